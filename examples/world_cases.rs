@@ -181,6 +181,29 @@ fn falling_chain(vehicle: &Vehicle) -> Vec<Vec<f64>> {
     states
 }
 
+/// A box of 10 kg that falls 0.4 m onto one of 0.1 kg on the ground, both with edges of 0.2 m: the time, positions and velocities.
+fn heavy_on_light() -> Vec<Vec<f64>> {
+    let given = |value: &str, unit: &str| {
+        format!("{{ value = {value}, unit = \"{unit}\", source = \"case\", uncertainty = \"exact\" }}")
+    };
+    let cube = |name: &str, centre: &str, mass: &str| {
+        let (centre, size, mass) = (given(centre, "m"), given("[0.2, 0.2, 0.2]", "m"), given(mass, "kg"));
+        format!("[[boxes]]\nname = \"{name}\"\ncentre = {centre}\nsize = {size}\nmass = {mass}\n")
+    };
+    let surface = format!("friction = {}\nrestitution = {}\n", given("0.5", "1"), given("0", "1"));
+    let cubes = cube("light", "[0, 0, 0.1]", "0.1") + &cube("heavy", "[0.03, 0.02, 0.7]", "10");
+    let scene = scene(&format!("name = \"heavy on light\"\n{surface}{cubes}"));
+    let mut plant = rapier(&airless(), &scene, &RigidBody::level_at(Vector3::new(0.0, 50.0, 100.0)));
+    let mut told = |tick: u32| {
+        plant.step(&[0.0; 4], TICK_S, &[]);
+        let [light, heavy] = plant.bodies() else { panic!("two boxes") };
+        let vectors = [light.position_W_m, light.velocity_W_m_s, heavy.position_W_m, heavy.velocity_W_m_s]
+            .map(<[f64; 3]>::from);
+        [vec![f64::from(tick) * TICK_S], vectors.concat()].concat()
+    };
+    (1..=1_000).map(&mut told).collect()
+}
+
 fn cases() -> Value {
     let (declared, body) = (hummingbird(), airless());
     let stand_m = Hull::of(&Airframe::new(body.clone())).stand_m();
@@ -227,6 +250,7 @@ fn cases() -> Value {
         "rig A, lower end": dropped(&body, &sliding_rig, &hung(&sliding_rig, 0.2), 0.5),
         "rig B, swing": dropped(&body, &fixed_rig, &swinging, 10.0),
         "chain": falling_chain(&body),
+        "heavy on light": heavy_on_light(),
         "rig B, cone": dropped(&body, &fixed_rig, &hits_cone, 0.3),
     })
 }

@@ -17,7 +17,7 @@ use vehicles::Vehicle;
 pub type Target = fn(&[u8]) -> bool;
 
 /// Every target by its name, which is that of its folder in `corpus/`.
-pub const TARGETS: [(&str, Target); 8] = [
+pub const TARGETS: [(&str, Target); 9] = [
     ("manifest", manifest),
     ("vehicle", vehicle),
     ("scene", scene),
@@ -25,6 +25,7 @@ pub const TARGETS: [(&str, Target); 8] = [
     ("csv", csv),
     ("ulog", ulog),
     ("crazyflie", crazyflie),
+    ("dataflash", dataflash),
     ("mcap", mcap),
 ];
 
@@ -53,6 +54,12 @@ battery_voltage = { columns = ["pm.vbatMV"], unit = "mV" }
 const ULOG_CHANNELS: &str = r#"
 angular_velocity = { topic = "sensor_combined", fields = ["gyro_rad[0]", "gyro_rad[1]", "gyro_rad[2]"], unit = "rad/s" }
 battery_voltage = { topic = "battery", fields = ["cell[1].volts"], unit = "V" }
+"#;
+
+/// Fields of the seeds in ArduPilot's format.
+const DATAFLASH_CHANNELS: &str = r#"
+angular_velocity = { topic = "IMU" }
+command = { topic = "RCOU", fields = ["C1", "C2", "C3", "C4"], unit = "count" }
 "#;
 
 /// A manifest in the folder of the shipped ones.
@@ -116,6 +123,12 @@ pub fn crazyflie(bytes: &[u8]) -> bool {
         }
     }
     as_it_is
+}
+
+/// A log of ArduPilot.
+pub fn dataflash(bytes: &[u8]) -> bool {
+    let place = Place::with("log", bytes);
+    place.reads_log("dataflash", "") | place.reads_log("dataflash", DATAFLASH_CHANNELS)
 }
 
 /// A recording of hummingbus or a bag of ROS 2.

@@ -4,6 +4,8 @@ use crate::COMPONENTS;
 use diagnostics::Diagnostic;
 use runtime::graph::Graph;
 use runtime::manifest::Manifest;
+use scenes::Scene;
+use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Checks the manifest at `path` and every file that it names, with `overrides` as `--set` has them. The text of the
@@ -39,4 +41,26 @@ pub fn check(path: &Path, overrides: &[String]) -> Result<Graph, Diagnostic> {
 /// ```
 pub fn check_text(text: &str, path: &Path, overrides: &[String]) -> Result<Graph, Diagnostic> {
     Graph::build(&Manifest::parse(text.to_owned(), path, overrides, COMPONENTS)?)
+}
+
+/// What the meshes of a checked manifest's scenes have: a line for each, with its triangles, its extent in the world and whether it is
+/// closed, below the name of its scene.
+///
+/// ```
+/// # use std::path::Path;
+/// let office = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/manifests/office.toml"));
+/// let lines = hummingbus::meshes(&hummingbus::check(office, &[])?);
+/// assert!(lines[0].ends_with("office.toml:") && lines[1].contains("desk: ") && lines[1].contains("triangles"));
+/// # Ok::<(), hummingbus::Diagnostic>(())
+/// ```
+#[must_use]
+pub fn meshes(checked: &Graph) -> Vec<String> {
+    let scene = |node: &bus::plan::NodePlan| node.parameters.get("scene")?.as_str().map(str::to_owned);
+    let files: BTreeSet<String> = checked.plan.nodes.iter().filter_map(scene).collect();
+    let lines = files.into_iter().filter_map(|file| {
+        let scene = Scene::load(Path::new(&file)).ok().filter(|scene| !scene.meshes.is_empty())?;
+        let meshes = scene.meshes.iter().map(|mesh| format!("  {mesh}"));
+        Some(std::iter::once(format!("meshes of {file}:")).chain(meshes).collect::<Vec<_>>())
+    });
+    lines.flatten().collect()
 }

@@ -7,7 +7,7 @@ use serde::Deserialize;
 use std::fmt::Display;
 use std::path::Path;
 use vehicles::gaps;
-use vehicles::table::{self, Table};
+use vehicles::table::{self, Dialect, Table};
 
 /// Which columns of a file hold a quantity, and in which unit.
 #[derive(Clone, Debug, Deserialize)]
@@ -36,6 +36,9 @@ mod array {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ColumnMap {
+    /// Form of a file that does not show it.
+    #[serde(default)]
+    pub csv: Dialect,
     /// Time, any origin.
     pub time: Columns<1>,
     /// Motor commands in the order of the vehicle file.
@@ -48,6 +51,16 @@ pub struct ColumnMap {
     pub attitude: Columns<4>,
     /// Angular velocity in the body.
     pub angular_velocity: Columns<3>,
+}
+
+impl ColumnMap {
+    fn names(&self) -> Vec<&str> {
+        let vectors = [&self.position.columns, &self.velocity.columns, &self.angular_velocity.columns];
+        let rest = [&self.command.columns, &self.attitude.columns];
+        let names =
+            self.time.columns.iter().chain(vectors.into_iter().flatten()).chain(rest.into_iter().flatten());
+        names.map(String::as_str).collect()
+    }
 }
 
 /// One row of a flight, in SI units; motor commands in raw counts.
@@ -83,7 +96,8 @@ impl FlightLog {
             let hint = "Give its path with --set process.<player>.data=PATH";
             refused(path, format_args!(" cannot be read: {cause}. {hint}"))
         })?;
-        let table = Table::parse(&bytes).map_err(|cause| refused(path, format_args!(": {cause}")))?;
+        let table = Table::parse(&bytes, &map.names(), &map.csv);
+        let table = table.map_err(|cause| refused(path, format_args!(": {cause}")))?;
         let source = Source { path, table };
         source.check_rows()?;
         let mut time_s = source.values("time", TIME, &map.time)?;
@@ -185,12 +199,9 @@ impl Source<'_> {
     ) -> Result<Vec<[f64; N]>, ParameterError> {
         let mut indices = [0; N];
         for (index, column) in indices.iter_mut().zip(&map.columns) {
-            *index = self.table.column(column).ok_or_else(|| {
-                let known = self.table.headers.join(", ");
-                let fault =
-                    format_args!(" has no column `{column}` (the map's `{quantity}`); it has {known}");
-                refused(self.path, fault)
-            })?;
+            let place = self.table.column(column);
+            *index = place
+                .map_err(|cause| refused(self.path, format_args!(", the map's `{quantity}`: {cause}")))?;
         }
         let factor = dimension.factor(&map.unit).ok_or_else(|| {
             let (found, expected) = (&map.unit, dimension.names(" or "));
@@ -200,7 +211,7 @@ impl Source<'_> {
         let sample = |row: &table::Row| -> Result<[f64; N], ParameterError> {
             let mut values = [0.0; N];
             for ((value, index), column) in values.iter_mut().zip(indices).zip(&map.columns) {
-                *value = number(row.cell(index), factor)
+                *value = number(self.table.number(row.cell(index)), factor)
                     .map_err(|expected| self.cell(row, column, row.cell(index), expected))?;
             }
             Ok(values)
@@ -210,6 +221,7 @@ impl Source<'_> {
 
     /// Refuses a file with too few rows, or with rows of another length than the header's, as with decimal commas.
     fn check_rows(&self) -> Result<(), ParameterError> {
+        self.table.check_lengths().map_err(|cause| refused(self.path, format_args!(": {cause}")))?;
         let (rows, expected) = (&self.table.rows, self.table.headers.len());
         if rows.len() < 2 {
             let fault = format_args!(": it has {} rows of data, expected at least 2", rows.len());
@@ -246,11 +258,11 @@ impl Source<'_> {
     }
 }
 
-/// The number in a cell times `factor`, or what was expected there.
-fn number(cell: &str, factor: f64) -> Result<f64, &'static str> {
-    match cell.parse::<f64>() {
-        Ok(number) if number.is_finite() && (number * factor).abs() <= CELL_MAX => Ok(number * factor),
-        Ok(number) if number.is_finite() => Err("at most 1e12 in SI, which no flight exceeds"),
-        _ => Err("a finite number"),
+/// The number of a cell times `factor`, or what was expected there.
+fn number(cell: Option<f64>, factor: f64) -> Result<f64, &'static str> {
+    match cell.filter(|number| number.is_finite()) {
+        Some(number) if (number * factor).abs() <= CELL_MAX => Ok(number * factor),
+        Some(_) => Err("at most 1e12 in SI, which no flight exceeds"),
+        None => Err("a finite number"),
     }
 }

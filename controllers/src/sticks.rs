@@ -16,6 +16,7 @@ use diagnostics::ParameterError;
 use inputs::InputFiles;
 use std::fmt::Display;
 use std::path::Path;
+use vehicles::table::{self, Dialect, Table, names, shown};
 
 /// A recording of sticks, at least one row.
 ///
@@ -51,11 +52,6 @@ fn refused(file: &str, fault: impl Display) -> ParameterError {
     ParameterError::conflict("data", format_args!("{file}{fault}"))
 }
 
-fn unreadable(file: &str, cause: &csv::Error) -> ParameterError {
-    let hint = "check the path, and that it is a CSV file with a header";
-    refused(file, format_args!(": cannot read these sticks: {cause}; {hint}"))
-}
-
 const COLUMNS: [&str; 5] = ["time_s", "roll_deg", "pitch_deg", "yaw_rate_deg_s", "altitude_m"];
 /// The most that each may hold, in its unit, and why; as the set points of a manifest.
 const MOST: [(f64, &str); 5] = [
@@ -74,24 +70,27 @@ impl Sticks {
     /// It cannot be read, or holds what no sticks can ask for.
     pub fn load(files: &InputFiles, path: &Path) -> Result<Self, ParameterError> {
         let file = path.display().to_string();
-        let bytes = files.bytes(path).map_err(|cause| unreadable(&file, &cause.into()))?;
+        let bytes = files.bytes(path).map_err(|cause| {
+            refused(&file, format_args!(": cannot read these sticks: {cause}; check the path"))
+        })?;
         Self::read(&file, &bytes)
     }
 
     fn read(file: &str, bytes: &[u8]) -> Result<Self, ParameterError> {
-        vehicles::quotes::check(bytes, b',').map_err(|quote| refused(file, format_args!(": {quote}")))?;
-        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes);
-        let header = reader.headers().map_err(|cause| unreadable(file, &cause))?;
-        let places = COLUMNS.map(|column| header.iter().position(|name| name == column));
-        if places[..3].contains(&None) || places.iter().flatten().count() != header.len() {
-            let found = header.iter().collect::<Vec<_>>().join(", ");
-            return Err(refused(file, format_args!(":1: expected the columns {EXPECTED}, found {found}")));
+        let table = Table::parse(bytes, &COLUMNS, &Dialect::default())
+            .map_err(|cause| refused(file, format_args!(": {cause}")))?;
+        let places = COLUMNS.map(|column| table.column(column).ok());
+        if places[..3].contains(&None) || places.iter().flatten().count() != table.headers.len() {
+            let (line, found) = (table.header_line.unwrap_or(1), names(&table.headers));
+            return Err(refused(
+                file,
+                format_args!(":{line}: expected the columns {EXPECTED}, found {found}"),
+            ));
         }
-        let table = Table { file, places };
+        let source = Source { file, table: &table, places };
         let mut rows: Vec<Row> = Vec::new();
-        for record in reader.records() {
-            let record = record.map_err(|cause| unreadable(file, &cause))?;
-            rows.push(table.row(&record, rows.last())?);
+        for row in &table.rows {
+            rows.push(source.row(row, rows.last())?);
         }
         if rows.is_empty() {
             return Err(refused(file, ": expected at least one row of sticks, found none"));
@@ -153,18 +152,25 @@ impl Row {
     }
 }
 
-/// The file, and where in a row each of [`COLUMNS`] stands.
-struct Table<'a> {
+/// The file, its table, and where in a row each of [`COLUMNS`] stands.
+struct Source<'a> {
     file: &'a str,
+    table: &'a Table,
     places: [Option<usize>; 5],
 }
 
-impl Table<'_> {
-    fn row(&self, record: &csv::StringRecord, before: Option<&Row>) -> Result<Row, ParameterError> {
-        let number = |column: usize| self.number(record, column);
+impl Source<'_> {
+    fn row(&self, cells: &table::Row, before: Option<&Row>) -> Result<Row, ParameterError> {
+        let (expected, found) = (self.table.headers.len(), cells.cells.len());
+        if found != expected {
+            let line = cells.line;
+            let fault = format_args!(":{line}: expected {expected} cells as in the header, found {found}");
+            return Err(refused(self.file, fault));
+        }
+        let number = |column: usize| self.number(cells, column);
         let time_s = number(0)?;
         if before.is_some_and(|before| before.time_s >= time_s) {
-            return Err(self.value(record, 0, "a time after the row before", time_s));
+            return Err(self.value(cells, 0, "a time after the row before", time_s));
         }
         let yaw_rate_rad_s = number(3)?.to_radians();
         Ok(Row {
@@ -178,26 +184,26 @@ impl Table<'_> {
     }
 
     /// The number in a column, 0 where the recording does not have it.
-    fn number(&self, record: &csv::StringRecord, column: usize) -> Result<f64, ParameterError> {
+    fn number(&self, cells: &table::Row, column: usize) -> Result<f64, ParameterError> {
         let Some(place) = self.places[column] else { return Ok(0.0) };
-        let text = record.get(place).unwrap_or_default();
+        let text = cells.cell(place);
         let (most, expected) = MOST[column];
-        let expected = match text.parse() {
-            Ok(number) if f64::abs(number) <= most => return Ok(number),
-            Ok(number) if number.is_finite() => expected,
+        let expected = match self.table.number(text) {
+            Some(number) if f64::abs(number) <= most => return Ok(number),
+            Some(number) if number.is_finite() => expected,
             _ => "a finite number",
         };
-        Err(self.value(record, column, expected, format_args!("\"{text}\"")))
+        Err(self.value(cells, column, expected, format_args!("\"{}\"", shown(text))))
     }
 
     fn value(
         &self,
-        record: &csv::StringRecord,
+        cells: &table::Row,
         column: usize,
         expected: &str,
         found: impl Display,
     ) -> ParameterError {
-        let (line, column) = (record.position().map_or(0, csv::Position::line), COLUMNS[column]);
+        let (line, column) = (cells.line, COLUMNS[column]);
         let fault = format_args!(":{line}: column `{column}`: expected {expected}, found {found}");
         refused(self.file, fault)
     }
@@ -253,7 +259,12 @@ mod tests {
                 "found time_s, roll_deg, pitch_deg, throttle",
             ),
             (header.to_owned(), "expected at least one row"),
-            (format!("{header}0,1\n"), "cannot read these sticks"),
+            (format!("{header}0,1\n"), "s.csv:2: expected 3 cells as in the header, found 2"),
+            ("0,1,2\n1,1,2\n".to_owned(), "line 1: expected a header"),
+            (
+                "\u{feff}# mine\ntime_s;roll_deg;pitch_deg\n0,5;1;x\n".to_owned(),
+                "s.csv:3: column `pitch_deg`",
+            ),
             (
                 format!("{header}0,1,2\n1,\"1,2\n2,1,2\n"),
                 "s.csv: line 3, cell 2: expected a cell on one line",

@@ -1,5 +1,7 @@
 //! Arrays of numbers: how a name asks for a part of one, and cells of a CSV file that hold one.
 
+use crate::name::Name;
+
 /// The name of an array and the index in `name[index]`.
 pub fn indexed(name: &str) -> Option<(&str, usize)> {
     let (array, index) = name.strip_suffix(']')?.rsplit_once('[')?;
@@ -7,8 +9,9 @@ pub fn indexed(name: &str) -> Option<(&str, usize)> {
 }
 
 /// The names of the first `size` numbers of the array `name`, whose sign they have.
-pub fn parts(name: &str, size: usize) -> Vec<String> {
-    (0..size).map(|index| format!("{name}[{index}]")).collect()
+pub fn parts(name: &Name, size: usize) -> Vec<Name> {
+    let part = |index| Name { plain: format!("{}[{index}]", name.plain), is_negated: name.is_negated };
+    (0..size).map(part).collect()
 }
 
 /// The numbers in a cell such as `[0.1, 0.2, 0.3]`, with blanks or semicolons between them too, and in round brackets;
@@ -36,7 +39,7 @@ mod tests {
         for name in ["acc", "acc[]", "acc[x]", "acc[-1]", "acc[1].x", "[1"] {
             assert_eq!(indexed(name), None, "{name}");
         }
-        assert_eq!(parts("-acc", 2), ["-acc[0]", "-acc[1]"]);
+        assert_eq!(parts(&"-acc".into(), 2), ["-acc[0]", "-acc[1]"].map(Name::from));
     }
 
     #[test]

@@ -10,7 +10,10 @@ use crate::error::{LogError, Spot};
 use crate::flight::Channel;
 use crate::frame;
 use crate::log::{Log, Samples};
+use crate::matrices;
+use crate::name::Name;
 use crate::quantity::{FRACTION, PERCENT, Quantity};
+use crate::scaling;
 use diagnostics::Dimension;
 use diagnostics::unit::ANGLE;
 
@@ -27,9 +30,12 @@ pub fn read<const N: usize>(
     is_trusted: bool,
 ) -> Result<Read<N>, LogError> {
     let layout = Layout::of(quantity, entry, vehicle)?;
-    let samples = signed_samples(log, entry.topic.as_deref(), &layout.names)?;
+    let samples = scaled_samples(log, entry, &layout.names)?;
     if !is_trusted {
         layout.check_angles(&samples.rows)?;
+    }
+    if layout.shape == Shape::Matrix {
+        matrices::check(&samples.rows)?;
     }
     let values = samples.rows.iter().map(|row| layout.convert(row)).collect::<Result<_, _>>()?;
     Ok((Channel { time_s: samples.time_s, values }, samples.notes))
@@ -39,29 +45,43 @@ pub fn read<const N: usize>(
 pub fn read_yaw(log: &dyn Log, entry: &Entry) -> Result<Option<Read<1>>, LogError> {
     let Some(yaw) = &entry.yaw else { return Ok(None) };
     let factor = factor(ANGLE, entry.unit.as_deref())?;
-    let samples = signed_samples(log, entry.topic.as_deref(), std::slice::from_ref(yaw))?;
+    let samples = scaled_samples(log, entry, std::slice::from_ref(yaw))?;
     let sign = if entry.frame == Some(Frame::FrdNed) { -1.0 } else { 1.0 };
     let north = if entry.frame == Some(Frame::FrdNed) { std::f64::consts::FRAC_PI_2 } else { 0.0 };
     let values = samples.rows.iter().map(|row| [north + sign * factor * row[0]]).collect();
     Ok(Some((Channel { time_s: samples.time_s, values }, samples.notes)))
 }
 
-/// The samples of `names`; a name with `-` in front is read negated.
-fn signed_samples(log: &dyn Log, topic: Option<&str>, names: &[String]) -> Result<Samples, LogError> {
-    let plain: Vec<String> = names.iter().map(|name| name.trim_start_matches('-').to_owned()).collect();
-    let mut samples = log.samples(topic, &plain)?;
-    let signs: Vec<f64> = names.iter().map(|name| if name.starts_with('-') { -1.0 } else { 1.0 }).collect();
+/// The samples of `names`: their signs, then the entry's `scale`, then its `offset` applied.
+fn scaled_samples(log: &dyn Log, entry: &Entry, names: &[Name]) -> Result<Samples, LogError> {
+    let scales = scaling::each(Spot::Key("scale"), entry.scale.as_ref(), 1.0, names.len())?;
+    let offsets = scaling::each(Spot::Key("offset"), entry.offset.as_ref(), 0.0, names.len())?;
+    let plain: Vec<String> = names.iter().map(|name| name.plain.clone()).collect();
+    let mut samples = log.samples(entry.topic.as_deref(), &plain)?;
     for row in &mut samples.rows {
-        row.iter_mut().zip(&signs).for_each(|(number, sign)| *number *= sign);
+        for (((number, name), scale), offset) in row.iter_mut().zip(names).zip(&scales).zip(&offsets) {
+            *number = *number * name.sign() * scale + offset;
+        }
     }
     Ok(samples)
+}
+
+/// Form of a sample in the log.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Shape {
+    /// The numbers of the quantity.
+    Plain,
+    /// Roll, pitch and yaw of an attitude.
+    Euler,
+    /// The rotation matrix of an attitude.
+    Matrix,
 }
 
 /// Which numbers of the log make a sample, and how.
 struct Layout<'a> {
     quantity: Quantity,
-    names: Cow<'a, [String]>,
-    euler: bool,
+    names: Cow<'a, [Name]>,
+    shape: Shape,
     /// What a number is multiplied by, and what is added then.
     factor: f64,
     offset: f64,
@@ -72,11 +92,11 @@ struct Layout<'a> {
 impl<'a> Layout<'a> {
     fn of(quantity: Quantity, entry: &'a Entry, vehicle: &Vehicle) -> Result<Self, LogError> {
         let frame = entry.frame.unwrap_or_default();
-        let (names, euler) = named(quantity, entry)?;
+        let (names, shape) = named(quantity, entry)?;
         let pole_pairs = pole_pairs(quantity, entry)?;
         require_command_on_change(quantity, entry)?;
         let (factor, offset) = match (quantity, entry.unit.as_deref()) {
-            (Quantity::Attitude, unit) if euler => (factor(ANGLE, unit)?, 0.0),
+            (Quantity::Attitude, unit) if shape == Shape::Euler => (factor(ANGLE, unit)?, 0.0),
             (Quantity::Attitude, None) => (1.0, 0.0),
             (Quantity::Command, Some(unit @ (FRACTION | PERCENT))) => {
                 let range = vehicle.command.max - vehicle.command.min;
@@ -85,7 +105,7 @@ impl<'a> Layout<'a> {
             (_, unit) => (factor(quantity.dimension(), unit)? / pole_pairs, 0.0),
         };
         let holds = holds(quantity, entry)?;
-        Ok(Self { quantity, names, euler, factor, offset, frame, holds })
+        Ok(Self { quantity, names, shape, factor, offset, frame, holds })
     }
 
     /// Roll and pitch in rad come to more than a turn, and not in a bad sample or two, only if they are in degrees.
@@ -95,7 +115,7 @@ impl<'a> Layout<'a> {
         let mut sizes: Vec<f64> = tilts.map(|angle| angle.abs()).collect();
         sizes.sort_by(f64::total_cmp);
         let largest = sizes.get(((1.0 - BAD) * sizes.len() as f64) as usize).copied().unwrap_or(0.0);
-        let is_in_rad = self.euler && self.factor > 0.5;
+        let is_in_rad = self.shape == Shape::Euler && self.factor > 0.5;
         let is_plausible = !is_in_rad || largest <= std::f64::consts::TAU;
         is_plausible.then_some(()).ok_or_else(|| {
             let found = format!("up to {largest:.1}, more than a turn");
@@ -113,8 +133,11 @@ impl<'a> Layout<'a> {
             }
             (Quantity::AngularVelocity, &[x, y, z]) => frame::body(self.frame, [x, y, z]).into(),
             (Quantity::SpecificForce, &[x, y, z]) => frame::force(self.frame, self.holds, [x, y, z]).into(),
-            (Quantity::Attitude, &[roll, pitch, yaw]) if self.euler => {
+            (Quantity::Attitude, &[roll, pitch, yaw]) if self.shape == Shape::Euler => {
                 frame::attitude(self.frame, frame::euler([roll, pitch, yaw])).into()
+            }
+            (Quantity::Attitude, matrix) if self.shape == Shape::Matrix => {
+                frame::attitude(self.frame, matrices::quaternion(matrix)).into()
             }
             (Quantity::Attitude, &[x, y, z, w]) => frame::attitude(self.frame, [w, x, y, z]).into(),
             _ => scaled,
@@ -126,28 +149,30 @@ impl<'a> Layout<'a> {
     }
 }
 
-/// The names that `entry` gives for a sample of `quantity`, those of its parts for an array, and whether they are Euler
-/// angles.
-fn named(quantity: Quantity, entry: &Entry) -> Result<(Cow<'_, [String]>, bool), LogError> {
+/// The names that `entry` gives for a sample of `quantity`, those of its parts for an array, and the sample's form.
+fn named(quantity: Quantity, entry: &Entry) -> Result<(Cow<'_, [Name]>, Shape), LogError> {
     let refused = |key, expected: &str, found: &str, advice| {
         Err(LogError::unexpected(Spot::Key(key), expected, found, advice))
     };
-    let is_attitude = quantity == Quantity::Attitude;
-    let (key, names, size) = match (&entry.columns, &entry.euler) {
-        (_, Some(_)) if !is_attitude => {
-            return refused("euler", "`attitude` alone to have it", "it", "remove it");
-        }
-        _ if entry.yaw.is_some() && !is_attitude => {
-            return refused("yaw", "`attitude` alone to have it", "it", "remove it");
-        }
-        (Some(_), Some(_)) => return refused("euler", "this or `columns`", "both", "remove one"),
-        (None, Some(euler)) => ("euler", euler, 3),
-        (Some(columns), None) => ("columns", columns, quantity.size()),
-        (None, None) if entry.yaw.is_some() => {
+    let of_attitude =
+        [("euler", entry.euler.is_some()), ("matrix", entry.matrix.is_some()), ("yaw", entry.yaw.is_some())];
+    if let Some((key, _)) =
+        of_attitude.into_iter().find(|(_, is_given)| *is_given && quantity != Quantity::Attitude)
+    {
+        return refused(key, "`attitude` alone to have it", "it", "remove it");
+    }
+    let (key, names, size, shape) = match (&entry.columns, &entry.euler, &entry.matrix) {
+        (Some(columns), None, None) => ("columns", columns, quantity.size(), Shape::Plain),
+        (None, Some(euler), None) => ("euler", euler, 3, Shape::Euler),
+        (None, None, Some(matrix)) => ("matrix", matrix, 9, Shape::Matrix),
+        (None, None, None) if entry.yaw.is_some() => {
             let advice = "add `assume = \"hover\"` to the flight";
             return refused("columns", "an attitude", "a `yaw` alone", advice);
         }
-        (None, None) => return refused("columns", "this or `fields`", "neither", "add them"),
+        (None, None, None) => return refused("columns", "this or `fields`", "neither", "add them"),
+        (None, ..) => return refused("matrix", "this or `euler`", "both", "remove one"),
+        (Some(_), Some(_), _) => return refused("euler", "this or `columns`", "both", "remove one"),
+        (Some(_), ..) => return refused("matrix", "this or `columns`", "both", "remove one"),
     };
     let names = match &names[..] {
         // The array as a whole.
@@ -159,7 +184,7 @@ fn named(quantity: Quantity, entry: &Entry) -> Result<(Cow<'_, [String]>, bool),
             return refused(key, &expected, &names.len().to_string(), "correct it");
         }
     };
-    Ok((names, entry.euler.is_some()))
+    Ok((names, shape))
 }
 
 /// What a specific force is made of.

@@ -2,6 +2,7 @@
 
 use vehicles::gaps::GAP_PERIODS;
 
+use crate::clock;
 use crate::error::{LogError, Spot};
 use crate::flight::{Channel, median, period_s};
 use crate::held;
@@ -21,6 +22,7 @@ pub fn clean<const N: usize>(
 ) -> Result<Channel<N>, LogError> {
     let total = channel.time_s.len();
     let channel = finite(quantity, channel, notes);
+    check_clock(&channel.time_s)?;
     let channel = growing(quantity, channel, notes);
     let channel = if quantity == Quantity::Command { channel } else { unheld(quantity, channel, notes) };
     if channel.is_empty() {
@@ -78,6 +80,18 @@ pub fn say_dropped<const N: usize>(
     if dropped > 0 {
         notes.push(format!("{quantity}: {dropped} of {total} samples {why}; left out"));
     }
+}
+
+/// Refuses times of several recordings.
+fn check_clock(time_s: &[f64]) -> Result<(), LogError> {
+    let Some(at) = clock::restarts(time_s).first().copied() else { return Ok(()) };
+    let found = format!(
+        "a clock that starts again: behind {at} samples the time goes back from {} s to {} s",
+        time_s[at - 1],
+        time_s[at]
+    );
+    let advice = "the log holds several recordings: cut it there";
+    Err(LogError::unexpected(Spot::Whole, "one clock", found, advice))
 }
 
 /// Leaves out the fewest samples such that time grows: a single stamp far ahead costs itself, not all after it.

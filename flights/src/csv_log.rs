@@ -1,12 +1,18 @@
 //! Logs in CSV: a header, then rows on one clock.
 
-use vehicles::table::Table;
+use std::num::NonZero;
+use std::ops::Range;
+
+use vehicles::table::{ColumnError, Dialect, Row, Table, TableError, shown};
+use vehicles::wall_clock;
 
 use crate::arrays;
+use crate::clock;
 use crate::declaration::Entry;
 use crate::error::{LogError, Spot};
 use crate::log::{Log, Samples};
 use crate::quantity::Quantity;
+use crate::scaling;
 
 /// A CSV file; a cell that holds no number is NaN.
 pub struct CsvLog {
@@ -14,26 +20,114 @@ pub struct CsvLog {
     time_s: Vec<f64>,
 }
 
+/// Declared form of a CSV file.
+pub struct Form<'a> {
+    /// Header, delimiter and decimal mark.
+    pub dialect: &'a Dialect,
+    /// Number of the recording that is used, from 1.
+    pub recording: Option<NonZero<usize>>,
+    /// Column of the times.
+    pub time: Option<&'a Entry>,
+    /// The channels that are read from the file, whose names find the header.
+    pub channels: Vec<&'a Entry>,
+}
+
 impl CsvLog {
-    /// Reads a file's bytes; `time` says which column is the time.
-    pub fn parse(bytes: &[u8], time: Option<&Entry>) -> Result<Self, LogError> {
-        let table = Table::parse(bytes)?;
+    /// Reads a file's bytes.
+    pub fn parse(bytes: &[u8], form: &Form<'_>) -> Result<Self, LogError> {
+        let names = form.channels.iter().copied().chain(form.time).flat_map(Entry::names);
+        let names: Vec<&str> = names.map(|name| name.plain.as_str()).collect();
+        let mut table = Table::parse(bytes, &names, form.dialect)?;
         check_arrays(&table)?;
-        let (column, unit) = match time.map(|time| (time.columns.as_deref(), time.unit.as_deref())) {
-            Some((Some([column]), unit)) => (column, unit.unwrap_or("(none)")),
-            found => {
-                let expected = "a channel with one column, which a CSV file needs";
-                let found = if found.is_some() { "no single column" } else { "no channel `time`" };
-                let advice = "add `time = { columns = [\"t\"], unit = \"s\" }` to `channels`";
-                return Err(LogError::unexpected(Spot::Key("time"), expected, found, advice));
-            }
-        };
-        let dimension = Quantity::Time.dimension();
-        let factor = dimension.factor(unit).ok_or_else(|| {
-            LogError::unexpected(Spot::Key("time.unit"), dimension.names(" or "), unit, "correct it")
-        })?;
-        let time_s = numbers(&table, column)?.iter().map(|time| time * factor).collect();
+        table.check_lengths()?;
+        let mut time_s = times(&table, form.time)?;
+        let part = recording(&table.rows, &time_s, form.recording)?;
+        table.rows.truncate(part.end);
+        table.rows.drain(..part.start);
+        time_s.truncate(part.end);
+        time_s.drain(..part.start);
         Ok(Self { table, time_s })
+    }
+}
+
+/// The times of the rows in s; NaN where a cell has none.
+fn times(table: &Table, time: Option<&Entry>) -> Result<Vec<f64>, LogError> {
+    let column = time.and_then(|time| time.columns.as_deref());
+    let (Some(time), Some([column])) = (time, column) else {
+        let expected = "a channel with one column, which a CSV file needs";
+        let found = if time.is_some() { "no single column" } else { "no channel `time`" };
+        let advice = "add `time = { columns = [\"t\"], unit = \"s\" }` to `channels`";
+        return Err(LogError::unexpected(Spot::Key("time"), expected, found, advice));
+    };
+    let unit = time.unit.as_deref().unwrap_or("(none)");
+    if unit == wall_clock::UNIT {
+        let index = table.column(&column.plain).map_err(TableError::from)?;
+        let times = wall_clock::times(table.rows.iter().map(|row| row.cell(index)));
+        check_times(table, &column.plain, &times, "times of day, as 10:00:04.25", "correct `time.unit`")?;
+        return Ok(times);
+    }
+    let dimension = Quantity::Time.dimension();
+    let factor = dimension.factor(unit).ok_or_else(|| {
+        let expected = format!("{}, or \"{}\" for times of day", dimension.names(" or "), wall_clock::UNIT);
+        LogError::unexpected(Spot::Key("time.unit"), expected, unit, "correct it")
+    })?;
+    let scale = scaling::each(Spot::Key("time.scale"), time.scale.as_ref(), 1.0, 1)?[0];
+    let offset = scaling::each(Spot::Key("time.offset"), time.offset.as_ref(), 0.0, 1)?[0];
+    let numbers = numbers(table, &column.plain)?;
+    let advice = "name another column, or set `unit = \"wall clock\"` in the channel `time` for times of day";
+    check_times(table, &column.plain, &numbers, &format!("numbers in {unit}"), advice)?;
+    Ok(numbers.iter().map(|time| (time * column.sign() * scale + offset) * factor).collect())
+}
+
+/// Refuses a column of which most cells hold no time, with the first of them.
+fn check_times(
+    table: &Table,
+    name: &str,
+    times: &[f64],
+    expected: &str,
+    advice: &'static str,
+) -> Result<(), LogError> {
+    let Ok(column) = table.column(name) else { return Ok(()) };
+    let rows = || table.rows.iter().zip(times).filter(|(row, _)| !row.cell(column).is_empty());
+    let without = || rows().filter(|(_, time)| !time.is_finite());
+    match without().next().filter(|_| 2 * without().count() > rows().count()) {
+        None => Ok(()),
+        Some((row, _)) => {
+            let found =
+                format!("`{}` in line {}, column `{}`", shown(row.cell(column)), row.line, shown(name));
+            Err(LogError::unexpected(Spot::Key("time"), expected, found, advice))
+        }
+    }
+}
+
+/// The rows of the recording with this number; those of the only one where none is asked for.
+fn recording(rows: &[Row], time_s: &[f64], number: Option<NonZero<usize>>) -> Result<Range<usize>, LogError> {
+    let restarts = clock::restarts(time_s);
+    let count = restarts.len() + 1;
+    let bounds = |index: usize| {
+        let from = index.checked_sub(1).map_or(0, |before| restarts[before]);
+        from..restarts.get(index).copied().unwrap_or(rows.len())
+    };
+    match (number, restarts.first()) {
+        (None, None) => Ok(0..rows.len()),
+        (Some(number), _) if number.get() <= count => Ok(bounds(number.get() - 1)),
+        (Some(number), _) => {
+            let found = format!("{number} of {count}");
+            Err(LogError::unexpected(Spot::Key("recording"), "a recording of the file", found, "correct it"))
+        }
+        (None, Some(first)) => {
+            let before_s =
+                time_s[..*first].iter().rfind(|time_s| time_s.is_finite()).copied().unwrap_or(f64::NAN);
+            let lines: Vec<String> =
+                restarts.iter().take(10).map(|index| rows[*index].line.to_string()).collect();
+            let found = format!(
+                "{count} recordings: the clock starts again in line {} (first from {before_s} s to {} s)",
+                lines.join(", "),
+                time_s[*first]
+            );
+            let advice = "cut the file there, or set the flight's `recording`, 1 for the first";
+            Err(LogError::unexpected(Spot::Key("time"), "one clock", found, advice))
+        }
     }
 }
 
@@ -46,6 +140,7 @@ impl Log for CsvLog {
         let mut rows = vec![Vec::with_capacity(names.len()); self.time_s.len()];
         for name in names {
             let numbers = numbers(&self.table, name)?;
+            check_numbers(&self.table, name, &numbers)?;
             rows.iter_mut().zip(numbers).for_each(|(row, number)| row.push(number));
         }
         Ok(Samples { time_s: self.time_s.clone(), rows, notes: Vec::new() })
@@ -60,20 +155,21 @@ impl Log for CsvLog {
 
 /// The numbers of the column `name`, or of a part of a column of arrays.
 fn numbers(table: &Table, name: &str) -> Result<Vec<f64>, LogError> {
-    if let Some(column) = table.column(name) {
-        return Ok(table.numbers(column).collect());
-    }
-    let array = arrays::indexed(name).and_then(|(array, index)| Some((table.column(array)?, index)));
-    let (column, index) =
-        array.ok_or_else(|| LogError::missing("column", name, &table.headers, "the name in `channels`"))?;
+    let missing = match table.column(name) {
+        Ok(column) => return Ok(table.numbers(column).collect()),
+        Err(missing @ ColumnError::Missing { .. }) => missing,
+        Err(error) => return Err(TableError::from(error).into()),
+    };
+    let array = arrays::indexed(name).and_then(|(array, index)| Some((table.column(array).ok()?, index)));
+    let (column, index) = array.ok_or_else(|| TableError::from(missing))?;
     table
         .rows
         .iter()
         .map(|row| {
             array_part(row.cell(column), index).ok_or_else(|| {
-                let at = Spot::Cell { line: row.line, column: table.headers[column].clone() };
+                let at = Spot::Cell { line: row.line, column: shown(&table.headers[column]) };
                 let expected = format!("an array of more than {index} numbers, such as \"[0.1, 0.2, 0.3]\"");
-                let found = format!("`{}`", shortened(row.cell(column)));
+                let found = format!("`{}`", shown(row.cell(column)));
                 let advice = "correct the line, or name a column for each number";
                 LogError::unexpected(at, expected, found, advice)
             })
@@ -81,15 +177,23 @@ fn numbers(table: &Table, name: &str) -> Result<Vec<f64>, LogError> {
         .collect()
 }
 
+/// Refuses a column in which no cell holds a number, with its first cell that holds something.
+fn check_numbers(table: &Table, name: &str, numbers: &[f64]) -> Result<(), LogError> {
+    let Ok(column) = table.column(name) else { return Ok(()) };
+    let filled = table.rows.iter().find(|row| !row.cell(column).is_empty());
+    match filled.filter(|_| numbers.iter().all(|number| !number.is_finite())) {
+        None => Ok(()),
+        Some(row) => {
+            let at = Spot::Cell { line: row.line, column: shown(name) };
+            let advice = "no cell of the column holds one: name another column, or set `csv.decimal` or `csv.delimiter`";
+            Err(LogError::unexpected(at, "a number", format!("`{}`", shown(row.cell(column))), advice))
+        }
+    }
+}
+
 /// A number of the array in a cell; NaN of a cell that is empty, `None` where there is none.
 fn array_part(cell: &str, index: usize) -> Option<f64> {
     if cell.is_empty() { Some(f64::NAN) } else { arrays::numbers(cell)?.get(index).copied() }
-}
-
-fn shortened(cell: &str) -> String {
-    const SHOWN: usize = 40;
-    let rest = if cell.chars().count() > SHOWN { "..." } else { "" };
-    cell.chars().take(SHOWN).collect::<String>() + rest
 }
 
 /// Refuses arrays that their own delimiters take apart: all columns behind them would hold other numbers.
@@ -98,14 +202,9 @@ fn check_arrays(table: &Table) -> Result<(), LogError> {
     for row in table.rows.iter().filter(|row| row.cells.len() > table.headers.len()) {
         let cut = table.headers.iter().zip(&row.cells).find(|(_, cell)| is_cut(cell));
         if let Some((column, cell)) = cut {
-            let at = Spot::Cell { line: row.line, column: column.clone() };
+            let at = Spot::Cell { line: row.line, column: shown(column) };
             let expected = "an array in quotation marks, or a file with other delimiters between its columns";
-            return Err(LogError::unexpected(
-                at,
-                expected,
-                format!("`{}`", shortened(cell)),
-                "write the log so",
-            ));
+            return Err(LogError::unexpected(at, expected, format!("`{}`", shown(cell)), "write the log so"));
         }
     }
     Ok(())

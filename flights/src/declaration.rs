@@ -1,11 +1,14 @@
 //! What a flights file says, as it is written.
 
 use std::collections::BTreeMap;
+use std::num::NonZero;
 
 use serde::Deserialize;
 use toml::Spanned;
+use vehicles::table::Dialect;
 
 use crate::flight::Role;
+use crate::name::Name;
 use crate::quantity::Quantity;
 
 /// A flights file.
@@ -16,6 +19,8 @@ pub struct Declaration {
     pub vehicle: Spanned<String>,
     /// Format of the logs whose flight does not say it.
     pub format: Option<Format>,
+    /// Form of the CSV files whose flight does not say it.
+    pub csv: Option<Dialect>,
     /// Clock of the logs whose flight does not say it.
     pub time: Option<Clock>,
     /// Channels of the logs; a flight's own come first.
@@ -38,6 +43,10 @@ pub struct FlightEntry {
     pub role: Role,
     /// Format of the log.
     pub format: Option<Format>,
+    /// Form of the log, if it is a CSV file.
+    pub csv: Option<Dialect>,
+    /// Number of the recording that is used, from 1, where a CSV file holds several.
+    pub recording: Option<NonZero<usize>>,
     /// Clock of the log, where it has two.
     pub time: Option<Clock>,
     /// Start of the part that is used, in seconds from the log's first sample.
@@ -67,6 +76,8 @@ pub enum Format {
     Mcap,
     /// PX4's ULog.
     Ulog,
+    /// ArduPilot's dataflash log, `.BIN`.
+    Dataflash,
     /// The log that a Crazyflie writes to its card, version 2.
     Crazyflie,
 }
@@ -98,13 +109,23 @@ pub type ChannelMap = BTreeMap<Quantity, Spanned<Entry>>;
 pub struct Entry {
     /// Columns of a CSV file, variables of a Crazyflie log, or fields of a topic.
     #[serde(alias = "fields")]
-    pub columns: Option<Vec<String>>,
+    pub columns: Option<Vec<Name>>,
     /// Roll, pitch and yaw instead of a quaternion's columns.
-    pub euler: Option<Vec<String>>,
+    pub euler: Option<Vec<Name>>,
+    /// A rotation matrix, body to world and row by row, instead of a quaternion's columns.
+    pub matrix: Option<Vec<Name>>,
     /// The yaw alone, for a level attitude that is assumed.
-    pub yaw: Option<String>,
+    pub yaw: Option<Name>,
+    /// Log that holds the quantity, if not that of the flight; relative to the flights file.
+    pub file: Option<Spanned<String>>,
+    /// Column of the times in that log, if it is not that of the channel `time`.
+    pub time: Option<Box<Entry>>,
     /// Topic of an MCAP file, message of a ULog, event of a Crazyflie log.
     pub topic: Option<String>,
+    /// Factor of the numbers in the log, before their unit.
+    pub scale: Option<EachNumber>,
+    /// Summand of the numbers in the log, behind the factor and before their unit.
+    pub offset: Option<EachNumber>,
     /// Unit of the numbers in the log.
     pub unit: Option<String>,
     /// Frames of the numbers in the log.
@@ -115,6 +136,24 @@ pub struct Entry {
     pub on_change: Option<bool>,
     /// By what electrical rotor speeds are divided: half the number of a motor's magnets.
     pub pole_pairs: Option<u32>,
+}
+
+impl Entry {
+    /// Names of all numbers, with their signs.
+    pub fn names(&self) -> impl Iterator<Item = &Name> {
+        let lists = [&self.columns, &self.euler, &self.matrix].into_iter().flatten();
+        lists.flatten().chain(&self.yaw)
+    }
+}
+
+/// A number, or one for each number of a sample.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(untagged, expecting = "a number, or a list with one for each number of a sample")]
+pub enum EachNumber {
+    /// The same for all.
+    All(f64),
+    /// One each.
+    Each(Vec<f64>),
 }
 
 /// The frames of a log's vectors and attitudes: those of the body, then those of the world.

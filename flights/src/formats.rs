@@ -5,27 +5,33 @@ use std::path::Path;
 use vehicles::foreign;
 
 use crate::crazyflie::CrazyflieLog;
-use crate::csv_log::CsvLog;
-use crate::declaration::{Clock, Entry, Format};
+use crate::csv_log::{CsvLog, Form};
+use crate::dataflash::Dataflash;
+use crate::declaration::{Clock, Format};
 use crate::error::{LogError, Spot};
 use crate::log::Log;
 use crate::mcap_log::McapLog;
 use crate::ulog::Ulog;
 
-/// The log with these bytes. `time` declares the column of the time, and `clock` chooses one of two clocks.
+/// The log with these bytes. `form` is that of a CSV file, and `clock` chooses one of two clocks.
 pub fn parse(
     bytes: Vec<u8>,
     format: Format,
-    time: Option<&Entry>,
+    form: &Form<'_>,
     clock: Option<Clock>,
 ) -> Result<Box<dyn Log>, LogError> {
+    if form.recording.is_some() && format != Format::Csv {
+        let expected = "a CSV file, of which alone one of several recordings is chosen";
+        return Err(LogError::unexpected(Spot::Key("recording"), expected, "another format", "remove it"));
+    }
     if clock.is_some() && format != Format::Mcap {
         let (expected, found) = ("a log in MCAP, which can have two clocks", "another format");
         return Err(LogError::unexpected(Spot::Key("time"), expected, found, "remove the flight's `time`"));
     }
     match format {
-        Format::Csv => Ok(Box::new(CsvLog::parse(&bytes, time)?)),
+        Format::Csv => Ok(Box::new(CsvLog::parse(&bytes, form)?)),
         Format::Crazyflie => Ok(Box::new(CrazyflieLog::parse(bytes)?)),
+        Format::Dataflash => Ok(Box::new(Dataflash::parse(bytes)?)),
         Format::Mcap => Ok(Box::new(McapLog::parse(bytes, clock)?)),
         Format::Ulog => Ok(Box::new(Ulog::parse(bytes)?)),
     }
@@ -37,6 +43,7 @@ pub fn guess(path: &Path, bytes: &[u8]) -> Format {
     match bytes {
         [0x89, b'M', b'C', b'A', b'P', b'0', b'\r', b'\n', ..] => Format::Mcap,
         [b'U', b'L', b'o', b'g', 1, 0x12, 0x35, _, ..] => Format::Ulog,
+        [0xA3, 0x95, 0x80, ..] => Format::Dataflash,
         // Of every version: its reader names those that it does not read.
         [0xBC, _, 0, _, _, _, _, _, ..] => Format::Crazyflie,
         // Its reader names what it is.

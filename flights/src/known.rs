@@ -36,20 +36,24 @@ impl KnownRotors {
     #[must_use]
     pub fn of(flight: &Flight) -> Self {
         let command = &flight.command;
-        let Some((first_s, last_s)) = command.span_s() else { return Self::measured(flight) };
+        let Some((first_s, _)) = command.span_s() else { return Self::measured(flight) };
         if flight.commands_on_change {
             return Self { stretches: vec![(first_s + SETTLE_S, f64::INFINITY)] };
         }
-        let period_s = held_period_s(&command.time_s).unwrap_or(0.0);
-        let gaps = of_held(&command.time_s);
-        let begins = std::iter::once(first_s).chain(gaps.iter().map(|gap| gap.1));
-        let ends = gaps.iter().map(|gap| gap.0).chain([last_s]);
-        let known = begins.zip(ends).map(|(from_s, to_s)| (from_s + SETTLE_S, to_s + period_s));
-        Self { stretches: known.filter(|(from_s, to_s)| from_s < to_s).collect() }
+        Self::between_gaps(&command.time_s, SETTLE_S, held_period_s(&command.time_s).unwrap_or(0.0))
     }
 
     fn measured(flight: &Flight) -> Self {
-        Self { stretches: flight.rotor_speed.span_s().into_iter().collect() }
+        Self::between_gaps(&flight.rotor_speed.time_s, 0.0, 0.0)
+    }
+
+    /// Stretches of samples without a gap, which begin `late_s` after the first and end `long_s` after the last.
+    fn between_gaps(time_s: &[f64], late_s: f64, long_s: f64) -> Self {
+        let gaps = of_held(time_s);
+        let begins = time_s.first().copied().into_iter().chain(gaps.iter().map(|gap| gap.1));
+        let ends = gaps.iter().map(|gap| gap.0).chain(time_s.last().copied());
+        let stretches = begins.zip(ends).map(|(from_s, to_s)| (from_s + late_s, to_s + long_s));
+        Self { stretches: stretches.filter(|(from_s, to_s)| from_s < to_s).collect() }
     }
 
     /// True if the rotors are known from `from_s` to `to_s`.
@@ -103,7 +107,9 @@ mod tests {
     fn without_commands_the_measured_speeds_are_known() {
         let mut measured = flight(Vec::new());
         assert_eq!(KnownRotors::of(&measured).stretches_s(), []);
-        measured.rotor_speed = Channel { time_s: vec![1.0, 2.0], values: vec![[500.0; 4]; 2] };
-        assert!(KnownRotors::of(&measured).hold(1.0, 2.0));
+        let time_s = vec![1.0, 1.02, 1.04, 3.0, 3.02];
+        measured.rotor_speed = Channel { values: vec![[500.0; 4]; time_s.len()], time_s };
+        let known = KnownRotors::of(&measured);
+        assert!(known.hold(1.0, 1.04) && !known.hold(1.04, 1.1) && known.hold(3.0, 3.02));
     }
 }

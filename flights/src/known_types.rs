@@ -3,6 +3,7 @@
 use crate::declaration::{ChannelMap, Entry, Format, Frame};
 use crate::error::{LogError, Spot};
 use crate::log::Log;
+use crate::name::Name;
 use crate::quantity::Quantity;
 
 /// Where a type of message holds a quantity. In `fields`, `*` stands for x, y, z (and w) in turn, and `#` for the
@@ -19,7 +20,13 @@ const fn ours(kind: &'static str, quantity: Quantity, fields: &'static str, unit
     Known { kind, quantity, fields, unit, frame: Frame::FluEnu }
 }
 
-const fn px4(kind: &'static str, quantity: Quantity, fields: &'static str, unit: &'static str) -> Known {
+/// Of PX4 and ArduPilot.
+const fn forward_right_down(
+    kind: &'static str,
+    quantity: Quantity,
+    fields: &'static str,
+    unit: &'static str,
+) -> Known {
     Known { kind, quantity, fields, unit, frame: Frame::FrdNed }
 }
 
@@ -85,14 +92,20 @@ const KNOWN: &[Known] = &[
     ours("hummingbus_msgs/msg/PlantState", Quantity::Attitude, "attitude.*", "1"),
     ours("hummingbus_msgs/msg/PlantState", Quantity::AngularVelocity, "angular_velocity.*", "rad/s"),
     ours("hummingbus_msgs/msg/PlantState", Quantity::SpecificForce, "specific_force.*", "m/s^2"),
-    px4("vehicle_attitude", Quantity::Attitude, "q[1] q[2] q[3] q[0]", "1"),
-    px4("vehicle_local_position", Quantity::Position, "x y z", "m"),
-    px4("vehicle_local_position", Quantity::Velocity, "vx vy vz", "m/s"),
-    px4("sensor_combined", Quantity::AngularVelocity, "gyro_rad[#]", "rad/s"),
-    px4("sensor_combined", Quantity::SpecificForce, "accelerometer_m_s2[#]", "m/s^2"),
-    px4("vehicle_angular_velocity", Quantity::AngularVelocity, "xyz[#]", "rad/s"),
-    px4("vehicle_acceleration", Quantity::SpecificForce, "xyz[#]", "m/s^2"),
-    px4("battery_status", Quantity::BatteryVoltage, "voltage_v", "V"),
+    forward_right_down("vehicle_attitude", Quantity::Attitude, "q[1] q[2] q[3] q[0]", "1"),
+    forward_right_down("vehicle_local_position", Quantity::Position, "x y z", "m"),
+    forward_right_down("vehicle_local_position", Quantity::Velocity, "vx vy vz", "m/s"),
+    forward_right_down("sensor_combined", Quantity::AngularVelocity, "gyro_rad[#]", "rad/s"),
+    forward_right_down("sensor_combined", Quantity::SpecificForce, "accelerometer_m_s2[#]", "m/s^2"),
+    forward_right_down("vehicle_angular_velocity", Quantity::AngularVelocity, "xyz[#]", "rad/s"),
+    forward_right_down("vehicle_acceleration", Quantity::SpecificForce, "xyz[#]", "m/s^2"),
+    forward_right_down("battery_status", Quantity::BatteryVoltage, "voltage_v", "V"),
+    forward_right_down("ATT", Quantity::Attitude, "Roll Pitch Yaw", "deg"),
+    forward_right_down("XKF1", Quantity::Position, "PN PE PD", "m"),
+    forward_right_down("XKF1", Quantity::Velocity, "VN VE VD", "m/s"),
+    forward_right_down("IMU", Quantity::AngularVelocity, "GyrX GyrY GyrZ", "rad/s"),
+    forward_right_down("IMU", Quantity::SpecificForce, "AccX AccY AccZ", "m/s^2"),
+    forward_right_down("BAT", Quantity::BatteryVoltage, "Volt", "V"),
 ];
 
 impl Known {
@@ -101,13 +114,16 @@ impl Known {
         let parts = ["x", "y", "z", "w"].into_iter().enumerate().take(self.quantity.size());
         let name =
             |(index, part): (usize, &str)| self.fields.replace('*', part).replace('#', &index.to_string());
-        let columns = if self.fields.contains(['*', '#']) {
-            parts.map(name).collect()
+        let names: Vec<Name> = if self.fields.contains(['*', '#']) {
+            parts.map(name).map(|name| name.as_str().into()).collect()
         } else {
-            self.fields.split(' ').map(str::to_owned).collect()
+            self.fields.split(' ').map(Name::from).collect()
         };
+        let is_euler = self.quantity == Quantity::Attitude && names.len() == 3;
+        let (columns, euler) = if is_euler { (None, Some(names)) } else { (Some(names), None) };
         Entry {
-            columns: Some(columns),
+            columns,
+            euler,
             topic: Some(topic.to_owned()),
             unit: Some(self.unit.to_owned()),
             frame: Some(self.frame),
@@ -132,9 +148,9 @@ pub fn absent(log: &dyn Log, quantity: Quantity, entry: &Entry) -> Option<Absent
     let validity =
         VALIDITIES.iter().find(|validity| validity.kind == kind && validity.quantity == quantity)?;
     let known = KNOWN.iter().find(|known| known.kind == kind && known.quantity == quantity)?.entry(topic);
-    let plain = |name: &String| name.trim_start_matches('-').to_owned();
+    let plain = |name: &Name| name.plain.clone();
     let declared: Vec<String> = entry.columns.iter().flatten().map(plain).collect();
-    if !known.columns.iter().flatten().any(|name| declared.contains(name)) {
+    if !known.columns.iter().flatten().any(|name| declared.contains(&name.plain)) {
         return None;
     }
     let fields: Vec<String> = validity.fields.split(' ').map(str::to_owned).collect();
@@ -149,7 +165,7 @@ pub fn absent(log: &dyn Log, quantity: Quantity, entry: &Entry) -> Option<Absent
 /// # Errors
 /// If the entry names a topic alone and its type is not known to hold the quantity.
 pub fn complete(log: &dyn Log, quantity: Quantity, entry: &Entry) -> Result<Entry, LogError> {
-    let named = entry.columns.is_some() || entry.euler.is_some() || entry.yaw.is_some();
+    let named = entry.names().next().is_some();
     let (false, Some(topic)) = (named, entry.topic.as_deref()) else { return Ok(entry.clone()) };
     let topics = log.topics();
     let Some((_, kind)) = topics.iter().find(|(name, _)| name == topic) else {
@@ -165,6 +181,7 @@ pub fn complete(log: &dyn Log, quantity: Quantity, entry: &Entry) -> Result<Entr
         unit: entry.unit.clone().or(default.unit),
         frame: entry.frame.or(default.frame),
         columns: default.columns,
+        euler: default.euler,
         ..entry.clone()
     })
 }
@@ -173,7 +190,7 @@ pub fn complete(log: &dyn Log, quantity: Quantity, entry: &Entry) -> Result<Entr
 /// exactly one topic has. The notes say what was taken and what was not clear.
 pub fn defaults(log: &dyn Log, format: Format) -> (ChannelMap, Vec<String>) {
     let (mut channels, mut notes) = (ChannelMap::new(), Vec::new());
-    if !matches!(format, Format::Mcap | Format::Ulog) {
+    if !matches!(format, Format::Mcap | Format::Ulog | Format::Dataflash) {
         return (channels, notes);
     }
     let topics = log.topics();

@@ -8,11 +8,12 @@
 //! | `quantity`, `frame` | units and frames |
 //! | `logs`, `log_reader` | which logs flights are read from: names and patterns; each log is read once |
 //! | `log` | what every log can do: samples of numbers by name |
-//! | `formats` | the formats of logs: `csv_log`, `mcap_log`, `ulog` (`ulog_messages`, `ulog_format`), `crazyflie`, `bytes`, `arrays` |
+//! | `formats` | the formats of logs: `csv_log`, `mcap_log`, `ulog` (`ulog_messages`, `ulog_format`), `crazyflie`, `dataflash`, `bytes`, `arrays` |
 //! | `known_types` | messages whose fields and units need not be said |
+//! | `name`, `scaling`, `matrices`, `clock` | names of numbers, their factors, rotation matrices, clocks that start again |
 //! | `channels`, `clean`, `held`, `jumps`, `reading` | from a log's numbers to a flight |
 //! | `specific_force` | specific force from what logs hold in its place |
-//! | `plausible`, `agreement`, `force_doubt`, `still`, `finding` | values against physics |
+//! | `plausible`, `agreement`, `force_doubt`, `still`, `units`, `finding` | values against physics |
 //! | `span` | times against the number of samples |
 //! | `held_out`, `twin` | whether test flights hold what parameters are fitted on: by file and time, by samples |
 //! | `state` | errors of a simulated state against the measured one |
@@ -27,8 +28,10 @@ mod bytes;
 mod canonical;
 mod channels;
 mod clean;
+mod clock;
 mod crazyflie;
 mod csv_log;
+mod dataflash;
 mod declaration;
 mod document;
 mod error;
@@ -45,11 +48,14 @@ mod known_types;
 mod log;
 mod log_reader;
 mod logs;
+mod matrices;
 mod mcap_log;
+mod name;
 mod plausible;
 mod played;
 mod quantity;
 mod reading;
+mod scaling;
 mod set;
 mod span;
 mod specific_force;
@@ -59,6 +65,7 @@ mod twin;
 mod ulog;
 mod ulog_format;
 mod ulog_messages;
+mod units;
 
 pub use canonical::{COLUMNS, Canonical, HEADER, Row, csv, write_csv};
 pub use error::{FlightsError, LogError, Spot};

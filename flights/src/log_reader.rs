@@ -49,6 +49,12 @@ impl<'a> LogReader<'a> {
         Ok(bytes)
     }
 
+    /// The bytes of a log beside the flights' own, which is read once and kept.
+    pub fn read_beside(&mut self, path: &Path) -> std::io::Result<Vec<u8>> {
+        self.logs.entry(real(path)).or_default().flights += 2;
+        self.read(path)
+    }
+
     /// The SHA-256 of a log that was read.
     pub fn sha256(&self) -> impl Fn(&Path) -> Option<String> + '_ {
         |path| self.logs.get(&real(path)).map(|log| log.sha256.clone())

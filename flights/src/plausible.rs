@@ -3,18 +3,18 @@
 //! A mismatch is clear where a known factor, frame or order explains it; otherwise it is only worth a note.
 
 use nalgebra::Vector3;
-use toml::Spanned;
 use vehicles::Vehicle;
 
 use crate::agreement::{Agreement, Pairs};
-use crate::declaration::{ChannelMap, Entry, Frame};
+use crate::declaration::{ChannelMap, Frame};
 use crate::finding::Finding;
 use crate::flight::{Channel, Flight, median};
 use crate::force_doubt::{ForceDoubt, Kind};
 use crate::frame;
 use crate::quantity::{FRACTION, PERCENT, Quantity};
 use crate::still;
-use diagnostics::unit::ANGLE;
+use crate::units::{HUNDREDS, Units, finding, is_gross, of_hundreds, of_unit};
+use diagnostics::unit::{ANGLE, ROTOR_SPEED};
 
 /// Above this correlation a logged and a derived vector are the same but for a factor.
 const SAME: f64 = 0.7;
@@ -60,8 +60,8 @@ const POSITION_MISTAKES: [Mistake<[f64; 3]>; 4] = [
     ("a `-` before y of the position", |[x, y, z]| [x, -y, z]),
     ("a `-` before x and y of the position", |[x, y, z]| [-x, -y, z]),
 ];
-/// What hover needs is known within this factor.
-const ROTOR_SPEED_TOLERANCE: f64 = 1.6;
+/// Speeds are those that hover needs within this factor: it is the root of the one within which thrust and mass are known.
+const ROTOR_SPEED_TOLERANCE: f64 = 1.25;
 /// How many pole pairs motors of vehicles have.
 const POLE_PAIRS: std::ops::RangeInclusive<f64> = 2.0..=24.0;
 /// Voltages that a battery of a vehicle can have, from one cell to fourteen.
@@ -69,7 +69,7 @@ const VOLTAGE_RANGE_V: (f64, f64) = (2.0, 62.0);
 
 /// Compares the channels of a flight with each other, with gravity and with the vehicle.
 pub fn judge(flight: &Flight, vehicle: &Vehicle, channels: &ChannelMap) -> Vec<Finding> {
-    let judge = Judge { flight, vehicle, channels };
+    let judge = Judge { flight, vehicle, units: Units { channels } };
     let findings = [
         judge.force().or_else(|| judge.gravity()),
         judge.upright(),
@@ -88,8 +88,8 @@ pub fn judge(flight: &Flight, vehicle: &Vehicle, channels: &ChannelMap) -> Vec<F
 /// as no logger's do over a time that no vehicle flies, where both are right in another unit. A first row of zeros, which
 /// some loggers write before their clock runs, hides no wrong unit.
 pub fn judge_time(flight: &Flight, vehicle: &Vehicle, channels: &ChannelMap) -> Option<Finding> {
-    let judge = Judge { flight, vehicle, channels };
-    judge.declared(Quantity::Time)?;
+    let judge = Judge { flight, vehicle, units: Units { channels } };
+    judge.units.declared(Quantity::Time)?;
     let times =
         [&flight.attitude.time_s, &flight.command.time_s].into_iter().find(|times| !times.is_empty())?;
     judge.time(times).or_else(|| judge.time(&times[1..]))
@@ -98,7 +98,7 @@ pub fn judge_time(flight: &Flight, vehicle: &Vehicle, channels: &ChannelMap) -> 
 struct Judge<'a> {
     flight: &'a Flight,
     vehicle: &'a Vehicle,
-    channels: &'a ChannelMap,
+    units: Units<'a>,
 }
 
 impl Judge<'_> {
@@ -108,13 +108,13 @@ impl Judge<'_> {
         let period_s = median(times.windows(2).map(|pair| pair[1] - pair[0]))?;
         let span_s = times.last()? - times.first()?;
         let is_wrong = |value: f64, (low, high): (f64, f64)| !(low..=high).contains(&value);
-        let factor = self.factor(quantity);
+        let factor = self.units.factor(quantity);
         let fits = |(_, other): &&(&str, f64)| {
             let scale = other / factor;
             !is_wrong(scale * period_s, PERIOD_RANGE_S) && !is_wrong(scale * span_s, SPAN_RANGE_S)
         };
         let (unit, _) = quantity.dimension().units.iter().find(fits)?;
-        let declared = self.unit(quantity);
+        let declared = self.units.unit(quantity);
         let what = format!("declared in {declared}, its samples are {period_s} s apart, over {span_s} s");
         (is_wrong(period_s, PERIOD_RANGE_S) && is_wrong(span_s, SPAN_RANGE_S))
             .then(|| finding(quantity, Some(of_unit(unit)), &what))
@@ -123,7 +123,7 @@ impl Judge<'_> {
     /// The specific force is one, and in the body, as the vehicle accelerates.
     fn force(&self) -> Option<Finding> {
         let quantity = Quantity::SpecificForce;
-        let force = ForceDoubt::of(self.flight, self.vehicle, self.declared(quantity)?)?;
+        let force = ForceDoubt::of(self.flight, self.vehicle, self.units.declared(quantity)?)?;
         let Some(doubt) = force.doubt() else { return self.acceleration(&force) };
         let kinds: Vec<String> = doubt.fits.iter().map(|kind| of_kind(*kind, force.declared)).collect();
         let what = format!(
@@ -144,7 +144,7 @@ impl Judge<'_> {
         }
         let agreement = force.agreement().filter(|agreement| agreement.correlation > SAME)?;
         let what = format!("it is {:.4} times the acceleration of the vehicle", agreement.slope);
-        self.by_unit(Quantity::SpecificForce, agreement.slope, LEANING_TOLERANCE, &what)
+        self.units.by_unit_or_scale(Quantity::SpecificForce, agreement.slope, LEANING_TOLERANCE, &what)
     }
 
     /// The specific force is gravity's in the median, and up.
@@ -155,9 +155,13 @@ impl Judge<'_> {
         let up = median(forces.iter().map(|f| f[2]))?;
         let factor = norm / self.vehicle.gravity_m_s2;
         let what = format!("its median magnitude is {norm:.4} m/s^2, {factor:.4} times gravity");
-        let by_unit = self.by_unit(quantity, factor, 1.25, &what).filter(|finding| finding.fits.is_some());
+        let by_unit =
+            self.units.by_unit(quantity, factor, 1.25, &what).filter(|finding| finding.fits.is_some());
         if by_unit.is_some() {
             return by_unit;
+        }
+        if is_gross(factor) && up > 0.7 * norm {
+            return Some(self.units.by_scale(quantity, factor, &what));
         }
         if up < -0.7 * norm {
             let what = format!("its median along z is {up:.3} m/s^2, but up is positive in our body");
@@ -180,7 +184,7 @@ impl Judge<'_> {
 
     /// The attitude as it would be if the columns named x, y, z, w held w, x, y, z; `None` in other frames.
     fn w_first(&self) -> Option<Channel<4>> {
-        let entry = self.declared(Quantity::Attitude)?;
+        let entry = self.units.declared(Quantity::Attitude)?;
         let plain = entry.frame.unwrap_or_default() == Frame::FluEnu && entry.columns.is_some();
         plain.then(|| Channel {
             time_s: self.flight.attitude.time_s.clone(),
@@ -199,11 +203,12 @@ impl Judge<'_> {
         if agreement.correlation > SAME {
             let what = format!("it is {:.4} times the derivative of the attitude", agreement.slope);
             if let Some(angles) = self.angles_that_fit(agreement.slope) {
-                let unit = self.unit_that_fits(quantity, agreement.slope, DERIVATIVE_TOLERANCE);
+                let unit = self.units.unit_that_fits(quantity, agreement.slope, DERIVATIVE_TOLERANCE);
                 return Some(finding(quantity, either(unit, Some(angles)), &what));
             }
             return self
-                .by_unit(quantity, agreement.slope, DERIVATIVE_TOLERANCE, &what)
+                .units
+                .by_unit_or_scale(quantity, agreement.slope, DERIVATIVE_TOLERANCE, &what)
                 .or_else(|| late(quantity, agreement));
         }
         let reordered = self
@@ -227,12 +232,22 @@ impl Judge<'_> {
         );
         let fits = explains.then(|| match signs {
             [x, y, z] if x < 0.0 && y < 0.0 && z < 0.0 => {
-                "an attitude that takes the world to the body: negate x, y and z of its columns".to_owned()
+                format!("an attitude that takes the world to the body: {}", self.inverse_advice())
             }
             [x, y, z] if x > 0.0 && y < 0.0 && z < 0.0 => self.other_frame(quantity),
             _ => "the axes, or angles of the attitude, with a `-` before the name".to_owned(),
         });
         Some(finding(quantity, fits, &what))
+    }
+
+    /// Names under which an attitude that takes the world to the body is read.
+    fn inverse_advice(&self) -> &'static str {
+        let is_matrix = self.units.declared(Quantity::Attitude).is_some_and(|entry| entry.matrix.is_some());
+        if is_matrix {
+            "name the columns of its `matrix` column by column"
+        } else {
+            "negate x, y and z of its columns"
+        }
     }
 
     /// An attitude turns where the gyroscope does.
@@ -257,8 +272,10 @@ impl Judge<'_> {
         let what = format!("it is {:.5} times the derivative of the position", agreement.slope);
         if agreement.correlation > SAME {
             let position =
-                self.unit_that_fits(Quantity::Position, 1.0 / agreement.slope, DERIVATIVE_TOLERANCE);
-            let Some(finding) = self.by_unit(quantity, agreement.slope, DERIVATIVE_TOLERANCE, &what) else {
+                self.units.unit_that_fits(Quantity::Position, 1.0 / agreement.slope, DERIVATIVE_TOLERANCE);
+            let Some(finding) =
+                self.units.by_unit_or_scale(quantity, agreement.slope, DERIVATIVE_TOLERANCE, &what)
+            else {
                 return late(quantity, agreement);
             };
             return Some(match (position, &finding.fits) {
@@ -296,9 +313,9 @@ impl Judge<'_> {
         }
         let what = format!(
             "declared in {}, it accelerates {factor:.4} times as much as the vehicle leans",
-            self.unit(quantity)
+            self.units.unit(quantity)
         );
-        let unit = self.unit_that_fits(quantity, factor, LEANING_TOLERANCE);
+        let unit = self.units.unit_that_fits(quantity, factor, LEANING_TOLERANCE);
         if pairs.agreement(QUIET_ACCELERATION_M_S2).is_none() {
             // Also what hangs on a rig leans and hardly moves.
             let hint = unit.map_or(String::new(), |unit| format!("; on a rig, or in another unit ({unit})"));
@@ -316,7 +333,7 @@ impl Judge<'_> {
             agreement.filter(|_| self.flight.assumed.is_empty()).map(|agreement| agreement.correlation)
         };
         let declared = agreement(attitude, position).filter(|correlation| *correlation < SAME)?;
-        let is_euler = self.declared(Quantity::Attitude)?.euler.is_some();
+        let is_euler = self.units.declared(Quantity::Attitude)?.euler.is_some();
         let of_angles = ANGLE_MISTAKES.iter().filter(|_| is_euler).filter_map(|(advice, change)| {
             Some((*advice, agreement(&with_angles(attitude, *change), position)?))
         });
@@ -342,7 +359,7 @@ impl Judge<'_> {
 
     /// The unit of Euler angles in which a vehicle that leans or turns `factor` times too little would not.
     fn angles_that_fit(&self, factor: f64) -> Option<String> {
-        let entry = self.declared(Quantity::Attitude)?;
+        let entry = self.units.declared(Quantity::Attitude)?;
         entry.euler.as_ref()?;
         let declared = entry.unit.as_deref()?;
         let (name, other) = ANGLE.units.iter().find(|unit| unit.0 != declared)?;
@@ -352,7 +369,7 @@ impl Judge<'_> {
 
     /// How much smaller a position can be than its true one, if its unit is declared too large.
     fn position_scale(&self) -> f64 {
-        let declared = self.factor(Quantity::Position);
+        let declared = self.units.factor(Quantity::Position);
         let largest = Quantity::Position.dimension().units.iter().map(|unit| unit.1).fold(declared, f64::max);
         declared / largest
     }
@@ -363,7 +380,7 @@ impl Judge<'_> {
         let pairs = Pairs::velocities(position, position, VELOCITY_WINDOW_S);
         let speed = median(pairs.derived.iter().map(|velocity| velocity.norm()))?;
         let what = format!("its median speed is {speed:.1} m/s");
-        let fits = self.units_within(quantity, speed, (0.0, SPEED_MAX_M_S));
+        let fits = self.units.units_within(quantity, speed, (0.0, SPEED_MAX_M_S));
         (speed > SPEED_MAX_M_S).then(|| finding(quantity, fits, &what))
     }
 
@@ -379,7 +396,7 @@ impl Judge<'_> {
             map.max,
             self.vehicle.hover_command()
         );
-        let share = match self.unit(quantity) {
+        let share = match self.units.unit(quantity) {
             "count" if high <= 1.001 && map.max > 50.0 => Some(FRACTION),
             "count" if high <= 100.1 && map.max > 1000.0 => Some(PERCENT),
             FRACTION | PERCENT if high > 20.0 * map.max => Some("count"),
@@ -407,28 +424,43 @@ impl Judge<'_> {
             return None;
         }
         let quantity = Quantity::RotorSpeed;
-        let found = self.by_unit(quantity, factor, ROTOR_SPEED_TOLERANCE, &what)?;
+        let found = self.units.by_unit(quantity, factor, ROTOR_SPEED_TOLERANCE, &what)?;
         if let Some(mechanical) = self.mechanical(factor) {
             return Some(finding(quantity, either(found.fits, Some(mechanical)), &what));
         }
-        let is_near = (0.5..2.0).contains(&factor);
-        match found.fits {
-            None if is_near => None,
-            None => Some(finding(quantity, None, &format!("{what}{}", self.hint_of_poles(factor)))),
-            Some(_) => Some(found),
+        if found.fits.is_some() || (0.5..2.0).contains(&factor) {
+            return found.fits.is_some().then_some(found);
         }
+        if let Some(hundreds) = self.hundreds_of_electrical(factor) {
+            return Some(finding(quantity, Some(hundreds), &what));
+        }
+        let hint = self.hint_of_poles(factor);
+        if is_gross(factor) && hint.is_empty() {
+            return Some(self.units.by_scale(quantity, factor, &what));
+        }
+        Some(finding(quantity, None, &format!("{what}{hint}")))
+    }
+
+    /// That the log has hundreds of electrical revolutions a minute, where they are not divided by pole pairs.
+    fn hundreds_of_electrical(&self, factor: f64) -> Option<String> {
+        let entry = self.units.declared(Quantity::RotorSpeed)?;
+        let pairs = factor * HUNDREDS * ROTOR_SPEED.factor("rpm")? / self.units.factor(Quantity::RotorSpeed);
+        let is_plain = entry.scale.is_none() && entry.pole_pairs.is_none();
+        (is_plain && POLE_PAIRS.contains(&pairs))
+            .then(|| format!("{} with the motor's `pole_pairs`, here about {pairs:.0},", of_hundreds()))
     }
 
     /// That the log has mechanical speeds, where they are divided by pole pairs and would be right without.
     fn mechanical(&self, factor: f64) -> Option<String> {
-        let pairs = self.declared(Quantity::RotorSpeed)?.pole_pairs.filter(|pairs| *pairs > 1)?;
+        let pairs = self.units.declared(Quantity::RotorSpeed)?.pole_pairs.filter(|pairs| *pairs > 1)?;
         let is_near = libm::log(factor * f64::from(pairs)).abs() < libm::log(ROTOR_SPEED_TOLERANCE);
         is_near.then(|| "mechanical speeds, without `pole_pairs`,".to_owned())
     }
 
     /// How many there are is known of the motor, and not from a hover that is known but roughly.
     fn hint_of_poles(&self, factor: f64) -> String {
-        let declared = self.declared(Quantity::RotorSpeed).and_then(|entry| entry.pole_pairs).unwrap_or(1);
+        let declared =
+            self.units.declared(Quantity::RotorSpeed).and_then(|entry| entry.pole_pairs).unwrap_or(1);
         let pairs = factor * f64::from(declared);
         if !POLE_PAIRS.contains(&pairs) {
             return String::new();
@@ -444,59 +476,12 @@ impl Judge<'_> {
         let volts = median(self.flight.battery_voltage.values.iter().map(|value| value[0]))?;
         let (low, high) = VOLTAGE_RANGE_V;
         let what = format!("its median is {volts} V, batteries have {low} to {high} V");
-        let fits = self.units_within(quantity, volts, VOLTAGE_RANGE_V);
+        let fits = self.units.units_within(quantity, volts, VOLTAGE_RANGE_V);
         (!(low..high).contains(&volts)).then(|| finding(quantity, fits, &what))
     }
 
-    /// The unit in which the values would lie in `range`.
-    fn units_within(&self, quantity: Quantity, value: f64, range: (f64, f64)) -> Option<String> {
-        let raw = value / self.factor(quantity);
-        let mut others = self.other_units(quantity);
-        let fits = |(_, factor): &&(&str, f64)| (range.0..range.1).contains(&(raw * factor));
-        others.rfind(fits).map(|(name, _)| of_unit(name))
-    }
-
-    /// A finding for values `factor` times too large: clear if another unit explains it within `tolerance`.
-    fn by_unit(&self, quantity: Quantity, factor: f64, tolerance: f64, what: &str) -> Option<Finding> {
-        if factor > 0.0 && libm::log(factor).abs() < libm::log(tolerance) {
-            return None;
-        }
-        let fits = self.unit_that_fits(quantity, factor, tolerance);
-        Some(finding(quantity, fits, &format!("declared in {}, {what}", self.unit(quantity))))
-    }
-
-    /// The unit in which values would be right that are now `factor` times too large.
-    fn unit_that_fits(&self, quantity: Quantity, factor: f64, tolerance: f64) -> Option<String> {
-        let declared = self.factor(quantity);
-        let off = |other: f64| libm::log((factor * other / declared).abs()).abs();
-        let best = self.other_units(quantity).min_by(|a, b| off(a.1).total_cmp(&off(b.1)))?;
-        (off(best.1) < libm::log(tolerance)).then(|| of_unit(best.0))
-    }
-
-    /// The units that it is not declared in.
-    fn other_units(
-        &self,
-        quantity: Quantity,
-    ) -> impl DoubleEndedIterator<Item = &'static (&'static str, f64)> {
-        quantity.dimension().units.iter().filter(move |(name, _)| *name != self.unit(quantity))
-    }
-
-    fn declared(&self, quantity: Quantity) -> Option<&Entry> {
-        self.channels.get(&quantity).map(Spanned::get_ref)
-    }
-
-    /// The declared unit; SI where the flights file leaves it to the type of message.
-    fn unit(&self, quantity: Quantity) -> &str {
-        let declared = self.declared(quantity).and_then(|entry| entry.unit.as_deref());
-        declared.unwrap_or(quantity.dimension().units[0].0)
-    }
-
-    fn factor(&self, quantity: Quantity) -> f64 {
-        quantity.dimension().factor(self.unit(quantity)).unwrap_or(1.0)
-    }
-
     fn other_frame(&self, quantity: Quantity) -> String {
-        let frame = self.declared(quantity).and_then(|entry| entry.frame);
+        let frame = self.units.declared(quantity).and_then(|entry| entry.frame);
         let other = if frame == Some(Frame::FrdNed) { "flu-enu" } else { "frd-ned" };
         format!("`frame = \"{other}\"`")
     }
@@ -525,15 +510,6 @@ fn of_kind(kind: Kind, declared: Kind) -> String {
     let holds = format!("`holds = \"{}\"`", kind.holds.name());
     let frame = if kind.frame == Frame::FrdNed { "frd-ned" } else { "flu-enu" };
     if kind.frame == declared.frame { holds } else { format!("{holds} with `frame = \"{frame}\"`") }
-}
-
-fn of_unit(name: &str) -> String {
-    format!("`unit = \"{name}\"`")
-}
-
-fn finding(channel: Quantity, fits: Option<String>, what: &str) -> Finding {
-    let advice = fits.as_ref().map_or(String::new(), |fits| format!("; {fits} would fit"));
-    Finding { channel, message: format!("`{channel}`: {what}{advice}"), fits }
 }
 
 /// A note where a vector follows its derived twin but loosely.

@@ -1,5 +1,6 @@
 //! Reads one flight from its log: every channel, on one clock, cut to the part that is used.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
 
@@ -58,7 +59,12 @@ pub struct Reading<'a> {
     pub file: &'a Path,
     /// The channels that apply to the flight.
     pub channels: ChannelMap,
+    /// The logs of channels that are in other files.
+    pub others: OtherLogs,
 }
+
+/// Logs by the channel that is read from them.
+pub type OtherLogs = BTreeMap<Quantity, Box<dyn Log>>;
 
 impl Reading<'_> {
     /// Reads the flight from `log`; says which part of the log's own time it is, too.
@@ -131,6 +137,7 @@ impl Reading<'_> {
         if self.entry.assume.is_some() && entry.yaw.is_some() {
             return Channel::default();
         }
+        let log = self.others.get(&quantity).map_or(log, AsRef::as_ref);
         let complete = known_types::complete(log, quantity, entry);
         let read = complete.and_then(|entry| {
             let (mut channel, said) =
@@ -159,6 +166,7 @@ impl Reading<'_> {
         let Some(entry) = self.declared(Quantity::Attitude).filter(|_| self.entry.assume.is_some()) else {
             return Ok(None);
         };
+        let log = self.others.get(&Quantity::Attitude).map_or(log, AsRef::as_ref);
         let read = channels::read_yaw(log, entry).and_then(|read| match read {
             None => Ok(None),
             Some((channel, _)) => clean::clean(Quantity::Attitude, channel, &mut Vec::new())

@@ -8,17 +8,19 @@ use diagnostics::Diagnostic;
 use inputs::InputFiles;
 use toml::Spanned;
 use vehicles::Vehicle;
+use vehicles::table::Dialect;
 
-use crate::declaration::{Declaration, FlightEntry};
+use crate::csv_log::Form;
+use crate::declaration::{ChannelMap, Declaration, Entry, FlightEntry, Format};
 use crate::document::Document;
-use crate::error::{FlightsError, LogError};
+use crate::error::{FlightsError, LogError, Spot};
 use crate::flight::Flight;
 use crate::formats;
 use crate::held_out;
 use crate::log_reader::{LogReader, ReadFile};
 use crate::logs::{self, Log, Patterns};
 use crate::quantity::Quantity;
-use crate::reading::{Part, Reading};
+use crate::reading::{OtherLogs, Part, Reading};
 
 /// The flights of a flights file, in its order.
 ///
@@ -203,9 +205,17 @@ impl Context<'_> {
         channels.extend(entry.channels.clone());
         let bytes = reader.read(file).map_err(|error| broken(LogError::Unreadable(error)))?;
         let format = entry.format.or(self.declaration.format).unwrap_or_else(|| formats::guess(file, &bytes));
+        if entry.csv.is_some() && format != Format::Csv {
+            let expected = "a CSV file, whose form it says";
+            let cause = LogError::unexpected(Spot::Key("csv"), expected, "another format", "remove it");
+            return Err(broken(cause));
+        }
         let time = channels.get(&Quantity::Time).map(Spanned::get_ref);
+        let of_log = channels.values().map(Spanned::get_ref).filter(|channel| channel.file.is_none());
+        let form = self.form(entry, time, of_log.collect());
         let clock = entry.time.or(self.declaration.time);
-        let log = formats::parse(bytes, format, time, clock).map_err(broken)?;
+        let log = formats::parse(bytes, format, &form, clock).map_err(broken)?;
+        let others = self.other_logs(declared, &channels, reader)?;
         Reading {
             document: self.document,
             vehicle: self.vehicle,
@@ -215,7 +225,51 @@ impl Context<'_> {
             format,
             file,
             channels,
+            others,
         }
         .flight(log.as_ref())
+    }
+
+    /// The form of a CSV file of the flight.
+    fn form<'b>(
+        &'b self,
+        entry: &'b FlightEntry,
+        time: Option<&'b Entry>,
+        channels: Vec<&'b Entry>,
+    ) -> Form<'b> {
+        const PLAIN: Dialect = Dialect { header_line: None, header: None, delimiter: None, decimal: None };
+        let dialect = entry.csv.as_ref().or(self.declaration.csv.as_ref()).unwrap_or(&PLAIN);
+        Form { dialect, recording: entry.recording, time, channels }
+    }
+
+    /// The logs of the channels that are in another file than the flight's.
+    fn other_logs(
+        &self,
+        declared: &Log<'_>,
+        channels: &ChannelMap,
+        reader: &mut LogReader<'_>,
+    ) -> Result<OtherLogs, FlightsError> {
+        let entry = declared.entry.get_ref();
+        let of_flight = channels.get(&Quantity::Time).map(Spanned::get_ref);
+        let mut others = OtherLogs::new();
+        for (quantity, channel) in channels {
+            let (place, channel) = (channel.span(), channel.get_ref());
+            let Some(file) = &channel.file else { continue };
+            let path = self.document.resolve(&format!("channels.{quantity}.file"), file)?;
+            let broken = |cause| FlightsError::Log {
+                place: self.document.place(&place),
+                flight: declared.name.clone(),
+                file: path.clone(),
+                channel: Some(*quantity),
+                cause,
+            };
+            let bytes = reader.read_beside(&path).map_err(|error| broken(LogError::Unreadable(error)))?;
+            let format = formats::guess(&path, &bytes);
+            let form = self.form(entry, channel.time.as_deref().or(of_flight), vec![channel]);
+            let form = Form { recording: None, ..form };
+            let clock = entry.time.or(self.declaration.time).filter(|_| format == Format::Mcap);
+            others.insert(*quantity, formats::parse(bytes, format, &form, clock).map_err(broken)?);
+        }
+        Ok(others)
     }
 }

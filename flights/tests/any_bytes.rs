@@ -1,5 +1,8 @@
 //! Whatever bytes a log has, reading it ends, with a flight or with words, and takes memory by the size of the file.
 
+#[path = "support/dataflash.rs"]
+#[allow(dead_code, reason = "other tests use the rest")]
+mod dataflash;
 #[path = "support/lz4.rs"]
 mod lz4;
 #[allow(dead_code, reason = "other tests use the rest")]
@@ -72,6 +75,12 @@ const ULOG: &str = r#"format = "ulog"
 [channels]
 specific_force = { topic = "sensor_combined" }
 battery_voltage = { topic = "battery", fields = ["cell[1].volts"], unit = "V" }
+"#;
+
+const DATAFLASH: &str = r#"format = "dataflash"
+[channels]
+attitude = { topic = "ATT" }
+angular_velocity = { topic = "IMU:1" }
 "#;
 
 const MCAP: &str = "format = \"mcap\"\n";
@@ -213,6 +222,14 @@ fn thousands_of_changed_ulogs_end_in_words_or_in_a_flight() {
 }
 
 #[test]
+fn thousands_of_changed_dataflash_logs_end_in_words_or_in_a_flight() {
+    let words: Vec<&[u8]> =
+        LENGTHS.into_iter().chain([&b"\xA3\x95"[..], b"\xA3\x95\x80", b"FMT\0", b"Q", b"#"]).collect();
+    let flights = mutated(DATAFLASH, &dataflash::log(20, true), &words, 4000, |_| {});
+    assert!(flights > 100 && flights < 4000, "{flights} of 4000 gave a flight");
+}
+
+#[test]
 fn thousands_of_changed_bags_end_in_words_or_in_a_flight() {
     for compression in [None, Some(mcap::Compression::Zstd)] {
         let whole = support::bag(10, compression);
@@ -239,8 +256,12 @@ fn every_length_of_a_bag_that_claims_four_gigabytes_is_refused_without_the_memor
 
 #[test]
 fn a_log_cut_at_any_byte_ends_in_words_or_in_a_flight() {
-    let logs =
-        [(CRAZYFLIE, support::crazyflie_log(5)), (ULOG, support::ulog(5)), (MCAP, support::bag(3, None))];
+    let logs = [
+        (CRAZYFLIE, support::crazyflie_log(5)),
+        (ULOG, support::ulog(5)),
+        (DATAFLASH, dataflash::log(5, true)),
+        (MCAP, support::bag(3, None)),
+    ];
     for (head, whole) in logs {
         for length in 0..whole.len() {
             let _ = read(head, &whole[..length]);

@@ -145,7 +145,10 @@ fn an_attitude_that_stays_while_the_gyroscope_turns_is_refused() {
 fn a_position_alone_that_is_too_fast_is_found() {
     let channels = without("velocity").replace("attitude =", "# attitude =");
     let mm = Motion { length_unit: 1000.0, ..Motion::default() };
-    assert_eq!(findings(&mm, &channels), [(Quantity::Position, "`unit = \"mm\"`".to_owned())]);
+    assert_eq!(
+        findings(&mm, &channels),
+        [(Quantity::Position, "`unit = \"cm\"` or `unit = \"mm\"`".to_owned())]
+    );
     assert_eq!(read(&Motion::default(), &channels, "").unwrap().notes, [""; 0]);
 }
 
@@ -265,7 +268,7 @@ fn electrical_rotor_speeds_are_divided_by_the_pole_pairs() {
     let mechanical = Motion { command_unit: hover / 101.5 * rpm, ..Motion::default() };
     let found = findings(&mechanical, &declared(", pole_pairs = 7"));
     let [(Quantity::RotorSpeed, fits)] = &found[..] else { panic!("{found:?}") };
-    assert_eq!(fits, "`unit = \"rad/s\"` here or mechanical speeds, without `pole_pairs`,");
+    assert_eq!(fits, "mechanical speeds, without `pole_pairs`,");
     let zero = refused(&declared(", pole_pairs = 0"), "");
     assert!(
         zero.contains("flights.toml:4:") && zero.contains("`pole_pairs`") && zero.contains("magnets"),
@@ -273,6 +276,43 @@ fn electrical_rotor_speeds_are_divided_by_the_pole_pairs() {
     );
     let of_rates = CHANNELS.replace("\"rad/s\"", "\"rad/s\", pole_pairs = 7");
     assert!(refused(&of_rates, "").contains("expected `rotor_speed` alone"));
+}
+
+#[test]
+fn a_unit_is_advised_only_where_it_alone_fits() {
+    let vehicle = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../vehicles/hummingbird.toml");
+    let hover = vehicles::Vehicle::load(&vehicle).unwrap().hover_speed_rad_s();
+    let rpm = 60.0 / std::f64::consts::TAU;
+    let channels = CHANNELS.replace("command =", "rotor_speed =");
+    let hundreds = Motion { command_unit: 7.0 * hover / 101.5 * rpm / 100.0, ..Motion::default() };
+    let declared = |keys: &str| channels.replace("unit = \"count\"", keys);
+    // A hundredth of electrical revolutions a minute is near to hertz, and no multiple of a unit.
+    for (keys, fits) in [
+        ("unit = \"rpm\", pole_pairs = 7", "`unit = \"rpm\"` with `scale = 100` (hundreds)"),
+        ("unit = \"Hz\", pole_pairs = 7", "`unit = \"rpm\"` with `scale = 100` (hundreds)"),
+        ("unit = \"rad/s\", pole_pairs = 7", "`unit = \"rpm\"` with `scale = 100` (hundreds)"),
+        ("unit = \"rpm\"", "with the motor's `pole_pairs`, here about 7"),
+        ("unit = \"rpm\", pole_pairs = 7, scale = 10", "`unit = \"rad/s\"`, or a `scale` of about 99.5"),
+    ] {
+        let found = findings(&hundreds, &declared(keys));
+        let [(Quantity::RotorSpeed, said)] = &found[..] else { panic!("{keys}: {found:?}") };
+        assert!(said.contains(fits), "{keys}: {said}");
+    }
+    let flight = read(&hundreds, &declared("unit = \"rpm\", pole_pairs = 7, scale = 100"), "").unwrap();
+    assert_eq!(flight.notes, [""; 0]);
+    let scaled = |quantity, motion: Motion, scale: f64| {
+        let found = findings(&motion, CHANNELS);
+        let fits = found.iter().find(|(found, _)| *found == quantity).map(|(_, fits)| fits.clone()).unwrap();
+        let number = fits.split_once("a `scale` of about ").unwrap_or_else(|| panic!("{fits}")).1;
+        assert!((number.parse::<f64>().unwrap() / scale - 1.0).abs() < 0.1, "{fits} for {scale}");
+    };
+    let force = |force_unit| Motion { force_unit, ..Motion::default() };
+    scaled(Quantity::SpecificForce, force(1000.0), 1e-3);
+    scaled(Quantity::SpecificForce, force(4096.0 / 9.81), 9.81 / 4096.0);
+    scaled(Quantity::SpecificForce, force(0.01), 100.0);
+    let rate = |rate_unit| Motion { rate_unit, ..Motion::default() };
+    scaled(Quantity::AngularVelocity, rate(16.4 * 57.3), 1.0 / 16.4 / 57.3);
+    scaled(Quantity::AngularVelocity, rate(0.01), 100.0);
 }
 
 #[test]

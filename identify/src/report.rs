@@ -158,6 +158,8 @@ impl fmt::Display for Report {
 
 /// With fewer blocks of validation data nothing is beyond chance.
 const ENOUGH_BLOCKS: usize = 12;
+/// Ratio of prediction errors, new by declared, above which the new vehicle predicts worse.
+const WORSE: f64 = 1.2;
 
 impl Report {
     /// Whether the verdict is empty only because the validation data are short.
@@ -274,7 +276,36 @@ impl Report {
                 writeln!(f, "    {horizon:>4} s  {errors}")?;
             }
         }
+        let worse = self.worse();
+        if !worse.is_empty() {
+            writeln!(
+                f,
+                "warning: the new vehicle predicts worse than the declared one: {}",
+                worse.join("; ")
+            )?;
+        }
         Ok(())
+    }
+
+    /// Prediction errors on held-out flights that the new vehicle makes larger, with their flights.
+    #[must_use]
+    pub fn worse(&self) -> Vec<String> {
+        let mut worse = Vec::new();
+        for (flight, horizons) in &self.held_out {
+            for (horizon, channels) in horizons {
+                let is_worse = |change: &&Change| change.after > WORSE * change.before;
+                worse.extend(channels.iter().filter(|(_, change)| is_worse(change)).map(
+                    |(channel, change)| {
+                        let [before, after] = [change.before, change.after].map(rounded);
+                        format!(
+                            "{channel} after {horizon} s of {flight}, {before} -> {after} {}",
+                            change.unit
+                        )
+                    },
+                ));
+            }
+        }
+        worse
     }
 
     fn write_rest(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -303,5 +334,38 @@ fn rounded(value: f64) -> String {
         format!("{value:.0}")
     } else {
         format!("{value:.3e}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_new_vehicle_that_predicts_worse_is_told() {
+        let change = |before, after| Change { before, after, unit: "m" };
+        let channels = BTreeMap::from([("position", change(0.1, 0.25)), ("velocity", change(0.1, 0.11))]);
+        let mut report = Report {
+            vehicle: String::new(),
+            flights: Vec::new(),
+            verdict: Vec::new(),
+            effects: BTreeMap::new(),
+            whiteness: BeforeAfter { before: BTreeMap::new(), after: BTreeMap::new() },
+            time_offsets_s: BTreeMap::new(),
+            faults: Vec::new(),
+            trims: Vec::new(),
+            held_out: Changes::from([("leg 2".to_owned(), BTreeMap::from([("0.5".to_owned(), channels)]))]),
+            fitted: Changes::new(),
+            noise_floor: BTreeMap::new(),
+            unexplained: BTreeMap::new(),
+            not_identifiable: Vec::new(),
+            block_s: 1.0,
+            test_blocks: 20,
+        };
+        let line = "warning: the new vehicle predicts worse than the declared one: position after 0.5 s of leg 2, 0.1000 -> \
+                    0.2500 m\n";
+        assert!(report.to_string().contains(line), "{report}");
+        report.held_out.clear();
+        assert!(!report.to_string().contains("warning"), "{report}");
     }
 }

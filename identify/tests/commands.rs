@@ -115,10 +115,13 @@ fn commands_that_are_written_on_change_hold_until_the_next() {
     assert!(without_key.as_ref().map_or(true, |compared_s| *compared_s < 25.0), "{without_key:?}");
 }
 
+/// A change that makes a flight unusable.
+type Change = fn(&mut Flight);
+
 #[test]
 fn a_flight_that_cannot_be_used_says_why() {
     let case = heavy(8.0);
-    let cases: [(&str, fn(&mut Flight)); 6] = [
+    let cases: [(&str, Change); 6] = [
         ("it has no command channel; declare `command`", |flight| flight.command = Channel::default()),
         ("it has no motion; declare `attitude`", |flight| {
             flight.attitude = Channel::default();

@@ -1,11 +1,14 @@
 //! Plain reading from the disk: regular files only, and texts up to a limit.
 
-use std::fs::File;
+use std::fs::{File, Metadata};
 use std::io::{Error, ErrorKind, Read as _, Result};
+use std::os::unix::fs::MetadataExt as _;
 use std::path::Path;
 
 /// The longest text that is read. People write a thousandth of it.
 pub const TEXT_BYTES_MAX: u64 = 16 << 20;
+/// Readings of a file that is written to meanwhile, before it is refused.
+const READINGS_MAX: u32 = 5;
 
 /// Reads the file at `path`, of any length, from the disk. Every call reads anew: files of a run or a fit are read with
 /// [`InputFiles`](crate::InputFiles).
@@ -16,19 +19,43 @@ pub const TEXT_BYTES_MAX: u64 = 16 << 20;
 /// ```
 ///
 /// # Errors
-/// If the file cannot be read, or is a device or a pipe, which have no end that could be read to.
+/// If the file cannot be read, is written to meanwhile, or is a device or a pipe, which have no end that could be read to.
 pub fn read_bytes(path: &Path) -> Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    open(path)?.read_to_end(&mut bytes)?;
-    Ok(bytes)
+    read_up_to(u64::MAX, path)
 }
 
 /// Reads the file at `path` if it is short enough for a text.
 pub(crate) fn read_text_bytes(path: &Path) -> Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    open(path)?.take(TEXT_BYTES_MAX + 1).read_to_end(&mut bytes)?;
+    let bytes = read_up_to(TEXT_BYTES_MAX + 1, path)?;
     require_text_length(&bytes)?;
     Ok(bytes)
+}
+
+fn read_up_to(length_max: u64, path: &Path) -> Result<Vec<u8>> {
+    unchanged(path, |file| {
+        let mut bytes = Vec::new();
+        file.take(length_max).read_to_end(&mut bytes)?;
+        Ok(bytes)
+    })
+}
+
+/// What `read` gives of a file that does not change meanwhile: one that is written in place would be half of one version
+/// and half of another.
+fn unchanged(path: &Path, mut read: impl FnMut(&mut File) -> Result<Vec<u8>>) -> Result<Vec<u8>> {
+    for _ in 0..READINGS_MAX {
+        let mut file = open(path)?;
+        let before = version(&file.metadata()?);
+        let bytes = read(&mut file)?;
+        if before == version(&file.metadata()?) {
+            return Ok(bytes);
+        }
+    }
+    Err(Error::other("it is written to while it is read; wait until it is complete"))
+}
+
+/// Length of a file, and when it was written to last.
+fn version(of: &Metadata) -> (u64, i64, i64) {
+    (of.len(), of.mtime(), of.mtime_nsec())
 }
 
 /// Refuses bytes that are too long for a text.
@@ -48,6 +75,8 @@ fn open(path: &Path) -> Result<File> {
 #[cfg(test)]
 mod tests {
     use super::{TEXT_BYTES_MAX, read_bytes, read_text_bytes};
+    use std::fs::File;
+    use std::io::{Read as _, Write as _};
 
     #[test]
     fn a_file_that_does_not_end_is_refused_in_words() {
@@ -58,6 +87,28 @@ mod tests {
         long.as_file().set_len(TEXT_BYTES_MAX + 1).unwrap();
         let error = read_text_bytes(long.path()).unwrap_err();
         assert_eq!(error.to_string(), "it is longer than 16 MiB, and no such text");
+    }
+
+    #[test]
+    fn a_file_that_is_written_to_meanwhile_is_read_anew_or_refused() {
+        let path = tempfile::NamedTempFile::new().unwrap().into_temp_path();
+        let reading = |writes: u32| {
+            std::fs::write(&path, "start").unwrap();
+            let mut readings = 0;
+            super::unchanged(&path, |file| {
+                let mut bytes = Vec::new();
+                file.read_to_end(&mut bytes)?;
+                readings += 1;
+                if readings <= writes {
+                    File::options().append(true).open(&path)?.write_all(b"+")?;
+                }
+                Ok(bytes)
+            })
+        };
+        assert_eq!(reading(0).unwrap(), b"start");
+        assert_eq!(reading(2).unwrap(), b"start++");
+        let refused = reading(u32::MAX).unwrap_err().to_string();
+        assert!(refused.contains("wait until it is complete"), "{refused}");
     }
 
     #[test]

@@ -61,7 +61,7 @@ pub trait Backend {
 }
 
 /// The most vehicles that share a room, this one included.
-pub const TRAFFIC_MAX: usize = 16;
+pub const TRAFFIC_MAX: usize = 32;
 
 /// Another vehicle of the run.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -83,7 +83,7 @@ mod tests {
         for (place, position) in traffic.position.iter_mut().zip(positions) {
             *place = (*position).into();
         }
-        traffic.velocity = [[1.0, 0.0, 0.0].into(); 16];
+        traffic.velocity = [[1.0, 0.0, 0.0].into(); TRAFFIC_MAX];
         traffic
     }
 

@@ -16,7 +16,7 @@
 //! | `scratch`, `stepping` | a step that is cut at impacts, and what it works with |
 //! | `unsolved` | impulses that were not found |
 //! | `contacts` | when contacts begin and end |
-//! | `rim` | the line along which a disc touches an edge |
+//! | `rim`, `rolling` | a disc's rim on an edge, and rolling |
 //! | `rig` | test rigs: joints and stops |
 
 mod body;
@@ -31,6 +31,7 @@ mod joint_forces;
 mod joints;
 mod rig;
 mod rim;
+mod rolling;
 mod scratch;
 mod solver;
 mod stepping;
@@ -119,6 +120,7 @@ impl Rapier {
         let motion = Motion {
             rig: scene.rig.map(|rig| Rig { mount_B_m: rig.mount_B_m + mount_shift_B_m, ..rig }),
             crash_speed_m_s,
+            disc_radius_m: hull.disc_radius_m,
             inertia_min_kg_m2: vehicle.inertia_kg_m2.symmetric_eigenvalues().min(),
             world: World::new(&hull, scene, free_bodies.tied_pairs()),
             contacts: Contacts::new(1 + scene.thing_count() + TRAFFIC_MAX),

@@ -17,7 +17,7 @@ use serde::Deserialize;
 ///
 /// let context = NodeContext::new("traffic", &["one", "two"]);
 /// let parameters = serde_json::from_str("{}").unwrap();
-/// assert!(bus::Harness::<Traffic>::in_context(parameters, &context).is_ok(), "up to 16 vehicles");
+/// assert!(bus::Harness::<Traffic>::in_context(parameters, &context).is_ok(), "up to 32 vehicles");
 /// ```
 #[derive(Debug)]
 pub struct Traffic;
@@ -35,7 +35,7 @@ pub struct Outputs {
 }
 
 impl Component for Traffic {
-    const INFO: Info = Info::new("traffic", "gathers the states of up to 16 plants");
+    const INFO: Info = Info::new("traffic", "gathers the states of up to 32 plants");
     type Parameters = Parameters;
     type Inputs<'a> = Many<'a, PlantState>;
     type Outputs = Outputs;
@@ -63,5 +63,24 @@ impl Component for Traffic {
             traffic.count += 1;
         }
         Ok(Outputs { traffic })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bus::Harness;
+
+    #[test]
+    fn as_many_as_a_message_holds_share_a_room_and_no_more() {
+        assert_eq!(Gathered::default().position.len(), TRAFFIC_MAX);
+        let names: Vec<String> = (0..=TRAFFIC_MAX).map(|number| format!("h{number:02}")).collect();
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        let made = |count: usize| {
+            let context = NodeContext::new("traffic", &names[..count]);
+            Harness::<Traffic>::in_context(serde_json::from_str("{}").unwrap(), &context).map(|_| ())
+        };
+        assert_eq!((made(20), made(TRAFFIC_MAX)), (Ok(()), Ok(())));
+        assert!(made(TRAFFIC_MAX + 1).unwrap_err().to_string().contains("at most 32 vehicles"));
     }
 }

@@ -245,9 +245,8 @@ fn a_tumbling_fall_ends_on_the_ground_and_not_in_it() {
         let depth_m = reach_m(&plant, &hull, &-Vector3::z());
         assert!(depth_m < 2e-3, "at tick {tick} it enters the ground by {depth_m} m");
     }
-    // It may still roll on its rim: nothing but the air would stop that.
     assert!(plant.state().body.position_W_m.z < hull.disc_radius_m + 0.01, "it lies on the ground");
-    assert!(plant.state().body.velocity_W_m_s.norm() < 1.0);
+    assert!(plant.state().body.velocity_W_m_s.norm() < 0.05, "it does not roll on");
 }
 
 /// A table of 2 m by 2 m whose top is at 0.7 m, as a box or as a mesh.
@@ -403,4 +402,28 @@ fn a_line_ends_where_the_edge_ends() {
         (spin.y - expected_rad_s).abs() < 1e-4 && spin.x.abs() < 1e-6,
         "{spin:?}, not {expected_rad_s} rad/s"
     );
+}
+
+#[test]
+fn a_vehicle_that_rolls_on_its_rim_slows_down_and_stops() {
+    let (radius_m, speed_m_s) = (hull().disc_radius_m, 0.2);
+    // The disc upright, its axis along y: rolling without slip.
+    let start = RigidBody {
+        attitude_WB: UnitQuaternion::from_axis_angle(&Vector3::x_axis(), -std::f64::consts::FRAC_PI_2),
+        velocity_W_m_s: Vector3::x() * speed_m_s,
+        angular_velocity_B_rad_s: Vector3::z() * (speed_m_s / radius_m),
+        ..RigidBody::level_at(Vector3::z() * radius_m)
+    };
+    let vehicle = common::free_body();
+    let mut plant = common::rapier(NewtonEuler::new(vehicle.clone(), 2), &Scene::default(), &start, 1e9);
+    fly(&mut plant, &[0.0; 4], 1_000);
+    // The ground carries it 0.02 radii ahead of the contact.
+    let carried_kg = vehicle.mass_kg + vehicle.inertia_kg_m2.m33 / (radius_m * radius_m);
+    let slows_m_s2 = 0.02 * vehicle.mass_kg * 9.81 / carried_kg;
+    let expected_m_s = speed_m_s - slows_m_s2;
+    let found_m_s = plant.state().body.velocity_W_m_s.x;
+    assert!((found_m_s - expected_m_s).abs() < 2e-3, "{found_m_s} m/s, not {expected_m_s} m/s");
+    fly(&mut plant, &[0.0; 4], 1_000);
+    let body = plant.state().body;
+    assert!(body.velocity_W_m_s.norm() < 1e-6 && body.angular_velocity_B_rad_s.norm() < 1e-6, "{body:?}");
 }

@@ -162,7 +162,7 @@ fn a_tower_of_ten_with_the_heavy_ones_on_top_stands() {
         .collect();
     let mut stack = Stack::new(&cubes, 0.5, 2);
     let (fastest_m_s, farthest_m) = stack.fastest_m_s(1_000, 9);
-    assert!(fastest_m_s < 1e-5 && farthest_m < 1e-5, "{fastest_m_s} m/s, {farthest_m} m");
+    assert!(fastest_m_s < 1e-4 && farthest_m < 1e-6, "{fastest_m_s} m/s, {farthest_m} m");
     assert_eq!(stack.plant.trouble(), None);
 }
 

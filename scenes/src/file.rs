@@ -36,6 +36,9 @@ const SCALE: Bounds = Bounds {
     why: "a unit of a mesh file is a micrometre at least and a kilometre at most",
 };
 
+/// Longest sides of meshes: a nut is longer, and a mountain range is not.
+const MESH_SIZE_M: std::ops::RangeInclusive<f64> = 1e-3..=1e4;
+
 /// Coulomb's coefficient.
 const FRICTION: Bounds = Bounds {
     min: 0.0,
@@ -264,12 +267,26 @@ fn one_mesh(
     let mesh = Mesh { name, file, corners_W_m, faces: triangles.faces, solidity, surface, body };
     let mut mesh = mesh.without_lines();
     mesh.shape().map_err(refused)?;
+    check_size(&mesh, scale_m).map_err(refused)?;
     mesh.body = keys.map(|keys| {
         let (centre_W_m, spread_m2) = body::solid_moments(&mesh.corners_W_m, &mesh.faces);
         // Along the file's axes, which are turned.
         keys.body(turn.transpose() * spread_m2 * turn, centre_W_m, yaw_rad)
     });
     Ok(mesh)
+}
+
+/// Refuses a mesh of a size that nothing has.
+fn check_size(mesh: &Mesh, scale_m: f64) -> Result<(), String> {
+    let [low, high] = mesh.extent_W_m();
+    let size_m = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f64::max);
+    if MESH_SIZE_M.contains(&size_m) {
+        return Ok(());
+    }
+    let (min, max) = (MESH_SIZE_M.start(), MESH_SIZE_M.end());
+    Err(format!(
+        "its longest side is {size_m:e} m with a unit of {scale_m} m, expected {min} m to {max} m: correct `scale`"
+    ))
 }
 
 /// What `section` says of its surface, and what `otherwise` says where it is silent.

@@ -15,7 +15,7 @@
 //! | [`rig`] | the test rigs that a vehicle hangs from |
 //! | [`mod@reference`] | the scene files of this crate, as text |
 //! | `file` | which keys a scene file has |
-//! | `mesh_file` | triangles of OBJ, STL and glTF files |
+//! | `mesh_file`, `triangles`; `obj`, `stl`, `glb` | triangles of mesh files; of each format |
 //!
 //! ```
 //! let scene = scenes::Scene::parse(scenes::reference::ROOM, "room.toml")?;
@@ -26,15 +26,19 @@
 
 pub mod body;
 mod file;
+mod glb;
 pub mod joint;
 pub mod mesh;
 mod mesh_file;
+mod obj;
 pub mod ray;
 pub mod reference;
 pub mod rig;
 pub mod scene;
+mod stl;
 pub mod surface;
 mod tied;
+mod triangles;
 
 pub use body::{BodyPose, FreeBody};
 pub use file::BODIES_MAX;

@@ -6,6 +6,7 @@ use crate::surface::Surface;
 use parry3d_f64::math::Vector;
 use parry3d_f64::shape::{SharedShape, TriMesh, TriMeshFlags};
 use std::collections::BTreeMap;
+use std::fmt;
 use std::path::PathBuf;
 
 /// Two triangles that meet at less than this are one face to the eye: 10 degrees; tuned, no source.
@@ -115,7 +116,8 @@ impl Mesh {
         let mut numbers = BTreeMap::new();
         let mut corners = Vec::new();
         let mut number = |corner: u32| {
-            let place = self.corners_W_m[corner as usize];
+            // Of the two zeros one.
+            let place = self.corners_W_m[corner as usize].map(|number| number + 0.0);
             *numbers.entry(place.map(f64::to_bits)).or_insert_with(|| {
                 corners.push(Vector::from(place));
                 corners.len() as u32 - 1
@@ -123,6 +125,28 @@ impl Mesh {
         };
         let faces = self.faces.iter().map(|face| face.map(&mut number)).collect();
         (corners, faces)
+    }
+
+    /// The lowest and the highest coordinates of its corners, in the world.
+    #[must_use]
+    pub fn extent_W_m(&self) -> [[f64; 3]; 2] {
+        let used = || self.faces.iter().flatten().map(|&corner| self.corners_W_m[corner as usize]);
+        let along = |bound: fn(f64, f64) -> f64, from: f64| {
+            [0, 1, 2].map(|axis| used().map(|corner| corner[axis]).fold(from, bound))
+        };
+        [along(f64::min, f64::INFINITY), along(f64::max, f64::NEG_INFINITY)]
+    }
+
+    /// True if it has no border: each edge of a triangle is one of another too, the other way round.
+    #[must_use]
+    pub fn is_closed(&self) -> bool {
+        let mut edges: BTreeMap<[u32; 2], i64> = BTreeMap::new();
+        for face in self.welded().1 {
+            for [a, b] in [[0, 1], [1, 2], [2, 0]].map(|edge| edge.map(|corner: usize| face[corner])) {
+                *edges.entry([a.min(b), a.max(b)]).or_default() += if a < b { 1 } else { -1 };
+            }
+        }
+        edges.values().all(|sum| *sum == 0)
     }
 
     /// The edges that the eye sees, as pairs of corners: those of one triangle, and those where two meet at an angle.
@@ -159,6 +183,21 @@ impl Mesh {
         let normal = along.cross(across);
         let is_face = normal.length() > LINE_MAX * along.length_squared().max(across.length_squared());
         is_face.then(|| normal.normalize())
+    }
+}
+
+impl fmt::Display for Mesh {
+    /// What it has, in a line.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [low, high] = self.extent_W_m();
+        let [x, y, z] = [0, 1, 2].map(|axis| high[axis] - low[axis]);
+        let closed = if self.is_closed() { "closed" } else { "open" };
+        write!(
+            f,
+            "{}: {} triangles, {closed}, {x:.3} x {y:.3} x {z:.3} m, from {low:.3?} to {high:.3?} m",
+            self.name,
+            self.faces.len()
+        )
     }
 }
 

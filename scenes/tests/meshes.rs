@@ -154,6 +154,91 @@ fn a_gltf_nodes_place_and_scale_are_heeded() {
 }
 
 #[test]
+fn a_mirrored_node_keeps_its_outside_outside() {
+    let place = "position = PLACE\nsolid = \"convex\"\n";
+    for moved in [
+        r#","scale":[-1,1,1]"#,
+        r#","scale":[1,-2,1]"#,
+        r#","scale":[-1,-1,-1]"#,
+        r#","scale":[-1,-1,1]"#,
+        r#","matrix":[0,1,0,0, 1,0,0,0, 0,0,1,0, 0,0,0,1]"#,
+    ] {
+        let scene = with_mesh("box.glb", place, glb(moved)).unwrap_or_else(|told| panic!("{moved}: {told}"));
+        assert!(scene.meshes[0].is_closed(), "{moved}");
+    }
+}
+
+#[test]
+fn a_node_below_itself_is_refused() {
+    let children = br#""children":["#;
+    let at = glb("").windows(children.len()).position(|bytes| bytes == children).unwrap() + children.len();
+    let mut itself = glb("");
+    itself[at] = b'0';
+    assert!(with_mesh("box.glb", TURNED, itself).unwrap_err().contains("stands below itself"));
+}
+
+/// A wall of 4 by 3 with a doorway of 1 by 2, across the x axis.
+const WALL: &str =
+    "v 0 -1.5 0\nv 0 -0.5 0\nv 0 -0.5 2\nv 0 0.5 2\nv 0 0.5 0\nv 0 2.5 0\nv 0 2.5 3\nv 0 -1.5 3\n";
+
+#[test]
+fn a_wall_of_one_polygon_has_its_doorway() {
+    for faces in ["f 1 2 3 4 5 6 7 8\n", "f 5 6 7 8 1 2 3 4\n", "f 8 7 6 5 4 3 2 1\n"] {
+        let scene = with_mesh(
+            "wall.obj",
+            "position = PLACE\nsolid = \"triangles\"\n",
+            format!("{WALL}{faces}").into(),
+        )
+        .unwrap();
+        let caster = RayCaster::new(&scene);
+        let meets = |y: f64, z: f64| {
+            caster.distance_m(&Vector3::new(0.0, 20.0 + y, 0.5 + z), &Vector3::x(), 100.0).is_some()
+        };
+        assert!(!meets(0.0, 1.0) && !meets(0.4, 1.9) && !meets(-0.4, 0.1), "{faces}");
+        assert!(meets(0.0, 2.5) && meets(-1.0, 1.0) && meets(1.5, 0.5) && meets(2.4, 2.9), "{faces}");
+    }
+}
+
+#[test]
+fn what_a_mesh_has_is_told() {
+    let of =
+        |file: &str, bytes: Vec<u8>| with_mesh(file, TURNED, bytes).unwrap().meshes.remove(0).to_string();
+    let expected = "box: 12 triangles, closed, 2.000 x 1.000 x 3.000 m, from [8.000, 20.000, 0.500] to [10.000, 21.000, 3.500] m";
+    for told in [
+        of("box.obj", obj()),
+        of("box.stl", ascii_stl()),
+        of("box.stl", binary_stl()),
+        of("box.glb", glb("")),
+    ] {
+        assert_eq!(told, expected);
+    }
+    let open = format!("{WALL}f 1 2 3 4 5 6 7 8\n");
+    assert!(of("wall.obj", open.into()).starts_with("box: 6 triangles, open, "));
+}
+
+#[test]
+fn a_mesh_of_a_size_that_nothing_has_is_refused() {
+    let scaled = |factor: f64| {
+        let corner = |bits| corner(bits).map(|length| f64::from(length) * factor);
+        let corners = (0..8).map(corner).map(|[x, y, z]| format!("v {x:e} {y:e} {z:e}\n"));
+        let faces =
+            FACES.map(|face| format!("f {}\n", face.map(|corner| (corner + 1).to_string()).join(" ")));
+        corners.chain(faces).collect::<String>().into_bytes()
+    };
+    for (factor, size) in [(1e30, "3e30 m"), (1e4, "3e4 m"), (1e-4, "e-4 m")] {
+        let told = with_mesh("box.obj", TURNED, scaled(factor)).unwrap_err();
+        assert!(
+            told.contains("its longest side is") && told.contains(size) && told.contains("correct `scale`"),
+            "{told}"
+        );
+    }
+    assert!(
+        with_mesh("box.obj", TURNED, scaled(1e3)).is_ok()
+            && with_mesh("box.obj", TURNED, scaled(1e-3)).is_ok()
+    );
+}
+
+#[test]
 fn rays_meet_the_triangles_and_the_hull() {
     for (solid, inside_m) in [("triangles", 1.0), ("convex", 0.0)] {
         let more = TURNED.replace("triangles", solid);

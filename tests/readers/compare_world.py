@@ -229,6 +229,28 @@ def compare_tip(told, cases):
         row(f"tip over an edge: tilt after {at} ms", "rad", tilt(states[at][7:11]), mujoco=(theirs, 2e-3))
 
 
+def compare_stack(told, cases):
+    """A box of 10 kg falls on one of 0.1 kg."""
+    states = np.array(cases["heavy on light"])
+    cubes = "".join(
+        f'<body pos="{place}"><freejoint/><geom type="box" size="0.1 0.1 0.1" mass="{mass}" contype="3" conaffinity="3" '
+        f'friction="0.5 0 0" {STIFF}/></body>'
+        for place, mass in [("0 0 0.1", 0.1), ("0.03 0.02 0.7", 10)]
+    )
+    model, data = world(told, GROUND.format(STIFF) + cubes, step_s=2e-5)
+    fastest = 0.0
+    for _ in range(50_000):
+        mujoco.mj_step(model, data)
+        fastest = max(fastest, np.linalg.norm(data.qvel[6:9]))
+    fall = np.sqrt(2 * told["gravity"] * 0.4)
+    what = "10 kg fall 0.4 m on 0.1 kg"
+    ours = max(np.linalg.norm(states[:, 10:13], axis=1))
+    row(f"{what}: greatest speed", "m/s", ours, closed=(fall, 0.01), mujoco=(fastest, 0.01))
+    row(f"{what}: height of the heavy box at rest", "m", states[-1][9], closed=(0.3, 2e-6), mujoco=(data.qpos[9], 1e-4))
+    row(f"{what}: way of the light box aside", "m", np.hypot(*states[-1][1:3]), closed=(0.0, 1e-6),
+        mujoco=(np.hypot(*data.qpos[:2]), 1e-3))
+
+
 def rig(told, start, slides):
     """The vehicle on a ball joint that turns up to the cone; the joint on a slider with a mass, or in the world."""
     mount, height = told["rig"]["mount"], told["rig"]["bearing"]
@@ -399,7 +421,7 @@ def main():
     comparisons = [compare_tumble, compare_plain_chirps]
     if arguments.all:
         comparisons += [compare_rotorpy, compare_dop853]
-    comparisons += [compare_bounces, compare_slide, compare_rest, compare_tip, compare_rigs, compare_chain]
+    comparisons += [compare_bounces, compare_slide, compare_rest, compare_tip, compare_stack, compare_rigs, compare_chain]
     for compare in comparisons:
         if arguments.only is None or compare.__name__ == f"compare_{arguments.only}":
             compare(told, told["cases"])

@@ -102,6 +102,12 @@ fn check_prints_slow_nodes_at_their_rate_and_takes_overrides() {
 }
 
 #[test]
+fn check_prints_what_the_meshes_of_a_scene_have() {
+    let ended = Place::new().call(&["check", &repository("manifests/office.toml")]).with_code(0);
+    ended.prints(&["meshes of ", "scenes/office.toml:\n  desk: 60 triangles, ", " m, from [", "  lamp: "]);
+}
+
+#[test]
 fn check_prints_the_graph_as_json() {
     let graph = Place::new().call(&["check", &hover(), "--json"]).with_code(0).json();
     assert_eq!(

@@ -197,16 +197,33 @@ fn a_stored_copy_that_was_changed_is_refused() {
 
 #[test]
 fn the_files_of_a_command_are_part_of_the_run() {
+    use crate::nodes::{manifest, sender};
     let place = Place::new();
-    let refused = |keys: &str| {
-        let command = format!("[process.other]\ncommand = [\"/bin/true\"]\n{keys}\n");
-        let manifest = manifest(&place, 0.3, &command);
-        place.call(&["check", &manifest])
+    let keys = |expected: &str| {
+        format!("data = \"list.txt\"\non_exit = \"restart\"\nparameters.expected_text = {expected:?}")
     };
-    refused("vehicle = \"missing.toml\"")
-        .with_code(2)
-        .says(&["process `other`: `vehicle`: cannot read", "missing.toml"]);
-    refused("data = \"/dev/null\"").with_code(0);
+    place.write("list.txt", "old");
+    let flown = place.write("list.toml", manifest(300, &[sender("reader", 1, &keys("old"))]));
+    let mut launch = start(&place, &flown, &place.path("list.mcap"));
+    launch.hold_at(100);
+    place.write("list.txt", "new");
+    kill_process(place.process_of("reader"), Signal::KILL).unwrap();
+    launch.release();
+    launch.end().with_code(0);
+    // The node looks at what it gets.
+    place.call(&["run", &flown]).with_code(2).says(&["list.txt holds \"new\""]);
+}
+
+#[test]
+fn a_model_of_a_command_has_to_be_there_and_its_data_may_be_a_device() {
+    let place = Place::new();
+    let check = |keys: &str| {
+        let command = format!("[process.other]\ncommand = [\"/bin/true\"]\n{keys}\n");
+        place.call(&["check", &manifest(&place, 0.3, &command)])
+    };
+    let ended = check("vehicle = \"missing.toml\"").with_code(2);
+    ended.says(&["process `other`: `vehicle`: cannot read", "missing.toml", "relative to the manifest"]);
+    check("data = \"/dev/null\"").with_code(0);
 }
 
 /// The flights of a validation are flown one after the other: the edit comes while the first one flies.

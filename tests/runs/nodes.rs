@@ -6,7 +6,7 @@ use bus::plan::Plan;
 use bus::process::RUN_VARIABLE;
 use bus::{BusError, Input, Message, NODE_VARIABLE, Node, Tick};
 use serde::Deserialize;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What a test node sends: when it computed, and what it saw.
 #[derive(Clone, Copy, Default, Message)]
@@ -52,6 +52,9 @@ struct Parameters {
     /// How long the node sleeps at that tick.
     #[serde(default)]
     nap_ms: u64,
+    /// A file, and the text that has to be in it.
+    data: Option<PathBuf>,
+    expected_text: Option<String>,
 }
 
 #[derive(Clone, Copy, Deserialize)]
@@ -98,6 +101,12 @@ fn a_process_started_by_a_launcher_is_a_node() {
 fn run() -> Result<(), BusError> {
     let mut node = Node::join()?;
     let parameters: Parameters = node.parameters()?;
+    if let Some(path) = &parameters.data {
+        let text = node.files().text(path).map_err(|cause| node.error(cause))?;
+        if Some(&text) != parameters.expected_text.as_ref() {
+            return Err(node.error(format!("{} holds {text:?}", path.display())));
+        }
+    }
     if parameters.has_other_layout {
         let output = node.output::<OtherNote>("note")?;
         return node.run(|tick| {

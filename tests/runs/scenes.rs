@@ -155,10 +155,10 @@ fn what_free_flight_does_not_know_is_refused() {
 }
 
 #[test]
-fn a_start_that_is_no_number_and_a_traffic_of_seventeen_are_refused() {
+fn a_start_that_is_no_number_and_a_traffic_of_thirty_three_are_refused() {
     refused("kind = \"plant\"", "kind = \"plant\"\nparameters.initial_yaw_deg = §nan")
         .says(&["initial_yaw_deg"]);
-    let inputs: Vec<String> = (0..17).map(|number| format!("h{number} = \"/plant/state\"")).collect();
+    let inputs: Vec<String> = (0..33).map(|number| format!("h{number} = \"/plant/state\"")).collect();
     let traffic = format!("[process.§traffic]\nkind = \"traffic\"\ninputs = {{ {} }}\n", inputs.join(", "));
-    refused_text(&(good() + &traffic)).says(&["at most 16 vehicles"]);
+    refused_text(&(good() + &traffic)).says(&["at most 32 vehicles"]);
 }

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use crate::bounds;
 use crate::command::CommandMap;
 use crate::effects;
+use crate::foreign;
 use crate::provenance::{Provenance, Uncertainty};
 use crate::reader::{Document, Quantity, Section};
 use crate::vehicle::{MotorModel, Rotor, Vehicle};
@@ -64,6 +65,7 @@ impl Vehicle {
         file_name: &str,
         read: &dyn Fn(&Path) -> io::Result<String>,
     ) -> Result<Self, Diagnostic> {
+        refuse_xml(text, file_name)?;
         let doc = Document::new(file_name, text);
         let tree = doc.tree()?;
         let root = Section::new(&doc, String::new(), 0..0, tree.get_ref());
@@ -79,6 +81,17 @@ impl Vehicle {
         let table: toml::Table = text.parse().ok()?;
         Some(beside(path, table.get("base")?.as_str()?))
     }
+}
+
+/// Refuses the robot descriptions of other programs by their names.
+fn refuse_xml(text: &str, file_name: &str) -> Result<(), Diagnostic> {
+    if !text.trim_start_matches('\u{feff}').trim_start().starts_with('<') {
+        return Ok(());
+    }
+    let found = foreign::robot(text.as_bytes()).unwrap_or("XML");
+    let help = "docs/vehicles.md has the keys of vehicle files, and the way from a robot description to a vehicle file";
+    Err(Diagnostic::in_file(file_name, format!("expected a vehicle file, which is TOML, found {found}"))
+        .help(help))
 }
 
 /// The path that a file at `path` calls `other`.

@@ -2,11 +2,13 @@
 
 use std::fmt;
 
+use crate::encoding;
+
 /// A file that is not of the format that its reader expects.
 ///
 /// ```
 /// let found = vehicles::foreign::of(b"\x1f\x8b\x08\x00...").unwrap();
-/// assert_eq!(found.to_string(), "it is compressed (gzip), which is not read; unpack it: `gunzip FILE`");
+/// assert_eq!(found.to_string(), "it is compressed (gzip), which is not read here; unpack it: `gunzip FILE`");
 /// assert!(vehicles::foreign::of(b"t,x\n0,1\n").is_none());
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,7 +21,7 @@ pub struct Foreign {
 
 impl fmt::Display for Foreign {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "it is {}, which is not read; {}", self.name, self.advice)
+        write!(f, "it is {}, which is not read here; {}", self.name, self.advice)
     }
 }
 
@@ -51,11 +53,7 @@ const MAGIC: [Magic; 33] = [
         "a database (SQLite; ROS 2 bags with the ending .db3 are such)",
         "make an MCAP file of the bag: `mcap convert FILE.db3 FILE.mcap`",
     ),
-    (
-        b"\xa3\x95",
-        "a DataFlash log (ArduPilot's .BIN)",
-        "write its messages as CSV: `mavlogdump.py --format csv --types RATE FILE.BIN > FILE.csv` (Python package pymavlink)",
-    ),
+    (b"\xa3\x95", "a dataflash log (ArduPilot's .BIN)", IN_FLIGHTS),
     (
         b"H Product:Blackbox flight data recorder",
         "a Blackbox log (Betaflight, INAV)",
@@ -119,11 +117,18 @@ const TEXTS: [Magic; 8] = [
     (b"<!doctype html", "a web page (HTML)", "download the file itself; the page may ask for a login"),
     (b"<html", "a web page (HTML)", "download the file itself; the page may ask for a login"),
     (b"<?xml", "XML", EXPORT),
-    (b"<robot", "a robot description (URDF)", EXPORT),
-    (b"<sdf", "a robot description (SDF)", EXPORT),
+    (b"<robot", ROBOTS[0].1, EXPORT),
+    (b"<sdf", ROBOTS[1].1, EXPORT),
     (b"{", "JSON", FROM_PANDAS),
     (b"[{", "JSON", FROM_PANDAS),
     (b"rosbag2_bagfile_information:", "the metadata of a ROS 2 bag", "name the .mcap file beside it"),
+];
+
+/// Elements of robot descriptions in XML.
+const ROBOTS: [(&[u8], &str); 3] = [
+    (b"<robot", "a robot description (URDF)"),
+    (b"<sdf", "a robot description (SDF)"),
+    (b"<mujoco", "a robot description (MJCF of MuJoCo)"),
 ];
 
 /// Number of bytes that are looked at for the kind of a file.
@@ -148,8 +153,21 @@ pub fn of(bytes: &[u8]) -> Option<Foreign> {
     if first.get(TAR.0..).is_some_and(|rest| rest.starts_with(TAR.1)) {
         return Some(Foreign { name: "an archive (tar)", advice: "unpack it: `tar xf FILE`" });
     }
-    let by_magic = MAGIC.iter().find(|magic| first.starts_with(magic.0)).map(named);
+    // A short word can be the name of a column.
+    let is_word = |magic: &Magic| magic.0.len() <= 4 && magic.0.is_ascii() && !has_control(magic.0);
+    let is_binary = has_control(first) || !first.is_ascii();
+    let is_meant = |magic: &&Magic| first.starts_with(magic.0) && (is_binary || !is_word(magic));
+    let by_magic = MAGIC.iter().find(is_meant).map(named);
     by_magic.or_else(|| telemetry(first)).or_else(|| text(first)).or_else(|| binary(bytes))
+}
+
+/// True for a control character that texts do not have.
+fn is_control(byte: u8) -> bool {
+    byte.is_ascii_control() && !matches!(byte, b'\t' | b'\n' | b'\r' | 0x0c | 0x1a)
+}
+
+fn has_control(bytes: &[u8]) -> bool {
+    bytes.iter().any(|byte| is_control(*byte))
 }
 
 /// MAVLink messages behind a time each, big-endian in microseconds since 1970, as ground stations write them.
@@ -164,10 +182,23 @@ fn telemetry(first: &[u8]) -> Option<Foreign> {
 
 fn text(first: &[u8]) -> Option<Foreign> {
     let trimmed = first.strip_prefix(b"\xef\xbb\xbf").unwrap_or(first).trim_ascii_start();
-    let begins = |magic: &&Magic| {
-        trimmed.get(..magic.0.len()).is_some_and(|begin| begin.eq_ignore_ascii_case(magic.0))
-    };
+    let begins = |magic: &&Magic| begins_with(trimmed, magic.0);
+    if let Some(name) = robot(first).filter(|_| begins_with(trimmed, b"<?xml")) {
+        return Some(Foreign { name, advice: EXPORT });
+    }
     TEXTS.iter().find(begins).map(|magic| Foreign { name: magic.1, advice: magic.2 })
+}
+
+fn begins_with(text: &[u8], begin: &[u8]) -> bool {
+    text.get(..begin.len()).is_some_and(|found| found.eq_ignore_ascii_case(begin))
+}
+
+/// Returns the name of the robot description that a text begins, whatever stands above its first element.
+#[must_use]
+pub fn robot(text: &[u8]) -> Option<&'static str> {
+    let first = &text[..text.len().min(LOOKED_AT)];
+    let has = |element: &[u8]| first.windows(element.len()).any(|window| window == element);
+    ROBOTS.iter().find(|(element, _)| has(element)).map(|(_, name)| *name)
 }
 
 /// Bytes that are no text: only zeros, or too many control characters. UTF-16 is a text.
@@ -177,39 +208,10 @@ fn binary(bytes: &[u8]) -> Option<Foreign> {
         let advice = "copy it again: it was not written to its end, or the card is damaged";
         return Some(Foreign { name: "a file of zeros", advice });
     }
-    let is_control =
-        |byte: &&u8| byte.is_ascii_control() && !matches!(**byte, b'\t' | b'\n' | b'\r' | 0x0c | 0x1a);
-    let control = first.iter().filter(is_control).count();
+    let control = first.iter().filter(|byte| is_control(**byte)).count();
     let is_binary = control as f64 > CONTROL_SHARE * first.len() as f64;
-    (is_binary && utf16(bytes).is_none())
+    (is_binary && encoding::utf16(bytes).is_none())
         .then_some(Foreign { name: "binary, of an unknown format", advice: EXPORT })
-}
-
-/// Order of the two bytes of a character.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Utf16 {
-    /// The low byte first.
-    Little,
-    /// The high byte first.
-    Big,
-}
-
-/// The order of bytes of a text in UTF-16: by its mark, else by where the zeros of its ASCII characters are.
-#[must_use]
-pub fn utf16(bytes: &[u8]) -> Option<Utf16> {
-    const PAIRS_MIN: usize = 2;
-    match bytes {
-        [0xFF, 0xFE, ..] => return Some(Utf16::Little),
-        [0xFE, 0xFF, ..] => return Some(Utf16::Big),
-        _ => {}
-    }
-    let pairs = || bytes[..bytes.len().min(LOOKED_AT)].chunks_exact(2);
-    let is_text = |byte: u8| matches!(byte, b'\t' | b'\n' | b'\r' | b' '..=b'~');
-    let all = |holds: &dyn Fn(&[u8]) -> bool| pairs().count() >= PAIRS_MIN && pairs().all(holds);
-    if all(&|pair| pair[1] == 0 && is_text(pair[0])) {
-        return Some(Utf16::Little);
-    }
-    all(&|pair| pair[0] == 0 && is_text(pair[1])).then_some(Utf16::Big)
 }
 
 #[cfg(test)]
@@ -223,13 +225,13 @@ mod tests {
     #[test]
     fn formats_are_named_by_their_first_bytes_with_what_converts_them() {
         let tar = [vec![b'a'; 257], b"ustar\x0000".to_vec()].concat();
-        let cases: [(&[u8], &str, &str); 34] = [
+        let cases: [(&[u8], &str, &str); 35] = [
             (b"#ROSBAG V2.0\n", "a bag of ROS 1", "rosbags-convert"),
             (b"SQLite format 3\0", ".db3", "mcap convert"),
-            (b"\xa3\x95\x80\x80YFMT", "ArduPilot", "mavlogdump.py"),
+            (b"\xa3\x95\x80\x80YFMT", "ArduPilot", "flights file"),
             (b"H Product:Blackbox flight data recorder by N", "Blackbox", "blackbox_decode"),
             (b"\x1f\x8b\x08\0", "gzip", "gunzip"),
-            (b"BZh91AY&SY", "bzip2", "bunzip2"),
+            (b"BZh91AY&SY\xf4\x02", "bzip2", "bunzip2"),
             (b"\xfd7zXZ\0", "xz", "unxz"),
             (b"\x28\xb5\x2f\xfd", "Zstandard", "unzstd"),
             (b"\x04\x22\x4d\x18", "LZ4", "unlz4"),
@@ -253,7 +255,8 @@ mod tests {
             (b"\x89MCAP0\r\n\x01", "MCAP", "flights file"),
             (b"\0\x05\x9f\0\0\0\0\0\xfd\x1c", "telemetry", "mavlogdump.py"),
             (b"  <!DOCTYPE HTML><html>", "web page", "download"),
-            (b"<?xml version=\"1.0\"?><robot>", "XML", "CSV"),
+            (b"<?xml version=\"1.0\"?><log>", "XML", "CSV"),
+            (b"<?xml version=\"1.0\"?>\n<!-- mine -->\n<robot>", "URDF", "CSV"),
             (b"\xef\xbb\xbf{\"t\": [0, 1]}", "JSON", "CSV"),
             (b"\x7fELF\x02", "program", "name the log"),
             (b"\x01\x02\x03\x04\x05\x06\x07\x08\x00\x01\x02", "unknown format", "CSV"),
@@ -276,8 +279,9 @@ mod tests {
                 .flat_map(|unit| if big { unit.to_be_bytes() } else { unit.to_le_bytes() })
                 .collect()
         };
-        let texts: [&[u8]; 9] = [
+        let texts: [&[u8]; 10] = [
             b"t,x\n0,1\n",
+            b"PAR1,PAR2\n0,1\n",
             b"\xef\xbb\xbft;x\r\n0;1\r\n",
             b"# made by a logger\nt,x\n0,1\n",
             b"\"t\",\"x\"\n0,1\n",
@@ -290,8 +294,5 @@ mod tests {
         for bytes in texts {
             assert_eq!(of(bytes), None, "{bytes:?}");
         }
-        assert_eq!(utf16(texts[6]), Some(Utf16::Little));
-        assert_eq!(utf16(texts[7]), Some(Utf16::Big));
-        assert_eq!((utf16(b"t,x\n"), utf16(b"")), (None, None));
     }
 }

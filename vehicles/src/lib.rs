@@ -12,8 +12,11 @@
 //! | [`foreign`] | formats that are taken for another one, by their first bytes |
 //! | [`reader`] | walks the TOML tree with positions, refuses what it does not know; scene files and gains files use it too |
 //! | [`quotes`] | quotation marks in CSV files of measurements, whose rows are lines |
+//! | `dialect`, `layout`, `table_error` | delimiter, header and decimal mark of such a table: declared, found, wrong |
+//! | [`lines`], [`encoding`] | lines of texts of any system; UTF-16 |
 //! | [`table`] | tables of measurements in CSV, for every log that has this format |
-//! //! | [`variables`] | variables of the environment within paths |
+//! | [`variables`] | variables of the environment within paths |
+//! | [`wall_clock`] | times of day in logs |
 //! | [`mod@reference`] | the vehicle files of this crate, as text |
 //!
 //! ```
@@ -25,17 +28,23 @@
 
 mod bounds;
 pub mod command;
+mod dialect;
 pub mod effects;
+pub mod encoding;
 mod file;
 pub mod foreign;
 pub mod gaps;
+mod layout;
+pub mod lines;
 pub mod provenance;
 pub mod quotes;
 pub mod reader;
 pub mod reference;
 pub mod table;
+mod table_error;
 pub mod variables;
 pub mod vehicle;
+pub mod wall_clock;
 
 pub use command::CommandMap;
 pub use effects::EffectEntry;

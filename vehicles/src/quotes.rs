@@ -4,6 +4,8 @@
 //! rows up to the next mark or the end of the file, and a reader finds nothing wrong. No logger writes a cell of several
 //! lines: a cell that begins with a mark has to end with one, on its line. The crate `csv` takes any such cell.
 
+use crate::lines;
+
 /// A quotation mark that would swallow what follows it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
@@ -29,16 +31,11 @@ pub struct StrayQuote {
 /// # Errors
 /// Where it stands.
 pub fn check(text: &[u8], delimiter: u8) -> Result<(), StrayQuote> {
-    let mut line = 1;
-    let mut rows = text.split_inclusive(|byte| matches!(byte, b'\n' | b'\r')).peekable();
-    while let Some(row) = rows.next() {
-        let cells = row.strip_suffix(b"\n").or(row.strip_suffix(b"\r")).unwrap_or(row);
-        if cells.contains(&b'"') {
-            check_row(cells, delimiter).map_err(|cell| StrayQuote { line, cell })?;
+    for line in lines::of(text) {
+        let row = &text[line.content];
+        if row.contains(&b'"') {
+            check_row(row, delimiter).map_err(|cell| StrayQuote { line: line.number, cell })?;
         }
-        // Of the two bytes that end a line elsewhere the second counts; the first alone ends one too.
-        let is_half = row.ends_with(b"\r") && rows.peek() == Some(&&b"\n"[..]);
-        line += u64::from(!is_half);
     }
     Ok(())
 }

@@ -1,26 +1,41 @@
 //! Tables of measurements in CSV: a header, then rows that are lines.
 
-use crate::foreign::{self, Foreign};
-use crate::quotes::{self, StrayQuote};
+use crate::encoding;
+use crate::foreign;
+use crate::layout::{self, by_number};
+use crate::lines;
+use crate::quotes;
+
+pub use crate::dialect::{Decimal, Delimiter, Dialect};
+pub use crate::table_error::{ColumnError, TableError, names, shown};
+
+/// Number of rows that are looked at for the decimal mark.
+const ROWS_FOR_MARK: usize = 1000;
 
 /// Rows of one file at most: three hours at 1 kHz. Each takes some hundred bytes of memory, however short its line is.
 const ROWS_MAX: usize = 10_000_000;
 
-/// A file in CSV. Its delimiter is the one of tab, semicolon and comma that the header has most of.
+/// A file in CSV.
 ///
 /// ```
-/// let table = vehicles::table::Table::parse(b"t; a\n0.1; 2\n\n0.2; x\n")?;
-/// let a = table.column("a").unwrap();
+/// use vehicles::table::{Dialect, Table};
+///
+/// let table = Table::parse(b"t; a\n0.1; 2\n\n0.2; x\n", &["t", "a"], &Dialect::default())?;
+/// let a = table.column("a")?;
 /// assert_eq!(table.numbers(a).next(), Some(2.0));
 /// assert!(table.numbers(a).last().unwrap().is_nan(), "no number");
 /// assert_eq!((table.rows[1].line, table.rows[1].cell(a)), (4, "x"));
+/// assert_eq!(table.column("#2"), Ok(a));
 /// # Ok::<(), vehicles::table::TableError>(())
 /// ```
 pub struct Table {
-    /// The names of the columns.
+    /// Names of the columns; `#1`, `#2`, … in a file without a header.
     pub headers: Vec<String>,
+    /// Line of the header, from 1; `None` in a file without one.
+    pub header_line: Option<u64>,
     /// The rows below the header.
     pub rows: Vec<Row>,
+    decimal: Decimal,
 }
 
 /// A row of a table. It may have fewer or more cells than the header.
@@ -31,65 +46,140 @@ pub struct Row {
     pub cells: csv::StringRecord,
 }
 
-/// Why a file is no table.
-#[derive(Debug, thiserror::Error)]
-pub enum TableError {
-    /// It is of another format.
-    #[error(transparent)]
-    Foreign(#[from] Foreign),
-    /// A quotation mark makes one cell of what are many.
-    #[error(transparent)]
-    Quote(#[from] StrayQuote),
-    /// It cannot be taken apart into cells.
-    #[error("it is not CSV: {0}; check the path and the format")]
-    Csv(#[from] csv::Error),
-    /// It has more rows than are read.
-    #[error("it has more than {0} rows; cut it into several files, or leave out rows")]
-    Rows(usize),
-}
-
 impl Table {
-    /// The table that a file's `bytes` hold; what is no UTF-8 in them is no number either.
+    /// Reads a file's `bytes`, of which the columns `wanted` are asked for; they find the header where other lines stand
+    /// above it. Columns can be named by number, `#1` the first. Delimiter, header and decimal mark are those of `dialect`,
+    /// else those that the file shows.
     ///
     /// # Errors
-    /// A file of another format, a cell that is opened by a quotation mark and not closed on its line, and millions of rows.
-    pub fn parse(bytes: &[u8]) -> Result<Self, TableError> {
-        Self::parse_within(bytes, ROWS_MAX)
+    /// A file of another format, without a header, with commas of two meanings, with millions of rows, or with a cell that
+    /// is opened by a quotation mark and not closed on its line.
+    pub fn parse(bytes: &[u8], wanted: &[&str], dialect: &Dialect) -> Result<Self, TableError> {
+        Self::parse_within(ROWS_MAX, bytes, wanted, dialect)
     }
 
-    fn parse_within(bytes: &[u8], rows_max: usize) -> Result<Self, TableError> {
+    fn parse_within(
+        rows_max: usize,
+        bytes: &[u8],
+        wanted: &[&str],
+        dialect: &Dialect,
+    ) -> Result<Self, TableError> {
         foreign::of(bytes).map_or(Ok(()), Err)?;
-        let text = String::from_utf8_lossy(bytes);
-        // Programs for other systems put a byte order mark before the first name.
-        let text = text.trim_start_matches('\u{feff}');
-        let delimiter = delimiter(text);
-        quotes::check(text.as_bytes(), delimiter)?;
+        let text = encoding::decode(bytes);
+        let layout = layout::find(&text, wanted, dialect)?;
+        let (text, delimiter) = layout::delimited(&text[layout.from..], layout.delimiter);
+        quotes::check(text.as_bytes(), delimiter)
+            .map_err(|quote| quotes::StrayQuote { line: quote.line + layout.lines_before, ..quote })?;
         let mut reader = csv::ReaderBuilder::new()
             .trim(csv::Trim::All)
+            .has_headers(false)
             .flexible(true)
             .delimiter(delimiter)
             .from_reader(text.as_bytes());
-        let headers = reader.headers()?.iter().map(str::to_owned).collect();
+        let mut lines = lines::of(text.as_bytes()).filter(|line| !line.content.is_empty()).peekable();
         let mut rows = Vec::new();
-        for cells in reader.into_records() {
+        for cells in reader.records() {
             let cells = cells?;
             if rows.len() == rows_max {
                 return Err(TableError::Rows(rows_max));
             }
-            rows.push(Row { line: line(text, &cells), cells });
+            // The reader's place can be in front of line ends and empty lines.
+            let from =
+                cells.position().map_or(0, |place| usize::try_from(place.byte()).unwrap_or(usize::MAX));
+            while lines.next_if(|line| line.next <= from).is_some() {}
+            let line = lines.next().map_or(0, |line| line.number);
+            rows.push(Row { line: layout.lines_before + line, cells });
         }
-        Ok(Self { headers, rows })
+        let count = rows.iter().map(|row: &Row| row.cells.len()).max().unwrap_or_default();
+        let header_line = layout.header.as_ref().map(|_| layout.header_line);
+        let headers =
+            layout.header.unwrap_or_else(|| (1..=count).map(|number| format!("#{number}")).collect());
+        let table = Self { headers, header_line, rows, decimal: Decimal::Point };
+        let decimal = dialect.decimal.map_or_else(|| table.find_decimal(wanted), Ok)?;
+        Ok(Self { decimal, ..table })
     }
 
-    /// The index of the column `name`.
-    #[must_use]
-    pub fn column(&self, name: &str) -> Option<usize> {
-        self.headers.iter().position(|header| header == name)
+    /// Returns the index of the column `name`, or of the number `#3`.
+    ///
+    /// # Errors
+    /// If there is none, or more than one of that name.
+    pub fn column(&self, name: &str) -> Result<usize, ColumnError> {
+        let places =
+            self.headers.iter().enumerate().filter(|(_, header)| *header == name).map(|(place, _)| place);
+        match (&places.collect::<Vec<_>>()[..], by_number(name)) {
+            ([place], _) => Ok(*place),
+            ([], Some(number)) if number <= self.headers.len() => Ok(number - 1),
+            ([], Some(_)) => Err(ColumnError::Number { name: name.to_owned(), count: self.headers.len() }),
+            ([], None) => Err(ColumnError::Missing {
+                name: name.to_owned(),
+                known: self.headers.clone(),
+                header_line: self.header_line,
+            }),
+            (places, _) => Err(ColumnError::Several {
+                name: name.to_owned(),
+                places: places.iter().map(|place| place + 1).collect(),
+            }),
+        }
     }
 
-    /// The numbers of a column; NaN where a cell has none.
+    /// Returns the numbers of a column; NaN where a cell has none, and in a row that is longer than the header.
     pub fn numbers(&self, column: usize) -> impl Iterator<Item = f64> {
-        self.rows.iter().map(move |row| row.cell(column).parse().unwrap_or(f64::NAN))
+        self.rows.iter().map(move |row| {
+            let is_long = self.extra_cells(row) > 0;
+            if is_long { f64::NAN } else { self.number(row.cell(column)).unwrap_or(f64::NAN) }
+        })
+    }
+
+    /// Returns the number in a cell.
+    #[must_use]
+    pub fn number(&self, cell: &str) -> Option<f64> {
+        self.decimal.number(cell)
+    }
+
+    /// Refuses a table of which most rows are longer than the header: the columns behind a missing name would hold other
+    /// numbers.
+    ///
+    /// # Errors
+    /// The first such row.
+    pub fn check_lengths(&self) -> Result<(), TableError> {
+        let mut long = self.rows.iter().filter(|row| self.extra_cells(row) > 0).peekable();
+        let (Some(first), Some(header_line)) = (long.peek().copied(), self.header_line) else {
+            return Ok(());
+        };
+        let (line, expected, found) = (first.line, self.headers.len(), first.cells.len());
+        if 2 * long.count() <= self.rows.len() {
+            return Ok(());
+        }
+        Err(TableError::LongRows { header_line, line, expected, found })
+    }
+
+    /// Number of cells behind those of the header; empty ones at the end do not count.
+    fn extra_cells(&self, row: &Row) -> usize {
+        if row.cells.len() <= self.headers.len() {
+            return 0;
+        }
+        let extra = row.cells.iter().skip(self.headers.len()).enumerate();
+        extra.filter(|(_, cell)| !cell.is_empty()).last().map_or(0, |(place, _)| place + 1)
+    }
+
+    /// The decimal mark that the wanted columns have.
+    fn find_decimal(&self, wanted: &[&str]) -> Result<Decimal, TableError> {
+        let columns: Vec<usize> = wanted.iter().filter_map(|name| self.column(name).ok()).collect();
+        let cells = || {
+            let rows = self.rows.iter().take(ROWS_FOR_MARK);
+            rows.flat_map(|row| columns.iter().map(move |column| (row.line, *column, row.cell(*column))))
+        };
+        let is_comma = |cell: &str| cell.contains(',') && Decimal::Comma.number(cell).is_some();
+        let is_point = |cell: &str| cell.contains('.') && Decimal::Point.number(cell).is_some();
+        let Some((line, column, cell)) = cells().find(|(_, _, cell)| is_comma(cell)) else {
+            return Ok(Decimal::Point);
+        };
+        let (column, cell) = (self.headers[column].clone(), cell.to_owned());
+        if let Some((other_line, _, other)) = cells().find(|(_, _, cell)| is_point(cell)) {
+            return Err(TableError::TwoMarks { line, column, cell, other_line, other: other.to_owned() });
+        }
+        let is_plain = cells().any(|(_, _, cell)| is_comma(cell) && !crate::dialect::is_group(cell));
+        is_plain.then_some(Decimal::Comma).ok_or(TableError::Comma { line, column, cell })
     }
 }
 
@@ -101,30 +191,16 @@ impl Row {
     }
 }
 
-/// The line of a record, from 1: the reader's place is in front of the line ends and empty lines before it.
-fn line(text: &str, record: &csv::StringRecord) -> u64 {
-    let Some(place) = record.position() else { return 0 };
-    let from = usize::try_from(place.byte()).unwrap_or(usize::MAX);
-    let before = text.as_bytes().get(from..).unwrap_or_default();
-    let ends = before.iter().take_while(|byte| matches!(byte, b'\r' | b'\n'));
-    place.line() + ends.filter(|byte| **byte == b'\n').count() as u64
-}
-
-/// The delimiter that the header has most of.
-fn delimiter(text: &str) -> u8 {
-    let header = text.lines().next().unwrap_or_default();
-    let count = |delimiter: u8| header.bytes().filter(|byte| *byte == delimiter).count();
-    // The last of equals wins, which is the comma.
-    [b'\t', b';', b','].into_iter().max_by_key(|delimiter| count(*delimiter)).unwrap_or(b',')
-}
-
 #[cfg(test)]
 mod tests {
-    use super::Table;
+    use super::{Dialect, Table};
 
     #[test]
     fn rows_beyond_a_limit_are_refused_with_it() {
-        let rows = |count: usize| Table::parse_within(&[b"a\n", &b"1\n".repeat(count)[..]].concat(), 5);
+        let rows = |count: usize| {
+            let text = [b"a,b\n", &b"1,2\n".repeat(count)[..]].concat();
+            Table::parse_within(5, &text, &["a", "b"], &Dialect::default())
+        };
         assert_eq!(rows(5).unwrap().rows.len(), 5);
         let error = rows(6).err().unwrap().to_string();
         assert_eq!(error, "it has more than 5 rows; cut it into several files, or leave out rows");

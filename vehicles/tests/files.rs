@@ -271,3 +271,26 @@ fn several_faults_are_told_at_once_each_with_its_place() {
         assert!(error.to_string().contains(&message));
     }
 }
+
+#[test]
+fn robot_descriptions_are_named_and_the_page_of_keys_has_every_key() {
+    let urdf = "<?xml version=\"1.0\"?>\n<!-- mine -->\n<robot name=\"q\"><link name=\"base\"/></robot>";
+    let cases = [
+        (urdf, "URDF"),
+        ("\u{feff}<robot name=\"q\"/>", "URDF"),
+        ("<?xml version=\"1.0\"?><sdf version=\"1.6\"><model name=\"iris\"/></sdf>", "SDF"),
+        ("\n<mujoco model=\"x2\"/>", "MJCF"),
+        ("<html></html>", "XML"),
+    ];
+    for (text, name) in cases {
+        let error = Vehicle::parse(text, "quad.urdf").unwrap_err().to_string();
+        assert!(error.contains("quad.urdf") && error.contains(name) && error.contains("TOML"), "{error}");
+        assert!(error.contains("docs/vehicles.md"), "{error}");
+    }
+    let page = include_str!("../../docs/vehicles.md");
+    let vehicle = Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml").unwrap();
+    for number in &vehicle.provenance {
+        let key = number.key.rsplit('.').next().unwrap();
+        assert!(page.contains(key), "docs/vehicles.md has no `{}`", number.key);
+    }
+}

@@ -238,10 +238,10 @@ pub struct Traffic {
     pub pad0: u32,
     /// Positions of their centres of mass, in the order of the inputs' names.
     #[field(unit = "m", frame = "world")]
-    pub position: [Vector3; 16],
+    pub position: [Vector3; 32],
     /// Their velocities.
     #[field(unit = "m/s", frame = "world")]
-    pub velocity: [Vector3; 16],
+    pub velocity: [Vector3; 32],
 }
 
 /// Where the free bodies of a scene are, and how they move, in the order of the scene: those beyond `count` are zeros.

@@ -9,7 +9,9 @@ use flights::Role;
 use inputs::InputFiles;
 use serde::Deserialize;
 use vehicles::Vehicle;
+use vehicles::table::Dialect;
 use vehicles::variables::expand;
+use vehicles::wall_clock;
 
 use super::error::RotorError;
 
@@ -50,6 +52,9 @@ pub struct StaticLog {
     pub file: PathBuf,
     /// Where the log is a recording: the topic whose fields are read.
     pub topic: Option<String>,
+    /// Form of a CSV file that does not show it.
+    #[serde(default)]
+    pub csv: Dialect,
     /// What it is for.
     #[serde(default = "fit")]
     pub role: Role,
@@ -83,6 +88,9 @@ pub struct DynamicLog {
     pub file: PathBuf,
     /// Where the log is a recording: the topic whose fields are read.
     pub topic: Option<String>,
+    /// Form of a CSV file that does not show it.
+    #[serde(default)]
+    pub csv: Dialect,
     /// What it is for.
     #[serde(default = "fit")]
     pub role: Role,
@@ -141,6 +149,8 @@ pub struct Source<'s> {
     pub file: &'s Path,
     /// Where it is a recording: the topic.
     pub topic: Option<&'s str>,
+    /// Form of a table.
+    pub csv: &'s Dialect,
     /// Where the time of a table stands.
     pub time: Option<&'s Column>,
     /// The columns by their keys in the stand file.
@@ -160,6 +170,7 @@ impl StaticLog {
             files: &self.files,
             file: &self.file,
             topic: self.topic.as_deref(),
+            csv: &self.csv,
             time: self.time.as_ref(),
             columns,
         }
@@ -174,6 +185,7 @@ impl DynamicLog {
             files: &self.files,
             file: &self.file,
             topic: self.topic.as_deref(),
+            csv: &self.csv,
             time: self.time.as_ref(),
             columns,
         }
@@ -252,7 +264,7 @@ impl Column {
 
     /// Whether its cells are times as `YYYY-MM-DD HH:MM:SS:mmm`.
     pub fn is_wall_clock(&self) -> bool {
-        self.unit == "wall clock"
+        self.unit == wall_clock::UNIT
     }
 
     /// What takes its cells to SI, a speed to that of the rotor; known to be right after [`Stand::read`].

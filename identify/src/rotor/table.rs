@@ -1,18 +1,14 @@
 //! One log, a table in CSV or a recording: its columns in SI.
 
-use std::path::Path;
-
 use diagnostics::Diagnostic;
 use diagnostics::unit::TIME;
-use inputs::InputFiles;
-use vehicles::table::Table;
+use vehicles::table::{Table, TableError};
+use vehicles::wall_clock;
 
 use super::error::RotorError;
 use super::recorded::Recorded;
 use super::stand::{Column, Source, short_name};
 
-/// Seconds of a day; a wall clock begins anew after them.
-const DAY_S: f64 = 86_400.0;
 /// How a recording begins (MCAP's specification, "Magic").
 const RECORDING: &[u8] = b"\x89MCAP0\r\n";
 
@@ -42,7 +38,7 @@ impl LogTable {
             check_times(&file, &time_s, place)?;
             return Ok(Self { file, time_s, content: Content::Recorded(recorded) });
         }
-        let table = table(source.files, source.file, &file)?;
+        let table = table(source, &file)?;
         let Some(column) = source.time else { return Err(no_column(&file, "time", table.headers)) };
         let time_s = times(&file, &table, column)?;
         let place = |row: usize| format!("line {}: column `{}`", table.rows[row].line, column.name());
@@ -67,8 +63,10 @@ impl LogTable {
     }
 }
 
-fn table(files: &InputFiles, path: &Path, file: &str) -> Result<Table, RotorError> {
-    let bytes = files
+fn table(source: &Source, file: &str) -> Result<Table, RotorError> {
+    let path = source.file;
+    let bytes = source
+        .files
         .bytes(path)
         .map_err(|cause| Diagnostic::unreadable(path.display().to_string(), &cause).help("check the path"))?;
     if bytes.starts_with(RECORDING) {
@@ -79,7 +77,15 @@ fn table(files: &InputFiles, path: &Path, file: &str) -> Result<Table, RotorErro
             "give its `topic`, and a `field` for each `column`",
         ));
     }
-    Table::parse(&bytes).map_err(|cause| RotorError::Table { file: file.to_owned(), cause })
+    let columns = source.columns.iter().map(|(_, column)| *column).chain(source.time);
+    let names: Vec<&str> = columns.map(Column::name).collect();
+    let read =
+        Table::parse(&bytes, &names, source.csv).and_then(|table| table.check_lengths().map(|()| table));
+    read.map_err(|cause| unusable(file, cause))
+}
+
+fn unusable(file: &str, cause: TableError) -> RotorError {
+    RotorError::Table { file: file.to_owned(), cause }
 }
 
 fn no_column(file: &str, column: &str, known: Vec<String>) -> RotorError {
@@ -87,8 +93,7 @@ fn no_column(file: &str, column: &str, known: Vec<String>) -> RotorError {
 }
 
 fn index(file: &str, table: &Table, column: &Column) -> Result<usize, RotorError> {
-    let name = column.name();
-    table.column(name).ok_or_else(|| no_column(file, name, table.headers.clone()))
+    table.column(column.name()).map_err(|cause| unusable(file, cause.into()))
 }
 
 fn numbers(file: &str, table: &Table, column: &Column, factor: f64) -> Result<Vec<f64>, RotorError> {
@@ -101,8 +106,7 @@ fn times(file: &str, table: &Table, column: &Column) -> Result<Vec<f64>, RotorEr
         return numbers(file, table, column, column.factor(TIME));
     }
     let index = index(file, table, column)?;
-    let cells = table.rows.iter().map(|row| row.cell(index));
-    Ok(unwrapped(cells.map(|cell| seconds_of_day(cell).unwrap_or(f64::NAN))))
+    Ok(wall_clock::times(table.rows.iter().map(|row| row.cell(index))))
 }
 
 /// Refuses rows without a time, and times that go back; `place` tells where a row stands.
@@ -116,42 +120,5 @@ fn check_times(file: &str, time_s: &[f64], place: impl Fn(usize) -> String) -> R
     match time_s.windows(2).position(|pair| pair[1] < pair[0]) {
         Some(row) => fault(row + 1, "goes back"),
         None => Ok(()),
-    }
-}
-
-/// Seconds since midnight of `YYYY-MM-DD HH:MM:SS:mmm`; a point before the milliseconds will do, and more digits.
-fn seconds_of_day(cell: &str) -> Option<f64> {
-    let time = cell.rsplit([' ', 'T']).next()?;
-    let mut parts = time.split([':', '.']);
-    let mut next = || parts.next()?.parse::<f64>().ok();
-    let whole = next()? * 3600.0 + next()? * 60.0 + next()?;
-    let digits = parts.next().unwrap_or("0");
-    Some(whole + format!("0.{digits}").parse::<f64>().ok()?)
-}
-
-/// Times that go on after midnight.
-fn unwrapped(times: impl Iterator<Item = f64>) -> Vec<f64> {
-    let mut days_s = 0.0;
-    let mut last = f64::NEG_INFINITY;
-    times
-        .map(|time| {
-            if time + days_s < last - 0.5 * DAY_S {
-                days_s += DAY_S;
-            }
-            last = time + days_s;
-            last
-        })
-        .collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn wall_clocks_go_on_after_midnight() {
-        let cells = ["2019-11-07 23:59:59:998", "2019-11-08 00:00:00:001"];
-        let times = unwrapped(cells.iter().map(|cell| seconds_of_day(cell).unwrap()));
-        assert!((times[1] - times[0] - 0.003).abs() < 1e-9, "{times:?}");
     }
 }

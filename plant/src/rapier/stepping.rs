@@ -12,6 +12,7 @@ use super::contacts::{Contacts, Sighting};
 use super::free_bodies::{Carrier, FIRST_BODY, FreeBodies, VEHICLE, Work};
 use super::islands::FOUND_M_S;
 use super::rig::{self, Mounted};
+use super::rolling;
 use super::scratch::{CONSTRAINTS, Scratch, TOUCH_M};
 use super::solver::{Bilateral, Body, Friction, Row, Unilateral, join, part};
 use super::unsolved::{Outcome, Unsolved};
@@ -96,6 +97,8 @@ pub(super) struct Motion {
     pub state: State,
     /// An impact that is faster is a crash.
     pub crash_speed_m_s: f64,
+    /// Radius of the vehicle's disc.
+    pub disc_radius_m: f64,
     /// The least moment of inertia about any axis.
     pub inertia_min_kg_m2: f64,
     pub held: Held,
@@ -353,6 +356,7 @@ impl Motion {
             let vehicle = &mut scratch.then[VEHICLE];
             vehicle.twist += vehicle.mobility * friction;
         }
+        rolling::resist(&scratch.near, &scratch.constraints, &mut scratch.then, self.disc_radius_m);
         self.tie(scratch, &free.state.body, true);
         scratch.let_ropes_yield();
         let start_J = self.energy_J(&scratch.then, &scratch.then);
@@ -366,6 +370,11 @@ impl Motion {
         if !is_anything_pushed && !self.is_held() {
             self.state = free.state;
             self.free_bodies.states.clone_from(&scratch.free_bodies.free);
+            // What bounces at every step, as a disc that whirls, sinks otherwise.
+            let is_inside = |it: &Unilateral| it.bound_m_s.is_finite() && it.gap_m < -TOUCH_M;
+            if scratch.constraints.iter().any(is_inside) {
+                self.push_out(scratch, span_s);
+            }
             return false;
         }
         if is_pushed || self.is_held() {

@@ -23,6 +23,8 @@ use std::f64::consts::FRAC_PI_2;
 pub(super) const GROUND: u32 = 1;
 /// The vehicle's feet, as [`Near::part`] numbers its colliders.
 pub(super) const FEET: u32 = 0b1111;
+/// The vehicle's disc.
+pub(super) const DISC: u32 = 0b1_0000;
 const FIRST_NEIGHBOUR: u32 = 1000;
 
 /// Free bodies that overlap more than this at the start are told: tuned, no source.

@@ -1,0 +1,136 @@
+//! Units and scales in which a channel's values would be right.
+
+use diagnostics::unit::ROTOR_SPEED;
+use toml::Spanned;
+
+use crate::declaration::{ChannelMap, EachNumber, Entry};
+use crate::finding::Finding;
+use crate::quantity::Quantity;
+
+/// ESCs of Betaflight and others log their electrical speeds in hundreds of revolutions a minute.
+pub const HUNDREDS: f64 = 100.0;
+/// Counts of sensors are as near to some units as this factor: beyond it, a scale is as likely as a unit.
+const EXACT: f64 = 1.05;
+/// Values that no unit explains are refused beyond this factor.
+const GROSS: f64 = 3.0;
+
+/// The declared units of a flight's channels.
+pub struct Units<'a> {
+    /// What the flights file declares.
+    pub channels: &'a ChannelMap,
+}
+
+impl Units<'_> {
+    /// The units in which the values would lie in `range`.
+    pub fn units_within(&self, quantity: Quantity, value: f64, range: (f64, f64)) -> Option<String> {
+        let raw = value / self.factor(quantity);
+        let fits = |(_, factor): &&(&str, f64)| (range.0..range.1).contains(&(raw * factor));
+        let names: Vec<String> =
+            self.other_units(quantity).filter(fits).map(|(name, _)| of_unit(name)).collect();
+        (!names.is_empty()).then(|| names.join(" or "))
+    }
+
+    /// A finding for values `factor` times too large: clear if another unit explains it within `tolerance`.
+    pub fn by_unit(&self, quantity: Quantity, factor: f64, tolerance: f64, what: &str) -> Option<Finding> {
+        if factor > 0.0 && libm::log(factor).abs() < libm::log(tolerance) {
+            return None;
+        }
+        let fits = self.unit_that_fits(quantity, factor, tolerance).map(|unit| {
+            let is_scaled = self.declared(quantity).is_some_and(|entry| entry.scale.is_some());
+            // The size of a rotor's speed, or of the force in a flight that leans, is not known as well.
+            let is_derivative = matches!(quantity, Quantity::AngularVelocity | Quantity::Velocity);
+            let is_exact = !is_derivative || self.unit_that_fits(quantity, factor, EXACT).is_some();
+            let is_alone = is_exact && !is_scaled;
+            if is_alone { unit } else { format!("{unit}, or {}", self.scale(quantity, factor)) }
+        });
+        Some(finding(quantity, fits, &format!("declared in {}, {what}", self.unit(quantity))))
+    }
+
+    /// As [`Self::by_unit`], but also clear where no unit explains a gross factor.
+    pub fn by_unit_or_scale(
+        &self,
+        quantity: Quantity,
+        factor: f64,
+        tolerance: f64,
+        what: &str,
+    ) -> Option<Finding> {
+        let found = self.by_unit(quantity, factor, tolerance, what)?;
+        let is_unexplained = found.fits.is_none() && is_gross(factor);
+        Some(if is_unexplained { self.by_scale(quantity, factor, what) } else { found })
+    }
+
+    /// A finding for values that are `factor` times too large in the declared unit, and wrong in all others.
+    pub fn by_scale(&self, quantity: Quantity, factor: f64, what: &str) -> Finding {
+        let fits = format!("no unit alone, but {}", self.scale(quantity, factor));
+        finding(quantity, Some(fits), &format!("declared in {}, {what}", self.unit(quantity)))
+    }
+
+    /// The scale with which values are right that are `factor` times too large.
+    fn scale(&self, quantity: Quantity, factor: f64) -> String {
+        match self.declared(quantity).and_then(|entry| entry.scale.as_ref()) {
+            None => format!("a `scale` of about {}", rounded(1.0 / factor)),
+            Some(EachNumber::All(scale)) => format!("a `scale` of about {}", rounded(scale / factor)),
+            Some(EachNumber::Each(_)) => format!("a `scale` {} times as large", rounded(1.0 / factor)),
+        }
+    }
+
+    /// The one reading in which values would be right that are now `factor` times too large; `None` where several would
+    /// be.
+    pub fn unit_that_fits(&self, quantity: Quantity, factor: f64, tolerance: f64) -> Option<String> {
+        let declared = self.factor(quantity);
+        let is_near = |other: f64| libm::log((factor * other / declared).abs()).abs() < libm::log(tolerance);
+        let units = self.other_units(quantity).map(|(name, other)| (of_unit(name), *other));
+        let is_scaled = self.declared(quantity).is_some_and(|entry| entry.scale.is_some());
+        let hundreds = ROTOR_SPEED.factor("rpm").filter(|_| quantity == Quantity::RotorSpeed && !is_scaled);
+        let hundreds = hundreds.map(|rpm| (of_hundreds(), HUNDREDS * rpm));
+        let mut fitting = units.chain(hundreds).filter(|(_, other)| is_near(*other)).map(|(name, _)| name);
+        fitting.next().filter(|_| fitting.next().is_none())
+    }
+
+    /// The units that it is not declared in.
+    pub fn other_units(&self, quantity: Quantity) -> impl Iterator<Item = &'static (&'static str, f64)> {
+        quantity.dimension().units.iter().filter(move |(name, _)| *name != self.unit(quantity))
+    }
+
+    /// The declaration of a channel.
+    pub fn declared(&self, quantity: Quantity) -> Option<&Entry> {
+        self.channels.get(&quantity).map(Spanned::get_ref)
+    }
+
+    /// The declared unit; SI where the flights file leaves it to the type of message.
+    pub fn unit(&self, quantity: Quantity) -> &str {
+        let declared = self.declared(quantity).and_then(|entry| entry.unit.as_deref());
+        declared.unwrap_or(quantity.dimension().units[0].0)
+    }
+
+    /// The factor from the declared unit to SI.
+    pub fn factor(&self, quantity: Quantity) -> f64 {
+        quantity.dimension().factor(self.unit(quantity)).unwrap_or(1.0)
+    }
+}
+
+/// True for a factor that no vehicle and no sensor explains.
+pub fn is_gross(factor: f64) -> bool {
+    libm::log(factor.abs()).abs() > libm::log(GROSS)
+}
+
+/// Three digits of a number.
+fn rounded(number: f64) -> String {
+    if (0.01..1000.0).contains(&number) { format!("{number:.3}") } else { format!("{number:.2e}") }
+}
+
+/// The keys for hundreds of revolutions a minute.
+pub fn of_hundreds() -> String {
+    format!("{} with `scale = {HUNDREDS}` (hundreds)", of_unit("rpm"))
+}
+
+/// The key of a unit.
+pub fn of_unit(name: &str) -> String {
+    format!("`unit = \"{name}\"`")
+}
+
+/// A finding about `channel`, clear where something `fits`.
+pub fn finding(channel: Quantity, fits: Option<String>, what: &str) -> Finding {
+    let advice = fits.as_ref().map_or(String::new(), |fits| format!("; {fits} would fit"));
+    Finding { channel, message: format!("`{channel}`: {what}{advice}"), fits }
+}

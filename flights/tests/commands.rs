@@ -1,0 +1,94 @@
+//! Commands with gaps, and commands that a log writes only when they change.
+
+#[allow(dead_code, reason = "other tests use the rest")]
+mod support;
+
+use flights::{Flight, FlightsError, KnownRotors, csv};
+use support::{Motion, Place};
+
+const CHANNELS: &str = r#"
+time = { columns = ["t"], unit = "s" }
+command = { columns = ["m1", "m2", "m3", "m4"], unit = "count" }
+attitude = { columns = ["qx", "qy", "qz", "qw"] }
+angular_velocity = { columns = ["wx", "wy", "wz"], unit = "rad/s" }
+"#;
+
+/// The made-up flight of 10 s whose commands are there where `is_logged` says so.
+fn read(is_logged: impl Fn(f64) -> bool, channels: &str, extra: &str) -> Result<Flight, FlightsError> {
+    let text = Motion::default().csv();
+    let (header, rows) = text.split_once('\n').expect("a header");
+    let commands: Vec<usize> =
+        header.split(',').enumerate().filter(|(_, name)| name.starts_with('m')).map(|(at, _)| at).collect();
+    let row = |line: &str| {
+        let mut cells: Vec<&str> = line.split(',').collect();
+        if !is_logged(cells[0].parse().expect("a time")) {
+            commands.iter().for_each(|at| cells[*at] = "");
+        }
+        cells.join(",") + "\n"
+    };
+    let place = Place::new();
+    let rows: String = rows.lines().map(row).collect();
+    place.write("log.csv", format!("{header}\n{rows}").as_bytes());
+    place.load("log.csv", channels, extra)
+}
+
+fn gap(t: f64) -> bool {
+    !(2.0..5.0).contains(&t)
+}
+
+#[test]
+fn a_gap_of_the_commands_is_noted_with_its_consequence() {
+    let flight = read(gap, CHANNELS, "").unwrap();
+    let note = flight.notes.iter().find(|note| note.starts_with("command: gaps")).expect("a note");
+    for part in
+        ["the longest from 1.990 s to 5.000 s", "unknown there and 0.5 s behind", "`on_change = true`"]
+    {
+        assert!(note.contains(part), "no {part:?} in {note}");
+    }
+    let known = KnownRotors::of(&flight);
+    assert!(known.hold(0.5, 1.9) && !known.hold(1.9, 2.1) && !known.hold(5.2, 5.4) && known.hold(5.5, 10.0));
+    let (written, text) = csv(&flight).unwrap();
+    let in_gap = |line: &str| {
+        let time_s: f64 = line.split(',').next().and_then(|cell| cell.parse().ok()).unwrap_or(0.0);
+        (2.0..4.995).contains(&time_s)
+    };
+    assert!(!text.lines().any(in_gap) && written.rows > 600, "{:?}", written.notes);
+}
+
+#[test]
+fn commands_written_on_change_have_no_gap() {
+    let channels = CHANNELS.replace("unit = \"count\"", "unit = \"count\", on_change = true");
+    let flight = read(gap, &channels, "").unwrap();
+    assert!(flight.commands_on_change && !flight.notes.iter().any(|note| note.contains("command: gaps")));
+    assert!(KnownRotors::of(&flight).hold(0.5, 10.0));
+    let (written, _) = csv(&flight).unwrap();
+    assert_eq!(written.rows, 1001);
+    let wrong = CHANNELS.replace("unit = \"rad/s\"", "unit = \"rad/s\", on_change = false");
+    let error = read(gap, &wrong, "").unwrap_err().to_string();
+    assert!(error.contains("on_change") && error.contains("`command` alone"), "{error}");
+}
+
+/// The command before a gap does not hold at a start within it; one within its period does.
+#[test]
+fn a_part_that_begins_in_a_gap_begins_with_the_next_command() {
+    let begins_s = |channels: &str, extra: &str| read(gap, channels, extra).unwrap().command.time_s[0];
+    assert!((begins_s(CHANNELS, "from_s = 3.0") - 2.0).abs() < 1e-9);
+    assert_eq!(begins_s(CHANNELS, "from_s = 1.005"), 0.0);
+    let on_change = CHANNELS.replace("unit = \"count\"", "unit = \"count\", on_change = true");
+    assert_eq!(begins_s(&on_change, "from_s = 3.0"), 0.0);
+}
+
+#[test]
+fn a_table_needs_commands_and_motion_at_one_time() {
+    let mut flight = read(|_| true, CHANNELS, "").unwrap();
+    flight.command.time_s.iter_mut().for_each(|time_s| *time_s += 1000.0);
+    let error = csv(&flight).unwrap_err().to_string();
+    for part in [
+        "expected an attitude",
+        "command from 1000.000 s",
+        "attitude from 0.000 s to 10.000 s",
+        "correct the clocks",
+    ] {
+        assert!(error.contains(part), "no {part:?} in {error}");
+    }
+}
