@@ -12,6 +12,9 @@ pub use crate::table_error::{ColumnError, TableError, names, shown};
 /// Number of rows that are looked at for the decimal mark.
 const ROWS_FOR_MARK: usize = 1000;
 
+/// Rows of one file at most: three hours at 1 kHz. Each takes some hundred bytes of memory, however short its line is.
+const ROWS_MAX: usize = 10_000_000;
+
 /// A file in CSV.
 ///
 /// ```
@@ -49,9 +52,18 @@ impl Table {
     /// else those that the file shows.
     ///
     /// # Errors
-    /// A file of another format, without a header, with commas of two meanings, or with a cell that is opened by a quotation
-    /// mark and not closed on its line.
+    /// A file of another format, without a header, with commas of two meanings, with millions of rows, or with a cell that
+    /// is opened by a quotation mark and not closed on its line.
     pub fn parse(bytes: &[u8], wanted: &[&str], dialect: &Dialect) -> Result<Self, TableError> {
+        Self::parse_within(ROWS_MAX, bytes, wanted, dialect)
+    }
+
+    fn parse_within(
+        rows_max: usize,
+        bytes: &[u8],
+        wanted: &[&str],
+        dialect: &Dialect,
+    ) -> Result<Self, TableError> {
         foreign::of(bytes).map_or(Ok(()), Err)?;
         let text = encoding::decode(bytes);
         let layout = layout::find(&text, wanted, dialect)?;
@@ -68,6 +80,9 @@ impl Table {
         let mut rows = Vec::new();
         for cells in reader.records() {
             let cells = cells?;
+            if rows.len() == rows_max {
+                return Err(TableError::Rows(rows_max));
+            }
             // The reader's place can be in front of line ends and empty lines.
             let from =
                 cells.position().map_or(0, |place| usize::try_from(place.byte()).unwrap_or(usize::MAX));
@@ -173,5 +188,21 @@ impl Row {
     #[must_use]
     pub fn cell(&self, column: usize) -> &str {
         self.cells.get(column).unwrap_or_default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Dialect, Table};
+
+    #[test]
+    fn rows_beyond_a_limit_are_refused_with_it() {
+        let rows = |count: usize| {
+            let text = [b"a,b\n", &b"1,2\n".repeat(count)[..]].concat();
+            Table::parse_within(5, &text, &["a", "b"], &Dialect::default())
+        };
+        assert_eq!(rows(5).unwrap().rows.len(), 5);
+        let error = rows(6).err().unwrap().to_string();
+        assert_eq!(error, "it has more than 5 rows; cut it into several files, or leave out rows");
     }
 }

@@ -15,6 +15,9 @@ pub enum TableError {
     /// It cannot be taken apart into cells.
     #[error("it is not CSV: {0}; check the path and the format")]
     Csv(#[from] csv::Error),
+    /// It has more rows than are read.
+    #[error("it has more than {0} rows; cut it into several files, or leave out rows")]
+    Rows(usize),
     /// A column that is asked for.
     #[error(transparent)]
     Column(#[from] ColumnError),
