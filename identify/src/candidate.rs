@@ -2,7 +2,7 @@
 
 use crate::parameter::Parameters;
 use crate::prepared::{Equation, Prepared};
-use plant::effects::{EffectKind, FitAs, Quantity, find};
+use plant::effects::{EffectKind, FitAs, Quantity};
 
 /// Need of effects that show in torques, or in the time at which commands act.
 pub const FAST_COMMANDS: &str =
@@ -69,10 +69,7 @@ fn missing(kind: &EffectKind, flights: &[&Prepared]) -> Option<&'static str> {
 /// True for effects that show in torques, or in the time at which commands act: commands that are logged slower than the
 /// motors follow show neither.
 fn needs_fast_commands(kind: &EffectKind) -> bool {
-    let of_drive = [find("motor-lag"), find("weak-rotor")];
-    kind.needs.contains(&Quantity::Torque)
-        || kind.is_delay
-        || of_drive.into_iter().flatten().any(|known| known == kind)
+    kind.needs.contains(&Quantity::Torque) || kind.is_delay || kind.changes_drive || kind.turns_steadily
 }
 
 /// Whether a flight shows a quantity.

@@ -12,9 +12,6 @@ use plant::effects::EffectKind;
 use vehicles::MotorModel;
 use vehicles::gaps::held_period_s;
 
-/// Name of the effect that changes the motors' lag.
-const MOTOR_LAG: &str = "motor-lag";
-
 /// Longest usual time between two commands, over all flights with commands.
 fn period_s(problem: &Problem) -> f64 {
     let flights = problem.flights().map(|flight| flight.flight).filter(|flight| !flight.commands_on_change);
@@ -51,7 +48,7 @@ pub fn note(problem: &Problem, lead_s: f64) -> String {
 
 /// True for motors that seem faster by less than one period of the logged commands.
 pub fn explains(problem: &Problem, kind: &EffectKind, free: &[usize], fitted: &FitResult) -> bool {
-    if kind.name != MOTOR_LAG {
+    if !kind.changes_drive {
         return false;
     }
     let mut without = fitted.values.clone();
@@ -66,7 +63,7 @@ pub fn bias(problem: &Problem, parameter: &Parameter) -> f64 {
     let half_s = || period_s(problem) / 2.0;
     match (parameter.kind, parameter.spec().name) {
         (kind, _) if kind.is_delay => half_s(),
-        (kind, "slowness") if kind.name == MOTOR_LAG => half_s() / lag_s(problem.model.vehicle.motor),
+        (kind, "slowness") if kind.changes_drive => half_s() / lag_s(problem.model.vehicle.motor),
         _ => 0.0,
     }
 }

@@ -188,7 +188,7 @@ fn files_that_are_no_recording_or_an_empty_one_end_in_words() {
     require_said(&with(b"time,speed\n0,0\n"), &["stand.mcap", "expected the magic bytes"]);
     require_said(&with(&whole[..whole.len() / 2]), &["stand.mcap", "not a complete MCAP file"]);
     fs::remove_file(stand.path("stand.mcap")).unwrap();
-    require_said(&stand.refusal(), &["cannot open the recording", "stand.mcap"]);
+    require_said(&stand.refusal(), &["stand.mcap", "cannot read this file", "check the path"]);
     let short = recorded(DYNAMIC, &[RotorLoad::default()]);
     require_said(&short.refusal(), &["stand.mcap", "too few"]);
 }

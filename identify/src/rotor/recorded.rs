@@ -29,8 +29,9 @@ impl Recorded {
         columns: &[(&'static str, &Column)],
     ) -> Result<Self, RotorError> {
         let file = short_name(path);
-        let bytes =
-            files.bytes(path).map_err(|cause| Diagnostic::unreadable(path.display().to_string(), &cause))?;
+        let unreadable =
+            |cause| Diagnostic::unreadable(path.display().to_string(), &cause).help("check the path");
+        let bytes = files.bytes(path).map_err(unreadable)?;
         let recording = Recording::of_bytes(bytes, path)?;
         let fields: Vec<_> = columns.iter().map(|(_, column)| (topic, column.name())).collect();
         let series = recording.series(&fields).map_err(|cause| match cause {

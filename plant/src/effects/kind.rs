@@ -45,6 +45,8 @@ pub struct EffectKind {
     pub turns_steadily: bool,
     /// Whether its parameters shift a signal in time: then the flight's grid says how small a value can be seen.
     pub is_delay: bool,
+    /// True if it changes how the rotors follow their commands.
+    pub changes_drive: bool,
     /// Whether equations linearised about the neutral values tell what it can explain.
     pub is_linear: bool,
     /// Where a fit may start, each a value for each fitted parameter. None: the neutral values are a start.
@@ -244,6 +246,7 @@ impl EffectKind {
         steady_state: false,
         turns_steadily: false,
         is_delay: false,
+        changes_drive: false,
         is_linear: true,
         guesses: &[],
         scale_to: None,

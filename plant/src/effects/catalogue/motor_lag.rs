@@ -15,6 +15,7 @@ pub static EFFECT: EffectKind = EffectKind {
     actions: &[Action::Vehicle(lag)],
     needs: &[Quantity::Command],
     stage: Stage::Rotors,
+    changes_drive: true,
     is_linear: false,
     guesses: &[&[-0.5, 0.0], &[-0.2, 0.0], &[0.3, 0.0], &[1.0, 0.0], &[2.5, 0.0]],
     confounded_with: &[Confounder {
