@@ -43,7 +43,7 @@ pub fn check_text(text: &str, path: &Path, overrides: &[String]) -> Result<Graph
     Graph::build(&Manifest::parse(text.to_owned(), path, overrides, COMPONENTS)?)
 }
 
-/// What the meshes of a checked manifest's scenes have: a line for each, with its triangles, its extent in the world and whether it is
+/// The sizes of the meshes of a checked manifest's scenes: a line for each, with its triangles, its extent in the world and whether it is
 /// closed, below the name of its scene.
 ///
 /// ```

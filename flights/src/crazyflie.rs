@@ -10,7 +10,7 @@ use crate::bytes::{Cursor, Number};
 use crate::error::{LogError, Spot};
 use crate::log::{Log, Samples};
 
-/// What to do about a log whose header is cut or damaged.
+/// Advice for a log whose header is cut or damaged.
 const COPY_AGAIN: &str = "it is damaged or was not closed: copy the log from the card again";
 /// Records in a row that show where records begin again behind damage.
 const IN_STEP: usize = 4;

@@ -61,7 +61,7 @@ fn same_part([(fit, fit_part), (test, test_part)]: [(&Flight, &Part); 2], how: &
     })
 }
 
-/// Whether two paths lead to one file, or `have_same_bytes` says that the same bytes were read from both; how, as text.
+/// True if two paths lead to one file, or `have_same_bytes` says that the same bytes were read from both; how, as text.
 ///
 /// ```
 /// let (here, there) = ("Cargo.toml".as_ref(), "src/../Cargo.toml".as_ref());

@@ -20,7 +20,7 @@ const fn ours(kind: &'static str, quantity: Quantity, fields: &'static str, unit
     Known { kind, quantity, fields, unit, frame: Frame::FluEnu }
 }
 
-/// Of PX4 and ArduPilot.
+/// Types of PX4 and ArduPilot.
 const fn forward_right_down(
     kind: &'static str,
     quantity: Quantity,

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::logs::Log;
 
-/// What gives the bytes of a file.
+/// Source of the bytes of a file.
 pub type ReadFile<'a> = dyn Fn(&Path) -> std::io::Result<Vec<u8>> + 'a;
 
 /// Reads logs. The bytes of a log are kept until the last flight in it has been read.

@@ -441,7 +441,7 @@ impl Judge<'_> {
         Some(finding(quantity, None, &format!("{what}{hint}")))
     }
 
-    /// That the log has hundreds of electrical revolutions a minute, where they are not divided by pole pairs.
+    /// Note that the log has hundreds of electrical revolutions a minute, where they are not divided by pole pairs.
     fn hundreds_of_electrical(&self, factor: f64) -> Option<String> {
         let entry = self.units.declared(Quantity::RotorSpeed)?;
         let pairs = factor * HUNDREDS * ROTOR_SPEED.factor("rpm")? / self.units.factor(Quantity::RotorSpeed);

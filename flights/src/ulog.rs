@@ -66,7 +66,7 @@ fn appended(bytes: &[u8]) -> Vec<usize> {
     offsets.filter(|offset| (HEADER_BYTES..bytes.len()).contains(offset)).collect()
 }
 
-/// What a reader should know of the log as a whole.
+/// Notes about the log as a whole.
 fn notes(content: &Content) -> Vec<String> {
     let (mut notes, damage) = (Vec::new(), content.damage);
     if damage.count > 0 {

@@ -19,7 +19,7 @@ const LOOKED_AT: usize = 32;
 /// Longest name of a format.
 const NAME_BYTES_MAX: usize = 256;
 
-/// What the messages of a log hold.
+/// Contents of the messages of a log.
 #[derive(Default)]
 pub struct Content {
     /// Formats of messages.
@@ -62,7 +62,7 @@ pub struct Damage {
     pub seconds: f64,
 }
 
-/// How well bytes fit as a message.
+/// Degree to which bytes fit as a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Fit {
     /// As a message whose content is known.
@@ -71,7 +71,7 @@ enum Fit {
     Unknown,
 }
 
-/// How well a message fits, its type, and the place of its content.
+/// Fit of a message, its type, and the place of its content.
 type Message = (Fit, u8, Range<usize>);
 
 /// A log that is being read.
@@ -146,7 +146,7 @@ impl Reader<'_> {
         Some((fit, kind, place))
     }
 
-    /// How well `body` fits as the content of a message of the type `kind`.
+    /// Degree to which `body` fits as the content of a message of the type `kind`.
     fn fit_of(&self, kind: u8, body: &[u8]) -> Option<Fit> {
         let length = body.len();
         let known = |is_known: bool| is_known.then_some(Fit::Known);

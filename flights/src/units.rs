@@ -16,7 +16,7 @@ const GROSS: f64 = 3.0;
 
 /// The declared units of a flight's channels.
 pub struct Units<'a> {
-    /// What the flights file declares.
+    /// Declaration in the flights file.
     pub channels: &'a ChannelMap,
 }
 

@@ -185,7 +185,7 @@ fn a_rotor_speed_that_is_half_where_there_are_no_commands() {
     require(&set, "rotor_speed.1", "scaled-sensor");
 }
 
-/// What breaks a flight.
+/// A change that breaks a flight.
 type Break = fn(&mut Flight);
 
 /// With two flights there is no majority: the one further from the vehicle file has the fault.
@@ -368,7 +368,7 @@ fn a_trim_that_no_rotors_hold() {
     assert!(fault.expected.contains("at most 18.9 rad/s^2"), "{fault:?}");
 }
 
-/// Where the only flight of a role has a fault that leaves nothing of it, identification says so.
+/// If the only flight of a role has a fault that leaves nothing of it, identification says so.
 #[test]
 fn a_role_without_a_sound_flight_is_refused_with_the_fault() {
     let mut set = flown(false);

@@ -46,7 +46,7 @@ pub struct InputFiles {
     used: Arc<Mutex<BTreeMap<PathBuf, Content>>>,
 }
 
-/// Where bytes come from.
+/// Origin of the bytes.
 #[derive(Clone, Debug)]
 enum Source {
     /// The disk, at the first request.

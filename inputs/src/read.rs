@@ -39,7 +39,7 @@ fn read_up_to(length_max: u64, path: &Path) -> Result<Vec<u8>> {
     })
 }
 
-/// What `read` gives of a file that does not change meanwhile: one that is written in place would be half of one version
+/// The result of `read` for a file that does not change meanwhile: one that is written in place would be half of one version
 /// and half of another.
 fn unchanged(path: &Path, mut read: impl FnMut(&mut File) -> Result<Vec<u8>>) -> Result<Vec<u8>> {
     for _ in 0..READINGS_MAX {

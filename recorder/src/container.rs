@@ -70,7 +70,7 @@ impl<'a> Bytes<'a> {
         Damage { is_refused: true, ..self.damage(at, reason) }
     }
 
-    /// What is wrong with the record at `at`, which the text calls `what`.
+    /// The damage of the record at `at`, which the text calls `what`.
     fn fault(&self, at: usize, what: &str, fault: &Fault) -> Damage {
         let refuse = if fault.is_limit() { Self::refused } else { Self::damage };
         refuse(self, at, format!("{what}{fault}"))
@@ -177,7 +177,7 @@ enum Fault {
 }
 
 impl Fault {
-    /// Whether it is a limit of this reader.
+    /// True if it is a limit of this reader.
     fn is_limit(&self) -> bool {
         matches!(self, Self::Large(_) | Self::Bomb { .. } | Self::Declared { .. } | Self::Name { .. })
     }

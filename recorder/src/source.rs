@@ -61,7 +61,7 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// Whether two recordings are the same bytes.
+    /// True if two recordings are the same bytes.
     ///
     /// # Errors
     /// As [`Source::read`].

@@ -93,7 +93,7 @@ impl Partial {
         self.location.rename(&self.real).with_context(cannot)
     }
 
-    /// Where it lies by now.
+    /// Its path by now.
     pub fn current_path(&self) -> PathBuf {
         self.location.current_path()
     }

@@ -222,7 +222,7 @@ enum Running {
     Thread(Thread),
 }
 
-/// Whether a process has exited. One that this process traces, as it does after PTRACE_TRACEME, is reported when it stops,
+/// True if a process has exited. One that this process traces, as it does after PTRACE_TRACEME, is reported when it stops,
 /// too, and has not ended then.
 fn has_exited(child: &Child, options: WaitIdOptions) -> bool {
     let options = options | WaitIdOptions::EXITED | WaitIdOptions::NOWAIT;

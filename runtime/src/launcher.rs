@@ -295,7 +295,7 @@ fn prepare(manifest: &Manifest, graph: &mut Graph, recording: Option<&Path>, run
     Ok(nodes.try_for_each(|node| store_files(&files, run_dir.path(), node))?)
 }
 
-/// What a recorder attaches under the name of `path`: the file `key` among those of the run.
+/// Content that a recorder attaches under the name of `path`: the file `key` among those of the run.
 fn attachment(path: &Path, key: &Path) -> serde_json::Value {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     serde_json::json!({ "name": name, "path": key })

@@ -42,7 +42,7 @@ pub enum Unlocated {
     /// Links that go round.
     #[error("more than {LINKS_MAX} symbolic links")]
     Links,
-    /// What the system refused.
+    /// The error of the system.
     #[error("{}: {cause}", .at.display())]
     System {
         /// The part of the path.
@@ -85,7 +85,7 @@ impl Location {
         Ok(File::from(file))
     }
 
-    /// What lies there, no link followed; `None` for nothing.
+    /// The entry that lies there, no link followed; `None` for nothing.
     pub fn stat(&self) -> io::Result<Option<Stat>> {
         match rustix::fs::statat(&self.folder, &self.name, AtFlags::SYMLINK_NOFOLLOW) {
             Ok(found) => Ok(Some(found)),
@@ -100,7 +100,7 @@ impl Location {
         folder.map_or_else(|_| self.path.clone(), |folder| folder.join(&self.name))
     }
 
-    /// Whether `file` lies there.
+    /// True if `file` lies there.
     pub fn holds(&self, file: &File) -> bool {
         let opened = rustix::fs::fstat(file);
         matches!((opened, self.stat()), (Ok(a), Ok(Some(b))) if (a.st_dev, a.st_ino) == (b.st_dev, b.st_ino))
@@ -222,7 +222,7 @@ impl Walk {
     }
 }
 
-/// Whether this user follows a link in a folder.
+/// True if this user follows a link in a folder.
 fn may_follow(link: &Stat, folder: &Stat) -> bool {
     let is_open_to_all = Mode::from_raw_mode(folder.st_mode).contains(Mode::WOTH);
     let follower = rustix::process::geteuid().as_raw();

@@ -76,10 +76,10 @@ struct Timing {
     reaped: Duration,
 }
 
-/// How far a run has come. Whatever of it changes, another process has its turn, and its watchdog begins anew.
+/// Progress of a run. Whatever of it changes, another process has its turn, and its watchdog begins anew.
 #[derive(Debug, Default, PartialEq)]
 struct Advance {
-    /// How far the first instances have joined; none before the first look.
+    /// Progress of the first instances' joining; none before the first look.
     phase: Option<Phase>,
     /// True if every node has joined as far as the next phase asks: then it is the clock's turn.
     awaits_phase: bool,

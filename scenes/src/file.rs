@@ -77,7 +77,7 @@ impl Scene {
     /// Reads and checks a scene file of `files`, and the meshes that it names: a component takes those of its context.
     ///
     /// # Errors
-    /// What is wrong with the file or a mesh, and where.
+    /// The error in the file or a mesh, with its place.
     pub fn load_from(files: &InputFiles, path: &Path) -> Result<Self, Diagnostic> {
         let file = path.display().to_string();
         match files.text(path) {

@@ -187,7 +187,7 @@ impl Mesh {
 }
 
 impl fmt::Display for Mesh {
-    /// What it has, in a line.
+    /// Its size in a line.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [low, high] = self.extent_W_m();
         let [x, y, z] = [0, 1, 2].map(|axis| high[axis] - low[axis]);

@@ -19,7 +19,7 @@ use std::path::Path;
 /// Rays of a cone: the axis, and eight in each of two rings.
 const RAYS: usize = 17;
 
-/// What stands in the scene of the file at `path` among `files`, the parameter `scene`.
+/// The objects in the scene of the file at `path` among `files`, the parameter `scene`.
 ///
 /// # Errors
 /// There is none, or it is refused.

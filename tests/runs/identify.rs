@@ -20,7 +20,7 @@ fn number(report: &Value, effect: &str, parameter: &str, key: &str) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("{effect}.{parameter}.{key}: {}", report["effects"][effect]))
 }
 
-/// What the bus flew is what the report predicts: both take states and windows by one rule.
+/// The bus flies the errors that the report predicts: both take states and windows by one rule.
 #[track_caller]
 fn require_bus_agrees(report: &Value) {
     let bus = &report["bus"];

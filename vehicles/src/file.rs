@@ -29,7 +29,7 @@ impl Vehicle {
     /// Reads and checks a vehicle file of `files`: a component takes those of its context.
     ///
     /// # Errors
-    /// What is wrong with the file or its base, and where.
+    /// The error in the file or its base, with its place.
     pub fn load_from(files: &InputFiles, path: &Path) -> Result<Self, Diagnostic> {
         let file = path.display().to_string();
         let read = |path: &Path| files.text(path);

@@ -2,7 +2,7 @@
 
 use vehicles::table::{Delimiter, Dialect, Table};
 
-/// What every readable table of these tests holds.
+/// Content of every readable table of these tests.
 const WANTED: [&str; 3] = ["t", "x", "y"];
 const TIMES: [f64; 3] = [0.5, 1.25, 2.0];
 

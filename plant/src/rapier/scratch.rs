@@ -106,7 +106,7 @@ impl Scratch {
         }
     }
 
-    /// How long after now the first gap closes, if any does in the free step of `span_s`, at more than `slow_m_s`; 0
+    /// Time until the first gap closes, if any does in the free step of `span_s`, at more than `slow_m_s`; 0
     /// where two that touch meet now.
     pub(super) fn next_impact_s(&self, span_s: f64, slow_m_s: f64) -> Option<f64> {
         let after_s = |constraint: &Unilateral| {

@@ -45,7 +45,7 @@ pub struct HorizonErrors {
     pub horizon_ms: u32,
     /// How many windows count.
     pub windows: usize,
-    /// How many do not, since a measured channel has a gap there or ends, or the rotors' speeds are not known yet.
+    /// Number of windows that do not, since a measured channel has a gap there or ends, or the rotors' speeds are not known yet.
     pub left_out: usize,
     /// The errors by channel; only channels that the flight tells of.
     pub channels: Vec<ChannelErrors>,

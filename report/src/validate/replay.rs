@@ -46,7 +46,7 @@ pub struct Replay {
     /// Where its files are.
     pub folder: PathBuf,
     manifest: ManifestBuilder,
-    /// What the player plays; tick 0 lies at its first row.
+    /// The rows that the player plays; tick 0 lies at its first row.
     pub played: Played,
     /// Ticks of the run.
     ticks: u32,

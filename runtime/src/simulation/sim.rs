@@ -21,7 +21,7 @@ pub(super) const WINDOW: u32 = 4;
 pub(super) const NEVER: u32 = u32::MAX;
 /// Simulated time within which a run must end once nothing happens to it any more.
 const QUIET: Duration = Duration::from_secs(60);
-/// How long a node, and then the clock, stands still while the run starts: less than a watchdog, more than half of one.
+/// Time for which a node, and then the clock, stands still while the run starts: less than a watchdog, more than half of one.
 pub(super) const SLOW_START: Duration = Duration::from_millis(300);
 /// What never ends by itself.
 pub(super) const FOR_EVER: Duration = Duration::MAX;

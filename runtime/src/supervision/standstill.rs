@@ -42,7 +42,7 @@ impl<W: World> Supervisor<'_, W> {
         Ok(())
     }
 
-    /// How far the run has come.
+    /// Progress of the run.
     fn advance(&self, straggler: Option<Role>) -> Advance {
         let view = &self.overseer.replacements.view;
         Advance {
