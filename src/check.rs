@@ -58,7 +58,9 @@ pub fn meshes(checked: &Graph) -> Vec<String> {
     let scene = |node: &bus::plan::NodePlan| node.parameters.get("scene")?.as_str().map(str::to_owned);
     let files: BTreeSet<String> = checked.plan.nodes.iter().filter_map(scene).collect();
     let lines = files.into_iter().filter_map(|file| {
-        let scene = Scene::load(Path::new(&file)).ok().filter(|scene| !scene.meshes.is_empty())?;
+        let scene = Scene::load_from(&checked.files, Path::new(&file))
+            .ok()
+            .filter(|scene| !scene.meshes.is_empty())?;
         let meshes = scene.meshes.iter().map(|mesh| format!("  {mesh}"));
         Some(std::iter::once(format!("meshes of {file}:")).chain(meshes).collect::<Vec<_>>())
     });

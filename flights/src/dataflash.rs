@@ -35,7 +35,7 @@ struct Topic {
     messages: Vec<Range<usize>>,
 }
 
-#[derive(Clone)]
+#[derive(Clone, PartialEq)]
 struct Field {
     name: String,
     /// `None` for texts and arrays.
@@ -260,11 +260,15 @@ fn scale(formats: &mut BTreeMap<u8, Format>, bytes: &[u8]) {
 /// The messages by name, those of further sensors with `:1` and so on behind it.
 fn topics(formats: BTreeMap<u8, Format>, bytes: &[u8]) -> BTreeMap<String, Topic> {
     let mut topics = BTreeMap::new();
-    for format in formats.into_values() {
+    for (kind, format) in formats {
         let instance = format.fields.iter().find(|field| field.is_instance).cloned();
         for message in format.messages {
             let number = instance.as_ref().map_or(0.0, |field| field.read(bytes, &message) / field.scale);
             let name = if number > 0.0 { format!("{}:{number}", format.name) } else { format.name.clone() };
+            // Another type may have the same name and other fields.
+            let is_other = |topic: &Topic| topic.fields != format.fields;
+            let name =
+                if topics.get(&name).is_some_and(is_other) { format!("{name} of type {kind}") } else { name };
             let topic = topics.entry(name).or_insert_with(|| Topic {
                 kind: format.name.clone(),
                 fields: format.fields.clone(),

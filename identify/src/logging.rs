@@ -12,10 +12,15 @@ use plant::effects::EffectKind;
 use vehicles::MotorModel;
 use vehicles::gaps::held_period_s;
 
-/// Longest usual time between two commands, over all flights with commands.
-fn period_s(problem: &Problem) -> f64 {
+/// Usual longest time between two commands of each flight with commands.
+fn periods_s(problem: &Problem) -> impl Iterator<Item = f64> {
     let flights = problem.flights().map(|flight| flight.flight).filter(|flight| !flight.commands_on_change);
-    flights.filter_map(|flight| held_period_s(&flight.command.time_s)).fold(0.0, f64::max)
+    flights.filter_map(|flight| held_period_s(&flight.command.time_s))
+}
+
+/// The shortest of these periods, which explains a shift in time that all flights share; 0 without commands.
+fn period_s(problem: &Problem) -> f64 {
+    periods_s(problem).reduce(f64::min).unwrap_or(0.0)
 }
 
 /// Time by which the rotor speeds follow slow changes of the commands.
@@ -60,7 +65,7 @@ pub fn explains(problem: &Problem, kind: &EffectKind, free: &[usize], fitted: &F
 
 /// Amount by which the logging of the commands makes the estimate of a parameter too small at most, in its unit.
 pub fn bias(problem: &Problem, parameter: &Parameter) -> f64 {
-    let half_s = || period_s(problem) / 2.0;
+    let half_s = || periods_s(problem).fold(0.0, f64::max) / 2.0;
     match (parameter.kind, parameter.spec().name) {
         (kind, _) if kind.is_delay => half_s(),
         (kind, "slowness") if kind.changes_drive => half_s() / lag_s(problem.model.vehicle.motor),

@@ -1,5 +1,7 @@
 //! Faults of one flight among several: each is named with its flight and its channel, and flights without one have none.
 mod simulated;
+#[path = "../../tests/runs/skipped.rs"]
+mod skipped;
 
 use flights::{Channel, Flight, FlightSet, Role};
 use identify::Fault;
@@ -391,7 +393,7 @@ fn a_role_without_a_sound_flight_is_refused_with_the_fault() {
 /// it, and the vehicle hovers meanwhile.
 #[test]
 fn real_flights_have_no_faults_but_those_that_are_real() {
-    if std::env::var_os("HUMMINGBUS_DATA").is_none() {
+    if skipped::variable_or_skip("HUMMINGBUS_DATA", "the folder of measured flights").is_none() {
         return;
     }
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../flights");

@@ -435,7 +435,8 @@ fn zstd_decoder(data: &[u8], size: u64) -> Result<impl Read, Fault> {
 /// The content of a chunk, which is `size` bytes; the memory grows with what there is.
 fn read_all(decoder: impl Read, size: u64) -> Result<Vec<u8>, Fault> {
     let mut content = Vec::new();
-    let read = decoder.take(size).read_to_end(&mut content)?;
+    // One byte more tells that there is more.
+    let read = decoder.take(size.saturating_add(1)).read_to_end(&mut content)?;
     if read as u64 == size {
         return Ok(content);
     }

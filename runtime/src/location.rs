@@ -1,8 +1,8 @@
 //! The location that a path names: an opened folder and a name in it. Once it is found, nobody can redirect it, whatever
 //! happens to the path.
 //!
-//! Links are followed as by a kernel with `fs.protected_symlinks`, and in every folder that everybody may write to: there a
-//! link counts only if it belongs to this user or to the owner of the folder.
+//! In a folder that everybody may write to, sticky or not, a link is followed only if it belongs to this user or to the
+//! owner of the folder, as by a kernel with `fs.protected_symlinks`.
 
 use rustix::fs::{AtFlags, CWD, FileType, Mode, OFlags, Stat};
 use rustix::io::Errno;

@@ -29,7 +29,7 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Triangles, String> {
             Some("f") => face(words, triangles.corners.len()).and_then(|face| {
                 let cut = cut(&triangles.corners, &face)?;
                 triangles.faces.extend(cut);
-                Ok(())
+                triangles.check_count()
             }),
             _ => Ok(()),
         };

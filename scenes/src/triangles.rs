@@ -35,7 +35,8 @@ impl Triangles {
         self.faces.push([first, first + 1, first + 2]);
     }
 
-    fn check_count(&self) -> Result<(), String> {
+    /// Refuses more triangles than are read.
+    pub(crate) fn check_count(&self) -> Result<(), String> {
         if self.faces.len() <= TRIANGLES_MAX {
             return Ok(());
         }

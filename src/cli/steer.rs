@@ -3,6 +3,7 @@
 use super::output;
 use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand};
+use inputs::InputFiles;
 use runtime::ctl::client;
 use runtime::ctl::protocol::{Answer, Request};
 use runtime::manifest::PaceSetting;
@@ -109,7 +110,7 @@ pub fn swap(arguments: &SwapArguments) -> Result<bool> {
 pub fn description(given: &str) -> Result<String> {
     let is_file = !given.is_empty() && (Path::new(given).is_file() || !given.contains('='));
     let text = if is_file {
-        std::fs::read_to_string(given).with_context(|| {
+        InputFiles::default().text(Path::new(given)).with_context(|| {
             format!("--with: cannot read {given}, and it is no TOML text such as kind=\"pid\"")
         })?
     } else {

@@ -9,10 +9,7 @@ use crate::quotes;
 pub use crate::dialect::{Decimal, Delimiter, Dialect};
 pub use crate::table_error::{ColumnError, TableError, names, shown};
 
-/// Number of rows that are looked at for the decimal mark.
-const ROWS_FOR_MARK: usize = 1000;
-
-/// Rows of one file at most: three hours at 1 kHz. Each takes some hundred bytes of memory, however short its line is.
+/// Rows of one file at most: two hours and a half at 1 kHz. Each takes some hundred bytes of memory, however short its line is.
 const ROWS_MAX: usize = 10_000_000;
 
 /// A file in CSV.
@@ -166,8 +163,9 @@ impl Table {
     fn find_decimal(&self, wanted: &[&str]) -> Result<Decimal, TableError> {
         let columns: Vec<usize> = wanted.iter().filter_map(|name| self.column(name).ok()).collect();
         let cells = || {
-            let rows = self.rows.iter().take(ROWS_FOR_MARK);
-            rows.flat_map(|row| columns.iter().map(move |column| (row.line, *column, row.cell(*column))))
+            self.rows
+                .iter()
+                .flat_map(|row| columns.iter().map(move |column| (row.line, *column, row.cell(*column))))
         };
         let is_comma = |cell: &str| cell.contains(',') && Decimal::Comma.number(cell).is_some();
         let is_point = |cell: &str| cell.contains('.') && Decimal::Point.number(cell).is_some();

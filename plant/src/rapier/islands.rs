@@ -1,4 +1,5 @@
-//! Bodies that push each other, each group of them an island: what happens in one changes no bit of another.
+//! Bodies that push each other, each group of them an island that the direct solve takes alone. The sweeps before it take all
+//! islands together.
 
 use super::direct::Direct;
 use super::solver::{self, Bilateral, Body, Unilateral};
