@@ -96,6 +96,18 @@ fn names_that_are_not_there_are_told_with_those_that_are() {
 }
 
 #[test]
+fn a_second_type_of_one_name_is_a_topic_of_its_own() {
+    let other = fmt(250, 3 + 8 + 4, "ATT", "Qf", "TimeUS,Volt");
+    let sample = message(250, &[&60_000_000_u64.to_le_bytes()[..], &4.2_f32.to_le_bytes()].concat());
+    let flight = read(&[log(400, false), other.clone(), sample.clone()].concat());
+    assert_eq!((flight.notes, flight.attitude.time_s.len()), (Vec::new(), 400));
+    let channels = "attitude = { topic = \"ATT\" }\n\
+                    battery_voltage = { topic = \"ATT of type 250\", fields = [\"Volt\"], unit = \"V\" }\n";
+    let flight = load(&[log(400, false), other, sample].concat(), channels, "trust_units = true").unwrap();
+    assert!((flight.battery_voltage.values[0][0] - 4.2).abs() < 1e-6, "{:?}", flight.battery_voltage);
+}
+
+#[test]
 fn damage_costs_what_is_at_it_alone_and_is_said() {
     let whole = log(400, true);
     let first = whole.len() - 400 * (17 + 2 * 36 + 19 + 17);

@@ -283,6 +283,11 @@ fn a_length_beyond_the_file_is_refused_with_its_place() {
         said.starts_with(&format!("byte {at}: a chunk says that it unpacks to 16777216 bytes, and ")),
         "{said}"
     );
+    // A chunk that unpacks to more than it says, without a checksum.
+    claims[at + 25..at + 33].copy_from_slice(&1_u64.to_le_bytes());
+    claims[at + 33..at + 37].fill(0);
+    let said = refused(&claims);
+    assert!(said.ends_with("a chunk says that it unpacks to 1 bytes, and unpacks to 2"), "{said}");
     // A record of a chunk that goes on behind the chunk's end, in the same file.
     let at = PLAIN.windows(9).position(|bytes| bytes[0] == 6 && bytes[3..9] == [0; 6]).unwrap();
     let mut beyond = PLAIN.clone();

@@ -71,6 +71,13 @@ fn tables_are_read_as_programs_write_them() {
 }
 
 #[test]
+fn a_decimal_comma_behind_many_whole_numbers_is_found() {
+    let text = format!("t;x;y\n{}0,5;1;-1\n", "0;1;-1\n".repeat(5000));
+    let table = read(text.as_bytes(), &WANTED, &Dialect::default()).unwrap();
+    assert_eq!(column(&table, "t").last(), Some(&0.5));
+}
+
+#[test]
 fn columns_are_named_by_number_without_a_header() {
     let rows = "0.5,1,-1\n1.25,2,-2\n2,3,-3\n";
     let cases = [
