@@ -1,24 +1,23 @@
-//! A connected node: waits for what a tick needs, computes it, sends, and follows the changes of the run.
+//! A connected node: what its next tick needs, gather → step → publish, and how it follows the changes of the run. Who
+//! calls it is the [executor](crate::executor).
 
 use crate::announcement::{self, Announcement};
 use crate::error::BusError;
 use crate::handles::Declared;
-use crate::host_time::{monotonic_ns, process_cpu_ns};
+use crate::host_time::monotonic_ns;
 use crate::links::Links;
-use crate::lockstep::{Need, Phase, SlotState, TransferOutcome, Waited};
+use crate::lockstep::{Need, NodeView, Phase, SlotState, TransferOutcome, Waited};
 use crate::membership::Membership;
 use crate::plan::{InputPlan, NodePlan};
-use crate::port::{InPort, OutPort, Source};
+use crate::port::{Feed, InPort, Locals, OutPort, Source};
 use crate::profile::TickWriter;
 use crate::schema::Schema;
 use crate::state_transfer::StateRing;
 use crate::tick::Tick;
 use crate::timing::{Due, Timing};
-use std::fmt::Display;
-use std::time::Duration;
 
-/// How long a process that retires sleeps before it looks again who still reads its last samples.
-const RETIREMENT_NAP: Duration = Duration::from_millis(1);
+/// The step of a component: it reads and writes the samples of a tick, and changes the state.
+pub(crate) type Step<'a> = dyn FnMut(&mut Tick<'_>, &mut [u8]) -> Result<(), String> + 'a;
 
 /// A node whose ports are connected.
 #[derive(Debug)]
@@ -41,19 +40,47 @@ pub(crate) struct ConnectedNode {
     timing: Option<Timing>,
     /// Words of the component's state; those of `timing` are behind them.
     state_words: usize,
+    /// The next tick that it computes.
+    pub(crate) tick: u32,
+    /// The ticks that the control segment counts as completed.
+    told_tick: u32,
+    /// True if another process may go on from its state at any tick.
+    states_every_tick: bool,
+    /// Host time of all its steps, ns.
+    step_ns: u64,
     // The transport last: the ports give back what they hold while it stands.
     links: Links,
 }
 
-/// What a wait for a tick came to.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Await {
-    /// The tick can be computed.
-    Tick,
-    /// The membership has changed.
+/// What a node does next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Turn {
+    /// It computes its next tick.
+    Compute,
+    /// It waits.
+    Wait(Awaited),
+    /// It follows a change of the membership first.
     Change,
-    /// The run ends before the tick.
-    End,
+    /// The run ends before its next tick, or its part in the run does.
+    Leave,
+}
+
+/// What a node waits for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Awaited {
+    /// A count.
+    Count {
+        /// Whose.
+        need: Need,
+        /// The count that it needs.
+        count: u32,
+        /// The count until which it may sleep.
+        sleep_for: u32,
+    },
+    /// Its backup's first tick, or the refusal of that backup.
+    Backup,
+    /// As a shadow behind the end of the run: its predecessor's end.
+    Predecessor,
 }
 
 impl ConnectedNode {
@@ -71,7 +98,8 @@ impl ConnectedNode {
             node.outputs.iter_mut().for_each(OutPort::set_timed);
         }
         node.connect_inputs(declared, membership)?;
-        node.follow(membership, first_tick)?;
+        node.connect(membership, &[])?;
+        node.states_every_tick = node.must_state(membership);
         node.links.transport.reserve()?;
         node.profile = node.links.tick_writer(first_tick)?;
         node.links.lockstep.note_process();
@@ -94,6 +122,10 @@ impl ConnectedNode {
             profile: None,
             timing: Timing::of(&links.plan, &links.node),
             state_words: 0,
+            tick: first_tick,
+            told_tick: first_tick,
+            states_every_tick: true,
+            step_ns: 0,
             links,
         }
     }
@@ -112,10 +144,14 @@ impl ConnectedNode {
             }
             let initial = links.initial_value(input, declared)?;
             let generation = links.publisher(membership, input.topic).primary.generation;
-            let receiver = links.subscriber(input.topic, generation)?;
-            let limit = self.first_tick.checked_sub(input.delay_ticks);
-            let source = Source::joined(generation, receiver, limit, topic.period_ticks);
-            let mut port = InPort::new(input, topic, announcement.size, initial, source);
+            let feed = if links.is_member(links.plan.publisher(input.topic), generation) {
+                Feed::Local { generation }
+            } else {
+                let receiver = links.subscriber(input.topic, generation)?;
+                let limit = self.first_tick.checked_sub(input.delay_ticks);
+                Feed::Shared(Source::joined(generation, receiver, limit, topic.period_ticks))
+            };
+            let mut port = InPort::new(input, topic, announcement.size, initial, feed);
             port.reads_shadow = matches!(declared, Declared::Raw);
             self.inputs.push(port);
             self.announcements.push(announcement);
@@ -129,17 +165,16 @@ impl ConnectedNode {
         (&self.links.plan.topics[topic].name, &self.announcements[input])
     }
 
-    /// Computes `step` at every due tick until the run ends, or until another process has taken over. The state, a
-    /// message of `schema`, is transferred to it if that knows the same type, and to one that is started after a crash.
+    /// Makes ready to transfer the state, a message of `schema`: to whoever takes this node's place, and from whom it takes
+    /// it. Returns the words behind the state of a node whose steps take time.
     ///
     /// # Errors
-    /// If a step fails, a due output stays unwritten, a sample is lost, or the run is aborted.
-    pub(crate) fn run<E: Display>(
-        mut self,
+    /// If shared memory cannot be had.
+    pub(crate) fn open_states(
+        &mut self,
         schema: Option<&'static Schema>,
-        state: &mut [u8],
-        mut step: impl FnMut(&mut Tick<'_>, &mut [u8]) -> Result<(), E>,
-    ) -> Result<(), BusError> {
+        state_bytes: usize,
+    ) -> Result<usize, BusError> {
         self.open_predecessor(schema)?;
         let more_words = self.timing_words(self.timing.is_some());
         if let Some(schema) = schema {
@@ -148,17 +183,8 @@ impl ConnectedNode {
             self.published_state =
                 Some(StateRing::create(dir, plan, links.index, links.generation, schema, more_words)?);
         }
-        let mut step =
-            |tick: &mut Tick<'_>, state: &mut [u8]| step(tick, state).map_err(|error| error.to_string());
-        if more_words == 0 {
-            return self.fly(state, step);
-        }
-        let bytes = state.len();
-        self.state_words = bytes.div_ceil(8);
-        let mut words = vec![0_u64; self.state_words + more_words];
-        let whole: &mut [u8] = bytemuck::cast_slice_mut(&mut words);
-        whole[..bytes].copy_from_slice(state);
-        self.fly(whole, |tick, whole| step(tick, &mut whole[..bytes]))
+        self.state_words = state_bytes.div_ceil(8);
+        Ok(more_words)
     }
 
     /// Words behind the state of a process of this node whose steps take time, or do not.
@@ -195,16 +221,16 @@ impl ConnectedNode {
             let input =
                 InputPlan { port: output.port.clone(), topic: output.topic, delay_ticks: 1, initial: None };
             let size = Announcement::load(&announcement::topic_path(&links.run_dir, output.topic))?.size;
-            self.predecessor.push(InPort::new(&input, topic, size, None, source));
+            self.predecessor.push(InPort::new(&input, topic, size, None, Feed::Shared(source)));
         }
         links.transport.reserve()
     }
 
-    fn fly(
-        &mut self,
-        state: &mut [u8],
-        mut step: impl FnMut(&mut Tick<'_>, &mut [u8]) -> Result<(), String>,
-    ) -> Result<(), BusError> {
+    /// Tells that this node can begin, with `state`.
+    ///
+    /// # Errors
+    /// If its memory cannot be locked.
+    pub(crate) fn begin(&mut self, state: &[u8]) -> Result<(), BusError> {
         // Last, when all that the ticks use is mapped: a mapping that exceeds the limit later fails without words.
         if self.links.plan.lock_memory {
             crate::process::lock_memory()?;
@@ -213,29 +239,29 @@ impl ConnectedNode {
             // A backup may have to begin with the first tick.
             self.publish_state(self.first_tick, state);
         }
+        self.links.lockstep.set_ready(Phase::Running);
+        Ok(())
+    }
+
+    /// Waits until the ticks begin: the run's, or those of a backup.
+    ///
+    /// # Errors
+    /// If the run is aborted.
+    pub(crate) fn await_ticks(&self) -> Result<(), BusError> {
         let links = &self.links;
-        links.lockstep.set_ready(Phase::Running);
         let waited = match links.generation {
             0 => links.lockstep.wait_phase(Phase::Running),
             _ => links.lockstep.wait_slot(SlotState::Taken),
         };
-        waited.or_aborted()?;
-        let cpu_start_ns = process_cpu_ns();
-        let period = links.node.period_ticks;
-        let mut tick = self.first_tick;
-        while self.await_tick(tick, state)? {
-            if self.links.generation > 0 && tick <= self.take_over_tick.max(self.first_tick) {
-                // What it begins with is its predecessor's, not what it came to itself.
-                self.publish_state(tick, state);
-            }
-            self.compute(tick, state, &mut step)?;
-            tick += period;
-            self.links.lockstep.completed(tick);
-        }
-        self.links.lockstep.note_cpu(process_cpu_ns() - cpu_start_ns);
+        waited.or_aborted()
+    }
+
+    /// Tells that this node computes no more.
+    pub(crate) fn complete(&mut self, cpu_ns: u64) {
+        self.tell();
+        self.links.lockstep.note_cpu(cpu_ns);
         // A node whose next due tick lies beyond the end has completed the run.
         self.links.lockstep.completed(u32::MAX - 1);
-        self.await_readers(tick)
     }
 
     /// Publishes the state at the start of `tick`, for whoever takes over there.
@@ -247,77 +273,78 @@ impl ConnectedNode {
         }
     }
 
-    /// Waits until `tick` may be computed; false when the run ends, or this process's part in it, before it.
-    fn await_tick(&mut self, tick: u32, state: &mut [u8]) -> Result<bool, BusError> {
-        loop {
-            let awaited = if self.links.lockstep.epoch() != self.epoch {
-                Await::Change
-            } else if self.links.lockstep.end_tick() <= tick {
-                self.await_predecessor(tick)
-            } else if tick >= self.retirement_tick {
-                self.await_backup()
-            } else {
-                self.await_needs(tick, state)?
-            };
-            match awaited {
-                // Who counts a promoted process's samples as there sees the change that promoted it, too.
-                Await::Tick if self.links.lockstep.epoch() != self.epoch => {}
-                Await::Tick => return Ok(true),
-                Await::End if self.links.lockstep.is_aborted() => return Err(BusError::Aborted),
-                Await::End => return Ok(false),
-                Await::Change => {
-                    let epoch = self.links.lockstep.epoch();
-                    self.follow(&Membership::load(&self.links.run_dir, epoch)?, tick)?;
-                    self.links.transport.reserve()?;
-                    self.links.lockstep.acknowledge(epoch);
-                }
-            }
+    /// What this node does next; `state` is its predecessor's afterwards where it is a shadow.
+    ///
+    /// # Errors
+    /// If the run is aborted, or the state of the predecessor is gone.
+    pub(crate) fn turn(&self, state: &mut [u8]) -> Result<Turn, BusError> {
+        let (lockstep, tick) = (&self.links.lockstep, self.tick);
+        if lockstep.epoch() != self.epoch {
+            return Ok(Turn::Change);
         }
+        if lockstep.end_tick() <= tick {
+            // A shadow that has come to the end of the run waits for its predecessor to get there: until then that may die,
+            // and the samples of its last ticks are then the shadow's.
+            let is_shadow = self.links.generation > 0 && self.take_over_tick >= tick;
+            let awaits = is_shadow && !lockstep.has(Need::OtherDone, tick);
+            return if awaits { Ok(Turn::Wait(Awaited::Predecessor)) } else { self.leave_turn() };
+        }
+        if tick >= self.retirement_tick {
+            let has_taken_over = lockstep.has(Need::OtherDone, self.retirement_tick + 1);
+            return if has_taken_over { self.leave_turn() } else { Ok(Turn::Wait(Awaited::Backup)) };
+        }
+        let turn = match self.missing(state)? {
+            Some(awaited) => Turn::Wait(awaited),
+            None => Turn::Compute,
+        };
+        // Who counts a promoted process's samples as there sees the change that promoted it, too.
+        Ok(if turn == Turn::Compute && lockstep.epoch() != self.epoch { Turn::Change } else { turn })
     }
 
-    /// Waits for the predecessor, the inputs, the shadows and the grant that `tick` needs.
-    fn await_needs(&self, tick: u32, state: &mut [u8]) -> Result<Await, BusError> {
-        let awaited = self.follow_predecessor(tick, state)?;
-        if awaited != Await::Tick {
-            return Ok(awaited);
+    fn leave_turn(&self) -> Result<Turn, BusError> {
+        if self.links.lockstep.is_aborted() { Err(BusError::Aborted) } else { Ok(Turn::Leave) }
+    }
+
+    /// The first of what the next tick needs that is not there: the predecessor, the inputs, the shadows, the grant.
+    fn missing(&self, state: &mut [u8]) -> Result<Option<Awaited>, BusError> {
+        if let Some(awaited) = self.missing_predecessor(state)? {
+            return Ok(Some(awaited));
         }
-        let links = &self.links;
-        // A node without outputs holds nobody up, so it lets samples gather and is woken less often.
-        let batch = if links.node.outputs.is_empty() { (links.plan.window_ticks / 4).max(1) } else { 1 };
-        for (index, input) in self.inputs.iter().enumerate() {
+        let (lockstep, tick) = (&self.links.lockstep, self.tick);
+        for (index, input) in self.inputs.iter().enumerate().filter(|(_, input)| !input.is_local()) {
             let needed = (tick + 1).saturating_sub(input.delay_ticks);
-            if links.lockstep.ticks_sent(input.topic) < needed {
-                let granted = links.lockstep.granted_ticks();
-                let sleep_for = needed.max((tick + batch).min(granted).saturating_sub(input.delay_ticks));
-                let awaited = self.wait(Need::Samples { topic: input.topic, input: index }, sleep_for, tick);
-                // A node that lets samples gather may be sent home with some of them still to be taken: all
-                // that was sent before an abort is recorded.
-                let is_sent = awaited == Await::End && links.lockstep.ticks_sent(input.topic) >= needed;
-                if awaited != Await::Tick && !is_sent {
-                    return Ok(awaited);
-                }
+            let need = Need::Samples { topic: input.topic, input: index };
+            if !lockstep.has(need, needed) {
+                let sleep_for = needed.max(self.gathered(tick).saturating_sub(input.delay_ticks));
+                return Ok(Some(Awaited::Count { need, count: needed, sleep_for }));
             }
-            if input.awaits_shadow(tick) {
-                let awaited = self.wait(Need::Shadow { topic: input.topic, input: index }, tick + 1, tick);
-                if awaited != Await::Tick {
-                    return Ok(awaited);
-                }
+            let need = Need::Shadow { topic: input.topic, input: index };
+            if input.awaits_shadow(tick) && !lockstep.has(need, tick + 1) {
+                return Ok(Some(Awaited::count(need, tick + 1)));
             }
         }
         // The inputs of this tick imply its grant, except where a node has none that are due at it.
-        Ok(self.wait(Need::Grant, tick + 1, tick))
+        let is_granted = lockstep.has(Need::Grant, tick + 1);
+        Ok((!is_granted).then_some(Awaited::count(Need::Grant, tick + 1)))
     }
 
-    /// As a shadow, starts `tick` from the state of the predecessor, if that states one: what this process
+    /// Ticks whose samples a node may let gather before it wakes: one without outputs holds nobody up.
+    fn gathered(&self, tick: u32) -> u32 {
+        let links = &self.links;
+        let batch = if links.node.outputs.is_empty() { (links.plan.window_ticks / 4).max(1) } else { 1 };
+        (tick + batch).min(links.lockstep.granted_ticks())
+    }
+
+    /// As a shadow, starts the tick from the state of the predecessor, if that states one: what this process
     /// sends then is what it would send if it took over here.
-    fn follow_predecessor(&self, tick: u32, state: &mut [u8]) -> Result<Await, BusError> {
+    fn missing_predecessor(&self, state: &mut [u8]) -> Result<Option<Awaited>, BusError> {
+        let (lockstep, tick) = (&self.links.lockstep, self.tick);
         if self.links.generation == 0 || tick > self.take_over_tick {
-            return Ok(Await::Tick);
+            return Ok(None);
         }
         if let Some(ring) = &self.predecessor_state {
-            let awaited = self.wait(Need::OtherState, tick + 1, tick);
-            if awaited != Await::Tick {
-                return Ok(awaited);
+            if !lockstep.has(Need::OtherState, tick + 1) {
+                return Ok(Some(Awaited::count(Need::OtherState, tick + 1)));
             }
             if !ring.load(tick, state) {
                 return Err(BusError::Parameters {
@@ -326,84 +353,168 @@ impl ConnectedNode {
                 });
             }
         }
-        if tick == self.take_over_tick && self.links.lockstep.other_computes() {
-            return Ok(self.wait(Need::OtherDone, tick, tick));
-        }
-        Ok(Await::Tick)
+        let awaits =
+            tick == self.take_over_tick && lockstep.other_computes() && !lockstep.has(Need::OtherDone, tick);
+        Ok(awaits.then_some(Awaited::count(Need::OtherDone, tick)))
     }
 
-    /// Waits until the backup has completed its first tick, or is refused.
-    fn await_backup(&self) -> Await {
-        let tick = self.retirement_tick;
-        match self.wait(Need::OtherDone, tick + 1, tick) {
-            Await::Tick => Await::End,
-            other => other,
+    /// Sleeps until what is `awaited` may be there; false if it will not come: the run ends before the next tick.
+    ///
+    /// # Errors
+    /// If the run is aborted.
+    pub(crate) fn wait(&self, awaited: Awaited) -> Result<bool, BusError> {
+        let (links, lockstep, tick) = (&self.links, &self.links.lockstep, self.tick);
+        let has_changed = || lockstep.epoch() != self.epoch;
+        let waited = match awaited {
+            Awaited::Count { need, sleep_for, .. } => {
+                let is_over = || lockstep.end_tick() <= tick || has_changed();
+                lockstep.wait(need, sleep_for, links.node.wait, is_over)
+            }
+            Awaited::Backup => {
+                let is_over = || lockstep.end_tick() <= self.retirement_tick || has_changed();
+                lockstep.wait(Need::OtherDone, self.retirement_tick + 1, links.node.wait, is_over)
+            }
+            Awaited::Predecessor => {
+                let is_over = || lockstep.is_aborted() || has_changed();
+                lockstep.wait(Need::OtherDone, tick, links.node.wait, is_over)
+            }
+        };
+        let is_there = waited == Waited::Reached || awaited.is_there(lockstep);
+        if is_there || !lockstep.is_abandoned() {
+            // A node that lets samples gather may be sent home with some of them still to be taken: all
+            // that was sent before an abort is recorded.
+            return Ok(true);
         }
+        self.leave_turn().map(|_| false)
     }
 
-    /// A shadow that has come to the end of the run waits for its predecessor to get there: until then that may die,
-    /// and the samples of its last ticks are then the shadow's.
-    fn await_predecessor(&self, tick: u32) -> Await {
-        let (links, lockstep) = (&self.links, &self.links.lockstep);
-        if links.generation == 0 || self.take_over_tick < tick {
-            return Await::End;
-        }
-        let is_over = || lockstep.is_aborted() || lockstep.epoch() != self.epoch;
-        match lockstep.wait(Need::OtherDone, tick, links.node.wait, is_over) {
-            Waited::Over if !lockstep.is_aborted() => Await::Change,
-            _ => Await::End,
-        }
-    }
-
-    fn wait(&self, need: Need, count: u32, tick: u32) -> Await {
+    /// Has the control segment count what this node has sent and completed.
+    pub(crate) fn tell(&mut self) {
         let lockstep = &self.links.lockstep;
-        let is_over = || lockstep.end_tick() <= tick || lockstep.epoch() != self.epoch;
-        match lockstep.wait(need, count, self.links.node.wait, is_over) {
-            Waited::Reached => Await::Tick,
-            Waited::Over if lockstep.is_abandoned() || lockstep.end_tick() <= tick => Await::End,
-            Waited::Over => Await::Change,
+        for output in &mut self.outputs {
+            if output.ticks_told < output.ticks_sent {
+                lockstep.samples_sent(output.topic, output.ticks_sent, &output.readers);
+                output.ticks_told = output.ticks_sent;
+            }
+        }
+        if self.told_tick < self.tick {
+            lockstep.completed(self.tick);
+            self.told_tick = self.tick;
         }
     }
 
-    /// Stays until every process has taken the last samples of this process: also one that is started in the place of
-    /// a reader that has died meanwhile.
-    fn await_readers(&mut self, tick: u32) -> Result<(), BusError> {
-        let longest = self.links.plan.nodes.iter().map(|node| node.period_ticks).max().unwrap_or(1);
-        let taken = tick.saturating_add(longest + 1);
-        loop {
-            let lockstep = &self.links.lockstep;
-            if lockstep.is_aborted() {
-                return Err(BusError::Aborted);
-            }
-            let needed = taken.min(lockstep.end_tick());
-            if lockstep.computing().all(|slot| lockstep.done(slot) >= needed) {
-                // No later change concerns this process, however long its program goes on.
-                lockstep.acknowledge(u32::MAX);
-                return Ok(());
-            }
-            let epoch = lockstep.epoch();
-            if epoch == self.epoch {
-                std::thread::sleep(RETIREMENT_NAP);
-                continue;
-            }
-            let membership = Membership::load(&self.links.run_dir, epoch)?;
-            self.connect_readers(&membership)?;
-            self.epoch = epoch;
-            self.links.lockstep.acknowledge(epoch);
+    /// True once every process has taken the last samples of this one, which has completed its ticks before: also one
+    /// that is started in the place of a reader that has died meanwhile.
+    ///
+    /// # Errors
+    /// If the run is aborted.
+    pub(crate) fn has_been_read(&self) -> Result<bool, BusError> {
+        let lockstep = &self.links.lockstep;
+        if lockstep.is_aborted() {
+            return Err(BusError::Aborted);
         }
+        let longest = self.links.plan.nodes.iter().map(|node| node.period_ticks).max().unwrap_or(1);
+        let needed = self.tick.saturating_add(longest + 1).min(lockstep.end_tick());
+        Ok(lockstep.computing().all(|slot| lockstep.done(slot) >= needed))
+    }
+
+    /// Leaves the run: no later change concerns this node, however long its process goes on.
+    pub(crate) fn leave(&self) {
+        self.links.lockstep.acknowledge(u32::MAX);
+        self.links.lockstep.leave();
+    }
+
+    /// True if the membership has changed since this node followed it.
+    pub(crate) fn is_behind(&self) -> bool {
+        self.links.lockstep.epoch() != self.epoch
+    }
+
+    /// The newest membership.
+    ///
+    /// # Errors
+    /// If its file cannot be read.
+    pub(crate) fn newest_membership(&self) -> Result<Membership, BusError> {
+        Membership::load(&self.links.run_dir, self.links.lockstep.epoch())
+    }
+
+    /// Tells that the connections agree with the membership that was followed.
+    pub(crate) fn acknowledge(&self) -> Result<(), BusError> {
+        self.links.transport.reserve()?;
+        self.links.lockstep.acknowledge(self.epoch);
+        Ok(())
+    }
+
+    /// The topics that members of the group read from this one, and the bytes of their messages.
+    pub(crate) fn local_topics(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let outputs = self.outputs.iter().filter(|output| self.links.has_local_readers(output.topic));
+        outputs.map(|output| (output.topic, output.size()))
+    }
+
+    /// Makes the outputs agree with `membership`, after the last tick.
+    ///
+    /// # Errors
+    /// If shared memory cannot be had.
+    pub(crate) fn follow_readers(
+        &mut self,
+        membership: &Membership,
+        locals: &Locals,
+    ) -> Result<(), BusError> {
+        self.connect_readers(membership, locals)?;
+        self.epoch = membership.epoch;
+        Ok(())
+    }
+
+    /// What ties this node to its run.
+    pub(crate) fn links(&self) -> &Links {
+        &self.links
+    }
+
+    /// Host time of all its steps, ns.
+    pub(crate) fn step_ns(&self) -> u64 {
+        self.step_ns
     }
 
     /// Sends to the readers that `membership` names from now on, and to new ones what was sent last.
-    fn connect_readers(&mut self, membership: &Membership) -> Result<(), BusError> {
+    fn connect_readers(&mut self, membership: &Membership, locals: &Locals) -> Result<(), BusError> {
+        let links = &self.links;
         for output in &mut self.outputs {
-            output.readers = self.links.readers(membership, output.topic);
-            output.update_subscribers(&self.links.node.name)?;
+            output.readers = links.readers(membership, output.topic);
+            output.is_awaited = links.is_awaited_outside(membership, output.topic);
+            if !output.is_shared() && links.is_read_outside(membership, output.topic) {
+                let sender = links.sender(output.topic, output.size())?;
+                output.share(sender, locals.get(output.topic).and_then(Option::as_ref), &links.node.name)?;
+            }
+            output.update_subscribers(&links.node.name)?;
         }
         Ok(())
     }
 
-    /// Makes the connections agree with `membership`; `tick` is the next that this node computes.
-    fn follow(&mut self, membership: &Membership, tick: u32) -> Result<(), BusError> {
+    /// Makes the connections agree with `membership`; `state` is that before the next tick.
+    pub(crate) fn follow(
+        &mut self,
+        membership: &Membership,
+        locals: &Locals,
+        state: &[u8],
+    ) -> Result<(), BusError> {
+        self.connect(membership, locals)?;
+        let instances = &membership.nodes[self.links.index];
+        let must_state = self.must_state(membership);
+        let did_state = std::mem::replace(&mut self.states_every_tick, must_state);
+        if must_state && !did_state && instances.primary.generation == self.links.generation {
+            self.publish_state(self.tick, state);
+        }
+        Ok(())
+    }
+
+    /// True if another process may go on from this one's state: a backup is there, or one is started when this one dies.
+    fn must_state(&self, membership: &Membership) -> bool {
+        self.links.generation > 0
+            || self.links.node.restarts
+            || membership.nodes[self.links.index].backup.is_some()
+    }
+
+    fn connect(&mut self, membership: &Membership, locals: &Locals) -> Result<(), BusError> {
+        let tick = self.tick;
         for input in &mut self.inputs {
             self.links.connect_backup(input, membership, tick)?;
         }
@@ -416,7 +527,7 @@ impl ConnectedNode {
         } else if instances.primary.generation == generation {
             self.retirement_tick = instances.backup.as_ref().map_or(u32::MAX, |_| instances.take_over_tick);
         }
-        self.connect_readers(membership)?;
+        self.connect_readers(membership, locals)?;
         if is_backup {
             for (index, output) in self.outputs.iter_mut().enumerate() {
                 self.links.promote(output, instances, index, tick);
@@ -426,18 +537,29 @@ impl ConnectedNode {
         Ok(())
     }
 
-    fn compute(
+    /// Computes the next tick; returns the host time at which it was done. `before_ns` is the host time of a look at the
+    /// clock after which nobody waited.
+    ///
+    /// # Errors
+    /// If a sample is lost, the step fails, or a due output stays unwritten.
+    pub(crate) fn compute(
         &mut self,
-        tick: u32,
+        before_ns: Option<u64>,
+        locals: &mut Locals,
         state: &mut [u8],
-        step: &mut impl FnMut(&mut Tick<'_>, &mut [u8]) -> Result<(), String>,
-    ) -> Result<(), BusError> {
+        step: &mut Step<'_>,
+    ) -> Result<u64, BusError> {
+        let tick = self.tick;
+        if self.links.generation > 0 && tick <= self.take_over_tick.max(self.first_tick) {
+            // What it begins with is its predecessor's, not what it came to itself.
+            self.publish_state(tick, state);
+        }
         self.take_inputs(tick)?;
-        let received_ns = monotonic_ns();
+        let received_ns = before_ns.unwrap_or_else(monotonic_ns);
         match self.timing.take() {
-            None => self.step(tick, state, step)?,
+            None => self.step(tick, locals, state, step)?,
             Some(mut timing) => {
-                self.step_in_time(&mut timing, tick, state, step)?;
+                self.step_in_time(&mut timing, tick, locals, state, step)?;
                 self.timing = Some(timing);
             }
         }
@@ -446,16 +568,20 @@ impl ConnectedNode {
             return Err(BusError::Aborted);
         }
         let done_ns = monotonic_ns();
+        self.step_ns += done_ns - received_ns;
         self.links.lockstep.count_step(done_ns - received_ns);
-        // Before anything is sent: whoever sees the sample can go on from the state after it.
-        self.publish_state(tick + self.links.node.period_ticks, state);
-        self.send(tick, received_ns, done_ns)?;
+        if self.states_every_tick {
+            // Before anything is sent: whoever sees the sample can go on from the state after it.
+            self.publish_state(tick + self.links.node.period_ticks, state);
+        }
+        self.send(tick, received_ns, done_ns, locals)?;
         if tick >= self.take_over_tick {
             // The predecessor leaves; nothing of it is read any more.
             self.predecessor.clear();
             self.predecessor_state = None;
         }
-        Ok(())
+        self.tick += self.links.node.period_ticks;
+        Ok(done_ns)
     }
 
     fn take_inputs(&mut self, tick: u32) -> Result<(), BusError> {
@@ -470,15 +596,16 @@ impl ConnectedNode {
     fn step(
         &mut self,
         tick: u32,
+        locals: &Locals,
         state: &mut [u8],
-        step: &mut impl FnMut(&mut Tick<'_>, &mut [u8]) -> Result<(), String>,
+        step: &mut Step<'_>,
     ) -> Result<(), BusError> {
         let links = &self.links;
         let (node, time_ns) = (&links.node.name, links.time_ns(tick));
         let takes_over = links.generation > 0 && tick == self.take_over_tick;
         let predecessor = if takes_over { self.predecessor.as_slice() } else { &[] };
         let (inputs, outputs) = (self.inputs.as_slice(), self.outputs.as_mut_slice());
-        let mut view = Tick { tick, time_ns, node, inputs, outputs, predecessor };
+        let mut view = Tick { tick, time_ns, node, inputs, locals, outputs, predecessor };
         let time_s = time_ns as f64 * 1e-9;
         step(&mut view, state).map_err(|reason| BusError::Step { node: node.clone(), tick, time_s, reason })
     }
@@ -488,8 +615,9 @@ impl ConnectedNode {
         &mut self,
         timing: &mut Timing,
         tick: u32,
+        locals: &Locals,
         state: &mut [u8],
-        step: &mut impl FnMut(&mut Tick<'_>, &mut [u8]) -> Result<(), String>,
+        step: &mut Step<'_>,
     ) -> Result<(), BusError> {
         let (state, words) = state.split_at_mut(8 * self.state_words);
         let words: &mut [u64] = bytemuck::cast_slice_mut(words);
@@ -501,7 +629,7 @@ impl ConnectedNode {
         let counts = tick >= self.take_over_tick;
         match timing.begin(tick, words, &self.outputs) {
             Due::Step => {
-                self.step(tick, state, step)?;
+                self.step(tick, locals, state, step)?;
                 let overran = timing.end(tick, words, &mut self.outputs, &self.links.node.name)?;
                 if overran && counts {
                     self.links.lockstep.count_overrun();
@@ -513,7 +641,13 @@ impl ConnectedNode {
         Timing::write(tick, words, &mut self.outputs, &self.links.node.name)
     }
 
-    fn send(&mut self, tick: u32, received_ns: u64, done_ns: u64) -> Result<(), BusError> {
+    fn send(
+        &mut self,
+        tick: u32,
+        received_ns: u64,
+        done_ns: u64,
+        locals: &mut Locals,
+    ) -> Result<(), BusError> {
         let (lockstep, node) = (&self.links.lockstep, &self.links.node.name);
         let time_ns = self.links.time_ns(tick);
         let mut sent_before = false;
@@ -524,12 +658,13 @@ impl ConnectedNode {
             if let Some(profile) = &mut self.profile {
                 profile.sent(index, sent_ns);
             }
-            output.send(tick, time_ns, [received_ns, done_ns, sent_ns], node)?;
-            let next = tick + output.period_ticks;
-            if tick >= output.counts_from {
-                lockstep.samples_sent(output.topic, next, &output.readers);
-            } else {
-                lockstep.shadow_sent(output.topic, next, &output.readers);
+            output.send(tick, time_ns, [received_ns, done_ns, sent_ns], node, locals)?;
+            if tick < output.counts_from {
+                output.ticks_told = output.ticks_sent;
+                lockstep.shadow_sent(output.topic, output.ticks_sent, &output.readers);
+            } else if output.is_awaited {
+                output.ticks_told = output.ticks_sent;
+                lockstep.samples_sent(output.topic, output.ticks_sent, &output.readers);
             }
             sent_before = true;
         }
@@ -540,5 +675,17 @@ impl ConnectedNode {
             profile.end(tick, received_ns, done_ns, monotonic_ns());
         }
         Ok(())
+    }
+}
+
+impl Awaited {
+    /// `count` of `need`, and no more.
+    fn count(need: Need, count: u32) -> Self {
+        Self::Count { need, count, sleep_for: count }
+    }
+
+    /// True if what was needed is there, although what was slept for is not.
+    fn is_there(self, lockstep: &NodeView) -> bool {
+        matches!(self, Self::Count { need, count, .. } if lockstep.has(need, count))
     }
 }

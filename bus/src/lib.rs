@@ -16,8 +16,12 @@ pub mod component;
 pub mod computing_time;
 mod connected;
 pub mod context;
+mod depths;
 pub mod error;
+mod executor;
 mod finite;
+#[doc(hidden)]
+pub mod group;
 mod handles;
 mod harness;
 #[doc(hidden)]
@@ -29,6 +33,7 @@ pub mod initial;
 mod join;
 mod json_file;
 mod links;
+mod local;
 #[doc(hidden)]
 pub mod lockstep;
 #[doc(hidden)]

@@ -6,11 +6,12 @@ use crate::handles::Declared;
 use crate::initial;
 use crate::lockstep::NodeView;
 use crate::membership::{Membership, NodeInstances};
-use crate::plan::{InputPlan, NodePlan, Plan};
+use crate::plan::{GroupPlan, InputPlan, NodePlan, Plan};
 use crate::port::{InPort, OutPort, Source};
 use crate::profile::TickWriter;
-use crate::transport::{Receiver, Transport};
+use crate::transport::{Receiver, Sender, Transport};
 use std::path::PathBuf;
+use std::rc::Rc;
 
 /// What ties a node to its run.
 #[derive(Debug)]
@@ -21,7 +22,7 @@ pub(crate) struct Links {
     pub(crate) generation: u32,
     pub(crate) node: NodePlan,
     pub(crate) lockstep: NodeView,
-    pub(crate) transport: Transport,
+    pub(crate) transport: Rc<Transport>,
     pub(crate) _claim: Claim,
 }
 
@@ -42,9 +43,44 @@ impl Links {
         self.transport.subscriber(&self.plan.topics[topic].name, generation, self.plan.capacity(topic))
     }
 
+    /// The group that this process is, if it is one.
+    fn group(&self) -> Option<&GroupPlan> {
+        if self.generation == 0 { self.plan.group_of(self.index) } else { None }
+    }
+
+    /// True if the instance `generation` of `node` shares this process.
+    pub(crate) fn is_member(&self, node: usize, generation: u32) -> bool {
+        generation == 0 && self.group().is_some_and(|group| group.has(node))
+    }
+
+    /// True if a member of the group that this process is reads `topic`.
+    pub(crate) fn has_local_readers(&self, topic: usize) -> bool {
+        let reads = |node: usize| self.plan.nodes[node].inputs.iter().any(|input| input.topic == topic);
+        self.group().is_some_and(|group| group.members.iter().any(|member| reads(member.node)))
+    }
+
     /// The processes of the node that publishes `topic`.
     pub(crate) fn publisher<'a>(&self, membership: &'a Membership, topic: usize) -> &'a NodeInstances {
         &membership.nodes[self.plan.publisher(topic)]
+    }
+
+    /// True if an instance in another process reads `topic`.
+    pub(crate) fn is_read_outside(&self, membership: &Membership, topic: usize) -> bool {
+        membership.readers(topic).any(|(node, generation, _)| !self.is_member(node, generation))
+    }
+
+    /// True if an instance in another process reads `topic` and sends something itself: others wait for it.
+    pub(crate) fn is_awaited_outside(&self, membership: &Membership, topic: usize) -> bool {
+        membership.readers(topic).any(|(node, generation, _)| {
+            let sends = membership.nodes[node].of(generation).is_some_and(|it| !it.plan.outputs.is_empty());
+            sends && !self.is_member(node, generation)
+        })
+    }
+
+    /// The sending end of `topic`, whose messages have `size` bytes.
+    pub(crate) fn sender(&self, topic: usize, size: usize) -> Result<Sender, BusError> {
+        let capacity = self.plan.capacity(topic);
+        self.transport.publisher(&self.plan.topics[topic].name, self.generation, size, capacity)
     }
 
     /// The inputs that read `topic`, by their numbers among those of all slots.

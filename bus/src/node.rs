@@ -4,6 +4,7 @@ use crate::announcement::{self, Announcement};
 use crate::claim;
 use crate::connected::ConnectedNode;
 use crate::error::BusError;
+use crate::executor::{Executor, Member};
 use crate::handles::{Declared, Input, Output, Wiring};
 use crate::join::Join;
 use crate::links::Links;
@@ -22,6 +23,7 @@ use inputs::InputFiles;
 use serde::de::DeserializeOwned;
 use std::fmt::Display;
 use std::path::PathBuf;
+use std::rc::Rc;
 
 /// A node that declares its ports by name and runs a closure, where no [`Component`](crate::Component) will do: the whole
 /// of an executable that a manifest names as a `command`.
@@ -325,31 +327,32 @@ impl Node {
     ///
     /// # Errors
     /// If a port of the manifest was not declared or declared twice, two sides disagree on a layout, or the run is aborted.
-    pub(crate) fn connect(mut self) -> Result<ConnectedNode, BusError> {
-        self.fault.take().map_or(Ok(()), Err)?;
-        self.require_all_declared()?;
-        let claim = claim::claim(&self.run_dir, &process_name(self.name(), self.generation))?;
-        let lockstep = NodeView::open(&self.plan, self.index, self.generation)?;
+    pub(crate) fn connect(self) -> Result<ConnectedNode, BusError> {
         crate::process::stay_on(self.node.cpu);
         if self.plan.pace == Pace::Free {
             crate::process::wait_for_turn();
         }
+        let transport = Rc::new(Transport::new(&self.run_dir, &self.plan.run_id, self.name())?);
+        self.announce(transport)?.connect()
+    }
+
+    /// Creates the outputs, and tells that it did: the first half of connecting.
+    ///
+    /// # Errors
+    /// As [`Node::connect`].
+    pub(crate) fn announce(mut self, transport: Rc<Transport>) -> Result<AnnouncedNode, BusError> {
+        self.fault.take().map_or(Ok(()), Err)?;
+        self.require_all_declared()?;
+        let claim = claim::claim(&self.run_dir, &process_name(self.name(), self.generation))?;
+        let lockstep = NodeView::open(&self.plan, self.index, self.generation)?;
         if self.generation > 0 {
             // Every topic is announced by then.
             lockstep.wait_phase(Phase::Connecting).or_aborted()?;
         }
-        let transport = Transport::new(&self.run_dir, &self.plan.run_id, self.name())?;
-        let outputs = self.connect_outputs(&transport)?;
-        transport.reserve()?;
-        lockstep.set_ready(Phase::Connecting);
-        let membership = if self.generation == 0 {
-            lockstep.wait_phase(Phase::Connecting).or_aborted()?;
-            Membership::first(&self.plan)
-        } else {
-            lockstep.wait_slot(SlotState::Joining).or_aborted()?;
-            // It names this process already; the others are told when this one has connected.
-            Membership::load(&self.run_dir, lockstep.epoch() + 1)?
-        };
+        let declared_outputs: Vec<DeclaredOutput> = self.outputs.iter().flatten().copied().collect();
+        for (output, declared) in self.node.outputs.iter().zip(&declared_outputs) {
+            self.announce_topic(output.topic, declared.schema)?;
+        }
         let links = Links {
             run_dir: self.run_dir,
             plan: self.plan,
@@ -360,7 +363,10 @@ impl Node {
             transport,
             _claim: claim,
         };
-        ConnectedNode::new(links, self.inputs.into_iter().flatten(), outputs, &membership)
+        let outputs = connect_outputs(&links, &declared_outputs)?;
+        links.transport.reserve()?;
+        links.lockstep.set_ready(Phase::Connecting);
+        Ok(AnnouncedNode { links, inputs: self.inputs.into_iter().flatten().collect(), outputs })
     }
 
     fn require_all_declared(&self) -> Result<(), BusError> {
@@ -378,22 +384,8 @@ impl Node {
         Ok(())
     }
 
-    fn connect_outputs(&self, transport: &Transport) -> Result<Vec<OutPort>, BusError> {
-        let ports = self.node.outputs.iter().zip(self.outputs.iter().flatten());
-        ports
-            .map(|(output, &DeclaredOutput { schema, is_forwarded })| {
-                let topic = &self.plan.topics[output.topic];
-                self.announce(output.topic, schema)?;
-                let capacity = self.plan.capacity(output.topic);
-                let sender = transport.publisher(&topic.name, self.generation, schema.size, capacity)?;
-                let port = OutPort::new(output, topic, schema, sender);
-                Ok(if is_forwarded { port.keeping_stamps() } else { port })
-            })
-            .collect()
-    }
-
     /// Announces the type of a topic, or checks that a backup sends what was announced.
-    fn announce(&self, topic: usize, schema: &Schema) -> Result<(), BusError> {
+    fn announce_topic(&self, topic: usize, schema: &Schema) -> Result<(), BusError> {
         let path = announcement::topic_path(&self.run_dir, topic);
         if self.generation == 0 {
             return Announcement::of(schema).store(&path);
@@ -418,8 +410,51 @@ impl Node {
         self,
         mut step: impl FnMut(&mut Tick<'_>) -> Result<(), E>,
     ) -> Result<(), BusError> {
-        self.connect()?.run(None, &mut [], |tick, _| step(tick))
+        let step = |tick: &mut Tick<'_>, _: &mut [u8]| step(tick).map_err(|error| error.to_string());
+        let member = Member::new(self.connect()?, None, &[], Box::new(step))?;
+        Executor::alone(member).run()
     }
+}
+
+/// A node whose outputs are there.
+pub(crate) struct AnnouncedNode {
+    links: Links,
+    inputs: Vec<Declared>,
+    outputs: Vec<OutPort>,
+}
+
+impl AnnouncedNode {
+    /// Connects the inputs, when every node of the run has announced its outputs.
+    ///
+    /// # Errors
+    /// As [`Node::connect`].
+    pub(crate) fn connect(self) -> Result<ConnectedNode, BusError> {
+        let Self { links, inputs, outputs } = self;
+        let membership = if links.generation == 0 {
+            links.lockstep.wait_phase(Phase::Connecting).or_aborted()?;
+            Membership::first(&links.plan)
+        } else {
+            links.lockstep.wait_slot(SlotState::Joining).or_aborted()?;
+            // It names this process already; the others are told when this one has connected.
+            Membership::load(&links.run_dir, links.lockstep.epoch() + 1)?
+        };
+        ConnectedNode::new(links, inputs.into_iter(), outputs, &membership)
+    }
+}
+
+fn connect_outputs(links: &Links, declared: &[DeclaredOutput]) -> Result<Vec<OutPort>, BusError> {
+    let membership = Membership::first(&links.plan);
+    let ports = links.node.outputs.iter().zip(declared);
+    ports
+        .map(|(output, &DeclaredOutput { schema, is_forwarded })| {
+            let topic = &links.plan.topics[output.topic];
+            let is_local = links.has_local_readers(output.topic);
+            let is_shared = !is_local || links.is_read_outside(&membership, output.topic);
+            let sender = if is_shared { Some(links.sender(output.topic, schema.size)?) } else { None };
+            let port = OutPort::new(output, topic, schema, sender, is_local);
+            Ok(if is_forwarded { port.keeping_stamps() } else { port })
+        })
+        .collect()
 }
 
 fn known<'a>(names: impl Iterator<Item = &'a str>) -> String {

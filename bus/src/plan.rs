@@ -161,6 +161,37 @@ pub struct Plan {
     pub topics: Vec<TopicPlan>,
     /// Nodes.
     pub nodes: Vec<NodePlan>,
+    /// Groups of nodes that share a process; a node of none has a process of its own.
+    #[serde(default)]
+    pub groups: Vec<GroupPlan>,
+}
+
+/// Nodes whose first instances share a process, which steps them one after the other.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct GroupPlan {
+    /// Name, unique among the groups of the run.
+    pub name: String,
+    /// Members, by ascending index of their nodes.
+    pub members: Vec<MemberPlan>,
+    /// Core of the process; any where `None`.
+    pub cpu: Option<usize>,
+}
+
+/// A member of a group.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct MemberPlan {
+    /// Index of its node.
+    pub node: usize,
+    /// Name of its component.
+    pub kind: String,
+}
+
+impl GroupPlan {
+    /// True if node `node` is a member.
+    #[must_use]
+    pub fn has(&self, node: usize) -> bool {
+        self.members.iter().any(|member| member.node == node)
+    }
 }
 
 /// Where the plan of a backup lies.
@@ -258,6 +289,12 @@ impl Plan {
         }
     }
 
+    /// The group of node `node`, if it is in one.
+    #[must_use]
+    pub fn group_of(&self, node: usize) -> Option<&GroupPlan> {
+        self.groups.iter().find(|group| group.has(node))
+    }
+
     /// The node that publishes topic `topic`.
     ///
     /// # Panics
@@ -308,6 +345,7 @@ impl Plan {
             lock_memory: false,
             topics,
             nodes,
+            groups: Vec::new(),
         }
     }
 }

@@ -2,12 +2,18 @@
 
 use crate::error::BusError;
 use crate::finite::{Floats, field_at};
+use crate::local::LocalTopic;
 use crate::message::{cdr_bytes, message_bytes, sample_words};
 use crate::messages::Time;
 use crate::plan::{InputPlan, OutputPlan, TopicPlan};
+use crate::sample_memory::empty_sample;
 use crate::schema::Schema;
 use crate::transport::{IceoryxError, Loan, Received, Receiver, SampleHeader, Sender};
 use std::collections::VecDeque;
+
+/// The topics of a group, by their numbers in the plan; those that no two members share are absent. Empty for a node that
+/// has a process of its own.
+pub(crate) type Locals = [Option<LocalTopic>];
 
 /// The samples of a topic from one generation of its publisher.
 #[derive(Debug)]
@@ -74,13 +80,44 @@ struct Backup {
     take_over_tick: u32,
 }
 
+/// Where the samples of an input come from.
+#[derive(Debug)]
+pub(crate) enum Feed {
+    /// Another process.
+    Shared(Source),
+    /// A member of the same group; its topic's number is that of the plan.
+    Local {
+        /// The publisher's generation.
+        generation: u32,
+    },
+}
+
+impl Feed {
+    fn generation(&self) -> u32 {
+        match self {
+            Self::Shared(source) => source.generation,
+            Self::Local { generation } => *generation,
+        }
+    }
+
+    /// True if the samples before number `first` were taken: those of a member are always there.
+    fn has_taken(&self, first: u64) -> bool {
+        match self {
+            Self::Shared(source) => source.next_sequence >= first,
+            Self::Local { .. } => true,
+        }
+    }
+}
+
 /// A connected input.
 #[derive(Debug)]
 pub(crate) struct InPort {
     // Samples before the receivers: they go back to the publisher while the connection still stands.
     current: Option<Received>,
     shadow: Option<Received>,
-    active: Source,
+    active: Feed,
+    /// The newest tick that a sample of a member may have.
+    newest_tick: Option<u32>,
     /// Those that succeed it, in order: more than one where a backup died before this node turned to it.
     backups: VecDeque<Backup>,
     initial: Option<Box<[u64]>>,
@@ -99,12 +136,13 @@ impl InPort {
         topic: &TopicPlan,
         size: usize,
         initial: Option<Box<[u64]>>,
-        active: Source,
+        active: Feed,
     ) -> Self {
         Self {
             current: None,
             shadow: None,
             active,
+            newest_tick: None,
             backups: VecDeque::new(),
             initial,
             topic_name: topic.name.clone(),
@@ -118,7 +156,7 @@ impl InPort {
 
     /// The newest generation that this input is connected to.
     pub(crate) fn newest_generation(&self) -> u32 {
-        self.backups.back().map_or(&self.active, |backup| &backup.source).generation
+        self.backups.back().map_or(self.active.generation(), |backup| backup.source.generation)
     }
 
     /// The tick whose sample `tick` reads, unless that lies before the run.
@@ -153,13 +191,16 @@ impl InPort {
 
     /// Makes the newest sample stamped at or before `tick` minus the delay the current one.
     pub(crate) fn take(&mut self, tick: u32, node: &str) -> Result<(), BusError> {
-        let Some(limit) = self.limit(tick) else { return Ok(()) };
+        self.newest_tick = self.limit(tick);
+        let Some(limit) = self.newest_tick else { return Ok(()) };
         // The samples between the current one and the newest are received too, so that gaps show.
         let newest_sequence = u64::from(limit / self.topic_period_ticks);
         self.pass_take_over(newest_sequence);
-        while self.active.next_sequence <= newest_sequence {
-            let expected = self.active.next_sequence;
-            let next = self.active.next(self.topic_period_ticks).transpose();
+        while let Feed::Shared(source) = &mut self.active
+            && source.next_sequence <= newest_sequence
+        {
+            let expected = source.next_sequence;
+            let next = source.next(self.topic_period_ticks).transpose();
             let next = next.unwrap_or_else(|| Err(Found::Nothing));
             self.current = Some(next.map_err(|found| self.gap(node, tick, expected, found))?);
             self.pass_take_over(newest_sequence);
@@ -170,9 +211,11 @@ impl InPort {
     /// As [`InPort::take`], without insisting on the newest sample: it may not have been sent yet.
     pub(crate) fn take_available(&mut self, tick: u32, node: &str) -> Result<(), BusError> {
         let newest_sequence = self.limit(tick).map_or(0, |limit| u64::from(limit / self.topic_period_ticks));
-        while self.active.next_sequence <= newest_sequence {
-            let expected = self.active.next_sequence;
-            match self.active.next(self.topic_period_ticks) {
+        while let Feed::Shared(source) = &mut self.active
+            && source.next_sequence <= newest_sequence
+        {
+            let expected = source.next_sequence;
+            match source.next(self.topic_period_ticks) {
                 Ok(Some(sample)) => self.current = Some(sample),
                 Ok(None) => break,
                 Err(found) => return Err(self.gap(node, tick, expected, found)),
@@ -185,8 +228,7 @@ impl InPort {
     fn pass_take_over(&mut self, newest_sequence: u64) {
         while let Some(next) = self.backups.front() {
             let first = u64::from(next.take_over_tick.div_ceil(self.topic_period_ticks));
-            if next.take_over_tick == u32::MAX || newest_sequence < first || self.active.next_sequence < first
-            {
+            if next.take_over_tick == u32::MAX || newest_sequence < first || !self.active.has_taken(first) {
                 return;
             }
             let Some(Backup { mut source, .. }) = self.backups.pop_front() else { return };
@@ -194,7 +236,7 @@ impl InPort {
             // A node that does not read the shadow may have left some of it in the queue.
             source.has_history |= source.next_sequence < first;
             source.next_sequence = source.next_sequence.max(first);
-            self.active = source;
+            self.active = Feed::Shared(source);
         }
     }
 
@@ -218,48 +260,56 @@ impl InPort {
         BusError::Gap { node: node.to_owned(), topic: self.topic_name.clone(), tick, expected, found }
     }
 
-    /// The current sample, or the initial value, if there is one.
-    pub(crate) fn newest(&self) -> Option<&[u64]> {
-        self.sample().or(self.initial.as_deref())
+    /// The sample that the tick reads, or the initial value, if there is one.
+    pub(crate) fn newest<'a>(&'a self, locals: &'a Locals) -> Option<&'a [u64]> {
+        self.sample(locals).map(|(_, words)| words).or(self.initial.as_deref())
     }
 
-    /// The current sample, or the initial value.
+    /// The sample that the tick reads, or the initial value.
     ///
     /// # Panics
     /// If there is neither: the launcher refuses a delayed input without an initial value.
-    pub(crate) fn words(&self) -> &[u64] {
-        let words = self.newest();
+    pub(crate) fn words<'a>(&'a self, locals: &'a Locals) -> &'a [u64] {
+        let words = self.newest(locals);
         words.unwrap_or_else(|| panic!("topic {} has no sample and no initial value", self.topic_name))
     }
 
-    /// The current sample, if there is one.
-    pub(crate) fn sample(&self) -> Option<&[u64]> {
-        self.current.as_ref().map(Received::words)
+    /// The sample that the tick reads, if there is one.
+    pub(crate) fn sample<'a>(&'a self, locals: &'a Locals) -> Option<(&'a SampleHeader, &'a [u64])> {
+        match &self.active {
+            Feed::Shared(_) => self.current.as_ref().map(|sample| (sample.header(), sample.words())),
+            Feed::Local { .. } => locals[self.topic].as_ref()?.at(self.newest_tick?),
+        }
     }
 
-    /// The tick at which the current sample was sent, if there is one.
-    pub(crate) fn sent_tick(&self) -> Option<u64> {
-        self.current.as_ref().map(|sample| sample.header().tick)
+    /// The tick at which that sample was sent, if there is one.
+    pub(crate) fn sent_tick(&self, locals: &Locals) -> Option<u64> {
+        self.sample(locals).map(|(header, _)| header.tick)
     }
 
-    pub(crate) fn host_times_ns(&self) -> [u64; 3] {
-        let header = self.current.as_ref().map(|sample| *sample.header()).unwrap_or_default();
+    pub(crate) fn host_times_ns(&self, locals: &Locals) -> [u64; 3] {
+        let header = self.sample(locals).map(|(header, _)| *header).unwrap_or_default();
         [header.received_ns, header.done_ns, header.sent_ns]
     }
 
-    /// The current sample as CDR bytes with its sequence number, if it was sent at `tick`.
-    pub(crate) fn fresh(&self, tick: u32) -> Option<(&[u8], u64)> {
-        self.cdr(self.current.as_ref(), tick)
+    /// That sample as CDR bytes with its sequence number, if it was sent at `tick`.
+    pub(crate) fn fresh<'a>(&'a self, tick: u32, locals: &'a Locals) -> Option<(&'a [u8], u64)> {
+        self.cdr(self.sample(locals), tick)
     }
 
     /// The same of the process that shadows the publisher.
     pub(crate) fn fresh_shadow(&self, tick: u32) -> Option<(&[u8], u64)> {
-        self.cdr(self.shadow.as_ref(), tick)
+        self.cdr(self.shadow.as_ref().map(|sample| (sample.header(), sample.words())), tick)
     }
 
-    fn cdr<'a>(&self, sample: Option<&'a Received>, tick: u32) -> Option<(&'a [u8], u64)> {
-        let sample = sample.filter(|sample| sample.header().tick == u64::from(tick))?;
-        Some((cdr_bytes(sample.words(), self.size), sample.header().sequence))
+    fn cdr<'a>(&self, sample: Option<(&'a SampleHeader, &'a [u64])>, tick: u32) -> Option<(&'a [u8], u64)> {
+        let (header, words) = sample.filter(|(header, _)| header.tick == u64::from(tick))?;
+        Some((cdr_bytes(words, self.size), header.sequence))
+    }
+
+    /// True if the samples that count now come from a member of the same group.
+    pub(crate) fn is_local(&self) -> bool {
+        matches!(self.active, Feed::Local { .. })
     }
 }
 
@@ -269,7 +319,10 @@ pub(crate) struct OutPort {
     // The loan before the sender, for the same reason as above.
     loan: Option<Loan>,
     is_written: bool,
-    sender: Sender,
+    /// The connection to other processes; absent as long as members of the same group alone read the topic.
+    sender: Option<Sender>,
+    /// Memory of the next sample where members of the same group read the topic.
+    staging: Option<Box<[u64]>>,
     port: String,
     topic_name: String,
     schema: &'static Schema,
@@ -285,6 +338,11 @@ pub(crate) struct OutPort {
     pub(crate) sends_from: u32,
     /// The inputs that read it, by their numbers among those of all slots.
     pub(crate) readers: Vec<usize>,
+    /// True if a node of another process computes from it, and so waits for it.
+    pub(crate) is_awaited: bool,
+    /// Ticks whose samples are sent, and those of them that the control segment counts.
+    pub(crate) ticks_sent: u32,
+    pub(crate) ticks_told: u32,
 }
 
 impl OutPort {
@@ -292,12 +350,14 @@ impl OutPort {
         output: &OutputPlan,
         topic: &TopicPlan,
         schema: &'static Schema,
-        sender: Sender,
+        sender: Option<Sender>,
+        has_local_readers: bool,
     ) -> Self {
         Self {
             loan: None,
             is_written: false,
             sender,
+            staging: has_local_readers.then(|| empty_sample(schema.size)),
             port: output.port.clone(),
             topic_name: topic.name.clone(),
             schema,
@@ -309,6 +369,9 @@ impl OutPort {
             counts_from: 0,
             sends_from: 0,
             readers: Vec::new(),
+            is_awaited: true,
+            ticks_sent: 0,
+            ticks_told: 0,
         }
     }
 
@@ -320,6 +383,11 @@ impl OutPort {
     /// Has the port take a sample at every step.
     pub(crate) fn set_timed(&mut self) {
         self.is_timed = true;
+    }
+
+    /// Bytes of its messages.
+    pub(crate) fn size(&self) -> usize {
+        self.schema.size
     }
 
     /// Words of a sample.
@@ -344,8 +412,18 @@ impl OutPort {
         if !self.is_written && self.is_due(tick) {
             return Err(self.unwritten(node, tick));
         }
-        let loan = self.loan.as_mut().filter(|_| self.is_written);
-        Ok(loan.map(|loan| &*loan.words()))
+        if !self.is_written {
+            return Ok(None);
+        }
+        Ok(self.memory().map(|words| &*words))
+    }
+
+    /// Memory of the next sample, if it was taken.
+    fn memory(&mut self) -> Option<&mut [u64]> {
+        match &mut self.staging {
+            Some(staging) => Some(staging),
+            None => self.loan.as_mut().map(Loan::words),
+        }
     }
 
     fn unwritten(&self, node: &str, tick: u32) -> BusError {
@@ -359,17 +437,39 @@ impl OutPort {
 
     /// The words of this tick's sample.
     pub(crate) fn words(&mut self, node: &str) -> Result<&mut [u64], BusError> {
-        self.prepare(node)?;
+        if self.staging.is_none() {
+            self.prepare(node)?;
+        }
         self.is_written = true;
-        match &mut self.loan {
-            Some(loan) => Ok(loan.words()),
-            None => unreachable!("the loan was taken above"),
+        match self.memory() {
+            Some(words) => Ok(words),
+            None => unreachable!("a topic without readers in its group has a sender"),
         }
     }
 
     /// Sees to it that a subscriber that joined gets the newest samples before the next one is sent.
     pub(crate) fn update_subscribers(&self, node: &str) -> Result<(), BusError> {
-        self.sender.update_subscribers().map_err(|reason| self.error("meeting subscribers", node, &reason))
+        let updated = self.sender.as_ref().map_or(Ok(()), Sender::update_subscribers);
+        updated.map_err(|reason| self.error("meeting subscribers", node, &reason))
+    }
+
+    /// True if other processes are sent the samples.
+    pub(crate) fn is_shared(&self) -> bool {
+        self.sender.is_some()
+    }
+
+    /// Has other processes be sent the samples from now on, the newest one of the group included.
+    pub(crate) fn share(
+        &mut self,
+        sender: Sender,
+        topic: Option<&LocalTopic>,
+        node: &str,
+    ) -> Result<(), BusError> {
+        if let Some((header, words)) = topic.and_then(LocalTopic::newest) {
+            copy_out(&sender, words, *header).map_err(|reason| self.error("sending", node, &reason))?;
+        }
+        self.sender = Some(sender);
+        Ok(())
     }
 
     /// Forgets what was written at a tick at which nothing was due.
@@ -379,8 +479,8 @@ impl OutPort {
 
     /// Takes the memory of the next sample.
     pub(crate) fn prepare(&mut self, node: &str) -> Result<(), BusError> {
-        if self.loan.is_none() {
-            let loan = self.sender.loan().map_err(|reason| self.error("taking a sample", node, &reason))?;
+        if let (None, None, Some(sender)) = (&self.loan, &self.staging, &self.sender) {
+            let loan = sender.loan().map_err(|reason| self.error("taking a sample", node, &reason))?;
             self.loan = Some(loan);
         }
         Ok(())
@@ -394,20 +494,39 @@ impl OutPort {
         time_ns: u64,
         [received_ns, done_ns, sent_ns]: [u64; 3],
         node: &str,
+        locals: &mut Locals,
     ) -> Result<(), BusError> {
-        let Some(mut loan) = self.loan.take().filter(|_| self.is_written) else {
+        if !self.is_written {
             return Err(self.unwritten(node, tick));
-        };
+        }
         self.is_written = false;
-        if let Some(found) = self.floats.first_not_finite(message_bytes(loan.words(), self.schema.size)) {
+        let (size, stamp_offset) = (self.schema.size, self.stamp_offset);
+        let words = match (&mut self.staging, &mut self.loan) {
+            (Some(staging), _) => &mut **staging,
+            (None, Some(loan)) => loan.words(),
+            (None, None) => return Err(self.unwritten(node, tick)),
+        };
+        if let Some(found) = self.floats.first_not_finite(message_bytes(words, size)) {
             return Err(self.not_finite(found, tick, time_ns, node));
         }
-        if let Some(offset) = self.stamp_offset {
-            stamp(loan.words(), offset, time_ns);
+        if let Some(offset) = stamp_offset {
+            stamp(words, offset, time_ns);
         }
         let sequence = u64::from(tick / self.period_ticks);
         let header = SampleHeader { tick: u64::from(tick), sequence, received_ns, done_ns, sent_ns };
-        loan.send(header).map_err(|reason| self.error("sending", node, &reason))
+        let sent = match (&self.staging, self.loan.take(), &self.sender) {
+            (None, Some(loan), _) => loan.send(header),
+            (Some(staging), _, Some(sender)) => copy_out(sender, staging, header),
+            _ => Ok(()),
+        };
+        sent.map_err(|reason| self.error("sending", node, &reason))?;
+        if let Some(staging) = &mut self.staging
+            && let Some(Some(topic)) = locals.get_mut(self.topic)
+        {
+            topic.send(header, staging);
+        }
+        self.ticks_sent = tick + self.period_ticks;
+        Ok(())
     }
 
     fn not_finite(&self, (offset, value): (usize, f64), tick: u32, time_ns: u64, node: &str) -> BusError {
@@ -425,6 +544,13 @@ impl OutPort {
         let action = format!("{action} on its output `{}`", self.port);
         BusError::Transport { node: node.to_owned(), action, reason: reason.to_string() }
     }
+}
+
+/// Sends a copy of a sample to other processes.
+fn copy_out(sender: &Sender, words: &[u64], header: SampleHeader) -> Result<(), IceoryxError> {
+    let mut loan = sender.loan()?;
+    loan.words().copy_from_slice(words);
+    loan.send(header)
 }
 
 fn stamp(words: &mut [u64], offset: usize, time_ns: u64) {

@@ -5,12 +5,14 @@ use crate::component::{Component, StepError, Transfer};
 use crate::connected::ConnectedNode;
 use crate::context::StepContext;
 use crate::error::BusError;
+use crate::executor::{Executor, Member};
 use crate::handles::Wiring;
 use crate::join::Join;
 use crate::node::Node;
-use crate::port::{InPort, OutPort};
+use crate::port::{InPort, Locals, OutPort};
 use crate::ports::{InputSamples, OutputSamples, SampleSink, SampleSource};
 use crate::registration::{Registration, Stepper};
+use crate::schema::Schema;
 use crate::tick::Tick;
 
 /// Runs the component `C` as the node that the launcher started this process for: the whole `main` of an executable
@@ -29,42 +31,85 @@ impl Registration {
     /// # Errors
     /// If the manifest and the component do not fit, a step fails, or the run is aborted.
     pub fn run(&self, join: Join, components: &'static [Registration]) -> Result<(), BusError> {
-        let mut node = Node::open(join)?;
-        let wiring = node.declare(self, components)?;
-        let (plan, node_plan) = node.plan();
-        let mut component =
-            self.make_for(plan, node_plan, &node.files()).map_err(|reason| node.error(reason))?;
-        let name = node.name().to_owned();
-        let failed =
-            |error: StepError| BusError::Parameters { node: name.clone(), reason: error.to_string() };
-        let mut state = component.initial();
-        let connected = node.connect()?;
-        let topics: Vec<(&str, &Announcement)> =
-            wiring.inputs.iter().flatten().map(|&input| connected.announced(input)).collect();
-        component.connected(&topics).map_err(failed)?;
-        let end = self.step_to_the_end(connected, &wiring, &mut *component, &mut state);
-        let finished = component.finish().map_err(failed);
-        match end {
-            Ok(()) | Err(BusError::Aborted) => finished.and(end),
-            // What made a step fail makes the end fail too: the first error counts.
-            Err(error) => Err(error),
-        }
+        let mut part = Part::make(join, self, components)?;
+        let connected = part.take_node()?.connect()?;
+        let member = part.member(connected)?;
+        let end = Executor::alone(member).run();
+        finish([part], end)
     }
+}
 
-    fn step_to_the_end(
-        &self,
-        connected: ConnectedNode,
-        wiring: &Wiring,
-        component: &mut dyn Stepper,
-        state: &mut [u64],
-    ) -> Result<(), BusError> {
-        let schema = match self.transfer {
+/// A node of this process before its first tick.
+pub(crate) struct Part {
+    name: String,
+    node: Option<Node>,
+    wiring: Wiring,
+    component: Box<dyn Stepper>,
+    state: Box<[u64]>,
+    state_bytes: usize,
+    schema: Option<&'static Schema>,
+}
+
+impl Part {
+    /// The node that `join` names, with its component.
+    pub(crate) fn make(
+        join: Join,
+        registration: &Registration,
+        components: &'static [Registration],
+    ) -> Result<Self, BusError> {
+        let mut node = Node::open(join)?;
+        let wiring = node.declare(registration, components)?;
+        let (plan, node_plan) = node.plan();
+        let made = registration.make_for(plan, node_plan, &node.files());
+        let component = made.map_err(|reason| node.error(reason))?;
+        let state = component.initial();
+        let schema = match registration.transfer {
             Transfer::Message(schema) => Some(schema),
             Transfer::Nothing | Transfer::Internal => None,
         };
-        let state = &mut bytemuck::cast_slice_mut(state)[..self.state_bytes()];
-        connected.run(schema, state, |tick, state| step(component, wiring, tick, state))
+        let (name, state_bytes) = (node.name().to_owned(), registration.state_bytes());
+        Ok(Self { name, node: Some(node), wiring, component, state, state_bytes, schema })
     }
+
+    /// The node, to be connected.
+    pub(crate) fn take_node(&mut self) -> Result<Node, BusError> {
+        self.node.take().ok_or_else(|| BusError::Claimed { name: self.name.clone() })
+    }
+
+    /// The node as a member of this process, once it is `connected`.
+    pub(crate) fn member(&mut self, connected: ConnectedNode) -> Result<Member<'_>, BusError> {
+        let topics: Vec<(&str, &Announcement)> =
+            self.wiring.inputs.iter().flatten().map(|&input| connected.announced(input)).collect();
+        let told = self.component.connected(&topics);
+        told.map_err(|error| failed(&self.name, &error))?;
+        let (component, wiring) = (&mut *self.component, &self.wiring);
+        let state = &bytemuck::cast_slice(&self.state)[..self.state_bytes];
+        let step = move |tick: &mut Tick<'_>, state: &mut [u8]| {
+            step(component, wiring, tick, state).map_err(|error| error.to_string())
+        };
+        Member::new(connected, self.schema, state, Box::new(step))
+    }
+}
+
+/// Ends the components of `parts`, whose ticks have come to `end`.
+pub(crate) fn finish(
+    parts: impl IntoIterator<Item = Part>,
+    end: Result<(), BusError>,
+) -> Result<(), BusError> {
+    let mut finished = Ok(());
+    for mut part in parts {
+        let ended = part.component.finish().map_err(|error| failed(&part.name, &error));
+        finished = finished.and(ended);
+    }
+    match end {
+        Ok(()) | Err(BusError::Aborted) => finished.and(end),
+        // What made a step fail makes the end fail too: the first error counts.
+        Err(error) => Err(error),
+    }
+}
+
+fn failed(node: &str, error: &StepError) -> BusError {
+    BusError::Parameters { node: node.to_owned(), reason: error.to_string() }
 }
 
 fn step(
@@ -74,8 +119,9 @@ fn step(
     state: &mut [u8],
 ) -> Result<(), StepError> {
     let number = tick.number();
-    let inputs = Received { tick: number, ports: tick.inputs, wiring: &wiring.inputs };
-    let predecessor = Received { tick: number, ports: tick.predecessor, wiring: &wiring.outputs };
+    let inputs = Received { tick: number, ports: tick.inputs, locals: tick.locals, wiring: &wiring.inputs };
+    let predecessor =
+        Received { tick: number, ports: tick.predecessor, locals: tick.locals, wiring: &wiring.outputs };
     let context = StepContext {
         tick: number,
         time_ns: tick.time_ns,
@@ -89,6 +135,7 @@ fn step(
 struct Received<'a> {
     tick: u32,
     ports: &'a [InPort],
+    locals: &'a Locals,
     wiring: &'a [Option<usize>],
 }
 
@@ -104,15 +151,15 @@ impl SampleSource for Received<'_> {
     }
 
     fn words(&self, port: usize) -> Option<&[u64]> {
-        self.port(port)?.newest()
+        self.port(port)?.newest(self.locals)
     }
 
     fn sent_tick(&self, port: usize) -> Option<u64> {
-        self.port(port)?.sent_tick()
+        self.port(port)?.sent_tick(self.locals)
     }
 
     fn fresh(&self, port: usize) -> Option<&[u8]> {
-        Some(self.port(port)?.fresh(self.tick)?.0)
+        Some(self.port(port)?.fresh(self.tick, self.locals)?.0)
     }
 
     fn fresh_shadow(&self, port: usize) -> Option<&[u8]> {

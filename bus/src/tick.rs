@@ -3,7 +3,7 @@
 use crate::error::BusError;
 use crate::handles::{Input, Output};
 use crate::message::{Message, view, view_mut};
-use crate::port::{InPort, OutPort};
+use crate::port::{InPort, Locals, OutPort};
 
 /// One computation of a node: its inputs and outputs at one tick.
 #[derive(Debug)]
@@ -12,6 +12,7 @@ pub struct Tick<'a> {
     pub(crate) time_ns: u64,
     pub(crate) node: &'a str,
     pub(crate) inputs: &'a [InPort],
+    pub(crate) locals: &'a Locals,
     pub(crate) outputs: &'a mut [OutPort],
     /// At the first tick whose outputs count, unless a state was handed over: what the predecessor sent, by
     /// output.
@@ -40,14 +41,14 @@ impl Tick<'_> {
     /// The newest sample of an input that this tick may see.
     #[must_use]
     pub fn get<T: Message>(&self, input: Input<T>) -> &T {
-        view(self.inputs[input.index].words())
+        view(self.inputs[input.index].words(self.locals))
     }
 
     /// Host times of the newest sample: when its sender had its inputs, was done, and sent it. For
     /// profiling only: what a node computes from them is not reproducible. Zero for an initial value.
     #[must_use]
     pub fn host_times_ns<T: Message>(&self, input: Input<T>) -> [u64; 3] {
-        self.inputs[input.index].host_times_ns()
+        self.inputs[input.index].host_times_ns(self.locals)
     }
 
     /// Whether `output` is due at this tick.

@@ -367,7 +367,7 @@ mod tests {
     use crate::host_time::monotonic_ns;
     use crate::names::shm_prefix;
     use crate::plan::{Capacity, InputPlan, TopicPlan};
-    use crate::port::{InPort, Source};
+    use crate::port::{Feed, InPort, Source};
     use std::os::unix::fs::{MetadataExt, PermissionsExt};
 
     const TOPIC: &str = "/plant/state";
@@ -412,7 +412,7 @@ mod tests {
             type_name: "test_msgs/msg/State".to_owned(),
             period_ticks: 1,
         };
-        InPort::new(&input, &topic, SIZE, None, Source::joined(0, receiver, Some(0), 1))
+        InPort::new(&input, &topic, SIZE, None, Feed::Shared(Source::joined(0, receiver, Some(0), 1)))
     }
 
     #[test]

@@ -6,12 +6,14 @@
 //! - `parameters`, `recorders`: what each node is given
 //! - `periods`: nodes and outputs that compute once or never count on
 //! - `ranges`: ranges of numbers by their units
+//! - `groups`: nodes that share a process
 //! - `evaluations`: what is judged after the run
 //! - `backups`: who shadows, takes over or stands by
 
 mod backups;
 mod computing_time;
 mod evaluations;
+mod groups;
 mod inputs;
 mod outputs;
 mod parameters;
@@ -99,6 +101,7 @@ impl Graph {
         let clock_cpu = &manifest.content.run.clock_cpu;
         processes::require_core(manifest, clock_cpu, "clock_cpu")?;
         placement::place(&mut plan, clock_cpu.as_ref().map(|cpu| *cpu.get_ref()));
+        let groups = groups::of(manifest, &declared_nodes, &plan.nodes)?;
         let mut notes = Notes::default();
         periods::check(manifest, &declared_nodes, &plan, &mut notes)?;
         let parameters =
@@ -112,6 +115,7 @@ impl Graph {
         let backups = backups::all(manifest, &plan, &declared_nodes, &mut notes)?;
         let programs: Vec<Program> = declared_nodes.into_iter().map(|declared| declared.program).collect();
         evaluations::check(manifest, &plan, &programs, &mut notes)?;
+        plan.groups = groups;
         let (models, warnings) = notes.into_parts(manifest);
         Ok(Self { plan, programs, backups, sidecars, models, files, warnings })
     }
@@ -146,5 +150,6 @@ fn plan(manifest: &Manifest, wiring: Wiring) -> Result<Plan, Diagnostic> {
         lock_memory: run.lock_memory,
         topics: wiring.topics,
         nodes: wiring.nodes,
+        groups: Vec::new(),
     })
 }

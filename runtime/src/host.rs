@@ -128,6 +128,17 @@ impl From<ExitStatus> for End {
     }
 }
 
+/// Part of a run that a thread takes.
+#[derive(Clone, Copy)]
+pub(crate) enum ThreadPart {
+    /// The clock service.
+    Clock,
+    /// A node.
+    Node(&'static Registration),
+    /// A group of nodes.
+    Group,
+}
+
 /// An instance on a thread.
 #[derive(Debug)]
 pub(crate) struct Thread {
@@ -137,21 +148,25 @@ pub(crate) struct Thread {
 }
 
 impl Thread {
-    /// Starts `component`, one of `components`, as the instance that `join` names; the clock where there is no component.
+    /// Starts `part` of a run on a thread of this process; `components` are those of the run.
     pub fn start(
-        component: Option<&'static Registration>,
+        part: ThreadPart,
         components: &'static [Registration],
         join: Join,
         control: Arc<SupervisorView>,
     ) -> Result<Self> {
         let is_cancelled = Arc::new(AtomicBool::new(false));
-        let (node, hosted) =
+        let (name, hosted) =
             (join.node.clone(), Hosted { join: join.clone(), is_cancelled: is_cancelled.clone() });
-        let thread = std::thread::Builder::new().name(node.clone()).stack_size(STACK_BYTES);
+        let thread = std::thread::Builder::new().name(name.clone()).stack_size(STACK_BYTES);
         let handle = thread.spawn(move || {
-            hosted.run(|| component.map_or_else(bus::clock::run, |component| component.run(join, components)))
+            hosted.run(|| match part {
+                ThreadPart::Clock => bus::clock::run(),
+                ThreadPart::Node(component) => component.run(join, components),
+                ThreadPart::Group => bus::group::run(&join.run_dir, &join.node, components),
+            })
         });
-        let handle = handle.with_context(|| format!("process `{node}`: cannot start a thread"))?;
+        let handle = handle.with_context(|| format!("process `{name}`: cannot start a thread"))?;
         Ok(Self { handle: Some(handle), is_cancelled, control })
     }
 

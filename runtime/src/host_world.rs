@@ -6,29 +6,31 @@ use crate::ctl::control::ControlServer;
 use crate::ctl::protocol::{Answer, Request};
 use crate::descendants::Descendants;
 use crate::graph::backup_of;
-use crate::host::{End, Host, Thread};
+use crate::host::{End, Host, Thread, ThreadPart};
 use crate::manifest::Manifest;
 use crate::process_log;
 use crate::program::{BackupSpec, Program, Readiness};
 use crate::role::Role;
-use crate::spawn;
+use crate::spawn::{self, Started};
 use crate::view::{SegmentWrite, View};
 use crate::world::{Body, Spent, World};
 use anyhow::{Context, Result};
 use bus::host_time::monotonic_ns;
 use bus::lockstep::SupervisorView;
 use bus::membership::Membership;
-use bus::plan::{InputPlan, NodePlan, Plan};
+use bus::plan::{GroupPlan, InputPlan, NodePlan, Plan};
 use bus::{BusError, Join};
 use diagnostics::Diagnostic;
 use inputs::InputFiles;
 use rustix::io::Errno;
 use rustix::process::{Pid, WaitId, WaitIdOptions, waitid};
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::os::unix::net::UnixDatagram;
 use std::path::{Path, PathBuf};
 use std::process::Child;
+use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -57,6 +59,8 @@ pub struct HostWorld<'a> {
     pub descendants: Option<&'a Descendants>,
     /// Where sidecars say that they are ready, by their number.
     pub sockets: BTreeMap<usize, UnixDatagram>,
+    /// The processes of groups that were started, by the groups' names.
+    pub groups: BTreeMap<String, Rc<RefCell<SharedBody>>>,
 }
 
 impl HostWorld<'_> {
@@ -71,6 +75,54 @@ impl HostWorld<'_> {
             place.insert(socket);
         }
         Ok(path)
+    }
+}
+
+impl HostWorld<'_> {
+    /// The group in whose process the instance of `role` lives, and its slot.
+    fn member_of(&self, role: Role) -> Option<(GroupPlan, usize)> {
+        let Role::Node { node, generation: 0 } = role else { return None };
+        Some((self.plan.group_of(node)?.clone(), self.plan.slot(node, 0)))
+    }
+
+    fn start_group(&mut self, group: &GroupPlan, role: Role) -> Result<Rc<RefCell<SharedBody>>> {
+        let body = Rc::new(RefCell::new(self.start_body(&group.name, role, Started::Group, None)?));
+        self.groups.insert(group.name.clone(), body.clone());
+        Ok(body)
+    }
+
+    fn start_body(
+        &self,
+        name: &str,
+        role: Role,
+        started: Started<'_>,
+        notify: Option<&Path>,
+    ) -> Result<SharedBody> {
+        let (body, log) = match &self.host {
+            Host::Exe(exe) => {
+                let (child, log) = spawn::start(exe, self.run_dir, name, role, started, notify)?;
+                (Running::Process(child), log)
+            }
+            Host::InProcess => {
+                let part = match started {
+                    Started::Clock => ThreadPart::Clock,
+                    Started::Group => ThreadPart::Group,
+                    Started::One(program) => {
+                        self.host.require(name, program)?;
+                        let component = program.component();
+                        ThreadPart::Node(
+                            component.with_context(|| format!("process `{name}` is no component"))?,
+                        )
+                    }
+                };
+                let components = self.manifest.registry().components();
+                let (run_dir, node) = (self.run_dir.to_owned(), name.to_owned());
+                let join = Join { run_dir, node, generation: role.generation() };
+                let thread = Thread::start(part, components, join, self.control.clone())?;
+                (Running::Thread(thread), PathBuf::new())
+            }
+        };
+        Ok(SharedBody { is_log_of_run: log.starts_with(self.run_dir), body, log, end: None })
     }
 }
 
@@ -126,23 +178,17 @@ impl World for HostWorld<'_> {
             }
             _ => None,
         };
-        let run_dir = self.run_dir;
-        let (body, log) = match &self.host {
-            Host::Exe(exe) => {
-                let (child, log) = spawn::start(exe, run_dir, name, role, program, notify.as_deref())?;
-                (Running::Process(child), log)
-            }
-            Host::InProcess => {
-                program.map_or(Ok(()), |program| self.host.require(name, program))?;
-                let component = program.and_then(Program::component);
-                let components = self.manifest.registry().components();
-                let (run_dir, node) = (run_dir.to_owned(), name.to_owned());
-                let join = Join { run_dir, node, generation: role.generation() };
-                let thread = Thread::start(component, components, join, self.control.clone())?;
-                (Running::Thread(thread), PathBuf::new())
-            }
-        };
-        Ok(HostBody { is_log_of_run: log.starts_with(run_dir), body, log })
+        let member = self.member_of(role);
+        if let Some((group, slot)) = member {
+            let started = self.groups.get(&group.name).cloned();
+            let body = match started {
+                Some(body) => body,
+                None => self.start_group(&group, role)?,
+            };
+            return Ok(HostBody::member(body, slot, &group, self.plan, self.control.clone()));
+        }
+        let started = program.map_or(Started::Clock, Started::One);
+        Ok(HostBody::alone(self.start_body(name, role, started, notify.as_deref())?))
     }
 
     fn hears_ready(&mut self, index: usize) -> bool {
@@ -208,12 +254,54 @@ pub fn store_files(files: &InputFiles, run_dir: &Path, plan: &NodePlan) -> Resul
     })
 }
 
-/// A process or thread, and its log.
+/// The process or thread of an instance, and its log.
 #[derive(Debug)]
 pub struct HostBody {
+    shared: Rc<RefCell<SharedBody>>,
+    member: Option<MemberBody>,
+}
+
+/// A process or thread that one instance has for itself, or the members of a group share.
+#[derive(Debug)]
+pub struct SharedBody {
     body: Running,
     log: PathBuf,
     is_log_of_run: bool,
+    /// How it ended.
+    end: Option<End>,
+}
+
+/// A member of a group.
+#[derive(Debug)]
+struct MemberBody {
+    slot: usize,
+    /// The slots of all members.
+    slots: Vec<usize>,
+    control: Arc<SupervisorView>,
+}
+
+impl HostBody {
+    fn alone(body: SharedBody) -> Self {
+        Self { shared: Rc::new(RefCell::new(body)), member: None }
+    }
+
+    fn member(
+        shared: Rc<RefCell<SharedBody>>,
+        slot: usize,
+        group: &GroupPlan,
+        plan: &Plan,
+        control: Arc<SupervisorView>,
+    ) -> Self {
+        let slots = group.members.iter().map(|member| plan.slot(member.node, 0)).collect();
+        Self { shared, member: Some(MemberBody { slot, slots, control }) }
+    }
+}
+
+impl MemberBody {
+    /// True if the member has ended and others of its group have not: the last one ends with the process.
+    fn has_left_others(&self) -> bool {
+        self.control.has_left(self.slot) && !self.slots.iter().all(|&slot| self.control.has_left(slot))
+    }
 }
 
 #[derive(Debug)]
@@ -234,7 +322,7 @@ fn has_exited(child: &Child, options: WaitIdOptions) -> bool {
     }
 }
 
-impl Body for HostBody {
+impl SharedBody {
     fn id(&self) -> Option<u32> {
         match &self.body {
             Running::Process(child) => Some(child.id()),
@@ -242,22 +330,24 @@ impl Body for HostBody {
         }
     }
 
-    fn end(&mut self) -> Result<Option<End>> {
-        match &mut self.body {
-            Running::Process(child) if !has_exited(child, WaitIdOptions::NOHANG) => Ok(None),
-            Running::Process(child) => Ok(child.try_wait().context("cannot watch a process")?.map(End::from)),
-            Running::Thread(thread) => Ok(thread.end()),
+    /// Looks whether it has ended.
+    fn look(&mut self) -> Result<()> {
+        if self.end.is_some() {
+            return Ok(());
         }
+        self.end = match &mut self.body {
+            Running::Process(child) if !has_exited(child, WaitIdOptions::NOHANG) => None,
+            Running::Process(child) => child.try_wait().context("cannot watch a process")?.map(End::from),
+            Running::Thread(thread) => thread.end(),
+        };
+        Ok(())
     }
 
-    fn cancel(&self) {
-        if let Running::Thread(thread) = &self.body {
-            thread.cancel();
+    fn kill(&mut self, patience: &mut Duration) {
+        if self.end.is_some() {
+            return;
         }
-    }
-
-    fn kill(&mut self, patience: &mut Duration) -> Option<End> {
-        match &mut self.body {
+        self.end = match &mut self.body {
             Running::Process(child) => {
                 // A command may have started processes of its own.
                 bus::process::kill_group(child.id());
@@ -271,20 +361,50 @@ impl Body for HostBody {
             }
         }
     }
+}
+
+impl Body for HostBody {
+    fn id(&self) -> Option<u32> {
+        self.shared.borrow().id()
+    }
+
+    fn end(&mut self) -> Result<Option<End>> {
+        let mut shared = self.shared.borrow_mut();
+        shared.look()?;
+        match &self.member {
+            Some(member) if member.has_left_others() => Ok(Some(End::Exited(0))),
+            _ => Ok(shared.end.clone()),
+        }
+    }
+
+    fn cancel(&self) {
+        if let Running::Thread(thread) = &self.shared.borrow().body {
+            thread.cancel();
+        }
+    }
+
+    fn kill(&mut self, patience: &mut Duration) -> Option<End> {
+        let mut shared = self.shared.borrow_mut();
+        shared.kill(patience);
+        shared.end.clone()
+    }
 
     fn last_lines(&self) -> Vec<String> {
-        process_log::last_words(&self.log)
+        process_log::last_words(&self.shared.borrow().log)
     }
 
     fn bound_log(&self) {
-        if self.is_log_of_run {
-            process_log::bound(&self.log);
+        let shared = self.shared.borrow();
+        if shared.is_log_of_run {
+            process_log::bound(&shared.log);
         }
     }
 
     fn remove_log(&self) {
-        if self.is_log_of_run {
-            let _ = std::fs::remove_file(&self.log);
+        let shared = self.shared.borrow();
+        // The log of a group is that of its other members, too.
+        if shared.is_log_of_run && self.member.is_none() {
+            let _ = std::fs::remove_file(&shared.log);
         }
     }
 }

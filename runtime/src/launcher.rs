@@ -231,6 +231,7 @@ impl<'a> Launcher<'a> {
             run_dir: dir,
             descendants: descendants.as_ref(),
             sockets: BTreeMap::new(),
+            groups: BTreeMap::new(),
         };
         let mut supervisor = Supervisor::new(graph, world, &self.stop, on);
         supervisor.fly(manifest.content.run.start_order_seed)?;

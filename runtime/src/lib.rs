@@ -43,7 +43,7 @@ mod world;
 use bus::{BusError, Join};
 use registry::Registry;
 
-/// Is the component `name` of the run that started this process; the clock for `clock`. A program that hands the
+/// Is the component `name` of the run that started this process; the clock for `clock`, a group of components for `group`. A program that hands the
 /// arguments `node KIND` of its command line on to this may be a [`host::Host::Exe`].
 ///
 /// ```
@@ -56,6 +56,7 @@ use registry::Registry;
 pub fn node(name: &str, registry: Registry) -> anyhow::Result<()> {
     let ended = match (name, registry.find(name)) {
         ("clock", _) => bus::clock::run(),
+        ("group", None) => bus::group::run_process(registry.components()),
         (_, Some(component)) => {
             Join::from_environment().and_then(|join| component.run(join, registry.components()))
         }

@@ -7,10 +7,12 @@
 //! - `sets`: vehicles of process sets become processes
 //! - `replacement`: a backup's differences become a whole process
 //! - `finite`: no number is infinite or none
+//! - `composition`: which nodes share a process
 //! - `builder`: a manifest that is built in code
 //! - `content`: the types that the whole is read into
 
 mod builder;
+mod composition;
 mod content;
 mod finite;
 mod include;
@@ -22,6 +24,7 @@ mod sources;
 mod tree;
 
 pub use builder::ManifestBuilder;
+pub use composition::Composition;
 pub use content::{Comparison, Content, PaceSetting, PassCondition, Reference, Statistic};
 pub(crate) use content::{ComputingTimeSetting, InputSetting, OutputSetting, Process, SwapSetting};
 

@@ -4,6 +4,7 @@ use crate::claimed_file::append_to_log;
 use crate::program::{Executable, Program};
 use crate::role::Role;
 use anyhow::{Context, Result, anyhow};
+use bus::group::GROUP_VARIABLE;
 use bus::process::{LAUNCHER_VARIABLE, RUN_VARIABLE};
 use bus::{GENERATION_VARIABLE, NODE_VARIABLE};
 use std::fs::{File, OpenOptions};
@@ -15,8 +16,27 @@ use std::process::{Child, Command, Stdio};
 /// The environment variable with the socket on which a sidecar says that it is ready (sd_notify(3)).
 const NOTIFY_VARIABLE: &str = "NOTIFY_SOCKET";
 
-/// The process `name` of the run in `run_dir`, the clock service where there is no program, and the file that its output
-/// goes to.
+/// Process to start.
+#[derive(Clone, Copy)]
+pub enum Started<'a> {
+    /// The clock service.
+    Clock,
+    /// The process of one node or sidecar.
+    One(&'a Program),
+    /// The process of a group.
+    Group,
+}
+
+impl<'a> Started<'a> {
+    fn program(self) -> Option<&'a Program> {
+        match self {
+            Self::One(program) => Some(program),
+            Self::Clock | Self::Group => None,
+        }
+    }
+}
+
+/// The process `name` of the run in `run_dir`, and the file that its output goes to.
 ///
 /// # Errors
 /// If it cannot be started, or the niceness or priority that it asks for is not allowed.
@@ -25,12 +45,16 @@ pub fn start(
     run_dir: &Path,
     name: &str,
     role: Role,
-    program: Option<&Program>,
+    started: Started<'_>,
     notify: Option<&Path>,
 ) -> Result<(Child, PathBuf)> {
-    let mut command = command(exe, program);
+    let mut command = command(exe, started);
+    let program = started.program();
     match role {
         Role::Clock => {}
+        Role::Node { .. } if matches!(started, Started::Group) => {
+            command.env(GROUP_VARIABLE, name);
+        }
         Role::Node { generation, .. } => {
             command.env(NODE_VARIABLE, name).env(GENERATION_VARIABLE, generation.to_string());
         }
@@ -42,7 +66,8 @@ pub fn start(
         }
     }
     let log = program.and_then(|program| program.log.as_deref());
-    let (file, path) = open_log(name, role, run_dir, log)?;
+    let log_name = if matches!(started, Started::Group) { format!("group.{name}") } else { name.to_owned() };
+    let (file, path) = open_log(&log_name, role, run_dir, log)?;
     command
         .env(RUN_VARIABLE, run_dir)
         .env(LAUNCHER_VARIABLE, std::process::id().to_string())
@@ -64,7 +89,8 @@ pub fn start(
 }
 
 /// What executes `program`: the binary `exe`, which becomes a component with these arguments, or a command.
-fn command(exe: &Path, program: Option<&Program>) -> Command {
+fn command(exe: &Path, started: Started<'_>) -> Command {
+    let program = started.program();
     let mut command = match program.map(|program| &program.executable) {
         Some(Executable::Command(args)) => {
             let mut command = Command::new(&args[0]);
@@ -72,9 +98,13 @@ fn command(exe: &Path, program: Option<&Program>) -> Command {
             command
         }
         Some(Executable::Component(_)) | None => {
-            let component = program.and_then(Program::component);
+            let kind = match started {
+                Started::Clock => "clock",
+                Started::Group => "group",
+                Started::One(program) => program.component().map_or("", |component| component.name),
+            };
             let mut command = Command::new(exe);
-            command.arg0("hummingbus").args(["node", component.map_or("clock", |component| component.name)]);
+            command.arg0("hummingbus").args(["node", kind]);
             // A `command` may be a shell that starts others first, who would not hear these signals either.
             bus::process::hold_stop_signals(&mut command);
             command

@@ -12,7 +12,7 @@ use report::summary::Summary;
 use runtime::graph::{self, Graph, backup_of};
 use runtime::host::Host;
 use runtime::launcher::Launcher;
-use runtime::manifest::{Manifest, PaceSetting};
+use runtime::manifest::{Composition, Manifest, PaceSetting};
 use runtime::outputs::Outputs;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -31,6 +31,9 @@ pub struct RunArguments {
     /// Ticks that a fast process may be ahead of the slowest.
     #[arg(long, value_name = "TICKS", value_parser = clap::value_parser!(u32).range(1..=i64::from(graph::WINDOW_TICKS_MAX)))]
     pub window: Option<u32>,
+    /// Nodes that share a process: none, all, vehicles, or groups such as plant+imu,ekf+controller.
+    #[arg(long, value_name = "GROUPS")]
+    pub compose: Option<Composition>,
     /// Override a key of the manifest, such as run.seed=3.
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
@@ -79,6 +82,9 @@ pub fn run(
     }
     if let Some(window) = arguments.window {
         manifest.content.run.window_ticks = Some(toml::Spanned::new(0..0, window));
+    }
+    if let Some(composition) = &arguments.compose {
+        manifest.content.run.compose = Some(toml::Spanned::new(0..0, composition.clone()));
     }
     let mut graph = Graph::build(&manifest)?;
     print_warnings(&graph.warnings);

@@ -114,6 +114,8 @@ cells! {
         overruns: AtomicU32,
         /// Due ticks at which it still computed, and so did not step.
         skipped_steps: AtomicU32,
+        /// 1 once the instance has ended although its process may go on: it was a member of a group.
+        has_left: AtomicU32,
         /// Processor time that it used between its first and its last tick.
         cpu_ns: AtomicU64,
         /// Waiter: it waits for the grant.

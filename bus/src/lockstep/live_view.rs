@@ -164,6 +164,12 @@ impl LiveView {
         TransferOutcome::of(self.segment.slots()[slot].transfer.load(Acquire))
     }
 
+    /// True if the instance in `slot` has ended although its process may go on.
+    #[must_use]
+    pub fn has_left(&self, slot: usize) -> bool {
+        self.segment.slots()[slot].has_left.load(Acquire) != 0
+    }
+
     /// Ticks that the process in `slot` has completed, also those after the end of the run.
     #[must_use]
     pub fn done(&self, slot: usize) -> u32 {

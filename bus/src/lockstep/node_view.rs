@@ -9,7 +9,7 @@ use crate::plan::{Plan, Wait};
 use crate::step_times::bucket_of;
 use std::ops::Deref;
 use std::sync::atomic::AtomicU32;
-use std::sync::atomic::Ordering::{Relaxed, Release};
+use std::sync::atomic::Ordering::{Acquire, Relaxed, Release};
 
 /// The view of a process of a node.
 #[derive(Debug)]
@@ -86,6 +86,12 @@ impl NodeView {
         self.segment.notify_supervisor();
     }
 
+    /// Notes that the instance of this slot has ended, although its process may go on.
+    pub(crate) fn leave(&self) {
+        self.segment.slots()[self.slot].has_left.store(1, Release);
+        self.segment.notify_supervisor();
+    }
+
     /// Notes what this process goes on from.
     pub(crate) fn set_transfer(&self, transfer: TransferOutcome) {
         self.segment.slots()[self.slot].transfer.store(transfer as u32, Release);
@@ -115,6 +121,11 @@ impl NodeView {
             Need::OtherState => (&segment.slots()[self.other_slot].published, &slot.other_waiter.word),
             Need::OtherDone => (&segment.slots()[self.other_slot].done, &slot.other_waiter.word),
         }
+    }
+
+    /// True if the count of `need` has reached `count`.
+    pub(crate) fn has(&self, need: Need, count: u32) -> bool {
+        self.sequence_and_waiter(need).0.load(Acquire) >= count
     }
 
     /// Waits until the count of `need` reaches `count`, or `is_over` says that it never will.

@@ -107,9 +107,15 @@ impl SupervisorView {
         cell.ready.store(Phase::Announcing as u32, Relaxed);
         cell.transfer.store(TransferOutcome::Unknown as u32, Relaxed);
         // Who sees a count of 0 sees that the slot is empty: the clock does not wait for who has left.
-        for count in
-            [&cell.late, &cell.epoch, &cell.done, &cell.published, &cell.overruns, &cell.skipped_steps]
-        {
+        for count in [
+            &cell.late,
+            &cell.epoch,
+            &cell.done,
+            &cell.published,
+            &cell.overruns,
+            &cell.skipped_steps,
+            &cell.has_left,
+        ] {
             count.store(0, Release);
         }
         cell.cpu_ns.store(0, Relaxed);

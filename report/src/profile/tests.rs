@@ -58,6 +58,7 @@ fn plan() -> Plan {
         clock_cpu: None,
         profile: true,
         lock_memory: false,
+        groups: Vec::new(),
         topics: [("/plant/state", 1), ("/imu/imu", 2), ("/controller/command", 1)].map(topic).into(),
         nodes: vec![
             node("plant", 1, &[(COMMAND, 1)], STATE),

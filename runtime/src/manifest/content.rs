@@ -1,5 +1,6 @@
 //! What a manifest says, as types; places stay with the values that an error may name.
 
+use super::composition::{Composition, GroupSetting};
 use crate::program::{OnExit, Readiness};
 use bus::plan::{Pace, Wait};
 use diagnostics::ParameterError;
@@ -18,6 +19,9 @@ pub struct Content {
     pub run: Run,
     /// The processes by name.
     pub(crate) process: BTreeMap<Spanned<String>, Process>,
+    /// Nodes that share a process, by the name of their group.
+    #[serde(default)]
+    pub(crate) group: BTreeMap<Spanned<String>, GroupSetting>,
     /// Conditions on the recording, evaluated after the run.
     #[serde(default)]
     pub pass: Vec<Spanned<PassCondition>>,
@@ -52,6 +56,8 @@ pub struct Run {
     pub pace: PaceSetting,
     /// Ticks that a fast node may be ahead of the slowest.
     pub window_ticks: Option<Spanned<u32>>,
+    /// Composition instead of the `[group]` tables.
+    pub compose: Option<Spanned<Composition>>,
     /// Core of the clock service.
     pub clock_cpu: Option<Spanned<usize>>,
     /// Starts the processes in an order shuffled by this seed.

@@ -8,8 +8,8 @@ use diagnostics::Diagnostic;
 use toml_edit::{Item, Table};
 
 /// Keys of `[run]` that change how fast or where a run computes, never what: they stay out of the recording.
-const HOST_ONLY_KEYS: [&str; 7] =
-    ["clock_cpu", "lock_memory", "pace", "profile", "record", "start_order_seed", "window_ticks"];
+const HOST_ONLY_KEYS: [&str; 8] =
+    ["clock_cpu", "compose", "lock_memory", "pace", "profile", "record", "start_order_seed", "window_ticks"];
 /// The same for keys of a process.
 const HOST_ONLY_PROCESS_KEYS: [&str; 8] = [
     "cpu",
@@ -52,6 +52,7 @@ fn is_host_only(text: &str) -> bool {
     let keys: Vec<&str> = path.split('.').map(str::trim).collect();
     match keys.as_slice() {
         ["run", key] => HOST_ONLY_KEYS.contains(key),
+        ["group", ..] => true,
         ["process", _, key, ..]
         | ["set", _, "process", _, key, ..]
         | ["vehicle", _, "process", _, key, ..] => HOST_ONLY_PROCESS_KEYS.contains(key),

@@ -38,6 +38,7 @@ fn plan(draw: &mut Draw) -> Plan {
         clock_cpu: None,
         profile: false,
         lock_memory: false,
+        groups: Vec::new(),
         topics: vec![topic("/a", 1), topic("/a2", 1), topic("/b", period_ticks)],
         nodes: vec![
             node("a", 1, vec![input(2, 1)], &[0, 1]),

@@ -51,9 +51,23 @@ impl<W: World> Supervisor<'_, W> {
         let slot = self.plan.slot(node, generation);
         let (view, inputs) =
             (&self.overseer.replacements.view, self.overseer.replacements.inputs(node, generation));
-        view.has_needs(slot, inputs)
-            && self.world.awaited_topic(slot, inputs).is_none()
-            && !view.slots[slot].awaits_other
+        view.has_needs(slot, inputs) && self.is_awake(node, generation)
+    }
+
+    /// True if an instance sleeps neither for a sample nor for the other instance of its node; of a group, none does that
+    /// shares its process.
+    fn is_awake(&self, node: usize, generation: u32) -> bool {
+        let sleeps = |node: usize| {
+            let slot = self.plan.slot(node, generation);
+            let inputs = self.overseer.replacements.inputs(node, generation);
+            self.world.awaited_topic(slot, inputs).is_some()
+                || self.overseer.replacements.view.slots[slot].awaits_other
+        };
+        let lives = |node: usize| self.overseer.replacements.view.lives(node, generation);
+        match self.plan.group_of(node).filter(|_| generation == 0) {
+            Some(group) => !group.members.iter().any(|member| lives(member.node) && sleeps(member.node)),
+            None => !sleeps(node),
+        }
     }
 
     /// A process that has completed the run and has not ended: a node, or else the clock.

@@ -1,0 +1,226 @@
+//! The executor: the nodes of a process, each tick gathered, stepped and published in the order of the data.
+//!
+//! A process has one node, or those of a group. Members step one after the other, by tick and then by depth in the graph:
+//! a reader of a sample of the same tick comes behind its publisher. So no member waits for another member. Groups do not
+//! wait for each other in a circle either: along edges without delay the depth grows, and all groups step in its order.
+
+use crate::connected::{ConnectedNode, Step, Turn};
+use crate::depths::depths;
+use crate::error::BusError;
+use crate::host_time::process_cpu_ns;
+use crate::local::LocalTopic;
+use crate::membership::Membership;
+use crate::schema::Schema;
+use std::time::Duration;
+
+/// How long a process that has completed its ticks sleeps before it looks again who still reads its last samples.
+const RETIREMENT_NAP: Duration = Duration::from_millis(1);
+/// A group tells others how far it has come this many times a window, so that the clock's window never runs out meanwhile.
+const TELLS_PER_WINDOW: u32 = 8;
+
+/// A node of this process.
+pub(crate) struct Member<'c> {
+    node: ConnectedNode,
+    step: Box<Step<'c>>,
+    /// The component's state, and the words of a step that takes time behind it.
+    words: Vec<u64>,
+    /// Bytes of both that are transferred.
+    bytes: usize,
+}
+
+impl<'c> Member<'c> {
+    /// A node that computes `step` at every due tick. The `state`, a message of `schema`, is transferred to the process that
+    /// takes its place if that knows the same type.
+    ///
+    /// # Errors
+    /// If shared memory cannot be had.
+    pub(crate) fn new(
+        mut node: ConnectedNode,
+        schema: Option<&'static Schema>,
+        state: &[u8],
+        mut step: Box<Step<'c>>,
+    ) -> Result<Self, BusError> {
+        let size = state.len();
+        let more_words = node.open_states(schema, size)?;
+        let mut words = vec![0_u64; size.div_ceil(8) + more_words];
+        bytemuck::cast_slice_mut::<u64, u8>(&mut words)[..size].copy_from_slice(state);
+        let bytes = if more_words == 0 { size } else { 8 * words.len() };
+        let step: Box<Step<'c>> = Box::new(move |tick, whole| step(tick, &mut whole[..size]));
+        Ok(Self { node, step, words, bytes })
+    }
+
+    fn state(&mut self) -> (&mut ConnectedNode, &mut Step<'c>, &mut [u8]) {
+        (&mut self.node, &mut *self.step, &mut bytemuck::cast_slice_mut(&mut self.words)[..self.bytes])
+    }
+
+    fn turn(&mut self) -> Result<Turn, BusError> {
+        let (node, _, state) = self.state();
+        node.turn(state)
+    }
+}
+
+/// The nodes of a process, on one thread.
+pub(crate) struct Executor<'c> {
+    /// Those that compute, in the order in which they step.
+    members: Vec<Member<'c>>,
+    /// Those that have completed their ticks, and whose last samples are not all taken yet.
+    leaving: Vec<Member<'c>>,
+    /// The topics of a group, by their numbers in the plan.
+    locals: Vec<Option<LocalTopic>>,
+    /// Ticks between two times at which a group tells others how far it has come.
+    tell_ticks: u32,
+    /// Host time of the last look at the clock, if nobody has waited since.
+    now_ns: Option<u64>,
+}
+
+impl<'c> Executor<'c> {
+    /// A process with one node.
+    pub(crate) fn alone(member: Member<'c>) -> Self {
+        let (members, leaving, locals) = (vec![member], Vec::new(), Vec::new());
+        Self { members, leaving, locals, tell_ticks: 1, now_ns: None }
+    }
+
+    /// A process with a group of nodes.
+    pub(crate) fn group(members: Vec<Member<'c>>) -> Self {
+        let topics = members.first().map_or(0, |member| member.node.links().plan.topics.len());
+        let mut locals: Vec<Option<LocalTopic>> = (0..topics).map(|_| None).collect();
+        for (topic, size) in members.iter().flat_map(|member| member.node.local_topics()) {
+            locals[topic] = Some(LocalTopic::new(size));
+        }
+        let window_ticks = members.first().map_or(1, |member| member.node.links().plan.window_ticks);
+        let tell_ticks = (window_ticks / TELLS_PER_WINDOW).max(1);
+        let mut group = Self { members, leaving: Vec::new(), locals, tell_ticks, now_ns: None };
+        if let Some(first) = group.members.first() {
+            let membership = Membership::first(&first.node.links().plan);
+            group.put_in_order(&membership);
+        }
+        group
+    }
+
+    /// Computes every due tick of every node until the run ends, or until other processes have taken their places.
+    ///
+    /// # Errors
+    /// If a step fails, a due output stays unwritten, a sample is lost, or the run is aborted.
+    pub(crate) fn run(&mut self) -> Result<(), BusError> {
+        for member in &mut self.members {
+            let (node, _, state) = member.state();
+            node.begin(state)?;
+        }
+        self.members.iter().try_for_each(|member| member.node.await_ticks())?;
+        let cpu_start_ns = process_cpu_ns();
+        while let Some(tick) = self.members.iter().map(|member| member.node.tick).min() {
+            self.compute_tick(tick, cpu_start_ns)?;
+            if tick.is_multiple_of(self.tell_ticks) {
+                self.tell();
+                self.look_at_leaving()?;
+            }
+        }
+        while !self.leaving.is_empty() {
+            self.look_at_leaving()?;
+            if !self.leaving.is_empty() {
+                std::thread::sleep(RETIREMENT_NAP);
+            }
+        }
+        Ok(())
+    }
+
+    /// Computes `tick` of every member for which it is the next.
+    fn compute_tick(&mut self, tick: u32, cpu_start_ns: u64) -> Result<(), BusError> {
+        let mut index = 0;
+        while index < self.members.len() {
+            if self.members[index].node.tick != tick {
+                index += 1;
+                continue;
+            }
+            match self.await_turn(index)? {
+                Turn::Compute => {
+                    let (node, step, state) = self.members[index].state();
+                    self.now_ns = Some(node.compute(self.now_ns, &mut self.locals, state, step)?);
+                    index += 1;
+                }
+                Turn::Leave => {
+                    let mut member = self.members.remove(index);
+                    let is_alone = self.locals.is_empty();
+                    // The members of a group share the processor time of their process: each is told its steps.
+                    let cpu_ns =
+                        if is_alone { process_cpu_ns() - cpu_start_ns } else { member.node.step_ns() };
+                    member.node.complete(cpu_ns);
+                    self.leaving.push(member);
+                }
+                // The order may be another one; who has computed the tick is passed over.
+                Turn::Change | Turn::Wait(_) => index = 0,
+            }
+        }
+        Ok(())
+    }
+
+    /// What member `index` does next, after all waiting.
+    fn await_turn(&mut self, index: usize) -> Result<Turn, BusError> {
+        loop {
+            match self.members[index].turn()? {
+                Turn::Wait(awaited) => {
+                    self.tell();
+                    self.look_at_leaving()?;
+                    self.now_ns = None;
+                    if !self.members[index].node.wait(awaited)? {
+                        return Ok(Turn::Leave);
+                    }
+                }
+                Turn::Change => {
+                    self.tell();
+                    self.follow()?;
+                    return Ok(Turn::Change);
+                }
+                turn => return Ok(turn),
+            }
+        }
+    }
+
+    /// Has others know how far the members have come.
+    fn tell(&mut self) {
+        self.members.iter_mut().for_each(|member| member.node.tell());
+    }
+
+    /// Makes all connections agree with the newest membership.
+    fn follow(&mut self) -> Result<(), BusError> {
+        let Some(first) = self.members.first() else { return Ok(()) };
+        let membership = first.node.newest_membership()?;
+        for member in &mut self.members {
+            let (node, _, state) = member.state();
+            node.follow(&membership, &self.locals, state)?;
+            node.acknowledge()?;
+        }
+        self.put_in_order(&membership);
+        Ok(())
+    }
+
+    /// Sorts the members by their depth in the graph of `membership`.
+    fn put_in_order(&mut self, membership: &Membership) {
+        let Some(first) = self.members.first().filter(|_| self.members.len() > 1) else { return };
+        let depths = depths(&first.node.links().plan, membership);
+        self.members.sort_by_key(|member| {
+            let node = member.node.links().index;
+            (depths[node], node)
+        });
+    }
+
+    /// Has those leave whose last samples were taken.
+    fn look_at_leaving(&mut self) -> Result<(), BusError> {
+        let mut index = 0;
+        while index < self.leaving.len() {
+            let node = &mut self.leaving[index].node;
+            if node.has_been_read()? {
+                node.leave();
+                self.leaving.remove(index);
+                continue;
+            }
+            if node.is_behind() {
+                let membership = node.newest_membership()?;
+                node.follow_readers(&membership, &self.locals)?;
+                node.acknowledge()?;
+            }
+            index += 1;
+        }
+        Ok(())
+    }
+}
