@@ -7,7 +7,7 @@ use vehicles::table::{ColumnError, Dialect, Row, Table, TableError, shown};
 use vehicles::wall_clock;
 
 use crate::arrays;
-use crate::clock;
+use crate::clock::{self, NotForward};
 use crate::declaration::Entry;
 use crate::error::{LogError, Spot};
 use crate::log::{Log, Samples};
@@ -41,6 +41,7 @@ impl CsvLog {
         check_arrays(&table)?;
         table.check_lengths()?;
         let mut time_s = times(&table, form.time)?;
+        check_forward(&table, &time_s, form.time)?;
         let part = recording(&table.rows, &time_s, form.recording)?;
         table.rows.truncate(part.end);
         table.rows.drain(..part.start);
@@ -79,7 +80,8 @@ fn times(table: &Table, time: Option<&Entry>) -> Result<Vec<f64>, LogError> {
     Ok(numbers.iter().map(|time| (time * column.sign() * scale + offset) * factor).collect())
 }
 
-/// Refuses a column of which most cells hold no time, with the first of them.
+/// Refuses a column of which most cells hold no time, with their number and the first of them. Rows without any cell do
+/// not count.
 fn check_times(
     table: &Table,
     name: &str,
@@ -88,16 +90,40 @@ fn check_times(
     advice: &'static str,
 ) -> Result<(), LogError> {
     let Ok(column) = table.column(name) else { return Ok(()) };
-    let rows = || table.rows.iter().zip(times).filter(|(row, _)| !row.cell(column).is_empty());
+    let is_filled = |row: &Row| row.cells.iter().any(|cell| !cell.is_empty());
+    let rows = || table.rows.iter().zip(times).filter(|(row, _)| is_filled(row));
     let without = || rows().filter(|(_, time)| !time.is_finite());
-    match without().next().filter(|_| 2 * without().count() > rows().count()) {
+    let (count, of) = (without().count(), rows().count());
+    match without().next().filter(|_| 2 * count > of) {
         None => Ok(()),
         Some((row, _)) => {
+            let (cell, line, name) = (shown(row.cell(column)), row.line, shown(name));
             let found =
-                format!("`{}` in line {}, column `{}`", shown(row.cell(column)), row.line, shown(name));
+                format!("none in {count} of {of} rows, first `{cell}` in line {line}, column `{name}`");
             Err(LogError::unexpected(Spot::Key("time"), expected, found, advice))
         }
     }
+}
+
+/// Refuses a column of times that fall or stay the same.
+fn check_forward(table: &Table, time_s: &[f64], time: Option<&Entry>) -> Result<(), LogError> {
+    let Some(fault) = clock::not_forward(time_s) else { return Ok(()) };
+    let name = time.and_then(|time| time.columns.as_deref()?.first()).map_or("", |name| name.plain.as_str());
+    let at = |row: usize| format!("{} s in line {}", time_s[row], table.rows[row].line);
+    let (found, advice) = match fault {
+        NotForward::Stands => {
+            let time_s = time_s.iter().find(|time_s| time_s.is_finite()).unwrap_or(&f64::NAN);
+            let found = format!("the same time, {time_s} s, in all {} rows", table.rows.len());
+            (found, "name the column that holds the times")
+        }
+        NotForward::Falls { falling, steps, first: [from, to] } => {
+            let steps = format!("times that fall in {falling} of {steps} steps");
+            let found = format!("{steps}, first from {} to {}", at(from), at(to));
+            (found, "sort the rows by time, or name another column; of one that counts down, negate the name")
+        }
+    };
+    let found = format!("{found}, column `{}`", shown(name));
+    Err(LogError::unexpected(Spot::Key("time"), "times that grow", found, advice))
 }
 
 /// The rows of the recording with this number; those of the only one where none is asked for.
