@@ -17,7 +17,7 @@ use vehicles::Vehicle;
 pub type Target = fn(&[u8]) -> bool;
 
 /// Every target by its name, which is that of its folder in `corpus/`.
-pub const TARGETS: [(&str, Target); 9] = [
+pub const TARGETS: [(&str, Target); 10] = [
     ("manifest", manifest),
     ("vehicle", vehicle),
     ("scene", scene),
@@ -26,8 +26,16 @@ pub const TARGETS: [(&str, Target); 9] = [
     ("ulog", ulog),
     ("crazyflie", crazyflie),
     ("dataflash", dataflash),
+    ("parquet", parquet),
     ("mcap", mcap),
 ];
+
+/// Columns of the seeds in Parquet.
+const PARQUET_CHANNELS: &str = r#"
+time = { columns = ["t"], unit = "s" }
+command = { columns = ["m1", "m2", "m3", "m4"], unit = "count" }
+position = { columns = ["px", "py", "pz"], unit = "m" }
+"#;
 
 /// A line of a manifest that begins with this is a `--set` as well.
 const OVERRIDE: &str = "#--set ";
@@ -129,6 +137,11 @@ pub fn crazyflie(bytes: &[u8]) -> bool {
 pub fn dataflash(bytes: &[u8]) -> bool {
     let place = Place::with("log", bytes);
     place.reads_log("dataflash", "") | place.reads_log("dataflash", DATAFLASH_CHANNELS)
+}
+
+/// A table in Parquet.
+pub fn parquet(bytes: &[u8]) -> bool {
+    Place::with("log", bytes).reads_log("parquet", PARQUET_CHANNELS)
 }
 
 /// A recording of hummingbus or a bag of ROS 2.

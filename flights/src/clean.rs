@@ -2,7 +2,7 @@
 
 use vehicles::gaps::GAP_PERIODS;
 
-use crate::clock;
+use crate::clock::{self, NotForward};
 use crate::error::{LogError, Spot};
 use crate::flight::{Channel, median, period_s};
 use crate::held;
@@ -82,8 +82,22 @@ pub fn say_dropped<const N: usize>(
     }
 }
 
-/// Refuses times of several recordings.
+/// Refuses times that do not run forward, and those of several recordings.
 fn check_clock(time_s: &[f64]) -> Result<(), LogError> {
+    if let Some(fault) = clock::not_forward(time_s) {
+        let (expected, advice) =
+            ("times that grow", "choose another clock or message, or sort the log by time");
+        let found = match fault {
+            NotForward::Stands => format!("the same time, {} s, in all {} samples", time_s[0], time_s.len()),
+            NotForward::Falls { falling, steps, first: [from, to] } => format!(
+                "times that fall in {falling} of {steps} steps, first from {} s to {} s behind {} samples",
+                time_s[from],
+                time_s[to],
+                from + 1
+            ),
+        };
+        return Err(LogError::unexpected(Spot::Whole, expected, found, advice));
+    }
     let Some(at) = clock::restarts(time_s).first().copied() else { return Ok(()) };
     let found = format!(
         "a clock that starts again: behind {at} samples the time goes back from {} s to {} s",

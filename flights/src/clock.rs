@@ -1,4 +1,4 @@
-//! Clocks that start again: several recordings in one log.
+//! Clocks that start again, run backwards or stand still.
 
 use crate::flight::median;
 
@@ -19,6 +19,45 @@ pub fn restarts(time_s: &[f64]) -> Vec<usize> {
         }
     }
     found
+}
+
+/// Times of a clock that does not run forward.
+#[derive(Debug, PartialEq, Eq)]
+pub enum NotForward {
+    /// Most steps fall, or so many that no recordings can be told apart.
+    Falls {
+        /// Number of steps that fall.
+        falling: usize,
+        /// Number of steps.
+        steps: usize,
+        /// The indices of the first two times that fall.
+        first: [usize; 2],
+    },
+    /// All times are the same.
+    Stands,
+}
+
+/// The fault of times that fall or stand still; `None` of a clock that runs forward, though it may start again.
+pub fn not_forward(time_s: &[f64]) -> Option<NotForward> {
+    let mut finite = (0..time_s.len()).filter(|index| time_s[*index].is_finite());
+    let mut before = finite.next()?;
+    let (mut steps, mut falling, mut rising, mut first) = (0, 0, 0, None);
+    for index in finite {
+        steps += 1;
+        falling += usize::from(time_s[index] < time_s[before]);
+        rising += usize::from(time_s[index] > time_s[before]);
+        if time_s[index] < time_s[before] {
+            first = first.or(Some([before, index]));
+        }
+        before = index;
+    }
+    match first {
+        None => (rising == 0 && steps + 1 >= RECORDING_MIN).then_some(NotForward::Stands),
+        Some(first) => {
+            let is_mixed = || 4 * falling > falling + rising && !restarts(time_s).is_empty();
+            (falling > 2 * rising || is_mixed()).then_some(NotForward::Falls { falling, steps, first })
+        }
+    }
 }
 
 /// True if time as a whole goes back from the last samples `before` to the first `after`.
@@ -57,6 +96,27 @@ mod tests {
                 "{:?}",
                 parts.iter().map(Vec::len).collect::<Vec<_>>()
             );
+        }
+    }
+
+    #[test]
+    fn clocks_that_fall_or_stand_still_are_no_recordings() {
+        let falling: Vec<f64> = times(0.0, 100).into_iter().rev().collect();
+        let found = NotForward::Falls { falling: 99, steps: 99, first: [0, 1] };
+        assert_eq!(not_forward(&falling), Some(found));
+        // Sorted by another column.
+        let sorted: Vec<f64> = (0..701).map(|index| f64::from(index * 300 % 701)).collect();
+        assert!(matches!(
+            not_forward(&sorted),
+            Some(NotForward::Falls { falling: 200.., first: [2, 3], .. })
+        ));
+        let still = [vec![f64::NAN], vec![5.0; 20], vec![f64::NAN]].concat();
+        assert_eq!(not_forward(&still), Some(NotForward::Stands));
+        let swapped: Vec<f64> = (0..100).map(|index: i32| f64::from(index ^ 1)).collect();
+        let held: Vec<f64> = (0..100).map(|index| f64::from(index / 50)).collect();
+        let again = [times(0.0, 100), times(0.0, 100)].concat();
+        for forward in [swapped, held, again, times(0.0, 9), vec![], vec![1.0], vec![2.0, 1.0, 3.0]] {
+            assert_eq!(not_forward(&forward), None, "{:?}", &forward[..forward.len().min(4)]);
         }
     }
 

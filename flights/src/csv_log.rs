@@ -1,18 +1,15 @@
 //! Logs in CSV: a header, then rows on one clock.
 
 use std::num::NonZero;
-use std::ops::Range;
 
 use vehicles::table::{ColumnError, Dialect, Row, Table, TableError, shown};
 use vehicles::wall_clock;
 
 use crate::arrays;
-use crate::clock;
 use crate::declaration::Entry;
 use crate::error::{LogError, Spot};
 use crate::log::{Log, Samples};
-use crate::quantity::Quantity;
-use crate::scaling;
+use crate::rows;
 
 /// A CSV file; a cell that holds no number is NaN.
 pub struct CsvLog {
@@ -41,7 +38,9 @@ impl CsvLog {
         check_arrays(&table)?;
         table.check_lengths()?;
         let mut time_s = times(&table, form.time)?;
-        let part = recording(&table.rows, &time_s, form.recording)?;
+        let place = |row: usize| format!("line {}", table.rows[row].line);
+        rows::check_forward(&time_s, form.time, &place)?;
+        let part = rows::recording(&time_s, form.recording, &place)?;
         table.rows.truncate(part.end);
         table.rows.drain(..part.start);
         time_s.truncate(part.end);
@@ -52,34 +51,25 @@ impl CsvLog {
 
 /// The times of the rows in s; NaN where a cell has none.
 fn times(table: &Table, time: Option<&Entry>) -> Result<Vec<f64>, LogError> {
-    let column = time.and_then(|time| time.columns.as_deref());
-    let (Some(time), Some([column])) = (time, column) else {
-        let expected = "a channel with one column, which a CSV file needs";
-        let found = if time.is_some() { "no single column" } else { "no channel `time`" };
-        let advice = "add `time = { columns = [\"t\"], unit = \"s\" }` to `channels`";
-        return Err(LogError::unexpected(Spot::Key("time"), expected, found, advice));
-    };
-    let unit = time.unit.as_deref().unwrap_or("(none)");
-    if unit == wall_clock::UNIT {
+    let (time, column) = rows::time_column(time, "a CSV file")?;
+    if time.unit.as_deref() == Some(wall_clock::UNIT) {
         let index = table.column(&column.plain).map_err(TableError::from)?;
         let times = wall_clock::times(table.rows.iter().map(|row| row.cell(index)));
         check_times(table, &column.plain, &times, "times of day, as 10:00:04.25", "correct `time.unit`")?;
         return Ok(times);
     }
-    let dimension = Quantity::Time.dimension();
-    let factor = dimension.factor(unit).ok_or_else(|| {
-        let expected = format!("{}, or \"{}\" for times of day", dimension.names(" or "), wall_clock::UNIT);
-        LogError::unexpected(Spot::Key("time.unit"), expected, unit, "correct it")
-    })?;
-    let scale = scaling::each(Spot::Key("time.scale"), time.scale.as_ref(), 1.0, 1)?[0];
-    let offset = scaling::each(Spot::Key("time.offset"), time.offset.as_ref(), 0.0, 1)?[0];
+    let unit = time.unit.as_deref();
+    let of_day = format!(", or \"{}\" for times of day", wall_clock::UNIT);
+    let factor = rows::time_factor(unit, &of_day)?;
+    let [scale, offset] = rows::time_scaling(time)?;
     let numbers = numbers(table, &column.plain)?;
     let advice = "name another column, or set `unit = \"wall clock\"` in the channel `time` for times of day";
-    check_times(table, &column.plain, &numbers, &format!("numbers in {unit}"), advice)?;
+    check_times(table, &column.plain, &numbers, &format!("numbers in {}", unit.unwrap_or_default()), advice)?;
     Ok(numbers.iter().map(|time| (time * column.sign() * scale + offset) * factor).collect())
 }
 
-/// Refuses a column of which most cells hold no time, with the first of them.
+/// Refuses a column of which most cells hold no time, with their number and the first of them. Rows without any cell do
+/// not count.
 fn check_times(
     table: &Table,
     name: &str,
@@ -88,45 +78,17 @@ fn check_times(
     advice: &'static str,
 ) -> Result<(), LogError> {
     let Ok(column) = table.column(name) else { return Ok(()) };
-    let rows = || table.rows.iter().zip(times).filter(|(row, _)| !row.cell(column).is_empty());
+    let is_filled = |row: &Row| row.cells.iter().any(|cell| !cell.is_empty());
+    let rows = || table.rows.iter().zip(times).filter(|(row, _)| is_filled(row));
     let without = || rows().filter(|(_, time)| !time.is_finite());
-    match without().next().filter(|_| 2 * without().count() > rows().count()) {
+    let (count, of) = (without().count(), rows().count());
+    match without().next().filter(|_| 2 * count > of) {
         None => Ok(()),
         Some((row, _)) => {
+            let (cell, line, name) = (shown(row.cell(column)), row.line, shown(name));
             let found =
-                format!("`{}` in line {}, column `{}`", shown(row.cell(column)), row.line, shown(name));
+                format!("none in {count} of {of} rows, first `{cell}` in line {line}, column `{name}`");
             Err(LogError::unexpected(Spot::Key("time"), expected, found, advice))
-        }
-    }
-}
-
-/// The rows of the recording with this number; those of the only one where none is asked for.
-fn recording(rows: &[Row], time_s: &[f64], number: Option<NonZero<usize>>) -> Result<Range<usize>, LogError> {
-    let restarts = clock::restarts(time_s);
-    let count = restarts.len() + 1;
-    let bounds = |index: usize| {
-        let from = index.checked_sub(1).map_or(0, |before| restarts[before]);
-        from..restarts.get(index).copied().unwrap_or(rows.len())
-    };
-    match (number, restarts.first()) {
-        (None, None) => Ok(0..rows.len()),
-        (Some(number), _) if number.get() <= count => Ok(bounds(number.get() - 1)),
-        (Some(number), _) => {
-            let found = format!("{number} of {count}");
-            Err(LogError::unexpected(Spot::Key("recording"), "a recording of the file", found, "correct it"))
-        }
-        (None, Some(first)) => {
-            let before_s =
-                time_s[..*first].iter().rfind(|time_s| time_s.is_finite()).copied().unwrap_or(f64::NAN);
-            let lines: Vec<String> =
-                restarts.iter().take(10).map(|index| rows[*index].line.to_string()).collect();
-            let found = format!(
-                "{count} recordings: the clock starts again in line {} (first from {before_s} s to {} s)",
-                lines.join(", "),
-                time_s[*first]
-            );
-            let advice = "cut the file there, or set the flight's `recording`, 1 for the first";
-            Err(LogError::unexpected(Spot::Key("time"), "one clock", found, advice))
         }
     }
 }

@@ -80,6 +80,15 @@ pub enum Format {
     Dataflash,
     /// The log that a Crazyflie writes to its card, version 2.
     Crazyflie,
+    /// Parquet: a table of columns with types.
+    Parquet,
+}
+
+impl Format {
+    /// True for a table whose rows are on one clock.
+    pub fn is_table(self) -> bool {
+        matches!(self, Self::Csv | Self::Parquet)
+    }
 }
 
 /// Clock of an MCAP file's messages.

@@ -11,6 +11,7 @@ use crate::declaration::{Clock, Format};
 use crate::error::{LogError, Spot};
 use crate::log::Log;
 use crate::mcap_log::McapLog;
+use crate::parquet::ParquetLog;
 use crate::ulog::Ulog;
 
 /// The log with these bytes. `form` is that of a CSV file, and `clock` chooses one of two clocks.
@@ -20,8 +21,8 @@ pub fn parse(
     form: &Form<'_>,
     clock: Option<Clock>,
 ) -> Result<Box<dyn Log>, LogError> {
-    if form.recording.is_some() && format != Format::Csv {
-        let expected = "a CSV file, of which alone one of several recordings is chosen";
+    if form.recording.is_some() && !format.is_table() {
+        let expected = "a CSV file or a Parquet file, of which alone one of several recordings is chosen";
         return Err(LogError::unexpected(Spot::Key("recording"), expected, "another format", "remove it"));
     }
     if clock.is_some() && format != Format::Mcap {
@@ -33,6 +34,7 @@ pub fn parse(
         Format::Crazyflie => Ok(Box::new(CrazyflieLog::parse(bytes)?)),
         Format::Dataflash => Ok(Box::new(Dataflash::parse(bytes)?)),
         Format::Mcap => Ok(Box::new(McapLog::parse(bytes, clock)?)),
+        Format::Parquet => Ok(Box::new(ParquetLog::parse(bytes, form)?)),
         Format::Ulog => Ok(Box::new(Ulog::parse(bytes)?)),
     }
 }
@@ -46,6 +48,7 @@ pub fn guess(path: &Path, bytes: &[u8]) -> Format {
         [0xA3, 0x95, 0x80, ..] => Format::Dataflash,
         // Of every version: its reader names those that it does not read.
         [0xBC, _, 0, _, _, _, _, _, ..] => Format::Crazyflie,
+        [b'P', b'A', b'R', b'1' | b'E', ..] if foreign::of(bytes).is_some() => Format::Parquet,
         // Its reader names what it is.
         _ if foreign::of(bytes).is_some() => Format::Csv,
         _ => match path.extension().and_then(|extension| extension.to_str()) {

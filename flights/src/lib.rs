@@ -8,7 +8,8 @@
 //! | `quantity`, `frame` | units and frames |
 //! | `logs`, `log_reader` | which logs flights are read from: names and patterns; each log is read once |
 //! | `log` | what every log can do: samples of numbers by name |
-//! | `formats` | the formats of logs: `csv_log`, `mcap_log`, `ulog` (`ulog_messages`, `ulog_format`), `crazyflie`, `dataflash`, `bytes`, `arrays` |
+//! | `formats` | the formats of logs: `csv_log`, `mcap_log`, `ulog` (`ulog_messages`, `ulog_format`), `crazyflie`, `dataflash`, `parquet`, `bytes`, `arrays` |
+//! | `rows` | rows of a table on one clock: CSV and Parquet |
 //! | `known_types` | messages whose fields and units need not be said |
 //! | `name`, `scaling`, `matrices`, `clock` | names of numbers, their factors, rotation matrices, clocks that start again |
 //! | `channels`, `clean`, `held`, `jumps`, `reading` | from a log's numbers to a flight |
@@ -51,10 +52,12 @@ mod logs;
 mod matrices;
 mod mcap_log;
 mod name;
+mod parquet;
 mod plausible;
 mod played;
 mod quantity;
 mod reading;
+mod rows;
 mod scaling;
 mod set;
 mod span;

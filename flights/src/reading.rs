@@ -83,7 +83,7 @@ impl Reading<'_> {
         flight.commands_on_change =
             self.declared(Quantity::Command).is_some_and(|entry| entry.on_change == Some(true));
         flight.notes.splice(0..0, taken);
-        if self.format == Format::Csv {
+        if self.format.is_table() {
             let of_time = plausible::judge_time(&flight, self.vehicle, &self.channels);
             self.settle(&mut flight, of_time.into_iter().collect())?;
         }

@@ -5,6 +5,8 @@
 mod dataflash;
 #[path = "support/lz4.rs"]
 mod lz4;
+#[path = "support/parquet.rs"]
+mod parquet_file;
 #[allow(dead_code, reason = "other tests use the rest")]
 mod support;
 
@@ -13,6 +15,8 @@ use std::cell::Cell;
 use std::path::Path;
 
 use flights::{FlightSet, FlightsError};
+use parquet::basic::{Compression, Encoding};
+use parquet::file::properties::{WriterProperties, WriterPropertiesBuilder, WriterVersion};
 use support::{Motion, crc32};
 
 /// What reading may hold for each byte of a log, and besides: rows of two bytes make rows of numbers, and the definition of
@@ -84,6 +88,35 @@ angular_velocity = { topic = "IMU:1" }
 "#;
 
 const MCAP: &str = "format = \"mcap\"\n";
+
+const PARQUET: &str = r#"format = "parquet"
+[channels]
+time = { columns = ["t"], unit = "s" }
+command = { columns = ["m1", "m2", "m3", "m4"], unit = "count" }
+position = { columns = ["px", "py", "pz"], unit = "m" }
+"#;
+
+/// The first `rows` of a flight in Parquet, packed so.
+fn parquet(rows: usize, properties: WriterPropertiesBuilder) -> Vec<u8> {
+    let mut columns = parquet_file::columns(&csv(rows));
+    columns.truncate(8);
+    columns[1].declared = "required int64 m1".to_owned();
+    parquet_file::file(&columns, 25, properties.build())
+}
+
+/// Ways to pack a file.
+fn packings() -> [WriterPropertiesBuilder; 5] {
+    let packed = |compression| WriterProperties::builder().set_compression(compression);
+    [
+        WriterProperties::builder().set_dictionary_enabled(false),
+        packed(Compression::SNAPPY).set_writer_version(WriterVersion::PARQUET_2_0),
+        packed(Compression::GZIP(Default::default())),
+        packed(Compression::ZSTD(Default::default()))
+            .set_dictionary_enabled(false)
+            .set_writer_version(WriterVersion::PARQUET_2_0),
+        packed(Compression::LZ4_RAW).set_dictionary_enabled(false).set_encoding(Encoding::BYTE_STREAM_SPLIT),
+    ]
+}
 
 /// Reads a log with these bytes as its one flight, believing its units.
 fn read(head: &str, log: &[u8]) -> Result<FlightSet, FlightsError> {
@@ -243,6 +276,34 @@ fn thousands_of_changed_bags_end_in_words_or_in_a_flight() {
 }
 
 #[test]
+fn thousands_of_changed_parquet_files_end_in_words_or_in_a_flight() {
+    for properties in packings() {
+        let whole = parquet(40, properties);
+        assert!(read(PARQUET, &whole).is_ok());
+        let flights = mutated(PARQUET, &whole, &LENGTHS, 2000, |_| {});
+        assert!(flights > 20 && flights < 2000, "{flights} of 2000 gave a flight");
+    }
+}
+
+#[test]
+fn every_byte_of_a_parquet_file_can_be_any_other_without_more_memory() {
+    for properties in packings() {
+        let whole = parquet(30, properties);
+        for at in 0..whole.len() {
+            for change in [0x01, 0x80, 0xFF, whole[at] ^ 0x7F] {
+                let mut bytes = whole.clone();
+                bytes[at] ^= change;
+                let _ = read(PARQUET, &bytes);
+            }
+            let mut bytes = whole.clone();
+            let end = (at + 5).min(bytes.len());
+            bytes[at..end].fill(0xFF);
+            let _ = read(PARQUET, &bytes);
+        }
+    }
+}
+
+#[test]
 fn every_length_of_a_bag_that_claims_four_gigabytes_is_refused_without_the_memory() {
     for compression in [None, Some(mcap::Compression::Zstd)] {
         let whole = support::bag(3, compression);
@@ -261,6 +322,7 @@ fn a_log_cut_at_any_byte_ends_in_words_or_in_a_flight() {
         (ULOG, support::ulog(5)),
         (DATAFLASH, dataflash::log(5, true)),
         (MCAP, support::bag(3, None)),
+        (PARQUET, parquet(5, WriterProperties::builder())),
     ];
     for (head, whole) in logs {
         for length in 0..whole.len() {
@@ -285,6 +347,38 @@ fn an_array_that_a_ulog_claims_is_no_longer_than_a_message() {
     log.extend(message(b'A', b"\0\x01\0sensor_combined"));
     log.extend(message(b'D', &[&[1, 0][..], &[0; 60_008]].concat()));
     assert!(refused(ULOG, &log).contains("a field name of 60000 bytes"));
+}
+
+/// Columns that stay the same, whose rows take no bytes.
+fn parquet_of_equal_rows(rows: usize) -> Vec<u8> {
+    let mut columns = parquet_file::columns(&csv(1));
+    columns.truncate(8);
+    for (index, column) in columns.iter_mut().enumerate() {
+        let cell = |row: usize| Some(if index == 0 { 0.001 * row as f64 } else { 100.0 });
+        column.cells = (0..rows).map(cell).collect();
+    }
+    columns[0].declared = "required int64 t".to_owned();
+    columns[0].cells.iter_mut().flatten().for_each(|cell| *cell *= 1000.0);
+    let delta = WriterProperties::builder()
+        .set_column_encoding("t".into(), Encoding::DELTA_BINARY_PACKED)
+        .set_column_dictionary_enabled("t".into(), false)
+        .set_statistics_enabled(parquet::file::properties::EnabledStatistics::None)
+        .set_compression(Compression::ZSTD(Default::default()));
+    parquet_file::file(&columns, rows, delta.build())
+}
+
+#[test]
+fn rows_that_take_no_bytes_are_read_up_to_a_number_by_the_size_of_the_file() {
+    let head = PARQUET.replace("\"s\"", "\"ms\"");
+    let log = parquet_of_equal_rows(90_000);
+    assert_eq!(read(&head, &log).unwrap().flights[0].command.time_s.len(), 90_000, "{} bytes", log.len());
+    let log = parquet_of_equal_rows(900_000);
+    let most = format!("at most {} rows in a file of {} bytes", 100_000 + 4 * log.len(), log.len());
+    let message = refused(&head, &log);
+    assert!(
+        message.contains(&most) && message.contains("found 900000") && message.contains("CSV"),
+        "{message}"
+    );
 }
 
 #[test]

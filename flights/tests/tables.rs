@@ -209,6 +209,62 @@ fn several_recordings_in_a_file_are_refused_or_chosen() {
 }
 
 #[test]
+fn times_that_do_not_run_forward_are_refused_by_what_they_do() {
+    let plain = Motion::default().csv();
+    let (header, rows) = plain.split_once('\n').unwrap();
+    let with_time = |of: &dyn Fn(usize, &str) -> String| -> String {
+        let row = |(index, line): (usize, &str)| {
+            let (time, rest) = line.split_once(',').unwrap();
+            format!("{},{rest}\n", of(index, time))
+        };
+        format!("{header}\n{}", rows.lines().enumerate().map(row).collect::<String>())
+    };
+    let load = |text: &str, channels: &str| load(text.as_bytes(), channels, "");
+    let falling = with_time(&|index, _| format!("{}", 10.0 - 0.01 * index as f64));
+    says(
+        "falling",
+        load(&falling, CHANNELS),
+        &[
+            "`time`",
+            "times that grow",
+            "fall in 1000 of 1000 steps",
+            "10 s in line 2 to 9.99 s in line 3",
+            "column `t`",
+        ],
+    );
+    same("counted down", load(&falling, &CHANNELS.replace("\"t\"", "\"-t\"")));
+    let sorted = with_time(&|index, _| format!("{}", 0.01 * (index * 300 % 1001) as f64));
+    says(
+        "sorted by another column",
+        load(&sorted, CHANNELS),
+        &["299 of 1000 steps", "sort the rows by time"],
+    );
+    let still = with_time(&|_, _| "5".to_owned());
+    says(
+        "still",
+        load(&still, CHANNELS),
+        &["the same time, 5 s, in all 1001 rows, column `t`", "name the column"],
+    );
+    let words = with_time(&|index, time| if index % 5 == 0 { time.to_owned() } else { "late".to_owned() });
+    says(
+        "words",
+        load(&words, CHANNELS),
+        &[
+            "`time`",
+            "numbers in s",
+            "none in 800 of 1001 rows, first `late` in line 3, column `t`",
+            "wall clock",
+        ],
+    );
+    let blank = with_time(&|index, time| if index % 5 == 0 { time.to_owned() } else { String::new() });
+    says("blank", load(&blank, CHANNELS), &["none in 800 of 1001 rows, first `` in line 3, column `t`"]);
+    // Spreadsheets write rows of delimiters alone below a table.
+    let below = format!("{plain}{}", ",".repeat(28) + "\n" + &format!("{}\n", ",".repeat(28)).repeat(1500));
+    let read = load(&below, CHANNELS).unwrap();
+    assert_eq!(read.position.values.len(), 1001);
+}
+
+#[test]
 fn numbers_are_scaled_before_their_unit() {
     let plain = Motion::default().csv();
     let sensor = Motion { force_unit: 4096.0 / 9.80665, length_unit: 1000.0, ..Motion::default() }.csv();

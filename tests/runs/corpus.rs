@@ -52,7 +52,7 @@ fn every_flights_file_of_the_corpus_is_read_or_refused_in_words() {
 
 #[test]
 fn every_log_of_the_corpus_is_read_or_refused_in_words() {
-    ["csv", "ulog", "crazyflie", "dataflash", "mcap"].into_iter().for_each(replay);
+    ["csv", "ulog", "crazyflie", "dataflash", "parquet", "mcap"].into_iter().for_each(replay);
 }
 
 /// Without an end to what is read, each of these would fill the memory.

@@ -101,22 +101,7 @@ impl Table {
     /// # Errors
     /// If there is none, or more than one of that name.
     pub fn column(&self, name: &str) -> Result<usize, ColumnError> {
-        let places =
-            self.headers.iter().enumerate().filter(|(_, header)| *header == name).map(|(place, _)| place);
-        match (&places.collect::<Vec<_>>()[..], by_number(name)) {
-            ([place], _) => Ok(*place),
-            ([], Some(number)) if number <= self.headers.len() => Ok(number - 1),
-            ([], Some(_)) => Err(ColumnError::Number { name: name.to_owned(), count: self.headers.len() }),
-            ([], None) => Err(ColumnError::Missing {
-                name: name.to_owned(),
-                known: self.headers.clone(),
-                header_line: self.header_line,
-            }),
-            (places, _) => Err(ColumnError::Several {
-                name: name.to_owned(),
-                places: places.iter().map(|place| place + 1).collect(),
-            }),
-        }
+        column_of(&self.headers, self.header_line, name)
     }
 
     /// Returns the numbers of a column; NaN where a cell has none, and in a row that is longer than the header.
@@ -178,6 +163,26 @@ impl Table {
         }
         let is_plain = cells().any(|(_, _, cell)| is_comma(cell) && !crate::dialect::is_group(cell));
         is_plain.then_some(Decimal::Comma).ok_or(TableError::Comma { line, column, cell })
+    }
+}
+
+/// Returns the index of the column `name` among `headers`, which are in a line of the file, or of the number `#3`.
+///
+/// # Errors
+/// If there is none, or more than one of that name.
+pub fn column_of(headers: &[String], header_line: Option<u64>, name: &str) -> Result<usize, ColumnError> {
+    let places = headers.iter().enumerate().filter(|(_, header)| *header == name).map(|(place, _)| place);
+    match (&places.collect::<Vec<_>>()[..], by_number(name)) {
+        ([place], _) => Ok(*place),
+        ([], Some(number)) if number <= headers.len() => Ok(number - 1),
+        ([], Some(_)) => Err(ColumnError::Number { name: name.to_owned(), count: headers.len() }),
+        ([], None) => {
+            Err(ColumnError::Missing { name: name.to_owned(), known: headers.to_vec(), header_line })
+        }
+        (places, _) => Err(ColumnError::Several {
+            name: name.to_owned(),
+            places: places.iter().map(|place| place + 1).collect(),
+        }),
     }
 }
 

@@ -105,7 +105,7 @@ pub enum ColumnError {
         "no column `{}`; it has {}{}",
         shown(name),
         names(known),
-        header_line.map_or(String::new(), |line| format!(
+        header_line.map_or("; correct the name".to_owned(), |line| format!(
             "; correct the name, or set `csv.header_line` if line {line} is not the header"
         ))
     )]

@@ -1,0 +1,194 @@
+//! Parquet files, read through a flights file.
+
+#[path = "support/parquet.rs"]
+mod file;
+#[allow(dead_code, reason = "other tests use the rest")]
+mod support;
+
+use file::{Column, columns};
+use flights::Flight;
+use parquet::basic::{Compression, Encoding};
+use parquet::file::properties::{WriterProperties, WriterPropertiesBuilder, WriterVersion};
+use support::{Motion, Place};
+
+const CHANNELS: &str = r#"
+time = { columns = ["t"], unit = "s" }
+command = { columns = ["m1", "m2", "m3", "m4"], unit = "count" }
+position = { columns = ["px", "py", "pz"], unit = "m" }
+attitude = { columns = ["qx", "qy", "qz", "qw"] }
+angular_velocity = { columns = ["wx", "wy", "wz"], unit = "rad/s" }
+specific_force = { columns = ["fx", "fy", "fz"], unit = "m/s^2" }
+battery_voltage = { columns = ["v"], unit = "V" }
+"#;
+
+fn load(log: &[u8], channels: &str, extra: &str) -> Result<Flight, String> {
+    load_as("log.parquet", log, channels, extra)
+}
+
+fn load_as(name: &str, log: &[u8], channels: &str, extra: &str) -> Result<Flight, String> {
+    let place = Place::new();
+    place.write(name, log);
+    place.load(name, channels, extra).map_err(|error| error.to_string())
+}
+
+/// A change of a column.
+type Change<'a> = &'a dyn Fn(&mut Column);
+
+/// The made-up flight, of which `change` changes columns by their names.
+fn changed(change: &[(&str, Change<'_>)]) -> Vec<u8> {
+    let mut columns = columns(&Motion::default().csv());
+    for column in &mut columns {
+        let name = column.declared.split(' ').next_back().unwrap().to_owned();
+        change.iter().filter(|(changed, _)| *changed == name).for_each(|(_, change)| change(column));
+    }
+    file::file(&columns, 400, WriterProperties::builder().set_compression(Compression::SNAPPY).build())
+}
+
+/// Declares a column as `declared`, and multiplies its cells by `factor` behind a summand.
+fn typed(declared: &'static str, summand: f64, factor: f64) -> impl Fn(&mut Column) {
+    move |column| {
+        column.declared = declared.to_owned();
+        column.cells.iter_mut().flatten().for_each(|cell| *cell = (*cell + summand) * factor);
+    }
+}
+
+/// The flight of the CSV file, and the same one of Parquet, are equal within `tolerance`.
+fn same(name: &str, flight: Result<Flight, String>, tolerance: f64) {
+    let flight = flight.unwrap_or_else(|error| panic!("{name}: {error}"));
+    let plain = load_as("log.csv", Motion::default().csv().as_bytes(), CHANNELS, "").unwrap();
+    assert_eq!(flight.notes, [""; 0], "{name}");
+    let near =
+        |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= tolerance);
+    assert!(near(&flight.position.time_s, &plain.position.time_s), "{name}: times");
+    assert!(near(flight.command.values.as_flattened(), plain.command.values.as_flattened()), "{name}");
+    assert!(near(flight.attitude.values.as_flattened(), plain.attitude.values.as_flattened()), "{name}");
+    assert!(near(flight.position.values.as_flattened(), plain.position.values.as_flattened()), "{name}");
+    let voltages = [&flight, &plain].map(|flight| flight.battery_voltage.values.as_flattened());
+    assert!(near(voltages[0], voltages[1]), "{name}");
+}
+
+fn says(name: &str, refused: Result<Flight, String>, parts: &[&str]) {
+    let text = refused.map(|flight| flight.notes).expect_err(name);
+    parts.iter().for_each(|part| assert!(text.contains(part), "{name}: `{part}` is not in: {text}"));
+    assert!(text.contains("flights.toml:"), "{name}: {text}");
+}
+
+#[test]
+fn files_are_read_however_their_columns_are_packed() {
+    let columns = columns(&Motion::default().csv());
+    let builder = WriterProperties::builder;
+    let gzip = Compression::GZIP(Default::default());
+    let zstd = Compression::ZSTD(Default::default());
+    let cases: [(&str, WriterPropertiesBuilder); 9] = [
+        ("plain", builder().set_dictionary_enabled(false)),
+        ("dictionaries", builder()),
+        ("version 2", builder().set_writer_version(WriterVersion::PARQUET_2_0)),
+        ("snappy", builder().set_compression(Compression::SNAPPY)),
+        ("gzip", builder().set_compression(gzip)),
+        ("zstd", builder().set_compression(zstd).set_writer_version(WriterVersion::PARQUET_2_0)),
+        ("lz4", builder().set_compression(Compression::LZ4_RAW)),
+        ("split", builder().set_dictionary_enabled(false).set_encoding(Encoding::BYTE_STREAM_SPLIT)),
+        ("small pages", builder().set_data_page_row_count_limit(70).set_write_batch_size(70)),
+    ];
+    for (name, properties) in cases {
+        for group in [300, 2000] {
+            same(name, load(&file::file(&columns, group, properties.clone().build()), CHANNELS, ""), 0.0);
+        }
+    }
+    let file = file::file(&columns, 300, builder().build());
+    same("by number", load(&file, &CHANNELS.replace("\"px\"", "6"), ""), 0.0);
+    same("another name", load_as("log", &file, CHANNELS, ""), 0.0);
+    same("a format", load_as("log", &file, CHANNELS, "format = \"parquet\""), 0.0);
+}
+
+#[test]
+fn columns_of_all_types_of_numbers_are_read() {
+    let whole = |declared: &'static str| typed(declared, 0.0, 1.0);
+    let of_types = changed(&[
+        ("m1", &whole("required int32 m1 (INTEGER(8,true))")),
+        ("m2", &whole("optional int32 m2 (INTEGER(32,false))")),
+        ("m3", &whole("optional int64 m3 (INTEGER(64,false))")),
+        ("m4", &whole("required float m4")),
+        ("pz", &typed("optional int64 pz (DECIMAL(18,9))", 0.0, 1e9)),
+        ("v", &typed("required boolean v", -10.0, 1.0)),
+    ]);
+    let channels = CHANNELS.replace("[\"v\"], unit", "[\"v\"], scale = 11, offset = 0.5, unit");
+    let flight = load(&of_types, &channels, "").unwrap();
+    assert!(flight.battery_voltage.values.iter().all(|value| *value == [11.5]));
+    let plain = load_as("log.csv", Motion::default().csv().as_bytes(), CHANNELS, "").unwrap();
+    assert_eq!(flight.command, plain.command);
+    let off = flight.position.values.iter().zip(&plain.position.values).map(|(a, b)| (a[2] - b[2]).abs());
+    assert!(off.fold(0.0, f64::max) < 1e-9);
+}
+
+#[test]
+fn times_have_the_unit_of_their_type_or_the_declared_one() {
+    let since_1970 = 1.9e9;
+    let without = CHANNELS.replace("[\"t\"], unit = \"s\"", "[\"t\"]");
+    for (declared, factor) in [
+        ("required int64 t (TIMESTAMP(MICROS,true))", 1e6),
+        ("required int64 t (TIMESTAMP(NANOS,false))", 1e9),
+        ("optional int64 t (TIMESTAMP_MILLIS)", 1e3),
+        ("required int64 t (TIME(MICROS,true))", 1e6),
+    ] {
+        let log = changed(&[("t", &typed(declared, since_1970, factor))]);
+        same(declared, load(&log, &without, ""), 1e-6);
+        same(declared, load(&log, &CHANNELS.replace("\"s\"", "\"wall clock\""), ""), 1e-6);
+    }
+    let log = changed(&[("t", &typed("required int64 t (TIMESTAMP(MICROS,true))", since_1970, 1e6))]);
+    same("the same unit", load(&log, &CHANNELS.replace("\"s\"", "\"us\""), ""), 1e-6);
+    says(
+        "another unit",
+        load(&log, CHANNELS, ""),
+        &["`time.unit`", "expected \"us\" or no unit", "column `t` has a type of times", "found \"s\""],
+    );
+    let plain = changed(&[("t", &typed("required int64 t", 0.0, 1e9))]);
+    same("a declared unit", load(&plain, &CHANNELS.replace("\"s\"", "\"ns\""), ""), 1e-9);
+    says(
+        "no unit",
+        load(&plain, &without, ""),
+        &["`time.unit`", "\"ns\", as the type of the column says none", "found (none)"],
+    );
+    says("a wrong unit", load(&plain, CHANNELS, ""), &["`unit = \"ns\"` would fit"]);
+}
+
+#[test]
+fn empty_cells_are_left_out_and_recordings_chosen_as_in_csv() {
+    let with_gaps = changed(&[("px", &|column: &mut Column| {
+        column.cells.iter_mut().step_by(10).for_each(|cell| *cell = None);
+    })]);
+    let flight = load(&with_gaps, CHANNELS, "").unwrap();
+    assert_eq!(flight.notes, ["position: 101 of 1001 samples have no finite number; left out"]);
+    let again = |column: &mut Column| column.cells[600..].iter_mut().flatten().for_each(|t| *t -= 6.0);
+    let twice = changed(&[("t", &again)]);
+    says("two recordings", load(&twice, CHANNELS, ""), &["2 recordings", "again in row 601", "`recording`"]);
+    let second = load(&twice, CHANNELS, "recording = 2").unwrap();
+    let plain = load_as("log.csv", Motion::default().csv().as_bytes(), CHANNELS, "").unwrap();
+    assert_eq!(second.position.values, plain.position.values[600..]);
+    let falling = |column: &mut Column| column.cells.reverse();
+    says(
+        "falling",
+        load(&changed(&[("t", &falling)]), CHANNELS, ""),
+        &["fall in 1000 of 1000 steps", "10 s in row 1 to 9.99 s in row 2", "column `t`"],
+    );
+}
+
+#[test]
+fn what_cannot_be_read_is_refused_with_what_it_is() {
+    let whole = changed(&[]);
+    let texts = changed(&[("px", &typed("required binary px (UTF8)", 0.0, 1.0))]);
+    says("texts", load(&texts, CHANNELS, ""), &["`position`", "column `px`", "found texts"]);
+    let named = CHANNELS.replace("\"px\"", "\"x\"");
+    says("a name", load(&whole, &named, ""), &["no column `x`", "it has t, m1", "correct the name"]);
+    let twice = changed(&[("vx", &typed("optional double px", 0.0, 1.0))]);
+    says("a name twice", load(&twice, CHANNELS, ""), &["`px` stands 2 times", "6, 9", "\"#6\""]);
+    same("of which one is chosen", load(&twice, &CHANNELS.replace("\"px\"", "6"), ""), 0.0);
+    let topic = CHANNELS.replace("columns = [\"v\"]", "topic = \"b\", columns = [\"v\"]");
+    says("a topic", load(&whole, &topic, ""), &["`topic`", "a Parquet file has no topics"]);
+    says("cut", load(&whole[..whole.len() / 2], CHANNELS, ""), &["`PAR1` at the end", "it is cut"]);
+    says("a form", load(&whole, CHANNELS, "csv = { header_line = 2 }"), &["`csv`", "a CSV file"]);
+    let encrypted = [b"PARE", &whole[4..whole.len() - 4], b"PARE"].concat();
+    says("encrypted", load(&encrypted, CHANNELS, "format = \"parquet\""), &["encrypted"]);
+    let empty = changed(&[("px", &|column: &mut Column| column.cells.fill(None))]);
+    says("no number", load(&empty, CHANNELS, ""), &["column `px`", "expected numbers", "none in any row"]);
+}
