@@ -2,9 +2,9 @@
 //! the thesis's (§5.5, Figs 5.30–5.34), where the pitch is a function of the distance; docs/walls.md flies both.
 //!
 //! It flies along the heading's +x. The velocity command is the cruising speed, or the `Approach` curve over
-//! the distance still to go where that is slower; the curve's own acceleration is fed forward. So it pitches up at once
-//! where the curve begins, and then by as much as the curve's deceleration takes. Once it has arrived, an integrator
-//! over the distance takes up what a tilted attitude estimate leaves.
+//! the distance still to go where that is slower. The acceleration of the curve is fed forward, earlier by the lag of
+//! the pitch behind its command. The vehicle therefore pitches up just before the curve begins, and its speed falls
+//! without rising again. Once it has arrived, an integrator over the distance compensates a tilted attitude estimate.
 //!
 //! Along y it holds its place by the integral of the estimated velocity, as well as that is known: well with a wall
 //! beside in sight, and not at all in the open, where the ranges tell nothing about it.
@@ -19,7 +19,7 @@ use crate::law_inputs::WallInputs;
 use crate::velocity::{LoopsGains, VelocityLoop, VelocitySetPoint, VelocityState};
 use bus::component::Info;
 use diagnostics::parameter::{ParameterError, finite, positive, positive_up_to};
-use diagnostics::unit::{ACCELERATION, LENGTH, PER_SECOND, PER_SECOND_3, VELOCITY};
+use diagnostics::unit::{ACCELERATION, LENGTH, PER_SECOND, PER_SECOND_3, TIME, VELOCITY};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
@@ -39,6 +39,8 @@ gains! {
     pub struct WallStopGains of file, built in "wall-stop.toml" {
         /// From the distance still to go to a velocity.
         approach: Approach = Approach::read(&file.table("approach")),
+        /// Time by which the fed-forward acceleration is ahead of the velocity command, s.
+        lead_s: f64 = file.limit("approach.lead", TIME),
         /// Back from a wall that is too near, and back along it, no faster than this, m/s.
         retreat_max_m_s: f64 = file.limit("approach.retreat_max", VELOCITY),
         /// Error of distance (m) held for one second to acceleration (m/s²), 1/s³.
@@ -188,7 +190,7 @@ impl Law for WallStopLaw {
         self.integrate(state, to_go_m);
         let aside_m = state.aside + input.walls.velocity[1] * self.velocity.cascade.period_s;
         state.aside = aside_m.clamp(-self.gains.aside_max_m, self.gains.aside_max_m);
-        let asked = self.asked(state, to_go_m, speed_m_s);
+        let asked = self.asked(state, to_go_m);
         let measured = HoverMotion::by_ranges(input);
         let output =
             self.velocity.demand(&mut state.velocity, last, &asked, &input.walls.velocity, &measured);
@@ -219,15 +221,24 @@ impl WallStopLaw {
         }
     }
 
-    fn asked(&self, state: &WallStopState, to_go_m: f64, speed_m_s: f64) -> VelocitySetPoint {
+    /// Returns the acceleration of the curve at the place that the vehicle reaches within the lead, at `command_m_s`.
+    ///
+    /// It is zero where the cruising speed or the limit of the retreat applies instead of the curve. It does not depend
+    /// on the measured velocity, which the velocity loop already feeds back.
+    fn braking_m_s2(&self, to_go_m: f64, command_m_s: f64) -> f64 {
+        let ahead_m = to_go_m - self.gains.lead_s * command_m_s;
+        let ahead_m_s = self.gains.approach.speed_m_s(ahead_m);
+        let is_on_curve = (-self.gains.retreat_max_m_s..self.cruise_speed_m_s).contains(&ahead_m_s);
+        if is_on_curve { self.gains.approach.acceleration_m_s2(ahead_m, ahead_m_s) } else { 0.0 }
+    }
+
+    fn asked(&self, state: &WallStopState, to_go_m: f64) -> VelocitySetPoint {
         let near_m_s = self.gains.approach.speed_m_s(to_go_m);
         let wanted_m_s = near_m_s.clamp(-self.gains.retreat_max_m_s, self.cruise_speed_m_s);
         let command_m_s = self.velocity.gathered_m_s(state.velocity.velocity_command[0], wanted_m_s);
-        // The curve's acceleration is that of a vehicle on the curve, not of one kept back by a limit. One that
-        // holds is better off without: it would be moved by the velocity's error once more.
-        let is_on_curve = command_m_s == near_m_s && state.phase != HOLDING;
-        let braking_m_s2 =
-            if is_on_curve { self.gains.approach.acceleration_m_s2(to_go_m, speed_m_s) } else { 0.0 };
+        // The hold is stiffer without the curve's acceleration, and its integrator does the same work.
+        let is_braking = command_m_s == wanted_m_s && state.phase != HOLDING;
+        let braking_m_s2 = if is_braking { self.braking_m_s2(to_go_m, command_m_s) } else { 0.0 };
         let back_max_m_s = self.gains.retreat_max_m_s;
         let back_m_s = (-self.gains.aside_1_s * state.aside).clamp(-back_max_m_s, back_max_m_s);
         VelocitySetPoint {

@@ -53,11 +53,16 @@ struct Stop {
     fastest_m_s: f64,
     /// The greatest speed then, whatever its direction.
     last_speed_m_s: f64,
+    /// Greatest speed towards the wall after the speed fell below [`STOPPED_M_S`] for the first time.
+    again_m_s: f64,
     /// How far it ever was from where it began, along the wall.
     aside_m: f64,
     state: u32,
     altitude_error_m: f64,
 }
+
+/// Speed towards the wall below which a vehicle counts as stopped.
+const STOPPED_M_S: f64 = 0.1;
 
 /// Flies towards a wall that is `away_m` away, to stop `distance_m` before it, for `seconds`.
 fn stop<L: Law>(law: &L, distance_m: f64, seed: u64, away_m: f64, seconds: u64) -> Stop {
@@ -69,6 +74,7 @@ fn stop_of<L: Law>(flown: Vehicle, law: &L, distance_m: f64, seed: u64, away_m: 
     let walls = [away_m, f64::INFINITY, 5.0, 5.0];
     let mut flight = Loop::of(flown, Vector3::new(0.0, 0.0, 1.5), Senses::new(seed, walls, NOISY));
     let mut stop = Stop { nearest_m: f64::INFINITY, ..Stop::default() };
+    let mut has_stopped = false;
     for tick in 0..1000 * seconds {
         flight.step(law);
         let (at, velocity) = (flight.position(), flight.state.body.velocity_W_m_s);
@@ -76,6 +82,10 @@ fn stop_of<L: Law>(flown: Vehicle, law: &L, distance_m: f64, seed: u64, away_m: 
         stop.fastest_m_s = stop.fastest_m_s.max(velocity.x);
         stop.altitude_error_m = stop.altitude_error_m.max((at.z - 1.5).abs());
         stop.aside_m = stop.aside_m.max(at.y.abs());
+        has_stopped |= velocity.x < STOPPED_M_S && stop.fastest_m_s > 2.0 * STOPPED_M_S;
+        if has_stopped {
+            stop.again_m_s = stop.again_m_s.max(velocity.x);
+        }
         if tick >= 1000 * (seconds - 5) {
             stop.worst_error_m = stop.worst_error_m.max((away_m - at.x - distance_m).abs());
             stop.last_speed_m_s = stop.last_speed_m_s.max(velocity.norm());
@@ -92,13 +102,14 @@ fn it_stops_at_three_metres_and_never_nearer_than_2_8_whatever_the_speed_and_see
             let stop = stop(&wall_stop(cruise_m_s, 3.0), 3.0, seed, away_m, 20 + (9.0 / cruise_m_s) as u64);
             println!(
                 "{cruise_m_s} m/s, seed {seed}: nearest {:.3} m, at the end within {:.3} m, fastest {:.2} m/s, \
-                 height within {:.3} m, at the end {:.3} m/s, aside by {:.3} m",
+                 height within {:.3} m, at the end {:.3} m/s, aside by {:.3} m, once stopped {:.3} m/s",
                 stop.nearest_m,
                 stop.worst_error_m,
                 stop.fastest_m_s,
                 stop.altitude_error_m,
                 stop.last_speed_m_s,
-                stop.aside_m
+                stop.aside_m,
+                stop.again_m_s
             );
             assert!(stop.nearest_m > 2.85, "nearest {}", stop.nearest_m);
             assert!(stop.worst_error_m < 0.05, "at the end off by {}", stop.worst_error_m);
@@ -106,6 +117,7 @@ fn it_stops_at_three_metres_and_never_nearer_than_2_8_whatever_the_speed_and_see
             assert_eq!(stop.state, HOLDING);
             assert!(stop.altitude_error_m < 0.1, "{}", stop.altitude_error_m);
             assert!(stop.last_speed_m_s < 0.1, "at the end {} m/s", stop.last_speed_m_s);
+            assert!(stop.again_m_s < STOPPED_M_S, "it stopped, and flew on at {} m/s", stop.again_m_s);
             assert!(stop.aside_m < 0.5, "aside by {} m", stop.aside_m);
         }
     }

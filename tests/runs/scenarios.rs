@@ -1,6 +1,7 @@
 //! The thesis's scenarios and those beyond: every condition holds, whatever the seed, and no controller is told the
 //! truth.
 
+use crate::recordings::rows;
 use crate::support::{Place, repository};
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -84,6 +85,35 @@ fn a_delay_beside_the_loop_shows_as_it_is_and_one_inside_is_not_flyable() {
 #[test]
 fn stops_before_a_wall_by_our_law_at_three_speeds() {
     ["wall-stop-slow", "wall-stop", "wall-stop-fast"].into_iter().for_each(fly);
+}
+
+/// The vehicle brakes from its cruising speed to standstill without speeding up on the way, at each speed and seed.
+#[test]
+fn it_stops_once_before_a_wall() {
+    const STOPPED_M_S: f64 = 0.1;
+    const STEPS_M_S: f64 = 0.03;
+    for (name, seconds) in [("wall-stop-slow", 35), ("wall-stop", 22), ("wall-stop-fast", 15)] {
+        for seed in SEEDS {
+            let (place, manifest) = (Place::new(), repository(&format!("manifests/{name}.toml")));
+            let recording = place.path("flight.mcap");
+            let [duration, seed_set] = [format!("run.duration_s={seconds}"), format!("run.seed={seed}")];
+            place.call(&["run", &manifest, "--record", &recording, "--set", &duration, "--set", &seed_set]);
+            let speeds_m_s = rows(&recording, "/plant/state").into_iter().map(|row| row.get("velocity.x"));
+            let speeds_m_s = speeds_m_s.skip_while(|speed| *speed < 2.0 * STOPPED_M_S).collect::<Vec<_>>();
+            let stopped = speeds_m_s.iter().position(|speed| *speed < STOPPED_M_S).expect("it stops");
+            let (braking, after) = speeds_m_s.split_at(stopped);
+            let again_m_s = after.iter().fold(0.0_f64, |most, speed| most.max(*speed));
+            assert!(again_m_s <= STOPPED_M_S, "{name}, seed {seed}: stopped, and flew on at {again_m_s} m/s");
+            let half_m_s = 0.5 * braking.iter().fold(0.0_f64, |most, speed| most.max(*speed));
+            let begins = braking.iter().rposition(|speed| *speed > half_m_s).expect("it cruises");
+            let mut slowest_m_s = half_m_s;
+            for speed_m_s in &braking[begins + 1..] {
+                slowest_m_s = slowest_m_s.min(*speed_m_s);
+                let rise_m_s = speed_m_s - slowest_m_s;
+                assert!(rise_m_s < STEPS_M_S, "{name}, seed {seed}: {rise_m_s} m/s faster while it brakes");
+            }
+        }
+    }
 }
 
 #[test]

@@ -308,10 +308,11 @@ impl Direct {
         }
     }
 
-    /// The greatest of the rates and impulses.
+    /// The greatest of the rates and impulses, of contacts and joints.
     fn greatest(&self) -> f64 {
-        let each = self.cones.iter().map(|cone| cone.free.amax().max(cone.z.x));
-        each.fold(f64::MIN_POSITIVE, f64::max)
+        let touching = self.cones.iter().map(|cone| cone.free.amax().max(cone.z.x));
+        let tied = self.ties.iter().map(|tie| tie.free.abs().max(tie.impulse.abs()));
+        touching.chain(tied).fold(f64::MIN_POSITIVE, f64::max)
     }
 
     /// The interior-point method for the shifts as they are.
@@ -477,3 +478,6 @@ fn root(mobility: &Matrix6<f64>) -> Matrix6<f64> {
     }
     root
 }
+
+#[cfg(test)]
+mod tests;
