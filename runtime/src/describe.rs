@@ -25,6 +25,16 @@ impl fmt::Display for Graph {
             plan.window_ticks,
             plan.seed
         )?;
+        for group in &plan.groups {
+            let members = group.members.iter().map(|member| plan.nodes[member.node].name.as_str());
+            let cpu = group.cpu.map_or(String::new(), |cpu| format!(", cpu {cpu}"));
+            writeln!(
+                f,
+                "group {}: {}, one process{cpu}",
+                group.name,
+                members.collect::<Vec<_>>().join(", ")
+            )?;
+        }
         for (index, (node, program)) in plan.nodes.iter().zip(&self.programs).enumerate() {
             let cpu = node.cpu.map_or(String::new(), |cpu| format!(", cpu {cpu}"));
             let (what, hz) = (what(program), rate_hz / f64::from(node.period_ticks));

@@ -19,6 +19,8 @@ pub struct Process<B: Body> {
     pub name: String,
     /// What it is for.
     pub role: Role,
+    /// Group whose process it shares.
+    pub group: Option<String>,
     /// What runs.
     pub body: B,
     /// How it ended.
@@ -119,7 +121,7 @@ impl<B: Body> Process<B> {
             Role::Node { generation, .. } => bus::names::process_name(name, generation),
             Role::Clock | Role::Sidecar { .. } => name.to_owned(),
         };
-        Self { name, role, body, end: None, is_settled: false, verdict: None }
+        Self { name, role, group: None, body, end: None, is_settled: false, verdict: None }
     }
 
     /// Looks whether the process has ended.
@@ -149,6 +151,7 @@ impl<B: Body> Process<B> {
             (None, None) => "is still running".to_owned(),
         };
         let lines: String = self.body.last_lines().iter().map(|line| format!("\n  {line}")).collect();
-        format!("process `{}` {end}{lines}", self.name)
+        let group = self.group.as_ref().map_or(String::new(), |group| format!(" of group `{group}`"));
+        format!("process `{}`{group} {end}{lines}", self.name)
     }
 }

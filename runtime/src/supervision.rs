@@ -156,7 +156,11 @@ impl<'a, W: World> Supervisor<'a, W> {
 
     fn start_process(&mut self, name: &str, role: Role, program: Option<&Program>) -> Result<()> {
         let body = self.world.start(name, role, program)?;
-        self.processes.running.push(Process::new(name, role, body));
+        let group = match role {
+            Role::Node { node, generation: 0 } => self.plan.group_of(node).map(|group| group.name.clone()),
+            _ => None,
+        };
+        self.processes.running.push(Process { group, ..Process::new(name, role, body) });
         Ok(())
     }
 

@@ -4,6 +4,7 @@
 //! - [`recordings`]: recordings read back and compared
 //! - [`nodes`]: the processes that the tests put into runs
 //! - [`determinism`]: a run is a function of its manifest
+//! - [`compose`]: nor does it depend on which nodes share a process
 //! - [`processors`]: nor does it depend on the processor
 //! - [`live`]: runs that are watched and steered
 //! - [`clean`]: what dead runs left is removed, and nothing of live ones
@@ -40,6 +41,7 @@ mod clean;
 mod cleanup;
 mod commands;
 mod components;
+mod compose;
 mod contract;
 mod corpus;
 mod determinism;

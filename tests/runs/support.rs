@@ -129,11 +129,21 @@ impl Place {
 
     /// The process of the clock service, once it has come up.
     pub fn clock(&self) -> Pid {
-        let is_clock = |pid: &Pid| {
+        self.process_of_kind("clock")
+    }
+
+    /// The process of the run's only group, once it has come up.
+    pub fn group(&self) -> Pid {
+        self.process_of_kind("group")
+    }
+
+    fn process_of_kind(&self, kind: &str) -> Pid {
+        let end = format!("\0node\0{kind}\0");
+        let is_meant = |pid: &Pid| {
             let args = fs::read(format!("/proc/{}/cmdline", pid.as_raw_nonzero())).unwrap_or_default();
-            args.ends_with(b"\0node\0clock\0")
+            args.ends_with(end.as_bytes())
         };
-        poll("no clock service", || self.processes().into_iter().map(|(pid, _)| pid).find(is_clock))
+        poll(&format!("no {kind}"), || self.processes().into_iter().map(|(pid, _)| pid).find(is_meant))
     }
 
     /// Waits until no process launched from this folder lives.

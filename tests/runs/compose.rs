@@ -1,0 +1,151 @@
+//! Composition: nodes that share a process give the same bytes, are swapped like others, and end like others.
+
+use crate::recordings::require_same;
+use crate::support::{Place, repository};
+use rand_core::Rng;
+use rustix::process::{Signal, kill_process};
+use std::fs;
+
+/// The nodes of hover.toml that can be members of a group.
+const NODES: [&str; 6] = ["controller", "ekf", "imu", "mocap", "pilot", "plant"];
+
+/// Flies `manifest` for `duration_s` with `more` arguments; returns the recording.
+fn fly(place: &Place, manifest: &str, duration_s: f64, more: &[&str]) -> String {
+    let (manifest, recording) = (repository(manifest), place.path("flight.mcap"));
+    let duration = format!("run.duration_s={duration_s}");
+    let args = ["run", &manifest, "--record", &recording, "--set", &duration];
+    // Conditions that a shorter flight misses are not what is looked at.
+    let ended = place.call(&[&args, more].concat());
+    assert!(!fs::read(&recording).unwrap_or_default().is_empty(), "{ended}");
+    recording
+}
+
+/// Requires that `manifest` gives the same file with each of these compositions as without any.
+#[track_caller]
+fn require_same_file(manifest: &str, duration_s: f64, compositions: &[String]) {
+    let place = Place::new();
+    let alone = fs::read(fly(&place, manifest, duration_s, &["--compose", "none"])).unwrap();
+    for composition in compositions {
+        let place = Place::new();
+        let composed = fly(&place, manifest, duration_s, &["--compose", composition]);
+        assert!(
+            alone == fs::read(&composed).unwrap(),
+            "{manifest}: another file with --compose {composition}"
+        );
+    }
+}
+
+/// A partition of the nodes of hover.toml, drawn from `seed`; a set of one node is no group.
+fn partition(seed: u64) -> String {
+    let mut random = bus::random::stream(seed, "partition");
+    let mut sets: [Vec<&str>; 3] = Default::default();
+    NODES.iter().for_each(|node| sets[(random.next_u64() % 3) as usize].push(node));
+    let groups: Vec<String> = sets.iter().filter(|set| set.len() > 1).map(|set| set.join("+")).collect();
+    if groups.is_empty() { "none".to_owned() } else { groups.join(",") }
+}
+
+#[test]
+fn every_partition_of_the_hover_gives_the_same_file() {
+    let drawn = (0..12).map(partition);
+    require_same_file("manifests/hover.toml", 1.0, &drawn.chain(["all".to_owned()]).collect::<Vec<_>>());
+}
+
+#[test]
+fn ten_vehicles_give_the_same_file_whole_by_vehicle_and_apart() {
+    require_same_file("manifests/ten-vehicles.toml", 0.3, &["all".to_owned(), "vehicles".to_owned()]);
+}
+
+#[test]
+fn contacts_walls_figures_and_swaps_give_the_same_file() {
+    for manifest in [
+        "manifests/wall-follow-varying.toml",
+        "manifests/figure-eight.toml",
+        "manifests/swap-laws.toml",
+        "manifests/standby.toml",
+        "manifests/hover-rapier.toml",
+        "manifests/computing-time.toml",
+    ] {
+        // swap-laws swaps at 3 s for the first time.
+        require_same_file(manifest, 3.5, &["all".to_owned()]);
+    }
+}
+
+#[test]
+fn the_recording_is_the_same_with_any_window_and_at_a_pace() {
+    let place = Place::new();
+    let alone = fs::read(fly(&place, "manifests/hover.toml", 1.0, &[])).unwrap();
+    for more in [["--window", "1"], ["--window", "5"], ["--window", "4096"], ["--pace", "8"]] {
+        let place = Place::new();
+        let composed = fly(&place, "manifests/hover.toml", 1.0, &[&["--compose", "all"], &more[..]].concat());
+        require_same(&alone, &composed);
+    }
+}
+
+#[test]
+fn a_group_of_a_manifest_flies_and_is_listed() {
+    let place = Place::new();
+    let text = format!(
+        "include = [{:?}]\n[run]\nduration_s = 0.5\n[group.estimation]\nprocesses = [\"imu\", \"mocap\", \"ekf\"]\n",
+        repository("manifests/hover.toml")
+    );
+    let manifest = place.write("grouped.toml", text);
+    place.call(&["check", &manifest]).with_code(0).prints(&["group estimation: ekf, imu, mocap"]);
+    let launch = place.start_endless(&["run", &manifest, "--record", &place.path("grouped.mcap")]);
+    // Launcher, clock, controller, pilot, plant, recorder and the group.
+    launch.await_process_count(&place, 7);
+    launch.signal(Signal::INT);
+    launch.end_among_others().with_code(1);
+}
+
+#[test]
+fn a_group_that_cannot_be_is_refused_with_the_reason() {
+    let place = Place::new();
+    let hover = repository("manifests/hover.toml");
+    for (composition, reason) in [
+        ("plant+recorder", "it is the recorder"),
+        ("plant+imu,imu+ekf", "`imu` is a member of group `plant+imu` and of group `imu+ekf`"),
+        ("plant+gyro", "a group names `gyro`, which is not there"),
+        ("plant", "there is no group `plant`"),
+        ("plant+plant", "names `plant` twice"),
+        ("vehicles", "there is no vehicle to compose"),
+    ] {
+        let args = ["run", &hover, "--record", &place.path("no.mcap"), "--compose", composition];
+        place.call(&args).with_code(2).says(&[reason]);
+    }
+    place.call(&["run", &hover, "--compose", "plant+"]).with_code(2).says(&["such as plant+imu"]);
+}
+
+#[test]
+fn a_killed_group_ends_the_run_in_order_and_is_named() {
+    let place = Place::new();
+    let (manifest, recording) = (repository("manifests/hover.toml"), place.path("killed.mcap"));
+    let mut launch = place.start_endless(&["run", &manifest, "--record", &recording, "--compose", "all"]);
+    launch.await_ticks(300);
+    kill_process(place.group(), Signal::KILL).unwrap();
+    launch.end().with_code(2).says(&["of group `all`", "was killed by signal 9", "aborted at tick"]);
+}
+
+#[test]
+fn a_member_is_swapped_in_flight_and_the_others_fly_on() {
+    let place = Place::new();
+    let (manifest, recording) = (repository("manifests/hover.toml"), place.path("live.mcap"));
+    let args = ["--record", &recording, "--json", "--compose", "all", "--set", "run.duration_s=1.5"];
+    let mut launch = place.start(&[&["run", &manifest], &args[..]].concat());
+    launch.hold_at(300);
+    let run = place.run_id();
+    let args = ["swap", "controller", "--with", "kind = \"pid\"", "--shadow-ticks", "20", "--run", &run];
+    let swap = place.start(&args);
+    launch.await_slot("controller", 1);
+    launch.release();
+    swap.end_among_others().with_code(0).prints(&["controller.1", "from tick 320", "handed over: state"]);
+    let ended = launch.end();
+    assert_eq!(ended.json()["successions"][0]["join_tick"], 300, "{ended}");
+    let commands = |recording: &str| -> Vec<Vec<u8>> {
+        let recording = recorder::reader::Recording::open(recording.as_ref()).unwrap();
+        let all = recording.messages().map(Result::unwrap);
+        all.filter(|record| !record.topic.starts_with("/shadow/")).map(|record| record.cdr).collect()
+    };
+    let place = Place::new();
+    let alone = fly(&place, "manifests/hover.toml", 1.5, &[]);
+    assert!(commands(&recording) == commands(&alone), "the flights differ");
+}
