@@ -16,6 +16,7 @@
 //! | `scratch`, `stepping` | a step that is cut at impacts, and what it works with |
 //! | `unsolved` | impulses that were not found |
 //! | `contacts` | when contacts begin and end |
+//! | `sheet` | triangles that touch with their borders |
 //! | `rim`, `rolling` | a disc's rim on an edge, and rolling |
 //! | `rig` | test rigs: joints and stops |
 
@@ -33,6 +34,7 @@ mod rig;
 mod rim;
 mod rolling;
 mod scratch;
+mod sheet;
 mod solver;
 mod stepping;
 mod unsolved;

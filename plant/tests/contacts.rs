@@ -315,6 +315,66 @@ fn a_vehicle_does_not_pass_through_triangles_that_it_flies_against() {
     }
 }
 
+/// A wall without thickness in the plane x = 0, 4.2 m wide and 2.6 m high, with a doorway from y = -0.6 m to 0.6 m, 2.1 m high.
+const DOORWAYS: [(&str, &str); 2] = [
+    (
+        "one polygon",
+        "v 0 -2.1 0\nv 0 -0.6 0\nv 0 -0.6 2.1\nv 0 0.6 2.1\nv 0 0.6 0\nv 0 2.1 0\nv 0 2.1 2.6\nv 0 -2.1 2.6\nf 1 2 3 4 5 6 7 8\n",
+    ),
+    (
+        "three quads",
+        "v 0 -2.1 0\nv 0 -0.6 0\nv 0 -0.6 2.6\nv 0 -2.1 2.6\nv 0 0.6 0\nv 0 2.1 0\nv 0 2.1 2.6\nv 0 0.6 2.6\nv 0 -0.6 2.1\n\
+         v 0 0.6 2.1\nf 1 2 3 4\nf 5 6 7 8\nf 9 10 8 3\n",
+    ),
+];
+
+/// A vehicle in the plane of a sheet of triangles meets its border as it meets the edge of a thin box: it goes no further in,
+/// and leaves with a fifth of its speed.
+#[test]
+fn a_vehicle_in_the_plane_of_a_sheet_meets_its_border() {
+    let number = "{ value = [0, 0, 0], unit = \"m\", source = \"test\", uncertainty = \"exact\" }";
+    let scale = "{ value = 1, unit = \"m\", source = \"test\", uncertainty = \"exact\" }";
+    let text = format!(
+        "name = \"test\"\n[[meshes]]\nname = \"wall\"\nfile = \"wall.obj\"\nposition = {number}\nscale = {scale}\nsolid = \"triangles\"\n"
+    );
+    let radius_m = hull().disc_radius_m;
+    for (name, wall) in DOORWAYS {
+        let scene = Scene::parse_with(&text, "test.toml", &|_| Ok(wall.as_bytes().to_vec())).unwrap();
+        // From the doorway towards a post, and from outside towards the other side of it.
+        for (from_m, post_m) in [(0.0, -0.6), (0.0, 0.6), (-2.6, -2.1), (2.6, 2.1)] {
+            for (aside_m, speed_m_s) in [(0.0, 0.5), (0.004, 1.3), (-0.004, 3.0), (0.1, 0.5)] {
+                let towards = f64::signum(post_m - from_m);
+                let start = RigidBody {
+                    velocity_W_m_s: Vector3::y() * towards * speed_m_s,
+                    ..RigidBody::level_at(Vector3::new(aside_m, from_m, 1.0))
+                };
+                let mut plant = plant(&scene, &start);
+                plant.settle_rotors(&[hummingbird().hover_command(); 4]);
+                let reaches_m = f64::sqrt(radius_m * radius_m - aside_m * aside_m);
+                let (mut nearest_m, mut slowest_m_s) = (f64::INFINITY, f64::INFINITY);
+                let (mut met, mut left) = (false, 0);
+                while left < 20 && plant.state().body.position_W_m.y.abs() < 3.0 {
+                    plant.step(&[hummingbird().hover_command(); 4], TICK_S, &[]);
+                    let body = &plant.state().body;
+                    nearest_m = nearest_m.min((post_m - body.position_W_m.y) * towards - reaches_m);
+                    slowest_m_s = slowest_m_s.min(body.velocity_W_m_s.y * towards);
+                    met |= plant.contact().began > 0;
+                    left += u32::from(met);
+                }
+                let case =
+                    format!("{name}, from {from_m} m to {post_m} m, {aside_m} m aside, {speed_m_s} m/s");
+                assert!(nearest_m.abs() < 2e-3, "{case}: {nearest_m} m from the border at the nearest");
+                let back_m_s = if aside_m.abs() < 0.01 { -0.19 * speed_m_s } else { 0.7 * speed_m_s };
+                assert!(slowest_m_s < back_m_s, "{case}: {slowest_m_s} m/s");
+                assert_eq!(plant.contact().object, 0, "{case}: it is free again");
+                let turn_B_rad_s = plant.state().body.angular_velocity_B_rad_s;
+                let pitch_rad_s = turn_B_rad_s.xy().norm();
+                assert!(pitch_rad_s < 0.3 * speed_m_s, "{case}: it pitches by {pitch_rad_s} rad/s");
+            }
+        }
+    }
+}
+
 /// A box that stands on the ground with a vertical edge towards -x, at the origin.
 fn edge(height_m: f64) -> Scene {
     let number = |value: &str, unit: &str| {

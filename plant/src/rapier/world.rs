@@ -7,15 +7,14 @@ use super::body::{self, from_rapier, to_rapier};
 use super::free_bodies::{FIRST_BODY, FIRST_THING, VEHICLE, WORLD};
 use super::hull::Hull;
 use super::rim;
+use super::sheet::{Borders, Manifold};
 use crate::backend::Neighbour;
 use crate::state::RigidBody;
 use nalgebra::{Unit, Vector3};
 use rapier3d_f64::geometry::{Collider, ColliderBuilder};
 use rapier3d_f64::math::{Pose, Vector};
 use rapier3d_f64::parry::bounding_volume::{Aabb, BoundingVolume};
-use rapier3d_f64::parry::query::{
-    ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher, intersection_test,
-};
+use rapier3d_f64::parry::query::{DefaultQueryDispatcher, PersistentQueryDispatcher, intersection_test};
 use scenes::{Scene, Surface, Thing};
 use std::f64::consts::FRAC_PI_2;
 
@@ -29,9 +28,6 @@ const FIRST_NEIGHBOUR: u32 = 1000;
 
 /// Free bodies that overlap more than this at the start are told: tuned, no source.
 const OVERLAP_M: f64 = 1e-4;
-
-/// Where two colliders are near each other, without what a solver of rapier's would keep there.
-type Manifold = ContactManifold<(), ()>;
 
 /// The vehicle and what is around it.
 pub(super) struct World {
@@ -52,6 +48,34 @@ pub(super) struct World {
 struct Still {
     collider: Collider,
     around: Aabb,
+    /// Of a mesh that has some.
+    borders: Option<Borders>,
+}
+
+impl Still {
+    fn new(collider: Collider) -> Self {
+        let borders = collider.shape().as_trimesh().and_then(Borders::of);
+        Self { around: collider.compute_aabb(), borders, collider }
+    }
+
+    /// As [`meet`] notes them, the points where a part, second, is near it.
+    fn meet(
+        &self,
+        part: (&Collider, &Pose),
+        margin_m: f64,
+        manifolds: &mut Vec<Manifold>,
+        note: impl FnMut(Near),
+    ) {
+        let thing = (&self.collider, self.collider.position());
+        match self.borders.as_ref().zip(self.collider.shape().as_trimesh()) {
+            Some((borders, mesh)) => {
+                let between = thing.1.inv_mul(part.1);
+                borders.manifolds(mesh, (part.0.shape(), &between), margin_m, manifolds);
+                tell(thing, part, margin_m, manifolds, note);
+            }
+            None => meet(thing, part, margin_m, manifolds, note),
+        }
+    }
 }
 
 /// A free body: its collider seen from its centre of mass.
@@ -89,7 +113,7 @@ impl World {
         let still = scene.things().zip(FIRST_THING..).filter(|(thing, _)| thing.body().is_none());
         let still = still.filter_map(|(thing, number)| collider(&thing, number));
         let still = [ground].into_iter().chain(still).map(|it| it.build());
-        let things = still.map(|collider| Still { around: collider.compute_aabb(), collider });
+        let things = still.map(Still::new);
         let foot = |foot_B_m: Vector3<f64>| {
             let ball = ColliderBuilder::ball(hull.foot_radius_m).translation(to_rapier(&foot_B_m));
             solid(ball, 0, &scene.surface).build()
@@ -165,8 +189,7 @@ impl World {
                 }
             }
             for thing in things.iter().filter(|thing| thing.around.intersects(&around)) {
-                let collider = &thing.collider;
-                meet((collider, collider.position()), (part, &part_pose), margin_m, manifolds, |contact| {
+                thing.meet((part, &part_pose), margin_m, manifolds, |contact| {
                     found.push(Near { part: 1 << place, ..contact });
                 });
             }
@@ -191,10 +214,8 @@ impl World {
             let place = pose * *moving.collider.position();
             let around = moving.collider.shape().compute_aabb(&place).loosened(margin_m);
             for thing in things.iter().filter(|thing| thing.around.intersects(&around)) {
-                let collider = &thing.collider;
-                let pair = ((collider, collider.position()), (&moving.collider, &place));
-                meet(pair.0, pair.1, margin_m, manifolds, |contact| {
-                    found.push(pair_surface(Near { bodies: [WORLD, this], ..contact }, pair.1.0));
+                thing.meet((&moving.collider, &place), margin_m, manifolds, |contact| {
+                    found.push(pair_surface(Near { bodies: [WORLD, this], ..contact }, &moving.collider));
                 });
             }
             for (other, (collider, state)) in bodies.iter().zip(states).enumerate().take(number) {
@@ -260,7 +281,7 @@ fn meet(
     part: (&Collider, &Pose),
     margin_m: f64,
     manifolds: &mut Vec<Manifold>,
-    mut note: impl FnMut(Near),
+    note: impl FnMut(Near),
 ) {
     let ((thing, thing_pose), (part, part_pose)) = (thing, part);
     let between = thing_pose.inv_mul(part_pose);
@@ -279,7 +300,19 @@ fn meet(
         DefaultQueryDispatcher.contact_manifolds(&between, shape, part_shape, margin_m, manifolds, &mut None);
     // Every shape of a scene and a hull can be asked.
     debug_assert!(found.is_ok(), "{:?} and {:?}", shape.shape_type(), part_shape.shape_type());
-    for manifold in manifolds.iter() {
+    tell((thing, thing_pose), (part, part_pose), margin_m, manifolds, note);
+}
+
+/// Notes every point of `manifolds` that is within the margin, and the rim's ends that they lack.
+fn tell(
+    thing: (&Collider, &Pose),
+    part: (&Collider, &Pose),
+    margin_m: f64,
+    manifolds: &[Manifold],
+    mut note: impl FnMut(Near),
+) {
+    let ((thing, thing_pose), (part, part_pose)) = (thing, part);
+    for manifold in manifolds {
         let normal = thing_pose.rotation * manifold.local_n1;
         let mut tell = |ends: [Vector; 2], gap_m: f64| {
             note(Near {
