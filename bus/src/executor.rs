@@ -135,7 +135,10 @@ impl<'c> Executor<'c> {
             match self.await_turn(index)? {
                 Turn::Compute => {
                     let (node, step, state) = self.members[index].state();
-                    self.now_ns = Some(node.compute(self.now_ns, &mut self.locals, state, step)?);
+                    let done_ns = node.compute(self.now_ns, &mut self.locals, state, step)?;
+                    // A profile tells when inputs were there; a process of its own may have got them since.
+                    let is_shared = !self.locals.is_empty() && !node.links().plan.profile;
+                    self.now_ns = is_shared.then_some(done_ns);
                     index += 1;
                 }
                 Turn::Leave => {

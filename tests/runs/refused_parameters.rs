@@ -121,7 +121,7 @@ fn an_override_that_is_none() {
     set("process.plnat.cpu=1").says(&["there is no process `plnat`", "did you mean `plant`?"]);
     set("process.h1/plant.cpu=1").says(&["there is no process `h1/plant`"]);
     set("=1").says(&["expected keys with dots between them"]);
-    set("pass.9.max=1").says(&["`pass` is a list of 4, and `9` is none of them", "numbered from 0"]);
+    set("pass.9.max=1").says(&["`pass` is a list of 6, and `9` is none of them", "numbered from 0"]);
     set("include=[]").says(&["unknown key `include`"]);
 }
 
