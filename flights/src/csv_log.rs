@@ -38,9 +38,9 @@ impl CsvLog {
         check_arrays(&table)?;
         table.check_lengths()?;
         let mut time_s = times(&table, form.time)?;
-        let place = |row: usize| format!("line {}", table.rows[row].line);
-        rows::check_forward(&time_s, form.time, &place)?;
-        let part = rows::recording(&time_s, form.recording, &place)?;
+        let places = rows::Places { name: "line", number: &|row| table.rows[row].line };
+        rows::check_forward(&time_s, form.time, &places)?;
+        let part = rows::recording(&time_s, form.recording, &places)?;
         table.rows.truncate(part.end);
         table.rows.drain(..part.start);
         time_s.truncate(part.end);

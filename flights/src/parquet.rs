@@ -45,9 +45,9 @@ impl ParquetLog {
 
     /// Cuts the times to one recording.
     fn choose(&mut self, recording: Option<NonZero<usize>>, time: Option<&Entry>) -> Result<(), LogError> {
-        let place = |row: usize| format!("row {}", row + 1);
-        rows::check_forward(&self.time_s, time, &place)?;
-        let part = rows::recording(&self.time_s, recording, &place)?;
+        let places = rows::Places { name: "row", number: &|row| row as u64 + 1 };
+        rows::check_forward(&self.time_s, time, &places)?;
+        let part = rows::recording(&self.time_s, recording, &places)?;
         self.first_row = part.start;
         self.time_s.truncate(part.end);
         self.time_s.drain(..part.start);

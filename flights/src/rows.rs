@@ -12,8 +12,13 @@ use crate::name::Name;
 use crate::quantity::Quantity;
 use crate::scaling;
 
-/// Place of a row in its file, as `line 7`.
-pub type Place<'a> = &'a dyn Fn(usize) -> String;
+/// Places of rows in their file.
+pub struct Places<'a> {
+    /// Name of a place: line or row.
+    pub name: &'static str,
+    /// Number of a row's place, from 1.
+    pub number: &'a dyn Fn(usize) -> u64,
+}
 
 /// The channel `time` and its one column.
 pub fn time_column<'e>(time: Option<&'e Entry>, file: &str) -> Result<(&'e Entry, &'e Name), LogError> {
@@ -44,10 +49,10 @@ pub fn time_scaling(time: &Entry) -> Result<[f64; 2], LogError> {
 }
 
 /// Refuses a column of times that fall or stay the same.
-pub fn check_forward(time_s: &[f64], time: Option<&Entry>, place: Place<'_>) -> Result<(), LogError> {
+pub fn check_forward(time_s: &[f64], time: Option<&Entry>, places: &Places<'_>) -> Result<(), LogError> {
     let Some(fault) = clock::not_forward(time_s) else { return Ok(()) };
     let name = time.and_then(|time| time.columns.as_deref()?.first()).map_or("", |name| name.plain.as_str());
-    let at = |row: usize| format!("{} s in {}", time_s[row], place(row));
+    let at = |row: usize| format!("{} s in {} {}", time_s[row], places.name, (places.number)(row));
     let (found, advice) = match fault {
         NotForward::Stands => {
             let first_s = time_s.iter().find(|time_s| time_s.is_finite()).unwrap_or(&f64::NAN);
@@ -68,7 +73,7 @@ pub fn check_forward(time_s: &[f64], time: Option<&Entry>, place: Place<'_>) -> 
 pub fn recording(
     time_s: &[f64],
     number: Option<NonZero<usize>>,
-    place: Place<'_>,
+    places: &Places<'_>,
 ) -> Result<Range<usize>, LogError> {
     let restarts = clock::restarts(time_s);
     let count = restarts.len() + 1;
@@ -86,10 +91,12 @@ pub fn recording(
         (None, Some(first)) => {
             let before_s =
                 time_s[..*first].iter().rfind(|time_s| time_s.is_finite()).copied().unwrap_or(f64::NAN);
-            let places: Vec<String> = restarts.iter().take(10).map(|index| place(*index)).collect();
+            let numbers: Vec<String> =
+                restarts.iter().take(10).map(|index| (places.number)(*index).to_string()).collect();
             let found = format!(
-                "{count} recordings: the clock starts again in {} (first from {before_s} s to {} s)",
-                places.join(", "),
+                "{count} recordings: the clock starts again in {} {} (first from {before_s} s to {} s)",
+                places.name,
+                numbers.join(", "),
                 time_s[*first]
             );
             let advice = "cut the file there, or set the flight's `recording`, 1 for the first";
