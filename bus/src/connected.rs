@@ -52,7 +52,7 @@ pub(crate) struct ConnectedNode {
     links: Links,
 }
 
-/// What a node does next.
+/// Next action of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Turn {
     /// It computes its next tick.
@@ -65,7 +65,7 @@ pub(crate) enum Turn {
     Leave,
 }
 
-/// What a node waits for.
+/// Count or event that a node waits for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Awaited {
     /// A count.
@@ -273,7 +273,7 @@ impl ConnectedNode {
         }
     }
 
-    /// What this node does next; `state` is its predecessor's afterwards where it is a shadow.
+    /// Next action of this node. A shadow finds the state of its predecessor in `state` afterwards.
     ///
     /// # Errors
     /// If the run is aborted, or the state of the predecessor is gone.
@@ -388,7 +388,7 @@ impl ConnectedNode {
         self.leave_turn().map(|_| false)
     }
 
-    /// Has the control segment count what this node has sent and completed.
+    /// Updates the counts of the control segment: samples sent, ticks completed.
     pub(crate) fn tell(&mut self) {
         let lockstep = &self.links.lockstep;
         for output in &mut self.outputs {
@@ -464,7 +464,7 @@ impl ConnectedNode {
         Ok(())
     }
 
-    /// What ties this node to its run.
+    /// Plan, lockstep and transport of this node.
     pub(crate) fn links(&self) -> &Links {
         &self.links
     }

@@ -13,7 +13,7 @@ use crate::membership::Membership;
 use crate::schema::Schema;
 use std::time::Duration;
 
-/// How long a process that has completed its ticks sleeps before it looks again who still reads its last samples.
+/// Sleep of a process that has completed its ticks, between two looks whether its last samples were taken.
 const RETIREMENT_NAP: Duration = Duration::from_millis(1);
 /// A group tells others how far it has come this many times a window, so that the clock's window never runs out meanwhile.
 const TELLS_PER_WINDOW: u32 = 8;
@@ -157,7 +157,7 @@ impl<'c> Executor<'c> {
         Ok(())
     }
 
-    /// What member `index` does next, after all waiting.
+    /// Next action of member `index`, after all waiting.
     fn await_turn(&mut self, index: usize) -> Result<Turn, BusError> {
         loop {
             match self.members[index].turn()? {
@@ -179,7 +179,7 @@ impl<'c> Executor<'c> {
         }
     }
 
-    /// Has others know how far the members have come.
+    /// Updates the counts of all members in the control segment.
     fn tell(&mut self) {
         self.members.iter_mut().for_each(|member| member.node.tell());
     }
@@ -207,7 +207,7 @@ impl<'c> Executor<'c> {
         });
     }
 
-    /// Has those leave whose last samples were taken.
+    /// Removes members from the run once their last samples were taken.
     fn look_at_leaving(&mut self) -> Result<(), BusError> {
         let mut index = 0;
         while index < self.leaving.len() {

@@ -80,7 +80,7 @@ struct Backup {
     take_over_tick: u32,
 }
 
-/// Where the samples of an input come from.
+/// Source of the samples of an input.
 #[derive(Debug)]
 pub(crate) enum Feed {
     /// Another process.
@@ -458,7 +458,7 @@ impl OutPort {
         self.sender.is_some()
     }
 
-    /// Has other processes be sent the samples from now on, the newest one of the group included.
+    /// Sends the samples to other processes from now on, the newest one of the group included.
     pub(crate) fn share(
         &mut self,
         sender: Sender,
