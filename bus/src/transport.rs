@@ -4,9 +4,8 @@
 //! whatever a killed process leaves behind is found by name.
 
 use crate::error::BusError;
-use crate::host_time::monotonic_ns;
 use crate::message::{ENCAPSULATION_WORD, sample_words};
-use crate::names::{shm_path, shm_prefix};
+use crate::names::{SHARED_MEMORY, shm_path, shm_prefix};
 use crate::plan::Capacity;
 use crate::reserve;
 use iceoryx2::node::NodeState;
@@ -24,7 +23,7 @@ use iceoryx2_bb_elementary::package_version::PackageVersion;
 use iceoryx2_cal::hash::Hash as _;
 use iceoryx2_cal::hash::sha1::Sha1;
 use std::cell::RefCell;
-use std::os::unix::fs::{OpenOptionsExt as _, PermissionsExt as _};
+use std::os::unix::fs::PermissionsExt as _;
 use std::path::Path;
 
 type Service = ipc::Service;
@@ -244,21 +243,19 @@ fn make_node_counter(config: &Config, run_id: &str) -> std::io::Result<()> {
     let hash = Sha1::new(COUNTER_TYPE.as_bytes()).value();
     let (hash, suffix) = (hash.as_base64url(), config.global.node.global_mgmt_suffix);
     let path = shm_path(run_id, &format!("{hash}_node.{major}_{minor}_{patch}{suffix}"));
-    // In one step, and never over another's: processes that come at the same time share one counter.
-    let draft = path.with_extension(format!("{:x}-{:x}", std::process::id(), monotonic_ns()));
-    let mut file = std::fs::OpenOptions::new().write(true).create_new(true).mode(0o600).open(&draft)?;
+    // In one step, and never over another's: nodes that come at the same time share one counter.
+    let folder = path.parent().unwrap_or(Path::new(SHARED_MEMORY));
+    let mut draft = tempfile::Builder::new().prefix(&shm_prefix(run_id)).tempfile_in(folder)?;
     // Whatever the umask takes away.
-    file.set_permissions(std::fs::Permissions::from_mode(0o600))?;
+    draft.as_file().set_permissions(std::fs::Permissions::from_mode(0o600))?;
     // The version that wrote it, and the count, each in 8 bytes.
-    let written = file.write_all(&[version.to_u64().to_ne_bytes(), [0; 8]].concat());
-    let linked = written.and_then(|()| std::fs::hard_link(&draft, &path));
-    std::fs::remove_file(&draft)?;
-    match linked {
+    draft.write_all(&[version.to_u64().to_ne_bytes(), [0; 8]].concat())?;
+    match draft.persist_noclobber(&path) {
         // Of this user, or another one has put it there.
-        Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {
+        Err(refused) if refused.error.kind() == std::io::ErrorKind::AlreadyExists => {
             crate::user_file::open(&path, true).map(|_| ())
         }
-        other => other,
+        other => Ok(other.map(|_| ())?),
     }
 }
 

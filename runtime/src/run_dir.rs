@@ -17,6 +17,7 @@ use std::fs::{File, Metadata};
 use std::io::{Read as _, Write as _};
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// More than any entry has: two paths and a few numbers.
 const ENTRY_BYTES_MAX: u64 = 64 << 10;
@@ -43,7 +44,7 @@ pub struct Entry {
 impl Entry {
     /// What a new run of `manifest` has to say.
     fn new(manifest: &Path) -> Result<Self> {
-        let run_id = format!("{:x}-{:x}", std::process::id(), bus::host_time::monotonic_ns());
+        let run_id = format!("{:x}-{:x}", std::process::id(), new_run_number());
         let run_dir = new_run_dir(&run_id)?;
         Ok(Self { run_id, run_dir, manifest: manifest.to_owned(), launcher: std::process::id() })
     }
@@ -55,6 +56,15 @@ impl Entry {
         let entry: Self = serde_json::from_str(&text).ok()?;
         (entry.run_id == run_id && is_run_dir_of(&entry.run_dir, run_id)).then_some(entry)
     }
+}
+
+/// The monotonic time, in ns; later than any that this process has given out, though a clock may stand still between
+/// two runs that begin together.
+fn new_run_number() -> u64 {
+    static LAST: AtomicU64 = AtomicU64::new(0);
+    let now = bus::host_time::monotonic_ns();
+    let next = |last: u64| now.max(last + 1);
+    LAST.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |last| Some(next(last))).map_or(now, next)
 }
 
 /// The folders in which runs have their directories: that for temporary files, or else the first of the others that is
@@ -440,6 +450,17 @@ mod tests {
             LiveRun { entry, file: tempfile::tempfile().unwrap() }
         };
         names.iter().map(run).collect()
+    }
+
+    #[test]
+    fn no_number_of_a_run_is_given_out_twice() {
+        let take = || (0..10_000).map(|_| super::new_run_number()).collect::<Vec<_>>();
+        let mut numbers = std::thread::scope(|scope| {
+            let threads: Vec<_> = (0..4).map(|_| scope.spawn(take)).collect();
+            threads.into_iter().flat_map(|thread| thread.join().unwrap()).collect::<Vec<_>>()
+        });
+        numbers.sort_unstable();
+        assert!(numbers.windows(2).all(|pair| pair[0] < pair[1]));
     }
 
     #[test]
