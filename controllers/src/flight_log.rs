@@ -208,11 +208,11 @@ impl Source<'_> {
             let message = format!("`{quantity}` has the unit `{found}`, expected {expected}");
             ParameterError::conflict("data", message)
         })?;
-        let sample = |row: &table::Row| -> Result<[f64; N], ParameterError> {
+        let sample = |row: table::Row<'_>| -> Result<[f64; N], ParameterError> {
             let mut values = [0.0; N];
             for ((value, index), column) in values.iter_mut().zip(indices).zip(&map.columns) {
                 *value = number(self.table.number(row.cell(index)), factor)
-                    .map_err(|expected| self.cell(row, column, row.cell(index), expected))?;
+                    .map_err(|expected| self.cell(row.line, column, row.cell(index), expected))?;
             }
             Ok(values)
         };
@@ -227,8 +227,8 @@ impl Source<'_> {
             let fault = format_args!(": it has {} rows of data, expected at least 2", rows.len());
             return Err(refused(self.path, fault));
         }
-        let Some(row) = rows.iter().find(|row| row.cells.len() != expected) else { return Ok(()) };
-        let (line, found) = (row.line, row.cells.len());
+        let Some(row) = rows.iter().find(|row| row.len() != expected) else { return Ok(()) };
+        let (line, found) = (row.line, row.len());
         let fault = format_args!(", line {line}: expected {expected} cells as in the header, found {found}");
         Err(refused(self.path, fault))
     }
@@ -245,15 +245,14 @@ impl Source<'_> {
         if let Some(index) = attitude.iter().position(is_zero) {
             let (found, expected) =
                 (attitude[index][3].to_string(), "part of an attitude: the quaternion is 0");
-            return Err(self.cell(&rows[index], last_part, &found, expected));
+            return Err(self.cell(rows.line(index), last_part, &found, expected));
         }
         let Some(index) = time_s.windows(2).position(|pair| pair[1] <= pair[0]) else { return Ok(()) };
-        let line = rows[index].line;
+        let line = rows.line(index);
         Err(refused(self.path, format_args!(": time does not grow from line {line} to the next")))
     }
 
-    fn cell(&self, row: &table::Row, column: &str, found: &str, expected: &str) -> ParameterError {
-        let line = row.line;
+    fn cell(&self, line: u64, column: &str, found: &str, expected: &str) -> ParameterError {
         refused(self.path, format_args!(", line {line}, column `{column}`: {found:?} is not {expected}"))
     }
 }

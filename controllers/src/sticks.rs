@@ -89,7 +89,7 @@ impl Sticks {
         }
         let source = Source { file, table: &table, places };
         let mut rows: Vec<Row> = Vec::new();
-        for row in &table.rows {
+        for row in table.rows.iter() {
             rows.push(source.row(row, rows.last())?);
         }
         if rows.is_empty() {
@@ -160,8 +160,8 @@ struct Source<'a> {
 }
 
 impl Source<'_> {
-    fn row(&self, cells: &table::Row, before: Option<&Row>) -> Result<Row, ParameterError> {
-        let (expected, found) = (self.table.headers.len(), cells.cells.len());
+    fn row(&self, cells: table::Row<'_>, before: Option<&Row>) -> Result<Row, ParameterError> {
+        let (expected, found) = (self.table.headers.len(), cells.len());
         if found != expected {
             let line = cells.line;
             let fault = format_args!(":{line}: expected {expected} cells as in the header, found {found}");
@@ -184,7 +184,7 @@ impl Source<'_> {
     }
 
     /// The number in a column, 0 where the recording does not have it.
-    fn number(&self, cells: &table::Row, column: usize) -> Result<f64, ParameterError> {
+    fn number(&self, cells: table::Row<'_>, column: usize) -> Result<f64, ParameterError> {
         let Some(place) = self.places[column] else { return Ok(0.0) };
         let text = cells.cell(place);
         let (most, expected) = MOST[column];
@@ -198,7 +198,7 @@ impl Source<'_> {
 
     fn value(
         &self,
-        cells: &table::Row,
+        cells: table::Row<'_>,
         column: usize,
         expected: &str,
         found: impl Display,

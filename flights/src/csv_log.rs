@@ -38,11 +38,10 @@ impl CsvLog {
         check_arrays(&table)?;
         table.check_lengths()?;
         let mut time_s = times(&table, form.time)?;
-        let places = rows::Places { name: "line", number: &|row| table.rows[row].line };
+        let places = rows::Places { name: "line", number: &|row| table.rows.line(row) };
         rows::check_forward(&time_s, form.time, &places)?;
         let part = rows::recording(&time_s, form.recording, &places)?;
-        table.rows.truncate(part.end);
-        table.rows.drain(..part.start);
+        table.rows.keep(part.clone());
         time_s.truncate(part.end);
         time_s.drain(..part.start);
         Ok(Self { table, time_s })
@@ -78,8 +77,8 @@ fn check_times(
     advice: &'static str,
 ) -> Result<(), LogError> {
     let Ok(column) = table.column(name) else { return Ok(()) };
-    let is_filled = |row: &Row| row.cells.iter().any(|cell| !cell.is_empty());
-    let rows = || table.rows.iter().zip(times).filter(|(row, _)| is_filled(row));
+    let is_filled = |row: Row<'_>| row.cells().any(|cell| !cell.is_empty());
+    let rows = || table.rows.iter().zip(times).filter(|(row, _)| is_filled(*row));
     let without = || rows().filter(|(_, time)| !time.is_finite());
     let (count, of) = (without().count(), rows().count());
     match without().next().filter(|_| 2 * count > of) {
@@ -111,7 +110,8 @@ impl Log for CsvLog {
     fn line(&self, time_s: f64) -> Option<u64> {
         let off = |row: &usize| (self.time_s[*row] - time_s).abs();
         let rows = (0..self.time_s.len()).filter(|row| self.time_s[*row].is_finite());
-        Some(self.table.rows[rows.min_by(|a, b| off(a).total_cmp(&off(b)))?].line)
+        let nearest = rows.min_by(|a, b| off(a).total_cmp(&off(b)))?;
+        Some(self.table.rows.line(nearest))
     }
 }
 
@@ -161,8 +161,8 @@ fn array_part(cell: &str, index: usize) -> Option<f64> {
 /// Refuses arrays that their own delimiters take apart: all columns behind them would hold other numbers.
 fn check_arrays(table: &Table) -> Result<(), LogError> {
     let is_cut = |cell: &str| cell.starts_with('[') && !cell.contains(']');
-    for row in table.rows.iter().filter(|row| row.cells.len() > table.headers.len()) {
-        let cut = table.headers.iter().zip(&row.cells).find(|(_, cell)| is_cut(cell));
+    for row in table.rows.iter().filter(|row| row.len() > table.headers.len()) {
+        let cut = table.headers.iter().zip(row.cells()).find(|(_, cell)| is_cut(cell));
         if let Some((column, cell)) = cut {
             let at = Spot::Cell { line: row.line, column: shown(column) };
             let expected = "an array in quotation marks, or a file with other delimiters between its columns";

@@ -15,6 +15,7 @@
 //! | `dialect`, `layout`, `table_error` | delimiter, header and decimal mark of such a table: declared, found, wrong |
 //! | [`lines`], [`encoding`] | lines of texts of any system; UTF-16 |
 //! | [`table`] | tables of measurements in CSV, for every log that has this format |
+//! | `table_rows` | their rows, in little memory |
 //! | [`variables`] | variables of the environment within paths |
 //! | [`wall_clock`] | times of day in logs |
 //! | [`mod@reference`] | the vehicle files of this crate, as text |
@@ -42,6 +43,7 @@ pub mod reader;
 pub mod reference;
 pub mod table;
 mod table_error;
+mod table_rows;
 pub mod variables;
 pub mod vehicle;
 pub mod wall_clock;

@@ -8,8 +8,9 @@ use crate::quotes;
 
 pub use crate::dialect::{Decimal, Delimiter, Dialect};
 pub use crate::table_error::{ColumnError, TableError, names, shown};
+pub use crate::table_rows::{Row, Rows};
 
-/// Rows of one file at most: two hours and a half at 1 kHz. Each takes some hundred bytes of memory, however short its line is.
+/// Rows of one file at most: two hours and a half at 1 kHz. One of two short cells takes 65 bytes of memory.
 const ROWS_MAX: usize = 10_000_000;
 
 /// A file in CSV.
@@ -21,7 +22,7 @@ const ROWS_MAX: usize = 10_000_000;
 /// let a = table.column("a")?;
 /// assert_eq!(table.numbers(a).next(), Some(2.0));
 /// assert!(table.numbers(a).last().unwrap().is_nan(), "no number");
-/// assert_eq!((table.rows[1].line, table.rows[1].cell(a)), (4, "x"));
+/// assert_eq!(table.rows.get(1).map(|row| (row.line, row.cell(a))), Some((4, "x")));
 /// assert_eq!(table.column("#2"), Ok(a));
 /// # Ok::<(), vehicles::table::TableError>(())
 /// ```
@@ -31,16 +32,8 @@ pub struct Table {
     /// Line of the header, from 1; `None` in a file without one.
     pub header_line: Option<u64>,
     /// The rows below the header.
-    pub rows: Vec<Row>,
+    pub rows: Rows,
     decimal: Decimal,
-}
-
-/// A row of a table. It may have fewer or more cells than the header.
-pub struct Row {
-    /// The line, from 1.
-    pub line: u64,
-    /// The cells, without blanks around them.
-    pub cells: csv::StringRecord,
 }
 
 impl Table {
@@ -74,9 +67,9 @@ impl Table {
             .delimiter(delimiter)
             .from_reader(text.as_bytes());
         let mut lines = lines::of(text.as_bytes()).filter(|line| !line.content.is_empty()).peekable();
-        let mut rows = Vec::new();
-        for cells in reader.records() {
-            let cells = cells?;
+        let (mut rows, mut count) = (Rows::default(), 0);
+        let mut cells = csv::StringRecord::new();
+        while reader.read_record(&mut cells)? {
             if rows.len() == rows_max {
                 return Err(TableError::Rows(rows_max));
             }
@@ -85,9 +78,9 @@ impl Table {
                 cells.position().map_or(0, |place| usize::try_from(place.byte()).unwrap_or(usize::MAX));
             while lines.next_if(|line| line.next <= from).is_some() {}
             let line = lines.next().map_or(0, |line| line.number);
-            rows.push(Row { line: layout.lines_before + line, cells });
+            rows.push(layout.lines_before + line, &cells);
+            count = count.max(cells.len());
         }
-        let count = rows.iter().map(|row: &Row| row.cells.len()).max().unwrap_or_default();
         let header_line = layout.header.as_ref().map(|_| layout.header_line);
         let headers =
             layout.header.unwrap_or_else(|| (1..=count).map(|number| format!("#{number}")).collect());
@@ -124,11 +117,11 @@ impl Table {
     /// # Errors
     /// The first such row.
     pub fn check_lengths(&self) -> Result<(), TableError> {
-        let mut long = self.rows.iter().filter(|row| self.extra_cells(row) > 0).peekable();
+        let mut long = self.rows.iter().filter(|row| self.extra_cells(*row) > 0).peekable();
         let (Some(first), Some(header_line)) = (long.peek().copied(), self.header_line) else {
             return Ok(());
         };
-        let (line, expected, found) = (first.line, self.headers.len(), first.cells.len());
+        let (line, expected, found) = (first.line, self.headers.len(), first.len());
         if 2 * long.count() <= self.rows.len() {
             return Ok(());
         }
@@ -136,11 +129,11 @@ impl Table {
     }
 
     /// Number of cells behind those of the header; empty ones at the end do not count.
-    fn extra_cells(&self, row: &Row) -> usize {
-        if row.cells.len() <= self.headers.len() {
+    fn extra_cells(&self, row: Row<'_>) -> usize {
+        if row.len() <= self.headers.len() {
             return 0;
         }
-        let extra = row.cells.iter().skip(self.headers.len()).enumerate();
+        let extra = row.cells().skip(self.headers.len()).enumerate();
         extra.filter(|(_, cell)| !cell.is_empty()).last().map_or(0, |(place, _)| place + 1)
     }
 
@@ -183,14 +176,6 @@ pub fn column_of(headers: &[String], header_line: Option<u64>, name: &str) -> Re
             name: name.to_owned(),
             places: places.iter().map(|place| place + 1).collect(),
         }),
-    }
-}
-
-impl Row {
-    /// A cell; empty behind the end of a short row.
-    #[must_use]
-    pub fn cell(&self, column: usize) -> &str {
-        self.cells.get(column).unwrap_or_default()
     }
 }
 

@@ -41,7 +41,7 @@ impl LogTable {
         let table = table(source, &file)?;
         let Some(column) = source.time else { return Err(no_column(&file, "time", table.headers)) };
         let time_s = times(&file, &table, column)?;
-        let place = |row: usize| format!("line {}: column `{}`", table.rows[row].line, column.name());
+        let place = |row: usize| format!("line {}: column `{}`", table.rows.line(row), column.name());
         check_times(&file, &time_s, place)?;
         Ok(Self { file, time_s, content: Content::Table(table) })
     }
