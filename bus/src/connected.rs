@@ -1,7 +1,9 @@
 //! A connected node: waits for what a tick needs, computes it, sends, and follows the changes of the run.
 
 use crate::announcement::{self, Announcement};
+use crate::component::Transfer;
 use crate::error::BusError;
+use crate::hand_over::{Computation, HandOver};
 use crate::handles::Declared;
 use crate::host_time::{monotonic_ns, process_cpu_ns};
 use crate::links::Links;
@@ -10,11 +12,8 @@ use crate::membership::Membership;
 use crate::plan::{InputPlan, NodePlan};
 use crate::port::{InPort, OutPort, Source};
 use crate::profile::TickWriter;
-use crate::schema::Schema;
-use crate::state_transfer::StateRing;
 use crate::tick::Tick;
 use crate::timing::{Due, Timing};
-use std::fmt::Display;
 use std::time::Duration;
 
 /// How long a process that retires sleeps before it looks again who still reads its last samples.
@@ -28,9 +27,8 @@ pub(crate) struct ConnectedNode {
     announcements: Vec<Announcement>,
     /// What the predecessor sends, by output; empty where its state is handed over.
     predecessor: Vec<InPort>,
-    /// Where the predecessor publishes its state, and where this process does.
-    predecessor_state: Option<StateRing>,
-    published_state: Option<StateRing>,
+    /// The state that the predecessor hands over, and the state of this process.
+    state: HandOver,
     /// The tick from which on this process goes on by itself, no longer as its predecessor's shadow.
     take_over_tick: u32,
     /// The tick from which on a backup takes this process's place.
@@ -38,9 +36,8 @@ pub(crate) struct ConnectedNode {
     first_tick: u32,
     epoch: u32,
     profile: Option<TickWriter>,
+    /// Simulated computing time; its words are behind the state.
     timing: Option<Timing>,
-    /// Words of the component's state; those of `timing` are behind them.
-    state_words: usize,
     // The transport last: the ports give back what they hold while it stands.
     links: Links,
 }
@@ -85,15 +82,13 @@ impl ConnectedNode {
             outputs,
             announcements: Vec::new(),
             predecessor: Vec::new(),
-            predecessor_state: None,
-            published_state: None,
+            state: HandOver::default(),
             take_over_tick: 0,
             retirement_tick: u32::MAX,
             first_tick,
             epoch,
             profile: None,
             timing: Timing::of(&links.plan, &links.node),
-            state_words: 0,
             links,
         }
     }
@@ -129,36 +124,17 @@ impl ConnectedNode {
         (&self.links.plan.topics[topic].name, &self.announcements[input])
     }
 
-    /// Computes `step` at every due tick until the run ends, or until another process has taken over. The state, a
-    /// message of `schema`, is transferred to it if that knows the same type, and to one that is started after a crash.
+    /// Computes the steps of `node` at every due tick until the run ends, or until another process has taken over. The state
+    /// is handed over to it as `transfer` says if it has the same layout, and to one that is started after a crash.
     ///
     /// # Errors
     /// If a step fails, a due output stays unwritten, a sample is lost, or the run is aborted.
-    pub(crate) fn run<E: Display>(
-        mut self,
-        schema: Option<&'static Schema>,
-        state: &mut [u8],
-        mut step: impl FnMut(&mut Tick<'_>, &mut [u8]) -> Result<(), E>,
-    ) -> Result<(), BusError> {
-        self.open_predecessor(schema)?;
+    pub(crate) fn run(mut self, transfer: Transfer, node: &mut dyn Computation) -> Result<(), BusError> {
         let more_words = self.timing_words(self.timing.is_some());
-        if let Some(schema) = schema {
-            let links = &self.links;
-            let (dir, plan) = (&links.run_dir, &links.plan);
-            self.published_state =
-                Some(StateRing::create(dir, plan, links.index, links.generation, schema, more_words)?);
-        }
-        let mut step =
-            |tick: &mut Tick<'_>, state: &mut [u8]| step(tick, state).map_err(|error| error.to_string());
-        if more_words == 0 {
-            return self.fly(state, step);
-        }
-        let bytes = state.len();
-        self.state_words = bytes.div_ceil(8);
-        let mut words = vec![0_u64; self.state_words + more_words];
-        let whole: &mut [u8] = bytemuck::cast_slice_mut(&mut words);
-        whole[..bytes].copy_from_slice(state);
-        self.fly(whole, |tick, whole| step(tick, &mut whole[..bytes]))
+        self.state = HandOver::new(transfer, node.state_size(), more_words);
+        self.open_predecessor()?;
+        self.state.create(&self.links)?;
+        self.fly(node)
     }
 
     /// Words behind the state of a process of this node whose steps take time, or do not.
@@ -167,25 +143,23 @@ impl ConnectedNode {
     }
 
     /// Opens the state of the process that this one succeeds, or else what it sends.
-    fn open_predecessor(&mut self, state: Option<&Schema>) -> Result<(), BusError> {
+    fn open_predecessor(&mut self) -> Result<(), BusError> {
         let links = &self.links;
         if links.generation == 0 {
             return Ok(());
         }
         let generation = Membership::load(&links.run_dir, self.epoch)?.nodes[links.index].primary.generation;
-        if let Some(schema) = state {
-            let (dir, plan, index) = (&links.run_dir, &links.plan, links.index);
-            let is_timed = match generation {
-                0 => plan.nodes[index].computing_time.is_some(),
-                _ => NodePlan::load_backup(dir, index, generation)?.computing_time.is_some(),
-            };
-            let more_words = self.timing_words(is_timed);
-            self.predecessor_state = StateRing::open(dir, plan, index, generation, schema, more_words)?;
-        }
-        if self.predecessor_state.is_some() {
-            links.lockstep.set_transfer(TransferOutcome::State);
+        let (dir, plan, index) = (&links.run_dir, &links.plan, links.index);
+        let is_timed = match generation {
+            0 => plan.nodes[index].computing_time.is_some(),
+            _ => NodePlan::load_backup(dir, index, generation)?.computing_time.is_some(),
+        };
+        let more_words = self.timing_words(is_timed);
+        if self.state.open(&self.links, generation, more_words)? {
+            self.links.lockstep.set_transfer(TransferOutcome::State);
             return Ok(());
         }
+        let links = &self.links;
         links.lockstep.set_transfer(TransferOutcome::LastOutput);
         for output in &links.node.outputs {
             let topic = &links.plan.topics[output.topic];
@@ -200,18 +174,14 @@ impl ConnectedNode {
         links.transport.reserve()
     }
 
-    fn fly(
-        &mut self,
-        state: &mut [u8],
-        mut step: impl FnMut(&mut Tick<'_>, &mut [u8]) -> Result<(), String>,
-    ) -> Result<(), BusError> {
+    fn fly(&mut self, computation: &mut dyn Computation) -> Result<(), BusError> {
         // Last, when all that the ticks use is mapped: a mapping that exceeds the limit later fails without words.
         if self.links.plan.lock_memory {
             crate::process::lock_memory()?;
         }
         if self.links.generation == 0 {
             // A backup may have to begin with the first tick.
-            self.publish_state(self.first_tick, state);
+            self.publish_state(self.first_tick, computation);
         }
         let links = &self.links;
         links.lockstep.set_ready(Phase::Running);
@@ -223,12 +193,12 @@ impl ConnectedNode {
         let cpu_start_ns = process_cpu_ns();
         let period = links.node.period_ticks;
         let mut tick = self.first_tick;
-        while self.await_tick(tick, state)? {
+        while self.await_tick(tick, computation)? {
             if self.links.generation > 0 && tick <= self.take_over_tick.max(self.first_tick) {
                 // What it begins with is its predecessor's, not what it came to itself.
-                self.publish_state(tick, state);
+                self.publish_state(tick, computation);
             }
-            self.compute(tick, state, &mut step)?;
+            self.compute(tick, computation)?;
             tick += period;
             self.links.lockstep.completed(tick);
         }
@@ -239,16 +209,15 @@ impl ConnectedNode {
     }
 
     /// Publishes the state at the start of `tick`, for whoever takes over there.
-    fn publish_state(&self, tick: u32, state: &[u8]) {
-        if let Some(ring) = &self.published_state {
-            ring.store(tick, state);
+    fn publish_state(&mut self, tick: u32, computation: &dyn Computation) {
+        if self.state.publish(tick, computation) {
             // A count of zero is no state.
             self.links.lockstep.state_published(tick + 1);
         }
     }
 
     /// Waits until `tick` may be computed; false when the run ends, or this process's part in it, before it.
-    fn await_tick(&mut self, tick: u32, state: &mut [u8]) -> Result<bool, BusError> {
+    fn await_tick(&mut self, tick: u32, computation: &mut dyn Computation) -> Result<bool, BusError> {
         loop {
             let awaited = if self.links.lockstep.epoch() != self.epoch {
                 Await::Change
@@ -257,7 +226,7 @@ impl ConnectedNode {
             } else if tick >= self.retirement_tick {
                 self.await_backup()
             } else {
-                self.await_needs(tick, state)?
+                self.await_needs(tick, computation)?
             };
             match awaited {
                 // Who counts a promoted process's samples as there sees the change that promoted it, too.
@@ -276,8 +245,8 @@ impl ConnectedNode {
     }
 
     /// Waits for the predecessor, the inputs, the shadows and the grant that `tick` needs.
-    fn await_needs(&self, tick: u32, state: &mut [u8]) -> Result<Await, BusError> {
-        let awaited = self.follow_predecessor(tick, state)?;
+    fn await_needs(&mut self, tick: u32, computation: &mut dyn Computation) -> Result<Await, BusError> {
+        let awaited = self.follow_predecessor(tick, computation)?;
         if awaited != Await::Tick {
             return Ok(awaited);
         }
@@ -310,21 +279,21 @@ impl ConnectedNode {
 
     /// As a shadow, starts `tick` from the state of the predecessor, if that states one: what this process
     /// sends then is what it would send if it took over here.
-    fn follow_predecessor(&self, tick: u32, state: &mut [u8]) -> Result<Await, BusError> {
+    fn follow_predecessor(
+        &mut self,
+        tick: u32,
+        computation: &mut dyn Computation,
+    ) -> Result<Await, BusError> {
         if self.links.generation == 0 || tick > self.take_over_tick {
             return Ok(Await::Tick);
         }
-        if let Some(ring) = &self.predecessor_state {
+        if self.state.has_predecessor() {
             let awaited = self.wait(Need::OtherState, tick + 1, tick);
             if awaited != Await::Tick {
                 return Ok(awaited);
             }
-            if !ring.load(tick, state) {
-                return Err(BusError::Parameters {
-                    node: self.links.node.name.clone(),
-                    reason: format!("the state that its predecessor had at tick {tick} is gone"),
-                });
-            }
+            let failed = |reason| BusError::Parameters { node: self.links.node.name.clone(), reason };
+            self.state.load(tick, computation).map_err(failed)?;
         }
         if tick == self.take_over_tick && self.links.lockstep.other_computes() {
             return Ok(self.wait(Need::OtherDone, tick, tick));
@@ -426,18 +395,13 @@ impl ConnectedNode {
         Ok(())
     }
 
-    fn compute(
-        &mut self,
-        tick: u32,
-        state: &mut [u8],
-        step: &mut impl FnMut(&mut Tick<'_>, &mut [u8]) -> Result<(), String>,
-    ) -> Result<(), BusError> {
+    fn compute(&mut self, tick: u32, computation: &mut dyn Computation) -> Result<(), BusError> {
         self.take_inputs(tick)?;
         let received_ns = monotonic_ns();
         match self.timing.take() {
-            None => self.step(tick, state, step)?,
+            None => self.step(tick, computation)?,
             Some(mut timing) => {
-                self.step_in_time(&mut timing, tick, state, step)?;
+                self.step_in_time(&mut timing, tick, computation)?;
                 self.timing = Some(timing);
             }
         }
@@ -448,12 +412,12 @@ impl ConnectedNode {
         let done_ns = monotonic_ns();
         self.links.lockstep.count_step(done_ns - received_ns);
         // Before anything is sent: whoever sees the sample can go on from the state after it.
-        self.publish_state(tick + self.links.node.period_ticks, state);
+        self.publish_state(tick + self.links.node.period_ticks, computation);
         self.send(tick, received_ns, done_ns)?;
         if tick >= self.take_over_tick {
             // The predecessor leaves; nothing of it is read any more.
             self.predecessor.clear();
-            self.predecessor_state = None;
+            self.state.leave_predecessor();
         }
         Ok(())
     }
@@ -467,12 +431,7 @@ impl ConnectedNode {
     }
 
     /// Computes the component's step, which writes what is due.
-    fn step(
-        &mut self,
-        tick: u32,
-        state: &mut [u8],
-        step: &mut impl FnMut(&mut Tick<'_>, &mut [u8]) -> Result<(), String>,
-    ) -> Result<(), BusError> {
+    fn step(&mut self, tick: u32, computation: &mut dyn Computation) -> Result<(), BusError> {
         let links = &self.links;
         let (node, time_ns) = (&links.node.name, links.time_ns(tick));
         let takes_over = links.generation > 0 && tick == self.take_over_tick;
@@ -480,7 +439,12 @@ impl ConnectedNode {
         let (inputs, outputs) = (self.inputs.as_slice(), self.outputs.as_mut_slice());
         let mut view = Tick { tick, time_ns, node, inputs, outputs, predecessor };
         let time_s = time_ns as f64 * 1e-9;
-        step(&mut view, state).map_err(|reason| BusError::Step { node: node.clone(), tick, time_s, reason })
+        computation.step(&mut view).map_err(|reason| BusError::Step {
+            node: node.clone(),
+            tick,
+            time_s,
+            reason,
+        })
     }
 
     /// Computes the step unless the one before is under way, and writes what is done by `tick`.
@@ -488,11 +452,9 @@ impl ConnectedNode {
         &mut self,
         timing: &mut Timing,
         tick: u32,
-        state: &mut [u8],
-        step: &mut impl FnMut(&mut Tick<'_>, &mut [u8]) -> Result<(), String>,
+        computation: &mut dyn Computation,
     ) -> Result<(), BusError> {
-        let (state, words) = state.split_at_mut(8 * self.state_words);
-        let words: &mut [u64] = bytemuck::cast_slice_mut(words);
+        let words = self.state.more_words();
         if tick == self.take_over_tick && !self.predecessor.is_empty() {
             // It goes on from what its predecessor sent last, not from a step of its own as a shadow.
             words.fill(0);
@@ -501,7 +463,8 @@ impl ConnectedNode {
         let counts = tick >= self.take_over_tick;
         match timing.begin(tick, words, &self.outputs) {
             Due::Step => {
-                self.step(tick, state, step)?;
+                self.step(tick, computation)?;
+                let words = self.state.more_words();
                 let overran = timing.end(tick, words, &mut self.outputs, &self.links.node.name)?;
                 if overran && counts {
                     self.links.lockstep.count_overrun();
@@ -510,7 +473,7 @@ impl ConnectedNode {
             Due::Skipped if counts => self.links.lockstep.count_skipped_step(),
             Due::Skipped => {}
         }
-        Timing::write(tick, words, &mut self.outputs, &self.links.node.name)
+        Timing::write(tick, self.state.more_words(), &mut self.outputs, &self.links.node.name)
     }
 
     fn send(&mut self, tick: u32, received_ns: u64, done_ns: u64) -> Result<(), BusError> {

@@ -18,6 +18,7 @@ mod connected;
 pub mod context;
 pub mod error;
 mod finite;
+mod hand_over;
 mod handles;
 mod harness;
 #[doc(hidden)]
@@ -59,6 +60,7 @@ mod shared_file;
 #[cfg(test)]
 #[path = "../../tests/runs/skipped.rs"]
 mod skipped;
+mod state;
 #[doc(hidden)]
 pub mod state_transfer;
 #[doc(hidden)]

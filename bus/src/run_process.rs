@@ -1,16 +1,16 @@
 //! A component as a node of a run: this process, or a thread of it, takes the node's part.
 
 use crate::announcement::Announcement;
-use crate::component::{Component, StepError, Transfer};
-use crate::connected::ConnectedNode;
+use crate::component::{Component, StateError, StepError};
 use crate::context::StepContext;
 use crate::error::BusError;
+use crate::hand_over::Computation;
 use crate::handles::Wiring;
 use crate::join::Join;
 use crate::node::Node;
 use crate::port::{InPort, OutPort};
 use crate::ports::{InputSamples, OutputSamples, SampleSink, SampleSource};
-use crate::registration::{Registration, Stepper};
+use crate::registration::{Instance, Registration};
 use crate::tick::Tick;
 
 /// Runs the component `C` as the node that the launcher started this process for: the whole `main` of an executable
@@ -32,57 +32,57 @@ impl Registration {
         let mut node = Node::open(join)?;
         let wiring = node.declare(self, components)?;
         let (plan, node_plan) = node.plan();
-        let mut component =
+        let mut instance =
             self.make_for(plan, node_plan, &node.files()).map_err(|reason| node.error(reason))?;
         let name = node.name().to_owned();
         let failed =
             |error: StepError| BusError::Parameters { node: name.clone(), reason: error.to_string() };
-        let mut state = component.initial();
         let connected = node.connect()?;
         let topics: Vec<(&str, &Announcement)> =
             wiring.inputs.iter().flatten().map(|&input| connected.announced(input)).collect();
-        component.connected(&topics).map_err(failed)?;
-        let end = self.step_to_the_end(connected, &wiring, &mut *component, &mut state);
-        let finished = component.finish().map_err(failed);
+        instance.connected(&topics).map_err(failed)?;
+        let end = connected.run(self.transfer, &mut Wired { instance: &mut *instance, wiring: &wiring });
+        let finished = instance.finish().map_err(failed);
         match end {
             Ok(()) | Err(BusError::Aborted) => finished.and(end),
             // What made a step fail makes the end fail too: the first error counts.
             Err(error) => Err(error),
         }
     }
-
-    fn step_to_the_end(
-        &self,
-        connected: ConnectedNode,
-        wiring: &Wiring,
-        component: &mut dyn Stepper,
-        state: &mut [u64],
-    ) -> Result<(), BusError> {
-        let schema = match self.transfer {
-            Transfer::Message(schema) => Some(schema),
-            Transfer::Nothing | Transfer::Internal => None,
-        };
-        let state = &mut bytemuck::cast_slice_mut(state)[..self.state_bytes()];
-        connected.run(schema, state, |tick, state| step(component, wiring, tick, state))
-    }
 }
 
-fn step(
-    component: &mut dyn Stepper,
-    wiring: &Wiring,
-    tick: &mut Tick<'_>,
-    state: &mut [u8],
-) -> Result<(), StepError> {
-    let number = tick.number();
-    let inputs = Received { tick: number, ports: tick.inputs, wiring: &wiring.inputs };
-    let predecessor = Received { tick: number, ports: tick.predecessor, wiring: &wiring.outputs };
-    let context = StepContext {
-        tick: number,
-        time_ns: tick.time_ns,
-        predecessor: (!tick.predecessor.is_empty()).then_some(&predecessor as &dyn SampleSource),
-    };
-    let mut sink = Loans { tick: number, node: tick.node, ports: tick.outputs, wiring: &wiring.outputs };
-    component.step(&context, InputSamples(&inputs), state, &mut OutputSamples(&mut sink))
+/// A component whose ports are those of a node.
+struct Wired<'a> {
+    instance: &'a mut dyn Instance,
+    wiring: &'a Wiring,
+}
+
+impl Computation for Wired<'_> {
+    fn state_size(&self) -> usize {
+        self.instance.state_size()
+    }
+
+    fn save(&self, bytes: &mut [u8]) {
+        self.instance.save(bytes);
+    }
+
+    fn load(&mut self, bytes: &[u8]) -> Result<(), StateError> {
+        self.instance.load(bytes)
+    }
+
+    fn step(&mut self, tick: &mut Tick<'_>) -> Result<(), String> {
+        let (number, wiring) = (tick.number(), self.wiring);
+        let inputs = Received { tick: number, ports: tick.inputs, wiring: &wiring.inputs };
+        let predecessor = Received { tick: number, ports: tick.predecessor, wiring: &wiring.outputs };
+        let context = StepContext {
+            tick: number,
+            time_ns: tick.time_ns,
+            predecessor: (!tick.predecessor.is_empty()).then_some(&predecessor as &dyn SampleSource),
+        };
+        let mut sink = Loans { tick: number, node: tick.node, ports: tick.outputs, wiring: &wiring.outputs };
+        let stepped = self.instance.step(&context, InputSamples(&inputs), &mut OutputSamples(&mut sink));
+        stepped.map_err(|error| error.to_string())
+    }
 }
 
 /// The samples that a node has received.

@@ -8,7 +8,7 @@
 
 use bus::Message;
 use bus::ports::FORWARDED_BYTES_MAX;
-use bus::random::{Stream, uniform};
+use bus::random::{self, Stream, uniform};
 
 /// Streams that share a line at most.
 pub const STREAMS: usize = 16;
@@ -179,7 +179,7 @@ impl Line {
     }
 
     /// Sends what waits, up to `until_ns`.
-    pub fn send(&mut self, state: &mut LineState, until_ns: u64) {
+    pub fn send(&self, state: &mut LineState, until_ns: u64) {
         while let Some((index, start_ns)) = self.next(state).filter(|(_, start_ns)| *start_ns < until_ns) {
             if start_ns > state.free_ns {
                 (state.busy_since_ns, state.busy_bits) = (start_ns, 0);
@@ -208,11 +208,11 @@ impl Line {
     }
 
     /// How long the message that is sent as number `number` travels behind its last bit, and whether it is lost.
-    fn fate(&mut self, number: u64) -> (u64, bool) {
+    fn fate(&self, number: u64) -> (u64, bool) {
         // Two draws of two words of 32 bits each.
-        self.random.set_word_pos(u128::from(number) * 4);
-        let is_lost = uniform(&mut self.random) < self.loss;
-        let jitter_ns = uniform(&mut self.random) * self.jitter_ns as f64;
+        let mut random = random::at(&self.random, u128::from(number) * 4);
+        let is_lost = uniform(&mut random) < self.loss;
+        let jitter_ns = uniform(&mut random) * self.jitter_ns as f64;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most the jitter")]
         let jitter_ns = jitter_ns as u64;
         (self.latency_ns + jitter_ns, is_lost)
