@@ -47,7 +47,7 @@ impl Component for Controller {
 
     fn initial(&self) {}
 
-    fn step(&mut self, _: &StepContext<'_>, inputs: Inputs<'_>, (): &mut ()) -> Result<Outputs, StepError> {
+    fn step(&self, _: &StepContext<'_>, inputs: Inputs<'_>, (): &mut ()) -> Result<Outputs, StepError> {
         let (Self(gains), asked, found) = (self, inputs.set_point, inputs.estimate);
         let law = |gains: [f64; 2], error: f64, rate: f64| gains[0] * error - gains[1] * rate;
         let lift = law(gains.altitude, asked.altitude - found.position.z, found.velocity.z);

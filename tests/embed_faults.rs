@@ -6,7 +6,7 @@
 
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
-use bus::messages::MotorCommand;
+use bus::messages::{MotorCommand, SetPoint};
 use bus::{InputPorts, OutputPorts, ParameterError, Registration};
 use hummingbus::{Answer, Host, Launcher, Manifest, ManifestBuilder, Progress, Request, RunEvent, StopToken};
 use runtime::registry::Registry;
@@ -58,7 +58,7 @@ impl Component for Source {
     }
 
     fn step(
-        &mut self,
+        &self,
         context: &StepContext<'_>,
         (): (),
         state: &mut MotorCommand,
@@ -78,28 +78,29 @@ impl Component for Source {
     }
 }
 
-/// Remembers nothing, and goes on from what its predecessor sent last.
-#[derive(Default)]
-struct Heir(f64);
+/// Has a state of another type than its predecessor, and goes on from what that sent last.
+struct Heir;
 
 impl Component for Heir {
     const INFO: Info = Info::new("heir", "goes on from what its predecessor sent");
     type Parameters = serde::de::IgnoredAny;
     type Inputs<'a> = ();
     type Outputs = Outputs;
-    type State = ();
+    type State = SetPoint;
 
     fn new(_: serde::de::IgnoredAny, _: &NodeContext<'_>) -> Result<Self, ParameterError> {
-        Ok(Self::default())
+        Ok(Self)
     }
 
-    fn initial(&self) {}
+    fn initial(&self) -> SetPoint {
+        SetPoint::default()
+    }
 
-    fn step(&mut self, context: &StepContext<'_>, (): (), (): &mut ()) -> Result<Outputs, StepError> {
+    fn step(&self, context: &StepContext<'_>, (): (), state: &mut SetPoint) -> Result<Outputs, StepError> {
         if let Some(Outputs { command }) = context.predecessor() {
-            self.0 = 1000.0 + command.command[0];
+            state.altitude = 1000.0 + command.command[0];
         }
-        Ok(Outputs { command: MotorCommand { command: [self.0; 4], ..MotorCommand::default() } })
+        Ok(Outputs { command: MotorCommand { command: [state.altitude; 4], ..MotorCommand::default() } })
     }
 }
 
@@ -124,7 +125,7 @@ impl Component for Sink {
 
     fn initial(&self) {}
 
-    fn step(&mut self, context: &StepContext<'_>, inputs: Inputs<'_>, (): &mut ()) -> Result<(), StepError> {
+    fn step(&self, context: &StepContext<'_>, inputs: Inputs<'_>, (): &mut ()) -> Result<(), StepError> {
         if self.0.fault == "hang" && context.tick() == self.0.at_tick {
             hang();
         }

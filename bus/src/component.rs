@@ -1,12 +1,12 @@
-//! A component is a type: what it declares, how it is made, and its step.
+//! A component: a value made from parameters, and a step that is a function of inputs, state and time.
 
 use crate::announcement::Announcement;
 use crate::context::{NodeContext, StepContext};
-use crate::message::Message;
 use crate::ports::{InputPorts, OutputPorts};
-use crate::schema::Schema;
 use diagnostics::ParameterError;
 use serde::de::DeserializeOwned;
+
+pub use crate::state::{State, StateError, Transfer};
 
 /// What goes wrong in a step, in words. Any error, and any text, becomes one by `?` or `into`.
 ///
@@ -18,9 +18,11 @@ pub type StepError = Box<dyn std::error::Error + Send + Sync>;
 
 /// Everything that runs at ticks: sensors, controllers, the plant, the recorder.
 ///
-/// What a manifest may say of it, how it is checked, and the process that runs it all follow from the declaration. A step
-/// is a function of its inputs, of the state and of the time: it does not know of processes, so that a test can call it
-/// ([`Harness`](crate::Harness)).
+/// The keys of a manifest, the check and the process that runs the component follow from this declaration.
+///
+/// A component is a value that does not change after it is made. Everything that changes is in its [`State`]. A step is a
+/// function of the inputs, the state and the time. It does not know of processes, so that a test can call it
+/// ([`Harness`](crate::Harness)) and a thread can host it.
 ///
 /// ```
 /// use bus::component::{Component, Info, StepError};
@@ -60,7 +62,7 @@ pub type StepError = Box<dyn std::error::Error + Send + Sync>;
 ///     fn initial(&self) -> Self::State {}
 ///
 ///     fn step(
-///         &mut self,
+///         &self,
 ///         _: &StepContext<'_>,
 ///         inputs: Inputs<'_>,
 ///         (): &mut Self::State,
@@ -74,7 +76,7 @@ pub type StepError = Box<dyn std::error::Error + Send + Sync>;
 /// let state = PlantState { position: [0.0, 0.0, 2.0].into(), ..Default::default() };
 /// assert_eq!(climb.step(Inputs { state: &state }).unwrap().set_point.altitude, 2.5);
 /// ```
-pub trait Component: Sized {
+pub trait Component: Sized + Send {
     /// Its name in manifests, and what it does.
     const INFO: Info;
     /// What the manifest's `parameters` table holds: a struct that refuses unknown fields.
@@ -83,8 +85,8 @@ pub trait Component: Sized {
     type Inputs<'a>: InputPorts<'a>;
     /// What it sends.
     type Outputs: OutputPorts;
-    /// All that it remembers from tick to tick: a [`Message`] that is transferred to another process, `()` where there is
-    /// nothing to remember, or [`Internal`].
+    /// Everything that changes from tick to tick: a [`Message`](crate::Message), `()` if nothing changes, or a type that
+    /// writes its own bytes.
     type State: State;
 
     /// Makes the component, for a check of the manifest as for a run.
@@ -108,7 +110,11 @@ pub trait Component: Sized {
     ///
     /// # Errors
     /// What stands against it.
-    fn connected(&mut self, _topics: &[(&str, &Announcement)]) -> Result<(), StepError> {
+    fn connected(
+        &self,
+        _topics: &[(&str, &Announcement)],
+        _state: &mut Self::State,
+    ) -> Result<(), StepError> {
         Ok(())
     }
 
@@ -117,7 +123,7 @@ pub trait Component: Sized {
     /// # Errors
     /// What goes wrong: the run ends with it.
     fn step(
-        &mut self,
+        &self,
         context: &StepContext<'_>,
         inputs: Self::Inputs<'_>,
         state: &mut Self::State,
@@ -127,7 +133,7 @@ pub trait Component: Sized {
     ///
     /// # Errors
     /// What stands against it.
-    fn finish(&mut self) -> Result<(), StepError> {
+    fn finish(&self, _state: &mut Self::State) -> Result<(), StepError> {
         Ok(())
     }
 }
@@ -171,49 +177,4 @@ impl Info {
     pub const fn recorder(self) -> Self {
         Self { role: Role::Record, ..self }
     }
-}
-
-/// What happens to a component's state when another process takes its place.
-#[derive(Clone, Copy, Debug)]
-pub enum Transfer {
-    /// It is transferred as this message.
-    Message(&'static Schema),
-    /// There is none.
-    Nothing,
-    /// It lives inside of the process and dies with it.
-    Internal,
-}
-
-/// What a component remembers from tick to tick.
-///
-/// ```
-/// use bus::component::{Internal, State, Transfer};
-///
-/// fn transfer<S: State>() -> Transfer {
-///     S::TRANSFER
-/// }
-/// assert!(matches!(transfer::<bus::messages::SetPoint>(), Transfer::Message(_)));
-/// assert!(matches!(transfer::<()>(), Transfer::Nothing));
-/// assert!(matches!(transfer::<Internal>(), Transfer::Internal));
-/// ```
-pub trait State: bytemuck::Pod {
-    /// What happens to it when another process takes the component's place.
-    const TRANSFER: Transfer;
-}
-
-impl<M: Message> State for M {
-    const TRANSFER: Transfer = Transfer::Message(M::SCHEMA);
-}
-
-impl State for () {
-    const TRANSFER: Transfer = Transfer::Nothing;
-}
-
-/// The state of a component that keeps it in its own fields: no other process can take its place.
-#[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-pub struct Internal;
-
-impl State for Internal {
-    const TRANSFER: Transfer = Transfer::Internal;
 }

@@ -2,7 +2,9 @@
 //! calls it is the [executor](crate::executor).
 
 use crate::announcement::{self, Announcement};
+use crate::component::Transfer;
 use crate::error::BusError;
+use crate::hand_over::{Computation, HandOver};
 use crate::handles::Declared;
 use crate::host_time::monotonic_ns;
 use crate::links::Links;
@@ -11,13 +13,8 @@ use crate::membership::Membership;
 use crate::plan::{InputPlan, NodePlan};
 use crate::port::{Feed, InPort, Locals, OutPort, Source};
 use crate::profile::TickWriter;
-use crate::schema::Schema;
-use crate::state_transfer::StateRing;
 use crate::tick::Tick;
 use crate::timing::{Due, Timing};
-
-/// The step of a component: it reads and writes the samples of a tick, and changes the state.
-pub(crate) type Step<'a> = dyn FnMut(&mut Tick<'_>, &mut [u8]) -> Result<(), String> + 'a;
 
 /// A node whose ports are connected.
 #[derive(Debug)]
@@ -27,9 +24,8 @@ pub(crate) struct ConnectedNode {
     announcements: Vec<Announcement>,
     /// What the predecessor sends, by output; empty where its state is handed over.
     predecessor: Vec<InPort>,
-    /// Where the predecessor publishes its state, and where this process does.
-    predecessor_state: Option<StateRing>,
-    published_state: Option<StateRing>,
+    /// The state that the predecessor hands over, and the state of this process.
+    state: HandOver,
     /// The tick from which on this process goes on by itself, no longer as its predecessor's shadow.
     take_over_tick: u32,
     /// The tick from which on a backup takes this process's place.
@@ -38,8 +34,6 @@ pub(crate) struct ConnectedNode {
     epoch: u32,
     profile: Option<TickWriter>,
     timing: Option<Timing>,
-    /// Words of the component's state; those of `timing` are behind them.
-    state_words: usize,
     /// The next tick that it computes.
     pub(crate) tick: u32,
     /// The ticks that the control segment counts as completed.
@@ -113,15 +107,13 @@ impl ConnectedNode {
             outputs,
             announcements: Vec::new(),
             predecessor: Vec::new(),
-            predecessor_state: None,
-            published_state: None,
+            state: HandOver::default(),
             take_over_tick: 0,
             retirement_tick: u32::MAX,
             first_tick,
             epoch,
             profile: None,
             timing: Timing::of(&links.plan, &links.node),
-            state_words: 0,
             tick: first_tick,
             told_tick: first_tick,
             states_every_tick: true,
@@ -165,26 +157,20 @@ impl ConnectedNode {
         (&self.links.plan.topics[topic].name, &self.announcements[input])
     }
 
-    /// Makes ready to transfer the state, a message of `schema`: to whoever takes this node's place, and from whom it takes
-    /// it. Returns the words behind the state of a node whose steps take time.
+    /// Makes ready to hand over the state of `computation` as `transfer` says: to whoever takes this node's place, and from
+    /// whom it takes it.
     ///
     /// # Errors
     /// If shared memory cannot be had.
     pub(crate) fn open_states(
         &mut self,
-        schema: Option<&'static Schema>,
-        state_bytes: usize,
-    ) -> Result<usize, BusError> {
-        self.open_predecessor(schema)?;
+        transfer: Transfer,
+        computation: &dyn Computation,
+    ) -> Result<(), BusError> {
         let more_words = self.timing_words(self.timing.is_some());
-        if let Some(schema) = schema {
-            let links = &self.links;
-            let (dir, plan) = (&links.run_dir, &links.plan);
-            self.published_state =
-                Some(StateRing::create(dir, plan, links.index, links.generation, schema, more_words)?);
-        }
-        self.state_words = state_bytes.div_ceil(8);
-        Ok(more_words)
+        self.state = HandOver::new(transfer, computation.state_size(), more_words);
+        self.open_predecessor()?;
+        self.state.create(&self.links)
     }
 
     /// Words behind the state of a process of this node whose steps take time, or do not.
@@ -193,25 +179,23 @@ impl ConnectedNode {
     }
 
     /// Opens the state of the process that this one succeeds, or else what it sends.
-    fn open_predecessor(&mut self, state: Option<&Schema>) -> Result<(), BusError> {
+    fn open_predecessor(&mut self) -> Result<(), BusError> {
         let links = &self.links;
         if links.generation == 0 {
             return Ok(());
         }
         let generation = Membership::load(&links.run_dir, self.epoch)?.nodes[links.index].primary.generation;
-        if let Some(schema) = state {
-            let (dir, plan, index) = (&links.run_dir, &links.plan, links.index);
-            let is_timed = match generation {
-                0 => plan.nodes[index].computing_time.is_some(),
-                _ => NodePlan::load_backup(dir, index, generation)?.computing_time.is_some(),
-            };
-            let more_words = self.timing_words(is_timed);
-            self.predecessor_state = StateRing::open(dir, plan, index, generation, schema, more_words)?;
-        }
-        if self.predecessor_state.is_some() {
-            links.lockstep.set_transfer(TransferOutcome::State);
+        let (dir, plan, index) = (&links.run_dir, &links.plan, links.index);
+        let is_timed = match generation {
+            0 => plan.nodes[index].computing_time.is_some(),
+            _ => NodePlan::load_backup(dir, index, generation)?.computing_time.is_some(),
+        };
+        let more_words = self.timing_words(is_timed);
+        if self.state.open(&self.links, generation, more_words)? {
+            self.links.lockstep.set_transfer(TransferOutcome::State);
             return Ok(());
         }
+        let links = &self.links;
         links.lockstep.set_transfer(TransferOutcome::LastOutput);
         for output in &links.node.outputs {
             let topic = &links.plan.topics[output.topic];
@@ -226,18 +210,18 @@ impl ConnectedNode {
         links.transport.reserve()
     }
 
-    /// Tells that this node can begin, with `state`.
+    /// Tells that this node can begin, with the state of `computation`.
     ///
     /// # Errors
     /// If its memory cannot be locked.
-    pub(crate) fn begin(&mut self, state: &[u8]) -> Result<(), BusError> {
+    pub(crate) fn begin(&mut self, computation: &dyn Computation) -> Result<(), BusError> {
         // Last, when all that the ticks use is mapped: a mapping that exceeds the limit later fails without words.
         if self.links.plan.lock_memory {
             crate::process::lock_memory()?;
         }
         if self.links.generation == 0 {
             // A backup may have to begin with the first tick.
-            self.publish_state(self.first_tick, state);
+            self.publish_state(self.first_tick, computation);
         }
         self.links.lockstep.set_ready(Phase::Running);
         Ok(())
@@ -265,19 +249,19 @@ impl ConnectedNode {
     }
 
     /// Publishes the state at the start of `tick`, for whoever takes over there.
-    fn publish_state(&self, tick: u32, state: &[u8]) {
-        if let Some(ring) = &self.published_state {
-            ring.store(tick, state);
+    fn publish_state(&mut self, tick: u32, computation: &dyn Computation) {
+        if self.state.publish(tick, computation) {
             // A count of zero is no state.
             self.links.lockstep.state_published(tick + 1);
         }
     }
 
-    /// Next action of this node. A shadow finds the state of its predecessor in `state` afterwards.
+    /// Next action of this node. As a shadow, `computation` has the state of its predecessor
+    /// afterwards.
     ///
     /// # Errors
     /// If the run is aborted, or the state of the predecessor is gone.
-    pub(crate) fn turn(&self, state: &mut [u8]) -> Result<Turn, BusError> {
+    pub(crate) fn turn(&mut self, computation: &mut dyn Computation) -> Result<Turn, BusError> {
         let (lockstep, tick) = (&self.links.lockstep, self.tick);
         if lockstep.epoch() != self.epoch {
             return Ok(Turn::Change);
@@ -293,12 +277,16 @@ impl ConnectedNode {
             let has_taken_over = lockstep.has(Need::OtherDone, self.retirement_tick + 1);
             return if has_taken_over { self.leave_turn() } else { Ok(Turn::Wait(Awaited::Backup)) };
         }
-        let turn = match self.missing(state)? {
+        let turn = match self.missing(computation)? {
             Some(awaited) => Turn::Wait(awaited),
             None => Turn::Compute,
         };
         // Who counts a promoted process's samples as there sees the change that promoted it, too.
-        Ok(if turn == Turn::Compute && lockstep.epoch() != self.epoch { Turn::Change } else { turn })
+        Ok(if turn == Turn::Compute && self.links.lockstep.epoch() != self.epoch {
+            Turn::Change
+        } else {
+            turn
+        })
     }
 
     fn leave_turn(&self) -> Result<Turn, BusError> {
@@ -306,8 +294,8 @@ impl ConnectedNode {
     }
 
     /// The first of what the next tick needs that is not there: the predecessor, the inputs, the shadows, the grant.
-    fn missing(&self, state: &mut [u8]) -> Result<Option<Awaited>, BusError> {
-        if let Some(awaited) = self.missing_predecessor(state)? {
+    fn missing(&mut self, computation: &mut dyn Computation) -> Result<Option<Awaited>, BusError> {
+        if let Some(awaited) = self.missing_predecessor(computation)? {
             return Ok(Some(awaited));
         }
         let (lockstep, tick) = (&self.links.lockstep, self.tick);
@@ -337,21 +325,20 @@ impl ConnectedNode {
 
     /// As a shadow, starts the tick from the state of the predecessor, if that states one: what this process
     /// sends then is what it would send if it took over here.
-    fn missing_predecessor(&self, state: &mut [u8]) -> Result<Option<Awaited>, BusError> {
+    fn missing_predecessor(
+        &mut self,
+        computation: &mut dyn Computation,
+    ) -> Result<Option<Awaited>, BusError> {
         let (lockstep, tick) = (&self.links.lockstep, self.tick);
         if self.links.generation == 0 || tick > self.take_over_tick {
             return Ok(None);
         }
-        if let Some(ring) = &self.predecessor_state {
+        if self.state.has_predecessor() {
             if !lockstep.has(Need::OtherState, tick + 1) {
                 return Ok(Some(Awaited::count(Need::OtherState, tick + 1)));
             }
-            if !ring.load(tick, state) {
-                return Err(BusError::Parameters {
-                    node: self.links.node.name.clone(),
-                    reason: format!("the state that its predecessor had at tick {tick} is gone"),
-                });
-            }
+            let failed = |reason| BusError::Parameters { node: self.links.node.name.clone(), reason };
+            self.state.load(tick, computation).map_err(failed)?;
         }
         let awaits =
             tick == self.take_over_tick && lockstep.other_computes() && !lockstep.has(Need::OtherDone, tick);
@@ -489,19 +476,19 @@ impl ConnectedNode {
         Ok(())
     }
 
-    /// Makes the connections agree with `membership`; `state` is that before the next tick.
+    /// Makes the connections agree with `membership`; `computation` has the state before the next tick.
     pub(crate) fn follow(
         &mut self,
         membership: &Membership,
         locals: &Locals,
-        state: &[u8],
+        computation: &dyn Computation,
     ) -> Result<(), BusError> {
         self.connect(membership, locals)?;
         let instances = &membership.nodes[self.links.index];
         let must_state = self.must_state(membership);
         let did_state = std::mem::replace(&mut self.states_every_tick, must_state);
         if must_state && !did_state && instances.primary.generation == self.links.generation {
-            self.publish_state(self.tick, state);
+            self.publish_state(self.tick, computation);
         }
         Ok(())
     }
@@ -546,20 +533,19 @@ impl ConnectedNode {
         &mut self,
         before_ns: Option<u64>,
         locals: &mut Locals,
-        state: &mut [u8],
-        step: &mut Step<'_>,
+        computation: &mut dyn Computation,
     ) -> Result<u64, BusError> {
         let tick = self.tick;
         if self.links.generation > 0 && tick <= self.take_over_tick.max(self.first_tick) {
             // What it begins with is its predecessor's, not what it came to itself.
-            self.publish_state(tick, state);
+            self.publish_state(tick, computation);
         }
         self.take_inputs(tick)?;
         let received_ns = before_ns.unwrap_or_else(monotonic_ns);
         match self.timing.take() {
-            None => self.step(tick, locals, state, step)?,
+            None => self.step(tick, locals, computation)?,
             Some(mut timing) => {
-                self.step_in_time(&mut timing, tick, locals, state, step)?;
+                self.step_in_time(&mut timing, tick, locals, computation)?;
                 self.timing = Some(timing);
             }
         }
@@ -572,13 +558,13 @@ impl ConnectedNode {
         self.links.lockstep.count_step(done_ns - received_ns);
         if self.states_every_tick {
             // Before anything is sent: whoever sees the sample can go on from the state after it.
-            self.publish_state(tick + self.links.node.period_ticks, state);
+            self.publish_state(tick + self.links.node.period_ticks, computation);
         }
         self.send(tick, received_ns, done_ns, locals)?;
         if tick >= self.take_over_tick {
             // The predecessor leaves; nothing of it is read any more.
             self.predecessor.clear();
-            self.predecessor_state = None;
+            self.state.leave_predecessor();
         }
         self.tick += self.links.node.period_ticks;
         Ok(done_ns)
@@ -597,8 +583,7 @@ impl ConnectedNode {
         &mut self,
         tick: u32,
         locals: &Locals,
-        state: &mut [u8],
-        step: &mut Step<'_>,
+        computation: &mut dyn Computation,
     ) -> Result<(), BusError> {
         let links = &self.links;
         let (node, time_ns) = (&links.node.name, links.time_ns(tick));
@@ -607,7 +592,12 @@ impl ConnectedNode {
         let (inputs, outputs) = (self.inputs.as_slice(), self.outputs.as_mut_slice());
         let mut view = Tick { tick, time_ns, node, inputs, locals, outputs, predecessor };
         let time_s = time_ns as f64 * 1e-9;
-        step(&mut view, state).map_err(|reason| BusError::Step { node: node.clone(), tick, time_s, reason })
+        computation.step(&mut view).map_err(|reason| BusError::Step {
+            node: node.clone(),
+            tick,
+            time_s,
+            reason,
+        })
     }
 
     /// Computes the step unless the one before is under way, and writes what is done by `tick`.
@@ -616,11 +606,9 @@ impl ConnectedNode {
         timing: &mut Timing,
         tick: u32,
         locals: &Locals,
-        state: &mut [u8],
-        step: &mut Step<'_>,
+        computation: &mut dyn Computation,
     ) -> Result<(), BusError> {
-        let (state, words) = state.split_at_mut(8 * self.state_words);
-        let words: &mut [u64] = bytemuck::cast_slice_mut(words);
+        let words = self.state.more_words();
         if tick == self.take_over_tick && !self.predecessor.is_empty() {
             // It goes on from what its predecessor sent last, not from a step of its own as a shadow.
             words.fill(0);
@@ -629,7 +617,8 @@ impl ConnectedNode {
         let counts = tick >= self.take_over_tick;
         match timing.begin(tick, words, &self.outputs) {
             Due::Step => {
-                self.step(tick, locals, state, step)?;
+                self.step(tick, locals, computation)?;
+                let words = self.state.more_words();
                 let overran = timing.end(tick, words, &mut self.outputs, &self.links.node.name)?;
                 if overran && counts {
                     self.links.lockstep.count_overrun();
@@ -638,7 +627,7 @@ impl ConnectedNode {
             Due::Skipped if counts => self.links.lockstep.count_skipped_step(),
             Due::Skipped => {}
         }
-        Timing::write(tick, words, &mut self.outputs, &self.links.node.name)
+        Timing::write(tick, self.state.more_words(), &mut self.outputs, &self.links.node.name)
     }
 
     fn send(

@@ -4,13 +4,14 @@
 //! a reader of a sample of the same tick comes behind its publisher. So no member waits for another member. Groups do not
 //! wait for each other in a circle either: along edges without delay the depth grows, and all groups step in its order.
 
-use crate::connected::{ConnectedNode, Step, Turn};
+use crate::component::Transfer;
+use crate::connected::{ConnectedNode, Turn};
 use crate::depths::depths;
 use crate::error::BusError;
+use crate::hand_over::Computation;
 use crate::host_time::process_cpu_ns;
 use crate::local::LocalTopic;
 use crate::membership::Membership;
-use crate::schema::Schema;
 use std::time::Duration;
 
 /// Sleep of a process that has completed its ticks, between two looks whether its last samples were taken.
@@ -21,41 +22,26 @@ const TELLS_PER_WINDOW: u32 = 8;
 /// A node of this process.
 pub(crate) struct Member<'c> {
     node: ConnectedNode,
-    step: Box<Step<'c>>,
-    /// The component's state, and the words of a step that takes time behind it.
-    words: Vec<u64>,
-    /// Bytes of both that are transferred.
-    bytes: usize,
+    computation: Box<dyn Computation + 'c>,
 }
 
 impl<'c> Member<'c> {
-    /// A node that computes `step` at every due tick. The `state`, a message of `schema`, is transferred to the process that
-    /// takes its place if that knows the same type.
+    /// A node that computes the steps of `computation` at every due tick. The state is handed over as `transfer` says to the
+    /// process that takes its place, if that has the same layout.
     ///
     /// # Errors
     /// If shared memory cannot be had.
     pub(crate) fn new(
         mut node: ConnectedNode,
-        schema: Option<&'static Schema>,
-        state: &[u8],
-        mut step: Box<Step<'c>>,
+        transfer: Transfer,
+        computation: Box<dyn Computation + 'c>,
     ) -> Result<Self, BusError> {
-        let size = state.len();
-        let more_words = node.open_states(schema, size)?;
-        let mut words = vec![0_u64; size.div_ceil(8) + more_words];
-        bytemuck::cast_slice_mut::<u64, u8>(&mut words)[..size].copy_from_slice(state);
-        let bytes = if more_words == 0 { size } else { 8 * words.len() };
-        let step: Box<Step<'c>> = Box::new(move |tick, whole| step(tick, &mut whole[..size]));
-        Ok(Self { node, step, words, bytes })
-    }
-
-    fn state(&mut self) -> (&mut ConnectedNode, &mut Step<'c>, &mut [u8]) {
-        (&mut self.node, &mut *self.step, &mut bytemuck::cast_slice_mut(&mut self.words)[..self.bytes])
+        node.open_states(transfer, &*computation)?;
+        Ok(Self { node, computation })
     }
 
     fn turn(&mut self) -> Result<Turn, BusError> {
-        let (node, _, state) = self.state();
-        node.turn(state)
+        self.node.turn(&mut *self.computation)
     }
 }
 
@@ -103,8 +89,7 @@ impl<'c> Executor<'c> {
     /// If a step fails, a due output stays unwritten, a sample is lost, or the run is aborted.
     pub(crate) fn run(&mut self) -> Result<(), BusError> {
         for member in &mut self.members {
-            let (node, _, state) = member.state();
-            node.begin(state)?;
+            member.node.begin(&*member.computation)?;
         }
         self.members.iter().try_for_each(|member| member.node.await_ticks())?;
         let cpu_start_ns = process_cpu_ns();
@@ -134,8 +119,8 @@ impl<'c> Executor<'c> {
             }
             match self.await_turn(index)? {
                 Turn::Compute => {
-                    let (node, step, state) = self.members[index].state();
-                    let done_ns = node.compute(self.now_ns, &mut self.locals, state, step)?;
+                    let Member { node, computation } = &mut self.members[index];
+                    let done_ns = node.compute(self.now_ns, &mut self.locals, &mut **computation)?;
                     // A profile tells when inputs were there; a process of its own may have got them since.
                     let is_shared = !self.locals.is_empty() && !node.links().plan.profile;
                     self.now_ns = is_shared.then_some(done_ns);
@@ -189,9 +174,8 @@ impl<'c> Executor<'c> {
         let Some(first) = self.members.first() else { return Ok(()) };
         let membership = first.node.newest_membership()?;
         for member in &mut self.members {
-            let (node, _, state) = member.state();
-            node.follow(&membership, &self.locals, state)?;
-            node.acknowledge()?;
+            member.node.follow(&membership, &self.locals, &*member.computation)?;
+            member.node.acknowledge()?;
         }
         self.put_in_order(&membership);
         Ok(())

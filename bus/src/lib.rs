@@ -22,6 +22,7 @@ mod executor;
 mod finite;
 #[doc(hidden)]
 pub mod group;
+mod hand_over;
 mod handles;
 mod harness;
 #[doc(hidden)]
@@ -64,6 +65,7 @@ mod shared_file;
 #[cfg(test)]
 #[path = "../../tests/runs/skipped.rs"]
 mod skipped;
+mod state;
 #[doc(hidden)]
 pub mod state_transfer;
 #[doc(hidden)]

@@ -45,7 +45,7 @@ use crate::schema::Schema;
 ///     voltage: f64,
 /// }
 /// ```
-pub trait Message: bytemuck::Pod {
+pub trait Message: bytemuck::Pod + Send {
     /// Type name, fields, units and frames.
     const SCHEMA: &'static Schema;
 }

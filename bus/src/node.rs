@@ -2,9 +2,11 @@
 
 use crate::announcement::{self, Announcement};
 use crate::claim;
+use crate::component::{State, StateError, Transfer};
 use crate::connected::ConnectedNode;
 use crate::error::BusError;
 use crate::executor::{Executor, Member};
+use crate::hand_over::Computation;
 use crate::handles::{Declared, Input, Output, Wiring};
 use crate::join::Join;
 use crate::links::Links;
@@ -406,13 +408,28 @@ impl Node {
     ///
     /// # Errors
     /// As `Node::connect` and `ConnectedNode::run`.
-    pub fn run<E: Display>(
-        self,
-        mut step: impl FnMut(&mut Tick<'_>) -> Result<(), E>,
-    ) -> Result<(), BusError> {
-        let step = |tick: &mut Tick<'_>, _: &mut [u8]| step(tick).map_err(|error| error.to_string());
-        let member = Member::new(self.connect()?, None, &[], Box::new(step))?;
+    pub fn run<E: Display>(self, step: impl FnMut(&mut Tick<'_>) -> Result<(), E>) -> Result<(), BusError> {
+        let member = Member::new(self.connect()?, Transfer::Nothing, Box::new(Steps(step)))?;
         Executor::alone(member).run()
+    }
+}
+
+/// Steps of a node that hands over no state.
+struct Steps<F>(F);
+
+impl<E: Display, F: FnMut(&mut Tick<'_>) -> Result<(), E>> Computation for Steps<F> {
+    fn state_size(&self) -> usize {
+        0
+    }
+
+    fn save(&self, _: &mut [u8]) {}
+
+    fn load(&mut self, bytes: &[u8]) -> Result<(), StateError> {
+        ().load(bytes)
+    }
+
+    fn step(&mut self, tick: &mut Tick<'_>) -> Result<(), String> {
+        (self.0)(tick).map_err(|error| error.to_string())
     }
 }
 

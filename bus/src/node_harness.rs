@@ -1,14 +1,14 @@
 //! A node of a plan, stepped without a run: what it reads is given to it as recorded bytes, and so is what it sends.
 
 use crate::announcement::Announcement;
-use crate::component::StepError;
+use crate::component::{StateError, StepError};
 use crate::context::StepContext;
 use crate::initial;
 use crate::message::{CDR_START, cdr_bytes};
 use crate::messages::Time;
 use crate::plan::{InputPlan, NodePlan, Plan};
 use crate::ports::{InputSamples, Inputs, OutputSamples};
-use crate::registration::{Registration, Stepper, message_of};
+use crate::registration::{Instance, Registration, message_of};
 use crate::sample_memory::SampleMemory;
 use crate::schema::Schema;
 use diagnostics::ParameterError;
@@ -18,9 +18,7 @@ use inputs::InputFiles;
 ///
 /// It reads and sends CDR bytes, as recordings hold them, so that any component can be stepped on what was recorded.
 pub struct NodeHarness {
-    component: Box<dyn Stepper>,
-    state: Box<[u64]>,
-    state_bytes: usize,
+    instance: Box<dyn Instance>,
     tick_ns: u64,
     inputs: Vec<Option<InputWire>>,
     outputs: Vec<OutputWire>,
@@ -69,27 +67,27 @@ impl NodeHarness {
             connect(&mut *made, &forwarded)?;
         }
         Ok(Self {
-            state: made.initial(),
-            state_bytes: component.state_bytes(),
-            component: made,
+            instance: made,
             tick_ns: plan.tick_ns,
             inputs: inputs(component, node, &forwarded)?,
             outputs: outputs.collect(),
         })
     }
 
-    /// The bytes of the state, in words.
+    /// Bytes of the state.
     #[must_use]
-    pub fn state(&self) -> &[u64] {
-        &self.state
+    pub fn state(&self) -> Vec<u8> {
+        let mut bytes = vec![0; self.instance.state_size()];
+        self.instance.save(&mut bytes);
+        bytes
     }
 
-    /// Goes on from the state of another.
+    /// Continues from the state of another instance of the node.
     ///
-    /// # Panics
-    /// If it is of another size.
-    pub fn restore(&mut self, state: &[u64]) {
-        self.state.copy_from_slice(state);
+    /// # Errors
+    /// It does not fit.
+    pub fn restore(&mut self, state: &[u8]) -> Result<(), StateError> {
+        self.instance.load(state)
     }
 
     /// Computes `tick`: `newest` gives the newest sample of a topic that was sent up to a tick. Returns what is sent.
@@ -110,8 +108,7 @@ impl NodeHarness {
         let mut sent = SampleMemory::empty(self.outputs.iter().map(|wire| wire.schema));
         let time_ns = u64::from(tick) * self.tick_ns;
         let context = StepContext { tick, time_ns, predecessor: None };
-        let state = &mut bytemuck::cast_slice_mut(&mut self.state)[..self.state_bytes];
-        self.component.step(&context, InputSamples(&given), state, &mut OutputSamples(&mut sent))?;
+        self.instance.step(&context, InputSamples(&given), &mut OutputSamples(&mut sent))?;
         let due = self.outputs.iter().zip(sent.samples).filter_map(|(wire, words)| {
             let (topic, period_ticks) = wire.topic?;
             let words = words.filter(|_| tick.is_multiple_of(period_ticks))?;
@@ -124,7 +121,7 @@ impl NodeHarness {
 
 impl std::fmt::Debug for NodeHarness {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("NodeHarness").field("state_bytes", &self.state_bytes).finish_non_exhaustive()
+        f.debug_struct("NodeHarness").field("state_size", &self.instance.state_size()).finish_non_exhaustive()
     }
 }
 
@@ -151,10 +148,10 @@ fn forwarded<'a>(
 }
 
 /// Tells a component what it forwards.
-fn connect(component: &mut dyn Stepper, forwarded: &[Forwarded<'_>]) -> Result<(), ParameterError> {
+fn connect(instance: &mut dyn Instance, forwarded: &[Forwarded<'_>]) -> Result<(), ParameterError> {
     let all: Vec<_> = forwarded.iter().map(|(name, schema)| (*name, Announcement::of(schema))).collect();
     let all: Vec<_> = all.iter().map(|(name, announcement)| (*name, announcement)).collect();
-    component.connected(&all).map_err(|reason| ParameterError::conflict("", reason))
+    instance.connected(&all).map_err(|reason| ParameterError::conflict("", reason))
 }
 
 /// The inputs of the node, in the order in which the component declares them.

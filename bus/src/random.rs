@@ -34,6 +34,28 @@ pub fn stream(run_seed: u64, node: &str) -> Stream {
     Stream::from_seed(key)
 }
 
+/// A copy of `stream` that continues `words` words of 32 bits after its start.
+///
+/// A component does not change, so it keeps its stream at the start. The position belongs to its state, or follows from the
+/// tick.
+///
+/// ```
+/// use bus::random::{at, normal, stream};
+///
+/// let imu = stream(7, "imu");
+/// let mut random = imu.clone();
+/// let first = normal(&mut random);
+/// let drawn_words = random.get_word_pos();
+/// assert_eq!(normal(&mut at(&imu, drawn_words)), normal(&mut random));
+/// assert_eq!(normal(&mut at(&imu, 0)), first);
+/// ```
+#[must_use]
+pub fn at(stream: &Stream, words: u128) -> Stream {
+    let mut random = stream.clone();
+    random.set_word_pos(words);
+    random
+}
+
 /// The next draw, evenly from 0 up to 1: a multiple of 2^-53.
 pub fn uniform(random: &mut impl Rng) -> f64 {
     (random.next_u64() >> 11) as f64 * (0.5 * f64::EPSILON)
@@ -44,11 +66,15 @@ fn exponent_and_fraction(exponent: u64, bits: u64) -> f64 {
     f64::from_bits((1023 + exponent) << 52 | bits >> 12)
 }
 
-pub(crate) const FNV_OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
+/// Start of [`fnv1a`].
+#[doc(hidden)]
+pub const FNV_OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
 const FNV_PRIME: u64 = 0x0000_0100_0000_01b3;
 
 /// FNV-1a over `bytes`, started from `offset` (Fowler, Noll, Vo; draft-eastlake-fnv).
-pub(crate) fn fnv1a(bytes: &[u8], offset: u64) -> u64 {
+#[doc(hidden)]
+#[must_use]
+pub fn fnv1a(bytes: &[u8], offset: u64) -> u64 {
     bytes.iter().fold(offset, |hash, &byte| (hash ^ u64::from(byte)).wrapping_mul(FNV_PRIME))
 }
 

@@ -1,7 +1,7 @@
 //! A component in a table of components: its declaration, and how one is made, without its type.
 
 use crate::announcement::Announcement;
-use crate::component::{Component, Info, Role, State, StepError, Transfer};
+use crate::component::{Component, Info, Role, State, StateError, StepError, Transfer};
 use crate::context::{NodeContext, StepContext};
 use crate::parameter_names;
 use crate::plan::{NodePlan, Plan};
@@ -24,14 +24,14 @@ pub struct Registration {
     pub inputs: Inputs,
     /// Outputs.
     pub outputs: &'static [PortSpec],
-    /// What happens to its state when another process takes its place.
+    /// Transfer of its state to the process that takes its place.
     pub transfer: Transfer,
     parameters: fn() -> &'static [&'static str],
     check: fn(&Value, &NodeContext<'_>) -> Result<(), ParameterError>,
     make: Make,
 }
 
-type Make = fn(&Value, &NodeContext<'_>) -> Result<Box<dyn Stepper>, ParameterError>;
+type Make = fn(&Value, &NodeContext<'_>) -> Result<Box<dyn Instance>, ParameterError>;
 
 impl Registration {
     /// The component `C`.
@@ -47,7 +47,10 @@ impl Registration {
             transfer: C::State::TRANSFER,
             parameters: parameter_names::of::<C::Parameters>,
             check: |parameters, context| make::<C>(parameters, context)?.rehearse(context),
-            make: |parameters, context| Ok(Box::new(make::<C>(parameters, context)?)),
+            make: |parameters, context| {
+                let component = make::<C>(parameters, context)?;
+                Ok(Box::new(Made { state: component.initial(), component }))
+            },
         }
     }
 
@@ -71,7 +74,7 @@ impl Registration {
         plan: &Plan,
         node: &NodePlan,
         files: &InputFiles,
-    ) -> Result<Box<dyn Stepper>, ParameterError> {
+    ) -> Result<Box<dyn Instance>, ParameterError> {
         let inputs: Vec<&str> = node.inputs.iter().map(|input| input.port.as_str()).collect();
         let outputs: Vec<&str> = node.outputs.iter().map(|output| output.port.as_str()).collect();
         let context = NodeContext::new(&node.name, &inputs)
@@ -80,14 +83,6 @@ impl Registration {
             .seeded(plan.seed)
             .given(files);
         (self.make)(&node.parameters, &context)
-    }
-
-    /// Bytes of its state.
-    pub(crate) fn state_bytes(&self) -> usize {
-        match self.transfer {
-            Transfer::Message(schema) => schema.size,
-            Transfer::Nothing | Transfer::Internal => 0,
-        }
     }
 
     /// The messages of its ports.
@@ -111,46 +106,58 @@ fn make<C: Component>(parameters: &Value, context: &NodeContext<'_>) -> Result<C
     C::new(diagnostics::read(parameters)?, context)
 }
 
-/// A component that was made, without its type; its state is kept by whoever steps it.
-pub(crate) trait Stepper {
-    /// The bytes of the state before the first tick, in words.
-    fn initial(&self) -> Box<[u64]>;
+/// A component with its state, without their types. Its steps do not allocate.
+pub(crate) trait Instance: Send {
+    /// As [`State::size`].
+    fn state_size(&self) -> usize;
+    /// As [`State::save`].
+    fn save(&self, bytes: &mut [u8]);
+    /// As [`State::load`].
+    fn load(&mut self, bytes: &[u8]) -> Result<(), StateError>;
     fn connected(&mut self, topics: &[(&str, &Announcement)]) -> Result<(), StepError>;
     fn step(
         &mut self,
         context: &StepContext<'_>,
         inputs: InputSamples<'_>,
-        state: &mut [u8],
         outputs: &mut OutputSamples<'_>,
     ) -> Result<(), StepError>;
     fn finish(&mut self) -> Result<(), StepError>;
 }
 
-impl<C: Component> Stepper for C {
-    fn initial(&self) -> Box<[u64]> {
-        let state = Component::initial(self);
-        let mut words = vec![0; size_of::<C::State>().div_ceil(8)].into_boxed_slice();
-        bytemuck::cast_slice_mut(&mut words)[..size_of::<C::State>()]
-            .copy_from_slice(bytemuck::bytes_of(&state));
-        words
+/// A component that was made, and its state.
+struct Made<C: Component> {
+    component: C,
+    state: C::State,
+}
+
+impl<C: Component> Instance for Made<C> {
+    fn state_size(&self) -> usize {
+        self.state.size()
+    }
+
+    fn save(&self, bytes: &mut [u8]) {
+        self.state.save(bytes);
+    }
+
+    fn load(&mut self, bytes: &[u8]) -> Result<(), StateError> {
+        self.state.load(bytes)
     }
 
     fn connected(&mut self, topics: &[(&str, &Announcement)]) -> Result<(), StepError> {
-        Component::connected(self, topics)
+        self.component.connected(topics, &mut self.state)
     }
 
     fn step(
         &mut self,
         context: &StepContext<'_>,
         inputs: InputSamples<'_>,
-        state: &mut [u8],
         outputs: &mut OutputSamples<'_>,
     ) -> Result<(), StepError> {
-        let sent = Component::step(self, context, C::Inputs::read(inputs), bytemuck::from_bytes_mut(state))?;
+        let sent = self.component.step(context, C::Inputs::read(inputs), &mut self.state)?;
         Ok(sent.write(outputs)?)
     }
 
     fn finish(&mut self) -> Result<(), StepError> {
-        Component::finish(self)
+        self.component.finish(&mut self.state)
     }
 }

@@ -1,18 +1,18 @@
 //! A component as a node of a run: this process, or a thread of it, takes the node's part.
 
 use crate::announcement::Announcement;
-use crate::component::{Component, StepError, Transfer};
+use crate::component::{Component, StateError, StepError, Transfer};
 use crate::connected::ConnectedNode;
 use crate::context::StepContext;
 use crate::error::BusError;
 use crate::executor::{Executor, Member};
+use crate::hand_over::Computation;
 use crate::handles::Wiring;
 use crate::join::Join;
 use crate::node::Node;
 use crate::port::{InPort, Locals, OutPort};
 use crate::ports::{InputSamples, OutputSamples, SampleSink, SampleSource};
-use crate::registration::{Registration, Stepper};
-use crate::schema::Schema;
+use crate::registration::{Instance, Registration};
 use crate::tick::Tick;
 
 /// Runs the component `C` as the node that the launcher started this process for: the whole `main` of an executable
@@ -44,10 +44,8 @@ pub(crate) struct Part {
     name: String,
     node: Option<Node>,
     wiring: Wiring,
-    component: Box<dyn Stepper>,
-    state: Box<[u64]>,
-    state_bytes: usize,
-    schema: Option<&'static Schema>,
+    instance: Box<dyn Instance>,
+    transfer: Transfer,
 }
 
 impl Part {
@@ -61,14 +59,9 @@ impl Part {
         let wiring = node.declare(registration, components)?;
         let (plan, node_plan) = node.plan();
         let made = registration.make_for(plan, node_plan, &node.files());
-        let component = made.map_err(|reason| node.error(reason))?;
-        let state = component.initial();
-        let schema = match registration.transfer {
-            Transfer::Message(schema) => Some(schema),
-            Transfer::Nothing | Transfer::Internal => None,
-        };
-        let (name, state_bytes) = (node.name().to_owned(), registration.state_bytes());
-        Ok(Self { name, node: Some(node), wiring, component, state, state_bytes, schema })
+        let instance = made.map_err(|reason| node.error(reason))?;
+        let (name, transfer) = (node.name().to_owned(), registration.transfer);
+        Ok(Self { name, node: Some(node), wiring, instance, transfer })
     }
 
     /// The node, to be connected.
@@ -80,14 +73,10 @@ impl Part {
     pub(crate) fn member(&mut self, connected: ConnectedNode) -> Result<Member<'_>, BusError> {
         let topics: Vec<(&str, &Announcement)> =
             self.wiring.inputs.iter().flatten().map(|&input| connected.announced(input)).collect();
-        let told = self.component.connected(&topics);
+        let told = self.instance.connected(&topics);
         told.map_err(|error| failed(&self.name, &error))?;
-        let (component, wiring) = (&mut *self.component, &self.wiring);
-        let state = &bytemuck::cast_slice(&self.state)[..self.state_bytes];
-        let step = move |tick: &mut Tick<'_>, state: &mut [u8]| {
-            step(component, wiring, tick, state).map_err(|error| error.to_string())
-        };
-        Member::new(connected, self.schema, state, Box::new(step))
+        let computation = Wired { instance: &mut *self.instance, wiring: &self.wiring };
+        Member::new(connected, self.transfer, Box::new(computation))
     }
 }
 
@@ -98,7 +87,7 @@ pub(crate) fn finish(
 ) -> Result<(), BusError> {
     let mut finished = Ok(());
     for mut part in parts {
-        let ended = part.component.finish().map_err(|error| failed(&part.name, &error));
+        let ended = part.instance.finish().map_err(|error| failed(&part.name, &error));
         finished = finished.and(ended);
     }
     match end {
@@ -112,23 +101,38 @@ fn failed(node: &str, error: &StepError) -> BusError {
     BusError::Parameters { node: node.to_owned(), reason: error.to_string() }
 }
 
-fn step(
-    component: &mut dyn Stepper,
-    wiring: &Wiring,
-    tick: &mut Tick<'_>,
-    state: &mut [u8],
-) -> Result<(), StepError> {
-    let number = tick.number();
-    let inputs = Received { tick: number, ports: tick.inputs, locals: tick.locals, wiring: &wiring.inputs };
-    let predecessor =
-        Received { tick: number, ports: tick.predecessor, locals: tick.locals, wiring: &wiring.outputs };
-    let context = StepContext {
-        tick: number,
-        time_ns: tick.time_ns,
-        predecessor: (!tick.predecessor.is_empty()).then_some(&predecessor as &dyn SampleSource),
-    };
-    let mut sink = Loans { tick: number, node: tick.node, ports: tick.outputs, wiring: &wiring.outputs };
-    component.step(&context, InputSamples(&inputs), state, &mut OutputSamples(&mut sink))
+/// A component whose ports are those of a node.
+struct Wired<'a> {
+    instance: &'a mut dyn Instance,
+    wiring: &'a Wiring,
+}
+
+impl Computation for Wired<'_> {
+    fn state_size(&self) -> usize {
+        self.instance.state_size()
+    }
+
+    fn save(&self, bytes: &mut [u8]) {
+        self.instance.save(bytes);
+    }
+
+    fn load(&mut self, bytes: &[u8]) -> Result<(), StateError> {
+        self.instance.load(bytes)
+    }
+
+    fn step(&mut self, tick: &mut Tick<'_>) -> Result<(), String> {
+        let (number, locals, wiring) = (tick.number(), tick.locals, self.wiring);
+        let inputs = Received { tick: number, ports: tick.inputs, locals, wiring: &wiring.inputs };
+        let predecessor = Received { tick: number, ports: tick.predecessor, locals, wiring: &wiring.outputs };
+        let context = StepContext {
+            tick: number,
+            time_ns: tick.time_ns,
+            predecessor: (!tick.predecessor.is_empty()).then_some(&predecessor as &dyn SampleSource),
+        };
+        let mut sink = Loans { tick: number, node: tick.node, ports: tick.outputs, wiring: &wiring.outputs };
+        let stepped = self.instance.step(&context, InputSamples(&inputs), &mut OutputSamples(&mut sink));
+        stepped.map_err(|error| error.to_string())
+    }
 }
 
 /// The samples that a node has received.

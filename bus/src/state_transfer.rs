@@ -4,15 +4,43 @@
 //! backup. It is stated before the tick's outputs are sent: whatever was sent, the state that follows it
 //! can be read, also when the process died right after.
 
-use crate::announcement::Announcement;
+use crate::component::Transfer;
 use crate::error::BusError;
+use crate::json_file;
 use crate::names::shm_path;
 use crate::plan::Plan;
-use crate::schema::Schema;
 use crate::shared_file;
 use memmap2::MmapRaw;
+use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+
+/// Layout of a state, as the process that publishes it announces it. A successor loads the state if its own is laid out
+/// the same.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct StateLayout {
+    type_name: String,
+    pub(crate) size: usize,
+    /// Hash of the fields of a message; 0 if the state is not a message.
+    layout_hash: u64,
+}
+
+impl StateLayout {
+    /// Layout of a state of `size` bytes; `None` if it is not transferred.
+    pub(crate) fn of(transfer: Transfer, size: usize) -> Option<Self> {
+        let (type_name, layout_hash) = match transfer {
+            Transfer::Message(schema) => (schema.type_name, schema.layout_hash()),
+            Transfer::Bytes(type_name) => (type_name, 0),
+            Transfer::Nothing | Transfer::File => return None,
+        };
+        Some(Self { type_name: type_name.to_owned(), size, layout_hash })
+    }
+
+    /// Number of 64-bit words of the state.
+    pub(crate) fn words(&self) -> usize {
+        self.size.div_ceil(8)
+    }
+}
 
 /// Bytes in front of each state: its tick plus one, so that memory that was never written holds none.
 const TICK_BYTES: usize = 8;
@@ -26,58 +54,62 @@ pub(crate) struct StateRing {
 }
 
 impl StateRing {
-    /// Creates the ring of generation `generation` of node `node`, whose state is `schema` with `more_words` of the bus
-    /// behind it, and announces it.
+    /// Creates the ring of generation `generation` of node `node`, whose state is laid out as `layout` with `more_words` of
+    /// the bus behind it, and announces it.
     pub(crate) fn create(
         run_dir: &Path,
         plan: &Plan,
         node: usize,
         generation: u32,
-        schema: &Schema,
+        layout: &StateLayout,
         more_words: usize,
     ) -> Result<Self, BusError> {
-        let state_words = schema.size.div_ceil(8) + more_words;
+        let state_words = layout.words() + more_words;
         let map = shared_file::create(&ring_path(plan, node, generation), ring_bytes(plan, state_words))?;
-        Announcement::of(schema).store(&announcement_path(run_dir, node, generation))?;
+        json_file::store(&announcement_path(run_dir, node, generation), layout)?;
         Ok(Self { map, entries: entries(plan), state_words })
     }
 
-    /// Opens the ring of a process that flies; `None` where it states no state, or one of another type.
+    /// Opens the ring of a running process; `None` if it publishes no state, or one of another layout.
     pub(crate) fn open(
         run_dir: &Path,
         plan: &Plan,
         node: usize,
         generation: u32,
-        schema: &Schema,
+        layout: &StateLayout,
         more_words: usize,
     ) -> Result<Option<Self>, BusError> {
         let announced = announcement_path(run_dir, node, generation);
-        if !announced.exists() || Announcement::load(&announced)?.layout_hash != schema.layout_hash() {
+        if !announced.exists() {
+            return Ok(None);
+        }
+        let found: StateLayout = json_file::load(&announced, "the layout of a state")?;
+        if found != *layout {
             return Ok(None);
         }
         let path = ring_path(plan, node, generation);
-        let state_words = schema.size.div_ceil(8) + more_words;
+        let state_words = layout.words() + more_words;
         let map = shared_file::open(&path, ring_bytes(plan, state_words), "the states of a process")?;
         Ok(Some(Self { map, entries: entries(plan), state_words }))
     }
 
     /// Publishes `state` as that at the start of `tick`.
-    pub(crate) fn store(&self, tick: u32, state: &[u8]) {
+    pub(crate) fn store(&self, tick: u32, state: &[u64]) {
         let (stamp, words) = self.entry(tick);
         stamp.store(u64::from(tick) + 1, Relaxed);
-        for (word, bytes) in words.iter().zip(state.chunks(8)) {
-            word.store(word_of(bytes), Relaxed);
+        for (word, value) in words.iter().zip(state) {
+            word.store(*value, Relaxed);
         }
     }
 
     /// Reads the state at the start of `tick`; false if the ring does not hold it.
-    pub(crate) fn load(&self, tick: u32, state: &mut [u8]) -> bool {
+    pub(crate) fn load(&self, tick: u32, state: &mut [u64]) -> bool {
         let (stamp, words) = self.entry(tick);
         if stamp.load(Relaxed) != u64::from(tick) + 1 {
             return false;
         }
-        for (word, bytes) in words.iter().zip(state.chunks_mut(8)) {
-            bytes.copy_from_slice(&word.load(Relaxed).to_le_bytes()[..bytes.len()]);
+        for (word, value) in words.iter().zip(state) {
+            *value = word.load(Relaxed);
         }
         true
     }
@@ -95,17 +127,6 @@ impl StateRing {
         };
         (&words[0], &words[1..])
     }
-}
-
-/// Up to eight bytes as a word, zeros behind them.
-fn word_of(bytes: &[u8]) -> u64 {
-    // The fast way for all words but the last.
-    if let Ok(whole) = bytes.try_into() {
-        return u64::from_le_bytes(whole);
-    }
-    let mut word = [0; 8];
-    word[..bytes.len()].copy_from_slice(bytes);
-    u64::from_le_bytes(word)
 }
 
 /// A slot is at most a window ahead of its backup; one state more belongs to the tick that it computes.
@@ -131,4 +152,22 @@ pub fn remove(run_dir: &Path, plan: &Plan, node: usize, generation: u32) {
     // A process without a state has neither.
     let _ = std::fs::remove_file(ring_path(plan, node, generation));
     let _ = std::fs::remove_file(announcement_path(run_dir, node, generation));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::StateLayout;
+    use crate::component::{State, Transfer};
+    use crate::messages::{MotorCommand, SetPoint};
+
+    #[test]
+    fn states_are_laid_out_alike_if_type_and_size_are_the_same() {
+        let of = |name, size| StateLayout::of(Transfer::Bytes(name), size);
+        assert_eq!(of("plant", 96), of("plant", 96));
+        assert_ne!(of("plant", 96), of("plant", 104), "another configuration");
+        assert_ne!(of("plant", 96), of("stand", 96), "another type");
+        let message = |transfer| StateLayout::of(transfer, 40);
+        assert_ne!(message(SetPoint::TRANSFER), message(MotorCommand::TRANSFER));
+        assert_eq!((message(Transfer::Nothing), message(Transfer::File)), (None, None));
+    }
 }

@@ -69,7 +69,7 @@ impl<L: Law> Component for Controller<L> {
     }
 
     fn step(
-        &mut self,
+        &self,
         context: &StepContext<'_>,
         inputs: L::Inputs<'_>,
         state: &mut ControllerState,

@@ -134,16 +134,12 @@ impl FlightLog {
     }
 
     /// The flight at `time_s` after its first row: commands as last set, measurements interpolated.
-    ///
-    /// `hint` is an index near the row, kept by the caller between calls at growing times.
     #[must_use]
-    pub fn at(&self, time_s: f64, hint: &mut usize) -> Row {
+    pub fn at(&self, time_s: f64) -> Row {
         // Times are sums of decimal fractions: a nanosecond of slack puts a tick on its own row.
-        while *hint + 1 < self.rows.len() && self.rows[*hint + 1].time_s <= time_s + 1e-9 {
-            *hint += 1;
-        }
-        let before = &self.rows[*hint];
-        let Some(after) = self.rows.get(*hint + 1) else { return *before };
+        let next = self.rows.partition_point(|row| row.time_s <= time_s + 1e-9).max(1);
+        let before = &self.rows[next - 1];
+        let Some(after) = self.rows.get(next) else { return *before };
         let part = ((time_s - before.time_s) / (after.time_s - before.time_s)).clamp(0.0, 1.0);
         Row {
             time_s,

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 /// A control law at one period, with all that does not change during a run.
 ///
 /// [`crate::controller::Controller`] makes a component of it.
-pub trait Law: Sized {
+pub trait Law: Sized + Send {
     /// Its name in manifests, and what it does.
     const INFO: Info;
     /// What the manifest's `parameters` table holds.

@@ -103,7 +103,7 @@ impl Component for Pilot {
 
     fn initial(&self) {}
 
-    fn step(&mut self, context: &StepContext<'_>, (): (), (): &mut ()) -> Result<Outputs, StepError> {
+    fn step(&self, context: &StepContext<'_>, (): (), (): &mut ()) -> Result<Outputs, StepError> {
         let asked = self.at(u64::from(context.tick()), context.time_s());
         let set_point = SetPoint {
             altitude: asked.altitude_m,

@@ -95,8 +95,6 @@ pub struct Player {
     log: FlightLog,
     from_s: f64,
     gaps: Gaps,
-    /// The row that was played last.
-    hint: usize,
 }
 
 impl Component for Player {
@@ -109,7 +107,7 @@ impl Component for Player {
 
     fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         let log = load(&parameters, &context.files)?;
-        Ok(Self { log, from_s: parameters.from_s, gaps: parameters.gaps, hint: 0 })
+        Ok(Self { log, from_s: parameters.from_s, gaps: parameters.gaps })
     }
 
     fn rehearse(self, context: &NodeContext<'_>) -> Result<(), ParameterError> {
@@ -119,7 +117,7 @@ impl Component for Player {
 
     fn initial(&self) {}
 
-    fn step(&mut self, context: &StepContext<'_>, (): (), (): &mut ()) -> Result<Outputs, StepError> {
+    fn step(&self, context: &StepContext<'_>, (): (), (): &mut ()) -> Result<Outputs, StepError> {
         let time_s = self.from_s + context.time_s();
         let left_s = self.log.duration_s() - self.from_s;
         if time_s > self.log.duration_s() + SLACK_S {
@@ -127,7 +125,7 @@ impl Component for Player {
                 format!("the flight ends {left_s:.3} s after `from_s`; shorten run.duration_s").into()
             );
         }
-        let row = self.log.at(time_s, &mut self.hint);
+        let row = self.log.at(time_s);
         let command = MotorCommand { command: row.command, ..Default::default() };
         Ok(Outputs { command, measured: message(&row) })
     }

@@ -149,7 +149,7 @@ impl Component for PositionHold {
     }
 
     fn step(
-        &mut self,
+        &self,
         _: &StepContext<'_>,
         inputs: Inputs<'_>,
         state: &mut PositionHoldState,

@@ -76,7 +76,7 @@ impl Component for TrajectoryNode {
 
     fn initial(&self) {}
 
-    fn step(&mut self, context: &StepContext<'_>, (): (), (): &mut ()) -> Result<Outputs, StepError> {
+    fn step(&self, context: &StepContext<'_>, (): (), (): &mut ()) -> Result<Outputs, StepError> {
         Ok(Outputs { reference: Reference::from(&self.0.at(context.time_ns() as f64 * 1e-9)) })
     }
 }

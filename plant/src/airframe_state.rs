@@ -4,12 +4,12 @@
 //! on to the same bits, random numbers included: a stream is written as its key and its position.
 
 use crate::actuation::Actuation;
+use crate::saved::{Reader, Saved, Unfit, Writer, saved_fields};
 use bus::random::{Stream, normal};
-use serde::{Deserialize, Serialize};
 
 /// What the effects of one airframe carry from tick to tick; made by
 /// [`Airframe::initial_state`](crate::Airframe::initial_state). Only its making allocates.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct AirframeState {
     /// What acts over the tick that began last.
     pub actuation: Actuation,
@@ -18,23 +18,17 @@ pub struct AirframeState {
     pub(crate) effects: Vec<EffectState>,
 }
 
-impl AirframeState {
-    /// Whether `other` can go on in place of this one: as many effects, as long a delay.
-    pub(crate) fn fits(&self, other: &Self) -> bool {
-        let (ring, newest) = (&other.commands.ring, other.commands.newest);
-        other.effects.len() == self.effects.len()
-            && ring.len() == self.commands.ring.len()
-            && newest < ring.len()
-    }
-}
+saved_fields!(AirframeState { actuation, commands, effects });
 
 /// What one effect carries from tick to tick.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct EffectState {
     /// The effect's own numbers, zeros at the start.
     pub numbers: [f64; 4],
     random: Stream,
 }
+
+saved_fields!(EffectState { numbers, random });
 
 impl EffectState {
     pub(crate) fn new(random: Stream) -> Self {
@@ -48,11 +42,33 @@ impl EffectState {
 }
 
 /// The commands of the last ticks, in a ring.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct DelayLine {
     ring: Vec<[f64; 4]>,
     newest: usize,
     is_empty: bool,
+}
+
+impl Saved for DelayLine {
+    fn size(&self) -> usize {
+        self.ring.size() + size_of::<u64>() + self.is_empty.size()
+    }
+
+    fn save(&self, to: &mut Writer<'_>) {
+        self.ring.save(to);
+        (self.newest as u64).save(to);
+        self.is_empty.save(to);
+    }
+
+    fn load(&mut self, from: &mut Reader<'_>) -> Result<(), Unfit> {
+        let mut newest = 0_u64;
+        self.ring.load(from)?;
+        newest.load(from)?;
+        self.is_empty.load(from)?;
+        let newest = usize::try_from(newest).ok().filter(|newest| *newest < self.ring.len());
+        self.newest = newest.ok_or(Unfit::Value("the newest command is outside the delay line"))?;
+        Ok(())
+    }
 }
 
 impl DelayLine {

@@ -1,6 +1,7 @@
 //! What a vehicle must be to fly at all, looked at before a run: `check` refuses what cannot, and tells what is odd.
 
 use crate::backend::Backend;
+use crate::newton_euler::NewtonEuler;
 use crate::state::{RigidBody, State};
 use bus::context::NodeContext;
 use diagnostics::parameter::{ParameterError, refuse};
@@ -164,11 +165,10 @@ fn places(numbers: &[&Provenance]) -> String {
 /// Which number is none, and after how many ticks.
 pub(crate) fn rehearse(
     backend: &mut dyn Backend,
-    vehicle: &Vehicle,
-    substeps: u32,
+    model: &NewtonEuler,
     dt_s: f64,
 ) -> Result<(), ParameterError> {
-    let ticks = (REHEARSAL_STEPS / substeps.max(1)).max(3);
+    let (vehicle, ticks) = (model.vehicle(), (REHEARSAL_STEPS / model.substeps()).max(3));
     let (map, mut flown) = (&vehicle.command, 0);
     for command in [vehicle.hover_command(), map.max, map.min] {
         backend.settle_rotors(&[command; 4]);
@@ -312,12 +312,11 @@ mod tests {
     #[test]
     fn numbers_that_overflow_together_are_found_on_the_ground() {
         let rehearsed = |change: fn(&mut Vehicle)| {
-            let vehicle = hummingbird(change);
-            let airframe = Airframe::new(vehicle.clone());
+            let airframe = Airframe::new(hummingbird(change));
             let effects = airframe.initial_state(0, "", 1e-3);
             let model = NewtonEuler::flying(airframe, 1);
-            let mut backend = FreeFlight::new(model, RigidBody::level_at(Vector3::z()), effects);
-            rehearse(&mut backend, &vehicle, 1, 1e-3)
+            let mut backend = FreeFlight::new(model.clone(), RigidBody::level_at(Vector3::z()), effects);
+            rehearse(&mut backend, &model, 1e-3)
         };
         assert_eq!(rehearsed(|_| {}), Ok(()));
         let message = rehearsed(|it| it.thrust_coefficient = 1e306).unwrap_err().to_string();

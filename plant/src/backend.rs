@@ -2,13 +2,16 @@
 
 use crate::actuation::Battery;
 use crate::newton_euler::Accelerations;
-use crate::snapshot::SnapshotError;
+use crate::saved::Saved;
+use crate::snapshot::{Snapshot, SnapshotError};
 use crate::state::{RigidBody, State};
 use nalgebra::Vector3;
-use serde::{Deserialize, Serialize};
 
 /// Physics that moves one vehicle from tick to tick.
-pub trait Backend {
+pub trait Backend: Send {
+    /// The name of the physics, as manifests say it.
+    fn name(&self) -> &'static str;
+
     /// Body and rotors at the end of the last tick.
     fn state(&self) -> &State;
 
@@ -24,6 +27,9 @@ pub trait Backend {
 
     /// Puts the body where it is said to be; the rotors stay as they are.
     fn set_body(&mut self, body: &RigidBody);
+
+    /// Has the rotors turn steadily at these speeds.
+    fn set_rotor_speeds(&mut self, speeds_rad_s: &[f64; 4]);
 
     /// What was touched over the last tick.
     fn contact(&self) -> ContactReport;
@@ -46,25 +52,49 @@ pub trait Backend {
     /// The battery, if an effect models it.
     fn battery(&self) -> Option<Battery>;
 
-    /// Everything that the next ticks depend on.
+    /// Tells `note` every part of the state that the next ticks depend on, by name, in a fixed order.
+    fn parts(&self, note: &mut dyn FnMut(&'static str, &dyn Saved));
+
+    /// As [`Backend::parts`], to be changed; the first error ends it.
     ///
     /// # Errors
-    /// If the state cannot be written down.
-    fn snapshot(&self) -> Result<Vec<u8>, SnapshotError>;
+    /// Those of `note`.
+    fn parts_mut(&mut self, note: &mut NotePart<'_>) -> Result<(), SnapshotError>;
+
+    /// The parts of the state as bytes with their names.
+    ///
+    /// # Errors
+    /// If the state cannot be written.
+    fn snapshot(&self) -> Result<Vec<u8>, SnapshotError> {
+        let mut snapshot = Snapshot::of(self.name());
+        self.parts(&mut |name, part| snapshot.push(name, part));
+        snapshot.bytes()
+    }
 
     /// Continues from a snapshot that the same backend took of the same vehicle in the same scene. After an
     /// error the backend is as it was.
     ///
     /// # Errors
     /// If the bytes are no such snapshot.
-    fn restore(&mut self, snapshot: &[u8]) -> Result<(), SnapshotError>;
+    fn restore(&mut self, snapshot: &[u8]) -> Result<(), SnapshotError> {
+        let snapshot = Snapshot::read(snapshot, self.name())?;
+        let mut before = Snapshot::of(self.name());
+        self.parts(&mut |name, part| before.push(name, part));
+        self.parts_mut(&mut |name, part| snapshot.load(name, part)).inspect_err(|_| {
+            // It was taken of this very backend: every part fits.
+            let _ = self.parts_mut(&mut |name, part| before.load(name, part));
+        })
+    }
 }
+
+/// What is done with a part of a state: see [`Backend::parts_mut`].
+pub type NotePart<'a> = dyn FnMut(&'static str, &mut dyn Saved) -> Result<(), SnapshotError> + 'a;
 
 /// The most vehicles that share a room, this one included.
 pub const TRAFFIC_MAX: usize = 32;
 
 /// Another vehicle of the run.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Neighbour {
     /// Its place in the traffic, from 0.
     pub number: u32,
@@ -75,7 +105,7 @@ pub struct Neighbour {
 }
 
 /// What the vehicle touches; `bus::messages::Contact` says what each field means.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ContactReport {
     /// Sum of the contact forces over the last tick.
     pub force_W_N: Vector3<f64>,

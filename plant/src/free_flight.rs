@@ -2,13 +2,11 @@
 
 use crate::actuation::Battery;
 use crate::airframe_state::AirframeState;
-use crate::backend::{Backend, ContactReport, Neighbour};
+use crate::backend::{Backend, ContactReport, Neighbour, NotePart};
 use crate::newton_euler::{Accelerations, NewtonEuler};
-use crate::snapshot::{Snapshot, SnapshotError};
-use crate::state::{RigidBody, State};
-
-/// What its snapshots are called.
-const NAME: &str = "newton-euler";
+use crate::saved::Saved;
+use crate::snapshot::SnapshotError;
+use crate::state::{RigidBody, RotorState, State};
 
 /// A vehicle in free flight: the model, the state that it moves, and the state of its effects.
 ///
@@ -44,6 +42,10 @@ impl FreeFlight {
 }
 
 impl Backend for FreeFlight {
+    fn name(&self) -> &'static str {
+        "newton-euler"
+    }
+
     fn state(&self) -> &State {
         &self.state
     }
@@ -65,6 +67,10 @@ impl Backend for FreeFlight {
         self.state.body = *body;
     }
 
+    fn set_rotor_speeds(&mut self, speeds_rad_s: &[f64; 4]) {
+        self.state.rotors = speeds_rad_s.map(RotorState::steady);
+    }
+
     fn contact(&self) -> ContactReport {
         ContactReport::default()
     }
@@ -73,14 +79,13 @@ impl Backend for FreeFlight {
         self.model.airframe().battery(&self.effects, &self.state)
     }
 
-    fn snapshot(&self) -> Result<Vec<u8>, SnapshotError> {
-        Snapshot::of(NAME).with("state", &self.state)?.with("effects", &self.effects)?.bytes()
+    fn parts(&self, note: &mut dyn FnMut(&'static str, &dyn Saved)) {
+        note("state", &self.state);
+        note("effects", &self.effects);
     }
 
-    fn restore(&mut self, snapshot: &[u8]) -> Result<(), SnapshotError> {
-        let snapshot = Snapshot::read(snapshot, NAME)?;
-        let effects = snapshot.fitting("effects", |effects| self.effects.fits(effects))?;
-        (self.state, self.effects) = (snapshot.get("state")?, effects);
-        Ok(())
+    fn parts_mut(&mut self, note: &mut NotePart<'_>) -> Result<(), SnapshotError> {
+        note("state", &mut self.state)?;
+        note("effects", &mut self.effects)
     }
 }

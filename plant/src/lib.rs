@@ -13,10 +13,11 @@
 //! | `backend` | what a plant can do, whichever physics moves it |
 //! | `free_flight` | the backend `newton-euler` |
 //! | [`rapier`] | the backend `rapier`: ground, walls, other vehicles, rigs |
-//! | [`snapshot`] | a backend's state as bytes |
-//! | [`node`] | the plant as a process of a run |
+//! | [`saved`] | parts of a state as bytes of a fixed number |
+//! | [`snapshot`] | a backend's state as bytes with names |
+//! | [`node`], `memory` | the plant as a process of a run, and its state |
 //! | `airworthy` | what a vehicle must be to fly at all |
-//! | `parameters` | what manifests say of a plant, and the backend that follows |
+//! | `parameters`, `origin` | what manifests say of a plant, and the flight that starts from it |
 //! | `others` | which vehicles of the traffic are others |
 //! | `output` | what a plant publishes |
 //! | [`propeller_stand`] | one rotor alone, bolted down |
@@ -47,9 +48,11 @@ mod airworthy;
 mod backend;
 pub mod effects;
 mod free_flight;
+mod memory;
 mod motor;
 mod newton_euler;
 pub mod node;
+mod origin;
 mod others;
 mod output;
 mod parameters;
@@ -57,6 +60,7 @@ pub mod propeller_stand;
 pub mod rapier;
 mod rotation;
 pub mod rotor;
+pub mod saved;
 pub mod snapshot;
 mod state;
 pub mod traffic;
@@ -64,8 +68,9 @@ pub mod traffic;
 pub use actuation::{Actuation, Battery};
 pub use airframe::Airframe;
 pub use airframe_state::{AirframeState, EffectState};
-pub use backend::{Backend, ContactReport, Neighbour};
+pub use backend::{Backend, ContactReport, Neighbour, NotePart};
 pub use free_flight::FreeFlight;
+pub use memory::PlantMemory;
 pub use newton_euler::{Accelerations, NewtonEuler};
 pub use rapier::Rapier;
 pub use rotor::Wrench;

@@ -5,18 +5,18 @@
 //! publishes at that tick is the end of the window before.
 
 use crate::airworthy;
-use crate::backend::Backend;
-use crate::others::Others;
+use crate::memory::PlantMemory;
+use crate::origin::Origin;
+use crate::others::OthersError;
 use crate::output::Outputs;
 use crate::parameters::Parameters;
 use crate::state::RigidBody;
 use bus::InputPorts;
-use bus::component::{Component, Info, Internal, StepError};
+use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
-use bus::messages::{MeasuredState, MotorCommand, Traffic};
+use bus::messages::{self, MeasuredState, MotorCommand, PlantState, Traffic};
 use diagnostics::ParameterError;
 use nalgebra::{UnitQuaternion, Vector3};
-use vehicles::Vehicle;
 
 /// What the plant reads.
 #[derive(Debug, InputPorts)]
@@ -29,7 +29,7 @@ pub struct Inputs<'a> {
     pub traffic: Option<&'a Traffic>,
 }
 
-/// The plant: its vehicle, and what moves it.
+/// The plant: its vehicle, and the physics that moves it.
 ///
 /// ```
 /// use bus::messages::MotorCommand;
@@ -44,13 +44,10 @@ pub struct Inputs<'a> {
 /// assert!(state.position.z < 1.0 && state.velocity.z < 0.0, "with its rotors off it falls: {state:?}");
 /// ```
 pub struct Plant {
-    vehicle: Vehicle,
-    substeps: u32,
-    backend: Box<dyn Backend>,
+    origin: Origin,
     /// Ticks between two settings to what is measured.
     window_ticks: u32,
     dt_s: f64,
-    others: Others,
 }
 
 impl Component for Plant {
@@ -58,81 +55,94 @@ impl Component for Plant {
     type Parameters = Parameters;
     type Inputs<'a> = Inputs<'a>;
     type Outputs = Outputs;
-    type State = Internal;
+    type State = PlantMemory;
 
     fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
-        let (dt_s, substeps) = (context.tick_s(), parameters.substeps);
-        let (vehicle, backend) = parameters.backend(context)?;
-        let window_ticks = parameters.window_ticks(dt_s)?;
-        Ok(Self { vehicle, substeps, backend, window_ticks, dt_s, others: Others::new() })
+        let (dt_s, origin) = (context.tick_s(), parameters.origin(context)?);
+        Ok(Self { origin, window_ticks: parameters.window_ticks(dt_s)?, dt_s })
     }
 
-    fn rehearse(mut self, _: &NodeContext<'_>) -> Result<(), ParameterError> {
-        airworthy::rehearse(&mut *self.backend, &self.vehicle, self.substeps, self.dt_s)
+    fn rehearse(self, _: &NodeContext<'_>) -> Result<(), ParameterError> {
+        airworthy::rehearse(&mut *self.origin.begin(), &self.origin.model, self.dt_s)
     }
 
-    fn initial(&self) -> Internal {
-        Internal
+    fn initial(&self) -> PlantMemory {
+        PlantMemory::new(self.origin.begin())
     }
 
     fn step(
-        &mut self,
+        &self,
         context: &StepContext<'_>,
         inputs: Inputs<'_>,
-        _: &mut Internal,
+        memory: &mut PlantMemory,
     ) -> Result<Outputs, StepError> {
         let measured = inputs.measured.filter(|_| context.tick().is_multiple_of(self.window_ticks));
+        if let Some(last) = context.predecessor::<Outputs>() {
+            memory.backend.set_body(&body_of(&last.state));
+            memory.backend.set_rotor_speeds(&last.state.rotor_speed);
+        }
         if context.tick() > 0 {
-            self.fly(context, &inputs)?;
+            self.fly(context, &inputs, memory)?;
         } else {
             // The input's initial value: the rotors turn steadily at it when the run starts.
-            self.backend.settle_rotors(&inputs.command.command);
-            self.set_body(measured);
+            memory.backend.settle_rotors(&inputs.command.command);
+            set_body(memory, measured);
         }
-        if let Some(number) = self.backend.bodies().iter().position(|body| !body.is_finite()) {
+        if let Some(number) = memory.backend.bodies().iter().position(|body| !body.is_finite()) {
             return Err(format!(
                 "the motion of the scene's free body {number}, counted from 0, is no number; look at the masses, speeds and \
                  joints of the scene, or raise `substeps`"
             )
             .into());
         }
-        if let Some(trouble) = self.backend.trouble() {
+        if let Some(trouble) = memory.backend.trouble() {
             return Err(trouble.into());
         }
-        let outputs = Outputs::of(&*self.backend, context.time_ns());
-        self.set_body(measured);
+        let outputs = Outputs::of(&*memory.backend, context.time_ns());
+        set_body(memory, measured);
         Ok(outputs)
     }
 }
 
 impl Plant {
     /// Moves the vehicle by the tick that ends now.
-    fn fly(&mut self, context: &StepContext<'_>, inputs: &Inputs<'_>) -> Result<(), StepError> {
+    fn fly(
+        &self,
+        context: &StepContext<'_>,
+        inputs: &Inputs<'_>,
+        memory: &mut PlantMemory,
+    ) -> Result<(), StepError> {
+        let PlantMemory { backend, others } = memory;
         let number = u64::from(context.tick());
         let before_ns = context.time_ns() / number * (number - 1);
-        let position_W_m = self.backend.state().body.position_W_m;
-        let seen =
-            inputs.traffic.map(|traffic| self.others.seen(traffic, &position_W_m, before_ns)).transpose()?;
-        self.backend.step(&inputs.command.command, self.dt_s, seen.unwrap_or_default());
+        let position_W_m = backend.state().body.position_W_m;
+        let seen = inputs.traffic.map(|traffic| others.seen(traffic, &position_W_m, before_ns));
+        let seen = match seen.transpose() {
+            // A shadow that cannot load the state of its predecessor is elsewhere until it takes over.
+            Err(OthersError::Absent { .. }) if number > 1 => None,
+            seen => seen?,
+        };
+        backend.step(&inputs.command.command, self.dt_s, seen.unwrap_or_default());
         Ok(())
-    }
-
-    fn set_body(&mut self, measured: Option<&MeasuredState>) {
-        if let Some(measured) = measured {
-            self.backend.set_body(&body(measured));
-        }
     }
 }
 
-fn body(measured: &MeasuredState) -> RigidBody {
-    let vector = |v| Vector3::from(<[f64; 3]>::from(v));
-    let q = measured.attitude;
-    RigidBody {
-        position_W_m: vector(measured.position),
-        velocity_W_m_s: vector(measured.velocity),
-        attitude_WB: UnitQuaternion::new_normalize(nalgebra::Quaternion::new(q.w, q.x, q.y, q.z)),
-        angular_velocity_B_rad_s: vector(measured.angular_velocity),
+fn set_body(memory: &mut PlantMemory, measured: Option<&MeasuredState>) {
+    if let Some(MeasuredState { position, velocity, attitude, angular_velocity, .. }) = measured {
+        memory.backend.set_body(&body([*position, *velocity, *angular_velocity], *attitude));
     }
+}
+
+fn body_of(state: &PlantState) -> RigidBody {
+    body([state.position, state.velocity, state.angular_velocity], state.attitude)
+}
+
+/// A body with this position, velocity and angular velocity.
+fn body(vectors: [messages::Vector3; 3], q: messages::Quaternion) -> RigidBody {
+    let [position_W_m, velocity_W_m_s, angular_velocity_B_rad_s] =
+        vectors.map(|v| Vector3::from(<[f64; 3]>::from(v)));
+    let attitude_WB = UnitQuaternion::new_normalize(nalgebra::Quaternion::new(q.w, q.x, q.y, q.z));
+    RigidBody { position_W_m, velocity_W_m_s, attitude_WB, angular_velocity_B_rad_s }
 }
 
 #[cfg(test)]

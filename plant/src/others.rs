@@ -1,6 +1,7 @@
 //! Which vehicles of the traffic are others: all but the one that is where this plant's vehicle is.
 
 use crate::backend::{Neighbour, TRAFFIC_MAX};
+use crate::saved::{Reader, Saved, Unfit, Writer};
 use bus::messages::{Time, Traffic};
 use nalgebra::Vector3;
 
@@ -8,9 +9,13 @@ use nalgebra::Vector3;
 #[derive(Debug, Default)]
 pub(crate) struct Others {
     /// This vehicle's place in the traffic, known from the first sample on.
-    self_index: Option<usize>,
+    self_index: Option<u32>,
+    /// Overwritten at every tick.
     neighbours: Vec<Neighbour>,
 }
+
+/// A place in the traffic that is not known yet, as it is saved.
+const UNKNOWN: u32 = u32::MAX;
 
 /// Traffic in which this vehicle cannot be told from the others.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -22,6 +27,26 @@ pub(crate) enum OthersError {
     Absent { count: usize, position_W_m: Vector3<f64> },
     #[error("the vehicles {first} and {second} of the traffic start at one place")]
     OnePlace { first: usize, second: usize },
+}
+
+impl Saved for Others {
+    fn size(&self) -> usize {
+        size_of::<u32>()
+    }
+
+    fn save(&self, to: &mut Writer<'_>) {
+        self.self_index.unwrap_or(UNKNOWN).save(to);
+    }
+
+    fn load(&mut self, from: &mut Reader<'_>) -> Result<(), Unfit> {
+        let mut index = UNKNOWN;
+        index.load(from)?;
+        if index != UNKNOWN && index as usize >= TRAFFIC_MAX {
+            return Err(Unfit::Value("it is beyond the last vehicle"));
+        }
+        self.self_index = (index != UNKNOWN).then_some(index);
+        Ok(())
+    }
 }
 
 impl Others {
@@ -43,12 +68,14 @@ impl Others {
         let count = (traffic.count as usize).min(TRAFFIC_MAX);
         let index = match self.self_index {
             Some(index) => index,
-            None => *self.self_index.insert(place(traffic, count, position_W_m)?),
+            None => *self.self_index.insert(place(traffic, count, position_W_m)? as u32),
         };
         let age_s = now_ns.saturating_sub(ns(traffic.stamp)) as f64 * 1e-9;
         self.neighbours.clear();
         self.neighbours.extend(
-            (0..count).filter(|number| *number != index).map(|number| neighbour(traffic, number, age_s)),
+            (0..count)
+                .filter(|number| *number != index as usize)
+                .map(|number| neighbour(traffic, number, age_s)),
         );
         Ok(&self.neighbours)
     }

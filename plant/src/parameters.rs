@@ -1,12 +1,10 @@
 //! What manifests say of a plant, and the backend that follows.
 
 use crate::airframe::Airframe;
-use crate::airframe_state::AirframeState;
 use crate::airworthy;
-use crate::backend::Backend;
 use crate::effects::{self, Quantity};
-use crate::free_flight::FreeFlight;
 use crate::newton_euler::NewtonEuler;
+use crate::origin::{Origin, Physics};
 use crate::rapier::{Misfit, Rapier};
 use crate::state::RigidBody;
 use bus::context::NodeContext;
@@ -139,64 +137,61 @@ impl Parameters {
         Ok(ticks as u32)
     }
 
-    /// The vehicle, and the backend that flies it, as it is at tick 0; the effects draw their random numbers by the
-    /// run's seed and the node's name.
+    /// The vehicle as it is at tick 0, and the backend that flies it; the effects draw their random numbers by the run's
+    /// seed and the node's name.
     ///
     /// # Errors
     /// What cannot be meant, or cannot fly.
-    pub(crate) fn backend(
-        &self,
-        run: &NodeContext<'_>,
-    ) -> Result<(Vehicle, Box<dyn Backend>), ParameterError> {
+    pub(crate) fn origin(&self, run: &NodeContext<'_>) -> Result<Origin, ParameterError> {
         self.check(run)?;
         let (airframe, scene) = self.airframe(&run.files)?;
         self.refuse_ports(&scene, run)?;
         // Before the backend, which a vehicle that is none might not survive.
         airworthy::tell_unsourced(airframe.vehicle(), run);
         airworthy::check_rotor_inertia(airframe.vehicle())?;
-        airworthy::check_steps(airframe.vehicle(), run.tick_s() / f64::from(self.substeps), run)?;
+        let dt_s = run.tick_s() / f64::from(self.substeps);
+        airworthy::check_steps(airframe.vehicle(), dt_s, run)?;
         if scene.rig.is_none() && self.window_s.is_none() {
             airworthy::check_lift(airframe.vehicle(), run)?;
         }
-        let vehicle = airframe.vehicle().clone();
         let effects = airframe.initial_state(run.seed, run.name, run.tick_s());
         let model = NewtonEuler::flying(airframe, self.substeps);
-        let dt_s = run.tick_s() / f64::from(self.substeps);
-        Ok((vehicle, self.fly(model, effects, &scene, dt_s)?))
+        let origin = Origin { model, effects, scene, start: self.start(), physics: self.physics() };
+        self.check_scene(&origin, dt_s)?;
+        Ok(origin)
     }
 
-    fn fly(
-        &self,
-        model: NewtonEuler,
-        effects: AirframeState,
-        scene: &Scene,
-        dt_s: f64,
-    ) -> Result<Box<dyn Backend>, ParameterError> {
-        let flies_freely = self.backend == BackendName::NewtonEuler;
+    fn physics(&self) -> Physics {
+        match self.backend {
+            BackendName::NewtonEuler => Physics::Free,
+            BackendName::Rapier => {
+                Physics::Rapier { crash_speed_m_s: self.crash_speed_m_s.unwrap_or(CRASH_SPEED_M_S) }
+            }
+        }
+    }
+
+    /// Refuses a scene in which the backend cannot fly, or the vehicle cannot start.
+    fn check_scene(&self, origin: &Origin, dt_s: f64) -> Result<(), ParameterError> {
+        let scene = &origin.scene;
+        if let Physics::Rapier { crash_speed_m_s } = origin.physics {
+            let mut rapier = origin.begin_in_scene(crash_speed_m_s);
+            self.refuse_inside(&rapier, scene)?;
+            return self.refuse_bodies(&mut rapier, scene, dt_s);
+        }
         let has_bodies = scene.bodies().next().is_some() || !scene.joints.is_empty();
-        refuse(flies_freely && has_bodies, "scene", || {
+        refuse(has_bodies, "scene", || {
             let name = &scene.name;
             format!(
                 "`scene` \"{name}\" holds free bodies or joints, which need `backend` = \"rapier\": newton-euler moves the vehicle \
                  alone"
             )
         })?;
-        refuse(flies_freely && scene.rig.is_some(), "scene", || {
+        refuse(scene.rig.is_some(), "scene", || {
             let name = &scene.name;
             format!(
                 "`scene` \"{name}\" holds a rig, which needs `backend` = \"rapier\": newton-euler flies freely"
             )
-        })?;
-        match self.backend {
-            BackendName::NewtonEuler => Ok(Box::new(FreeFlight::new(model, self.start(), effects))),
-            BackendName::Rapier => {
-                let crash_speed_m_s = self.crash_speed_m_s.unwrap_or(CRASH_SPEED_M_S);
-                let mut rapier = Rapier::new(model, effects, scene, &self.start(), crash_speed_m_s);
-                self.refuse_inside(&rapier, scene)?;
-                self.refuse_bodies(&mut rapier, scene, dt_s)?;
-                Ok(Box::new(rapier))
-            }
-        }
+        })
     }
 
     /// The vehicle as it flies, and what stands around it.

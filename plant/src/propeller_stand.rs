@@ -12,7 +12,7 @@ use crate::state::RotorState;
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::Time;
-use bus::random::{Stream, normal, stream};
+use bus::random::{self, Stream, normal, stream};
 use bus::{Message, OutputPorts};
 use diagnostics::parameter::{ParameterError, not_negative, refuse, require};
 use serde::Deserialize;
@@ -141,9 +141,9 @@ struct Noise {
 impl Noise {
     /// What is added to force, torque and speed at a tick. All are drawn always, so that one's noise does not reshuffle
     /// the others'.
-    fn at(&mut self, tick: u32) -> [f64; 3] {
-        self.random.set_word_pos(u128::from(tick) * WORDS_PER_TICK);
-        self.sigmas.map(|sigma| sigma * normal(&mut self.random))
+    fn at(&self, tick: u32) -> [f64; 3] {
+        let mut random = random::at(&self.random, u128::from(tick) * WORDS_PER_TICK);
+        self.sigmas.map(|sigma| sigma * normal(&mut random))
     }
 }
 
@@ -190,12 +190,7 @@ impl Component for PropellerStand {
         StandState::default()
     }
 
-    fn step(
-        &mut self,
-        context: &StepContext<'_>,
-        (): (),
-        state: &mut StandState,
-    ) -> Result<Outputs, StepError> {
+    fn step(&self, context: &StepContext<'_>, (): (), state: &mut StandState) -> Result<Outputs, StepError> {
         let tick = context.tick();
         if let Some(before) = tick.checked_sub(1) {
             let target_rad_s = self.commanded_rad_s(before);
@@ -237,7 +232,7 @@ impl PropellerStand {
 
 impl PropellerStand {
     /// What the sensors make of the truth at a tick.
-    fn read(&mut self, truth: &RotorLoad, tick: u32) -> RotorLoad {
+    fn read(&self, truth: &RotorLoad, tick: u32) -> RotorLoad {
         let [force_N, torque_N_m, speed_rad_s] = self.noise.at(tick);
         let against_spin = -self.vehicle.rotors[self.rotor].spin;
         RotorLoad {

@@ -42,10 +42,11 @@ mod world;
 
 use crate::actuation::Battery;
 use crate::airframe_state::AirframeState;
-use crate::backend::{Backend, ContactReport, Neighbour, TRAFFIC_MAX};
+use crate::backend::{Backend, ContactReport, Neighbour, NotePart, TRAFFIC_MAX};
 use crate::newton_euler::{Accelerations, NewtonEuler};
-use crate::snapshot::{Snapshot, SnapshotError};
-use crate::state::{RigidBody, State};
+use crate::saved::{Fingerprint, Saved, saved_fields};
+use crate::snapshot::SnapshotError;
+use crate::state::{RigidBody, RotorState, State};
 use contacts::Contacts;
 pub(crate) use free_bodies::Misfit;
 use free_bodies::{FIRST_THING, FreeBodies};
@@ -53,12 +54,8 @@ use hull::Hull;
 use nalgebra::{UnitQuaternion, Vector3};
 use scenes::{Rig, Scene};
 use scratch::Scratch;
-use serde::{Deserialize, Serialize};
 use stepping::{Changed, Held, Motion};
 use world::World;
-
-/// What its snapshots are called.
-const NAME: &str = "rapier";
 
 /// A vehicle lower than this above its stand starts on its feet, at rest.
 const ON_THE_GROUND_M: f64 = 1e-3;
@@ -91,16 +88,20 @@ pub struct Rapier {
     others: Vec<Neighbour>,
     /// The names of the scene's things.
     names: Vec<String>,
+    /// Tells this scene and vehicle from others.
+    print: Fingerprint,
 }
 
 /// What contacts and joints changed over the last tick, against free flight.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 struct Reaction {
     acceleration_W_m_s2: Vector3<f64>,
     angular_acceleration_W_rad_s2: Vector3<f64>,
     /// Force of the contacts along their normals.
     normal_W_N: Vector3<f64>,
 }
+
+saved_fields!(Reaction { acceleration_W_m_s2, angular_acceleration_W_rad_s2, normal_W_N });
 
 impl Rapier {
     /// A vehicle that starts as `body` in `scene`, its rotors at the lowest command; it crashes where it meets
@@ -128,7 +129,7 @@ impl Rapier {
             contacts: Contacts::new(1 + scene.thing_count() + TRAFFIC_MAX),
             state: model.start(free_bodies.carrier_at_start(), 0.0),
             free_bodies,
-            held: Held::default(),
+            held: Held::new(scene.bodies().count(), scene.joints.len()),
             unsolved: None,
             changed: Changed::default(),
             scratch: Scratch::new(),
@@ -136,7 +137,8 @@ impl Rapier {
         };
         let others = Vec::with_capacity(TRAFFIC_MAX);
         let names = scene.things().map(|thing| thing.name().to_owned()).collect();
-        let mut rapier = Self { hull, motion, effects, reaction: Reaction::default(), others, names };
+        let print = Fingerprint::of(numbers(&motion).into_iter());
+        let mut rapier = Self { hull, motion, effects, reaction: Reaction::default(), others, names, print };
         rapier.set_body(body);
         rapier
     }
@@ -156,13 +158,6 @@ impl Rapier {
     /// What of the scene's joints cannot be meant, with the vehicle and the bodies where they are.
     pub(crate) fn misfit(&self) -> Option<Misfit> {
         self.motion.free_bodies.misfit(&self.motion.model, &self.motion.state.body)
-    }
-
-    /// Numbers that tell this scene and vehicle from others.
-    fn numbers(&self) -> Vec<f64> {
-        let mut numbers = self.motion.world.numbers();
-        numbers.extend(self.motion.free_bodies.numbers());
-        numbers
     }
 
     /// Has the vehicle stand on its feet where it is too low to fly.
@@ -213,7 +208,19 @@ impl Rapier {
     }
 }
 
+/// Numbers that tell a scene and a vehicle from others.
+fn numbers(motion: &Motion) -> Vec<f64> {
+    let mut numbers = motion.world.numbers();
+    numbers.extend(motion.free_bodies.numbers());
+    numbers.extend(motion.rig.iter().flat_map(rig::numbers));
+    numbers
+}
+
 impl Backend for Rapier {
+    fn name(&self) -> &'static str {
+        "rapier"
+    }
+
     fn state(&self) -> &State {
         &self.motion.state
     }
@@ -271,6 +278,11 @@ impl Backend for Rapier {
         self.lean_on_support();
     }
 
+    fn set_rotor_speeds(&mut self, speeds_rad_s: &[f64; 4]) {
+        self.motion.state.rotors = speeds_rad_s.map(RotorState::steady);
+        self.lean_on_support();
+    }
+
     fn bodies(&self) -> &[RigidBody] {
         &self.motion.free_bodies.states
     }
@@ -302,33 +314,25 @@ impl Backend for Rapier {
         self.motion.model.airframe().battery(&self.effects, &self.motion.state)
     }
 
-    fn snapshot(&self) -> Result<Vec<u8>, SnapshotError> {
-        Snapshot::of(NAME)
-            .with("state", &self.motion.state)?
-            .with("effects", &self.effects)?
-            .with("reaction", &self.reaction)?
-            .with("rig", &self.motion.rig.as_ref().map(rig::numbers))?
-            .with("held", &self.motion.held)?
-            .with("contacts", &self.motion.contacts)?
-            .with("bodies", &self.motion.free_bodies.states)?
-            .with("world", &self.numbers())?
-            .bytes()
+    fn parts(&self, note: &mut dyn FnMut(&'static str, &dyn Saved)) {
+        note("world", &self.print);
+        note("state", &self.motion.state);
+        note("effects", &self.effects);
+        note("reaction", &self.reaction);
+        note("held", &self.motion.held);
+        note("contacts", &self.motion.contacts);
+        note("bodies", &self.motion.free_bodies.states);
     }
 
-    fn restore(&mut self, snapshot: &[u8]) -> Result<(), SnapshotError> {
-        let snapshot = Snapshot::read(snapshot, NAME)?;
-        let (state, reaction) = (snapshot.get("state")?, snapshot.get("reaction")?);
-        let effects = snapshot.fitting("effects", |effects| self.effects.fits(effects))?;
-        let rig = self.motion.rig.as_ref().map(rig::numbers);
-        snapshot.fitting("rig", |found: &Option<Vec<f64>>| *found == rig)?;
-        let (held, contacts) = (snapshot.get("held")?, snapshot.get("contacts")?);
-        snapshot.fitting("world", |numbers: &Vec<f64>| *numbers == self.numbers())?;
-        let states =
-            snapshot.fitting("bodies", |states: &Vec<RigidBody>| states.len() == self.bodies().len())?;
-        (self.motion.state, self.effects, self.reaction) = (state, effects, reaction);
-        (self.motion.held, self.motion.contacts) = (held, contacts);
+    fn parts_mut(&mut self, note: &mut NotePart<'_>) -> Result<(), SnapshotError> {
+        note("world", &mut self.print)?;
+        note("state", &mut self.motion.state)?;
+        note("effects", &mut self.effects)?;
+        note("reaction", &mut self.reaction)?;
+        note("held", &mut self.motion.held)?;
+        note("contacts", &mut self.motion.contacts)?;
+        note("bodies", &mut self.motion.free_bodies.states)?;
         self.motion.unsolved = None;
-        self.motion.free_bodies.states = states;
         Ok(())
     }
 }

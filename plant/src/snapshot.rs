@@ -1,6 +1,6 @@
 //! A backend's state as bytes: named components, so that two snapshots that differ tell where.
 
-use serde::de::DeserializeOwned;
+use crate::saved::{Reader, Saved, Unfit, Writer};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -23,17 +23,14 @@ pub enum SnapshotError {
     Missing(&'static str),
     /// A component is that of another vehicle or scene.
     #[error(
-        "component {0:?} of the snapshot does not fit this vehicle and scene; restore it with the vehicle, effects \
+        "component {component:?} does not fit this vehicle and scene: {cause}; restore it with the vehicle, effects \
          and scene that it was taken with"
     )]
-    Misfit(&'static str),
-    /// A component cannot be written or read.
-    #[error("component {component:?} of the snapshot: {cause}")]
-    Component {
+    Misfit {
         /// Its name.
         component: &'static str,
         /// Why not.
-        cause: postcard::Error,
+        cause: Unfit,
     },
 }
 
@@ -50,16 +47,11 @@ impl Snapshot {
         Self { backend: backend.to_owned(), components: Vec::new() }
     }
 
-    /// The same with one more component.
-    pub(crate) fn with(
-        mut self,
-        component: &'static str,
-        value: &impl Serialize,
-    ) -> Result<Self, SnapshotError> {
-        let bytes =
-            postcard::to_stdvec(value).map_err(|cause| SnapshotError::Component { component, cause })?;
-        self.components.push((component.to_owned(), bytes));
-        Ok(self)
+    /// Adds a component.
+    pub(crate) fn push(&mut self, name: &'static str, part: &dyn Saved) {
+        let mut bytes = vec![0; part.size()];
+        part.save(&mut Writer::new(&mut bytes));
+        self.components.push((name.to_owned(), bytes));
     }
 
     /// As bytes.
@@ -77,20 +69,15 @@ impl Snapshot {
         }
     }
 
-    /// One component, refused where it does not fit.
-    pub(crate) fn fitting<T: DeserializeOwned>(
-        &self,
-        component: &'static str,
-        fits: impl FnOnce(&T) -> bool,
-    ) -> Result<T, SnapshotError> {
-        Some(self.get(component)?).filter(fits).ok_or(SnapshotError::Misfit(component))
-    }
-
-    /// One component.
-    pub(crate) fn get<T: DeserializeOwned>(&self, component: &'static str) -> Result<T, SnapshotError> {
-        let found = self.components.iter().find(|(name, _)| name == component);
-        let (_, bytes) = found.ok_or(SnapshotError::Missing(component))?;
-        postcard::from_bytes(bytes).map_err(|cause| SnapshotError::Component { component, cause })
+    /// Loads a component into `part`.
+    pub(crate) fn load(&self, name: &'static str, part: &mut dyn Saved) -> Result<(), SnapshotError> {
+        let found = self.components.iter().find(|(component, _)| component == name);
+        let (_, bytes) = found.ok_or(SnapshotError::Missing(name))?;
+        let loaded = match bytes.len() == part.size() {
+            true => part.load(&mut Reader::new(bytes)),
+            false => Err(Unfit::Value("it has another size")),
+        };
+        loaded.map_err(|cause| SnapshotError::Misfit { component: name, cause })
     }
 }
 

@@ -1,7 +1,7 @@
 //! The state that the integrator moves: one rigid body and four rotors, in SI units.
 
+use crate::saved::saved_fields;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use serde::{Deserialize, Serialize};
 
 /// Pose and motion of the body frame B (x forward, y left, z up) in the world frame W (z up).
 ///
@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 /// assert_eq!(body.attitude_WB * Vector3::x(), Vector3::x(), "it faces along the world's x");
 /// assert!(body.velocity_W_m_s.norm() == 0.0 && body.is_finite());
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RigidBody {
     /// The centre of mass, in W.
     pub position_W_m: Vector3<f64>,
@@ -26,7 +26,7 @@ pub struct RigidBody {
 }
 
 /// One rotor's speed relative to the body, positive in the rotor's own sense of rotation.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct RotorState {
     /// Rotation speed.
     pub speed_rad_s: f64,
@@ -35,13 +35,17 @@ pub struct RotorState {
 }
 
 /// Everything the physics carries from one tick to the next.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct State {
     /// The rigid body.
     pub body: RigidBody,
     /// The rotors, in the order of the motor commands.
     pub rotors: [RotorState; 4],
 }
+
+saved_fields!(RigidBody { position_W_m, velocity_W_m_s, attitude_WB, angular_velocity_B_rad_s });
+saved_fields!(RotorState { speed_rad_s, acceleration_rad_s2 });
+saved_fields!(State { body, rotors });
 
 impl RigidBody {
     /// At rest at `position_W_m`, level, facing along +x of the world.

@@ -52,7 +52,7 @@ impl Component for Traffic {
     fn initial(&self) {}
 
     fn step(
-        &mut self,
+        &self,
         _: &StepContext<'_>,
         states: Many<'_, PlantState>,
         (): &mut (),

@@ -7,6 +7,7 @@ use common::{TICK_S, crazyflie, hummingbird};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use plant::effects::FlightCondition;
 use plant::effects::{Action, CATALOGUE, Effect, EffectKind, Values, find};
+use plant::saved::{Reader, Saved, Writer};
 use plant::{Airframe, AirframeState, NewtonEuler, RigidBody, RotorState, State, Wrench};
 use proptest::prelude::*;
 use std::collections::BTreeSet;
@@ -166,17 +167,15 @@ fn a_state_of_effects_written_down_and_read_back_goes_on_to_the_same_bits() {
     let all: Vec<Effect> = CATALOGUE.iter().map(|kind| kind.nominal()).collect();
     let mut flight = Flight::new(hummingbird(), &all, lively());
     flight.swing(0..123);
-    let written = serde_json::to_string(&flight.effects).unwrap();
+    let mut written = vec![0; flight.effects.size()];
+    flight.effects.save(&mut Writer::new(&mut written));
     let mut restored = Flight::new(hummingbird(), &all, flight.state);
-    restored.effects = serde_json::from_str(&written).unwrap();
+    restored.effects.load(&mut Reader::new(&written)).unwrap();
     assert_eq!(restored.effects, flight.effects);
     flight.swing(123..600);
     restored.swing(123..600);
     assert_eq!(restored.state, flight.state);
-    assert_eq!(
-        serde_json::to_string(&restored.effects).unwrap(),
-        serde_json::to_string(&flight.effects).unwrap()
-    );
+    assert_eq!(restored.effects, flight.effects);
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use crate::error::RecordingError;
 use crate::writer::{ChannelId, RecordingWriter};
 use bus::announcement::Announcement;
-use bus::component::{Component, Info, Internal, StepError};
+use bus::component::{Component, Info, State, StateError, StepError, Transfer};
 use bus::context::{NodeContext, StepContext};
 use bus::ports::AnyInputs;
 use diagnostics::ParameterError;
@@ -51,7 +51,23 @@ pub struct Recorder {
     parameters: Parameters,
     files: InputFiles,
     flush_ticks: u32,
-    recording: Option<Recording>,
+}
+
+/// State of a recorder: the file that it writes, once it is connected.
+pub struct RecorderState(Option<Recording>);
+
+impl State for RecorderState {
+    const TRANSFER: Transfer = Transfer::File;
+
+    fn size(&self) -> usize {
+        0
+    }
+
+    fn save(&self, _: &mut [u8]) {}
+
+    fn load(&mut self, _: &[u8]) -> Result<(), StateError> {
+        Err(StateError::File)
+    }
 }
 
 /// The file under way.
@@ -79,29 +95,33 @@ impl Component for Recorder {
     type Parameters = Parameters;
     type Inputs<'a> = AnyInputs<'a>;
     type Outputs = ();
-    type State = Internal;
+    type State = RecorderState;
 
     fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         let (files, flush_ticks) = (context.files.clone(), flush_period_ticks(context.tick_s()));
-        Ok(Self { parameters, files, flush_ticks, recording: None })
+        Ok(Self { parameters, files, flush_ticks })
     }
 
-    fn initial(&self) -> Internal {
-        Internal
+    fn initial(&self) -> RecorderState {
+        RecorderState(None)
     }
 
-    fn connected(&mut self, topics: &[(&str, &Announcement)]) -> Result<(), StepError> {
-        self.recording = Some(Recording::begin(&self.parameters, &self.files, topics)?);
+    fn connected(
+        &self,
+        topics: &[(&str, &Announcement)],
+        RecorderState(recording): &mut RecorderState,
+    ) -> Result<(), StepError> {
+        *recording = Some(Recording::begin(&self.parameters, &self.files, topics)?);
         Ok(())
     }
 
     fn step(
-        &mut self,
+        &self,
         context: &StepContext<'_>,
         inputs: AnyInputs<'_>,
-        _: &mut Internal,
+        RecorderState(recording): &mut RecorderState,
     ) -> Result<(), StepError> {
-        let Some(recording) = &mut self.recording else { return Ok(()) };
+        let Some(recording) = recording else { return Ok(()) };
         recording.record(context, inputs)?;
         let is_last_of_chunk = context.tick() % self.flush_ticks == self.flush_ticks - 1;
         let writer = &mut recording.writer;
@@ -109,8 +129,8 @@ impl Component for Recorder {
     }
 
     /// Also a run that failed leaves a whole file of what was recorded.
-    fn finish(&mut self) -> Result<(), StepError> {
-        Ok(self.recording.take().map_or(Ok(()), |recording| recording.writer.finish())?)
+    fn finish(&self, RecorderState(recording): &mut RecorderState) -> Result<(), StepError> {
+        Ok(recording.take().map_or(Ok(()), |recording| recording.writer.finish())?)
     }
 }
 

@@ -72,7 +72,7 @@ pub struct Outcome {
 ///         Ok(Self)
 ///     }
 ///     fn initial(&self) {}
-///     fn step(&mut self, _: &StepContext<'_>, (): (), (): &mut ()) -> Result<Outputs, StepError> {
+///     fn step(&self, _: &StepContext<'_>, (): (), (): &mut ()) -> Result<Outputs, StepError> {
 ///         Ok(Outputs { command: MotorCommand { command: [76.5; 4], ..Default::default() } })
 ///     }
 /// }

@@ -10,7 +10,7 @@
 //! Journal 39, 1960): with probability `dropout` a measurement is lost, and losses last `dropout_mean_s` on
 //! average. They are drawn from a stream of their own: switching them on does not reshuffle the noise.
 
-use crate::noise::{drawn_words, set_drawn_words};
+use crate::noise::{drawn, drawn_words};
 use bus::Message;
 use bus::context::NodeContext;
 use bus::random::{Stream, stream, uniform};
@@ -141,7 +141,7 @@ pub struct ChannelState {
     pad0: u32,
 }
 
-/// The channel of a node: all that does not change during a run, and its random streams.
+/// The channel of a node, and its random streams at their start.
 #[derive(Debug, Clone)]
 pub struct Channel {
     interval_ns: u64,
@@ -202,7 +202,7 @@ impl Channel {
     /// What has arrived by `now_ns`, a tick of its node. Where a measurement is due, `measure` makes it from the one
     /// before.
     pub(crate) fn measure<S: Remembered>(
-        &mut self,
+        &self,
         now_ns: u64,
         state: &mut S,
         measure: impl FnOnce(&mut S, &S::Measurement, &mut Chance<'_>) -> S::Measurement,
@@ -210,18 +210,18 @@ impl Channel {
         let (under_way, queue) = state.under_way();
         if now_ns >= under_way.next_ns {
             let last = queue[before(under_way.measured)];
-            set_drawn_words(&mut self.noise, under_way.noise_words);
-            set_drawn_words(&mut self.loss, under_way.loss_words);
-            let (noise, loss, lost) = (&mut self.noise, &mut self.loss, under_way.lost);
-            let mut chance = Chance { now_ns, noise, loss, losses: self.losses, lost };
+            let mut noise = drawn(&self.noise, under_way.noise_words);
+            let mut loss = drawn(&self.loss, under_way.loss_words);
+            let (losses, lost) = (self.losses, under_way.lost);
+            let mut chance = Chance { now_ns, noise: &mut noise, loss: &mut loss, losses, lost };
             let measurement = measure(state, &last, &mut chance);
             let lost = chance.lost;
             let (under_way, queue) = state.under_way();
             let number = place(under_way.measured);
             queue[number] = measurement;
             under_way.lost = lost;
-            under_way.noise_words = drawn_words(&self.noise);
-            under_way.loss_words = drawn_words(&self.loss);
+            under_way.noise_words = drawn_words(&noise);
+            under_way.loss_words = drawn_words(&loss);
             under_way.arrival_ns[number] = now_ns.saturating_add(self.delay_ns);
             under_way.measured += 1;
             under_way.next_ns = (now_ns / self.interval_ns + 1).saturating_mul(self.interval_ns);
@@ -280,7 +280,7 @@ mod tests {
 
     /// The times at which measurements were made, tick by tick as they arrive; 0 is sent until the first.
     fn arrivals(timing: &Timing, period_ticks: u64, ticks: u64) -> Vec<(u64, u64)> {
-        let mut channel = channel(timing, period_ticks, 1, "gps").unwrap();
+        let channel = channel(timing, period_ticks, 1, "gps").unwrap();
         let mut state = nothing_measured(u64::MAX);
         (0..ticks)
             .step_by(usize::try_from(period_ticks).unwrap())
@@ -341,7 +341,7 @@ mod tests {
 
     #[test]
     fn a_channel_that_starts_late_measures_once_and_then_at_its_rate() {
-        let mut channel = channel(&timing(), 1, 1, "gps").unwrap();
+        let channel = channel(&timing(), 1, 1, "gps").unwrap();
         let mut state = nothing_measured(());
         let mut count = 0;
         for tick in 5031..5331 {
@@ -351,7 +351,7 @@ mod tests {
     }
 
     fn lost(timing: &Timing, count: usize) -> Vec<bool> {
-        let mut channel = channel(timing, 1, 3, "mocap").unwrap();
+        let channel = channel(timing, 1, 3, "mocap").unwrap();
         let mut state = nothing_measured(false);
         let interval_ns = channel.interval_ns;
         (0..count as u64)
@@ -380,7 +380,7 @@ mod tests {
     #[test]
     fn losses_do_not_reshuffle_the_noise() {
         let noise = |dropout: f64| {
-            let mut channel = channel(&Timing { dropout, ..timing() }, 1, 3, "gps").unwrap();
+            let channel = channel(&Timing { dropout, ..timing() }, 1, 3, "gps").unwrap();
             let mut state = nothing_measured(0);
             let measure = |_: &mut _, _: &u64, chance: &mut Chance<'_>| {
                 chance.is_lost(0);
@@ -397,12 +397,12 @@ mod tests {
         let measure = |_: &mut _, _: &u64, chance: &mut Chance<'_>| {
             if chance.is_lost(0) { 0 } else { chance.noise.next_u64() }
         };
-        let mut first = channel(&timing, 1, 3, "gps").unwrap();
+        let first = channel(&timing, 1, 3, "gps").unwrap();
         let mut state = nothing_measured(1);
         for tick in 0..333 {
             first.measure(tick * TICK_NS, &mut state, measure);
         }
-        let mut second = channel(&timing, 1, 3, "gps").unwrap();
+        let second = channel(&timing, 1, 3, "gps").unwrap();
         let mut handed = state;
         for tick in 333..1000 {
             let expected = first.measure(tick * TICK_NS, &mut state, measure);

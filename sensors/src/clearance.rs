@@ -100,7 +100,7 @@ impl Component for ClearanceJudge {
     }
 
     fn step(
-        &mut self,
+        &self,
         _: &StepContext<'_>,
         inputs: Inputs<'_>,
         state: &mut ClearanceState,

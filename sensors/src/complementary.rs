@@ -202,7 +202,7 @@ impl Component for Complementary {
     }
 
     fn step(
-        &mut self,
+        &self,
         _: &StepContext<'_>,
         inputs: ImuInputs<'_>,
         state: &mut ComplementaryState,

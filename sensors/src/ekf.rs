@@ -75,7 +75,7 @@ impl Component for Ekf {
     }
 
     fn step(
-        &mut self,
+        &self,
         context: &StepContext<'_>,
         inputs: EkfInputs<'_>,
         state: &mut EkfState,

@@ -55,7 +55,7 @@ impl Component for Ideal {
     fn initial(&self) {}
 
     fn step(
-        &mut self,
+        &self,
         _: &StepContext<'_>,
         TruthInputs { state }: TruthInputs<'_>,
         (): &mut (),

@@ -6,12 +6,13 @@
 use crate::channel::{Channel, ChannelState, QUEUE, Remembered};
 use crate::imu_model::{ImuModel, ImuModelState, ImuParams, ImuReading};
 use crate::imu_part::{ImuMotion, ImuPart, ImuPartState};
-use crate::noise::{drawn_words, set_drawn_words};
+use crate::noise::{drawn, drawn_words};
 use crate::sensing::TruthInputs;
 use crate::wire::{vector, vector_message};
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::{Imu, PlantState, Vector3};
+use bus::random::Stream;
 use bus::{Message, OutputPorts};
 use diagnostics::ParameterError;
 use diagnostics::unit::STANDARD_GRAVITY_M_S2;
@@ -87,10 +88,13 @@ impl ImuState {
         self.filtered_angular_velocity = vector_message(part.filtered.angular_velocity_B_rad_s);
     }
 
-    fn restore(&self, model: &mut ImuModelState) {
-        model.accelerometer_bias_B_m_s2 = vector(self.accelerometer_bias);
-        model.gyroscope_bias_B_rad_s = vector(self.gyroscope_bias);
-        set_drawn_words(&mut model.random, self.random_words);
+    /// State of the model; `random` is the node's random stream.
+    fn model(&self, random: &Stream) -> ImuModelState {
+        ImuModelState {
+            accelerometer_bias_B_m_s2: vector(self.accelerometer_bias),
+            gyroscope_bias_B_rad_s: vector(self.gyroscope_bias),
+            random: drawn(random, self.random_words),
+        }
     }
 }
 
@@ -127,8 +131,8 @@ pub struct ImuSensor {
     part: ImuPart,
     model: ImuModel,
     channel: Channel,
-    /// The model's state, drawn anew from the transferred one at each step; it holds the random stream.
-    model_state: ImuModelState,
+    /// The model's state before the first reading. It holds the node's random stream.
+    initial: ImuModelState,
 }
 
 impl Component for ImuSensor {
@@ -144,27 +148,27 @@ impl Component for ImuSensor {
         let model = ImuModel::new(params, rate_hz)?;
         let part = ImuPart::new(params, rate_hz);
         let channel = Channel::new(&params.timing(rate_hz), context)?;
-        let model_state = model.initial_state(context.seed, context.name);
-        Ok(Self { part, model, channel, model_state })
+        let initial = model.initial_state(context.seed, context.name);
+        Ok(Self { part, model, channel, initial })
     }
 
     fn initial(&self) -> ImuState {
-        ImuState::new(&self.model_state)
+        ImuState::new(&self.initial)
     }
 
     fn step(
-        &mut self,
+        &self,
         context: &StepContext<'_>,
         inputs: TruthInputs<'_>,
         state: &mut ImuState,
     ) -> Result<Outputs, StepError> {
-        state.restore(&mut self.model_state);
+        let mut model = state.model(&self.initial.random);
         let mut part = state.part();
         let felt = self.part.feel(&mut part, &motion(inputs.state, context.time_ns()));
-        let reading = self.part.in_steps(&self.model.read(&mut self.model_state, &felt));
+        let reading = self.part.in_steps(&self.model.read(&mut model, &felt));
         let reading = message(&reading);
         state.store_part(&part);
-        state.store(&self.model_state);
+        state.store(&model);
         let imu =
             self.channel.measure(
                 context.time_ns(),

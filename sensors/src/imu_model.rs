@@ -212,7 +212,7 @@ fn saturate(value: Vector3<f64>, range: f64) -> Vector3<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::noise::{drawn_words, set_drawn_words};
+    use crate::noise::{drawn, drawn_words};
 
     const RATE_HZ: f64 = 1000.0;
 
@@ -301,7 +301,7 @@ mod tests {
         let mut second = model.initial_state(7, "imu");
         second.accelerometer_bias_B_m_s2 = first.accelerometer_bias_B_m_s2;
         second.gyroscope_bias_B_rad_s = first.gyroscope_bias_B_rad_s;
-        set_drawn_words(&mut second.random, drawn_words(&first.random));
+        second.random = drawn(&second.random, drawn_words(&first.random));
         for _ in 0..100 {
             assert_eq!(model.read(&mut first, &truth()), model.read(&mut second, &truth()));
         }

@@ -8,7 +8,7 @@
 
 use bus::Message;
 use bus::ports::FORWARDED_BYTES_MAX;
-use bus::random::{Stream, uniform};
+use bus::random::{self, Stream, uniform};
 
 /// Streams that share a line at most.
 pub const STREAMS: usize = 16;
@@ -179,7 +179,7 @@ impl Line {
     }
 
     /// Sends what waits, up to `until_ns`.
-    pub fn send(&mut self, state: &mut LineState, until_ns: u64) {
+    pub fn send(&self, state: &mut LineState, until_ns: u64) {
         while let Some((index, start_ns)) = self.next(state).filter(|(_, start_ns)| *start_ns < until_ns) {
             if start_ns > state.free_ns {
                 (state.busy_since_ns, state.busy_bits) = (start_ns, 0);
@@ -208,11 +208,11 @@ impl Line {
     }
 
     /// How long the message that is sent as number `number` travels behind its last bit, and whether it is lost.
-    fn fate(&mut self, number: u64) -> (u64, bool) {
+    fn fate(&self, number: u64) -> (u64, bool) {
         // Two draws of two words of 32 bits each.
-        self.random.set_word_pos(u128::from(number) * 4);
-        let is_lost = uniform(&mut self.random) < self.loss;
-        let jitter_ns = uniform(&mut self.random) * self.jitter_ns as f64;
+        let mut random = random::at(&self.random, u128::from(number) * 4);
+        let is_lost = uniform(&mut random) < self.loss;
+        let jitter_ns = uniform(&mut random) * self.jitter_ns as f64;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most the jitter")]
         let jitter_ns = jitter_ns as u64;
         (self.latency_ns + jitter_ns, is_lost)
@@ -340,7 +340,7 @@ mod tests {
 
     #[test]
     fn what_finds_no_room_is_dropped_and_counted() {
-        let (mut line, mut state) = (line(1), LineState::default());
+        let (line, mut state) = (line(1), LineState::default());
         for _ in 0..7 {
             line.queue(&mut state, 1, &[1; 24], 35, 0).unwrap();
         }
@@ -354,7 +354,7 @@ mod tests {
 
     #[test]
     fn more_packets_than_there_are_places_for_are_an_error_and_not_a_full_queue() {
-        let mut line = Line { latency_ns: 10_000 * MS, bits_s: 1_000_000, ..line(1) };
+        let line = Line { latency_ns: 10_000 * MS, bits_s: 1_000_000, ..line(1) };
         let mut state = LineState::default();
         for number in 0..PACKETS as u64 {
             line.queue(&mut state, 0, &[1], 12, number * MS).unwrap();
@@ -367,7 +367,7 @@ mod tests {
 
     #[test]
     fn the_higher_priority_goes_first_and_interrupts_nothing() {
-        let mut line = Line { priorities: vec![0, 9, 0], ..line(1) };
+        let line = Line { priorities: vec![0, 9, 0], ..line(1) };
         let mut state = LineState::default();
         for (stream, at_ns) in [(0, 0), (0, 0), (1, MS), (2, MS)] {
             line.queue(&mut state, stream, &[7], 12, at_ns).unwrap();
@@ -384,7 +384,7 @@ mod tests {
 
     #[test]
     fn messages_keep_their_order_whatever_the_jitter() {
-        let mut line = Line { bits_s: 1_000_000, jitter_ns: 50 * MS, ..line(3) };
+        let line = Line { bits_s: 1_000_000, jitter_ns: 50 * MS, ..line(3) };
         let (mut state, mut newest, mut delays) = (LineState::default(), 0, Vec::new());
         for ms in 0..250_u64 {
             let message = u8::try_from(ms).unwrap();

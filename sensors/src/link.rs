@@ -11,7 +11,7 @@
 
 use crate::line::{Line, LineState, NoPlace, PACKETS, STREAMS};
 use bus::announcement::Announcement;
-use bus::component::{Component, Info, StepError};
+use bus::component::{Component, Info, State, StateError, StepError, Transfer};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::Time;
 use bus::ports::{
@@ -216,9 +216,38 @@ impl OutputPorts for Outputs {
 #[derive(Debug)]
 struct LinkStream {
     parameters: StreamParameters,
-    /// Bytes of a message in memory, and where its stamp is: known once the link is connected.
+}
+
+/// Layout of the messages of a stream, known once the link is connected.
+#[derive(Debug, Clone, Copy, Default)]
+struct Forwarded {
+    /// Number of bytes in memory.
     size: usize,
+    /// Offset of the stamp.
     stamp_offset: Option<usize>,
+}
+
+/// State of a link. The layouts are not transferred: a successor learns them when it connects.
+#[derive(Debug)]
+pub struct LinkMemory {
+    state: LinkState,
+    forwarded: [Forwarded; STREAMS],
+}
+
+impl State for LinkMemory {
+    const TRANSFER: Transfer = LinkState::TRANSFER;
+
+    fn size(&self) -> usize {
+        self.state.size()
+    }
+
+    fn save(&self, bytes: &mut [u8]) {
+        self.state.save(bytes);
+    }
+
+    fn load(&mut self, bytes: &[u8]) -> Result<(), StateError> {
+        self.state.load(bytes)
+    }
 }
 
 /// A data link.
@@ -253,7 +282,7 @@ impl Component for Link {
     type Parameters = Parameters;
     type Inputs<'a> = ForwardedInputs<'a>;
     type Outputs = Outputs;
-    type State = LinkState;
+    type State = LinkMemory;
 
     fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         refuse(context.period_ticks != 1, "", || {
@@ -278,62 +307,70 @@ impl Component for Link {
         Ok(Self { line, overhead_bytes: parameters.overhead_bytes, tick_ns: context.tick_ns, streams })
     }
 
-    fn initial(&self) -> LinkState {
+    fn initial(&self) -> LinkMemory {
         let (taken_mark, taken_period) = ([u64::MAX; STREAMS], [u64::MAX; STREAMS]);
-        LinkState { line: LineState::default(), taken_mark, taken_period }
+        let state = LinkState { line: LineState::default(), taken_mark, taken_period };
+        LinkMemory { state, forwarded: [Forwarded::default(); STREAMS] }
     }
 
-    fn connected(&mut self, topics: &[(&str, &Announcement)]) -> Result<(), StepError> {
-        for (stream, (_, announcement)) in self.streams.iter_mut().zip(topics) {
-            (stream.size, stream.stamp_offset) = (announcement.size, announcement.stamp_offset);
+    fn connected(&self, topics: &[(&str, &Announcement)], memory: &mut LinkMemory) -> Result<(), StepError> {
+        for (forwarded, (_, announcement)) in memory.forwarded.iter_mut().zip(topics) {
+            *forwarded = Forwarded { size: announcement.size, stamp_offset: announcement.stamp_offset };
         }
         Ok(())
     }
 
     fn step(
-        &mut self,
+        &self,
         context: &StepContext<'_>,
         inputs: ForwardedInputs<'_>,
-        state: &mut LinkState,
+        LinkMemory { state, forwarded }: &mut LinkMemory,
     ) -> Result<Outputs, StepError> {
         let now_ns = context.time_ns();
+        let forwarded = &forwarded[..self.streams.len()];
         if context.tick() == 0 {
             // What the inputs hold is no message yet.
-            for (index, (stream, newest)) in self.streams.iter().zip(&mut state.line.newest).enumerate() {
-                newest[..stream.size].copy_from_slice(&inputs.newest(index)[..stream.size]);
-                stream.mark_as_none(newest);
+            for (index, (layout, newest)) in forwarded.iter().zip(&mut state.line.newest).enumerate() {
+                newest[..layout.size].copy_from_slice(&inputs.newest(index)[..layout.size]);
+                layout.mark_as_none(newest);
             }
         } else {
             let sent_ns = now_ns - self.tick_ns;
             self.line.send(&mut state.line, sent_ns);
-            self.take(inputs, state, sent_ns)?;
+            self.take(inputs, state, forwarded, sent_ns)?;
         }
         self.line.send(&mut state.line, now_ns);
         Line::arrive(&mut state.line, now_ns);
-        Ok(self.outputs(&state.line, now_ns))
+        Ok(self.outputs(&state.line, forwarded, now_ns))
     }
 }
 
 impl Link {
     /// Queues the messages that are new and due.
-    fn take(&self, inputs: ForwardedInputs<'_>, state: &mut LinkState, sent_ns: u64) -> Result<(), NoPlace> {
-        for (index, stream) in self.streams.iter().enumerate() {
-            let message = &inputs.newest(index)[..stream.size];
-            let mark = stream.stamp(message).or_else(|| inputs.sent_tick(index));
+    fn take(
+        &self,
+        inputs: ForwardedInputs<'_>,
+        state: &mut LinkState,
+        forwarded: &[Forwarded],
+        sent_ns: u64,
+    ) -> Result<(), NoPlace> {
+        for (index, (stream, layout)) in self.streams.iter().zip(forwarded).enumerate() {
+            let message = &inputs.newest(index)[..layout.size];
+            let mark = layout.stamp(message).or_else(|| inputs.sent_tick(index));
             let period = stream.period(sent_ns);
-            let is_new = !stream.is_none(message) && mark.is_none_or(|mark| mark != state.taken_mark[index]);
+            let is_new = !layout.is_none(message) && mark.is_none_or(|mark| mark != state.taken_mark[index]);
             let is_due = period.is_none_or(|period| period != state.taken_period[index]);
             if is_new && is_due {
                 state.taken_mark[index] = mark.unwrap_or(u64::MAX);
                 state.taken_period[index] = period.unwrap_or(u64::MAX);
-                let wire_bytes = stream.wire_bytes(self.overhead_bytes);
+                let wire_bytes = stream.wire_bytes(layout.size, self.overhead_bytes);
                 self.line.queue(&mut state.line, index, message, wire_bytes, sent_ns)?;
             }
         }
         Ok(())
     }
 
-    fn outputs(&self, line: &LineState, now_ns: u64) -> Outputs {
+    fn outputs(&self, line: &LineState, forwarded: &[Forwarded], now_ns: u64) -> Outputs {
         let counts = &line.counts;
         let (queued_bytes, queued) = line.waiting();
         let statistics = LinkStatistics {
@@ -351,7 +388,7 @@ impl Link {
             ..LinkStatistics::default()
         };
         let mut sizes = [0; STREAMS];
-        sizes.iter_mut().zip(&self.streams).for_each(|(size, stream)| *size = stream.size);
+        sizes.iter_mut().zip(forwarded).for_each(|(size, layout)| *size = layout.size);
         Outputs { statistics, sizes, streams: self.streams.len(), newest: line.newest }
     }
 }
@@ -367,15 +404,24 @@ impl LinkStream {
             let most = context.period_s().recip();
             positive_up_to(&key("rate_hz"), rate_hz, most, "Hz, the rate of the link's own steps")?;
         }
-        Ok(Self { parameters, size: 0, stamp_offset: None })
+        Ok(Self { parameters })
     }
 
     /// Bytes of a message on the wire.
     #[allow(clippy::cast_possible_truncation, reason = "a message is far shorter than 4 GiB")]
-    fn wire_bytes(&self, overhead_bytes: u32) -> u32 {
-        self.parameters.bytes.unwrap_or(self.size as u32) + overhead_bytes
+    fn wire_bytes(&self, size: usize, overhead_bytes: u32) -> u32 {
+        self.parameters.bytes.unwrap_or(size as u32) + overhead_bytes
     }
 
+    /// The period of the stream's rate in which `time_ns` is, if it has a rate.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count of messages")]
+    fn period(&self, time_ns: u64) -> Option<u64> {
+        // A time that is a period's start is in it, however its product was rounded.
+        self.parameters.rate_hz.map(|rate_hz| (time_ns as f64 * rate_hz * 1e-9 + 1e-9) as u64)
+    }
+}
+
+impl Forwarded {
     /// Gives `message`, an initial value, the stamp of what was never sent.
     fn mark_as_none(&self, message: &mut [u8]) {
         if let Some(offset) = self.stamp_offset {
@@ -392,13 +438,6 @@ impl LinkStream {
     fn stamp(&self, message: &[u8]) -> Option<u64> {
         let offset = self.stamp_offset?;
         message[offset..offset + size_of::<Time>()].try_into().ok().map(u64::from_le_bytes)
-    }
-
-    /// The period of the stream's rate in which `time_ns` is, if it has a rate.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count of messages")]
-    fn period(&self, time_ns: u64) -> Option<u64> {
-        // A time that is a period's start is in it, however its product was rounded.
-        self.parameters.rate_hz.map(|rate_hz| (time_ns as f64 * rate_hz * 1e-9 + 1e-9) as u64)
     }
 }
 

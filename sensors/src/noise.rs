@@ -4,7 +4,7 @@
 //! truth + bias + white noise, and the bias is the integral of a second white noise. A density holds
 //! at any rate; the size of one sample follows from the density and the time between samples.
 
-use bus::random::{Stream, normal};
+use bus::random::{self, Stream, normal};
 use nalgebra::Vector3;
 
 /// White noise on each of three axes, independent between axes and between samples.
@@ -79,13 +79,9 @@ pub(crate) fn drawn_words(random: &Stream) -> [u64; 2] {
     [words as u64, (words >> 64) as u64]
 }
 
-/// Has a random stream go on where it was drawn so far.
-pub(crate) fn set_drawn_words(random: &mut Stream, [low, high]: [u64; 2]) {
-    let words = u128::from(high) << 64 | u128::from(low);
-    // Where it is there already, its block need not be computed again.
-    if random.get_word_pos() != words {
-        random.set_word_pos(words);
-    }
+/// A copy of a node's random stream that continues where it was drawn so far.
+pub(crate) fn drawn(random: &Stream, [low, high]: [u64; 2]) -> Stream {
+    random::at(random, u128::from(high) << 64 | u128::from(low))
 }
 
 #[cfg(test)]

@@ -41,7 +41,7 @@ impl Component for RangeInertial {
     }
 
     fn step(
-        &mut self,
+        &self,
         context: &StepContext<'_>,
         inputs: RangeInertialInputs<'_>,
         state: &mut RangeInertialState,

@@ -86,7 +86,7 @@ impl Measurement for Ranges {
 }
 
 /// A sensor: all of it that does not change during a run.
-pub trait Sensor: Sized {
+pub trait Sensor: Sized + Send {
     /// Its name in manifests, and what it does.
     const INFO: Info;
     /// What the manifest's `parameters` table holds.
@@ -184,7 +184,7 @@ impl<S: Sensor> Component for Sensing<S> {
     }
 
     fn step(
-        &mut self,
+        &self,
         context: &StepContext<'_>,
         inputs: S::Inputs<'_>,
         state: &mut S::State,

@@ -58,8 +58,9 @@ fn row(component: &Registration) -> String {
     let parameters = listed(parameters(component).iter().map(|name| format!("`{name}`")));
     let state = match component.transfer {
         Transfer::Message(schema) => type_name(schema),
+        Transfer::Bytes(type_name) => type_name,
         Transfer::Nothing => "–",
-        Transfer::Internal => "cannot be replaced",
+        Transfer::File => "cannot be replaced",
     };
     format!("| **`{name}`**: {summary} | {inputs} | {outputs} | {parameters} | {state} |\n")
 }
@@ -74,8 +75,9 @@ fn json(component: &Registration) -> Value {
     };
     let state = match component.transfer {
         Transfer::Message(schema) => json!(schema.type_name),
+        Transfer::Bytes(type_name) => json!(type_name),
         Transfer::Nothing => json!("none"),
-        Transfer::Internal => json!("internal"),
+        Transfer::File => json!("file"),
     };
     json!({
         "name": component.name,

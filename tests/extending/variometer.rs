@@ -3,7 +3,7 @@
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::{Climb, PlantState};
-use bus::random::{Stream, normal, stream};
+use bus::random::{self, Stream, normal, stream};
 use bus::{InputPorts, Message, OutputPorts};
 use diagnostics::ParameterError;
 use diagnostics::parameter::{not_negative, positive};
@@ -73,15 +73,15 @@ impl Component for Variometer {
     }
 
     fn step(
-        &mut self,
+        &self,
         context: &StepContext<'_>,
         inputs: Inputs<'_>,
         state: &mut State,
     ) -> Result<Outputs, StepError> {
         state.rate += self.followed * (inputs.state.velocity.z - state.rate);
-        // A place in the stream for each tick: what was drawn need not be remembered.
-        self.random.set_word_pos(u128::from(context.tick()) << 8);
-        let rate = state.rate + self.noise_m_s * normal(&mut self.random);
+        // The position in the stream follows from the tick, so that it is no part of the state.
+        let mut random = random::at(&self.random, u128::from(context.tick()) << 8);
+        let rate = state.rate + self.noise_m_s * normal(&mut random);
         Ok(Outputs { climb: Climb { rate, ..Default::default() } })
     }
 }

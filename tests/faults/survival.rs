@@ -12,9 +12,9 @@ use serde_json::Value;
 use std::collections::BTreeSet;
 
 const KILL_POINTS: u64 = 90;
-const VICTIMS: [&str; 5] = ["controller", "ekf", "imu", "pilot", "saboteur"];
+const VICTIMS: [&str; 6] = ["controller", "ekf", "imu", "pilot", "plant", "saboteur"];
 /// Those that hand their state over.
-const STATEFUL: [&str; 3] = ["controller", "ekf", "imu"];
+const STATEFUL: [&str; 4] = ["controller", "ekf", "imu", "plant"];
 /// The first strike comes before this tick, and the second so many ticks later: the first one's [`GUARD_TICKS`] are over.
 const LAST_TICK: usize = 2200;
 const TICKS_BETWEEN: u32 = GUARD_TICKS + 100;
@@ -109,6 +109,58 @@ fn a_run_goes_on_after_every_kill_point_as_if_nothing_had_been() {
     let references = [Policy::Restart, Policy::Standby].map(|policy| Reference::fly_with(&policy.tables()));
     let paths = references.each_ref().map(Reference::path);
     campaign::run("survival", KILL_POINTS, Case::draw, |case| strike(case, &paths[case.policy as usize]));
+}
+
+/// The beginning of manifests/slung-load.toml, without conditions: the world holds contacts, a rope and a load.
+fn write_slung_load(place: &Place) -> String {
+    let whole = std::fs::read_to_string(repository("manifests/slung-load.toml")).unwrap();
+    let (flown, _) = whole.split_once("[[pass]]").unwrap();
+    let flown = flown
+        .replace("\"sets/", &format!("\"{}/", repository("manifests/sets")))
+        .replace("\"../", &format!("\"{}/", repository("")))
+        .replace("duration_s = 18.0", "duration_s = 4.5");
+    place.write("slung-load.toml", flown)
+}
+
+/// Flies the slung load with `on_exit` for its plant, which is killed at each of `ticks`; returns the recording.
+fn fly_slung_load(on_exit: &str, ticks: &[u32]) -> Vec<(String, u32, Vec<u8>)> {
+    let place = Place::new();
+    let (manifest, recording) = (write_slung_load(&place), place.path("flight.mcap"));
+    let policy = format!("process.plant.on_exit={on_exit:?}");
+    let launch = place.start(&["run", &manifest, "--record", &recording, "--json", "--set", &policy]);
+    if !ticks.is_empty() {
+        let watched = Watched::attach(&place);
+        for (generation, &tick) in ticks.iter().enumerate() {
+            assert_eq!(watched.hold_at(tick), tick);
+            let plant = watched.node("plant").unwrap();
+            if on_exit == "standby" {
+                watched.await_shadow(&place, plant);
+            }
+            let primary = watched.instances(&place, plant).primary.generation;
+            assert_eq!(primary as usize, generation);
+            let epoch = watched.control.epoch();
+            kill_process(place.process_of_generation("plant", primary), Signal::KILL).unwrap();
+            watched.await_epoch(epoch + 1);
+        }
+        watched.control.set_hold_tick(u32::MAX);
+    }
+    let ended = launch.end().with_code(0);
+    let summary = ended.json();
+    let successions = summary["successions"].as_array().unwrap();
+    let flew: Vec<&Value> = successions.iter().filter(|one| !one["take_over_tick"].is_null()).collect();
+    assert_eq!(flew.len(), ticks.len(), "{ended}");
+    assert!(flew.iter().all(|one| one["hand_over"] == "state"), "{ended}");
+    messages(&recording)
+}
+
+#[test]
+fn a_plant_that_dies_with_a_load_on_a_rope_goes_on_as_if_nothing_had_been() {
+    // Vehicle and load stand on the ground; the rope is slack; the load hangs.
+    let ticks = [400, 2000, 3900];
+    for on_exit in ["restart", "standby"] {
+        let undisturbed = fly_slung_load(on_exit, &[]);
+        assert!(fly_slung_load(on_exit, &ticks) == undisturbed, "other messages with {on_exit}");
+    }
 }
 
 /// Flies with a saboteur that panics at tick 700 whoever it is.

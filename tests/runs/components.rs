@@ -1,7 +1,7 @@
 //! Every component, flown once as a process and stepped on the recording of that flight in this one.
 
 use crate::support::{Place, repository};
-use bus::component::{Role, Transfer};
+use bus::component::Role;
 use bus::plan::Plan;
 use bus::{NodeHarness, Registration};
 use hummingbus::COMPONENTS;
@@ -128,14 +128,13 @@ fn require_same(recorded: &Recorded, component: &Registration, node: usize) {
     let make = || NodeHarness::new(component, COMPONENTS.components(), &recorded.plan, node).unwrap();
     let plan = &recorded.plan.nodes[node];
     let (mut first, mut second) = (make(), make());
-    let has_internal_state = matches!(component.transfer, Transfer::Internal);
     for tick in (0..TICKS).step_by(plan.period_ticks as usize) {
         recorded.step(&mut first, &plan.name, tick);
-        if !has_internal_state && tick >= TRANSFER_TICK {
+        if tick >= TRANSFER_TICK {
             recorded.step(&mut second, &plan.name, tick);
             assert!(first.state() == second.state(), "{}: another state after tick {tick}", plan.name);
         } else {
-            second.restore(first.state());
+            second.restore(&first.state()).unwrap();
         }
     }
 }

@@ -2,9 +2,9 @@
 
 use super::world::Near;
 use crate::backend::ContactReport;
+use crate::saved::{Bounded, saved_fields};
 use crate::state::RigidBody;
 use nalgebra::Vector3;
-use serde::{Deserialize, Serialize};
 
 /// A contact lasts until there is this much air between: a foot that trembles on the floor touches it once.
 /// Tuned, no source.
@@ -27,7 +27,7 @@ impl Sighting {
 }
 
 /// A contact that lasts.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default)]
 struct Touch {
     object: u32,
     /// The vehicle's colliders that it touches, a bit for each.
@@ -40,6 +40,8 @@ struct Touch {
     met: bool,
 }
 
+saved_fields!(Touch { object, parts, parts_seen, seen, met });
+
 impl Touch {
     fn see(&mut self, sighting: &Sighting) {
         let is_near = sighting.near.gap_m < LIFT_M || sighting.pushes();
@@ -51,9 +53,9 @@ impl Touch {
 }
 
 /// The contacts from tick to tick, the longest-lasting first.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone)]
 pub(super) struct Contacts {
-    touches: Vec<Touch>,
+    touches: Bounded<Touch>,
     began: u32,
     crashed: bool,
     /// The speed of approach of the newest impact; 0 where nothing is touched.
@@ -64,10 +66,19 @@ pub(super) struct Contacts {
     pub(super) normal_impulse_W_N_s: Vector3<f64>,
 }
 
+saved_fields!(Contacts { touches, began, crashed, impact_speed_m_s, is_impact_new, normal_impulse_W_N_s });
+
 impl Contacts {
     /// No contact so far, among at most `objects` things.
     pub(super) fn new(objects: usize) -> Self {
-        Self { touches: Vec::with_capacity(objects), ..Self::default() }
+        Self {
+            touches: Bounded::new(objects),
+            began: 0,
+            crashed: false,
+            impact_speed_m_s: 0.0,
+            is_impact_new: false,
+            normal_impulse_W_N_s: Vector3::zeros(),
+        }
     }
 
     /// A tick begins.
@@ -80,7 +91,7 @@ impl Contacts {
     }
 
     fn forget_impact(&mut self) {
-        if self.touches.is_empty() {
+        if self.touches.as_slice().is_empty() {
             self.impact_speed_m_s = 0.0;
         }
     }
@@ -89,7 +100,7 @@ impl Contacts {
     /// begin.
     pub(super) fn place(&mut self, object: Option<u32>, parts: u32) {
         self.touches.clear();
-        self.touches.extend(object.map(|object| Touch {
+        self.touches.extend(object.into_iter().map(|object| Touch {
             object,
             parts,
             parts_seen: parts,
@@ -127,7 +138,7 @@ impl Contacts {
 
     /// Notes what pushes a part of the vehicle, unless that part touched it before.
     fn meet(&mut self, sighting: &Sighting, speed_m_s: f64) {
-        let touching = self.touches.iter().find(|touch| touch.object == sighting.near.object);
+        let touching = self.touches.as_slice().iter().find(|touch| touch.object == sighting.near.object);
         if touching.is_some_and(|touch| touch.parts & sighting.near.part != 0) {
             return;
         }
@@ -142,11 +153,11 @@ impl Contacts {
 
     /// The report on a tick over which the contacts pushed with `force_W_N`.
     pub(super) fn report(&self, force_W_N: &Vector3<f64>) -> ContactReport {
-        let first = self.touches.first();
+        let first = self.touches.as_slice().first();
         ContactReport {
             force_W_N: first.map_or(Vector3::zeros(), |_| *force_W_N),
             impact_speed_m_s: self.impact_speed_m_s,
-            count: self.touches.len() as u32,
+            count: self.touches.as_slice().len() as u32,
             object: first.map_or(0, |touch| touch.object),
             began: self.began,
             crashed: self.crashed,

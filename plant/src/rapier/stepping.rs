@@ -20,10 +20,10 @@ use super::world::{Near, World};
 use crate::actuation::Actuation;
 use crate::backend::Neighbour;
 use crate::newton_euler::NewtonEuler;
+use crate::saved::{Bounded, saved_fields};
 use crate::state::{RigidBody, State};
 use nalgebra::{Matrix6, Vector3, Vector6};
 use scenes::Rig;
-use serde::{Deserialize, Serialize};
 
 /// Gaps that are not closed any further: what stands on several points stands on all of them. Tuned, no source.
 const LEVEL_M: f64 = 1e-9;
@@ -47,17 +47,26 @@ const MARGIN_MAX_M: f64 = 2.0;
 /// source.
 const PUSH_OUT_M_S: f64 = 1.0;
 
+/// Impulses of contacts that are kept for each free body; the search for more begins with none. Tuned, no source: the most
+/// that a scene of this repository has is 11, among six bodies and the vehicle.
+const BODY_CONTACTS: usize = 16;
+
+/// Stops of a rig at most: two along each axis, and that of its tilt.
+const RIG_STOPS: usize = 7;
+/// Stops of a joint at most: its two ends.
+const JOINT_STOPS: usize = 2;
+
 /// Errors of a pose that are left as they are.
 const EXACT_M: f64 = 1e-12;
 
 /// The impulses of the last step, with which the next one warm starts its search.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone)]
 pub(super) struct Held {
-    contacts: Vec<HeldContact>,
-    stops_N_s: Vec<f64>,
+    contacts: Bounded<HeldContact>,
+    stops_N_s: Bounded<f64>,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 struct HeldContact {
     object: u32,
     /// The number of the body that touches it.
@@ -67,13 +76,17 @@ struct HeldContact {
     slip_W_N_s: Vector3<f64>,
 }
 
-impl Default for Held {
-    fn default() -> Self {
-        Self { contacts: Vec::with_capacity(CONSTRAINTS), stops_N_s: Vec::with_capacity(CONSTRAINTS) }
-    }
-}
+saved_fields!(HeldContact { object, body, part, impulse_N_s, slip_W_N_s });
+saved_fields!(Held { contacts, stops_N_s });
 
 impl Held {
+    /// No impulses so far, of a vehicle among `bodies` free bodies and `joints`.
+    pub(super) fn new(bodies: usize, joints: usize) -> Self {
+        let contacts = CONSTRAINTS + BODY_CONTACTS * bodies;
+        let stops = RIG_STOPS + JOINT_STOPS * joints;
+        Self { contacts: Bounded::new(contacts), stops_N_s: Bounded::new(stops) }
+    }
+
     pub(super) fn clear(&mut self) {
         self.contacts.clear();
         self.stops_N_s.clear();
@@ -488,14 +501,14 @@ impl Motion {
             let before = near[..number].iter().rev();
             let place = before.take_while(|other| key(other) == key(this)).count();
             let is_this = |held: &&HeldContact| (held.object, held.body, held.part) == key(this);
-            let held = self.held.contacts.iter().filter(is_this).nth(place);
+            let held = self.held.contacts.as_slice().iter().filter(is_this).nth(place);
             let Some(held) = held.filter(|_| constraint.bound_m_s.is_finite()) else { continue };
             constraint.impulse_N_s = held.impulse_N_s;
             if let Some(friction) = &mut constraint.friction {
                 friction.warm_start(&held.slip_W_N_s);
             }
         }
-        for (constraint, held_N_s) in stops.iter_mut().zip(&self.held.stops_N_s) {
+        for (constraint, held_N_s) in stops.iter_mut().zip(self.held.stops_N_s.as_slice()) {
             if constraint.bound_m_s.is_finite() {
                 constraint.impulse_N_s = *held_N_s;
             }

@@ -1,0 +1,102 @@
+//! State of a connected node as words: the bytes of its computation, then the words of the bus.
+
+use crate::component::{StateError, Transfer};
+use crate::error::BusError;
+use crate::links::Links;
+use crate::state_transfer::{StateLayout, StateRing};
+use crate::tick::Tick;
+
+/// Computation of a node: its steps, and the state that they change.
+pub(crate) trait Computation {
+    /// Number of bytes of the state.
+    fn state_size(&self) -> usize;
+    /// Writes the state.
+    fn save(&self, bytes: &mut [u8]);
+    /// Continues from a state.
+    fn load(&mut self, bytes: &[u8]) -> Result<(), StateError>;
+    /// Computes a tick.
+    fn step(&mut self, tick: &mut Tick<'_>) -> Result<(), String>;
+}
+
+/// State of a node, and the rings by which processes of the node hand it to each other.
+#[derive(Debug, Default)]
+pub(crate) struct HandOver {
+    layout: Option<StateLayout>,
+    /// The state, then the words of the bus.
+    words: Vec<u64>,
+    state_words: usize,
+    published: Option<StateRing>,
+    predecessor: Option<StateRing>,
+}
+
+impl HandOver {
+    /// A state of `size` bytes with `more_words` of the bus behind it.
+    pub(crate) fn new(transfer: Transfer, size: usize, more_words: usize) -> Self {
+        let layout = StateLayout::of(transfer, size);
+        let state_words = layout.as_ref().map_or(0, StateLayout::words);
+        Self { layout, words: vec![0; state_words + more_words], state_words, ..Self::default() }
+    }
+
+    /// Opens the ring of the predecessor, which is generation `generation` and has `more_words` of the bus behind its
+    /// state. Returns false if that publishes no state of this layout.
+    pub(crate) fn open(
+        &mut self,
+        links: &Links,
+        generation: u32,
+        more_words: usize,
+    ) -> Result<bool, BusError> {
+        if let Some(layout) = &self.layout {
+            let (dir, plan) = (&links.run_dir, &links.plan);
+            self.predecessor = StateRing::open(dir, plan, links.index, generation, layout, more_words)?;
+        }
+        Ok(self.predecessor.is_some())
+    }
+
+    /// Creates the ring of this process.
+    pub(crate) fn create(&mut self, links: &Links) -> Result<(), BusError> {
+        if let Some(layout) = &self.layout {
+            let (dir, plan, more_words) = (&links.run_dir, &links.plan, self.words.len() - self.state_words);
+            self.published =
+                Some(StateRing::create(dir, plan, links.index, links.generation, layout, more_words)?);
+        }
+        Ok(())
+    }
+
+    /// The words of the bus behind the state.
+    pub(crate) fn more_words(&mut self) -> &mut [u64] {
+        &mut self.words[self.state_words..]
+    }
+
+    /// Publishes the state of `node` at the start of `tick`; returns false if it publishes none.
+    pub(crate) fn publish(&mut self, tick: u32, node: &dyn Computation) -> bool {
+        let (Some(ring), Some(layout)) = (&self.published, &self.layout) else { return false };
+        let (state, _) = self.words.split_at_mut(self.state_words);
+        node.save(&mut bytemuck::cast_slice_mut(state)[..layout.size]);
+        ring.store(tick, &self.words);
+        true
+    }
+
+    /// True if the predecessor publishes a state that this node can load.
+    pub(crate) fn has_predecessor(&self) -> bool {
+        self.predecessor.is_some()
+    }
+
+    /// Loads the state that the predecessor had at the start of `tick` into `node`.
+    ///
+    /// # Errors
+    /// The ring does not hold it, or it does not fit.
+    pub(crate) fn load(&mut self, tick: u32, node: &mut dyn Computation) -> Result<(), String> {
+        let (Some(ring), Some(layout)) = (&self.predecessor, &self.layout) else { return Ok(()) };
+        // If the predecessor's steps take no time, it has no words of the bus, and those of this process stay.
+        if !ring.load(tick, &mut self.words) {
+            return Err(format!("the state that its predecessor had at tick {tick} is gone"));
+        }
+        let state = &bytemuck::cast_slice(&self.words[..self.state_words])[..layout.size];
+        node.load(state).map_err(|error| error.to_string())
+    }
+
+    /// Forgets the predecessor.
+    pub(crate) fn leave_predecessor(&mut self) {
+        self.predecessor = None;
+    }
+}

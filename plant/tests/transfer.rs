@@ -1,0 +1,151 @@
+//! A plant that loads the state of another one amid a flight continues byte for byte, with either backend.
+#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
+
+use bus::Harness;
+use bus::component::State;
+use bus::context::NodeContext;
+use bus::messages::{MotorCommand, PlantState, Traffic};
+use plant::node::{Inputs, Plant};
+use serde_json::{Value, json};
+
+fn repository(file: &str) -> String {
+    format!("{}/../{file}", env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Raw commands around a hover that climb, sink and turn.
+fn commands() -> Vec<MotorCommand> {
+    let command = |tick: u32| {
+        let swing = 8.0 * libm::sin(f64::from(tick) * 0.02);
+        MotorCommand { command: [76.0 + swing, 76.5, 76.0 - swing, 75.5], ..Default::default() }
+    };
+    (0..3000).map(command).collect()
+}
+
+fn plant(parameters: &Value, ports: &[&str]) -> Harness<Plant> {
+    let mut all = json!({ "vehicle": repository("vehicles/hummingbird.toml") });
+    all.as_object_mut().unwrap().extend(parameters.as_object().unwrap().clone());
+    let context = NodeContext::new("plant", ports);
+    Harness::in_context(diagnostics::read(&all).unwrap(), &context).unwrap()
+}
+
+/// Requires that a transfer leaves no trace, and returns the number of contacts that began before it and in all.
+fn require_transfer(parameters: &Value) -> [u32; 2] {
+    let commands = commands();
+    let inputs = |tick: u32| Inputs { command: &commands[tick as usize], measured: None, traffic: None };
+    Harness::require_transfer(|| plant(parameters, &["command"]), inputs);
+    let mut flown = plant(parameters, &["command"]);
+    let began: Vec<u32> =
+        (0..2000).map(|tick| flown.step(inputs(tick)).unwrap().contact.unwrap().began).collect();
+    [began[776], began[1999]]
+}
+
+#[test]
+fn free_flight_continues_with_every_effect() {
+    for vehicle in ["hummingbird-battery.toml", "hummingbird-drag.toml", "hummingbird-on-rig.toml"] {
+        let vehicle = repository(&format!("vehicles/{vehicle}"));
+        require_transfer(&json!({ "vehicle": vehicle, "initial_position_m": [0.0, 0.0, 1.0] }));
+    }
+    let gusts = repository("scenes/ground-disturbed.toml");
+    require_transfer(&json!({ "scene": gusts, "initial_position_m": [0.0, 0.0, 0.3] }));
+}
+
+#[test]
+fn a_vehicle_that_hits_the_walls_and_the_floor_continues() {
+    let room = repository("scenes/room.toml");
+    let start = json!({
+        "scene": room, "backend": "rapier", "initial_position_m": [4.2, 0.0, 0.3],
+        "initial_velocity_m_s": [1.5, 0.3, -1.0], "initial_yaw_deg": 30.0,
+    });
+    let [before, all] = require_transfer(&start);
+    assert!(before > 0 && all > before, "{before} contacts before the transfer, {all} in all");
+}
+
+#[test]
+fn free_bodies_joints_and_a_rope_continue() {
+    for scene in ["workshop.toml", "slung-load.toml"] {
+        let scene = repository(&format!("scenes/{scene}"));
+        require_transfer(
+            &json!({ "scene": scene, "backend": "rapier", "initial_position_m": [0.0, 0.0, 1.0] }),
+        );
+    }
+}
+
+#[test]
+fn a_rig_continues() {
+    for scene in ["rig-sliding.toml", "rig-fixed.toml"] {
+        require_transfer(&json!({ "scene": repository(&format!("scenes/{scene}")), "backend": "rapier" }));
+    }
+}
+
+#[test]
+fn a_vehicle_among_others_knows_its_place_after_a_transfer() {
+    let parameters = json!({ "backend": "rapier", "initial_position_m": [0.0, 0.0, 2.0] });
+    let make = || plant(&parameters, &["command", "traffic"]);
+    let (commands, mut first) = (commands(), make());
+    let mut last = PlantState::default();
+    let traffic = |state: &PlantState| {
+        let mut traffic = Traffic { count: 2, ..Default::default() };
+        (traffic.position[1], traffic.velocity[1]) = (state.position, state.velocity);
+        // Another one crosses its way, so that the two meet.
+        traffic.position[0] = [0.0, 0.0, 1.2].into();
+        traffic
+    };
+    let fly = |harness: &mut Harness<Plant>, last: &mut PlantState| {
+        let seen = traffic(last);
+        let command = &commands[harness.tick as usize];
+        let sent = harness.step(Inputs { command, measured: None, traffic: Some(&seen) }).unwrap();
+        *last = sent.state;
+        sent.contact.unwrap()
+    };
+    (0..200).for_each(|_| {
+        fly(&mut first, &mut last);
+    });
+    let mut second = make();
+    second.state.load(&first.saved()).unwrap();
+    second.tick = first.tick;
+    let mut other = last;
+    for tick in 200..1500 {
+        let contacts = (fly(&mut first, &mut last), fly(&mut second, &mut other));
+        assert!(first.saved() == second.saved(), "another state after tick {tick}: {contacts:?}");
+    }
+    assert_eq!(<[f64; 3]>::from(last.position), <[f64; 3]>::from(other.position));
+}
+
+#[test]
+fn the_state_of_another_backend_scene_or_effect_is_refused() {
+    let rapier =
+        |scene: &str| json!({ "backend": "rapier", "scene": repository(&format!("scenes/{scene}")) });
+    // As many things, and therefore as many bytes.
+    let (near, mut far) =
+        (plant(&rapier("rig-fixed-near.toml"), &[]).saved(), plant(&rapier("rig-fixed.toml"), &[]));
+    assert_eq!(near.len(), far.saved().len());
+    let error = far.state.load(&near).unwrap_err().to_string();
+    assert!(error.contains("PlantMemory") && error.contains("the configuration is another one"), "{error}");
+    let free = plant(&json!({}), &[]).saved();
+    let battery = json!({ "vehicle": repository("vehicles/hummingbird-battery.toml") });
+    let error = plant(&battery, &[]).state.load(&free).unwrap_err().to_string();
+    assert!(error.contains("bytes, expected"), "{error}");
+}
+
+#[test]
+fn a_plant_that_cannot_load_the_state_continues_from_the_last_sample() {
+    let commands = commands();
+    let inputs = |tick: u32| Inputs { command: &commands[tick as usize], measured: None, traffic: None };
+    let start = json!({ "initial_position_m": [0.0, 0.0, 1.0] });
+    let mut first = plant(&start, &[]);
+    let mut last = None;
+    for tick in 0..500 {
+        last = Some(first.step(inputs(tick)).unwrap());
+    }
+    let mut second = plant(&json!({ "backend": "rapier" }), &[]);
+    second.tick = first.tick;
+    second.replaces(last.unwrap());
+    for tick in 500..600 {
+        let (one, other) =
+            (first.step(inputs(tick)).unwrap().state, second.step(inputs(tick)).unwrap().state);
+        let off_m = (0..3).map(|axis| {
+            (<[f64; 3]>::from(one.position)[axis] - <[f64; 3]>::from(other.position)[axis]).abs()
+        });
+        assert!(off_m.fold(0.0, f64::max) < 1e-4, "at tick {tick}: {one:?} and {other:?}");
+    }
+}
