@@ -243,6 +243,7 @@ impl Parameters {
             )
         })?;
         let joint = |number: usize| scene.joints.get(number).map_or("", |joint| &joint.name);
+        let is_driven = |number: usize| scene.joints.get(number).is_some_and(|joint| joint.drive.is_some());
         let what = match rapier.misfit() {
             Some(Misfit::Overstretched { joint: number, over_m }) if !is_measured => format!(
                 "starts with the ends of \"{}\" {over_m:.4} m farther apart than its `length`, with the vehicle at {:?}; \
@@ -256,7 +257,18 @@ impl Parameters {
                 joint(number)
             ),
             // The pole times the step, as of a motor.
-            Some(Misfit::Damping { joint: number, per_s }) if per_s * dt_s > airworthy::POLE_STEPS_MAX => {
+            Some(Misfit::Fast { joint: number, per_s })
+                if is_driven(number) && per_s * dt_s > airworthy::POLE_STEPS_MAX =>
+            {
+                format!(
+                    "has a `drive` of \"{}\" whose fastest pole, {per_s:.4} 1/s with the inertia of what it moves, times a step of \
+                 {dt_s} s is {:.4}, expected at most {}; lower its `stiffness` or `damping`, or raise `substeps`",
+                    joint(number),
+                    per_s * dt_s,
+                    airworthy::POLE_STEPS_MAX
+                )
+            }
+            Some(Misfit::Fast { joint: number, per_s }) if per_s * dt_s > airworthy::POLE_STEPS_MAX => {
                 format!(
                     "has a `damping` of \"{}\" that stops what it moves within {:.1e} s, which a step of {dt_s} s cannot follow; \
                  give it less, at most {:.3} of that, or raise `substeps`",

@@ -10,6 +10,7 @@
 //! | [`hull`] | how much room a vehicle takes |
 //! | `free_bodies` | the free bodies of the scene, and a step without contacts |
 //! | `joints`, `joint_forces` | what ties them: rows of constraints, and the forces that keep them |
+//! | `drive` | the force of a motor in a joint |
 //! | `solver` | the impulses of contacts, stops and joints, by sweeps |
 //! | `islands`, `direct` | the same of bodies that the sweeps do not settle, all at once |
 //! | `cone`, `cholesky` | the algebra of that |
@@ -25,6 +26,7 @@ mod cholesky;
 mod cone;
 mod contacts;
 mod direct;
+mod drive;
 mod free_bodies;
 pub mod hull;
 mod islands;
@@ -87,6 +89,8 @@ pub struct Rapier {
     motion: Motion,
     effects: AirframeState,
     reaction: Reaction,
+    /// Ticks since the start, for the schedules of drives.
+    ticks: u64,
     /// The other vehicles, moved on within a tick.
     others: Vec<Neighbour>,
     /// The names of the scene's things.
@@ -127,6 +131,7 @@ impl Rapier {
             world: World::new(&hull, scene, free_bodies.tied_pairs()),
             contacts: Contacts::new(1 + scene.thing_count() + TRAFFIC_MAX),
             state: model.start(free_bodies.carrier_at_start(), 0.0),
+            time_s: 0.0,
             free_bodies,
             held: Held::default(),
             unsolved: None,
@@ -136,7 +141,8 @@ impl Rapier {
         };
         let others = Vec::with_capacity(TRAFFIC_MAX);
         let names = scene.things().map(|thing| thing.name().to_owned()).collect();
-        let mut rapier = Self { hull, motion, effects, reaction: Reaction::default(), others, names };
+        let mut rapier =
+            Self { hull, motion, effects, reaction: Reaction::default(), ticks: 0, others, names };
         rapier.set_body(body);
         rapier
     }
@@ -238,9 +244,12 @@ impl Backend for Rapier {
         let mut others = std::mem::take(&mut self.others);
         others.clear();
         others.extend_from_slice(traffic);
-        for _ in 0..self.motion.model.substeps() {
-            self.motion.substep(&actuation, span_s, &mut others);
+        let begin_s = self.ticks as f64 * dt_s;
+        for number in 0..self.motion.model.substeps() {
+            let time_s = begin_s + f64::from(number) * span_s;
+            self.motion.substep(&actuation, [time_s, span_s], &mut others);
         }
+        self.ticks += 1;
         self.others = others;
         let body = &mut self.motion.state.body;
         body.attitude_WB = UnitQuaternion::new_normalize(body.attitude_WB.into_inner());
@@ -311,6 +320,7 @@ impl Backend for Rapier {
             .with("held", &self.motion.held)?
             .with("contacts", &self.motion.contacts)?
             .with("bodies", &self.motion.free_bodies.states)?
+            .with("ticks", &self.ticks)?
             .with("world", &self.numbers())?
             .bytes()
     }
@@ -322,12 +332,13 @@ impl Backend for Rapier {
         let rig = self.motion.rig.as_ref().map(rig::numbers);
         snapshot.fitting("rig", |found: &Option<Vec<f64>>| *found == rig)?;
         let (held, contacts) = (snapshot.get("held")?, snapshot.get("contacts")?);
+        let ticks = snapshot.get("ticks")?;
         snapshot.fitting("world", |numbers: &Vec<f64>| *numbers == self.numbers())?;
         let states =
             snapshot.fitting("bodies", |states: &Vec<RigidBody>| states.len() == self.bodies().len())?;
         (self.motion.state, self.effects, self.reaction) = (state, effects, reaction);
         (self.motion.held, self.motion.contacts) = (held, contacts);
-        self.motion.unsolved = None;
+        (self.motion.unsolved, self.ticks) = (None, ticks);
         self.motion.free_bodies.states = states;
         Ok(())
     }

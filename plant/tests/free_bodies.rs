@@ -144,6 +144,22 @@ fn a_damped_slide_nears_its_terminal_speed() {
 }
 
 #[test]
+fn a_driven_hinge_nears_its_speed_with_the_time_constant_of_inertia_by_damping() {
+    let drive = format!(
+        "[joints.drive]\nmode = \"speed\"\ndamping = {}\nschedule = {}\n",
+        given("0.006", "N*m*s/rad"),
+        given("[[0, 2]]", "rad/s")
+    );
+    let spindle = [("anchor", "[0, 0, 5]", "m"), ("axis", "[0, 0, 1]", "1")];
+    let tie = joint("revolute", ["world", "ball"], &spindle) + &drive;
+    let mut plant = plant(&[body("balls", "ball", &BALL), tie]);
+    // w = 2 (1 - exp(-t d / I)), I = 2/5 m r^2 = 3e-4 kg m2: a time constant of 0.05 s.
+    let found = after(&mut plant, 0.1);
+    let expected_rad_s = 2.0 * (1.0 - libm::exp(-2.0));
+    assert!((found.angular_velocity_B_rad_s.z - expected_rad_s).abs() < 1e-9, "{found:?}");
+}
+
+#[test]
 fn a_rope_lets_a_ball_fall_freely_and_then_holds_it() {
     let rope = [("anchor", "[0, 0, 5]", "m"), ("end", "[0, 0, 5]", "m"), ("length", "1.25", "m")];
     let mut plant = plant(&[body("balls", "ball", &BALL), joint("rope", ["world", "ball"], &rope)]);

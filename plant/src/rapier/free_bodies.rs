@@ -79,6 +79,8 @@ pub(super) struct Carrier<'a> {
     pub model: &'a NewtonEuler,
     pub rig: Option<&'a Rig>,
     pub actuation: &'a Actuation,
+    /// Time since the start at which the step begins.
+    pub time_s: f64,
 }
 
 /// What a start or a joint cannot be.
@@ -88,8 +90,9 @@ pub(crate) enum Misfit {
     Overstretched { joint: usize, over_m: f64 },
     /// What a joint ties moves apart, at a speed in m/s or rad/s.
     Parting { joint: usize, rate: f64 },
-    /// The joint that is damped fastest, as a rate: it is for the step to tell whether that is too fast.
-    Damping { joint: usize, per_s: f64 },
+    /// The joint that is damped and driven fastest, as the rate of a pole: it is for the step to tell whether that is too
+    /// fast.
+    Fast { joint: usize, per_s: f64 },
 }
 
 /// Slower than this is rounding in a scene file, m/s or rad/s.
@@ -191,8 +194,8 @@ impl FreeBodies {
         if let Some((joint, rate)) = forces.fastest_row().filter(|(_, rate)| *rate > PARTING) {
             return Some(Misfit::Parting { joint, rate });
         }
-        let (joint, per_s) = forces.fastest_damping(&self.joints)?;
-        Some(Misfit::Damping { joint, per_s })
+        let (joint, per_s) = forces.fastest_pole(&self.joints)?;
+        Some(Misfit::Fast { joint, per_s })
     }
 
     /// The bodies as impulses see them.
@@ -236,7 +239,8 @@ impl FreeBodies {
                     if stage == 0 { *body } else { body.moved(&work.rates[before][number], share * span_s) };
                 work.stage.push(moved);
             }
-            ks[stage] = Some(self.rates(carrier, &state, stage, work));
+            let time_s = carrier.time_s + share * span_s;
+            ks[stage] = Some(self.rates(&Carrier { time_s, ..*carrier }, &state, stage, work));
             let Work { forces, pulls_N_s, .. } = &mut *work;
             forces.add_pulls(WEIGHTS[stage] * span_s, &self.joints, pulls_N_s);
         }
@@ -278,7 +282,8 @@ impl FreeBodies {
         }
     }
 
-    /// The rates of the vehicle at `state` and of the bodies at `work.stage`; the latter go into `work.rates[stage]`.
+    /// The rates of the vehicle at `state` and of the bodies at `work.stage`, at the time of `carrier`; the latter go into
+    /// `work.rates[stage]`.
     fn rates(&self, carrier: &Carrier<'_>, state: &State, stage: usize, work: &mut Work) -> Rates {
         let mut rates = carrier.model.rates(state, carrier.actuation);
         if let Some(rig) = carrier.rig {
@@ -299,6 +304,7 @@ impl FreeBodies {
         let bodies = out.iter().zip(&frames[FIRST_BODY..]);
         accelerations.extend(bodies.map(|(rates, frame)| accelerations_of(frame, rates)));
         forces.damp(&self.joints, accelerations);
+        forces.drive(&self.joints, carrier.time_s, accelerations);
         forces.lay(&self.joints, acting);
         forces.find(|line, _| -(line.bias + line.rate(|end| accelerations[end])));
         forces.push(|end, by| accelerations[end] += by);

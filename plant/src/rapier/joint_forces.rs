@@ -4,6 +4,7 @@
 //! symmetric and positive semidefinite. Forces over accelerations, and shifts over distances, are found the same way.
 use super::body::lay_out;
 use super::cholesky::{factorise, substitute};
+use super::drive::{Drive, fastest_pole_per_s};
 use super::joints::{Joint, Line};
 use crate::state::RigidBody;
 use nalgebra::{Matrix6, Vector6};
@@ -117,16 +118,22 @@ impl JointForces {
         }
     }
 
-    /// The joint whose damping is the fastest against the inertia of what it moves, and its rate, 1/s.
-    pub(super) fn fastest_damping(&mut self, joints: &[Joint]) -> Option<(usize, f64)> {
+    /// The joint whose damping and drive are the fastest against the inertia of what they move, and the rate of the fastest
+    /// pole, 1/s. The bodies count as free, which they are not where other joints hold them: the rate is a bound.
+    pub(super) fn fastest_pole(&mut self, joints: &[Joint]) -> Option<(usize, f64)> {
         let mut fastest: Option<(usize, f64)> = None;
         for (number, joint) in joints.iter().enumerate() {
             self.damped.clear();
             joint.damped(&self.frames, &mut self.damped);
+            let [stiffness, more] = joint.drive.as_ref().map_or([0.0; 2], Drive::gains);
+            let driven = joint.drive.as_ref().and_then(|_| joint.axial(&self.frames));
+            if self.damped.is_empty() {
+                self.damped.extend(driven.map(|line| (line, 0.0)));
+            }
             for (line, damping) in &self.damped {
                 let yields = [0, 1]
                     .map(|at| line.jacobian[at].dot(&(self.mobilities[line.ends[at]] * line.jacobian[at])));
-                let rate = damping * (yields[0] + yields[1]);
+                let rate = fastest_pole_per_s(yields[0] + yields[1], stiffness, damping + more);
                 if fastest.is_none_or(|(_, known)| rate > known) {
                     fastest = Some((number, rate));
                 }
@@ -140,6 +147,18 @@ impl JointForces {
         let rate = |line: &Line| line.rate(|end| super::body::twist(&self.frames[end])).abs();
         let rows = self.lines.iter().map(|(joint, line)| (*joint, rate(line)));
         rows.max_by(|(_, one), (_, other)| one.total_cmp(other))
+    }
+
+    /// Adds what the drives of the joints do to the accelerations, at `time_s` after the start.
+    pub(super) fn drive(&self, joints: &[Joint], time_s: f64, accelerations: &mut [Vector6<f64>]) {
+        for joint in joints {
+            let Some((drive, line)) = joint.drive.as_ref().zip(joint.axial(&self.frames)) else { continue };
+            let rate = line.rate(|end| super::body::twist(&self.frames[end]));
+            let force = drive.force(time_s, line.off, rate);
+            for (end, jacobian) in line.ends.iter().zip(&line.jacobian) {
+                accelerations[*end] += self.mobilities[*end] * jacobian * force;
+            }
+        }
     }
 
     /// Adds what the damping of the joints does to the accelerations.
