@@ -3,6 +3,7 @@
 
 mod common;
 
+use common::parts::{body, given, joint};
 use common::{TICK_S, hummingbird};
 use nalgebra::{Matrix3, Vector3};
 use plant::{Backend, NewtonEuler, Rapier, RigidBody};
@@ -11,24 +12,6 @@ use std::f64::consts::PI;
 use vehicles::Vehicle;
 
 const G_M_S2: f64 = 9.81;
-
-fn given(value: &str, unit: &str) -> String {
-    format!("{{ value = {value}, unit = \"{unit}\", source = \"test\", uncertainty = \"exact\" }}")
-}
-
-fn body(kind: &str, name: &str, more: &[(&str, &str, &str)]) -> String {
-    let keys: String =
-        more.iter().map(|(key, value, unit)| format!("{key} = {}\n", given(value, unit))).collect();
-    format!("[[{kind}]]\nname = \"{name}\"\n{keys}")
-}
-
-fn joint(kind: &str, [parent, child]: [&str; 2], more: &[(&str, &str, &str)]) -> String {
-    let keys: String =
-        more.iter().map(|(key, value, unit)| format!("{key} = {}\n", given(value, unit))).collect();
-    format!(
-        "[[joints]]\nname = \"joint\"\nkind = \"{kind}\"\nparent = \"{parent}\"\nchild = \"{child}\"\n{keys}"
-    )
-}
 
 /// A scene in which the vehicle is far away.
 fn plant(parts: &[String]) -> Rapier {
@@ -141,22 +124,6 @@ fn a_damped_slide_nears_its_terminal_speed() {
     let found = after(&mut plant, 0.2);
     let expected_m_s = -0.981 * (1.0 - libm::exp(-2.0));
     assert!((found.velocity_W_m_s.z - expected_m_s).abs() < 1e-9, "{found:?}");
-}
-
-#[test]
-fn a_driven_hinge_nears_its_speed_with_the_time_constant_of_inertia_by_damping() {
-    let drive = format!(
-        "[joints.drive]\nmode = \"speed\"\ndamping = {}\nschedule = {}\n",
-        given("0.006", "N*m*s/rad"),
-        given("[[0, 2]]", "rad/s")
-    );
-    let spindle = [("anchor", "[0, 0, 5]", "m"), ("axis", "[0, 0, 1]", "1")];
-    let tie = joint("revolute", ["world", "ball"], &spindle) + &drive;
-    let mut plant = plant(&[body("balls", "ball", &BALL), tie]);
-    // w = 2 (1 - exp(-t d / I)), I = 2/5 m r^2 = 3e-4 kg m2: a time constant of 0.05 s.
-    let found = after(&mut plant, 0.1);
-    let expected_rad_s = 2.0 * (1.0 - libm::exp(-2.0));
-    assert!((found.angular_velocity_B_rad_s.z - expected_rad_s).abs() < 1e-9, "{found:?}");
 }
 
 #[test]
