@@ -330,6 +330,33 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_drive_that_a_step_cannot_follow_is_refused_and_more_substeps_help() {
+        let tried = |[from, to]: [&str; 2], dt_s: f64| {
+            let text = scenes::reference::DRIVEN_JOINTS;
+            assert!(text.contains(from), "{from}");
+            let scene = Scene::parse(&text.replacen(from, to, 1), "driven-joints.toml").unwrap();
+            let vehicle = Vehicle::load(repository("vehicles/hummingbird.toml").as_ref()).unwrap();
+            let airframe = Airframe::new(vehicle);
+            let effects = airframe.initial_state(1, "plant", dt_s);
+            let start = RigidBody::level_at(Vector3::z());
+            let mut rapier = Rapier::new(NewtonEuler::flying(airframe, 1), effects, &scene, &start, 1.0);
+            let parameters = serde_json::json!({ "vehicle": "", "initial_position_m": [0.0, 0.0, 1.0] });
+            let parameters: Parameters = serde_json::from_value(parameters).unwrap();
+            parameters.refuse_bodies(&mut rapier, &scene, dt_s).map_err(|error| error.to_string())
+        };
+        // 0.18 kg m2 by 1000 N m s/rad, and 20 kg by 4e8 N/m and the dampers: 5556 1/s and 4472 1/s.
+        for (changed, told) in [
+            (["value = 1.8,", "value = 1000,"], ["\"spindle\"", "5555.5556 1/s"]),
+            (["value = 2000,", "value = 4e8,"], ["\"rail\"", "4472.1360 1/s"]),
+        ] {
+            let error = tried(changed, 1e-3).unwrap_err();
+            assert!(error.contains("`substeps`") && told.iter().all(|word| error.contains(word)), "{error}");
+            assert_eq!(tried(changed, 4e-4), Ok(()));
+        }
+        assert_eq!(tried(["value = 1.8,", "value = 1.9,"], 1e-3), Ok(()));
+    }
+
     /// Any effect, from a file.
     fn effect_entry() -> EffectEntry {
         Scene::load(repository("scenes/ground-disturbed.toml").as_ref()).unwrap().effects.remove(0)

@@ -62,6 +62,31 @@ impl Drive {
         }
     }
 
+    /// Its numbers in a line, in the SI units of these `dimensions`.
+    pub(crate) fn told(&self, dimensions: &Dimensions) -> String {
+        let mode = MODES.iter().find(|(_, mode)| *mode == self.mode).map_or("", |(name, _)| name);
+        let of_targets = dimensions.of_targets(self.mode).si();
+        let range = |at: usize| {
+            let along = || self.schedule.iter().map(move |point| point[at]);
+            let (least, most) =
+                (along().fold(f64::INFINITY, f64::min), along().fold(f64::NEG_INFINITY, f64::max));
+            if least == most { format!("{least}") } else { format!("{least} to {most}") }
+        };
+        let mut told = format!("{mode}, {} {of_targets} at {} s", range(1), range(0));
+        for (name, gain, unit) in [
+            ("stiffness", self.stiffness, dimensions.stiffness.si()),
+            ("damping", self.damping, dimensions.damping.si()),
+        ] {
+            if gain > 0.0 {
+                told += &format!(", {name} {gain} {unit}");
+            }
+        }
+        match self.limit.is_finite() {
+            true => told + &format!(", at most {} {}", self.limit, dimensions.force.si()),
+            false => told + ", without limit",
+        }
+    }
+
     /// Value and slope of the schedule.
     fn scheduled(&self, time_s: f64) -> [f64; 2] {
         let past = self.schedule.partition_point(|[at_s, _]| *at_s <= time_s);
@@ -104,6 +129,15 @@ pub(crate) struct Dimensions {
     force: Dimension,
 }
 
+impl Dimensions {
+    fn of_targets(&self, mode: Mode) -> Dimension {
+        match mode {
+            Mode::Speed => self.speed,
+            Mode::Position => self.position,
+        }
+    }
+}
+
 /// Those of a revolute joint.
 pub(crate) const ROTARY: Dimensions = Dimensions {
     position: ANGLE,
@@ -130,11 +164,7 @@ pub(crate) fn parse(section: &Section, dimensions: &Dimensions) -> Result<Drive,
         false => f64::INFINITY,
     };
     let [stiffness, damping] = gains(section, mode, dimensions)?;
-    let of_targets = match mode {
-        Mode::Speed => dimensions.speed,
-        Mode::Position => dimensions.position,
-    };
-    let schedule = section.schedule("schedule", of_targets, [&TIME, &TARGET])?;
+    let schedule = section.schedule("schedule", dimensions.of_targets(mode), [&TIME, &TARGET])?;
     section.finish()?;
     Ok(Drive { mode, stiffness, damping, limit, schedule })
 }

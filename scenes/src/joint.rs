@@ -78,6 +78,26 @@ pub struct Joint {
     pub drive: Option<Drive>,
 }
 
+impl Joint {
+    /// Its drive in a line, in SI units, if it has one.
+    ///
+    /// ```
+    /// let scene = scenes::Scene::parse(scenes::reference::DRIVEN_JOINTS, "driven-joints.toml")?;
+    /// let told = scene.joints[0].driven().unwrap();
+    /// assert_eq!(told, "spindle: speed, 0 to 2 rad/s at 0 to 1 s, damping 1.8 N*m*s/rad, at most 2 N*m");
+    /// # Ok::<(), diagnostics::Diagnostic>(())
+    /// ```
+    #[must_use]
+    pub fn driven(&self) -> Option<String> {
+        let dimensions = match self.freedom {
+            Freedom::Revolute(_) => &drive::ROTARY,
+            Freedom::Prismatic(_) => &drive::LINEAR,
+            Freedom::Fixed | Freedom::Ball | Freedom::Rope { .. } => return None,
+        };
+        Some(format!("{}: {}", self.name, self.drive.as_ref()?.told(dimensions)))
+    }
+}
+
 /// Two points nearer than a millimetre are one to a rope.
 const ROPE: Bounds = Bounds { min: 1e-3, max: 1e4, unit: "m", why: "a millimetre to 10 km" };
 
