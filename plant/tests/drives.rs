@@ -96,7 +96,7 @@ fn a_scheduled_speed_is_followed_late_by_the_time_constant() {
             during if during <= 0.5 => ramp_rad_s(during - 0.1),
             after => 1.6 - (1.6 - ramp_rad_s(0.4)) * libm::exp(-(after - 0.5) / lag_s),
         };
-        near(spin_rad_s(&found), expected_rad_s, 1e-8, time_s);
+        near(spin_rad_s(&found), expected_rad_s, 1e-9, time_s);
     }
 }
 
@@ -124,6 +124,20 @@ fn a_damped_position_comes_to_rest_as_an_oscillator_does() {
         let (sin, cos) = libm::sincos(swing_rad_s * time_s);
         let left = libm::exp(-decay_per_s * time_s) * (cos + decay_per_s / swing_rad_s * sin);
         near(angle_rad(&found), target_rad * (1.0 - left), 1e-9, time_s);
+    }
+}
+
+#[test]
+fn a_jump_acts_from_its_time_on_and_not_before() {
+    // At a tick, and between two steps of half a millisecond within one.
+    for at_s in [0.1, 0.1005] {
+        let points = format!("[[0, 0], [{at_s}, 0], [{at_s}, 2]]");
+        let drive = drive("speed", &[("damping", "0.006", "N*m*s/rad"), ("schedule", &points, "rad/s")]);
+        let lag_s = BALL_KG_M2 / 0.006;
+        for (time_s, found) in flown(&mut plant(&spindle(&[], &drive)), 0.4) {
+            let since_s = (time_s - at_s).max(0.0);
+            near(spin_rad_s(&found), 2.0 * (1.0 - libm::exp(-since_s / lag_s)), 1e-9, time_s);
+        }
     }
 }
 

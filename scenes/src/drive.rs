@@ -55,7 +55,14 @@ impl Drive {
     /// Of two points at one time, the second counts from then on.
     #[must_use]
     pub fn target(&self, time_s: f64) -> Target {
-        let [value, slope] = self.scheduled(time_s);
+        self.target_of_step(time_s, time_s)
+    }
+
+    /// The target at `time_s` of an integration step whose middle is `middle_s`, both after the start: the schedule bends and
+    /// jumps between two steps only, so that a step is smooth.
+    #[must_use]
+    pub fn target_of_step(&self, time_s: f64, middle_s: f64) -> Target {
+        let [value, slope] = self.scheduled(time_s, middle_s);
         match self.mode {
             Mode::Speed => Target { position: 0.0, rate: value },
             Mode::Position => Target { position: value, rate: slope },
@@ -87,9 +94,9 @@ impl Drive {
         }
     }
 
-    /// Value and slope of the schedule.
-    fn scheduled(&self, time_s: f64) -> [f64; 2] {
-        let past = self.schedule.partition_point(|[at_s, _]| *at_s <= time_s);
+    /// Value and slope at `time_s` of the line that the schedule has at `middle_s`.
+    fn scheduled(&self, time_s: f64, middle_s: f64) -> [f64; 2] {
+        let past = self.schedule.partition_point(|[at_s, _]| *at_s <= middle_s);
         let before = past.checked_sub(1).and_then(|place| self.schedule.get(place));
         match (before, self.schedule.get(past)) {
             (Some([from_s, from]), Some([to_s, to])) => {
@@ -201,6 +208,9 @@ mod tests {
         let found = [0.0, 1.0, 1.5, 3.0, 9.0].map(|time_s| drive.target(time_s));
         let expected = [(2.0, 0.0), (2.0, 2.0), (3.0, 2.0), (-1.0, 0.0), (-1.0, 0.0)];
         assert_eq!(found, expected.map(|(position, rate)| Target { position, rate }));
+        // A step that ends at the jump has the line before it, one that begins there the line behind it.
+        assert_eq!(drive.target_of_step(3.0, 2.75), Target { position: 6.0, rate: 2.0 });
+        assert_eq!(drive.target_of_step(3.0, 3.25), Target { position: -1.0, rate: 0.0 });
         let speed = Drive { mode: Mode::Speed, ..drive };
         assert_eq!(speed.target(1.5), Target { position: 0.0, rate: 3.0 });
     }

@@ -113,7 +113,10 @@ fn what_no_drive_can_be_is_refused_with_its_key() {
         assert!(scene(&with("revolute", &axis, whole)).is_ok(), "{whole}");
     }
     for kind in ["fixed", "ball"] {
-        refused(&with(kind, "", &speed), &["test.toml:13:1:", "joints.0.drive", "revolute or prismatic", kind]);
+        refused(
+            &with(kind, "", &speed),
+            &["test.toml:13:1:", "joints.0.drive", "revolute or prismatic", kind],
+        );
     }
     let hinge = |keys: &str, told: &[&str]| refused(&with("revolute", &axis, keys), told);
     // Modes and their gains.

@@ -5,6 +5,7 @@
 //! after the step, positions and velocities. A rope is a joint while it is taut and pulls.
 
 use super::body::{add_twist, mobility, shift, twist};
+use super::drive::Instant;
 use super::joint_forces::JointForces;
 use super::joints::Joint;
 use super::rig;
@@ -79,8 +80,8 @@ pub(super) struct Carrier<'a> {
     pub model: &'a NewtonEuler,
     pub rig: Option<&'a Rig>,
     pub actuation: &'a Actuation,
-    /// Time since the start at which the step begins.
-    pub time_s: f64,
+    /// Time since the start.
+    pub when: Instant,
 }
 
 /// What a start or a joint cannot be.
@@ -239,8 +240,8 @@ impl FreeBodies {
                     if stage == 0 { *body } else { body.moved(&work.rates[before][number], share * span_s) };
                 work.stage.push(moved);
             }
-            let time_s = carrier.time_s + share * span_s;
-            ks[stage] = Some(self.rates(&Carrier { time_s, ..*carrier }, &state, stage, work));
+            let when = Instant { time_s: carrier.when.time_s + share * span_s, ..carrier.when };
+            ks[stage] = Some(self.rates(&Carrier { when, ..*carrier }, &state, stage, work));
             let Work { forces, pulls_N_s, .. } = &mut *work;
             forces.add_pulls(WEIGHTS[stage] * span_s, &self.joints, pulls_N_s);
         }
@@ -304,7 +305,7 @@ impl FreeBodies {
         let bodies = out.iter().zip(&frames[FIRST_BODY..]);
         accelerations.extend(bodies.map(|(rates, frame)| accelerations_of(frame, rates)));
         forces.damp(&self.joints, accelerations);
-        forces.drive(&self.joints, carrier.time_s, accelerations);
+        forces.drive(&self.joints, &carrier.when, accelerations);
         forces.lay(&self.joints, acting);
         forces.find(|line, _| -(line.bias + line.rate(|end| accelerations[end])));
         forces.push(|end, by| accelerations[end] += by);

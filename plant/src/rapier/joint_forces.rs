@@ -4,7 +4,7 @@
 //! symmetric and positive semidefinite. Forces over accelerations, and shifts over distances, are found the same way.
 use super::body::lay_out;
 use super::cholesky::{factorise, substitute};
-use super::drive::{Drive, fastest_pole_per_s};
+use super::drive::{Drive, Instant, fastest_pole_per_s};
 use super::joints::{Joint, Line};
 use crate::state::RigidBody;
 use nalgebra::{Matrix6, Vector6};
@@ -149,12 +149,12 @@ impl JointForces {
         rows.max_by(|(_, one), (_, other)| one.total_cmp(other))
     }
 
-    /// Adds what the drives of the joints do to the accelerations, at `time_s` after the start.
-    pub(super) fn drive(&self, joints: &[Joint], time_s: f64, accelerations: &mut [Vector6<f64>]) {
+    /// Adds what the drives of the joints do to the accelerations, at this time.
+    pub(super) fn drive(&self, joints: &[Joint], when: &Instant, accelerations: &mut [Vector6<f64>]) {
         for joint in joints {
             let Some((drive, line)) = joint.drive.as_ref().zip(joint.axial(&self.frames)) else { continue };
             let rate = line.rate(|end| super::body::twist(&self.frames[end]));
-            let force = drive.force(time_s, line.off, rate);
+            let force = drive.force(when, line.off, rate);
             for (end, jacobian) in line.ends.iter().zip(&line.jacobian) {
                 accelerations[*end] += self.mobilities[*end] * jacobian * force;
             }

@@ -9,6 +9,7 @@
 
 use super::body::{lay_out, mobility, set_twist, shift, twist};
 use super::contacts::{Contacts, Sighting};
+use super::drive::Instant;
 use super::free_bodies::{Carrier, FIRST_BODY, FreeBodies, VEHICLE, Work};
 use super::islands::FOUND_M_S;
 use super::rig::{self, Mounted};
@@ -188,7 +189,8 @@ impl Motion {
         let mut state = unheld;
         if !self.free_bodies.is_empty() {
             let (model, rig) = (&self.model, self.rig.as_ref());
-            let carrier = Carrier { model, rig, actuation, time_s: self.time_s };
+            let when = Instant { time_s: self.time_s, middle_s: self.time_s + span_s / 2.0 };
+            let carrier = Carrier { model, rig, actuation, when };
             state = self.free_bodies.free_step(&carrier, &self.state, span_s, work);
         } else if let Some(rig) = &self.rig {
             let hold = |state: &State, rates| rig::hold(rig, &self.model, state, rates);
