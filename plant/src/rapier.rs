@@ -11,6 +11,7 @@
 //! | `free_bodies` | the free bodies of the scene, and a step without contacts |
 //! | `joints`, `joint_forces` | what ties them: rows of constraints, and the forces that keep them |
 //! | `drive` | the force of a motor in a joint |
+//! | `poles` | how fast damped and driven joints are, for the step to follow |
 //! | `solver` | the impulses of contacts, stops and joints, by sweeps |
 //! | `islands`, `direct` | the same of bodies that the sweeps do not settle, all at once |
 //! | `cone`, `cholesky` | the algebra of that |
@@ -32,6 +33,7 @@ pub mod hull;
 mod islands;
 mod joint_forces;
 mod joints;
+mod poles;
 mod rig;
 mod rim;
 mod rolling;

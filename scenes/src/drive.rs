@@ -100,7 +100,7 @@ impl Drive {
         let before = past.checked_sub(1).and_then(|place| self.schedule.get(place));
         match (before, self.schedule.get(past)) {
             (Some([from_s, from]), Some([to_s, to])) => {
-                let slope = (to - from) / (to_s - from_s);
+                let slope = (to - from) / (to_s - from_s).max(JUMP_S);
                 [from + slope * (time_s - from_s), slope]
             }
             (Some([_, held]), None) | (None, Some([_, held])) => [*held, 0.0],
@@ -120,6 +120,9 @@ const GAIN: Bounds =
 
 const DAMPING: Bounds =
     Bounds { min: 0.0, max: 1e9, unit: "", why: "zero or more: a drive pushes towards its target" };
+
+/// Points that are nearer in time are a jump: no step is that short, and a slope stays finite.
+const JUMP_S: f64 = 1e-9;
 
 /// Targets of any kind.
 const TARGET: Bounds = Bounds { min: -1e4, max: 1e4, unit: "", why: "in case of a wrong unit" };
@@ -211,6 +214,8 @@ mod tests {
         // A step that ends at the jump has the line before it, one that begins there the line behind it.
         assert_eq!(drive.target_of_step(3.0, 2.75), Target { position: 6.0, rate: 2.0 });
         assert_eq!(drive.target_of_step(3.0, 3.25), Target { position: -1.0, rate: 0.0 });
+        let steep = Drive { schedule: vec![[0.0, 0.0], [f64::MIN_POSITIVE, 1.0]], ..drive.clone() };
+        assert!(steep.target(0.0).rate.is_finite() && steep.target(0.0).position == 0.0);
         let speed = Drive { mode: Mode::Speed, ..drive };
         assert_eq!(speed.target(1.5), Target { position: 0.0, rate: 3.0 });
     }

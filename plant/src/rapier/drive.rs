@@ -41,7 +41,7 @@ impl Drive {
             (Mode::Position, true) => (wanted - position) - TAU * ((wanted - position) / TAU).round(),
         };
         let force = self.told.stiffness * off + self.told.damping * (wanted_rate - rate);
-        force.clamp(-self.told.limit, self.told.limit)
+        if force.abs() > self.told.limit { self.told.limit.copysign(force) } else { force }
     }
 
     /// Stiffness, N/m or N m/rad, and damping, N s/m or N m s/rad.
@@ -56,16 +56,6 @@ impl Drive {
         [mode, *stiffness, *damping, *limit, schedule.len() as f64]
             .into_iter()
             .chain(schedule.iter().copied().flatten())
-    }
-}
-
-/// The rate of the fastest pole, 1/s, of what yields to a force by `mobility`, 1/kg or 1/(kg m²), between a spring of this
-/// `stiffness` and a damper of this `damping`: the roots of s² + mobility damping s + mobility stiffness.
-pub(super) fn fastest_pole_per_s(mobility: f64, stiffness: f64, damping: f64) -> f64 {
-    let (half, square) = (mobility * damping / 2.0, mobility * stiffness);
-    match half * half - square {
-        beyond if beyond >= 0.0 => half + beyond.sqrt(),
-        _ => square.sqrt(),
     }
 }
 
@@ -99,13 +89,5 @@ mod tests {
         assert_eq!(drive(Mode::Position, 100.0, false).force(&at(9.0), -3.0, 0.0), 18.0);
         let found = drive(Mode::Position, 100.0, true).force(&at(9.0), -3.0, 0.0);
         assert!((found - 3.0 * (6.0 - TAU)).abs() < 1e-12, "{found}");
-    }
-
-    #[test]
-    fn the_fastest_pole_is_the_larger_root() {
-        assert_eq!(fastest_pole_per_s(0.5, 0.0, 4.0), 2.0);
-        assert_eq!(fastest_pole_per_s(0.5, 8.0, 0.0), 2.0);
-        // s^2 + 3 s + 2.
-        assert_eq!(fastest_pole_per_s(1.0, 2.0, 3.0), 2.0);
     }
 }

@@ -4,8 +4,9 @@
 //! symmetric and positive semidefinite. Forces over accelerations, and shifts over distances, are found the same way.
 use super::body::lay_out;
 use super::cholesky::{factorise, substitute};
-use super::drive::{Drive, Instant, fastest_pole_per_s};
+use super::drive::{Drive, Instant};
 use super::joints::{Joint, Line};
+use super::poles::{self, Spring};
 use crate::state::RigidBody;
 use nalgebra::{Matrix6, Vector6};
 
@@ -118,28 +119,22 @@ impl JointForces {
         }
     }
 
-    /// The joint whose damping and drive are the fastest against the inertia of what they move, and the rate of the fastest
-    /// pole, 1/s. The bodies count as free, which they are not where other joints hold them: the rate is a bound.
+    /// The joint whose damping and drive are the fastest against the inertia of what they move, and a bound of the rate of
+    /// the fastest pole, 1/s. The bodies count as free, which they are not where other joints hold them.
     pub(super) fn fastest_pole(&mut self, joints: &[Joint]) -> Option<(usize, f64)> {
-        let mut fastest: Option<(usize, f64)> = None;
+        let mut springs = Vec::new();
         for (number, joint) in joints.iter().enumerate() {
+            let [stiffness, more] = joint.drive.as_ref().map_or([0.0; 2], Drive::gains);
             self.damped.clear();
             joint.damped(&self.frames, &mut self.damped);
-            let [stiffness, more] = joint.drive.as_ref().map_or([0.0; 2], Drive::gains);
-            let driven = joint.drive.as_ref().and_then(|_| joint.axial(&self.frames));
-            if self.damped.is_empty() {
-                self.damped.extend(driven.map(|line| (line, 0.0)));
+            if let (true, Some(_)) = (self.damped.is_empty(), &joint.drive) {
+                self.damped.extend(joint.axial(&self.frames).map(|line| (line, 0.0)));
             }
-            for (line, damping) in &self.damped {
-                let yields = [0, 1]
-                    .map(|at| line.jacobian[at].dot(&(self.mobilities[line.ends[at]] * line.jacobian[at])));
-                let rate = fastest_pole_per_s(yields[0] + yields[1], stiffness, damping + more);
-                if fastest.is_none_or(|(_, known)| rate > known) {
-                    fastest = Some((number, rate));
-                }
-            }
+            let spring =
+                |&(line, damping)| Spring { joint: number, line, stiffness, damping: damping + more };
+            springs.extend(self.damped.iter().map(spring));
         }
-        fastest
+        poles::fastest(&springs, &self.mobilities)
     }
 
     /// The joint whose rows move apart fastest, and how fast, m/s or rad/s.
