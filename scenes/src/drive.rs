@@ -77,6 +77,7 @@ impl Drive {
             let along = || self.schedule.iter().map(move |point| point[at]);
             let (least, most) =
                 (along().fold(f64::INFINITY, f64::min), along().fold(f64::NEG_INFINITY, f64::max));
+            let [least, most] = [least, most].map(|number| (number * 1e6).round() / 1e6);
             if least == most { format!("{least}") } else { format!("{least} to {most}") }
         };
         let mut told = format!("{mode}, {} {of_targets} at {} s", range(1), range(0));

@@ -35,8 +35,8 @@ pub(super) fn fastest(springs: &[Spring], mobilities: &[Matrix6<f64>]) -> Option
 /// A bound of the poles that the spring `number` has a part in.
 fn pole_per_s(number: usize, springs: &[Spring], answers: &[[Vector6<f64>; 2]]) -> f64 {
     let spring = &springs[number];
-    let own = coupling(&spring.line, spring, &answers[number]);
-    let (mut damping, mut stiffness, mut is_alone) = (spring.damping * own, spring.stiffness * own, true);
+    let alone = coupling(&spring.line, spring, &answers[number]);
+    let (mut damping, mut stiffness, mut is_alone) = (spring.damping * alone, spring.stiffness * alone, true);
     for (other, answer) in
         springs.iter().zip(answers).enumerate().filter(|(place, _)| *place != number).map(|it| it.1)
     {
