@@ -132,6 +132,37 @@ const CHAIN: [Link; 4] = [
 /// The axis of its second and third joint.
 const CHAIN_AXIS: [f64; 3] = [0.6, 0.8, 0.0];
 
+/// Drives of the second and third joint, where they are driven: to a position, rad, and to a speed, m/s, that is never reached. A force that
+/// comes to its limit within a step would err by the square of the step.
+const CHAIN_DRIVES: [(&str, Drive); 2] = [
+    ("b", Drive { target: 0.6, stiffness: 0.4, damping: 0.02, limit: f64::INFINITY }),
+    ("c", Drive { target: 10.0, stiffness: 0.0, damping: 1.5, limit: 0.02 }),
+];
+
+/// A drive of a joint of the chain, in SI units: without stiffness, of a speed.
+struct Drive {
+    target: f64,
+    stiffness: f64,
+    damping: f64,
+    limit: f64,
+}
+
+/// The chain with its drives.
+fn driven_chain() -> Scene {
+    let mut scene = chain();
+    for joint in &mut scene.joints {
+        let drive = CHAIN_DRIVES.iter().find(|(name, _)| *name == joint.name);
+        joint.drive = drive.map(|(_, drive)| scenes::Drive {
+            mode: if drive.stiffness > 0.0 { scenes::Mode::Position } else { scenes::Mode::Speed },
+            stiffness: drive.stiffness,
+            damping: drive.damping,
+            limit: drive.limit,
+            schedule: vec![[0.0, drive.target]],
+        });
+    }
+    scene
+}
+
 fn chain() -> Scene {
     let given = |value: &str, unit: &str| {
         format!("{{ value = {value}, unit = \"{unit}\", source = \"case\", uncertainty = \"exact\" }}")
@@ -155,13 +186,13 @@ fn chain() -> Scene {
     scene(&(text + &joints))
 }
 
-/// The chain and the vehicle, which spin in free fall until two of them meet: the time, and position and attitude (w first) of each.
-fn falling_chain(vehicle: &Vehicle) -> Vec<Vec<f64>> {
+/// A chain and the vehicle, which spin in free fall until two of them meet: the time, and position and attitude (w first) of each.
+fn falling_chain(vehicle: &Vehicle, scene: &Scene, ticks: u32) -> Vec<Vec<f64>> {
     let start = RigidBody {
         angular_velocity_B_rad_s: Vector3::new(2.0, 1.0, 3.0),
         ..RigidBody::level_at(Vector3::z() * 100.0)
     };
-    let mut plant = rapier(vehicle, &chain(), &start);
+    let mut plant = rapier(vehicle, scene, &start);
     let told = |tick: u32, plant: &Rapier| {
         let mut numbers = vec![f64::from(tick) * TICK_S];
         for body in [&plant.state().body].into_iter().chain(plant.bodies()) {
@@ -172,7 +203,7 @@ fn falling_chain(vehicle: &Vehicle) -> Vec<Vec<f64>> {
         numbers
     };
     let mut states = vec![told(0, &plant)];
-    for tick in 1..=2_400 {
+    for tick in 1..=ticks {
         plant.step(&[0.0; 4], TICK_S, &[]);
         if tick % 10 == 0 {
             states.push(told(tick, &plant));
@@ -249,7 +280,8 @@ fn cases() -> Value {
         "tip": dropped(&body, &table(), &RigidBody::level_at(Vector3::z() * (2.0 + stand_m)), 0.3),
         "rig A, lower end": dropped(&body, &sliding_rig, &hung(&sliding_rig, 0.2), 0.5),
         "rig B, swing": dropped(&body, &fixed_rig, &swinging, 10.0),
-        "chain": falling_chain(&body),
+        "chain": falling_chain(&body, &chain(), 2_400),
+        "driven chain": falling_chain(&body, &driven_chain(), 1_500),
         "heavy on light": heavy_on_light(),
         "rig B, cone": dropped(&body, &fixed_rig, &hits_cone, 0.3),
     })
@@ -298,6 +330,10 @@ pub fn told() -> Value {
             json!({ "name": name, "centre": centre, "size": size, "mass": mass_kg, "kind": kind, "anchor": anchor })
         }),
         "chain axis": CHAIN_AXIS,
+        "chain drives": CHAIN_DRIVES.map(|(name, drive)| {
+            let limit = drive.limit.is_finite().then_some(drive.limit);
+            json!({ "name": name, "target": drive.target, "stiffness": drive.stiffness, "damping": drive.damping, "limit": limit })
+        }),
         "targets": speeds(&commands[0]),
         "hard targets": speeds(&commands[1]),
         "cases": cases(),

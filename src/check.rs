@@ -55,14 +55,33 @@ pub fn check_text(text: &str, path: &Path, overrides: &[String]) -> Result<Graph
 /// ```
 #[must_use]
 pub fn meshes(checked: &Graph) -> Vec<String> {
+    of_scenes(checked, "meshes", |scene| scene.meshes.iter().map(ToString::to_string).collect())
+}
+
+/// The driven joints of a checked manifest's scenes: a line for each, with its gains, its limit and its schedule in SI units, below the
+/// name of its scene.
+///
+/// ```
+/// # use std::path::Path;
+/// let manifest = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/manifests/driven-joints.toml"));
+/// let lines = hummingbus::drives(&hummingbus::check(manifest, &[])?);
+/// assert!(lines[0].ends_with("driven-joints.toml:") && lines[1].contains("spindle: speed, 0 to 2 rad/s"));
+/// # Ok::<(), hummingbus::Diagnostic>(())
+/// ```
+#[must_use]
+pub fn drives(checked: &Graph) -> Vec<String> {
+    of_scenes(checked, "drives", |scene| scene.joints.iter().filter_map(scenes::Joint::driven).collect())
+}
+
+/// Lines of each scene of a checked manifest, below its name; of a scene without any, none.
+fn of_scenes(checked: &Graph, title: &str, lines: impl Fn(&Scene) -> Vec<String>) -> Vec<String> {
     let scene = |node: &bus::plan::NodePlan| node.parameters.get("scene")?.as_str().map(str::to_owned);
     let files: BTreeSet<String> = checked.plan.nodes.iter().filter_map(scene).collect();
     let lines = files.into_iter().filter_map(|file| {
-        let scene = Scene::load_from(&checked.files, Path::new(&file))
-            .ok()
-            .filter(|scene| !scene.meshes.is_empty())?;
-        let meshes = scene.meshes.iter().map(|mesh| format!("  {mesh}"));
-        Some(std::iter::once(format!("meshes of {file}:")).chain(meshes).collect::<Vec<_>>())
+        let scene = Scene::load_from(&checked.files, Path::new(&file)).ok()?;
+        let found: Vec<_> = lines(&scene).into_iter().map(|line| format!("  {line}")).collect();
+        let title = format!("{title} of {file}:");
+        (!found.is_empty()).then(|| std::iter::once(title).chain(found).collect::<Vec<_>>())
     });
     lines.flatten().collect()
 }

@@ -42,7 +42,7 @@ mod extremes;
 #[cfg(test)]
 mod properties;
 
-pub use check::{check, check_text, meshes};
+pub use check::{check, check_text, drives, meshes};
 pub use components::COMPONENTS;
 pub use diagnostics::Diagnostic;
 pub use runtime::ctl::Remote;

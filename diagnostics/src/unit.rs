@@ -148,6 +148,9 @@ pub const TORQUE: Dimension = Dimension::of("torque", &[("N*m", 1.0), ("N*mm", 1
 pub const ROTARY_DAMPING: Dimension =
     Dimension::of("torque per rotation speed", &[("N*m*s/rad", 1.0), ("N*m*s", 1.0)]);
 
+/// Forces against a way.
+pub const LINEAR_STIFFNESS: Dimension = Dimension::of("force per length", &[("N/m", 1.0), ("N/mm", 1e3)]);
+
 /// Torques against a deflection.
 pub const ROTARY_STIFFNESS: Dimension = Dimension::of("torque per angle", &[("N*m/rad", 1.0)]);
 

@@ -238,6 +238,7 @@ impl Parameters {
             )
         })?;
         let joint = |number: usize| scene.joints.get(number).map_or("", |joint| &joint.name);
+        let is_driven = |number: usize| scene.joints.get(number).is_some_and(|joint| joint.drive.is_some());
         let what = match rapier.misfit() {
             Some(Misfit::Overstretched { joint: number, over_m }) if !is_measured => format!(
                 "starts with the ends of \"{}\" {over_m:.4} m farther apart than its `length`, with the vehicle at {:?}; \
@@ -251,7 +252,18 @@ impl Parameters {
                 joint(number)
             ),
             // The pole times the step, as of a motor.
-            Some(Misfit::Damping { joint: number, per_s }) if per_s * dt_s > airworthy::POLE_STEPS_MAX => {
+            Some(Misfit::Fast { joint: number, per_s })
+                if is_driven(number) && per_s * dt_s > airworthy::POLE_STEPS_MAX =>
+            {
+                format!(
+                    "has a `drive` of \"{}\" whose fastest pole, {per_s:.4} 1/s with the inertia of what it moves, times a step of \
+                 {dt_s} s is {:.4}, expected at most {}; lower its `stiffness` or `damping`, or raise `substeps`",
+                    joint(number),
+                    per_s * dt_s,
+                    airworthy::POLE_STEPS_MAX
+                )
+            }
+            Some(Misfit::Fast { joint: number, per_s }) if per_s * dt_s > airworthy::POLE_STEPS_MAX => {
                 format!(
                     "has a `damping` of \"{}\" that stops what it moves within {:.1e} s, which a step of {dt_s} s cannot follow; \
                  give it less, at most {:.3} of that, or raise `substeps`",
@@ -311,6 +323,33 @@ mod tests {
             scene.rig = None;
             assert_eq!(refuse_double_rig(&vehicle, &scene), Ok(()));
         }
+    }
+
+    #[test]
+    fn a_drive_that_a_step_cannot_follow_is_refused_and_more_substeps_help() {
+        let tried = |[from, to]: [&str; 2], dt_s: f64| {
+            let text = scenes::reference::DRIVEN_JOINTS;
+            assert!(text.contains(from), "{from}");
+            let scene = Scene::parse(&text.replacen(from, to, 1), "driven-joints.toml").unwrap();
+            let vehicle = Vehicle::load(repository("vehicles/hummingbird.toml").as_ref()).unwrap();
+            let airframe = Airframe::new(vehicle);
+            let effects = airframe.initial_state(1, "plant", dt_s);
+            let start = RigidBody::level_at(Vector3::z());
+            let mut rapier = Rapier::new(NewtonEuler::flying(airframe, 1), effects, &scene, &start, 1.0);
+            let parameters = serde_json::json!({ "vehicle": "", "initial_position_m": [0.0, 0.0, 1.0] });
+            let parameters: Parameters = serde_json::from_value(parameters).unwrap();
+            parameters.refuse_bodies(&mut rapier, &scene, dt_s).map_err(|error| error.to_string())
+        };
+        // 0.18 kg m2 by 1000 N m s/rad, and 20 kg by 4e8 N/m and the dampers: 5556 1/s and 4472 1/s.
+        for (changed, told) in [
+            (["value = 1.8,", "value = 1000,"], ["\"spindle\"", "5555.5556 1/s"]),
+            (["value = 2000,", "value = 4e8,"], ["\"rail\"", "4472.1360 1/s"]),
+        ] {
+            let error = tried(changed, 1e-3).unwrap_err();
+            assert!(error.contains("`substeps`") && told.iter().all(|word| error.contains(word)), "{error}");
+            assert_eq!(tried(changed, 4e-4), Ok(()));
+        }
+        assert_eq!(tried(["value = 1.8,", "value = 1.9,"], 1e-3), Ok(()));
     }
 
     /// Any effect, from a file.

@@ -10,6 +10,8 @@
 //! | [`hull`] | how much room a vehicle takes |
 //! | `free_bodies` | the free bodies of the scene, and a step without contacts |
 //! | `joints`, `joint_forces` | what ties them: rows of constraints, and the forces that keep them |
+//! | `drive` | the force of a motor in a joint |
+//! | `poles` | how fast damped and driven joints are, for the step to follow |
 //! | `solver` | the impulses of contacts, stops and joints, by sweeps |
 //! | `islands`, `direct` | the same of bodies that the sweeps do not settle, all at once |
 //! | `cone`, `cholesky` | the algebra of that |
@@ -25,11 +27,13 @@ mod cholesky;
 mod cone;
 mod contacts;
 mod direct;
+mod drive;
 mod free_bodies;
 pub mod hull;
 mod islands;
 mod joint_forces;
 mod joints;
+mod poles;
 mod rig;
 mod rim;
 mod rolling;
@@ -84,6 +88,8 @@ pub struct Rapier {
     motion: Motion,
     effects: AirframeState,
     reaction: Reaction,
+    /// Ticks since the start, for the schedules of drives.
+    ticks: u64,
     /// The other vehicles, moved on within a tick.
     others: Vec<Neighbour>,
     /// The names of the scene's things.
@@ -128,6 +134,7 @@ impl Rapier {
             world: World::new(&hull, scene, free_bodies.tied_pairs()),
             contacts: Contacts::new(1 + scene.thing_count() + TRAFFIC_MAX),
             state: model.start(free_bodies.carrier_at_start(), 0.0),
+            time_s: 0.0,
             free_bodies,
             held: Held::new(scene.bodies().count(), scene.joints.len()),
             unsolved: None,
@@ -138,7 +145,8 @@ impl Rapier {
         let others = Vec::with_capacity(TRAFFIC_MAX);
         let names = scene.things().map(|thing| thing.name().to_owned()).collect();
         let print = Fingerprint::of(numbers(&motion).into_iter());
-        let mut rapier = Self { hull, motion, effects, reaction: Reaction::default(), others, names, print };
+        let reaction = Reaction::default();
+        let mut rapier = Self { hull, motion, effects, reaction, ticks: 0, others, names, print };
         rapier.set_body(body);
         rapier
     }
@@ -245,9 +253,12 @@ impl Backend for Rapier {
         let mut others = std::mem::take(&mut self.others);
         others.clear();
         others.extend_from_slice(traffic);
-        for _ in 0..self.motion.model.substeps() {
-            self.motion.substep(&actuation, span_s, &mut others);
+        let begin_s = self.ticks as f64 * dt_s;
+        for number in 0..self.motion.model.substeps() {
+            let time_s = begin_s + f64::from(number) * span_s;
+            self.motion.substep(&actuation, [time_s, span_s], &mut others);
         }
+        self.ticks += 1;
         self.others = others;
         let body = &mut self.motion.state.body;
         body.attitude_WB = UnitQuaternion::new_normalize(body.attitude_WB.into_inner());
@@ -322,6 +333,7 @@ impl Backend for Rapier {
         note("held", &self.motion.held);
         note("contacts", &self.motion.contacts);
         note("bodies", &self.motion.free_bodies.states);
+        note("ticks", &self.ticks);
     }
 
     fn parts_mut(&mut self, note: &mut NotePart<'_>) -> Result<(), SnapshotError> {
@@ -332,6 +344,7 @@ impl Backend for Rapier {
         note("held", &mut self.motion.held)?;
         note("contacts", &mut self.motion.contacts)?;
         note("bodies", &mut self.motion.free_bodies.states)?;
+        note("ticks", &mut self.ticks)?;
         self.motion.unsolved = None;
         Ok(())
     }

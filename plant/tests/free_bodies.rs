@@ -3,6 +3,7 @@
 
 mod common;
 
+use common::parts::{body, given, joint};
 use common::{TICK_S, hummingbird};
 use nalgebra::{Matrix3, Vector3};
 use plant::{Backend, NewtonEuler, Rapier, RigidBody};
@@ -11,24 +12,6 @@ use std::f64::consts::PI;
 use vehicles::Vehicle;
 
 const G_M_S2: f64 = 9.81;
-
-fn given(value: &str, unit: &str) -> String {
-    format!("{{ value = {value}, unit = \"{unit}\", source = \"test\", uncertainty = \"exact\" }}")
-}
-
-fn body(kind: &str, name: &str, more: &[(&str, &str, &str)]) -> String {
-    let keys: String =
-        more.iter().map(|(key, value, unit)| format!("{key} = {}\n", given(value, unit))).collect();
-    format!("[[{kind}]]\nname = \"{name}\"\n{keys}")
-}
-
-fn joint(kind: &str, [parent, child]: [&str; 2], more: &[(&str, &str, &str)]) -> String {
-    let keys: String =
-        more.iter().map(|(key, value, unit)| format!("{key} = {}\n", given(value, unit))).collect();
-    format!(
-        "[[joints]]\nname = \"joint\"\nkind = \"{kind}\"\nparent = \"{parent}\"\nchild = \"{child}\"\n{keys}"
-    )
-}
 
 /// A scene in which the vehicle is far away.
 fn plant(parts: &[String]) -> Rapier {

@@ -1,6 +1,7 @@
 //! Joints: what ties free bodies to the world, to each other and to the vehicle.
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
+use crate::drive::{self, Drive};
 use crate::rig::PLACE;
 use diagnostics::Diagnostic;
 use diagnostics::parameter::Bounds;
@@ -73,6 +74,28 @@ pub struct Joint {
     pub freedom: Freedom,
     /// Viscous friction of what is free: N m s of rotations, N s/m of a way.
     pub damping: f64,
+    /// Motor of a revolute or a prismatic joint, if it has one.
+    pub drive: Option<Drive>,
+}
+
+impl Joint {
+    /// Its drive in a line, in SI units, if it has one.
+    ///
+    /// ```
+    /// let scene = scenes::Scene::parse(scenes::reference::DRIVEN_JOINTS, "driven-joints.toml")?;
+    /// let told = scene.joints[0].driven().unwrap();
+    /// assert_eq!(told, "spindle: speed, 0 to 2 rad/s at 0 to 1 s, damping 1.8 N*m*s/rad, at most 2 N*m");
+    /// # Ok::<(), diagnostics::Diagnostic>(())
+    /// ```
+    #[must_use]
+    pub fn driven(&self) -> Option<String> {
+        let dimensions = match self.freedom {
+            Freedom::Revolute(_) => &drive::ROTARY,
+            Freedom::Prismatic(_) => &drive::LINEAR,
+            Freedom::Fixed | Freedom::Ball | Freedom::Rope { .. } => return None,
+        };
+        Some(format!("{}: {}", self.name, self.drive.as_ref()?.told(dimensions)))
+    }
 }
 
 /// Two points nearer than a millimetre are one to a rope.
@@ -133,8 +156,31 @@ pub(crate) fn parse(section: &Section, bodies: &[&str]) -> Result<Joint, Diagnos
         }
         (false, _) => 0.0,
     };
+    let drive = drive_of(section, kind)?;
     section.finish()?;
-    Ok(Joint { name, parent, child, anchor_W_m, freedom, damping })
+    Ok(Joint { name, parent, child, anchor_W_m, freedom, damping, drive })
+}
+
+/// The table `drive` of a joint of this `kind`, if it has one.
+fn drive_of(section: &Section, kind: Kind) -> Result<Option<Drive>, Diagnostic> {
+    let dimensions = match kind {
+        _ if !section.has("drive") => return Ok(None),
+        Kind::Revolute => &drive::ROTARY,
+        Kind::Prismatic => &drive::LINEAR,
+        Kind::Fixed | Kind::Ball | Kind::Rope => {
+            let found = format!(
+                "one of kind \"{}\", which has no axis to drive; remove it, or change `kind`",
+                section.text("kind")?
+            );
+            return Err(refused(
+                section,
+                "drive",
+                "a table of a joint of kind revolute or prismatic",
+                &found,
+            ));
+        }
+    };
+    drive::parse(&section.section("drive")?, dimensions).map(Some)
 }
 
 fn refused(section: &Section, key: &str, expected: &str, found: &str) -> Diagnostic {

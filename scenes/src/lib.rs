@@ -9,6 +9,7 @@
 //! | [`mesh`] | things of any shape: triangles |
 //! | [`body`] | what makes a thing a free body: its mass, its inertia, how it starts |
 //! | [`joint`] | what ties free bodies to the world, to each other and to the vehicle |
+//! | [`drive`] | motors in joints |
 //! | `tied` | what hangs from what, by joints |
 //! | [`ray`] | the distance from a point along a direction to what is met first |
 //! | [`surface`] | friction and restitution |
@@ -25,6 +26,7 @@
 #![forbid(unsafe_code)]
 
 pub mod body;
+pub mod drive;
 mod file;
 mod glb;
 pub mod joint;
@@ -41,6 +43,7 @@ mod tied;
 mod triangles;
 
 pub use body::{BodyPose, FreeBody};
+pub use drive::{Drive, Mode, Target};
 pub use file::BODIES_MAX;
 pub use joint::{Axis, End, Freedom, Joint};
 pub use mesh::{Mesh, Solidity};

@@ -14,5 +14,7 @@ pub const ROOM: &str = include_str!("../room.toml");
 pub const RIG_FIXED: &str = include_str!("../rig-fixed.toml");
 /// A vehicle on a rig that slides.
 pub const RIG_SLIDING: &str = include_str!("../rig-sliding.toml");
+/// A turntable, a sliding gate and an arm of the vehicle that motors drive.
+pub const DRIVEN_JOINTS: &str = include_str!("../driven-joints.toml");
 /// A load that hangs from the vehicle by a rope.
 pub const SLUNG_LOAD: &str = include_str!("../slung-load.toml");

@@ -97,6 +97,75 @@ fn what_no_body_can_be_is_refused_with_its_key() {
 }
 
 #[test]
+fn what_no_drive_can_be_is_refused_with_its_key() {
+    let axis = format!("axis = {}\n", given("[0, 0, 1]", "1"));
+    let with = |kind: &str, axis: &str, keys: &str| {
+        [heavy("load"), joint(kind, "world", "load", axis) + "[joints.drive]\n" + keys]
+    };
+    let key = |name: &str, value: &str, unit: &str| format!("{name} = {}\n", given(value, unit));
+    let mode = |name: &str| format!("mode = \"{name}\"\n");
+    let speeds = |points: &str| key("schedule", points, "rad/s");
+    let damping = |value: &str| key("damping", value, "N*m*s/rad");
+    let stiffness = |value: &str| key("stiffness", value, "N*m/rad");
+    let speed = mode("speed") + &damping("1") + &speeds("[[0, 1]]");
+    let position = mode("position") + &stiffness("1") + &key("schedule", "[[0, 90], [1, -90]]", "deg");
+    for whole in [&speed, &position, &(position.clone() + &damping("0") + &key("limit", "0", "N*m"))] {
+        assert!(scene(&with("revolute", &axis, whole)).is_ok(), "{whole}");
+    }
+    for kind in ["fixed", "ball"] {
+        refused(
+            &with(kind, "", &speed),
+            &["test.toml:13:1:", "joints.0.drive", "revolute or prismatic", kind],
+        );
+    }
+    let hinge = |keys: &str, told: &[&str]| refused(&with("revolute", &axis, keys), told);
+    // Modes and their gains.
+    hinge(&speed.replace("speed", "torque"), &["joints.0.drive.mode", "\"position\"", "\"torque\""]);
+    hinge(&(mode("speed") + &speeds("[[0, 1]]")), &["missing key `joints.0.drive.damping`"]);
+    hinge(
+        &position.replace("stiffness", "damping").replace("N*m/rad", "N*m*s/rad"),
+        &["missing key `joints.0.drive.stiffness`"],
+    );
+    hinge(&(speed.clone() + &stiffness("1")), &["joints.0.drive.stiffness", "\"position\""]);
+    hinge(&(speed.clone() + &key("gain", "1", "1")), &["joints.0.drive.gain", "unknown"]);
+    // Numbers.
+    hinge(&speed.replace(&damping("1"), &damping("-1")), &["joints.0.drive.damping", "-1"]);
+    hinge(&speed.replace(&damping("1"), &damping("0")), &["joints.0.drive.damping", "above 0"]);
+    hinge(&speed.replace(&damping("1"), &damping("nan")), &["joints.0.drive.damping", "finite", "nan"]);
+    hinge(&position.replace(&stiffness("1"), &stiffness("-1")), &["joints.0.drive.stiffness", "-1"]);
+    hinge(
+        &position.replace(&stiffness("1"), &stiffness("inf")),
+        &["joints.0.drive.stiffness", "finite", "inf"],
+    );
+    hinge(&(position.clone() + &damping("-1")), &["joints.0.drive.damping", "-1"]);
+    hinge(&(speed.clone() + &key("limit", "-1", "N*m")), &["joints.0.drive.limit", "-1"]);
+    hinge(&(speed.clone() + &key("limit", "1", "N")), &["joints.0.drive.limit.unit", "N*m"]);
+    refused(&with("prismatic", &axis, &speed), &["joints.0.drive.damping.unit", "N*s/m"]);
+}
+
+#[test]
+fn what_no_schedule_can_be_is_refused_with_its_point() {
+    let with = |points: &str| {
+        let axis = format!("axis = {}\n", given("[0, 0, 1]", "1"));
+        let damping = given("1", "N*m*s/rad");
+        let keys = format!("mode = \"speed\"\ndamping = {damping}\nschedule = {}\n", given(points, "rad/s"));
+        [heavy("load"), joint("revolute", "world", "load", &axis) + "[joints.drive]\n" + &keys]
+    };
+    let schedule = "joints.0.drive.schedule";
+    assert!(scene(&with("[[0, 1], [2, 3], [2, 4]]")).is_ok(), "two of one time are a jump");
+    refused(&with("[]"), &["test.toml:17:22:", schedule, "one or more points", "empty"]);
+    refused(&with("1"), &[schedule, "one or more points", "integer"]);
+    refused(&with("[1, 2]"), &["schedule.value.0", "two numbers", "integer"]);
+    refused(&with("[[0, 1], [1, 2, 3]]"), &["schedule.value.1", "two numbers", "an array of 3"]);
+    refused(&with("[[0, 1], [2, 2], [1.5, 3]]"), &["schedule.value.2", "2 s or later", "1.5 s"]);
+    refused(&with("[[-1, 1]]"), &["schedule.value.0", "since the start", "-1"]);
+    refused(&with("[[0, nan]]"), &["schedule.value.0", "finite", "nan"]);
+    refused(&with("[[inf, 1]]"), &["schedule.value.0", "finite", "inf"]);
+    refused(&with("[[0, 1e9]]"), &["schedule.value.0", "wrong unit", "1000000000.0 rad/s"]);
+    refused(&with("[[0, \"fast\"]]"), &["schedule.value.0", "finite number", "string"]);
+}
+
+#[test]
 fn what_no_joint_can_be_is_refused_with_its_key() {
     let body = || heavy("load");
     let with = |text: String| [body(), text];

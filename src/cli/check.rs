@@ -29,7 +29,10 @@ pub fn check(arguments: &CheckArguments) -> Result<bool> {
         print_json(&checked.json())?;
     } else {
         let graph = checked.to_string().trim_end().to_owned();
-        let lines: Vec<String> = std::iter::once(graph).chain(hummingbus::meshes(&checked)).collect();
+        let lines: Vec<String> = std::iter::once(graph)
+            .chain(hummingbus::meshes(&checked))
+            .chain(hummingbus::drives(&checked))
+            .collect();
         print_text(&lines.join("\n"))?;
     }
     Ok(true)

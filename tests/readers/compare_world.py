@@ -306,11 +306,25 @@ def compare_rigs(told, cases):
     row("rig B: period of a swing of 0.5 rad", "s", period, closed=(closed, 5e-6))
 
 
-def compare_chain(told, cases):
-    """What hangs from the vehicle by a ball joint, a hinge, a slide and a fixed joint, all in free fall."""
+def actuators(drives):
+    """Servos of the joints that are driven, with the targets that they hold."""
+    each, targets = "", []
+    for drive in drives:
+        limit = "" if drive["limit"] is None else f'forcerange="{-drive["limit"]} {drive["limit"]}"'
+        stiffness, damping = drive["stiffness"], drive["damping"]
+        gain = stiffness or damping
+        each += (f'<general joint="{drive["name"]}" gainprm="{gain}" biastype="affine" '
+                 f'biasprm="0 {-stiffness} {-damping}" {limit}/>')
+        targets.append(drive["target"])
+    return f"<actuator>{each}</actuator>", targets
+
+
+def chain_apart(told, states, drives):
+    """How far the bodies of a chain that falls freely get from MuJoCo's, in m and in rad."""
     axis = " ".join(str(number) for number in told["chain axis"])
-    kinds = {"ball": '<joint type="ball" pos="{0}"/>', "revolute": f'<joint type="hinge" axis="{axis}" pos="{{0}}"/>',
-             "prismatic": f'<joint type="slide" axis="{axis}" pos="{{0}}"/>', "fixed": ""}
+    kinds = {"ball": '<joint name="{1}" type="ball" pos="{0}"/>',
+             "revolute": f'<joint name="{{1}}" type="hinge" axis="{axis}" pos="{{0}}"/>',
+             "prismatic": f'<joint name="{{1}}" type="slide" axis="{axis}" pos="{{0}}"/>', "fixed": ""}
     inside, ends, above = "", "", np.zeros(3)
     for link in told["chain"]:
         centre, half = np.array(link["centre"]), np.array(link["size"]) / 2
@@ -318,13 +332,15 @@ def compare_chain(told, cases):
         place = " ".join(str(number) for number in centre - above)
         moments = link["mass"] / 3 * (sum(half**2) - half**2)
         diagonal = " ".join(str(moment) for moment in moments)
-        inside += (f'<body name="{link["name"]}" pos="{place}">{kinds[link["kind"]].format(anchor)}'
+        inside += (f'<body name="{link["name"]}" pos="{place}">{kinds[link["kind"]].format(anchor, link["name"])}'
                    f'<inertial pos="0 0 0" mass="{link["mass"]}" diaginertia="{diagonal}"/>')
         ends, above = ends + "</body>", centre
-    states = np.array(cases["chain"])
+    states = np.array(states)
     start = [0, *states[0][1:4], 0, 0, 0, 1, 0, 0, 0]
-    model, data = world(told, body(told, start, inside + ends), integrator="RK4")
+    servos, targets = actuators(drives)
+    model, data = world(told, body(told, start, inside + ends), servos, integrator="RK4")
     data.qvel[3:6] = [2, 1, 3]
+    data.ctrl[:] = targets
     mujoco.mj_forward(model, data)
     off, turned = 0.0, 0.0
     for state in states[1:]:
@@ -336,7 +352,21 @@ def compare_chain(told, cases):
             mujoco.mj_kinematics(model, data)
             off = max(off, np.linalg.norm(ours[:3] - data.xpos[number + 1]))
             turned = max(turned, angle_between(ours[3:], data.xquat[number + 1]))
+    return off, turned
+
+
+def compare_chain(told, cases):
+    """What hangs from the vehicle by a ball joint, a hinge, a slide and a fixed joint, all in free fall."""
+    off, turned = chain_apart(told, cases["chain"], [])
     what = "vehicle and a chain of four by a ball joint, a hinge, a slide and a fixed joint, 2.4 s of free fall"
+    apart(f"{what}: position", "m", mujoco=(off, 1e-9))
+    apart(f"{what}: attitude", "rad", mujoco=(turned, 1e-9))
+
+
+def compare_driven_chain(told, cases):
+    """The same with a position servo in the hinge and a speed servo, at its limit all the time, in the slide."""
+    off, turned = chain_apart(told, cases["driven chain"], told["chain drives"])
+    what = "the same chain with a driven hinge and a driven slide, 1.5 s of free fall"
     apart(f"{what}: position", "m", mujoco=(off, 1e-9))
     apart(f"{what}: attitude", "rad", mujoco=(turned, 1e-9))
 
@@ -422,6 +452,7 @@ def main():
     if arguments.all:
         comparisons += [compare_rotorpy, compare_dop853]
     comparisons += [compare_bounces, compare_slide, compare_rest, compare_tip, compare_stack, compare_rigs, compare_chain]
+    comparisons += [compare_driven_chain]
     for compare in comparisons:
         if arguments.only is None or compare.__name__ == f"compare_{arguments.only}":
             compare(told, told["cases"])

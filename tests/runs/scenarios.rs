@@ -142,8 +142,8 @@ fn among_meshes_in_an_office_and_a_labyrinth() {
 }
 
 #[test]
-fn among_free_bodies_with_a_slung_load_and_in_a_workshop() {
-    ["slung-load", "workshop"].into_iter().for_each(fly);
+fn among_free_bodies_with_a_slung_load_in_a_workshop_and_with_driven_joints() {
+    ["slung-load", "workshop", "driven-joints"].into_iter().for_each(fly);
 }
 
 /// Not for the two laps that the manifest asks for, which take a minute: for half a lap, and no contact.

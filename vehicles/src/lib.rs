@@ -11,6 +11,7 @@
 //! | `file` | which keys a vehicle file has, and what is physical |
 //! | [`foreign`] | formats that are taken for another one, by their first bytes |
 //! | [`reader`] | walks the TOML tree with positions, refuses what it does not know; scene files and gains files use it too |
+//! | `schedule` | parameters that are lines of times and values |
 //! | [`quotes`] | quotation marks in CSV files of measurements, whose rows are lines |
 //! | `dialect`, `layout`, `table_error` | delimiter, header and decimal mark of such a table: declared, found, wrong |
 //! | [`lines`], [`encoding`] | lines of texts of any system; UTF-16 |
@@ -41,6 +42,7 @@ pub mod provenance;
 pub mod quotes;
 pub mod reader;
 pub mod reference;
+mod schedule;
 pub mod table;
 mod table_error;
 mod table_rows;

@@ -99,7 +99,7 @@ impl Quantity {
 
 /// Whether a number describes what is there or was chosen by somebody.
 #[derive(Debug, Clone, Copy)]
-enum Origin {
+pub(crate) enum Origin {
     Known,
     Chosen,
 }
@@ -144,7 +144,7 @@ impl<'d, 't> Section<'d, 't> {
         self.table.get(name)
     }
 
-    fn need(&self, name: &'d str, expected: &str) -> Result<&'d Spanned<DeValue<'t>>, Diagnostic> {
+    pub(crate) fn need(&self, name: &'d str, expected: &str) -> Result<&'d Spanned<DeValue<'t>>, Diagnostic> {
         let missing = || ParameterError::missing(self.key(name), expected);
         self.find(name).ok_or_else(|| Diagnostic::at(self.doc.place(&self.at), missing()))
     }
@@ -276,13 +276,13 @@ impl<'d, 't> Section<'d, 't> {
         Ok(stated)
     }
 
-    fn parameter(&self, name: &'d str) -> Result<Section<'d, 't>, Diagnostic> {
+    pub(crate) fn parameter(&self, name: &'d str) -> Result<Section<'d, 't>, Diagnostic> {
         let expected = "a table with value, unit, source and uncertainty";
         self.as_section(self.key(name), self.need(name, expected)?, expected)
     }
 
     /// Checks unit, source and uncertainty of a parameter's table; notes them; gives the factor to SI.
-    fn meta(&self, dimension: Dimension, origin: Origin) -> Result<f64, Diagnostic> {
+    pub(crate) fn meta(&self, dimension: Dimension, origin: Origin) -> Result<f64, Diagnostic> {
         let unit = self.text("unit")?;
         let factor = dimension.factor(unit).ok_or_else(|| {
             self.doc.bad(&self.at_of("unit"), &self.key("unit"), dimension.describe(), format!("\"{unit}\""))
@@ -340,7 +340,7 @@ impl<'d, 't> Section<'d, 't> {
     }
 
     /// A finite number, integer or not.
-    fn number(&self, name: &str, value: &Spanned<DeValue<'t>>) -> Result<f64, Diagnostic> {
+    pub(crate) fn number(&self, name: &str, value: &Spanned<DeValue<'t>>) -> Result<f64, Diagnostic> {
         let expected = "a finite number";
         let number = match value.get_ref() {
             DeValue::Float(float) => float.as_str().parse().ok(),

@@ -5,6 +5,7 @@
 //! after the step, positions and velocities. A rope is a joint while it is taut and pulls.
 
 use super::body::{add_twist, mobility, shift, twist};
+use super::drive::Instant;
 use super::joint_forces::JointForces;
 use super::joints::Joint;
 use super::rig;
@@ -79,6 +80,8 @@ pub(super) struct Carrier<'a> {
     pub model: &'a NewtonEuler,
     pub rig: Option<&'a Rig>,
     pub actuation: &'a Actuation,
+    /// Time since the start.
+    pub when: Instant,
 }
 
 /// What a start or a joint cannot be.
@@ -88,8 +91,9 @@ pub(crate) enum Misfit {
     Overstretched { joint: usize, over_m: f64 },
     /// What a joint ties moves apart, at a speed in m/s or rad/s.
     Parting { joint: usize, rate: f64 },
-    /// The joint that is damped fastest, as a rate: it is for the step to tell whether that is too fast.
-    Damping { joint: usize, per_s: f64 },
+    /// The joint that is damped and driven fastest, as the rate of a pole: it is for the step to tell whether that is too
+    /// fast.
+    Fast { joint: usize, per_s: f64 },
 }
 
 /// Slower than this is rounding in a scene file, m/s or rad/s.
@@ -191,8 +195,8 @@ impl FreeBodies {
         if let Some((joint, rate)) = forces.fastest_row().filter(|(_, rate)| *rate > PARTING) {
             return Some(Misfit::Parting { joint, rate });
         }
-        let (joint, per_s) = forces.fastest_damping(&self.joints)?;
-        Some(Misfit::Damping { joint, per_s })
+        let (joint, per_s) = forces.fastest_pole(&self.joints)?;
+        Some(Misfit::Fast { joint, per_s })
     }
 
     /// The bodies as impulses see them.
@@ -236,7 +240,8 @@ impl FreeBodies {
                     if stage == 0 { *body } else { body.moved(&work.rates[before][number], share * span_s) };
                 work.stage.push(moved);
             }
-            ks[stage] = Some(self.rates(carrier, &state, stage, work));
+            let when = Instant { time_s: carrier.when.time_s + share * span_s, ..carrier.when };
+            ks[stage] = Some(self.rates(&Carrier { when, ..*carrier }, &state, stage, work));
             let Work { forces, pulls_N_s, .. } = &mut *work;
             forces.add_pulls(WEIGHTS[stage] * span_s, &self.joints, pulls_N_s);
         }
@@ -278,7 +283,8 @@ impl FreeBodies {
         }
     }
 
-    /// The rates of the vehicle at `state` and of the bodies at `work.stage`; the latter go into `work.rates[stage]`.
+    /// The rates of the vehicle at `state` and of the bodies at `work.stage`, at the time of `carrier`; the latter go into
+    /// `work.rates[stage]`.
     fn rates(&self, carrier: &Carrier<'_>, state: &State, stage: usize, work: &mut Work) -> Rates {
         let mut rates = carrier.model.rates(state, carrier.actuation);
         if let Some(rig) = carrier.rig {
@@ -299,6 +305,7 @@ impl FreeBodies {
         let bodies = out.iter().zip(&frames[FIRST_BODY..]);
         accelerations.extend(bodies.map(|(rates, frame)| accelerations_of(frame, rates)));
         forces.damp(&self.joints, accelerations);
+        forces.drive(&self.joints, &carrier.when, accelerations);
         forces.lay(&self.joints, acting);
         forces.find(|line, _| -(line.bias + line.rate(|end| accelerations[end])));
         forces.push(|end, by| accelerations[end] += by);

@@ -4,7 +4,9 @@
 //! symmetric and positive semidefinite. Forces over accelerations, and shifts over distances, are found the same way.
 use super::body::lay_out;
 use super::cholesky::{factorise, substitute};
+use super::drive::{Drive, Instant};
 use super::joints::{Joint, Line};
+use super::poles::{self, Spring};
 use crate::state::RigidBody;
 use nalgebra::{Matrix6, Vector6};
 
@@ -117,22 +119,22 @@ impl JointForces {
         }
     }
 
-    /// The joint whose damping is the fastest against the inertia of what it moves, and its rate, 1/s.
-    pub(super) fn fastest_damping(&mut self, joints: &[Joint]) -> Option<(usize, f64)> {
-        let mut fastest: Option<(usize, f64)> = None;
+    /// The joint whose damping and drive are the fastest against the inertia of what they move, and a bound of the rate of
+    /// the fastest pole, 1/s. The bodies count as free, which they are not where other joints hold them.
+    pub(super) fn fastest_pole(&mut self, joints: &[Joint]) -> Option<(usize, f64)> {
+        let mut springs = Vec::new();
         for (number, joint) in joints.iter().enumerate() {
+            let [stiffness, more] = joint.drive.as_ref().map_or([0.0; 2], Drive::gains);
             self.damped.clear();
             joint.damped(&self.frames, &mut self.damped);
-            for (line, damping) in &self.damped {
-                let yields = [0, 1]
-                    .map(|at| line.jacobian[at].dot(&(self.mobilities[line.ends[at]] * line.jacobian[at])));
-                let rate = damping * (yields[0] + yields[1]);
-                if fastest.is_none_or(|(_, known)| rate > known) {
-                    fastest = Some((number, rate));
-                }
+            if let (true, Some(_)) = (self.damped.is_empty(), &joint.drive) {
+                self.damped.extend(joint.axial(&self.frames).map(|line| (line, 0.0)));
             }
+            let spring =
+                |&(line, damping)| Spring { joint: number, line, stiffness, damping: damping + more };
+            springs.extend(self.damped.iter().map(spring));
         }
-        fastest
+        poles::fastest(&springs, &self.mobilities)
     }
 
     /// The joint whose rows move apart fastest, and how fast, m/s or rad/s.
@@ -140,6 +142,18 @@ impl JointForces {
         let rate = |line: &Line| line.rate(|end| super::body::twist(&self.frames[end])).abs();
         let rows = self.lines.iter().map(|(joint, line)| (*joint, rate(line)));
         rows.max_by(|(_, one), (_, other)| one.total_cmp(other))
+    }
+
+    /// Adds what the drives of the joints do to the accelerations, at this time.
+    pub(super) fn drive(&self, joints: &[Joint], when: &Instant, accelerations: &mut [Vector6<f64>]) {
+        for joint in joints {
+            let Some((drive, line)) = joint.drive.as_ref().zip(joint.axial(&self.frames)) else { continue };
+            let rate = line.rate(|end| super::body::twist(&self.frames[end]));
+            let force = drive.force(when, line.off, rate);
+            for (end, jacobian) in line.ends.iter().zip(&line.jacobian) {
+                accelerations[*end] += self.mobilities[*end] * jacobian * force;
+            }
+        }
     }
 
     /// Adds what the damping of the joints does to the accelerations.

@@ -4,6 +4,7 @@
 //! or the child's rotation about d. A row's Jacobian takes the twists of the two to the rate of that; its bias is what of the
 //! second derivative is left without accelerations (R. Featherstone, Rigid Body Dynamics Algorithms, 2008, section 8.2).
 
+use super::drive::Drive;
 use super::solver::{Body, Row, Unilateral, join, stop};
 use crate::state::RigidBody;
 use nalgebra::{Unit, UnitQuaternion, Vector3, Vector6};
@@ -26,6 +27,7 @@ pub(super) struct Joint {
     /// The child's attitude at the start, seen from the parent.
     start: UnitQuaternion<f64>,
     damping: f64,
+    pub drive: Option<Drive>,
 }
 
 /// What a joint leaves free, in the parent's axes.
@@ -100,7 +102,10 @@ impl Joint {
         };
         let anchors_m = [seen_from(parent, &told.anchor_W_m), seen_from(child, end_W_m)];
         let start = parent.attitude_WB.inverse() * child.attitude_WB;
-        Self { ends, anchors_m, along, about, motion, start, damping: told.damping }
+        let has_stops = |axis: &Axis| axis.limits.iter().any(|limit| limit.is_finite());
+        let turns_round = matches!(motion, Way::Turn(axis) if !has_stops(&axis));
+        let drive = told.drive.as_ref().map(|drive| Drive::new(drive, turns_round));
+        Self { ends, anchors_m, along, about, motion, start, damping: told.damping, drive }
     }
 
     /// Moves the anchors on the vehicle, whose centre of mass is not where its file says.
@@ -130,7 +135,8 @@ impl Joint {
         let more = [axis.x, axis.y, axis.z, limits[0], limits[1], self.damping];
         let start = <[f64; 4]>::from(self.start.coords);
         let held = [self.along.len() as f64, self.about.len() as f64];
-        ends.into_iter().chain(anchors).chain(more).chain(held).chain(start)
+        let drive = self.drive.iter().flat_map(Drive::numbers);
+        ends.into_iter().chain(anchors).chain(more).chain(held).chain(start).chain(drive)
     }
 
     fn placed(&self, frames: &[RigidBody]) -> Placed {
@@ -218,20 +224,38 @@ impl Joint {
         if self.damping == 0.0 {
             return;
         }
-        let parent = &frames[self.ends[0]];
         let turning =
             |about_W: &Vector3<f64>| Line { ends: self.ends, jacobian: turn(about_W), bias: 0.0, off: 0.0 };
         match self.motion {
             Way::AnyTurn => lines.extend(
                 [Vector3::x(), Vector3::y(), Vector3::z()].map(|about_W| (turning(&about_W), self.damping)),
             ),
-            Way::Turn(axis) => lines.push((turning(&(parent.attitude_WB * axis.along_W)), self.damping)),
-            Way::Shift(axis) => {
-                let along_W = parent.attitude_WB * axis.along_W;
-                lines.push((self.line_along(&self.placed(frames), &along_W), self.damping));
-            }
-            Way::Nothing | Way::Rope { .. } => (),
+            _ => lines.extend(self.axial(frames).map(|line| (line, self.damping))),
         }
+    }
+
+    /// The row of the motion about or along the axis of a revolute or prismatic joint: it is off by the angle, from -pi to
+    /// pi, or the way since the start. None of others.
+    pub(super) fn axial(&self, frames: &[RigidBody]) -> Option<Line> {
+        let parent = &frames[self.ends[0]];
+        match self.motion {
+            Way::Turn(axis) => {
+                let jacobian = turn(&(parent.attitude_WB * axis.along_W));
+                Some(Line { ends: self.ends, jacobian, bias: 0.0, off: self.angle_rad(frames, &axis) })
+            }
+            Way::Shift(axis) => {
+                Some(self.line_along(&self.placed(frames), &(parent.attitude_WB * axis.along_W)))
+            }
+            Way::Nothing | Way::AnyTurn | Way::Rope { .. } => None,
+        }
+    }
+
+    /// The angle about the axis since the start, from -pi to pi.
+    fn angle_rad(&self, frames: &[RigidBody], axis: &Axis) -> f64 {
+        let turned = self.turned(frames);
+        let angle_rad = 2.0 * libm::atan2(turned.imag().dot(&axis.along_W), turned.w);
+        // From -2 pi to 2 pi: the quaternion may have either sign.
+        angle_rad - std::f64::consts::TAU * (angle_rad / std::f64::consts::TAU).round()
     }
 
     /// How far a rope's ends may still go apart, and how fast they do; none of another joint.
@@ -253,19 +277,12 @@ impl Joint {
             let ends = gaps.into_iter().filter(|(_, gap)| gap.is_finite());
             constraints.extend(ends.map(|(sign, gap)| stop(row(jacobian, sign * lever), lever * gap)));
         };
-        let parent = &frames[self.ends[0]];
         match self.motion {
-            Way::Turn(axis) => {
-                let turned = self.turned(frames);
-                let angle_rad = 2.0 * libm::atan2(turned.imag().dot(&axis.along_W), turned.w);
-                // From -2 pi to 2 pi: the quaternion may have either sign.
-                let angle_rad =
-                    angle_rad - std::f64::consts::TAU * (angle_rad / std::f64::consts::TAU).round();
-                between(axis.limits, angle_rad, LEVER_M, turn(&(parent.attitude_WB * axis.along_W)));
-            }
-            Way::Shift(axis) => {
-                let line = self.line_along(&self.placed(frames), &(parent.attitude_WB * axis.along_W));
-                between(axis.limits, line.off, 1.0, line.jacobian);
+            Way::Turn(Axis { limits, .. }) | Way::Shift(Axis { limits, .. }) => {
+                let lever = if matches!(self.motion, Way::Turn(_)) { LEVER_M } else { 1.0 };
+                if let Some(line) = self.axial(frames) {
+                    between(limits, line.off, lever, line.jacobian);
+                }
             }
             Way::Rope { length_m } => {
                 if let Some(line) = self.line_of_rope(&self.placed(frames), length_m) {

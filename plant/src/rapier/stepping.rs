@@ -9,6 +9,7 @@
 
 use super::body::{lay_out, mobility, set_twist, shift, twist};
 use super::contacts::{Contacts, Sighting};
+use super::drive::Instant;
 use super::free_bodies::{Carrier, FIRST_BODY, FreeBodies, VEHICLE, Work};
 use super::islands::FOUND_M_S;
 use super::rig::{self, Mounted};
@@ -108,6 +109,8 @@ pub(super) struct Motion {
     pub free_bodies: FreeBodies,
     pub contacts: Contacts,
     pub state: State,
+    /// Time of that since the start.
+    pub time_s: f64,
     /// An impact that is faster is a crash.
     pub crash_speed_m_s: f64,
     /// Radius of the vehicle's disc.
@@ -129,9 +132,15 @@ pub(super) struct Changed {
 }
 
 impl Motion {
-    /// One step of `span_s`; `others` are the other vehicles as they are at its start.
-    pub(super) fn substep(&mut self, actuation: &Actuation, span_s: f64, others: &mut [Neighbour]) {
+    /// One step of `span_s` from `time_s` after the start; `others` are the other vehicles as they are then.
+    pub(super) fn substep(
+        &mut self,
+        actuation: &Actuation,
+        [time_s, span_s]: [f64; 2],
+        others: &mut [Neighbour],
+    ) {
         let mut scratch = std::mem::take(&mut self.scratch);
+        self.time_s = time_s;
         self.cut_at_impacts(&mut scratch, actuation, span_s, others);
         self.scratch = scratch;
     }
@@ -176,6 +185,7 @@ impl Motion {
                     is_pushed |= self.constrain(scratch, &free, after_s, -slow_m_s);
                     move_on(others, after_s);
                     (left_s, cuts) = (left_s - after_s, cuts + 1);
+                    self.time_s += after_s;
                 }
             }
             free = self.free(&mut scratch.free_bodies, actuation, left_s);
@@ -191,7 +201,9 @@ impl Motion {
         let unheld = self.model.runge_kutta(&self.state, actuation, span_s);
         let mut state = unheld;
         if !self.free_bodies.is_empty() {
-            let carrier = Carrier { model: &self.model, rig: self.rig.as_ref(), actuation };
+            let (model, rig) = (&self.model, self.rig.as_ref());
+            let when = Instant { time_s: self.time_s, middle_s: self.time_s + span_s / 2.0 };
+            let carrier = Carrier { model, rig, actuation, when };
             state = self.free_bodies.free_step(&carrier, &self.state, span_s, work);
         } else if let Some(rig) = &self.rig {
             let hold = |state: &State, rates| rig::hold(rig, &self.model, state, rates);

@@ -2,6 +2,8 @@
 #![allow(dead_code, reason = "every test file uses its own part of these helpers")]
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
+pub mod parts;
+
 use nalgebra::Vector3;
 use plant::{FreeFlight, NewtonEuler, Rapier, RigidBody, State};
 use scenes::Scene;
