@@ -88,6 +88,12 @@ fn what_hangs_on_a_rope_takes_memory_only_where_it_lies() {
 }
 
 #[test]
+fn driven_joints_take_no_memory() {
+    let mut plant = rapier(scenes::reference::DRIVEN_JOINTS, Vector3::z() * 20.0);
+    assert_eq!(taken(&mut plant, hummingbird().hover_command(), &[]), 0);
+}
+
+#[test]
 fn impulses_that_are_found_directly_take_no_memory() {
     let key = |value: &str, unit: &str| {
         format!("{{ value = {value}, unit = \"{unit}\", source = \"test\", uncertainty = \"exact\" }}")
