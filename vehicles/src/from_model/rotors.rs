@@ -2,7 +2,6 @@
 
 use diagnostics::Diagnostic;
 use nalgebra::{Point3, Vector3};
-use std::f64::consts::TAU;
 
 use super::body::turned;
 use super::model::{Freedom, Joint, Link, Model, Motor};
@@ -11,8 +10,8 @@ use super::model::{Freedom, Joint, Link, Model, Motor};
 const WORDS: [&str; 3] = ["rotor", "prop", "motor"];
 /// Largest sine of the angle between a rotor's axis and the body's z axis.
 const TILT_MAX: f64 = 0.02;
-/// Angles by which a rotor may stand to the left of the nose and still count as in front, in rad.
-const FRONT_SLACK_RAD: f64 = 1e-6;
+/// Share of its distance by which a rotor may stand to the left of the nose and still count as in front: rounding.
+const FRONT_SLACK: f64 = 1e-6;
 
 /// A rotor of the model.
 pub struct Rotor<'m> {
@@ -147,12 +146,13 @@ fn sort(rotors: &mut [Rotor]) {
     if numbers.len() == rotors.len() {
         rotors.sort_by(|a, b| number(a).unwrap_or(0.0).total_cmp(&number(b).unwrap_or(0.0)));
     } else {
-        rotors.sort_by(|a, b| clockwise_rad(&a.position_m).total_cmp(&clockwise_rad(&b.position_m)));
+        rotors.sort_by(|a, b| clockwise(&a.position_m).total_cmp(&clockwise(&b.position_m)));
     }
 }
 
-/// The angle of a place from the nose, clockwise seen from above.
-fn clockwise_rad(place: &Vector3<f64>) -> f64 {
-    let angle = -place.y.atan2(place.x);
-    if angle < -FRONT_SLACK_RAD { angle + TAU } else { angle }
+/// A number that grows with the angle of a place from the nose, clockwise seen from above: 0 in front, 2 in the rear.
+fn clockwise(place: &Vector3<f64>) -> f64 {
+    let size = place.x.abs() + place.y.abs();
+    let forward = if size > 0.0 { place.x / size } else { 1.0 };
+    if place.y <= FRONT_SLACK * size { 1.0 - forward } else { 3.0 + forward }
 }

@@ -3,7 +3,7 @@
 use diagnostics::{Diagnostic, ParameterError};
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use roxmltree::Node;
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use super::model::{Freedom, Inertial, Joint, Link, Model, pose, tensor};
@@ -17,7 +17,7 @@ const MODEL: &str = "__model__";
 /// Poses of a model's links, joints and frames, each relative to another.
 #[derive(Default)]
 struct Frames<'d> {
-    poses: HashMap<&'d str, (Isometry3<f64>, &'d str, Range<usize>)>,
+    poses: BTreeMap<&'d str, (Isometry3<f64>, &'d str, Range<usize>)>,
 }
 
 /// Reads the only model of the element `<sdf>`. The model's frame is that of its element.
@@ -66,9 +66,9 @@ impl<'d> Frames<'d> {
             "frame" => node.attribute("attached_to"),
             _ => None,
         };
-        let own = child(node, "pose");
+        let posed = child(node, "pose");
         let relative = |node: Node<'d, '_>| node.attribute("relative_to").or(node.attribute("frame"));
-        let to = own.and_then(relative).filter(|name| !name.trim().is_empty()).or(carrier);
+        let to = posed.and_then(relative).filter(|name| !name.trim().is_empty()).or(carrier);
         let entry = (own_pose(source, node)?, to.unwrap_or(MODEL), start_of(node));
         if self.poses.insert(name, entry).is_some() {
             let message =
@@ -147,10 +147,10 @@ fn link(source: Source, node: Node, frames: &Frames) -> Result<Link, Diagnostic>
 /// A joint; none for one that holds the model to the world.
 fn joint(source: Source, node: Node, frames: &Frames) -> Result<Option<Joint>, Diagnostic> {
     let name = source.attribute(node, "name")?.to_owned();
-    let end = |which: &str| {
-        text_of(node, which).map(str::to_owned).ok_or_else(|| {
-            let message = format!("joint `{name}`: expected <{which}>, found none");
-            source.fault(start_of(node), message).help(format!("add <{which}> with the name of a link"))
+    let end = |side: &str| {
+        text_of(node, side).map(str::to_owned).ok_or_else(|| {
+            let message = format!("joint `{name}`: expected <{side}>, found none");
+            source.fault(start_of(node), message).help(format!("add <{side}> with the name of a link"))
         })
     };
     let (parent, below) = (end("parent")?, end("child")?);

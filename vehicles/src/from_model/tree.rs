@@ -1,7 +1,7 @@
 //! Links and joints as a tree, with one root.
 
 use diagnostics::Diagnostic;
-use std::collections::{HashMap, VecDeque};
+use std::collections::{BTreeMap, VecDeque};
 
 use super::model::{Joint, Link};
 use super::xml::Source;
@@ -24,7 +24,7 @@ pub fn order(source: Source, links: &[Link], joints: &[Joint]) -> Result<Vec<Ste
         let message = format!("expected one link without a parent, found two: `{first}` and `{second}`");
         return Err(source.fault(links[other].at.clone(), message).help("join them with a fixed joint"));
     }
-    let mut below: HashMap<usize, Vec<Step>> = HashMap::new();
+    let mut below: BTreeMap<usize, Vec<Step>> = BTreeMap::new();
     for (number, joint) in joints.iter().enumerate() {
         below
             .entry(index[joint.parent.as_str()])
@@ -40,8 +40,8 @@ pub fn order(source: Source, links: &[Link], joints: &[Joint]) -> Result<Vec<Ste
     if steps.len() < links.len() { Err(cycle(source, links, joints, &steps)) } else { Ok(steps) }
 }
 
-fn index<'a>(source: Source, links: &'a [Link]) -> Result<HashMap<&'a str, usize>, Diagnostic> {
-    let mut index = HashMap::new();
+fn index<'a>(source: Source, links: &'a [Link]) -> Result<BTreeMap<&'a str, usize>, Diagnostic> {
+    let mut index = BTreeMap::new();
     for (number, link) in links.iter().enumerate() {
         let name = link.name.as_str();
         if index.insert(name, number).is_some() {
@@ -58,15 +58,15 @@ fn index<'a>(source: Source, links: &'a [Link]) -> Result<HashMap<&'a str, usize
 /// The joint above each link.
 fn parents(
     source: Source,
-    index: &HashMap<&str, usize>,
+    index: &BTreeMap<&str, usize>,
     joints: &[Joint],
-) -> Result<HashMap<usize, usize>, Diagnostic> {
-    let mut above = HashMap::new();
+) -> Result<BTreeMap<usize, usize>, Diagnostic> {
+    let mut above = BTreeMap::new();
     for (number, joint) in joints.iter().enumerate() {
-        let own = &joint.name;
-        for name in [joint.parent.as_str(), joint.child.as_str()] {
-            if !index.contains_key(name) {
-                let message = format!("joint `{own}`: expected the name of a link, found `{name}`");
+        let name = &joint.name;
+        for end in [joint.parent.as_str(), joint.child.as_str()] {
+            if !index.contains_key(end) {
+                let message = format!("joint `{name}`: expected the name of a link, found `{end}`");
                 return Err(source
                     .fault(joint.at.clone(), message)
                     .help("add this link, or correct the name"));
@@ -75,7 +75,7 @@ fn parents(
         if let Some(other) = above.insert(index[joint.child.as_str()], number) {
             let (child, other) = (&joint.child, &joints[other].name);
             let message = format!(
-                "link `{child}`: expected one parent, found two, by the joints `{other}` and `{own}`"
+                "link `{child}`: expected one parent, found two, by the joints `{other}` and `{name}`"
             );
             return Err(source.fault(joint.at.clone(), message).help("remove one of the joints"));
         }

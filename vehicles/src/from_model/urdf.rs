@@ -3,7 +3,7 @@
 use diagnostics::Diagnostic;
 use nalgebra::{Isometry3, Point3, Vector3};
 use roxmltree::Node;
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 
 use super::model::{Freedom, Inertial, Joint, Link, Model, pose, tensor};
 use super::plugins;
@@ -30,7 +30,7 @@ fn place(
     joints: &mut [Joint],
     origins: &[Isometry3<f64>],
 ) -> Result<(), Diagnostic> {
-    let mut poses = HashMap::new();
+    let mut poses = BTreeMap::new();
     for (link, above) in tree::order(source, links, joints)? {
         let pose = match above {
             Some(number) => {
@@ -72,12 +72,12 @@ fn inertial(source: Source, node: Node, link: &str) -> Result<Inertial, Diagnost
 
 fn joint(source: Source, node: Node) -> Result<(Joint, Isometry3<f64>), Diagnostic> {
     let name = source.attribute(node, "name")?.to_owned();
-    let end = |which: &str| -> Result<String, Diagnostic> {
+    let end = |side: &str| -> Result<String, Diagnostic> {
         let missing = || {
-            let message = format!("joint `{name}`: expected <{which}>, found none");
-            source.fault(start_of(node), message).help(format!("add <{which} link=\"…\"/>"))
+            let message = format!("joint `{name}`: expected <{side}>, found none");
+            source.fault(start_of(node), message).help(format!("add <{side} link=\"…\"/>"))
         };
-        Ok(source.attribute(child(node, which).ok_or_else(missing)?, "link")?.to_owned())
+        Ok(source.attribute(child(node, side).ok_or_else(missing)?, "link")?.to_owned())
     };
     let (parent, below) = (end("parent")?, end("child")?);
     let freedom = match source.attribute(node, "type")? {
