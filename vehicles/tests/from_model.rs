@@ -1,6 +1,7 @@
 //! Vehicle files from URDF and SDF: numbers against closed forms by hand, and errors with their places.
 
 use nalgebra::{Matrix3, Vector3};
+use proptest::prelude::*;
 use vehicles::from_model::{Converted, convert};
 use vehicles::{MotorModel, Vehicle};
 
@@ -199,4 +200,79 @@ fn what_is_wrong_with_a_model_is_told_with_its_line() {
         ":5:",
         &["another model"],
     );
+}
+
+/// Texts that replace a part of a model.
+const PARTS: [&str; 16] = [
+    "",
+    "0",
+    "-1",
+    "1e308",
+    "-1e308",
+    "5e-324",
+    "nan",
+    "inf",
+    "\"",
+    "<",
+    "/>",
+    "&#10;",
+    "rotor_0",
+    "base_link",
+    "fixed",
+    "cw",
+];
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// A replaced word of a model gives an error with the file's name, or a vehicle file that loads.
+    #[test]
+    fn a_changed_model_is_refused_in_words_or_loads(
+        is_urdf in any::<bool>(),
+        pick in any::<prop::sample::Index>(),
+        part in prop::sample::select(PARTS.to_vec()),
+    ) {
+        let model = if is_urdf { URDF } else { SDF };
+        let is_border = |c: char| matches!(c, '"' | '<' | '>' | ' ' | '\n');
+        let borders: Vec<usize> = model.match_indices(is_border).map(|(at, _)| at).collect();
+        let index = pick.index(borders.len() - 1);
+        let text = format!("{}{part}{}", &model[..=borders[index]], &model[borders[index + 1]..]);
+        match convert(&text, "any.model") {
+            Err(error) => prop_assert!(error.to_string().contains("any.model"), "{error}"),
+            Ok(made) => {
+                let read = Vehicle::parse(&made.text, "made.toml");
+                let read = read.map_err(|error| TestCaseError::fail(format!("{error}\n{}", made.text)))?;
+                prop_assert_eq!(read.rotors, made.vehicle.rotors);
+            }
+        }
+    }
+}
+
+#[test]
+fn names_of_a_model_end_neither_a_comment_nor_a_text() {
+    let hostile = URDF
+        .replace("name=\"plus\"", "name=\"a&#10;mass = 1&quot;'\"")
+        .replace("rotor_front_joint", "rotor&#10;[command]&#10;")
+        .replace("rotor_front", "rotor&#10;'''&quot;");
+    let made = of(&hostile, "plus.urdf");
+    assert_eq!(made.vehicle.name, "a\\nmass = 1\"'");
+    assert!(made.vehicle.rotors[0].name.starts_with("rotor\\n'''"), "{:?}", made.vehicle.rotors[0].name);
+    assert_eq!(made.text.lines().count(), of(URDF, "plus.urdf").text.lines().count());
+}
+
+#[test]
+fn rotors_on_fixed_joints_are_at_the_centres_of_mass_of_their_links() {
+    // Joints at one place, and the places of the rotors in the links.
+    let mut text = URDF.replace("type=\"continuous\"", "type=\"fixed\"");
+    for xyz in ["<origin xyz=\"0.2 0 0\"/>\n    <parent", "<origin xyz=\"-0.2 0 0\"/>\n    <parent"] {
+        text = text.replace(xyz, "<parent");
+    }
+    for (name, xyz) in [("left", "0.2"), ("front", "0.2"), ("rear", "-0.2"), ("right", "-0.2")] {
+        let from = format!("<link name=\"rotor_{name}\">\n    <inertial>");
+        assert!(text.contains(&from), "{from}");
+        text = text.replace(&from, &format!("{from}\n      <origin xyz=\"{xyz} 0 0\"/>"));
+    }
+    let (fixed, turning) = (of(&text, "plus.urdf").vehicle, of(URDF, "plus.urdf").vehicle);
+    assert_eq!(fixed.rotors, turning.rotors);
+    assert_eq!(fixed.inertia_kg_m2, turning.inertia_kg_m2);
 }
