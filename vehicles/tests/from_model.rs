@@ -170,7 +170,7 @@ fn what_is_wrong_with_a_model_is_told_with_its_line() {
     let ring = "<link name=\"a\"/><link name=\"b\"/><joint name=\"ab\" type=\"fixed\"><parent link=\"a\"/><child link=\"b\"/></joint>\
                 <joint name=\"ba\" type=\"fixed\"><parent link=\"b\"/><child link=\"a\"/></joint></robot>";
     urdf("</robot>", ring, "", &["cycle", "joint `ab`"]);
-    urdf("</robot>", "", ":", &["expected XML"]);
+    urdf("</robot>", "", ":", &["expected XML; the reader says: "]);
     urdf("<axis xyz=\"0 0 1\"/>", "<axis xyz=\"1 0 0\"/>", "", &["rotor_left_joint", "along z"]);
     urdf(
         "type=\"continuous\"",
@@ -183,6 +183,10 @@ fn what_is_wrong_with_a_model_is_told_with_its_line() {
     refused("<robot name=\"q\"/>", "quad.urdf", "", &["with links, found none"]);
     refused("<mujoco/>", "x2.xml", ":1:1", &["<mujoco>", "URDF or SDF"]);
     refused("", "quad.urdf", ":1:1", &["expected XML"]);
+    refused("<robot>\n</robot\n", "quad.urdf", ":2:8", &["expected XML"]);
+    refused("<robot>\n  <link", "quad.urdf", ":2:", &["expected XML"]);
+    urdf("?>", ">", ":", &["expected XML"]);
+    urdf("-->", ">", ":", &["expected XML"]);
     let deep = format!("<robot name=\"q\">{}{}</robot>", "<a>".repeat(100), "</a>".repeat(100));
     refused(&deep, "quad.urdf", ":1:", &["at most 64 deep"]);
     let many = format!("<robot name=\"q\">{}</robot>", "<a/>".repeat(100_001));

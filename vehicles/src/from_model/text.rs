@@ -84,7 +84,8 @@ impl Text {
             Origin::Model(place) => format!("from {}: {place}", self.file),
             Origin::Assumed(why) => {
                 self.assumed.push(format!("{}.{key}: {why}", self.table));
-                format!("not in {}: {why}; measure it", self.file)
+                let advice = if why.starts_with("the Hummingbird") { "measure it" } else { "check it" };
+                format!("not in {}: {why}; {advice}", self.file)
             }
         }
     }

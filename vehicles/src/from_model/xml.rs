@@ -31,8 +31,11 @@ impl<'a> Source<'a> {
                 .whole(format!("expected at most {NODES_MAX} elements and attributes, found more"))
                 .help("remove the parts without mass, such as meshes and sensors"),
             _ => {
-                let at = self.offset(error.pos());
-                self.fault(at..at + 1, format!("expected XML, found {error}")).help("correct the XML here")
+                use roxmltree::Error::{UnclosedRootNode, UnexpectedEndOfStream};
+                let is_cut = matches!(error, UnclosedRootNode | UnexpectedEndOfStream);
+                let at = if is_cut { self.text.trim_end().len() } else { self.offset(error.pos()) };
+                self.fault(at..at + 1, format!("expected XML; the reader says: {error}"))
+                    .help("correct the XML here")
             }
         })?;
         self.require_plain(&document)?;
@@ -74,10 +77,11 @@ impl<'a> Source<'a> {
 
     /// Byte offset of a line and a column in characters.
     fn offset(self, at: TextPos) -> usize {
-        let line = self.text.split_inclusive('\n').nth(at.row.saturating_sub(1) as usize).unwrap_or("");
-        let before = line.as_ptr() as usize - self.text.as_ptr() as usize;
-        let column = line.char_indices().nth(at.col.saturating_sub(1) as usize);
-        if line.is_empty() { self.text.len() } else { before + column.map_or(line.len(), |(byte, _)| byte) }
+        let above = at.row.saturating_sub(1) as usize;
+        let start: usize = self.text.split_inclusive('\n').take(above).map(str::len).sum();
+        let columns = at.col.saturating_sub(1) as usize;
+        let column = self.text[start..].char_indices().nth(columns);
+        column.map_or(self.text.len(), |(byte, _)| start + byte)
     }
 
     /// An error at a place of the file.
