@@ -9,6 +9,7 @@ mod files;
 mod identify;
 mod inherited;
 mod interrupts;
+mod new;
 mod node;
 mod output;
 mod plot;
@@ -70,6 +71,9 @@ commands! {
     /// Write a vehicle's body as URDF, which Foxglove, Rerun and RViz show: what is seen, mass and inertia, what touches.
     #[command(after_help = urdf::HELP)]
     Urdf(urdf::UrdfArguments) => urdf::urdf;
+    /// Make a first vehicle file from a model in URDF or SDF.
+    #[command(after_help = new::HELP)]
+    New(new::NewArguments) => new::new;
     /// Print every message's fields, units, frames and layout hash.
     #[command(after_help = "Example: hummingbus schema --json")]
     Schema(schema::SchemaArguments) => schema::schema;

@@ -24,6 +24,7 @@
 //! - [`profile`]: where the host time of a run's ticks goes
 //! - [`laps`], [`plot`]: recordings that are written, and pictures of them
 //! - [`urdf`]: bodies of vehicles for other tools
+//! - [`new`]: vehicle files from models of other tools
 //! - [`rights`]: rights that a run lacks are named
 //! - [`skipped`]: tests that cannot run here
 //! - [`sensors`]: sensors read what they should, and hand over what is under way
@@ -53,6 +54,7 @@ mod laps;
 mod live;
 mod loss;
 mod manifests;
+mod new;
 mod nodes;
 mod outputs;
 mod planted;

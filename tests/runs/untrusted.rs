@@ -70,6 +70,7 @@ fn names_of_files_and_arguments_are_escaped_by_every_command() {
         &["cat", &mcap],
         &["plot", &mcap],
         &["plot", &mcap, "--out", HOSTILE],
+        &["new", "vehicle", "--from", &missing, "-o", &place.path("new.toml")],
         &["urdf", &toml],
         &["urdf", &vehicle, "--frame", HOSTILE],
         &["identify", &toml, "--out", &place.path("out")],

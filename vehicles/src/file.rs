@@ -89,7 +89,15 @@ fn refuse_xml(text: &str, file_name: &str) -> Result<(), Diagnostic> {
         return Ok(());
     }
     let found = foreign::robot(text.as_bytes()).unwrap_or("XML");
-    let help = "docs/vehicles.md has the keys of vehicle files, and the way from a robot description to a vehicle file";
+    let way = match found {
+        name if foreign::is_converted(name) => {
+            format!("make a vehicle file of it: `hummingbus new vehicle --from {file_name} -o NAME.toml`; ")
+        }
+        "XML" => String::new(),
+        _ => "convert it to URDF or SDF, and run `hummingbus new vehicle --from FILE -o NAME.toml`; "
+            .to_owned(),
+    };
+    let help = format!("{way}docs/vehicles.md has the keys of vehicle files");
     Err(Diagnostic::in_file(file_name, format!("expected a vehicle file, which is TOML, found {found}"))
         .help(help))
 }

@@ -201,6 +201,12 @@ pub fn robot(text: &[u8]) -> Option<&'static str> {
     ROBOTS.iter().find(|(element, _)| has(element)).map(|(_, name)| *name)
 }
 
+/// True for the name of a robot description that `hummingbus new vehicle` converts.
+#[must_use]
+pub fn is_converted(name: &str) -> bool {
+    ROBOTS[..2].iter().any(|(_, converted)| *converted == name)
+}
+
 /// Bytes that are no text: only zeros, or too many control characters. UTF-16 is a text.
 fn binary(bytes: &[u8]) -> Option<Foreign> {
     let first = &bytes[..bytes.len().min(LOOKED_AT)];

@@ -7,6 +7,7 @@
 //! | [`provenance`] | where each number came from, kept for reports |
 //! | [`effects`] | the effects that a vehicle or scene file lists, as they are written |
 //! | `bounds` | what the numbers of a vehicle can be, and why |
+//! | [`from_model`] | first vehicle files from URDF and SDF |
 //! | [`gaps`] | gaps of logs whose samples hold until the next |
 //! | `file` | which keys a vehicle file has, and what is physical |
 //! | [`foreign`] | formats that are taken for another one, by their first bytes |
@@ -35,6 +36,7 @@ pub mod effects;
 pub mod encoding;
 mod file;
 pub mod foreign;
+pub mod from_model;
 pub mod gaps;
 mod layout;
 pub mod lines;

@@ -286,6 +286,8 @@ fn robot_descriptions_are_named_and_the_page_of_keys_has_every_key() {
         let error = Vehicle::parse(text, "quad.urdf").unwrap_err().to_string();
         assert!(error.contains("quad.urdf") && error.contains(name) && error.contains("TOML"), "{error}");
         assert!(error.contains("docs/vehicles.md"), "{error}");
+        let made_by = if matches!(name, "URDF" | "SDF") { "new vehicle --from quad.urdf" } else { "" };
+        assert!(error.contains(made_by) && (name != "XML" || !error.contains("new vehicle")), "{error}");
     }
     let page = include_str!("../../docs/vehicles.md");
     let vehicle = Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml").unwrap();

@@ -1,0 +1,87 @@
+//! The command `new`.
+
+use super::output::{print_text, say};
+use anyhow::{Result, bail};
+use clap::{Args, Subcommand};
+use hummingbus::inputs::InputFiles;
+use hummingbus::vehicles::from_model::{self, Converted};
+use runtime::output_file::{self, Kind, Mark};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Example that `--help` shows.
+pub const HELP: &str = "Example: hummingbus new vehicle --from quad.urdf -o quad.toml";
+
+const VEHICLE: Kind = Kind { name: "vehicle file", mark: Mark::Start(from_model::MARK.as_bytes()) };
+
+/// Arguments of `new`.
+#[derive(Args)]
+pub struct NewArguments {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Subcommand)]
+enum What {
+    /// Make a first vehicle file from a model in URDF or SDF; numbers that the model does not have are the Hummingbird's,
+    /// and are listed.
+    #[command(after_help = HELP)]
+    Vehicle(VehicleArguments),
+}
+
+#[derive(Args)]
+struct VehicleArguments {
+    /// The model: a URDF or SDF file. Run `xacro` first where it has expressions.
+    #[arg(long, value_name = "FILE")]
+    from: PathBuf,
+    /// Write this vehicle file, which must not exist yet.
+    #[arg(short, long, value_name = "NAME.toml")]
+    out: PathBuf,
+}
+
+/// Makes a file.
+///
+/// # Errors
+/// If the model cannot be read, is not physical or does not have four rotors, or the file exists or cannot be written.
+pub fn new(arguments: &NewArguments) -> Result<bool> {
+    let What::Vehicle(VehicleArguments { from, out }) = &arguments.what;
+    require_free(out)?;
+    let file = from.display().to_string();
+    let text = InputFiles::default()
+        .text(from)
+        .map_err(|cause| hummingbus::Diagnostic::unreadable(file.clone(), &cause))?;
+    let made = from_model::convert(&text, &file)?;
+    output_file::write(out, &VEHICLE, |file| file.write_all(made.text.as_bytes()))?;
+    made.notes.iter().for_each(|note| say(&format!("warning: {file}: {note}")));
+    print_text(&summary(&made, &file, out))?;
+    Ok(true)
+}
+
+fn require_free(out: &Path) -> Result<()> {
+    if out.symlink_metadata().is_ok() {
+        bail!(
+            "{}: it exists, and `new` replaces no file; name another file, or remove this one",
+            out.display()
+        );
+    }
+    output_file::check(out, &VEHICLE)
+}
+
+fn summary(made: &Converted, file: &str, out: &Path) -> String {
+    let vehicle = &made.vehicle;
+    let rotors: Vec<_> = vehicle.rotors.iter().map(|rotor| rotor.name.as_str()).collect();
+    let place = if out.is_absolute() { "" } else { "$PWD/" };
+    let out = out.display();
+    let mut text = format!(
+        "{out}: made from {file}: {:.4} kg, rotors {} (in the order of the commands)\n",
+        vehicle.mass_kg,
+        rotors.join(", ")
+    );
+    if !made.assumed.is_empty() {
+        text += &format!("not in {file}; measure these, and replace them in {out}:\n");
+        made.assumed.iter().for_each(|line| text += &format!("  {line}\n"));
+    }
+    text + &format!(
+        "check it in a manifest: hummingbus check manifests/hover.toml --set process.plant.vehicle=\"{place}{out}\""
+    )
+}

@@ -1,0 +1,74 @@
+//! First vehicle files from descriptions of robots: URDF and SDF.
+//!
+//! | room | content |
+//! |---|---|
+//! | `xml` | XML within bounds, whose errors have places |
+//! | `model` | links, joints and motors, whatever the format |
+//! | `tree` | the order of links from the root |
+//! | `urdf`, `sdf` | the formats |
+//! | `plugins` | plugins of Gazebo that drive rotors |
+//! | `body` | mass, centre of mass and inertia of all links |
+//! | `rotors` | the rotors among the joints |
+//! | `vehicle` | the numbers of the vehicle file |
+//! | `text` | its text |
+
+mod body;
+mod model;
+mod plugins;
+mod rotors;
+mod sdf;
+mod text;
+mod tree;
+mod urdf;
+mod vehicle;
+mod xml;
+
+use diagnostics::Diagnostic;
+use std::path::Path;
+
+use crate::reference::HUMMINGBIRD;
+use crate::vehicle::Vehicle;
+use xml::Source;
+
+pub use text::MARK;
+
+/// A vehicle file that was made from a model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Converted {
+    /// Text of the vehicle file.
+    pub text: String,
+    /// Numbers that the model does not have: key and origin of each.
+    pub assumed: Vec<String>,
+    /// Properties of the model that the vehicle file does not show, or that are unlikely.
+    pub notes: Vec<String>,
+    /// The vehicle of the file.
+    pub vehicle: Vehicle,
+}
+
+/// Makes a vehicle file of the `text` of a model in URDF or SDF; `file` is its name. Missing numbers are those of the
+/// Hummingbird.
+///
+/// # Errors
+/// If the text is not such a model, is not physical, or does not have four rotors.
+pub fn convert(text: &str, file: &str) -> Result<Converted, Diagnostic> {
+    let source = Source { file, text };
+    let document = source.parse()?;
+    let root = document.root_element();
+    let model = match root.tag_name().name() {
+        "robot" => urdf::read(source, root)?,
+        "sdf" => sdf::read(source, root)?,
+        other => {
+            let message = format!("expected <robot> (URDF) or <sdf> (SDF), found <{other}>");
+            return Err(source
+                .fault(xml::start_of(root), message)
+                .help("convert the model to URDF or SDF in the program that it is for"));
+        }
+    };
+    let body = body::of(&model)?;
+    let rotors = rotors::find(&model, &body.centre)?;
+    let reference = Vehicle::parse(HUMMINGBIRD, "hummingbird.toml")?;
+    let name = Path::new(file).file_name().map_or(file.into(), |name| name.to_string_lossy());
+    let (written, notes) = vehicle::Parts { model: &model, body, rotors, reference }.write(&name)?;
+    let vehicle = Vehicle::parse(&written.text, &format!("vehicle file of {name}"))?;
+    Ok(Converted { text: written.text, assumed: written.assumed, notes, vehicle })
+}

@@ -1,0 +1,158 @@
+//! Rotors among the joints of a model, in the order of the commands.
+
+use diagnostics::Diagnostic;
+use nalgebra::{Point3, Vector3};
+
+use super::body::turned;
+use super::model::{Freedom, Joint, Link, Model, Motor};
+
+/// Words by which rotors are known, the surest first.
+const WORDS: [&str; 3] = ["rotor", "prop", "motor"];
+/// Largest sine of the angle between a rotor's axis and the body's z axis.
+const TILT_MAX: f64 = 0.02;
+/// Share of its distance by which a rotor may stand to the left of the nose and still count as in front: rounding.
+const FRONT_SLACK: f64 = 1e-6;
+
+/// A rotor of the model.
+pub struct Rotor<'m> {
+    /// Its joint.
+    pub joint: &'m Joint,
+    /// Its link.
+    pub link: &'m Link,
+    /// Its plugin.
+    pub motor: Option<&'m Motor>,
+    /// Hub, from the centre of mass.
+    pub position_m: Vector3<f64>,
+}
+
+impl Rotor<'_> {
+    /// Moment of inertia about the axis, in kg m^2, through the link's own centre of mass; none without mass.
+    pub fn inertia_kg_m2(&self) -> Option<f64> {
+        let inertial = self.link.inertial.as_ref().filter(|inertial| inertial.mass_kg > 0.0)?;
+        let axis = self.joint.axis.try_normalize(0.0).unwrap_or_else(Vector3::z);
+        Some(axis.dot(&(turned(self.link, inertial) * axis)))
+    }
+}
+
+/// Finds the rotors: joints that plugins name, else joints that turn and are named so, else fixed ones that are. The order
+/// is that of the plugins' numbers, else clockwise from the nose, seen from above.
+///
+/// # Errors
+/// If there are not four, or one is tilted.
+pub fn find<'m>(model: &'m Model, centre: &Point3<f64>) -> Result<Vec<Rotor<'m>>, Diagnostic> {
+    let joints = if model.motors.is_empty() { by_name(model) } else { by_motor(model)? };
+    require_four(model, &joints)?;
+    let mut rotors = Vec::new();
+    for (joint, motor) in joints {
+        let Some(link) = model.links.iter().find(|link| link.name == joint.child) else { continue };
+        if joint.freedom == Freedom::Turns {
+            require_upright(model, joint)?;
+        }
+        rotors.push(Rotor { joint, link, motor, position_m: hub(joint, link) - centre });
+    }
+    sort(&mut rotors);
+    Ok(rotors)
+}
+
+/// Where the rotor of a joint is. Fixed joints may all be at the origin, and only their links' centres of mass apart.
+fn hub(joint: &Joint, link: &Link) -> Point3<f64> {
+    match &link.inertial {
+        Some(inertial) if joint.freedom == Freedom::Fixed => link.pose * inertial.pose * Point3::origin(),
+        _ => joint.point,
+    }
+}
+
+fn by_motor<'m>(model: &'m Model) -> Result<Vec<(&'m Joint, Option<&'m Motor>)>, Diagnostic> {
+    let of = |motor: &'m Motor| {
+        let is_it = |joint: &&Joint| match (&motor.joint, &motor.link) {
+            (Some(name), _) => joint.name == *name,
+            (None, Some(name)) => joint.child == *name,
+            (None, None) => false,
+        };
+        let name = motor.joint.as_deref().or(motor.link.as_deref()).unwrap_or("none");
+        let missing = || {
+            let message = format!("plugin of a motor: expected the joint or link of a rotor, found `{name}`");
+            model.source.fault(motor.at.clone(), message).help("correct <jointName> or <linkName>")
+        };
+        Ok((model.joints.iter().find(is_it).ok_or_else(missing)?, Some(motor)))
+    };
+    model.motors.iter().map(of).collect()
+}
+
+fn by_name<'m>(model: &'m Model) -> Vec<(&'m Joint, Option<&'m Motor>)> {
+    let named = |joint: &Joint, words: &[&str]| {
+        let names = [joint.name.to_lowercase(), joint.child.to_lowercase()];
+        words.iter().any(|word| names.iter().any(|name| name.contains(word)))
+    };
+    let of = |freedom: Freedom, words: &[&str]| -> Vec<_> {
+        let is_one = |joint: &&Joint| joint.freedom == freedom && named(joint, words);
+        model.joints.iter().filter(is_one).map(|joint| (joint, None)).collect()
+    };
+    let sets = std::iter::once(&WORDS[..]).chain(WORDS.iter().map(std::slice::from_ref));
+    let tries: Vec<_> = [Freedom::Turns, Freedom::Fixed]
+        .into_iter()
+        .flat_map(|freedom| sets.clone().map(move |words| (freedom, words)))
+        .map(|(freedom, words)| of(freedom, words))
+        .collect();
+    let four = tries.iter().position(|found| found.len() == 4);
+    let any = tries.iter().position(|found| !found.is_empty());
+    // Turning joints of another number are the rotors of a vehicle that is not flown here, whatever else there is.
+    let is_turning = !tries[0].is_empty();
+    let best = four.filter(|index| !is_turning || *index < tries.len() / 2).or(any).unwrap_or(0);
+    tries.into_iter().nth(best).unwrap_or_default()
+}
+
+fn require_four(model: &Model, joints: &[(&Joint, Option<&Motor>)]) -> Result<(), Diagnostic> {
+    if joints.is_empty() {
+        let error = model.source.whole("expected four rotors, found none");
+        let help =
+            "rotors are links of joints whose names have `rotor`, `prop` or `motor` in them: rename them";
+        return Err(error.help(help));
+    }
+    let mut names: Vec<&str> = joints.iter().map(|(joint, _)| joint.name.as_str()).collect();
+    names.sort_unstable();
+    let is_twice = names.windows(2).find(|two| two[0] == two[1]).map(|two| two[0]);
+    if let Some(name) = is_twice {
+        let error = model.source.whole(format!("expected one motor for each rotor, found two for `{name}`"));
+        return Err(error.help("remove one of the plugins"));
+    }
+    if joints.len() != 4 {
+        let (count, shown) = (names.len(), names[..names.len().min(8)].join(", "));
+        let error = model.source.whole(format!("expected four rotors, found {count}: {shown}"));
+        return Err(error.help("only vehicles with four rotors are flown at present"));
+    }
+    Ok(())
+}
+
+fn require_upright(model: &Model, joint: &Joint) -> Result<(), Diagnostic> {
+    let axis = joint.axis.try_normalize(0.0).unwrap_or_else(Vector3::zeros);
+    if axis.z.abs() > 0.5 && axis.xy().norm() <= TILT_MAX {
+        return Ok(());
+    }
+    let (name, axis) = (&joint.name, joint.axis);
+    let message = format!(
+        "rotor `{name}`: expected an axis along z of the body, found [{:.4}, {:.4}, {:.4}]",
+        axis.x, axis.y, axis.z
+    );
+    let help = "only rotors that push upwards are flown at present; of a model whose z is not up, turn its root link";
+    Err(model.source.fault(joint.at.clone(), message).help(help))
+}
+
+fn sort(rotors: &mut [Rotor]) {
+    let number = |rotor: &Rotor| rotor.motor.and_then(|motor| motor.number);
+    let mut numbers: Vec<f64> = rotors.iter().filter_map(number).collect();
+    numbers.sort_by(f64::total_cmp);
+    numbers.dedup();
+    if numbers.len() == rotors.len() {
+        rotors.sort_by(|a, b| number(a).unwrap_or(0.0).total_cmp(&number(b).unwrap_or(0.0)));
+    } else {
+        rotors.sort_by(|a, b| clockwise(&a.position_m).total_cmp(&clockwise(&b.position_m)));
+    }
+}
+
+/// A number that grows with the angle of a place from the nose, clockwise seen from above: 0 in front, 2 in the rear.
+fn clockwise(place: &Vector3<f64>) -> f64 {
+    let size = place.x.abs() + place.y.abs();
+    let forward = if size > 0.0 { place.x / size } else { 1.0 };
+    if place.y <= FRONT_SLACK * size { 1.0 - forward } else { 3.0 + forward }
+}

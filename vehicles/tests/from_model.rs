@@ -1,0 +1,282 @@
+//! Vehicle files from URDF and SDF: numbers against closed forms by hand, and errors with their places.
+
+use nalgebra::{Matrix3, Vector3};
+use proptest::prelude::*;
+use vehicles::from_model::{Converted, convert};
+use vehicles::{MotorModel, Vehicle};
+
+const URDF: &str = include_str!("models/plus.urdf");
+const SDF: &str = include_str!("models/cross.sdf");
+
+fn close(found: f64, expected: f64, what: &str) {
+    assert!(
+        (found - expected).abs() <= 1e-9 * expected.abs().max(1e-9),
+        "{what}: {found}, by hand {expected}"
+    );
+}
+
+fn of(text: &str, file: &str) -> Converted {
+    convert(text, file).unwrap_or_else(|error| panic!("{error:#}"))
+}
+
+/// The tensor of point masses about their common centre of mass, by its definition: the sum of m (r^2 1 - r r^T).
+fn of_points(points: &[(f64, [f64; 3])], centre: Vector3<f64>) -> Matrix3<f64> {
+    let one = |(mass, place): &(f64, [f64; 3])| {
+        let [x, y, z] = [place[0] - centre.x, place[1] - centre.y, place[2] - centre.z];
+        *mass
+            * Matrix3::new(
+                y * y + z * z,
+                -x * y,
+                -x * z,
+                -x * y,
+                x * x + z * z,
+                -y * z,
+                -x * z,
+                -y * z,
+                x * x + y * y,
+            )
+    };
+    points.iter().map(one).sum()
+}
+
+#[test]
+fn a_urdf_gives_mass_centre_inertia_and_places_of_a_closed_form() {
+    let made = of(URDF, "models/plus.urdf");
+    let vehicle = &made.vehicle;
+    // base 0.6 kg at 0; battery 0.2 kg at (0.03, 0, -0.05): the joint at (0.03, 0, -0.03), its link 0.02 m below.
+    // Four rotors of 0.01 kg, 0.2 m from the origin and 0.02 m above. In all 0.84 kg.
+    close(vehicle.mass_kg, 0.84, "mass");
+    let centre = Vector3::new(0.2 * 0.03, 0.0, 0.2 * -0.05 + 4.0 * 0.01 * 0.02) / 0.84;
+    let hubs = [[0.2, 0.0, 0.02], [0.0, -0.2, 0.02], [-0.2, 0.0, 0.02], [0.0, 0.2, 0.02]];
+    let mut points = vec![(0.6, [0.0; 3]), (0.2, [0.03, 0.0, -0.05])];
+    points.extend(hubs.map(|hub| (0.01, hub)));
+    // The battery's axes are turned by 90 degrees about z: its x moment is about the body's y.
+    let own = Matrix3::from_diagonal(&Vector3::new(
+        0.004 + 2e-4 + 4.0 * 2e-5,
+        0.005 + 1e-4 + 4.0 * 2e-5,
+        0.008 + 2.5e-4 + 4.0 * 4e-5,
+    ));
+    let expected = own + of_points(&points, centre);
+    for (found, expected) in vehicle.inertia_kg_m2.iter().zip(expected.iter()) {
+        close(*found, *expected, "inertia");
+    }
+    assert!(vehicle.inertia_kg_m2[(0, 2)].abs() > 1e-5, "the battery makes a product of inertia");
+    for (rotor, (hub, name)) in vehicle.rotors.iter().zip(hubs.iter().zip(["front", "right", "rear", "left"]))
+    {
+        assert_eq!(rotor.name, format!("rotor_{name}"));
+        for axis in 0..3 {
+            close(rotor.position_m[axis], hub[axis] - centre[axis], "hub");
+        }
+    }
+    assert_eq!(vehicle.rotors.each_ref().map(|rotor| rotor.spin), [-1.0, 1.0, -1.0, 1.0]);
+    close(vehicle.rotor_inertia_kg_m2, 4e-5, "inertia of a rotor");
+}
+
+#[test]
+fn numbers_that_a_urdf_has_not_are_the_hummingbirds_scaled_and_listed() {
+    let made = of(URDF, "plus.urdf");
+    let bird = Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml").unwrap();
+    // As heavy a vehicle hovers at the same speed.
+    close(made.vehicle.hover_speed_rad_s(), bird.hover_speed_rad_s(), "hover");
+    close(made.vehicle.command.speed_at_max_rad_s, bird.command.speed_at_max_rad_s, "largest speed");
+    assert_eq!(made.vehicle.motor, bird.motor);
+    let keys: Vec<&str> = made.assumed.iter().map(|line| line.split(':').next().unwrap()).collect();
+    for key in ["body.gravity", "rotor.thrust_coefficient", "rotor.torque_coefficient", "motor.damping_ratio"]
+    {
+        assert!(keys.contains(&key), "{key} is not among {keys:?}");
+    }
+    assert!(!keys.contains(&"rotor.inertia") && !keys.contains(&"body.mass"), "{keys:?}");
+    let numbers = made.text.lines().filter(|line| line.contains(" = "));
+    for line in numbers.filter(|line| *line != "name = \"plus\"") {
+        let is_told = line.contains(" # from plus.urdf: ") || line.contains(" # not in plus.urdf: ");
+        assert!(is_told, "no origin: {line}");
+    }
+    let assumed = made.text.lines().filter(|line| line.contains(" # not in ")).count();
+    assert_eq!(assumed, made.assumed.len());
+}
+
+#[test]
+fn an_sdf_gives_what_its_plugins_say_in_the_order_of_their_numbers() {
+    let made = of(SDF, "cross.sdf");
+    let vehicle = &made.vehicle;
+    // From the model's frame: body 1.46 kg at (0.01, 0, 0.1), gps 0.02 kg at (0, 0, 0.15), four rotors of 5 g at z = 0.13.
+    close(vehicle.mass_kg, 1.5, "mass");
+    let centre = Vector3::new(1.46 * 0.01 / 1.5, 0.0, (1.46 * 0.1 + 0.02 * 0.15 + 4.0 * 0.005 * 0.13) / 1.5);
+    let hubs = [[0.15, -0.2, 0.13], [-0.15, 0.2, 0.13], [0.15, 0.2, 0.13], [-0.15, -0.2, 0.13]];
+    let mut points = vec![(1.46, [0.01, 0.0, 0.1]), (0.02, [0.0, 0.0, 0.15])];
+    points.extend(hubs.map(|hub| (0.005, hub)));
+    // The gps is turned by 90 degrees about z.
+    let own = Matrix3::from_diagonal(&Vector3::new(
+        0.02 + 3e-6 + 4.0 * 1e-6,
+        0.03 + 2e-6 + 4.0 * 3e-5,
+        0.04 + 4e-6 + 4.0 * 3.1e-5,
+    ));
+    for (found, expected) in vehicle.inertia_kg_m2.iter().zip((own + of_points(&points, centre)).iter()) {
+        close(*found, *expected, "inertia");
+    }
+    for (rotor, hub) in vehicle.rotors.iter().zip(hubs) {
+        for axis in 0..3 {
+            close(rotor.position_m[axis], hub[axis] - centre[axis], "hub");
+        }
+    }
+    assert_eq!(vehicle.rotors.each_ref().map(|rotor| rotor.spin), [1.0, 1.0, -1.0, -1.0]);
+    close(vehicle.thrust_coefficient, 8.5e-6, "thrust coefficient");
+    close(vehicle.torque_coefficient, 8.5e-6 * 0.016, "torque coefficient");
+    close(vehicle.rotor_inertia_kg_m2, 3.1e-5, "inertia of a rotor");
+    assert_eq!(vehicle.motor, MotorModel::FirstOrder { time_constant_s: 0.0125 });
+    assert_eq!((vehicle.command.speed_at_min_rad_s, vehicle.command.speed_at_max_rad_s), (0.0, 800.0));
+    let text = &made.text;
+    assert!(text.contains("timeConstantUp; timeConstantDown is 0.025 s"), "{text}");
+    let keys: Vec<&str> = made.assumed.iter().map(|line| line.split(':').next().unwrap()).collect();
+    assert_eq!(keys, ["body.gravity", "command.min", "command.max", "command.speed_at_min"]);
+    assert_eq!(made.notes, Vec::<String>::new());
+    let weak = of(&SDF.replace("<maxRotVelocity>800.0", "<maxRotVelocity>600.0"), "cross.sdf");
+    // 4 c 600^2 = 12.24 N, and 1.5 kg weigh 14.715 N.
+    assert!(weak.notes[0].contains("12.240 N") && weak.notes[0].contains("14.715 N"), "{:?}", weak.notes);
+}
+
+#[test]
+fn what_is_wrong_with_a_model_is_told_with_its_line() {
+    let refused = |text: &str, file: &str, place: &str, parts: &[&str]| {
+        let error = convert(text, file).map(|made| made.text).unwrap_err().to_string();
+        assert!(error.starts_with(&format!("{file}{place}")), "{error}");
+        parts.iter().for_each(|part| assert!(error.contains(part), "no `{part}` in {error}"));
+    };
+    let urdf = |from: &str, to: &str, place: &str, parts: &[&str]| {
+        assert!(URDF.contains(from), "{from}");
+        refused(&URDF.replacen(from, to, 1), "quad.urdf", place, parts);
+    };
+    let sdf = |from: &str, to: &str, place: &str, parts: &[&str]| {
+        assert!(SDF.contains(from), "{from}");
+        refused(&SDF.replacen(from, to, 1), "quad.sdf", place, parts);
+    };
+    urdf("<mass value=\"0.6\"/>", "", ":5:5", &["base_link", "<mass>"]);
+    urdf("<mass value=\"0.6\"/>", "<mass value=\"-1\"/>", ":5:5", &["base_link", "-1 kg"]);
+    urdf("<mass value=\"0.6\"/>", "<mass value=\"nan\"/>", ":6:7", &["finite number", "`nan`"]);
+    urdf("<mass value=\"0.6\"/>", "<mass value=\"${m}\"/>", ":6:13", &["xacro FILE.xacro"]);
+    urdf("<link name=\"camera\"/>", "<xacro:mast/>", ":11:4", &["xacro FILE.xacro"]);
+    urdf("ixx=\"0.004\"", "ixx=\"0\"", ":5:5", &["base_link", "above 0"]);
+    urdf("izz=\"0.008\"", "izz=\"0.0095\"", ":5:5", &["base_link", "sum of the other two"]);
+    urdf("<link name=\"camera\"/>", "<link name=\"battery\"/>", "", &["`battery` twice"]);
+    urdf("<child link=\"camera\"/>", "<child link=\"base_link\"/>", "", &["expected"]);
+    urdf("<child link=\"camera\"/>", "<child link=\"camra\"/>", ":12:3", &["camera_mount", "`camra`"]);
+    urdf("<child link=\"camera\"/>", "<child link=\"battery\"/>", "", &["`battery`", "two", "camera_mount"]);
+    urdf(
+        "<link name=\"camera\"/>",
+        "<link name=\"camera\"/><link name=\"lost\"/>",
+        ":11:",
+        &["`base_link` and `lost`"],
+    );
+    let ring = "<link name=\"a\"/><link name=\"b\"/><joint name=\"ab\" type=\"fixed\"><parent link=\"a\"/><child link=\"b\"/></joint>\
+                <joint name=\"ba\" type=\"fixed\"><parent link=\"b\"/><child link=\"a\"/></joint></robot>";
+    urdf("</robot>", ring, "", &["cycle", "joint `ab`"]);
+    urdf("</robot>", "", ":", &["expected XML; the reader says: "]);
+    urdf("<axis xyz=\"0 0 1\"/>", "<axis xyz=\"1 0 0\"/>", "", &["rotor_left_joint", "along z"]);
+    urdf(
+        "type=\"continuous\"",
+        "type=\"fixed\"",
+        "",
+        &["expected four rotors, found 3", "only vehicles with four rotors are flown"],
+    );
+    refused(&URDF.replace("rotor_", "part_"), "quad.urdf", "", &["found none", "`rotor`"]);
+    refused("<robot name=\"q\"><link name=\"a\"/></robot>", "quad.urdf", "", &["with mass, found none"]);
+    refused("<robot name=\"q\"/>", "quad.urdf", "", &["with links, found none"]);
+    refused("<mujoco/>", "x2.xml", ":1:1", &["<mujoco>", "URDF or SDF"]);
+    refused("", "quad.urdf", ":1:1", &["expected XML"]);
+    refused("<robot>\n</robot\n", "quad.urdf", ":2:8", &["expected XML"]);
+    refused("<robot>\n  <link", "quad.urdf", ":2:", &["expected XML"]);
+    urdf("?>", ">", ":", &["expected XML"]);
+    urdf("-->", ">", ":", &["expected XML"]);
+    let deep = format!("<robot name=\"q\">{}{}</robot>", "<a>".repeat(100), "</a>".repeat(100));
+    refused(&deep, "quad.urdf", ":1:", &["at most 64 deep"]);
+    let many = format!("<robot name=\"q\">{}</robot>", "<a/>".repeat(100_001));
+    refused(&many, "quad.urdf", "", &["at most 100000 elements"]);
+    sdf("<mass>1.46</mass>", "", ":9:9", &["body", "<mass>", "Gazebo would take 1 kg"]);
+    sdf("<pose relative_to=\"body\"", "<pose relative_to=\"gps\"", "", &["cycle"]);
+    sdf("<pose relative_to=\"body\"", "<pose relative_to=\"bdy\"", ":15:", &["`bdy`"]);
+    sdf(">ccw<", ">left<", "", &["turningDirection", "`left`"]);
+    sdf("8.5e-06", "9.5e-06", "", &["motorConstant", "same for all rotors", "0.0000095"]);
+    sdf("<jointName>rotor_2_joint", "<jointName>rotor_9_joint", "", &["rotor_9_joint"]);
+    sdf("<jointName>rotor_2_joint", "<jointName>rotor_0_joint", "", &["two for `rotor_0_joint`"]);
+    sdf(
+        "<model name=\"cross\">",
+        "<model name=\"cross\"><include><uri>model://x</uri></include>",
+        ":5:",
+        &["another model"],
+    );
+}
+
+/// Texts that replace a part of a model.
+const PARTS: [&str; 16] = [
+    "",
+    "0",
+    "-1",
+    "1e308",
+    "-1e308",
+    "5e-324",
+    "nan",
+    "inf",
+    "\"",
+    "<",
+    "/>",
+    "&#10;",
+    "rotor_0",
+    "base_link",
+    "fixed",
+    "cw",
+];
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// A replaced word of a model gives an error with the file's name, or a vehicle file that loads.
+    #[test]
+    fn a_changed_model_is_refused_in_words_or_loads(
+        is_urdf in any::<bool>(),
+        pick in any::<prop::sample::Index>(),
+        part in prop::sample::select(PARTS.to_vec()),
+    ) {
+        let model = if is_urdf { URDF } else { SDF };
+        let is_border = |c: char| matches!(c, '"' | '<' | '>' | ' ' | '\n');
+        let borders: Vec<usize> = model.match_indices(is_border).map(|(at, _)| at).collect();
+        let index = pick.index(borders.len() - 1);
+        let text = format!("{}{part}{}", &model[..=borders[index]], &model[borders[index + 1]..]);
+        match convert(&text, "any.model") {
+            Err(error) => prop_assert!(error.to_string().contains("any.model"), "{error}"),
+            Ok(made) => {
+                let read = Vehicle::parse(&made.text, "made.toml");
+                let read = read.map_err(|error| TestCaseError::fail(format!("{error}\n{}", made.text)))?;
+                prop_assert_eq!(read.rotors, made.vehicle.rotors);
+            }
+        }
+    }
+}
+
+#[test]
+fn names_of_a_model_end_neither_a_comment_nor_a_text() {
+    let hostile = URDF
+        .replace("name=\"plus\"", "name=\"a&#10;mass = 1&quot;'\"")
+        .replace("rotor_front_joint", "rotor&#10;[command]&#10;")
+        .replace("rotor_front", "rotor&#10;'''&quot;");
+    let made = of(&hostile, "plus.urdf");
+    assert_eq!(made.vehicle.name, "a\\nmass = 1\"'");
+    assert!(made.vehicle.rotors[0].name.starts_with("rotor\\n'''"), "{:?}", made.vehicle.rotors[0].name);
+    assert_eq!(made.text.lines().count(), of(URDF, "plus.urdf").text.lines().count());
+}
+
+#[test]
+fn rotors_on_fixed_joints_are_at_the_centres_of_mass_of_their_links() {
+    // Joints at one place, and the places of the rotors in the links.
+    let mut text = URDF.replace("type=\"continuous\"", "type=\"fixed\"");
+    for xyz in ["<origin xyz=\"0.2 0 0\"/>\n    <parent", "<origin xyz=\"-0.2 0 0\"/>\n    <parent"] {
+        text = text.replace(xyz, "<parent");
+    }
+    for (name, xyz) in [("left", "0.2"), ("front", "0.2"), ("rear", "-0.2"), ("right", "-0.2")] {
+        let from = format!("<link name=\"rotor_{name}\">\n    <inertial>");
+        assert!(text.contains(&from), "{from}");
+        text = text.replace(&from, &format!("{from}\n      <origin xyz=\"{xyz} 0 0\"/>"));
+    }
+    let (fixed, turning) = (of(&text, "plus.urdf").vehicle, of(URDF, "plus.urdf").vehicle);
+    assert_eq!(fixed.rotors, turning.rotors);
+    assert_eq!(fixed.inertia_kg_m2, turning.inertia_kg_m2);
+}
