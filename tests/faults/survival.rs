@@ -111,21 +111,22 @@ fn a_run_goes_on_after_every_kill_point_as_if_nothing_had_been() {
     campaign::run("survival", KILL_POINTS, Case::draw, |case| strike(case, &paths[case.policy as usize]));
 }
 
-/// The beginning of manifests/slung-load.toml, without conditions: the world holds contacts, a rope and a load.
-fn write_slung_load(place: &Place) -> String {
-    let whole = std::fs::read_to_string(repository("manifests/slung-load.toml")).unwrap();
+/// The beginning of `manifest`, without conditions.
+fn write_beginning(place: &Place, manifest: &str) -> String {
+    let whole = std::fs::read_to_string(repository(manifest)).unwrap();
     let (flown, _) = whole.split_once("[[pass]]").unwrap();
     let flown = flown
         .replace("\"sets/", &format!("\"{}/", repository("manifests/sets")))
         .replace("\"../", &format!("\"{}/", repository("")))
-        .replace("duration_s = 18.0", "duration_s = 4.5");
-    place.write("slung-load.toml", flown)
+        .replace("duration_s = 18.0", "duration_s = 4.5")
+        .replace("duration_s = 7.0", "duration_s = 4.5");
+    place.write("beginning.toml", flown)
 }
 
-/// Flies the slung load with `on_exit` for its plant, which is killed at each of `ticks`; returns the recording.
-fn fly_slung_load(on_exit: &str, ticks: &[u32]) -> Vec<(String, u32, Vec<u8>)> {
+/// Flies `manifest` with `on_exit` for its plant, which is killed at each of `ticks`; returns the recording.
+fn fly_beginning(manifest: &str, on_exit: &str, ticks: &[u32]) -> Vec<(String, u32, Vec<u8>)> {
     let place = Place::new();
-    let (manifest, recording) = (write_slung_load(&place), place.path("flight.mcap"));
+    let (manifest, recording) = (write_beginning(&place, manifest), place.path("flight.mcap"));
     let policy = format!("process.plant.on_exit={on_exit:?}");
     let launch = place.start(&["run", &manifest, "--record", &recording, "--json", "--set", &policy]);
     if !ticks.is_empty() {
@@ -153,14 +154,22 @@ fn fly_slung_load(on_exit: &str, ticks: &[u32]) -> Vec<(String, u32, Vec<u8>)> {
     messages(&recording)
 }
 
+fn require_the_plant_goes_on(manifest: &str, ticks: &[u32]) {
+    for on_exit in ["restart", "standby"] {
+        let undisturbed = fly_beginning(manifest, on_exit, &[]);
+        assert!(fly_beginning(manifest, on_exit, ticks) == undisturbed, "other messages with {on_exit}");
+    }
+}
+
 #[test]
 fn a_plant_that_dies_with_a_load_on_a_rope_goes_on_as_if_nothing_had_been() {
     // Vehicle and load stand on the ground; the rope is slack; the load hangs.
-    let ticks = [400, 2000, 3900];
-    for on_exit in ["restart", "standby"] {
-        let undisturbed = fly_slung_load(on_exit, &[]);
-        assert!(fly_slung_load(on_exit, &ticks) == undisturbed, "other messages with {on_exit}");
-    }
+    require_the_plant_goes_on("manifests/slung-load.toml", &[400, 2000, 3900]);
+}
+
+#[test]
+fn a_plant_that_dies_among_driven_joints_goes_on_as_if_nothing_had_been() {
+    require_the_plant_goes_on("manifests/driven-joints.toml", &[700, 2345]);
 }
 
 /// Flies with a saboteur that panics at tick 700 whoever it is.
