@@ -168,7 +168,7 @@ impl ConnectedNode {
         computation: &dyn Computation,
     ) -> Result<(), BusError> {
         let more_words = self.timing_words(self.timing.is_some());
-        self.state = HandOver::new(transfer, computation.state_size(), more_words);
+        self.state = HandOver::new(transfer, computation, more_words);
         self.open_predecessor()?;
         self.state.create(&self.links)
     }

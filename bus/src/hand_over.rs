@@ -8,6 +8,8 @@ use crate::tick::Tick;
 
 /// Computation of a node: its steps, and the state that they change.
 pub(crate) trait Computation {
+    /// As [`State::configuration`](crate::component::State::configuration).
+    fn configuration(&self) -> u64;
     /// Number of bytes of the state.
     fn state_size(&self) -> usize;
     /// Writes the state.
@@ -30,9 +32,9 @@ pub(crate) struct HandOver {
 }
 
 impl HandOver {
-    /// A state of `size` bytes with `more_words` of the bus behind it.
-    pub(crate) fn new(transfer: Transfer, size: usize, more_words: usize) -> Self {
-        let layout = StateLayout::of(transfer, size);
+    /// The state of `computation` with `more_words` of the bus behind it.
+    pub(crate) fn new(transfer: Transfer, computation: &dyn Computation, more_words: usize) -> Self {
+        let layout = StateLayout::of(transfer, computation.state_size(), computation.configuration());
         let state_words = layout.as_ref().map_or(0, StateLayout::words);
         Self { layout, words: vec![0; state_words + more_words], state_words, ..Self::default() }
     }

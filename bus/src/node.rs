@@ -418,6 +418,10 @@ impl Node {
 struct Steps<F>(F);
 
 impl<E: Display, F: FnMut(&mut Tick<'_>) -> Result<(), E>> Computation for Steps<F> {
+    fn configuration(&self) -> u64 {
+        0
+    }
+
     fn state_size(&self) -> usize {
         0
     }

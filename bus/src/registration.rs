@@ -108,6 +108,8 @@ fn make<C: Component>(parameters: &Value, context: &NodeContext<'_>) -> Result<C
 
 /// A component with its state, without their types. Its steps do not allocate.
 pub(crate) trait Instance: Send {
+    /// As [`State::configuration`].
+    fn configuration(&self) -> u64;
     /// As [`State::size`].
     fn state_size(&self) -> usize;
     /// As [`State::save`].
@@ -131,6 +133,10 @@ struct Made<C: Component> {
 }
 
 impl<C: Component> Instance for Made<C> {
+    fn configuration(&self) -> u64 {
+        self.state.configuration()
+    }
+
     fn state_size(&self) -> usize {
         self.state.size()
     }

@@ -108,6 +108,10 @@ struct Wired<'a> {
 }
 
 impl Computation for Wired<'_> {
+    fn configuration(&self) -> u64 {
+        self.instance.configuration()
+    }
+
     fn state_size(&self) -> usize {
         self.instance.state_size()
     }

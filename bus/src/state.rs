@@ -62,6 +62,12 @@ pub trait State: Send + Sized + 'static {
     /// Transfer of the state to the process that takes the component's place.
     const TRANSFER: Transfer;
 
+    /// Number that differs between two configurations of which one cannot continue from the state of the other, although both
+    /// have as many bytes: a successor with another number is given no state.
+    fn configuration(&self) -> u64 {
+        0
+    }
+
     /// Number of bytes that [`State::save`] writes: constant for one component made from the same parameters.
     fn size(&self) -> usize;
 

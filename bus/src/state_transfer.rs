@@ -21,16 +21,16 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 pub(crate) struct StateLayout {
     type_name: String,
     pub(crate) size: usize,
-    /// Hash of the fields of a message; 0 if the state is not a message.
+    /// Hash of the fields of a message, or the configuration of another state.
     layout_hash: u64,
 }
 
 impl StateLayout {
-    /// Layout of a state of `size` bytes; `None` if it is not transferred.
-    pub(crate) fn of(transfer: Transfer, size: usize) -> Option<Self> {
+    /// Layout of a state of `size` bytes with this `configuration`; `None` if it is not transferred.
+    pub(crate) fn of(transfer: Transfer, size: usize, configuration: u64) -> Option<Self> {
         let (type_name, layout_hash) = match transfer {
             Transfer::Message(schema) => (schema.type_name, schema.layout_hash()),
-            Transfer::Bytes(type_name) => (type_name, 0),
+            Transfer::Bytes(type_name) => (type_name, configuration),
             Transfer::Nothing | Transfer::File => return None,
         };
         Some(Self { type_name: type_name.to_owned(), size, layout_hash })
@@ -161,12 +161,13 @@ mod tests {
     use crate::messages::{MotorCommand, SetPoint};
 
     #[test]
-    fn states_are_laid_out_alike_if_type_and_size_are_the_same() {
-        let of = |name, size| StateLayout::of(Transfer::Bytes(name), size);
+    fn states_are_laid_out_alike_if_type_size_and_configuration_are_the_same() {
+        let of = |name, size| StateLayout::of(Transfer::Bytes(name), size, 7);
         assert_eq!(of("plant", 96), of("plant", 96));
         assert_ne!(of("plant", 96), of("plant", 104), "another configuration");
         assert_ne!(of("plant", 96), of("stand", 96), "another type");
-        let message = |transfer| StateLayout::of(transfer, 40);
+        assert_ne!(of("plant", 96), StateLayout::of(Transfer::Bytes("plant"), 96, 8), "other effects");
+        let message = |transfer| StateLayout::of(transfer, 40, 0);
         assert_ne!(message(SetPoint::TRANSFER), message(MotorCommand::TRANSFER));
         assert_eq!((message(Transfer::Nothing), message(Transfer::File)), (None, None));
     }

@@ -26,6 +26,7 @@ use crate::airframe_state::{AirframeState, DelayLine, EffectState};
 use crate::effects::{Action, Advance, Effect, FlightCondition, entry};
 use crate::motor;
 use crate::rotor::{self, Wrench};
+use crate::saved::Fingerprint;
 use crate::state::{RotorRates, RotorState, State};
 use diagnostics::Diagnostic;
 use nalgebra::Vector3;
@@ -90,6 +91,11 @@ impl Airframe {
     /// How far the effects have moved the frame, seen from the centre of mass, from where it is declared.
     pub(crate) fn frame_shift_B_m(&self) -> &Vector3<f64> {
         &self.frame_shift_B_m
+    }
+
+    /// Fingerprint of what the state of its flight with the backend `backend` depends on: the kinds of its effects.
+    pub(crate) fn fingerprint(&self, backend: &'static str) -> Fingerprint {
+        Fingerprint::of(std::iter::once(backend).chain(self.effects.iter().map(|effect| effect.kind.name)))
     }
 
     /// Its effects, in the order in which they are summed.

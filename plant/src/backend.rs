@@ -28,9 +28,6 @@ pub trait Backend: Send {
     /// Puts the body where it is said to be; the rotors stay as they are.
     fn set_body(&mut self, body: &RigidBody);
 
-    /// Has the rotors turn steadily at these speeds.
-    fn set_rotor_speeds(&mut self, speeds_rad_s: &[f64; 4]);
-
     /// What was touched over the last tick.
     fn contact(&self) -> ContactReport;
 
@@ -51,6 +48,9 @@ pub trait Backend: Send {
 
     /// The battery, if an effect models it.
     fn battery(&self) -> Option<Battery>;
+
+    /// Hash of backend, scene and kinds of effects: only a state of the same can be loaded.
+    fn configuration(&self) -> u64;
 
     /// Tells `note` every part of the state that the next ticks depend on, by name, in a fixed order.
     fn parts(&self, note: &mut dyn FnMut(&'static str, &dyn Saved));

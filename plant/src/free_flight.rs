@@ -4,9 +4,11 @@ use crate::actuation::Battery;
 use crate::airframe_state::AirframeState;
 use crate::backend::{Backend, ContactReport, Neighbour, NotePart};
 use crate::newton_euler::{Accelerations, NewtonEuler};
-use crate::saved::Saved;
+use crate::saved::{Fingerprint, Saved};
 use crate::snapshot::SnapshotError;
-use crate::state::{RigidBody, RotorState, State};
+use crate::state::{RigidBody, State};
+
+const NAME: &str = "newton-euler";
 
 /// A vehicle in free flight: the model, the state that it moves, and the state of its effects.
 ///
@@ -30,6 +32,7 @@ pub struct FreeFlight {
     model: NewtonEuler,
     state: State,
     effects: AirframeState,
+    configuration: Fingerprint,
 }
 
 impl FreeFlight {
@@ -37,13 +40,14 @@ impl FreeFlight {
     #[must_use]
     pub fn new(model: NewtonEuler, body: RigidBody, effects: AirframeState) -> Self {
         let state = model.start(body, 0.0);
-        Self { model, state, effects }
+        let configuration = model.airframe().fingerprint(NAME);
+        Self { model, state, effects, configuration }
     }
 }
 
 impl Backend for FreeFlight {
     fn name(&self) -> &'static str {
-        "newton-euler"
+        NAME
     }
 
     fn state(&self) -> &State {
@@ -67,10 +71,6 @@ impl Backend for FreeFlight {
         self.state.body = *body;
     }
 
-    fn set_rotor_speeds(&mut self, speeds_rad_s: &[f64; 4]) {
-        self.state.rotors = speeds_rad_s.map(RotorState::steady);
-    }
-
     fn contact(&self) -> ContactReport {
         ContactReport::default()
     }
@@ -79,12 +79,18 @@ impl Backend for FreeFlight {
         self.model.airframe().battery(&self.effects, &self.state)
     }
 
+    fn configuration(&self) -> u64 {
+        self.configuration.number()
+    }
+
     fn parts(&self, note: &mut dyn FnMut(&'static str, &dyn Saved)) {
+        note("configuration", &self.configuration);
         note("state", &self.state);
         note("effects", &self.effects);
     }
 
     fn parts_mut(&mut self, note: &mut NotePart<'_>) -> Result<(), SnapshotError> {
+        note("configuration", &mut self.configuration)?;
         note("state", &mut self.state)?;
         note("effects", &mut self.effects)
     }

@@ -33,6 +33,10 @@ impl std::fmt::Debug for PlantMemory {
 impl State for PlantMemory {
     const TRANSFER: Transfer = Transfer::Bytes(TYPE_NAME);
 
+    fn configuration(&self) -> u64 {
+        self.backend.configuration()
+    }
+
     fn size(&self) -> usize {
         let mut size = self.others.size();
         self.backend.parts(&mut |_, part| size += part.size());

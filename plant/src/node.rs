@@ -14,7 +14,7 @@ use crate::state::RigidBody;
 use bus::InputPorts;
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
-use bus::messages::{self, MeasuredState, MotorCommand, PlantState, Traffic};
+use bus::messages::{self, MeasuredState, MotorCommand, Traffic};
 use diagnostics::ParameterError;
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -50,6 +50,10 @@ pub struct Plant {
     dt_s: f64,
 }
 
+/// A plant that took over from the last sample alone would lose bodies, contacts, gusts and charge.
+const NO_STATE: &str = "it cannot take over from a plant of another backend, another scene or other effects: the state of one does not \
+                        fit the other; give both the same, other numbers of vehicle and effects may differ";
+
 impl Component for Plant {
     const INFO: Info = Info::new("plant", "flies the vehicle of a vehicle file, freely or in a scene");
     type Parameters = Parameters;
@@ -77,9 +81,8 @@ impl Component for Plant {
         memory: &mut PlantMemory,
     ) -> Result<Outputs, StepError> {
         let measured = inputs.measured.filter(|_| context.tick().is_multiple_of(self.window_ticks));
-        if let Some(last) = context.predecessor::<Outputs>() {
-            memory.backend.set_body(&body_of(&last.state));
-            memory.backend.set_rotor_speeds(&last.state.rotor_speed);
+        if context.predecessor::<Outputs>().is_some() {
+            return Err(NO_STATE.into());
         }
         if context.tick() > 0 {
             self.fly(context, &inputs, memory)?;
@@ -118,7 +121,7 @@ impl Plant {
         let position_W_m = backend.state().body.position_W_m;
         let seen = inputs.traffic.map(|traffic| others.seen(traffic, &position_W_m, before_ns));
         let seen = match seen.transpose() {
-            // A shadow that cannot load the state of its predecessor is elsewhere until it takes over.
+            // A shadow that cannot load the state of its predecessor is elsewhere; it never takes over.
             Err(OthersError::Absent { .. }) if number > 1 => None,
             seen => seen?,
         };
@@ -131,10 +134,6 @@ fn set_body(memory: &mut PlantMemory, measured: Option<&MeasuredState>) {
     if let Some(MeasuredState { position, velocity, attitude, angular_velocity, .. }) = measured {
         memory.backend.set_body(&body([*position, *velocity, *angular_velocity], *attitude));
     }
-}
-
-fn body_of(state: &PlantState) -> RigidBody {
-    body([state.position, state.velocity, state.angular_velocity], state.attitude)
 }
 
 /// A body with this position, velocity and angular velocity.

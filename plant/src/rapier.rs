@@ -50,7 +50,7 @@ use crate::backend::{Backend, ContactReport, Neighbour, NotePart, TRAFFIC_MAX};
 use crate::newton_euler::{Accelerations, NewtonEuler};
 use crate::saved::{Fingerprint, Saved, saved_fields};
 use crate::snapshot::SnapshotError;
-use crate::state::{RigidBody, RotorState, State};
+use crate::state::{RigidBody, State};
 use contacts::Contacts;
 pub(crate) use free_bodies::Misfit;
 use free_bodies::{FIRST_THING, FreeBodies};
@@ -66,6 +66,8 @@ const ON_THE_GROUND_M: f64 = 1e-3;
 
 /// A vehicle that is slower than this when it is placed on the ground or in a rig is carried there: tuned, no source.
 const AT_REST_M_S: f64 = 0.01;
+
+const NAME: &str = "rapier";
 
 /// A vehicle in a scene.
 ///
@@ -94,8 +96,8 @@ pub struct Rapier {
     others: Vec<Neighbour>,
     /// The names of the scene's things.
     names: Vec<String>,
-    /// Tells this scene and vehicle from others.
-    print: Fingerprint,
+    /// Scene, rig and kinds of effects, which no state of others fits.
+    configuration: Fingerprint,
 }
 
 /// What contacts and joints changed over the last tick, against free flight.
@@ -144,9 +146,10 @@ impl Rapier {
         };
         let others = Vec::with_capacity(TRAFFIC_MAX);
         let names = scene.things().map(|thing| thing.name().to_owned()).collect();
-        let print = Fingerprint::of(numbers(&motion).into_iter());
+        let fingerprint = motion.model.airframe().fingerprint(NAME);
+        let configuration = fingerprint.with(numbers(&motion).into_iter());
         let reaction = Reaction::default();
-        let mut rapier = Self { hull, motion, effects, reaction, ticks: 0, others, names, print };
+        let mut rapier = Self { hull, motion, effects, reaction, ticks: 0, others, names, configuration };
         rapier.set_body(body);
         rapier
     }
@@ -226,7 +229,7 @@ fn numbers(motion: &Motion) -> Vec<f64> {
 
 impl Backend for Rapier {
     fn name(&self) -> &'static str {
-        "rapier"
+        NAME
     }
 
     fn state(&self) -> &State {
@@ -289,11 +292,6 @@ impl Backend for Rapier {
         self.lean_on_support();
     }
 
-    fn set_rotor_speeds(&mut self, speeds_rad_s: &[f64; 4]) {
-        self.motion.state.rotors = speeds_rad_s.map(RotorState::steady);
-        self.lean_on_support();
-    }
-
     fn bodies(&self) -> &[RigidBody] {
         &self.motion.free_bodies.states
     }
@@ -325,8 +323,12 @@ impl Backend for Rapier {
         self.motion.model.airframe().battery(&self.effects, &self.motion.state)
     }
 
+    fn configuration(&self) -> u64 {
+        self.configuration.number()
+    }
+
     fn parts(&self, note: &mut dyn FnMut(&'static str, &dyn Saved)) {
-        note("world", &self.print);
+        note("configuration", &self.configuration);
         note("state", &self.motion.state);
         note("effects", &self.effects);
         note("reaction", &self.reaction);
@@ -337,7 +339,7 @@ impl Backend for Rapier {
     }
 
     fn parts_mut(&mut self, note: &mut NotePart<'_>) -> Result<(), SnapshotError> {
-        note("world", &mut self.print)?;
+        note("configuration", &mut self.configuration)?;
         note("state", &mut self.motion.state)?;
         note("effects", &mut self.effects)?;
         note("reaction", &mut self.reaction)?;

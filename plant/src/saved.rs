@@ -296,7 +296,7 @@ impl<T: Saved + Copy + Default> Saved for Bounded<T> {
         let mut count = 0_u64;
         count.load(from)?;
         let count = usize::try_from(count).ok().filter(|count| *count <= self.most);
-        let count = count.ok_or(Unfit::Value("there are more items than places"))?;
+        let count = count.ok_or(Unfit::Value("it has more items than fit"))?;
         self.items.clear();
         for _ in 0..count {
             let mut item = T::default();
@@ -307,15 +307,27 @@ impl<T: Saved + Copy + Default> Saved for Bounded<T> {
     }
 }
 
-/// A number that tells one configuration from others: it is saved, and another one is refused.
+/// Hash of a configuration: it is saved, and the state of another configuration is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Fingerprint(u64);
 
 impl Fingerprint {
-    /// The fingerprint of `numbers`.
-    pub(crate) fn of(numbers: impl Iterator<Item = f64>) -> Self {
+    /// The fingerprint of what is called by these `names`.
+    pub(crate) fn of<'n>(names: impl Iterator<Item = &'n str>) -> Self {
+        // No name has the byte 255, so that no two names are taken for one.
+        let hash = |hash, name: &str| bus::random::fnv1a(&[255], bus::random::fnv1a(name.as_bytes(), hash));
+        Self(names.fold(bus::random::FNV_OFFSET, hash))
+    }
+
+    /// The same, and these `numbers`.
+    pub(crate) fn with(self, numbers: impl Iterator<Item = f64>) -> Self {
         let hash = |hash, number: f64| bus::random::fnv1a(&number.to_bits().to_le_bytes(), hash);
-        Self(numbers.fold(bus::random::FNV_OFFSET, hash))
+        Self(numbers.fold(self.0, hash))
+    }
+
+    /// The hash.
+    pub(crate) fn number(self) -> u64 {
+        self.0
     }
 }
 
@@ -331,7 +343,11 @@ impl Saved for Fingerprint {
     fn load(&mut self, from: &mut Reader<'_>) -> Result<(), Unfit> {
         let mut found = 0_u64;
         found.load(from)?;
-        if found == self.0 { Ok(()) } else { Err(Unfit::Value("the configuration is another one")) }
+        if found == self.0 {
+            Ok(())
+        } else {
+            Err(Unfit::Value("it is of another backend, another scene or other effects"))
+        }
     }
 }
 
@@ -371,14 +387,14 @@ mod tests {
         let mut more = saved(&few);
         more[0] = 4;
         let error = other.load(&mut Reader::new(&more)).unwrap_err();
-        assert_eq!(error, Unfit::Value("there are more items than places"));
+        assert_eq!(error, Unfit::Value("it has more items than fit"));
         assert_eq!(other.load(&mut Reader::new(&saved(&few)[..20])), Err(Unfit::Short));
     }
 
     #[test]
     fn a_flag_and_a_fingerprint_refuse_what_they_are_not() {
         assert!(false.load(&mut Reader::new(&[2])).is_err());
-        let print = |number: f64| Fingerprint::of([1.0, number].into_iter());
+        let print = |number: f64| Fingerprint::of(["rapier"].into_iter()).with([1.0, number].into_iter());
         assert_eq!(print(2.0).load(&mut Reader::new(&saved(&print(2.0)))), Ok(()));
         assert!(print(2.0).load(&mut Reader::new(&saved(&print(2.5)))).is_err());
     }

@@ -3,6 +3,7 @@
 use crate::manifest::{Manifest, Process, is_name};
 use crate::output_file;
 use crate::program::{Executable, OnExit, Program, Readiness};
+use bus::component::Transfer;
 use bus::plan::NodePlan;
 use bus::process::{LAUNCHER_VARIABLE, RUN_VARIABLE};
 use bus::{GENERATION_VARIABLE, NODE_VARIABLE};
@@ -353,8 +354,11 @@ pub fn require_replaceable(declared: &DeclaredNode<'_>, node: &NodePlan) -> Resu
 
 /// Why another process cannot go on in the place of this one.
 pub fn irreplaceable(declared: &DeclaredNode<'_>, node: &NodePlan) -> Option<&'static str> {
+    let component = declared.program.component();
     if declared.program.is_recorder() {
         Some("it is the recorder, and its file would be torn")
+    } else if component.is_some_and(|component| matches!(component.transfer, Transfer::File)) {
+        Some("it writes a file, which no other process can go on with")
     } else if node.outputs.is_empty() {
         Some("it has no outputs, so nothing could be transferred")
     } else {
