@@ -83,15 +83,16 @@ fn a_vehicle_among_others_knows_its_place_after_a_transfer() {
     let make = || plant(&parameters, &["command", "traffic"]);
     let (commands, mut first) = (commands(), make());
     let mut last = PlantState::default();
-    let traffic = |state: &PlantState| {
+    let traffic = |state: &PlantState, tick: u32| {
         let mut traffic = Traffic { count: 2, ..Default::default() };
         (traffic.position[1], traffic.velocity[1]) = (state.position, state.velocity);
-        // Another one crosses its way, so that the two meet.
-        traffic.position[0] = [0.0, 0.0, 1.2].into();
+        // Another one comes down on it.
+        traffic.position[0] = [0.0, 0.0, 2.6 - 0.6e-3 * f64::from(tick)].into();
+        traffic.velocity[0] = [0.0, 0.0, -0.6].into();
         traffic
     };
     let fly = |harness: &mut Harness<Plant>, last: &mut PlantState| {
-        let seen = traffic(last);
+        let seen = traffic(last, harness.tick);
         let command = &commands[harness.tick as usize];
         let sent = harness.step(Inputs { command, measured: None, traffic: Some(&seen) }).unwrap();
         *last = sent.state;

@@ -154,6 +154,34 @@ fn a_process_of_a_live_run_is_swapped() {
     assert!(messages(&recording) == messages(&undisturbed(&place)), "the flights differ");
 }
 
+/// A swap of the plant for one `with` other parameters; returns the end of the run and its recording.
+fn swap_plant(place: &Place, with: &str) -> (Ended, String) {
+    let swap = format!("[[swap]]\nprocess = \"plant\"\nat_tick = 700\nshadow_ticks = 50\nwith.{with}\n");
+    let (manifest, recording) = (hover_with(place, "swap.toml", &swap), place.path("swap.mcap"));
+    (fly(place, &manifest, &recording), recording)
+}
+
+#[test]
+fn a_plant_hands_its_state_to_one_with_other_numbers() {
+    let place = Place::new();
+    let (ended, recording) = swap_plant(&place, "parameters.substeps = 4");
+    let ended = ended.flown();
+    assert_eq!(ended.json()["successions"][0]["hand_over"], "state", "{ended}");
+    let (flown, whole) = (messages(&recording), messages(&undisturbed(&place)));
+    assert!(flown != whole, "nothing was swapped");
+    assert_eq!(ticks_of(&recording, "/plant/state"), (0..1500).collect::<Vec<u32>>());
+}
+
+#[test]
+fn a_plant_of_another_backend_is_refused_and_the_run_flies_on() {
+    let place = Place::new();
+    let (ended, recording) = swap_plant(&place, "parameters.backend = \"rapier\"");
+    let ended = ended.with_code(1);
+    let refused = ended.json()["successions"][0]["refused"].to_string();
+    assert!(refused.contains("another backend"), "{ended}");
+    assert!(messages(&recording) == messages(&undisturbed(&place)), "the flights differ");
+}
+
 #[test]
 fn a_live_swap_that_cannot_be_is_refused_and_the_run_flies_on() {
     let place = Place::new();
