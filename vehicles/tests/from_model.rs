@@ -206,6 +206,29 @@ fn what_is_wrong_with_a_model_is_told_with_its_line() {
     );
 }
 
+#[test]
+fn comments_within_a_text_change_no_number() {
+    let plain = of(SDF, "cross.sdf");
+    for (from, to) in [
+        (">0.01 0 0 0 0 0</pose>", "><!-- x -->0.01 0 <!-- y --> 0 0 0 0</pose>"),
+        (">1.46<", ">1<!-- c -->.46<"),
+        (">0.02<", "><!-- c -->0.0<!-- d -->2<"),
+        (">0 0 1</xyz>", "><!-- axis -->0 0 1</xyz>"),
+        (">ccw<", "><!-- not cw -->ccw<"),
+        ("<parent>body<", "<parent><!-- root -->bo<!-- -->dy<"),
+        (">0.016<", ">0.<?pi?>01<!-- x -->6<"),
+    ] {
+        assert!(SDF.contains(from), "{from}");
+        assert_eq!(of(&SDF.replace(from, to), "cross.sdf"), plain, "{to}");
+    }
+    let divided = SDF.replace(">1.46<", ">1<b/>.46<");
+    let error = convert(&divided, "cross.sdf").unwrap_err().to_string();
+    assert!(error.contains(":11:") && error.contains("`1 .46`"), "{error}");
+    let hidden = SDF.replace(">1.46<", "><!-- kg -->${mass}<");
+    let error = convert(&hidden, "cross.sdf").unwrap_err().to_string();
+    assert!(error.contains(":11:") && error.contains("xacro"), "{error}");
+}
+
 /// Texts that replace a part of a model.
 const PARTS: [&str; 16] = [
     "",

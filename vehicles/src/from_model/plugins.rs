@@ -26,7 +26,8 @@ fn is_motor(plugin: Node) -> bool {
 
 fn motor(source: Source, node: Node) -> Result<Motor, Diagnostic> {
     let positive = |name: &str| number(source, node, name, false);
-    let name = |key: &str| text_of(node, key).map(|text| text.rsplit("::").next().unwrap_or(text).to_owned());
+    let name =
+        |key: &str| text_of(node, key).map(|text| text.rsplit("::").next().unwrap_or_default().to_owned());
     let number_of_command = number(source, node, "motorNumber", true)?;
     Ok(Motor {
         joint: name("jointName"),
@@ -43,7 +44,7 @@ fn motor(source: Source, node: Node) -> Result<Motor, Diagnostic> {
 }
 
 fn spin(source: Source, node: Node) -> Result<Option<f64>, Diagnostic> {
-    match text_of(node, "turningDirection") {
+    match text_of(node, "turningDirection").as_deref() {
         Some("ccw") => Ok(Some(1.0)),
         Some("cw") => Ok(Some(-1.0)),
         Some(other) => {
