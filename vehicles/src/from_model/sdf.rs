@@ -161,6 +161,7 @@ fn joint(source: Source, node: Node, frames: &Frames) -> Result<Option<Joint>, D
     }
     let freedom = match source.attribute(node, "type")? {
         "fixed" => Freedom::Fixed,
+        "revolute" | "prismatic" if is_locked(source, node)? => Freedom::Fixed,
         "continuous" | "revolute" => Freedom::Turns,
         _ => Freedom::Other,
     };
@@ -169,6 +170,18 @@ fn joint(source: Source, node: Node, frames: &Frames) -> Result<Option<Joint>, D
     let at = start_of(node);
     let point = pose * Point3::origin();
     Ok(Some(Joint { name, parent, child: below, freedom, point, axis, at }))
+}
+
+/// True if a joint states that both of its limits are 0.
+fn is_locked(source: Source, joint: Node) -> Result<bool, Diagnostic> {
+    let Some(limit) = child(joint, "axis").and_then(|axis| child(axis, "limit")) else { return Ok(false) };
+    for name in ["lower", "upper"] {
+        match child(limit, name) {
+            Some(node) if source.number_of(node)? == 0.0 => {}
+            _ => return Ok(false),
+        }
+    }
+    Ok(true)
 }
 
 /// The axis of a joint in the model's frame; z of the joint if there is none.
