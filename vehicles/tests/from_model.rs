@@ -81,14 +81,17 @@ fn numbers_that_a_urdf_has_not_are_the_hummingbirds_scaled_and_listed() {
     close(made.vehicle.command.speed_at_max_rad_s, bird.command.speed_at_max_rad_s, "largest speed");
     assert_eq!(made.vehicle.motor, bird.motor);
     let keys: Vec<&str> = made.assumed.iter().map(|line| line.split(':').next().unwrap()).collect();
-    for key in ["body.gravity", "rotor.thrust_coefficient", "rotor.torque_coefficient", "motor.damping_ratio"]
-    {
+    for key in ["rotor.thrust_coefficient", "rotor.torque_coefficient", "motor.damping_ratio"] {
         assert!(keys.contains(&key), "{key} is not among {keys:?}");
     }
+    assert!(made.text.contains("standard gravity") && !keys.contains(&"body.gravity"), "{keys:?}");
+    close(made.vehicle.gravity_m_s2, 9.80665, "standard gravity");
     assert!(!keys.contains(&"rotor.inertia") && !keys.contains(&"body.mass"), "{keys:?}");
     let numbers = made.text.lines().filter(|line| line.contains(" = "));
     for line in numbers.filter(|line| *line != "name = \"plus\"") {
-        let is_told = line.contains(" # from plus.urdf: ") || line.contains(" # not in plus.urdf: ");
+        let is_told = line.contains(" # from plus.urdf: ")
+            || line.contains(" # not in plus.urdf: ")
+            || line.ends_with(" # chosen: standard gravity");
         assert!(is_told, "no origin: {line}");
     }
     let assumed = made.text.lines().filter(|line| line.contains(" # not in ")).count();
@@ -122,17 +125,19 @@ fn an_sdf_gives_what_its_plugins_say_in_the_order_of_their_numbers() {
     assert_eq!(vehicle.rotors.each_ref().map(|rotor| rotor.spin), [1.0, 1.0, -1.0, -1.0]);
     close(vehicle.thrust_coefficient, 8.5e-6, "thrust coefficient");
     close(vehicle.torque_coefficient, 8.5e-6 * 0.016, "torque coefficient");
-    close(vehicle.rotor_inertia_kg_m2, 3.1e-5, "inertia of a rotor");
+    // The plugins turn the links at a tenth of the speed unless they say otherwise.
+    close(vehicle.rotor_inertia_kg_m2, 3.1e-6, "inertia of a rotor");
     assert_eq!(vehicle.motor, MotorModel::FirstOrder { time_constant_s: 0.0125 });
     assert_eq!((vehicle.command.speed_at_min_rad_s, vehicle.command.speed_at_max_rad_s), (0.0, 800.0));
     let text = &made.text;
     assert!(text.contains("timeConstantUp; timeConstantDown is 0.025 s"), "{text}");
     let keys: Vec<&str> = made.assumed.iter().map(|line| line.split(':').next().unwrap()).collect();
-    assert_eq!(keys, ["body.gravity", "command.min", "command.max", "command.speed_at_min"]);
-    assert_eq!(made.notes, Vec::<String>::new());
+    assert_eq!(keys, ["command.min", "command.max", "command.speed_at_min"]);
+    let lags = "timeConstantUp is 0.0125 s and timeConstantDown 0.025 s";
+    assert!(made.notes.len() == 1 && made.notes[0].starts_with(lags), "{:?}", made.notes);
     let weak = of(&SDF.replace("<maxRotVelocity>800.0", "<maxRotVelocity>600.0"), "cross.sdf");
-    // 4 c 600^2 = 12.24 N, and 1.5 kg weigh 14.715 N.
-    assert!(weak.notes[0].contains("12.240 N") && weak.notes[0].contains("14.715 N"), "{:?}", weak.notes);
+    // 4 c 600^2 = 12.24 N, and 1.5 kg weigh 14.710 N.
+    assert!(weak.notes[1].contains("12.240 N") && weak.notes[1].contains("14.710 N"), "{:?}", weak.notes);
 }
 
 #[test]
@@ -198,12 +203,160 @@ fn what_is_wrong_with_a_model_is_told_with_its_line() {
     sdf("8.5e-06", "9.5e-06", "", &["motorConstant", "same for all rotors", "0.0000095"]);
     sdf("<jointName>rotor_2_joint", "<jointName>rotor_9_joint", "", &["rotor_9_joint"]);
     sdf("<jointName>rotor_2_joint", "<jointName>rotor_0_joint", "", &["two for `rotor_0_joint`"]);
+    urdf("<mass value=\"0.6\"/>", "<mass value=\"1e7\"/>", ":5:5", &["base_link", "at most 1000000 kg"]);
+    let far = "<origin xyz=\"0 0 -200\"";
+    urdf("<origin xyz=\"0 0 -0.02\"", far, ":18:5", &["battery", "within 100 m", "-2.0003e2"]);
+    let wide = URDF
+        .replacen("<inertial>", "<inertial><origin xyz=\"-90 0 0\"/>", 1)
+        .replace("<origin xyz=\"0.2 0 0\"", "<origin xyz=\"99 0 0\"");
+    refused(
+        &wide,
+        "quad.urdf",
+        ":60:3",
+        &["distance from the centre of mass of rotor rotor_front", "100.0 m"],
+    );
+    sdf(">0.016<", ">1e9<", ":79:9", &["momentConstant", "10.0 m"]);
+    sdf(">800.0<", ">1e9<", ":77:9", &["maxRotVelocity", "rad/s"]);
+    sdf(">0.0125<", ">1e9<", ":75:9", &["timeConstantUp", "100.0 s"]);
+    sdf(">8.5e-06<", ">1e-40<", ":78:9", &["motorConstant", "N/(rad/s)^2"]);
+    sdf(">2<", ">2.5<", ":80:9", &["actuator_number", "whole number"]);
+    // The first plugin is that of rotor_2, at line 71.
+    sdf("<actuator_number>2</actuator_number>", "", ":71:7", &["motorNumber", "none for `rotor_2_joint`"]);
+    sdf("actuator_number>3<", "actuator_number>0<", ":93:7", &["0 for `rotor_0_joint` and `rotor_3_joint`"]);
+    sdf("<turningDirection>cw</turningDirection>", "", ":71:7", &["turningDirection", "`rotor_2_joint`"]);
+    let (low, head) = ("0.15 -0.2 0.03 0 0 0", ":23:7");
+    sdf(low, "0.15 -0.2 0.03 3.141592653589793 0 0", head, &["rotor_0_joint", "upwards", "-1.0000]"]);
+    let fixed = |text: &str| {
+        text.replace(
+            "<joint name=\"rotor_0_joint\" type=\"revolute\">",
+            "<joint name=\"rotor_0_joint\" type=\"fixed\">",
+        )
+    };
+    for turn in ["3.141592653589793 0 0", "0 1.5 0"] {
+        let text = fixed(&SDF.replace(low, &format!("0.15 -0.2 0.03 {turn}")));
+        refused(&text, "quad.sdf", head, &["rotor_0_joint", "z points upwards"]);
+    }
     sdf(
         "<model name=\"cross\">",
         "<model name=\"cross\"><include><uri>model://x</uri></include>",
         ":5:",
         &["another model"],
     );
+}
+
+#[test]
+fn comments_within_a_text_change_no_number() {
+    let plain = of(SDF, "cross.sdf");
+    for (from, to) in [
+        (">0.01 0 0 0 0 0</pose>", "><!-- x -->0.01 0 <!-- y --> 0 0 0 0</pose>"),
+        (">1.46<", ">1<!-- c -->.46<"),
+        (">0.02<", "><!-- c -->0.0<!-- d -->2<"),
+        (">0 0 1</xyz>", "><!-- axis -->0 0 1</xyz>"),
+        (">ccw<", "><!-- not cw -->ccw<"),
+        ("<parent>body<", "<parent><!-- root -->bo<!-- -->dy<"),
+        (">0.016<", ">0.<?pi?>01<!-- x -->6<"),
+    ] {
+        assert!(SDF.contains(from), "{from}");
+        assert_eq!(of(&SDF.replace(from, to), "cross.sdf"), plain, "{to}");
+    }
+    let divided = SDF.replace(">1.46<", ">1<b/>.46<");
+    let error = convert(&divided, "cross.sdf").unwrap_err().to_string();
+    assert!(error.contains(":11:") && error.contains("`1 .46`"), "{error}");
+    let hidden = SDF.replace(">1.46<", "><!-- kg -->${mass}<");
+    let error = convert(&hidden, "cross.sdf").unwrap_err().to_string();
+    assert!(error.contains(":11:") && error.contains("xacro"), "{error}");
+}
+
+#[test]
+fn a_link_that_the_simulator_turns_slower_than_the_rotor_has_as_much_more_inertia() {
+    let with = |by: &str| {
+        let key = format!("<rotorVelocitySlowdownSim>{by}</rotorVelocitySlowdownSim><motorConstant>");
+        of(&SDF.replace("<motorConstant>", &key), "cross.sdf")
+    };
+    for (by, inertia) in [("1", 3.1e-5), ("10", 3.1e-6), ("20", 1.55e-6)] {
+        let made = with(by);
+        close(made.vehicle.rotor_inertia_kg_m2, inertia, "inertia of a rotor");
+        close(made.vehicle.thrust_coefficient, 8.5e-6, "thrust coefficient");
+        let told = format!("divided by rotorVelocitySlowdownSim = {by}: ");
+        assert_eq!(made.text.contains(&told), by != "1", "{}", made.text);
+    }
+    assert_eq!(with("10"), of(SDF, "cross.sdf"));
+}
+
+#[test]
+fn a_key_that_one_plugin_lacks_is_told_with_both_rotors() {
+    // Rotors are in the order of their numbers; the file has the plugins of 2, 0, 3, 1.
+    for (rotor, found) in [
+        ("rotor_0", "found none for `rotor_0_joint` and 0.0000085 for `rotor_1_joint`"),
+        ("rotor_3", "found 0.0000085 for `rotor_0_joint` and none for `rotor_3_joint`"),
+    ] {
+        let at = SDF.find(&format!("<linkName>{rotor}<")).unwrap();
+        let rest = SDF[at..].replacen("<motorConstant>8.5e-06</motorConstant>", "", 1);
+        let error = convert(&format!("{}{rest}", &SDF[..at]), "cross.sdf").unwrap_err().to_string();
+        assert!(error.contains("motorConstant: expected the same") && error.contains(found), "{error}");
+    }
+}
+
+/// The SDF model without the elements of this name.
+fn without(name: &str) -> String {
+    let lines: Vec<&str> =
+        SDF.lines().filter(|line| !line.trim().starts_with(&format!("<{name}>"))).collect();
+    assert!(lines.len() < SDF.lines().count(), "{name}");
+    lines.join("\n")
+}
+
+#[test]
+fn assumed_directions_alternate_around_the_vehicle_whatever_the_order_of_commands() {
+    let made = of(&without("turningDirection"), "cross.sdf");
+    for rotor in &made.vehicle.rotors {
+        // Front right and rear left are the first and the third clockwise from the nose.
+        let is_clockwise = rotor.position_m.x * rotor.position_m.y < 0.0;
+        assert_eq!(rotor.spin, if is_clockwise { -1.0 } else { 1.0 }, "{}", rotor.name);
+    }
+    assert_eq!(made.vehicle.rotors.each_ref().map(|rotor| rotor.spin), [-1.0, -1.0, 1.0, 1.0]);
+}
+
+#[test]
+fn stated_directions_that_do_not_balance_are_noted() {
+    let notes = |changes: [(&str, &str); 2]| {
+        let mut text = SDF.to_owned();
+        for (rotor, to) in changes {
+            let at = text.find(&format!("<linkName>{rotor}<")).unwrap();
+            let end = at + text[at..].find("</turningDirection>").unwrap();
+            let start = text[..end].rfind('>').unwrap() + 1;
+            text.replace_range(start..end, to);
+        }
+        // The first note is that on the lags.
+        of(&text, "cross.sdf").notes.split_off(1).join("; ")
+    };
+    let three = notes([("rotor_0", "cw"), ("rotor_0", "cw")]);
+    assert!(three.starts_with("counter-clockwise rotors: 1, clockwise rotors: 3"), "{three}");
+    // The front pair the one way, the rear pair the other.
+    let pairs = notes([("rotor_1", "cw"), ("rotor_2", "ccw")]);
+    assert!(pairs.contains("opposite to each other turn in different directions"), "{pairs}");
+    assert_eq!(notes([("rotor_0", "ccw"), ("rotor_1", "ccw")]), "");
+}
+
+#[test]
+fn joints_whose_limits_are_both_0_are_fixed() {
+    let sdf = |lower: &str| {
+        let axis =
+            format!("<axis><xyz>0 0 1</xyz><limit><lower>{lower}</lower><upper>0</upper></limit></axis>");
+        let joint = format!("type=\"revolute\"><parent>body</parent><child>gps</child>{axis}");
+        SDF.replace("type=\"fixed\"><parent>body</parent><child>gps</child>", &joint)
+    };
+    assert_eq!(of(&sdf("0"), "cross.sdf"), of(SDF, "cross.sdf"));
+    let note = "joint gps_joint is movable but not a rotor; its link is treated as fixed at the joint's zero";
+    assert_eq!(of(&sdf("-1"), "cross.sdf").notes[0], note);
+    let urdf = |limit: &str| {
+        let from = "type=\"fixed\">\n    <origin xyz=\"0.03 0 -0.03\"";
+        assert!(URDF.contains(from));
+        let to =
+            from.replace("fixed\">", &format!("revolute\"><limit {limit} effort=\"1\" velocity=\"1\"/>"));
+        of(&URDF.replace(from, &to), "plus.urdf")
+    };
+    assert_eq!(urdf("lower=\"0\" upper=\"0\""), of(URDF, "plus.urdf"));
+    assert!(urdf("upper=\"0\"").notes[0].contains("battery_mount is movable"));
 }
 
 /// Texts that replace a part of a model.
@@ -276,7 +429,10 @@ fn rotors_on_fixed_joints_are_at_the_centres_of_mass_of_their_links() {
         assert!(text.contains(&from), "{from}");
         text = text.replace(&from, &format!("{from}\n      <origin xyz=\"{xyz} 0 0\"/>"));
     }
+    // The default axis of URDF is x, which is no rotor's.
+    let text = text.replace("<axis xyz=\"0 0 1\"/>", "");
     let (fixed, turning) = (of(&text, "plus.urdf").vehicle, of(URDF, "plus.urdf").vehicle);
     assert_eq!(fixed.rotors, turning.rotors);
     assert_eq!(fixed.inertia_kg_m2, turning.inertia_kg_m2);
+    close(fixed.rotor_inertia_kg_m2, 4e-5, "inertia of a rotor about z");
 }

@@ -4,6 +4,7 @@ use diagnostics::{Diagnostic, ParameterError};
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::model::{Inertial, Link, Model};
+use super::text::plain;
 use crate::bounds;
 use crate::file::is_rigid;
 
@@ -26,13 +27,14 @@ pub struct Body {
 /// Joins all links, whatever joints they have, at the joints' zero.
 ///
 /// # Errors
-/// If a mass or tensor is not physical, or no link has mass.
+/// If a mass or tensor is not physical or not within bounds, a link is far away, or no link has mass.
 pub fn of(model: &Model) -> Result<Body, Diagnostic> {
     let mut parts = Vec::new();
     for link in &model.links {
         if let Some(inertial) = &link.inertial
             && has_mass(model, link, inertial)?
         {
+            require_near(model, &(link, inertial))?;
             parts.push((link, inertial));
         }
     }
@@ -44,9 +46,7 @@ pub fn of(model: &Model) -> Result<Body, Diagnostic> {
     let moment: Vector3<f64> = parts.iter().map(|part| place(part).coords * part.1.mass_kg).sum();
     let centre = Point3::from(moment / mass_kg);
     let inertia_kg_m2: Matrix3<f64> = parts.iter().map(|part| about(part, &centre)).sum();
-    if !inertia_kg_m2.iter().all(|entry| entry.is_finite()) {
-        return Err(model.source.whole("expected links within 100 m, found one that is farther away"));
-    }
+    require_bounds(model, &parts, mass_kg, &inertia_kg_m2)?;
     let links = parts.iter().map(|(link, _)| link.name.clone()).collect();
     Ok(Body { mass_kg, centre, inertia_kg_m2, links })
 }
@@ -54,6 +54,40 @@ pub fn of(model: &Model) -> Result<Body, Diagnostic> {
 /// The centre of mass of a link in the model's frame.
 fn place((link, inertial): &(&Link, &Inertial)) -> Point3<f64> {
     link.pose * inertial.pose * Point3::origin()
+}
+
+/// Refuses a centre of mass that is farther from the model's origin than any vehicle reaches.
+fn require_near(model: &Model, part: &(&Link, &Inertial)) -> Result<(), Diagnostic> {
+    let (place, max) = (place(part), bounds::HUB.max);
+    if place.coords.amax() <= max {
+        return Ok(());
+    }
+    let key = format!("centre of mass of link {}", plain(&part.0.name));
+    let found = format!("[{:.4e}, {:.4e}, {:.4e}] m", place.x, place.y, place.z);
+    let expected = format!("within {max} m of the model's origin along each axis");
+    Err(model
+        .source
+        .fault(part.1.at.clone(), ParameterError::value(key, expected, found))
+        .help("give lengths in metres, and poses from the model's own frame"))
+}
+
+/// Refuses a mass and a tensor of all links that no vehicle has; the place is that of the heaviest link.
+fn require_bounds(
+    model: &Model,
+    parts: &[(&Link, &Inertial)],
+    mass_kg: f64,
+    inertia_kg_m2: &Matrix3<f64>,
+) -> Result<(), Diagnostic> {
+    let heaviest = parts.iter().max_by(|a, b| a.1.mass_kg.total_cmp(&b.1.mass_kg));
+    let at = heaviest.map_or(0..0, |part| part.1.at.clone());
+    let moments = inertia_kg_m2.diagonal();
+    bounds::MASS
+        .check("mass of all links", mass_kg)
+        .and_then(|()| bounds::INERTIA.check("least moment of inertia of all links", moments.min()))
+        .and_then(|()| bounds::INERTIA.check("largest moment of inertia of all links", moments.max()))
+        .map_err(|error| {
+            model.source.fault(at, error).help("give masses in kg and moments of inertia in kg*m^2")
+        })
 }
 
 /// The tensor of a link in the axes of the model's frame, about the link's own centre of mass.
@@ -76,7 +110,7 @@ fn has_mass(model: &Model, link: &Link, inertial: &Inertial) -> Result<bool, Dia
     if mass == 0.0 && tensor.amax() == 0.0 {
         return Ok(false);
     }
-    let key = |what: &str| format!("{what} of link `{}`", link.name);
+    let key = |what: &str| format!("{what} of link {}", plain(&link.name));
     if mass <= 0.0 || mass > bounds::MASS.max {
         let expected = format!("above 0 and at most {} kg", bounds::MASS.max);
         return fault(ParameterError::value(key("mass"), expected, format!("{mass} kg")));

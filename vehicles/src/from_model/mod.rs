@@ -10,10 +10,12 @@
 //! | `body` | mass, centre of mass and inertia of all links |
 //! | `rotors` | the rotors among the joints |
 //! | `vehicle` | the numbers of the vehicle file |
+//! | `notes` | notes on the model |
 //! | `text` | its text |
 
 mod body;
 mod model;
+mod notes;
 mod plugins;
 mod rotors;
 mod sdf;
@@ -69,6 +71,13 @@ pub fn convert(text: &str, file: &str) -> Result<Converted, Diagnostic> {
     let reference = Vehicle::parse(HUMMINGBIRD, "hummingbird.toml")?;
     let name = Path::new(file).file_name().map_or(file.into(), |name| name.to_string_lossy());
     let (written, notes) = vehicle::Parts { model: &model, body, rotors, reference }.write(&name)?;
-    let vehicle = Vehicle::parse(&written.text, &format!("vehicle file of {name}"))?;
+    let vehicle = Vehicle::parse(&written.text, file).map_err(|error| unlikely(source, &error))?;
     Ok(Converted { text: written.text, assumed: written.assumed, notes, vehicle })
+}
+
+/// The error for a number that no vehicle has, and that follows from several of the model.
+fn unlikely(source: Source, error: &Diagnostic) -> Diagnostic {
+    source
+        .whole(format!("expected the numbers of a vehicle; of the vehicle file: {}", error.error))
+        .help("correct the masses, places and plugins of the model from which this number follows")
 }

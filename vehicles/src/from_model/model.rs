@@ -1,4 +1,4 @@
-//! What the descriptions of robots have in common: links with mass, joints between them, motors.
+//! Content of descriptions of robots, whatever the format: links with mass, joints between them, motors.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
 use std::ops::Range;
@@ -46,7 +46,7 @@ pub struct Inertial {
 /// Freedom of a joint.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Freedom {
-    /// None.
+    /// None: a fixed joint, or one whose limits are both 0.
     Fixed,
     /// Turns about its axis.
     Turns,
@@ -72,7 +72,7 @@ pub struct Joint {
     pub at: Range<usize>,
 }
 
-/// What a plugin of Gazebo says about a rotor; SI.
+/// Numbers of a plugin of Gazebo about a rotor; SI.
 pub struct Motor {
     /// Joint of the rotor.
     pub joint: Option<String>,
@@ -90,6 +90,8 @@ pub struct Motor {
     pub lag_up_s: Option<f64>,
     /// Lag of a rotor that becomes slower.
     pub lag_down_s: Option<f64>,
+    /// Ratio of the speed of the rotor to that of its joint in the simulator.
+    pub slowdown: f64,
     /// Index of its command.
     pub number: Option<f64>,
     /// Place in the file.

@@ -1,15 +1,34 @@
 //! Plugins of Gazebo that drive rotors: `libgazebo_motor_model`, `gz-sim-multicopter-motor-model-system`.
 
+use diagnostics::parameter::Bounds;
 use diagnostics::{Diagnostic, ParameterError};
 use roxmltree::Node;
 
 use super::model::Motor;
 use super::xml::{Source, child, start_of, text_of};
+use crate::bounds;
+
+/// Thrust by speed squared: the lightest vehicle at the largest rotor speed has the least.
+const THRUST: Bounds = Bounds { min: 1e-16, ..bounds::THRUST_COEFFICIENT };
+/// Torque by thrust.
+const MOMENT: Bounds =
+    Bounds { min: 1e-6, max: 10.0, unit: "m", why: "a rotor of 32 m that takes 17 MW has 2.2 m" };
+/// Largest speed of a rotor.
+const SPEED_MAX: Bounds = Bounds { min: 1.0, ..bounds::ROTOR_SPEED };
+/// Ratio of the speed of a rotor to that of its joint.
+const SLOWDOWN: Bounds = Bounds {
+    min: 1.0,
+    max: 1000.0,
+    unit: "",
+    why: "joints turn slower than rotors so that the simulator can follow",
+};
+/// Ratio that the plugins take if the model has none.
+const SLOWDOWN_DEFAULT: f64 = 10.0;
 
 /// Reads all plugins of motors within `top`.
 ///
 /// # Errors
-/// If a number is not one, is not positive where it has to be, or a direction is neither `cw` nor `ccw`.
+/// If a number is not one or not within its bounds, or a direction is neither `cw` nor `ccw`.
 pub fn read(source: Source, top: Node) -> Result<Vec<Motor>, Diagnostic> {
     let plugins = top.descendants().filter(|node| node.tag_name().name() == "plugin");
     plugins.filter(|node| is_motor(*node)).map(|node| motor(source, node)).collect()
@@ -25,25 +44,27 @@ fn is_motor(plugin: Node) -> bool {
 }
 
 fn motor(source: Source, node: Node) -> Result<Motor, Diagnostic> {
-    let positive = |name: &str| number(source, node, name, false);
-    let name = |key: &str| text_of(node, key).map(|text| text.rsplit("::").next().unwrap_or(text).to_owned());
-    let number_of_command = number(source, node, "motorNumber", true)?;
+    let bounded = |name: &str, bounds: &Bounds| bounded(source, node, name, bounds);
+    let name =
+        |key: &str| text_of(node, key).map(|text| text.rsplit("::").next().unwrap_or_default().to_owned());
+    let number_of_command = index(source, node, "motorNumber")?;
     Ok(Motor {
         joint: name("jointName"),
         link: name("linkName"),
         spin: spin(source, node)?,
-        thrust_coefficient: positive("motorConstant")?,
-        moment_m: positive("momentConstant")?,
-        speed_max_rad_s: positive("maxRotVelocity")?,
-        lag_up_s: positive("timeConstantUp")?,
-        lag_down_s: positive("timeConstantDown")?,
-        number: number_of_command.or(number(source, node, "actuator_number", true)?),
+        thrust_coefficient: bounded("motorConstant", &THRUST)?,
+        moment_m: bounded("momentConstant", &MOMENT)?,
+        speed_max_rad_s: bounded("maxRotVelocity", &SPEED_MAX)?,
+        lag_up_s: bounded("timeConstantUp", &bounds::TIME_CONSTANT)?,
+        lag_down_s: bounded("timeConstantDown", &bounds::TIME_CONSTANT)?,
+        slowdown: bounded("rotorVelocitySlowdownSim", &SLOWDOWN)?.unwrap_or(SLOWDOWN_DEFAULT),
+        number: number_of_command.or(index(source, node, "actuator_number")?),
         at: start_of(node),
     })
 }
 
 fn spin(source: Source, node: Node) -> Result<Option<f64>, Diagnostic> {
-    match text_of(node, "turningDirection") {
+    match text_of(node, "turningDirection").as_deref() {
         Some("ccw") => Ok(Some(1.0)),
         Some("cw") => Ok(Some(-1.0)),
         Some(other) => {
@@ -54,12 +75,21 @@ fn spin(source: Source, node: Node) -> Result<Option<f64>, Diagnostic> {
     }
 }
 
-fn number(source: Source, plugin: Node, name: &str, can_be_0: bool) -> Result<Option<f64>, Diagnostic> {
+/// A number within bounds, in SI; none without its element.
+fn bounded(source: Source, plugin: Node, name: &str, bounds: &Bounds) -> Result<Option<f64>, Diagnostic> {
     let Some(node) = child(plugin, name) else { return Ok(None) };
     let number = source.number_of(node)?;
-    if number < 0.0 || (number == 0.0 && !can_be_0) {
-        let expected = if can_be_0 { "a number of at least 0" } else { "a number above 0" };
-        return Err(source.fault(start_of(node), ParameterError::value(name, expected, number)));
+    bounds.check(name, number).map_err(|error| source.fault(start_of(node), error))?;
+    Ok(Some(number))
+}
+
+/// The index of a command; none without its element.
+fn index(source: Source, plugin: Node, name: &str) -> Result<Option<f64>, Diagnostic> {
+    let Some(node) = child(plugin, name) else { return Ok(None) };
+    let number = source.number_of(node)?;
+    if number < 0.0 || number.fract() != 0.0 {
+        let error = ParameterError::value(name, "a whole number of at least 0", number);
+        return Err(source.fault(start_of(node), error));
     }
     Ok(Some(number))
 }

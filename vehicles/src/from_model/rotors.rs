@@ -1,10 +1,12 @@
 //! Rotors among the joints of a model, in the order of the commands.
 
-use diagnostics::Diagnostic;
+use diagnostics::{Diagnostic, ParameterError};
 use nalgebra::{Point3, Vector3};
 
 use super::body::turned;
 use super::model::{Freedom, Joint, Link, Model, Motor};
+use super::text::plain;
+use crate::bounds;
 
 /// Words by which rotors are known, the surest first.
 const WORDS: [&str; 3] = ["rotor", "prop", "motor"];
@@ -23,14 +25,19 @@ pub struct Rotor<'m> {
     pub motor: Option<&'m Motor>,
     /// Hub, from the centre of mass.
     pub position_m: Vector3<f64>,
+    /// Rank clockwise from the nose, seen from above: 0 to 3.
+    pub rank: usize,
 }
 
 impl Rotor<'_> {
-    /// Moment of inertia about the axis, in kg m^2, through the link's own centre of mass; none without mass.
+    /// Moment of inertia about the axis, in kg m^2, through the link's own centre of mass; none without mass. The axis of a
+    /// fixed joint is z of the body: formats state none. A joint that the simulator turns more slowly than the rotor has a
+    /// link with as much more inertia, which is divided out.
     pub fn inertia_kg_m2(&self) -> Option<f64> {
         let inertial = self.link.inertial.as_ref().filter(|inertial| inertial.mass_kg > 0.0)?;
-        let axis = self.joint.axis.try_normalize(0.0).unwrap_or_else(Vector3::z);
-        Some(axis.dot(&(turned(self.link, inertial) * axis)))
+        let stated = Some(self.joint.axis).filter(|_| self.joint.freedom != Freedom::Fixed);
+        let axis = stated.and_then(|axis| axis.try_normalize(0.0)).unwrap_or_else(Vector3::z);
+        Some(axis.dot(&(turned(self.link, inertial) * axis)) / self.motor.map_or(1.0, |motor| motor.slowdown))
     }
 }
 
@@ -38,23 +45,29 @@ impl Rotor<'_> {
 /// is that of the plugins' numbers, else clockwise from the nose, seen from above.
 ///
 /// # Errors
-/// If there are not four, or one is tilted.
+/// If there are not four, one is tilted or pushes downwards, or the plugins' numbers or directions are not complete.
 pub fn find<'m>(model: &'m Model, centre: &Point3<f64>) -> Result<Vec<Rotor<'m>>, Diagnostic> {
     let joints = if model.motors.is_empty() { by_name(model) } else { by_motor(model)? };
     require_four(model, &joints)?;
     let mut rotors = Vec::new();
     for (joint, motor) in joints {
         let Some(link) = model.links.iter().find(|link| link.name == joint.child) else { continue };
-        if joint.freedom == Freedom::Turns {
+        if joint.freedom != Freedom::Fixed {
             require_upright(model, joint)?;
         }
-        rotors.push(Rotor { joint, link, motor, position_m: hub(joint, link) - centre });
+        if motor.is_some() {
+            require_upward(model, joint, link)?;
+        }
+        let rotor = Rotor { joint, link, motor, position_m: hub(joint, link) - centre, rank: 0 };
+        require_bounds(model, &rotor)?;
+        rotors.push(rotor);
     }
-    sort(&mut rotors);
+    require_directions(model, &rotors)?;
+    sort(model, &mut rotors)?;
     Ok(rotors)
 }
 
-/// Where the rotor of a joint is. Fixed joints may all be at the origin, and only their links' centres of mass apart.
+/// Place of the rotor of a joint. Fixed joints may all be at the origin, and only their links' centres of mass apart.
 fn hub(joint: &Joint, link: &Link) -> Point3<f64> {
     match &link.inertial {
         Some(inertial) if joint.freedom == Freedom::Fixed => link.pose * inertial.pose * Point3::origin(),
@@ -138,16 +151,99 @@ fn require_upright(model: &Model, joint: &Joint) -> Result<(), Diagnostic> {
     Err(model.source.fault(joint.at.clone(), message).help(help))
 }
 
-fn sort(rotors: &mut [Rotor]) {
-    let number = |rotor: &Rotor| rotor.motor.and_then(|motor| motor.number);
-    let mut numbers: Vec<f64> = rotors.iter().filter_map(number).collect();
-    numbers.sort_by(f64::total_cmp);
-    numbers.dedup();
-    if numbers.len() == rotors.len() {
-        rotors.sort_by(|a, b| number(a).unwrap_or(0.0).total_cmp(&number(b).unwrap_or(0.0)));
-    } else {
-        rotors.sort_by(|a, b| clockwise(&a.position_m).total_cmp(&clockwise(&b.position_m)));
+/// Refuses a rotor that is farther from the centre of mass, or heavier, than any that flies.
+fn require_bounds(model: &Model, rotor: &Rotor) -> Result<(), Diagnostic> {
+    let key = |what: &str| format!("{what} of rotor {}", plain(&rotor.link.name));
+    for entry in rotor.position_m.iter() {
+        bounds::HUB
+            .check(&key("distance from the centre of mass"), *entry)
+            .map_err(|error| model.source.fault(rotor.joint.at.clone(), error))?;
     }
+    let inertial = rotor.inertia_kg_m2().zip(rotor.link.inertial.as_ref());
+    inertial.map_or(Ok(()), |(inertia, inertial)| {
+        bounds::ROTOR_INERTIA
+            .check(&key("moment of inertia"), inertia)
+            .map_err(|error| model.source.fault(inertial.at.clone(), error))
+    })
+}
+
+/// Refuses a plugin whose link does not point upwards: Gazebo pushes along z of the link, whatever the joint's axis.
+fn require_upward(model: &Model, joint: &Joint, link: &Link) -> Result<(), Diagnostic> {
+    let up = link.pose * Vector3::z();
+    if up.z > 0.5 && up.xy().norm() <= TILT_MAX {
+        return Ok(());
+    }
+    let message = format!(
+        "rotor `{}`: expected a link whose z points upwards, found [{:.4}, {:.4}, {:.4}]",
+        plain(&joint.name),
+        up.x,
+        up.y,
+        up.z
+    );
+    let help = "the plugin pushes along z of the link: turn the link; only rotors that push upwards are flown at present";
+    Err(model.source.fault(link.at.clone(), message).help(help))
+}
+
+/// Refuses directions of rotation that only some plugins state.
+fn require_directions(model: &Model, rotors: &[Rotor]) -> Result<(), Diagnostic> {
+    let is_stated = |rotor: &&Rotor| rotor.motor.is_some_and(|motor| motor.spin.is_some());
+    let with = rotors.iter().find(is_stated);
+    let without = rotors.iter().find(|rotor| !is_stated(rotor));
+    match (with, without.and_then(|rotor| Some((rotor, rotor.motor?)))) {
+        (Some(with), Some((without, motor))) => {
+            let found = format!("none for `{}`", plain(&without.joint.name));
+            let expected = format!("a direction, as for `{}`", plain(&with.joint.name));
+            let error = ParameterError::value("turningDirection", expected, found);
+            Err(model.source.fault(motor.at.clone(), error).help("add <turningDirection> to this plugin"))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Ranks the rotors clockwise from the nose, and orders them by their commands' numbers where there are some.
+fn sort(model: &Model, rotors: &mut [Rotor]) -> Result<(), Diagnostic> {
+    rotors.sort_by(|a, b| clockwise(&a.position_m).total_cmp(&clockwise(&b.position_m)));
+    rotors.iter_mut().enumerate().for_each(|(rank, rotor)| rotor.rank = rank);
+    require_numbers(model, rotors)?;
+    rotors.sort_by(|a, b| number(a).unwrap_or(0.0).total_cmp(&number(b).unwrap_or(0.0)));
+    Ok(())
+}
+
+fn number(rotor: &Rotor) -> Option<f64> {
+    rotor.motor?.number
+}
+
+/// Refuses numbers of commands that stand twice, or that only some plugins have.
+fn require_numbers(model: &Model, rotors: &[Rotor]) -> Result<(), Diagnostic> {
+    let mut seen: Vec<&Rotor> = Vec::new();
+    let is_any = rotors.iter().any(|rotor| number(rotor).is_some());
+    // Plugins in the order of the file: the second of two equal ones is the place.
+    let mut plugins: Vec<_> = rotors.iter().filter_map(|rotor| Some((rotor, rotor.motor?))).collect();
+    plugins.sort_by_key(|(_, motor)| motor.at.start);
+    for (rotor, motor) in plugins {
+        let name = plain(&rotor.joint.name);
+        let fault = |expected: String, found: String| {
+            let error = ParameterError::value("motorNumber", expected, found);
+            model
+                .source
+                .fault(motor.at.clone(), error)
+                .help("give each plugin of a motor a number of its own, or none of them a number")
+        };
+        let Some(index) = motor.number else {
+            if is_any {
+                let expected = "a number in all plugins of motors or in none".to_owned();
+                return Err(fault(expected, format!("none for `{name}`")));
+            }
+            continue;
+        };
+        if let Some(other) = seen.iter().find(|other| number(other) == Some(index)) {
+            let other = plain(&other.joint.name);
+            let found = format!("{index} for `{other}` and `{name}`");
+            return Err(fault("a number of its own for each rotor".to_owned(), found));
+        }
+        seen.push(rotor);
+    }
+    Ok(())
 }
 
 /// A number that grows with the angle of a place from the nose, clockwise seen from above: 0 in front, 2 in the rear.

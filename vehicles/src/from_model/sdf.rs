@@ -9,7 +9,7 @@ use std::ops::Range;
 use super::model::{Freedom, Inertial, Joint, Link, Model, pose, tensor};
 use super::plugins;
 use super::tree;
-use super::xml::{Source, child, children, start_of, text_of};
+use super::xml::{Source, child, children, start_of, text_in, text_of};
 
 /// Name of the model's own frame.
 const MODEL: &str = "__model__";
@@ -17,7 +17,7 @@ const MODEL: &str = "__model__";
 /// Poses of a model's links, joints and frames, each relative to another.
 #[derive(Default)]
 struct Frames<'d> {
-    poses: BTreeMap<&'d str, (Isometry3<f64>, &'d str, Range<usize>)>,
+    poses: BTreeMap<&'d str, (Isometry3<f64>, String, Range<usize>)>,
 }
 
 /// Reads the only model of the element `<sdf>`. The model's frame is that of its element.
@@ -63,13 +63,14 @@ impl<'d> Frames<'d> {
         let name = source.attribute(node, "name")?;
         let carrier = match kind {
             "joint" => text_of(node, "child"),
-            "frame" => node.attribute("attached_to"),
+            "frame" => node.attribute("attached_to").map(str::to_owned),
             _ => None,
         };
         let posed = child(node, "pose");
         let relative = |node: Node<'d, '_>| node.attribute("relative_to").or(node.attribute("frame"));
-        let to = posed.and_then(relative).filter(|name| !name.trim().is_empty()).or(carrier);
-        let entry = (own_pose(source, node)?, to.unwrap_or(MODEL), start_of(node));
+        let stated = posed.and_then(relative).filter(|name| !name.trim().is_empty());
+        let to = stated.map(str::to_owned).or(carrier).unwrap_or_else(|| MODEL.to_owned());
+        let entry = (own_pose(source, node)?, to, start_of(node));
         if self.poses.insert(name, entry).is_some() {
             let message =
                 format!("expected links, joints and frames with different names, found `{name}` twice");
@@ -89,7 +90,7 @@ impl<'d> Frames<'d> {
                 let message = format!("expected the name of a link, joint or frame, found `{next}`");
                 return Err(source.fault(at, message).help("add it, or correct the name"));
             };
-            (whole, next, at) = (pose * whole, to, place.clone());
+            (whole, next, at) = (pose * whole, to.as_str(), place.clone());
         }
         let message =
             format!("expected poses that lead to the model, found a cycle that `{name}` leads into");
@@ -100,7 +101,8 @@ impl<'d> Frames<'d> {
 /// The pose in the element `<pose>` of `node`; none is the identity.
 fn own_pose(source: Source, node: Node) -> Result<Isometry3<f64>, Diagnostic> {
     let Some(node) = child(node, "pose") else { return Ok(Isometry3::identity()) };
-    let text = node.text().unwrap_or_default();
+    let text = text_in(node);
+    let text = text.as_str();
     if node.attribute("rotation_format") == Some("quat_xyzw") {
         let [x, y, z, i, j, k, w] = source.numbers(node, "pose", text)?;
         let quaternion = nalgebra::Quaternion::new(w, i, j, k);
@@ -148,7 +150,7 @@ fn link(source: Source, node: Node, frames: &Frames) -> Result<Link, Diagnostic>
 fn joint(source: Source, node: Node, frames: &Frames) -> Result<Option<Joint>, Diagnostic> {
     let name = source.attribute(node, "name")?.to_owned();
     let end = |side: &str| {
-        text_of(node, side).map(str::to_owned).ok_or_else(|| {
+        text_of(node, side).ok_or_else(|| {
             let message = format!("joint `{name}`: expected <{side}>, found none");
             source.fault(start_of(node), message).help(format!("add <{side}> with the name of a link"))
         })
@@ -159,6 +161,7 @@ fn joint(source: Source, node: Node, frames: &Frames) -> Result<Option<Joint>, D
     }
     let freedom = match source.attribute(node, "type")? {
         "fixed" => Freedom::Fixed,
+        "revolute" | "prismatic" if is_locked(source, node)? => Freedom::Fixed,
         "continuous" | "revolute" => Freedom::Turns,
         _ => Freedom::Other,
     };
@@ -167,6 +170,18 @@ fn joint(source: Source, node: Node, frames: &Frames) -> Result<Option<Joint>, D
     let at = start_of(node);
     let point = pose * Point3::origin();
     Ok(Some(Joint { name, parent, child: below, freedom, point, axis, at }))
+}
+
+/// True if a joint states that both of its limits are 0.
+fn is_locked(source: Source, joint: Node) -> Result<bool, Diagnostic> {
+    let Some(limit) = child(joint, "axis").and_then(|axis| child(axis, "limit")) else { return Ok(false) };
+    for name in ["lower", "upper"] {
+        match child(limit, name) {
+            Some(node) if source.number_of(node)? == 0.0 => {}
+            _ => return Ok(false),
+        }
+    }
+    Ok(true)
 }
 
 /// The axis of a joint in the model's frame; z of the joint if there is none.
@@ -178,8 +193,9 @@ fn axis(
 ) -> Result<Vector3<f64>, Diagnostic> {
     let Some(axis) = child(joint, "axis") else { return Ok(pose * Vector3::z()) };
     let Some(xyz) = child(axis, "xyz") else { return Ok(pose * Vector3::z()) };
-    let vector = Vector3::from(source.numbers(xyz, "xyz", xyz.text().unwrap_or_default())?);
-    let of_model = text_of(axis, "use_parent_model_frame").is_some_and(|text| matches!(text, "1" | "true"));
+    let vector = Vector3::from(source.numbers(xyz, "xyz", &text_in(xyz))?);
+    let of_model =
+        text_of(axis, "use_parent_model_frame").is_some_and(|text| matches!(text.as_str(), "1" | "true"));
     match xyz.attribute("expressed_in").filter(|name| !name.trim().is_empty()) {
         Some(name) => Ok(frames.of(source, name)? * vector),
         None if of_model => Ok(vector),

@@ -16,6 +16,8 @@ const ROUNDING: f64 = 1e-12;
 pub enum Origin {
     /// The model; with the place in it.
     Model(String),
+    /// A choice that needs no measurement; with its name.
+    Chosen(String),
     /// Not the model: the reference vehicle, or a choice; with the reason.
     Assumed(String),
 }
@@ -75,6 +77,7 @@ impl Text {
     fn source(&self, origin: &Origin) -> String {
         match origin {
             Origin::Model(_) => quoted(&self.file),
+            Origin::Chosen(name) => quoted(name),
             Origin::Assumed(why) => quoted(&format!("not measured: {why}")),
         }
     }
@@ -82,6 +85,7 @@ impl Text {
     fn comment(&mut self, key: &str, origin: &Origin) -> String {
         match origin {
             Origin::Model(place) => format!("from {}: {place}", self.file),
+            Origin::Chosen(name) => format!("chosen: {name}"),
             Origin::Assumed(why) => {
                 self.assumed.push(format!("{}.{key}: {why}", self.table));
                 let advice = if why.starts_with("the Hummingbird") { "measure it" } else { "check it" };

@@ -82,6 +82,7 @@ fn joint(source: Source, node: Node) -> Result<(Joint, Isometry3<f64>), Diagnost
     let (parent, below) = (end("parent")?, end("child")?);
     let freedom = match source.attribute(node, "type")? {
         "fixed" => Freedom::Fixed,
+        "revolute" | "prismatic" if is_locked(source, node)? => Freedom::Fixed,
         "continuous" | "revolute" => Freedom::Turns,
         _ => Freedom::Other,
     };
@@ -92,6 +93,17 @@ fn joint(source: Source, node: Node) -> Result<(Joint, Isometry3<f64>), Diagnost
     let (point, axis) = (Point3::origin(), Vector3::from(axis));
     let joint = Joint { name, parent, child: below, freedom, point, axis, at: start_of(node) };
     Ok((joint, origin(source, node)?))
+}
+
+/// True if a joint states that both of its limits are 0.
+fn is_locked(source: Source, joint: Node) -> Result<bool, Diagnostic> {
+    let Some(limit) = child(joint, "limit") else { return Ok(false) };
+    for name in ["lower", "upper"] {
+        if limit.attribute(name).is_none() || source.number_in(limit, name)? != 0.0 {
+            return Ok(false);
+        }
+    }
+    Ok(true)
 }
 
 /// The pose of `<origin>`; none is the identity.

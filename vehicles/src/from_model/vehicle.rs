@@ -3,15 +3,20 @@
 use diagnostics::Diagnostic;
 
 use super::body::Body;
-use super::model::{Freedom, Model, Motor};
+use super::model::{Model, Motor};
+use super::notes;
 use super::rotors::Rotor;
 use super::text::{Origin, Text, digits, listed, plain, quoted};
+use crate::bounds;
 use crate::vehicle::{MotorModel, Vehicle};
 
 /// By how much the numbers of the rotors may differ, relative to the largest: a vehicle file has one for all.
 const ALIKE: f64 = 1e-3;
 
-/// What a vehicle file is written from.
+/// Standard gravity.
+pub const GRAVITY_M_S2: f64 = 9.80665;
+
+/// Sources of a vehicle file.
 pub struct Parts<'m> {
     /// The model.
     pub model: &'m Model<'m>,
@@ -24,7 +29,7 @@ pub struct Parts<'m> {
 }
 
 impl Parts<'_> {
-    /// The vehicle file, and what there is to say about it.
+    /// The vehicle file, and notes on the model.
     ///
     /// # Errors
     /// If the rotors differ from each other.
@@ -35,7 +40,7 @@ impl Parts<'_> {
         self.write_motor(&mut text)?;
         let speed_max = self.write_command(&mut text, thrust)?;
         self.write_rotors(&mut text);
-        Ok((text, self.notes(thrust, speed_max)))
+        Ok((text, notes::of(self, thrust, speed_max)))
     }
 
     fn write_body(&self, text: &mut Text) {
@@ -49,8 +54,8 @@ impl Parts<'_> {
             let value = digits(tensor[at], scale);
             text.number(&format!("inertia_{name}"), &value, "kg*m^2", &origin);
         }
-        let gravity = digits(self.reference.gravity_m_s2, 1.0);
-        text.number("gravity", &gravity, "m/s^2", &assumed("the Hummingbird's"));
+        let gravity = digits(GRAVITY_M_S2, 1.0);
+        text.number("gravity", &gravity, "m/s^2", &Origin::Chosen("standard gravity".to_owned()));
     }
 
     /// Writes `[rotor]` and returns the thrust coefficient, in N/(rad/s)^2.
@@ -60,8 +65,8 @@ impl Parts<'_> {
         let moment_m = self.common("momentConstant", |motor| motor.moment_m)?;
         let inertia = self.alike("moment of inertia", &self.each(|rotor| rotor.inertia_kg_m2()))?;
         text.table("[rotor]", "rotor");
-        let coefficient = thrust.unwrap_or(reference.thrust_coefficient * masses);
-        let origin = thrust.map_or(assumed("the Hummingbird's, scaled with the mass"), |_| {
+        let coefficient = thrust.unwrap_or(reference.thrust_coefficient * self.weight_ratio());
+        let origin = thrust.map_or(assumed("the Hummingbird's, scaled with the weight"), |_| {
             Origin::Model("motorConstant".to_owned())
         });
         text.number("thrust_coefficient", &digits(coefficient, coefficient), "N/(rad/s)^2", &origin);
@@ -73,12 +78,23 @@ impl Parts<'_> {
             });
         text.number("torque_coefficient", &digits(torque, torque), "N*m/(rad/s)^2", &origin);
         let axial = inertia.unwrap_or(reference.rotor_inertia_kg_m2 * masses * arms * arms);
+        let slowdown = self.slowdown()?;
         let names: Vec<String> = self.rotors.iter().map(|rotor| rotor.link.name.clone()).collect();
         let origin = inertia.map_or(assumed("the Hummingbird's, scaled with mass and arm"), |_| {
-            Origin::Model(listed(&names))
+            Origin::Model(listed(&names) + &slowdown)
         });
         text.number("inertia", &digits(axial, axial), "kg*m^2", &origin);
         Ok(coefficient)
+    }
+
+    /// Words on the factor by which the simulator's joints are slower than the rotors; none if they are not.
+    fn slowdown(&self) -> Result<String, Diagnostic> {
+        let slowdown = self.common("rotorVelocitySlowdownSim", |motor| Some(motor.slowdown))?;
+        Ok(slowdown.filter(|by| *by != 1.0).map_or(String::new(), |by| {
+            format!(
+                ", divided by rotorVelocitySlowdownSim = {by}: the simulator turns the links that much slower"
+            )
+        }))
     }
 
     fn write_motor(&self, text: &mut Text) -> Result<(), Diagnostic> {
@@ -121,12 +137,13 @@ impl Parts<'_> {
                 ([0.0, 1.0], [0.0, max], range, assumed("a motor that can stop"), of_max)
             }
             None => {
-                let hover = (self.mass_ratio() * self.reference.thrust_coefficient / thrust).sqrt();
+                let hover = (self.weight_ratio() * self.reference.thrust_coefficient / thrust).sqrt();
                 let why = "the Hummingbird's, scaled with the speed in hover";
                 let speeds = [map.speed_at_min_rad_s * hover, map.speed_at_max_rad_s * hover];
                 ([map.min, map.max], speeds, assumed("the Hummingbird's"), assumed(why), assumed(why))
             }
         };
+        self.require_speed(speeds[1])?;
         text.number("min", &digits(range[0], 1.0), "1", &of_range);
         text.number("max", &digits(range[1], 1.0), "1", &of_range);
         text.number("speed_at_min", &digits(speeds[0], 1.0), "rad/s", &of_min);
@@ -134,8 +151,19 @@ impl Parts<'_> {
         Ok(speeds[1])
     }
 
+    /// Refuses a thrust with which the rotors have to turn faster than any does.
+    fn require_speed(&self, speed_rad_s: f64) -> Result<(), Diagnostic> {
+        let Err(error) = bounds::ROTOR_SPEED.check("largest speed of the rotors", speed_rad_s) else {
+            return Ok(());
+        };
+        let motor = self.rotors.iter().find_map(|rotor| rotor.motor);
+        let at = motor.map_or(0..0, |motor| motor.at.clone());
+        let help = "it follows from the mass and <motorConstant>, in N/(rad/s)^2: correct them, or add <maxRotVelocity>";
+        Err(self.model.source.fault(at, error).help(help))
+    }
+
     fn write_rotors(&self, text: &mut Text) {
-        for (number, rotor) in self.rotors.iter().enumerate() {
+        for rotor in &self.rotors {
             let (joint, link) = (plain(&rotor.joint.name), plain(&rotor.link.name));
             text.table("[[rotors]]", &format!("rotors {link}"));
             text.line(&format!("name = {}", quoted(&link)), &Origin::Model(format!("joint {joint}")));
@@ -146,36 +174,19 @@ impl Parts<'_> {
             match rotor.motor.and_then(|motor| motor.spin) {
                 Some(spin) => text.spin(spin, &Origin::Model(format!("turningDirection of {joint}"))),
                 None => text.spin(
-                    if number % 2 == 0 { -1.0 } else { 1.0 },
+                    assumed_spin(rotor.rank),
                     &assumed("the Hummingbird's, alternating clockwise from the nose"),
                 ),
             }
         }
     }
 
-    fn notes(&self, thrust: f64, speed_max: f64) -> Vec<String> {
-        let mut notes = Vec::new();
-        let is_rotor = |name: &str| self.rotors.iter().any(|rotor| rotor.joint.name == name);
-        for joint in &self.model.joints {
-            if joint.freedom != Freedom::Fixed && !is_rotor(&joint.name) {
-                let name = plain(&joint.name);
-                notes.push(format!(
-                    "joint {name} can move and is no rotor: its link counts as fixed at the joint's zero"
-                ));
-            }
-        }
-        let weight = self.body.mass_kg * self.reference.gravity_m_s2;
-        let most = 4.0 * thrust * speed_max * speed_max;
-        if most <= weight {
-            notes.push(format!(
-                "the rotors push with at most {most:.3} N, the vehicle weighs {weight:.3} N: it cannot take off"
-            ));
-        }
-        notes
-    }
-
     fn mass_ratio(&self) -> f64 {
         self.body.mass_kg / self.reference.mass_kg
+    }
+
+    fn weight_ratio(&self) -> f64 {
+        self.mass_ratio() * GRAVITY_M_S2 / self.reference.gravity_m_s2
     }
 
     fn arm_ratio(&self) -> f64 {
@@ -199,18 +210,18 @@ impl Parts<'_> {
     }
 
     fn alike(&self, key: &str, each: &[Option<f64>]) -> Result<Option<f64>, Diagnostic> {
-        let first = each.iter().flatten().next().copied();
+        let first = each.first().copied().flatten();
         let is_alike = |value: &Option<f64>| match (value, first) {
             (Some(value), Some(first)) => (value - first).abs() <= ALIKE * value.abs().max(first.abs()),
-            (None, first) => first.is_none(),
-            (Some(_), None) => true,
+            (None, None) => true,
+            _ => false,
         };
         let Some(other) = each.iter().position(|value| !is_alike(value)) else { return Ok(first) };
         let told = |value: Option<f64>| value.map_or("none".to_owned(), |value| value.to_string());
         let names = [&self.rotors[0], &self.rotors[other]].map(|rotor| plain(&rotor.joint.name));
         let message = format!(
             "{key}: expected the same for all rotors, found {} for `{}` and {} for `{}`",
-            told(each[0]),
+            told(first),
             names[0],
             told(each[other]),
             names[1]
@@ -223,6 +234,11 @@ impl Parts<'_> {
             .fault(at, message)
             .help("a vehicle file has one number for all rotors: make them equal"))
     }
+}
+
+/// The Hummingbird's sense of rotation of a rotor by its rank clockwise from the nose: clockwise in front.
+fn assumed_spin(rank: usize) -> f64 {
+    if rank.is_multiple_of(2) { -1.0 } else { 1.0 }
 }
 
 fn assumed(why: &str) -> Origin {

@@ -63,7 +63,7 @@ impl<'a> Source<'a> {
             if let Some(attribute) = node.attributes().find(|attribute| is_expression(attribute.value())) {
                 return Err(self.xacro(attribute.range().start));
             }
-            if node.text().is_some_and(is_expression) {
+            if is_expression(&text_in(node)) {
                 return Err(self.xacro(node.range().start));
             }
         }
@@ -134,7 +134,7 @@ impl<'a> Source<'a> {
     /// # Errors
     /// If it is not a finite number.
     pub fn number_of(self, node: Node) -> Result<f64, Diagnostic> {
-        let [number] = self.numbers(node, node.tag_name().name(), node.text().unwrap_or_default())?;
+        let [number] = self.numbers(node, node.tag_name().name(), &text_in(node))?;
         Ok(number)
     }
 }
@@ -160,8 +160,19 @@ pub fn children<'d, 'i>(node: Node<'d, 'i>, name: &str) -> impl Iterator<Item = 
 }
 
 /// The text of the first child element with a name, without blanks around it.
-pub fn text_of<'d>(node: Node<'d, '_>, name: &str) -> Option<&'d str> {
-    child(node, name)?.text().map(str::trim).filter(|text| !text.is_empty())
+pub fn text_of(node: Node, name: &str) -> Option<String> {
+    let text = text_in(child(node, name)?);
+    Some(text.trim().to_owned()).filter(|text| !text.is_empty())
+}
+
+/// The whole text of an element. Comments do not divide words; elements within do.
+pub fn text_in(node: Node) -> String {
+    let part = |child: Node<'_, '_>| match child.is_text() {
+        true => child.text().unwrap_or_default().to_owned(),
+        false if child.is_element() => " ".to_owned(),
+        false => String::new(),
+    };
+    node.children().map(part).collect()
 }
 
 /// Bytes of the begin of an element: its name, and its angle bracket.

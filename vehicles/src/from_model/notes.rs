@@ -1,0 +1,67 @@
+//! Properties of a model that its vehicle file does not show, or that are unlikely.
+
+use super::model::{Freedom, Motor};
+use super::rotors::Rotor;
+use super::text::{digits, plain};
+use super::vehicle::{GRAVITY_M_S2, Parts};
+
+/// Notes on a model whose rotors have the coefficient `thrust` in N/(rad/s)^2 and turn at most at `speed_max` in rad/s.
+pub fn of(parts: &Parts, thrust: f64, speed_max: f64) -> Vec<String> {
+    let mut notes = movable(parts);
+    notes.extend(lags(&parts.rotors));
+    notes.extend(directions(&parts.rotors));
+    let weight = parts.body.mass_kg * GRAVITY_M_S2;
+    let most = 4.0 * thrust * speed_max * speed_max;
+    if most <= weight {
+        notes.push(format!(
+            "the rotors push with at most {most:.3} N, the vehicle weighs {weight:.3} N: it cannot take off"
+        ));
+    }
+    notes
+}
+
+/// Joints that move and carry no rotor.
+fn movable(parts: &Parts) -> Vec<String> {
+    let is_rotor = |name: &str| parts.rotors.iter().any(|rotor| rotor.joint.name == name);
+    let joints = parts.model.joints.iter();
+    let others = joints.filter(|joint| joint.freedom != Freedom::Fixed && !is_rotor(&joint.name));
+    others
+        .map(|joint| {
+            let name = plain(&joint.name);
+            format!(
+                "joint {name} is movable but not a rotor; its link is treated as fixed at the joint's zero"
+            )
+        })
+        .collect()
+}
+
+/// Motors that become faster at another rate than slower: a vehicle file has one lag.
+fn lags(rotors: &[Rotor]) -> Option<String> {
+    let two = |motor: &Motor| Some((motor.lag_up_s?, motor.lag_down_s?));
+    let (up, down) = rotors.iter().filter_map(|rotor| two(rotor.motor?)).find(|(up, down)| up != down)?;
+    let [up, down] = [up, down].map(|lag| digits(lag, lag));
+    Some(format!(
+        "timeConstantUp is {up} s and timeConstantDown {down} s; the vehicle file has one time constant: {up} s"
+    ))
+}
+
+/// Directions with which thrusts cannot turn the vehicle about z, or not without tilting it.
+fn directions(rotors: &[Rotor]) -> Option<String> {
+    let mut ranked: Vec<(usize, f64)> =
+        rotors.iter().filter_map(|rotor| Some((rotor.rank, rotor.motor?.spin?))).collect();
+    ranked.sort_by_key(|(rank, _)| *rank);
+    let [first, second, third, fourth] = ranked[..] else { return None };
+    let sum = first.1 + second.1 + third.1 + fourth.1;
+    if sum != 0.0 {
+        let count = ranked.iter().filter(|(_, spin)| *spin > 0.0).count();
+        return Some(format!(
+            "counter-clockwise rotors: {count}, clockwise rotors: {}; their drag turns the vehicle about z in hover",
+            ranked.len() - count
+        ));
+    }
+    (first.1 != third.1).then(|| {
+        "rotors that are opposite to each other turn in different directions: the vehicle cannot turn about z without \
+         tilting"
+            .to_owned()
+    })
+}
