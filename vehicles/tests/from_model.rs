@@ -215,6 +215,12 @@ fn what_is_wrong_with_a_model_is_told_with_its_line() {
         ":60:3",
         &["distance from the centre of mass of rotor rotor_front", "100.0 m"],
     );
+    sdf(
+        "type=\"revolute\"",
+        "type=\"prismatic\"",
+        ":30:7",
+        &["rotor_0_joint", "revolute, continuous or fixed"],
+    );
     sdf(">0.016<", ">1e9<", ":79:9", &["momentConstant", "10.0 m"]);
     sdf(">800.0<", ">1e9<", ":77:9", &["maxRotVelocity", "rad/s"]);
     sdf(">0.0125<", ">1e9<", ":75:9", &["timeConstantUp", "100.0 s"]);
@@ -280,7 +286,13 @@ fn a_link_that_the_simulator_turns_slower_than_the_rotor_has_as_much_more_inerti
         let told = format!("divided by rotorVelocitySlowdownSim = {by}: ");
         assert_eq!(made.text.contains(&told), by != "1", "{}", made.text);
     }
-    assert_eq!(with("10"), of(SDF, "cross.sdf"));
+    let (stated, default) = (with("10"), of(SDF, "cross.sdf"));
+    assert_eq!(default.vehicle.rotor_inertia_kg_m2, stated.vehicle.rotor_inertia_kg_m2);
+    assert!(
+        default.text.contains("rotorVelocitySlowdownSim = 10 (the plugins' default): "),
+        "{}",
+        default.text
+    );
 }
 
 #[test]
