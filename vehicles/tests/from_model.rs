@@ -221,6 +221,11 @@ fn what_is_wrong_with_a_model_is_told_with_its_line() {
         ":30:7",
         &["rotor_0_joint", "revolute, continuous or fixed"],
     );
+    let heavy =
+        URDF.replace("<mass value=\"0.6\"/>", "<mass value=\"9e5\"/>").replace("\"0.2\"/>", "\"8e5\"/>");
+    refused(&heavy, "quad.urdf", ":5:5", &["mass of all links", "1700000.04 kg"]);
+    let weak = without("maxRotVelocity").replace("8.5e-06", "1e-13");
+    refused(&weak, "quad.sdf", ":81:7", &["largest speed of the rotors", "<motorConstant>"]);
     sdf(">0.016<", ">1e9<", ":79:9", &["momentConstant", "10.0 m"]);
     sdf(">800.0<", ">1e9<", ":77:9", &["maxRotVelocity", "rad/s"]);
     sdf(">0.0125<", ">1e9<", ":75:9", &["timeConstantUp", "100.0 s"]);
