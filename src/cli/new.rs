@@ -60,7 +60,7 @@ pub fn new(arguments: &NewArguments) -> Result<bool> {
 fn require_free(out: &Path) -> Result<()> {
     if out.symlink_metadata().is_ok() {
         bail!(
-            "{}: it exists, and `new` replaces no file; name another file, or remove this one",
+            "{} already exists; `new` does not replace files: name another file, or remove this one",
             out.display()
         );
     }
@@ -70,7 +70,8 @@ fn require_free(out: &Path) -> Result<()> {
 fn summary(made: &Converted, file: &str, out: &Path) -> String {
     let vehicle = &made.vehicle;
     let rotors: Vec<_> = vehicle.rotors.iter().map(|rotor| rotor.name.as_str()).collect();
-    let place = if out.is_absolute() { "" } else { "$PWD/" };
+    // A path that holds in the manifests of all folders.
+    let whole = std::path::absolute(out).unwrap_or_else(|_| out.to_owned()).display().to_string();
     let out = out.display();
     let mut text = format!(
         "{out}: made from {file}: {:.4} kg, rotors {} (in the order of the commands)\n",
@@ -82,6 +83,7 @@ fn summary(made: &Converted, file: &str, out: &Path) -> String {
         made.assumed.iter().for_each(|line| text += &format!("  {line}\n"));
     }
     text + &format!(
-        "check it in a manifest: hummingbus check manifests/hover.toml --set process.plant.vehicle=\"{place}{out}\""
+        "fly it with this line in the manifest, under [process.plant] and under controllers: vehicle = {}",
+        toml::Value::from(whole)
     )
 }

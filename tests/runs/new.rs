@@ -1,9 +1,10 @@
 //! `hummingbus new vehicle`: a vehicle file from a model, which flies; files are not replaced.
 
-use crate::support::{Place, repository};
+use crate::support::{HUMMINGBUS, Place, repository};
 use recorder::reader::Recording;
 use std::fs;
 use std::path::Path;
+use std::process::Command;
 use vehicles::Vehicle;
 
 const MODELS: [(&str, &str); 2] =
@@ -43,8 +44,12 @@ fn a_model_becomes_a_vehicle_file_that_hovers() {
         let place = Place::new();
         let out = place.path("quad.toml");
         let made = place.call(&["new", "vehicle", "--from", &repository(model), "-o", &out]).with_code(0);
-        assert!(made.output.contains(mass) && made.output.contains("body.gravity"), "{}", made.output);
-        let manifest = place.write("hover.toml", hover(&out));
+        assert!(made.output.contains(mass) && made.output.contains("command.min"), "{}", made.output);
+        assert!(!made.output.contains("body.gravity"), "a choice needs no measurement: {}", made.output);
+        let line = format!("vehicle = {}", toml::Value::from(out.as_str()));
+        let flown = hover(&out);
+        assert!(made.output.contains(&line) && flown.contains(&line), "{}", made.output);
+        let manifest = place.write("hover.toml", flown);
         place.call(&["check", &manifest]).with_code(0);
         place.call(&["run", &manifest]).with_code(0);
         let read = Recording::open(Path::new(&place.path("hover.mcap"))).unwrap();
@@ -56,6 +61,20 @@ fn a_model_becomes_a_vehicle_file_that_hovers() {
         assert!((last[0] - 1.0).abs() < 0.05, "{model}: height {} m", last[0]);
         assert!(last[1].abs() < 0.02 && last[2].abs() < 0.02, "{model}: attitude {last:?}");
     }
+}
+
+#[test]
+fn the_line_for_manifests_holds_in_every_folder() {
+    let place = Place::new();
+    let out = place.path("quad.toml");
+    let folder = Path::new(&out).parent().unwrap().canonicalize().unwrap();
+    let mut command = Command::new(HUMMINGBUS);
+    let model = repository(MODELS[0].0);
+    command.current_dir(&folder).args(["new", "vehicle", "--from", &model, "-o", "quad.toml"]);
+    let made = place.launch(command).end().with_code(0);
+    let line =
+        format!("vehicle = {}", toml::Value::from(folder.join("quad.toml").to_string_lossy().as_ref()));
+    assert!(made.output.contains(&line), "{}", made.output);
 }
 
 #[test]
@@ -71,9 +90,9 @@ fn a_file_that_exists_stays_and_what_is_wrong_leaves_no_file() {
     new(&model, &out).with_code(0);
     let edited = format!("{}# mine\n", fs::read_to_string(&out).unwrap());
     fs::write(&out, &edited).unwrap();
-    new(&model, &out).with_code(2).says(&["quad.toml", "it exists", "replaces no file"]);
+    new(&model, &out).with_code(2).says(&["quad.toml already exists", "does not replace files"]);
     assert_eq!(fs::read_to_string(&out).unwrap(), edited);
-    new(&model, &model).with_code(2).says(&["plus.urdf", "it exists"]);
+    new(&model, &model).with_code(2).says(&["plus.urdf already exists"]);
     // A model in the place of a vehicle file: the message has the way.
     place.call(&["urdf", &model]).with_code(2).says(&["URDF", "hummingbus new vehicle --from"]);
 }

@@ -215,6 +215,17 @@ fn what_is_wrong_with_a_model_is_told_with_its_line() {
         ":60:3",
         &["distance from the centre of mass of rotor rotor_front", "100.0 m"],
     );
+    sdf(
+        "type=\"revolute\"",
+        "type=\"prismatic\"",
+        ":30:7",
+        &["rotor_0_joint", "revolute, continuous or fixed"],
+    );
+    let heavy =
+        URDF.replace("<mass value=\"0.6\"/>", "<mass value=\"9e5\"/>").replace("\"0.2\"/>", "\"8e5\"/>");
+    refused(&heavy, "quad.urdf", ":5:5", &["mass of all links", "1700000.04 kg"]);
+    let weak = without("maxRotVelocity").replace("8.5e-06", "1e-13");
+    refused(&weak, "quad.sdf", ":81:7", &["largest speed of the rotors", "<motorConstant>"]);
     sdf(">0.016<", ">1e9<", ":79:9", &["momentConstant", "10.0 m"]);
     sdf(">800.0<", ">1e9<", ":77:9", &["maxRotVelocity", "rad/s"]);
     sdf(">0.0125<", ">1e9<", ":75:9", &["timeConstantUp", "100.0 s"]);
@@ -280,7 +291,13 @@ fn a_link_that_the_simulator_turns_slower_than_the_rotor_has_as_much_more_inerti
         let told = format!("divided by rotorVelocitySlowdownSim = {by}: ");
         assert_eq!(made.text.contains(&told), by != "1", "{}", made.text);
     }
-    assert_eq!(with("10"), of(SDF, "cross.sdf"));
+    let (stated, default) = (with("10"), of(SDF, "cross.sdf"));
+    assert_eq!(default.vehicle.rotor_inertia_kg_m2, stated.vehicle.rotor_inertia_kg_m2);
+    assert!(
+        default.text.contains("rotorVelocitySlowdownSim = 10 (the plugins' default): "),
+        "{}",
+        default.text
+    );
 }
 
 #[test]
@@ -379,6 +396,31 @@ const PARTS: [&str; 16] = [
     "cw",
 ];
 
+/// Bounds that the physics sets, and those of all vehicles.
+fn require_physical(vehicle: &Vehicle) -> Result<(), TestCaseError> {
+    let within = |what: &str, value: f64, min: f64, max: f64| {
+        prop_assert!((min..=max).contains(&value), "{what}: {value}");
+        Ok(())
+    };
+    within("mass", vehicle.mass_kg, 1e-6, 1e6)?;
+    let moments = vehicle.inertia_kg_m2.symmetric_eigenvalues();
+    within("least moment", moments.min(), f64::MIN_POSITIVE, 1e9)?;
+    within("triangle", 2.0 * moments.max(), 0.0, moments.sum() * (1.0 + 1e-3))?;
+    within("thrust", vehicle.thrust_coefficient, f64::MIN_POSITIVE, 1e5)?;
+    within("torque", vehicle.torque_coefficient, f64::MIN_POSITIVE, 1e6)?;
+    within("inertia of a rotor", vehicle.rotor_inertia_kg_m2, f64::MIN_POSITIVE, 1e7)?;
+    within("largest speed", vehicle.command.speed_at_max_rad_s, vehicle.command.speed_at_min_rad_s, 1e5)?;
+    within("gravity", vehicle.gravity_m_s2, 9.8, 9.81)?;
+    for rotor in &vehicle.rotors {
+        within("spin", rotor.spin.abs(), 1.0, 1.0)?;
+        within("hub", rotor.position_m.amax(), 0.0, 100.0)?;
+    }
+    match vehicle.motor {
+        MotorModel::FirstOrder { time_constant_s } => within("lag", time_constant_s, 1e-6, 100.0),
+        MotorModel::SecondOrder { damping_ratio, .. } => within("damping", damping_ratio, 0.1, 1.0),
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
 
@@ -395,13 +437,38 @@ proptest! {
         let index = pick.index(borders.len() - 1);
         let text = format!("{}{part}{}", &model[..=borders[index]], &model[borders[index + 1]..]);
         match convert(&text, "any.model") {
-            Err(error) => prop_assert!(error.to_string().contains("any.model"), "{error}"),
+            Err(error) => {
+                let told = error.to_string();
+                prop_assert!(told.starts_with("any.model"), "{told}");
+                prop_assert!(!told.contains("of the vehicle file: "), "a number without a place: {told}");
+            }
             Ok(made) => {
                 let read = Vehicle::parse(&made.text, "made.toml");
                 let read = read.map_err(|error| TestCaseError::fail(format!("{error}\n{}", made.text)))?;
-                prop_assert_eq!(read.rotors, made.vehicle.rotors);
+                prop_assert_eq!(&read.rotors, &made.vehicle.rotors);
+                require_physical(&read)?;
+                if text == model {
+                    prop_assert_eq!(made, of(model, "any.model"));
+                }
             }
         }
+    }
+
+    /// Comments change nothing, wherever they stand.
+    #[test]
+    fn a_model_that_says_the_same_gives_the_same_numbers(
+        is_urdf in any::<bool>(),
+        picks in prop::collection::vec(any::<prop::sample::Index>(), 1..20),
+    ) {
+        let model = if is_urdf { URDF } else { SDF };
+        let ends: Vec<usize> = model.match_indices('>').map(|(at, _)| at + 1).collect();
+        let mut places: Vec<usize> = picks.iter().map(|pick| ends[pick.index(ends.len())]).collect();
+        places.sort_unstable();
+        let mut text = model.to_owned();
+        for place in places.into_iter().rev() {
+            text.insert_str(place, "<!-- 1 2 rotor -->");
+        }
+        prop_assert_eq!(of(&text, "any.model"), of(model, "any.model"));
     }
 }
 
@@ -412,6 +479,11 @@ fn names_of_a_model_end_neither_a_comment_nor_a_text() {
         .replace("rotor_front_joint", "rotor&#10;[command]&#10;")
         .replace("rotor_front", "rotor&#10;'''&quot;");
     let made = of(&hostile, "plus.urdf");
+    for (model, name) in [(URDF, "plus"), (SDF, "cross")] {
+        let named = format!("name=\"{name}\"");
+        assert_eq!(of(&model.replace(&named, "name=\" \""), "a.model").vehicle.name, "vehicle");
+        assert_eq!(of(&model.replace(&named, ""), "a.model").vehicle.name, "vehicle");
+    }
     assert_eq!(made.vehicle.name, "a\\nmass = 1\"'");
     assert!(made.vehicle.rotors[0].name.starts_with("rotor\\n'''"), "{:?}", made.vehicle.rotors[0].name);
     assert_eq!(made.text.lines().count(), of(URDF, "plus.urdf").text.lines().count());

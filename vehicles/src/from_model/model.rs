@@ -91,11 +91,21 @@ pub struct Motor {
     /// Lag of a rotor that becomes slower.
     pub lag_down_s: Option<f64>,
     /// Ratio of the speed of the rotor to that of its joint in the simulator.
-    pub slowdown: f64,
+    pub slowdown: Option<f64>,
     /// Index of its command.
     pub number: Option<f64>,
     /// Place in the file.
     pub at: Range<usize>,
+}
+
+/// Ratio of the speed of a rotor to that of its joint that the plugins take if the model has none.
+pub const SLOWDOWN_DEFAULT: f64 = 10.0;
+
+impl Motor {
+    /// Ratio of the speed of the rotor to that of its joint in the simulator.
+    pub fn slowdown(&self) -> f64 {
+        self.slowdown.unwrap_or(SLOWDOWN_DEFAULT)
+    }
 }
 
 /// The pose of a place, and of angles about the fixed axes x, y, z, in this order (rad).

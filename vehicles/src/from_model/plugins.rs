@@ -22,8 +22,6 @@ const SLOWDOWN: Bounds = Bounds {
     unit: "",
     why: "joints turn slower than rotors so that the simulator can follow",
 };
-/// Ratio that the plugins take if the model has none.
-const SLOWDOWN_DEFAULT: f64 = 10.0;
 
 /// Reads all plugins of motors within `top`.
 ///
@@ -57,7 +55,7 @@ fn motor(source: Source, node: Node) -> Result<Motor, Diagnostic> {
         speed_max_rad_s: bounded("maxRotVelocity", &SPEED_MAX)?,
         lag_up_s: bounded("timeConstantUp", &bounds::TIME_CONSTANT)?,
         lag_down_s: bounded("timeConstantDown", &bounds::TIME_CONSTANT)?,
-        slowdown: bounded("rotorVelocitySlowdownSim", &SLOWDOWN)?.unwrap_or(SLOWDOWN_DEFAULT),
+        slowdown: bounded("rotorVelocitySlowdownSim", &SLOWDOWN)?,
         number: number_of_command.or(index(source, node, "actuator_number")?),
         at: start_of(node),
     })

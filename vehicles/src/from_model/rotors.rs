@@ -37,7 +37,7 @@ impl Rotor<'_> {
         let inertial = self.link.inertial.as_ref().filter(|inertial| inertial.mass_kg > 0.0)?;
         let stated = Some(self.joint.axis).filter(|_| self.joint.freedom != Freedom::Fixed);
         let axis = stated.and_then(|axis| axis.try_normalize(0.0)).unwrap_or_else(Vector3::z);
-        Some(axis.dot(&(turned(self.link, inertial) * axis)) / self.motor.map_or(1.0, |motor| motor.slowdown))
+        Some(axis.dot(&(turned(self.link, inertial) * axis)) / self.motor.map_or(1.0, Motor::slowdown))
     }
 }
 
@@ -52,8 +52,10 @@ pub fn find<'m>(model: &'m Model, centre: &Point3<f64>) -> Result<Vec<Rotor<'m>>
     let mut rotors = Vec::new();
     for (joint, motor) in joints {
         let Some(link) = model.links.iter().find(|link| link.name == joint.child) else { continue };
-        if joint.freedom != Freedom::Fixed {
-            require_upright(model, joint)?;
+        match joint.freedom {
+            Freedom::Fixed => {}
+            Freedom::Turns => require_upright(model, joint)?,
+            Freedom::Other => return Err(cannot_turn(model, joint)),
         }
         if motor.is_some() {
             require_upward(model, joint, link)?;
@@ -135,6 +137,17 @@ fn require_four(model: &Model, joints: &[(&Joint, Option<&Motor>)]) -> Result<()
         return Err(error.help("only vehicles with four rotors are flown at present"));
     }
     Ok(())
+}
+
+/// The error for a rotor on a joint that moves without turning.
+fn cannot_turn(model: &Model, joint: &Joint) -> Diagnostic {
+    let name = plain(&joint.name);
+    let message =
+        format!("rotor `{name}`: expected a revolute, continuous or fixed joint, found another type");
+    model
+        .source
+        .fault(joint.at.clone(), message)
+        .help("correct the joint's type, or the joint that the plugin names")
 }
 
 fn require_upright(model: &Model, joint: &Joint) -> Result<(), Diagnostic> {

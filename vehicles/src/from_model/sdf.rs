@@ -9,7 +9,7 @@ use std::ops::Range;
 use super::model::{Freedom, Inertial, Joint, Link, Model, pose, tensor};
 use super::plugins;
 use super::tree;
-use super::xml::{Source, child, children, start_of, text_in, text_of};
+use super::xml::{Source, child, children, name_of, start_of, text_in, text_of};
 
 /// Name of the model's own frame.
 const MODEL: &str = "__model__";
@@ -37,7 +37,7 @@ pub fn read<'a>(source: Source<'a>, sdf: Node) -> Result<Model<'a>, Diagnostic> 
     let joints = children(model, "joint").map(|node| joint(source, node, &frames));
     let joints: Vec<Joint> = joints.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
     tree::order(source, &links, &joints)?;
-    let name = model.attribute("name").unwrap_or("vehicle").to_owned();
+    let name = name_of(model);
     Ok(Model { source, name, links, joints, motors: plugins::read(source, model)? })
 }
 

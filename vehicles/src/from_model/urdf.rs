@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use super::model::{Freedom, Inertial, Joint, Link, Model, pose, tensor};
 use super::plugins;
 use super::tree;
-use super::xml::{Source, child, children, start_of};
+use super::xml::{Source, child, children, name_of, start_of};
 
 /// Reads the element `<robot>`. The model's frame is that of its root link.
 ///
@@ -19,7 +19,7 @@ pub fn read<'a>(source: Source<'a>, robot: Node) -> Result<Model<'a>, Diagnostic
     let read = children(robot, "joint").map(|node| joint(source, node)).collect::<Result<Vec<_>, _>>()?;
     let (mut joints, origins): (Vec<_>, Vec<_>) = read.into_iter().unzip();
     place(source, &mut links, &mut joints, &origins)?;
-    let name = robot.attribute("name").unwrap_or("vehicle").to_owned();
+    let name = name_of(robot);
     Ok(Model { source, name, links, joints, motors: plugins::read(source, robot)? })
 }
 

@@ -89,10 +89,13 @@ impl Parts<'_> {
 
     /// Words on the factor by which the simulator's joints are slower than the rotors; none if they are not.
     fn slowdown(&self) -> Result<String, Diagnostic> {
-        let slowdown = self.common("rotorVelocitySlowdownSim", |motor| Some(motor.slowdown))?;
+        let slowdown = self.common("rotorVelocitySlowdownSim", |motor| Some(motor.slowdown()))?;
+        let is_stated =
+            self.rotors.iter().any(|rotor| rotor.motor.is_some_and(|motor| motor.slowdown.is_some()));
+        let default = if is_stated { "" } else { " (the plugins' default)" };
         Ok(slowdown.filter(|by| *by != 1.0).map_or(String::new(), |by| {
             format!(
-                ", divided by rotorVelocitySlowdownSim = {by}: the simulator turns the links that much slower"
+                ", divided by rotorVelocitySlowdownSim = {by}{default}: the simulator turns the links that much slower"
             )
         }))
     }

@@ -149,6 +149,12 @@ fn is_expression(text: &str) -> bool {
     text.contains("${") || text.contains("$(")
 }
 
+/// Name of a model; `vehicle` if it has none.
+pub fn name_of(model: Node) -> String {
+    let name = model.attribute("name").filter(|name| !name.trim().is_empty());
+    name.unwrap_or("vehicle").to_owned()
+}
+
 /// First child element with a name.
 pub fn child<'d, 'i>(node: Node<'d, 'i>, name: &str) -> Option<Node<'d, 'i>> {
     children(node, name).next()
