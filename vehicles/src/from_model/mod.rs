@@ -10,12 +10,14 @@
 //! | `body` | mass, centre of mass and inertia of all links |
 //! | `rotors` | the rotors among the joints |
 //! | `vehicle` | the numbers of the vehicle file |
+//! | `parts` | the parts that a vehicle file is written from |
 //! | `notes` | notes on the model |
 //! | `text` | its text |
 
 mod body;
 mod model;
 mod notes;
+mod parts;
 mod plugins;
 mod rotors;
 mod sdf;
@@ -70,7 +72,7 @@ pub fn convert(text: &str, file: &str) -> Result<Converted, Diagnostic> {
     let rotors = rotors::find(&model, &body.centre)?;
     let reference = Vehicle::parse(HUMMINGBIRD, "hummingbird.toml")?;
     let name = Path::new(file).file_name().map_or(file.into(), |name| name.to_string_lossy());
-    let (written, notes) = vehicle::Parts { model: &model, body, rotors, reference }.write(&name)?;
+    let (written, notes) = parts::Parts { model: &model, body, rotors, reference }.write(&name)?;
     let vehicle = Vehicle::parse(&written.text, file).map_err(|error| unlikely(source, &error))?;
     Ok(Converted { text: written.text, assumed: written.assumed, notes, vehicle })
 }

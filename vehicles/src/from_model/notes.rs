@@ -1,9 +1,9 @@
 //! Properties of a model that its vehicle file does not show, or that are unlikely.
 
 use super::model::{Freedom, Motor};
+use super::parts::{GRAVITY_M_S2, Parts};
 use super::rotors::Rotor;
 use super::text::{digits, plain};
-use super::vehicle::{GRAVITY_M_S2, Parts};
 
 /// Notes on a model whose rotors have the coefficient `thrust` in N/(rad/s)^2 and turn at most at `speed_max` in rad/s.
 pub fn of(parts: &Parts, thrust: f64, speed_max: f64) -> Vec<String> {

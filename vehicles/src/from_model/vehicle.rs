@@ -2,31 +2,16 @@
 
 use diagnostics::Diagnostic;
 
-use super::body::Body;
-use super::model::{Model, Motor};
+use super::model::Motor;
 use super::notes;
+use super::parts::{GRAVITY_M_S2, Parts};
 use super::rotors::Rotor;
 use super::text::{Origin, Text, digits, listed, plain, quoted};
 use crate::bounds;
-use crate::vehicle::{MotorModel, Vehicle};
+use crate::vehicle::MotorModel;
 
 /// By how much the numbers of the rotors may differ, relative to the largest: a vehicle file has one for all.
 const ALIKE: f64 = 1e-3;
-
-/// Standard gravity.
-pub const GRAVITY_M_S2: f64 = 9.80665;
-
-/// Sources of a vehicle file.
-pub struct Parts<'m> {
-    /// The model.
-    pub model: &'m Model<'m>,
-    /// All links as one body.
-    pub body: Body,
-    /// The rotors, in the order of the commands.
-    pub rotors: Vec<Rotor<'m>>,
-    /// The Hummingbird.
-    pub reference: Vehicle,
-}
 
 impl Parts<'_> {
     /// The vehicle file, and notes on the model.
