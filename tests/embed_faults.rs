@@ -78,7 +78,7 @@ impl Component for Source {
     }
 }
 
-/// Has a state of another type than its predecessor, and goes on from what that sent last.
+/// Component whose state is of another type than its predecessor's: it goes on from what that sent last.
 struct Heir;
 
 impl Component for Heir {

@@ -87,7 +87,7 @@ pub trait Backend: Send {
     }
 }
 
-/// What is done with a part of a state: see [`Backend::parts_mut`].
+/// Function that changes a part of a state: see [`Backend::parts_mut`].
 pub type NotePart<'a> = dyn FnMut(&'static str, &mut dyn Saved) -> Result<(), SnapshotError> + 'a;
 
 /// The most vehicles that share a room, this one included.

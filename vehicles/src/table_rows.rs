@@ -26,7 +26,7 @@ pub struct Row<'a> {
     /// The line, from 1.
     pub line: u64,
     text: &'a str,
-    /// Where the first cell begins in the text.
+    /// Start of the first cell in the text.
     from: usize,
     /// The end of each cell in the text.
     ends: &'a [usize],
