@@ -573,20 +573,25 @@ mod tests {
         allocations(check, node)
     }
 
-    /// As the launcher does: iceoryx2 leaves a file of its own until the last process is gone.
-    fn remove_shared_memory(run_id: &str) {
-        let prefix = crate::names::shm_prefix(run_id);
-        for entry in std::fs::read_dir("/dev/shm").unwrap().flatten() {
-            if entry.file_name().to_string_lossy().starts_with(&prefix) {
-                std::fs::remove_file(entry.path()).unwrap();
-            }
+    /// Shared memory of a run, removed with this as the launcher does: iceoryx2 leaves a file of its own until the last
+    /// process is gone.
+    struct SharedMemory<'p>(&'p Plan);
+
+    impl Drop for SharedMemory<'_> {
+        fn drop(&mut self) {
+            let prefix = crate::names::shm_prefix(&self.0.run_id);
+            let files = std::fs::read_dir("/dev/shm").into_iter().flatten().flatten();
+            let ours = files.filter(|file| file.file_name().to_string_lossy().starts_with(&prefix));
+            ours.for_each(|file| drop(std::fs::remove_file(file.path())));
         }
     }
 
     #[test]
     fn a_port_that_is_declared_twice_is_refused_with_both_types_and_never_takes_the_last() {
         let folder = tempfile::tempdir().unwrap();
-        source_and_sink().store(folder.path()).unwrap();
+        let plan = source_and_sink();
+        let _shared_memory = SharedMemory(&plan);
+        plan.store(folder.path()).unwrap();
         let open = |name| Node::open(first(folder.path(), name)).unwrap();
 
         let mut source = open("source");
@@ -618,6 +623,7 @@ mod tests {
     fn a_tick_allocates_nothing_but_what_iceoryx2_allocates_for_a_loan() {
         let folder = tempfile::tempdir().unwrap();
         let plan = source_and_sink();
+        let _shared_memory = SharedMemory(&plan);
         plan.store(folder.path()).unwrap();
         let _segment = SupervisorView::create(&plan).unwrap();
         let clock = ClockView::open(&plan).unwrap();
@@ -627,7 +633,6 @@ mod tests {
             crate::clock::serve(&plan, &clock, None).unwrap();
             (source.join().unwrap().unwrap(), sink.join().unwrap().unwrap())
         });
-        remove_shared_memory(&plan.run_id);
         assert_eq!(sink, 0, "allocations of a sink in its ticks");
         assert_eq!(source, u64::from(LAST_TICK - WARM_UP_TICKS), "iceoryx2 0.10 allocates once a loan");
     }
