@@ -292,7 +292,7 @@ impl InPort {
         [header.received_ns, header.done_ns, header.sent_ns]
     }
 
-    /// That sample as CDR bytes with its sequence number, if it was sent at `tick`.
+    /// The same sample as CDR bytes with its sequence number, if it was sent at `tick`.
     pub(crate) fn fresh<'a>(&'a self, tick: u32, locals: &'a Locals) -> Option<(&'a [u8], u64)> {
         self.cdr(self.sample(locals), tick)
     }

@@ -267,7 +267,7 @@ pub struct SharedBody {
     body: Running,
     log: PathBuf,
     is_log_of_run: bool,
-    /// How it ended.
+    /// Its end.
     end: Option<End>,
 }
 

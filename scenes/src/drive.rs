@@ -52,7 +52,7 @@ pub struct Target {
 
 impl Drive {
     /// The target at `time_s` after the start: linear between two points, constant before the first and after the last.
-    /// Of two points at one time, the second counts from then on.
+    /// The second of two points at one time counts from then on.
     #[must_use]
     pub fn target(&self, time_s: f64) -> Target {
         self.target_of_step(time_s, time_s)

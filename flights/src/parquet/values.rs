@@ -32,7 +32,7 @@ pub fn read(bytes: &[u8], metadata: &ParquetMetaData, index: usize) -> Result<Ve
     Ok(numbers)
 }
 
-/// What is needed to read numbers of a column.
+/// Everything that reading the numbers of a column takes.
 struct Column {
     physical: Type,
     is_unsigned: bool,

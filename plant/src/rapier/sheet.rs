@@ -15,7 +15,7 @@ use rapier3d_f64::parry::query::{
 use rapier3d_f64::parry::shape::TrianglePseudoNormals;
 use std::collections::BTreeMap;
 
-/// Where two colliders are near each other, without what a solver of rapier's would keep there.
+/// Places at which two colliders are near each other, without the data of a solver of rapier.
 pub(super) type Manifold = ContactManifold<(), ()>;
 
 /// Distance beside the middle of an edge at which another triangle is looked for, over the edge's length. Tuned, no source.

@@ -48,7 +48,7 @@ pub(super) struct World {
 struct Still {
     collider: Collider,
     around: Aabb,
-    /// Of a mesh that has some.
+    /// Borders of a mesh that has some.
     borders: Option<Borders>,
 }
 
