@@ -2,7 +2,7 @@
 
 use crate::error::BusError;
 use crate::json_file;
-use crate::schema::Schema;
+use crate::schema::{Extent, Schema};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -21,6 +21,9 @@ pub struct Announcement {
     pub definition: String,
     /// Where a message holds its stamp, if it has one.
     pub stamp_offset: Option<usize>,
+    /// The part of a message's bytes that counts; absent where it is all of them.
+    #[serde(default)]
+    pub extent: Option<Extent>,
 }
 
 impl Announcement {
@@ -34,7 +37,14 @@ impl Announcement {
             layout: schema.layout(),
             definition: schema.ros2_definition(),
             stamp_offset: schema.stamp_offset(),
+            extent: schema.extent(),
         }
+    }
+
+    /// The part of `message`, the bytes of a message without its header, that counts.
+    #[must_use]
+    pub fn used<'a>(&self, message: &'a [u8]) -> &'a [u8] {
+        self.extent.map_or(message, |extent| extent.of(message))
     }
 
     /// Writes the announcement to `path`.

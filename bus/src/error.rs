@@ -253,6 +253,28 @@ pub enum BusError {
         /// Simulation time in seconds.
         time_s: f64,
     },
+    /// A node wrote a sequence whose count does not fit its values.
+    #[error(
+        "node `{node}` failed at tick {tick} (t = {time_s:.3} s): its output {output} says that {field} has {found} \
+         values, expected at most {most}, and zeros behind them; the sample was not sent. Make the values with \
+         `bus::Bounded`, which keeps both"
+    )]
+    Count {
+        /// The node.
+        node: String,
+        /// Its output, and the topic.
+        output: String,
+        /// The field.
+        field: String,
+        /// Its count.
+        found: usize,
+        /// Values for which there is room.
+        most: usize,
+        /// The tick.
+        tick: u32,
+        /// Simulation time in seconds.
+        time_s: f64,
+    },
     /// The node's own computation failed.
     #[error("node `{node}` failed at tick {tick} (t = {time_s:.3} s): {reason}")]
     Step {

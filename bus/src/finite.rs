@@ -1,5 +1,6 @@
 //! Which numbers of a message have to be finite, and whether they are: found once, looked at before every sample.
 
+use crate::bounded::VALUES_START;
 use crate::schema::{Kind, Primitive, Schema};
 
 /// Floating-point numbers that lie side by side in a message.
@@ -38,9 +39,11 @@ impl Floats {
             Kind::Primitive(Primitive::F32) => self.add_span(Span { offset, count: 1, is_double: false }),
             Kind::Primitive(_) | Kind::Text => {}
             Kind::Message(inner) => self.add_message(inner, offset),
+            // Also the values behind the count, which are zero.
+            Kind::Sequence(element, most) => self.add(&Kind::Array(element, *most), offset + VALUES_START),
             Kind::Array(element, length) => {
                 for index in 0..*length {
-                    self.add(element, offset + index * size_of_kind(element));
+                    self.add(element, offset + index * element.size());
                 }
             }
         }
@@ -80,19 +83,6 @@ fn number(bytes: &[u8]) -> f64 {
     }
 }
 
-fn size_of_kind(kind: &Kind) -> usize {
-    match kind {
-        Kind::Primitive(Primitive::F64 | Primitive::I64 | Primitive::U64) => 8,
-        Kind::Primitive(Primitive::F32 | Primitive::I32 | Primitive::U32) => 4,
-        Kind::Primitive(Primitive::I16 | Primitive::U16) => 2,
-        Kind::Primitive(Primitive::I8 | Primitive::U8) => 1,
-        Kind::Message(schema) => schema.size,
-        Kind::Array(element, length) => length * size_of_kind(element),
-        // Only ever behind the numbers of a message that an array does not hold.
-        Kind::Text => 0,
-    }
-}
-
 /// The field of `schema` at `offset` bytes, such as `position.z` or `command[2]`.
 pub(crate) fn field_at(schema: &Schema, offset: usize) -> String {
     let field = schema.fields.iter().rev().find(|field| field.offset <= offset);
@@ -105,9 +95,10 @@ fn within(kind: &Kind, offset: usize) -> String {
     match kind {
         Kind::Message(inner) => format!(".{}", field_at(inner, offset)),
         Kind::Array(element, _) => {
-            let size = size_of_kind(element).max(1);
+            let size = element.size().max(1);
             format!("[{}]{}", offset / size, within(element, offset % size))
         }
+        Kind::Sequence(element, _) => within(&Kind::Array(element, 0), offset.saturating_sub(VALUES_START)),
         Kind::Primitive(_) | Kind::Text => String::new(),
     }
 }

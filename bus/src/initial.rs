@@ -1,5 +1,6 @@
 //! The value that a delayed input has before its first sample: a message made from named fields.
 
+use crate::bounded::VALUES_START;
 use crate::message::BODY_START;
 use crate::sample_memory::empty_sample;
 use crate::schema::{Kind, Primitive, Schema};
@@ -67,6 +68,7 @@ fn write_value(kind: &Kind, value: &Value, bytes: &mut [u8], path: &str) -> Resu
         Kind::Primitive(primitive) => write_number(*primitive, value, bytes, path),
         Kind::Message(schema) => write_message(schema, value, bytes, path),
         Kind::Array(element, length) => write_array(element, *length, value, bytes, path),
+        Kind::Sequence(element, most) => write_sequence(element, *most, value, bytes, path),
         Kind::Text => Err(InitialError::Constant(path.to_owned())),
     }
 }
@@ -80,13 +82,27 @@ fn write_array(
 ) -> Result<(), InitialError> {
     match value {
         Value::Array(values) if values.len() == length => {
-            let size = size_of_kind(element);
+            let size = element.size();
             values.iter().enumerate().try_for_each(|(index, value)| {
                 write_value(element, value, &mut bytes[index * size..], &format!("{path}[{index}]"))
             })
         }
         _ => Err(InitialError::value(path, value, format!("an array of {length}"))),
     }
+}
+
+fn write_sequence(
+    element: &Kind,
+    most: usize,
+    value: &Value,
+    bytes: &mut [u8],
+    path: &str,
+) -> Result<(), InitialError> {
+    let count = value.as_array().map(Vec::len).filter(|count| *count <= most);
+    let count =
+        count.ok_or_else(|| InitialError::value(path, value, format!("an array of at most {most}")))?;
+    put(bytes, &(count as u32).to_le_bytes());
+    write_array(element, count, value, &mut bytes[VALUES_START..], path)
 }
 
 fn write_number(
@@ -135,20 +151,6 @@ fn single_range() -> String {
 
 fn put(bytes: &mut [u8], number: &[u8]) {
     bytes[..number.len()].copy_from_slice(number);
-}
-
-fn size_of_kind(kind: &Kind) -> usize {
-    match kind {
-        Kind::Primitive(primitive) => match primitive {
-            Primitive::F64 | Primitive::I64 | Primitive::U64 => 8,
-            Primitive::F32 | Primitive::I32 | Primitive::U32 => 4,
-            Primitive::I16 | Primitive::U16 => 2,
-            Primitive::I8 | Primitive::U8 => 1,
-        },
-        Kind::Message(schema) => schema.size,
-        Kind::Array(element, length) => length * size_of_kind(element),
-        Kind::Text => 0,
-    }
 }
 
 #[cfg(test)]

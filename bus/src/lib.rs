@@ -8,6 +8,7 @@
 extern crate self as bus;
 
 pub mod announcement;
+mod bounded;
 #[doc(hidden)]
 pub mod claim;
 #[doc(hidden)]
@@ -76,6 +77,7 @@ mod transport;
 #[doc(hidden)]
 pub mod user_file;
 
+pub use bounded::Bounded;
 pub use bus_derive::{InputPorts, Message, OutputPorts};
 pub use component::Component;
 pub use diagnostics::ParameterError;

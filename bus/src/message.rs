@@ -45,6 +45,18 @@ use crate::schema::Schema;
 ///     voltage: f64,
 /// }
 /// ```
+///
+/// A [`Bounded`](crate::Bounded), a sequence of numbers, is the last field:
+/// ```compile_fail,E0080
+/// #[derive(Clone, Copy, bus::Message)]
+/// #[repr(C)]
+/// #[message(type_name = "my_msgs/msg/Cells")]
+/// struct Cells {
+///     #[field(unit = "V")]
+///     voltage: bus::Bounded<f64, 12>,
+///     flags: u64,
+/// }
+/// ```
 pub trait Message: bytemuck::Pod + Send {
     /// Type name, fields, units and frames.
     const SCHEMA: &'static Schema;

@@ -4,12 +4,12 @@ use crate::announcement::Announcement;
 use crate::component::{StateError, StepError};
 use crate::context::StepContext;
 use crate::initial;
-use crate::message::{CDR_START, cdr_bytes};
+use crate::message::{BODY_START, CDR_START, cdr_bytes};
 use crate::messages::Time;
 use crate::plan::{InputPlan, NodePlan, Plan};
 use crate::ports::{InputSamples, Inputs, OutputSamples};
 use crate::registration::{Instance, Registration, message_of};
-use crate::sample_memory::SampleMemory;
+use crate::sample_memory::{SampleMemory, empty_sample};
 use crate::schema::Schema;
 use diagnostics::ParameterError;
 use inputs::InputFiles;
@@ -29,6 +29,8 @@ struct InputWire {
     topic: usize,
     delay_ticks: u32,
     initial: Option<Box<[u64]>>,
+    /// Bytes of a message in memory.
+    size: usize,
 }
 
 /// An output, wired or not.
@@ -102,7 +104,8 @@ impl NodeHarness {
         let given = |wire: &Option<InputWire>| {
             let wire = wire.as_ref()?;
             let limit = tick.checked_sub(wire.delay_ticks);
-            limit.and_then(|limit| newest(wire.topic, limit)).map(words_of).or_else(|| wire.initial.clone())
+            let sample = limit.and_then(|limit| newest(wire.topic, limit));
+            sample.map(|cdr| words_of(cdr, wire.size)).or_else(|| wire.initial.clone())
         };
         let given = SampleMemory::given(self.inputs.iter().map(given).collect());
         let mut sent = SampleMemory::empty(self.outputs.iter().map(|wire| wire.schema));
@@ -164,7 +167,7 @@ fn inputs(
         let Some(input) = node.inputs.iter().find(|input| input.port == name) else { return Ok(None) };
         let initial = input.initial.as_ref().map(|value| initial::sample(schema, value)).transpose();
         let initial = initial.map_err(|reason| ParameterError::conflict(name, reason))?;
-        Ok(Some(InputWire { topic: input.topic, delay_ticks: input.delay_ticks, initial }))
+        Ok(Some(InputWire { topic: input.topic, delay_ticks: input.delay_ticks, initial, size: schema.size }))
     };
     match component.inputs {
         Inputs::Ports(ports) => ports.iter().map(|port| wire(port.name, port.schema)).collect(),
@@ -180,9 +183,9 @@ fn inputs(
     }
 }
 
-/// The words of a sample whose CDR bytes are `cdr`.
-fn words_of(cdr: &[u8]) -> Box<[u64]> {
-    let mut words = vec![0; (CDR_START + cdr.len()).div_ceil(8)].into_boxed_slice();
+/// The words of a sample whose CDR bytes are `cdr` and whose message has `size` bytes in memory.
+fn words_of(cdr: &[u8], size: usize) -> Box<[u64]> {
+    let mut words = empty_sample(size);
     bytemuck::cast_slice_mut(&mut words)[CDR_START..CDR_START + cdr.len()].copy_from_slice(cdr);
     words
 }
@@ -193,5 +196,7 @@ fn stamped(mut words: Box<[u64]>, schema: &Schema, time_ns: Option<u64>) -> Vec<
         let body: &mut [u8] = bytemuck::cast_slice_mut(&mut words[1..]);
         body[offset..offset + size_of::<Time>()].copy_from_slice(bytemuck::bytes_of(&Time::from_ns(time_ns)));
     }
-    cdr_bytes(&words, schema.size).to_vec()
+    let cdr = cdr_bytes(&words, schema.size);
+    let (header, message) = cdr.split_at(BODY_START - CDR_START);
+    [header, schema.extent().map_or(message, |extent| extent.of(message))].concat()
 }

@@ -7,7 +7,7 @@ use crate::message::{cdr_bytes, message_bytes, sample_words};
 use crate::messages::Time;
 use crate::plan::{InputPlan, OutputPlan, TopicPlan};
 use crate::sample_memory::empty_sample;
-use crate::schema::Schema;
+use crate::schema::{Extent, Schema};
 use crate::transport::{IceoryxError, Loan, Received, Receiver, SampleHeader, Sender};
 use std::collections::VecDeque;
 
@@ -327,6 +327,8 @@ pub(crate) struct OutPort {
     topic_name: String,
     schema: &'static Schema,
     floats: Floats,
+    /// The part of a message's bytes that counts.
+    extent: Option<Extent>,
     stamp_offset: Option<usize>,
     /// Whether a sample is taken at ticks at which none is sent: its node's steps take time, and send later.
     is_timed: bool,
@@ -362,6 +364,7 @@ impl OutPort {
             topic_name: topic.name.clone(),
             schema,
             floats: Floats::of(schema),
+            extent: schema.extent(),
             stamp_offset: schema.stamp_offset(),
             is_timed: false,
             topic: output.topic,
@@ -509,6 +512,9 @@ impl OutPort {
         if let Some(found) = self.floats.first_not_finite(message_bytes(words, size)) {
             return Err(self.not_finite(found, tick, time_ns, node));
         }
+        if let Some(found) = self.extent.and_then(|extent| extent.wrong_count(message_bytes(words, size))) {
+            return Err(self.wrong_count(found, tick, time_ns, node));
+        }
         if let Some(offset) = stamp_offset {
             stamp(words, offset, time_ns);
         }
@@ -535,6 +541,18 @@ impl OutPort {
             output: format!("`{}` on {}", self.port, self.topic_name),
             field: field_at(self.schema, offset),
             value,
+            tick,
+            time_s: time_ns as f64 * 1e-9,
+        }
+    }
+
+    fn wrong_count(&self, found: usize, tick: u32, time_ns: u64, node: &str) -> BusError {
+        BusError::Count {
+            node: node.to_owned(),
+            output: format!("`{}` on {}", self.port, self.topic_name),
+            field: self.schema.fields.last().map_or("", |field| field.name).to_owned(),
+            found,
+            most: self.extent.map_or(0, |extent| extent.values_max),
             tick,
             time_s: time_ns as f64 * 1e-9,
         }

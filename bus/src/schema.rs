@@ -1,6 +1,8 @@
 //! What a message's bytes mean: fields, units, frames, the layout hash, and the ROS 2 definition.
 
+use crate::bounded::VALUES_START;
 use crate::random::{FNV_OFFSET, fnv1a};
+use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
 
 /// A fixed-width primitive, little-endian in memory and in recordings.
@@ -45,6 +47,17 @@ impl Primitive {
             Self::U8 => "uint8",
         }
     }
+
+    /// Bytes of a number.
+    #[must_use]
+    pub const fn size(self) -> usize {
+        match self {
+            Self::F64 | Self::I64 | Self::U64 => 8,
+            Self::F32 | Self::I32 | Self::U32 => 4,
+            Self::I16 | Self::U16 => 2,
+            Self::I8 | Self::U8 => 1,
+        }
+    }
 }
 
 /// The type of a field.
@@ -56,8 +69,116 @@ pub enum Kind {
     Message(&'static Schema),
     /// A fixed array.
     Array(&'static Kind, usize),
+    /// Numbers up to so many, as [`Bounded`](crate::Bounded) holds them: the last field of a message.
+    Sequence(&'static Kind, usize),
     /// A string of constant length, stored as ROS 2 stores it (length with its NUL, then the bytes).
     Text,
+}
+
+impl Kind {
+    /// Bytes of a value in memory; 0 for a string.
+    #[must_use]
+    pub const fn size(&self) -> usize {
+        match self {
+            Self::Primitive(primitive) => primitive.size(),
+            Self::Message(schema) => schema.size,
+            Self::Array(element, length) => *length * element.size(),
+            Self::Sequence(element, most) => VALUES_START + *most * element.size(),
+            Self::Text => 0,
+        }
+    }
+
+    /// True if a value is as long as its count says.
+    const fn is_counted(&self) -> bool {
+        match self {
+            Self::Sequence(..) => true,
+            Self::Array(element, _) => element.is_counted(),
+            Self::Message(schema) => holds_counted(schema.fields),
+            Self::Primitive(_) | Self::Text => false,
+        }
+    }
+}
+
+const fn holds_counted(fields: &[Field]) -> bool {
+    let mut index = 0;
+    while index < fields.len() {
+        if fields[index].kind.is_counted() {
+            return true;
+        }
+        index += 1;
+    }
+    false
+}
+
+/// True if at most the last of `fields` is a sequence, which states a unit. `#[derive(Message)]` requires it.
+#[doc(hidden)]
+#[must_use]
+pub const fn sequences_are_last(fields: &[Field]) -> bool {
+    let mut index = 0;
+    while index < fields.len() {
+        let is_fine = match fields[index].kind {
+            Kind::Sequence(..) => index + 1 == fields.len() && !fields[index].unit.is_empty(),
+            kind => !kind.is_counted(),
+        };
+        if !is_fine {
+            return false;
+        }
+        index += 1;
+    }
+    true
+}
+
+/// Part of a message's bytes that counts: up to the end of its sequence.
+///
+/// ```
+/// use bus::Message;
+/// use bus::messages::SetPoint;
+///
+/// assert!(SetPoint::SCHEMA.extent().is_none(), "its messages are all of one length");
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Extent {
+    /// Offset of the count, an unsigned integer of 32 bits.
+    pub count_offset: usize,
+    /// Offset of the first value.
+    pub values_offset: usize,
+    /// Bytes of a value.
+    pub value_bytes: usize,
+    /// Values for which there is room.
+    pub values_max: usize,
+}
+
+impl Extent {
+    /// Number of values in `message`, as it says itself.
+    fn count(&self, message: &[u8]) -> usize {
+        let count = message.get(self.count_offset..).and_then(<[u8]>::first_chunk);
+        count.map_or(0, |bytes| u32::from_le_bytes(*bytes) as usize)
+    }
+
+    /// The bytes of `message` that count, as CDR has them: without values it ends behind its count.
+    #[must_use]
+    pub fn of<'a>(&self, message: &'a [u8]) -> &'a [u8] {
+        let end = match self.count(message).min(self.values_max) {
+            0 => self.count_offset + size_of::<u32>(),
+            count => self.values_offset + count * self.value_bytes,
+        };
+        &message[..end.min(message.len())]
+    }
+
+    /// Sets the count of `message`, which has room for all values.
+    pub(crate) fn set_count(&self, message: &mut [u8], count: u32) {
+        message[self.count_offset..][..size_of::<u32>()].copy_from_slice(&count.to_le_bytes());
+    }
+
+    /// The count of `message`, if it is more than there is room for or if a value behind it is not zero.
+    pub(crate) fn wrong_count(&self, message: &[u8]) -> Option<usize> {
+        let count = self.count(message);
+        let is_right = || {
+            let unused = &message[self.values_offset + count * self.value_bytes..];
+            unused.iter().all(|byte| *byte == 0)
+        };
+        (count > self.values_max || !is_right()).then_some(count)
+    }
 }
 
 /// A type that can be a field of a message: plain bytes without padding.
@@ -135,6 +256,25 @@ impl Schema {
             Kind::Message(inner) => inner.stamp_offset().map(|offset| field.offset + offset),
             _ => None,
         })
+    }
+
+    /// The part of a message's bytes that counts; `None` where it is all of them.
+    #[must_use]
+    pub fn extent(&self) -> Option<Extent> {
+        let last = self.fields.last()?;
+        let Kind::Sequence(element, values_max) = last.kind else { return None };
+        let values_offset = last.offset + VALUES_START;
+        Some(Extent { count_offset: last.offset, values_offset, value_bytes: element.size(), values_max })
+    }
+
+    /// A message of zeros, with as many values in its sequence as there is room for.
+    #[must_use]
+    pub fn zeros(&self) -> Vec<u8> {
+        let mut bytes = vec![0; self.size];
+        if let Some(extent) = self.extent() {
+            extent.set_count(&mut bytes, extent.values_max as u32);
+        }
+        bytes
     }
 
     /// Whether the message, or one nested in it, has a string or a definition of its own.
@@ -231,6 +371,7 @@ fn ros_type(kind: &Kind) -> String {
         Kind::Primitive(primitive) => primitive.ros_name().to_owned(),
         Kind::Message(schema) => two_part(schema.type_name),
         Kind::Array(element, length) => format!("{}[{length}]", ros_type(element)),
+        Kind::Sequence(element, most) => format!("{}[<={most}]", ros_type(element)),
         Kind::Text => "string".to_owned(),
     }
 }
@@ -243,7 +384,7 @@ fn two_part(type_name: &str) -> String {
 fn nested(kind: &Kind) -> Option<&'static Schema> {
     match kind {
         Kind::Message(schema) => Some(schema),
-        Kind::Array(element, _) => nested(element),
+        Kind::Array(element, _) | Kind::Sequence(element, _) => nested(element),
         Kind::Primitive(_) | Kind::Text => None,
     }
 }
@@ -275,6 +416,33 @@ mod tests {
         }
         let layout = Path::SCHEMA.layout();
         assert!(layout.contains("points[3].y") && layout.contains("m        world"), "{layout}");
+    }
+
+    #[test]
+    fn a_sequence_is_bounded_in_the_definition_and_the_message_ends_with_it() {
+        use crate::Bounded;
+        #[derive(Clone, Copy, crate::Message)]
+        #[repr(C)]
+        #[message(type_name = "test_msgs/msg/Counted")]
+        struct Counted {
+            flag: u64,
+            #[field(unit = "V")]
+            cells: Bounded<f64, 5>,
+        }
+        let counted = |cells: Bounded<f64, 5>| Counted { flag: 1, cells };
+        let schema = Counted::SCHEMA;
+        assert!(
+            schema.ros2_definition().ends_with("float64[<=5] cells  # [V]\n"),
+            "{}",
+            schema.ros2_definition()
+        );
+        assert!(schema.layout().contains("float64[<=5]") && schema.size == 8 + 8 + 40);
+        let extent = schema.extent().unwrap();
+        let bytes = |cells: Bounded<f64, 5>| extent.of(bytemuck::bytes_of(&counted(cells))).len();
+        assert_eq!((bytes([].into()), bytes([1.0].into()), bytes([1.0; 5].into())), (12, 24, 56));
+        assert_eq!(extent.of(&schema.zeros()).len(), schema.size);
+        assert_eq!(extent.wrong_count(bytemuck::bytes_of(&counted([1.0; 5].into()))), None);
+        assert_eq!(extent.of(&[0; 3]), [0; 3], "no message, and no panic");
     }
 
     #[test]

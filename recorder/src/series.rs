@@ -83,7 +83,7 @@ fn parts(leaves: &[Leaf], topic: &str, field: &str) -> Result<Vec<String>, Recor
 }
 
 /// The unit of `field` in messages of `schema`, that of its parts for a vector, known before anything is recorded;
-/// `None` where the message has strings or sequences, whose fields are known only from data.
+/// `None` where the message has strings or sequences without a bound, whose fields are known only from data.
 ///
 /// # Errors
 /// If there is no such field; the error lists those there are.
@@ -91,7 +91,7 @@ pub fn unit_of(schema: &Schema, topic: &str, field: &str) -> Result<Option<Strin
     if schema.has_text() {
         return Ok(None);
     }
-    let zeros = [&[0, 1, 0, 0][..], &vec![0; schema.size]].concat();
+    let zeros = [&[0, 1, 0, 0][..], &schema.zeros()].concat();
     let decoded = Definition::parse(schema.type_name, &schema.ros2_definition())
         .map_err(DecodeError::from)
         .and_then(|parsed| parsed.decode(&zeros));

@@ -5,6 +5,8 @@
 
 use crate::error::RecordingError;
 use bus::announcement::Announcement;
+use bus::message::{BODY_START, CDR_START};
+use bus::schema::Extent;
 use mcap::records::MessageHeader;
 use mcap::{Attachment, Compression, WriteOptions};
 use std::borrow::Cow;
@@ -23,6 +25,8 @@ const ZSTD_LEVEL: u32 = 1;
 pub const START: &[u8] = b"\x89MCAP0\r\n\x01\x16\0\0\0\0\0\0\0\x04\0\0\0ros2\x0a\0\0\0hummingbus";
 /// `O_NOFOLLOW` of the kernel.
 const NO_LINK: i32 = rustix::fs::OFlags::NOFOLLOW.bits().cast_signed();
+/// Bytes of the encapsulation header in front of a message.
+const CDR_HEADER_BYTES: usize = BODY_START - CDR_START;
 const FILE_BUFFER_BYTES: usize = 1024 * 1024;
 
 /// A recording being written.
@@ -31,6 +35,8 @@ pub struct RecordingWriter {
     path: PathBuf,
     /// Bytes of messages in the open chunk.
     chunk_bytes: usize,
+    /// By channel, the part of its messages that is written.
+    extents: BTreeMap<u16, Extent>,
 }
 
 /// A channel of a recording.
@@ -56,7 +62,7 @@ impl RecordingWriter {
             .chunk_size(None)
             .create(BufWriter::with_capacity(FILE_BUFFER_BYTES, file))
             .map_err(|error| write_error(path, &error))?;
-        Ok(Self { mcap, path: path.to_owned(), chunk_bytes: 0 })
+        Ok(Self { mcap, path: path.to_owned(), chunk_bytes: 0, extents: BTreeMap::new() })
     }
 
     /// Attaches a text file under `name`.
@@ -83,14 +89,16 @@ impl RecordingWriter {
             ("offered_qos_profiles".to_owned(), String::new()),
             ("layout_hash".to_owned(), format!("{:016x}", message.layout_hash)),
         ]);
-        self.mcap
+        let channel = self
+            .mcap
             .add_schema(&message.type_name, "ros2msg", message.definition.as_bytes())
             .and_then(|schema| self.mcap.add_channel(schema, topic, "cdr", &metadata))
-            .map(ChannelId)
-            .map_err(|error| write_error(&self.path, &error))
+            .map_err(|error| write_error(&self.path, &error))?;
+        self.extents.extend(message.extent.map(|extent| (channel, extent)));
+        Ok(ChannelId(channel))
     }
 
-    /// Writes one message: `cdr` is its encapsulation header and body.
+    /// Writes one message: `cdr` is its encapsulation header and body, of which only the values that count are written.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -103,6 +111,10 @@ impl RecordingWriter {
     ) -> Result<(), RecordingError> {
         let header =
             MessageHeader { channel_id: channel.0, sequence: tick, log_time: time_ns, publish_time: time_ns };
+        let cdr = match (self.extents.get(&channel.0), cdr.split_at_checked(CDR_HEADER_BYTES)) {
+            (Some(extent), Some((_, message))) => &cdr[..CDR_HEADER_BYTES + extent.of(message).len()],
+            _ => cdr,
+        };
         self.chunk_bytes += cdr.len();
         self.mcap.write_to_known_channel(&header, cdr).map_err(|error| write_error(&self.path, &error))
     }

@@ -18,6 +18,7 @@ use bus::ports::{
     FORWARDED_BYTES_MAX, ForwardedInputs, InputSamples, OutputPort, OutputPorts, OutputSamples, PortSpec,
 };
 use bus::random::stream;
+use bus::schema::Extent;
 use bus::{BusError, Message};
 use diagnostics::ParameterError;
 use diagnostics::parameter::{not_negative, positive_up_to, refuse, require};
@@ -98,7 +99,7 @@ fn queue_bytes() -> u32 {
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StreamParameters {
-    /// Bytes of a message on the wire, without the overhead: as many as in memory where absent.
+    /// Bytes of a message on the wire, without the overhead: as many as a recording holds where absent.
     bytes: Option<u32>,
     /// Messages a second that are sent at most; each that is new where absent.
     rate_hz: Option<f64>,
@@ -225,6 +226,8 @@ struct Forwarded {
     size: usize,
     /// Offset of the stamp.
     stamp_offset: Option<usize>,
+    /// The part of a message that counts, and takes the wire's time.
+    extent: Option<Extent>,
 }
 
 /// State of a link. The layouts are not transferred: a successor learns them when it connects.
@@ -315,7 +318,8 @@ impl Component for Link {
 
     fn connected(&self, topics: &[(&str, &Announcement)], memory: &mut LinkMemory) -> Result<(), StepError> {
         for (forwarded, (_, announcement)) in memory.forwarded.iter_mut().zip(topics) {
-            *forwarded = Forwarded { size: announcement.size, stamp_offset: announcement.stamp_offset };
+            let Announcement { size, stamp_offset, extent, .. } = **announcement;
+            *forwarded = Forwarded { size, stamp_offset, extent };
         }
         Ok(())
     }
@@ -363,7 +367,7 @@ impl Link {
             if is_new && is_due {
                 state.taken_mark[index] = mark.unwrap_or(u64::MAX);
                 state.taken_period[index] = period.unwrap_or(u64::MAX);
-                let wire_bytes = stream.wire_bytes(layout.size, self.overhead_bytes);
+                let wire_bytes = stream.wire_bytes(layout.used_bytes(message), self.overhead_bytes);
                 self.line.queue(&mut state.line, index, message, wire_bytes, sent_ns)?;
             }
         }
@@ -422,6 +426,11 @@ impl LinkStream {
 }
 
 impl Forwarded {
+    /// Bytes of `message` that count.
+    fn used_bytes(&self, message: &[u8]) -> usize {
+        self.extent.map_or(message.len(), |extent| extent.of(message).len())
+    }
+
     /// Gives `message`, an initial value, the stamp of what was never sent.
     fn mark_as_none(&self, message: &mut [u8]) {
         if let Some(offset) = self.stamp_offset {

@@ -46,6 +46,13 @@ fn expand(input: &DeriveInput) -> Result<Tokens> {
                 concat!("message ", stringify!(#name), " has implicit padding: reorder its fields or add `pad0`"),
             );
             assert!(::core::mem::align_of::<#name>() <= 8, "a message's alignment is at most 8 bytes");
+            assert!(
+                ::bus::schema::sequences_are_last(<#name as ::bus::Message>::SCHEMA.fields),
+                concat!(
+                    "message ", stringify!(#name), " has a `Bounded` that is not its last field, stands in a nested ",
+                    "message, or states no unit: move it to the end, or add #[field(unit = \"m/s\")]",
+                ),
+            );
         };
         // SAFETY: every field is `Pod` (required by `FieldType`), the struct is `repr(C)` and has no
         // padding (asserted above), so every bit pattern is a value and every value is plain bytes.
