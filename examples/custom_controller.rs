@@ -58,7 +58,7 @@ impl Component for Controller {
         // pitch the rear.
         let mix = [-pitch, -roll, pitch, roll];
         let command = mix.map(|tilt| gains.hover_count + lift + tilt);
-        Ok(Outputs { command: MotorCommand { command, ..Default::default() } })
+        Ok(Outputs { command: MotorCommand { command: command.into(), ..Default::default() } })
     }
 }
 

@@ -10,7 +10,7 @@ use plant::rapier::hull::Hull;
 use plant::{Airframe, Backend, FreeFlight, NewtonEuler, Rapier, RigidBody, State};
 use scenes::{Scene, Surface};
 use serde_json::{Value, json};
-use vehicles::{MotorModel, Vehicle};
+use vehicles::{MotorModel, Rotor, Vehicle};
 
 const TICK_S: f64 = 1e-3;
 const HOVER_RAD_S: f64 = 411.6;
@@ -296,10 +296,8 @@ pub fn told() -> Value {
     let (vehicle, body) = (hummingbird(), airless());
     let hull = Hull::of(&Airframe::new(body));
     let rig = rig(scenes::reference::RIG_SLIDING).rig.expect("a rig");
-    let rotors = vehicle
-        .rotors
-        .each_ref()
-        .map(|rotor| json!({ "position": rotor.position_m.as_slice(), "spin": rotor.spin }));
+    let rotor = |rotor: &Rotor| json!({ "position": rotor.position_m.as_slice(), "spin": rotor.spin });
+    let rotors: Vec<_> = vehicle.rotors.iter().map(rotor).collect();
     let MotorModel::SecondOrder { natural_frequency_rad_s, damping_ratio } = vehicle.motor else {
         panic!("the Hummingbird's motors are of second order")
     };

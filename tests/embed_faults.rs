@@ -100,7 +100,9 @@ impl Component for Heir {
         if let Some(Outputs { command }) = context.predecessor() {
             state.altitude = 1000.0 + command.command[0];
         }
-        Ok(Outputs { command: MotorCommand { command: [state.altitude; 4], ..MotorCommand::default() } })
+        Ok(Outputs {
+            command: MotorCommand { command: [state.altitude; 4].into(), ..MotorCommand::default() },
+        })
     }
 }
 

@@ -53,7 +53,7 @@ mod chain {
     use controllers::pid_gains::PidGains;
     use controllers::set_points::{Schedule, SetPoint, SetPointEntry};
     use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-    use plant::{NewtonEuler, RigidBody, State};
+    use plant::{NewtonEuler, PerRotor, RigidBody, State};
     use sensors::ekf::filter::{Ekf, EkfState};
     use sensors::ekf::history::{Measurement, Newest, Reading, Source};
     use sensors::ekf::params::EkfParams;
@@ -75,7 +75,7 @@ mod chain {
         integrals: Integrals,
         allocation: Allocation,
         schedule: Schedule,
-        command: [f64; 4],
+        command: PerRotor<f64>,
     }
 
     impl Chain {
@@ -113,7 +113,7 @@ mod chain {
                 integrals: Integrals::default(),
                 allocation: craft.allocation,
                 schedule: Schedule::new(&[step], &initial, 1000)?,
-                command: [hover; 4],
+                command: [hover; 4].into(),
             })
         }
 

@@ -42,7 +42,7 @@ pub struct NodeContext<'a> {
 /// ```
 /// use bus::context::{InputMessage, NodeContext};
 /// let inputs = ["estimate"];
-/// let messages = [InputMessage { port: "estimate", bytes: 96, period_ticks: 4 }];
+/// let messages = [InputMessage { port: "estimate", bytes: 96, period_ticks: 4, initial: None }];
 /// let context = NodeContext::new("down", &inputs).reading(&messages);
 /// assert_eq!(context.messages[0].bytes, 96);
 /// ```
@@ -50,10 +50,28 @@ pub struct NodeContext<'a> {
 pub struct InputMessage<'a> {
     /// The input.
     pub port: &'a str,
-    /// Bytes of a message.
+    /// The most bytes that a message has.
     pub bytes: usize,
     /// Ticks between two messages.
     pub period_ticks: u32,
+    /// Fields of the message before the first one is sent, as the manifest gives them.
+    pub initial: Option<&'a serde_json::Value>,
+}
+
+impl InputMessage<'_> {
+    /// Number of values that the initial message has in its array `field`; `None` without an initial message.
+    ///
+    /// ```
+    /// # use bus::context::InputMessage;
+    /// let initial = serde_json::json!({ "command": [76.5, 76.5, 76.5, 76.5] });
+    /// let input = InputMessage { port: "command", bytes: 112, period_ticks: 1, initial: Some(&initial) };
+    /// assert_eq!(input.initial_count("command"), Some(4));
+    /// ```
+    #[must_use]
+    pub fn initial_count(&self, field: &str) -> Option<usize> {
+        let initial = self.initial?;
+        Some(initial.get(field).and_then(|values| values.as_array()).map_or(0, Vec::len))
+    }
 }
 
 /// What is odd about a node in its run.

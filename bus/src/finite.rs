@@ -133,7 +133,7 @@ mod tests {
         assert_eq!(found(&state), None);
         state.position.z = f64::INFINITY;
         assert_eq!(found(&state), Some(("position.z".to_owned(), f64::INFINITY)));
-        let command = MotorCommand { command: [1.0, 2.0, f64::NAN, 4.0], ..Default::default() };
+        let command = MotorCommand { command: [1.0, 2.0, f64::NAN, 4.0].into(), ..Default::default() };
         let (field, value) = found(&command).unwrap();
         assert!(field == "command[2]" && value.is_nan(), "{field} = {value}");
     }

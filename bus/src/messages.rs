@@ -9,8 +9,8 @@
 //! assert_eq!(state.attitude.w, 1.0, "level by default");
 //! ```
 
-use crate::Message;
 use crate::schema::{FieldType, Kind};
+use crate::{Bounded, Message};
 
 mod control;
 mod sensing;
@@ -20,6 +20,21 @@ pub use sensing::{
     Barometer, Battery, BodyStates, Clearance, Contact, Gps, Innovation, Magnetometer, Mocap, Ranges,
     RotorSpeeds, StateEstimate, Traffic, WallEstimate,
 };
+
+/// The most rotors that a vehicle has.
+pub const ROTORS_MAX: usize = 12;
+
+/// A number for each rotor of a vehicle, in the order of its vehicle file.
+///
+/// ```
+/// use bus::messages::{MotorCommand, PerRotor};
+///
+/// let hexacopter = MotorCommand { command: PerRotor::filled(6, 76.5), ..MotorCommand::default() };
+/// assert_eq!(hexacopter.command.len(), 6);
+/// let quadrotor = MotorCommand { command: [76.5; 4].into(), ..MotorCommand::default() };
+/// assert_eq!(quadrotor.command, [76.5; 4]);
+/// ```
+pub type PerRotor = Bounded<f64, ROTORS_MAX>;
 
 /// Simulation time as ROS 2 writes it. The bus fills it in when a sample is sent.
 ///
@@ -136,7 +151,7 @@ pub struct PlantState {
     pub specific_force: Vector3,
     /// Rotor speeds, in the order of the vehicle file.
     #[field(unit = "rad/s")]
-    pub rotor_speed: [f64; 4],
+    pub rotor_speed: PerRotor,
 }
 
 /// A pose that 3-D views draw, at frame `map` (the world).
@@ -368,7 +383,7 @@ pub struct MotorCommand {
     pub stamp: Time,
     /// Commands in the order of the vehicle file's rotors; its `command` table maps them to speeds.
     #[field(unit = "count")]
-    pub command: [f64; 4],
+    pub command: PerRotor,
 }
 
 /// A vehicle's state as measured in a real flight.

@@ -29,7 +29,7 @@ impl ControlledVehicle {
     /// The vehicle of the file at `path` among `files`.
     ///
     /// # Errors
-    /// The file is refused, or four such rotors cannot be allocated to.
+    /// The file is refused, or its rotors cannot be allocated to.
     pub fn load(files: &InputFiles, path: &Path) -> Result<Self, ParameterError> {
         let vehicle = Vehicle::load_from(files, path);
         let vehicle = vehicle.map_err(|error| ParameterError::conflict("vehicle", error))?;
@@ -39,7 +39,7 @@ impl ControlledVehicle {
     /// `vehicle` with its allocation.
     ///
     /// # Errors
-    /// Four such rotors cannot be allocated to.
+    /// Its rotors cannot be allocated to.
     pub fn new(vehicle: Vehicle) -> Result<Self, AllocationError> {
         let allocation = Allocation::new(&vehicle)?;
         Ok(Self { vehicle, allocation })

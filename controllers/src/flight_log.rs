@@ -1,13 +1,15 @@
 //! A measured flight: rows of a CSV file, read by a column map that states every unit.
 
+use bus::Bounded;
+use bus::messages::PerRotor;
 use diagnostics::ParameterError;
 use diagnostics::unit::{COUNT, Dimension, LENGTH, PURE_NUMBER, SPEED, TIME, VELOCITY};
 use inputs::InputFiles;
 use serde::Deserialize;
 use std::fmt::Display;
 use std::path::Path;
-use vehicles::gaps;
 use vehicles::table::{self, Dialect, Table};
+use vehicles::{ROTORS_MAX, gaps};
 
 /// Which columns of a file hold a quantity, and in which unit.
 #[derive(Clone, Debug, Deserialize)]
@@ -18,6 +20,26 @@ pub struct Columns<const N: usize> {
     pub columns: [String; N],
     /// Unit of the numbers in the file.
     pub unit: String,
+}
+
+/// Columns of the motor commands and their unit.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CommandColumns {
+    /// Names, one for each rotor.
+    #[serde(deserialize_with = "rotors")]
+    pub columns: Vec<String>,
+    /// Unit.
+    pub unit: String,
+}
+
+fn rotors<'de, D: serde::Deserializer<'de>>(d: D) -> Result<Vec<String>, D::Error> {
+    let names = Vec::<String>::deserialize(d)?;
+    if (1..=ROTORS_MAX).contains(&names.len()) {
+        return Ok(names);
+    }
+    let message = format!("`columns` names {} columns, expected 1 to {ROTORS_MAX}", names.len());
+    Err(serde::de::Error::custom(message))
 }
 
 /// Reads a fixed array, for which serde has no generic length.
@@ -42,7 +64,7 @@ pub struct ColumnMap {
     /// Time, any origin.
     pub time: Columns<1>,
     /// Motor commands in the order of the vehicle file.
-    pub command: Columns<4>,
+    pub command: CommandColumns,
     /// Position in the world.
     pub position: Columns<3>,
     /// Velocity in the world.
@@ -56,10 +78,14 @@ pub struct ColumnMap {
 impl ColumnMap {
     fn names(&self) -> Vec<&str> {
         let vectors = [&self.position.columns, &self.velocity.columns, &self.angular_velocity.columns];
-        let rest = [&self.command.columns, &self.attitude.columns];
-        let names =
-            self.time.columns.iter().chain(vectors.into_iter().flatten()).chain(rest.into_iter().flatten());
-        names.map(String::as_str).collect()
+        let rest = self.command.columns.iter().chain(&self.attitude.columns);
+        self.time
+            .columns
+            .iter()
+            .chain(vectors.into_iter().flatten())
+            .chain(rest)
+            .map(String::as_str)
+            .collect()
     }
 }
 
@@ -69,7 +95,7 @@ pub struct Row {
     /// Time since the first row.
     pub time_s: f64,
     /// Motor commands.
-    pub command: [f64; 4],
+    pub command: PerRotor,
     /// Position in the world, in metres.
     pub position_m: [f64; 3],
     /// Velocity in the world, in metres a second.
@@ -100,14 +126,16 @@ impl FlightLog {
         let table = table.map_err(|cause| refused(path, format_args!(": {cause}")))?;
         let source = Source { path, table };
         source.check_rows()?;
-        let mut time_s = source.values("time", TIME, &map.time)?;
+        let Columns { columns, unit } = &map.time;
+        let mut time_s = source.values::<1>("time", TIME, columns, unit)?;
         let start_s = time_s.first().map_or(0.0, |first| first[0]);
         time_s.iter_mut().for_each(|time_s| time_s[0] -= start_s);
-        let command = source.values("command", COUNT, &map.command)?;
-        let position_m = source.values("position", LENGTH, &map.position)?;
-        let velocity_m_s = source.values("velocity", VELOCITY, &map.velocity)?;
-        let attitude = source.values("attitude", PURE_NUMBER, &map.attitude)?;
-        let rates_rad_s = source.values("angular_velocity", SPEED, &map.angular_velocity)?;
+        let CommandColumns { columns, unit } = &map.command;
+        let command = source.values("command", COUNT, columns, unit)?;
+        let position_m = source.arrays("position", LENGTH, &map.position)?;
+        let velocity_m_s = source.arrays("velocity", VELOCITY, &map.velocity)?;
+        let attitude = source.arrays("attitude", PURE_NUMBER, &map.attitude)?;
+        let rates_rad_s = source.arrays("angular_velocity", SPEED, &map.angular_velocity)?;
         source.check_values(&time_s, &attitude, &map.attitude.columns[3])?;
         let row = |index: usize| Row {
             time_s: time_s[index][0],
@@ -186,31 +214,41 @@ struct Source<'a> {
 }
 
 impl Source<'_> {
-    /// The samples of a quantity in SI, row by row.
-    fn values<const N: usize>(
+    /// The samples of a quantity of `N` numbers in SI, row by row.
+    fn arrays<const N: usize>(
         &self,
         quantity: &'static str,
         dimension: Dimension,
         map: &Columns<N>,
     ) -> Result<Vec<[f64; N]>, ParameterError> {
-        let mut indices = [0; N];
-        for (index, column) in indices.iter_mut().zip(&map.columns) {
+        let values = self.values::<N>(quantity, dimension, &map.columns, &map.unit)?;
+        Ok(values.iter().map(|values| std::array::from_fn(|index| values[index])).collect())
+    }
+
+    /// The samples of a quantity in SI, row by row: a number for each of `columns`, at most `N`.
+    fn values<const N: usize>(
+        &self,
+        quantity: &'static str,
+        dimension: Dimension,
+        columns: &[String],
+        unit: &str,
+    ) -> Result<Vec<Bounded<f64, N>>, ParameterError> {
+        let place = |column: &String| {
             let place = self.table.column(column);
-            *index = place
-                .map_err(|cause| refused(self.path, format_args!(", the map's `{quantity}`: {cause}")))?;
-        }
-        let factor = dimension.factor(&map.unit).ok_or_else(|| {
-            let (found, expected) = (&map.unit, dimension.names(" or "));
-            let message = format!("`{quantity}` has the unit `{found}`, expected {expected}");
+            place.map_err(|cause| refused(self.path, format_args!(", the map's `{quantity}`: {cause}")))
+        };
+        let indices = columns.iter().map(place).collect::<Result<Vec<_>, _>>()?;
+        let factor = dimension.factor(unit).ok_or_else(|| {
+            let expected = dimension.names(" or ");
+            let message = format!("`{quantity}` has the unit `{unit}`, expected {expected}");
             ParameterError::conflict("data", message)
         })?;
-        let sample = |row: table::Row<'_>| -> Result<[f64; N], ParameterError> {
-            let mut values = [0.0; N];
-            for ((value, index), column) in values.iter_mut().zip(indices).zip(&map.columns) {
-                *value = number(self.table.number(row.cell(index)), factor)
-                    .map_err(|expected| self.cell(row.line, column, row.cell(index), expected))?;
-            }
-            Ok(values)
+        let sample = |row: table::Row<'_>| -> Result<Bounded<f64, N>, ParameterError> {
+            let cell = |(index, column): (&usize, &String)| {
+                number(self.table.number(row.cell(*index)), factor)
+                    .map_err(|expected| self.cell(row.line, column, row.cell(*index), expected))
+            };
+            indices.iter().zip(columns).map(cell).collect()
         };
         self.table.rows.iter().map(sample).collect()
     }
@@ -232,7 +270,7 @@ impl Source<'_> {
     /// Refuses times that do not grow, and quaternions without a direction.
     fn check_values(
         &self,
-        time_s: &[[f64; 1]],
+        time_s: &[Bounded<f64, 1>],
         attitude: &[[f64; 4]],
         last_part: &str,
     ) -> Result<(), ParameterError> {
@@ -243,7 +281,7 @@ impl Source<'_> {
                 (attitude[index][3].to_string(), "part of an attitude: the quaternion is 0");
             return Err(self.cell(rows.line(index), last_part, &found, expected));
         }
-        let Some(index) = time_s.windows(2).position(|pair| pair[1] <= pair[0]) else { return Ok(()) };
+        let Some(index) = time_s.windows(2).position(|pair| pair[1][0] <= pair[0][0]) else { return Ok(()) };
         let line = rows.line(index);
         Err(refused(self.path, format_args!(": time does not grow from line {line} to the next")))
     }

@@ -1,6 +1,7 @@
 //! Where nothing is touched both backends fly the same flight, to the last bit.
 #![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in")]
 
+use bus::messages::PerRotor;
 use controllers::airframe::ControlledVehicle;
 use controllers::control::{HoverMotion, Integrals};
 use controllers::pid::PidLaw;
@@ -60,7 +61,7 @@ impl Loop {
         }
     }
 
-    fn commands(&mut self, tick: u64, body: &RigidBody) -> [f64; 4] {
+    fn commands(&mut self, tick: u64, body: &RigidBody) -> PerRotor {
         let (roll_rad, pitch_rad, yaw_rad) = body.attitude_WB.euler_angles();
         let measured = HoverMotion {
             altitude_m: body.position_W_m.z,
@@ -93,7 +94,7 @@ fn rapier(scene: &Scene) -> Box<dyn Backend> {
 }
 
 /// The states of a flight in closed loop, and the commands.
-fn flown(mut plant: Box<dyn Backend>) -> Vec<(State, [f64; 4])> {
+fn flown(mut plant: Box<dyn Backend>) -> Vec<(State, PerRotor)> {
     let mut pilot = Loop::new();
     start(&mut *plant);
     let mut flight = Vec::new();
@@ -102,7 +103,7 @@ fn flown(mut plant: Box<dyn Backend>) -> Vec<(State, [f64; 4])> {
         flight.push((*plant.state(), commands));
         plant.step(&commands, TICK_S, &[]);
     }
-    flight.push((*plant.state(), [0.0; 4]));
+    flight.push((*plant.state(), [0.0; 4].into()));
     flight
 }
 

@@ -130,9 +130,15 @@ fn vehicle(path: &Path, read: &ReadFile<'_>, files: &InputFiles) -> Result<Vehic
         files.keep(path, read(path)?);
         files.text(path)
     };
-    match text(path) {
-        Ok(read) => Vehicle::parse_with(&read, &file, &text),
-        Err(cause) => Err(Diagnostic::unreadable(file, &cause)),
+    let read = text(path).map_err(|cause| Diagnostic::unreadable(file.clone(), &cause))?;
+    let vehicle = Vehicle::parse_with(&read, &file, &text)?;
+    match vehicle.rotors.len() {
+        4 => Ok(vehicle),
+        count => {
+            let message = format!("`rotors` has {count} rotors, expected four");
+            let help = "measured flights are read for vehicles with four rotors at present; name another vehicle file";
+            Err(Diagnostic::in_file(file, message).help(help))
+        }
     }
 }
 

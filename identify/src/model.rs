@@ -109,7 +109,8 @@ impl Model {
                 attitude_WB,
                 angular_velocity_B_rad_s: tracks.rates[i].into(),
             };
-            let motion = model.accelerations_under(&actuation, &State { body, rotors: rotors.flown[i] });
+            let motion =
+                model.accelerations_under(&actuation, &State { body, rotors: rotors.flown[i].into() });
             sides.force_B.push(motion.specific_force_B_m_s2.into());
             sides.angular_B.push(motion.angular_acceleration_B_rad_s2.into());
             if has_world {
@@ -168,7 +169,8 @@ struct Sides {
 
 /// How the air moves: what the steady effects make of it, which is the same at every instant.
 fn air(airframe: &Airframe, step_s: f64) -> Actuation {
-    let state = State { body: RigidBody::level_at(Vector3::zeros()), rotors: [RotorState::default(); 4] };
+    let state =
+        State { body: RigidBody::level_at(Vector3::zeros()), rotors: [RotorState::default(); 4].into() };
     airframe.begin_tick(&mut airframe.initial_state(0, "identify", step_s), &state, &[0.0; 4], step_s)
 }
 
@@ -184,7 +186,7 @@ fn spun(airframe: &Airframe, flight: &Prepared, pose_s: f64) -> Vec<[RotorState;
     let first = commands.at(start_s);
     let mut memory = airframe.initial_state(0, "identify", step_s);
     let rotors = first.map(|command| RotorState::steady(airframe.vehicle().command.speed(command)));
-    let mut state = State { body: RigidBody::level_at(Vector3::zeros()), rotors };
+    let mut state = State { body: RigidBody::level_at(Vector3::zeros()), rotors: rotors.into() };
     let mut out = Vec::with_capacity(clock.count);
     for index in 0..clock.count {
         let mut sum = [RotorState::default(); 4];

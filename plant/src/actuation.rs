@@ -1,17 +1,32 @@
 //! What acts on an airframe over a tick.
 
 use crate::saved::saved_fields;
+use crate::state::PerRotor;
 use nalgebra::Vector3;
 
 /// What acts on an airframe over one tick.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Actuation {
-    /// Rotor speeds that the motors are asked for, in the order of the motor commands.
-    pub targets_rad_s: [f64; 4],
+    /// Rotor speeds that the motors are asked for.
+    pub targets_rad_s: PerRotor<f64>,
     /// How the air moves.
     pub air_velocity_W_m_s: Vector3<f64>,
     /// By which part of itself the thrust of each rotor is more than it should be.
-    pub thrust_deviation: [f64; 4],
+    pub thrust_deviation: PerRotor<f64>,
+}
+
+impl Actuation {
+    /// Motors of `rotors` rotors that are asked for no speed, in still air.
+    #[must_use]
+    pub fn none(rotors: usize) -> Self {
+        Self::of(PerRotor::filled(rotors, 0.0))
+    }
+
+    /// Motors that are asked for these speeds, in still air.
+    pub(crate) fn of(targets_rad_s: PerRotor<f64>) -> Self {
+        let thrust_deviation = targets_rad_s.map(|_| 0.0);
+        Self { targets_rad_s, air_velocity_W_m_s: Vector3::zeros(), thrust_deviation }
+    }
 }
 
 saved_fields!(Actuation { targets_rad_s, air_velocity_W_m_s, thrust_deviation });

@@ -7,7 +7,7 @@
 //! and rotors are those of [`Airframe::vehicle`], which is the vehicle as it flies, its effects included.
 //!
 //! ```
-//! # use plant::{Airframe, RigidBody, RotorState, State};
+//! # use plant::{Airframe, PerRotor, RigidBody, RotorState, State};
 //! # let text = vehicles::reference::HUMMINGBIRD;
 //! # let vehicle = vehicles::Vehicle::parse(text, "hummingbird.toml")?;
 //! # let scene = scenes::Scene::parse(scenes::reference::GROUND, "ground.toml")?;
@@ -15,7 +15,7 @@
 //! let (seed, dt_s) = (7, 0.001);
 //! let mut effects = airframe.initial_state(seed, "plant", dt_s);
 //! # let body = RigidBody::level_at(nalgebra::Vector3::z());
-//! # let state = State { body, rotors: [RotorState::steady(400.0); 4] };
+//! # let state = State { body, rotors: PerRotor::filled(4, RotorState::steady(400.0)) };
 //! let actuation = airframe.begin_tick(&mut effects, &state, &[76.5; 4], dt_s);
 //! assert_eq!(actuation, effects.actuation);
 //! # Ok::<(), diagnostics::Diagnostic>(())
@@ -27,7 +27,7 @@ use crate::effects::{Action, Advance, Effect, FlightCondition, entry};
 use crate::motor;
 use crate::rotor::{self, Wrench};
 use crate::saved::Fingerprint;
-use crate::state::{RotorRates, RotorState, State};
+use crate::state::{PerRotor, RotorRates, RotorState, State, paired};
 use diagnostics::Diagnostic;
 use nalgebra::Vector3;
 use vehicles::{EffectEntry, Vehicle};
@@ -93,9 +93,12 @@ impl Airframe {
         &self.frame_shift_B_m
     }
 
-    /// Fingerprint of what the state of its flight with the backend `backend` depends on: the kinds of its effects.
+    /// Fingerprint of what the state of its flight with the backend `backend` depends on: the kinds of its effects and the
+    /// number of its rotors.
     pub(crate) fn fingerprint(&self, backend: &'static str) -> Fingerprint {
-        Fingerprint::of(std::iter::once(backend).chain(self.effects.iter().map(|effect| effect.kind.name)))
+        let kinds = self.effects.iter().map(|effect| effect.kind.name);
+        Fingerprint::of(std::iter::once(backend).chain(kinds))
+            .with(std::iter::once(self.vehicle.rotors.len() as f64))
     }
 
     /// Its effects, in the order in which they are summed.
@@ -109,20 +112,22 @@ impl Airframe {
     #[must_use]
     pub fn initial_state(&self, seed: u64, node: &str, dt_s: f64) -> AirframeState {
         let random = |effect: &Effect| bus::random::stream(seed, &format!("{node}/{}", effect.kind.name));
+        let state = |random| EffectState::new(random, self.vehicle.rotors.len());
         AirframeState {
-            actuation: Actuation::default(),
-            commands: DelayLine::new(self.delay_s() / dt_s),
-            effects: self.effects.iter().map(|effect| EffectState::new(random(effect))).collect(),
+            actuation: Actuation::none(self.vehicle.rotors.len()),
+            commands: DelayLine::new(self.delay_s() / dt_s, self.vehicle.rotors.len()),
+            effects: self.effects.iter().map(|effect| state(random(effect))).collect(),
         }
     }
 
-    /// What acts over the tick of `dt_s` that begins at `state`, under raw motor `commands` held over it.
+    /// What acts over the tick of `dt_s` that begins at `state`, under raw motor `commands` held over it: one for each
+    /// rotor.
     #[must_use]
     pub fn begin_tick(
         &self,
         effects: &mut AirframeState,
         state: &State,
-        commands: &[f64; 4],
+        commands: &[f64],
         dt_s: f64,
     ) -> Actuation {
         let delayed = effects.commands.pass(commands, self.delay_s() / dt_s);
@@ -155,25 +160,27 @@ impl Airframe {
     }
 
     /// What acts under `commands` in still air, without the state of effects.
-    pub(crate) fn commanded(&self, commands: &[f64; 4]) -> Actuation {
-        Actuation {
-            targets_rad_s: commands.map(|command| self.vehicle.command.speed(command)),
-            ..Actuation::default()
-        }
+    pub(crate) fn commanded(&self, commands: &[f64]) -> Actuation {
+        Actuation::of(commands.iter().map(|command| self.vehicle.command.speed(*command)).collect())
     }
 
     /// Rates of change of the rotors.
-    pub(crate) fn rotor_rates(&self, actuation: &Actuation, state: &State) -> [RotorRates; 4] {
-        std::array::from_fn(|i| {
-            motor::rates(&self.vehicle.motor, &state.rotors[i], actuation.targets_rad_s[i])
-        })
+    pub(crate) fn rotor_rates(&self, actuation: &Actuation, state: &State) -> PerRotor<RotorRates> {
+        let motor = &self.vehicle.motor;
+        paired(&state.rotors, &actuation.targets_rad_s, |rotor, target| motor::rates(motor, rotor, *target))
     }
 
     /// All forces but gravity and contacts, and their torques about the centre of mass. The effects are added in
     /// their order; the order is part of the result, as float addition is not associative.
-    pub(crate) fn wrench(&self, actuation: &Actuation, state: &State, rotors: &[RotorRates; 4]) -> Wrench {
+    pub(crate) fn wrench(
+        &self,
+        actuation: &Actuation,
+        state: &State,
+        rotors: &PerRotor<RotorRates>,
+    ) -> Wrench {
         let condition = FlightCondition::new(&self.vehicle, state, &actuation.air_velocity_W_m_s);
-        let thrusts_N = std::array::from_fn(|i| self.thrust_N(actuation, &condition, i));
+        let thrusts_N =
+            PerRotor::from_fn(self.vehicle.rotors.len(), |i| self.thrust_N(actuation, &condition, i));
         let w_B_rad_s = &state.body.angular_velocity_B_rad_s;
         let mut sum = rotor::wrench(&self.vehicle, &thrusts_N, &state.rotors, rotors, w_B_rad_s);
         for (effect, action) in actions(&self.effects) {
@@ -187,16 +194,25 @@ impl Airframe {
     /// The rotors at the end of a tick of `dt_s` that began with `actuation`, whatever the body does: one Runge-Kutta
     /// step of fourth order.
     #[must_use]
-    pub fn spun(&self, actuation: &Actuation, rotors: &[RotorState; 4], dt_s: f64) -> [RotorState; 4] {
+    pub fn spun(
+        &self,
+        actuation: &Actuation,
+        rotors: &PerRotor<RotorState>,
+        dt_s: f64,
+    ) -> PerRotor<RotorState> {
         let motor = &self.vehicle.motor;
-        let moved =
-            std::array::from_fn(|i| motor::moved(motor, &rotors[i], actuation.targets_rad_s[i], dt_s));
-        self.settled(actuation, &moved)
+        let moved = |rotor: &RotorState, target: &f64| motor::moved(motor, rotor, *target, dt_s);
+        self.settled(actuation, &paired(rotors, &actuation.targets_rad_s, moved))
     }
 
     /// The rotors with accelerations that fit their speeds and targets, as shown at the end of a tick.
-    pub(crate) fn settled(&self, actuation: &Actuation, rotors: &[RotorState; 4]) -> [RotorState; 4] {
-        std::array::from_fn(|i| motor::settled(&self.vehicle.motor, &rotors[i], actuation.targets_rad_s[i]))
+    pub(crate) fn settled(
+        &self,
+        actuation: &Actuation,
+        rotors: &PerRotor<RotorState>,
+    ) -> PerRotor<RotorState> {
+        let motor = &self.vehicle.motor;
+        paired(rotors, &actuation.targets_rad_s, |rotor, target| motor::settled(motor, rotor, *target))
     }
 
     fn thrust_N(&self, actuation: &Actuation, condition: &FlightCondition, rotor: usize) -> f64 {
@@ -220,7 +236,7 @@ impl Airframe {
 
 /// The mean of the rotors' places, from the centre of mass.
 pub(crate) fn amid_rotors_B_m(vehicle: &Vehicle) -> Vector3<f64> {
-    vehicle.rotors.iter().map(|rotor| rotor.position_m).sum::<Vector3<f64>>() / 4.0
+    vehicle.rotors.iter().map(|rotor| rotor.position_m).sum::<Vector3<f64>>() / vehicle.rotors.len() as f64
 }
 
 /// Each action of each effect, in order.

@@ -5,6 +5,7 @@
 
 use crate::actuation::Actuation;
 use crate::saved::{Reader, Saved, Unfit, Writer, saved_fields};
+use crate::state::{PerRotor, paired};
 use bus::random::{Stream, normal};
 
 /// What the effects of one airframe carry from tick to tick; made by
@@ -25,26 +26,33 @@ saved_fields!(AirframeState { actuation, commands, effects });
 pub struct EffectState {
     /// The effect's own numbers, zeros at the start.
     pub numbers: [f64; 4],
+    /// A number for each rotor, zeros at the start.
+    pub rotors: PerRotor<f64>,
     random: Stream,
 }
 
-saved_fields!(EffectState { numbers, random });
+saved_fields!(EffectState { numbers, rotors, random });
 
 impl EffectState {
-    pub(crate) fn new(random: Stream) -> Self {
-        Self { numbers: [0.0; 4], random }
+    pub(crate) fn new(random: Stream, rotors: usize) -> Self {
+        Self { numbers: [0.0; 4], rotors: PerRotor::filled(rotors, 0.0), random }
+    }
+
+    /// The next draw from the normal distribution of mean 0 and variance 1.
+    pub fn normal(&mut self) -> f64 {
+        normal(&mut self.random)
     }
 
     /// The next four draws from the normal distribution of mean 0 and variance 1.
     pub fn normals(&mut self) -> [f64; 4] {
-        std::array::from_fn(|_| normal(&mut self.random))
+        std::array::from_fn(|_| self.normal())
     }
 }
 
 /// The commands of the last ticks, in a ring.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct DelayLine {
-    ring: Vec<[f64; 4]>,
+    ring: Vec<PerRotor<f64>>,
     newest: usize,
     is_empty: bool,
 }
@@ -72,27 +80,33 @@ impl Saved for DelayLine {
 }
 
 impl DelayLine {
-    /// A line that holds commands for up to `ticks`.
-    pub(crate) fn new(ticks: f64) -> Self {
-        Self { ring: vec![[0.0; 4]; ticks.ceil() as usize + 2], newest: 0, is_empty: true }
+    /// A line that holds commands of `rotors` motors for up to `ticks`.
+    pub(crate) fn new(ticks: f64, rotors: usize) -> Self {
+        let none = PerRotor::filled(rotors, 0.0);
+        Self { ring: vec![none; ticks.ceil() as usize + 2], newest: 0, is_empty: true }
     }
 
     /// Takes the commands of this tick and gives those of `ticks` before, linear between two ticks. The first
     /// commands count as held since ever. More ticks than the line was made for count as as many as it holds.
-    pub(crate) fn pass(&mut self, commands: &[f64; 4], ticks: f64) -> [f64; 4] {
+    pub(crate) fn pass(&mut self, commands: &[f64], ticks: f64) -> PerRotor<f64> {
+        let commands = PerRotor::from_iter(commands.iter().copied());
         if self.is_empty {
-            self.ring.fill(*commands);
+            self.ring.fill(commands);
             self.is_empty = false;
         }
         self.newest = (self.newest + 1) % self.ring.len();
-        self.ring[self.newest] = *commands;
+        self.ring[self.newest] = commands;
         let held = ticks.min((self.ring.len() - 2) as f64);
         let (whole, part) = (held.floor(), held.fract());
         let (late, later) = (self.back(whole as usize), self.back(whole as usize + 1));
-        if part == 0.0 { late } else { std::array::from_fn(|i| late[i] * (1.0 - part) + later[i] * part) }
+        if part == 0.0 {
+            late
+        } else {
+            paired(&late, &later, |late, later| late * (1.0 - part) + later * part)
+        }
     }
 
-    fn back(&self, ticks: usize) -> [f64; 4] {
+    fn back(&self, ticks: usize) -> PerRotor<f64> {
         self.ring[(self.newest + self.ring.len() - ticks) % self.ring.len()]
     }
 }
@@ -103,21 +117,21 @@ mod tests {
 
     #[test]
     fn a_delay_of_whole_ticks_gives_the_very_numbers_back() {
-        let mut line = DelayLine::new(3.0);
+        let mut line = DelayLine::new(3.0, 4);
         let given: Vec<_> = (0..10).map(|k| line.pass(&[f64::from(k) + 0.1; 4], 3.0)[0]).collect();
         assert_eq!(given, [0.1, 0.1, 0.1, 0.1, 1.1, 2.1, 3.1, 4.1, 5.1, 6.1]);
     }
 
     #[test]
     fn a_part_of_a_tick_lies_between_its_ends() {
-        let mut line = DelayLine::new(1.25);
+        let mut line = DelayLine::new(1.25, 4);
         let given: Vec<_> = (0..5).map(|k| line.pass(&[f64::from(k); 4], 1.25)[2]).collect();
         assert_eq!(given, [0.0, 0.0, 0.75, 1.75, 2.75]);
     }
 
     #[test]
     fn no_delay_passes_commands_through() {
-        let mut line = DelayLine::new(0.0);
+        let mut line = DelayLine::new(0.0, 4);
         for k in 0..5 {
             assert_eq!(line.pass(&[f64::from(k); 4], 0.0), [f64::from(k); 4]);
         }

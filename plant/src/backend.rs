@@ -18,12 +18,12 @@ pub trait Backend: Send {
     /// What sensors at the centre of mass measure at the end of the last tick.
     fn accelerations(&self) -> Accelerations;
 
-    /// Moves the vehicle by one tick of `dt_s` under raw motor `commands` held over it. `traffic` are the other
+    /// Moves the vehicle by one tick of `dt_s` under raw motor `commands`, one for each rotor, held over it. `traffic` are the other
     /// vehicles as they were at the start of the tick, always the same ones in the same order.
-    fn step(&mut self, commands: &[f64; 4], dt_s: f64, traffic: &[Neighbour]);
+    fn step(&mut self, commands: &[f64], dt_s: f64, traffic: &[Neighbour]);
 
     /// Has the rotors turn steadily at raw motor `commands`.
-    fn settle_rotors(&mut self, commands: &[f64; 4]);
+    fn settle_rotors(&mut self, commands: &[f64]);
 
     /// Puts the body where it is said to be; the rotors stay as they are.
     fn set_body(&mut self, body: &RigidBody);

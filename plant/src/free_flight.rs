@@ -58,13 +58,13 @@ impl Backend for FreeFlight {
         self.model.accelerations_under(&self.effects.actuation, &self.state)
     }
 
-    fn step(&mut self, commands: &[f64; 4], dt_s: f64, _traffic: &[Neighbour]) {
+    fn step(&mut self, commands: &[f64], dt_s: f64, _traffic: &[Neighbour]) {
         let actuation = self.model.airframe().begin_tick(&mut self.effects, &self.state, commands, dt_s);
         self.model.advance(&mut self.state, &actuation, dt_s);
     }
 
-    fn settle_rotors(&mut self, commands: &[f64; 4]) {
-        self.state.rotors = commands.map(|command| self.model.steady(command));
+    fn settle_rotors(&mut self, commands: &[f64]) {
+        self.state.rotors = self.model.steady_each(commands);
     }
 
     fn set_body(&mut self, body: &RigidBody) {

@@ -74,4 +74,4 @@ pub use memory::PlantMemory;
 pub use newton_euler::{Accelerations, NewtonEuler};
 pub use rapier::Rapier;
 pub use rotor::Wrench;
-pub use state::{RigidBody, RotorState, State};
+pub use state::{PerRotor, RigidBody, RotorState, State};

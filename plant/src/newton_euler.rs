@@ -11,7 +11,7 @@ use vehicles::Vehicle;
 use crate::actuation::Actuation;
 use crate::airframe::Airframe;
 use crate::rotation::rotated;
-use crate::state::{BodyRates, Rates, RigidBody, RotorRates, RotorState, State};
+use crate::state::{BodyRates, PerRotor, Rates, RigidBody, RotorRates, RotorState, State};
 
 /// The model: immutable, while the [`State`] it moves belongs to the caller.
 ///
@@ -83,9 +83,14 @@ impl NewtonEuler {
         RotorState::steady(self.vehicle().command.speed(command))
     }
 
-    /// A state with all four rotors settled at the same raw motor command.
+    /// Rotors that have settled at raw motor `commands`.
+    pub(crate) fn steady_each(&self, commands: &[f64]) -> PerRotor<RotorState> {
+        commands.iter().map(|command| self.steady(*command)).collect()
+    }
+
+    /// A state with all rotors settled at the same raw motor command.
     pub fn start(&self, body: RigidBody, command: f64) -> State {
-        State { body, rotors: [self.steady(command); 4] }
+        State { body, rotors: PerRotor::filled(self.vehicle().rotors.len(), self.steady(command)) }
     }
 
     /// Moves `state` by one tick of `dt_s` under raw motor `commands` held over the tick, as the declared vehicle
@@ -93,7 +98,7 @@ impl NewtonEuler {
     ///
     /// # Panics
     /// If the airframe has effects: some of them have a state, which [`NewtonEuler::advance`] sees by the actuation.
-    pub fn step(&self, state: &mut State, commands: &[f64; 4], dt_s: f64) {
+    pub fn step(&self, state: &mut State, commands: &[f64], dt_s: f64) {
         assert!(self.airframe.effects().is_empty(), "effects need begin_tick and advance");
         self.advance(state, &self.airframe.commanded(commands), dt_s);
     }
@@ -110,7 +115,7 @@ impl NewtonEuler {
 
     /// Specific force and angular acceleration at `state`, in still air.
     pub fn accelerations(&self, state: &State) -> Accelerations {
-        self.accelerations_under(&Actuation::default(), state)
+        self.accelerations_under(&Actuation::none(state.rotors.len()), state)
     }
 
     /// Specific force and angular acceleration at `state`, with what acts over the tick that ends there.

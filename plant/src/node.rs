@@ -9,7 +9,7 @@ use crate::memory::PlantMemory;
 use crate::origin::Origin;
 use crate::others::OthersError;
 use crate::output::Outputs;
-use crate::parameters::Parameters;
+use crate::parameters::{Parameters, unequal};
 use crate::state::RigidBody;
 use bus::InputPorts;
 use bus::component::{Component, Info, StepError};
@@ -38,7 +38,7 @@ pub struct Inputs<'a> {
 /// let vehicle = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
 /// let parameters = serde_json::json!({ "vehicle": vehicle, "initial_position_m": [0.0, 0.0, 1.0] });
 /// let mut plant = bus::Harness::<Plant>::from_json(&parameters).unwrap();
-/// let command = MotorCommand::default();
+/// let command = MotorCommand { command: [0.0; 4].into(), ..MotorCommand::default() };
 /// let inputs = || Inputs { command: &command, measured: None, traffic: None };
 /// let state = (0..=100).map(|_| plant.step(inputs()).unwrap().state).last().unwrap();
 /// assert!(state.position.z < 1.0 && state.velocity.z < 0.0, "with its rotors off it falls: {state:?}");
@@ -84,6 +84,7 @@ impl Component for Plant {
         if context.predecessor::<Outputs>().is_some() {
             return Err(NO_STATE.into());
         }
+        self.require_count(&inputs.command.command)?;
         if context.tick() > 0 {
             self.fly(context, &inputs, memory)?;
         } else {
@@ -108,6 +109,15 @@ impl Component for Plant {
 }
 
 impl Plant {
+    /// Refuses a command that does not have one number for each rotor.
+    fn require_count(&self, commands: &[f64]) -> Result<(), StepError> {
+        let vehicle = self.origin.model.vehicle();
+        match commands.len() {
+            found if found == vehicle.rotors.len() => Ok(()),
+            found => Err(unequal(vehicle, "its input", found).into()),
+        }
+    }
+
     /// Moves the vehicle by the tick that ends now.
     fn fly(
         &self,
@@ -148,6 +158,7 @@ fn body(vectors: [messages::Vector3; 3], q: messages::Quaternion) -> RigidBody {
 mod tests {
     use super::*;
     use bus::Registration;
+    use bus::context::InputMessage;
     use serde_json::{Value, json};
 
     fn repository(file: &str) -> String {
@@ -175,6 +186,33 @@ mod tests {
         }
         let measured = json!({ "initial_position_m": [5.05, 0.0, 1.0], "window_s": 0.1 });
         assert_eq!(checked("scenes/room.toml", measured, &["measured"]), Ok(()));
+    }
+
+    #[test]
+    fn a_command_without_a_number_for_each_rotor_is_refused() {
+        let parameters = json!({ "vehicle": repository("vehicles/hummingbird.toml") });
+        let step = |command: &[f64]| {
+            let command = MotorCommand { command: command.iter().copied().collect(), ..Default::default() };
+            let inputs = Inputs { command: &command, measured: None, traffic: None };
+            let mut plant = bus::Harness::<Plant>::from_json(&parameters).unwrap();
+            plant.step(inputs).map(|outputs| outputs.state.rotor_speed.len())
+        };
+        assert_eq!(step(&[76.5; 4]).unwrap(), 4);
+        for count in [0, 3, 6, 12] {
+            let error = step(&[76.5; 12][..count]).unwrap_err().to_string();
+            assert!(error.contains(&format!("`command` has {count} motor commands, expected 4")), "{error}");
+        }
+        let initial = |value: &Value| {
+            let message = InputMessage { port: "command", bytes: 112, period_ticks: 1, initial: Some(value) };
+            let messages = [message];
+            let context = NodeContext::new("plant", &["command"]).reading(&messages);
+            Registration::of::<Plant>().check(&parameters, &context)
+        };
+        assert_eq!(initial(&json!({ "command": [76.5, 76.5, 76.5, 76.5] })), Ok(()));
+        for (value, count) in [(json!({}), 0), (json!({ "command": [76.5] }), 1)] {
+            let error = initial(&value).unwrap_err().to_string();
+            assert!(error.contains(&format!("initial value of its input `command` has {count}")), "{error}");
+        }
     }
 
     #[test]

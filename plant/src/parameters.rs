@@ -64,6 +64,26 @@ fn two() -> u32 {
     2
 }
 
+/// Refuses an initial command that does not have one number for each rotor.
+fn refuse_initial(vehicle: &Vehicle, run: &NodeContext<'_>) -> Result<(), ParameterError> {
+    let command = run.messages.iter().find(|input| input.port == "command");
+    let count = vehicle.rotors.len();
+    let wrong = command.and_then(|input| input.initial_count("command")).filter(|found| *found != count);
+    wrong.map_or(Ok(()), |found| {
+        refuse(true, "vehicle", || unequal(vehicle, "the initial value of its input", found))
+    })
+}
+
+/// The words on a command of `holder` that has `found` numbers.
+pub(crate) fn unequal(vehicle: &Vehicle, holder: &str, found: usize) -> String {
+    format!(
+        "{holder} `command` has {found} motor commands, expected {}, one for each rotor of `vehicle` \"{}\"; give plant \
+         and controller the same vehicle file, or correct the input's `initial`",
+        vehicle.rotors.len(),
+        vehicle.name
+    )
+}
+
 impl Parameters {
     /// Refuses ports that do not go with the scene's free bodies.
     fn refuse_ports(&self, scene: &Scene, run: &NodeContext<'_>) -> Result<(), ParameterError> {
@@ -146,6 +166,7 @@ impl Parameters {
         self.check(run)?;
         let (airframe, scene) = self.airframe(&run.files)?;
         self.refuse_ports(&scene, run)?;
+        refuse_initial(airframe.vehicle(), run)?;
         // Before the backend, which a vehicle that is none might not survive.
         airworthy::tell_unsourced(airframe.vehicle(), run);
         airworthy::check_rotor_inertia(airframe.vehicle())?;

@@ -247,7 +247,7 @@ impl Backend for Rapier {
         }
     }
 
-    fn step(&mut self, commands: &[f64; 4], dt_s: f64, traffic: &[Neighbour]) {
+    fn step(&mut self, commands: &[f64], dt_s: f64, traffic: &[Neighbour]) {
         let actuation =
             self.motion.model.airframe().begin_tick(&mut self.effects, &self.motion.state, commands, dt_s);
         let span_s = dt_s / f64::from(self.motion.model.substeps());
@@ -274,8 +274,8 @@ impl Backend for Rapier {
         };
     }
 
-    fn settle_rotors(&mut self, commands: &[f64; 4]) {
-        self.motion.state.rotors = commands.map(|command| self.motion.model.steady(command));
+    fn settle_rotors(&mut self, commands: &[f64]) {
+        self.motion.state.rotors = self.motion.model.steady_each(commands);
         self.lean_on_support();
     }
 

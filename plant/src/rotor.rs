@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 use std::ops::AddAssign;
 use vehicles::{Rotor, Vehicle};
 
-use crate::state::{RotorRates, RotorState};
+use crate::state::{PerRotor, RotorRates, RotorState};
 
 /// A force and a torque about the centre of mass, both written in the body frame.
 ///
@@ -56,13 +56,13 @@ pub(crate) fn drag_torque_N_m(vehicle: &Vehicle, rotor: &Rotor, speed_rad_s: f64
     vehicle.torque_coefficient * speed_rad_s * speed_rad_s.abs() * rotor.torque_scale
 }
 
-/// The wrench of all four rotors with these thrusts on a body that turns with `angular_velocity_B_rad_s`. Rotors are summed in the
+/// The wrench of all rotors with these thrusts on a body that turns with `angular_velocity_B_rad_s`. Rotors are summed in the
 /// order of the motor commands; the order is part of the result, as float addition is not associative.
 pub(crate) fn wrench(
     vehicle: &Vehicle,
-    thrusts_N: &[f64; 4],
-    rotors: &[RotorState; 4],
-    rates: &[RotorRates; 4],
+    thrusts_N: &PerRotor<f64>,
+    rotors: &PerRotor<RotorState>,
+    rates: &PerRotor<RotorRates>,
     angular_velocity_B_rad_s: &Vector3<f64>,
 ) -> Wrench {
     let (mut lift_N, mut torque_B_N_m) = (0.0, Vector3::zeros());

@@ -163,6 +163,21 @@ impl<T: Saved, const N: usize> Saved for [T; N] {
     }
 }
 
+/// The values that there are: their count follows from the configuration.
+impl<T: Saved, const N: usize> Saved for bus::Bounded<T, N> {
+    fn size(&self) -> usize {
+        self.iter().map(T::size).sum()
+    }
+
+    fn save(&self, to: &mut Writer<'_>) {
+        self.iter().for_each(|item| item.save(to));
+    }
+
+    fn load(&mut self, from: &mut Reader<'_>) -> Result<(), Unfit> {
+        self.iter_mut().try_for_each(|item| item.load(from))
+    }
+}
+
 /// A vector whose length follows from the configuration.
 impl<T: Saved> Saved for Vec<T> {
     fn size(&self) -> usize {

@@ -1,7 +1,9 @@
-//! The state that the integrator moves: one rigid body and four rotors, in SI units.
+//! The state that the integrator moves: one rigid body and its rotors, in SI units.
 
 use crate::saved::saved_fields;
+use bus::Bounded;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use vehicles::ROTORS_MAX;
 
 /// Pose and motion of the body frame B (x forward, y left, z up) in the world frame W (z up).
 ///
@@ -25,6 +27,18 @@ pub struct RigidBody {
     pub angular_velocity_B_rad_s: Vector3<f64>,
 }
 
+/// A value for each rotor of a vehicle, in the order of the motor commands.
+///
+/// ```
+/// use plant::{PerRotor, RotorState};
+///
+/// let rotors = PerRotor::filled(6, RotorState::steady(400.0));
+/// assert_eq!(rotors.map(|rotor| rotor.speed_rad_s), [400.0; 6]);
+/// ```
+pub type PerRotor<T> = Bounded<T, ROTORS_MAX>;
+
+const _: () = assert!(ROTORS_MAX == bus::messages::ROTORS_MAX, "messages have room for all rotors");
+
 /// One rotor's speed relative to the body, positive in the rotor's own sense of rotation.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct RotorState {
@@ -40,7 +54,7 @@ pub struct State {
     /// The rigid body.
     pub body: RigidBody,
     /// The rotors, in the order of the motor commands.
-    pub rotors: [RotorState; 4],
+    pub rotors: PerRotor<RotorState>,
 }
 
 saved_fields!(RigidBody { position_W_m, velocity_W_m_s, attitude_WB, angular_velocity_B_rad_s });
@@ -82,7 +96,7 @@ impl RotorState {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Rates {
     pub body: BodyRates,
-    pub rotors: [RotorRates; 4],
+    pub rotors: PerRotor<RotorRates>,
 }
 
 /// Rates of change of every component of a [`RigidBody`].
@@ -95,10 +109,19 @@ pub(crate) struct BodyRates {
 }
 
 /// Rates of change of a [`RotorState`].
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct RotorRates {
     pub acceleration_rad_s2: f64,
     pub jerk_rad_s3: f64,
+}
+
+/// A value for each rotor, made from two of its values.
+pub(crate) fn paired<A, B, T: Copy + Default>(
+    a: &PerRotor<A>,
+    b: &PerRotor<B>,
+    value: impl Fn(&A, &B) -> T,
+) -> PerRotor<T> {
+    a.iter().zip(b).map(|(a, b)| value(a, b)).collect()
 }
 
 impl Rates {
@@ -106,7 +129,7 @@ impl Rates {
     pub fn plus(&self, other: &Rates, factor: f64) -> Rates {
         Rates {
             body: self.body.plus(&other.body, factor),
-            rotors: std::array::from_fn(|i| self.rotors[i].plus(&other.rotors[i], factor)),
+            rotors: paired(&self.rotors, &other.rotors, |rates, other| rates.plus(other, factor)),
         }
     }
 }
@@ -138,7 +161,7 @@ impl State {
     pub(crate) fn moved(&self, rates: &Rates, span_s: f64) -> State {
         State {
             body: self.body.moved(&rates.body, span_s),
-            rotors: std::array::from_fn(|i| self.rotors[i].moved(&rates.rotors[i], span_s)),
+            rotors: paired(&self.rotors, &rates.rotors, |rotor, rates| rotor.moved(rates, span_s)),
         }
     }
 }

@@ -113,7 +113,7 @@ fn lively() -> State {
     body.velocity_W_m_s = Vector3::new(2.0, -1.5, 0.7);
     body.attitude_WB = UnitQuaternion::new_normalize(Quaternion::new(0.95, 0.15, -0.2, 0.1));
     body.angular_velocity_B_rad_s = Vector3::new(0.8, -0.6, 0.9);
-    State { body, rotors: [380.0, 410.0, 430.0, 400.0].map(RotorState::steady) }
+    State { body, rotors: [380.0, 410.0, 430.0, 400.0].map(RotorState::steady).into() }
 }
 
 fn end(effects: &[Effect]) -> State {
@@ -211,7 +211,7 @@ prop_compose! {
         speeds in prop::array::uniform4(-50.0..1500.0),
     ) -> State {
         let body = RigidBody { position_W_m, velocity_W_m_s, attitude_WB, angular_velocity_B_rad_s };
-        State { body, rotors: speeds.map(RotorState::steady) }
+        State { body, rotors: speeds.map(RotorState::steady).into() }
     }
 }
 
@@ -378,7 +378,7 @@ proptest! {
         let effect = between_bounds(find("ground-effect").unwrap(), &shares);
         let at = |height_m: f64| {
             let body = RigidBody::level_at(Vector3::z() * height_m);
-            let state = State { body, rotors: [RotorState::steady(400.0); 4] };
+            let state = State { body, rotors: [RotorState::steady(400.0); 4].into() };
             answer(&effect, &FlightCondition::new(&vehicle, &state, &Vector3::zeros()))[6]
         };
         let (low, high, far) = (at(low_m), at(low_m + step_m), at(1000.0));
@@ -393,7 +393,7 @@ fn lags(name: &str, values: Values, height_m: f64, dt_s: f64, ticks: usize) -> V
     let airframe = Airframe::with_effects(hummingbird(), vec![effect]);
     let mut carried = airframe.initial_state(3, "plant", dt_s);
     let body = RigidBody::level_at(Vector3::z() * height_m);
-    let state = State { body, rotors: [RotorState::steady(400.0); 4] };
+    let state = State { body, rotors: [RotorState::steady(400.0); 4].into() };
     (0..ticks).map(|_| airframe.begin_tick(&mut carried, &state, &[76.5; 4], dt_s)).collect()
 }
 

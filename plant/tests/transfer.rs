@@ -16,7 +16,7 @@ fn repository(file: &str) -> String {
 fn commands() -> Vec<MotorCommand> {
     let command = |tick: u32| {
         let swing = 8.0 * libm::sin(f64::from(tick) * 0.02);
-        MotorCommand { command: [76.0 + swing, 76.5, 76.0 - swing, 75.5], ..Default::default() }
+        MotorCommand { command: [76.0 + swing, 76.5, 76.0 - swing, 75.5].into(), ..Default::default() }
     };
     (0..3000).map(command).collect()
 }

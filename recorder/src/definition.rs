@@ -363,7 +363,8 @@ mod tests {
         let definition =
             Definition::parse(MotorCommand::SCHEMA.type_name, &MotorCommand::SCHEMA.ros2_definition())
                 .unwrap();
-        let message = MotorCommand { stamp: Time { sec: 3, nanosec: 4 }, command: [1.0, 2.0, 3.0, 4.5] };
+        let message =
+            MotorCommand { stamp: Time { sec: 3, nanosec: 4 }, command: [1.0, 2.0, 3.0, 4.5].into() };
         let leaves = definition.decode(&cdr(&message)).unwrap();
         let paths: Vec<_> = leaves.iter().map(|leaf| leaf.path.as_str()).collect();
         assert_eq!(paths[..3], ["stamp.sec", "stamp.nanosec", "command[0]"]);
@@ -392,7 +393,8 @@ mod tests {
         let definition =
             Definition::parse(MotorCommand::SCHEMA.type_name, &MotorCommand::SCHEMA.ros2_definition())
                 .unwrap();
-        let error = definition.decode(&cdr(&MotorCommand::default())[..20]).unwrap_err();
+        let message = MotorCommand { command: [1.0; 4].into(), ..MotorCommand::default() };
+        let error = definition.decode(&cdr(&message)[..20]).unwrap_err();
         assert!(error.to_string().contains("a value of 8 bytes is due at 16"), "{error}");
     }
 

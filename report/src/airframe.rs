@@ -94,7 +94,7 @@ pub struct Body {
     /// What touches: that of the backend `rapier`.
     pub touching: Vec<Part>,
     centre_B_m: Vector3<f64>,
-    rotors_B_m: [Vector3<f64>; 4],
+    rotors_B_m: Vec<Vector3<f64>>,
     reach_m: f64,
 }
 
@@ -104,7 +104,7 @@ impl Body {
     #[must_use]
     pub fn of(airframe: &Airframe) -> Option<Self> {
         let (vehicle, hull) = (airframe.vehicle(), Hull::of(airframe));
-        let rotors_B_m = vehicle.rotors.each_ref().map(|rotor| rotor.position_m);
+        let rotors_B_m: Vec<_> = vehicle.rotors.iter().map(|rotor| rotor.position_m).collect();
         let arm_m =
             rotors_B_m.iter().map(|at_B_m| (at_B_m - hull.centre_B_m).xy().norm()).fold(0.0, f64::max);
         if arm_m <= 0.0 {

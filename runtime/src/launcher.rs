@@ -73,7 +73,7 @@ pub struct Outcome {
 ///     }
 ///     fn initial(&self) {}
 ///     fn step(&self, _: &StepContext<'_>, (): (), (): &mut ()) -> Result<Outputs, StepError> {
-///         Ok(Outputs { command: MotorCommand { command: [76.5; 4], ..Default::default() } })
+///         Ok(Outputs { command: MotorCommand { command: [76.5; 4].into(), ..Default::default() } })
 ///     }
 /// }
 /// const COMPONENTS: Registry = Registry::new(&[

@@ -11,7 +11,7 @@ use crate::sensing::TruthInputs;
 use crate::wire::{vector, vector_message};
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
-use bus::messages::{Imu, PlantState, Vector3};
+use bus::messages::{Imu, PlantState, ROTORS_MAX, Vector3};
 use bus::random::Stream;
 use bus::{Message, OutputPorts};
 use diagnostics::ParameterError;
@@ -37,7 +37,7 @@ pub struct ImuState {
     readings: u64,
     /// The angle of each rotor, from where it started.
     #[field(unit = "rad")]
-    rotor_angles: [f64; 4],
+    rotor_angles: [f64; ROTORS_MAX],
     /// The true angular velocity at the last reading.
     #[field(unit = "rad/s", frame = "body")]
     last_angular_velocity: Vector3,
@@ -284,7 +284,8 @@ mod tests {
             gyroscope_resolution_rad_s: 1e-3,
             ..ImuParams::default()
         };
-        let truth_at = |tick| PlantState { rotor_speed: [400.0, 410.0, 390.0, 405.0], ..truth_at(tick) };
+        let truth_at =
+            |tick| PlantState { rotor_speed: [400.0, 410.0, 390.0, 405.0].into(), ..truth_at(tick) };
         let truths: Vec<_> = (0..2000).map(truth_at).collect();
         Harness::require_transfer(|| imu(params), |tick| TruthInputs { state: &truths[tick as usize] });
         let mut imu = imu(params);

@@ -6,11 +6,13 @@
 
 use crate::imu_model::{ImuParams, ImuReading};
 use crate::steps::in_steps;
+use bus::messages::{PerRotor, ROTORS_MAX};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
 
-/// Where the rotors stand at the first reading: a golden angle apart, so that no two shake alike.
-const START_ANGLES_RAD: [f64; 4] = [0.0, 2.4, 4.8, 0.917];
+/// Angles of the rotors at the first reading: a golden angle apart, so that no two shake alike.
+const START_ANGLES_RAD: [f64; ROTORS_MAX] =
+    [0.0, 2.4, 4.8, 0.917, 3.317, 5.717, 1.834, 4.234, 0.35, 2.75, 5.15, 1.267];
 
 /// The part at one sample rate.
 ///
@@ -22,7 +24,7 @@ const START_ANGLES_RAD: [f64; 4] = [0.0, 2.4, 4.8, 0.917];
 /// let params = ImuParams { position_m: [0.1, 0.0, 0.0], ..ImuParams::default() };
 /// let part = ImuPart::new(params, 1000.0);
 /// let motion = ImuReading { angular_velocity_B_rad_s: Vector3::z() * 2.0, ..ImuReading::default() };
-/// let truth = ImuMotion { motion, rotor_speeds_rad_s: [400.0; 4], time_s: 0.0 };
+/// let truth = ImuMotion { motion, rotor_speeds_rad_s: [400.0; 4].into(), time_s: 0.0 };
 /// let felt = part.feel(&mut ImuPartState::default(), &truth).specific_force_B_m_s2;
 /// assert!((felt.x + 0.4).abs() < 1e-12, "10 cm off a turn of 2 rad/s, in m/s^2: {felt:?}");
 /// ```
@@ -44,7 +46,7 @@ pub struct ImuPartState {
     /// Readings so far.
     pub readings: u64,
     /// The angle of each rotor, 0 to 2π, from where it started.
-    pub rotor_angles_rad: [f64; 4],
+    pub rotor_angles_rad: [f64; ROTORS_MAX],
     /// The true angular velocity at the last reading.
     pub last_B_rad_s: Vector3<f64>,
     /// What has come through the filters.
@@ -57,7 +59,7 @@ pub struct ImuMotion {
     /// At the centre of mass, in body axes.
     pub motion: ImuReading,
     /// Rotor speeds.
-    pub rotor_speeds_rad_s: [f64; 4],
+    pub rotor_speeds_rad_s: PerRotor,
     /// Since the part was switched on.
     pub time_s: f64,
 }
@@ -131,7 +133,7 @@ impl ImuPart {
         if state.readings == 0 {
             state.rotor_angles_rad = START_ANGLES_RAD;
         }
-        let senses = [1.0, -1.0, 1.0, -1.0];
+        let senses = [1.0, -1.0].into_iter().cycle();
         let rotors = state.rotor_angles_rad.iter_mut().zip(truth.rotor_speeds_rad_s).zip(senses);
         for ((angle_rad, speed_rad_s), sense) in rotors {
             if state.readings > 0 {
@@ -198,7 +200,7 @@ mod tests {
                 specific_force_B_m_s2: Vector3::new(0.3, -0.2, 9.81),
                 angular_velocity_B_rad_s: Vector3::new(0.1, -0.7, 0.02),
             },
-            rotor_speeds_rad_s: [400.0, 410.0, 420.0, 430.0],
+            rotor_speeds_rad_s: [400.0, 410.0, 420.0, 430.0].into(),
             time_s: 0.0,
         }
     }
@@ -246,7 +248,7 @@ mod tests {
             ..ImuParams::default()
         };
         let (part, mut state) = (part(params), ImuPartState::default());
-        let truth = ImuMotion { rotor_speeds_rad_s: [400.0, 0.0, 0.0, 0.0], ..moving() };
+        let truth = ImuMotion { rotor_speeds_rad_s: [400.0, 0.0, 0.0, 0.0].into(), ..moving() };
         let (mut at_speed, mut elsewhere) = ([0.0; 2], [0.0; 2]);
         for tick in 0..10_000 {
             let felt = part.feel(&mut state, &truth);

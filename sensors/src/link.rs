@@ -260,7 +260,7 @@ impl State for LinkMemory {
 /// use bus::context::{InputMessage, NodeContext};
 /// use sensors::link::Link;
 /// # use serde_json::json;
-/// let messages = [InputMessage { port: "estimate", bytes: 96, period_ticks: 1 }];
+/// let messages = [InputMessage { port: "estimate", bytes: 96, period_ticks: 1, initial: None }];
 /// let context = NodeContext::new("down", &["estimate"]).reading(&messages);
 /// Link::new(diagnostics::read(&json!({ "streams": { "estimate": { "rate_hz": 25.0 } } }))?, &context)?;
 /// // 107 bytes a millisecond are more than 57 600 baud carry.

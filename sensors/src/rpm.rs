@@ -7,8 +7,8 @@
 use crate::channel::Chance;
 use crate::sensing::{Sensor, TruthInputs};
 use crate::steps::in_steps;
-use bus::component::Info;
-use bus::messages::RotorSpeeds;
+use bus::component::{Info, StepError};
+use bus::messages::{ROTORS_MAX, RotorSpeeds};
 use bus::random::normal;
 use diagnostics::parameter::{ParameterError, not_negative, require};
 use inputs::InputFiles;
@@ -27,8 +27,9 @@ parameters! {
     ///
     /// let parameters = RpmParams { half_reading_rotor: 2, ..RpmParams::default() };
     /// let mut rpm = bus::Harness::<Sensing<RpmParams>>::new(parameters).unwrap();
-    /// let state = PlantState { rotor_speed: [400.0; 4], ..Default::default() };
-    /// let [first, second, ..] = rpm.step(TruthInputs { state: &state }).unwrap().speeds.rotor_speed;
+    /// let state = PlantState { rotor_speed: [400.0; 4].into(), ..Default::default() };
+    /// let speeds = rpm.step(TruthInputs { state: &state }).unwrap().speeds.rotor_speed;
+    /// let (first, second) = (speeds[0], speeds[1]);
     /// assert!((first - 400.0).abs() < 10.0 && (second - 200.0).abs() < 10.0, "rad/s: {first}, {second}");
     /// ```
     #[derive(Copy)]
@@ -45,14 +46,15 @@ parameters! {
 }
 
 fn rotor(key: &str, number: f64) -> Result<(), ParameterError> {
-    require(key, number, number <= 4.0, "the number of a rotor, 1 to 4, or 0 for none")
+    let expected = format!("the number of a rotor, 1 to {ROTORS_MAX}, or 0 for none");
+    require(key, number, number <= ROTORS_MAX as f64, expected)
 }
 
 sensor! {
     pub struct RpmState as "hummingbus_msgs/msg/RpmState" sends speeds: RotorSpeeds {
         /// What was read last, whether it was lost or not.
         #[field(unit = "rad/s")]
-        read: [f64; 4],
+        read: [f64; ROTORS_MAX],
         /// 1 from the first reading on.
         #[field(unit = "1")]
         has_read: u64,
@@ -69,6 +71,20 @@ impl Sensor for RpmParams {
 
     fn made_of(parameters: Self, _: &InputFiles) -> Result<Self, ParameterError> {
         Ok(parameters)
+    }
+
+    /// The vehicle's rotors are known with its first state.
+    fn check_inputs(&self, inputs: &TruthInputs<'_>) -> Result<(), StepError> {
+        let count = inputs.state.rotor_speed.len();
+        let faults = [("stuck_rotor", self.stuck_rotor), ("half_reading_rotor", self.half_reading_rotor)];
+        match faults.into_iter().find(|(_, rotor)| *rotor > count) {
+            Some((key, rotor)) => Err(format!(
+                "`{key}` is {rotor}, expected the number of a rotor, 1 to {count}: its input `state` has {count} rotor \
+                 speeds"
+            )
+            .into()),
+            None => Ok(()),
+        }
     }
 
     fn measure(
@@ -88,7 +104,8 @@ impl Sensor for RpmParams {
             }
         }
         state.has_read = 1;
-        Some(RotorSpeeds { rotor_speed: state.read, ..Default::default() })
+        let rotor_speed = inputs.state.rotor_speed.iter().zip(state.read).map(|(_, read)| read).collect();
+        Some(RotorSpeeds { rotor_speed, ..Default::default() })
     }
 }
 
@@ -97,15 +114,15 @@ mod tests {
     use super::*;
     use crate::testing::{harness, refusal, require_normal};
     use bus::Harness;
-    use bus::messages::PlantState;
+    use bus::messages::{PerRotor, PlantState};
 
     fn truth_at(time_s: f64) -> PlantState {
-        let rotor_speed = [400.0, 410.0 + 50.0 * time_s, 420.0, 430.0];
+        let rotor_speed = [400.0, 410.0 + 50.0 * time_s, 420.0, 430.0].into();
         PlantState { rotor_speed, ..Default::default() }
     }
 
     /// Readings every 5 ms while the second rotor speeds up.
-    fn readings(params: &RpmParams, count: u64) -> Vec<[f64; 4]> {
+    fn readings(params: &RpmParams, count: u64) -> Vec<PerRotor> {
         let mut sensor = harness::<RpmParams>(*params, 5);
         let sample = |n: u64| {
             let state = truth_at(n as f64 * 5e-3);
@@ -147,6 +164,17 @@ mod tests {
     }
 
     #[test]
+    fn it_reads_as_many_rotors_as_there_are_and_refuses_a_fault_of_another() {
+        let six = PlantState { rotor_speed: PerRotor::filled(6, 400.0), ..Default::default() };
+        let read = |params: RpmParams| harness::<RpmParams>(params, 5).step(TruthInputs { state: &six });
+        let half = RpmParams { half_reading_rotor: 6, ..RpmParams::default() };
+        let speeds = read(half).unwrap().speeds.rotor_speed;
+        assert!(speeds.len() == 6 && (speeds[5] - 200.0).abs() < 10.0, "{speeds:?}");
+        let error = read(RpmParams { stuck_rotor: 7, ..RpmParams::default() }).unwrap_err().to_string();
+        assert!(error.contains("`stuck_rotor` is 7") && error.contains("1 to 6"), "{error}");
+    }
+
+    #[test]
     fn a_state_that_is_transferred_goes_on_byte_for_byte() {
         let params = RpmParams { dropout: 0.2, delay_ms: 45.0, stuck_rotor: 3, ..RpmParams::default() };
         let truths: Vec<_> = (0..2000).map(|tick| truth_at(f64::from(tick) * 1e-3)).collect();
@@ -162,7 +190,7 @@ mod tests {
             assert!(reason.contains(&format!("`{key}`")), "{reason}");
         }
         for key in ["stuck_rotor", "half_reading_rotor"] {
-            let reason = refusal::<RpmParams>(&serde_json::json!({ key: 5 }));
+            let reason = refusal::<RpmParams>(&serde_json::json!({ key: 13 }));
             assert!(reason.contains(&format!("`{key}`")), "{reason}");
         }
     }

@@ -20,7 +20,7 @@ macro_rules! sensor {
         /// All that the sensor remembers.
         #[derive(Debug, Clone, Copy, Default, bus::Message)]
         #[repr(C)]
-        #[message(type_name = $type_name)]
+        #[message(type_name = $type_name, role = "state")]
         pub struct $State {
             /// What is under way.
             channel: $crate::channel::ChannelState,

@@ -74,7 +74,7 @@ fn sample(tick: u32, vehicle: usize) -> (PlantState, Reference) {
         position: Vector3 { x: asked.x * sways, y: asked.y * sways, z },
         attitude: Quaternion { x: 0.0, y: 0.0, z: libm::sin(half_yaw), w: libm::cos(half_yaw) },
         angular_velocity: Vector3 { x: 0.0, y: 0.0, z: TAU / LAP_S },
-        rotor_speed: [400.0, 401.0, 402.0, 403.0],
+        rotor_speed: [400.0, 401.0, 402.0, 403.0].into(),
         ..PlantState::default()
     };
     (flown, Reference { position: asked, ..Reference::default() })

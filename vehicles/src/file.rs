@@ -10,7 +10,7 @@ use crate::effects;
 use crate::foreign;
 use crate::provenance::{Provenance, Uncertainty};
 use crate::reader::{Document, Quantity, Section};
-use crate::vehicle::{MotorModel, Rotor, Vehicle};
+use crate::vehicle::{MotorModel, ROTORS_MAX, Rotor, Vehicle};
 use diagnostics::unit::{
     ACCELERATION, INERTIA, LENGTH, MASS, PURE_NUMBER, SPEED, THRUST_COEFFICIENT, TIME, TORQUE_COEFFICIENT,
 };
@@ -137,7 +137,7 @@ fn on_base(
 struct Tables {
     body: Option<(f64, Matrix3<f64>, f64)>,
     rotor: Option<[f64; 3]>,
-    rotors: Option<[Rotor; 4]>,
+    rotors: Option<Vec<Rotor>>,
     motor: Option<MotorModel>,
     command: Option<CommandMap>,
 }
@@ -280,13 +280,15 @@ fn rotor(section: &Section) -> Result<[f64; 3], Diagnostic> {
     Ok(numbers)
 }
 
-fn layout(root: &Section) -> Result<[Rotor; 4], Diagnostic> {
+fn layout(root: &Section) -> Result<Vec<Rotor>, Diagnostic> {
     let sections = root.sections("rotors")?;
     let rotors = sections.iter().map(one_rotor).collect::<Result<Vec<_>, _>>()?;
-    let count = rotors.len();
     // The first table tells where; with none at all, the file's start does.
     let at = sections.first().map_or(0..0, |section| section.at.clone());
-    rotors.try_into().map_err(|_| root.doc.bad(&at, "rotors", "four rotors", format!("{count}")))
+    match rotors.len() {
+        1..=ROTORS_MAX => Ok(rotors),
+        count => Err(root.doc.bad(&at, "rotors", format!("1 to {ROTORS_MAX} rotors"), format!("{count}"))),
+    }
 }
 
 fn one_rotor(section: &Section) -> Result<Rotor, Diagnostic> {

@@ -56,4 +56,4 @@ pub use command::CommandMap;
 pub use effects::EffectEntry;
 pub use file::is_rigid;
 pub use provenance::{Provenance, Stated, Uncertainty};
-pub use vehicle::{MotorModel, Rotor, Vehicle};
+pub use vehicle::{MotorModel, ROTORS_MAX, Rotor, Vehicle};

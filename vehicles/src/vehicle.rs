@@ -8,7 +8,10 @@ use crate::command::CommandMap;
 use crate::effects::EffectEntry;
 use crate::provenance::Provenance;
 
-/// A quadrotor, in SI units.
+/// The most rotors that a vehicle has.
+pub const ROTORS_MAX: usize = 12;
+
+/// A multirotor, in SI units.
 ///
 /// ```
 /// use vehicles::{MotorModel, Vehicle};
@@ -29,8 +32,8 @@ pub struct Vehicle {
     pub inertia_kg_m2: Matrix3<f64>,
     /// Magnitude of gravity; it points along -z of the world.
     pub gravity_m_s2: f64,
-    /// The four rotors, in the order of the motor commands.
-    pub rotors: [Rotor; 4],
+    /// The 1 to [`ROTORS_MAX`] rotors, in the order of the motor commands.
+    pub rotors: Vec<Rotor>,
     /// c_T of T = c_T w^2, in N/(rad/s)^2 (thesis eq. 3.1).
     pub thrust_coefficient: f64,
     /// c_Q of Q = c_Q w^2, in N*m/(rad/s)^2 (thesis eq. 3.2).
@@ -81,12 +84,13 @@ pub enum MotorModel {
 }
 
 impl Vehicle {
-    /// The rotor speed at which four equal thrusts carry the weight: sqrt(m g / (4 c_T)), in rad/s.
+    /// The rotor speed at which n rotors of equal thrust carry the weight: sqrt(m g / (n c_T)), in rad/s.
     /// Infinite for a vehicle whose rotors make no thrust.
     pub fn hover_speed_rad_s(&self) -> f64 {
         #[allow(non_snake_case, reason = "units stand last in names, and the newton is N")]
         let weight_N = self.mass_kg * self.gravity_m_s2;
-        if weight_N == 0.0 { 0.0 } else { (weight_N / (4.0 * self.thrust_coefficient)).sqrt() }
+        let count = self.rotors.len() as f64;
+        if weight_N == 0.0 { 0.0 } else { (weight_N / (count * self.thrust_coefficient)).sqrt() }
     }
 
     /// The raw motor command for hover, saturated to the motors' range.

@@ -45,7 +45,7 @@ fn the_hummingbird_is_the_thesiss() {
     assert!((rpm(bird.command.speed(200.0)) - 8600.0).abs() < 1e-9);
     let names: Vec<_> = bird.rotors.iter().map(|rotor| rotor.name.as_str()).collect();
     assert_eq!(names, ["front", "right", "rear", "left"]);
-    assert_eq!(bird.rotors.each_ref().map(|rotor| rotor.spin), [-1.0, 1.0, -1.0, 1.0]);
+    assert_eq!(bird.rotors.iter().map(|rotor| rotor.spin).collect::<Vec<_>>(), [-1.0, 1.0, -1.0, 1.0]);
 }
 
 #[test]
@@ -201,10 +201,24 @@ fn a_wrong_type_is_named() {
 }
 
 #[test]
-fn three_rotors_are_not_enough() {
-    let cut = HUMMINGBIRD.rfind("[[rotors]]").unwrap();
-    let message = Vehicle::parse(&HUMMINGBIRD[..cut], "bird.toml").unwrap_err().to_string();
-    assert!(message.contains("must be four rotors, found 3"), "{message}");
+fn a_vehicle_has_one_to_twelve_rotors() {
+    let first = HUMMINGBIRD.find("[[rotors]]").unwrap();
+    let last = HUMMINGBIRD.rfind("[[rotors]]").unwrap();
+    let (before, rotor) = (&HUMMINGBIRD[..first], &HUMMINGBIRD[last..]);
+    let parse = |count: usize| Vehicle::parse(&format!("{before}{}", rotor.repeat(count)), "bird.toml");
+    for count in [1, 3, 6, 12] {
+        let vehicle = parse(count).unwrap();
+        assert_eq!(vehicle.rotors.len(), count);
+        let lift_N = count as f64 * vehicle.thrust_coefficient * vehicle.hover_speed_rad_s().powi(2);
+        assert!(
+            (lift_N / (vehicle.mass_kg * vehicle.gravity_m_s2) - 1.0).abs() < 1e-12,
+            "{count}: {lift_N} N"
+        );
+    }
+    for count in [0, 13] {
+        let message = parse(count).unwrap_err().to_string();
+        assert!(message.contains(&format!("must be 1 to 12 rotors, found {count}")), "{message}");
+    }
 }
 
 #[test]

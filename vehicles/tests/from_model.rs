@@ -68,7 +68,7 @@ fn a_urdf_gives_mass_centre_inertia_and_places_of_a_closed_form() {
             close(rotor.position_m[axis], hub[axis] - centre[axis], "hub");
         }
     }
-    assert_eq!(vehicle.rotors.each_ref().map(|rotor| rotor.spin), [-1.0, 1.0, -1.0, 1.0]);
+    assert_eq!(vehicle.rotors.iter().map(|rotor| rotor.spin).collect::<Vec<_>>(), [-1.0, 1.0, -1.0, 1.0]);
     close(vehicle.rotor_inertia_kg_m2, 4e-5, "inertia of a rotor");
 }
 
@@ -122,7 +122,7 @@ fn an_sdf_gives_what_its_plugins_say_in_the_order_of_their_numbers() {
             close(rotor.position_m[axis], hub[axis] - centre[axis], "hub");
         }
     }
-    assert_eq!(vehicle.rotors.each_ref().map(|rotor| rotor.spin), [1.0, 1.0, -1.0, -1.0]);
+    assert_eq!(vehicle.rotors.iter().map(|rotor| rotor.spin).collect::<Vec<_>>(), [1.0, 1.0, -1.0, -1.0]);
     close(vehicle.thrust_coefficient, 8.5e-6, "thrust coefficient");
     close(vehicle.torque_coefficient, 8.5e-6 * 0.016, "torque coefficient");
     // The plugins turn the links at a tenth of the speed unless they say otherwise.
@@ -181,7 +181,7 @@ fn what_is_wrong_with_a_model_is_told_with_its_line() {
         "type=\"continuous\"",
         "type=\"fixed\"",
         "",
-        &["expected four rotors, found 3", "only vehicles with four rotors are flown"],
+        &["expected four rotors, found 3", "only models with four are converted"],
     );
     refused(&URDF.replace("rotor_", "part_"), "quad.urdf", "", &["found none", "`rotor`"]);
     refused("<robot name=\"q\"><link name=\"a\"/></robot>", "quad.urdf", "", &["with mass, found none"]);
@@ -330,7 +330,10 @@ fn assumed_directions_alternate_around_the_vehicle_whatever_the_order_of_command
         let is_clockwise = rotor.position_m.x * rotor.position_m.y < 0.0;
         assert_eq!(rotor.spin, if is_clockwise { -1.0 } else { 1.0 }, "{}", rotor.name);
     }
-    assert_eq!(made.vehicle.rotors.each_ref().map(|rotor| rotor.spin), [-1.0, -1.0, 1.0, 1.0]);
+    assert_eq!(
+        made.vehicle.rotors.iter().map(|rotor| rotor.spin).collect::<Vec<_>>(),
+        [-1.0, -1.0, 1.0, 1.0]
+    );
 }
 
 #[test]

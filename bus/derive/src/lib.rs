@@ -15,7 +15,8 @@ use syn::{
 /// Derives `bus::Message` for a `repr(C)` struct without padding.
 ///
 /// On the struct: `#[message(type_name = "package/msg/Name")]`, and `definition = "…"` where the ROS 2
-/// definition is nested differently from the Rust struct. On fields: `#[field(unit = "m", frame =
+/// definition is nested differently from the Rust struct; `role = "state"` for the state of a component that no topic
+/// carries, in which sequences may stand anywhere. On fields: `#[field(unit = "m", frame =
 /// "world")]`; an empty unit means "that of the field that holds this message".
 #[proc_macro_derive(Message, attributes(message, field))]
 pub fn derive_message(input: TokenStream) -> TokenStream {
@@ -29,7 +30,7 @@ fn expanded(input: &DeriveInput, expand: fn(&DeriveInput) -> Result<Tokens>) -> 
 fn expand(input: &DeriveInput) -> Result<Tokens> {
     require_repr_c(input)?;
     require_no_generics(input, "a message has one layout: it cannot be generic")?;
-    let (type_name, definition) = message_options(input)?;
+    let MessageOptions { type_name, definition, is_state } = message_options(input)?;
     let fields = named_fields(input)?;
     let name = &input.ident;
     let types: Vec<&Type> = fields.iter().map(|field| &field.ty).collect();
@@ -47,7 +48,7 @@ fn expand(input: &DeriveInput) -> Result<Tokens> {
             );
             assert!(::core::mem::align_of::<#name>() <= 8, "a message's alignment is at most 8 bytes");
             assert!(
-                ::bus::schema::sequences_are_last(<#name as ::bus::Message>::SCHEMA.fields),
+                #is_state || ::bus::schema::sequences_are_last(<#name as ::bus::Message>::SCHEMA.fields),
                 concat!(
                     "message ", stringify!(#name), " has a `Bounded` that is not its last field, stands in a nested ",
                     "message, or states no unit: move it to the end, or add #[field(unit = \"m/s\")]",
@@ -74,13 +75,26 @@ fn expand(input: &DeriveInput) -> Result<Tokens> {
     })
 }
 
-/// The ROS 2 name of a message, and its definition where it is stated.
-fn message_options(input: &DeriveInput) -> Result<(LitStr, Option<LitStr>)> {
-    let [type_name, definition] = options(&input.attrs, "message", ["type_name", "definition"])?;
+/// Attributes of a message.
+struct MessageOptions {
+    /// ROS 2 name.
+    type_name: LitStr,
+    /// ROS 2 definition, where it is stated.
+    definition: Option<LitStr>,
+    /// True for the state of a component, which no topic carries.
+    is_state: bool,
+}
+
+fn message_options(input: &DeriveInput) -> Result<MessageOptions> {
+    let [type_name, definition, role] =
+        options(&input.attrs, "message", ["type_name", "definition", "role"])?;
     let missing = || Error::new_spanned(&input.ident, "add #[message(type_name = \"package/msg/Name\")]");
     let type_name = type_name.ok_or_else(missing)?;
     require_ros_type_name(&type_name)?;
-    Ok((type_name, definition))
+    match role {
+        Some(role) if role.value() != "state" => Err(Error::new_spanned(role, "expected \"state\"")),
+        role => Ok(MessageOptions { type_name, definition, is_state: role.is_some() }),
+    }
 }
 
 /// Derives `bus::ports::InputPorts` for a struct `Name<'a>` whose fields are `&'a T` and `Option<&'a T>`.
@@ -163,11 +177,15 @@ fn require_no_generics(input: &DeriveInput, why: &str) -> Result<()> {
 }
 
 /// The texts that the attributes `#[attribute(…)]` give for `keys`.
-fn options(attributes: &[Attribute], attribute: &str, keys: [&str; 2]) -> Result<[Option<LitStr>; 2]> {
-    let mut texts = [None, None];
+fn options<const N: usize>(
+    attributes: &[Attribute],
+    attribute: &str,
+    keys: [&str; N],
+) -> Result<[Option<LitStr>; N]> {
+    let mut texts = [const { None }; N];
     for attribute in attributes.iter().filter(|found| found.path().is_ident(attribute)) {
         attribute.parse_nested_meta(|meta| {
-            let expected = || meta.error(format_args!("expected `{}` or `{}`", keys[0], keys[1]));
+            let expected = || meta.error(format_args!("expected `{}`", keys.join("` or `")));
             let key = keys.iter().position(|key| meta.path.is_ident(key)).ok_or_else(expected)?;
             texts[key] = Some(meta.value()?.parse()?);
             Ok(())

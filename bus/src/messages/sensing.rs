@@ -3,7 +3,7 @@
 //! A sensor sends a sample at each of its periods, as every publisher does. `valid` is 1 in a sample that holds
 //! a measurement and 0 where it was lost; the other fields then hold what was measured last.
 
-use super::{Quaternion, Time, Vector3};
+use super::{PerRotor, Quaternion, Time, Vector3};
 use crate::Message;
 
 /// What a satellite receiver reports, in the world's axes.
@@ -130,15 +130,15 @@ pub struct RotorSpeeds {
     /// Simulation time at which it was measured.
     #[field(unit = "ns")]
     pub measured_ns: u64,
-    /// Speeds of the rotors, in the order of the vehicle file.
-    #[field(unit = "rad/s")]
-    pub rotor_speed: [f64; 4],
     /// 1 if this sample holds a measurement, 0 if it was lost.
     #[field(unit = "1")]
     pub valid: u32,
     /// Zero.
     #[field(unit = "")]
     pub pad0: u32,
+    /// Speeds of the rotors, in the order of the vehicle file.
+    #[field(unit = "rad/s")]
+    pub rotor_speed: PerRotor,
 }
 
 /// Voltage and current of the battery, true or measured.

@@ -263,7 +263,7 @@ pub fn bag(count: u32, compression: Option<mcap::Compression>) -> Vec<u8> {
             writer.write_to_known_channel(&header, &[&[0, 1, 0, 0], body].concat()).unwrap();
         };
         let stamp = Time::from_ns(ns);
-        let motors = MotorCommand { stamp, command: [100.0, 101.0, 102.0, 103.0] };
+        let motors = MotorCommand { stamp, command: [100.0, 101.0, 102.0, 103.0].into() };
         send(command, bytemuck::bytes_of(&motors));
         let noise = 0.001 * f64::from(k % 7);
         let sensors = Imu {

@@ -19,7 +19,8 @@ const ADVICE: &str =
 /// `None` if the rotors cannot hover.
 pub fn greatest_rad_s2(vehicle: &Vehicle) -> Option<[f64; 3]> {
     let lever = vehicle.torque_coefficient / vehicle.thrust_coefficient;
-    let columns = vehicle.rotors.each_ref().map(|rotor| {
+    let [a, b, c, d] = &vehicle.rotors[..] else { return None };
+    let columns = [a, b, c, d].map(|rotor| {
         let at = rotor.position_m;
         Vector4::new(1.0, at.y, -at.x, -rotor.spin * rotor.torque_scale * lever)
     });

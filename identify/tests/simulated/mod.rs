@@ -8,7 +8,7 @@ use controllers::allocation::{Allocation, RotorWrench};
 use flights::{Channel, Flight, Role};
 use nalgebra::{UnitQuaternion, Vector3};
 use plant::effects::{Effect, find};
-use plant::{Airframe, Backend, FreeFlight, NewtonEuler, RigidBody};
+use plant::{Airframe, Backend, FreeFlight, NewtonEuler, PerRotor, RigidBody};
 use std::path::{Path, PathBuf};
 use vehicles::Vehicle;
 
@@ -168,9 +168,9 @@ pub fn fly(declared: &Vehicle, plan: &Plan, role: Role) -> Flight {
     let start = RigidBody::level_at(course.at(0.0).0[0]);
     let mut plant = FreeFlight::new(NewtonEuler::flying(airframe, 1), start, effects);
     let allocation = Allocation::new(declared).expect("a quadrotor");
-    let mut commands = [declared.hover_command(); 4];
+    let mut commands = PerRotor::filled(4, declared.hover_command());
     plant.settle_rotors(&commands);
-    let slow_rad_s = [declared.hover_speed_rad_s(); 4];
+    let slow_rad_s = PerRotor::filled(4, declared.hover_speed_rad_s());
     let period_s = plan.control_ticks as f64 * TICK_S;
     let mut pilot = Pilot {
         allocation,
@@ -231,7 +231,7 @@ fn stirred(
     sticks: &Sticks,
     state: &plant::State,
     time_s: f64,
-) -> [f64; 4] {
+) -> PerRotor<f64> {
     let (kick_N_m, lift) = sticks.0[(time_s / STICK_S) as usize];
     let body = &state.body;
     let levelling =
@@ -241,11 +241,16 @@ fn stirred(
     allocation.allocate(&wrench).speeds_rad_s.map(|speed| vehicle.command.command(speed))
 }
 
+/// The values of a quadrotor.
+fn four(values: &PerRotor<f64>) -> [f64; 4] {
+    std::array::from_fn(|rotor| values[rotor])
+}
+
 /// A tracking controller with the gains of somebody careful: bounded for all truths of the cases.
 struct Pilot {
     allocation: Allocation,
     /// Wanted speeds of the rotors, a moment ago.
-    slow_rad_s: [f64; 4],
+    slow_rad_s: PerRotor<f64>,
     /// Integrals of the errors of attitude and height.
     leaned: Vector3<f64>,
     sunk: f64,
@@ -266,7 +271,7 @@ impl Pilot {
         course: &Course,
         state: &plant::State,
         time_s: f64,
-    ) -> [f64; 4] {
+    ) -> PerRotor<f64> {
         let ([position, velocity, acceleration], heading) = course.at(time_s);
         let body = &state.body;
         let (away, slip) = (position - body.position_W_m, velocity - body.velocity_W_m_s);
@@ -291,9 +296,9 @@ impl Pilot {
             .map(|speed| vehicle.command.command(speed))
     }
 
-    fn hurried(&mut self, wanted_rad_s: [f64; 4]) -> [f64; 4] {
+    fn hurried(&mut self, wanted_rad_s: PerRotor<f64>) -> PerRotor<f64> {
         let part = self.period_s / (self.period_s + LEAD_FILTER_S);
-        std::array::from_fn(|i| {
+        PerRotor::from_fn(wanted_rad_s.len(), |i| {
             let rise = wanted_rad_s[i] - self.slow_rad_s[i];
             self.slow_rad_s[i] += part * rise;
             wanted_rad_s[i] + LEAD_S * part * rise / self.period_s
@@ -321,10 +326,10 @@ impl Log {
         })
     }
 
-    fn sample(&mut self, tick: usize, plant: &FreeFlight, commands: &[f64; 4]) {
+    fn sample(&mut self, tick: usize, plant: &FreeFlight, commands: &PerRotor<f64>) {
         let time_s = tick as f64 * TICK_S;
         let body = plant.state().body;
-        push(&mut self.flight.command, time_s, *commands);
+        push(&mut self.flight.command, time_s, four(commands));
         if tick.is_multiple_of(self.sensors.imu_ticks) && tick > 0 {
             let motion = plant.accelerations();
             let bias = Vector3::from(self.sensors.accelerometer_bias_m_s2);
@@ -354,7 +359,7 @@ impl Log {
                 let normal = bus::random::normal(&mut self.random);
                 rotor.speed_rad_s + self.sensors.noise * normal
             });
-            push(&mut self.flight.rotor_speed, time_s, speeds);
+            push(&mut self.flight.rotor_speed, time_s, four(&speeds));
         }
     }
 

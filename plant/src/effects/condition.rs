@@ -2,7 +2,7 @@
 
 use crate::rotation::rotated_back;
 use crate::rotor;
-use crate::state::State;
+use crate::state::{PerRotor, State};
 use nalgebra::Vector3;
 use vehicles::Vehicle;
 
@@ -11,12 +11,12 @@ use vehicles::Vehicle;
 /// ```
 /// use nalgebra::Vector3;
 /// use plant::effects::FlightCondition;
-/// use plant::{RigidBody, RotorState, State};
+/// use plant::{PerRotor, RigidBody, RotorState, State};
 ///
 /// let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
 /// let vehicle = vehicles::Vehicle::load(path.as_ref()).unwrap();
 /// let body = RigidBody::level_at(Vector3::new(0.0, 0.0, 2.0));
-/// let state = State { body, rotors: [RotorState::steady(400.0); 4] };
+/// let state = State { body, rotors: PerRotor::filled(4, RotorState::steady(400.0)) };
 /// let headwind_W_m_s = Vector3::new(-3.0, 0.0, 0.0);
 /// let condition = FlightCondition::new(&vehicle, &state, &headwind_W_m_s);
 /// assert_eq!((condition.airspeed_B_m_s.x, condition.height_m), (3.0, 2.0));
@@ -34,7 +34,7 @@ pub struct FlightCondition<'v> {
     /// Height of the centre of mass over the ground, the plane z = 0 of the world.
     pub height_m: f64,
     /// Speeds of the rotors, in the order of the motor commands.
-    pub rotor_speeds_rad_s: [f64; 4],
+    pub rotor_speeds_rad_s: PerRotor<f64>,
 }
 
 impl<'v> FlightCondition<'v> {

@@ -98,7 +98,7 @@ pub enum Action {
     /// Adds a force and a torque.
     Wrench(fn(&Values, &FlightCondition) -> Wrench),
     /// Tells how the battery is under these speeds of the rotors.
-    Battery(fn(&Values, &EffectState, &Vehicle, &[f64; 4]) -> Battery),
+    Battery(fn(&Values, &EffectState, &Vehicle, &[f64]) -> Battery),
 }
 
 /// What an effect sees and changes when a tick begins.

@@ -112,7 +112,7 @@ mod tests {
 
     #[test]
     fn vectors_arrays_and_quaternions_become_channels_in_the_units_that_people_read() {
-        let leaves = leaves(&PlantState::default());
+        let leaves = leaves(&PlantState { rotor_speed: [400.0; 4].into(), ..PlantState::default() });
         let found = |field: &str| described(channels(&leaves, field, None));
         let position = [("position.x", "m"), ("position.y", "m"), ("position.z", "m")];
         assert_eq!(found("position"), pairs(&position));
@@ -139,8 +139,11 @@ mod tests {
     fn values_are_in_the_unit_that_is_shown() {
         let half = std::f64::consts::FRAC_1_SQRT_2;
         let attitude = Quaternion { x: half, y: 0.0, z: 0.0, w: half };
-        let state =
-            PlantState { attitude, rotor_speed: [100.0 * std::f64::consts::PI; 4], ..Default::default() };
+        let state = PlantState {
+            attitude,
+            rotor_speed: [100.0 * std::f64::consts::PI; 4].into(),
+            ..Default::default()
+        };
         let leaves = leaves(&state);
         let first = |field: &str| channels(&leaves, field, None).unwrap()[0].value(&leaves);
         assert!((first("attitude.roll") - 90.0).abs() < 1e-9);
@@ -149,7 +152,7 @@ mod tests {
 
     #[test]
     fn a_motor_command_is_drawn_in_percent_of_full_throttle_where_that_is_known() {
-        let leaves = leaves(&MotorCommand { command: [76.5; 4], ..Default::default() });
+        let leaves = leaves(&MotorCommand { command: [76.5; 4].into(), ..Default::default() });
         let drawn = |full_throttle| {
             let mut channels = channels(&leaves, "command", full_throttle).unwrap();
             (channels[3].value(&leaves), channels[3].unit.clone())

@@ -134,10 +134,11 @@ fn read_named(files: &InputFiles, key: &str, named: &[PathBuf]) -> Result<(), St
 
 /// What the inputs of `declared` carry, as far as the registry knows it.
 fn messages<'a>(declared: &DeclaredNode<'a>, plan: &Plan) -> Vec<InputMessage<'a>> {
-    let of = |(port, input): (&'a Spanned<String>, &InputSetting)| {
+    let of = |(port, input): (&'a Spanned<String>, &'a InputSetting)| {
         let topic = plan.topics.iter().find(|topic| topic.name == input.topic)?;
         let schema = declared.manifest.registry().message(&topic.type_name)?;
-        Some(InputMessage { port: port.get_ref(), bytes: schema.size, period_ticks: topic.period_ticks })
+        let (period_ticks, initial) = (topic.period_ticks, input.initial.as_ref());
+        Some(InputMessage { port: port.get_ref(), bytes: schema.size, period_ticks, initial })
     };
     declared.process.inputs.iter().filter_map(of).collect()
 }

@@ -134,7 +134,7 @@ fn require_four(model: &Model, joints: &[(&Joint, Option<&Motor>)]) -> Result<()
     if joints.len() != 4 {
         let (count, shown) = (names.len(), names[..names.len().min(8)].join(", "));
         let error = model.source.whole(format!("expected four rotors, found {count}: {shown}"));
-        return Err(error.help("only vehicles with four rotors are flown at present"));
+        return Err(error.help("a vehicle file may have 1 to 12 rotors, but only models with four are converted at present: write it by hand"));
     }
     Ok(())
 }

@@ -72,7 +72,7 @@ fn sag(values: &Values, advance: &mut Advance) {
 }
 
 /// The battery when as much has been drawn since the start as the first of the effect's numbers says, in coulomb.
-fn battery(values: &Values, state: &EffectState, vehicle: &Vehicle, speeds_rad_s: &[f64; 4]) -> Battery {
+fn battery(values: &Values, state: &EffectState, vehicle: &Vehicle, speeds_rad_s: &[f64]) -> Battery {
     let parameters = Parameters::from(values);
     let charge = (1.0 - parameters.discharged - state.numbers[0] / parameters.capacity).max(0.0);
     let power_W = shaft_power_W(vehicle, speeds_rad_s) / parameters.efficiency;
@@ -82,7 +82,7 @@ fn battery(values: &Values, state: &EffectState, vehicle: &Vehicle, speeds_rad_s
     Battery { voltage_V: open_V - parameters.internal_resistance * current_A, current_A, charge }
 }
 
-fn shaft_power_W(vehicle: &Vehicle, speeds_rad_s: &[f64; 4]) -> f64 {
+fn shaft_power_W(vehicle: &Vehicle, speeds_rad_s: &[f64]) -> f64 {
     let each = vehicle.rotors.iter().zip(speeds_rad_s);
     each.map(|(place, speed)| (rotor::drag_torque_N_m(vehicle, place, *speed) * speed).abs()).sum()
 }

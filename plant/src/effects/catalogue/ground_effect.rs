@@ -48,7 +48,8 @@ fn gain_N(values: &Values, condition: &FlightCondition, rotor: usize) -> f64 {
 /// A rotor is at most half as wide as the way to the next one.
 fn scale_to(vehicle: &Vehicle, values: &mut Values) {
     let mut parameters = Parameters::from(&*values);
-    let apart_m = (vehicle.rotors[0].position_m - vehicle.rotors[1].position_m).norm();
+    let [first, second, ..] = &vehicle.rotors[..] else { return };
+    let apart_m = (first.position_m - second.position_m).norm();
     if !(0.3..0.5).contains(&(parameters.rotor_radius / apart_m)) {
         parameters.rotor_radius = 0.35 * apart_m;
     }

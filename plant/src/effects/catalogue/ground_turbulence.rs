@@ -31,8 +31,9 @@ effect_parameters! {
 fn shake(values: &Values, advance: &mut Advance) {
     let Parameters { intensity, height_scale: scale_m, correlation_time: correlation_s } = values.into();
     let keep = libm::exp(-advance.dt_s / correlation_s);
-    for (rotor, noise) in advance.state.normals().into_iter().enumerate() {
-        let lag = &mut advance.state.numbers[rotor];
+    for rotor in 0..advance.state.rotors.len() {
+        let noise = advance.state.normal();
+        let lag = &mut advance.state.rotors[rotor];
         *lag = keep * *lag + (1.0 - keep * keep).sqrt() * noise;
         let height_m = advance.condition.hub_height_m(rotor).max(0.0);
         advance.actuation.thrust_deviation[rotor] += intensity * libm::exp(-height_m / scale_m) * *lag;

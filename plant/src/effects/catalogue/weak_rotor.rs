@@ -35,5 +35,6 @@ effect_parameters! {
 
 fn loss_N(values: &Values, condition: &FlightCondition, rotor: usize) -> f64 {
     let Parameters { loss_1, loss_2, loss_3, loss_4 } = values.into();
-    -[loss_1, loss_2, loss_3, loss_4][rotor] * condition.thrust_N(rotor)
+    let loss = [loss_1, loss_2, loss_3, loss_4].get(rotor).copied().unwrap_or_default();
+    -loss * condition.thrust_N(rotor)
 }
