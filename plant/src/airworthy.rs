@@ -2,7 +2,7 @@
 
 use crate::backend::Backend;
 use crate::newton_euler::NewtonEuler;
-use crate::state::{RigidBody, State};
+use crate::state::{PerRotor, RigidBody, State};
 use bus::context::NodeContext;
 use diagnostics::parameter::{ParameterError, refuse};
 use vehicles::{CommandMap, MotorModel, Provenance, Vehicle};
@@ -171,9 +171,10 @@ pub(crate) fn rehearse(
     let (vehicle, ticks) = (model.vehicle(), (REHEARSAL_STEPS / model.substeps()).max(3));
     let (map, mut flown) = (&vehicle.command, 0);
     for command in [vehicle.hover_command(), map.max, map.min] {
-        backend.settle_rotors(&[command; 4]);
+        let commands = PerRotor::filled(vehicle.rotors.len(), command);
+        backend.settle_rotors(&commands);
         for _ in 0..ticks {
-            backend.step(&[command; 4], dt_s, &[]);
+            backend.step(&commands, dt_s, &[]);
             flown += 1;
             let odd = first_not_finite(backend);
             refuse(odd.is_some(), "vehicle", || {
@@ -307,6 +308,19 @@ mod tests {
         let pole_rad_s = 15.075_567_228_888_18;
         assert!(swing(POLE_STEPS_MAX / pole_rad_s) < 1e-3);
         assert!(swing(3.5 / pole_rad_s).is_nan() || swing(3.5 / pole_rad_s) > 1e3);
+    }
+
+    #[test]
+    fn a_vehicle_of_any_number_of_rotors_is_rehearsed_with_all_of_them() {
+        for count in [1, 3, 6, 8, 12] {
+            let vehicle = hummingbird(|it| it.rotors = vec![it.rotors[0].clone(); count]);
+            let airframe = Airframe::new(vehicle);
+            let effects = airframe.initial_state(0, "", 1e-3);
+            let model = NewtonEuler::flying(airframe, 1);
+            let mut backend = FreeFlight::new(model.clone(), RigidBody::level_at(Vector3::z()), effects);
+            assert_eq!(rehearse(&mut backend, &model, 1e-3), Ok(()));
+            assert_eq!(backend.state().rotors.len(), count);
+        }
     }
 
     #[test]
