@@ -120,7 +120,7 @@ fn growing<const N: usize>(quantity: Quantity, channel: Channel<N>, notes: &mut 
 }
 
 /// Marks a longest strictly growing subsequence of finite numbers.
-fn longest_growing(times: &[f64]) -> Vec<bool> {
+pub fn longest_growing(times: &[f64]) -> Vec<bool> {
     // `tails[n]` is the index of the smallest time that ends a growing sequence of n + 1 samples.
     let mut tails: Vec<usize> = Vec::new();
     let mut before: Vec<Option<usize>> = Vec::with_capacity(times.len());

@@ -153,6 +153,7 @@ impl Log for CrazyflieLog {
             time_s: event.records.iter().map(|(time_us, _)| *time_us as f64 * 1e-6).collect(),
             rows: event.records.iter().map(|(_, at)| row(*at)).collect(),
             notes: self.notes.clone(),
+            seams: Vec::new(),
         })
     }
 }

@@ -310,6 +310,7 @@ impl Log for Dataflash {
             time_s: time_s.collect(),
             rows: topic.messages.iter().map(row).collect(),
             notes: self.notes.clone(),
+            seams: Vec::new(),
         })
     }
 

@@ -189,6 +189,10 @@ impl Log for McapLog {
         Err(LogError::unexpected(Spot::Key("time"), "one clock for all topics", found, advice))
     }
 
+    fn origin_ns(&self) -> i128 {
+        self.start_ns
+    }
+
     fn topics(&self) -> Vec<(String, String)> {
         self.topics.iter().map(|(name, topic)| (name.clone(), topic.kind.clone())).collect()
     }

@@ -7,16 +7,14 @@ mod pages;
 mod thrift;
 mod values;
 
-use std::num::NonZero;
-
 use parquet::file::metadata::ParquetMetaData;
 use parquet::schema::types::SchemaDescriptor;
 use vehicles::table::{TableError, column_of, shown};
 use vehicles::wall_clock;
 
-use crate::csv_log::Form;
 use crate::declaration::Entry;
 use crate::error::{LogError, Spot};
+use crate::form::Form;
 use crate::log::{Log, Samples};
 use crate::rows;
 
@@ -39,15 +37,15 @@ impl ParquetLog {
         let headers = headers(metadata.file_metadata().schema_descr());
         let mut log = Self { bytes, metadata, headers, time_s: Vec::new(), first_row: 0 };
         log.time_s = log.times(form.time)?;
-        log.choose(form.recording, form.time)?;
+        log.choose(form)?;
         Ok(log)
     }
 
     /// Cuts the times to one recording.
-    fn choose(&mut self, recording: Option<NonZero<usize>>, time: Option<&Entry>) -> Result<(), LogError> {
+    fn choose(&mut self, form: &Form<'_>) -> Result<(), LogError> {
         let places = rows::Places { name: "row", number: &|row| row as u64 + 1 };
-        rows::check_forward(&self.time_s, time, &places)?;
-        let part = rows::recording(&self.time_s, recording, &places)?;
+        rows::check_forward(&self.time_s, form.time, &places)?;
+        let part = rows::recording(&self.time_s, form, &places)?;
         self.first_row = part.start;
         self.time_s.truncate(part.end);
         self.time_s.drain(..part.start);
@@ -103,7 +101,11 @@ impl Log for ParquetLog {
             let used = numbers.iter().skip(self.first_row);
             rows.iter_mut().zip(used).for_each(|(row, number)| row.push(*number));
         }
-        Ok(Samples { time_s: self.time_s.clone(), rows, notes: Vec::new() })
+        Ok(Samples { time_s: self.time_s.clone(), rows, ..Samples::default() })
+    }
+
+    fn columns(&self) -> Vec<String> {
+        self.headers.clone()
     }
 }
 

@@ -114,7 +114,7 @@ impl Log for Ulog {
             notes.push("time is `timestamp_sample`, when it was measured".to_owned());
         }
         let time_s = topic.data.iter().map(time_s).collect();
-        Ok(Samples { time_s, rows: topic.data.iter().map(row).collect(), notes })
+        Ok(Samples { time_s, rows: topic.data.iter().map(row).collect(), notes, seams: Vec::new() })
     }
 
     fn topics(&self) -> Vec<(String, String)> {
