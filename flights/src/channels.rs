@@ -12,6 +12,7 @@ use crate::frame;
 use crate::log::{Log, Samples};
 use crate::matrices;
 use crate::name::Name;
+use crate::number_rows::NumberRows;
 use crate::quantity::{FRACTION, PERCENT, Quantity};
 use crate::scaling;
 use crate::seams::SeamList;
@@ -45,7 +46,10 @@ pub fn read<const N: usize>(
     if layout.shape == Shape::Matrix {
         matrices::check(&samples.rows)?;
     }
-    let values = samples.rows.iter().map(|row| layout.convert(row)).collect::<Result<_, _>>()?;
+    let mut values = Vec::with_capacity(samples.time_s.len());
+    for row in samples.rows.iter() {
+        values.push(layout.convert(row)?);
+    }
     let channel = Channel { time_s: samples.time_s, values };
     Ok(Read { channel, notes: samples.notes, seams: samples.seams })
 }
@@ -67,7 +71,7 @@ fn scaled_samples(log: &dyn Log, entry: &Entry, names: &[Name]) -> Result<Sample
     let offsets = scaling::each(Spot::Key("offset"), entry.offset.as_ref(), 0.0, names.len())?;
     let plain: Vec<String> = names.iter().map(|name| name.plain.clone()).collect();
     let mut samples = log.samples(entry.topic.as_deref(), &plain)?;
-    for row in &mut samples.rows {
+    for row in samples.rows.iter_mut() {
         for (((number, name), scale), offset) in row.iter_mut().zip(names).zip(&scales).zip(&offsets) {
             *number = *number * name.sign() * scale + offset;
         }
@@ -118,7 +122,7 @@ impl<'a> Layout<'a> {
     }
 
     /// Roll and pitch in rad come to more than a turn, and not in a bad sample or two, only if they are in degrees.
-    fn check_angles(&self, rows: &[Vec<f64>]) -> Result<(), LogError> {
+    fn check_angles(&self, rows: &NumberRows) -> Result<(), LogError> {
         const BAD: f64 = 0.02;
         let tilts = rows.iter().flat_map(|row| row.iter().take(2)).filter(|angle| angle.is_finite());
         let mut sizes: Vec<f64> = tilts.map(|angle| angle.abs()).collect();

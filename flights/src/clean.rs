@@ -37,6 +37,9 @@ fn finite<const N: usize>(quantity: Quantity, channel: Channel<N>, notes: &mut V
     let is_finite = |index: usize| {
         channel.time_s[index].is_finite() && channel.values[index].iter().all(|number| number.is_finite())
     };
+    if (0..channel.time_s.len()).all(is_finite) {
+        return channel;
+    }
     let kept = channel.kept(is_finite);
     say_dropped(quantity, &channel, &kept, "have no finite number", notes);
     kept

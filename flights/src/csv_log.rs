@@ -8,6 +8,7 @@ use crate::declaration::Entry;
 use crate::error::{LogError, Spot};
 use crate::form::Form;
 use crate::log::{Log, Samples};
+use crate::number_rows::NumberRows;
 use crate::rows;
 
 /// A CSV file; a cell that holds no number is NaN.
@@ -85,11 +86,11 @@ impl Log for CsvLog {
             let expected = "none, as a CSV file has no topics";
             return Err(LogError::unexpected(Spot::Key("topic"), expected, topic, "remove it"));
         }
-        let mut rows = vec![Vec::with_capacity(names.len()); self.time_s.len()];
-        for name in names {
+        let mut rows = NumberRows::unknown(names.len(), self.time_s.len());
+        for (index, name) in names.iter().enumerate() {
             let numbers = numbers(&self.table, name)?;
             check_numbers(&self.table, name, &numbers)?;
-            rows.iter_mut().zip(numbers).for_each(|(row, number)| row.push(number));
+            rows.set_column(index, numbers);
         }
         Ok(Samples { time_s: self.time_s.clone(), rows, ..Samples::default() })
     }

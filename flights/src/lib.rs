@@ -9,7 +9,7 @@
 //! | `files`, `joined`, `seams` | logs in several files: their names, their parts as one log, the times between them |
 //! | `opening` | the logs of a flight, opened |
 //! | `logs`, `log_reader` | which logs flights are read from: names and patterns; each log is read once |
-//! | `log` | what every log can do: samples of numbers by name |
+//! | `log`, `number_rows` | what every log can do: samples of numbers by name |
 //! | `formats` | the formats of logs: `csv_log`, `mcap_log`, `ulog` (`ulog_messages`, `ulog_format`), `crazyflie`, `dataflash`, `parquet`, `bytes`, `arrays` |
 //! | `form`, `rows` | tables, CSV and Parquet: their declared form, and rows on one clock |
 //! | `known_types` | messages whose fields and units need not be said |
@@ -57,6 +57,7 @@ mod logs;
 mod matrices;
 mod mcap_log;
 mod name;
+mod number_rows;
 mod opening;
 mod parquet;
 mod plausible;

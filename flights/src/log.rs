@@ -1,6 +1,7 @@
 //! A log, whatever its format: samples of numbers by name.
 
 use crate::error::LogError;
+use crate::number_rows::NumberRows;
 use crate::seams::SeamList;
 
 /// Samples of some numbers as the log has them: any origin of time, any unit.
@@ -9,7 +10,7 @@ pub struct Samples {
     /// When, in seconds; need not grow, and can be NaN where the log has no number.
     pub time_s: Vec<f64>,
     /// The numbers in the order they were asked for; NaN where the log has none.
-    pub rows: Vec<Vec<f64>>,
+    pub rows: NumberRows,
     /// What a reader of the samples should know, such as which stamp was taken.
     pub notes: Vec<String>,
     /// Seams of a log in several files: for each, the time of the last sample before it, and of the first behind it. Infinite

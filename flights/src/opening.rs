@@ -92,7 +92,7 @@ impl Opening<'_> {
             channels,
             others,
         }
-        .flight(log.as_ref())
+        .flight(log)
     }
 
     /// The form of a table of the flight, with the recording that is used and the advice where there are several.

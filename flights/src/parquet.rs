@@ -16,6 +16,7 @@ use crate::declaration::Entry;
 use crate::error::{LogError, Spot};
 use crate::form::Form;
 use crate::log::{Log, Samples};
+use crate::number_rows::NumberRows;
 use crate::rows;
 
 use kind::Kind;
@@ -91,15 +92,14 @@ impl Log for ParquetLog {
             let expected = "none, as a Parquet file has no topics";
             return Err(LogError::unexpected(Spot::Key("topic"), expected, topic, "remove it"));
         }
-        let mut rows = vec![Vec::with_capacity(names.len()); self.time_s.len()];
-        for name in names {
+        let mut rows = NumberRows::unknown(names.len(), self.time_s.len());
+        for (index, name) in names.iter().enumerate() {
             let numbers = values::read(&self.bytes, &self.metadata, self.column(name)?)?;
             if numbers.iter().all(|number| !number.is_finite()) {
                 let at = Spot::Named("column", shown(name));
                 return Err(LogError::unexpected(at, "numbers", "none in any row", "name another column"));
             }
-            let used = numbers.iter().skip(self.first_row);
-            rows.iter_mut().zip(used).for_each(|(row, number)| row.push(*number));
+            rows.set_column(index, numbers.into_iter().skip(self.first_row));
         }
         Ok(Samples { time_s: self.time_s.clone(), rows, ..Samples::default() })
     }

@@ -86,11 +86,13 @@ struct Said {
 }
 
 impl Reading<'_> {
-    /// Reads the flight from `log`; says which part of the log's own time it is, too.
+    /// Reads the flight from `log`; says which part of the log's own time it is, too. The memory of the log is free before the
+    /// flight is judged.
     ///
     /// # Errors
     /// Those of all channels at once.
-    pub fn flight(mut self, log: &dyn Log) -> Result<(Flight, Part), FlightsError> {
+    pub fn flight(mut self, whole: Box<dyn Log>) -> Result<(Flight, Part), FlightsError> {
+        let log = whole.as_ref();
         let mut taken = Vec::new();
         if self.channels.is_empty() {
             (self.channels, taken) = known_types::defaults(log, self.format);
@@ -112,6 +114,7 @@ impl Reading<'_> {
         self.to_flight_time(&mut flight, origin_s);
         self.check_span(&flight, log, origin_s)?;
         let part = self.part(&flight, log, origin_s);
+        drop(whole);
         self.say_breaks(&mut flight, &breaks, origin_s);
         yaw.iter_mut().for_each(|yaw| self.shift(Quantity::Attitude, &mut yaw.time_s, origin_s));
         self.assume(&mut flight, yaw)?;

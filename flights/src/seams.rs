@@ -34,6 +34,9 @@ impl Seams {
                 *whole = (whole.0.max(seam.0), whole.1.min(seam.1));
             }
         }
+        if whole.is_empty() {
+            return whole;
+        }
         let of_log = times.iter().filter(|(channel, _)| channels.contains(channel));
         let periods = of_log.filter_map(|(_, time_s)| held_period_s(time_s));
         let fastest_s = periods.min_by(f64::total_cmp).unwrap_or(0.0);
