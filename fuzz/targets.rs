@@ -17,9 +17,10 @@ use vehicles::Vehicle;
 pub type Target = fn(&[u8]) -> bool;
 
 /// Every target by its name, which is that of its folder in `corpus/`.
-pub const TARGETS: [(&str, Target); 10] = [
+pub const TARGETS: [(&str, Target); 11] = [
     ("manifest", manifest),
     ("vehicle", vehicle),
+    ("model", model),
     ("scene", scene),
     ("flights", flights),
     ("csv", csv),
@@ -87,6 +88,13 @@ pub fn vehicle(bytes: &[u8]) -> bool {
     // A refusal can also name the file that it is based on.
     said(Vehicle::load(&place.path("under-test.toml")), ":").is_some()
         && place.is_flown_by("hover.toml", "process.plant.vehicle")
+}
+
+/// A model in URDF or SDF; one that is accepted becomes a vehicle file that loads.
+pub fn model(bytes: &[u8]) -> bool {
+    let text = String::from_utf8_lossy(bytes);
+    let made = said(vehicles::from_model::convert(&text, "under-test.sdf"), "under-test.sdf");
+    made.is_some_and(|made| Vehicle::parse(&made.text, "under-test.sdf").is_ok())
 }
 
 /// A scene file; one that is accepted is put around the hover with contacts and rigs.

@@ -23,6 +23,7 @@ pub const COMPONENTS: Registry = Registry::new(&[
     Registration::of::<Sensing<sensors::gps::GpsParams>>(),
     Registration::of::<sensors::ideal::Ideal>(),
     Registration::of::<sensors::imu::ImuSensor>(),
+    Registration::of::<report::judge::node::Judge>(),
     Registration::of::<sensors::link::Link>(),
     Registration::of::<Controller<controllers::lqr::LqrLaw>>(),
     Registration::of::<Sensing<sensors::magnetometer::MagnetometerParams>>(),

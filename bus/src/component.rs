@@ -163,6 +163,8 @@ pub enum Role {
     Compute,
     /// It writes the run's recording: there is one in a run, it takes every sample, and the launcher names its file.
     Record,
+    /// It evaluates the conditions of a run that is not recorded. The launcher adds it; a manifest cannot name it.
+    Judge,
 }
 
 impl Info {
@@ -176,5 +178,11 @@ impl Info {
     #[must_use]
     pub const fn recorder(self) -> Self {
         Self { role: Role::Record, ..self }
+    }
+
+    /// The same component as the one that judges a run that is not recorded.
+    #[must_use]
+    pub const fn judge(self) -> Self {
+        Self { role: Role::Judge, ..self }
     }
 }

@@ -13,6 +13,7 @@ use crate::membership::Membership;
 use crate::plan::{InputPlan, NodePlan};
 use crate::port::{Feed, InPort, Locals, OutPort, Source};
 use crate::profile::TickWriter;
+use crate::sample_ring::SampleRing;
 use crate::tick::Tick;
 use crate::timing::{Due, Timing};
 
@@ -38,6 +39,8 @@ pub(crate) struct ConnectedNode {
     pub(crate) tick: u32,
     /// The ticks that the control segment counts as completed.
     told_tick: u32,
+    /// The ticks for which everything is known to be there, as long as the membership stays.
+    known_ticks: u32,
     /// True if another process may go on from its state at any tick.
     states_every_tick: bool,
     /// Host time of all its steps, ns.
@@ -116,6 +119,7 @@ impl ConnectedNode {
             timing: Timing::of(&links.plan, &links.node),
             tick: first_tick,
             told_tick: first_tick,
+            known_ticks: 0,
             states_every_tick: true,
             step_ns: 0,
             links,
@@ -138,6 +142,8 @@ impl ConnectedNode {
             let generation = links.publisher(membership, input.topic).primary.generation;
             let feed = if links.is_member(links.plan.publisher(input.topic), generation) {
                 Feed::Local { generation }
+            } else if links.records_member(input.topic, generation) {
+                Feed::Ring(SampleRing::open(&links.plan, input.topic, announcement.size)?)
             } else {
                 let receiver = links.subscriber(input.topic, generation)?;
                 let limit = self.first_tick.checked_sub(input.delay_ticks);
@@ -299,6 +305,9 @@ impl ConnectedNode {
             return Ok(Some(awaited));
         }
         let (lockstep, tick) = (&self.links.lockstep, self.tick);
+        if tick < self.known_ticks {
+            return Ok(None);
+        }
         for (index, input) in self.inputs.iter().enumerate().filter(|(_, input)| !input.is_local()) {
             let needed = (tick + 1).saturating_sub(input.delay_ticks);
             let need = Need::Samples { topic: input.topic, input: index };
@@ -312,8 +321,25 @@ impl ConnectedNode {
             }
         }
         // The inputs of this tick imply its grant, except where a node has none that are due at it.
-        let is_granted = lockstep.has(Need::Grant, tick + 1);
-        Ok((!is_granted).then_some(Awaited::count(Need::Grant, tick + 1)))
+        if !lockstep.has(Need::Grant, tick + 1) {
+            return Ok(Some(Awaited::count(Need::Grant, tick + 1)));
+        }
+        self.known_ticks = self.ticks_there();
+        Ok(None)
+    }
+
+    /// Ticks for which a node that lets samples gather has everything, so that it need not look again before them; 0 for
+    /// others, for which that would be one tick more at most.
+    fn ticks_there(&self) -> u32 {
+        let (lockstep, tick) = (&self.links.lockstep, self.tick);
+        if !self.links.node.outputs.is_empty() || self.inputs.iter().any(|input| input.awaits_shadow(tick)) {
+            return 0;
+        }
+        let sent = self.inputs.iter().enumerate().map(|(index, input)| {
+            let need = Need::Samples { topic: input.topic, input: index };
+            lockstep.count(need).saturating_add(input.delay_ticks)
+        });
+        sent.fold(lockstep.granted_ticks(), u32::min)
     }
 
     /// Ticks whose samples a node may let gather before it wakes: one without outputs holds nobody up.
@@ -502,6 +528,7 @@ impl ConnectedNode {
 
     fn connect(&mut self, membership: &Membership, locals: &Locals) -> Result<(), BusError> {
         let tick = self.tick;
+        self.known_ticks = 0;
         for input in &mut self.inputs {
             self.links.connect_backup(input, membership, tick)?;
         }

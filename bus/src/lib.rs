@@ -61,6 +61,7 @@ mod reserve;
 pub mod room;
 mod run_process;
 mod sample_memory;
+mod sample_ring;
 pub mod schema;
 mod shared_file;
 #[cfg(test)]

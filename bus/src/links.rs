@@ -64,9 +64,23 @@ impl Links {
         &membership.nodes[self.plan.publisher(topic)]
     }
 
-    /// True if an instance in another process reads `topic`.
+    /// True if an instance in another process reads `topic`, but for a recorder that reads the ring of the topic.
     pub(crate) fn is_read_outside(&self, membership: &Membership, topic: usize) -> bool {
-        membership.readers(topic).any(|(node, generation, _)| !self.is_member(node, generation))
+        let reads_ring = |node: usize| self.group().is_some() && self.plan.nodes[node].is_recorder;
+        let mut readers = membership.readers(topic);
+        readers.any(|(node, generation, _)| !self.is_member(node, generation) && !reads_ring(node))
+    }
+
+    /// True if a recorder in another process reads `topic`, and this process is a group.
+    pub(crate) fn is_recorded(&self, topic: usize) -> bool {
+        let reads = |node: &NodePlan| node.inputs.iter().any(|input| input.topic == topic);
+        self.group().is_some() && self.plan.nodes.iter().any(|node| node.is_recorder && reads(node))
+    }
+
+    /// True if this process records instance `generation` of the publisher of `topic`, which is a member of a group.
+    pub(crate) fn records_member(&self, topic: usize, generation: u32) -> bool {
+        let publisher = self.plan.publisher(topic);
+        self.node.is_recorder && generation == 0 && self.plan.group_of(publisher).is_some()
     }
 
     /// True if an instance in another process reads `topic` and sends something itself: others wait for it.

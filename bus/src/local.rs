@@ -24,8 +24,8 @@ impl LocalSample {
         Self { header: SampleHeader::default(), words: empty_sample(size), is_sent: false }
     }
 
-    fn sent(&self) -> Option<(&SampleHeader, &[u64])> {
-        self.is_sent.then_some((&self.header, &*self.words))
+    fn sent(&self) -> Option<(SampleHeader, &[u64])> {
+        self.is_sent.then_some((self.header, &*self.words))
     }
 }
 
@@ -36,13 +36,13 @@ impl LocalTopic {
     }
 
     /// The newest sample that was sent at or before `tick`.
-    pub(crate) fn at(&self, tick: u32) -> Option<(&SampleHeader, &[u64])> {
+    pub(crate) fn at(&self, tick: u32) -> Option<(SampleHeader, &[u64])> {
         let is_seen = |sample: &&LocalSample| sample.is_sent && sample.header.tick <= u64::from(tick);
         [&self.newest, &self.previous].into_iter().find(is_seen).and_then(LocalSample::sent)
     }
 
     /// The newest sample.
-    pub(crate) fn newest(&self) -> Option<(&SampleHeader, &[u64])> {
+    pub(crate) fn newest(&self) -> Option<(SampleHeader, &[u64])> {
         self.newest.sent()
     }
 

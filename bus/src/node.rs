@@ -18,6 +18,7 @@ use crate::plan::{NodePlan, Pace, Plan};
 use crate::port::OutPort;
 use crate::ports::{Inputs, PortSpec};
 use crate::registration::{Registration, message_of};
+use crate::sample_ring::SampleRing;
 use crate::schema::Schema;
 use crate::tick::Tick;
 use crate::transport::Transport;
@@ -470,9 +471,13 @@ fn connect_outputs(links: &Links, declared: &[DeclaredOutput]) -> Result<Vec<Out
         .map(|(output, &DeclaredOutput { schema, is_forwarded })| {
             let topic = &links.plan.topics[output.topic];
             let is_local = links.has_local_readers(output.topic);
-            let is_shared = !is_local || links.is_read_outside(&membership, output.topic);
+            let is_recorded = links.is_recorded(output.topic);
+            let is_shared = !(is_local || is_recorded) || links.is_read_outside(&membership, output.topic);
             let sender = if is_shared { Some(links.sender(output.topic, schema.size)?) } else { None };
-            let port = OutPort::new(output, topic, schema, sender, is_local);
+            let mut port = OutPort::new(output, topic, schema, sender, is_local || is_recorded);
+            if is_recorded {
+                port.record(SampleRing::create(&links.plan, output.topic, schema.size)?);
+            }
             Ok(if is_forwarded { port.keeping_stamps() } else { port })
         })
         .collect()

@@ -108,6 +108,9 @@ pub struct NodePlan {
     /// How long its steps take, where that is simulated.
     #[serde(default)]
     pub computing_time: Option<ComputingTime>,
+    /// True for the recorder: it takes every sample, of a group from rings in shared memory.
+    #[serde(default)]
+    pub is_recorder: bool,
 }
 
 impl NodePlan {
@@ -325,6 +328,7 @@ impl NodePlan {
             files: Vec::new(),
             restarts,
             computing_time,
+            is_recorder: false,
         }
     }
 }

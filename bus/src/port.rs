@@ -7,6 +7,7 @@ use crate::message::{cdr_bytes, message_bytes, sample_words};
 use crate::messages::Time;
 use crate::plan::{InputPlan, OutputPlan, TopicPlan};
 use crate::sample_memory::empty_sample;
+use crate::sample_ring::SampleRing;
 use crate::schema::{Extent, Schema};
 use crate::transport::{IceoryxError, Loan, Received, Receiver, SampleHeader, Sender};
 use std::collections::VecDeque;
@@ -90,6 +91,8 @@ pub(crate) enum Feed {
         /// The publisher's generation.
         generation: u32,
     },
+    /// A member of a group, for the recorder.
+    Ring(SampleRing),
 }
 
 impl Feed {
@@ -97,6 +100,8 @@ impl Feed {
         match self {
             Self::Shared(source) => source.generation,
             Self::Local { generation } => *generation,
+            // Only the first instance of a node is a member.
+            Self::Ring(_) => 0,
         }
     }
 
@@ -104,7 +109,7 @@ impl Feed {
     fn has_taken(&self, first: u64) -> bool {
         match self {
             Self::Shared(source) => source.next_sequence >= first,
-            Self::Local { .. } => true,
+            Self::Local { .. } | Self::Ring(_) => true,
         }
     }
 }
@@ -205,6 +210,12 @@ impl InPort {
             self.current = Some(next.map_err(|found| self.gap(node, tick, expected, found))?);
             self.pass_take_over(newest_sequence);
         }
+        if let Feed::Ring(ring) = &self.active
+            && limit.is_multiple_of(self.topic_period_ticks)
+            && ring.at(limit).is_none()
+        {
+            return Err(self.gap(node, tick, newest_sequence, Found::Nothing));
+        }
         self.take_shadow(newest_sequence).map_err(|(expected, found)| self.gap(node, tick, expected, found))
     }
 
@@ -275,10 +286,16 @@ impl InPort {
     }
 
     /// The sample that the tick reads, if there is one.
-    pub(crate) fn sample<'a>(&'a self, locals: &'a Locals) -> Option<(&'a SampleHeader, &'a [u64])> {
+    pub(crate) fn sample<'a>(&'a self, locals: &'a Locals) -> Option<(SampleHeader, &'a [u64])> {
         match &self.active {
-            Feed::Shared(_) => self.current.as_ref().map(|sample| (sample.header(), sample.words())),
+            Feed::Shared(_) => self.current.as_ref().map(|sample| (*sample.header(), sample.words())),
             Feed::Local { .. } => locals[self.topic].as_ref()?.at(self.newest_tick?),
+            Feed::Ring(ring) => {
+                let tick = self.newest_tick?;
+                let sequence = u64::from(tick / self.topic_period_ticks);
+                let header = SampleHeader { tick: tick.into(), sequence, ..SampleHeader::default() };
+                ring.at(tick).map(|words| (header, words))
+            }
         }
     }
 
@@ -288,7 +305,7 @@ impl InPort {
     }
 
     pub(crate) fn host_times_ns(&self, locals: &Locals) -> [u64; 3] {
-        let header = self.sample(locals).map(|(header, _)| *header).unwrap_or_default();
+        let header = self.sample(locals).map(|(header, _)| header).unwrap_or_default();
         [header.received_ns, header.done_ns, header.sent_ns]
     }
 
@@ -299,10 +316,10 @@ impl InPort {
 
     /// The same of the process that shadows the publisher.
     pub(crate) fn fresh_shadow(&self, tick: u32) -> Option<(&[u8], u64)> {
-        self.cdr(self.shadow.as_ref().map(|sample| (sample.header(), sample.words())), tick)
+        self.cdr(self.shadow.as_ref().map(|sample| (*sample.header(), sample.words())), tick)
     }
 
-    fn cdr<'a>(&self, sample: Option<(&'a SampleHeader, &'a [u64])>, tick: u32) -> Option<(&'a [u8], u64)> {
+    fn cdr<'a>(&self, sample: Option<(SampleHeader, &'a [u64])>, tick: u32) -> Option<(&'a [u8], u64)> {
         let (header, words) = sample.filter(|(header, _)| header.tick == u64::from(tick))?;
         Some((cdr_bytes(words, self.size), header.sequence))
     }
@@ -321,8 +338,10 @@ pub(crate) struct OutPort {
     is_written: bool,
     /// The connection to other processes; absent as long as members of the same group alone read the topic.
     sender: Option<Sender>,
-    /// Memory of the next sample where members of the same group read the topic.
+    /// Memory of the next sample where members of the same group, or the recorder of a group, read the topic.
     staging: Option<Box<[u64]>>,
+    /// Where the recorder of a group reads the samples.
+    ring: Option<SampleRing>,
     port: String,
     topic_name: String,
     schema: &'static Schema,
@@ -353,13 +372,14 @@ impl OutPort {
         topic: &TopicPlan,
         schema: &'static Schema,
         sender: Option<Sender>,
-        has_local_readers: bool,
+        is_staged: bool,
     ) -> Self {
         Self {
             loan: None,
             is_written: false,
             sender,
-            staging: has_local_readers.then(|| empty_sample(schema.size)),
+            staging: is_staged.then(|| empty_sample(schema.size)),
+            ring: None,
             port: output.port.clone(),
             topic_name: topic.name.clone(),
             schema,
@@ -381,6 +401,11 @@ impl OutPort {
     /// The same port, whose samples are others' messages and keep the stamps of their senders.
     pub(crate) fn keeping_stamps(self) -> Self {
         Self { stamp_offset: None, ..self }
+    }
+
+    /// Has the recorder of a group read the samples in `ring`.
+    pub(crate) fn record(&mut self, ring: SampleRing) {
+        self.ring = Some(ring);
     }
 
     /// Has the port take a sample at every step.
@@ -446,7 +471,7 @@ impl OutPort {
         self.is_written = true;
         match self.memory() {
             Some(words) => Ok(words),
-            None => unreachable!("a topic without readers in its group has a sender"),
+            None => unreachable!("a topic that neither its group nor a recorder of it reads has a sender"),
         }
     }
 
@@ -468,11 +493,19 @@ impl OutPort {
         topic: Option<&LocalTopic>,
         node: &str,
     ) -> Result<(), BusError> {
-        if let Some((header, words)) = topic.and_then(LocalTopic::newest) {
-            copy_out(&sender, words, *header).map_err(|reason| self.error("sending", node, &reason))?;
+        if let Some((header, words)) = topic.and_then(LocalTopic::newest).or_else(|| self.recorded()) {
+            copy_out(&sender, words, header).map_err(|reason| self.error("sending", node, &reason))?;
         }
         self.sender = Some(sender);
         Ok(())
+    }
+
+    /// The newest sample in the ring.
+    fn recorded(&self) -> Option<(SampleHeader, &[u64])> {
+        let tick = self.ticks_sent.checked_sub(self.period_ticks)?;
+        let sequence = u64::from(tick / self.period_ticks);
+        let header = SampleHeader { tick: tick.into(), sequence, ..SampleHeader::default() };
+        Some((header, self.ring.as_ref()?.at(tick)?))
     }
 
     /// Forgets what was written at a tick at which nothing was due.
@@ -526,6 +559,9 @@ impl OutPort {
             _ => Ok(()),
         };
         sent.map_err(|reason| self.error("sending", node, &reason))?;
+        if let (Some(ring), Some(staging)) = (&mut self.ring, &self.staging) {
+            ring.store(tick, staging);
+        }
         if let Some(staging) = &mut self.staging
             && let Some(Some(topic)) = locals.get_mut(self.topic)
         {

@@ -148,6 +148,9 @@ pub struct Extent {
     pub values_max: usize,
 }
 
+/// Bytes of CDR's encapsulation header.
+const CDR_HEADER_BYTES: usize = 4;
+
 impl Extent {
     /// Number of values in `message`, as it says itself.
     fn count(&self, message: &[u8]) -> usize {
@@ -163,6 +166,15 @@ impl Extent {
             count => self.values_offset + count * self.value_bytes,
         };
         &message[..end.min(message.len())]
+    }
+
+    /// The same of `cdr`, a message behind the header of its encapsulation.
+    #[must_use]
+    pub fn of_cdr<'a>(&self, cdr: &'a [u8]) -> &'a [u8] {
+        match cdr.split_at_checked(CDR_HEADER_BYTES) {
+            Some((header, message)) => &cdr[..header.len() + self.of(message).len()],
+            None => cdr,
+        }
     }
 
     /// Sets the count of `message`, which has room for all values.

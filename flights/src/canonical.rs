@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use nalgebra::{Matrix3, Vector3};
-use vehicles::gaps::{GAP_PERIODS, held_period_s, of_held};
+use vehicles::gaps::{GAP_PERIODS, held_period_s};
 
 use crate::clean::gaps;
 use crate::error::FlightsError;
@@ -212,12 +212,13 @@ fn without(time_s: &[f64]) -> Vec<(f64, f64)> {
 fn without_commands(flight: &Flight) -> Vec<(f64, f64)> {
     let time_s = &flight.command.time_s;
     let Some((first_s, last_s)) = flight.command.span_s() else { return Vec::new() };
-    let before = (f64::NEG_INFINITY, first_s);
-    if flight.commands_on_change {
-        return vec![before];
+    let mut gaps = flight.command_gaps_s();
+    gaps.push((f64::NEG_INFINITY, first_s));
+    if !flight.commands_on_change {
+        let period_s = held_period_s(time_s).unwrap_or(0.0);
+        gaps.push((last_s + GAP_PERIODS * period_s, f64::INFINITY));
     }
-    let period_s = held_period_s(time_s).unwrap_or(0.0);
-    of_held(time_s).into_iter().chain([before, (last_s + GAP_PERIODS * period_s, f64::INFINITY)]).collect()
+    gaps
 }
 
 /// The samples around `time_s` and how far it lies between them; at the ends the nearest sample twice.

@@ -12,13 +12,22 @@ use crate::frame;
 use crate::log::{Log, Samples};
 use crate::matrices;
 use crate::name::Name;
+use crate::number_rows::NumberRows;
 use crate::quantity::{FRACTION, PERCENT, Quantity};
 use crate::scaling;
+use crate::seams::SeamList;
 use diagnostics::Dimension;
 use diagnostics::unit::ANGLE;
 
-/// A channel as read, and what to say about it. Times need not grow yet and numbers need not be finite.
-pub type Read<const N: usize> = (Channel<N>, Vec<String>);
+/// A channel as read. Times need not grow yet and numbers need not be finite.
+pub struct Read<const N: usize> {
+    /// The samples.
+    pub channel: Channel<N>,
+    /// What to say about it.
+    pub notes: Vec<String>,
+    /// Seams of a log in several files.
+    pub seams: SeamList,
+}
 
 /// Reads `quantity` as `entry` says; an attitude in the order w, x, y, z. Angles that no vehicle flies at are refused,
 /// unless they are trusted.
@@ -37,19 +46,23 @@ pub fn read<const N: usize>(
     if layout.shape == Shape::Matrix {
         matrices::check(&samples.rows)?;
     }
-    let values = samples.rows.iter().map(|row| layout.convert(row)).collect::<Result<_, _>>()?;
-    Ok((Channel { time_s: samples.time_s, values }, samples.notes))
+    let mut values = Vec::with_capacity(samples.time_s.len());
+    for row in samples.rows.iter() {
+        values.push(layout.convert(row)?);
+    }
+    let channel = Channel { time_s: samples.time_s, values };
+    Ok(Read { channel, notes: samples.notes, seams: samples.seams })
 }
 
 /// Reads the yaw of an attitude that is level by assumption, in rad; `None` where the entry has none.
-pub fn read_yaw(log: &dyn Log, entry: &Entry) -> Result<Option<Read<1>>, LogError> {
+pub fn read_yaw(log: &dyn Log, entry: &Entry) -> Result<Option<Channel<1>>, LogError> {
     let Some(yaw) = &entry.yaw else { return Ok(None) };
     let factor = factor(ANGLE, entry.unit.as_deref())?;
     let samples = scaled_samples(log, entry, std::slice::from_ref(yaw))?;
     let sign = if entry.frame == Some(Frame::FrdNed) { -1.0 } else { 1.0 };
     let north = if entry.frame == Some(Frame::FrdNed) { std::f64::consts::FRAC_PI_2 } else { 0.0 };
     let values = samples.rows.iter().map(|row| [north + sign * factor * row[0]]).collect();
-    Ok(Some((Channel { time_s: samples.time_s, values }, samples.notes)))
+    Ok(Some(Channel { time_s: samples.time_s, values }))
 }
 
 /// The samples of `names`: their signs, then the entry's `scale`, then its `offset` applied.
@@ -58,7 +71,7 @@ fn scaled_samples(log: &dyn Log, entry: &Entry, names: &[Name]) -> Result<Sample
     let offsets = scaling::each(Spot::Key("offset"), entry.offset.as_ref(), 0.0, names.len())?;
     let plain: Vec<String> = names.iter().map(|name| name.plain.clone()).collect();
     let mut samples = log.samples(entry.topic.as_deref(), &plain)?;
-    for row in &mut samples.rows {
+    for row in samples.rows.iter_mut() {
         for (((number, name), scale), offset) in row.iter_mut().zip(names).zip(&scales).zip(&offsets) {
             *number = *number * name.sign() * scale + offset;
         }
@@ -109,7 +122,7 @@ impl<'a> Layout<'a> {
     }
 
     /// Roll and pitch in rad come to more than a turn, and not in a bad sample or two, only if they are in degrees.
-    fn check_angles(&self, rows: &[Vec<f64>]) -> Result<(), LogError> {
+    fn check_angles(&self, rows: &NumberRows) -> Result<(), LogError> {
         const BAD: f64 = 0.02;
         let tilts = rows.iter().flat_map(|row| row.iter().take(2)).filter(|angle| angle.is_finite());
         let mut sizes: Vec<f64> = tilts.map(|angle| angle.abs()).collect();

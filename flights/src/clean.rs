@@ -37,6 +37,9 @@ fn finite<const N: usize>(quantity: Quantity, channel: Channel<N>, notes: &mut V
     let is_finite = |index: usize| {
         channel.time_s[index].is_finite() && channel.values[index].iter().all(|number| number.is_finite())
     };
+    if (0..channel.time_s.len()).all(is_finite) {
+        return channel;
+    }
     let kept = channel.kept(is_finite);
     say_dropped(quantity, &channel, &kept, "have no finite number", notes);
     kept
@@ -120,7 +123,7 @@ fn growing<const N: usize>(quantity: Quantity, channel: Channel<N>, notes: &mut 
 }
 
 /// Marks a longest strictly growing subsequence of finite numbers.
-fn longest_growing(times: &[f64]) -> Vec<bool> {
+pub fn longest_growing(times: &[f64]) -> Vec<bool> {
     // `tails[n]` is the index of the smallest time that ends a growing sequence of n + 1 samples.
     let mut tails: Vec<usize> = Vec::new();
     let mut before: Vec<Option<usize>> = Vec::with_capacity(times.len());

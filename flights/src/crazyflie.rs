@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use crate::bytes::{Cursor, Number};
 use crate::error::{LogError, Spot};
 use crate::log::{Log, Samples};
+use crate::number_rows::NumberRows;
 
 /// Advice for a log whose header is cut or damaged.
 const COPY_AGAIN: &str = "it is damaged or was not closed: copy the log from the card again";
@@ -146,14 +147,12 @@ impl Log for CrazyflieLog {
     fn samples(&self, topic: Option<&str>, names: &[String]) -> Result<Samples, LogError> {
         let event = self.event(topic, names)?;
         let places: Vec<_> = names.iter().filter_map(|name| event.offset_of(name)).collect();
-        let row = |at: usize| {
-            places.iter().map(|(number, offset)| number.read(&self.bytes[at + offset..])).collect()
-        };
-        Ok(Samples {
-            time_s: event.records.iter().map(|(time_us, _)| *time_us as f64 * 1e-6).collect(),
-            rows: event.records.iter().map(|(_, at)| row(*at)).collect(),
-            notes: self.notes.clone(),
-        })
+        let mut rows = NumberRows::of_width(places.len());
+        for (_, at) in &event.records {
+            rows.push(places.iter().map(|(number, offset)| number.read(&self.bytes[at + offset..])));
+        }
+        let time_s = event.records.iter().map(|(time_us, _)| *time_us as f64 * 1e-6).collect();
+        Ok(Samples { time_s, rows, notes: self.notes.clone(), ..Samples::default() })
     }
 }
 

@@ -1,32 +1,20 @@
 //! Logs in CSV: a header, then rows on one clock.
 
-use std::num::NonZero;
-
-use vehicles::table::{ColumnError, Dialect, Row, Table, TableError, shown};
+use vehicles::table::{ColumnError, Row, Table, TableError, shown};
 use vehicles::wall_clock;
 
 use crate::arrays;
 use crate::declaration::Entry;
 use crate::error::{LogError, Spot};
+use crate::form::Form;
 use crate::log::{Log, Samples};
+use crate::number_rows::NumberRows;
 use crate::rows;
 
 /// A CSV file; a cell that holds no number is NaN.
 pub struct CsvLog {
     table: Table,
     time_s: Vec<f64>,
-}
-
-/// Declared form of a CSV file.
-pub struct Form<'a> {
-    /// Header, delimiter and decimal mark.
-    pub dialect: &'a Dialect,
-    /// Number of the recording that is used, from 1.
-    pub recording: Option<NonZero<usize>>,
-    /// Column of the times.
-    pub time: Option<&'a Entry>,
-    /// The channels that are read from the file, whose names find the header.
-    pub channels: Vec<&'a Entry>,
 }
 
 impl CsvLog {
@@ -40,7 +28,7 @@ impl CsvLog {
         let mut time_s = times(&table, form.time)?;
         let places = rows::Places { name: "line", number: &|row| table.rows.line(row) };
         rows::check_forward(&time_s, form.time, &places)?;
-        let part = rows::recording(&time_s, form.recording, &places)?;
+        let part = rows::recording(&time_s, form, &places)?;
         table.rows.keep(part.clone());
         time_s.truncate(part.end);
         time_s.drain(..part.start);
@@ -98,13 +86,17 @@ impl Log for CsvLog {
             let expected = "none, as a CSV file has no topics";
             return Err(LogError::unexpected(Spot::Key("topic"), expected, topic, "remove it"));
         }
-        let mut rows = vec![Vec::with_capacity(names.len()); self.time_s.len()];
-        for name in names {
+        let mut rows = NumberRows::unknown(names.len(), self.time_s.len());
+        for (index, name) in names.iter().enumerate() {
             let numbers = numbers(&self.table, name)?;
             check_numbers(&self.table, name, &numbers)?;
-            rows.iter_mut().zip(numbers).for_each(|(row, number)| row.push(number));
+            rows.set_column(index, numbers);
         }
-        Ok(Samples { time_s: self.time_s.clone(), rows, notes: Vec::new() })
+        Ok(Samples { time_s: self.time_s.clone(), rows, ..Samples::default() })
+    }
+
+    fn columns(&self) -> Vec<String> {
+        self.table.headers.clone()
     }
 
     fn line(&self, time_s: f64) -> Option<u64> {

@@ -10,6 +10,7 @@ use std::ops::Range;
 use crate::bytes::Number;
 use crate::error::{LogError, Spot};
 use crate::log::{Log, Samples};
+use crate::number_rows::NumberRows;
 
 /// In front of each message, with its type behind.
 const HEAD: [u8; 2] = [0xA3, 0x95];
@@ -305,12 +306,11 @@ impl Log for Dataflash {
         })?;
         let time_s =
             topic.messages.iter().map(|message| stamp.read(&self.bytes, message) / stamp.scale * unit_s);
-        let row = |message| wanted.iter().map(|field| field.read(&self.bytes, message)).collect();
-        Ok(Samples {
-            time_s: time_s.collect(),
-            rows: topic.messages.iter().map(row).collect(),
-            notes: self.notes.clone(),
-        })
+        let mut rows = NumberRows::of_width(wanted.len());
+        for message in &topic.messages {
+            rows.push(wanted.iter().map(|field| field.read(&self.bytes, message)));
+        }
+        Ok(Samples { time_s: time_s.collect(), rows, notes: self.notes.clone(), ..Samples::default() })
     }
 
     fn topics(&self) -> Vec<(String, String)> {

@@ -7,6 +7,7 @@ use serde::Deserialize;
 use toml::Spanned;
 use vehicles::table::Dialect;
 
+use crate::files::Files;
 use crate::flight::Role;
 use crate::name::Name;
 use crate::quantity::Quantity;
@@ -37,8 +38,8 @@ pub struct Declaration {
 pub struct FlightEntry {
     /// What reports call it, or the begin of that for the logs of a pattern; else the log's name.
     pub name: Option<Spanned<String>>,
-    /// The log, relative to the flights file, or a pattern of logs that become a flight each.
-    pub file: Spanned<String>,
+    /// The log, relative to the flights file, or a pattern of logs that become a flight each, or a list of a log's parts.
+    pub file: Spanned<Files>,
     /// What it is for.
     pub role: Role,
     /// Format of the log.
@@ -85,6 +86,18 @@ pub enum Format {
 }
 
 impl Format {
+    /// The name in a flights file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Csv => "csv",
+            Self::Mcap => "mcap",
+            Self::Ulog => "ulog",
+            Self::Dataflash => "dataflash",
+            Self::Crazyflie => "crazyflie",
+            Self::Parquet => "parquet",
+        }
+    }
+
     /// True for a table whose rows are on one clock.
     pub fn is_table(self) -> bool {
         matches!(self, Self::Csv | Self::Parquet)
@@ -125,8 +138,10 @@ pub struct Entry {
     pub matrix: Option<Vec<Name>>,
     /// The yaw alone, for a level attitude that is assumed.
     pub yaw: Option<Name>,
-    /// Log that holds the quantity, if not that of the flight; relative to the flights file.
-    pub file: Option<Spanned<String>>,
+    /// Log that holds the quantity, if not that of the flight, or a list of its parts; relative to the flights file.
+    pub file: Option<Spanned<Files>>,
+    /// Number of the recording that is used of that log, from 1.
+    pub recording: Option<NonZero<usize>>,
     /// Column of the times in that log, if it is not that of the channel `time`.
     pub time: Option<Box<Entry>>,
     /// Topic of an MCAP file, message of a ULog, event of a Crazyflie log.

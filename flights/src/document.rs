@@ -6,7 +6,6 @@ use std::path::{Component, Path, PathBuf};
 
 use diagnostics::{Diagnostic, ParameterError, Place};
 use serde::de::DeserializeOwned;
-use toml::Spanned;
 
 use crate::error::FlightsError;
 
@@ -51,11 +50,11 @@ impl Document {
 
     /// A path as written: `${NAME:-default}` is the environment's NAME, and a relative path starts at the folder
     /// of the flights file.
-    pub fn resolve(&self, key: &str, written: &Spanned<String>) -> Result<PathBuf, FlightsError> {
-        let expanded = vehicles::variables::expand(written.get_ref(), |name| std::env::var(name).ok())
-            .map_err(|found| {
+    pub fn resolve(&self, key: &str, written: &str, place: &Range<usize>) -> Result<PathBuf, FlightsError> {
+        let expanded =
+            vehicles::variables::expand(written, |name| std::env::var(name).ok()).map_err(|found| {
                 let advice = "set the variable, or give a default: ${NAME:-path}";
-                self.bad(&written.span(), key, "a path", found.to_string(), advice)
+                self.bad(place, key, "a path", found.to_string(), advice)
             })?;
         Ok(tidy(&self.path.parent().unwrap_or(Path::new("")).join(expanded)))
     }

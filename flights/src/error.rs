@@ -189,6 +189,15 @@ pub enum LogError {
     /// Samples that are too far apart for a flight.
     #[error(transparent)]
     Sparse(#[from] Sparse),
+    /// A part of a log in several files is wrong.
+    #[error("part {}: {cause}", file.display())]
+    Part {
+        /// The file of the part.
+        file: PathBuf,
+        /// What is wrong with it.
+        #[source]
+        cause: Box<LogError>,
+    },
 }
 
 /// Where in a log, or in what the flights file says of it.

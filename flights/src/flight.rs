@@ -3,7 +3,9 @@
 //! World W: z up. Body B: x forward, y left, z up. Times are seconds from the flight's start, one clock for all
 //! channels; they grow strictly within a channel. A gap is a time without samples, never a filler.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+
+use vehicles::gaps::of_held;
 
 use crate::quantity::Quantity;
 
@@ -40,6 +42,8 @@ pub struct Flight {
     pub name: String,
     /// The file it was read from.
     pub file: PathBuf,
+    /// Further files it was read from: later parts of its log, and the logs of single channels.
+    pub other_files: Vec<PathBuf>,
     /// What it is for.
     pub role: Role,
     /// Raw motor commands, in the unit of the vehicle file's command map and in its order of rotors. A command
@@ -47,6 +51,8 @@ pub struct Flight {
     pub command: Channel<4>,
     /// True if the log writes commands only on change: then a time without commands is no gap.
     pub commands_on_change: bool,
+    /// Times between the files of such a log, in which nobody knows if a command changed.
+    pub command_breaks_s: Vec<(f64, f64)>,
     /// Speeds of the rotors in rad/s, in the order of the commands.
     pub rotor_speed: Channel<4>,
     /// Position in W, in m.
@@ -121,9 +127,11 @@ impl Flight {
         Self {
             name: name.into(),
             file: file.into(),
+            other_files: Vec::new(),
             role,
             command: Channel::default(),
             commands_on_change: false,
+            command_breaks_s: Vec::new(),
             rotor_speed: Channel::default(),
             position: Channel::default(),
             velocity: Channel::default(),
@@ -145,6 +153,23 @@ impl Flight {
         };
         let all: Vec<String> = self.times().into_iter().filter_map(of).collect();
         if all.is_empty() { "no channel".to_owned() } else { all.join(", ") }
+    }
+
+    /// All files it was read from.
+    pub fn files(&self) -> impl Iterator<Item = &Path> {
+        std::iter::once(&self.file).chain(&self.other_files).map(PathBuf::as_path)
+    }
+
+    /// Gaps of the commands, each as the times of the last command before and the first behind it; infinite behind the
+    /// last. In a log that writes commands only on change, they are the times between its files.
+    pub(crate) fn command_gaps_s(&self) -> Vec<(f64, f64)> {
+        let time_s = &self.command.time_s;
+        if !self.commands_on_change {
+            return of_held(time_s);
+        }
+        let next_s = |to_s: f64| time_s.get(time_s.partition_point(|time_s| *time_s < to_s)).copied();
+        let breaks = self.command_breaks_s.iter();
+        breaks.map(|(from_s, to_s)| (*from_s, next_s(*to_s).unwrap_or(f64::INFINITY))).collect()
     }
 
     /// The times of the samples of all channels, in the order of [`Quantity::CHANNELS`].

@@ -5,10 +5,11 @@ use std::path::Path;
 use vehicles::foreign;
 
 use crate::crazyflie::CrazyflieLog;
-use crate::csv_log::{CsvLog, Form};
+use crate::csv_log::CsvLog;
 use crate::dataflash::Dataflash;
 use crate::declaration::{Clock, Format};
 use crate::error::{LogError, Spot};
+use crate::form::Form;
 use crate::log::Log;
 use crate::mcap_log::McapLog;
 use crate::parquet::ParquetLog;

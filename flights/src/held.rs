@@ -31,8 +31,10 @@ pub fn is_held<const N: usize>(values: &[[f64; N]]) -> bool {
         return false;
     }
     let of_chance = || {
-        let changes: Vec<Vec<f64>> = starts.iter().map(|start| values[*start].to_vec()).collect();
-        chance(&changes, 0.0).max(angles(&changes).map_or(0.0, |angles| chance(&angles, SAME_RAD)))
+        let changed = |index: usize| values[starts[index]];
+        let of_angles =
+            || chance(starts.len(), |index| angles(&changed(index)).unwrap_or_default(), SAME_RAD);
+        chance(starts.len(), changed, 0.0).max(if N == 4 { of_angles() } else { 0.0 })
     };
     is_regular(&runs) || of_chance() < COARSE_SHARE * long / runs.len() as f64
 }
@@ -51,26 +53,24 @@ fn is_regular(runs: &[usize]) -> bool {
     median >= 2.0 && runs.iter().filter(is_near).count() as f64 >= REGULAR_SHARE * runs.len() as f64
 }
 
-/// Roll, pitch and yaw of quaternions: a log of coarse angles has coarse ones, although the quaternions are not.
-fn angles(values: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
-    let angles = |value: &Vec<f64>| {
-        let wxyz: [f64; 4] = value[..].try_into().ok()?;
-        let (roll, pitch, yaw) = frame::rotation(wxyz).euler_angles();
-        Some(vec![roll, pitch, yaw])
-    };
-    values.iter().map(angles).collect()
+/// Roll, pitch and yaw of a quaternion: a log of coarse angles has coarse ones, although the quaternions are not.
+fn angles(value: &[f64]) -> Option<[f64; 3]> {
+    let wxyz: [f64; 4] = value.try_into().ok()?;
+    let (roll, pitch, yaw) = frame::rotation(wxyz).euler_angles();
+    Some([roll, pitch, yaw])
 }
 
-/// The chance that a value of the sensor equals the one before, from `values` of which none does.
-fn chance(values: &[Vec<f64>], same: f64) -> f64 {
-    let stays = |pair: &[Vec<f64>]| -> Vec<bool> {
-        pair[0].iter().zip(&pair[1]).map(|(a, b)| (a - b).abs() <= same).collect()
+/// The chance that a value of the sensor equals the one before, from `count` values of which none does.
+fn chance<const N: usize>(count: usize, value: impl Fn(usize) -> [f64; N], same: f64) -> f64 {
+    let stays = |index: usize| -> [bool; N] {
+        let (before, after) = (value(index), value(index + 1));
+        std::array::from_fn(|component| (before[component] - after[component]).abs() <= same)
     };
-    let stays: Vec<Vec<bool>> = values.windows(2).map(stays).collect();
+    let stays: Vec<[bool; N]> = (0..count - 1).map(stays).collect();
     let varies = |component: &usize| stays.iter().any(|stays| !stays[*component]);
-    let components: Vec<usize> = (0..values[0].len()).filter(varies).collect();
+    let components: Vec<usize> = (0..N).filter(varies).collect();
     if let [component] = components[..] {
-        return chance_of_one(values, component, same);
+        return chance_of_one((0..count).map(|index| value(index)[component]), same);
     }
     let windows = stays.chunks(WINDOW).map(|window| {
         let stay = |component: &usize| {
@@ -85,8 +85,8 @@ fn chance(values: &[Vec<f64>], same: f64) -> f64 {
 }
 
 /// The same for one component: a coarse one changes mostly by its smallest step, which it then often does not do.
-fn chance_of_one(values: &[Vec<f64>], component: usize, same: f64) -> f64 {
-    let steps = values.windows(2).map(|pair| (pair[1][component] - pair[0][component]).abs());
+fn chance_of_one(values: impl Iterator<Item = f64> + Clone, same: f64) -> f64 {
+    let steps = values.clone().zip(values.skip(1)).map(|(before, after)| (after - before).abs());
     let mut steps: Vec<f64> = steps.filter(|step| *step > same).collect();
     steps.sort_by(f64::total_cmp);
     let smallest = steps.get(steps.len() / 20).copied().unwrap_or(0.0);

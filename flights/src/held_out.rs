@@ -28,9 +28,8 @@ pub fn clashes(flights: &[Flight], parts: &[Part], sha256: impl Fn(&Path) -> Opt
     let of_role = |role| (0..flights.len()).filter(move |index| flights[*index].role == role);
     let clash = |fit: usize, test: usize| {
         let pair = [fit, test].map(|index| (&flights[index], &parts[index]));
-        let files = pair.map(|(flight, _)| flight.file.as_path());
-        let reason = match same_file(files[0], files[1], || sha256(files[0]) == sha256(files[1])) {
-            Some(how) => same_part(pair, how),
+        let reason = match shared(pair.map(|(flight, _)| flight), &sha256) {
+            Some(shared) => same_part(pair, &shared),
             None => same_samples(pair),
         };
         reason.map(|reason| Clash { fit, test, reason })
@@ -38,25 +37,42 @@ pub fn clashes(flights: &[Flight], parts: &[Part], sha256: impl Fn(&Path) -> Opt
     of_role(Role::Test).filter_map(|test| of_role(Role::Fit).find_map(|fit| clash(fit, test))).collect()
 }
 
+/// A file that two flights have in common: its paths, and how they are the same.
+struct Shared<'a> {
+    files: [&'a Path; 2],
+    how: &'static str,
+}
+
+fn shared<'a>(pair: [&'a Flight; 2], sha256: impl Fn(&Path) -> Option<String>) -> Option<Shared<'a>> {
+    let [fit, test] = pair;
+    let pairs = fit.files().flat_map(|a| test.files().map(move |b| [a, b]));
+    pairs.into_iter().find_map(|[a, b]| {
+        let how = same_file(a, b, || sha256(a) == sha256(b))?;
+        Some(Shared { files: [a, b], how })
+    })
+}
+
 /// Whether both, of one log, have some of its time in common. Their samples need not be compared then: a course that comes
 /// round has the same ones again.
-fn same_part([(fit, fit_part), (test, test_part)]: [(&Flight, &Part); 2], how: &str) -> Option<String> {
-    // On the log's own clock: the first samples of two choices of channels can be others.
-    let span = |part: &Part| (part.origin_s + part.from_s, part.origin_s + part.to_s);
+fn same_part([(_, fit_part), (_, test_part)]: [(&Flight, &Part); 2], shared: &Shared<'_>) -> Option<String> {
+    // On the log's own clock: the first samples of two choices of channels, and of parts of a log, can be others.
+    let begin_s = |part: &Part| part.clock_s + part.origin_s;
+    let span = |part: &Part| (begin_s(part) + part.from_s, begin_s(part) + part.to_s);
     let (a, b) = (span(fit_part), span(test_part));
     let (from_s, to_s) = (a.0.max(b.0), a.1.min(b.1));
     (to_s - from_s > EDGE_S).then(|| {
         format!(
-            "{} and {} are {how}, and of its time from {:.3} s to {:.3} s and from {:.3} s to {:.3} s both have {:.3} s to \
+            "{} and {} are {}, and of its time from {:.3} s to {:.3} s and from {:.3} s to {:.3} s both have {:.3} s to \
              {:.3} s",
-            fit.file.display(),
-            test.file.display(),
+            shared.files[0].display(),
+            shared.files[1].display(),
+            shared.how,
             fit_part.from_s,
             fit_part.to_s,
             test_part.from_s,
             test_part.to_s,
-            from_s - fit_part.origin_s,
-            to_s - fit_part.origin_s,
+            from_s - begin_s(fit_part),
+            to_s - begin_s(fit_part),
         )
     })
 }

@@ -32,26 +32,30 @@ pub struct KnownRotors {
 impl KnownRotors {
     /// Stretches of `flight`. They begin [`SETTLE_S`] after the first command and after each gap of the commands, and end
     /// one period after the last command before a gap and before the end. In a log that writes commands only on change, the
-    /// last one holds. Without commands, measured speeds are known wherever they were measured.
+    /// last one holds, but not from one of its files to the next. Without commands, measured speeds are known wherever they were measured.
     #[must_use]
     pub fn of(flight: &Flight) -> Self {
         let command = &flight.command;
         let Some((first_s, _)) = command.span_s() else { return Self::measured(flight) };
+        let (gaps, last_s) = (flight.command_gaps_s(), command.time_s.last().copied());
         if flight.commands_on_change {
-            return Self { stretches: vec![(first_s + SETTLE_S, f64::INFINITY)] };
+            return Self::between(&gaps, (first_s, f64::INFINITY), (SETTLE_S, 0.0));
         }
-        Self::between_gaps(&command.time_s, SETTLE_S, held_period_s(&command.time_s).unwrap_or(0.0))
+        let period_s = held_period_s(&command.time_s).unwrap_or(0.0);
+        Self::between(&gaps, (first_s, last_s.unwrap_or(first_s)), (SETTLE_S, period_s))
     }
 
     fn measured(flight: &Flight) -> Self {
-        Self::between_gaps(&flight.rotor_speed.time_s, 0.0, 0.0)
+        let span_s = flight.rotor_speed.span_s();
+        span_s.map_or(Self { stretches: Vec::new() }, |span_s| {
+            Self::between(&of_held(&flight.rotor_speed.time_s), span_s, (0.0, 0.0))
+        })
     }
 
-    /// Stretches of samples without a gap, which begin `late_s` after the first and end `long_s` after the last.
-    fn between_gaps(time_s: &[f64], late_s: f64, long_s: f64) -> Self {
-        let gaps = of_held(time_s);
-        let begins = time_s.first().copied().into_iter().chain(gaps.iter().map(|gap| gap.1));
-        let ends = gaps.iter().map(|gap| gap.0).chain(time_s.last().copied());
+    /// Stretches between `gaps`, which begin `late_s` after the first sample and end `long_s` after the last.
+    fn between(gaps: &[(f64, f64)], span_s: (f64, f64), (late_s, long_s): (f64, f64)) -> Self {
+        let begins = std::iter::once(span_s.0).chain(gaps.iter().map(|gap| gap.1));
+        let ends = gaps.iter().map(|gap| gap.0).chain([span_s.1]);
         let stretches = begins.zip(ends).map(|(from_s, to_s)| (from_s + late_s, to_s + long_s));
         Self { stretches: stretches.filter(|(from_s, to_s)| from_s < to_s).collect() }
     }
@@ -101,6 +105,14 @@ mod tests {
         assert!(!KnownRotors::of(&written).hold(1.0, 2.0));
         written.commands_on_change = true;
         assert!(KnownRotors::of(&written).hold(0.5, 99.0) && !KnownRotors::of(&written).hold(0.4, 1.0));
+    }
+
+    #[test]
+    fn commands_on_change_do_not_hold_from_file_to_file() {
+        let mut written = flight(vec![0.0, 1.0, 5.0, 6.0]);
+        (written.commands_on_change, written.command_breaks_s) = (true, vec![(2.0, 4.0), (8.0, 9.0)]);
+        let known = KnownRotors::of(&written);
+        assert_eq!(known.stretches_s(), [(0.5, 2.0), (5.5, 8.0)]);
     }
 
     #[test]

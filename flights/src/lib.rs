@@ -6,10 +6,12 @@
 //! | `set` | a flights file and all its logs |
 //! | `declaration`, `document` | what a flights file says, and where |
 //! | `quantity`, `frame` | units and frames |
+//! | `files`, `joined`, `seams` | logs in several files: their names, their parts as one log, the times between them |
+//! | `opening` | the logs of a flight, opened |
 //! | `logs`, `log_reader` | which logs flights are read from: names and patterns; each log is read once |
-//! | `log` | what every log can do: samples of numbers by name |
+//! | `log`, `number_rows` | what every log can do: samples of numbers by name |
 //! | `formats` | the formats of logs: `csv_log`, `mcap_log`, `ulog` (`ulog_messages`, `ulog_format`), `crazyflie`, `dataflash`, `parquet`, `bytes`, `arrays` |
-//! | `rows` | rows of a table on one clock: CSV and Parquet |
+//! | `form`, `rows` | tables, CSV and Parquet: their declared form, and rows on one clock |
 //! | `known_types` | messages whose fields and units need not be said |
 //! | `name`, `scaling`, `matrices`, `clock` | names of numbers, their factors, rotation matrices, clocks that start again |
 //! | `channels`, `clean`, `held`, `jumps`, `reading` | from a log's numbers to a flight |
@@ -36,13 +38,16 @@ mod dataflash;
 mod declaration;
 mod document;
 mod error;
+mod files;
 mod finding;
 mod flight;
 mod force_doubt;
+mod form;
 mod formats;
 mod frame;
 mod held;
 mod held_out;
+mod joined;
 mod jumps;
 mod known;
 mod known_types;
@@ -52,6 +57,8 @@ mod logs;
 mod matrices;
 mod mcap_log;
 mod name;
+mod number_rows;
+mod opening;
 mod parquet;
 mod plausible;
 mod played;
@@ -59,6 +66,7 @@ mod quantity;
 mod reading;
 mod rows;
 mod scaling;
+mod seams;
 mod set;
 mod span;
 mod specific_force;

@@ -1,6 +1,8 @@
 //! A log, whatever its format: samples of numbers by name.
 
 use crate::error::LogError;
+use crate::number_rows::NumberRows;
+use crate::seams::SeamList;
 
 /// Samples of some numbers as the log has them: any origin of time, any unit.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -8,9 +10,12 @@ pub struct Samples {
     /// When, in seconds; need not grow, and can be NaN where the log has no number.
     pub time_s: Vec<f64>,
     /// The numbers in the order they were asked for; NaN where the log has none.
-    pub rows: Vec<Vec<f64>>,
+    pub rows: NumberRows,
     /// What a reader of the samples should know, such as which stamp was taken.
     pub notes: Vec<String>,
+    /// Seams of a log in several files: for each, the time of the last sample before it, and of the first behind it. Infinite
+    /// where there is none.
+    pub seams: SeamList,
 }
 
 /// What every format can do.
@@ -26,6 +31,16 @@ pub trait Log {
     /// Checks that the times of these topics are of one clock.
     fn check_clocks(&self, _topics: &[&str]) -> Result<(), LogError> {
         Ok(())
+    }
+
+    /// Time of the log's clock, in ns, from which the times of samples count.
+    fn origin_ns(&self) -> i128 {
+        0
+    }
+
+    /// The names of a table's columns; none where the format has topics.
+    fn columns(&self) -> Vec<String> {
+        Vec::new()
     }
 
     /// The topics that have data, with the type of each; none where the format has no types.

@@ -27,7 +27,8 @@ impl<'a> LogReader<'a> {
     /// A reader of `logs`, whose bytes `read` gives.
     pub fn of(logs: &[Log<'_>], read: &'a ReadFile<'a>) -> Self {
         let mut reader = Self { read, logs: BTreeMap::new() };
-        logs.iter().for_each(|log| reader.logs.entry(real(&log.file)).or_default().flights += 1);
+        let files = logs.iter().flat_map(|log| &log.files);
+        files.for_each(|file| reader.logs.entry(real(file)).or_default().flights += 1);
         reader
     }
 

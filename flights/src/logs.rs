@@ -1,4 +1,4 @@
-//! The logs that flights are read from: the one that an entry names, or all that its pattern finds.
+//! The logs that flights are read from: the one that an entry names, in one file or several, or all that its pattern finds.
 
 use std::ops::Range;
 use std::path::{Component, Path, PathBuf};
@@ -9,6 +9,7 @@ use toml::Spanned;
 use crate::declaration::FlightEntry;
 use crate::document::Document;
 use crate::error::FlightsError;
+use crate::files::Files;
 
 /// Hidden files are found by no `*`: some systems write one beside each file.
 const MATCHING: MatchOptions =
@@ -22,8 +23,8 @@ pub struct Log<'a> {
     pub index: usize,
     /// What reports call the flight.
     pub name: String,
-    /// The log.
-    pub file: PathBuf,
+    /// The files of the log, in the order of time; one at least.
+    pub files: Vec<PathBuf>,
 }
 
 impl Log<'_> {
@@ -51,12 +52,69 @@ pub fn of_entry<'a>(
     patterns: Patterns,
 ) -> Result<Vec<Log<'a>>, FlightsError> {
     let (declared, key) = (entry.get_ref(), format!("flight.{index}.file"));
-    let file = document.resolve(&key, &declared.file)?;
     let given = declared.name.as_ref().map(|name| name.get_ref().as_str());
+    let log = |name: String, files: Vec<PathBuf>| Log { entry, index, name, files };
+    let (written, place) = match declared.file.get_ref() {
+        Files::One(written) => (written, declared.file.span()),
+        Files::Parts(_) => {
+            let files = parts(document, &key, &declared.file, patterns)?;
+            return Ok(vec![log(given.map_or_else(|| own_name(&files[0]), str::to_owned), files)]);
+        }
+    };
+    match found(document, &key, (written, &place), patterns)? {
+        Found::File(file) => Ok(vec![log(given.map_or_else(|| own_name(&file), str::to_owned), vec![file])]),
+        Found::ByPattern { files, fixed } => {
+            let name = |file: &Path| {
+                let found = without_ending(&plain(file).components().skip(fixed).collect::<PathBuf>());
+                given.map_or(found.clone(), |given| format!("{given} {found}"))
+            };
+            Ok(files.into_iter().map(|file| log(name(&file), vec![file])).collect())
+        }
+    }
+}
+
+/// The files of one log that the value of the key names, in its order; those that a pattern in a list finds in the order of
+/// their paths. A name that is no list is no pattern.
+pub fn parts(
+    document: &Document,
+    key: &str,
+    files: &Spanned<Files>,
+    patterns: Patterns,
+) -> Result<Vec<PathBuf>, FlightsError> {
+    let patterns = if files.get_ref().are_parts() { patterns } else { Patterns::Literal };
+    let mut all = Vec::new();
+    for (written, place) in files.get_ref().each(files.span()) {
+        match found(document, key, (written, &place), patterns)? {
+            Found::File(file) => all.push(file),
+            Found::ByPattern { files, .. } => all.extend(files),
+        }
+    }
+    Ok(all)
+}
+
+/// Files for a name in a flights file.
+enum Found {
+    /// The one with this name.
+    File(PathBuf),
+    /// Those that a pattern finds, sorted.
+    ByPattern {
+        /// Their paths.
+        files: Vec<PathBuf>,
+        /// Number of parts of their paths in front of the first wildcard.
+        fixed: usize,
+    },
+}
+
+/// Files for what is written at a place.
+fn found(
+    document: &Document,
+    key: &str,
+    (written, place): (&str, &Range<usize>),
+    patterns: Patterns,
+) -> Result<Found, FlightsError> {
+    let file = document.resolve(key, written, place)?;
     if patterns == Patterns::Literal || !has_wildcard(&file) || file.exists() {
-        let name = given
-            .map_or_else(|| without_ending(Path::new(file.file_name().unwrap_or_default())), str::to_owned);
-        return Ok(vec![Log { entry, index, name, file }]);
+        return Ok(Found::File(file));
     }
     let (folder, fixed) = fixed_folder(&file);
     let found = find(&file).and_then(|found| match found[..] {
@@ -64,16 +122,17 @@ pub fn of_entry<'a>(
         [] => Err("no such folder".to_owned()),
         _ => Ok(found),
     });
-    let found = found.map_err(|found| {
-        let expected = format!("files as `{}` in the folder {}", declared.file.get_ref(), shown(&folder));
+    let files = found.map_err(|found| {
+        let expected = format!("files as `{written}` in the folder {}", shown(&folder));
         let advice = "correct the pattern, in which `*` is any part of a name and `?` a character of it";
-        document.bad(&declared.file.span(), key, &expected, found, advice)
+        document.bad(place, key, &expected, found, advice)
     })?;
-    let name = |file: &Path| {
-        let found = without_ending(&plain(file).components().skip(fixed).collect::<PathBuf>());
-        given.map_or(found.clone(), |given| format!("{given} {found}"))
-    };
-    Ok(found.into_iter().map(|file| Log { entry, index, name: name(&file), file }).collect())
+    Ok(Found::ByPattern { files, fixed })
+}
+
+/// Name of a flight by its log.
+fn own_name(file: &Path) -> String {
+    without_ending(Path::new(file.file_name().unwrap_or_default()))
 }
 
 fn has_wildcard(path: &Path) -> bool {

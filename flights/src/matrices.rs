@@ -5,17 +5,15 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 use crate::error::{LogError, Spot};
 use crate::flight::median;
 use crate::frame::to_wxyz;
+use crate::number_rows::NumberRows;
 
 /// Greatest element of R^T R - I of a rotation matrix that was rounded.
 const TOLERANCE: f64 = 0.05;
 
 /// Refuses samples of which most are no rotation matrices.
-pub fn check(rows: &[Vec<f64>]) -> Result<(), LogError> {
-    let read: Vec<Matrix3<f64>> = rows
-        .iter()
-        .filter_map(|row| matrix(row))
-        .filter(|matrix| matrix.iter().all(|part| part.is_finite()))
-        .collect();
+pub fn check(rows: &NumberRows) -> Result<(), LogError> {
+    let read: Vec<Matrix3<f64>> =
+        rows.iter().filter_map(matrix).filter(|matrix| matrix.iter().all(|part| part.is_finite())).collect();
     let wrong = read.iter().filter(|matrix| !is_rotation(matrix)).count();
     if 2 * wrong <= read.len() {
         return Ok(());
@@ -56,6 +54,12 @@ fn is_rotation(matrix: &Matrix3<f64>) -> bool {
 mod tests {
     use super::*;
 
+    fn of<const N: usize>(matrices: [Vec<f64>; N]) -> NumberRows {
+        let mut rows = NumberRows::of_width(9);
+        matrices.into_iter().for_each(|row| rows.push(row));
+        rows
+    }
+
     #[test]
     fn rotation_matrices_become_quaternions() {
         for angles in [[0.0, 0.0, 0.0], [0.3, -0.2, 3.0], [3.1, 0.1, -1.0]] {
@@ -64,7 +68,7 @@ mod tests {
             let [w, x, y, z] = quaternion(&rows);
             let read = UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, x, y, z));
             assert!(read.angle_to(&q) < 1e-7, "{angles:?}");
-            assert!(check(&[rows.clone(), rows, vec![f64::NAN; 9]]).is_ok());
+            assert!(check(&of([rows.clone(), rows, vec![f64::NAN; 9]])).is_ok());
         }
     }
 
@@ -76,7 +80,7 @@ mod tests {
             (vec![0.0; 9], "length 0.000"),
         ];
         for (row, part) in cases {
-            let error = check(&[row.clone(), row.clone()]).unwrap_err().to_string();
+            let error = check(&of([row.clone(), row.clone()])).unwrap_err().to_string();
             assert!(
                 error.contains("`matrix`") && error.contains(part) && error.contains("row by row"),
                 "{error}"

@@ -9,6 +9,7 @@ use crate::declaration::Clock;
 use crate::error::{LogError, Spot};
 use crate::flight::median;
 use crate::log::{Log, Samples};
+use crate::number_rows::NumberRows;
 
 /// Messages of a topic that are looked at for its clock.
 const CLOCK_SAMPLES: usize = 200;
@@ -136,7 +137,8 @@ impl Topic {
 impl Log for McapLog {
     fn samples(&self, topic: Option<&str>, names: &[String]) -> Result<Samples, LogError> {
         let (name, topic, definition) = self.topic(topic)?;
-        let mut samples = Samples { notes: self.notes.clone(), ..Samples::default() };
+        let rows = NumberRows::of_width(names.len());
+        let mut samples = Samples { rows, notes: self.notes.clone(), ..Samples::default() };
         let mut stamped = 0_usize;
         let mut absent = Absent::of(names);
         for message in self.messages_of(name) {
@@ -187,6 +189,10 @@ impl Log for McapLog {
         let found = format!("two that are {apart_s:.3} s apart: {}, and {}", first.1, last.1);
         let advice = "choose by `time = \"log\"`, or by `time = \"stamp\"` where every topic has stamps, in the flight";
         Err(LogError::unexpected(Spot::Key("time"), "one clock for all topics", found, advice))
+    }
+
+    fn origin_ns(&self) -> i128 {
+        self.start_ns
     }
 
     fn topics(&self) -> Vec<(String, String)> {

@@ -7,17 +7,16 @@ mod pages;
 mod thrift;
 mod values;
 
-use std::num::NonZero;
-
 use parquet::file::metadata::ParquetMetaData;
 use parquet::schema::types::SchemaDescriptor;
 use vehicles::table::{TableError, column_of, shown};
 use vehicles::wall_clock;
 
-use crate::csv_log::Form;
 use crate::declaration::Entry;
 use crate::error::{LogError, Spot};
+use crate::form::Form;
 use crate::log::{Log, Samples};
+use crate::number_rows::NumberRows;
 use crate::rows;
 
 use kind::Kind;
@@ -39,15 +38,15 @@ impl ParquetLog {
         let headers = headers(metadata.file_metadata().schema_descr());
         let mut log = Self { bytes, metadata, headers, time_s: Vec::new(), first_row: 0 };
         log.time_s = log.times(form.time)?;
-        log.choose(form.recording, form.time)?;
+        log.choose(form)?;
         Ok(log)
     }
 
     /// Cuts the times to one recording.
-    fn choose(&mut self, recording: Option<NonZero<usize>>, time: Option<&Entry>) -> Result<(), LogError> {
+    fn choose(&mut self, form: &Form<'_>) -> Result<(), LogError> {
         let places = rows::Places { name: "row", number: &|row| row as u64 + 1 };
-        rows::check_forward(&self.time_s, time, &places)?;
-        let part = rows::recording(&self.time_s, recording, &places)?;
+        rows::check_forward(&self.time_s, form.time, &places)?;
+        let part = rows::recording(&self.time_s, form, &places)?;
         self.first_row = part.start;
         self.time_s.truncate(part.end);
         self.time_s.drain(..part.start);
@@ -93,17 +92,20 @@ impl Log for ParquetLog {
             let expected = "none, as a Parquet file has no topics";
             return Err(LogError::unexpected(Spot::Key("topic"), expected, topic, "remove it"));
         }
-        let mut rows = vec![Vec::with_capacity(names.len()); self.time_s.len()];
-        for name in names {
+        let mut rows = NumberRows::unknown(names.len(), self.time_s.len());
+        for (index, name) in names.iter().enumerate() {
             let numbers = values::read(&self.bytes, &self.metadata, self.column(name)?)?;
             if numbers.iter().all(|number| !number.is_finite()) {
                 let at = Spot::Named("column", shown(name));
                 return Err(LogError::unexpected(at, "numbers", "none in any row", "name another column"));
             }
-            let used = numbers.iter().skip(self.first_row);
-            rows.iter_mut().zip(used).for_each(|(row, number)| row.push(*number));
+            rows.set_column(index, numbers.into_iter().skip(self.first_row));
         }
-        Ok(Samples { time_s: self.time_s.clone(), rows, notes: Vec::new() })
+        Ok(Samples { time_s: self.time_s.clone(), rows, ..Samples::default() })
+    }
+
+    fn columns(&self) -> Vec<String> {
+        self.headers.clone()
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::ops::Range;
-use std::path::Path;
+use std::path::PathBuf;
 
 use toml::Spanned;
 use vehicles::Vehicle;
@@ -22,6 +22,7 @@ use crate::known_types;
 use crate::log::Log;
 use crate::plausible;
 use crate::quantity::Quantity;
+use crate::seams::{self, SeamList, Seams};
 use crate::span::{self, Moment, Sparse};
 use crate::specific_force::{self, Meaning};
 
@@ -31,6 +32,8 @@ const SLACK_S: f64 = 1e-6;
 /// A part of a log, in s from the log's first sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Part {
+    /// When the log's own clock begins, on the clock of the computer that wrote it, where that is known.
+    pub clock_s: f64,
     /// When the first sample was, on the log's own clock.
     pub origin_s: f64,
     /// When the flight's own time begins.
@@ -55,23 +58,41 @@ pub struct Reading<'a> {
     pub at: Range<usize>,
     /// The log's format.
     pub format: Format,
-    /// The log.
-    pub file: &'a Path,
+    /// The files of the log, in the order of time.
+    pub files: &'a [PathBuf],
     /// The channels that apply to the flight.
     pub channels: ChannelMap,
     /// The logs of channels that are in other files.
     pub others: OtherLogs,
 }
 
+/// A log beside the flight's own.
+pub struct OtherLog {
+    /// Its files, in the order of time.
+    pub files: Vec<PathBuf>,
+    /// Its content.
+    pub log: Box<dyn Log>,
+}
+
 /// Logs by the channel that is read from them.
-pub type OtherLogs = BTreeMap<Quantity, Box<dyn Log>>;
+pub type OtherLogs = BTreeMap<Quantity, OtherLog>;
+
+/// What is found while channels are read.
+#[derive(Default)]
+struct Said {
+    notes: Vec<String>,
+    errors: Vec<FlightsError>,
+    seams: Seams,
+}
 
 impl Reading<'_> {
-    /// Reads the flight from `log`; says which part of the log's own time it is, too.
+    /// Reads the flight from `log`; says which part of the log's own time it is, too. The memory of the log is free before the
+    /// flight is judged.
     ///
     /// # Errors
     /// Those of all channels at once.
-    pub fn flight(mut self, log: &dyn Log) -> Result<(Flight, Part), FlightsError> {
+    pub fn flight(mut self, whole: Box<dyn Log>) -> Result<(Flight, Part), FlightsError> {
+        let log = whole.as_ref();
         let mut taken = Vec::new();
         if self.channels.is_empty() {
             (self.channels, taken) = known_types::defaults(log, self.format);
@@ -79,10 +100,11 @@ impl Reading<'_> {
         let topics: Vec<&str> =
             self.channels.values().filter_map(|entry| entry.get_ref().topic.as_deref()).collect();
         log.check_clocks(&topics).map_err(|cause| self.log_error(&self.at, None, cause))?;
-        let mut flight = self.read_channels(log)?;
+        let (mut flight, seams) = self.read_channels(log)?;
         flight.commands_on_change =
             self.declared(Quantity::Command).is_some_and(|entry| entry.on_change == Some(true));
         flight.notes.splice(0..0, taken);
+        let breaks = self.part_at_seams(&mut flight, &seams);
         if self.format.is_table() {
             let of_time = plausible::judge_time(&flight, self.vehicle, &self.channels);
             self.settle(&mut flight, of_time.into_iter().collect())?;
@@ -91,7 +113,9 @@ impl Reading<'_> {
         let origin_s = self.origin_s(&flight, yaw.as_ref())?;
         self.to_flight_time(&mut flight, origin_s);
         self.check_span(&flight, log, origin_s)?;
-        let part = self.part(&flight, origin_s);
+        let part = self.part(&flight, log, origin_s);
+        drop(whole);
+        self.say_breaks(&mut flight, &breaks, origin_s);
         yaw.iter_mut().for_each(|yaw| self.shift(Quantity::Attitude, &mut yaw.time_s, origin_s));
         self.assume(&mut flight, yaw)?;
         jumps::leave_out_jumps(&mut flight);
@@ -104,57 +128,107 @@ impl Reading<'_> {
         Ok((flight, part))
     }
 
-    fn read_channels(&self, log: &dyn Log) -> Result<Flight, FlightsError> {
-        let mut flight = Flight::new(self.name, self.file, self.entry.role);
-        let (mut notes, mut errors) = (Vec::new(), Vec::new());
-        let said = (&mut notes, &mut errors);
-        flight.attitude = self.channel(log, Quantity::Attitude, said.0, said.1);
-        match clean::unit_quaternions(std::mem::take(&mut flight.attitude), said.0) {
+    fn read_channels(&self, log: &dyn Log) -> Result<(Flight, Seams), FlightsError> {
+        let mut flight = Flight::new(self.name, &self.files[0], self.entry.role);
+        flight.other_files = self.files[1..].to_vec();
+        flight.other_files.extend(self.others.values().flat_map(|other| other.files.iter().cloned()));
+        let said = &mut Said::default();
+        flight.attitude = self.channel(log, Quantity::Attitude, said);
+        match clean::unit_quaternions(std::mem::take(&mut flight.attitude), &mut said.notes) {
             Ok(attitude) => flight.attitude = attitude,
-            Err(cause) => said.1.push(self.channel_error(Quantity::Attitude, cause)),
+            Err(cause) => said.errors.push(self.channel_error(Quantity::Attitude, cause)),
         }
-        flight.command = self.channel(log, Quantity::Command, said.0, said.1);
-        flight.rotor_speed = self.channel(log, Quantity::RotorSpeed, said.0, said.1);
-        flight.position = self.channel(log, Quantity::Position, said.0, said.1);
-        flight.velocity = self.channel(log, Quantity::Velocity, said.0, said.1);
-        flight.angular_velocity = self.channel(log, Quantity::AngularVelocity, said.0, said.1);
-        flight.specific_force = self.channel(log, Quantity::SpecificForce, said.0, said.1);
-        flight.battery_voltage = self.channel(log, Quantity::BatteryVoltage, said.0, said.1);
-        FlightsError::gather(errors)?;
-        flight.notes = notes;
-        Ok(flight)
+        flight.command = self.channel(log, Quantity::Command, said);
+        flight.rotor_speed = self.channel(log, Quantity::RotorSpeed, said);
+        flight.position = self.channel(log, Quantity::Position, said);
+        flight.velocity = self.channel(log, Quantity::Velocity, said);
+        flight.angular_velocity = self.channel(log, Quantity::AngularVelocity, said);
+        flight.specific_force = self.channel(log, Quantity::SpecificForce, said);
+        flight.battery_voltage = self.channel(log, Quantity::BatteryVoltage, said);
+        FlightsError::gather(std::mem::take(&mut said.errors))?;
+        flight.notes = std::mem::take(&mut said.notes);
+        Ok((flight, std::mem::take(&mut said.seams)))
     }
 
     /// A channel on the log's clock; empty where the flight does not declare it, or where it cannot be read.
-    fn channel<const N: usize>(
-        &self,
-        log: &dyn Log,
-        quantity: Quantity,
-        notes: &mut Vec<String>,
-        errors: &mut Vec<FlightsError>,
-    ) -> Channel<N> {
+    fn channel<const N: usize>(&self, log: &dyn Log, quantity: Quantity, said: &mut Said) -> Channel<N> {
         let Some(entry) = self.declared(quantity) else { return Channel::default() };
         if self.entry.assume.is_some() && entry.yaw.is_some() {
             return Channel::default();
         }
-        let log = self.others.get(&quantity).map_or(log, AsRef::as_ref);
+        let log = self.log_of(quantity, log);
         let complete = known_types::complete(log, quantity, entry);
         let read = complete.and_then(|entry| {
-            let (mut channel, said) =
-                channels::read(log, quantity, &entry, self.vehicle, self.entry.trust_units)?;
+            let mut read = channels::read(log, quantity, &entry, self.vehicle, self.entry.trust_units)?;
             if let Some(absent) = known_types::absent(log, quantity, &entry) {
-                channel = clean::without_absent(quantity, channel, &absent.messages, absent.fields, notes)?;
+                let (messages, notes) = (&absent.messages, &mut said.notes);
+                read.channel = clean::without_absent(quantity, read.channel, messages, absent.fields, notes)?;
             }
-            Ok((channel, said))
+            Ok(read)
         });
-        let cleaned = read.and_then(|(channel, said)| {
-            notes.extend(said.into_iter().map(|said| format!("{quantity}: {said}")));
-            clean::clean(quantity, channel, notes)
+        let cleaned = read.and_then(|read| {
+            said.notes.extend(read.notes.into_iter().map(|note| format!("{quantity}: {note}")));
+            said.seams.of_channel.insert(quantity, read.seams);
+            clean::clean(quantity, read.channel, &mut said.notes)
         });
         cleaned.unwrap_or_else(|cause| {
-            errors.push(self.channel_error(quantity, cause));
+            said.errors.push(self.channel_error(quantity, cause));
             Channel::default()
         })
+    }
+
+    /// The log of a channel, if not the flight's own, `log`.
+    fn log_of<'b>(&'b self, quantity: Quantity, log: &'b dyn Log) -> &'b dyn Log {
+        self.others.get(&quantity).map_or(log, |other| other.log.as_ref())
+    }
+
+    /// Makes a gap of the time between two parts of a log, in every channel that the log has, where samples are missing.
+    /// Returns these times of the flight's own log, on its clock. The voltage of a battery changes slowly and is left as it is.
+    fn part_at_seams(&self, flight: &mut Flight, seams: &Seams) -> SeamList {
+        let of_log: Vec<Quantity> = Quantity::CHANNELS
+            .iter()
+            .copied()
+            .filter(|quantity| !self.others.contains_key(quantity))
+            .collect();
+        let is_on_change = flight.commands_on_change;
+        let holds = |quantity| is_on_change && quantity == Quantity::Command;
+        let times: Vec<_> = flight.times().into_iter().filter(|(quantity, _)| !holds(*quantity)).collect();
+        let of_own_log = seams.breaks(&of_log, &times);
+        let of_others: BTreeMap<Quantity, SeamList> =
+            self.others.keys().map(|quantity| (*quantity, seams.breaks(&[*quantity], &times))).collect();
+        let mut notes = Vec::new();
+        for (quantity, channel) in flight.channels_mut() {
+            let breaks = of_others.get(&quantity).unwrap_or(&of_own_log);
+            if breaks.is_empty() || quantity == Quantity::BatteryVoltage || holds(quantity) {
+                continue;
+            }
+            let count = seams::widen(channel, breaks);
+            if count > 0 {
+                notes.push(format!(
+                    "{quantity}: {count} samples beside the gap between two files are left out"
+                ));
+            }
+        }
+        flight.notes.extend(notes);
+        if is_on_change {
+            flight.command_breaks_s = of_others.get(&Quantity::Command).unwrap_or(&of_own_log).clone();
+        }
+        of_own_log
+    }
+
+    /// Notes the times between the files of the flight's log, in which nothing was logged.
+    fn say_breaks(&self, flight: &mut Flight, breaks: &[(f64, f64)], origin_s: f64) {
+        let mut times = breaks.iter().map(|(from_s, to_s)| [*from_s, *to_s]).collect::<Vec<_>>();
+        times.iter_mut().flatten().for_each(|time_s| *time_s -= origin_s + self.start_s());
+        let shown: Vec<String> =
+            times.iter().map(|[from_s, to_s]| format!("{from_s:.3} s to {to_s:.3} s")).collect();
+        if !shown.is_empty() {
+            let count = self.files.len();
+            flight.notes.push(format!(
+                "the log has {count} files; nothing was logged between them from {}",
+                shown.join(", from ")
+            ));
+        }
     }
 
     fn declared(&self, quantity: Quantity) -> Option<&Entry> {
@@ -166,10 +240,10 @@ impl Reading<'_> {
         let Some(entry) = self.declared(Quantity::Attitude).filter(|_| self.entry.assume.is_some()) else {
             return Ok(None);
         };
-        let log = self.others.get(&Quantity::Attitude).map_or(log, AsRef::as_ref);
+        let log = self.log_of(Quantity::Attitude, log);
         let read = channels::read_yaw(log, entry).and_then(|read| match read {
             None => Ok(None),
-            Some((channel, _)) => clean::clean(Quantity::Attitude, channel, &mut Vec::new())
+            Some(channel) => clean::clean(Quantity::Attitude, channel, &mut Vec::new())
                 .map(|cleaned| Some(unwrapped(cleaned))),
         });
         read.map_err(|cause| self.channel_error(Quantity::Attitude, cause))
@@ -188,15 +262,15 @@ impl Reading<'_> {
 
     /// Puts all channels on the flight's clock and cuts them to its part.
     fn to_flight_time(&self, flight: &mut Flight, origin_s: f64) {
-        let is_on_change = flight.commands_on_change;
         for (quantity, channel) in flight.channels_mut() {
-            let time_s = channel.time_s();
-            self.shift(quantity, time_s, origin_s);
-            if quantity == Quantity::Command {
-                begin_holding(time_s, is_on_change);
-            }
-            self.cut(channel);
+            self.shift(quantity, channel.time_s(), origin_s);
         }
+        for (from_s, to_s) in &mut flight.command_breaks_s {
+            self.shift(Quantity::Command, std::slice::from_mut(from_s), origin_s);
+            self.shift(Quantity::Command, std::slice::from_mut(to_s), origin_s);
+        }
+        begin_holding(flight);
+        flight.channels_mut().into_iter().for_each(|(_, channel)| self.cut(channel));
     }
 
     /// Moves times from the log's clock to the flight's, and to when the samples were true.
@@ -228,10 +302,11 @@ impl Reading<'_> {
     }
 
     /// The part of the log that the flight's samples come from.
-    fn part(&self, flight: &Flight, origin_s: f64) -> Part {
+    fn part(&self, flight: &Flight, log: &dyn Log, origin_s: f64) -> Part {
         let times = || flight.times().into_iter().map(|(_, time_s)| time_s);
         let (firsts, lasts) = (times().filter_map(<[f64]>::first), times().filter_map(<[f64]>::last));
         Part {
+            clock_s: log.origin_ns() as f64 * 1e-9,
             origin_s,
             start_s: self.start_s(),
             from_s: self.start_s() + firsts.copied().fold(f64::INFINITY, f64::min),
@@ -311,7 +386,7 @@ impl Reading<'_> {
         Err(FlightsError::Implausible {
             place: self.document.place(&self.declaration_of(clear[0].channel)),
             flight: flight.name.clone(),
-            file: self.file.to_owned(),
+            file: self.files[0].clone(),
             findings: clear,
         })
     }
@@ -327,17 +402,19 @@ impl Reading<'_> {
     }
 
     fn log_error(&self, at: &Range<usize>, channel: Option<Quantity>, cause: LogError) -> FlightsError {
-        let (flight, file) = (self.name.to_owned(), self.file.to_owned());
+        let other = channel.and_then(|channel| self.others.get(&channel)).map(|other| &other.files[0]);
+        let (flight, file) = (self.name.to_owned(), other.unwrap_or(&self.files[0]).clone());
         FlightsError::Log { place: self.document.place(at), flight, file, channel, cause }
     }
 }
 
 /// Moves the command that holds at the start, 0 s, to there; not if the start lies in a gap.
-fn begin_holding(time_s: &mut [f64], is_on_change: bool) {
+fn begin_holding(flight: &mut Flight) {
+    let is_in_gap = flight.command_gaps_s().into_iter().any(|(from_s, to_s)| from_s <= 0.0 && 0.0 < to_s);
+    let time_s = &mut flight.command.time_s;
     let Some(holding) = time_s.partition_point(|time_s| *time_s <= 0.0).checked_sub(1) else { return };
-    let is_in_gap = of_held(time_s).into_iter().any(|(from_s, to_s)| from_s <= 0.0 && 0.0 < to_s);
-    let is_last = holding + 1 == time_s.len();
-    if is_on_change || !(is_in_gap || is_last) {
+    let is_last = holding + 1 == time_s.len() && !flight.commands_on_change;
+    if !(is_in_gap || is_last) {
         time_s[holding] = 0.0;
     }
 }

@@ -1,6 +1,5 @@
 //! Rows of a table on one clock: the column of their times, its unit, and the recordings that they are.
 
-use std::num::NonZero;
 use std::ops::Range;
 
 use vehicles::table::shown;
@@ -8,6 +7,7 @@ use vehicles::table::shown;
 use crate::clock::{self, NotForward};
 use crate::declaration::Entry;
 use crate::error::{LogError, Spot};
+use crate::form::Form;
 use crate::name::Name;
 use crate::quantity::Quantity;
 use crate::scaling;
@@ -70,18 +70,14 @@ pub fn check_forward(time_s: &[f64], time: Option<&Entry>, places: &Places<'_>) 
 }
 
 /// The rows of the recording with this number; those of the only one where none is asked for.
-pub fn recording(
-    time_s: &[f64],
-    number: Option<NonZero<usize>>,
-    places: &Places<'_>,
-) -> Result<Range<usize>, LogError> {
+pub fn recording(time_s: &[f64], form: &Form<'_>, places: &Places<'_>) -> Result<Range<usize>, LogError> {
     let restarts = clock::restarts(time_s);
     let count = restarts.len() + 1;
     let bounds = |index: usize| {
         let from = index.checked_sub(1).map_or(0, |before| restarts[before]);
         from..restarts.get(index).copied().unwrap_or(time_s.len())
     };
-    match (number, restarts.first()) {
+    match (form.recording, restarts.first()) {
         (None, None) => Ok(0..time_s.len()),
         (Some(number), _) if number.get() <= count => Ok(bounds(number.get() - 1)),
         (Some(number), _) => {
@@ -99,8 +95,7 @@ pub fn recording(
                 numbers.join(", "),
                 time_s[*first]
             );
-            let advice = "cut the file there, or set the flight's `recording`, 1 for the first";
-            Err(LogError::unexpected(Spot::Key("time"), "one clock", found, advice))
+            Err(LogError::unexpected(Spot::Key("time"), "one clock", found, form.restarts))
         }
     }
 }

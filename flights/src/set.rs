@@ -8,19 +8,16 @@ use diagnostics::Diagnostic;
 use inputs::InputFiles;
 use toml::Spanned;
 use vehicles::Vehicle;
-use vehicles::table::Dialect;
 
-use crate::csv_log::Form;
-use crate::declaration::{ChannelMap, Declaration, Entry, FlightEntry, Format};
+use crate::declaration::{Declaration, FlightEntry};
 use crate::document::Document;
-use crate::error::{FlightsError, LogError, Spot};
+use crate::error::FlightsError;
 use crate::flight::Flight;
-use crate::formats;
 use crate::held_out;
 use crate::log_reader::{LogReader, ReadFile};
 use crate::logs::{self, Log, Patterns};
+use crate::opening::Opening;
 use crate::quantity::Quantity;
-use crate::reading::{OtherLogs, Part, Reading};
 
 /// The flights of a flights file, in its order.
 ///
@@ -90,18 +87,19 @@ impl FlightSet {
             }
         }
         errors.extend(check_names(&document, &logs));
-        let vehicle = document.resolve("vehicle", &declaration.vehicle).and_then(|path| {
-            let place = document.place(&declaration.vehicle.span());
+        let (written, at) = (declaration.vehicle.get_ref(), declaration.vehicle.span());
+        let vehicle = document.resolve("vehicle", written, &at).and_then(|path| {
+            let place = document.place(&at);
             let vehicle = vehicle(&path, read, &files);
             let vehicle = vehicle.map_err(|cause| FlightsError::Vehicle { place, cause: Box::new(cause) })?;
             Ok((path, vehicle))
         });
         let (vehicle_path, vehicle) = FlightsError::gather_with(vehicle, errors)?;
         let mut reader = LogReader::of(&logs, read);
-        let context = Context { document: &document, declaration: &declaration, vehicle: &vehicle };
+        let opening = Opening { document: &document, declaration: &declaration, vehicle: &vehicle, patterns };
         let (mut flights, mut parts, mut errors) = (Vec::new(), Vec::new(), Vec::new());
         for log in &logs {
-            match context.flight(log, &mut reader) {
+            match opening.flight(log, &mut reader) {
                 Ok((flight, part)) => {
                     flights.push(flight);
                     parts.push(part);
@@ -155,6 +153,12 @@ fn check_keys(document: &Document, flights: &[Spanned<FlightEntry>]) -> Vec<Flig
             let expected = "0 <= from_s < to_s, in seconds from the log's first sample";
             errors.push(document.bad(&at, key(bound), expected, found, "correct it"));
         }
+        if let Some(recording) = entry.recording.filter(|_| entry.file.get_ref().are_parts()) {
+            let (expected, found) =
+                ("one `file`, of which it chooses a recording", format!("{recording} beside a list"));
+            let advice = "remove it, or cut the recording out of its file";
+            errors.push(document.bad(&entry.file.span(), key("recording"), expected, found, advice));
+        }
         for (quantity, delay_s) in &entry.delay_s {
             let number = *delay_s.get_ref();
             if *quantity == Quantity::Time || !number.is_finite() {
@@ -186,96 +190,5 @@ fn bad_window(entry: &FlightEntry) -> Option<(&'static str, Range<usize>, f64)> 
         (Some(from), _) if !(from_s >= 0.0 && from_s.is_finite()) => Some(("from_s", from.span(), from_s)),
         (_, Some(to)) if to_s.is_nan() || to_s <= from_s => Some(("to_s", to.span(), to_s)),
         _ => None,
-    }
-}
-
-struct Context<'a> {
-    document: &'a Document,
-    declaration: &'a Declaration,
-    vehicle: &'a Vehicle,
-}
-
-impl Context<'_> {
-    /// Reads a flight of the file.
-    fn flight(&self, declared: &Log<'_>, reader: &mut LogReader<'_>) -> Result<(Flight, Part), FlightsError> {
-        let (entry, file) = (declared.entry.get_ref(), &declared.file);
-        let broken = |cause| FlightsError::Log {
-            place: self.document.place(&entry.file.span()),
-            flight: declared.name.clone(),
-            file: file.clone(),
-            channel: None,
-            cause,
-        };
-        // Those of the file, overridden by those of the flight.
-        let mut channels = self.declaration.channels.clone();
-        channels.extend(entry.channels.clone());
-        let bytes = reader.read(file).map_err(|error| broken(LogError::Unreadable(error)))?;
-        let format = entry.format.or(self.declaration.format).unwrap_or_else(|| formats::guess(file, &bytes));
-        if entry.csv.is_some() && format != Format::Csv {
-            let expected = "a CSV file, whose form it says";
-            let cause = LogError::unexpected(Spot::Key("csv"), expected, "another format", "remove it");
-            return Err(broken(cause));
-        }
-        let time = channels.get(&Quantity::Time).map(Spanned::get_ref);
-        let of_log = channels.values().map(Spanned::get_ref).filter(|channel| channel.file.is_none());
-        let form = self.form(entry, time, of_log.collect());
-        let clock = entry.time.or(self.declaration.time);
-        let log = formats::parse(bytes, format, &form, clock).map_err(broken)?;
-        let others = self.other_logs(declared, &channels, reader)?;
-        Reading {
-            document: self.document,
-            vehicle: self.vehicle,
-            name: &declared.name,
-            entry,
-            at: declared.entry.span(),
-            format,
-            file,
-            channels,
-            others,
-        }
-        .flight(log.as_ref())
-    }
-
-    /// The form of a CSV file of the flight.
-    fn form<'b>(
-        &'b self,
-        entry: &'b FlightEntry,
-        time: Option<&'b Entry>,
-        channels: Vec<&'b Entry>,
-    ) -> Form<'b> {
-        const PLAIN: Dialect = Dialect { header_line: None, header: None, delimiter: None, decimal: None };
-        let dialect = entry.csv.as_ref().or(self.declaration.csv.as_ref()).unwrap_or(&PLAIN);
-        Form { dialect, recording: entry.recording, time, channels }
-    }
-
-    /// The logs of the channels that are in another file than the flight's.
-    fn other_logs(
-        &self,
-        declared: &Log<'_>,
-        channels: &ChannelMap,
-        reader: &mut LogReader<'_>,
-    ) -> Result<OtherLogs, FlightsError> {
-        let entry = declared.entry.get_ref();
-        let of_flight = channels.get(&Quantity::Time).map(Spanned::get_ref);
-        let mut others = OtherLogs::new();
-        for (quantity, channel) in channels {
-            let (place, channel) = (channel.span(), channel.get_ref());
-            let Some(file) = &channel.file else { continue };
-            let path = self.document.resolve(&format!("channels.{quantity}.file"), file)?;
-            let broken = |cause| FlightsError::Log {
-                place: self.document.place(&place),
-                flight: declared.name.clone(),
-                file: path.clone(),
-                channel: Some(*quantity),
-                cause,
-            };
-            let bytes = reader.read_beside(&path).map_err(|error| broken(LogError::Unreadable(error)))?;
-            let format = formats::guess(&path, &bytes);
-            let form = self.form(entry, channel.time.as_deref().or(of_flight), vec![channel]);
-            let form = Form { recording: None, ..form };
-            let clock = entry.time.or(self.declaration.time).filter(|_| format == Format::Mcap);
-            others.insert(*quantity, formats::parse(bytes, format, &form, clock).map_err(broken)?);
-        }
-        Ok(others)
     }
 }

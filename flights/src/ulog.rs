@@ -8,6 +8,7 @@ use std::ops::Range;
 use crate::bytes::Cursor;
 use crate::error::{LogError, Spot};
 use crate::log::{Log, Samples};
+use crate::number_rows::NumberRows;
 use crate::ulog_format::Leaf;
 use crate::ulog_messages::{self, Content, Topic};
 
@@ -108,13 +109,14 @@ impl Log for Ulog {
             let mut stamps = stamps.iter().flatten().map(|leaf| number(place, leaf));
             stamps.find(|stamp_us| *stamp_us > 0.0).map_or(f64::NAN, |stamp_us| stamp_us * 1e-6)
         };
-        let row = |place| wanted.iter().map(|leaf| number(place, leaf)).collect();
+        let mut rows = NumberRows::of_width(wanted.len());
+        topic.data.iter().for_each(|place| rows.push(wanted.iter().map(|leaf| number(place, leaf))));
         let mut notes = self.notes.clone();
         if stamps[0].is_some() {
             notes.push("time is `timestamp_sample`, when it was measured".to_owned());
         }
         let time_s = topic.data.iter().map(time_s).collect();
-        Ok(Samples { time_s, rows: topic.data.iter().map(row).collect(), notes })
+        Ok(Samples { time_s, rows, notes, ..Samples::default() })
     }
 
     fn topics(&self) -> Vec<(String, String)> {

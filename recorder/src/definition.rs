@@ -108,6 +108,91 @@ pub struct Leaf {
     pub value: Value,
 }
 
+/// The type of a number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Number {
+    F64,
+    F32,
+    I64,
+    U64,
+    I32,
+    U32,
+    I16,
+    U16,
+    I8,
+    U8,
+}
+
+impl Number {
+    /// The number called `base` in a definition.
+    fn of(base: &str) -> Option<Self> {
+        Some(match base {
+            "float64" => Self::F64,
+            "float32" => Self::F32,
+            "int64" => Self::I64,
+            "uint64" => Self::U64,
+            "int32" => Self::I32,
+            "uint32" => Self::U32,
+            "int16" => Self::I16,
+            "uint16" => Self::U16,
+            "int8" => Self::I8,
+            "uint8" | "byte" | "bool" => Self::U8,
+            _ => return None,
+        })
+    }
+
+    /// Bytes of a value.
+    fn size(self) -> usize {
+        match self {
+            Self::F64 | Self::I64 | Self::U64 => 8,
+            Self::F32 | Self::I32 | Self::U32 => 4,
+            Self::I16 | Self::U16 => 2,
+            Self::I8 | Self::U8 => 1,
+        }
+    }
+}
+
+/// Place of a number in the body of a message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Place {
+    at: usize,
+    number: Number,
+}
+
+impl Place {
+    /// The number in `body`; `None` if that ends before it.
+    pub(crate) fn read(self, body: &[u8]) -> Option<f64> {
+        Cursor { body, at: self.at }.number(self.number).ok()?.as_f64()
+    }
+}
+
+/// Places of the leaves of one message, which are those of every message with the same lengths in it.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Layout {
+    /// By leaf; `None` for a string.
+    pub(crate) places: Vec<Option<Place>>,
+    /// Places of the lengths of strings and sequences, and these lengths.
+    lengths: Vec<(Place, u32)>,
+    /// Bytes of the body.
+    size: usize,
+}
+
+impl Layout {
+    /// True if `body` has its numbers at these places.
+    pub(crate) fn is_of(&self, body: &[u8]) -> bool {
+        let has = |(place, length): &(Place, u32)| place.read(body) == Some(f64::from(*length));
+        body.len() == self.size && self.lengths.iter().all(has)
+    }
+}
+
+/// The body of a message in little-endian CDR, behind its encapsulation header.
+pub(crate) fn body(cdr: &[u8]) -> Result<&[u8], DecodeError> {
+    match cdr.split_first_chunk::<4>() {
+        Some((&[0, 1, 0, 0], body)) => Ok(body),
+        _ => Err(DecodeError::Header),
+    }
+}
+
 #[derive(Clone, Debug)]
 struct Field {
     base: String,
@@ -184,19 +269,26 @@ impl Definition {
     /// # Errors
     /// If the bytes do not fit the definition.
     pub fn decode(&self, cdr: &[u8]) -> Result<Vec<Leaf>, DecodeError> {
-        let Some((&[0, 1, 0, 0], body)) = cdr.split_first_chunk::<4>() else {
-            return Err(DecodeError::Header);
-        };
+        self.decode_with_layout(cdr).map(|(leaves, _)| leaves)
+    }
+
+    /// Decodes a message, and tells the places of its leaves.
+    ///
+    /// # Errors
+    /// As [`Definition::decode`].
+    pub(crate) fn decode_with_layout(&self, cdr: &[u8]) -> Result<(Vec<Leaf>, Layout), DecodeError> {
+        let body = body(cdr)?;
         let mut walk = Walk {
             definition: self,
             cdr: Cursor { body, at: 0 },
             leaves: Vec::new(),
+            layout: Layout { size: body.len(), ..Layout::default() },
             depth: 0,
             values_left: DEPTH_MAX.saturating_mul(body.len() + 1),
             path_bytes_left: PATH_BYTES_MAX.saturating_mul(body.len() + DEPTH_MAX).min(NAMES_BYTES_MAX),
         };
         walk.message(&self.root, "", "")?;
-        Ok(walk.leaves)
+        Ok((walk.leaves, walk.layout))
     }
 }
 
@@ -257,6 +349,7 @@ struct Walk<'a> {
     definition: &'a Definition,
     cdr: Cursor<'a>,
     leaves: Vec<Leaf>,
+    layout: Layout,
     depth: usize,
     /// Values that are still read. A value takes a byte at least or holds one that does, so that only messages
     /// without fields use this up: repeated, they would be read for ever.
@@ -278,7 +371,7 @@ impl Walk<'_> {
                     continue;
                 }
                 Repeat::Fixed(length) => length,
-                Repeat::Sequence => u32::from_le_bytes(self.cdr.take()?) as usize,
+                Repeat::Sequence => self.length()?,
             };
             (0..length).try_for_each(|index| self.value(&field.base, format!("{path}[{index}]"), unit))?;
         }
@@ -293,20 +386,16 @@ impl Walk<'_> {
         if self.leaves.len() == VALUES_MAX {
             return Err(DecodeError::Large);
         }
-        let cdr = &mut self.cdr;
-        let value = match base {
-            "float64" => Value::Float(f64::from_le_bytes(cdr.take()?)),
-            "float32" => Value::Float(f32::from_le_bytes(cdr.take()?).into()),
-            "int64" => Value::Integer(i64::from_le_bytes(cdr.take()?).into()),
-            "uint64" => Value::Integer(u64::from_le_bytes(cdr.take()?).into()),
-            "int32" => Value::Integer(i32::from_le_bytes(cdr.take()?).into()),
-            "uint32" => Value::Integer(u32::from_le_bytes(cdr.take()?).into()),
-            "int16" => Value::Integer(i16::from_le_bytes(cdr.take()?).into()),
-            "uint16" => Value::Integer(u16::from_le_bytes(cdr.take()?).into()),
-            "int8" => Value::Integer(i8::from_le_bytes(cdr.take()?).into()),
-            "uint8" | "byte" | "bool" => Value::Integer(u8::from_le_bytes(cdr.take()?).into()),
-            "string" => Value::Text(cdr.text()?),
-            _ => {
+        let (value, place) = match Number::of(base) {
+            Some(number) => {
+                let value = self.cdr.number(number)?;
+                (value, Some(Place { at: self.cdr.at - number.size(), number }))
+            }
+            None if base == "string" => {
+                let length = self.length()?;
+                (Value::Text(self.cdr.text(length)?), None)
+            }
+            None => {
                 let definition = self.definition;
                 let fields =
                     definition.types.get(base).ok_or_else(|| DecodeError::Undefined(base.to_owned()))?;
@@ -320,7 +409,16 @@ impl Walk<'_> {
             }
         };
         self.leaves.push(Leaf { path, unit: unit.to_owned(), value });
+        self.layout.places.push(place);
         Ok(())
+    }
+
+    /// The length of a string or a sequence.
+    fn length(&mut self) -> Result<usize, DecodeError> {
+        let length = u32::from_le_bytes(self.cdr.take()?);
+        let number = Number::U32;
+        self.layout.lengths.push((Place { at: self.cdr.at - number.size(), number }, length));
+        Ok(length as usize)
     }
 }
 
@@ -339,8 +437,22 @@ impl Cursor<'_> {
         bytes.ok_or(DecodeError::End { end: self.body.len(), size: N, at: start })
     }
 
-    fn text(&mut self) -> Result<String, DecodeError> {
-        let length = u32::from_le_bytes(self.take()?) as usize;
+    fn number(&mut self, number: Number) -> Result<Value, DecodeError> {
+        Ok(match number {
+            Number::F64 => Value::Float(f64::from_le_bytes(self.take()?)),
+            Number::F32 => Value::Float(f32::from_le_bytes(self.take()?).into()),
+            Number::I64 => Value::Integer(i64::from_le_bytes(self.take()?).into()),
+            Number::U64 => Value::Integer(u64::from_le_bytes(self.take()?).into()),
+            Number::I32 => Value::Integer(i32::from_le_bytes(self.take()?).into()),
+            Number::U32 => Value::Integer(u32::from_le_bytes(self.take()?).into()),
+            Number::I16 => Value::Integer(i16::from_le_bytes(self.take()?).into()),
+            Number::U16 => Value::Integer(u16::from_le_bytes(self.take()?).into()),
+            Number::I8 => Value::Integer(i8::from_le_bytes(self.take()?).into()),
+            Number::U8 => Value::Integer(u8::from_le_bytes(self.take()?).into()),
+        })
+    }
+
+    fn text(&mut self, length: usize) -> Result<String, DecodeError> {
         let bytes = self.body.get(self.at..self.at + length);
         self.at += length;
         let bytes = bytes.ok_or(DecodeError::Text(length))?;

@@ -34,6 +34,13 @@ pub struct Topic {
     pub message_count: u64,
 }
 
+impl Topic {
+    /// The definition of its messages.
+    pub(crate) fn definition(&self) -> &Definition {
+        &self.definition
+    }
+}
+
 /// An open recording.
 ///
 /// ```no_run

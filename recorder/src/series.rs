@@ -70,7 +70,7 @@ impl Recording {
     }
 }
 
-fn parts(leaves: &[Leaf], topic: &str, field: &str) -> Result<Vec<String>, RecordingError> {
+pub(crate) fn parts(leaves: &[Leaf], topic: &str, field: &str) -> Result<Vec<String>, RecordingError> {
     let vector = ["x", "y", "z"].map(|axis| format!("{field}.{axis}"));
     let is_number = |path: &str| number(leaves, path).is_some();
     match value(leaves, field) {
@@ -114,33 +114,87 @@ const ALONG_BODY: [&str; 3] = ["u", "v", "w"];
 /// of the body.
 #[must_use]
 pub fn value<'a>(leaves: &'a [Leaf], field: &str) -> Option<(f64, &'a str)> {
-    if let Some(leaf) = leaves.iter().find(|leaf| leaf.path == field) {
-        return Some((leaf.value.as_f64()?, &leaf.unit));
+    let made = Made::of(leaves, field)?;
+    Some((made.value(|&leaf| leaves[leaf].value.as_f64())?, made.unit(leaves)))
+}
+
+/// The numbers of a message of which a field is made, each a `P`: an index among its leaves, or a place in its bytes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Made<P> {
+    /// It is one of them.
+    Number(P),
+    /// It is the angle of this number of a quaternion, in the order x, y, z, w.
+    Angle([P; 4], usize),
+    /// It is the component along this axis of the body of a velocity in the world.
+    AlongBody([P; 3], [P; 4], usize),
+}
+
+impl Made<usize> {
+    /// The indices among `leaves` of which `field` is made.
+    pub(crate) fn of(leaves: &[Leaf], field: &str) -> Option<Self> {
+        if let Some(leaf) = leaves.iter().position(|leaf| leaf.path == field) {
+            return Some(Self::Number(leaf));
+        }
+        let (whole, part) = field.rsplit_once('.')?;
+        let index_in = |names: [&str; 3]| names.iter().position(|name| *name == part);
+        if let Some(angle) = index_in(ANGLES) {
+            return Some(Self::Angle(parts_of(leaves, whole, ["x", "y", "z", "w"])?, angle));
+        }
+        let axis = index_in(ALONG_BODY)?;
+        let message = whole.strip_suffix("velocity").filter(|rest| rest.is_empty() || rest.ends_with('.'))?;
+        let attitude = parts_of(leaves, &format!("{message}attitude"), ["x", "y", "z", "w"])?;
+        Some(Self::AlongBody(parts_of(leaves, whole, ["x", "y", "z"])?, attitude, axis))
     }
-    let (whole, part) = field.rsplit_once('.')?;
-    let index_in = |names: [&str; 3]| names.iter().position(|name| *name == part);
-    if let Some(angle) = index_in(ANGLES) {
-        return Some((roll_pitch_yaw(quaternion(leaves, whole)?)[angle], "rad"));
+
+    /// The unit of the field.
+    pub(crate) fn unit<'a>(&self, leaves: &'a [Leaf]) -> &'a str {
+        match self {
+            Self::Number(leaf) => &leaves[*leaf].unit,
+            Self::Angle(..) => "rad",
+            Self::AlongBody(velocity, _, axis) => &leaves[velocity[*axis]].unit,
+        }
     }
-    let axis = index_in(ALONG_BODY)?;
-    let message = whole.strip_suffix("velocity").filter(|rest| rest.is_empty() || rest.ends_with('.'))?;
-    let attitude = quaternion(leaves, &format!("{message}attitude"))?;
-    let velocity = ["x", "y", "z"].map(|axis| part_of(leaves, whole, axis));
-    let [Some(x), Some(y), Some(z)] = velocity.map(|leaf| leaf.and_then(|leaf| leaf.value.as_f64())) else {
-        return None;
+}
+
+impl<P> Made<P> {
+    /// The value of the field; `None` where `number` knows no number.
+    pub(crate) fn value(&self, number: impl Fn(&P) -> Option<f64>) -> Option<f64> {
+        match self {
+            Self::Number(one) => number(one),
+            Self::Angle(quaternion, angle) => Some(roll_pitch_yaw(all(quaternion, number)?)[*angle]),
+            Self::AlongBody(velocity, attitude, axis) => {
+                Some(along_body(all(velocity, &number)?, all(attitude, &number)?)[*axis])
+            }
+        }
+    }
+
+    /// The same made of others; `None` where there is no other for one.
+    pub(crate) fn map<Q: Copy>(&self, other: impl Fn(&P) -> Option<Q>) -> Option<Made<Q>> {
+        Some(match self {
+            Self::Number(one) => Made::Number(other(one)?),
+            Self::Angle(quaternion, angle) => Made::Angle(all(quaternion, other)?, *angle),
+            Self::AlongBody(velocity, attitude, axis) => {
+                Made::AlongBody(all(velocity, &other)?, all(attitude, &other)?, *axis)
+            }
+        })
+    }
+}
+
+/// What `other` makes of each, if it makes something of all.
+fn all<P, Q: Copy, const N: usize>(of: &[P; N], other: impl Fn(&P) -> Option<Q>) -> Option<[Q; N]> {
+    let mut found = [other(of.first()?)?; N];
+    for (place, one) in found.iter_mut().zip(of) {
+        *place = other(one)?;
+    }
+    Some(found)
+}
+
+/// The indices among `leaves` of these parts of the field `whole`.
+fn parts_of<const N: usize>(leaves: &[Leaf], whole: &str, names: [&str; N]) -> Option<[usize; N]> {
+    let is_part = |path: &str, name: &str| {
+        path.strip_prefix(whole).and_then(|rest| rest.strip_prefix('.')) == Some(name)
     };
-    Some((along_body([x, y, z], attitude)[axis], &velocity[axis]?.unit))
-}
-
-fn part_of<'a>(leaves: &'a [Leaf], whole: &str, part: &str) -> Option<&'a Leaf> {
-    let is_part = |path: &str| path.strip_prefix(whole).and_then(|rest| rest.strip_prefix('.')) == Some(part);
-    leaves.iter().find(|leaf| is_part(&leaf.path))
-}
-
-/// The quaternion at `path`, in the order x, y, z, w.
-fn quaternion(leaves: &[Leaf], path: &str) -> Option<[f64; 4]> {
-    let part = |name: &str| part_of(leaves, path, name)?.value.as_f64();
-    Some([part("x")?, part("y")?, part("z")?, part("w")?])
+    all(&names, |name| leaves.iter().position(|leaf| is_part(&leaf.path, name)))
 }
 
 /// A vector in the world, along the axes of a body with this attitude: the quaternion, in the order x, y, z, w, turns the

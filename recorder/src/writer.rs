@@ -5,7 +5,6 @@
 
 use crate::error::RecordingError;
 use bus::announcement::Announcement;
-use bus::message::{BODY_START, CDR_START};
 use bus::schema::Extent;
 use mcap::records::MessageHeader;
 use mcap::{Attachment, Compression, WriteOptions};
@@ -25,8 +24,6 @@ const ZSTD_LEVEL: u32 = 1;
 pub const START: &[u8] = b"\x89MCAP0\r\n\x01\x16\0\0\0\0\0\0\0\x04\0\0\0ros2\x0a\0\0\0hummingbus";
 /// `O_NOFOLLOW` of the kernel.
 const NO_LINK: i32 = rustix::fs::OFlags::NOFOLLOW.bits().cast_signed();
-/// Bytes of the encapsulation header in front of a message.
-const CDR_HEADER_BYTES: usize = BODY_START - CDR_START;
 const FILE_BUFFER_BYTES: usize = 1024 * 1024;
 
 /// A recording being written.
@@ -111,10 +108,7 @@ impl RecordingWriter {
     ) -> Result<(), RecordingError> {
         let header =
             MessageHeader { channel_id: channel.0, sequence: tick, log_time: time_ns, publish_time: time_ns };
-        let cdr = match (self.extents.get(&channel.0), cdr.split_at_checked(CDR_HEADER_BYTES)) {
-            (Some(extent), Some((_, message))) => &cdr[..CDR_HEADER_BYTES + extent.of(message).len()],
-            _ => cdr,
-        };
+        let cdr = self.extents.get(&channel.0).map_or(cdr, |extent| extent.of_cdr(cdr));
         self.chunk_bytes += cdr.len();
         self.mcap.write_to_known_channel(&header, cdr).map_err(|error| write_error(&self.path, &error))
     }

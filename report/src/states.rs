@@ -50,14 +50,17 @@ impl Track {
     }
 }
 
+/// The names of all fields of a state.
+pub(crate) fn names_of_state() -> impl Iterator<Item = String> {
+    VECTORS.iter().flat_map(|(vector, parts)| parts.iter().map(move |part| format!("{vector}.{part}")))
+}
+
 /// The first `fields` fields of the states of all `topics`, read in one pass.
 ///
 /// # Errors
 /// If a topic is not in the recording or holds no state.
 pub(crate) fn tracks(recording: &Recording, topics: &[String], fields: usize) -> Result<Vec<Track>> {
-    let names =
-        VECTORS.iter().flat_map(|(vector, parts)| parts.iter().map(move |part| format!("{vector}.{part}")));
-    let names: Vec<String> = names.take(fields).collect();
+    let names: Vec<String> = names_of_state().take(fields).collect();
     let wanted = topics.iter().flat_map(|topic| names.iter().map(|name| (topic.as_str(), name.as_str())));
     let wanted: Vec<(&str, &str)> = wanted.collect();
     let mut series = recording.series(&wanted)?.into_iter();

@@ -1,16 +1,17 @@
 //! The summary of a run: for people, and as JSON for programs.
 
-use crate::judge::{self, Verdict, WindowErrors};
+use crate::judge::{self, Figures, Found, Verdict, WindowErrors};
 use crate::shadow::{self, Difference, Replacement};
 use anyhow::Result;
 use bus::plan::Plan;
 use diagnostics::Diagnostic;
 use recorder::reader::Recording;
 use runtime::launcher::Outcome;
-use runtime::manifest::Content;
+use runtime::manifest::{Content, PassCondition};
 use serde::Serialize;
 use std::fmt;
 use std::path::PathBuf;
+use toml::Spanned;
 
 /// Replacements that the text shows.
 const REPLACEMENTS_SHOWN: usize = 5;
@@ -114,6 +115,7 @@ impl Summary {
     ///     overruns: Vec::new(),
     ///     replacements: Vec::new(),
     ///     flight: None,
+    ///     figures: None,
     /// };
     /// let summary = Summary::new("hover".to_owned(), outcome, 1e-3);
     /// assert_eq!((summary.passed, summary.real_time_factor), (true, 4.0));
@@ -156,13 +158,31 @@ impl Summary {
         shadow::add_steps(recording, plan, &mut self.replacements)?;
         self.shadows = shadow::differences(recording, &shadow::joins(plan, &self.replacements))?;
         if !self.stopped_early {
-            self.pass = judge::verdicts(&content.pass, recording)?;
-            self.measures = judge::verdicts(&content.measure, recording)?;
-            self.compare = judge::window_errors(content, recording)?;
+            self.add(&judge::figures(&content.conditions(), recording)?, content)?;
         }
+        self.recording = Some(recording.path().to_owned());
+        Ok(())
+    }
+
+    /// Judges a run without a recording by the `figures` of its judge ([`Outcome::figures`]), as [`Summary::judge`] judges
+    /// a recording.
+    ///
+    /// # Errors
+    /// If the figures are not those of `content`, or there is nothing to compare.
+    pub fn judge_by(&mut self, figures: &[u8], content: &Content) -> Result<()> {
+        if self.stopped_early { Ok(()) } else { self.add(&Figures::of_bytes(figures)?, content) }
+    }
+
+    /// Adds the verdicts on the conditions in `content`, of which these are the figures.
+    fn add(&mut self, figures: &Figures, content: &Content) -> Result<()> {
+        let of = |(pass, found): (&Spanned<PassCondition>, &Found)| Verdict::of(pass.get_ref(), found);
+        self.pass = content.pass.iter().zip(&figures.pass).map(of).collect();
+        self.measures = content.measure.iter().zip(&figures.measures).map(of).collect();
+        let compared = content.compare.iter().zip(&figures.compare);
+        let compared = compared.map(|(compare, found)| WindowErrors::of(compare.get_ref(), found));
+        self.compare = compared.collect::<Result<_>>()?;
         let held = self.pass.iter().all(|verdict| verdict.passed);
         self.passed &= held && self.compare.iter().all(|errors| errors.passed);
-        self.recording = Some(recording.path().to_owned());
         Ok(())
     }
 

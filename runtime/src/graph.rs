@@ -38,6 +38,8 @@ use wiring::{Wiring, wire};
 
 /// Ticks that a fast node may be ahead of the slowest where the manifest does not say.
 const DEFAULT_WINDOW_TICKS: u32 = 64;
+/// The same with groups, which compute many ticks between two waits: measured, a composed hover is a quarter faster.
+const GROUPS_WINDOW_TICKS: u32 = 512;
 /// More would only grow the queues: a window's samples are what shared memory must hold.
 pub const WINDOW_TICKS_MAX: u32 = 4096;
 const RATE_HZ_MAX: u32 = 1_000_000;
@@ -102,6 +104,9 @@ impl Graph {
         processes::require_core(manifest, clock_cpu, "clock_cpu")?;
         placement::place(&mut plan, clock_cpu.as_ref().map(|cpu| *cpu.get_ref()));
         let groups = groups::of(manifest, &declared_nodes, &plan.nodes)?;
+        if manifest.content.run.window_ticks.is_none() && !groups.is_empty() {
+            plan.window_ticks = GROUPS_WINDOW_TICKS;
+        }
         let mut notes = Notes::default();
         periods::check(manifest, &declared_nodes, &plan, &mut notes)?;
         let parameters =

@@ -25,8 +25,8 @@ use inputs::InputFiles;
 use rustix::io::Errno;
 use rustix::process::{Pid, WaitId, WaitIdOptions, waitid};
 use std::cell::RefCell;
-use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet};
 use std::os::unix::net::UnixDatagram;
 use std::path::{Path, PathBuf};
 use std::process::Child;
@@ -122,7 +122,13 @@ impl HostWorld<'_> {
                 (Running::Thread(thread), PathBuf::new())
             }
         };
-        Ok(SharedBody { is_log_of_run: log.starts_with(self.run_dir), body, log, end: None })
+        Ok(SharedBody {
+            is_log_of_run: log.starts_with(self.run_dir),
+            body,
+            log,
+            end: None,
+            left: BTreeSet::new(),
+        })
     }
 }
 
@@ -269,6 +275,8 @@ pub struct SharedBody {
     is_log_of_run: bool,
     /// Its end.
     end: Option<End>,
+    /// Slots of the members of a group that were seen to have left. A later instance may use the slot again.
+    left: BTreeSet<usize>,
 }
 
 /// A member of a group.
@@ -298,9 +306,14 @@ impl HostBody {
 }
 
 impl MemberBody {
-    /// True if the member has ended and others of its group have not: the last one ends with the process.
-    fn has_left_others(&self) -> bool {
-        self.control.has_left(self.slot) && !self.slots.iter().all(|&slot| self.control.has_left(slot))
+    /// True if the member has ended and others of its group have not: the last one ends with the process. `left` are the
+    /// slots of the members that were seen to have left.
+    fn has_left_others(&self, left: &mut BTreeSet<usize>) -> bool {
+        if self.control.has_left(self.slot) {
+            left.insert(self.slot);
+        }
+        let has_left = |slot: &usize| left.contains(slot) || self.control.has_left(*slot);
+        left.contains(&self.slot) && !self.slots.iter().all(has_left)
     }
 }
 
@@ -372,7 +385,7 @@ impl Body for HostBody {
         let mut shared = self.shared.borrow_mut();
         shared.look()?;
         match &self.member {
-            Some(member) if member.has_left_others() => Ok(Some(End::Exited(0))),
+            Some(member) if member.has_left_others(&mut shared.left) => Ok(Some(End::Exited(0))),
             _ => Ok(shared.end.clone()),
         }
     }

@@ -10,6 +10,7 @@ use crate::host::{Host, needs_process};
 use crate::host_world::{HostWorld, store_files};
 use crate::manifest::Manifest;
 use crate::outputs::Outputs;
+use crate::program::Program;
 pub use crate::replacement::{Purpose, Report};
 use crate::run_dir::RunDir;
 use crate::supervision::Supervisor;
@@ -23,6 +24,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
+
+/// The file in a run directory with the figures of the judge.
+const FIGURES: &str = "figures";
 
 /// What is known about a run when it is over: what [`Launcher::fly`] returns, whose example asserts on it.
 #[derive(Debug)]
@@ -44,6 +48,8 @@ pub struct Outcome {
     pub replacements: Vec<Report>,
     /// The host times that the processes noted, in a run that is profiled.
     pub flight: Option<Flight>,
+    /// Figures of the conditions, as the judge of a run without a recording wrote them; `None` for a run that was stopped.
+    pub figures: Option<Vec<u8>>,
 }
 
 /// Launches a run. By itself it takes no signal of this process and changes nothing else of it either: several runs may
@@ -240,6 +246,9 @@ impl<'a> Launcher<'a> {
         if plan.profile {
             outcome.flight = Some(Flight::open(plan, dir, outcome.ticks, &outcome.replacements)?);
         }
+        if !outcome.was_stopped {
+            outcome.figures = figures(graph, dir)?;
+        }
         Ok(outcome)
     }
 }
@@ -292,8 +301,19 @@ fn prepare(manifest: &Manifest, graph: &mut Graph, recording: Option<&Path>, run
             node.files = files.used();
         }
     }
+    let judges = graph.programs.iter().zip(&mut graph.plan.nodes).filter(|(program, _)| program.is_judge());
+    for (_, judge) in judges {
+        judge.parameters["path"] = serde_json::json!(run_dir.path().join(FIGURES));
+    }
     let mut nodes = graph.plan.nodes.iter().chain(graph.backups.iter().map(|backup| &backup.plan));
     Ok(nodes.try_for_each(|node| store_files(&files, run_dir.path(), node))?)
+}
+
+/// What the judge of a run without a recording has written, if there is one.
+fn figures(graph: &Graph, run_dir: &Path) -> Result<Option<Vec<u8>>> {
+    let has_judge = graph.programs.iter().any(Program::is_judge);
+    let read = || std::fs::read(run_dir.join(FIGURES)).context("cannot read the figures of the judge");
+    has_judge.then(read).transpose()
 }
 
 /// Content that a recorder attaches under the name of `path`: the file `key` among those of the run.
@@ -327,5 +347,6 @@ fn outcome(plan: &Plan, control: &SupervisorView, supervisor: &Supervisor<'_, Ho
         overruns: overruns.collect(),
         replacements: Vec::new(),
         flight: None,
+        figures: None,
     }
 }

@@ -8,6 +8,7 @@
 //! - `replacement`: a backup's differences become a whole process
 //! - `finite`: no number is infinite or none
 //! - `composition`: which nodes share a process
+//! - `judging`: the process that judges a run that is not recorded
 //! - `builder`: a manifest that is built in code
 //! - `content`: the types that the whole is read into
 
@@ -16,6 +17,7 @@ mod composition;
 mod content;
 mod finite;
 mod include;
+mod judging;
 mod overrides;
 mod recorded;
 mod replacement;
@@ -25,7 +27,9 @@ mod tree;
 
 pub use builder::ManifestBuilder;
 pub use composition::Composition;
-pub use content::{Comparison, Content, PaceSetting, PassCondition, Reference, Statistic};
+pub use content::{
+    Comparison, Conditions, Content, NO_RECORDING, PaceSetting, PassCondition, Reference, Statistic,
+};
 pub(crate) use content::{ComputingTimeSetting, InputSetting, OutputSetting, Process, SwapSetting};
 
 pub(crate) use sets::is_name;
@@ -193,7 +197,7 @@ impl Manifest {
 /// Where it cannot be read: what is wrong there, and with each process.
 fn content(sources: &Sources, tree: DeTable<'_>) -> Result<Content, Diagnostic> {
     let whole = Spanned::new(0..0, DeValue::Table(tree));
-    read_tree(&whole).map_err(|first| {
+    let mut content = read_tree(&whole).map_err(|first| {
         let processes = whole.get_ref().get("process").and_then(|processes| processes.get_ref().as_table());
         let others = processes.into_iter().flatten().filter_map(|(name, process)| {
             let misread = read_tree::<Process>(process).err()?;
@@ -202,7 +206,9 @@ fn content(sources: &Sources, tree: DeTable<'_>) -> Result<Content, Diagnostic> 
         });
         let others: Vec<Diagnostic> = others.collect();
         sources.refused(first).and(others)
-    })
+    })?;
+    judging::complete(&mut content, sources)?;
+    Ok(content)
 }
 
 /// Everything that the sources say, with sets expanded and backups made whole.

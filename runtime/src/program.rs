@@ -80,9 +80,18 @@ impl Program {
         }
     }
 
-    /// Whether this writes the run's recording.
+    /// True if this writes the run's recording.
     pub fn is_recorder(&self) -> bool {
-        self.component().is_some_and(|component| component.role == Role::Record)
+        self.has(Role::Record)
+    }
+
+    /// True if this evaluates the conditions of a run that is not recorded.
+    pub fn is_judge(&self) -> bool {
+        self.has(Role::Judge)
+    }
+
+    fn has(&self, role: Role) -> bool {
+        self.component().is_some_and(|component| component.role == role)
     }
 }
 

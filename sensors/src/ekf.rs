@@ -19,7 +19,7 @@ use diagnostics::ParameterError;
 use filter::{Ekf, EkfState};
 use history::{Measurement, Reading, Source};
 use params::EkfParams;
-use transition::{ATTITUDE, Covariance, POSITION, VELOCITY};
+use transition::{ATTITUDE, MotionCovariance, POSITION, VELOCITY};
 
 /// The position's standard deviation before the filter has begun, m, and likewise of all else: nothing is known.
 const UNKNOWN_SIGMA: f64 = 1e6;
@@ -122,7 +122,7 @@ fn magnetometer(sample: &Magnetometer) -> Option<Measurement> {
 
 fn state_estimate(filter: &Ekf, state: &EkfState) -> StateEstimate {
     let motion = state.motion();
-    let sigma = state.has_begun().then(|| sigmas(&filter.covariance(state), state));
+    let sigma = state.has_begun().then(|| sigmas(&filter.motion_covariance(state), state));
     let [position_sigma, velocity_sigma, attitude_sigma] = sigma.unwrap_or([[UNKNOWN_SIGMA; 3].into(); 3]);
     StateEstimate {
         position: motion.position,
@@ -137,7 +137,7 @@ fn state_estimate(filter: &Ekf, state: &EkfState) -> StateEstimate {
 }
 
 /// Standard deviations of position, velocity and attitude, the last about the body's axes.
-fn sigmas(covariance: &Covariance, state: &EkfState) -> [Vector3; 3] {
+fn sigmas(covariance: &MotionCovariance, state: &EkfState) -> [Vector3; 3] {
     let block = |from: usize| covariance.fixed_view::<3, 3>(from, from).into_owned();
     let to_body = attitude(state.motion().attitude).inverse().to_rotation_matrix();
     let turned = to_body * block(ATTITUDE) * to_body.transpose();

@@ -89,11 +89,11 @@ fn json(component: &Registration) -> Value {
     })
 }
 
-/// What a manifest may give it: the launcher gives a recorder its own.
+/// Parameters in a manifest: recorders and judges are given theirs by the launcher.
 fn parameters(component: &Registration) -> &'static [&'static str] {
     match component.role {
         Role::Compute => component.parameters(),
-        Role::Record => &[],
+        Role::Record | Role::Judge => &[],
     }
 }
 

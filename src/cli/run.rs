@@ -6,13 +6,14 @@ use super::profile::Files;
 use super::progress::{self, RUN};
 use anyhow::{Context, Error, Result, anyhow, bail};
 use clap::Args;
+use diagnostics::Diagnostic;
 use hummingbus::COMPONENTS;
 use report::profile::Profile;
 use report::summary::Summary;
 use runtime::graph::{self, Graph, backup_of};
 use runtime::host::Host;
 use runtime::launcher::Launcher;
-use runtime::manifest::{Composition, Manifest, PaceSetting};
+use runtime::manifest::{Composition, Manifest, NO_RECORDING, PaceSetting};
 use runtime::outputs::Outputs;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -22,7 +23,7 @@ use std::path::{Path, PathBuf};
 pub struct RunArguments {
     /// The manifest.
     pub manifest: PathBuf,
-    /// Where to record; beside the manifest, named like it, where absent.
+    /// File to record to, or none; beside the manifest, named like it, where absent.
     #[arg(long, value_name = "PATH")]
     pub record: Option<PathBuf>,
     /// free, realtime, or simulated seconds per second.
@@ -76,7 +77,9 @@ pub fn run(
 ) -> Result<bool> {
     // First, so that who stops the run early hears that it was stopped.
     let stop = stop_token()?;
-    let mut manifest = Manifest::load(&arguments.manifest, &arguments.set, COMPONENTS)?;
+    let record = arguments.record.as_deref();
+    let manifest = Manifest::load(&arguments.manifest, &arguments.set, COMPONENTS)?;
+    let mut manifest = recorded(manifest, record)?;
     if let Some(pace) = arguments.pace {
         manifest.content.run.pace = pace;
     }
@@ -96,7 +99,7 @@ pub fn run(
         }
         graph.backups.push(shadow);
     }
-    let mut path = recording_path(&manifest, arguments.record.as_deref())?;
+    let mut path = recording_path(&manifest, record)?;
     if extra_shadow.is_some() && arguments.record.is_none() {
         // That of the manifest itself stays as it is.
         path.set_extension("shadow.mcap");
@@ -115,11 +118,13 @@ pub fn run(
     });
     let (mut outcome, recording) =
         flown.or_else(|error| Err(broken(&manifest, &error, outputs.left().as_deref(), arguments.json)?))?;
-    let flight = outcome.flight.take();
+    let (flight, figures) = (outcome.flight.take(), outcome.figures.take());
     let profile = flight.as_ref().map(|flight| Profile::of(flight, outcome.missed_deadlines));
     let mut summary = Summary::new(manifest.name(), outcome, graph.plan.tick_s());
-    if let Some(recording) = &recording {
-        summary.judge(recording, &graph.plan, &manifest.content)?;
+    match (&recording, figures) {
+        (Some(recording), _) => summary.judge(recording, &graph.plan, &manifest.content)?,
+        (None, Some(figures)) => summary.judge_by(&figures, &manifest.content)?,
+        (None, None) => {}
     }
     summary.warnings = graph.warnings;
     let mut text = summary.to_string();
@@ -183,9 +188,22 @@ fn as_json(summary: &Summary, profile: Option<&Profile>, files: &Files) -> Resul
     Ok(value)
 }
 
-/// Where the run is recorded: `--record`, the manifest's `record`, or beside the manifest.
+/// The manifest with a recorder or a judge as `record` says, the file to record to or `none`.
+fn recorded(manifest: Manifest, record: Option<&Path>) -> Result<Manifest, Diagnostic> {
+    let Some(record) = record else { return Ok(manifest) };
+    let is_none = record.as_os_str() == NO_RECORDING;
+    if is_none == manifest.content.run.is_unrecorded() {
+        return Ok(manifest);
+    }
+    // A path of any other text: the file is that of the argument, which need not be UTF-8.
+    manifest.set("run.record", if is_none { NO_RECORDING } else { "--record" })
+}
+
+/// Path of the recording: `--record`, the manifest's `record`, or beside the manifest. A run without a recording has its
+/// other files beside the manifest.
 fn recording_path(manifest: &Manifest, argument: Option<&Path>) -> Result<PathBuf> {
     let path = match (argument, &manifest.content.run.record) {
+        _ if manifest.content.run.is_unrecorded() => manifest.path.with_extension("mcap"),
         (Some(path), _) => path.to_owned(),
         (None, Some(path)) => manifest.resolve(path)?,
         (None, None) => manifest.path.with_extension("mcap"),

@@ -117,6 +117,27 @@ fn a_group_that_cannot_be_is_refused_with_the_reason() {
 }
 
 #[test]
+fn top_names_the_group_of_each_member() {
+    let place = Place::new();
+    let (manifest, recording) = (repository("manifests/hover.toml"), place.path("watched.mcap"));
+    let compose = ["--record", &recording, "--compose", "imu+ekf"];
+    let mut launch = place.start_endless(&[&["run", &manifest], &compose[..]].concat());
+    launch.await_ticks(100);
+    let top = |more: &[&str]| {
+        let run = place.run_id();
+        place.start(&[&["top", "--once", "--run", &run], more].concat()).end_among_others().with_code(0)
+    };
+    top(&[]).prints(&["ekf [imu+ekf]", "imu [imu+ekf]"]);
+    let view = top(&["--json"]).json();
+    let processes = view["processes"].as_array().unwrap();
+    let grouped = processes.iter().filter(|process| process["group"] == "imu+ekf");
+    let names: Vec<_> = grouped.map(|process| process["name"].clone()).collect();
+    assert_eq!(names, ["ekf", "imu"]);
+    launch.signal(Signal::INT);
+    launch.end().with_code(1);
+}
+
+#[test]
 fn a_killed_group_ends_the_run_in_order_and_is_named() {
     let place = Place::new();
     let (manifest, recording) = (repository("manifests/hover.toml"), place.path("killed.mcap"));

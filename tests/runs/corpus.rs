@@ -36,6 +36,11 @@ fn every_manifest_of_the_corpus_is_checked_or_refused_in_words() {
 }
 
 #[test]
+fn every_model_of_the_corpus_is_converted_or_refused_in_words() {
+    replay("model");
+}
+
+#[test]
 fn every_vehicle_of_the_corpus_is_read_or_refused_in_words() {
     replay("vehicle");
 }

@@ -34,6 +34,7 @@
 //! - [`validate`]: measured commands flown by vehicles side by side
 //! - [`scenarios`]: the thesis's scenarios and those beyond
 //! - [`scenes`]: ground, walls, rigs and other vehicles
+//! - [`judging`]: runs without a recording are judged in flight
 //! - [`inputs`]: files that are edited after they were read
 
 mod as_printed;
@@ -50,6 +51,7 @@ mod documentation;
 mod failures;
 mod identify;
 mod inputs;
+mod judging;
 mod laps;
 mod live;
 mod loss;

@@ -1,7 +1,6 @@
 //! Refused: pass conditions and comparisons.
 
-use crate::nodes::{sender, table};
-use crate::refusals::{good, refused, refused_text, refused_with};
+use crate::refusals::{good, refused, refused_with};
 use crate::support::{Place, repository};
 
 /// A condition that holds at the start of the good manifest's flight.
@@ -59,17 +58,20 @@ fn a_lag_or_gain_without_a_reference_that_it_can_have() {
 }
 
 #[test]
-fn a_condition_without_a_recorder() {
-    let ended = refused("[process.recorder]\nkind = \"recorder\"\n", &format!("§{PASS}"));
+fn a_condition_on_a_topic_that_the_recorder_leaves_out() {
+    let recorder = "[process.recorder]\nkind = \"recorder\"\n";
+    let ended = refused(recorder, &format!("{recorder}inputs.imu = \"/imu/imu\"\n§{PASS}"));
     ended.says(&["/plant/state is judged but not recorded", "kind = \"recorder\""]);
 }
 
+/// What is wrong is refused before the start without a recording, too.
 #[test]
-fn a_condition_on_a_topic_that_only_another_reader_takes() {
-    let nodes = sender("source", 1, "") + &table("reader", "inputs.input = \"/source/note\"");
-    let pass = PASS.replace("/plant/state", "/source/note").replace("position.z", "tick");
-    let ended = refused_text(&format!("[run]\nduration_s = 0.1\n{nodes}§{pass}"));
-    ended.says(&["/source/note is judged but not recorded", "kind = \"recorder\""]);
+fn a_condition_without_a_recorder_on_a_topic_or_field_that_is_none() {
+    let recorder = "[process.recorder]\nkind = \"recorder\"\n";
+    let with = |from: &str, to: &str| refused(recorder, &format!("§{}", PASS.replace(from, to)));
+    with("/plant/state", "/plant/stat").says(&["nobody publishes /plant/stat", "did you mean"]);
+    with("position.z", "position.q").says(&["pass condition `low`", "`position.q`", "position.z"]);
+    with("\"m\"", "\"deg\"").says(&["pass condition `low`", "`deg` is not a unit of length"]);
 }
 
 #[test]

@@ -81,6 +81,7 @@ impl Table {
             rows.push(layout.lines_before + line, &cells);
             count = count.max(cells.len());
         }
+        rows.shrink_to_fit();
         let header_line = layout.header.as_ref().map(|_| layout.header_line);
         let headers =
             layout.header.unwrap_or_else(|| (1..=count).map(|number| format!("#{number}")).collect());

@@ -68,6 +68,13 @@ impl Rows {
         self.places.drain(..kept.start);
     }
 
+    /// Gives back the memory for rows that did not come.
+    pub(crate) fn shrink_to_fit(&mut self) {
+        self.text.shrink_to_fit();
+        self.ends.shrink_to_fit();
+        self.places.shrink_to_fit();
+    }
+
     pub(crate) fn push<'c>(&mut self, line: u64, cells: impl IntoIterator<Item = &'c str>) {
         let first = self.ends.len();
         for cell in cells {

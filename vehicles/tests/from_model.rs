@@ -251,8 +251,51 @@ fn what_is_wrong_with_a_model_is_told_with_its_line() {
         "<model name=\"cross\">",
         "<model name=\"cross\"><include><uri>model://x</uri></include>",
         ":5:",
-        &["another model"],
+        &["<include> of `model://x`", "another file", "gz sdf -p"],
     );
+    sdf(
+        "<model name=\"cross\">",
+        "<model name=\"cross\"><model name=\"arm\"/>",
+        ":5:",
+        &["the model `arm` within this one", "copy its links"],
+    );
+    refused(
+        "<sdf version=\"1.9\"><world name=\"w\"><include><uri>model://quad</uri></include></world></sdf>",
+        "quad.sdf",
+        ":1:",
+        &["<include> of `model://quad`", "gz sdf -p"],
+    );
+    sdf(
+        "<model name=\"cross\">",
+        "<gravity>0 9</gravity><model name=\"cross\">",
+        ":5:",
+        &["gravity", "3 finite numbers"],
+    );
+}
+
+#[test]
+fn gravity_and_other_models_of_a_world_are_noted() {
+    let noted = |from: &str, to: &str| {
+        assert!(SDF.contains(from), "{from}");
+        let (plain, made) = (of(SDF, "cross.sdf"), of(&SDF.replacen(from, to, 1), "cross.sdf"));
+        assert_eq!(made.text, plain.text);
+        made.notes.into_iter().filter(|note| !plain.notes.contains(note)).collect::<Vec<_>>()
+    };
+    let world = |added: &str| noted("<model name=\"cross\">", &format!("{added}<model name=\"cross\">"));
+    assert_eq!(world("<gravity>0 0 -9.8</gravity>"), [""; 0]);
+    let mars = world("<gravity>0 0 -3.71</gravity>");
+    assert!(
+        mars.len() == 1 && mars[0].contains("[0, 0, -3.71] m/s^2") && mars[0].contains("body.gravity"),
+        "{mars:?}"
+    );
+    let included = world("<include><uri>model://sun</uri></include><include/>");
+    assert!(
+        included.len() == 1 && included[0].contains("model://sun, a model without <uri> beside"),
+        "{included:?}"
+    );
+    assert_eq!(noted("<link name=\"gps\">", "<link name=\"gps\"><gravity>1</gravity>"), [""; 0]);
+    let off = noted("<link name=\"gps\">", "<link name=\"gps\"><gravity>false</gravity>");
+    assert!(off.len() == 1 && off[0].contains("off for gps"), "{off:?}");
 }
 
 #[test]

@@ -123,9 +123,14 @@ impl NodeView {
         }
     }
 
+    /// The count of `need`.
+    pub(crate) fn count(&self, need: Need) -> u32 {
+        self.sequence_and_waiter(need).0.load(Acquire)
+    }
+
     /// True if the count of `need` has reached `count`.
     pub(crate) fn has(&self, need: Need, count: u32) -> bool {
-        self.sequence_and_waiter(need).0.load(Acquire) >= count
+        self.count(need) >= count
     }
 
     /// Waits until the count of `need` reaches `count`, or `is_over` says that it never will.

@@ -198,6 +198,11 @@ pub fn ulog_message(kind: u8, content: &[u8]) -> Vec<u8> {
 
 /// A ULog of `count` samples at 100 Hz.
 pub fn ulog(count: u32) -> Vec<u8> {
+    ulog_of(0..count)
+}
+
+/// The samples of a range of it.
+pub fn ulog_of(samples: std::ops::Range<u32>) -> Vec<u8> {
     let mut bytes = b"ULog\x01\x12\x35\x01".to_vec();
     bytes.extend(0_u64.to_le_bytes());
     bytes.extend(ulog_message(
@@ -208,7 +213,7 @@ pub fn ulog(count: u32) -> Vec<u8> {
     bytes.extend(ulog_message(b'F', b"battery:uint64_t timestamp;cell[2] cell;"));
     bytes.extend(ulog_message(b'A', b"\0\x01\0sensor_combined"));
     bytes.extend(ulog_message(b'A', b"\0\x02\0battery"));
-    for k in 0..count {
+    for k in samples {
         let stamp = (1_000_000 + 10_000 * u64::from(k)).to_le_bytes();
         let floats = |floats: &[f32]| floats.iter().flat_map(|f| f.to_le_bytes()).collect::<Vec<u8>>();
         // Down is positive, and an accelerometer reads -g then.
@@ -245,6 +250,11 @@ pub fn recording(path: &Path, count: u32) {
 
 /// The same, its chunks compressed or not.
 pub fn bag(count: u32, compression: Option<mcap::Compression>) -> Vec<u8> {
+    bag_of(0..count, compression)
+}
+
+/// The samples of a range of it.
+pub fn bag_of(samples: std::ops::Range<u32>, compression: Option<mcap::Compression>) -> Vec<u8> {
     let mut file = std::io::Cursor::new(Vec::new());
     let mut writer = mcap::WriteOptions::new().compression(compression).create(&mut file).unwrap();
     let mut channel = |topic: &str, kind: &str, definition: &str| {
@@ -255,7 +265,7 @@ pub fn bag(count: u32, compression: Option<mcap::Compression>) -> Vec<u8> {
         channel("/control/command", MotorCommand::SCHEMA.type_name, &MotorCommand::SCHEMA.ros2_definition());
     let imu = channel("/imu/imu", Imu::SCHEMA.type_name, &Imu::SCHEMA.ros2_definition());
     let battery = channel("/battery", "sensor_msgs/msg/BatteryState", BATTERY_STATE);
-    for k in 0..count {
+    for k in samples {
         let ns = 10_000_000 * u64::from(k + 1);
         let mut send = |channel_id: u16, body: &[u8]| {
             let header =

@@ -39,6 +39,7 @@ fn node(name: &str, period_ticks: u32, inputs: &[(usize, u32)], output: usize) -
         files: Vec::new(),
         restarts: false,
         computing_time: None,
+        is_recorder: false,
     }
 }
 

@@ -128,6 +128,9 @@ impl Source {
         let (id, tick) = (self.control.process(slot), self.control.completed_by(slot));
         let name = &self.plan.nodes[node].name;
         let (mut row, cpu_ticks) = process(name, id, tick, self.node_state(slot, instances));
+        // A member's successor has a process of its own.
+        let group = self.plan.group_of(node).filter(|_| instances.primary.generation == 0);
+        row.group = group.map(|group| group.name.clone());
         row.late = self.control.late_count(slot);
         (row, (cpu_ticks, Some(self.control.step_times(slot))))
     }

@@ -95,6 +95,7 @@ mod tests {
 
     fn view(rows: usize) -> View {
         let process = |index| ProcessRow {
+            group: None,
             name: format!("process-{index}"),
             process: Some(7),
             state: "waits for /attitude/estimate".to_owned(),

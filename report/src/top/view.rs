@@ -41,6 +41,9 @@ pub struct View {
 pub struct ProcessRow {
     /// Name.
     pub name: String,
+    /// Group with whose other members it shares a process: the processor time is that of all of them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub group: Option<String>,
     /// Process number.
     pub process: Option<u32>,
     /// What it does or waits for.
@@ -82,7 +85,7 @@ fn process(row: &ProcessRow) -> Vec<String> {
     let or_dash =
         |value: Option<f64>, digits| value.map_or("-".to_owned(), |value| format!("{value:.digits$}"));
     vec![
-        row.name.clone(),
+        row.group.as_ref().map_or(row.name.clone(), |group| format!("{} [{group}]", row.name)),
         row.state.clone(),
         row.tick.to_string(),
         or_dash(row.cpu_share.map(|share| share * 100.0), 0),

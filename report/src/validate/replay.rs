@@ -165,7 +165,7 @@ fn manifest(ticks: u32, columns: &str, initial: [f64; 4], vehicles: &[&Path]) ->
 
 /// Refuses to write where `flight` or one of `vehicles` was read from.
 fn require_no_input(output: &Path, flight: &Flight, vehicles: &[&Path]) -> Result<()> {
-    match vehicles.iter().copied().chain([flight.file.as_path()]).find(|input| is_same(input, output)) {
+    match vehicles.iter().copied().chain(flight.files()).find(|input| is_same(input, output)) {
         Some(input) => bail!("{} would be replaced, and is read; keep it in another folder", input.display()),
         None => Ok(()),
     }

@@ -1,4 +1,4 @@
-//! What is judged after the run: it will be recorded, and its fields and units exist.
+//! Conditions, measures and comparisons: their topics are recorded or judged in flight, and their fields and units exist.
 
 use super::parameters::Notes;
 use crate::manifest::{Comparison, Manifest, PassCondition, Statistic};
@@ -8,14 +8,14 @@ use diagnostics::{Diagnostic, did_you_mean};
 use recorder::RecordingError;
 use toml::Spanned;
 
-/// Checks that what is evaluated after the run will be recorded, and that its fields and units exist.
+/// Checks that all topics of the conditions reach the recorder or the judge, and that fields and units exist.
 pub fn check(
     manifest: &Manifest,
     plan: &Plan,
     programs: &[Program],
     notes: &mut Notes,
 ) -> Result<(), Diagnostic> {
-    check_recorded(manifest, plan, programs)?;
+    check_taken(manifest, plan, programs)?;
     let content = &manifest.content;
     Diagnostic::gather(content.compare.iter().map(|compare| check_window(manifest, plan, compare)))?;
     let conditions = content.pass.iter().map(|pass| {
@@ -276,35 +276,26 @@ fn unit_of(
     recorder::series::unit_of(schema, topic, field)
 }
 
-/// The topics that a condition reads.
-fn judged_topics(pass: &PassCondition) -> Vec<&String> {
-    let others = [
-        pass.minus.as_ref().map(|minus| &minus.topic),
-        pass.reference.as_ref().map(|reference| &reference.topic),
-        pass.gate.as_ref().map(|gate| &gate.topic),
-    ];
-    std::iter::once(&pass.topic).chain(others.into_iter().flatten()).collect()
-}
-
-fn check_recorded(manifest: &Manifest, plan: &Plan, programs: &[Program]) -> Result<(), Diagnostic> {
+/// Refuses a condition on a topic that nobody publishes, or that neither the recorder nor a judge takes.
+fn check_taken(manifest: &Manifest, plan: &Plan, programs: &[Program]) -> Result<(), Diagnostic> {
     let content = &manifest.content;
     let passes = content.pass.iter().chain(&content.measure);
-    let passes = passes.map(|pass| (pass.span(), judged_topics(pass.get_ref())));
+    let passes = passes.map(|pass| (pass.span(), pass.get_ref().topics().collect()));
     let compares = content.compare.iter().map(|compare| {
         let Comparison { simulated, measured, .. } = compare.get_ref();
-        (compare.span(), vec![simulated, measured])
+        (compare.span(), vec![simulated.as_str(), measured.as_str()])
     });
-    let recorders = plan.nodes.iter().zip(programs).filter(|(_, program)| program.is_recorder());
-    let recorded: Vec<usize> =
-        recorders.flat_map(|(node, _)| &node.inputs).map(|input| input.topic).collect();
+    let takes_samples = |(_, program): &(_, &Program)| program.is_recorder() || program.is_judge();
+    let takers = plan.nodes.iter().zip(programs).filter(takes_samples);
+    let taken: Vec<usize> = takers.flat_map(|(node, _)| &node.inputs).map(|input| input.topic).collect();
     for (span, topics) in passes.chain(compares) {
         for topic in topics {
-            let Some(index) = plan.topics.iter().position(|known| known.name == *topic) else {
+            let Some(index) = plan.topics.iter().position(|known| known.name == topic) else {
                 let known = plan.topics.iter().map(|topic| topic.name.as_str());
                 let help = did_you_mean(topic, known, "the topics are");
                 return Err(manifest.problem(&span, format!("nobody publishes {topic}"), help));
             };
-            if !recorded.contains(&index) {
+            if !taken.contains(&index) {
                 let help = "add a process with kind = \"recorder\" that takes it";
                 return Err(manifest.problem(&span, format!("{topic} is judged but not recorded"), help));
             }

@@ -2,7 +2,7 @@
 
 use super::outputs::{Published, require_known_ports};
 use super::processes::DeclaredNode;
-use crate::manifest::InputSetting;
+use crate::manifest::{Conditions, InputSetting};
 use crate::placement;
 use crate::program::Program;
 use bus::plan::{InputPlan, NodePlan, TopicPlan};
@@ -24,7 +24,12 @@ pub fn inputs(declared: &DeclaredNode<'_>, topics: &[TopicPlan]) -> Result<Vec<I
                 delay_ticks: 0,
                 initial: None,
             };
-            return Ok(topics.iter().enumerate().map(port).collect());
+            let judged = program.is_judge().then(|| manifest.content.conditions());
+            let judged = judged.as_ref().map(Conditions::topics);
+            let is_read = |(_, plan): &(usize, &TopicPlan)| {
+                judged.as_ref().is_none_or(|judged| judged.contains(plan.name.as_str()))
+            };
+            return Ok(topics.iter().enumerate().filter(is_read).map(port).collect());
         }
         Some(Inputs::Many(schema)) if process.inputs.is_empty() => {
             let message = format!("process `{}` has no input", name.get_ref());

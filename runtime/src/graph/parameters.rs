@@ -90,6 +90,8 @@ pub fn of(
     let parameters = serde_json::to_value(parameters).unwrap_or_default();
     if program.is_recorder() {
         require_none(manifest, process)?;
+    } else if program.is_judge() {
+        return Ok((serde_json::json!({ "conditions": manifest.content.conditions() }), Vec::new()));
     } else if let Executable::Component(kind) = &program.executable {
         ranges::check(manifest, name, process)?;
         let inputs: Vec<&str> = process.inputs.keys().map(|port| port.get_ref().as_str()).collect();

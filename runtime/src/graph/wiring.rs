@@ -35,6 +35,7 @@ pub fn wire(declared_nodes: &[DeclaredNode<'_>], changed: Option<usize>) -> Resu
             files: Vec::new(),
             restarts: declared.program.on_exit == OnExit::Restart,
             computing_time: computing_time::of(declared)?,
+            is_recorder: declared.program.is_recorder(),
         })
     }))?;
     inputs::require_no_cycle(declared_nodes, &nodes, &published, changed)?;

@@ -7,7 +7,7 @@ use diagnostics::ParameterError;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{self, Deserializer, MapAccess, Visitor};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use toml::Spanned;
 
@@ -22,13 +22,13 @@ pub struct Content {
     /// Nodes that share a process, by the name of their group.
     #[serde(default)]
     pub(crate) group: BTreeMap<Spanned<String>, GroupSetting>,
-    /// Conditions on the recording, evaluated after the run.
+    /// Conditions on the samples of the run.
     #[serde(default)]
     pub pass: Vec<Spanned<PassCondition>>,
-    /// Numbers of the recording that are reported after the run and not judged: conditions without limits.
+    /// Numbers that are reported after the run and not judged: conditions without limits.
     #[serde(default)]
     pub measure: Vec<Spanned<PassCondition>>,
-    /// Simulated states compared with measured ones, evaluated after the run.
+    /// Simulated states compared with measured ones.
     #[serde(default)]
     pub compare: Vec<Spanned<Comparison>>,
     /// Processes that take over from others in flight.
@@ -37,6 +37,39 @@ pub struct Content {
     /// Processes that run beside others and are not listened to.
     #[serde(default)]
     pub(crate) shadow: Vec<Spanned<ShadowSetting>>,
+}
+
+impl Content {
+    /// The conditions of the run, without their places.
+    #[must_use]
+    pub fn conditions(&self) -> Conditions {
+        fn all<T: Clone>(stated: &[Spanned<T>]) -> Vec<T> {
+            stated.iter().map(|one| one.get_ref().clone()).collect()
+        }
+        Conditions { pass: all(&self.pass), measure: all(&self.measure), compare: all(&self.compare) }
+    }
+}
+
+/// Conditions, measures and comparisons of a run.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Conditions {
+    /// Pass conditions.
+    pub pass: Vec<PassCondition>,
+    /// Measures.
+    pub measure: Vec<PassCondition>,
+    /// Comparisons with measured states.
+    pub compare: Vec<Comparison>,
+}
+
+impl Conditions {
+    /// The topics that they need, each once.
+    #[must_use]
+    pub fn topics(&self) -> BTreeSet<&str> {
+        let conditions = self.pass.iter().chain(&self.measure).flat_map(PassCondition::topics);
+        let compared = self.compare.iter().flat_map(|compare| [&*compare.simulated, &*compare.measured]);
+        conditions.chain(compared).collect()
+    }
 }
 
 /// Settings of the whole run.
@@ -62,7 +95,7 @@ pub struct Run {
     pub clock_cpu: Option<Spanned<usize>>,
     /// Starts the processes in an order shuffled by this seed.
     pub start_order_seed: Option<u64>,
-    /// The recording; beside the manifest and named like it where absent.
+    /// The recording, or `none`; beside the manifest and named like it where absent.
     pub record: Option<Spanned<String>>,
     /// Whether every process notes the host times of its ticks.
     #[serde(default)]
@@ -76,8 +109,19 @@ fn default_rate_hz() -> Spanned<u32> {
     Spanned::new(0..0, 1000)
 }
 
+/// The value of `run.record` for a run without a recording.
+pub const NO_RECORDING: &str = "none";
+
+impl Run {
+    /// True if the run is not recorded, whatever recorder the manifest has.
+    #[must_use]
+    pub fn is_unrecorded(&self) -> bool {
+        self.record.as_ref().is_some_and(|record| record.get_ref() == NO_RECORDING)
+    }
+}
+
 /// A process.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Process {
     /// A built-in node.
@@ -341,7 +385,7 @@ impl Statistic {
 /// assert_eq!((pass.statistic, pass.from_s, pass.max), (Statistic::Rms, 0.0, Some(0.1)));
 /// # Ok::<(), toml::de::Error>(())
 /// ```
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct PassCondition {
     /// What it means, for the summary.
@@ -372,8 +416,20 @@ pub struct PassCondition {
     pub max: Option<f64>,
 }
 
+impl PassCondition {
+    /// The topics that it needs.
+    pub fn topics(&self) -> impl Iterator<Item = &str> {
+        let others = [
+            self.minus.as_ref().map(|minus| &minus.topic),
+            self.reference.as_ref().map(|reference| &reference.topic),
+            self.gate.as_ref().map(|gate| &gate.topic),
+        ];
+        std::iter::once(&self.topic).chain(others.into_iter().flatten()).map(String::as_str)
+    }
+}
+
 /// A field of a topic.
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Signal {
     /// Topic.
@@ -383,7 +439,7 @@ pub struct Signal {
 }
 
 /// A signal that another follows, or leads.
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Reference {
     /// Topic.
@@ -400,7 +456,7 @@ fn default_within_s() -> f64 {
 }
 
 /// Limits of a signal, in its own unit, within which a condition judges.
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Gate {
     /// Topic.
@@ -422,7 +478,7 @@ pub struct Gate {
 /// assert_eq!((comparison.max_position_m, comparison.max_attitude_deg), (Some(0.1), None));
 /// # Ok::<(), toml::de::Error>(())
 /// ```
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Comparison {
     /// Topic of the simulated state.

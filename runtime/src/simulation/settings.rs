@@ -68,6 +68,7 @@ fn node(name: &str, period_ticks: u32, inputs: Vec<InputPlan>, outputs: &[usize]
         files: Vec::new(),
         restarts: true,
         computing_time: None,
+        is_recorder: false,
     }
 }
 

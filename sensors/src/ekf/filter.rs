@@ -20,7 +20,7 @@ use super::motion::Motion;
 use super::observation::{self, Observation};
 use super::params::EkfParams;
 use super::start::{lost_covariance, start};
-use super::transition::{Covariance, STATES, Transition, symmetric};
+use super::transition::{Covariance, MotionCovariance, STATES, Transition, symmetric};
 use bus::Message;
 use diagnostics::parameter::{ParameterError, positive, require};
 use nalgebra::SMatrix;
@@ -300,6 +300,11 @@ impl Ekf {
     #[must_use]
     pub fn covariance(&self, state: &EkfState) -> Covariance {
         state.since.carry(&state.covariance(), &self.params)
+    }
+
+    /// The covariance of the errors of the present position, velocity and attitude.
+    pub(crate) fn motion_covariance(&self, state: &EkfState) -> MotionCovariance {
+        state.since.carry_motion(&state.covariance(), &self.params)
     }
 }
 

@@ -18,6 +18,8 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 /// Number of errors.
 pub const STATES: usize = 19;
+/// Number of the first of them: position, velocity and attitude.
+pub(super) const MOTION: usize = 9;
 /// Where the errors of each quantity begin.
 pub(super) const POSITION: usize = 0;
 pub(super) const VELOCITY: usize = 3;
@@ -31,6 +33,8 @@ pub(super) const BAROMETER: usize = 18;
 pub type Errors = SVector<f64, STATES>;
 /// Their covariance.
 pub type Covariance = SMatrix<f64, STATES, STATES>;
+/// The covariance of the errors of position, velocity and attitude.
+pub(crate) type MotionCovariance = SMatrix<f64, MOTION, MOTION>;
 
 /// The integrals, each over the time from the filter's to a later one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Message)]
@@ -90,27 +94,68 @@ impl Transition {
         symmetric(&carried)
     }
 
+    /// The covariance of the errors of position, velocity and attitude alone: as [`Self::carry`], for less than half of the
+    /// work.
+    pub fn carry_motion(&self, covariance: &Covariance, params: &EkfParams) -> MotionCovariance {
+        if self.time == 0.0 {
+            return covariance.fixed_view::<MOTION, MOTION>(0, 0).into_owned();
+        }
+        let half = self.rows_of_motion(covariance).transpose();
+        let mut carried = self.rows_of_motion(&half);
+        self.add_noise_of_motion(&mut carried, params);
+        0.5 * (carried + carried.transpose())
+    }
+
     /// The transition matrix times `columns`.
     fn apply(&self, columns: &Covariance, gps_fade: f64) -> Covariance {
-        let rows = |from: usize| columns.fixed_rows::<3>(from).into_owned();
-        let (attitude, gyroscope, accelerometer) = (rows(ATTITUDE), rows(GYROSCOPE), rows(ACCELEROMETER));
-        let position = rows(VELOCITY) * self.time - vector(self.shift).cross_matrix() * attitude
-            + matrix(&self.tilt_twice) * gyroscope
-            - matrix(&self.turn_twice) * accelerometer;
-        let velocity = matrix(&self.tilt) * gyroscope
-            - vector(self.push).cross_matrix() * attitude
-            - matrix(&self.turn) * accelerometer;
         let mut applied = *columns;
-        add_rows(&mut applied, POSITION, &position);
-        add_rows(&mut applied, VELOCITY, &velocity);
-        add_rows(&mut applied, ATTITUDE, &(-matrix(&self.turn) * gyroscope));
+        applied.fixed_rows_mut::<MOTION>(0).copy_from(&self.rows_of_motion(columns));
         applied.fixed_rows_mut::<3>(GPS).scale_mut(gps_fade);
+        applied
+    }
+
+    /// The first rows of the transition matrix, those of position, velocity and attitude, times `columns`.
+    fn rows_of_motion<const N: usize>(&self, columns: &SMatrix<f64, STATES, N>) -> SMatrix<f64, MOTION, N> {
+        let (shift, push) = (vector(self.shift).cross_matrix(), vector(self.push).cross_matrix());
+        let [turn, turn_twice, tilt, tilt_twice] =
+            [&self.turn, &self.turn_twice, &self.tilt, &self.tilt_twice].map(matrix);
+        let mut applied = columns.fixed_rows::<MOTION>(0).into_owned();
+        // Column by column: products of three by three stay in registers.
+        for (column, mut applied) in columns.column_iter().zip(applied.column_iter_mut()) {
+            let part = |from: usize| column.fixed_rows::<3>(from).into_owned();
+            let (attitude, gyroscope, accelerometer) = (part(ATTITUDE), part(GYROSCOPE), part(ACCELEROMETER));
+            let position = part(VELOCITY) * self.time - shift * attitude + tilt_twice * gyroscope
+                - turn_twice * accelerometer;
+            let velocity = tilt * gyroscope - push * attitude - turn * accelerometer;
+            let mut add = |from: usize, change: &Vector3<f64>| {
+                let mut rows = applied.fixed_rows_mut::<3>(from);
+                rows += change;
+            };
+            add(POSITION, &position);
+            add(VELOCITY, &velocity);
+            add(ATTITUDE, &(-turn * gyroscope));
+        }
         applied
     }
 
     /// What the noises have added. Their way through the attitude within the span is left out: it is three
     /// orders below the rest in the 20 ms that the filter carries its covariance at most.
     fn add_noise(&self, covariance: &mut Covariance, params: &EkfParams) {
+        let time_s = self.time;
+        self.add_noise_of_motion(covariance, params);
+        let fade = libm::exp(-2.0 * time_s / params.gps_position_drift_time_s);
+        let mut add =
+            |from: usize, count: usize, variance: f64| add_variance(covariance, from, count, variance);
+        add(GYROSCOPE, 3, params.gyroscope_bias_walk_rad_s2_sqrt_hz.powi(2) * time_s);
+        add(ACCELEROMETER, 3, params.accelerometer_bias_walk_m_s3_sqrt_hz.powi(2) * time_s);
+        add(BAROMETER, 1, params.barometer_bias_walk_m_sqrt_s.powi(2) * time_s);
+        for (axis, drift_m) in params.gps_position_drift_m.iter().enumerate() {
+            add(GPS + axis, 1, drift_m.powi(2) * (1.0 - fade));
+        }
+    }
+
+    /// The part of that in the errors of position, velocity and attitude.
+    fn add_noise_of_motion<const N: usize>(&self, covariance: &mut SMatrix<f64, N, N>, params: &EkfParams) {
         let time_s = self.time;
         let force = params.accelerometer_noise_density_m_s2_sqrt_hz.powi(2);
         for axis in 0..3 {
@@ -119,19 +164,19 @@ impl Transition {
             covariance[(position, velocity)] += force * time_s.powi(2) / 2.0;
             covariance[(velocity, position)] += force * time_s.powi(2) / 2.0;
         }
-        let fade = libm::exp(-2.0 * time_s / params.gps_position_drift_time_s);
-        let mut add = |from: usize, count: usize, variance: f64| {
-            (from..from + count).for_each(|state| covariance[(state, state)] += variance);
-        };
-        add(VELOCITY, 3, force * time_s);
-        add(ATTITUDE, 3, params.gyroscope_noise_density_rad_s_sqrt_hz.powi(2) * time_s);
-        add(GYROSCOPE, 3, params.gyroscope_bias_walk_rad_s2_sqrt_hz.powi(2) * time_s);
-        add(ACCELEROMETER, 3, params.accelerometer_bias_walk_m_s3_sqrt_hz.powi(2) * time_s);
-        add(BAROMETER, 1, params.barometer_bias_walk_m_sqrt_s.powi(2) * time_s);
-        for (axis, drift_m) in params.gps_position_drift_m.iter().enumerate() {
-            add(GPS + axis, 1, drift_m.powi(2) * (1.0 - fade));
-        }
+        add_variance(covariance, VELOCITY, 3, force * time_s);
+        add_variance(covariance, ATTITUDE, 3, params.gyroscope_noise_density_rad_s_sqrt_hz.powi(2) * time_s);
     }
+}
+
+/// Adds `variance` to `count` errors from number `from` on.
+fn add_variance<const N: usize>(
+    covariance: &mut SMatrix<f64, N, N>,
+    from: usize,
+    count: usize,
+    variance: f64,
+) {
+    (from..from + count).for_each(|state| covariance[(state, state)] += variance);
 }
 
 /// The mean of a matrix and its transpose, which rounding has let drift apart.
@@ -145,9 +190,4 @@ fn matrix(flat: &[f64; 9]) -> Matrix3<f64> {
 
 fn add(flat: &mut [f64; 9], change: &Matrix3<f64>) {
     flat.iter_mut().zip(change).for_each(|(value, change)| *value += change);
-}
-
-fn add_rows(covariance: &mut Covariance, from: usize, change: &SMatrix<f64, 3, STATES>) {
-    let mut rows = covariance.fixed_rows_mut::<3>(from);
-    rows += change;
 }

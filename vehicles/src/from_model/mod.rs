@@ -5,7 +5,7 @@
 //! | `xml` | XML within bounds, whose errors have places |
 //! | `model` | links, joints and motors, whatever the format |
 //! | `tree` | the order of links from the root |
-//! | `urdf`, `sdf` | the formats |
+//! | `urdf`, `sdf`, `sdf_notes` | the formats; properties of SDF that a vehicle file does not have |
 //! | `plugins` | plugins of Gazebo that drive rotors |
 //! | `body` | mass, centre of mass and inertia of all links |
 //! | `rotors` | the rotors among the joints |
@@ -21,6 +21,7 @@ mod parts;
 mod plugins;
 mod rotors;
 mod sdf;
+mod sdf_notes;
 mod text;
 mod tree;
 mod urdf;

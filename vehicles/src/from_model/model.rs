@@ -17,6 +17,8 @@ pub struct Model<'a> {
     pub joints: Vec<Joint>,
     /// Motors of the simulator's plugins, in the order of the file.
     pub motors: Vec<Motor>,
+    /// Properties of the file that the model cannot hold, in words.
+    pub notes: Vec<String>,
 }
 
 /// A rigid part.

@@ -7,7 +7,8 @@ use super::text::{digits, plain};
 
 /// Notes on a model whose rotors have the coefficient `thrust` in N/(rad/s)^2 and turn at most at `speed_max` in rad/s.
 pub fn of(parts: &Parts, thrust: f64, speed_max: f64) -> Vec<String> {
-    let mut notes = movable(parts);
+    let mut notes = parts.model.notes.clone();
+    notes.extend(movable(parts));
     notes.extend(lags(&parts.rotors));
     notes.extend(directions(&parts.rotors));
     let weight = parts.body.mass_kg * GRAVITY_M_S2;

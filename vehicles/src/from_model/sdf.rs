@@ -8,6 +8,8 @@ use std::ops::Range;
 
 use super::model::{Freedom, Inertial, Joint, Link, Model, pose, tensor};
 use super::plugins;
+use super::sdf_notes;
+use super::text::plain;
 use super::tree;
 use super::xml::{Source, child, children, name_of, start_of, text_in, text_of};
 
@@ -23,7 +25,7 @@ struct Frames<'d> {
 /// Reads the only model of the element `<sdf>`. The model's frame is that of its element.
 ///
 /// # Errors
-/// If there is not one model, it includes others, an element is missing or not of its kind, or the joints do not form a tree.
+/// If there is not one model, it includes or holds others, an element is missing or not of its kind, or the joints do not form a tree.
 pub fn read<'a>(source: Source<'a>, sdf: Node) -> Result<Model<'a>, Diagnostic> {
     let model = only_model(source, sdf)?;
     let mut frames = Frames::default();
@@ -38,24 +40,48 @@ pub fn read<'a>(source: Source<'a>, sdf: Node) -> Result<Model<'a>, Diagnostic> 
     let joints: Vec<Joint> = joints.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
     tree::order(source, &links, &joints)?;
     let name = name_of(model);
-    Ok(Model { source, name, links, joints, motors: plugins::read(source, model)? })
+    let notes = sdf_notes::of(source, sdf, model)?;
+    Ok(Model { source, name, links, joints, motors: plugins::read(source, model)?, notes })
 }
 
 fn only_model<'d, 'i>(source: Source, sdf: Node<'d, 'i>) -> Result<Node<'d, 'i>, Diagnostic> {
     let models: Vec<_> = children(sdf, "model")
         .chain(children(sdf, "world").flat_map(|world| children(world, "model")))
         .collect();
+    let included =
+        children(sdf, "include").chain(children(sdf, "world").flat_map(|world| children(world, "include")));
+    if let (true, Some(include)) = (models.is_empty(), included.into_iter().next()) {
+        return Err(included_model(source, include));
+    }
     let [model] = models[..] else {
         let message = format!("expected one <model>, found {}", models.len());
         return Err(source.whole(message).help("keep the model of the vehicle alone in the file"));
     };
     let inner = model.children().find(|node| matches!(node.tag_name().name(), "include" | "model"));
     match inner {
-        Some(node) => Err(source
-            .fault(start_of(node), "expected links and joints, found another model within this one")
-            .help("copy its links and joints into this model")),
+        Some(node) if node.has_tag_name("include") => Err(included_model(source, node)),
+        Some(node) => {
+            let message = format!(
+                "expected links and joints, found the model `{}` within this one",
+                plain(&name_of(node))
+            );
+            Err(source.fault(start_of(node), message).help(
+                "copy its links, joints and plugins into this model, and add its pose to the poses of its links",
+            ))
+        }
         None => Ok(model),
     }
+}
+
+/// The error for a model in another file, which is not looked for: its place depends on the simulator's settings.
+fn included_model(source: Source, include: Node) -> Diagnostic {
+    let uri = text_of(include, "uri")
+        .map_or("a model without <uri>".to_owned(), |uri| format!("`{}`", plain(&uri)));
+    let message = format!("expected links and joints, found <include> of {uri}, which is in another file");
+    source.fault(start_of(include), message).help(
+        "let the simulator write one file with all models, `gz sdf -p FILE > WHOLE.sdf`, and convert that, or copy the \
+         links, joints and plugins of the included model into this one",
+    )
 }
 
 impl<'d> Frames<'d> {

@@ -20,7 +20,7 @@ pub fn read<'a>(source: Source<'a>, robot: Node) -> Result<Model<'a>, Diagnostic
     let (mut joints, origins): (Vec<_>, Vec<_>) = read.into_iter().unzip();
     place(source, &mut links, &mut joints, &origins)?;
     let name = name_of(robot);
-    Ok(Model { source, name, links, joints, motors: plugins::read(source, robot)? })
+    Ok(Model { source, name, links, joints, motors: plugins::read(source, robot)?, notes: Vec::new() })
 }
 
 /// Chains the joints from the root link, so that all poses are in its frame.

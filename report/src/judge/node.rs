@@ -1,0 +1,124 @@
+//! The judge: a component that passes the samples of a run without a recording through the evaluator.
+
+use super::evaluator::Evaluator;
+use bus::announcement::Announcement;
+use bus::component::{Component, Info, State, StateError, StepError, Transfer};
+use bus::context::{NodeContext, StepContext};
+use bus::ports::AnyInputs;
+use diagnostics::ParameterError;
+use recorder::fields::TopicFields;
+use runtime::manifest::Conditions;
+use serde::Deserialize;
+use std::path::PathBuf;
+
+/// Parameters of the judge, which the launcher gives.
+///
+/// ```
+/// let conditions = serde_json::json!({ "pass": [], "measure": [], "compare": [] });
+/// let parameters = serde_json::json!({ "path": "figures", "conditions": conditions });
+/// let parameters: report::judge::node::Parameters = diagnostics::read(&parameters)?;
+/// assert!(parameters.conditions.topics().is_empty());
+/// # Ok::<(), diagnostics::ParameterError>(())
+/// ```
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Parameters {
+    /// The file to which the figures are written.
+    pub path: PathBuf,
+    /// Conditions, measures and comparisons.
+    pub conditions: Conditions,
+}
+
+/// The judge of a run without a recording.
+#[derive(Debug)]
+pub struct Judge {
+    parameters: Parameters,
+    tick_ns: u64,
+    duration_ticks: u32,
+}
+
+/// State of a judge: its evaluator, once it is connected.
+#[derive(Debug)]
+pub struct JudgeState(Option<Judging>);
+
+#[derive(Debug)]
+struct Judging {
+    evaluator: Evaluator,
+    /// By input, the number of its topic in the evaluator.
+    topics: Vec<Option<usize>>,
+}
+
+impl State for JudgeState {
+    const TRANSFER: Transfer = Transfer::File;
+
+    fn size(&self) -> usize {
+        0
+    }
+
+    fn save(&self, _: &mut [u8]) {}
+
+    fn load(&mut self, _: &[u8]) -> Result<(), StateError> {
+        Err(StateError::File)
+    }
+}
+
+impl Component for Judge {
+    const INFO: Info = Info::new(
+        "judge",
+        "evaluates the conditions of a run without a recording; the launcher adds it, a manifest cannot",
+    )
+    .judge();
+    type Parameters = Parameters;
+    type Inputs<'a> = AnyInputs<'a>;
+    type Outputs = ();
+    type State = JudgeState;
+
+    fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
+        Ok(Self { parameters, tick_ns: context.tick_ns, duration_ticks: context.duration_ticks })
+    }
+
+    fn initial(&self) -> JudgeState {
+        JudgeState(None)
+    }
+
+    fn connected(
+        &self,
+        announced: &[(&str, &Announcement)],
+        JudgeState(judging): &mut JudgeState,
+    ) -> Result<(), StepError> {
+        let open = |topic: &str| {
+            let (_, announcement) = announced.iter().find(|(name, _)| *name == topic).ok_or_else(|| {
+                let known = announced.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+                recorder::RecordingError::UnknownTopic { topic: topic.to_owned(), known }
+            })?;
+            TopicFields::announced(topic, announcement)
+        };
+        let mut evaluator = Evaluator::new(&self.parameters.conditions, open)?;
+        evaluator.reserve(u64::from(self.duration_ticks) * self.tick_ns, self.tick_ns);
+        let topics = announced.iter().map(|(name, _)| evaluator.topic(name)).collect();
+        *judging = Some(Judging { evaluator, topics });
+        Ok(())
+    }
+
+    fn step(
+        &self,
+        context: &StepContext<'_>,
+        inputs: AnyInputs<'_>,
+        JudgeState(judging): &mut JudgeState,
+    ) -> Result<(), StepError> {
+        let Some(Judging { evaluator, topics }) = judging else { return Ok(()) };
+        for (input, topic) in topics.iter().enumerate() {
+            if let Some((topic, cdr)) = topic.zip(inputs.fresh(input)) {
+                evaluator.take(topic, cdr)?;
+            }
+        }
+        Ok(evaluator.end_tick(context.time_ns())?)
+    }
+
+    fn finish(&self, JudgeState(judging): &mut JudgeState) -> Result<(), StepError> {
+        let Some(Judging { evaluator, .. }) = judging.take() else { return Ok(()) };
+        let path = &self.parameters.path;
+        let written = std::fs::write(path, evaluator.finish().to_bytes()?);
+        Ok(written.map_err(|error| format!("cannot write the figures {}: {error}", path.display()))?)
+    }
+}

@@ -1,0 +1,152 @@
+//! Verdicts: figures against their limits, and their lines of the summary.
+
+use super::figures::{Found, WindowFigures};
+use anyhow::{Result, bail};
+use runtime::manifest::{Comparison, PassCondition};
+use serde::Serialize;
+use std::fmt;
+
+/// A pass condition and how it came out, or a measure, which has no limits; its text is a line of the summary.
+///
+/// ```
+/// use report::judge::Verdict;
+/// let (name, unit) = ("altitude".to_owned(), "m".to_owned());
+/// let values = vec![1.49, 1.51];
+/// let verdict = Verdict { name, values, unit, min: Some(1.4), max: Some(1.6), passed: true, why: None };
+/// assert_eq!(verdict.to_string(), "  ok     altitude: 1.4900 … 1.5100 m (1.4 … 1.6)");
+/// ```
+#[derive(Debug, Serialize)]
+pub struct Verdict {
+    /// Meaning of the condition.
+    pub name: String,
+    /// The values compared with the limits: one, or the smallest and the largest.
+    pub values: Vec<f64>,
+    /// Their unit.
+    pub unit: String,
+    /// Lower limit.
+    pub min: Option<f64>,
+    /// Upper limit.
+    pub max: Option<f64>,
+    /// True if it held.
+    pub passed: bool,
+    /// Why there are no values, where more is to say than that there were no samples.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub why: Option<String>,
+}
+
+/// RMS errors of a simulated state at the ends of windows; its text is a line of the summary.
+///
+/// ```
+/// use report::judge::WindowErrors;
+/// let errors = WindowErrors {
+///     simulated: "/plant/state".to_owned(),
+///     window_s: 0.5,
+///     windows: 8,
+///     position_rms_m: 0.012,
+///     velocity_rms_m_s: 0.1,
+///     attitude_rms_deg: 2.5,
+///     passed: false,
+/// };
+/// assert!(errors.to_string().ends_with("position 0.0120 m, velocity 0.1000 m/s, attitude 2.500 deg  FAILED"));
+/// ```
+#[derive(Debug, Serialize)]
+pub struct WindowErrors {
+    /// Topic of the simulated state.
+    pub simulated: String,
+    /// Length of the windows.
+    pub window_s: f64,
+    /// Windows compared.
+    pub windows: usize,
+    /// RMS length of the position error.
+    pub position_rms_m: f64,
+    /// RMS length of the velocity error.
+    pub velocity_rms_m_s: f64,
+    /// RMS angle of the attitude error.
+    pub attitude_rms_deg: f64,
+    /// True if all limits held.
+    pub passed: bool,
+}
+
+impl Verdict {
+    /// The verdict on `pass`, of whose samples this was found.
+    pub(crate) fn of(pass: &PassCondition, found: &Found) -> Self {
+        let PassCondition { name, unit, min, max, .. } = pass;
+        let Found { values, why } = found.clone();
+        // A span without samples fails: samples that were never there did not pass.
+        let passed = !values.is_empty() && values.iter().all(|value| within(*value, *min, *max));
+        Self { name: name.clone(), values, unit: unit.clone(), min: *min, max: *max, passed, why }
+    }
+}
+
+impl WindowErrors {
+    /// The errors of `compare`, at the ends of whose windows this was found.
+    ///
+    /// # Errors
+    /// If both states have no sample at the end of a window.
+    pub(crate) fn of(compare: &Comparison, found: &WindowFigures) -> Result<Self> {
+        let Comparison { simulated, measured, window_s, .. } = compare;
+        let WindowFigures { windows, position_rms_m, velocity_rms_m_s, attitude_rms_deg } = *found;
+        if windows == 0 {
+            bail!("{simulated} and {measured} have no common sample at the end of a window of {window_s} s");
+        }
+        let passed = within(position_rms_m, None, compare.max_position_m)
+            && within(velocity_rms_m_s, None, compare.max_velocity_m_s)
+            && within(attitude_rms_deg, None, compare.max_attitude_deg);
+        Ok(Self {
+            simulated: simulated.clone(),
+            window_s: *window_s,
+            windows: windows as usize,
+            position_rms_m,
+            velocity_rms_m_s,
+            attitude_rms_deg,
+            passed,
+        })
+    }
+}
+
+/// True if `value` is a number between the limits that there are.
+pub(crate) fn within(value: f64, min: Option<f64>, max: Option<f64>) -> bool {
+    !value.is_nan() && min.is_none_or(|min| value >= min) && max.is_none_or(|max| value <= max)
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let values: Vec<String> = self.values.iter().map(|value| shown(*value)).collect();
+        let nothing = || self.why.clone().map_or("no samples".to_owned(), |why| format!("no value: {why}"));
+        let values = if values.is_empty() { nothing() } else { values.join(" … ") };
+        let has_unit = self.unit != "1" && !self.values.is_empty();
+        let unit = if has_unit { format!(" {}", self.unit) } else { String::new() };
+        let limit = match (self.min, self.max) {
+            (Some(min), Some(max)) => format!("{min} … {max}"),
+            (Some(min), None) => format!("at least {min}"),
+            (None, Some(max)) => format!("at most {max}"),
+            (None, None) => return write!(f, "  value  {}: {values}{unit}", self.name),
+        };
+        let mark = if self.passed { "ok    " } else { "FAILED" };
+        write!(f, "  {mark} {}: {values}{unit} ({limit})", self.name)
+    }
+}
+
+/// Four digits behind the point, or four that are not zero; what is whole without any.
+fn shown(value: f64) -> String {
+    if value.fract() == 0.0 && value.abs() < 1e15 {
+        return format!("{value:.0}");
+    }
+    let zeros = (-libm::log10(value.abs())).ceil().clamp(1.0, 12.0);
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 12")]
+    let digits = zeros as usize + 3;
+    format!("{value:.digits$}")
+}
+
+impl fmt::Display for WindowErrors {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { simulated, window_s, windows, position_rms_m, velocity_rms_m_s, attitude_rms_deg, .. } =
+            self;
+        let mark = if self.passed { "" } else { "  FAILED" };
+        write!(
+            f,
+            "  {simulated} after {window_s} s (RMS over {windows} windows): position {position_rms_m:.4} m, \
+             velocity {velocity_rms_m_s:.4} m/s, attitude {attitude_rms_deg:.3} deg{mark}"
+        )
+    }
+}
