@@ -355,4 +355,4 @@ impl<'a> InputPorts<'a> for ForwardedInputs<'a> {
 }
 
 /// Bytes that a forwarded message has at most.
-pub const FORWARDED_BYTES_MAX: usize = 192;
+pub const FORWARDED_BYTES_MAX: usize = 256;

@@ -70,7 +70,7 @@ fn refuse_initial(vehicle: &Vehicle, run: &NodeContext<'_>) -> Result<(), Parame
     let count = vehicle.rotors.len();
     let wrong = command.and_then(|input| input.initial_count("command")).filter(|found| *found != count);
     wrong.map_or(Ok(()), |found| {
-        refuse(true, "vehicle", || unequal(vehicle, "the initial value of its input", found))
+        refuse(true, "inputs.command", || unequal(vehicle, "the initial value of its input", found))
     })
 }
 

@@ -36,7 +36,7 @@ fn manifest(place: &Place) -> String {
          [process.link]\nkind = \"link\"\n\
          inputs.gps = {{ topic = \"/gps/gps\", delay_ticks = 1, initial = {{}} }}\n\
          inputs.state = {{ topic = \"/plant/state\", delay_ticks = 1, initial = {{}} }}\n\
-         parameters = {{ loss = 0.2, jitter_ms = 5.0, streams.state.rate_hz = 25.0 }}\n\
+         parameters = {{ loss = 0.2, jitter_ms = 5.0, queue_bytes = 512, streams.state.rate_hz = 25.0 }}\n\
          [process.traffic]\nkind = \"traffic\"\ninputs.one = \"/plant/state\"\n\
          [process.clearance]\nkind = \"clearance\"\nscene = {room:?}\ninputs.state = \"/plant/state\"\n\
          [process.hold]\nkind = \"position-hold\"\n\

@@ -170,8 +170,14 @@ fn problem(declared: &DeclaredNode<'_>, at: &Range<usize>, message: &str, help: 
     declared.manifest.problem(at, format!("process `{}`: {message}", declared.name.get_ref()), help)
 }
 
-/// Where the dotted `key` stands: by its first name, which is a parameter or a file; else the place of the process.
+/// Where the dotted `key` stands: an input as `inputs.PORT`, or by its first name a parameter or a file; else the place of
+/// the process.
 fn place(declared: &DeclaredNode<'_>, key: &str) -> Range<usize> {
+    if let Some(port) = key.strip_prefix("inputs.")
+        && let Some(input) = declared.process.inputs.keys().find(|input| input.get_ref() == port)
+    {
+        return input.span();
+    }
     let first = key.split('.').next().unwrap_or(key);
     let parameter = declared.process.parameters.keys().find(|key| key.get_ref() == first).map(Spanned::span);
     let file = files(declared.process).into_iter().find(|(key, _)| *key == first);
