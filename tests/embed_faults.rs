@@ -54,7 +54,7 @@ impl Component for Source {
     }
 
     fn initial(&self) -> MotorCommand {
-        MotorCommand::default()
+        MotorCommand { command: [0.0; 4].into(), ..MotorCommand::default() }
     }
 
     fn step(

@@ -33,9 +33,6 @@ pub struct Bounded<T, const N: usize> {
     values: [T; N],
 }
 
-/// Bytes from the start of a [`Bounded`] to its first value.
-pub(crate) const VALUES_START: usize = 8;
-
 impl<T: Copy + Default, const N: usize> Bounded<T, N> {
     /// `count` values, each made from its index; at most `N`.
     #[must_use]

@@ -1,7 +1,6 @@
 //! Which numbers of a message have to be finite, and whether they are: found once, looked at before every sample.
 
-use crate::bounded::VALUES_START;
-use crate::schema::{Kind, Primitive, Schema};
+use crate::schema::{Kind, Primitive, Schema, VALUES_START};
 
 /// Floating-point numbers that lie side by side in a message.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,9 +1,8 @@
 //! The value that a delayed input has before its first sample: a message made from named fields.
 
-use crate::bounded::VALUES_START;
 use crate::message::BODY_START;
 use crate::sample_memory::empty_sample;
-use crate::schema::{Kind, Primitive, Schema};
+use crate::schema::{Kind, Primitive, Schema, VALUES_START};
 use serde_json::Value;
 
 /// What does not fit the message, by its path.

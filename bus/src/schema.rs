@@ -1,6 +1,5 @@
 //! What a message's bytes mean: fields, units, frames, the layout hash, and the ROS 2 definition.
 
-use crate::bounded::VALUES_START;
 use crate::random::{FNV_OFFSET, fnv1a};
 use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
@@ -148,6 +147,8 @@ pub struct Extent {
     pub values_max: usize,
 }
 
+/// Bytes from the start of a [`Bounded`](crate::Bounded) to its first value.
+pub(crate) const VALUES_START: usize = 8;
 /// Bytes of CDR's encapsulation header.
 const CDR_HEADER_BYTES: usize = 4;
 
