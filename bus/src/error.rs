@@ -76,7 +76,7 @@ pub enum BusError {
         path: PathBuf,
         /// What it should hold.
         expected: &'static str,
-        /// What is wrong with it.
+        /// Its fault.
         found: String,
     },
     /// The plan has no node of this name.

@@ -340,7 +340,7 @@ pub(crate) struct OutPort {
     sender: Option<Sender>,
     /// Memory of the next sample where members of the same group, or the recorder of a group, read the topic.
     staging: Option<Box<[u64]>>,
-    /// Where the recorder of a group reads the samples.
+    /// Ring in which the recorder of a group reads the samples.
     ring: Option<SampleRing>,
     port: String,
     topic_name: String,
@@ -403,7 +403,7 @@ impl OutPort {
         Self { stamp_offset: None, ..self }
     }
 
-    /// Has the recorder of a group read the samples in `ring`.
+    /// Lets the recorder of a group read the samples in `ring`.
     pub(crate) fn record(&mut self, ring: SampleRing) {
         self.ring = Some(ring);
     }

@@ -23,7 +23,7 @@ use diagnostics::unit::ANGLE;
 pub struct Read<const N: usize> {
     /// The samples.
     pub channel: Channel<N>,
-    /// What to say about it.
+    /// Note about it.
     pub notes: Vec<String>,
     /// Seams of a log in several files.
     pub seams: SeamList,

@@ -31,7 +31,7 @@ pub enum FlightsError {
     Vehicle {
         /// Where the flights file names it.
         place: Place,
-        /// What is wrong with it.
+        /// Its fault.
         #[source]
         cause: Box<Diagnostic>,
     },
@@ -194,7 +194,7 @@ pub enum LogError {
     Part {
         /// The file of the part.
         file: PathBuf,
-        /// What is wrong with it.
+        /// Its fault.
         #[source]
         cause: Box<LogError>,
     },

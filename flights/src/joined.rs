@@ -79,7 +79,7 @@ fn shown(name: &str) -> String {
 }
 
 impl LogPart {
-    /// What is wrong with this part.
+    /// Fault of this part.
     fn refused(&self, cause: LogError) -> LogError {
         LogError::Part { file: self.file.clone(), cause: Box::new(cause) }
     }

@@ -30,7 +30,7 @@ const CHOOSE_BESIDE: &str =
 /// Advice where the clock of a part starts again.
 const CUT: &str = "a part of a log has one recording: cut the file there";
 
-/// What is needed to open the logs of a flights file.
+/// All that is needed to open the logs of a flights file.
 pub struct Opening<'a> {
     /// The flights file.
     pub document: &'a Document,
@@ -38,7 +38,7 @@ pub struct Opening<'a> {
     pub declaration: &'a Declaration,
     /// The declared vehicle.
     pub vehicle: &'a Vehicle,
-    /// Whether lists may hold patterns.
+    /// True if lists may hold patterns.
     pub patterns: Patterns,
 }
 

@@ -77,7 +77,7 @@ pub struct OtherLog {
 /// Logs by the channel that is read from them.
 pub type OtherLogs = BTreeMap<Quantity, OtherLog>;
 
-/// What is found while channels are read.
+/// Findings while channels are read.
 #[derive(Default)]
 struct Said {
     notes: Vec<String>,

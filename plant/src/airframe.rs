@@ -120,7 +120,7 @@ impl Airframe {
         }
     }
 
-    /// What acts over the tick of `dt_s` that begins at `state`, under raw motor `commands` held over it: one for each
+    /// Wrench over the tick of `dt_s` that begins at `state`, under raw motor `commands` held over it: one for each
     /// rotor.
     #[must_use]
     pub fn begin_tick(

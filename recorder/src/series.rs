@@ -180,7 +180,7 @@ impl<P> Made<P> {
     }
 }
 
-/// What `other` makes of each, if it makes something of all.
+/// Values that `other` makes of each, if it makes something of all.
 fn all<P, Q: Copy, const N: usize>(of: &[P; N], other: impl Fn(&P) -> Option<Q>) -> Option<[Q; N]> {
     let mut found = [other(of.first()?)?; N];
     for (place, one) in found.iter_mut().zip(of) {
