@@ -309,7 +309,7 @@ fn prepare(manifest: &Manifest, graph: &mut Graph, recording: Option<&Path>, run
     Ok(nodes.try_for_each(|node| store_files(&files, run_dir.path(), node))?)
 }
 
-/// What the judge of a run without a recording has written, if there is one.
+/// Figures that the judge of a run without a recording has written, if there is one.
 fn figures(graph: &Graph, run_dir: &Path) -> Result<Option<Vec<u8>>> {
     let has_judge = graph.programs.iter().any(Program::is_judge);
     let read = || std::fs::read(run_dir.join(FIGURES)).context("cannot read the figures of the judge");

@@ -64,7 +64,7 @@ fn a_condition_on_a_topic_that_the_recorder_leaves_out() {
     ended.says(&["/plant/state is judged but not recorded", "kind = \"recorder\""]);
 }
 
-/// What is wrong is refused before the start without a recording, too.
+/// Faults are refused before the start without a recording, too.
 #[test]
 fn a_condition_without_a_recorder_on_a_topic_or_field_that_is_none() {
     let recorder = "[process.recorder]\nkind = \"recorder\"\n";

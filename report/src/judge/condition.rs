@@ -165,7 +165,7 @@ impl Pairs {
         }
     }
 
-    /// How the field follows `reference`, and the time between two samples in seconds.
+    /// Response of the field to `reference`, and the time between two samples in seconds.
     fn response(&self, reference: &Reference) -> Result<(Response, f64), NoResponse> {
         let (first, second) = self.first_ns.zip(self.second_ns).ok_or(NoResponse::TooShort)?;
         let step_s = (second - first) as f64 * 1e-9;

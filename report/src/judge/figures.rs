@@ -14,11 +14,11 @@ use serde::{Deserialize, Serialize};
 /// ```
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Figures {
-    /// Of the pass conditions.
+    /// Figures of the pass conditions.
     pub pass: Vec<Found>,
-    /// Of the measures.
+    /// Figures of the measures.
     pub measures: Vec<Found>,
-    /// Of the comparisons.
+    /// Figures of the comparisons.
     pub compare: Vec<WindowFigures>,
 }
 

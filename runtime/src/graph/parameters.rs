@@ -170,7 +170,7 @@ fn problem(declared: &DeclaredNode<'_>, at: &Range<usize>, message: &str, help: 
     declared.manifest.problem(at, format!("process `{}`: {message}", declared.name.get_ref()), help)
 }
 
-/// Where the dotted `key` stands: an input as `inputs.PORT`, or by its first name a parameter or a file; else the place of
+/// Place of the dotted `key`: an input as `inputs.PORT`, or by its first name a parameter or a file; else the place of
 /// the process.
 fn place(declared: &DeclaredNode<'_>, key: &str) -> Range<usize> {
     if let Some(port) = key.strip_prefix("inputs.")
