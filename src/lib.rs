@@ -1,7 +1,7 @@
 //! hummingbus: a vehicle simulation as independent components in deterministic lockstep, on a zero-copy bus.
 //!
 //! A manifest says which components fly together, and how they are wired. [`load`] reads one, [`Launcher`] flies it, in
-//! processes or on threads, and what comes back is the recording and what there is to say about the run:
+//! processes, on threads or in one thread, and what comes back is the recording and what there is to say about the run:
 //!
 //! ```
 //! use hummingbus::{Host, Launcher};
@@ -15,6 +15,22 @@
 //! assert_eq!(outcome.ticks, 100);
 //! let altitude = &recording.unwrap().series(&[("/plant/state", "position.z")])?[0];
 //! assert!((altitude.value[99] - 1.0).abs() < 0.01);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! To look between two ticks, or to stop in a debugger, step the same components by [`simulate`]: the samples are the
+//! same, bit for bit:
+//!
+//! ```
+//! use bus::messages::PlantState;
+//! # use hummingbus::bus;
+//! # let hover = concat!(env!("CARGO_MANIFEST_DIR"), "/manifests/hover.toml");
+//! let mut simulation = hummingbus::simulate(&hummingbus::load(hover)?)?;
+//! let state = simulation.topic::<PlantState>("/plant/state")?;
+//! while simulation.time_s() < 4.0 {
+//!     simulation.step()?;
+//! }
+//! assert!((simulation.newest(state).unwrap().position.z - 1.5).abs() < 0.05);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
@@ -42,6 +58,7 @@ mod extremes;
 #[cfg(test)]
 mod properties;
 
+pub use bus::Simulation;
 pub use check::{check, check_text, drives, meshes};
 pub use components::COMPONENTS;
 pub use diagnostics::Diagnostic;
@@ -52,6 +69,7 @@ pub use runtime::graph::Graph;
 pub use runtime::host::Host;
 pub use runtime::launcher::{Launcher, Outcome};
 pub use runtime::manifest::{Manifest, ManifestBuilder};
+pub use runtime::simulate;
 pub use {
     bus, controllers, flights, identify, inputs, plant, recorder, report, runtime, scenes, sensors, vehicles,
 };

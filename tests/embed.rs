@@ -8,7 +8,7 @@ fn hover() -> Manifest {
 }
 
 fn threads() -> Launcher<'static> {
-    Launcher::new(Host::InProcess)
+    Launcher::new(Host::Threads)
 }
 
 /// The bytes of a recording of `manifest`.

@@ -170,7 +170,7 @@ fn build(plan: &ManifestBuilder, folder: &Path) -> Manifest {
 
 /// Flies `plan` with an armed fault; the counts that were recorded, or the error as text.
 fn flown(plan: &ManifestBuilder, folder: &Path) -> Result<Vec<f64>, String> {
-    flown_by(Launcher::new(Host::InProcess), plan, folder, "a.mcap")
+    flown_by(Launcher::new(Host::Threads), plan, folder, "a.mcap")
 }
 
 fn flown_by(
@@ -301,7 +301,7 @@ fn a_run_whose_listener_panics_is_taken_down() {
             RunEvent::Progress(Progress { ticks, .. }) if ticks > 100 => panic!("the listener gave up"),
             _ => {}
         };
-        let launcher = Launcher::new(Host::InProcess).followed_by(give_up);
+        let launcher = Launcher::new(Host::Threads).followed_by(give_up);
         let manifest = build(&plan(1_000_000, "none"), folder);
         let path = folder.join("a.mcap");
         let flown = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| launcher.fly(&manifest, &path)));
@@ -320,7 +320,7 @@ fn a_run_that_is_interrupted_twice_is_aborted() {
             }
             _ => {}
         };
-        let launcher = Launcher::new(Host::InProcess).stopped_by(&stop).followed_by(interrupt);
+        let launcher = Launcher::new(Host::Threads).stopped_by(&stop).followed_by(interrupt);
         let message = flown_by(launcher, &plan(1_000_000, "none"), folder, "a.mcap").unwrap_err();
         assert!(message.contains("interrupted twice: the run was aborted at tick"), "{message}");
     });
@@ -422,7 +422,7 @@ fn a_thread_that_hangs_is_replaced_and_sends_nothing_once_it_goes_on() {
                 RunEvent::Progress(Progress { ticks, .. }) if ticks > 100 => IS_RELEASED.store(true, SeqCst),
                 _ => {}
             };
-            let launcher = Launcher::new(Host::InProcess).followed_by(release_it);
+            let launcher = Launcher::new(Host::Threads).followed_by(release_it);
             assert_eq!(flown_by(launcher, &plan, folder, "a.mcap").unwrap(), counted(3000), "{on_exit}");
             release();
         });
@@ -443,7 +443,7 @@ fn a_hot_swap_hands_the_state_over() {
 fn a_swap_for_what_fails_is_refused_and_the_run_flies_on() {
     alone(|folder| {
         let stop = StopToken::new();
-        let launcher = Launcher::new(Host::InProcess).stopped_by(&stop);
+        let launcher = Launcher::new(Host::Threads).stopped_by(&stop);
         let remote = launcher.remote();
         let counts = std::thread::scope(|scope| {
             scope.spawn(|| {
@@ -481,11 +481,10 @@ fn of_two_runs_at_once_one_fails_and_the_other_does_not_notice() {
     alone(|folder| {
         let (sound, broken) = (plan(2000, "none"), plan(2000, "panic"));
         std::thread::scope(|scope| {
-            let sound =
-                scope.spawn(|| flown_by(Launcher::new(Host::InProcess), &sound, folder, "sound.mcap"));
+            let sound = scope.spawn(|| flown_by(Launcher::new(Host::Threads), &sound, folder, "sound.mcap"));
             for _ in 0..3 {
                 let message =
-                    flown_by(Launcher::new(Host::InProcess), &broken, folder, "broken.mcap").unwrap_err();
+                    flown_by(Launcher::new(Host::Threads), &broken, folder, "broken.mcap").unwrap_err();
                 assert!(message.contains("the propeller came off"), "{message}");
             }
             assert_eq!(sound.join().unwrap().unwrap(), counted(2000));

@@ -22,7 +22,7 @@ fn load(base: &str, more: &str) -> Result<Manifest, hummingbus::Diagnostic> {
 fn fly(base: &str, more: &str) -> (Topics, Vec<(String, u32, u32)>) {
     let folder = tempfile::tempdir().unwrap();
     let manifest = load(base, more).unwrap();
-    let launcher = Launcher::new(Host::InProcess);
+    let launcher = Launcher::new(Host::Threads);
     let (outcome, _) = launcher.fly(&manifest, &folder.path().join("test.mcap")).unwrap();
     (topics(&folder.path().join("test.mcap")), outcome.overruns)
 }

@@ -209,7 +209,8 @@ impl Clock<'_> {
 
 /// Host time that `ticks` ticks take at `factor` simulated seconds per second.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a run lasts less than 584 years")]
-fn deadline_ns(ticks: u32, tick_ns: u64, factor: f64) -> u64 {
+#[must_use]
+pub fn deadline_ns(ticks: u32, tick_ns: u64, factor: f64) -> u64 {
     ((u64::from(ticks) * tick_ns) as f64 / factor) as u64
 }
 

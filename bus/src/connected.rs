@@ -14,17 +14,14 @@ use crate::plan::{InputPlan, NodePlan};
 use crate::port::{Feed, InPort, Locals, OutPort, Source};
 use crate::profile::TickWriter;
 use crate::sample_ring::SampleRing;
-use crate::tick::Tick;
-use crate::timing::{Due, Timing};
+use crate::stepper::{Stepped, Stepper};
+use crate::timing::Timing;
 
 /// A node whose ports are connected.
 #[derive(Debug)]
 pub(crate) struct ConnectedNode {
-    inputs: Vec<InPort>,
-    outputs: Vec<OutPort>,
+    stepper: Stepper,
     announcements: Vec<Announcement>,
-    /// What the predecessor sends, by output; empty where its state is handed over.
-    predecessor: Vec<InPort>,
     /// The state that the predecessor hands over, and the state of this process.
     state: HandOver,
     /// The tick from which on this process goes on by itself, no longer as its predecessor's shadow.
@@ -34,7 +31,6 @@ pub(crate) struct ConnectedNode {
     first_tick: u32,
     epoch: u32,
     profile: Option<TickWriter>,
-    timing: Option<Timing>,
     /// The next tick that it computes.
     pub(crate) tick: u32,
     /// The ticks that the control segment counts as completed.
@@ -91,9 +87,6 @@ impl ConnectedNode {
         let instance = membership.nodes[links.index].of(links.generation);
         let first_tick = instance.expect("the membership by which a process joins names it").join_tick;
         let mut node = Self::unconnected(links, outputs, membership.epoch, first_tick);
-        if node.timing.is_some() {
-            node.outputs.iter_mut().for_each(OutPort::set_timed);
-        }
         node.connect_inputs(declared, membership)?;
         node.connect(membership, &[])?;
         node.states_every_tick = node.must_state(membership);
@@ -106,17 +99,14 @@ impl ConnectedNode {
 
     fn unconnected(links: Links, outputs: Vec<OutPort>, epoch: u32, first_tick: u32) -> Self {
         Self {
-            inputs: Vec::new(),
-            outputs,
+            stepper: Stepper::new(&links.plan, &links.node, outputs),
             announcements: Vec::new(),
-            predecessor: Vec::new(),
             state: HandOver::default(),
             take_over_tick: 0,
             retirement_tick: u32::MAX,
             first_tick,
             epoch,
             profile: None,
-            timing: Timing::of(&links.plan, &links.node),
             tick: first_tick,
             told_tick: first_tick,
             known_ticks: 0,
@@ -138,7 +128,7 @@ impl ConnectedNode {
             if let Declared::Typed(schema) = declared {
                 announcement.check(schema, &links.node.name, &input.port, &topic.name)?;
             }
-            let initial = links.initial_value(input, declared)?;
+            let initial = declared.initial_value(input, &links.node.name)?;
             let generation = links.publisher(membership, input.topic).primary.generation;
             let feed = if links.is_member(links.plan.publisher(input.topic), generation) {
                 Feed::Local { generation }
@@ -151,7 +141,7 @@ impl ConnectedNode {
             };
             let mut port = InPort::new(input, topic, announcement.size, initial, feed);
             port.reads_shadow = matches!(declared, Declared::Raw);
-            self.inputs.push(port);
+            self.stepper.inputs.push(port);
             self.announcements.push(announcement);
         }
         Ok(())
@@ -173,15 +163,9 @@ impl ConnectedNode {
         transfer: Transfer,
         computation: &dyn Computation,
     ) -> Result<(), BusError> {
-        let more_words = self.timing_words(self.timing.is_some());
-        self.state = HandOver::new(transfer, computation, more_words);
+        self.state = HandOver::new(transfer, computation, self.stepper.words());
         self.open_predecessor()?;
         self.state.create(&self.links)
-    }
-
-    /// Words behind the state of a process of this node whose steps take time, or do not.
-    fn timing_words(&self, is_timed: bool) -> usize {
-        if is_timed { Timing::words(&self.outputs) } else { 0 }
     }
 
     /// Opens the state of the process that this one succeeds, or else what it sends.
@@ -196,7 +180,7 @@ impl ConnectedNode {
             0 => plan.nodes[index].computing_time.is_some(),
             _ => NodePlan::load_backup(dir, index, generation)?.computing_time.is_some(),
         };
-        let more_words = self.timing_words(is_timed);
+        let more_words = if is_timed { Timing::words(&self.stepper.outputs) } else { 0 };
         if self.state.open(&self.links, generation, more_words)? {
             self.links.lockstep.set_transfer(TransferOutcome::State);
             return Ok(());
@@ -211,7 +195,7 @@ impl ConnectedNode {
             let input =
                 InputPlan { port: output.port.clone(), topic: output.topic, delay_ticks: 1, initial: None };
             let size = Announcement::load(&announcement::topic_path(&links.run_dir, output.topic))?.size;
-            self.predecessor.push(InPort::new(&input, topic, size, None, Feed::Shared(source)));
+            self.stepper.predecessor.push(InPort::new(&input, topic, size, None, Feed::Shared(source)));
         }
         links.transport.reserve()
     }
@@ -308,7 +292,7 @@ impl ConnectedNode {
         if tick < self.known_ticks {
             return Ok(None);
         }
-        for (index, input) in self.inputs.iter().enumerate().filter(|(_, input)| !input.is_local()) {
+        for (index, input) in self.stepper.inputs.iter().enumerate().filter(|(_, input)| !input.is_local()) {
             let needed = (tick + 1).saturating_sub(input.delay_ticks);
             let need = Need::Samples { topic: input.topic, input: index };
             if !lockstep.has(need, needed) {
@@ -332,10 +316,12 @@ impl ConnectedNode {
     /// others, for which that would be one tick more at most.
     fn ticks_there(&self) -> u32 {
         let (lockstep, tick) = (&self.links.lockstep, self.tick);
-        if !self.links.node.outputs.is_empty() || self.inputs.iter().any(|input| input.awaits_shadow(tick)) {
+        if !self.links.node.outputs.is_empty()
+            || self.stepper.inputs.iter().any(|input| input.awaits_shadow(tick))
+        {
             return 0;
         }
-        let sent = self.inputs.iter().enumerate().map(|(index, input)| {
+        let sent = self.stepper.inputs.iter().enumerate().map(|(index, input)| {
             let need = Need::Samples { topic: input.topic, input: index };
             lockstep.count(need).saturating_add(input.delay_ticks)
         });
@@ -404,7 +390,7 @@ impl ConnectedNode {
     /// Updates the counts of the control segment: samples sent, ticks completed.
     pub(crate) fn tell(&mut self) {
         let lockstep = &self.links.lockstep;
-        for output in &mut self.outputs {
+        for output in &mut self.stepper.outputs {
             if output.ticks_told < output.ticks_sent {
                 lockstep.samples_sent(output.topic, output.ticks_sent, &output.readers);
                 output.ticks_told = output.ticks_sent;
@@ -459,7 +445,7 @@ impl ConnectedNode {
 
     /// The topics that members of the group read from this one, and the bytes of their messages.
     pub(crate) fn local_topics(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
-        let outputs = self.outputs.iter().filter(|output| self.links.has_local_readers(output.topic));
+        let outputs = self.stepper.outputs.iter().filter(|output| self.links.has_local_readers(output.topic));
         outputs.map(|output| (output.topic, output.size()))
     }
 
@@ -490,7 +476,7 @@ impl ConnectedNode {
     /// Sends to the readers that `membership` names from now on, and to new ones what was sent last.
     fn connect_readers(&mut self, membership: &Membership, locals: &Locals) -> Result<(), BusError> {
         let links = &self.links;
-        for output in &mut self.outputs {
+        for output in &mut self.stepper.outputs {
             output.readers = links.readers(membership, output.topic);
             output.is_awaited = links.is_awaited_outside(membership, output.topic);
             if !output.is_shared() && links.is_read_outside(membership, output.topic) {
@@ -529,7 +515,7 @@ impl ConnectedNode {
     fn connect(&mut self, membership: &Membership, locals: &Locals) -> Result<(), BusError> {
         let tick = self.tick;
         self.known_ticks = 0;
-        for input in &mut self.inputs {
+        for input in &mut self.stepper.inputs {
             self.links.connect_backup(input, membership, tick)?;
         }
         let instances = &membership.nodes[self.links.index];
@@ -543,7 +529,7 @@ impl ConnectedNode {
         }
         self.connect_readers(membership, locals)?;
         if is_backup {
-            for (index, output) in self.outputs.iter_mut().enumerate() {
+            for (index, output) in self.stepper.outputs.iter_mut().enumerate() {
                 self.links.promote(output, instances, index, tick);
             }
         }
@@ -567,15 +553,11 @@ impl ConnectedNode {
             // What it begins with is its predecessor's, not what it came to itself.
             self.publish_state(tick, computation);
         }
-        self.take_inputs(tick)?;
+        let lockstep = &self.links.lockstep;
+        let gathered = self.stepper.gather(tick);
+        gathered.inspect_err(|&(topic, _)| lockstep.count_gap(topic)).map_err(|(_, error)| error)?;
         let received_ns = before_ns.unwrap_or_else(monotonic_ns);
-        match self.timing.take() {
-            None => self.step(tick, locals, computation)?,
-            Some(mut timing) => {
-                self.step_in_time(&mut timing, tick, locals, computation)?;
-                self.timing = Some(timing);
-            }
-        }
+        self.step(tick, locals, computation)?;
         if crate::hosted::is_cancelled() {
             // Another instance may have been told to go on in its place by now.
             return Err(BusError::Aborted);
@@ -587,22 +569,14 @@ impl ConnectedNode {
             // Before anything is sent: whoever sees the sample can go on from the state after it.
             self.publish_state(tick + self.links.node.period_ticks, computation);
         }
-        self.send(tick, received_ns, done_ns, locals)?;
+        self.publish(tick, received_ns, done_ns, locals)?;
         if tick >= self.take_over_tick {
             // The predecessor leaves; nothing of it is read any more.
-            self.predecessor.clear();
+            self.stepper.predecessor.clear();
             self.state.leave_predecessor();
         }
         self.tick += self.links.node.period_ticks;
         Ok(done_ns)
-    }
-
-    fn take_inputs(&mut self, tick: u32) -> Result<(), BusError> {
-        let (lockstep, node) = (&self.links.lockstep, &self.links.node.name);
-        for input in &mut self.inputs {
-            input.take(tick, node).inspect_err(|_| lockstep.count_gap(input.topic))?;
-        }
-        self.predecessor.iter_mut().try_for_each(|port| port.take_available(tick, node))
     }
 
     /// Computes the component's step, which writes what is due.
@@ -612,69 +586,37 @@ impl ConnectedNode {
         locals: &Locals,
         computation: &mut dyn Computation,
     ) -> Result<(), BusError> {
-        let links = &self.links;
-        let (node, time_ns) = (&links.node.name, links.time_ns(tick));
-        let takes_over = links.generation > 0 && tick == self.take_over_tick;
-        let predecessor = if takes_over { self.predecessor.as_slice() } else { &[] };
-        let (inputs, outputs) = (self.inputs.as_slice(), self.outputs.as_mut_slice());
-        let mut view = Tick { tick, time_ns, node, inputs, locals, outputs, predecessor };
-        let time_s = time_ns as f64 * 1e-9;
-        computation.step(&mut view).map_err(|reason| BusError::Step {
-            node: node.clone(),
-            tick,
-            time_s,
-            reason,
-        })
-    }
-
-    /// Computes the step unless the one before is under way, and writes what is done by `tick`.
-    fn step_in_time(
-        &mut self,
-        timing: &mut Timing,
-        tick: u32,
-        locals: &Locals,
-        computation: &mut dyn Computation,
-    ) -> Result<(), BusError> {
+        let takes_over = self.links.generation > 0 && tick == self.take_over_tick;
         let words = self.state.more_words();
-        if tick == self.take_over_tick && !self.predecessor.is_empty() {
-            // It goes on from what its predecessor sent last, not from a step of its own as a shadow.
-            words.fill(0);
-        }
+        let stepped = self.stepper.step(tick, takes_over, words, locals, computation)?;
         // Until then they are its predecessor's to count.
         let counts = tick >= self.take_over_tick;
-        match timing.begin(tick, words, &self.outputs) {
-            Due::Step => {
-                self.step(tick, locals, computation)?;
-                let words = self.state.more_words();
-                let overran = timing.end(tick, words, &mut self.outputs, &self.links.node.name)?;
-                if overran && counts {
-                    self.links.lockstep.count_overrun();
-                }
-            }
-            Due::Skipped if counts => self.links.lockstep.count_skipped_step(),
-            Due::Skipped => {}
+        match stepped {
+            Stepped::Overran if counts => self.links.lockstep.count_overrun(),
+            Stepped::Skipped if counts => self.links.lockstep.count_skipped_step(),
+            Stepped::InTime | Stepped::Overran | Stepped::Skipped => {}
         }
-        Timing::write(tick, self.state.more_words(), &mut self.outputs, &self.links.node.name)
+        Ok(())
     }
 
-    fn send(
+    fn publish(
         &mut self,
         tick: u32,
         received_ns: u64,
         done_ns: u64,
         locals: &mut Locals,
     ) -> Result<(), BusError> {
-        let (lockstep, node) = (&self.links.lockstep, &self.links.node.name);
-        let time_ns = self.links.time_ns(tick);
+        let (lockstep, profile) = (&self.links.lockstep, &mut self.profile);
         let mut sent_before = false;
-        let is_sent = |(_, output): &(usize, &mut OutPort)| output.is_sent(tick);
-        for (index, output) in self.outputs.iter_mut().enumerate().filter(is_sent) {
+        let times_ns = |output| {
             // The first output is sent at once: one look at the clock serves for both times.
-            let sent_ns = if sent_before { monotonic_ns() } else { done_ns };
-            if let Some(profile) = &mut self.profile {
-                profile.sent(index, sent_ns);
+            let sent_ns = if std::mem::replace(&mut sent_before, true) { monotonic_ns() } else { done_ns };
+            if let Some(profile) = profile.as_mut() {
+                profile.sent(output, sent_ns);
             }
-            output.send(tick, time_ns, [received_ns, done_ns, sent_ns], node, locals)?;
+            [received_ns, done_ns, sent_ns]
+        };
+        let sent = |output: &mut OutPort| {
             if tick < output.counts_from {
                 output.ticks_told = output.ticks_sent;
                 lockstep.shadow_sent(output.topic, output.ticks_sent, &output.readers);
@@ -682,11 +624,8 @@ impl ConnectedNode {
                 output.ticks_told = output.ticks_sent;
                 lockstep.samples_sent(output.topic, output.ticks_sent, &output.readers);
             }
-            sent_before = true;
-        }
-        self.outputs.iter_mut().for_each(OutPort::forget);
-        // Readers are awake by now: what the next tick needs is fetched while they compute.
-        self.outputs.iter_mut().try_for_each(|output| output.prepare(node))?;
+        };
+        self.stepper.publish(tick, locals, times_ns, sent)?;
         if let Some(profile) = &mut self.profile {
             profile.end(tick, received_ns, done_ns, monotonic_ns());
         }

@@ -87,6 +87,14 @@ pub enum BusError {
         /// The names there are.
         known: String,
     },
+    /// No node sends a topic of this name.
+    #[error("no node of the run sends {topic}; it has {known}")]
+    UnknownTopic {
+        /// The name asked for.
+        topic: String,
+        /// The names there are.
+        known: String,
+    },
     /// A node declares a port that the manifest does not wire.
     #[error(
         "node `{node}` declares the {direction} `{port}`, which the manifest does not {verb}; it has {known}"

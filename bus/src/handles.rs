@@ -1,5 +1,8 @@
 //! Handles of declared ports: what a node reads and writes them by.
 
+use crate::error::BusError;
+use crate::initial;
+use crate::plan::InputPlan;
 use crate::schema::Schema;
 use std::marker::PhantomData;
 
@@ -57,6 +60,20 @@ impl Declared {
             Self::Typed(schema) => schema.type_name,
             Self::Raw => "bytes of any type",
         }
+    }
+
+    /// The sample that `input` of `node` reads before the first one is sent, if the manifest states one.
+    ///
+    /// # Errors
+    /// If the stated value does not fit the message.
+    pub(crate) fn initial_value(self, input: &InputPlan, node: &str) -> Result<Option<Box<[u64]>>, BusError> {
+        let (Some(value), Self::Typed(schema)) = (&input.initial, self) else { return Ok(None) };
+        initial::sample(schema, value).map(Some).map_err(|reason| BusError::InitialValue {
+            node: node.to_owned(),
+            port: input.port.clone(),
+            type_name: schema.type_name,
+            reason: reason.to_string(),
+        })
     }
 }
 

@@ -64,6 +64,7 @@ mod sample_memory;
 mod sample_ring;
 pub mod schema;
 mod shared_file;
+mod simulation;
 #[cfg(test)]
 #[path = "../../tests/runs/skipped.rs"]
 mod skipped;
@@ -72,6 +73,7 @@ mod state;
 pub mod state_transfer;
 #[doc(hidden)]
 pub mod step_times;
+mod stepper;
 mod tick;
 mod timing;
 mod transport;
@@ -92,6 +94,7 @@ pub use node::Node;
 pub use node_harness::{NodeHarness, Sample};
 pub use registration::{Registration, message_of};
 pub use run_process::run_process;
+pub use simulation::{Simulation, Topic};
 pub use tick::Tick;
 pub use transport::{IceoryxError, limit_transport_log, reap_dead, takes_run_dir};
 

@@ -2,11 +2,9 @@
 
 use crate::claim::Claim;
 use crate::error::BusError;
-use crate::handles::Declared;
-use crate::initial;
 use crate::lockstep::NodeView;
 use crate::membership::{Membership, NodeInstances};
-use crate::plan::{GroupPlan, InputPlan, NodePlan, Plan};
+use crate::plan::{GroupPlan, NodePlan, Plan};
 use crate::port::{InPort, OutPort, Source};
 use crate::profile::TickWriter;
 use crate::transport::{Receiver, Sender, Transport};
@@ -27,11 +25,6 @@ pub(crate) struct Links {
 }
 
 impl Links {
-    /// Simulation time at the start of `tick`, ns.
-    pub(crate) fn time_ns(&self, tick: u32) -> u64 {
-        u64::from(tick) * self.plan.tick_ns
-    }
-
     /// What records the host times of the ticks from `first_tick` on, if the run is profiled.
     pub(crate) fn tick_writer(&self, first_tick: u32) -> Result<Option<TickWriter>, BusError> {
         let create =
@@ -103,20 +96,6 @@ impl Links {
         let number =
             |(node, generation, input)| self.plan.first_input(self.plan.slot(node, generation)) + input;
         readers.map(number).collect()
-    }
-
-    pub(crate) fn initial_value(
-        &self,
-        input: &InputPlan,
-        declared: Declared,
-    ) -> Result<Option<Box<[u64]>>, BusError> {
-        let (Some(value), Declared::Typed(schema)) = (&input.initial, declared) else { return Ok(None) };
-        initial::sample(schema, value).map(Some).map_err(|reason| BusError::InitialValue {
-            node: self.node.name.clone(),
-            port: input.port.clone(),
-            type_name: schema.type_name,
-            reason: reason.to_string(),
-        })
     }
 
     /// Connects `input` to the process that shadows its publisher, and lets go of one that is gone.

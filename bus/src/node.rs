@@ -60,10 +60,17 @@ pub struct Node {
 
 /// What a node sends on an output.
 #[derive(Clone, Copy, Debug)]
-struct DeclaredOutput {
-    schema: &'static Schema,
+pub(crate) struct DeclaredOutput {
+    pub(crate) schema: &'static Schema,
     /// Whether its samples are others' messages, which keep their stamps.
     is_forwarded: bool,
+}
+
+impl DeclaredOutput {
+    /// `port` as it keeps its stamps or sets them.
+    pub(crate) fn with_stamps(self, port: OutPort) -> OutPort {
+        if self.is_forwarded { port.keeping_stamps() } else { port }
+    }
 }
 
 impl Node {
@@ -84,9 +91,17 @@ impl Node {
             0 => plan.nodes[index].clone(),
             _ => NodePlan::load_backup(&run_dir, index, generation)?,
         };
-        let (inputs, outputs) = (node.inputs.len(), node.outputs.len());
-        let (inputs, outputs) = (vec![None; inputs], vec![None; outputs]);
-        Ok(Self { run_dir, plan, index, generation, node, inputs, outputs, fault: None })
+        Ok(Self::undeclared(run_dir, plan, index, generation, node))
+    }
+
+    /// Node `index` of `plan` without a run directory: the files that it reads are its host's.
+    pub(crate) fn in_memory(plan: &Plan, index: usize) -> Self {
+        Self::undeclared(PathBuf::new(), plan.clone(), index, 0, plan.nodes[index].clone())
+    }
+
+    fn undeclared(run_dir: PathBuf, plan: Plan, index: usize, generation: u32, node: NodePlan) -> Self {
+        let (inputs, outputs) = (vec![None; node.inputs.len()], vec![None; node.outputs.len()]);
+        Self { run_dir, plan, index, generation, node, inputs, outputs, fault: None }
     }
 
     /// The node's name in the run.
@@ -344,15 +359,13 @@ impl Node {
     /// # Errors
     /// As [`Node::connect`].
     pub(crate) fn announce(mut self, transport: Rc<Transport>) -> Result<AnnouncedNode, BusError> {
-        self.fault.take().map_or(Ok(()), Err)?;
-        self.require_all_declared()?;
+        let (inputs, declared_outputs) = self.declared()?;
         let claim = claim::claim(&self.run_dir, &process_name(self.name(), self.generation))?;
         let lockstep = NodeView::open(&self.plan, self.index, self.generation)?;
         if self.generation > 0 {
             // Every topic is announced by then.
             lockstep.wait_phase(Phase::Connecting).or_aborted()?;
         }
-        let declared_outputs: Vec<DeclaredOutput> = self.outputs.iter().flatten().copied().collect();
         for (output, declared) in self.node.outputs.iter().zip(&declared_outputs) {
             self.announce_topic(output.topic, declared.schema)?;
         }
@@ -369,7 +382,18 @@ impl Node {
         let outputs = connect_outputs(&links, &declared_outputs)?;
         links.transport.reserve()?;
         links.lockstep.set_ready(Phase::Connecting);
-        Ok(AnnouncedNode { links, inputs: self.inputs.into_iter().flatten().collect(), outputs })
+        Ok(AnnouncedNode { links, inputs, outputs })
+    }
+
+    /// The declared inputs and outputs, in the order of the plan.
+    ///
+    /// # Errors
+    /// If a port of the manifest was not declared, or one was declared twice.
+    pub(crate) fn declared(&mut self) -> Result<(Vec<Declared>, Vec<DeclaredOutput>), BusError> {
+        self.fault.take().map_or(Ok(()), Err)?;
+        self.require_all_declared()?;
+        let inputs = self.inputs.iter().flatten().copied().collect();
+        Ok((inputs, self.outputs.iter().flatten().copied().collect()))
     }
 
     fn require_all_declared(&self) -> Result<(), BusError> {
@@ -468,7 +492,8 @@ fn connect_outputs(links: &Links, declared: &[DeclaredOutput]) -> Result<Vec<Out
     let membership = Membership::first(&links.plan);
     let ports = links.node.outputs.iter().zip(declared);
     ports
-        .map(|(output, &DeclaredOutput { schema, is_forwarded })| {
+        .map(|(output, &declared)| {
+            let schema = declared.schema;
             let topic = &links.plan.topics[output.topic];
             let is_local = links.has_local_readers(output.topic);
             let is_recorded = links.is_recorded(output.topic);
@@ -478,7 +503,7 @@ fn connect_outputs(links: &Links, declared: &[DeclaredOutput]) -> Result<Vec<Out
             if is_recorded {
                 port.record(SampleRing::create(&links.plan, output.topic, schema.size)?);
             }
-            Ok(if is_forwarded { port.keeping_stamps() } else { port })
+            Ok(declared.with_stamps(port))
         })
         .collect()
 }

@@ -14,6 +14,7 @@ use crate::port::{InPort, Locals, OutPort};
 use crate::ports::{InputSamples, OutputSamples, SampleSink, SampleSource};
 use crate::registration::{Instance, Registration};
 use crate::tick::Tick;
+use inputs::InputFiles;
 
 /// Runs the component `C` as the node that the launcher started this process for: the whole `main` of an executable
 /// that a manifest names as a `command`.
@@ -55,13 +56,32 @@ impl Part {
         registration: &Registration,
         components: &'static [Registration],
     ) -> Result<Self, BusError> {
-        let mut node = Node::open(join)?;
+        let node = Node::open(join)?;
+        let files = node.files();
+        Self::of(node, registration, components, &files)
+    }
+
+    /// `node` with its component, which reads `files`.
+    ///
+    /// # Errors
+    /// If the manifest and the component do not fit.
+    pub(crate) fn of(
+        mut node: Node,
+        registration: &Registration,
+        components: &'static [Registration],
+        files: &InputFiles,
+    ) -> Result<Self, BusError> {
         let wiring = node.declare(registration, components)?;
         let (plan, node_plan) = node.plan();
-        let made = registration.make_for(plan, node_plan, &node.files());
+        let made = registration.make_for(plan, node_plan, files);
         let instance = made.map_err(|reason| node.error(reason))?;
         let (name, transfer) = (node.name().to_owned(), registration.transfer);
         Ok(Self { name, node: Some(node), wiring, instance, transfer })
+    }
+
+    /// Name of the node.
+    pub(crate) fn name(&self) -> &str {
+        &self.name
     }
 
     /// The node, to be connected.
@@ -71,12 +91,27 @@ impl Part {
 
     /// The node as a member of this process, once it is `connected`.
     pub(crate) fn member(&mut self, connected: ConnectedNode) -> Result<Member<'_>, BusError> {
-        let topics: Vec<(&str, &Announcement)> =
-            self.wiring.inputs.iter().flatten().map(|&input| connected.announced(input)).collect();
+        self.connect(|input| connected.announced(input))?;
+        let transfer = self.transfer;
+        Member::new(connected, transfer, Box::new(self.computation()))
+    }
+
+    /// Tells the component the names and the messages of its inputs' topics, by `announced`.
+    ///
+    /// # Errors
+    /// What the component says against them.
+    pub(crate) fn connect<'t>(
+        &mut self,
+        announced: impl Fn(usize) -> (&'t str, &'t Announcement),
+    ) -> Result<(), BusError> {
+        let topics: Vec<_> = self.wiring.inputs.iter().flatten().map(|&input| announced(input)).collect();
         let told = self.instance.connected(&topics);
-        told.map_err(|error| failed(&self.name, &error))?;
-        let computation = Wired { instance: &mut *self.instance, wiring: &self.wiring };
-        Member::new(connected, self.transfer, Box::new(computation))
+        told.map_err(|error| failed(&self.name, &error))
+    }
+
+    /// The component with its state, as what steps at each tick.
+    pub(crate) fn computation(&mut self) -> Wired<'_> {
+        Wired { instance: &mut *self.instance, wiring: &self.wiring }
     }
 }
 
@@ -102,7 +137,7 @@ fn failed(node: &str, error: &StepError) -> BusError {
 }
 
 /// A component whose ports are those of a node.
-struct Wired<'a> {
+pub(crate) struct Wired<'a> {
     instance: &'a mut dyn Instance,
     wiring: &'a Wiring,
 }

@@ -1,4 +1,4 @@
-//! Where the instances of a run's nodes live: in processes of their own, or on threads of this one.
+//! Where the instances of a run's nodes live: in processes of their own, on threads of this one, or on its own thread.
 
 use crate::program::{Executable, Program};
 use anyhow::{Context, Result, anyhow, bail};
@@ -36,6 +36,10 @@ pub enum Host {
     Exe(PathBuf),
     /// Each component is a thread of this process, which the run leaves as it is otherwise. A `command`, and what only
     /// a process of its own can have (`nice`, `cpu`, …), is refused.
+    Threads,
+    /// All components, the recorder too, are stepped one after the other by the thread that flies the run, without
+    /// shared memory and without a clock service. What threads cannot have is refused, and what changes processes in
+    /// flight too: swaps, standbys, restarts, requests.
     InProcess,
 }
 

@@ -103,7 +103,7 @@ impl HostWorld<'_> {
                 let (child, log) = spawn::start(exe, self.run_dir, name, role, started, notify)?;
                 (Running::Process(child), log)
             }
-            Host::InProcess => {
+            Host::Threads | Host::InProcess => {
                 let part = match started {
                     Started::Clock => ThreadPart::Clock,
                     Started::Group => ThreadPart::Group,

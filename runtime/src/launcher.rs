@@ -6,9 +6,12 @@ use crate::descendants::{Descendants, Place};
 use crate::event::{RunEvent, StopToken};
 use crate::flight::Flight;
 use crate::graph::Graph;
-use crate::host::{Host, needs_process};
+use crate::host::Host;
+use crate::host_limits::require_host;
 use crate::host_world::{HostWorld, store_files};
+use crate::in_process;
 use crate::manifest::Manifest;
+pub use crate::outcome::Outcome;
 use crate::outputs::Outputs;
 use crate::program::Program;
 pub use crate::replacement::{Purpose, Report};
@@ -27,30 +30,6 @@ use std::sync::mpsc::{Receiver, channel};
 
 /// The file in a run directory with the figures of the judge.
 const FIGURES: &str = "figures";
-
-/// What is known about a run when it is over: what [`Launcher::fly`] returns, whose example asserts on it.
-#[derive(Debug)]
-pub struct Outcome {
-    /// Ticks that every node completed.
-    pub ticks: u32,
-    /// Whether the run was stopped before its end.
-    pub was_stopped: bool,
-    /// Host time from the first grant to the last completed tick.
-    pub host_s: f64,
-    /// Deadlines missed (paced runs).
-    pub missed_deadlines: u32,
-    /// Per process: name, processor share of one core, deadlines at which it was late.
-    pub processes: Vec<(String, f64, u32)>,
-    /// Per process whose steps take simulated time: name, steps that took longer than to its next due tick, and due ticks
-    /// without a step.
-    pub overruns: Vec<(String, u32, u32)>,
-    /// What became of backups.
-    pub replacements: Vec<Report>,
-    /// The host times that the processes noted, in a run that is profiled.
-    pub flight: Option<Flight>,
-    /// Figures of the conditions, as the judge of a run without a recording wrote them; `None` for a run that was stopped.
-    pub figures: Option<Vec<u8>>,
-}
 
 /// Launches a run. By itself it takes no signal of this process and changes nothing else of it either: several runs may
 /// fly in one process, also at the same time.
@@ -193,8 +172,10 @@ impl<'a> Launcher<'a> {
         graph: &mut Graph,
         outputs: &mut Outputs,
     ) -> Result<Outcome> {
-        Host::require_proc()?;
         require_host(&self.host, manifest, graph)?;
+        if self.host != Host::InProcess {
+            Host::require_proc()?;
+        }
         let place = Place::take(self.adopts_orphans)?;
         let run_dir = RunDir::create(&manifest.path)?;
         let mut on = std::mem::replace(&mut self.on, Box::new(|_| {}));
@@ -214,7 +195,9 @@ impl<'a> Launcher<'a> {
         on: &mut dyn FnMut(RunEvent<'_>),
     ) -> Result<Outcome> {
         // Before anything is touched that an earlier run left.
-        bus::room::require(&graph.plan, &manifest.registry().messages())?;
+        if self.host != Host::InProcess {
+            bus::room::require(&graph.plan, &manifest.registry().messages())?;
+        }
         outputs.claim(run_dir)?;
         if let Some(kept) = outputs.kept() {
             on(RunEvent::Note(&format!("what an earlier run left unfinished is kept as {}", kept.display())));
@@ -223,6 +206,13 @@ impl<'a> Launcher<'a> {
         graph.plan.run_id = run_dir.run_id().to_owned();
         graph.plan.store(run_dir.path())?;
         let graph = &*graph;
+        if self.host == Host::InProcess {
+            let mut outcome = in_process::fly(graph, manifest.registry().components(), &self.stop, on)?;
+            if !outcome.was_stopped {
+                outcome.figures = figures(graph, run_dir.path())?;
+            }
+            return Ok(outcome);
+        }
         let control = Arc::new(SupervisorView::create(&graph.plan)?);
         let (plan, dir) = (&graph.plan, run_dir.path());
         // Dropped behind the supervisor, which ends the processes.
@@ -250,31 +240,6 @@ impl<'a> Launcher<'a> {
             outcome.figures = figures(graph, dir)?;
         }
         Ok(outcome)
-    }
-}
-
-/// Refuses what `host` cannot do.
-fn require_host(host: &Host, manifest: &Manifest, graph: &Graph) -> Result<()> {
-    if *host != Host::InProcess {
-        return Ok(());
-    }
-    for (program, node) in graph.programs.iter().zip(&graph.plan.nodes) {
-        host.require(&node.name, program)?;
-    }
-    for backup in &graph.backups {
-        host.require(&backup.plan.name, &backup.program)?;
-    }
-    let run = &manifest.content.run;
-    let core = manifest.content.process.iter().find(|(_, process)| process.cpu.is_some());
-    let asked = [
-        graph.sidecars.first().map(|(name, _)| format!("process `{name}`: `lockstep = false`")),
-        core.map(|(name, _)| format!("process `{}`: `cpu`", name.get_ref())),
-        run.clock_cpu.as_ref().map(|_| "`run.clock_cpu`".to_owned()),
-        run.lock_memory.then(|| "`run.lock_memory`".to_owned()),
-    ];
-    match asked.into_iter().flatten().next() {
-        None => Ok(()),
-        Some(key) => Err(needs_process(&key)),
     }
 }
 

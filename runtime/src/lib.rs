@@ -11,10 +11,13 @@ mod file_lock;
 pub mod flight;
 pub mod graph;
 pub mod host;
+mod host_limits;
 mod host_world;
+mod in_process;
 pub mod launcher;
 mod location;
 pub mod manifest;
+mod outcome;
 pub mod output_file;
 pub mod outputs;
 mod overseer;
@@ -39,6 +42,8 @@ mod supervisor;
 mod view;
 mod watch_clock;
 mod world;
+
+pub use in_process::simulate;
 
 use bus::{BusError, Join};
 use registry::Registry;

@@ -35,6 +35,9 @@ pub struct RunArguments {
     /// Nodes that share a process: none, all, vehicles, or groups such as plant+imu,ekf+controller.
     #[arg(long, value_name = "GROUPS")]
     pub compose: Option<Composition>,
+    /// Step all nodes one after the other in this process: no shared memory, and a debugger sees them all.
+    #[arg(long, conflicts_with_all = ["compose", "window"])]
+    pub in_process: bool,
     /// Override a key of the manifest, such as run.seed=3.
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
@@ -108,7 +111,8 @@ pub fn run(
     let pages = if graph.plan.profile { files.outputs() } else { Vec::new() };
     let mut outputs = Outputs::of(&manifest, &graph, &path, pages)?;
     let bar = progress::bar(RUN, arguments.json);
-    let launcher = Launcher::new(Host::this_binary())
+    let host = if arguments.in_process { Host::InProcess } else { Host::this_binary() };
+    let launcher = Launcher::new(host)
         .stopped_by(&stop)
         .adopting_orphans()
         .followed_by(|event| progress::show(&bar, event));

@@ -100,7 +100,7 @@ fn a_graph_is_flown_with_the_files_that_were_checked() {
     let mut outputs =
         hummingbus::runtime::outputs::Outputs::of(&manifest, &graph, Path::new(&recording), Vec::new())
             .unwrap();
-    Launcher::new(Host::InProcess).launch(&manifest, &mut graph, &mut outputs).unwrap();
+    Launcher::new(Host::Threads).launch(&manifest, &mut graph, &mut outputs).unwrap();
     outputs.finish().unwrap();
     require_same(&references(0.3, "")[0], &recording);
     require_attached(&recording);

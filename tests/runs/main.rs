@@ -50,6 +50,7 @@ mod determinism;
 mod documentation;
 mod failures;
 mod identify;
+mod in_process;
 mod inputs;
 mod judging;
 mod laps;

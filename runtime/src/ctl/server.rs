@@ -57,7 +57,7 @@ enum Place {
 /// ```
 /// use runtime::ctl::protocol::{Answer, Request};
 /// use runtime::{host::Host, launcher::Launcher};
-/// let launcher = Launcher::new(Host::InProcess);
+/// let launcher = Launcher::new(Host::Threads);
 /// let remote = launcher.remote();
 /// drop(launcher);
 /// let Answer::Refused { reason } = remote.ask(Request::Pause) else { panic!("it flies") };

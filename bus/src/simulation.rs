@@ -1,0 +1,239 @@
+//! A run in the memory of one thread: no processes, no shared memory, no clock.
+
+use crate::announcement::Announcement;
+use crate::depths::depths;
+use crate::error::BusError;
+use crate::handles::Declared;
+use crate::local::LocalTopic;
+use crate::membership::Membership;
+use crate::message::{Message, view};
+use crate::node::{DeclaredOutput, Node};
+use crate::plan::Plan;
+use crate::port::{Feed, InPort, OutPort};
+use crate::registration::Registration;
+use crate::run_process::{Part, finish};
+use crate::schema::Schema;
+use crate::stepper::{Stepped, Stepper};
+use inputs::InputFiles;
+use std::marker::PhantomData;
+
+/// The nodes of a plan, stepped one after the other on the calling thread: the samples are those that processes of the
+/// same plan send, bit for bit.
+///
+/// A debugger, a test and whoever wants to look between two ticks step it; nothing flies unless they do. A run with
+/// processes has a launcher.
+pub struct Simulation {
+    plan: Plan,
+    /// In the order in which they step: a reader of a sample of the same tick comes behind its publisher.
+    members: Vec<Member>,
+    /// Samples by topic; absent where no member sends any.
+    samples: Vec<Option<LocalTopic>>,
+    announcements: Vec<Option<Announcement>>,
+    tick: u32,
+}
+
+/// A node that steps.
+struct Member {
+    part: Part,
+    stepper: Stepper,
+    period_ticks: u32,
+    /// Words of its simulated computing time.
+    words: Vec<u64>,
+    /// Steps that took longer than to the next due tick, and due ticks without a step.
+    overruns: [u32; 2],
+}
+
+/// Handle of a topic whose messages are `T`.
+#[derive(Debug)]
+pub struct Topic<T> {
+    index: usize,
+    message: PhantomData<T>,
+}
+
+impl<T> Clone for Topic<T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+impl<T> Copy for Topic<T> {}
+
+impl Simulation {
+    /// The nodes `members` of `plan`, by their indices, before tick 0, each with its component, which is one of
+    /// `components` and reads `files`. Nodes that only read may be left out.
+    ///
+    /// # Errors
+    /// If the plan and a component do not fit.
+    ///
+    /// # Panics
+    /// If a member reads what a node sends that is left out.
+    pub fn new(
+        plan: &Plan,
+        members: impl IntoIterator<Item = (usize, &'static Registration)>,
+        components: &'static [Registration],
+        files: &InputFiles,
+    ) -> Result<Self, BusError> {
+        let depths = depths(plan, &Membership::first(plan));
+        let mut parts = members
+            .into_iter()
+            .map(|(node, registration)| Declaration::new(plan, node, registration, components, files))
+            .collect::<Result<Vec<_>, BusError>>()?;
+        parts.sort_by_key(|part| (depths[part.node], part.node));
+        let mut announcements: Vec<Option<Announcement>> = (0..plan.topics.len()).map(|_| None).collect();
+        let mut samples: Vec<Option<LocalTopic>> = (0..plan.topics.len()).map(|_| None).collect();
+        for (topic, schema) in parts.iter().flat_map(|part| part.sent(plan)) {
+            announcements[topic] = Some(Announcement::of(schema));
+            samples[topic] = Some(LocalTopic::new(schema.size));
+        }
+        let members = parts.into_iter().map(|part| part.connect(plan, &announcements));
+        let members = members.collect::<Result<Vec<_>, BusError>>()?;
+        Ok(Self { plan: plan.clone(), members, samples, announcements, tick: 0 })
+    }
+
+    /// The next tick.
+    #[must_use]
+    pub fn tick(&self) -> u32 {
+        self.tick
+    }
+
+    /// Simulation time at the start of the next tick, s.
+    #[must_use]
+    pub fn time_s(&self) -> f64 {
+        f64::from(self.tick) * self.plan.tick_s()
+    }
+
+    /// Computes the next tick of every node that is due.
+    ///
+    /// # Errors
+    /// If a step fails, or leaves a due output unwritten or with what no message may hold. Nothing more can be computed
+    /// then.
+    pub fn step(&mut self) -> Result<(), BusError> {
+        let tick = self.tick;
+        for member in &mut self.members {
+            if tick.is_multiple_of(member.period_ticks) {
+                member.step(tick, &mut self.samples)?;
+            }
+        }
+        self.tick += 1;
+        Ok(())
+    }
+
+    /// The topic called `name`.
+    ///
+    /// # Errors
+    /// If no node sends it, or its messages are not `T`.
+    pub fn topic<T: Message>(&self, name: &str) -> Result<Topic<T>, BusError> {
+        let sent = |index: usize| self.announcements[index].as_ref();
+        let named = |index: &usize| self.plan.topics[*index].name == name && sent(*index).is_some();
+        let index = (0..self.plan.topics.len()).find(named).ok_or_else(|| BusError::UnknownTopic {
+            topic: name.to_owned(),
+            known: self.plan.topics.iter().map(|topic| topic.name.clone()).collect::<Vec<_>>().join(", "),
+        })?;
+        if let Some(announcement) = sent(index) {
+            announcement.check(T::SCHEMA, "the simulation's host", name, name)?;
+        }
+        Ok(Topic { index, message: PhantomData })
+    }
+
+    /// The newest sample of `topic`; `None` before the first one.
+    #[must_use]
+    pub fn newest<T: Message>(&self, topic: Topic<T>) -> Option<&T> {
+        let (_, words) = self.samples[topic.index].as_ref()?.newest()?;
+        Some(view(words))
+    }
+
+    /// Each node whose steps take simulated time: its name, the steps that took longer than to its next due tick, and the
+    /// due ticks without a step.
+    #[must_use]
+    pub fn overruns(&self) -> Vec<(String, u32, u32)> {
+        let timed = self.members.iter().filter(|member| !member.words.is_empty());
+        timed.map(|member| (member.part.name().to_owned(), member.overruns[0], member.overruns[1])).collect()
+    }
+
+    /// Ends the components, whose ticks have come to `end`: a recorder closes its file.
+    ///
+    /// # Errors
+    /// That of `end`, or what a component says.
+    pub fn finish(self, end: Result<(), BusError>) -> Result<(), BusError> {
+        finish(self.members.into_iter().map(|member| member.part), end)
+    }
+}
+
+impl std::fmt::Debug for Simulation {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let members = self.members.len();
+        f.debug_struct("Simulation")
+            .field("tick", &self.tick)
+            .field("members", &members)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Member {
+    fn step(&mut self, tick: u32, samples: &mut [Option<LocalTopic>]) -> Result<(), BusError> {
+        self.stepper.gather(tick).map_err(|(_, error)| error)?;
+        let computation = &mut self.part.computation();
+        match self.stepper.step(tick, false, &mut self.words, samples, computation)? {
+            Stepped::InTime => {}
+            Stepped::Overran => self.overruns[0] += 1,
+            Stepped::Skipped => self.overruns[1] += 1,
+        }
+        self.stepper.publish(tick, samples, |_| [0; 3], |_| {})
+    }
+}
+
+/// A node that has declared its ports.
+struct Declaration {
+    node: usize,
+    part: Part,
+    inputs: Vec<Declared>,
+    outputs: Vec<DeclaredOutput>,
+}
+
+impl Declaration {
+    fn new(
+        plan: &Plan,
+        node: usize,
+        registration: &'static Registration,
+        components: &'static [Registration],
+        files: &InputFiles,
+    ) -> Result<Self, BusError> {
+        let mut part = Part::of(Node::in_memory(plan, node), registration, components, files)?;
+        let (inputs, outputs) = part.take_node()?.declared()?;
+        Ok(Self { node, part, inputs, outputs })
+    }
+
+    /// The topics that the node sends, and their messages.
+    fn sent<'a>(&'a self, plan: &'a Plan) -> impl Iterator<Item = (usize, &'static Schema)> + 'a {
+        let outputs = plan.nodes[self.node].outputs.iter().zip(&self.outputs);
+        outputs.map(|(output, declared)| (output.topic, declared.schema))
+    }
+
+    fn connect(mut self, plan: &Plan, announcements: &[Option<Announcement>]) -> Result<Member, BusError> {
+        let node = &plan.nodes[self.node];
+        let announced = |topic: usize| {
+            let announcement = announcements[topic].as_ref();
+            announcement.unwrap_or_else(|| panic!("no member sends {}", plan.topics[topic].name))
+        };
+        let outputs = node.outputs.iter().zip(&self.outputs).map(|(output, declared)| {
+            let topic = &plan.topics[output.topic];
+            declared.with_stamps(OutPort::new(output, topic, declared.schema, None, true))
+        });
+        let mut stepper = Stepper::new(plan, node, outputs.collect());
+        for (input, declared) in node.inputs.iter().zip(&self.inputs) {
+            let topic = &plan.topics[input.topic];
+            let announcement = announced(input.topic);
+            if let Declared::Typed(schema) = declared {
+                announcement.check(schema, &node.name, &input.port, &topic.name)?;
+            }
+            let initial = declared.initial_value(input, &node.name)?;
+            let feed = Feed::Local { generation: 0 };
+            stepper.inputs.push(InPort::new(input, topic, announcement.size, initial, feed));
+        }
+        self.part.connect(|input| {
+            let topic = node.inputs[input].topic;
+            (plan.topics[topic].name.as_str(), announced(topic))
+        })?;
+        let words = vec![0; stepper.words()];
+        Ok(Member { part: self.part, stepper, period_ticks: node.period_ticks, words, overruns: [0; 2] })
+    }
+}

@@ -1,0 +1,157 @@
+//! One tick of a node, wherever it lives: its inputs are gathered, it steps, its outputs are published.
+
+use crate::error::BusError;
+use crate::hand_over::Computation;
+use crate::plan::{NodePlan, Plan};
+use crate::port::{InPort, Locals, OutPort};
+use crate::tick::Tick;
+use crate::timing::{Due, Timing};
+
+/// The connected ports of a node.
+#[derive(Debug)]
+pub(crate) struct Stepper {
+    node: String,
+    tick_ns: u64,
+    pub(crate) inputs: Vec<InPort>,
+    pub(crate) outputs: Vec<OutPort>,
+    /// Outputs of the predecessor, read as inputs; empty where its state is handed over.
+    pub(crate) predecessor: Vec<InPort>,
+    /// Simulated computing time, if the steps take any.
+    timing: Option<Timing>,
+}
+
+/// Result of a due tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Stepped {
+    /// The step is done before the next due tick.
+    InTime,
+    /// The step is under way beyond the next due tick.
+    Overran,
+    /// The step before was under way, and nothing was computed.
+    Skipped,
+}
+
+impl Stepper {
+    /// The ports of `node` with `outputs`, and no inputs yet.
+    pub(crate) fn new(plan: &Plan, node: &NodePlan, mut outputs: Vec<OutPort>) -> Self {
+        let timing = Timing::of(plan, node);
+        if timing.is_some() {
+            outputs.iter_mut().for_each(OutPort::set_timed);
+        }
+        let (inputs, predecessor) = (Vec::new(), Vec::new());
+        Self { node: node.name.clone(), tick_ns: plan.tick_ns, inputs, outputs, predecessor, timing }
+    }
+
+    /// Words that the steps need behind the state of the node.
+    pub(crate) fn words(&self) -> usize {
+        if self.timing.is_some() { Timing::words(&self.outputs) } else { 0 }
+    }
+
+    /// Simulation time at the start of `tick`, ns.
+    pub(crate) fn time_ns(&self, tick: u32) -> u64 {
+        u64::from(tick) * self.tick_ns
+    }
+
+    /// Takes the inputs of `tick`.
+    ///
+    /// # Errors
+    /// The number of a topic of which a sample is missing, and what was found.
+    pub(crate) fn gather(&mut self, tick: u32) -> Result<(), (usize, BusError)> {
+        for input in &mut self.inputs {
+            input.take(tick, &self.node).map_err(|error| (input.topic, error))?;
+        }
+        for input in &mut self.predecessor {
+            input.take_available(tick, &self.node).map_err(|error| (input.topic, error))?;
+        }
+        Ok(())
+    }
+
+    /// Computes the step of `tick` unless the one before is under way, and writes what is due. `words` are those of
+    /// [`Stepper::words`]. A node that `takes_over` goes on from what its predecessor sent last.
+    ///
+    /// # Errors
+    /// If the step fails, or left a due output unwritten.
+    pub(crate) fn step(
+        &mut self,
+        tick: u32,
+        takes_over: bool,
+        words: &mut [u64],
+        locals: &Locals,
+        computation: &mut dyn Computation,
+    ) -> Result<Stepped, BusError> {
+        let Some(mut timing) = self.timing.take() else {
+            self.compute(tick, takes_over, locals, computation)?;
+            return Ok(Stepped::InTime);
+        };
+        let stepped = self.step_in_time(&mut timing, tick, takes_over, words, locals, computation);
+        self.timing = Some(timing);
+        stepped
+    }
+
+    fn step_in_time(
+        &mut self,
+        timing: &mut Timing,
+        tick: u32,
+        takes_over: bool,
+        words: &mut [u64],
+        locals: &Locals,
+        computation: &mut dyn Computation,
+    ) -> Result<Stepped, BusError> {
+        if takes_over && !self.predecessor.is_empty() {
+            // It goes on from what its predecessor sent last, not from a step of its own as a shadow.
+            words.fill(0);
+        }
+        let stepped = match timing.begin(tick, words, &self.outputs) {
+            Due::Step => {
+                self.compute(tick, takes_over, locals, computation)?;
+                let overran = timing.end(tick, words, &mut self.outputs, &self.node)?;
+                if overran { Stepped::Overran } else { Stepped::InTime }
+            }
+            Due::Skipped => Stepped::Skipped,
+        };
+        Timing::write(tick, words, &mut self.outputs, &self.node)?;
+        Ok(stepped)
+    }
+
+    fn compute(
+        &mut self,
+        tick: u32,
+        takes_over: bool,
+        locals: &Locals,
+        computation: &mut dyn Computation,
+    ) -> Result<(), BusError> {
+        let (node, time_ns) = (&self.node, u64::from(tick) * self.tick_ns);
+        let predecessor = if takes_over { self.predecessor.as_slice() } else { &[] };
+        let (inputs, outputs) = (self.inputs.as_slice(), self.outputs.as_mut_slice());
+        let mut view = Tick { tick, time_ns, node, inputs, locals, outputs, predecessor };
+        computation.step(&mut view).map_err(|reason| BusError::Step {
+            node: node.clone(),
+            tick,
+            time_s: time_ns as f64 * 1e-9,
+            reason,
+        })
+    }
+
+    /// Sends the outputs that are due at `tick`. `times_ns` returns the host times of a sample, by the number of its
+    /// output; `sent` hears of each sample that was sent.
+    ///
+    /// # Errors
+    /// If a due output was not written or holds what no message may, or cannot be sent.
+    pub(crate) fn publish(
+        &mut self,
+        tick: u32,
+        locals: &mut Locals,
+        mut times_ns: impl FnMut(usize) -> [u64; 3],
+        mut sent: impl FnMut(&mut OutPort),
+    ) -> Result<(), BusError> {
+        let time_ns = self.time_ns(tick);
+        let is_sent = |(_, output): &(usize, &mut OutPort)| output.is_sent(tick);
+        for (index, output) in self.outputs.iter_mut().enumerate().filter(is_sent) {
+            output.send(tick, time_ns, times_ns(index), &self.node, locals)?;
+            sent(output);
+        }
+        self.outputs.iter_mut().for_each(OutPort::forget);
+        // Readers are awake by now: what the next tick needs is fetched while they compute.
+        self.outputs.iter_mut().try_for_each(|output| output.prepare(&self.node))
+    }
+}

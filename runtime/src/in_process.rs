@@ -1,0 +1,198 @@
+//! A run on the thread of its launcher: no processes, no shared memory, no clock service.
+
+use crate::event::{Progress, RunEvent, StopToken};
+use crate::graph::Graph;
+use crate::host::Host;
+use crate::host_limits::require_host;
+use crate::manifest::Manifest;
+use crate::outcome::Outcome;
+use anyhow::{Result, anyhow, bail};
+use bus::clock::deadline_ns;
+use bus::component::Role;
+use bus::host_time::monotonic_ns;
+use bus::plan::Pace;
+use bus::{Registration, Simulation};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::Duration;
+
+/// Host time between two reports of progress, ns.
+const PROGRESS_NS: u64 = 50_000_000;
+/// Ticks between two looks at the host's clock in a run that is not paced.
+const LOOK_TICKS: u32 = 64;
+/// The longest sleep, ns, so that a stop is heard soon.
+const NAP_NS: u64 = 20_000_000;
+
+/// The nodes of `manifest` before tick 0, to be stepped by the caller; a recorder and a judge are left out.
+///
+/// ```
+/// use bus::component::{Component, Info, StepError};
+/// use bus::context::{NodeContext, StepContext};
+/// use bus::messages::MotorCommand;
+/// use bus::{ParameterError, Registration};
+/// use runtime::{manifest::ManifestBuilder, registry::Registry};
+///
+/// #[derive(bus::OutputPorts)]
+/// struct Outputs {
+///     command: MotorCommand,
+/// }
+/// /// Commands that rise by one a tick.
+/// struct Ramp;
+/// impl Component for Ramp {
+///     const INFO: Info = Info::new("ramp", "sends commands that rise");
+///     type Parameters = std::collections::BTreeMap<String, f64>;
+///     type Inputs<'a> = ();
+///     type Outputs = Outputs;
+///     type State = ();
+///     fn new(_: Self::Parameters, _: &NodeContext<'_>) -> Result<Self, ParameterError> {
+///         Ok(Self)
+///     }
+///     fn initial(&self) {}
+///     fn step(&self, context: &StepContext<'_>, (): (), (): &mut ()) -> Result<Outputs, StepError> {
+///         let command = [f64::from(context.tick()); 4].into();
+///         Ok(Outputs { command: MotorCommand { command, ..Default::default() } })
+///     }
+/// }
+/// const COMPONENTS: Registry = Registry::new(&[Registration::of::<Ramp>()]);
+/// let manifest = ManifestBuilder::new().set("run.duration_s", 1.0).set("process.ramp.kind", "ramp");
+/// let mut simulation = runtime::simulate(&manifest.build("ramp.toml".as_ref(), COMPONENTS)?)?;
+/// let command = simulation.topic::<MotorCommand>("/ramp/command")?;
+/// assert!(simulation.newest(command).is_none());
+/// for tick in 0..10 {
+///     simulation.step()?;
+///     assert_eq!(simulation.newest(command).unwrap().command[0], f64::from(tick));
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// A problem in the manifest, or what needs a process of its own: an executable, a swap, a standby.
+pub fn simulate(manifest: &Manifest) -> Result<Simulation> {
+    let graph = Graph::build(manifest)?;
+    require_host(&Host::InProcess, manifest, &graph)?;
+    simulation(&graph, |component| component.role == Role::Compute, manifest.registry().components())
+}
+
+/// The nodes of `graph` of which `is_member` is true, in one simulation.
+///
+/// # Errors
+/// If a node is no component of this program, or the plan and a component do not fit.
+fn simulation(
+    graph: &Graph,
+    is_member: impl Fn(&Registration) -> bool,
+    components: &'static [Registration],
+) -> Result<Simulation> {
+    let mut members = Vec::new();
+    for (index, (program, node)) in graph.programs.iter().zip(&graph.plan.nodes).enumerate() {
+        let component = program.component();
+        let component = component.ok_or_else(|| anyhow!("process `{}` is no component", node.name))?;
+        if is_member(component) {
+            members.push((index, component));
+        }
+    }
+    Ok(Simulation::new(&graph.plan, members, components, &graph.files)?)
+}
+
+/// Flies `graph` to its end, or to a stop.
+///
+/// # Errors
+/// If a step fails, or a component panics.
+pub(crate) fn fly(
+    graph: &Graph,
+    components: &'static [Registration],
+    stop: &StopToken,
+    on: &mut dyn FnMut(RunEvent<'_>),
+) -> Result<Outcome> {
+    let simulation = simulation(graph, |_| true, components)?;
+    let start_ns = monotonic_ns();
+    let mut run = Run { graph, stop, on, start_ns, reported_ns: start_ns, missed_deadlines: 0 };
+    let flown = catch_unwind(AssertUnwindSafe(|| run.fly(simulation)));
+    let (ticks, overruns) = match flown {
+        Ok(flown) => flown?,
+        Err(panic) => {
+            let text = panic.downcast_ref::<String>().map(String::as_str);
+            let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("without a message");
+            bail!("a component panicked: {text}");
+        }
+    };
+    Ok(Outcome {
+        ticks,
+        was_stopped: ticks < graph.plan.duration_ticks,
+        host_s: seconds(monotonic_ns() - start_ns),
+        missed_deadlines: run.missed_deadlines,
+        processes: Vec::new(),
+        overruns,
+        replacements: Vec::new(),
+        flight: None,
+        figures: None,
+    })
+}
+
+/// A run under way.
+struct Run<'a> {
+    graph: &'a Graph,
+    stop: &'a StopToken,
+    on: &'a mut dyn FnMut(RunEvent<'_>),
+    start_ns: u64,
+    /// Host time of the last report.
+    reported_ns: u64,
+    missed_deadlines: u32,
+}
+
+/// Ticks that were computed, and for each node with a simulated computing time its overruns and skipped steps.
+type Flown = (u32, Vec<(String, u32, u32)>);
+
+impl Run<'_> {
+    fn fly(&mut self, mut simulation: Simulation) -> Result<Flown> {
+        let end = self.step_all(&mut simulation);
+        let (ticks, overruns) = (simulation.tick(), simulation.overruns());
+        simulation.finish(end)?;
+        Ok((ticks, overruns))
+    }
+
+    fn step_all(&mut self, simulation: &mut Simulation) -> Result<(), bus::BusError> {
+        let plan = &self.graph.plan;
+        while simulation.tick() < plan.duration_ticks && self.stop.count() == 0 {
+            let tick = simulation.tick();
+            match plan.pace {
+                Pace::Factor(factor) if !self.await_deadline(tick, factor) => break,
+                Pace::Factor(_) => {}
+                Pace::Free if !tick.is_multiple_of(LOOK_TICKS) => {}
+                Pace::Free => self.report(tick),
+            }
+            simulation.step()?;
+        }
+        Ok(())
+    }
+
+    /// Sleeps until tick `tick` is due; false if a stop was asked for meanwhile. A tick whose predecessor was done behind
+    /// its own deadline is a missed one.
+    fn await_deadline(&mut self, tick: u32, factor: f64) -> bool {
+        let due_ns = self.start_ns + deadline_ns(tick, self.graph.plan.tick_ns, factor);
+        if tick > 0 && monotonic_ns() > due_ns {
+            self.missed_deadlines += 1;
+        }
+        self.report(tick);
+        loop {
+            let left_ns = due_ns.saturating_sub(monotonic_ns());
+            if self.stop.count() > 0 || left_ns == 0 {
+                return self.stop.count() == 0;
+            }
+            std::thread::sleep(Duration::from_nanos(left_ns.min(NAP_NS)));
+        }
+    }
+
+    fn report(&mut self, ticks: u32) {
+        let now_ns = monotonic_ns();
+        if now_ns < self.reported_ns + PROGRESS_NS {
+            return;
+        }
+        self.reported_ns = now_ns;
+        let (plan, host_s) = (&self.graph.plan, seconds(now_ns - self.start_ns));
+        let (duration_ticks, tick_s) = (plan.duration_ticks, plan.tick_s());
+        (self.on)(RunEvent::Progress(Progress { ticks, duration_ticks, tick_s, host_s }));
+    }
+}
+
+fn seconds(ns: u64) -> f64 {
+    ns as f64 * 1e-9
+}

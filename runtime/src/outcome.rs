@@ -1,0 +1,28 @@
+//! What there is to say about a run when it is over.
+
+use crate::flight::Flight;
+use crate::replacement::Report;
+
+/// What is known about a run when it is over: what [`Launcher::fly`](crate::launcher::Launcher::fly) returns, whose example asserts on it.
+#[derive(Debug)]
+pub struct Outcome {
+    /// Ticks that every node completed.
+    pub ticks: u32,
+    /// Whether the run was stopped before its end.
+    pub was_stopped: bool,
+    /// Host time from the first grant to the last completed tick.
+    pub host_s: f64,
+    /// Deadlines missed (paced runs).
+    pub missed_deadlines: u32,
+    /// Per process: name, processor share of one core, deadlines at which it was late.
+    pub processes: Vec<(String, f64, u32)>,
+    /// Per process whose steps take simulated time: name, steps that took longer than to its next due tick, and due ticks
+    /// without a step.
+    pub overruns: Vec<(String, u32, u32)>,
+    /// What became of backups.
+    pub replacements: Vec<Report>,
+    /// The host times that the processes noted, in a run that is profiled.
+    pub flight: Option<Flight>,
+    /// Figures of the conditions, as the judge of a run without a recording wrote them; `None` for a run that was stopped.
+    pub figures: Option<Vec<u8>>,
+}
