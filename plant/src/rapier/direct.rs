@@ -36,6 +36,13 @@ const PROXIMAL: f64 = 1e-11;
 /// Bound of the residuals, against the greatest rate or impulse. Tuned, no source.
 const EXACT: f64 = 1e-12;
 
+/// Bound of the residuals where rounding lets them come no nearer: several contacts between two faces may share a load in
+/// any way, and then the matrix is nearly singular. Tuned, no source.
+const NEARLY_EXACT: f64 = 1e-9;
+
+/// Steps without half the residual after which rounding is what is left. Tuned, no source.
+const STALLED_STEPS: usize = 5;
+
 /// Bound of the error of the shifts. Tuned, no source.
 const SHIFT_EXACT_M_S: f64 = 1e-9;
 
@@ -270,7 +277,7 @@ impl Direct {
     /// integral equations, 1965).
     fn find(&mut self) {
         let (mut known, mut before_m_s) = (0, 0.0);
-        for _ in 0..SHIFTS_MAX {
+        for round in 0..SHIFTS_MAX {
             let steps = self.find_shifted();
             let mut most_m_s = 0.0_f64;
             for cone in &mut self.cones {
@@ -281,8 +288,9 @@ impl Direct {
             if steps >= STEPS_MAX || most_m_s <= SHIFT_EXACT_M_S {
                 return;
             }
-            // An extrapolation that made it worse is forgotten.
-            known = if most_m_s < before_m_s { (known + 1).min(DEPTH) } else { 0 };
+            // An extrapolation that made it worse is forgotten. Without one, what made it worse tells the next shift.
+            let more = if most_m_s < before_m_s || known == 0 { known + 1 } else { 0 };
+            known = more.min(round).min(DEPTH);
             before_m_s = most_m_s;
             self.change_shifts(known);
         }
@@ -326,10 +334,14 @@ impl Direct {
         let start = cone::unit() * self.greatest();
         self.cones.iter_mut().for_each(|cone| (cone.z, cone.s) = (start, start));
         self.ties.iter_mut().for_each(|tie| tie.impulse = 0.0);
+        let (mut least, mut stalled) = (f64::INFINITY, 0);
         for steps in 0..STEPS_MAX {
             let (residual, gap) = self.residuals();
-            let scale = EXACT * self.greatest();
-            if (residual <= scale && gap <= scale * scale) || !self.scale() {
+            let left = residual.max(gap.max(0.0).sqrt()) / self.greatest();
+            stalled = if left < 0.5 * least { 0 } else { stalled + 1 };
+            least = least.min(left);
+            let is_stalled = stalled >= STALLED_STEPS && left <= NEARLY_EXACT;
+            if left <= EXACT || is_stalled || !self.scale() {
                 return steps;
             }
             self.factorise(count);
@@ -347,6 +359,10 @@ impl Direct {
             }
             self.newton();
             let length = (SHORT_OF_SURFACE * self.longest_step()).min(1.0);
+            if !length.is_finite() || self.step.iter().any(|step| !step.is_finite()) {
+                // A point on the cone's surface by rounding has no scaling: what was found before is as near as it gets.
+                return steps;
+            }
             self.advance(length);
         }
         STEPS_MAX

@@ -86,7 +86,12 @@ impl Islands {
         let bodies = all.iter_mut().zip(&*start).enumerate().filter(|(number, _)| is_in(*number));
         bodies.for_each(|(_, (body, start))| body.twist = *start);
         direct.solve(all, mobile, constraints, joints, is_in);
-        let direct_off_m_s = off_m_s(all, constraints, joints, is_row_in);
+        let mut direct_off_m_s = off_m_s(all, constraints, joints, is_row_in);
+        if direct_off_m_s > FOUND_M_S {
+            // The loads are found, and almost the directions in which the contacts slip: those the sweeps find.
+            solver::sweep(all, constraints, joints);
+            direct_off_m_s = off_m_s(all, constraints, joints, is_row_in);
+        }
         let is_finite = all.iter().all(|body| body.twist.iter().all(|it| it.is_finite()));
         if is_finite && direct_off_m_s < swept_off_m_s {
             return direct_off_m_s;

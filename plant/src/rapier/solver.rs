@@ -309,6 +309,11 @@ pub(super) fn solve(all: &mut [Body], constraints: &mut [Unilateral], joints: &[
             friction.push(all, &friction.impulses_N_s);
         }
     }
+    sweep(all, constraints, joints);
+}
+
+/// Goes on from impulses that the bodies have already.
+pub(super) fn sweep(all: &mut [Body], constraints: &mut [Unilateral], joints: &[Bilateral]) {
     iterate(all, constraints, joints, QUICK_ITERATIONS, Unilateral::relax);
     if unmet_m_s(all, constraints) > TO_AND_FRO_M_S {
         iterate(all, constraints, joints, ITERATIONS_MAX, Unilateral::relax_whole);
