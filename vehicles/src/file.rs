@@ -314,10 +314,7 @@ fn axis(section: &Section) -> Result<Vector3<f64>, Diagnostic> {
     if axis.z >= bounds::AXIS_UPWARDS_MIN {
         return Ok(axis);
     }
-    let expected = format!(
-        "a direction upwards, at most {:.0} deg from body z",
-        bounds::AXIS_UPWARDS_MIN.acos().to_degrees()
-    );
+    let expected = "a direction upwards, at most 75 deg from body z";
     let found = format!("[{}, {}, {}]", given.x, given.y, given.z);
     Err(section.doc.bad(&section.at_of("axis"), &section.key("axis"), expected, found))
 }
