@@ -219,7 +219,7 @@ def log_path(entity, states, colour):
 
 
 def log_motion(entity, states, frame):
-    """Logs how a frame moves in the world: of several vehicles, or where the recording has no transforms."""
+    """Logs how a frame moves in the world, where the recording has no transforms of it."""
     # 100 a second are enough to look at.
     period_ns, last_ns, shown = 10_000_000, None, []
     for message in states:
@@ -239,19 +239,22 @@ def log_motion(entity, states, frame):
 
 
 def log_vehicle(recording, vehicle, number, has_transforms):
-    """Logs a vehicle's body and path; returns its states, and the entity of what touches."""
+    """Logs a vehicle's body and path; returns its states, and the entity of what touches.
+
+    `has_transforms` is true if the recording holds the transforms of its frame.
+    """
     states = list(read_ros2_messages(recording, topics=[f"/{vehicle}/plant/state" if vehicle else "/plant/state"]))
 
     def entity(name):
         return rr.new_entity_path([name, vehicle] if vehicle else [name])
 
-    # All plants call their frame hb_body, so that several need names of their own.
-    frame = f"{vehicle}_body" if vehicle else "hb_body"
+    # The frame that the vehicle's plant publishes, where its output `tf` is recorded.
+    frame = f"{vehicle}/body" if vehicle else "hb_body"
     # The axes of the body, x forward, y left, z up.
     rr.log(entity("body"), rr.CoordinateFrame(frame), rr.TransformAxes3D(AXES_M), static=True)
     if states:
         log_path(entity("path"), states, [BLUE, RED, GREEN][number % 3])
-    if states and (vehicle or not has_transforms):
+    if states and not has_transforms:
         log_motion(entity("motion"), states, frame)
     with tempfile.TemporaryDirectory() as folder:
         return states, log_airframe(recording, vehicle, frame, folder)
@@ -272,9 +275,10 @@ def main(recording, out, shown=None):
     # The view is told at the end, when it is known what is to be hidden.
     rr.save(out)
     rr.log_file_from_path(recording)
-    has_transforms = "tf2_msgs/msg/TFMessage" in topics.values()
+    transforms = [topic for topic, name in topics.items() if name == "tf2_msgs/msg/TFMessage"]
     hidden = []
     for number, vehicle in enumerate(vehicles):
+        has_transforms = any(topic.startswith(f"/{vehicle}/" if vehicle else "/") for topic in transforms)
         states, touching = log_vehicle(recording, vehicle, number, has_transforms)
         hidden += [touching] if touching else []
         if vehicle == shown and states:

@@ -46,6 +46,26 @@ fn rosbags_decodes_the_same_values() {
     check("read_rosbags.py");
 }
 
+/// Their frames have names of other lengths, which moves what stands behind them.
+#[test]
+fn others_decode_the_frames_of_ten_vehicles() {
+    let Some(readers) = readers() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let (recording, lines) = (folder.path().join("ten.mcap"), folder.path().join("ten.jsonl"));
+    let manifest = Path::new(ROOT).join("manifests/ten-vehicles.toml");
+    let tf = r#"set.wall-follower.process.plant.outputs.tf={ topic = "/tf", every_ticks = 10 }"#;
+    let mut run = Command::new(HUMMINGBUS);
+    run.arg("run").arg(&manifest).args(["--set", "run.duration_s=0.1", "--set", tf, "--record"]);
+    // Whether it passes does not matter: it is cut short.
+    assert!(matches!(run.arg(&recording).output().unwrap().status.code(), Some(0 | 1)));
+    fs::write(&lines, hummingbus(&["cat".as_ref(), recording.as_ref()]).stdout).unwrap();
+    assert!(fs::read_to_string(&lines).unwrap().contains("\"transforms[0].child_frame_id\":\"v9/body\""));
+    for script in ["read_mcap_ros2.py", "read_rosbags.py", "read_foxglove.mjs"] {
+        let output = read(&readers, script, &recording, &lines).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    }
+}
+
 #[test]
 fn foxglove_decodes_the_same_values() {
     check("read_foxglove.mjs");
@@ -125,14 +145,11 @@ impl Flight {
     }
 
     fn read(&self, readers: &Path, script: &str, lines: &Path) -> Output {
-        let program = if script.ends_with(".py") { readers.join("venv/bin/python") } else { "node".into() };
-        let mut command = Command::new(&program);
-        command.env("HUMMINGBUS_READERS", readers).env("PYTHONDONTWRITEBYTECODE", "1");
-        command.arg(Path::new(ROOT).join("tests/readers").join(script)).arg(&self.recording).arg(lines);
+        let mut command = read(readers, script, &self.recording, lines);
         if script == "read_container.py" {
             command.arg(&self.manifest).arg(VEHICLE);
         }
-        command.output().unwrap_or_else(|error| panic!("{}: {error}", program.display()))
+        command.output().unwrap_or_else(|error| panic!("{script}: {error}"))
     }
 
     /// A copy of the lines in which `change` was applied to one message of `topic`.
@@ -156,6 +173,15 @@ impl Flight {
         fs::write(&path, lines.join("\n")).unwrap();
         path
     }
+}
+
+/// A reader of `recording` that compares with `lines`.
+fn read(readers: &Path, script: &str, recording: &Path, lines: &Path) -> Command {
+    let program = if script.ends_with(".py") { readers.join("venv/bin/python") } else { "node".into() };
+    let mut command = Command::new(program);
+    command.env("HUMMINGBUS_READERS", readers).env("PYTHONDONTWRITEBYTECODE", "1");
+    command.arg(Path::new(ROOT).join("tests/readers").join(script)).arg(recording).arg(lines);
+    command
 }
 
 /// The hover manifest, shortened, without conditions, and with absolute paths.

@@ -1,6 +1,6 @@
 //! Which numbers of a message have to be finite, and whether they are: found once, looked at before every sample.
 
-use crate::schema::{Kind, Primitive, Schema, VALUES_START};
+use crate::schema::{Extent, Kind, Primitive, Schema, VALUES_START};
 
 /// Floating-point numbers that lie side by side in a message.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,12 +15,15 @@ struct Span {
 #[derive(Debug)]
 pub(crate) struct Floats {
     spans: Vec<Span>,
+    /// The numbers behind the name that ends a message.
+    named: Option<Extent>,
 }
 
 impl Floats {
     /// Those of `schema`.
     pub(crate) fn of(schema: &Schema) -> Self {
-        let mut floats = Self { spans: Vec::new() };
+        let named = schema.extent().filter(|extent| extent.tail_bytes > 0);
+        let mut floats = Self { spans: Vec::new(), named };
         floats.add_message(schema, 0);
         floats
     }
@@ -36,7 +39,8 @@ impl Floats {
         match kind {
             Kind::Primitive(Primitive::F64) => self.add_span(Span { offset, count: 1, is_double: true }),
             Kind::Primitive(Primitive::F32) => self.add_span(Span { offset, count: 1, is_double: false }),
-            Kind::Primitive(_) | Kind::Text => {}
+            // The place of named numbers depends on the name.
+            Kind::Primitive(_) | Kind::Text | Kind::NamedNumbers(..) => {}
             Kind::Message(inner) => self.add_message(inner, offset),
             // Also the values behind the count, which are zero.
             Kind::Sequence(element, most) => self.add(&Kind::Array(element, *most), offset + VALUES_START),
@@ -62,13 +66,25 @@ impl Floats {
 
     /// The first number in the message `bytes` that is not finite: its place in bytes, and what it is.
     pub(crate) fn first_not_finite(&self, bytes: &[u8]) -> Option<(usize, f64)> {
-        self.spans.iter().find_map(|span| {
-            let numbers = &bytes[span.offset..][..span.count * width(span.is_double)];
-            let mut numbers = numbers.chunks_exact(width(span.is_double)).map(number);
-            let index = numbers.clone().position(|number| !number.is_finite())?;
-            Some((span.offset + index * width(span.is_double), numbers.nth(index)?))
-        })
+        let named = || {
+            let place = self.named?.tail_of(bytes);
+            let (index, number) = first_in(bytes.get(place.clone())?, size_of::<f64>())?;
+            Some((place.start + index, number))
+        };
+        let in_span = |span: &Span| {
+            let width = width(span.is_double);
+            let (index, number) = first_in(&bytes[span.offset..][..span.count * width], width)?;
+            Some((span.offset + index, number))
+        };
+        self.spans.iter().find_map(in_span).or_else(named)
     }
+}
+
+/// The first of `numbers`, of `width` bytes each, that is not finite: its place in bytes, and what it is.
+fn first_in(numbers: &[u8], width: usize) -> Option<(usize, f64)> {
+    let mut numbers = numbers.chunks_exact(width).map(number);
+    let index = numbers.clone().position(|number| !number.is_finite())?;
+    Some((index * width, numbers.nth(index)?))
 }
 
 fn width(is_double: bool) -> usize {
@@ -98,7 +114,7 @@ fn within(kind: &Kind, offset: usize) -> String {
             format!("[{}]{}", offset / size, within(element, offset % size))
         }
         Kind::Sequence(element, _) => within(&Kind::Array(element, 0), offset.saturating_sub(VALUES_START)),
-        Kind::Primitive(_) | Kind::Text => String::new(),
+        Kind::Primitive(_) | Kind::Text | Kind::NamedNumbers(..) => String::new(),
     }
 }
 
@@ -135,6 +151,20 @@ mod tests {
         let command = MotorCommand { command: [1.0, 2.0, f64::NAN, 4.0].into(), ..Default::default() };
         let (field, value) = found(&command).unwrap();
         assert!(field == "command[2]" && value.is_nan(), "{field} = {value}");
+    }
+
+    #[test]
+    fn the_numbers_behind_a_name_are_looked_at_wherever_they_begin() {
+        use crate::messages::{BodyTransform, FrameName, Orientation, Point};
+        let level = Orientation { w: 1.0, ..Orientation::default() };
+        for name in ["b", "seven77", "eight888", "h1/body"] {
+            let at = |z: f64| {
+                let point = Point { z, ..Point::default() };
+                found(&BodyTransform::new(&FrameName::new(name).unwrap(), point, level))
+            };
+            assert_eq!(at(1.0), None);
+            assert_eq!(at(f64::INFINITY), Some(("child".to_owned(), f64::INFINITY)), "{name}");
+        }
     }
 
     #[test]

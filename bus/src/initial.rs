@@ -68,7 +68,7 @@ fn write_value(kind: &Kind, value: &Value, bytes: &mut [u8], path: &str) -> Resu
         Kind::Message(schema) => write_message(schema, value, bytes, path),
         Kind::Array(element, length) => write_array(element, *length, value, bytes, path),
         Kind::Sequence(element, most) => write_sequence(element, *most, value, bytes, path),
-        Kind::Text => Err(InitialError::Constant(path.to_owned())),
+        Kind::Text | Kind::NamedNumbers(..) => Err(InitialError::Constant(path.to_owned())),
     }
 }
 

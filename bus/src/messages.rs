@@ -14,12 +14,14 @@ use crate::{Bounded, Message};
 
 mod control;
 mod sensing;
+mod transform;
 
 pub use control::{ControlStatus, Reference};
 pub use sensing::{
     Barometer, Battery, BodyStates, Clearance, Contact, Gps, Innovation, Magnetometer, Mocap, Ranges,
     RotorSpeeds, StateEstimate, Traffic, WallEstimate,
 };
+pub use transform::{BodyTransform, FRAME_BYTES_MAX, FrameName, body_frame};
 
 /// The most rotors that a vehicle has.
 pub const ROTORS_MAX: usize = 12;
@@ -242,78 +244,6 @@ impl FieldType for MapFrame {
     const KIND: Kind = Kind::Text;
 }
 
-/// One transform `map` → `hb_body`, byte-identical to a ROS 2 `TFMessage` with one element.
-#[derive(Clone, Copy, Debug, Message)]
-#[repr(C)]
-#[message(
-    type_name = "tf2_msgs/msg/TFMessage",
-    definition = "\
-geometry_msgs/TransformStamped[] transforms
-================================================================================
-MSG: geometry_msgs/TransformStamped
-std_msgs/Header header
-string child_frame_id
-geometry_msgs/Transform transform
-================================================================================
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-================================================================================
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-================================================================================
-MSG: geometry_msgs/Transform
-geometry_msgs/Vector3 translation  # [m]
-geometry_msgs/Quaternion rotation
-================================================================================
-MSG: geometry_msgs/Vector3
-float64 x
-float64 y
-float64 z
-================================================================================
-MSG: geometry_msgs/Quaternion
-float64 x  # [1]
-float64 y  # [1]
-float64 z  # [1]
-float64 w  # [1]
-"
-)]
-pub struct BodyTransform {
-    /// Number of transforms: one.
-    count: u32,
-    /// Simulation time.
-    pub stamp: Time,
-    /// Parent frame, `map`.
-    frame_id: MapFrame,
-    /// Bytes in the child frame's name, its NUL included.
-    child_length: u32,
-    /// Child frame, `hb_body`.
-    child: [u8; 8],
-    /// Position of the body.
-    #[field(unit = "m", frame = "world")]
-    pub translation: Point,
-    /// Attitude, body to world.
-    #[field(frame = "world")]
-    pub rotation: Orientation,
-}
-
-impl BodyTransform {
-    /// The transform of a body at `translation` in the world, turned by `rotation` (body to world).
-    #[must_use]
-    pub fn new(translation: Point, rotation: Orientation) -> Self {
-        Self {
-            count: 1,
-            stamp: Time::default(),
-            frame_id: MapFrame::default(),
-            child_length: 8,
-            child: *b"hb_body\0",
-            translation,
-            rotation,
-        }
-    }
-}
-
 /// What an inertial measurement unit reports.
 #[derive(Clone, Copy, Debug, Default, Message)]
 #[repr(C)]
@@ -409,13 +339,12 @@ pub struct MeasuredState {
 
 #[cfg(test)]
 mod tests {
-    use super::{BodyTransform, MapFrame, PoseStamped, Time};
+    use super::{MapFrame, PoseStamped, Time};
 
     /// Sizes of the CDR bodies of the real ROS 2 messages with these frame names.
     #[test]
     fn standard_messages_have_their_cdr_size() {
         assert_eq!(size_of::<PoseStamped>(), 72);
-        assert_eq!(size_of::<BodyTransform>(), 88);
         assert_eq!(bytemuck::bytes_of(&MapFrame::default()), b"\x04\0\0\0map\0");
     }
 

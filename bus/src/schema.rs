@@ -3,6 +3,7 @@
 use crate::random::{FNV_OFFSET, fnv1a};
 use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
+use std::ops::Range;
 
 /// A fixed-width primitive, little-endian in memory and in recordings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,6 +73,9 @@ pub enum Kind {
     Sequence(&'static Kind, usize),
     /// A string of constant length, stored as ROS 2 stores it (length with its NUL, then the bytes).
     Text,
+    /// A string of at most so many bytes, its NUL included, and so many doubles, which begin behind the string at a multiple
+    /// of 8 bytes: the last field of a message.
+    NamedNumbers(usize, usize),
 }
 
 impl Kind {
@@ -84,13 +88,16 @@ impl Kind {
             Self::Array(element, length) => *length * element.size(),
             Self::Sequence(element, most) => VALUES_START + *most * element.size(),
             Self::Text => 0,
+            Self::NamedNumbers(name_bytes_max, numbers) => {
+                NAME_START + *name_bytes_max + *numbers * Primitive::F64.size()
+            }
         }
     }
 
     /// True if a value is as long as its count says.
     const fn is_counted(&self) -> bool {
         match self {
-            Self::Sequence(..) => true,
+            Self::Sequence(..) | Self::NamedNumbers(..) => true,
             Self::Array(element, _) => element.is_counted(),
             Self::Message(schema) => holds_counted(schema.fields),
             Self::Primitive(_) | Self::Text => false,
@@ -116,7 +123,9 @@ pub const fn sequences_are_last(fields: &[Field]) -> bool {
     let mut index = 0;
     while index < fields.len() {
         let is_fine = match fields[index].kind {
-            Kind::Sequence(..) => index + 1 == fields.len() && !fields[index].unit.is_empty(),
+            Kind::Sequence(..) | Kind::NamedNumbers(..) => {
+                index + 1 == fields.len() && !fields[index].unit.is_empty()
+            }
             kind => !kind.is_counted(),
         };
         if !is_fine {
@@ -127,7 +136,7 @@ pub const fn sequences_are_last(fields: &[Field]) -> bool {
     true
 }
 
-/// Part of a message's bytes that counts: up to the end of its sequence.
+/// Part of a message's bytes that counts: up to the end of its sequence, or of the numbers behind its name.
 ///
 /// ```
 /// use bus::Message;
@@ -145,10 +154,15 @@ pub struct Extent {
     pub value_bytes: usize,
     /// Values for which there is room.
     pub values_max: usize,
+    /// Bytes of the doubles that begin behind the values, at a multiple of 8 bytes; 0 where the message ends with the values.
+    #[serde(default)]
+    pub tail_bytes: usize,
 }
 
 /// Bytes from the start of a [`Bounded`](crate::Bounded) to its first value.
 pub(crate) const VALUES_START: usize = 8;
+/// Bytes from the start of a string to its first character.
+const NAME_START: usize = 4;
 /// Bytes of CDR's encapsulation header.
 const CDR_HEADER_BYTES: usize = 4;
 
@@ -162,11 +176,23 @@ impl Extent {
     /// The bytes of `message` that count, as CDR has them: without values it ends behind its count.
     #[must_use]
     pub fn of<'a>(&self, message: &'a [u8]) -> &'a [u8] {
-        let end = match self.count(message).min(self.values_max) {
-            0 => self.count_offset + size_of::<u32>(),
-            count => self.values_offset + count * self.value_bytes,
+        let end = match (self.count(message), self.tail_bytes) {
+            (0, 0) => self.count_offset + size_of::<u32>(),
+            (count, _) => self.tail(count).end,
         };
         &message[..end.min(message.len())]
+    }
+
+    /// The place of the doubles behind the values of `message`.
+    pub(crate) fn tail_of(&self, message: &[u8]) -> Range<usize> {
+        self.tail(self.count(message))
+    }
+
+    /// The place of what follows `count` values.
+    fn tail(&self, count: usize) -> Range<usize> {
+        let end = self.values_offset + count.min(self.values_max) * self.value_bytes;
+        let start = if self.tail_bytes == 0 { end } else { end.next_multiple_of(8) };
+        start..start + self.tail_bytes
     }
 
     /// The same of `cdr`, a message behind the header of its encapsulation.
@@ -186,10 +212,7 @@ impl Extent {
     /// The count of `message`, if it is more than there is room for or if a value behind it is not zero.
     pub(crate) fn wrong_count(&self, message: &[u8]) -> Option<usize> {
         let count = self.count(message);
-        let is_right = || {
-            let unused = &message[self.values_offset + count * self.value_bytes..];
-            unused.iter().all(|byte| *byte == 0)
-        };
+        let is_right = || message[self.tail(count).end..].iter().all(|byte| *byte == 0);
         (count > self.values_max || !is_right()).then_some(count)
     }
 }
@@ -275,9 +298,14 @@ impl Schema {
     #[must_use]
     pub fn extent(&self) -> Option<Extent> {
         let last = self.fields.last()?;
-        let Kind::Sequence(element, values_max) = last.kind else { return None };
-        let values_offset = last.offset + VALUES_START;
-        Some(Extent { count_offset: last.offset, values_offset, value_bytes: element.size(), values_max })
+        let (start, value_bytes, values_max, numbers) = match last.kind {
+            Kind::Sequence(element, values_max) => (VALUES_START, element.size(), values_max, 0),
+            Kind::NamedNumbers(name_bytes_max, numbers) => (NAME_START, 1, name_bytes_max, numbers),
+            _ => return None,
+        };
+        let (count_offset, values_offset) = (last.offset, last.offset + start);
+        let tail_bytes = numbers * Primitive::F64.size();
+        Some(Extent { count_offset, values_offset, value_bytes, values_max, tail_bytes })
     }
 
     /// A message of zeros, with as many values in its sequence as there is room for.
@@ -294,7 +322,7 @@ impl Schema {
     #[must_use]
     pub fn has_text(&self) -> bool {
         let is_text = |field: &Field| match field.kind {
-            Kind::Text => true,
+            Kind::Text | Kind::NamedNumbers(..) => true,
             kind => nested(&kind).is_some_and(Schema::has_text),
         };
         self.definition.is_some() || self.fields.iter().any(is_text)
@@ -386,6 +414,9 @@ fn ros_type(kind: &Kind) -> String {
         Kind::Array(element, length) => format!("{}[{length}]", ros_type(element)),
         Kind::Sequence(element, most) => format!("{}[<={most}]", ros_type(element)),
         Kind::Text => "string".to_owned(),
+        Kind::NamedNumbers(name_bytes_max, numbers) => {
+            format!("string[<={name_bytes_max}] float64[{numbers}]")
+        }
     }
 }
 
@@ -398,7 +429,7 @@ fn nested(kind: &Kind) -> Option<&'static Schema> {
     match kind {
         Kind::Message(schema) => Some(schema),
         Kind::Array(element, _) | Kind::Sequence(element, _) => nested(element),
-        Kind::Primitive(_) | Kind::Text => None,
+        Kind::Primitive(_) | Kind::Text | Kind::NamedNumbers(..) => None,
     }
 }
 

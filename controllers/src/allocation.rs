@@ -1,14 +1,17 @@
 //! Control allocation: a wrench to the speeds of the rotors, and what is given up at their limits.
 //!
-//! A rotor at r = (x, y) from the centre of mass turning at ω makes the thrust c_T·ω² along body z. Its
-//! torque on the body is r × thrust, that is (y, −x)·c_T·ω² about x and y, and against its own sense of
-//! turning, −spin·c_Q·ω² about z. This is eq. 3.7 of the thesis with the moment arm (not the distance
-//! between the axes), and with signs that follow from the axes rather than from a rotor numbering.
+//! A rotor at r from the centre of mass with the axis a that turns at ω makes the thrust c_T·ω²·a. Its torque on the body is
+//! r × a·c_T·ω², and against its own sense of turning −spin·c_Q·ω²·a. With axes along body z this is eq. 3.7 of the thesis
+//! with the moment arm (not the distance between the axes), and with signs that follow from the axes rather than from a rotor
+//! numbering. Of the thrust, the part along body z counts.
 //!
 //! Four rotors have one set of squared speeds for each wrench: the effectiveness matrix B is inverted. More rotors have many
 //! sets: the one with the least sum of squares is taken, Bᵀ(BBᵀ)⁻¹ (Moore-Penrose; Johansen and Fossen, Control allocation: a
-//! survey, Automatica 49, 2013, section 2.2).
+//! survey, Automatica 49, 2013, section 2.2). Where that is beyond the limits of a rotor, the torques are first cut to what fits
+//! beside the thrust, or to a share of what fits in hover if that is more: yaw first, then roll and pitch. Then the speeds within
+//! the limits make these torques, and come as near to the thrust as that leaves (`bounded`).
 
+use crate::bounded::{BoundedLeastSquares, Parts};
 use bus::Bounded;
 use bus::messages::PerRotor;
 use nalgebra::{Matrix4, Vector3, Vector4};
@@ -19,6 +22,17 @@ use vehicles::{ROTORS_MAX, Vehicle};
 /// [`Allocation::thrust_range_N`]. Tuned, no source: it leaves 0.09 N·m on the Hummingbird.
 pub(crate) const THRUST_RESERVE: f64 = 0.05;
 
+/// The share of the torques that the rotors can make in hover for which thrust is given up: that of ArduPilot, the default of
+/// ATC_THR_MIX_MAX. Laws whose demands are off by far would else throw the vehicle about.
+const TORQUE_SHARE: f64 = 0.5;
+
+/// What is missed of a part of a wrench, against its size over all rotors, that counts as nothing: rounding, and what
+/// lower priorities move a higher one by.
+const MISSED_MIN: f64 = 5e-4;
+/// The torque that rotors must make both ways while they carry the weight, against that of all rotors together. Tuned, no
+/// source: less is no control.
+const HELD_MIN: f64 = 0.01;
+
 /// A thrust along body z and a torque about the centre of mass in body axes.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct RotorWrench {
@@ -28,18 +42,61 @@ pub struct RotorWrench {
     pub torque_B_N_m: Vector3<f64>,
 }
 
+/// A part of a wrench.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// Thrust along body z.
+    Thrust,
+    /// Torque about body x.
+    Roll,
+    /// Torque about body y.
+    Pitch,
+    /// Torque about body z.
+    Yaw,
+}
+
+impl std::fmt::Display for Part {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Thrust => "thrust",
+            Self::Roll => "roll",
+            Self::Pitch => "pitch",
+            Self::Yaw => "yaw",
+        })
+    }
+}
+
 /// A set of rotors that cannot be allocated to.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum AllocationError {
     /// The rotors do not make thrust and the three torques independently.
     #[error(
-        "its {rotors} rotors cannot make thrust and three torques independently, expected four or more rotors that can: \
-         their positions, spins or coefficients make the effectiveness matrix singular; correct `rotors` and `rotor` of \
-         the vehicle file"
+        "its {working} working rotors of {rotors} cannot make thrust and three torques independently: {part} is not \
+         controllable{}; expected four or more rotors that push and turn each in a way of its own; correct `rotors` and \
+         `rotor` of the vehicle file",
+        why(*part, *working)
     )]
     Singular {
         /// Number of rotors.
         rotors: usize,
+        /// Number of those that have not failed.
+        working: usize,
+        /// The part that follows from those before it.
+        part: Part,
+    },
+    /// Within their limits, the rotors do not make a torque both ways while they carry the weight.
+    #[error(
+        "its {working} working rotors of {rotors} cannot hover: while they carry the weight, {part} is not controllable both ways \
+         within the limits of their speeds; correct `rotors` and `command` of the vehicle file, or arrange the rotors so that \
+         the others take over from one that has failed"
+    )]
+    Unheld {
+        /// Number of rotors.
+        rotors: usize,
+        /// Number of those that have not failed.
+        working: usize,
+        /// The part that is not controllable.
+        part: Part,
     },
     /// The range of speeds is empty or not finite.
     #[error("rotor speeds must satisfy 0 <= min < max, found min {min_rad_s} and max {max_rad_s} rad/s")]
@@ -49,6 +106,18 @@ pub enum AllocationError {
         /// The greatest speed given, rad/s.
         max_rad_s: f64,
     },
+}
+
+/// The likely reason for a part that is not controllable.
+fn why(part: Part, working: usize) -> &'static str {
+    match part {
+        Part::Yaw if working == 3 => {
+            " (a tricopter needs a servo that tilts a rotor, which no vehicle file describes)"
+        }
+        Part::Yaw => " (do all rotors turn one way?)",
+        Part::Roll | Part::Pitch => " (are the rotors in a line?)",
+        Part::Thrust => " (`rotor.thrust_coefficient` is 0)",
+    }
 }
 
 /// The inverse of the rotors' effectiveness, and their limits.
@@ -70,6 +139,10 @@ pub struct Allocation {
     effectiveness: Bounded<Vector4<f64>, ROTORS_MAX>,
     /// Squared speeds of the rotors for thrust and for the torques about x, y and z.
     inverse: [PerRotor; 4],
+    /// The same beyond the limits.
+    bounded: BoundedLeastSquares,
+    /// Squared speeds of hover: those of the weight, or of as much of it as the rotors lift with room for torques.
+    hover: PerRotor,
     square_min_rad2_s2: f64,
     square_max_rad2_s2: f64,
 }
@@ -81,11 +154,11 @@ pub struct Allocated {
     pub speeds_rad_s: PerRotor,
     /// The wrench that these speeds make once the motors have reached them.
     pub wrench: RotorWrench,
-    /// Thrust made less thrust demanded, N: zero unless the rotors cannot make that much or that little.
+    /// Thrust made less thrust demanded, N: zero unless the rotors cannot make the wrench; thrust is given up first.
     pub thrust_error_N: f64,
-    /// The part of the demanded roll and pitch torque that is made, 0 to 1.
+    /// The part of the demanded roll and pitch torque that is made, 0 to 1; it is given up last.
     pub roll_pitch_part: f64,
-    /// The part of the demanded yaw torque that is made, 0 to 1; yaw is given up first.
+    /// The part of the demanded yaw torque that is made, 0 to 1.
     pub yaw_part: f64,
 }
 
@@ -101,17 +174,28 @@ impl Allocation {
     /// The allocation to the rotors of `vehicle`.
     ///
     /// # Errors
-    /// The effectiveness matrix is singular or the range of speeds is empty.
+    /// The rotors do not make thrust and torques independently, cannot hover within their limits, or have no range of
+    /// speeds. Whether they lift the weight is not looked at: on a rig they need not.
     pub fn new(vehicle: &Vehicle) -> Result<Self, AllocationError> {
         let (min_rad_s, max_rad_s) = (vehicle.command.speed_at_min_rad_s, vehicle.command.speed_at_max_rad_s);
         if !(0.0 <= min_rad_s && min_rad_s < max_rad_s && max_rad_s.is_finite()) {
             return Err(AllocationError::SpeedRange { min_rad_s, max_rad_s });
         }
+        let (rotors, working) = (vehicle.rotors.len(), vehicle.working_rotors().count());
         let effectiveness = effectiveness(vehicle);
-        let inverse = inverse(&effectiveness);
-        let inverse = inverse.ok_or(AllocationError::Singular { rotors: effectiveness.len() })?;
+        let singular = |part| AllocationError::Singular { rotors, working, part };
+        dependent(&effectiveness).map_or(Ok(()), |part| Err(singular(part)))?;
+        let inverse = inverse(&effectiveness).ok_or_else(|| singular(Part::Yaw))?;
         let (square_min_rad2_s2, square_max_rad2_s2) = (min_rad_s * min_rad_s, max_rad_s * max_rad_s);
-        Ok(Self { effectiveness, inverse, square_min_rad2_s2, square_max_rad2_s2 })
+        let at_full_speed = effectiveness.iter().map(|rotor| torques_first(rotor) * square_max_rad2_s2);
+        let bounded = BoundedLeastSquares::new(at_full_speed, square_min_rad2_s2 / square_max_rad2_s2);
+        let hover = PerRotor::default();
+        let mut made =
+            Self { effectiveness, inverse, bounded, hover, square_min_rad2_s2, square_max_rad2_s2 };
+        let (min_N, max_N) = made.thrust_range_N(THRUST_RESERVE);
+        let thrust_N = (vehicle.mass_kg * vehicle.gravity_m_s2).clamp(min_N, max_N);
+        made.hover = made.within_limits(&RotorWrench { thrust_N, ..RotorWrench::default() });
+        made.unheld().map_or(Ok(made), |part| Err(AllocationError::Unheld { rotors, working, part }))
     }
 
     /// The least and greatest thrust (N) to demand if the fraction `reserve` (0 to ½) of the range from
@@ -134,40 +218,117 @@ impl Allocation {
         RotorWrench { thrust_N: wrench[0], torque_B_N_m: Vector3::new(wrench[1], wrench[2], wrench[3]) }
     }
 
-    /// The speeds that make `demand`, or as much of it as the rotors can: yaw torque is given up first,
-    /// then roll and pitch torque together, keeping their direction, and thrust only when thrust alone
-    /// is beyond the rotors: then each rotor is cut to its limit.
+    /// The speeds that make `demand`. Beyond the limits of the rotors, roll and pitch torque come first, keeping their direction,
+    /// then yaw torque, each up to a share of what the rotors make in hover. Thrust comes last: it moves towards hover, and not
+    /// beyond.
     #[must_use]
     pub fn allocate(&self, demand: &RotorWrench) -> Allocated {
-        let torque = &demand.torque_B_N_m;
-        let [thrust, roll, pitch, yaw] = &self.inverse;
-        let for_thrust = thrust.map(|square| square * demand.thrust_N);
-        let for_roll_pitch = each(roll, pitch, |roll, pitch| roll * torque.x + pitch * torque.y);
-        let for_yaw = yaw.map(|square| square * torque.z);
-
-        let thrust_squares = for_thrust.map(|square| self.clamp(square));
-        let roll_pitch_part = self.part_that_fits(&thrust_squares, &for_roll_pitch);
-        let attitude_squares =
-            each(&thrust_squares, &for_roll_pitch, |square, more| square + roll_pitch_part * more);
-        let yaw_part = self.part_that_fits(&attitude_squares, &for_yaw);
-        let squares = each(&attitude_squares, &for_yaw, |square, more| square + yaw_part * more);
-
+        let squares = self.squares(demand);
+        if !self.are_within(&squares) {
+            return self.nearest(demand);
+        }
         let speeds_rad_s = squares.map(|square| self.clamp(square).sqrt());
         let wrench = self.wrench(&speeds_rad_s);
-        // Rounding aside, clamping changed nothing if and only if the rotors can make the thrust.
-        let is_thrust_made = thrust_squares == for_thrust;
-        let thrust_error_N = if is_thrust_made { 0.0 } else { wrench.thrust_N - demand.thrust_N };
-        Allocated { speeds_rad_s, wrench, thrust_error_N, roll_pitch_part, yaw_part }
+        Allocated { speeds_rad_s, wrench, thrust_error_N: 0.0, roll_pitch_part: 1.0, yaw_part: 1.0 }
     }
 
-    /// The greatest part, 0 to 1, of `addition` that keeps every rotor within its limits when it is added
-    /// to `base`, which is within them.
+    /// Squared speeds that make `demand`, whatever the limits.
+    fn squares(&self, demand: &RotorWrench) -> PerRotor {
+        let for_thrust = self.inverse[0].map(|square| square * demand.thrust_N);
+        let for_attitude = each(&for_thrust, &self.for_roll_pitch(demand), |square, more| square + more);
+        each(&for_attitude, &self.for_yaw(demand), |square, more| square + more)
+    }
+
+    fn for_roll_pitch(&self, demand: &RotorWrench) -> PerRotor {
+        let ([_, roll, pitch, _], torque) = (&self.inverse, &demand.torque_B_N_m);
+        each(roll, pitch, |roll, pitch| roll * torque.x + pitch * torque.y)
+    }
+
+    fn for_yaw(&self, demand: &RotorWrench) -> PerRotor {
+        self.inverse[3].map(|square| square * demand.torque_B_N_m.z)
+    }
+
+    /// What comes nearest to `demand` within the limits.
+    fn nearest(&self, demand: &RotorWrench) -> Allocated {
+        let squares = self.within_limits(&self.cut(demand));
+        let speeds_rad_s = squares.map(|square| self.clamp(square).sqrt());
+        let wrench = self.wrench(&speeds_rad_s);
+        let (made, asked) = (torques_then_thrust(&wrench), torques_then_thrust(demand));
+        let missed = (made - asked).component_div(self.bounded.sizes());
+        let is_made = |missed: f64| missed.abs() <= MISSED_MIN;
+        let part = |made: f64, asked: f64| if asked == 0.0 { 1.0 } else { (made / asked).clamp(0.0, 1.0) };
+        let tilt_part = part(made.xy().dot(&asked.xy()), asked.xy().norm_squared());
+        Allocated {
+            speeds_rad_s,
+            wrench,
+            thrust_error_N: if is_made(missed[3]) { 0.0 } else { made[3] - asked[3] },
+            roll_pitch_part: if is_made(missed.xy().norm()) { 1.0 } else { tilt_part },
+            yaw_part: if is_made(missed[2]) { 1.0 } else { part(made[2], asked[2]) },
+        }
+    }
+
+    /// `demand` with the torques cut to the larger of what fits beside its thrust, and a share of what fits in hover.
+    fn cut(&self, demand: &RotorWrench) -> RotorWrench {
+        let beside_thrust = self.inverse[0].map(|square| self.clamp(square * demand.thrust_N));
+        let (kept, in_hover) = (self.fitting(&beside_thrust, demand), self.fitting(&self.hover, demand));
+        let [tilting, turning] =
+            [0, 1].map(|part| kept[part].max(TORQUE_SHARE * in_hover[part]).clamp(0.0, 1.0));
+        let torque_B_N_m = demand.torque_B_N_m.component_mul(&Vector3::new(tilting, tilting, turning));
+        RotorWrench { torque_B_N_m, ..*demand }
+    }
+
+    /// The parts of the roll and pitch torque together, and of the yaw torque, that fit beside the squared speeds `base`; above
+    /// 1 where there is room for more.
+    fn fitting(&self, base: &PerRotor, demand: &RotorWrench) -> [f64; 2] {
+        let for_roll_pitch = self.for_roll_pitch(demand);
+        let tilting = self.part_that_fits(base, &for_roll_pitch);
+        let for_attitude = each(base, &for_roll_pitch, |square, more| square + tilting.min(1.0) * more);
+        [tilting, self.part_that_fits(&for_attitude, &self.for_yaw(demand))]
+    }
+
+    /// The greatest multiple of `addition` that keeps every rotor within its limits when it is added to `base`, which is
+    /// within them.
     fn part_that_fits(&self, base: &PerRotor, addition: &PerRotor) -> f64 {
-        base.iter().zip(addition).fold(1.0_f64, |part, (&base, &addition)| {
+        base.iter().zip(addition).fold(f64::INFINITY, |part, (&base, &addition)| {
             let room =
                 if addition > 0.0 { self.square_max_rad2_s2 - base } else { self.square_min_rad2_s2 - base };
             if addition == 0.0 { part } else { part.min((room / addition).max(0.0)) }
         })
+    }
+
+    /// The squared speeds within the limits that come nearest to `demand`: to roll and pitch, then yaw, then thrust.
+    fn within_limits(&self, demand: &RotorWrench) -> PerRotor {
+        let squares = self.squares(demand);
+        if self.are_within(&squares) {
+            return squares;
+        }
+        let mut start = Parts::zeros();
+        start.iter_mut().zip(&squares).for_each(|(part, square)| *part = square / self.square_max_rad2_s2);
+        let parts = self.bounded.solve(&torques_then_thrust(demand), &start);
+        PerRotor::from_fn(squares.len(), |rotor| parts[rotor] * self.square_max_rad2_s2)
+    }
+
+    /// The first torque that the rotors cannot make both ways in hover. Yaw is tried first: rotors have least of it.
+    fn unheld(&self) -> Option<Part> {
+        let axes = [(Part::Yaw, 2), (Part::Roll, 0), (Part::Pitch, 1)];
+        let hover_N = self.wrench(&self.hover.map(f64::sqrt)).thrust_N;
+        let is_held = |axis: usize, sign: f64| {
+            let asked_N_m = sign * HELD_MIN * self.bounded.sizes()[axis];
+            let torque_B_N_m = Vector3::from_fn(|row, _| if row == axis { asked_N_m } else { 0.0 });
+            let made = self.allocate(&RotorWrench { thrust_N: hover_N, torque_B_N_m });
+            let missed = (made.wrench.torque_B_N_m - torque_B_N_m).component_div(&self.bounded.sizes().xyz());
+            missed.amax() < HELD_MIN / 2.0 && made.thrust_error_N.abs() < HELD_MIN * hover_N
+        };
+        axes.into_iter()
+            .find(|(_, axis)| !(is_held(*axis, 1.0) && is_held(*axis, -1.0)))
+            .map(|(part, _)| part)
+    }
+
+    fn are_within(&self, squares: &PerRotor) -> bool {
+        let limits = self.square_min_rad2_s2..=self.square_max_rad2_s2;
+        let of = squares.iter().zip(&self.effectiveness);
+        // One that has failed has no effect, and turns as slowly as it can be told to.
+        of.into_iter().all(|(square, effect)| limits.contains(square) || *effect == Vector4::zeros())
     }
 
     fn clamp(&self, square_rad2_s2: f64) -> f64 {
@@ -179,13 +340,60 @@ fn each(a: &PerRotor, b: &PerRotor, value: impl Fn(f64, f64) -> f64) -> PerRotor
     a.iter().zip(b).map(|(a, b)| value(*a, *b)).collect()
 }
 
+fn torques_then_thrust(wrench: &RotorWrench) -> Vector4<f64> {
+    let torque = &wrench.torque_B_N_m;
+    Vector4::new(torque.x, torque.y, torque.z, wrench.thrust_N)
+}
+
+/// Torques about x, y and z, then thrust.
+fn torques_first(effect: &Vector4<f64>) -> Vector4<f64> {
+    Vector4::new(effect[1], effect[2], effect[3], effect[0])
+}
+
 fn effectiveness(vehicle: &Vehicle) -> Bounded<Vector4<f64>, ROTORS_MAX> {
     let (c_t, c_q) = (vehicle.thrust_coefficient, vehicle.torque_coefficient);
     let rotors = vehicle.rotors.iter().map(|rotor| {
-        let position_B_m = rotor.position_m;
-        Vector4::new(c_t, position_B_m.y * c_t, -position_B_m.x * c_t, -rotor.spin * c_q)
+        if rotor.has_failed {
+            return Vector4::zeros();
+        }
+        let lever_B_m = rotor.position_m.cross(&rotor.axis);
+        let torque_B = lever_B_m * c_t - rotor.axis * (rotor.spin * c_q);
+        Vector4::new(c_t * rotor.axis.z, torque_B.x, torque_B.y, torque_B.z)
     });
     rotors.collect()
+}
+
+/// Length of what is left of a row of length 1 below which the row counts as dependent on the others.
+const INDEPENDENT_MIN: f64 = 1e-6;
+
+/// The first of thrust, roll, pitch and yaw that follows from those before it, whatever the speeds: its row of the
+/// effectiveness matrix is a combination of theirs (Gram-Schmidt).
+fn dependent(effectiveness: &[Vector4<f64>]) -> Option<Part> {
+    let mut before: Bounded<[f64; ROTORS_MAX], 4> = Bounded::default();
+    for (row, part) in [Part::Thrust, Part::Roll, Part::Pitch, Part::Yaw].into_iter().enumerate() {
+        let effects: PerRotor = effectiveness.iter().map(|rotor| rotor[row]).collect();
+        let size = norm(&effects);
+        let mut left = effects.map(|effect| effect / size);
+        // Twice, so that what rounding leaves of a dependent row is not taken for a row.
+        for _ in 0..2 {
+            for unit in &before {
+                let along: f64 = left.iter().zip(unit).map(|(left, unit)| left * unit).sum();
+                left.iter_mut().zip(unit).for_each(|(left, unit)| *left -= along * unit);
+            }
+        }
+        let length = norm(&left);
+        // A row of zeros makes it NaN.
+        if length.partial_cmp(&INDEPENDENT_MIN) != Some(Ordering::Greater) {
+            return Some(part);
+        }
+        let unit = std::array::from_fn(|rotor| left.get(rotor).map_or(0.0, |left| left / length));
+        before = before.iter().copied().chain([unit]).collect();
+    }
+    None
+}
+
+fn norm(numbers: &[f64]) -> f64 {
+    numbers.iter().map(|number| number * number).sum::<f64>().sqrt()
 }
 
 /// Squared speeds for a unit of each part of a wrench; `None` if the rotors cannot make all of them.
@@ -204,20 +412,15 @@ fn rows(inverse: &Matrix4<f64>) -> Bounded<Vector4<f64>, ROTORS_MAX> {
     Bounded::from_fn(4, |rotor| inverse.row(rotor).transpose())
 }
 
-/// Determinant below which the normalised rows of the effectiveness matrix count as dependent: that of orthogonal rows is
-/// 1, rounding of dependent ones leaves about 1e-16.
-const DETERMINANT_MIN: f64 = 1e-12;
-
 /// Rows of Bᵀ(BBᵀ)⁻¹. The rows of B, which have different units, are scaled to length 1 for the inversion.
 fn pseudo_inverse(effectiveness: &[Vector4<f64>]) -> Option<Bounded<Vector4<f64>, ROTORS_MAX>> {
     let squares: Vector4<f64> = effectiveness.iter().map(|rotor| rotor.component_mul(rotor)).sum();
     let scale = squares.map(|square| square.sqrt().recip());
-    let scaled = effectiveness.iter().map(|rotor| rotor.component_mul(&scale));
-    let product: Matrix4<f64> = scaled.clone().map(|rotor| rotor * rotor.transpose()).sum();
-    // A row of zeros, whose scale is not finite, makes it NaN.
-    let is_independent = product.determinant().partial_cmp(&DETERMINANT_MIN) == Some(Ordering::Greater);
-    let inverse = product.try_inverse().filter(|_| is_independent)?;
-    Some(scaled.map(|rotor| (inverse * rotor).component_mul(&scale)).collect())
+    let scaled: Bounded<Vector4<f64>, ROTORS_MAX> =
+        effectiveness.iter().map(|rotor| rotor.component_mul(&scale)).collect();
+    let product: Matrix4<f64> = scaled.iter().map(|rotor| rotor * rotor.transpose()).sum();
+    let inverse = product.try_inverse()?;
+    Some(scaled.map(|rotor| (inverse * rotor).component_mul(&scale)))
 }
 
 #[cfg(test)]
@@ -274,30 +477,58 @@ mod tests {
         assert!(front > left && rear > right, "the clockwise pair turns the body counter-clockwise");
     }
 
-    #[test]
-    fn yaw_is_given_up_before_roll_and_pitch() {
-        let allocated = allocation().allocate(&wrench(4.7, 0.2, -0.1, 0.5));
-        assert!(allocated.yaw_part > 0.0 && allocated.yaw_part < 1.0);
-        assert_eq!((allocated.thrust_error_N, allocated.roll_pitch_part), (0.0, 1.0));
-        assert_made(&allocated.wrench, &wrench(4.7, 0.2, -0.1, 0.5 * allocated.yaw_part));
+    #[track_caller]
+    fn assert_near(found: f64, expected: f64, size: f64) {
+        assert!((found - expected).abs() < 5e-4 * size, "found {found}, expected {expected}");
     }
 
     #[test]
-    fn roll_and_pitch_are_scaled_together_before_thrust() {
-        let allocated = allocation().allocate(&wrench(4.7, 2.0, -1.0, 0.0));
-        let part = allocated.roll_pitch_part;
-        assert!(part > 0.1 && part < 1.0);
-        assert_made(&allocated.wrench, &wrench(4.7, 2.0 * part, -part, 0.0));
+    fn thrust_is_given_up_before_yaw_and_yaw_before_roll_and_pitch() {
+        // 0.06 N*m of yaw are more than the rotors make at 2 N, and less than half of what they make in hover.
+        let allocated = allocation().allocate(&wrench(2.0, 0.05, -0.02, 0.06));
+        assert_eq!((allocated.roll_pitch_part, allocated.yaw_part), (1.0, 1.0));
+        assert!(allocated.thrust_error_N > 0.2 && allocated.thrust_error_N < 2.7, "{allocated:?}");
+        assert_near(allocated.wrench.torque_B_N_m.z, 0.06, 0.4);
+
+        let allocated = allocation().allocate(&wrench(2.0, 0.15, -0.1, 5.0));
+        assert!(allocated.yaw_part > 0.0 && allocated.yaw_part < 0.1, "{allocated:?}");
+        assert_eq!(allocated.roll_pitch_part, 1.0);
+        assert_near(allocated.wrench.torque_B_N_m.x, 0.15, 2.0);
+        assert_near(allocated.wrench.torque_B_N_m.y, -0.1, 2.0);
+    }
+
+    /// More torque than there is in hover is cut to that: a law that asks for too much neither climbs nor falls.
+    #[test]
+    fn torques_beyond_those_of_hover_move_thrust_to_hover_and_no_further() {
+        let hover_N = 0.48 * 9.81;
+        for thrust_N in [1.0, hover_N, 15.0] {
+            for torque in [[20.0, -10.0, 0.0], [-3.0, 0.0, 4.0], [0.0, 0.0, 9.0], [0.5, 0.5, -0.5]] {
+                let made = allocation().allocate(&wrench(thrust_N, torque[0], torque[1], torque[2])).wrench;
+                let (low, high) = (thrust_N.min(hover_N) - 0.01, thrust_N.max(hover_N) + 0.01);
+                assert!((low..=high).contains(&made.thrust_N), "{thrust_N} {torque:?}: {made:?}");
+                assert!(
+                    made.torque_B_N_m.dot(&Vector3::from(torque)) > 0.0,
+                    "{thrust_N} {torque:?}: {made:?}"
+                );
+            }
+        }
     }
 
     #[test]
-    fn thrust_is_given_up_only_beyond_the_rotors() {
+    fn thrust_makes_room_for_roll_and_pitch() {
         let (least_N, greatest_N) = allocation().thrust_range_N(0.0);
         let allocated = allocation().allocate(&wrench(2.0 * greatest_N, 0.1, 0.0, 0.0));
-        assert!((allocated.wrench.thrust_N - greatest_N).abs() < 1e-9);
-        assert!((allocated.thrust_error_N + greatest_N).abs() < 1e-9);
-        assert_eq!(allocated.roll_pitch_part, 0.0);
-        assert!((allocation().allocate(&wrench(0.0, 0.0, 0.0, 0.0)).wrench.thrust_N - least_N).abs() < 1e-9);
+        assert_near(allocated.wrench.torque_B_N_m.x, 0.1, 2.0);
+        assert_eq!((allocated.roll_pitch_part, allocated.yaw_part), (1.0, 1.0));
+        assert!((allocated.thrust_error_N - allocated.wrench.thrust_N + 2.0 * greatest_N).abs() < 1e-9);
+        // The rotor on the right is slower by what makes the torque, and front and rear by half of that, which the yaw needs.
+        let slower_N = 0.1 / 0.17;
+        assert_near(allocated.wrench.thrust_N, greatest_N - 2.0 * slower_N, 30.0);
+        let at_rest = allocation().allocate(&wrench(0.0, 0.0, 0.0, 0.0));
+        assert!(
+            (at_rest.wrench.thrust_N - least_N).abs() < 1e-9
+                && at_rest.thrust_error_N == at_rest.wrench.thrust_N
+        );
     }
 
     #[test]
@@ -381,15 +612,27 @@ mod tests {
         }
     }
 
+    fn refused(vehicle: &Vehicle) -> (Option<Part>, String) {
+        let error = Allocation::new(vehicle).unwrap_err();
+        let part = match error {
+            AllocationError::Singular { part, .. } | AllocationError::Unheld { part, .. } => Some(part),
+            AllocationError::SpeedRange { .. } => None,
+        };
+        (part, error.to_string())
+    }
+
     #[test]
-    fn rotors_that_cannot_hover_are_refused_by_their_number() {
-        for count in 1..=3 {
-            let error = Allocation::new(&ring(count)).unwrap_err();
-            assert!(error.to_string().contains(&format!("its {count} rotors cannot make")), "{error}");
+    fn rotors_that_cannot_hover_are_refused_with_what_is_not_controllable() {
+        for (count, expected) in [(1, Part::Roll), (2, Part::Pitch), (3, Part::Yaw)] {
+            let (part, message) = refused(&ring(count));
+            assert_eq!(part, Some(expected), "{message}");
+            assert!(message.contains(&format!("its {count} working rotors of {count} cannot")), "{message}");
         }
+        assert!(refused(&ring(3)).1.contains("a tricopter needs a servo"));
         let mut one_way = ring(6);
         one_way.rotors.iter_mut().for_each(|rotor| rotor.spin = 1.0);
-        assert_eq!(Allocation::new(&one_way), Err(AllocationError::Singular { rotors: 6 }));
+        let (part, message) = refused(&one_way);
+        assert!(part == Some(Part::Yaw) && message.contains("all rotors turn one way"), "{message}");
     }
 
     #[test]
@@ -398,9 +641,64 @@ mod tests {
         for (rotor, x) in line.rotors.iter_mut().zip([1.0, 1.0, -1.0, -1.0]) {
             rotor.position_m = Vector3::x() * x;
         }
-        assert_eq!(Allocation::new(&line), Err(AllocationError::Singular { rotors: 4 }));
+        assert_eq!(refused(&line).0, Some(Part::Roll));
+        let mut powerless = hummingbird();
+        powerless.thrust_coefficient = 0.0;
+        assert_eq!(refused(&powerless).0, Some(Part::Thrust));
         let mut empty = hummingbird();
         (empty.command.speed_at_min_rad_s, empty.command.speed_at_max_rad_s) = (900.0, 900.0);
         assert!(matches!(Allocation::new(&empty), Err(AllocationError::SpeedRange { .. })));
+    }
+
+    /// A hexacopter whose rotors turn in turns cannot lose one; with two neighbours turning alike it can lose most (Du, Quan,
+    /// Yang and Cai, Controllability analysis for multirotor helicopter rotor degradation and failure, JGCD 38(5), 2015).
+    #[test]
+    fn a_hexacopter_flies_on_without_a_rotor_or_is_refused_by_its_spins() {
+        let turns_in_turns = |failed: usize| {
+            let mut vehicle = ring(6);
+            vehicle.rotors[failed].has_failed = true;
+            vehicle
+        };
+        for failed in 0..6 {
+            let (part, message) = refused(&turns_in_turns(failed));
+            assert!(part == Some(Part::Yaw) && message.contains("its 5 working rotors of 6"), "{message}");
+        }
+        let flies_on = |failed: usize| {
+            let mut vehicle = ring(6);
+            let spins = [1.0, 1.0, -1.0, -1.0, 1.0, -1.0];
+            vehicle.rotors.iter_mut().zip(spins).for_each(|(rotor, spin)| rotor.spin = spin);
+            vehicle.rotors[failed].has_failed = true;
+            Allocation::new(&vehicle).map(|allocation| {
+                let demand = wrench(4.7, 0.05, -0.05, 0.005);
+                let allocated = allocation.allocate(&demand);
+                assert!(!allocated.is_saturated(), "{allocated:?}");
+                assert_made(&allocated.wrench, &demand);
+            })
+        };
+        let lost: Vec<bool> = (0..6).map(|failed| flies_on(failed).is_ok()).collect();
+        assert_eq!(
+            lost,
+            [true, true, true, true, false, false],
+            "PPNNPN flies on without one of its first four"
+        );
+    }
+
+    #[test]
+    fn tilted_rotors_make_their_wrench_and_more_yaw_than_upright_ones() {
+        let upright = ring(6);
+        let mut tilted = upright.clone();
+        for (index, rotor) in tilted.rotors.iter_mut().enumerate() {
+            // About the arm, so that the thrust turns the body as the drag does.
+            let arm = rotor.position_m.normalize();
+            let lean = if index.is_multiple_of(2) { -0.3 } else { 0.3 };
+            rotor.axis = (Vector3::z() + arm.cross(&Vector3::z()) * -lean).normalize();
+        }
+        let most = |vehicle: &Vehicle| {
+            let allocation = Allocation::new(vehicle).unwrap();
+            let demand = wrench(4.7, 0.05, -0.1, 0.02);
+            assert_made(&allocation.allocate(&demand).wrench, &demand);
+            allocation.allocate(&wrench(4.7, 0.0, 0.0, 10.0)).wrench.torque_B_N_m.z
+        };
+        assert!(most(&tilted) > 3.0 * most(&upright), "{} {}", most(&tilted), most(&upright));
     }
 }

@@ -65,6 +65,9 @@ impl ForesightState {
     }
 }
 
+/// A law that asked for more than a hundred times what the rotors make had lost its way: tuned, no source.
+const PART_MADE_MIN: f64 = 0.01;
+
 /// What is foreseen of a vehicle at one period.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Foresight {
@@ -157,12 +160,15 @@ impl Foresight {
         RotorWrench { thrust_N: (self.mass_kg * self.gravity_m_s2), ..RotorWrench::default() }
     }
 
-    /// What of `wrench` the rotors can make; of one that is no number, hovering.
+    /// What of `wrench` the rotors can make; hovering, if it is no number or far beyond what they ever make.
     fn possible(&self, wrench: &RotorWrench) -> RotorWrench {
-        let wrench = self.allocation.allocate(wrench).wrench;
-        let is_finite =
-            wrench.thrust_N.is_finite() && wrench.torque_B_N_m.iter().all(|part| part.is_finite());
-        if is_finite { wrench } else { self.hover() }
+        let allocated = self.allocation.allocate(wrench);
+        let made = allocated.wrench;
+        let is_finite = made.thrust_N.is_finite() && made.torque_B_N_m.iter().all(|part| part.is_finite());
+        let (_, most_N) = self.allocation.thrust_range_N(0.0);
+        let is_far = allocated.thrust_error_N.abs() > most_N
+            || allocated.roll_pitch_part.min(allocated.yaw_part) < PART_MADE_MIN;
+        if is_finite && !is_far { made } else { self.hover() }
     }
 
     /// The same of a wrench that changes. A lag that rises evenly is its delay behind what was asked for, so that much

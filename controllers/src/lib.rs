@@ -3,7 +3,8 @@
 //! A control law is a type that implements [`law::Law`]; [`controller::Controller`] makes a component of it, and
 //! [`bumpless`] lets any law go on after any other. The rooms, pure cores first:
 //! - [`set_points`]: a pilot's schedule of steps, ramps and doublets; [`sticks`]: a recording of sticks.
-//! - [`allocation`]: from a wrench to the speeds of the rotors; [`airframe`]: the vehicle that a law knows.
+//! - [`allocation`]: from a wrench to the speeds of the rotors; `bounded`: the same beyond their limits; [`airframe`]: the
+//!   vehicle that a law knows.
 //! - [`control`]: what a law reads and answers; [`law_inputs`]: the ports that it comes from.
 //! - `gains_file`: gains with units and sources; a law's gains are beside it, ours and the thesis's.
 //! - `altitude_loop`: the part that all laws about hover share.
@@ -39,6 +40,7 @@ pub mod allocation;
 mod altitude_loop;
 mod angle;
 mod approach;
+mod bounded;
 pub mod bumpless;
 pub mod cascade;
 pub mod cascade_gains;

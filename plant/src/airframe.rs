@@ -161,7 +161,8 @@ impl Airframe {
 
     /// What acts under `commands` in still air, without the state of effects.
     pub(crate) fn commanded(&self, commands: &[f64]) -> Actuation {
-        Actuation::of(commands.iter().map(|command| self.vehicle.command.speed(*command)).collect())
+        let speed = |(rotor, command): (usize, &f64)| self.vehicle.commanded_speed_rad_s(rotor, *command);
+        Actuation::of(commands.iter().enumerate().map(speed).collect())
     }
 
     /// Rates of change of the rotors.

@@ -143,7 +143,8 @@ fn least_rad_s(map: &CommandMap) -> f64 {
 }
 
 fn lift_N(vehicle: &Vehicle, speed_rad_s: f64) -> f64 {
-    vehicle.rotors.len() as f64 * vehicle.thrust_coefficient * speed_rad_s * speed_rad_s
+    let upwards: f64 = vehicle.working_rotors().map(|rotor| rotor.axis.z).sum();
+    upwards * vehicle.thrust_coefficient * speed_rad_s * speed_rad_s
 }
 
 /// The keys that lift and weight come from, with their lines.
@@ -153,7 +154,8 @@ fn places_of_lift(vehicle: &Vehicle) -> String {
     places(&stated.collect::<Vec<_>>())
 }
 
-fn places(numbers: &[&Provenance]) -> String {
+/// The lines of the files in which these numbers are.
+pub(crate) fn places(numbers: &[&Provenance]) -> String {
     let place = |number: &&Provenance| format!("{}:{}: `{}`", number.file, number.line, number.key);
     numbers.iter().map(place).collect::<Vec<_>>().join(", ")
 }

@@ -16,7 +16,7 @@
 //! | [`saved`] | parts of a state as bytes of a fixed number |
 //! | [`snapshot`] | a backend's state as bytes with names |
 //! | [`node`], `memory` | the plant as a process of a run, and its state |
-//! | `airworthy` | what a vehicle must be to fly at all |
+//! | `airworthy`, `odd` | what a vehicle must be to fly at all; what is odd about it |
 //! | `parameters`, `origin` | what manifests say of a plant, and the flight that starts from it |
 //! | `others` | which vehicles of the traffic are others |
 //! | `output` | what a plant publishes |
@@ -52,6 +52,7 @@ mod memory;
 mod motor;
 mod newton_euler;
 pub mod node;
+mod odd;
 mod origin;
 mod others;
 mod output;

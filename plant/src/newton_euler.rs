@@ -85,12 +85,14 @@ impl NewtonEuler {
 
     /// Rotors that have settled at raw motor `commands`.
     pub(crate) fn steady_each(&self, commands: &[f64]) -> PerRotor<RotorState> {
-        commands.iter().map(|command| self.steady(*command)).collect()
+        let speed = |(rotor, command): (usize, &f64)| self.vehicle().commanded_speed_rad_s(rotor, *command);
+        commands.iter().enumerate().map(speed).map(RotorState::steady).collect()
     }
 
     /// A state with all rotors settled at the same raw motor command.
     pub fn start(&self, body: RigidBody, command: f64) -> State {
-        State { body, rotors: PerRotor::filled(self.vehicle().rotors.len(), self.steady(command)) }
+        let commands = PerRotor::filled(self.vehicle().rotors.len(), command);
+        State { body, rotors: self.steady_each(&commands) }
     }
 
     /// Moves `state` by one tick of `dt_s` under raw motor `commands` held over the tick, as the declared vehicle

@@ -14,7 +14,7 @@ use crate::state::RigidBody;
 use bus::InputPorts;
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
-use bus::messages::{self, MeasuredState, MotorCommand, Traffic};
+use bus::messages::{self, FRAME_BYTES_MAX, FrameName, MeasuredState, MotorCommand, Traffic, body_frame};
 use diagnostics::ParameterError;
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -45,6 +45,8 @@ pub struct Inputs<'a> {
 /// ```
 pub struct Plant {
     origin: Origin,
+    /// The frame of the vehicle's body.
+    frame: FrameName,
     /// Ticks between two settings to what is measured.
     window_ticks: u32,
     dt_s: f64,
@@ -63,7 +65,8 @@ impl Component for Plant {
 
     fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         let (dt_s, origin) = (context.tick_s(), parameters.origin(context)?);
-        Ok(Self { origin, window_ticks: parameters.window_ticks(dt_s)?, dt_s })
+        let (frame, window_ticks) = (frame_of(context.name)?, parameters.window_ticks(dt_s)?);
+        Ok(Self { origin, frame, window_ticks, dt_s })
     }
 
     fn rehearse(self, _: &NodeContext<'_>) -> Result<(), ParameterError> {
@@ -102,7 +105,7 @@ impl Component for Plant {
         if let Some(trouble) = memory.backend.trouble() {
             return Err(trouble.into());
         }
-        let outputs = Outputs::of(&*memory.backend, context.time_ns());
+        let outputs = Outputs::of(&*memory.backend, &self.frame, context.time_ns());
         set_body(memory, measured);
         Ok(outputs)
     }
@@ -138,6 +141,27 @@ impl Plant {
         backend.step(&inputs.command.command, self.dt_s, seen.unwrap_or_default());
         Ok(())
     }
+}
+
+/// The frame of the vehicle that the node `name` flies. The vehicle has the node's name, without the process's own `plant`: no
+/// two nodes of a run have the same frame.
+fn frame_of(name: &str) -> Result<FrameName, ParameterError> {
+    let vehicle = match name {
+        "plant" => "",
+        name => name.strip_suffix("/plant").unwrap_or(name),
+    };
+    let frame = body_frame(vehicle);
+    FrameName::new(&frame).ok_or_else(|| {
+        let most = FRAME_BYTES_MAX - 1;
+        let length = frame.len();
+        ParameterError::conflict(
+            "",
+            format!(
+                "the frame of the vehicle's body would be `{frame}`, of {length} characters, expected at most {most}; give the \
+                 vehicle a shorter name"
+            ),
+        )
+    })
 }
 
 fn set_body(memory: &mut PlantMemory, measured: Option<&MeasuredState>) {
@@ -186,6 +210,24 @@ mod tests {
         }
         let measured = json!({ "initial_position_m": [5.05, 0.0, 1.0], "window_s": 0.1 });
         assert_eq!(checked("scenes/room.toml", measured, &["measured"]), Ok(()));
+    }
+
+    #[test]
+    fn each_vehicle_has_a_frame_of_its_own() {
+        let frame = |name: &str| frame_of(name).map(|frame| frame.as_str().to_owned());
+        for (name, expected) in [
+            ("plant", "hb_body"),
+            ("h1/plant", "h1/body"),
+            ("h10/plant", "h10/body"),
+            ("left", "left/body"),
+            ("h1/second", "h1/second/body"),
+        ] {
+            assert_eq!(frame(name).as_deref(), Ok(expected));
+        }
+        let longest = "h".repeat(58);
+        assert_eq!(frame(&format!("{longest}/plant")), Ok(format!("{longest}/body")));
+        let error = frame(&format!("{longest}h/plant")).unwrap_err().to_string();
+        assert!(error.contains("of 64 characters, expected at most 63"), "{error}");
     }
 
     #[test]

@@ -3,8 +3,8 @@
 use crate::backend::Backend;
 use bus::OutputPorts;
 use bus::messages::{
-    Battery, BodyStates, BodyTransform, Contact, Orientation, PlantState, Point, Pose, PoseStamped,
-    Quaternion,
+    Battery, BodyStates, BodyTransform, Contact, FrameName, Orientation, PlantState, Point, Pose,
+    PoseStamped, Quaternion,
 };
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -26,14 +26,14 @@ pub struct Outputs {
 }
 
 impl Outputs {
-    /// The motion of `backend`, at `time_ns`.
-    pub(crate) fn of(backend: &dyn Backend, time_ns: u64) -> Self {
+    /// The motion of `backend`, at `time_ns`, of a body with this frame.
+    pub(crate) fn of(backend: &dyn Backend, frame: &FrameName, time_ns: u64) -> Self {
         let body = &backend.state().body;
         let (position, orientation) = (point(&body.position_W_m), orientation(&body.attitude_WB));
         Self {
             state: state(backend),
             pose: Some(PoseStamped { pose: Pose { position, orientation }, ..Default::default() }),
-            tf: Some(BodyTransform::new(position, orientation)),
+            tf: Some(BodyTransform::new(frame, position, orientation)),
             contact: Some(contact(backend)),
             bodies: Some(bodies(backend)),
             battery: Some(battery_message(backend, time_ns)),

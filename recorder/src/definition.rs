@@ -464,7 +464,7 @@ impl Cursor<'_> {
 mod tests {
     use super::{Definition, Value};
     use bus::Message;
-    use bus::messages::{BodyTransform, MotorCommand, Orientation, Point, PoseStamped, Time};
+    use bus::messages::{BodyTransform, FrameName, MotorCommand, Orientation, Point, PoseStamped, Time};
 
     fn cdr<T: Message>(message: &T) -> Vec<u8> {
         [&[0, 1, 0, 0], bytemuck::bytes_of(message)].concat()
@@ -494,10 +494,13 @@ mod tests {
         let definition =
             Definition::parse(BodyTransform::SCHEMA.type_name, &BodyTransform::SCHEMA.ros2_definition())
                 .unwrap();
-        let leaves =
-            definition.decode(&cdr(&BodyTransform::new(Point::default(), Orientation::default()))).unwrap();
-        assert_eq!(leaves[3].value, Value::Text("hb_body".to_owned()));
-        assert_eq!(leaves.len(), 11);
+        for name in ["hb_body", "v0/body", "a-vehicle-with-a-long-name/body"] {
+            let (frame, at) = (FrameName::new(name).unwrap(), Point { x: 1.0, y: 2.0, z: 3.0 });
+            let leaves =
+                definition.decode(&cdr(&BodyTransform::new(&frame, at, Orientation::default()))).unwrap();
+            assert_eq!((&leaves[3].value, leaves.len()), (&Value::Text(name.to_owned()), 11));
+            assert_eq!(leaves[6].value, Value::Float(3.0));
+        }
     }
 
     #[test]

@@ -195,7 +195,11 @@ impl Size {
         };
         let shape = Shape::Cylinder { radius_m: *propeller_radius_m, length_m: PROPELLER_THICKNESS * arm_m };
         let turns = if rotor.spin > 0.0 { Paint::CounterClockwise } else { Paint::Clockwise };
-        let propeller = Part { paint: turns, ..Part::upright(&name("propeller"), shape, rotor.position_m) };
+        let propeller = Part {
+            paint: turns,
+            roll_pitch_yaw_rad: leaning(&rotor.axis),
+            ..Part::upright(&name("propeller"), shape, rotor.position_m)
+        };
         arm.map(|arm| Part { paint, ..arm }).into_iter().chain([motor, propeller]).collect()
     }
 
@@ -223,12 +227,19 @@ impl Part {
 fn rod(name: &str, from_B_m: Vector3<f64>, to_B_m: Vector3<f64>, radius_m: f64) -> Option<Part> {
     let along_B_m = to_B_m - from_B_m;
     let length_m = along_B_m.norm();
-    // About y first, then about z: that takes z to (cos yaw sin pitch, sin yaw sin pitch, cos pitch).
-    let pitch_rad = libm::atan2(along_B_m.xy().norm(), along_B_m.z);
-    let roll_pitch_yaw_rad = [0.0, pitch_rad, libm::atan2(along_B_m.y, along_B_m.x)];
     let shape = Shape::Cylinder { radius_m, length_m };
-    let part = Part { roll_pitch_yaw_rad, ..Part::upright(name, shape, (from_B_m + to_B_m) / 2.0) };
+    let part = Part {
+        roll_pitch_yaw_rad: leaning(&along_B_m),
+        ..Part::upright(name, shape, (from_B_m + to_B_m) / 2.0)
+    };
     (length_m > 0.0).then_some(part)
+}
+
+/// The turn (rad) that takes body z to the direction `along_B`: about y first, then about z, which takes z to
+/// (cos yaw sin pitch, sin yaw sin pitch, cos pitch).
+fn leaning(along_B: &Vector3<f64>) -> [f64; 3] {
+    let pitch_rad = libm::atan2(along_B.xy().norm(), along_B.z);
+    [0.0, pitch_rad, libm::atan2(along_B.y, along_B.x)]
 }
 
 /// The disc and the four balls that the backend `rapier` touches the world with.

@@ -42,7 +42,7 @@ struct VehicleArguments {
 /// Makes a file.
 ///
 /// # Errors
-/// If the model cannot be read, is not physical or does not have four rotors, or the file exists or cannot be written.
+/// If the model cannot be read, is not physical or does not have 1 to 12 rotors, or the file exists or cannot be written.
 pub fn new(arguments: &NewArguments) -> Result<bool> {
     let What::Vehicle(VehicleArguments { from, out }) = &arguments.what;
     require_free(out)?;

@@ -4,6 +4,7 @@ use super::files::open_recording;
 use super::output::print_file;
 use anyhow::{Context, Result, bail};
 use clap::Args;
+use hummingbus::bus::messages::body_frame;
 use hummingbus::plant::Airframe;
 use hummingbus::vehicles::Vehicle;
 use report::airframe::Body;
@@ -15,7 +16,7 @@ use std::path::{Path, PathBuf};
 /// Examples that `--help` shows.
 pub const HELP: &str = "Examples:
   hummingbus urdf vehicles/hummingbird.toml --out hummingbird.urdf
-  hummingbus urdf swarm.mcap --vehicle h1 --frame h1_body --out h1.urdf";
+  hummingbus urdf swarm.mcap --vehicle h1 --out h1.urdf";
 
 const URDF: Kind = Kind { name: "URDF file", mark: Mark::Within(report::urdf::MARK.as_bytes()) };
 
@@ -30,9 +31,10 @@ pub struct UrdfArguments {
     /// Write this file; left out: print it.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// The name of the link: the frame that moves the body.
-    #[arg(long, value_name = "NAME", default_value = "hb_body")]
-    frame: String,
+    /// The name of the link: the frame that moves the body. Left out: that which the plant publishes, hb_body or
+    /// VEHICLE/body.
+    #[arg(long, value_name = "NAME")]
+    frame: Option<String>,
 }
 
 /// Writes a vehicle's body in the Unified Robot Description Format.
@@ -41,7 +43,7 @@ pub struct UrdfArguments {
 /// If the vehicle cannot be read, or the file not be written.
 pub fn urdf(arguments: &UrdfArguments) -> Result<bool> {
     let from = &arguments.vehicle_or_recording;
-    if arguments.frame.trim().is_empty() {
+    if arguments.frame.as_ref().is_some_and(|frame| frame.trim().is_empty()) {
         bail!("--frame: expected the name of a frame, such as hb_body, found an empty one");
     }
     if let Some(out) = &arguments.out {
@@ -51,12 +53,13 @@ pub fn urdf(arguments: &UrdfArguments) -> Result<bool> {
         output_file::check(out, &URDF)?;
     }
     let is_recording = from.extension().is_some_and(|extension| extension == "mcap");
-    let body = match &arguments.vehicle {
+    let (name, body) = match &arguments.vehicle {
         _ if is_recording => of_recording(from, arguments.vehicle.as_deref())?,
-        None => of_file(from)?,
+        None => (String::new(), of_file(from)?),
         Some(name) => bail!("--vehicle {name}: a vehicle file has one vehicle; name a recording (.mcap)"),
     };
-    let text = report::urdf::text(&body, &arguments.frame);
+    let frame = arguments.frame.clone().unwrap_or_else(|| body_frame(&name));
+    let text = report::urdf::text(&body, &frame);
     match &arguments.out {
         Some(out) => output_file::write(out, &URDF, |file| file.write_all(text.as_bytes()))?,
         None => print_file(&text)?,
@@ -70,7 +73,8 @@ fn of_file(path: &Path) -> Result<Body> {
     Body::of(&airframe).with_context(nothing)
 }
 
-fn of_recording(path: &Path, name: Option<&str>) -> Result<Body> {
+/// The name of the vehicle, empty where it has none, and its body.
+fn of_recording(path: &Path, name: Option<&str>) -> Result<(String, Body)> {
     let recording = open_recording(path)?;
     let attached = Attached::to(&recording)?;
     // Of one without a manifest the topics tell.
@@ -94,5 +98,5 @@ fn of_recording(path: &Path, name: Option<&str>) -> Result<Body> {
             "the recording {path} has no file of the vehicle attached that can be read: name the vehicle file"
         )
     };
-    attached.body(name).with_context(nothing)
+    Ok((name.to_owned(), attached.body(name).with_context(nothing)?))
 }

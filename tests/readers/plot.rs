@@ -154,9 +154,8 @@ fn the_view_for_rerun_holds_the_scene_the_path_and_the_vehicle() {
     python(&readers, &[&rerun[..], &["verify".as_ref(), view.as_os_str()]].concat());
     let stats = python(&readers, &[&rerun[..], &["stats".as_ref(), view.as_os_str()]].concat());
     let part = |vehicle: &str, part: &str| format!("/airframe/{vehicle}/AscTec\\ Hummingbird/{part}: ");
-    let airframes = ["h1", "h2"].map(|vehicle| {
-        part(vehicle, "visual_geometries/h1_body/hub").replace("h1_body", &format!("{vehicle}_body"))
-    });
+    let airframes =
+        ["h1", "h2"].map(|vehicle| part(vehicle, &format!("visual_geometries/{vehicle}\\/body/hub")));
     let plain = ["/scene: ", "/path/h1: ", "/path/h2: ", "/body/h1: ", "/motion/h2: ", "/flown/attitude: "];
     let settings = ["overrides/h1/plant/state/visualizers: "];
     for entity in plain.iter().chain(&settings).copied().chain(airframes.iter().map(String::as_str)) {

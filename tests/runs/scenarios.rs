@@ -146,6 +146,68 @@ fn among_free_bodies_with_a_slung_load_in_a_workshop_and_with_driven_joints() {
     ["slung-load", "workshop", "driven-joints"].into_iter().for_each(fly);
 }
 
+#[test]
+fn a_hexacopter_and_an_octocopter_hover_and_follow_a_doublet() {
+    ["hexa-hover", "octo-hover"].into_iter().for_each(|name| fly_with(name, &SEEDS));
+}
+
+/// The vehicle file of the hexacopter with `line` in the table of its first rotor.
+fn hexacopter_with(place: &Place, line: &str) -> String {
+    let text = std::fs::read_to_string(repository("vehicles/dji-f550.toml")).unwrap();
+    place.write("hexa.toml", text.replacen("name = \"left\"", &format!("name = \"left\"\n{line}"), 1))
+}
+
+#[test]
+fn a_tricopter_and_a_hexacopter_that_cannot_lose_a_rotor_are_refused_with_the_reason() {
+    let place = Place::new();
+    let text = std::fs::read_to_string(repository("vehicles/hummingbird.toml")).unwrap();
+    let tricopter = place.write("tri.toml", &text[..text.rfind("[[rotors]]").unwrap()]);
+    let failed = hexacopter_with(&place, "failed = { value = true, source = \"test\" }");
+    for (vehicle, told) in [
+        (tricopter, ["yaw is not controllable", "a tricopter needs a servo"]),
+        (failed, ["its 5 working rotors of 6 cannot hover", "yaw is not controllable both ways"]),
+    ] {
+        let set = format!("process.controller.vehicle={vehicle}");
+        let check = ["check", &repository("manifests/hexa-hover.toml"), "--set", &set];
+        place.call(&check).with_code(2).says(&told);
+    }
+}
+
+/// With neighbours that turn alike the others take over, and it flies on.
+#[test]
+fn a_hexacopter_whose_spins_allow_it_flies_on_without_a_rotor() {
+    let place = Place::new();
+    let vehicle = hexacopter_with(&place, "failed = { value = true, source = \"test\" }");
+    // From the left rotor on, counter-clockwise seen from above: P P N N P N with the failed one first.
+    let text = std::fs::read_to_string(&vehicle).unwrap();
+    let mut document: toml_edit::DocumentMut = text.parse().unwrap();
+    let spins = [
+        ("left", "counter-clockwise"),
+        ("rear left", "counter-clockwise"),
+        ("rear right", "clockwise"),
+        ("right", "clockwise"),
+        ("front right", "counter-clockwise"),
+        ("front left", "clockwise"),
+    ];
+    for rotor in document["rotors"].as_array_of_tables_mut().unwrap().iter_mut() {
+        let name = rotor["name"].as_str().unwrap().to_owned();
+        rotor["spin"]["value"] = toml_edit::value(spins.iter().find(|spin| spin.0 == name).unwrap().1);
+    }
+    std::fs::write(&vehicle, document.to_string()).unwrap();
+    let recording = place.path("flight.mcap");
+    let [plant, controller] =
+        ["plant", "controller"].map(|process| format!("process.{process}.vehicle={vehicle}"));
+    let manifest = repository("manifests/hexa-hover.toml");
+    let run = ["run", &manifest, "--set", &plant, "--set", &controller, "--record", &recording];
+    place.call(&run).flown();
+    let states = rows(&recording, "/plant/state");
+    assert!(states.iter().all(|state| state.get("rotor_speed[0]") == 0.0));
+    let last = states.last().unwrap();
+    assert!((last.get("position.z") - 1.5).abs() < 0.05, "{last:?}");
+    let tilt = |state: &crate::recordings::Row| state.get("attitude.x").hypot(state.get("attitude.y"));
+    assert!(tilt(last) < 0.01 && last.get("attitude.z").abs() < 0.05, "{last:?}");
+}
+
 /// Not for the two laps that the manifest asks for, which take a minute: for half a lap, and no contact.
 #[test]
 fn ten_vehicles_share_a_room() {
@@ -191,6 +253,8 @@ fn no_controller_is_told_the_truth() {
     let manifests = [
         "hover",
         "hover-rapier",
+        "hexa-hover",
+        "octo-hover",
         "take-off",
         "take-off-attitude",
         "rig-a",

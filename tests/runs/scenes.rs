@@ -1,7 +1,9 @@
 //! Runs in a scene: ground, walls, rigs and other vehicles.
 
+use crate::recordings;
 use crate::refusals::{good, refused, refused_text};
 use crate::support::{Place, repository};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The good manifest's plant on the backend `rapier`, with `more` of its keys.
 fn in_rapier(more: &str) -> String {
@@ -161,4 +163,34 @@ fn a_start_that_is_no_number_and_a_traffic_of_thirty_three_are_refused() {
     let inputs: Vec<String> = (0..33).map(|number| format!("h{number} = \"/plant/state\"")).collect();
     let traffic = format!("[process.§traffic]\nkind = \"traffic\"\ninputs = {{ {} }}\n", inputs.join(", "));
     refused_text(&(good() + &traffic)).says(&["at most 32 vehicles"]);
+}
+
+/// Viewers draw what a frame's name says: ten bodies under one name would be one that jumps.
+#[test]
+fn each_of_ten_vehicles_in_one_room_has_a_frame_of_its_own() {
+    let (place, manifest) = (Place::new(), repository("manifests/ten-vehicles.toml"));
+    let recording = place.path("frames.mcap");
+    let tf = r#"set.wall-follower.process.plant.outputs.tf={ topic = "/tf", every_ticks = 10 }"#;
+    // Whether it passes does not matter: it is cut short.
+    place
+        .call(&["run", &manifest, "--record", &recording, "--set", "run.duration_s=0.1", "--set", tf])
+        .flown();
+    let recording = recordings::open(&recording);
+    let (mut frames, mut drawn, mut flown) = (BTreeSet::new(), BTreeMap::new(), BTreeMap::new());
+    for record in recording.messages().map(Result::unwrap) {
+        let leaves = recording.decode(&record).unwrap();
+        let value = |path: &str| leaves.iter().find(|leaf| leaf.path == path).unwrap().value.to_string();
+        let position = |path: &str| ["x", "y", "z"].map(|axis| value(&format!("{path}.{axis}")));
+        if let Some(vehicle) = record.topic.strip_suffix("/tf") {
+            frames.insert((vehicle.to_owned(), value("transforms[0].child_frame_id")));
+            let at = position("transforms[0].transform.translation");
+            drawn.insert((vehicle.to_owned(), record.tick), at);
+        } else if let Some(vehicle) = record.topic.strip_suffix("/plant/state") {
+            flown.insert((vehicle.to_owned(), record.tick), position("position"));
+        }
+    }
+    let expected = (0..10).map(|number| (format!("/v{number}"), format!("\"v{number}/body\"")));
+    assert_eq!(frames, expected.collect());
+    assert_eq!(drawn.len(), 100);
+    assert!(drawn.iter().all(|(at, position)| flown[at] == *position), "{drawn:?}");
 }

@@ -294,14 +294,29 @@ fn layout(root: &Section) -> Result<Vec<Rotor>, Diagnostic> {
 fn one_rotor(section: &Section) -> Result<Rotor, Diagnostic> {
     let name = section.text("name")?.to_owned();
     let position_m = Vector3::from(section.vector("position", LENGTH, &bounds::HUB)?);
+    let axis = if section.has("axis") { axis(section)? } else { Vector3::z() };
     let spin = spin(&section.section("spin")?)?;
+    let has_failed = section.has("failed") && told(&section.section("failed")?)?;
     let torque_scale = if section.has("torque_scale") {
         section.bounded("torque_scale", PURE_NUMBER, &bounds::TORQUE_SCALE)?
     } else {
         1.0
     };
     section.finish()?;
-    Ok(Rotor { name, position_m, spin, torque_scale })
+    Ok(Rotor { name, position_m, axis, spin, torque_scale, has_failed })
+}
+
+/// The direction of a rotor's thrust, of which the length does not matter.
+fn axis(section: &Section) -> Result<Vector3<f64>, Diagnostic> {
+    let given = Vector3::from(section.vector("axis", PURE_NUMBER, &bounds::AXIS)?);
+    // Not divided where it is that of the other rotors: it stays the same number.
+    let axis = if given == Vector3::z() { given } else { given / given.norm() };
+    if axis.z >= bounds::AXIS_UPWARDS_MIN {
+        return Ok(axis);
+    }
+    let expected = "a direction upwards, at most 75 deg from body z";
+    let found = format!("[{}, {}, {}]", given.x, given.y, given.z);
+    Err(section.doc.bad(&section.at_of("axis"), &section.key("axis"), expected, found))
 }
 
 /// A sense of rotation has a value and a source, but neither unit nor uncertainty.
@@ -336,7 +351,7 @@ fn command(section: &Section) -> Result<CommandMap, Diagnostic> {
     let (above_min, above_low) = (max.si > min.si, high.si > low.si);
     let max = max.require(doc, above_min, "a command above `command.min`")?;
     let high = high.require(doc, above_low, "a speed above `command.speed_at_min`")?;
-    let zero_is_off = section.has("zero_is_off") && off(&section.section("zero_is_off")?)?;
+    let zero_is_off = section.has("zero_is_off") && told(&section.section("zero_is_off")?)?;
     section.finish()?;
     Ok(CommandMap {
         min: min.si,
@@ -347,7 +362,8 @@ fn command(section: &Section) -> Result<CommandMap, Diagnostic> {
     })
 }
 
-fn off(section: &Section) -> Result<bool, Diagnostic> {
+/// True or false, with a source.
+fn told(section: &Section) -> Result<bool, Diagnostic> {
     let value = section.flag("value")?;
     section.note("true or false", section.source()?, Uncertainty::OneSigma(0.0));
     section.finish()?;

@@ -58,11 +58,15 @@ pub struct Rotor {
     pub name: String,
     /// The hub, seen from the centre of mass, body frame.
     pub position_m: Vector3<f64>,
-    /// Sense of rotation seen from above: +1 counter-clockwise, -1 clockwise.
+    /// Direction of the thrust: a unit vector in the body frame, (0, 0, 1) unless the file says otherwise.
+    pub axis: Vector3<f64>,
+    /// Sense of rotation seen from the tip of the axis: +1 counter-clockwise, -1 clockwise.
     pub spin: f64,
     /// This rotor's drag torque as a multiple of what c_Q makes of its speed: 1 unless the file says otherwise. Only the
     /// physics knows it; controllers count on rotors that are alike.
     pub torque_scale: f64,
+    /// True for a rotor that has failed: it stands still whatever is commanded.
+    pub has_failed: bool,
 }
 
 /// How the rotor speed follows the commanded speed. Both have unit gain at rest: the thesis's gain of
@@ -84,13 +88,24 @@ pub enum MotorModel {
 }
 
 impl Vehicle {
-    /// The rotor speed at which n rotors of equal thrust carry the weight: sqrt(m g / (n c_T)), in rad/s.
-    /// Infinite for a vehicle whose rotors make no thrust.
+    /// The rotor speed at which rotors that turn alike carry the weight: sqrt(m g / (c_T sum of their axes' z)), in rad/s.
+    /// Rotors that have failed carry nothing. Infinite for a vehicle whose rotors make no thrust.
     pub fn hover_speed_rad_s(&self) -> f64 {
         #[allow(non_snake_case, reason = "units stand last in names, and the newton is N")]
         let weight_N = self.mass_kg * self.gravity_m_s2;
-        let count = self.rotors.len() as f64;
-        if weight_N == 0.0 { 0.0 } else { (weight_N / (count * self.thrust_coefficient)).sqrt() }
+        let upwards: f64 = self.working_rotors().map(|rotor| rotor.axis.z).sum();
+        if weight_N == 0.0 { 0.0 } else { (weight_N / (upwards * self.thrust_coefficient)).sqrt() }
+    }
+
+    /// The rotors that turn.
+    pub fn working_rotors(&self) -> impl Iterator<Item = &Rotor> {
+        self.rotors.iter().filter(|rotor| !rotor.has_failed)
+    }
+
+    /// The speed in rad/s that a raw `command` asks of a rotor, counted from 0; 0 of one that has failed.
+    pub fn commanded_speed_rad_s(&self, rotor: usize, command: f64) -> f64 {
+        let has_failed = self.rotors.get(rotor).is_some_and(|rotor| rotor.has_failed);
+        if has_failed { 0.0 } else { self.command.speed(command) }
     }
 
     /// The raw motor command for hover, saturated to the motors' range.

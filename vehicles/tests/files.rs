@@ -74,10 +74,10 @@ fn the_crazyflie_follows_its_sources_where_it_hovers() {
 #[test]
 fn every_file_in_the_folder_loads_from_disk() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
-    for name in ["hummingbird.toml", "crazyflie-2.1.toml"] {
+    for name in ["hummingbird.toml", "crazyflie-2.1.toml", "dji-f550.toml", "tarot-t18.toml"] {
         let vehicle = Vehicle::load(&folder.join(name)).unwrap();
         assert!(vehicle.provenance.len() >= 16 && vehicle.provenance.iter().all(|p| !p.source.is_empty()));
-        // Opposite rotors turn alike and the spins cancel: hover needs no yaw torque.
+        // The spins cancel: hover needs no yaw torque.
         assert_eq!(vehicle.rotors.iter().map(|rotor| rotor.spin).sum::<f64>(), 0.0);
     }
 }
@@ -219,6 +219,50 @@ fn a_vehicle_has_one_to_twelve_rotors() {
     assert!(message.contains("must be 1 to 12 rotors, found 13"), "{message}");
     let message = parse(0).unwrap_err().to_string();
     assert!(message.contains("missing key `rotors`"), "{message}");
+}
+
+/// The first rotor's `position` with a line behind it.
+fn with_line(line: &str) -> String {
+    let first = HUMMINGBIRD.find("position = ").unwrap();
+    let end = first + HUMMINGBIRD[first..].find('\n').unwrap();
+    format!("{}\n{line}{}", &HUMMINGBIRD[..end], &HUMMINGBIRD[end..])
+}
+
+#[test]
+fn a_rotors_axis_is_a_direction_upwards_of_any_length() {
+    let axis = |value: &str| {
+        let line = format!("axis = {{ value = {value}, unit = \"1\", source = \"test\", uncertainty = 0 }}");
+        Vehicle::parse(&with_line(&line), "bird.toml").map(|vehicle| vehicle.rotors[0].axis)
+    };
+    assert_eq!(Vehicle::parse(HUMMINGBIRD, "").unwrap().rotors[0].axis.as_slice(), [0.0, 0.0, 1.0]);
+    assert_eq!(axis("[0, 0, 1]").unwrap().as_slice(), [0.0, 0.0, 1.0]);
+    let tilted = axis("[0, 3, 4]").unwrap();
+    assert!((tilted.y - 0.6).abs() < 1e-15 && (tilted.z - 0.8).abs() < 1e-15, "{tilted}");
+    for value in ["[0, 0, -1]", "[1, 0, 0]", "[0, 0, 0]", "[1, 0, 0.2]"] {
+        let message = axis(value).unwrap_err().to_string();
+        assert!(
+            message.contains("`rotors.0.axis` must be a direction upwards, at most 75 deg"),
+            "{value}: {message}"
+        );
+    }
+    assert!(axis("[nan, 0, 1]").is_err() && axis("[0, 1]").is_err());
+}
+
+#[test]
+fn a_rotor_that_has_failed_stands_still_and_carries_nothing() {
+    let line = "failed = { value = true, source = \"test\" }";
+    let vehicle = Vehicle::parse(&with_line(line), "bird.toml").unwrap();
+    let whole = Vehicle::parse(HUMMINGBIRD, "").unwrap();
+    assert_eq!(
+        vehicle.rotors.iter().map(|rotor| rotor.has_failed).collect::<Vec<_>>(),
+        [true, false, false, false]
+    );
+    assert_eq!(
+        (vehicle.commanded_speed_rad_s(0, 100.0), vehicle.commanded_speed_rad_s(1, 100.0)),
+        (0.0, whole.command.speed(100.0))
+    );
+    let more = vehicle.hover_speed_rad_s() / whole.hover_speed_rad_s();
+    assert!((more - (4.0_f64 / 3.0).sqrt()).abs() < 1e-12, "{more}");
 }
 
 #[test]

@@ -177,12 +177,9 @@ fn what_is_wrong_with_a_model_is_told_with_its_line() {
     urdf("</robot>", ring, "", &["cycle", "joint `ab`"]);
     urdf("</robot>", "", ":", &["expected XML; the reader says: "]);
     urdf("<axis xyz=\"0 0 1\"/>", "<axis xyz=\"1 0 0\"/>", "", &["rotor_left_joint", "along z"]);
-    urdf(
-        "type=\"continuous\"",
-        "type=\"fixed\"",
-        "",
-        &["expected four rotors, found 3", "only models with four are converted"],
-    );
+    let many = URDF.replace("</robot>", &(0..9).map(|number| another_rotor(number, 0.5)).collect::<String>())
+        + "</robot>";
+    refused(&many, "quad.urdf", "", &["expected 1 to 12 rotors, found 13", "rename the others"]);
     refused(&URDF.replace("rotor_", "part_"), "quad.urdf", "", &["found none", "`rotor`"]);
     refused("<robot name=\"q\"><link name=\"a\"/></robot>", "quad.urdf", "", &["with mass, found none"]);
     refused("<robot name=\"q\"/>", "quad.urdf", "", &["with links, found none"]);
@@ -270,6 +267,38 @@ fn what_is_wrong_with_a_model_is_told_with_its_line() {
         "<gravity>0 9</gravity><model name=\"cross\">",
         ":5:",
         &["gravity", "3 finite numbers"],
+    );
+}
+
+/// A link and a joint of one more rotor, ahead of the others by `x` m.
+fn another_rotor(number: usize, x: f64) -> String {
+    format!(
+        "<link name=\"rotor_{number}\"><inertial><mass value=\"0.01\"/><inertia ixx=\"2e-5\" ixy=\"0\" ixz=\"0\" iyy=\"2e-5\" \
+         iyz=\"0\" izz=\"4e-5\"/></inertial></link><joint name=\"rotor_{number}_joint\" type=\"continuous\"><origin \
+         xyz=\"{x} {} 0\"/><parent link=\"base_link\"/><child link=\"rotor_{number}\"/><axis xyz=\"0 0 1\"/></joint>",
+        if number.is_multiple_of(2) { 0.3 } else { -0.3 }
+    )
+}
+
+#[test]
+fn models_of_other_counts_share_the_weight_between_their_rotors() {
+    let bird = Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml").unwrap();
+    for more in [2, 4, 8] {
+        let added: String =
+            (0..more).map(|number| another_rotor(number, 0.1 * (1 + number / 2) as f64)).collect();
+        let made = of(&(URDF.replace("</robot>", &added) + "</robot>"), "more.urdf");
+        assert_eq!(made.vehicle.rotors.len(), 4 + more);
+        close(made.vehicle.mass_kg, 0.84 + 0.01 * more as f64, "mass");
+        // As heavy a vehicle hovers at the same speed, however many rotors carry it.
+        close(made.vehicle.hover_speed_rad_s(), bird.hover_speed_rad_s(), "hover");
+        assert_eq!(made.vehicle.rotors.iter().map(|rotor| rotor.spin).sum::<f64>(), 0.0);
+    }
+    let three = of(&URDF.replacen("type=\"continuous\"", "type=\"fixed\"", 1), "tri.urdf");
+    assert_eq!(three.vehicle.rotors.len(), 3);
+    assert!(
+        three.notes.iter().any(|note| note.starts_with("3 rotors: controllers need four")),
+        "{:?}",
+        three.notes
     );
 }
 

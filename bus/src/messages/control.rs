@@ -55,13 +55,13 @@ pub struct ControlStatus {
     /// Demanded torque.
     #[field(unit = "N*m", frame = "body")]
     pub torque: Vector3,
-    /// Thrust made less thrust demanded.
+    /// Thrust made less thrust demanded; it is given up first.
     #[field(unit = "N")]
     pub thrust_error: f64,
     /// The part of the demanded roll and pitch torque that is made, 0 to 1.
     #[field(unit = "1")]
     pub roll_pitch_part: f64,
-    /// The part of the demanded yaw torque that is made, 0 to 1; yaw is given up first.
+    /// The part of the demanded yaw torque that is made, 0 to 1.
     #[field(unit = "1")]
     pub yaw_part: f64,
     /// 1 if any of the demand was given up.

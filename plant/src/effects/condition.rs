@@ -59,6 +59,14 @@ impl<'v> FlightCondition<'v> {
         self.airspeed_B_m_s + self.angular_velocity_B_rad_s.cross(&self.vehicle.rotors[rotor].position_m)
     }
 
+    /// The part of [`FlightCondition::hub_airspeed_B_m_s`] along the rotor's axis, and the part across it.
+    #[must_use]
+    pub fn hub_airspeed_along_and_across(&self, rotor: usize) -> (f64, Vector3<f64>) {
+        let (v_B_m_s, axis) = (self.hub_airspeed_B_m_s(rotor), &self.vehicle.rotors[rotor].axis);
+        let along_m_s = v_B_m_s.dot(axis);
+        (along_m_s, v_B_m_s - axis * along_m_s)
+    }
+
     /// Height of the hub of a rotor over the ground.
     #[must_use]
     pub fn hub_height_m(&self, rotor: usize) -> f64 {

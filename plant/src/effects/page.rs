@@ -26,8 +26,8 @@ Drag, inflow and whatever else depends on the motion are evaluated at every stag
 delays and the battery are settled when a tick begins and hold over it. Random effects draw from a stream of their own,
 made from the run's seed, the plant's name and the effect's name: adding one changes no other's noise.
 
-Thrusts T_i, speeds w_i, hub velocities v_i and heights z_i are those of rotor i; z is the axis of the rotors and `up`
-the vertical, both in the body. T_i is c_T w_i |w_i|: effects do not act on each other's changes of thrust.
+Thrusts T_i, speeds w_i, axes a_i, hub velocities v_i and heights z_i are those of rotor i; `up` is the vertical, in the
+body. T_i is c_T w_i |w_i|: effects do not act on each other's changes of thrust.
 
 Delay and bias of a sensor are no effects: they are parameters of the sensors ([manifest.md](manifest.md)).
 

@@ -54,7 +54,7 @@ pub struct Converted {
 /// Hummingbird.
 ///
 /// # Errors
-/// If the text is not such a model, is not physical, or does not have four rotors.
+/// If the text is not such a model, is not physical, or does not have 1 to 12 rotors.
 pub fn convert(text: &str, file: &str) -> Result<Converted, Diagnostic> {
     let source = Source { file, text };
     let document = source.parse()?;

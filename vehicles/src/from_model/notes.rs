@@ -12,10 +12,16 @@ pub fn of(parts: &Parts, thrust: f64, speed_max: f64) -> Vec<String> {
     notes.extend(lags(&parts.rotors));
     notes.extend(directions(&parts.rotors));
     let weight = parts.body.mass_kg * GRAVITY_M_S2;
-    let most = 4.0 * thrust * speed_max * speed_max;
+    let count = parts.rotors.len();
+    let most = count as f64 * thrust * speed_max * speed_max;
     if most <= weight {
         notes.push(format!(
             "the rotors push with at most {most:.3} N, the vehicle weighs {weight:.3} N: it cannot take off"
+        ));
+    }
+    if count < 4 {
+        notes.push(format!(
+            "{count} rotors: controllers need four or more to choose thrust, roll, pitch and yaw independently"
         ));
     }
     notes
@@ -51,15 +57,15 @@ fn directions(rotors: &[Rotor]) -> Option<String> {
     let mut ranked: Vec<(usize, f64)> =
         rotors.iter().filter_map(|rotor| Some((rotor.rank, rotor.motor?.spin?))).collect();
     ranked.sort_by_key(|(rank, _)| *rank);
-    let [first, second, third, fourth] = ranked[..] else { return None };
-    let sum = first.1 + second.1 + third.1 + fourth.1;
-    if sum != 0.0 {
+    if ranked.iter().map(|(_, spin)| spin).sum::<f64>() != 0.0 {
         let count = ranked.iter().filter(|(_, spin)| *spin > 0.0).count();
         return Some(format!(
             "counter-clockwise rotors: {count}, clockwise rotors: {}; their drag turns the vehicle about z in hover",
             ranked.len() - count
         ));
     }
+    // More rotors may have other pairs that turn the vehicle.
+    let [first, _, third, _] = ranked[..] else { return None };
     (first.1 != third.1).then(|| {
         "rotors that are opposite to each other turn in different directions: the vehicle cannot turn about z without \
          tilting"

@@ -7,9 +7,12 @@ use super::body::turned;
 use super::model::{Freedom, Joint, Link, Model, Motor};
 use super::text::plain;
 use crate::bounds;
+use crate::vehicle::ROTORS_MAX;
 
 /// Words by which rotors are known, the surest first.
 const WORDS: [&str; 3] = ["rotor", "prop", "motor"];
+/// Least number of joints with one word that are all rotors of a vehicle.
+const WHOLE_MIN: usize = 3;
 /// Largest sine of the angle between a rotor's axis and the body's z axis.
 const TILT_MAX: f64 = 0.02;
 /// Share of its distance by which a rotor may stand to the left of the nose and still count as in front: rounding.
@@ -25,7 +28,7 @@ pub struct Rotor<'m> {
     pub motor: Option<&'m Motor>,
     /// Hub, from the centre of mass.
     pub position_m: Vector3<f64>,
-    /// Rank clockwise from the nose, seen from above: 0 to 3.
+    /// Rank clockwise from the nose, seen from above, from 0 on.
     pub rank: usize,
 }
 
@@ -45,10 +48,10 @@ impl Rotor<'_> {
 /// is that of the plugins' numbers, else clockwise from the nose, seen from above.
 ///
 /// # Errors
-/// If there are not four, one is tilted or pushes downwards, or the plugins' numbers or directions are not complete.
+/// If there are none or more than 12, one is tilted or pushes downwards, or the plugins' numbers or directions are not complete.
 pub fn find<'m>(model: &'m Model, centre: &Point3<f64>) -> Result<Vec<Rotor<'m>>, Diagnostic> {
     let joints = if model.motors.is_empty() { by_name(model) } else { by_motor(model)? };
-    require_four(model, &joints)?;
+    require_count(model, &joints)?;
     let mut rotors = Vec::new();
     for (joint, motor) in joints {
         let Some(link) = model.links.iter().find(|link| link.name == joint.child) else { continue };
@@ -103,23 +106,19 @@ fn by_name<'m>(model: &'m Model) -> Vec<(&'m Joint, Option<&'m Motor>)> {
         let is_one = |joint: &&Joint| joint.freedom == freedom && named(joint, words);
         model.joints.iter().filter(is_one).map(|joint| (joint, None)).collect()
     };
-    let sets = std::iter::once(&WORDS[..]).chain(WORDS.iter().map(std::slice::from_ref));
-    let tries: Vec<_> = [Freedom::Turns, Freedom::Fixed]
-        .into_iter()
-        .flat_map(|freedom| sets.clone().map(move |words| (freedom, words)))
-        .map(|(freedom, words)| of(freedom, words))
-        .collect();
-    let four = tries.iter().position(|found| found.len() == 4);
-    let any = tries.iter().position(|found| !found.is_empty());
-    // Turning joints of another number are the rotors of a vehicle that is not flown here, whatever else there is.
-    let is_turning = !tries[0].is_empty();
-    let best = four.filter(|index| !is_turning || *index < tries.len() / 2).or(any).unwrap_or(0);
-    tries.into_iter().nth(best).unwrap_or_default()
+    let tries = [Freedom::Turns, Freedom::Fixed].map(|freedom| {
+        let any = of(freedom, &WORDS);
+        // Where a word names a whole vehicle, what has another word only is a cover or a mount.
+        let of_word = WORDS.iter().map(|word| of(freedom, std::slice::from_ref(word)));
+        of_word.into_iter().find(|found| found.len() >= WHOLE_MIN).unwrap_or(any)
+    });
+    // Joints that turn are the rotors, whatever else there is.
+    tries.into_iter().find(|found| !found.is_empty()).unwrap_or_default()
 }
 
-fn require_four(model: &Model, joints: &[(&Joint, Option<&Motor>)]) -> Result<(), Diagnostic> {
+fn require_count(model: &Model, joints: &[(&Joint, Option<&Motor>)]) -> Result<(), Diagnostic> {
     if joints.is_empty() {
-        let error = model.source.whole("expected four rotors, found none");
+        let error = model.source.whole(format!("expected 1 to {ROTORS_MAX} rotors, found none"));
         let help =
             "rotors are links of joints whose names have `rotor`, `prop` or `motor` in them: rename them";
         return Err(error.help(help));
@@ -131,10 +130,11 @@ fn require_four(model: &Model, joints: &[(&Joint, Option<&Motor>)]) -> Result<()
         let error = model.source.whole(format!("expected one motor for each rotor, found two for `{name}`"));
         return Err(error.help("remove one of the plugins"));
     }
-    if joints.len() != 4 {
-        let (count, shown) = (names.len(), names[..names.len().min(8)].join(", "));
-        let error = model.source.whole(format!("expected four rotors, found {count}: {shown}"));
-        return Err(error.help("a vehicle file may have 1 to 12 rotors, but only models with four are converted at present: write it by hand"));
+    if joints.len() > ROTORS_MAX {
+        let (count, shown) = (names.len(), names[..8].join(", "));
+        let message = format!("expected 1 to {ROTORS_MAX} rotors, found {count}: {shown}, ...");
+        let help = "rotors are links of joints whose names have `rotor`, `prop` or `motor` in them: rename the others";
+        return Err(model.source.whole(message).help(help));
     }
     Ok(())
 }
@@ -160,7 +160,8 @@ fn require_upright(model: &Model, joint: &Joint) -> Result<(), Diagnostic> {
         "rotor `{name}`: expected an axis along z of the body, found [{:.4}, {:.4}, {:.4}]",
         axis.x, axis.y, axis.z
     );
-    let help = "only rotors that push upwards are flown at present; of a model whose z is not up, turn its root link";
+    let help = "only models with upright rotors are converted: give a vehicle file `rotors.axis` by hand; of a model whose z is not up, \
+                turn its root link";
     Err(model.source.fault(joint.at.clone(), message).help(help))
 }
 
@@ -193,7 +194,7 @@ fn require_upward(model: &Model, joint: &Joint, link: &Link) -> Result<(), Diagn
         up.y,
         up.z
     );
-    let help = "the plugin pushes along z of the link: turn the link; only rotors that push upwards are flown at present";
+    let help = "the plugin pushes along z of the link: turn the link; only models with rotors that push upwards are converted";
     Err(model.source.fault(link.at.clone(), message).help(help))
 }
 

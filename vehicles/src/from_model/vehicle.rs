@@ -50,10 +50,11 @@ impl Parts<'_> {
         let moment_m = self.common("momentConstant", |motor| motor.moment_m)?;
         let inertia = self.alike("moment of inertia", &self.each(|rotor| rotor.inertia_kg_m2()))?;
         text.table("[rotor]", "rotor");
-        let coefficient = thrust.unwrap_or(reference.thrust_coefficient * self.weight_ratio());
-        let origin = thrust.map_or(assumed("the Hummingbird's, scaled with the weight"), |_| {
-            Origin::Model("motorConstant".to_owned())
-        });
+        let coefficient = thrust.unwrap_or(reference.thrust_coefficient * self.share_ratio());
+        let origin = thrust
+            .map_or(assumed("the Hummingbird's, scaled with the weight that a rotor carries"), |_| {
+                Origin::Model("motorConstant".to_owned())
+            });
         text.number("thrust_coefficient", &digits(coefficient, coefficient), "N/(rad/s)^2", &origin);
         let reference_m = reference.torque_coefficient / reference.thrust_coefficient * arms;
         let torque = coefficient * moment_m.unwrap_or(reference_m);
@@ -125,7 +126,7 @@ impl Parts<'_> {
                 ([0.0, 1.0], [0.0, max], range, assumed("a motor that can stop"), of_max)
             }
             None => {
-                let hover = (self.weight_ratio() * self.reference.thrust_coefficient / thrust).sqrt();
+                let hover = (self.share_ratio() * self.reference.thrust_coefficient / thrust).sqrt();
                 let why = "the Hummingbird's, scaled with the speed in hover";
                 let speeds = [map.speed_at_min_rad_s * hover, map.speed_at_max_rad_s * hover];
                 ([map.min, map.max], speeds, assumed("the Hummingbird's"), assumed(why), assumed(why))
@@ -177,9 +178,14 @@ impl Parts<'_> {
         self.mass_ratio() * GRAVITY_M_S2 / self.reference.gravity_m_s2
     }
 
+    /// Ratio of the weight that each rotor carries.
+    fn share_ratio(&self) -> f64 {
+        self.weight_ratio() * (self.reference.rotors.len() as f64 / self.rotors.len() as f64)
+    }
+
     fn arm_ratio(&self) -> f64 {
         let reference = self.reference.rotors.iter().map(|rotor| rotor.position_m.xy().norm()).sum::<f64>();
-        4.0 * self.arm_m() / reference
+        self.reference.rotors.len() as f64 * self.arm_m() / reference
     }
 
     /// Mean distance of the rotors from the z axis through the centre of mass.

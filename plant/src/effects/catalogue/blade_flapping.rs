@@ -5,12 +5,11 @@ use crate::effects::condition::FlightCondition;
 use crate::effects::kind::{Action, Confounder, EffectKind, Quantity, Values};
 use crate::rotor::Wrench;
 use diagnostics::unit::{ROTARY_STIFFNESS, TILT};
-use nalgebra::Vector3;
 
 pub static EFFECT: EffectKind = EffectKind {
     name: "blade-flapping",
     summary: "the advancing blade rises: the thrust tilts away from where the rotor is flown, and twists the hub",
-    equation: "a_i = k (v_ix, v_iy), F_i = -T_i a_i at the hub, tau_i = K_b (a_iy, -a_ix, 0)",
+    equation: "t_i = k (v_i - (v_i . a_i) a_i), F_i = -T_i t_i at the hub, tau_i = K_b t_i x a_i",
     source: "Hoffmann, Huang, Waslander and Tomlin, Quadrotor helicopter flight dynamics and control, AIAA \
              2007-6461: blade flapping; Mahony, Kumar and Corke, IEEE RAM 19(3), 2012",
     validity: "small tilts (below 0.1 rad); the lateral tilt, which is opposite for opposite senses of rotation, is \
@@ -41,12 +40,12 @@ fn flapping(values: &Values, condition: &FlightCondition) -> Wrench {
     let Parameters { tilt_per_speed, hub_stiffness } = values.into();
     let mut sum = Wrench::default();
     for (i, rotor) in condition.vehicle.rotors.iter().enumerate() {
-        let tilt_B_rad = condition.hub_airspeed_B_m_s(i).xy() * tilt_per_speed;
+        let tilt_B_rad = condition.hub_airspeed_along_and_across(i).1 * tilt_per_speed;
         // A rotor that runs backwards for a moment has no thrust that could tilt.
-        let force_B_N = Vector3::new(tilt_B_rad.x, tilt_B_rad.y, 0.0) * -condition.thrust_N(i).max(0.0);
+        let force_B_N = tilt_B_rad * -condition.thrust_N(i).max(0.0);
         sum += Wrench::at(&rotor.position_m, force_B_N);
         // Flown forward (+x) the disc tips back, which twists the nose up: negative about y.
-        sum.torque_B_N_m += Vector3::new(tilt_B_rad.y, -tilt_B_rad.x, 0.0) * hub_stiffness;
+        sum.torque_B_N_m += tilt_B_rad.cross(&rotor.axis) * hub_stiffness;
     }
     sum
 }

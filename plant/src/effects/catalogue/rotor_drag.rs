@@ -4,12 +4,11 @@ use crate::effects::condition::FlightCondition;
 use crate::effects::kind::{Action, EffectKind, Quantity, Values};
 use crate::rotor::Wrench;
 use diagnostics::unit::ROTOR_DRAG;
-use nalgebra::Vector3;
 
 pub static EFFECT: EffectKind = EffectKind {
     name: "rotor-drag",
     summary: "the air that crosses a spinning rotor drags at its hub, linear in both speeds",
-    equation: "F_i = -c |w_i| (v_i - (v_i . z) z) at the hub of rotor i, v_i its velocity through the air",
+    equation: "F_i = -c |w_i| (v_i - (v_i . a_i) a_i) at the hub of rotor i, v_i its velocity through the air",
     source: "Martin and Salaun, The true role of accelerometer feedback in quadrotor control, ICRA 2010; \
              Mahony, Kumar and Corke, Multirotor aerial vehicles, IEEE RAM 19(3), 2012",
     validity: "advance ratios below 0.1 (the Hummingbird: 4 m/s); along the rotor's axis nothing acts",
@@ -31,9 +30,8 @@ fn drag(values: &Values, condition: &FlightCondition) -> Wrench {
     let Parameters { coefficient } = values.into();
     let mut sum = Wrench::default();
     for (i, rotor) in condition.vehicle.rotors.iter().enumerate() {
-        let v_B_m_s = condition.hub_airspeed_B_m_s(i);
-        let in_plane_B_m_s = Vector3::new(v_B_m_s.x, v_B_m_s.y, 0.0);
-        let force_B_N = in_plane_B_m_s * (-coefficient * condition.rotor_speeds_rad_s[i].abs());
+        let (_, across_B_m_s) = condition.hub_airspeed_along_and_across(i);
+        let force_B_N = across_B_m_s * (-coefficient * condition.rotor_speeds_rad_s[i].abs());
         sum += Wrench::at(&rotor.position_m, force_B_N);
     }
     sum

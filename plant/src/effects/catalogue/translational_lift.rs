@@ -7,7 +7,7 @@ use diagnostics::unit::{DYNAMIC_DRAG, ROTOR_DRAG};
 pub static EFFECT: EffectKind = EffectKind {
     name: "translational-lift",
     summary: "a rotor that climbs loses thrust, one that is flown sideways gains some",
-    equation: "dT_i = -k_z |w_i| v_iz + k_h (v_ix^2 + v_iy^2), v_i the hub's velocity through the air",
+    equation: "dT_i = -k_z |w_i| (v_i . a_i) + k_h |v_i - (v_i . a_i) a_i|^2, v_i the hub's velocity through the air",
     source: "Svacha, Mohta and Kumar, Improving quadrotor trajectory tracking by compensating for aerodynamic \
              effects, ICUAS 2017: thrust model; blade element theory as in Leishman, Principles of Helicopter \
              Aerodynamics",
@@ -32,7 +32,7 @@ effect_parameters! {
 
 fn lift_N(values: &Values, condition: &FlightCondition, rotor: usize) -> f64 {
     let Parameters { climb_coefficient: climb, translational_coefficient: across } = values.into();
-    let v_B_m_s = condition.hub_airspeed_B_m_s(rotor);
+    let (along_m_s, across_B_m_s) = condition.hub_airspeed_along_and_across(rotor);
     let speed_rad_s = condition.rotor_speeds_rad_s[rotor].abs();
-    across * v_B_m_s.xy().norm_squared() - climb * speed_rad_s * v_B_m_s.z
+    across * across_B_m_s.norm_squared() - climb * speed_rad_s * along_m_s
 }

@@ -1,0 +1,187 @@
+//! What is odd about a vehicle that may fly all the same: `check` warns of it, with the lines of the file.
+
+use crate::airframe::amid_rotors_B_m;
+use crate::airworthy::places;
+use bus::context::NodeContext;
+use vehicles::{MotorModel, Vehicle};
+
+/// Arms above this are odd: the largest multirotors that carry people have 4 to 5 m (Volocopter 2X: 9.15 m across its
+/// rotors). Tuned.
+const ARM_MAX_M: f64 = 10.0;
+/// Rotors nearer to each other than this part of the longest arm are in one place; coaxial ones have a gap. Tuned, no source.
+const APART_MIN: f64 = 1e-3;
+/// A radius of gyration above this multiple of the longest arm is odd: what is on the arms is within them. Tuned, no source;
+/// shipped vehicles have 0.2 to 0.8.
+const GYRATION_MAX: f64 = 1.5;
+/// One below this multiple is odd: motors are at the ends of the arms. Tuned, no source.
+const GYRATION_MIN: f64 = 0.03;
+/// Motors with a slower pole are odd: those of multirotors take 0.01 to 0.3 s. Tuned, no source.
+const SLOW_MAX_S: f64 = 1.0;
+
+/// Warns of everything odd about `vehicle`.
+pub(crate) fn tell(vehicle: &Vehicle, run: &NodeContext<'_>) {
+    let odd = [arms(vehicle), one_place(vehicle), one_way(vehicle), inertia(vehicle), slow_motors(vehicle)];
+    for what in odd.into_iter().flatten() {
+        run.warn("vehicle", format!("`vehicle` \"{}\" {what}", vehicle.name));
+    }
+}
+
+/// Length of the longest arm, m: from the middle of the rotors.
+fn longest_arm_m(vehicle: &Vehicle) -> f64 {
+    let middle_B_m = amid_rotors_B_m(vehicle);
+    vehicle.rotors.iter().map(|rotor| (rotor.position_m - middle_B_m).norm()).fold(0.0, f64::max)
+}
+
+fn arms(vehicle: &Vehicle) -> Option<String> {
+    let arm_m = longest_arm_m(vehicle);
+    let message = || {
+        format!(
+            "has arms of {arm_m:.4} m, expected at most {ARM_MAX_M} m, longer than those of any multirotor; look at {}",
+            lines(vehicle, &["rotors.0.position"])
+        )
+    };
+    (arm_m > ARM_MAX_M).then(message)
+}
+
+fn one_place(vehicle: &Vehicle) -> Option<String> {
+    let (rotors, near_m) = (&vehicle.rotors, APART_MIN * longest_arm_m(vehicle));
+    let is_one = |a: usize, b: usize| (rotors[a].position_m - rotors[b].position_m).norm() <= near_m;
+    let mut pairs = (0..rotors.len()).flat_map(|b| (0..b).map(move |a| (a, b)));
+    let (a, b) = pairs.find(|(a, b)| is_one(*a, *b))?;
+    let keys = [a, b].map(|rotor| format!("rotors.{rotor}.position"));
+    let places = lines(vehicle, &keys.each_ref().map(String::as_str));
+    let [a, b] = [a, b].map(|rotor| &rotors[rotor].name);
+    Some(format!(
+        "has its rotors \"{a}\" and \"{b}\" in one place, expected each in a place of its own; look at {places}"
+    ))
+}
+
+fn one_way(vehicle: &Vehicle) -> Option<String> {
+    let is_one_way = vehicle.rotors.windows(2).all(|pair| pair[0].spin.total_cmp(&pair[1].spin).is_eq());
+    let message = || {
+        format!(
+            "has {} rotors that all turn one way, expected both senses of rotation: their drag turns the vehicle about z; look \
+             at {}",
+            vehicle.rotors.len(),
+            lines(vehicle, &["rotors.0.spin"])
+        )
+    };
+    (is_one_way && vehicle.rotors.len() > 1).then(message)
+}
+
+/// Compares the radii of gyration, sqrt(J / m), with the arms.
+fn inertia(vehicle: &Vehicle) -> Option<String> {
+    let arm_m = longest_arm_m(vehicle);
+    let (names, moments) = (["xx", "yy", "zz"], vehicle.inertia_kg_m2.diagonal());
+    let is_odd = |axis: &usize| {
+        let radius_m = (moments[*axis] / vehicle.mass_kg).sqrt();
+        arm_m > 0.0 && !(GYRATION_MIN * arm_m..=GYRATION_MAX * arm_m).contains(&radius_m)
+    };
+    let axis = (0..3).find(is_odd)?;
+    let key = format!("body.inertia_{}", names[axis]);
+    let [least, most] = [GYRATION_MIN, GYRATION_MAX].map(|part| vehicle.mass_kg * (part * arm_m).powi(2));
+    Some(format!(
+        "has a moment of inertia of {:.4e} kg*m^2 at {:.4} kg and arms of {arm_m:.4} m, expected {least:.1e} to {most:.1e} kg*m^2; \
+         look at {}",
+        moments[axis],
+        vehicle.mass_kg,
+        lines(vehicle, &[&key, "body.mass"])
+    ))
+}
+
+fn slow_motors(vehicle: &Vehicle) -> Option<String> {
+    let (slowest_s, keys) = match vehicle.motor {
+        MotorModel::FirstOrder { time_constant_s } => (time_constant_s, ["motor.time_constant"; 2]),
+        MotorModel::SecondOrder { natural_frequency_rad_s, damping_ratio } => {
+            let less = (damping_ratio * damping_ratio - 1.0).max(0.0).sqrt();
+            let pole_rad_s = natural_frequency_rad_s * (damping_ratio - less);
+            (pole_rad_s.recip(), ["motor.natural_frequency", "motor.damping_ratio"])
+        }
+    };
+    let message = || {
+        format!(
+            "has motors that take {slowest_s:.4} s to follow, expected at most {SLOW_MAX_S} s: no law holds an attitude with them; \
+             look at {}",
+            lines(vehicle, &keys)
+        )
+    };
+    (slowest_s > SLOW_MAX_S).then(message)
+}
+
+/// The lines of the file in which the numbers `keys` are.
+fn lines(vehicle: &Vehicle, keys: &[&str]) -> String {
+    let stated = vehicle.provenance.iter().filter(|number| keys.contains(&number.key.as_str()));
+    places(&stated.collect::<Vec<_>>())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+
+    fn load(file: &str) -> Vehicle {
+        Vehicle::load(format!("{}/../vehicles/{file}", env!("CARGO_MANIFEST_DIR")).as_ref()).unwrap()
+    }
+
+    fn told(vehicle: &Vehicle) -> Vec<String> {
+        let run = NodeContext::new("plant", &[]);
+        tell(vehicle, &run);
+        run.into_warnings().into_iter().map(|warning| warning.message).collect()
+    }
+
+    #[test]
+    fn shipped_vehicles_are_not_odd() {
+        for file in ["hummingbird.toml", "crazyflie-2.1.toml", "dji-f550.toml", "tarot-t18.toml"] {
+            assert_eq!(told(&load(file)), [""; 0], "{file}");
+        }
+    }
+
+    #[test]
+    fn what_is_odd_is_told_with_its_line() {
+        type Change = fn(&mut Vehicle);
+        let cases: [(Change, &[&str]); 7] = [
+            (
+                |it| it.rotors.iter_mut().for_each(|rotor| rotor.position_m *= 88.0 / 0.17),
+                &["arms of 88.0000 m", "`rotors.0.position`"],
+            ),
+            (
+                |it| it.rotors[2].position_m = it.rotors[0].position_m,
+                &["\"front\" and \"rear\" in one place", "`rotors.2.position`"],
+            ),
+            (|it| it.rotors.iter_mut().for_each(|rotor| rotor.spin = 1.0), &["all turn one way"]),
+            (
+                |it| it.inertia_kg_m2 *= 2.0 / 0.0056,
+                &["inertia of 2.0000e0 kg*m^2 at 0.4800 kg", "`body.inertia_xx`"],
+            ),
+            (|it| it.inertia_kg_m2 *= 1e-4, &["inertia of 5.6000e-7 kg*m^2"]),
+            (
+                |it| it.motor = MotorModel::FirstOrder { time_constant_s: 25.0 },
+                &["motors that take 25.0000 s"],
+            ),
+            (
+                |it| it.motor = MotorModel::SecondOrder { natural_frequency_rad_s: 0.04, damping_ratio: 1.0 },
+                &["motors that take 25.0000 s", "`motor.natural_frequency`"],
+            ),
+        ];
+        for (change, expected) in cases {
+            let mut vehicle = load("hummingbird.toml");
+            change(&mut vehicle);
+            let messages = told(&vehicle);
+            let of = messages.iter().find(|message| message.contains(expected[0]));
+            let message = of.unwrap_or_else(|| panic!("{expected:?} in {messages:?}"));
+            assert!(expected.iter().all(|word| message.contains(word)), "{message}");
+        }
+    }
+
+    #[test]
+    fn rotors_above_each_other_are_in_two_places() {
+        let mut vehicle = load("hummingbird.toml");
+        let above = vehicle.rotors.clone().into_iter().map(|rotor| vehicles::Rotor {
+            position_m: rotor.position_m + 0.03 * Vector3::z(),
+            spin: -rotor.spin,
+            ..rotor
+        });
+        vehicle.rotors.extend(above.collect::<Vec<_>>());
+        assert_eq!(told(&vehicle), [""; 0]);
+    }
+}
