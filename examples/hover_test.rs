@@ -1,4 +1,4 @@
-//! A simulation as a unit test: flies the hover with changed gains, on threads of the test's own process, and asserts on
+//! A simulation as a unit test: flies the hover with changed gains, on the thread of the test, and asserts on
 //! the recording. `cargo test --example hover_test` runs it.
 
 #[test]
