@@ -144,6 +144,7 @@ type Flown = (u32, Vec<(String, u32, u32)>);
 impl Run<'_> {
     fn fly(&mut self, mut simulation: Simulation) -> Result<Flown> {
         let end = self.step_all(&mut simulation);
+        self.tell(simulation.tick());
         let (ticks, overruns) = (simulation.tick(), simulation.overruns());
         simulation.finish(end)?;
         Ok((ticks, overruns))
@@ -187,7 +188,11 @@ impl Run<'_> {
             return;
         }
         self.reported_ns = now_ns;
-        let (plan, host_s) = (&self.graph.plan, seconds(now_ns - self.start_ns));
+        self.tell(ticks);
+    }
+
+    fn tell(&mut self, ticks: u32) {
+        let (plan, host_s) = (&self.graph.plan, seconds(monotonic_ns() - self.start_ns));
         let (duration_ticks, tick_s) = (plan.duration_ticks, plan.tick_s());
         (self.on)(RunEvent::Progress(Progress { ticks, duration_ticks, tick_s, host_s }));
     }
