@@ -204,7 +204,7 @@ fn a_hexacopter_whose_spins_allow_it_flies_on_without_a_rotor() {
     assert!(states.iter().all(|state| state.get("rotor_speed[0]") == 0.0));
     let last = states.last().unwrap();
     assert!((last.get("position.z") - 1.5).abs() < 0.05, "{last:?}");
-    let tilt = |state: &crate::recordings::Row| state.get("attitude.x").hypot(state.get("attitude.y"));
+    let tilt = |state: &crate::recordings::Row| libm::hypot(state.get("attitude.x"), state.get("attitude.y"));
     assert!(tilt(last) < 0.01 && last.get("attitude.z").abs() < 0.05, "{last:?}");
 }
 
