@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use nalgebra::{Matrix3, Vector3};
+use vehicles::ROTORS_MAX;
 use vehicles::gaps::{GAP_PERIODS, held_period_s};
 
 use crate::clean::gaps;
@@ -10,17 +11,23 @@ use crate::error::FlightsError;
 use crate::flight::{Channel, Flight, period_s};
 use crate::frame::{rotation, to_wxyz};
 
-/// How the columns of the file are to be read, as the `columns` table of a player in a manifest.
-pub const COLUMNS: &str = r#"time = { columns = ["t"], unit = "s" }
-command = { columns = ["m1", "m2", "m3", "m4"], unit = "count" }
+/// How the columns of the file of a vehicle with so many `rotors` are to be read, as the `columns` table of a player in a
+/// manifest.
+#[must_use]
+pub fn columns(rotors: usize) -> String {
+    let command: Vec<String> = (1..=rotors).map(|rotor| format!("\"m{rotor}\"")).collect();
+    format!("command = {{ columns = [{}], unit = \"count\" }}\n{COLUMNS}", command.join(", "))
+}
+
+const COLUMNS: &str = r#"time = { columns = ["t"], unit = "s" }
 position = { columns = ["px", "py", "pz"], unit = "m" }
 velocity = { columns = ["vx", "vy", "vz"], unit = "m/s" }
 attitude = { columns = ["qx", "qy", "qz", "qw"], unit = "1" }
 angular_velocity = { columns = ["wx", "wy", "wz"], unit = "rad/s" }
 "#;
 
-/// The first line of every such file.
-pub const HEADER: &str = "t,m1,m2,m3,m4,px,py,pz,vx,vy,vz,qx,qy,qz,qw,wx,wy,wz\n";
+/// The start of every such file.
+pub const HEADER_START: &str = "t,m1,";
 /// Samples to either side of one at which a derivative is fitted.
 pub const HALF_WINDOW: usize = 3;
 
@@ -49,8 +56,8 @@ pub fn write_csv(flight: &Flight, path: &Path) -> Result<Canonical, FlightsError
 pub struct Row {
     /// Time of the flight.
     pub time_s: f64,
-    /// Motor commands in effect.
-    pub command: [f64; 4],
+    /// Motor commands in effect; zeros behind the last rotor.
+    pub command: [f64; ROTORS_MAX],
     /// Position in W.
     pub position_m: [f64; 3],
     /// Velocity in W.
@@ -62,10 +69,11 @@ pub struct Row {
 }
 
 impl Row {
-    fn text(&self) -> String {
+    /// A line of the file of a vehicle with so many `rotors`.
+    fn text(&self, rotors: usize) -> String {
         let numbers = [
             &[self.time_s][..],
-            &self.command,
+            &self.command[..rotors],
             &self.position_m,
             &self.velocity_m_s,
             &self.attitude,
@@ -79,12 +87,12 @@ impl Row {
 /// The text that [`write_csv`] writes.
 ///
 /// ```
-/// use flights::{Channel, Flight, HEADER, Role};
+/// use flights::{Channel, Flight, Role};
 ///
 /// let mut flight = Flight::new("still", "log.csv", Role::Fit);
 /// flight.attitude = Channel { time_s: vec![0.0, 0.1], values: vec![[1.0, 0.0, 0.0, 0.0]; 2] };
 /// let (written, text) = flights::csv(&flight)?;
-/// assert!(written.rows == 2 && text.starts_with(HEADER));
+/// assert!(written.rows == 2 && text.starts_with("t,m1,m2,m3,m4,px,py,pz,"));
 /// # Ok::<(), flights::FlightsError>(())
 /// ```
 ///
@@ -92,12 +100,14 @@ impl Row {
 /// If the flight has neither attitude nor angular velocity.
 pub fn csv(flight: &Flight) -> Result<(Canonical, String), FlightsError> {
     let (canonical, rows) = rows(flight)?;
-    Ok((canonical, text(&rows)))
+    Ok((canonical, text(&rows, flight.rotors)))
 }
 
-/// The rows as a CSV file.
-pub fn text(rows: &[Row]) -> String {
-    rows.iter().fold(HEADER.to_owned(), |text, row| text + &row.text())
+/// The rows of a vehicle with so many `rotors` as a CSV file.
+pub fn text(rows: &[Row], rotors: usize) -> String {
+    let command: String = (1..=rotors).map(|rotor| format!("m{rotor},")).collect();
+    let header = format!("t,{command}px,py,pz,vx,vy,vz,qx,qy,qz,qw,wx,wy,wz\n");
+    rows.iter().fold(header, |text, row| text + &row.text(rotors))
 }
 
 /// The rows of the table.
@@ -240,8 +250,8 @@ fn linear(channel: &Channel<3>, time_s: f64) -> [f64; 3] {
     })
 }
 
-fn held(channel: &Channel<4>, time_s: f64) -> [f64; 4] {
-    around(channel, time_s).map_or([0.0; 4], |(from, _, _)| from)
+fn held(channel: &Channel<ROTORS_MAX>, time_s: f64) -> [f64; ROTORS_MAX] {
+    around(channel, time_s).map_or([0.0; ROTORS_MAX], |(from, _, _)| from)
 }
 
 /// In the order w, x, y, z.

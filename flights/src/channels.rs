@@ -105,7 +105,7 @@ struct Layout<'a> {
 impl<'a> Layout<'a> {
     fn of(quantity: Quantity, entry: &'a Entry, vehicle: &Vehicle) -> Result<Self, LogError> {
         let frame = entry.frame.unwrap_or_default();
-        let (names, shape) = named(quantity, entry)?;
+        let (names, shape) = named(quantity, entry, vehicle.rotors.len())?;
         let pole_pairs = pole_pairs(quantity, entry)?;
         require_command_on_change(quantity, entry)?;
         let (factor, offset) = match (quantity, entry.unit.as_deref()) {
@@ -153,6 +153,10 @@ impl<'a> Layout<'a> {
                 frame::attitude(self.frame, matrices::quaternion(matrix)).into()
             }
             (Quantity::Attitude, &[x, y, z, w]) => frame::attitude(self.frame, [w, x, y, z]).into(),
+            // Behind the last rotor there are zeros.
+            (Quantity::Command | Quantity::RotorSpeed, _) => {
+                scaled.into_iter().chain(std::iter::repeat(0.0)).take(N).collect()
+            }
             _ => scaled,
         };
         turned.try_into().map_err(|row: Vec<f64>| {
@@ -162,8 +166,9 @@ impl<'a> Layout<'a> {
     }
 }
 
-/// The names that `entry` gives for a sample of `quantity`, those of its parts for an array, and the sample's form.
-fn named(quantity: Quantity, entry: &Entry) -> Result<(Cow<'_, [Name]>, Shape), LogError> {
+/// The names that `entry` gives for a sample of `quantity` of a vehicle with so many `rotors`, those of its parts for an
+/// array, and the sample's form.
+fn named(quantity: Quantity, entry: &Entry, rotors: usize) -> Result<(Cow<'_, [Name]>, Shape), LogError> {
     let refused = |key, expected: &str, found: &str, advice| {
         Err(LogError::unexpected(Spot::Key(key), expected, found, advice))
     };
@@ -175,7 +180,7 @@ fn named(quantity: Quantity, entry: &Entry) -> Result<(Cow<'_, [Name]>, Shape), 
         return refused(key, "`attitude` alone to have it", "it", "remove it");
     }
     let (key, names, size, shape) = match (&entry.columns, &entry.euler, &entry.matrix) {
-        (Some(columns), None, None) => ("columns", columns, quantity.size(), Shape::Plain),
+        (Some(columns), None, None) => ("columns", columns, quantity.size().unwrap_or(rotors), Shape::Plain),
         (None, Some(euler), None) => ("euler", euler, 3, Shape::Euler),
         (None, None, Some(matrix)) => ("matrix", matrix, 9, Shape::Matrix),
         (None, None, None) if entry.yaw.is_some() => {

@@ -5,6 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
+use vehicles::ROTORS_MAX;
 use vehicles::gaps::of_held;
 
 use crate::quantity::Quantity;
@@ -46,15 +47,17 @@ pub struct Flight {
     pub other_files: Vec<PathBuf>,
     /// What it is for.
     pub role: Role,
+    /// Number of rotors of its vehicle: behind so many, commands and speeds are zero.
+    pub rotors: usize,
     /// Raw motor commands, in the unit of the vehicle file's command map and in its order of rotors. A command
     /// holds until the next.
-    pub command: Channel<4>,
+    pub command: Channel<ROTORS_MAX>,
     /// True if the log writes commands only on change: then a time without commands is no gap.
     pub commands_on_change: bool,
     /// Times between the files of such a log, in which nobody knows if a command changed.
     pub command_breaks_s: Vec<(f64, f64)>,
     /// Speeds of the rotors in rad/s, in the order of the commands.
-    pub rotor_speed: Channel<4>,
+    pub rotor_speed: Channel<ROTORS_MAX>,
     /// Position in W, in m.
     pub position: Channel<3>,
     /// Velocity in W, in m/s.
@@ -121,7 +124,7 @@ impl<const N: usize> AnyChannel for Channel<N> {
 }
 
 impl Flight {
-    /// A flight without samples.
+    /// A flight without samples, of a vehicle with four rotors.
     #[must_use]
     pub fn new(name: impl Into<String>, file: impl Into<PathBuf>, role: Role) -> Self {
         Self {
@@ -129,6 +132,7 @@ impl Flight {
             file: file.into(),
             other_files: Vec::new(),
             role,
+            rotors: 4,
             command: Channel::default(),
             commands_on_change: false,
             command_breaks_s: Vec::new(),

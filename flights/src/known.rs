@@ -20,7 +20,7 @@ const SLACK_S: f64 = 1e-6;
 ///
 /// let mut flight = Flight::new("gap", "log.csv", Role::Fit);
 /// flight.command.time_s = (0..300).map(|k| f64::from(k) * 0.02).filter(|t| !(2.0..3.5).contains(t)).collect();
-/// flight.command.values = vec![[40.0; 4]; flight.command.time_s.len()];
+/// flight.command.values = vec![[40.0; 12]; flight.command.time_s.len()];
 /// let known = KnownRotors::of(&flight);
 /// assert!(known.hold(0.5, 1.9) && !known.hold(1.9, 2.1) && !known.hold(3.6, 3.9) && known.hold(4.1, 5.0));
 /// ```
@@ -78,9 +78,10 @@ impl KnownRotors {
 mod tests {
     use super::*;
     use crate::{Channel, Role};
+    use vehicles::ROTORS_MAX;
 
     fn flight(time_s: Vec<f64>) -> Flight {
-        let command = Channel { values: vec![[1.0; 4]; time_s.len()], time_s };
+        let command = Channel { values: vec![[1.0; ROTORS_MAX]; time_s.len()], time_s };
         Flight { command, ..Flight::new("f", "log", Role::Fit) }
     }
 
@@ -120,7 +121,7 @@ mod tests {
         let mut measured = flight(Vec::new());
         assert_eq!(KnownRotors::of(&measured).stretches_s(), []);
         let time_s = vec![1.0, 1.02, 1.04, 3.0, 3.02];
-        measured.rotor_speed = Channel { values: vec![[500.0; 4]; time_s.len()], time_s };
+        measured.rotor_speed = Channel { values: vec![[500.0; ROTORS_MAX]; time_s.len()], time_s };
         let known = KnownRotors::of(&measured);
         assert!(known.hold(1.0, 1.04) && !known.hold(1.04, 1.1) && known.hold(3.0, 3.02));
     }

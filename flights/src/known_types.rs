@@ -109,13 +109,15 @@ const KNOWN: &[Known] = &[
 ];
 
 impl Known {
-    /// The entry that reads it from `topic`.
-    fn entry(&self, topic: &str) -> Entry {
-        let parts = ["x", "y", "z", "w"].into_iter().enumerate().take(self.quantity.size());
-        let name =
-            |(index, part): (usize, &str)| self.fields.replace('*', part).replace('#', &index.to_string());
+    /// The entry that reads it from `topic`, of a vehicle with so many `rotors`.
+    fn entry(&self, topic: &str, rotors: usize) -> Entry {
+        let axes = ["x", "y", "z", "w"];
+        let name = |index: usize| {
+            let axis = axes.get(index).copied().unwrap_or_default();
+            self.fields.replace('*', axis).replace('#', &index.to_string()).as_str().into()
+        };
         let names: Vec<Name> = if self.fields.contains(['*', '#']) {
-            parts.map(name).map(|name| name.as_str().into()).collect()
+            (0..self.quantity.size().unwrap_or(rotors)).map(name).collect()
         } else {
             self.fields.split(' ').map(Name::from).collect()
         };
@@ -147,7 +149,8 @@ pub fn absent(log: &dyn Log, quantity: Quantity, entry: &Entry) -> Option<Absent
     let (_, kind) = log.topics().into_iter().find(|(name, _)| name == topic)?;
     let validity =
         VALIDITIES.iter().find(|validity| validity.kind == kind && validity.quantity == quantity)?;
-    let known = KNOWN.iter().find(|known| known.kind == kind && known.quantity == quantity)?.entry(topic);
+    // Of these quantities none has a number for each rotor.
+    let known = KNOWN.iter().find(|known| known.kind == kind && known.quantity == quantity)?.entry(topic, 0);
     let plain = |name: &Name| name.plain.clone();
     let declared: Vec<String> = entry.columns.iter().flatten().map(plain).collect();
     if !known.columns.iter().flatten().any(|name| declared.contains(&name.plain)) {
@@ -160,11 +163,11 @@ pub fn absent(log: &dyn Log, quantity: Quantity, entry: &Entry) -> Option<Absent
     Some(Absent { messages, fields: validity.fields })
 }
 
-/// `entry` with what need not be said about a known type of message.
+/// `entry` with what need not be said about a known type of message, of a vehicle with so many `rotors`.
 ///
 /// # Errors
 /// If the entry names a topic alone and its type is not known to hold the quantity.
-pub fn complete(log: &dyn Log, quantity: Quantity, entry: &Entry) -> Result<Entry, LogError> {
+pub fn complete(log: &dyn Log, quantity: Quantity, entry: &Entry, rotors: usize) -> Result<Entry, LogError> {
     let named = entry.names().next().is_some();
     let (false, Some(topic)) = (named, entry.topic.as_deref()) else { return Ok(entry.clone()) };
     let topics = log.topics();
@@ -176,7 +179,7 @@ pub fn complete(log: &dyn Log, quantity: Quantity, entry: &Entry) -> Result<Entr
         let found = format!("the type {kind}");
         LogError::unexpected(Spot::Key("topic"), "a type known to hold it", found, "add `fields` and `unit`")
     })?;
-    let default = known.entry(topic);
+    let default = known.entry(topic, rotors);
     Ok(Entry {
         unit: entry.unit.clone().or(default.unit),
         frame: entry.frame.or(default.frame),
@@ -188,7 +191,7 @@ pub fn complete(log: &dyn Log, quantity: Quantity, entry: &Entry) -> Result<Entr
 
 /// The channels of a log for which the flights file declares none: for each quantity the preferred type that
 /// exactly one topic has. The notes say what was taken and what was not clear.
-pub fn defaults(log: &dyn Log, format: Format) -> (ChannelMap, Vec<String>) {
+pub fn defaults(log: &dyn Log, format: Format, rotors: usize) -> (ChannelMap, Vec<String>) {
     let (mut channels, mut notes) = (ChannelMap::new(), Vec::new());
     if !matches!(format, Format::Mcap | Format::Ulog | Format::Dataflash) {
         return (channels, notes);
@@ -200,7 +203,7 @@ pub fn defaults(log: &dyn Log, format: Format) -> (ChannelMap, Vec<String>) {
                 topics.iter().filter(|(_, kind)| kind == known.kind).map(|(name, _)| name.as_str()).collect();
             match of_kind[..] {
                 [] => continue,
-                [topic] if holds_nothing(log, quantity, &known.entry(topic)) => {
+                [topic] if holds_nothing(log, quantity, &known.entry(topic, rotors)) => {
                     notes.push(format!(
                         "{quantity}: not taken from {topic}, whose messages say that they have none"
                     ));
@@ -208,7 +211,7 @@ pub fn defaults(log: &dyn Log, format: Format) -> (ChannelMap, Vec<String>) {
                 }
                 [topic] => {
                     notes.push(format!("{quantity}: taken from {topic}, as no channel is declared"));
-                    channels.insert(quantity, toml::Spanned::new(0..0, known.entry(topic)));
+                    channels.insert(quantity, toml::Spanned::new(0..0, known.entry(topic, rotors)));
                 }
                 _ => notes.push(format!(
                     "{quantity}: not read, as more than one topic has it ({}); name one in `channels`",

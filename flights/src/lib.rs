@@ -78,7 +78,7 @@ mod ulog_format;
 mod ulog_messages;
 mod units;
 
-pub use canonical::{COLUMNS, Canonical, HEADER, Row, csv, write_csv};
+pub use canonical::{Canonical, HEADER_START, Row, columns, csv, write_csv};
 pub use error::{FlightsError, LogError, Spot};
 pub use finding::Finding;
 pub use flight::{Channel, Flight, Role};

@@ -3,7 +3,7 @@
 //! A mismatch is clear where a known factor, frame or order explains it; otherwise it is only worth a note.
 
 use nalgebra::Vector3;
-use vehicles::Vehicle;
+use vehicles::{ROTORS_MAX, Vehicle};
 
 use crate::agreement::{Agreement, Pairs};
 use crate::declaration::{ChannelMap, Frame};
@@ -32,7 +32,7 @@ const QUIET_ACCELERATION_M_S2: f64 = 0.2;
 const LEANING_TOLERANCE: f64 = 3.0;
 /// And a vector is its twin's derivative within this one.
 const DERIVATIVE_TOLERANCE: f64 = 1.3;
-/// No vehicle with four rotors flies faster, in m/s.
+/// No multirotor flies faster, in m/s.
 const SPEED_MAX_M_S: f64 = 100.0;
 /// Loggers sample at 4 Hz to 5 kHz, and vehicles fly for a second to an hour.
 const PERIOD_RANGE_S: (f64, f64) = (2e-4, 0.25);
@@ -384,11 +384,17 @@ impl Judge<'_> {
         (speed > SPEED_MAX_M_S).then(|| finding(quantity, fits, &what))
     }
 
+    /// All numbers of the rotors that the vehicle has.
+    fn of_rotors<'c>(&self, channel: &'c Channel<ROTORS_MAX>) -> impl Iterator<Item = f64> + Clone + use<'c> {
+        let count = self.vehicle.rotors.len();
+        channel.values.iter().flat_map(move |each| each.iter().take(count).copied())
+    }
+
     /// The commands lie in the vehicle's range.
     fn commands(&self) -> Option<Finding> {
         let quantity = Quantity::Command;
         let map = self.vehicle.command;
-        let (low, high) = range(self.flight.command.values.iter().flatten().copied())?;
+        let (low, high) = range(self.of_rotors(&self.flight.command))?;
         let tolerance = 0.05 * (map.max - map.min);
         let what = format!(
             "its commands go from {low} to {high}, the vehicle's from {} to {} (hover {:.1})",
@@ -414,7 +420,7 @@ impl Judge<'_> {
 
     /// The rotors turn about as fast as hover needs.
     fn rotor_speed(&self) -> Option<Finding> {
-        let speeds = self.flight.rotor_speed.values.iter().flatten().copied();
+        let speeds = self.of_rotors(&self.flight.rotor_speed);
         let (_, high) = range(speeds.clone())?;
         let turning = median(speeds.filter(|speed| *speed > 0.3 * high))?;
         let hover = self.vehicle.hover_speed_rad_s();

@@ -19,7 +19,7 @@ const SLACK_S: f64 = 1e-9;
 /// let mut flight = Flight::new("climb", "log.csv", Role::Test);
 /// let time_s: Vec<f64> = (0..200).map(|k| f64::from(k) * 0.01).collect();
 /// flight.attitude = Channel { values: vec![[1.0, 0.0, 0.0, 0.0]; 200], time_s: time_s.clone() };
-/// flight.command = Channel { values: vec![[40.0; 4]; 200], time_s: time_s.clone() };
+/// flight.command = Channel { values: vec![[40.0; 12]; 200], time_s: time_s.clone() };
 /// flight.position = Channel { values: time_s.iter().map(|t| [0.0, 0.0, *t]).collect(), time_s };
 /// let played = Played::of(&flight)?;
 /// assert!((played.at(1.005, &mut 0).velocity_m_s[2] - 1.0).abs() < 1e-9);
@@ -30,6 +30,8 @@ const SLACK_S: f64 = 1e-9;
 #[derive(Debug, Clone)]
 pub struct Played {
     rows: Vec<Row>,
+    /// Number of rotors of the vehicle.
+    rotors: usize,
     /// Bounds of the windows that count.
     counted_s: (f64, f64),
     /// Stretches within which windows count.
@@ -46,13 +48,13 @@ impl Played {
     pub fn of(flight: &Flight) -> Result<Self, FlightsError> {
         let (_, rows) = rows(&with_rows_at_commands(flight))?;
         let (counted_s, known) = (counted_s(flight, rows[0].time_s), KnownRotors::of(flight));
-        Ok(Self { counted_s, known, gaps: gaps(flight), rows })
+        Ok(Self { counted_s, known, gaps: gaps(flight), rows, rotors: flight.rotors })
     }
 
     /// The rows as a CSV file, as [`crate::csv`] writes it.
     #[must_use]
     pub fn csv(&self) -> String {
-        text(&self.rows)
+        text(&self.rows, self.rotors)
     }
 
     /// The times of the first and the last row.
@@ -197,6 +199,7 @@ fn mixed<const N: usize>(from: &[f64; N], to: &[f64; N], part: f64) -> [f64; N] 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use vehicles::ROTORS_MAX;
 
     #[test]
     fn there_is_a_row_at_every_command_between_attitudes() {
@@ -223,7 +226,7 @@ mod tests {
         let time_s: Vec<f64> = (0..300).map(|k| f64::from(k) * 0.01).collect();
         let kept: Vec<f64> = time_s.iter().copied().filter(|t| !(1.4..1.6).contains(t)).collect();
         flight.position = Channel { values: vec![[0.0; 3]; kept.len()], time_s: kept };
-        flight.command = Channel { values: vec![[40.0; 4]; 300], time_s: time_s.clone() };
+        flight.command = Channel { values: vec![[40.0; ROTORS_MAX]; 300], time_s: time_s.clone() };
         flight.attitude = Channel { values: vec![[1.0, 0.0, 0.0, 0.0]; 300], time_s };
         let played = Played::of(&flight).unwrap();
         for (from_s, to_s, counts) in [
@@ -251,7 +254,7 @@ mod tests {
         flight.attitude = Channel { values: vec![[1.0, 0.0, 0.0, 0.0]; 600], time_s: time_s.clone() };
         flight.angular_velocity = Channel { values: vec![[0.0; 3]; 600], time_s: time_s.clone() };
         let given: Vec<f64> = time_s.into_iter().filter(|t| (1.0..2.0).contains(t) || *t > 4.0).collect();
-        flight.command = Channel { values: vec![[40.0; 4]; given.len()], time_s: given };
+        flight.command = Channel { values: vec![[40.0; ROTORS_MAX]; given.len()], time_s: given };
         let played = Played::of(&flight).unwrap();
         for (from_s, to_s, counts) in [
             (0.5, 0.9, false),

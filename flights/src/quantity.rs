@@ -14,7 +14,7 @@ use serde::Deserialize;
 /// use flights::Quantity;
 ///
 /// let rates = Quantity::AngularVelocity;
-/// assert_eq!((rates.name(), rates.size(), rates.dimension().factor("rad/s")), ("angular_velocity", 3, Some(1.0)));
+/// assert_eq!((rates.name(), rates.size(), rates.dimension().factor("rad/s")), ("angular_velocity", Some(3), Some(1.0)));
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -63,9 +63,9 @@ impl Quantity {
         self.facts().0
     }
 
-    /// How many numbers a sample has.
+    /// How many numbers a sample has; `None` for those that have one for each rotor.
     #[must_use]
-    pub fn size(self) -> usize {
+    pub fn size(self) -> Option<usize> {
         self.facts().1
     }
 
@@ -76,17 +76,17 @@ impl Quantity {
         self.facts().2
     }
 
-    fn facts(self) -> (&'static str, usize, Dimension) {
+    fn facts(self) -> (&'static str, Option<usize>, Dimension) {
         match self {
-            Self::Time => ("time", 1, TIME),
-            Self::Command => ("command", 4, COMMAND),
-            Self::RotorSpeed => ("rotor_speed", 4, ROTOR_SPEED),
-            Self::Position => ("position", 3, LENGTH),
-            Self::Velocity => ("velocity", 3, VELOCITY),
-            Self::Attitude => ("attitude", 4, PURE_NUMBER),
-            Self::AngularVelocity => ("angular_velocity", 3, ANGULAR_VELOCITY),
-            Self::SpecificForce => ("specific_force", 3, ACCELERATION),
-            Self::BatteryVoltage => ("battery_voltage", 1, VOLTAGE),
+            Self::Time => ("time", Some(1), TIME),
+            Self::Command => ("command", None, COMMAND),
+            Self::RotorSpeed => ("rotor_speed", None, ROTOR_SPEED),
+            Self::Position => ("position", Some(3), LENGTH),
+            Self::Velocity => ("velocity", Some(3), VELOCITY),
+            Self::Attitude => ("attitude", Some(4), PURE_NUMBER),
+            Self::AngularVelocity => ("angular_velocity", Some(3), ANGULAR_VELOCITY),
+            Self::SpecificForce => ("specific_force", Some(3), ACCELERATION),
+            Self::BatteryVoltage => ("battery_voltage", Some(1), VOLTAGE),
         }
     }
 }

@@ -95,7 +95,7 @@ impl Reading<'_> {
         let log = whole.as_ref();
         let mut taken = Vec::new();
         if self.channels.is_empty() {
-            (self.channels, taken) = known_types::defaults(log, self.format);
+            (self.channels, taken) = known_types::defaults(log, self.format, self.vehicle.rotors.len());
         }
         let topics: Vec<&str> =
             self.channels.values().filter_map(|entry| entry.get_ref().topic.as_deref()).collect();
@@ -130,6 +130,7 @@ impl Reading<'_> {
 
     fn read_channels(&self, log: &dyn Log) -> Result<(Flight, Seams), FlightsError> {
         let mut flight = Flight::new(self.name, &self.files[0], self.entry.role);
+        flight.rotors = self.vehicle.rotors.len();
         flight.other_files = self.files[1..].to_vec();
         flight.other_files.extend(self.others.values().flat_map(|other| other.files.iter().cloned()));
         let said = &mut Said::default();
@@ -157,7 +158,7 @@ impl Reading<'_> {
             return Channel::default();
         }
         let log = self.log_of(quantity, log);
-        let complete = known_types::complete(log, quantity, entry);
+        let complete = known_types::complete(log, quantity, entry, self.vehicle.rotors.len());
         let read = complete.and_then(|entry| {
             let mut read = channels::read(log, quantity, &entry, self.vehicle, self.entry.trust_units)?;
             if let Some(absent) = known_types::absent(log, quantity, &entry) {

@@ -129,15 +129,7 @@ fn vehicle(path: &Path, read: &ReadFile<'_>, files: &InputFiles) -> Result<Vehic
         files.text(path)
     };
     let read = text(path).map_err(|cause| Diagnostic::unreadable(file.clone(), &cause))?;
-    let vehicle = Vehicle::parse_with(&read, &file, &text)?;
-    match vehicle.rotors.len() {
-        4 => Ok(vehicle),
-        count => {
-            let message = format!("`rotors` has {count} rotors, expected four");
-            let help = "measured flights are read for vehicles with four rotors at present; name another vehicle file";
-            Err(Diagnostic::in_file(file, message).help(help))
-        }
-    }
+    Vehicle::parse_with(&read, &file, &text)
 }
 
 /// What is wrong with the values of keys, before any log is read.

@@ -20,9 +20,9 @@ use parquet::file::properties::{WriterProperties, WriterPropertiesBuilder, Write
 use support::{Motion, crc32};
 
 /// What reading may hold for each byte of a log, and besides: rows of two bytes make rows of numbers, and the definition of
-/// an array in a few bytes makes a table of its 65536 elements.
+/// an array in a few bytes makes a table of its 65536 elements. A row of commands has room for twelve rotors.
 const HELD_PER_BYTE: usize = 1000;
-const HELD_BESIDES: usize = 24 << 20;
+const HELD_BESIDES: usize = 40 << 20;
 
 /// Counts the bytes that each thread holds.
 struct Counting;

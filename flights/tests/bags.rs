@@ -120,7 +120,7 @@ impl Bag {
 fn a_bag_is_read_with_arrays_of_one_length() {
     let flight = Bag::default().read(CHANNELS, "").unwrap_or_else(|error| panic!("{error}"));
     assert_eq!((flight.command.time_s.len(), flight.angular_velocity.time_s.len()), (400, 400));
-    assert_eq!(flight.command.values[7], [100.0, 101.0, 102.0, 103.0]);
+    assert_eq!(flight.command.values[7][..4], [100.0, 101.0, 102.0, 103.0]);
 }
 
 #[test]

@@ -44,7 +44,7 @@ fn a_plain_flight_is_read_without_notes() {
     let flight = read(&Motion::default(), CHANNELS, "").unwrap();
     assert_eq!(flight.notes, [""; 0]);
     assert_eq!(flight.attitude.time_s.len(), 1001);
-    assert_eq!(flight.command.values[7], [100.0, 101.0, 102.0, 103.0]);
+    assert_eq!(flight.command.values[7][..4], [100.0, 101.0, 102.0, 103.0]);
     assert!(
         (flight.attitude.values[0][0] - 1.0).abs() < 0.03,
         "w comes first: {:?}",
@@ -585,7 +585,7 @@ fn the_canonical_file_derives_what_was_not_logged() {
     let written = flights::write_csv(&flight, &path).unwrap();
     assert_eq!((written.rows, written.notes.len()), (1001, 2), "{:?}", written.notes);
     // Its own column map reads it again.
-    let again = place.load("flight.csv", flights::COLUMNS, "").unwrap();
+    let again = place.load("flight.csv", &format!("\n{}", flights::columns(4)), "").unwrap();
     for (a, b) in again.velocity.values.iter().zip(&whole.velocity.values) {
         assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 2e-3), "{a:?} {b:?}");
     }
@@ -631,7 +631,7 @@ fn a_crazyflie_log_is_read() {
     let log = support::crazyflie_log(200);
     place.write("log00", &log);
     let flight = place.load("log00", CRAZYFLIE, "").unwrap();
-    assert_eq!(flight.command.values[3], [10.0, 20.0, 30.0, 40.0]);
+    assert_eq!(flight.command.values[3][..4], [10.0, 20.0, 30.0, 40.0]);
     assert!((flight.specific_force.values[0][2] - 9.80665).abs() < 1e-6);
     assert_eq!(flight.battery_voltage.values[0], [3.7]);
     assert!((flight.command.time_s[3] - 0.03).abs() < 1e-9);
@@ -720,7 +720,7 @@ fn a_recording_of_ours_needs_no_channels() {
     let place = Place::new();
     support::recording(&place.path("log.mcap"), 200);
     let flight = place.load("log.mcap", "", "").unwrap();
-    assert_eq!(flight.command.values[0], [100.0, 101.0, 102.0, 103.0]);
+    assert_eq!(flight.command.values[0][..4], [100.0, 101.0, 102.0, 103.0]);
     assert!((flight.specific_force.values[5][2] - 9.81).abs() < 0.1);
     assert!(flight.notes.iter().any(|note| note.contains("command: taken from /control/command")));
     assert_eq!(flight.angular_velocity.time_s.len(), 200);

@@ -2,12 +2,12 @@
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use crate::parameter::Parameters;
-use crate::prepared::{BOX_STEPS, Equation, Held, Prepared, Tracks};
+use crate::prepared::{BOX_STEPS, EachRotor, Equation, Held, Prepared, Tracks};
 use crate::sensing::SensorErrors;
 use crate::track::Track;
 use nalgebra::Vector3;
 use plant::effects::Stage;
-use plant::{Actuation, Airframe, NewtonEuler, RigidBody, RotorState, State};
+use plant::{Actuation, Airframe, NewtonEuler, PerRotor, RigidBody, RotorState, State};
 use vehicles::Vehicle;
 
 /// The motors are simulated in steps of at most this length.
@@ -17,9 +17,9 @@ const MOTOR_STEP_S: f64 = 0.001;
 #[derive(Debug, Clone)]
 pub struct Rotors {
     /// What turns the vehicle: measured where it was, else what follows from the commands.
-    pub flown: Vec<[RotorState; 4]>,
-    /// What follows from the commands.
-    pub commanded: Vec<[f64; 4]>,
+    pub flown: Vec<PerRotor<RotorState>>,
+    /// What follows from the commands; zeros behind the last rotor.
+    pub commanded: Vec<EachRotor>,
 }
 
 /// The declared vehicle with all that may be changed of it.
@@ -49,10 +49,10 @@ impl Model {
         let pose_s = SensorErrors::of(&self.parameters, values).pose_delay_s;
         if flight.flight.command.is_empty() {
             let flown = measured_rotors(flight, pose_s);
-            return Rotors { commanded: flown.iter().map(|rotors| rotors.map(speed)).collect(), flown };
+            return Rotors { commanded: flown.iter().map(speeds).collect(), flown };
         }
         let mut flown = spun(&self.airframe(values), flight, pose_s);
-        let commanded: Vec<[f64; 4]> = flown.iter().map(|rotors| rotors.map(speed)).collect();
+        let commanded: Vec<EachRotor> = flown.iter().map(speeds).collect();
         if !flight.flight.rotor_speed.is_empty() {
             correct(flight, pose_s, &commanded, &mut flown);
         }
@@ -77,7 +77,7 @@ impl Model {
                     Equation::Acceleration => take(&window.over(&sides.acceleration_W, knot)),
                     Equation::AngularAcceleration => take(&window.over(&sides.angular_B, knot)),
                     Equation::Gyroscope => take(&errors.gyroscope_bias_rad_s),
-                    Equation::RotorSpeed => take(&window.over(&rotors.commanded, knot)),
+                    Equation::RotorSpeed(count) => take(&window.over(&rotors.commanded, knot)[..*count]),
                 }
             }
         }
@@ -87,8 +87,8 @@ impl Model {
 
     /// A rotor's speed that is not believed is compared with nothing.
     fn leave_out_distrusted(&self, flight: &Prepared, residual: &mut [f64]) {
-        let Some(offset) = flight.offset_of(Equation::RotorSpeed) else { return };
-        for rotor in (0..4).filter(|rotor| flight.distrusted[*rotor]) {
+        let Some(offset) = flight.offset_of(flight.rotor_speed()) else { return };
+        for rotor in (0..flight.flight.rotors).filter(|rotor| flight.distrusted[*rotor]) {
             residual.iter_mut().skip(offset + rotor).step_by(flight.width()).for_each(|row| *row = 0.0);
         }
     }
@@ -109,8 +109,7 @@ impl Model {
                 attitude_WB,
                 angular_velocity_B_rad_s: tracks.rates[i].into(),
             };
-            let motion =
-                model.accelerations_under(&actuation, &State { body, rotors: rotors.flown[i].into() });
+            let motion = model.accelerations_under(&actuation, &State { body, rotors: rotors.flown[i] });
             sides.force_B.push(motion.specific_force_B_m_s2.into());
             sides.angular_B.push(motion.angular_acceleration_B_rad_s2.into());
             if has_world {
@@ -169,14 +168,17 @@ struct Sides {
 
 /// How the air moves: what the steady effects make of it, which is the same at every instant.
 fn air(airframe: &Airframe, step_s: f64) -> Actuation {
-    let state =
-        State { body: RigidBody::level_at(Vector3::zeros()), rotors: [RotorState::default(); 4].into() };
-    airframe.begin_tick(&mut airframe.initial_state(0, "identify", step_s), &state, &[0.0; 4], step_s)
+    let count = airframe.vehicle().rotors.len();
+    let rotors = PerRotor::filled(count, RotorState::default());
+    let state = State { body: RigidBody::level_at(Vector3::zeros()), rotors };
+    let commands = PerRotor::filled(count, 0.0);
+    airframe.begin_tick(&mut airframe.initial_state(0, "identify", step_s), &state, &commands, step_s)
 }
 
 /// The rotors that follow from the commands: simulated in fine steps, averaged over one step about each instant.
-fn spun(airframe: &Airframe, flight: &Prepared, pose_s: f64) -> Vec<[RotorState; 4]> {
-    let clock = &flight.layout.clock;
+fn spun(airframe: &Airframe, flight: &Prepared, pose_s: f64) -> Vec<PerRotor<RotorState>> {
+    let (clock, vehicle) = (&flight.layout.clock, airframe.vehicle());
+    let count = vehicle.rotors.len();
     let parts = (clock.step_s / MOTOR_STEP_S - 1e-9).ceil().max(1.0) as usize;
     let step_s = clock.step_s / parts as f64;
     let mut commands = Held::new(&flight.flight.command);
@@ -185,11 +187,12 @@ fn spun(airframe: &Airframe, flight: &Prepared, pose_s: f64) -> Vec<[RotorState;
     let at_s = |step: usize| start_s + step as f64 * step_s;
     let first = commands.at(start_s);
     let mut memory = airframe.initial_state(0, "identify", step_s);
-    let rotors = first.map(|command| RotorState::steady(airframe.vehicle().command.speed(command)));
-    let mut state = State { body: RigidBody::level_at(Vector3::zeros()), rotors: rotors.into() };
+    let steady = |rotor| RotorState::steady(vehicle.commanded_speed_rad_s(rotor, first[rotor]));
+    let mut state =
+        State { body: RigidBody::level_at(Vector3::zeros()), rotors: PerRotor::from_fn(count, steady) };
     let mut out = Vec::with_capacity(clock.count);
     for index in 0..clock.count {
-        let mut sum = [RotorState::default(); 4];
+        let mut sum = PerRotor::filled(count, RotorState::default());
         for part in 0..parts {
             let (from_s, to_s) = (at_s(index * parts + part), at_s(index * parts + part + 1));
             let command = match flight.slow_period_s {
@@ -198,7 +201,7 @@ fn spun(airframe: &Airframe, flight: &Prepared, pose_s: f64) -> Vec<[RotorState;
                 // Where the grid does not lie on the commands' own, a step sees two of them.
                 None => commands.mean(from_s, to_s),
             };
-            let actuation = airframe.begin_tick(&mut memory, &state, &command, step_s);
+            let actuation = airframe.begin_tick(&mut memory, &state, &command[..count], step_s);
             let after = airframe.spun(&actuation, &state.rotors, step_s);
             let half = 0.5 / parts as f64;
             for (sum, (before, after)) in sum.iter_mut().zip(state.rotors.iter().zip(&after)) {
@@ -212,30 +215,32 @@ fn spun(airframe: &Airframe, flight: &Prepared, pose_s: f64) -> Vec<[RotorState;
     out
 }
 
-fn speed(rotor: RotorState) -> f64 {
-    rotor.speed_rad_s
+/// The speeds; zeros behind the last rotor.
+fn speeds(rotors: &PerRotor<RotorState>) -> EachRotor {
+    std::array::from_fn(|rotor| rotors.get(rotor).map_or(0.0, |rotor| rotor.speed_rad_s))
 }
 
 /// Adds to rotors that follow from the commands by how much the measured ones turn faster. Their acceleration stays that
 /// of the commands: even of a smoothed measurement it would be noise for the most part.
-fn correct(flight: &Prepared, pose_s: f64, commanded: &[[f64; 4]], rotors: &mut [[RotorState; 4]]) {
+fn correct(flight: &Prepared, pose_s: f64, commanded: &[EachRotor], rotors: &mut [PerRotor<RotorState>]) {
     let mut difference = Track::sampled(&flight.flight.rotor_speed, -pose_s, &flight.layout.clock);
     for (difference, commanded) in difference.values.iter_mut().zip(commanded) {
         *difference = std::array::from_fn(|i| difference[i] - commanded[i]);
     }
     let smooth = difference.smoothed(BOX_STEPS);
     for (rotors, more) in rotors.iter_mut().zip(&smooth) {
-        for i in (0..4).filter(|i| !flight.distrusted[*i]) {
+        for i in (0..flight.flight.rotors).filter(|i| !flight.distrusted[*i]) {
             rotors[i].speed_rad_s += more[i];
         }
     }
 }
 
-fn measured_rotors(flight: &Prepared, pose_s: f64) -> Vec<[RotorState; 4]> {
+fn measured_rotors(flight: &Prepared, pose_s: f64) -> Vec<PerRotor<RotorState>> {
     let clock = &flight.layout.clock;
     let track = Track::sampled(&flight.flight.rotor_speed, -pose_s, clock);
     let slopes = track.slope(BOX_STEPS, clock.step_s);
     let rotor = |speed_rad_s, acceleration_rad_s2| RotorState { speed_rad_s, acceleration_rad_s2 };
     let rotors = track.values.iter().zip(&slopes);
-    rotors.map(|(speed, slope)| std::array::from_fn(|i| rotor(speed[i], slope[i]))).collect()
+    let count = flight.flight.rotors;
+    rotors.map(|(speed, slope)| PerRotor::from_fn(count, |i| rotor(speed[i], slope[i]))).collect()
 }

@@ -47,7 +47,7 @@ impl Parameters {
         let candidates = baseline.iter().chain(&of_sensors);
         let all = candidates
             .filter(|effect| effect.kind.randomness == Randomness::Deterministic)
-            .flat_map(of_effect)
+            .flat_map(|effect| of_effect(effect, vehicle))
             .collect();
         Self { all, baseline, declared: declared.iter().map(|effect| effect.kind).collect() }
     }
@@ -110,7 +110,7 @@ impl Parameter {
 /// The grid cannot see less.
 const DELAY_STEP_S: f64 = 0.002;
 
-fn of_effect(effect: &Effect) -> Vec<Parameter> {
+fn of_effect(effect: &Effect, vehicle: &Vehicle) -> Vec<Parameter> {
     let kind = effect.kind;
     let of_spec = |(index, spec): (usize, &ParameterSpec)| {
         let reach = (spec.nominal - spec.neutral?).abs();
@@ -118,5 +118,5 @@ fn of_effect(effect: &Effect) -> Vec<Parameter> {
         let step = if kind.is_delay { DELAY_STEP_S } else { scale / 50.0 };
         Some(Parameter { kind, index, baseline: effect.values[index], scale, step })
     };
-    kind.parameters.iter().enumerate().filter_map(of_spec).collect()
+    kind.parameters_for(vehicle).iter().enumerate().filter_map(of_spec).collect()
 }

@@ -39,11 +39,12 @@ impl Measured {
         let at_s = |tick: usize| start_s + tick as f64 * TICK_S;
         let mut hint = 0;
         let mut before = self.played.at(start_s, &mut hint);
+        let count = airframe.vehicle().rotors.len();
         let mut plant = FreeFlight::new(NewtonEuler::flying(airframe, 1), body(&before), memory);
-        plant.settle_rotors(&before.command);
+        plant.settle_rotors(&before.command[..count]);
         let mut errors = WindowEndErrors::default();
         for tick in 1..=((end_s - start_s + SLACK_S) / TICK_S) as usize {
-            plant.step(&before.command, TICK_S, &[]);
+            plant.step(&before.command[..count], TICK_S, &[]);
             before = self.played.at(at_s(tick), &mut hint);
             if tick % window == 0 {
                 let measured = body(&before);

@@ -8,7 +8,7 @@ use crate::window::{NUMEROV, SIMPSON, Window, central_difference, second_differe
 use flights::{Channel, Flight, KnownRotors, SETTLE_S};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use vehicles::gaps::held_period_s;
-use vehicles::{CommandMap, MotorModel, Vehicle};
+use vehicles::{CommandMap, MotorModel, ROTORS_MAX, Vehicle};
 
 /// An equation that measurement and model are both put into.
 ///
@@ -29,14 +29,18 @@ pub enum Equation {
     /// What the gyroscope reads against the attitude's rate of change, in B: the sensors alone.
     Gyroscope,
     /// Measured speeds of the rotors against those that follow from the commands.
-    RotorSpeed,
+    /// It has so many rotors.
+    RotorSpeed(usize),
 }
+
+/// A number for each rotor; zeros behind the last.
+pub type EachRotor = [f64; ROTORS_MAX];
 
 impl Equation {
     /// How many components it has.
     #[must_use]
     pub fn size(self) -> usize {
-        if self == Equation::RotorSpeed { 4 } else { 3 }
+        if let Equation::RotorSpeed(count) = self { count } else { 3 }
     }
 
     /// What reports call it.
@@ -57,7 +61,7 @@ impl Equation {
             Equation::Acceleration => ("acceleration", "m/s^2"),
             Equation::AngularAcceleration => ("angular_acceleration", "rad/s^2"),
             Equation::Gyroscope => ("gyroscope", "rad/s"),
-            Equation::RotorSpeed => ("rotor_speed", "rad/s"),
+            Equation::RotorSpeed(_) => ("rotor_speed", "rad/s"),
         }
     }
 }
@@ -142,7 +146,7 @@ pub struct Prepared<'f> {
     /// What its pose is late by, beyond what `sensor-delay` has.
     pub late: Lateness,
     /// Rotors whose measured speed is not believed.
-    pub distrusted: [bool; 4],
+    pub distrusted: [bool; ROTORS_MAX],
     /// The period of commands that are logged slower than the motors follow, without measured speeds.
     pub slow_period_s: Option<f64>,
 }
@@ -155,7 +159,7 @@ impl<'f> Prepared<'f> {
     pub fn new(flight: &'f Flight, box_s: Option<f64>, propulsion: &Propulsion) -> Result<Self, Unusable> {
         let slow_period_s = propulsion.slow_period_s(flight);
         let equations = equations(flight, slow_period_s.is_some());
-        if equations.iter().all(|equation| *equation == Equation::RotorSpeed) {
+        if equations.iter().all(|equation| matches!(equation, Equation::RotorSpeed(_))) {
             let motor_s = propulsion.motor_s;
             let slow = slow_period_s.map(|period_s| Unusable::SlowCommands { period_s, motor_s });
             return Err(Unusable::of_channels(flight).or(slow).unwrap_or(Unusable::NoMotion));
@@ -171,7 +175,7 @@ impl<'f> Prepared<'f> {
         let clock = Clock::spanning(start_s, end_s, step_s);
         let windows = equations.iter().map(|equation| windows(*equation, flight, step_s)).collect();
         let layout = Layout { clock, knots: Vec::new(), equations, windows };
-        let (late, distrusted) = (Lateness::default(), [false; 4]);
+        let (late, distrusted) = (Lateness::default(), [false; ROTORS_MAX]);
         let mut prepared = Self { flight, layout, late, distrusted, slow_period_s };
         prepared.layout.knots = prepared.knots(propulsion);
         if prepared.layout.knots.len() >= 3 { Ok(prepared) } else { Err(prepared.unusable(propulsion)) }
@@ -222,6 +226,11 @@ impl<'f> Prepared<'f> {
         self.layout.equations.iter().map(|equation| equation.size()).sum()
     }
 
+    /// The equation of the rotor speeds.
+    pub fn rotor_speed(&self) -> Equation {
+        Equation::RotorSpeed(self.flight.rotors)
+    }
+
     /// Where the rows of `equation` start within a knot.
     pub fn offset_of(&self, equation: Equation) -> Option<usize> {
         let at = self.layout.equations.iter().position(|known| *known == equation)?;
@@ -267,7 +276,9 @@ impl<'f> Prepared<'f> {
                             (model.over(&gyroscope.values, knot), measured.over(&turning, knot));
                         rows.extend((0..3).map(|axis| gyro[axis] - turned[axis]));
                     }
-                    Equation::RotorSpeed => rows.extend(measured.over(&speeds.values, knot)),
+                    Equation::RotorSpeed(count) => {
+                        rows.extend(&measured.over(&speeds.values, knot)[..*count])
+                    }
                 }
             }
         }
@@ -409,13 +420,17 @@ impl Propulsion {
 
     /// Mean speeds of the rotors at the instants of `clock`, by commands or else as measured.
     fn speeds(&self, flight: &Flight, clock: &Clock) -> Vec<f64> {
-        let mean = |speeds: [f64; 4]| speeds.iter().sum::<f64>() / 4.0;
+        let mean = |speeds: EachRotor| speeds.iter().sum::<f64>() / flight.rotors as f64;
         if flight.command.is_empty() {
             let measured = Track::sampled(&flight.rotor_speed, 0.0, clock).values;
             return measured.into_iter().map(mean).collect();
         }
         let mut held = Held::new(&flight.command);
-        let commanded = |index| held.at(clock.at(index)).map(|command| self.command.speed(command));
+        let commanded = |index| {
+            let mut each = held.at(clock.at(index));
+            each[..flight.rotors].iter_mut().for_each(|command| *command = self.command.speed(*command));
+            each
+        };
         (0..clock.count).map(commanded).map(mean).collect()
     }
 }
@@ -451,18 +466,18 @@ fn sampled_about<const N: usize>(
 /// A channel whose samples hold until the next.
 #[derive(Debug)]
 pub struct Held<'c> {
-    channel: &'c Channel<4>,
+    channel: &'c Channel<ROTORS_MAX>,
     next: usize,
 }
 
 impl<'c> Held<'c> {
     /// From its beginning.
-    pub fn new(channel: &'c Channel<4>) -> Self {
+    pub fn new(channel: &'c Channel<ROTORS_MAX>) -> Self {
         Self { channel, next: 0 }
     }
 
     /// What holds at `at_s`; times have to grow from call to call. Before the first sample, the first.
-    pub fn at(&mut self, at_s: f64) -> [f64; 4] {
+    pub fn at(&mut self, at_s: f64) -> EachRotor {
         // Times are differences of decimal fractions since 1970: the slack puts an instant on its own sample.
         while self.next < self.channel.time_s.len() && self.channel.time_s[self.next] <= at_s + SLACK_S {
             self.next += 1;
@@ -471,7 +486,7 @@ impl<'c> Held<'c> {
     }
 
     /// The commands at `at_s`, interpolated between the logged ones; times have to grow from call to call.
-    pub fn between(&mut self, at_s: f64) -> [f64; 4] {
+    pub fn between(&mut self, at_s: f64) -> EachRotor {
         let before = self.at(at_s);
         let (Some(last), Some(next_s)) = (self.next.checked_sub(1), self.channel.time_s.get(self.next))
         else {
@@ -483,8 +498,8 @@ impl<'c> Held<'c> {
     }
 
     /// The mean of what holds from `from_s` to `to_s`; times have to grow from call to call.
-    pub fn mean(&mut self, from_s: f64, to_s: f64) -> [f64; 4] {
-        let (mut at_s, mut sum) = (from_s, [0.0; 4]);
+    pub fn mean(&mut self, from_s: f64, to_s: f64) -> EachRotor {
+        let (mut at_s, mut sum) = (from_s, [0.0; ROTORS_MAX]);
         loop {
             let value = self.at(at_s);
             let end_s = self.channel.time_s.get(self.next).copied().unwrap_or(f64::INFINITY);
@@ -526,7 +541,7 @@ fn equations(flight: &Flight, is_slow: bool) -> Vec<Equation> {
         // Torques follow commands that were not logged.
         (Equation::AngularAcceleration, (has_attitude || has_gyroscope) && !is_slow),
         (Equation::Gyroscope, has_attitude && has_gyroscope && !is_assumed),
-        (Equation::RotorSpeed, has_both_speeds),
+        (Equation::RotorSpeed(flight.rotors), has_both_speeds),
     ];
     all.into_iter().filter(|(_, is_there)| *is_there).map(|(equation, _)| equation).collect()
 }
@@ -535,7 +550,7 @@ fn windows(equation: Equation, flight: &Flight, step_s: f64) -> (Window, Window)
     let plain = Window::b_spline(BOX_STEPS);
     let central = central_difference(step_s);
     match equation {
-        Equation::SpecificForce | Equation::RotorSpeed => (plain.clone(), plain),
+        Equation::SpecificForce | Equation::RotorSpeed(_) => (plain.clone(), plain),
         Equation::Acceleration if flight.position.is_empty() => Translation::Velocity.windows(step_s),
         Equation::Acceleration => Translation::Position.windows(step_s),
         Equation::AngularAcceleration if flight.angular_velocity.is_empty() => {

@@ -5,6 +5,7 @@ use flights::{Channel, Flight, FlightSet};
 use identify::report::{Estimate, Report};
 use identify::run::identify;
 use simulated::cases::Case;
+use vehicles::ROTORS_MAX;
 
 /// Flights of a vehicle that is 8 % heavier than declared.
 fn heavy(duration_s: f64) -> Case {
@@ -93,12 +94,13 @@ fn commands_that_are_written_on_change_hold_until_the_next() {
     let written = |is_on_change: bool| {
         changed(&case, |flight| {
             // A message when the command changes by more than 1 %.
-            let mut last: Option<[f64; 4]> = None;
+            let mut last: Option<[f64; ROTORS_MAX]> = None;
             let values = flight.command.values.clone();
             let is_new: Vec<bool> = values
                 .iter()
                 .map(|value| {
-                    let far = |old: [f64; 4]| old.iter().zip(value).any(|(a, b)| (a - b).abs() > 1e-2 * a);
+                    let far =
+                        |old: [f64; ROTORS_MAX]| old.iter().zip(value).any(|(a, b)| (a - b).abs() > 1e-2 * a);
                     let is_new = last.is_none_or(far);
                     last = if is_new { Some(*value) } else { last };
                     is_new

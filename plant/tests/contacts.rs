@@ -83,7 +83,7 @@ fn a_centre_of_mass_that_is_elsewhere_moves_the_whole_hull_and_leaves_its_shape(
     let offset_B_m = Vector3::new(0.02, -0.01, 0.005);
     let kind = plant::effects::find("com-offset").unwrap();
     let [x_m, y_m, z_m]: [f64; 3] = offset_B_m.into();
-    let effect = plant::effects::Effect { kind, values: [x_m, y_m, z_m, 0.0, 0.0, 0.0] };
+    let effect = plant::effects::Effect { kind, values: common::values([x_m, y_m, z_m]) };
     let (moved, declared) = (Hull::of(&Airframe::with_effects(hummingbird(), vec![effect])), hull());
     assert!((moved.disc_radius_m - declared.disc_radius_m).abs() < 1e-12);
     assert!((moved.centre_B_m - (declared.centre_B_m - offset_B_m)).norm() < 1e-12);

@@ -63,7 +63,10 @@ fn the_vehicles_effects_come_before_the_scenes() {
     let found: Vec<_> =
         airframe.effects().iter().map(|effect| (effect.kind.name, effect.values[0])).collect();
     assert_eq!(found, [("rotor-drag", 8e-5), ("wind", 3.0)]);
-    assert_eq!(airframe.effects()[1].values[1..], [0.0; 5], "what is left out is neutral");
+    assert!(
+        airframe.effects()[1].values[1..].iter().all(|value| *value == 0.0),
+        "what is left out is neutral"
+    );
 }
 
 #[test]
@@ -186,4 +189,22 @@ fn a_table_of_a_file_replaces_that_of_its_base_whole() {
     let error =
         of("[body]\nmass = { value = 1, unit = \"kg\", source = \"test\", uncertainty = 0 }\n").unwrap_err();
     assert!(error.to_string().contains("missing key `body.gravity`"), "{error}");
+}
+
+/// A Hummingbird lacks a fifth rotor, and a hexacopter has it.
+#[test]
+fn a_loss_of_a_rotor_that_the_vehicle_lacks_is_refused() {
+    let weak = |rotor: usize| {
+        format!(
+            "\n[[effects]]\nname = \"weak-rotor\"\nloss_{rotor} = {{ value = 0.1, unit = \"1\", source = \"test\", \
+             uncertainty = \"exact\" }}\n"
+        )
+    };
+    assert!(airframe(&weak(4), "").is_ok());
+    assert_refused(&weak(5), 4, &["loss_5", "a rotor of the vehicle, which has 4"]);
+    let hexacopter = Vehicle::load(Path::new("../vehicles/dji-f550.toml")).unwrap();
+    for (rotor, is_there) in [(6, true), (7, false)] {
+        let scene = Scene::parse(&format!("name = \"test\"\n{}", weak(rotor)), "here.toml").unwrap();
+        assert_eq!(Airframe::from_files(hexacopter.clone(), &scene.effects).is_ok(), is_there, "{rotor}");
+    }
 }

@@ -92,7 +92,7 @@ impl Flight {
         Self { model, effects: carried, state }
     }
 
-    fn tick(&mut self, commands: &[f64; 4]) {
+    fn tick(&mut self, commands: &[f64]) {
         let actuation = self.model.airframe().begin_tick(&mut self.effects, &self.state, commands, TICK_S);
         self.model.advance(&mut self.state, &actuation, TICK_S);
     }
@@ -144,11 +144,36 @@ fn with_neutral_parameters_an_effect_does_nothing_to_the_last_bit() {
 fn every_parameter_of_every_effect_matters() {
     for kind in CATALOGUE {
         let nominal = end(&with_drag(Some(kind.nominal())));
-        for (i, spec) in kind.parameters.iter().enumerate() {
+        for (i, spec) in kind.parameters_for(&hummingbird()).iter().enumerate() {
             let mut changed = kind.nominal();
             changed.values[i] = 0.5 * (spec.nominal + spec.max);
             assert!(end(&with_drag(Some(changed))) != nominal, "{}.{} does nothing", kind.name, spec.name);
         }
+    }
+}
+
+/// Each loss weakens the rotor of its number alone, also of twelve.
+#[test]
+fn each_of_twelve_rotors_has_a_loss_of_its_own() {
+    let rotors = [(); 3].iter().flat_map(|()| hummingbird().rotors).collect();
+    let vehicle = Vehicle { rotors, ..hummingbird() };
+    let state = State { rotors: [RotorState::steady(400.0); 12].into(), ..lively() };
+    let kind = find("weak-rotor").unwrap();
+    assert_eq!(kind.parameters_for(&vehicle).len(), 12);
+    let thrusts = |effect: Effect| {
+        let mut flight = Flight::new(vehicle.clone(), &[effect], state);
+        flight.tick(&[76.5; 12]);
+        flight.state.body.angular_velocity_B_rad_s
+    };
+    let sound = thrusts(kind.neutral());
+    for rotor in 0..12 {
+        let mut weak = kind.neutral();
+        weak.values[rotor] = 0.5;
+        let turn = thrusts(weak) - sound;
+        // Less thrust at the arm: the vehicle begins to turn towards the weak rotor.
+        let arm = vehicle.rotors[rotor].position_m;
+        let towards = Vector3::z().cross(&arm);
+        assert!(turn.xy().dot(&towards.xy()) > 0.0, "rotor {}: {turn:?} {arm:?}", rotor + 1);
     }
 }
 
@@ -408,7 +433,7 @@ fn spread(samples: &[f64], lag: usize) -> (f64, f64) {
 fn turbulence_has_the_strength_and_length_of_the_specification() {
     // At 30.48 m, 100 feet, in a wind of 10 m/s: the bounds are six standard deviations of the estimates.
     let (dt_s, ticks) = (0.1, 400_000);
-    let actuations = lags("turbulence", [10.0, 0.0, 0.0, 0.0, 0.0, 0.0], 30.48, dt_s, ticks);
+    let actuations = lags("turbulence", common::values([10.0]), 30.48, dt_s, ticks);
     let shape: f64 = 0.177 + 0.0823;
     for (axis, sigma_m_s, length_m) in [
         (0, 1.0 / libm::pow(shape, 0.4), 30.48 / libm::pow(shape, 1.2)),
@@ -430,7 +455,7 @@ fn turbulence_has_the_strength_and_length_of_the_specification() {
 
 #[test]
 fn turbulence_near_the_ground_fades_with_height_and_differs_between_rotors() {
-    let values = [0.1, 0.3, 0.05, 0.0, 0.0, 0.0];
+    let values = common::values([0.1, 0.3, 0.05]);
     let sigma = |height_m: f64| {
         let actuations = lags("ground-turbulence", values, height_m, TICK_S, 200_000);
         spread(&actuations.iter().map(|actuation| actuation.thrust_deviation[0]).collect::<Vec<_>>(), 50)

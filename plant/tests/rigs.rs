@@ -127,7 +127,7 @@ fn hung_at_rest_the_accelerometer_feels_g_before_anything_has_moved() {
 #[test]
 fn the_bearing_holds_the_frame_where_it_is_whatever_the_centre_of_mass() {
     let kind = plant::effects::find("com-offset").unwrap();
-    let effect = plant::effects::Effect { kind, values: [0.02, -0.01, 0.005, 0.0, 0.0, 0.0] };
+    let effect = plant::effects::Effect { kind, values: common::values([0.02, -0.01, 0.005]) };
     let model = NewtonEuler::flying(Airframe::with_effects(hummingbird(), vec![effect]), 1);
     let effects = model.airframe().initial_state(0, "plant", TICK_S);
     let scene = scene(FIXED);

@@ -44,18 +44,19 @@ fn fault(
 
 fn frozen(evidence: &Evidence) -> Option<Fault> {
     let flight = evidence.flight;
-    let map = evidence.model.vehicle.command;
+    let (map, rotors) = (evidence.model.vehicle.command, flight.flight.rotors);
     // At its limits a command may stay.
     let at_limit = |value: f64| value <= map.min || value >= map.max;
     let stretch = |rotor: usize| longest(flight, &flight.flight.command, rotor, FROZEN_S, at_limit);
     let stretches: Vec<(usize, Stretch)> =
-        (0..4).filter_map(|rotor| Some((rotor, stretch(rotor)?))).collect();
+        (0..rotors).filter_map(|rotor| Some((rotor, stretch(rotor)?))).collect();
     let (rotor, longest) = *stretches.first()?;
     // All commands may stand still on a stand; then the vehicle does not go on as before.
-    if stretches.len() == 4 && !goes_on(evidence, &longest) {
+    if stretches.len() == rotors && !goes_on(evidence, &longest) {
         return None;
     }
-    let channel = if stretches.len() == 4 { "command".to_owned() } else { format!("command.{}", rotor + 1) };
+    let channel =
+        if stretches.len() == rotors { "command".to_owned() } else { format!("command.{}", rotor + 1) };
     let expected = "a number that changes while the vehicle is controlled".to_owned();
     Some(fault(evidence, channel, "frozen", expected, longest.found(), LOGGER))
 }

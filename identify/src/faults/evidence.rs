@@ -4,7 +4,7 @@
 use super::fault::Part;
 use super::twin::Twin;
 use crate::model::Model;
-use crate::prepared::{BOX_STEPS, Equation, Prepared, Tracks};
+use crate::prepared::{BOX_STEPS, EachRotor, Equation, Prepared, Tracks};
 use crate::rows::column;
 use crate::track::Track;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -20,9 +20,9 @@ pub struct Evidence<'p> {
     pub doubted: Vec<Part>,
     tracks: Tracks,
     /// Speeds that follow from the commands, on the grid.
-    commanded: Vec<[f64; 4]>,
+    commanded: Vec<EachRotor>,
     /// Measured speeds on the grid; zero where there are none.
-    measured: Vec<[f64; 4]>,
+    measured: Vec<EachRotor>,
 }
 
 impl<'p> Evidence<'p> {
@@ -46,7 +46,7 @@ impl<'p> Evidence<'p> {
             Equation::SpecificForce => Part::Accelerometer,
             Equation::Acceleration => Part::Translation,
             Equation::AngularAcceleration | Equation::Gyroscope => Part::Gyroscope,
-            Equation::RotorSpeed => Part::RotorSpeed,
+            Equation::RotorSpeed(_) => Part::RotorSpeed,
         };
         if self.doubted.contains(&source) {
             return None;
@@ -105,12 +105,12 @@ impl<'p> Evidence<'p> {
     }
 
     /// Squared speeds that follow from the commands, about `knot` less `late` instants; `None` outside the grid.
-    pub fn commanded_squares(&self, knot: usize, late: usize) -> Option<[f64; 4]> {
+    pub fn commanded_squares(&self, knot: usize, late: usize) -> Option<EachRotor> {
         squares_about(&self.commanded, knot, late)
     }
 
     /// Squared speeds as measured, like [`Self::commanded_squares`].
-    pub fn measured_squares(&self, knot: usize, late: usize) -> Option<[f64; 4]> {
+    pub fn measured_squares(&self, knot: usize, late: usize) -> Option<EachRotor> {
         squares_about(&self.measured, knot, late)
     }
 
@@ -118,7 +118,8 @@ impl<'p> Evidence<'p> {
     pub fn thrust_m_s2(&self, knot: usize) -> f64 {
         let vehicle = &self.model.vehicle;
         let squares = self.commanded_squares(knot, 0).unwrap_or_default();
-        vehicle.thrust_coefficient * squares.iter().sum::<f64>() / vehicle.mass_kg
+        let upwards = vehicle.rotors.iter().zip(squares).map(|(rotor, square)| rotor.axis.z * square);
+        vehicle.thrust_coefficient * upwards.sum::<f64>() / vehicle.mass_kg
     }
 
     fn accelerations_W(&self) -> Option<Vec<Vec<f64>>> {
@@ -131,7 +132,7 @@ impl<'p> Evidence<'p> {
 }
 
 /// Mean squares about `knot` less `late` instants; `None` outside the grid.
-fn squares_about(speeds: &[[f64; 4]], knot: usize, late: usize) -> Option<[f64; 4]> {
+fn squares_about(speeds: &[EachRotor], knot: usize, late: usize) -> Option<EachRotor> {
     let middle = knot.checked_sub(late).filter(|middle| *middle >= BOX_STEPS)?;
     let about = speeds.get(middle - BOX_STEPS..=middle + BOX_STEPS)?;
     let sum = |rotor: usize| about.iter().map(|speeds| speeds[rotor] * speeds[rotor]).sum::<f64>();

@@ -22,10 +22,10 @@ const MOTOR: &str = "check motor, propeller and the column of the command";
 /// Finds faults of the rotors in each flight. Faulty sensors are distrusted in `problem`.
 pub fn find(problem: &mut Problem) -> Vec<Fault> {
     let speeds: Vec<Option<Speeds>> = problem.flights().map(|flight| Speeds::of(problem, flight)).collect();
-    let mut faults = Vec::new();
+    let (mut faults, rotors) = (Vec::new(), problem.model.vehicle.rotors.len());
     for at in 0..speeds.len() {
         let suspicions: Vec<(usize, Suspicion)> =
-            (0..4).filter_map(|rotor| Some((rotor, suspicion(&speeds, at, rotor)?))).collect();
+            (0..rotors).filter_map(|rotor| Some((rotor, suspicion(&speeds, at, rotor)?))).collect();
         // All at once: if every sensor is wrong, one alone improves nothing.
         suspicions.iter().for_each(|(rotor, _)| distrust(problem, at, *rotor, true));
         for (rotor, suspicion) in suspicions {
@@ -67,22 +67,23 @@ struct Suspicion {
 
 /// Measured and expected speeds of one flight's rotors.
 struct Speeds {
-    measured: [Vec<f64>; 4],
-    expected: [Vec<f64>; 4],
+    measured: Vec<Vec<f64>>,
+    expected: Vec<Vec<f64>>,
 }
 
 impl Speeds {
     /// Speeds at all knots; `None` if the flight does not have both.
     fn of(problem: &Problem, flight: &Prepared) -> Option<Self> {
-        flight.offset_of(Equation::RotorSpeed)?;
+        flight.offset_of(flight.rotor_speed())?;
         let declared = problem.model.parameters.baseline();
         let rows = problem.model.tracks(flight, &declared).rows;
         let commanded = problem.model.rotors(flight, &declared).commanded;
+        let rotors = || 0..flight.flight.rotors;
         let at_knots =
             |rotor: usize| flight.layout.knots.iter().map(|knot| commanded[*knot][rotor]).collect();
         Some(Self {
-            measured: std::array::from_fn(|rotor| column(flight, &rows, Equation::RotorSpeed, rotor)),
-            expected: std::array::from_fn(at_knots),
+            measured: rotors().map(|rotor| column(flight, &rows, flight.rotor_speed(), rotor)).collect(),
+            expected: rotors().map(at_knots).collect(),
         })
     }
 
@@ -107,7 +108,7 @@ fn suspicion(flights: &[Option<Speeds>], at: usize, rotor: usize) -> Option<Susp
             found: format!("{here:.3} of it"),
         })
     };
-    let others = (0..4).filter(|other| *other != rotor).map(|other| speeds.ratio(other));
+    let others = (0..speeds.measured.len()).filter(|other| *other != rotor).map(|other| speeds.ratio(other));
     let elsewhere = (0..flights.len()).filter(|other| *other != at);
     let elsewhere = elsewhere.filter_map(|other| Some(flights[other].as_ref()?.ratio(rotor)));
     // Of two flights, the one further from its commands is wrong.
@@ -137,7 +138,7 @@ fn motion_cost(problem: &Problem, at: usize) -> f64 {
     let Some(flight) = problem.flights().nth(at) else { return 0.0 };
     let residual = problem.model.residual_under(flight, &declared);
     let measured = problem.model.tracks(flight, &declared).rows;
-    let of_motion = |equation: &Equation| !matches!(equation, Equation::RotorSpeed | Equation::Gyroscope);
+    let of_motion = |equation: &Equation| !matches!(equation, Equation::RotorSpeed(_) | Equation::Gyroscope);
     let mut sum = 0.0;
     for equation in flight.layout.equations.iter().filter(|equation| of_motion(equation)) {
         for axis in 0..equation.size() {
@@ -150,7 +151,7 @@ fn motion_cost(problem: &Problem, at: usize) -> f64 {
     sum
 }
 
-/// Fault of a flight with rotor speeds and without commands: a sensor that reads half or twice of the other three. No
+/// Fault of a flight with rotor speeds and without commands: a sensor that reads half or twice of the others. No
 /// rotor carries its share of the weight at such a speed.
 pub fn among_each_other(flight: &Prepared) -> Option<Fault> {
     let channel = &flight.flight.rotor_speed;
@@ -165,8 +166,9 @@ pub fn among_each_other(flight: &Prepared) -> Option<Fault> {
     };
     let count = in_flight().count().max(1) as f64;
     let mean = |rotor: usize| in_flight().map(|speeds| speeds[rotor]).sum::<f64>() / count;
-    (0..4).find_map(|rotor| {
-        let others = middle((0..4).filter(|other| *other != rotor).map(mean))?;
+    let rotors = flight.flight.rotors;
+    (0..rotors).find_map(|rotor| {
+        let others = middle((0..rotors).filter(|other| *other != rotor).map(mean))?;
         is_off_scale(mean(rotor) / others).then(|| Fault {
             flight: flight.flight.name.clone(),
             channel: format!("rotor_speed.{}", rotor + 1),

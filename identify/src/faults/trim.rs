@@ -10,25 +10,37 @@ use crate::prepared::{Equation, Prepared};
 use crate::rows::column;
 use crate::statistics::mean;
 use nalgebra::{Matrix4, Vector4};
-use vehicles::Vehicle;
+use vehicles::{Rotor, Vehicle};
 
 const ADVICE: &str =
     "check if the vehicle was held, if rotors or payload changed, and if `command` or `rotor_speed` is wrong";
 
 /// Greatest constant angular accelerations about x, y and z that the rotors of `vehicle` balance at hover, in rad/s^2;
-/// `None` if the rotors cannot hover.
+/// `None` if the rotors cannot hover. With other numbers of rotors than four they are an upper bound: those under which the
+/// rotors carry the weight, whatever torque they make about the other axes.
 pub fn greatest_rad_s2(vehicle: &Vehicle) -> Option<[f64; 3]> {
     let lever = vehicle.torque_coefficient / vehicle.thrust_coefficient;
-    let [a, b, c, d] = &vehicle.rotors[..] else { return None };
-    let columns = [a, b, c, d].map(|rotor| {
-        let at = rotor.position_m;
-        Vector4::new(1.0, at.y, -at.x, -rotor.spin * rotor.torque_scale * lever)
-    });
-    let thrusts_of = Matrix4::from_columns(&columns).try_inverse()?;
-    let hover = thrusts_of * Vector4::new(vehicle.mass_kg * vehicle.gravity_m_s2, 0.0, 0.0, 0.0);
+    let of_thrust = |rotor: &Rotor| {
+        let (at, axis) = (rotor.position_m, rotor.axis);
+        let torque = at.cross(&axis) - axis * (rotor.spin * rotor.torque_scale * lever);
+        Vector4::new(axis.z, torque.x, torque.y, torque.z)
+    };
+    let columns: Vec<Vector4<f64>> = vehicle.working_rotors().map(of_thrust).collect();
     let thrust = |speed: f64| vehicle.thrust_coefficient * speed * speed;
     let least_rad_s = if vehicle.command.zero_is_off { 0.0 } else { vehicle.command.speed_at_min_rad_s };
-    let (least, most) = (thrust(least_rad_s), thrust(vehicle.command.speed_at_max_rad_s));
+    let limits = [thrust(least_rad_s), thrust(vehicle.command.speed_at_max_rad_s)];
+    let weight = vehicle.mass_kg * vehicle.gravity_m_s2;
+    let torques = match &columns[..] {
+        [a, b, c, d] => of_four(&Matrix4::from_columns(&[*a, *b, *c, *d]), weight, limits)?,
+        columns => carrying(columns, weight, limits)?,
+    };
+    Some(std::array::from_fn(|axis| torques[axis] / vehicle.inertia_kg_m2[(axis, axis)]))
+}
+
+/// Greatest torques of four rotors, N*m, without any about the other axes.
+fn of_four(columns: &Matrix4<f64>, weight: f64, [least, most]: [f64; 2]) -> Option<[f64; 3]> {
+    let thrusts_of = columns.try_inverse()?;
+    let hover = thrusts_of * Vector4::new(weight, 0.0, 0.0, 0.0);
     if hover.iter().any(|thrust| !(least..=most).contains(thrust)) {
         return None;
     }
@@ -42,8 +54,29 @@ pub fn greatest_rad_s2(vehicle: &Vehicle) -> Option<[f64; 3]> {
             });
             rooms.filter(|room| !room.is_nan()).fold(f64::INFINITY, f64::min)
         };
-        reach(1.0).max(reach(-1.0)) / vehicle.inertia_kg_m2[(axis, axis)]
+        reach(1.0).max(reach(-1.0))
     }))
+}
+
+/// Greatest torques of any rotors that carry `weight`, N*m: the rotors that turn most for what they lift go first.
+fn carrying(columns: &[Vector4<f64>], weight: f64, [least, most]: [f64; 2]) -> Option<[f64; 3]> {
+    let lifted: f64 = columns.iter().map(|column| column[0]).sum();
+    if !(least * lifted..=most * lifted).contains(&weight) {
+        return None;
+    }
+    let reach = |axis: usize, sign: f64| {
+        let mut turns: Vec<_> =
+            columns.iter().map(|column| (sign * column[axis + 1] / column[0], column[0])).collect();
+        turns.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let (mut left, mut torque) = (weight - least * lifted, 0.0);
+        for (turn, up) in turns {
+            let more = left.min((most - least) * up);
+            left -= more;
+            torque += turn * (least * up + more);
+        }
+        torque
+    };
+    Some(std::array::from_fn(|axis| reach(axis, 1.0).max(reach(axis, -1.0))))
 }
 
 /// Impossible trims of all flights, each on its worst axis.
@@ -87,5 +120,28 @@ mod tests {
         assert!((x - 2.0 * room * 0.17 / vehicle.inertia_kg_m2[(0, 0)]).abs() < 1e-9 * x, "{x}");
         assert!((65.0..67.0).contains(&x) && (18.5..19.5).contains(&z), "{x} {z}");
         assert!((x - y).abs() < 1e-9 * x && z < x, "{x} {y} {z}");
+    }
+
+    /// No torque about another axis is a condition more: the bound is not below what four rotors balance with it.
+    #[test]
+    fn the_bound_of_other_numbers_is_above_what_four_rotors_balance() {
+        let vehicle = Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml").unwrap();
+        let exact = greatest_rad_s2(&vehicle).unwrap();
+        // Two more rotors that do nothing.
+        let idle = vehicle.rotors[0].clone();
+        let more = Vehicle {
+            rotors: [vehicle.rotors.clone(), vec![Rotor { has_failed: true, ..idle }; 2]].concat(),
+            ..vehicle.clone()
+        };
+        assert_eq!(greatest_rad_s2(&more), Some(exact));
+        let eight = Vehicle {
+            rotors: [vehicle.rotors.clone(), vehicle.rotors.clone()].concat(),
+            mass_kg: 2.0 * vehicle.mass_kg,
+            ..vehicle
+        };
+        let bound = greatest_rad_s2(&eight).unwrap();
+        for axis in 0..3 {
+            assert!(bound[axis] >= 2.0 * exact[axis] * (1.0 - 1e-9), "{bound:?} {exact:?}");
+        }
     }
 }

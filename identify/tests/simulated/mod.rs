@@ -10,7 +10,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use plant::effects::{Effect, find};
 use plant::{Airframe, Backend, FreeFlight, NewtonEuler, PerRotor, RigidBody};
 use std::path::{Path, PathBuf};
-use vehicles::Vehicle;
+use vehicles::{MotorModel, ROTORS_MAX, Vehicle};
 
 pub mod cases;
 
@@ -167,10 +167,11 @@ pub fn fly(declared: &Vehicle, plan: &Plan, role: Role) -> Flight {
     let sticks = Sticks::of(plan);
     let start = RigidBody::level_at(course.at(0.0).0[0]);
     let mut plant = FreeFlight::new(NewtonEuler::flying(airframe, 1), start, effects);
-    let allocation = Allocation::new(declared).expect("a quadrotor");
-    let mut commands = PerRotor::filled(4, declared.hover_command());
+    let allocation = Allocation::new(declared).expect("a multirotor");
+    let rotors = declared.rotors.len();
+    let mut commands = PerRotor::filled(rotors, declared.hover_command());
     plant.settle_rotors(&commands);
-    let slow_rad_s = PerRotor::filled(4, declared.hover_speed_rad_s());
+    let slow_rad_s = PerRotor::filled(rotors, declared.hover_speed_rad_s());
     let period_s = plan.control_ticks as f64 * TICK_S;
     let mut pilot = Pilot {
         allocation,
@@ -179,8 +180,10 @@ pub fn fly(declared: &Vehicle, plan: &Plan, role: Role) -> Flight {
         sunk: 0.0,
         period_s,
         stiffness: plan.stiffness,
+        lead_s: lead_s(declared),
     };
     let mut log = Log::new(plan);
+    log.flight.rotors = rotors;
     for tick in 0..(plan.duration_s / TICK_S) as usize {
         let time_s = tick as f64 * TICK_S;
         log.sample(tick, &plant, &commands);
@@ -241,9 +244,9 @@ fn stirred(
     allocation.allocate(&wrench).speeds_rad_s.map(|speed| vehicle.command.command(speed))
 }
 
-/// The values of a quadrotor.
-fn four(values: &PerRotor<f64>) -> [f64; 4] {
-    std::array::from_fn(|rotor| values[rotor])
+/// The values, and zeros behind the last rotor.
+fn padded(values: &PerRotor<f64>) -> [f64; ROTORS_MAX] {
+    std::array::from_fn(|rotor| values.get(rotor).copied().unwrap_or_default())
 }
 
 /// A tracking controller with the gains of somebody careful: bounded for all truths of the cases.
@@ -256,11 +259,20 @@ struct Pilot {
     sunk: f64,
     period_s: f64,
     stiffness: f64,
+    lead_s: f64,
 }
 
 /// What takes the motors' lag back: a lead over the slower part of it.
 const LEAD_S: f64 = 0.08;
 const LEAD_FILTER_S: f64 = 0.01;
+
+/// The lead for motors as slow as the Hummingbird's, or as long as the lag of faster ones.
+fn lead_s(vehicle: &Vehicle) -> f64 {
+    match vehicle.motor {
+        MotorModel::FirstOrder { time_constant_s } if time_constant_s < LEAD_S / 2.0 => time_constant_s,
+        _ => LEAD_S,
+    }
+}
 /// Most that errors of the course ask for sideways.
 const ANSWER_MAX_M_S2: f64 = 4.0;
 
@@ -301,7 +313,7 @@ impl Pilot {
         PerRotor::from_fn(wanted_rad_s.len(), |i| {
             let rise = wanted_rad_s[i] - self.slow_rad_s[i];
             self.slow_rad_s[i] += part * rise;
-            wanted_rad_s[i] + LEAD_S * part * rise / self.period_s
+            wanted_rad_s[i] + self.lead_s * part * rise / self.period_s
         })
     }
 }
@@ -329,7 +341,7 @@ impl Log {
     fn sample(&mut self, tick: usize, plant: &FreeFlight, commands: &PerRotor<f64>) {
         let time_s = tick as f64 * TICK_S;
         let body = plant.state().body;
-        push(&mut self.flight.command, time_s, four(commands));
+        push(&mut self.flight.command, time_s, padded(commands));
         if tick.is_multiple_of(self.sensors.imu_ticks) && tick > 0 {
             let motion = plant.accelerations();
             let bias = Vector3::from(self.sensors.accelerometer_bias_m_s2);
@@ -359,7 +371,7 @@ impl Log {
                 let normal = bus::random::normal(&mut self.random);
                 rotor.speed_rad_s + self.sensors.noise * normal
             });
-            push(&mut self.flight.rotor_speed, time_s, four(&speeds));
+            push(&mut self.flight.rotor_speed, time_s, padded(&speeds));
         }
     }
 

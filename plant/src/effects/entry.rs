@@ -92,6 +92,18 @@ pub(crate) fn require(
         if let Some(Err(expected)) = effect.kind.require.map(|require| require(vehicle)) {
             return Err(bad_name(entry, expected, "which does not"));
         }
+        refuse_absent_rotors(vehicle, effect, entry)?;
     }
     Ok(())
+}
+
+/// Refuses a value for a rotor that the vehicle does not have.
+fn refuse_absent_rotors(vehicle: &Vehicle, effect: &Effect, entry: &EffectEntry) -> Result<(), Diagnostic> {
+    let known = effect.kind.parameters_for(vehicle);
+    let is_absent = |stated: &&Stated| known.iter().all(|spec| spec.name != stated.name);
+    let Some(absent) = entry.parameters.iter().find(is_absent) else { return Ok(()) };
+    let expected = format!("a rotor of the vehicle, which has {}", vehicle.rotors.len());
+    let error =
+        ParameterError::value(format!("{}.{}", entry.key, absent.name), expected, "one behind the last");
+    Err(Diagnostic::at(absent.place.clone(), error))
 }

@@ -5,10 +5,10 @@ use crate::actuation::{Actuation, Battery};
 use crate::airframe_state::EffectState;
 use crate::rotor::Wrench;
 use diagnostics::unit::Dimension;
-use vehicles::Vehicle;
+use vehicles::{ROTORS_MAX, Vehicle};
 
 /// The most parameters that an effect has.
-pub const PARAMETERS_MAX: usize = 6;
+pub const PARAMETERS_MAX: usize = ROTORS_MAX;
 
 /// The parameters of an effect in SI, in the order of its specification; zeros behind the last one. Effects read them
 /// by name, see [`effect_parameters!`](crate::effect_parameters).
@@ -57,6 +57,8 @@ pub struct EffectKind {
     pub confounded_with: &'static [Confounder],
     /// What must be true of the vehicle that it acts on; in words if it is not.
     pub require: Option<Requirement>,
+    /// True if its parameters are one for each rotor: those behind the vehicle's last rotor have to be neutral.
+    pub is_per_rotor: bool,
 }
 
 /// A condition on the vehicle that an effect acts on; the error says what it is in words.
@@ -252,12 +254,20 @@ impl EffectKind {
         scale_to: None,
         confounded_with: &[],
         require: None,
+        is_per_rotor: false,
     };
 
     /// The effect with neutral parameters, and nominal ones where none is neutral: it does nothing.
     #[must_use]
     pub fn neutral(&'static self) -> Effect {
         self.with(|spec| spec.neutral.unwrap_or(spec.nominal))
+    }
+
+    /// The parameters that mean something for `vehicle`: of those that are one for each rotor, as many as it has.
+    #[must_use]
+    pub fn parameters_for(&self, vehicle: &Vehicle) -> &'static [ParameterSpec] {
+        let count = if self.is_per_rotor { vehicle.rotors.len() } else { self.parameters.len() };
+        &self.parameters[..count.min(self.parameters.len())]
     }
 
     /// The effect with neutral parameters, and those that fit `vehicle` where none is neutral.

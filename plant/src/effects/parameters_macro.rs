@@ -16,7 +16,8 @@
 ///
 /// let specs: &[ParameterSpec] = Offset::SPECS;
 /// assert_eq!((specs[0].name, specs[0].unit()), ("ahead", "m"));
-/// let values: Values = [0.02, 0.0, 0.0, 0.0, 0.0, 0.0];
+/// let mut values = Values::default();
+/// values[0] = 0.02;
 /// assert_eq!(Offset::from(&values).ahead, 0.02);
 /// ```
 #[macro_export]

@@ -36,6 +36,11 @@ pub fn crazyflie() -> Vehicle {
     Vehicle::parse(CRAZYFLIE, "crazyflie-2.1.toml").unwrap()
 }
 
+/// Parameters of an effect that begin with these.
+pub fn values<const N: usize>(first: [f64; N]) -> plant::effects::Values {
+    std::array::from_fn(|index| first.get(index).copied().unwrap_or_default())
+}
+
 /// A Hummingbird whose air does nothing; its rotors keep their inertia.
 pub fn airless() -> Vehicle {
     hummingbird_with(&[(C_T, "value = 0"), (C_Q, "value = 0")])

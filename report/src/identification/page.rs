@@ -65,7 +65,7 @@ fn title(equation: Equation) -> &'static str {
         Equation::Acceleration => "acceleration (world)",
         Equation::AngularAcceleration => "angular acceleration (body)",
         Equation::Gyroscope => "gyroscope less attitude (body)",
-        Equation::RotorSpeed => "rotor speed",
+        Equation::RotorSpeed(_) => "rotor speed",
     }
 }
 
@@ -80,7 +80,7 @@ fn component(
     let (measured, before, after) = (&picture.measured[axis], &picture.before[axis], &picture.after[axis]);
     let chosen = extremes(&[measured, before, after], points);
     let name = match picture.equation {
-        Equation::RotorSpeed => format!("rotor {}", axis + 1),
+        Equation::RotorSpeed(_) => format!("rotor {}", axis + 1),
         _ => ["x", "y", "z"][axis].to_owned(),
     };
     let inputs = std::iter::once(measured).chain(regressors.iter().map(|regressor| &regressor.values));
@@ -259,7 +259,7 @@ mod tests {
             Equation::Acceleration,
             Equation::AngularAcceleration,
             Equation::Gyroscope,
-            Equation::RotorSpeed,
+            Equation::RotorSpeed(4),
         ];
         let of_flight = |name: &'static str| equations.map(|equation| picture(name, equation, count));
         let inputs = |_| Regressor { name: "speed", unit: "m/s", values: noise(3, count) };

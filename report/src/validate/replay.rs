@@ -35,7 +35,7 @@ const RECORDING: &str = "flight.mcap";
 /// The first line of a manifest that is written here.
 const MANIFEST_START: &str = "# A measured flight, flown again in windows. Written by `hummingbus validate`.";
 const WRITTEN: Kind = Kind { name: "manifest of a replay", mark: Mark::Start(MANIFEST_START.as_bytes()) };
-const CSV: Kind = Kind { name: "flight in SI", mark: Mark::Start(flights::HEADER.as_bytes()) };
+const CSV: Kind = Kind { name: "flight in SI", mark: Mark::Start(flights::HEADER_START.as_bytes()) };
 
 /// What plants of the vehicles are called.
 const VEHICLES: [&str; 2] = ["first", "second"];
@@ -77,7 +77,7 @@ impl Replay {
         let (start_s, end_s) = played.span_s();
         let ticks = ticks(end_s - start_s)?;
         let initial = command_at(flight, start_s).context("it has no motor commands")?;
-        let manifest = manifest(ticks, flights::COLUMNS, initial, vehicles)?;
+        let manifest = manifest(ticks, &flights::columns(flight.rotors), &initial, vehicles)?;
         // For whoever keeps the folder, and flies it once more.
         output_file::write(&folder.join(MANIFEST), &WRITTEN, |out| {
             write!(out, "{MANIFEST_START}\n\n{manifest}")
@@ -128,7 +128,7 @@ impl Replay {
 }
 
 /// The manifest of a run of `ticks` ticks, with the column map `columns` and the command `initial` before the first.
-fn manifest(ticks: u32, columns: &str, initial: [f64; 4], vehicles: &[&Path]) -> Result<ManifestBuilder> {
+fn manifest(ticks: u32, columns: &str, initial: &[f64], vehicles: &[&Path]) -> Result<ManifestBuilder> {
     let every = i64::from(RECORDED_TICKS);
     let mut manifest = ManifestBuilder::new()
         .set("run.rate_hz", i64::from(RATE_HZ))
@@ -187,9 +187,9 @@ fn ticks(duration_s: f64) -> Result<u32> {
 }
 
 /// The command that holds at `time_s`, or the first where none was given before.
-fn command_at(flight: &Flight, time_s: f64) -> Option<[f64; 4]> {
+fn command_at(flight: &Flight, time_s: f64) -> Option<Vec<f64>> {
     let given = flight.command.time_s.partition_point(|time| *time <= time_s + 1e-9);
-    flight.command.values.get(given.saturating_sub(1)).copied()
+    flight.command.values.get(given.saturating_sub(1)).map(|command| command[..flight.rotors].to_vec())
 }
 
 /// A name for a file: letters and digits as they are, `-` for all else.

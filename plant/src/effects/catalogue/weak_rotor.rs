@@ -14,6 +14,7 @@ pub static EFFECT: EffectKind = EffectKind {
     actions: &[Action::Thrust(loss_N)],
     fit_as: FitAs::EachParameter,
     turns_steadily: true,
+    is_per_rotor: true,
     ..EffectKind::PLAIN
 };
 
@@ -21,6 +22,7 @@ pub static EFFECT: EffectKind = EffectKind {
 const CHIPPED: &str = "tuned, no source: a chipped propeller";
 
 effect_parameters! {
+    #[allow(dead_code, reason = "its values are read by the number of the rotor")]
     struct Parameters {
         /// l_1: part of the thrust that the first rotor of the vehicle file lacks
         loss_1: RATIO, min: 0.0, max: 1.0, neutral: Some(0.0), nominal: 0.1, source: CHIPPED;
@@ -30,11 +32,26 @@ effect_parameters! {
         loss_3: RATIO, min: 0.0, max: 1.0, neutral: Some(0.0), nominal: 0.1, source: CHIPPED;
         /// l_4: the same of the fourth rotor
         loss_4: RATIO, min: 0.0, max: 1.0, neutral: Some(0.0), nominal: 0.1, source: CHIPPED;
+        /// l_5: the same of the fifth rotor
+        loss_5: RATIO, min: 0.0, max: 1.0, neutral: Some(0.0), nominal: 0.1, source: CHIPPED;
+        /// l_6: the same of the sixth rotor
+        loss_6: RATIO, min: 0.0, max: 1.0, neutral: Some(0.0), nominal: 0.1, source: CHIPPED;
+        /// l_7: the same of the seventh rotor
+        loss_7: RATIO, min: 0.0, max: 1.0, neutral: Some(0.0), nominal: 0.1, source: CHIPPED;
+        /// l_8: the same of the eighth rotor
+        loss_8: RATIO, min: 0.0, max: 1.0, neutral: Some(0.0), nominal: 0.1, source: CHIPPED;
+        /// l_9: the same of the ninth rotor
+        loss_9: RATIO, min: 0.0, max: 1.0, neutral: Some(0.0), nominal: 0.1, source: CHIPPED;
+        /// l_10: the same of the tenth rotor
+        loss_10: RATIO, min: 0.0, max: 1.0, neutral: Some(0.0), nominal: 0.1, source: CHIPPED;
+        /// l_11: the same of the eleventh rotor
+        loss_11: RATIO, min: 0.0, max: 1.0, neutral: Some(0.0), nominal: 0.1, source: CHIPPED;
+        /// l_12: the same of the twelfth rotor
+        loss_12: RATIO, min: 0.0, max: 1.0, neutral: Some(0.0), nominal: 0.1, source: CHIPPED;
     }
 }
 
 fn loss_N(values: &Values, condition: &FlightCondition, rotor: usize) -> f64 {
-    let Parameters { loss_1, loss_2, loss_3, loss_4 } = values.into();
-    let loss = [loss_1, loss_2, loss_3, loss_4].get(rotor).copied().unwrap_or_default();
-    -loss * condition.thrust_N(rotor)
+    // The parameters are in the order of the rotors.
+    -values[rotor] * condition.thrust_N(rotor)
 }
