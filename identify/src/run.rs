@@ -13,7 +13,7 @@ use crate::noise;
 use crate::parameter::{Parameter, Parameters};
 use crate::prepared::{BOX_STEPS, Equation, Prepared, Propulsion};
 use crate::regressor::{Regressor, regressors};
-use crate::report::{BeforeAfter, EffectReport, Estimate, FlightReport, Report, Unexplained};
+use crate::report::{BeforeAfter, Changes, EffectReport, Estimate, FlightReport, Report, Unexplained};
 use crate::rows::column;
 use crate::select::{Selection, confounded, select};
 use crate::sensing::SensorErrors;
@@ -135,7 +135,7 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
         vehicle: set.vehicle.display().to_string(),
         flights: flight_reports,
         verdict: verdict(&problem, &selection),
-        losses: losses(&held_out, &noise_floor),
+        losses: losses(&of_measured_attitude(&problem, &held_out), &noise_floor),
         withdrawn: selection.withdrawn.clone(),
         refined: selection.refined.is_some(),
         effects,
@@ -160,6 +160,14 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
     let pictures = pictures(&problem, &selection);
     drop(problem);
     Ok(Outcome { pictures, regressors, effects, late, sensor_errors, report, believed })
+}
+
+/// The errors of flights whose attitude was measured: under an assumed one a prediction says nothing of the vehicle.
+fn of_measured_attitude(problem: &Problem, errors: &Changes) -> Changes {
+    let is_measured =
+        |name: &str| problem.flights().any(|flight| flight.flight.name == name && !flight.is_assumed());
+    let kept = errors.iter().filter(|(name, _)| is_measured(name));
+    kept.map(|(name, errors)| (name.clone(), errors.clone())).collect()
 }
 
 /// The problem, its flights as reported, and their clock offsets.
