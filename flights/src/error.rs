@@ -67,18 +67,19 @@ pub enum FlightsError {
         /// What contradicts.
         findings: Vec<Finding>,
     },
-    /// A test flight holds samples of a flight that parameters are fitted on.
+    /// A flight that is to be held out holds samples of one that parameters are fitted or effects are chosen on.
     #[error(
-        "{place}: flight `{test}` with role \"test\" is not held out from flight `{fit}` with role \"fit\": {reason}; give \
-         them parts that do not overlap by `from_s` and `to_s`, name another log, or take one of them out"
+        "{place}: flight `{}` with role \"{}\" is not held out from flight `{}` with role \"{}\": {reason}; give \
+         them parts that do not overlap by `from_s` and `to_s`, name another log, or take one of them out",
+        flight.0, flight.1, other.0, other.1
     )]
     NotHeldOut {
-        /// The line that names the test flight's log.
+        /// The line that names the log of the flight that is to be held out.
         place: Place,
-        /// The test flight's name.
-        test: String,
-        /// The fit flight's name.
-        fit: String,
+        /// Name and role of that flight.
+        flight: (String, &'static str),
+        /// Name and role of the other flight.
+        other: (String, &'static str),
         /// What they have in common.
         reason: String,
     },

@@ -11,13 +11,31 @@ use vehicles::gaps::of_held;
 use crate::quantity::Quantity;
 
 /// What a flight is for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
+///
+/// ```
+/// assert_eq!(flights::Role::Select.name(), "select");
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Role {
     /// Parameters are fitted on it.
     Fit,
-    /// Errors are judged on it; nothing is fitted.
+    /// Effects are chosen on it: none of their parameters is fitted on it.
+    Select,
+    /// Errors are reported on it, once: nothing is fitted or chosen on it.
     Test,
+}
+
+impl Role {
+    /// The role as flights files spell it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Role::Fit => "fit",
+            Role::Select => "select",
+            Role::Test => "test",
+        }
+    }
 }
 
 /// Samples of one quantity.

@@ -1,9 +1,10 @@
-//! Whether test flights are held out: none holds what parameters are fitted on, by its log and time or by its samples.
+//! Check that flights are held out: none with role `test` holds samples that parameters are fitted or effects are chosen on,
+//! none with role `select` samples that parameters are fitted on, by its log and time or by its samples.
 
 use std::os::unix::fs::MetadataExt as _;
 use std::path::Path;
 
-use crate::flight::{Channel, Flight, Role};
+use crate::flight::{Channel, Flight};
 use crate::quantity::Quantity;
 use crate::reading::Part;
 use crate::twin::{Comparison, Twin, twin};
@@ -14,27 +15,30 @@ const EDGE_S: f64 = 1e-5;
 /// Two flights that hold the same.
 #[derive(Debug)]
 pub struct Clash {
-    /// The index of the flight with role `fit`.
-    pub fit: usize,
-    /// That of the flight with role `test`.
-    pub test: usize,
+    /// The index of the flight that is used first: with role `fit` or `select`.
+    pub used: usize,
+    /// The index of the flight that is to be held out from it: with role `select` or `test`.
+    pub held_out: usize,
     /// What they have in common, as text.
     pub reason: String,
 }
 
-/// The test flights that are not held out, each with the first flight that it is not held out from; `parts` are the parts
+/// The flights that are not held out, each with the first flight that it is not held out from; `parts` are the parts
 /// of the logs that the flights are, and `sha256` gives the SHA-256 of a log as it was read.
 pub fn clashes(flights: &[Flight], parts: &[Part], sha256: impl Fn(&Path) -> Option<String>) -> Vec<Clash> {
-    let of_role = |role| (0..flights.len()).filter(move |index| flights[*index].role == role);
-    let clash = |fit: usize, test: usize| {
-        let pair = [fit, test].map(|index| (&flights[index], &parts[index]));
+    let clash = |used: usize, held_out: usize| {
+        let pair = [used, held_out].map(|index| (&flights[index], &parts[index]));
         let reason = match shared(pair.map(|(flight, _)| flight), &sha256) {
             Some(shared) => same_part(pair, &shared),
             None => same_samples(pair),
         };
-        reason.map(|reason| Clash { fit, test, reason })
+        reason.map(|reason| Clash { used, held_out, reason })
     };
-    of_role(Role::Test).filter_map(|test| of_role(Role::Fit).find_map(|fit| clash(fit, test))).collect()
+    let all = 0..flights.len();
+    let before =
+        |held_out: usize| all.clone().filter(move |used| flights[*used].role < flights[held_out].role);
+    let first = |held_out| before(held_out).find_map(|used| clash(used, held_out));
+    all.clone().filter_map(first).collect()
 }
 
 /// A file that two flights have in common: its paths, and how they are the same.

@@ -108,11 +108,12 @@ impl FlightSet {
             }
         }
         FlightsError::gather(errors)?;
+        let of = |at: usize| (flights[at].name.clone(), flights[at].role.name());
         let clashes = held_out::clashes(&flights, &parts, reader.sha256()).into_iter().map(|clash| {
             FlightsError::NotHeldOut {
-                place: document.place(&logs[clash.test].entry.get_ref().file.span()),
-                test: flights[clash.test].name.clone(),
-                fit: flights[clash.fit].name.clone(),
+                place: document.place(&logs[clash.held_out].entry.get_ref().file.span()),
+                flight: of(clash.held_out),
+                other: of(clash.used),
                 reason: clash.reason,
             }
         });

@@ -7,10 +7,12 @@
 //! that is taken off, and so is what position and velocity have beyond it.
 
 use crate::clock::Lateness;
-use crate::fit::{Problem, Weights};
+use crate::fit::Problem;
+use crate::noise_model::NoiseModel;
 use crate::normal::{self, Block};
 use crate::prepared::{Equation, Prepared, Translation};
 use crate::sensor_effects::POSE_DELAY;
+use crate::whitening::{ComponentNoise, Noises};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -158,9 +160,11 @@ fn descended(between_s: f64, mut blocks_at: impl FnMut(f64) -> Vec<Block>) -> Op
     None
 }
 
-/// Weights under which only gyroscope and attitude count.
-fn kinematic_weights() -> Weights {
-    (0..3).map(|axis| ((Equation::Gyroscope.name(), axis), 1.0)).collect()
+/// Noises under which only gyroscope and attitude count.
+fn kinematic_noises() -> Noises {
+    (0..3)
+        .map(|axis| ((Equation::Gyroscope.name(), axis), ComponentNoise::of(NoiseModel::white(1.0))))
+        .collect()
 }
 
 /// What was found of one flight.
@@ -195,10 +199,10 @@ impl Clocks {
 /// what they are late beyond that mean if they are apart from the attitude; they come with it if they are not. Only what
 /// is sure is taken off. Says what was found for each flight of `fit` and then of `test`.
 pub fn align(problem: &mut Problem) -> Vec<(String, Offsets)> {
-    let weights = std::mem::replace(&mut problem.weights, kinematic_weights());
+    let noises = std::mem::replace(&mut problem.noises, kinematic_noises());
     let flights: Vec<&Prepared> = problem.flights().collect();
     let clocks: Vec<Clocks> = flights.par_iter().map(|flight| Clocks::of(problem, flight)).collect();
-    problem.weights = weights;
+    problem.noises = noises;
     let of_fit: Vec<Found> =
         clocks[..problem.estimation.len()].iter().filter_map(|shift| shift.attitude).collect();
     let shared = Found::mean(&of_fit);

@@ -91,7 +91,7 @@ pub fn of_rotors(problem: &mut Problem) -> Vec<Fault> {
     let mut faults = rotor_speed::find(problem);
     let trims = trim::find(problem);
     let is_used = |name: &str| !trims.iter().any(|fault| fault.flight == name);
-    for flights in [&mut problem.estimation, &mut problem.validation] {
+    for flights in [&mut problem.estimation, &mut problem.validation, &mut problem.test] {
         flights.retain(|flight| is_used(&flight.flight.name));
     }
     faults.extend(trims);

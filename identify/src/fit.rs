@@ -6,18 +6,21 @@
 
 use crate::candidate::Candidate;
 use crate::model::Model;
+use crate::noise_model::Products;
 use crate::normal::{self, Block};
 use crate::prepared::Prepared;
-use crate::rows::{keep_means, take_off_means};
+use crate::rows::keep_means;
 use crate::statistics::student_quantile;
+use crate::whitening::{
+    Component, ComponentNoise, Noises, Whitening, components, has_trim, mean, spread, stretches,
+};
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 
-/// Weight of each component of each equation: one over the variance of its residual.
-pub type Weights = BTreeMap<(&'static str, usize), f64>;
-
 /// Steps of a fit at most.
 const STEPS_MAX: usize = 12;
+/// Parts that the estimation data are cut into for cross-validation.
+const FOLDS: usize = 10;
 /// A fit is done when a step changes every parameter by less than this part of its standard deviation.
 const SMALL_STEP: f64 = 0.02;
 
@@ -28,16 +31,17 @@ pub struct Problem<'f> {
     pub model: Model,
     /// Estimation data: flights that parameters are fitted on.
     pub estimation: Vec<Prepared<'f>>,
-    /// Validation data: flights that errors are judged on.
+    /// Validation data: flights that effects are chosen on. Where there are none, they are chosen by cross-validation over
+    /// blocks of the estimation data.
     pub validation: Vec<Prepared<'f>>,
-    /// How much each component counts.
-    pub weights: Weights,
+    /// Test data: flights that errors are reported on, and that decide nothing.
+    pub test: Vec<Prepared<'f>>,
+    /// The noise of each component, by which its residual is whitened and weighed.
+    pub noises: Noises,
     /// Length of the blocks that count as independent.
     pub block_s: f64,
     /// What the attitudes of all flights are late by according to the gyroscopes, in s: where a fit of their delay starts.
     pub shared_late_s: f64,
-    /// Whether each flight has a trim of its own: then the means of the angular accelerations do not count.
-    pub has_own_trims: bool,
 }
 
 /// What came of a fit.
@@ -72,6 +76,15 @@ impl FitResult {
         Some(self.covariance[(at, at)].max(0.0).sqrt())
     }
 
+    /// Wald's statistic of these free parameters: how far they are `away` together, in units of their covariance.
+    pub fn wald(&self, parameters: &[usize], away: &[f64]) -> f64 {
+        let place = |parameter: &usize| self.free.iter().position(|free| free == parameter);
+        let Some(at) = parameters.iter().map(place).collect::<Option<Vec<usize>>>() else { return 0.0 };
+        let covariance = DMatrix::from_fn(at.len(), at.len(), |i, j| self.covariance[(at[i], at[j])]);
+        let away = DVector::from_column_slice(away);
+        away.dot(&(normal::inverse(&covariance) * &away))
+    }
+
     /// The value that an estimate's error, in units of its standard error, stays below with `probability`: the quantile
     /// of Student's t with G - 1 degrees of freedom for G blocks.
     ///
@@ -87,12 +100,12 @@ impl FitResult {
 impl<'f> Problem<'f> {
     /// All flights, those that are fitted on first.
     pub fn flights(&self) -> impl Iterator<Item = &Prepared<'f>> {
-        self.estimation.iter().chain(&self.validation)
+        self.estimation.iter().chain(&self.validation).chain(&self.test)
     }
 
-    /// The same flights, to be changed.
+    /// The same, to be changed.
     pub fn flights_mut(&mut self) -> impl Iterator<Item = &mut Prepared<'f>> {
-        self.estimation.iter_mut().chain(&mut self.validation)
+        self.estimation.iter_mut().chain(&mut self.validation).chain(&mut self.test)
     }
 
     /// Fits the parameters `free`, starting from `start`.
@@ -115,10 +128,40 @@ impl<'f> Problem<'f> {
                 break;
             }
         }
-        let covariance = normal::covariance(&blocks);
-        let validation_costs = self.costs(&self.validation, &values);
+        let covariance = normal::covariance(&blocks) + self.trim_covariance(&blocks, &values, free);
+        let validation_costs = if self.validation.is_empty() {
+            self.cross_validated(&blocks, &values, free)
+        } else {
+            self.costs(&self.validation, &values)
+        };
         let estimation_costs = blocks.iter().map(|block| block.cost).collect();
         FitResult { values, free: free.to_vec(), covariance, validation_costs, estimation_costs }
+    }
+
+    /// The cost of each block of the estimation data under parameters that were fitted without its fold: the folds are
+    /// stretches of time, and the fit without one is a step from the equations about `values`.
+    pub fn cross_validated(&self, blocks: &[Block], values: &[f64], free: &[usize]) -> Vec<f64> {
+        if free.is_empty() {
+            return blocks.iter().map(|block| block.cost).collect();
+        }
+        let total = normal::sum(blocks);
+        let of_fold = |fold: &[Block]| -> Vec<f64> {
+            let step = self.step_of(&total.without(&normal::sum(fold)), values, free);
+            fold.iter().map(|block| block.cost_after(&step)).collect()
+        };
+        blocks.chunks(blocks.len().div_ceil(FOLDS).max(1)).flat_map(of_fold).collect()
+    }
+
+    /// The values that were `fitted`, without the estimation flight at `flight`, by a step from the equations about them. With
+    /// one flight all there is stays.
+    pub fn values_without(&self, fitted: &FitResult, flight: usize) -> Vec<f64> {
+        if self.estimation.len() < 2 || fitted.free.is_empty() {
+            return fitted.values.clone();
+        }
+        let of = |flights: &[Prepared]| self.blocks(flights, &fitted.values, &fitted.free);
+        let others = [of(&self.estimation[..flight]), of(&self.estimation[flight + 1..])].concat();
+        let step = self.step(&others, &fitted.values, &fitted.free);
+        self.moved(&fitted.values, &fitted.free, &step)
     }
 
     /// Whether a step is a small part of every parameter's standard deviation, if all rows were independent.
@@ -153,11 +196,14 @@ impl<'f> Problem<'f> {
     /// The Gauss-Newton step within the bounds: a parameter that would leave them stops there, and the others are
     /// fitted to that.
     pub fn step(&self, blocks: &[Block], values: &[f64], free: &[usize]) -> DVector<f64> {
-        let total = normal::sum(blocks);
+        self.step_of(&normal::sum(blocks), values, free)
+    }
+
+    fn step_of(&self, total: &Block, values: &[f64], free: &[usize]) -> DVector<f64> {
         let mut held: Vec<Option<f64>> = vec![None; free.len()];
         let mut step = DVector::zeros(free.len());
         for _ in 0..=free.len() {
-            step = held_step(&total, &held);
+            step = held_step(total, &held);
             let mut is_within = true;
             for (at, parameter) in free.iter().enumerate() {
                 let entry = &self.model.parameters.all[*parameter];
@@ -189,18 +235,35 @@ impl<'f> Problem<'f> {
         flights.iter().flat_map(|flight| self.blocks_of(flight, values, free)).collect()
     }
 
-    /// The model's residual and its derivatives, without what this problem does not compare: the means of angular
-    /// accelerations where flights have trims of their own, all but their means where the attitude was assumed.
+    /// The model's residual and its derivatives; where the attitude was assumed, the means of blocks alone.
     fn linearised(&self, flight: &Prepared, values: &[f64], free: &[usize]) -> (Vec<f64>, Vec<Vec<f64>>) {
         let (mut residual, mut columns) = self.model.linearised(flight, values, free);
-        for rows in std::iter::once(&mut residual).chain(&mut columns) {
-            if flight.is_assumed() {
-                keep_means(flight, rows, &self.block_knots(flight));
-            } else if self.has_own_trims {
-                take_off_means(flight, rows);
-            }
+        if flight.is_assumed() {
+            let blocks = self.block_knots(flight);
+            std::iter::once(&mut residual)
+                .chain(&mut columns)
+                .for_each(|rows| keep_means(flight, rows, &blocks));
         }
         (residual, columns)
+    }
+
+    /// Part of a fit's covariance that the flights' trims add; `blocks` are given at its solution.
+    fn trim_covariance(&self, blocks: &[Block], values: &[f64], free: &[usize]) -> DMatrix<f64> {
+        let mut covariance = DMatrix::zeros(free.len(), free.len());
+        if free.is_empty() || self.noises.values().all(|noise| noise.trim_variance == 0.0) {
+            return covariance;
+        }
+        let inverse = normal::inverse(&normal::sum(blocks).gram);
+        for flight in &self.estimation {
+            let whitening = Whitening::of(flight, &self.noises);
+            let (_, mut columns) = self.linearised(flight, values, free);
+            columns.iter_mut().for_each(|column| whitening.apply(column));
+            for gradient in whitening.trim_gradients(&columns) {
+                let away = &inverse * DVector::from_vec(gradient);
+                covariance += &away * away.transpose();
+            }
+        }
+        covariance
     }
 
     /// The weighted sums of squares of all blocks of `flights`.
@@ -211,7 +274,9 @@ impl<'f> Problem<'f> {
     /// The normal equations of the blocks of one flight.
     pub fn blocks_of(&self, flight: &Prepared, values: &[f64], free: &[usize]) -> Vec<Block> {
         use rayon::prelude::*;
-        let (residual, columns) = self.linearised(flight, values, free);
+        let (mut residual, mut columns) = self.linearised(flight, values, free);
+        let whitening = Whitening::of(flight, &self.noises);
+        std::iter::once(&mut residual).chain(&mut columns).for_each(|rows| whitening.apply(rows));
         let (width, weights) = (flight.width(), self.row_weights(flight));
         let of_knots = |knots: &(usize, usize)| {
             let mut block = Block::zero(columns.len());
@@ -231,18 +296,22 @@ impl<'f> Problem<'f> {
 
     /// The weights of the rows of one knot.
     fn row_weights(&self, flight: &Prepared) -> Vec<f64> {
-        let weight = |component| self.weights.get(&component).copied().unwrap_or(0.0);
+        let weight = |component| self.noises.get(&component).map_or(0.0, |noise| noise.model.weight());
         components(flight).map(weight).collect()
+    }
+
+    /// The block of time that an instant lies in.
+    pub fn block_of(&self, at_s: f64) -> i64 {
+        (at_s / self.block_s).floor() as i64
     }
 
     /// First knot of each block, and the one behind its last.
     pub fn block_knots(&self, flight: &Prepared) -> Vec<(usize, usize)> {
         let knots = &flight.layout.knots;
-        let block_of = |knot: usize| (flight.layout.clock.at(knot) / self.block_s).floor();
+        let block_of = |knot: usize| self.block_of(flight.layout.clock.at(knot));
         let mut blocks = Vec::new();
         let mut first = 0;
         for at in 1..=knots.len() {
-            #[allow(clippy::float_cmp, reason = "whole numbers")]
             if at == knots.len() || block_of(knots[at]) != block_of(knots[first]) {
                 blocks.push((first, at));
                 first = at;
@@ -250,12 +319,6 @@ impl<'f> Problem<'f> {
         }
         blocks
     }
-}
-
-/// What the rows of one knot are: equations by name, each with its axes.
-fn components(flight: &Prepared) -> impl Iterator<Item = (&'static str, usize)> {
-    let equations = flight.layout.equations.iter();
-    equations.flat_map(|equation| (0..equation.size()).map(|axis| (equation.name(), axis)))
 }
 
 /// The step of the parameters that are not held, while the others go where they are held.
@@ -268,11 +331,36 @@ fn held_step(total: &Block, held: &[Option<f64>]) -> DVector<f64> {
     step
 }
 
+/// Residual of one component of a flight.
+struct Left {
+    column: Vec<f64>,
+    stretches: Vec<(usize, usize)>,
+    /// Sum of the squares of what was measured.
+    signal: f64,
+}
+
+/// The noise of one component, and the spread of its trims if they are each flight's own.
+fn noise_of(flights: &[Left], is_own: bool, is_white: bool) -> ComponentNoise {
+    let mut products = Products::default();
+    for Left { column, stretches, signal } in flights {
+        let centre = if is_own { column.iter().sum::<f64>() / column.len().max(1) as f64 } else { 0.0 };
+        for (first, end) in stretches {
+            let rows: Vec<f64> = column[*first..*end].iter().map(|row| row - centre).collect();
+            products.add(&rows);
+        }
+        products.add_white(LEAST_NOISE * LEAST_NOISE * signal);
+    }
+    let model = if is_white { products.white() } else { products.model() };
+    let means = flights.iter().filter_map(|left| mean(&left.column, &left.stretches, &model));
+    let trim_variance = if is_own { spread(&means.collect::<Vec<_>>()) } else { 0.0 };
+    ComponentNoise { model, trim_variance }
+}
+
 /// A component without any noise would count infinitely: no sensor is better than this part of its own signal.
 const LEAST_NOISE: f64 = 1e-4;
 
 impl Problem<'_> {
-    /// Sets the weights by the variance that is left on the estimation data when, from `base` on, all of `candidates` take
+    /// Sets the noises by what is left on the estimation data when, from `base` on, all of `candidates` take
     /// the step that fits best.
     pub fn weigh(&mut self, base: &FitResult, candidates: &[Candidate]) {
         let mut all = base.free.clone();
@@ -284,34 +372,53 @@ impl Problem<'_> {
             all.extend(candidate.free.iter().filter(|at| !base.free.contains(at)));
         }
         for _ in 0..2 {
-            if self.weights.is_empty() {
-                self.weights = self.variances(&base.values, &[], &DVector::zeros(0));
+            if self.noises.is_empty() {
+                self.noises = self.noises_after(&base.values, &[], &DVector::zeros(0));
             }
             let total = normal::sum(&self.blocks(&self.estimation, &base.values, &all));
             let step = -(normal::inverse(&total.gram) * &total.gradient);
-            self.weights = self.variances(&base.values, &all, &step);
+            self.noises = self.noises_after(&base.values, &all, &step);
         }
     }
 
-    /// One over the variance of each component after a step.
-    fn variances(&self, values: &[f64], free: &[usize], step: &DVector<f64>) -> Weights {
-        let mut sums: BTreeMap<(&'static str, usize), (f64, f64, f64)> = BTreeMap::new();
+    /// The noise of each component, and the spread of the flights' trims, after a step.
+    fn noises_after(&self, values: &[f64], free: &[usize], step: &DVector<f64>) -> Noises {
+        let mut left: BTreeMap<Component, Vec<Left>> = BTreeMap::new();
         for flight in &self.estimation {
-            let (residual, columns) = self.linearised(flight, values, free);
-            let measured = self.model.tracks(flight, values).rows;
-            let names: Vec<_> = components(flight).collect();
-            for (at, residual) in residual.iter().enumerate() {
-                let left = residual
-                    + columns.iter().zip(step.iter()).map(|(column, step)| column[at] * step).sum::<f64>();
-                let sum = sums.entry(names[at % names.len()]).or_default();
-                *sum = (sum.0 + left * left, sum.1 + measured[at] * measured[at], sum.2 + 1.0);
+            for (component, of_flight) in self.left_after(flight, values, free, step) {
+                left.entry(component).or_default().push(of_flight);
             }
         }
-        let weight = |(cost, signal, count): (f64, f64, f64)| {
-            let variance = (cost + LEAST_NOISE * LEAST_NOISE * signal) / count;
-            if variance > 0.0 { 1.0 / variance } else { 0.0 }
+        let is_assumed = self.estimation.iter().any(Prepared::is_assumed);
+        let noise = |(component, flights): (Component, Vec<Left>)| {
+            let is_own = !is_assumed && flights.len() > 1 && has_trim(component);
+            (component, noise_of(&flights, is_own, is_assumed))
         };
-        sums.into_iter().map(|(name, sum)| (name, weight(sum))).collect()
+        left.into_iter().map(noise).collect()
+    }
+
+    /// Residuals of each component of a flight after a step.
+    fn left_after(
+        &self,
+        flight: &Prepared,
+        values: &[f64],
+        free: &[usize],
+        step: &DVector<f64>,
+    ) -> Vec<(Component, Left)> {
+        let (mut left, columns) = self.linearised(flight, values, free);
+        for (column, step) in columns.iter().zip(step.iter()) {
+            left.iter_mut().zip(column).for_each(|(left, slope)| *left += slope * step);
+        }
+        let measured = self.model.tracks(flight, values).rows;
+        let width = flight.width();
+        let of = |rows: &[f64], offset: usize| -> Vec<f64> {
+            rows[offset..].iter().step_by(width).copied().collect()
+        };
+        let of_component = |(offset, component)| {
+            let signal = of(&measured, offset).iter().map(|row| row * row).sum();
+            (component, Left { column: of(&left, offset), stretches: stretches(flight), signal })
+        };
+        components(flight).enumerate().map(of_component).collect()
     }
 
     /// The cost that `fitted` leaves on the estimation data, in units of what all candidates together would leave by the
@@ -319,6 +426,11 @@ impl Problem<'_> {
     /// not count.
     pub fn left(&self, fitted: &FitResult) -> f64 {
         fitted.estimation_cost() / self.rows(&self.estimation) as f64
+    }
+
+    /// Number of rows that count in the data that effects are chosen on, at least one.
+    pub fn validation_rows(&self) -> usize {
+        self.rows(if self.validation.is_empty() { &self.estimation } else { &self.validation })
     }
 
     /// How many rows of `flights` count, at least one.

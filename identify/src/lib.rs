@@ -13,13 +13,16 @@
 //! | `model` | the model's side of the equations |
 //! | `parameter`, `sensor_effects` | what may be changed of the model; sensors' errors as effects beside the plant's |
 //! | `candidate` | which effects these flights can show |
-//! | `normal`, `fit` | least squares over blocks of time: an estimation problem and its result |
+//! | `noise_model`, `whitening` | the noise of a residual: autoregressive within a flight, trims between flights |
+//! | `normal`, `fit` | generalised least squares over blocks of time: an estimation problem and its result |
 //! | `logging` | timing errors that slowly logged commands make |
 //! | `select` | the stepwise search for the effects that the flights ask for |
 //! | `align`, `faults`, `trim` | clocks, sensors and trims, before anything is fitted |
 //! | `sensing` | the sensors' delays and biases, and a flight without them |
 //! | `whiteness`, `noise`, [`statistics`] | what is left, and what noise alone would leave |
-//! | `predict` | prediction over horizons |
+//! | `predict`, `horizons` | prediction over horizons, and tables of its errors |
+//! | `foresight`, `loss` | predictions as a judge of effects and of the verdict |
+//! | `refine` | parameters moved to where predictions are best |
 //! | `regressor` | what residuals are looked at against |
 //! | [`report`], [`vehicle_file`] | what is written down |
 //! | [`rotor`] | the rotor from a thrust stand |
@@ -40,13 +43,18 @@ mod candidate;
 mod clock;
 mod faults;
 mod fit;
+mod foresight;
+mod horizons;
 mod logging;
+mod loss;
 mod model;
 mod noise;
+mod noise_model;
 mod normal;
 mod parameter;
 mod predict;
 mod prepared;
+mod refine;
 mod regressor;
 pub mod report;
 pub mod rotor;
@@ -61,6 +69,7 @@ mod trim;
 mod unusable;
 pub mod vehicle_file;
 mod whiteness;
+mod whitening;
 mod window;
 
 pub use clock::Lateness;

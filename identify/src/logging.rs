@@ -51,16 +51,21 @@ pub fn note(problem: &Problem, lead_s: f64) -> String {
     )
 }
 
-/// True for motors that seem faster by less than one period of the logged commands.
-pub fn explains(problem: &Problem, kind: &EffectKind, free: &[usize], fitted: &FitResult) -> bool {
+/// Time by which the motors seem faster, in s, if the logging of the commands explains it: less than one of their periods.
+pub fn explained_lag_s(
+    problem: &Problem,
+    kind: &EffectKind,
+    free: &[usize],
+    fitted: &FitResult,
+) -> Option<f64> {
     if !kind.changes_drive {
-        return false;
+        return None;
     }
     let mut without = fitted.values.clone();
     free.iter().for_each(|at| without[*at] = problem.model.parameters.all[*at].baseline);
     let of = |values: &[f64]| lag_s(problem.model.airframe(values).vehicle().motor);
-    let change_s = of(&fitted.values) - of(&without);
-    change_s < 0.0 && -change_s < period_s(problem)
+    let faster_s = of(&without) - of(&fitted.values);
+    (faster_s > 0.0 && faster_s < period_s(problem)).then_some(faster_s)
 }
 
 /// Amount by which the logging of the commands makes the estimate of a parameter too small at most, in its unit.

@@ -1,7 +1,8 @@
 //! What sensors scatter, and what follows from it for a prediction that starts at a measured state.
 
-use crate::fit::Problem;
+use crate::prepared::Prepared;
 use flights::{Channel, Flight};
+use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Standard deviation of the white noise of a channel, mean over its axes: third differences leave little of a smooth
@@ -17,12 +18,11 @@ pub fn deviation<const N: usize>(channel: &Channel<N>) -> Option<f64> {
 /// The noise of channels, with its unit.
 pub type Floor = BTreeMap<&'static str, (f64, &'static str)>;
 
-/// The noise of each channel that was measured, over the validation data.
-pub fn floor(problem: &Problem) -> Floor {
+/// The noise of each channel that was measured, over `flights`.
+pub fn floor(flights: &[Prepared]) -> Floor {
     let mut floor = Floor::new();
     let mut add = |name: &'static str, unit: &'static str, of_flight: &dyn Fn(&Flight) -> Option<f64>| {
-        let found: Vec<f64> =
-            problem.validation.iter().filter_map(|flight| of_flight(flight.flight)).collect();
+        let found: Vec<f64> = flights.iter().filter_map(|flight| of_flight(flight.flight)).collect();
         if !found.is_empty() {
             let mean_square = found.iter().map(|x| x * x).sum::<f64>() / found.len() as f64;
             floor.insert(name, (mean_square.sqrt(), unit));
@@ -77,4 +77,28 @@ pub fn prediction_floor(floor: &Floor, horizon_s: f64, gravity_m_s2: f64) -> BTr
         .into_iter()
         .filter(|(name, _)| floor.contains_key(name))
         .collect()
+}
+
+/// The noise of a channel.
+#[derive(Debug, Clone, Serialize)]
+pub struct Noise {
+    /// Standard deviation of one axis.
+    pub value: f64,
+    /// Its unit.
+    pub unit: &'static str,
+    /// Prediction error that noise alone makes, by horizon in s, in the unit of `held_out`.
+    pub prediction: BTreeMap<String, f64>,
+}
+
+/// The noise of each channel, with the prediction errors that it alone makes at these horizons.
+pub fn table(floor: &Floor, horizons_s: &[f64], gravity_m_s2: f64) -> BTreeMap<&'static str, Noise> {
+    let at = |name: &str, horizon_s: &f64| {
+        let of_all = prediction_floor(floor, *horizon_s, gravity_m_s2);
+        Some((horizon_s.to_string(), *of_all.get(name)?))
+    };
+    let one = |(name, (value, unit)): (&&'static str, &(f64, &'static str))| {
+        let prediction = horizons_s.iter().filter_map(|horizon_s| at(name, horizon_s)).collect();
+        (*name, Noise { value: *value, unit, prediction })
+    };
+    floor.iter().map(one).collect()
 }

@@ -52,6 +52,15 @@ impl Block {
         }
     }
 
+    /// It without `other`, which is a part of it.
+    pub fn without(&self, other: &Self) -> Self {
+        Self {
+            gram: &self.gram - &other.gram,
+            gradient: &self.gradient - &other.gradient,
+            cost: self.cost - other.cost,
+        }
+    }
+
     /// The equations about the point that a step leads to.
     pub fn after(&self, step: &DVector<f64>) -> Self {
         let gradient = &self.gradient + &self.gram * step;

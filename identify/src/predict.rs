@@ -4,7 +4,7 @@
 
 use flights::state::{StateQuantity, VehicleState, WindowEndErrors};
 use flights::{Flight, Played, Row};
-use nalgebra::{Quaternion, UnitQuaternion};
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use plant::{Airframe, Backend, FreeFlight, NewtonEuler, RigidBody};
 use std::collections::BTreeMap;
 
@@ -17,10 +17,25 @@ const SLACK_S: f64 = 1e-9;
 #[derive(Debug)]
 pub struct Measured {
     played: Played,
+    /// Longest time from the first sample that is predicted, in s.
+    span_s: f64,
 }
 
 /// Root mean squares at the ends of windows, by channel.
 pub type Errors = BTreeMap<&'static str, f64>;
+
+/// The end of a window that counts: the states that are compared there.
+#[derive(Debug, Clone, Copy)]
+pub struct WindowEnd {
+    /// Begin of the window, in s.
+    pub from_s: f64,
+    /// The state as the model predicts it.
+    pub simulated: RigidBody,
+    /// Persistence: velocity, attitude and rates as they were measured at the begin; the position moves on at that velocity.
+    pub persistent: RigidBody,
+    /// The state as it was measured.
+    pub measured: RigidBody,
+}
 
 impl Measured {
     /// The states of `flight`; `None` where it has no commands, or no motion.
@@ -28,11 +43,22 @@ impl Measured {
         if flight.command.is_empty() {
             return None;
         }
-        Some(Self { played: Played::of(flight).ok()? })
+        Some(Self { played: Played::of(flight).ok()?, span_s: f64::INFINITY })
+    }
+
+    /// The first `span_s` of it.
+    pub fn shortened(self, span_s: f64) -> Self {
+        Self { span_s, ..self }
     }
 
     /// Errors of `airframe` at the ends of windows of `horizon_s`.
     pub fn predicted(&self, flight: &Flight, airframe: Airframe, horizon_s: f64) -> Errors {
+        errors(flight, &self.ends(airframe, horizon_s, |_| [0.0; 6]), |end| end.simulated)
+    }
+
+    /// The ends of the windows of `horizon_s` that count, one window after the other, as `airframe` predicts them
+    /// under a constant push over each window: angular acceleration in B and acceleration in W, by the window's begin.
+    pub fn ends(&self, airframe: Airframe, horizon_s: f64, push: impl Fn(f64) -> [f64; 6]) -> Vec<WindowEnd> {
         let window = (horizon_s / TICK_S).round() as usize;
         let memory = airframe.initial_state(0, "predict", TICK_S);
         let (start_s, end_s) = self.played.span_s();
@@ -40,25 +66,55 @@ impl Measured {
         let mut hint = 0;
         let mut before = self.played.at(start_s, &mut hint);
         let count = airframe.vehicle().rotors.len();
-        let mut plant = FreeFlight::new(NewtonEuler::flying(airframe, 1), body(&before), memory);
+        let mut begin = body(&before);
+        let mut plant = FreeFlight::new(NewtonEuler::flying(airframe, 1), begin, memory);
         plant.settle_rotors(&before.command[..count]);
-        let mut errors = WindowEndErrors::default();
-        for tick in 1..=((end_s - start_s + SLACK_S) / TICK_S) as usize {
+        let (mut ends, mut pushing) = (Vec::new(), push(start_s));
+        let span_s = (end_s - start_s + SLACK_S).min(self.span_s);
+        for tick in 1..=(span_s / TICK_S) as usize {
             plant.step(&before.command[..count], TICK_S, &[]);
+            if pushing != [0.0; 6] {
+                let pushed = pushed(&plant.state().body, &pushing);
+                plant.set_body(&pushed);
+            }
             before = self.played.at(at_s(tick), &mut hint);
             if tick % window == 0 {
-                let measured = body(&before);
-                if self.played.counts(at_s(tick - window), at_s(tick)) {
-                    errors.add(&state(&plant.state().body), &state(&measured));
+                let (from_s, measured) = (at_s(tick - window), body(&before));
+                if self.played.counts(from_s, at_s(tick)) {
+                    let position_W_m = begin.position_W_m + horizon_s * begin.velocity_W_m_s;
+                    ends.push(WindowEnd {
+                        from_s,
+                        simulated: plant.state().body,
+                        persistent: RigidBody { position_W_m, ..begin },
+                        measured,
+                    });
                 }
+                (begin, pushing) = (measured, push(at_s(tick)));
                 plant.set_body(&measured);
             }
         }
-        if errors.windows() == 0 {
-            return Errors::new();
-        }
-        let measured = StateQuantity::ALL.into_iter().filter(|quantity| quantity.is_measured(flight));
-        measured.map(|quantity| (quantity.name(), errors.rms(quantity))).collect()
+        ends
+    }
+}
+
+/// Errors of a state `of` each end, for the quantities that `flight` has a measurement of; none without ends.
+pub fn errors(flight: &Flight, ends: &[WindowEnd], of: impl Fn(&WindowEnd) -> RigidBody) -> Errors {
+    let mut sums = WindowEndErrors::default();
+    ends.iter().for_each(|end| sums.add(&state(&of(end)), &state(&end.measured)));
+    if ends.is_empty() {
+        return Errors::new();
+    }
+    let measured = StateQuantity::ALL.into_iter().filter(|quantity| quantity.is_measured(flight));
+    measured.map(|quantity| (quantity.name(), sums.rms(quantity))).collect()
+}
+
+/// The body after a tick under a push.
+fn pushed(body: &RigidBody, push: &[f64; 6]) -> RigidBody {
+    let [x, y, z, forward, left, up] = push.map(|acceleration| acceleration * TICK_S);
+    RigidBody {
+        velocity_W_m_s: body.velocity_W_m_s + Vector3::new(forward, left, up),
+        angular_velocity_B_rad_s: body.angular_velocity_B_rad_s + Vector3::new(x, y, z),
+        ..*body
     }
 }
 

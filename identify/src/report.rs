@@ -3,11 +3,16 @@
 use crate::align::Offsets;
 use crate::candidate::Unidentifiable;
 use crate::faults::Fault;
+use crate::loss::{Loss, advice};
+use crate::select::Withdrawn;
 use crate::trim::Trim;
 use crate::whiteness::Whiteness;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt;
+
+pub use crate::horizons::{Change, Changes};
+pub use crate::noise::Noise;
 
 /// Everything that was found.
 #[derive(Debug, Clone, Serialize)]
@@ -16,8 +21,15 @@ pub struct Report {
     pub vehicle: String,
     /// The flights.
     pub flights: Vec<FlightReport>,
-    /// The effects accepted, in order; empty where the declared model holds.
+    /// The effects accepted, in order; empty where the declared model holds. Not to be acted on where `losses` has some.
     pub verdict: Vec<&'static str>,
+    /// Predictions of the test flights that lose to persistence or to the declared vehicle: then the vehicle file does not
+    /// describe these flights, with these effects or without.
+    pub losses: Vec<Loss>,
+    /// Effects that were accepted and taken back.
+    pub withdrawn: Vec<Withdrawn>,
+    /// True if the parameters were refined by prediction errors, because that predicts better.
+    pub refined: bool,
     /// Every candidate that was judged, by name.
     pub effects: BTreeMap<&'static str, EffectReport>,
     /// The residuals on the validation data.
@@ -29,9 +41,11 @@ pub struct Report {
     pub faults: Vec<Fault>,
     /// The trims of the flights where they differ between flights: constant torques that no one vehicle explains.
     pub trims: Vec<Trim>,
-    /// Prediction errors of the validation data: flight, horizon in s, channel.
+    /// Prediction errors of the test flights: flight, horizon in s, channel.
     pub held_out: Changes,
-    /// The same of the estimation data.
+    /// The same of the flights that effects are chosen on.
+    pub selected: Changes,
+    /// The same of the flights that parameters are fitted on.
     pub fitted: Changes,
     /// White noise of each channel, and the prediction error that it alone makes at each horizon.
     pub noise_floor: BTreeMap<&'static str, Noise>,
@@ -41,8 +55,8 @@ pub struct Report {
     pub not_identifiable: Vec<Unidentifiable>,
     /// Length of the blocks that count as independent.
     pub block_s: f64,
-    /// So many of them have the flights that errors are judged on.
-    pub test_blocks: usize,
+    /// Number of these blocks in the flights that effects are chosen on.
+    pub validation_blocks: usize,
 }
 
 /// A value under the declared and under the new model.
@@ -54,26 +68,12 @@ pub struct BeforeAfter<T> {
     pub after: T,
 }
 
-/// Prediction errors by flight, horizon in s and channel.
-pub type Changes = BTreeMap<String, BTreeMap<String, BTreeMap<&'static str, Change>>>;
-
-/// A prediction error before and after.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Change {
-    /// Root mean square of the declared model.
-    pub before: f64,
-    /// With the accepted effects.
-    pub after: f64,
-    /// Unit of both.
-    pub unit: &'static str,
-}
-
 /// A flight as it was used.
 #[derive(Debug, Clone, Serialize)]
 pub struct FlightReport {
     /// Its name.
     pub name: String,
-    /// `fit` or `test`.
+    /// `fit`, `select` or `test`.
     pub role: flights::Role,
     /// Length of what was compared, in s.
     pub compared_s: f64,
@@ -124,17 +124,6 @@ pub struct Estimate {
     pub determined: bool,
 }
 
-/// The noise of a channel.
-#[derive(Debug, Clone, Serialize)]
-pub struct Noise {
-    /// Standard deviation of one axis.
-    pub value: f64,
-    /// Its unit.
-    pub unit: &'static str,
-    /// Prediction error that noise alone makes, by horizon in s, in the unit of `held_out`.
-    pub prediction: BTreeMap<String, f64>,
-}
-
 /// A residual without an explanation.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Unexplained {
@@ -152,6 +141,7 @@ impl fmt::Display for Report {
         self.write_verdict(f)?;
         self.write_trims(f)?;
         self.write_errors(f)?;
+        self.write_residuals(f)?;
         self.write_rest(f)
     }
 }
@@ -164,7 +154,7 @@ const WORSE: f64 = 1.2;
 impl Report {
     /// Whether the verdict is empty only because the validation data are short.
     fn is_undecided(&self) -> bool {
-        self.verdict.is_empty() && self.test_blocks < ENOUGH_BLOCKS
+        self.verdict.is_empty() && self.validation_blocks < ENOUGH_BLOCKS
     }
 
     /// What was assumed and noticed, each with its flights.
@@ -184,9 +174,9 @@ impl Report {
     fn write_flights(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "declared: {}", self.vehicle)?;
         for flight in &self.flights {
-            let role = if flight.role == flights::Role::Fit { "fit " } else { "test" };
+            let role = flight.role.name();
             let equations = flight.equations.join(", ");
-            writeln!(f, "  {role}  {:28} {:7.1} s  {equations}", flight.name, flight.compared_s)?;
+            writeln!(f, "  {role:6}  {:28} {:7.1} s  {equations}", flight.name, flight.compared_s)?;
         }
         for (note, flights) in self.notes() {
             let all = flights.len() == self.flights.len() && flights.len() > 1;
@@ -211,16 +201,24 @@ impl Report {
 
     fn write_verdict(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.is_undecided() {
-            let (blocks, block_s) = (self.test_blocks, self.block_s);
+            let (blocks, block_s) = (self.validation_blocks, self.block_s);
             writeln!(
                 f,
-                "\nverdict: undecided. The test flights have {blocks} blocks of {block_s} s, of {ENOUGH_BLOCKS} that it takes to \
-                 show anything beyond chance: fly longer."
+                "\nverdict: undecided. The flights that effects are chosen on have {blocks} blocks of {block_s} s, of {ENOUGH_BLOCKS} \
+                 that it takes to show anything beyond chance: fly longer."
             )?;
+        } else if !self.losses.is_empty() {
+            self.write_losses(f)?;
         } else if self.verdict.is_empty() {
-            writeln!(f, "\nverdict: nothing. No candidate makes the held-out flights better beyond chance.")?;
+            writeln!(f, "\nverdict: nothing. No candidate makes the equations fit better beyond chance.")?;
         } else {
             writeln!(f, "\nverdict: {}", self.verdict.join(", "))?;
+        }
+        if self.refined {
+            writeln!(
+                f,
+                "  (parameters refined by prediction errors over 0.1 and 0.5 s, which predicts better)"
+            )?;
         }
         for name in &self.verdict {
             let Some(effect) = self.effects.get(name) else { continue };
@@ -244,16 +242,38 @@ impl Report {
                 writeln!(f, "    to tell them apart: {experiment}")?;
             }
         }
+        for Withdrawn { effect, reason } in &self.withdrawn {
+            writeln!(f, "withdrawn: {effect}: {reason}")?;
+        }
         self.faults.iter().try_for_each(|fault| {
             let Fault { flight, channel, kind, consequence, advice, .. } = fault;
             writeln!(f, "fault: {flight}: {channel} ({kind}): {}; {consequence}; {advice}", fault.finding())
         })
     }
 
+    /// The answer where predictions lose: no verdict, and what to measure.
+    fn write_losses(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "\nverdict: this vehicle file does not describe these flights. Its predictions lose:")?;
+        for Loss { flight, horizon, channel, rival, new, other, unit } in &self.losses {
+            let (new, other) = (rounded(*new), rounded(*other));
+            writeln!(f, "  {channel} after {horizon} s of {flight}: {new} {unit}, {rival} {other} {unit}")?;
+        }
+        let mut channels: Vec<&str> = self.losses.iter().map(|loss| loss.channel).collect();
+        channels.sort_unstable();
+        channels.dedup();
+        for channel in channels {
+            writeln!(f, "to measure, for {}", advice(channel))?;
+        }
+        if !self.verdict.is_empty() {
+            let names = self.verdict.join(", ");
+            writeln!(f, "The equations ask for these effects, which are not to be acted on: {names}")?;
+        }
+        Ok(())
+    }
+
     fn write_trims(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if !self.trims.is_empty() {
-            let why = "the flights differ in trim, so their mean torques were left out";
-            writeln!(f, "\n{why} (rad/s^2 beyond the model):")?;
+            writeln!(f, "\nthe flights differ in trim (rad/s^2 beyond the new model):")?;
         }
         for trim in &self.trims {
             let [x, y, z] = trim.angular_acceleration_rad_s2.map(rounded);
@@ -264,13 +284,16 @@ impl Report {
 
     fn write_errors(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if !self.held_out.is_empty() {
-            writeln!(f, "\nprediction errors on flights that nothing was fitted on (RMS, declared -> new):")?;
+            let what = "prediction errors on the test flights (RMS, declared -> new; in brackets with the flight's own trim, and persistence)";
+            writeln!(f, "\n{what}:")?;
         }
         for (flight, horizons) in &self.held_out {
             writeln!(f, "  {flight}")?;
             for (horizon, channels) in horizons {
-                let one = |(name, Change { before, after, unit }): (&&str, &Change)| {
-                    format!("{name} {} -> {} {unit}", rounded(*before), rounded(*after))
+                let one = |(name, change): (&&str, &Change)| {
+                    let [before, after, own_trim, persistence] =
+                        [change.before, change.after, change.own_trim, change.persistence].map(rounded);
+                    format!("{name} {before} -> {after} ({own_trim}; {persistence}) {}", change.unit)
                 };
                 let errors = channels.iter().map(one).collect::<Vec<_>>().join("   ");
                 writeln!(f, "    {horizon:>4} s  {errors}")?;
@@ -308,6 +331,21 @@ impl Report {
         worse
     }
 
+    fn write_residuals(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if !self.whiteness.after.is_empty() {
+            writeln!(
+                f,
+                "\nresiduals on the test flights (RMS, declared -> new, in brackets without any model):"
+            )?;
+        }
+        for (name, after) in &self.whiteness.after {
+            let before = self.whiteness.before.get(name).map_or(f64::NAN, |before| before.rms);
+            let [before, new, no_model] = [before, after.rms, after.no_model].map(rounded);
+            writeln!(f, "  {name:20} {before} -> {new} ({no_model}) {}", after.unit)?;
+        }
+        Ok(())
+    }
+
     fn write_rest(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (name, Unexplained { rms, unit, before }) in &self.unexplained {
             let [rms, before] = [*rms, *before].map(rounded);
@@ -343,24 +381,28 @@ mod tests {
 
     #[test]
     fn a_new_vehicle_that_predicts_worse_is_told() {
-        let change = |before, after| Change { before, after, unit: "m" };
+        let change = |before, after| Change { before, after, persistence: 1.0, own_trim: after, unit: "m" };
         let channels = BTreeMap::from([("position", change(0.1, 0.25)), ("velocity", change(0.1, 0.11))]);
         let mut report = Report {
             vehicle: String::new(),
             flights: Vec::new(),
             verdict: Vec::new(),
+            losses: Vec::new(),
+            withdrawn: Vec::new(),
+            refined: false,
             effects: BTreeMap::new(),
             whiteness: BeforeAfter { before: BTreeMap::new(), after: BTreeMap::new() },
             time_offsets_s: BTreeMap::new(),
             faults: Vec::new(),
             trims: Vec::new(),
+            selected: Changes::new(),
             held_out: Changes::from([("leg 2".to_owned(), BTreeMap::from([("0.5".to_owned(), channels)]))]),
             fitted: Changes::new(),
             noise_floor: BTreeMap::new(),
             unexplained: BTreeMap::new(),
             not_identifiable: Vec::new(),
             block_s: 1.0,
-            test_blocks: 20,
+            validation_blocks: 20,
         };
         let line = "warning: the new vehicle predicts worse than the declared one: position after 0.5 s of leg 2, 0.1000 -> \
                     0.2500 m\n";

@@ -8,12 +8,6 @@ pub fn column(flight: &Prepared, rows: &[f64], equation: Equation, axis: usize) 
     rows[offset + axis..].iter().step_by(flight.width()).copied().collect()
 }
 
-/// Takes the mean of the angular acceleration's rows off them.
-pub fn take_off_means(flight: &Prepared, rows: &mut [f64]) {
-    let all = (0, flight.layout.knots.len());
-    on_means(flight, rows, &[all], |row, mean| *row -= mean);
-}
-
 /// Puts the mean of each block, given by its first knot and the one behind its last, in place of the angular
 /// acceleration's rows.
 pub fn keep_means(flight: &Prepared, rows: &mut [f64], blocks: &[(usize, usize)]) {

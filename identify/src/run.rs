@@ -4,31 +4,30 @@ use crate::align::{Offsets, align};
 use crate::candidate::{Candidate, FAST_COMMANDS, Unidentifiable, candidates, free_parameters};
 use crate::clock::Lateness;
 use crate::faults::{self, Fault};
-use crate::fit::{FitResult, Problem, Weights};
+use crate::fit::{FitResult, Problem};
+use crate::horizons::{of_role, predictions};
 use crate::logging;
+use crate::loss::losses;
 use crate::model::Model;
-use crate::noise::{self, Floor};
+use crate::noise;
 use crate::parameter::{Parameter, Parameters};
-use crate::predict::{Errors, Measured};
 use crate::prepared::{BOX_STEPS, Equation, Prepared, Propulsion};
 use crate::regressor::{Regressor, regressors};
-use crate::report::{
-    BeforeAfter, Change, Changes, EffectReport, Estimate, FlightReport, Noise, Report, Unexplained,
-};
+use crate::report::{BeforeAfter, Changes, EffectReport, Estimate, FlightReport, Report, Unexplained};
 use crate::rows::column;
 use crate::select::{Selection, confounded, select};
 use crate::sensing::SensorErrors;
 use crate::trim;
 use crate::whiteness::{Whiteness, whiteness};
+use crate::whitening::Noises;
 use diagnostics::Diagnostic;
-use flights::state::StateQuantity;
 use flights::{Flight, FlightSet, Role};
 use plant::effects::{Effect, EffectKind, entry};
 use std::collections::BTreeMap;
 use vehicles::Vehicle;
 
-/// Horizons of prediction.
-pub const HORIZONS_S: [f64; 3] = [0.1, 0.5, 1.0];
+pub use crate::horizons::HORIZONS_S;
+
 /// Windows of flights without an inertial unit: twice a derivative of a position needs more of it.
 const POSE_BOX_S: f64 = 0.04;
 /// A residual is worth telling where its persistent part is beyond this part of its noise.
@@ -116,8 +115,6 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
     let (mut problem, mut flight_reports, offsets) = aligned(&vehicle, &declared, set, &mut faults)?;
     let all: Vec<&Prepared> = problem.flights().collect();
     let (open, unidentifiable) = candidates(&problem.model.parameters, &all);
-    progress("trims");
-    let trims = trim::compare(&mut problem, &open);
     let selection = select(&mut problem, &open, progress);
     progress("confounded effects");
     let mut effects = judged_effects(&problem, &selection);
@@ -125,10 +122,11 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
     undetermined_effects(&problem, &selection, &unidentifiable, &mut effects);
     note_logging(&problem, &selection, &mut flight_reports);
     progress("predictions");
-    let values = &selection.after.values;
+    let values = &selection.flown().values;
     let sensor_errors = SensorErrors::of(&problem.model.parameters, values);
-    let predictions = predictions(&problem, set, values, &sensor_errors);
-    let floor = noise::floor(&problem);
+    let predictions = predictions(&problem, set, values);
+    let held_out = of_role(&predictions, Role::Test);
+    let noise_floor = noise::table(&noise::floor(&problem.test), &HORIZONS_S, vehicle.gravity_m_s2);
     let whiteness = BeforeAfter {
         before: whiteness(&problem, &selection.before.values),
         after: whiteness(&problem, values),
@@ -137,18 +135,22 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
         vehicle: set.vehicle.display().to_string(),
         flights: flight_reports,
         verdict: verdict(&problem, &selection),
+        losses: losses(&of_measured_attitude(&problem, &held_out), &noise_floor),
+        withdrawn: selection.withdrawn.clone(),
+        refined: selection.refined.is_some(),
         effects,
         unexplained: unexplained(&whiteness),
         whiteness,
         time_offsets_s: offsets.into_iter().collect(),
         faults,
-        trims,
-        held_out: of_role(&predictions, Role::Test),
+        trims: trim::differing(&problem, values),
+        held_out,
+        selected: of_role(&predictions, Role::Select),
         fitted: of_role(&predictions, Role::Fit),
-        noise_floor: noise_report(&floor, vehicle.gravity_m_s2),
+        noise_floor,
         not_identifiable: unidentifiable,
         block_s: problem.block_s,
-        test_blocks: selection.after.validation_costs.len(),
+        validation_blocks: selection.after.validation_costs.len(),
     };
     let effects = problem.model.parameters.effects_under(values);
     let name = |flight: &Prepared| flight.flight.name.clone();
@@ -158,6 +160,14 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
     let pictures = pictures(&problem, &selection);
     drop(problem);
     Ok(Outcome { pictures, regressors, effects, late, sensor_errors, report, believed })
+}
+
+/// The errors of flights whose attitude was measured: under an assumed one a prediction says nothing of the vehicle.
+fn of_measured_attitude(problem: &Problem, errors: &Changes) -> Changes {
+    let is_measured =
+        |name: &str| problem.flights().any(|flight| flight.flight.name == name && !flight.is_assumed());
+    let kept = errors.iter().filter(|(name, _)| is_measured(name));
+    kept.map(|(name, errors)| (name.clone(), errors.clone())).collect()
 }
 
 /// The problem, its flights as reported, and their clock offsets.
@@ -174,7 +184,7 @@ fn aligned<'f>(
         problem(vehicle, declared, set).map_err(|cause| faulty(faults, set).unwrap_or(cause))?;
     let offsets = align(&mut problem);
     faults.extend(faults::of_rotors(&mut problem));
-    for (role, flights) in [(Role::Fit, &problem.estimation), (Role::Test, &problem.validation)] {
+    for (role, flights) in [(Role::Fit, &problem.estimation), (Role::Test, &problem.test)] {
         if flights.is_empty() {
             return Err(faulty(faults, set).unwrap_or_else(|| no_flight(role, &[])));
         }
@@ -205,8 +215,8 @@ pub fn problem<'f>(
 ) -> Result<(Problem<'f>, Vec<FlightReport>), IdentifyError> {
     let parameters = Parameters::of(vehicle, declared);
     let propulsion = Propulsion::of(vehicle);
-    let (mut estimation, mut validation, mut reports) = (Vec::new(), Vec::new(), Vec::new());
-    let mut reasons = Vec::new();
+    let (mut estimation, mut validation, mut test) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut reports, mut reasons) = (Vec::new(), Vec::new());
     for flight in &set.flights {
         // A flight that cannot be used does not stop the others.
         let prepared = flight
@@ -225,11 +235,12 @@ pub fn problem<'f>(
         reports.push(report);
         match (prepared, flight.role) {
             (Some(prepared), Role::Fit) => estimation.push(prepared),
-            (Some(prepared), Role::Test) => validation.push(prepared),
+            (Some(prepared), Role::Select) => validation.push(prepared),
+            (Some(prepared), Role::Test) => test.push(prepared),
             (None, _) => {}
         }
     }
-    for (role, flights) in [(Role::Fit, &estimation), (Role::Test, &validation)] {
+    for (role, flights) in [(Role::Fit, &estimation), (Role::Test, &test)] {
         if flights.is_empty() {
             return Err(no_flight(role, &reasons));
         }
@@ -237,9 +248,8 @@ pub fn problem<'f>(
     let total_s: f64 = estimation.iter().map(compared_s).sum();
     let block_s = (total_s / 40.0).clamp(0.5, 2.0);
     let model = Model { vehicle: vehicle.clone(), parameters };
-    let weights = Weights::new();
-    let problem =
-        Problem { model, estimation, validation, weights, block_s, shared_late_s: 0.0, has_own_trims: false };
+    let noises = Noises::new();
+    let problem = Problem { model, estimation, validation, test, noises, block_s, shared_late_s: 0.0 };
     Ok((problem, reports))
 }
 
@@ -263,7 +273,7 @@ fn faulty(faults: &[Fault], set: &FlightSet) -> Option<IdentifyError> {
         )
     };
     let reason = faults.iter().flatten().map(one).collect::<Vec<_>>().join("; ");
-    Some(IdentifyError::NoFlight { role: name_of(role), reason })
+    Some(IdentifyError::NoFlight { role: role.name(), reason })
 }
 
 fn slow_note(period_s: f64, propulsion: &Propulsion) -> String {
@@ -272,10 +282,6 @@ fn slow_note(period_s: f64, propulsion: &Propulsion) -> String {
         "command: logged every {period_s:.3} s, expected at most {most_s:.3} s, half of the motors' time constant of {motor_s:.3} s; motor lag, \
          command delay, inertia and all torques cannot be determined, and are not compared; log commands or rotor speeds faster"
     )
-}
-
-fn name_of(role: Role) -> &'static str {
-    if role == Role::Fit { "fit" } else { "test" }
 }
 
 /// The error of `role`, none of whose flights can be used for these reasons.
@@ -292,7 +298,7 @@ fn no_flight(role: Role, reasons: &[(&Flight, String)]) -> IdentifyError {
     let reason = of_role.collect::<Vec<_>>().join("\n  ");
     let none = "there is none. Add flights, or give one a part of another's time by `from_s` and `to_s`";
     let reason = if reason.is_empty() { none.to_owned() } else { reason };
-    IdentifyError::NoFlight { role: name_of(role), reason }
+    IdentifyError::NoFlight { role: role.name(), reason }
 }
 
 fn box_s(flight: &Flight) -> Option<f64> {
@@ -347,7 +353,12 @@ fn named<'s>(problem: &Problem, selection: &'s Selection) -> impl Iterator<Item 
 fn note_logging(problem: &Problem, selection: &Selection, reports: &mut [FlightReport]) {
     let leads = selection.accepted.iter();
     let leads = leads.filter_map(|candidate| logging::explained_lead_s(problem, candidate, &selection.after));
-    let Some(lead_s) = leads.reduce(f64::max) else { return };
+    let last = selection.rounds.last().into_iter().flat_map(|round| &round.judged);
+    let lags = last.filter(|judged| judged.is_logging).filter_map(|judged| {
+        let Candidate { kind, free } = &judged.candidate;
+        logging::explained_lag_s(problem, kind, free, &judged.fitted)
+    });
+    let Some(lead_s) = leads.chain(lags).reduce(f64::max) else { return };
     reports.iter_mut().for_each(|report| report.notes.push(logging::note(problem, lead_s)));
 }
 
@@ -393,7 +404,7 @@ fn accepted_effects(
         let mut parameters = BTreeMap::new();
         for at in &indices {
             let candidate = &selection.accepted[*at];
-            parameters.extend(estimates(problem, &selection.after, &candidate.free));
+            parameters.extend(estimates(problem, selection.flown(), &candidate.free));
             candidate.free.iter().for_each(|at| start[*at] = problem.model.parameters.all[*at].baseline);
         }
         let without = problem.fitted(&start, &free_parameters(&others));
@@ -451,7 +462,7 @@ fn undetermined_effects(
 
 /// The weighted root mean square of a sum of squares of the validation data.
 fn size(problem: &Problem, cost: f64) -> f64 {
-    (cost / problem.rows(&problem.validation) as f64).sqrt()
+    (cost / problem.validation_rows() as f64).sqrt()
 }
 
 /// The estimates of these parameters, with 95 % intervals.
@@ -473,58 +484,6 @@ pub fn estimates(problem: &Problem, fitted: &FitResult, free: &[usize]) -> BTree
     free.iter().map(one).collect()
 }
 
-type Prediction = (String, Role, f64, Errors, Errors);
-
-/// Errors of every flight at every horizon, declared and new.
-fn predictions(
-    problem: &Problem,
-    set: &FlightSet,
-    values: &[f64],
-    sensor_errors: &SensorErrors,
-) -> Vec<Prediction> {
-    let declared = problem.model.parameters.baseline();
-    let mut predictions = Vec::new();
-    for flight in &set.flights {
-        let prepared = problem.flights().find(|prepared| prepared.flight.name == flight.name);
-        let late = prepared.map_or(Lateness::default(), |prepared| prepared.late);
-        let aligned = SensorErrors::default().taken_off(flight, &late);
-        let corrected = sensor_errors.taken_off(flight, &late);
-        let (Some(before), Some(after)) = (Measured::of(&aligned), Measured::of(&corrected)) else {
-            continue;
-        };
-        for horizon_s in HORIZONS_S {
-            let old = before.predicted(&aligned, problem.model.airframe(&declared), horizon_s);
-            let new = after.predicted(&corrected, problem.model.airframe(values), horizon_s);
-            predictions.push((flight.name.clone(), flight.role, horizon_s, old, new));
-        }
-    }
-    predictions
-}
-
-fn of_role(predictions: &[Prediction], role: Role) -> Changes {
-    let mut flights = Changes::new();
-    for (name, _, horizon_s, old, new) in predictions.iter().filter(|row| row.1 == role) {
-        let channels = StateQuantity::ALL.iter().filter_map(|quantity| {
-            let (channel, unit) = (quantity.name(), quantity.unit());
-            Some((channel, Change { before: *old.get(channel)?, after: *new.get(channel)?, unit }))
-        });
-        flights.entry(name.clone()).or_default().insert(format!("{horizon_s}"), channels.collect());
-    }
-    flights
-}
-
-fn noise_report(floor: &Floor, gravity_m_s2: f64) -> BTreeMap<&'static str, Noise> {
-    let at = |name: &str, horizon_s: &f64| {
-        let of_all = noise::prediction_floor(floor, *horizon_s, gravity_m_s2);
-        Some((horizon_s.to_string(), *of_all.get(name)?))
-    };
-    let one = |(name, (value, unit)): (&&'static str, &(f64, &'static str))| {
-        let prediction = HORIZONS_S.iter().filter_map(|horizon_s| at(name, horizon_s)).collect();
-        (*name, Noise { value: *value, unit, prediction })
-    };
-    floor.iter().map(one).collect()
-}
-
 fn unexplained(
     whiteness: &BeforeAfter<BTreeMap<&'static str, Whiteness>>,
 ) -> BTreeMap<&'static str, Unexplained> {
@@ -541,8 +500,8 @@ fn pictures(problem: &Problem, selection: &Selection) -> Vec<Picture> {
     let mut pictures = Vec::new();
     for flight in problem.flights() {
         let before = problem.model.residual_under(flight, &selection.before.values);
-        let after = problem.model.residual_under(flight, &selection.after.values);
-        let measured = problem.model.tracks(flight, &selection.after.values).rows;
+        let after = problem.model.residual_under(flight, &selection.flown().values);
+        let measured = problem.model.tracks(flight, &selection.flown().values).rows;
         for equation in &flight.layout.equations {
             let columns = |rows: &[f64]| {
                 (0..equation.size()).map(|axis| column(flight, rows, *equation, axis)).collect()

@@ -1,11 +1,11 @@
 //! Attribution: which candidates the flights ask for, one after the other.
 //!
 //! In each round every candidate is fitted, together with what was accepted before, on the estimation data, and judged
-//! on the validation data. It is accepted only if four things hold:
+//! on the validation data, or without these by cross-validation over blocks of the estimation data. It is accepted only if four things hold:
 //!
-//! 1. The gain on the validation data is beyond chance: the mean of the blocks' gains is above zero at 5 % over all
+//! 1. The gain on the validation data is beyond chance: the mean of the blocks' gains is above zero at 1 % over all
 //!    candidates of the round together (Bonferroni; one-sided percentile bootstrap over blocks, Efron 1979).
-//! 2. One of its parameters differs from its baseline beyond chance on the estimation data, at the same level.
+//! 2. Its parameters together differ from their baselines beyond chance on the estimation data, at the same level.
 //! 3. The gain matters: it is at least [`LEAST_GAIN`] of the squared error.
 //! 4. It is not for an effect of which more is asked than it can be: not all parameters that moved stopped at a bound.
 //!
@@ -13,18 +13,24 @@
 //! beyond chance. Then those taken before have to pass the first test again, as a later effect may explain what an
 //! earlier one stood in for.
 //!
+//! In the end effects are withdrawn, and the search goes on without them: those of which a parameter stopped at a bound, those
+//! that are no longer beyond chance beside the others, and those without which predictions are better (`foresight`).
+//!
 //! Where a round accepts nothing although much is left that candidates together would take away, two are looked for that
 //! only gain together, under the same tests; the chance of a false acceptance in that search is [`FALSE_RATE`] once more.
 //! The rounds end when nothing changes any more.
 
 use crate::candidate::{Candidate, free_parameters};
 use crate::fit::{FitResult, Problem};
+use crate::foresight::{Foresight, Growth};
 use crate::logging;
 use crate::normal::{self, Block};
+use crate::refine;
 use crate::sensor_effects::POSE_DELAY;
+use crate::statistics::{chance_of_no_gain, fisher_tail};
 use plant::effects::EffectKind;
-use rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
+use serde::Serialize;
 
 /// A smaller part of the squared error does not matter, however certain it is: what the comparison itself leaves at
 /// its joints is of the order of a tenth of it.
@@ -32,13 +38,9 @@ const LEAST_GAIN: f64 = 0.002;
 /// A smaller part of a plausible value is none worth naming.
 const LEAST_PART: f64 = 0.01;
 /// Chance of a false acceptance in a round.
-const FALSE_RATE: f64 = 0.05;
+const FALSE_RATE: f64 = 0.01;
 /// Two candidates whose difference is within this one-sided level cannot be told apart.
 const CONFOUNDED_LEVEL: f64 = 0.05;
-/// Resamples of a bootstrap: enough for the level of one among thirty candidates, tried beside four others.
-const RESAMPLES: usize = 20_000;
-/// After so many that lose, a chance is known well enough.
-const LOSSES_ENOUGH: usize = 500;
 /// So many candidates of a round are fitted in earnest.
 const CONFIRMED: usize = 4;
 /// A confounded effect has at least this part of the gain.
@@ -64,6 +66,8 @@ pub struct Judged {
     pub p_value: f64,
     /// Whether it was accepted.
     pub is_accepted: bool,
+    /// True if it would be, but for the logging of the commands, which explains it.
+    pub is_logging: bool,
     /// Whether `fitted` is no fit but what the linearised equations promise.
     pub is_promise: bool,
 }
@@ -84,6 +88,15 @@ impl Round {
     }
 }
 
+/// An effect that was accepted and taken back.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Withdrawn {
+    /// The effect.
+    pub effect: &'static str,
+    /// The reason.
+    pub reason: String,
+}
+
 /// What a selection came to.
 #[derive(Debug, Clone)]
 pub struct Selection {
@@ -93,11 +106,20 @@ pub struct Selection {
     pub before: FitResult,
     /// The model with all that was accepted.
     pub after: FitResult,
+    /// The same, refined by prediction errors; `None` where that does not predict better.
+    pub refined: Option<FitResult>,
     /// The rounds.
     pub rounds: Vec<Round>,
+    /// Effects that were accepted and taken back.
+    pub withdrawn: Vec<Withdrawn>,
 }
 
 impl Selection {
+    /// The model that is reported: refined, or as it came out of the equations.
+    pub fn flown(&self) -> &FitResult {
+        self.refined.as_ref().unwrap_or(&self.after)
+    }
+
     /// Chance of as much gain without the accepted `effect`, in the round that took the best part of it.
     pub fn p_value(&self, effect: &str) -> f64 {
         let taken = self.rounds.iter().filter_map(Round::taken);
@@ -110,29 +132,33 @@ impl Selection {
 
 /// Selects among `candidates`, telling `progress` of each step.
 ///
-/// Where flights have trims of their own, these are left out at first; in the end a shift of the centre of mass, which
-/// is what most trims are, is tried with them.
+/// In the end effects without which predictions are better are taken back, and the search goes on without them.
 pub fn select(problem: &mut Problem, candidates: &[Candidate], progress: &mut dyn FnMut(&str)) -> Selection {
     let declared = problem.model.parameters.baseline();
     let base = problem.fitted(&declared, &[]);
     let mut search = StepwiseSearch { accepted: Vec::new(), rounds: Vec::new(), base };
-    search.run(problem, candidates, progress);
-    if problem.has_own_trims {
-        let (base, of_trim) = (search.base.clone(), Candidate::is_trim);
-        problem.has_own_trims = false;
-        let shifts: Vec<Candidate> =
-            candidates.iter().filter(|candidate| of_trim(candidate)).cloned().collect();
-        search.run(problem, &shifts, progress);
-        if !search.accepted.iter().any(of_trim) {
-            problem.has_own_trims = true;
-            search.base = base;
+    let mut open = candidates.to_vec();
+    let mut withdrawn = Vec::new();
+    let refined = loop {
+        search.run(problem, &open, progress);
+        problem.weigh(&search.base, candidates);
+        search.base = problem.fitted(&search.base.values, &free_parameters(&search.accepted));
+        progress("every effect once more, by its parameters and by predictions");
+        let mut found = search.unsound(problem).or_else(|| search.worst(problem));
+        let mut refined = None;
+        if found.is_none() {
+            progress("refinement by prediction errors");
+            refined = refine::refined(problem, &search.base);
+            found = refined.as_ref().and_then(|refined| search.stopped(problem, refined));
         }
-    }
-    let StepwiseSearch { accepted, rounds, base } = search;
-    problem.weigh(&base, candidates);
-    let after = problem.fitted(&base.values, &free_parameters(&accepted));
+        let Some(found) = found else { break refined };
+        search.withdraw(problem, found.effect);
+        open.retain(|candidate| candidate.kind.name != found.effect);
+        withdrawn.push(found);
+    };
+    let StepwiseSearch { accepted, rounds, base: after } = search;
     let before = problem.fitted(&declared, &[]);
-    Selection { accepted, before, after, rounds }
+    Selection { accepted, before, after, refined, rounds, withdrawn }
 }
 
 /// How far a selection has come.
@@ -143,6 +169,65 @@ struct StepwiseSearch {
 }
 
 impl StepwiseSearch {
+    /// An accepted effect with a parameter that `fitted` left at a bound.
+    fn stopped(&self, problem: &Problem, fitted: &FitResult) -> Option<Withdrawn> {
+        self.accepted.iter().find_map(|candidate| {
+            let bound = at_bound(problem, candidate, fitted)?;
+            let reason = format!("{bound}: more is asked for than this effect can be");
+            Some(Withdrawn { effect: candidate.kind.name, reason })
+        })
+    }
+
+    /// An accepted effect with a parameter that the last fit left at a bound, or that is no longer beyond chance beside the
+    /// others.
+    fn unsound(&self, problem: &Problem) -> Option<Withdrawn> {
+        let by_chance = |candidate: &Candidate| {
+            let chance = joint_p_value(problem, &self.base, candidate);
+            let reason =
+                format!("its parameters are no longer beyond chance beside those of the others: {chance:.3}");
+            (chance >= FALSE_RATE).then_some(Withdrawn { effect: candidate.kind.name, reason })
+        };
+        self.stopped(problem, &self.base).or_else(|| self.accepted.iter().find_map(by_chance))
+    }
+
+    /// The accepted effect without which predictions are better, of several the one with the greatest growth.
+    fn worst(&self, problem: &Problem) -> Option<Withdrawn> {
+        let mut names: Vec<&'static str> =
+            self.accepted.iter().map(|candidate| candidate.kind.name).collect();
+        names.dedup();
+        if names.is_empty() {
+            return None;
+        }
+        let with = Foresight::of(problem, &self.base);
+        let growth = |name: &'static str| {
+            let without = Foresight::of(problem, &self.without_effect(problem, name).1);
+            Some((name, with.growth(&without)?))
+        };
+        let (effect, Growth { component, horizon_s, without, with, unit }) =
+            names.into_iter().filter_map(growth).max_by(|a, b| a.1.ratio().total_cmp(&b.1.ratio()))?;
+        let reason = format!(
+            "the error of {component} after {horizon_s} s is {without:.3} {unit} without it, {with:.3} {unit} with it"
+        );
+        Some(Withdrawn { effect, reason })
+    }
+
+    /// The other accepted candidates, and their fit.
+    fn without_effect(&self, problem: &Problem, effect: &str) -> (Vec<Candidate>, FitResult) {
+        let (dropped, others): (Vec<Candidate>, Vec<Candidate>) =
+            self.accepted.iter().cloned().partition(|candidate| candidate.kind.name == effect);
+        let mut start = self.base.values.clone();
+        free_parameters(&dropped)
+            .into_iter()
+            .for_each(|at| start[at] = problem.model.parameters.all[at].baseline);
+        let fitted = problem.fitted(&start, &free_parameters(&others));
+        (others, fitted)
+    }
+
+    /// Takes an effect back.
+    fn withdraw(&mut self, problem: &Problem, effect: &str) {
+        (self.accepted, self.base) = self.without_effect(problem, effect);
+    }
+
     /// Rounds among `candidates` until none changes anything.
     fn run(&mut self, problem: &mut Problem, candidates: &[Candidate], progress: &mut dyn FnMut(&str)) {
         for _ in 0..ROUNDS_MAX {
@@ -235,7 +320,7 @@ fn round(
     };
     let mut all: Vec<Judged> = open.par_iter().map(judge).collect();
     confirm(problem, base, accepted, &mut all, level);
-    let taken = best(&all);
+    let taken = best(problem, &all);
     Round { judged: all, taken }
 }
 
@@ -263,15 +348,24 @@ fn judged(
 ) -> Judged {
     let gain = base.validation_cost() - fitted.validation_cost();
     let p_value = p_value(&base.validation_costs, &fitted.validation_costs);
-    let t_value = t_value(problem, &fitted, candidate);
-    let is_accepted = p_value < level
-        && t_value > fitted.t_quantile(1.0 - level / 2.0)
+    let joint_p_value = joint_p_value(problem, &fitted, candidate);
+    let is_real = p_value < level
+        && joint_p_value < level
         && gain > LEAST_GAIN * base.validation_cost()
         && is_seen(problem, candidate, &fitted)
-        && !logging::explains(problem, candidate.kind, &candidate.free, &fitted)
         && !is_beyond_bounds(problem, candidate, &fitted);
+    let is_logging =
+        is_real && logging::explained_lag_s(problem, candidate.kind, &candidate.free, &fitted).is_some();
     let (candidate, gain) = (candidate.clone(), gain / base.validation_cost());
-    Judged { candidate, fitted, gain, p_value, is_accepted, is_promise: false }
+    Judged {
+        candidate,
+        fitted,
+        gain,
+        p_value,
+        is_accepted: is_real && !is_logging,
+        is_logging,
+        is_promise: false,
+    }
 }
 
 /// Whether one of its parameters is large enough to be more than an artefact of the grid: a delay of more than half a
@@ -291,6 +385,20 @@ fn is_beyond_bounds(problem: &Problem, candidate: &Candidate, fitted: &FitResult
     candidate.free.iter().all(|at| {
         let (entry, value) = (&problem.model.parameters.all[*at], fitted.values[*at]);
         value == entry.baseline || value == entry.spec().min || value == entry.spec().max
+    })
+}
+
+/// The first parameter that stopped at a bound other than its baseline, of those that the flights determine.
+#[allow(clippy::float_cmp, reason = "values that stop at a bound are the bound")]
+fn at_bound(problem: &Problem, candidate: &Candidate, fitted: &FitResult) -> Option<String> {
+    candidate.free.iter().find_map(|at| {
+        let (entry, value) = (&problem.model.parameters.all[*at], fitted.values[*at]);
+        let spec = entry.spec();
+        let half = fitted.t_quantile(0.975) * fitted.standard_error(*at).unwrap_or(f64::INFINITY);
+        let is_bound = value != entry.baseline && (value == spec.min || value == spec.max);
+        let is_determined = value - half > spec.min || value + half < spec.max;
+        (is_bound && is_determined)
+            .then(|| format!("{} stopped at its bound {value} {}", spec.name, spec.unit()))
     })
 }
 
@@ -314,35 +422,37 @@ fn fitted(problem: &Problem, base: &FitResult, accepted: &[Candidate], candidate
     problem.fitted(&start, &all)
 }
 
-fn t_value(problem: &Problem, fitted: &FitResult, candidate: &Candidate) -> f64 {
-    let t = |at: &usize| {
-        let away = (fitted.values[*at] - problem.model.parameters.all[*at].baseline).abs();
-        let deviation = fitted.standard_error(*at).unwrap_or(0.0);
-        if deviation > 0.0 { away / deviation } else { 0.0 }
-    };
-    candidate.free.iter().map(t).fold(0.0, f64::max)
+/// Chance that the candidate's parameters are as far from their baselines together if they are there in truth: Wald's test
+/// with the jackknife's covariance. Of two that act as a product alone neither is sure by itself.
+fn joint_p_value(problem: &Problem, fitted: &FitResult, candidate: &Candidate) -> f64 {
+    let is_known =
+        |at: &usize| fitted.standard_error(*at).is_some_and(|error| error > 0.0 && error.is_finite());
+    let known: Vec<usize> = candidate.free.iter().copied().filter(is_known).collect();
+    let away: Vec<f64> =
+        known.iter().map(|at| fitted.values[*at] - problem.model.parameters.all[*at].baseline).collect();
+    let blocks = fitted.estimation_costs.len() as f64;
+    fisher_tail(fitted.wald(&known, &away) / known.len() as f64, known.len() as f64, blocks - 1.0)
 }
 
-/// Chance that the mean gain from `before` to `after` is not above zero, by resampling the blocks: of gains so
-/// unequal, since a few blocks of violent flight hold most of them, a mean is far from normal.
+/// Chance that the mean gain of the blocks from `before` to `after` is not above zero.
 fn p_value(before: &[f64], after: &[f64]) -> f64 {
     let gains: Vec<f64> = before.iter().zip(after).map(|(before, after)| before - after).collect();
-    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(gains.len() as u64);
-    let count = gains.len() as u64;
-    let draw =
-        |random: &mut rand_chacha::ChaCha8Rng| gains[(((random.next_u64() >> 32) * count) >> 32) as usize];
-    let (mut losses, mut drawn) = (0, 0);
-    while drawn < RESAMPLES && losses < LOSSES_ENOUGH {
-        losses += usize::from((0..count).map(|_| draw(&mut random)).sum::<f64>() <= 0.0);
-        drawn += 1;
-    }
-    // A few blocks that agree prove no more than a few coins that fall alike.
-    ((losses + 1) as f64 / (drawn + 1) as f64).max(0.5_f64.powi(gains.len().min(1000) as i32))
+    chance_of_no_gain(&gains)
 }
 
 /// The accepted one with the greatest gain, or the one with the fewest parameters that is not worse beyond chance.
-fn best(judged: &[Judged]) -> Option<usize> {
-    let accepted: Vec<usize> = (0..judged.len()).filter(|at| judged[*at].is_accepted).collect();
+fn best(problem: &Problem, judged: &[Judged]) -> Option<usize> {
+    // What the logging of the commands explains as well is no effect; sensors that lead for it are named nowhere.
+    let is_logged = |at: usize| {
+        let Judged { candidate, fitted, .. } = &judged[at];
+        if logging::explained_lead_s(problem, candidate, fitted).is_some() {
+            return false;
+        }
+        let rivals = judged.iter().filter(|rival| rival.is_logging);
+        rivals.into_iter().any(|rival| !is_worse(&rival.fitted, &judged[at].fitted))
+    };
+    let accepted: Vec<usize> =
+        (0..judged.len()).filter(|at| judged[*at].is_accepted && !is_logged(*at)).collect();
     let by_gain = |a: &&usize, b: &&usize| judged[**a].gain.total_cmp(&judged[**b].gain);
     let greatest = *accepted.iter().max_by(by_gain)?;
     let is_alike = |at: &&usize| !is_worse(&judged[**at].fitted, &judged[greatest].fitted);
@@ -403,7 +513,11 @@ impl Screen {
         FitResult {
             values: problem.moved(&base.values, &wanted, &step),
             covariance: normal::covariance(&moved),
-            validation_costs: after(&test),
+            validation_costs: if problem.validation.is_empty() {
+                problem.cross_validated(&fit, &base.values, &wanted)
+            } else {
+                after(&test)
+            },
             estimation_costs: after(&fit),
             free: wanted,
         }

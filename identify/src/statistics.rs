@@ -11,6 +11,7 @@
 
 mod bootstrap;
 mod correlation;
+mod gain;
 mod jackknife;
 mod ljung_box;
 mod quantile;
@@ -18,6 +19,7 @@ mod quantile;
 pub use bootstrap::{Bootstrap, MeanInterval, block_bootstrap_mean};
 pub(crate) use correlation::deviation;
 pub use correlation::{autocorrelation, cross_correlation, mean, white_noise_bound};
+pub(crate) use gain::chance_of_no_gain;
 pub use jackknife::{Estimate, jackknife};
 pub use ljung_box::{LjungBox, ljung_box};
-pub use quantile::{chi_square_tail, normal_quantile, student_quantile};
+pub use quantile::{chi_square_tail, fisher_tail, normal_quantile, student_quantile};

@@ -36,9 +36,14 @@ pub fn text(
     added["effects"] = Item::ArrayOfTables(tables);
     // A comment holds no control character.
     let file = diagnostics::printable_line(&file);
+    let doubt = if report.losses.is_empty() {
+        ""
+    } else {
+        "# It does not describe these flights: its predictions lose to persistence or to the declared file (`losses` in report.json).\n"
+    };
     Ok(format!(
         "# Written by hummingbus identify. Up to the effects at its end this is the declared file {file}, with its \
-         comments.\n{document}\n{added}"
+         comments.\n{doubt}{document}\n{added}"
     ))
 }
 
@@ -89,11 +94,13 @@ fn source(report: &Report) -> String {
             report.flights.iter().filter(move |flight| flight.role == role && flight.compared_s > 0.0);
         flights.map(|flight| flight.name.as_str()).collect::<Vec<_>>().join(", ")
     };
-    format!(
-        "hummingbus identify: fitted on {}; accepted for its gain on {}",
-        of_role(flights::Role::Fit),
-        of_role(flights::Role::Test)
-    )
+    let (fit, select) = (of_role(flights::Role::Fit), of_role(flights::Role::Select));
+    let chosen = if select.is_empty() {
+        "cross-validated on their blocks".to_owned()
+    } else {
+        format!("accepted for its gain on {select}")
+    };
+    format!("hummingbus identify: fitted on {fit}; {chosen}")
 }
 
 fn of_estimate(estimate: &Estimate, source: &str) -> Item {
@@ -140,18 +147,22 @@ mod tests {
             vehicle: String::new(),
             flights: Vec::new(),
             verdict: Vec::new(),
+            losses: Vec::new(),
+            withdrawn: Vec::new(),
+            refined: false,
             effects: BTreeMap::new(),
             whiteness: BeforeAfter { before: BTreeMap::new(), after: BTreeMap::new() },
             time_offsets_s: BTreeMap::new(),
             faults: Vec::new(),
             trims: Vec::new(),
             held_out: BTreeMap::new(),
+            selected: BTreeMap::new(),
             fitted: BTreeMap::new(),
             noise_floor: BTreeMap::new(),
             unexplained: BTreeMap::new(),
             not_identifiable: Vec::new(),
             block_s: 0.0,
-            test_blocks: 0,
+            validation_blocks: 0,
         }
     }
 

@@ -3,7 +3,7 @@
 use crate::fit::Problem;
 use crate::prepared::Equation;
 use crate::rows::column;
-use crate::statistics::{autocorrelation, ljung_box, white_noise_bound};
+use crate::statistics::{autocorrelation, deviation, ljung_box, white_noise_bound};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -12,11 +12,13 @@ const APART: usize = 4;
 /// Lags looked at, in windows that do not overlap.
 const LAGS: usize = 25;
 
-/// The residual of one equation on the validation data.
+/// The residual of one equation on the test data.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Whiteness {
     /// Root mean square over all components.
     pub rms: f64,
+    /// The same without any model: of what was measured, less its mean over each flight.
+    pub no_model: f64,
     /// Its unit.
     pub unit: &'static str,
     /// Part of the autocorrelations up to lag 25 (of windows that do not overlap) beyond their 99 % bound: 0.01 if
@@ -29,25 +31,38 @@ pub struct Whiteness {
     pub persistent: f64,
 }
 
-/// The whiteness of every equation under `values`, over the validation data.
+/// The whiteness of every equation under `values`, over the test data.
 pub fn whiteness(problem: &Problem, values: &[f64]) -> BTreeMap<&'static str, Whiteness> {
-    let mut columns: BTreeMap<&'static str, Vec<(Equation, Vec<f64>)>> = BTreeMap::new();
-    for flight in &problem.validation {
+    let mut columns: BTreeMap<&'static str, Vec<Column>> = BTreeMap::new();
+    for flight in &problem.test {
         let residual = problem.model.residual_under(flight, values);
+        let measured = problem.model.tracks(flight, values).rows;
         for equation in &flight.layout.equations {
             for axis in 0..equation.size() {
-                let column = column(flight, &residual, *equation, axis);
-                columns.entry(equation.name()).or_default().push((*equation, column));
+                let [residual, measured] =
+                    [&residual, &measured].map(|rows| column(flight, rows, *equation, axis));
+                let column = Column { equation: *equation, residual, spread: deviation(&measured) };
+                columns.entry(equation.name()).or_default().push(column);
             }
         }
     }
     columns.into_iter().map(|(name, columns)| (name, of_equation(&columns))).collect()
 }
 
-fn of_equation(columns: &[(Equation, Vec<f64>)]) -> Whiteness {
+/// One component of an equation over one flight.
+struct Column {
+    equation: Equation,
+    residual: Vec<f64>,
+    /// Standard deviation of what was measured.
+    spread: f64,
+}
+
+fn of_equation(columns: &[Column]) -> Whiteness {
     let (mut squares, mut count, mut common, mut beyond, mut lags, mut p_value) =
         (0.0, 0, 0.0, 0, 0, 1.0_f64);
-    for (_, column) in columns {
+    let mut measured = 0.0;
+    for Column { residual: column, spread, .. } in columns {
+        measured += spread * spread * column.len() as f64;
         squares += column.iter().map(|number| number * number).sum::<f64>();
         count += column.len();
         let pairs = column.iter().zip(column.iter().skip(APART));
@@ -62,9 +77,10 @@ fn of_equation(columns: &[(Equation, Vec<f64>)]) -> Whiteness {
             p_value = p_value.min(ljung_box(&apart, own_lags).p_value);
         }
     }
-    let unit = columns.first().map_or("", |(equation, _)| equation.unit());
+    let unit = columns.first().map_or("", |column| column.equation.unit());
     Whiteness {
         rms: (squares / count.max(1) as f64).sqrt(),
+        no_model: (measured / count.max(1) as f64).sqrt(),
         unit,
         beyond_bound: f64::from(beyond as u32) / (lags.max(1) as f64),
         p_value: (p_value * columns.len() as f64).min(1.0),

@@ -1,6 +1,6 @@
 //! Quantiles and tails of the usual distributions, by the crate `statrs`.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF, Normal, StudentsT};
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, Normal, StudentsT};
 
 /// The value that a standard normal number stays below with probability `p`.
 #[must_use]
@@ -23,4 +23,13 @@ pub fn chi_square_tail(x: f64, freedom: f64) -> f64 {
         return f64::NAN;
     }
     ChiSquared::new(freedom).map_or(f64::NAN, |chi_square| chi_square.sf(x))
+}
+
+/// The probability that Fisher's F with these degrees of freedom is above `x`; NaN if either is not above 0.
+#[must_use]
+pub fn fisher_tail(x: f64, numerator: f64, denominator: f64) -> f64 {
+    if x.is_nan() {
+        return f64::NAN;
+    }
+    FisherSnedecor::new(numerator, denominator).map_or(f64::NAN, |fisher| fisher.sf(x))
 }

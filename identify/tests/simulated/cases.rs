@@ -227,8 +227,8 @@ impl Case {
             .filter(|effect| **effect != name)
             .flat_map(|effect| parameters.of_name(effect))
             .collect();
-        let best: f64 = problem.costs(&problem.validation, values).iter().sum();
-        1.0 - best / problem.fitted(&without, &others).validation_cost()
+        let cost = |values: &[f64]| problem.costs(&problem.test, values).iter().sum::<f64>();
+        1.0 - cost(values) / cost(&problem.fitted(&without, &others).values)
     }
 
     fn of_floor(&self, problem: &Problem, values: &[f64], set: &FlightSet, report: &Report) -> f64 {

@@ -13,6 +13,7 @@ use std::path::{Path, PathBuf};
 use vehicles::{MotorModel, ROTORS_MAX, Vehicle};
 
 pub mod cases;
+pub mod feedback;
 
 const TICK_S: f64 = 0.001;
 /// A vehicle further away than this has got out of control: its flight says nothing of any other.

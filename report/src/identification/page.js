@@ -29,24 +29,33 @@ const doubt = ({ determined, at_bound }) => (!determined ? ", not determined by 
 const estimateText = ([name, estimate]) => `${spaced(name)} = ${withUnit(estimate.value, estimate.unit)} ` +
   `(95 %: ${number(estimate.low)} to ${number(estimate.high)}${doubt(estimate)})`;
 
+const lossText = ({ flight, horizon, channel, rival, other, unit, ...loss }) =>
+  `${channel} after ${horizon} s of ${flight}: new ${withUnit(loss.new, unit)}, ${rival} ${withUnit(other, unit)}`;
+
 function verdictText() {
-  if (report.verdict.length) return `The flights ask for ${report.verdict.join(", ")}.`;
-  if (report.test_blocks < 12) {
-    return `Undecided: the flights to test on have ${report.test_blocks} blocks of ${report.block_s} s, and with less than a dozen nothing is beyond chance.`;
+  if (report.losses.length) {
+    const asked = report.verdict.length ? ` The equations ask for ${report.verdict.join(", ")}: not to be acted on.` : "";
+    return `This vehicle file does not describe these flights: its predictions lose.${asked}`;
   }
-  return "The flights ask for nothing: no effect makes the prediction of flights that nothing was fitted on better beyond chance.";
+  if (report.verdict.length) return `The flights ask for ${report.verdict.join(", ")}.`;
+  if (report.validation_blocks < 12) {
+    return `Undecided: the flights that effects are chosen on have ${report.validation_blocks} blocks of ${report.block_s} s, and with less than a dozen nothing is beyond chance.`;
+  }
+  return "The flights ask for nothing: no effect makes the equations fit better beyond chance.";
 }
 
 function drawSummary() {
   title(`${report.vehicle.split(/[\\/]/).pop().replace(/\.toml$/, "")}: what flights show beyond the declared model`);
   element("verdict").textContent = verdictText();
+  for (const loss of report.losses) addItem("findings", `Loses: ${lossText(loss)}.`);
+  for (const { effect, reason } of report.withdrawn) addItem("findings", `Withdrawn, ${effect}: ${reason}.`);
   for (const [name, effect] of accepted) {
     const estimates = Object.entries(effect.parameters).map(estimateText);
     const rivals = effect.confused_with.length ? `; cannot be told from ${effect.confused_with.join(", ")} here` : "";
     addItem("findings", `${name}: ${estimates.join("; ")}${rivals}.`);
   }
   for (const fault of report.faults) addItem("findings", `Fault of ${fault.flight}, ${fault.channel} (${fault.kind}): expected ${fault.expected}, found ${fault.found}; ${fault.consequence}; ${fault.advice}.`);
-  if (report.trims.length) addItem("findings", "The flights differ in trim; their mean torques were left out.");
+  if (report.trims.length) addItem("findings", "The flights differ in trim: a constant torque that no one vehicle explains.");
   for (const [name, { rms, before, unit }] of Object.entries(report.unexplained)) {
     addItem("findings", `Unexplained, ${spaced(name)}: ${withUnit(rms, unit)} are neither noise nor any ` +
       `effect's (${withUnit(before, unit)} with the declared model).`);
@@ -114,13 +123,13 @@ const floorOf = (channel, horizon) => report.noise_floor[channel]?.prediction[ho
 
 function fillErrors(id, flights) {
   const rows = (flight, errors) => horizons({ errors }).flatMap((horizon) => CHANNELS.filter((name) => errors[horizon][name]).map((channel) => {
-    const { before, after, unit } = errors[horizon][channel];
+    const { before, after, persistence, own_trim, unit } = errors[horizon][channel];
     const flown = data.bus?.flights[flight]?.[horizon]?.[channel];
-    return [horizon, left(channel), number(before), number(after), left(shownUnit(unit)), change(before, after),
+    return [horizon, left(channel), number(before), number(after), number(own_trim), number(persistence), left(shownUnit(unit)), change(before, after),
       number(floorOf(channel, horizon)), ...(data.bus ? [number(flown?.before), number(flown?.after)] : [])];
   }));
   const onBus = data.bus ? ["declared, on the bus", "new, on the bus"] : [];
-  fillTable(id, [left("flight"), "horizon [s]", left("channel"), "declared", "new", left("unit"), "change", "by noise alone", ...onBus],
+  fillTable(id, [left("flight"), "horizon [s]", left("channel"), "declared", "new", "own trim", "persistence", left("unit"), "change", "by noise alone", ...onBus],
     Object.entries(flights).flatMap(([flight, errors]) => grouped(flight, rows(flight, errors))));
 }
 
@@ -150,7 +159,7 @@ function drawErrors() {
     }
   }
   fillErrors("held-out", report.held_out);
-  fillErrors("fitted", report.fitted);
+  fillErrors("fitted", { ...report.selected, ...report.fitted });
 }
 
 function drawNoise() {
@@ -162,9 +171,9 @@ function drawNoise() {
 }
 
 function drawWhiteness() {
-  const cells = (model, { rms, persistent, unit, beyond_bound, p_value }) =>
-    [left(NAMES[model]), number(rms), number(persistent), left(shownUnit(unit)), `${(100 * beyond_bound).toFixed(0)} %`, chance(p_value)];
-  fillTable("whiteness", [left("equation"), left("model"), "RMS", "common to neighbours", left("unit"), "beyond bound", "p"],
+  const cells = (model, { rms, no_model, persistent, unit, beyond_bound, p_value }) =>
+    [left(NAMES[model]), number(rms), number(no_model), number(persistent), left(shownUnit(unit)), `${(100 * beyond_bound).toFixed(0)} %`, chance(p_value)];
+  fillTable("whiteness", [left("equation"), left("model"), "RMS", "no model", "common to neighbours", left("unit"), "beyond bound", "p"],
     Object.keys(report.whiteness.before).flatMap((name) =>
       grouped(spaced(name), MODELS.map((model) => cells(model, report.whiteness[model][name])))));
 }

@@ -236,18 +236,22 @@ mod tests {
             vehicle: "one.toml".to_owned(),
             flights: FLIGHTS.map(flight).to_vec(),
             verdict: Vec::new(),
+            losses: Vec::new(),
+            withdrawn: Vec::new(),
+            refined: false,
             effects: BTreeMap::new(),
             whiteness: BeforeAfter { before: BTreeMap::new(), after: BTreeMap::new() },
             time_offsets_s: BTreeMap::new(),
             faults: Vec::new(),
             trims: Vec::new(),
             held_out: BTreeMap::new(),
+            selected: BTreeMap::new(),
             fitted: BTreeMap::new(),
             noise_floor: BTreeMap::new(),
             unexplained: BTreeMap::new(),
             not_identifiable: Vec::new(),
             block_s: 1.0,
-            test_blocks: 20,
+            validation_blocks: 20,
         }
     }
 

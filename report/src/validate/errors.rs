@@ -134,10 +134,9 @@ impl fmt::Display for Errors {
 }
 
 fn row(flight: &FlightErrors, horizon: &HorizonErrors, channel: &ChannelErrors) -> Vec<String> {
-    let role = if flight.role == Role::Fit { "fit" } else { "test" };
     let mut row = vec![
         flight.name.clone(),
-        role.to_owned(),
+        flight.role.name().to_owned(),
         format!("{} s", horizon.horizon()),
         horizon.windows.to_string(),
         format!("{}, {}", channel.quantity.name(), channel.quantity.unit()),

@@ -1,0 +1,94 @@
+//! Predictions that lose: to the declared vehicle, or to persistence, which knows no vehicle at all.
+
+use crate::horizons::Changes;
+use crate::noise::Noise;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Horizons and channels that are judged.
+const HORIZONS: [&str; 2] = ["0.1", "0.5"];
+const CHANNELS: [&str; 2] = ["attitude", "velocity"];
+/// A smaller ratio of errors is no loss.
+const LEAST_RATIO: f64 = 1.05;
+
+/// A prediction error of the new vehicle that is greater than a rival's.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Loss {
+    /// The flight.
+    pub flight: String,
+    /// Horizon in s.
+    pub horizon: &'static str,
+    /// The channel.
+    pub channel: &'static str,
+    /// `persistence` or `declared`.
+    pub rival: &'static str,
+    /// Root mean square of the new vehicle.
+    pub new: f64,
+    /// Root mean square of the rival.
+    pub other: f64,
+    /// Unit of both.
+    pub unit: &'static str,
+}
+
+/// The losses among `errors` of test flights. The part of an error that sensors' noise makes of the measured start is no
+/// loss: a vehicle that hardly moves is predicted best by persistence.
+pub fn losses(errors: &Changes, noise: &BTreeMap<&'static str, Noise>) -> Vec<Loss> {
+    let mut losses = Vec::new();
+    for (flight, horizons) in errors {
+        let places = HORIZONS.into_iter().flat_map(|horizon| CHANNELS.map(|channel| (horizon, channel)));
+        for (horizon, channel) in places {
+            let Some(change) = horizons.get(horizon).and_then(|channels| channels.get(channel)) else {
+                continue;
+            };
+            let floor =
+                noise.get(channel).and_then(|noise| noise.prediction.get(horizon)).copied().unwrap_or(0.0);
+            // A flight's own trim is none of the vehicle's.
+            let trimmed = change.after.min(change.own_trim);
+            let rivals =
+                [("persistence", trimmed, change.persistence), ("declared", change.after, change.before)];
+            let loses =
+                |new: f64, other: f64| (new * new - floor * floor).max(0.0).sqrt() > LEAST_RATIO * other;
+            let beaten = rivals.into_iter().filter(|(_, new, other)| loses(*new, *other));
+            if let Some((rival, new, other)) = beaten.min_by(|a, b| a.2.total_cmp(&b.2)) {
+                let (flight, unit) = (flight.clone(), change.unit);
+                losses.push(Loss { flight, horizon, channel, rival, new, other, unit });
+            }
+        }
+    }
+    losses
+}
+
+/// Measurements that would help where `channel` loses.
+pub fn advice(channel: &str) -> &'static str {
+    if channel == "attitude" {
+        "torques: log rotor speeds and every command the motors get, weigh and balance the vehicle before each flight, and measure \
+         its inertia and the rotors' thrust over command on a stand"
+    } else {
+        "forces: weigh the vehicle, measure thrust over command and voltage on a stand, and fly in still air"
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::horizons::Change;
+
+    fn losses_of(after: f64, own_trim: f64, persistence: f64, floor: f64) -> Vec<Loss> {
+        let change = Change { before: 4.0, after, persistence, own_trim, unit: "deg" };
+        let channels = BTreeMap::from([("attitude", change)]);
+        let errors = Changes::from([("leg".to_owned(), BTreeMap::from([("0.5".to_owned(), channels)]))]);
+        let prediction = BTreeMap::from([("0.5".to_owned(), floor)]);
+        losses(&errors, &BTreeMap::from([("attitude", Noise { value: 0.1, unit: "rad", prediction })]))
+    }
+
+    #[test]
+    fn the_greater_rival_is_told_and_noise_is_no_loss() {
+        let rival = |losses: &[Loss]| losses.iter().map(|loss| loss.rival).collect::<Vec<_>>();
+        assert_eq!(rival(&losses_of(2.0, 2.0, 1.0, 0.1)), ["persistence"]);
+        assert_eq!(rival(&losses_of(5.0, 5.0, 9.0, 0.1)), ["declared"]);
+        assert!(losses_of(0.9, 0.9, 1.0, 0.1).is_empty());
+        // The sensors make nearly all of the error; or the flight's own trim does.
+        assert!(losses_of(2.0, 2.0, 1.0, 1.8).is_empty());
+        assert!(losses_of(2.0, 0.9, 1.0, 0.1).is_empty());
+    }
+}
