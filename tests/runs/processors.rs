@@ -4,6 +4,7 @@
 use crate::manifests::{settings, shipped};
 use crate::recordings::open;
 use crate::support::{Place, repository};
+use bus::messages::ROTORS_MAX;
 use plant::effects::{CATALOGUE, EffectKind, ParameterSpec};
 use recorder::diff::first_difference;
 use std::hint::black_box;
@@ -71,14 +72,16 @@ fn every_effect_is_the_same_on_an_older_processor() {
     }
 }
 
-/// An effect with its plausible values, as a vehicle file has it.
+/// An effect with its plausible values, as a file of a vehicle with four rotors has it.
 fn effect_table(kind: &EffectKind) -> String {
     let value = |spec: &ParameterSpec| {
         let unit = spec.dimension.units[0].0;
         let rest = format!("unit = {unit:?}, source = \"docs/effects.md\", uncertainty = \"not stated\"");
         format!("{} = {{ value = {:?}, {rest} }}\n", spec.name, spec.nominal)
     };
-    let values: String = kind.parameters.iter().map(value).collect();
+    let beyond = (5..=ROTORS_MAX).map(|rotor| format!("loss_{rotor}")).collect::<Vec<_>>();
+    let is_there = |spec: &&ParameterSpec| !beyond.iter().any(|name| name == spec.name);
+    let values: String = kind.parameters.iter().filter(is_there).map(value).collect();
     format!("[[effects]]\nname = {:?}\n{values}\n", kind.name)
 }
 
