@@ -20,7 +20,7 @@ use std::time::Instant;
 const REPETITIONS: usize = 7;
 const SECONDS: f64 = 60.0;
 
-/// Where the nodes live, and what is recorded.
+/// Hosts of the nodes, and their recordings.
 const HOSTS: [(&str, &[&str]); 5] = [
     ("a process each, recorded", &["--compose", "none"]),
     ("one group, recorded", &["--compose", "all"]),

@@ -99,7 +99,7 @@ impl Part {
     /// Tells the component the names and the messages of its inputs' topics, by `announced`.
     ///
     /// # Errors
-    /// What the component says against them.
+    /// The component's objection.
     pub(crate) fn connect<'t>(
         &mut self,
         announced: impl Fn(usize) -> (&'t str, &'t Announcement),

@@ -152,7 +152,7 @@ impl Simulation {
     /// Ends the components, whose ticks have come to `end`: a recorder closes its file.
     ///
     /// # Errors
-    /// That of `end`, or what a component says.
+    /// The error of `end`, or a component's.
     pub fn finish(self, end: Result<(), BusError>) -> Result<(), BusError> {
         finish(self.members.into_iter().map(|member| member.part), end)
     }

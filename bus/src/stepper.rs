@@ -48,7 +48,7 @@ impl Stepper {
     }
 
     /// Simulation time at the start of `tick`, ns.
-    pub(crate) fn time_ns(&self, tick: u32) -> u64 {
+    fn time_ns(&self, tick: u32) -> u64 {
         u64::from(tick) * self.tick_ns
     }
 
@@ -79,37 +79,22 @@ impl Stepper {
         locals: &Locals,
         computation: &mut dyn Computation,
     ) -> Result<Stepped, BusError> {
-        let Some(mut timing) = self.timing.take() else {
-            self.compute(tick, takes_over, locals, computation)?;
-            return Ok(Stepped::InTime);
-        };
-        let stepped = self.step_in_time(&mut timing, tick, takes_over, words, locals, computation);
-        self.timing = Some(timing);
-        stepped
-    }
-
-    fn step_in_time(
-        &mut self,
-        timing: &mut Timing,
-        tick: u32,
-        takes_over: bool,
-        words: &mut [u64],
-        locals: &Locals,
-        computation: &mut dyn Computation,
-    ) -> Result<Stepped, BusError> {
         if takes_over && !self.predecessor.is_empty() {
             // It goes on from what its predecessor sent last, not from a step of its own as a shadow.
             words.fill(0);
         }
-        let stepped = match timing.begin(tick, words, &self.outputs) {
-            Due::Step => {
-                self.compute(tick, takes_over, locals, computation)?;
-                let overran = timing.end(tick, words, &mut self.outputs, &self.node)?;
-                if overran { Stepped::Overran } else { Stepped::InTime }
+        let due = self.timing.as_ref().map_or(Due::Step, |timing| timing.begin(tick, words, &self.outputs));
+        let mut stepped = Stepped::Skipped;
+        if due == Due::Step {
+            stepped = Stepped::InTime;
+            self.compute(tick, takes_over, locals, computation)?;
+        }
+        if let Some(timing) = &mut self.timing {
+            if due == Due::Step && timing.end(tick, words, &mut self.outputs, &self.node)? {
+                stepped = Stepped::Overran;
             }
-            Due::Skipped => Stepped::Skipped,
-        };
-        Timing::write(tick, words, &mut self.outputs, &self.node)?;
+            Timing::write(tick, words, &mut self.outputs, &self.node)?;
+        }
         Ok(stepped)
     }
 
@@ -120,7 +105,7 @@ impl Stepper {
         locals: &Locals,
         computation: &mut dyn Computation,
     ) -> Result<(), BusError> {
-        let (node, time_ns) = (&self.node, u64::from(tick) * self.tick_ns);
+        let (node, time_ns) = (&self.node, self.time_ns(tick));
         let predecessor = if takes_over { self.predecessor.as_slice() } else { &[] };
         let (inputs, outputs) = (self.inputs.as_slice(), self.outputs.as_mut_slice());
         let mut view = Tick { tick, time_ns, node, inputs, locals, outputs, predecessor };

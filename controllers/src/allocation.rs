@@ -26,8 +26,8 @@ pub(crate) const THRUST_RESERVE: f64 = 0.05;
 /// ATC_THR_MIX_MAX. Laws whose demands are off by far would else throw the vehicle about.
 const TORQUE_SHARE: f64 = 0.5;
 
-/// What is missed of a part of a wrench, against its size over all rotors, that counts as nothing: rounding, and what
-/// lower priorities move a higher one by.
+/// The error of a part of a wrench, against its size over all rotors, that counts as none: rounding, and the part by which
+/// lower priorities move a higher one.
 const MISSED_MIN: f64 = 5e-4;
 /// The torque that rotors must make both ways while they carry the weight, against that of all rotors together. Tuned, no
 /// source: less is no control.
@@ -248,7 +248,7 @@ impl Allocation {
         self.inverse[3].map(|square| square * demand.torque_B_N_m.z)
     }
 
-    /// What comes nearest to `demand` within the limits.
+    /// The wrench nearest to `demand` within the limits.
     fn nearest(&self, demand: &RotorWrench) -> Allocated {
         let squares = self.within_limits(&self.cut(demand));
         let speeds_rad_s = squares.map(|square| self.clamp(square).sqrt());

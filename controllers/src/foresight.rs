@@ -160,7 +160,7 @@ impl Foresight {
         RotorWrench { thrust_N: (self.mass_kg * self.gravity_m_s2), ..RotorWrench::default() }
     }
 
-    /// What of `wrench` the rotors can make; hovering, if it is no number or far beyond what they ever make.
+    /// The part of `wrench` that the rotors can make; hover, if it is no number or far beyond their limits.
     fn possible(&self, wrench: &RotorWrench) -> RotorWrench {
         let allocated = self.allocation.allocate(wrench);
         let made = allocated.wrench;

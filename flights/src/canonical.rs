@@ -11,7 +11,7 @@ use crate::error::FlightsError;
 use crate::flight::{Channel, Flight, period_s};
 use crate::frame::{rotation, to_wxyz};
 
-/// How the columns of the file of a vehicle with so many `rotors` are to be read, as the `columns` table of a player in a
+/// The columns of the file of a vehicle with so many `rotors`, as the `columns` table of a player in a
 /// manifest.
 #[must_use]
 pub fn columns(rotors: usize) -> String {

@@ -63,7 +63,7 @@ impl Quantity {
         self.facts().0
     }
 
-    /// How many numbers a sample has; `None` for those that have one for each rotor.
+    /// Count of numbers in a sample; `None` for those that have one for each rotor.
     #[must_use]
     pub fn size(self) -> Option<usize> {
         self.facts().1

@@ -18,7 +18,7 @@ const MOTOR_STEP_S: f64 = 0.001;
 pub struct Rotors {
     /// What turns the vehicle: measured where it was, else what follows from the commands.
     pub flown: Vec<PerRotor<RotorState>>,
-    /// What follows from the commands; zeros behind the last rotor.
+    /// Rotor speeds that follow from the commands; zeros behind the last rotor.
     pub commanded: Vec<EachRotor>,
 }
 

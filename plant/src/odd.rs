@@ -1,4 +1,4 @@
-//! What is odd about a vehicle that may fly all the same: `check` warns of it, with the lines of the file.
+//! Oddities of a vehicle that may fly all the same: `check` warns of them, with the lines of the file.
 
 use crate::airframe::amid_rotors_B_m;
 use crate::airworthy::places;

@@ -1,10 +1,11 @@
-//! Where the instances of a run's nodes live: in processes of their own, on threads of this one, or on its own thread.
+//! The place of a run's nodes: processes of their own, threads of this process, or the thread that flies the run.
 
 use crate::program::{Executable, Program};
 use anyhow::{Context, Result, anyhow, bail};
 use bus::hosted::Hosted;
 use bus::lockstep::SupervisorView;
 use bus::{BusError, Join, Registration};
+use std::any::Any;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::ExitStatus;
@@ -82,12 +83,18 @@ impl Host {
     }
 }
 
-/// Why a run whose nodes are threads cannot have `what`.
+/// The reason why a run whose nodes live in this process cannot have `what`.
 pub(crate) fn needs_process(what: &str) -> anyhow::Error {
     anyhow!(
-        "{what} needs a process of its own, and the nodes of this run are threads; leave it out, or give the \
-         launcher a binary to execute (Host::Exe)"
+        "{what} needs a process of its own, and the nodes of this run share the launcher's; leave it out, or fly without \
+         `--in-process` (in Rust: with Host::Exe, which executes a binary for each node)"
     )
+}
+
+/// The message of a panic that was caught.
+pub(crate) fn panic_message(panic: &(dyn Any + Send)) -> &str {
+    let text = panic.downcast_ref::<String>().map(String::as_str);
+    text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("without a message")
 }
 
 /// How an instance ended.
@@ -180,12 +187,7 @@ impl Thread {
         Some(match handle.join() {
             Ok(Ok(()) | Err(BusError::Aborted)) => End::Exited(0),
             Ok(Err(error)) => End::Failed(error.to_string()),
-            Err(panic) => {
-                let text = panic.downcast_ref::<String>().map(String::as_str);
-                let text =
-                    text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("without a message");
-                End::Failed(format!("it panicked: {text}"))
-            }
+            Err(panic) => End::Failed(format!("it panicked: {}", panic_message(&*panic))),
         })
     }
 

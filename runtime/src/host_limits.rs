@@ -1,4 +1,4 @@
-//! What a run asks for that its host cannot give.
+//! Requests of a run that its host cannot meet.
 
 use crate::graph::Graph;
 use crate::host::{Host, needs_process};
@@ -46,7 +46,7 @@ fn require_one_thread(graph: &Graph) -> Result<()> {
     match asked {
         None => Ok(()),
         Some(what) => {
-            bail!("{what} needs processes, and this run is one thread; fly it without --in-process")
+            bail!("{what} needs processes, and this run is one thread; fly it without `--in-process`")
         }
     }
 }

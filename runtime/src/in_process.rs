@@ -2,7 +2,7 @@
 
 use crate::event::{Progress, RunEvent, StopToken};
 use crate::graph::Graph;
-use crate::host::Host;
+use crate::host::{Host, panic_message};
 use crate::host_limits::require_host;
 use crate::manifest::Manifest;
 use crate::outcome::Outcome;
@@ -108,11 +108,7 @@ pub(crate) fn fly(
     let flown = catch_unwind(AssertUnwindSafe(|| run.fly(simulation)));
     let (ticks, overruns) = match flown {
         Ok(flown) => flown?,
-        Err(panic) => {
-            let text = panic.downcast_ref::<String>().map(String::as_str);
-            let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("without a message");
-            bail!("a component panicked: {text}");
-        }
+        Err(panic) => bail!("a component panicked: {}", panic_message(&*panic)),
     };
     Ok(Outcome {
         ticks,

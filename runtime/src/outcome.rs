@@ -1,14 +1,14 @@
-//! What there is to say about a run when it is over.
+//! The outcome of a run.
 
 use crate::flight::Flight;
 use crate::replacement::Report;
 
-/// What is known about a run when it is over: what [`Launcher::fly`](crate::launcher::Launcher::fly) returns, whose example asserts on it.
+/// The outcome of a run, as [`Launcher::fly`](crate::launcher::Launcher::fly) returns it.
 #[derive(Debug)]
 pub struct Outcome {
     /// Ticks that every node completed.
     pub ticks: u32,
-    /// Whether the run was stopped before its end.
+    /// True if the run was stopped before its end.
     pub was_stopped: bool,
     /// Host time from the first grant to the last completed tick.
     pub host_s: f64,
@@ -19,7 +19,7 @@ pub struct Outcome {
     /// Per process whose steps take simulated time: name, steps that took longer than to its next due tick, and due ticks
     /// without a step.
     pub overruns: Vec<(String, u32, u32)>,
-    /// What became of backups.
+    /// Results of backups.
     pub replacements: Vec<Report>,
     /// The host times that the processes noted, in a run that is profiled.
     pub flight: Option<Flight>,

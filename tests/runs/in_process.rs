@@ -10,7 +10,7 @@ use std::path::Path;
 /// Simulated length of the flights that are compared, s.
 const DURATION_S: f64 = 0.5;
 
-/// What a manifest has that one thread cannot fly; nothing for others.
+/// The part of a manifest that one thread cannot fly; nothing for others.
 fn reason_against(manifest: &str) -> Option<&'static str> {
     match Path::new(manifest).file_stem()?.to_str()? {
         "llp-hlp" | "standby" | "swap-gains" | "swap-identical" | "swap-laws" => {

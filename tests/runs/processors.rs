@@ -4,13 +4,13 @@
 use crate::manifests::{settings, shipped};
 use crate::recordings::open;
 use crate::support::{Place, repository};
-use bus::messages::ROTORS_MAX;
 use plant::effects::{CATALOGUE, EffectKind, ParameterSpec};
 use recorder::diff::first_difference;
 use std::hint::black_box;
 use std::io::Write as _;
 use std::process::Command;
 use std::{env, fs};
+use vehicles::Vehicle;
 
 /// What hides newer instructions from glibc, whose functions for older processors are taken then.
 const OLDER: (&str, &str) = ("GLIBC_TUNABLES", "glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4,-AVX2_Usable,-FMA_Usable");
@@ -62,7 +62,8 @@ fn what_is_shipped_flies_the_same_on_an_older_processor() {
 fn every_effect_is_the_same_on_an_older_processor() {
     let place = Place::new();
     let base = repository("vehicles/hummingbird.toml");
-    let effects = CATALOGUE.iter().map(|kind| effect_table(kind)).collect::<String>();
+    let hummingbird = Vehicle::load(base.as_ref()).unwrap();
+    let effects = CATALOGUE.iter().map(|kind| effect_table(kind, &hummingbird)).collect::<String>();
     let text = format!("base = {base:?}\nname = \"every effect\"\n\n{effects}");
     let vehicle = format!("process.plant.vehicle={}", place.write("every-effect.toml", text));
     for manifest in ["manifests/hover.toml", "manifests/hover-rapier.toml"] {
@@ -72,16 +73,14 @@ fn every_effect_is_the_same_on_an_older_processor() {
     }
 }
 
-/// An effect with its plausible values, as a file of a vehicle with four rotors has it.
-fn effect_table(kind: &EffectKind) -> String {
+/// An effect with its plausible values, as a file on the base of `vehicle` has it.
+fn effect_table(kind: &EffectKind, vehicle: &Vehicle) -> String {
     let value = |spec: &ParameterSpec| {
         let unit = spec.dimension.units[0].0;
         let rest = format!("unit = {unit:?}, source = \"docs/effects.md\", uncertainty = \"not stated\"");
         format!("{} = {{ value = {:?}, {rest} }}\n", spec.name, spec.nominal)
     };
-    let beyond = (5..=ROTORS_MAX).map(|rotor| format!("loss_{rotor}")).collect::<Vec<_>>();
-    let is_there = |spec: &&ParameterSpec| !beyond.iter().any(|name| name == spec.name);
-    let values: String = kind.parameters.iter().filter(is_there).map(value).collect();
+    let values: String = kind.parameters_for(vehicle).iter().map(value).collect();
     format!("[[effects]]\nname = {:?}\n{values}\n", kind.name)
 }
 
