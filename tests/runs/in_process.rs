@@ -79,6 +79,11 @@ fn it_leaves_no_process_and_stops_where_it_is_told() {
     });
     let processes = place.processes();
     assert!(matches!(&processes[..], [(_, node)] if node.is_empty()), "only the launcher: {processes:?}");
+    let run = place.run_id();
+    for asked in [vec!["ctl", "pause", "--run", &run], vec!["top", "--once", "--run", &run]] {
+        let refused = place.start(&asked).end_among_others().with_code(2);
+        refused.says(&["flies on one thread (--in-process)"]);
+    }
     launch.signal(Signal::INT);
     launch.end().with_code(1).prints(&["stopped"]);
     assert!(fs::metadata(&recording).unwrap().len() > 4_000);
