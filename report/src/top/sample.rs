@@ -51,7 +51,9 @@ impl Source {
             std::thread::sleep(POLL);
             source = open();
         }
-        source.with_context(|| format!("run {} has ended, or flies on one thread (--in-process)", run.entry.run_id))
+        source.with_context(|| {
+            format!("run {} has ended, or flies on one thread (--in-process)", run.entry.run_id)
+        })
     }
 
     /// What the run shows now.

@@ -20,7 +20,9 @@ const POLL: Duration = Duration::from_millis(5);
 /// If the run has ended.
 pub fn ask(run: &LiveRun, request: &Request) -> Result<Answer> {
     let run_id = &run.entry.run_id;
-    let mut stream = connect(run).with_context(|| format!("run {run_id} has ended, or flies on one thread (--in-process), which takes no requests"))?;
+    let mut stream = connect(run).with_context(|| {
+        format!("run {run_id} has ended, or flies on one thread (--in-process), which takes no requests")
+    })?;
     let mut line = serde_json::to_string(request)?;
     line.push('\n');
     stream.write_all(line.as_bytes()).with_context(|| format!("run {run_id} has ended"))?;
