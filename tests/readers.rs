@@ -3,6 +3,10 @@
 //! Each of `tests/readers/read_*` decodes every topic and ends at the first difference. `scripts/test`
 //! installs what they need and says where in `HUMMINGBUS_READERS`.
 
+#[path = "readers/campaign.rs"]
+mod campaign;
+#[path = "readers/dataflash.rs"]
+mod dataflash;
 #[path = "readers/identify.rs"]
 mod identify;
 #[path = "runs/laps.rs"]

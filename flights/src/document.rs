@@ -2,7 +2,7 @@
 
 use std::fmt::Display;
 use std::ops::Range;
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
 use diagnostics::{Diagnostic, ParameterError, Place};
 use serde::de::DeserializeOwned;
@@ -56,24 +56,6 @@ impl Document {
                 let advice = "set the variable, or give a default: ${NAME:-path}";
                 self.bad(place, key, "a path", found.to_string(), advice)
             })?;
-        Ok(tidy(&self.path.parent().unwrap_or(Path::new("")).join(expanded)))
-    }
-}
-
-/// The path without ways down and up again, if it still leads to the same file.
-fn tidy(path: &Path) -> PathBuf {
-    let mut short = PathBuf::new();
-    for part in path.components() {
-        let is_way_down =
-            short.components().next_back().is_some_and(|last| matches!(last, Component::Normal(_)));
-        if part == Component::ParentDir && is_way_down {
-            short.pop();
-        } else {
-            short.push(part);
-        }
-    }
-    match (short.canonicalize(), path.canonicalize()) {
-        (Ok(a), Ok(b)) if a == b => short,
-        _ => path.to_owned(),
+        Ok(inputs::tidy(&self.path.parent().unwrap_or(Path::new("")).join(expanded)))
     }
 }

@@ -11,6 +11,7 @@
 //! | `content` | bytes with their SHA-256 |
 //! | `store` | files in a folder, named by their SHA-256 |
 //! | `read` | plain reading from the disk, with a limit |
+//! | `tidy` | paths without detours |
 //!
 //! ```
 //! let folder = tempfile::tempdir()?;
@@ -29,7 +30,9 @@ mod content;
 mod files;
 mod read;
 mod store;
+mod tidy;
 
 pub use content::sha256;
 pub use files::{InputFile, InputFiles};
 pub use read::{TEXT_BYTES_MAX, read_bytes};
+pub use tidy::tidy;

@@ -10,13 +10,14 @@ use serde_json::Value;
 pub const MARK: &str = r#"<meta name="generator" content="hummingbus">"#;
 
 /// plotly.js with lines, bars and pies.
-pub(crate) const PLOTLY_BASIC: &str = include_str!("page/plotly-basic.min.js");
+pub const PLOTLY_BASIC: &str = include_str!("page/plotly-basic.min.js");
 /// plotly.js with lines, and lines and bodies in space.
 pub(crate) const PLOTLY_3D: &str = include_str!("page/plotly-gl3d.min.js");
 
 /// The page with this `body` of headings, texts and the places of tables and plots, on which `script` draws `data` with a
 /// bundle of plotly.js and what `kit.js` offers.
-pub(crate) fn page(body: &str, plotly: &str, script: &str, data: &Value) -> Vec<u8> {
+#[must_use]
+pub fn page(body: &str, plotly: &str, script: &str, data: &Value) -> Vec<u8> {
     format!(
         include_str!("page/page.html"),
         style = include_str!("page/page.css"),

@@ -6,15 +6,20 @@ use crate::host::{Host, panic_message};
 use crate::host_limits::require_host;
 use crate::manifest::Manifest;
 use crate::outcome::Outcome;
-use anyhow::{Result, anyhow, bail};
+use crate::program::Program;
+use anyhow::{Context, Result, anyhow, bail};
 use bus::clock::deadline_ns;
 use bus::component::Role;
 use bus::host_time::monotonic_ns;
 use bus::plan::Pace;
 use bus::{Registration, Simulation};
+use inputs::InputFiles;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
 use std::time::Duration;
 
+/// The file with the figures of the judge.
+pub(crate) const FIGURES: &str = "figures";
 /// Host time between two reports of progress, ns.
 const PROGRESS_NS: u64 = 50_000_000;
 /// Ticks between two looks at the host's clock in a run that is not paced.
@@ -132,6 +137,26 @@ struct Run<'a> {
     /// Host time of the last report.
     reported_ns: u64,
     missed_deadlines: u32,
+}
+
+/// Flies `manifest`, which is not recorded, on the calling thread; the files that `files` has read are not read again. Its
+/// judge writes into `folder`, and nothing else is written.
+///
+/// # Errors
+/// A problem in the manifest, a request that needs a process of its own, a step that fails, or a component that panics.
+pub fn fly_unrecorded(manifest: &Manifest, files: InputFiles, folder: &Path) -> Result<Outcome> {
+    let mut graph = Graph::build_from(manifest, files)?;
+    require_host(&Host::InProcess, manifest, &graph)?;
+    let path = folder.join(FIGURES);
+    let judge = graph.programs.iter().position(Program::is_judge);
+    if let Some(judge) = judge {
+        graph.plan.nodes[judge].parameters["path"] = serde_json::json!(path);
+    }
+    let stop = StopToken::new();
+    let mut outcome = fly(&graph, manifest.registry().components(), &stop, &mut |_| {})?;
+    let read = || std::fs::read(&path).context("cannot read the figures of the judge");
+    outcome.figures = judge.map(|_| read()).transpose()?;
+    Ok(outcome)
 }
 
 /// Ticks that were computed, and for each node with a simulated computing time its overruns and skipped steps.

@@ -9,7 +9,7 @@ use crate::graph::Graph;
 use crate::host::Host;
 use crate::host_limits::require_host;
 use crate::host_world::{HostWorld, store_files};
-use crate::in_process;
+use crate::in_process::{self, FIGURES};
 use crate::manifest::Manifest;
 pub use crate::outcome::Outcome;
 use crate::outputs::Outputs;
@@ -27,9 +27,6 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
-
-/// The file in a run directory with the figures of the judge.
-const FIGURES: &str = "figures";
 
 /// Launches a run. By itself it takes no signal of this process and changes nothing else of it either: several runs may
 /// fly in one process, also at the same time.

@@ -6,19 +6,23 @@
 //! - `tree`: tables with the places of their values, merged
 //! - `sets`: vehicles of process sets become processes
 //! - `replacement`: a backup's differences become a whole process
+//! - `file_edits`: values of vehicle, scene and gains files given with `--set`
 //! - `finite`: no number is infinite or none
 //! - `composition`: which nodes share a process
 //! - `judging`: the process that judges a run that is not recorded
+//! - `put`: values put into the text of a TOML file
 //! - `builder`: a manifest that is built in code
 //! - `content`: the types that the whole is read into
 
 mod builder;
 mod composition;
 mod content;
+mod file_edits;
 mod finite;
 mod include;
 mod judging;
 mod overrides;
+mod put;
 mod recorded;
 mod replacement;
 mod sets;
@@ -36,6 +40,8 @@ pub(crate) use sets::is_name;
 
 use crate::registry::Registry;
 use diagnostics::{Diagnostic, ParameterError, read_tree};
+use file_edits::FileEdit;
+use inputs::InputFiles;
 use sources::{Origin, Sources};
 use std::fmt::Display;
 use std::ops::{Range, RangeInclusive};
@@ -64,6 +70,8 @@ pub struct Manifest {
     /// What it says.
     pub content: Content,
     pub(crate) sources: Sources,
+    /// Values of files that `--set` replaces.
+    file_edits: Vec<FileEdit>,
 }
 
 impl Manifest {
@@ -100,11 +108,44 @@ impl Manifest {
         Self::of(self.path, sources)
     }
 
+    /// This manifest with further `overrides` (`key.path=value`), as [`Manifest::load`] takes them.
+    ///
+    /// # Errors
+    /// A [`Diagnostic`] that names the place.
+    pub fn overridden(&self, overrides: &[String]) -> Result<Self, Diagnostic> {
+        let mut sources = self.sources.clone();
+        overrides.iter().for_each(|text| sources.add(Origin::Override, text.clone()));
+        Self::of(self.path.clone(), sources)
+    }
+
+    /// The number at `key`, a key of this manifest or of a file that a process names, as `--set` takes it; `None` if there is
+    /// no number.
+    ///
+    /// # Errors
+    /// A [`Diagnostic`] if the manifest cannot be read.
+    pub fn number(&self, files: &InputFiles, key: &str) -> Result<Option<f64>, Diagnostic> {
+        let tree = whole_tree(&self.sources)?;
+        let of_file = |process: &str, file: &str| {
+            let process = self.content.process.iter().find(|(name, _)| name.get_ref() == process)?.1;
+            let written =
+                [("vehicle", &process.vehicle), ("scene", &process.scene), ("gains", &process.gains)];
+            let written = written.into_iter().find(|(key, _)| *key == file)?.1.as_ref()?;
+            files.text(&self.resolve(written).ok()?).ok()
+        };
+        Ok(file_edits::number(key, of_file).or_else(|| tree::number(tree, key)))
+    }
+
+    /// The texts that this manifest is made of: its own file, those that it includes, and the values of `--set`.
+    pub fn texts(&self) -> impl Iterator<Item = &str> {
+        self.sources.all.iter().map(|source| source.text.as_str())
+    }
+
     fn of(path: PathBuf, sources: Sources) -> Result<Self, Diagnostic> {
         let tree = whole_tree(&sources)?;
         let content = content(&sources, tree)?;
         let recorded_text = recorded::text(&sources)?;
-        Ok(Self { path, recorded_text, content, sources })
+        let file_edits = file_edits::all(&sources, &content)?;
+        Ok(Self { path, recorded_text, content, sources, file_edits })
     }
 
     /// The manifest's name: its file name without `.toml`.
@@ -166,6 +207,30 @@ impl Manifest {
         self.sources.resolve(written)
     }
 
+    /// The file at `path`, the value of `key` of the process `name`: where `--set` changes values in it, an edited copy that
+    /// `files` keeps.
+    ///
+    /// # Errors
+    /// If a value has no place in the file.
+    pub(crate) fn with_edits(
+        &self,
+        files: &InputFiles,
+        name: &str,
+        key: &str,
+        path: PathBuf,
+    ) -> Result<PathBuf, Diagnostic> {
+        let edits: Vec<&FileEdit> = self.file_edits.iter().filter(|edit| edit.is_of(name, key)).collect();
+        // A file that cannot be read is refused by its reader.
+        let Some(text) = (!edits.is_empty()).then(|| files.text(&path).ok()).flatten() else {
+            return Ok(path);
+        };
+        let text = file_edits::edited(&text, &edits)
+            .map_err(|(edit, message)| edit.problem(&self.sources, &message, &path))?;
+        let edited = file_edits::edited_path(&path, name);
+        files.keep(&edited, text.into_bytes());
+        Ok(edited)
+    }
+
     /// This manifest with one more `[[swap]]`-like backup of `process`, whose differences are the TOML
     /// `with_text`: the manifest that its places refer to, and the whole process.
     ///
@@ -187,7 +252,8 @@ impl Manifest {
         let whole = read_tree::<Process>(&whole).map_err(|misread| sources.refused(misread))?;
         let content = content(&sources, tree)?;
         let (path, recorded_text) = (self.path.clone(), self.recorded_text.clone());
-        Ok((Self { path, recorded_text, content, sources }, Spanned::new(span, whole)))
+        let file_edits = self.file_edits.clone();
+        Ok((Self { path, recorded_text, content, sources, file_edits }, Spanned::new(span, whole)))
     }
 }
 
@@ -216,8 +282,10 @@ fn whole_tree(sources: &Sources) -> Result<DeTable<'_>, Diagnostic> {
     // In every file, also where another one's number takes the place of what is none.
     sources.files().try_for_each(|file| finite::require(&sources.table(file)?, "", sources))?;
     let mut tree = include::merged(sources)?;
-    let (late, early): (Vec<_>, Vec<_>) =
-        overrides::all(sources)?.into_iter().partition(overrides::Override::is_of_an_expanded_process);
+    let (late, early): (Vec<_>, Vec<_>) = overrides::all(sources)?
+        .into_iter()
+        .filter(|change| !change.is_of_a_file())
+        .partition(overrides::Override::is_of_an_expanded_process);
     early.into_iter().try_for_each(|change| change.apply(&mut tree, sources))?;
     sets::expand(&mut tree, sources)?;
     late.into_iter().try_for_each(|change| change.apply(&mut tree, sources))?;

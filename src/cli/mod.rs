@@ -1,5 +1,6 @@
 //! The command line: the table of commands, what is printed, exit codes.
 
+mod campaign;
 mod cat;
 mod check;
 mod clean;
@@ -56,6 +57,9 @@ commands! {
         after_help = "Examples: hummingbus shadow manifests/hover.toml --process controller --with better.toml\n          hummingbus shadow hover.mcap"
     )]
     Shadow(shadow::ShadowArguments) => shadow::shadow;
+    /// Fly a manifest thousands of times with varied values: pass rate, figures and worst flights.
+    #[command(after_help = campaign::HELP)]
+    Campaign(campaign::CampaignArguments) => campaign::campaign;
     /// Check a manifest without running it, and print its graph.
     #[command(after_help = "Example: hummingbus check manifests/hover.toml")]
     Check(check::CheckArguments) => check::check;

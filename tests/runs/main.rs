@@ -7,6 +7,7 @@
 //! - [`compose`]: nor does it depend on which nodes share a process
 //! - [`processors`]: nor does it depend on the processor
 //! - [`live`]: runs that are watched and steered
+//! - [`campaign`]: thousands of flights with varied values
 //! - [`clean`]: what dead runs left is removed, and nothing of live ones
 //! - [`terminal`]: a terminal for a program under test
 //! - [`loss`]: every sample is recorded
@@ -39,6 +40,7 @@
 
 mod as_printed;
 mod backups;
+mod campaign;
 mod clean;
 mod cleanup;
 mod commands;

@@ -22,6 +22,8 @@ pub struct Condition {
     factor: Option<f64>,
     samples: Samples,
     pairs: Pairs,
+    /// Time of the first sample after which the condition cannot hold any more.
+    lost_ns: Option<u64>,
 }
 
 /// Samples of a field and of its reference within the span, of which the lag and the gain are computed at the end.
@@ -51,7 +53,8 @@ impl Condition {
             pass.reference.as_ref().map(|other| signal(&other.topic, &other.field)).transpose()?;
         let gate = pass.gate.as_ref().map(|gate| signal(&gate.topic, &gate.field)).transpose()?;
         let (samples, pairs) = (Samples::default(), Pairs::default());
-        Ok(Self { pass: pass.clone(), judged, minus, reference, gate, factor: None, samples, pairs })
+        let pass = pass.clone();
+        Ok(Self { pass, judged, minus, reference, gate, factor: None, samples, pairs, lost_ns: None })
     }
 
     /// Reserves memory for a run of `duration_ns` in ticks of `tick_ns`, so that no sample allocates.
@@ -89,7 +92,11 @@ impl Condition {
         } else if self.is_open(signals)
             && let Some(value) = difference(judged, self.minus.map(|minus| signals.held(minus)))
         {
-            self.samples.add(value * factor);
+            let value = value * factor;
+            self.samples.add(value);
+            if self.lost_ns.is_none() && self.is_lost_by(value) {
+                self.lost_ns = Some(time_ns);
+            }
         }
         Ok(())
     }
@@ -97,7 +104,8 @@ impl Condition {
     /// The values of the condition.
     pub fn finish(&self) -> Found {
         let Some(reference) = &self.pass.reference else {
-            return Found { values: self.samples.values(self.pass.statistic), why: None };
+            let values = self.samples.values(self.pass.statistic);
+            return Found { values, why: None, lost_s: self.lost_ns.map(|ns| ns as f64 * 1e-9) };
         };
         match self.pairs.response(reference) {
             Ok((response, step_s)) => {
@@ -105,9 +113,9 @@ impl Condition {
                     Statistic::Lag => response.lag_samples as f64 * step_s,
                     _ => response.gain,
                 };
-                Found { values: vec![value * self.factor.unwrap_or(1.0)], why: None }
+                Found { values: vec![value * self.factor.unwrap_or(1.0)], ..Found::default() }
             }
-            Err(why) => Found { values: Vec::new(), why: Some(why.to_string()) },
+            Err(why) => Found { why: Some(why.to_string()), ..Found::default() },
         }
     }
 
@@ -146,6 +154,17 @@ impl Condition {
         let time_s = time_ns as f64 * 1e-9;
         let PassCondition { from_s, to_s, .. } = self.pass;
         time_s >= from_s - 5e-10 && to_s.is_none_or(|to_s| time_s <= to_s + 5e-10)
+    }
+
+    /// True if the condition fails by this sample, whatever comes behind it.
+    fn is_lost_by(&self, value: f64) -> bool {
+        let PassCondition { min, max, .. } = self.pass;
+        match self.pass.statistic {
+            Statistic::Every => !within(value, min, max),
+            Statistic::Max => !within(value, None, max),
+            Statistic::Min => !within(value, min, None),
+            _ => false,
+        }
     }
 
     /// True if the newest value of the gate is within its limits.

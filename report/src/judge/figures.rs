@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// ```
 /// use report::judge::{Figures, Found};
-/// let found = Found { values: vec![1.0, f64::NAN], why: None };
+/// let found = Found { values: vec![1.0, f64::NAN], ..Found::default() };
 /// let figures = Figures { pass: vec![found], ..Figures::default() };
 /// let read = Figures::of_bytes(&figures.to_bytes()?)?;
 /// assert!(read.pass[0].values[1].is_nan());
@@ -29,6 +29,8 @@ pub struct Found {
     pub values: Vec<f64>,
     /// Reason why there are none, if it is another.
     pub why: Option<String>,
+    /// Time of the first sample by which the condition fails whatever comes behind it; none for a mean, an RMS and the like.
+    pub lost_s: Option<f64>,
 }
 
 /// RMS errors of one comparison, NaN without a window.

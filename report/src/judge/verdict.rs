@@ -12,7 +12,8 @@ use std::fmt;
 /// use report::judge::Verdict;
 /// let (name, unit) = ("altitude".to_owned(), "m".to_owned());
 /// let values = vec![1.49, 1.51];
-/// let verdict = Verdict { name, values, unit, min: Some(1.4), max: Some(1.6), passed: true, why: None };
+/// let (min, max) = (Some(1.4), Some(1.6));
+/// let verdict = Verdict { name, values, unit, min, max, passed: true, why: None, failed_at_s: None };
 /// assert_eq!(verdict.to_string(), "  ok     altitude: 1.4900 … 1.5100 m (1.4 … 1.6)");
 /// ```
 #[derive(Debug, Serialize)]
@@ -32,6 +33,9 @@ pub struct Verdict {
     /// Why there are no values, where more is to say than that there were no samples.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub why: Option<String>,
+    /// Simulation time of the first sample by which it failed; none for a mean, an RMS and the like.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub failed_at_s: Option<f64>,
 }
 
 /// RMS errors of a simulated state at the ends of windows; its text is a line of the summary.
@@ -71,10 +75,20 @@ impl Verdict {
     /// The verdict on `pass`, of whose samples this was found.
     pub(crate) fn of(pass: &PassCondition, found: &Found) -> Self {
         let PassCondition { name, unit, min, max, .. } = pass;
-        let Found { values, why } = found.clone();
+        let Found { values, why, lost_s } = found.clone();
         // A span without samples fails: samples that were never there did not pass.
         let passed = !values.is_empty() && values.iter().all(|value| within(*value, *min, *max));
-        Self { name: name.clone(), values, unit: unit.clone(), min: *min, max: *max, passed, why }
+        let failed_at_s = lost_s.filter(|_| !passed);
+        Self {
+            name: name.clone(),
+            values,
+            unit: unit.clone(),
+            min: *min,
+            max: *max,
+            passed,
+            why,
+            failed_at_s,
+        }
     }
 }
 
@@ -123,7 +137,8 @@ impl fmt::Display for Verdict {
             (None, None) => return write!(f, "  value  {}: {values}{unit}", self.name),
         };
         let mark = if self.passed { "ok    " } else { "FAILED" };
-        write!(f, "  {mark} {}: {values}{unit} ({limit})", self.name)
+        let from = self.failed_at_s.map_or(String::new(), |at_s| format!(", first at {at_s:.3} s"));
+        write!(f, "  {mark} {}: {values}{unit} ({limit}){from}", self.name)
     }
 }
 

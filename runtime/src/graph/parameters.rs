@@ -71,7 +71,8 @@ pub fn of(
     for (key, file) in files(process) {
         let Some(file) = file else { continue };
         // As the node gets it.
-        let path = manifest.resolve(file)?.to_string_lossy().into_owned();
+        let path = manifest.with_edits(&declared.files, name.get_ref(), key, manifest.resolve(file)?)?;
+        let path = path.to_string_lossy().into_owned();
         if parameters.insert(key, path.as_str().into()).is_some() {
             let message = format!("`{}` has `{key}` twice: as a file, and in its parameters", name.get_ref());
             return Err(manifest.problem(&file.span(), message, "leave one of them out"));

@@ -1,5 +1,6 @@
 //! `--set key.path=value`.
 
+use super::file_edits;
 use super::sources::{Source, Sources};
 use super::tree;
 use diagnostics::{Diagnostic, did_you_mean};
@@ -43,6 +44,11 @@ impl<'s> Override<'s> {
     /// Whether it changes a process that a vehicle's set becomes: such names hold a `/`.
     pub fn is_of_an_expanded_process(&self) -> bool {
         matches!(self.names().as_slice(), ["process", name, ..] if name.contains('/'))
+    }
+
+    /// True if it changes a value in a file of a process: `file_edits`.
+    pub fn is_of_a_file(&self) -> bool {
+        file_edits::split(&self.names()).is_some()
     }
 
     /// The keys of the path.

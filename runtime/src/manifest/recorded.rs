@@ -1,11 +1,13 @@
 //! The manifest's text as the recording holds it: the user's own, comments and all, with what `--set`
 //! changed.
 
+use super::file_edits;
 use super::include;
+use super::put::put;
 use super::sources::Sources;
 use super::tree;
 use diagnostics::Diagnostic;
-use toml_edit::{Item, Table};
+use std::path::Path;
 
 /// Keys of `[run]` that change how fast or where a run computes, never what: they stay out of the recording.
 const HOST_ONLY_KEYS: [&str; 8] =
@@ -64,6 +66,9 @@ fn is_host_only(text: &str) -> bool {
 fn set(document: &mut toml_edit::DocumentMut, text: &str, sources: &Sources) -> Result<bool, Diagnostic> {
     let Some((path, value)) = text.split_once('=') else { return Ok(false) };
     let value = value.trim();
+    if let Some(is_put) = set_file(document, path) {
+        return Ok(is_put);
+    }
     // What counts as TOML is decided as when it is read.
     let parsed = tree::parse_value(value, 0).and_then(|_| value.parse::<toml_edit::Value>().ok());
     let value = parsed.unwrap_or_else(|| value.into());
@@ -84,34 +89,24 @@ fn set(document: &mut toml_edit::DocumentMut, text: &str, sources: &Sources) -> 
     Ok(is_put)
 }
 
-fn put(item: &mut Item, keys: &[String], mut value: toml_edit::Value) -> Option<()> {
-    let (last, path) = keys.split_last()?;
-    let inside = keys.iter().skip(1).zip(path).try_fold(item, |item, (next, key)| {
-        // What is missing on the way is a table; a list that is missing has no elements.
-        let empty = || if next.parse::<usize>().is_ok() { Item::None } else { Item::Table(Table::new()) };
-        slot(item, key, empty).filter(|found| !found.is_none())
-    })?;
-    if let Some(array) = inside.as_array_mut() {
-        let index = last.parse().ok()?;
-        array.get(index)?;
-        array.replace(index, value);
-        return Some(());
+/// Names the edited copy of a file in the place of the original, where `path` leads into a file; false if the original is
+/// not named in the text.
+fn set_file(document: &mut toml_edit::DocumentMut, path: &str) -> Option<bool> {
+    let keys: Vec<&str> = path.split('.').map(str::trim).collect();
+    let (process, file, _) = file_edits::split(&keys)?;
+    let processes = document.get_mut("process").and_then(|processes| processes.get_mut(process));
+    let Some(written) = processes.and_then(|process| process.get_mut(file)?.as_value_mut()) else {
+        return Some(false);
+    };
+    let Some(original) = written.as_str().map(str::to_owned) else { return Some(false) };
+    let edited = file_edits::edited_path(Path::new(&original), process);
+    // A second edit finds the name of the copy.
+    if !file_edits::is_edited(Path::new(&original), process) {
+        let decor = written.decor().clone();
+        *written = edited.to_string_lossy().into_owned().into();
+        *written.decor_mut() = decor;
     }
-    let table = inside.as_table_like_mut()?;
-    if let Some(old) = table.get(last).and_then(Item::as_value) {
-        // With it stays the comment behind it.
-        *value.decor_mut() = old.decor().clone();
-    }
-    table.insert(last, Item::Value(value));
-    Some(())
-}
-
-/// What lies at `key` of a list or a table; `empty` where the table has nothing there.
-fn slot<'i>(inside: &'i mut Item, key: &str, empty: impl FnOnce() -> Item) -> Option<&'i mut Item> {
-    if inside.is_array() || inside.is_array_of_tables() {
-        return inside.get_mut(key.parse::<usize>().ok()?);
-    }
-    Some(inside.as_table_like_mut()?.entry(key).or_insert_with(empty))
+    Some(true)
 }
 
 #[cfg(test)]
@@ -148,6 +143,15 @@ mod tests {
         let found = recorded("[[swap]]\nat_tick = 1\n[[swap]]\nat_tick = 2\n", &["swap.1.at_tick=5"]);
         assert_eq!(found, "[[swap]]\nat_tick = 1\n[[swap]]\nat_tick = 5\n");
         assert_eq!(recorded("a = [{ b = 1 }]\n", &["a.0.b=2"]), "a = [{ b = 2 }]\n");
+    }
+
+    #[test]
+    fn an_edited_file_is_named_in_the_place_of_the_original() {
+        let manifest = "[process.plant]\nvehicle = \"../a.toml\" # why\n";
+        let edits = ["process.plant.vehicle.body.mass=2", "process.plant.vehicle.body.inertia_xx=3"];
+        let expected = "[process.plant]\nvehicle = \"../a@plant.toml\" # why\n";
+        assert_eq!(recorded(manifest, &edits), expected);
+        assert_eq!(recorded("a = 1\n", &edits[..1]), format!("a = 1\n# --set {}\n", edits[0]));
     }
 
     #[test]

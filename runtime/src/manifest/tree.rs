@@ -128,6 +128,26 @@ pub fn take_table<'t>(table: &mut DeTable<'t>, key: &str) -> Result<DeTable<'t>,
     }
 }
 
+/// The number at the dotted `key`; the elements of lists are numbered from 0.
+pub fn number(root: DeTable<'_>, key: &str) -> Option<f64> {
+    let whole = DeValue::Table(root);
+    let found = key.split('.').try_fold(&whole, |inside, key| {
+        let found = match inside {
+            DeValue::Table(table) => table.get(key.trim()),
+            DeValue::Array(array) => array.get(key.trim().parse::<usize>().ok()?),
+            _ => None,
+        };
+        found.map(Spanned::get_ref)
+    })?;
+    match found {
+        DeValue::Float(number) => number.as_str().parse().ok(),
+        DeValue::Integer(number) => {
+            i64::from_str_radix(number.as_str(), number.radix()).ok().map(|it| it as f64)
+        }
+        _ => None,
+    }
+}
+
 /// The keys of `table`.
 pub fn names<'v>(table: &'v DeTable<'_>) -> impl Iterator<Item = &'v str> {
     table.keys().map(|key| key.get_ref().as_ref())

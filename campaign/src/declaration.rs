@@ -1,0 +1,288 @@
+//! The campaign file.
+
+use crate::distribution::Distribution;
+use diagnostics::{Diagnostic, ParameterError, Place, read_toml};
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+use toml::Spanned;
+
+/// Most flights of a campaign.
+pub const FLIGHTS_MAX: u64 = 10_000_000;
+
+/// A campaign, as its file declares it.
+///
+/// ```
+/// use campaign::declaration::Campaign;
+/// let text = "manifest = \"hover.toml\"\nflights = 100\n\
+///             [[vary]]\nkey = \"process.plant.vehicle.body.mass\"\nas = \"factor\"\nuniform = [0.9, 1.1]";
+/// let campaign = Campaign::parse("campaigns/mass.toml".as_ref(), text)?;
+/// assert_eq!(campaign.manifest, std::path::Path::new("campaigns/hover.toml"));
+/// assert_eq!(campaign.vary[0].name, "mass");
+/// # Ok::<(), diagnostics::Diagnostic>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Campaign {
+    /// The campaign file.
+    pub path: PathBuf,
+    /// The manifest that is flown.
+    pub manifest: PathBuf,
+    /// Number of flights.
+    pub flights: u64,
+    /// Seed of the drawn values; each flight has a seed of its own, `run.seed`, unless that is varied.
+    pub seed: u64,
+    /// Method by which values are drawn.
+    pub sampling: Sampling,
+    /// Overrides of all flights, as `--set` takes them.
+    pub set: Vec<String>,
+    /// Measures beside those of the manifest, as TOML `[[measure]]` tables.
+    pub measures: String,
+    /// Varied values.
+    pub vary: Vec<Varied>,
+    /// Host time after which a flight is given up, in seconds.
+    pub timeout_s_host: f64,
+}
+
+/// Method by which the values of the flights are drawn.
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sampling {
+    /// Each value's distribution is cut into as many equal parts as there are flights, and each part is drawn from once
+    /// (McKay, Beckman and Conover, Technometrics 21(2), 1979).
+    #[default]
+    LatinHypercube,
+    /// Independent values.
+    Random,
+    /// Every combination of `values` and `integers`.
+    Grid,
+}
+
+/// Meaning of a drawn number.
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "kebab-case")]
+pub enum Meaning {
+    /// The value itself.
+    #[default]
+    Value,
+    /// A factor of the declared value.
+    Factor,
+    /// A number added to the declared value.
+    Offset,
+}
+
+/// A varied value.
+#[derive(Clone, Debug)]
+pub struct Varied {
+    /// Column of the plan and of the rows.
+    pub name: String,
+    /// Keys that all get the value, as `--set` takes them.
+    pub keys: Vec<String>,
+    /// Meaning of the drawn number.
+    pub meaning: Meaning,
+    /// Distribution of the drawn number.
+    pub distribution: Distribution,
+    /// Place in the file.
+    place: Place,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    manifest: Spanned<String>,
+    flights: Option<Spanned<u64>>,
+    #[serde(default = "first")]
+    seed: u64,
+    #[serde(default)]
+    sampling: Sampling,
+    #[serde(default)]
+    set: Vec<String>,
+    #[serde(default)]
+    measure: Vec<toml::Table>,
+    vary: Vec<Spanned<Vary>>,
+    timeout_s_host: Option<Spanned<f64>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Vary {
+    name: Option<String>,
+    key: Option<String>,
+    #[serde(default)]
+    keys: Vec<String>,
+    #[serde(default, rename = "as")]
+    meaning: Meaning,
+    values: Option<Vec<f64>>,
+    uniform: Option<[f64; 2]>,
+    log_uniform: Option<[f64; 2]>,
+    normal: Option<[f64; 2]>,
+    integers: Option<[i64; 2]>,
+}
+
+fn first() -> u64 {
+    1
+}
+
+/// Host time of a flight where the file does not say, s.
+const TIMEOUT_S_HOST: f64 = 60.0;
+
+impl Campaign {
+    /// The campaign in `text`, which stands at `path`.
+    ///
+    /// # Errors
+    /// A [`Diagnostic`] that names the place.
+    pub fn parse(path: &Path, text: &str) -> Result<Self, Diagnostic> {
+        let name = path.display().to_string();
+        let file: File = read_toml(&name, text)?;
+        let at = |span: &std::ops::Range<usize>, error: ParameterError, help: &str| {
+            Diagnostic::at(Place::of(name.clone(), text, span), error).help(help)
+        };
+        let vary = Diagnostic::gather(file.vary.iter().map(|vary| {
+            let place = Place::of(name.clone(), text, &vary.span());
+            Varied::of(vary.get_ref(), &place).map_err(|error| {
+                let help = "docs/campaigns.md lists the keys of [[vary]]";
+                Diagnostic::at(place.clone(), error).help(help)
+            })
+        }))?;
+        require_names(&vary)?;
+        let flights = flights(&file, &vary).map_err(|error| {
+            let span = file.flights.as_ref().map_or(0..0, Spanned::span);
+            at(&span, error, "docs/campaigns.md lists the keys of a campaign")
+        })?;
+        let timeout_s_host = file.timeout_s_host.as_ref().map_or(TIMEOUT_S_HOST, |it| *it.get_ref());
+        if !(timeout_s_host > 0.0 && timeout_s_host.is_finite()) {
+            let span = file.timeout_s_host.as_ref().map_or(0..0, Spanned::span);
+            let error = ParameterError::value("timeout_s_host", "seconds above 0", timeout_s_host);
+            return Err(at(&span, error, "leave it out for 60 s"));
+        }
+        let mut measures = toml::Table::new();
+        if !file.measure.is_empty() {
+            measures.insert("measure".into(), file.measure.into());
+        }
+        let manifest = inputs::tidy(&path.parent().unwrap_or(Path::new("")).join(file.manifest.get_ref()));
+        let (seed, sampling, set) = (file.seed, file.sampling, file.set);
+        let path = path.to_owned();
+        let measures = measures.to_string();
+        Ok(Self { path, manifest, flights, seed, sampling, set, measures, vary, timeout_s_host })
+    }
+}
+
+/// Number of flights: as stated, or the combinations of a grid.
+fn flights(file: &File, vary: &[Varied]) -> Result<u64, ParameterError> {
+    let stated = file.flights.as_ref().map(|flights| *flights.get_ref());
+    let expected = format!("1 to {FLIGHTS_MAX} flights");
+    let flights = if file.sampling == Sampling::Grid {
+        let counts = vary.iter().map(|varied| varied.distribution.count());
+        let combinations = counts.collect::<Result<Vec<_>, _>>()?;
+        let combinations = combinations.iter().try_fold(1_u64, |all, count| all.checked_mul(*count));
+        let combinations = combinations.unwrap_or(u64::MAX);
+        if stated.is_some_and(|stated| stated != combinations) {
+            let message =
+                format!("a grid has as many flights as combinations: {combinations}; leave `flights` out");
+            return Err(ParameterError::conflict("flights", message));
+        }
+        combinations
+    } else {
+        stated.ok_or_else(|| ParameterError::missing("flights", expected.clone()))?
+    };
+    if (1..=FLIGHTS_MAX).contains(&flights) {
+        Ok(flights)
+    } else {
+        Err(ParameterError::value("flights", expected, flights))
+    }
+}
+
+fn require_names(vary: &[Varied]) -> Result<(), Diagnostic> {
+    for (index, varied) in vary.iter().enumerate() {
+        if vary[..index].iter().any(|other| other.name == varied.name) {
+            let message = format!("two varied values are called `{}`", varied.name);
+            return Err(
+                varied.problem(ParameterError::conflict("name", message), "give each a `name` of its own")
+            );
+        }
+    }
+    Ok(())
+}
+
+impl Varied {
+    fn of(vary: &Vary, place: &Place) -> Result<Self, ParameterError> {
+        let keys: Vec<String> = vary.key.iter().chain(&vary.keys).cloned().collect();
+        let first =
+            keys.first().ok_or_else(|| ParameterError::missing("key", "a key, as `--set` takes it"))?;
+        let last = first.rsplit('.').next().unwrap_or(first);
+        let name = vary.name.clone().unwrap_or_else(|| last.to_owned());
+        let distribution = vary.distribution()?;
+        distribution.check()?;
+        Ok(Self { name, keys, meaning: vary.meaning, distribution, place: place.clone() })
+    }
+
+    /// A problem with this value, at its place in the file.
+    pub(crate) fn problem(&self, error: ParameterError, help: &str) -> Diagnostic {
+        Diagnostic::at(self.place.clone(), error).help(help)
+    }
+}
+
+impl Vary {
+    fn distribution(&self) -> Result<Distribution, ParameterError> {
+        let stated: Vec<Distribution> = [
+            self.values.clone().map(Distribution::Values),
+            self.uniform.map(Distribution::Uniform),
+            self.log_uniform.map(Distribution::LogUniform),
+            self.normal.map(Distribution::Normal),
+            self.integers.map(Distribution::Integers),
+        ]
+        .into_iter()
+        .flatten()
+        .collect();
+        match stated.as_slice() {
+            [one] => Ok(one.clone()),
+            _ => {
+                let expected = "one of `values`, `uniform`, `log_uniform`, `normal`, `integers`";
+                Err(ParameterError::value("vary", expected, format!("{} of them", stated.len())))
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Campaign, Sampling};
+
+    fn parse(text: &str) -> Result<Campaign, String> {
+        let text = format!("manifest = \"a.toml\"\n{text}");
+        Campaign::parse("c.toml".as_ref(), &text).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_grid_has_all_combinations() {
+        let text = "sampling = \"grid\"\n[[vary]]\nkey = \"a\"\nvalues = [1, 2]\n[[vary]]\nkey = \"b\"\nintegers = [1, 3]";
+        let campaign = parse(text).unwrap();
+        assert_eq!((campaign.flights, campaign.sampling), (6, Sampling::Grid));
+    }
+
+    #[test]
+    fn what_is_refused_has_its_line() {
+        for (text, expected) in [
+            (
+                "flights = 0\n[[vary]]\nkey = \"a\"\nvalues = [1]",
+                "c.toml:2:11: `flights` must be 1 to 10000000 flights",
+            ),
+            ("flights = 2\n[[vary]]\nkey = \"a\"", "c.toml:3:1: `vary` must be one of `values`"),
+            ("flights = 2\n[[vary]]\nvalues = [1]", "c.toml:3:1: `key` is missing"),
+            (
+                "flights = 2\n[[vary]]\nkey = \"a\"\nuniform = [2, 1]",
+                "c.toml:3:1: `uniform` must be a lower limit",
+            ),
+            ("flights = 2\nvary = []\nflight = 3", "c.toml:4:1: unknown"),
+            (
+                "sampling = \"grid\"\n[[vary]]\nkey = \"a\"\nuniform = [1, 2]",
+                "a grid takes `values` or `integers`",
+            ),
+            (
+                "flights = 2\n[[vary]]\nkey = \"a.x\"\nvalues = [1]\n[[vary]]\nkey = \"b.x\"\nvalues = [1]",
+                "c.toml:6:1: two varied values are called `x`",
+            ),
+        ] {
+            let found = parse(text).unwrap_err();
+            assert!(found.contains(expected), "{found}\nexpected {expected}");
+        }
+    }
+}

@@ -1,0 +1,33 @@
+//! Campaigns: thousands of flights of one manifest, each with other values.
+//!
+//! | module | contents |
+//! |---|---|
+//! | [`declaration`] | the campaign file: the manifest, the varied values, the number of flights |
+//! | [`distribution`] | distributions of a varied value |
+//! | [`draw`] | values of all flights, drawn from the campaign's seed |
+//! | [`plan`] | the plan: the values of every flight, a CSV file that may be edited |
+//! | [`base`] | the manifest that all flights have in common, and the files it reads |
+//! | [`row`] | the result of one flight |
+//! | [`worker`], [`pool`] | processes that fly, and the process that hands out flights |
+//! | [`store`] | the output folder: lock, plan, rows flown so far |
+//! | [`table`] | all rows as Parquet |
+//! | [`statistics`], [`requirement`], [`report`], [`page`] | pass rate, distributions, rank correlations, the gate for continuous integration |
+//!
+//! A flight is a run on one thread of a worker process, without a recording. Its row depends on the plan alone: the number
+//! of workers, their order and the load of the machine change no value.
+#![forbid(unsafe_code)]
+
+pub mod base;
+pub mod declaration;
+pub mod distribution;
+pub mod draw;
+pub mod page;
+pub mod plan;
+pub mod pool;
+pub mod report;
+pub mod requirement;
+pub mod row;
+pub mod statistics;
+pub mod store;
+pub mod table;
+pub mod worker;

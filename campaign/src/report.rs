@@ -1,0 +1,305 @@
+//! The report of a campaign: pass rate, failures, distributions, influences, worst flights; as text and as JSON.
+
+use crate::base::Base;
+use crate::declaration::Campaign;
+use crate::plan::Plan;
+use crate::row::{Row, columns};
+use crate::statistics::{clopper_pearson, quantiles, rank_correlation};
+use anyhow::Result;
+use runtime::manifest::PassCondition;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::fmt;
+
+/// Confidence of the interval of the pass rate.
+const CONFIDENCE: f64 = 0.95;
+/// Flights that are listed with their commands.
+const WORST: usize = 10;
+/// Quantiles of a figure.
+const QUANTILES: [f64; 5] = [0.0, 0.05, 0.5, 0.95, 1.0];
+/// Chance below which a rank correlation is shown: one in a thousand, since many pairs are looked at.
+const CHANCE_MAX: f64 = 1e-3;
+
+/// The report of a campaign.
+#[derive(Debug, Serialize)]
+pub struct Report {
+    /// The campaign file.
+    pub campaign: String,
+    /// The manifest that was flown.
+    pub manifest: String,
+    /// Flights in the plan.
+    pub planned: u64,
+    /// Flights with a row.
+    pub flights: u64,
+    /// Flights whose conditions all held.
+    pub passed: u64,
+    /// Flights without figures.
+    pub broken: u64,
+    /// Part of the flights that passed.
+    pub pass_rate: f64,
+    /// Its interval at 95 % (Clopper and Pearson).
+    pub interval: [f64; 2],
+    /// Conditions that failed first, most frequent first.
+    pub failures: Vec<Failure>,
+    /// Reasons of flights without figures, most frequent first.
+    pub errors: Vec<(String, u64)>,
+    /// Distribution of each figure.
+    pub figures: Vec<Spread>,
+    /// Rank correlations that chance does not explain, strongest first.
+    pub influences: Vec<Influence>,
+    /// Worst flights, worst first.
+    pub worst: Vec<Worst>,
+}
+
+/// A condition that failed first in some flights.
+#[derive(Debug, Serialize)]
+pub struct Failure {
+    /// Name of the condition.
+    pub condition: String,
+    /// Flights in which it failed first.
+    pub flights: u64,
+    /// Median simulation time of the failure, s.
+    pub median_s: Option<f64>,
+}
+
+/// Distribution of a figure over the flights.
+#[derive(Debug, Serialize)]
+pub struct Spread {
+    /// Name of the figure.
+    pub figure: String,
+    /// Flights with a value.
+    pub flights: u64,
+    /// Least value, 5 %, median, 95 %, greatest value.
+    pub quantiles: Vec<f64>,
+}
+
+/// Rank correlation of a varied value with the outcome or a figure.
+#[derive(Debug, Serialize)]
+pub struct Influence {
+    /// Name of the varied value.
+    pub varied: String,
+    /// Name of the figure, or `passed`.
+    pub figure: String,
+    /// Spearman's rank correlation.
+    pub rank_correlation: f64,
+    /// Chance of one as large without any relation.
+    pub chance: f64,
+}
+
+/// A flight near the end of the list.
+#[derive(Debug, Serialize)]
+pub struct Worst {
+    /// Number of the flight.
+    pub flight: u64,
+    /// Reason: the failed condition, the error, or the smallest margin.
+    pub reason: String,
+    /// Command that flies it again, recorded.
+    pub command: String,
+}
+
+impl Report {
+    /// The report of the `rows` flown so far.
+    ///
+    /// # Errors
+    /// If the values of a flight cannot be written as overrides.
+    pub fn of(campaign: &Campaign, base: &Base, plan: &Plan, rows: &[Row]) -> Result<Self> {
+        let figures = columns(&base.manifest.content);
+        let flights = rows.len() as u64;
+        let passed = rows.iter().filter(|row| row.passed).count() as u64;
+        Ok(Self {
+            campaign: campaign.path.display().to_string(),
+            manifest: campaign.manifest.display().to_string(),
+            planned: plan.flights.len() as u64,
+            flights,
+            passed,
+            broken: rows.iter().filter(|row| row.error.is_some()).count() as u64,
+            pass_rate: passed as f64 / flights.max(1) as f64,
+            interval: clopper_pearson(passed, flights.max(1), CONFIDENCE),
+            failures: failures(rows),
+            errors: errors(rows),
+            figures: spreads(&figures, rows),
+            influences: influences(plan, &figures, rows),
+            worst: worst(campaign, base, plan, rows)?,
+        })
+    }
+}
+
+fn failures(rows: &[Row]) -> Vec<Failure> {
+    let mut by_condition: BTreeMap<&str, Vec<Option<f64>>> = BTreeMap::new();
+    for row in rows {
+        if let Some(failed) = &row.failed {
+            by_condition.entry(failed).or_default().push(row.failed_at_s);
+        }
+    }
+    let failure = |(condition, times): (&str, Vec<Option<f64>>)| {
+        let known: Vec<f64> = times.iter().flatten().copied().collect();
+        let median_s = quantiles(&known, &[0.5]).first().copied();
+        Failure { condition: condition.to_owned(), flights: times.len() as u64, median_s }
+    };
+    let mut failures: Vec<Failure> = by_condition.into_iter().map(failure).collect();
+    failures.sort_by_key(|failure| std::cmp::Reverse(failure.flights));
+    failures
+}
+
+fn errors(rows: &[Row]) -> Vec<(String, u64)> {
+    let mut counts: BTreeMap<&str, u64> = BTreeMap::new();
+    rows.iter()
+        .filter_map(|row| row.error.as_deref())
+        .for_each(|error| *counts.entry(error).or_default() += 1);
+    let mut errors: Vec<(String, u64)> =
+        counts.into_iter().map(|(error, count)| (error.to_owned(), count)).collect();
+    errors.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+    errors
+}
+
+fn spreads(figures: &[String], rows: &[Row]) -> Vec<Spread> {
+    let spread = |(index, figure): (usize, &String)| {
+        let values: Vec<f64> = rows.iter().filter_map(|row| *row.figures.get(index)?).collect();
+        Spread {
+            figure: figure.clone(),
+            flights: values.len() as u64,
+            quantiles: quantiles(&values, &QUANTILES),
+        }
+    };
+    figures.iter().enumerate().map(spread).collect()
+}
+
+fn influences(plan: &Plan, figures: &[String], rows: &[Row]) -> Vec<Influence> {
+    let mut influences = Vec::new();
+    for (varied, name) in plan.names.iter().enumerate() {
+        let mut add = |figure: &str, value: &dyn Fn(&Row) -> Option<f64>| {
+            let pairs: Vec<(f64, f64)> =
+                rows.iter().filter_map(|row| Some((*row.drawn.get(varied)?, value(row)?))).collect();
+            if let Some((rank_correlation, chance)) =
+                rank_correlation(&pairs).filter(|(_, chance)| *chance < CHANCE_MAX)
+            {
+                let (varied, figure) = (name.clone(), figure.to_owned());
+                influences.push(Influence { varied, figure, rank_correlation, chance });
+            }
+        };
+        add("passed", &|row| row.error.is_none().then_some(if row.passed { 1.0 } else { 0.0 }));
+        for (index, figure) in figures.iter().enumerate() {
+            add(figure, &|row| row.figures.get(index).copied().flatten());
+        }
+    }
+    influences.sort_by(|a, b| b.rank_correlation.abs().total_cmp(&a.rank_correlation.abs()));
+    influences
+}
+
+/// The worst flights: those without figures, then by the smallest margin to a limit.
+fn worst(campaign: &Campaign, base: &Base, plan: &Plan, rows: &[Row]) -> Result<Vec<Worst>> {
+    let mut ranked: Vec<(f64, String, &Row)> = rows.iter().map(|row| rank(base, row)).collect();
+    ranked.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.2.flight.cmp(&b.2.flight)));
+    ranked.truncate(WORST);
+    let listed = |(_, reason, row): (f64, String, &Row)| {
+        let sets = plan.sets(campaign, base, row.flight as usize)?;
+        let command = command(campaign, row.flight, &sets);
+        Ok(Worst { flight: row.flight, reason, command })
+    };
+    ranked.into_iter().map(listed).collect()
+}
+
+/// Margin of a flight, and the reason why it is so small.
+fn rank<'r>(base: &Base, row: &'r Row) -> (f64, String, &'r Row) {
+    if let Some(error) = &row.error {
+        return (f64::NEG_INFINITY, error.clone(), row);
+    }
+    let mut values = row.figures.iter();
+    let margins = base.manifest.content.pass.iter().map(|pass| {
+        let pass = pass.get_ref();
+        let count = if pass.statistic == runtime::manifest::Statistic::Every { 2 } else { 1 };
+        let margins = values
+            .by_ref()
+            .take(count)
+            .map(|value| value.map_or(f64::NEG_INFINITY, |value| margin(pass, value)));
+        (margins.fold(f64::INFINITY, f64::min), &pass.name)
+    });
+    let (margin, name) =
+        margins.min_by(|a, b| a.0.total_cmp(&b.0)).map_or((f64::INFINITY, ""), |(m, n)| (m, n));
+    let reason = match (&row.failed, row.failed_at_s) {
+        (Some(failed), Some(at_s)) => format!("failed first at {at_s:.3} s: {failed}"),
+        (Some(failed), None) => format!("failed: {failed}"),
+        (None, _) if margin.is_infinite() => "passed; no condition has a limit".to_owned(),
+        (None, _) => format!("passed with a margin of {:.1} %: {name}", 100.0 * margin),
+    };
+    (margin, reason, row)
+}
+
+/// Distance of `value` to the nearest limit, as a part of the width between the limits, or of the only limit.
+fn margin(pass: &PassCondition, value: f64) -> f64 {
+    let scale = match (pass.min, pass.max) {
+        (Some(min), Some(max)) => max - min,
+        (Some(limit), None) | (None, Some(limit)) => limit.abs(),
+        (None, None) => return f64::INFINITY,
+    };
+    let below = pass.max.map_or(f64::INFINITY, |max| max - value);
+    let above = pass.min.map_or(f64::INFINITY, |min| value - min);
+    below.min(above) / if scale > 0.0 { scale } else { 1.0 }
+}
+
+/// The command that flies a flight again, recorded.
+fn command(campaign: &Campaign, flight: u64, sets: &[String]) -> String {
+    let manifest = word(&campaign.manifest.display().to_string());
+    let sets = campaign.set.iter().chain(sets).map(|set| format!(" --set {}", word(set)));
+    format!("hummingbus run {manifest} --record flight-{flight}.mcap{}", sets.collect::<String>())
+}
+
+/// `text` as one word of a shell.
+fn word(text: &str) -> String {
+    let is_plain = |c: char| c.is_alphanumeric() || "/._-+=:,@".contains(c);
+    if text.chars().all(is_plain) { text.to_owned() } else { format!("'{}'", text.replace('\'', "'\\''")) }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [low, high] = self.interval.map(|limit| 100.0 * limit);
+        writeln!(
+            f,
+            "{}: {} of {} flights passed: {:.2} % ({low:.2} … {high:.2} % at 95 %)",
+            self.campaign,
+            self.passed,
+            self.flights,
+            100.0 * self.pass_rate
+        )?;
+        if self.flights < self.planned {
+            writeln!(
+                f,
+                "  {} of {} planned flights were not flown",
+                self.planned - self.flights,
+                self.planned
+            )?;
+        }
+        for Failure { condition, flights, median_s } in &self.failures {
+            let at = median_s.map_or(String::new(), |at_s| format!(", at {at_s:.2} s in the median"));
+            writeln!(f, "  failed first in {flights} flights{at}: {condition}")?;
+        }
+        for (error, flights) in self.errors.iter().take(WORST) {
+            writeln!(
+                f,
+                "  without figures, {flights} flights: {}",
+                error.lines().next().unwrap_or_default()
+            )?;
+        }
+        writeln!(f, "  least, 5 %, median, 95 %, greatest:")?;
+        for Spread { figure, quantiles, .. } in &self.figures {
+            let values: Vec<String> = quantiles.iter().map(|value| format!("{value:.4}")).collect();
+            writeln!(
+                f,
+                "    {figure}: {}",
+                if values.is_empty() { "no value".to_owned() } else { values.join(", ") }
+            )?;
+        }
+        writeln!(f, "  rank correlations (Spearman), strongest first:")?;
+        for Influence { varied, figure, rank_correlation, .. } in self.influences.iter().take(WORST) {
+            writeln!(f, "    {rank_correlation:+.2} of `{varied}` with: {figure}")?;
+        }
+        if self.influences.is_empty() {
+            writeln!(f, "    none that chance does not explain")?;
+        }
+        writeln!(f, "  worst flights:")?;
+        for Worst { flight, reason, .. } in &self.worst {
+            writeln!(f, "    {flight}: {}", reason.lines().next().unwrap_or_default())?;
+        }
+        Ok(())
+    }
+}

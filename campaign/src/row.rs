@@ -1,0 +1,83 @@
+//! The result of one flight.
+
+use report::summary::Summary;
+use runtime::manifest::{Content, Statistic};
+use serde::{Deserialize, Serialize};
+
+/// The result of one flight.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// Number of the flight, from 0.
+    pub flight: u64,
+    /// Drawn numbers of the plan.
+    #[serde(default)]
+    pub drawn: Vec<f64>,
+    /// True if all conditions held.
+    pub passed: bool,
+    /// Name of the condition that failed first, or the first in the manifest where none has a time.
+    pub failed: Option<String>,
+    /// Simulation time of its first sample by which it failed, s; none for a mean, an RMS and the like.
+    pub failed_at_s: Option<f64>,
+    /// Reason why the flight has no figures: refused values, a failed step, a worker that died.
+    pub error: Option<String>,
+    /// Figures by column; none where a condition has no value, or it is not a finite number.
+    pub figures: Vec<Option<f64>>,
+    /// Host time that the flight took, s.
+    pub wall_s: f64,
+}
+
+/// Names of the figures of the conditions in `content`: the columns of [`Row::figures`].
+#[must_use]
+pub fn columns(content: &Content) -> Vec<String> {
+    let conditions = content.pass.iter().chain(&content.measure).flat_map(|condition| {
+        let condition = condition.get_ref();
+        let names: &[&str] =
+            if condition.statistic == Statistic::Every { &[" (min)", " (max)"] } else { &[""] };
+        names.iter().map(|ending| format!("{}{ending}", condition.name)).collect::<Vec<_>>()
+    });
+    let compare = content.compare.iter().flat_map(|compare| {
+        let compare = compare.get_ref();
+        ["position_rms_m", "velocity_rms_m_s", "attitude_rms_deg"]
+            .map(|name| format!("{} after {} s: {name}", compare.simulated, compare.window_s))
+    });
+    conditions.chain(compare).collect()
+}
+
+impl Row {
+    /// The row of flight number `flight`, whose run has this `summary`.
+    #[must_use]
+    pub fn of(flight: u64, summary: &Summary, content: &Content) -> Self {
+        let conditions =
+            content.pass.iter().chain(&content.measure).zip(summary.pass.iter().chain(&summary.measures));
+        let mut figures: Vec<Option<f64>> = Vec::new();
+        for (condition, verdict) in conditions {
+            let count = if condition.get_ref().statistic == Statistic::Every { 2 } else { 1 };
+            let values = verdict.values.iter().map(|value| Some(*value).filter(|value| value.is_finite()));
+            figures.extend(values.chain(std::iter::repeat(None)).take(count));
+        }
+        for errors in &summary.compare {
+            let errors = [errors.position_rms_m, errors.velocity_rms_m_s, errors.attitude_rms_deg];
+            figures.extend(errors.map(|error| Some(error).filter(|error| error.is_finite())));
+        }
+        let (failed, failed_at_s) = first_failure(summary);
+        let (passed, wall_s) = (summary.passed, summary.host_s);
+        Self { flight, drawn: Vec::new(), passed, failed, failed_at_s, error: None, figures, wall_s }
+    }
+
+    /// The row of a flight that was not flown to its end.
+    #[must_use]
+    pub fn broken(flight: u64, error: String) -> Self {
+        Self { flight, error: Some(error), ..Self::default() }
+    }
+}
+
+/// The condition that failed first, and when.
+fn first_failure(summary: &Summary) -> (Option<String>, Option<f64>) {
+    let failed = summary.pass.iter().filter(|verdict| !verdict.passed);
+    let at = |verdict: &&report::judge::Verdict| verdict.failed_at_s.unwrap_or(f64::INFINITY);
+    let Some(first) = failed.min_by(|a, b| at(a).total_cmp(&at(b))) else {
+        let compared = summary.compare.iter().find(|errors| !errors.passed);
+        return (compared.map(|errors| format!("{} after {} s", errors.simulated, errors.window_s)), None);
+    };
+    (Some(first.name.clone()), first.failed_at_s)
+}

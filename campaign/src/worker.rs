@@ -1,0 +1,101 @@
+//! A worker: a process that flies the flights that it is handed, one after the other.
+//!
+//! It reads one JSON value a line from standard input, first an [`Order`], then a [`Job`] for each flight, and answers each
+//! with a line on standard output: a [`Greeting`], then a [`Row`] for each flight. It ends when its input ends, or with its
+//! parent.
+
+use crate::base::Base;
+use crate::declaration::Campaign;
+use crate::row::Row;
+use anyhow::{Context, Result, bail};
+use report::summary::Summary;
+use runtime::registry::Registry;
+use rustix::process::{Signal, set_parent_process_death_signal};
+use serde::{Deserialize, Serialize};
+use std::io::{BufRead, Write};
+use std::path::{Path, PathBuf};
+
+/// Campaign that a worker flies for.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct Order {
+    /// Path of the campaign file.
+    pub path: PathBuf,
+    /// Its text.
+    pub text: String,
+    /// Digest of all inputs, as the parent read them.
+    pub fingerprint: String,
+    /// Folder in which each worker has a folder of its own; the parent makes and removes it.
+    pub folder: PathBuf,
+}
+
+/// A flight to fly.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Job {
+    /// Number of the flight.
+    pub flight: u64,
+    /// Its overrides.
+    pub sets: Vec<String>,
+}
+
+/// First answer of a worker.
+#[derive(Debug, Serialize, Deserialize)]
+pub enum Greeting {
+    /// It has read what it needs.
+    Ready,
+    /// It cannot fly; the reason.
+    Refused(String),
+}
+
+/// Flies what `input` hands out, with the components of `registry`, until it ends.
+///
+/// # Errors
+/// If input or output break, or a line is not what is expected.
+pub fn serve(registry: Registry, input: impl BufRead, mut output: impl Write) -> Result<()> {
+    // A flight that hangs must not outlive the campaign.
+    set_parent_process_death_signal(Some(Signal::KILL)).context("cannot bind the worker to its parent")?;
+    let mut lines = input.lines();
+    let order = lines.next().context("expected the order, found nothing")??;
+    let order: Order = serde_json::from_str(&order)?;
+    let folder = order.folder.join(std::process::id().to_string());
+    std::fs::create_dir(&folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    let base = match prepare(&order, registry) {
+        Ok(base) => base,
+        Err(error) => return answer(&mut output, &Greeting::Refused(format!("{error:#}"))),
+    };
+    answer(&mut output, &Greeting::Ready)?;
+    for line in lines {
+        let job: Job = serde_json::from_str(&line?)?;
+        answer(&mut output, &fly(&base, &job, &folder))?;
+    }
+    Ok(())
+}
+
+fn answer(output: &mut impl Write, value: &impl Serialize) -> Result<()> {
+    writeln!(output, "{}", serde_json::to_string(value)?)?;
+    Ok(output.flush()?)
+}
+
+fn prepare(order: &Order, registry: Registry) -> Result<Base> {
+    let campaign = Campaign::parse(&order.path, &order.text)?;
+    let base = Base::read(&campaign, registry)?;
+    if base.fingerprint != order.fingerprint {
+        bail!("the manifest or a file that it names changed while the campaign flew; start it again");
+    }
+    Ok(base)
+}
+
+/// The row of one flight; what goes wrong is in it.
+fn fly(base: &Base, job: &Job, folder: &Path) -> Row {
+    let flown = fly_once(base, job, folder);
+    flown.unwrap_or_else(|error| Row::broken(job.flight, format!("{error:#}")))
+}
+
+fn fly_once(base: &Base, job: &Job, folder: &Path) -> Result<Row> {
+    let manifest = base.of_flight(&job.sets)?;
+    let mut outcome = runtime::fly_unrecorded(&manifest, base.files.branch(), folder)?;
+    let figures = outcome.figures.take().context("the judge left no figures")?;
+    let tick_s = 1.0 / f64::from(*manifest.content.run.rate_hz.get_ref());
+    let mut summary = Summary::new(manifest.name(), outcome, tick_s);
+    summary.judge_by(&figures, &manifest.content)?;
+    Ok(Row::of(job.flight, &summary, &manifest.content))
+}

@@ -1,0 +1,243 @@
+//! Values of vehicle, scene and gains files that `--set` replaces: `--set process.plant.vehicle.body.mass=0.5`.
+//!
+//! The file on the disk stays as it is. The process reads an edited copy under a path of its own beside the original, so
+//! that a controller of the same vehicle file still reads the original.
+
+use super::content::{Content, Process};
+use super::put::put;
+use super::sources::Sources;
+use diagnostics::{Diagnostic, did_you_mean};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use toml_edit::{DocumentMut, Item, Table, Value};
+
+/// Keys of a process whose value is a TOML file.
+const FILES: [&str; 3] = ["vehicle", "scene", "gains"];
+/// Key of the number or the vector in a quantity of a vehicle file.
+const VALUE: &str = "value";
+
+/// A value and its place in a file of a process.
+#[derive(Clone, Debug)]
+pub struct FileEdit {
+    process: String,
+    /// Key of the file: one of [`FILES`].
+    file: &'static str,
+    /// Keys in the file, such as `body`, `mass`.
+    keys: Vec<String>,
+    value: Value,
+    /// Place of the `--set`.
+    span: Range<usize>,
+}
+
+/// The process, the key of the file, and the keys in it, where `keys` lead into a file.
+pub fn split<'k, 's>(keys: &'k [&'s str]) -> Option<(&'s str, &'static str, &'k [&'s str])> {
+    let ["process", process, file, rest @ ..] = keys else { return None };
+    let file = FILES.iter().find(|known| *known == file)?;
+    (!rest.is_empty()).then_some((*process, *file, rest))
+}
+
+/// Path of the edited copy of a file: `hummingbird.toml` of `plant` becomes `hummingbird@plant.toml`.
+pub fn edited_path(path: &Path, process: &str) -> PathBuf {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let ending = path.extension().map_or(String::new(), |ending| format!(".{}", ending.to_string_lossy()));
+    path.with_file_name(format!("{stem}@{}{ending}", plain(process)))
+}
+
+/// True if `path` is the edited copy of a file of `process`.
+pub fn is_edited(path: &Path, process: &str) -> bool {
+    path.file_stem().is_some_and(|stem| stem.to_string_lossy().ends_with(&format!("@{}", plain(process))))
+}
+
+/// The name of a vehicle's process without its slash.
+fn plain(process: &str) -> String {
+    process.replace('/', "-")
+}
+
+/// All values of files that are given with `--set`, in their order.
+///
+/// # Errors
+/// If there is no such process, or it names no such file.
+pub fn all(sources: &Sources, content: &Content) -> Result<Vec<FileEdit>, Diagnostic> {
+    let edits = sources.overrides().filter_map(|source| FileEdit::parse(&source.text, source.base));
+    let require = |edit: FileEdit| edit.require_file(sources, content).map(|()| edit);
+    edits.map(require).collect()
+}
+
+/// `text` with `edits`.
+///
+/// # Errors
+/// The edit that has no place, and the reason.
+pub fn edited<'e>(text: &str, edits: &[&'e FileEdit]) -> Result<String, (&'e FileEdit, String)> {
+    // The reader of the file says where it is no TOML.
+    let Ok(mut document) = text.parse::<DocumentMut>() else { return Ok(text.to_owned()) };
+    for edit in edits {
+        edit.apply(&mut document).map_err(|message| (*edit, message))?;
+    }
+    Ok(document.to_string())
+}
+
+impl FileEdit {
+    /// The edit that the text of a `--set` asks for, if it leads into a file.
+    fn parse(text: &str, base: usize) -> Option<Self> {
+        let (path, value) = text.split_once('=')?;
+        let keys: Vec<&str> = path.split('.').map(str::trim).collect();
+        let (process, file, keys) = split(&keys)?;
+        let value = value.trim();
+        Some(Self {
+            process: process.to_owned(),
+            file,
+            keys: keys.iter().map(|key| (*key).to_owned()).collect(),
+            value: value.parse().unwrap_or_else(|_| value.into()),
+            span: base..base + path.len(),
+        })
+    }
+
+    /// True if the edit belongs to the file `key` of the process `name`.
+    pub fn is_of(&self, name: &str, key: &str) -> bool {
+        self.process == name && self.file == key
+    }
+
+    fn require_file(&self, sources: &Sources, content: &Content) -> Result<(), Diagnostic> {
+        let name = &self.process;
+        let Some((_, process)) = content.process.iter().find(|(other, _)| other.get_ref() == name) else {
+            let known = content.process.keys().map(|known| known.get_ref().as_str());
+            let help = did_you_mean(name, known, "the processes are");
+            return Err(sources.problem(&self.span, format!("there is no process `{name}`"), help));
+        };
+        if self.file_of(process) {
+            return Ok(());
+        }
+        let message = format!("process `{name}` names no {} file", self.file);
+        let help = format!("add {} = \"PATH\" to [process.{name}]", self.file);
+        Err(sources.problem(&self.span, message, help))
+    }
+
+    /// True if `process` names the file.
+    fn file_of(&self, process: &Process) -> bool {
+        let file = match self.file {
+            "vehicle" => &process.vehicle,
+            "scene" => &process.scene,
+            _ => &process.gains,
+        };
+        file.is_some()
+    }
+
+    fn apply(&self, document: &mut DocumentMut) -> Result<(), String> {
+        let keys = self.keys_in(document.as_item());
+        put(document.as_item_mut(), &keys, self.value.clone())
+            .ok_or_else(|| format!("the {} file has no place `{}`", self.file, self.keys.join(".")))
+    }
+
+    /// The keys to the number itself: a quantity keeps its unit and source.
+    fn keys_in(&self, document: &Item) -> Vec<String> {
+        let is_quantity = |item: &Item| item.as_table_like().is_some_and(|table| table.contains_key(VALUE));
+        let (mut keys, mut item) = (Vec::new(), Some(document));
+        for key in &self.keys {
+            // An element of a vector.
+            if item.is_some_and(is_quantity) && key.parse::<usize>().is_ok() {
+                keys.push(VALUE.to_owned());
+                item = item.and_then(|quantity| quantity.get(VALUE));
+            }
+            let key = item.and_then(|list| index_of(list, key)).unwrap_or_else(|| key.clone());
+            item = item.and_then(|inside| at(inside, &key));
+            keys.push(key);
+        }
+        if item.is_some_and(is_quantity) && !self.value.is_inline_table() {
+            keys.push(VALUE.to_owned());
+        }
+        keys
+    }
+
+    /// The number at the place of this edit in `text`; `None` if there is none.
+    fn number_in(&self, text: &str) -> Option<f64> {
+        let document: DocumentMut = text.parse().ok()?;
+        let keys = self.keys_in(document.as_item());
+        let item = keys.iter().try_fold(document.as_item(), |item, key| at(item, key))?;
+        let integer = || item.as_integer().map(|number| number as f64);
+        item.as_float().or_else(integer)
+    }
+
+    /// This edit's problem with the file at `path`.
+    pub fn problem(&self, sources: &Sources, message: &str, path: &Path) -> Diagnostic {
+        sources.problem(&self.span, message, format!("{} shows the keys", path.display()))
+    }
+}
+
+/// The number that the `key` of a `--set` leads to in a file, whose text `read` gives by the process and the file's key;
+/// `None` if `key` leads into no file, or to no number.
+pub fn number(key: &str, read: impl FnOnce(&str, &str) -> Option<String>) -> Option<f64> {
+    let edit = FileEdit::parse(&format!("{key}=0"), 0)?;
+    edit.number_in(&read(&edit.process, edit.file)?)
+}
+
+/// The item at `key`, a name in a table or an index in a list.
+fn at<'i>(inside: &'i Item, key: &str) -> Option<&'i Item> {
+    match key.parse::<usize>() {
+        Ok(index) if !inside.is_table_like() => inside.get(index),
+        _ => inside.get(key),
+    }
+}
+
+/// Index of the table called `name` in a list of tables, as the effects of a vehicle are named.
+fn index_of(list: &Item, name: &str) -> Option<String> {
+    let is_it = |table: &Table| table.get("name").and_then(Item::as_str) == Some(name);
+    list.as_array_of_tables()?.iter().position(is_it).map(|index| index.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{FileEdit, edited, edited_path};
+    use std::path::Path;
+
+    const VEHICLE: &str = "[body]\nmass = { value = 0.48, unit = \"kg\" } # weighed\n[[rotors]]\nname = \"front\"\n\
+                           position = { value = [0.17, 0, 0], unit = \"m\" }\n";
+
+    fn changed(set: &str) -> Result<String, String> {
+        let edit = FileEdit::parse(set, 0).unwrap();
+        edited(VEHICLE, &[&edit]).map_err(|(_, message)| message)
+    }
+
+    #[test]
+    fn a_quantity_keeps_its_unit_and_its_comment() {
+        let found = changed("process.plant.vehicle.body.mass=0.5").unwrap();
+        assert_eq!(found, VEHICLE.replace("0.48", "0.5"));
+        let found = changed("process.plant.vehicle.body.mass.unit=g").unwrap();
+        assert_eq!(found, VEHICLE.replace("kg", "g"));
+    }
+
+    #[test]
+    fn an_element_of_a_vector_in_a_list_is_reached() {
+        for rotor in ["0", "front"] {
+            let found = changed(&format!("process.plant.vehicle.rotors.{rotor}.position.2=0.01")).unwrap();
+            assert_eq!(found, VEHICLE.replace("0.17, 0, 0", "0.17, 0, 0.01"));
+        }
+    }
+
+    #[test]
+    fn the_number_at_a_key_is_found() {
+        let number = |key: &str| super::number(key, |_, _| Some(VEHICLE.to_owned()));
+        assert_eq!(number("process.plant.vehicle.body.mass"), Some(0.48));
+        assert_eq!(number("process.plant.vehicle.rotors.front.position.0"), Some(0.17));
+        assert_eq!(number("process.plant.vehicle.rotors.front.position.1"), Some(0.0));
+        assert_eq!(number("process.plant.vehicle.body.name"), None);
+        assert_eq!(number("run.seed"), None);
+    }
+
+    #[test]
+    fn a_missing_key_is_added_and_an_impossible_one_refused() {
+        let quantity = "{ value = 0.1, unit = \"1\" }";
+        let found = changed(&format!("process.plant.vehicle.effects.lift={quantity}")).unwrap();
+        assert!(found.contains("[effects]") && found.contains(&format!("lift = {quantity}")), "{found}");
+        for keys in ["rotors.3.position", "body.mass.value.deep"] {
+            let message = changed(&format!("process.plant.vehicle.{keys}=1")).unwrap_err();
+            assert_eq!(message, format!("the vehicle file has no place `{keys}`"));
+        }
+    }
+
+    #[test]
+    fn the_copy_lies_beside_the_original() {
+        let found = edited_path(Path::new("/a/b.toml"), "h1/plant");
+        assert_eq!(found, Path::new("/a/b@h1-plant.toml"));
+        assert!(super::is_edited(&found, "h1/plant") && !super::is_edited(&found, "plant2"));
+    }
+}

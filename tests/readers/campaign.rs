@@ -1,0 +1,55 @@
+//! pandas, polars and DuckDB read the flights of a campaign.
+
+use crate::{ROOT, hummingbus, readers};
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+/// Flights that pass, that fail, and one that is refused.
+const CAMPAIGN: &str = r#"
+sampling = "grid"
+set = ["run.duration_s=2.1"]
+
+[[vary]]
+name = "mass in kg, \"as flown\""
+key = "process.plant.vehicle.body.mass"
+values = [0.48, 0.9, -1.0]
+
+[[vary]]
+key = "run.seed"
+integers = [1, 2]
+"#;
+
+#[test]
+fn pandas_polars_and_duckdb_find_the_rows_of_a_campaign() {
+    let Some(readers) = readers() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let campaign = folder.path().join("c.toml");
+    let manifest = Path::new(ROOT).join("manifests/hover.toml");
+    fs::write(&campaign, format!("manifest = {:?}\n{CAMPAIGN}", manifest.to_str().unwrap())).unwrap();
+    let out = folder.path().join("out");
+    hummingbus(&["campaign".as_ref(), campaign.as_os_str(), "--out".as_ref(), out.as_os_str()]);
+
+    let output = read(&readers, &out);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(String::from_utf8_lossy(&output.stdout).trim(), "6");
+
+    // The same comparison must notice a value that differs by one bit.
+    let rows = fs::read_to_string(out.join("rows.jsonl")).unwrap();
+    let falsified =
+        rows.replacen("\"flight\":1,\"drawn\":[0.48,", "\"flight\":1,\"drawn\":[0.48000000000000004,", 1);
+    assert_ne!(rows, falsified);
+    fs::write(out.join("rows.jsonl"), falsified).unwrap();
+    let output = read(&readers, &out);
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        output.status.code() == Some(1) && message.starts_with("read_campaign.py: pandas has"),
+        "{message}"
+    );
+}
+
+fn read(readers: &Path, folder: &Path) -> Output {
+    let mut command = Command::new(readers.join("venv/bin/python"));
+    command.env("PYTHONDONTWRITEBYTECODE", "1").arg(Path::new(ROOT).join("tests/readers/read_campaign.py"));
+    command.arg(folder).output().unwrap()
+}

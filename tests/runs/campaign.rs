@@ -1,0 +1,165 @@
+//! Campaigns: rows depend on the plan alone, failures are named and counted, and what was flown is never lost.
+
+use crate::support::{Place, repository};
+use recorder::reader::Recording;
+use serde_json::Value;
+use std::fs;
+
+/// A campaign of short hovers of varied mass.
+const HOVERS: &str = "flights = 12\nset = [\"run.duration_s=0.4\"]\n\
+                      [[vary]]\nkey = \"process.plant.vehicle.body.mass\"\nas = \"factor\"\nuniform = [0.8, 1.2]\n\
+                      [[measure]]\nname = \"height\"\ntopic = \"/plant/state\"\nfield = \"position.z\"\nunit = \"m\"\nstatistic = \"last\"\n";
+
+/// Writes a campaign of the shipped hover without its conditions, which a short flight misses.
+fn written(place: &Place, name: &str, text: &str) -> String {
+    let hover = fs::read_to_string(repository("manifests/hover.toml")).unwrap();
+    let (head, _) = hover.split_once("[[pass]]").unwrap();
+    let vehicles = repository("vehicles");
+    place.write("hover.toml", &head.replace("../vehicles", &vehicles));
+    place.write(name, &format!("manifest = \"hover.toml\"\n{text}"))
+}
+
+/// The rows of a campaign by flight, without the host time.
+fn rows(folder: &str) -> Vec<Value> {
+    let text = fs::read_to_string(format!("{folder}/rows.jsonl")).unwrap();
+    let mut rows: Vec<Value> = text.lines().skip(1).map(|line| serde_json::from_str(line).unwrap()).collect();
+    rows.sort_by_key(|row| row["flight"].as_u64());
+    for row in &mut rows {
+        row.as_object_mut().unwrap().remove("wall_s");
+    }
+    rows
+}
+
+#[test]
+fn the_rows_are_those_of_the_plan_however_many_workers_fly_and_whenever_it_is_interrupted() {
+    let place = Place::new();
+    let campaign = written(&place, "c.toml", HOVERS);
+    let [one, three, cut] = ["one", "three", "cut"].map(|name| place.path(name));
+    for (folder, workers) in [(&one, "1"), (&three, "3"), (&cut, "2")] {
+        place
+            .call(&["campaign", &campaign, "--out", folder, "--workers", workers])
+            .with_code(0)
+            .prints(&["12 of 12 flights passed"]);
+    }
+    let flown = rows(&one);
+    assert_eq!(flown.len(), 12);
+    assert_eq!(flown, rows(&three));
+    let heights: Vec<f64> = flown.iter().map(|row| row["figures"][0].as_f64().unwrap()).collect();
+    // A heavier vehicle sinks: the order of the heights is that of the masses.
+    let mut by_mass: Vec<(f64, f64)> = flown
+        .iter()
+        .zip(&heights)
+        .map(|(row, height)| (row["drawn"][0].as_f64().unwrap(), *height))
+        .collect();
+    by_mass.sort_by(|a, b| a.0.total_cmp(&b.0));
+    assert!(by_mass.windows(2).all(|pair| pair[0].1 > pair[1].1), "{by_mass:?}");
+
+    // As if it had been ended in the middle of a row: the rest is flown, and nothing else.
+    let path = format!("{cut}/rows.jsonl");
+    let text = fs::read_to_string(&path).unwrap();
+    let kept: Vec<&str> = text.split_inclusive('\n').take(6).collect();
+    fs::write(&path, format!("{}{{\"flight\": 11, \"pa", kept.concat())).unwrap();
+    place.call(&["campaign", &campaign, "--out", &cut]).with_code(0).prints(&["12 of 12 flights passed"]);
+    assert_eq!(flown, rows(&cut));
+    assert!(fs::read_to_string(&path).unwrap().starts_with(&kept.concat()));
+    let tables = [&one, &cut].map(|folder| fs::metadata(format!("{folder}/flights.parquet")).unwrap().len());
+    assert_eq!(tables[0], tables[1]);
+}
+
+#[test]
+fn a_flight_is_flown_again_recorded_by_the_command_of_the_report() {
+    let place = Place::new();
+    let campaign = written(&place, "c.toml", HOVERS);
+    let folder = place.path("out");
+    let report = place.call(&["campaign", &campaign, "--out", &folder, "--json"]).with_code(0).json();
+    let worst = &report["worst"][0];
+    let command = worst["command"].as_str().unwrap();
+    let flight = worst["flight"].as_u64().unwrap();
+    let recording = place.path("again.mcap");
+    let command = command.replace(&format!("flight-{flight}.mcap"), &recording);
+    place.call(&command.split(' ').skip(1).collect::<Vec<_>>()).with_code(0);
+    let height = rows(&folder)[flight as usize]["figures"][0].as_f64().unwrap();
+    let recorded =
+        &Recording::open(recording.as_ref()).unwrap().series(&[("/plant/state", "position.z")]).unwrap()[0];
+    assert_eq!(recorded.value.last(), Some(&height));
+
+    let number = flight.to_string();
+    place
+        .call(&["campaign", &campaign, "--out", &folder, "--fly", &number])
+        .with_code(0)
+        .prints(&["value  height"]);
+    let again = format!("{folder}/flight-{flight}.mcap");
+    assert_eq!(fs::read(&again).unwrap().len(), fs::read(&recording).unwrap().len());
+    let beyond = place.call(&["campaign", &campaign, "--out", &folder, "--fly", "12"]).with_code(2);
+    beyond.says(&["there is no flight 12: the plan has the flights 0 to 11"]);
+}
+
+#[test]
+fn flights_that_cannot_be_flown_are_counted_with_their_reasons() {
+    let place = Place::new();
+    // Half of the masses are negative.
+    let text = HOVERS.replace("as = \"factor\"\nuniform = [0.8, 1.2]", "values = [-1.0, 0.48]");
+    let campaign = written(&place, "c.toml", &text);
+    let folder = place.path("out");
+    place.call(&["campaign", &campaign, "--out", &folder]).with_code(0).prints(&[
+        "6 of 12 flights passed",
+        "without figures, 6 flights",
+        "mass",
+    ]);
+    let broken = rows(&folder).into_iter().filter(|row| !row["error"].is_null()).count();
+    assert_eq!(broken, 6);
+
+    // No flight is that fast.
+    let text = HOVERS.replace("flights = 12", "flights = 3\ntimeout_s_host = 0.001").replace("0.4", "400.0");
+    let campaign = written(&place, "slow.toml", &text);
+    let folder = place.path("slow");
+    place
+        .call(&["campaign", &campaign, "--out", &folder])
+        .with_code(0)
+        .prints(&["0 of 3 flights passed", "timeout_s_host"]);
+}
+
+#[test]
+fn a_requirement_decides_the_exit_code() {
+    let place = Place::new();
+    let campaign = written(&place, "c.toml", HOVERS);
+    let folder = place.path("out");
+    let gate =
+        |condition: &str| place.call(&["campaign", &campaign, "--out", &folder, "--require", condition]);
+    gate("pass_rate >= 0.9").with_code(0);
+    // Twelve flights without a failure show 0.05^(1/12) = 0.779.
+    gate("pass_rate >= 0.77 at 95 %").with_code(0);
+    gate("pass_rate >= 0.79 at 95 %")
+        .with_code(1)
+        .says(&["not met: pass_rate >= 0.79 at 95 %; these flights show 0.779"]);
+    gate("pass_rate > 1").with_code(2).says(&["expected `pass_rate >= 0.99 at 95 %`"]);
+}
+
+#[test]
+fn what_cannot_be_flown_at_all_is_refused_before_the_first_flight() {
+    let place = Place::new();
+    let vary = |key: &str| HOVERS.replace("process.plant.vehicle.body.mass", key);
+    for (text, says) in [
+        (vary("process.plnt.vehicle.body.mass"), "no declared number"),
+        (vary("process.plant.vehicle.body.mas").replace("as = \"factor\"\n", ""), "mas"),
+        (
+            vary("process.plnt.vehicle.body.mass").replace("as = \"factor\"\n", ""),
+            "there is no process `plnt`",
+        ),
+        (vary("run.sed").replace("as = \"factor\"\n", ""), "sed"),
+        (HOVERS.replace("uniform = [0.8, 1.2]", "uniform = [1.2, 0.8]"), "a lower limit below the upper one"),
+        (HOVERS.replace("position.z", "position.w"), "position.w"),
+        (HOVERS.split("[[measure]]").next().unwrap().to_owned(), "neither [[pass]] nor [[measure]]"),
+    ] {
+        let campaign = written(&place, "c.toml", &text);
+        let ended = place.call(&["campaign", &campaign, "--out", &place.path("out")]).with_code(2);
+        ended.says(&[says]);
+        assert!(!ended.to_string().contains("panicked"), "{ended}");
+    }
+    // A folder whose flights are of another vehicle.
+    let campaign = written(&place, "c.toml", HOVERS);
+    let folder = place.path("other");
+    place.call(&["campaign", &campaign, "--out", &folder]).with_code(0);
+    let campaign = written(&place, "c.toml", &HOVERS.replace("0.4\"", "0.5\""));
+    place.call(&["campaign", &campaign, "--out", &folder]).with_code(2).says(&["flown of other inputs"]);
+}
