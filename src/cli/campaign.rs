@@ -113,6 +113,7 @@ pub fn campaign(arguments: &CampaignArguments) -> Result<bool> {
     };
     let end = pool.fly(jobs.into_iter(), &stop, |mut row| {
         row.drawn.clone_from(&plan.flights[row.flight as usize]);
+        row.figures.resize(figures.len(), None);
         store.add(&row)?;
         rows.insert(row.flight, row);
         bar.inc(1);

@@ -8,6 +8,7 @@ mod components;
 mod diff;
 mod files;
 mod identify;
+mod included_models;
 mod inherited;
 mod interrupts;
 mod new;

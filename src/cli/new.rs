@@ -1,5 +1,6 @@
 //! The command `new`.
 
+use super::included_models;
 use super::output::{print_text, say};
 use anyhow::{Result, bail};
 use clap::{Args, Subcommand};
@@ -50,7 +51,7 @@ pub fn new(arguments: &NewArguments) -> Result<bool> {
     let text = InputFiles::default()
         .text(from)
         .map_err(|cause| hummingbus::Diagnostic::unreadable(file.clone(), &cause))?;
-    let made = from_model::convert(&text, &file)?;
+    let made = from_model::convert_with(&text, &file, &|uri| included_models::read(from, uri))?;
     output_file::write(out, &VEHICLE, |file| file.write_all(made.text.as_bytes()))?;
     made.notes.iter().for_each(|note| say(&format!("warning: {file}: {note}")));
     print_text(&summary(&made, &file, out))?;

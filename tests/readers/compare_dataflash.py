@@ -113,11 +113,14 @@ def compare(program, vehicle, path):
     if "error" in read:
         return 0, [f"refused: {read['error'].splitlines()[0]}"]
     flight, compared, wrong = read["flights"][0], 0, []
+    # Ours counts from the first sample of all channels.
+    begin_us = min(min(samples) for samples in theirs.values() if samples)
+    begin_us -= round(1e6 * min(flight[name]["time_s"][0] for name in theirs if flight[name]["time_s"]))
     for name, samples in theirs.items():
         channel = flight[name]
         is_close = turned if name == "attitude" else distance
         for time, value in zip(channel["time_s"], channel["values"]):
-            sample = samples.get(round(time * 1e6), "absent")
+            sample = samples.get(begin_us + round(time * 1e6), "absent")
             if sample is None:
                 continue
             if sample == "absent" or is_close(value, sample) > CLOSE * (1 + max(map(abs, value))):

@@ -30,6 +30,13 @@ fn rows(folder: &str) -> Vec<Value> {
     rows
 }
 
+/// Height of the vehicle at the end of a recording, m.
+fn last_height(recording: &str) -> f64 {
+    let series =
+        Recording::open(recording.as_ref()).unwrap().series(&[("/plant/state", "position.z")]).unwrap();
+    *series[0].value.last().unwrap()
+}
+
 #[test]
 fn the_rows_are_those_of_the_plan_however_many_workers_fly_and_whenever_it_is_interrupted() {
     let place = Place::new();
@@ -62,8 +69,6 @@ fn the_rows_are_those_of_the_plan_however_many_workers_fly_and_whenever_it_is_in
     place.call(&["campaign", &campaign, "--out", &cut]).with_code(0).prints(&["12 of 12 flights passed"]);
     assert_eq!(flown, rows(&cut));
     assert!(fs::read_to_string(&path).unwrap().starts_with(&kept.concat()));
-    let tables = [&one, &cut].map(|folder| fs::metadata(format!("{folder}/flights.parquet")).unwrap().len());
-    assert_eq!(tables[0], tables[1]);
 }
 
 #[test]
@@ -79,9 +84,7 @@ fn a_flight_is_flown_again_recorded_by_the_command_of_the_report() {
     let command = command.replace(&format!("flight-{flight}.mcap"), &recording);
     place.call(&command.split(' ').skip(1).collect::<Vec<_>>()).with_code(0);
     let height = rows(&folder)[flight as usize]["figures"][0].as_f64().unwrap();
-    let recorded =
-        &Recording::open(recording.as_ref()).unwrap().series(&[("/plant/state", "position.z")]).unwrap()[0];
-    assert_eq!(recorded.value.last(), Some(&height));
+    assert_eq!(last_height(&recording).to_bits(), height.to_bits());
 
     let number = flight.to_string();
     place
@@ -89,7 +92,7 @@ fn a_flight_is_flown_again_recorded_by_the_command_of_the_report() {
         .with_code(0)
         .prints(&["value  height"]);
     let again = format!("{folder}/flight-{flight}.mcap");
-    assert_eq!(fs::read(&again).unwrap().len(), fs::read(&recording).unwrap().len());
+    assert_eq!(last_height(&again).to_bits(), height.to_bits());
     let beyond = place.call(&["campaign", &campaign, "--out", &folder, "--fly", "12"]).with_code(2);
     beyond.says(&["there is no flight 12: the plan has the flights 0 to 11"]);
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
-use vehicles::from_model::{Converted, convert};
+use vehicles::from_model::{Converted, convert, convert_with};
 use vehicles::{MotorModel, Vehicle};
 
 const URDF: &str = include_str!("models/plus.urdf");
@@ -248,19 +248,20 @@ fn what_is_wrong_with_a_model_is_told_with_its_line() {
         "<model name=\"cross\">",
         "<model name=\"cross\"><include><uri>model://x</uri></include>",
         ":5:",
-        &["<include> of `model://x`", "another file", "gz sdf -p"],
+        &["<include> of `model://x`", "another file", "GAZEBO_MODEL_PATH"],
     );
     sdf(
         "<model name=\"cross\">",
-        "<model name=\"cross\"><model name=\"arm\"/>",
+        "<model name=\"cross\"><model name=\"arm\"><link name=\"tip\"><inertial><mass>0.1</mass><inertia><ixx>1e-5</ixx>\
+         <iyy>1e-5</iyy><izz>1e-5</izz></inertia></inertial></link></model>",
         ":5:",
-        &["the model `arm` within this one", "copy its links"],
+        &["expected one link without a parent", "`arm::tip`"],
     );
     refused(
         "<sdf version=\"1.9\"><world name=\"w\"><include><uri>model://quad</uri></include></world></sdf>",
         "quad.sdf",
         ":1:",
-        &["<include> of `model://quad`", "gz sdf -p"],
+        &["<include> of `model://quad`", "GAZEBO_MODEL_PATH"],
     );
     sdf(
         "<model name=\"cross\">",
@@ -300,6 +301,55 @@ fn models_of_other_counts_share_the_weight_between_their_rotors() {
         "{:?}",
         three.notes
     );
+}
+
+/// A part of 10 g, 3 cm beside the origin of its model.
+const PART: &str = "<sdf version=\"1.6\">\n<model name=\"part\"><pose>9 9 9 0 0 0</pose>\n<link name=\"link\"><pose>0.03 0 0 0 0 0</pose>\n\
+                    <inertial><mass>0.01</mass><inertia><ixx>1e-6</ixx><iyy>1e-6</iyy><izz>1e-6</izz></inertia></inertial></link>\n\
+                    </model></sdf>";
+
+#[test]
+fn a_model_within_the_model_is_a_part_of_it_in_the_file_or_in_another() {
+    let joint =
+        "<joint name=\"part_joint\" type=\"fixed\"><parent>body</parent><child>part0::link</child></joint>";
+    // Turned by 90 degrees about z: its link lies 3 cm to the left of the place.
+    let pose = "<pose>0.05 0 0.04 0 0 1.5707963267948966</pose>";
+    let part = PART.replace("name=\"part\"", "name=\"part0\"").replace("<pose>9 9 9 0 0 0</pose>", pose);
+    let inner = part.replace("<sdf version=\"1.6\">\n", "").replace("</sdf>", "");
+    let include = format!("<include>\n<uri>model://part</uri>{pose}<name>part0</name></include>");
+    let flat = "<link name=\"p\"><pose>0.05 0.03 0.04 0 0 1.5707963267948966</pose><inertial><mass>0.01</mass><inertia>\
+                <ixx>1e-6</ixx><iyy>1e-6</iyy><izz>1e-6</izz></inertia></inertial></link>";
+    let with = |part: &str, joint: &str| {
+        let text = SDF.replacen("<model name=\"cross\">", &format!("<model name=\"cross\">{part}{joint}"), 1);
+        convert_with(&text, "cross.sdf", &|uri| (uri == "model://part").then(|| Ok(PART.to_owned()))).unwrap()
+    };
+    let flat = with(flat, &joint.replace("part0::link", "p"));
+    for part in [inner, include] {
+        let made = with(&part, joint);
+        let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} {b}");
+        close(made.vehicle.mass_kg, flat.vehicle.mass_kg);
+        close(made.vehicle.mass_kg, of(SDF, "cross.sdf").vehicle.mass_kg + 0.01);
+        for (a, b) in made.vehicle.inertia_kg_m2.iter().zip(flat.vehicle.inertia_kg_m2.iter()) {
+            close(*a, *b);
+        }
+        let rotors = made.vehicle.rotors.iter().zip(&flat.vehicle.rotors);
+        rotors.for_each(|(a, b)| close((a.position_m - b.position_m).norm(), 0.0));
+    }
+}
+
+#[test]
+fn an_included_model_that_cannot_be_read_or_includes_itself_is_refused() {
+    let include = "<model name=\"cross\"><include><uri>model://part</uri></include>";
+    let text = SDF.replacen("<model name=\"cross\">", include, 1);
+    let refused = |read: &dyn Fn(&str) -> Option<Result<String, String>>| {
+        convert_with(&text, "cross.sdf", read).unwrap_err().to_string()
+    };
+    let unreadable = refused(&|_| Some(Err("cannot read part.sdf: no rights".to_owned())));
+    assert!(unreadable.contains("cross.sdf:5:") && unreadable.contains("no rights"), "{unreadable}");
+    let other = refused(&|_| Some(Ok("<robot name=\"q\"/>".to_owned())));
+    assert!(other.contains("its file has no <model>"), "{other}");
+    let endless = refused(&|_| Some(Ok(format!("<sdf>{include}</model></sdf>"))));
+    assert!(endless.contains("include each other at most 8 deep"), "{endless}");
 }
 
 #[test]

@@ -6,6 +6,7 @@
 //! | `model` | links, joints and motors, whatever the format |
 //! | `tree` | the order of links from the root |
 //! | `urdf`, `sdf`, `sdf_notes` | the formats; properties of SDF that a vehicle file does not have |
+//! | `included` | models in other files that an SDF model includes |
 //! | `plugins` | plugins of Gazebo that drive rotors |
 //! | `body` | mass, centre of mass and inertia of all links |
 //! | `rotors` | the rotors among the joints |
@@ -15,6 +16,7 @@
 //! | `text` | its text |
 
 mod body;
+mod included;
 mod model;
 mod notes;
 mod parts;
@@ -35,6 +37,7 @@ use crate::reference::HUMMINGBIRD;
 use crate::vehicle::Vehicle;
 use xml::Source;
 
+pub use included::Read;
 pub use text::MARK;
 
 /// A vehicle file that was made from a model.
@@ -51,12 +54,21 @@ pub struct Converted {
 }
 
 /// Makes a vehicle file of the `text` of a model in URDF or SDF; `file` is its name. Missing numbers are those of the
-/// Hummingbird.
+/// Hummingbird. Models in other files are refused: [`convert_with`] reads them.
 ///
 /// # Errors
 /// If the text is not such a model, is not physical, or does not have 1 to 12 rotors.
 pub fn convert(text: &str, file: &str) -> Result<Converted, Diagnostic> {
-    let source = Source { file, text };
+    convert_with(text, file, &|_| None)
+}
+
+/// As [`convert`]; `read` returns the text of the model that an `<include>` of SDF names by its URI, such as `model://gps`.
+///
+/// # Errors
+/// As [`convert`], and if an included model cannot be read.
+pub fn convert_with(text: &str, file: &str, read: &Read<'_>) -> Result<Converted, Diagnostic> {
+    let text = included::expand(Source { file, text }, read)?;
+    let source = Source { file, text: &text };
     let document = source.parse()?;
     let root = document.root_element();
     let model = match root.tag_name().name() {

@@ -18,25 +18,34 @@ const MODEL: &str = "__model__";
 
 /// Poses of a model's links, joints and frames, each relative to another.
 #[derive(Default)]
-struct Frames<'d> {
-    poses: BTreeMap<&'d str, (Isometry3<f64>, String, Range<usize>)>,
+struct Frames {
+    poses: BTreeMap<String, (Isometry3<f64>, String, Range<usize>)>,
+}
+
+/// The model, or a model within it, whose names have a prefix outside: `gps0::link`.
+struct Scope<'d, 'i> {
+    model: Node<'d, 'i>,
+    prefix: String,
 }
 
 /// Reads the only model of the element `<sdf>`. The model's frame is that of its element.
 ///
 /// # Errors
-/// If there is not one model, it includes or holds others, an element is missing or not of its kind, or the joints do not form a tree.
+/// If there is not one model, it includes another that was not found, an element is missing or not of its kind, or the joints do not form a tree.
 pub fn read<'a>(source: Source<'a>, sdf: Node) -> Result<Model<'a>, Diagnostic> {
     let model = only_model(source, sdf)?;
+    let mut scopes = Vec::new();
+    add_scopes(source, model, String::new(), &mut scopes)?;
     let mut frames = Frames::default();
-    for kind in ["link", "joint", "frame"] {
-        for node in children(model, kind) {
-            frames.add(source, node, kind)?;
-        }
+    for scope in &scopes {
+        frames.add_all(source, scope)?;
     }
-    let links = children(model, "link").map(|node| link(source, node, &frames));
+    let each = |kind| {
+        scopes.iter().flat_map(move |scope| children(scope.model, kind).map(move |node| (node, scope)))
+    };
+    let links = each("link").map(|(node, scope)| link(source, node, scope, &frames));
     let links = links.collect::<Result<Vec<_>, _>>()?;
-    let joints = children(model, "joint").map(|node| joint(source, node, &frames));
+    let joints = each("joint").map(|(node, scope)| joint(source, node, scope, &frames));
     let joints: Vec<Joint> = joints.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
     tree::order(source, &links, &joints)?;
     let name = name_of(model);
@@ -57,47 +66,91 @@ fn only_model<'d, 'i>(source: Source, sdf: Node<'d, 'i>) -> Result<Node<'d, 'i>,
         let message = format!("expected one <model>, found {}", models.len());
         return Err(source.whole(message).help("keep the model of the vehicle alone in the file"));
     };
-    let inner = model.children().find(|node| matches!(node.tag_name().name(), "include" | "model"));
-    match inner {
-        Some(node) if node.has_tag_name("include") => Err(included_model(source, node)),
-        Some(node) => {
-            let message = format!(
-                "expected links and joints, found the model `{}` within this one",
-                plain(&name_of(node))
-            );
-            Err(source.fault(start_of(node), message).help(
-                "copy its links, joints and plugins into this model, and add its pose to the poses of its links",
-            ))
+    Ok(model)
+}
+
+/// Adds `model` and the models within it, which have no `<include>` any more.
+fn add_scopes<'d, 'i>(
+    source: Source,
+    model: Node<'d, 'i>,
+    prefix: String,
+    scopes: &mut Vec<Scope<'d, 'i>>,
+) -> Result<(), Diagnostic> {
+    if let Some(include) = child(model, "include") {
+        return Err(included_model(source, include));
+    }
+    let inner = children(model, "model").map(|inner| Ok((inner, source.attribute(inner, "name")?)));
+    let inner = inner.collect::<Result<Vec<_>, Diagnostic>>()?;
+    scopes.push(Scope { model, prefix: prefix.clone() });
+    inner
+        .into_iter()
+        .try_for_each(|(inner, name)| add_scopes(source, inner, format!("{prefix}{name}::"), scopes))
+}
+
+impl Scope<'_, '_> {
+    /// The frame of the model itself.
+    fn frame(&self) -> &str {
+        self.prefix.strip_suffix("::").unwrap_or(MODEL)
+    }
+
+    /// The full name of what is called `name` in this model.
+    fn full(&self, name: &str) -> String {
+        match name {
+            MODEL => self.frame().to_owned(),
+            "world" => name.to_owned(),
+            _ => format!("{}{name}", self.prefix),
         }
-        None => Ok(model),
     }
 }
 
-/// The error for a model in another file, which is not looked for: its place depends on the simulator's settings.
+/// The error for a model in another file that was not found.
 fn included_model(source: Source, include: Node) -> Diagnostic {
     let uri = text_of(include, "uri")
         .map_or("a model without <uri>".to_owned(), |uri| format!("`{}`", plain(&uri)));
     let message = format!("expected links and joints, found <include> of {uri}, which is in another file");
     source.fault(start_of(include), message).help(
-        "let the simulator write one file with all models, `gz sdf -p FILE > WHOLE.sdf`, and convert that, or copy the \
-         links, joints and plugins of the included model into this one",
+        "set GAZEBO_MODEL_PATH to the folder that holds the folder of this model, or put that beside the folder of this file",
     )
 }
 
-impl<'d> Frames<'d> {
-    fn add(&mut self, source: Source, node: Node<'d, '_>, kind: &str) -> Result<(), Diagnostic> {
-        let name = source.attribute(node, "name")?;
-        let carrier = match kind {
-            "joint" => text_of(node, "child"),
-            "frame" => node.attribute("attached_to").map(str::to_owned),
-            _ => None,
-        };
+impl Frames {
+    /// Adds the model of `scope`, if it lies within another, and what it holds.
+    fn add_all(&mut self, source: Source, scope: &Scope) -> Result<(), Diagnostic> {
+        if !scope.prefix.is_empty() {
+            let outer =
+                scope.frame().rsplit_once("::").map_or(String::new(), |(outer, _)| format!("{outer}::"));
+            let outer = Scope { model: scope.model, prefix: outer };
+            self.add(source, scope.model, scope.frame().to_owned(), &outer, None)?;
+        }
+        for kind in ["link", "joint", "frame"] {
+            for node in children(scope.model, kind) {
+                let carrier = match kind {
+                    "joint" => text_of(node, "child"),
+                    "frame" => node.attribute("attached_to").map(str::to_owned),
+                    _ => None,
+                };
+                let name = scope.full(source.attribute(node, "name")?);
+                self.add(source, node, name, scope, carrier)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds the pose of `node`, which is called `name` outside; names in it are those of `scope`.
+    fn add(
+        &mut self,
+        source: Source,
+        node: Node,
+        name: String,
+        scope: &Scope,
+        carrier: Option<String>,
+    ) -> Result<(), Diagnostic> {
         let posed = child(node, "pose");
-        let relative = |node: Node<'d, '_>| node.attribute("relative_to").or(node.attribute("frame"));
-        let stated = posed.and_then(relative).filter(|name| !name.trim().is_empty());
-        let to = stated.map(str::to_owned).or(carrier).unwrap_or_else(|| MODEL.to_owned());
+        let stated = posed.and_then(|pose| pose.attribute("relative_to").or(pose.attribute("frame")));
+        let stated = stated.filter(|name| !name.trim().is_empty()).map(str::to_owned);
+        let to = scope.full(&stated.or(carrier).unwrap_or_else(|| MODEL.to_owned()));
         let entry = (own_pose(source, node)?, to, start_of(node));
-        if self.poses.insert(name, entry).is_some() {
+        if self.poses.insert(name.clone(), entry).is_some() {
             let message =
                 format!("expected links, joints and frames with different names, found `{name}` twice");
             return Err(source.fault(start_of(node), message).help("rename one of them"));
@@ -146,8 +199,8 @@ fn own_pose(source: Source, node: Node) -> Result<Isometry3<f64>, Diagnostic> {
     Ok(pose([x, y, z], [roll * unit, pitch * unit, yaw * unit]))
 }
 
-fn link(source: Source, node: Node, frames: &Frames) -> Result<Link, Diagnostic> {
-    let name = source.attribute(node, "name")?.to_owned();
+fn link(source: Source, node: Node, scope: &Scope, frames: &Frames) -> Result<Link, Diagnostic> {
+    let name = scope.full(source.attribute(node, "name")?);
     let missing = |what: &str, place: Node| {
         let message = format!("link `{name}`: expected {what}, found none");
         source
@@ -173,10 +226,10 @@ fn link(source: Source, node: Node, frames: &Frames) -> Result<Link, Diagnostic>
 }
 
 /// A joint; none for one that holds the model to the world.
-fn joint(source: Source, node: Node, frames: &Frames) -> Result<Option<Joint>, Diagnostic> {
-    let name = source.attribute(node, "name")?.to_owned();
+fn joint(source: Source, node: Node, scope: &Scope, frames: &Frames) -> Result<Option<Joint>, Diagnostic> {
+    let name = scope.full(source.attribute(node, "name")?);
     let end = |side: &str| {
-        text_of(node, side).ok_or_else(|| {
+        text_of(node, side).map(|end| scope.full(&end)).ok_or_else(|| {
             let message = format!("joint `{name}`: expected <{side}>, found none");
             source.fault(start_of(node), message).help(format!("add <{side}> with the name of a link"))
         })
@@ -192,7 +245,7 @@ fn joint(source: Source, node: Node, frames: &Frames) -> Result<Option<Joint>, D
         _ => Freedom::Other,
     };
     let pose = frames.of(source, &name)?;
-    let axis = axis(source, node, frames, &pose)?;
+    let axis = axis(source, node, scope, frames, &pose)?;
     let at = start_of(node);
     let point = pose * Point3::origin();
     Ok(Some(Joint { name, parent, child: below, freedom, point, axis, at }))
@@ -214,6 +267,7 @@ fn is_locked(source: Source, joint: Node) -> Result<bool, Diagnostic> {
 fn axis(
     source: Source,
     joint: Node,
+    scope: &Scope,
     frames: &Frames,
     pose: &Isometry3<f64>,
 ) -> Result<Vector3<f64>, Diagnostic> {
@@ -223,8 +277,8 @@ fn axis(
     let of_model =
         text_of(axis, "use_parent_model_frame").is_some_and(|text| matches!(text.as_str(), "1" | "true"));
     match xyz.attribute("expressed_in").filter(|name| !name.trim().is_empty()) {
-        Some(name) => Ok(frames.of(source, name)? * vector),
-        None if of_model => Ok(vector),
+        Some(name) => Ok(frames.of(source, &scope.full(name))? * vector),
+        None if of_model => Ok(frames.of(source, scope.frame())? * vector),
         None => Ok(pose * vector),
     }
 }
