@@ -82,6 +82,7 @@ async function zoom(page) {
 
 /** Adds a plot of a field that is searched for, with the keyboard alone. */
 async function pick(page, words) {
+  const count = await page.evaluate(() => window.hummingbus.scopes.plots.length);
   await page.focus("#add-plot");
   await page.keyboard.press("Enter");
   await page.waitForSelector("#picker[open]");
@@ -90,7 +91,7 @@ async function pick(page, words) {
   await page.keyboard.press("Space");
   await page.focus("#picker-done");
   await page.keyboard.press("Enter");
-  await page.waitForFunction(() => document.querySelector("#picker").open === false);
+  await page.waitForFunction((before) => window.hummingbus.scopes.plots.length > before, {}, count);
   return page.evaluate(() => window.hummingbus.scopes.layout().at(-1));
 }
 

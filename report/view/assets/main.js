@@ -62,7 +62,7 @@ function legend(room) {
 }
 
 function head(recordings) {
-  const names = recordings.map(({ name }) => name).join("  against  ");
+  const names = recordings.map(({ name }) => name).join(" against ");
   document.getElementById("title").textContent = names;
   document.title = `${names} · hummingbus view`;
   const notes = recordings.flatMap((recording) => recording.notes);

@@ -46,19 +46,11 @@ export class Room {
   }
 
   #renderer(flat) {
-    try {
-      if (flat) throw new Error("a flat canvas was asked for");
-      // A picture of the page is taken between two drawings: without a kept buffer it would be empty.
-      const options = { antialias: true, alpha: true, preserveDrawingBuffer: true };
-      this.renderer = new THREE.WebGLRenderer({ canvas: this.canvas, ...options });
-    } catch {
-      // A canvas that was asked for WebGL may be lost for anything else.
-      const fresh = this.canvas.cloneNode();
-      this.canvas.replaceWith(fresh);
-      this.canvas = fresh;
-      this.renderer = new FlatRenderer(fresh);
-    }
-    this.isFlat = this.renderer instanceof FlatRenderer;
+    // Another canvas is asked first: one that was asked for WebGL is lost for a flat drawing.
+    this.isFlat = flat || !document.createElement("canvas").getContext("webgl2");
+    // A picture of the page is taken between two drawings: without a kept buffer it would be empty.
+    const options = { canvas: this.canvas, antialias: true, alpha: true, preserveDrawingBuffer: true };
+    this.renderer = this.isFlat ? new FlatRenderer(this.canvas) : new THREE.WebGLRenderer(options);
   }
 
   #lights() {
@@ -161,7 +153,9 @@ export class Room {
       this.renderer.setPixelRatio(devicePixelRatio);
       this.renderer.setSize(width, height, false);
     }
+    // Another size empties the canvas: it is filled before the browser shows it.
     this.isStale = true;
+    this.draw();
   }
 
   /** Without vehicles the camera looks at what stands there. */

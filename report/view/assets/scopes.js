@@ -34,7 +34,7 @@ export function defaultPlots(recordings) {
   const rotors = Array.from({ length: count }, (_, index) => `rotor_speed[${index}]`);
   const beams = [0, 1, 2, 3, 4].map((index) => `distance[${index}]`);
   return [
-    [...plot(state, ["position.x", "position.y", "position.z"]), ...plot(topics.status, ["altitude_set_point"])],
+    [...plot(state, ["position.x", "position.y", "position.z"]), ...plot(topics.status ?? topics.set_point, ["altitude_set_point", "altitude"])],
     plot(state, ["attitude.roll", "attitude.pitch", "attitude.yaw"]),
     topics.ranges ? plot(topics.ranges, beams) : plot(state, ["velocity.x", "velocity.y", "velocity.z"]),
     plot(state, rotors),

@@ -52,6 +52,9 @@ fn write(path: &Path, chunk: u32, is_finished: bool) {
     }
     if is_finished {
         writer.finish().unwrap();
+    } else {
+        // A writer that is dropped finishes its file; one that is killed does not.
+        std::mem::forget(writer);
     }
 }
 
