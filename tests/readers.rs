@@ -20,6 +20,8 @@ mod profile;
 mod skipped;
 #[path = "readers/urdf.rs"]
 mod urdf;
+#[path = "readers/view.rs"]
+mod view;
 #[path = "readers/world.rs"]
 mod world;
 

@@ -5,9 +5,11 @@
 //! as its bytes go, whatever its header says. What a file unpacks to and declares is bounded by its own length: a few
 //! bytes can be compressed from gigabytes.
 
+pub(crate) mod blocks;
+
 use crate::source::Source;
 use mcap::read::ChannelAccumulator;
-use mcap::records::{self, AttachmentIndex, ChunkHeader, Record, SchemaHeader, op};
+use mcap::records::{self, AttachmentIndex, ChunkHeader, ChunkIndex, Record, SchemaHeader, op};
 use mcap::{Channel, MAGIC, Message, parse_record};
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -228,6 +230,8 @@ fn long32<'a>(rest: &mut &'a [u8]) -> Result<&'a [u8], Fault> {
 pub struct Messages<'a> {
     source: Source<'a>,
     at: usize,
+    /// The byte that reading stops in front of; none where it goes on to the footer.
+    end: Option<usize>,
     chunk: Option<Chunk>,
     /// Bytes that further chunks may unpack to.
     unpacked_left: u64,
@@ -255,6 +259,7 @@ impl<'a> Messages<'a> {
         Self {
             source,
             at: 0,
+            end: None,
             chunk: None,
             unpacked_left: limit(&source, UNPACKED_BYTES, UNPACKED_RATIO),
             channels: Declared::of(&source),
@@ -275,6 +280,10 @@ impl<'a> Messages<'a> {
             self.chunk = None;
         }
         let (file, at) = (Bytes { source: self.source, of: "" }, self.at);
+        if self.end.is_some_and(|end| at >= end) {
+            self.is_done = true;
+            return Ok(None);
+        }
         if at == 0 {
             self.at = magic(&file, 0)?;
             return Ok(None);
@@ -451,6 +460,8 @@ pub(crate) struct Summary {
     pub channels: Channels,
     /// Where the attachments are.
     pub attachments: Vec<AttachmentIndex>,
+    /// Where the chunks are; none where the file does not list all of them.
+    pub chunks: Option<Vec<ChunkIndex>>,
 }
 
 /// The summary of a file; `None` where it has none.
@@ -469,12 +480,17 @@ pub(crate) fn summary(source: Source<'_>) -> Result<Option<Summary>, Damage> {
     }
     let (mut channels, mut known, mut counts) = (Declared::of(&source), Vec::new(), BTreeMap::new());
     let (mut attachments, mut offsets, mut attached) = (Vec::new(), BTreeSet::new(), 0_u64);
+    let (mut chunks, mut chunk_count) = (Vec::new(), None);
     let section = Bytes { source: source.up_to(footer_at), of: "" };
     let mut at = usize::try_from(footer.summary_start).unwrap_or(usize::MAX);
     while at != footer_at {
         let raw = section.record(at)?;
         match section.parsed(at, &raw)? {
-            Record::Statistics(statistics) => counts = statistics.channel_message_counts,
+            Record::Statistics(statistics) => {
+                chunk_count = Some(statistics.chunk_count as usize);
+                counts = statistics.channel_message_counts;
+            }
+            Record::ChunkIndex(index) => chunks.push(index),
             Record::AttachmentIndex(index) => {
                 // Each is read whole: one that is listed again and again would take any amount of memory.
                 if !offsets.insert(index.offset) {
@@ -501,7 +517,9 @@ pub(crate) fn summary(source: Source<'_>) -> Result<Option<Summary>, Damage> {
         at = raw.end;
     }
     let counted = |id: u16| Some((id, (channels.all.get(id)?, counts.get(&id).copied().unwrap_or(0))));
-    Ok(Some(Summary { channels: known.into_iter().filter_map(counted).collect(), attachments }))
+    let channels = known.into_iter().filter_map(counted).collect();
+    let chunks = Some(chunks).filter(|chunks| chunk_count == Some(chunks.len()) && !chunks.is_empty());
+    Ok(Some(Summary { channels, attachments, chunks }))
 }
 
 /// Name and content of the attachment at the place that `index` names.

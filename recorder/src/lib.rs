@@ -6,6 +6,7 @@
 //! - `source`: the bytes of a recording, in memory or in a file
 //! - `container`: the records of an MCAP file, their lengths checked before memory is taken for them
 //! - [`reader`]: a recording's topics, messages and attachments
+//! - [`index`]: a recording by time, read stretch by stretch
 //! - [`fields`]: newest values of the fields of a topic, read message by message
 //! - [`series`]: one field of one topic over time
 //! - [`diff`]: where two recordings first differ
@@ -52,6 +53,7 @@ pub mod definition;
 pub mod diff;
 mod error;
 pub mod fields;
+pub mod index;
 pub mod node;
 pub mod reader;
 pub mod series;

@@ -2,6 +2,7 @@
 
 pub use crate::container::{Damage, Messages};
 
+use crate::container::blocks::leading_attachments;
 use crate::container::{Channels, attachment, summary};
 use crate::definition::{Definition, Leaf};
 use crate::error::RecordingError;
@@ -59,6 +60,7 @@ impl Topic {
 pub struct Recording {
     path: PathBuf,
     content: Content,
+    channels: Channels,
     topics: BTreeMap<String, Topic>,
     cut: Option<Cut>,
 }
@@ -149,8 +151,9 @@ impl Recording {
     fn complete(content: Content, path: &Path) -> Result<Self, RecordingError> {
         let summary = summary(content.source()).map_err(|damage| RecordingError::content(path, damage))?;
         let missing = || RecordingError::content(path, "it has no summary section");
-        let topics = topics(&summary.ok_or_else(missing)?.channels, path)?;
-        Ok(Self { path: path.to_owned(), content, topics, cut: None })
+        let channels = summary.ok_or_else(missing)?.channels;
+        let topics = topics(&channels, path)?;
+        Ok(Self { path: path.to_owned(), content, channels, topics, cut: None })
     }
 
     /// Opens the recording at `path`, or what is whole of it if its writer did not come to the end of the file:
@@ -182,7 +185,7 @@ impl Recording {
             channels.entry(message.channel.id).or_insert((message.channel, 0)).1 += 1;
         }
         let topics = topics(&channels, path)?;
-        Ok(Self { path: path.to_owned(), content, topics, cut: Some(Cut { last_tick }) })
+        Ok(Self { path: path.to_owned(), content, channels, topics, cut: Some(Cut { last_tick }) })
     }
 
     /// How the file ends, where its writer did not finish it.
@@ -200,6 +203,11 @@ impl Recording {
     /// The bytes of the file.
     pub(crate) fn source(&self) -> Source<'_> {
         self.content.source()
+    }
+
+    /// The channels by their numbers.
+    pub(crate) fn channels(&self) -> &Channels {
+        &self.channels
     }
 
     /// The topics by name.
@@ -222,7 +230,14 @@ impl Recording {
     /// All messages in the order of the file: by tick, then by topic. A damaged chunk is an error in front of any
     /// of its messages; a recording that was cut ends in front of it.
     pub fn messages(&self) -> impl Iterator<Item = Result<Record, RecordingError>> {
-        let messages = Messages::of(self.source());
+        self.whole(Messages::of(self.source()))
+    }
+
+    /// These messages, as far as the recording is whole.
+    pub(crate) fn whole<'a>(
+        &'a self,
+        messages: Messages<'a>,
+    ) -> impl Iterator<Item = Result<Record, RecordingError>> + use<'a> {
         let is_whole = |message: &Result<_, Damage>| match message {
             Ok(_) => true,
             Err(damage) => self.cut.is_none() || damage.is_refused,
@@ -251,15 +266,16 @@ impl Recording {
         })
     }
 
-    /// The attachments: name and content; none of a recording that was cut, which has no index of them.
+    /// The attachments: name and content. Of a recording that was cut, which has no index of them, those in front of its
+    /// first message: where ours are.
     ///
     /// # Errors
     /// If the file is damaged.
     pub fn attachments(&self) -> Result<Vec<(String, Vec<u8>)>, RecordingError> {
-        if self.cut.is_some() {
-            return Ok(Vec::new());
-        }
         let broken = |damage| RecordingError::content(&self.path, damage);
+        if self.cut.is_some() {
+            return leading_attachments(self.source()).map_err(broken);
+        }
         let summary = summary(self.source()).map_err(broken)?;
         let attachments = summary.iter().flat_map(|summary| &summary.attachments);
         attachments.map(|index| attachment(self.source(), index).map_err(broken)).collect()

@@ -15,12 +15,14 @@ use vehicles::Vehicle;
 pub struct Attached {
     /// The manifest with all that it includes.
     manifest: Table,
+    /// The same file by file: the included ones first.
+    tables: Vec<Table>,
     /// Texts by file names.
     files: Vec<(String, String)>,
 }
 
 impl Attached {
-    /// What is attached to a recording: nothing where it was cut off.
+    /// The files that are attached to a recording.
     ///
     /// # Errors
     /// If the recording is damaged.
@@ -38,11 +40,11 @@ impl Attached {
         let mut tables: Vec<Table> = tables.filter(is_of_manifest).collect();
         // The manifest comes first, and what stands in it counts before what it includes.
         tables.reverse();
-        let manifest = tables.into_iter().fold(Table::new(), |mut lower, upper| {
+        let manifest = tables.iter().cloned().fold(Table::new(), |mut lower, upper| {
             put(&mut lower, upper);
             lower
         });
-        Self { manifest, files }
+        Self { manifest, tables, files }
     }
 
     /// The names of the vehicles; none where the manifest has but one, without a name.
@@ -54,11 +56,25 @@ impl Attached {
     /// The body of the vehicle that is called `name`, empty where it has none; nothing where no file of it is attached.
     #[must_use]
     pub fn body(&self, name: &str) -> Option<Body> {
+        Body::of(&self.airframe(name)?)
+    }
+
+    /// The vehicle that is called `name`, empty where it has none, with the effects of its file; `None` where no file of it
+    /// is attached.
+    #[must_use]
+    pub fn airframe(&self, name: &str) -> Option<Airframe> {
         let vehicle = match self.file_of(name) {
             Some(file) => self.vehicle(&file),
             None => self.only_vehicle(),
         };
-        Body::of(&Airframe::from_files(vehicle?, &[]).ok()?)
+        Airframe::from_files(vehicle?, &[]).ok()
+    }
+
+    /// The tables of a list of the manifest, such as `pass`: those of the included files first.
+    #[must_use]
+    pub fn list(&self, key: &str) -> Vec<&Table> {
+        let lists = self.tables.iter().filter_map(|table| table.get(key)?.as_array());
+        lists.flatten().filter_map(Value::as_table).collect()
     }
 
     fn vehicles(&self) -> impl Iterator<Item = &Value> {
@@ -164,6 +180,16 @@ mod tests {
         let names = ["h1", "h2"].map(|name| found.body(name).unwrap().name);
         assert_eq!(names, ["AscTec Hummingbird", "another"]);
         assert!(found.body("h3").is_none(), "two are attached, and none is told to be its");
+    }
+
+    #[test]
+    fn lists_add_up_the_included_files_first() {
+        let manifest = "[process.plant]\nkind = \"plant\"\n[[pass]]\nname = \"second\"\n";
+        let included = "[process.imu]\nkind = \"imu\"\n[[pass]]\nname = \"first\"\n";
+        let found = attached(&[("run.toml", manifest), ("sensors.toml", included)]);
+        let names: Vec<_> = found.list("pass").iter().map(|pass| pass["name"].as_str().unwrap()).collect();
+        assert_eq!(names, ["first", "second"]);
+        assert!(found.list("swap").is_empty());
     }
 
     #[test]

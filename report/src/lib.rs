@@ -8,6 +8,7 @@
 //! | [`summary`] | all that there is to say about a run, as text and as JSON |
 //! | [`airframe`] | the body of a vehicle: what is seen of it, and what of it touches |
 //! | [`attached`] | the vehicles whose files a recording has attached |
+//! | [`topics`] | names of topics and of message types |
 //! | [`urdf`] | a vehicle as other tools show it |
 //! | [`plot`] | curves over time and paths in space, as a page, PNG or SVG |
 //! | [`profile`] | where the host time of ticks goes |
@@ -33,5 +34,6 @@ pub mod shadow;
 mod states;
 pub mod summary;
 pub mod top;
+pub mod topics;
 pub mod urdf;
 pub mod validate;

@@ -25,6 +25,7 @@ mod table;
 mod top;
 mod urdf;
 mod validate;
+mod view;
 
 use anyhow::Result;
 use clap::{Parser, Subcommand};
@@ -73,6 +74,9 @@ commands! {
     /// Draw a recording: a page with curves over time and the paths in space, or pictures of them.
     #[command(after_help = plot::HELP)]
     Plot(plot::PlotArguments) => plot::plot;
+    /// Show a recording in the browser: the vehicles in their room, and any field over time.
+    #[command(after_help = view::HELP)]
+    View(view::ViewArguments) => view::view;
     /// Write a vehicle's body as URDF, which Foxglove, Rerun and RViz show: what is seen, mass and inertia, what touches.
     #[command(after_help = urdf::HELP)]
     Urdf(urdf::UrdfArguments) => urdf::urdf;

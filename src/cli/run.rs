@@ -137,7 +137,7 @@ pub fn run(
         text += &format!("\n\n{profile}\n{}", lines.join("\n"));
     }
     if let Some(path) = &summary.recording {
-        text += &format!("\nto see it: {}", command("plot", path));
+        text += &format!("\nto plot it: {}\nto see it fly: {}", command("plot", path), command("view", path));
     }
     if arguments.json {
         print_json(&as_json(&summary, profile.as_ref(), &files)?)?;

@@ -36,6 +36,7 @@
 //! - [`scenarios`]: the thesis's scenarios and those beyond
 //! - [`scenes`]: ground, walls, rigs and other vehicles
 //! - [`judging`]: runs without a recording are judged in flight
+//! - [`view`]: recordings in the browser: address, end, refusals
 //! - [`inputs`]: files that are edited after they were read
 
 mod as_printed;
@@ -86,3 +87,4 @@ mod terminal;
 mod untrusted;
 mod urdf;
 mod validate;
+mod view;

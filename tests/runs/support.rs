@@ -302,6 +302,11 @@ impl Launch<'_> {
         });
     }
 
+    /// What it has printed so far.
+    pub fn output(&self) -> String {
+        fs::read_to_string(&self.output).unwrap_or_default()
+    }
+
     /// Whether it has ended.
     pub fn has_ended(&mut self) -> bool {
         self.status = self.status.or_else(|| self.child.try_wait().unwrap());

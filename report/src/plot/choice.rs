@@ -4,6 +4,7 @@ use crate::plot::field::Channel;
 use crate::plot::request::Request;
 use crate::plot::scene;
 use crate::plot::thin::{Line, Poses};
+use crate::topics::{self, is_of_shadow, short_name};
 use anyhow::{Context, Result, bail};
 use recorder::reader::{Recording, Topic};
 use serde::Serialize;
@@ -115,7 +116,7 @@ impl Ask {
 
     /// The vehicle whose topic it is; empty where it has no name.
     pub fn vehicle(&self) -> &str {
-        prefix(&self.topic)
+        topics::vehicle(&self.topic)
     }
 }
 
@@ -187,27 +188,12 @@ fn listed(names: &[String]) -> String {
     }
 }
 
-/// The last part of the name of a message of ours; nothing of others', which may be called the same.
-fn short_name(type_name: &str) -> &str {
-    type_name.strip_prefix("hummingbus_msgs/msg/").unwrap_or_default()
-}
-
-/// What stands in front of the process in the name of a topic: the vehicle, or nothing.
-fn prefix(topic: &str) -> &str {
-    let mut parts = topic.trim_start_matches('/').rsplitn(3, '/');
-    parts.nth(2).unwrap_or_default()
-}
-
-/// What a shadow publishes was not flown.
-fn is_of_shadow(topic: &str) -> bool {
-    topic.starts_with("/shadow/")
-}
-
 /// The vehicles by name, `h2` before `h10`.
 fn vehicles(recording: &Recording) -> Vec<String> {
     let makes_one = |topic: &Topic| MOVING[..2].contains(&short_name(&topic.type_name));
     let states = recording.topics().iter().filter(|(name, topic)| makes_one(topic) && !is_of_shadow(name));
-    let names: BTreeSet<_> = states.map(|(name, _)| (prefix(name).len(), prefix(name))).collect();
+    let names: BTreeSet<_> =
+        states.map(|(name, _)| (topics::vehicle(name).len(), topics::vehicle(name))).collect();
     let no_name = names.is_empty().then(String::new);
     names.into_iter().map(|(_, name)| name.to_owned()).chain(no_name).collect()
 }

@@ -36,6 +36,7 @@ use serde::Serialize;
 pub use drawing::Drawing;
 pub use picture::{PNG_MARK, SVG_MARK};
 pub use request::{Request, Span, View};
+pub use scene::{Solid, bodies_of, scene_of};
 
 /// A kind of file that shows a drawing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

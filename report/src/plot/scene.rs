@@ -1,8 +1,9 @@
 //! The scene of a recording, as what stands still in it is drawn: boxes, meshes and balls by their corners and edges.
 
+use nalgebra::Vector3;
 use recorder::RecordingError;
 use recorder::reader::Recording;
-use scenes::{Ball, Cuboid, Mesh, Scene, Thing};
+use scenes::{Ball, BodyPose, Cuboid, Mesh, Scene, Thing};
 use serde::Serialize;
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
@@ -100,6 +101,16 @@ impl Solid {
         Self { name: mesh.name.clone(), corners, faces, edges: mesh.edges(), is_box: false }
     }
 
+    /// The same along the axes of a body, from its centre of mass.
+    fn seen_from(mut self, pose: &BodyPose) -> Self {
+        let seen = |corner: &[f64; 3]| -> [f64; 3] {
+            pose.attitude_W.inverse_transform_vector(&(Vector3::from(*corner) - pose.position_W_m)).into()
+        };
+        self.corners = self.corners.iter().map(seen).collect();
+        self.edges = self.edges.iter().map(|edge| [seen(&edge[0]), seen(&edge[1])]).collect();
+        self
+    }
+
     /// What is seen of it along an axis: the closed outline of a box, or the edges of a mesh. `across` and `up` are the axes
     /// of the view.
     pub fn outlines(&self, across: usize, up: usize) -> Vec<Vec<(f64, f64)>> {
@@ -127,6 +138,17 @@ pub fn scene_of(recording: &Recording) -> Result<Vec<Solid>, RecordingError> {
     let Some(scene) = read_scene(recording)? else { return Ok(Vec::new()) };
     let still = scene.things().filter(|thing| thing.body().is_none());
     Ok(still.map(|thing| Solid::of(&thing)).collect())
+}
+
+/// The free bodies of a recording's scene, drawn along their own axes from their centres of mass, in the order of the
+/// numbers that `BodyStates` counts them by; none where it has no scene that can be read.
+///
+/// # Errors
+/// If the recording is damaged.
+pub fn bodies_of(recording: &Recording) -> Result<Vec<Solid>, RecordingError> {
+    let Some(scene) = read_scene(recording)? else { return Ok(Vec::new()) };
+    let bodies = scene.things().filter_map(|thing| Some(Solid::of(&thing).seen_from(&thing.body()?.start())));
+    Ok(bodies.collect())
 }
 
 /// What the free bodies of a recording's scene are called; none where it has no scene that can be read.

@@ -1,0 +1,117 @@
+//! A recording by time: any stretch of it is read without the rest.
+
+use crate::container::blocks::{Block, scanned};
+use crate::container::{Channels, Messages, summary};
+use crate::error::RecordingError;
+use crate::reader::{Record, Recording};
+use std::ops::Range;
+
+/// Blocks of a recording in the order of the file, and the times of their messages.
+///
+/// A block is a chunk of the file, or a mebibyte of messages that stand outside of chunks. A recording of ours has a block
+/// for each second or each mebibyte, whichever is less.
+///
+/// ```
+/// # use bus::{Message, announcement::Announcement, messages::SetPoint};
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("climb.mcap");
+/// # let mut writer = recorder::writer::RecordingWriter::create(&path)?;
+/// # let channel = writer.add_channel("/pilot/set_point", &Announcement::of(SetPoint::SCHEMA))?;
+/// # let cdr = [&[0, 1, 0, 0], bytemuck::bytes_of(&SetPoint::default())].concat();
+/// # for tick in 0..5000_u32 {
+/// #     writer.write(channel, tick, u64::from(tick) * 1_000_000, &cdr)?;
+/// #     if tick % 1000 == 999 { writer.flush()?; }
+/// # }
+/// # writer.finish()?;
+/// // Five seconds, a thousand set points in each.
+/// let recording = recorder::reader::Recording::open(&path)?;
+/// let index = recorder::index::Index::of(&recording)?;
+/// assert_eq!((index.len(), index.span_ns()), (5, Some([0, 4_999_000_000])));
+///
+/// let blocks = index.between(2_500_000_000, 3_500_000_000);
+/// assert_eq!(blocks, 2..4);
+/// assert_eq!(index.messages(&recording, 2).count(), 1000);
+/// assert_eq!(index.before("/pilot/set_point", 2), Some(1));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct Index {
+    blocks: Vec<Block>,
+    /// The latest time of each block and all before it: it grows even where the times of the blocks do not.
+    reached_ns: Vec<u64>,
+    channels: Channels,
+}
+
+impl Index {
+    /// The index of a recording: from its summary, or by going through its records.
+    ///
+    /// # Errors
+    /// If the file is damaged.
+    pub fn of(recording: &Recording) -> Result<Self, RecordingError> {
+        let broken = |damage| RecordingError::content(recording.path(), damage);
+        let (source, is_cut) = (recording.source(), recording.cut().is_some());
+        let summary = if is_cut { None } else { summary(source).map_err(broken)? };
+        let mut blocks: Vec<Block> = match summary.and_then(|summary| summary.chunks) {
+            Some(chunks) => chunks.iter().map(Block::listed).collect(),
+            None => scanned(source, is_cut).map_err(broken)?,
+        };
+        blocks.sort_by_key(|block| block.at);
+        let reached = |latest: &mut u64, block: &Block| {
+            *latest = block.span_ns[1].max(*latest);
+            Some(*latest)
+        };
+        let reached_ns = blocks.iter().scan(0, reached).collect();
+        Ok(Self { blocks, reached_ns, channels: recording.channels().clone() })
+    }
+
+    /// Number of blocks.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.blocks.len()
+    }
+
+    /// True if the recording has no message.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.blocks.is_empty()
+    }
+
+    /// Times of the earliest and the latest message, in ns; `None` without messages.
+    #[must_use]
+    pub fn span_ns(&self) -> Option<[u64; 2]> {
+        let first = self.blocks.iter().map(|block| block.span_ns[0]).min()?;
+        Some([first, *self.reached_ns.last()?])
+    }
+
+    /// Blocks from the first to the last one with messages between two times; others may lie between these where the file
+    /// is not in the order of time.
+    #[must_use]
+    pub fn between(&self, from_ns: u64, to_ns: u64) -> Range<usize> {
+        let first = self.reached_ns.partition_point(|reached_ns| *reached_ns < from_ns);
+        let is_earlier = |block: &Block| block.span_ns[0] <= to_ns;
+        let end = self.blocks[first..].iter().rposition(is_earlier).map_or(first, |last| first + last + 1);
+        first..end
+    }
+
+    /// The last block in front of `block` with a message of `topic`; `None` without one. Where the file does not list the
+    /// topics of its blocks, that is the one in front of it.
+    #[must_use]
+    pub fn before(&self, topic: &str, block: usize) -> Option<usize> {
+        let is_of_topic = |id: &u16| self.channels.get(id).is_some_and(|(channel, _)| channel.topic == topic);
+        let has = |block: &Block| block.channels.as_ref().is_none_or(|ids| ids.iter().any(is_of_topic));
+        self.blocks.get(..block)?.iter().rposition(has)
+    }
+
+    /// The messages of one block, in the order of the file. A damaged chunk is an error in front of any of its messages; a
+    /// recording that was cut ends in front of it.
+    ///
+    /// # Panics
+    /// If there is no such block.
+    pub fn messages<'a>(
+        &self,
+        recording: &'a Recording,
+        block: usize,
+    ) -> impl Iterator<Item = Result<Record, RecordingError>> + use<'a> {
+        recording.whole(Messages::within(recording.source(), &self.blocks[block], &self.channels))
+    }
+}

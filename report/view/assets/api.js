@@ -1,0 +1,29 @@
+// Questions to the server. Addresses are relative: that of the page holds the token.
+
+async function answered(response) {
+  if (!response.ok) throw new Error((await response.text()).trim() || `the server answered ${response.status}`);
+  return response;
+}
+
+async function numbers(path, request, signal) {
+  const body = JSON.stringify(request);
+  const headers = { "content-type": "application/json" };
+  const response = await answered(await fetch(path, { method: "POST", headers, body, signal }));
+  const values = new Float64Array(await response.arrayBuffer());
+  return { values, read: Number(response.headers.get("x-read")) };
+}
+
+/** All that is known of the recordings before values are asked for. */
+export async function catalogue() {
+  return (await answered(await fetch("api/catalogue"))).json();
+}
+
+/** The newest values at `count` times from `from_ns` on, `step_ns` apart: time after time, a value for each of the fields. */
+export async function frames(request, signal) {
+  return (await numbers("api/frames", request, signal)).values;
+}
+
+/** Two values for each of `bins` intervals between two times, field after field; and the part of the recording read for it. */
+export function curves(request, signal) {
+  return numbers("api/curves", request, signal);
+}

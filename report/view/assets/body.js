@@ -1,0 +1,185 @@
+// A vehicle as it is seen: its body with rotors that turn, arrows of thrust, beams of its sensor, and what was asked of it.
+
+import * as THREE from "./vendor/three.min.js";
+
+const PAINTS = { front: 0xd55e00, "counter-clockwise": 0x0072b2, clockwise: 0x009e73 };
+const BEAMS = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, -1]];
+// A vehicle whose file the recording lacks is drawn with this reach.
+const REACH_M = 0.25;
+const VECTOR = ["x", "y", "z"];
+
+function geometry(shape) {
+  if (shape.box) return new THREE.BoxGeometry(...shape.box);
+  if (shape.ball) return new THREE.SphereGeometry(shape.ball, 12, 8);
+  const [radius, length] = shape.cylinder;
+  // Cylinders of three.js stand along y.
+  return new THREE.CylinderGeometry(radius, radius, length, 20).rotateX(Math.PI / 2);
+}
+
+/** The look of a part; that of the frame is coloured with the page. */
+function material(paint, ghost) {
+  const isDisc = paint.endsWith("clockwise");
+  if (ghost) return new THREE.MeshLambertMaterial({ color: ghost, transparent: true, opacity: isDisc ? 0.15 : 0.45, depthWrite: false });
+  const seen = isDisc ? { transparent: true, opacity: 0.3, depthWrite: false } : {};
+  return new THREE.MeshLambertMaterial({ color: PAINTS[paint] ?? 0x808080, ...seen });
+}
+
+function arrow(colour) {
+  const made = new THREE.ArrowHelper(new THREE.Vector3(0, 0, 1), new THREE.Vector3(), 0.1, colour, 0.03, 0.02);
+  made.visible = false;
+  return made;
+}
+
+export class VehicleBody {
+  /** `ghost` is the colour of a vehicle of another recording, null of the first's. */
+  constructor(vehicle, columns, colour, ghost) {
+    Object.assign(this, { vehicle, colour, name: vehicle.name, reach: vehicle.body?.reach_m ?? REACH_M });
+    this.group = new THREE.Group();
+    this.world = new THREE.Group();
+    this.propellers = [];
+    this.frames = [];
+    this.isGhost = ghost !== null;
+    this.isKnown = false;
+    this.#shape(ghost);
+    this.#find(columns);
+    this.#marks(colour);
+  }
+
+  #shape(ghost) {
+    const { body } = this.vehicle;
+    const unknown = { shape: { ball: 0.06 }, at_m: [0, 0, 0], roll_pitch_yaw_rad: [0, 0, 0], paint: "frame" };
+    for (const part of body?.parts ?? [unknown]) {
+      const mesh = new THREE.Mesh(geometry(part.shape), material(part.paint, ghost));
+      mesh.position.set(...part.at_m);
+      // About the fixed axes x, y and z, one after another.
+      mesh.rotation.set(...part.roll_pitch_yaw_rad, "ZYX");
+      this.group.add(mesh);
+      if (part.paint === "frame" && !ghost) this.frames.push(mesh.material);
+    }
+    this.axes = new THREE.AxesHelper(1.6 * this.reach);
+    this.group.add(this.axes);
+    for (const rotor of body?.rotors ?? []) this.#rotor(rotor, body.propeller_radius_m, ghost);
+  }
+
+  #rotor(rotor, radius, ghost) {
+    const hub = new THREE.Group();
+    hub.position.set(...rotor.at_m);
+    hub.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, 1), new THREE.Vector3(...rotor.axis));
+    const paint = ghost ?? (rotor.spin > 0 ? PAINTS["counter-clockwise"] : PAINTS.clockwise);
+    const blade = new THREE.Mesh(
+      new THREE.BoxGeometry(2 * radius, 0.14 * radius, 0.03 * radius),
+      new THREE.MeshLambertMaterial({ color: paint, transparent: ghost !== null, opacity: ghost === null ? 1 : 0.4 }),
+    );
+    const thrust = arrow(0xe69f00);
+    hub.add(blade, thrust);
+    this.group.add(hub);
+    this.propellers.push({ blade, thrust, spin: rotor.spin });
+  }
+
+  /** The places of the values that it needs. */
+  #find(columns) {
+    const { state, topics, rotor_speeds: count } = this.vehicle;
+    const vector = (topic, field) => columns.all(topic, VECTOR.map((axis) => `${field}.${axis}`));
+    const row = (topic, field, length) => columns.all(topic, Array.from({ length }, (_, index) => `${field}[${index}]`));
+    this.position = vector(state, "position");
+    this.attitude = columns.all(state, ["x", "y", "z", "w"].map((part) => `attitude.${part}`));
+    this.velocity = vector(state, "velocity");
+    this.speeds = count > 0 ? row(state, "rotor_speed", count) : null;
+    this.estimate = vector(topics.estimate, "position");
+    this.reference = vector(topics.reference, "position");
+    this.altitude = columns.all(topics.status, ["altitude_set_point"]) ?? columns.all(topics.set_point, ["altitude"]);
+    this.distances = row(topics.ranges, "distance", BEAMS.length);
+    this.hits = row(topics.ranges, "valid", BEAMS.length);
+  }
+
+  #marks(colour) {
+    const line = (points) => {
+      const made = new THREE.LineSegments(
+        new THREE.BufferGeometry().setFromPoints(points),
+        new THREE.LineBasicMaterial({ color: colour }),
+      );
+      made.frustumCulled = false;
+      made.visible = false;
+      return made;
+    };
+    const size = 0.6 * this.reach;
+    const cross = VECTOR.flatMap((_, axis) => [-size, size].map((end) => new THREE.Vector3().setComponent(axis, end)));
+    this.asked = line(cross);
+    // Pairs of corners: the end of each side begins the next.
+    const angles = Array.from({ length: 48 }, (_, index) => (Math.PI * Math.ceil(index / 2)) / 12);
+    this.level = line(angles.map((angle) => new THREE.Vector3(Math.cos(angle), Math.sin(angle), 0).multiplyScalar(1.5 * this.reach)));
+    this.believed = new THREE.Mesh(
+      new THREE.OctahedronGeometry(0.25 * this.reach),
+      new THREE.MeshBasicMaterial({ color: colour, wireframe: true }),
+    );
+    this.believed.visible = false;
+    this.beams = new THREE.LineSegments(
+      new THREE.BufferGeometry().setAttribute("position", new THREE.Float32BufferAttribute(new Float32Array(6 * BEAMS.length), 3)),
+      new THREE.LineBasicMaterial({ color: 0xcc3377, transparent: true, opacity: 0.7 }),
+    );
+    this.beams.frustumCulled = false;
+    this.beams.visible = false;
+    this.dots = BEAMS.map(() => new THREE.Mesh(new THREE.SphereGeometry(0.04, 8, 6), new THREE.MeshBasicMaterial({ color: 0xcc3377 })));
+    for (const dot of this.dots) dot.visible = false;
+    this.group.add(this.beams, ...this.dots);
+    this.world.add(this.asked, this.level, this.believed);
+  }
+
+  /** Moves to the values of `row`; `turnS` is the simulated time that passed since the last. */
+  update(row, turnS, shown) {
+    // Of a ghost the body alone is shown: the rest would be taken for the other's.
+    const layers = this.isGhost ? {} : shown;
+    const at = (places) => places?.map((place) => row[place]);
+    const position = at(this.position);
+    this.isKnown = position?.every(Number.isFinite) ?? false;
+    this.group.visible = this.isKnown;
+    this.world.visible = this.isKnown;
+    if (!this.isKnown) return;
+    this.group.position.set(...position);
+    const attitude = at(this.attitude);
+    if (attitude?.every(Number.isFinite)) this.group.quaternion.set(...attitude).normalize();
+    this.axes.visible = layers.axes ?? false;
+    this.#turn(at(this.speeds), turnS, layers.thrust);
+    this.#measure(at(this.distances), at(this.hits), layers.beams);
+    this.#ask(at(this.reference), at(this.altitude)?.[0], position, layers.asked);
+    const estimate = at(this.estimate);
+    this.believed.visible = Boolean(layers.estimate && estimate?.every(Number.isFinite));
+    if (this.believed.visible) this.believed.position.set(...estimate);
+  }
+
+  #turn(speeds, turnS, hasThrust) {
+    const { body } = this.vehicle;
+    this.propellers.forEach(({ blade, thrust, spin }, index) => {
+      const speed = speeds?.[index];
+      const isKnown = Number.isFinite(speed);
+      if (isKnown) blade.rotation.z = (blade.rotation.z + spin * speed * turnS) % (2 * Math.PI);
+      // Carrying its part of the weight, a rotor has an arrow as long as the vehicle's reach.
+      const share = isKnown ? (body.thrust_coefficient * speed * speed * this.propellers.length) / body.weight_N : 0;
+      const length = share * this.reach;
+      thrust.visible = Boolean(hasThrust && length > 0.02);
+      if (thrust.visible) thrust.setLength(length, Math.min(0.25 * this.reach, length), 0.12 * this.reach);
+    });
+  }
+
+  #measure(distances, hits, isShown) {
+    const isSeen = isShown && distances !== undefined;
+    this.beams.visible = isSeen && distances.every(Number.isFinite);
+    const places = this.beams.geometry.attributes.position;
+    BEAMS.forEach((beam, index) => {
+      const isHit = this.beams.visible && hits?.[index] === 1;
+      // A beam that meets nothing is drawn short: its reach would hide the room.
+      const length = this.beams.visible ? (isHit ? distances[index] : Math.min(distances[index], 2 * this.reach)) : 0;
+      places.setXYZ(2 * index + 1, ...beam.map((part) => part * length));
+      this.dots[index].visible = isHit;
+      if (isHit) this.dots[index].position.set(...beam.map((part) => part * length));
+    });
+    places.needsUpdate = true;
+  }
+
+  #ask(reference, altitude, position, isShown) {
+    this.asked.visible = Boolean(isShown && reference?.every(Number.isFinite));
+    if (this.asked.visible) this.asked.position.set(...reference);
+    this.level.visible = Boolean(isShown && !this.asked.visible && Number.isFinite(altitude));
+    if (this.level.visible) this.level.position.set(position[0], position[1], altitude);
+  }
+}

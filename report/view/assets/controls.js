@@ -1,0 +1,106 @@
+// Buttons, slider and keys of time, and the choices of the camera.
+
+import { PACES } from "./playback.js";
+import { LAYERS } from "./room.js";
+
+const get = (id) => document.getElementById(id);
+
+function option(value, text) {
+  return Object.assign(document.createElement("option"), { value, textContent: text });
+}
+
+/** A time as people read it: seconds, from a minute on with minutes, from an hour on with hours. */
+export function timeText(seconds, decimals) {
+  const [hours, minutes] = [Math.floor(seconds / 3600), Math.floor(seconds / 60) % 60];
+  const rest = seconds.toFixed(decimals);
+  if (seconds < 60) return `${rest} s`;
+  const part = (seconds % 60).toFixed(decimals).padStart(decimals ? decimals + 3 : 2, "0");
+  return hours ? `${hours}:${String(minutes).padStart(2, "0")}:${part}` : `${minutes}:${part}`;
+}
+
+export class TimeControls {
+  constructor(playback, startS) {
+    Object.assign(this, { playback, startS, slider: get("slider") });
+    this.decimals = Math.min(Math.max(Math.ceil(-Math.log10(playback.tickNs * 1e-9)), 0), 6);
+    this.slider.max = Math.max(Math.round(playback.durationNs / playback.tickNs), 1);
+    get("pace").append(...PACES.map((pace) => option(pace, `×${pace}`)));
+    get("pace").value = playback.pace;
+    get("clock").children[1].textContent = ` of ${timeText(startS + playback.durationNs * 1e-9, 1)}`;
+    this.#listen();
+    this.#keys();
+    playback.onChange(() => this.#show());
+    this.#show();
+  }
+
+  #listen() {
+    const { playback, slider } = this;
+    slider.addEventListener("input", () => playback.seek(slider.value * playback.tickNs));
+    get("play").addEventListener("click", () => playback.toggle());
+    get("back").addEventListener("click", () => playback.step(-1));
+    get("forward").addEventListener("click", () => playback.step(1));
+    get("pace").addEventListener("change", (event) => playback.setPace(Number(event.target.value)));
+  }
+
+  #keys() {
+    const { playback } = this;
+    const ticksOfSecond = Math.max(Math.round(1e9 / playback.tickNs), 1);
+    const paceAt = (step) => PACES[Math.min(Math.max(PACES.indexOf(playback.pace) + step, 0), PACES.length - 1)];
+    const keys = {
+      " ": () => playback.toggle(),
+      ArrowLeft: ({ shiftKey }) => playback.step(shiftKey ? -ticksOfSecond : -1),
+      ArrowRight: ({ shiftKey }) => playback.step(shiftKey ? ticksOfSecond : 1),
+      Home: () => playback.seek(0),
+      End: () => playback.seek(playback.durationNs),
+      "-": () => playback.setPace(paceAt(-1)),
+      "+": () => playback.setPace(paceAt(1)),
+    };
+    document.addEventListener("keydown", (event) => {
+      const { target } = event;
+      // These do something of their own with keys. A button does with the space bar alone, the slider with all but it.
+      const isTyping = target.closest("select, dialog, summary, input:not([type=range])");
+      const isOwn = event.key === " " ? target.closest("button") : target === this.slider;
+      if (isTyping || isOwn || event.ctrlKey || event.altKey || event.metaKey || !keys[event.key]) return;
+      event.preventDefault();
+      keys[event.key](event);
+    });
+  }
+
+  #show() {
+    const { playback, slider } = this;
+    const seconds = this.startS + playback.timeNs * 1e-9;
+    const text = timeText(seconds, this.decimals);
+    slider.value = Math.round(playback.timeNs / playback.tickNs);
+    slider.setAttribute("aria-valuetext", text);
+    get("clock").children[0].textContent = text;
+    get("play").textContent = playback.isPlaying ? "Pause" : "Play";
+    get("pace").value = playback.pace;
+  }
+}
+
+/** The choices of camera, vehicle and layers; `changed` hears that something else is to be shown. */
+export function cameraControls(room, changed) {
+  const [mode, vehicle] = [get("camera-mode"), get("camera-vehicle")];
+  vehicle.append(...room.vehicles.map((body, index) => option(index, body.label)));
+  get("camera-vehicle-label").hidden = room.vehicles.length < 2;
+  get("camera").hidden = false;
+  if (room.vehicles.length === 0) mode.replaceChildren(option("free", "free"));
+  const change = () => {
+    room.setMode(mode.value, Number(vehicle.value) || 0);
+    changed();
+  };
+  mode.addEventListener("change", change);
+  vehicle.addEventListener("change", () => {
+    room.hasSeen = false;
+    change();
+  });
+  for (const [key, [text]] of Object.entries(LAYERS)) {
+    const box = Object.assign(document.createElement("input"), { type: "checkbox", checked: room.layers[key] });
+    box.addEventListener("change", () => {
+      room.layers[key] = box.checked;
+      changed();
+    });
+    const label = document.createElement("label");
+    label.append(box, ` ${text}`);
+    get("layer-list").append(label);
+  }
+}

@@ -1,0 +1,128 @@
+// The page: reads the catalogue, and ties time, room and scopes together.
+
+import { catalogue } from "./api.js";
+import { cameraControls, TimeControls } from "./controls.js";
+import { Columns, Feed } from "./feed.js";
+import { Picker } from "./picker.js";
+import { Playback } from "./playback.js";
+import { Room } from "./room.js";
+import { defaultPlots, Scopes } from "./scopes.js";
+
+const state = document.getElementById("state");
+// Kept for people at the console and for tests.
+const shown = { timeNs: null, vehicles: [], frames: 0, isFlat: false, scopesDrawn: false };
+window.hummingbus = { shown };
+
+/** Says what went wrong or what goes on; each speaker has one text at a time. */
+const texts = new Map();
+function teller(speaker) {
+  return (text) => {
+    texts.set(speaker, text);
+    const said = [...texts.values()].filter(Boolean).join(" ");
+    if (state.textContent !== said) state.textContent = said;
+  };
+}
+
+/** The plots that the address names, or those that the recordings start with. */
+function plotsOf(recordings) {
+  try {
+    const named = JSON.parse(decodeURIComponent(location.hash.slice(1)));
+    return named.plots.map((plot) => plot.map(([recording, topic, field]) => ({ recording, topic, field })));
+  } catch {
+    return defaultPlots(recordings);
+  }
+}
+
+/** Names of vehicles as they are told apart, the recording's where there are two. */
+function label(room, recordings) {
+  for (const body of room.vehicles) {
+    const recording = recordings.length > 1 ? recordings[body.recording].name : "";
+    body.label = [body.name, recording].filter(Boolean).join(" of ") || body.vehicle.body?.name || body.vehicle.state;
+  }
+}
+
+/** The list of vehicles with their places. */
+function legend(room) {
+  const lines = room.vehicles.slice(0, 12).map((body) => {
+    const line = document.createElement("div");
+    const swatch = Object.assign(document.createElement("span"), { className: "swatch" });
+    swatch.style.background = body.colour;
+    const place = document.createElement("span");
+    line.append(swatch, body.label, place);
+    return { body, line, place };
+  });
+  document.getElementById("legend").replaceChildren(...lines.map(({ line }) => line));
+  document.getElementById("legend").hidden = lines.length === 0;
+  return () => {
+    for (const { body, place } of lines) {
+      const { x, y, z } = body.group.position;
+      place.textContent = body.isKnown ? `x ${x.toFixed(2)}  y ${y.toFixed(2)}  z ${z.toFixed(2)} m` : "not there yet";
+    }
+  };
+}
+
+function head(recordings) {
+  const names = recordings.map(({ name }) => name).join(" against ");
+  document.getElementById("title").textContent = names;
+  document.title = `${names} · hummingbus view`;
+  const notes = recordings.flatMap((recording) => recording.notes);
+  const list = document.getElementById("notes");
+  list.hidden = notes.length === 0;
+  list.replaceChildren(...notes.map((note) => Object.assign(document.createElement("li"), { textContent: note })));
+}
+
+async function start() {
+  const { recordings } = await catalogue();
+  head(recordings);
+  const durationNs = Math.max(...recordings.map((recording) => recording.duration_ns));
+  const playback = new Playback(durationNs, recordings[0].tick_ns ?? 1e6);
+  const columns = recordings.map((recording) => new Columns(recording));
+  const asked = new URLSearchParams(location.search);
+  const options = { flat: asked.has("flat") };
+  const room = new Room(document.getElementById("space"), recordings, columns, options);
+  label(room, recordings);
+  const feeds = recordings.map((recording, number) => new Feed(number, recording, columns[number].fields, teller(`values ${number}`)));
+  const note = document.getElementById("room-note");
+  note.hidden = !room.isFlat;
+  note.textContent = "This browser has no WebGL: the room is painted plainly.";
+  const places = legend(room);
+  let isStale = true;
+  cameraControls(room, () => (isStale = true));
+  new TimeControls(playback, recordings[0].start_s);
+  const picker = new Picker(recordings);
+  const keep = (plots) => history.replaceState(null, "", `#${encodeURIComponent(JSON.stringify({ plots }))}`);
+  const scopes = new Scopes(recordings, playback, picker, plotsOf(recordings), { tell: teller("scopes"), changed: keep });
+  playback.onChange(() => (isStale = true));
+  Object.assign(window.hummingbus, { playback, room, scopes });
+  shown.isFlat = room.isFlat;
+
+  const show = () => {
+    const rows = feeds.map((feed) => feed.row(playback));
+    if (rows.every(Boolean)) {
+      isStale = playback.isPlaying;
+      shown.timeNs = rows[0].timeNs;
+    }
+    room.update(rows, feeds.map((feed) => Math.min(playback.timeNs, feed.durationNs)));
+    places();
+    shown.vehicles = room.vehicles.map(({ name, recording, group, isKnown }) => (
+      { name, recording, isKnown, position: group.position.toArray(), attitude: group.quaternion.toArray() }));
+    scopes.showTime();
+  };
+  playback.seek((Number(asked.get("t")) - recordings[0].start_s) * 1e9 || 0);
+  let last = performance.now();
+  const frame = (now) => {
+    playback.pass(now - last);
+    last = now;
+    if (isStale) show();
+    if (room.draw()) shown.frames += 1;
+    shown.scopesDrawn = scopes.isDrawn ?? false;
+    requestAnimationFrame(frame);
+  };
+  requestAnimationFrame(frame);
+}
+
+start().catch((error) => {
+  state.textContent = `The page cannot show this: ${error.message}`;
+  state.className = "wrong";
+  window.hummingbus.error = String(error.stack ?? error);
+});

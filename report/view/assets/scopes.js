@@ -1,0 +1,365 @@
+// Scopes: fields over time, several to a plot, all plots over the same window.
+
+import { curves } from "./api.js";
+import { Feed } from "./feed.js";
+import { curveColour, onTheme, pageColour } from "./palette.js";
+import uPlot from "./vendor/uplot.min.js";
+
+const HEIGHT = 150;
+const CALM_MS = 60;
+// While the overview is being made, it is asked for again.
+const AGAIN_MS = 700;
+const VALUES_MS = 150;
+const DEGREES = 180 / Math.PI;
+const SYNC = "hummingbus";
+
+/** Unit and factor of a field as people read it: angles in degrees, rotor speeds in revolutions a minute. */
+function readable({ path, unit }) {
+  if (unit === "rad") return { unit: "deg", factor: DEGREES };
+  if (unit !== "rad/s") return { unit, factor: 1 };
+  return path.startsWith("rotor_speed") ? { unit: "rpm", factor: 30 / Math.PI } : { unit: "deg/s", factor: DEGREES };
+}
+
+const clipped = (text, length) => (text.length > length ? `${text.slice(0, length - 1)}…` : text);
+
+/** The plots that a recording starts with. */
+export function defaultPlots(recordings) {
+  const [first] = recordings;
+  const has = (recording, topic, field) => recording.topics.find(({ name }) => name === topic)?.fields.some(({ path }) => path === field);
+  const plot = (topic, fields) => recordings.flatMap((recording, number) =>
+    fields.filter((field) => has(recording, topic, field)).map((field) => ({ recording: number, topic, field })));
+  const vehicle = first.vehicles[0];
+  if (!vehicle) return first.topics.slice(0, 3).map(({ name, fields }) => plot(name, fields.slice(0, 3).map(({ path }) => path)));
+  const { state, topics, rotor_speeds: count } = vehicle;
+  const rotors = Array.from({ length: count }, (_, index) => `rotor_speed[${index}]`);
+  const beams = [0, 1, 2, 3, 4].map((index) => `distance[${index}]`);
+  return [
+    [...plot(state, ["position.x", "position.y", "position.z"]), ...plot(topics.status ?? topics.set_point, ["altitude_set_point", "altitude"])],
+    plot(state, ["attitude.roll", "attitude.pitch", "attitude.yaw"]),
+    topics.ranges ? plot(topics.ranges, beams) : plot(state, ["velocity.x", "velocity.y", "velocity.z"]),
+    plot(state, rotors),
+  ].filter((fields) => fields.length > 0);
+}
+
+/** One plot: its curves, and the names and values above them. */
+class Plot {
+  constructor(scopes, fields) {
+    this.scopes = scopes;
+    this.root = document.createElement("div");
+    this.root.className = "plot";
+    this.head = document.createElement("div");
+    this.head.className = "plot-head";
+    this.edit = Object.assign(document.createElement("button"), { type: "button", textContent: "Edit" });
+    this.edit.addEventListener("click", () => scopes.edit(this));
+    this.area = document.createElement("div");
+    this.root.append(this.head, this.edit, this.area);
+    this.set(fields);
+  }
+
+  set(fields) {
+    const { recordings } = this.scopes;
+    this.curves = fields.flatMap((field) => {
+      const topic = recordings[field.recording]?.topics.find(({ name }) => name === field.topic);
+      const known = topic?.fields.find(({ path }) => path === field.field);
+      return known ? [{ ...field, ...readable(known) }] : [];
+    });
+    // The same field of another recording has the same colour, and is dashed.
+    const is = (one) => (other) => one.topic === other.topic && one.field === other.field;
+    const names = this.curves.filter((curve, index) => this.curves.findIndex(is(curve)) === index);
+    for (const curve of this.curves) curve.colour = names.findIndex(is(curve));
+    this.#heading();
+    this.build();
+  }
+
+  #heading() {
+    const units = [...new Set(this.curves.map(({ unit }) => unit))];
+    const topics = new Set(this.curves.map(({ topic }) => topic));
+    this.values = this.curves.map((curve) => {
+      const dash = document.createElement("span");
+      dash.className = curve.recording > 0 ? "dash ghost" : "dash";
+      dash.style.borderColor = curveColour(curve.colour);
+      const value = Object.assign(document.createElement("span"), { className: "value" });
+      const name = Object.assign(document.createElement("span"), { className: "name", title: `${curve.topic} ${curve.field}` });
+      const unit = units.length > 1 && curve.unit ? ` [${clipped(curve.unit, 16)}]` : "";
+      name.append(dash, `${clipped(topics.size > 1 ? `${curve.topic} ${curve.field}` : curve.field, 60)}${unit}`, value);
+      return { name, value };
+    });
+    const topic = Object.assign(document.createElement("span"), { className: "unit" });
+    const unit = units.length === 1 && units[0] ? ` [${clipped(units[0], 16)}]` : "";
+    topic.textContent = topics.size === 1 ? `${clipped([...topics][0], 60)}${unit}` : unit.trim();
+    this.head.replaceChildren(topic, ...this.values.map(({ name }) => name));
+    this.edit.setAttribute("aria-label", `Edit the plot of ${this.curves.map(({ field }) => field).join(", ")}`);
+  }
+
+  /** Makes the drawing anew: for other curves, another width or other colours. */
+  build() {
+    this.drawing?.destroy();
+    this.area.replaceChildren();
+    const width = Math.floor(this.area.clientWidth || this.root.clientWidth - 14);
+    if (width < 50) return;
+    const { scopes } = this;
+    const axis = { stroke: pageColour("faint"), grid: { stroke: pageColour("line"), width: 1 }, ticks: { stroke: pageColour("line"), width: 1 }, font: "11px system-ui" };
+    const series = this.curves.map((curve) => ({
+      stroke: curveColour(curve.colour), width: 1.25, dash: curve.recording > 0 ? [5, 4] : undefined, spanGaps: true, points: { show: false },
+    }));
+    const options = {
+      width, height: HEIGHT, legend: { show: false }, padding: [8, 12, 0, 0],
+      cursor: { sync: { key: SYNC }, drag: { x: true, y: false, setScale: false }, points: { show: false } },
+      scales: { x: { time: false, range: () => scopes.windowS() }, y: { range: (plot, low, high) => this.#range(low, high) } },
+      axes: [{ ...axis, size: 26 }, { ...axis, size: 54 }],
+      series: [{}, ...series],
+      hooks: { draw: [(plot) => this.#marks(plot)], setSelect: [(plot) => this.#selected(plot)] },
+    };
+    this.drawing = new uPlot(options, [[], ...this.curves.map(() => [])], this.area);
+    this.now = document.createElement("div");
+    this.now.style.cssText = `position:absolute;top:0;bottom:0;width:1px;pointer-events:none;background:${pageColour("accent")}`;
+    this.drawing.over.append(this.now);
+    this.drawing.over.addEventListener("dblclick", () => scopes.zoom(null));
+    this.#clicks();
+    this.bins = Math.max(Math.round((width - 66) / 1.5), 20);
+  }
+
+  /** A click that is no drag goes to its time. */
+  #clicks() {
+    const { over } = this.drawing;
+    let downX = null;
+    over.addEventListener("mousedown", (event) => (downX = event.clientX));
+    over.addEventListener("click", (event) => {
+      if (downX === null || Math.abs(event.clientX - downX) > 3) return;
+      this.scopes.seekS(this.drawing.posToVal(event.clientX - over.getBoundingClientRect().left, "x"));
+    });
+  }
+
+  #selected(plot) {
+    const { left, width } = plot.select;
+    if (width < 4) return;
+    this.scopes.zoom([left, left + width].map((place) => plot.posToVal(place, "x")));
+    plot.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
+  }
+
+  #range(low, high) {
+    if (!Number.isFinite(low) || !Number.isFinite(high)) return [-1, 1];
+    const room = 0.06 * (high - low) || 0.05 * Math.abs(high) || 1;
+    return [low - room, high + room];
+  }
+
+  /** Draws limits of pass conditions on these fields, and swaps. */
+  #marks(plot) {
+    const { ctx: context, bbox } = plot;
+    const [x, y] = [(seconds) => plot.valToPos(seconds, "x", true), (value) => plot.valToPos(value, "y", true)];
+    context.save();
+    context.beginPath();
+    context.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+    context.clip();
+    context.lineWidth = devicePixelRatio;
+    context.setLineDash([4 * devicePixelRatio, 3 * devicePixelRatio]);
+    for (const mark of this.scopes.marks) {
+      if (mark.kind === "swap") this.#line(context, pageColour("ink"), [x(mark.from_s), bbox.top], [x(mark.from_s), bbox.top + bbox.height]);
+      const factor = mark.kind === "pass" ? this.#factorOf(mark) : null;
+      if (factor === null) continue;
+      const [from, to] = [x(mark.from_s), x(mark.to_s ?? this.scopes.endS)];
+      for (const limit of [mark.min, mark.max].filter((limit) => limit !== null)) {
+        this.#line(context, pageColour("warn"), [from, y(limit * factor)], [to, y(limit * factor)]);
+      }
+    }
+    context.restore();
+  }
+
+  #line(context, colour, from, to) {
+    context.strokeStyle = colour;
+    context.beginPath();
+    context.moveTo(...from);
+    context.lineTo(...to);
+    context.stroke();
+  }
+
+  /** From the unit of a condition to that of the curve it limits; null where no curve is of its field. */
+  #factorOf({ topic, field, unit }) {
+    const curve = this.curves.find((other) => other.recording === 0 && other.topic === topic && other.field === field);
+    if (!curve) return null;
+    if (unit === curve.unit) return 1;
+    if (unit === "rad" && curve.unit === "deg") return DEGREES;
+    return unit === "rad/s" && curve.unit === "deg/s" ? DEGREES : null;
+  }
+
+  /** Reads the curves of the window; the part of the recordings that was read for them. */
+  async read(fromNs, toNs, signal) {
+    if (!this.drawing || this.curves.length === 0) return 1;
+    const { bins } = this;
+    const numbers = [...new Set(this.curves.map(({ recording }) => recording))];
+    let least = 1;
+    const lines = this.curves.map(() => []);
+    await Promise.all(numbers.map(async (recording) => {
+      const mine = this.curves.map((curve, index) => ({ ...curve, index })).filter((curve) => curve.recording === recording);
+      const fields = mine.map(({ topic, field }) => ({ topic, field }));
+      const { values, read } = await curves({ recording, from_ns: fromNs, to_ns: toNs, bins, fields }, signal);
+      least = Math.min(least, read);
+      mine.forEach(({ index, factor }, place) => {
+        const line = values.subarray(2 * bins * place, 2 * bins * (place + 1));
+        lines[index] = Array.from(line, (value) => (Number.isNaN(value) ? null : value * factor));
+      });
+    }));
+    const stepS = ((toNs - fromNs) * 1e-9) / bins;
+    const startS = this.scopes.startS + fromNs * 1e-9;
+    const times = Array.from({ length: 2 * bins }, (_, index) => startS + stepS * (Math.floor(index / 2) + (index % 2 ? 0.75 : 0.25)));
+    this.drawing.setData([times, ...lines]);
+    return least;
+  }
+
+  showTime(seconds) {
+    if (!this.drawing) return;
+    const place = this.drawing.valToPos(seconds, "x");
+    this.now.style.left = `${place}px`;
+    this.now.hidden = !(place >= 0 && place <= this.drawing.over.clientWidth);
+  }
+
+  showValues(rows, places) {
+    this.curves.forEach((curve, index) => {
+      const value = rows[curve.recording]?.[places(curve)];
+      const text = Number.isFinite(value) ? Number((value * curve.factor).toPrecision(5)).toString() : "–";
+      if (this.values[index].value.textContent !== text) this.values[index].value.textContent = text;
+    });
+  }
+}
+
+export class Scopes {
+  #timer = null;
+  #running = null;
+  #valuesAt = 0;
+
+  constructor(recordings, playback, picker, plots, { tell, changed }) {
+    Object.assign(this, { recordings, playback, picker, tell, changed, window: null, list: document.getElementById("plots") });
+    this.startS = recordings[0].start_s;
+    this.endS = this.startS + playback.durationNs * 1e-9;
+    this.marks = recordings[0].marks;
+    this.plots = [];
+    for (const fields of plots) this.#add(fields);
+    this.#feeds();
+    document.getElementById("add-plot").addEventListener("click", () => this.edit(null));
+    document.getElementById("whole").addEventListener("click", () => this.zoom(null));
+    onTheme(() => this.#rebuild());
+    let width = this.list.clientWidth;
+    new ResizeObserver(() => {
+      if (this.list.clientWidth === width) return;
+      width = this.list.clientWidth;
+      this.#rebuild();
+    }).observe(this.list);
+    this.refresh();
+  }
+
+  #add(fields) {
+    const plot = new Plot(this, []);
+    this.plots.push(plot);
+    this.list.append(plot.root);
+    plot.set(fields);
+    return plot;
+  }
+
+  /** Opens the choice of fields for a plot; for a new one without. */
+  edit(plot) {
+    const chosen = plot?.curves.map(({ recording, topic, field }) => ({ recording, topic, field })) ?? [];
+    this.picker.open(chosen, (fields) => {
+      if (fields.length === 0) this.#remove(plot);
+      else if (plot) plot.set(fields);
+      else this.#add(fields);
+      this.#feeds();
+      this.refresh();
+      this.changed(this.layout());
+    });
+  }
+
+  #remove(plot) {
+    if (!plot) return;
+    plot.drawing?.destroy();
+    plot.root.remove();
+    this.plots.splice(this.plots.indexOf(plot), 1);
+  }
+
+  layout() {
+    return this.plots.map(({ curves: shown }) => shown.map(({ recording, topic, field }) => [recording, topic, field]));
+  }
+
+  /** Feeds of the values at the time that is shown. */
+  #feeds() {
+    this.feeds = this.recordings.map((recording, number) => {
+      const shown = this.plots.flatMap(({ curves: all }) => all).filter((curve) => curve.recording === number);
+      const keys = [...new Map(shown.map(({ topic, field }) => [`${topic} ${field}`, { topic, field }])).values()];
+      return new Feed(number, recording, keys, this.tell);
+    });
+  }
+
+  windowS() {
+    const [from, to] = this.window ?? [this.startS, this.endS];
+    return to > from ? [from, to] : [from, from + 1e-3];
+  }
+
+  /** Shows a window of time, in seconds; all of it for null. */
+  zoom(window) {
+    if (window) {
+      const [from, to] = [Math.max(window[0], this.startS), Math.min(window[1], this.endS)];
+      if (to - from < 2e-9 * this.playback.tickNs) return;
+      this.window = [from, to];
+    } else {
+      this.window = null;
+    }
+    document.getElementById("whole").disabled = this.window === null;
+    this.refresh();
+  }
+
+  seekS(seconds) {
+    this.playback.seek((seconds - this.startS) * 1e9);
+  }
+
+  #rebuild() {
+    for (const plot of this.plots) plot.build();
+    this.refresh();
+  }
+
+  /** Reads all curves anew, soon. */
+  refresh(afterMs = CALM_MS) {
+    clearTimeout(this.#timer);
+    this.#timer = setTimeout(() => this.#read(), afterMs);
+  }
+
+  async #read() {
+    this.#running?.abort();
+    this.#running = new AbortController();
+    const { signal } = this.#running;
+    const [from, to] = this.windowS();
+    const [fromNs, toNs] = [Math.max(Math.round((from - this.startS) * 1e9), 0), Math.round((to - this.startS) * 1e9) + 1];
+    try {
+      const parts = await Promise.all(this.plots.map((plot) => plot.read(fromNs, toNs, signal)));
+      const read = Math.min(1, ...parts);
+      this.tell(read < 1 ? `Reading the recording: ${Math.floor(100 * read)} %` : "");
+      if (read < 1) this.refresh(AGAIN_MS);
+      this.isDrawn = true;
+      this.showTime();
+    } catch (error) {
+      if (error.name !== "AbortError") this.tell(error.message);
+    }
+  }
+
+  /** Moves the line of time, and the window where it runs out of it. */
+  showTime() {
+    const seconds = this.startS + this.playback.timeNs * 1e-9;
+    if (this.window && this.playback.isPlaying && (seconds > this.window[1] || seconds < this.window[0])) {
+      const span = this.window[1] - this.window[0];
+      this.zoom([seconds, seconds + span]);
+    }
+    for (const plot of this.plots) plot.showTime(seconds);
+    this.#showValues();
+  }
+
+  #showValues() {
+    const now = performance.now();
+    if (this.playback.isPlaying && now - this.#valuesAt < VALUES_MS) return;
+    const still = { timeNs: this.playback.timeNs, isPlaying: false };
+    const rows = this.feeds.map((feed) => (feed.fields.length > 0 ? feed.row(still)?.values : undefined));
+    if (rows.every((row, number) => !row && this.feeds[number].fields.length > 0)) return;
+    this.#valuesAt = now;
+    for (const plot of this.plots) {
+      plot.showValues(rows, ({ recording, topic, field }) =>
+        this.feeds[recording].fields.findIndex((other) => other.topic === topic && other.field === field));
+    }
+  }
+}

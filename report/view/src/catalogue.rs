@@ -1,0 +1,92 @@
+//! The catalogue: all that the page needs to know before it asks for values.
+
+use crate::fields::Field;
+use crate::marks::marks;
+use crate::shown::Shown;
+use crate::vehicles::vehicles;
+use anyhow::Result;
+use report::attached::Attached;
+use report::plot::{bodies_of, scene_of};
+use report::topics::{short_name, vehicle};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+
+/// What the page needs to know of a recording: name, span, topics with the fields that `fields` lists, vehicles, scene and
+/// marks.
+///
+/// # Errors
+/// If the recording is damaged.
+pub fn catalogue(shown: &Shown, fields: &BTreeMap<String, Vec<Field>>) -> Result<Value> {
+    let recording = shown.recording();
+    let attached = Attached::to(recording)?;
+    let tick_ns = tick_ns(shown)?;
+    let vehicles = vehicles(recording, fields, &attached);
+    Ok(json!({
+        "name": shown.name(),
+        "start_s": shown.start_ns() as f64 * 1e-9,
+        "duration_ns": shown.duration_ns(),
+        "tick_ns": tick_ns,
+        "blocks": shown.block_count(),
+        "notes": notes(shown, vehicles.is_empty()),
+        "topics": topics(shown, fields),
+        "vehicles": vehicles,
+        "scene": scene_of(recording)?,
+        "bodies": bodies(shown, fields)?,
+        "marks": marks(&attached, tick_ns.map(|tick_ns| tick_ns as f64 * 1e-9)),
+    }))
+}
+
+fn topics(shown: &Shown, fields: &BTreeMap<String, Vec<Field>>) -> Vec<Value> {
+    let topics = shown.recording().topics().iter();
+    let with_fields = topics.filter_map(|(name, topic)| Some((name, topic, fields.get(name)?)));
+    let topic = with_fields.map(|(name, topic, fields)| {
+        json!({ "name": name, "type": topic.type_name, "messages": topic.message_count, "fields": fields })
+    });
+    topic.collect()
+}
+
+/// Free bodies of the scene, with the topic that says where they are.
+fn bodies(shown: &Shown, fields: &BTreeMap<String, Vec<Field>>) -> Result<Value> {
+    let mut topics = shown.recording().topics().iter();
+    let states = topics
+        .find(|(name, topic)| short_name(&topic.type_name) == "BodyStates" && fields.contains_key(*name))
+        .map(|(name, _)| name);
+    let Some(states) = states else { return Ok(Value::Null) };
+    Ok(json!({ "topic": states, "vehicle": vehicle(states), "solids": bodies_of(shown.recording())? }))
+}
+
+/// What people should know before they look.
+fn notes(shown: &Shown, has_no_vehicle: bool) -> Vec<String> {
+    let mut notes = Vec::new();
+    if let Some(cut) = shown.recording().cut() {
+        let end = cut
+            .last_tick
+            .map_or("no message is whole".to_owned(), |tick| format!("the last whole tick is {tick}"));
+        notes.push(format!("{} was cut off: {end}. The page shows what is whole.", shown.name()));
+    }
+    if has_no_vehicle {
+        notes.push(format!(
+            "{} has no state of a vehicle: no topic of type PlantState, MeasuredState or StateEstimate. The room shows \
+             the scene alone; the scopes show every topic.",
+            shown.name()
+        ));
+    }
+    notes
+}
+
+/// Time of a tick: that between the first two messages with different ticks, divided by these; `None` where that is no
+/// whole number of ns, as in recordings of others.
+fn tick_ns(shown: &Shown) -> Result<Option<u64>> {
+    let mut first = None;
+    for block in 0..shown.block_count().min(8) {
+        for record in shown.messages(block) {
+            let record = record?;
+            let (tick, time_ns) = *first.get_or_insert((record.tick, record.time_ns));
+            if record.tick > tick && record.time_ns > time_ns {
+                let (ticks, span_ns) = (u64::from(record.tick - tick), record.time_ns - time_ns);
+                return Ok(span_ns.is_multiple_of(ticks).then_some(span_ns / ticks));
+            }
+        }
+    }
+    Ok(None)
+}

@@ -1,0 +1,36 @@
+//! Recordings in the browser: a server on the loopback, and the page that it serves.
+//!
+//! | room | what it holds |
+//! |---|---|
+//! | [`shown`] | a recording that is shown, with its index by time |
+//! | [`fields`] | the fields of its topics, and messages read for some of them |
+//! | [`frames`] | the newest values at evenly spaced times, as the room shows them |
+//! | [`curves`] | the lowest and highest values in intervals of time, as scopes draw them |
+//! | [`overview`] | the same over the whole recording, read once in the background |
+//! | [`catalogue`] | all that the page needs to know before it asks for values |
+//! | `vehicles`, `marks` | the vehicles of a recording; its swaps and pass conditions |
+//! | `assets` | the files of the page, part of this program |
+//! | `gate` | requests that are let in |
+//! | [`server`] | the server: addresses and their answers |
+//! | [`browser`] | the user's browser |
+//!
+//! Times that the page sends and gets are nanoseconds since the recording's first message.
+#![forbid(unsafe_code)]
+
+mod assets;
+pub mod browser;
+pub mod catalogue;
+pub mod curves;
+pub mod fields;
+pub mod frames;
+mod gate;
+mod marks;
+pub mod overview;
+pub mod server;
+pub mod shown;
+#[cfg(test)]
+mod tests;
+mod vehicles;
+
+pub use server::Server;
+pub use shown::Shown;

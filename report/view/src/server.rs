@@ -1,0 +1,219 @@
+//! The server: addresses and their answers.
+//!
+//! | address | answer |
+//! |---|---|
+//! | `GET  /token=…/` | the page |
+//! | `GET  /token=…/assets/NAME` | a file of the page |
+//! | `GET  /token=…/api/catalogue` | JSON: the recordings ([`crate::catalogue`]) |
+//! | `POST /token=…/api/frames` | numbers: [`crate::frames`] |
+//! | `POST /token=…/api/curves` | numbers: [`crate::curves`]; the header `x-read` holds the part that was read for them |
+//!
+//! Numbers are 64-bit floats, little-endian, one after the other. It listens on the loopback alone, and answers requests
+//! that name it and know its token; all others get 403.
+
+use crate::assets::{PAGE, asset};
+use crate::catalogue::catalogue;
+use crate::curves::{CurvesRequest, curves};
+use crate::fields::fields;
+use crate::frames::{FramesRequest, frames};
+use crate::gate::Gate;
+use crate::overview::Overview;
+use crate::shown::Shown;
+use anyhow::{Context as _, Result, anyhow};
+use axum::extract::{DefaultBodyLimit, Path, Request, State};
+use axum::http::{HeaderName, HeaderValue, StatusCode, header};
+use axum::middleware::{Next, from_fn_with_state};
+use axum::response::{IntoResponse, Response};
+use axum::routing::{get, post};
+use axum::{Json, Router};
+use serde_json::{Value, json};
+use std::net::{Ipv4Addr, TcpListener};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// Bytes of a request: fields by their names.
+const BODY_BYTES_MAX: usize = 1 << 20;
+/// Requests that read recordings at the same time.
+const READERS: usize = 4;
+/// Pause between two looks for the end.
+const LOOK: Duration = Duration::from_millis(50);
+/// Time that answers under way have at the end.
+const LEAVE: Duration = Duration::from_millis(500);
+
+/// Headers of every answer: no other page embeds or reads it, nothing but the page's own files runs in it, and its address
+/// is told to nobody.
+const HEADERS: [(HeaderName, &str); 5] = [
+    (
+        header::CONTENT_SECURITY_POLICY,
+        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; \
+         base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+    ),
+    (header::REFERRER_POLICY, "no-referrer"),
+    (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+    (HeaderName::from_static("cross-origin-resource-policy"), "same-origin"),
+    (header::CACHE_CONTROL, "no-store"),
+];
+
+/// A server that shows recordings.
+#[derive(Debug)]
+pub struct Server {
+    listener: TcpListener,
+    content: Arc<Content>,
+}
+
+/// What the server answers from.
+#[derive(Debug)]
+struct Content {
+    gate: Gate,
+    recordings: Vec<Entry>,
+    catalogue: Value,
+    readers: tokio::sync::Semaphore,
+}
+
+#[derive(Debug)]
+struct Entry {
+    shown: Shown,
+    overview: Overview,
+}
+
+impl Server {
+    /// A server for these recordings at a port of the loopback; at any free one for port 0.
+    ///
+    /// # Errors
+    /// If a recording is damaged or the port is taken.
+    pub fn new(recordings: Vec<Shown>, port: u16) -> Result<Self> {
+        let mut entries = Vec::new();
+        let mut told = Vec::new();
+        for shown in recordings {
+            let fields = fields(&shown)?;
+            told.push(catalogue(&shown, &fields)?);
+            entries.push(Entry { shown, overview: Overview::new(fields) });
+        }
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).with_context(|| {
+            format!("cannot listen at port {port} of 127.0.0.1: name another one with --port, or leave it out for any free one")
+        })?;
+        listener.set_nonblocking(true)?;
+        let gate =
+            Gate::new(listener.local_addr()?.port()).map_err(|error| anyhow!("no random token: {error}"))?;
+        let readers = tokio::sync::Semaphore::new(READERS);
+        let content =
+            Content { gate, recordings: entries, catalogue: json!({ "recordings": told }), readers };
+        Ok(Self { listener, content: Arc::new(content) })
+    }
+
+    /// The address of the page, with its token.
+    #[must_use]
+    pub fn address(&self) -> String {
+        self.content.gate.address()
+    }
+
+    /// Serves the page until `is_ended`.
+    ///
+    /// # Errors
+    /// If the system refuses threads.
+    pub fn serve(self, is_ended: &dyn Fn() -> bool) -> Result<()> {
+        let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_io().build()?;
+        let listener = {
+            let _entered = runtime.enter();
+            tokio::net::TcpListener::from_std(self.listener)?
+        };
+        let routes = routes(self.content.clone());
+        runtime.spawn(async move { axum::serve(listener, routes).await });
+        let (content, is_over) = (self.content, AtomicBool::new(false));
+        std::thread::scope(|scope| {
+            scope.spawn(|| read_overviews(&content, &is_over));
+            while !is_ended() {
+                std::thread::sleep(LOOK);
+            }
+            is_over.store(true, Ordering::Relaxed);
+        });
+        runtime.shutdown_timeout(LEAVE);
+        Ok(())
+    }
+}
+
+/// Reads the recordings once. Damage ends the overview where it is: windows of it are refused with its place.
+fn read_overviews(content: &Content, is_over: &AtomicBool) {
+    for Entry { shown, overview } in &content.recordings {
+        let _ = overview.fill(shown, is_over);
+    }
+}
+
+fn routes(content: Arc<Content>) -> Router {
+    Router::new()
+        .route("/{token}/", get(|| async { ([(header::CONTENT_TYPE, "text/html; charset=utf-8")], PAGE) }))
+        .route("/{token}/assets/{*name}", get(file))
+        .route("/{token}/api/catalogue", get(told))
+        .route("/{token}/api/frames", post(answer_frames))
+        .route("/{token}/api/curves", post(answer_curves))
+        .layer(DefaultBodyLimit::max(BODY_BYTES_MAX))
+        .layer(from_fn_with_state(content.clone(), guard))
+        .with_state(content)
+}
+
+/// Lets in requests that the gate knows, and gives every answer its headers.
+async fn guard(State(content): State<Arc<Content>>, request: Request, next: Next) -> Response {
+    let host = request.headers().get(header::HOST).and_then(|host| host.to_str().ok());
+    let mut response = match content.gate.check(host, request.uri().path()) {
+        Ok(()) => next.run(request).await,
+        Err(refusal) => (StatusCode::FORBIDDEN, refusal.text()).into_response(),
+    };
+    for (name, value) in HEADERS {
+        response.headers_mut().insert(name, HeaderValue::from_static(value));
+    }
+    response
+}
+
+async fn file(Path((_, name)): Path<(String, String)>) -> Response {
+    match asset(&name) {
+        Some(asset) => ([(header::CONTENT_TYPE, asset.media)], asset.content).into_response(),
+        None => (StatusCode::NOT_FOUND, "there is no such file\n").into_response(),
+    }
+}
+
+async fn told(State(content): State<Arc<Content>>) -> Json<Value> {
+    Json(content.catalogue.clone())
+}
+
+async fn answer_frames(State(content): State<Arc<Content>>, Json(request): Json<FramesRequest>) -> Response {
+    reading(content, request.recording, move |entry| Ok((frames(&entry.shown, &request)?, 1.0))).await
+}
+
+async fn answer_curves(State(content): State<Arc<Content>>, Json(request): Json<CurvesRequest>) -> Response {
+    reading(content, request.recording, move |entry| {
+        let found = curves(&entry.shown, &entry.overview, &request)?;
+        Ok((found.values, found.read))
+    })
+    .await
+}
+
+/// The answer to a request that reads a recording: on a thread of its own, since files are read there.
+async fn reading(
+    content: Arc<Content>,
+    recording: usize,
+    read: impl FnOnce(&Entry) -> Result<(Vec<f64>, f64)> + Send + 'static,
+) -> Response {
+    // The semaphore is never closed.
+    let _turn = content.readers.acquire().await;
+    let reader = content.clone();
+    let done = tokio::task::spawn_blocking(move || {
+        let count = reader.recordings.len();
+        let known = reader.recordings.get(recording);
+        read(
+            known
+                .with_context(|| format!("there is no recording {recording}, expected 0 to {}", count - 1))?,
+        )
+    });
+    match done.await {
+        Ok(Ok((values, part))) => {
+            let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
+            let kind = (header::CONTENT_TYPE, "application/octet-stream".to_owned());
+            ([kind, (HeaderName::from_static("x-read"), part.to_string())], bytes).into_response()
+        }
+        Ok(Err(error)) => (StatusCode::BAD_REQUEST, format!("{error:#}\n")).into_response(),
+        Err(_) => {
+            (StatusCode::INTERNAL_SERVER_ERROR, "reading ended by an error of the program\n").into_response()
+        }
+    }
+}

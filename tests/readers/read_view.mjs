@@ -1,0 +1,132 @@
+// Prints as JSON what a browser shows of recordings that `hummingbus view` serves.
+// Usage: read_view.mjs ADDRESS [no-webgl] [dark] [WIDTHxHEIGHT] [SCREENSHOT.png] [T_NS…]
+
+import { withPage } from "./browser.mjs";
+
+const [address, ...rest] = process.argv.slice(2);
+const screenshot = rest.find((word) => word.endsWith(".png"));
+const times = rest.filter((word) => /^\d+$/.test(word)).map(Number);
+const [width, height] = (rest.find((word) => /^\d+x\d+$/.test(word)) ?? "1280x900").split("x").map(Number);
+
+const refuseWebGl = () => {
+  const real = HTMLCanvasElement.prototype.getContext;
+  HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
+    return String(kind).includes("webgl") ? null : real.call(this, kind, ...more);
+  };
+};
+
+const isShown = (timeNs) => window.hummingbus.shown.timeNs === timeNs;
+
+/** The poses at a time that was gone to. */
+async function poses(page, timeNs) {
+  await page.evaluate((time) => window.hummingbus.playback.seek(time), timeNs);
+  await page.waitForFunction(isShown, {}, timeNs);
+  return page.evaluate(() => structuredClone(window.hummingbus.shown.vehicles));
+}
+
+/** The colours of the room that cover more than a few dots. */
+async function colours(page) {
+  return page.evaluate(() => {
+    const { canvas, room } = { canvas: window.hummingbus.room.canvas, room: window.hummingbus.room };
+    room.isStale = true;
+    room.draw();
+    const copy = Object.assign(document.createElement("canvas"), { width: 300, height: 200 });
+    const context = copy.getContext("2d");
+    context.drawImage(canvas, 0, 0, 300, 200);
+    const dots = new Uint32Array(context.getImageData(0, 0, 300, 200).data.buffer);
+    const count = new Map();
+    for (const dot of dots) count.set(dot, (count.get(dot) ?? 0) + 1);
+    return [...count.values()].filter((dots) => dots > 5).length;
+  });
+}
+
+/** Keys alone: play, pause, step, end, home. */
+async function keys(page) {
+  const time = () => page.evaluate(() => window.hummingbus.playback.timeNs);
+  await page.evaluate(() => document.activeElement?.blur());
+  await page.keyboard.press("Home");
+  const home = await time();
+  await page.keyboard.press("ArrowRight");
+  await page.keyboard.press("ArrowRight");
+  const stepped = await time();
+  await page.keyboard.press("ArrowLeft");
+  const back = await time();
+  await page.keyboard.press("Space");
+  await page.waitForFunction((from) => window.hummingbus.playback.timeNs > from + 3e8 && window.hummingbus.shown.timeNs > from, {}, back);
+  await page.keyboard.press("Space");
+  const paused = await time();
+  await new Promise((resolve) => setTimeout(resolve, 200));
+  const still = await time();
+  await page.keyboard.press("End");
+  const end = await time();
+  await page.keyboard.press("Home");
+  return { home, stepped, back, paused, still, end };
+}
+
+/** Zooms a plot with the mouse and goes back with a double click; the windows in seconds. */
+async function zoom(page) {
+  const over = await page.$(".plot .u-over");
+  await over.scrollIntoView();
+  const box = await over.boundingBox();
+  const at = (part) => [box.x + part * box.width, box.y + box.height / 2];
+  await page.mouse.move(...at(0.25));
+  await page.mouse.down();
+  await page.mouse.move(...at(0.5), { steps: 5 });
+  await page.mouse.up();
+  await page.waitForFunction(() => window.hummingbus.scopes.window !== null);
+  const zoomed = await page.evaluate(() => window.hummingbus.scopes.window);
+  await page.click("#whole");
+  await page.waitForFunction(() => window.hummingbus.scopes.window === null);
+  return zoomed;
+}
+
+/** Adds a plot of a field that is searched for, with the keyboard alone. */
+async function pick(page, words) {
+  const count = await page.evaluate(() => window.hummingbus.scopes.plots.length);
+  await page.focus("#add-plot");
+  await page.keyboard.press("Enter");
+  await page.waitForSelector("#picker[open]");
+  await page.keyboard.type(words);
+  await page.keyboard.press("Tab");
+  await page.keyboard.press("Space");
+  await page.focus("#picker-done");
+  await page.keyboard.press("Enter");
+  await page.waitForFunction((before) => window.hummingbus.scopes.plots.length > before, {}, count);
+  return page.evaluate(() => window.hummingbus.scopes.layout().at(-1));
+}
+
+/** Each plot's curves: names, how many points are drawn, the extremes. */
+function curvesShown() {
+  const spread = (line) => line.reduce(([low, high], value) => (value === null ? [low, high] : [Math.min(low, value), Math.max(high, value)]), [Infinity, -Infinity]);
+  return window.hummingbus.scopes.plots.map((plot) => plot.curves.map((curve, index) => {
+    const line = plot.drawing.data[index + 1];
+    return { recording: curve.recording, topic: curve.topic, field: curve.field, unit: curve.unit, points: line.filter((value) => value !== null).length, spread: spread(line) };
+  }));
+}
+
+const options = { before: rest.includes("no-webgl") ? refuseWebGl : undefined };
+const seen = await withPage(address, async (page, wrong) => {
+  const said = [];
+  page.on("console", (message) => message.type() === "error" && said.push(message.text()));
+  await page.setViewport({ width, height });
+  if (rest.includes("dark")) await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: "dark" }]);
+  await page.waitForFunction(() => window.hummingbus?.error || (window.hummingbus?.shown.timeNs !== null && window.hummingbus?.shown.scopesDrawn));
+  const error = await page.evaluate(() => window.hummingbus.error ?? null);
+  if (error) throw new Error(error);
+  const shown = [];
+  for (const timeNs of times) shown.push(await poses(page, timeNs));
+  const found = {
+    title: await page.$eval("#title", (title) => title.textContent),
+    notes: await page.$eval("#notes", (notes) => notes.textContent),
+    state: await page.$eval("#state", (state) => state.textContent),
+    isFlat: await page.evaluate(() => window.hummingbus.shown.isFlat),
+    overflow: await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth),
+    poses: shown,
+    colours: await colours(page),
+    plots: await page.evaluate(curvesShown),
+  };
+  if (screenshot) await page.screenshot({ path: screenshot });
+  Object.assign(found, { keys: await keys(page), zoomed: await zoom(page), picked: await pick(page, "plant/state position.z") });
+  return { ...found, wrong: [...wrong, ...said] };
+}, options);
+console.log(JSON.stringify(seen));

@@ -1,0 +1,151 @@
+//! A browser shows recordings that `hummingbus view` serves: the poses are the recording's, the room and the scopes are
+//! drawn, and keys alone do everything.
+
+use crate::{Flight, HUMMINGBUS, ROOT, laps, look, readers};
+use recorder::reader::Recording;
+use serde_json::{Value, json};
+use std::ffi::OsStr;
+use std::fs;
+use std::io::{BufRead as _, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use tempfile::TempDir;
+
+/// A server of recordings; dropping it ends it.
+struct View {
+    child: Child,
+    address: String,
+}
+
+impl View {
+    fn of(recordings: &[&Path]) -> Self {
+        let mut command = Command::new(HUMMINGBUS);
+        command.arg("view").args(recordings).arg("--no-open").stdout(Stdio::piped()).stderr(Stdio::null());
+        let mut child = command.spawn().unwrap();
+        let mut address = String::new();
+        BufReader::new(child.stdout.take().unwrap()).read_line(&mut address).unwrap();
+        Self { child, address: address.trim().to_owned() }
+    }
+
+    fn look(&self, readers: &Path, more: &[&str]) -> Value {
+        let arguments: Vec<&OsStr> =
+            std::iter::once(&*self.address).chain(more.iter().copied()).map(OsStr::new).collect();
+        let seen = look(readers, "read_view.mjs", &arguments);
+        assert_eq!((&seen["wrong"], &seen["state"], &seen["overflow"]), (&json!([]), &json!(""), &json!(0)));
+        seen
+    }
+}
+
+impl Drop for View {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// The numbers of `fields` on a topic at the newest sample at or before `time_ns`.
+fn at<const N: usize>(recording: &Recording, topic: &str, fields: [&str; N], time_ns: u64) -> [f64; N] {
+    let asked = fields.map(|field| (topic, field));
+    let series = recording.series(&asked).unwrap();
+    let index = series[0].time_ns.partition_point(|time| *time <= time_ns) - 1;
+    std::array::from_fn(|field| series[field].value[index])
+}
+
+/// The shown pose of a vehicle is that of the recording.
+fn require_pose(shown: &Value, recording: &Recording, topic: &str, time_ns: u64) {
+    let numbers = |key: &str| serde_json::from_value::<Vec<f64>>(shown[key].clone()).unwrap();
+    let position = at(recording, topic, ["position.x", "position.y", "position.z"], time_ns);
+    assert_eq!(numbers("position"), position, "{topic} at {time_ns} ns");
+    let attitude = at(recording, topic, ["attitude.x", "attitude.y", "attitude.z", "attitude.w"], time_ns);
+    let differ = numbers("attitude").iter().zip(attitude).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    // The page makes it a unit quaternion once more.
+    assert!(differ < 1e-12, "{topic} at {time_ns} ns: {shown} {attitude:?}");
+}
+
+/// The keys did what they are for, in a recording of ticks of `tick_ns` that ends at `end_ns`.
+fn require_keys(seen: &Value, tick_ns: f64, end_ns: f64) {
+    let time = |key: &str| seen["keys"][key].as_f64().unwrap();
+    assert_eq!((time("home"), time("stepped"), time("back")), (0.0, 2.0 * tick_ns, tick_ns));
+    assert!(time("paused") > 3e8 && time("paused") == time("still"), "{}", seen["keys"]);
+    assert_eq!(time("end"), end_ns);
+}
+
+const TIMES_NS: [u64; 3] = [0, 1_234_000_000, 1_999_000_000];
+
+#[test]
+fn a_browser_shows_the_poses_and_curves_of_a_flight_on_every_screen() {
+    let Some(readers) = readers() else { return };
+    let flight = Flight::shared();
+    let view = View::of(&[&flight.recording]);
+    let recording = Recording::open(&flight.recording).unwrap();
+    let times = TIMES_NS.map(|time| time.to_string());
+    for looks in [&["1280x900"][..], &["390x844", "dark"], &["1280x900", "no-webgl", "dark"]] {
+        let arguments: Vec<&str> = looks.iter().copied().chain(times.iter().map(String::as_str)).collect();
+        let seen = view.look(&readers, &arguments);
+        assert_eq!(
+            (&seen["title"], &seen["isFlat"]),
+            (&json!("hover.mcap"), &json!(looks.contains(&"no-webgl")))
+        );
+        for (poses, time_ns) in seen["poses"].as_array().unwrap().iter().zip(TIMES_NS) {
+            require_pose(&poses[0], &recording, "/plant/state", time_ns);
+        }
+        assert!(seen["colours"].as_u64().unwrap() > 8, "the room is drawn: {looks:?} {}", seen["colours"]);
+        require_keys(&seen, 1e6, 1.999e9);
+        require_curves(&seen, &recording);
+        // A quarter to a half of two seconds.
+        let zoomed: [f64; 2] = serde_json::from_value(seen["zoomed"].clone()).unwrap();
+        assert!((zoomed[0] - 0.5).abs() < 0.06 && (zoomed[1] - 1.0).abs() < 0.06, "{zoomed:?}");
+        assert_eq!(seen["picked"], json!([[0, "/plant/state", "position.z"]]));
+    }
+}
+
+/// The first plot has the positions, with the extremes of the recording.
+fn require_curves(seen: &Value, recording: &Recording) {
+    let curves = seen["plots"][0].as_array().unwrap();
+    let height = curves.iter().find(|curve| curve["field"] == "position.z").unwrap();
+    assert_eq!((&height["unit"], &height["topic"]), (&json!("m"), &json!("/plant/state")));
+    let values = &recording.series(&[("/plant/state", "position.z")]).unwrap()[0].value;
+    let spread = values
+        .iter()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(*value), high.max(*value)]);
+    assert_eq!(height["spread"], json!(spread));
+    assert!(height["points"].as_u64().unwrap() > 100, "{height}");
+}
+
+#[test]
+fn a_browser_shows_two_vehicles_in_their_room_and_another_recording_as_a_ghost() {
+    let Some(readers) = readers() else { return };
+    let laps = Laps::of(&["h1", "h2"]);
+    let other = Laps::of(&["h1"]);
+    let view = View::of(&[&laps.recording, &other.recording]);
+    let time_ns = u64::from(laps::SPIKE_TICK) * laps::TICK_NS;
+    let seen = view.look(&readers, &["1280x900", &time_ns.to_string()]);
+    assert_eq!(seen["title"], "laps.mcap against laps.mcap");
+    let poses = seen["poses"][0].as_array().unwrap();
+    let names: Vec<_> = poses.iter().map(|pose| (&pose["name"], &pose["recording"])).collect();
+    assert_eq!(names, [(&json!("h1"), &json!(0)), (&json!("h2"), &json!(0)), (&json!("h1"), &json!(1))]);
+    let recording = Recording::open(&laps.recording).unwrap();
+    require_pose(&poses[0], &recording, "/h1/plant/state", time_ns);
+    require_pose(&poses[1], &recording, "/h2/plant/state", time_ns);
+    require_pose(&poses[2], &Recording::open(&other.recording).unwrap(), "/h1/plant/state", time_ns);
+    // The sample that is elsewhere for one tick of sixty seconds is seen in the curve of both.
+    let heights = seen["plots"][0].as_array().unwrap().iter().filter(|curve| curve["field"] == "position.z");
+    let highest: Vec<f64> = heights.map(|curve| curve["spread"][1].as_f64().unwrap()).collect();
+    assert_eq!(highest, [laps::SPIKE_M, laps::SPIKE_M]);
+}
+
+/// A recording in which vehicles fly laps in a room.
+struct Laps {
+    recording: PathBuf,
+    _folder: TempDir,
+}
+
+impl Laps {
+    fn of(vehicles: &[&str]) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let recording = folder.path().join("laps.mcap");
+        let room = fs::read_to_string(Path::new(ROOT).join("scenes/room.toml")).unwrap();
+        laps::record(&recording, vehicles, Some(&room));
+        Self { recording, _folder: folder }
+    }
+}
