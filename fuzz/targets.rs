@@ -6,6 +6,7 @@
 
 use flights::FlightSet;
 use recorder::diff::first_difference;
+use recorder::index::Index;
 use recorder::reader::Recording;
 use scenes::Scene;
 use std::fmt::Display;
@@ -164,6 +165,11 @@ pub fn mcap(bytes: &[u8]) -> bool {
         let _ = first_difference(strict, salvaged);
     }
     if let Some(recording) = salvaged {
+        let _ = recording.attachments();
+        if let Ok(index) = Index::of(&recording) {
+            (0..index.len())
+                .for_each(|block| drop(index.messages(&recording, block).map_while(Result::ok).last()));
+        }
         recording.messages().map_while(Result::ok).for_each(|record| drop(recording.decode(&record)));
     }
     place.reads_log("mcap", "")

@@ -56,6 +56,12 @@ impl Index {
             None => scanned(source, is_cut).map_err(broken)?,
         };
         blocks.sort_by_key(|block| block.at);
+        // A chunk that is listed again and again would be read as often.
+        if let Some(pair) = blocks.windows(2).find(|pair| pair[1].at < pair[0].end) {
+            let reason =
+                format!("byte {}: expected a chunk behind the one at byte {}", pair[1].at, pair[0].at);
+            return Err(RecordingError::content(recording.path(), reason));
+        }
         let reached = |latest: &mut u64, block: &Block| {
             *latest = block.span_ns[1].max(*latest);
             Some(*latest)

@@ -8,6 +8,7 @@ use bus::schema::Schema;
 use proptest::prelude::*;
 use recorder::definition::Definition;
 use recorder::diff::first_difference;
+use recorder::index::Index;
 use recorder::reader::{Messages, Recording};
 use recorder::writer::{RecordingWriter, START};
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -161,12 +162,39 @@ fn read(bytes: &[u8]) -> Result<Option<usize>, TestCaseError> {
     prop_assert!(strict.is_err() || salvaged.is_ok(), "what opens can be salvaged");
     let count = salvaged.ok().map(|recording| {
         let _ = first_difference(&recording, &Recording::open(&whole).unwrap());
+        let _ = (recording.attachments(), by_blocks(&recording));
         let records = recording.messages().map_while(Result::ok);
         records.filter(|record| recording.decode(record).is_ok()).count()
     });
     let held = HELD_MAX.get() - before;
     prop_assert!(held < HELD_BYTES_MAX, "{held} bytes were held");
     Ok(count)
+}
+
+/// Reads a recording block by block: the number of messages, where its index can be read.
+fn by_blocks(recording: &Recording) -> Option<usize> {
+    let index = Index::of(recording).ok()?;
+    let of_block = |block: usize| index.messages(recording, block).map_while(Result::ok).count();
+    Some((0..index.len()).map(of_block).sum())
+}
+
+/// With the index of chunks, and without one: of a file whose end is missing, and of messages beside chunks.
+#[test]
+fn blocks_have_all_messages_and_a_cut_file_has_the_attachments_in_front_of_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("any.mcap");
+    let counts = |bytes: &[u8]| {
+        std::fs::write(&path, bytes).unwrap();
+        let recording = Recording::salvage(&path).unwrap();
+        let names = recording.attachments().unwrap().into_iter().map(|(name, _)| name);
+        (by_blocks(&recording).unwrap(), recording.messages().count(), names.collect::<Vec<_>>())
+    };
+    let attached = vec!["run.toml".to_owned()];
+    assert_eq!(counts(&WHOLE), (90, 90, attached.clone()));
+    assert_eq!(counts(&PLAIN), (20, 20, attached.clone()));
+    // Without the magic bytes at its end; PLAIN has its attachment behind the messages.
+    assert_eq!(counts(&WHOLE[..WHOLE.len() - 8]), (90, 90, attached));
+    assert_eq!(counts(&PLAIN[..PLAIN.len() - 8]), (20, 20, vec![]));
 }
 
 /// Text that looks like a definition.

@@ -1,10 +1,12 @@
 // Prints as JSON what a browser shows of recordings that `hummingbus view` serves.
-// Usage: read_view.mjs ADDRESS [no-webgl] [dark] [WIDTHxHEIGHT] [SCREENSHOT.png] [T_NS…]
+// Usage: read_view.mjs ADDRESS [no-webgl] [dark] [WIDTHxHEIGHT] [SCREENSHOT.png] [end=PID] [T_NS…]
+// `end` ends the server, to see what the page says then.
 
 import { withPage } from "./browser.mjs";
 
 const [address, ...rest] = process.argv.slice(2);
 const screenshot = rest.find((word) => word.endsWith(".png"));
+const server = Number(rest.find((word) => word.startsWith("end="))?.slice(4) ?? 0);
 const times = rest.filter((word) => /^\d+$/.test(word)).map(Number);
 const [width, height] = (rest.find((word) => /^\d+x\d+$/.test(word)) ?? "1280x900").split("x").map(Number);
 
@@ -95,6 +97,14 @@ async function pick(page, words) {
   return page.evaluate(() => window.hummingbus.scopes.layout().at(-1));
 }
 
+/** Ends the server; the words of the page about it. */
+async function lose(page) {
+  process.kill(server);
+  await page.evaluate(() => window.hummingbus.playback.step(7));
+  await page.waitForFunction(() => document.querySelector("#state").textContent.includes("does not answer"));
+  return page.$eval("#state", (state) => state.textContent);
+}
+
 /** Each plot's curves: names, how many points are drawn, the extremes. */
 function curvesShown() {
   const spread = (line) => line.reduce(([low, high], value) => (value === null ? [low, high] : [Math.min(low, value), Math.max(high, value)]), [Infinity, -Infinity]);
@@ -121,12 +131,15 @@ const seen = await withPage(address, async (page, wrong) => {
     state: await page.$eval("#state", (state) => state.textContent),
     isFlat: await page.evaluate(() => window.hummingbus.shown.isFlat),
     overflow: await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth),
+    images: await page.evaluate(() => document.images.length),
+    legend: await page.$eval("#legend", (legend) => legend.textContent),
     poses: shown,
     colours: await colours(page),
     plots: await page.evaluate(curvesShown),
   };
   if (screenshot) await page.screenshot({ path: screenshot });
   Object.assign(found, { keys: await keys(page), zoomed: await zoom(page), picked: await pick(page, "plant/state position.z") });
-  return { ...found, wrong: [...wrong, ...said] };
+  found.wrong = [...wrong, ...said];
+  return server ? { ...found, lost: await lose(page) } : found;
 }, options);
 console.log(JSON.stringify(seen));

@@ -134,6 +134,21 @@ fn a_browser_shows_two_vehicles_in_their_room_and_another_recording_as_a_ghost()
     assert_eq!(highest, [laps::SPIKE_M, laps::SPIKE_M]);
 }
 
+/// Names are those of whoever wrote the recording: they are text, whatever they look like.
+#[test]
+fn a_browser_shows_names_that_look_like_html_as_they_are_and_says_that_the_server_has_ended() {
+    let Some(readers) = readers() else { return };
+    let name = "<img src=x onerror=alert(1)>";
+    let laps = Laps::of(&[name]);
+    let view = View::of(&[&laps.recording]);
+    let seen = view.look(&readers, &["1280x900", "0", &format!("end={}", view.child.id())]);
+    assert_eq!((&seen["poses"][0][0]["name"], &seen["images"]), (&json!(name), &json!(0)));
+    assert!(seen["legend"].as_str().unwrap().starts_with(name), "{}", seen["legend"]);
+    assert_eq!(seen["plots"][0][0]["topic"], format!("/{name}/plant/state"));
+    // At the end of the server the page says what to do.
+    assert!(seen["lost"].as_str().unwrap().contains("Start it again"), "{}", seen["lost"]);
+}
+
 /// A recording in which vehicles fly laps in a room.
 struct Laps {
     recording: PathBuf,

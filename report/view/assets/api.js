@@ -1,6 +1,12 @@
 // Questions to the server. Addresses are relative: that of the page holds the token.
 
-async function answered(response) {
+const GONE = "The server does not answer: hummingbus view has ended. Start it again, and open its new address.";
+
+/** The answer of the server; an error with words for people without one. */
+async function answered(path, options) {
+  const response = await fetch(path, options).catch((error) => {
+    throw error.name === "AbortError" ? error : new Error(GONE);
+  });
   if (!response.ok) throw new Error((await response.text()).trim() || `the server answered ${response.status}`);
   return response;
 }
@@ -8,14 +14,14 @@ async function answered(response) {
 async function numbers(path, request, signal) {
   const body = JSON.stringify(request);
   const headers = { "content-type": "application/json" };
-  const response = await answered(await fetch(path, { method: "POST", headers, body, signal }));
+  const response = await answered(path, { method: "POST", headers, body, signal });
   const values = new Float64Array(await response.arrayBuffer());
   return { values, read: Number(response.headers.get("x-read")) };
 }
 
 /** All that is known of the recordings before values are asked for. */
 export async function catalogue() {
-  return (await answered(await fetch("api/catalogue"))).json();
+  return (await answered("api/catalogue")).json();
 }
 
 /** The newest values at `count` times from `from_ns` on, `step_ns` apart: time after time, a value for each of the fields. */

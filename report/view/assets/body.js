@@ -7,6 +7,9 @@ const BEAMS = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, -1]];
 // A vehicle whose file the recording lacks is drawn with this reach.
 const REACH_M = 0.25;
 const VECTOR = ["x", "y", "z"];
+// Directions of wall estimates along the heading, in the order of the message; a wall is drawn as a frame of this size.
+const WALLS_RAD = [0, Math.PI, Math.PI / 2, -Math.PI / 2];
+const WALL_M = 1;
 
 function geometry(shape) {
   if (shape.box) return new THREE.BoxGeometry(...shape.box);
@@ -88,6 +91,8 @@ export class VehicleBody {
     this.estimate = vector(topics.estimate, "position");
     this.reference = vector(topics.reference, "position");
     this.altitude = columns.all(topics.status, ["altitude_set_point"]) ?? columns.all(topics.set_point, ["altitude"]);
+    this.wallDistances = row(topics.walls, "distance", WALLS_RAD.length);
+    this.inSight = row(topics.walls, "in_sight", WALLS_RAD.length);
     this.distances = row(topics.ranges, "distance", BEAMS.length);
     this.hits = row(topics.ranges, "valid", BEAMS.length);
   }
@@ -119,10 +124,13 @@ export class VehicleBody {
     );
     this.beams.frustumCulled = false;
     this.beams.visible = false;
-    this.dots = BEAMS.map(() => new THREE.Mesh(new THREE.SphereGeometry(0.04, 8, 6), new THREE.MeshBasicMaterial({ color: 0xcc3377 })));
+    this.dots = BEAMS.map(() => new THREE.Mesh(new THREE.SphereGeometry(0.15 * this.reach, 8, 6), new THREE.MeshBasicMaterial({ color: 0xcc3377 })));
     for (const dot of this.dots) dot.visible = false;
+    const corners = [[-1, -1], [1, -1], [1, 1], [-1, 1]].map(([y, z]) => new THREE.Vector3(0, y, z).multiplyScalar(WALL_M / 2));
+    const sides = corners.flatMap((corner, index) => [corner, corners[(index + 1) % 4]]);
+    this.walls = WALLS_RAD.map(() => line([...sides, corners[0], corners[2], corners[1], corners[3]]));
     this.group.add(this.beams, ...this.dots);
-    this.world.add(this.asked, this.level, this.believed);
+    this.world.add(this.asked, this.level, this.believed, ...this.walls);
   }
 
   /** Moves to the values of `row`; `turnS` is the simulated time that passed since the last. */
@@ -142,6 +150,7 @@ export class VehicleBody {
     this.#turn(at(this.speeds), turnS, layers.thrust);
     this.#measure(at(this.distances), at(this.hits), layers.beams);
     this.#ask(at(this.reference), at(this.altitude)?.[0], position, layers.asked);
+    this.#sense(at(this.wallDistances), at(this.inSight), position, layers.walls);
     const estimate = at(this.estimate);
     this.believed.visible = Boolean(layers.estimate && estimate?.every(Number.isFinite));
     if (this.believed.visible) this.believed.position.set(...estimate);
@@ -156,7 +165,7 @@ export class VehicleBody {
       // Carrying its part of the weight, a rotor has an arrow as long as the vehicle's reach.
       const share = isKnown ? (body.thrust_coefficient * speed * speed * this.propellers.length) / body.weight_N : 0;
       const length = share * this.reach;
-      thrust.visible = Boolean(hasThrust && length > 0.02);
+      thrust.visible = Boolean(hasThrust && share > 0.05);
       if (thrust.visible) thrust.setLength(length, Math.min(0.25 * this.reach, length), 0.12 * this.reach);
     });
   }
@@ -174,6 +183,20 @@ export class VehicleBody {
       if (isHit) this.dots[index].position.set(...beam.map((part) => part * length));
     });
     places.needsUpdate = true;
+  }
+
+  /** Stands a frame where a wall is believed, upright, along the heading. */
+  #sense(distances, inSight, position, isShown) {
+    const ahead = new THREE.Vector3(1, 0, 0).applyQuaternion(this.group.quaternion);
+    const heading = Math.atan2(ahead.y, ahead.x);
+    this.walls.forEach((wall, index) => {
+      wall.visible = Boolean(isShown && inSight?.[index] === 1 && Number.isFinite(distances?.[index]));
+      if (!wall.visible) return;
+      const angle = heading + WALLS_RAD[index];
+      const [x, y, z] = position;
+      wall.position.set(x + distances[index] * Math.cos(angle), y + distances[index] * Math.sin(angle), z);
+      wall.rotation.z = angle;
+    });
   }
 
   #ask(reference, altitude, position, isShown) {

@@ -6,6 +6,8 @@ const FRAMES_OF_BLOCK = 120;
 const BLOCKS_KEPT = 40;
 // Frames a second of the viewer's.
 const RATE_HZ = 60;
+// Pause behind an answer that failed.
+const CALM_MS = 1000;
 
 /** The fields that are shown of a recording, each with its place in a row of values. */
 export class Columns {
@@ -72,6 +74,7 @@ export class Feed {
       return values;
     } catch (error) {
       this.tell(error.message);
+      await new Promise((resolve) => setTimeout(resolve, CALM_MS));
       return null;
     }
   }

@@ -8,9 +8,11 @@ import { curveColour, onTheme, pageColour } from "./palette.js";
 
 const PATH_POINTS = 3000;
 // A path that spreads over more blocks of the file is drawn around the time that is shown.
-const PATH_BLOCKS = 400;
+const PATH_BLOCKS = 200;
 const ABOARD = new THREE.Vector3(0.02, 0, 0.09);
 const AHEAD = new THREE.Vector3(1, 0, 0);
+// The first place of the camera, seen from a vehicle, in multiples of its reach.
+const FIRST_LOOK = new THREE.Vector3(-7, -7, 7);
 
 /** What is shown beside the bodies, and whether it is from the start. */
 export const LAYERS = {
@@ -19,6 +21,7 @@ export const LAYERS = {
   asked: ["set point", true],
   estimate: ["estimate", true],
   beams: ["range beams", true],
+  walls: ["wall estimates", true],
   axes: ["axes", true],
   grid: ["grid", true],
 };
@@ -30,7 +33,7 @@ export class Room {
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(50, 1, 0.02, 2000);
     this.camera.up.set(0, 0, 1);
-    this.camera.position.set(-2.2, -2.2, 2.2);
+    this.camera.position.set(-2, -2, 2);
     this.#renderer(flat);
     this.controls = new THREE.OrbitControls(this.camera, this.canvas);
     this.controls.addEventListener("change", () => (this.isStale = true));
@@ -90,11 +93,10 @@ export class Room {
     this.vehicles = [];
     this.recordings.forEach((recording, number) => {
       for (const vehicle of recording.vehicles) {
-        const colour = curveColour(this.vehicles.length);
-        const body = new VehicleBody(vehicle, columns[number], colour, number > 0 ? colour : null);
-        Object.assign(body, { recording: number, fields: columns[number].fields, path: this.#path(colour), pathSpan: null });
-        this.scene.add(body.group, body.world, body.path);
-        this.vehicles.push(body);
+        this.#vehicle(vehicle, number, columns[number], number > 0);
+        // What was measured flies beside what was simulated.
+        const measured = { ...vehicle, name: `${vehicle.name} measured`.trim(), state: vehicle.topics.measured, topics: {}, rotor_speeds: 0 };
+        if (measured.state) this.#vehicle(measured, number, columns[number], true);
       }
     });
     const { bodies } = this.recordings[0];
@@ -102,6 +104,14 @@ export class Room {
       position: columns[0].all(bodies.topic, ["x", "y", "z"].map((axis) => `position[${index}].${axis}`)),
       attitude: columns[0].all(bodies.topic, ["x", "y", "z", "w"].map((part) => `attitude[${index}].${part}`)),
     }));
+  }
+
+  #vehicle(vehicle, recording, columns, isGhost) {
+    const colour = curveColour(this.vehicles.length);
+    const body = new VehicleBody(vehicle, columns, colour, isGhost ? colour : null);
+    Object.assign(body, { recording, fields: columns.fields, path: this.#path(colour), pathSpan: null });
+    this.scene.add(body.group, body.world, body.path);
+    this.vehicles.push(body);
   }
 
   /** The path of a vehicle: all that was read of it, and above that what is flown by now. */
@@ -206,10 +216,11 @@ export class Room {
   /** Takes the camera along with a vehicle. */
   #follow(body, before, wasKnown) {
     if (this.mode === "free" && this.hasSeen) return;
-    const move = wasKnown && this.hasSeen ? body.group.position.clone().sub(before) : body.group.position.clone().sub(this.controls.target);
+    const { position } = body.group;
+    if (wasKnown && this.hasSeen) this.camera.position.add(position.clone().sub(before));
+    else this.camera.position.copy(FIRST_LOOK).multiplyScalar(body.reach).add(position);
     this.hasSeen = true;
-    this.controls.target.copy(body.group.position);
-    this.camera.position.add(move);
+    this.controls.target.copy(position);
   }
 
   async #trail(body, timesNs) {

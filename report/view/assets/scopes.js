@@ -32,9 +32,10 @@ export function defaultPlots(recordings) {
   if (!vehicle) return first.topics.slice(0, 3).map(({ name, fields }) => plot(name, fields.slice(0, 3).map(({ path }) => path)));
   const { state, topics, rotor_speeds: count } = vehicle;
   const rotors = Array.from({ length: count }, (_, index) => `rotor_speed[${index}]`);
+  const place = ["position.x", "position.y", "position.z"];
   const beams = [0, 1, 2, 3, 4].map((index) => `distance[${index}]`);
   return [
-    [...plot(state, ["position.x", "position.y", "position.z"]), ...plot(topics.status ?? topics.set_point, ["altitude_set_point", "altitude"])],
+    [...plot(state, place), ...plot(topics.measured, place), ...plot(topics.status ?? topics.set_point, ["altitude_set_point", "altitude"])],
     plot(state, ["attitude.roll", "attitude.pitch", "attitude.yaw"]),
     topics.ranges ? plot(topics.ranges, beams) : plot(state, ["velocity.x", "velocity.y", "velocity.z"]),
     plot(state, rotors),

@@ -11,7 +11,7 @@ use serde::Deserialize;
 
 /// Intervals of one request: of a wide screen.
 const BINS_MAX: usize = 8192;
-/// Windows over more blocks are answered by the overview: 64 blocks take about 0.2 s to read.
+/// Windows over more blocks are answered by the overview: a minute of a recording of ours, which has a block a second.
 const BLOCKS_MAX: usize = 64;
 
 /// A request of curves.
