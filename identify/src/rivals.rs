@@ -10,7 +10,7 @@ use rayon::prelude::*;
 const NEAR: f64 = 0.5;
 
 /// For an accepted candidate: the effects that would do as well in its place, of those that were anywhere near it when
-/// it was taken; alone, or with another effect that is declared to look like it.
+/// it was taken or are declared to look like it; alone, or with another that is declared to look like it.
 pub fn confounded(problem: &Problem, selection: &Selection, at: usize) -> Vec<&'static EffectKind> {
     let candidate = &selection.accepted[at];
     let mut others = selection.accepted.clone();
@@ -35,7 +35,9 @@ pub fn confounded(problem: &Problem, selection: &Selection, at: usize) -> Vec<&'
             .flat_map(|second| [first.kind, second.kind])
             .collect()
     };
-    near(selection, candidate).par_iter().flat_map_iter(of_first).collect()
+    let mut firsts = near(selection, candidate);
+    firsts.extend(seconds.iter().filter(|second| !firsts.contains(second)).copied().collect::<Vec<_>>());
+    firsts.par_iter().flat_map_iter(of_first).collect()
 }
 
 /// The candidates that are declared to look like `candidate`, of those that were not accepted.
