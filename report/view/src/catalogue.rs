@@ -27,6 +27,7 @@ pub fn catalogue(shown: &Shown, fields: &BTreeMap<String, Vec<Field>>) -> Result
         "duration_ns": shown.duration_ns(),
         "tick_ns": tick_ns,
         "blocks": shown.block_count(),
+        "is_growing": shown.is_growing(),
         "notes": notes(shown, vehicles.is_empty()),
         "topics": topics(shown, fields),
         "vehicles": vehicles,
