@@ -1,6 +1,6 @@
 //! A recording by time: any stretch of it is read without the rest.
 
-use crate::container::blocks::{Block, scanned};
+use crate::container::blocks::{Block, FIRST, scanned};
 use crate::container::{Channels, Messages, summary};
 use crate::error::RecordingError;
 use crate::reader::{Record, Recording};
@@ -53,7 +53,7 @@ impl Index {
         let summary = if is_cut { None } else { summary(source).map_err(broken)? };
         let mut blocks: Vec<Block> = match summary.and_then(|summary| summary.chunks) {
             Some(chunks) => chunks.iter().map(Block::listed).collect(),
-            None => scanned(source, is_cut).map_err(broken)?,
+            None => scanned(source, FIRST, is_cut).map_err(broken)?,
         };
         blocks.sort_by_key(|block| block.at);
         // A chunk that is listed again and again would be read as often.
@@ -62,12 +62,61 @@ impl Index {
                 format!("byte {}: expected a chunk behind the one at byte {}", pair[1].at, pair[0].at);
             return Err(RecordingError::content(recording.path(), reason));
         }
+        Ok(Self::of_blocks(blocks, recording))
+    }
+
+    fn of_blocks(blocks: Vec<Block>, recording: &Recording) -> Self {
         let reached = |latest: &mut u64, block: &Block| {
             *latest = block.span_ns[1].max(*latest);
             Some(*latest)
         };
         let reached_ns = blocks.iter().scan(0, reached).collect();
-        Ok(Self { blocks, reached_ns, channels: recording.channels().clone() })
+        Self { blocks, reached_ns, channels: recording.channels().clone() }
+    }
+
+    /// The recording that this is the index of, and its index, with all that its writer has added since; `None` where that
+    /// is nothing, or the writer has finished.
+    ///
+    /// ```
+    /// # use bus::{Message, announcement::Announcement, messages::SetPoint};
+    /// # use recorder::{index::Index, reader::Recording, writer::RecordingWriter};
+    /// # let folder = tempfile::tempdir()?;
+    /// # let path = folder.path().join("live.mcap");
+    /// # let cdr = [&[0, 1, 0, 0], bytemuck::bytes_of(&SetPoint::default())].concat();
+    /// let mut writer = RecordingWriter::create(&path)?;
+    /// let channel = writer.add_channel("/pilot/set_point", &Announcement::of(SetPoint::SCHEMA))?;
+    /// writer.write(channel, 0, 0, &cdr)?;
+    /// writer.flush()?;
+    /// let recording = Recording::salvage(&path)?;
+    /// let index = Index::of(&recording)?;
+    ///
+    /// writer.write(channel, 1, 1_000_000, &cdr)?;
+    /// assert!(index.grown(&recording)?.is_none(), "it is not in the file yet");
+    /// writer.finish()?;
+    /// let (recording, index) = index.grown(&recording)?.expect("one more block");
+    /// assert_eq!((index.len(), index.span_ns()), (2, Some([0, 1_000_000])));
+    /// assert_eq!((recording.topic("/pilot/set_point")?.message_count, recording.cut()), (2, None));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn grown(&self, recording: &Recording) -> Result<Option<(Recording, Self)>, RecordingError> {
+        if recording.cut().is_none() {
+            return Ok(None);
+        }
+        let Some(mut longer) = recording.longer()? else { return Ok(None) };
+        let broken = |damage| RecordingError::content(recording.path(), damage);
+        let from = self.blocks.last().map_or(FIRST, |block| block.end);
+        let mut added = scanned(longer.source(), from, true).map_err(broken)?;
+        added.truncate(longer.count(&added)?);
+        let is_finished = longer.cut().is_none();
+        let blocks: Vec<Block> = self.blocks.iter().cloned().chain(added).collect();
+        if blocks.len() == self.blocks.len() && !is_finished {
+            return Ok(None);
+        }
+        let index = Self::of_blocks(blocks, &longer);
+        Ok(Some((longer, index)))
     }
 
     /// Number of blocks.

@@ -2,7 +2,7 @@
 
 pub use crate::container::{Damage, Messages};
 
-use crate::container::blocks::leading_attachments;
+use crate::container::blocks::{Block, leading_attachments};
 use crate::container::{Channels, attachment, summary};
 use crate::definition::{Definition, Leaf};
 use crate::error::RecordingError;
@@ -26,7 +26,7 @@ pub struct Record {
 }
 
 /// A topic of a recording.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Topic {
     /// Three-part type name.
     pub type_name: String,
@@ -225,6 +225,38 @@ impl Recording {
             topic: topic.to_owned(),
             known: self.topics.keys().cloned().collect::<Vec<_>>().join(", "),
         })
+    }
+
+    /// The same recording of all bytes that its file has by now; `None` where these are no more.
+    pub(crate) fn longer(&self) -> Result<Option<Self>, RecordingError> {
+        let Content::File { file, length } = &self.content else { return Ok(None) };
+        let content = Content::of_file(file, &self.path)?;
+        if content.source().len() <= *length {
+            return Ok(None);
+        }
+        let (channels, topics) = (self.channels.clone(), self.topics.clone());
+        Ok(Some(Self { path: self.path.clone(), content, channels, topics, cut: self.cut.clone() }))
+    }
+
+    /// Counts the messages of `blocks`, which follow those that it has; returns how many of these blocks are whole.
+    pub(crate) fn count(&mut self, blocks: &[Block]) -> Result<usize, RecordingError> {
+        let (mut channels, mut whole) = (self.channels.clone(), 0);
+        for block in blocks {
+            let messages: Result<Vec<_>, _> = Messages::within(self.source(), block, &channels).collect();
+            let Ok(messages) = messages else { break };
+            for message in messages {
+                self.cut = self.cut.as_ref().map(|_| Cut { last_tick: Some(message.sequence) });
+                channels.entry(message.channel.id).or_insert((message.channel, 0)).1 += 1;
+            }
+            whole += 1;
+        }
+        // Its writer has finished it.
+        if summary(self.source()).is_ok_and(|summary| summary.is_some()) {
+            self.cut = None;
+        }
+        self.topics = topics(&channels, &self.path)?;
+        self.channels = channels;
+        Ok(whole)
     }
 
     /// All messages in the order of the file: by tick, then by topic. A damaged chunk is an error in front of any

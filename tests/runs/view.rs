@@ -21,11 +21,17 @@ fn address(launch: &Launch<'_>) -> String {
 
 /// The first line of the answer to a request for `path`.
 fn status(host: &str, path: &str) -> String {
+    answer(host, path).0.lines().next().unwrap_or_default().to_owned()
+}
+
+/// Head and body of the answer to a request for `path`.
+fn answer(host: &str, path: &str) -> (String, String) {
     let mut stream = TcpStream::connect(host).unwrap();
     write!(stream, "GET {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n").unwrap();
     let mut answer = Vec::new();
     stream.read_to_end(&mut answer).unwrap();
-    String::from_utf8_lossy(&answer).lines().next().unwrap_or_default().to_owned()
+    let answer = String::from_utf8_lossy(&answer).into_owned();
+    answer.split_once("\r\n\r\n").map(|(head, body)| (head.to_owned(), body.to_owned())).unwrap()
 }
 
 #[test]
@@ -84,4 +90,33 @@ fn a_port_that_is_taken_is_refused_in_words() {
     let port = taken.local_addr().unwrap().port().to_string();
     let ended = place.call(&["view", &recording, "--port", &port, "--no-open"]).with_code(2);
     ended.says(&[&format!("cannot listen at port {port}"), "--port", "in use"]);
+}
+
+#[test]
+fn a_live_run_is_shown_as_far_as_it_is_recorded() {
+    let place = Place::new();
+    let recording = place.path("live.mcap");
+    let mut run = place.start_endless(&["run", &repository("manifests/hover.toml"), "--record", &recording]);
+    run.await_ticks(10);
+    let launch = place.start(&["view", "--run", &place.run_id(), "--no-open"]);
+    let address = address(&launch);
+    let (host, path) = address.split_at(address.find('/').unwrap());
+    let duration = || {
+        let (_, body) = answer(host, &format!("{path}api/growth"));
+        let told: serde_json::Value = serde_json::from_str(&body).unwrap();
+        assert_eq!(told[0]["is_growing"], true, "{told}");
+        told[0]["duration_ns"].as_u64().unwrap()
+    };
+    let first = duration();
+    poll("the recording does not grow", || (duration() > first).then_some(()));
+    launch.signal(Signal::TERM);
+    launch.end_among_others().with_code(0);
+    run.signal(Signal::TERM);
+    run.end();
+}
+
+#[test]
+fn a_run_that_is_not_alive_is_refused_in_words() {
+    let place = Place::new();
+    place.call(&["view", "--run", "0-0"]).with_code(2).says(&["alive"]);
 }

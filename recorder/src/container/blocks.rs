@@ -48,11 +48,14 @@ impl Block {
     }
 }
 
-/// The blocks of a file, found by going through its records. Chunks are not unpacked. With `is_cut`, the file ends where
-/// a record is not whole.
-pub fn scanned(source: Source<'_>, is_cut: bool) -> Result<Vec<Block>, Damage> {
+/// The first record of a file.
+pub const FIRST: usize = MAGIC.len();
+
+/// The blocks of a file, found by going through its records from the one at `at` on. Chunks are not unpacked. With
+/// `is_cut`, the file ends where a record is not whole.
+pub fn scanned(source: Source<'_>, mut at: usize, is_cut: bool) -> Result<Vec<Block>, Damage> {
     let file = Bytes { source, of: "" };
-    let (mut blocks, mut at, mut is_loose) = (Vec::<Block>::new(), MAGIC.len(), false);
+    let (mut blocks, mut is_loose) = (Vec::<Block>::new(), false);
     loop {
         let raw = match file.record(at) {
             Ok(raw) => raw,

@@ -24,6 +24,11 @@ export async function catalogue() {
   return (await answered("api/catalogue")).json();
 }
 
+/** How far each recording has come: durations, blocks, and if it still grows. */
+export async function growth() {
+  return (await answered("api/growth")).json();
+}
+
 /** The newest values at `count` times from `from_ns` on, `step_ns` apart: time after time, a value for each of the fields. */
 export async function frames(request, signal) {
   return (await numbers("api/frames", request, signal)).values;

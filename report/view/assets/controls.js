@@ -22,10 +22,8 @@ export class TimeControls {
   constructor(playback, startS) {
     Object.assign(this, { playback, startS, slider: get("slider") });
     this.decimals = Math.min(Math.max(Math.ceil(-Math.log10(playback.tickNs * 1e-9)), 0), 6);
-    this.slider.max = Math.max(Math.round(playback.durationNs / playback.tickNs), 1);
     get("pace").append(...PACES.map((pace) => option(pace, `×${pace}`)));
     get("pace").value = playback.pace;
-    get("clock").children[1].textContent = ` of ${timeText(startS + playback.durationNs * 1e-9, 1)}`;
     this.#listen();
     this.#keys();
     playback.onChange(() => this.#show());
@@ -69,9 +67,11 @@ export class TimeControls {
     const { playback, slider } = this;
     const seconds = this.startS + playback.timeNs * 1e-9;
     const text = timeText(seconds, this.decimals);
+    slider.max = Math.max(Math.round(playback.durationNs / playback.tickNs), 1);
     slider.value = Math.round(playback.timeNs / playback.tickNs);
     slider.setAttribute("aria-valuetext", text);
     get("clock").children[0].textContent = text;
+    get("clock").children[1].textContent = ` of ${timeText(this.startS + playback.durationNs * 1e-9, 1)}`;
     get("play").textContent = playback.isPlaying ? "Pause" : "Play";
     get("pace").value = playback.pace;
   }

@@ -40,6 +40,13 @@ export class Feed {
     Object.assign(this, { number, durationNs: recording.duration_ns, tickNs: recording.tick_ns ?? 1e6, fields, tell });
   }
 
+  /** The recording has come so far: frames behind its former end are asked for anew. */
+  grow(durationNs) {
+    for (const [key, { endNs }] of this.#blocks) if (endNs > this.durationNs) this.#blocks.delete(key);
+    if (this.#exact?.timeNs >= this.durationNs) this.#exact = null;
+    this.durationNs = durationNs;
+  }
+
   /** The row of values at the time of `playback`, with the time for which they hold; null while they are on their way. */
   row(playback) {
     const timeNs = Math.min(playback.timeNs, this.durationNs);
@@ -96,7 +103,7 @@ export class Feed {
     const key = `${stepNs} ${number}`;
     const fromNs = number * FRAMES_OF_BLOCK * stepNs;
     if (this.#blocks.has(key) || fromNs > this.durationNs) return;
-    const block = { values: null };
+    const block = { values: null, endNs: fromNs + FRAMES_OF_BLOCK * stepNs };
     this.#blocks.set(key, block);
     if (this.#blocks.size > BLOCKS_KEPT) this.#blocks.delete(this.#blocks.keys().next().value);
     block.values = await this.#frames({ from_ns: fromNs, step_ns: stepNs, count: FRAMES_OF_BLOCK });

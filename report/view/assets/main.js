@@ -1,6 +1,6 @@
 // The page: reads the catalogue, and ties time, room and scopes together.
 
-import { catalogue } from "./api.js";
+import { catalogue, growth } from "./api.js";
 import { cameraControls, TimeControls } from "./controls.js";
 import { Columns, Feed } from "./feed.js";
 import { Picker } from "./picker.js";
@@ -8,6 +8,8 @@ import { Playback } from "./playback.js";
 import { Room } from "./room.js";
 import { defaultPlots, Scopes } from "./scopes.js";
 
+// Pause between two questions for how far a recording has come that is being written.
+const GROWTH_MS = 500;
 const state = document.getElementById("state");
 // Kept for people at the console and for tests.
 const shown = { timeNs: null, vehicles: [], frames: 0, isFlat: false, scopesDrawn: false };
@@ -71,6 +73,23 @@ function head(recordings) {
   list.replaceChildren(...notes.map((note) => Object.assign(document.createElement("li"), { textContent: note })));
 }
 
+/** Follows recordings that grow, until their writers have finished them; `grown` hears of each growth. */
+async function follow(recordings, tell, grown) {
+  while (recordings.some((recording) => recording.is_growing)) {
+    tell("The recording is not finished: End goes to its newest second.");
+    await new Promise((resolve) => setTimeout(resolve, GROWTH_MS));
+    const told = await growth().catch((error) => tell(error.message));
+    if (!told) continue;
+    // Topics that had no message before.
+    const isNew = told.some(({ topics }, number) => topics !== recordings[number].topics.length);
+    const known = isNew ? (await catalogue()).recordings : told.map(({ topics, ...rest }) => rest);
+    const hasGrown = told.some((one, number) => one.duration_ns !== recordings[number].duration_ns || !one.is_growing);
+    known.forEach((one, number) => Object.assign(recordings[number], one));
+    if (hasGrown) grown();
+  }
+  tell("");
+}
+
 async function start() {
   const { recordings } = await catalogue();
   head(recordings);
@@ -109,6 +128,19 @@ async function start() {
     scopes.showTime();
   };
   playback.seek((Number(asked.get("t")) - recordings[0].start_s) * 1e9 || 0);
+  playback.isGrowing = recordings.some((recording) => recording.is_growing);
+  if (playback.isGrowing && !asked.has("t")) {
+    // What is live is seen at its newest, and goes on.
+    playback.seek(durationNs);
+    playback.toggle();
+  }
+  follow(recordings, teller("growth"), () => {
+    const isGrowing = recordings.some((recording) => recording.is_growing);
+    playback.grow(Math.max(...recordings.map((recording) => recording.duration_ns)), isGrowing);
+    feeds.forEach((feed, number) => feed.grow(recordings[number].duration_ns));
+    scopes.grow();
+    room.grow();
+  });
   let last = performance.now();
   const frame = (now) => {
     playback.pass(now - last);

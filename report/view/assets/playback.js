@@ -3,11 +3,15 @@
 /** Paces that are offered: simulated seconds in a second. */
 export const PACES = [0.1, 0.25, 0.5, 1, 2, 5, 10];
 
+// A recorder writes what it has each second. Where time is to be the newest and falls farther behind, it goes on from there.
+const BEHIND_NS = 2.5e9;
+const AT_ONCE_NS = 1e9;
+
 export class Playback {
   #heard = [];
 
   constructor(durationNs, tickNs) {
-    Object.assign(this, { durationNs, tickNs, timeNs: 0, pace: 1, isPlaying: false });
+    Object.assign(this, { durationNs, tickNs, timeNs: 0, pace: 1, isPlaying: false, isGrowing: false, isNewest: false });
   }
 
   /** Calls `hear` after each change. */
@@ -18,6 +22,8 @@ export class Playback {
   /** Goes to a time, at a tick within the recording. */
   seek(timeNs) {
     this.timeNs = this.#atTick(timeNs);
+    // Whoever goes to the end of a recording that grows stays with it.
+    this.isNewest = this.isGrowing && this.timeNs >= this.durationNs;
     this.#tell();
   }
 
@@ -34,7 +40,13 @@ export class Playback {
   toggle() {
     this.isPlaying = !this.isPlaying;
     if (!this.isPlaying) this.timeNs = this.#atTick(this.timeNs);
-    else if (this.timeNs >= this.durationNs) this.timeNs = 0;
+    else if (this.timeNs >= this.durationNs && !this.isGrowing) this.timeNs = 0;
+    this.#tell();
+  }
+
+  /** The recording has come so far, and may go on. */
+  grow(durationNs, isGrowing) {
+    Object.assign(this, { durationNs, isGrowing });
     this.#tell();
   }
 
@@ -48,9 +60,11 @@ export class Playback {
     if (!this.isPlaying) return;
     // After a pause of the browser, time goes on where it was.
     this.timeNs += Math.min(ms, 100) * 1e6 * this.pace;
+    if (this.isNewest && this.timeNs < this.durationNs - BEHIND_NS) this.timeNs = this.durationNs - AT_ONCE_NS;
     if (this.timeNs >= this.durationNs) {
       this.timeNs = this.durationNs;
-      this.isPlaying = false;
+      // At the end of a recording that grows, time waits for more.
+      this.isPlaying = this.isGrowing;
     }
     this.#tell();
   }

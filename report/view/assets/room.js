@@ -9,6 +9,8 @@ import { curveColour, onTheme, pageColour } from "./palette.js";
 const PATH_POINTS = 3000;
 // A path that spreads over more blocks of the file is drawn around the time that is shown.
 const PATH_BLOCKS = 200;
+// It is read again and again of a recording that grows.
+const PATH_BLOCKS_GROWING = 60;
 const ABOARD = new THREE.Vector3(0.02, 0, 0.09);
 const AHEAD = new THREE.Vector3(1, 0, 0);
 // The first place of the camera, seen from a vehicle, in multiples of its reach.
@@ -174,6 +176,11 @@ export class Room {
     this.controls.update();
   }
 
+  /** Recordings have grown: their paths are read anew. */
+  grow() {
+    for (const body of this.vehicles) body.pathSpan = null;
+  }
+
   setMode(mode, followed = this.followed) {
     const target = this.vehicles[followed];
     if (this.mode === "board" && mode !== "board" && target) {
@@ -238,7 +245,8 @@ export class Room {
 
   /** Reads the path of a vehicle: all of a short recording, and around the time of a long one. */
   async #readPath(body, recording, timeNs) {
-    const part = Math.min(PATH_BLOCKS / Math.max(recording.blocks, 1), 1);
+    const most = recording.is_growing ? PATH_BLOCKS_GROWING : PATH_BLOCKS;
+    const part = Math.min(most / Math.max(recording.blocks, 1), 1);
     const spanNs = Math.max(recording.duration_ns * part, 1e9);
     const fromNs = part === 1 ? 0 : Math.max(Math.round(timeNs - 0.7 * spanNs), 0);
     // Before the answer: one question is enough.

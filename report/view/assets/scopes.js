@@ -289,6 +289,13 @@ export class Scopes {
     });
   }
 
+  /** The recordings have come so far. */
+  grow() {
+    this.endS = this.startS + this.playback.durationNs * 1e-9;
+    for (const [number, feed] of this.feeds.entries()) feed.grow(this.recordings[number].duration_ns);
+    this.refresh();
+  }
+
   windowS() {
     const [from, to] = this.window ?? [this.startS, this.endS];
     return to > from ? [from, to] : [from, from + 1e-3];

@@ -27,6 +27,7 @@ pub fn catalogue(shown: &Shown, fields: &BTreeMap<String, Vec<Field>>) -> Result
         "duration_ns": shown.duration_ns(),
         "tick_ns": tick_ns,
         "blocks": shown.block_count(),
+        "is_growing": shown.is_growing(),
         "notes": notes(shown, vehicles.is_empty()),
         "topics": topics(shown, fields),
         "vehicles": vehicles,
@@ -59,10 +60,11 @@ fn bodies(shown: &Shown, fields: &BTreeMap<String, Vec<Field>>) -> Result<Value>
 fn notes(shown: &Shown, has_no_vehicle: bool) -> Vec<String> {
     let mut notes = Vec::new();
     if let Some(cut) = shown.recording().cut() {
-        let end = cut
-            .last_tick
-            .map_or("no message is whole".to_owned(), |tick| format!("the last whole tick is {tick}"));
-        notes.push(format!("{} was cut off: {end}. The page shows what is whole.", shown.name()));
+        let end = cut.last_tick.map_or("no message is whole".to_owned(), |tick| {
+            format!("the last whole tick was {tick} when it was opened")
+        });
+        let name = shown.name();
+        notes.push(format!("{name} is not finished: its recorder is at work, or was killed; {end}."));
     }
     if has_no_vehicle {
         notes.push(format!(

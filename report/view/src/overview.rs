@@ -1,5 +1,5 @@
 //! The overview: the lowest and highest values of every field over the whole recording, in a bounded number of bins. It is
-//! read once, in the background; until then it holds what was read so far.
+//! read once, in the background, and goes on where the recording grows; it holds what was read so far.
 
 use crate::fields::{Asked, Columns, Field, Sample};
 use crate::shown::Shown;
@@ -17,8 +17,9 @@ const BINS: [usize; 2] = [1 << 10, 1 << 16];
 #[derive(Debug)]
 pub struct Overview {
     topics: Mutex<BTreeMap<String, Topic>>,
-    fields: BTreeMap<String, Vec<Field>>,
-    progress: Mutex<f64>,
+    fields: Mutex<BTreeMap<String, Vec<Field>>>,
+    /// Blocks that were read, and blocks that there are.
+    progress: Mutex<[usize; 2]>,
     bins_max: usize,
 }
 
@@ -47,27 +48,40 @@ impl Overview {
         let count: usize = fields.values().map(Vec::len).sum();
         let affordable = (bytes / size_of::<[f64; 2]>() / count.max(1)).max(1);
         let bins_max = (1 << affordable.ilog2()).clamp(BINS[0], BINS[1]);
-        Self { topics: Mutex::default(), fields, progress: Mutex::default(), bins_max }
+        Self { topics: Mutex::default(), fields: Mutex::new(fields), progress: Mutex::default(), bins_max }
     }
 
-    /// Reads the recording to its end, or until `is_ended`.
+    /// Takes fields of topics that had no message before.
+    pub fn add_fields(&self, fields: &BTreeMap<String, Vec<Field>>) {
+        let mut known = lock(&self.fields);
+        for (topic, fields) in fields {
+            known.entry(topic.clone()).or_insert_with(|| fields.clone());
+        }
+    }
+
+    /// Reads the recording from where it was read before to its end, or until `is_ended`.
     ///
     /// # Errors
     /// If the recording is damaged.
     pub fn fill(&self, shown: &Shown, is_ended: &AtomicBool) -> Result<()> {
         // One field more than a request may have would be refused: topic by topic they are few enough.
         let mut columns = Vec::new();
-        for (topic, fields) in &self.fields {
+        let known = lock(&self.fields).clone();
+        for (topic, fields) in &known {
             let asked = |field: &Field| Asked { topic: topic.clone(), field: field.path.clone() };
             let asked: Vec<Asked> = fields.iter().take(crate::fields::ASKED_MAX).map(asked).collect();
             columns.push((topic, Columns::new(shown, &asked)?));
         }
-        for block in 0..shown.block_count() {
+        let read = self.progress(|progress| {
+            progress[1] = shown.block_count();
+            progress[0]
+        });
+        for block in read..shown.block_count() {
             if is_ended.load(Ordering::Relaxed) {
                 return Ok(());
             }
             self.add_block(shown, block, &mut columns)?;
-            *lock(&self.progress) = (block + 1) as f64 / shown.block_count() as f64;
+            self.progress(|progress| progress[0] = block + 1);
         }
         Ok(())
     }
@@ -91,16 +105,24 @@ impl Overview {
         Ok(())
     }
 
+    fn progress<T>(&self, change: impl FnOnce(&mut [usize; 2]) -> T) -> T {
+        change(&mut lock(&self.progress))
+    }
+
     /// The part of the recording that was read, 0 to 1.
     #[must_use]
     pub fn read(&self) -> f64 {
-        *lock(&self.progress)
+        let [read, all] = *lock(&self.progress);
+        if all == 0 { 0.0 } else { read as f64 / all as f64 }
     }
 
     /// Calls `visit` with the time of each bin of a field, and its lowest and highest value.
     pub fn visit(&self, asked: &Asked, visit: &mut dyn FnMut(u64, f64, f64)) {
-        let known = self.fields.get(&asked.topic);
-        let place = known.and_then(|fields| fields.iter().position(|field| field.path == asked.field));
+        let place = {
+            let known = lock(&self.fields);
+            let fields = known.get(&asked.topic);
+            fields.and_then(|fields| fields.iter().position(|field| field.path == asked.field))
+        };
         let topics = lock(&self.topics);
         let (Some(place), Some(topic)) = (place, topics.get(&asked.topic)) else { return };
         let rows = topic.extremes.chunks_exact(topic.width.max(1));

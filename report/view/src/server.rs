@@ -5,6 +5,7 @@
 //! | `GET  /token=…/` | the page |
 //! | `GET  /token=…/assets/NAME` | a file of the page |
 //! | `GET  /token=…/api/catalogue` | JSON: the recordings ([`crate::catalogue`]) |
+//! | `GET  /token=…/api/growth` | JSON: of each recording its duration, its blocks, and if it still grows |
 //! | `POST /token=…/api/frames` | numbers: [`crate::frames`] |
 //! | `POST /token=…/api/curves` | numbers: [`crate::curves`]; the header `x-read` holds the part that was read for them |
 //!
@@ -14,7 +15,7 @@
 use crate::assets::{PAGE, asset};
 use crate::catalogue::catalogue;
 use crate::curves::{CurvesRequest, curves};
-use crate::fields::fields;
+use crate::fields::{Field, fields};
 use crate::frames::{FramesRequest, frames};
 use crate::gate::Gate;
 use crate::overview::Overview;
@@ -27,9 +28,10 @@ use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use axum::{Json, Router};
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::net::{Ipv4Addr, TcpListener};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, PoisonError, RwLock};
 use std::time::Duration;
 
 /// Bytes of a request: fields by their names.
@@ -38,6 +40,8 @@ const BODY_BYTES_MAX: usize = 1 << 20;
 const READERS: usize = 4;
 /// Pause between two looks for the end.
 const LOOK: Duration = Duration::from_millis(50);
+/// Looks for the end between two looks for what a recording has grown by: half a second.
+const GROWTH_LOOKS: u32 = 10;
 /// Time that answers under way have at the end.
 const LEAVE: Duration = Duration::from_millis(500);
 
@@ -67,14 +71,52 @@ pub struct Server {
 struct Content {
     gate: Gate,
     recordings: Vec<Entry>,
-    catalogue: Value,
     readers: tokio::sync::Semaphore,
 }
 
 #[derive(Debug)]
 struct Entry {
-    shown: Shown,
+    state: RwLock<Arc<Known>>,
     overview: Overview,
+}
+
+/// A recording as far as it is known, and what the catalogue says of it.
+#[derive(Debug)]
+struct Known {
+    shown: Shown,
+    told: Value,
+}
+
+impl Known {
+    fn of(shown: Shown, fields: &BTreeMap<String, Vec<Field>>) -> Result<Self> {
+        let told = catalogue(&shown, fields)?;
+        Ok(Self { shown, told })
+    }
+}
+
+impl Entry {
+    fn of(shown: Shown) -> Result<Self> {
+        let fields = fields(&shown)?;
+        let known = Known::of(shown, &fields)?;
+        Ok(Self { state: RwLock::new(Arc::new(known)), overview: Overview::new(fields) })
+    }
+
+    fn known(&self) -> Arc<Known> {
+        self.state.read().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Reads the overview to the present end, and looks for more; true while more may come.
+    fn keep_up(&self, is_over: &AtomicBool) -> Result<bool> {
+        let known = self.known();
+        self.overview.fill(&known.shown, is_over)?;
+        let Some(grown) = known.shown.grown()? else { return Ok(known.shown.is_growing()) };
+        let fields = fields(&grown)?;
+        self.overview.add_fields(&fields);
+        let grown = Known::of(grown, &fields)?;
+        *self.state.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(grown);
+        // What was just found is read in the next round.
+        Ok(true)
+    }
 }
 
 impl Server {
@@ -83,13 +125,7 @@ impl Server {
     /// # Errors
     /// If a recording is damaged or the port is taken.
     pub fn new(recordings: Vec<Shown>, port: u16) -> Result<Self> {
-        let mut entries = Vec::new();
-        let mut told = Vec::new();
-        for shown in recordings {
-            let fields = fields(&shown)?;
-            told.push(catalogue(&shown, &fields)?);
-            entries.push(Entry { shown, overview: Overview::new(fields) });
-        }
+        let recordings = recordings.into_iter().map(Entry::of).collect::<Result<_>>()?;
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).with_context(|| {
             format!("cannot listen at port {port} of 127.0.0.1: name another one with --port, or leave it out for any free one")
         })?;
@@ -97,8 +133,7 @@ impl Server {
         let gate =
             Gate::new(listener.local_addr()?.port()).map_err(|error| anyhow!("no random token: {error}"))?;
         let readers = tokio::sync::Semaphore::new(READERS);
-        let content =
-            Content { gate, recordings: entries, catalogue: json!({ "recordings": told }), readers };
+        let content = Content { gate, recordings, readers };
         Ok(Self { listener, content: Arc::new(content) })
     }
 
@@ -122,7 +157,7 @@ impl Server {
         runtime.spawn(async move { axum::serve(listener, routes).await });
         let (content, is_over) = (self.content, AtomicBool::new(false));
         std::thread::scope(|scope| {
-            scope.spawn(|| read_overviews(&content, &is_over));
+            scope.spawn(|| keep_up(&content, &is_over));
             while !is_ended() {
                 std::thread::sleep(LOOK);
             }
@@ -133,10 +168,17 @@ impl Server {
     }
 }
 
-/// Reads the recordings once. Damage ends the overview where it is: windows of it are refused with its place.
-fn read_overviews(content: &Content, is_over: &AtomicBool) {
-    for Entry { shown, overview } in &content.recordings {
-        let _ = overview.fill(shown, is_over);
+/// Reads the overviews, and goes on while recordings grow. Damage ends the overview where it is: windows of it are refused
+/// with its place.
+fn keep_up(content: &Content, is_over: &AtomicBool) {
+    let is_growing = |entry: &Entry| entry.keep_up(is_over).unwrap_or(false);
+    while content.recordings.iter().map(is_growing).fold(false, |any, more| any || more) {
+        for _ in 0..GROWTH_LOOKS {
+            if is_over.load(Ordering::Relaxed) {
+                return;
+            }
+            std::thread::sleep(LOOK);
+        }
     }
 }
 
@@ -145,6 +187,7 @@ fn routes(content: Arc<Content>) -> Router {
         .route("/{token}/", get(|| async { ([(header::CONTENT_TYPE, "text/html; charset=utf-8")], PAGE) }))
         .route("/{token}/assets/{*name}", get(file))
         .route("/{token}/api/catalogue", get(told))
+        .route("/{token}/api/growth", get(growth))
         .route("/{token}/api/frames", post(answer_frames))
         .route("/{token}/api/curves", post(answer_curves))
         .layer(DefaultBodyLimit::max(BODY_BYTES_MAX))
@@ -173,16 +216,30 @@ async fn file(Path((_, name)): Path<(String, String)>) -> Response {
 }
 
 async fn told(State(content): State<Arc<Content>>) -> Json<Value> {
-    Json(content.catalogue.clone())
+    let told = content.recordings.iter().map(|entry| entry.known().told.clone());
+    Json(json!({ "recordings": told.collect::<Vec<_>>() }))
+}
+
+async fn growth(State(content): State<Arc<Content>>) -> Json<Value> {
+    let of = |entry: &Entry| {
+        let told = &entry.known().told;
+        json!({
+            "duration_ns": told["duration_ns"],
+            "blocks": told["blocks"],
+            "topics": told["topics"].as_array().map_or(0, Vec::len),
+            "is_growing": told["is_growing"],
+        })
+    };
+    Json(content.recordings.iter().map(of).collect())
 }
 
 async fn answer_frames(State(content): State<Arc<Content>>, Json(request): Json<FramesRequest>) -> Response {
-    reading(content, request.recording, move |entry| Ok((frames(&entry.shown, &request)?, 1.0))).await
+    reading(content, request.recording, move |entry| Ok((frames(&entry.known().shown, &request)?, 1.0))).await
 }
 
 async fn answer_curves(State(content): State<Arc<Content>>, Json(request): Json<CurvesRequest>) -> Response {
     reading(content, request.recording, move |entry| {
-        let found = curves(&entry.shown, &entry.overview, &request)?;
+        let found = curves(&entry.known().shown, &entry.overview, &request)?;
         Ok((found.values, found.read))
     })
     .await

@@ -20,11 +20,30 @@ impl Shown {
     /// If its file is damaged or it has no message.
     pub fn new(recording: Recording) -> Result<Self> {
         let index = Index::of(&recording)?;
+        Self::of(recording, index)
+    }
+
+    fn of(recording: Recording, index: Index) -> Result<Self> {
         let Some(span_ns) = index.span_ns() else {
             let path = recording.path().display();
             anyhow::bail!("cannot show {path}: it has no message; expected a recording of at least one tick");
         };
         Ok(Self { recording, index, span_ns })
+    }
+
+    /// The same with all that its writer has added since; `None` where that is nothing.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn grown(&self) -> Result<Option<Self>> {
+        let grown = self.index.grown(&self.recording)?;
+        grown.map(|(recording, index)| Self::of(recording, index)).transpose()
+    }
+
+    /// True while its writer has not finished it: more may come.
+    #[must_use]
+    pub fn is_growing(&self) -> bool {
+        self.recording.cut().is_some()
     }
 
     /// The recording.

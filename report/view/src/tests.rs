@@ -181,7 +181,11 @@ struct Running {
 
 impl Running {
     fn start(flight: &Flight) -> Self {
-        let server = Server::new(vec![flight.shown()], 0).unwrap();
+        Self::of(flight.shown())
+    }
+
+    fn of(shown: Shown) -> Self {
+        let server = Server::new(vec![shown], 0).unwrap();
         let (address, is_over) = (server.address(), Arc::new(AtomicBool::new(false)));
         let seen = is_over.clone();
         let serve = move || server.serve(&|| seen.load(Ordering::Relaxed)).unwrap();
@@ -289,7 +293,7 @@ fn the_catalogue_tells_fields_units_and_what_is_missing() {
         state["fields"].as_array().unwrap().contains(&json!({ "path": path, "unit": unit }))
     };
     assert!(has("position.z", "m") && has("attitude.yaw", "rad"), "{state}");
-    assert!(told["notes"][0].as_str().unwrap().contains("cut off: the last whole tick is 4999"), "{told}");
+    assert!(told["notes"][0].as_str().unwrap().contains("the last whole tick was 4999"), "{told}");
 }
 
 #[test]
@@ -299,4 +303,46 @@ fn a_taken_port_is_refused_with_what_to_do() {
     let error = Server::new(vec![Flight::of(1000, true).shown()], port).unwrap_err();
     let text = format!("{error:#}");
     assert!(text.contains(&format!("port {port} of 127.0.0.1")) && text.contains("--port"), "{text}");
+}
+
+/// What a live run records is shown as it comes, and stays when the run has ended.
+#[test]
+fn a_recording_that_grows_is_followed_to_its_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("live.mcap");
+    let mut writer = RecordingWriter::create(&path).unwrap();
+    let state = writer.add_channel("/plant/state", &Announcement::of(PlantState::SCHEMA)).unwrap();
+    let write = |writer: &mut RecordingWriter, tick: u32| {
+        let position = [f64::from(tick), 0.0, 0.0].into();
+        let message = PlantState { position, ..PlantState::default() };
+        writer.write(state, tick, u64::from(tick) * MS, &cdr(&message)).unwrap();
+    };
+    (0..100).for_each(|tick| write(&mut writer, tick));
+    writer.flush().unwrap();
+    let shown = Shown::new(Recording::salvage(&path).unwrap()).unwrap();
+    assert!(shown.is_growing() && shown.grown().unwrap().is_none());
+    let server = Running::of(shown);
+    let (host, page) = server.parts();
+    let told = |key: &str| {
+        let (status, _, body) = server.ask("GET", host, &format!("{page}api/growth"), "");
+        assert_eq!(status, 200);
+        serde_json::from_slice::<serde_json::Value>(&body).unwrap()[0][key].clone()
+    };
+    let await_told = |key: &str, expected: serde_json::Value| {
+        while told(key) != expected {
+            std::thread::sleep(std::time::Duration::from_millis(20));
+        }
+    };
+    assert_eq!((told("duration_ns"), told("is_growing")), (json!(99 * MS), json!(true)));
+    (100..200).for_each(|tick| write(&mut writer, tick));
+    writer.flush().unwrap();
+    await_told("duration_ns", json!(199 * MS));
+    let position = json!([{ "topic": "/plant/state", "field": "position.x" }]);
+    let request =
+        json!({ "recording": 0, "from_ns": 150 * MS, "step_ns": 0, "count": 1, "fields": position });
+    assert_eq!(server.post("api/frames", &request), (200, 150.0_f64.to_le_bytes().to_vec()));
+    assert_eq!(told("is_growing"), json!(true));
+    writer.finish().unwrap();
+    await_told("is_growing", json!(false));
+    assert_eq!(told("duration_ns"), json!(199 * MS));
 }
