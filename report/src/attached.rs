@@ -92,12 +92,23 @@ impl Attached {
             let set = set.and_then(|set| self.manifest.get("set")?.get(set)?.as_table());
             let mut merged = set.cloned().unwrap_or_default();
             put(&mut merged, vehicle.clone());
+            put(&mut merged, self.adjusted(name));
             merged
         };
         let is_plant = |process: &&Value| process.get("kind").and_then(Value::as_str) == Some("plant");
         let plant = merged.get("process")?.as_table()?.values().find(is_plant)?;
         let file = plant.get("vehicle").or_else(|| plant.get("parameters")?.get("vehicle"))?;
         Some(Path::new(file.as_str()?).file_name()?.to_string_lossy().into_owned())
+    }
+
+    /// Adjustments of the vehicle's processes: tables such as `[process."h1/plant"]`.
+    fn adjusted(&self, name: &str) -> Table {
+        let processes = self.manifest.get("process").and_then(Value::as_table).into_iter().flatten();
+        let own = processes.filter_map(|(process, adjusted)| {
+            let local = process.strip_prefix(name)?.strip_prefix('/')?;
+            Some((local.to_owned(), adjusted.clone()))
+        });
+        Table::from_iter([("process".to_owned(), Value::Table(own.collect()))])
     }
 
     /// The vehicle in the file that is attached as `file`: others, such as manifests, may have the same name.

@@ -125,14 +125,11 @@ impl Manifest {
     /// A [`Diagnostic`] if the manifest cannot be read.
     pub fn number(&self, files: &InputFiles, key: &str) -> Result<Option<f64>, Diagnostic> {
         let tree = whole_tree(&self.sources)?;
-        let of_file = |process: &str, file: &str| {
-            let process = self.content.process.iter().find(|(name, _)| name.get_ref() == process)?.1;
-            let written =
-                [("vehicle", &process.vehicle), ("scene", &process.scene), ("gains", &process.gains)];
-            let written = written.into_iter().find(|(key, _)| *key == file)?.1.as_ref()?;
-            files.text(&self.resolve(written).ok()?).ok()
+        let find = |process: &str, file: &str| {
+            let path = self.resolve(self.file_of(process, file)?).ok()?;
+            self.with_edits(files, process, file, path).ok()
         };
-        Ok(file_edits::number(key, of_file).or_else(|| tree::number(tree, key)))
+        Ok(file_edits::number(files, key, find).or_else(|| tree::number(tree, key)))
     }
 
     /// The texts that this manifest is made of: its own file, those that it includes, and the values of `--set`.
@@ -143,8 +140,8 @@ impl Manifest {
     fn of(path: PathBuf, sources: Sources) -> Result<Self, Diagnostic> {
         let tree = whole_tree(&sources)?;
         let content = content(&sources, tree)?;
-        let recorded_text = recorded::text(&sources)?;
         let file_edits = file_edits::all(&sources, &content)?;
+        let recorded_text = recorded::text(&sources, &content.process)?;
         Ok(Self { path, recorded_text, content, sources, file_edits })
     }
 
@@ -207,6 +204,12 @@ impl Manifest {
         self.sources.resolve(written)
     }
 
+    /// The file `key` of the process `name`, as it is written.
+    fn file_of(&self, name: &str, key: &str) -> Option<&Spanned<String>> {
+        let (_, process) = self.content.process.iter().find(|(other, _)| other.get_ref() == name)?;
+        file_edits::file_of(process, key)
+    }
+
     /// The file at `path`, the value of `key` of the process `name`: where `--set` changes values in it, an edited copy that
     /// `files` keeps.
     ///
@@ -220,11 +223,13 @@ impl Manifest {
         path: PathBuf,
     ) -> Result<PathBuf, Diagnostic> {
         let edits: Vec<&FileEdit> = self.file_edits.iter().filter(|edit| edit.is_of(name, key)).collect();
+        // A backup of the process may name another file, which is not edited.
+        let own = self.file_of(name, key).and_then(|written| self.resolve(written).ok());
+        let is_edited = !edits.is_empty() && own.as_ref() == Some(&path);
         // A file that cannot be read is refused by its reader.
-        let Some(text) = (!edits.is_empty()).then(|| files.text(&path).ok()).flatten() else {
-            return Ok(path);
-        };
-        let text = file_edits::edited(&text, &edits)
+        let Some(text) = is_edited.then(|| files.text(&path).ok()).flatten() else { return Ok(path) };
+        let base = |base: &str| file_edits::base_text(files, &path, base);
+        let text = file_edits::edited(&text, &edits, &base)
             .map_err(|(edit, message)| edit.problem(&self.sources, &message, &path))?;
         let edited = file_edits::edited_path(&path, name);
         files.keep(&edited, text.into_bytes());

@@ -68,10 +68,16 @@ pub fn of(
     let read = declared.files.listing_anew();
     let mut parameters: BTreeMap<&str, serde_json::Value> =
         process.parameters.iter().map(|(key, value)| (key.get_ref().as_str(), value.clone())).collect();
+    // Copies of files with the values of `--set`, and their originals.
+    let mut edited: Vec<(String, String)> = Vec::new();
     for (key, file) in files(process) {
         let Some(file) = file else { continue };
         // As the node gets it.
-        let path = manifest.with_edits(&declared.files, name.get_ref(), key, manifest.resolve(file)?)?;
+        let original = manifest.resolve(file)?;
+        let path = manifest.with_edits(declared.files, name.get_ref(), key, original.clone())?;
+        if path != original {
+            edited.push((path.display().to_string(), original.display().to_string()));
+        }
         let path = path.to_string_lossy().into_owned();
         if parameters.insert(key, path.as_str().into()).is_some() {
             let message = format!("`{}` has `{key}` twice: as a file, and in its parameters", name.get_ref());
@@ -104,7 +110,14 @@ pub fn of(
             .timed(plan.tick_ns, period_ticks, plan.duration_ticks)
             .seeded(plan.seed)
             .given(&read);
-        kind.check(&parameters, &context).map_err(|error| refused(declared, &error))?;
+        let copies = |refused: Diagnostic| match edited.as_slice() {
+            [] => refused,
+            [(copy, original), ..] => {
+                let help = format!("{copy} is {original} with the values of --set. {}", refused.help);
+                refused.help(help.trim_end())
+            }
+        };
+        kind.check(&parameters, &context).map_err(|error| copies(refused(declared, &error)))?;
         for warning in context.into_warnings() {
             let at = place(declared, &warning.key);
             if !(warning.is_behind_end && notes.is_cut(manifest, &at)) {

@@ -7,8 +7,10 @@ use super::content::{Content, Process};
 use super::put::put;
 use super::sources::Sources;
 use diagnostics::{Diagnostic, did_you_mean};
+use inputs::InputFiles;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use toml::Spanned;
 use toml_edit::{DocumentMut, Item, Table, Value};
 
 /// Keys of a process whose value is a TOML file.
@@ -36,21 +38,31 @@ pub fn split<'k, 's>(keys: &'k [&'s str]) -> Option<(&'s str, &'static str, &'k 
     (!rest.is_empty()).then_some((*process, *file, rest))
 }
 
-/// Path of the edited copy of a file: `hummingbird.toml` of `plant` becomes `hummingbird@plant.toml`.
+/// Path of the edited copy of a file: `hummingbird.toml` of `h1/plant` becomes `hummingbird@h1@plant.toml`.
 pub fn edited_path(path: &Path, process: &str) -> PathBuf {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let ending = path.extension().map_or(String::new(), |ending| format!(".{}", ending.to_string_lossy()));
-    path.with_file_name(format!("{stem}@{}{ending}", plain(process)))
+    path.with_file_name(format!("{stem}@{}{ending}", process.replace('/', "@")))
 }
 
-/// True if `path` is the edited copy of a file of `process`.
-pub fn is_edited(path: &Path, process: &str) -> bool {
-    path.file_stem().is_some_and(|stem| stem.to_string_lossy().ends_with(&format!("@{}", plain(process))))
+/// The processes and keys of files that `overrides` edit, each once.
+pub fn edited_files<'s>(overrides: impl Iterator<Item = &'s str>) -> Vec<(&'s str, &'static str)> {
+    let mut found = Vec::new();
+    for text in overrides {
+        let keys: Vec<&str> = text.split('=').next().unwrap_or_default().split('.').map(str::trim).collect();
+        if let Some((process, file, _)) = split(&keys)
+            && !found.contains(&(process, file))
+        {
+            found.push((process, file));
+        }
+    }
+    found
 }
 
-/// The name of a vehicle's process without its slash.
-fn plain(process: &str) -> String {
-    process.replace('/', "-")
+/// The written path of the file `key` of `process`.
+pub fn file_of<'p>(process: &'p Process, key: &str) -> Option<&'p Spanned<String>> {
+    let files = [("vehicle", &process.vehicle), ("scene", &process.scene), ("gains", &process.gains)];
+    files.into_iter().find(|(name, _)| *name == key)?.1.as_ref()
 }
 
 /// All values of files that are given with `--set`, in their order.
@@ -63,14 +75,19 @@ pub fn all(sources: &Sources, content: &Content) -> Result<Vec<FileEdit>, Diagno
     edits.map(require).collect()
 }
 
-/// `text` with `edits`.
+/// `text` with `edits`; `base` returns the text of the file that it is based on, by the path written in it.
 ///
 /// # Errors
 /// The edit that has no place, and the reason.
-pub fn edited<'e>(text: &str, edits: &[&'e FileEdit]) -> Result<String, (&'e FileEdit, String)> {
+pub fn edited<'e>(
+    text: &str,
+    edits: &[&'e FileEdit],
+    base: &dyn Fn(&str) -> Option<String>,
+) -> Result<String, (&'e FileEdit, String)> {
     // The reader of the file says where it is no TOML.
     let Ok(mut document) = text.parse::<DocumentMut>() else { return Ok(text.to_owned()) };
     for edit in edits {
+        edit.inherit(&mut document, base);
         edit.apply(&mut document).map_err(|message| (*edit, message))?;
     }
     Ok(document.to_string())
@@ -104,7 +121,7 @@ impl FileEdit {
             let help = did_you_mean(name, known, "the processes are");
             return Err(sources.problem(&self.span, format!("there is no process `{name}`"), help));
         };
-        if self.file_of(process) {
+        if file_of(process, self.file).is_some() {
             return Ok(());
         }
         let message = format!("process `{name}` names no {} file", self.file);
@@ -112,14 +129,19 @@ impl FileEdit {
         Err(sources.problem(&self.span, message, help))
     }
 
-    /// True if `process` names the file.
-    fn file_of(&self, process: &Process) -> bool {
-        let file = match self.file {
-            "vehicle" => &process.vehicle,
-            "scene" => &process.scene,
-            _ => &process.gains,
+    /// Takes the table of the edited key over from the base: a file states a table whole, or not at all.
+    fn inherit(&self, document: &mut DocumentMut, base: &dyn Fn(&str) -> Option<String>) {
+        let (Some(first), Some(path)) = (self.keys.first(), document.get("base").and_then(Item::as_str))
+        else {
+            return;
         };
-        file.is_some()
+        if document.contains_key(first) {
+            return;
+        }
+        let below = base(path).and_then(|text| text.parse::<DocumentMut>().ok());
+        if let Some(item) = below.and_then(|mut below| below.remove(first)) {
+            document.insert(first, item);
+        }
     }
 
     fn apply(&self, document: &mut DocumentMut) -> Result<(), String> {
@@ -149,8 +171,9 @@ impl FileEdit {
     }
 
     /// The number at the place of this edit in `text`; `None` if there is none.
-    fn number_in(&self, text: &str) -> Option<f64> {
-        let document: DocumentMut = text.parse().ok()?;
+    fn number_in(&self, text: &str, base: &dyn Fn(&str) -> Option<String>) -> Option<f64> {
+        let mut document: DocumentMut = text.parse().ok()?;
+        self.inherit(&mut document, base);
         let keys = self.keys_in(document.as_item());
         let item = keys.iter().try_fold(document.as_item(), |item, key| at(item, key))?;
         let integer = || item.as_integer().map(|number| number as f64);
@@ -163,11 +186,21 @@ impl FileEdit {
     }
 }
 
-/// The number that the `key` of a `--set` leads to in a file, whose text `read` gives by the process and the file's key;
+/// The number that the `key` of a `--set` leads to in a file, whose path `find` gives by the process and the file's key;
 /// `None` if `key` leads into no file, or to no number.
-pub fn number(key: &str, read: impl FnOnce(&str, &str) -> Option<String>) -> Option<f64> {
+pub fn number(
+    files: &InputFiles,
+    key: &str,
+    find: impl FnOnce(&str, &str) -> Option<PathBuf>,
+) -> Option<f64> {
     let edit = FileEdit::parse(&format!("{key}=0"), 0)?;
-    edit.number_in(&read(&edit.process, edit.file)?)
+    let path = find(&edit.process, edit.file)?;
+    edit.number_in(&files.text(&path).ok()?, &|base| base_text(files, &path, base))
+}
+
+/// The text of the file that the one at `path` is based on.
+pub fn base_text(files: &InputFiles, path: &Path, base: &str) -> Option<String> {
+    files.text(&path.parent()?.join(base)).ok()
 }
 
 /// The item at `key`, a name in a table or an index in a list.
@@ -186,7 +219,8 @@ fn index_of(list: &Item, name: &str) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::{FileEdit, edited, edited_path};
+    use super::{FileEdit, edited, edited_files, edited_path};
+    use inputs::InputFiles;
     use std::path::Path;
 
     const VEHICLE: &str = "[body]\nmass = { value = 0.48, unit = \"kg\" } # weighed\n[[rotors]]\nname = \"front\"\n\
@@ -194,7 +228,17 @@ mod tests {
 
     fn changed(set: &str) -> Result<String, String> {
         let edit = FileEdit::parse(set, 0).unwrap();
-        edited(VEHICLE, &[&edit]).map_err(|(_, message)| message)
+        edited(VEHICLE, &[&edit], &|_| None).map_err(|(_, message)| message)
+    }
+
+    #[test]
+    fn a_table_of_the_base_is_taken_over_whole() {
+        let edit = FileEdit::parse("process.plant.vehicle.body.mass=0.5", 0).unwrap();
+        let base = |path: &str| {
+            (path == "b.toml").then(|| "[body]\nmass = { value = 1, unit = \"kg\" }\nlength = 2\n".into())
+        };
+        let found = edited("base = \"b.toml\"\n", &[&edit], &base).unwrap();
+        assert_eq!(found, "base = \"b.toml\"\n[body]\nmass = { value = 0.5, unit = \"kg\" }\nlength = 2\n");
     }
 
     #[test]
@@ -215,7 +259,9 @@ mod tests {
 
     #[test]
     fn the_number_at_a_key_is_found() {
-        let number = |key: &str| super::number(key, |_, _| Some(VEHICLE.to_owned()));
+        let files = InputFiles::default();
+        files.keep("/v.toml".as_ref(), VEHICLE.into());
+        let number = |key: &str| super::number(&files, key, |_, _| Some("/v.toml".into()));
         assert_eq!(number("process.plant.vehicle.body.mass"), Some(0.48));
         assert_eq!(number("process.plant.vehicle.rotors.front.position.0"), Some(0.17));
         assert_eq!(number("process.plant.vehicle.rotors.front.position.1"), Some(0.0));
@@ -237,7 +283,9 @@ mod tests {
     #[test]
     fn the_copy_lies_beside_the_original() {
         let found = edited_path(Path::new("/a/b.toml"), "h1/plant");
-        assert_eq!(found, Path::new("/a/b@h1-plant.toml"));
-        assert!(super::is_edited(&found, "h1/plant") && !super::is_edited(&found, "plant2"));
+        assert_eq!(found, Path::new("/a/b@h1@plant.toml"));
+        let overrides =
+            ["process.p.vehicle.a=1", "run.seed=3", "process.p.vehicle.b=1", "process.p.gains.c=1"];
+        assert_eq!(edited_files(overrides.into_iter()), [("p", "vehicle"), ("p", "gains")]);
     }
 }

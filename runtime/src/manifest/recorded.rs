@@ -1,13 +1,19 @@
 //! The manifest's text as the recording holds it: the user's own, comments and all, with what `--set`
 //! changed.
 
+use super::content::Process;
 use super::file_edits;
 use super::include;
 use super::put::put;
 use super::sources::Sources;
 use super::tree;
 use diagnostics::Diagnostic;
+use std::collections::BTreeMap;
 use std::path::Path;
+use toml::Spanned;
+
+/// The processes of the manifest by name.
+type Processes = BTreeMap<Spanned<String>, Process>;
 
 /// Keys of `[run]` that change how fast or where a run computes, never what: they stay out of the recording.
 const HOST_ONLY_KEYS: [&str; 8] =
@@ -28,7 +34,7 @@ const HOST_ONLY_PROCESS_KEYS: [&str; 8] = [
 ///
 /// # Errors
 /// If an included file is not TOML.
-pub fn text(sources: &Sources) -> Result<String, Diagnostic> {
+pub fn text(sources: &Sources, processes: &Processes) -> Result<String, Diagnostic> {
     let original = &sources.all[0].text;
     let simulated: Vec<&String> =
         sources.overrides().map(|source| &source.text).filter(|text| !is_host_only(text)).collect();
@@ -38,11 +44,12 @@ pub fn text(sources: &Sources) -> Result<String, Diagnostic> {
     }
     let mut elsewhere = String::new();
     for text in simulated {
-        if !set(&mut document, text, sources)? {
-            // It changes what an included file or a set holds, which has no line of its own here.
+        if is_of_a_file(text) || !set(&mut document, text, sources)? {
+            // It changes another file, or what an included file or a set holds, which has no line of its own here.
             elsewhere += &format!("# --set {}\n", text.replace('\n', "\\n"));
         }
     }
+    name_copies(&mut document, sources, processes);
     let text = document.to_string();
     let gap = if text.ends_with('\n') || elsewhere.is_empty() { "" } else { "\n" };
     Ok(text + gap + &elsewhere)
@@ -62,13 +69,16 @@ fn is_host_only(text: &str) -> bool {
     }
 }
 
+/// True if an override leads into a file of a process.
+fn is_of_a_file(text: &str) -> bool {
+    let keys: Vec<&str> = text.split('=').next().unwrap_or_default().split('.').map(str::trim).collect();
+    file_edits::split(&keys).is_some()
+}
+
 /// Writes an override into the text; false if its place is not in it.
 fn set(document: &mut toml_edit::DocumentMut, text: &str, sources: &Sources) -> Result<bool, Diagnostic> {
     let Some((path, value)) = text.split_once('=') else { return Ok(false) };
     let value = value.trim();
-    if let Some(is_put) = set_file(document, path) {
-        return Ok(is_put);
-    }
     // What counts as TOML is decided as when it is read.
     let parsed = tree::parse_value(value, 0).and_then(|_| value.parse::<toml_edit::Value>().ok());
     let value = parsed.unwrap_or_else(|| value.into());
@@ -89,24 +99,17 @@ fn set(document: &mut toml_edit::DocumentMut, text: &str, sources: &Sources) -> 
     Ok(is_put)
 }
 
-/// Names the edited copy of a file in the place of the original, where `path` leads into a file; false if the original is
-/// not named in the text.
-fn set_file(document: &mut toml_edit::DocumentMut, path: &str) -> Option<bool> {
-    let keys: Vec<&str> = path.split('.').map(str::trim).collect();
-    let (process, file, _) = file_edits::split(&keys)?;
-    let processes = document.get_mut("process").and_then(|processes| processes.get_mut(process));
-    let Some(written) = processes.and_then(|process| process.get_mut(file)?.as_value_mut()) else {
-        return Some(false);
-    };
-    let Some(original) = written.as_str().map(str::to_owned) else { return Some(false) };
-    let edited = file_edits::edited_path(Path::new(&original), process);
-    // A second edit finds the name of the copy.
-    if !file_edits::is_edited(Path::new(&original), process) {
-        let decor = written.decor().clone();
-        *written = edited.to_string_lossy().into_owned().into();
-        *written.decor_mut() = decor;
+/// Names the edited copies of files in the place of the originals. A process that has no line here, since an included file or
+/// a set declares it, gets one.
+fn name_copies(document: &mut toml_edit::DocumentMut, sources: &Sources, processes: &Processes) {
+    for (process, file) in file_edits::edited_files(sources.overrides().map(|source| source.text.as_str())) {
+        let found = processes.iter().find(|(name, _)| name.get_ref() == process);
+        let Some(written) = found.and_then(|(_, found)| file_edits::file_of(found, file)) else { continue };
+        let copy = file_edits::edited_path(Path::new(written.get_ref()), process);
+        let keys = ["process", process, file].map(str::to_owned);
+        // It fails only where `process` is no table, and then there is no process.
+        let _ = put(document.as_item_mut(), &keys, copy.to_string_lossy().into_owned().into());
     }
-    Some(true)
 }
 
 #[cfg(test)]
@@ -119,7 +122,9 @@ mod tests {
         sources.add(Origin::File("a.toml".into()), manifest.to_owned());
         sources.order.push(0);
         overrides.iter().for_each(|text| sources.add(Origin::Override, (*text).to_owned()));
-        text(&sources).unwrap()
+        let content =
+            super::super::whole_tree(&sources).and_then(|tree| super::super::content(&sources, tree));
+        text(&sources, &content.map(|content| content.process).unwrap_or_default()).unwrap()
     }
 
     #[test]
@@ -147,11 +152,11 @@ mod tests {
 
     #[test]
     fn an_edited_file_is_named_in_the_place_of_the_original() {
-        let manifest = "[process.plant]\nvehicle = \"../a.toml\" # why\n";
-        let edits = ["process.plant.vehicle.body.mass=2", "process.plant.vehicle.body.inertia_xx=3"];
-        let expected = "[process.plant]\nvehicle = \"../a@plant.toml\" # why\n";
+        let manifest = "[run]\nduration_s = 1.0\n[process.plant]\nvehicle = \"../a.toml\" # why\n";
+        let edits = ["process.plant.vehicle.body.mass=2", "process.plant.vehicle=../b.toml"];
+        let expected =
+            manifest.replace("../a.toml", "../b@plant.toml") + "# --set process.plant.vehicle.body.mass=2\n";
         assert_eq!(recorded(manifest, &edits), expected);
-        assert_eq!(recorded("a = 1\n", &edits[..1]), format!("a = 1\n# --set {}\n", edits[0]));
     }
 
     #[test]
