@@ -1,7 +1,8 @@
 //! A recording by time: any stretch of it is read without the rest.
 
 use crate::container::blocks::{Block, FIRST, scanned};
-use crate::container::{Channels, Messages, summary};
+use crate::container::summary::summary;
+use crate::container::{Channels, Messages};
 use crate::error::RecordingError;
 use crate::reader::{Record, Recording};
 use std::ops::Range;

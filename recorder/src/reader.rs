@@ -2,8 +2,9 @@
 
 pub use crate::container::{Damage, Messages};
 
+use crate::container::Channels;
 use crate::container::blocks::{Block, leading_attachments};
-use crate::container::{Channels, attachment, summary};
+use crate::container::summary::{attachment, summary};
 use crate::definition::{Definition, Leaf};
 use crate::error::RecordingError;
 use crate::source::Source;

@@ -1,12 +1,14 @@
 // Prints as JSON what a browser shows of recordings that `hummingbus view` serves.
 // Usage: read_view.mjs ADDRESS [no-webgl] [dark] [WIDTHxHEIGHT] [SCREENSHOT.png] [end=PID] [T_NS…]
-// `end` ends the server, to see what the page says then.
+//    or: read_view.mjs ADDRESS live=PID
+// `end` ends the server, to see what the page says then; `live` follows a live run, and ends that.
 
 import { withPage } from "./browser.mjs";
 
 const [address, ...rest] = process.argv.slice(2);
 const screenshot = rest.find((word) => word.endsWith(".png"));
 const server = Number(rest.find((word) => word.startsWith("end="))?.slice(4) ?? 0);
+const run = Number(rest.find((word) => word.startsWith("live="))?.slice(5) ?? 0);
 const times = rest.filter((word) => /^\d+$/.test(word)).map(Number);
 const [width, height] = (rest.find((word) => /^\d+x\d+$/.test(word)) ?? "1280x900").split("x").map(Number);
 
@@ -105,6 +107,20 @@ async function lose(page) {
   return page.$eval("#state", (state) => state.textContent);
 }
 
+/** Follows a live run for two of its seconds, and to its end. */
+async function live(page) {
+  const look = () => page.evaluate(() => {
+    const { playback, shown, room } = window.hummingbus;
+    return { timeNs: shown.timeNs, durationNs: playback.durationNs, isPlaying: playback.isPlaying, isGrowing: playback.isGrowing, isKnown: room.vehicles[0].isKnown };
+  });
+  const first = await look();
+  await page.waitForFunction((from) => window.hummingbus.shown.timeNs >= from + 2e9, {}, first.timeNs);
+  const later = await look();
+  process.kill(run);
+  await page.waitForFunction(() => !window.hummingbus.playback.isGrowing && document.querySelector("#state").textContent === "");
+  return { first, later, last: await look() };
+}
+
 /** Each plot's curves: names, how many points are drawn, the extremes. */
 function curvesShown() {
   const spread = (line) => line.reduce(([low, high], value) => (value === null ? [low, high] : [Math.min(low, value), Math.max(high, value)]), [Infinity, -Infinity]);
@@ -123,6 +139,7 @@ const seen = await withPage(address, async (page, wrong) => {
   await page.waitForFunction(() => window.hummingbus?.error || (window.hummingbus?.shown.timeNs !== null && window.hummingbus?.shown.scopesDrawn));
   const error = await page.evaluate(() => window.hummingbus.error ?? null);
   if (error) throw new Error(error);
+  if (run) return { ...(await live(page)), wrong: [...wrong, ...said] };
   const shown = [];
   for (const timeNs of times) shown.push(await poses(page, timeNs));
   const found = {

@@ -11,9 +11,19 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use tempfile::TempDir;
 
-/// A server of recordings; dropping it ends it.
+/// A process; dropping it ends it.
+struct Process(Child);
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// A server of recordings.
 struct View {
-    child: Child,
+    process: Process,
     address: String,
 }
 
@@ -24,7 +34,7 @@ impl View {
         let mut child = command.spawn().unwrap();
         let mut address = String::new();
         BufReader::new(child.stdout.take().unwrap()).read_line(&mut address).unwrap();
-        Self { child, address: address.trim().to_owned() }
+        Self { process: Process(child), address: address.trim().to_owned() }
     }
 
     fn look(&self, readers: &Path, more: &[&str]) -> Value {
@@ -33,13 +43,6 @@ impl View {
         let seen = look(readers, "read_view.mjs", &arguments);
         assert_eq!((&seen["wrong"], &seen["state"], &seen["overflow"]), (&json!([]), &json!(""), &json!(0)));
         seen
-    }
-}
-
-impl Drop for View {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
     }
 }
 
@@ -141,12 +144,42 @@ fn a_browser_shows_names_that_look_like_html_as_they_are_and_says_that_the_serve
     let name = "<img src=x onerror=alert(1)>";
     let laps = Laps::of(&[name]);
     let view = View::of(&[&laps.recording]);
-    let seen = view.look(&readers, &["1280x900", "0", &format!("end={}", view.child.id())]);
+    let seen = view.look(&readers, &["1280x900", "0", &format!("end={}", view.process.0.id())]);
     assert_eq!((&seen["poses"][0][0]["name"], &seen["images"]), (&json!(name), &json!(0)));
     assert!(seen["legend"].as_str().unwrap().starts_with(name), "{}", seen["legend"]);
     assert_eq!(seen["plots"][0][0]["topic"], format!("/{name}/plant/state"));
     // At the end of the server the page says what to do.
     assert!(seen["lost"].as_str().unwrap().contains("Start it again"), "{}", seen["lost"]);
+}
+
+/// The page goes on with the newest second, and has the whole flight when the run has ended.
+#[test]
+fn a_browser_follows_a_live_run_to_its_end() {
+    let Some(readers) = readers() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let recording = folder.path().join("live.mcap");
+    let partial = folder.path().join("live.partial.mcap");
+    let mut run = Command::new(HUMMINGBUS);
+    run.arg("run").arg(Path::new(ROOT).join("manifests/hover.toml")).arg("--record").arg(&recording);
+    run.args(["--pace", "realtime", "--set", "run.duration_s=4000"]);
+    let mut run = Process(run.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap());
+    while Recording::salvage(&partial).map_or(true, |recording| recording.topics().is_empty()) {
+        assert!(run.0.try_wait().unwrap().is_none(), "the run has ended");
+        std::thread::sleep(std::time::Duration::from_millis(50));
+    }
+    let view = View::of(&[&partial]);
+    let seen =
+        look(&readers, "read_view.mjs", &[view.address.as_ref(), format!("live={}", run.0.id()).as_ref()]);
+    run.0.wait().unwrap();
+    assert_eq!(seen["wrong"], json!([]));
+    let number = |look: &str, key: &str| seen[look][key].as_f64().unwrap();
+    assert!(number("later", "timeNs") >= number("first", "timeNs") + 2e9, "{seen}");
+    assert!(
+        number("later", "durationNs") - number("later", "timeNs") < 4e9,
+        "it stays with the newest: {seen}"
+    );
+    assert!(number("last", "durationNs") >= number("later", "durationNs"), "{seen}");
+    assert_eq!((&seen["later"]["isPlaying"], &seen["last"]["isKnown"]), (&json!(true), &json!(true)));
 }
 
 /// A recording in which vehicles fly laps in a room.

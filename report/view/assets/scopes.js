@@ -64,12 +64,21 @@ class Plot {
       const known = topic?.fields.find(({ path }) => path === field.field);
       return known ? [{ ...field, ...readable(known) }] : [];
     });
-    // The same field of another recording has the same colour, and is dashed.
-    const is = (one) => (other) => one.topic === other.topic && one.field === other.field;
-    const names = this.curves.filter((curve, index) => this.curves.findIndex(is(curve)) === index);
-    for (const curve of this.curves) curve.colour = names.findIndex(is(curve));
+    this.#colour();
     this.#heading();
     this.build();
+  }
+
+  /** Two curves of one field, such as measured and simulated, have one colour; the second is dashed. */
+  #colour() {
+    const twins = (curve) => this.curves.filter(({ field }) => field === curve.field);
+    let colours = 0;
+    for (const curve of this.curves) {
+      const [first, second, third] = twins(curve);
+      const isSecond = curve === second && third === undefined;
+      curve.colour = isSecond ? first.colour : colours++;
+      curve.isDashed = isSecond || curve.recording > 0;
+    }
   }
 
   #heading() {
@@ -77,7 +86,7 @@ class Plot {
     const topics = new Set(this.curves.map(({ topic }) => topic));
     this.values = this.curves.map((curve) => {
       const dash = document.createElement("span");
-      dash.className = curve.recording > 0 ? "dash ghost" : "dash";
+      dash.className = curve.isDashed ? "dash ghost" : "dash";
       dash.style.borderColor = curveColour(curve.colour);
       const value = Object.assign(document.createElement("span"), { className: "value" });
       const name = Object.assign(document.createElement("span"), { className: "name", title: `${curve.topic} ${curve.field}` });
@@ -101,7 +110,7 @@ class Plot {
     const { scopes } = this;
     const axis = { stroke: pageColour("faint"), grid: { stroke: pageColour("line"), width: 1 }, ticks: { stroke: pageColour("line"), width: 1 }, font: "11px system-ui" };
     const series = this.curves.map((curve) => ({
-      stroke: curveColour(curve.colour), width: 1.25, dash: curve.recording > 0 ? [5, 4] : undefined, spanGaps: true, points: { show: false },
+      stroke: curveColour(curve.colour), width: 1.25, dash: curve.isDashed ? [5, 4] : undefined, spanGaps: true, points: { show: false },
     }));
     const options = {
       width, height: HEIGHT, legend: { show: false }, padding: [8, 12, 0, 0],

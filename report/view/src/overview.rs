@@ -64,7 +64,7 @@ impl Overview {
     /// # Errors
     /// If the recording is damaged.
     pub fn fill(&self, shown: &Shown, is_ended: &AtomicBool) -> Result<()> {
-        // One field more than a request may have would be refused: topic by topic they are few enough.
+        // Topic by topic, so that none has more fields than may be asked for at once.
         let mut columns = Vec::new();
         let known = lock(&self.fields).clone();
         for (topic, fields) in &known {

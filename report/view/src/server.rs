@@ -172,7 +172,8 @@ impl Server {
 /// with its place.
 fn keep_up(content: &Content, is_over: &AtomicBool) {
     let is_growing = |entry: &Entry| entry.keep_up(is_over).unwrap_or(false);
-    while content.recordings.iter().map(is_growing).fold(false, |any, more| any || more) {
+    // Each has its turn, whether or not one before it grows.
+    while content.recordings.iter().filter(|entry| is_growing(entry)).count() > 0 {
         for _ in 0..GROWTH_LOOKS {
             if is_over.load(Ordering::Relaxed) {
                 return;
