@@ -2,12 +2,15 @@
 
 use crate::declaration::{Campaign, Meaning, Varied};
 use crate::draw::rounded;
+use crate::row::{columns, require_different};
 use anyhow::{Context, Result, bail};
 use diagnostics::{Diagnostic, ParameterError};
 use inputs::{InputFiles, sha256};
 use runtime::graph::Graph;
 use runtime::manifest::{Manifest, NO_RECORDING};
 use runtime::registry::Registry;
+use std::collections::BTreeMap;
+use std::sync::{Mutex, PoisonError};
 
 /// The manifest of a campaign, not recorded, with the files that its flights read.
 #[derive(Debug)]
@@ -16,15 +19,17 @@ pub struct Base {
     pub manifest: Manifest,
     /// Files that were read.
     pub files: InputFiles,
-    /// Digest of all texts and files.
+    /// Digest of all texts and files, and of the meaning of the varied values.
     pub fingerprint: String,
+    /// Declared numbers by key: the manifest is not read again for each flight.
+    declared: Mutex<BTreeMap<String, Option<f64>>>,
 }
 
 impl Base {
     /// Reads the manifest of `campaign` and all files that it names.
     ///
     /// # Errors
-    /// A problem in the manifest or a file, or a varied key that no manifest has.
+    /// A problem in the manifest or a file, a request that needs a process of its own, or two columns with one name.
     pub fn read(campaign: &Campaign, registry: Registry) -> Result<Self> {
         let files = InputFiles::default();
         let path = &campaign.manifest;
@@ -32,27 +37,15 @@ impl Base {
             files.text(path).with_context(|| format!("cannot read the manifest {}", path.display()))?;
         // Measures are tables: they may stand behind everything else.
         let text = if campaign.measures.is_empty() { text } else { format!("{text}\n{}", campaign.measures) };
-        let overrides = [campaign.set.clone(), vec![format!("run.record={NO_RECORDING}")]].concat();
+        let own = [format!("run.record={NO_RECORDING}"), "run.pace=free".to_owned()];
+        let overrides = [&campaign.set[..], &own].concat();
         let manifest = Manifest::parse(text, path, &overrides, registry)?;
-        let graph = Graph::build_from(&manifest, files.clone())?;
-        let texts: Vec<&str> = manifest.texts().collect();
-        let read: Vec<String> = graph.files.used().into_iter().map(|file| file.sha256).collect();
-        let fingerprint = sha256(format!("{texts:?}{read:?}").as_bytes());
-        let base = Self { manifest, files: graph.files, fingerprint };
-        base.require_judgement()?;
-        Ok(base)
-    }
-
-    fn require_judgement(&self) -> Result<()> {
-        let conditions = self.manifest.content.conditions();
-        if conditions.topics().is_empty() {
-            bail!(
-                "{}: the manifest has neither [[pass]] nor [[measure]], so that its flights have no figures; add one, or \
-                 [[measure]] tables to the campaign file",
-                self.manifest.path.display()
-            );
-        }
-        Ok(())
+        let graph = Graph::build_from(&manifest, files)?;
+        runtime::require_one_thread(&manifest, &graph)?;
+        require_judgement(&manifest)?;
+        require_different(&campaign.vary, &columns(&manifest.content))?;
+        let fingerprint = fingerprint(campaign, &manifest, &graph);
+        Ok(Self { manifest, files: graph.files, fingerprint, declared: Mutex::default() })
     }
 
     /// Values of `varied` for a drawn number: by key.
@@ -64,7 +57,7 @@ impl Base {
             if varied.meaning == Meaning::Value {
                 return Ok((key.clone(), drawn));
             }
-            let declared = self.manifest.number(&self.files, key)?.ok_or_else(|| {
+            let declared = self.declared(key)?.ok_or_else(|| {
                 let message = format!("`{key}` has no declared number, which a factor or an offset needs");
                 varied.problem(
                     ParameterError::conflict("key", message),
@@ -75,6 +68,16 @@ impl Base {
             Ok((key.clone(), rounded(value)))
         };
         varied.keys.iter().map(value).collect()
+    }
+
+    fn declared(&self, key: &str) -> Result<Option<f64>, Diagnostic> {
+        let mut declared = self.declared.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = declared.get(key) {
+            return Ok(*known);
+        }
+        let number = self.manifest.number(&self.files, key)?;
+        declared.insert(key.to_owned(), number);
+        Ok(number)
     }
 
     /// Checks the manifest of one flight, without flying it.
@@ -92,4 +95,26 @@ impl Base {
     pub fn of_flight(&self, sets: &[String]) -> Result<Manifest, Diagnostic> {
         self.manifest.overridden(sets)
     }
+}
+
+/// Digest of everything but the drawn numbers that a row depends on.
+fn fingerprint(campaign: &Campaign, manifest: &Manifest, graph: &Graph) -> String {
+    let texts: Vec<&str> = manifest.texts().collect();
+    // Each node lists the files that it reads.
+    let files: Vec<&str> =
+        graph.plan.nodes.iter().flat_map(|node| &node.files).map(|file| file.sha256.as_str()).collect();
+    let varied: Vec<_> =
+        campaign.vary.iter().map(|varied| (&varied.name, &varied.keys, varied.meaning)).collect();
+    sha256(format!("{texts:?}{files:?}{varied:?}").as_bytes())
+}
+
+fn require_judgement(manifest: &Manifest) -> Result<()> {
+    if manifest.content.conditions().topics().is_empty() {
+        bail!(
+            "{}: the manifest has neither [[pass]] nor [[measure]], so that its flights have no figures; add one, or \
+             [[measure]] tables to the campaign file",
+            manifest.path.display()
+        );
+    }
+    Ok(())
 }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use toml::Spanned;
 
 /// Most flights of a campaign.
-pub const FLIGHTS_MAX: u64 = 10_000_000;
+pub const FLIGHTS_MAX: u64 = 1_000_000;
 
 /// A campaign, as its file declares it.
 ///
@@ -153,6 +153,13 @@ impl Campaign {
             let error = ParameterError::value("timeout_s_host", "seconds above 0", timeout_s_host);
             return Err(at(&span, error, "leave it out for 60 s"));
         }
+        if let Some(set) =
+            file.set.iter().find(|set| set.split('=').next().is_some_and(|key| key.trim() == "run.seed"))
+        {
+            let message = format!("`{set}` in `set`: each flight has a seed of its own");
+            let error = ParameterError::conflict("set", message);
+            return Err(at(&(0..0), error, "change `seed` of the campaign, or vary run.seed"));
+        }
         let mut measures = toml::Table::new();
         if !file.measure.is_empty() {
             measures.insert("measure".into(), file.measure.into());
@@ -263,7 +270,7 @@ mod tests {
         for (text, expected) in [
             (
                 "flights = 0\n[[vary]]\nkey = \"a\"\nvalues = [1]",
-                "c.toml:2:11: `flights` must be 1 to 10000000 flights",
+                "c.toml:2:11: `flights` must be 1 to 1000000 flights",
             ),
             ("flights = 2\n[[vary]]\nkey = \"a\"", "c.toml:3:1: `vary` must be one of `values`"),
             ("flights = 2\n[[vary]]\nvalues = [1]", "c.toml:3:1: `key` is missing"),

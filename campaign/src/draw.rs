@@ -39,7 +39,9 @@ fn column(campaign: &Campaign, varied: &Varied) -> Vec<f64> {
         let cells = permutation(&mut random, count);
         cells.into_iter().map(|cell| (cell as f64 + uniform(&mut random)) / count as f64).collect()
     };
-    quantiles.into_iter().map(|quantile| rounded(varied.distribution.at(quantile))).collect()
+    let is_whole = varied.distribution.is_whole();
+    let value = |quantile| varied.distribution.at(quantile);
+    quantiles.into_iter().map(value).map(|value| if is_whole { value } else { rounded(value) }).collect()
 }
 
 /// The numbers below `count` in random order (Fisher and Yates).
@@ -96,6 +98,14 @@ mod tests {
             flights.iter().map(|flight| (flight[0] - 0.5) * (flight[1] - 0.5)).sum::<f64>() / 400.0;
         // The covariance of independent values has a standard deviation of 1/12/20.
         assert!(mean.abs() < 4.0 / 240.0, "{mean}");
+    }
+
+    #[test]
+    fn whole_numbers_keep_all_digits() {
+        let text = "flights = 9\n[[vary]]\nkey = \"a\"\nintegers = [1234567891, 1234567899]";
+        let mut drawn: Vec<f64> = draw(&campaign(text)).iter().map(|flight| flight[0]).collect();
+        drawn.sort_by(f64::total_cmp);
+        assert_eq!(drawn, (1..=9).map(|digit| 1_234_567_890.0 + f64::from(digit)).collect::<Vec<_>>());
     }
 
     #[test]

@@ -1,13 +1,15 @@
 //! The plan of a campaign: the drawn values of every flight, a CSV file that may be read and edited before it is flown.
 
 use crate::base::Base;
-use crate::declaration::{Campaign, Varied};
+use crate::declaration::{Campaign, FLIGHTS_MAX, Varied};
 use crate::draw::draw;
 use anyhow::{Context, Result, bail};
 use std::path::Path;
 
 /// Name of the column with the number of the flight.
 const FLIGHT: &str = "flight";
+/// Seeds are whole numbers of TOML.
+const SEEDS: u64 = 1 << 62;
 /// The override of the seed of a run.
 const SEED: &str = "run.seed";
 
@@ -88,7 +90,10 @@ impl Plan {
     pub fn sets(&self, campaign: &Campaign, base: &Base, flight: usize) -> Result<Vec<String>> {
         let mut sets = Vec::new();
         if !campaign.vary.iter().any(|varied| varied.keys.iter().any(|key| key == SEED)) {
-            sets.push(format!("{SEED}={}", flight + 1));
+            // Campaigns with other seeds share no noise.
+            let seed =
+                campaign.seed.wrapping_sub(1).wrapping_mul(FLIGHTS_MAX).wrapping_add(flight as u64 + 1);
+            sets.push(format!("{SEED}={}", seed % SEEDS));
         }
         for (varied, drawn) in campaign.vary.iter().zip(&self.flights[flight]) {
             let values = base.values(varied, *drawn)?;

@@ -6,16 +6,18 @@ use crate::worker::{Greeting, Job, Order};
 use anyhow::{Context, Result, bail};
 use runtime::event::StopToken;
 use std::io::{BufRead as _, BufReader, Write as _};
-use std::os::unix::process::ExitStatusExt as _;
+use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
 use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
 use std::sync::Mutex;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::{Duration, Instant};
 
-/// Host time between two looks at the stop token while a flight is waited for.
+/// Host time between two looks at the stop token while a worker is waited for.
 const LOOK: Duration = Duration::from_millis(50);
 /// Host time in which a worker must have read its inputs.
 const START: Duration = Duration::from_secs(60);
+/// Workers that are started, one after another, before the campaign is given up.
+const STARTS: usize = 3;
 
 /// Workers of a campaign.
 #[derive(Debug)]
@@ -62,8 +64,10 @@ impl Pool<'_> {
             drop(sender);
             let mut end = Ok(());
             for row in rows {
-                end = end.and_then(|()| take(row?));
-                if end.is_err() {
+                // Flights that end behind an error are kept too.
+                let taken = row.and_then(&mut take);
+                if let (Err(error), Ok(())) = (taken, &end) {
+                    end = Err(error);
                     halt.stop();
                 }
             }
@@ -82,19 +86,43 @@ impl Pool<'_> {
         while let Some(job) = next() {
             let mut alive = match worker.take() {
                 Some(worker) => worker,
-                None => Worker::start(self.command, self.order)?,
+                None => match self.start(stop)? {
+                    Some(started) => started,
+                    None => return Ok(()),
+                },
             };
             match alive.fly(&job, self.timeout, stop)? {
                 Flown::Row(row) => {
                     worker = Some(alive);
                     rows.send(Ok(row))?;
                 }
-                Flown::Ended(why) => rows.send(Ok(Row::broken(job.flight, why)))?,
+                Flown::Ended(why) => rows.send(Ok(Row::ended(job.flight, why)))?,
                 Flown::Stopped => return Ok(()),
             }
         }
         Ok(())
     }
+
+    /// Starts a worker, again if it dies before it is ready; `None` if the campaign is stopped meanwhile.
+    fn start(&self, stop: &StopToken) -> Result<Option<Worker>> {
+        let mut last = String::new();
+        for _ in 0..STARTS {
+            let mut worker = Worker::spawn(self.command)?;
+            match worker.greet(self.order, stop)? {
+                Greeted::Ready => return Ok(Some(worker)),
+                Greeted::Stopped => return Ok(None),
+                Greeted::Ended(why) => last = why,
+            }
+        }
+        bail!("{STARTS} workers ended before they were ready; the last one: {last}")
+    }
+}
+
+/// End of a worker's start.
+enum Greeted {
+    Ready,
+    Ended(String),
+    Stopped,
 }
 
 /// End of a flight.
@@ -102,6 +130,17 @@ enum Flown {
     Row(Row),
     /// The worker died or was ended; the reason.
     Ended(String),
+    /// The campaign was stopped.
+    Stopped,
+}
+
+/// Result of waiting for a worker.
+enum Answer {
+    Line(String),
+    /// The worker has ended.
+    Dead(String),
+    /// It took longer than it may.
+    Late,
     /// The campaign was stopped.
     Stopped,
 }
@@ -114,10 +153,15 @@ struct Worker {
 }
 
 impl Worker {
-    fn start(command: &[String], order: &Order) -> Result<Self> {
+    fn spawn(command: &[String]) -> Result<Self> {
         let (program, arguments) = command.split_first().context("no command for the workers")?;
-        let child =
-            Command::new(program).args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn();
+        // A group of its own: Ctrl-C ends the campaign, and the flights under way end as they are.
+        let child = Command::new(program)
+            .args(arguments)
+            .process_group(0)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn();
         let mut child = child.with_context(|| format!("cannot start the worker {program}"))?;
         let (input, output) = (child.stdin.take(), child.stdout.take());
         let (input, output) = input.zip(output).context("a worker has no pipes")?;
@@ -126,14 +170,21 @@ impl Worker {
             // The receiver is gone once the worker is not needed.
             BufReader::new(output).lines().try_for_each(|line| sender.send(line)).ok();
         });
-        let mut worker = Self { child, input, lines };
-        worker.ask(order)?;
-        match worker.lines.recv_timeout(START) {
-            Ok(line) => match serde_json::from_str(&line?)? {
-                Greeting::Ready => Ok(worker),
+        Ok(Self { child, input, lines })
+    }
+
+    /// Gives the worker its order, and waits until it has read its inputs.
+    fn greet(&mut self, order: &Order, stop: &StopToken) -> Result<Greeted> {
+        // A worker that is dead says so below.
+        let _ = self.ask(order);
+        match self.answer(START, stop)? {
+            Answer::Line(line) => match serde_json::from_str(&line)? {
+                Greeting::Ready => Ok(Greeted::Ready),
                 Greeting::Refused(why) => bail!("{why}"),
             },
-            Err(_) => bail!("a worker {} before it was ready", worker.end()),
+            Answer::Dead(why) => Ok(Greeted::Ended(why)),
+            Answer::Late => Ok(Greeted::Ended(format!("it was not ready within {} s", START.as_secs()))),
+            Answer::Stopped => Ok(Greeted::Stopped),
         }
     }
 
@@ -144,24 +195,30 @@ impl Worker {
     fn fly(&mut self, job: &Job, timeout: Duration, stop: &StopToken) -> Result<Flown> {
         // A worker that is dead says so below.
         let _ = self.ask(job);
+        Ok(match self.answer(timeout, stop)? {
+            Answer::Line(line) => {
+                Flown::Row(serde_json::from_str(&line).context("a worker's answer is not a row")?)
+            }
+            Answer::Dead(why) => Flown::Ended(format!("the worker {why}")),
+            Answer::Late => {
+                let seconds = timeout.as_secs_f64();
+                Flown::Ended(format!("the flight took more than {seconds} s of host time (timeout_s_host)"))
+            }
+            Answer::Stopped => Flown::Stopped,
+        })
+    }
+
+    /// The next line of the worker.
+    fn answer(&mut self, timeout: Duration, stop: &StopToken) -> Result<Answer> {
         let begin = Instant::now();
         loop {
             match self.lines.recv_timeout(LOOK) {
-                Ok(line) => {
-                    let row: Row = serde_json::from_str(&line?).context("a worker's answer is not a row")?;
-                    return Ok(Flown::Row(row));
-                }
-                Err(RecvTimeoutError::Disconnected) => {
-                    return Ok(Flown::Ended(format!("the worker {}", self.end())));
-                }
+                Ok(line) => return Ok(Answer::Line(line?)),
+                Err(RecvTimeoutError::Disconnected) if stop.count() > 0 => return Ok(Answer::Stopped),
+                Err(RecvTimeoutError::Disconnected) => return Ok(Answer::Dead(self.end())),
                 // A second stop does not wait for the flight.
-                Err(RecvTimeoutError::Timeout) if stop.count() > 1 => return Ok(Flown::Stopped),
-                Err(RecvTimeoutError::Timeout) if begin.elapsed() > timeout => {
-                    let seconds = timeout.as_secs_f64();
-                    return Ok(Flown::Ended(format!(
-                        "the flight took more than {seconds} s of host time (timeout_s_host)"
-                    )));
-                }
+                Err(RecvTimeoutError::Timeout) if stop.count() > 1 => return Ok(Answer::Stopped),
+                Err(RecvTimeoutError::Timeout) if begin.elapsed() > timeout => return Ok(Answer::Late),
                 Err(RecvTimeoutError::Timeout) => {}
             }
         }

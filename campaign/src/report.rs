@@ -3,13 +3,14 @@
 use crate::base::Base;
 use crate::declaration::Campaign;
 use crate::plan::Plan;
-use crate::row::{Row, columns};
+use crate::row::{Row, columns, count};
 use crate::statistics::{clopper_pearson, quantiles, rank_correlation};
 use anyhow::Result;
 use runtime::manifest::PassCondition;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt;
+use std::path::Path;
 
 /// Confidence of the interval of the pass rate.
 const CONFIDENCE: f64 = 0.95;
@@ -93,16 +94,18 @@ pub struct Worst {
     pub flight: u64,
     /// Reason: the failed condition, the error, or the smallest margin.
     pub reason: String,
-    /// Command that flies it again, recorded.
+    /// Command that flies it again, recorded, to the same figures.
     pub command: String,
+    /// Command that flies it without the campaign's folder and measures.
+    pub run: String,
 }
 
 impl Report {
-    /// The report of the `rows` flown so far.
+    /// The report of the `rows` flown so far; `folder` holds the plan.
     ///
     /// # Errors
     /// If the values of a flight cannot be written as overrides.
-    pub fn of(campaign: &Campaign, base: &Base, plan: &Plan, rows: &[Row]) -> Result<Self> {
+    pub fn of(campaign: &Campaign, base: &Base, plan: &Plan, rows: &[Row], folder: &Path) -> Result<Self> {
         let figures = columns(&base.manifest.content);
         let flights = rows.len() as u64;
         let passed = rows.iter().filter(|row| row.passed).count() as u64;
@@ -119,7 +122,7 @@ impl Report {
             errors: errors(rows),
             figures: spreads(&figures, rows),
             influences: influences(plan, &figures, rows),
-            worst: worst(campaign, base, plan, rows)?,
+            worst: worst(campaign, base, plan, rows, folder)?,
         })
     }
 }
@@ -186,15 +189,17 @@ fn influences(plan: &Plan, figures: &[String], rows: &[Row]) -> Vec<Influence> {
     influences
 }
 
-/// The worst flights: those without figures, then by the smallest margin to a limit.
-fn worst(campaign: &Campaign, base: &Base, plan: &Plan, rows: &[Row]) -> Result<Vec<Worst>> {
+/// The worst flights: those without figures, then those that failed, then those with the smallest margin to a limit.
+fn worst(campaign: &Campaign, base: &Base, plan: &Plan, rows: &[Row], folder: &Path) -> Result<Vec<Worst>> {
     let mut ranked: Vec<(f64, String, &Row)> = rows.iter().map(|row| rank(base, row)).collect();
-    ranked.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.2.flight.cmp(&b.2.flight)));
+    let order = |ranked: &(f64, String, &Row)| (ranked.2.error.is_none(), ranked.2.passed);
+    ranked
+        .sort_by(|a, b| order(a).cmp(&order(b)).then(a.0.total_cmp(&b.0)).then(a.2.flight.cmp(&b.2.flight)));
     ranked.truncate(WORST);
     let listed = |(_, reason, row): (f64, String, &Row)| {
         let sets = plan.sets(campaign, base, row.flight as usize)?;
-        let command = command(campaign, row.flight, &sets);
-        Ok(Worst { flight: row.flight, reason, command })
+        let (command, run) = (again(campaign, folder, row.flight), run(campaign, row.flight, &sets));
+        Ok(Worst { flight: row.flight, reason, command, run })
     };
     ranked.into_iter().map(listed).collect()
 }
@@ -207,15 +212,12 @@ fn rank<'r>(base: &Base, row: &'r Row) -> (f64, String, &'r Row) {
     let mut values = row.figures.iter();
     let margins = base.manifest.content.pass.iter().map(|pass| {
         let pass = pass.get_ref();
-        let count = if pass.statistic == runtime::manifest::Statistic::Every { 2 } else { 1 };
-        let margins = values
-            .by_ref()
-            .take(count)
-            .map(|value| value.map_or(f64::NEG_INFINITY, |value| margin(pass, value)));
+        let values = values.by_ref().take(count(pass.statistic));
+        let margins = values.map(|value| value.map_or(f64::NEG_INFINITY, |value| margin(pass, value)));
         (margins.fold(f64::INFINITY, f64::min), &pass.name)
     });
-    let (margin, name) =
-        margins.min_by(|a, b| a.0.total_cmp(&b.0)).map_or((f64::INFINITY, ""), |(m, n)| (m, n));
+    let least = margins.min_by(|a, b| a.0.total_cmp(&b.0));
+    let (margin, name) = least.map_or((f64::INFINITY, ""), |(margin, name)| (margin, name));
     let reason = match (&row.failed, row.failed_at_s) {
         (Some(failed), Some(at_s)) => format!("failed first at {at_s:.3} s: {failed}"),
         (Some(failed), None) => format!("failed: {failed}"),
@@ -237,8 +239,14 @@ fn margin(pass: &PassCondition, value: f64) -> f64 {
     below.min(above) / if scale > 0.0 { scale } else { 1.0 }
 }
 
-/// The command that flies a flight again, recorded.
-fn command(campaign: &Campaign, flight: u64, sets: &[String]) -> String {
+/// The command that flies a flight again, recorded, to the same figures.
+fn again(campaign: &Campaign, folder: &Path, flight: u64) -> String {
+    let [file, folder] = [&campaign.path, folder].map(|path| word(&path.display().to_string()));
+    format!("hummingbus campaign {file} --out {folder} --fly {flight}")
+}
+
+/// The `run` command of a flight: without the measures of the campaign file, and in no need of the folder.
+fn run(campaign: &Campaign, flight: u64, sets: &[String]) -> String {
     let manifest = word(&campaign.manifest.display().to_string());
     let sets = campaign.set.iter().chain(sets).map(|set| format!(" --set {}", word(set)));
     format!("hummingbus run {manifest} --record flight-{flight}.mcap{}", sets.collect::<String>())
@@ -253,26 +261,16 @@ fn word(text: &str) -> String {
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [low, high] = self.interval.map(|limit| 100.0 * limit);
+        let (campaign, passed, flights, rate) =
+            (&self.campaign, self.passed, self.flights, 100.0 * self.pass_rate);
         writeln!(
             f,
-            "{}: {} of {} flights passed: {:.2} % ({low:.2} … {high:.2} % at 95 %)",
-            self.campaign,
-            self.passed,
-            self.flights,
-            100.0 * self.pass_rate
+            "{campaign}: {passed} of {flights} flights passed: {rate:.2} % ({low:.2} … {high:.2} % at 95 %)"
         )?;
-        if self.flights < self.planned {
-            writeln!(
-                f,
-                "  {} of {} planned flights were not flown",
-                self.planned - self.flights,
-                self.planned
-            )?;
+        if flights < self.planned {
+            writeln!(f, "  {} of {} planned flights were not flown", self.planned - flights, self.planned)?;
         }
-        for Failure { condition, flights, median_s } in &self.failures {
-            let at = median_s.map_or(String::new(), |at_s| format!(", at {at_s:.2} s in the median"));
-            writeln!(f, "  failed first in {flights} flights{at}: {condition}")?;
-        }
+        self.failures.iter().try_for_each(|failure| writeln!(f, "  {failure}"))?;
         for (error, flights) in self.errors.iter().take(WORST) {
             writeln!(
                 f,
@@ -281,14 +279,7 @@ impl fmt::Display for Report {
             )?;
         }
         writeln!(f, "  least, 5 %, median, 95 %, greatest:")?;
-        for Spread { figure, quantiles, .. } in &self.figures {
-            let values: Vec<String> = quantiles.iter().map(|value| format!("{value:.4}")).collect();
-            writeln!(
-                f,
-                "    {figure}: {}",
-                if values.is_empty() { "no value".to_owned() } else { values.join(", ") }
-            )?;
-        }
+        self.figures.iter().try_for_each(|spread| writeln!(f, "    {spread}"))?;
         writeln!(f, "  rank correlations (Spearman), strongest first:")?;
         for Influence { varied, figure, rank_correlation, .. } in self.influences.iter().take(WORST) {
             writeln!(f, "    {rank_correlation:+.2} of `{varied}` with: {figure}")?;
@@ -297,9 +288,24 @@ impl fmt::Display for Report {
             writeln!(f, "    none that chance does not explain")?;
         }
         writeln!(f, "  worst flights:")?;
-        for Worst { flight, reason, .. } in &self.worst {
-            writeln!(f, "    {flight}: {}", reason.lines().next().unwrap_or_default())?;
-        }
-        Ok(())
+        let mut worst = self.worst.iter();
+        worst.try_for_each(|Worst { flight, reason, .. }| {
+            writeln!(f, "    {flight}: {}", reason.lines().next().unwrap_or_default())
+        })
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let at = self.median_s.map_or(String::new(), |at_s| format!(", at {at_s:.2} s in the median"));
+        write!(f, "failed first in {} flights{at}: {}", self.flights, self.condition)
+    }
+}
+
+impl fmt::Display for Spread {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let values: Vec<String> = self.quantiles.iter().map(|value| format!("{value:.4}")).collect();
+        let values = if values.is_empty() { "no value".to_owned() } else { values.join(", ") };
+        write!(f, "{}: {values}", self.figure)
     }
 }

@@ -1,5 +1,7 @@
 //! The result of one flight.
 
+use crate::declaration::Varied;
+use diagnostics::{Diagnostic, ParameterError};
 use report::summary::Summary;
 use runtime::manifest::{Content, Statistic};
 use serde::{Deserialize, Serialize};
@@ -24,6 +26,40 @@ pub struct Row {
     pub figures: Vec<Option<f64>>,
     /// Host time that the flight took, s.
     pub wall_s: f64,
+    /// True if the host ended the flight: another attempt may end otherwise, and is made by the next call.
+    #[serde(default)]
+    pub is_of_host: bool,
+}
+
+/// Columns of every campaign.
+pub const COLUMNS: [&str; 6] = ["flight", "passed", "failed", "failed_at_s", "error", "wall_s"];
+
+/// Refuses two columns with one name: `varied` values, `figures`, and the columns of every campaign.
+///
+/// # Errors
+/// The varied value whose name is taken, or the name of two conditions.
+pub fn require_different(vary: &[Varied], figures: &[String]) -> Result<(), Diagnostic> {
+    let is_taken = |name: &str| COLUMNS.contains(&name) || figures.iter().any(|figure| figure == name);
+    if let Some(varied) = vary.iter().find(|varied| is_taken(&varied.name)) {
+        let message = format!("`{}` is the name of another column of the results", varied.name);
+        return Err(varied.problem(ParameterError::conflict("name", message), "give it another `name`"));
+    }
+    let twice =
+        |(index, name): (usize, &String)| figures[..index].contains(name) || COLUMNS.contains(&name.as_str());
+    match figures.iter().enumerate().find(|pair| twice(*pair)) {
+        None => Ok(()),
+        Some((_, name)) => {
+            let message = format!("two columns of the results would be called `{name}`");
+            Err(Diagnostic::in_file("the conditions of the manifest", message)
+                .help("give each condition another `name`"))
+        }
+    }
+}
+
+/// Number of values of a condition with this statistic.
+#[must_use]
+pub fn count(statistic: Statistic) -> usize {
+    if statistic == Statistic::Every { 2 } else { 1 }
 }
 
 /// Names of the figures of the conditions in `content`: the columns of [`Row::figures`].
@@ -51,7 +87,7 @@ impl Row {
             content.pass.iter().chain(&content.measure).zip(summary.pass.iter().chain(&summary.measures));
         let mut figures: Vec<Option<f64>> = Vec::new();
         for (condition, verdict) in conditions {
-            let count = if condition.get_ref().statistic == Statistic::Every { 2 } else { 1 };
+            let count = count(condition.get_ref().statistic);
             let values = verdict.values.iter().map(|value| Some(*value).filter(|value| value.is_finite()));
             figures.extend(values.chain(std::iter::repeat(None)).take(count));
         }
@@ -61,7 +97,14 @@ impl Row {
         }
         let (failed, failed_at_s) = first_failure(summary);
         let (passed, wall_s) = (summary.passed, summary.host_s);
-        Self { flight, drawn: Vec::new(), passed, failed, failed_at_s, error: None, figures, wall_s }
+        let (drawn, error, is_of_host) = (Vec::new(), None, false);
+        Self { flight, drawn, passed, failed, failed_at_s, error, figures, wall_s, is_of_host }
+    }
+
+    /// The row of a flight that the host ended.
+    #[must_use]
+    pub fn ended(flight: u64, error: String) -> Self {
+        Self { is_of_host: true, ..Self::broken(flight, error) }
     }
 
     /// The row of a flight that was not flown to its end.

@@ -75,10 +75,11 @@ fn ranks(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
     let mut ranks = vec![0.0; values.len()];
+    let mut below = 0;
     for equal in order.chunk_by(|a, b| values[*a].total_cmp(&values[*b]).is_eq()) {
-        let first = order.iter().position(|index| *index == equal[0]).unwrap_or(0);
-        let mean = first as f64 + 0.5 * (equal.len() as f64 + 1.0);
+        let mean = below as f64 + 0.5 * (equal.len() as f64 + 1.0);
         equal.iter().for_each(|index| ranks[*index] = mean);
+        below += equal.len();
     }
     ranks
 }

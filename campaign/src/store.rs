@@ -6,20 +6,23 @@ use crate::declaration::Campaign;
 use crate::plan::Plan;
 use crate::row::Row;
 use anyhow::{Context, Result, bail};
-use inputs::InputFiles;
+use inputs::sha256;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{BufRead as _, BufReader, Write as _};
+use std::io::{BufRead as _, BufReader, Read as _, Seek as _, Write as _};
+use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::{Path, PathBuf};
+use tempfile::TempDir;
 
 /// The plan.
 pub const PLAN: &str = "plan.csv";
 /// The rows flown so far, in the order in which they ended.
 const ROWS: &str = "rows.jsonl";
+/// The lock, which holds the digest of the plan as it was drawn.
 const LOCK: &str = "lock";
-/// Folder in which workers write while they fly.
-const WORK: &str = "workers";
+/// Start of the name of the folder in which workers write while they fly.
+const WORK: &str = ".workers-";
 
 /// The output folder, locked.
 #[derive(Debug)]
@@ -28,6 +31,7 @@ pub struct Store {
     rows: File,
     /// Held open: the lock goes with the process.
     _lock: File,
+    work: TempDir,
 }
 
 /// First line of the rows: what they were flown of.
@@ -42,7 +46,7 @@ impl Store {
     /// Opens or makes `folder` for `campaign`: its plan, which is written if it is not there, and the rows flown so far.
     ///
     /// # Errors
-    /// If another campaign uses the folder, holds something else, or was flown of other inputs.
+    /// If another campaign uses the folder, it holds something else, or its flights were flown of other inputs.
     pub fn open(
         folder: &Path,
         campaign: &Campaign,
@@ -51,49 +55,41 @@ impl Store {
     ) -> Result<(Self, Plan, BTreeMap<u64, Row>)> {
         let shown = folder.display();
         std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {shown}"))?;
-        let lock = locked(folder)?;
-        let plan = plan(folder, campaign)?;
+        require_own(folder)?;
+        let mut lock = locked(folder)?;
+        remove_left_work(folder)?;
+        let plan = plan(folder, campaign, &mut lock)?;
         let header =
             Header { version: version(), fingerprint: fingerprint.to_owned(), figures: figures.to_owned() };
         let path = folder.join(ROWS);
         let (mut flown, whole) = if path.exists() { read(&path, &header)? } else { (BTreeMap::new(), 0) };
-        // The plan may have been edited since.
-        flown.retain(|flight, row| plan.flights.get(*flight as usize) == Some(&row.drawn));
-        let file = OpenOptions::new().create(true).append(true).open(&path);
-        let mut rows = file.with_context(|| format!("cannot write {}", path.display()))?;
+        // The plan may have been edited since, and what the host ended is flown again.
+        flown.retain(|flight, row| !row.is_of_host && plan.flights.get(*flight as usize) == Some(&row.drawn));
+        let mut rows = opened(&path, OpenOptions::new().create(true).append(true))?;
         // A line that was cut off is written again.
         rows.set_len(whole)?;
         if whole == 0 {
             writeln!(rows, "{}", serde_json::to_string(&header)?)?;
         }
-        Ok((Self { folder: folder.to_owned(), rows, _lock: lock }, plan, flown))
+        let work = tempfile::Builder::new().prefix(WORK).tempdir_in(folder);
+        let work = work.with_context(|| format!("cannot make a folder in {shown}"))?;
+        Ok((Self { folder: folder.to_owned(), rows, _lock: lock, work }, plan, flown))
     }
 
-    /// Makes the folder in which workers write while they fly, empty.
+    /// Folder in which workers write while they fly; it goes with this value.
     ///
     /// # Errors
-    /// If it cannot be made.
-    pub fn make_work_folder(&self) -> Result<PathBuf> {
-        let folder = std::path::absolute(self.folder.join(WORK))?;
-        // One of a campaign that was killed.
-        self.remove_work_folder()?;
-        std::fs::create_dir(&folder)
-            .with_context(|| format!("cannot make the folder {}", folder.display()))?;
-        Ok(folder)
+    /// If the working directory is gone.
+    pub fn work_folder(&self) -> Result<PathBuf> {
+        Ok(std::path::absolute(self.work.path())?)
     }
 
-    /// Removes that folder.
+    /// Writes the file `name` whole, or not at all: beside its place first, then in its place.
     ///
     /// # Errors
-    /// If it cannot be removed.
-    pub fn remove_work_folder(&self) -> Result<()> {
-        let folder = self.folder.join(WORK);
-        match std::fs::remove_dir_all(&folder) {
-            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-                Err(error).context(format!("cannot remove {}", folder.display()))
-            }
-            _ => Ok(()),
-        }
+    /// If the folder cannot be written to.
+    pub fn write(&self, name: &str, write: impl FnOnce(&mut File) -> Result<()>) -> Result<()> {
+        put(&self.folder, name, write)
     }
 
     /// Adds a row.
@@ -111,10 +107,48 @@ fn version() -> String {
     env!("CARGO_PKG_VERSION").to_owned()
 }
 
+/// Refuses a folder with other files: those of a campaign might take their place.
+fn require_own(folder: &Path) -> Result<()> {
+    let is_of_campaign = [PLAN, ROWS, LOCK].iter().any(|name| folder.join(name).exists());
+    let is_empty = std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_none());
+    if is_of_campaign || is_empty {
+        return Ok(());
+    }
+    bail!("{} is not empty, and holds no campaign; choose another --out", folder.display())
+}
+
+/// Removes the folders of workers of a campaign that was killed.
+fn remove_left_work(folder: &Path) -> Result<()> {
+    for entry in std::fs::read_dir(folder)?.flatten() {
+        if entry.file_name().to_string_lossy().starts_with(WORK) {
+            let path = entry.path();
+            std::fs::remove_dir_all(&path).with_context(|| format!("cannot remove {}", path.display()))?;
+        }
+    }
+    Ok(())
+}
+
+/// Opens a file of the folder; a link in its place is not followed.
+fn opened(path: &Path, options: &mut OpenOptions) -> Result<File> {
+    let no_follow = rustix::fs::OFlags::NOFOLLOW.bits() as i32;
+    let file = options.custom_flags(no_follow).open(path);
+    file.with_context(|| format!("cannot open {}", path.display()))
+}
+
+/// Writes the file `name` in `folder` beside its place first; a link in its place is replaced.
+fn put(folder: &Path, name: &str, write: impl FnOnce(&mut File) -> Result<()>) -> Result<()> {
+    let path = folder.join(name);
+    let failed = || format!("cannot write {}", path.display());
+    let mut draft = tempfile::Builder::new().prefix(".draft-").tempfile_in(folder).with_context(failed)?;
+    // As other files of the user: readable as the umask says.
+    draft.as_file().set_permissions(std::os::unix::fs::PermissionsExt::from_mode(0o644))?;
+    write(draft.as_file_mut()).with_context(failed)?;
+    draft.persist(&path).map(drop).with_context(failed)
+}
+
 fn locked(folder: &Path) -> Result<File> {
     let path = folder.join(LOCK);
-    let file = OpenOptions::new().create(true).truncate(false).write(true).open(&path);
-    let file = file.with_context(|| format!("cannot open {}", path.display()))?;
+    let file = opened(&path, OpenOptions::new().create(true).truncate(false).read(true).write(true))?;
     match file.try_lock() {
         Ok(()) => Ok(file),
         Err(TryLockError::WouldBlock) => {
@@ -125,25 +159,34 @@ fn locked(folder: &Path) -> Result<File> {
 }
 
 /// The plan in the folder, drawn and written where there is none.
-fn plan(folder: &Path, campaign: &Campaign) -> Result<Plan> {
-    let path = folder.join(PLAN);
-    if path.exists() {
-        let text =
-            InputFiles::default().text(&path).with_context(|| format!("cannot read {}", path.display()))?;
-        return Plan::parse(&path, &text, campaign);
+fn plan(folder: &Path, campaign: &Campaign, lock: &mut File) -> Result<Plan> {
+    let (path, drawn) = (folder.join(PLAN), Plan::of(campaign));
+    let text = drawn.to_csv()?;
+    let digest = sha256(&text);
+    if !path.exists() {
+        put(folder, PLAN, |file| Ok(file.write_all(&text)?))?;
+        lock.set_len(0)?;
+        lock.rewind()?;
+        lock.write_all(digest.as_bytes())?;
+        return Ok(drawn);
     }
-    let plan = Plan::of(campaign);
-    let draft = folder.join(format!("{PLAN}.draft"));
-    std::fs::write(&draft, plan.to_csv()?).with_context(|| format!("cannot write {}", draft.display()))?;
-    std::fs::rename(&draft, &path).with_context(|| format!("cannot write {}", path.display()))?;
-    Ok(plan)
+    let mut before = String::new();
+    lock.read_to_string(&mut before)?;
+    if before != digest {
+        bail!(
+            "{}: it was drawn of another campaign file; choose another --out, or remove the plan to have it drawn again",
+            path.display()
+        );
+    }
+    let text = std::fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
+    Plan::parse(&path, &text, campaign)
 }
 
 /// The rows in the file at `path`, and the length of its whole lines.
 fn read(path: &Path, header: &Header) -> Result<(BTreeMap<u64, Row>, u64)> {
     let shown = path.display();
     let mut reader = BufReader::new(File::open(path).with_context(|| format!("cannot read {shown}"))?);
-    let (mut rows, mut whole, mut line) = (BTreeMap::new(), 0_u64, String::new());
+    let (mut rows, mut whole, mut line, mut number) = (BTreeMap::new(), 0_u64, String::new(), 1);
     while reader.read_line(&mut line).with_context(|| format!("cannot read {shown}"))? > 0
         && line.ends_with('\n')
     {
@@ -157,9 +200,12 @@ fn read(path: &Path, header: &Header) -> Result<(BTreeMap<u64, Row>, u64)> {
                 );
             }
         } else {
-            let row: Row = serde_json::from_str(&line).with_context(|| format!("{shown}: a damaged row"))?;
+            let row: Row = serde_json::from_str(&line).with_context(|| {
+                format!("{shown}:{number}: expected a row as JSON; remove the line to fly its flight again")
+            })?;
             rows.insert(row.flight, row);
         }
+        number += 1;
         whole += line.len() as u64;
         line.clear();
     }
@@ -188,6 +234,8 @@ mod tests {
             ..Row::default()
         };
         store.add(&row(1, 1.0)).unwrap();
+        // Another attempt may end otherwise.
+        store.add(&Row { is_of_host: true, ..row(2, 1.0) }).unwrap();
         // Of a plan that was edited since.
         store.add(&row(0, 7.0)).unwrap();
         let error = open("a").unwrap_err().to_string();
@@ -200,5 +248,18 @@ mod tests {
         drop(store);
         let error = open("b").unwrap_err().to_string();
         assert!(error.contains("flown of other inputs"), "{error}");
+        let more = Campaign { flights: 4, ..campaign.clone() };
+        let error = Store::open(folder.path(), &more, "a", &["f".to_owned()]).unwrap_err().to_string();
+        assert!(error.contains("drawn of another campaign file"), "{error}");
+    }
+
+    #[test]
+    fn a_folder_with_other_files_is_left_alone() {
+        let text = "manifest = \"a.toml\"\nflights = 3\n[[vary]]\nkey = \"x\"\nvalues = [1]";
+        let campaign = Campaign::parse("c.toml".as_ref(), text).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("workers")).unwrap();
+        let error = Store::open(folder.path(), &campaign, "a", &[]).unwrap_err().to_string();
+        assert!(error.contains("is not empty, and holds no campaign"), "{error}");
     }
 }

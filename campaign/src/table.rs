@@ -10,7 +10,6 @@ use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use parquet::schema::types::{Type, TypePtr};
 use std::fs::File;
-use std::path::Path;
 use std::sync::Arc;
 
 /// A column with the values of all rows.
@@ -21,21 +20,19 @@ enum Column {
     Text(Vec<Option<String>>),
 }
 
-/// Writes the `rows` of `plan` to `path`, beside it first and then in its place. `figures` names the figures of the rows.
+/// Writes the `rows` of `plan` to `file`. `figures` names the figures of the rows.
 ///
 /// Columns: `flight`; the drawn numbers by their names; `passed`; `failed`, `failed_at_s`, `error`; the figures; `wall_s`,
 /// the host time, which alone differs between two runs of a campaign.
 ///
 /// # Errors
 /// If the file cannot be written.
-pub fn write(path: &Path, plan: &Plan, figures: &[String], rows: &[Row]) -> Result<()> {
+pub fn write(file: &mut File, plan: &Plan, figures: &[String], rows: &[Row]) -> Result<()> {
     let columns = columns(plan, figures, rows);
     let fields = columns.iter().map(|(name, column)| field(name, column)).collect::<Result<_>>()?;
     let schema = Arc::new(Type::group_type_builder("flights").with_fields(fields).build()?);
     let version = KeyValue::new("hummingbus".to_owned(), env!("CARGO_PKG_VERSION").to_owned());
     let properties = WriterProperties::builder().set_key_value_metadata(Some(vec![version])).build();
-    let draft = path.with_extension("parquet.draft");
-    let file = File::create(&draft).with_context(|| format!("cannot write {}", draft.display()))?;
     let mut writer = SerializedFileWriter::new(file, schema, Arc::new(properties))?;
     let mut group = writer.next_row_group()?;
     for (_, column) in &columns {
@@ -44,8 +41,8 @@ pub fn write(path: &Path, plan: &Plan, figures: &[String], rows: &[Row]) -> Resu
         open.close()?;
     }
     group.close()?;
-    writer.close().with_context(|| format!("cannot write {}", draft.display()))?;
-    std::fs::rename(&draft, path).with_context(|| format!("cannot write {}", path.display()))
+    writer.close()?;
+    Ok(())
 }
 
 fn columns(plan: &Plan, figures: &[String], rows: &[Row]) -> Vec<(String, Column)> {

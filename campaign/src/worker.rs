@@ -12,6 +12,7 @@ use report::summary::Summary;
 use runtime::registry::Registry;
 use rustix::process::{Signal, set_parent_process_death_signal};
 use serde::{Deserialize, Serialize};
+use std::fs::File;
 use std::io::{BufRead, Write};
 use std::path::{Path, PathBuf};
 
@@ -46,6 +47,16 @@ pub enum Greeting {
     Refused(String),
 }
 
+/// Standard output for answers. Whatever a component prints goes to standard error from here on: the parent reads answers only.
+///
+/// # Errors
+/// If the descriptors cannot be duplicated.
+pub fn take_output() -> std::io::Result<File> {
+    let output = File::from(rustix::io::dup(std::io::stdout())?);
+    rustix::stdio::dup2_stdout(std::io::stderr())?;
+    Ok(output)
+}
+
 /// Flies what `input` hands out, with the components of `registry`, until it ends.
 ///
 /// # Errors
@@ -56,8 +67,8 @@ pub fn serve(registry: Registry, input: impl BufRead, mut output: impl Write) ->
     let mut lines = input.lines();
     let order = lines.next().context("expected the order, found nothing")??;
     let order: Order = serde_json::from_str(&order)?;
-    let folder = order.folder.join(std::process::id().to_string());
-    std::fs::create_dir(&folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    let folder = tempfile::tempdir_in(&order.folder);
+    let folder = folder.with_context(|| format!("cannot make a folder in {}", order.folder.display()))?;
     let base = match prepare(&order, registry) {
         Ok(base) => base,
         Err(error) => return answer(&mut output, &Greeting::Refused(format!("{error:#}"))),
@@ -65,7 +76,7 @@ pub fn serve(registry: Registry, input: impl BufRead, mut output: impl Write) ->
     answer(&mut output, &Greeting::Ready)?;
     for line in lines {
         let job: Job = serde_json::from_str(&line?)?;
-        answer(&mut output, &fly(&base, &job, &folder))?;
+        answer(&mut output, &fly(&base, &job, folder.path()))?;
     }
     Ok(())
 }

@@ -139,6 +139,14 @@ struct Run<'a> {
     missed_deadlines: u32,
 }
 
+/// Refuses what [`fly_unrecorded`] cannot fly in `manifest`, whose graph is `graph`.
+///
+/// # Errors
+/// A request that needs a process of its own: an executable, a swap, a standby.
+pub fn require_one_thread(manifest: &Manifest, graph: &Graph) -> Result<()> {
+    require_host(&Host::InProcess, manifest, graph)
+}
+
 /// Flies `manifest`, which is not recorded, on the calling thread; the files that `files` has read are not read again. Its
 /// judge writes into `folder`, and nothing else is written.
 ///

@@ -43,7 +43,7 @@ mod view;
 mod watch_clock;
 mod world;
 
-pub use in_process::{fly_unrecorded, simulate};
+pub use in_process::{fly_unrecorded, require_one_thread, simulate};
 
 use bus::{BusError, Join};
 use registry::Registry;

@@ -11,8 +11,8 @@ use campaign::pool::Pool;
 use campaign::report::Report;
 use campaign::requirement::Requirement;
 use campaign::row::{Row, columns};
-use campaign::store::Store;
-use campaign::worker::{Job, Order, serve};
+use campaign::store::{PLAN, Store};
+use campaign::worker::{Job, Order, serve, take_output};
 use campaign::{page, table};
 use clap::Args;
 use hummingbus::COMPONENTS;
@@ -23,7 +23,7 @@ use runtime::host::Host;
 use runtime::launcher::Launcher;
 use serde_json::json;
 use std::collections::BTreeMap;
-use std::io::{stdin, stdout};
+use std::io::{Write as _, stdin};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -31,6 +31,8 @@ pub const HELP: &str = "Example: hummingbus campaign manifests/campaigns/hover-r
                         Writes plan.csv, flights.parquet, report.json and report.html into the folder. The same command goes \
                         on where an earlier one was interrupted. docs/campaigns.md has the keys of campaign files.";
 
+/// The page of the report.
+const PAGE: &str = "report.html";
 /// Progress of a campaign.
 const BAR: &str = "{bar:30} {pos}/{len} flights  {per_sec}, {eta} left  {msg}";
 /// Flights that are checked before the first one is flown.
@@ -38,7 +40,7 @@ const CHECKED: usize = 3;
 /// The hidden argument of a worker.
 const WORKER: &str = "--worker";
 
-/// What `campaign` takes.
+/// Arguments of `campaign`.
 #[derive(Args)]
 pub struct CampaignArguments {
     /// The campaign file.
@@ -51,7 +53,7 @@ pub struct CampaignArguments {
     #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u16).range(1..=1024))]
     workers: Option<u16>,
     /// Draw and write the plan, and fly nothing.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "require")]
     plan_only: bool,
     /// Fly one flight of the plan again, recorded into the folder, and judge it as `run` does.
     #[arg(long, value_name = "FLIGHT", conflicts_with_all = ["plan_only", "require", "workers"])]
@@ -73,73 +75,102 @@ pub struct CampaignArguments {
 /// A problem in the campaign, its manifest or its folder, or an interrupted campaign.
 pub fn campaign(arguments: &CampaignArguments) -> Result<bool> {
     if arguments.worker {
-        return serve(COMPONENTS, stdin().lock(), stdout().lock()).map(|()| true);
+        let output = take_output().context("cannot keep standard output for answers")?;
+        return serve(COMPONENTS, stdin().lock(), output).map(|()| true);
     }
     let path = arguments.campaign.as_deref().context("expected a campaign file")?;
     let text = InputFiles::default().text(path).with_context(|| format!("cannot read {}", path.display()))?;
     let campaign = Campaign::parse(path, &text)?;
     let base = Base::read(&campaign, COMPONENTS)?;
-    let figures = columns(&base.manifest.content);
     let folder = arguments.out.clone().unwrap_or_else(|| path.with_extension(""));
-    let (mut store, plan, flown) = Store::open(&folder, &campaign, &base.fingerprint, &figures)?;
+    let figures = columns(&base.manifest.content);
+    let (store, plan, flown) = Store::open(&folder, &campaign, &base.fingerprint, &figures)?;
+    let mut opened = Opened { path, text, campaign, base, folder, figures, store, plan };
     if arguments.plan_only {
-        print_text(&format!(
-            "{} flights: {}",
-            plan.flights.len(),
-            folder.join(campaign::store::PLAN).display()
-        ))?;
-        return Ok(true);
+        let path = opened.folder.join(PLAN);
+        return print_text(&format!("{} flights: {}", opened.plan.flights.len(), path.display()))
+            .map(|()| true);
     }
     if let Some(flight) = arguments.fly {
-        return fly_one(&campaign, &base, &plan, flight, &folder, arguments.json);
+        return fly_one(&opened, flight, arguments.json);
     }
-    let mut rows = flown;
-    let stop = stop_token()?;
-    let jobs = jobs(&campaign, &base, &plan, &rows)?;
-    require_flyable(&base, &jobs)?;
-    let bar = progress::bar(BAR, arguments.json);
-    bar.set_length(plan.flights.len() as u64);
-    bar.set_position(rows.len() as u64);
-    let pool = Pool {
-        command: &worker_command()?,
-        workers: workers(arguments, jobs.len()),
-        order: &Order {
-            path: path.to_owned(),
-            text,
-            fingerprint: base.fingerprint.clone(),
-            folder: store.make_work_folder()?,
-        },
-        timeout: Duration::from_secs_f64(campaign.timeout_s_host),
-    };
-    let end = pool.fly(jobs.into_iter(), &stop, |mut row| {
-        row.drawn.clone_from(&plan.flights[row.flight as usize]);
-        row.figures.resize(figures.len(), None);
-        store.add(&row)?;
-        rows.insert(row.flight, row);
-        bar.inc(1);
-        Ok(())
-    });
-    progress::finish(&bar);
-    store.remove_work_folder()?;
-    let rows: Vec<Row> = rows.into_values().collect();
-    table::write(&folder.join("flights.parquet"), &plan, &figures, &rows)?;
-    end.with_context(|| format!("{} flights are in {}", rows.len(), folder.display()))?;
-    let report = Report::of(&campaign, &base, &plan, &rows)?;
-    std::fs::write(folder.join("report.json"), serde_json::to_vec_pretty(&report)?)?;
-    std::fs::write(folder.join("report.html"), page::page(&report, &plan, &figures, &rows))?;
+    let rows = opened.fly(arguments, flown)?;
+    let report = opened.write(&rows)?;
+    judge(&opened, arguments, &report)
+}
+
+/// A campaign with its folder.
+struct Opened<'a> {
+    path: &'a Path,
+    text: String,
+    campaign: Campaign,
+    base: Base,
+    folder: PathBuf,
+    figures: Vec<String>,
+    store: Store,
+    plan: Plan,
+}
+
+impl Opened<'_> {
+    /// Flies the flights that have no row yet; all rows by flight.
+    fn fly(
+        &mut self,
+        arguments: &CampaignArguments,
+        mut rows: BTreeMap<u64, Row>,
+    ) -> Result<BTreeMap<u64, Row>> {
+        let jobs = jobs(&self.campaign, &self.base, &self.plan, &rows)?;
+        require_flyable(&self.base, &jobs)?;
+        let stop = stop_token()?;
+        let bar = progress::bar(BAR, arguments.json);
+        bar.set_length(self.plan.flights.len() as u64);
+        bar.set_position(rows.len() as u64);
+        let (path, text, fingerprint) =
+            (self.path.to_owned(), self.text.clone(), self.base.fingerprint.clone());
+        let pool = Pool {
+            command: &worker_command()?,
+            workers: workers(arguments, jobs.len()),
+            order: &Order { path, text, fingerprint, folder: self.store.work_folder()? },
+            timeout: Duration::from_secs_f64(self.campaign.timeout_s_host),
+        };
+        let Self { plan, figures, store, .. } = self;
+        let end = pool.fly(jobs.into_iter(), &stop, |mut row| {
+            row.drawn.clone_from(&plan.flights[row.flight as usize]);
+            row.figures.resize(figures.len(), None);
+            store.add(&row)?;
+            rows.insert(row.flight, row);
+            bar.inc(1);
+            Ok(())
+        });
+        progress::finish(&bar);
+        end.with_context(|| format!("{} flights are kept in {}", rows.len(), self.folder.display()))?;
+        Ok(rows)
+    }
+
+    /// Writes the table and the report.
+    fn write(&self, rows: &BTreeMap<u64, Row>) -> Result<Report> {
+        let rows: Vec<Row> = rows.values().cloned().collect();
+        let report = Report::of(&self.campaign, &self.base, &self.plan, &rows, &self.folder)?;
+        let Self { store, plan, figures, .. } = self;
+        store.write("flights.parquet", |file| table::write(file, plan, figures, &rows))?;
+        store.write("report.json", |file| Ok(serde_json::to_writer_pretty(file, &report)?))?;
+        store.write(PAGE, |file| Ok(file.write_all(&page::page(&report, plan, figures, &rows))?))?;
+        Ok(report)
+    }
+}
+
+/// Prints the report, and says if the requirement holds.
+fn judge(opened: &Opened<'_>, arguments: &CampaignArguments, report: &Report) -> Result<bool> {
     let is_met = arguments.require.is_none_or(|required| required.is_met(report.passed, report.flights));
     if arguments.json {
         let mut value = json!(report);
         value["requirement_met"] = json!(is_met);
         print_json(&value)?;
     } else {
-        print_text(&format!("{report}{}", next_steps(path, &folder, &report)))?;
+        print_text(&format!("{report}{}", next_steps(&opened.folder, report)))?;
     }
-    if report.flights < report.planned {
-        bail!(
-            "the campaign was interrupted; the same command flies the other {} flights",
-            report.planned - report.flights
-        );
+    let left = report.planned - report.flights;
+    if left > 0 {
+        bail!("the campaign was interrupted; the same command flies the other {left} flights");
     }
     if let Some(required) = arguments.require.filter(|_| !is_met) {
         let shown = required.shown(report.passed, report.flights);
@@ -149,22 +180,15 @@ pub fn campaign(arguments: &CampaignArguments) -> Result<bool> {
 }
 
 /// Last lines of the summary: the page, and the command that flies the worst flight again.
-fn next_steps(campaign: &Path, folder: &Path, report: &Report) -> String {
-    let page = format!("to see it: {}", folder.join("report.html").display());
+fn next_steps(folder: &Path, report: &Report) -> String {
+    let page = format!("to see it: {}", folder.join(PAGE).display());
     let Some(worst) = report.worst.first() else { return page };
-    let again = format!("{} --out {} --fly {}", campaign.display(), folder.display(), worst.flight);
-    format!("to fly the worst again, recorded: hummingbus campaign {again}\n{page}")
+    format!("to fly the worst again, recorded: {}\n{page}", worst.command)
 }
 
 /// Flies flight number `flight` of the plan on this thread, recorded; false if a condition does not hold.
-fn fly_one(
-    campaign: &Campaign,
-    base: &Base,
-    plan: &Plan,
-    flight: usize,
-    folder: &Path,
-    is_json: bool,
-) -> Result<bool> {
+fn fly_one(opened: &Opened<'_>, flight: usize, is_json: bool) -> Result<bool> {
+    let Opened { campaign, base, plan, folder, .. } = opened;
     if flight >= plan.flights.len() {
         bail!("there is no flight {flight}: the plan has the flights 0 to {}", plan.flights.len() - 1);
     }

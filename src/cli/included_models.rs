@@ -14,8 +14,11 @@ const CONFIG: &str = "model.config";
 /// It is looked for beside the folder of `from`, in that folder, and in the folders of the simulator's variables.
 pub fn read(from: &Path, uri: &str) -> Option<Result<String, String>> {
     let name = uri.strip_prefix("model://").or_else(|| uri.strip_prefix("file://")).unwrap_or(uri);
-    let path = folders(from).into_iter().map(|folder| folder.join(name)).find(|path| path.exists())?;
-    let file = if path.is_dir() { file_of(&path)? } else { path };
+    let file_in = |folder: PathBuf| {
+        let path = folder.join(name);
+        if path.is_dir() { file_of(&path) } else { Some(path).filter(|path| path.is_file()) }
+    };
+    let file = folders(from).into_iter().find_map(file_in)?;
     let text = InputFiles::default().text(&file);
     Some(text.map_err(|error| format!("cannot read {}: {error}", file.display())))
 }

@@ -1,7 +1,8 @@
 //! Campaigns: rows depend on the plan alone, failures are named and counted, and what was flown is never lost.
 
-use crate::support::{Place, repository};
+use crate::support::{Place, poll, repository};
 use recorder::reader::Recording;
+use rustix::process::Signal;
 use serde_json::Value;
 use std::fs;
 
@@ -72,13 +73,61 @@ fn the_rows_are_those_of_the_plan_however_many_workers_fly_and_whenever_it_is_in
 }
 
 #[test]
+fn a_campaign_that_is_interrupted_loses_and_falsifies_no_flight() {
+    let place = Place::new();
+    let campaign =
+        written(&place, "c.toml", &HOVERS.replace("0.4\"", "10.0\"").replace("flights = 12", "flights = 6"));
+    let folder = place.path("out");
+    let mut launch = place.start(&["campaign", &campaign, "--out", &folder, "--workers", "2"]);
+    poll("no flight ended", || {
+        assert!(!launch.has_ended(), "it ended by itself");
+        let text = fs::read_to_string(format!("{folder}/rows.jsonl")).unwrap_or_default();
+        (text.lines().count() > 1).then_some(())
+    });
+    launch.signal(Signal::INT);
+    let ended = launch.end().with_code(2);
+    ended.says(&["the campaign was interrupted; the same command flies the other"]);
+    let before = rows(&folder);
+    assert!((1..6).contains(&before.len()) && before.iter().all(|row| row["error"].is_null()), "{before:?}");
+    place.call(&["campaign", &campaign, "--out", &folder]).with_code(0).prints(&["6 of 6 flights passed"]);
+    let after = rows(&folder);
+    assert!(before.iter().all(|row| after.contains(row)) && after.len() == 6);
+}
+
+#[test]
+fn an_edited_vehicle_file_is_refused_in_a_folder_of_the_old_one() {
+    let place = Place::new();
+    let campaign = written(&place, "c.toml", &HOVERS.replace("flights = 12", "flights = 2"));
+    let vehicle = fs::read_to_string(repository("vehicles/hummingbird.toml")).unwrap();
+    place.write("v.toml", &vehicle);
+    let text = fs::read_to_string(&campaign).unwrap();
+    let set = "set = [\"process.plant.vehicle=v.toml\", ";
+    place.write("c.toml", text.replace("set = [", set));
+    let folder = place.path("out");
+    place.call(&["campaign", &campaign, "--out", &folder]).with_code(0);
+    place.write("v.toml", vehicle.replace("value = 0.480", "value = 0.500"));
+    place.call(&["campaign", &campaign, "--out", &folder]).with_code(2).says(&["flown of other inputs"]);
+}
+
+#[test]
+fn a_factor_acts_on_the_value_that_all_flights_have() {
+    let place = Place::new();
+    let text = HOVERS.replace("set = [", "set = [\"process.plant.vehicle.body.mass=1.0\", ");
+    let campaign = written(&place, "c.toml", &text.replace("uniform = [0.8, 1.2]", "values = [1.5]"));
+    let folder = place.path("out");
+    let report = place.call(&["campaign", &campaign, "--out", &folder, "--json"]).with_code(0).json();
+    let run = report["worst"][0]["run"].as_str().unwrap();
+    assert!(run.contains("vehicle.body.mass=1.0 ") && run.ends_with("vehicle.body.mass=1.5"), "{run}");
+}
+
+#[test]
 fn a_flight_is_flown_again_recorded_by_the_command_of_the_report() {
     let place = Place::new();
     let campaign = written(&place, "c.toml", HOVERS);
     let folder = place.path("out");
     let report = place.call(&["campaign", &campaign, "--out", &folder, "--json"]).with_code(0).json();
     let worst = &report["worst"][0];
-    let command = worst["command"].as_str().unwrap();
+    let command = worst["run"].as_str().unwrap();
     let flight = worst["flight"].as_u64().unwrap();
     let recording = place.path("again.mcap");
     let command = command.replace(&format!("flight-{flight}.mcap"), &recording);
@@ -152,6 +201,8 @@ fn what_cannot_be_flown_at_all_is_refused_before_the_first_flight() {
         (vary("run.sed").replace("as = \"factor\"\n", ""), "sed"),
         (HOVERS.replace("uniform = [0.8, 1.2]", "uniform = [1.2, 0.8]"), "a lower limit below the upper one"),
         (HOVERS.replace("position.z", "position.w"), "position.w"),
+        (HOVERS.replace("name = \"height\"", "name = \"mass\""), "`mass` is the name of another column"),
+        (HOVERS.replace("[\"run.dur", "[\"run.seed=5\", \"run.dur"), "each flight has a seed of its own"),
         (HOVERS.split("[[measure]]").next().unwrap().to_owned(), "neither [[pass]] nor [[measure]]"),
     ] {
         let campaign = written(&place, "c.toml", &text);
@@ -159,7 +210,18 @@ fn what_cannot_be_flown_at_all_is_refused_before_the_first_flight() {
         ended.says(&[says]);
         assert!(!ended.to_string().contains("panicked"), "{ended}");
     }
-    // A folder whose flights are of another vehicle.
+    // A controller in a process of its own, and a swap.
+    let swap = HOVERS.replace("hover.toml", "swap.toml");
+    place.write("swap.toml", &format!("include = [{:?}]", repository("manifests/swap-gains.toml")));
+    let campaign = place.write("swap-c.toml", &format!("manifest = \"swap.toml\"\n{swap}"));
+    place
+        .call(&["campaign", &campaign, "--out", &place.path("swap")])
+        .with_code(2)
+        .says(&["needs processes"]);
+    // A folder of somebody else.
+    let campaign = written(&place, "c.toml", HOVERS);
+    place.call(&["campaign", &campaign, "--out", &place.path("")]).with_code(2).says(&["holds no campaign"]);
+    // A folder whose flights are shorter.
     let campaign = written(&place, "c.toml", HOVERS);
     let folder = place.path("other");
     place.call(&["campaign", &campaign, "--out", &folder]).with_code(0);

@@ -9,6 +9,10 @@ element("summary").textContent =
   `(${percent(report.interval[0])} to ${percent(report.interval[1])} at 95 %). ` +
   (report.flights < report.planned ? `${report.planned - report.flights} planned flights were not flown.` : "");
 
+if (flights.length < report.flights) {
+  element("summary").textContent += ` The plots show every ${Math.round(report.flights / flights.length)}th flight.`;
+}
+
 fillTable(
   "failures",
   ["flights", "first failure", "median time in s"],

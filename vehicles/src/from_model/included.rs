@@ -25,11 +25,6 @@ pub fn expand(source: Source, read: &Read) -> Result<String, Diagnostic> {
         if expanded == text {
             return Ok(text);
         }
-        if expanded.len() > BYTES_MAX {
-            let message =
-                format!("expected at most {} MB with all included models, found more", BYTES_MAX >> 20);
-            return Err(source.whole(message).help("remove the models without mass"));
-        }
         text = expanded;
     }
     let message =
@@ -44,6 +39,7 @@ fn expand_once(source: Source, read: &Read) -> Result<String, Diagnostic> {
     let (mut text, mut end) = (String::new(), 0);
     for include in includes {
         let Some(model) = included(source, include, read)? else { continue };
+        require_room(source, text.len() + model.len())?;
         let place = include.range();
         text += &source.text[end..place.start];
         text += &model;
@@ -52,6 +48,14 @@ fn expand_once(source: Source, read: &Read) -> Result<String, Diagnostic> {
         end = place.end;
     }
     Ok(text + &source.text[end..])
+}
+
+fn require_room(source: Source, bytes: usize) -> Result<(), Diagnostic> {
+    if bytes <= BYTES_MAX {
+        return Ok(());
+    }
+    let message = format!("expected at most {} MB with all included models, found more", BYTES_MAX >> 20);
+    Err(source.whole(message).help("remove the models without mass"))
 }
 
 /// The `<model>` in the place of `include`, on one line; `None` if its model is not found.
@@ -68,12 +72,18 @@ fn included(source: Source, include: Node, read: &Read) -> Result<Option<String>
     let model = model.ok_or_else(|| refused("its file has no <model>".to_owned()))?;
     let name = text_of(include, "name").or_else(|| model.attribute("name").map(str::to_owned));
     let name = name.ok_or_else(|| refused("it has no name".to_owned()))?;
+    if child(include, "placement_frame").is_some() {
+        return Err(refused("<placement_frame> is not read".to_owned()));
+    }
+    // Plugins of the element act on the model, such as motors.
+    let plugins: String = children(include, "plugin").map(|plugin| &source.text[plugin.range()]).collect();
     // The pose of the element counts before that of the model.
     let pose = child(include, "pose").map(|pose| &source.text[pose.range()]);
     let own = child(model, "pose").map(|pose| &text[pose.range()]);
     let parts = model.children().filter(|part| part.is_element() && !part.has_tag_name("pose"));
     let parts = parts.map(|part| &text[part.range()]).collect::<String>();
     let name = name.replace('&', "&amp;").replace('"', "&quot;").replace('<', "&lt;");
-    let model = format!("<model name=\"{name}\">{}{parts}</model>", pose.or(own).unwrap_or_default());
+    let model =
+        format!("<model name=\"{name}\">{}{parts}{plugins}</model>", pose.or(own).unwrap_or_default());
     Ok(Some(model.replace(['\n', '\r'], " ")))
 }
