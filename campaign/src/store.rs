@@ -58,6 +58,10 @@ impl Store {
         require_own(folder)?;
         let mut lock = locked(folder)?;
         remove_left_work(folder)?;
+        if !has_rows(&folder.join(ROWS))? {
+            // Nothing was flown: a refused campaign file that is corrected begins anew.
+            forget(folder, &mut lock)?;
+        }
         let plan = plan(folder, campaign, &mut lock)?;
         let header =
             Header { version: version(), fingerprint: fingerprint.to_owned(), figures: figures.to_owned() };
@@ -115,6 +119,31 @@ fn require_own(folder: &Path) -> Result<()> {
         return Ok(());
     }
     bail!("{} is not empty, and holds no campaign; choose another --out", folder.display())
+}
+
+/// True if a flight has a row.
+fn has_rows(path: &Path) -> Result<bool> {
+    if !path.exists() {
+        return Ok(false);
+    }
+    let file = File::open(path).with_context(|| format!("cannot read {}", path.display()))?;
+    Ok(BufReader::new(file).lines().nth(1).is_some())
+}
+
+/// Removes a plan as it was drawn, which nobody edited, and the head of rows that were never flown.
+fn forget(folder: &Path, lock: &mut File) -> Result<()> {
+    let mut drawn = String::new();
+    lock.rewind()?;
+    lock.read_to_string(&mut drawn)?;
+    lock.rewind()?;
+    let is_drawn = |text: Vec<u8>| sha256(&text) == drawn;
+    for (name, is_removed) in [(PLAN, std::fs::read(folder.join(PLAN)).is_ok_and(is_drawn)), (ROWS, true)] {
+        let path = folder.join(name);
+        if is_removed && path.exists() {
+            std::fs::remove_file(&path).with_context(|| format!("cannot remove {}", path.display()))?;
+        }
+    }
+    Ok(())
 }
 
 /// Removes the folders of workers of a campaign that was killed.
@@ -249,7 +278,25 @@ mod tests {
         let error = open("b").unwrap_err().to_string();
         assert!(error.contains("flown of other inputs"), "{error}");
         let more = Campaign { flights: 4, ..campaign.clone() };
+        // Rows were flown: the plan of another campaign file is not drawn over them.
         let error = Store::open(folder.path(), &more, "a", &["f".to_owned()]).unwrap_err().to_string();
+        assert!(error.contains("drawn of another campaign file"), "{error}");
+    }
+
+    #[test]
+    fn a_campaign_that_flew_nothing_begins_anew_but_an_edited_plan_stays() {
+        let text = "manifest = \"a.toml\"\nflights = 3\n[[vary]]\nkey = \"x\"\nvalues = [1]";
+        let campaign = Campaign::parse("c.toml".as_ref(), text).unwrap();
+        let more = Campaign { flights: 4, ..campaign.clone() };
+        let folder = tempfile::tempdir().unwrap();
+        let open = |campaign, fingerprint| Store::open(folder.path(), campaign, fingerprint, &[]);
+        open(&campaign, "a").unwrap();
+        assert_eq!(open(&more, "b").unwrap().1.flights.len(), 4);
+        let path = folder.path().join(super::PLAN);
+        let edited = std::fs::read_to_string(&path).unwrap().replace("0,1", "0,2");
+        std::fs::write(&path, &edited).unwrap();
+        assert_eq!(open(&more, "c").unwrap().1.flights[0], [2.0]);
+        let error = open(&campaign, "c").unwrap_err().to_string();
         assert!(error.contains("drawn of another campaign file"), "{error}");
     }
 
