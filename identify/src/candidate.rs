@@ -100,11 +100,5 @@ fn parts(parameters: &Parameters, kind: &'static EffectKind) -> Vec<Candidate> {
     match kind.fit_as {
         FitAs::Whole => vec![Candidate { kind, free }],
         FitAs::EachParameter => free.into_iter().map(|one| Candidate { kind, free: vec![one] }).collect(),
-        FitAs::Groups(groups) => {
-            let is_in = |group: &[usize], at: usize| group.contains(&parameters.all[at].index);
-            let of_group =
-                |group: &&[usize]| free.iter().copied().filter(|at| is_in(group, *at)).collect::<Vec<_>>();
-            groups.iter().map(|group| Candidate { kind, free: of_group(group) }).collect()
-        }
     }
 }

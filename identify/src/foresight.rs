@@ -63,14 +63,15 @@ pub struct Foresight {
 impl Foresight {
     /// Prediction errors of the judged flights under what was `fitted`; empty where no attitude was measured.
     pub fn of(problem: &Problem, fitted: &FitResult) -> Self {
-        Self::by(problem, &judged(problem, fitted), |flight, values, horizon_s| {
+        let flights: Vec<(&Prepared, Vec<f64>)> = if problem.validation.is_empty() {
+            let without = |at| problem.values_without(fitted, at);
+            problem.estimation.iter().enumerate().map(|(at, flight)| (flight, without(at))).collect()
+        } else {
+            problem.validation.iter().map(|flight| (flight, fitted.values.clone())).collect()
+        };
+        Self::by(problem, &flights, |flight, values, horizon_s| {
             trimmed_ends(problem, flight, values, horizon_s)
         })
-    }
-
-    /// The same without trims of their own: what the parameters alone predict of a flight that they were not fitted on.
-    pub fn untrimmed(problem: &Problem, fitted: &FitResult) -> Self {
-        Self::under(problem, &judged(problem, fitted))
     }
 
     /// Prediction errors of flights, each under its values, without trims of their own.
@@ -150,13 +151,6 @@ impl Foresight {
         total.1 > LEAST_GROWTH * LEAST_GROWTH * total.0 && chance_of_no_gain(&gains) < LEVEL
     }
 
-    /// Error of the attitude after the shortest horizon in units of `other`'s; 1 where there is none.
-    pub fn attitude_ratio(&self, other: &Self) -> f64 {
-        let pairs = (0..3).flat_map(|axis| self.blocks(other, 0, axis));
-        let (new, old) = pairs.fold((0.0, 0.0), |sum, pair| (sum.0 + pair.0, sum.1 + pair.1));
-        if old > 0.0 { (new / old).sqrt() } else { 1.0 }
-    }
-
     /// Mean squares of one component by block, with and without, where both have some.
     fn blocks(&self, without: &Self, horizon: usize, at: usize) -> Vec<(f64, f64)> {
         let of_horizon = self.squares.iter().filter(|(key, _)| key.1 == horizon);
@@ -165,16 +159,6 @@ impl Foresight {
             Some((with[at] / count, other[at] / other_count))
         };
         of_horizon.filter_map(pair).collect()
-    }
-}
-
-/// The judged flights, each with values that were not fitted on it.
-fn judged<'p, 'f>(problem: &'p Problem<'f>, fitted: &FitResult) -> Vec<(&'p Prepared<'f>, Vec<f64>)> {
-    if problem.validation.is_empty() {
-        let without = |at| problem.values_without(fitted, at);
-        problem.estimation.iter().enumerate().map(|(at, flight)| (flight, without(at))).collect()
-    } else {
-        problem.validation.iter().map(|flight| (flight, fitted.values.clone())).collect()
     }
 }
 

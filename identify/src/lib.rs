@@ -17,7 +17,6 @@
 //! | `normal`, `fit` | generalised least squares over blocks of time: an estimation problem and its result |
 //! | `logging` | timing errors that slowly logged commands make |
 //! | `select` | the stepwise search for the effects that the flights ask for |
-//! | `rivals` | effects that would do as well as an accepted one |
 //! | `align`, `faults`, `trim` | clocks, sensors and trims, before anything is fitted |
 //! | `sensing` | the sensors' delays and biases, and a flight without them |
 //! | `whiteness`, `noise`, [`statistics`] | what is left, and what noise alone would leave |
@@ -58,7 +57,6 @@ mod prepared;
 mod refine;
 mod regressor;
 pub mod report;
-mod rivals;
 pub mod rotor;
 mod rows;
 pub mod run;

@@ -242,7 +242,7 @@ impl Report {
                 writeln!(f, "    to tell them apart: {experiment}")?;
             }
         }
-        for Withdrawn { effect, reason, .. } in &self.withdrawn {
+        for Withdrawn { effect, reason } in &self.withdrawn {
             writeln!(f, "withdrawn: {effect}: {reason}")?;
         }
         self.faults.iter().try_for_each(|fault| {

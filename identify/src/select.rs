@@ -28,9 +28,9 @@ use crate::normal::{self, Block};
 use crate::refine;
 use crate::sensor_effects::POSE_DELAY;
 use crate::statistics::{chance_of_no_gain, fisher_tail};
+use plant::effects::EffectKind;
 use rayon::prelude::*;
 use serde::Serialize;
-use std::collections::BTreeSet;
 
 /// A smaller part of the squared error does not matter, however certain it is: what the comparison itself leaves at
 /// its joints is of the order of a tenth of it.
@@ -43,14 +43,13 @@ const FALSE_RATE: f64 = 0.01;
 const CONFOUNDED_LEVEL: f64 = 0.05;
 /// So many candidates of a round are fitted in earnest.
 const CONFIRMED: usize = 4;
+/// A confounded effect has at least this part of the gain.
+const NEAR: f64 = 0.5;
 /// More rounds than there are effects worth naming.
 const ROUNDS_MAX: usize = 12;
 /// Two that mask each other are looked for where this many times the cost is left that all candidates together
 /// would leave on the estimation data.
 const MUCH_LEFT: f64 = 1.5;
-/// A trim that flights share takes the error of their attitude below this part; one that they have alike by chance takes
-/// little beside disturbances within the flights. Tuned, no source.
-const SHARED_TRIM: f64 = 0.7;
 /// So many candidates are tried as the first of two.
 const FIRSTS: usize = 4;
 
@@ -96,9 +95,6 @@ pub struct Withdrawn {
     pub effect: &'static str,
     /// The reason.
     pub reason: String,
-    /// True if predictions are better without it, beside the effects of that time.
-    #[serde(skip)]
-    pub is_for_predictions: bool,
 }
 
 /// What a selection came to.
@@ -142,13 +138,9 @@ pub fn select(problem: &mut Problem, candidates: &[Candidate], progress: &mut dy
     let base = problem.fitted(&declared, &[]);
     let mut search = StepwiseSearch { accepted: Vec::new(), rounds: Vec::new(), base };
     let mut open = candidates.to_vec();
-    let mut withdrawn: Vec<Withdrawn> = Vec::new();
-    let mut retried = BTreeSet::new();
+    let mut withdrawn = Vec::new();
     let refined = loop {
         search.run(problem, &open, progress);
-        if search.take_shared_trim(problem, &open, progress) {
-            search.run(problem, &open, progress);
-        }
         problem.weigh(&search.base, candidates);
         search.base = problem.fitted(&search.base.values, &free_parameters(&search.accepted));
         progress("every effect once more, by its parameters and by predictions");
@@ -160,17 +152,8 @@ pub fn select(problem: &mut Problem, candidates: &[Candidate], progress: &mut dy
             found = refined.as_ref().and_then(|refined| search.stopped(problem, refined));
         }
         let Some(found) = found else { break refined };
-        progress(&format!("withdrawn: {}: {}", found.effect, found.reason));
         search.withdraw(problem, found.effect);
         open.retain(|candidate| candidate.kind.name != found.effect);
-        // What was withdrawn for predictions beside this effect was judged beside a false one: once it is tried again.
-        if !found.is_for_predictions {
-            let reopened =
-                withdrawn.extract_if(.., |other| other.is_for_predictions && retried.insert(other.effect));
-            let names: Vec<&str> = reopened.map(|other| other.effect).collect();
-            let again = candidates.iter().filter(|candidate| names.contains(&candidate.kind.name));
-            open.extend(again.cloned());
-        }
         withdrawn.push(found);
     };
     let StepwiseSearch { accepted, rounds, base: after } = search;
@@ -191,7 +174,7 @@ impl StepwiseSearch {
         self.accepted.iter().find_map(|candidate| {
             let bound = at_bound(problem, candidate, fitted)?;
             let reason = format!("{bound}: more is asked for than this effect can be");
-            Some(Withdrawn { effect: candidate.kind.name, reason, is_for_predictions: false })
+            Some(Withdrawn { effect: candidate.kind.name, reason })
         })
     }
 
@@ -202,8 +185,7 @@ impl StepwiseSearch {
             let chance = joint_p_value(problem, &self.base, candidate);
             let reason =
                 format!("its parameters are no longer beyond chance beside those of the others: {chance:.3}");
-            let effect = candidate.kind.name;
-            (chance >= FALSE_RATE).then_some(Withdrawn { effect, reason, is_for_predictions: false })
+            (chance >= FALSE_RATE).then_some(Withdrawn { effect: candidate.kind.name, reason })
         };
         self.stopped(problem, &self.base).or_else(|| self.accepted.iter().find_map(by_chance))
     }
@@ -226,7 +208,7 @@ impl StepwiseSearch {
         let reason = format!(
             "the error of {component} after {horizon_s} s is {without:.3} {unit} without it, {with:.3} {unit} with it"
         );
-        Some(Withdrawn { effect, reason, is_for_predictions: true })
+        Some(Withdrawn { effect, reason })
     }
 
     /// The other accepted candidates, and their fit.
@@ -271,36 +253,6 @@ impl StepwiseSearch {
         true
     }
 
-    /// Accepts an effect that turns the vehicle steadily, if its parameters are beyond the spread of the trims and flights
-    /// predict each other's attitude much better with it: beside slow disturbances a constant torque gains little in the
-    /// equations, but predictions need it.
-    fn take_shared_trim(
-        &mut self,
-        problem: &mut Problem,
-        candidates: &[Candidate],
-        progress: &mut dyn FnMut(&str),
-    ) -> bool {
-        if problem.estimation.len() + problem.validation.len() < 2 {
-            return false;
-        }
-        let without = Foresight::untrimmed(problem, &self.base);
-        let is_open = |candidate: &&Candidate| candidate.is_trim() && !self.accepted.contains(*candidate);
-        let taken = candidates.iter().filter(is_open).find_map(|candidate| {
-            let fitted = fitted(problem, &self.base, &self.accepted, candidate);
-            if joint_p_value(problem, &fitted, candidate) >= FALSE_RATE {
-                return None;
-            }
-            let with = Foresight::untrimmed(problem, &fitted);
-            let is_shared = with.attitude_ratio(&without) < SHARED_TRIM && with.is_better_than(&without);
-            is_shared.then_some((candidate, fitted))
-        });
-        let Some((candidate, fitted)) = taken else { return false };
-        progress(&format!("accepted for predictions: {}", candidate.kind.name));
-        self.accepted.push(candidate.clone());
-        self.base = fitted;
-        true
-    }
-
     /// Accepts two that only gain together: of two strong effects each can make the blocks worse in which the other
     /// acts. The firsts that are tried are chosen on the estimation data, the second in a round with the first, and then
     /// the first has to pass a round with the second.
@@ -338,7 +290,7 @@ impl StepwiseSearch {
 }
 
 /// The fit of `accepted` but that at `at`, from `base` on.
-pub fn without(problem: &Problem, base: &FitResult, accepted: &[Candidate], at: usize) -> FitResult {
+fn without(problem: &Problem, base: &FitResult, accepted: &[Candidate], at: usize) -> FitResult {
     let mut others = accepted.to_vec();
     let dropped = others.remove(at);
     let mut start = base.values.clone();
@@ -451,12 +403,7 @@ fn at_bound(problem: &Problem, candidate: &Candidate, fitted: &FitResult) -> Opt
 }
 
 /// The candidate's parameters fitted together with the accepted ones, from the best of its starts.
-pub fn fitted(
-    problem: &Problem,
-    base: &FitResult,
-    accepted: &[Candidate],
-    candidate: &Candidate,
-) -> FitResult {
+fn fitted(problem: &Problem, base: &FitResult, accepted: &[Candidate], candidate: &Candidate) -> FitResult {
     let mut all = free_parameters(accepted);
     all.extend(&candidate.free);
     let mut start = base.values.clone();
@@ -514,7 +461,7 @@ fn best(problem: &Problem, judged: &[Judged]) -> Option<usize> {
 }
 
 /// Whether `fitted` is worse on the validation data than `other`, beyond chance.
-pub fn is_worse(fitted: &FitResult, other: &FitResult) -> bool {
+fn is_worse(fitted: &FitResult, other: &FitResult) -> bool {
     p_value(&fitted.validation_costs, &other.validation_costs) < CONFOUNDED_LEVEL
 }
 
@@ -575,4 +522,30 @@ impl Screen {
             free: wanted,
         }
     }
+}
+
+/// For an accepted candidate: the effects that would do as well in its place, of those that were anywhere near it when
+/// it was taken.
+pub fn confounded(problem: &Problem, selection: &Selection, at: usize) -> Vec<&'static EffectKind> {
+    let candidate = &selection.accepted[at];
+    let mut others = selection.accepted.clone();
+    others.remove(at);
+    let base = without(problem, &selection.after, &selection.accepted, at);
+    let is_alike =
+        |candidate: &&Candidate| !is_worse(&fitted(problem, &base, &others, candidate), &selection.after);
+    let near = near(selection, candidate);
+    near.par_iter().filter(|candidate| is_alike(candidate)).map(|candidate| candidate.kind).collect()
+}
+
+/// The candidates of other effects that gained at least [`NEAR`] of what `candidate` did in the round that took it.
+fn near<'s>(selection: &'s Selection, candidate: &Candidate) -> Vec<&'s Candidate> {
+    let took = |round: &&Round| round.taken().is_some_and(|taken| taken.candidate == *candidate);
+    let Some(round) = selection.rounds.iter().find(took) else { return Vec::new() };
+    let gain = round.taken().map_or(0.0, |taken| taken.gain);
+    let is_near = |judged: &&Judged| {
+        judged.gain > NEAR * gain
+            && judged.candidate.kind.name != candidate.kind.name
+            && !selection.accepted.contains(&judged.candidate)
+    };
+    round.judged.iter().filter(is_near).map(|judged| &judged.candidate).collect()
 }

@@ -1,4 +1,4 @@
-//! Torques of the air in free flight: torque by speed and rate damping, alone, together and beside their rivals.
+//! Torques of the air in free flight: torque by speed and rate damping, alone and beside an inertia error.
 mod simulated;
 
 use rayon::prelude::*;
@@ -32,19 +32,6 @@ fn a_torque_by_speed_is_named_and_nothing_else() {
 #[test]
 fn rate_damping_is_named_and_nothing_else() {
     require_named_alone(&["rate-damping"], 2_200..2_204);
-}
-
-/// Beside drag blade flapping makes the same torque: it may be named in place of the torque by speed, if the report says so.
-#[test]
-fn both_are_named_beside_drag_or_the_rival_is_told() {
-    for judgement in judged(&["velocity-torque", "rate-damping", "rotor-drag"], 2_300..2_302) {
-        let rivals = &judgement.confused_with;
-        let told = format!("named {:?}, not to be told from {rivals:?}", judgement.named);
-        assert!(judgement.named.contains(&"rate-damping"), "{told}");
-        assert!(judgement.missed().is_empty() || judgement.is_declared_swap(), "{told}");
-        let is_known = |name: &&str| ["blade-flapping", "com-offset"].contains(name);
-        assert!(judgement.invented().iter().all(is_known), "{told}");
-    }
 }
 
 /// Without rate damping among the candidates the inertia would have to stand in for it.

@@ -43,7 +43,7 @@ pub const EFFECTS: [&str; 21] = [
 ];
 
 /// Pairs of effects that act together.
-pub const PAIRS: [[&str; 2]; 14] = [
+pub const PAIRS: [[&str; 2]; 13] = [
     ["rotor-drag", "mass-error"],
     ["parasitic-drag", "motor-lag"],
     ["command-delay", "motor-lag"],
@@ -56,7 +56,6 @@ pub const PAIRS: [[&str; 2]; 14] = [
     [SENSOR_BIAS, "rotor-drag"],
     [SENSOR_DELAY, "command-delay"],
     ["rig-pendulum", "bearing-friction"],
-    ["velocity-torque", "rotor-drag"],
     ["rate-damping", "inertia-error"],
 ];
 

@@ -174,8 +174,6 @@ pub enum FitAs {
     Whole,
     /// Each of its parameters.
     EachParameter,
-    /// Groups of parameters, given by their numbers.
-    Groups(&'static [&'static [usize]]),
 }
 
 /// An effect that looks like another on some flights.

@@ -76,17 +76,11 @@ fn fitted(kind: &EffectKind) -> String {
             .to_owned();
     }
     let part = match kind.fit_as {
-        FitAs::Whole => "as a whole".to_owned(),
-        FitAs::EachParameter => "each parameter by itself".to_owned(),
-        FitAs::Groups(groups) => {
-            let names = |group: &&[usize]| {
-                group.iter().map(|at| kind.parameters[*at].name).collect::<Vec<_>>().join(" with ")
-            };
-            groups.iter().map(names).collect::<Vec<_>>().join(", and by itself ")
-        }
+        FitAs::Whole => "as a whole",
+        FitAs::EachParameter => "each parameter by itself",
     };
     let needs: Vec<_> = kind.needs.iter().filter_map(|need| need.describe().split(':').next()).collect();
-    if needs.is_empty() { part } else { format!("{part}; needs {}", needs.join("; ")) }
+    if needs.is_empty() { part.to_owned() } else { format!("{part}; needs {}", needs.join("; ")) }
 }
 
 fn row(page: &mut String, spec: &ParameterSpec) {

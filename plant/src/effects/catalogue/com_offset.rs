@@ -1,7 +1,7 @@
 //! A centre of mass that is not amid the rotors.
 
 use super::weak_rotor;
-use crate::effects::kind::{Action, Confounder, EffectKind, FitAs, Quantity, Values};
+use crate::effects::kind::{Action, Confounder, EffectKind, Quantity, Values};
 use diagnostics::unit::LENGTH;
 use nalgebra::Vector3;
 use vehicles::Vehicle;
@@ -17,8 +17,6 @@ pub static EFFECT: EffectKind = EffectKind {
     parameters: Parameters::SPECS,
     actions: &[Action::Vehicle(shift)],
     needs: &[Quantity::Torque],
-    // The height shows only where drag acts, and as a torque by speed: nothing that a trim could bring along.
-    fit_as: FitAs::Groups(&[&[0, 1], &[2]]),
     steady_state: true,
     turns_steadily: true,
     confounded_with: &[Confounder {
