@@ -37,8 +37,8 @@ impl Base {
             files.text(path).with_context(|| format!("cannot read the manifest {}", path.display()))?;
         // Measures are tables: they may stand behind everything else.
         let text = if campaign.measures.is_empty() { text } else { format!("{text}\n{}", campaign.measures) };
-        let own = [format!("run.record={NO_RECORDING}"), "run.pace=free".to_owned()];
-        let overrides = [&campaign.set[..], &own].concat();
+        let forced = [format!("run.record={NO_RECORDING}"), "run.pace=free".to_owned()];
+        let overrides = [&campaign.set[..], &forced].concat();
         let manifest = Manifest::parse(text, path, &overrides, registry)?;
         let graph = Graph::build_from(&manifest, files)?;
         runtime::require_one_thread(&manifest, &graph)?;

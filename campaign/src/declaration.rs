@@ -121,6 +121,8 @@ fn first() -> u64 {
     1
 }
 
+/// Longest host time of a flight that may be stated, s.
+const TIMEOUT_S_HOST_MAX: f64 = 1e6;
 /// Host time of a flight where the file does not say, s.
 const TIMEOUT_S_HOST: f64 = 60.0;
 
@@ -148,9 +150,9 @@ impl Campaign {
             at(&span, error, "docs/campaigns.md lists the keys of a campaign")
         })?;
         let timeout_s_host = file.timeout_s_host.as_ref().map_or(TIMEOUT_S_HOST, |it| *it.get_ref());
-        if !(timeout_s_host > 0.0 && timeout_s_host.is_finite()) {
+        if !(timeout_s_host > 0.0 && timeout_s_host <= TIMEOUT_S_HOST_MAX) {
             let span = file.timeout_s_host.as_ref().map_or(0..0, Spanned::span);
-            let error = ParameterError::value("timeout_s_host", "seconds above 0", timeout_s_host);
+            let error = ParameterError::value("timeout_s_host", "seconds above 0, at most a million", timeout_s_host);
             return Err(at(&span, error, "leave it out for 60 s"));
         }
         if let Some(set) =

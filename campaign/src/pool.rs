@@ -4,13 +4,14 @@
 use crate::row::Row;
 use crate::worker::{Greeting, Job, Order};
 use anyhow::{Context, Result, bail};
+use bus::host_time::monotonic_ns;
 use runtime::event::StopToken;
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
 use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
 use std::sync::Mutex;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Host time between two looks at the stop token while a worker is waited for.
 const LOOK: Duration = Duration::from_millis(50);
@@ -210,7 +211,7 @@ impl Worker {
 
     /// The next line of the worker.
     fn answer(&mut self, timeout: Duration, stop: &StopToken) -> Result<Answer> {
-        let begin = Instant::now();
+        let end_ns = monotonic_ns() + timeout.as_nanos() as u64;
         loop {
             match self.lines.recv_timeout(LOOK) {
                 Ok(line) => return Ok(Answer::Line(line?)),
@@ -218,7 +219,7 @@ impl Worker {
                 Err(RecvTimeoutError::Disconnected) => return Ok(Answer::Dead(self.end())),
                 // A second stop does not wait for the flight.
                 Err(RecvTimeoutError::Timeout) if stop.count() > 1 => return Ok(Answer::Stopped),
-                Err(RecvTimeoutError::Timeout) if begin.elapsed() > timeout => return Ok(Answer::Late),
+                Err(RecvTimeoutError::Timeout) if monotonic_ns() > end_ns => return Ok(Answer::Late),
                 Err(RecvTimeoutError::Timeout) => {}
             }
         }

@@ -104,11 +104,11 @@ impl Attached {
     /// Adjustments of the vehicle's processes: tables such as `[process."h1/plant"]`.
     fn adjusted(&self, name: &str) -> Table {
         let processes = self.manifest.get("process").and_then(Value::as_table).into_iter().flatten();
-        let own = processes.filter_map(|(process, adjusted)| {
+        let adjusted = processes.filter_map(|(process, adjusted)| {
             let local = process.strip_prefix(name)?.strip_prefix('/')?;
             Some((local.to_owned(), adjusted.clone()))
         });
-        Table::from_iter([("process".to_owned(), Value::Table(own.collect()))])
+        Table::from_iter([("process".to_owned(), Value::Table(adjusted.collect()))])
     }
 
     /// The vehicle in the file that is attached as `file`: others, such as manifests, may have the same name.

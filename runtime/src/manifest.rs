@@ -224,8 +224,8 @@ impl Manifest {
     ) -> Result<PathBuf, Diagnostic> {
         let edits: Vec<&FileEdit> = self.file_edits.iter().filter(|edit| edit.is_of(name, key)).collect();
         // A backup of the process may name another file, which is not edited.
-        let own = self.file_of(name, key).and_then(|written| self.resolve(written).ok());
-        let is_edited = !edits.is_empty() && own.as_ref() == Some(&path);
+        let original = self.file_of(name, key).and_then(|written| self.resolve(written).ok());
+        let is_edited = !edits.is_empty() && original.as_ref() == Some(&path);
         // A file that cannot be read is refused by its reader.
         let Some(text) = is_edited.then(|| files.text(&path).ok()).flatten() else { return Ok(path) };
         let base = |base: &str| file_edits::base_text(files, &path, base);

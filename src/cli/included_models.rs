@@ -24,12 +24,12 @@ pub fn read(from: &Path, uri: &str) -> Option<Result<String, String>> {
 }
 
 fn folders(from: &Path) -> Vec<PathBuf> {
-    let own = from.parent().unwrap_or(Path::new("")).to_owned();
-    let own = if own.as_os_str().is_empty() { PathBuf::from(".") } else { own };
-    let beside = tidy(&own.join(".."));
+    let beside = from.parent().unwrap_or(Path::new("")).to_owned();
+    let folder = if beside.as_os_str().is_empty() { PathBuf::from(".") } else { beside };
+    let beside = tidy(&folder.join(".."));
     let stated = VARIABLES.iter().filter_map(std::env::var_os);
     let stated = stated.flat_map(|folders| std::env::split_paths(&folders).collect::<Vec<_>>());
-    [beside, own].into_iter().chain(stated.filter(|folder| !folder.as_os_str().is_empty())).collect()
+    [beside, folder].into_iter().chain(stated.filter(|folder| !folder.as_os_str().is_empty())).collect()
 }
 
 /// The SDF file of a model's folder: the last that its description names, which is of the newest format, or `model.sdf`.

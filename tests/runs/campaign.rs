@@ -16,8 +16,8 @@ fn written(place: &Place, name: &str, text: &str) -> String {
     let hover = fs::read_to_string(repository("manifests/hover.toml")).unwrap();
     let (head, _) = hover.split_once("[[pass]]").unwrap();
     let vehicles = repository("vehicles");
-    place.write("hover.toml", &head.replace("../vehicles", &vehicles));
-    place.write(name, &format!("manifest = \"hover.toml\"\n{text}"))
+    place.write("hover.toml", head.replace("../vehicles", &vehicles));
+    place.write(name, format!("manifest = \"hover.toml\"\n{text}"))
 }
 
 /// The rows of a campaign by flight, without the host time.
@@ -212,8 +212,8 @@ fn what_cannot_be_flown_at_all_is_refused_before_the_first_flight() {
     }
     // A controller in a process of its own, and a swap.
     let swap = HOVERS.replace("hover.toml", "swap.toml");
-    place.write("swap.toml", &format!("include = [{:?}]", repository("manifests/swap-gains.toml")));
-    let campaign = place.write("swap-c.toml", &format!("manifest = \"swap.toml\"\n{swap}"));
+    place.write("swap.toml", format!("include = [{:?}]", repository("manifests/swap-gains.toml")));
+    let campaign = place.write("swap-c.toml", format!("manifest = \"swap.toml\"\n{swap}"));
     place
         .call(&["campaign", &campaign, "--out", &place.path("swap")])
         .with_code(2)

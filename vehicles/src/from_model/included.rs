@@ -79,11 +79,13 @@ fn included(source: Source, include: Node, read: &Read) -> Result<Option<String>
     let plugins: String = children(include, "plugin").map(|plugin| &source.text[plugin.range()]).collect();
     // The pose of the element counts before that of the model.
     let pose = child(include, "pose").map(|pose| &source.text[pose.range()]);
-    let own = child(model, "pose").map(|pose| &text[pose.range()]);
+    let pose_of_model = child(model, "pose").map(|pose| &text[pose.range()]);
     let parts = model.children().filter(|part| part.is_element() && !part.has_tag_name("pose"));
     let parts = parts.map(|part| &text[part.range()]).collect::<String>();
     let name = name.replace('&', "&amp;").replace('"', "&quot;").replace('<', "&lt;");
-    let model =
-        format!("<model name=\"{name}\">{}{parts}{plugins}</model>", pose.or(own).unwrap_or_default());
+    let model = format!(
+        "<model name=\"{name}\">{}{parts}{plugins}</model>",
+        pose.or(pose_of_model).unwrap_or_default()
+    );
     Ok(Some(model.replace(['\n', '\r'], " ")))
 }
