@@ -11,7 +11,8 @@ use runtime::event::StopToken;
 use runtime::run_dir::{LiveRun, find_live};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
-use view::{Server, Shown, browser};
+use view::browser::{self, Redirect};
+use view::{Server, Shown};
 
 /// Examples that `--help` shows.
 pub const HELP: &str = "Examples:
@@ -53,14 +54,23 @@ pub fn view(arguments: &ViewArguments) -> Result<bool> {
     let server = Server::new(recordings, arguments.port)?;
     let address = server.address();
     print_text(&address)?;
-    let is_open = !arguments.no_open && browser::open(&address);
-    say(if is_open {
+    // It holds the file that leads the browser to the address until the server has ended.
+    let redirect = if arguments.no_open { None } else { opened(&address) };
+    say(if redirect.is_some() {
         "The browser shows it. Ctrl-C ends."
     } else {
         "Open this address in a browser on this machine. Ctrl-C ends."
     });
     server.serve(&|| stop.count() > 0)?;
     Ok(true)
+}
+
+/// The browser that shows `address`; `None` if there is none, or it could not be led there.
+fn opened(address: &str) -> Option<Redirect> {
+    browser::open(address).unwrap_or_else(|error| {
+        say(&format!("warning: no browser was opened: {error:#}"));
+        None
+    })
 }
 
 /// What a live run has recorded so far; waits for its first messages.

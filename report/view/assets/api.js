@@ -24,7 +24,7 @@ export async function catalogue() {
   return (await answered("api/catalogue")).json();
 }
 
-/** How far each recording has come: durations, blocks, and if it still grows. */
+/** Growth of each recording: duration, blocks, number of topics, if it still grows, and the error that ended reading. */
 export async function growth() {
   return (await answered("api/growth")).json();
 }

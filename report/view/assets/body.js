@@ -44,7 +44,7 @@ export class VehicleBody {
     this.isGhost = ghost !== null;
     this.isKnown = false;
     this.#shape(ghost);
-    this.#find(columns);
+    this.find(columns);
     this.#marks(colour);
   }
 
@@ -79,8 +79,9 @@ export class VehicleBody {
     this.propellers.push({ blade, thrust, spin: rotor.spin });
   }
 
-  /** The places of the values that it needs. */
-  #find(columns) {
+  /** Finds the places of the values that it needs, among the topics of `vehicle`. */
+  find(columns, vehicle = this.vehicle) {
+    this.vehicle = vehicle;
     const { state, topics, rotor_speeds: count } = this.vehicle;
     const vector = (topic, field) => columns.all(topic, VECTOR.map((axis) => `${field}.${axis}`));
     const row = (topic, field, length) => columns.all(topic, Array.from({ length }, (_, index) => `${field}[${index}]`));

@@ -77,13 +77,20 @@ export class TimeControls {
   }
 }
 
-/** The choices of camera, vehicle and layers; `changed` hears that something else is to be shown. */
+/** The choices of camera, vehicle and layers; `changed` hears that something else is to be shown. `learn` takes new vehicles. */
 export function cameraControls(room, changed) {
   const [mode, vehicle] = [get("camera-mode"), get("camera-vehicle")];
-  vehicle.append(...room.vehicles.map((body, index) => option(index, body.label)));
-  get("camera-vehicle-label").hidden = room.vehicles.length < 2;
+  const modes = [...mode.children];
+  const learn = () => {
+    vehicle.replaceChildren(...room.vehicles.map((body, index) => option(index, body.label)));
+    vehicle.value = room.followed;
+    get("camera-vehicle-label").hidden = room.vehicles.length < 2;
+    const hasVehicles = room.vehicles.length > 0;
+    mode.replaceChildren(...(hasVehicles ? modes : [option("free", "free")]));
+    mode.value = hasVehicles ? room.mode : "free";
+  };
+  learn();
   get("camera").hidden = false;
-  if (room.vehicles.length === 0) mode.replaceChildren(option("free", "free"));
   const change = () => {
     room.setMode(mode.value, Number(vehicle.value) || 0);
     changed();
@@ -103,4 +110,5 @@ export function cameraControls(room, changed) {
     label.append(box, ` ${text}`);
     get("layer-list").append(label);
   }
+  return { learn };
 }

@@ -13,6 +13,11 @@ const CALM_MS = 1000;
 export class Columns {
   constructor(recording) {
     this.fields = [];
+    this.learn(recording);
+  }
+
+  /** Takes the topics that the recording has by now. */
+  learn(recording) {
     this.known = new Map(recording.topics.map((topic) => [topic.name, new Set(topic.fields.map((field) => field.path))]));
   }
 
@@ -47,6 +52,12 @@ export class Feed {
     this.durationNs = durationNs;
   }
 
+  /** There are more fields than before: rows that lack them are asked for anew. */
+  widen() {
+    this.#blocks.clear();
+    this.#exact = null;
+  }
+
   /** The row of values at the time of `playback`, with the time for which they hold; null while they are on their way. */
   row(playback) {
     const timeNs = Math.min(playback.timeNs, this.durationNs);
@@ -67,9 +78,11 @@ export class Feed {
     if (isBusy) return;
     while (this.#exact?.timeNs !== this.#asked) {
       const wish = this.#asked;
+      const width = this.fields.length;
       const values = await this.#frames({ from_ns: wish, step_ns: 0, count: 1 });
       if (!values) break;
-      this.#exact = { timeNs: wish, values };
+      // Fields that came meanwhile are not in it.
+      if (width === this.fields.length) this.#exact = { timeNs: wish, values };
     }
     this.#asked = null;
   }

@@ -8,19 +8,19 @@ import { Playback } from "./playback.js";
 import { Room } from "./room.js";
 import { defaultPlots, Scopes } from "./scopes.js";
 
-// Pause between two questions for how far a recording has come that is being written.
+// Pause between two questions for the growth of a recording that is being written.
 const GROWTH_MS = 500;
 const state = document.getElementById("state");
 // Kept for people at the console and for tests.
 const shown = { timeNs: null, vehicles: [], frames: 0, isFlat: false, scopesDrawn: false };
 window.hummingbus = { shown };
 
-/** Says what went wrong or what goes on; each speaker has one text at a time. */
+/** Says what went wrong or what goes on; each speaker has one text at a time, and two with the same text say it once. */
 const texts = new Map();
 function teller(speaker) {
   return (text) => {
     texts.set(speaker, text);
-    const said = [...texts.values()].filter(Boolean).join(" ");
+    const said = [...new Set(texts.values())].filter(Boolean).join(" ");
     if (state.textContent !== said) state.textContent = said;
   };
 }
@@ -73,21 +73,30 @@ function head(recordings) {
   list.replaceChildren(...notes.map((note) => Object.assign(document.createElement("li"), { textContent: note })));
 }
 
-/** Follows recordings that grow, until their writers have finished them; `grown` hears of each growth. */
+/** Follows recordings that grow, until their writers have finished them; `grown` hears of each growth, and of new topics. */
 async function follow(recordings, tell, grown) {
   while (recordings.some((recording) => recording.is_growing)) {
     tell("The recording is not finished: End goes to its newest second.");
     await new Promise((resolve) => setTimeout(resolve, GROWTH_MS));
-    const told = await growth().catch((error) => tell(error.message));
-    if (!told) continue;
-    // Topics that had no message before.
-    const isNew = told.some(({ topics }, number) => topics !== recordings[number].topics.length);
-    const known = isNew ? (await catalogue()).recordings : told.map(({ topics, ...rest }) => rest);
-    const hasGrown = told.some((one, number) => one.duration_ns !== recordings[number].duration_ns || !one.is_growing);
-    known.forEach((one, number) => Object.assign(recordings[number], one));
-    if (hasGrown) grown();
+    try {
+      const { news, isNew } = await newsOf(recordings);
+      const hasGrown = isNew || news.some((one, number) => one.duration_ns !== recordings[number].duration_ns || !one.is_growing);
+      news.forEach((one, number) => Object.assign(recordings[number], one));
+      if (hasGrown) grown(isNew);
+    } catch (error) {
+      tell(error.message);
+    }
   }
-  tell("");
+  tell([...new Set(recordings.map(({ damage }) => damage).filter(Boolean))].join(" "));
+}
+
+/** The growth of the recordings; their catalogues, where there are topics that had no message before. */
+async function newsOf(recordings) {
+  const grown = await growth();
+  const isNew = grown.some(({ topics }, number) => topics !== recordings[number].topics.length);
+  const catalogues = isNew ? (await catalogue()).recordings : [];
+  const news = grown.map(({ topics, ...rest }, number) => ({ ...rest, ...catalogues[number], is_growing: rest.is_growing }));
+  return { news, isNew };
 }
 
 async function start() {
@@ -104,9 +113,9 @@ async function start() {
   const note = document.getElementById("room-note");
   note.hidden = !room.isFlat;
   note.textContent = "This browser has no WebGL: the room is painted plainly.";
-  const places = legend(room);
+  let places = legend(room);
   let isStale = true;
-  cameraControls(room, () => (isStale = true));
+  const camera = cameraControls(room, () => (isStale = true));
   new TimeControls(playback, recordings[0].start_s);
   const picker = new Picker(recordings);
   const keep = (plots) => history.replaceState(null, "", `#${encodeURIComponent(JSON.stringify({ plots }))}`);
@@ -134,7 +143,18 @@ async function start() {
     playback.seek(durationNs);
     playback.toggle();
   }
-  follow(recordings, teller("growth"), () => {
+  const learn = () => {
+    columns.forEach((known, number) => known.learn(recordings[number]));
+    room.learn();
+    feeds.forEach((feed) => feed.widen());
+    label(room, recordings);
+    places = legend(room);
+    camera.learn();
+    head(recordings);
+    isStale = true;
+  };
+  follow(recordings, teller("growth"), (isNew) => {
+    if (isNew) learn();
     const isGrowing = recordings.some((recording) => recording.is_growing);
     playback.grow(Math.max(...recordings.map((recording) => recording.duration_ns)), isGrowing);
     feeds.forEach((feed, number) => feed.grow(recordings[number].duration_ns));

@@ -16,7 +16,7 @@ const AHEAD = new THREE.Vector3(1, 0, 0);
 // The first place of the camera, seen from a vehicle, in multiples of its reach.
 const FIRST_LOOK = new THREE.Vector3(-7, -7, 7);
 
-/** What is shown beside the bodies, and whether it is from the start. */
+/** Names of the layers beside the bodies, and if they are shown from the start. */
 export const LAYERS = {
   path: ["path", true],
   thrust: ["thrust", true],
@@ -41,7 +41,10 @@ export class Room {
     this.controls.addEventListener("change", () => (this.isStale = true));
     this.#lights();
     this.#solids();
-    this.#vehicles(columns);
+    this.columns = columns;
+    this.vehicles = [];
+    this.#vehicles();
+    this.#placeBodies();
     this.#grid();
     onTheme(() => this.#paint());
     this.#paint();
@@ -68,13 +71,8 @@ export class Room {
   /** What stands still, and free bodies, of the first recording. */
   #solids() {
     this.things = [];
-    const [{ scene, bodies }] = this.recordings;
-    for (const solid of scene) this.scene.add(this.#solid(solid, 0.22));
-    this.bodies = (bodies?.solids ?? []).map((solid) => {
-      const group = this.#solid(solid, 0.9);
-      this.scene.add(group);
-      return group;
-    });
+    for (const solid of this.recordings[0].scene) this.scene.add(this.#solid(solid, 0.22));
+    this.bodies = [];
   }
 
   #solid({ corners, faces, edges }, opacity) {
@@ -91,24 +89,44 @@ export class Room {
     return new THREE.Group().add(mesh, lines);
   }
 
-  #vehicles(columns) {
-    this.vehicles = [];
+  /** Takes the vehicles and topics that the recordings have by now: those of a live run come one after the other. */
+  learn() {
+    this.#vehicles();
+    this.#placeBodies();
+    this.#paint();
+  }
+
+  #vehicles() {
     this.recordings.forEach((recording, number) => {
       for (const vehicle of recording.vehicles) {
-        this.#vehicle(vehicle, number, columns[number], number > 0);
-        // What was measured flies beside what was simulated.
+        this.#vehicle(vehicle, number, number > 0);
+        // The measured flight is shown beside the simulated one.
         const measured = { ...vehicle, name: `${vehicle.name} measured`.trim(), state: vehicle.topics.measured, topics: {}, rotor_speeds: 0 };
-        if (measured.state) this.#vehicle(measured, number, columns[number], true);
+        if (measured.state) this.#vehicle(measured, number, true);
       }
     });
+  }
+
+  #placeBodies() {
+    const { columns } = this;
     const { bodies } = this.recordings[0];
+    const known = this.bodies.length;
+    this.bodies.push(...(bodies?.solids ?? []).slice(known).map((solid) => this.#solid(solid, 0.9)));
+    if (this.bodies.length > known) this.scene.add(...this.bodies.slice(known));
     this.bodyPlaces = this.bodies.map((_, index) => ({
       position: columns[0].all(bodies.topic, ["x", "y", "z"].map((axis) => `position[${index}].${axis}`)),
       attitude: columns[0].all(bodies.topic, ["x", "y", "z", "w"].map((part) => `attitude[${index}].${part}`)),
     }));
   }
 
-  #vehicle(vehicle, recording, columns, isGhost) {
+  /** Adds a vehicle, or gives the one of this name its new topics. */
+  #vehicle(vehicle, recording, isGhost) {
+    const columns = this.columns[recording];
+    const known = this.vehicles.find((body) => body.recording === recording && body.name === vehicle.name);
+    if (known) {
+      known.find(columns, vehicle);
+      return;
+    }
     const colour = curveColour(this.vehicles.length);
     const body = new VehicleBody(vehicle, columns, colour, isGhost ? colour : null);
     Object.assign(body, { recording, fields: columns.fields, path: this.#path(colour), pathSpan: null });

@@ -6,22 +6,56 @@ use crate::shown::Shown;
 use crate::vehicles::vehicles;
 use anyhow::Result;
 use report::attached::Attached;
-use report::plot::{bodies_of, scene_of};
+use report::plot::{Solid, bodies_of, scene_of};
 use report::topics::{short_name, vehicle};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
-/// What the page needs to know of a recording: name, span, topics with the fields that `fields` lists, vehicles, scene and
-/// marks.
-///
-/// # Errors
-/// If the recording is damaged.
-pub fn catalogue(shown: &Shown, fields: &BTreeMap<String, Vec<Field>>) -> Result<Value> {
-    let recording = shown.recording();
-    let attached = Attached::to(recording)?;
-    let tick_ns = tick_ns(shown)?;
-    let vehicles = vehicles(recording, fields, &attached);
-    Ok(json!({
+/// Parts of a catalogue that stay the same while a recording grows.
+#[derive(Debug)]
+pub struct Lasting {
+    attached: Attached,
+    scene: Vec<Solid>,
+    bodies: Vec<Solid>,
+    tick_ns: Option<u64>,
+    is_growing: bool,
+}
+
+impl Lasting {
+    /// Reads them.
+    ///
+    /// # Errors
+    /// If the recording is damaged.
+    pub fn of(shown: &Shown) -> Result<Self> {
+        let recording = shown.recording();
+        Ok(Self {
+            attached: Attached::to(recording)?,
+            scene: scene_of(recording)?,
+            bodies: bodies_of(recording)?,
+            tick_ns: tick_ns(shown)?,
+            is_growing: shown.is_growing(),
+        })
+    }
+
+    /// Reads them again if they can differ: a recording that is finished has attachments behind its messages, too, and one
+    /// of a single tick has no time of a tick.
+    ///
+    /// # Errors
+    /// If the recording is damaged.
+    pub fn update(&mut self, shown: &Shown) -> Result<()> {
+        if self.is_growing != shown.is_growing() || self.tick_ns.is_none() {
+            *self = Self::of(shown)?;
+        }
+        Ok(())
+    }
+}
+
+/// Catalogue of a recording: name, span, topics with the fields that `fields` lists, vehicles, scene and marks.
+#[must_use]
+pub fn catalogue(shown: &Shown, fields: &BTreeMap<String, Vec<Field>>, lasting: &Lasting) -> Value {
+    let Lasting { attached, scene, tick_ns, .. } = lasting;
+    let vehicles = vehicles(shown.recording(), fields, attached);
+    json!({
         "name": shown.name(),
         "start_s": shown.start_ns() as f64 * 1e-9,
         "duration_ns": shown.duration_ns(),
@@ -31,10 +65,10 @@ pub fn catalogue(shown: &Shown, fields: &BTreeMap<String, Vec<Field>>) -> Result
         "notes": notes(shown, vehicles.is_empty()),
         "topics": topics(shown, fields),
         "vehicles": vehicles,
-        "scene": scene_of(recording)?,
-        "bodies": bodies(shown, fields)?,
-        "marks": marks(&attached, tick_ns.map(|tick_ns| tick_ns as f64 * 1e-9)),
-    }))
+        "scene": scene,
+        "bodies": bodies(shown, fields, lasting),
+        "marks": marks(attached, tick_ns.map(|tick_ns| tick_ns as f64 * 1e-9)),
+    })
 }
 
 fn topics(shown: &Shown, fields: &BTreeMap<String, Vec<Field>>) -> Vec<Value> {
@@ -46,17 +80,17 @@ fn topics(shown: &Shown, fields: &BTreeMap<String, Vec<Field>>) -> Vec<Value> {
     topic.collect()
 }
 
-/// Free bodies of the scene, with the topic that says where they are.
-fn bodies(shown: &Shown, fields: &BTreeMap<String, Vec<Field>>) -> Result<Value> {
+/// Free bodies of the scene, with the topic of their states.
+fn bodies(shown: &Shown, fields: &BTreeMap<String, Vec<Field>>, lasting: &Lasting) -> Value {
     let mut topics = shown.recording().topics().iter();
     let states = topics
         .find(|(name, topic)| short_name(&topic.type_name) == "BodyStates" && fields.contains_key(*name))
         .map(|(name, _)| name);
-    let Some(states) = states else { return Ok(Value::Null) };
-    Ok(json!({ "topic": states, "vehicle": vehicle(states), "solids": bodies_of(shown.recording())? }))
+    let Some(states) = states else { return Value::Null };
+    json!({ "topic": states, "vehicle": vehicle(states), "solids": lasting.bodies })
 }
 
-/// What people should know before they look.
+/// Texts that people should read before they look.
 fn notes(shown: &Shown, has_no_vehicle: bool) -> Vec<String> {
     let mut notes = Vec::new();
     if let Some(cut) = shown.recording().cut() {

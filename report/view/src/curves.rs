@@ -43,7 +43,8 @@ pub struct Curves {
 /// The curves that are asked for, with all samples of a short window, and by the overview of a long one.
 ///
 /// # Errors
-/// If the recording is damaged, has no such topic, or too much is asked for.
+/// If the recording is damaged, has no such topic, or too much is asked for. A long window of a damaged recording is
+/// refused, wherever the damage is.
 pub fn curves(shown: &Shown, overview: &Overview, request: &CurvesRequest) -> Result<Curves> {
     let CurvesRequest { from_ns, to_ns, bins, .. } = *request;
     if bins == 0 || bins > BINS_MAX || to_ns <= from_ns {
@@ -64,7 +65,7 @@ pub fn curves(shown: &Shown, overview: &Overview, request: &CurvesRequest) -> Re
         overview.visit(asked, &mut |time_ns, low, high| {
             bins.add(curve, time_ns, low);
             bins.add(curve, time_ns, high);
-        });
+        })?;
     }
     Ok(Curves { values: bins.values(), read: overview.read() })
 }

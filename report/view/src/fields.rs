@@ -35,33 +35,67 @@ pub struct Field {
     pub unit: String,
 }
 
-/// The numbers of the first message of each topic.
-///
-/// # Errors
-/// If the recording is damaged.
-pub fn fields(shown: &Shown) -> Result<BTreeMap<String, Vec<Field>>> {
-    let topics = shown.recording().topics().iter();
-    let with_messages = topics.filter(|(_, topic)| topic.message_count > 0);
-    let mut missing: BTreeSet<&str> = with_messages.map(|(name, _)| name.as_str()).collect();
-    let (mut found, mut left) = (BTreeMap::new(), FIELDS_MAX);
-    for block in 0..shown.block_count() {
-        if missing.is_empty() {
-            break;
-        }
-        for record in shown.messages(block) {
-            let record = record?;
-            if missing.remove(record.topic.as_str()) {
-                // A message that does not fit its definition has no field that could be shown.
-                let leaves = shown.recording().decode(&record).unwrap_or_default();
-                let numbers = leaves.into_iter().filter(|leaf| !matches!(leaf.value, Value::Text(_)));
-                let listed = numbers.take(left.min(FIELDS_OF_TOPIC_MAX));
-                let listed: Vec<_> = listed.map(|leaf| Field { path: leaf.path, unit: leaf.unit }).collect();
-                left -= listed.len();
-                found.insert(record.topic, with_angles(listed));
+/// The fields of the first message of each topic, as far as the recording was read for them.
+#[derive(Debug, Default)]
+pub struct Listed {
+    fields: BTreeMap<String, Vec<Field>>,
+    /// Blocks that were searched for first messages.
+    blocks: usize,
+    /// Number of fields, those of angles left out.
+    count: usize,
+}
+
+impl Listed {
+    /// The fields of a recording.
+    ///
+    /// # Errors
+    /// If the recording is damaged.
+    pub fn of(shown: &Shown) -> Result<Self> {
+        let mut listed = Self::default();
+        listed.update(shown)?;
+        Ok(listed)
+    }
+
+    /// Fields by their topics.
+    #[must_use]
+    pub fn fields(&self) -> &BTreeMap<String, Vec<Field>> {
+        &self.fields
+    }
+
+    /// Lists the topics that had no message before, in the blocks that were added since.
+    ///
+    /// # Errors
+    /// If one of these blocks is damaged.
+    pub fn update(&mut self, shown: &Shown) -> Result<()> {
+        let topics = shown.recording().topics().iter();
+        let with_messages =
+            topics.filter(|(_, topic)| topic.message_count > 0).map(|(name, _)| name.as_str());
+        let mut missing: BTreeSet<&str> =
+            with_messages.filter(|name| !self.fields.contains_key(*name)).collect();
+        for block in self.blocks..shown.block_count() {
+            if missing.is_empty() {
+                break;
+            }
+            for record in shown.messages(block) {
+                let record = record?;
+                if missing.remove(record.topic.as_str()) {
+                    self.add(shown, record);
+                }
             }
         }
+        self.blocks = shown.block_count();
+        Ok(())
     }
-    Ok(found)
+
+    fn add(&mut self, shown: &Shown, record: Record) {
+        // A message that does not fit its definition has no field that could be shown.
+        let leaves = shown.recording().decode(&record).unwrap_or_default();
+        let numbers = leaves.into_iter().filter(|leaf| !matches!(leaf.value, Value::Text(_)));
+        let listed = numbers.take(FIELDS_OF_TOPIC_MAX.min(FIELDS_MAX - self.count));
+        let listed: Vec<_> = listed.map(|leaf| Field { path: leaf.path, unit: leaf.unit }).collect();
+        self.count += listed.len();
+        self.fields.insert(record.topic, with_angles(listed));
+    }
 }
 
 /// The same fields with the angles of each quaternion behind it.

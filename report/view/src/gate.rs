@@ -33,7 +33,7 @@ impl Refusal {
     }
 }
 
-/// What a request has to know.
+/// Token and port that a request must name.
 #[derive(Debug)]
 pub struct Gate {
     token: String,
@@ -67,7 +67,7 @@ impl Gate {
         }
         let first = path.trim_start_matches('/').split('/').next().unwrap_or_default();
         let token = first.strip_prefix(PREFIX).ok_or(Refusal::Token)?;
-        // A comparison that ends at the first difference would tell a guesser how far it came.
+        // A comparison that ends at the first difference would show a guesser the number of right characters.
         if bool::from(token.as_bytes().ct_eq(self.token.as_bytes())) { Ok(()) } else { Err(Refusal::Token) }
     }
 }

@@ -9,6 +9,8 @@
 //! | [`overview`] | the same over the whole recording, read once in the background |
 //! | [`catalogue`] | all that the page needs to know before it asks for values |
 //! | `vehicles`, `marks` | the vehicles of a recording; its swaps and pass conditions |
+//! | `entry` | a recording of the server, which keeps up with its growth |
+//! | `readers` | threads that read recordings, a few at the same time |
 //! | `assets` | the files of the page, part of this program |
 //! | `gate` | requests that are let in |
 //! | [`server`] | the server: addresses and their answers |
@@ -21,11 +23,13 @@ mod assets;
 pub mod browser;
 pub mod catalogue;
 pub mod curves;
+mod entry;
 pub mod fields;
 pub mod frames;
 mod gate;
 mod marks;
 pub mod overview;
+mod readers;
 pub mod server;
 pub mod shown;
 #[cfg(test)]

@@ -3,10 +3,10 @@
 
 use crate::fields::{Asked, Columns, Field, Sample};
 use crate::shown::Shown;
-use anyhow::Result;
+use anyhow::{Result, bail};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, MutexGuard};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Memory of the bins of all fields.
 const BYTES_MAX: usize = 96 << 20;
@@ -16,11 +16,22 @@ const BINS: [usize; 2] = [1 << 10, 1 << 16];
 /// The lowest and highest values of the fields of a recording.
 #[derive(Debug)]
 pub struct Overview {
-    topics: Mutex<BTreeMap<String, Topic>>,
-    fields: Mutex<BTreeMap<String, Vec<Field>>>,
-    /// Blocks that were read, and blocks that there are.
-    progress: Mutex<[usize; 2]>,
+    budget_bytes: usize,
+    state: Mutex<State>,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    fields: BTreeMap<String, Vec<Field>>,
+    topics: BTreeMap<String, Topic>,
+    /// Bins of a topic, at most: a power of two.
     bins_max: usize,
+    /// Blocks that were read.
+    read: usize,
+    /// Blocks of the recording.
+    blocks: usize,
+    /// The error that ended reading.
+    damage: Option<String>,
 }
 
 /// The bins of one topic.
@@ -39,24 +50,28 @@ struct Topic {
 impl Overview {
     /// The overview of a recording with these fields, of which nothing was read yet.
     #[must_use]
-    pub fn new(fields: BTreeMap<String, Vec<Field>>) -> Self {
+    pub fn new(fields: &BTreeMap<String, Vec<Field>>) -> Self {
         Self::with_budget(fields, BYTES_MAX)
     }
 
     /// The same with bins that take this many bytes, unless that is fewer than the least number of bins.
-    pub(crate) fn with_budget(fields: BTreeMap<String, Vec<Field>>, bytes: usize) -> Self {
-        let count: usize = fields.values().map(Vec::len).sum();
-        let affordable = (bytes / size_of::<[f64; 2]>() / count.max(1)).max(1);
-        let bins_max = (1 << affordable.ilog2()).clamp(BINS[0], BINS[1]);
-        Self { topics: Mutex::default(), fields: Mutex::new(fields), progress: Mutex::default(), bins_max }
+    pub(crate) fn with_budget(fields: &BTreeMap<String, Vec<Field>>, bytes: usize) -> Self {
+        let overview = Self { budget_bytes: bytes, state: Mutex::default() };
+        overview.add_fields(fields);
+        overview
     }
 
-    /// Takes fields of topics that had no message before.
+    /// Takes fields of topics that had no message before. All topics have fewer bins then, if the budget asks for it.
     pub fn add_fields(&self, fields: &BTreeMap<String, Vec<Field>>) {
-        let mut known = lock(&self.fields);
+        let mut state = self.state();
         for (topic, fields) in fields {
-            known.entry(topic.clone()).or_insert_with(|| fields.clone());
+            state.fields.entry(topic.clone()).or_insert_with(|| fields.clone());
         }
+        let count: usize = state.fields.values().map(Vec::len).sum();
+        let affordable = (self.budget_bytes / size_of::<[f64; 2]>() / count.max(1)).max(1);
+        state.bins_max = (1 << affordable.ilog2()).clamp(BINS[0], BINS[1]);
+        let bins_max = state.bins_max;
+        state.topics.values_mut().for_each(|topic| topic.shrink(bins_max));
     }
 
     /// Reads the recording from where it was read before to its end, or until `is_ended`.
@@ -64,73 +79,90 @@ impl Overview {
     /// # Errors
     /// If the recording is damaged.
     pub fn fill(&self, shown: &Shown, is_ended: &AtomicBool) -> Result<()> {
+        let mut state = self.state();
+        state.blocks = shown.block_count();
         // Topic by topic, so that none has more fields than may be asked for at once.
         let mut columns = Vec::new();
-        let known = lock(&self.fields).clone();
-        for (topic, fields) in &known {
+        for (topic, fields) in &state.fields {
             let asked = |field: &Field| Asked { topic: topic.clone(), field: field.path.clone() };
             let asked: Vec<Asked> = fields.iter().take(crate::fields::ASKED_MAX).map(asked).collect();
-            columns.push((topic, Columns::new(shown, &asked)?));
+            columns.push((topic.clone(), Columns::new(shown, &asked)?));
         }
-        let read = self.progress(|progress| {
-            progress[1] = shown.block_count();
-            progress[0]
-        });
-        for block in read..shown.block_count() {
+        let blocks = state.read..state.blocks;
+        drop(state);
+        for block in blocks {
             if is_ended.load(Ordering::Relaxed) {
-                return Ok(());
+                break;
             }
-            self.add_block(shown, block, &mut columns)?;
-            self.progress(|progress| progress[0] = block + 1);
+            let mut state = self.state();
+            state.add_block(shown, block, &mut columns)?;
+            state.read = block + 1;
         }
         Ok(())
     }
 
-    fn add_block(&self, shown: &Shown, block: usize, columns: &mut [(&String, Columns)]) -> Result<()> {
-        let mut topics = lock(&self.topics);
-        for record in shown.messages(block) {
-            let record = record?;
-            let found = columns.binary_search_by_key(&&record.topic, |(topic, _)| *topic);
-            let Ok(found) = found else { continue };
-            let (name, columns) = &mut columns[found];
-            columns.read_message(&record, &mut |sample: Sample<'_>| {
-                if !topics.contains_key(*name) {
-                    topics.insert((*name).clone(), Topic::new(sample.values.len()));
-                }
-                if let Some(topic) = topics.get_mut(*name) {
-                    topic.add(&sample, self.bins_max);
-                }
-            });
-        }
-        Ok(())
+    /// Keeps the error that ended reading: [`Overview::visit`] answers with it from now on.
+    pub fn fail(&self, damage: String) {
+        self.state().damage = Some(damage);
     }
 
-    fn progress<T>(&self, change: impl FnOnce(&mut [usize; 2]) -> T) -> T {
-        change(&mut lock(&self.progress))
+    /// The error that ended reading.
+    #[must_use]
+    pub fn damage(&self) -> Option<String> {
+        self.state().damage.clone()
     }
 
     /// The part of the recording that was read, 0 to 1.
     #[must_use]
     pub fn read(&self) -> f64 {
-        let [read, all] = *lock(&self.progress);
-        if all == 0 { 0.0 } else { read as f64 / all as f64 }
+        let state = self.state();
+        if state.blocks == 0 { 0.0 } else { state.read as f64 / state.blocks as f64 }
     }
 
     /// Calls `visit` with the time of each bin of a field, and its lowest and highest value.
-    pub fn visit(&self, asked: &Asked, visit: &mut dyn FnMut(u64, f64, f64)) {
-        let place = {
-            let known = lock(&self.fields);
-            let fields = known.get(&asked.topic);
-            fields.and_then(|fields| fields.iter().position(|field| field.path == asked.field))
-        };
-        let topics = lock(&self.topics);
-        let (Some(place), Some(topic)) = (place, topics.get(&asked.topic)) else { return };
+    ///
+    /// # Errors
+    /// If reading ended with an error.
+    pub fn visit(&self, asked: &Asked, visit: &mut dyn FnMut(u64, f64, f64)) -> Result<()> {
+        let state = self.state();
+        if let Some(damage) = &state.damage {
+            bail!("{damage}");
+        }
+        let fields = state.fields.get(&asked.topic);
+        let place = fields.and_then(|fields| fields.iter().position(|field| field.path == asked.field));
+        let (Some(place), Some(topic)) = (place, state.topics.get(&asked.topic)) else { return Ok(()) };
         let rows = topic.extremes.chunks_exact(topic.width.max(1));
         for (time_ns, row) in topic.times_ns.iter().zip(rows) {
             if let Some([low, high]) = row.get(place) {
                 visit(*time_ns, *low, *high);
             }
         }
+        Ok(())
+    }
+
+    /// The state, also after a thread that held it panicked: its numbers are valid one by one.
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl State {
+    fn add_block(&mut self, shown: &Shown, block: usize, columns: &mut [(String, Columns)]) -> Result<()> {
+        for record in shown.messages(block) {
+            let record = record?;
+            let found = columns.binary_search_by(|(topic, _)| topic.cmp(&record.topic));
+            let Ok(found) = found else { continue };
+            let (name, columns) = &mut columns[found];
+            columns.read_message(&record, &mut |sample: Sample<'_>| {
+                if !self.topics.contains_key(name) {
+                    self.topics.insert(name.clone(), Topic::new(sample.values.len()));
+                }
+                if let Some(topic) = self.topics.get_mut(name) {
+                    topic.add(&sample, self.bins_max);
+                }
+            });
+        }
+        Ok(())
     }
 }
 
@@ -157,6 +189,13 @@ impl Topic {
         self.samples += 1;
     }
 
+    /// Has at most this many bins from now on, which is a power of two.
+    fn shrink(&mut self, bins_max: usize) {
+        while self.times_ns.len() > bins_max {
+            self.halve();
+        }
+    }
+
     /// Makes one bin of two.
     fn halve(&mut self) {
         let width = self.width;
@@ -172,9 +211,4 @@ impl Topic {
         self.extremes = self.extremes.chunks(2 * width.max(1)).flat_map(merged).collect();
         self.samples_of_bin *= 2;
     }
-}
-
-/// A lock that holds whatever a thread that panicked left: numbers that are valid one by one.
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
 }

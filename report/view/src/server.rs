@@ -5,7 +5,7 @@
 //! | `GET  /token=…/` | the page |
 //! | `GET  /token=…/assets/NAME` | a file of the page |
 //! | `GET  /token=…/api/catalogue` | JSON: the recordings ([`crate::catalogue`]) |
-//! | `GET  /token=…/api/growth` | JSON: of each recording its duration, its blocks, and if it still grows |
+//! | `GET  /token=…/api/growth` | JSON: of each recording its duration, blocks and number of topics, if it still grows, and the error that ended reading |
 //! | `POST /token=…/api/frames` | numbers: [`crate::frames`] |
 //! | `POST /token=…/api/curves` | numbers: [`crate::curves`]; the header `x-read` holds the part that was read for them |
 //!
@@ -13,12 +13,11 @@
 //! that name it and know its token; all others get 403.
 
 use crate::assets::{PAGE, asset};
-use crate::catalogue::catalogue;
 use crate::curves::{CurvesRequest, curves};
-use crate::fields::{Field, fields};
+use crate::entry::Entry;
 use crate::frames::{FramesRequest, frames};
 use crate::gate::Gate;
-use crate::overview::Overview;
+use crate::readers::Readers;
 use crate::shown::Shown;
 use anyhow::{Context as _, Result, anyhow};
 use axum::extract::{DefaultBodyLimit, Path, Request, State};
@@ -28,10 +27,9 @@ use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use axum::{Json, Router};
 use serde_json::{Value, json};
-use std::collections::BTreeMap;
 use std::net::{Ipv4Addr, TcpListener};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, PoisonError, RwLock};
 use std::time::Duration;
 
 /// Bytes of a request: fields by their names.
@@ -45,8 +43,8 @@ const GROWTH_LOOKS: u32 = 10;
 /// Time that answers under way have at the end.
 const LEAVE: Duration = Duration::from_millis(500);
 
-/// Headers of every answer: no other page embeds or reads it, nothing but the page's own files runs in it, and its address
-/// is told to nobody.
+/// Headers of every answer: no other page embeds or reads it, nothing but the page's own files runs in it, and no request
+/// of it names its address.
 const HEADERS: [(HeaderName, &str); 5] = [
     (
         header::CONTENT_SECURITY_POLICY,
@@ -66,57 +64,12 @@ pub struct Server {
     content: Arc<Content>,
 }
 
-/// What the server answers from.
+/// Recordings, and the gate in front of them.
 #[derive(Debug)]
 struct Content {
     gate: Gate,
     recordings: Vec<Entry>,
-    readers: tokio::sync::Semaphore,
-}
-
-#[derive(Debug)]
-struct Entry {
-    state: RwLock<Arc<Known>>,
-    overview: Overview,
-}
-
-/// A recording as far as it is known, and what the catalogue says of it.
-#[derive(Debug)]
-struct Known {
-    shown: Shown,
-    told: Value,
-}
-
-impl Known {
-    fn of(shown: Shown, fields: &BTreeMap<String, Vec<Field>>) -> Result<Self> {
-        let told = catalogue(&shown, fields)?;
-        Ok(Self { shown, told })
-    }
-}
-
-impl Entry {
-    fn of(shown: Shown) -> Result<Self> {
-        let fields = fields(&shown)?;
-        let known = Known::of(shown, &fields)?;
-        Ok(Self { state: RwLock::new(Arc::new(known)), overview: Overview::new(fields) })
-    }
-
-    fn known(&self) -> Arc<Known> {
-        self.state.read().unwrap_or_else(PoisonError::into_inner).clone()
-    }
-
-    /// Reads the overview to the present end, and looks for more; true while more may come.
-    fn keep_up(&self, is_over: &AtomicBool) -> Result<bool> {
-        let known = self.known();
-        self.overview.fill(&known.shown, is_over)?;
-        let Some(grown) = known.shown.grown()? else { return Ok(known.shown.is_growing()) };
-        let fields = fields(&grown)?;
-        self.overview.add_fields(&fields);
-        let grown = Known::of(grown, &fields)?;
-        *self.state.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(grown);
-        // What was just found is read in the next round.
-        Ok(true)
-    }
+    readers: Readers,
 }
 
 impl Server {
@@ -132,8 +85,7 @@ impl Server {
         listener.set_nonblocking(true)?;
         let gate =
             Gate::new(listener.local_addr()?.port()).map_err(|error| anyhow!("no random token: {error}"))?;
-        let readers = tokio::sync::Semaphore::new(READERS);
-        let content = Content { gate, recordings, readers };
+        let content = Content { gate, recordings, readers: Readers::new(READERS) };
         Ok(Self { listener, content: Arc::new(content) })
     }
 
@@ -168,12 +120,11 @@ impl Server {
     }
 }
 
-/// Reads the overviews, and goes on while recordings grow. Damage ends the overview where it is: windows of it are refused
-/// with its place.
+/// Reads the overviews, and goes on while recordings grow. Damage ends the overview: long windows of it are refused with
+/// the place of the damage.
 fn keep_up(content: &Content, is_over: &AtomicBool) {
-    let is_growing = |entry: &Entry| entry.keep_up(is_over).unwrap_or(false);
     // Each has its turn, whether or not one before it grows.
-    while content.recordings.iter().filter(|entry| is_growing(entry)).count() > 0 {
+    while content.recordings.iter().filter(|entry| entry.keep_up(is_over)).count() > 0 {
         for _ in 0..GROWTH_LOOKS {
             if is_over.load(Ordering::Relaxed) {
                 return;
@@ -187,7 +138,7 @@ fn routes(content: Arc<Content>) -> Router {
     Router::new()
         .route("/{token}/", get(|| async { ([(header::CONTENT_TYPE, "text/html; charset=utf-8")], PAGE) }))
         .route("/{token}/assets/{*name}", get(file))
-        .route("/{token}/api/catalogue", get(told))
+        .route("/{token}/api/catalogue", get(catalogues))
         .route("/{token}/api/growth", get(growth))
         .route("/{token}/api/frames", post(answer_frames))
         .route("/{token}/api/curves", post(answer_curves))
@@ -216,22 +167,13 @@ async fn file(Path((_, name)): Path<(String, String)>) -> Response {
     }
 }
 
-async fn told(State(content): State<Arc<Content>>) -> Json<Value> {
-    let told = content.recordings.iter().map(|entry| entry.known().told.clone());
-    Json(json!({ "recordings": told.collect::<Vec<_>>() }))
+async fn catalogues(State(content): State<Arc<Content>>) -> Json<Value> {
+    let catalogues = content.recordings.iter().map(|entry| entry.known().catalogue.clone());
+    Json(json!({ "recordings": catalogues.collect::<Vec<_>>() }))
 }
 
 async fn growth(State(content): State<Arc<Content>>) -> Json<Value> {
-    let of = |entry: &Entry| {
-        let told = &entry.known().told;
-        json!({
-            "duration_ns": told["duration_ns"],
-            "blocks": told["blocks"],
-            "topics": told["topics"].as_array().map_or(0, Vec::len),
-            "is_growing": told["is_growing"],
-        })
-    };
-    Json(content.recordings.iter().map(of).collect())
+    Json(content.recordings.iter().map(Entry::growth).collect())
 }
 
 async fn answer_frames(State(content): State<Arc<Content>>, Json(request): Json<FramesRequest>) -> Response {
@@ -252,18 +194,14 @@ async fn reading(
     recording: usize,
     read: impl FnOnce(&Entry) -> Result<(Vec<f64>, f64)> + Send + 'static,
 ) -> Response {
-    // The semaphore is never closed.
-    let _turn = content.readers.acquire().await;
     let reader = content.clone();
-    let done = tokio::task::spawn_blocking(move || {
-        let count = reader.recordings.len();
-        let known = reader.recordings.get(recording);
-        read(
-            known
-                .with_context(|| format!("there is no recording {recording}, expected 0 to {}", count - 1))?,
-        )
-    });
-    match done.await {
+    let work = move || {
+        let entry = reader.recordings.get(recording).with_context(|| {
+            format!("there is no recording {recording}, expected 0 to {}", reader.recordings.len() - 1)
+        })?;
+        read(entry)
+    };
+    match content.readers.run(work).await {
         Ok(Ok((values, part))) => {
             let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
             let kind = (header::CONTENT_TYPE, "application/octet-stream".to_owned());

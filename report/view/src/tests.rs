@@ -1,7 +1,10 @@
 //! Answers of the server against what was written into a recording.
 
+mod live;
+
+use crate::catalogue::{Lasting, catalogue};
 use crate::curves::{CurvesRequest, curves};
-use crate::fields::{Asked, fields};
+use crate::fields::{Asked, Listed};
 use crate::frames::{FramesRequest, frames};
 use crate::overview::Overview;
 use crate::{Server, Shown};
@@ -13,9 +16,11 @@ use recorder::writer::RecordingWriter;
 use serde_json::json;
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
+use std::os::unix::fs::FileExt as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 use tempfile::TempDir;
 
 const MS: u64 = 1_000_000;
@@ -129,7 +134,7 @@ fn curve_of(shown: &Shown, overview: &Overview, from_ns: u64, to_ns: u64, bins: 
 fn a_curve_keeps_the_peak_that_one_sample_has() {
     let flight = Flight::of(1000, true);
     let shown = flight.shown();
-    let overview = Overview::new(fields(&shown).unwrap());
+    let overview = Overview::new(Listed::of(&shown).unwrap().fields());
     let (values, read) = curve_of(&shown, &overview, 0, 5000 * MS, 10);
     assert_eq!((values.len(), read), (20, 1.0));
     // Half a second each: climbing, the lowest comes first; in the one with the peak, too.
@@ -145,7 +150,7 @@ fn a_curve_keeps_the_peak_that_one_sample_has() {
 fn a_long_window_is_answered_by_the_overview_with_the_same_extremes() {
     let flight = Flight::of(10, true);
     let shown = flight.shown();
-    let overview = Overview::new(fields(&shown).unwrap());
+    let overview = Overview::new(Listed::of(&shown).unwrap().fields());
     assert_eq!(curve_of(&shown, &overview, 0, 5000 * MS, 10).1, 0.0, "nothing was read yet");
     overview.fill(&shown, &AtomicBool::new(false)).unwrap();
     let (values, read) = curve_of(&shown, &overview, 0, 5000 * MS, 10);
@@ -162,14 +167,39 @@ fn a_long_window_is_answered_by_the_overview_with_the_same_extremes() {
 fn an_overview_of_few_bins_keeps_the_extremes_of_all_samples() {
     let shown = Flight::of(1000, true).shown();
     // The least number of bins: 1024 for 5000 samples.
-    let overview = Overview::with_budget(fields(&shown).unwrap(), 0);
+    let overview = Overview::with_budget(Listed::of(&shown).unwrap().fields(), 0);
     overview.fill(&shown, &AtomicBool::new(false)).unwrap();
     let (mut low_m, mut high_m, mut bins) = (f64::INFINITY, f64::NEG_INFINITY, 0);
-    overview.visit(&asked(&[("/plant/state", "position.z")])[0], &mut |_, low, high| {
-        (low_m, high_m, bins) = (low_m.min(low), high_m.max(high), bins + 1);
-    });
+    overview
+        .visit(&asked(&[("/plant/state", "position.z")])[0], &mut |_, low, high| {
+            (low_m, high_m, bins) = (low_m.min(low), high_m.max(high), bins + 1);
+        })
+        .unwrap();
     assert_eq!((low_m, high_m), (0.0, 40.0));
     assert!((512..=1024).contains(&bins), "{bins}");
+}
+
+/// Topics of late vehicles share the budget with those that were there before.
+#[test]
+fn an_overview_has_fewer_bins_when_more_fields_come() {
+    let shown = Flight::of(1000, true).shown();
+    let mut fields = Listed::of(&shown).unwrap().fields().clone();
+    let count: usize = fields.values().map(Vec::len).sum();
+    let budget = 4096 * count * size_of::<[f64; 2]>();
+    let overview = Overview::with_budget(&fields, budget);
+    overview.fill(&shown, &AtomicBool::new(false)).unwrap();
+    let found = || {
+        let (mut high_m, mut bins) = (f64::NEG_INFINITY, 0);
+        let mut see = |_, _, high| (high_m, bins) = (f64::max(high_m, high), bins + 1);
+        overview.visit(&asked(&[("/plant/state", "position.z")])[0], &mut see).unwrap();
+        (high_m, bins)
+    };
+    assert_eq!(found(), (40.0, 2500));
+    let late = fields["/plant/state"].clone();
+    fields.extend((0..8).map(|number| (format!("/late{number}/state"), late.clone())));
+    overview.add_fields(&fields);
+    let (high_m, bins) = found();
+    assert!(high_m == 40.0 && bins <= 1024, "{high_m} {bins}");
 }
 
 /// A server at work, and its end.
@@ -213,6 +243,14 @@ impl Running {
         let end = bytes.windows(4).position(|four| four == b"\r\n\r\n").unwrap();
         let head = String::from_utf8(bytes[..end].to_vec()).unwrap();
         (head.split(' ').nth(1).unwrap().parse().unwrap(), head, bytes[end + 4..].to_vec())
+    }
+
+    /// An answer in JSON.
+    fn get(&self, path: &str) -> serde_json::Value {
+        let (host, page) = self.parts();
+        let (status, _, body) = self.ask("GET", host, &format!("{page}{path}"), "");
+        assert_eq!(status, 200);
+        serde_json::from_slice(&body).unwrap()
     }
 
     fn post(&self, path: &str, body: &serde_json::Value) -> (u16, Vec<u8>) {
@@ -281,10 +319,10 @@ fn numbers_are_answered_as_bytes_and_refusals_as_text() {
 }
 
 #[test]
-fn the_catalogue_tells_fields_units_and_what_is_missing() {
+fn the_catalogue_lists_fields_units_and_what_is_missing() {
     let flight = Flight::of(1000, false);
     let shown = flight.shown();
-    let told = crate::catalogue::catalogue(&shown, &fields(&shown).unwrap()).unwrap();
+    let told = catalogue(&shown, Listed::of(&shown).unwrap().fields(), &Lasting::of(&shown).unwrap());
     assert_eq!((&told["duration_ns"], &told["tick_ns"]), (&json!(4999 * MS), &json!(MS)));
     assert_eq!(told["vehicles"][0]["state"], "/plant/state");
     assert_eq!(told["vehicles"][0]["topics"]["set_point"], "/pilot/set_point");
@@ -305,44 +343,44 @@ fn a_taken_port_is_refused_with_what_to_do() {
     assert!(text.contains(&format!("port {port} of 127.0.0.1")) && text.contains("--port"), "{text}");
 }
 
-/// What a live run records is shown as it comes, and stays when the run has ended.
+/// The page would ask for the rest of the overview for ever.
 #[test]
-fn a_recording_that_grows_is_followed_to_its_end() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("live.mcap");
-    let mut writer = RecordingWriter::create(&path).unwrap();
-    let state = writer.add_channel("/plant/state", &Announcement::of(PlantState::SCHEMA)).unwrap();
-    let write = |writer: &mut RecordingWriter, tick: u32| {
-        let position = [f64::from(tick), 0.0, 0.0].into();
-        let message = PlantState { position, ..PlantState::default() };
-        writer.write(state, tick, u64::from(tick) * MS, &cdr(&message)).unwrap();
-    };
-    (0..100).for_each(|tick| write(&mut writer, tick));
-    writer.flush().unwrap();
-    let shown = Shown::new(Recording::salvage(&path).unwrap()).unwrap();
-    assert!(shown.is_growing() && shown.grown().unwrap().is_none());
-    let server = Running::of(shown);
-    let (host, page) = server.parts();
-    let told = |key: &str| {
-        let (status, _, body) = server.ask("GET", host, &format!("{page}api/growth"), "");
-        assert_eq!(status, 200);
-        serde_json::from_slice::<serde_json::Value>(&body).unwrap()[0][key].clone()
-    };
-    let await_told = |key: &str, expected: serde_json::Value| {
-        while told(key) != expected {
-            std::thread::sleep(std::time::Duration::from_millis(20));
+fn damage_within_a_recording_is_the_answer_to_a_long_window() {
+    let flight = Flight::of(10, true);
+    overwrite(&flight.path, 2, 5);
+    let server = Running::start(&flight);
+    let height = json!([{ "topic": "/plant/state", "field": "position.z" }]);
+    let request = json!({ "recording": 0, "from_ns": 0, "to_ns": 5000 * MS, "bins": 10, "fields": height });
+    let text = await_some(|| {
+        let (status, body) = server.post("api/curves", &request);
+        (status != 200).then(|| (status, String::from_utf8(body).unwrap()))
+    });
+    assert!(text.0 == 400 && text.1.contains("climb.mcap") && text.1.contains("byte "), "{text:?}");
+    assert_eq!(server.get("api/growth")[0]["damage"], text.1.trim());
+    // Short windows in front of it are still answered.
+    let (status, _) = server.post(
+        "api/frames",
+        &json!({
+            "recording": 0, "from_ns": 0, "step_ns": MS, "count": 2, "fields": height
+        }),
+    );
+    assert_eq!(status, 200);
+}
+
+/// Overwrites a few bytes at this part of a file.
+fn overwrite(path: &Path, part: u64, of: u64) {
+    let file = std::fs::OpenOptions::new().write(true).open(path).unwrap();
+    let at = file.metadata().unwrap().len() * part / of;
+    file.write_all_at(&[0xa5; 64], at).unwrap();
+}
+
+/// The first value of `look`; panics if none comes for long.
+fn await_some<T>(mut look: impl FnMut() -> Option<T>) -> T {
+    for _ in 0..3000 {
+        if let Some(found) = look() {
+            return found;
         }
-    };
-    assert_eq!((told("duration_ns"), told("is_growing")), (json!(99 * MS), json!(true)));
-    (100..200).for_each(|tick| write(&mut writer, tick));
-    writer.flush().unwrap();
-    await_told("duration_ns", json!(199 * MS));
-    let position = json!([{ "topic": "/plant/state", "field": "position.x" }]);
-    let request =
-        json!({ "recording": 0, "from_ns": 150 * MS, "step_ns": 0, "count": 1, "fields": position });
-    assert_eq!(server.post("api/frames", &request), (200, 150.0_f64.to_le_bytes().to_vec()));
-    assert_eq!(told("is_growing"), json!(true));
-    writer.finish().unwrap();
-    await_told("is_growing", json!(false));
-    assert_eq!(told("duration_ns"), json!(199 * MS));
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    panic!("it did not come for a minute");
 }

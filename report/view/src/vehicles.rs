@@ -1,4 +1,4 @@
-//! The vehicles of a recording: their bodies, and the topics that show where they are and what they do.
+//! The vehicles of a recording: their bodies, and the topics of their states and commands.
 
 use crate::fields::Field;
 use recorder::reader::Recording;
@@ -8,7 +8,7 @@ use report::topics::{is_of_shadow, short_name, vehicle};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
-/// Types of what a vehicle's pose is taken from, the best first.
+/// Types of messages with a vehicle's pose, the best first.
 const STATES: [&str; 3] = ["PlantState", "MeasuredState", "StateEstimate"];
 /// Topics that are shown of a vehicle, by their types, and their names in the catalogue.
 const SHOWN: [(&str, &str); 8] = [
@@ -22,7 +22,7 @@ const SHOWN: [(&str, &str); 8] = [
     ("MotorCommand", "command"),
 ];
 
-/// What the catalogue says of each vehicle, `h2` before `h10`.
+/// The vehicles as the catalogue lists them, `h2` before `h10`.
 pub fn vehicles(
     recording: &Recording,
     fields: &BTreeMap<String, Vec<Field>>,
