@@ -152,7 +152,8 @@ impl Campaign {
         let timeout_s_host = file.timeout_s_host.as_ref().map_or(TIMEOUT_S_HOST, |it| *it.get_ref());
         if !(timeout_s_host > 0.0 && timeout_s_host <= TIMEOUT_S_HOST_MAX) {
             let span = file.timeout_s_host.as_ref().map_or(0..0, Spanned::span);
-            let error = ParameterError::value("timeout_s_host", "seconds above 0, at most a million", timeout_s_host);
+            let error =
+                ParameterError::value("timeout_s_host", "seconds above 0, at most a million", timeout_s_host);
             return Err(at(&span, error, "leave it out for 60 s"));
         }
         if let Some(set) =
