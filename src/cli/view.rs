@@ -24,7 +24,7 @@ pub const HELP: &str = "Examples:
 /// Pause between two looks for the first messages of a live run.
 const LOOK: Duration = Duration::from_millis(100);
 
-/// What `view` takes.
+/// Arguments of `view`.
 #[derive(Args)]
 pub struct ViewArguments {
     /// The recording, and another one that is shown as a ghost beside it; none for the live run.
@@ -73,7 +73,7 @@ fn opened(address: &str) -> Option<Redirect> {
     })
 }
 
-/// What a live run has recorded so far; waits for its first messages.
+/// The recording of a live run so far; waits for its first messages.
 fn live(run: &LiveRun, stop: &StopToken) -> Result<Shown> {
     let id = &run.entry.run_id;
     let plan = Plan::load(&run.entry.run_dir)

@@ -1,14 +1,19 @@
 // Prints as JSON what a browser shows of recordings that `hummingbus view` serves.
 // Usage: read_view.mjs ADDRESS [no-webgl] [dark] [WIDTHxHEIGHT] [SCREENSHOT.png] [end=PID] [T_NS…]
 //    or: read_view.mjs ADDRESS live=PID
-// `end` ends the server, to see what the page says then; `live` follows a live run, and ends that.
+//    or: read_view.mjs ADDRESS late=NAME ready=FILE
+// `end` ends the server, to see what the page says then; `live` follows a live run, and ends that. `late` waits for a
+// vehicle that comes after FILE is there, although the first question for it fails.
 
+import { writeFileSync } from "node:fs";
 import { withPage } from "./browser.mjs";
 
 const [address, ...rest] = process.argv.slice(2);
 const screenshot = rest.find((word) => word.endsWith(".png"));
 const server = Number(rest.find((word) => word.startsWith("end="))?.slice(4) ?? 0);
 const run = Number(rest.find((word) => word.startsWith("live="))?.slice(5) ?? 0);
+const late = rest.find((word) => word.startsWith("late="))?.slice(5);
+const ready = rest.find((word) => word.startsWith("ready="))?.slice(6);
 const times = rest.filter((word) => /^\d+$/.test(word)).map(Number);
 const [width, height] = (rest.find((word) => /^\d+x\d+$/.test(word)) ?? "1280x900").split("x").map(Number);
 
@@ -121,6 +126,27 @@ async function live(page) {
   return { first, later, last: await look() };
 }
 
+/** Waits for a vehicle that comes late; names of those that are shown then. */
+async function lateVehicle(page) {
+  await page.evaluate(() => {
+    const real = window.fetch;
+    window.refused = 0;
+    window.fetch = (path, options) => {
+      if (window.refused > 0 || !String(path).includes("catalogue")) return real(path, options);
+      window.refused += 1;
+      return Promise.reject(new TypeError("refused by the test"));
+    };
+  });
+  writeFileSync(ready, "");
+  await page.waitForFunction((name) => window.hummingbus.shown.vehicles.some((vehicle) => vehicle.name === name && vehicle.isKnown), {}, late);
+  return page.evaluate(() => ({
+    vehicles: window.hummingbus.shown.vehicles.map(({ name, isKnown, position }) => ({ name, isKnown, height_m: position[2] })),
+    choices: [...document.getElementById("camera-vehicle").options].map(({ textContent }) => textContent),
+    lines: [...document.getElementById("legend").children].length,
+    refused: window.refused,
+  }));
+}
+
 /** Each plot's curves: names, how many points are drawn, the extremes. */
 function curvesShown() {
   const spread = (line) => line.reduce(([low, high], value) => (value === null ? [low, high] : [Math.min(low, value), Math.max(high, value)]), [Infinity, -Infinity]);
@@ -139,6 +165,7 @@ const seen = await withPage(address, async (page, wrong) => {
   await page.waitForFunction(() => window.hummingbus?.error || (window.hummingbus?.shown.timeNs !== null && window.hummingbus?.shown.scopesDrawn));
   const error = await page.evaluate(() => window.hummingbus.error ?? null);
   if (error) throw new Error(error);
+  if (late) return { ...(await lateVehicle(page)), wrong: [...wrong, ...said] };
   if (run) return { ...(await live(page)), wrong: [...wrong, ...said] };
   const shown = [];
   for (const timeNs of times) shown.push(await poses(page, timeNs));

@@ -2,13 +2,19 @@
 //! drawn, and keys alone do everything.
 
 use crate::{Flight, HUMMINGBUS, ROOT, laps, look, readers};
+use bus::Message as _;
+use bus::announcement::Announcement;
+use bus::messages::PlantState;
 use recorder::reader::Recording;
+use recorder::writer::{ChannelId, RecordingWriter};
 use serde_json::{Value, json};
 use std::ffi::OsStr;
 use std::fs;
 use std::io::{BufRead as _, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 use tempfile::TempDir;
 
 /// A process; dropping it ends it.
@@ -180,6 +186,60 @@ fn a_browser_follows_a_live_run_to_its_end() {
     );
     assert!(number("last", "durationNs") >= number("later", "durationNs"), "{seen}");
     assert_eq!((&seen["later"]["isPlaying"], &seen["last"]["isKnown"]), (&json!(true), &json!(true)));
+}
+
+/// A vehicle whose first message comes after the page was opened is shown like the others, also if the first question for
+/// it gets no answer.
+#[test]
+fn a_browser_shows_a_vehicle_that_comes_late() {
+    let Some(readers) = readers() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let (recording, ready) = (folder.path().join("late.mcap"), folder.path().join("ready"));
+    let mut writer = RecordingWriter::create(&recording).unwrap();
+    let add = |writer: &mut RecordingWriter, name: &str| {
+        writer.add_channel(&format!("/{name}/plant/state"), &Announcement::of(PlantState::SCHEMA)).unwrap()
+    };
+    let mut channels = vec![add(&mut writer, "h1")];
+    fly_second(&mut writer, &channels, 0);
+    let view = View::of(&[&recording]);
+    let is_over = AtomicBool::new(false);
+    let seen = std::thread::scope(|scope| {
+        scope.spawn(|| {
+            for second in 1.. {
+                std::thread::sleep(Duration::from_millis(200));
+                if is_over.load(Ordering::Relaxed) {
+                    break;
+                }
+                if ready.exists() && channels.len() == 1 {
+                    channels.push(add(&mut writer, "h2"));
+                }
+                fly_second(&mut writer, &channels, second);
+            }
+        });
+        let arguments = [view.address.clone(), "late=h2".to_owned(), format!("ready={}", ready.display())];
+        let seen = std::panic::catch_unwind(|| {
+            look(&readers, "read_view.mjs", &arguments.each_ref().map(|argument| argument.as_ref()))
+        });
+        is_over.store(true, Ordering::Relaxed);
+        seen.unwrap()
+    });
+    let vehicle = |name: &str, height_m: f64| json!({ "name": name, "isKnown": true, "height_m": height_m });
+    assert_eq!(seen["vehicles"], json!([vehicle("h1", 1.5), vehicle("h2", 2.5)]));
+    assert_eq!((&seen["choices"], &seen["lines"]), (&json!(["h1", "h2"]), &json!(2)));
+    assert_eq!((&seen["refused"], &seen["wrong"]), (&json!(1), &json!([])));
+}
+
+/// One more second of a recording: the first vehicle hovers at 1.5 m, the next one at 2.5 m.
+fn fly_second(writer: &mut RecordingWriter, channels: &[ChannelId], second: u32) {
+    for tick in 100 * second..100 * (second + 1) {
+        for (channel, height_m) in channels.iter().zip([1.5, 2.5]) {
+            let position = [0.0, 0.0, height_m].into();
+            let state = PlantState { position, ..PlantState::default() };
+            let cdr = [&[0, 1, 0, 0], bytemuck::bytes_of(&state)].concat();
+            writer.write(*channel, tick, u64::from(tick) * 10_000_000, &cdr).unwrap();
+        }
+    }
+    writer.flush().unwrap();
 }
 
 /// A recording in which vehicles fly laps in a room.

@@ -40,9 +40,9 @@ export class Feed {
   #exact = null;
   #asked = null;
 
-  /** `tell` hears what went wrong, and an empty text when all is well again. */
-  constructor(number, recording, fields, tell) {
-    Object.assign(this, { number, durationNs: recording.duration_ns, tickNs: recording.tick_ns ?? 1e6, fields, tell });
+  /** `report` gets the text of an error, and an empty text after the next success. */
+  constructor(number, recording, fields, report) {
+    Object.assign(this, { number, durationNs: recording.duration_ns, tickNs: recording.tick_ns ?? 1e6, fields, report });
   }
 
   /** The recording has come so far: frames behind its former end are asked for anew. */
@@ -90,10 +90,10 @@ export class Feed {
   async #frames(span) {
     try {
       const values = await frames({ recording: this.number, fields: this.fields, ...span });
-      this.tell("");
+      this.report("");
       return values;
     } catch (error) {
-      this.tell(error.message);
+      this.report(error.message);
       await new Promise((resolve) => setTimeout(resolve, CALM_MS));
       return null;
     }

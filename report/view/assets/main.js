@@ -10,6 +10,7 @@ import { defaultPlots, Scopes } from "./scopes.js";
 
 // Pause between two questions for the growth of a recording that is being written.
 const GROWTH_MS = 500;
+const GROWING = "The recording is not finished: End goes to its newest second.";
 const state = document.getElementById("state");
 // Kept for people at the console and for tests.
 const shown = { timeNs: null, vehicles: [], frames: 0, isFlat: false, scopesDrawn: false };
@@ -17,7 +18,7 @@ window.hummingbus = { shown };
 
 /** Says what went wrong or what goes on; each speaker has one text at a time, and two with the same text say it once. */
 const texts = new Map();
-function teller(speaker) {
+function reporter(speaker) {
   return (text) => {
     texts.set(speaker, text);
     const said = [...new Set(texts.values())].filter(Boolean).join(" ");
@@ -35,7 +36,7 @@ function plotsOf(recordings) {
   }
 }
 
-/** Names of vehicles as they are told apart, the recording's where there are two. */
+/** Names of vehicles, no two alike: with the recording's where there are two. */
 function label(room, recordings) {
   for (const body of room.vehicles) {
     const recording = recordings.length > 1 ? recordings[body.recording].name : "";
@@ -74,20 +75,22 @@ function head(recordings) {
 }
 
 /** Follows recordings that grow, until their writers have finished them; `grown` hears of each growth, and of new topics. */
-async function follow(recordings, tell, grown) {
-  while (recordings.some((recording) => recording.is_growing)) {
-    tell("The recording is not finished: End goes to its newest second.");
+async function follow(recordings, report, grown) {
+  const goesOn = () => recordings.some((recording) => recording.is_growing);
+  if (goesOn()) report(GROWING);
+  while (goesOn()) {
     await new Promise((resolve) => setTimeout(resolve, GROWTH_MS));
     try {
       const { news, isNew } = await newsOf(recordings);
       const hasGrown = isNew || news.some((one, number) => one.duration_ns !== recordings[number].duration_ns || !one.is_growing);
       news.forEach((one, number) => Object.assign(recordings[number], one));
       if (hasGrown) grown(isNew);
+      report(GROWING);
     } catch (error) {
-      tell(error.message);
+      report(error.message);
     }
   }
-  tell([...new Set(recordings.map(({ damage }) => damage).filter(Boolean))].join(" "));
+  report([...new Set(recordings.map(({ damage }) => damage).filter(Boolean))].join(" "));
 }
 
 /** The growth of the recordings; their catalogues, where there are topics that had no message before. */
@@ -109,7 +112,7 @@ async function start() {
   const options = { flat: asked.has("flat") };
   const room = new Room(document.getElementById("space"), recordings, columns, options);
   label(room, recordings);
-  const feeds = recordings.map((recording, number) => new Feed(number, recording, columns[number].fields, teller(`values ${number}`)));
+  const feeds = recordings.map((recording, number) => new Feed(number, recording, columns[number].fields, reporter(`values ${number}`)));
   const note = document.getElementById("room-note");
   note.hidden = !room.isFlat;
   note.textContent = "This browser has no WebGL: the room is painted plainly.";
@@ -119,7 +122,7 @@ async function start() {
   new TimeControls(playback, recordings[0].start_s);
   const picker = new Picker(recordings);
   const keep = (plots) => history.replaceState(null, "", `#${encodeURIComponent(JSON.stringify({ plots }))}`);
-  const scopes = new Scopes(recordings, playback, picker, plotsOf(recordings), { tell: teller("scopes"), changed: keep });
+  const scopes = new Scopes(recordings, playback, picker, plotsOf(recordings), { report: reporter("scopes"), changed: keep });
   playback.onChange(() => (isStale = true));
   Object.assign(window.hummingbus, { playback, room, scopes });
   shown.isFlat = room.isFlat;
@@ -153,7 +156,7 @@ async function start() {
     head(recordings);
     isStale = true;
   };
-  follow(recordings, teller("growth"), (isNew) => {
+  follow(recordings, reporter("growth"), (isNew) => {
     if (isNew) learn();
     const isGrowing = recordings.some((recording) => recording.is_growing);
     playback.grow(Math.max(...recordings.map((recording) => recording.duration_ns)), isGrowing);

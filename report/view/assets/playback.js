@@ -24,7 +24,7 @@ export class Playback {
     this.timeNs = this.#atTick(timeNs);
     // Whoever goes to the end of a recording that grows stays with it.
     this.isNewest = this.isGrowing && this.timeNs >= this.durationNs;
-    this.#tell();
+    this.#notify();
   }
 
   #atTick(timeNs) {
@@ -41,18 +41,18 @@ export class Playback {
     this.isPlaying = !this.isPlaying;
     if (!this.isPlaying) this.timeNs = this.#atTick(this.timeNs);
     else if (this.timeNs >= this.durationNs && !this.isGrowing) this.timeNs = 0;
-    this.#tell();
+    this.#notify();
   }
 
   /** The recording has come so far, and may go on. */
   grow(durationNs, isGrowing) {
     Object.assign(this, { durationNs, isGrowing });
-    this.#tell();
+    this.#notify();
   }
 
   setPace(pace) {
     this.pace = pace;
-    this.#tell();
+    this.#notify();
   }
 
   /** Lets `ms` of the viewer's time pass. */
@@ -66,10 +66,10 @@ export class Playback {
       // At the end of a recording that grows, time waits for more.
       this.isPlaying = this.isGrowing;
     }
-    this.#tell();
+    this.#notify();
   }
 
-  #tell() {
+  #notify() {
     for (const hear of this.#heard) hear(this);
   }
 }

@@ -68,7 +68,7 @@ export class Room {
     this.scene.add(sun);
   }
 
-  /** What stands still, and free bodies, of the first recording. */
+  /** The fixed objects of the first recording. */
   #solids() {
     this.things = [];
     for (const solid of this.recordings[0].scene) this.scene.add(this.#solid(solid, 0.22));

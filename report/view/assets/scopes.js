@@ -237,8 +237,8 @@ export class Scopes {
   #running = null;
   #valuesAt = 0;
 
-  constructor(recordings, playback, picker, plots, { tell, changed }) {
-    Object.assign(this, { recordings, playback, picker, tell, changed, window: null, list: document.getElementById("plots") });
+  constructor(recordings, playback, picker, plots, { report, changed }) {
+    Object.assign(this, { recordings, playback, picker, report, changed, window: null, list: document.getElementById("plots") });
     this.startS = recordings[0].start_s;
     this.endS = this.startS + playback.durationNs * 1e-9;
     this.marks = recordings[0].marks;
@@ -294,7 +294,7 @@ export class Scopes {
     this.feeds = this.recordings.map((recording, number) => {
       const shown = this.plots.flatMap(({ curves: all }) => all).filter((curve) => curve.recording === number);
       const keys = [...new Map(shown.map(({ topic, field }) => [`${topic} ${field}`, { topic, field }])).values()];
-      return new Feed(number, recording, keys, this.tell);
+      return new Feed(number, recording, keys, this.report);
     });
   }
 
@@ -347,12 +347,12 @@ export class Scopes {
     try {
       const parts = await Promise.all(this.plots.map((plot) => plot.read(fromNs, toNs, signal)));
       const read = Math.min(1, ...parts);
-      this.tell(read < 1 ? `Reading the recording: ${Math.floor(100 * read)} %` : "");
+      this.report(read < 1 ? `Reading the recording: ${Math.floor(100 * read)} %` : "");
       if (read < 1) this.refresh(AGAIN_MS);
       this.isDrawn = true;
       this.showTime();
     } catch (error) {
-      if (error.name !== "AbortError") this.tell(error.message);
+      if (error.name !== "AbortError") this.report(error.message);
     }
   }
 

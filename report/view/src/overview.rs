@@ -189,7 +189,7 @@ impl Topic {
         self.samples += 1;
     }
 
-    /// Has at most this many bins from now on, which is a power of two.
+    /// Merges bins until there are at most this many, which is a power of two.
     fn shrink(&mut self, bins_max: usize) {
         while self.times_ns.len() > bins_max {
             self.halve();

@@ -322,16 +322,16 @@ fn numbers_are_answered_as_bytes_and_refusals_as_text() {
 fn the_catalogue_lists_fields_units_and_what_is_missing() {
     let flight = Flight::of(1000, false);
     let shown = flight.shown();
-    let told = catalogue(&shown, Listed::of(&shown).unwrap().fields(), &Lasting::of(&shown).unwrap());
-    assert_eq!((&told["duration_ns"], &told["tick_ns"]), (&json!(4999 * MS), &json!(MS)));
-    assert_eq!(told["vehicles"][0]["state"], "/plant/state");
-    assert_eq!(told["vehicles"][0]["topics"]["set_point"], "/pilot/set_point");
-    let state = &told["topics"][1];
+    let listed = catalogue(&shown, Listed::of(&shown).unwrap().fields(), &Lasting::of(&shown).unwrap());
+    assert_eq!((&listed["duration_ns"], &listed["tick_ns"]), (&json!(4999 * MS), &json!(MS)));
+    assert_eq!(listed["vehicles"][0]["state"], "/plant/state");
+    assert_eq!(listed["vehicles"][0]["topics"]["set_point"], "/pilot/set_point");
+    let state = &listed["topics"][1];
     let has = |path: &str, unit: &str| {
         state["fields"].as_array().unwrap().contains(&json!({ "path": path, "unit": unit }))
     };
     assert!(has("position.z", "m") && has("attitude.yaw", "rad"), "{state}");
-    assert!(told["notes"][0].as_str().unwrap().contains("the last whole tick was 4999"), "{told}");
+    assert!(listed["notes"][0].as_str().unwrap().contains("the last whole tick was 4999"), "{listed}");
 }
 
 #[test]
