@@ -15,7 +15,7 @@ if (flights.length < report.flights) {
 
 fillTable(
   "failures",
-  ["flights", "first failure", "median time in s"],
+  ["flights", left("first failure"), "median time in s"],
   [
     ...report.failures.map((failure) => [failure.flights, left(failure.condition), number(failure.median_s)]),
     ...report.errors.map(([error, count]) => [count, long(error), "–"]),
@@ -23,19 +23,22 @@ fillTable(
 );
 fillTable(
   "figures",
-  ["figure", "flights", "least", "5 %", "median", "95 %", "greatest"],
+  [left("figure"), "flights", "least", "5 %", "median", "95 %", "greatest"],
   report.figures.map((figure) => [left(figure.figure), figure.flights, ...figure.quantiles.map((value) => number(value))]),
 );
 fillTable(
   "influences",
-  ["varied value", "outcome or figure", "rank correlation", "chance"],
+  [left("varied value"), left("outcome or figure"), "rank correlation", "chance"],
   report.influences.map((it) => [left(it.varied), left(it.figure), it.rank_correlation.toFixed(2), number(it.chance)]),
 );
 fillTable(
   "worst",
-  ["flight", "reason", "command"],
+  ["flight", left("reason"), left("command")],
   report.worst.map((worst) => [worst.flight, left(worst.reason), left(worst.command)]),
 );
+
+// A name that fits beside an axis.
+const short = (name) => (name.length > 36 ? `${name.slice(0, 35)}…` : name);
 
 // Flights that passed and flights that failed, as two traces.
 function traces(make) {
@@ -54,14 +57,14 @@ function drawHistogram() {
     for (const flight of group) if (flight.figures[index] !== null) counts[Math.floor((flight.figures[index] - low) / size)] += 1;
     return { type: "bar", x: counts.map((_, bin) => low + (bin + 0.5) * size), y: counts };
   });
-  const more = { barmode: "stack", bargap: 0.05, height: 320, showlegend: true };
+  const more = { barmode: "stack", bargap: 0.05, showlegend: true };
   Plotly.react("histogram", bars, layout("", figures[index], "flights", more), CONFIG);
 }
 
 function drawScatter() {
   const [from, to] = [Number(element("varied").value), Number(element("against").value)];
   const points = traces((group) => ({ type: "scatter", mode: "markers", x: group.map((it) => it.drawn[from]), y: group.map((it) => it.figures[to]), text: group.map((it) => `flight ${it.flight}`) }));
-  Plotly.react("scatter", points, layout("", varied[from], figures[to], { height: 380, showlegend: true }), CONFIG);
+  Plotly.react("scatter", points, layout("", varied[from], short(figures[to]), { showlegend: true }), CONFIG);
 }
 
 for (const [id, names, draw] of [["figure", figures, drawHistogram], ["varied", varied, drawScatter], ["against", figures, drawScatter]]) {

@@ -18,7 +18,7 @@ pub const MATTERS: f64 = 0.01;
 pub const FREE_DELAY_S: f64 = 0.02;
 
 /// All effects that are candidates.
-pub const EFFECTS: [&str; 21] = [
+pub const EFFECTS: [&str; 19] = [
     "rotor-drag",
     "parasitic-drag",
     "translational-lift",
@@ -38,12 +38,10 @@ pub const EFFECTS: [&str; 21] = [
     "bearing-friction",
     SENSOR_DELAY,
     SENSOR_BIAS,
-    "velocity-torque",
-    "rate-damping",
 ];
 
 /// Pairs of effects that act together.
-pub const PAIRS: [[&str; 2]; 13] = [
+pub const PAIRS: [[&str; 2]; 12] = [
     ["rotor-drag", "mass-error"],
     ["parasitic-drag", "motor-lag"],
     ["command-delay", "motor-lag"],
@@ -56,7 +54,6 @@ pub const PAIRS: [[&str; 2]; 13] = [
     [SENSOR_BIAS, "rotor-drag"],
     [SENSOR_DELAY, "command-delay"],
     ["rig-pendulum", "bearing-friction"],
-    ["rate-damping", "inertia-error"],
 ];
 
 /// A vehicle file, what is true beyond it, and how it is flown.
