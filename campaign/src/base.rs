@@ -58,6 +58,10 @@ impl Base {
                 return Ok((key.clone(), drawn));
             }
             let declared = self.declared(key)?.ok_or_else(|| {
+                // Its reader may say more about a key that does not exist.
+                if let Err(refusal) = self.check(&[format!("{key}=1")]) {
+                    return refusal;
+                }
                 let message = format!("`{key}` has no declared number, which a factor or an offset needs");
                 varied.problem(
                     ParameterError::conflict("key", message),

@@ -203,7 +203,8 @@ fn plan(folder: &Path, campaign: &Campaign, lock: &mut File) -> Result<Plan> {
     lock.read_to_string(&mut before)?;
     if before != digest {
         bail!(
-            "{}: it was drawn of another campaign file; choose another --out, or remove the plan to have it drawn again",
+            "{}: it was drawn of a campaign file with other flights, seed, sampling or [[vary]]; choose another --out, or remove \
+             the plan to have it drawn again",
             path.display()
         );
     }
@@ -280,7 +281,7 @@ mod tests {
         let more = Campaign { flights: 4, ..campaign.clone() };
         // Rows were flown: the plan of another campaign file is not drawn over them.
         let error = Store::open(folder.path(), &more, "a", &["f".to_owned()]).unwrap_err().to_string();
-        assert!(error.contains("drawn of another campaign file"), "{error}");
+        assert!(error.contains("drawn of a campaign file with other flights"), "{error}");
     }
 
     #[test]
@@ -297,7 +298,7 @@ mod tests {
         std::fs::write(&path, &edited).unwrap();
         assert_eq!(open(&more, "c").unwrap().1.flights[0], [2.0]);
         let error = open(&campaign, "c").unwrap_err().to_string();
-        assert!(error.contains("drawn of another campaign file"), "{error}");
+        assert!(error.contains("drawn of a campaign file with other flights"), "{error}");
     }
 
     #[test]

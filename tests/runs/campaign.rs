@@ -192,7 +192,7 @@ fn what_cannot_be_flown_at_all_is_refused_before_the_first_flight() {
     let place = Place::new();
     let vary = |key: &str| HOVERS.replace("process.plant.vehicle.body.mass", key);
     for (text, says) in [
-        (vary("process.plnt.vehicle.body.mass"), "no declared number"),
+        (vary("process.plnt.vehicle.body.mass"), "there is no process `plnt`"),
         (vary("process.plant.vehicle.body.mas").replace("as = \"factor\"\n", ""), "mas"),
         (
             vary("process.plnt.vehicle.body.mass").replace("as = \"factor\"\n", ""),
