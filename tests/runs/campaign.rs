@@ -211,7 +211,7 @@ fn what_cannot_be_flown_at_all_is_refused_before_the_first_flight() {
         assert!(!ended.to_string().contains("panicked"), "{ended}");
     }
     // A controller in a process of its own, and a swap.
-    let swap = HOVERS.replace("hover.toml", "swap.toml");
+    let swap = HOVERS.replace("set = [\"run.duration_s=0.4\"]\n", "");
     place.write("swap.toml", format!("include = [{:?}]", repository("manifests/swap-gains.toml")));
     let campaign = place.write("swap-c.toml", format!("manifest = \"swap.toml\"\n{swap}"));
     place
