@@ -276,7 +276,7 @@ mod tests {
                 "c.toml:2:11: `flights` must be 1 to 1000000 flights",
             ),
             ("flights = 2\n[[vary]]\nkey = \"a\"", "c.toml:3:1: `vary` must be one of `values`"),
-            ("flights = 2\n[[vary]]\nvalues = [1]", "c.toml:3:1: `key` is missing"),
+            ("flights = 2\n[[vary]]\nvalues = [1]", "c.toml:3:1: missing key `key`"),
             (
                 "flights = 2\n[[vary]]\nkey = \"a\"\nuniform = [2, 1]",
                 "c.toml:3:1: `uniform` must be a lower limit",
