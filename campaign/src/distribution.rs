@@ -9,7 +9,7 @@ use statrs::distribution::{ContinuousCDF, Normal};
 /// ```
 /// use campaign::distribution::Distribution;
 /// let mass: Distribution = toml::from_str("uniform = [0.9, 1.1]")?;
-/// assert_eq!(mass.at(0.25), 0.95);
+/// assert_eq!(mass.at(0.5), 1.0);
 /// let delay: Distribution = toml::from_str("integers = [1, 20]")?;
 /// assert_eq!((delay.at(0.0), delay.at(0.999)), (1.0, 20.0));
 /// # Ok::<(), toml::de::Error>(())
