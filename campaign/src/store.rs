@@ -168,9 +168,10 @@ fn opened(path: &Path, options: &mut OpenOptions) -> Result<File> {
 fn put(folder: &Path, name: &str, write: impl FnOnce(&mut File) -> Result<()>) -> Result<()> {
     let path = folder.join(name);
     let failed = || format!("cannot write {}", path.display());
-    let mut draft = tempfile::Builder::new().prefix(".draft-").tempfile_in(folder).with_context(failed)?;
-    // As other files of the user: readable as the umask says.
-    draft.as_file().set_permissions(std::os::unix::fs::PermissionsExt::from_mode(0o644))?;
+    // Readable as the umask says, as other files of the user.
+    let permissions = std::os::unix::fs::PermissionsExt::from_mode(0o666);
+    let draft = tempfile::Builder::new().prefix(".draft-").permissions(permissions).tempfile_in(folder);
+    let mut draft = draft.with_context(failed)?;
     write(draft.as_file_mut()).with_context(failed)?;
     draft.persist(&path).map(drop).with_context(failed)
 }

@@ -302,7 +302,7 @@ impl Launch<'_> {
         });
     }
 
-    /// What it has printed so far.
+    /// Standard output so far.
     pub fn output(&self) -> String {
         fs::read_to_string(&self.output).unwrap_or_default()
     }

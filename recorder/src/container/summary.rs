@@ -6,12 +6,12 @@ use mcap::MAGIC;
 use mcap::records::{AttachmentIndex, ChunkIndex, Record};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What the end of a complete file says about the rest.
+/// Index at the end of a complete file.
 pub struct Summary {
     pub channels: Channels,
-    /// Where the attachments are.
+    /// Places of the attachments.
     pub attachments: Vec<AttachmentIndex>,
-    /// Where the chunks are; none where the file does not list all of them.
+    /// Places of the chunks; none where the file does not list all of them.
     pub chunks: Option<Vec<ChunkIndex>>,
 }
 

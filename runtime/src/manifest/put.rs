@@ -26,7 +26,7 @@ pub fn put(item: &mut Item, keys: &[String], mut value: toml_edit::Value) -> Opt
     Some(())
 }
 
-/// What lies at `key` of a list or a table; `empty` where the table has nothing there.
+/// The item at `key` of a list or a table; `empty` where the table has nothing there.
 fn slot<'i>(inside: &'i mut Item, key: &str, empty: impl FnOnce() -> Item) -> Option<&'i mut Item> {
     if inside.is_array() || inside.is_array_of_tables() {
         return inside.get_mut(key.parse::<usize>().ok()?);
