@@ -81,7 +81,7 @@ impl Clock<'_> {
 
     /// Grants ticks until the run ends; returns the end tick.
     fn run(&self) -> Result<u32, BusError> {
-        let mut granted = 0;
+        let mut granted = self.plan.first_tick;
         let mut deadlines: Option<Deadlines> = None;
         loop {
             let end = self.end_after(granted);

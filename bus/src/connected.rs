@@ -2,6 +2,7 @@
 //! calls it is the [executor](crate::executor).
 
 use crate::announcement::{self, Announcement};
+use crate::checkpoint::{NodePart, Samples, store_part};
 use crate::component::Transfer;
 use crate::error::BusError;
 use crate::hand_over::{Computation, HandOver};
@@ -16,6 +17,7 @@ use crate::profile::TickWriter;
 use crate::sample_ring::SampleRing;
 use crate::stepper::{Stepped, Stepper};
 use crate::timing::Timing;
+use crate::transport::Receiver;
 
 /// A node whose ports are connected.
 #[derive(Debug)]
@@ -39,6 +41,10 @@ pub(crate) struct ConnectedNode {
     known_ticks: u32,
     /// True if another process may go on from its state at any tick.
     states_every_tick: bool,
+    /// The number of the plan's checkpoint that comes next.
+    next_checkpoint: usize,
+    /// The tick of the checkpoint that was asked for last and is written.
+    asked_checkpoint: u32,
     /// Host time of all its steps, ns.
     step_ns: u64,
     // The transport last: the ports give back what they hold while it stands.
@@ -111,6 +117,8 @@ impl ConnectedNode {
             told_tick: first_tick,
             known_ticks: 0,
             states_every_tick: true,
+            next_checkpoint: 0,
+            asked_checkpoint: 0,
             step_ns: 0,
             links,
         }
@@ -122,6 +130,7 @@ impl ConnectedNode {
         membership: &Membership,
     ) -> Result<(), BusError> {
         let links = &self.links;
+        let restored = Samples::of_run(&links.run_dir, &links.plan)?;
         for (input, declared) in links.node.inputs.iter().zip(declared) {
             let topic = &links.plan.topics[input.topic];
             let announcement = Announcement::load(&announcement::topic_path(&links.run_dir, input.topic))?;
@@ -136,15 +145,28 @@ impl ConnectedNode {
                 Feed::Ring(SampleRing::open(&links.plan, input.topic, announcement.size)?)
             } else {
                 let receiver = links.subscriber(input.topic, generation)?;
-                let limit = self.first_tick.checked_sub(input.delay_ticks);
-                Feed::Shared(Source::joined(generation, receiver, limit, topic.period_ticks))
+                Feed::Shared(self.source(input, generation, receiver))
             };
-            let mut port = InPort::new(input, topic, announcement.size, initial, feed);
+            let mut port = InPort::new(input, topic, &announcement, initial, feed);
+            if let Some(sample) = restored.get(&topic.name) {
+                port.restore(sample, &links.node.name)?;
+            }
             port.reads_shadow = matches!(declared, Declared::Raw);
             self.stepper.inputs.push(port);
             self.announcements.push(announcement);
         }
         Ok(())
+    }
+
+    /// The samples that `receiver` gets of `input`, from the first that this process reads on. Those from before a
+    /// checkpoint from which the run goes on are not sent again.
+    fn source(&self, input: &InputPlan, generation: u32, receiver: Receiver) -> Source {
+        let period_ticks = self.links.plan.topics[input.topic].period_ticks;
+        let (run_tick, limit) = (self.links.plan.first_tick, self.first_tick.checked_sub(input.delay_ticks));
+        if limit.is_none_or(|limit| limit - limit % period_ticks < run_tick) {
+            return Source::new(generation, receiver, run_tick, period_ticks);
+        }
+        Source::joined(generation, receiver, limit, period_ticks)
     }
 
     /// Topic name and announced type of input `input`.
@@ -194,10 +216,62 @@ impl ConnectedNode {
             let source = Source::joined(generation, receiver, limit, topic.period_ticks);
             let input =
                 InputPlan { port: output.port.clone(), topic: output.topic, delay_ticks: 1, initial: None };
-            let size = Announcement::load(&announcement::topic_path(&links.run_dir, output.topic))?.size;
-            self.stepper.predecessor.push(InPort::new(&input, topic, size, None, Feed::Shared(source)));
+            let announced = Announcement::load(&announcement::topic_path(&links.run_dir, output.topic))?;
+            self.stepper.predecessor.push(InPort::new(&input, topic, &announced, None, Feed::Shared(source)));
         }
         links.transport.reserve()
+    }
+
+    /// Goes on from the checkpoint from which the run does, if it does and this is the node's first process.
+    ///
+    /// # Errors
+    /// If the checkpoint does not fit the node.
+    pub(crate) fn go_on(&mut self, computation: &mut dyn Computation) -> Result<(), BusError> {
+        let links = &self.links;
+        if links.plan.first_tick == 0 || links.generation > 0 {
+            return Ok(());
+        }
+        let part = NodePart::of_run(&links.run_dir, links.index)?;
+        self.state.restore(&part, computation)
+    }
+
+    /// Writes this node's parts of the checkpoints that fall between its last due tick and `tick`, whose inputs it has
+    /// taken, unless another process is the node.
+    fn write_checkpoints(
+        &mut self,
+        tick: u32,
+        locals: &Locals,
+        computation: &dyn Computation,
+    ) -> Result<(), BusError> {
+        while let Some(&of) = self.links.plan.checkpoint_ticks.get(self.next_checkpoint)
+            && of <= tick
+        {
+            self.next_checkpoint += 1;
+            self.write_checkpoint(of, tick, locals, computation)?;
+        }
+        let asked = self.links.lockstep.checkpoint_tick();
+        if asked > self.asked_checkpoint && asked <= tick {
+            self.asked_checkpoint = asked;
+            self.write_checkpoint(asked, tick, locals, computation)?;
+        }
+        Ok(())
+    }
+
+    /// Writes this node's part of the checkpoint at tick `of` if `tick` is the first due tick from there on.
+    fn write_checkpoint(
+        &self,
+        of: u32,
+        tick: u32,
+        locals: &Locals,
+        computation: &dyn Computation,
+    ) -> Result<(), BusError> {
+        let links = &self.links;
+        if of + links.node.period_ticks <= tick || tick < self.take_over_tick {
+            return Ok(());
+        }
+        let samples = self.stepper.samples_before(of, locals);
+        let part = self.state.part(&links.node.name, links.generation, samples, computation);
+        store_part(&links.run_dir, of, links.index, &part)
     }
 
     /// Tells that this node can begin, with the state of `computation`.
@@ -556,6 +630,7 @@ impl ConnectedNode {
         let lockstep = &self.links.lockstep;
         let gathered = self.stepper.gather(tick);
         gathered.inspect_err(|&(topic, _)| lockstep.count_gap(topic)).map_err(|(_, error)| error)?;
+        self.write_checkpoints(tick, locals, computation)?;
         let received_ns = before_ns.unwrap_or_else(monotonic_ns);
         self.step(tick, locals, computation)?;
         if crate::hosted::is_cancelled() {

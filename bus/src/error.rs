@@ -79,6 +79,14 @@ pub enum BusError {
         /// Its fault.
         found: String,
     },
+    /// A checkpoint does not fit a node.
+    #[error("node `{node}` cannot go on from the checkpoint: {reason}")]
+    Checkpoint {
+        /// The node.
+        node: String,
+        /// The part that does not fit.
+        reason: String,
+    },
     /// The plan has no node of this name.
     #[error("the run has no node named `{node}`; it has {known}")]
     UnknownNode {

@@ -34,9 +34,10 @@ impl<'c> Member<'c> {
     pub(crate) fn new(
         mut node: ConnectedNode,
         transfer: Transfer,
-        computation: Box<dyn Computation + 'c>,
+        mut computation: Box<dyn Computation + 'c>,
     ) -> Result<Self, BusError> {
         node.open_states(transfer, &*computation)?;
+        node.go_on(&mut *computation)?;
         Ok(Self { node, computation })
     }
 

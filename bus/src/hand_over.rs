@@ -1,5 +1,6 @@
 //! State of a connected node as words: the bytes of its computation, then the words of the bus.
 
+use crate::checkpoint::{NodePart, SavedSample};
 use crate::component::{StateError, Transfer};
 use crate::error::BusError;
 use crate::links::Links;
@@ -21,8 +22,9 @@ pub(crate) trait Computation {
 }
 
 /// State of a node, and the rings by which processes of the node hand it to each other.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct HandOver {
+    transfer: Transfer,
     layout: Option<StateLayout>,
     /// The state, then the words of the bus.
     words: Vec<u64>,
@@ -36,7 +38,8 @@ impl HandOver {
     pub(crate) fn new(transfer: Transfer, computation: &dyn Computation, more_words: usize) -> Self {
         let layout = StateLayout::of(transfer, computation.state_size(), computation.configuration());
         let state_words = layout.as_ref().map_or(0, StateLayout::words);
-        Self { layout, words: vec![0; state_words + more_words], state_words, ..Self::default() }
+        let words = vec![0; state_words + more_words];
+        Self { transfer, layout, words, state_words, published: None, predecessor: None }
     }
 
     /// Opens the ring of the predecessor, which is generation `generation` and has `more_words` of the bus behind its
@@ -97,8 +100,39 @@ impl HandOver {
         node.load(state).map_err(|error| error.to_string())
     }
 
+    /// The part of a checkpoint of generation `generation` of the node `name`, whose state `node` has and whose inputs read
+    /// `samples`.
+    pub(crate) fn part(
+        &self,
+        name: &str,
+        generation: u32,
+        samples: Vec<SavedSample>,
+        node: &dyn Computation,
+    ) -> NodePart {
+        let timing = &self.words[self.state_words..];
+        let mut part = NodePart::new(name, self.transfer, node, timing, samples);
+        part.generation = generation;
+        part
+    }
+
+    /// Goes on from `part` of a checkpoint.
+    ///
+    /// # Errors
+    /// If it does not fit `node`.
+    pub(crate) fn restore(&mut self, part: &NodePart, node: &mut dyn Computation) -> Result<(), BusError> {
+        part.restore(self.transfer, node, &mut self.words[self.state_words..])
+    }
+
     /// Forgets the predecessor.
     pub(crate) fn leave_predecessor(&mut self) {
         self.predecessor = None;
+    }
+}
+
+impl Default for HandOver {
+    /// That of a node without a state.
+    fn default() -> Self {
+        let (layout, words, state_words) = (None, Vec::new(), 0);
+        Self { transfer: Transfer::Nothing, layout, words, state_words, published: None, predecessor: None }
     }
 }

@@ -10,6 +10,8 @@ extern crate self as bus;
 pub mod announcement;
 mod bounded;
 #[doc(hidden)]
+pub mod checkpoint;
+#[doc(hidden)]
 pub mod claim;
 #[doc(hidden)]
 pub mod clock;

@@ -50,7 +50,12 @@ impl Membership {
     #[must_use]
     pub fn first(plan: &Plan) -> Self {
         let first = |node: &NodePlan| NodeInstances {
-            primary: Instance { generation: 0, join_tick: 0, shadows: false, plan: node.clone() },
+            primary: Instance {
+                generation: 0,
+                join_tick: plan.first_tick.next_multiple_of(node.period_ticks.max(1)),
+                shadows: false,
+                plan: node.clone(),
+            },
             backup: None,
             take_over_tick: u32::MAX,
             take_over_ticks: vec![u32::MAX; node.outputs.len()],

@@ -148,6 +148,12 @@ pub struct Plan {
     pub tick_ns: u64,
     /// Ticks until the run ends.
     pub duration_ticks: u32,
+    /// The first tick that is computed: that of the checkpoint from which the run goes on.
+    #[serde(default)]
+    pub first_tick: u32,
+    /// Ticks before which the nodes write their parts of a checkpoint, ascending.
+    #[serde(default)]
+    pub checkpoint_ticks: Vec<u32>,
     /// Ticks that a fast node may be ahead of the slowest.
     pub window_ticks: u32,
     /// Pacing.
@@ -342,6 +348,8 @@ impl Plan {
             seed: 1,
             tick_ns: 1_000_000,
             duration_ticks,
+            first_tick: 0,
+            checkpoint_ticks: Vec::new(),
             window_ticks: 64,
             pace: Pace::Free,
             clock_cpu: None,

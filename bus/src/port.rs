@@ -1,5 +1,7 @@
 //! The two ends of a connection inside a node: what may be read at a tick, and what must be sent.
 
+use crate::announcement::Announcement;
+use crate::checkpoint::SavedSample;
 use crate::error::BusError;
 use crate::finite::{Floats, field_at};
 use crate::local::LocalTopic;
@@ -126,8 +128,11 @@ pub(crate) struct InPort {
     /// Those that succeed it, in order: more than one where a backup died before this node turned to it.
     backups: VecDeque<Backup>,
     initial: Option<Box<[u64]>>,
+    /// The newest sample from before the run went on from a checkpoint.
+    restored: Option<(SampleHeader, Box<[u64]>)>,
     topic_name: String,
     size: usize,
+    layout_hash: u64,
     topic_period_ticks: u32,
     /// Whether the node reads the shadow samples too, and so waits for them.
     pub(crate) reads_shadow: bool,
@@ -139,7 +144,7 @@ impl InPort {
     pub(crate) fn new(
         input: &InputPlan,
         topic: &TopicPlan,
-        size: usize,
+        announcement: &Announcement,
         initial: Option<Box<[u64]>>,
         active: Feed,
     ) -> Self {
@@ -150,8 +155,10 @@ impl InPort {
             newest_tick: None,
             backups: VecDeque::new(),
             initial,
+            restored: None,
             topic_name: topic.name.clone(),
-            size,
+            size: announcement.size,
+            layout_hash: announcement.layout_hash,
             topic_period_ticks: topic.period_ticks,
             reads_shadow: false,
             topic: input.topic,
@@ -287,6 +294,63 @@ impl InPort {
 
     /// The sample that the tick reads, if there is one.
     pub(crate) fn sample<'a>(&'a self, locals: &'a Locals) -> Option<(SampleHeader, &'a [u64])> {
+        self.received(locals).or_else(|| self.restored())
+    }
+
+    /// The newest sample from before the run went on from a checkpoint.
+    fn restored(&self) -> Option<(SampleHeader, &[u64])> {
+        self.restored.as_ref().map(|(header, words)| (*header, &**words))
+    }
+
+    /// The same as CDR bytes.
+    pub(crate) fn restored_cdr(&self) -> Option<&[u8]> {
+        self.restored().map(|(_, words)| cdr_bytes(words, self.size))
+    }
+
+    /// Goes on with `sample` as the newest one.
+    ///
+    /// # Errors
+    /// If it is not laid out as the samples of the topic are now.
+    pub(crate) fn restore(&mut self, sample: &SavedSample, node: &str) -> Result<(), BusError> {
+        if sample.layout_hash != self.layout_hash || sample.words.len() != sample_words(self.size) {
+            let reason = format!(
+                "the messages of {} are laid out otherwise than when the checkpoint was written",
+                self.topic_name
+            );
+            return Err(BusError::Checkpoint { node: node.to_owned(), reason });
+        }
+        let header = SampleHeader { tick: sample.tick, sequence: sample.sequence, ..SampleHeader::default() };
+        self.restored = Some((header, sample.words.clone().into_boxed_slice()));
+        Ok(())
+    }
+
+    /// Has a feed of this process show what was sent up to `tick`.
+    pub(crate) fn look_at(&mut self, tick: u32) {
+        self.newest_tick = Some(tick);
+    }
+
+    /// The newest sample that was sent before tick `before`, as far as this or a later tick may read it.
+    pub(crate) fn sample_before(&self, before: u32, locals: &Locals) -> Option<SavedSample> {
+        let (header, words) = match (&self.active, self.newest_tick) {
+            (Feed::Ring(ring), Some(newest)) => {
+                let sequence = newest / self.topic_period_ticks;
+                let tick = sequence * self.topic_period_ticks;
+                let header =
+                    SampleHeader { tick: tick.into(), sequence: sequence.into(), ..SampleHeader::default() };
+                ring.at(tick).map(|words| (header, words)).or_else(|| self.restored())
+            }
+            _ => self.sample(locals),
+        }?;
+        (header.tick < u64::from(before)).then(|| SavedSample {
+            topic: self.topic_name.clone(),
+            layout_hash: self.layout_hash,
+            tick: header.tick,
+            sequence: header.sequence,
+            words: words.to_vec(),
+        })
+    }
+
+    fn received<'a>(&'a self, locals: &'a Locals) -> Option<(SampleHeader, &'a [u64])> {
         match &self.active {
             Feed::Shared(_) => self.current.as_ref().map(|sample| (*sample.header(), sample.words())),
             Feed::Local { .. } => locals[self.topic].as_ref()?.at(self.newest_tick?),

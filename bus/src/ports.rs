@@ -119,6 +119,10 @@ pub(crate) trait SampleSource {
     fn sent_tick(&self, port: usize) -> Option<u64>;
     /// The CDR bytes of a port's sample, if it was sent at this tick.
     fn fresh(&self, port: usize) -> Option<&[u8]>;
+    /// The CDR bytes of a port's newest sample from before the checkpoint from which the run goes on.
+    fn restored(&self, _port: usize) -> Option<&[u8]> {
+        None
+    }
     /// The same of the process that shadows the publisher.
     fn fresh_shadow(&self, port: usize) -> Option<&[u8]>;
 }
@@ -301,6 +305,12 @@ impl<'a> AnyInputs<'a> {
     #[must_use]
     pub fn fresh(&self, input: usize) -> Option<&'a [u8]> {
         self.0.0.fresh(input)
+    }
+
+    /// The newest sample of input `input` from before the checkpoint from which the run goes on, as CDR bytes.
+    #[must_use]
+    pub fn restored(&self, input: usize) -> Option<&'a [u8]> {
+        self.0.0.restored(input)
     }
 
     /// The same of the process that shadows the publisher of the input.

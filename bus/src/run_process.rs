@@ -84,6 +84,11 @@ impl Part {
         &self.name
     }
 
+    /// Transfer of the component's state.
+    pub(crate) fn transfer(&self) -> Transfer {
+        self.transfer
+    }
+
     /// The node, to be connected.
     pub(crate) fn take_node(&mut self) -> Result<Node, BusError> {
         self.node.take().ok_or_else(|| BusError::Claimed { name: self.name.clone() })
@@ -203,6 +208,10 @@ impl SampleSource for Received<'_> {
 
     fn fresh(&self, port: usize) -> Option<&[u8]> {
         Some(self.port(port)?.fresh(self.tick, self.locals)?.0)
+    }
+
+    fn restored(&self, port: usize) -> Option<&[u8]> {
+        self.port(port)?.restored_cdr()
     }
 
     fn fresh_shadow(&self, port: usize) -> Option<&[u8]> {

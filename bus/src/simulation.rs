@@ -1,6 +1,7 @@
 //! A run in the memory of one thread: no processes, no shared memory, no clock.
 
 use crate::announcement::Announcement;
+use crate::checkpoint::{NodePart, Parts};
 use crate::depths::depths;
 use crate::error::BusError;
 use crate::handles::Declared;
@@ -34,6 +35,8 @@ pub struct Simulation {
 
 /// A node that steps.
 struct Member {
+    /// Index of the node in the plan.
+    node: usize,
     part: Part,
     stepper: Stepper,
     period_ticks: u32,
@@ -86,7 +89,7 @@ impl Simulation {
         }
         let members = parts.into_iter().map(|part| part.connect(plan, &announcements));
         let members = members.collect::<Result<Vec<_>, BusError>>()?;
-        Ok(Self { plan: plan.clone(), members, samples, announcements, tick: 0 })
+        Ok(Self { plan: plan.clone(), members, samples, announcements, tick: plan.first_tick })
     }
 
     /// The next tick.
@@ -114,6 +117,38 @@ impl Simulation {
             }
         }
         self.tick += 1;
+        Ok(())
+    }
+
+    /// What another simulation of the same nodes needs to go on from the next tick.
+    #[must_use]
+    pub fn save(&mut self) -> Parts {
+        let (tick, samples) = (self.tick, &self.samples);
+        let mut nodes: Vec<_> =
+            self.members.iter_mut().map(|member| (member.node, member.save(tick, samples))).collect();
+        nodes.sort_by_key(|(node, _)| *node);
+        Parts { tick, nodes: nodes.into_iter().map(|(_, part)| part).collect() }
+    }
+
+    /// Goes on from `parts` of a checkpoint of the same nodes.
+    ///
+    /// # Errors
+    /// If there is no part of a node, or one that does not fit it. Nothing more can be computed then.
+    pub fn restore(&mut self, parts: &Parts) -> Result<(), BusError> {
+        let samples = parts.samples();
+        for member in &mut self.members {
+            let node = member.part.name().to_owned();
+            let part = parts.nodes.iter().find(|part| part.name == node);
+            let missing =
+                || BusError::Checkpoint { node: node.clone(), reason: "it has no part of it".to_owned() };
+            member.restore(part.ok_or_else(missing)?)?;
+            for input in &mut member.stepper.inputs {
+                if let Some(sample) = samples.get(&self.plan.topics[input.topic].name) {
+                    input.restore(sample, &node)?;
+                }
+            }
+        }
+        self.tick = parts.tick;
         Ok(())
     }
 
@@ -169,6 +204,19 @@ impl std::fmt::Debug for Simulation {
 }
 
 impl Member {
+    fn save(&mut self, tick: u32, samples: &[Option<LocalTopic>]) -> NodePart {
+        // No sample of this tick is there yet: the newest are those that were sent before it.
+        self.stepper.look_at(tick);
+        let samples = self.stepper.samples_before(tick, samples);
+        let (name, transfer) = (self.part.name().to_owned(), self.part.transfer());
+        NodePart::new(&name, transfer, &self.part.computation(), &self.words, samples)
+    }
+
+    fn restore(&mut self, part: &NodePart) -> Result<(), BusError> {
+        let transfer = self.part.transfer();
+        part.restore(transfer, &mut self.part.computation(), &mut self.words)
+    }
+
     fn step(&mut self, tick: u32, samples: &mut [Option<LocalTopic>]) -> Result<(), BusError> {
         self.stepper.gather(tick).map_err(|(_, error)| error)?;
         let computation = &mut self.part.computation();
@@ -227,13 +275,20 @@ impl Declaration {
             }
             let initial = declared.initial_value(input, &node.name)?;
             let feed = Feed::Local { generation: 0 };
-            stepper.inputs.push(InPort::new(input, topic, announcement.size, initial, feed));
+            stepper.inputs.push(InPort::new(input, topic, announcement, initial, feed));
         }
         self.part.connect(|input| {
             let topic = node.inputs[input].topic;
             (plan.topics[topic].name.as_str(), announced(topic))
         })?;
         let words = vec![0; stepper.words()];
-        Ok(Member { part: self.part, stepper, period_ticks: node.period_ticks, words, overruns: [0; 2] })
+        Ok(Member {
+            node: self.node,
+            part: self.part,
+            stepper,
+            period_ticks: node.period_ticks,
+            words,
+            overruns: [0; 2],
+        })
     }
 }

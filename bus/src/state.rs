@@ -12,6 +12,9 @@ pub enum Transfer {
     Nothing,
     /// The state is transferred as bytes. Their number depends on the component's parameters; the text names their type.
     Bytes(&'static str),
+    /// The state is transferred as bytes whose number grows with the run: a checkpoint holds them, and no other process
+    /// takes the component's place in flight. The text names their type.
+    Growing(&'static str),
     /// The state is a file that is being written. No other process can continue it.
     File,
 }
@@ -68,7 +71,8 @@ pub trait State: Send + Sized + 'static {
         0
     }
 
-    /// Number of bytes that [`State::save`] writes: constant for one component made from the same parameters.
+    /// Number of bytes that [`State::save`] writes: constant for one component made from the same parameters, unless the
+    /// state is [growing](Transfer::Growing).
     fn size(&self) -> usize;
 
     /// Writes the state into `bytes`, which are [`State::size`] bytes, and leaves none of them as it was. Does not allocate.

@@ -31,14 +31,39 @@ impl StateLayout {
         let (type_name, layout_hash) = match transfer {
             Transfer::Message(schema) => (schema.type_name, schema.layout_hash()),
             Transfer::Bytes(type_name) => (type_name, configuration),
-            Transfer::Nothing | Transfer::File => return None,
+            Transfer::Nothing | Transfer::File | Transfer::Growing(_) => return None,
         };
         Some(Self { type_name: type_name.to_owned(), size, layout_hash })
+    }
+
+    /// The same of a state that a checkpoint holds.
+    pub(crate) fn saved(transfer: Transfer, size: usize, configuration: u64) -> Option<Self> {
+        match transfer {
+            Transfer::Growing(name) => {
+                Some(Self { type_name: name.to_owned(), size, layout_hash: configuration })
+            }
+            _ => Self::of(transfer, size, configuration),
+        }
+    }
+
+    /// True if a component goes on from a state of this layout, whose own is laid out as `own` and transferred by `transfer`.
+    pub(crate) fn fits(&self, own: &Self, transfer: Transfer) -> bool {
+        let grows = matches!(transfer, Transfer::Growing(_));
+        self.type_name == own.type_name
+            && self.layout_hash == own.layout_hash
+            && (grows || self.size == own.size)
     }
 
     /// Number of 64-bit words of the state.
     pub(crate) fn words(&self) -> usize {
         self.size.div_ceil(8)
+    }
+}
+
+impl std::fmt::Display for StateLayout {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { type_name, size, layout_hash } = self;
+        write!(f, "a state of type {type_name} ({size} bytes, layout {layout_hash:016x})")
     }
 }
 

@@ -1,5 +1,6 @@
 //! One tick of a node, wherever it lives: its inputs are gathered, it steps, its outputs are published.
 
+use crate::checkpoint::SavedSample;
 use crate::error::BusError;
 use crate::hand_over::Computation;
 use crate::plan::{NodePlan, Plan};
@@ -64,6 +65,16 @@ impl Stepper {
             input.take_available(tick, &self.node).map_err(|error| (input.topic, error))?;
         }
         Ok(())
+    }
+
+    /// Has its inputs read what was sent up to `tick`, where members of the same process send it.
+    pub(crate) fn look_at(&mut self, tick: u32) {
+        self.inputs.iter_mut().for_each(|input| input.look_at(tick));
+    }
+
+    /// The newest samples of its inputs that were sent before tick `before`.
+    pub(crate) fn samples_before(&self, before: u32, locals: &Locals) -> Vec<SavedSample> {
+        self.inputs.iter().filter_map(|input| input.sample_before(before, locals)).collect()
     }
 
     /// Computes the step of `tick` unless the one before is under way, and writes what is due. `words` are those of

@@ -361,7 +361,10 @@ impl Received {
 #[cfg(test)]
 mod tests {
     use super::{Receiver, SampleHeader, Sender, Transport, run_dir_bytes_max, takes_run_dir};
+    use crate::announcement::Announcement;
     use crate::host_time::monotonic_ns;
+    use crate::message::Message as _;
+    use crate::messages::SetPoint;
     use crate::names::shm_prefix;
     use crate::plan::{Capacity, InputPlan, TopicPlan};
     use crate::port::{Feed, InPort, Source};
@@ -409,7 +412,14 @@ mod tests {
             type_name: "test_msgs/msg/State".to_owned(),
             period_ticks: 1,
         };
-        InPort::new(&input, &topic, SIZE, None, Feed::Shared(Source::joined(0, receiver, Some(0), 1)))
+        let announcement = Announcement { size: SIZE, ..Announcement::of(SetPoint::SCHEMA) };
+        InPort::new(
+            &input,
+            &topic,
+            &announcement,
+            None,
+            Feed::Shared(Source::joined(0, receiver, Some(0), 1)),
+        )
     }
 
     #[test]

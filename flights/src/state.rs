@@ -127,7 +127,7 @@ fn angle_deg(a: &[f64; 4], b: &[f64; 4]) -> f64 {
 /// errors.add(&at(1.0), &at(5.0));
 /// assert_eq!(errors.rms(StateQuantity::Position), 12.5_f64.sqrt());
 /// ```
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct WindowEndErrors {
     squares: [f64; 4],
     windows: u32,

@@ -30,6 +30,18 @@ pub enum Difference {
         /// The recording that goes on.
         longer: PathBuf,
     },
+    /// One recording begins later, as that of a run which goes on from a checkpoint does, and holds the same messages as the
+    /// other from there on.
+    Later {
+        /// The recording that begins later.
+        later: PathBuf,
+        /// Its first tick.
+        first_tick: u32,
+        /// The recording that begins earlier.
+        earlier: PathBuf,
+        /// The recording that ends first, and its last tick; `None` where they end together.
+        ends: Option<(PathBuf, u32)>,
+    },
     /// The messages are the same; an attachment or the container differs.
     Container(String),
 }
@@ -50,6 +62,17 @@ impl fmt::Display for Difference {
                     None => write!(f, "it ends before the first message"),
                 }
             }
+            Self::Later { later, first_tick, earlier, ends } => {
+                let (later, earlier) = (later.display(), earlier.display());
+                write!(
+                    f,
+                    "{later} begins at tick {first_tick}, and from there on all messages are those of {earlier}"
+                )?;
+                match ends {
+                    Some((path, tick)) => write!(f, " up to tick {tick}, where {} ends", path.display()),
+                    None => Ok(()),
+                }
+            }
             Self::Container(what) => write!(f, "all messages are the same; {what}"),
         }
     }
@@ -64,18 +87,27 @@ pub fn first_difference(a: &Recording, b: &Recording) -> Result<Option<Differenc
     if is_same {
         return Ok(None);
     }
-    let prefix = |shorter: &Recording, last_tick, longer: &Recording| {
-        Ok(Difference::Prefix {
-            shorter: shorter.path().to_owned(),
-            last_tick,
-            longer: longer.path().to_owned(),
-        })
+    let (mut left, mut right) = (a.messages().peekable(), b.messages().peekable());
+    let later = match (first_tick(&mut left), first_tick(&mut right)) {
+        (Some(x), Some(y)) if x < y => skip_to(&mut left, y).then_some((b, y, a)),
+        (Some(x), Some(y)) if y < x => skip_to(&mut right, x).then_some((a, x, b)),
+        _ => None,
     };
-    let (mut left, mut right) = (a.messages(), b.messages());
+    let ends = |first: Option<(&Recording, u32)>| -> Option<Difference> {
+        let (later, first_tick, earlier) = later?;
+        let (later, earlier) = (later.path().to_owned(), earlier.path().to_owned());
+        let ends = first.map(|(recording, tick)| (recording.path().to_owned(), tick));
+        Some(Difference::Later { later, first_tick, earlier, ends })
+    };
+    let prefix = |shorter: &Recording, last_tick: Option<u32>, longer: &Recording| {
+        let (path, longer) = (shorter.path().to_owned(), longer.path().to_owned());
+        let later = last_tick.and_then(|tick| ends(Some((shorter, tick))));
+        Ok(later.unwrap_or(Difference::Prefix { shorter: path, last_tick, longer }))
+    };
     let mut last_tick = None;
     loop {
         return match (left.next().transpose()?, right.next().transpose()?) {
-            (None, None) => container_difference(a, b),
+            (None, None) => ends(None).map_or_else(|| container_difference(a, b), Ok),
             (Some(x), Some(y)) if same_message(&x, &y) => {
                 last_tick = Some(x.tick);
                 continue;
@@ -87,6 +119,20 @@ pub fn first_difference(a: &Recording, b: &Recording) -> Result<Option<Differenc
         }
         .map(Some);
     }
+}
+
+/// Messages of a recording, of which the next can be looked at.
+type Messages<I> = std::iter::Peekable<I>;
+
+/// The tick of the next of `messages`.
+fn first_tick(messages: &mut Messages<impl Iterator<Item = Result<Record, RecordingError>>>) -> Option<u32> {
+    messages.peek()?.as_ref().ok().map(|record| record.tick)
+}
+
+/// Passes over those of `messages` before `tick`; false if none is left.
+fn skip_to(messages: &mut Messages<impl Iterator<Item = Result<Record, RecordingError>>>, tick: u32) -> bool {
+    while messages.next_if(|record| record.as_ref().is_ok_and(|record| record.tick < tick)).is_some() {}
+    messages.peek().is_some()
 }
 
 fn same_message(x: &Record, y: &Record) -> bool {

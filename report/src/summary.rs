@@ -23,7 +23,9 @@ pub struct Summary {
     pub manifest: String,
     /// Whether the run completed and every condition held.
     pub passed: bool,
-    /// Ticks completed.
+    /// The first tick of the run: that of the checkpoint from which it went on, or 0.
+    pub first_tick: u32,
+    /// Ticks completed, from that one on.
     pub ticks: u32,
     /// Simulated time.
     pub simulated_s: f64,
@@ -43,6 +45,10 @@ pub struct Summary {
     pub computing_times: Vec<OverrunSummary>,
     /// The recording.
     pub recording: Option<PathBuf>,
+    /// Checkpoints that were written and kept.
+    pub checkpoints: Vec<PathBuf>,
+    /// True where the conditions are not judged: the run went on from a checkpoint that holds nothing of what was flown before.
+    pub is_unjudged: bool,
     /// Pass conditions.
     pub pass: Vec<Verdict>,
     /// Numbers that are reported and not judged.
@@ -107,6 +113,7 @@ impl Summary {
     /// use report::summary::Summary;
     /// use runtime::launcher::Outcome;
     /// let outcome = Outcome {
+    ///     first_tick: 0,
     ///     ticks: 2000,
     ///     was_stopped: false,
     ///     host_s: 0.5,
@@ -116,13 +123,15 @@ impl Summary {
     ///     replacements: Vec::new(),
     ///     flight: None,
     ///     figures: None,
+    ///     checkpoints: Vec::new(),
     /// };
     /// let summary = Summary::new("hover".to_owned(), outcome, 1e-3);
     /// assert_eq!((summary.passed, summary.real_time_factor), (true, 4.0));
     /// assert!(summary.to_string().starts_with("hover: 2000 ticks (2.000 s) in 0.500 s: 4000 ticks/s"));
     /// ```
     pub fn new(manifest: String, outcome: Outcome, tick_s: f64) -> Self {
-        let ticks_per_s = f64::from(outcome.ticks) / outcome.host_s.max(1e-9);
+        let ticks = outcome.ticks.saturating_sub(outcome.first_tick);
+        let ticks_per_s = f64::from(ticks) / outcome.host_s.max(1e-9);
         let replacement = |report| Replacement { report, steps: Vec::new() };
         let replacements: Vec<_> = outcome.replacements.into_iter().map(replacement).collect();
         let process = |(name, cpu_share, late)| ProcessSummary { name, cpu_share, late };
@@ -130,8 +139,9 @@ impl Summary {
         Self {
             manifest,
             passed: !outcome.was_stopped && !replacements.iter().any(Replacement::has_failed),
-            ticks: outcome.ticks,
-            simulated_s: f64::from(outcome.ticks) * tick_s,
+            first_tick: outcome.first_tick,
+            ticks,
+            simulated_s: f64::from(ticks) * tick_s,
             host_s: outcome.host_s,
             ticks_per_s,
             real_time_factor: ticks_per_s * tick_s,
@@ -140,6 +150,8 @@ impl Summary {
             processes: outcome.processes.into_iter().map(process).collect(),
             computing_times: outcome.overruns.into_iter().map(overruns).collect(),
             recording: None,
+            checkpoints: outcome.checkpoints,
+            is_unjudged: false,
             pass: Vec::new(),
             measures: Vec::new(),
             compare: Vec::new(),
@@ -155,11 +167,19 @@ impl Summary {
     /// # Errors
     /// If the recording is damaged, or lacks what a condition judges.
     pub fn judge(&mut self, recording: &Recording, plan: &Plan, content: &Content) -> Result<()> {
-        shadow::add_steps(recording, plan, &mut self.replacements)?;
-        self.shadows = shadow::differences(recording, &shadow::joins(plan, &self.replacements))?;
         if !self.stopped_early {
             self.add(&judge::figures(&content.conditions(), recording)?, content)?;
         }
+        self.describe(recording, plan)
+    }
+
+    /// Adds what the `recording` of the run says of its shadows and replacements.
+    ///
+    /// # Errors
+    /// If the recording is damaged.
+    pub fn describe(&mut self, recording: &Recording, plan: &Plan) -> Result<()> {
+        shadow::add_steps(recording, plan, &mut self.replacements)?;
+        self.shadows = shadow::differences(recording, &shadow::joins(plan, &self.replacements))?;
         self.recording = Some(recording.path().to_owned());
         Ok(())
     }
@@ -207,6 +227,9 @@ impl fmt::Display for Summary {
             "{}: {} ticks ({:.3} s) in {:.3} s: {:.0} ticks/s, {:.2} × real time",
             self.manifest, self.ticks, self.simulated_s, self.host_s, self.ticks_per_s, self.real_time_factor
         )?;
+        if self.first_tick > 0 {
+            writeln!(f, "  from the checkpoint of tick {} on", self.first_tick)?;
+        }
         if self.stopped_early {
             writeln!(f, "  stopped before its end")?;
         }
@@ -220,8 +243,15 @@ impl fmt::Display for Summary {
         self.shadows.iter().try_for_each(|difference| writeln!(f, "{difference}"))?;
         self.compare.iter().try_for_each(|errors| writeln!(f, "{errors}"))?;
         self.pass.iter().chain(&self.measures).try_for_each(|verdict| writeln!(f, "{verdict}"))?;
+        if self.is_unjudged {
+            let why = "the run before had no judge in flight; one that writes checkpoints by itself has";
+            writeln!(f, "  conditions: not judged, {why}")?;
+        }
         if let Some(recording) = &self.recording {
             writeln!(f, "  recording: {}", recording.display())?;
+        }
+        if let Some(last) = self.checkpoints.last() {
+            writeln!(f, "  checkpoints: {}, the last {}", self.checkpoints.len(), last.display())?;
         }
         let refused = self.replacements.iter().filter(|replacement| replacement.has_failed()).count();
         match (self.passed, refused) {

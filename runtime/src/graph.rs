@@ -8,9 +8,11 @@
 //! - `ranges`: ranges of numbers by their units
 //! - `groups`: nodes that share a process
 //! - `evaluations`: what is judged after the run
+//! - `checkpoints`: ticks at which the nodes write their states
 //! - `backups`: who shadows, takes over or stands by
 
 mod backups;
+mod checkpoints;
 mod computing_time;
 mod evaluations;
 mod groups;
@@ -29,6 +31,7 @@ pub use backups::backup_of;
 
 use crate::manifest::Manifest;
 use crate::placement;
+use bus::checkpoint::Parts;
 use bus::plan::Plan;
 use bus::{InputFiles, Registration};
 use diagnostics::Diagnostic;
@@ -71,6 +74,8 @@ pub struct Graph {
     pub(crate) models: Vec<PathBuf>,
     /// The files that the run reads, each read once.
     pub files: InputFiles,
+    /// Parts of the checkpoint from which the run goes on.
+    pub(crate) from: Option<Parts>,
     /// What is odd and flies all the same; `check` and `run` tell it.
     pub warnings: Vec<Diagnostic>,
 }
@@ -122,7 +127,8 @@ impl Graph {
         evaluations::check(manifest, &plan, &programs, &mut notes)?;
         plan.groups = groups;
         let (models, warnings) = notes.into_parts(manifest);
-        Ok(Self { plan, programs, backups, sidecars, models, files, warnings })
+        plan.checkpoint_ticks = checkpoints::ticks(manifest, &plan, &backups)?;
+        Ok(Self { plan, programs, backups, sidecars, models, files, from: None, warnings })
     }
 }
 
@@ -148,6 +154,8 @@ fn plan(manifest: &Manifest, wiring: Wiring) -> Result<Plan, Diagnostic> {
         seed: run.seed,
         tick_ns: u64::from(1_000_000_000 / rate_hz),
         duration_ticks,
+        first_tick: 0,
+        checkpoint_ticks: Vec::new(),
         window_ticks: window_ticks.unwrap_or(DEFAULT_WINDOW_TICKS),
         pace: run.pace.0,
         clock_cpu: None,

@@ -8,6 +8,7 @@ use crate::manifest::Manifest;
 use crate::outcome::Outcome;
 use crate::program::Program;
 use anyhow::{Context, Result, anyhow, bail};
+use bus::checkpoint::Parts;
 use bus::clock::deadline_ns;
 use bus::component::Role;
 use bus::host_time::monotonic_ns;
@@ -106,16 +107,21 @@ pub(crate) fn fly(
     components: &'static [Registration],
     stop: &StopToken,
     on: &mut dyn FnMut(RunEvent<'_>),
+    save: &mut dyn FnMut(Parts),
 ) -> Result<Outcome> {
-    let simulation = simulation(graph, |_| true, components)?;
+    let mut simulation = simulation(graph, |_| true, components)?;
+    if let Some(parts) = &graph.from {
+        simulation.restore(parts)?;
+    }
     let start_ns = monotonic_ns();
-    let mut run = Run { graph, stop, on, start_ns, reported_ns: start_ns, missed_deadlines: 0 };
+    let mut run = Run { graph, stop, on, save, start_ns, reported_ns: start_ns, missed_deadlines: 0 };
     let flown = catch_unwind(AssertUnwindSafe(|| run.fly(simulation)));
     let (ticks, overruns) = match flown {
         Ok(flown) => flown?,
         Err(panic) => bail!("a component panicked: {}", panic_message(&*panic)),
     };
     Ok(Outcome {
+        first_tick: graph.plan.first_tick,
         ticks,
         was_stopped: ticks < graph.plan.duration_ticks,
         host_s: seconds(monotonic_ns() - start_ns),
@@ -125,6 +131,7 @@ pub(crate) fn fly(
         replacements: Vec::new(),
         flight: None,
         figures: None,
+        checkpoints: Vec::new(),
     })
 }
 
@@ -133,6 +140,8 @@ struct Run<'a> {
     graph: &'a Graph,
     stop: &'a StopToken,
     on: &'a mut dyn FnMut(RunEvent<'_>),
+    /// Takes the parts of a checkpoint.
+    save: &'a mut dyn FnMut(Parts),
     start_ns: u64,
     /// Host time of the last report.
     reported_ns: u64,
@@ -161,7 +170,7 @@ pub fn fly_unrecorded(manifest: &Manifest, files: InputFiles, folder: &Path) -> 
         graph.plan.nodes[judge].parameters["path"] = serde_json::json!(path);
     }
     let stop = StopToken::new();
-    let mut outcome = fly(&graph, manifest.registry().components(), &stop, &mut |_| {})?;
+    let mut outcome = fly(&graph, manifest.registry().components(), &stop, &mut |_| {}, &mut |_| {})?;
     let read = || std::fs::read(&path).context("cannot read the figures of the judge");
     outcome.figures = judge.map(|_| read()).transpose()?;
     Ok(outcome)
@@ -189,6 +198,9 @@ impl Run<'_> {
                 Pace::Free if !tick.is_multiple_of(LOOK_TICKS) => {}
                 Pace::Free => self.report(tick),
             }
+            if plan.checkpoint_ticks.binary_search(&tick).is_ok() {
+                (self.save)(simulation.save());
+            }
             simulation.step()?;
         }
         Ok(())
@@ -197,8 +209,9 @@ impl Run<'_> {
     /// Sleeps until tick `tick` is due; false if a stop was asked for meanwhile. A tick whose predecessor was done behind
     /// its own deadline is a missed one.
     fn await_deadline(&mut self, tick: u32, factor: f64) -> bool {
-        let due_ns = self.start_ns + deadline_ns(tick, self.graph.plan.tick_ns, factor);
-        if tick > 0 && monotonic_ns() > due_ns {
+        let due_ns =
+            self.start_ns + deadline_ns(tick - self.graph.plan.first_tick, self.graph.plan.tick_ns, factor);
+        if tick > self.graph.plan.first_tick && monotonic_ns() > due_ns {
             self.missed_deadlines += 1;
         }
         self.report(tick);

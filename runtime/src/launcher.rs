@@ -1,5 +1,6 @@
 //! Launches runs: from a checked manifest to the outcome of its run.
 
+use crate::checkpoint::Collector;
 use crate::ctl::control::ControlServer;
 use crate::ctl::{Asked, Remote};
 use crate::descendants::{Descendants, Place};
@@ -202,9 +203,32 @@ impl<'a> Launcher<'a> {
         prepare(manifest, graph, outputs.partial(), run_dir)?;
         graph.plan.run_id = run_dir.run_id().to_owned();
         graph.plan.store(run_dir.path())?;
+        if let Some(parts) = &graph.from {
+            parts.store_for_run(run_dir.path())?;
+        }
         let graph = &*graph;
+        let mut checkpoints = Collector::new(manifest, graph, run_dir.path(), &outputs.stem);
+        let flown = self.fly_in(run_dir, place, manifest, graph, &mut checkpoints, on);
+        // Those of a run that broke are what somebody goes back to.
+        let written = checkpoints.finish();
+        let mut outcome = flown?;
+        outcome.checkpoints = written?;
+        Ok(outcome)
+    }
+
+    fn fly_in(
+        self,
+        run_dir: &RunDir,
+        place: &Place,
+        manifest: &Manifest,
+        graph: &Graph,
+        checkpoints: &mut Collector<'_>,
+        on: &mut dyn FnMut(RunEvent<'_>),
+    ) -> Result<Outcome> {
         if self.host == Host::InProcess {
-            let mut outcome = in_process::fly(graph, manifest.registry().components(), &self.stop, on)?;
+            let components = manifest.registry().components();
+            let mut outcome =
+                in_process::fly(graph, components, &self.stop, on, &mut |parts| checkpoints.add(parts))?;
             if !outcome.was_stopped {
                 outcome.figures = figures(graph, run_dir.path())?;
             }
@@ -219,14 +243,27 @@ impl<'a> Launcher<'a> {
             manifest,
             plan,
             files: &graph.files,
-            control_server: ControlServer::open(dir, plan, &control, self.remote, self.requests)?,
+            control_server: ControlServer::open(
+                dir,
+                plan,
+                &control,
+                self.remote,
+                self.requests,
+                checkpoints.writer,
+            )?,
             control: control.clone(),
             run_dir: dir,
             descendants: descendants.as_ref(),
             sockets: BTreeMap::new(),
             groups: BTreeMap::new(),
         };
-        let mut supervisor = Supervisor::new(graph, world, &self.stop, on);
+        let mut on = |event: RunEvent<'_>| {
+            if let RunEvent::Progress(_) = event {
+                checkpoints.collect();
+            }
+            on(event);
+        };
+        let mut supervisor = Supervisor::new(graph, world, &self.stop, &mut on);
         supervisor.fly(manifest.content.run.start_order_seed)?;
         let mut outcome = outcome(plan, &control, &supervisor);
         outcome.replacements = supervisor.overseer.replacements.into_reports();
@@ -301,6 +338,7 @@ fn outcome(plan: &Plan, control: &SupervisorView, supervisor: &Supervisor<'_, Ho
         is_timed.then(|| (node.name.clone(), overruns, skipped_steps))
     });
     Outcome {
+        first_tick: plan.first_tick,
         ticks: control.completed_ticks(),
         was_stopped: control.end_tick() < plan.duration_ticks,
         host_s,
@@ -310,5 +348,6 @@ fn outcome(plan: &Plan, control: &SupervisorView, supervisor: &Supervisor<'_, Ho
         replacements: Vec::new(),
         flight: None,
         figures: None,
+        checkpoints: Vec::new(),
     }
 }

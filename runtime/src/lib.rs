@@ -1,6 +1,7 @@
 //! Checks manifests, and launches the runs that they describe: starts the processes, watches over them, and takes
 //! everything down again.
 
+pub mod checkpoint;
 mod claimed_file;
 pub mod clean;
 pub mod ctl;

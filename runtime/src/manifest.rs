@@ -150,6 +150,16 @@ impl Manifest {
         self.path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
     }
 
+    /// The text of the file itself.
+    pub(crate) fn text(&self) -> &str {
+        self.sources.all.first().map_or("", |source| source.text.as_str())
+    }
+
+    /// The values of `--set`.
+    pub(crate) fn overrides(&self) -> impl Iterator<Item = &str> {
+        self.sources.overrides().map(|source| source.text.as_str())
+    }
+
     /// The files it includes, each once: their paths and texts.
     pub(crate) fn included(&self) -> impl Iterator<Item = (&Path, &str)> {
         self.sources.included()

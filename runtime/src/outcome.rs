@@ -2,11 +2,14 @@
 
 use crate::flight::Flight;
 use crate::replacement::Report;
+use std::path::PathBuf;
 
 /// The outcome of a run, as [`Launcher::fly`](crate::launcher::Launcher::fly) returns it.
 #[derive(Debug)]
 pub struct Outcome {
-    /// Ticks that every node completed.
+    /// The first tick that was computed: 0, or that of the checkpoint from which the run went on.
+    pub first_tick: u32,
+    /// Ticks that every node completed, those before the first one too.
     pub ticks: u32,
     /// True if the run was stopped before its end.
     pub was_stopped: bool,
@@ -25,4 +28,6 @@ pub struct Outcome {
     pub flight: Option<Flight>,
     /// Figures of the conditions, as the judge of a run without a recording wrote them; `None` for a run that was stopped.
     pub figures: Option<Vec<u8>>,
+    /// Files of the checkpoints that were written and kept, in their order.
+    pub checkpoints: Vec<PathBuf>,
 }

@@ -2,6 +2,7 @@
 //!
 //! A second run that would write to one of them is refused at its start, and is told who does.
 
+use crate::checkpoint::{self, CHECKPOINT};
 use crate::claimed_file::{LogClaim, Partial, partial_path};
 use crate::graph::Graph;
 use crate::manifest::Manifest;
@@ -17,6 +18,8 @@ use std::time::Duration;
 /// may be about to say so, or about to leave.
 const ATTEMPTS: u32 = 100;
 const POLL: Duration = Duration::from_millis(20);
+/// Checkpoints whose places are looked at before the run: of a thousand more the names differ by a number only.
+const CHECKPOINTS_CHECKED: usize = 100;
 /// The file in a run directory that lists what the run writes.
 const LIST: &str = "outputs.json";
 
@@ -53,6 +56,8 @@ pub struct Output {
 #[derive(Debug)]
 pub struct Outputs {
     recording: Option<Output>,
+    /// The recording's path without its ending, or that which it would have.
+    pub(crate) stem: PathBuf,
     /// In the order of their real paths, so that no two runs wait for each other.
     logs: Vec<Output>,
     partial: Option<Partial>,
@@ -65,6 +70,7 @@ impl Outputs {
     /// # Errors
     /// If one of them would replace what is not of its kind, an input of the run, or another of them.
     pub fn of(manifest: &Manifest, graph: &Graph, recording: &Path, pages: Vec<Output>) -> Result<Self> {
+        let stem = recording.with_extension("");
         let has_recorder = graph.programs.iter().any(Program::is_recorder);
         let recording = has_recorder.then(|| Output {
             what: "the recording".to_owned(),
@@ -76,7 +82,10 @@ impl Outputs {
         logs.sort_by_key(|log| output_file::real_path(&log.path).ok());
         let inputs = inputs(manifest, graph);
         let partial = recording.as_ref().map(Output::until_complete).transpose()?;
-        let all: Vec<&Output> = recording.iter().chain(&partial).chain(&logs).chain(&pages).collect();
+        let checkpoints = graph.plan.checkpoint_ticks.iter().take(CHECKPOINTS_CHECKED);
+        let checkpoints: Vec<Output> = checkpoints.map(|&tick| checkpoint(&stem, tick)).collect();
+        let all: Vec<&Output> =
+            recording.iter().chain(&partial).chain(&logs).chain(&pages).chain(&checkpoints).collect();
         for (index, output) in all.iter().enumerate() {
             output_file::check(&output.path, output.kind)?;
             let path = output.path.display();
@@ -91,7 +100,7 @@ impl Outputs {
                 );
             }
         }
-        Ok(Self { recording, logs, partial: None, claimed_logs: Vec::new() })
+        Ok(Self { recording, stem, logs, partial: None, claimed_logs: Vec::new() })
     }
 
     /// Claims all for the run in `run_dir`, which must be registered already, and empties the logs.
@@ -190,6 +199,13 @@ impl Output {
     fn refused(&self) -> String {
         format!("{} cannot be {}", self.path.display(), self.what)
     }
+}
+
+/// The checkpoint of `tick`, beside the recording.
+fn checkpoint(stem: &Path, tick: u32) -> Output {
+    let what = format!("the checkpoint of tick {tick}");
+    let advice = "name another recording with --record PATH".to_owned();
+    Output { what, path: checkpoint::path(stem, tick), kind: &CHECKPOINT, advice }
 }
 
 /// The live run that writes to the file at `real`, as text for a message.

@@ -60,7 +60,7 @@ fn row(component: &Registration) -> String {
         Transfer::Message(schema) => type_name(schema),
         Transfer::Bytes(type_name) => type_name,
         Transfer::Nothing => "–",
-        Transfer::File => "cannot be replaced",
+        Transfer::File | Transfer::Growing(_) => "cannot be replaced",
     };
     format!("| **`{name}`**: {summary} | {inputs} | {outputs} | {parameters} | {state} |\n")
 }
@@ -78,6 +78,7 @@ fn json(component: &Registration) -> Value {
         Transfer::Bytes(type_name) => json!(type_name),
         Transfer::Nothing => json!("none"),
         Transfer::File => json!("file"),
+        Transfer::Growing(type_name) => json!({ "growing": type_name }),
     };
     json!({
         "name": component.name,

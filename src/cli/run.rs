@@ -10,6 +10,7 @@ use diagnostics::Diagnostic;
 use hummingbus::COMPONENTS;
 use report::profile::Profile;
 use report::summary::Summary;
+use runtime::checkpoint::Checkpoint;
 use runtime::graph::{self, Graph, backup_of};
 use runtime::host::Host;
 use runtime::launcher::Launcher;
@@ -21,8 +22,18 @@ use std::path::{Path, PathBuf};
 /// What `run` and its kin take.
 #[derive(Args)]
 pub struct RunArguments {
-    /// The manifest.
-    pub manifest: PathBuf,
+    /// The manifest; with --from it is that of the checkpoint.
+    #[arg(required_unless_present = "from", conflicts_with = "from")]
+    pub manifest: Option<PathBuf>,
+    /// Go on from this checkpoint, with other values where --set gives them.
+    #[arg(long, value_name = "CHECKPOINT")]
+    pub from: Option<PathBuf>,
+    /// Write a checkpoint at every multiple of this simulated time, such as 1s or 250ms.
+    #[arg(long, value_name = "TIME", value_parser = seconds)]
+    pub checkpoint_every: Option<f64>,
+    /// Newest checkpoints that are kept.
+    #[arg(long, value_name = "NUMBER", requires = "checkpoint_every")]
+    pub keep: Option<u32>,
     /// File to record to, or none; beside the manifest, named like it, where absent.
     #[arg(long, value_name = "PATH")]
     pub record: Option<PathBuf>,
@@ -81,8 +92,8 @@ pub fn run(
     // First, so that who stops the run early hears that it was stopped.
     let stop = stop_token()?;
     let record = arguments.record.as_deref();
-    let manifest = Manifest::load(&arguments.manifest, &arguments.set, COMPONENTS)?;
-    let mut manifest = recorded(manifest, record)?;
+    let from = arguments.from.as_deref().map(Checkpoint::read).transpose()?;
+    let mut manifest = recorded(loaded(arguments, from.as_ref())?, record)?;
     if let Some(pace) = arguments.pace {
         manifest.content.run.pace = pace;
     }
@@ -95,6 +106,11 @@ pub fn run(
     let mut graph = Graph::build(&manifest)?;
     print_warnings(&graph.warnings);
     graph.plan.profile |= files.is_some();
+    let going_on = from.as_ref().map(Checkpoint::tick);
+    if let (Some(from), Some(path)) = (from, &arguments.from) {
+        let about = || format!("cannot go on from {}", path.display());
+        from.resume(&mut graph, !arguments.set.is_empty()).with_context(about)?;
+    }
     if let Some((process, with)) = extra_shadow {
         let shadow = backup_of(&manifest, &graph.plan, &graph.files, process, with)?;
         if graph.backups.iter().any(|other| other.node == shadow.node) {
@@ -106,6 +122,10 @@ pub fn run(
     if extra_shadow.is_some() && arguments.record.is_none() {
         // That of the manifest itself stays as it is.
         path.set_extension("shadow.mcap");
+    }
+    if let (Some(tick), None) = (going_on, record) {
+        // The recording of the run before stays as it is.
+        path.set_extension(format!("from-{tick}.mcap"));
     }
     let files = files.unwrap_or_else(|| Files::beside(&path));
     let pages = if graph.plan.profile { files.outputs() } else { Vec::new() };
@@ -126,7 +146,16 @@ pub fn run(
     let profile = flight.as_ref().map(|flight| Profile::of(flight, outcome.missed_deadlines));
     let mut summary = Summary::new(manifest.name(), outcome, graph.plan.tick_s());
     match (&recording, figures) {
-        (Some(recording), _) => summary.judge(recording, &graph.plan, &manifest.content)?,
+        // A recording holds what was flown from the checkpoint on; its judge has seen the ticks before, too.
+        (Some(recording), Some(figures)) => {
+            summary.judge_by(&figures, &manifest.content)?;
+            summary.describe(recording, &graph.plan)?;
+        }
+        (Some(recording), None) if going_on.is_some() => {
+            summary.is_unjudged = !manifest.content.conditions().topics().is_empty();
+            summary.describe(recording, &graph.plan)?;
+        }
+        (Some(recording), None) => summary.judge(recording, &graph.plan, &manifest.content)?,
         (None, Some(figures)) => summary.judge_by(&figures, &manifest.content)?,
         (None, None) => {}
     }
@@ -138,6 +167,9 @@ pub fn run(
     }
     if let Some(path) = &summary.recording {
         text += &format!("\nto plot it: {}\nto see it fly: {}", command("plot", path), command("view", path));
+    }
+    if let Some(last) = summary.checkpoints.last() {
+        text += &format!("\nto go on from it: {}", command("run --from", last));
     }
     if arguments.json {
         print_json(&as_json(&summary, profile.as_ref(), &files)?)?;
@@ -192,6 +224,35 @@ fn as_json(summary: &Summary, profile: Option<&Profile>, files: &Files) -> Resul
     Ok(value)
 }
 
+/// The manifest that `arguments` name, or that of the checkpoint `from`, with the values that they give.
+fn loaded(arguments: &RunArguments, from: Option<&Checkpoint>) -> Result<Manifest> {
+    let mut set = arguments.set.clone();
+    if let Some(every_s) = arguments.checkpoint_every {
+        set.push(format!("run.checkpoint_every_s={every_s:?}"));
+    }
+    if let Some(keep) = arguments.keep {
+        set.push(format!("run.checkpoint_keep={keep}"));
+    }
+    match (from, &arguments.manifest) {
+        (Some(from), _) => from.load_manifest(&set, COMPONENTS),
+        (None, Some(path)) => Ok(Manifest::load(path, &set, COMPONENTS)?),
+        (None, None) => bail!("name a manifest, or a checkpoint with --from"),
+    }
+}
+
+/// A time such as `1s`, `250ms` or `0.5`, in seconds.
+fn seconds(text: &str) -> Result<f64, String> {
+    let (number, factor) = match (text.strip_suffix("ms"), text.strip_suffix('s')) {
+        (Some(number), _) => (number, 1e-3),
+        (None, Some(number)) => (number, 1.0),
+        (None, None) => (text, 1.0),
+    };
+    let time_s = number.trim().parse::<f64>().ok().map(|number| number * factor);
+    time_s
+        .filter(|time_s| time_s.is_finite() && *time_s > 0.0)
+        .ok_or_else(|| "it is no time: write a number above 0 with its unit, such as 1s or 250ms".to_owned())
+}
+
 /// The manifest with a recorder or a judge as `record` says, the file to record to or `none`.
 fn recorded(manifest: Manifest, record: Option<&Path>) -> Result<Manifest, Diagnostic> {
     let Some(record) = record else { return Ok(manifest) };
@@ -217,8 +278,16 @@ fn recording_path(manifest: &Manifest, argument: Option<&Path>) -> Result<PathBu
 
 #[cfg(test)]
 mod tests {
-    use super::quoted;
+    use super::{quoted, seconds};
     use std::path::Path;
+
+    #[test]
+    fn a_time_has_a_unit_or_is_in_seconds() {
+        assert_eq!(["1s", "250ms", "0.5"].map(seconds), [Ok(1.0), Ok(0.25), Ok(0.5)]);
+        for text in ["0s", "-1", "ms", "1m", "inf", ""] {
+            assert!(seconds(text).is_err(), "{text}");
+        }
+    }
 
     #[test]
     fn a_path_is_one_word_of_a_shell() {

@@ -6,6 +6,7 @@ use super::steer;
 use anyhow::{Result, bail};
 use clap::Args;
 use recorder::reader::Recording;
+use std::path::PathBuf;
 
 /// What `shadow` takes.
 #[derive(Args)]
@@ -25,15 +26,16 @@ pub struct ShadowArguments {
 /// # Errors
 /// As `run`; or a recording cannot be read.
 pub fn shadow(arguments: &ShadowArguments) -> Result<bool> {
-    let path = &arguments.run.manifest;
-    match (&arguments.process, path.extension().is_some_and(|extension| extension == "mcap")) {
-        (Some(process), false) => {
+    let is_recording = |path: &&PathBuf| path.extension().is_some_and(|extension| extension == "mcap");
+    let recording = arguments.run.manifest.as_ref().filter(is_recording);
+    match (&arguments.process, recording) {
+        (Some(process), None) => {
             let with = steer::description(&arguments.with)?;
             run(&arguments.run, None, Some((process, &with)))
         }
-        (None, true) => print_text(&report::shadow::report(&Recording::open(path)?)?).map(|()| true),
-        (None, false) => bail!("name the process to shadow: --process NAME; or give a recording (.mcap)"),
-        (Some(_), true) => {
+        (None, Some(path)) => print_text(&report::shadow::report(&Recording::open(path)?)?).map(|()| true),
+        (None, None) => bail!("name the process to shadow: --process NAME; or give a recording (.mcap)"),
+        (Some(_), Some(path)) => {
             bail!("{} is a recording: leave --process out, or give a manifest", path.display())
         }
     }

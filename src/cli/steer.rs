@@ -8,7 +8,7 @@ use runtime::ctl::client;
 use runtime::ctl::protocol::{Answer, Request};
 use runtime::manifest::PaceSetting;
 use runtime::run_dir::find_live;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The arguments of `hummingbus ctl`.
 #[derive(Args)]
@@ -23,7 +23,7 @@ pub struct CtlArguments {
     verb: CtlVerb,
 }
 
-#[derive(Clone, Copy, Subcommand)]
+#[derive(Clone, Subcommand)]
 enum CtlVerb {
     /// Say how far the run has come.
     Status,
@@ -44,20 +44,30 @@ enum CtlVerb {
         /// free, realtime, or simulated seconds per second.
         pace: PaceSetting,
     },
+    /// Write a checkpoint of the next tick boundary, from which `run --from` goes on.
+    #[command(after_help = "Example: hummingbus ctl checkpoint before-the-wall.ckpt")]
+    Checkpoint {
+        /// The file; beside the recording and called after the tick where absent.
+        file: Option<PathBuf>,
+    },
     /// End the run at the next tick boundary, as Ctrl-C does.
     Stop,
 }
 
 impl CtlVerb {
-    fn request(self) -> Request {
-        match self {
+    fn request(&self) -> Result<Request> {
+        Ok(match self {
             Self::Status => Request::Status,
             Self::Pause => Request::Pause,
-            Self::Step { ticks } => Request::Step { ticks },
+            Self::Step { ticks } => Request::Step { ticks: *ticks },
             Self::Resume => Request::Resume,
-            Self::Pace { pace } => Request::Pace { pace },
+            Self::Pace { pace } => Request::Pace { pace: *pace },
+            // The run has a working directory of its own.
+            Self::Checkpoint { file } => {
+                Request::Checkpoint { path: file.as_ref().map(std::path::absolute).transpose()? }
+            }
             Self::Stop => Request::Stop,
-        }
+        })
     }
 }
 
@@ -66,7 +76,7 @@ impl CtlVerb {
 /// # Errors
 /// If there is no such run, or it refuses.
 pub fn ctl(arguments: &CtlArguments) -> Result<bool> {
-    ask(arguments.run.as_deref(), &arguments.verb.request(), arguments.json).map(|()| true)
+    ask(arguments.run.as_deref(), &arguments.verb.request()?, arguments.json).map(|()| true)
 }
 
 /// The arguments of `hummingbus swap`.

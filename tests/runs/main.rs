@@ -42,6 +42,7 @@
 mod as_printed;
 mod backups;
 mod campaign;
+mod checkpoints;
 mod clean;
 mod cleanup;
 mod commands;

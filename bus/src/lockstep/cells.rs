@@ -43,6 +43,8 @@ cells! {
         abort: AtomicU32,
         /// The number of the newest membership.
         epoch: AtomicU32,
+        /// The tick before which every node writes its part of a checkpoint that was asked for; 0 where none was.
+        checkpoint_tick: AtomicU32,
     }
 
     /// What the clock says.

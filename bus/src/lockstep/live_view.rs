@@ -54,6 +54,12 @@ impl LiveView {
         self.segment.head().run.epoch.load(Acquire)
     }
 
+    /// The tick before which every node writes its part of the checkpoint that was asked for last; 0 where none was.
+    #[must_use]
+    pub fn checkpoint_tick(&self) -> u32 {
+        self.segment.head().run.checkpoint_tick.load(Acquire)
+    }
+
     /// Ticks that may be computed.
     #[must_use]
     pub fn granted_ticks(&self) -> u32 {

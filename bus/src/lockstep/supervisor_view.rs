@@ -40,10 +40,20 @@ impl SupervisorView {
         segment.waiters().for_each(|waiter| waiter.store(AWAKE, Relaxed));
         let this = Self { live: LiveView { segment } };
         this.set_pace(plan.pace);
+        this.begin_at(plan);
         // Generation 0 of every node is there from the start.
         (0..plan.nodes.len()).for_each(|slot| this.set_slot_state(slot, SlotState::Taken));
         this.segment.publish();
         Ok(this)
+    }
+
+    /// Counts the ticks before the first one of `plan` as granted, sent and completed.
+    fn begin_at(&self, plan: &Plan) {
+        self.segment.head().clock.granted.store(plan.first_tick, Relaxed);
+        for (cell, topic) in self.segment.topics().iter().zip(&plan.topics) {
+            cell.sent.store(plan.first_tick.next_multiple_of(topic.period_ticks.max(1)), Relaxed);
+        }
+        (0..plan.nodes.len()).for_each(|slot| self.set_first_tick(slot, plan.first_tick));
     }
 
     /// Opens the control segment of `plan`, to steer a run that another process supervises.
@@ -87,6 +97,11 @@ impl SupervisorView {
         if steering.join_tick.load(Relaxed) != tick {
             wake::ask_for_hold(&steering.join_tick, tick, &steering.changes);
         }
+    }
+
+    /// Has every node write its part of a checkpoint before `tick`, at which the clock holds the run.
+    pub fn ask_for_checkpoint(&self, tick: u32) {
+        self.segment.head().run.checkpoint_tick.store(tick, Release);
     }
 
     /// Changes the pace; the clock follows at its next grant.

@@ -9,6 +9,7 @@ use anyhow::{Result, anyhow, bail};
 use recorder::RecordingError;
 use recorder::fields::TopicFields;
 use runtime::manifest::{PassCondition, Reference, Statistic};
+use serde::{Deserialize, Serialize};
 
 /// A condition or measure and everything that it keeps of the samples so far.
 #[derive(Debug)]
@@ -27,13 +28,23 @@ pub struct Condition {
 }
 
 /// Samples of a field and of its reference within the span, of which the lag and the gain are computed at the end.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 struct Pairs {
     field: Vec<f64>,
     reference: Vec<f64>,
     /// Times of the first two samples of the field, in ns.
     first_ns: Option<u64>,
     second_ns: Option<u64>,
+}
+
+/// What a checkpoint holds of a condition.
+#[derive(Serialize, Deserialize)]
+pub struct KeptSamples {
+    name: String,
+    factor: Option<f64>,
+    samples: Samples,
+    pairs: Pairs,
+    lost_ns: Option<u64>,
 }
 
 impl Condition {
@@ -67,6 +78,30 @@ impl Condition {
             self.pairs.field.reserve_exact(most);
             self.pairs.reference.reserve_exact(most);
         }
+    }
+
+    /// Everything that it keeps of the samples so far.
+    pub fn kept(&self) -> KeptSamples {
+        let Self { pass, factor, samples, pairs, lost_ns, .. } = self;
+        let (name, pairs) = (pass.name.clone(), pairs.clone());
+        KeptSamples { name, factor: *factor, samples: *samples, pairs, lost_ns: *lost_ns }
+    }
+
+    /// Goes on from what another evaluation of the condition has `kept`.
+    ///
+    /// # Errors
+    /// If it is of another condition.
+    pub fn go_on(&mut self, kept: KeptSamples) -> Result<()> {
+        let name = &self.pass.name;
+        if kept.name != *name {
+            bail!("it holds the samples of `{}` where the manifest has `{name}`", kept.name);
+        }
+        // In the memory that was reserved.
+        self.pairs.field.extend(kept.pairs.field);
+        self.pairs.reference.extend(kept.pairs.reference);
+        (self.pairs.first_ns, self.pairs.second_ns) = (kept.pairs.first_ns, kept.pairs.second_ns);
+        (self.factor, self.samples, self.lost_ns) = (kept.factor, kept.samples, kept.lost_ns);
+        Ok(())
     }
 
     /// Ends the tick at `time_ns`, all of whose samples `signals` has.

@@ -1,13 +1,23 @@
 //! The evaluator: takes samples in the order of their ticks, and yields the figures of all conditions at the end.
 
-use super::condition::Condition;
+use super::condition::{Condition, KeptSamples};
 use super::figures::Figures;
 use super::signals::Signals;
 use super::windows::Windows;
-use anyhow::Result;
+use anyhow::{Result, bail};
+use flights::state::WindowEndErrors;
 use recorder::RecordingError;
 use recorder::fields::TopicFields;
 use runtime::manifest::Conditions;
+use serde::{Deserialize, Serialize};
+
+/// What a checkpoint holds of an evaluator.
+#[derive(Serialize, Deserialize)]
+struct Kept {
+    /// Of the conditions, then of the measures.
+    conditions: Vec<KeptSamples>,
+    windows: Vec<WindowEndErrors>,
+}
 
 /// Conditions, measures and comparisons of a run, evaluated as samples pass.
 ///
@@ -80,6 +90,45 @@ impl Evaluator {
     /// If it does not fit its definition, or lacks a field that a condition needs.
     pub fn take(&mut self, topic: usize, cdr: &[u8]) -> Result<(), RecordingError> {
         self.signals.take(topic, cdr)
+    }
+
+    /// Takes the sample `cdr` of topic number `topic`, which was sent before the ticks that follow.
+    ///
+    /// # Errors
+    /// As [`Evaluator::take`].
+    pub fn hold(&mut self, topic: usize, cdr: &[u8]) -> Result<(), RecordingError> {
+        self.signals.hold(topic, cdr)
+    }
+
+    /// Everything that it keeps of the samples so far, but the newest of each topic.
+    #[must_use]
+    pub fn save(&self) -> Vec<u8> {
+        let conditions = self.pass.iter().chain(&self.measures).map(Condition::kept).collect();
+        let windows = self.compare.iter().map(Windows::kept).collect();
+        let kept = Kept { conditions, windows };
+        postcard::to_stdvec(&kept).unwrap_or_else(|error| unreachable!("numbers serialise: {error}"))
+    }
+
+    /// Goes on from what [`Evaluator::save`] returned for the same conditions; [`Evaluator::hold`] gives it the newest
+    /// samples.
+    ///
+    /// # Errors
+    /// If it is of other conditions.
+    pub fn load(&mut self, bytes: &[u8]) -> Result<()> {
+        let kept: Kept = postcard::from_bytes(bytes)?;
+        let (conditions, windows) = (self.pass.len() + self.measures.len(), self.compare.len());
+        if (kept.conditions.len(), kept.windows.len()) != (conditions, windows) {
+            bail!(
+                "it holds {} conditions and measures and {} comparisons, and the manifest has {conditions} and {windows}",
+                kept.conditions.len(),
+                kept.windows.len()
+            );
+        }
+        for (condition, kept) in self.pass.iter_mut().chain(&mut self.measures).zip(kept.conditions) {
+            condition.go_on(kept)?;
+        }
+        self.compare.iter_mut().zip(kept.windows).for_each(|(compare, kept)| compare.go_on(kept));
+        Ok(())
     }
 
     /// Ends the tick under way, whose simulation time is `time_ns`: all its samples were taken.

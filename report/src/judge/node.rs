@@ -41,24 +41,36 @@ pub struct Judge {
 #[derive(Debug)]
 pub struct JudgeState(Option<Judging>);
 
+/// Type of the state.
+const NAME: &str = "Judge";
+
 #[derive(Debug)]
 struct Judging {
     evaluator: Evaluator,
     /// By input, the number of its topic in the evaluator.
     topics: Vec<Option<usize>>,
+    /// True before the first step after a checkpoint, whose samples are still to be read.
+    is_restored: bool,
 }
 
 impl State for JudgeState {
-    const TRANSFER: Transfer = Transfer::File;
+    const TRANSFER: Transfer = Transfer::Growing(NAME);
 
     fn size(&self) -> usize {
-        0
+        self.0.as_ref().map_or(0, |judging| judging.evaluator.save().len())
     }
 
-    fn save(&self, _: &mut [u8]) {}
+    fn save(&self, bytes: &mut [u8]) {
+        if let Self(Some(judging)) = self {
+            bytes.copy_from_slice(&judging.evaluator.save());
+        }
+    }
 
-    fn load(&mut self, _: &[u8]) -> Result<(), StateError> {
-        Err(StateError::File)
+    fn load(&mut self, bytes: &[u8]) -> Result<(), StateError> {
+        let Self(Some(judging)) = self else { return StateError::check_size(NAME, 0, bytes) };
+        let loaded = judging.evaluator.load(bytes);
+        judging.is_restored = true;
+        loaded.map_err(|error| StateError::Contents { type_name: NAME, reason: error.to_string() })
     }
 }
 
@@ -96,7 +108,7 @@ impl Component for Judge {
         let mut evaluator = Evaluator::new(&self.parameters.conditions, open)?;
         evaluator.reserve(u64::from(self.duration_ticks) * self.tick_ns, self.tick_ns);
         let topics = announced.iter().map(|(name, _)| evaluator.topic(name)).collect();
-        *judging = Some(Judging { evaluator, topics });
+        *judging = Some(Judging { evaluator, topics, is_restored: false });
         Ok(())
     }
 
@@ -106,7 +118,14 @@ impl Component for Judge {
         inputs: AnyInputs<'_>,
         JudgeState(judging): &mut JudgeState,
     ) -> Result<(), StepError> {
-        let Some(Judging { evaluator, topics }) = judging else { return Ok(()) };
+        let Some(Judging { evaluator, topics, is_restored }) = judging else { return Ok(()) };
+        if std::mem::take(is_restored) {
+            for (input, topic) in topics.iter().enumerate() {
+                if let Some((topic, cdr)) = topic.zip(inputs.restored(input)) {
+                    evaluator.hold(topic, cdr)?;
+                }
+            }
+        }
         for (input, topic) in topics.iter().enumerate() {
             if let Some((topic, cdr)) = topic.zip(inputs.fresh(input)) {
                 evaluator.take(topic, cdr)?;

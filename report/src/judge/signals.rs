@@ -63,6 +63,17 @@ impl Signals {
         Ok(())
     }
 
+    /// Takes the sample `cdr` of topic number `topic`, which was sent before the tick under way.
+    ///
+    /// # Errors
+    /// As [`Signals::take`].
+    pub fn hold(&mut self, topic: usize, cdr: &[u8]) -> Result<(), RecordingError> {
+        let topic = &mut self.topics[topic];
+        topic.fields.read(cdr)?;
+        topic.is_known = true;
+        Ok(())
+    }
+
     /// Ends the tick: no sample is fresh.
     pub fn end_tick(&mut self) {
         self.topics.iter_mut().for_each(|topic| topic.is_fresh = false);

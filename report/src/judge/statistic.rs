@@ -1,9 +1,10 @@
 //! Statistics of samples that come one after the other.
 
 use runtime::manifest::Statistic;
+use serde::{Deserialize, Serialize};
 
 /// Sums and extremes of the samples so far.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Samples {
     count: u64,
     least: f64,

@@ -51,6 +51,16 @@ impl Windows {
         }
     }
 
+    /// The errors so far.
+    pub fn kept(&self) -> WindowEndErrors {
+        self.errors.clone()
+    }
+
+    /// Goes on from the errors `kept`.
+    pub fn go_on(&mut self, kept: WindowEndErrors) {
+        self.errors = kept;
+    }
+
     /// The errors of all windows.
     pub fn finish(&self) -> WindowFigures {
         let [position_rms_m, velocity_rms_m_s, attitude_rms_deg, _] =

@@ -54,6 +54,8 @@ fn plan() -> Plan {
         seed: 0,
         tick_ns: 1000,
         duration_ticks: 4,
+        first_tick: 0,
+        checkpoint_ticks: Vec::new(),
         window_ticks: 64,
         pace: Pace::Free,
         clock_cpu: None,

@@ -1,11 +1,12 @@
 //! What the launcher does with requests: holds, steps, paces and stops the run through its control segment.
 
+use crate::checkpoint::Writer;
 use crate::ctl::protocol::{Answer, Request, Status};
 use crate::ctl::server::{Asked, Remote, Reply, Server};
 use anyhow::Result;
 use bus::lockstep::SupervisorView;
 use bus::plan::Plan;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::Receiver;
 
 /// The hold tick of a run that is not to be held.
@@ -18,6 +19,8 @@ pub struct ControlServer<'a> {
     plan: &'a Plan,
     control: &'a SupervisorView,
     server: Server,
+    /// Writes checkpoints.
+    checkpoints: Writer<'a>,
     /// What was asked for and has not happened yet: one thing at a time, the newest.
     wish: Option<(Goal, Reply)>,
 }
@@ -29,6 +32,10 @@ enum Goal {
     PauseToStep(u32),
     /// To be held again at the boundary before `target`, `ticks` after it was let go.
     Step { ticks: u32, target: u32 },
+    /// To be held, for a checkpoint; the hold before was `hold_tick`.
+    PauseToSave { path: Option<PathBuf>, hold_tick: u32 },
+    /// To have the parts of the checkpoint of `tick`.
+    Save { path: Option<PathBuf>, tick: u32 },
 }
 
 impl<'a> ControlServer<'a> {
@@ -42,8 +49,10 @@ impl<'a> ControlServer<'a> {
         control: &'a SupervisorView,
         remote: Remote,
         requests: Receiver<Asked>,
+        checkpoints: Writer<'a>,
     ) -> Result<Self> {
-        Ok(Self { plan, control, server: Server::start(run_dir, remote, requests)?, wish: None })
+        let server = Server::start(run_dir, remote, requests)?;
+        Ok(Self { plan, control, server, checkpoints, wish: None })
     }
 
     /// Serves what has been asked since the last look; returns a request that is not about the clock, a swap.
@@ -63,6 +72,10 @@ impl<'a> ControlServer<'a> {
                 Request::Stop => {
                     self.control.request_stop();
                     self.answer(reply, "stopping at the next tick boundary".to_owned());
+                }
+                Request::Checkpoint { path } => {
+                    let hold_tick = self.control.hold_tick();
+                    self.wish(0, Goal::PauseToSave { path, hold_tick }, reply);
                 }
                 Request::Swap { .. } => return Some((request, reply)),
             }
@@ -115,8 +128,37 @@ impl<'a> ControlServer<'a> {
                 let what = if held_at == Some(target) { "paused" } else { "ended" };
                 self.answer(reply, format!("{what} at tick {target}, {} on", ticks_in_words(ticks)));
             }
+            (Goal::PauseToSave { path, hold_tick }, Some(tick)) => self.save(path, tick, hold_tick, reply),
+            (Goal::Save { path, tick }, _) => match self.checkpoints.write(tick, path.as_deref()) {
+                Ok(Some(written)) => {
+                    let text = format!("the checkpoint of tick {tick} is {}", written.display());
+                    self.answer(reply, text);
+                }
+                Ok(None) => self.wish = Some((Goal::Save { path, tick }, reply)),
+                Err(error) => drop(reply.send(&Answer::refused(format!("{error:#}")))),
+            },
             (goal, _) => self.wish = Some((goal, reply)),
         }
+    }
+
+    /// Has the nodes write the checkpoint of `tick`, at which the run is held, and lets it go on to `hold_tick`.
+    fn save(&mut self, path: Option<PathBuf>, tick: u32, hold_tick: u32, reply: Reply) {
+        self.control.set_hold_tick(hold_tick);
+        let refused = if tick == 0 {
+            Some("tick 0 is the start of the run: there is nothing to go on from")
+        } else if hold_tick <= tick {
+            Some(
+                "a paused run writes no checkpoint, since every process writes its part at its next step; resume it",
+            )
+        } else {
+            None
+        };
+        if let Some(reason) = refused {
+            reply.send(&Answer::refused(reason));
+            return;
+        }
+        self.control.ask_for_checkpoint(tick);
+        self.wish = Some((Goal::Save { path, tick }, reply));
     }
 
     /// Lets the run, held at `tick`, go for `ticks` ticks.

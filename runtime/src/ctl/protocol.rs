@@ -4,6 +4,7 @@ use crate::manifest::PaceSetting;
 use bus::lockstep::{LiveView, Phase};
 use bus::plan::Plan;
 use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
 
 /// The name of the socket in the run directory.
 pub(crate) const SOCKET: &str = "ctl.sock";
@@ -37,6 +38,11 @@ pub enum Request {
     },
     /// End at the next tick boundary.
     Stop,
+    /// Write a checkpoint of the next tick boundary; answered when the file is there.
+    Checkpoint {
+        /// The file; beside the recording and called after the tick where absent.
+        path: Option<PathBuf>,
+    },
     /// Replace a process; answered when the backup has taken over.
     Swap {
         /// The process to replace.
@@ -196,6 +202,7 @@ mod tests {
     fn a_request_is_one_json_object() {
         require_round_trip(r#"{"request":"status"}"#);
         require_round_trip(r#"{"request":"step","ticks":7}"#);
+        require_round_trip(r#"{"request":"checkpoint","path":"/a/b.ckpt"}"#);
         require_round_trip(r#"{"request":"pace","pace":"free"}"#);
         require_round_trip(r#"{"request":"pace","pace":"realtime"}"#);
         require_round_trip(r#"{"request":"pace","pace":"0.25"}"#);

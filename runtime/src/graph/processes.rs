@@ -357,7 +357,9 @@ pub fn irreplaceable(declared: &DeclaredNode<'_>, node: &NodePlan) -> Option<&'s
     let component = declared.program.component();
     if declared.program.is_recorder() {
         Some("it is the recorder, and its file would be torn")
-    } else if component.is_some_and(|component| matches!(component.transfer, Transfer::File)) {
+    } else if component
+        .is_some_and(|component| matches!(component.transfer, Transfer::File | Transfer::Growing(_)))
+    {
         Some("it writes a file, which no other process can go on with")
     } else if node.outputs.is_empty() {
         Some("it has no outputs, so nothing could be transferred")

@@ -31,6 +31,9 @@ pub struct Content {
     /// Simulated states compared with measured ones.
     #[serde(default)]
     pub compare: Vec<Spanned<Comparison>>,
+    /// Ticks at which the run writes a checkpoint.
+    #[serde(default)]
+    pub(crate) checkpoint: Vec<Spanned<CheckpointSetting>>,
     /// Processes that take over from others in flight.
     #[serde(default)]
     pub(crate) swap: Vec<Spanned<SwapSetting>>,
@@ -40,6 +43,11 @@ pub struct Content {
 }
 
 impl Content {
+    /// True if the run writes checkpoints.
+    pub(crate) fn writes_checkpoints(&self) -> bool {
+        !self.checkpoint.is_empty() || self.run.checkpoint_every_s.is_some()
+    }
+
     /// The conditions of the run, without their places.
     #[must_use]
     pub fn conditions(&self) -> Conditions {
@@ -97,6 +105,10 @@ pub struct Run {
     pub start_order_seed: Option<u64>,
     /// The recording, or `none`; beside the manifest and named like it where absent.
     pub record: Option<Spanned<String>>,
+    /// Simulated time between two checkpoints, s; none are written where absent.
+    pub checkpoint_every_s: Option<Spanned<f64>>,
+    /// Newest checkpoints that are kept; all where absent.
+    pub checkpoint_keep: Option<Spanned<usize>>,
     /// Whether every process notes the host times of its ticks.
     #[serde(default)]
     pub profile: bool,
@@ -518,6 +530,14 @@ pub struct SwapSetting {
 
 fn default_shadow_ticks() -> u32 {
     100
+}
+
+/// A tick at which the run writes a checkpoint.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CheckpointSetting {
+    /// The first tick that a run computes which goes on from it.
+    pub at_tick: Spanned<u32>,
 }
 
 /// A process that computes beside another from the first tick to the last, and never takes over.

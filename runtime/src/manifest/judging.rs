@@ -1,4 +1,5 @@
-//! The process that judges a run that is not recorded: it takes the recorder's place.
+//! The process that judges a run in flight: one that is not recorded, and one that writes checkpoints, since a run that
+//! goes on from one has recorded a part only.
 
 use super::content::{Content, Process};
 use super::sources::Sources;
@@ -31,9 +32,9 @@ pub fn complete(content: &mut Content, sources: &Sources) -> Result<(), Diagnost
     }
     let is_recorded = content.process.values().any(|process| has(process, Role::Record));
     let judge = registry.iter().find(|component| component.role == Role::Judge);
-    if let Some(Registration { name: kind, .. }) =
-        judge.filter(|_| !is_recorded && !content.conditions().topics().is_empty())
-    {
+    if let Some(Registration { name: kind, .. }) = judge.filter(|_| {
+        (!is_recorded || content.writes_checkpoints()) && !content.conditions().topics().is_empty()
+    }) {
         let is_free = |name: &String| content.process.keys().all(|other| other.get_ref() != name);
         let numbered = (2..).map(|number| format!("{NAME}-{number}"));
         let name = std::iter::once(NAME.to_owned()).chain(numbered).find(is_free).unwrap_or_default();

@@ -16,8 +16,18 @@ use toml::Spanned;
 type Processes = BTreeMap<Spanned<String>, Process>;
 
 /// Keys of `[run]` that change how fast or where a run computes, never what: they stay out of the recording.
-const HOST_ONLY_KEYS: [&str; 8] =
-    ["clock_cpu", "compose", "lock_memory", "pace", "profile", "record", "start_order_seed", "window_ticks"];
+const HOST_ONLY_KEYS: [&str; 10] = [
+    "checkpoint_every_s",
+    "checkpoint_keep",
+    "clock_cpu",
+    "compose",
+    "lock_memory",
+    "pace",
+    "profile",
+    "record",
+    "start_order_seed",
+    "window_ticks",
+];
 /// The same for keys of a process.
 const HOST_ONLY_PROCESS_KEYS: [&str; 8] = [
     "cpu",

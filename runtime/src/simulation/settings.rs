@@ -33,6 +33,8 @@ fn plan(draw: &mut Draw) -> Plan {
         seed: 0,
         tick_ns: 1_000_000,
         duration_ticks: TICKS,
+        first_tick: 0,
+        checkpoint_ticks: Vec::new(),
         window_ticks: WINDOW,
         pace: Pace::Free,
         clock_cpu: None,
@@ -104,5 +106,5 @@ pub(super) fn graph(draw: &mut Draw) -> Graph {
     });
     let sidecars = sidecars.collect();
     let files = bus::InputFiles::default();
-    Graph { plan, programs, backups, sidecars, models: Vec::new(), files, warnings: Vec::new() }
+    Graph { plan, programs, backups, sidecars, models: Vec::new(), files, from: None, warnings: Vec::new() }
 }

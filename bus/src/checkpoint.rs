@@ -1,0 +1,229 @@
+//! Checkpoints: what the nodes of a run need so that another run goes on from a tick.
+//!
+//! Every node writes its part at its first due tick from the checkpoint's tick on, when it has taken its inputs and before
+//! it steps. Until then its state is what it was when that tick began, so that nobody waits for anybody. A part holds the
+//! state, the words of a simulated computing time, and the newest sample of each input that was sent before the tick.
+
+use crate::component::Transfer;
+use crate::error::BusError;
+use crate::hand_over::Computation;
+use crate::plan::Plan;
+use crate::state_transfer::StateLayout;
+use crate::user_file;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+
+/// The folder in a run directory with the parts of its checkpoints, a folder for each tick.
+const FOLDER: &str = "checkpoints";
+/// The folder in a run directory with the parts that its nodes go on from.
+const FROM: &str = "from";
+/// The file with the samples among them.
+const SAMPLES: &str = "samples";
+/// The largest part that is read: no state comes near it.
+const PART_BYTES_MAX: u64 = 1 << 30;
+
+/// A sample that was sent before the tick of a checkpoint.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SavedSample {
+    pub(crate) topic: String,
+    pub(crate) layout_hash: u64,
+    pub(crate) tick: u64,
+    pub(crate) sequence: u64,
+    pub(crate) words: Vec<u64>,
+}
+
+/// What a node needs to go on from a checkpoint.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct NodePart {
+    /// Name of the node.
+    pub name: String,
+    /// Generation of the process that has written it: 0 unless another process has taken the first one's place.
+    pub generation: u32,
+    layout: Option<StateLayout>,
+    state: Vec<u8>,
+    /// What is under way of a step that takes simulated time.
+    timing: Vec<u64>,
+    samples: Vec<SavedSample>,
+}
+
+/// All that a run goes on from: the parts of its nodes.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Parts {
+    /// The first tick that is computed.
+    pub tick: u32,
+    /// In the order of the plan's nodes.
+    pub nodes: Vec<NodePart>,
+}
+
+/// The newest samples from before a checkpoint, one of a topic.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Samples(Vec<SavedSample>);
+
+impl NodePart {
+    /// The part of the node `name`, whose state is that of `computation`.
+    pub(crate) fn new(
+        name: &str,
+        transfer: Transfer,
+        computation: &dyn Computation,
+        timing: &[u64],
+        samples: Vec<SavedSample>,
+    ) -> Self {
+        let layout = StateLayout::saved(transfer, computation.state_size(), computation.configuration());
+        let mut state = vec![0; layout.as_ref().map_or(0, |layout| layout.size)];
+        if layout.is_some() {
+            computation.save(&mut state);
+        }
+        let (name, timing) = (name.to_owned(), timing.to_vec());
+        Self { name, generation: 0, layout, state, timing, samples }
+    }
+
+    /// Gives `computation`, the node's, the state of this part, and `timing` the words of its computing time.
+    ///
+    /// # Errors
+    /// If the state is one of another component, or of other parameters.
+    pub(crate) fn restore(
+        &self,
+        transfer: Transfer,
+        computation: &mut dyn Computation,
+        timing: &mut [u64],
+    ) -> Result<(), BusError> {
+        let refused = |reason: String| BusError::Checkpoint { node: self.name.clone(), reason };
+        let layout = StateLayout::saved(transfer, computation.state_size(), computation.configuration());
+        match (&self.layout, &layout) {
+            (None, None) => {}
+            (Some(found), Some(expected)) if found.fits(expected, transfer) => {
+                computation.load(&self.state).map_err(|error| refused(error.to_string()))?;
+            }
+            (found, expected) => {
+                let text = |layout: &Option<StateLayout>| {
+                    layout.as_ref().map_or("no state".to_owned(), ToString::to_string)
+                };
+                let (found, expected) = (text(found), text(expected));
+                let reason = format!("it holds {found}, and the node goes on from {expected}");
+                return Err(refused(reason));
+            }
+        }
+        if self.timing.len() != timing.len() {
+            return Err(refused(
+                "its steps take simulated time in one of the two and none in the other".to_owned(),
+            ));
+        }
+        timing.copy_from_slice(&self.timing);
+        Ok(())
+    }
+
+    /// The part that node `index` of the run in `run_dir` goes on from.
+    pub(crate) fn of_run(run_dir: &Path, index: usize) -> Result<Self, BusError> {
+        load(&run_dir.join(FROM).join(index.to_string()))
+    }
+
+    /// The part of a node without a state.
+    #[must_use]
+    pub fn stateless(name: &str) -> Self {
+        let (layout, state) = (None, Vec::new());
+        Self { name: name.to_owned(), generation: 0, layout, state, timing: Vec::new(), samples: Vec::new() }
+    }
+
+    /// Bytes of its state.
+    #[must_use]
+    pub fn state_bytes(&self) -> usize {
+        self.state.len()
+    }
+}
+
+impl Samples {
+    /// The newest sample of each topic in `parts`.
+    fn of(parts: &Parts) -> Self {
+        let mut newest: Vec<SavedSample> = Vec::new();
+        for sample in parts.nodes.iter().flat_map(|part| &part.samples) {
+            match newest.iter_mut().find(|known| known.topic == sample.topic) {
+                Some(known) if known.tick < sample.tick => *known = sample.clone(),
+                Some(_) => {}
+                None => newest.push(sample.clone()),
+            }
+        }
+        Self(newest)
+    }
+
+    /// The samples from before the first tick of the run in `run_dir`.
+    pub(crate) fn of_run(run_dir: &Path, plan: &Plan) -> Result<Self, BusError> {
+        let path = run_dir.join(FROM).join(SAMPLES);
+        if plan.first_tick == 0 { Ok(Self::default()) } else { load(&path).map(Self) }
+    }
+
+    /// That of `topic`.
+    pub(crate) fn get(&self, topic: &str) -> Option<&SavedSample> {
+        self.0.iter().find(|sample| sample.topic == topic)
+    }
+}
+
+impl Parts {
+    /// The newest samples from before its tick.
+    pub(crate) fn samples(&self) -> Samples {
+        Samples::of(self)
+    }
+
+    /// Puts the parts where the nodes of the run in `run_dir` find them.
+    ///
+    /// # Errors
+    /// If they cannot be written.
+    pub fn store_for_run(&self, run_dir: &Path) -> Result<(), BusError> {
+        let folder = run_dir.join(FROM);
+        store(&folder.join(SAMPLES), &self.samples().0)?;
+        let mut parts = self.nodes.iter().enumerate();
+        parts.try_for_each(|(index, part)| store(&folder.join(index.to_string()), part))
+    }
+
+    /// The parts that the `nodes` nodes of the run in `run_dir` have written for `tick`; `None` before the last has.
+    ///
+    /// # Errors
+    /// If one of them cannot be read.
+    pub fn written(run_dir: &Path, tick: u32, nodes: usize) -> Result<Option<Self>, BusError> {
+        let paths: Vec<PathBuf> = (0..nodes).map(|index| part_path(run_dir, tick, index)).collect();
+        if !paths.iter().all(|path| path.exists()) {
+            return Ok(None);
+        }
+        let nodes = paths.iter().map(|path| load(path)).collect::<Result<_, _>>()?;
+        Ok(Some(Self { tick, nodes }))
+    }
+
+    /// Removes what the nodes have written for `tick`.
+    pub fn remove_written(run_dir: &Path, tick: u32) {
+        // It goes with the run directory otherwise.
+        let _ = std::fs::remove_dir_all(run_dir.join(FOLDER).join(tick.to_string()));
+    }
+}
+
+/// Writes the part of node `index` of the checkpoint at `tick` into `run_dir`.
+pub(crate) fn store_part(run_dir: &Path, tick: u32, index: usize, part: &NodePart) -> Result<(), BusError> {
+    store(&part_path(run_dir, tick, index), part)
+}
+
+fn part_path(run_dir: &Path, tick: u32, index: usize) -> PathBuf {
+    run_dir.join(FOLDER).join(tick.to_string()).join(index.to_string())
+}
+
+/// Writes `value` to `path` in one step, in a folder that is made where it is missing.
+fn store(path: &Path, value: &impl Serialize) -> Result<(), BusError> {
+    let bytes =
+        postcard::to_stdvec(value).unwrap_or_else(|error| unreachable!("its types serialise: {error}"));
+    let folder = path.parent().map_or(Ok(()), std::fs::create_dir_all);
+    let draft = path.with_extension("draft");
+    let written =
+        folder.and_then(|()| std::fs::write(&draft, bytes)).and_then(|()| std::fs::rename(&draft, path));
+    written.map_err(|source| BusError::File { action: "write", path: path.to_owned(), source })
+}
+
+fn load<T: DeserializeOwned>(path: &Path) -> Result<T, BusError> {
+    let mut bytes = Vec::new();
+    let read =
+        user_file::open(path, false).and_then(|file| file.take(PART_BYTES_MAX).read_to_end(&mut bytes));
+    read.map_err(|source| BusError::File { action: "read", path: path.to_owned(), source })?;
+    postcard::from_bytes(&bytes).map_err(|error| BusError::Content {
+        path: path.to_owned(),
+        expected: "a part of a checkpoint",
+        found: error.to_string(),
+    })
+}

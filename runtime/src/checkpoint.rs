@@ -1,0 +1,430 @@
+//! Checkpoint files: all that another run needs to go on from a tick, written beside their place and renamed.
+//!
+//! A file holds what the nodes have saved, the manifest's path with the SHA-256 of its texts, the values of `--set`, and
+//! the SHA-256 of every file that the run has read. A run that goes on from it loads the manifest again and refuses texts
+//! and files that have changed since.
+
+use crate::graph::Graph;
+use crate::manifest::Manifest;
+use crate::output_file::{self, Kind, Mark};
+use crate::program::{OnExit, Program};
+use crate::registry::Registry;
+use anyhow::{Context as _, Result, anyhow, bail};
+use bus::checkpoint::{NodePart, Parts};
+use inputs::{InputFile, sha256};
+use serde::{Deserialize, Serialize};
+use std::io::{Read as _, Write as _};
+use std::path::{Path, PathBuf};
+
+/// The first bytes of a checkpoint; the digit counts the changes of the format.
+const START: &[u8] = b"hummingbus checkpoint 1\n";
+/// Characters of a SHA-256 in hexadecimal, which the file ends with.
+const SUM_BYTES: usize = 64;
+/// The largest file that is read.
+const BYTES_MAX: u64 = 4 << 30;
+/// The version of the program that goes on from a checkpoint must be that which has written it.
+const VERSION: &str = env!("CARGO_PKG_VERSION");
+/// The kind of the file.
+pub(crate) const CHECKPOINT: Kind = Kind { name: "checkpoint", mark: Mark::Start(START) };
+
+/// A checkpoint.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Checkpoint {
+    /// Version of the program that has written it.
+    version: String,
+    /// The manifest's file, absolute.
+    manifest: PathBuf,
+    /// The manifest and what it includes, with their SHA-256.
+    texts: Vec<(PathBuf, String)>,
+    /// The values of `--set`.
+    overrides: Vec<String>,
+    /// Files that the run has read, with their SHA-256.
+    files: Vec<(PathBuf, String)>,
+    /// Simulated time of a tick, ns.
+    tick_ns: u64,
+    parts: Parts,
+}
+
+impl Checkpoint {
+    /// The checkpoint with `parts` of the run of `manifest`, checked as `graph`.
+    pub(crate) fn new(manifest: &Manifest, graph: &Graph, parts: Parts) -> Self {
+        let file = |file: InputFile| (file.path, file.sha256);
+        Self {
+            version: VERSION.to_owned(),
+            manifest: std::path::absolute(&manifest.path).unwrap_or_else(|_| manifest.path.clone()),
+            texts: texts(manifest).collect(),
+            overrides: manifest
+                .overrides()
+                .filter(|text| !is_of_recording(text))
+                .map(str::to_owned)
+                .collect(),
+            files: graph.files.used().into_iter().map(file).collect(),
+            tick_ns: graph.plan.tick_ns,
+            parts,
+        }
+    }
+
+    /// Reads the checkpoint at `path`.
+    ///
+    /// # Errors
+    /// If it cannot be read, is no checkpoint of this version of the program, or is damaged.
+    pub fn read(path: &Path) -> Result<Self> {
+        let about = || format!("cannot go on from {}", path.display());
+        let mut bytes = Vec::new();
+        let file = std::fs::File::open(path).with_context(about)?;
+        file.take(BYTES_MAX).read_to_end(&mut bytes).with_context(about)?;
+        Self::from_bytes(&bytes).with_context(about)
+    }
+
+    fn from_bytes(bytes: &[u8]) -> Result<Self> {
+        let kind = START.len() - 2;
+        if !bytes.starts_with(&START[..kind]) {
+            bail!(
+                "it is no checkpoint of hummingbus; `run` writes them with --checkpoint-every or [[checkpoint]]"
+            );
+        }
+        if !bytes.starts_with(START) {
+            bail!(
+                "another version of hummingbus has written it, in another format; go on from it with that version"
+            );
+        }
+        let (content, sum) = bytes.split_at(bytes.len().saturating_sub(SUM_BYTES).max(START.len()));
+        if sha256(content).as_bytes() != sum {
+            bail!("it is damaged: its SHA-256 is not the one at its end");
+        }
+        let found: Self = postcard::from_bytes(&content[START.len()..])
+            .map_err(|error| anyhow!("it is damaged: {error}"))?;
+        if found.version != VERSION {
+            bail!(
+                "hummingbus {} has written it, and this is {VERSION}: states may mean something else; go on from it with \
+                 that version",
+                found.version
+            );
+        }
+        Ok(found)
+    }
+
+    /// Writes the checkpoint to `path`, in the place of nothing or of a checkpoint.
+    ///
+    /// # Errors
+    /// If it cannot be written, or something else would be lost.
+    pub(crate) fn write(&self, path: &Path) -> Result<()> {
+        let mut bytes = START.to_vec();
+        bytes.extend(postcard::to_stdvec(self).context("cannot put the checkpoint into bytes")?);
+        let sum = sha256(&bytes);
+        bytes.extend(sum.as_bytes());
+        output_file::write(path, &CHECKPOINT, |out| out.write_all(&bytes))
+    }
+
+    /// The first tick that a run computes which goes on from here.
+    #[must_use]
+    pub fn tick(&self) -> u32 {
+        self.parts.tick
+    }
+
+    /// Simulation time at the start of that tick, s.
+    #[must_use]
+    pub fn time_s(&self) -> f64 {
+        f64::from(self.tick()) * self.tick_ns as f64 * 1e-9
+    }
+
+    /// The manifest of the run.
+    #[must_use]
+    pub fn manifest_path(&self) -> &Path {
+        &self.manifest
+    }
+
+    /// The nodes and the bytes of their states.
+    pub fn nodes(&self) -> impl Iterator<Item = (&str, usize)> {
+        self.parts.nodes.iter().map(|part| (part.name.as_str(), part.state_bytes()))
+    }
+
+    /// The manifest of the run, loaded again, with further `overrides`.
+    ///
+    /// # Errors
+    /// If one of its files has changed, or a value does not fit.
+    pub fn load_manifest(&self, overrides: &[String], registry: Registry) -> Result<Manifest> {
+        let all: Vec<String> = self.overrides.iter().chain(overrides).cloned().collect();
+        let manifest = Manifest::load(&self.manifest, &all, registry)?;
+        for (path, found) in texts(&manifest) {
+            let known = self.texts.iter().find(|(known, _)| *known == path);
+            let (_, expected) = known.ok_or_else(|| {
+                anyhow!(
+                    "the manifest includes {}, which it did not when the checkpoint was written",
+                    path.display()
+                )
+            })?;
+            require_same(&path, expected, &found)?;
+        }
+        Ok(manifest)
+    }
+
+    /// Has the run of `graph` go on from here; `is_changed` says that it has other values than the run that has written the
+    /// checkpoint.
+    ///
+    /// # Errors
+    /// If it is another run: a file has changed, a node is not in it, or its ticks are others.
+    pub fn resume(self, graph: &mut Graph, is_changed: bool) -> Result<()> {
+        for InputFile { path, sha256, .. } in graph.files.used() {
+            match self.files.iter().find(|(known, _)| *known == path) {
+                // A copy with values of `--set` lies nowhere, and is another one by right.
+                Some(_) if is_changed && !path.exists() => {}
+                Some((_, expected)) => require_same(&path, expected, &sha256)?,
+                None if is_changed => {}
+                None => bail!("the run reads {}, which it did not before the checkpoint", path.display()),
+            }
+        }
+        let (tick, plan) = (self.tick(), &graph.plan);
+        if plan.tick_ns != self.tick_ns {
+            bail!("a tick of the checkpoint is {} ns, and one of the run {} ns", self.tick_ns, plan.tick_ns);
+        }
+        if tick >= plan.duration_ticks {
+            bail!(
+                "the checkpoint is of tick {tick}, and the run ends at tick {}: raise run.duration_s",
+                plan.duration_ticks
+            );
+        }
+        let nodes =
+            plan.nodes.iter().zip(&graph.programs).map(|(node, program)| self.part(&node.name, program));
+        let nodes = nodes.collect::<Result<Vec<_>>>()?;
+        let is_flown = |name: &str| plan.nodes.iter().any(|node| node.name == name);
+        if let Some(part) =
+            self.parts.nodes.iter().find(|part| part.state_bytes() > 0 && !is_flown(&part.name))
+        {
+            bail!("the checkpoint holds the state of `{}`, which is no process of the run", part.name);
+        }
+        for backup in &mut graph.backups {
+            if backup.take_over_tick.is_some() && backup.join_tick < tick {
+                bail!(
+                    "another process joins `{}` before tick {tick}, at which the run goes on",
+                    backup.plan.name
+                );
+            }
+            // A standby and a shadow have no part of their own: they go on from the state of the process before.
+            backup.join_tick = backup.join_tick.max(tick.next_multiple_of(backup.plan.period_ticks.max(1)));
+        }
+        graph.plan.first_tick = tick;
+        graph.plan.checkpoint_ticks.retain(|&at| at > tick);
+        graph.from = Some(Parts { tick, nodes });
+        Ok(())
+    }
+
+    /// The part of the node `name`, which is `program`; an empty one for a recorder, which begins a file of its own.
+    fn part(&self, name: &str, program: &Program) -> Result<NodePart> {
+        if program.is_recorder() {
+            return Ok(NodePart::stateless(name));
+        }
+        let part = self.parts.nodes.iter().find(|part| part.name == name).cloned();
+        part.ok_or_else(|| {
+            let known: Vec<&str> = self.nodes().map(|(name, _)| name).collect();
+            anyhow!("the checkpoint holds no state of `{name}`; it has {}", known.join(", "))
+        })
+    }
+}
+
+/// The files that `manifest` is made of, with their SHA-256.
+fn texts(manifest: &Manifest) -> impl Iterator<Item = (PathBuf, String)> {
+    let own = std::iter::once((manifest.path.as_path(), manifest.text()));
+    let all = own.chain(manifest.included());
+    all.map(|(path, text)| {
+        let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+        (path, sha256(text.as_bytes()))
+    })
+}
+
+fn require_same(path: &Path, expected: &str, found: &str) -> Result<()> {
+    if expected == found {
+        return Ok(());
+    }
+    let short = |sum: &str| sum.chars().take(12).collect::<String>();
+    bail!(
+        "{} has changed since the checkpoint was written (SHA-256 {}…, then {}…): put the file of then in its place, or \
+         fly from the start; what is to be another value in the run that goes on is given by --set",
+        path.display(),
+        short(found),
+        short(expected)
+    )
+}
+
+/// True for a value of `--set` that says where a run is recorded to.
+fn is_of_recording(text: &str) -> bool {
+    text.split('=').next().is_some_and(|key| key.trim() == "run.record")
+}
+
+/// Writes the checkpoints of a run.
+#[derive(Clone, Copy)]
+pub(crate) struct Writer<'a> {
+    manifest: &'a Manifest,
+    graph: &'a Graph,
+    run_dir: &'a Path,
+    /// Path of the files without `.TICK.ckpt`.
+    stem: &'a Path,
+}
+
+impl Writer<'_> {
+    /// Writes the checkpoint of `tick` to `path`, or beside the recording, once its nodes have written their parts; `None`
+    /// before.
+    pub(crate) fn write(&self, tick: u32, path: Option<&Path>) -> Result<Option<PathBuf>> {
+        let Some(parts) = Parts::written(self.run_dir, tick, self.graph.plan.nodes.len())? else {
+            return Ok(None);
+        };
+        let path = path.map_or_else(|| self::path(self.stem, tick), Path::to_owned);
+        self.put(parts, &path)?;
+        Parts::remove_written(self.run_dir, tick);
+        Ok(Some(path))
+    }
+
+    fn put(&self, parts: Parts, path: &Path) -> Result<()> {
+        for (part, program) in parts.nodes.iter().zip(&self.graph.programs) {
+            // A process that was restarted is what its predecessor was.
+            if part.generation > 0 && program.on_exit != OnExit::Restart {
+                bail!(
+                    "no checkpoint of tick {}: another process has taken the place of `{}`, and the manifest, by which a run \
+                     goes on, does not say which",
+                    parts.tick,
+                    part.name
+                );
+            }
+        }
+        Checkpoint::new(self.manifest, self.graph, parts).write(path)
+    }
+}
+
+/// Puts together what the nodes of a run write for the checkpoints of its plan.
+pub(crate) struct Collector<'a> {
+    pub(crate) writer: Writer<'a>,
+    /// Those of the plan's ticks that are done.
+    done: usize,
+    /// Files that were written and are still there, the oldest first.
+    pub(crate) written: Vec<PathBuf>,
+    /// Why one could not be written.
+    failed: Option<anyhow::Error>,
+}
+
+impl<'a> Collector<'a> {
+    /// The collector of the run of `manifest` in `run_dir`, whose files are called after `stem`.
+    pub(crate) fn new(manifest: &'a Manifest, graph: &'a Graph, run_dir: &'a Path, stem: &'a Path) -> Self {
+        let writer = Writer { manifest, graph, run_dir, stem };
+        Self { writer, done: 0, written: Vec::new(), failed: None }
+    }
+
+    /// Writes the files of the checkpoints that are complete.
+    pub(crate) fn collect(&mut self) {
+        while self.failed.is_none()
+            && let Some(&tick) = self.writer.graph.plan.checkpoint_ticks.get(self.done)
+        {
+            match self.writer.write(tick, None) {
+                Ok(Some(path)) => self.note(path),
+                Ok(None) => return,
+                Err(error) => self.failed = Some(error),
+            }
+        }
+    }
+
+    /// Writes the file of `parts`.
+    pub(crate) fn add(&mut self, parts: Parts) {
+        let path = path(self.writer.stem, parts.tick);
+        match self.writer.put(parts, &path) {
+            Ok(()) => self.note(path),
+            Err(error) => self.failed = self.failed.take().or(Some(error)),
+        }
+    }
+
+    /// Notes that `path` is written, and removes the oldest where fewer are kept.
+    fn note(&mut self, path: PathBuf) {
+        self.done += 1;
+        self.written.push(path);
+        let keep = self
+            .writer
+            .manifest
+            .content
+            .run
+            .checkpoint_keep
+            .as_ref()
+            .map_or(usize::MAX, |keep| *keep.get_ref());
+        if self.written.len() > keep {
+            // Who has removed or replaced it meanwhile has done so on purpose.
+            let _ = std::fs::remove_file(self.written.remove(0));
+        }
+    }
+
+    /// The files that the run has left.
+    ///
+    /// # Errors
+    /// If one could not be written.
+    pub(crate) fn finish(mut self) -> Result<Vec<PathBuf>> {
+        self.collect();
+        match self.failed.take() {
+            Some(error) => {
+                Err(error.context("the run was flown, but not every checkpoint of it was written"))
+            }
+            None => Ok(self.written),
+        }
+    }
+}
+
+/// The file of the checkpoint at `tick` of a run whose recording is `stem` with `.mcap`.
+pub(crate) fn path(stem: &Path, tick: u32) -> PathBuf {
+    let mut name = stem.file_name().unwrap_or_default().to_owned();
+    name.push(format!(".{tick}.ckpt"));
+    stem.with_file_name(name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Checkpoint, START, VERSION, path, sha256};
+    use bus::checkpoint::{NodePart, Parts};
+    use std::path::Path;
+
+    fn checkpoint() -> Checkpoint {
+        let nodes = vec![NodePart::stateless("plant")];
+        Checkpoint {
+            version: VERSION.to_owned(),
+            manifest: "/a/hover.toml".into(),
+            texts: vec![("/a/hover.toml".into(), sha256(b"[run]"))],
+            overrides: vec!["run.seed=3".to_owned()],
+            files: Vec::new(),
+            tick_ns: 1_000_000,
+            parts: Parts { tick: 6500, nodes },
+        }
+    }
+
+    #[test]
+    fn what_was_written_is_read_and_every_changed_byte_is_noticed() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("a.6500.ckpt");
+        checkpoint().write(&file).unwrap();
+        let read = Checkpoint::read(&file).unwrap();
+        assert_eq!((read.tick(), read.time_s()), (6500, 6.5));
+        assert_eq!(read, checkpoint());
+        let bytes = std::fs::read(&file).unwrap();
+        for index in 0..bytes.len() {
+            let mut damaged = bytes.clone();
+            damaged[index] ^= 1;
+            assert!(Checkpoint::from_bytes(&damaged).is_err(), "byte {index}");
+            assert!(Checkpoint::from_bytes(&bytes[..index]).is_err(), "cut at {index}");
+        }
+    }
+
+    #[test]
+    fn another_version_and_another_file_are_named() {
+        let mut old = checkpoint();
+        old.version = "0.0.1".to_owned();
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("a.ckpt");
+        old.write(&file).unwrap();
+        let error = format!("{:#}", Checkpoint::read(&file).unwrap_err());
+        assert!(error.contains("a.ckpt") && error.contains("hummingbus 0.0.1 has written it"), "{error}");
+        let error = Checkpoint::from_bytes(b"a letter").unwrap_err().to_string();
+        assert!(error.contains("no checkpoint"), "{error}");
+        let mut future = START.to_vec();
+        future[START.len() - 2] = b'9';
+        let error = Checkpoint::from_bytes(&future).unwrap_err().to_string();
+        assert!(error.contains("another format"), "{error}");
+    }
+
+    #[test]
+    fn a_file_is_called_after_the_recording_and_the_tick() {
+        assert_eq!(path(Path::new("/a/b.c"), 7), Path::new("/a/b.c.7.ckpt"));
+    }
+}

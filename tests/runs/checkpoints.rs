@@ -1,0 +1,277 @@
+//! A run that goes on from a checkpoint writes what the run that was never interrupted has written, whoever hosts its
+//! nodes before and after.
+
+use crate::manifests::{settings, shipped};
+use crate::support::{Place, poll, repository};
+use rustix::process::Signal;
+use std::fs;
+use std::path::Path;
+
+/// Simulated length of the flights of all manifests, s.
+const DURATION_S: f64 = 0.5;
+/// Hosts of the nodes: the arguments that ask for them.
+const HOSTS: [&[&str]; 3] = [&["--in-process"], &["--compose", "all"], &["--compose", "none"]];
+
+/// A shipped manifest, flown for half a second.
+struct Flight<'a> {
+    manifest: &'a str,
+    set: Vec<String>,
+}
+
+impl<'a> Flight<'a> {
+    fn new(place: &Place, manifest: &'a str) -> Self {
+        let mut set = settings(place, manifest);
+        if !set.iter().any(|setting| setting.starts_with("run.duration_s")) {
+            set.push(format!("run.duration_s={DURATION_S}"));
+        }
+        Self { manifest, set }
+    }
+
+    fn args<'s>(&'s self, more: &[&'s str]) -> Vec<&'s str> {
+        let set = self.set.iter().flat_map(|setting| ["--set", setting]);
+        ["run", self.manifest].into_iter().chain(set).chain(more.iter().copied()).collect()
+    }
+}
+
+/// True for a manifest of which a node is replaced in flight, which one process cannot host.
+fn has_backups(manifest: &str) -> bool {
+    let name = Path::new(manifest).file_stem().unwrap().to_string_lossy();
+    ["llp-hlp", "standby", "swap-gains", "swap-identical", "swap-laws"].contains(&&*name)
+}
+
+/// True for a manifest that names an executable or a core of its own.
+fn needs_processes(manifest: &str) -> bool {
+    manifest.ends_with("custom-controller.toml")
+}
+
+/// Checkpoints beside the recording `stem`: their ticks and paths, by tick.
+fn checkpoints(place: &Place, stem: &str) -> Vec<(u32, String)> {
+    let folder = place.path("");
+    let names = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let tick = |name: &String| -> Option<u32> {
+        name.strip_prefix(&format!("{stem}."))?.strip_suffix(".ckpt")?.parse().ok()
+    };
+    let mut found: Vec<(u32, String)> =
+        names.filter_map(|name| Some((tick(&name)?, place.path(&name)))).collect();
+    found.sort();
+    found
+}
+
+/// Requires that `later` begins at `tick` and goes on as `whole` does.
+#[track_caller]
+fn require_goes_on(place: &Place, whole: &str, later: &str, tick: u32) {
+    let expected = format!("begins at tick {tick}, and from there on all messages are those of");
+    place.call(&["diff", whole, later]).with_code(1).prints(&[&expected]);
+}
+
+#[test]
+fn every_shipped_manifest_goes_on_from_random_ticks_under_every_host() {
+    let place = Place::new();
+    let mut drawn: u32 = 1;
+    let mut draw = |below: u32| {
+        // The constants of a linear congruential generator (Numerical Recipes, 2nd ed., ch. 7.1).
+        drawn = drawn.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (drawn >> 8) % below
+    };
+    let mut gone_on = 0;
+    for (number, manifest) in shipped().iter().enumerate() {
+        if has_backups(manifest) {
+            continue;
+        }
+        let flight = Flight::new(&place, manifest);
+        let host = |index: usize| match needs_processes(manifest) {
+            true => HOSTS[2],
+            false => HOSTS[index % HOSTS.len()],
+        };
+        let whole = place.path(&format!("{number}.mcap"));
+        let every = format!("{}ms", 23 + draw(90));
+        let more = [&["--record", &whole, "--checkpoint-every", &every][..], host(number)].concat();
+        place.call(&flight.args(&more)).flown();
+        let stem = number.to_string();
+        let all = checkpoints(&place, &stem);
+        assert!(!all.is_empty(), "{manifest}: no checkpoint every {every}");
+        for turn in 0..2 {
+            let (tick, file) = &all[draw(all.len() as u32) as usize];
+            let later = place.path(&format!("{number}.later.mcap"));
+            let more = [&["run", "--from", file, "--record", &later][..], host(number + turn)].concat();
+            place.call(&more).flown();
+            require_goes_on(&place, &whole, &later, *tick);
+            gone_on += 1;
+        }
+        for (_, file) in all {
+            fs::remove_file(file).unwrap();
+        }
+    }
+    assert!(gone_on > 60, "only {gone_on} runs went on");
+}
+
+#[test]
+fn verdicts_are_those_of_the_whole_flight_and_the_manifest_names_the_tick() {
+    let place = Place::new();
+    let hover = repository("manifests/hover.toml");
+    let text = format!("include = [{hover:?}]\n[[checkpoint]]\nat_tick = 6500\n");
+    let manifest = place.write("m.toml", text);
+    let whole = place.path("a.mcap");
+    let ended = place.call(&["run", &manifest, "--record", &whole, "--json"]).with_code(0).json();
+    let file = place.path("a.6500.ckpt");
+    assert_eq!(ended["checkpoints"], serde_json::json!([file]));
+    for (host, record) in [(HOSTS[0], "none"), (HOSTS[1], "b.mcap"), (HOSTS[2], "c.mcap")] {
+        let record = if record == "none" { record.to_owned() } else { place.path(record) };
+        let more = [&["run", "--from", &file, "--json", "--record", &record][..], host].concat();
+        let summary = place.call(&more).with_code(0).json();
+        assert_eq!((&summary["first_tick"], &summary["ticks"]), (&6500.into(), &5500.into()));
+        assert_eq!(summary["pass"], ended["pass"]);
+        assert!(ended["pass"].as_array().unwrap().len() > 2);
+        if record != "none" {
+            require_goes_on(&place, &whole, &record, 6500);
+        }
+    }
+}
+
+/// Contacts, joints, a queue of a radio link, a step that takes time, and a filter that remembers the past.
+#[test]
+fn what_is_under_way_goes_on() {
+    let place = Place::new();
+    for (name, tick, more) in [
+        ("workshop", 1503, "run.duration_s=1.7"),
+        ("driven-joints", 1201, "run.duration_s=1.4"),
+        ("commands-over-a-link", 1999, "run.duration_s=2.2"),
+        ("computing-time", 1502, "run.duration_s=1.7"),
+        ("sensors", 2101, "run.duration_s=2.3"),
+        ("take-off", 1702, "run.duration_s=2.0"),
+    ] {
+        let manifest = repository(&format!("manifests/{name}.toml"));
+        let text = format!("include = [{manifest:?}]\n[[checkpoint]]\nat_tick = {tick}\n");
+        let manifest = place.write(&format!("{name}.toml"), text);
+        let (whole, later) = (place.path(&format!("{name}.mcap")), place.path(&format!("{name}.later.mcap")));
+        place.call(&["run", &manifest, "--set", more, "--record", &whole, "--in-process"]).flown();
+        let file = place.path(&format!("{name}.{tick}.ckpt"));
+        for host in HOSTS {
+            place.call(&[&["run", "--from", &file, "--record", &later][..], host].concat()).flown();
+            require_goes_on(&place, &whole, &later, tick);
+        }
+    }
+}
+
+#[test]
+fn a_fork_differs_from_the_tick_on_at_which_its_value_counts() {
+    let place = Place::new();
+    let whole = place.path("a.mcap");
+    let hover = repository("manifests/hover.toml");
+    let args = ["run", &hover, "--record", &whole, "--in-process", "--checkpoint-every", "1s", "--keep", "2"];
+    place.call(&[&args[..], &["--set", "run.duration_s=4"]].concat()).flown();
+    let kept = checkpoints(&place, "a");
+    assert_eq!(kept.iter().map(|(tick, _)| *tick).collect::<Vec<_>>(), [2000, 3000], "two are kept");
+    let fork = place.path("fork.mcap");
+    let set = ["--set", "process.controller.parameters.gains.altitude_p=0.2"];
+    let ended =
+        place.call(&[&["run", "--from", &kept[0].1, "--record", &fork, "--in-process"][..], &set].concat());
+    ended.flown();
+    place.call(&["diff", &whole, &fork]).with_code(1).prints(&["tick 2000, topic /controller/"]);
+}
+
+#[test]
+fn a_run_that_breaks_leaves_the_checkpoints_before() {
+    let place = Place::new();
+    let hover = repository("manifests/hover.toml");
+    let record = place.path("a.mcap");
+    let launch = place.start_endless(&[
+        "run",
+        &hover,
+        "--record",
+        &record,
+        "--checkpoint-every",
+        "100ms",
+        "--keep",
+        "3",
+    ]);
+    let kept = poll("three checkpoints", || {
+        let found = checkpoints(&place, "a");
+        (found.len() >= 3).then_some(found)
+    });
+    rustix::process::kill_process(place.process_of("imu"), Signal::KILL).unwrap();
+    launch.end().with_code(2).says(&["imu"]);
+    let left = checkpoints(&place, "a");
+    assert!(left.len() <= 3 && left.last().unwrap().0 >= kept[2].0, "{left:?}");
+    let (tick, file) = left.last().unwrap();
+    let later = place.path("b.mcap");
+    let end = format!("run.duration_s={}", f64::from(tick + 200) * 1e-3);
+    let args = ["run", "--from", file, "--record", &later, "--pace", "free", "--set", &end];
+    place.call(&args).flown();
+    assert!(fs::metadata(&later).unwrap().len() > 4000);
+}
+
+#[test]
+fn a_live_run_writes_one_when_it_is_asked() {
+    let place = Place::new();
+    let hover = repository("manifests/hover.toml");
+    let launch = place.start_endless(&["run", &hover, "--record", &place.path("a.mcap")]);
+    let run = place.run_id();
+    let file = place.path("asked.ckpt");
+    let asked = place.start(&["ctl", "checkpoint", &file, "--run", &run, "--json"]).end_among_others();
+    let tick = asked.with_code(0).json()["tick"].as_u64().unwrap();
+    assert!(tick > 0);
+    place.start(&["ctl", "pause", "--run", &run]).end_among_others().with_code(0);
+    let refused = place.start(&["ctl", "checkpoint", "--run", &run]).end_among_others();
+    refused.with_code(2).says(&["a paused run writes no checkpoint"]);
+    place.start(&["ctl", "stop", "--run", &run]).end_among_others().with_code(0);
+    launch.end().with_code(1);
+    let end = ["--set", "run.duration_s=1e3", "--pace", "free", "--record"];
+    let later = place.path("b.mcap");
+    let mut goes_on = place.start(&[&["run", "--from", &file][..], &end, &[&later]].concat());
+    goes_on.await_ticks(u32::try_from(tick).unwrap() + 300);
+    goes_on.signal(Signal::INT);
+    goes_on.end().with_code(1).prints(&["from the checkpoint of tick"]);
+    let compared = place.call(&["diff", &place.path("a.mcap"), &later]);
+    compared.with_code(1).prints(&["begins at tick"]);
+}
+
+#[test]
+fn what_does_not_fit_is_refused_in_words() {
+    let place = Place::new();
+    let vehicle = place.write("v.toml", fs::read(repository("vehicles/hummingbird.toml")).unwrap());
+    let text = fs::read_to_string(repository("manifests/hover.toml")).unwrap();
+    let text = text.replace("../vehicles/hummingbird.toml", &vehicle);
+    assert!(text.contains(&vehicle), "hover.toml names its vehicle otherwise");
+    let manifest = place.write("m.toml", &text);
+    let record = place.path("a.mcap");
+    let args = ["run", &manifest, "--record", &record, "--in-process", "--set", "run.duration_s=1"];
+    place.call(&[&args[..], &["--checkpoint-every", "500ms"]].concat()).flown();
+    let file = place.path("a.500.ckpt");
+    let refused = |args: &[&str], parts: &[&str]| {
+        place.call(&[&["run", "--from", &file, "--record", "none"], args].concat()).with_code(2).says(parts);
+    };
+    refused(&["--set", "run.duration_s=0.4"], &["tick 500", "tick 400", "raise run.duration_s"]);
+    refused(&["--set", "run.rate_hz=500"], &["a tick of the checkpoint is 1000000 ns"]);
+    refused(&[&manifest], &["cannot be used with"]);
+
+    let good = fs::read(&file).unwrap();
+    let mut damaged = good.clone();
+    damaged[good.len() / 2] ^= 4;
+    fs::write(&file, damaged).unwrap();
+    refused(&[], &["a.500.ckpt", "damaged"]);
+    fs::write(&file, "a letter").unwrap();
+    refused(&[], &["a.500.ckpt", "no checkpoint"]);
+    fs::write(&file, &good).unwrap();
+
+    fs::write(&vehicle, format!("{}\n# heavier\n", fs::read_to_string(&vehicle).unwrap())).unwrap();
+    refused(&[], &["v.toml has changed since the checkpoint was written"]);
+    fs::write(&vehicle, fs::read(repository("vehicles/hummingbird.toml")).unwrap()).unwrap();
+    fs::write(&manifest, format!("{text}\n# longer\n")).unwrap();
+    refused(&[], &["m.toml has changed since the checkpoint was written"]);
+    fs::write(&manifest, &text).unwrap();
+    place.call(&["run", "--from", &file, "--record", "none", "--in-process"]).flown();
+
+    for (more, part) in [
+        ("[[checkpoint]]\nat_tick = 0\n", "tick 0"),
+        ("[[checkpoint]]\nat_tick = 12000\n", "tick 12000 of a run of 12000 ticks"),
+        ("[[checkpoint]]\nat_s = 1\n", "at_s"),
+    ] {
+        let hover = repository("manifests/hover.toml");
+        let manifest = place.write("bad.toml", format!("include = [{hover:?}]\n{more}"));
+        place.call(&["check", &manifest]).with_code(2).says(&[part]);
+    }
+    let swap = repository("manifests/swap-gains.toml");
+    let args = ["run", &swap, "--record", "none", "--checkpoint-every", "11s"];
+    place.call(&args).with_code(2).says(&["another process joins `controller`"]);
+}
