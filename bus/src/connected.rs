@@ -41,8 +41,8 @@ pub(crate) struct ConnectedNode {
     known_ticks: u32,
     /// True if another process may go on from its state at any tick.
     states_every_tick: bool,
-    /// The number of the plan's checkpoint that comes next.
-    next_checkpoint: usize,
+    /// The tick of the plan's checkpoint that comes next; `u32::MAX` behind the last.
+    next_checkpoint: u32,
     /// The tick of the checkpoint that was asked for last and is written.
     asked_checkpoint: u32,
     /// Host time of all its steps, ns.
@@ -117,7 +117,7 @@ impl ConnectedNode {
             told_tick: first_tick,
             known_ticks: 0,
             states_every_tick: true,
-            next_checkpoint: 0,
+            next_checkpoint: links.plan.checkpoint_after(links.plan.first_tick).unwrap_or(u32::MAX),
             asked_checkpoint: 0,
             step_ns: 0,
             links,
@@ -243,10 +243,9 @@ impl ConnectedNode {
         locals: &Locals,
         computation: &dyn Computation,
     ) -> Result<(), BusError> {
-        while let Some(&of) = self.links.plan.checkpoint_ticks.get(self.next_checkpoint)
-            && of <= tick
-        {
-            self.next_checkpoint += 1;
+        while self.next_checkpoint <= tick {
+            let of = self.next_checkpoint;
+            self.next_checkpoint = self.links.plan.checkpoint_after(of).unwrap_or(u32::MAX);
             self.write_checkpoint(of, tick, locals, computation)?;
         }
         let asked = self.links.lockstep.checkpoint_tick();

@@ -154,6 +154,9 @@ pub struct Plan {
     /// Ticks before which the nodes write their parts of a checkpoint, ascending.
     #[serde(default)]
     pub checkpoint_ticks: Vec<u32>,
+    /// Ticks between two further checkpoints.
+    #[serde(default)]
+    pub checkpoint_period: Option<u32>,
     /// Ticks that a fast node may be ahead of the slowest.
     pub window_ticks: u32,
     /// Pacing.
@@ -229,6 +232,25 @@ impl Plan {
     /// If the file cannot be written.
     pub fn store(&self, run_dir: &Path) -> Result<(), BusError> {
         json_file::store(&run_dir.join(Self::FILE), self)
+    }
+
+    /// The first checkpoint behind `tick`, if there is one. Checkpoints after which a node computes nothing more are left
+    /// out: nothing would go on from them.
+    #[must_use]
+    pub fn checkpoint_after(&self, tick: u32) -> Option<u32> {
+        let named = self.checkpoint_ticks.iter().copied().find(|&named| named > tick);
+        let period = self.checkpoint_period.unwrap_or(u32::MAX).max(1);
+        let next = (tick / period).checked_add(1).and_then(|number| number.checked_mul(period));
+        [named, next].into_iter().flatten().min().filter(|&next| self.goes_on_from(next))
+    }
+
+    /// True if every node computes at or behind `tick`.
+    #[must_use]
+    pub fn goes_on_from(&self, tick: u32) -> bool {
+        self.nodes.iter().all(|node| {
+            let due = u64::from(tick).next_multiple_of(u64::from(node.period_ticks.max(1)));
+            due < u64::from(self.duration_ticks)
+        })
     }
 
     /// Simulated time of one tick in seconds.
@@ -350,6 +372,7 @@ impl Plan {
             duration_ticks,
             first_tick: 0,
             checkpoint_ticks: Vec::new(),
+            checkpoint_period: None,
             window_ticks: 64,
             pace: Pace::Free,
             clock_cpu: None,

@@ -58,7 +58,7 @@ impl Checkpoint {
                 .filter(|text| !is_of_recording(text))
                 .map(str::to_owned)
                 .collect(),
-            files: graph.files.used().into_iter().map(file).collect(),
+            files: files(graph).cloned().map(file).collect(),
             tick_ns: graph.plan.tick_ns,
             parts,
         }
@@ -165,11 +165,11 @@ impl Checkpoint {
     /// # Errors
     /// If it is another run: a file has changed, a node is not in it, or its ticks are others.
     pub fn resume(self, graph: &mut Graph, is_changed: bool) -> Result<()> {
-        for InputFile { path, sha256, .. } in graph.files.used() {
-            match self.files.iter().find(|(known, _)| *known == path) {
+        for InputFile { path, sha256, .. } in files(graph) {
+            match self.files.iter().find(|(known, _)| known == path) {
                 // A copy with values of `--set` lies nowhere, and is another one by right.
                 Some(_) if is_changed && !path.exists() => {}
-                Some((_, expected)) => require_same(&path, expected, &sha256)?,
+                Some((_, expected)) => require_same(path, expected, sha256)?,
                 None if is_changed => {}
                 None => bail!("the run reads {}, which it did not before the checkpoint", path.display()),
             }
@@ -204,7 +204,6 @@ impl Checkpoint {
             backup.join_tick = backup.join_tick.max(tick.next_multiple_of(backup.plan.period_ticks.max(1)));
         }
         graph.plan.first_tick = tick;
-        graph.plan.checkpoint_ticks.retain(|&at| at > tick);
         graph.from = Some(Parts { tick, nodes });
         Ok(())
     }
@@ -220,6 +219,12 @@ impl Checkpoint {
             anyhow!("the checkpoint holds no state of `{name}`; it has {}", known.join(", "))
         })
     }
+}
+
+/// The files that the nodes of `graph` read: those of a recorder are the manifest's.
+fn files(graph: &Graph) -> impl Iterator<Item = &InputFile> {
+    let nodes = graph.plan.nodes.iter().filter(|node| !node.is_recorder);
+    nodes.chain(graph.backups.iter().map(|backup| &backup.plan)).flat_map(|node| &node.files)
 }
 
 /// The files that `manifest` is made of, with their SHA-256.
@@ -293,8 +298,8 @@ impl Writer<'_> {
 /// Puts together what the nodes of a run write for the checkpoints of its plan.
 pub(crate) struct Collector<'a> {
     pub(crate) writer: Writer<'a>,
-    /// Those of the plan's ticks that are done.
-    done: usize,
+    /// The checkpoint that comes next.
+    next: Option<u32>,
     /// Files that were written and are still there, the oldest first.
     pub(crate) written: Vec<PathBuf>,
     /// Why one could not be written.
@@ -305,16 +310,17 @@ impl<'a> Collector<'a> {
     /// The collector of the run of `manifest` in `run_dir`, whose files are called after `stem`.
     pub(crate) fn new(manifest: &'a Manifest, graph: &'a Graph, run_dir: &'a Path, stem: &'a Path) -> Self {
         let writer = Writer { manifest, graph, run_dir, stem };
-        Self { writer, done: 0, written: Vec::new(), failed: None }
+        let next = graph.plan.checkpoint_after(graph.plan.first_tick);
+        Self { writer, next, written: Vec::new(), failed: None }
     }
 
     /// Writes the files of the checkpoints that are complete.
     pub(crate) fn collect(&mut self) {
         while self.failed.is_none()
-            && let Some(&tick) = self.writer.graph.plan.checkpoint_ticks.get(self.done)
+            && let Some(tick) = self.next
         {
             match self.writer.write(tick, None) {
-                Ok(Some(path)) => self.note(path),
+                Ok(Some(path)) => self.note(tick, path),
                 Ok(None) => return,
                 Err(error) => self.failed = Some(error),
             }
@@ -323,16 +329,16 @@ impl<'a> Collector<'a> {
 
     /// Writes the file of `parts`.
     pub(crate) fn add(&mut self, parts: Parts) {
-        let path = path(self.writer.stem, parts.tick);
+        let (tick, path) = (parts.tick, path(self.writer.stem, parts.tick));
         match self.writer.put(parts, &path) {
-            Ok(()) => self.note(path),
+            Ok(()) => self.note(tick, path),
             Err(error) => self.failed = self.failed.take().or(Some(error)),
         }
     }
 
-    /// Notes that `path` is written, and removes the oldest where fewer are kept.
-    fn note(&mut self, path: PathBuf) {
-        self.done += 1;
+    /// Notes that the checkpoint of `tick` is written to `path`, and removes the oldest where fewer are kept.
+    fn note(&mut self, tick: u32, path: PathBuf) {
+        self.next = self.writer.graph.plan.checkpoint_after(tick);
         self.written.push(path);
         let keep = self
             .writer

@@ -127,7 +127,7 @@ impl Graph {
         evaluations::check(manifest, &plan, &programs, &mut notes)?;
         plan.groups = groups;
         let (models, warnings) = notes.into_parts(manifest);
-        plan.checkpoint_ticks = checkpoints::ticks(manifest, &plan, &backups)?;
+        checkpoints::add(manifest, &mut plan, &backups)?;
         Ok(Self { plan, programs, backups, sidecars, models, files, from: None, warnings })
     }
 }
@@ -156,6 +156,7 @@ fn plan(manifest: &Manifest, wiring: Wiring) -> Result<Plan, Diagnostic> {
         duration_ticks,
         first_tick: 0,
         checkpoint_ticks: Vec::new(),
+        checkpoint_period: None,
         window_ticks: window_ticks.unwrap_or(DEFAULT_WINDOW_TICKS),
         pace: run.pace.0,
         clock_cpu: None,

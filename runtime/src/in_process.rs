@@ -190,6 +190,7 @@ impl Run<'_> {
 
     fn step_all(&mut self, simulation: &mut Simulation) -> Result<(), bus::BusError> {
         let plan = &self.graph.plan;
+        let mut next_checkpoint = plan.checkpoint_after(plan.first_tick);
         while simulation.tick() < plan.duration_ticks && self.stop.count() == 0 {
             let tick = simulation.tick();
             match plan.pace {
@@ -198,8 +199,9 @@ impl Run<'_> {
                 Pace::Free if !tick.is_multiple_of(LOOK_TICKS) => {}
                 Pace::Free => self.report(tick),
             }
-            if plan.checkpoint_ticks.binary_search(&tick).is_ok() {
+            if next_checkpoint == Some(tick) {
                 (self.save)(simulation.save());
+                next_checkpoint = plan.checkpoint_after(tick);
             }
             simulation.step()?;
         }

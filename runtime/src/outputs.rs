@@ -82,8 +82,11 @@ impl Outputs {
         logs.sort_by_key(|log| output_file::real_path(&log.path).ok());
         let inputs = inputs(manifest, graph);
         let partial = recording.as_ref().map(Output::until_complete).transpose()?;
-        let checkpoints = graph.plan.checkpoint_ticks.iter().take(CHECKPOINTS_CHECKED);
-        let checkpoints: Vec<Output> = checkpoints.map(|&tick| checkpoint(&stem, tick)).collect();
+        let plan = &graph.plan;
+        let checkpoints = plan.checkpoint_after(plan.first_tick);
+        let checkpoints = std::iter::successors(checkpoints, |&tick| plan.checkpoint_after(tick));
+        let checkpoints = checkpoints.take(CHECKPOINTS_CHECKED).map(|tick| checkpoint(&stem, tick));
+        let checkpoints: Vec<Output> = checkpoints.collect();
         let all: Vec<&Output> =
             recording.iter().chain(&partial).chain(&logs).chain(&pages).chain(&checkpoints).collect();
         for (index, output) in all.iter().enumerate() {

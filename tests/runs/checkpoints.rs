@@ -163,7 +163,10 @@ fn a_fork_differs_from_the_tick_on_at_which_its_value_counts() {
     let kept = checkpoints(&place, "a");
     assert_eq!(kept.iter().map(|(tick, _)| *tick).collect::<Vec<_>>(), [2000, 3000], "two are kept");
     let fork = place.path("fork.mcap");
-    let set = ["--set", "process.controller.parameters.gains.altitude_p=0.2"];
+    let set = [
+        "--set",
+        "process.controller.parameters.gains.roll={ proportional_1_s2 = 20.0, integral_1_s3 = 0.0, derivative_1_s = 7.0 }",
+    ];
     let ended =
         place.call(&[&["run", "--from", &kept[0].1, "--record", &fork, "--in-process"][..], &set].concat());
     ended.flown();
@@ -205,7 +208,8 @@ fn a_run_that_breaks_leaves_the_checkpoints_before() {
 fn a_live_run_writes_one_when_it_is_asked() {
     let place = Place::new();
     let hover = repository("manifests/hover.toml");
-    let launch = place.start_endless(&["run", &hover, "--record", &place.path("a.mcap")]);
+    let mut launch = place.start_endless(&["run", &hover, "--record", &place.path("a.mcap")]);
+    launch.await_ticks(100);
     let run = place.run_id();
     let file = place.path("asked.ckpt");
     let asked = place.start(&["ctl", "checkpoint", &file, "--run", &run, "--json"]).end_among_others();

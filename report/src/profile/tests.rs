@@ -56,6 +56,7 @@ fn plan() -> Plan {
         duration_ticks: 4,
         first_tick: 0,
         checkpoint_ticks: Vec::new(),
+        checkpoint_period: None,
         window_ticks: 64,
         pace: Pace::Free,
         clock_cpu: None,

@@ -143,7 +143,6 @@ impl<'a> ControlServer<'a> {
 
     /// Has the nodes write the checkpoint of `tick`, at which the run is held, and lets it go on to `hold_tick`.
     fn save(&mut self, path: Option<PathBuf>, tick: u32, hold_tick: u32, reply: Reply) {
-        self.control.set_hold_tick(hold_tick);
         let refused = if tick == 0 {
             Some("tick 0 is the start of the run: there is nothing to go on from")
         } else if hold_tick <= tick {
@@ -154,10 +153,13 @@ impl<'a> ControlServer<'a> {
             None
         };
         if let Some(reason) = refused {
+            self.control.set_hold_tick(hold_tick);
             reply.send(&Answer::refused(reason));
             return;
         }
+        // Before the hold is lifted: every node sees it at its next tick.
         self.control.ask_for_checkpoint(tick);
+        self.control.set_hold_tick(hold_tick);
         self.wish = Some((Goal::Save { path, tick }, reply));
     }
 

@@ -6,50 +6,44 @@ use bus::plan::Plan;
 use diagnostics::Diagnostic;
 use std::ops::Range;
 
-/// The ticks at which the nodes of `plan` write their parts of a checkpoint, ascending, each once.
+/// Has the nodes of `plan` write the checkpoints that `manifest` asks for.
 ///
 /// # Errors
 /// A tick that is none of the run's, that a node does not reach, or that lies behind a swap.
-pub fn ticks(manifest: &Manifest, plan: &Plan, backups: &[BackupSpec]) -> Result<Vec<u32>, Diagnostic> {
+pub fn add(manifest: &Manifest, plan: &mut Plan, backups: &[BackupSpec]) -> Result<(), Diagnostic> {
     let run = &manifest.content.run;
-    let mut ticks = Vec::new();
     for checkpoint in &manifest.content.checkpoint {
         let at = &checkpoint.get_ref().at_tick;
         require(manifest, plan, backups, *at.get_ref(), &at.span())?;
-        ticks.push(*at.get_ref());
+        plan.checkpoint_ticks.push(*at.get_ref());
     }
+    plan.checkpoint_ticks.sort_unstable();
     if let Some(keep) = run.checkpoint_keep.as_ref().filter(|keep| *keep.get_ref() == 0) {
         let help = "keep at least one, or leave `checkpoint_every_s` out";
         return Err(manifest.problem(&keep.span(), "`checkpoint_keep` is 0", help));
     }
     if let Some(every) = &run.checkpoint_every_s {
-        let period = every.get_ref() / plan.tick_s();
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked to be in range")]
-        let period = if period >= 0.5 && period < f64::from(u32::MAX) { period.round() as u32 } else { 0 };
-        if period == 0 {
+        let period = period(*every.get_ref() / plan.tick_s()).ok_or_else(|| {
             let message = format!("`checkpoint_every_s` is {} s", every.get_ref());
-            let help = "choose some time of at least one tick, such as 1.0";
-            return Err(manifest.problem(&every.span(), message, help));
+            manifest.problem(&every.span(), message, "choose some time of at least one tick, such as 1.0")
+        })?;
+        if plan.goes_on_from(period) {
+            let last = (plan.duration_ticks - 1) / period * period;
+            require_unswapped(manifest, backups, last, &every.span())?;
         }
-        let last = (1..).map(|number: u64| number * u64::from(period));
-        let last = last.map_while(|tick| u32::try_from(tick).ok()).take_while(|&tick| !is_late(plan, tick));
-        let before = ticks.len();
-        ticks.extend(last);
-        for &tick in &ticks[before..] {
-            require(manifest, plan, backups, tick, &every.span())?;
-        }
+        plan.checkpoint_period = Some(period);
     }
-    ticks.sort_unstable();
-    ticks.dedup();
-    Ok(ticks)
+    Ok(())
 }
 
-/// True if a node of `plan` computes nothing more from `tick` on.
-fn is_late(plan: &Plan, tick: u32) -> bool {
-    plan.nodes.iter().any(|node| {
-        let due = u64::from(tick).next_multiple_of(u64::from(node.period_ticks.max(1)));
-        due >= u64::from(plan.duration_ticks)
-    })
+/// A number of ticks as one, if it is at least 1.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "within the range, which is checked"
+)]
+fn period(ticks: f64) -> Option<u32> {
+    (ticks >= 0.5 && ticks < f64::from(u32::MAX)).then(|| ticks.round() as u32)
 }
 
 fn require(
@@ -59,25 +53,27 @@ fn require(
     tick: u32,
     span: &Range<usize>,
 ) -> Result<(), Diagnostic> {
-    let at = |message: String, help: &str| Err(manifest.problem(span, message, help));
-    let end = plan.duration_ticks;
-    if tick == 0 || is_late(plan, tick) {
-        let message = format!("a checkpoint at tick {tick} of a run of {end} ticks");
+    if tick == 0 || !plan.goes_on_from(tick) {
+        let message = format!("a checkpoint at tick {tick} of a run of {} ticks", plan.duration_ticks);
         let help = "it lies before a tick that every process still computes, and behind the first: a run goes on from it";
-        return at(message, help);
+        return Err(manifest.problem(span, message, help));
     }
+    require_unswapped(manifest, backups, tick, span)
+}
+
+/// Refuses a checkpoint at `tick`, asked for at `span`, behind a swap.
+fn require_unswapped(
+    manifest: &Manifest,
+    backups: &[BackupSpec],
+    tick: u32,
+    span: &Range<usize>,
+) -> Result<(), Diagnostic> {
     let swapped = backups.iter().find(|backup| backup.take_over_tick.is_some() && backup.join_tick < tick);
-    match swapped {
-        Some(backup) => {
-            let message = format!(
-                "a checkpoint at tick {tick}, and another process joins `{}` at tick {}",
-                backup.plan.name, backup.join_tick
-            );
-            at(
-                message,
-                "a checkpoint lies before the first swap: the manifest says which process a node is from its first tick on",
-            )
-        }
-        None => Ok(()),
-    }
+    let Some(backup) = swapped else { return Ok(()) };
+    let message = format!(
+        "a checkpoint at tick {tick}, and another process joins `{}` at tick {}",
+        backup.plan.name, backup.join_tick
+    );
+    let help = "a checkpoint lies before the first swap: the manifest says which process a node is from its first tick on";
+    Err(manifest.problem(span, message, help))
 }

@@ -35,6 +35,7 @@ fn plan(draw: &mut Draw) -> Plan {
         duration_ticks: TICKS,
         first_tick: 0,
         checkpoint_ticks: Vec::new(),
+        checkpoint_period: None,
         window_ticks: WINDOW,
         pace: Pace::Free,
         clock_cpu: None,
