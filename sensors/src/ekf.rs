@@ -164,10 +164,10 @@ fn attitude_estimate(state: &EkfState) -> AttitudeEstimate {
 
 fn innovations(state: &EkfState) -> Innovation {
     Innovation {
-        normalised_squared: state.normalised_squared,
+        normalised_squared: state.kept.normalised_squared,
         degrees_of_freedom: DEGREES_OF_FREEDOM,
-        updates: state.updates,
-        refused: state.refused,
+        updates: state.kept.updates,
+        refused: state.kept.refused,
         ..Default::default()
     }
 }

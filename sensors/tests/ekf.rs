@@ -232,11 +232,11 @@ fn consistency(timings: &[Timing], true_params: EkfParams, believed: EkfParams) 
         run(&flight, timings, (true_params, believed), seed, |sample| {
             // Several updates of one sensor at one sample show only the last: count those.
             for sensor in 0..4 {
-                if sample.state.updates[sensor] + sample.state.refused[sensor] != last[sensor] {
-                    sums[sensor] += sample.state.normalised_squared[sensor];
+                if sample.state.kept.updates[sensor] + sample.state.kept.refused[sensor] != last[sensor] {
+                    sums[sensor] += sample.state.kept.normalised_squared[sensor];
                     counts[sensor] += 1;
                 }
-                last[sensor] = sample.state.updates[sensor] + sample.state.refused[sensor];
+                last[sensor] = sample.state.kept.updates[sensor] + sample.state.kept.refused[sensor];
             }
             if sample.number % 1000 == 999 {
                 nees_sums[sample.number / 1000] += nees(sample);
@@ -247,7 +247,7 @@ fn consistency(timings: &[Timing], true_params: EkfParams, believed: EkfParams) 
                 squares_count += 1;
             }
             if sample.number == flight.len() - 1 {
-                refused += sample.state.refused.iter().sum::<u32>();
+                refused += sample.state.kept.refused.iter().sum::<u32>();
             }
         });
         let seeds_done = (seed - SEEDS.start + 1) as usize;
@@ -355,7 +355,7 @@ fn more_measurements_than_can_wait_are_used_early_and_what_is_later_than_they_is
             sums.push(nees(sample) / JUDGED as f64);
         }
         if sample.number == flight.len() - 1 {
-            let ([gps, _, barometer, _], [late, ..]) = (sample.state.updates, sample.state.refused);
+            let ([gps, _, barometer, _], [late, ..]) = (sample.state.kept.updates, sample.state.kept.refused);
             assert!(barometer > 4000 && gps == 1 && late > 90, "{gps} {barometer} {late}");
         }
     });
@@ -372,7 +372,7 @@ fn outliers_are_refused_and_counted_and_leave_no_mark() {
     };
     let mut refused = 0;
     run_spoilt(spoil, |sample| {
-        refused = sample.state.refused[Source::Mocap.index()];
+        refused = sample.state.kept.refused[Source::Mocap.index()];
         if sample.number > 2000 {
             assert!(errors(sample).fixed_rows::<3>(0).norm() < 2e-3, "at sample {}", sample.number);
         }
@@ -389,7 +389,7 @@ fn what_is_no_number_is_refused() {
         Some(measured)
     };
     let mut last = None;
-    run_spoilt(spoil, |sample| last = Some((sample.state.refused, errors(sample))));
+    run_spoilt(spoil, |sample| last = Some((sample.state.kept.refused, errors(sample))));
     let (refused, errors) = last.unwrap();
     assert_eq!(refused, [0, 1, 0, 0]);
     assert!(errors.fixed_rows::<3>(0).norm() < 2e-3);
@@ -437,7 +437,7 @@ fn a_filter_that_is_told_a_wrong_start_finds_its_way() {
     let believed = EkfParams { initial_position_m: Some([2.0, -1.0, 5.0]), ..EkfParams::default() };
     let mut refused = 0;
     let mut judge = |sample: &Sample<'_>| {
-        refused = sample.state.refused[Source::Mocap.index()];
+        refused = sample.state.kept.refused[Source::Mocap.index()];
         if sample.number > 1000 {
             assert!(errors(sample).fixed_rows::<3>(0).norm() < 5e-3, "at sample {}", sample.number);
         }

@@ -15,18 +15,22 @@
 //! covariance growing, so a filter that is wrong comes to accept what it refused; after twenty refusals of a position in
 //! a row the filter takes itself for lost: it keeps its motion with hardly any confidence.
 
-use super::history::{Newest, READINGS, Reading, Readings, Source, Waiting};
+use super::history::{Newest, Reading, Readings, ReadingsHead, Source, Waiting, places};
 use super::motion::Motion;
 use super::observation::{self, Observation};
 use super::params::EkfParams;
 use super::start::{lost_covariance, start};
 use super::transition::{Covariance, MotionCovariance, STATES, Transition, symmetric};
 use bus::Message;
+use bus::component::{State, StateError, Transfer};
 use diagnostics::parameter::{ParameterError, positive, require};
 use nalgebra::SMatrix;
 
 /// The covariance is carried over spans of at most this, since noise acts through the attitude in longer ones.
 const SPAN_MAX_NS: u64 = 20_000_000;
+
+/// Type of the state.
+const STATE: &str = "EkfState";
 
 /// No measurement was seen.
 const NEVER: u64 = u64::MAX;
@@ -36,10 +40,19 @@ const NEVER: u64 = u64::MAX;
 const REFUSED_IN_ROW_MAX: u32 = 20;
 
 /// What the estimator remembers, as it is handed over.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EkfState {
+    /// What it remembers besides the last readings.
+    pub kept: Kept,
+    /// The last readings.
+    readings: Readings,
+}
+
+/// What it remembers besides the last readings.
 #[derive(Clone, Copy, Debug, PartialEq, Message)]
 #[repr(C)]
-#[message(type_name = "hummingbus_msgs/msg/EkfState")]
-pub struct EkfState {
+#[message(type_name = "hummingbus_msgs/msg/EkfKept")]
+pub struct Kept {
     /// The reading at the filter's time; its time is that of the filter.
     at: Reading,
     /// The motion at the filter's time.
@@ -51,8 +64,6 @@ pub struct EkfState {
     present: Motion,
     /// What the errors do from the filter's time to the newest reading.
     since: Transition,
-    /// The last readings.
-    readings: Readings,
     /// Measurements that wait.
     waiting: Waiting,
     /// When the newest measurement of each sensor was taken; the largest number before the first.
@@ -98,6 +109,8 @@ pub struct Ekf {
     params: EkfParams,
     period_ns: u64,
     delay_max_ns: u64,
+    /// Readings that are remembered.
+    places: usize,
 }
 
 impl Ekf {
@@ -109,22 +122,26 @@ impl Ekf {
         params.validate()?;
         positive("period_s", period_s)?;
         let span_s = params.delay_max_ms * 1e-3 + SPAN_MAX_NS as f64 * 1e-9;
-        let fits = span_s / period_s <= (READINGS - 2) as f64;
-        require("delay_max_ms", params.delay_max_ms, fits, "20 ms shorter than 254 of the node's periods")?;
+        let places = places(span_s, period_s);
+        require(
+            "delay_max_ms",
+            params.delay_max_ms,
+            places.is_some(),
+            "at most four million of the node's periods",
+        )?;
         let (period_ns, delay_max_ns) = ((period_s * 1e9).round() as u64, (params.delay_max_ms * 1e6) as u64);
-        Ok(Self { params, period_ns, delay_max_ns })
+        Ok(Self { params, period_ns, delay_max_ns, places: places.unwrap_or_default() })
     }
 
     /// The state before the first reading.
     #[must_use]
     pub fn initial_state(&self) -> EkfState {
-        EkfState {
+        let kept = Kept {
             at: Reading::default(),
             settled: Motion::default(),
             covariance: [0.0; STATES * STATES],
             present: Motion::default(),
             since: Transition::default(),
-            readings: Readings::every(self.period_ns),
             waiting: Waiting::default(),
             newest_ns: [NEVER; 4],
             normalised_squared: [0.0; 4],
@@ -133,7 +150,8 @@ impl Ekf {
             refused_in_row: [0; 4],
             has_begun: 0,
             pad0: 0,
-        }
+        };
+        EkfState { kept, readings: Readings::every(self.period_ns, self.places) }
     }
 
     /// Moves `state` on to `reading`, with what the sensors have measured last.
@@ -143,7 +161,7 @@ impl Ekf {
         let usable = if reading.is_finite() { *reading } else { last.unwrap_or_default() };
         let now_ns = reading.time_ns;
         state.readings.push(&Reading { time_ns: now_ns, ..usable });
-        let begins = state.has_begun == 0;
+        let begins = state.kept.has_begun == 0;
         if begins && !self.begin(state, newest) {
             return;
         }
@@ -151,19 +169,19 @@ impl Ekf {
         if self.settle(state, newest, now_ns) || was_full || begins {
             self.catch_up(state);
         } else if let (Some(last), Some(now)) = (last, state.readings.newest()) {
-            state.present.travel(&last, &now, self.params.gravity_m_s2, &mut state.since);
+            state.kept.present.travel(&last, &now, self.params.gravity_m_s2, &mut state.kept.since);
         }
     }
 
     /// Begins if a position is known; whether it has.
     fn begin(&self, state: &mut EkfState, newest: &Newest) -> bool {
         let Some((reading, start)) = start(newest, &state.readings, &self.params) else { return false };
-        (state.at, state.settled) = (reading, start.motion);
-        state.covariance = flat(&start.covariance(&self.params));
+        (state.kept.at, state.kept.settled) = (reading, start.motion);
+        state.kept.covariance = flat(&start.covariance(&self.params));
         for earlier in newest.iter().flatten().flatten().filter(|m| m.measured_ns < reading.time_ns) {
-            state.newest_ns[earlier.sensor().index()] = earlier.measured_ns;
+            state.kept.newest_ns[earlier.sensor().index()] = earlier.measured_ns;
         }
-        state.has_begun = 1;
+        state.kept.has_begun = 1;
         true
     }
 
@@ -172,15 +190,15 @@ impl Ekf {
         let mut was_full = false;
         for measurement in newest.iter().flatten().flatten() {
             let sensor = measurement.sensor().index();
-            if state.newest_ns[sensor] == measurement.measured_ns {
+            if state.kept.newest_ns[sensor] == measurement.measured_ns {
                 continue;
             }
-            state.newest_ns[sensor] = measurement.measured_ns;
-            if state.waiting.is_full() {
+            state.kept.newest_ns[sensor] = measurement.measured_ns;
+            if state.kept.waiting.is_full() {
                 self.use_first(state);
                 was_full = true;
             }
-            state.waiting.insert(*measurement);
+            state.kept.waiting.insert(*measurement);
         }
         was_full
     }
@@ -190,12 +208,12 @@ impl Ekf {
     fn settle(&self, state: &mut EkfState, newest: &Newest, now_ns: u64) -> bool {
         let mut has_changed = false;
         let until_ns = self.settled_ns(state, newest, now_ns);
-        while state.waiting.first().is_some_and(|first| first.measured_ns <= until_ns) {
+        while state.kept.waiting.first().is_some_and(|first| first.measured_ns <= until_ns) {
             self.use_first(state);
             has_changed = true;
         }
         let horizon_ns = now_ns.saturating_sub(self.delay_max_ns);
-        if horizon_ns >= state.at.time_ns + SPAN_MAX_NS {
+        if horizon_ns >= state.kept.at.time_ns + SPAN_MAX_NS {
             self.advance(state, horizon_ns);
             has_changed = true;
         }
@@ -204,7 +222,7 @@ impl Ekf {
 
     /// Up to when nothing can arrive any more: no sensor sends its measurements out of order.
     fn settled_ns(&self, state: &EkfState, newest: &Newest, now_ns: u64) -> u64 {
-        let seen = |sensor: &Source| match state.newest_ns[sensor.index()] {
+        let seen = |sensor: &Source| match state.kept.newest_ns[sensor.index()] {
             NEVER => 0,
             newest_ns => newest_ns,
         };
@@ -215,14 +233,14 @@ impl Ekf {
 
     /// Goes on to the time of the earliest measurement that waits, and uses it.
     fn use_first(&self, state: &mut EkfState) {
-        let Some(measurement) = state.waiting.pop() else { return };
+        let Some(measurement) = state.kept.waiting.pop() else { return };
         let is_known =
-            measurement.measured_ns >= state.at.time_ns && self.advance(state, measurement.measured_ns);
+            measurement.measured_ns >= state.kept.at.time_ns && self.advance(state, measurement.measured_ns);
         if !is_known || !measurement.values.iter().all(|value| value.is_finite()) {
-            state.refused[measurement.sensor().index()] += 1;
+            state.kept.refused[measurement.sensor().index()] += 1;
             return;
         }
-        let (motion, params) = (&state.settled, &self.params);
+        let (motion, params) = (&state.kept.settled, &self.params);
         let sensor = measurement.sensor();
         match sensor {
             Source::Gps => self.update(state, sensor, &observation::gps(motion, &measurement, params)),
@@ -238,29 +256,29 @@ impl Ekf {
 
     /// Carries the filter on to `until_ns`; false if there are no readings up to then.
     fn advance(&self, state: &mut EkfState, until_ns: u64) -> bool {
-        while state.at.time_ns < until_ns {
-            let next_ns = until_ns.min(state.at.time_ns + SPAN_MAX_NS);
+        while state.kept.at.time_ns < until_ns {
+            let next_ns = until_ns.min(state.kept.at.time_ns + SPAN_MAX_NS);
             let Some(end) = state.readings.at(next_ns) else { return false };
             let mut span = Transition::default();
-            let mut from = state.at;
+            let mut from = state.kept.at;
             for to in state.readings.after(from.time_ns).take_while(|reading| reading.time_ns < next_ns) {
-                state.settled.travel(&from, &to, self.params.gravity_m_s2, &mut span);
+                state.kept.settled.travel(&from, &to, self.params.gravity_m_s2, &mut span);
                 from = to;
             }
-            state.settled.travel(&from, &end, self.params.gravity_m_s2, &mut span);
-            state.settled.fade_gps_drift(span.time_s(), self.params.gps_position_drift_time_s);
-            state.covariance = flat(&span.carry(&state.covariance(), &self.params));
-            state.at = end;
+            state.kept.settled.travel(&from, &end, self.params.gravity_m_s2, &mut span);
+            state.kept.settled.fade_gps_drift(span.time_s(), self.params.gps_position_drift_time_s);
+            state.kept.covariance = flat(&span.carry(&state.covariance(), &self.params));
+            state.kept.at = end;
         }
         true
     }
 
     /// The present anew, from the filter's time.
     fn catch_up(&self, state: &mut EkfState) {
-        (state.present, state.since) = (state.settled, Transition::default());
-        let mut from = state.at;
+        (state.kept.present, state.kept.since) = (state.kept.settled, Transition::default());
+        let mut from = state.kept.at;
         for to in state.readings.after(from.time_ns) {
-            state.present.travel(&from, &to, self.params.gravity_m_s2, &mut state.since);
+            state.kept.present.travel(&from, &to, self.params.gravity_m_s2, &mut state.kept.since);
             from = to;
         }
     }
@@ -273,38 +291,70 @@ impl Ekf {
         let mut spread = observed.jacobian * cross;
         (0..N).for_each(|row| spread[(row, row)] += observed.variance[row]);
         let Some(spread) = spread.cholesky() else {
-            state.refused[index] += 1;
+            state.kept.refused[index] += 1;
             return;
         };
         let normalised_squared = observed.innovation.dot(&spread.solve(&observed.innovation));
-        state.normalised_squared[index] = normalised_squared;
+        state.kept.normalised_squared[index] = normalised_squared;
         if deviation(normalised_squared, N) > self.params.gate_sigma {
-            state.refused[index] += 1;
-            state.refused_in_row[index] += 1;
-            if state.refused_in_row[index] < REFUSED_IN_ROW_MAX || !sensor.tells_position() {
+            state.kept.refused[index] += 1;
+            state.kept.refused_in_row[index] += 1;
+            if state.kept.refused_in_row[index] < REFUSED_IN_ROW_MAX || !sensor.tells_position() {
                 return;
             }
             // It is not the sensor that is wrong.
-            state.covariance = flat(&lost_covariance(&self.params));
-            state.refused_in_row[index] = 0;
+            state.kept.covariance = flat(&lost_covariance(&self.params));
+            state.kept.refused_in_row[index] = 0;
             return self.update(state, sensor, observed);
         }
-        state.refused_in_row[index] = 0;
+        state.kept.refused_in_row[index] = 0;
         let gain = cross * spread.inverse();
-        state.settled.correct(&(gain * observed.innovation));
-        state.covariance = flat(&reduced(&covariance, &gain, &cross));
-        state.updates[index] += 1;
+        state.kept.settled.correct(&(gain * observed.innovation));
+        state.kept.covariance = flat(&reduced(&covariance, &gain, &cross));
+        state.kept.updates[index] += 1;
     }
 
     /// The covariance of the present motion's errors.
     #[must_use]
     pub fn covariance(&self, state: &EkfState) -> Covariance {
-        state.since.carry(&state.covariance(), &self.params)
+        state.kept.since.carry(&state.covariance(), &self.params)
     }
 
     /// The covariance of the errors of the present position, velocity and attitude.
     pub(crate) fn motion_covariance(&self, state: &EkfState) -> MotionCovariance {
-        state.since.carry_motion(&state.covariance(), &self.params)
+        state.kept.since.carry_motion(&state.covariance(), &self.params)
+    }
+}
+
+impl State for EkfState {
+    const TRANSFER: Transfer = Transfer::Bytes(STATE);
+
+    /// As many readings of another period reach another time back.
+    fn configuration(&self) -> u64 {
+        self.readings.period_ns()
+    }
+
+    fn size(&self) -> usize {
+        let (_, ring) = self.readings.parts();
+        size_of::<Kept>() + size_of::<ReadingsHead>() + ring.len()
+    }
+
+    fn save(&self, bytes: &mut [u8]) {
+        let (head, ring) = self.readings.parts();
+        let (kept, rest) = bytes.split_at_mut(size_of::<Kept>());
+        let (of_head, of_ring) = rest.split_at_mut(size_of::<ReadingsHead>());
+        kept.copy_from_slice(bytemuck::bytes_of(&self.kept));
+        of_head.copy_from_slice(bytemuck::bytes_of(&head));
+        of_ring.copy_from_slice(ring);
+    }
+
+    fn load(&mut self, bytes: &[u8]) -> Result<(), StateError> {
+        StateError::check_size(STATE, self.size(), bytes)?;
+        let (kept, rest) = bytes.split_at(size_of::<Kept>());
+        let (head, ring) = rest.split_at(size_of::<ReadingsHead>());
+        self.kept = bytemuck::pod_read_unaligned(kept);
+        self.readings.go_on(bytemuck::pod_read_unaligned(head), ring);
+        Ok(())
     }
 }
 
@@ -312,13 +362,13 @@ impl EkfState {
     /// The motion at the newest reading.
     #[must_use]
     pub fn motion(&self) -> &Motion {
-        &self.present
+        &self.kept.present
     }
 
     /// Whether the filter has begun: before, there is no estimate.
     #[must_use]
     pub fn has_begun(&self) -> bool {
-        self.has_begun == 1
+        self.kept.has_begun == 1
     }
 
     /// The newest reading.
@@ -327,7 +377,7 @@ impl EkfState {
     }
 
     fn covariance(&self) -> Covariance {
-        Covariance::from_column_slice(&self.covariance)
+        Covariance::from_column_slice(&self.kept.covariance)
     }
 }
 
@@ -369,8 +419,8 @@ mod tests {
             let pose = Measurement::new(Source::Mocap, time_ns / 10_000_000 * 10_000_000, &POSE);
             filter.update_to(&mut state, &reading, &[None, Some(Some(pose)), None, None]);
         }
-        assert_eq!(state.updates[Source::Mocap.index()], 100);
-        (state.settled, state.covariance())
+        assert_eq!(state.kept.updates[Source::Mocap.index()], 100);
+        (state.kept.settled, state.covariance())
     }
 
     const POSE: [f64; 7] = [1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0];

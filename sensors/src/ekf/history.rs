@@ -3,8 +3,10 @@
 use bus::Message;
 use bus::messages::Vector3;
 
-/// How many readings are remembered.
-pub(crate) const READINGS: usize = 256;
+/// Readings that are remembered at least.
+const READINGS_MIN: usize = 256;
+/// Readings that are remembered at most: 100 MB of them.
+const READINGS_MAX: usize = 4 << 20;
 /// How many measurements can wait.
 pub(crate) const WAITING: usize = 48;
 
@@ -52,49 +54,85 @@ impl Reading {
 ///
 /// They are kept in single precision, since what a node hands over is written at every tick: it rounds a reading by
 /// 10⁻⁷ of itself, four orders below its noise. The filter sees no other readings than these.
-#[derive(Clone, Copy, Debug, PartialEq, Message)]
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Readings {
+    /// Number of the readings and time of the newest.
+    head: ReadingsHead,
+    /// Time between two, ns.
+    period_ns: u64,
+    /// Specific force in m/s² and angular rate in rad/s, body axes. Reading number n is at the place n modulo the number of
+    /// places.
+    ring: Box<[[f32; 6]]>,
+}
+
+/// The part of the readings that has the same size whatever is remembered.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/EkfReadings")]
-pub(crate) struct Readings {
-    /// Readings so far; number n is at the place n modulo the number of places.
+pub(crate) struct ReadingsHead {
+    /// Readings so far.
+    #[field(unit = "1")]
     count: u64,
     /// When the newest was read.
     #[field(unit = "ns")]
     newest_ns: u64,
-    /// Time between two.
-    #[field(unit = "ns")]
-    period_ns: u64,
-    /// Specific force in m/s² and angular rate in rad/s, body axes.
-    #[field(unit = "")]
-    ring: [[f32; 6]; READINGS],
+}
+
+/// Places for readings every `period_s` that reach `span_s` back; `None` where they would fill the memory.
+pub(crate) fn places(span_s: f64, period_s: f64) -> Option<usize> {
+    let needed = (span_s / period_s).ceil() + 2.0;
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "within the range, which is checked"
+    )]
+    (needed <= READINGS_MAX as f64).then(|| READINGS_MIN.max(needed as usize))
 }
 
 impl Readings {
-    /// None yet, of those that will come every `period_ns`.
+    /// None yet, of those that will come every `period_ns`, with `places` places.
     #[must_use]
-    pub fn every(period_ns: u64) -> Self {
-        Self { count: 0, newest_ns: 0, period_ns, ring: [[0.0; 6]; READINGS] }
+    pub fn every(period_ns: u64, places: usize) -> Self {
+        Self { head: ReadingsHead::default(), period_ns, ring: vec![[0.0; 6]; places].into_boxed_slice() }
+    }
+
+    /// Time between two, ns.
+    #[must_use]
+    pub fn period_ns(&self) -> u64 {
+        self.period_ns
+    }
+
+    /// The part that has the same size whatever is remembered, and the bytes of the rest.
+    pub fn parts(&self) -> (ReadingsHead, &[u8]) {
+        (self.head, bytemuck::cast_slice(&self.ring))
+    }
+
+    /// Goes on from both parts; the bytes are as many as those of its own.
+    pub fn go_on(&mut self, head: ReadingsHead, ring: &[u8]) {
+        self.head = head;
+        bytemuck::cast_slice_mut(&mut self.ring).copy_from_slice(ring);
     }
 
     /// Remembers the newest reading, one period after the last.
     pub fn push(&mut self, reading: &Reading) {
         let (force, rate) = (reading.specific_force, reading.angular_velocity);
         let values = [force.x, force.y, force.z, rate.x, rate.y, rate.z];
-        self.ring[self.count as usize % READINGS] = values.map(|value| value as f32);
-        self.newest_ns = reading.time_ns;
-        self.count += 1;
+        let place = self.place(self.head.count);
+        self.ring[place] = values.map(|value| value as f32);
+        self.head.newest_ns = reading.time_ns;
+        self.head.count += 1;
     }
 
     /// The newest reading, if there is one.
     #[must_use]
     pub fn newest(&self) -> Option<Reading> {
-        self.count.checked_sub(1).map(|number| self.numbered(number))
+        self.head.count.checked_sub(1).map(|number| self.numbered(number))
     }
 
     /// The readings after `time_ns`, oldest first.
     pub fn after(&self, time_ns: u64) -> impl Iterator<Item = Reading> {
         let next = self.last_until(time_ns).map_or(self.oldest(), |number| number + 1);
-        (next..self.count).map(|number| self.numbered(number))
+        (next..self.head.count).map(|number| self.numbered(number))
     }
 
     /// The reading at `time_ns`, between those around it; `None` before the oldest and after the newest.
@@ -105,23 +143,27 @@ impl Readings {
         if before.time_ns == time_ns {
             return Some(before);
         }
-        (number + 1 < self.count).then(|| before.toward(&self.numbered(number + 1), time_ns))
+        (number + 1 < self.head.count).then(|| before.toward(&self.numbered(number + 1), time_ns))
     }
 
     /// The number of the last reading up to `time_ns`.
     fn last_until(&self, time_ns: u64) -> Option<u64> {
-        let back = self.newest_ns.saturating_sub(time_ns).div_ceil(self.period_ns);
-        let number = self.count.checked_sub(1 + back)?;
+        let back = self.head.newest_ns.saturating_sub(time_ns).div_ceil(self.period_ns);
+        let number = self.head.count.checked_sub(1 + back)?;
         (number >= self.oldest()).then_some(number)
     }
 
     fn oldest(&self) -> u64 {
-        self.count.saturating_sub(READINGS as u64)
+        self.head.count.saturating_sub(self.ring.len() as u64)
+    }
+
+    fn place(&self, number: u64) -> usize {
+        number as usize % self.ring.len()
     }
 
     fn numbered(&self, number: u64) -> Reading {
-        let [a, b, c, u, v, w] = self.ring[number as usize % READINGS].map(f64::from);
-        let time_ns = self.newest_ns - (self.count - 1 - number) * self.period_ns;
+        let [a, b, c, u, v, w] = self.ring[self.place(number)].map(f64::from);
+        let time_ns = self.head.newest_ns - (self.head.count - 1 - number) * self.period_ns;
         Reading { time_ns, specific_force: [a, b, c].into(), angular_velocity: [u, v, w].into() }
     }
 }
