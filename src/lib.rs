@@ -37,6 +37,28 @@
 //! A run is followed with [`Launcher::followed_by`], steered from another thread with [`Launcher::remote`], and ended
 //! early with a [`StopToken`]. [`check()`] and [`check_text`] check a manifest and all that it names without flying it.
 //!
+//! A simulation is a value: what it saves at a tick, another one of the same manifest goes on from, as often as you like.
+//! [`Checkpoint`] is the same in a file, for runs under any host:
+//!
+//! ```
+//! use bus::messages::PlantState;
+//! # use hummingbus::bus;
+//! # let hover = concat!(env!("CARGO_MANIFEST_DIR"), "/manifests/hover.toml");
+//! let manifest = hummingbus::load(hover)?;
+//! let (mut whole, mut later) = (hummingbus::simulate(&manifest)?, hummingbus::simulate(&manifest)?);
+//! for _ in 0..50 {
+//!     whole.step()?;
+//! }
+//! later.restore(&whole.save())?;
+//! for _ in 0..50 {
+//!     whole.step()?;
+//!     later.step()?;
+//! }
+//! let state = whole.topic::<PlantState>("/plant/state")?;
+//! assert_eq!(whole.newest(state).unwrap().position, later.newest(state).unwrap().position);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! | crate | what it holds |
 //! |---|---|
 //! | [`bus`] | components, messages, the lockstep |
@@ -62,6 +84,7 @@ pub use bus::Simulation;
 pub use check::{check, check_text, drives, meshes};
 pub use components::COMPONENTS;
 pub use diagnostics::Diagnostic;
+pub use runtime::checkpoint::Checkpoint;
 pub use runtime::ctl::Remote;
 pub use runtime::ctl::protocol::{Answer, Request};
 pub use runtime::event::{Progress, RunEvent, StopToken};

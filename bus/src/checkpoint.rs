@@ -7,9 +7,10 @@
 use crate::component::Transfer;
 use crate::error::BusError;
 use crate::hand_over::Computation;
-use crate::plan::Plan;
+use crate::plan::{NodePlan, Plan};
 use crate::state_transfer::StateLayout;
 use crate::user_file;
+use inputs::sha256;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::io::Read as _;
@@ -41,6 +42,8 @@ pub struct NodePart {
     pub name: String,
     /// Generation of the process that has written it: 0 unless another process has taken the first one's place.
     pub generation: u32,
+    /// SHA-256 of that process's part of the plan.
+    plan_sum: String,
     layout: Option<StateLayout>,
     state: Vec<u8>,
     /// What is under way of a step that takes simulated time.
@@ -76,7 +79,7 @@ impl NodePart {
             computation.save(&mut state);
         }
         let (name, timing) = (name.to_owned(), timing.to_vec());
-        Self { name, generation: 0, layout, state, timing, samples }
+        Self { name, generation: 0, plan_sum: String::new(), layout, state, timing, samples }
     }
 
     /// Gives `computation`, the node's, the state of this part, and `timing` the words of its computing time.
@@ -123,7 +126,19 @@ impl NodePart {
     #[must_use]
     pub fn stateless(name: &str) -> Self {
         let (layout, state) = (None, Vec::new());
-        Self { name: name.to_owned(), generation: 0, layout, state, timing: Vec::new(), samples: Vec::new() }
+        let (name, timing, samples) = (name.to_owned(), Vec::new(), Vec::new());
+        Self { name, generation: 0, plan_sum: String::new(), layout, state, timing, samples }
+    }
+
+    /// The same part, of generation `generation` of the node, which flies by `plan`.
+    pub(crate) fn of_process(self, generation: u32, plan: &NodePlan) -> Self {
+        Self { generation, plan_sum: plan_sum(plan), ..self }
+    }
+
+    /// True if the process that has written it flew by `plan`.
+    #[must_use]
+    pub fn is_of(&self, plan: &NodePlan) -> bool {
+        self.plan_sum == plan_sum(plan)
     }
 
     /// Bytes of its state.
@@ -194,6 +209,13 @@ impl Parts {
         // It goes with the run directory otherwise.
         let _ = std::fs::remove_dir_all(run_dir.join(FOLDER).join(tick.to_string()));
     }
+}
+
+/// SHA-256 of what `plan` says of what a process computes.
+fn plan_sum(plan: &NodePlan) -> String {
+    let NodePlan { period_ticks, inputs, parameters, computing_time, .. } = plan;
+    let text = serde_json::to_string(&(period_ticks, inputs, parameters, computing_time));
+    sha256(text.unwrap_or_else(|error| unreachable!("a plan serialises: {error}")).as_bytes())
 }
 
 /// Writes the part of node `index` of the checkpoint at `tick` into `run_dir`.

@@ -100,19 +100,9 @@ impl HandOver {
         node.load(state).map_err(|error| error.to_string())
     }
 
-    /// The part of a checkpoint of generation `generation` of the node `name`, whose state `node` has and whose inputs read
-    /// `samples`.
-    pub(crate) fn part(
-        &self,
-        name: &str,
-        generation: u32,
-        samples: Vec<SavedSample>,
-        node: &dyn Computation,
-    ) -> NodePart {
-        let timing = &self.words[self.state_words..];
-        let mut part = NodePart::new(name, self.transfer, node, timing, samples);
-        part.generation = generation;
-        part
+    /// The part of a checkpoint of the node `name`, whose state `node` has and whose inputs read `samples`.
+    pub(crate) fn part(&self, name: &str, samples: Vec<SavedSample>, node: &dyn Computation) -> NodePart {
+        NodePart::new(name, self.transfer, node, &self.words[self.state_words..], samples)
     }
 
     /// Goes on from `part` of a checkpoint.

@@ -9,7 +9,6 @@ extern crate self as bus;
 
 pub mod announcement;
 mod bounded;
-#[doc(hidden)]
 pub mod checkpoint;
 #[doc(hidden)]
 pub mod claim;

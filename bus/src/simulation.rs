@@ -123,9 +123,12 @@ impl Simulation {
     /// What another simulation of the same nodes needs to go on from the next tick.
     #[must_use]
     pub fn save(&mut self) -> Parts {
-        let (tick, samples) = (self.tick, &self.samples);
-        let mut nodes: Vec<_> =
-            self.members.iter_mut().map(|member| (member.node, member.save(tick, samples))).collect();
+        let (tick, samples, plan) = (self.tick, &self.samples, &self.plan);
+        let mut nodes: Vec<_> = self
+            .members
+            .iter_mut()
+            .map(|member| (member.node, member.save(tick, samples).of_process(0, &plan.nodes[member.node])))
+            .collect();
         nodes.sort_by_key(|(node, _)| *node);
         Parts { tick, nodes: nodes.into_iter().map(|(_, part)| part).collect() }
     }

@@ -7,7 +7,7 @@
 use crate::graph::Graph;
 use crate::manifest::Manifest;
 use crate::output_file::{self, Kind, Mark};
-use crate::program::{OnExit, Program};
+use crate::program::{BackupSpec, OnExit, Program};
 use crate::registry::Registry;
 use anyhow::{Context as _, Result, anyhow, bail};
 use bus::checkpoint::{NodePart, Parts};
@@ -184,6 +184,8 @@ impl Checkpoint {
                 plan.duration_ticks
             );
         }
+        take_over(graph, tick)?;
+        let plan = &graph.plan;
         let nodes =
             plan.nodes.iter().zip(&graph.programs).map(|(node, program)| self.part(&node.name, program));
         let nodes = nodes.collect::<Result<Vec<_>>>()?;
@@ -192,16 +194,6 @@ impl Checkpoint {
             self.parts.nodes.iter().find(|part| part.state_bytes() > 0 && !is_flown(&part.name))
         {
             bail!("the checkpoint holds the state of `{}`, which is no process of the run", part.name);
-        }
-        for backup in &mut graph.backups {
-            if backup.take_over_tick.is_some() && backup.join_tick < tick {
-                bail!(
-                    "another process joins `{}` before tick {tick}, at which the run goes on",
-                    backup.plan.name
-                );
-            }
-            // A standby and a shadow have no part of their own: they go on from the state of the process before.
-            backup.join_tick = backup.join_tick.max(tick.next_multiple_of(backup.plan.period_ticks.max(1)));
         }
         graph.plan.first_tick = tick;
         graph.from = Some(Parts { tick, nodes });
@@ -219,6 +211,43 @@ impl Checkpoint {
             anyhow!("the checkpoint holds no state of `{name}`; it has {}", known.join(", "))
         })
     }
+}
+
+/// True if `backup` flies at `tick`.
+fn has_taken_over(backup: &BackupSpec, tick: u32) -> bool {
+    backup.take_over_tick.is_some_and(|at| at < tick)
+}
+
+/// Puts the processes that have taken over before `tick` into the place of those before them.
+///
+/// # Errors
+/// If one is on the way in at `tick`.
+fn take_over(graph: &mut Graph, tick: u32) -> Result<()> {
+    let (done, ahead): (Vec<_>, Vec<_>) =
+        std::mem::take(&mut graph.backups).into_iter().partition(|backup| has_taken_over(backup, tick));
+    for BackupSpec { node, plan, program, .. } in done {
+        for group in &mut graph.plan.groups {
+            let place = group.members.iter().position(|member| member.node == node);
+            match (place, program.component()) {
+                (Some(place), Some(component)) => component.name.clone_into(&mut group.members[place].kind),
+                (Some(place), None) => drop(group.members.remove(place)),
+                (None, _) => {}
+            }
+        }
+        (graph.plan.nodes[node], graph.programs[node]) = (plan, program);
+    }
+    graph.backups = ahead;
+    for backup in &mut graph.backups {
+        if backup.take_over_tick.is_some() && backup.join_tick < tick {
+            bail!(
+                "another process joins `{}` before tick {tick}, at which the run goes on",
+                backup.plan.name
+            );
+        }
+        // A standby and a shadow have no part of their own: they go on from the state of the process before.
+        backup.join_tick = backup.join_tick.max(tick.next_multiple_of(backup.plan.period_ticks.max(1)));
+    }
+    Ok(())
 }
 
 /// The files that the nodes of `graph` read: those of a recorder are the manifest's.
@@ -279,10 +308,20 @@ impl Writer<'_> {
         Ok(Some(path))
     }
 
+    /// True if the process that has written `part` is what the manifest says that node `index` is at `tick`.
+    fn is_planned(&self, index: usize, part: &NodePart, tick: u32) -> bool {
+        let Graph { plan, backups, programs, .. } = self.graph;
+        let is_swap = |backup: &&BackupSpec| backup.node == index && has_taken_over(backup, tick);
+        let swaps: Vec<&BackupSpec> = backups.iter().filter(is_swap).collect();
+        let plan = swaps.last().map_or(&plan.nodes[index], |backup| &backup.plan);
+        // A process that was restarted is what its predecessor was.
+        let is_restarted = programs[index].on_exit == OnExit::Restart;
+        part.is_of(plan) && (is_restarted || part.generation as usize == swaps.len())
+    }
+
     fn put(&self, parts: Parts, path: &Path) -> Result<()> {
-        for (part, program) in parts.nodes.iter().zip(&self.graph.programs) {
-            // A process that was restarted is what its predecessor was.
-            if part.generation > 0 && program.on_exit != OnExit::Restart {
+        for (index, part) in parts.nodes.iter().enumerate() {
+            if !self.is_planned(index, part, parts.tick) {
                 bail!(
                     "no checkpoint of tick {}: another process has taken the place of `{}`, and the manifest, by which a run \
                      goes on, does not say which",

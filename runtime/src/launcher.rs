@@ -1,6 +1,6 @@
 //! Launches runs: from a checked manifest to the outcome of its run.
 
-use crate::checkpoint::Collector;
+use crate::checkpoint::{Checkpoint, Collector};
 use crate::ctl::control::ControlServer;
 use crate::ctl::{Asked, Remote};
 use crate::descendants::{Descendants, Place};
@@ -91,6 +91,7 @@ pub struct Launcher<'a> {
     remote: Remote,
     requests: Receiver<Asked>,
     files: InputFiles,
+    from: Option<Checkpoint>,
 }
 
 impl<'a> Launcher<'a> {
@@ -106,6 +107,7 @@ impl<'a> Launcher<'a> {
             remote: Remote::new(sender),
             requests,
             files: InputFiles::default(),
+            from: None,
         }
     }
 
@@ -113,6 +115,13 @@ impl<'a> Launcher<'a> {
     #[must_use]
     pub fn reading(mut self, files: InputFiles) -> Self {
         self.files = files;
+        self
+    }
+
+    /// [`Launcher::fly`] goes on from `checkpoint`; [`Checkpoint::load_manifest`] loads the manifest for it.
+    #[must_use]
+    pub fn going_on_from(mut self, checkpoint: Checkpoint) -> Self {
+        self.from = Some(checkpoint);
         self
     }
 
@@ -151,8 +160,11 @@ impl<'a> Launcher<'a> {
     ///
     /// # Errors
     /// A problem in the manifest, or as [`Launcher::launch`].
-    pub fn fly(self, manifest: &Manifest, recording: &Path) -> Result<(Outcome, Option<Recording>)> {
+    pub fn fly(mut self, manifest: &Manifest, recording: &Path) -> Result<(Outcome, Option<Recording>)> {
         let mut graph = Graph::build_from(manifest, self.files.clone())?;
+        if let Some(from) = self.from.take() {
+            from.resume(&mut graph, true)?;
+        }
         let mut outputs = Outputs::of(manifest, &graph, recording, Vec::new())?;
         let outcome = self.launch(manifest, &mut graph, &mut outputs)?;
         Ok((outcome, outputs.finish()?))

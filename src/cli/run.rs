@@ -106,17 +106,17 @@ pub fn run(
     let mut graph = Graph::build(&manifest)?;
     print_warnings(&graph.warnings);
     graph.plan.profile |= files.is_some();
-    let going_on = from.as_ref().map(Checkpoint::tick);
-    if let (Some(from), Some(path)) = (from, &arguments.from) {
-        let about = || format!("cannot go on from {}", path.display());
-        from.resume(&mut graph, !arguments.set.is_empty()).with_context(about)?;
-    }
     if let Some((process, with)) = extra_shadow {
         let shadow = backup_of(&manifest, &graph.plan, &graph.files, process, with)?;
         if graph.backups.iter().any(|other| other.node == shadow.node) {
             bail!("`{process}` has a backup, a standby or a shadow in this manifest already; one at a time");
         }
         graph.backups.push(shadow);
+    }
+    let going_on = from.as_ref().map(Checkpoint::tick);
+    if let (Some(from), Some(path)) = (from, &arguments.from) {
+        let about = || format!("cannot go on from {}", path.display());
+        from.resume(&mut graph, !arguments.set.is_empty()).with_context(about)?;
     }
     let mut path = recording_path(&manifest, record)?;
     if extra_shadow.is_some() && arguments.record.is_none() {

@@ -153,6 +153,43 @@ fn what_is_under_way_goes_on() {
     }
 }
 
+/// Before, between and behind swaps to other laws: a run that goes on is told by the manifest who flies.
+#[test]
+fn whoever_has_taken_over_by_then_goes_on() {
+    let place = Place::new();
+    let laws = repository("manifests/swap-laws.toml");
+    let ticks = [2501, 4500, 7500, 10_001].map(|tick| format!("[[checkpoint]]\nat_tick = {tick}\n"));
+    let manifest = place.write("m.toml", format!("include = [{laws:?}]\n{}", ticks.concat()));
+    let whole = place.path("a.mcap");
+    let flown = place.call(&["run", &manifest, "--record", &whole, "--json"]).with_code(0).json();
+    let later = place.path("b.mcap");
+    for tick in [2501, 4500, 7500, 10_001] {
+        // Nobody takes over behind the last: one process can host what is left.
+        let host = if tick > 9000 { HOSTS[0] } else { HOSTS[1] };
+        let file = place.path(&format!("a.{tick}.ckpt"));
+        let more = [&["run", "--from", &file, "--json", "--record", &later][..], host].concat();
+        assert_eq!(place.call(&more).with_code(0).json()["pass"], flown["pass"], "from tick {tick}");
+        require_goes_on(&place, &whole, &later, tick);
+    }
+    place
+        .call(&["run", "--from", &place.path("a.4500.ckpt"), "--in-process"])
+        .with_code(2)
+        .says(&["in-process"]);
+}
+
+/// A standby shadows the process before from the first tick on.
+#[test]
+fn a_standby_stands_by_again() {
+    let place = Place::new();
+    let standby = repository("manifests/standby.toml");
+    let (whole, later) = (place.path("a.mcap"), place.path("b.mcap"));
+    let args =
+        ["run", &standby, "--record", &whole, "--checkpoint-every", "1s", "--set", "run.duration_s=2.5"];
+    place.call(&args).flown();
+    place.call(&["run", "--from", &place.path("a.1000.ckpt"), "--record", &later]).flown();
+    require_goes_on(&place, &whole, &later, 1000);
+}
+
 #[test]
 fn a_fork_differs_from_the_tick_on_at_which_its_value_counts() {
     let place = Place::new();
@@ -276,6 +313,10 @@ fn what_does_not_fit_is_refused_in_words() {
         place.call(&["check", &manifest]).with_code(2).says(&[part]);
     }
     let swap = repository("manifests/swap-gains.toml");
-    let args = ["run", &swap, "--record", "none", "--checkpoint-every", "11s"];
-    place.call(&args).with_code(2).says(&["another process joins `controller`"]);
+    let args = ["run", &swap, "--record", "none", "--checkpoint-every", "2900ms"];
+    place.call(&args).with_code(2).says(&[
+        "tick 2900",
+        "joins `controller` at tick 2800",
+        "takes over at tick 3000",
+    ]);
 }

@@ -9,7 +9,7 @@ use std::ops::Range;
 /// Has the nodes of `plan` write the checkpoints that `manifest` asks for.
 ///
 /// # Errors
-/// A tick that is none of the run's, that a node does not reach, or that lies behind a swap.
+/// A tick that is none of the run's, that a node does not reach, or that lies within a swap.
 pub fn add(manifest: &Manifest, plan: &mut Plan, backups: &[BackupSpec]) -> Result<(), Diagnostic> {
     let run = &manifest.content.run;
     for checkpoint in &manifest.content.checkpoint {
@@ -27,10 +27,9 @@ pub fn add(manifest: &Manifest, plan: &mut Plan, backups: &[BackupSpec]) -> Resu
             let message = format!("`checkpoint_every_s` is {} s", every.get_ref());
             manifest.problem(&every.span(), message, "choose some time of at least one tick, such as 1.0")
         })?;
-        if plan.goes_on_from(period) {
-            let last = (plan.duration_ticks - 1) / period * period;
-            require_unswapped(manifest, backups, last, &every.span())?;
-        }
+        let ticks = (1..).map_while(|number: u32| number.checked_mul(period));
+        let mut ticks = ticks.take_while(|&tick| !backups.is_empty() && plan.goes_on_from(tick));
+        ticks.try_for_each(|tick| require_flying(manifest, backups, tick, &every.span()))?;
         plan.checkpoint_period = Some(period);
     }
     Ok(())
@@ -58,22 +57,25 @@ fn require(
         let help = "it lies before a tick that every process still computes, and behind the first: a run goes on from it";
         return Err(manifest.problem(span, message, help));
     }
-    require_unswapped(manifest, backups, tick, span)
+    require_flying(manifest, backups, tick, span)
 }
 
-/// Refuses a checkpoint at `tick`, asked for at `span`, behind a swap.
-fn require_unswapped(
+/// Refuses a checkpoint at `tick`, asked for at `span`, at which a process is about to take another one's place.
+fn require_flying(
     manifest: &Manifest,
     backups: &[BackupSpec],
     tick: u32,
     span: &Range<usize>,
 ) -> Result<(), Diagnostic> {
-    let swapped = backups.iter().find(|backup| backup.take_over_tick.is_some() && backup.join_tick < tick);
-    let Some(backup) = swapped else { return Ok(()) };
+    let joins = |backup: &&BackupSpec| {
+        backup.take_over_tick.is_some_and(|take_over| backup.join_tick < tick && tick <= take_over)
+    };
+    let Some(backup) = backups.iter().find(joins) else { return Ok(()) };
     let message = format!(
-        "a checkpoint at tick {tick}, and another process joins `{}` at tick {}",
-        backup.plan.name, backup.join_tick
+        "a checkpoint at tick {tick}, and another process joins `{}` at tick {} and takes over at tick {}",
+        backup.plan.name,
+        backup.join_tick,
+        backup.take_over_tick.unwrap_or_default()
     );
-    let help = "a checkpoint lies before the first swap: the manifest says which process a node is from its first tick on";
-    Err(manifest.problem(span, message, help))
+    Err(manifest.problem(span, message, "a checkpoint lies before the one or behind the other"))
 }

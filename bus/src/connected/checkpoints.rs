@@ -1,0 +1,61 @@
+//! The parts of checkpoints that a connected node writes, and the one that it goes on from.
+
+use super::ConnectedNode;
+use crate::checkpoint::{NodePart, store_part};
+use crate::error::BusError;
+use crate::hand_over::Computation;
+use crate::port::Locals;
+
+impl ConnectedNode {
+    /// Goes on from the checkpoint from which the run does, if it does and this is the node's first process.
+    ///
+    /// # Errors
+    /// If the checkpoint does not fit the node.
+    pub(crate) fn go_on(&mut self, computation: &mut dyn Computation) -> Result<(), BusError> {
+        let links = &self.links;
+        if links.plan.first_tick == 0 || links.generation > 0 {
+            return Ok(());
+        }
+        let part = NodePart::of_run(&links.run_dir, links.index)?;
+        self.state.restore(&part, computation)
+    }
+
+    /// Writes this node's parts of the checkpoints that fall between its last due tick and `tick`, whose inputs it has
+    /// taken, unless another process is the node.
+    pub(super) fn write_checkpoints(
+        &mut self,
+        tick: u32,
+        locals: &Locals,
+        computation: &dyn Computation,
+    ) -> Result<(), BusError> {
+        while self.next_checkpoint <= tick {
+            let of = self.next_checkpoint;
+            self.next_checkpoint = self.links.plan.checkpoint_after(of).unwrap_or(u32::MAX);
+            self.write_checkpoint(of, tick, locals, computation)?;
+        }
+        let asked = self.links.lockstep.checkpoint_tick();
+        if asked > self.asked_checkpoint && asked <= tick {
+            self.asked_checkpoint = asked;
+            self.write_checkpoint(asked, tick, locals, computation)?;
+        }
+        Ok(())
+    }
+
+    /// Writes this node's part of the checkpoint at tick `of` if `tick` is the first due tick from there on.
+    fn write_checkpoint(
+        &self,
+        of: u32,
+        tick: u32,
+        locals: &Locals,
+        computation: &dyn Computation,
+    ) -> Result<(), BusError> {
+        let links = &self.links;
+        if of + links.node.period_ticks <= tick || tick < self.take_over_tick {
+            return Ok(());
+        }
+        let samples = self.stepper.samples_before(of, locals);
+        let part = self.state.part(&links.node.name, samples, computation);
+        let part = part.of_process(links.generation, &links.node);
+        store_part(&links.run_dir, of, links.index, &part)
+    }
+}
