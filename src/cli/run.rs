@@ -4,6 +4,7 @@ use super::interrupts::stop_token;
 use super::output::{message, print_json, print_text, print_warnings};
 use super::profile::Files;
 use super::progress::{self, RUN};
+use super::shell::command;
 use anyhow::{Context, Error, Result, anyhow, bail};
 use clap::Args;
 use diagnostics::Diagnostic;
@@ -179,21 +180,6 @@ pub fn run(
     Ok(summary.passed)
 }
 
-/// A command line of this program that a shell understands: the program as it was called, a subcommand, and a file.
-fn command(subcommand: &str, path: &Path) -> String {
-    let program = std::env::args_os().next().map_or_else(|| PathBuf::from("hummingbus"), PathBuf::from);
-    let folder = std::env::current_dir().unwrap_or_default();
-    let path = path.strip_prefix(folder).unwrap_or(path);
-    format!("{} {subcommand} {}", quoted(&program), quoted(path))
-}
-
-/// A path as one word of a shell.
-fn quoted(path: &Path) -> String {
-    let text = path.to_string_lossy();
-    let is_plain = |c: char| c.is_alphanumeric() || "/._-+=:,@".contains(c);
-    if text.chars().all(is_plain) { text.into_owned() } else { format!("'{}'", text.replace('\'', "'\\''")) }
-}
-
 /// What there is to say about a run that was refused or broke, with what is `left` of its recording; printed as JSON too
 /// where that is asked for.
 fn broken(manifest: &Manifest, error: &Error, left: Option<&Path>, is_json: bool) -> Result<Error> {
@@ -278,8 +264,7 @@ fn recording_path(manifest: &Manifest, argument: Option<&Path>) -> Result<PathBu
 
 #[cfg(test)]
 mod tests {
-    use super::{quoted, seconds};
-    use std::path::Path;
+    use super::seconds;
 
     #[test]
     fn a_time_has_a_unit_or_is_in_seconds() {
@@ -287,11 +272,5 @@ mod tests {
         for text in ["0s", "-1", "ms", "1m", "inf", ""] {
             assert!(seconds(text).is_err(), "{text}");
         }
-    }
-
-    #[test]
-    fn a_path_is_one_word_of_a_shell() {
-        assert_eq!(quoted(Path::new("manifests/hover.mcap")), "manifests/hover.mcap");
-        assert_eq!(quoted(Path::new("my flights/a'b.mcap")), "'my flights/a'\\''b.mcap'");
     }
 }
