@@ -6,6 +6,7 @@ use anyhow::Result;
 use bus::plan::Plan;
 use diagnostics::Diagnostic;
 use recorder::reader::Recording;
+use runtime::checkpoint::Written;
 use runtime::launcher::Outcome;
 use runtime::manifest::{Content, PassCondition};
 use serde::Serialize;
@@ -46,7 +47,7 @@ pub struct Summary {
     /// The recording.
     pub recording: Option<PathBuf>,
     /// Checkpoints that were written and kept.
-    pub checkpoints: Vec<PathBuf>,
+    pub checkpoints: Vec<Written>,
     /// True where the conditions are not judged: the run went on from a checkpoint that holds nothing of what was flown before.
     pub is_unjudged: bool,
     /// Pass conditions.
@@ -206,6 +207,16 @@ impl Summary {
         Ok(())
     }
 
+    /// The checkpoint to go back to: the newest before a condition failed first, or the newest. `tick_s` is the time of a tick.
+    #[must_use]
+    pub fn checkpoint_to_go_back_to(&self, tick_s: f64) -> Option<&Written> {
+        let failed = self.pass.iter().filter(|verdict| !verdict.passed);
+        let failed_s = failed.filter_map(|verdict| verdict.failed_at_s).min_by(f64::total_cmp);
+        let is_before =
+            |written: &&Written| failed_s.is_none_or(|failed_s| f64::from(written.tick) * tick_s <= failed_s);
+        self.checkpoints.iter().rev().find(is_before)
+    }
+
     /// The replacements as text; those that were refused are never left out.
     fn write_replacements(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let all = self.replacements.iter().enumerate();
@@ -251,7 +262,7 @@ impl fmt::Display for Summary {
             writeln!(f, "  recording: {}", recording.display())?;
         }
         if let Some(last) = self.checkpoints.last() {
-            writeln!(f, "  checkpoints: {}, the last {}", self.checkpoints.len(), last.display())?;
+            writeln!(f, "  checkpoints: {}, the last {}", self.checkpoints.len(), last.path.display())?;
         }
         let refused = self.replacements.iter().filter(|replacement| replacement.has_failed()).count();
         match (self.passed, refused) {

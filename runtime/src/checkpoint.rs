@@ -285,6 +285,21 @@ fn is_of_recording(text: &str) -> bool {
     text.split('=').next().is_some_and(|key| key.trim() == "run.record")
 }
 
+/// A checkpoint that a run has written.
+///
+/// ```
+/// let written = runtime::checkpoint::Written { tick: 6500, path: "a.6500.ckpt".into() };
+/// assert_eq!(serde_json::to_value(written)?["tick"], 6500);
+/// # Ok::<(), serde_json::Error>(())
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Written {
+    /// The first tick that a run computes which goes on from it.
+    pub tick: u32,
+    /// The file.
+    pub path: PathBuf,
+}
+
 /// Writes the checkpoints of a run.
 #[derive(Clone, Copy)]
 pub(crate) struct Writer<'a> {
@@ -340,7 +355,7 @@ pub(crate) struct Collector<'a> {
     /// The checkpoint that comes next.
     next: Option<u32>,
     /// Files that were written and are still there, the oldest first.
-    pub(crate) written: Vec<PathBuf>,
+    pub(crate) written: Vec<Written>,
     /// Why one could not be written.
     failed: Option<anyhow::Error>,
 }
@@ -378,7 +393,7 @@ impl<'a> Collector<'a> {
     /// Notes that the checkpoint of `tick` is written to `path`, and removes the oldest where fewer are kept.
     fn note(&mut self, tick: u32, path: PathBuf) {
         self.next = self.writer.graph.plan.checkpoint_after(tick);
-        self.written.push(path);
+        self.written.push(Written { tick, path });
         let keep = self
             .writer
             .manifest
@@ -389,7 +404,7 @@ impl<'a> Collector<'a> {
             .map_or(usize::MAX, |keep| *keep.get_ref());
         if self.written.len() > keep {
             // Who has removed or replaced it meanwhile has done so on purpose.
-            let _ = std::fs::remove_file(self.written.remove(0));
+            let _ = std::fs::remove_file(self.written.remove(0).path);
         }
     }
 
@@ -397,7 +412,7 @@ impl<'a> Collector<'a> {
     ///
     /// # Errors
     /// If one could not be written.
-    pub(crate) fn finish(mut self) -> Result<Vec<PathBuf>> {
+    pub(crate) fn finish(mut self) -> Result<Vec<Written>> {
         self.collect();
         match self.failed.take() {
             Some(error) => {

@@ -1,6 +1,6 @@
 //! Launches runs: from a checked manifest to the outcome of its run.
 
-use crate::checkpoint::{Checkpoint, Collector};
+use crate::checkpoint::{Checkpoint, Collector, Written};
 use crate::ctl::control::ControlServer;
 use crate::ctl::{Asked, Remote};
 use crate::descendants::{Descendants, Place};
@@ -223,6 +223,9 @@ impl<'a> Launcher<'a> {
         let flown = self.fly_in(run_dir, place, manifest, graph, &mut checkpoints, on);
         // Those of a run that broke are what somebody goes back to.
         let written = checkpoints.finish();
+        if let (Err(_), Some(Written { tick, path })) = (&flown, written.iter().flatten().last()) {
+            on(RunEvent::Note(&format!("the last checkpoint is {}, of tick {tick}", path.display())));
+        }
         let mut outcome = flown?;
         outcome.checkpoints = written?;
         Ok(outcome)

@@ -1,8 +1,8 @@
 //! The outcome of a run.
 
+use crate::checkpoint::Written;
 use crate::flight::Flight;
 use crate::replacement::Report;
-use std::path::PathBuf;
 
 /// The outcome of a run, as [`Launcher::fly`](crate::launcher::Launcher::fly) returns it.
 #[derive(Debug)]
@@ -29,5 +29,5 @@ pub struct Outcome {
     /// Figures of the conditions, as the judge of a run without a recording wrote them; `None` for a run that was stopped.
     pub figures: Option<Vec<u8>>,
     /// Files of the checkpoints that were written and kept, in their order.
-    pub checkpoints: Vec<PathBuf>,
+    pub checkpoints: Vec<Written>,
 }

@@ -11,7 +11,7 @@ use diagnostics::Diagnostic;
 use hummingbus::COMPONENTS;
 use report::profile::Profile;
 use report::summary::Summary;
-use runtime::checkpoint::Checkpoint;
+use runtime::checkpoint::{Checkpoint, Written};
 use runtime::graph::{self, Graph, backup_of};
 use runtime::host::Host;
 use runtime::launcher::Launcher;
@@ -169,8 +169,8 @@ pub fn run(
     if let Some(path) = &summary.recording {
         text += &format!("\nto plot it: {}\nto see it fly: {}", command("plot", path), command("view", path));
     }
-    if let Some(last) = summary.checkpoints.last() {
-        text += &format!("\nto go on from it: {}", command("run --from", last));
+    if let Some(Written { tick, path }) = summary.checkpoint_to_go_back_to(graph.plan.tick_s()) {
+        text += &format!("\nto go on from tick {tick}: {}", command("run --from", path));
     }
     if arguments.json {
         print_json(&as_json(&summary, profile.as_ref(), &files)?)?;

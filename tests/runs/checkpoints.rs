@@ -114,7 +114,7 @@ fn verdicts_are_those_of_the_whole_flight_and_the_manifest_names_the_tick() {
     let whole = place.path("a.mcap");
     let ended = place.call(&["run", &manifest, "--record", &whole, "--json"]).with_code(0).json();
     let file = place.path("a.6500.ckpt");
-    assert_eq!(ended["checkpoints"], serde_json::json!([file]));
+    assert_eq!(ended["checkpoints"], serde_json::json!([{ "tick": 6500, "path": file }]));
     for (host, record) in [(HOSTS[0], "none"), (HOSTS[1], "b.mcap"), (HOSTS[2], "c.mcap")] {
         let record = if record == "none" { record.to_owned() } else { place.path(record) };
         let more = [&["run", "--from", &file, "--json", "--record", &record][..], host].concat();
@@ -230,7 +230,7 @@ fn a_run_that_breaks_leaves_the_checkpoints_before() {
         (found.len() >= 3).then_some(found)
     });
     rustix::process::kill_process(place.process_of("imu"), Signal::KILL).unwrap();
-    launch.end().with_code(2).says(&["imu"]);
+    launch.end().with_code(2).says(&["imu", "the last checkpoint is"]);
     let left = checkpoints(&place, "a");
     assert!(left.len() <= 3 && left.last().unwrap().0 >= kept[2].0, "{left:?}");
     let (tick, file) = left.last().unwrap();
@@ -239,6 +239,18 @@ fn a_run_that_breaks_leaves_the_checkpoints_before() {
     let args = ["run", "--from", file, "--record", &later, "--pace", "free", "--set", &end];
     place.call(&args).flown();
     assert!(fs::metadata(&later).unwrap().len() > 4000);
+}
+
+/// The summary says from where to look at what went wrong.
+#[test]
+fn a_failed_condition_leads_to_the_checkpoint_before() {
+    let place = Place::new();
+    let hover = repository("manifests/hover.toml");
+    let rises = "[[pass]]\nname = \"stays down\"\ntopic = \"/plant/state\"\nfield = \"position.z\"\nunit = \"m\"\nmax = 1.25\n";
+    let manifest = place.write("m.toml", format!("include = [{hover:?}]\n{rises}"));
+    let args = ["run", &manifest, "--record", &place.path("a.mcap"), "--checkpoint-every", "1s"];
+    // The climb from 1.0 m to 1.5 m begins at 2 s.
+    place.call(&args).with_code(1).prints(&["FAILED stays down", "to go on from tick 2000:", "a.2000.ckpt"]);
 }
 
 #[test]
