@@ -246,7 +246,7 @@ fn a_run_that_breaks_leaves_the_checkpoints_before() {
 fn a_failed_condition_leads_to_the_checkpoint_before() {
     let place = Place::new();
     let hover = repository("manifests/hover.toml");
-    let rises = "[[pass]]\nname = \"stays down\"\ntopic = \"/plant/state\"\nfield = \"position.z\"\nunit = \"m\"\nmax = 1.25\n";
+    let rises = "[[pass]]\nname = \"stays down\"\ntopic = \"/plant/state\"\nfield = \"position.z\"\nunit = \"m\"\nstatistic = \"max\"\nmax = 1.25\n";
     let manifest = place.write("m.toml", format!("include = [{hover:?}]\n{rises}"));
     let args = ["run", &manifest, "--record", &place.path("a.mcap"), "--checkpoint-every", "1s"];
     // The climb from 1.0 m to 1.5 m begins at 2 s.
