@@ -17,9 +17,11 @@ mod output;
 mod plot;
 mod profile;
 mod progress;
+mod project;
 mod run;
 mod schema;
 mod shadow;
+mod shell;
 mod steer;
 mod table;
 mod top;
@@ -80,7 +82,7 @@ commands! {
     /// Write a vehicle's body as URDF, which Foxglove, Rerun and RViz show: what is seen, mass and inertia, what touches.
     #[command(after_help = urdf::HELP)]
     Urdf(urdf::UrdfArguments) => urdf::urdf;
-    /// Make a first vehicle file from a model in URDF or SDF.
+    /// Make a project folder that flies, or a first vehicle file from a model in URDF or SDF.
     #[command(after_help = new::HELP)]
     New(new::NewArguments) => new::new;
     /// Print every message's fields, units, frames and layout hash.

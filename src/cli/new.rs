@@ -1,7 +1,8 @@
 //! The command `new`.
 
-use super::included_models;
 use super::output::{print_text, say};
+use super::shell::{command, quoted};
+use super::{included_models, project};
 use anyhow::{Result, bail};
 use clap::{Args, Subcommand};
 use hummingbus::inputs::InputFiles;
@@ -10,23 +11,33 @@ use runtime::output_file::{self, Kind, Mark};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-/// Example that `--help` shows.
-pub const HELP: &str = "Example: hummingbus new vehicle --from quad.urdf -o quad.toml";
+/// Examples that `--help` shows.
+pub const HELP: &str =
+    "Examples: hummingbus new drone\n          hummingbus new vehicle --from quad.urdf -o quad.toml";
+/// Example that the help of `new vehicle` shows.
+const VEHICLE_HELP: &str = "Example: hummingbus new vehicle --from quad.urdf -o quad.toml";
 
 const VEHICLE: Kind = Kind { name: "vehicle file", mark: Mark::Start(from_model::MARK.as_bytes()) };
 
 /// Arguments of `new`.
 #[derive(Args)]
+#[command(args_conflicts_with_subcommands = true)]
 pub struct NewArguments {
+    /// Folder of a new project: vehicle, manifest, gains, campaign, and a controller in Rust.
+    #[arg(required = true, value_name = "NAME")]
+    folder: Option<PathBuf>,
+    /// Checkout of hummingbus that the project's controller builds against.
+    #[arg(long, value_name = "FOLDER")]
+    sources: Option<PathBuf>,
     #[command(subcommand)]
-    what: What,
+    file: Option<NewFile>,
 }
 
 #[derive(Subcommand)]
-enum What {
+enum NewFile {
     /// Make a first vehicle file from a model in URDF or SDF; numbers that the model does not have are the Hummingbird's,
     /// and are listed.
-    #[command(after_help = HELP)]
+    #[command(after_help = VEHICLE_HELP)]
     Vehicle(VehicleArguments),
 }
 
@@ -40,12 +51,31 @@ struct VehicleArguments {
     out: PathBuf,
 }
 
-/// Makes a file.
+/// Makes a project folder, or a vehicle file.
 ///
 /// # Errors
-/// If the model cannot be read, is not physical or does not have 1 to 12 rotors, or the file exists or cannot be written.
+/// If the folder or the file exists or cannot be written. For a project, if its name is not suitable. For a vehicle file, if the
+/// model cannot be read, is not physical or does not have 1 to 12 rotors.
 pub fn new(arguments: &NewArguments) -> Result<bool> {
-    let What::Vehicle(VehicleArguments { from, out }) = &arguments.what;
+    match (&arguments.file, &arguments.folder) {
+        (Some(NewFile::Vehicle(arguments)), _) => vehicle(arguments),
+        (None, Some(folder)) => new_project(folder, arguments.sources.as_deref()),
+        (None, None) => bail!("name the folder of the new project: hummingbus new drone"),
+    }
+}
+
+fn new_project(folder: &Path, sources: Option<&Path>) -> Result<bool> {
+    project::make(folder, sources)?;
+    let shown = quoted(folder);
+    print_text(&format!(
+        "{shown}: a project with a vehicle, a manifest, gains, a campaign and a controller in Rust\n\
+         to fly it: {}\nnext steps: {shown}/README.md",
+        command("run", &folder.join("hover.toml"))
+    ))?;
+    Ok(true)
+}
+
+fn vehicle(VehicleArguments { from, out }: &VehicleArguments) -> Result<bool> {
     require_free(out)?;
     let file = from.display().to_string();
     let text = InputFiles::default()

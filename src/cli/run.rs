@@ -4,6 +4,7 @@ use super::interrupts::stop_token;
 use super::output::{message, print_json, print_text, print_warnings};
 use super::profile::Files;
 use super::progress::{self, RUN};
+use super::shell::command;
 use anyhow::{Context, Error, Result, anyhow, bail};
 use clap::Args;
 use diagnostics::Diagnostic;
@@ -44,6 +45,9 @@ pub struct RunArguments {
     /// Print the summary as JSON, and no progress.
     #[arg(long)]
     pub json: bool,
+    /// Print no progress, and a summary only if the run did not pass.
+    #[arg(short, long, conflicts_with = "json")]
+    pub quiet: bool,
 }
 
 /// What `profile` takes.
@@ -110,7 +114,7 @@ pub fn run(
     let files = files.unwrap_or_else(|| Files::beside(&path));
     let pages = if graph.plan.profile { files.outputs() } else { Vec::new() };
     let mut outputs = Outputs::of(&manifest, &graph, &path, pages)?;
-    let bar = progress::bar(RUN, arguments.json);
+    let bar = progress::bar(RUN, arguments.json || arguments.quiet);
     let host = if arguments.in_process { Host::InProcess } else { Host::this_binary() };
     let launcher = Launcher::new(host)
         .stopped_by(&stop)
@@ -141,25 +145,10 @@ pub fn run(
     }
     if arguments.json {
         print_json(&as_json(&summary, profile.as_ref(), &files)?)?;
-    } else {
+    } else if !(arguments.quiet && summary.passed) {
         print_text(&text)?;
     }
     Ok(summary.passed)
-}
-
-/// A command line of this program that a shell understands: the program as it was called, a subcommand, and a file.
-fn command(subcommand: &str, path: &Path) -> String {
-    let program = std::env::args_os().next().map_or_else(|| PathBuf::from("hummingbus"), PathBuf::from);
-    let folder = std::env::current_dir().unwrap_or_default();
-    let path = path.strip_prefix(folder).unwrap_or(path);
-    format!("{} {subcommand} {}", quoted(&program), quoted(path))
-}
-
-/// A path as one word of a shell.
-fn quoted(path: &Path) -> String {
-    let text = path.to_string_lossy();
-    let is_plain = |c: char| c.is_alphanumeric() || "/._-+=:,@".contains(c);
-    if text.chars().all(is_plain) { text.into_owned() } else { format!("'{}'", text.replace('\'', "'\\''")) }
 }
 
 /// What there is to say about a run that was refused or broke, with what is `left` of its recording; printed as JSON too
@@ -213,16 +202,4 @@ fn recording_path(manifest: &Manifest, argument: Option<&Path>) -> Result<PathBu
         (None, None) => manifest.path.with_extension("mcap"),
     };
     std::path::absolute(&path).with_context(|| format!("{} is not a path", path.display()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::quoted;
-    use std::path::Path;
-
-    #[test]
-    fn a_path_is_one_word_of_a_shell() {
-        assert_eq!(quoted(Path::new("manifests/hover.mcap")), "manifests/hover.mcap");
-        assert_eq!(quoted(Path::new("my flights/a'b.mcap")), "'my flights/a'\\''b.mcap'");
-    }
 }

@@ -96,3 +96,99 @@ fn a_file_that_exists_stays_and_what_is_wrong_leaves_no_file() {
     // A model in the place of a vehicle file: the message has the way.
     place.call(&["urdf", &model]).with_code(2).says(&["URDF", "hummingbus new vehicle --from"]);
 }
+
+/// A new project in `place`, as its folder.
+fn project(place: &Place) -> String {
+    let folder = place.path("my-quad");
+    let made = place.call(&["new", &folder, "--sources", &repository("")]).with_code(0);
+    assert!(made.output.contains("hover.toml") && made.output.contains("README.md"), "{}", made.output);
+    folder
+}
+
+#[test]
+fn a_new_project_flies_as_it_is() {
+    let place = Place::new();
+    let folder = project(&place);
+    let recording = place.path("hover.mcap");
+    let args = ["run", &format!("{folder}/hover.toml"), "--record", &recording];
+    let flown = place.call(&args).with_code(0);
+    assert!(!flown.error.contains("warning"), "{}", flown.error);
+    flown.prints(&["ok     height within 5 %", "ok     roll reaches", "passed"]);
+}
+
+/// The controller's template is built with the tests, as an example of this package.
+#[test]
+fn the_controller_of_a_new_project_flies_as_a_program() {
+    let place = Place::new();
+    let folder = project(&place);
+    let program = Path::new(HUMMINGBUS).with_file_name("examples/project_controller");
+    assert!(program.exists(), "{} is not built: cargo build --examples", program.display());
+    let command = format!("process.controller.command=[{:?}]", program.display().to_string());
+    let manifest = format!("{folder}/hover-rust.toml");
+    let recording = place.path("hover.mcap");
+    place
+        .call(&["run", &manifest, "--record", &recording, "--set", &command])
+        .with_code(0)
+        .prints(&["passed"]);
+}
+
+#[test]
+fn the_campaign_of_a_new_project_passes() {
+    let place = Place::new();
+    let folder = project(&place);
+    let text = fs::read_to_string(format!("{folder}/campaign.toml")).unwrap();
+    let few = format!("{folder}/few.toml");
+    fs::write(&few, text.replace("flights = 50", "flights = 4")).unwrap();
+    let args = ["campaign", &few, "--out", &place.path("out"), "--require", "pass_rate >= 1"];
+    place.call(&args).with_code(0);
+}
+
+#[test]
+fn the_package_of_a_new_project_stands_on_the_stated_sources() {
+    let place = Place::new();
+    let folder = project(&place);
+    let text = fs::read_to_string(format!("{folder}/controller/Cargo.toml")).unwrap();
+    let package: toml::Table = text.parse().unwrap();
+    assert_eq!(package["package"]["name"].as_str(), Some("my-quad-controller"));
+    let of = |table: &str, name: &str| -> toml::Table {
+        let path = package[table][name]["path"].as_str().unwrap();
+        fs::read_to_string(format!("{path}/Cargo.toml")).unwrap().parse().unwrap()
+    };
+    assert_eq!(of("dependencies", "bus")["package"]["name"].as_str(), Some("hummingbus-bus"));
+    assert_eq!(of("dev-dependencies", "hummingbus")["package"]["name"].as_str(), Some("hummingbus"));
+    let test = fs::read_to_string(format!("{folder}/controller/src/hover_test.rs")).unwrap();
+    assert!(test.contains("\"/../hover-rust.toml\""), "{test}");
+}
+
+#[test]
+fn files_that_a_new_project_names_exist() {
+    let place = Place::new();
+    let folder = project(&place);
+    let readme = fs::read_to_string(format!("{folder}/README.md")).unwrap();
+    assert!(readme.starts_with("# my-quad\n"), "{readme}");
+    let rows: Vec<_> =
+        readme.lines().filter_map(|line| line.strip_prefix("| `")?.split('`').next()).collect();
+    assert!(rows.len() > 5, "{rows:?}");
+    rows.iter().for_each(|row| assert!(Path::new(&format!("{folder}/{row}")).exists(), "{row}"));
+}
+
+#[test]
+fn a_project_is_refused_whole() {
+    let place = Place::new();
+    let count = || fs::read_dir(place.path("")).unwrap().count();
+    let before = count();
+    for name in ["2fast", "no spaces", "ünicode", "-x/..", &"long".repeat(20)] {
+        place.call(&["new", "--", &place.path(name)]).with_code(2).says(&["not a project name", "letter"]);
+    }
+    place.call(&["new", &place.path("absent/quad")]).with_code(2).says(&["cannot make a folder", "absent"]);
+    place
+        .call(&["new", &place.path("quad"), "--sources", &place.path("")])
+        .with_code(2)
+        .says(&["not a checkout"]);
+    place.call(&["new"]).with_code(2).says(&["NAME"]);
+    assert_eq!(count(), before);
+    let taken = place.write("taken", "a letter");
+    place.call(&["new", &taken]).with_code(2).says(&["already exists"]);
+    assert_eq!(fs::read_to_string(taken).unwrap(), "a letter");
+    assert_eq!(count(), before + 1);
+}
