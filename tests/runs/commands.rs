@@ -290,6 +290,24 @@ fn every_subcommand_shows_an_example() {
 }
 
 #[test]
+fn shells_and_the_manual_know_the_commands() {
+    let place = Place::new();
+    for shell in ["bash", "zsh", "fish"] {
+        let printed = place.call(&["completions", shell]).with_code(0).output;
+        assert!(printed.contains("campaign"), "{shell}");
+        assert!(printed.contains("in-process"), "{shell} does not know the options of run");
+    }
+    place.call(&["completions", "cmd"]).with_code(2).says(&["bash", "zsh", "fish"]);
+    let folder = place.path("man1");
+    place.call(&["man", &folder]).with_code(0);
+    let page = fs::read_to_string(format!("{folder}/hummingbus-run.1")).unwrap();
+    assert!(page.starts_with(".ie") || page.starts_with(".TH"), "{page}");
+    assert!(page.contains("in\\-process"), "{page}");
+    let version = place.call(&["--version"]).with_code(0).output;
+    assert!(version.starts_with(concat!("hummingbus ", env!("CARGO_PKG_VERSION"))), "{version}");
+}
+
+#[test]
 fn a_node_without_a_launcher_says_how_to_start_it() {
     let place = Place::new();
     let ended = place.call(&["node", "plant"]).with_code(2);
