@@ -2,11 +2,14 @@
 
 use super::files::open_recording;
 use super::output::{gone_or_failed, write_json_line};
-use anyhow::Result;
+use anyhow::{Context, Result, bail};
 use clap::Args;
+use recorder::definition::{Leaf, Value};
+use recorder::reader::{Record, Recording};
+use std::io::Write as _;
 use std::path::PathBuf;
 
-/// What `cat` takes.
+/// Arguments of `cat`.
 #[derive(Args)]
 pub struct CatArguments {
     /// The recording.
@@ -14,26 +17,44 @@ pub struct CatArguments {
     /// Only this topic.
     #[arg(long)]
     topic: Option<String>,
+    /// Only this field, such as position.z, or all fields below it, such as position; repeatable.
+    #[arg(long, value_name = "FIELD", requires = "topic")]
+    field: Vec<String>,
+    /// Start of the span, in seconds of simulated time.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value_t = 0.0, hide_default_value = true)]
+    from: f64,
+    /// End of the span, which belongs to it.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value_t = f64::INFINITY, hide_default_value = true)]
+    to: f64,
+    /// Print CSV with a column for each field.
+    #[arg(long, requires = "topic")]
+    csv: bool,
 }
 
-/// Prints the messages of a recording: topic, tick, time and fields in the order of the definition; false if it
-/// was cut off.
+/// Prints the messages of a recording: topic, tick, time and fields in the order of the definition, without padding; false if
+/// the recording was cut off.
 ///
 /// # Errors
-/// If the recording cannot be read, or has no such topic.
+/// If the recording cannot be read, or has no such topic or field.
 pub fn cat(arguments: &CatArguments) -> Result<bool> {
-    use std::io::Write as _;
-    let (recording, topic) = (open_recording(&arguments.recording)?, arguments.topic.as_deref());
-    if let Some(topic) = topic {
+    let recording = open_recording(&arguments.recording)?;
+    if let Some(topic) = &arguments.topic {
         recording.topic(topic)?;
     }
+    if arguments.csv { csv(&recording, arguments) } else { json_lines(&recording, arguments) }
+}
+
+/// Seconds of simulated time from 0 on.
+fn seconds(text: &str) -> Result<f64, String> {
+    let number: f64 = text.parse().map_err(|_| "expected seconds, such as 2.5".to_owned())?;
+    if number >= 0.0 { Ok(number) } else { Err("expected seconds from 0 on".to_owned()) }
+}
+
+fn json_lines(recording: &Recording, arguments: &CatArguments) -> Result<bool> {
     let mut out = std::io::BufWriter::new(std::io::stdout().lock());
-    for record in recording.messages() {
+    for record in arguments.records(recording) {
         let record = record?;
-        if topic.is_some_and(|topic| topic != record.topic) {
-            continue;
-        }
-        let leaves = recording.decode(&record)?;
+        let leaves = arguments.leaves(recording, &record)?;
         let fields: serde_json::Map<_, _> =
             leaves.into_iter().map(|leaf| (leaf.path, json_value(&leaf.value))).collect();
         let line = serde_json::json!({
@@ -46,9 +67,93 @@ pub fn cat(arguments: &CatArguments) -> Result<bool> {
     out.flush().map_or_else(gone_or_failed, |()| Ok(recording.cut().is_none()))
 }
 
+fn csv(recording: &Recording, arguments: &CatArguments) -> Result<bool> {
+    let mut out = std::io::BufWriter::new(std::io::stdout().lock());
+    let mut header: Option<Vec<String>> = None;
+    for record in arguments.records(recording) {
+        let record = record?;
+        let leaves = arguments.leaves(recording, &record)?;
+        let (paths, values): (Vec<_>, Vec<_>) =
+            leaves.into_iter().map(|leaf| (leaf.path, leaf.value.to_string())).unzip();
+        let mut lines = String::new();
+        if let Some(columns) = &header {
+            if *columns != paths {
+                let tick = record.tick;
+                bail!(
+                    "the message at tick {tick} has other fields than the first one: name single ones with --field"
+                );
+            }
+        } else {
+            lines += &row(["tick", "time_ns"].map(str::to_owned).into_iter().chain(paths.clone()));
+            header = Some(paths);
+        }
+        let stamps = [record.tick.to_string(), record.time_ns.to_string()];
+        lines += &row(stamps.into_iter().chain(values));
+        if let Err(error) = out.write_all(lines.as_bytes()) {
+            return gone_or_failed(error);
+        }
+    }
+    out.flush().map_or_else(gone_or_failed, |()| Ok(recording.cut().is_none()))
+}
+
+/// A row of CSV, safe to be shown on a terminal.
+fn row(cells: impl Iterator<Item = String>) -> String {
+    let cells: Vec<_> = cells.map(|cell| cell_of(&diagnostics::printable(&cell))).collect();
+    format!("{}\n", cells.join(","))
+}
+
+/// A cell of CSV, in quotes where it needs them (RFC 4180).
+fn cell_of(text: &str) -> String {
+    if text.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_owned()
+    }
+}
+
+impl CatArguments {
+    /// The messages of the topic within the span; of all topics where none is named.
+    fn records<'a>(&'a self, recording: &'a Recording) -> impl Iterator<Item = Result<Record>> + 'a {
+        let is_wanted = |record: &Record| {
+            let time_s = std::time::Duration::from_nanos(record.time_ns).as_secs_f64();
+            let is_within = time_s >= self.from && time_s <= self.to;
+            is_within && self.topic.as_ref().is_none_or(|topic| *topic == record.topic)
+        };
+        let records = recording.messages().filter(move |record| record.as_ref().map_or(true, is_wanted));
+        records.map(|record| record.context("cannot read on"))
+    }
+
+    /// The fields that are asked for, in the order of the definition.
+    fn leaves(&self, recording: &Recording, record: &Record) -> Result<Vec<Leaf>> {
+        let mut leaves = recording.decode(record)?;
+        leaves.retain(|leaf| !is_padding(&leaf.path));
+        for field in &self.field {
+            if !leaves.iter().any(|leaf| is_part(&leaf.path, field)) {
+                let known: Vec<_> = leaves.iter().map(|leaf| leaf.path.as_str()).collect();
+                bail!("no field {field} in {}; there are: {}", record.topic, known.join(", "));
+            }
+        }
+        let is_wanted =
+            |leaf: &Leaf| self.field.is_empty() || self.field.iter().any(|f| is_part(&leaf.path, f));
+        leaves.retain(is_wanted);
+        Ok(leaves)
+    }
+}
+
+/// True for the field `of` itself and the fields and elements below it.
+fn is_part(path: &str, of: &str) -> bool {
+    path.strip_prefix(of).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
+}
+
+/// True for a field that fills a gap of the layout: `pad0`, `pad1`, …
+fn is_padding(path: &str) -> bool {
+    let name = path.rsplit('.').next().unwrap_or(path);
+    let digits = name.split('[').next().and_then(|name| name.strip_prefix("pad"));
+    digits.is_some_and(|digits| !digits.is_empty() && digits.bytes().all(|byte| byte.is_ascii_digit()))
+}
+
 /// A value of a recording as JSON; JSON has no NaN and no infinity, so these are strings.
-fn json_value(value: &recorder::definition::Value) -> serde_json::Value {
-    use recorder::definition::Value;
+fn json_value(value: &Value) -> serde_json::Value {
     match value {
         Value::Float(number) if number.is_finite() => (*number).into(),
         Value::Float(number) => number.to_string().into(),
@@ -57,5 +162,33 @@ fn json_value(value: &recorder::definition::Value) -> serde_json::Value {
             Err(_) => u64::try_from(*number).map_or_else(|_| number.to_string().into(), Into::into),
         },
         Value::Text(text) => text.clone().into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{cell_of, is_padding, is_part};
+
+    #[test]
+    fn a_field_has_the_fields_below_it() {
+        assert!(
+            is_part("position.z", "position")
+                && is_part("position.z", "position.z")
+                && is_part("command[2]", "command")
+        );
+        assert!(!is_part("position_error.z", "position") && !is_part("position", "position.z"));
+    }
+
+    #[test]
+    fn padding_is_known_by_its_name() {
+        assert!(is_padding("pad0") && is_padding("status.pad12") && is_padding("pad0[3]"));
+        assert!(!is_padding("pad") && !is_padding("padding") && !is_padding("pad0.x"));
+    }
+
+    #[test]
+    fn cells_with_commas_are_quoted() {
+        assert_eq!(cell_of("a,b"), "\"a,b\"");
+        assert_eq!(cell_of("say \"a\""), "\"say \"\"a\"\"\"");
+        assert_eq!(cell_of("1.5"), "1.5");
     }
 }

@@ -1,7 +1,7 @@
 //! The command `components`.
 
 use super::output::{print_file, print_json};
-use anyhow::Result;
+use anyhow::{Result, anyhow};
 use bus::Registration;
 use bus::component::{Role, Transfer};
 use bus::ports::{Inputs, PortSpec};
@@ -18,30 +18,40 @@ hold, `hummingbus schema` prints. A port in brackets may be left out. What a com
 another instance goes on ([hot-swap.md](hot-swap.md)).
 ";
 
-/// What `components` takes.
+/// Arguments of `components`.
 #[derive(Args)]
 pub struct ComponentsArguments {
+    /// Only this component, such as pid.
+    component: Option<String>,
     /// Print JSON.
     #[arg(long)]
     json: bool,
 }
 
-/// Prints every component with its ports, its parameters and the state that it hands over.
+/// Prints components with their ports, their parameters and the state that they hand over: all, or the one that is named.
 ///
 /// # Errors
-/// If it cannot be printed.
+/// If there is no such component, or it cannot be printed.
 pub fn components(arguments: &ComponentsArguments) -> Result<bool> {
-    if arguments.json {
-        print_json(&COMPONENTS.iter().map(json).collect::<Vec<_>>())?;
-    } else {
-        print_file(&markdown())?;
+    let chosen = arguments.component.as_deref().map(find).transpose()?;
+    match (chosen, arguments.json) {
+        (None, true) => print_json(&COMPONENTS.iter().map(json).collect::<Vec<_>>())?,
+        (Some(component), true) => print_json(&[json(component)])?,
+        (None, false) => print_file(&format!("{HEAD}\n{}", table(COMPONENTS.iter())))?,
+        (Some(component), false) => print_file(&table(std::iter::once(component)))?,
     }
     Ok(true)
 }
 
-fn markdown() -> String {
-    let rows: String = COMPONENTS.iter().map(row).collect();
-    format!("{HEAD}\n| component | reads | sends | parameters | hands over |\n|---|---|---|---|---|\n{rows}")
+fn find(name: &str) -> Result<&'static Registration> {
+    COMPONENTS
+        .find(name)
+        .ok_or_else(|| anyhow!("there is no component {name}; there are: {}", COMPONENTS.names()))
+}
+
+fn table(components: impl Iterator<Item = &'static Registration>) -> String {
+    let rows: String = components.map(row).collect();
+    format!("| component | reads | sends | parameters | hands over |\n|---|---|---|---|---|\n{rows}")
 }
 
 fn row(component: &Registration) -> String {

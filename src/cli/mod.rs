@@ -4,6 +4,7 @@ mod campaign;
 mod cat;
 mod check;
 mod clean;
+mod completions;
 mod components;
 mod diff;
 mod files;
@@ -30,7 +31,7 @@ mod validate;
 mod view;
 
 use anyhow::Result;
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, Parser, Subcommand};
 use output::{message, readable, say};
 use std::process::ExitCode;
 use table::commands;
@@ -38,7 +39,7 @@ use table::commands;
 /// A vehicle simulation as independent processes in deterministic lockstep.
 #[derive(Parser)]
 #[command(
-    version,
+    version = env!("HUMMINGBUS_VERSION"),
     after_help = "Example: hummingbus run manifests/hover.toml\n\n`hummingbus COMMAND --help` tells what a command takes."
 )]
 struct Cli {
@@ -109,6 +110,12 @@ commands! {
     /// Remove what dead runs left, and nothing of live ones; exit code 1 if something could not be removed.
     #[command(after_help = "Example: hummingbus clean --dry-run")]
     Clean(clean::CleanArguments) => clean::clean;
+    /// Print the completions of this program for a shell.
+    #[command(after_help = "Example: hummingbus completions bash > ~/.local/share/bash-completion/completions/hummingbus")]
+    Completions(completions::CompletionsArguments) => print_completions;
+    /// Write the manual pages.
+    #[command(after_help = "Example: hummingbus man ~/.local/share/man/man1")]
+    Man(completions::ManArguments) => write_manual;
     /// Be a process of a run; started by `run`.
     #[command(hide = true)]
     Node(node::NodeArguments) => node::node;
@@ -133,6 +140,14 @@ pub fn main() -> ExitCode {
             ExitCode::from(2)
         }
     }
+}
+
+fn print_completions(arguments: &completions::CompletionsArguments) -> Result<bool> {
+    completions::print(arguments, Cli::command())
+}
+
+fn write_manual(arguments: &completions::ManArguments) -> Result<bool> {
+    completions::write_manual(arguments, Cli::command())
 }
 
 /// Prints help, the version, or the reason why the arguments are refused. A shell's `*` makes arguments of any names.

@@ -56,6 +56,9 @@ pub struct RunArguments {
     /// Print the summary as JSON, and no progress.
     #[arg(long)]
     pub json: bool,
+    /// Print no progress, and a summary only if the run did not pass.
+    #[arg(short, long, conflicts_with = "json")]
+    pub quiet: bool,
 }
 
 /// What `profile` takes.
@@ -131,7 +134,7 @@ pub fn run(
     let files = files.unwrap_or_else(|| Files::beside(&path));
     let pages = if graph.plan.profile { files.outputs() } else { Vec::new() };
     let mut outputs = Outputs::of(&manifest, &graph, &path, pages)?;
-    let bar = progress::bar(RUN, arguments.json);
+    let bar = progress::bar(RUN, arguments.json || arguments.quiet);
     let host = if arguments.in_process { Host::InProcess } else { Host::this_binary() };
     let launcher = Launcher::new(host)
         .stopped_by(&stop)
@@ -174,7 +177,7 @@ pub fn run(
     }
     if arguments.json {
         print_json(&as_json(&summary, profile.as_ref(), &files)?)?;
-    } else {
+    } else if !(arguments.quiet && summary.passed) {
         print_text(&text)?;
     }
     Ok(summary.passed)

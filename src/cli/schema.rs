@@ -1,36 +1,66 @@
 //! The command `schema`.
 
 use super::output::{print_json, print_text};
-use anyhow::Result;
+use anyhow::{Result, bail};
 use bus::announcement::Announcement;
+use bus::schema::Schema;
 use clap::Args;
 use hummingbus::COMPONENTS;
+use serde_json::Value;
 use std::fmt::Write as _;
 
-/// What `schema` takes.
+/// Arguments of `schema`.
 #[derive(Args)]
 pub struct SchemaArguments {
-    /// Print JSON, with the ROS 2 definitions.
+    /// Only this message, such as PlantState.
+    message: Option<String>,
+    /// Print JSON, with the ROS 2 definitions. Hashes of layouts are strings of hexadecimal digits.
     #[arg(long)]
     json: bool,
 }
 
-/// Prints every message that a component's port carries.
+/// Prints the messages that components' ports carry: all, or the one that is named.
 ///
 /// # Errors
-/// If it cannot be printed.
+/// If there is no such message, or it cannot be printed.
 pub fn schema(arguments: &SchemaArguments) -> Result<bool> {
+    let schemas = chosen(arguments.message.as_deref())?;
     if arguments.json {
-        print_json(&COMPONENTS.messages().into_iter().map(Announcement::of).collect::<Vec<_>>())?;
+        print_json(&schemas.into_iter().map(announced).collect::<Result<Vec<_>>>()?)?;
     } else {
-        print_text(&schemas())?;
+        print_text(&text(&schemas))?;
     }
     Ok(true)
 }
 
-/// Every message with its fields, units, frames and layout hash.
-fn schemas() -> String {
-    COMPONENTS.messages().into_iter().fold(String::new(), |mut text, schema| {
+/// The messages whose name, with or without its package, is `name`.
+fn chosen(name: Option<&str>) -> Result<Vec<&'static Schema>> {
+    let mut schemas = COMPONENTS.messages();
+    let Some(name) = name else { return Ok(schemas) };
+    let names: Vec<_> = schemas.iter().map(|schema| short(schema)).collect();
+    let known = names.join(", ");
+    schemas.retain(|schema| schema.type_name == name || short(schema) == name);
+    if schemas.is_empty() {
+        bail!("no component has a port for a message {name}; there are: {known}");
+    }
+    Ok(schemas)
+}
+
+/// A message's name without its package.
+fn short(schema: &Schema) -> &'static str {
+    schema.type_name.rsplit('/').next().unwrap_or(schema.type_name)
+}
+
+/// A message as JSON. Many readers of JSON round integers beyond 53 bits, so that the hash is a string.
+fn announced(schema: &Schema) -> Result<Value> {
+    let mut value = serde_json::to_value(Announcement::of(schema))?;
+    value["layout_hash"] = format!("{:016x}", schema.layout_hash()).into();
+    Ok(value)
+}
+
+/// The messages with their fields, units, frames and layout hashes.
+fn text(schemas: &[&Schema]) -> String {
+    schemas.iter().fold(String::new(), |mut text, schema| {
         let _ = write!(text, "{}  layout {:016x}\n  {}\n", schema.layout(), schema.layout_hash(), schema.doc);
         text.push('\n');
         text

@@ -150,7 +150,7 @@ fn schema_prints_the_same_as_json() {
     assert!(schemas.len() >= 8);
     for schema in schemas {
         let section = section(&text, schema["type_name"].as_str().unwrap());
-        assert!(section.contains(&format!("{:016x}", schema["layout_hash"].as_u64().unwrap())), "{section}");
+        assert!(section.contains(schema["layout_hash"].as_str().unwrap()), "{section}");
         assert!(schema["definition"].as_str().unwrap().ends_with('\n'));
     }
 }
@@ -171,6 +171,64 @@ fn cat_prints_one_json_object_a_line() {
     assert_eq!(lines[0]["fields"]["pose.position.z"], 1.0);
     let all = place.call(&["cat", &recording]).with_code(0).output;
     assert_eq!(all.lines().count(), 5 * 500 + 100 + 2 * 50);
+}
+
+#[test]
+fn schema_and_components_print_one() {
+    let place = Place::new();
+    let ended = place.call(&["schema", "PlantState"]).with_code(0);
+    assert_eq!(ended.output.matches("layout ").count(), 1, "{}", ended.output);
+    let one = place.call(&["schema", "hummingbus_msgs/msg/PlantState", "--json"]).with_code(0).json();
+    assert_eq!(one.as_array().map(Vec::len), Some(1));
+    place.call(&["schema", "PlantStat"]).with_code(2).says(&["no component", "PlantStat", "PlantState"]);
+    let ended = place.call(&["components", "pid"]).with_code(0);
+    assert!(ended.output.lines().count() == 3 && ended.output.contains("**`pid`**"), "{}", ended.output);
+    place.call(&["components", "pit"]).with_code(2).says(&["no component pit", "pid"]);
+}
+
+#[test]
+fn cat_prints_a_span_of_fields_as_csv() {
+    let place = Place::new();
+    let recording = recording(&place);
+    let topic = ["cat", &recording, "--topic", "/plant/state"];
+    let span = ["--field", "position.z", "--field", "velocity", "--from", "0.1", "--to", "0.2", "--csv"];
+    let ended = place.call(&[&topic[..], &span].concat()).with_code(0);
+    let lines: Vec<_> = ended.output.lines().collect();
+    assert_eq!(lines[0], "tick,time_ns,position.z,velocity.x,velocity.y,velocity.z");
+    assert_eq!(lines.len(), 1 + 101);
+    assert!(lines[1].starts_with("100,100000000,") && lines[101].starts_with("200,200000000,"));
+    let height: f64 = lines[1].split(',').nth(2).unwrap().parse().unwrap();
+    assert!((height - 1.0).abs() < 0.05, "{height} m");
+    place
+        .call(&[&topic[..], &["--field", "position.w"]].concat())
+        .with_code(2)
+        .says(&["no field", "position.z"]);
+    place.call(&["cat", &recording, "--csv"]).with_code(2).says(&["--topic"]);
+    place.call(&[&topic[..], &["--from", "-1"]].concat()).with_code(2);
+}
+
+#[test]
+fn cat_leaves_padding_out() {
+    let place = Place::new();
+    let ended = place.call(&["cat", &recording(&place), "--topic", "/mocap/mocap"]).with_code(0);
+    assert!(ended.output.lines().count() > 10 && !ended.output.contains("pad0"), "{}", ended.output);
+}
+
+#[test]
+fn a_manifest_is_not_read_as_a_recording() {
+    let ended = Place::new().call(&["cat", &hover()]).with_code(2);
+    ended.says(&["hover.toml is a TOML file, not a recording", "hummingbus run"]);
+}
+
+#[test]
+fn a_quiet_run_prints_only_its_failure() {
+    let place = Place::new();
+    let record = place.path("quiet.mcap");
+    let args = ["run", &hover(), "--quiet", "--record", &record];
+    let passed = place.call(&args).with_code(0);
+    assert_eq!((passed.output.as_str(), passed.error.as_str()), ("", ""));
+    let short = ["--set", "run.duration_s=3"];
+    place.call(&[&args[..], &short].concat()).with_code(1).prints(&["no samples", "FAILED"]);
 }
 
 #[test]
@@ -229,6 +287,24 @@ fn every_subcommand_shows_an_example() {
         ended.prints(&[&format!("Example: hummingbus {command}")]);
     }
     place.call(&["--help"]).with_code(0).prints(&["Example: hummingbus run manifests/hover.toml"]);
+}
+
+#[test]
+fn shells_and_the_manual_know_the_commands() {
+    let place = Place::new();
+    for shell in ["bash", "zsh", "fish"] {
+        let printed = place.call(&["completions", shell]).with_code(0).output;
+        assert!(printed.contains("campaign"), "{shell}");
+        assert!(printed.contains("in-process"), "{shell} does not know the options of run");
+    }
+    place.call(&["completions", "cmd"]).with_code(2).says(&["bash", "zsh", "fish"]);
+    let folder = place.path("man1");
+    place.call(&["man", &folder]).with_code(0);
+    let page = fs::read_to_string(format!("{folder}/hummingbus-run.1")).unwrap();
+    assert!(page.starts_with(".ie") || page.starts_with(".TH"), "{page}");
+    assert!(page.contains("in\\-process"), "{page}");
+    let version = place.call(&["--version"]).with_code(0).output;
+    assert!(version.starts_with(concat!("hummingbus ", env!("CARGO_PKG_VERSION"))), "{version}");
 }
 
 #[test]
