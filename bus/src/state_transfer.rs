@@ -46,12 +46,13 @@ impl StateLayout {
         }
     }
 
-    /// True if a component goes on from a state of this layout, whose own is laid out as `own` and transferred by `transfer`.
-    pub(crate) fn fits(&self, own: &Self, transfer: Transfer) -> bool {
+    /// True if a component whose state is laid out as `expected`, and transferred by `transfer`, goes on from a state of this
+    /// layout.
+    pub(crate) fn fits(&self, expected: &Self, transfer: Transfer) -> bool {
         let grows = matches!(transfer, Transfer::Growing(_));
-        self.type_name == own.type_name
-            && self.layout_hash == own.layout_hash
-            && (grows || self.size == own.size)
+        self.type_name == expected.type_name
+            && self.layout_hash == expected.layout_hash
+            && (grows || self.size == expected.size)
     }
 
     /// Number of 64-bit words of the state.

@@ -258,8 +258,8 @@ fn files(graph: &Graph) -> impl Iterator<Item = &InputFile> {
 
 /// The files that `manifest` is made of, with their SHA-256.
 fn texts(manifest: &Manifest) -> impl Iterator<Item = (PathBuf, String)> {
-    let own = std::iter::once((manifest.path.as_path(), manifest.text()));
-    let all = own.chain(manifest.included());
+    let first = std::iter::once((manifest.path.as_path(), manifest.text()));
+    let all = first.chain(manifest.included());
     all.map(|(path, text)| {
         let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
         (path, sha256(text.as_bytes()))

@@ -2,6 +2,7 @@
 
 use anyhow::{Result, anyhow};
 use recorder::reader::Recording;
+use runtime::checkpoint::Checkpoint;
 use runtime::output_file::{Kind, Mark};
 use std::path::Path;
 
@@ -12,7 +13,11 @@ pub const PAGE: Kind = Kind { name: "page", mark: Mark::Within(report::page::MAR
 pub fn open_recording(path: &Path) -> Result<Recording> {
     let recording = Recording::salvage(path).map_err(|error| {
         let is_toml = path.is_file() && path.extension().is_some_and(|extension| extension == "toml");
-        if is_toml { not_recorded(path) } else { error.into() }
+        match Checkpoint::read(path) {
+            Ok(checkpoint) => not_recorded_but(path, &checkpoint),
+            Err(_) if is_toml => not_recorded(path),
+            Err(_) => error.into(),
+        }
     })?;
     if let Some(cut) = recording.cut() {
         let end = cut.last_tick.map_or("nothing of it is whole".to_owned(), |tick| {
@@ -24,6 +29,16 @@ pub fn open_recording(path: &Path) -> Result<Recording> {
         ));
     }
     Ok(recording)
+}
+
+/// The reason why a checkpoint is not read as a recording.
+fn not_recorded_but(path: &Path, checkpoint: &Checkpoint) -> anyhow::Error {
+    let (path, tick, time_s) = (path.display(), checkpoint.tick(), checkpoint.time_s());
+    let manifest = checkpoint.manifest_path().display();
+    anyhow!(
+        "{path} is a checkpoint of {manifest} at tick {tick} ({time_s:.3} s), not a recording: `hummingbus run --from {path}` \
+         goes on from it"
+    )
 }
 
 /// The reason why a TOML file is not read as a recording.

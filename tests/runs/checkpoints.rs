@@ -297,6 +297,9 @@ fn what_does_not_fit_is_refused_in_words() {
     refused(&["--set", "run.duration_s=0.4"], &["tick 500", "tick 400", "raise run.duration_s"]);
     refused(&["--set", "run.rate_hz=500"], &["a tick of the checkpoint is 1000000 ns"]);
     refused(&[&manifest], &["cannot be used with"]);
+    place.call(&["run", &file]).with_code(2).says(&["a.500.ckpt", "with --from"]);
+    let named = ["m.toml", "at tick 500 (0.500 s), not a recording", "run --from"];
+    place.call(&["cat", &file]).with_code(2).says(&named);
 
     let good = fs::read(&file).unwrap();
     let mut damaged = good.clone();

@@ -24,7 +24,12 @@ pub const LISTS: [&str; 6] = ["compare", "measure", "pass", "shadow", "swap", "v
 pub fn text(path: &Path) -> Result<String, Diagnostic> {
     InputFiles::default().text(path).map_err(|error| {
         let file = path.display().to_string();
-        Diagnostic::in_file(file, format!("cannot be read: {error}")).help("give the path of a manifest")
+        let help = if path.extension().is_some_and(|extension| extension == "ckpt") {
+            "go on from a checkpoint with --from"
+        } else {
+            "give the path of a manifest"
+        };
+        Diagnostic::in_file(file, format!("cannot be read: {error}")).help(help)
     })
 }
 
