@@ -5,9 +5,10 @@
 //! state, the words of a simulated computing time, and the newest sample of each input that was sent before the tick.
 
 use crate::component::Transfer;
+use crate::computation::Computation;
 use crate::error::BusError;
-use crate::hand_over::Computation;
 use crate::plan::{NodePlan, Plan};
+use crate::saved_sample::SavedSample;
 use crate::state_transfer::StateLayout;
 use crate::user_file;
 use inputs::sha256;
@@ -24,16 +25,6 @@ const FROM: &str = "from";
 const SAMPLES: &str = "samples";
 /// The largest part that is read: no state comes near it.
 const PART_BYTES_MAX: u64 = 1 << 30;
-
-/// A sample that was sent before the tick of a checkpoint.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct SavedSample {
-    pub(crate) topic: String,
-    pub(crate) layout_hash: u64,
-    pub(crate) tick: u64,
-    pub(crate) sequence: u64,
-    pub(crate) words: Vec<u64>,
-}
 
 /// What a node needs to go on from a checkpoint.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -5,10 +5,10 @@
 //! wait for each other in a circle either: along edges without delay the depth grows, and all groups step in its order.
 
 use crate::component::Transfer;
+use crate::computation::Computation;
 use crate::connected::{ConnectedNode, Turn};
 use crate::depths::depths;
 use crate::error::BusError;
-use crate::hand_over::Computation;
 use crate::host_time::process_cpu_ns;
 use crate::local::LocalTopic;
 use crate::membership::Membership;

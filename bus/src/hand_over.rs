@@ -1,25 +1,12 @@
 //! State of a connected node as words: the bytes of its computation, then the words of the bus.
 
-use crate::checkpoint::{NodePart, SavedSample};
-use crate::component::{StateError, Transfer};
+use crate::checkpoint::NodePart;
+use crate::component::Transfer;
+use crate::computation::Computation;
 use crate::error::BusError;
 use crate::links::Links;
+use crate::saved_sample::SavedSample;
 use crate::state_transfer::{StateLayout, StateRing};
-use crate::tick::Tick;
-
-/// Computation of a node: its steps, and the state that they change.
-pub(crate) trait Computation {
-    /// As [`State::configuration`](crate::component::State::configuration).
-    fn configuration(&self) -> u64;
-    /// Number of bytes of the state.
-    fn state_size(&self) -> usize;
-    /// Writes the state.
-    fn save(&self, bytes: &mut [u8]);
-    /// Continues from a state.
-    fn load(&mut self, bytes: &[u8]) -> Result<(), StateError>;
-    /// Computes a tick.
-    fn step(&mut self, tick: &mut Tick<'_>) -> Result<(), String>;
-}
 
 /// State of a node, and the rings by which processes of the node hand it to each other.
 #[derive(Debug)]

@@ -15,6 +15,7 @@ pub mod claim;
 #[doc(hidden)]
 pub mod clock;
 pub mod component;
+mod computation;
 pub mod computing_time;
 mod connected;
 pub mod context;
@@ -63,6 +64,7 @@ pub mod room;
 mod run_process;
 mod sample_memory;
 mod sample_ring;
+mod saved_sample;
 pub mod schema;
 mod shared_file;
 mod simulation;

@@ -3,10 +3,10 @@
 use crate::announcement::{self, Announcement};
 use crate::claim;
 use crate::component::{State, StateError, Transfer};
+use crate::computation::Computation;
 use crate::connected::ConnectedNode;
 use crate::error::BusError;
 use crate::executor::{Executor, Member};
-use crate::hand_over::Computation;
 use crate::handles::{Declared, Input, Output, Wiring};
 use crate::join::Join;
 use crate::links::Links;

@@ -1,7 +1,6 @@
 //! The two ends of a connection inside a node: what may be read at a tick, and what must be sent.
 
 use crate::announcement::Announcement;
-use crate::checkpoint::SavedSample;
 use crate::error::BusError;
 use crate::finite::{Floats, field_at};
 use crate::local::LocalTopic;
@@ -10,6 +9,7 @@ use crate::messages::Time;
 use crate::plan::{InputPlan, OutputPlan, TopicPlan};
 use crate::sample_memory::empty_sample;
 use crate::sample_ring::SampleRing;
+use crate::saved_sample::SavedSample;
 use crate::schema::{Extent, Schema};
 use crate::transport::{IceoryxError, Loan, Received, Receiver, SampleHeader, Sender};
 use std::collections::VecDeque;

@@ -2,11 +2,11 @@
 
 use crate::announcement::Announcement;
 use crate::component::{Component, StateError, StepError, Transfer};
+use crate::computation::Computation;
 use crate::connected::ConnectedNode;
 use crate::context::StepContext;
 use crate::error::BusError;
 use crate::executor::{Executor, Member};
-use crate::hand_over::Computation;
 use crate::handles::Wiring;
 use crate::join::Join;
 use crate::node::Node;

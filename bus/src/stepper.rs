@@ -1,10 +1,10 @@
 //! One tick of a node, wherever it lives: its inputs are gathered, it steps, its outputs are published.
 
-use crate::checkpoint::SavedSample;
+use crate::computation::Computation;
 use crate::error::BusError;
-use crate::hand_over::Computation;
 use crate::plan::{NodePlan, Plan};
 use crate::port::{InPort, Locals, OutPort};
+use crate::saved_sample::SavedSample;
 use crate::tick::Tick;
 use crate::timing::{Due, Timing};
 

@@ -2,8 +2,8 @@
 
 use super::ConnectedNode;
 use crate::checkpoint::{NodePart, store_part};
+use crate::computation::Computation;
 use crate::error::BusError;
-use crate::hand_over::Computation;
 use crate::port::Locals;
 
 impl ConnectedNode {
