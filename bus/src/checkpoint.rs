@@ -26,7 +26,7 @@ const SAMPLES: &str = "samples";
 /// The largest part that is read: no state comes near it.
 const PART_BYTES_MAX: u64 = 1 << 30;
 
-/// What a node needs to go on from a checkpoint.
+/// The part of a node in a checkpoint: its state, and the samples that it still reads.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct NodePart {
     /// Name of the node.
@@ -37,12 +37,12 @@ pub struct NodePart {
     plan_sum: String,
     layout: Option<StateLayout>,
     state: Vec<u8>,
-    /// What is under way of a step that takes simulated time.
+    /// Words of a step under way that takes simulated time.
     timing: Vec<u64>,
     samples: Vec<SavedSample>,
 }
 
-/// All that a run goes on from: the parts of its nodes.
+/// Contents of a checkpoint: the parts of the nodes.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Parts {
     /// The first tick that is computed.
@@ -159,7 +159,7 @@ impl Samples {
         if plan.first_tick == 0 { Ok(Self::default()) } else { load(&path).map(Self) }
     }
 
-    /// That of `topic`.
+    /// The sample of `topic`.
     pub(crate) fn get(&self, topic: &str) -> Option<&SavedSample> {
         self.0.iter().find(|sample| sample.topic == topic)
     }

@@ -107,7 +107,7 @@ impl HandOver {
 }
 
 impl Default for HandOver {
-    /// That of a node without a state.
+    /// The hand-over of a node without a state.
     fn default() -> Self {
         let (layout, words, state_words) = (None, Vec::new(), 0);
         Self { transfer: Transfer::Nothing, layout, words, state_words, published: None, predecessor: None }

@@ -324,7 +324,7 @@ impl InPort {
         Ok(())
     }
 
-    /// Has a feed of this process show what was sent up to `tick`.
+    /// Lets a feed of this process show what was sent up to `tick`.
     pub(crate) fn look_at(&mut self, tick: u32) {
         self.newest_tick = Some(tick);
     }

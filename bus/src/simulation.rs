@@ -120,7 +120,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// What another simulation of the same nodes needs to go on from the next tick.
+    /// A checkpoint of the next tick, from which another simulation of the same nodes goes on.
     #[must_use]
     pub fn save(&mut self) -> Parts {
         let (tick, samples, plan) = (self.tick, &self.samples, &self.plan);

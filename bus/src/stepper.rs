@@ -67,7 +67,7 @@ impl Stepper {
         Ok(())
     }
 
-    /// Has its inputs read what was sent up to `tick`, where members of the same process send it.
+    /// Lets its inputs read what was sent up to `tick`, where members of the same process send it.
     pub(crate) fn look_at(&mut self, tick: u32) {
         self.inputs.iter_mut().for_each(|input| input.look_at(tick));
     }

@@ -88,9 +88,16 @@ pub fn first_difference(a: &Recording, b: &Recording) -> Result<Option<Differenc
         return Ok(None);
     }
     let (mut left, mut right) = (a.messages().peekable(), b.messages().peekable());
-    let later = match (first_tick(&mut left), first_tick(&mut right)) {
-        (Some(x), Some(y)) if x < y => skip_to(&mut left, y).then_some((b, y, a)),
-        (Some(x), Some(y)) if y < x => skip_to(&mut right, x).then_some((a, x, b)),
+    let later = match (first_of(&mut left), first_of(&mut right)) {
+        (Some(x), Some(y)) if x.tick != y.tick => {
+            let is_later = x.tick < y.tick;
+            let overlaps = if is_later { skip_to(&mut left, y.tick) } else { skip_to(&mut right, x.tick) };
+            if !overlaps {
+                // One ends before the other begins.
+                return Ok(Some(message_difference(&x, &y)));
+            }
+            Some(if is_later { (b, y.tick, a) } else { (a, x.tick, b) })
+        }
         _ => None,
     };
     let ends = |first: Option<(&Recording, u32)>| -> Option<Difference> {
@@ -124,9 +131,9 @@ pub fn first_difference(a: &Recording, b: &Recording) -> Result<Option<Differenc
 /// Messages of a recording, of which the next can be looked at.
 type Messages<I> = std::iter::Peekable<I>;
 
-/// The tick of the next of `messages`.
-fn first_tick(messages: &mut Messages<impl Iterator<Item = Result<Record, RecordingError>>>) -> Option<u32> {
-    messages.peek()?.as_ref().ok().map(|record| record.tick)
+/// The next of `messages`, which stays the next.
+fn first_of(messages: &mut Messages<impl Iterator<Item = Result<Record, RecordingError>>>) -> Option<Record> {
+    messages.peek()?.as_ref().ok().cloned()
 }
 
 /// Passes over those of `messages` before `tick`; false if none is left.

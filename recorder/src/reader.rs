@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// A message of a recording.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Record {
     /// Tick at which it was sent.
     pub tick: u32,

@@ -71,8 +71,12 @@ impl Checkpoint {
     pub fn read(path: &Path) -> Result<Self> {
         let about = || format!("cannot go on from {}", path.display());
         let mut bytes = Vec::new();
-        let file = std::fs::File::open(path).with_context(about)?;
-        file.take(BYTES_MAX).read_to_end(&mut bytes).with_context(about)?;
+        let mut file = std::fs::File::open(path).with_context(about)?;
+        // Of a file that is no checkpoint no more than its beginning is read.
+        (&mut file).take(START.len() as u64).read_to_end(&mut bytes).with_context(about)?;
+        if bytes == START {
+            file.take(BYTES_MAX).read_to_end(&mut bytes).with_context(about)?;
+        }
         Self::from_bytes(&bytes).with_context(about)
     }
 
@@ -159,7 +163,7 @@ impl Checkpoint {
         Ok(manifest)
     }
 
-    /// Has the run of `graph` go on from here; `is_changed` says that it has other values than the run that has written the
+    /// Makes the run of `graph` go on from here; `is_changed` says that it has other values than the run that has written the
     /// checkpoint.
     ///
     /// # Errors

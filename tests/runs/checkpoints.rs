@@ -208,6 +208,15 @@ fn a_fork_differs_from_the_tick_on_at_which_its_value_counts() {
         place.call(&[&["run", "--from", &kept[0].1, "--record", &fork, "--in-process"][..], &set].concat());
     ended.flown();
     place.call(&["diff", &whole, &fork]).with_code(1).prints(&["tick 2000, topic /controller/"]);
+    // One that ends before the other begins has nothing in common with it.
+    let short = place.path("short.mcap");
+    let end = ["--set", "run.duration_s=0.1", "--in-process"];
+    place.call(&[&["run", &hover, "--record", &short][..], &end].concat()).flown();
+    place.call(&["diff", &short, &fork]).with_code(1).prints(&[
+        "tick 0, topic",
+        "a message of",
+        "at tick 2000",
+    ]);
 }
 
 #[test]

@@ -99,7 +99,7 @@ impl SupervisorView {
         }
     }
 
-    /// Has every node write its part of a checkpoint before `tick`, at which the clock holds the run.
+    /// Makes every node write its part of a checkpoint before `tick`, at which the clock holds the run.
     pub fn ask_for_checkpoint(&self, tick: u32) {
         self.segment.head().run.checkpoint_tick.store(tick, Release);
     }

@@ -37,7 +37,7 @@ struct Pairs {
     second_ns: Option<u64>,
 }
 
-/// What a checkpoint holds of a condition.
+/// Contents of a condition in a checkpoint.
 #[derive(Serialize, Deserialize)]
 pub struct KeptSamples {
     name: String,

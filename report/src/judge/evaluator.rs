@@ -11,10 +11,10 @@ use recorder::fields::TopicFields;
 use runtime::manifest::Conditions;
 use serde::{Deserialize, Serialize};
 
-/// What a checkpoint holds of an evaluator.
+/// Contents of an evaluator in a checkpoint.
 #[derive(Serialize, Deserialize)]
 struct Kept {
-    /// Of the conditions, then of the measures.
+    /// Conditions first, then measures.
     conditions: Vec<KeptSamples>,
     windows: Vec<WindowEndErrors>,
 }

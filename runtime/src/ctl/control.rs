@@ -141,7 +141,7 @@ impl<'a> ControlServer<'a> {
         }
     }
 
-    /// Has the nodes write the checkpoint of `tick`, at which the run is held, and lets it go on to `hold_tick`.
+    /// Makes the nodes write the checkpoint of `tick`, at which the run is held, and lets it go on to `hold_tick`.
     fn save(&mut self, path: Option<PathBuf>, tick: u32, hold_tick: u32, reply: Reply) {
         let refused = if tick == 0 {
             Some("tick 0 is the start of the run: there is nothing to go on from")

@@ -6,7 +6,7 @@ use bus::plan::Plan;
 use diagnostics::Diagnostic;
 use std::ops::Range;
 
-/// Has the nodes of `plan` write the checkpoints that `manifest` asks for.
+/// Makes the nodes of `plan` write the checkpoints that `manifest` asks for.
 ///
 /// # Errors
 /// A tick that is none of the run's, that a node does not reach, or that lies within a swap.
