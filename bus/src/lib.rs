@@ -20,6 +20,7 @@ pub mod computing_time;
 mod connected;
 pub mod context;
 mod depths;
+pub mod dynamic;
 pub mod error;
 mod executor;
 mod finite;

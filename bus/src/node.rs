@@ -203,9 +203,7 @@ impl Node {
         if !port.required && !is_wired {
             return Ok(None);
         }
-        let index = self.input_index(port.name)?;
-        self.declare_input(index, Declared::Typed(port.schema))?;
-        Ok(Some(index))
+        self.declare_typed_input(port.name, port.schema).map(Some)
     }
 
     /// Declares the input `port`, whose messages are `T`.
@@ -213,9 +211,21 @@ impl Node {
     /// # Errors
     /// If the manifest does not wire it, or the node declared it before.
     pub fn input<T: Message>(&mut self, port: &str) -> Result<Input<T>, BusError> {
+        self.declare_typed_input(port, T::SCHEMA).map(Input::new)
+    }
+
+    /// Declares the input `port`, whose messages have `schema`.
+    ///
+    /// # Errors
+    /// As [`Node::input`].
+    pub(crate) fn declare_typed_input(
+        &mut self,
+        port: &str,
+        schema: &'static Schema,
+    ) -> Result<usize, BusError> {
         let index = self.input_index(port)?;
-        self.declare_input(index, Declared::Typed(T::SCHEMA))?;
-        Ok(Input::new(index))
+        self.declare_input(index, Declared::Typed(schema))?;
+        Ok(index)
     }
 
     /// Declares the input `port` if the manifest wires it. A port that was declared before is refused when the node
@@ -309,7 +319,7 @@ impl Node {
         Ok(Output::new(index))
     }
 
-    fn declare_output(
+    pub(crate) fn declare_output(
         &mut self,
         port: &str,
         schema: &'static Schema,

@@ -1,6 +1,7 @@
 //! The components that a manifest may name.
 
 use bus::Registration;
+use bus::component::Transfer;
 use bus::schema::Schema;
 use std::collections::BTreeMap;
 
@@ -51,6 +52,17 @@ impl Registry {
     pub fn messages(&self) -> Vec<&'static Schema> {
         let by_name: BTreeMap<_, _> =
             self.iter().flat_map(Registration::messages).map(|schema| (schema.type_name, schema)).collect();
+        by_name.into_values().collect()
+    }
+
+    /// Every state of a component that is a message, in the order of their type names.
+    #[must_use]
+    pub fn states(&self) -> Vec<&'static Schema> {
+        let state = |component: &Registration| match component.transfer {
+            Transfer::Message(schema) => Some((schema.type_name, schema)),
+            Transfer::Nothing | Transfer::Bytes(_) | Transfer::Growing(_) | Transfer::File => None,
+        };
+        let by_name: BTreeMap<_, _> = self.iter().filter_map(state).collect();
         by_name.into_values().collect()
     }
 

@@ -21,6 +21,7 @@ mod progress;
 mod project;
 mod run;
 mod schema;
+mod schema_code;
 mod shadow;
 mod shell;
 mod steer;

@@ -1,6 +1,7 @@
 //! The command `schema`.
 
 use super::output::{print_json, print_text};
+use super::schema_code::{self, Language};
 use anyhow::{Result, bail};
 use bus::announcement::Announcement;
 use bus::schema::Schema;
@@ -17,6 +18,13 @@ pub struct SchemaArguments {
     /// Print JSON, with the ROS 2 definitions. Hashes of layouts are strings of hexadecimal digits.
     #[arg(long)]
     json: bool,
+    /// Print structs for C, and the tables by which a program declares them; with the states of components, which a
+    /// controller may take over.
+    #[arg(long, conflicts_with = "json")]
+    c: bool,
+    /// The same for C++.
+    #[arg(long, conflicts_with_all = ["json", "c"])]
+    cpp: bool,
 }
 
 /// Prints the messages that components' ports carry: all, or the one that is named.
@@ -24,8 +32,11 @@ pub struct SchemaArguments {
 /// # Errors
 /// If there is no such message, or it cannot be printed.
 pub fn schema(arguments: &SchemaArguments) -> Result<bool> {
-    let schemas = chosen(arguments.message.as_deref())?;
-    if arguments.json {
+    let language = arguments.language();
+    let schemas = chosen(arguments.message.as_deref(), language.is_some())?;
+    if let Some(language) = language {
+        print_text(&schema_code::header(&schemas, language))?;
+    } else if arguments.json {
         print_json(&schemas.into_iter().map(announced).collect::<Result<Vec<_>>>()?)?;
     } else {
         print_text(&text(&schemas))?;
@@ -33,9 +44,20 @@ pub fn schema(arguments: &SchemaArguments) -> Result<bool> {
     Ok(true)
 }
 
-/// The messages whose name, with or without its package, is `name`.
-fn chosen(name: Option<&str>) -> Result<Vec<&'static Schema>> {
+impl SchemaArguments {
+    fn language(&self) -> Option<Language> {
+        let languages = [(self.c, Language::C), (self.cpp, Language::Cpp)];
+        languages.into_iter().find(|(is_asked, _)| *is_asked).map(|(_, language)| language)
+    }
+}
+
+/// The messages whose name, with or without its package, is `name`; `with_states`, states of components that are messages
+/// as well.
+fn chosen(name: Option<&str>, with_states: bool) -> Result<Vec<&'static Schema>> {
     let mut schemas = COMPONENTS.messages();
+    if with_states {
+        schemas.extend(COMPONENTS.states());
+    }
     let Some(name) = name else { return Ok(schemas) };
     let names: Vec<_> = schemas.iter().map(|schema| short(schema)).collect();
     let known = names.join(", ");

@@ -1,0 +1,1211 @@
+// The messages of hummingbus for C++17. Made by `hummingbus schema --cpp`: not to be edited.
+
+#pragma once
+
+#include "hummingbus.hpp"
+
+#include <array>
+#include <cstdint>
+
+namespace hummingbus::msgs {
+// Simulation time as ROS 2 writes it. The bus fills it in when a sample is sent.
+struct Time {
+  // Whole seconds since tick 0. [s]
+  std::int32_t sec{};
+  // The rest, 0 to 999 999 999. [ns]
+  std::uint32_t nanosec{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::Time, "builtin_interfaces/msg/Time", "Simulation time as ROS 2 writes it. The bus fills it in when a sample is sent.",
+    HUMMINGBUS_FIELD(sec, "s", "", "Whole seconds since tick 0."),
+    HUMMINGBUS_FIELD(nanosec, "ns", "", "The rest, 0 to 999 999 999."));
+
+namespace hummingbus::msgs {
+// A unit quaternion, Hamilton convention, stored x, y, z, w; it rotates body vectors into the world.
+struct Quaternion {
+  // Vector part along x. [1]
+  double x{};
+  // Vector part along y. [1]
+  double y{};
+  // Vector part along z. [1]
+  double z{};
+  // Scalar part. [1]
+  double w{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::Quaternion, "hummingbus_msgs/msg/Quaternion", "A unit quaternion, Hamilton convention, stored x, y, z, w; it rotates body vectors into the world.",
+    HUMMINGBUS_FIELD(x, "1", "", "Vector part along x."),
+    HUMMINGBUS_FIELD(y, "1", "", "Vector part along y."),
+    HUMMINGBUS_FIELD(z, "1", "", "Vector part along z."),
+    HUMMINGBUS_FIELD(w, "1", "", "Scalar part."));
+
+namespace hummingbus::msgs {
+// Three numbers along the axes of a frame.
+struct Vector3 {
+  // Along x.
+  double x{};
+  // Along y.
+  double y{};
+  // Along z.
+  double z{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::Vector3, "hummingbus_msgs/msg/Vector3", "Three numbers along the axes of a frame.",
+    HUMMINGBUS_FIELD(x, "", "", "Along x."),
+    HUMMINGBUS_FIELD(y, "", "", "Along y."),
+    HUMMINGBUS_FIELD(z, "", "", "Along z."));
+
+namespace hummingbus::msgs {
+// Estimated attitude and angular velocity.
+struct AttitudeEstimate {
+  // Simulation time.
+  Time stamp{};
+  // Attitude, body to world. in world
+  Quaternion attitude{};
+  // Roll about body x (z-y-x sequence). [rad] in world
+  double roll{};
+  // Pitch about y, positive nose down. [rad] in world
+  double pitch{};
+  // Yaw about world z, positive counter-clockwise from above. [rad] in world
+  double yaw{};
+  // Angular velocity. [rad/s] in body
+  Vector3 angular_velocity{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::AttitudeEstimate, "hummingbus_msgs/msg/AttitudeEstimate", "Estimated attitude and angular velocity.",
+    HUMMINGBUS_FIELD(stamp, "", "", "Simulation time."),
+    HUMMINGBUS_FIELD(attitude, "", "world", "Attitude, body to world."),
+    HUMMINGBUS_FIELD(roll, "rad", "world", "Roll about body x (z-y-x sequence)."),
+    HUMMINGBUS_FIELD(pitch, "rad", "world", "Pitch about y, positive nose down."),
+    HUMMINGBUS_FIELD(yaw, "rad", "world", "Yaw about world z, positive counter-clockwise from above."),
+    HUMMINGBUS_FIELD(angular_velocity, "rad/s", "body", "Angular velocity."));
+
+namespace hummingbus::msgs {
+// What a barometer reports.
+struct Barometer {
+  // Simulation time of sending.
+  Time stamp{};
+  // Simulation time at which it was measured. [ns]
+  std::uint64_t measured_ns{};
+  // Static pressure. [Pa]
+  double pressure{};
+  // Height above the world's origin that the pressure means in the standard atmosphere. [m] in world
+  double altitude{};
+  // 1 if this sample holds a measurement, 0 if it was lost. [1]
+  std::uint32_t valid{};
+  // Zero.
+  std::uint32_t pad0{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::Barometer, "hummingbus_msgs/msg/Barometer", "What a barometer reports.",
+    HUMMINGBUS_FIELD(stamp, "", "", "Simulation time of sending."),
+    HUMMINGBUS_FIELD(measured_ns, "ns", "", "Simulation time at which it was measured."),
+    HUMMINGBUS_FIELD(pressure, "Pa", "", "Static pressure."),
+    HUMMINGBUS_FIELD(altitude, "m", "world", "Height above the world's origin that the pressure means in the standard atmosphere."),
+    HUMMINGBUS_FIELD(valid, "1", "", "1 if this sample holds a measurement, 0 if it was lost."),
+    HUMMINGBUS_FIELD(pad0, "", "", "Zero."));
+
+namespace hummingbus::msgs {
+// Voltage and current of the battery, true or measured.
+struct Battery {
+  // Simulation time of sending.
+  Time stamp{};
+  // Simulation time at which it was measured. [ns]
+  std::uint64_t measured_ns{};
+  // Voltage at the terminals. [V]
+  double voltage{};
+  // Current drawn. [A]
+  double current{};
+  // What is left of the capacity, 0 to 1. [1]
+  double charge{};
+  // 1 if this sample holds a measurement, 0 if it was lost or the plant has no model of its battery. [1]
+  std::uint32_t valid{};
+  // Zero.
+  std::uint32_t pad0{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::Battery, "hummingbus_msgs/msg/Battery", "Voltage and current of the battery, true or measured.",
+    HUMMINGBUS_FIELD(stamp, "", "", "Simulation time of sending."),
+    HUMMINGBUS_FIELD(measured_ns, "ns", "", "Simulation time at which it was measured."),
+    HUMMINGBUS_FIELD(voltage, "V", "", "Voltage at the terminals."),
+    HUMMINGBUS_FIELD(current, "A", "", "Current drawn."),
+    HUMMINGBUS_FIELD(charge, "1", "", "What is left of the capacity, 0 to 1."),
+    HUMMINGBUS_FIELD(valid, "1", "", "1 if this sample holds a measurement, 0 if it was lost or the plant has no model of its battery."),
+    HUMMINGBUS_FIELD(pad0, "", "", "Zero."));
+
+namespace hummingbus::msgs {
+// Where the free bodies of a scene are, and how they move, in the order of the scene: those beyond `count` are zeros.
+struct BodyStates {
+  // Simulation time.
+  Time stamp{};
+  // How many bodies there are. [1]
+  std::uint32_t count{};
+  // Zero.
+  std::uint32_t pad0{};
+  // Their numbers among the things of the scene, as `Contact` counts them: 2 + i of the thing i. [1]
+  std::array<std::uint32_t, 16> object{};
+  // Positions of their centres of mass. [m] in world
+  std::array<Vector3, 16> position{};
+  // Attitudes, the body's own axes to the world's. in world
+  std::array<Quaternion, 16> attitude{};
+  // Velocities of their centres of mass. [m/s] in world
+  std::array<Vector3, 16> velocity{};
+  // Angular velocities. [rad/s] in world
+  std::array<Vector3, 16> angular_velocity{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::BodyStates, "hummingbus_msgs/msg/BodyStates", "Where the free bodies of a scene are, and how they move, in the order of the scene: those beyond `count` are zeros.",
+    HUMMINGBUS_FIELD(stamp, "", "", "Simulation time."),
+    HUMMINGBUS_FIELD(count, "1", "", "How many bodies there are."),
+    HUMMINGBUS_FIELD(pad0, "", "", "Zero."),
+    HUMMINGBUS_FIELD(object, "1", "", "Their numbers among the things of the scene, as `Contact` counts them: 2 + i of the thing i."),
+    HUMMINGBUS_FIELD(position, "m", "world", "Positions of their centres of mass."),
+    HUMMINGBUS_FIELD(attitude, "", "world", "Attitudes, the body's own axes to the world's."),
+    HUMMINGBUS_FIELD(velocity, "m/s", "world", "Velocities of their centres of mass."),
+    HUMMINGBUS_FIELD(angular_velocity, "rad/s", "world", "Angular velocities."));
+
+namespace hummingbus::msgs {
+// How far a vehicle truly is from what stands in the scene: for judging and plotting, not for controllers.
+struct Clearance {
+  // Simulation time.
+  Time stamp{};
+  // Distance from the centre of mass to the nearest box. [m] in world
+  double nearest{};
+  // Distances to what stands along the world's +x, -x, +y, -y; 1000 where nothing does. [m] in world
+  std::array<double, 4> wall{};
+  // The smallest of them less the distance that is to be kept. [m] in world
+  double side_error{};
+  // Turns flown about the world's origin, clockwise from above as positive: laps of a room. [1]
+  double laps{};
+  // 1 in the corner between two walls, where both are about as far as is to be kept; 0 along a side. [1]
+  std::uint32_t corner{};
+  // Zero.
+  std::uint32_t pad0{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::Clearance, "hummingbus_msgs/msg/Clearance", "How far a vehicle truly is from what stands in the scene: for judging and plotting, not for controllers.",
+    HUMMINGBUS_FIELD(stamp, "", "", "Simulation time."),
+    HUMMINGBUS_FIELD(nearest, "m", "world", "Distance from the centre of mass to the nearest box."),
+    HUMMINGBUS_FIELD(wall, "m", "world", "Distances to what stands along the world's +x, -x, +y, -y; 1000 where nothing does."),
+    HUMMINGBUS_FIELD(side_error, "m", "world", "The smallest of them less the distance that is to be kept."),
+    HUMMINGBUS_FIELD(laps, "1", "", "Turns flown about the world's origin, clockwise from above as positive: laps of a room."),
+    HUMMINGBUS_FIELD(corner, "1", "", "1 in the corner between two walls, where both are about as far as is to be kept; 0 along a side."),
+    HUMMINGBUS_FIELD(pad0, "", "", "Zero."));
+
+namespace hummingbus::msgs {
+// What the plant touches, whatever else is in the scene.
+struct Contact {
+  // Simulation time.
+  Time stamp{};
+  // Sum of the contact forces over the last tick. [N] in world
+  Vector3 force{};
+  // Speed of approach just before the newest impact: a part of the vehicle, a foot or the disc of propellers, touched something that it had not touched. The fastest of those within a tick; 0 without a contact. [m/s]
+  double impact_speed{};
+  // Number of things touched: the ground, boxes, other vehicles. [1]
+  std::uint32_t count{};
+  // What is touched first: 0 nothing, 1 the ground, 2 + i the scene's thing i (boxes first, then meshes), 1000 + i the other vehicle i. [1]
+  std::uint32_t object{};
+  // Contacts that began since the run started, resting on the ground at the start left out. [1]
+  std::uint32_t began{};
+  // 1 from the first impact on that was faster than the vehicle bears. [1]
+  std::uint32_t crashed{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::Contact, "hummingbus_msgs/msg/Contact", "What the plant touches, whatever else is in the scene.",
+    HUMMINGBUS_FIELD(stamp, "", "", "Simulation time."),
+    HUMMINGBUS_FIELD(force, "N", "world", "Sum of the contact forces over the last tick."),
+    HUMMINGBUS_FIELD(impact_speed, "m/s", "", "Speed of approach just before the newest impact: a part of the vehicle, a foot or the disc of propellers, touched something that it had not touched. The fastest of those within a tick; 0 without a contact."),
+    HUMMINGBUS_FIELD(count, "1", "", "Number of things touched: the ground, boxes, other vehicles."),
+    HUMMINGBUS_FIELD(object, "1", "", "What is touched first: 0 nothing, 1 the ground, 2 + i the scene's thing i (boxes first, then meshes), 1000 + i the other vehicle i."),
+    HUMMINGBUS_FIELD(began, "1", "", "Contacts that began since the run started, resting on the ground at the start left out."),
+    HUMMINGBUS_FIELD(crashed, "1", "", "1 from the first impact on that was faster than the vehicle bears."));
+
+namespace hummingbus::msgs {
+// What a controller did at a tick: what it asked for, what the rotors could give, what state it is in.
+struct ControlStatus {
+  // Simulation time.
+  Time stamp{};
+  // Altitude that its inner loops hold: the pilot's, or its outer loop's. [m] in world
+  double altitude_set_point{};
+  // Roll, pitch and yaw that its inner loops hold. [rad] in world
+  std::array<double, 3> attitude_set_point{};
+  // Velocity that its outer loop asks for, level axes along the heading; 0 without one. [m/s]
+  std::array<double, 2> velocity_set_point{};
+  // Demanded thrust along body z. [N] in body
+  double thrust{};
+  // Demanded torque. [N*m] in body
+  Vector3 torque{};
+  // Thrust made less thrust demanded; it is given up first. [N]
+  double thrust_error{};
+  // The part of the demanded roll and pitch torque that is made, 0 to 1. [1]
+  double roll_pitch_part{};
+  // The part of the demanded yaw torque that is made, 0 to 1. [1]
+  double yaw_part{};
+  // 1 if any of the demand was given up. [1]
+  std::uint32_t saturated{};
+  // State of its guidance: of `wall-follow` 1 to 5 as in the thesis, of `wall-stop` 1 cruising, 2 braking, 3 holding; 0 without guidance. [1]
+  std::uint32_t state{};
+  // Laps flown. [1]
+  std::uint32_t laps{};
+  // Zero.
+  std::uint32_t pad0{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::ControlStatus, "hummingbus_msgs/msg/ControlStatus", "What a controller did at a tick: what it asked for, what the rotors could give, what state it is in.",
+    HUMMINGBUS_FIELD(stamp, "", "", "Simulation time."),
+    HUMMINGBUS_FIELD(altitude_set_point, "m", "world", "Altitude that its inner loops hold: the pilot's, or its outer loop's."),
+    HUMMINGBUS_FIELD(attitude_set_point, "rad", "world", "Roll, pitch and yaw that its inner loops hold."),
+    HUMMINGBUS_FIELD(velocity_set_point, "m/s", "", "Velocity that its outer loop asks for, level axes along the heading; 0 without one."),
+    HUMMINGBUS_FIELD(thrust, "N", "body", "Demanded thrust along body z."),
+    HUMMINGBUS_FIELD(torque, "N*m", "body", "Demanded torque."),
+    HUMMINGBUS_FIELD(thrust_error, "N", "", "Thrust made less thrust demanded; it is given up first."),
+    HUMMINGBUS_FIELD(roll_pitch_part, "1", "", "The part of the demanded roll and pitch torque that is made, 0 to 1."),
+    HUMMINGBUS_FIELD(yaw_part, "1", "", "The part of the demanded yaw torque that is made, 0 to 1."),
+    HUMMINGBUS_FIELD(saturated, "1", "", "1 if any of the demand was given up."),
+    HUMMINGBUS_FIELD(state, "1", "", "State of its guidance: of `wall-follow` 1 to 5 as in the thesis, of `wall-stop` 1 cruising, 2 braking, 3 holding; 0 without guidance."),
+    HUMMINGBUS_FIELD(laps, "1", "", "Laps flown."),
+    HUMMINGBUS_FIELD(pad0, "", "", "Zero."));
+
+namespace hummingbus::msgs {
+// What a satellite receiver reports, in the world's axes.
+struct Gps {
+  // Simulation time of sending.
+  Time stamp{};
+  // Simulation time at which it was measured. [ns]
+  std::uint64_t measured_ns{};
+  // Position of the centre of mass. [m] in world
+  Vector3 position{};
+  // Velocity of the centre of mass. [m/s] in world
+  Vector3 velocity{};
+  // 1 if this sample holds a measurement, 0 if it was lost. [1]
+  std::uint32_t valid{};
+  // Zero.
+  std::uint32_t pad0{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::Gps, "hummingbus_msgs/msg/Gps", "What a satellite receiver reports, in the world's axes.",
+    HUMMINGBUS_FIELD(stamp, "", "", "Simulation time of sending."),
+    HUMMINGBUS_FIELD(measured_ns, "ns", "", "Simulation time at which it was measured."),
+    HUMMINGBUS_FIELD(position, "m", "world", "Position of the centre of mass."),
+    HUMMINGBUS_FIELD(velocity, "m/s", "world", "Velocity of the centre of mass."),
+    HUMMINGBUS_FIELD(valid, "1", "", "1 if this sample holds a measurement, 0 if it was lost."),
+    HUMMINGBUS_FIELD(pad0, "", "", "Zero."));
+
+namespace hummingbus::msgs {
+// What an inertial measurement unit reports.
+struct Imu {
+  // Simulation time.
+  Time stamp{};
+  // Measured specific force (at rest: +g along z). [m/s^2] in body
+  Vector3 specific_force{};
+  // Measured angular velocity. [rad/s] in body
+  Vector3 angular_velocity{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::Imu, "hummingbus_msgs/msg/Imu", "What an inertial measurement unit reports.",
+    HUMMINGBUS_FIELD(stamp, "", "", "Simulation time."),
+    HUMMINGBUS_FIELD(specific_force, "m/s^2", "body", "Measured specific force (at rest: +g along z)."),
+    HUMMINGBUS_FIELD(angular_velocity, "rad/s", "body", "Measured angular velocity."));
+
+namespace hummingbus::msgs {
+// How well an estimator's predictions met its measurements: the last update of each sensor.
+struct Innovation {
+  // Simulation time.
+  Time stamp{};
+  // Normalised innovation squared of the last update by GPS, motion capture, barometer, magnetometer. [1]
+  std::array<double, 4> normalised_squared{};
+  // Its degrees of freedom, which it should equal on average. [1]
+  std::array<std::uint32_t, 4> degrees_of_freedom{};
+  // Updates so far. [1]
+  std::array<std::uint32_t, 4> updates{};
+  // Measurements refused as outliers so far. [1]
+  std::array<std::uint32_t, 4> refused{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::Innovation, "hummingbus_msgs/msg/Innovation", "How well an estimator's predictions met its measurements: the last update of each sensor.",
+    HUMMINGBUS_FIELD(stamp, "", "", "Simulation time."),
+    HUMMINGBUS_FIELD(normalised_squared, "1", "", "Normalised innovation squared of the last update by GPS, motion capture, barometer, magnetometer."),
+    HUMMINGBUS_FIELD(degrees_of_freedom, "1", "", "Its degrees of freedom, which it should equal on average."),
+    HUMMINGBUS_FIELD(updates, "1", "", "Updates so far."),
+    HUMMINGBUS_FIELD(refused, "1", "", "Measurements refused as outliers so far."));
+
+namespace hummingbus::msgs {
+// What a link says of itself, from its first tick on; arrays by the names of the streams.
+struct LinkStatistics {
+  // Simulation time.
+  Time stamp{};
+  // Whole bytes that the wire has carried. [1]
+  std::uint64_t sent_bytes{};
+  // Bytes that wait for the wire. [1]
+  std::uint32_t queued_bytes{};
+  // Messages that wait for the wire. [1]
+  std::uint32_t queued{};
+  // How long the message that arrived last had taken since it was queued. [s]
+  double delay{};
+  // Messages that are on the wire or behind it. [1]
+  std::uint32_t under_way{};
+  // Messages that have arrived. [1]
+  std::uint32_t arrived{};
+  // Messages that were lost on the way; counted when they would have arrived. [1]
+  std::uint32_t lost{};
+  // Messages that were dropped because the queue was full. [1]
+  std::uint32_t dropped{};
+  // Messages that have arrived, by stream. [1]
+  std::array<std::uint32_t, 16> stream_arrived{};
+  // Messages that were lost on the way, by stream. [1]
+  std::array<std::uint32_t, 16> stream_lost{};
+  // Messages that were dropped because the queue was full, by stream. [1]
+  std::array<std::uint32_t, 16> stream_dropped{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::LinkStatistics, "hummingbus_msgs/msg/LinkStatistics", "What a link says of itself, from its first tick on; arrays by the names of the streams.",
+    HUMMINGBUS_FIELD(stamp, "", "", "Simulation time."),
+    HUMMINGBUS_FIELD(sent_bytes, "1", "", "Whole bytes that the wire has carried."),
+    HUMMINGBUS_FIELD(queued_bytes, "1", "", "Bytes that wait for the wire."),
+    HUMMINGBUS_FIELD(queued, "1", "", "Messages that wait for the wire."),
+    HUMMINGBUS_FIELD(delay, "s", "", "How long the message that arrived last had taken since it was queued."),
+    HUMMINGBUS_FIELD(under_way, "1", "", "Messages that are on the wire or behind it."),
+    HUMMINGBUS_FIELD(arrived, "1", "", "Messages that have arrived."),
+    HUMMINGBUS_FIELD(lost, "1", "", "Messages that were lost on the way; counted when they would have arrived."),
+    HUMMINGBUS_FIELD(dropped, "1", "", "Messages that were dropped because the queue was full."),
+    HUMMINGBUS_FIELD(stream_arrived, "1", "", "Messages that have arrived, by stream."),
+    HUMMINGBUS_FIELD(stream_lost, "1", "", "Messages that were lost on the way, by stream."),
+    HUMMINGBUS_FIELD(stream_dropped, "1", "", "Messages that were dropped because the queue was full, by stream."));
+
+namespace hummingbus::msgs {
+// What a magnetometer reports.
+struct Magnetometer {
+  // Simulation time of sending.
+  Time stamp{};
+  // Simulation time at which it was measured. [ns]
+  std::uint64_t measured_ns{};
+  // Magnetic flux density. [T] in body
+  Vector3 field{};
+  // 1 if this sample holds a measurement, 0 if it was lost. [1]
+  std::uint32_t valid{};
+  // Zero.
+  std::uint32_t pad0{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::Magnetometer, "hummingbus_msgs/msg/Magnetometer", "What a magnetometer reports.",
+    HUMMINGBUS_FIELD(stamp, "", "", "Simulation time of sending."),
+    HUMMINGBUS_FIELD(measured_ns, "ns", "", "Simulation time at which it was measured."),
+    HUMMINGBUS_FIELD(field, "T", "body", "Magnetic flux density."),
+    HUMMINGBUS_FIELD(valid, "1", "", "1 if this sample holds a measurement, 0 if it was lost."),
+    HUMMINGBUS_FIELD(pad0, "", "", "Zero."));
+
+namespace hummingbus::msgs {
+// A vehicle's state as measured in a real flight.
+struct MeasuredState {
+  // Simulation time.
+  Time stamp{};
+  // Position. [m] in world
+  Vector3 position{};
+  // Velocity. [m/s] in world
+  Vector3 velocity{};
+  // Attitude, body to world. in world
+  Quaternion attitude{};
+  // Angular velocity. [rad/s] in body
+  Vector3 angular_velocity{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::MeasuredState, "hummingbus_msgs/msg/MeasuredState", "A vehicle's state as measured in a real flight.",
+    HUMMINGBUS_FIELD(stamp, "", "", "Simulation time."),
+    HUMMINGBUS_FIELD(position, "m", "world", "Position."),
+    HUMMINGBUS_FIELD(velocity, "m/s", "world", "Velocity."),
+    HUMMINGBUS_FIELD(attitude, "", "world", "Attitude, body to world."),
+    HUMMINGBUS_FIELD(angular_velocity, "rad/s", "body", "Angular velocity."));
+
+namespace hummingbus::msgs {
+// What a motion-capture system reports.
+struct Mocap {
+  // Simulation time of sending.
+  Time stamp{};
+  // Simulation time at which it was measured. [ns]
+  std::uint64_t measured_ns{};
+  // Position of the centre of mass. [m] in world
+  Vector3 position{};
+  // Attitude, body to world. in world
+  Quaternion attitude{};
+  // 1 if this sample holds a measurement, 0 if it was lost. [1]
+  std::uint32_t valid{};
+  // Zero.
+  std::uint32_t pad0{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::Mocap, "hummingbus_msgs/msg/Mocap", "What a motion-capture system reports.",
+    HUMMINGBUS_FIELD(stamp, "", "", "Simulation time of sending."),
+    HUMMINGBUS_FIELD(measured_ns, "ns", "", "Simulation time at which it was measured."),
+    HUMMINGBUS_FIELD(position, "m", "world", "Position of the centre of mass."),
+    HUMMINGBUS_FIELD(attitude, "", "world", "Attitude, body to world."),
+    HUMMINGBUS_FIELD(valid, "1", "", "1 if this sample holds a measurement, 0 if it was lost."),
+    HUMMINGBUS_FIELD(pad0, "", "", "Zero."));
+
+namespace hummingbus::msgs {
+// Motor commands in the vehicle's own raw counts (Hummingbird 1…200, Crazyflie 0…65535).
+struct MotorCommand {
+  // Simulation time.
+  Time stamp{};
+  // Commands in the order of the vehicle file's rotors; its `command` table maps them to speeds. [count]
+  hummingbus::Bounded<double, 12> command{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::MotorCommand, "hummingbus_msgs/msg/MotorCommand", "Motor commands in the vehicle's own raw counts (Hummingbird 1…200, Crazyflie 0…65535).",
+    HUMMINGBUS_FIELD(stamp, "", "", "Simulation time."),
+    HUMMINGBUS_FIELD(command, "count", "", "Commands in the order of the vehicle file's rotors; its `command` table maps them to speeds."));
+
+namespace hummingbus::msgs {
+// The true state of a vehicle and its rotors. Sensors and recorders read it; estimators do not.
+struct PlantState {
+  // Simulation time.
+  Time stamp{};
+  // Position of the centre of mass. [m] in world
+  Vector3 position{};
+  // Velocity of the centre of mass. [m/s] in world
+  Vector3 velocity{};
+  // Attitude, body to world. in world
+  Quaternion attitude{};
+  // Angular velocity of the body against the world. [rad/s] in body
+  Vector3 angular_velocity{};
+  // Specific force at the centre of mass: what an ideal accelerometer there reads. [m/s^2] in body
+  Vector3 specific_force{};
+  // Rotor speeds, in the order of the vehicle file. [rad/s]
+  hummingbus::Bounded<double, 12> rotor_speed{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::PlantState, "hummingbus_msgs/msg/PlantState", "The true state of a vehicle and its rotors. Sensors and recorders read it; estimators do not.",
+    HUMMINGBUS_FIELD(stamp, "", "", "Simulation time."),
+    HUMMINGBUS_FIELD(position, "m", "world", "Position of the centre of mass."),
+    HUMMINGBUS_FIELD(velocity, "m/s", "world", "Velocity of the centre of mass."),
+    HUMMINGBUS_FIELD(attitude, "", "world", "Attitude, body to world."),
+    HUMMINGBUS_FIELD(angular_velocity, "rad/s", "body", "Angular velocity of the body against the world."),
+    HUMMINGBUS_FIELD(specific_force, "m/s^2", "body", "Specific force at the centre of mass: what an ideal accelerometer there reads."),
+    HUMMINGBUS_FIELD(rotor_speed, "rad/s", "", "Rotor speeds, in the order of the vehicle file."));
+
+namespace hummingbus::msgs {
+// What five range finders report, in the order +x, -x, +y, -y of the body, and down.
+struct Ranges {
+  // Simulation time of sending.
+  Time stamp{};
+  // Simulation time at which it was measured. [ns]
+  std::uint64_t measured_ns{};
+  // Distances; the sensor's reach where nothing is met. [m] in body
+  std::array<double, 5> distance{};
+  // 1 for each beam that measured something, 0 where it met nothing within reach or was lost. [1]
+  std::array<std::uint32_t, 5> valid{};
+  // Zero.
+  std::uint32_t pad0{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::Ranges, "hummingbus_msgs/msg/Ranges", "What five range finders report, in the order +x, -x, +y, -y of the body, and down.",
+    HUMMINGBUS_FIELD(stamp, "", "", "Simulation time of sending."),
+    HUMMINGBUS_FIELD(measured_ns, "ns", "", "Simulation time at which it was measured."),
+    HUMMINGBUS_FIELD(distance, "m", "body", "Distances; the sensor's reach where nothing is met."),
+    HUMMINGBUS_FIELD(valid, "1", "", "1 for each beam that measured something, 0 where it met nothing within reach or was lost."),
+    HUMMINGBUS_FIELD(pad0, "", "", "Zero."));
+
+namespace hummingbus::msgs {
+// A point of a trajectory.
+struct Reference {
+  // Simulation time.
+  Time stamp{};
+  // Position. [m] in world
+  Vector3 position{};
+  // Velocity. [m/s] in world
+  Vector3 velocity{};
+  // Acceleration. [m/s^2] in world
+  Vector3 acceleration{};
+  // Jerk. [m/s^3] in world
+  Vector3 jerk{};
+  // Snap. [m/s^4] in world
+  Vector3 snap{};
+  // Yaw. [rad] in world
+  double yaw{};
+  // Its rate of change. [rad/s] in world
+  double yaw_rate{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::Reference, "hummingbus_msgs/msg/Reference", "A point of a trajectory.",
+    HUMMINGBUS_FIELD(stamp, "", "", "Simulation time."),
+    HUMMINGBUS_FIELD(position, "m", "world", "Position."),
+    HUMMINGBUS_FIELD(velocity, "m/s", "world", "Velocity."),
+    HUMMINGBUS_FIELD(acceleration, "m/s^2", "world", "Acceleration."),
+    HUMMINGBUS_FIELD(jerk, "m/s^3", "world", "Jerk."),
+    HUMMINGBUS_FIELD(snap, "m/s^4", "world", "Snap."),
+    HUMMINGBUS_FIELD(yaw, "rad", "world", "Yaw."),
+    HUMMINGBUS_FIELD(yaw_rate, "rad/s", "world", "Its rate of change."));
+
+namespace hummingbus::msgs {
+// What the stand's sensors read.
+struct RotorLoad {
+  // Simulation time.
+  Time stamp{};
+  // The speed that the motor is asked for. [rad/s]
+  double rotor_speed_commanded{};
+  // Speed of the rotor, positive in its own sense of rotation. [rad/s]
+  double rotor_speed{};
+  // Thrust along the rotor's axis. [N]
+  double thrust{};
+  // Torque of the air on the rotor, against its rotation. [N*m]
+  double drag_torque{};
+  // Torque on what the motor is bolted to, about the axis that points up: the air's drag and what speeds the rotor up. [N*m] in body
+  double mount_torque{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::RotorLoad, "hummingbus_msgs/msg/RotorLoad", "What the stand's sensors read.",
+    HUMMINGBUS_FIELD(stamp, "", "", "Simulation time."),
+    HUMMINGBUS_FIELD(rotor_speed_commanded, "rad/s", "", "The speed that the motor is asked for."),
+    HUMMINGBUS_FIELD(rotor_speed, "rad/s", "", "Speed of the rotor, positive in its own sense of rotation."),
+    HUMMINGBUS_FIELD(thrust, "N", "", "Thrust along the rotor's axis."),
+    HUMMINGBUS_FIELD(drag_torque, "N*m", "", "Torque of the air on the rotor, against its rotation."),
+    HUMMINGBUS_FIELD(mount_torque, "N*m", "body", "Torque on what the motor is bolted to, about the axis that points up: the air's drag and what speeds the rotor up."));
+
+namespace hummingbus::msgs {
+// What the controllers of the motors report.
+struct RotorSpeeds {
+  // Simulation time of sending.
+  Time stamp{};
+  // Simulation time at which it was measured. [ns]
+  std::uint64_t measured_ns{};
+  // 1 if this sample holds a measurement, 0 if it was lost. [1]
+  std::uint32_t valid{};
+  // Zero.
+  std::uint32_t pad0{};
+  // Speeds of the rotors, in the order of the vehicle file. [rad/s]
+  hummingbus::Bounded<double, 12> rotor_speed{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::RotorSpeeds, "hummingbus_msgs/msg/RotorSpeeds", "What the controllers of the motors report.",
+    HUMMINGBUS_FIELD(stamp, "", "", "Simulation time of sending."),
+    HUMMINGBUS_FIELD(measured_ns, "ns", "", "Simulation time at which it was measured."),
+    HUMMINGBUS_FIELD(valid, "1", "", "1 if this sample holds a measurement, 0 if it was lost."),
+    HUMMINGBUS_FIELD(pad0, "", "", "Zero."),
+    HUMMINGBUS_FIELD(rotor_speed, "rad/s", "", "Speeds of the rotors, in the order of the vehicle file."));
+
+namespace hummingbus::msgs {
+// What a pilot or a planner asks of the controller.
+struct SetPoint {
+  // Simulation time.
+  Time stamp{};
+  // Altitude of the centre of mass. [m] in world
+  double altitude{};
+  // Roll. [rad] in world
+  double roll{};
+  // Pitch, positive nose down. [rad] in world
+  double pitch{};
+  // Yaw. [rad] in world
+  double yaw{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::SetPoint, "hummingbus_msgs/msg/SetPoint", "What a pilot or a planner asks of the controller.",
+    HUMMINGBUS_FIELD(stamp, "", "", "Simulation time."),
+    HUMMINGBUS_FIELD(altitude, "m", "world", "Altitude of the centre of mass."),
+    HUMMINGBUS_FIELD(roll, "rad", "world", "Roll."),
+    HUMMINGBUS_FIELD(pitch, "rad", "world", "Pitch, positive nose down."),
+    HUMMINGBUS_FIELD(yaw, "rad", "world", "Yaw."));
+
+namespace hummingbus::msgs {
+// What an estimator believes of the vehicle's motion.
+struct StateEstimate {
+  // Simulation time.
+  Time stamp{};
+  // Position of the centre of mass. [m] in world
+  Vector3 position{};
+  // Velocity of the centre of mass. [m/s] in world
+  Vector3 velocity{};
+  // Attitude, body to world. in world
+  Quaternion attitude{};
+  // Angular velocity, the gyroscope's estimated bias taken off. [rad/s] in body
+  Vector3 angular_velocity{};
+  // Standard deviation of the position as the estimator believes it. [m] in world
+  Vector3 position_sigma{};
+  // Standard deviation of the velocity. [m/s] in world
+  Vector3 velocity_sigma{};
+  // Standard deviation of the attitude, as a rotation vector. [rad] in body
+  Vector3 attitude_sigma{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::StateEstimate, "hummingbus_msgs/msg/StateEstimate", "What an estimator believes of the vehicle's motion.",
+    HUMMINGBUS_FIELD(stamp, "", "", "Simulation time."),
+    HUMMINGBUS_FIELD(position, "m", "world", "Position of the centre of mass."),
+    HUMMINGBUS_FIELD(velocity, "m/s", "world", "Velocity of the centre of mass."),
+    HUMMINGBUS_FIELD(attitude, "", "world", "Attitude, body to world."),
+    HUMMINGBUS_FIELD(angular_velocity, "rad/s", "body", "Angular velocity, the gyroscope's estimated bias taken off."),
+    HUMMINGBUS_FIELD(position_sigma, "m", "world", "Standard deviation of the position as the estimator believes it."),
+    HUMMINGBUS_FIELD(velocity_sigma, "m/s", "world", "Standard deviation of the velocity."),
+    HUMMINGBUS_FIELD(attitude_sigma, "rad", "body", "Standard deviation of the attitude, as a rotation vector."));
+
+namespace hummingbus::msgs {
+// Where the vehicles of a run are, for those that share a room.
+struct Traffic {
+  // Simulation time.
+  Time stamp{};
+  // How many vehicles there are. [1]
+  std::uint32_t count{};
+  // Zero.
+  std::uint32_t pad0{};
+  // Positions of their centres of mass, in the order of the inputs' names. [m] in world
+  std::array<Vector3, 32> position{};
+  // Their velocities. [m/s] in world
+  std::array<Vector3, 32> velocity{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::Traffic, "hummingbus_msgs/msg/Traffic", "Where the vehicles of a run are, for those that share a room.",
+    HUMMINGBUS_FIELD(stamp, "", "", "Simulation time."),
+    HUMMINGBUS_FIELD(count, "1", "", "How many vehicles there are."),
+    HUMMINGBUS_FIELD(pad0, "", "", "Zero."),
+    HUMMINGBUS_FIELD(position, "m", "world", "Positions of their centres of mass, in the order of the inputs' names."),
+    HUMMINGBUS_FIELD(velocity, "m/s", "world", "Their velocities."));
+
+namespace hummingbus::msgs {
+// What an estimator makes of range finders: level distances to what stands around.
+struct WallEstimate {
+  // Simulation time.
+  Time stamp{};
+  // Level distances along the heading's +x, -x, +y, -y; the sensor's reach where nothing is in sight. [m]
+  std::array<double, 4> distance{};
+  // 1 where a wall is in sight. [1]
+  std::array<std::uint32_t, 4> in_sight{};
+  // Velocity along the heading's x and y: level axes that turn with the yaw. [m/s]
+  std::array<double, 2> velocity{};
+  // Height above what is below. [m]
+  double height{};
+  // Rate of climb. [m/s]
+  double climb_rate{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::WallEstimate, "hummingbus_msgs/msg/WallEstimate", "What an estimator makes of range finders: level distances to what stands around.",
+    HUMMINGBUS_FIELD(stamp, "", "", "Simulation time."),
+    HUMMINGBUS_FIELD(distance, "m", "", "Level distances along the heading's +x, -x, +y, -y; the sensor's reach where nothing is in sight."),
+    HUMMINGBUS_FIELD(in_sight, "1", "", "1 where a wall is in sight."),
+    HUMMINGBUS_FIELD(velocity, "m/s", "", "Velocity along the heading's x and y: level axes that turn with the yaw."),
+    HUMMINGBUS_FIELD(height, "m", "", "Height above what is below."),
+    HUMMINGBUS_FIELD(climb_rate, "m/s", "", "Rate of climb."));
+
+namespace hummingbus::msgs {
+// What is remembered of a channel from tick to tick, beside the queue of measurements.
+struct ChannelState {
+  // Simulation time from which on the next measurement is due. [ns]
+  std::uint64_t next_ns{};
+  // Measurements so far; number n is at place n modulo the length of the queue. [1]
+  std::uint64_t measured{};
+  // How many of them have arrived. [1]
+  std::uint64_t arrived{};
+  // When those in the queue arrive. [ns]
+  std::array<std::uint64_t, 32> arrival_ns{};
+  // Words of 32 bits drawn from the noise stream: the low and the high half of the count. [1]
+  std::array<std::uint64_t, 2> noise_words{};
+  // The same of the stream of losses. [1]
+  std::array<std::uint64_t, 2> loss_words{};
+  // Which parts of the last measurement were lost, a bit for each. [1]
+  std::uint32_t lost{};
+  // Zero.
+  std::uint32_t pad0{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::ChannelState, "hummingbus_msgs/msg/ChannelState", "What is remembered of a channel from tick to tick, beside the queue of measurements.",
+    HUMMINGBUS_FIELD(next_ns, "ns", "", "Simulation time from which on the next measurement is due."),
+    HUMMINGBUS_FIELD(measured, "1", "", "Measurements so far; number n is at place n modulo the length of the queue."),
+    HUMMINGBUS_FIELD(arrived, "1", "", "How many of them have arrived."),
+    HUMMINGBUS_FIELD(arrival_ns, "ns", "", "When those in the queue arrive."),
+    HUMMINGBUS_FIELD(noise_words, "1", "", "Words of 32 bits drawn from the noise stream: the low and the high half of the count."),
+    HUMMINGBUS_FIELD(loss_words, "1", "", "The same of the stream of losses."),
+    HUMMINGBUS_FIELD(lost, "1", "", "Which parts of the last measurement were lost, a bit for each."),
+    HUMMINGBUS_FIELD(pad0, "", "", "Zero."));
+
+namespace hummingbus::msgs {
+// All that the sensor remembers.
+struct BarometerState {
+  // What is under way.
+  ChannelState channel{};
+  // The last measurements.
+  std::array<Barometer, 32> queue{};
+  // The bias at the next measurement. [Pa]
+  double bias{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::BarometerState, "hummingbus_msgs/msg/BarometerState", "All that the sensor remembers.",
+    HUMMINGBUS_FIELD(channel, "", "", "What is under way."),
+    HUMMINGBUS_FIELD(queue, "", "", "The last measurements."),
+    HUMMINGBUS_FIELD(bias, "Pa", "", "The bias at the next measurement."));
+
+namespace hummingbus::msgs {
+// All that the sensor remembers.
+struct BatteryMonitorState {
+  // What is under way.
+  ChannelState channel{};
+  // The last measurements.
+  std::array<Battery, 32> queue{};
+  // The charge that is left. [1]
+  double charge{};
+  // Until when it is counted; the end of time before the first measurement. [ns]
+  std::uint64_t counted_ns{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::BatteryMonitorState, "hummingbus_msgs/msg/BatteryMonitorState", "All that the sensor remembers.",
+    HUMMINGBUS_FIELD(channel, "", "", "What is under way."),
+    HUMMINGBUS_FIELD(queue, "", "", "The last measurements."),
+    HUMMINGBUS_FIELD(charge, "1", "", "The charge that is left."),
+    HUMMINGBUS_FIELD(counted_ns, "ns", "", "Until when it is counted; the end of time before the first measurement."));
+
+namespace hummingbus::msgs {
+// All that the component remembers.
+struct ClearanceState {
+  // Bearing of the vehicle from the world's origin at the last tick; not a number before the first. [rad] in world
+  double bearing{};
+  // Turns flown clockwise. [1]
+  double laps{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::ClearanceState, "hummingbus_msgs/msg/ClearanceState", "All that the component remembers.",
+    HUMMINGBUS_FIELD(bearing, "rad", "world", "Bearing of the vehicle from the world's origin at the last tick; not a number before the first."),
+    HUMMINGBUS_FIELD(laps, "1", "", "Turns flown clockwise."));
+
+namespace hummingbus::msgs {
+// What the filter knows between two samples.
+struct ComplementaryState {
+  // The estimated attitude at the last sample, body to world. in world
+  Quaternion attitude{};
+  // The last sample's angular rate; not a number before the first. [rad/s] in body
+  Vector3 last_angular_velocity{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::ComplementaryState, "hummingbus_msgs/msg/ComplementaryState", "What the filter knows between two samples.",
+    HUMMINGBUS_FIELD(attitude, "", "world", "The estimated attitude at the last sample, body to world."),
+    HUMMINGBUS_FIELD(last_angular_velocity, "rad/s", "body", "The last sample's angular rate; not a number before the first."));
+
+namespace hummingbus::msgs {
+// Which law a state belongs to; zero before the first tick.
+struct LawId {
+  // The law's name, zeros behind. [1]
+  std::array<std::uint8_t, 24> name{};
+  // Layout hash of its state. [1]
+  std::uint64_t state{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::LawId, "hummingbus_msgs/msg/LawId", "Which law a state belongs to; zero before the first tick.",
+    HUMMINGBUS_FIELD(name, "1", "", "The law's name, zeros behind."),
+    HUMMINGBUS_FIELD(state, "1", "", "Layout hash of its state."));
+
+namespace hummingbus::msgs {
+// What the integrators of a law ask for, in units that mean the same to all laws.
+struct ControlIntegrals {
+  // Vertical acceleration. [m/s^2] in world
+  double lift{};
+  // Angular accelerations for roll, pitch and yaw; zero under `lqr` and `geometric`, which observe a lift alone. [rad/s^2] in body
+  std::array<double, 3> turn{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::ControlIntegrals, "hummingbus_msgs/msg/ControlIntegrals", "What the integrators of a law ask for, in units that mean the same to all laws.",
+    HUMMINGBUS_FIELD(lift, "m/s^2", "world", "Vertical acceleration."),
+    HUMMINGBUS_FIELD(turn, "rad/s^2", "body", "Angular accelerations for roll, pitch and yaw; zero under `lqr` and `geometric`, which observe a lift alone."));
+
+namespace hummingbus::msgs {
+// All that a controller remembers between ticks.
+struct ControllerState {
+  // The law that left it.
+  LawId id{};
+  // Thrust that was demanded last. [N] in body
+  double thrust{};
+  // Torque that was demanded last. [N*m] in body
+  std::array<double, 3> torque{};
+  // What the law's integrators ask for.
+  ControlIntegrals integrals{};
+  // What is left of the predecessor's thrust that this law does not ask for itself. [N] in body
+  double residual_thrust{};
+  // The same of its torque. [N*m] in body
+  std::array<double, 3> residual_torque{};
+  // The law's own state in the first words. [1]
+  std::array<std::uint64_t, 32> law_state{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::ControllerState, "hummingbus_msgs/msg/ControllerState", "All that a controller remembers between ticks.",
+    HUMMINGBUS_FIELD(id, "", "", "The law that left it."),
+    HUMMINGBUS_FIELD(thrust, "N", "body", "Thrust that was demanded last."),
+    HUMMINGBUS_FIELD(torque, "N*m", "body", "Torque that was demanded last."),
+    HUMMINGBUS_FIELD(integrals, "", "", "What the law's integrators ask for."),
+    HUMMINGBUS_FIELD(residual_thrust, "N", "body", "What is left of the predecessor's thrust that this law does not ask for itself."),
+    HUMMINGBUS_FIELD(residual_torque, "N*m", "body", "The same of its torque."),
+    HUMMINGBUS_FIELD(law_state, "1", "", "The law's own state in the first words."));
+
+namespace hummingbus::msgs {
+// All that the sensor remembers.
+struct GpsState {
+  // What is under way.
+  ChannelState channel{};
+  // The last measurements.
+  std::array<Gps, 32> queue{};
+  // The drift at the last measurement; not a number before the first. [m] in world
+  Vector3 drift{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::GpsState, "hummingbus_msgs/msg/GpsState", "All that the sensor remembers.",
+    HUMMINGBUS_FIELD(channel, "", "", "What is under way."),
+    HUMMINGBUS_FIELD(queue, "", "", "The last measurements."),
+    HUMMINGBUS_FIELD(drift, "m", "world", "The drift at the last measurement; not a number before the first."));
+
+namespace hummingbus::msgs {
+// All that the IMU remembers: its biases, how far its random stream was drawn, and the readings under way.
+struct ImuState {
+  // The accelerometer's bias at the next reading. [m/s^2] in body
+  Vector3 accelerometer_bias{};
+  // The gyroscope's bias at the next reading. [rad/s] in body
+  Vector3 gyroscope_bias{};
+  // Words of 32 bits drawn from the random stream: the low and the high half of the count. [1]
+  std::array<std::uint64_t, 2> random_words{};
+  // Readings so far. [1]
+  std::uint64_t readings{};
+  // The angle of each rotor, from where it started. [rad]
+  std::array<double, 12> rotor_angles{};
+  // The true angular velocity at the last reading. [rad/s] in body
+  Vector3 last_angular_velocity{};
+  // What has come through the accelerometer's low pass. [m/s^2] in body
+  Vector3 filtered_specific_force{};
+  // What has come through the gyroscope's low pass. [rad/s] in body
+  Vector3 filtered_angular_velocity{};
+  // What is under way.
+  ChannelState channel{};
+  // The last readings.
+  std::array<Imu, 32> queue{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::ImuState, "hummingbus_msgs/msg/ImuState", "All that the IMU remembers: its biases, how far its random stream was drawn, and the readings under way.",
+    HUMMINGBUS_FIELD(accelerometer_bias, "m/s^2", "body", "The accelerometer's bias at the next reading."),
+    HUMMINGBUS_FIELD(gyroscope_bias, "rad/s", "body", "The gyroscope's bias at the next reading."),
+    HUMMINGBUS_FIELD(random_words, "1", "", "Words of 32 bits drawn from the random stream: the low and the high half of the count."),
+    HUMMINGBUS_FIELD(readings, "1", "", "Readings so far."),
+    HUMMINGBUS_FIELD(rotor_angles, "rad", "", "The angle of each rotor, from where it started."),
+    HUMMINGBUS_FIELD(last_angular_velocity, "rad/s", "body", "The true angular velocity at the last reading."),
+    HUMMINGBUS_FIELD(filtered_specific_force, "m/s^2", "body", "What has come through the accelerometer's low pass."),
+    HUMMINGBUS_FIELD(filtered_angular_velocity, "rad/s", "body", "What has come through the gyroscope's low pass."),
+    HUMMINGBUS_FIELD(channel, "", "", "What is under way."),
+    HUMMINGBUS_FIELD(queue, "", "", "The last readings."));
+
+namespace hummingbus::msgs {
+// A message on the line, waiting or under way.
+struct LinkPacket {
+  // Its place among those that were queued. [1]
+  std::uint64_t number{};
+  // When it was queued. [ns]
+  std::uint64_t queued_ns{};
+  // When it arrives, once it is under way. [ns]
+  std::uint64_t arrival_ns{};
+  // Its stream. [1]
+  std::uint32_t stream{};
+  // Its length on the wire. [1]
+  std::uint32_t wire_bytes{};
+  // 0: the place is free; 1: it waits; 2: it is under way. [1]
+  std::uint32_t stage{};
+  // 1 where it is lost on the way. [1]
+  std::uint32_t is_lost{};
+  // The message. [1]
+  std::array<std::uint8_t, 256> message{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::LinkPacket, "hummingbus_msgs/msg/LinkPacket", "A message on the line, waiting or under way.",
+    HUMMINGBUS_FIELD(number, "1", "", "Its place among those that were queued."),
+    HUMMINGBUS_FIELD(queued_ns, "ns", "", "When it was queued."),
+    HUMMINGBUS_FIELD(arrival_ns, "ns", "", "When it arrives, once it is under way."),
+    HUMMINGBUS_FIELD(stream, "1", "", "Its stream."),
+    HUMMINGBUS_FIELD(wire_bytes, "1", "", "Its length on the wire."),
+    HUMMINGBUS_FIELD(stage, "1", "", "0: the place is free; 1: it waits; 2: it is under way."),
+    HUMMINGBUS_FIELD(is_lost, "1", "", "1 where it is lost on the way."),
+    HUMMINGBUS_FIELD(message, "1", "", "The message."));
+
+namespace hummingbus::msgs {
+// What a line has carried.
+struct LineCounts {
+  // Bytes of the messages whose sending has begun. [1]
+  std::uint64_t begun_bytes{};
+  // Those messages. [1]
+  std::uint64_t begun{};
+  // Messages that have arrived, by stream. [1]
+  std::array<std::uint32_t, 16> arrived{};
+  // Messages that were lost on the way, by stream; counted when they would have arrived. [1]
+  std::array<std::uint32_t, 16> lost{};
+  // Messages for which the queue had no room, by stream. [1]
+  std::array<std::uint32_t, 16> dropped{};
+  // How long the message that arrived last had taken since it was queued. [ns]
+  std::uint64_t delay_ns{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::LineCounts, "hummingbus_msgs/msg/LineCounts", "What a line has carried.",
+    HUMMINGBUS_FIELD(begun_bytes, "1", "", "Bytes of the messages whose sending has begun."),
+    HUMMINGBUS_FIELD(begun, "1", "", "Those messages."),
+    HUMMINGBUS_FIELD(arrived, "1", "", "Messages that have arrived, by stream."),
+    HUMMINGBUS_FIELD(lost, "1", "", "Messages that were lost on the way, by stream; counted when they would have arrived."),
+    HUMMINGBUS_FIELD(dropped, "1", "", "Messages for which the queue had no room, by stream."),
+    HUMMINGBUS_FIELD(delay_ns, "ns", "", "How long the message that arrived last had taken since it was queued."));
+
+namespace hummingbus::msgs {
+// What a line remembers.
+struct LineState {
+  // The messages that wait or are under way, in any order.
+  std::array<LinkPacket, 64> packets{};
+  // The newest message of each stream that has arrived. [1]
+  std::array<std::array<std::uint8_t, 256>, 16> newest{};
+  // What has happened so far.
+  LineCounts counts{};
+  // Messages queued so far. [1]
+  std::uint64_t queued{};
+  // When the wire began to be busy without a break. [ns]
+  std::uint64_t busy_since_ns{};
+  // Bits that it carries from then on. [1]
+  std::uint64_t busy_bits{};
+  // When it is free again. [ns]
+  std::uint64_t free_ns{};
+  // When the message that was sent last arrives: the next does not overtake it. [ns]
+  std::uint64_t last_arrival_ns{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::LineState, "hummingbus_msgs/msg/LineState", "What a line remembers.",
+    HUMMINGBUS_FIELD(packets, "", "", "The messages that wait or are under way, in any order."),
+    HUMMINGBUS_FIELD(newest, "1", "", "The newest message of each stream that has arrived."),
+    HUMMINGBUS_FIELD(counts, "", "", "What has happened so far."),
+    HUMMINGBUS_FIELD(queued, "1", "", "Messages queued so far."),
+    HUMMINGBUS_FIELD(busy_since_ns, "ns", "", "When the wire began to be busy without a break."),
+    HUMMINGBUS_FIELD(busy_bits, "1", "", "Bits that it carries from then on."),
+    HUMMINGBUS_FIELD(free_ns, "ns", "", "When it is free again."),
+    HUMMINGBUS_FIELD(last_arrival_ns, "ns", "", "When the message that was sent last arrives: the next does not overtake it."));
+
+namespace hummingbus::msgs {
+// What a link remembers: what it last took from each input, and what is on its line.
+struct LinkState {
+  // 
+  LineState line{};
+  // The mark of the message that was taken last from each input; all bits set before the first. [1]
+  std::array<std::uint64_t, 16> taken_mark{};
+  // The period of its rate in which it was taken; all bits set before the first. [1]
+  std::array<std::uint64_t, 16> taken_period{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::LinkState, "hummingbus_msgs/msg/LinkState", "What a link remembers: what it last took from each input, and what is on its line.",
+    HUMMINGBUS_FIELD(line, "", "", ""),
+    HUMMINGBUS_FIELD(taken_mark, "1", "", "The mark of the message that was taken last from each input; all bits set before the first."),
+    HUMMINGBUS_FIELD(taken_period, "1", "", "The period of its rate in which it was taken; all bits set before the first."));
+
+namespace hummingbus::msgs {
+// All that the sensor remembers.
+struct MagnetometerState {
+  // What is under way.
+  ChannelState channel{};
+  // The last measurements.
+  std::array<Magnetometer, 32> queue{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::MagnetometerState, "hummingbus_msgs/msg/MagnetometerState", "All that the sensor remembers.",
+    HUMMINGBUS_FIELD(channel, "", "", "What is under way."),
+    HUMMINGBUS_FIELD(queue, "", "", "The last measurements."));
+
+namespace hummingbus::msgs {
+// All that the sensor remembers.
+struct MocapState {
+  // What is under way.
+  ChannelState channel{};
+  // The last measurements.
+  std::array<Mocap, 32> queue{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::MocapState, "hummingbus_msgs/msg/MocapState", "All that the sensor remembers.",
+    HUMMINGBUS_FIELD(channel, "", "", "What is under way."),
+    HUMMINGBUS_FIELD(queue, "", "", "The last measurements."));
+
+namespace hummingbus::msgs {
+// All that it remembers.
+struct PositionHoldState {
+  // The place that is held; without meaning along an axis that is not locked. [m] in world
+  std::array<double, 2> place{};
+  // 1 where the place along the heading's x, or y, is locked. [1]
+  std::array<std::uint32_t, 2> locked{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::PositionHoldState, "hummingbus_msgs/msg/PositionHoldState", "All that it remembers.",
+    HUMMINGBUS_FIELD(place, "m", "world", "The place that is held; without meaning along an axis that is not locked."),
+    HUMMINGBUS_FIELD(locked, "1", "", "1 where the place along the heading's x, or y, is locked."));
+
+namespace hummingbus::msgs {
+// All that the component remembers.
+struct PropellerStandState {
+  // Speed of the rotor. [rad/s]
+  double speed{};
+  // Its rate of change. [rad/s^2]
+  double acceleration{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::PropellerStandState, "hummingbus_msgs/msg/PropellerStandState", "All that the component remembers.",
+    HUMMINGBUS_FIELD(speed, "rad/s", "", "Speed of the rotor."),
+    HUMMINGBUS_FIELD(acceleration, "rad/s^2", "", "Its rate of change."));
+
+namespace hummingbus::msgs {
+// What the filter knows of one axis.
+struct RangeInertialAxis {
+  // Velocity. [m/s] in world
+  double velocity{};
+  // What is wrong with the acceleration that is fed in. [m/s^2] in world
+  double bias{};
+  // Displacement since the start. [m] in world
+  double path{};
+  // Distances to what stands ahead and behind; without meaning where nothing is in sight. [m] in world
+  std::array<double, 2> distance{};
+  // 1 where something is in sight. [1]
+  std::array<std::uint32_t, 2> in_sight{};
+  // Covariance of the errors of the above, in their order and units.
+  std::array<double, 25> covariance{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::RangeInertialAxis, "hummingbus_msgs/msg/RangeInertialAxis", "What the filter knows of one axis.",
+    HUMMINGBUS_FIELD(velocity, "m/s", "world", "Velocity."),
+    HUMMINGBUS_FIELD(bias, "m/s^2", "world", "What is wrong with the acceleration that is fed in."),
+    HUMMINGBUS_FIELD(path, "m", "world", "Displacement since the start."),
+    HUMMINGBUS_FIELD(distance, "m", "world", "Distances to what stands ahead and behind; without meaning where nothing is in sight."),
+    HUMMINGBUS_FIELD(in_sight, "1", "", "1 where something is in sight."),
+    HUMMINGBUS_FIELD(covariance, "", "", "Covariance of the errors of the above, in their order and units."));
+
+namespace hummingbus::msgs {
+// Sums of the acceleration, its bias not taken off.
+struct RangeInertialGains {
+  // Samples so far.
+  std::uint64_t samples{};
+  // The sum of all. [m/s] in world
+  Vector3 total{};
+  // The sum as it was every 10 ms, the k-th of these at the place k modulo the number of places. [m/s] in world
+  std::array<Vector3, 128> kept{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::RangeInertialGains, "hummingbus_msgs/msg/RangeInertialGains", "Sums of the acceleration, its bias not taken off.",
+    HUMMINGBUS_FIELD(samples, "", "", "Samples so far."),
+    HUMMINGBUS_FIELD(total, "m/s", "world", "The sum of all."),
+    HUMMINGBUS_FIELD(kept, "m/s", "world", "The sum as it was every 10 ms, the k-th of these at the place k modulo the number of places."));
+
+namespace hummingbus::msgs {
+// Where the vehicle was at a sample.
+struct RangeInertialPast {
+  // Displacement since the start. [m] in world
+  Vector3 path{};
+  // Attitude, body to world. in world
+  Quaternion attitude{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::RangeInertialPast, "hummingbus_msgs/msg/RangeInertialPast", "Where the vehicle was at a sample.",
+    HUMMINGBUS_FIELD(path, "m", "world", "Displacement since the start."),
+    HUMMINGBUS_FIELD(attitude, "", "world", "Attitude, body to world."));
+
+namespace hummingbus::msgs {
+// What the estimator remembers, as it is handed over.
+struct RangeInertialState {
+  // Samples so far.
+  std::uint64_t samples{};
+  // When the newest ranges were measured; the largest number before the first. [ns]
+  std::uint64_t measured_ns{};
+  // When the newest velocity of a receiver was measured; the largest number before the first. [ns]
+  std::uint64_t gps_measured_ns{};
+  // When the last echo came from ahead and from behind along x, and along y. [ns]
+  std::array<std::array<std::uint64_t, 2>, 2> echo_ns{};
+  // In a room of known size: distances to what hides the walls, and when it was seen last, as above. [m] in world
+  std::array<std::array<double, 2>, 2> obstacle{};
+  // See above; 0 for never. [ns]
+  std::array<std::array<std::uint64_t, 2>, 2> obstacle_ns{};
+  // The last sample's acceleration. [m/s^2] in world
+  Vector3 acceleration{};
+  // The axes of the world; the ground is behind the third.
+  std::array<RangeInertialAxis, 3> axes{};
+  // What the velocity gained.
+  RangeInertialGains gains{};
+  // The last samples, sample k at the place k modulo the number of places.
+  std::array<RangeInertialPast, 128> past{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::RangeInertialState, "hummingbus_msgs/msg/RangeInertialState", "What the estimator remembers, as it is handed over.",
+    HUMMINGBUS_FIELD(samples, "", "", "Samples so far."),
+    HUMMINGBUS_FIELD(measured_ns, "ns", "", "When the newest ranges were measured; the largest number before the first."),
+    HUMMINGBUS_FIELD(gps_measured_ns, "ns", "", "When the newest velocity of a receiver was measured; the largest number before the first."),
+    HUMMINGBUS_FIELD(echo_ns, "ns", "", "When the last echo came from ahead and from behind along x, and along y."),
+    HUMMINGBUS_FIELD(obstacle, "m", "world", "In a room of known size: distances to what hides the walls, and when it was seen last, as above."),
+    HUMMINGBUS_FIELD(obstacle_ns, "ns", "", "See above; 0 for never."),
+    HUMMINGBUS_FIELD(acceleration, "m/s^2", "world", "The last sample's acceleration."),
+    HUMMINGBUS_FIELD(axes, "", "", "The axes of the world; the ground is behind the third."),
+    HUMMINGBUS_FIELD(gains, "", "", "What the velocity gained."),
+    HUMMINGBUS_FIELD(past, "", "", "The last samples, sample k at the place k modulo the number of places."));
+
+namespace hummingbus::msgs {
+// All that the sensor remembers.
+struct RangeState {
+  // What is under way.
+  ChannelState channel{};
+  // The last measurements.
+  std::array<Ranges, 32> queue{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::RangeState, "hummingbus_msgs/msg/RangeState", "All that the sensor remembers.",
+    HUMMINGBUS_FIELD(channel, "", "", "What is under way."),
+    HUMMINGBUS_FIELD(queue, "", "", "The last measurements."));
+
+namespace hummingbus::msgs {
+// All that the sensor remembers.
+struct RpmState {
+  // What is under way.
+  ChannelState channel{};
+  // The last measurements.
+  std::array<RotorSpeeds, 32> queue{};
+  // What was read last, whether it was lost or not. [rad/s]
+  std::array<double, 12> read{};
+  // 1 from the first reading on. [1]
+  std::uint64_t has_read{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::RpmState, "hummingbus_msgs/msg/RpmState", "All that the sensor remembers.",
+    HUMMINGBUS_FIELD(channel, "", "", "What is under way."),
+    HUMMINGBUS_FIELD(queue, "", "", "The last measurements."),
+    HUMMINGBUS_FIELD(read, "rad/s", "", "What was read last, whether it was lost or not."),
+    HUMMINGBUS_FIELD(has_read, "1", "", "1 from the first reading on."));

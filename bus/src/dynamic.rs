@@ -1,0 +1,306 @@
+//! A node whose ports and state are known at run time: the part that bindings to other languages stand on.
+//!
+//! A program declares its ports with [schemas](MessageDescription), and reads and writes messages as bytes. The layouts are
+//! compared as for Rust. The state is a block of bytes that the program changes in place; the bus copies it for whoever
+//! takes the node's place, and into checkpoints.
+
+mod message;
+
+use crate::component::{StateError, Transfer};
+use crate::computation::Computation;
+use crate::error::BusError;
+use crate::executor::{Executor, Member};
+use crate::message::{BODY_START, message_bytes};
+use crate::node::Node;
+use crate::schema::Schema;
+use crate::tick::Tick;
+use inputs::InputFiles;
+use serde_json::Value;
+
+pub use message::{FieldDescription, KindDescription, MessageDescription};
+
+/// A node before its first tick.
+///
+/// ```no_run
+/// use bus::Message;
+/// use bus::dynamic::DynamicNode;
+/// use bus::messages::{PlantState, SetPoint};
+///
+/// fn main() -> Result<(), bus::BusError> {
+///     let mut node = DynamicNode::join()?;
+///     let state = node.input("state", PlantState::SCHEMA)?;
+///     let set_point = node.output("set_point", SetPoint::SCHEMA)?;
+///     node.run(|tick| {
+///         let position_z = tick.input(state)[24..32].to_vec();
+///         let Some(message) = tick.output(set_point).map_err(|error| error.to_string())? else { return Ok(()) };
+///         message[8..16].copy_from_slice(&position_z);
+///         Ok(())
+///     })
+/// }
+/// ```
+#[derive(Debug)]
+pub struct DynamicNode {
+    node: Node,
+    inputs: Vec<DynamicPort>,
+    outputs: Vec<DynamicPort>,
+    state: Option<StateMemory>,
+}
+
+/// A declared port.
+#[derive(Clone, Copy, Debug)]
+struct DynamicPort {
+    /// Place among the ports of the node.
+    index: usize,
+    /// Bytes of a message.
+    size: usize,
+}
+
+/// Memory of a state, which the program changes in place.
+#[derive(Debug)]
+struct StateMemory {
+    schema: &'static Schema,
+    /// Made from a box of `words` words, which this owns: a pointer, since the program has it too.
+    start: *mut u64,
+    words: usize,
+}
+
+// SAFETY: it owns its memory, as a box would.
+unsafe impl Send for StateMemory {}
+
+impl DynamicNode {
+    /// Joins the run that started this process.
+    ///
+    /// # Errors
+    /// If the process was not started by a launcher, or the run is gone.
+    pub fn join() -> Result<Self, BusError> {
+        Ok(Self { node: Node::join()?, inputs: Vec::new(), outputs: Vec::new(), state: None })
+    }
+
+    /// The node's name in the run.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        self.node.name()
+    }
+
+    /// Simulated time between two computations of this node, in seconds.
+    #[must_use]
+    pub fn period_s(&self) -> f64 {
+        self.node.period_s()
+    }
+
+    /// The seed of the run.
+    #[must_use]
+    pub fn seed(&self) -> u64 {
+        self.node.seed()
+    }
+
+    /// The node's parameters from the manifest.
+    #[must_use]
+    pub fn parameters(&self) -> &Value {
+        &self.node.plan().1.parameters
+    }
+
+    /// The files that the manifest names for the node, with the bytes that they had when the run began.
+    #[must_use]
+    pub fn files(&self) -> InputFiles {
+        self.node.files()
+    }
+
+    /// Inputs that the manifest wires, with the types of their topics.
+    pub fn wired_inputs(&self) -> impl Iterator<Item = (&str, &str)> {
+        let (plan, node) = self.node.plan();
+        node.inputs.iter().map(|input| (input.port.as_str(), plan.topics[input.topic].type_name.as_str()))
+    }
+
+    /// Outputs that the manifest names, with the types of their topics.
+    pub fn named_outputs(&self) -> impl Iterator<Item = (&str, &str)> {
+        let (plan, node) = self.node.plan();
+        node.outputs.iter().map(|output| (output.port.as_str(), plan.topics[output.topic].type_name.as_str()))
+    }
+
+    /// Declares the input `port`; returns its number for [`DynamicTick::input`].
+    ///
+    /// # Errors
+    /// If the manifest does not wire it, or the node declared it before.
+    pub fn input(&mut self, port: &str, schema: &'static Schema) -> Result<usize, BusError> {
+        let index = self.node.declare_typed_input(port, schema)?;
+        self.inputs.push(DynamicPort { index, size: schema.size });
+        Ok(self.inputs.len() - 1)
+    }
+
+    /// Declares the output `port`; returns its number for [`DynamicTick::output`].
+    ///
+    /// # Errors
+    /// If the manifest does not name it, or states another message type, or the node declared it before.
+    pub fn output(&mut self, port: &str, schema: &'static Schema) -> Result<usize, BusError> {
+        let index = self.node.declare_output(port, schema, false)?;
+        self.outputs.push(DynamicPort { index, size: schema.size });
+        Ok(self.outputs.len() - 1)
+    }
+
+    /// Declares the state as one value of `schema`; returns its memory, zeros aligned to eight bytes, which stays where it
+    /// is until [`DynamicNode::run`] returns. All that changes from tick to tick belongs there: whoever takes the node's
+    /// place goes on from it. The bus reads and writes it between steps.
+    ///
+    /// # Errors
+    /// If the node declared it before.
+    pub fn state(&mut self, schema: &'static Schema) -> Result<*mut u8, BusError> {
+        if let Some(before) = &self.state {
+            let both = format!(
+                "declares its state twice, as {} and as {}",
+                before.schema.type_name, schema.type_name
+            );
+            return Err(self.node.error(both));
+        }
+        let memory = StateMemory::of(schema);
+        let start = memory.start.cast();
+        self.state = Some(memory);
+        Ok(start)
+    }
+
+    /// An error of this node about its own parameters or files.
+    pub fn error(&self, reason: impl std::fmt::Display) -> BusError {
+        self.node.error(reason)
+    }
+
+    /// Connects, then computes `step` at every due tick until the run ends or another process has taken the node's place.
+    ///
+    /// # Errors
+    /// If the manifest and the declarations do not fit, two sides disagree on a layout, a step fails or leaves a due
+    /// output unwritten, or the run is aborted.
+    pub fn run(
+        self,
+        step: impl FnMut(&mut DynamicTick<'_, '_>) -> Result<(), String>,
+    ) -> Result<(), BusError> {
+        let Self { node, inputs, outputs, state } = self;
+        let transfer = state.as_ref().map_or(Transfer::Nothing, |state| Transfer::Message(state.schema));
+        let steps = DynamicSteps { inputs, outputs, state, step };
+        let member = Member::new(node.connect()?, transfer, Box::new(steps))?;
+        Executor::alone(member).run()
+    }
+}
+
+impl StateMemory {
+    fn of(schema: &'static Schema) -> Self {
+        let words = schema.size.div_ceil(8);
+        let start = Box::into_raw(vec![0_u64; words].into_boxed_slice()).cast();
+        Self { schema, start, words }
+    }
+
+    /// Runs `with` on the bytes of the state.
+    fn bytes<R>(&self, with: impl FnOnce(&mut [u8]) -> R) -> R {
+        // SAFETY: the memory is that of the box, of `words` words, until this is dropped. The program changes it in its
+        // steps only, which this does not run beside.
+        let words = unsafe { std::slice::from_raw_parts_mut(self.start, self.words) };
+        with(&mut bytemuck::cast_slice_mut(words)[..self.schema.size])
+    }
+}
+
+impl Drop for StateMemory {
+    fn drop(&mut self) {
+        let words = std::ptr::slice_from_raw_parts_mut(self.start, self.words);
+        // SAFETY: it was made by `Box::into_raw` from a box of as many words, and nobody else frees it.
+        drop(unsafe { Box::from_raw(words) });
+    }
+}
+
+/// The steps of a program with their state.
+struct DynamicSteps<F> {
+    inputs: Vec<DynamicPort>,
+    outputs: Vec<DynamicPort>,
+    state: Option<StateMemory>,
+    step: F,
+}
+
+impl<F: FnMut(&mut DynamicTick<'_, '_>) -> Result<(), String>> Computation for DynamicSteps<F> {
+    fn configuration(&self) -> u64 {
+        0
+    }
+
+    fn state_size(&self) -> usize {
+        self.state.as_ref().map_or(0, |state| state.schema.size)
+    }
+
+    fn save(&self, bytes: &mut [u8]) {
+        if let Some(state) = &self.state {
+            state.bytes(|memory| bytes.copy_from_slice(memory));
+        }
+    }
+
+    fn load(&mut self, bytes: &[u8]) -> Result<(), StateError> {
+        let type_name = self.state.as_ref().map_or("()", |state| state.schema.type_name);
+        StateError::check_size(type_name, self.state_size(), bytes)?;
+        if let Some(state) = &self.state {
+            state.bytes(|memory| memory.copy_from_slice(bytes));
+        }
+        Ok(())
+    }
+
+    fn step(&mut self, tick: &mut Tick<'_>) -> Result<(), String> {
+        (self.step)(&mut DynamicTick { tick, inputs: &self.inputs, outputs: &self.outputs })
+    }
+}
+
+/// One computation: messages as bytes.
+#[derive(Debug)]
+pub struct DynamicTick<'s, 't> {
+    tick: &'s mut Tick<'t>,
+    inputs: &'s [DynamicPort],
+    outputs: &'s [DynamicPort],
+}
+
+impl DynamicTick<'_, '_> {
+    /// The tick's number.
+    #[must_use]
+    pub fn number(&self) -> u32 {
+        self.tick.number()
+    }
+
+    /// Simulation time in nanoseconds.
+    #[must_use]
+    pub fn time_ns(&self) -> u64 {
+        self.tick.time_ns()
+    }
+
+    /// The newest message of input `input` that this tick may see, in shared memory: aligned to eight bytes.
+    ///
+    /// # Panics
+    /// If there is no such input.
+    #[must_use]
+    pub fn input(&self, input: usize) -> &[u8] {
+        let DynamicPort { index, size } = self.inputs[input];
+        message_bytes(self.tick.inputs[index].words(self.tick.locals), size)
+    }
+
+    /// Memory of the message of output `output`, zeros aligned to eight bytes; `None` where none is due at this tick.
+    /// The bus fills in its stamp.
+    ///
+    /// # Errors
+    /// If shared memory cannot be had.
+    ///
+    /// # Panics
+    /// If there is no such output.
+    pub fn output(&mut self, output: usize) -> Result<Option<&mut [u8]>, BusError> {
+        let DynamicPort { index, size } = self.outputs[output];
+        let port = &mut self.tick.outputs[index];
+        if !port.takes(self.tick.tick) {
+            return Ok(None);
+        }
+        let message = &mut bytemuck::cast_slice_mut(port.words(self.tick.node)?)[BODY_START..][..size];
+        // It may hold an earlier sample.
+        message.fill(0);
+        Ok(Some(message))
+    }
+
+    /// The message that the process whose place this one takes sent last on output `output`, at the tick at which it takes
+    /// it and only where no state was handed over: the command to go on from without a jump.
+    ///
+    /// # Panics
+    /// If there is no such output.
+    #[must_use]
+    pub fn predecessor(&self, output: usize) -> Option<&[u8]> {
+        let DynamicPort { index, size } = self.outputs[output];
+        let words = self.tick.predecessor.get(index)?.newest(self.tick.locals)?;
+        Some(message_bytes(words, size))
+    }
+}

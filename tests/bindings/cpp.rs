@@ -1,0 +1,165 @@
+//! Nodes in C++ and C: same bytes, hand-over of state, own messages, and what is said where one fails.
+
+use crate::build::{built, succeed};
+use crate::support::{Ended, Place, repository};
+use std::fs;
+use std::process::Command;
+
+/// The shipped manifest `name`, flown by the controller that the tests have built.
+fn shipped(place: &Place, name: &str) -> String {
+    let text = fs::read_to_string(repository(&format!("manifests/{name}"))).unwrap();
+    let text = text
+        .replace("\"../target/cpp/controller\"", &format!("{:?}", built().program("controller")))
+        .replace("\"sets/", &format!("\"{}/", repository("manifests/sets")))
+        .replace("\"../vehicles/", &format!("\"{}/", repository("vehicles")));
+    place.write(name, text)
+}
+
+/// A hover whose controller is `controller` and whose pilot `pilot` is, of 0.3 s.
+fn hover(place: &Place, pilot: &str) -> String {
+    let (flight, vehicle) =
+        (repository("manifests/sets/flight.toml"), repository("vehicles/hummingbird.toml"));
+    let text = format!(
+        "include = [{flight:?}]\n[run]\nduration_s = 0.3\n\
+         [process.controller]\nkind = \"pid\"\nvehicle = {vehicle:?}\n\
+         inputs = {{ set_point = \"/pilot/set_point\", estimate = \"/ekf/estimate\" }}\n{pilot}"
+    );
+    place.write("hover.toml", text)
+}
+
+/// A pilot that is the program `name` with these parameters.
+fn pilot(name: &str, more: &str) -> String {
+    let program = built().program(name);
+    format!(
+        "[process.pilot]\ncommand = [{program:?}]\n\
+         outputs.set_point = {{ type = \"hummingbus_msgs/msg/SetPoint\" }}\n{more}"
+    )
+}
+
+fn fly(place: &Place, manifest: &str) -> Ended {
+    place.call(&["run", manifest, "--record", &place.path("flight.mcap")])
+}
+
+#[test]
+fn a_controller_in_cpp_flies_the_hover_and_two_runs_are_the_same_bytes() {
+    let place = Place::new();
+    let manifest = shipped(&place, "cpp-controller.toml");
+    let [first, second] = ["first.mcap", "second.mcap"].map(|name| {
+        let recording = place.path(name);
+        place.call(&["run", &manifest, "--record", &recording]).with_code(0);
+        fs::read(recording).unwrap()
+    });
+    assert!(first == second, "two runs differ");
+}
+
+#[test]
+fn a_controller_in_cpp_takes_over_from_pid_with_its_state_and_pid_from_it() {
+    let place = Place::new();
+    let manifest = shipped(&place, "swap-cpp.toml");
+    let ended = place.call(&["run", &manifest, "--record", &place.path("swap.mcap"), "--json"]).with_code(0);
+    let summary = ended.json();
+    let successions = summary["successions"].as_array().unwrap();
+    assert_eq!(successions.len(), 2, "{ended}");
+    assert!(successions.iter().all(|succession| succession["hand_over"] == "state"), "{ended}");
+    // The same law from the same state: what it asks for as a shadow of `pid` differs in rounding.
+    let shadows = summary["shadows"].as_array().unwrap().iter().filter(|shadow| shadow["from_tick"] == 2800);
+    let rms: Vec<f64> = shadows.map(|shadow| shadow["rms"].as_f64().unwrap()).collect();
+    assert!(rms.len() == 4 && rms.iter().all(|count| *count < 1e-6), "{rms:?}\n{ended}");
+}
+
+#[test]
+fn a_checkpoint_holds_the_state_of_a_controller_in_cpp() {
+    let place = Place::new();
+    let manifest = shipped(&place, "cpp-controller.toml");
+    let (whole, rest) = (place.path("whole.mcap"), place.path("rest.mcap"));
+    let set = ["--set", "run.duration_s=1.5", "--record", &whole, "--checkpoint-every", "0.7s"];
+    place.call(&[&["run", &manifest], &set[..]].concat()).flown();
+    let checkpoint = place.path("whole.700.ckpt");
+    place.call(&["run", "--from", &checkpoint, "--record", &rest]).flown();
+    let expected = "begins at tick 700, and from there on all messages are those of";
+    place.call(&["diff", &whole, &rest]).with_code(1).prints(&[expected]);
+}
+
+#[test]
+fn a_pilot_in_c_sends_what_the_controller_reads() {
+    let place = Place::new();
+    let manifest = hover(&place, &pilot("pilot", "parameters = { altitude_m = 1.25, name = \"up\" }\n"));
+    fly(&place, &manifest).flown();
+    let cat =
+        ["cat", &place.path("flight.mcap"), "--topic", "/pilot/set_point", "--field", "altitude", "--csv"];
+    let ended = place.call(&cat).with_code(0);
+    assert_eq!(ended.output.lines().count(), 301, "{ended}");
+    assert!(ended.output.lines().skip(1).all(|line| line.ends_with(",1.25")), "{ended}");
+}
+
+#[test]
+fn a_message_of_the_program_s_own_is_recorded_with_its_units() {
+    let place = Place::new();
+    let battery = "outputs.battery = { type = \"test_msgs/msg/Cells\", every_ticks = 3 }\n";
+    let manifest =
+        hover(&place, &pilot("faulty", &format!("{battery}parameters = {{ fault = \"none\" }}\n")));
+    fly(&place, &manifest).flown();
+    let ended = place.call(&["cat", &place.path("flight.mcap"), "--topic", "/pilot/battery"]).with_code(0);
+    ended.prints(&["voltage", "11.5", "cells"]);
+}
+
+#[test]
+fn what_goes_wrong_in_a_program_is_said_with_node_and_reason() {
+    let cases = [
+        ("throw", "node `pilot` failed at tick 100 (t = 0.100 s): the battery is empty"),
+        ("throw-other", "it threw something that is no std::exception"),
+        ("unwritten", "node `pilot` computed tick 100 without writing its output `set_point`"),
+        ("nan", "holds altitude = NaN, expected a finite number"),
+        ("unread", "parameters.extra is not read; the program reads `fault`"),
+        ("missing", "parameters.gains.altitude is missing; the manifest gives `fault`"),
+        ("array", "parameters.fault is \"array\", expected an array of 3 numbers"),
+        (
+            "port",
+            "declares the output `nothing`, which the manifest does not name; it has `battery`, `set_point`",
+        ),
+        ("type", "publishes hummingbus_msgs/msg/MotorCommand on its output `set_point`, the manifest states"),
+        ("layout", "layout mismatch on topic /pilot/set_point"),
+        ("padding", "has its field `voltage` at byte 8, and the fields before it end at 4"),
+        ("handle", "index out of bounds"),
+        ("twice", "declares its state twice"),
+    ];
+    for (fault, words) in cases {
+        let place = Place::new();
+        let extra = if fault == "unread" { ", extra = 1" } else { "" };
+        let more = format!(
+            "outputs.battery = {{ type = \"test_msgs/msg/Cells\" }}\nparameters = {{ fault = {fault:?}{extra} }}\n"
+        );
+        let manifest = hover(&place, &pilot("faulty", &more));
+        let ended = fly(&place, &manifest);
+        assert!(ended.code != Some(0) && ended.error.contains(words), "{fault}: no {words:?} in\n{ended}");
+    }
+}
+
+#[test]
+fn pkg_config_and_a_compiler_are_enough() {
+    let built = built();
+    let mut pkg_config = Command::new("pkg-config");
+    pkg_config.args(["--cflags", "--libs", "hummingbus"]);
+    let folders = ["lib", "lib64", "lib/x86_64-linux-gnu", "lib/aarch64-linux-gnu"];
+    let folders =
+        folders.map(|folder| built.prefix.join(folder).join("pkgconfig").to_string_lossy().into_owned());
+    pkg_config.env("PKG_CONFIG_PATH", folders.join(":"));
+    let flags = succeed(pkg_config);
+    let place = Place::new();
+    let (source, program) = (repository("tests/bindings/cpp/pilot.c"), place.path("pilot"));
+    let mut compiler = Command::new("cc");
+    compiler.args(["-std=c11", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-o", &program, &source]);
+    compiler.args(flags.split_whitespace());
+    succeed(compiler);
+    let ended = Command::new(&program).env("LD_LIBRARY_PATH", library_folder()).output().unwrap();
+    let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert!(!ended.status.success() && said.contains("hummingbus run MANIFEST"), "{said}");
+}
+
+/// The folder that `cmake --install` has put the library into.
+fn library_folder() -> String {
+    let folders = ["lib", "lib64", "lib/x86_64-linux-gnu", "lib/aarch64-linux-gnu"];
+    let mut found = folders.into_iter().map(|folder| built().prefix.join(folder));
+    let found = found.find(|folder| folder.join("libhummingbus.so").exists());
+    found.expect("the library is installed").to_string_lossy().into_owned()
+}

@@ -1,0 +1,13 @@
+//! Nodes in other languages, built as their users build them, in real runs.
+//!
+//! - [`support`]: a folder of its own for each test, launches under a watchdog, what a run left behind
+//! - [`build`]: the library and the programs of the tests, built with CMake
+//! - [`cpp`]: controllers in C++, and pilots in C
+//! - [`headers`]: the headers are those of the messages
+
+mod build;
+mod cpp;
+mod headers;
+#[path = "../runs/support.rs"]
+#[allow(dead_code, reason = "it serves other tests, too")]
+mod support;
