@@ -3,11 +3,17 @@
 //! - [`support`]: a folder of its own for each test, launches under a watchdog, what a run left behind
 //! - [`build`]: the library and the programs of the tests, built with CMake
 //! - [`cpp`]: controllers in C++, and pilots in C
+//! - [`python`]: nodes, runs and recordings in Python
+//! - [`skipped`]: tests that cannot run here
 //! - [`headers`]: the headers are those of the messages
 
 mod build;
 mod cpp;
 mod headers;
+mod python;
+#[path = "../runs/skipped.rs"]
+#[allow(dead_code, reason = "it serves other tests, too")]
+mod skipped;
 #[path = "../runs/support.rs"]
 #[allow(dead_code, reason = "it serves other tests, too")]
 mod support;

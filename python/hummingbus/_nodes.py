@@ -1,0 +1,144 @@
+"""Nodes: programs in Python that take part in runs."""
+
+from __future__ import annotations
+
+import gc
+import json
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from . import _native
+from ._messages import Message, of
+
+
+@dataclass(frozen=True)
+class Optional:
+    """A port that the manifest may leave out; the step gets `None` for it then."""
+
+    message: str | Message
+
+
+class Parameters(dict):
+    """The parameters that the manifest gives a node. One that the program does not read is refused."""
+
+    def __init__(self, values: Mapping[str, Any]):
+        super().__init__(values)
+        self._read: set[str] = set()
+
+    def __getitem__(self, key: str) -> Any:
+        self._read.add(key)
+        if key not in self:
+            known = ", ".join(f"`{name}`" for name in self.keys()) or "none"
+            raise _native.Error(f"parameters.{key} is missing; the manifest gives {known}")
+        return super().__getitem__(key)
+
+    def get(self, key: str, default: Any = None) -> Any:
+        self._read.add(key)
+        return super().get(key, default)
+
+    def _require_all_read(self) -> None:
+        for key in self.keys():
+            if key not in self._read:
+                read = ", ".join(f"`{name}`" for name in sorted(self._read)) or "none"
+                raise _native.Error(f"parameters.{key} is not read; the program reads {read}")
+
+
+@dataclass(frozen=True)
+class Node:
+    """What a component may know of its node.
+
+    `period_s` is the simulated time between two steps, `seed` that of the run.
+    """
+
+    name: str
+    period_s: float
+    seed: int
+    parameters: Parameters
+    _native: _native.Node
+
+    def file(self, key: str) -> str:
+        """Contents of the file that the parameter `key` names, as it was when the run began."""
+        return self._native.file(str(self.parameters[key]))
+
+
+class Component:
+    """A node with ports, and what it computes.
+
+    `inputs` and `outputs` are messages by the names of their ports; `state` is the message that holds all that changes from
+    tick to tick: whoever takes the node's place goes on from it, and checkpoints hold it. `step` gets each message under the
+    name of its port: numpy arrays of no dimension in shared memory, valid until it returns. An output is zeros, and `None` where
+    none is due.
+
+        class Climb(hummingbus.Component):
+            inputs = {"state": "PlantState"}
+            outputs = {"set_point": "SetPoint"}
+
+            def __init__(self, node):
+                self.more_m = node.parameters["more_m"]
+
+            def step(self, tick, state, set_point):
+                set_point["altitude"] = state["position"]["z"] + self.more_m
+
+        hummingbus.run_node(Climb)
+    """
+
+    inputs: Mapping[str, str | Message | Optional] = {}
+    outputs: Mapping[str, str | Message | Optional] = {}
+    state: str | Message | None = None
+
+    def __init__(self, node: Node):
+        """Reads the parameters of `node`."""
+
+    def step(self, tick: int, **messages: Any) -> None:
+        """Computes one tick."""
+        raise NotImplementedError
+
+
+def run_node(
+    component: type[Component] | Callable[..., None],
+    *,
+    inputs: Mapping[str, str | Message | Optional] | None = None,
+    outputs: Mapping[str, str | Message | Optional] | None = None,
+    state: str | Message | None = None,
+) -> None:
+    """Runs a component, or a function with these ports, as the node that the launcher started this process for: all of a
+    program that a manifest names as a `command`. What goes wrong is printed, and the process exits with code 1.
+    """
+    try:
+        _run(component, inputs, outputs, state)
+    except _native.Error as error:
+        print(f"error: {error}", file=sys.stderr)
+        sys.exit(1)
+
+
+def _run(component: Any, inputs: Any, outputs: Any, state: Any) -> None:
+    node = _native.Node()
+    parameters = Parameters(json.loads(node.parameters()))
+    is_class = isinstance(component, type)
+    declared = (component.inputs, component.outputs, component.state) if is_class else (inputs or {}, outputs or {}, state)
+    absent = {}
+    for ports, wired, declare in zip(declared, node.wired(), (node.input, node.output)):
+        names = [name for name, _ in wired]
+        for port, of_port in ports.items():
+            if isinstance(of_port, Optional):
+                if port not in names:
+                    absent[port] = None
+                    continue
+                of_port = of_port.message
+            message = of(of_port)
+            declare(port, message._description, message.dtype)
+    if declared[2] is not None:
+        message = of(declared[2])
+        node.declare_state(message._description, message.dtype)
+    step = component
+    if is_class:
+        step = component(Node(node.name, node.period_s, node.seed, parameters, node)).step
+        parameters._require_all_read()
+    elif parameters:
+        parameters._require_all_read()
+    # What is there now stays: the collector need not look at it again at every tick.
+    gc.collect()
+    gc.freeze()
+    node.run(step if not absent else lambda tick, **messages: step(tick, **messages, **absent))

@@ -1,0 +1,270 @@
+//! Nodes, runs and recordings in Python: same bytes, hand-over of state, own messages, and what is said where one fails.
+
+use crate::support::{Ended, HUMMINGBUS, Place, repository};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::OnceLock;
+
+/// A Python with numpy, pandas and polars, and the folder of the package that was built with the tests.
+struct Python {
+    interpreter: PathBuf,
+    packages: PathBuf,
+}
+
+/// The Python of the readers, or a skipped test.
+fn python() -> Option<&'static Python> {
+    static PYTHON: OnceLock<Option<Python>> = OnceLock::new();
+    let python = PYTHON.get_or_init(|| {
+        let readers = std::env::var_os("HUMMINGBUS_READERS")?;
+        let target = Path::new(HUMMINGBUS).parent().unwrap();
+        let packages = target.join("bindings/python");
+        let package = packages.join("hummingbus");
+        fs::create_dir_all(&package).unwrap();
+        for file in fs::read_dir(repository("python/hummingbus")).unwrap().flatten() {
+            if file.path().is_file() {
+                fs::copy(file.path(), package.join(file.file_name())).unwrap();
+            }
+        }
+        let built = target.join("libhummingbus_native.so");
+        fs::copy(&built, package.join("_native.abi3.so")).unwrap_or_else(|error| {
+            panic!("{}: {error}; cargo build --workspace --lib builds it", built.display())
+        });
+        Some(Python { interpreter: Path::new(&readers).join("venv/bin/python3"), packages })
+    });
+    if python.is_none() {
+        crate::skipped::skip("HUMMINGBUS_READERS, the Python with numpy, is not set");
+    }
+    python.as_ref()
+}
+
+impl Python {
+    /// Variables by which programs find the package, and runs this Python.
+    fn variables(&self) -> Vec<(&'static str, String)> {
+        let folder = self.interpreter.parent().unwrap();
+        let path = format!("{}:{}", folder.display(), std::env::var("PATH").unwrap_or_default());
+        vec![
+            ("PATH", path),
+            ("PYTHONPATH", self.packages.to_string_lossy().into_owned()),
+            ("PYTHONDONTWRITEBYTECODE", "1".to_owned()),
+            ("HUMMINGBUS_PROGRAM", HUMMINGBUS.to_owned()),
+        ]
+    }
+
+    fn call(&self, place: &Place, args: &[&str]) -> Ended {
+        let variables = self.variables();
+        let variables: Vec<_> = variables.iter().map(|(name, value)| (*name, value.as_str())).collect();
+        place.start_with(args, &variables).end()
+    }
+
+    fn run(&self, program: &[&str]) -> Output {
+        let mut command = Command::new(&self.interpreter);
+        command.args(program).envs(self.variables()).current_dir(repository("."));
+        command.output().unwrap()
+    }
+
+    /// Runs `code`, which has to succeed; returns what it prints.
+    #[track_caller]
+    fn eval(&self, code: &str) -> String {
+        let ended = self.run(&["-c", code]);
+        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+        assert!(ended.status.success(), "{code}\n{}{}", text(&ended.stdout), text(&ended.stderr));
+        text(&ended.stdout)
+    }
+}
+
+/// The shipped manifest `name` with its paths from the repository.
+fn shipped(place: &Place, name: &str) -> String {
+    let text = fs::read_to_string(repository(&format!("manifests/{name}"))).unwrap();
+    let text = text
+        .replace("\"../examples/", &format!("\"{}/", repository("examples")))
+        .replace("\"sets/", &format!("\"{}/", repository("manifests/sets")))
+        .replace("\"../vehicles/", &format!("\"{}/", repository("vehicles")));
+    place.write(name, text)
+}
+
+/// A hover of 0.3 s whose pilot is the Python program `code`.
+fn hover(place: &Place, code: &str, more: &str) -> String {
+    let program = place.write("pilot.py", format!("#!/usr/bin/env python3\nimport hummingbus as hb\n{code}"));
+    let mut permissions = fs::metadata(&program).unwrap().permissions();
+    std::os::unix::fs::PermissionsExt::set_mode(&mut permissions, 0o755);
+    fs::set_permissions(&program, permissions).unwrap();
+    let (flight, vehicle) =
+        (repository("manifests/sets/flight.toml"), repository("vehicles/hummingbird.toml"));
+    let text = format!(
+        "include = [{flight:?}]\n[run]\nduration_s = 0.3\n\
+         [process.controller]\nkind = \"pid\"\nvehicle = {vehicle:?}\n\
+         inputs = {{ set_point = \"/pilot/set_point\", estimate = \"/ekf/estimate\" }}\n\
+         [process.pilot]\ncommand = [{program:?}]\n\
+         inputs.state = {{ topic = \"/plant/state\", delay_ticks = 1, initial = {{}} }}\n\
+         outputs.set_point = {{ type = \"hummingbus_msgs/msg/SetPoint\" }}\n{more}"
+    );
+    place.write("hover.toml", text)
+}
+
+fn fly(python: &Python, place: &Place, manifest: &str) -> Ended {
+    python.call(place, &["run", manifest, "--record", &place.path("flight.mcap")])
+}
+
+#[test]
+fn a_controller_in_python_flies_the_hover_and_two_runs_are_the_same_bytes() {
+    let Some(python) = python() else { return };
+    let place = Place::new();
+    let manifest = shipped(&place, "python-controller.toml");
+    let [first, second] = ["first.mcap", "second.mcap"].map(|name| {
+        let recording = place.path(name);
+        python.call(&place, &["run", &manifest, "--record", &recording]).with_code(0);
+        fs::read(recording).unwrap()
+    });
+    assert!(first == second, "two runs differ");
+}
+
+#[test]
+fn a_controller_in_python_takes_over_from_pid_with_its_state_and_pid_from_it() {
+    let Some(python) = python() else { return };
+    let place = Place::new();
+    let manifest = shipped(&place, "swap-python.toml");
+    let recording = place.path("swap.mcap");
+    let ended = python.call(&place, &["run", &manifest, "--record", &recording, "--json"]).with_code(0);
+    let summary = ended.json();
+    let successions = summary["successions"].as_array().unwrap();
+    assert_eq!(successions.len(), 2, "{ended}");
+    assert!(successions.iter().all(|succession| succession["hand_over"] == "state"), "{ended}");
+    let shadows = summary["shadows"].as_array().unwrap().iter().filter(|shadow| shadow["from_tick"] == 2800);
+    let rms: Vec<f64> = shadows.map(|shadow| shadow["rms"].as_f64().unwrap()).collect();
+    assert!(rms.len() == 4 && rms.iter().all(|count| *count < 1e-6), "{rms:?}\n{ended}");
+}
+
+#[test]
+fn a_message_and_a_state_of_the_program_s_own() {
+    let Some(python) = python() else { return };
+    let place = Place::new();
+    let code = "\
+cells = hb.message('test_msgs/msg/Cells', [hb.Field('stamp', 'Time'), hb.Field('voltage', unit='V'),
+                                           hb.Field('cells', unit='V', length=2)])
+count = hb.message('test_msgs/msg/Count', [hb.Field('steps', 'uint64', unit='1')])
+def step(tick, state, battery, set_point, more):
+    assert more is None
+    if battery is None:
+        assert tick % 3 != 0
+    else:
+        battery['voltage'] = 11.5 + 0.001 * tick
+        battery['cells'] = [3.8, 3.9]
+    set_point['altitude'] = 1.0
+hb.run_node(step, inputs={'state': 'PlantState', 'more': hb.Optional('Imu')},
+            outputs={'set_point': 'SetPoint', 'battery': cells})
+";
+    let battery = "outputs.battery = { type = \"test_msgs/msg/Cells\", every_ticks = 3 }\n";
+    fly(python, &place, &hover(&place, code, battery)).flown();
+    let recording = place.path("flight.mcap");
+    let printed = python.eval(&format!(
+        "import hummingbus as hb\nr = hb.Recording({recording:?})\nc = r.numpy('/pilot/battery')\n\
+         print(len(c['time_s']), c['voltage'][-1], c['cells[1]'][0], r.units('/pilot/battery')['voltage'])"
+    ));
+    assert_eq!(printed, "100 11.797 3.9 V\n");
+}
+
+#[test]
+fn what_goes_wrong_in_a_program_is_said_with_node_and_reason() {
+    let Some(python) = python() else { return };
+    let run = "hb.run_node(step, inputs={'state': 'PlantState'}, outputs={'set_point': 'SetPoint'})\n";
+    let step = |body: &str| format!("kept = []\ndef step(tick, state, set_point):\n    {body}\n{run}");
+    let class = "class Pilot(hb.Component):\n    inputs = {'state': 'PlantState'}\n    outputs = {'set_point': 'SetPoint'}\n";
+    let cases = [
+        (
+            step("if tick == 100: raise ValueError('the battery is empty')"),
+            "node `pilot` failed at tick 100 (t = 0.100 s): ValueError: the battery is empty",
+        ),
+        (step("if tick == 100: raise ValueError('the battery is empty')"), "pilot.py\", line 5, in step"),
+        (step("kept.append(state)"), "the step has kept a view of `state`"),
+        (step("kept.append(state['position'])"), "the step has kept a view of `state`"),
+        (step("kept.append(hb.vector(set_point))"), "its parts are of several types"),
+        (step("kept.append(set_point)"), "the step has kept a view of `set_point`"),
+        (step("state['position']['z'] = 1.0"), "read-only"),
+        (step("set_point['altitude'] = float('nan')"), "holds altitude = NaN, expected a finite number"),
+        (
+            run.replace("step,", "print,").replace("'SetPoint'", "'MotorCommand'"),
+            "publishes hummingbus_msgs/msg/MotorCommand on its output `set_point`",
+        ),
+        (run.replace("step,", "print,").replace("'SetPoint'", "'Nothing'"), "there is no message Nothing"),
+        (
+            run.replace("step,", "print,").replace("'state'", "'stat'"),
+            "declares the input `stat`, which the manifest does not wire; it has `state`",
+        ),
+        (
+            run.replace("step,", "print,").replace("inputs={'state': 'PlantState'}, ", ""),
+            "gives node `pilot` the input `state`, which the node does not declare",
+        ),
+        (
+            format!("{class}    def __init__(self, node): node.parameters['gain']\nhb.run_node(Pilot)\n"),
+            "parameters.gain is missing; the manifest gives `extra`",
+        ),
+        (format!("{class}hb.run_node(Pilot)\n"), "parameters.extra is not read"),
+        ("import sys\nsys.exit(3)\n".to_owned(), "exit code 3"),
+    ];
+    for (number, (code, words)) in cases.iter().enumerate() {
+        let place = Place::new();
+        let parameters = if words.contains("parameters.") { "parameters = { extra = 1 }\n" } else { "" };
+        let ended = fly(python, &place, &hover(&place, code, parameters));
+        assert!(
+            ended.code == Some(2) && ended.error.contains(words),
+            "case {number}: no {words:?} in\n{ended}"
+        );
+    }
+}
+
+#[test]
+fn the_columns_of_a_recording_are_what_cat_prints() {
+    let Some(python) = python() else { return };
+    let place = Place::new();
+    let (manifest, recording) = (repository("manifests/hover.toml"), place.path("hover.mcap"));
+    place.call(&["run", &manifest, "--record", &recording, "--set", "run.duration_s=0.2"]).flown();
+    let cat = ["cat", &recording, "--topic", "/plant/state", "--field", "position", "--csv"];
+    let printed = place.call(&cat).with_code(0).output;
+    let columns = python.eval(&format!(
+        "import hummingbus as hb\nr = hb.Recording({recording:?})\nf = r.pandas('/plant/state')\np = r.polars('/plant/state')\n\
+         assert (p['velocity.x'].to_numpy() == f['velocity.x'].to_numpy()).all() and p.columns[0] == 'time_s'\n\
+         assert f.index.name == 'time_s' and 'attitude.w' in f and 'rotor_speed[3]' in f, f.columns\n\
+         for x, y, z in zip(f['position.x'], f['position.y'], f['position.z']): print(f'{{x!r}},{{y!r}},{{z!r}}')"
+    ));
+    let numbers = |line: &str, skip: usize| -> Vec<f64> {
+        line.split(',').skip(skip).map(|number| number.parse().unwrap()).collect()
+    };
+    let header = printed.lines().next().unwrap();
+    let skip =
+        header.split(',').position(|name| name.starts_with("position")).unwrap_or_else(|| panic!("{header}"));
+    let expected: Vec<_> = printed.lines().skip(1).map(|line| numbers(line, skip)).collect();
+    let found: Vec<_> = columns.lines().map(|line| numbers(line, 0)).collect();
+    assert!(found.len() == 200 && found == expected, "{header}\n{:?}\n{:?}", found.last(), expected.last());
+}
+
+#[test]
+fn a_run_that_fails_raises_its_own_words() {
+    let Some(python) = python() else { return };
+    let said = python.eval(
+        "import hummingbus as hb\ntry: hb.fly('manifests/hover.toml', set={'run.rate_hz': 7})\nexcept hb.Error as error: print(error)",
+    );
+    assert!(said.contains("choose a divisor"), "{said}");
+}
+
+#[test]
+fn the_examples_of_the_page_and_of_the_package_run() {
+    let Some(python) = python() else { return };
+    let page = fs::read_to_string(repository("docs/python.md")).unwrap();
+    let blocks: Vec<&str> =
+        page.split("\n```python\n").skip(1).map(|rest| rest.split("\n```").next().unwrap()).collect();
+    assert_eq!(blocks.len(), 3, "docs/python.md");
+    python.eval(&blocks.join("\n"));
+    python.eval("import doctest, hummingbus._messages as m\nassert doctest.testmod(m).failed == 0");
+
+    let node = page
+        .split("\n```python node\nimport hummingbus as hb\n")
+        .nth(1)
+        .unwrap()
+        .split("\n```")
+        .next()
+        .unwrap();
+    let place = Place::new();
+    let ended = fly(python, &place, &hover(&place, node, "parameters = { more_m = 0.25 }\n"));
+    ended.flown();
+}
