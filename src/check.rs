@@ -28,6 +28,27 @@ pub fn check(path: &Path, overrides: &[String]) -> Result<Graph, Diagnostic> {
     Graph::build(&Manifest::load(path, overrides, COMPONENTS)?)
 }
 
+/// As [`check()`], and asks the programs that the manifest names as a `command` for their ports: each is started once, and ends
+/// where it would connect. What it reads and sends is compared with the manifest and with the others.
+///
+/// # Errors
+/// What is wrong, or what a program says that would not fly.
+///
+/// ```
+/// # use std::path::Path;
+/// let hover = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/manifests/hover.toml"));
+/// let problem = hummingbus::check_with_programs(hover, &["process.pilot={ command = [\"false\"] }".to_owned()]);
+/// assert!(problem.is_err());
+/// assert!(hummingbus::check_with_programs(hover, &[])?.warnings.is_empty(), "all of its processes are components");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn check_with_programs(path: &Path, overrides: &[String]) -> anyhow::Result<Graph> {
+    let manifest = Manifest::load(path, overrides, COMPONENTS)?;
+    let mut graph = Graph::build(&manifest)?;
+    graph.warnings.extend(runtime::check_programs(&manifest, &graph)?);
+    Ok(graph)
+}
+
 /// Checks `text` as the manifest at `path`, which need not exist: paths written in it start at its folder.
 ///
 /// # Errors

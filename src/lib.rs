@@ -81,7 +81,7 @@ mod extremes;
 mod properties;
 
 pub use bus::Simulation;
-pub use check::{check, check_text, drives, meshes};
+pub use check::{check, check_text, check_with_programs, drives, meshes};
 pub use components::COMPONENTS;
 pub use diagnostics::Diagnostic;
 pub use runtime::checkpoint::Checkpoint;

@@ -20,6 +20,8 @@ pub mod computing_time;
 mod connected;
 pub mod context;
 mod depths;
+#[doc(hidden)]
+pub mod description;
 pub mod dynamic;
 pub mod error;
 mod executor;

@@ -5,6 +5,7 @@ use crate::claim;
 use crate::component::{State, StateError, Transfer};
 use crate::computation::Computation;
 use crate::connected::ConnectedNode;
+use crate::description::{self, Description};
 use crate::error::BusError;
 use crate::executor::{Executor, Member};
 use crate::handles::{Declared, Input, Output, Wiring};
@@ -356,12 +357,30 @@ impl Node {
     /// # Errors
     /// If a port of the manifest was not declared or declared twice, two sides disagree on a layout, or the run is aborted.
     pub(crate) fn connect(self) -> Result<ConnectedNode, BusError> {
+        if description::is_asked_for() {
+            return Err(self.describe().err().unwrap_or(BusError::Aborted));
+        }
         crate::process::stay_on(self.node.cpu);
         if self.plan.pace == Pace::Free {
             crate::process::wait_for_turn();
         }
         let transport = Rc::new(Transport::new(&self.run_dir, &self.plan.run_id, self.name())?);
         self.announce(transport)?.connect()
+    }
+
+    /// Tells the declared ports to a check of the manifest.
+    fn describe(mut self) -> Result<(), BusError> {
+        let (inputs, outputs) = self.declared()?;
+        let message = |declared: &Declared| match declared {
+            Declared::Typed(schema) => Some(Announcement::of(schema)),
+            Declared::Raw => None,
+        };
+        for (input, declared) in self.node.inputs.iter().zip(&inputs) {
+            declared.initial_value(input, &self.node.name)?;
+        }
+        let outputs = outputs.iter().map(|output| Announcement::of(output.schema)).collect();
+        let description = Description { inputs: inputs.iter().map(message).collect(), outputs };
+        description.store(&self.run_dir, self.index, self.generation)
     }
 
     /// Creates the outputs, and tells that it did: the first half of connecting.

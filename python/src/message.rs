@@ -1,6 +1,6 @@
 //! Messages as Python declares and reads them: JSON, of which `hummingbus/_messages.py` makes types of numpy.
 
-use crate::raised;
+use crate::error::raised;
 use bus::dynamic::{FieldDescription, KindDescription, MessageDescription};
 use bus::schema::{Field, Kind, Primitive, Schema};
 use hummingbus::COMPONENTS;

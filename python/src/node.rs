@@ -1,7 +1,7 @@
 //! A node whose step is a Python function: it gets its messages as arrays of numpy in shared memory.
 
+use crate::error::raised;
 use crate::message::declared;
-use crate::raised;
 use bus::BusError;
 use bus::dynamic::{DynamicNode, DynamicTick};
 use pyo3::ffi;

@@ -1,6 +1,6 @@
 //! Recordings as columns.
 
-use crate::raised;
+use crate::error::raised;
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyDict};
 use recorder::fields::TopicFields;

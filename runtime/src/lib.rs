@@ -7,6 +7,7 @@ pub mod clean;
 pub mod ctl;
 mod descendants;
 mod describe;
+mod describe_programs;
 pub mod event;
 mod file_lock;
 pub mod flight;
@@ -44,6 +45,7 @@ mod view;
 mod watch_clock;
 mod world;
 
+pub use describe_programs::check_programs;
 pub use in_process::{fly_unrecorded, require_one_thread, simulate};
 
 use bus::{BusError, Join};

@@ -13,6 +13,9 @@ pub struct CheckArguments {
     /// Override a key of the manifest.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// Start no program that the manifest names as a `command`: their ports are not compared.
+    #[arg(long)]
+    no_programs: bool,
     /// Print the graph as JSON.
     #[arg(long)]
     json: bool,
@@ -23,7 +26,12 @@ pub struct CheckArguments {
 /// # Errors
 /// What is wrong with it.
 pub fn check(arguments: &CheckArguments) -> Result<bool> {
-    let checked = hummingbus::check(&arguments.manifest, &arguments.set)?;
+    let CheckArguments { manifest, set, .. } = arguments;
+    let checked = if arguments.no_programs {
+        hummingbus::check(manifest, set)?
+    } else {
+        hummingbus::check_with_programs(manifest, set)?
+    };
     print_warnings(&checked.warnings);
     if arguments.json {
         print_json(&checked.json())?;

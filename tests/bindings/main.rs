@@ -2,12 +2,14 @@
 //!
 //! - [`support`]: a folder of its own for each test, launches under a watchdog, what a run left behind
 //! - [`build`]: the library and the programs of the tests, built with CMake
+//! - [`check`]: programs are asked for their ports
 //! - [`cpp`]: controllers in C++, and pilots in C
 //! - [`python`]: nodes, runs and recordings in Python
 //! - [`skipped`]: tests that cannot run here
 //! - [`headers`]: the headers are those of the messages
 
 mod build;
+mod check;
 mod cpp;
 mod headers;
 mod python;

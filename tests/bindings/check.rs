@@ -1,0 +1,113 @@
+//! `check` asks programs for their ports and finds what a run would.
+
+use crate::build::built;
+use crate::support::{Ended, HUMMINGBUS, Place, repository};
+use std::path::Path;
+
+/// A hover of 0.3 s with this controller and this pilot.
+fn hover(place: &Place, controller: &str, pilot: &str) -> String {
+    let flight = repository("manifests/sets/flight.toml");
+    let text = format!(
+        "include = [{flight:?}]\n[run]\nduration_s = 0.3\n[process.controller]\n{controller}[process.pilot]\n{pilot}"
+    );
+    place.write("hover.toml", text)
+}
+
+/// The controller of the example in Rust, with the inputs and parameters that it needs and `more`.
+fn custom(inputs: &str, parameters: &str) -> String {
+    let program = Path::new(HUMMINGBUS).with_file_name("examples/custom_controller");
+    format!(
+        "command = [{program:?}]\noutputs.command = {{ type = \"hummingbus_msgs/msg/MotorCommand\" }}\n\
+         inputs = {{ {inputs} }}\nparameters = {{ hover_count = 76.5, altitude = [63.6, 31.8]{parameters} }}\n"
+    )
+}
+
+const INPUTS: &str = "set_point = \"/pilot/set_point\", estimate = \"/ekf/estimate\"";
+const TILT: &str = ", tilt = [11.6, 4.4]";
+const PILOT: &str = "kind = \"pilot\"\nparameters = { initial_altitude_m = 1.0 }\n";
+
+/// The pilot of the tests in C++ with this fault.
+fn faulty(fault: &str) -> String {
+    let (program, extra) = (built().program("faulty"), if fault == "unread" { ", extra = 1" } else { "" });
+    format!(
+        "command = [{program:?}]\noutputs.set_point = {{ type = \"hummingbus_msgs/msg/SetPoint\" }}\n\
+         outputs.battery = {{ type = \"test_msgs/msg/Cells\" }}\nparameters = {{ fault = {fault:?}{extra} }}\n"
+    )
+}
+
+fn check(controller: &str, pilot: &str) -> Ended {
+    let place = Place::new();
+    let manifest = hover(&place, controller, pilot);
+    place.call(&["check", &manifest])
+}
+
+#[test]
+fn a_manifest_that_fits_its_programs_is_accepted_without_a_word() {
+    let ended = check(&custom(INPUTS, TILT), &faulty("none")).with_code(0);
+    assert!(ended.error.is_empty(), "{ended}");
+    ended.prints(&["/pilot/battery"]);
+}
+
+#[test]
+fn a_check_finds_what_a_run_would() {
+    let (controller, none) = (custom(INPUTS, TILT), faulty("none"));
+    let cases = [
+        (custom(INPUTS, ""), none.clone(), "missing key `tilt`"),
+        (custom(INPUTS, ", tilt = [11.6, 4.4], tild = 1.0"), none.clone(), "unknown key `tild`"),
+        (
+            custom("estimate = \"/ekf/estimate\"", TILT),
+            none.clone(),
+            "declares the input `set_point`, which the manifest does not wire",
+        ),
+        (
+            custom(&format!("{INPUTS}, imu = \"/imu/imu\""), TILT),
+            none.clone(),
+            "gives node `controller` the input `imu`",
+        ),
+        (
+            custom("set_point = \"/pilot/battery\", estimate = \"/ekf/estimate\"", TILT),
+            none,
+            "layout mismatch on topic /pilot/battery",
+        ),
+        (controller.clone(), faulty("unread"), "parameters.extra is not read"),
+        (controller.clone(), faulty("port"), "declares the output `nothing`"),
+        (controller.clone(), faulty("type"), "the manifest states"),
+        (controller.clone(), faulty("layout"), "process `controller` reads its port `set_point` as"),
+        (controller.clone(), faulty("padding"), "at byte 8, and the fields before it end at 4"),
+    ];
+    for (controller, pilot, words) in cases {
+        let ended = check(&controller, &pilot).with_code(2);
+        assert!(ended.error.contains(words), "no {words:?} in\n{ended}");
+        assert!(ended.error.contains("hover.toml:"), "no place in\n{ended}");
+    }
+}
+
+#[test]
+fn a_program_that_tells_nothing_is_a_warning_and_none_is_started_where_that_is_asked_for() {
+    let silent = "command = [\"true\"]\noutputs.set_point = { type = \"hummingbus_msgs/msg/SetPoint\" }\n";
+    let place = Place::new();
+    let manifest = hover(&place, &custom(INPUTS, TILT), silent);
+    place
+        .call(&["check", &manifest])
+        .with_code(0)
+        .says(&["was not asked for its ports: it ended without an answer"]);
+    let ended = place.call(&["check", &manifest, "--no-programs"]).with_code(0);
+    assert!(ended.error.is_empty(), "{ended}");
+    let failing = hover(&place, &custom(INPUTS, TILT), &silent.replace("true", "false"));
+    place.call(&["check", &failing]).with_code(2).says(&["process `pilot` would not take part in a run"]);
+}
+
+#[test]
+fn programs_that_take_over_are_asked_too() {
+    let place = Place::new();
+    let pid = format!(
+        "kind = \"pid\"\nvehicle = {:?}\ninputs = {{ {INPUTS} }}\n",
+        repository("vehicles/hummingbird.toml")
+    );
+    let program = built().program("controller");
+    let swap = format!(
+        "{PILOT}[[swap]]\nprocess = \"controller\"\nat_tick = 200\nwith = {{ command = [{program:?}] }}\n"
+    );
+    let manifest = hover(&place, &pid, &swap);
+    place.call(&["check", &manifest]).with_code(2).says(&["parameters.mass_kg is missing"]);
+}
