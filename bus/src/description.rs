@@ -1,8 +1,7 @@
-//! Ports of a program as it declares them, told to a check of the manifest instead of a run.
+//! Description of a node's ports, which a check of the manifest reads.
 //!
-//! Who starts a node's process with [`DESCRIBE_VARIABLE`] set, in the directory of a run that nobody flies, finds there what
-//! the program declares, or hears its error. The program reads its parameters and files as in a run, and ends where it would
-//! connect.
+//! If [`DESCRIBE_VARIABLE`] is set, a node stores its description in the run directory instead of connecting. It has read its
+//! parameters and files as in a run.
 
 use crate::announcement::Announcement;
 use crate::error::BusError;

@@ -16,6 +16,7 @@ use crate::schema::Schema;
 use crate::tick::Tick;
 use inputs::InputFiles;
 use serde_json::Value;
+use std::mem::ManuallyDrop;
 
 pub use message::{FieldDescription, KindDescription, MessageDescription};
 
@@ -31,8 +32,8 @@ pub use message::{FieldDescription, KindDescription, MessageDescription};
 ///     let state = node.input("state", PlantState::SCHEMA)?;
 ///     let set_point = node.output("set_point", SetPoint::SCHEMA)?;
 ///     node.run(|tick| {
-///         let position_z = tick.input(state)[24..32].to_vec();
-///         let Some(message) = tick.output(set_point).map_err(|error| error.to_string())? else { return Ok(()) };
+///         let position_z = tick.input(state)?[24..32].to_vec();
+///         let Some(message) = tick.output(set_point)? else { return Ok(()) };
 ///         message[8..16].copy_from_slice(&position_z);
 ///         Ok(())
 ///     })
@@ -59,12 +60,12 @@ struct DynamicPort {
 #[derive(Debug)]
 struct StateMemory {
     schema: &'static Schema,
-    /// Made from a box of `words` words, which this owns: a pointer, since the program has it too.
+    /// A box of `words` words that is never freed: the program may keep the pointer, and a process is one node.
     start: *mut u64,
     words: usize,
 }
 
-// SAFETY: it owns its memory, as a box would.
+// SAFETY: the memory is there as long as the process is.
 unsafe impl Send for StateMemory {}
 
 impl DynamicNode {
@@ -138,8 +139,8 @@ impl DynamicNode {
         Ok(self.outputs.len() - 1)
     }
 
-    /// Declares the state as one value of `schema`; returns its memory, zeros aligned to eight bytes, which stays where it
-    /// is until [`DynamicNode::run`] returns. All that changes from tick to tick belongs there: whoever takes the node's
+    /// Declares the state as one value of `schema`; returns its memory, zeros aligned to eight bytes, which stay where they
+    /// are as long as the process lives. All that changes from tick to tick belongs there: whoever takes the node's
     /// place goes on from it. The bus reads and writes it between steps.
     ///
     /// # Errors
@@ -176,7 +177,13 @@ impl DynamicNode {
         let transfer = state.as_ref().map_or(Transfer::Nothing, |state| Transfer::Message(state.schema));
         let steps = DynamicSteps { inputs, outputs, state, step };
         let member = Member::new(node.connect()?, transfer, Box::new(steps))?;
-        Executor::alone(member).run()
+        let mut executor = ManuallyDrop::new(Executor::alone(member));
+        let ended = executor.run();
+        if ended.is_ok() {
+            drop(ManuallyDrop::into_inner(executor));
+        }
+        // After an error the program may look at messages of the step that failed, until its process ends: they stay mapped.
+        ended
     }
 }
 
@@ -189,18 +196,10 @@ impl StateMemory {
 
     /// Runs `with` on the bytes of the state.
     fn bytes<R>(&self, with: impl FnOnce(&mut [u8]) -> R) -> R {
-        // SAFETY: the memory is that of the box, of `words` words, until this is dropped. The program changes it in its
-        // steps only, which this does not run beside.
+        // SAFETY: the memory is that of the box, of `words` words. The program changes it in its steps only, which this does
+        // not run beside.
         let words = unsafe { std::slice::from_raw_parts_mut(self.start, self.words) };
         with(&mut bytemuck::cast_slice_mut(words)[..self.schema.size])
-    }
-}
-
-impl Drop for StateMemory {
-    fn drop(&mut self) {
-        let words = std::ptr::slice_from_raw_parts_mut(self.start, self.words);
-        // SAFETY: it was made by `Box::into_raw` from a box of as many words, and nobody else frees it.
-        drop(unsafe { Box::from_raw(words) });
     }
 }
 
@@ -264,43 +263,52 @@ impl DynamicTick<'_, '_> {
 
     /// The newest message of input `input` that this tick may see, in shared memory: aligned to eight bytes.
     ///
-    /// # Panics
+    /// # Errors
     /// If there is no such input.
-    #[must_use]
-    pub fn input(&self, input: usize) -> &[u8] {
-        let DynamicPort { index, size } = self.inputs[input];
-        message_bytes(self.tick.inputs[index].words(self.tick.locals), size)
+    pub fn input(&self, input: usize) -> Result<&[u8], String> {
+        let DynamicPort { index, size } = port(self.inputs, input, "input")?;
+        Ok(message_bytes(self.tick.inputs[index].words(self.tick.locals), size))
     }
 
-    /// Memory of the message of output `output`, zeros aligned to eight bytes; `None` where none is due at this tick.
-    /// The bus fills in its stamp.
+    /// Memory of the message of output `output`, aligned to eight bytes: zeros until the step writes them; `None` where the step
+    /// sends none. The bus fills in its stamp.
     ///
     /// # Errors
-    /// If shared memory cannot be had.
-    ///
-    /// # Panics
-    /// If there is no such output.
-    pub fn output(&mut self, output: usize) -> Result<Option<&mut [u8]>, BusError> {
-        let DynamicPort { index, size } = self.outputs[output];
+    /// If there is no such output, or shared memory cannot be had.
+    pub fn output(&mut self, output: usize) -> Result<Option<&mut [u8]>, String> {
+        let DynamicPort { index, size } = port(self.outputs, output, "output")?;
         let port = &mut self.tick.outputs[index];
         if !port.takes(self.tick.tick) {
             return Ok(None);
         }
-        let message = &mut bytemuck::cast_slice_mut(port.words(self.tick.node)?)[BODY_START..][..size];
-        // It may hold an earlier sample.
-        message.fill(0);
+        let is_first = !port.is_written();
+        let words = port.words(self.tick.node).map_err(|error| error.to_string())?;
+        let message = &mut bytemuck::cast_slice_mut(words)[BODY_START..][..size];
+        if is_first {
+            // It may hold an earlier sample.
+            message.fill(0);
+        }
         Ok(Some(message))
     }
 
     /// The message that the process whose place this one takes sent last on output `output`, at the tick at which it takes
     /// it and only where no state was handed over: the command to go on from without a jump.
     ///
-    /// # Panics
+    /// # Errors
     /// If there is no such output.
-    #[must_use]
-    pub fn predecessor(&self, output: usize) -> Option<&[u8]> {
-        let DynamicPort { index, size } = self.outputs[output];
-        let words = self.tick.predecessor.get(index)?.newest(self.tick.locals)?;
-        Some(message_bytes(words, size))
+    pub fn predecessor(&self, output: usize) -> Result<Option<&[u8]>, String> {
+        let DynamicPort { index, size } = port(self.outputs, output, "output")?;
+        let sent = self.tick.predecessor.get(index).and_then(|port| port.newest(self.tick.locals));
+        Ok(sent.map(|words| message_bytes(words, size)))
     }
+}
+
+/// The port of this number among those that were declared.
+fn port(ports: &[DynamicPort], number: usize, direction: &str) -> Result<DynamicPort, String> {
+    ports.get(number).copied().ok_or_else(|| {
+        format!(
+            "the step asks for {direction} number {number}; the program has declared {} (counted from 0)",
+            ports.len()
+        )
+    })
 }

@@ -149,7 +149,8 @@ pub enum BusError {
     /// Publisher and subscriber disagree on the bytes.
     #[error(
         "layout mismatch on topic {topic}: node `{node}` reads its port `{port}` as\n{expected}\n\
-         but the publisher sends\n{found}\nBuild both against the same message definition"
+         but the publisher sends\n{found}\nBuild the program of node `{node}` anew with the message of the publisher, or the \
+         publisher with that of `{node}`"
     )]
     LayoutMismatch {
         /// The topic.
@@ -166,7 +167,7 @@ pub enum BusError {
     /// A backup sends other bytes than the process it would succeed.
     #[error(
         "layout mismatch on topic {topic}: the backup of node `{node}` sends\n{found}\nbut the topic carries\n\
-         {expected}\nBuild both against the same message definition"
+         {expected}\nBuild the program of the backup anew with the message that the topic carries"
     )]
     BackupLayout {
         /// The node.

@@ -496,6 +496,11 @@ impl OutPort {
         self.is_timed || self.is_due(tick)
     }
 
+    /// True if the step has taken the memory of its sample.
+    pub(crate) fn is_written(&self) -> bool {
+        self.is_written
+    }
+
     /// What the step at `tick` wrote.
     ///
     /// # Errors

@@ -7,7 +7,7 @@ use crate::error::BusError;
 use crate::handles::Declared;
 use crate::local::LocalTopic;
 use crate::membership::Membership;
-use crate::message::{Message, view};
+use crate::message::{Message, message_bytes, view};
 use crate::node::{DeclaredOutput, Node};
 use crate::plan::Plan;
 use crate::port::{Feed, InPort, OutPort};
@@ -160,13 +160,8 @@ impl Simulation {
     /// # Errors
     /// If no node sends it, or its messages are not `T`.
     pub fn topic<T: Message>(&self, name: &str) -> Result<Topic<T>, BusError> {
-        let sent = |index: usize| self.announcements[index].as_ref();
-        let named = |index: &usize| self.plan.topics[*index].name == name && sent(*index).is_some();
-        let index = (0..self.plan.topics.len()).find(named).ok_or_else(|| BusError::UnknownTopic {
-            topic: name.to_owned(),
-            known: self.plan.topics.iter().map(|topic| topic.name.clone()).collect::<Vec<_>>().join(", "),
-        })?;
-        if let Some(announcement) = sent(index) {
+        let index = self.topic_index(name)?;
+        if let Some(announcement) = &self.announcements[index] {
             announcement.check(T::SCHEMA, "the simulation's host", name, name)?;
         }
         Ok(Topic { index, message: PhantomData })
@@ -177,6 +172,28 @@ impl Simulation {
     pub fn newest<T: Message>(&self, topic: Topic<T>) -> Option<&T> {
         let (_, words) = self.samples[topic.index].as_ref()?.newest()?;
         Some(view(words))
+    }
+
+    /// The message type of the topic called `name`, and its newest message as bytes; `None` before the first one.
+    ///
+    /// # Errors
+    /// If no node sends it.
+    pub fn newest_bytes(&self, name: &str) -> Result<(&str, Option<&[u8]>), BusError> {
+        let index = self.topic_index(name)?;
+        let (topic, size) =
+            (&self.plan.topics[index], self.announcements[index].as_ref().map_or(0, |sent| sent.size));
+        let newest = self.samples[index].as_ref().and_then(LocalTopic::newest);
+        Ok((&topic.type_name, newest.map(|(_, words)| message_bytes(words, size))))
+    }
+
+    /// The number of the topic called `name`, which a node sends.
+    fn topic_index(&self, name: &str) -> Result<usize, BusError> {
+        let topics = self.plan.topics.iter().zip(&self.announcements);
+        let index = topics.clone().position(|(topic, sent)| topic.name == name && sent.is_some());
+        index.ok_or_else(|| BusError::UnknownTopic {
+            topic: name.to_owned(),
+            known: topics.map(|(topic, _)| topic.name.clone()).collect::<Vec<_>>().join(", "),
+        })
     }
 
     /// Each node whose steps take simulated time: its name, the steps that took longer than to its next due tick, and the

@@ -20,6 +20,7 @@ from ._messages import Field, Message, dtype, message, messages, set_values, vec
 from ._nodes import Component, Optional, run_node
 from ._recordings import Recording
 from ._runs import Outcome, Run, fly, start
+from ._simulations import Simulation
 
 __all__ = [
     "Component",
@@ -30,6 +31,7 @@ __all__ = [
     "Outcome",
     "Recording",
     "Run",
+    "Simulation",
     "__version__",
     "dtype",
     "fly",

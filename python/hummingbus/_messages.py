@@ -114,6 +114,8 @@ def vector(field: np.ndarray) -> np.ndarray:
     >>> float(state["position"]["z"])
     1.5
     """
+    if field.shape:
+        raise TypeError(f"it is an array of shape {field.shape} itself")
     shape, kind, _ = _parts.get(id(field.dtype)) or _parts_of(field.dtype)
     return np.ndarray(shape, kind, field)
 

@@ -21,7 +21,8 @@ class Optional:
 
 
 class Parameters(dict):
-    """The parameters that the manifest gives a node. One that the program does not read is refused."""
+    """The parameters that the manifest gives a node. One that the program does not read is refused; to look at all of them
+    (`items()`, `dict(parameters)`) reads all."""
 
     def __init__(self, values: Mapping[str, Any]):
         super().__init__(values)
@@ -29,17 +30,33 @@ class Parameters(dict):
 
     def __getitem__(self, key: str) -> Any:
         self._read.add(key)
-        if key not in self:
-            known = ", ".join(f"`{name}`" for name in self.keys()) or "none"
+        if not super().__contains__(key):
+            known = ", ".join(f"`{name}`" for name in super().keys()) or "none"
             raise _native.Error(f"parameters.{key} is missing; the manifest gives {known}")
         return super().__getitem__(key)
+
+    def __iter__(self) -> Any:
+        self._read.update(super().keys())
+        return super().__iter__()
+
+    def items(self) -> Any:
+        self._read.update(super().keys())
+        return super().items()
+
+    def values(self) -> Any:
+        self._read.update(super().keys())
+        return super().values()
+
+    def __contains__(self, key: object) -> bool:
+        self._read.add(str(key))
+        return super().__contains__(key)
 
     def get(self, key: str, default: Any = None) -> Any:
         self._read.add(key)
         return super().get(key, default)
 
     def _require_all_read(self) -> None:
-        for key in self.keys():
+        for key in super().keys():
             if key not in self._read:
                 read = ", ".join(f"`{name}`" for name in sorted(self._read)) or "none"
                 raise _native.Error(f"parameters.{key} is not read; the program reads {read}")
@@ -104,7 +121,8 @@ def run_node(
     state: str | Message | None = None,
 ) -> None:
     """Runs a component, or a function with these ports, as the node that the launcher started this process for: all of a
-    program that a manifest names as a `command`. What goes wrong is printed, and the process exits with code 1.
+    program that a manifest names as a `command`. Errors are printed, and the process exits with code 1 then. A function reads no
+    parameters.
     """
     try:
         _run(component, inputs, outputs, state)
@@ -113,11 +131,23 @@ def run_node(
         sys.exit(1)
 
 
+def _require_own_names(inputs: Any, outputs: Any, state: Any) -> None:
+    """Refuses ports whose messages `step` would get under one name."""
+    names = ["tick", *inputs, *outputs] + ([] if state is None else ["state"])
+    for name in names:
+        if names.count(name) > 1:
+            raise _native.Error(
+                f"`step` would get two values under the name `{name}`: `tick`, each input, each output and `state` need names of "
+                "their own; rename the port in the program and in the manifest"
+            )
+
+
 def _run(component: Any, inputs: Any, outputs: Any, state: Any) -> None:
     node = _native.Node()
     parameters = Parameters(json.loads(node.parameters()))
     is_class = isinstance(component, type)
     declared = (component.inputs, component.outputs, component.state) if is_class else (inputs or {}, outputs or {}, state)
+    _require_own_names(*declared)
     absent = {}
     for ports, wired, declare in zip(declared, node.wired(), (node.input, node.output)):
         names = [name for name, _ in wired]
@@ -132,12 +162,9 @@ def _run(component: Any, inputs: Any, outputs: Any, state: Any) -> None:
     if declared[2] is not None:
         message = of(declared[2])
         node.declare_state(message._description, message.dtype)
-    step = component
-    if is_class:
-        step = component(Node(node.name, node.period_s, node.seed, parameters, node)).step
-        parameters._require_all_read()
-    elif parameters:
-        parameters._require_all_read()
+    of_node = Node(node.name, node.period_s, node.seed, parameters, node)
+    step = component(of_node).step if is_class else component
+    parameters._require_all_read()
     # What is there now stays: the collector need not look at it again at every tick.
     gc.collect()
     gc.freeze()

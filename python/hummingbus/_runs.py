@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import glob
 import json
+import math
 import os
 import shutil
 import subprocess
+import tempfile
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -48,19 +50,24 @@ class Outcome:
 class Run:
     """A run under way. Leaving a `with` block stops it."""
 
-    def __init__(self, process: subprocess.Popen):
-        self._process = process
+    def __init__(self, command: Sequence[str]):
+        # Files, since a pipe that nobody reads would hold up the run.
+        self._output, self._said = tempfile.TemporaryFile("w+"), tempfile.TemporaryFile("w+")
+        self._process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=self._output, stderr=self._said, text=True)
         self._outcome: Outcome | None = None
 
     @property
     def id(self) -> str:
         """Name of the run, as `hummingbus top` has it."""
         pattern = f"/dev/shm/hb_{self._process.pid:x}-*_run"
+        patience_s = time.monotonic() + 30.0
         while self._process.poll() is None:
             if found := glob.glob(pattern):
-                return os.path.basename(found[0])[len("hb_") : -len("_run")]
+                return os.path.basename(max(found, key=os.path.getmtime))[len("hb_") : -len("_run")]
+            if time.monotonic() > patience_s:
+                raise _native.Error(f"the run has not begun within 30 s: there is no {pattern}; is {_program()} the program itself?")
             time.sleep(0.005)
-        raise _native.Error("the run has ended")
+        raise _native.Error("the run has ended: " + self._texts()[1].strip())
 
     def status(self) -> Mapping[str, Any]:
         """How far the run has come."""
@@ -97,7 +104,8 @@ class Run:
         Raises `hummingbus.Error` with the run's own words where it did not come to its end, and `subprocess.TimeoutExpired`.
         """
         if self._outcome is None:
-            output, said = self._process.communicate(timeout=timeout_s)
+            self._process.wait(timeout_s)
+            output, said = self._texts()
             if self._process.returncode not in (0, 1) or not output.strip():
                 raise _native.Error(said.strip())
             self._outcome = Outcome(self._process.returncode == 0, json.loads(output))
@@ -109,7 +117,13 @@ class Run:
     def __exit__(self, *_: Any) -> None:
         if self._process.poll() is None:
             self._process.terminate()
-            self._process.communicate()
+            self._process.wait()
+
+    def _texts(self) -> tuple[str, str]:
+        """Standard output and standard error so far."""
+        for file in (self._output, self._said):
+            file.seek(0)
+        return self._output.read(), self._said.read()
 
     def _ask(self, *words: str) -> Mapping[str, Any]:
         command = [_program(), "ctl", "--run", self.id, "--json", *words]
@@ -137,8 +151,7 @@ def start(
     if pace is not None:
         command += ["--pace", str(pace)]
     command += arguments
-    pipe = subprocess.PIPE
-    return Run(subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=pipe, stderr=pipe, text=True))
+    return Run(command)
 
 
 def fly(manifest: str | os.PathLike[str], **options: Any) -> Outcome:
@@ -155,4 +168,8 @@ def _toml(value: Any) -> str:
         return "[" + ", ".join(map(_toml, value)) + "]"
     if hasattr(value, "tolist"):
         return _toml(value.tolist())
-    return json.dumps(value)
+    if isinstance(value, float) and not math.isfinite(value):
+        return "nan" if math.isnan(value) else "inf" if value > 0 else "-inf"
+    if value is None:
+        raise TypeError("a manifest has no value `None`; leave the key out")
+    return json.dumps(value, ensure_ascii=False)

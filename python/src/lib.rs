@@ -1,10 +1,12 @@
 //! The part of the Python package `hummingbus` that is Rust: nodes, messages and recordings. `hummingbus/__init__.py` is what
 //! people import.
 
+mod agent;
 mod error;
 mod message;
 mod node;
 mod recording;
+mod simulation;
 
 use pyo3::prelude::*;
 
@@ -15,6 +17,9 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<node::Node>()?;
     module.add_class::<recording::Recording>()?;
+    module.add_class::<simulation::Saved>()?;
+    module.add_class::<simulation::Simulation>()?;
+    module.add("REFERENCE_VEHICLE", hummingbus::vehicles::reference::HUMMINGBIRD)?;
     module.add_function(wrap_pyfunction!(message::messages, module)?)?;
     module.add_function(wrap_pyfunction!(message::message, module)?)
 }

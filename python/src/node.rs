@@ -41,10 +41,15 @@ impl Node {
     /// Joins the run that started this process.
     #[new]
     fn join(py: Python<'_>) -> PyResult<Self> {
-        // A signal ends the run at a tick; Python would raise in the middle of one.
+        // A signal ends the run at a tick; Python would raise in the middle of one. What the bus does on one comes in addition.
         let signal = py.import("signal")?;
-        signal.call_method1("signal", (signal.getattr("SIGINT")?, signal.getattr("SIG_IGN")?))?;
-        let node = DynamicNode::join().map_err(raised)?;
+        let interrupt = signal.getattr("SIGINT")?;
+        let before = signal.call_method1("signal", (&interrupt, signal.getattr("SIG_IGN")?));
+        let node = DynamicNode::join().map_err(|error| {
+            // Where it cannot be set, since this is no main thread, it was not set before either.
+            let _ = before.and_then(|before| signal.call_method1("signal", (&interrupt, before)));
+            raised(error)
+        })?;
         Ok(Self { node: Some(node), inputs: Vec::new(), outputs: Vec::new(), state: None })
     }
 
@@ -111,9 +116,13 @@ impl Node {
     }
 
     /// Calls `step(tick, **messages)` at every due tick until the run ends. False if the launcher ended it early.
-    fn run(&mut self, py: Python<'_>, step: Py<PyAny>) -> PyResult<bool> {
-        let node = self.node.take().ok_or_else(|| raised("the node runs already"))?;
-        let caller = Caller::new(py, self, step)?;
+    fn run(slf: &Bound<'_, Self>, step: Py<PyAny>) -> PyResult<bool> {
+        let py = slf.py();
+        // Borrowed no longer than this: a step that asks the node is answered in words.
+        let mut declared = slf.try_borrow_mut()?;
+        let node = declared.node.take().ok_or_else(|| raised("the node runs already"))?;
+        let caller = Caller::new(py, &mut declared, step)?;
+        drop(declared);
         let ended = py.detach(|| {
             // What the closure holds is used by this thread alone.
             let caller = caller;
@@ -162,7 +171,7 @@ impl Caller {
             format_exception: py.import("traceback")?.getattr("format_exception")?.unbind(),
         };
         if let Some(State { memory, size, dtype }) = node.state.take() {
-            // SAFETY: the bus keeps this memory until the run ends, and with it the calls of this caller.
+            // SAFETY: this memory stays as long as the process lives; the bus changes it between steps only.
             let view = unsafe { memory_view(py, memory, size, true) }?;
             caller.state = Some(caller.message(py, &view, &dtype)?.unbind());
         }
@@ -195,8 +204,9 @@ impl Caller {
     ) -> PyResult<()> {
         let messages = PyDict::new(py);
         for Port { name, number, dtype } in &self.inputs {
-            let bytes = tick.input(*number);
-            // SAFETY: the message lies there until the step ends, and `released` sees to it that no view outlives that.
+            let bytes = tick.input(*number).map_err(raised)?;
+            // SAFETY: the message lies there until the step ends, and `released` ends the run where a view outlives that; what
+            // such a run has mapped stays as long as the process lives.
             let view = unsafe { memory_view(py, bytes.as_ptr().cast_mut(), bytes.len(), false) }?;
             messages.set_item(name, self.message(py, &view, dtype)?)?;
             views.push((name.clone_ref(py), view));

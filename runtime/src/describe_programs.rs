@@ -1,7 +1,7 @@
 //! Programs of a manifest are asked for their ports, so that a check finds what a run would.
 //!
-//! Each `command` that takes part in the ticks is started once, in the directory of a run that nobody flies, and ends where it
-//! would connect ([`bus::description`]).
+//! Each `command` that takes part in the ticks is started once, in a temporary run directory, and ends where it would connect
+//! ([`bus::description`]).
 
 use crate::graph::Graph;
 use crate::host_world::store_files;
@@ -9,12 +9,14 @@ use crate::manifest::Manifest;
 use crate::process_log;
 use crate::program::{Executable, Program};
 use crate::role::Role;
+use crate::run_dir::shared_memory_of;
 use crate::spawn::{Started, start};
 use anyhow::{Context, Result};
 use bus::announcement::Announcement;
 use bus::description::{DESCRIBE_VARIABLE, Description};
 use bus::host_time::monotonic_ns;
 use bus::plan::{NodePlan, Plan};
+use bus::ports::Inputs;
 use diagnostics::Diagnostic;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -52,6 +54,8 @@ pub fn check_programs(manifest: &Manifest, graph: &Graph) -> Result<Vec<Diagnost
     plan.store(run_dir)?;
     let (mut messages, mut warnings, mut described) =
         (known_messages(manifest, graph), Vec::new(), Vec::new());
+    // Dropped before the folder: memory of a program that has joined instead of describing itself.
+    let _shared_memory = SharedMemory(&plan.run_id);
     for program in asked {
         store_files(&graph.files, run_dir, program.plan)?;
         if program.generation > 0 {
@@ -73,6 +77,15 @@ pub fn check_programs(manifest: &Manifest, graph: &Graph) -> Result<Vec<Diagnost
     Ok(warnings)
 }
 
+/// Shared memory that a program of an older version may leave, which joins a run although there is none.
+struct SharedMemory<'p>(&'p str);
+
+impl Drop for SharedMemory<'_> {
+    fn drop(&mut self) {
+        shared_memory_of(self.0).iter().for_each(|path| drop(std::fs::remove_file(path)));
+    }
+}
+
 /// The programs of `graph` that are no components, with those that take their places.
 fn asked(graph: &Graph) -> Vec<Asked<'_>> {
     let first = graph.plan.nodes.iter().zip(&graph.programs).enumerate();
@@ -86,15 +99,18 @@ fn asked(graph: &Graph) -> Vec<Asked<'_>> {
     first.chain(backups).filter(|asked| matches!(asked.program.executable, Executable::Command(_))).collect()
 }
 
-/// Messages of the topics that components send, by the numbers of the topics.
+/// Messages of the topics that components send or read by their types, by the numbers of the topics.
 fn known_messages(manifest: &Manifest, graph: &Graph) -> BTreeMap<usize, Announcement> {
     let of_components = graph.plan.nodes.iter().zip(&graph.programs);
-    let topics = of_components
-        .filter(|(_, program)| program.component().is_some())
-        .flat_map(|(node, _)| &node.outputs);
-    let announced = topics.filter_map(|output| {
-        let schema = manifest.registry().message(&graph.plan.topics[output.topic].type_name)?;
-        Some((output.topic, Announcement::of(schema)))
+    let of_components = of_components.filter_map(|(node, program)| Some((node, program.component()?)));
+    let topics = of_components.flat_map(|(node, component)| {
+        let is_typed = matches!(component.inputs, Inputs::Ports(_) | Inputs::Many(_));
+        let read = node.inputs.iter().filter(move |_| is_typed).map(|input| input.topic);
+        read.chain(node.outputs.iter().map(|output| output.topic))
+    });
+    let announced = topics.filter_map(|topic| {
+        let schema = manifest.registry().message(&graph.plan.topics[topic].type_name)?;
+        Some((topic, Announcement::of(schema)))
     });
     announced.collect()
 }
@@ -115,6 +131,8 @@ fn ask(manifest: &Manifest, run_dir: &Path, asked: Asked<'_>) -> Result<Answer> 
     // Only a component needs the executable.
     let (mut child, log) = start(Path::new(""), run_dir, &plan.name, role, Started::One(&program), None)?;
     let ended = wait(&mut child);
+    // Also what it has started itself.
+    bus::process::kill_group(child.id());
     if let Some(description) = Description::load(run_dir, node, generation)? {
         return Ok(Answer::Described(description));
     }
@@ -127,13 +145,13 @@ fn ask(manifest: &Manifest, run_dir: &Path, asked: Asked<'_>) -> Result<Answer> 
                 manifest,
                 &plan.name,
                 message,
-                "its words say what to correct, in the manifest or in the program",
+                "correct the manifest or the program as its output says",
             )
             .into())
         }
         ended => {
-            let why = if ended.is_some() { "it ended" } else { "it went on for 20 s" };
-            let message = format!("{who} was not asked for its ports: {why} without an answer");
+            let why = if ended.is_some() { "it exited with code 0" } else { "it was stopped after 20 s" };
+            let message = format!("{who} did not report its ports: {why}");
             let help = "a program that joins by this version of hummingbus answers; its ports are compared when a run begins";
             Ok(Answer::Silent(Box::new(problem(manifest, &plan.name, message, help))))
         }
@@ -173,10 +191,10 @@ fn compare(
         };
         let topic = &graph.plan.topics[topic].name;
         let message = format!(
-            "layout mismatch on topic {topic}: process `{}` {verb} its port `{port}` as\n{}\nand the publisher sends\n{}",
+            "layout mismatch on topic {topic}: process `{}` {verb} its port `{port}` as\n{}\nand the other side has\n{}",
             asked.plan.name, declared.layout, sent.layout
         );
-        let help = "build the program against the messages of the publisher, or the publisher against those of the program";
+        let help = "build the program anew with the message of the other side, or the other side with that of the program";
         return Err(problem(manifest, &asked.plan.name, message, help).into());
     }
     Ok(())

@@ -13,13 +13,18 @@ const KEPT_BYTES: u64 = 16 * 1024 * 1024;
 const TAIL_BYTES: u64 = 64 * 1024;
 /// Lines that are shown.
 const LINES: usize = 20;
+/// The same where the line that says what went wrong stands above them: layouts of two messages are as long.
+const ERROR_LINES: usize = 160;
 /// Characters of a line that are shown: a line without end fills neither memory nor terminal.
 const LINE_CHARS: usize = 600;
 
 /// What the standard library writes when a thread panics.
 const PANIC: &[u8] = b"panicked at";
+/// What a program writes in front of the error with which it ends.
+const ERROR: &[u8] = b"error: ";
 
-/// The last lines of the log at `path`, or those from the last panic's message on; none where it cannot be read.
+/// The last lines of the log at `path`, with those from the last error on, or those from the last panic's message on; none where
+/// it cannot be read.
 /// Whatever a terminal would obey is escaped, and so is what is not UTF-8.
 pub fn last_words(path: &Path) -> Vec<String> {
     let (bytes, is_cut) = tail(path).unwrap_or_default();
@@ -33,8 +38,14 @@ pub fn last_words(path: &Path) -> Vec<String> {
         return Vec::new();
     }
     let is_panic = |line: &&[u8]| line.windows(PANIC.len()).any(|part| part == PANIC);
-    let start = lines.iter().rposition(is_panic).unwrap_or(lines.len().saturating_sub(LINES));
-    lines[start..].iter().take(LINES).map(|line| printable(line)).collect()
+    if let Some(start) = lines.iter().rposition(is_panic) {
+        return lines[start..].iter().take(LINES).map(|line| printable(line)).collect();
+    }
+    let last = lines.len().saturating_sub(LINES);
+    let is_error =
+        |line: &&[u8]| line.len() >= ERROR.len() && line[..ERROR.len()].eq_ignore_ascii_case(ERROR);
+    let error = lines.iter().rposition(is_error).filter(|error| lines.len() - error <= ERROR_LINES);
+    lines[last.min(error.unwrap_or(last))..].iter().map(|line| printable(line)).collect()
 }
 
 /// Gives back the room of all but the end of the log at `path`. Its length stays as it is, so that whoever writes to it
@@ -98,6 +109,17 @@ mod tests {
         assert!(lines_of(b"").is_empty() && lines_of(b"\n\n").is_empty());
         assert!(last_words("/nowhere/log".as_ref()).is_empty());
         assert!(last_words("/dev/zero".as_ref()).is_empty(), "a device has no end");
+    }
+
+    #[test]
+    fn an_error_of_many_lines_is_shown_from_its_first_on() {
+        let rows: String = (0..60).map(|n| format!("  row {n}\n")).collect();
+        let lines = lines_of(format!("before\nError: layout mismatch on topic /a/b\n{rows}").as_bytes());
+        assert_eq!((lines.len(), lines[0].as_str()), (61, "Error: layout mismatch on topic /a/b"));
+        let lines = lines_of(b"the battery is low\nerror: it is empty\n");
+        assert_eq!(lines, ["the battery is low", "error: it is empty"]);
+        let lines = lines_of(format!("error: long ago\n{}", rows.repeat(9)).as_bytes());
+        assert_eq!((lines.len(), lines[0].as_str()), (LINES, "  row 40"));
     }
 
     #[test]

@@ -4,6 +4,7 @@ use crate::claimed_file::append_to_log;
 use crate::program::{Executable, Program};
 use crate::role::Role;
 use anyhow::{Context, Result, anyhow};
+use bus::description::DESCRIBE_VARIABLE;
 use bus::group::GROUP_VARIABLE;
 use bus::process::{LAUNCHER_VARIABLE, RUN_VARIABLE};
 use bus::{GENERATION_VARIABLE, NODE_VARIABLE};
@@ -110,6 +111,8 @@ fn command(exe: &Path, started: Started<'_>) -> Command {
             command
         }
     };
+    // That of a check which started this launcher is not meant for the nodes of its run.
+    command.env_remove(DESCRIBE_VARIABLE);
     if let Some(program) = program {
         command.envs(&program.environment);
         if let Some(folder) = &program.working_directory {

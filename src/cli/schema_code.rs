@@ -164,13 +164,14 @@ fn c_message(schema: &Schema) -> String {
             nested.map_or_else(|| "NULL".to_owned(), |nested| format!("&HB_{}", screaming(short(nested))));
         let _ = writeln!(
             rows,
-            "  {{ {}, {}, {}, {}, offsetof({name}, {}), {kind}, {message}, {}, {} }},",
+            "  {{ {}, {}, {}, {}, offsetof({name}, {}), {kind}, {message}, {}, {}, {} }},",
             quoted(field.name),
             quoted(field.doc),
             quoted(field.unit),
             quoted(field.frame),
             field.name,
-            array.iter().product::<usize>() * usize::from(!array.is_empty()),
+            array.first().unwrap_or(&0),
+            array.get(1).unwrap_or(&0),
             sequence.unwrap_or(0),
         );
     }

@@ -28,12 +28,11 @@ pub fn built() -> &'static Built {
         let folder = target.join("bindings");
         let (library, prefix) = (folder.join("library"), folder.join("prefix"));
         // The library that the build of all crates has made, or one that CMake has Cargo make.
-        let made = target.join("libhummingbus_c.so");
+        let is_made = ["so", "a"].iter().all(|end| target.join(format!("libhummingbus_c.{end}")).exists());
         let mut configure = cmake(&["-S", &repository("bindings/c"), "-B"], &library);
         configure.arg("-DHUMMINGBUS_PROFILE=dev");
-        if made.exists() {
-            configure.arg(format!("-DHUMMINGBUS_BUILT={}", target.display()));
-        }
+        let built = if is_made { target.to_string_lossy().into_owned() } else { String::new() };
+        configure.arg(format!("-DHUMMINGBUS_BUILT={built}"));
         succeed(configure);
         succeed(cmake(&["--build"], &library));
         let mut install = cmake(&["--install"], &library);
@@ -52,6 +51,10 @@ pub fn built() -> &'static Built {
 }
 
 fn cmake(arguments: &[&str], folder: &Path) -> Command {
+    if arguments[0] == "-S" {
+        // A folder that was copied or moved would be refused.
+        let _ = std::fs::remove_file(folder.join("CMakeCache.txt"));
+    }
     let mut command = Command::new("cmake");
     command.args(arguments).arg(folder);
     command

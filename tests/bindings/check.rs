@@ -26,6 +26,14 @@ const INPUTS: &str = "set_point = \"/pilot/set_point\", estimate = \"/ekf/estima
 const TILT: &str = ", tilt = [11.6, 4.4]";
 const PILOT: &str = "kind = \"pilot\"\nparameters = { initial_altitude_m = 1.0 }\n";
 
+/// The controller `pid`.
+fn pid() -> String {
+    format!(
+        "kind = \"pid\"\nvehicle = {:?}\ninputs = {{ {INPUTS} }}\n",
+        repository("vehicles/hummingbird.toml")
+    )
+}
+
 /// The pilot of the tests in C++ with this fault.
 fn faulty(fault: &str) -> String {
     let (program, extra) = (built().program("faulty"), if fault == "unread" { ", extra = 1" } else { "" });
@@ -73,6 +81,8 @@ fn a_check_finds_what_a_run_would() {
         (controller.clone(), faulty("port"), "declares the output `nothing`"),
         (controller.clone(), faulty("type"), "the manifest states"),
         (controller.clone(), faulty("layout"), "process `controller` reads its port `set_point` as"),
+        // What the program sends is read by a component.
+        (pid(), faulty("layout"), "process `pilot` sends its port `set_point` as"),
         (controller.clone(), faulty("padding"), "at byte 8, and the fields before it end at 4"),
     ];
     for (controller, pilot, words) in cases {
@@ -87,27 +97,29 @@ fn a_program_that_tells_nothing_is_a_warning_and_none_is_started_where_that_is_a
     let silent = "command = [\"true\"]\noutputs.set_point = { type = \"hummingbus_msgs/msg/SetPoint\" }\n";
     let place = Place::new();
     let manifest = hover(&place, &custom(INPUTS, TILT), silent);
-    place
-        .call(&["check", &manifest])
-        .with_code(0)
-        .says(&["was not asked for its ports: it ended without an answer"]);
+    place.call(&["check", &manifest]).with_code(0).says(&["did not report its ports: it exited with code 0"]);
     let ended = place.call(&["check", &manifest, "--no-programs"]).with_code(0);
     assert!(ended.error.is_empty(), "{ended}");
     let failing = hover(&place, &custom(INPUTS, TILT), &silent.replace("true", "false"));
     place.call(&["check", &failing]).with_code(2).says(&["process `pilot` would not take part in a run"]);
 }
 
+/// As one that is linked with an older library, which knows nothing of a check.
+#[test]
+fn a_program_that_joins_instead_of_describing_itself_is_refused_and_leaves_nothing() {
+    let pilot =
+        faulty("none").replacen("command = [", "command = [\"env\", \"-u\", \"HUMMINGBUS_DESCRIBE\", ", 1);
+    let ended = check(&custom(INPUTS, TILT), &pilot).with_code(2);
+    ended.says(&["process `pilot` would not take part in a run"]);
+}
+
 #[test]
 fn programs_that_take_over_are_asked_too() {
     let place = Place::new();
-    let pid = format!(
-        "kind = \"pid\"\nvehicle = {:?}\ninputs = {{ {INPUTS} }}\n",
-        repository("vehicles/hummingbird.toml")
-    );
     let program = built().program("controller");
     let swap = format!(
         "{PILOT}[[swap]]\nprocess = \"controller\"\nat_tick = 200\nwith = {{ command = [{program:?}] }}\n"
     );
-    let manifest = hover(&place, &pid, &swap);
+    let manifest = hover(&place, &pid(), &swap);
     place.call(&["check", &manifest]).with_code(2).says(&["parameters.mass_kg is missing"]);
 }

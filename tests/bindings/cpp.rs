@@ -120,8 +120,10 @@ fn what_goes_wrong_in_a_program_is_said_with_node_and_reason() {
         ("type", "publishes hummingbus_msgs/msg/MotorCommand on its output `set_point`, the manifest states"),
         ("layout", "layout mismatch on topic /pilot/set_point"),
         ("padding", "has its field `voltage` at byte 8, and the fields before it end at 4"),
-        ("handle", "index out of bounds"),
+        ("handle", "the step asks for input number 7; the program has declared 0"),
         ("twice", "declares its state twice"),
+        ("kind", "the field `voltage` has the kind 77, expected an HbKind"),
+        ("unaligned", "its offset has to be a multiple of 8"),
     ];
     for (fault, words) in cases {
         let place = Place::new();
@@ -149,15 +151,15 @@ fn pkg_config_and_a_compiler_are_enough() {
     let (source, program) = (repository("tests/bindings/cpp/pilot.c"), place.path("pilot"));
     let mut compiler = Command::new("cc");
     compiler.args(["-std=c11", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-o", &program, &source]);
-    compiler.args(flags.split_whitespace());
+    compiler.args(flags.split_whitespace()).arg(format!("-Wl,-rpath,{}", library_folder()));
     succeed(compiler);
-    let ended = Command::new(&program).env("LD_LIBRARY_PATH", library_folder()).output().unwrap();
+    let ended = Command::new(&program).output().unwrap();
     let said = String::from_utf8_lossy(&ended.stderr).into_owned();
     assert!(!ended.status.success() && said.contains("hummingbus run MANIFEST"), "{said}");
 }
 
 /// The folder that `cmake --install` has put the library into.
-fn library_folder() -> String {
+pub fn library_folder() -> String {
     let folders = ["lib", "lib64", "lib/x86_64-linux-gnu", "lib/aarch64-linux-gnu"];
     let mut found = folders.into_iter().map(|folder| built().prefix.join(folder));
     let found = found.find(|folder| folder.join("libhummingbus.so").exists());

@@ -179,6 +179,17 @@ fn what_goes_wrong_in_a_program_is_said_with_node_and_reason() {
         (step("kept.append(state)"), "the step has kept a view of `state`"),
         (step("kept.append(state['position'])"), "the step has kept a view of `state`"),
         (step("kept.append(hb.vector(set_point))"), "its parts are of several types"),
+        (
+            format!("def step(tick, state): pass\n{}", run.replace("'set_point'", "'state'")),
+            "two values under the name `state`",
+        ),
+        (
+            run.replace("step,", "print,").replace(
+                "'SetPoint'",
+                "hb.message('a/msg/B', [hb.Field('a', 'uint32'), hb.Field('b', unit='V')])",
+            ),
+            "its offset has to be a multiple of 8",
+        ),
         (step("kept.append(set_point)"), "the step has kept a view of `set_point`"),
         (step("state['position']['z'] = 1.0"), "read-only"),
         (step("set_point['altitude'] = float('nan')"), "holds altitude = NaN, expected a finite number"),
@@ -253,9 +264,13 @@ fn the_examples_of_the_page_and_of_the_package_run() {
     let page = fs::read_to_string(repository("docs/python.md")).unwrap();
     let blocks: Vec<&str> =
         page.split("\n```python\n").skip(1).map(|rest| rest.split("\n```").next().unwrap()).collect();
-    assert_eq!(blocks.len(), 3, "docs/python.md");
+    assert_eq!(blocks.len(), 5, "docs/python.md");
     python.eval(&blocks.join("\n"));
     python.eval("import doctest, hummingbus._messages as m\nassert doctest.testmod(m).failed == 0");
+    python.eval(
+        "import json, hummingbus as hb\nfrom hummingbus import _native\nnames = hb.messages()\nassert len(names) > 30\n\
+         for name in names: assert hb.dtype(name).itemsize == json.loads(_native.message(name))['size'], name",
+    );
 
     let node = page
         .split("\n```python node\nimport hummingbus as hb\n")
@@ -267,4 +282,60 @@ fn the_examples_of_the_page_and_of_the_package_run() {
     let place = Place::new();
     let ended = fly(python, &place, &hover(&place, node, "parameters = { more_m = 0.25 }\n"));
     ended.flown();
+}
+
+#[test]
+fn a_simulation_that_is_stepped_has_the_samples_of_a_run() {
+    let Some(python) = python() else { return };
+    let place = Place::new();
+    let (manifest, recording) = (repository("manifests/hover.toml"), place.path("hover.mcap"));
+    place.call(&["run", &manifest, "--record", &recording, "--set", "run.duration_s=0.3"]).flown();
+    python.eval(&format!(
+        "import hummingbus as hb, numpy as np\n\
+         recorded = hb.Recording({recording:?}).numpy('/plant/state', ['position.x', 'position.y', 'position.z', 'attitude.w'])\n\
+         simulation = hb.Simulation({manifest:?}, set={{'run.duration_s': 0.3}})\n\
+         assert simulation.read('/plant/state') is None and simulation.tick == 0\n\
+         for tick in range(300):\n\
+         \x20   simulation.step()\n\
+         \x20   state = simulation.read('/plant/state')\n\
+         \x20   found = [*hb.vector(state['position']), state['attitude']['w']]\n\
+         \x20   assert found == [column[tick] for name, column in recorded.items() if name != 'time_s'], tick\n\
+         assert abs(simulation.time_s - 0.3) < 1e-12\n\
+         try: simulation.read('/nothing')\n\
+         except hb.Error as error: assert '/plant/state' in str(error)\n\
+         else: raise AssertionError"
+    ));
+}
+
+#[test]
+fn an_environment_is_what_gymnasium_expects_and_a_seed_gives_the_same_episode() {
+    let Some(python) = python() else { return };
+    python.eval(
+        "import numpy as np, warnings\n\
+         from gymnasium.utils.env_checker import check_env\n\
+         from hummingbus.envs import HoverEnv\n\
+         with warnings.catch_warnings():\n\
+         \x20   warnings.filterwarnings('ignore', message='.*Box observation space (min|max)imum value is -?inf.*')\n\
+         \x20   check_env(HoverEnv(), skip_render_check=True)\n\
+         def episode(seed):\n\
+         \x20   env, found = HoverEnv(), []\n\
+         \x20   observation, _ = env.reset(seed=seed)\n\
+         \x20   for number in range(200):\n\
+         \x20       tilt = np.clip(0.02 * observation[2] + 0.1 * np.sin(number) * np.array([1, -1, 1, -1]), -1, 1)\n\
+         \x20       observation, reward, is_over, _, _ = env.step(tilt)\n\
+         \x20       found.append([*observation, reward])\n\
+         \x20       if is_over: break\n\
+         \x20   env.close()\n\
+         \x20   return np.array(found)\n\
+         first, second, other = episode(1), episode(1), episode(2)\n\
+         assert len(first) > 50 and (first == second).all() and not (first[0] == other[0]).all()\n\
+         # An equal command for all rotors climbs straight up; a nose-down pair of commands moves forward.\n\
+         env = HoverEnv()\n\
+         env.reset(options={'position_m': [0, 0, 1]})\n\
+         for _ in range(30): observation, *_ = env.step(np.full(4, 0.2))\n\
+         assert observation[5] > 0.1 and abs(observation[3]) < 1e-9 and observation[2] < 0, observation\n\
+         env.reset(options={'position_m': [0, 0, 1]})\n\
+         for _ in range(40): observation, *_ = env.step(np.array([-0.05, 0, 0.05, 0]))\n\
+         assert observation[3] > 0.01 and observation[7] > 0, observation",
+    );
 }

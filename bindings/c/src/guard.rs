@@ -5,11 +5,11 @@ use std::cell::RefCell;
 use std::ffi::{CStr, CString, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// What was asked for happened.
+/// Success.
 pub const HB_OK: i32 = 0;
-/// It did not; `hb_last_error` says why.
+/// Failure; `hb_last_error` returns the reason.
 pub const HB_FAILED: i32 = 1;
-/// The launcher ended the run early, and knows why: the program ends without a word.
+/// The launcher aborted the run. The program exits without a message.
 pub const HB_ABORTED: i32 = 2;
 
 thread_local! {

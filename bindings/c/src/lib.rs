@@ -11,7 +11,7 @@ mod parameters;
 mod tick;
 
 pub use guard::{HB_ABORTED, HB_FAILED, HB_OK, hb_last_error};
-pub use message::{HbField, HbKind, HbMessage};
+pub use message::{HbField, HbKind, HbMessage, hb_message_layout_hash};
 pub use node::{
     HbNode, HbStep, hb_node_free, hb_node_input, hb_node_is_wired, hb_node_join, hb_node_name,
     hb_node_output, hb_node_period_s, hb_node_run, hb_node_seed, hb_node_state,

@@ -47,12 +47,14 @@ pub struct HbField {
     pub frame: *const c_char,
     /// Bytes from the start of the message.
     pub offset: usize,
-    /// Type of the value, or of each value of an array or a sequence.
-    pub kind: HbKind,
+    /// Type of the value, or of each value of an array or a sequence: an `HbKind`.
+    pub kind: u32,
     /// Message of a `HbNested`; null otherwise.
     pub message: *const HbMessage,
-    /// Values of a fixed array; 0 for a single value.
+    /// Values of a fixed array, or its arrays; 0 for a single value.
     pub array: usize,
+    /// Values of each array of an array of arrays; 0 otherwise.
+    pub inner_array: usize,
     /// The most values of a sequence: `uint32_t` count, `uint32_t` zero, then room for so many; 0 where it is none.
     pub sequence: usize,
 }
@@ -72,6 +74,17 @@ pub struct HbMessage {
     pub fields: *const HbField,
     /// Their number.
     pub field_count: usize,
+}
+
+/// Hash of the layout of a message, which both ends of a topic have to agree on; 0 if it is refused, and `hb_last_error` says
+/// why.
+///
+/// # Safety
+/// `message` is a description.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hb_message_layout_hash(message: *const HbMessage) -> u64 {
+    // SAFETY: the caller's promise.
+    guard::noted(|| Ok(unsafe { described(message) }?.declare_state()?.layout_hash()), 0)
 }
 
 /// The most messages within messages: what is deeper holds itself.
@@ -115,20 +128,35 @@ unsafe fn at_depth(message: *const HbMessage, depth: usize) -> Result<MessageDes
 /// # Safety
 /// As [`described`].
 unsafe fn field_described(field: &HbField, depth: usize) -> Result<FieldDescription, String> {
+    // SAFETY: the caller's promise.
+    let name = unsafe { guard::text(field.name, "name of a field") }?.to_owned();
     let value = match primitive(field.kind) {
         Some(primitive) => KindDescription::Primitive(primitive),
-        // SAFETY: the caller's promise.
-        None => KindDescription::Message(Box::new(unsafe { at_depth(field.message, depth + 1) }?)),
+        None if field.kind == HbKind::HbNested as u32 => {
+            // SAFETY: the caller's promise.
+            let nested = unsafe { at_depth(field.message, depth + 1) }?;
+            KindDescription::Message(Box::new(nested))
+        }
+        None => {
+            return Err(format!(
+                "the field `{name}` has the kind {}, expected an HbKind (0 to 10)",
+                field.kind
+            ));
+        }
     };
-    let kind = match (field.array, field.sequence) {
-        (0, 0) => value,
-        (array, 0) => KindDescription::Array(Box::new(value), array),
-        (_, most) => KindDescription::Sequence(Box::new(value), most),
+    let array = |value, length| KindDescription::Array(Box::new(value), length);
+    let kind = match (field.array, field.inner_array, field.sequence) {
+        (0, 0, 0) => value,
+        (length, 0, 0) => array(value, length),
+        (0, 0, most) => KindDescription::Sequence(Box::new(value), most),
+        (0, ..) => return Err(format!("the field `{name}` has inner arrays and no array")),
+        (outer, inner, 0) => array(array(value, inner), outer),
+        _ => return Err(format!("the field `{name}` is both an array and a sequence")),
     };
     // SAFETY: the caller's promise.
     unsafe {
         Ok(FieldDescription {
-            name: guard::text(field.name, "name of a field")?.to_owned(),
+            name,
             doc: optional_text(field.doc)?,
             unit: optional_text(field.unit)?,
             frame: optional_text(field.frame)?,
@@ -148,18 +176,19 @@ unsafe fn optional_text(text: *const c_char) -> Result<String, String> {
     unsafe { guard::text(text, "text of a message") }.map(str::to_owned)
 }
 
-fn primitive(kind: HbKind) -> Option<Primitive> {
-    Some(match kind {
-        HbKind::HbF64 => Primitive::F64,
-        HbKind::HbF32 => Primitive::F32,
-        HbKind::HbI64 => Primitive::I64,
-        HbKind::HbU64 => Primitive::U64,
-        HbKind::HbI32 => Primitive::I32,
-        HbKind::HbU32 => Primitive::U32,
-        HbKind::HbI16 => Primitive::I16,
-        HbKind::HbU16 => Primitive::U16,
-        HbKind::HbI8 => Primitive::I8,
-        HbKind::HbU8 => Primitive::U8,
-        HbKind::HbNested => return None,
-    })
+/// The primitive of this `HbKind`; `None` for others.
+fn primitive(kind: u32) -> Option<Primitive> {
+    const PRIMITIVES: [(HbKind, Primitive); 10] = [
+        (HbKind::HbF64, Primitive::F64),
+        (HbKind::HbF32, Primitive::F32),
+        (HbKind::HbI64, Primitive::I64),
+        (HbKind::HbU64, Primitive::U64),
+        (HbKind::HbI32, Primitive::I32),
+        (HbKind::HbU32, Primitive::U32),
+        (HbKind::HbI16, Primitive::I16),
+        (HbKind::HbU16, Primitive::U16),
+        (HbKind::HbI8, Primitive::I8),
+        (HbKind::HbU8, Primitive::U8),
+    ];
+    PRIMITIVES.into_iter().find(|(known, _)| *known as u32 == kind).map(|(_, primitive)| primitive)
 }

@@ -57,7 +57,7 @@ pub unsafe extern "C" fn hb_node_join(node: *mut *mut HbNode) -> i32 {
     })
 }
 
-/// Frees a node; null is one that is free.
+/// Frees a node; does nothing if `node` is null.
 ///
 /// # Safety
 /// `node` is null or came from `hb_node_join` and was not freed.
@@ -115,7 +115,7 @@ pub unsafe extern "C" fn hb_node_is_wired(node: *const HbNode, port: *const c_ch
 /// Declares the input `port`, whose messages are `message`. `*input` is its number for `hb_tick_input`.
 ///
 /// # Safety
-/// `node` as for `hb_node_name`; `port` is a text, `message` a description, `input` a place.
+/// `node` as for `hb_node_name`; `port` is a text, `message` a description, `input` points to a number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hb_node_input(
     node: *mut HbNode,
@@ -168,8 +168,8 @@ unsafe fn declare(
     })
 }
 
-/// Declares the state as one value of `message`. `*state` becomes its memory: zeros, aligned to eight bytes, until
-/// `hb_node_run` returns. All that changes from tick to tick belongs there, since whoever takes the node's place goes on
+/// Declares the state as one value of `message`. `*state` becomes its memory: zeros, aligned to eight bytes, as long as the
+/// process lives. All that changes from tick to tick belongs there, since whoever takes the node's place goes on
 /// from it, and since checkpoints hold it. The bus reads and writes it between steps.
 ///
 /// # Safety

@@ -4,6 +4,7 @@ use crate::guard::{misuse, mutable, noted, status, text};
 use crate::node::HbNode;
 use crate::parameters::{Parameters, numbers};
 use bus::BusError;
+use bus::dynamic::DynamicNode;
 use std::ffi::c_char;
 use std::path::Path;
 
@@ -36,7 +37,10 @@ pub unsafe extern "C" fn hb_node_numbers(
     unsafe {
         of_parameter(node, key, |parameters, key| {
             let value = parameters.required(key)?;
-            let found = numbers(value).filter(|numbers| numbers.len() == count && !values.is_null());
+            if values.is_null() {
+                return Err("the argument `values` is a null pointer".to_owned());
+            }
+            let found = numbers(value).filter(|numbers| numbers.len() == count);
             let expected =
                 if count == 1 { "a number".to_owned() } else { format!("an array of {count} numbers") };
             let found = found.ok_or_else(|| format!("parameters.{key} is {value}, expected {expected}"))?;
@@ -59,9 +63,7 @@ pub unsafe extern "C" fn hb_node_text(
     // SAFETY: the caller's promise.
     unsafe {
         of_parameter(node, key, |parameters, key| {
-            let found = parameters.required(key)?;
-            let text = found.as_str().ok_or_else(|| format!("parameters.{key} is {found}, expected a text"));
-            let text = text?.to_owned();
+            let text = required_text(parameters, key)?;
             *mutable(value, "value")? = parameters.keep(&text);
             Ok(())
         })
@@ -100,16 +102,33 @@ pub unsafe extern "C" fn hb_node_file(
         let (node, key) = unsafe { (mutable(node, "node"), text(key, "key")) };
         let node = node.map_err(misuse)?;
         let key = key.map_err(|reason| node.error(reason))?;
-        let path = node.parameters.required(key).map(|value| value.as_str().unwrap_or_default().to_owned());
-        let path = path.map_err(|reason| node.error(reason))?;
-        let files = node.known().map(bus::dynamic::DynamicNode::files).unwrap_or_default();
+        let path = required_text(&mut node.parameters, key).map_err(|reason| node.error(reason))?;
+        let files = node.known().map(DynamicNode::files);
+        let files = files.ok_or_else(|| node.error("it runs already: files are read before"))?;
         let text = files
             .text(Path::new(&path))
             .map_err(|reason| node.error(format!("parameters.{key}: {reason}")))?;
+        if text.contains('\0') {
+            return Err(node.error(format!(
+                "parameters.{key}: the file {path} holds a NUL, with which a text ends in C"
+            )));
+        }
         // SAFETY: the caller's promise.
         *unsafe { mutable(contents, "contents") }.map_err(misuse)? = node.parameters.keep(&text);
         Ok(())
     })
+}
+
+/// The text of the parameter `key`, which C can be given.
+fn required_text(parameters: &mut Parameters, key: &str) -> Result<String, String> {
+    let found = parameters.required(key)?;
+    match found.as_str() {
+        Some(text) if text.contains('\0') => {
+            Err(format!("parameters.{key} holds a NUL, with which a text ends in C"))
+        }
+        Some(text) => Ok(text.to_owned()),
+        None => Err(format!("parameters.{key} is {found}, expected a text")),
+    }
 }
 
 /// # Safety

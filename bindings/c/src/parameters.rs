@@ -9,7 +9,7 @@ use std::ffi::{CString, c_char};
 #[derive(Debug)]
 pub(crate) struct Parameters {
     value: Value,
-    /// The first parts of the keys that were read.
+    /// Keys that were asked for.
     read: BTreeSet<String>,
     /// Texts that the program was given.
     texts: Vec<CString>,
@@ -23,8 +23,7 @@ impl Parameters {
 
     /// The parameter `key`, whose parts are joined by dots.
     pub fn read(&mut self, key: &str) -> Option<&Value> {
-        let first = key.split('.').next().unwrap_or(key);
-        self.read.insert(first.to_owned());
+        self.read.insert(key.to_owned());
         key.split('.').try_fold(&self.value, |value, part| value.get(part))
     }
 
@@ -47,16 +46,24 @@ impl Parameters {
         &self.value
     }
 
-    /// Refuses a parameter that nothing has read: a slip of the pen in the manifest.
+    /// Refuses a parameter that nothing has read: a misspelt key of the manifest.
     pub fn require_all_read(&self) -> Result<(), String> {
-        let given = self.value.as_object().into_iter().flatten();
-        match given.map(|(key, _)| key).find(|key| !self.read.contains(*key)) {
-            Some(key) => {
-                let read: Vec<_> = self.read.iter().map(|key| format!("`{key}`")).collect();
-                Err(format!("parameters.{key} is not read; the program reads {}", read.join(", ")))
+        let Some(key) = self.unread(&self.value, "") else { return Ok(()) };
+        let read: Vec<_> = self.read.iter().map(|key| format!("`{key}`")).collect();
+        let read = if read.is_empty() { "none".to_owned() } else { read.join(", ") };
+        Err(format!("parameters.{key} is not read; the program reads {read}"))
+    }
+
+    /// The first key of `table`, which stands at `prefix`, that was not asked for, nor a table that holds it.
+    fn unread(&self, table: &Value, prefix: &str) -> Option<String> {
+        table.as_object()?.iter().find_map(|(key, value)| {
+            let whole = if prefix.is_empty() { key.clone() } else { format!("{prefix}.{key}") };
+            match value {
+                _ if self.read.contains(&whole) => None,
+                Value::Object(_) => self.unread(value, &whole),
+                _ => Some(whole),
             }
-            None => Ok(()),
-        }
+        })
     }
 
     /// `text` for the program, as long as the node lives.
@@ -82,10 +89,17 @@ mod tests {
 
     #[test]
     fn a_parameter_that_is_not_read_is_refused_with_those_that_are() {
-        let mut parameters = Parameters::of(&json!({ "gains": { "tilt": [1.0, 2.0] }, "masss": 0.5 }));
+        let mut parameters =
+            Parameters::of(&json!({ "gains": { "tilt": [1.0, 2.0], "yaw": 1.0 }, "masss": 0.5 }));
+        assert!(parameters.require_all_read().unwrap_err().ends_with("the program reads none"));
         assert_eq!(super::numbers(parameters.read("gains.tilt").unwrap()), Some(vec![1.0, 2.0]));
         assert!(parameters.read("mass").is_none());
         let reason = parameters.require_all_read().unwrap_err();
-        assert_eq!(reason, "parameters.masss is not read; the program reads `gains`, `mass`");
+        assert_eq!(reason, "parameters.gains.yaw is not read; the program reads `gains.tilt`, `mass`");
+        assert!(parameters.read("gains").is_some(), "a whole table");
+        let reason = parameters.require_all_read().unwrap_err();
+        assert_eq!(reason, "parameters.masss is not read; the program reads `gains`, `gains.tilt`, `mass`");
+        parameters.all();
+        assert_eq!(parameters.require_all_read(), Ok(()));
     }
 }

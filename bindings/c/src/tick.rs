@@ -1,8 +1,8 @@
 //! One step of a node.
 
-use crate::guard::{HB_ABORTED, HB_FAILED, HB_OK, caught, noted, text};
+use crate::guard::{HB_FAILED, HB_OK, caught, noted};
 use bus::dynamic::DynamicTick;
-use std::ffi::{c_char, c_void};
+use std::ffi::{CStr, c_char, c_void};
 use std::ptr::{null, null_mut};
 
 /// One step of a node, valid until the step returns.
@@ -32,7 +32,7 @@ impl<'a, 's, 't> Step<'a, 's, 't> {
     pub fn end(self, status: i32) -> Result<(), String> {
         match (self.error, status) {
             (Some(reason), _) => Err(reason),
-            (None, HB_OK | HB_ABORTED) => Ok(()),
+            (None, HB_OK) => Ok(()),
             (None, status) => Err(format!("its step returned {status} without a reason (hb_tick_fail)")),
         }
     }
@@ -80,18 +80,19 @@ pub unsafe extern "C" fn hb_tick_time_ns(tick: *mut HbTick) -> u64 {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hb_tick_input(tick: *mut HbTick, input: u32) -> *const c_void {
     // SAFETY: the caller's promise.
-    unsafe { in_step(tick, null(), |step| Ok(step.tick.input(input as usize).as_ptr().cast())) }
+    unsafe { in_step(tick, null(), |step| Ok(step.tick.input(input as usize)?.as_ptr().cast())) }
 }
 
-/// Memory of the message of output `output`: zeros, shared, aligned to eight bytes, valid until the step returns. Null if
-/// no message is due at this tick. The bus fills in the stamp, and sends the message when the step has returned.
+/// Memory of the message of output `output`: shared, zeros until the step writes them, aligned to eight bytes, valid until the
+/// step returns. Null if the step sends none, and if `hb_node_output` has given no such number; the step has failed then. The
+/// bus fills in the stamp, and sends the message when the step has returned.
 ///
 /// # Safety
 /// As `hb_tick_number`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hb_tick_output(tick: *mut HbTick, output: u32) -> *mut c_void {
     let memory = |step: &mut Step<'_, '_, '_>| {
-        let message = step.tick.output(output as usize).map_err(|error| error.to_string())?;
+        let message = step.tick.output(output as usize)?;
         Ok(message.map_or(null_mut(), |bytes| bytes.as_mut_ptr().cast()))
     };
     // SAFETY: the caller's promise.
@@ -106,7 +107,7 @@ pub unsafe extern "C" fn hb_tick_output(tick: *mut HbTick, output: u32) -> *mut 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hb_tick_predecessor(tick: *mut HbTick, output: u32) -> *const c_void {
     let sent = |step: &mut Step<'_, '_, '_>| {
-        Ok(step.tick.predecessor(output as usize).map_or(null(), |bytes| bytes.as_ptr().cast()))
+        Ok(step.tick.predecessor(output as usize)?.map_or(null(), |bytes| bytes.as_ptr().cast()))
     };
     // SAFETY: the caller's promise.
     unsafe { in_step(tick, null(), sent) }
@@ -120,8 +121,11 @@ pub unsafe extern "C" fn hb_tick_predecessor(tick: *mut HbTick, output: u32) -> 
 pub unsafe extern "C" fn hb_tick_fail(tick: *mut HbTick, reason: *const c_char) -> i32 {
     let fail = || {
         // SAFETY: the caller's promise.
-        let (step, reason) = unsafe { (step(tick)?, text(reason, "reason")) };
-        step.fail(reason.map_or_else(|error| error, str::to_owned));
+        let step = unsafe { step(tick) }?;
+        // SAFETY: the caller's promise.
+        let reason =
+            (!reason.is_null()).then(|| unsafe { CStr::from_ptr(reason) }.to_string_lossy().into_owned());
+        step.fail(reason.unwrap_or_else(|| "the step failed without a reason".to_owned()));
         Ok(HB_FAILED)
     };
     noted(fail, HB_FAILED)

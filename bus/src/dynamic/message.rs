@@ -1,5 +1,5 @@
 //! Messages that a program in another language declares: a schema made at run time, held to the rules that
-//! `#[derive(Message)]` enforces when it compiles.
+//! `#[derive(Message)]` and the compiler enforce for messages in Rust.
 
 use crate::schema::{Field, Kind, Primitive, Schema, sequences_are_last};
 
@@ -75,10 +75,20 @@ impl MessageDescription {
     /// Its type or field names are not ROS 2's, it has padding, or a sequence is not its last field.
     pub fn declare(&self) -> Result<&'static Schema, String> {
         let schema = self.declare_state()?;
+        // A nested message's unit may be that of the field which holds it.
+        if let Some(field) = self.fields.iter().find(|field| field.unit.is_empty() && field.kind.is_float()) {
+            return Err(self.refused(&format!(
+                "states no unit of its field `{}`; numbers without a unit have the unit `1`",
+                field.name
+            )));
+        }
         if sequences_are_last(schema.fields) {
             return Ok(schema);
         }
-        Err(self.refused("has a sequence that is not its last field, or that states no unit"))
+        let sequence = self.fields.iter().find(|field| matches!(field.kind, KindDescription::Sequence(..)));
+        let name = sequence.map_or("", |field| field.name.as_str());
+        Err(self
+            .refused(&format!("has a sequence `{name}` that is not its last field, or that states no unit")))
     }
 
     /// The schema of a state, which no topic carries: sequences may stand anywhere in it.
@@ -106,34 +116,48 @@ impl MessageDescription {
         if !is_ros_name {
             return Err(self.refused("needs a name of three parts: `package/msg/Name`"));
         }
-        match self.fields.iter().find(|field| !is_field_name(&field.name)) {
-            Some(field) => Err(self.refused(&format!(
-                "has a field `{}`; a field name matches ^[a-z](_?[a-z0-9]+)*$ (ROS 2 tools refuse others)",
-                field.name
-            ))),
-            None if self.fields.is_empty() => Err(self.refused("has no fields")),
-            None => Ok(()),
+        if self.fields.is_empty() {
+            return Err(self.refused("has no fields"));
         }
+        for (index, field) in self.fields.iter().enumerate() {
+            let name = &field.name;
+            if !is_field_name(name) {
+                return Err(self.refused(&format!(
+                    "has a field `{name}`; a field name matches ^[a-z](_?[a-z0-9]+)*$ (ROS 2 tools refuse others)"
+                )));
+            }
+            if self.fields[..index].iter().any(|other| other.name == *name) {
+                return Err(self.refused(&format!("has two fields `{name}`")));
+            }
+        }
+        Ok(())
     }
 
-    /// Refuses padding, fields on each other, and a size that is not that of the fields.
+    /// Refuses padding, fields on each other, fields that CDR would place elsewhere, and a size that is not that of the fields.
     fn check_places(&self, fields: &[Field]) -> Result<(), String> {
         let mut end = 0;
         for field in fields {
-            if field.offset != end {
+            let alignment = alignment(&field.kind);
+            if field.offset != end || !end.is_multiple_of(alignment) {
                 return Err(self.refused(&format!(
-                    "has its field `{}` at byte {}, and the fields before it end at {end}; reorder the fields or add \
-                     a field `pad0`",
+                    "has its field `{}` at byte {}, and the fields before it end at {end}; its offset has to be a multiple of \
+                     {alignment}; reorder the fields or add a field `pad0`",
                     field.name, field.offset
                 )));
             }
+            if let Some(reason) = misfit(&field.kind) {
+                return Err(self.refused(&format!("has a field `{}` with {reason}", field.name)));
+            }
             end += field.kind.size();
         }
-        if end == self.size {
+        let whole = fields.iter().map(|field| alignment(&field.kind)).max().unwrap_or(1);
+        if end == self.size && end.is_multiple_of(whole) {
             return Ok(());
         }
-        let found = format!("has {} bytes, and its fields take {end}; add a field `pad0`", self.size);
-        Err(self.refused(&found))
+        Err(self.refused(&format!(
+            "has {} bytes, and its fields take {end}; its size has to be a multiple of {whole}; add a field `pad0`",
+            self.size
+        )))
     }
 
     fn refused(&self, reason: &str) -> String {
@@ -155,6 +179,15 @@ impl FieldDescription {
 }
 
 impl KindDescription {
+    /// True for numbers with a point, and arrays and sequences of them.
+    fn is_float(&self) -> bool {
+        match self {
+            Self::Primitive(primitive) => matches!(primitive, Primitive::F64 | Primitive::F32),
+            Self::Array(element, _) | Self::Sequence(element, _) => element.is_float(),
+            Self::Message(_) => false,
+        }
+    }
+
     fn declare(&self) -> Result<Kind, String> {
         Ok(match self {
             Self::Primitive(primitive) => Kind::Primitive(*primitive),
@@ -162,6 +195,31 @@ impl KindDescription {
             Self::Array(element, length) => Kind::Array(Box::leak(Box::new(element.declare()?)), *length),
             Self::Sequence(element, most) => Kind::Sequence(Box::leak(Box::new(element.declare()?)), *most),
         })
+    }
+}
+
+/// Bytes to whose multiples a value is aligned, in memory as in CDR.
+fn alignment(kind: &Kind) -> usize {
+    match kind {
+        Kind::Primitive(primitive) => primitive.size(),
+        Kind::Message(schema) => schema.fields.iter().map(|field| alignment(&field.kind)).max().unwrap_or(1),
+        Kind::Array(element, _) => alignment(element),
+        Kind::Sequence(..) | Kind::Text | Kind::NamedNumbers(..) => 8,
+    }
+}
+
+/// Reason why no message holds a value of this kind.
+fn misfit(kind: &Kind) -> Option<&'static str> {
+    match kind {
+        Kind::Array(_, 0) | Kind::Sequence(_, 0) => Some("room for no value"),
+        Kind::Array(element, _) => misfit(element),
+        // CDR places smaller ones right behind the count.
+        Kind::Sequence(element, _) if alignment(element) != 8 => {
+            Some("a sequence of values that are not of 8 bytes")
+        }
+        Kind::Sequence(..) | Kind::Primitive(_) | Kind::Message(_) | Kind::Text | Kind::NamedNumbers(..) => {
+            None
+        }
     }
 }
 
@@ -238,6 +296,38 @@ mod tests {
         assert!(refused(|message| message.type_name = "Time".to_owned()).contains("three parts"));
         assert!(refused(|message| message.fields[0].name = "Sec".to_owned()).contains("a field `Sec`"));
         assert!(refused(|message| message.fields.clear()).contains("no fields"));
+        assert!(refused(|message| message.fields[1].name = "sec".to_owned()).contains("two fields `sec`"));
+        // A double behind four bytes, and four bytes behind a double: CDR would place it, and the next message, elsewhere.
+        let double = |message: &mut MessageDescription, field: usize| {
+            message.fields[field].kind = KindDescription::Primitive(Primitive::F64);
+            message.fields[1].offset = if field == 0 { 8 } else { 4 };
+            message.size = 12;
+        };
+        let mut message = time.clone();
+        double(&mut message, 1);
+        assert!(message.declare_state().unwrap_err().contains("a multiple of 8; reorder"));
+        let mut message = time.clone();
+        double(&mut message, 0);
+        assert!(message.declare_state().unwrap_err().contains("its size has to be a multiple of 8"));
+        assert!(
+            refused(|message| message.fields[0].kind = KindDescription::Array(Box::default(), 0))
+                .contains("no value")
+        );
+        let cells = |message: &mut MessageDescription| {
+            message.fields[1].kind =
+                KindDescription::Sequence(Box::new(KindDescription::Primitive(Primitive::U32)), 4);
+            message.fields[0].kind = KindDescription::Primitive(Primitive::U64);
+            (message.fields[1].offset, message.size) = (8, 8 + 8 + 16);
+        };
+        assert!(refused(cells).contains("not of 8 bytes"));
+        assert!(
+            refused(|message| {
+                message.fields[0].kind = KindDescription::default();
+                (message.fields[0].unit, message.fields[1].offset, message.size) = (String::new(), 8, 16);
+                message.fields[1].kind = KindDescription::Primitive(Primitive::U64);
+            })
+            .contains("states no unit of its field `sec`")
+        );
         let mut command = described(MotorCommand::SCHEMA);
         command.fields.swap(0, 1);
         command.fields[0].offset = 0;

@@ -34,6 +34,26 @@ struct Padded {
 HUMMINGBUS_MESSAGE(Padded, "test_msgs/msg/Cells", "A message with padding.", HUMMINGBUS_FIELD(flag, "1", "", "A flag."),
                    HUMMINGBUS_FIELD(voltage, "V", "", "Voltage at the terminals."));
 
+#pragma pack(push, 4)
+struct Unaligned {
+  std::uint32_t flag{};
+  double voltage{};
+};
+#pragma pack(pop)
+HUMMINGBUS_MESSAGE(Unaligned, "test_msgs/msg/Cells", "A message that CDR lays out otherwise.",
+                   HUMMINGBUS_FIELD(flag, "1", "", "A flag."),
+                   HUMMINGBUS_FIELD(voltage, "V", "", "Voltage at the terminals."));
+
+// Declares a message whose table is wrong, as one by hand may be.
+void declare_wrong_kind() {
+  HbNode* node = nullptr;
+  hummingbus::detail::require(hb_node_join(&node));
+  const HbField field = {"voltage", "", "V", "", 0, 77, nullptr, 0, 0, 0};
+  const HbMessage message = {"test_msgs/msg/Cells", "", 8, &field, 1};
+  std::uint32_t number = 0;
+  hummingbus::detail::require(hb_node_output(node, "battery", &message, &number));
+}
+
 int main() {
   return hummingbus::program([] {
     hummingbus::Node node;
@@ -43,6 +63,8 @@ int main() {
     if (fault == "port") node.output<SetPoint>("nothing");
     if (fault == "type") node.output<MotorCommand>("set_point");
     if (fault == "padding") node.output<Padded>("battery");
+    if (fault == "unaligned") node.output<Unaligned>("battery");
+    if (fault == "kind") declare_wrong_kind();
     if (fault == "twice") node.state<SetPoint>(), node.state<SetPoint>();
     const auto battery = node.output<Cells>("battery");
     if (fault == "layout") {
@@ -60,6 +82,8 @@ int main() {
       if (is_time && fault == "nan") asked.altitude = std::numeric_limits<double>::quiet_NaN();
       if (is_time && fault == "handle") tick.get(hummingbus::Input<SetPoint>{7});
       if (!is_time || fault != "unwritten") tick.write(set_point, asked);
+      // The same memory once more: it holds what was written.
+      if (fault == "none" && tick.output(set_point)->altitude != 1.0) throw std::runtime_error("the set point is gone");
       Cells cells;
       cells.voltage = 11.5;
       cells.cells = {3.8, 3.8, 3.9};

@@ -9,13 +9,13 @@
 #include <stdint.h>
 #include <stdlib.h>
 
-// What was asked for happened.
+// Success.
 #define HB_OK 0
 
-// It did not; `hb_last_error` says why.
+// Failure; `hb_last_error` returns the reason.
 #define HB_FAILED 1
 
-// The launcher ended the run early, and knows why: the program ends without a word.
+// The launcher aborted the run. The program exits without a message.
 #define HB_ABORTED 2
 
 // Type of a value.
@@ -62,12 +62,14 @@ typedef struct HbField {
   const char *frame;
   // Bytes from the start of the message.
   size_t offset;
-  // Type of the value, or of each value of an array or a sequence.
-  enum HbKind kind;
+  // Type of the value, or of each value of an array or a sequence: an `HbKind`.
+  uint32_t kind;
   // Message of a `HbNested`; null otherwise.
   const struct HbMessage *message;
-  // Values of a fixed array; 0 for a single value.
+  // Values of a fixed array, or its arrays; 0 for a single value.
   size_t array;
+  // Values of each array of an array of arrays; 0 otherwise.
+  size_t inner_array;
   // The most values of a sequence: `uint32_t` count, `uint32_t` zero, then room for so many; 0 where it is none.
   size_t sequence;
 } HbField;
@@ -98,13 +100,20 @@ extern "C" {
 // Reason of the last call on this thread that failed: UTF-8, valid until the next call that fails. Empty if none has.
 const char *hb_last_error(void);
 
+// Hash of the layout of a message, which both ends of a topic have to agree on; 0 if it is refused, and `hb_last_error` says
+// why.
+//
+// # Safety
+// `message` is a description.
+uint64_t hb_message_layout_hash(const struct HbMessage *message);
+
 // Joins the run that started this process. `*node` is freed with `hb_node_free`.
 //
 // # Safety
 // `node` points to a pointer.
 int32_t hb_node_join(struct HbNode **node);
 
-// Frees a node; null is one that is free.
+// Frees a node; does nothing if `node` is null.
 //
 // # Safety
 // `node` is null or came from `hb_node_join` and was not freed.
@@ -137,7 +146,7 @@ bool hb_node_is_wired(const struct HbNode *node, const char *port);
 // Declares the input `port`, whose messages are `message`. `*input` is its number for `hb_tick_input`.
 //
 // # Safety
-// `node` as for `hb_node_name`; `port` is a text, `message` a description, `input` a place.
+// `node` as for `hb_node_name`; `port` is a text, `message` a description, `input` points to a number.
 int32_t hb_node_input(struct HbNode *node, const char *port, const struct HbMessage *message, uint32_t *input);
 
 // Declares the output `port`, whose messages are `message`. `*output` is its number for `hb_tick_output`.
@@ -146,13 +155,15 @@ int32_t hb_node_input(struct HbNode *node, const char *port, const struct HbMess
 // As `hb_node_input`.
 int32_t hb_node_output(struct HbNode *node, const char *port, const struct HbMessage *message, uint32_t *output);
 
-// Declares the state as one value of `message`. `*state` becomes its memory: zeros, aligned to eight bytes, until
-// `hb_node_run` returns. All that changes from tick to tick belongs there, since whoever takes the node's place goes on
+// Declares the state as one value of `message`. `*state` becomes its memory: zeros, aligned to eight bytes, as long as the
+// process lives. All that changes from tick to tick belongs there, since whoever takes the node's place goes on
 // from it, and since checkpoints hold it. The bus reads and writes it between steps.
 //
 // # Safety
 // As `hb_node_input`.
-int32_t hb_node_state(struct HbNode *node, const struct HbMessage *message, void **state);
+int32_t hb_node_state(struct HbNode *node,
+                      const struct HbMessage *message,
+                      void **state);
 
 // Connects, then calls `step` at every due tick, until the run ends or another process has taken the node's place. A
 // parameter of the manifest that nothing has read is refused.
@@ -214,8 +225,9 @@ uint64_t hb_tick_time_ns(struct HbTick *tick);
 const void *hb_tick_input(struct HbTick *tick,
                           uint32_t input);
 
-// Memory of the message of output `output`: zeros, shared, aligned to eight bytes, valid until the step returns. Null if
-// no message is due at this tick. The bus fills in the stamp, and sends the message when the step has returned.
+// Memory of the message of output `output`: shared, zeros until the step writes them, aligned to eight bytes, valid until the
+// step returns. Null if the step sends none, and if `hb_node_output` has given no such number; the step has failed then. The
+// bus fills in the stamp, and sends the message when the step has returned.
 //
 // # Safety
 // As `hb_tick_number`.

@@ -75,9 +75,10 @@ struct Message;
 namespace detail {
 template <typename T>
 HbField field(const char* name, std::size_t offset, const char* unit, const char* frame, const char* doc, T*) {
-  HbField field = {name, doc, unit, frame, offset, HB_NESTED, nullptr, 0, 0};
+  HbField field = {name, doc, unit, frame, offset, HB_NESTED, nullptr, 0, 0, 0};
   if constexpr (std::is_arithmetic_v<T>) {
-    static_assert(!std::is_same_v<T, bool> && !std::is_same_v<T, long double>, "take an integer or a double");
+    static_assert(!std::is_same_v<T, bool> && !std::is_same_v<T, char> && !std::is_same_v<T, long double>,
+                  "take a number of <cstdint>, a float or a double");
     constexpr bool is_float = std::is_floating_point_v<T>, is_signed = std::is_signed_v<T>;
     constexpr HbKind floats[] = {HB_F32, HB_F64};
     constexpr HbKind integers[2][4] = {{HB_U8, HB_U16, HB_U32, HB_U64}, {HB_I8, HB_I16, HB_I32, HB_I64}};
@@ -91,11 +92,14 @@ HbField field(const char* name, std::size_t offset, const char* unit, const char
 template <typename T, std::size_t N>
 HbField field(const char* name, std::size_t offset, const char* unit, const char* frame, const char* doc, std::array<T, N>*) {
   HbField inner = field(name, offset, unit, frame, doc, static_cast<T*>(nullptr));
+  // An array of arrays has two lengths, and there are no more.
+  inner.inner_array = inner.array;
   inner.array = N;
   return inner;
 }
 template <typename T, std::size_t N>
 HbField field(const char* name, std::size_t offset, const char* unit, const char* frame, const char* doc, Bounded<T, N>*) {
+  static_assert(alignof(T) == 8, "a sequence holds values of eight bytes");
   HbField inner = field(name, offset, unit, frame, doc, static_cast<T*>(nullptr));
   inner.sequence = N;
   return inner;
@@ -207,9 +211,10 @@ class Node {
   std::string file(const char* key) { return texts(hb_node_file, key); }
 
   // Calls `step` with a Tick& at every due tick until the run ends, or another process has taken the node's place.
+  // The state stays where it is until the node is destroyed.
   template <typename Step>
   void run(Step&& step) {
-    using Steps = std::remove_reference_t<Step>;
+    using Steps = std::decay_t<Step>;
     const HbStep trampoline = [](void* steps, HbTick* tick) -> std::int32_t {
       try {
         Tick view(tick);
@@ -221,7 +226,8 @@ class Node {
         return hb_tick_fail(tick, "it threw something that is no std::exception");
       }
     };
-    detail::require(hb_node_run(node_, trampoline, const_cast<void*>(static_cast<const void*>(&step))));
+    Steps steps(std::forward<Step>(step));
+    detail::require(hb_node_run(node_, trampoline, &steps));
   }
 
  private:
@@ -234,19 +240,21 @@ class Node {
   HbNode* node_ = nullptr;
 };
 
-// The exit code of `body`, whose errors are printed: all of a `main`.
+// The exit code of `body`, whose errors are printed: all of a `main`. A run that the launcher aborted ends without a message.
 template <typename Body>
 int program(Body&& body) noexcept {
   try {
     body();
     return 0;
   } catch (const Error& error) {
+    if (error.is_abort()) return 0;
     std::fprintf(stderr, "error: %s\n", error.what());
-    return 1;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "error: %s\n", error.what());
-    return 1;
+  } catch (...) {
+    std::fputs("error: an exception that is no std::exception\n", stderr);
   }
+  return 1;
 }
 
 } // namespace hummingbus

@@ -17,8 +17,8 @@ typedef struct HbTime {
 } HbTime;
 
 static const HbField HB_TIME_FIELDS[] = {
-  { "sec", "Whole seconds since tick 0.", "s", "", offsetof(HbTime, sec), HB_I32, NULL, 0, 0 },
-  { "nanosec", "The rest, 0 to 999 999 999.", "ns", "", offsetof(HbTime, nanosec), HB_U32, NULL, 0, 0 },
+  { "sec", "Whole seconds since tick 0.", "s", "", offsetof(HbTime, sec), HB_I32, NULL, 0, 0, 0 },
+  { "nanosec", "The rest, 0 to 999 999 999.", "ns", "", offsetof(HbTime, nanosec), HB_U32, NULL, 0, 0, 0 },
 };
 
 static const HbMessage HB_TIME = { "builtin_interfaces/msg/Time", "Simulation time as ROS 2 writes it. The bus fills it in when a sample is sent.", sizeof(HbTime), HB_TIME_FIELDS, 2 };
@@ -36,10 +36,10 @@ typedef struct HbQuaternion {
 } HbQuaternion;
 
 static const HbField HB_QUATERNION_FIELDS[] = {
-  { "x", "Vector part along x.", "1", "", offsetof(HbQuaternion, x), HB_F64, NULL, 0, 0 },
-  { "y", "Vector part along y.", "1", "", offsetof(HbQuaternion, y), HB_F64, NULL, 0, 0 },
-  { "z", "Vector part along z.", "1", "", offsetof(HbQuaternion, z), HB_F64, NULL, 0, 0 },
-  { "w", "Scalar part.", "1", "", offsetof(HbQuaternion, w), HB_F64, NULL, 0, 0 },
+  { "x", "Vector part along x.", "1", "", offsetof(HbQuaternion, x), HB_F64, NULL, 0, 0, 0 },
+  { "y", "Vector part along y.", "1", "", offsetof(HbQuaternion, y), HB_F64, NULL, 0, 0, 0 },
+  { "z", "Vector part along z.", "1", "", offsetof(HbQuaternion, z), HB_F64, NULL, 0, 0, 0 },
+  { "w", "Scalar part.", "1", "", offsetof(HbQuaternion, w), HB_F64, NULL, 0, 0, 0 },
 };
 
 static const HbMessage HB_QUATERNION = { "hummingbus_msgs/msg/Quaternion", "A unit quaternion, Hamilton convention, stored x, y, z, w; it rotates body vectors into the world.", sizeof(HbQuaternion), HB_QUATERNION_FIELDS, 4 };
@@ -55,9 +55,9 @@ typedef struct HbVector3 {
 } HbVector3;
 
 static const HbField HB_VECTOR3_FIELDS[] = {
-  { "x", "Along x.", "", "", offsetof(HbVector3, x), HB_F64, NULL, 0, 0 },
-  { "y", "Along y.", "", "", offsetof(HbVector3, y), HB_F64, NULL, 0, 0 },
-  { "z", "Along z.", "", "", offsetof(HbVector3, z), HB_F64, NULL, 0, 0 },
+  { "x", "Along x.", "", "", offsetof(HbVector3, x), HB_F64, NULL, 0, 0, 0 },
+  { "y", "Along y.", "", "", offsetof(HbVector3, y), HB_F64, NULL, 0, 0, 0 },
+  { "z", "Along z.", "", "", offsetof(HbVector3, z), HB_F64, NULL, 0, 0, 0 },
 };
 
 static const HbMessage HB_VECTOR3 = { "hummingbus_msgs/msg/Vector3", "Three numbers along the axes of a frame.", sizeof(HbVector3), HB_VECTOR3_FIELDS, 3 };
@@ -79,12 +79,12 @@ typedef struct HbAttitudeEstimate {
 } HbAttitudeEstimate;
 
 static const HbField HB_ATTITUDE_ESTIMATE_FIELDS[] = {
-  { "stamp", "Simulation time.", "", "", offsetof(HbAttitudeEstimate, stamp), HB_NESTED, &HB_TIME, 0, 0 },
-  { "attitude", "Attitude, body to world.", "", "world", offsetof(HbAttitudeEstimate, attitude), HB_NESTED, &HB_QUATERNION, 0, 0 },
-  { "roll", "Roll about body x (z-y-x sequence).", "rad", "world", offsetof(HbAttitudeEstimate, roll), HB_F64, NULL, 0, 0 },
-  { "pitch", "Pitch about y, positive nose down.", "rad", "world", offsetof(HbAttitudeEstimate, pitch), HB_F64, NULL, 0, 0 },
-  { "yaw", "Yaw about world z, positive counter-clockwise from above.", "rad", "world", offsetof(HbAttitudeEstimate, yaw), HB_F64, NULL, 0, 0 },
-  { "angular_velocity", "Angular velocity.", "rad/s", "body", offsetof(HbAttitudeEstimate, angular_velocity), HB_NESTED, &HB_VECTOR3, 0, 0 },
+  { "stamp", "Simulation time.", "", "", offsetof(HbAttitudeEstimate, stamp), HB_NESTED, &HB_TIME, 0, 0, 0 },
+  { "attitude", "Attitude, body to world.", "", "world", offsetof(HbAttitudeEstimate, attitude), HB_NESTED, &HB_QUATERNION, 0, 0, 0 },
+  { "roll", "Roll about body x (z-y-x sequence).", "rad", "world", offsetof(HbAttitudeEstimate, roll), HB_F64, NULL, 0, 0, 0 },
+  { "pitch", "Pitch about y, positive nose down.", "rad", "world", offsetof(HbAttitudeEstimate, pitch), HB_F64, NULL, 0, 0, 0 },
+  { "yaw", "Yaw about world z, positive counter-clockwise from above.", "rad", "world", offsetof(HbAttitudeEstimate, yaw), HB_F64, NULL, 0, 0, 0 },
+  { "angular_velocity", "Angular velocity.", "rad/s", "body", offsetof(HbAttitudeEstimate, angular_velocity), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
 };
 
 static const HbMessage HB_ATTITUDE_ESTIMATE = { "hummingbus_msgs/msg/AttitudeEstimate", "Estimated attitude and angular velocity.", sizeof(HbAttitudeEstimate), HB_ATTITUDE_ESTIMATE_FIELDS, 6 };
@@ -106,12 +106,12 @@ typedef struct HbBarometer {
 } HbBarometer;
 
 static const HbField HB_BAROMETER_FIELDS[] = {
-  { "stamp", "Simulation time of sending.", "", "", offsetof(HbBarometer, stamp), HB_NESTED, &HB_TIME, 0, 0 },
-  { "measured_ns", "Simulation time at which it was measured.", "ns", "", offsetof(HbBarometer, measured_ns), HB_U64, NULL, 0, 0 },
-  { "pressure", "Static pressure.", "Pa", "", offsetof(HbBarometer, pressure), HB_F64, NULL, 0, 0 },
-  { "altitude", "Height above the world's origin that the pressure means in the standard atmosphere.", "m", "world", offsetof(HbBarometer, altitude), HB_F64, NULL, 0, 0 },
-  { "valid", "1 if this sample holds a measurement, 0 if it was lost.", "1", "", offsetof(HbBarometer, valid), HB_U32, NULL, 0, 0 },
-  { "pad0", "Zero.", "", "", offsetof(HbBarometer, pad0), HB_U32, NULL, 0, 0 },
+  { "stamp", "Simulation time of sending.", "", "", offsetof(HbBarometer, stamp), HB_NESTED, &HB_TIME, 0, 0, 0 },
+  { "measured_ns", "Simulation time at which it was measured.", "ns", "", offsetof(HbBarometer, measured_ns), HB_U64, NULL, 0, 0, 0 },
+  { "pressure", "Static pressure.", "Pa", "", offsetof(HbBarometer, pressure), HB_F64, NULL, 0, 0, 0 },
+  { "altitude", "Height above the world's origin that the pressure means in the standard atmosphere.", "m", "world", offsetof(HbBarometer, altitude), HB_F64, NULL, 0, 0, 0 },
+  { "valid", "1 if this sample holds a measurement, 0 if it was lost.", "1", "", offsetof(HbBarometer, valid), HB_U32, NULL, 0, 0, 0 },
+  { "pad0", "Zero.", "", "", offsetof(HbBarometer, pad0), HB_U32, NULL, 0, 0, 0 },
 };
 
 static const HbMessage HB_BAROMETER = { "hummingbus_msgs/msg/Barometer", "What a barometer reports.", sizeof(HbBarometer), HB_BAROMETER_FIELDS, 6 };
@@ -135,13 +135,13 @@ typedef struct HbBattery {
 } HbBattery;
 
 static const HbField HB_BATTERY_FIELDS[] = {
-  { "stamp", "Simulation time of sending.", "", "", offsetof(HbBattery, stamp), HB_NESTED, &HB_TIME, 0, 0 },
-  { "measured_ns", "Simulation time at which it was measured.", "ns", "", offsetof(HbBattery, measured_ns), HB_U64, NULL, 0, 0 },
-  { "voltage", "Voltage at the terminals.", "V", "", offsetof(HbBattery, voltage), HB_F64, NULL, 0, 0 },
-  { "current", "Current drawn.", "A", "", offsetof(HbBattery, current), HB_F64, NULL, 0, 0 },
-  { "charge", "What is left of the capacity, 0 to 1.", "1", "", offsetof(HbBattery, charge), HB_F64, NULL, 0, 0 },
-  { "valid", "1 if this sample holds a measurement, 0 if it was lost or the plant has no model of its battery.", "1", "", offsetof(HbBattery, valid), HB_U32, NULL, 0, 0 },
-  { "pad0", "Zero.", "", "", offsetof(HbBattery, pad0), HB_U32, NULL, 0, 0 },
+  { "stamp", "Simulation time of sending.", "", "", offsetof(HbBattery, stamp), HB_NESTED, &HB_TIME, 0, 0, 0 },
+  { "measured_ns", "Simulation time at which it was measured.", "ns", "", offsetof(HbBattery, measured_ns), HB_U64, NULL, 0, 0, 0 },
+  { "voltage", "Voltage at the terminals.", "V", "", offsetof(HbBattery, voltage), HB_F64, NULL, 0, 0, 0 },
+  { "current", "Current drawn.", "A", "", offsetof(HbBattery, current), HB_F64, NULL, 0, 0, 0 },
+  { "charge", "What is left of the capacity, 0 to 1.", "1", "", offsetof(HbBattery, charge), HB_F64, NULL, 0, 0, 0 },
+  { "valid", "1 if this sample holds a measurement, 0 if it was lost or the plant has no model of its battery.", "1", "", offsetof(HbBattery, valid), HB_U32, NULL, 0, 0, 0 },
+  { "pad0", "Zero.", "", "", offsetof(HbBattery, pad0), HB_U32, NULL, 0, 0, 0 },
 };
 
 static const HbMessage HB_BATTERY = { "hummingbus_msgs/msg/Battery", "Voltage and current of the battery, true or measured.", sizeof(HbBattery), HB_BATTERY_FIELDS, 7 };
@@ -167,14 +167,14 @@ typedef struct HbBodyStates {
 } HbBodyStates;
 
 static const HbField HB_BODY_STATES_FIELDS[] = {
-  { "stamp", "Simulation time.", "", "", offsetof(HbBodyStates, stamp), HB_NESTED, &HB_TIME, 0, 0 },
-  { "count", "How many bodies there are.", "1", "", offsetof(HbBodyStates, count), HB_U32, NULL, 0, 0 },
-  { "pad0", "Zero.", "", "", offsetof(HbBodyStates, pad0), HB_U32, NULL, 0, 0 },
-  { "object", "Their numbers among the things of the scene, as `Contact` counts them: 2 + i of the thing i.", "1", "", offsetof(HbBodyStates, object), HB_U32, NULL, 16, 0 },
-  { "position", "Positions of their centres of mass.", "m", "world", offsetof(HbBodyStates, position), HB_NESTED, &HB_VECTOR3, 16, 0 },
-  { "attitude", "Attitudes, the body's own axes to the world's.", "", "world", offsetof(HbBodyStates, attitude), HB_NESTED, &HB_QUATERNION, 16, 0 },
-  { "velocity", "Velocities of their centres of mass.", "m/s", "world", offsetof(HbBodyStates, velocity), HB_NESTED, &HB_VECTOR3, 16, 0 },
-  { "angular_velocity", "Angular velocities.", "rad/s", "world", offsetof(HbBodyStates, angular_velocity), HB_NESTED, &HB_VECTOR3, 16, 0 },
+  { "stamp", "Simulation time.", "", "", offsetof(HbBodyStates, stamp), HB_NESTED, &HB_TIME, 0, 0, 0 },
+  { "count", "How many bodies there are.", "1", "", offsetof(HbBodyStates, count), HB_U32, NULL, 0, 0, 0 },
+  { "pad0", "Zero.", "", "", offsetof(HbBodyStates, pad0), HB_U32, NULL, 0, 0, 0 },
+  { "object", "Their numbers among the things of the scene, as `Contact` counts them: 2 + i of the thing i.", "1", "", offsetof(HbBodyStates, object), HB_U32, NULL, 16, 0, 0 },
+  { "position", "Positions of their centres of mass.", "m", "world", offsetof(HbBodyStates, position), HB_NESTED, &HB_VECTOR3, 16, 0, 0 },
+  { "attitude", "Attitudes, the body's own axes to the world's.", "", "world", offsetof(HbBodyStates, attitude), HB_NESTED, &HB_QUATERNION, 16, 0, 0 },
+  { "velocity", "Velocities of their centres of mass.", "m/s", "world", offsetof(HbBodyStates, velocity), HB_NESTED, &HB_VECTOR3, 16, 0, 0 },
+  { "angular_velocity", "Angular velocities.", "rad/s", "world", offsetof(HbBodyStates, angular_velocity), HB_NESTED, &HB_VECTOR3, 16, 0, 0 },
 };
 
 static const HbMessage HB_BODY_STATES = { "hummingbus_msgs/msg/BodyStates", "Where the free bodies of a scene are, and how they move, in the order of the scene: those beyond `count` are zeros.", sizeof(HbBodyStates), HB_BODY_STATES_FIELDS, 8 };
@@ -198,13 +198,13 @@ typedef struct HbClearance {
 } HbClearance;
 
 static const HbField HB_CLEARANCE_FIELDS[] = {
-  { "stamp", "Simulation time.", "", "", offsetof(HbClearance, stamp), HB_NESTED, &HB_TIME, 0, 0 },
-  { "nearest", "Distance from the centre of mass to the nearest box.", "m", "world", offsetof(HbClearance, nearest), HB_F64, NULL, 0, 0 },
-  { "wall", "Distances to what stands along the world's +x, -x, +y, -y; 1000 where nothing does.", "m", "world", offsetof(HbClearance, wall), HB_F64, NULL, 4, 0 },
-  { "side_error", "The smallest of them less the distance that is to be kept.", "m", "world", offsetof(HbClearance, side_error), HB_F64, NULL, 0, 0 },
-  { "laps", "Turns flown about the world's origin, clockwise from above as positive: laps of a room.", "1", "", offsetof(HbClearance, laps), HB_F64, NULL, 0, 0 },
-  { "corner", "1 in the corner between two walls, where both are about as far as is to be kept; 0 along a side.", "1", "", offsetof(HbClearance, corner), HB_U32, NULL, 0, 0 },
-  { "pad0", "Zero.", "", "", offsetof(HbClearance, pad0), HB_U32, NULL, 0, 0 },
+  { "stamp", "Simulation time.", "", "", offsetof(HbClearance, stamp), HB_NESTED, &HB_TIME, 0, 0, 0 },
+  { "nearest", "Distance from the centre of mass to the nearest box.", "m", "world", offsetof(HbClearance, nearest), HB_F64, NULL, 0, 0, 0 },
+  { "wall", "Distances to what stands along the world's +x, -x, +y, -y; 1000 where nothing does.", "m", "world", offsetof(HbClearance, wall), HB_F64, NULL, 4, 0, 0 },
+  { "side_error", "The smallest of them less the distance that is to be kept.", "m", "world", offsetof(HbClearance, side_error), HB_F64, NULL, 0, 0, 0 },
+  { "laps", "Turns flown about the world's origin, clockwise from above as positive: laps of a room.", "1", "", offsetof(HbClearance, laps), HB_F64, NULL, 0, 0, 0 },
+  { "corner", "1 in the corner between two walls, where both are about as far as is to be kept; 0 along a side.", "1", "", offsetof(HbClearance, corner), HB_U32, NULL, 0, 0, 0 },
+  { "pad0", "Zero.", "", "", offsetof(HbClearance, pad0), HB_U32, NULL, 0, 0, 0 },
 };
 
 static const HbMessage HB_CLEARANCE = { "hummingbus_msgs/msg/Clearance", "How far a vehicle truly is from what stands in the scene: for judging and plotting, not for controllers.", sizeof(HbClearance), HB_CLEARANCE_FIELDS, 7 };
@@ -228,13 +228,13 @@ typedef struct HbContact {
 } HbContact;
 
 static const HbField HB_CONTACT_FIELDS[] = {
-  { "stamp", "Simulation time.", "", "", offsetof(HbContact, stamp), HB_NESTED, &HB_TIME, 0, 0 },
-  { "force", "Sum of the contact forces over the last tick.", "N", "world", offsetof(HbContact, force), HB_NESTED, &HB_VECTOR3, 0, 0 },
-  { "impact_speed", "Speed of approach just before the newest impact: a part of the vehicle, a foot or the disc of propellers, touched something that it had not touched. The fastest of those within a tick; 0 without a contact.", "m/s", "", offsetof(HbContact, impact_speed), HB_F64, NULL, 0, 0 },
-  { "count", "Number of things touched: the ground, boxes, other vehicles.", "1", "", offsetof(HbContact, count), HB_U32, NULL, 0, 0 },
-  { "object", "What is touched first: 0 nothing, 1 the ground, 2 + i the scene's thing i (boxes first, then meshes), 1000 + i the other vehicle i.", "1", "", offsetof(HbContact, object), HB_U32, NULL, 0, 0 },
-  { "began", "Contacts that began since the run started, resting on the ground at the start left out.", "1", "", offsetof(HbContact, began), HB_U32, NULL, 0, 0 },
-  { "crashed", "1 from the first impact on that was faster than the vehicle bears.", "1", "", offsetof(HbContact, crashed), HB_U32, NULL, 0, 0 },
+  { "stamp", "Simulation time.", "", "", offsetof(HbContact, stamp), HB_NESTED, &HB_TIME, 0, 0, 0 },
+  { "force", "Sum of the contact forces over the last tick.", "N", "world", offsetof(HbContact, force), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
+  { "impact_speed", "Speed of approach just before the newest impact: a part of the vehicle, a foot or the disc of propellers, touched something that it had not touched. The fastest of those within a tick; 0 without a contact.", "m/s", "", offsetof(HbContact, impact_speed), HB_F64, NULL, 0, 0, 0 },
+  { "count", "Number of things touched: the ground, boxes, other vehicles.", "1", "", offsetof(HbContact, count), HB_U32, NULL, 0, 0, 0 },
+  { "object", "What is touched first: 0 nothing, 1 the ground, 2 + i the scene's thing i (boxes first, then meshes), 1000 + i the other vehicle i.", "1", "", offsetof(HbContact, object), HB_U32, NULL, 0, 0, 0 },
+  { "began", "Contacts that began since the run started, resting on the ground at the start left out.", "1", "", offsetof(HbContact, began), HB_U32, NULL, 0, 0, 0 },
+  { "crashed", "1 from the first impact on that was faster than the vehicle bears.", "1", "", offsetof(HbContact, crashed), HB_U32, NULL, 0, 0, 0 },
 };
 
 static const HbMessage HB_CONTACT = { "hummingbus_msgs/msg/Contact", "What the plant touches, whatever else is in the scene.", sizeof(HbContact), HB_CONTACT_FIELDS, 7 };
@@ -270,19 +270,19 @@ typedef struct HbControlStatus {
 } HbControlStatus;
 
 static const HbField HB_CONTROL_STATUS_FIELDS[] = {
-  { "stamp", "Simulation time.", "", "", offsetof(HbControlStatus, stamp), HB_NESTED, &HB_TIME, 0, 0 },
-  { "altitude_set_point", "Altitude that its inner loops hold: the pilot's, or its outer loop's.", "m", "world", offsetof(HbControlStatus, altitude_set_point), HB_F64, NULL, 0, 0 },
-  { "attitude_set_point", "Roll, pitch and yaw that its inner loops hold.", "rad", "world", offsetof(HbControlStatus, attitude_set_point), HB_F64, NULL, 3, 0 },
-  { "velocity_set_point", "Velocity that its outer loop asks for, level axes along the heading; 0 without one.", "m/s", "", offsetof(HbControlStatus, velocity_set_point), HB_F64, NULL, 2, 0 },
-  { "thrust", "Demanded thrust along body z.", "N", "body", offsetof(HbControlStatus, thrust), HB_F64, NULL, 0, 0 },
-  { "torque", "Demanded torque.", "N*m", "body", offsetof(HbControlStatus, torque), HB_NESTED, &HB_VECTOR3, 0, 0 },
-  { "thrust_error", "Thrust made less thrust demanded; it is given up first.", "N", "", offsetof(HbControlStatus, thrust_error), HB_F64, NULL, 0, 0 },
-  { "roll_pitch_part", "The part of the demanded roll and pitch torque that is made, 0 to 1.", "1", "", offsetof(HbControlStatus, roll_pitch_part), HB_F64, NULL, 0, 0 },
-  { "yaw_part", "The part of the demanded yaw torque that is made, 0 to 1.", "1", "", offsetof(HbControlStatus, yaw_part), HB_F64, NULL, 0, 0 },
-  { "saturated", "1 if any of the demand was given up.", "1", "", offsetof(HbControlStatus, saturated), HB_U32, NULL, 0, 0 },
-  { "state", "State of its guidance: of `wall-follow` 1 to 5 as in the thesis, of `wall-stop` 1 cruising, 2 braking, 3 holding; 0 without guidance.", "1", "", offsetof(HbControlStatus, state), HB_U32, NULL, 0, 0 },
-  { "laps", "Laps flown.", "1", "", offsetof(HbControlStatus, laps), HB_U32, NULL, 0, 0 },
-  { "pad0", "Zero.", "", "", offsetof(HbControlStatus, pad0), HB_U32, NULL, 0, 0 },
+  { "stamp", "Simulation time.", "", "", offsetof(HbControlStatus, stamp), HB_NESTED, &HB_TIME, 0, 0, 0 },
+  { "altitude_set_point", "Altitude that its inner loops hold: the pilot's, or its outer loop's.", "m", "world", offsetof(HbControlStatus, altitude_set_point), HB_F64, NULL, 0, 0, 0 },
+  { "attitude_set_point", "Roll, pitch and yaw that its inner loops hold.", "rad", "world", offsetof(HbControlStatus, attitude_set_point), HB_F64, NULL, 3, 0, 0 },
+  { "velocity_set_point", "Velocity that its outer loop asks for, level axes along the heading; 0 without one.", "m/s", "", offsetof(HbControlStatus, velocity_set_point), HB_F64, NULL, 2, 0, 0 },
+  { "thrust", "Demanded thrust along body z.", "N", "body", offsetof(HbControlStatus, thrust), HB_F64, NULL, 0, 0, 0 },
+  { "torque", "Demanded torque.", "N*m", "body", offsetof(HbControlStatus, torque), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
+  { "thrust_error", "Thrust made less thrust demanded; it is given up first.", "N", "", offsetof(HbControlStatus, thrust_error), HB_F64, NULL, 0, 0, 0 },
+  { "roll_pitch_part", "The part of the demanded roll and pitch torque that is made, 0 to 1.", "1", "", offsetof(HbControlStatus, roll_pitch_part), HB_F64, NULL, 0, 0, 0 },
+  { "yaw_part", "The part of the demanded yaw torque that is made, 0 to 1.", "1", "", offsetof(HbControlStatus, yaw_part), HB_F64, NULL, 0, 0, 0 },
+  { "saturated", "1 if any of the demand was given up.", "1", "", offsetof(HbControlStatus, saturated), HB_U32, NULL, 0, 0, 0 },
+  { "state", "State of its guidance: of `wall-follow` 1 to 5 as in the thesis, of `wall-stop` 1 cruising, 2 braking, 3 holding; 0 without guidance.", "1", "", offsetof(HbControlStatus, state), HB_U32, NULL, 0, 0, 0 },
+  { "laps", "Laps flown.", "1", "", offsetof(HbControlStatus, laps), HB_U32, NULL, 0, 0, 0 },
+  { "pad0", "Zero.", "", "", offsetof(HbControlStatus, pad0), HB_U32, NULL, 0, 0, 0 },
 };
 
 static const HbMessage HB_CONTROL_STATUS = { "hummingbus_msgs/msg/ControlStatus", "What a controller did at a tick: what it asked for, what the rotors could give, what state it is in.", sizeof(HbControlStatus), HB_CONTROL_STATUS_FIELDS, 13 };
@@ -304,12 +304,12 @@ typedef struct HbGps {
 } HbGps;
 
 static const HbField HB_GPS_FIELDS[] = {
-  { "stamp", "Simulation time of sending.", "", "", offsetof(HbGps, stamp), HB_NESTED, &HB_TIME, 0, 0 },
-  { "measured_ns", "Simulation time at which it was measured.", "ns", "", offsetof(HbGps, measured_ns), HB_U64, NULL, 0, 0 },
-  { "position", "Position of the centre of mass.", "m", "world", offsetof(HbGps, position), HB_NESTED, &HB_VECTOR3, 0, 0 },
-  { "velocity", "Velocity of the centre of mass.", "m/s", "world", offsetof(HbGps, velocity), HB_NESTED, &HB_VECTOR3, 0, 0 },
-  { "valid", "1 if this sample holds a measurement, 0 if it was lost.", "1", "", offsetof(HbGps, valid), HB_U32, NULL, 0, 0 },
-  { "pad0", "Zero.", "", "", offsetof(HbGps, pad0), HB_U32, NULL, 0, 0 },
+  { "stamp", "Simulation time of sending.", "", "", offsetof(HbGps, stamp), HB_NESTED, &HB_TIME, 0, 0, 0 },
+  { "measured_ns", "Simulation time at which it was measured.", "ns", "", offsetof(HbGps, measured_ns), HB_U64, NULL, 0, 0, 0 },
+  { "position", "Position of the centre of mass.", "m", "world", offsetof(HbGps, position), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
+  { "velocity", "Velocity of the centre of mass.", "m/s", "world", offsetof(HbGps, velocity), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
+  { "valid", "1 if this sample holds a measurement, 0 if it was lost.", "1", "", offsetof(HbGps, valid), HB_U32, NULL, 0, 0, 0 },
+  { "pad0", "Zero.", "", "", offsetof(HbGps, pad0), HB_U32, NULL, 0, 0, 0 },
 };
 
 static const HbMessage HB_GPS = { "hummingbus_msgs/msg/Gps", "What a satellite receiver reports, in the world's axes.", sizeof(HbGps), HB_GPS_FIELDS, 6 };
@@ -325,9 +325,9 @@ typedef struct HbImu {
 } HbImu;
 
 static const HbField HB_IMU_FIELDS[] = {
-  { "stamp", "Simulation time.", "", "", offsetof(HbImu, stamp), HB_NESTED, &HB_TIME, 0, 0 },
-  { "specific_force", "Measured specific force (at rest: +g along z).", "m/s^2", "body", offsetof(HbImu, specific_force), HB_NESTED, &HB_VECTOR3, 0, 0 },
-  { "angular_velocity", "Measured angular velocity.", "rad/s", "body", offsetof(HbImu, angular_velocity), HB_NESTED, &HB_VECTOR3, 0, 0 },
+  { "stamp", "Simulation time.", "", "", offsetof(HbImu, stamp), HB_NESTED, &HB_TIME, 0, 0, 0 },
+  { "specific_force", "Measured specific force (at rest: +g along z).", "m/s^2", "body", offsetof(HbImu, specific_force), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
+  { "angular_velocity", "Measured angular velocity.", "rad/s", "body", offsetof(HbImu, angular_velocity), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
 };
 
 static const HbMessage HB_IMU = { "hummingbus_msgs/msg/Imu", "What an inertial measurement unit reports.", sizeof(HbImu), HB_IMU_FIELDS, 3 };
@@ -347,11 +347,11 @@ typedef struct HbInnovation {
 } HbInnovation;
 
 static const HbField HB_INNOVATION_FIELDS[] = {
-  { "stamp", "Simulation time.", "", "", offsetof(HbInnovation, stamp), HB_NESTED, &HB_TIME, 0, 0 },
-  { "normalised_squared", "Normalised innovation squared of the last update by GPS, motion capture, barometer, magnetometer.", "1", "", offsetof(HbInnovation, normalised_squared), HB_F64, NULL, 4, 0 },
-  { "degrees_of_freedom", "Its degrees of freedom, which it should equal on average.", "1", "", offsetof(HbInnovation, degrees_of_freedom), HB_U32, NULL, 4, 0 },
-  { "updates", "Updates so far.", "1", "", offsetof(HbInnovation, updates), HB_U32, NULL, 4, 0 },
-  { "refused", "Measurements refused as outliers so far.", "1", "", offsetof(HbInnovation, refused), HB_U32, NULL, 4, 0 },
+  { "stamp", "Simulation time.", "", "", offsetof(HbInnovation, stamp), HB_NESTED, &HB_TIME, 0, 0, 0 },
+  { "normalised_squared", "Normalised innovation squared of the last update by GPS, motion capture, barometer, magnetometer.", "1", "", offsetof(HbInnovation, normalised_squared), HB_F64, NULL, 4, 0, 0 },
+  { "degrees_of_freedom", "Its degrees of freedom, which it should equal on average.", "1", "", offsetof(HbInnovation, degrees_of_freedom), HB_U32, NULL, 4, 0, 0 },
+  { "updates", "Updates so far.", "1", "", offsetof(HbInnovation, updates), HB_U32, NULL, 4, 0, 0 },
+  { "refused", "Measurements refused as outliers so far.", "1", "", offsetof(HbInnovation, refused), HB_U32, NULL, 4, 0, 0 },
 };
 
 static const HbMessage HB_INNOVATION = { "hummingbus_msgs/msg/Innovation", "How well an estimator's predictions met its measurements: the last update of each sensor.", sizeof(HbInnovation), HB_INNOVATION_FIELDS, 5 };
@@ -385,18 +385,18 @@ typedef struct HbLinkStatistics {
 } HbLinkStatistics;
 
 static const HbField HB_LINK_STATISTICS_FIELDS[] = {
-  { "stamp", "Simulation time.", "", "", offsetof(HbLinkStatistics, stamp), HB_NESTED, &HB_TIME, 0, 0 },
-  { "sent_bytes", "Whole bytes that the wire has carried.", "1", "", offsetof(HbLinkStatistics, sent_bytes), HB_U64, NULL, 0, 0 },
-  { "queued_bytes", "Bytes that wait for the wire.", "1", "", offsetof(HbLinkStatistics, queued_bytes), HB_U32, NULL, 0, 0 },
-  { "queued", "Messages that wait for the wire.", "1", "", offsetof(HbLinkStatistics, queued), HB_U32, NULL, 0, 0 },
-  { "delay", "How long the message that arrived last had taken since it was queued.", "s", "", offsetof(HbLinkStatistics, delay), HB_F64, NULL, 0, 0 },
-  { "under_way", "Messages that are on the wire or behind it.", "1", "", offsetof(HbLinkStatistics, under_way), HB_U32, NULL, 0, 0 },
-  { "arrived", "Messages that have arrived.", "1", "", offsetof(HbLinkStatistics, arrived), HB_U32, NULL, 0, 0 },
-  { "lost", "Messages that were lost on the way; counted when they would have arrived.", "1", "", offsetof(HbLinkStatistics, lost), HB_U32, NULL, 0, 0 },
-  { "dropped", "Messages that were dropped because the queue was full.", "1", "", offsetof(HbLinkStatistics, dropped), HB_U32, NULL, 0, 0 },
-  { "stream_arrived", "Messages that have arrived, by stream.", "1", "", offsetof(HbLinkStatistics, stream_arrived), HB_U32, NULL, 16, 0 },
-  { "stream_lost", "Messages that were lost on the way, by stream.", "1", "", offsetof(HbLinkStatistics, stream_lost), HB_U32, NULL, 16, 0 },
-  { "stream_dropped", "Messages that were dropped because the queue was full, by stream.", "1", "", offsetof(HbLinkStatistics, stream_dropped), HB_U32, NULL, 16, 0 },
+  { "stamp", "Simulation time.", "", "", offsetof(HbLinkStatistics, stamp), HB_NESTED, &HB_TIME, 0, 0, 0 },
+  { "sent_bytes", "Whole bytes that the wire has carried.", "1", "", offsetof(HbLinkStatistics, sent_bytes), HB_U64, NULL, 0, 0, 0 },
+  { "queued_bytes", "Bytes that wait for the wire.", "1", "", offsetof(HbLinkStatistics, queued_bytes), HB_U32, NULL, 0, 0, 0 },
+  { "queued", "Messages that wait for the wire.", "1", "", offsetof(HbLinkStatistics, queued), HB_U32, NULL, 0, 0, 0 },
+  { "delay", "How long the message that arrived last had taken since it was queued.", "s", "", offsetof(HbLinkStatistics, delay), HB_F64, NULL, 0, 0, 0 },
+  { "under_way", "Messages that are on the wire or behind it.", "1", "", offsetof(HbLinkStatistics, under_way), HB_U32, NULL, 0, 0, 0 },
+  { "arrived", "Messages that have arrived.", "1", "", offsetof(HbLinkStatistics, arrived), HB_U32, NULL, 0, 0, 0 },
+  { "lost", "Messages that were lost on the way; counted when they would have arrived.", "1", "", offsetof(HbLinkStatistics, lost), HB_U32, NULL, 0, 0, 0 },
+  { "dropped", "Messages that were dropped because the queue was full.", "1", "", offsetof(HbLinkStatistics, dropped), HB_U32, NULL, 0, 0, 0 },
+  { "stream_arrived", "Messages that have arrived, by stream.", "1", "", offsetof(HbLinkStatistics, stream_arrived), HB_U32, NULL, 16, 0, 0 },
+  { "stream_lost", "Messages that were lost on the way, by stream.", "1", "", offsetof(HbLinkStatistics, stream_lost), HB_U32, NULL, 16, 0, 0 },
+  { "stream_dropped", "Messages that were dropped because the queue was full, by stream.", "1", "", offsetof(HbLinkStatistics, stream_dropped), HB_U32, NULL, 16, 0, 0 },
 };
 
 static const HbMessage HB_LINK_STATISTICS = { "hummingbus_msgs/msg/LinkStatistics", "What a link says of itself, from its first tick on; arrays by the names of the streams.", sizeof(HbLinkStatistics), HB_LINK_STATISTICS_FIELDS, 12 };
@@ -416,11 +416,11 @@ typedef struct HbMagnetometer {
 } HbMagnetometer;
 
 static const HbField HB_MAGNETOMETER_FIELDS[] = {
-  { "stamp", "Simulation time of sending.", "", "", offsetof(HbMagnetometer, stamp), HB_NESTED, &HB_TIME, 0, 0 },
-  { "measured_ns", "Simulation time at which it was measured.", "ns", "", offsetof(HbMagnetometer, measured_ns), HB_U64, NULL, 0, 0 },
-  { "field", "Magnetic flux density.", "T", "body", offsetof(HbMagnetometer, field), HB_NESTED, &HB_VECTOR3, 0, 0 },
-  { "valid", "1 if this sample holds a measurement, 0 if it was lost.", "1", "", offsetof(HbMagnetometer, valid), HB_U32, NULL, 0, 0 },
-  { "pad0", "Zero.", "", "", offsetof(HbMagnetometer, pad0), HB_U32, NULL, 0, 0 },
+  { "stamp", "Simulation time of sending.", "", "", offsetof(HbMagnetometer, stamp), HB_NESTED, &HB_TIME, 0, 0, 0 },
+  { "measured_ns", "Simulation time at which it was measured.", "ns", "", offsetof(HbMagnetometer, measured_ns), HB_U64, NULL, 0, 0, 0 },
+  { "field", "Magnetic flux density.", "T", "body", offsetof(HbMagnetometer, field), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
+  { "valid", "1 if this sample holds a measurement, 0 if it was lost.", "1", "", offsetof(HbMagnetometer, valid), HB_U32, NULL, 0, 0, 0 },
+  { "pad0", "Zero.", "", "", offsetof(HbMagnetometer, pad0), HB_U32, NULL, 0, 0, 0 },
 };
 
 static const HbMessage HB_MAGNETOMETER = { "hummingbus_msgs/msg/Magnetometer", "What a magnetometer reports.", sizeof(HbMagnetometer), HB_MAGNETOMETER_FIELDS, 5 };
@@ -440,11 +440,11 @@ typedef struct HbMeasuredState {
 } HbMeasuredState;
 
 static const HbField HB_MEASURED_STATE_FIELDS[] = {
-  { "stamp", "Simulation time.", "", "", offsetof(HbMeasuredState, stamp), HB_NESTED, &HB_TIME, 0, 0 },
-  { "position", "Position.", "m", "world", offsetof(HbMeasuredState, position), HB_NESTED, &HB_VECTOR3, 0, 0 },
-  { "velocity", "Velocity.", "m/s", "world", offsetof(HbMeasuredState, velocity), HB_NESTED, &HB_VECTOR3, 0, 0 },
-  { "attitude", "Attitude, body to world.", "", "world", offsetof(HbMeasuredState, attitude), HB_NESTED, &HB_QUATERNION, 0, 0 },
-  { "angular_velocity", "Angular velocity.", "rad/s", "body", offsetof(HbMeasuredState, angular_velocity), HB_NESTED, &HB_VECTOR3, 0, 0 },
+  { "stamp", "Simulation time.", "", "", offsetof(HbMeasuredState, stamp), HB_NESTED, &HB_TIME, 0, 0, 0 },
+  { "position", "Position.", "m", "world", offsetof(HbMeasuredState, position), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
+  { "velocity", "Velocity.", "m/s", "world", offsetof(HbMeasuredState, velocity), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
+  { "attitude", "Attitude, body to world.", "", "world", offsetof(HbMeasuredState, attitude), HB_NESTED, &HB_QUATERNION, 0, 0, 0 },
+  { "angular_velocity", "Angular velocity.", "rad/s", "body", offsetof(HbMeasuredState, angular_velocity), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
 };
 
 static const HbMessage HB_MEASURED_STATE = { "hummingbus_msgs/msg/MeasuredState", "A vehicle's state as measured in a real flight.", sizeof(HbMeasuredState), HB_MEASURED_STATE_FIELDS, 5 };
@@ -466,12 +466,12 @@ typedef struct HbMocap {
 } HbMocap;
 
 static const HbField HB_MOCAP_FIELDS[] = {
-  { "stamp", "Simulation time of sending.", "", "", offsetof(HbMocap, stamp), HB_NESTED, &HB_TIME, 0, 0 },
-  { "measured_ns", "Simulation time at which it was measured.", "ns", "", offsetof(HbMocap, measured_ns), HB_U64, NULL, 0, 0 },
-  { "position", "Position of the centre of mass.", "m", "world", offsetof(HbMocap, position), HB_NESTED, &HB_VECTOR3, 0, 0 },
-  { "attitude", "Attitude, body to world.", "", "world", offsetof(HbMocap, attitude), HB_NESTED, &HB_QUATERNION, 0, 0 },
-  { "valid", "1 if this sample holds a measurement, 0 if it was lost.", "1", "", offsetof(HbMocap, valid), HB_U32, NULL, 0, 0 },
-  { "pad0", "Zero.", "", "", offsetof(HbMocap, pad0), HB_U32, NULL, 0, 0 },
+  { "stamp", "Simulation time of sending.", "", "", offsetof(HbMocap, stamp), HB_NESTED, &HB_TIME, 0, 0, 0 },
+  { "measured_ns", "Simulation time at which it was measured.", "ns", "", offsetof(HbMocap, measured_ns), HB_U64, NULL, 0, 0, 0 },
+  { "position", "Position of the centre of mass.", "m", "world", offsetof(HbMocap, position), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
+  { "attitude", "Attitude, body to world.", "", "world", offsetof(HbMocap, attitude), HB_NESTED, &HB_QUATERNION, 0, 0, 0 },
+  { "valid", "1 if this sample holds a measurement, 0 if it was lost.", "1", "", offsetof(HbMocap, valid), HB_U32, NULL, 0, 0, 0 },
+  { "pad0", "Zero.", "", "", offsetof(HbMocap, pad0), HB_U32, NULL, 0, 0, 0 },
 };
 
 static const HbMessage HB_MOCAP = { "hummingbus_msgs/msg/Mocap", "What a motion-capture system reports.", sizeof(HbMocap), HB_MOCAP_FIELDS, 6 };
@@ -485,8 +485,8 @@ typedef struct HbMotorCommand {
 } HbMotorCommand;
 
 static const HbField HB_MOTOR_COMMAND_FIELDS[] = {
-  { "stamp", "Simulation time.", "", "", offsetof(HbMotorCommand, stamp), HB_NESTED, &HB_TIME, 0, 0 },
-  { "command", "Commands in the order of the vehicle file's rotors; its `command` table maps them to speeds.", "count", "", offsetof(HbMotorCommand, command), HB_F64, NULL, 0, 12 },
+  { "stamp", "Simulation time.", "", "", offsetof(HbMotorCommand, stamp), HB_NESTED, &HB_TIME, 0, 0, 0 },
+  { "command", "Commands in the order of the vehicle file's rotors; its `command` table maps them to speeds.", "count", "", offsetof(HbMotorCommand, command), HB_F64, NULL, 0, 0, 12 },
 };
 
 static const HbMessage HB_MOTOR_COMMAND = { "hummingbus_msgs/msg/MotorCommand", "Motor commands in the vehicle's own raw counts (Hummingbird 1…200, Crazyflie 0…65535).", sizeof(HbMotorCommand), HB_MOTOR_COMMAND_FIELDS, 2 };
@@ -510,13 +510,13 @@ typedef struct HbPlantState {
 } HbPlantState;
 
 static const HbField HB_PLANT_STATE_FIELDS[] = {
-  { "stamp", "Simulation time.", "", "", offsetof(HbPlantState, stamp), HB_NESTED, &HB_TIME, 0, 0 },
-  { "position", "Position of the centre of mass.", "m", "world", offsetof(HbPlantState, position), HB_NESTED, &HB_VECTOR3, 0, 0 },
-  { "velocity", "Velocity of the centre of mass.", "m/s", "world", offsetof(HbPlantState, velocity), HB_NESTED, &HB_VECTOR3, 0, 0 },
-  { "attitude", "Attitude, body to world.", "", "world", offsetof(HbPlantState, attitude), HB_NESTED, &HB_QUATERNION, 0, 0 },
-  { "angular_velocity", "Angular velocity of the body against the world.", "rad/s", "body", offsetof(HbPlantState, angular_velocity), HB_NESTED, &HB_VECTOR3, 0, 0 },
-  { "specific_force", "Specific force at the centre of mass: what an ideal accelerometer there reads.", "m/s^2", "body", offsetof(HbPlantState, specific_force), HB_NESTED, &HB_VECTOR3, 0, 0 },
-  { "rotor_speed", "Rotor speeds, in the order of the vehicle file.", "rad/s", "", offsetof(HbPlantState, rotor_speed), HB_F64, NULL, 0, 12 },
+  { "stamp", "Simulation time.", "", "", offsetof(HbPlantState, stamp), HB_NESTED, &HB_TIME, 0, 0, 0 },
+  { "position", "Position of the centre of mass.", "m", "world", offsetof(HbPlantState, position), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
+  { "velocity", "Velocity of the centre of mass.", "m/s", "world", offsetof(HbPlantState, velocity), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
+  { "attitude", "Attitude, body to world.", "", "world", offsetof(HbPlantState, attitude), HB_NESTED, &HB_QUATERNION, 0, 0, 0 },
+  { "angular_velocity", "Angular velocity of the body against the world.", "rad/s", "body", offsetof(HbPlantState, angular_velocity), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
+  { "specific_force", "Specific force at the centre of mass: what an ideal accelerometer there reads.", "m/s^2", "body", offsetof(HbPlantState, specific_force), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
+  { "rotor_speed", "Rotor speeds, in the order of the vehicle file.", "rad/s", "", offsetof(HbPlantState, rotor_speed), HB_F64, NULL, 0, 0, 12 },
 };
 
 static const HbMessage HB_PLANT_STATE = { "hummingbus_msgs/msg/PlantState", "The true state of a vehicle and its rotors. Sensors and recorders read it; estimators do not.", sizeof(HbPlantState), HB_PLANT_STATE_FIELDS, 7 };
@@ -536,11 +536,11 @@ typedef struct HbRanges {
 } HbRanges;
 
 static const HbField HB_RANGES_FIELDS[] = {
-  { "stamp", "Simulation time of sending.", "", "", offsetof(HbRanges, stamp), HB_NESTED, &HB_TIME, 0, 0 },
-  { "measured_ns", "Simulation time at which it was measured.", "ns", "", offsetof(HbRanges, measured_ns), HB_U64, NULL, 0, 0 },
-  { "distance", "Distances; the sensor's reach where nothing is met.", "m", "body", offsetof(HbRanges, distance), HB_F64, NULL, 5, 0 },
-  { "valid", "1 for each beam that measured something, 0 where it met nothing within reach or was lost.", "1", "", offsetof(HbRanges, valid), HB_U32, NULL, 5, 0 },
-  { "pad0", "Zero.", "", "", offsetof(HbRanges, pad0), HB_U32, NULL, 0, 0 },
+  { "stamp", "Simulation time of sending.", "", "", offsetof(HbRanges, stamp), HB_NESTED, &HB_TIME, 0, 0, 0 },
+  { "measured_ns", "Simulation time at which it was measured.", "ns", "", offsetof(HbRanges, measured_ns), HB_U64, NULL, 0, 0, 0 },
+  { "distance", "Distances; the sensor's reach where nothing is met.", "m", "body", offsetof(HbRanges, distance), HB_F64, NULL, 5, 0, 0 },
+  { "valid", "1 for each beam that measured something, 0 where it met nothing within reach or was lost.", "1", "", offsetof(HbRanges, valid), HB_U32, NULL, 5, 0, 0 },
+  { "pad0", "Zero.", "", "", offsetof(HbRanges, pad0), HB_U32, NULL, 0, 0, 0 },
 };
 
 static const HbMessage HB_RANGES = { "hummingbus_msgs/msg/Ranges", "What five range finders report, in the order +x, -x, +y, -y of the body, and down.", sizeof(HbRanges), HB_RANGES_FIELDS, 5 };
@@ -566,14 +566,14 @@ typedef struct HbReference {
 } HbReference;
 
 static const HbField HB_REFERENCE_FIELDS[] = {
-  { "stamp", "Simulation time.", "", "", offsetof(HbReference, stamp), HB_NESTED, &HB_TIME, 0, 0 },
-  { "position", "Position.", "m", "world", offsetof(HbReference, position), HB_NESTED, &HB_VECTOR3, 0, 0 },
-  { "velocity", "Velocity.", "m/s", "world", offsetof(HbReference, velocity), HB_NESTED, &HB_VECTOR3, 0, 0 },
-  { "acceleration", "Acceleration.", "m/s^2", "world", offsetof(HbReference, acceleration), HB_NESTED, &HB_VECTOR3, 0, 0 },
-  { "jerk", "Jerk.", "m/s^3", "world", offsetof(HbReference, jerk), HB_NESTED, &HB_VECTOR3, 0, 0 },
-  { "snap", "Snap.", "m/s^4", "world", offsetof(HbReference, snap), HB_NESTED, &HB_VECTOR3, 0, 0 },
-  { "yaw", "Yaw.", "rad", "world", offsetof(HbReference, yaw), HB_F64, NULL, 0, 0 },
-  { "yaw_rate", "Its rate of change.", "rad/s", "world", offsetof(HbReference, yaw_rate), HB_F64, NULL, 0, 0 },
+  { "stamp", "Simulation time.", "", "", offsetof(HbReference, stamp), HB_NESTED, &HB_TIME, 0, 0, 0 },
+  { "position", "Position.", "m", "world", offsetof(HbReference, position), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
+  { "velocity", "Velocity.", "m/s", "world", offsetof(HbReference, velocity), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
+  { "acceleration", "Acceleration.", "m/s^2", "world", offsetof(HbReference, acceleration), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
+  { "jerk", "Jerk.", "m/s^3", "world", offsetof(HbReference, jerk), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
+  { "snap", "Snap.", "m/s^4", "world", offsetof(HbReference, snap), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
+  { "yaw", "Yaw.", "rad", "world", offsetof(HbReference, yaw), HB_F64, NULL, 0, 0, 0 },
+  { "yaw_rate", "Its rate of change.", "rad/s", "world", offsetof(HbReference, yaw_rate), HB_F64, NULL, 0, 0, 0 },
 };
 
 static const HbMessage HB_REFERENCE = { "hummingbus_msgs/msg/Reference", "A point of a trajectory.", sizeof(HbReference), HB_REFERENCE_FIELDS, 8 };
@@ -595,12 +595,12 @@ typedef struct HbRotorLoad {
 } HbRotorLoad;
 
 static const HbField HB_ROTOR_LOAD_FIELDS[] = {
-  { "stamp", "Simulation time.", "", "", offsetof(HbRotorLoad, stamp), HB_NESTED, &HB_TIME, 0, 0 },
-  { "rotor_speed_commanded", "The speed that the motor is asked for.", "rad/s", "", offsetof(HbRotorLoad, rotor_speed_commanded), HB_F64, NULL, 0, 0 },
-  { "rotor_speed", "Speed of the rotor, positive in its own sense of rotation.", "rad/s", "", offsetof(HbRotorLoad, rotor_speed), HB_F64, NULL, 0, 0 },
-  { "thrust", "Thrust along the rotor's axis.", "N", "", offsetof(HbRotorLoad, thrust), HB_F64, NULL, 0, 0 },
-  { "drag_torque", "Torque of the air on the rotor, against its rotation.", "N*m", "", offsetof(HbRotorLoad, drag_torque), HB_F64, NULL, 0, 0 },
-  { "mount_torque", "Torque on what the motor is bolted to, about the axis that points up: the air's drag and what speeds the rotor up.", "N*m", "body", offsetof(HbRotorLoad, mount_torque), HB_F64, NULL, 0, 0 },
+  { "stamp", "Simulation time.", "", "", offsetof(HbRotorLoad, stamp), HB_NESTED, &HB_TIME, 0, 0, 0 },
+  { "rotor_speed_commanded", "The speed that the motor is asked for.", "rad/s", "", offsetof(HbRotorLoad, rotor_speed_commanded), HB_F64, NULL, 0, 0, 0 },
+  { "rotor_speed", "Speed of the rotor, positive in its own sense of rotation.", "rad/s", "", offsetof(HbRotorLoad, rotor_speed), HB_F64, NULL, 0, 0, 0 },
+  { "thrust", "Thrust along the rotor's axis.", "N", "", offsetof(HbRotorLoad, thrust), HB_F64, NULL, 0, 0, 0 },
+  { "drag_torque", "Torque of the air on the rotor, against its rotation.", "N*m", "", offsetof(HbRotorLoad, drag_torque), HB_F64, NULL, 0, 0, 0 },
+  { "mount_torque", "Torque on what the motor is bolted to, about the axis that points up: the air's drag and what speeds the rotor up.", "N*m", "body", offsetof(HbRotorLoad, mount_torque), HB_F64, NULL, 0, 0, 0 },
 };
 
 static const HbMessage HB_ROTOR_LOAD = { "hummingbus_msgs/msg/RotorLoad", "What the stand's sensors read.", sizeof(HbRotorLoad), HB_ROTOR_LOAD_FIELDS, 6 };
@@ -620,11 +620,11 @@ typedef struct HbRotorSpeeds {
 } HbRotorSpeeds;
 
 static const HbField HB_ROTOR_SPEEDS_FIELDS[] = {
-  { "stamp", "Simulation time of sending.", "", "", offsetof(HbRotorSpeeds, stamp), HB_NESTED, &HB_TIME, 0, 0 },
-  { "measured_ns", "Simulation time at which it was measured.", "ns", "", offsetof(HbRotorSpeeds, measured_ns), HB_U64, NULL, 0, 0 },
-  { "valid", "1 if this sample holds a measurement, 0 if it was lost.", "1", "", offsetof(HbRotorSpeeds, valid), HB_U32, NULL, 0, 0 },
-  { "pad0", "Zero.", "", "", offsetof(HbRotorSpeeds, pad0), HB_U32, NULL, 0, 0 },
-  { "rotor_speed", "Speeds of the rotors, in the order of the vehicle file.", "rad/s", "", offsetof(HbRotorSpeeds, rotor_speed), HB_F64, NULL, 0, 12 },
+  { "stamp", "Simulation time of sending.", "", "", offsetof(HbRotorSpeeds, stamp), HB_NESTED, &HB_TIME, 0, 0, 0 },
+  { "measured_ns", "Simulation time at which it was measured.", "ns", "", offsetof(HbRotorSpeeds, measured_ns), HB_U64, NULL, 0, 0, 0 },
+  { "valid", "1 if this sample holds a measurement, 0 if it was lost.", "1", "", offsetof(HbRotorSpeeds, valid), HB_U32, NULL, 0, 0, 0 },
+  { "pad0", "Zero.", "", "", offsetof(HbRotorSpeeds, pad0), HB_U32, NULL, 0, 0, 0 },
+  { "rotor_speed", "Speeds of the rotors, in the order of the vehicle file.", "rad/s", "", offsetof(HbRotorSpeeds, rotor_speed), HB_F64, NULL, 0, 0, 12 },
 };
 
 static const HbMessage HB_ROTOR_SPEEDS = { "hummingbus_msgs/msg/RotorSpeeds", "What the controllers of the motors report.", sizeof(HbRotorSpeeds), HB_ROTOR_SPEEDS_FIELDS, 5 };
@@ -644,11 +644,11 @@ typedef struct HbSetPoint {
 } HbSetPoint;
 
 static const HbField HB_SET_POINT_FIELDS[] = {
-  { "stamp", "Simulation time.", "", "", offsetof(HbSetPoint, stamp), HB_NESTED, &HB_TIME, 0, 0 },
-  { "altitude", "Altitude of the centre of mass.", "m", "world", offsetof(HbSetPoint, altitude), HB_F64, NULL, 0, 0 },
-  { "roll", "Roll.", "rad", "world", offsetof(HbSetPoint, roll), HB_F64, NULL, 0, 0 },
-  { "pitch", "Pitch, positive nose down.", "rad", "world", offsetof(HbSetPoint, pitch), HB_F64, NULL, 0, 0 },
-  { "yaw", "Yaw.", "rad", "world", offsetof(HbSetPoint, yaw), HB_F64, NULL, 0, 0 },
+  { "stamp", "Simulation time.", "", "", offsetof(HbSetPoint, stamp), HB_NESTED, &HB_TIME, 0, 0, 0 },
+  { "altitude", "Altitude of the centre of mass.", "m", "world", offsetof(HbSetPoint, altitude), HB_F64, NULL, 0, 0, 0 },
+  { "roll", "Roll.", "rad", "world", offsetof(HbSetPoint, roll), HB_F64, NULL, 0, 0, 0 },
+  { "pitch", "Pitch, positive nose down.", "rad", "world", offsetof(HbSetPoint, pitch), HB_F64, NULL, 0, 0, 0 },
+  { "yaw", "Yaw.", "rad", "world", offsetof(HbSetPoint, yaw), HB_F64, NULL, 0, 0, 0 },
 };
 
 static const HbMessage HB_SET_POINT = { "hummingbus_msgs/msg/SetPoint", "What a pilot or a planner asks of the controller.", sizeof(HbSetPoint), HB_SET_POINT_FIELDS, 5 };
@@ -674,14 +674,14 @@ typedef struct HbStateEstimate {
 } HbStateEstimate;
 
 static const HbField HB_STATE_ESTIMATE_FIELDS[] = {
-  { "stamp", "Simulation time.", "", "", offsetof(HbStateEstimate, stamp), HB_NESTED, &HB_TIME, 0, 0 },
-  { "position", "Position of the centre of mass.", "m", "world", offsetof(HbStateEstimate, position), HB_NESTED, &HB_VECTOR3, 0, 0 },
-  { "velocity", "Velocity of the centre of mass.", "m/s", "world", offsetof(HbStateEstimate, velocity), HB_NESTED, &HB_VECTOR3, 0, 0 },
-  { "attitude", "Attitude, body to world.", "", "world", offsetof(HbStateEstimate, attitude), HB_NESTED, &HB_QUATERNION, 0, 0 },
-  { "angular_velocity", "Angular velocity, the gyroscope's estimated bias taken off.", "rad/s", "body", offsetof(HbStateEstimate, angular_velocity), HB_NESTED, &HB_VECTOR3, 0, 0 },
-  { "position_sigma", "Standard deviation of the position as the estimator believes it.", "m", "world", offsetof(HbStateEstimate, position_sigma), HB_NESTED, &HB_VECTOR3, 0, 0 },
-  { "velocity_sigma", "Standard deviation of the velocity.", "m/s", "world", offsetof(HbStateEstimate, velocity_sigma), HB_NESTED, &HB_VECTOR3, 0, 0 },
-  { "attitude_sigma", "Standard deviation of the attitude, as a rotation vector.", "rad", "body", offsetof(HbStateEstimate, attitude_sigma), HB_NESTED, &HB_VECTOR3, 0, 0 },
+  { "stamp", "Simulation time.", "", "", offsetof(HbStateEstimate, stamp), HB_NESTED, &HB_TIME, 0, 0, 0 },
+  { "position", "Position of the centre of mass.", "m", "world", offsetof(HbStateEstimate, position), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
+  { "velocity", "Velocity of the centre of mass.", "m/s", "world", offsetof(HbStateEstimate, velocity), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
+  { "attitude", "Attitude, body to world.", "", "world", offsetof(HbStateEstimate, attitude), HB_NESTED, &HB_QUATERNION, 0, 0, 0 },
+  { "angular_velocity", "Angular velocity, the gyroscope's estimated bias taken off.", "rad/s", "body", offsetof(HbStateEstimate, angular_velocity), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
+  { "position_sigma", "Standard deviation of the position as the estimator believes it.", "m", "world", offsetof(HbStateEstimate, position_sigma), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
+  { "velocity_sigma", "Standard deviation of the velocity.", "m/s", "world", offsetof(HbStateEstimate, velocity_sigma), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
+  { "attitude_sigma", "Standard deviation of the attitude, as a rotation vector.", "rad", "body", offsetof(HbStateEstimate, attitude_sigma), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
 };
 
 static const HbMessage HB_STATE_ESTIMATE = { "hummingbus_msgs/msg/StateEstimate", "What an estimator believes of the vehicle's motion.", sizeof(HbStateEstimate), HB_STATE_ESTIMATE_FIELDS, 8 };
@@ -701,11 +701,11 @@ typedef struct HbTraffic {
 } HbTraffic;
 
 static const HbField HB_TRAFFIC_FIELDS[] = {
-  { "stamp", "Simulation time.", "", "", offsetof(HbTraffic, stamp), HB_NESTED, &HB_TIME, 0, 0 },
-  { "count", "How many vehicles there are.", "1", "", offsetof(HbTraffic, count), HB_U32, NULL, 0, 0 },
-  { "pad0", "Zero.", "", "", offsetof(HbTraffic, pad0), HB_U32, NULL, 0, 0 },
-  { "position", "Positions of their centres of mass, in the order of the inputs' names.", "m", "world", offsetof(HbTraffic, position), HB_NESTED, &HB_VECTOR3, 32, 0 },
-  { "velocity", "Their velocities.", "m/s", "world", offsetof(HbTraffic, velocity), HB_NESTED, &HB_VECTOR3, 32, 0 },
+  { "stamp", "Simulation time.", "", "", offsetof(HbTraffic, stamp), HB_NESTED, &HB_TIME, 0, 0, 0 },
+  { "count", "How many vehicles there are.", "1", "", offsetof(HbTraffic, count), HB_U32, NULL, 0, 0, 0 },
+  { "pad0", "Zero.", "", "", offsetof(HbTraffic, pad0), HB_U32, NULL, 0, 0, 0 },
+  { "position", "Positions of their centres of mass, in the order of the inputs' names.", "m", "world", offsetof(HbTraffic, position), HB_NESTED, &HB_VECTOR3, 32, 0, 0 },
+  { "velocity", "Their velocities.", "m/s", "world", offsetof(HbTraffic, velocity), HB_NESTED, &HB_VECTOR3, 32, 0, 0 },
 };
 
 static const HbMessage HB_TRAFFIC = { "hummingbus_msgs/msg/Traffic", "Where the vehicles of a run are, for those that share a room.", sizeof(HbTraffic), HB_TRAFFIC_FIELDS, 5 };
@@ -727,12 +727,12 @@ typedef struct HbWallEstimate {
 } HbWallEstimate;
 
 static const HbField HB_WALL_ESTIMATE_FIELDS[] = {
-  { "stamp", "Simulation time.", "", "", offsetof(HbWallEstimate, stamp), HB_NESTED, &HB_TIME, 0, 0 },
-  { "distance", "Level distances along the heading's +x, -x, +y, -y; the sensor's reach where nothing is in sight.", "m", "", offsetof(HbWallEstimate, distance), HB_F64, NULL, 4, 0 },
-  { "in_sight", "1 where a wall is in sight.", "1", "", offsetof(HbWallEstimate, in_sight), HB_U32, NULL, 4, 0 },
-  { "velocity", "Velocity along the heading's x and y: level axes that turn with the yaw.", "m/s", "", offsetof(HbWallEstimate, velocity), HB_F64, NULL, 2, 0 },
-  { "height", "Height above what is below.", "m", "", offsetof(HbWallEstimate, height), HB_F64, NULL, 0, 0 },
-  { "climb_rate", "Rate of climb.", "m/s", "", offsetof(HbWallEstimate, climb_rate), HB_F64, NULL, 0, 0 },
+  { "stamp", "Simulation time.", "", "", offsetof(HbWallEstimate, stamp), HB_NESTED, &HB_TIME, 0, 0, 0 },
+  { "distance", "Level distances along the heading's +x, -x, +y, -y; the sensor's reach where nothing is in sight.", "m", "", offsetof(HbWallEstimate, distance), HB_F64, NULL, 4, 0, 0 },
+  { "in_sight", "1 where a wall is in sight.", "1", "", offsetof(HbWallEstimate, in_sight), HB_U32, NULL, 4, 0, 0 },
+  { "velocity", "Velocity along the heading's x and y: level axes that turn with the yaw.", "m/s", "", offsetof(HbWallEstimate, velocity), HB_F64, NULL, 2, 0, 0 },
+  { "height", "Height above what is below.", "m", "", offsetof(HbWallEstimate, height), HB_F64, NULL, 0, 0, 0 },
+  { "climb_rate", "Rate of climb.", "m/s", "", offsetof(HbWallEstimate, climb_rate), HB_F64, NULL, 0, 0, 0 },
 };
 
 static const HbMessage HB_WALL_ESTIMATE = { "hummingbus_msgs/msg/WallEstimate", "What an estimator makes of range finders: level distances to what stands around.", sizeof(HbWallEstimate), HB_WALL_ESTIMATE_FIELDS, 6 };
@@ -758,14 +758,14 @@ typedef struct HbChannelState {
 } HbChannelState;
 
 static const HbField HB_CHANNEL_STATE_FIELDS[] = {
-  { "next_ns", "Simulation time from which on the next measurement is due.", "ns", "", offsetof(HbChannelState, next_ns), HB_U64, NULL, 0, 0 },
-  { "measured", "Measurements so far; number n is at place n modulo the length of the queue.", "1", "", offsetof(HbChannelState, measured), HB_U64, NULL, 0, 0 },
-  { "arrived", "How many of them have arrived.", "1", "", offsetof(HbChannelState, arrived), HB_U64, NULL, 0, 0 },
-  { "arrival_ns", "When those in the queue arrive.", "ns", "", offsetof(HbChannelState, arrival_ns), HB_U64, NULL, 32, 0 },
-  { "noise_words", "Words of 32 bits drawn from the noise stream: the low and the high half of the count.", "1", "", offsetof(HbChannelState, noise_words), HB_U64, NULL, 2, 0 },
-  { "loss_words", "The same of the stream of losses.", "1", "", offsetof(HbChannelState, loss_words), HB_U64, NULL, 2, 0 },
-  { "lost", "Which parts of the last measurement were lost, a bit for each.", "1", "", offsetof(HbChannelState, lost), HB_U32, NULL, 0, 0 },
-  { "pad0", "Zero.", "", "", offsetof(HbChannelState, pad0), HB_U32, NULL, 0, 0 },
+  { "next_ns", "Simulation time from which on the next measurement is due.", "ns", "", offsetof(HbChannelState, next_ns), HB_U64, NULL, 0, 0, 0 },
+  { "measured", "Measurements so far; number n is at place n modulo the length of the queue.", "1", "", offsetof(HbChannelState, measured), HB_U64, NULL, 0, 0, 0 },
+  { "arrived", "How many of them have arrived.", "1", "", offsetof(HbChannelState, arrived), HB_U64, NULL, 0, 0, 0 },
+  { "arrival_ns", "When those in the queue arrive.", "ns", "", offsetof(HbChannelState, arrival_ns), HB_U64, NULL, 32, 0, 0 },
+  { "noise_words", "Words of 32 bits drawn from the noise stream: the low and the high half of the count.", "1", "", offsetof(HbChannelState, noise_words), HB_U64, NULL, 2, 0, 0 },
+  { "loss_words", "The same of the stream of losses.", "1", "", offsetof(HbChannelState, loss_words), HB_U64, NULL, 2, 0, 0 },
+  { "lost", "Which parts of the last measurement were lost, a bit for each.", "1", "", offsetof(HbChannelState, lost), HB_U32, NULL, 0, 0, 0 },
+  { "pad0", "Zero.", "", "", offsetof(HbChannelState, pad0), HB_U32, NULL, 0, 0, 0 },
 };
 
 static const HbMessage HB_CHANNEL_STATE = { "hummingbus_msgs/msg/ChannelState", "What is remembered of a channel from tick to tick, beside the queue of measurements.", sizeof(HbChannelState), HB_CHANNEL_STATE_FIELDS, 8 };
@@ -781,9 +781,9 @@ typedef struct HbBarometerState {
 } HbBarometerState;
 
 static const HbField HB_BAROMETER_STATE_FIELDS[] = {
-  { "channel", "What is under way.", "", "", offsetof(HbBarometerState, channel), HB_NESTED, &HB_CHANNEL_STATE, 0, 0 },
-  { "queue", "The last measurements.", "", "", offsetof(HbBarometerState, queue), HB_NESTED, &HB_BAROMETER, 32, 0 },
-  { "bias", "The bias at the next measurement.", "Pa", "", offsetof(HbBarometerState, bias), HB_F64, NULL, 0, 0 },
+  { "channel", "What is under way.", "", "", offsetof(HbBarometerState, channel), HB_NESTED, &HB_CHANNEL_STATE, 0, 0, 0 },
+  { "queue", "The last measurements.", "", "", offsetof(HbBarometerState, queue), HB_NESTED, &HB_BAROMETER, 32, 0, 0 },
+  { "bias", "The bias at the next measurement.", "Pa", "", offsetof(HbBarometerState, bias), HB_F64, NULL, 0, 0, 0 },
 };
 
 static const HbMessage HB_BAROMETER_STATE = { "hummingbus_msgs/msg/BarometerState", "All that the sensor remembers.", sizeof(HbBarometerState), HB_BAROMETER_STATE_FIELDS, 3 };
@@ -801,10 +801,10 @@ typedef struct HbBatteryMonitorState {
 } HbBatteryMonitorState;
 
 static const HbField HB_BATTERY_MONITOR_STATE_FIELDS[] = {
-  { "channel", "What is under way.", "", "", offsetof(HbBatteryMonitorState, channel), HB_NESTED, &HB_CHANNEL_STATE, 0, 0 },
-  { "queue", "The last measurements.", "", "", offsetof(HbBatteryMonitorState, queue), HB_NESTED, &HB_BATTERY, 32, 0 },
-  { "charge", "The charge that is left.", "1", "", offsetof(HbBatteryMonitorState, charge), HB_F64, NULL, 0, 0 },
-  { "counted_ns", "Until when it is counted; the end of time before the first measurement.", "ns", "", offsetof(HbBatteryMonitorState, counted_ns), HB_U64, NULL, 0, 0 },
+  { "channel", "What is under way.", "", "", offsetof(HbBatteryMonitorState, channel), HB_NESTED, &HB_CHANNEL_STATE, 0, 0, 0 },
+  { "queue", "The last measurements.", "", "", offsetof(HbBatteryMonitorState, queue), HB_NESTED, &HB_BATTERY, 32, 0, 0 },
+  { "charge", "The charge that is left.", "1", "", offsetof(HbBatteryMonitorState, charge), HB_F64, NULL, 0, 0, 0 },
+  { "counted_ns", "Until when it is counted; the end of time before the first measurement.", "ns", "", offsetof(HbBatteryMonitorState, counted_ns), HB_U64, NULL, 0, 0, 0 },
 };
 
 static const HbMessage HB_BATTERY_MONITOR_STATE = { "hummingbus_msgs/msg/BatteryMonitorState", "All that the sensor remembers.", sizeof(HbBatteryMonitorState), HB_BATTERY_MONITOR_STATE_FIELDS, 4 };
@@ -818,8 +818,8 @@ typedef struct HbClearanceState {
 } HbClearanceState;
 
 static const HbField HB_CLEARANCE_STATE_FIELDS[] = {
-  { "bearing", "Bearing of the vehicle from the world's origin at the last tick; not a number before the first.", "rad", "world", offsetof(HbClearanceState, bearing), HB_F64, NULL, 0, 0 },
-  { "laps", "Turns flown clockwise.", "1", "", offsetof(HbClearanceState, laps), HB_F64, NULL, 0, 0 },
+  { "bearing", "Bearing of the vehicle from the world's origin at the last tick; not a number before the first.", "rad", "world", offsetof(HbClearanceState, bearing), HB_F64, NULL, 0, 0, 0 },
+  { "laps", "Turns flown clockwise.", "1", "", offsetof(HbClearanceState, laps), HB_F64, NULL, 0, 0, 0 },
 };
 
 static const HbMessage HB_CLEARANCE_STATE = { "hummingbus_msgs/msg/ClearanceState", "All that the component remembers.", sizeof(HbClearanceState), HB_CLEARANCE_STATE_FIELDS, 2 };
@@ -833,8 +833,8 @@ typedef struct HbComplementaryState {
 } HbComplementaryState;
 
 static const HbField HB_COMPLEMENTARY_STATE_FIELDS[] = {
-  { "attitude", "The estimated attitude at the last sample, body to world.", "", "world", offsetof(HbComplementaryState, attitude), HB_NESTED, &HB_QUATERNION, 0, 0 },
-  { "last_angular_velocity", "The last sample's angular rate; not a number before the first.", "rad/s", "body", offsetof(HbComplementaryState, last_angular_velocity), HB_NESTED, &HB_VECTOR3, 0, 0 },
+  { "attitude", "The estimated attitude at the last sample, body to world.", "", "world", offsetof(HbComplementaryState, attitude), HB_NESTED, &HB_QUATERNION, 0, 0, 0 },
+  { "last_angular_velocity", "The last sample's angular rate; not a number before the first.", "rad/s", "body", offsetof(HbComplementaryState, last_angular_velocity), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
 };
 
 static const HbMessage HB_COMPLEMENTARY_STATE = { "hummingbus_msgs/msg/ComplementaryState", "What the filter knows between two samples.", sizeof(HbComplementaryState), HB_COMPLEMENTARY_STATE_FIELDS, 2 };
@@ -848,8 +848,8 @@ typedef struct HbLawId {
 } HbLawId;
 
 static const HbField HB_LAW_ID_FIELDS[] = {
-  { "name", "The law's name, zeros behind.", "1", "", offsetof(HbLawId, name), HB_U8, NULL, 24, 0 },
-  { "state", "Layout hash of its state.", "1", "", offsetof(HbLawId, state), HB_U64, NULL, 0, 0 },
+  { "name", "The law's name, zeros behind.", "1", "", offsetof(HbLawId, name), HB_U8, NULL, 24, 0, 0 },
+  { "state", "Layout hash of its state.", "1", "", offsetof(HbLawId, state), HB_U64, NULL, 0, 0, 0 },
 };
 
 static const HbMessage HB_LAW_ID = { "hummingbus_msgs/msg/LawId", "Which law a state belongs to; zero before the first tick.", sizeof(HbLawId), HB_LAW_ID_FIELDS, 2 };
@@ -863,8 +863,8 @@ typedef struct HbControlIntegrals {
 } HbControlIntegrals;
 
 static const HbField HB_CONTROL_INTEGRALS_FIELDS[] = {
-  { "lift", "Vertical acceleration.", "m/s^2", "world", offsetof(HbControlIntegrals, lift), HB_F64, NULL, 0, 0 },
-  { "turn", "Angular accelerations for roll, pitch and yaw; zero under `lqr` and `geometric`, which observe a lift alone.", "rad/s^2", "body", offsetof(HbControlIntegrals, turn), HB_F64, NULL, 3, 0 },
+  { "lift", "Vertical acceleration.", "m/s^2", "world", offsetof(HbControlIntegrals, lift), HB_F64, NULL, 0, 0, 0 },
+  { "turn", "Angular accelerations for roll, pitch and yaw; zero under `lqr` and `geometric`, which observe a lift alone.", "rad/s^2", "body", offsetof(HbControlIntegrals, turn), HB_F64, NULL, 3, 0, 0 },
 };
 
 static const HbMessage HB_CONTROL_INTEGRALS = { "hummingbus_msgs/msg/ControlIntegrals", "What the integrators of a law ask for, in units that mean the same to all laws.", sizeof(HbControlIntegrals), HB_CONTROL_INTEGRALS_FIELDS, 2 };
@@ -888,13 +888,13 @@ typedef struct HbControllerState {
 } HbControllerState;
 
 static const HbField HB_CONTROLLER_STATE_FIELDS[] = {
-  { "id", "The law that left it.", "", "", offsetof(HbControllerState, id), HB_NESTED, &HB_LAW_ID, 0, 0 },
-  { "thrust", "Thrust that was demanded last.", "N", "body", offsetof(HbControllerState, thrust), HB_F64, NULL, 0, 0 },
-  { "torque", "Torque that was demanded last.", "N*m", "body", offsetof(HbControllerState, torque), HB_F64, NULL, 3, 0 },
-  { "integrals", "What the law's integrators ask for.", "", "", offsetof(HbControllerState, integrals), HB_NESTED, &HB_CONTROL_INTEGRALS, 0, 0 },
-  { "residual_thrust", "What is left of the predecessor's thrust that this law does not ask for itself.", "N", "body", offsetof(HbControllerState, residual_thrust), HB_F64, NULL, 0, 0 },
-  { "residual_torque", "The same of its torque.", "N*m", "body", offsetof(HbControllerState, residual_torque), HB_F64, NULL, 3, 0 },
-  { "law_state", "The law's own state in the first words.", "1", "", offsetof(HbControllerState, law_state), HB_U64, NULL, 32, 0 },
+  { "id", "The law that left it.", "", "", offsetof(HbControllerState, id), HB_NESTED, &HB_LAW_ID, 0, 0, 0 },
+  { "thrust", "Thrust that was demanded last.", "N", "body", offsetof(HbControllerState, thrust), HB_F64, NULL, 0, 0, 0 },
+  { "torque", "Torque that was demanded last.", "N*m", "body", offsetof(HbControllerState, torque), HB_F64, NULL, 3, 0, 0 },
+  { "integrals", "What the law's integrators ask for.", "", "", offsetof(HbControllerState, integrals), HB_NESTED, &HB_CONTROL_INTEGRALS, 0, 0, 0 },
+  { "residual_thrust", "What is left of the predecessor's thrust that this law does not ask for itself.", "N", "body", offsetof(HbControllerState, residual_thrust), HB_F64, NULL, 0, 0, 0 },
+  { "residual_torque", "The same of its torque.", "N*m", "body", offsetof(HbControllerState, residual_torque), HB_F64, NULL, 3, 0, 0 },
+  { "law_state", "The law's own state in the first words.", "1", "", offsetof(HbControllerState, law_state), HB_U64, NULL, 32, 0, 0 },
 };
 
 static const HbMessage HB_CONTROLLER_STATE = { "hummingbus_msgs/msg/ControllerState", "All that a controller remembers between ticks.", sizeof(HbControllerState), HB_CONTROLLER_STATE_FIELDS, 7 };
@@ -910,9 +910,9 @@ typedef struct HbGpsState {
 } HbGpsState;
 
 static const HbField HB_GPS_STATE_FIELDS[] = {
-  { "channel", "What is under way.", "", "", offsetof(HbGpsState, channel), HB_NESTED, &HB_CHANNEL_STATE, 0, 0 },
-  { "queue", "The last measurements.", "", "", offsetof(HbGpsState, queue), HB_NESTED, &HB_GPS, 32, 0 },
-  { "drift", "The drift at the last measurement; not a number before the first.", "m", "world", offsetof(HbGpsState, drift), HB_NESTED, &HB_VECTOR3, 0, 0 },
+  { "channel", "What is under way.", "", "", offsetof(HbGpsState, channel), HB_NESTED, &HB_CHANNEL_STATE, 0, 0, 0 },
+  { "queue", "The last measurements.", "", "", offsetof(HbGpsState, queue), HB_NESTED, &HB_GPS, 32, 0, 0 },
+  { "drift", "The drift at the last measurement; not a number before the first.", "m", "world", offsetof(HbGpsState, drift), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
 };
 
 static const HbMessage HB_GPS_STATE = { "hummingbus_msgs/msg/GpsState", "All that the sensor remembers.", sizeof(HbGpsState), HB_GPS_STATE_FIELDS, 3 };
@@ -942,16 +942,16 @@ typedef struct HbImuState {
 } HbImuState;
 
 static const HbField HB_IMU_STATE_FIELDS[] = {
-  { "accelerometer_bias", "The accelerometer's bias at the next reading.", "m/s^2", "body", offsetof(HbImuState, accelerometer_bias), HB_NESTED, &HB_VECTOR3, 0, 0 },
-  { "gyroscope_bias", "The gyroscope's bias at the next reading.", "rad/s", "body", offsetof(HbImuState, gyroscope_bias), HB_NESTED, &HB_VECTOR3, 0, 0 },
-  { "random_words", "Words of 32 bits drawn from the random stream: the low and the high half of the count.", "1", "", offsetof(HbImuState, random_words), HB_U64, NULL, 2, 0 },
-  { "readings", "Readings so far.", "1", "", offsetof(HbImuState, readings), HB_U64, NULL, 0, 0 },
-  { "rotor_angles", "The angle of each rotor, from where it started.", "rad", "", offsetof(HbImuState, rotor_angles), HB_F64, NULL, 12, 0 },
-  { "last_angular_velocity", "The true angular velocity at the last reading.", "rad/s", "body", offsetof(HbImuState, last_angular_velocity), HB_NESTED, &HB_VECTOR3, 0, 0 },
-  { "filtered_specific_force", "What has come through the accelerometer's low pass.", "m/s^2", "body", offsetof(HbImuState, filtered_specific_force), HB_NESTED, &HB_VECTOR3, 0, 0 },
-  { "filtered_angular_velocity", "What has come through the gyroscope's low pass.", "rad/s", "body", offsetof(HbImuState, filtered_angular_velocity), HB_NESTED, &HB_VECTOR3, 0, 0 },
-  { "channel", "What is under way.", "", "", offsetof(HbImuState, channel), HB_NESTED, &HB_CHANNEL_STATE, 0, 0 },
-  { "queue", "The last readings.", "", "", offsetof(HbImuState, queue), HB_NESTED, &HB_IMU, 32, 0 },
+  { "accelerometer_bias", "The accelerometer's bias at the next reading.", "m/s^2", "body", offsetof(HbImuState, accelerometer_bias), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
+  { "gyroscope_bias", "The gyroscope's bias at the next reading.", "rad/s", "body", offsetof(HbImuState, gyroscope_bias), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
+  { "random_words", "Words of 32 bits drawn from the random stream: the low and the high half of the count.", "1", "", offsetof(HbImuState, random_words), HB_U64, NULL, 2, 0, 0 },
+  { "readings", "Readings so far.", "1", "", offsetof(HbImuState, readings), HB_U64, NULL, 0, 0, 0 },
+  { "rotor_angles", "The angle of each rotor, from where it started.", "rad", "", offsetof(HbImuState, rotor_angles), HB_F64, NULL, 12, 0, 0 },
+  { "last_angular_velocity", "The true angular velocity at the last reading.", "rad/s", "body", offsetof(HbImuState, last_angular_velocity), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
+  { "filtered_specific_force", "What has come through the accelerometer's low pass.", "m/s^2", "body", offsetof(HbImuState, filtered_specific_force), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
+  { "filtered_angular_velocity", "What has come through the gyroscope's low pass.", "rad/s", "body", offsetof(HbImuState, filtered_angular_velocity), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
+  { "channel", "What is under way.", "", "", offsetof(HbImuState, channel), HB_NESTED, &HB_CHANNEL_STATE, 0, 0, 0 },
+  { "queue", "The last readings.", "", "", offsetof(HbImuState, queue), HB_NESTED, &HB_IMU, 32, 0, 0 },
 };
 
 static const HbMessage HB_IMU_STATE = { "hummingbus_msgs/msg/ImuState", "All that the IMU remembers: its biases, how far its random stream was drawn, and the readings under way.", sizeof(HbImuState), HB_IMU_STATE_FIELDS, 10 };
@@ -977,14 +977,14 @@ typedef struct HbLinkPacket {
 } HbLinkPacket;
 
 static const HbField HB_LINK_PACKET_FIELDS[] = {
-  { "number", "Its place among those that were queued.", "1", "", offsetof(HbLinkPacket, number), HB_U64, NULL, 0, 0 },
-  { "queued_ns", "When it was queued.", "ns", "", offsetof(HbLinkPacket, queued_ns), HB_U64, NULL, 0, 0 },
-  { "arrival_ns", "When it arrives, once it is under way.", "ns", "", offsetof(HbLinkPacket, arrival_ns), HB_U64, NULL, 0, 0 },
-  { "stream", "Its stream.", "1", "", offsetof(HbLinkPacket, stream), HB_U32, NULL, 0, 0 },
-  { "wire_bytes", "Its length on the wire.", "1", "", offsetof(HbLinkPacket, wire_bytes), HB_U32, NULL, 0, 0 },
-  { "stage", "0: the place is free; 1: it waits; 2: it is under way.", "1", "", offsetof(HbLinkPacket, stage), HB_U32, NULL, 0, 0 },
-  { "is_lost", "1 where it is lost on the way.", "1", "", offsetof(HbLinkPacket, is_lost), HB_U32, NULL, 0, 0 },
-  { "message", "The message.", "1", "", offsetof(HbLinkPacket, message), HB_U8, NULL, 256, 0 },
+  { "number", "Its place among those that were queued.", "1", "", offsetof(HbLinkPacket, number), HB_U64, NULL, 0, 0, 0 },
+  { "queued_ns", "When it was queued.", "ns", "", offsetof(HbLinkPacket, queued_ns), HB_U64, NULL, 0, 0, 0 },
+  { "arrival_ns", "When it arrives, once it is under way.", "ns", "", offsetof(HbLinkPacket, arrival_ns), HB_U64, NULL, 0, 0, 0 },
+  { "stream", "Its stream.", "1", "", offsetof(HbLinkPacket, stream), HB_U32, NULL, 0, 0, 0 },
+  { "wire_bytes", "Its length on the wire.", "1", "", offsetof(HbLinkPacket, wire_bytes), HB_U32, NULL, 0, 0, 0 },
+  { "stage", "0: the place is free; 1: it waits; 2: it is under way.", "1", "", offsetof(HbLinkPacket, stage), HB_U32, NULL, 0, 0, 0 },
+  { "is_lost", "1 where it is lost on the way.", "1", "", offsetof(HbLinkPacket, is_lost), HB_U32, NULL, 0, 0, 0 },
+  { "message", "The message.", "1", "", offsetof(HbLinkPacket, message), HB_U8, NULL, 256, 0, 0 },
 };
 
 static const HbMessage HB_LINK_PACKET = { "hummingbus_msgs/msg/LinkPacket", "A message on the line, waiting or under way.", sizeof(HbLinkPacket), HB_LINK_PACKET_FIELDS, 8 };
@@ -1006,12 +1006,12 @@ typedef struct HbLineCounts {
 } HbLineCounts;
 
 static const HbField HB_LINE_COUNTS_FIELDS[] = {
-  { "begun_bytes", "Bytes of the messages whose sending has begun.", "1", "", offsetof(HbLineCounts, begun_bytes), HB_U64, NULL, 0, 0 },
-  { "begun", "Those messages.", "1", "", offsetof(HbLineCounts, begun), HB_U64, NULL, 0, 0 },
-  { "arrived", "Messages that have arrived, by stream.", "1", "", offsetof(HbLineCounts, arrived), HB_U32, NULL, 16, 0 },
-  { "lost", "Messages that were lost on the way, by stream; counted when they would have arrived.", "1", "", offsetof(HbLineCounts, lost), HB_U32, NULL, 16, 0 },
-  { "dropped", "Messages for which the queue had no room, by stream.", "1", "", offsetof(HbLineCounts, dropped), HB_U32, NULL, 16, 0 },
-  { "delay_ns", "How long the message that arrived last had taken since it was queued.", "ns", "", offsetof(HbLineCounts, delay_ns), HB_U64, NULL, 0, 0 },
+  { "begun_bytes", "Bytes of the messages whose sending has begun.", "1", "", offsetof(HbLineCounts, begun_bytes), HB_U64, NULL, 0, 0, 0 },
+  { "begun", "Those messages.", "1", "", offsetof(HbLineCounts, begun), HB_U64, NULL, 0, 0, 0 },
+  { "arrived", "Messages that have arrived, by stream.", "1", "", offsetof(HbLineCounts, arrived), HB_U32, NULL, 16, 0, 0 },
+  { "lost", "Messages that were lost on the way, by stream; counted when they would have arrived.", "1", "", offsetof(HbLineCounts, lost), HB_U32, NULL, 16, 0, 0 },
+  { "dropped", "Messages for which the queue had no room, by stream.", "1", "", offsetof(HbLineCounts, dropped), HB_U32, NULL, 16, 0, 0 },
+  { "delay_ns", "How long the message that arrived last had taken since it was queued.", "ns", "", offsetof(HbLineCounts, delay_ns), HB_U64, NULL, 0, 0, 0 },
 };
 
 static const HbMessage HB_LINE_COUNTS = { "hummingbus_msgs/msg/LineCounts", "What a line has carried.", sizeof(HbLineCounts), HB_LINE_COUNTS_FIELDS, 6 };
@@ -1037,14 +1037,14 @@ typedef struct HbLineState {
 } HbLineState;
 
 static const HbField HB_LINE_STATE_FIELDS[] = {
-  { "packets", "The messages that wait or are under way, in any order.", "", "", offsetof(HbLineState, packets), HB_NESTED, &HB_LINK_PACKET, 64, 0 },
-  { "newest", "The newest message of each stream that has arrived.", "1", "", offsetof(HbLineState, newest), HB_U8, NULL, 4096, 0 },
-  { "counts", "What has happened so far.", "", "", offsetof(HbLineState, counts), HB_NESTED, &HB_LINE_COUNTS, 0, 0 },
-  { "queued", "Messages queued so far.", "1", "", offsetof(HbLineState, queued), HB_U64, NULL, 0, 0 },
-  { "busy_since_ns", "When the wire began to be busy without a break.", "ns", "", offsetof(HbLineState, busy_since_ns), HB_U64, NULL, 0, 0 },
-  { "busy_bits", "Bits that it carries from then on.", "1", "", offsetof(HbLineState, busy_bits), HB_U64, NULL, 0, 0 },
-  { "free_ns", "When it is free again.", "ns", "", offsetof(HbLineState, free_ns), HB_U64, NULL, 0, 0 },
-  { "last_arrival_ns", "When the message that was sent last arrives: the next does not overtake it.", "ns", "", offsetof(HbLineState, last_arrival_ns), HB_U64, NULL, 0, 0 },
+  { "packets", "The messages that wait or are under way, in any order.", "", "", offsetof(HbLineState, packets), HB_NESTED, &HB_LINK_PACKET, 64, 0, 0 },
+  { "newest", "The newest message of each stream that has arrived.", "1", "", offsetof(HbLineState, newest), HB_U8, NULL, 16, 256, 0 },
+  { "counts", "What has happened so far.", "", "", offsetof(HbLineState, counts), HB_NESTED, &HB_LINE_COUNTS, 0, 0, 0 },
+  { "queued", "Messages queued so far.", "1", "", offsetof(HbLineState, queued), HB_U64, NULL, 0, 0, 0 },
+  { "busy_since_ns", "When the wire began to be busy without a break.", "ns", "", offsetof(HbLineState, busy_since_ns), HB_U64, NULL, 0, 0, 0 },
+  { "busy_bits", "Bits that it carries from then on.", "1", "", offsetof(HbLineState, busy_bits), HB_U64, NULL, 0, 0, 0 },
+  { "free_ns", "When it is free again.", "ns", "", offsetof(HbLineState, free_ns), HB_U64, NULL, 0, 0, 0 },
+  { "last_arrival_ns", "When the message that was sent last arrives: the next does not overtake it.", "ns", "", offsetof(HbLineState, last_arrival_ns), HB_U64, NULL, 0, 0, 0 },
 };
 
 static const HbMessage HB_LINE_STATE = { "hummingbus_msgs/msg/LineState", "What a line remembers.", sizeof(HbLineState), HB_LINE_STATE_FIELDS, 8 };
@@ -1060,9 +1060,9 @@ typedef struct HbLinkState {
 } HbLinkState;
 
 static const HbField HB_LINK_STATE_FIELDS[] = {
-  { "line", "", "", "", offsetof(HbLinkState, line), HB_NESTED, &HB_LINE_STATE, 0, 0 },
-  { "taken_mark", "The mark of the message that was taken last from each input; all bits set before the first.", "1", "", offsetof(HbLinkState, taken_mark), HB_U64, NULL, 16, 0 },
-  { "taken_period", "The period of its rate in which it was taken; all bits set before the first.", "1", "", offsetof(HbLinkState, taken_period), HB_U64, NULL, 16, 0 },
+  { "line", "", "", "", offsetof(HbLinkState, line), HB_NESTED, &HB_LINE_STATE, 0, 0, 0 },
+  { "taken_mark", "The mark of the message that was taken last from each input; all bits set before the first.", "1", "", offsetof(HbLinkState, taken_mark), HB_U64, NULL, 16, 0, 0 },
+  { "taken_period", "The period of its rate in which it was taken; all bits set before the first.", "1", "", offsetof(HbLinkState, taken_period), HB_U64, NULL, 16, 0, 0 },
 };
 
 static const HbMessage HB_LINK_STATE = { "hummingbus_msgs/msg/LinkState", "What a link remembers: what it last took from each input, and what is on its line.", sizeof(HbLinkState), HB_LINK_STATE_FIELDS, 3 };
@@ -1076,8 +1076,8 @@ typedef struct HbMagnetometerState {
 } HbMagnetometerState;
 
 static const HbField HB_MAGNETOMETER_STATE_FIELDS[] = {
-  { "channel", "What is under way.", "", "", offsetof(HbMagnetometerState, channel), HB_NESTED, &HB_CHANNEL_STATE, 0, 0 },
-  { "queue", "The last measurements.", "", "", offsetof(HbMagnetometerState, queue), HB_NESTED, &HB_MAGNETOMETER, 32, 0 },
+  { "channel", "What is under way.", "", "", offsetof(HbMagnetometerState, channel), HB_NESTED, &HB_CHANNEL_STATE, 0, 0, 0 },
+  { "queue", "The last measurements.", "", "", offsetof(HbMagnetometerState, queue), HB_NESTED, &HB_MAGNETOMETER, 32, 0, 0 },
 };
 
 static const HbMessage HB_MAGNETOMETER_STATE = { "hummingbus_msgs/msg/MagnetometerState", "All that the sensor remembers.", sizeof(HbMagnetometerState), HB_MAGNETOMETER_STATE_FIELDS, 2 };
@@ -1091,8 +1091,8 @@ typedef struct HbMocapState {
 } HbMocapState;
 
 static const HbField HB_MOCAP_STATE_FIELDS[] = {
-  { "channel", "What is under way.", "", "", offsetof(HbMocapState, channel), HB_NESTED, &HB_CHANNEL_STATE, 0, 0 },
-  { "queue", "The last measurements.", "", "", offsetof(HbMocapState, queue), HB_NESTED, &HB_MOCAP, 32, 0 },
+  { "channel", "What is under way.", "", "", offsetof(HbMocapState, channel), HB_NESTED, &HB_CHANNEL_STATE, 0, 0, 0 },
+  { "queue", "The last measurements.", "", "", offsetof(HbMocapState, queue), HB_NESTED, &HB_MOCAP, 32, 0, 0 },
 };
 
 static const HbMessage HB_MOCAP_STATE = { "hummingbus_msgs/msg/MocapState", "All that the sensor remembers.", sizeof(HbMocapState), HB_MOCAP_STATE_FIELDS, 2 };
@@ -1106,8 +1106,8 @@ typedef struct HbPositionHoldState {
 } HbPositionHoldState;
 
 static const HbField HB_POSITION_HOLD_STATE_FIELDS[] = {
-  { "place", "The place that is held; without meaning along an axis that is not locked.", "m", "world", offsetof(HbPositionHoldState, place), HB_F64, NULL, 2, 0 },
-  { "locked", "1 where the place along the heading's x, or y, is locked.", "1", "", offsetof(HbPositionHoldState, locked), HB_U32, NULL, 2, 0 },
+  { "place", "The place that is held; without meaning along an axis that is not locked.", "m", "world", offsetof(HbPositionHoldState, place), HB_F64, NULL, 2, 0, 0 },
+  { "locked", "1 where the place along the heading's x, or y, is locked.", "1", "", offsetof(HbPositionHoldState, locked), HB_U32, NULL, 2, 0, 0 },
 };
 
 static const HbMessage HB_POSITION_HOLD_STATE = { "hummingbus_msgs/msg/PositionHoldState", "All that it remembers.", sizeof(HbPositionHoldState), HB_POSITION_HOLD_STATE_FIELDS, 2 };
@@ -1121,8 +1121,8 @@ typedef struct HbPropellerStandState {
 } HbPropellerStandState;
 
 static const HbField HB_PROPELLER_STAND_STATE_FIELDS[] = {
-  { "speed", "Speed of the rotor.", "rad/s", "", offsetof(HbPropellerStandState, speed), HB_F64, NULL, 0, 0 },
-  { "acceleration", "Its rate of change.", "rad/s^2", "", offsetof(HbPropellerStandState, acceleration), HB_F64, NULL, 0, 0 },
+  { "speed", "Speed of the rotor.", "rad/s", "", offsetof(HbPropellerStandState, speed), HB_F64, NULL, 0, 0, 0 },
+  { "acceleration", "Its rate of change.", "rad/s^2", "", offsetof(HbPropellerStandState, acceleration), HB_F64, NULL, 0, 0, 0 },
 };
 
 static const HbMessage HB_PROPELLER_STAND_STATE = { "hummingbus_msgs/msg/PropellerStandState", "All that the component remembers.", sizeof(HbPropellerStandState), HB_PROPELLER_STAND_STATE_FIELDS, 2 };
@@ -1144,12 +1144,12 @@ typedef struct HbRangeInertialAxis {
 } HbRangeInertialAxis;
 
 static const HbField HB_RANGE_INERTIAL_AXIS_FIELDS[] = {
-  { "velocity", "Velocity.", "m/s", "world", offsetof(HbRangeInertialAxis, velocity), HB_F64, NULL, 0, 0 },
-  { "bias", "What is wrong with the acceleration that is fed in.", "m/s^2", "world", offsetof(HbRangeInertialAxis, bias), HB_F64, NULL, 0, 0 },
-  { "path", "Displacement since the start.", "m", "world", offsetof(HbRangeInertialAxis, path), HB_F64, NULL, 0, 0 },
-  { "distance", "Distances to what stands ahead and behind; without meaning where nothing is in sight.", "m", "world", offsetof(HbRangeInertialAxis, distance), HB_F64, NULL, 2, 0 },
-  { "in_sight", "1 where something is in sight.", "1", "", offsetof(HbRangeInertialAxis, in_sight), HB_U32, NULL, 2, 0 },
-  { "covariance", "Covariance of the errors of the above, in their order and units.", "", "", offsetof(HbRangeInertialAxis, covariance), HB_F64, NULL, 25, 0 },
+  { "velocity", "Velocity.", "m/s", "world", offsetof(HbRangeInertialAxis, velocity), HB_F64, NULL, 0, 0, 0 },
+  { "bias", "What is wrong with the acceleration that is fed in.", "m/s^2", "world", offsetof(HbRangeInertialAxis, bias), HB_F64, NULL, 0, 0, 0 },
+  { "path", "Displacement since the start.", "m", "world", offsetof(HbRangeInertialAxis, path), HB_F64, NULL, 0, 0, 0 },
+  { "distance", "Distances to what stands ahead and behind; without meaning where nothing is in sight.", "m", "world", offsetof(HbRangeInertialAxis, distance), HB_F64, NULL, 2, 0, 0 },
+  { "in_sight", "1 where something is in sight.", "1", "", offsetof(HbRangeInertialAxis, in_sight), HB_U32, NULL, 2, 0, 0 },
+  { "covariance", "Covariance of the errors of the above, in their order and units.", "", "", offsetof(HbRangeInertialAxis, covariance), HB_F64, NULL, 25, 0, 0 },
 };
 
 static const HbMessage HB_RANGE_INERTIAL_AXIS = { "hummingbus_msgs/msg/RangeInertialAxis", "What the filter knows of one axis.", sizeof(HbRangeInertialAxis), HB_RANGE_INERTIAL_AXIS_FIELDS, 6 };
@@ -1165,9 +1165,9 @@ typedef struct HbRangeInertialGains {
 } HbRangeInertialGains;
 
 static const HbField HB_RANGE_INERTIAL_GAINS_FIELDS[] = {
-  { "samples", "Samples so far.", "", "", offsetof(HbRangeInertialGains, samples), HB_U64, NULL, 0, 0 },
-  { "total", "The sum of all.", "m/s", "world", offsetof(HbRangeInertialGains, total), HB_NESTED, &HB_VECTOR3, 0, 0 },
-  { "kept", "The sum as it was every 10 ms, the k-th of these at the place k modulo the number of places.", "m/s", "world", offsetof(HbRangeInertialGains, kept), HB_NESTED, &HB_VECTOR3, 128, 0 },
+  { "samples", "Samples so far.", "", "", offsetof(HbRangeInertialGains, samples), HB_U64, NULL, 0, 0, 0 },
+  { "total", "The sum of all.", "m/s", "world", offsetof(HbRangeInertialGains, total), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
+  { "kept", "The sum as it was every 10 ms, the k-th of these at the place k modulo the number of places.", "m/s", "world", offsetof(HbRangeInertialGains, kept), HB_NESTED, &HB_VECTOR3, 128, 0, 0 },
 };
 
 static const HbMessage HB_RANGE_INERTIAL_GAINS = { "hummingbus_msgs/msg/RangeInertialGains", "Sums of the acceleration, its bias not taken off.", sizeof(HbRangeInertialGains), HB_RANGE_INERTIAL_GAINS_FIELDS, 3 };
@@ -1181,8 +1181,8 @@ typedef struct HbRangeInertialPast {
 } HbRangeInertialPast;
 
 static const HbField HB_RANGE_INERTIAL_PAST_FIELDS[] = {
-  { "path", "Displacement since the start.", "m", "world", offsetof(HbRangeInertialPast, path), HB_NESTED, &HB_VECTOR3, 0, 0 },
-  { "attitude", "Attitude, body to world.", "", "world", offsetof(HbRangeInertialPast, attitude), HB_NESTED, &HB_QUATERNION, 0, 0 },
+  { "path", "Displacement since the start.", "m", "world", offsetof(HbRangeInertialPast, path), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
+  { "attitude", "Attitude, body to world.", "", "world", offsetof(HbRangeInertialPast, attitude), HB_NESTED, &HB_QUATERNION, 0, 0, 0 },
 };
 
 static const HbMessage HB_RANGE_INERTIAL_PAST = { "hummingbus_msgs/msg/RangeInertialPast", "Where the vehicle was at a sample.", sizeof(HbRangeInertialPast), HB_RANGE_INERTIAL_PAST_FIELDS, 2 };
@@ -1212,16 +1212,16 @@ typedef struct HbRangeInertialState {
 } HbRangeInertialState;
 
 static const HbField HB_RANGE_INERTIAL_STATE_FIELDS[] = {
-  { "samples", "Samples so far.", "", "", offsetof(HbRangeInertialState, samples), HB_U64, NULL, 0, 0 },
-  { "measured_ns", "When the newest ranges were measured; the largest number before the first.", "ns", "", offsetof(HbRangeInertialState, measured_ns), HB_U64, NULL, 0, 0 },
-  { "gps_measured_ns", "When the newest velocity of a receiver was measured; the largest number before the first.", "ns", "", offsetof(HbRangeInertialState, gps_measured_ns), HB_U64, NULL, 0, 0 },
-  { "echo_ns", "When the last echo came from ahead and from behind along x, and along y.", "ns", "", offsetof(HbRangeInertialState, echo_ns), HB_U64, NULL, 4, 0 },
-  { "obstacle", "In a room of known size: distances to what hides the walls, and when it was seen last, as above.", "m", "world", offsetof(HbRangeInertialState, obstacle), HB_F64, NULL, 4, 0 },
-  { "obstacle_ns", "See above; 0 for never.", "ns", "", offsetof(HbRangeInertialState, obstacle_ns), HB_U64, NULL, 4, 0 },
-  { "acceleration", "The last sample's acceleration.", "m/s^2", "world", offsetof(HbRangeInertialState, acceleration), HB_NESTED, &HB_VECTOR3, 0, 0 },
-  { "axes", "The axes of the world; the ground is behind the third.", "", "", offsetof(HbRangeInertialState, axes), HB_NESTED, &HB_RANGE_INERTIAL_AXIS, 3, 0 },
-  { "gains", "What the velocity gained.", "", "", offsetof(HbRangeInertialState, gains), HB_NESTED, &HB_RANGE_INERTIAL_GAINS, 0, 0 },
-  { "past", "The last samples, sample k at the place k modulo the number of places.", "", "", offsetof(HbRangeInertialState, past), HB_NESTED, &HB_RANGE_INERTIAL_PAST, 128, 0 },
+  { "samples", "Samples so far.", "", "", offsetof(HbRangeInertialState, samples), HB_U64, NULL, 0, 0, 0 },
+  { "measured_ns", "When the newest ranges were measured; the largest number before the first.", "ns", "", offsetof(HbRangeInertialState, measured_ns), HB_U64, NULL, 0, 0, 0 },
+  { "gps_measured_ns", "When the newest velocity of a receiver was measured; the largest number before the first.", "ns", "", offsetof(HbRangeInertialState, gps_measured_ns), HB_U64, NULL, 0, 0, 0 },
+  { "echo_ns", "When the last echo came from ahead and from behind along x, and along y.", "ns", "", offsetof(HbRangeInertialState, echo_ns), HB_U64, NULL, 2, 2, 0 },
+  { "obstacle", "In a room of known size: distances to what hides the walls, and when it was seen last, as above.", "m", "world", offsetof(HbRangeInertialState, obstacle), HB_F64, NULL, 2, 2, 0 },
+  { "obstacle_ns", "See above; 0 for never.", "ns", "", offsetof(HbRangeInertialState, obstacle_ns), HB_U64, NULL, 2, 2, 0 },
+  { "acceleration", "The last sample's acceleration.", "m/s^2", "world", offsetof(HbRangeInertialState, acceleration), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
+  { "axes", "The axes of the world; the ground is behind the third.", "", "", offsetof(HbRangeInertialState, axes), HB_NESTED, &HB_RANGE_INERTIAL_AXIS, 3, 0, 0 },
+  { "gains", "What the velocity gained.", "", "", offsetof(HbRangeInertialState, gains), HB_NESTED, &HB_RANGE_INERTIAL_GAINS, 0, 0, 0 },
+  { "past", "The last samples, sample k at the place k modulo the number of places.", "", "", offsetof(HbRangeInertialState, past), HB_NESTED, &HB_RANGE_INERTIAL_PAST, 128, 0, 0 },
 };
 
 static const HbMessage HB_RANGE_INERTIAL_STATE = { "hummingbus_msgs/msg/RangeInertialState", "What the estimator remembers, as it is handed over.", sizeof(HbRangeInertialState), HB_RANGE_INERTIAL_STATE_FIELDS, 10 };
@@ -1235,8 +1235,8 @@ typedef struct HbRangeState {
 } HbRangeState;
 
 static const HbField HB_RANGE_STATE_FIELDS[] = {
-  { "channel", "What is under way.", "", "", offsetof(HbRangeState, channel), HB_NESTED, &HB_CHANNEL_STATE, 0, 0 },
-  { "queue", "The last measurements.", "", "", offsetof(HbRangeState, queue), HB_NESTED, &HB_RANGES, 32, 0 },
+  { "channel", "What is under way.", "", "", offsetof(HbRangeState, channel), HB_NESTED, &HB_CHANNEL_STATE, 0, 0, 0 },
+  { "queue", "The last measurements.", "", "", offsetof(HbRangeState, queue), HB_NESTED, &HB_RANGES, 32, 0, 0 },
 };
 
 static const HbMessage HB_RANGE_STATE = { "hummingbus_msgs/msg/RangeState", "All that the sensor remembers.", sizeof(HbRangeState), HB_RANGE_STATE_FIELDS, 2 };
@@ -1254,10 +1254,10 @@ typedef struct HbRpmState {
 } HbRpmState;
 
 static const HbField HB_RPM_STATE_FIELDS[] = {
-  { "channel", "What is under way.", "", "", offsetof(HbRpmState, channel), HB_NESTED, &HB_CHANNEL_STATE, 0, 0 },
-  { "queue", "The last measurements.", "", "", offsetof(HbRpmState, queue), HB_NESTED, &HB_ROTOR_SPEEDS, 32, 0 },
-  { "read", "What was read last, whether it was lost or not.", "rad/s", "", offsetof(HbRpmState, read), HB_F64, NULL, 12, 0 },
-  { "has_read", "1 from the first reading on.", "1", "", offsetof(HbRpmState, has_read), HB_U64, NULL, 0, 0 },
+  { "channel", "What is under way.", "", "", offsetof(HbRpmState, channel), HB_NESTED, &HB_CHANNEL_STATE, 0, 0, 0 },
+  { "queue", "The last measurements.", "", "", offsetof(HbRpmState, queue), HB_NESTED, &HB_ROTOR_SPEEDS, 32, 0, 0 },
+  { "read", "What was read last, whether it was lost or not.", "rad/s", "", offsetof(HbRpmState, read), HB_F64, NULL, 12, 0, 0 },
+  { "has_read", "1 from the first reading on.", "1", "", offsetof(HbRpmState, has_read), HB_U64, NULL, 0, 0, 0 },
 };
 
 static const HbMessage HB_RPM_STATE = { "hummingbus_msgs/msg/RpmState", "All that the sensor remembers.", sizeof(HbRpmState), HB_RPM_STATE_FIELDS, 4 };

@@ -1,0 +1,92 @@
+//! The component `agent`: a controller or pilot that is whoever steps a simulation.
+
+use bus::component::{Component, Info, StepError};
+use bus::context::{NodeContext, StepContext};
+use bus::messages::{MotorCommand, Reference, SetPoint};
+use bus::{Message, OutputPorts, ParameterError};
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+
+/// Messages that the agent of a simulation sends at its next steps.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Action {
+    command: Option<MotorCommand>,
+    set_point: Option<SetPoint>,
+    reference: Option<Reference>,
+}
+
+impl Action {
+    /// Sends `message` on output `output` from now on.
+    ///
+    /// # Errors
+    /// There is no such output, or the message has another size.
+    pub fn set(&mut self, output: &str, message: &[u8]) -> Result<(), String> {
+        match output {
+            "command" => read(message).map(|message| self.command = Some(message)),
+            "set_point" => read(message).map(|message| self.set_point = Some(message)),
+            "reference" => read(message).map(|message| self.reference = Some(message)),
+            _ => Err(format!("an agent has no output `{output}`; it has command, set_point, reference")),
+        }
+    }
+}
+
+fn read<T: Message>(message: &[u8]) -> Result<T, String> {
+    bytemuck::try_pod_read_unaligned(message).map_err(|_| {
+        format!("{} bytes are no {}, which has {}", message.len(), T::SCHEMA.type_name, size_of::<T>())
+    })
+}
+
+thread_local! {
+    /// Actions of the simulation that this thread steps, by the names of their nodes.
+    static ACTIONS: RefCell<BTreeMap<String, Action>> = RefCell::default();
+}
+
+/// Runs `step` on this thread, whose agents send `actions`.
+pub(crate) fn acting<R>(actions: &mut BTreeMap<String, Action>, step: impl FnOnce() -> R) -> R {
+    ACTIONS.with_borrow_mut(|current| std::mem::swap(current, actions));
+    let stepped = step();
+    ACTIONS.with_borrow_mut(|current| std::mem::swap(current, actions));
+    stepped
+}
+
+/// A node that sends what the host of the simulation has set.
+#[derive(Debug)]
+pub(crate) struct Agent {
+    name: String,
+}
+
+/// It has none.
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Parameters {}
+
+/// What the manifest names of these.
+#[derive(OutputPorts)]
+pub(crate) struct Outputs {
+    /// To the motors.
+    command: Option<MotorCommand>,
+    /// To a controller.
+    set_point: Option<SetPoint>,
+    /// To a controller that follows a trajectory.
+    reference: Option<Reference>,
+}
+
+impl Component for Agent {
+    const INFO: Info = Info::new("agent", "sends what the host of the simulation has set");
+    type Parameters = Parameters;
+    type Inputs<'a> = ();
+    type Outputs = Outputs;
+    type State = ();
+
+    fn new(_: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
+        Ok(Self { name: context.name.to_owned() })
+    }
+
+    fn initial(&self) {}
+
+    fn step(&self, _: &StepContext<'_>, (): (), (): &mut ()) -> Result<Outputs, StepError> {
+        let action = ACTIONS.with_borrow(|actions| actions.get(&self.name).cloned()).unwrap_or_default();
+        let Action { command, set_point, reference } = action;
+        Ok(Outputs { command, set_point, reference })
+    }
+}

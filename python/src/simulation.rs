@@ -1,0 +1,98 @@
+//! A simulation that Python steps, on its own thread, without processes.
+
+use crate::agent::{Action, Agent, acting};
+use crate::error::raised;
+use bus::Registration;
+use bus::checkpoint::Parts;
+use hummingbus::COMPONENTS;
+use hummingbus::runtime::manifest::Manifest;
+use hummingbus::runtime::registry::Registry;
+use hummingbus::runtime::simulate;
+use pyo3::prelude::*;
+use pyo3::types::PyByteArray;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::OnceLock;
+
+/// The components of this package, and `agent`.
+fn registry() -> Registry {
+    static REGISTRY: OnceLock<Registry> = OnceLock::new();
+    *REGISTRY.get_or_init(|| {
+        let all = [COMPONENTS.components(), &[Registration::of::<Agent>()]].concat();
+        Registry::new(all.leak())
+    })
+}
+
+/// A simulation; `hummingbus/_simulations.py` has what people use.
+#[pyclass(unsendable)]
+pub struct Simulation {
+    simulation: bus::Simulation,
+    actions: BTreeMap<String, Action>,
+}
+
+/// All that a simulation needs to go on from a tick.
+#[pyclass(unsendable)]
+pub struct Saved {
+    parts: Parts,
+    actions: BTreeMap<String, Action>,
+}
+
+#[pymethods]
+impl Simulation {
+    /// The manifest `text` as if it stood in the file `path`, with overrides as `--set` has them.
+    #[new]
+    fn new(text: String, path: &str, overrides: Vec<String>) -> PyResult<Self> {
+        let manifest = Manifest::parse(text, Path::new(path), &overrides, registry()).map_err(raised)?;
+        let simulation = simulate(&manifest).map_err(|error| raised(format!("{error:#}")))?;
+        Ok(Self { simulation, actions: BTreeMap::new() })
+    }
+
+    /// The next tick.
+    #[getter]
+    fn tick(&self) -> u32 {
+        self.simulation.tick()
+    }
+
+    /// Simulation time at the start of the next tick, s.
+    #[getter]
+    fn time_s(&self) -> f64 {
+        self.simulation.time_s()
+    }
+
+    /// Computes so many ticks.
+    fn step(&mut self, ticks: u32) -> PyResult<()> {
+        let Self { simulation, actions } = self;
+        acting(actions, || (0..ticks).try_for_each(|_| simulation.step())).map_err(raised)
+    }
+
+    /// Has the agent `node` send `message` on `output` from now on.
+    fn act(&mut self, node: &str, output: &str, message: &[u8]) -> PyResult<()> {
+        if !self.actions.contains_key(node) {
+            self.actions.insert(node.to_owned(), Action::default());
+        }
+        let action = self.actions.get_mut(node).ok_or_else(|| raised("the agent is gone"))?;
+        action.set(output, message).map_err(raised)
+    }
+
+    /// Type of `topic`, and its newest message.
+    fn newest<'py>(
+        &self,
+        py: Python<'py>,
+        topic: &str,
+    ) -> PyResult<(String, Option<Bound<'py, PyByteArray>>)> {
+        let (type_name, message) = self.simulation.newest_bytes(topic).map_err(raised)?;
+        Ok((type_name.to_owned(), message.map(|message| PyByteArray::new(py, message))))
+    }
+
+    /// The state before the next tick.
+    fn save(&mut self) -> Saved {
+        Saved { parts: self.simulation.save(), actions: self.actions.clone() }
+    }
+
+    /// Goes on from a saved state of the same manifest.
+    fn restore(&mut self, saved: &Saved) -> PyResult<()> {
+        self.simulation.restore(&saved.parts).map_err(raised)?;
+        self.actions.clone_from(&saved.actions);
+        Ok(())
+    }
+}
