@@ -32,7 +32,7 @@ pub fn check(path: &Path, overrides: &[String]) -> Result<Graph, Diagnostic> {
 /// where it would connect. What it reads and sends is compared with the manifest and with the others.
 ///
 /// # Errors
-/// What is wrong, or what a program says that would not fly.
+/// A problem of the manifest, or of a program that would not take part in a run.
 ///
 /// ```
 /// # use std::path::Path;

@@ -60,7 +60,7 @@ pub(crate) struct Agent {
 #[serde(deny_unknown_fields)]
 pub(crate) struct Parameters {}
 
-/// What the manifest names of these.
+/// Outputs, of which the manifest names some.
 #[derive(OutputPorts)]
 pub(crate) struct Outputs {
     /// To the motors.

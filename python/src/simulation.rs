@@ -30,7 +30,7 @@ pub struct Simulation {
     actions: BTreeMap<String, Action>,
 }
 
-/// All that a simulation needs to go on from a tick.
+/// State of a simulation before a tick, from which it goes on.
 #[pyclass(unsendable)]
 pub struct Saved {
     parts: Parts,
@@ -65,7 +65,7 @@ impl Simulation {
         acting(actions, || (0..ticks).try_for_each(|_| simulation.step())).map_err(raised)
     }
 
-    /// Has the agent `node` send `message` on `output` from now on.
+    /// Sets the message that the agent `node` sends on `output` from now on.
     fn act(&mut self, node: &str, output: &str, message: &[u8]) -> PyResult<()> {
         if !self.actions.contains_key(node) {
             self.actions.insert(node.to_owned(), Action::default());

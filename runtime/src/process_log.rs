@@ -20,7 +20,7 @@ const LINE_CHARS: usize = 600;
 
 /// What the standard library writes when a thread panics.
 const PANIC: &[u8] = b"panicked at";
-/// What a program writes in front of the error with which it ends.
+/// Start of the line with which a program reports the error that ended it.
 const ERROR: &[u8] = b"error: ";
 
 /// The last lines of the log at `path`, with those from the last error on, or those from the last panic's message on; none where

@@ -11,7 +11,7 @@ pub struct HbTick {
     _private: (),
 }
 
-/// What an [`HbTick`] points to.
+/// Target of an [`HbTick`].
 pub(crate) struct Step<'a, 's, 't> {
     tick: &'a mut DynamicTick<'s, 't>,
     /// The first thing that went wrong.
@@ -23,7 +23,7 @@ impl<'a, 's, 't> Step<'a, 's, 't> {
         Self { tick, error: None }
     }
 
-    /// What the program is given.
+    /// The handle that the program is given.
     pub fn handle(&mut self) -> *mut HbTick {
         std::ptr::from_mut(self).cast()
     }
@@ -131,7 +131,7 @@ pub unsafe extern "C" fn hb_tick_fail(tick: *mut HbTick, reason: *const c_char) 
     noted(fail, HB_FAILED)
 }
 
-/// What `call` gives; its error fails the step.
+/// Calls `call`; its error fails the step.
 ///
 /// # Safety
 /// As `hb_tick_number`.
