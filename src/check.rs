@@ -29,7 +29,8 @@ pub fn check(path: &Path, overrides: &[String]) -> Result<Graph, Diagnostic> {
 }
 
 /// As [`check()`], and asks the programs that the manifest names as a `command` for their ports: each is started once, and ends
-/// where it would connect. What it reads and sends is compared with the manifest and with the others.
+/// where it would connect. Ports and messages are compared with the manifest and with the others. A kind that is a program,
+/// such as `fmu`, is this executable, called with `node KIND`.
 ///
 /// # Errors
 /// A problem of the manifest, or of a program that would not take part in a run.
@@ -45,7 +46,7 @@ pub fn check(path: &Path, overrides: &[String]) -> Result<Graph, Diagnostic> {
 pub fn check_with_programs(path: &Path, overrides: &[String]) -> anyhow::Result<Graph> {
     let manifest = Manifest::load(path, overrides, COMPONENTS)?;
     let mut graph = Graph::build(&manifest)?;
-    graph.warnings.extend(runtime::check_programs(&manifest, &graph)?);
+    graph.warnings.extend(runtime::check_programs(&manifest, &graph, Path::new("/proc/self/exe"))?);
     Ok(graph)
 }
 

@@ -2,7 +2,7 @@
 
 use bus::Registration;
 use controllers::controller::Controller;
-use runtime::registry::Registry;
+use runtime::registry::{NodeProgram, Registry};
 use sensors::sensing::Sensing;
 
 /// Every component that this package brings, in alphabetical order.
@@ -45,4 +45,10 @@ pub const COMPONENTS: Registry = Registry::new(&[
     Registration::of::<Controller<controllers::wall_follow_thesis::WallFollowThesisLaw>>(),
     Registration::of::<Controller<controllers::wall_stop::WallStopLaw>>(),
     Registration::of::<Controller<controllers::wall_stop_thesis::WallStopThesisLaw>>(),
-]);
+])
+.with_programs(&[NodeProgram {
+    name: "fmu",
+    summary: "an FMU for co-simulation, of FMI 2.0 or 3.0",
+    parameters: &fmu::PARAMETERS,
+    run: fmu::run,
+}]);

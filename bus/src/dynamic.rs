@@ -170,12 +170,27 @@ impl DynamicNode {
     /// If the manifest and the declarations do not fit, two sides disagree on a layout, a step fails or leaves a due
     /// output unwritten, or the run is aborted.
     pub fn run(
-        self,
+        mut self,
         step: impl FnMut(&mut DynamicTick<'_, '_>) -> Result<(), String>,
     ) -> Result<(), BusError> {
-        let Self { node, inputs, outputs, state } = self;
+        let state = self.state.take();
         let transfer = state.as_ref().map_or(Transfer::Nothing, |state| Transfer::Message(state.schema));
-        let steps = DynamicSteps { inputs, outputs, state, step };
+        self.execute(transfer, StepsInMemory { state, step })
+    }
+
+    /// As [`run`](Self::run), for a program that saves its state itself: one that has called
+    /// [`state`](Self::state) loses that memory.
+    ///
+    /// # Errors
+    /// As [`run`](Self::run).
+    pub fn run_program<P: Program>(self, program: P) -> Result<(), BusError> {
+        let transfer = program.state_size().map_or(Transfer::Nothing, |_| Transfer::Bytes(P::STATE_TYPE));
+        self.execute(transfer, program)
+    }
+
+    fn execute(self, transfer: Transfer, program: impl Program) -> Result<(), BusError> {
+        let Self { node, inputs, outputs, .. } = self;
+        let steps = DynamicSteps { inputs, outputs, program };
         let member = Member::new(node.connect()?, transfer, Box::new(steps))?;
         let mut executor = ManuallyDrop::new(Executor::alone(member));
         let ended = executor.run();
@@ -203,21 +218,48 @@ impl StateMemory {
     }
 }
 
-/// The steps of a program with their state.
-struct DynamicSteps<F> {
-    inputs: Vec<DynamicPort>,
-    outputs: Vec<DynamicPort>,
+/// Steps of a program that saves its state itself, as bytes whose number does not change.
+pub trait Program {
+    /// Type of the state, for messages.
+    const STATE_TYPE: &'static str;
+
+    /// Number that differs between two programs of which one cannot go on from the state of the other.
+    fn configuration(&self) -> u64;
+
+    /// Bytes of the state; `None` if it is not saved.
+    fn state_size(&self) -> Option<usize>;
+
+    /// Writes the state.
+    fn save(&self, bytes: &mut [u8]);
+
+    /// Goes on from a state, of as many bytes as its own.
+    ///
+    /// # Errors
+    /// Its contents do not fit.
+    fn load(&mut self, bytes: &[u8]) -> Result<(), StateError>;
+
+    /// Computes a tick.
+    ///
+    /// # Errors
+    /// What goes wrong: the run ends with it.
+    fn step(&mut self, tick: &mut DynamicTick<'_, '_>) -> Result<(), String>;
+}
+
+/// A step that keeps its state in memory which the bus reads and writes.
+struct StepsInMemory<F> {
     state: Option<StateMemory>,
     step: F,
 }
 
-impl<F: FnMut(&mut DynamicTick<'_, '_>) -> Result<(), String>> Computation for DynamicSteps<F> {
+impl<F: FnMut(&mut DynamicTick<'_, '_>) -> Result<(), String>> Program for StepsInMemory<F> {
+    const STATE_TYPE: &'static str = "state";
+
     fn configuration(&self) -> u64 {
         0
     }
 
-    fn state_size(&self) -> usize {
-        self.state.as_ref().map_or(0, |state| state.schema.size)
+    fn state_size(&self) -> Option<usize> {
+        self.state.as_ref().map(|state| state.schema.size)
     }
 
     fn save(&self, bytes: &mut [u8]) {
@@ -227,16 +269,45 @@ impl<F: FnMut(&mut DynamicTick<'_, '_>) -> Result<(), String>> Computation for D
     }
 
     fn load(&mut self, bytes: &[u8]) -> Result<(), StateError> {
-        let type_name = self.state.as_ref().map_or("()", |state| state.schema.type_name);
-        StateError::check_size(type_name, self.state_size(), bytes)?;
         if let Some(state) = &self.state {
+            StateError::check_size(state.schema.type_name, state.schema.size, bytes)?;
             state.bytes(|memory| memory.copy_from_slice(bytes));
         }
         Ok(())
     }
 
+    fn step(&mut self, tick: &mut DynamicTick<'_, '_>) -> Result<(), String> {
+        (self.step)(tick)
+    }
+}
+
+/// A program with its ports.
+struct DynamicSteps<P> {
+    inputs: Vec<DynamicPort>,
+    outputs: Vec<DynamicPort>,
+    program: P,
+}
+
+impl<P: Program> Computation for DynamicSteps<P> {
+    fn configuration(&self) -> u64 {
+        self.program.configuration()
+    }
+
+    fn state_size(&self) -> usize {
+        self.program.state_size().unwrap_or(0)
+    }
+
+    fn save(&self, bytes: &mut [u8]) {
+        self.program.save(bytes);
+    }
+
+    fn load(&mut self, bytes: &[u8]) -> Result<(), StateError> {
+        StateError::check_size(P::STATE_TYPE, self.state_size(), bytes)?;
+        self.program.load(bytes)
+    }
+
     fn step(&mut self, tick: &mut Tick<'_>) -> Result<(), String> {
-        (self.step)(&mut DynamicTick { tick, inputs: &self.inputs, outputs: &self.outputs })
+        self.program.step(&mut DynamicTick { tick, inputs: &self.inputs, outputs: &self.outputs })
     }
 }
 

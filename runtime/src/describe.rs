@@ -72,6 +72,7 @@ impl fmt::Display for Graph {
 fn what(program: &Program) -> String {
     match &program.executable {
         Executable::Component(kind) => kind.name.to_owned(),
+        Executable::Program(kind) => kind.name.to_owned(),
         Executable::Command(args) => args.join(" "),
     }
 }

@@ -7,7 +7,7 @@ use crate::graph::Graph;
 use crate::host_world::store_files;
 use crate::manifest::Manifest;
 use crate::process_log;
-use crate::program::{Executable, Program};
+use crate::program::Program;
 use crate::role::Role;
 use crate::run_dir::shared_memory_of;
 use crate::spawn::{Started, start};
@@ -36,12 +36,13 @@ struct Asked<'g> {
     program: &'g Program,
 }
 
-/// Starts the programs that `graph`, the checked `manifest`, names as a `command`, and compares what they declare with the
+/// Starts the programs that `graph`, the checked `manifest`, names as a `command`, and those of `exe`, the binary that brings
+/// the kinds of the manifest; and compares what they declare with the
 /// manifest and with each other. Returns warnings of those that tell nothing.
 ///
 /// # Errors
 /// The problem of the first program that would not fly, or the reason why none can be started.
-pub fn check_programs(manifest: &Manifest, graph: &Graph) -> Result<Vec<Diagnostic>> {
+pub fn check_programs(manifest: &Manifest, graph: &Graph, exe: &Path) -> Result<Vec<Diagnostic>> {
     let asked = asked(graph);
     if asked.is_empty() {
         return Ok(Vec::new());
@@ -61,7 +62,7 @@ pub fn check_programs(manifest: &Manifest, graph: &Graph) -> Result<Vec<Diagnost
         if program.generation > 0 {
             program.plan.store_backup(run_dir, program.node, program.generation)?;
         }
-        match ask(manifest, run_dir, program)? {
+        match ask(manifest, exe, run_dir, program)? {
             Answer::Described(description) => {
                 for (output, message) in program.plan.outputs.iter().zip(&description.outputs) {
                     messages.entry(output.topic).or_insert_with(|| message.clone());
@@ -96,7 +97,7 @@ fn asked(graph: &Graph) -> Vec<Asked<'_>> {
         *generation += 1;
         Asked { node: backup.node, generation: *generation, plan: &backup.plan, program: &backup.program }
     });
-    first.chain(backups).filter(|asked| matches!(asked.program.executable, Executable::Command(_))).collect()
+    first.chain(backups).filter(|asked| asked.program.component().is_none()).collect()
 }
 
 /// Messages of the topics that components send or read by their types, by the numbers of the topics.
@@ -122,14 +123,13 @@ enum Answer {
     Silent(Box<Diagnostic>),
 }
 
-fn ask(manifest: &Manifest, run_dir: &Path, asked: Asked<'_>) -> Result<Answer> {
+fn ask(manifest: &Manifest, exe: &Path, run_dir: &Path, asked: Asked<'_>) -> Result<Answer> {
     let Asked { node, generation, plan, program } = asked;
     // Where the manifest has the output of its runs is no place for that of a check.
     let mut program = Program { log: None, ..program.clone() };
     program.environment.insert(DESCRIBE_VARIABLE.to_owned(), "1".to_owned());
     let role = Role::Node { node, generation };
-    // Only a component needs the executable.
-    let (mut child, log) = start(Path::new(""), run_dir, &plan.name, role, Started::One(&program), None)?;
+    let (mut child, log) = start(exe, run_dir, &plan.name, role, Started::One(&program), None)?;
     let ended = wait(&mut child);
     // Also what it has started itself.
     bus::process::kill_group(child.id());

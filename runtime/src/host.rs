@@ -70,6 +70,7 @@ impl Host {
         }
         let asked = [
             ("command", matches!(program.executable, Executable::Command(_))),
+            ("kind", matches!(program.executable, Executable::Program(_))),
             ("environment", !program.environment.is_empty()),
             ("working_directory", program.working_directory.is_some()),
             ("nice", program.nice.is_some()),

@@ -68,6 +68,7 @@ pub fn node(name: &str, registry: Registry) -> anyhow::Result<()> {
         (_, Some(component)) => {
             Join::from_environment().and_then(|join| component.run(join, registry.components()))
         }
+        (_, None) if let Some(program) = registry.program(name) => (program.run)(registry.components()),
         (_, None) => anyhow::bail!("no kind `{name}`; there are {}", registry.names()),
     };
     match ended {

@@ -1,6 +1,7 @@
 //! What the supervisor starts: the executable behind a node, how it runs on the host, and what follows its
 //! end.
 
+use crate::registry::NodeProgram;
 use bus::Registration;
 use bus::component::Role;
 use bus::plan::NodePlan;
@@ -18,6 +19,8 @@ pub const WATCHDOG: Duration = Duration::from_secs(20);
 pub enum Executable {
     /// A component that this binary brings.
     Component(&'static Registration),
+    /// A kind of this binary that is a program of its own.
+    Program(&'static NodeProgram),
     /// Another executable and its arguments.
     Command(Vec<String>),
 }
@@ -76,6 +79,15 @@ impl Program {
     pub fn component(&self) -> Option<&'static Registration> {
         match self.executable {
             Executable::Component(component) => Some(component),
+            Executable::Program(_) | Executable::Command(_) => None,
+        }
+    }
+
+    /// The name of the kind that this is, where the binary brings it.
+    pub fn kind(&self) -> Option<&'static str> {
+        match self.executable {
+            Executable::Component(component) => Some(component.name),
+            Executable::Program(program) => Some(program.name),
             Executable::Command(_) => None,
         }
     }

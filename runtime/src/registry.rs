@@ -1,38 +1,85 @@
 //! The components that a manifest may name.
 
-use bus::Registration;
 use bus::component::Transfer;
 use bus::schema::Schema;
+use bus::{BusError, Registration};
 use std::collections::BTreeMap;
 
 /// The components that a manifest may name: whoever checks or launches one says which there are.
 ///
 /// ```
-/// use bus::Registration;
+/// use bus::{BusError, Registration};
 /// use runtime::registry::Registry;
 /// const COMPONENTS: Registry = Registry::new(&[Registration::of::<recorder::node::Recorder>()]);
 /// assert_eq!(COMPONENTS.names(), "recorder");
 /// assert!(COMPONENTS.find("recorder").is_some() && COMPONENTS.find("imu").is_none());
 /// ```
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Registry(&'static [Registration]);
+pub struct Registry {
+    components: &'static [Registration],
+    programs: &'static [NodeProgram],
+}
+
+/// A kind that is a program of its own instead of a component: its ports are those that the manifest gives it, and its process
+/// holds nothing else.
+///
+/// ```
+/// use runtime::registry::{NodeProgram, Registry};
+/// const ECHO: NodeProgram = NodeProgram {
+///     name: "echo",
+///     summary: "sends what it reads",
+///     parameters: &[],
+///     run: |_| Ok(()),
+/// };
+/// const KINDS: Registry = Registry::new(&[]).with_programs(&[ECHO]);
+/// assert_eq!((KINDS.names().as_str(), KINDS.program("echo").is_some()), ("echo", true));
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct NodeProgram {
+    /// Name in manifests.
+    pub name: &'static str,
+    /// What it does, in one line.
+    pub summary: &'static str,
+    /// The names of its parameters.
+    pub parameters: &'static [&'static str],
+    /// Joins the run that started this process and takes part in it; is given the components, whose messages it may exchange.
+    pub run: fn(&'static [Registration]) -> Result<(), BusError>,
+}
 
 impl Registry {
     /// A registry of `components`, in the order in which messages list them.
     #[must_use]
     pub const fn new(components: &'static [Registration]) -> Self {
-        Self(components)
+        Self { components, programs: &[] }
+    }
+
+    /// The same with `programs`.
+    #[must_use]
+    pub const fn with_programs(self, programs: &'static [NodeProgram]) -> Self {
+        Self { programs, ..self }
+    }
+
+    /// The programs.
+    #[must_use]
+    pub const fn programs(&self) -> &'static [NodeProgram] {
+        self.programs
+    }
+
+    /// The program named `name`.
+    #[must_use]
+    pub fn program(&self, name: &str) -> Option<&'static NodeProgram> {
+        self.programs.iter().find(|program| program.name == name)
     }
 
     /// All components, as a node of a run is given them.
     #[must_use]
     pub const fn components(&self) -> &'static [Registration] {
-        self.0
+        self.components
     }
 
     /// All components.
     pub fn iter(&self) -> impl Iterator<Item = &'static Registration> {
-        self.0.iter()
+        self.components.iter()
     }
 
     /// The component named `name`.
@@ -41,10 +88,16 @@ impl Registry {
         self.iter().find(|component| component.name == name)
     }
 
-    /// The names of all components, for messages.
+    /// The names of all kinds, for messages.
     #[must_use]
     pub fn names(&self) -> String {
-        self.iter().map(|component| component.name).collect::<Vec<_>>().join(", ")
+        self.kinds().collect::<Vec<_>>().join(", ")
+    }
+
+    /// The names of all kinds.
+    pub fn kinds(&self) -> impl Iterator<Item = &'static str> {
+        let programs = self.programs.iter().map(|program| program.name);
+        self.iter().map(|component| component.name).chain(programs)
     }
 
     /// Every message that a port of a component carries, in the order of their type names.
@@ -69,6 +122,6 @@ impl Registry {
     /// The message whose type is called `type_name`.
     #[must_use]
     pub fn message(&self, type_name: &str) -> Option<&'static Schema> {
-        bus::message_of(self.0, type_name)
+        bus::message_of(self.components, type_name)
     }
 }

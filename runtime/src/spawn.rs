@@ -98,11 +98,11 @@ fn command(exe: &Path, started: Started<'_>) -> Command {
             command.args(&args[1..]);
             command
         }
-        Some(Executable::Component(_)) | None => {
+        Some(Executable::Component(_) | Executable::Program(_)) | None => {
             let kind = match started {
                 Started::Clock => "clock",
                 Started::Group => "group",
-                Started::One(program) => program.component().map_or("", |component| component.name),
+                Started::One(program) => program.kind().unwrap_or(""),
             };
             let mut command = Command::new(exe);
             command.arg0("hummingbus").args(["node", kind]);

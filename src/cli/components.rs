@@ -8,6 +8,7 @@ use bus::ports::{Inputs, PortSpec};
 use bus::schema::Schema;
 use clap::Args;
 use hummingbus::COMPONENTS;
+use runtime::registry::NodeProgram;
 use serde_json::{Value, json};
 
 /// What stands above the table.
@@ -35,12 +36,40 @@ pub struct ComponentsArguments {
 pub fn components(arguments: &ComponentsArguments) -> Result<bool> {
     let chosen = arguments.component.as_deref().map(find).transpose()?;
     match (chosen, arguments.json) {
-        (None, true) => print_json(&COMPONENTS.iter().map(json).collect::<Vec<_>>())?,
+        (None, true) => print_json(&all_json())?,
         (Some(component), true) => print_json(&[json(component)])?,
-        (None, false) => print_file(&format!("{HEAD}\n{}", table(COMPONENTS.iter())))?,
+        (None, false) => print_file(&format!("{HEAD}\n{}{}", table(COMPONENTS.iter()), programs()))?,
         (Some(component), false) => print_file(&table(std::iter::once(component)))?,
     }
     Ok(true)
+}
+
+/// The kinds that are programs, as rows of the table.
+fn programs() -> String {
+    let row = |program: &NodeProgram| {
+        let NodeProgram { name, summary, parameters, .. } = program;
+        let parameters = listed(parameters.iter().map(|name| format!("`{name}`")));
+        let ports = "those of the manifest";
+        format!(
+            "| **`{name}`**: {summary}; a process of its own | {ports} | {ports} | {parameters} | what it can save |\n"
+        )
+    };
+    COMPONENTS.programs().iter().map(row).collect()
+}
+
+/// All kinds.
+fn all_json() -> Vec<Value> {
+    let program = |program: &NodeProgram| {
+        json!({
+            "name": program.name,
+            "summary": program.summary,
+            "inputs": "of the manifest",
+            "outputs": "of the manifest",
+            "parameters": program.parameters,
+            "state": "what it can save",
+        })
+    };
+    COMPONENTS.iter().map(json).chain(COMPONENTS.programs().iter().map(program)).collect()
 }
 
 fn find(name: &str) -> Result<&'static Registration> {

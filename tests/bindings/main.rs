@@ -4,6 +4,7 @@
 //! - [`build`]: the library and the programs of the tests, built with CMake
 //! - [`check`]: programs are asked for their ports
 //! - [`cpp`]: controllers in C++, and pilots in C
+//! - [`mod@fmu`]: controllers in FMUs
 //! - [`python`]: nodes, runs and recordings in Python
 //! - [`skipped`]: tests that cannot run here
 //! - [`headers`]: the headers are those of the messages
@@ -11,6 +12,7 @@
 mod build;
 mod check;
 mod cpp;
+mod fmu;
 mod headers;
 mod python;
 #[path = "../runs/skipped.rs"]

@@ -13,7 +13,7 @@ pub fn shipped() -> Vec<String> {
     let entries = fs::read_dir(repository("manifests")).unwrap().map(|entry| entry.unwrap().path());
     let is_flown_here = |path: &PathBuf| {
         let name = path.file_name().unwrap().to_string_lossy();
-        name.ends_with(".toml") && !["cpp", "python"].iter().any(|language| name.contains(language))
+        name.ends_with(".toml") && !["cpp", "python", "fmu"].iter().any(|language| name.contains(language))
     };
     entries.filter(is_flown_here).map(|path| path.to_string_lossy().into_owned()).collect()
 }

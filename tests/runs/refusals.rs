@@ -149,7 +149,7 @@ fn a_process_without_a_kind_or_a_command() {
 fn a_command_without_words_or_types() {
     refused("kind = \"imu\"", "command = §[]").says(&["`command` is empty", "name an executable"]);
     let untyped = table("other", "outputs.§note = {}");
-    refused_with(&untyped).says(&["output `note` of a command has no `type`", "hummingbus schema"]);
+    refused_with(&untyped).says(&["output `note` of `other` has no `type`", "hummingbus schema"]);
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use super::processes::{DeclaredNode, require_core};
 use crate::manifest::{Composition, Manifest};
+use crate::program::Executable;
 use bus::plan::{GroupPlan, MemberPlan, NodePlan};
 use diagnostics::{Diagnostic, did_you_mean};
 use std::collections::BTreeMap;
@@ -164,8 +165,12 @@ impl Composer<'_> {
     /// Why `node` needs a process of its own; `None` for one that can be a member of a group.
     fn objection(&self, node: usize) -> Option<String> {
         let DeclaredNode { program, process, .. } = &self.declared_nodes[node];
-        if program.component().is_none() {
-            return Some("it is a `command`".to_owned());
+        match program.executable {
+            Executable::Component(_) => {}
+            Executable::Program(kind) => {
+                return Some(format!("a process of kind `{}` holds nothing else", kind.name));
+            }
+            Executable::Command(_) => return Some("it is a `command`".to_owned()),
         }
         if program.is_recorder() {
             return Some("it is the recorder, whose file must outlive the others' faults".to_owned());

@@ -124,7 +124,7 @@ fn published_by(node: usize, declared: &DeclaredNode<'_>) -> Result<Vec<Publishe
                 .chain(forwarded.into_iter().map(|(port, topic)| (port, Carries::Forwarded(topic))))
                 .collect()
         }
-        Executable::Command(_) => {
+        Executable::Program(_) | Executable::Command(_) => {
             process.outputs.keys().map(|port| (port.get_ref().as_str(), Carries::Stated)).collect()
         }
     };
@@ -200,7 +200,7 @@ fn topic(
         (Carries::Stated, Some(stated)) => stated,
         (Carries::Stated, None) => {
             let help = "add type = \"hummingbus_msgs/msg/MotorCommand\", for example; `hummingbus schema` lists the types";
-            return at(format!("output `{port}` of a command has no `type`"), help);
+            return at(format!("output `{port}` of `{}` has no `type`", node.get_ref()), help);
         }
     };
     let period_ticks = every_ticks.unwrap_or(period);

@@ -108,12 +108,13 @@ fn require_no_sidecar(
 }
 
 /// The keys of a process that name a file which becomes a parameter.
-pub fn files(process: &Process) -> [(&'static str, &Option<Spanned<String>>); 4] {
+pub fn files(process: &Process) -> [(&'static str, &Option<Spanned<String>>); 5] {
     [
         ("vehicle", &process.vehicle),
         ("scene", &process.scene),
         ("gains", &process.gains),
         ("data", &process.data),
+        ("fmu", &process.fmu),
     ]
 }
 
@@ -153,9 +154,10 @@ fn executable(
     match (&process.kind, &process.command) {
         (Some(kind), None) => {
             let registry = manifest.registry();
-            let found = registry.find(kind.get_ref()).map(Executable::Component);
+            let component = registry.find(kind.get_ref()).map(Executable::Component);
+            let found = component.or_else(|| registry.program(kind.get_ref()).map(Executable::Program));
             found.ok_or_else(|| {
-                let near = nearest(kind.get_ref(), registry.iter().map(|kind| kind.name));
+                let near = nearest(kind.get_ref(), registry.kinds());
                 let near = near.map_or("the".to_owned(), |near| format!("did you mean `{near}`? The"));
                 let message = format!("there is no kind `{}`", kind.get_ref());
                 manifest.problem(&kind.span(), message, format!("{near} kinds are {}", registry.names()))

@@ -150,6 +150,8 @@ pub struct Process {
     pub gains: Option<Spanned<String>>,
     /// Data file, relative to the manifest.
     pub data: Option<Spanned<String>>,
+    /// FMU, relative to the manifest.
+    pub fmu: Option<Spanned<String>>,
     /// Ticks between two computations.
     pub period_ticks: Option<Spanned<u32>>,
     /// Core it runs on.

@@ -1,0 +1,487 @@
+//! FMUs of others' tools, and one in C: same bytes, states that are proved, units, and what is said where one fails.
+
+use crate::support::{Ended, HUMMINGBUS, Place, repository};
+use recorder::reader::Recording;
+use std::fmt::Write as _;
+use std::fs;
+use std::io::{Cursor, Write as _};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+use zip::ZipWriter;
+use zip::write::SimpleFileOptions;
+
+/// FMUs that PythonFMU has built, and what flies them: Python's library, and the packages.
+struct Fmus {
+    folder: PathBuf,
+    python: String,
+    packages: String,
+}
+
+/// The FMUs, built once, or a skipped test.
+fn fmus() -> Option<&'static Fmus> {
+    static FMUS: OnceLock<Option<Fmus>> = OnceLock::new();
+    let fmus = FMUS.get_or_init(|| {
+        let readers = PathBuf::from(std::env::var_os("HUMMINGBUS_READERS")?);
+        let interpreter = readers.join("venv/bin/python3");
+        let folder = Path::new(HUMMINGBUS).parent().unwrap().join("bindings/fmu");
+        fs::create_dir_all(&folder).unwrap();
+        let built = [
+            ("pythonfmu", "examples/fmu/controller.py"),
+            ("pythonfmu3", "tests/bindings/fmu/controller3.py"),
+            ("pythonfmu", "tests/bindings/fmu/forgetful.py"),
+        ];
+        for (tool, source) in built {
+            let mut command = Command::new(&interpreter);
+            command.args([
+                "-m",
+                tool,
+                "build",
+                "--handle-state",
+                "--serialize-state",
+                "-f",
+                &repository(source),
+            ]);
+            command.arg("-d").arg(&folder);
+            crate::build::succeed(command);
+        }
+        let mut asked = Command::new(&interpreter);
+        asked.args(["-c", "import sysconfig; print(sysconfig.get_paths()['purelib'])"]);
+        let packages = crate::build::succeed(asked).trim().to_owned();
+        Some(Fmus { folder, python: python_library()?, packages })
+    });
+    if fmus.is_none() {
+        crate::skipped::skip(
+            "HUMMINGBUS_READERS with PythonFMU is not set, or there is no shared library of Python",
+        );
+    }
+    fmus.as_ref()
+}
+
+/// Name of the shared library of Python 3 that the dynamic linker knows.
+fn python_library() -> Option<String> {
+    let known = Command::new("/sbin/ldconfig").arg("-p").output().ok()?;
+    let known = String::from_utf8_lossy(&known.stdout).into_owned();
+    let mut names = known.lines().filter_map(|line| line.split_whitespace().next());
+    names.find(|name| name.starts_with("libpython3.") && name.ends_with(".so.1.0")).map(str::to_owned)
+}
+
+impl Fmus {
+    fn path(&self, name: &str) -> String {
+        self.folder.join(name).to_string_lossy().into_owned()
+    }
+
+    /// The environment of a process that holds one of them.
+    fn environment(&self) -> String {
+        format!("{{ LD_PRELOAD = {:?}, PYTHONPATH = {:?} }}", self.python, self.packages)
+    }
+
+    /// The shipped manifest, whose FMU is `name`.
+    fn shipped(&self, place: &Place, name: &str) -> String {
+        let text = fs::read_to_string(repository("manifests/fmu-controller.toml")).unwrap();
+        let environment = "environment = { LD_PRELOAD = \"libpython3.11.so.1.0\" }";
+        assert!(text.contains(environment));
+        let text = text
+            .replace("\"../target/fmu/Controller.fmu\"", &format!("{:?}", self.path(name)))
+            .replace(environment, &format!("environment = {}", self.environment()))
+            .replace("\"sets/", &format!("\"{}/", repository("manifests/sets")));
+        place.write(&name.replace(".fmu", ".toml"), text)
+    }
+}
+
+/// Topic of the controller's commands.
+const TOPIC: &str = "/controller/command";
+
+fn fly(place: &Place, manifest: &str, name: &str) -> Ended {
+    place.call(&["run", manifest, "--record", &place.path(name)])
+}
+
+#[test]
+fn a_controller_of_fmi_2_flies_the_hover_and_two_runs_are_the_same_bytes() {
+    let Some(fmus) = fmus() else { return };
+    let place = Place::new();
+    let manifest = fmus.shipped(&place, "Controller.fmu");
+    let [first, second] = ["first.mcap", "second.mcap"].map(|name| {
+        fly(&place, &manifest, name).flown();
+        fs::read(place.path(name)).unwrap()
+    });
+    assert!(first == second, "two runs differ");
+    let recording = Recording::open(Path::new(&place.path("first.mcap"))).unwrap();
+    let attached = recording.attachments().unwrap();
+    let (_, bytes) = attached.iter().find(|(name, _)| name.ends_with("Controller.fmu")).unwrap();
+    assert!(*bytes == fs::read(fmus.path("Controller.fmu")).unwrap(), "another FMU is attached");
+}
+
+#[test]
+fn one_of_fmi_3_flies_the_same_in_its_own_units() {
+    let Some(fmus) = fmus() else { return };
+    let place = Place::new();
+    let text = fs::read_to_string(fmus.shipped(&place, "Controller3.fmu")).unwrap();
+    let text = text.replace("\naltitude = \"set_point.altitude\"", "\nheight = \"set_point.altitude\"");
+    let text = text.replace("altitude_gain = 12.0", "active = true");
+    let three = place.write("three.toml", text);
+    fly(&place, &three, "three.mcap").flown();
+    fly(&place, &fmus.shipped(&place, "Controller.fmu"), "two.mcap").flown();
+    let [two, three] = ["two.mcap", "three.mcap"].map(|name| commands(&place, name, TOPIC));
+    let difference = two.iter().zip(&three).map(|(two, three)| (two - three).abs()).fold(0.0, f64::max);
+    // The height in cm and the tilt in degrees cost the last digit.
+    assert!(two.len() == 4 * 8000 && two.len() == three.len() && difference < 1e-6, "{difference}");
+}
+
+/// All commands of a recording, four by four.
+fn commands(place: &Place, name: &str, topic: &str) -> Vec<f64> {
+    let columns = [0, 1, 2, 3].map(|index| column(place, name, topic, &format!("command[{index}]")));
+    (0..columns[0].len()).flat_map(|row| columns.each_ref().map(|column| column[row])).collect()
+}
+
+/// The values of one field in a recording.
+fn column(place: &Place, name: &str, topic: &str, field: &str) -> Vec<f64> {
+    let cat = ["cat", &place.path(name), "--topic", topic, "--csv"];
+    let printed = place.call(&cat).with_code(0).output;
+    let header = printed.lines().next().unwrap();
+    let index = header.split(',').position(|name| name == field);
+    let index = index.unwrap_or_else(|| panic!("no {field} in {header}"));
+    printed.lines().skip(1).map(|line| line.split(',').nth(index).unwrap().parse().unwrap()).collect()
+}
+
+#[test]
+fn its_state_goes_over_to_a_successor_and_into_a_checkpoint() {
+    let Some(fmus) = fmus() else { return };
+    let place = Place::new();
+    let manifest = fmus.shipped(&place, "Controller.fmu");
+    let whole = fs::read_to_string(&manifest).unwrap();
+    let checkpoint = place.path("whole.4000.ckpt");
+    place.write("whole.toml", format!("{whole}\n[[checkpoint]]\nat_tick = 4000\n"));
+    fly(&place, &place.path("whole.toml"), "whole.mcap").flown();
+    let rest = place.path("rest.mcap");
+    place.call(&["run", "--from", &checkpoint, "--record", &rest]).with_code(0);
+    let said = place.call(&["diff", &place.path("whole.mcap"), &rest]).output;
+    assert!(said.contains("from there on all messages are those of"), "{said}");
+
+    // The process table of the manifest, once more as the successor.
+    let process =
+        |from: &str| whole[whole.find(from).unwrap()..].split("\n[process.pilot]").next().unwrap().to_owned();
+    let process = process("kind = \"fmu\"");
+    let process =
+        process.replace("[process.controller.", "[swap.with.").replace("outputs.command = {", "# {");
+    place.write(
+        "swap.toml",
+        format!("{whole}\n[[swap]]\nprocess = \"controller\"\nat_tick = 2000\n[swap.with]\n{process}"),
+    );
+    let ended =
+        place.call(&["run", &place.path("swap.toml"), "--record", &place.path("swap.mcap"), "--json"]);
+    let summary = ended.with_code(0).json();
+    assert_eq!(summary["successions"][0]["hand_over"], "state", "{summary}");
+    assert!(
+        commands(&place, "whole.mcap", TOPIC) == commands(&place, "swap.mcap", TOPIC),
+        "the successor computes otherwise"
+    );
+}
+
+/// An FMU of these entries.
+fn archive(place: &Place, name: &str, entries: &[(&str, &[u8])]) -> String {
+    let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+    for (entry, bytes) in entries {
+        archive.start_file(*entry, SimpleFileOptions::default()).unwrap();
+        archive.write_all(bytes).unwrap();
+    }
+    place.write(name, archive.finish().unwrap().into_inner())
+}
+
+/// The library of a C program.
+fn compiled(place: &Place, source: &str) -> Vec<u8> {
+    let (source, library) = (place.write("library.c", source), place.path("library.so"));
+    let mut compiler = Command::new("cc");
+    compiler.args(["-shared", "-fPIC", "-O1", &source, "-o", &library]);
+    crate::build::succeed(compiler);
+    fs::read(library).unwrap()
+}
+
+/// The library of `native.c`.
+fn library() -> &'static [u8] {
+    static LIBRARY: OnceLock<Vec<u8>> = OnceLock::new();
+    LIBRARY.get_or_init(|| {
+        compiled(&Place::new(), &fs::read_to_string(repository("tests/bindings/fmu/native.c")).unwrap())
+    })
+}
+
+fn description() -> String {
+    fs::read_to_string(repository("tests/bindings/fmu/native.xml")).unwrap()
+}
+
+/// The FMU of `native.c`.
+fn native(place: &Place) -> String {
+    let folder = if cfg!(target_arch = "aarch64") { "aarch64-linux" } else { "x86_64-linux" };
+    let path = format!("binaries/{folder}/native.so");
+    archive(place, "native.fmu", &[("modelDescription.xml", description().as_bytes()), (&path, library())])
+}
+
+/// Mappings of a process that holds the FMU `native`, as the manifest below has them.
+const MAPPED: &str = "\
+inputs = { position = \"state.position\", seconds = \"state.stamp.sec\" }
+outputs = { passed = \"command.command\" }
+";
+
+/// A plant that nobody steers, and an FMU that reads its state; `more` stands in its parameters, `process` in its table.
+fn beside(place: &Place, fmu: &str, process: &str, parameters: &str) -> String {
+    let vehicle = repository("vehicles/hummingbird.toml");
+    let mut text = format!(
+        "[run]\nrate_hz = 1000\nduration_s = 1.2\n[process.plant]\nkind = \"plant\"\nvehicle = {vehicle:?}\n"
+    );
+    text += "inputs.command = { topic = \"/still/command\", delay_ticks = 1, initial = { command = [1, 1, 1, 1] } }\n";
+    write!(text, "[process.still]\nkind = \"fmu\"\nfmu = {fmu:?}\n{process}").unwrap();
+    if !process.contains("inputs.") {
+        text += "inputs.state = \"/plant/state\"\n";
+    }
+    if !process.contains("outputs.") {
+        text += "outputs.command = { type = \"hummingbus_msgs/msg/MotorCommand\" }\n";
+    }
+    write!(text, "[process.still.parameters]\n{parameters}\n[process.recorder]\nkind = \"recorder\"\n")
+        .unwrap();
+    place.write("beside.toml", text)
+}
+
+#[test]
+fn arrays_and_integers_pass_through_one_in_c() {
+    let place = Place::new();
+    let manifest = beside(&place, &native(&place), "", MAPPED);
+    fly(&place, &manifest, "flight.mcap").with_code(0);
+    let passed = commands(&place, "flight.mcap", "/still/command");
+    for (index, axis) in ["x", "y", "z"].iter().enumerate() {
+        let position = column(&place, "flight.mcap", "/plant/state", &format!("position.{axis}"));
+        assert!(
+            position.len() == 1200
+                && position.iter().zip(passed.chunks(4)).all(|(position, passed)| *position == passed[index])
+        );
+    }
+    assert_eq!(passed[4 * 1199 + 3], 1.0, "the seconds of the last stamp");
+}
+
+#[test]
+fn a_state_that_is_none_is_refused_and_flown_without() {
+    let Some(fmus) = fmus() else { return };
+    let place = Place::new();
+    let mapped = "inputs = { u = \"state.position.z\" }\noutputs = { y = \"command.command[0]\" }\n";
+    let process = format!("environment = {}\n", fmus.environment());
+    let manifest = beside(&place, &fmus.path("Forgetful.fmu"), &process, mapped);
+    let ended = place.call(&["check", &manifest]);
+    assert!(
+        ended.error.contains("a replay shows that it does not: after its state was restored in"),
+        "{ended}"
+    );
+    assert!(ended.error.contains("`y` is "), "{ended}");
+    let manifest = beside(&place, &fmus.path("Forgetful.fmu"), &process, &format!("{mapped}state = false\n"));
+    let ended = fly(&place, &manifest, "flight.mcap");
+    // Its one command is not the four of this vehicle: it has flown until then.
+    assert!(ended.error.contains("node `plant`") && !ended.error.contains("replay"), "{ended}");
+}
+
+#[test]
+fn what_does_not_fit_is_said_by_check_with_its_key() {
+    let place = Place::new();
+    let fmu = native(&place);
+    let mapped = |from: &str, to: &str| {
+        assert!(MAPPED.contains(from), "{from}");
+        MAPPED.replace(from, to)
+    };
+    let start = |value: &str| format!("{MAPPED}start = {{ {value} }}\n");
+    let cases = [
+        (
+            "",
+            mapped("position =", "positio ="),
+            "`parameters.inputs.positio`: the FMU has no variable `positio`; did you mean `position`?",
+        ),
+        (
+            "",
+            mapped("state.position\"", "state.positions\""),
+            "has no field `positions`; did you mean `position",
+        ),
+        (
+            "",
+            mapped("state.stamp", "stat.stamp"),
+            "the inputs of the process have no `stat`; did you mean `state`?",
+        ),
+        (
+            "",
+            mapped("\"state.position\"", "[\"state.position\", \"state.position.x\"]"),
+            "has 3 elements, and [\"state.position\", \"state.position.x\"] are 4 fields",
+        ),
+        (
+            "",
+            mapped("seconds =", "weight ="),
+            "`parameters.inputs.weight` is in `kg`, and the field is in `s`",
+        ),
+        ("", mapped("seconds =", "steps ="), "`parameters.inputs.steps` is no input of the FMU"),
+        (
+            "",
+            mapped("seconds = \"state.stamp.sec\"", "seconds = \"state.position.z\""),
+            "is not a signed 32-bit integer",
+        ),
+        ("", mapped("passed =", "label ="), "`parameters.outputs.label` is a string"),
+        (
+            "",
+            mapped("passed = \"command.command\"", "steps = \"command.command[1]\""),
+            "and not all values before it",
+        ),
+        (
+            "",
+            mapped("\"command.command\"", "\"command.command\", negative = \"command.command[2]\""),
+            "more than one variable writes `command.command[2]`",
+        ),
+        (
+            "",
+            mapped("passed = \"command.command\"", "negative = \"command.stamp.nanosec\""),
+            "-1 is not uint32",
+        ),
+        (
+            "",
+            "outputs = { passed = \"command.command\" }".to_owned(),
+            "`inputs.state` is wired, and no variable",
+        ),
+        ("", start("crash_at = -1"), "`parameters.start.crash_at`: -1 is not an unsigned 64-bit integer"),
+        ("", start("crash_at = [1, 2]"), "it has 1 elements, found 2"),
+        ("", start("crash_at = \"late\""), "it is no string"),
+        ("", start("label = \"x\""), "fmi3SetString returned the status `error`"),
+        ("", start("crash_at = 100"), "killed by signal 11"),
+        (
+            "",
+            format!("{MAPPED}state_bytes = 8\n"),
+            "there is room for 8; give parameters.state_bytes, at least 48",
+        ),
+        ("", format!("{MAPPED}colour = 1\n"), "colour"),
+        ("period_ticks = 1\nlog = \"no/such/folder/x.log\"\n", MAPPED.to_owned(), "no/such/folder"),
+        (
+            "inputs.state = \"/plant/state\"\ninputs.command = { topic = \"/still/command\", delay_ticks = 1, initial = {} }\n",
+            MAPPED.to_owned(),
+            "`inputs.command` is wired",
+        ),
+        ("outputs.command = { type = \"my_msgs/msg/Own\" }\n", MAPPED.to_owned(), "my_msgs/msg/Own"),
+        ("outputs.command = {}\n", MAPPED.to_owned(), "output `command` of `still` has no `type`"),
+    ];
+    let mut wrong = String::new();
+    for (number, (process, parameters, words)) in cases.iter().enumerate() {
+        let manifest = beside(&place, &fmu, process, parameters);
+        let ended = fly(&place, &manifest, "flight.mcap");
+        if ended.code != Some(2) || !ended.error.contains(words) {
+            writeln!(wrong, "case {number}: no {words:?} in\n{ended}").unwrap();
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong}");
+}
+
+#[test]
+fn what_is_no_fmu_for_this_machine_is_refused() {
+    let place = Place::new();
+    let xml = description();
+    let platform = if cfg!(target_arch = "aarch64") { "aarch64-linux" } else { "x86_64-linux" };
+    let path = format!("binaries/{platform}/native.so");
+    let fmu = |name: &str, xml: &str, library: (&str, &[u8])| {
+        archive(&place, name, &[("modelDescription.xml", xml.as_bytes()), library])
+    };
+    let cases = [
+        (place.write("a.fmu", "MATLAB 5.0 MAT-file"), "a ZIP archive with a modelDescription.xml"),
+        (archive(&place, "b.fmu", &[("other.xml", b"<a/>")]), "holds no modelDescription.xml"),
+        (fmu("c.fmu", "<a>", (&path, library())), "is no XML"),
+        (fmu("d.fmu", &xml.replace("\"3.0\"", "\"1.0\""), (&path, library())), "is of FMI 1.0"),
+        (
+            fmu("e.fmu", &xml.replace("CoSimulation", "ModelExchange"), (&path, library())),
+            "for model exchange alone",
+        ),
+        (
+            fmu("f.fmu", &xml, ("binaries/x86_64-windows/native.dll", b"MZ")),
+            "it holds those of x86_64-windows: export it for Linux",
+        ),
+        (fmu("g.fmu", &xml, (&path, b"not a library")), "cannot load the FMU's library"),
+        (
+            fmu("h.fmu", &xml, (&path, &compiled(&place, "int nothing;"))),
+            "no function fmi3InstantiateCoSimulation",
+        ),
+        (
+            fmu("i.fmu", &xml.replace("Token=\"native\"", "Token=\"other\""), (&path, library())),
+            "the token or the path of the resources is wrong",
+        ),
+        (
+            fmu("j.fmu", &xml.replace("0.0005", "0.003"), (&path, library())),
+            "in steps of 0.003 s, and its process every 0.001 s",
+        ),
+        (place.path("none.fmu"), "cannot read"),
+    ];
+    for (fmu, words) in &cases {
+        let manifest = beside(&place, fmu, "", MAPPED);
+        let ended = place.call(&["check", &manifest]);
+        assert!(ended.code != Some(0) && ended.error.contains(words), "{fmu}: no {words:?} in\n{ended}");
+    }
+}
+
+#[test]
+fn an_exception_and_a_crash_end_the_run_in_words() {
+    let place = Place::new();
+    let crash = format!("{MAPPED}state = false\nstart = {{ crash_at = 100 }}\n");
+    let ended = fly(&place, &beside(&place, &native(&place), "", &crash), "flight.mcap");
+    assert!(
+        ended.code == Some(2) && ended.error.contains("`still` was killed by signal 11 (SIGSEGV)"),
+        "{ended}"
+    );
+    assert!(ended.error.contains("at tick 99"), "{ended}");
+
+    let Some(fmus) = fmus() else { return };
+    let mapped =
+        "inputs = { u = \"state.stamp.nanosec\" }\noutputs = { y = \"command.command[0]\" }\nstate = false\n";
+    let process = format!("environment = {}\n", fmus.environment());
+    let vehicle_of_one = beside(&place, &fmus.path("Forgetful.fmu"), &process, mapped);
+    let text = fs::read_to_string(&vehicle_of_one)
+        .unwrap()
+        .replace("\"/still/command\", delay", "\"/steady/command\", delay");
+    let set = format!(
+        "{text}[process.steady]\nkind = \"fmu\"\nfmu = {:?}\ninputs.state = \"/plant/state\"\noutputs.command = {{ type = \"hummingbus_msgs/msg/MotorCommand\" }}\n[process.steady.parameters]\n{MAPPED}",
+        native(&place)
+    );
+    let ended = fly(&place, &place.write("exception.toml", set), "exception.mcap");
+    assert!(ended.code == Some(2) && ended.error.contains("which no sensor measures"), "{ended}");
+    assert!(ended.error.contains("node `still` failed at tick 2"), "{ended}");
+}
+
+/// The reference FMUs of the Modelica Association, of both versions, as its release has them: `2.0/*.fmu` and `3.0/*.fmu`.
+#[test]
+fn the_reference_fmus_save_their_states_and_pass_their_inputs_through() {
+    let Some(folder) = std::env::var_os("HUMMINGBUS_REFERENCE_FMUS") else {
+        return crate::skipped::skip("HUMMINGBUS_REFERENCE_FMUS is not set");
+    };
+    let place = Place::new();
+    for version in ["2.0", "3.0"] {
+        let path = |name: &str| Path::new(&folder).join(version).join(name).to_string_lossy().into_owned();
+        let mapped = "inputs = { Float64_continuous_input = \"state.position.z\", Int32_input = \"state.stamp.sec\" }\n\
+                      outputs = { Float64_continuous_output = \"command.command[0]\", Int32_output = \"command.command[1]\", \
+                      Float64_discrete_output = \"command.command[2]\", Boolean_output = \"command.command[3]\" }\n\
+                      start = { Float64_fixed_parameter = 1.5, String_input = \"x\" }\n";
+        fly(
+            &place,
+            &beside(&place, &path("Feedthrough.fmu"), "period_ticks = 100\n", mapped),
+            "through.mcap",
+        )
+        .with_code(0);
+        let passed = commands(&place, "through.mcap", "/still/command");
+        assert_eq!(passed[4 * 11 + 1], 1.0, "the seconds of the last stamp");
+        let heights = column(&place, "through.mcap", "/plant/state", "position.z");
+        let heights = heights.iter().step_by(100);
+        assert!(
+            passed.len() == 48 && heights.zip(passed.chunks(4)).all(|(height, passed)| *height == passed[0])
+        );
+
+        // dx/dt = -k x by Euler's method in steps of 0.1 s: its process computes every 100 ticks.
+        let dahlquist = path("Dahlquist.fmu");
+        let text = format!(
+            "[run]\nrate_hz = 1000\nduration_s = 1.0\n[process.still]\nkind = \"fmu\"\nfmu = {dahlquist:?}\n\
+             period_ticks = 100\noutputs.command = {{ type = \"hummingbus_msgs/msg/MotorCommand\" }}\n\
+             [process.still.parameters]\noutputs = {{ x = \"command.command[0]\" }}\nstart = {{ k = 2.0 }}\n\
+             [process.recorder]\nkind = \"recorder\"\n"
+        );
+        fly(&place, &place.write("decay.toml", text), "decay.mcap").with_code(0);
+        let decayed = column(&place, "decay.mcap", "/still/command", "command[0]");
+        let expected = (1..=10).map(|step| 0.8_f64.powi(step));
+        assert!(
+            decayed.len() == 10
+                && decayed.iter().zip(expected).all(|(x, expected)| (x - expected).abs() < 1e-12)
+        );
+    }
+}
