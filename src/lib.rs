@@ -71,12 +71,14 @@
 //! | [`flights`], [`identify`] | measured flights, and what they show that a vehicle file lacks |
 #![forbid(unsafe_code)]
 
+pub mod agent;
 #[cfg(test)]
 mod backups;
 mod check;
 mod components;
 #[cfg(test)]
 mod extremes;
+pub mod fmu_export;
 #[cfg(test)]
 mod properties;
 

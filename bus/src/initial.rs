@@ -1,6 +1,6 @@
 //! The value that a delayed input has before its first sample: a message made from named fields.
 
-use crate::message::BODY_START;
+use crate::message::{BODY_START, message_bytes};
 use crate::sample_memory::empty_sample;
 use crate::schema::{Kind, Primitive, Schema, VALUES_START};
 use serde_json::Value;
@@ -45,6 +45,23 @@ pub fn sample(schema: &Schema, value: &Value) -> Result<Box<[u64]>, InitialError
     let mut words = empty_sample(schema.size);
     write_message(schema, value, &mut bytemuck::cast_slice_mut(&mut words)[BODY_START..], "")?;
     Ok(words)
+}
+
+/// The same as the bytes of the message alone.
+///
+/// ```
+/// use bus::Message;
+/// use bus::messages::SetPoint;
+///
+/// let bytes = bus::initial::message(SetPoint::SCHEMA, &serde_json::json!({ "altitude": 1.5 }))?;
+/// assert_eq!(bytemuck::pod_read_unaligned::<SetPoint>(&bytes).altitude, 1.5);
+/// # Ok::<(), bus::initial::InitialError>(())
+/// ```
+///
+/// # Errors
+/// As [`sample`].
+pub fn message(schema: &Schema, value: &Value) -> Result<Vec<u8>, InitialError> {
+    Ok(message_bytes(&sample(schema, value)?, schema.size).to_vec())
 }
 
 fn write_message(schema: &Schema, value: &Value, bytes: &mut [u8], path: &str) -> Result<(), InitialError> {

@@ -31,6 +31,10 @@ pub struct Simulation {
     samples: Vec<Option<LocalTopic>>,
     announcements: Vec<Option<Announcement>>,
     tick: u32,
+    /// Number of members that have computed the next tick already.
+    begun: usize,
+    /// Number of members that `begin_step` computes.
+    first: usize,
 }
 
 /// A node that steps.
@@ -89,7 +93,16 @@ impl Simulation {
         }
         let members = parts.into_iter().map(|part| part.connect(plan, &announcements));
         let members = members.collect::<Result<Vec<_>, BusError>>()?;
-        Ok(Self { plan: plan.clone(), members, samples, announcements, tick: plan.first_tick })
+        let first = members.len();
+        Ok(Self {
+            plan: plan.clone(),
+            members,
+            samples,
+            announcements,
+            tick: plan.first_tick,
+            begun: 0,
+            first,
+        })
     }
 
     /// The next tick.
@@ -104,25 +117,72 @@ impl Simulation {
         f64::from(self.tick) * self.plan.tick_s()
     }
 
+    /// Lets the node `name`, and those that read it in the same tick, step behind all others: [`Simulation::begin_step`]
+    /// computes the others, so that whoever decides what this node sends sees first what they have sent.
+    ///
+    /// # Errors
+    /// If there is no such node.
+    pub fn step_last(&mut self, name: &str) -> Result<(), BusError> {
+        let named = self.members.iter().find(|member| member.part.name() == name).map(|member| member.node);
+        let Some(named) = named else {
+            let known = self.members.iter().map(|member| member.part.name().to_owned()).collect::<Vec<_>>();
+            return Err(BusError::UnknownNode { node: name.to_owned(), known: known.join(", ") });
+        };
+        let mut late = vec![named];
+        let sent = |nodes: &[usize], topic: usize| {
+            nodes.iter().any(|&node| self.plan.nodes[node].outputs.iter().any(|output| output.topic == topic))
+        };
+        // A reader stands behind its publisher.
+        for member in &self.members {
+            let inputs = &self.plan.nodes[member.node].inputs;
+            if inputs.iter().any(|input| input.delay_ticks == 0 && sent(&late, input.topic)) {
+                late.push(member.node);
+            }
+        }
+        self.members.sort_by_key(|member| late.contains(&member.node));
+        self.first = self.members.len() - late.len();
+        Ok(())
+    }
+
+    /// Computes the next tick of the nodes that do not step last; [`Simulation::step`] computes the others.
+    ///
+    /// # Errors
+    /// As [`Simulation::step`].
+    pub fn begin_step(&mut self) -> Result<(), BusError> {
+        self.compute(self.first)
+    }
+
+    /// Computes the next tick of the members up to the number `end` that have not computed it.
+    fn compute(&mut self, end: usize) -> Result<(), BusError> {
+        let (tick, begun) = (self.tick, self.begun.min(end));
+        self.begun = end;
+        for member in &mut self.members[begun..end] {
+            if tick.is_multiple_of(member.period_ticks) {
+                member.step(tick, &mut self.samples)?;
+            }
+        }
+        Ok(())
+    }
+
     /// Computes the next tick of every node that is due.
     ///
     /// # Errors
     /// If a step fails, or leaves a due output unwritten or with what no message may hold. Nothing more can be computed
     /// then.
     pub fn step(&mut self) -> Result<(), BusError> {
-        let tick = self.tick;
-        for member in &mut self.members {
-            if tick.is_multiple_of(member.period_ticks) {
-                member.step(tick, &mut self.samples)?;
-            }
-        }
+        self.compute(self.members.len())?;
         self.tick += 1;
+        self.begun = 0;
         Ok(())
     }
 
     /// A checkpoint of the next tick, from which another simulation of the same nodes goes on.
+    ///
+    /// # Panics
+    /// If the tick has begun ([`Simulation::begin_step`]).
     #[must_use]
     pub fn save(&mut self) -> Parts {
+        assert_eq!(self.begun, 0, "a tick that has begun is not saved");
         let (tick, samples, plan) = (self.tick, &self.samples, &self.plan);
         let mut nodes: Vec<_> = self
             .members
@@ -152,6 +212,7 @@ impl Simulation {
             }
         }
         self.tick = parts.tick;
+        self.begun = 0;
         Ok(())
     }
 

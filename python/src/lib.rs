@@ -1,7 +1,6 @@
 //! The part of the Python package `hummingbus` that is Rust: nodes, messages and recordings. `hummingbus/__init__.py` is what
 //! people import.
 
-mod agent;
 mod error;
 mod message;
 mod node;

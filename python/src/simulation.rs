@@ -1,40 +1,26 @@
 //! A simulation that Python steps, on its own thread, without processes.
 
-use crate::agent::{Action, Agent, acting};
 use crate::error::raised;
-use bus::Registration;
 use bus::checkpoint::Parts;
-use hummingbus::COMPONENTS;
+use hummingbus::agent::{Action, Actions, acting, registry};
 use hummingbus::runtime::manifest::Manifest;
-use hummingbus::runtime::registry::Registry;
 use hummingbus::runtime::simulate;
 use pyo3::prelude::*;
 use pyo3::types::PyByteArray;
-use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::OnceLock;
-
-/// The components of this package, and `agent`.
-fn registry() -> Registry {
-    static REGISTRY: OnceLock<Registry> = OnceLock::new();
-    *REGISTRY.get_or_init(|| {
-        let all = [COMPONENTS.components(), &[Registration::of::<Agent>()]].concat();
-        Registry::new(all.leak())
-    })
-}
 
 /// A simulation; `hummingbus/_simulations.py` has what people use.
 #[pyclass(unsendable)]
 pub struct Simulation {
     simulation: bus::Simulation,
-    actions: BTreeMap<String, Action>,
+    actions: Actions,
 }
 
 /// State of a simulation before a tick, from which it goes on.
 #[pyclass(unsendable)]
 pub struct Saved {
     parts: Parts,
-    actions: BTreeMap<String, Action>,
+    actions: Actions,
 }
 
 #[pymethods]
@@ -44,7 +30,7 @@ impl Simulation {
     fn new(text: String, path: &str, overrides: Vec<String>) -> PyResult<Self> {
         let manifest = Manifest::parse(text, Path::new(path), &overrides, registry()).map_err(raised)?;
         let simulation = simulate(&manifest).map_err(|error| raised(format!("{error:#}")))?;
-        Ok(Self { simulation, actions: BTreeMap::new() })
+        Ok(Self { simulation, actions: Actions::new() })
     }
 
     /// The next tick.

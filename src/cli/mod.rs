@@ -7,6 +7,7 @@ mod clean;
 mod completions;
 mod components;
 mod diff;
+mod export_fmu;
 mod files;
 mod identify;
 mod included_models;
@@ -84,6 +85,9 @@ commands! {
     /// Write a vehicle's body as URDF, which Foxglove, Rerun and RViz show: what is seen, mass and inertia, what touches.
     #[command(after_help = urdf::HELP)]
     Urdf(urdf::UrdfArguments) => urdf::urdf;
+    /// Write a simulation as an FMU, for Simulink, OpenModelica, Dymola and others.
+    #[command(after_help = export_fmu::HELP)]
+    ExportFmu(export_fmu::ExportFmuArguments) => export_fmu::export_fmu;
     /// Make a project folder that flies, or a first vehicle file from a model in URDF or SDF.
     #[command(after_help = new::HELP)]
     New(new::NewArguments) => new::new;

@@ -17,10 +17,12 @@
 //! | `functions` | loading of its functions, and those of its state |
 //! | `proof` | whether a saved state is one: a replay |
 //! | `host` | the node: parameters, steps, state |
+//! | [`export`] | simulations as FMUs |
 //! | `said` | messages of the FMU |
 
 mod archive;
 mod description;
+pub mod export;
 mod fields;
 mod fmi2;
 mod fmi3;
@@ -34,4 +36,7 @@ mod units;
 mod values;
 mod wiring;
 
+pub use description::Version;
+pub use fields::Field;
 pub use host::{PARAMETERS, run};
+pub use values::Number;

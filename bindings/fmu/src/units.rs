@@ -62,7 +62,7 @@ const SYMBOLS: [(&str, Exponents); 12] = [
 ];
 
 /// The unit of a field, such as `m/s^2` or `N*m`; `None` if it has another symbol.
-fn of_field(text: &str) -> Option<BaseUnit> {
+pub fn of_field(text: &str) -> Option<BaseUnit> {
     if text == "ns" {
         return Some(BaseUnit { exponents: [0, 0, 1, 0, 0, 0, 0], factor: 1e-9, offset: 0.0 });
     }

@@ -1,15 +1,48 @@
-//! The component `agent`: a controller or pilot that is whoever steps a simulation.
+//! The component `agent`: a controller or pilot that is whoever steps a simulation, such as a program in Python or the importer
+//! of an FMU.
+//!
+//! ```
+//! use bus::messages::{MotorCommand, PlantState};
+//! use hummingbus::{agent, bus, runtime};
+//!
+//! let text = "[run]\nrate_hz = 1000\nduration_s = 1.0\n[process.pilot]\nkind = \"agent\"\noutputs.command = {}\n";
+//! let manifest = hummingbus::Manifest::parse(text.to_owned(), "fall.toml".as_ref(), &[], agent::registry())?;
+//! let mut simulation = runtime::simulate(&manifest)?;
+//! let mut actions = agent::Actions::default();
+//! let command = MotorCommand { command: [76.5; 4].into(), ..Default::default() };
+//! actions.entry("pilot".to_owned()).or_default().set("command", bytemuck::bytes_of(&command))?;
+//! agent::acting(&mut actions, || simulation.step())?;
+//! let sent = simulation.topic::<MotorCommand>("/pilot/command")?;
+//! assert_eq!(simulation.newest(sent).unwrap().command[3], 76.5);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
+use crate::COMPONENTS;
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::{MotorCommand, Reference, SetPoint};
-use bus::{Message, OutputPorts, ParameterError};
+use bus::{Message, OutputPorts, ParameterError, Registration};
+use runtime::registry::Registry;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
+use std::sync::OnceLock;
 
-/// Messages that the agent of a simulation sends at its next steps.
+/// The components of this package, and `agent`.
+#[must_use]
+pub fn registry() -> Registry {
+    static REGISTRY: OnceLock<Registry> = OnceLock::new();
+    *REGISTRY.get_or_init(|| {
+        let all = [COMPONENTS.components(), &[Registration::of::<Agent>()]].concat();
+        Registry::new(all.leak())
+    })
+}
+
+/// Actions of the agents of a simulation, by their names.
+pub type Actions = BTreeMap<String, Action>;
+
+/// Messages that an agent sends at its next steps.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Action {
+pub struct Action {
     command: Option<MotorCommand>,
     set_point: Option<SetPoint>,
     reference: Option<Reference>,
@@ -38,11 +71,11 @@ fn read<T: Message>(message: &[u8]) -> Result<T, String> {
 
 thread_local! {
     /// Actions of the simulation that this thread steps, by the names of their nodes.
-    static ACTIONS: RefCell<BTreeMap<String, Action>> = RefCell::default();
+    static ACTIONS: RefCell<Actions> = RefCell::default();
 }
 
 /// Runs `step` on this thread, whose agents send `actions`.
-pub(crate) fn acting<R>(actions: &mut BTreeMap<String, Action>, step: impl FnOnce() -> R) -> R {
+pub fn acting<R>(actions: &mut Actions, step: impl FnOnce() -> R) -> R {
     ACTIONS.with_borrow_mut(|current| std::mem::swap(current, actions));
     let stepped = step();
     ACTIONS.with_borrow_mut(|current| std::mem::swap(current, actions));
@@ -51,18 +84,18 @@ pub(crate) fn acting<R>(actions: &mut BTreeMap<String, Action>, step: impl FnOnc
 
 /// A node that sends what the host of the simulation has set.
 #[derive(Debug)]
-pub(crate) struct Agent {
+pub struct Agent {
     name: String,
 }
 
 /// It has none.
-#[derive(serde::Deserialize)]
+#[derive(Debug, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Parameters {}
+pub struct Parameters {}
 
 /// Outputs, of which the manifest names some.
-#[derive(OutputPorts)]
-pub(crate) struct Outputs {
+#[derive(Debug, OutputPorts)]
+pub struct Outputs {
     /// To the motors.
     command: Option<MotorCommand>,
     /// To a controller.

@@ -1,0 +1,103 @@
+//! The command `export-fmu`.
+
+use super::output::{print_json, print_text};
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use hummingbus::fmu_export::{Wishes, export};
+use runtime::output_file::{self, Kind, Mark, is_same};
+use serde_json::json;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Examples that `--help` shows.
+pub const HELP: &str = "Examples:
+  hummingbus export-fmu vehicles/hummingbird.toml                     the plant with an IMU and motion capture
+  hummingbus export-fmu manifests/hover.toml --without controller     everything but the controller
+  hummingbus export-fmu hover.toml --output /imu/imu --fmi 3 --out plant.fmu";
+
+/// Name of the library that goes into an FMU: bindings/fmu-export.
+const LIBRARY: &str = "libhummingbus_fmu.so";
+const FMU: Kind = Kind { name: "FMU", mark: Mark::Start(b"PK\x03\x04") };
+
+/// What `export-fmu` takes.
+#[derive(Args)]
+pub struct ExportFmuArguments {
+    /// A manifest, or a vehicle file.
+    file: PathBuf,
+    /// The process in whose place the importer of the FMU stands: what it sends becomes the inputs of the FMU.
+    #[arg(long, value_name = "PROCESS", default_value = "controller")]
+    without: String,
+    /// A topic whose fields become outputs of the FMU. Left out: what that process reads, and the states of plants.
+    #[arg(long = "output", value_name = "TOPIC")]
+    outputs: Vec<String>,
+    /// Version of the standard: 2 or 3.
+    #[arg(long, value_name = "VERSION", default_value = "2")]
+    fmi: String,
+    /// Write this file. Left out: NAME.fmu in this folder.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// A value of the manifest or of a file that it names, as for `run`.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Print what it holds as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Writes a simulation as an FMU, for Simulink, OpenModelica, Dymola and others.
+///
+/// # Errors
+/// If the manifest has a problem, what is asked for is not in it, or the file cannot be written.
+pub fn export_fmu(arguments: &ExportFmuArguments) -> Result<bool> {
+    let Some(version) = fmu::export::version_of(&arguments.fmi) else {
+        bail!("--fmi: expected 2 or 3, found {}", arguments.fmi);
+    };
+    let name = arguments.file.file_stem().unwrap_or_default();
+    let out = arguments.out.clone().unwrap_or_else(|| Path::new(name).with_extension("fmu"));
+    if is_same(&out, &arguments.file) {
+        bail!("{} is what is read: name another file", out.display());
+    }
+    output_file::check(&out, &FMU)?;
+    let wishes = Wishes {
+        without: &arguments.without,
+        outputs: &arguments.outputs,
+        version,
+        overrides: &arguments.set,
+    };
+    let exported = export(&arguments.file, &wishes, &library()?)?;
+    output_file::write(&out, &FMU, |file| file.write_all(&exported.bytes))?;
+    let (inputs, outputs): (Vec<_>, Vec<_>) =
+        exported.model.variables.iter().partition(|variable| variable.is_input());
+    if arguments.json {
+        print_json(&json!({ "fmu": out, "model": exported.model }))?;
+    } else {
+        print_text(&format!(
+            "{}: FMI {}, {} inputs in place of `{}`, {} outputs, a step of {} s\nin Simulink: docs/simulink.md; in Python: \
+             fmpy simulate {}",
+            out.display(),
+            arguments.fmi,
+            inputs.len(),
+            arguments.without,
+            outputs.len(),
+            exported.model.tick_s,
+            out.display()
+        ))?;
+    }
+    Ok(true)
+}
+
+/// The library, which lies beside the program, or in `lib/hummingbus` beside its folder.
+fn library() -> Result<Vec<u8>> {
+    let program = std::env::current_exe().context("cannot find this program's own file")?;
+    let folder = program.parent().unwrap_or(Path::new("."));
+    let places = [folder.join(LIBRARY), folder.join("../lib/hummingbus").join(LIBRARY)];
+    let Some(path) = places.iter().find(|path| path.is_file()) else {
+        let places: Vec<_> = places.iter().map(|path| path.display().to_string()).collect();
+        bail!(
+            "the library that goes into an FMU is not there: neither {}; `cargo build --release -p hummingbus-fmu-export` \
+             in the sources of hummingbus builds it beside the program",
+            places.join(" nor ")
+        );
+    };
+    std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))
+}

@@ -1,0 +1,228 @@
+//! A manifest as an FMU: everything but one process, in whose place the importer of the FMU stands.
+
+use crate::agent::{Actions, acting, registry};
+use anyhow::{Context, Result, anyhow, bail};
+use bus::component::Role;
+use bus::plan::{NodePlan, Plan};
+use bus::{Registration, initial};
+use fmu::Version;
+use fmu::export::{Contents, Model, ModelVariable, Source};
+use inputs::sha256;
+use runtime::graph::Graph;
+use runtime::manifest::Manifest;
+use std::io::Cursor;
+use std::path::Path;
+
+/// Manifest of a vehicle on its own: the plant with an IMU and motion capture, as `manifests/sets/flight.toml` has them.
+const VEHICLE: &str = include_str!("fmu_export/vehicle.toml");
+/// Ports of an agent.
+const PORTS: [&str; 3] = ["command", "set_point", "reference"];
+
+/// Wishes for an FMU.
+#[derive(Clone, Debug)]
+pub struct Wishes<'w> {
+    /// The process in whose place the importer stands.
+    pub without: &'w str,
+    /// Topics that become outputs; where empty those that the process reads, and the states of plants.
+    pub outputs: &'w [String],
+    /// Version of the standard.
+    pub version: Version,
+    /// Values as `--set` has them.
+    pub overrides: &'w [String],
+}
+
+/// An FMU that was made.
+#[derive(Clone, Debug)]
+pub struct Exported {
+    /// The file.
+    pub bytes: Vec<u8>,
+    /// Contents.
+    pub model: Model,
+}
+
+/// The FMU of the manifest or vehicle file at `path`, with the library `library` of `bindings/fmu-export`.
+///
+/// # Errors
+/// The manifest has a problem, the process is not in it or sends what no importer can, a node needs a process of its own, or
+/// a topic is not there.
+pub fn export(path: &Path, wishes: &Wishes<'_>, library: &[u8]) -> Result<Exported> {
+    let load = |overrides: &[String]| load(path, overrides);
+    let declared = Graph::build(&load(wishes.overrides)?)?;
+    let replaced = node(&declared.plan, wishes.without)?;
+    let outputs = outputs(&declared.plan, replaced, wishes.outputs)?;
+    let agent = agent(&declared.plan, replaced)?;
+    let manifest = load(&[wishes.overrides, &[agent]].concat())?;
+    let graph = Graph::build(&manifest)?;
+    let simulation = runtime::simulate(&manifest)?;
+    let variables = variables(&graph.plan, simulation, wishes.without, &outputs)?;
+    write(&graph, path, wishes, variables, library)
+}
+
+/// The manifest at `path`, or that of the vehicle file there.
+fn load(path: &Path, overrides: &[String]) -> Result<Manifest> {
+    let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let is_vehicle = text
+        .parse::<toml::Table>()
+        .is_ok_and(|table| table.contains_key("body") && !table.contains_key("process"));
+    if !is_vehicle {
+        return Ok(Manifest::load(path, overrides, registry())?);
+    }
+    let vehicle = vehicles::Vehicle::load(path)?;
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let hover = format!("{:?}", vec![vehicle.hover_command(); vehicle.rotors.len()]);
+    let text = VEHICLE.replace("VEHICLE", &name).replace("HOVER", &hover);
+    Ok(Manifest::parse(text, &path.with_file_name("vehicle-as-fmu.toml"), overrides, registry())?)
+}
+
+fn node<'p>(plan: &'p Plan, name: &str) -> Result<&'p NodePlan> {
+    let found = plan.nodes.iter().find(|node| node.name == name);
+    found.ok_or_else(|| {
+        let names: Vec<&str> = plan.nodes.iter().map(|node| node.name.as_str()).collect();
+        anyhow!(
+            "there is no process `{name}` to leave out; there are {}: name one with --without",
+            names.join(", ")
+        )
+    })
+}
+
+/// The topics that become outputs.
+fn outputs(plan: &Plan, replaced: &NodePlan, asked: &[String]) -> Result<Vec<String>> {
+    let name = |topic: usize| plan.topics[topic].name.clone();
+    for asked in asked {
+        if !plan.topics.iter().any(|topic| topic.name == *asked) {
+            let names: Vec<&str> = plan.topics.iter().map(|topic| topic.name.as_str()).collect();
+            bail!("there is no topic {asked}; there are {}", names.join(", "));
+        }
+    }
+    if !asked.is_empty() {
+        return Ok(asked.to_vec());
+    }
+    let read = replaced.inputs.iter().map(|input| name(input.topic));
+    let states = plan.topics.iter().filter(|topic| topic.type_name.ends_with("/PlantState"));
+    let mut all: Vec<String> = read.chain(states.map(|topic| topic.name.clone())).collect();
+    let mut seen = std::collections::BTreeSet::new();
+    all.retain(|topic| seen.insert(topic.clone()));
+    Ok(all)
+}
+
+/// The setting that puts an agent into the place of `replaced`, with the same topics.
+fn agent(plan: &Plan, replaced: &NodePlan) -> Result<String> {
+    let name = &replaced.name;
+    let mut outputs = Vec::new();
+    for output in &replaced.outputs {
+        let (port, topic) = (&output.port, &plan.topics[output.topic]);
+        if !PORTS.contains(&port.as_str()) {
+            bail!(
+                "`{name}` sends `{port}` ({}), which an importer cannot; it can send {}: leave another process out",
+                topic.type_name,
+                PORTS.join(", ")
+            );
+        }
+        outputs
+            .push(format!("{port} = {{ topic = {:?}, every_ticks = {} }}", topic.name, topic.period_ticks));
+    }
+    if outputs.is_empty() {
+        bail!("`{name}` sends nothing: leave out a process that others listen to");
+    }
+    let (period, outputs) = (replaced.period_ticks, outputs.join(", "));
+    Ok(format!("process.{name}={{ kind = \"agent\", period_ticks = {period}, outputs = {{ {outputs} }} }}"))
+}
+
+/// Variables of the simulation: inputs from what the agent sends, outputs from the topics, with their values before the
+/// first step.
+fn variables(
+    plan: &Plan,
+    mut simulation: bus::Simulation,
+    agent: &str,
+    outputs: &[String],
+) -> Result<Vec<ModelVariable>> {
+    let mut all = Vec::new();
+    let mut actions = Actions::new();
+    for output in &node(plan, agent)?.outputs {
+        let schema = registry().message(&plan.topics[output.topic].type_name);
+        let schema =
+            schema.ok_or_else(|| anyhow!("{} is of an unknown type", plan.topics[output.topic].name))?;
+        let readers =
+            plan.nodes.iter().flat_map(|node| &node.inputs).filter(|input| input.topic == output.topic);
+        let value = readers.filter_map(|input| input.initial.as_ref()).next();
+        let value = value.cloned().unwrap_or_else(|| serde_json::json!({}));
+        let message = initial::message(schema, &value)?;
+        actions
+            .entry(agent.to_owned())
+            .or_default()
+            .set(&output.port, &message)
+            .map_err(|reason| anyhow!(reason))?;
+        let prefix = format!("{agent}.{}", output.port);
+        let fields = ModelVariable::all(&prefix, &Source::Port(output.port.clone()), schema, &message);
+        if fields.is_empty() {
+            bail!(
+                "nothing says how many values `{agent}` sends on `{}`: give the input that reads it an `initial` value",
+                output.port
+            );
+        }
+        all.extend(fields);
+    }
+    simulation.step_last(agent)?;
+    acting(&mut actions, || simulation.begin_step())?;
+    for topic in outputs {
+        let (type_name, message) = simulation.newest_bytes(topic)?;
+        let schema = registry()
+            .message(type_name)
+            .ok_or_else(|| anyhow!("{topic} carries {type_name}, which is no built-in message"))?;
+        let zeros = vec![0; schema.size];
+        let prefix = topic.trim_start_matches('/').replace('/', ".");
+        all.extend(ModelVariable::all(
+            &prefix,
+            &Source::Topic(topic.clone()),
+            schema,
+            message.unwrap_or(&zeros),
+        ));
+    }
+    Ok(all)
+}
+
+fn write(
+    graph: &Graph,
+    path: &Path,
+    wishes: &Wishes<'_>,
+    variables: Vec<ModelVariable>,
+    library: &[u8],
+) -> Result<Exported> {
+    let is_stepped = |component: &&'static Registration| component.role == Role::Compute;
+    let members = graph.components().enumerate();
+    let members =
+        members.filter_map(|(node, component)| Some((node, component.filter(is_stepped)?.name.to_owned())));
+    // The memory of a simulation has no name.
+    let plan = Plan { run_id: "fmu".to_owned(), ..graph.plan.clone() };
+    let folder = tempfile::tempdir().context("cannot make a folder for temporary files")?;
+    plan.store(folder.path())?;
+    for node in &plan.nodes {
+        graph
+            .files
+            .store(&folder.path().join(Plan::INPUTS), &node.files)
+            .context("cannot write the files of the run")?;
+    }
+    let mut model = Model {
+        name: identifier(path),
+        token: String::new(),
+        tick_s: plan.tick_s(),
+        duration_s: f64::from(plan.duration_ticks) * plan.tick_s(),
+        seed: plan.seed,
+        agent: wishes.without.to_owned(),
+        members: members.collect(),
+        variables,
+    };
+    let contents = serde_json::to_vec(&(&model, &plan)).context("cannot write the model")?;
+    model.token = format!("{{{}}}", &sha256(&contents)[..32]);
+    let mut bytes = Cursor::new(Vec::new());
+    let version = wishes.version;
+    fmu::export::write(Contents { model: &model, version, run_dir: folder.path(), library }, &mut bytes)?;
+    Ok(Exported { bytes: bytes.into_inner(), model })
+}
+
+/// The name of the file at `path` as the name of a library: letters, digits and `_`.
+fn identifier(path: &Path) -> String {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let name: String = stem.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
+    if name.starts_with(|c: char| c.is_ascii_alphabetic()) { name } else { format!("model_{name}") }
+}
