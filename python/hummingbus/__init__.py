@@ -16,6 +16,7 @@ A run and its recording:
 """
 
 from ._native import Error, __version__
+from ._campaigns import Campaign, campaign, identify
 from ._messages import Field, Message, dtype, message, messages, set_values, vector
 from ._nodes import Component, Optional, run_node
 from ._recordings import Recording
@@ -23,6 +24,7 @@ from ._runs import Outcome, Run, fly, start
 from ._simulations import Simulation
 
 __all__ = [
+    "Campaign",
     "Component",
     "Error",
     "Field",
@@ -33,8 +35,10 @@ __all__ = [
     "Run",
     "Simulation",
     "__version__",
+    "campaign",
     "dtype",
     "fly",
+    "identify",
     "message",
     "messages",
     "run_node",

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import glob
 import json
-import math
 import os
-import shutil
 import subprocess
 import tempfile
 import time
@@ -15,15 +13,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from . import _native
+from ._program import program, report, toml
 from ._recordings import Recording
-
-
-
-def _program() -> str:
-    found = os.environ.get("HUMMINGBUS_PROGRAM") or shutil.which("hummingbus")
-    if not found:
-        raise _native.Error("no folder of PATH holds the program `hummingbus`; put it there, or set HUMMINGBUS_PROGRAM")
-    return found
 
 
 @dataclass(frozen=True)
@@ -65,7 +56,7 @@ class Run:
             if found := glob.glob(pattern):
                 return os.path.basename(max(found, key=os.path.getmtime))[len("hb_") : -len("_run")]
             if time.monotonic() > patience_s:
-                raise _native.Error(f"the run has not begun within 30 s: there is no {pattern}; is {_program()} the program itself?")
+                raise _native.Error(f"the run has not begun within 30 s: there is no {pattern}; is {program()} the program itself?")
             time.sleep(0.005)
         raise _native.Error("the run has ended: " + self._texts()[1].strip())
 
@@ -92,6 +83,30 @@ class Run:
     def checkpoint(self, path: str | os.PathLike[str]) -> Mapping[str, Any]:
         """Writes a checkpoint, from which another run goes on."""
         return self._ask("checkpoint", os.fspath(path))
+
+    def swap(
+        self,
+        process: str,
+        backup: Mapping[str, Any] | str | os.PathLike[str] = "",
+        *,
+        shadow_ticks: int | None = None,
+        at_tick: int | None = None,
+    ) -> Mapping[str, Any]:
+        """Replaces `process` by a backup, which goes on from its state where both have the same.
+
+        `backup` is what the backup has otherwise: the keys of a process in a manifest, as a mapping, a TOML text or a TOML file. It
+        computes `shadow_ticks` beside the process, and its outputs count from `at_tick` on, or as soon as possible.
+        """
+        # Its processes join first; before that nothing can be replaced.
+        while self.status()["state"] == "starting":
+            time.sleep(0.005)
+        # Each key on a line of its own: a file may not be one inline table.
+        tables = isinstance(backup, Mapping)
+        text = "".join(f"{json.dumps(key)} = {toml(value)}\n" for key, value in backup.items()) if tables else os.fspath(backup)
+        words = [process, "--with", text]
+        for option, value in (("--shadow-ticks", shadow_ticks), ("--at-tick", at_tick)):
+            words += [] if value is None else [option, str(value)]
+        return self._answer("swap", *words)
 
     def stop(self) -> Outcome:
         """Ends the run at the next tick boundary."""
@@ -126,11 +141,10 @@ class Run:
         return self._output.read(), self._said.read()
 
     def _ask(self, *words: str) -> Mapping[str, Any]:
-        command = [_program(), "ctl", "--run", self.id, "--json", *words]
-        ended = subprocess.run(command, capture_output=True, text=True)
-        if ended.returncode != 0:
-            raise _native.Error(ended.stderr.strip())
-        return json.loads(ended.stdout)
+        return self._answer("ctl", *words)
+
+    def _answer(self, command: str, *words: str) -> Mapping[str, Any]:
+        return report([command, "--run", self.id, "--json", *words])
 
 
 def start(
@@ -144,10 +158,10 @@ def start(
     """Starts a run of `manifest`. `record` is where its recording goes; without it there is none. `set` overrides keys, such as
     `{"run.duration_s": 2.0}`; `arguments` are more of `hummingbus run`.
     """
-    command = [_program(), "run", os.fspath(manifest), "--json"]
+    command = [program(), "run", os.fspath(manifest), "--json"]
     command += ["--record", "none" if record is None else os.fspath(record)]
     for key, value in (set or {}).items():
-        command += ["--set", f"{key}={_toml(value)}"]
+        command += ["--set", f"{key}={toml(value)}"]
     if pace is not None:
         command += ["--pace", str(pace)]
     command += arguments
@@ -158,18 +172,3 @@ def fly(manifest: str | os.PathLike[str], **options: Any) -> Outcome:
     """Flies `manifest` to its end: `start` and `wait`."""
     with start(manifest, **options) as run:
         return run.wait()
-
-
-def _toml(value: Any) -> str:
-    """A value as `--set` takes it."""
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{json.dumps(str(key))} = {_toml(item)}" for key, item in value.items()) + " }"
-    if isinstance(value, (list, tuple)):
-        return "[" + ", ".join(map(_toml, value)) + "]"
-    if hasattr(value, "tolist"):
-        return _toml(value.tolist())
-    if isinstance(value, float) and not math.isfinite(value):
-        return "nan" if math.isnan(value) else "inf" if value > 0 else "-inf"
-    if value is None:
-        raise TypeError("a manifest has no value `None`; leave the key out")
-    return json.dumps(value, ensure_ascii=False)

@@ -11,7 +11,7 @@ import numpy as np
 
 from . import _native
 from ._messages import dtype
-from ._runs import _toml
+from ._program import toml
 
 
 class Simulation:
@@ -40,7 +40,7 @@ class Simulation:
                 text = Path(path).read_text()
             except OSError as error:
                 raise _native.Error(f"cannot read {path}: {error.strerror}") from error
-        overrides = [f"{key}={_toml(value)}" for key, value in (set or {}).items()]
+        overrides = [f"{key}={toml(value)}" for key, value in (set or {}).items()]
         self._native = _native.Simulation(text, path, overrides)
 
     @property

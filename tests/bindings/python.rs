@@ -250,6 +250,43 @@ fn the_columns_of_a_recording_are_what_cat_prints() {
 }
 
 #[test]
+fn the_notebook_runs_from_a_launch_to_plots() {
+    let Some(python) = python() else { return };
+    let said = python.eval(
+        "import nbformat, nbclient\nnotebook = nbformat.read('examples/python/hover.ipynb', 4)\n\
+         assert not any(cell.get('outputs') for cell in notebook.cells), 'it is kept without outputs'\n\
+         options = {'metadata': {'path': 'examples/python'}}\n\
+         nbclient.NotebookClient(notebook, timeout=300, resources=options).execute()\n\
+         outputs = [output for cell in notebook.cells for output in cell.get('outputs', [])]\n\
+         print(sum('image/png' in output.get('data', {}) for output in outputs), 'pictures')\n\
+         print(*(output['text'] for output in outputs if output['output_type'] == 'stream' and output['name'] == 'stdout'))",
+    );
+    assert!(said.starts_with("4 pictures\n") && said.contains("with its state"), "{said}");
+}
+
+#[test]
+fn a_campaign_and_an_identification_return_their_reports_or_raise_their_words() {
+    let Some(python) = python() else { return };
+    let place = Place::new();
+    let (hover, out) = (repository("manifests/hover.toml"), place.path("out"));
+    let text = format!(
+        "manifest = {hover:?}\nflights = 3\nset = [\"run.duration_s=1.0\"]\n[[vary]]\nname = \"mass\"\n\
+         key = \"process.plant.vehicle.body.mass\"\nuniform = [0.47, 0.49]\n"
+    );
+    let file = place.write("small.toml", text);
+    python.eval(&format!(
+        "import hummingbus as hb\nc = hb.campaign({file:?}, {out:?}, workers=1, require='pass_rate >= 0.9 at 95 %')\n\
+         assert c.report['flights'] == 3 and not c.holds, c.report\n\
+         rows = c.polars()\nassert rows.height == 3 and rows['mass'].is_between(0.47, 0.49).all(), rows\n\
+         assert (c.pandas()['mass'] == rows['mass'].to_numpy()).all()\n\
+         for wrong in (lambda: hb.campaign('nowhere.toml', {out:?}), lambda: hb.identify('nowhere.toml', {out:?})):\n\
+         \x20   try: wrong()\n\
+         \x20   except hb.Error as error: assert 'nowhere.toml' in str(error), error\n\
+         \x20   else: raise AssertionError"
+    ));
+}
+
+#[test]
 fn a_run_that_fails_raises_its_own_words() {
     let Some(python) = python() else { return };
     let said = python.eval(
