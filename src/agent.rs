@@ -33,7 +33,7 @@ pub fn registry() -> Registry {
     static REGISTRY: OnceLock<Registry> = OnceLock::new();
     *REGISTRY.get_or_init(|| {
         let all = [COMPONENTS.components(), &[Registration::of::<Agent>()]].concat();
-        Registry::new(all.leak())
+        Registry::new(all.leak()).with_programs(COMPONENTS.programs())
     })
 }
 

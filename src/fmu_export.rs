@@ -11,7 +11,7 @@ use inputs::sha256;
 use runtime::graph::Graph;
 use runtime::manifest::Manifest;
 use std::io::Cursor;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Manifest of a vehicle on its own: the plant with an IMU and motion capture, as `manifests/sets/flight.toml` has them.
 const VEHICLE: &str = include_str!("fmu_export/vehicle.toml");
@@ -68,9 +68,9 @@ fn load(path: &Path, overrides: &[String]) -> Result<Manifest> {
         return Ok(Manifest::load(path, overrides, registry())?);
     }
     let vehicle = vehicles::Vehicle::load(path)?;
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let hover = format!("{:?}", vec![vehicle.hover_command(); vehicle.rotors.len()]);
-    let text = VEHICLE.replace("VEHICLE", &name).replace("HOVER", &hover);
+    let text = VEHICLE.replace("HOVER", &hover).replace("\"VEHICLE\"", &toml::Value::from(name).to_string());
     Ok(Manifest::parse(text, &path.with_file_name("vehicle-as-fmu.toml"), overrides, registry())?)
 }
 
@@ -108,6 +108,11 @@ fn outputs(plan: &Plan, replaced: &NodePlan, asked: &[String]) -> Result<Vec<Str
 /// The setting that puts an agent into the place of `replaced`, with the same topics.
 fn agent(plan: &Plan, replaced: &NodePlan) -> Result<String> {
     let name = &replaced.name;
+    if replaced.computing_time.is_some() {
+        bail!(
+            "`{name}` has a `computing_time`, which an importer has not: leave the key out, and let the importer wait as long"
+        );
+    }
     let mut outputs = Vec::new();
     for output in &replaced.outputs {
         let (port, topic) = (&output.port, &plan.topics[output.topic]);
@@ -152,7 +157,7 @@ fn variables(
             .or_default()
             .set(&output.port, &message)
             .map_err(|reason| anyhow!(reason))?;
-        let prefix = format!("{agent}.{}", output.port);
+        let prefix = format!("{}.{}", agent.replace('/', "."), output.port);
         let fields = ModelVariable::all(&prefix, &Source::Port(output.port.clone()), schema, &message);
         if fields.is_empty() {
             bail!(
@@ -169,14 +174,14 @@ fn variables(
         let schema = registry()
             .message(type_name)
             .ok_or_else(|| anyhow!("{topic} carries {type_name}, which is no built-in message"))?;
-        let zeros = vec![0; schema.size];
+        let message = message.ok_or_else(|| {
+            anyhow!(
+                "{topic} depends on what `{agent}` sends in the same tick, so that the FMU has no value of it before a step; \
+                 name other topics with --output"
+            )
+        })?;
         let prefix = topic.trim_start_matches('/').replace('/', ".");
-        all.extend(ModelVariable::all(
-            &prefix,
-            &Source::Topic(topic.clone()),
-            schema,
-            message.unwrap_or(&zeros),
-        ));
+        all.extend(ModelVariable::all(&prefix, &Source::Topic(topic.clone()), schema, message));
     }
     Ok(all)
 }
@@ -192,11 +197,13 @@ fn write(
     let members = graph.components().enumerate();
     let members =
         members.filter_map(|(node, component)| Some((node, component.filter(is_stepped)?.name.to_owned())));
-    // The memory of a simulation has no name.
-    let plan = Plan { run_id: "fmu".to_owned(), ..graph.plan.clone() };
+    let plan = portable(&graph.plan);
+    if i32::try_from(plan.seed).is_err() {
+        bail!("the seed {} is not one of 32 bits, which an FMU can have: set run.seed", plan.seed);
+    }
     let folder = tempfile::tempdir().context("cannot make a folder for temporary files")?;
     plan.store(folder.path())?;
-    for node in &plan.nodes {
+    for node in &graph.plan.nodes {
         graph
             .files
             .store(&folder.path().join(Plan::INPUTS), &node.files)
@@ -218,6 +225,51 @@ fn write(
     let version = wishes.version;
     fmu::export::write(Contents { model: &model, version, run_dir: folder.path(), library }, &mut bytes)?;
     Ok(Exported { bytes: bytes.into_inner(), model })
+}
+
+/// The plan without what is this machine's: paths begin at `/fmu` instead of the folder that all files lie in, no node has a core, and
+/// the memory of the run has no name.
+fn portable(plan: &Plan) -> Plan {
+    let mut plan = Plan { run_id: "fmu".to_owned(), clock_cpu: None, ..plan.clone() };
+    let paths: Vec<PathBuf> =
+        plan.nodes.iter().flat_map(|node| node.files.iter().map(|file| file.path.clone())).collect();
+    let root = common_folder(&paths);
+    let moved = |path: &Path| path.strip_prefix(&root).ok().map(|rest| Path::new("/fmu").join(rest));
+    for node in &mut plan.nodes {
+        node.cpu = None;
+        for file in &mut node.files {
+            if let Some(path) = moved(&file.path) {
+                file.path = path;
+            }
+        }
+        each_text(&mut node.parameters, &mut |text| {
+            if paths.iter().any(|path| path == Path::new(text.as_str()))
+                && let Some(path) = moved(Path::new(text.as_str()))
+            {
+                *text = path.to_string_lossy().into_owned();
+            }
+        });
+    }
+    plan
+}
+
+/// The deepest folder that all `paths` lie in.
+fn common_folder(paths: &[PathBuf]) -> PathBuf {
+    let mut folders = paths.iter().filter_map(|path| path.parent());
+    let Some(first) = folders.next() else { return PathBuf::from("/") };
+    folders.fold(first.to_owned(), |common, folder| {
+        common.ancestors().find(|ancestor| folder.starts_with(ancestor)).unwrap_or(Path::new("/")).to_owned()
+    })
+}
+
+/// Calls `change` on each text in `value`.
+fn each_text(value: &mut serde_json::Value, change: &mut dyn FnMut(&mut String)) {
+    match value {
+        serde_json::Value::String(text) => change(text),
+        serde_json::Value::Array(values) => values.iter_mut().for_each(|value| each_text(value, change)),
+        serde_json::Value::Object(table) => table.values_mut().for_each(|value| each_text(value, change)),
+        _ => {}
+    }
 }
 
 /// The name of the file at `path` as the name of a library: letters, digits and `_`.

@@ -122,7 +122,11 @@ impl Simulation {
     ///
     /// # Errors
     /// If there is no such node.
+    ///
+    /// # Panics
+    /// If a tick has begun.
     pub fn step_last(&mut self, name: &str) -> Result<(), BusError> {
+        assert_eq!(self.begun, 0, "nodes do not change their order within a tick");
         let named = self.members.iter().find(|member| member.part.name() == name).map(|member| member.node);
         let Some(named) = named else {
             let known = self.members.iter().map(|member| member.part.name().to_owned()).collect::<Vec<_>>();
@@ -154,12 +158,12 @@ impl Simulation {
 
     /// Computes the next tick of the members up to the number `end` that have not computed it.
     fn compute(&mut self, end: usize) -> Result<(), BusError> {
-        let (tick, begun) = (self.tick, self.begun.min(end));
-        self.begun = end;
-        for member in &mut self.members[begun..end] {
+        let tick = self.tick;
+        for member in self.members.iter_mut().take(end).skip(self.begun) {
             if tick.is_multiple_of(member.period_ticks) {
                 member.step(tick, &mut self.samples)?;
             }
+            self.begun += 1;
         }
         Ok(())
     }

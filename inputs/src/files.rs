@@ -168,7 +168,7 @@ fn stored(folder: &Path, files: &[InputFile], path: &Path) -> Result<Content> {
     let listed = files.iter().find(|file| file.path == path).ok_or_else(|| {
         Error::new(
             ErrorKind::NotFound,
-            "it was not read when the run began; name it in the manifest with vehicle, scene, gains or data",
+            "it was not read when the run began; name it in the manifest with vehicle, scene, gains, data or fmu",
         )
     })?;
     store::get(folder, &listed.sha256).map(Content::new)

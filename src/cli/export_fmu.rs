@@ -53,7 +53,7 @@ pub fn export_fmu(arguments: &ExportFmuArguments) -> Result<bool> {
         bail!("--fmi: expected 2 or 3, found {}", arguments.fmi);
     };
     let name = arguments.file.file_stem().unwrap_or_default();
-    let out = arguments.out.clone().unwrap_or_else(|| Path::new(name).with_extension("fmu"));
+    let out = arguments.out.clone().unwrap_or_else(|| format!("{}.fmu", name.to_string_lossy()).into());
     if is_same(&out, &arguments.file) {
         bail!("{} is what is read: name another file", out.display());
     }

@@ -123,7 +123,11 @@ fn one_of_fmi_3_flies_the_same_in_its_own_units() {
     fly(&place, &three, "three.mcap").flown();
     fly(&place, &fmus.shipped(&place, "Controller.fmu"), "two.mcap").flown();
     let [two, three] = ["two.mcap", "three.mcap"].map(|name| commands(&place, name, TOPIC));
-    let difference = two.iter().zip(&three).map(|(two, three)| (two - three).abs()).fold(0.0, f64::max);
+    let difference = two
+        .iter()
+        .zip(&three)
+        .map(|(two, three)| (two - three).abs())
+        .fold(0.0, |most: f64, one| if one.is_nan() { f64::NAN } else { most.max(one) });
     // The height in cm and the tilt in degrees cost the last digit.
     assert!(two.len() == 4 * 8000 && two.len() == three.len() && difference < 1e-6, "{difference}");
 }
@@ -176,6 +180,23 @@ fn its_state_goes_over_to_a_successor_and_into_a_checkpoint() {
         commands(&place, "whole.mcap", TOPIC) == commands(&place, "swap.mcap", TOPIC),
         "the successor computes otherwise"
     );
+}
+
+/// Start values are part of the state: a successor with others is given none, so that they hold.
+#[test]
+fn a_successor_with_other_start_values_begins_anew() {
+    let Some(fmus) = fmus() else { return };
+    let place = Place::new();
+    let whole = fs::read_to_string(fmus.shipped(&place, "Controller.fmu")).unwrap();
+    let process = whole[whole.find("kind = \"fmu\"").unwrap()..].split("\n[process.pilot]").next().unwrap();
+    let process =
+        process.replace("[process.controller.", "[swap.with.").replace("outputs.command = {", "# {");
+    let process = process.replace("altitude_gain = 12.0", "altitude_gain = 6.0");
+    let swap = format!("{whole}\n[[swap]]\nprocess = \"controller\"\nat_tick = 2000\n[swap.with]\n{process}");
+    let swap = place.write("swap.toml", swap);
+    let ended = place.call(&["run", &swap, "--record", &place.path("swap.mcap"), "--json"]);
+    let summary = ended.json();
+    assert_ne!(summary["successions"][0]["hand_over"], "state", "{summary}");
 }
 
 /// An FMU of these entries.
@@ -265,10 +286,7 @@ fn a_state_that_is_none_is_refused_and_flown_without() {
     let process = format!("environment = {}\n", fmus.environment());
     let manifest = beside(&place, &fmus.path("Forgetful.fmu"), &process, mapped);
     let ended = place.call(&["check", &manifest]);
-    assert!(
-        ended.error.contains("a replay shows that it does not: after its state was restored in"),
-        "{ended}"
-    );
+    assert!(ended.error.contains("a replay does not prove it: after its state was restored in"), "{ended}");
     assert!(ended.error.contains("`y` is "), "{ended}");
     let manifest = beside(&place, &fmus.path("Forgetful.fmu"), &process, &format!("{mapped}state = false\n"));
     let ended = fly(&place, &manifest, "flight.mcap");
@@ -311,6 +329,12 @@ fn what_does_not_fit_is_said_by_check_with_its_key() {
             mapped("seconds =", "weight ="),
             "`parameters.inputs.weight` is in `kg`, and the field is in `s`",
         ),
+        (
+            "",
+            mapped("\"state.position\"", "[\"state.position\", \"state.position.x\", \"state.rotor_speed\"]"),
+            "has 3 elements",
+        ),
+        ("", mapped("\"state.stamp.sec\"", "\"state\""), "is `state`; a field is `PORT.FIELD`"),
         ("", mapped("seconds =", "steps ="), "`parameters.inputs.steps` is no input of the FMU"),
         (
             "",
@@ -398,7 +422,7 @@ fn what_is_no_fmu_for_this_machine_is_refused() {
         ),
         (
             fmu("i.fmu", &xml.replace("Token=\"native\"", "Token=\"other\""), (&path, library())),
-            "the token or the path of the resources is wrong",
+            "the token is wrong",
         ),
         (
             fmu("j.fmu", &xml.replace("0.0005", "0.003"), (&path, library())),
@@ -535,9 +559,16 @@ fn a_simulation_as_an_fmu_is_valid_and_its_trajectory_is_that_of_the_bus_bit_for
             assert_eq!((differs, rows.len()), (None, 3000), "{topic} {field} as FMI {version}");
         }
     }
-    // Two exports are the same bytes.
+    // Two exports are the same bytes, also from another folder: nothing in it is of this machine.
+    for folder in ["manifests", "vehicles"] {
+        fs::create_dir(place.path(folder)).unwrap();
+    }
+    for file in ["manifests/hover.toml", "vehicles/hummingbird.toml"] {
+        fs::copy(repository(file), place.path(file)).unwrap();
+    }
     let again = place.path("again.fmu");
-    place.call(&[&["export-fmu", &manifest, "--out", &again], &short[..]].concat()).with_code(0);
+    let moved = place.path("manifests/hover.toml");
+    place.call(&[&["export-fmu", &moved, "--out", &again], &short[..]].concat()).with_code(0);
     assert!(
         fs::read(again).unwrap() == fs::read(place.path("hover2.fmu")).unwrap(),
         "another export differs"
@@ -549,16 +580,20 @@ fn a_vehicle_as_an_fmu_joins_a_run_as_its_plant() {
     let place = Place::new();
     let fmu = place.path("hummingbird.fmu");
     place.call(&["export-fmu", &repository("vehicles/hummingbird.toml"), "--out", &fmu]).with_code(0);
+    let commands: String =
+        (0..4).map(|rotor| format!("\"controller.command.command[{rotor}]\" = 77.5\n")).collect();
     let text = format!(
         "[run]\nrate_hz = 1000\nduration_s = 0.5\n[process.plant]\nkind = \"fmu\"\nfmu = {fmu:?}\n\
          outputs.state = {{ type = \"hummingbus_msgs/msg/PlantState\" }}\n[process.plant.parameters.outputs]\n\
          \"plant.state.position.z\" = \"state.position.z\"\n\"plant.state.velocity.z\" = \"state.velocity.z\"\n\
-         [process.plant.parameters.start]\nseed = 7\n[process.recorder]\nkind = \"recorder\"\n"
+         [process.plant.parameters.start]\nseed = 7\n{commands}[process.recorder]\nkind = \"recorder\"\n"
     );
     fly(&place, &place.write("plant.toml", text), "plant.mcap").with_code(0);
-    // Its inputs keep the commands of hover.
+    // Its inputs keep the commands that they begin with: 1 count above hover, with which it climbs.
     let height = column(&place, "plant.mcap", "/plant/state", "position.z");
-    assert!(height.len() == 500 && height.iter().all(|z| (z - 1.0).abs() < 0.01), "{:?}", height.last());
+    let climb = column(&place, "plant.mcap", "/plant/state", "velocity.z");
+    assert!(height.len() == 500 && (0.01..0.2).contains(&(height[499] - 1.0)), "{:?}", height.last());
+    assert!(climb.windows(2).all(|pair| pair[0] <= pair[1] + 1e-12), "it climbs ever faster");
 }
 
 #[test]
@@ -568,17 +603,24 @@ fn an_export_that_cannot_be_is_refused_in_words() {
     let out = place.path("out.fmu");
     let text = place.write("text.fmu", "not an FMU");
     let custom = repository("manifests/fmu-controller.toml");
-    let cases: [(&[&str], &str); 8] = [
+    let computing = repository("manifests/computing-time.toml");
+    let cases: [(&[&str], &str); 11] = [
         (&[&hover, "--without", "control"], "there is no process `control` to leave out; there are"),
         (
             &[&hover, "--without", "imu"],
             "`imu` sends `imu` (hummingbus_msgs/msg/Imu), which an importer cannot",
         ),
         (&[&hover, "--without", "recorder"], "`recorder` sends nothing"),
+        (
+            &[&hover, "--without", "pilot", "--output", "/controller/command"],
+            "depends on what `pilot` sends in the same tick",
+        ),
+        (&[&hover, "--set", "run.seed=5000000000"], "is not one of 32 bits"),
+        (&[&computing, "--without", "t20/controller"], "has a `computing_time`"),
         (&[&hover, "--output", "/no/topic"], "there is no topic /no/topic; there are"),
         (&[&hover, "--fmi", "1"], "--fmi: expected 2 or 3, found 1"),
         (&[&hover, "--out", &text], "text.fmu"),
-        (&[&custom, "--without", "pilot"], "fmu"),
+        (&[&custom, "--without", "pilot"], "needs a process of its own"),
         (&["nowhere.toml"], "nowhere.toml"),
     ];
     for (arguments, words) in cases {

@@ -54,11 +54,17 @@ unsafe extern "C" fn fmi2Instantiate(
     let (name, token, uri, callbacks) =
         unsafe { (text(name), text(token), text(resources), callbacks.as_ref()) };
     let log = callbacks.and_then(|callbacks| Some(Log::Two(callbacks.log?, callbacks.environment)));
-    // file:///x, and file:/x as some tools write it.
     let uri = uri.to_bytes();
-    let path = uri.strip_prefix(b"file://").or_else(|| uri.strip_prefix(b"file:")).unwrap_or(uri);
-    let path: Vec<u8> = percent_decode(path).collect();
+    let path: Vec<u8> = percent_decode(path_of(uri)).collect();
     handle::instantiate(name, token, Path::new(OsStr::from_bytes(&path)), log)
+}
+
+/// The path of a URI: of file:///x, file://localhost/x, and file:/x as some tools write it.
+fn path_of(uri: &[u8]) -> &[u8] {
+    match uri.strip_prefix(b"file://") {
+        Some(rest) => &rest[rest.iter().position(|byte| *byte == b'/').unwrap_or(0)..],
+        None => uri.strip_prefix(b"file:").unwrap_or(uri),
+    }
 }
 
 #[unsafe(no_mangle)]
@@ -98,7 +104,12 @@ unsafe extern "C" fn fmi2ExitInitializationMode(instance: *mut c_void) -> c_int 
 #[unsafe(no_mangle)]
 unsafe extern "C" fn fmi2Terminate(instance: *mut c_void) -> c_int {
     // SAFETY: the importer's promise.
-    unsafe { on(instance, |_| Ok(())) }
+    unsafe {
+        on(instance, |simulation| {
+            simulation.end("it was terminated");
+            Ok(())
+        })
+    }
 }
 
 #[unsafe(no_mangle)]
@@ -205,4 +216,16 @@ refused! {
 extern "C" fn fmi2CancelStep(_: *mut c_void) -> c_int {
     // No step is ever under way.
     ERROR
+}
+
+#[cfg(test)]
+mod tests {
+    use super::path_of;
+
+    #[test]
+    fn a_uri_of_a_file_with_and_without_an_authority_is_a_path() {
+        for uri in ["file:///a/b%20c", "file://localhost/a/b%20c", "file:/a/b%20c", "/a/b%20c"] {
+            assert_eq!(path_of(uri.as_bytes()), b"/a/b%20c", "{uri}");
+        }
+    }
 }

@@ -81,7 +81,12 @@ unsafe extern "C" fn fmi3ExitInitializationMode(instance: *mut c_void) -> c_int 
 #[unsafe(no_mangle)]
 unsafe extern "C" fn fmi3Terminate(instance: *mut c_void) -> c_int {
     // SAFETY: the importer's promise.
-    unsafe { on(instance, |_| Ok(())) }
+    unsafe {
+        on(instance, |simulation| {
+            simulation.end("it was terminated");
+            Ok(())
+        })
+    }
 }
 
 #[unsafe(no_mangle)]
@@ -120,6 +125,13 @@ unsafe extern "C" fn fmi3DoStep(
     unsafe { on(instance, step) }
 }
 
+/// Refuses a number of values that is not that of the references: no variable is an array.
+fn require_scalars(references: usize, values: usize) -> Result<(), String> {
+    let differ =
+        || Err(format!("there are {references} references and {values} values; no variable is an array"));
+    if references == values { Ok(()) } else { differ() }
+}
+
 /// The functions that read and write variables of one type.
 macro_rules! variables {
     ($($type:ty: $get:ident $read:expr, $set:ident $write:expr;)*) => {
@@ -135,6 +147,7 @@ macro_rules! variables {
                 // SAFETY: the importer's promise.
                 let (references, places) = unsafe { (values(references, count), places(first, length)) };
                 let get = |simulation: &mut Simulation| {
+                    require_scalars(count, length)?;
                     for (reference, place) in references.iter().zip(places) {
                         let number = simulation.get(*reference)?;
                         let read: Option<$type> = $read(number);
@@ -157,6 +170,7 @@ macro_rules! variables {
                 // SAFETY: the importer's promise.
                 let (references, numbers) = unsafe { (values(references, count), values(first, length)) };
                 let set = |simulation: &mut Simulation| {
+                    require_scalars(count, length)?;
                     let mut pairs = references.iter().zip(numbers);
                     pairs.try_for_each(|(reference, number)| simulation.set(*reference, $write(*number)))
                 };

@@ -81,10 +81,18 @@ pub unsafe fn free(instance: *mut c_void) {
 pub unsafe fn on(instance: *mut c_void, call: impl FnOnce(&mut Simulation) -> Result<(), String>) -> c_int {
     // SAFETY: the caller's promise.
     let Some(handle) = (unsafe { instance.cast::<Handle>().as_mut() }) else { return ERROR };
-    let simulation = &mut handle.simulation;
-    match caught(|| call(simulation)) {
+    let mut is_through = false;
+    let called = caught(|| {
+        let called = call(&mut handle.simulation);
+        is_through = true;
+        called
+    });
+    match called {
         Ok(()) => OK,
         Err(reason) => {
+            if !is_through {
+                handle.simulation.end(&reason);
+            }
             if let Some(log) = &handle.log {
                 log.error(&handle.name, &reason);
             }
@@ -137,7 +145,8 @@ pub unsafe fn places<'a, T>(first: *mut T, count: usize) -> &'a mut [T] {
     if count == 0 { &mut [] } else { unsafe { std::slice::from_raw_parts_mut(first, count) } }
 }
 
-/// Declares functions of the standard that are refused.
+/// Declares functions of the standard that are refused. They take the instance and ignore the arguments behind it, which the callers
+/// of both platforms' C put in registers and on the stack and take away themselves.
 macro_rules! refused {
     ($($function:ident)*) => {
         $(

@@ -24,6 +24,8 @@ pub struct Simulation {
     seed: u64,
     /// Once it is initialized.
     running: Option<bus::Simulation>,
+    /// The reason why it cannot go on: until it is reset.
+    ended: Option<String>,
     actions: Actions,
 }
 
@@ -68,7 +70,17 @@ impl Simulation {
             variables.push(Variable { source: variable.source.clone(), field });
         }
         let seed = model.seed;
-        Ok(Self { model, plan, files, variables, ports, seed, running: None, actions: Actions::new() })
+        Ok(Self {
+            model,
+            plan,
+            files,
+            variables,
+            ports,
+            seed,
+            running: None,
+            ended: None,
+            actions: Actions::new(),
+        })
     }
 
     /// Makes the nodes, and computes what they send before the importer's first step.
@@ -76,6 +88,9 @@ impl Simulation {
     /// # Errors
     /// A node cannot be made, or fails.
     pub fn initialize(&mut self) -> Result<(), String> {
+        if self.running.is_some() {
+            return Err("it is initialized already".to_owned());
+        }
         let known = registry();
         let member = |(node, kind): &(usize, String)| -> Result<(usize, &'static Registration), String> {
             let component = known.find(kind).ok_or_else(|| format!("there is no kind `{kind}`"))?;
@@ -120,7 +135,7 @@ impl Simulation {
     /// # Errors
     /// None that could not have been before.
     pub fn reset(&mut self) -> Result<(), String> {
-        (self.running, self.seed, self.actions) = (None, self.model.seed, Actions::new());
+        (self.running, self.ended, self.seed, self.actions) = (None, None, self.model.seed, Actions::new());
         for (variable, of_model) in self.variables.iter().zip(&self.model.variables) {
             if let Source::Port(port) = &variable.source
                 && let Some(port) = self.ports.get_mut(port)
@@ -130,6 +145,11 @@ impl Simulation {
             }
         }
         Ok(())
+    }
+
+    /// Ends the simulation for `reason`: no step follows, until it is reset.
+    pub fn end(&mut self, reason: &str) {
+        self.ended = Some(reason.to_owned());
     }
 
     /// Time of the simulation, s.
@@ -150,13 +170,13 @@ impl Simulation {
             self.seed = seed.ok_or_else(|| format!("the seed {number} is no whole number from 0 on"))?;
             return Ok(());
         }
-        let name = self.name(reference);
         let variable = self.variables.get(index(reference)?).ok_or_else(|| no_variable(reference))?;
-        let Source::Port(port) = &variable.source else { return Err(format!("`{name}` is an output")) };
+        let name = || &self.model.variables[variable_index(reference)].name;
+        let Source::Port(port) = &variable.source else { return Err(format!("`{}` is an output", name())) };
         let port = self.ports.get_mut(port).ok_or_else(|| no_variable(reference))?;
         port.is_changed = true;
         let written = variable.field.write(&mut port.message, number);
-        written.ok_or_else(|| format!("`{name}` does not hold {number}"))
+        written.ok_or_else(|| format!("`{}` does not hold {number}", name()))
     }
 
     /// The variable `reference`; of one that nothing has sent yet its start value.
@@ -177,15 +197,27 @@ impl Simulation {
                 Some(simulation) => simulation.newest_bytes(topic).map_err(|error| error.to_string())?.1,
             },
         };
-        let start = || Number::Float(self.model.variables[variable_index(reference)].start);
-        Ok(message.and_then(|message| variable.field.read(message)).unwrap_or_else(start))
+        let of_model = &self.model.variables[variable_index(reference)];
+        match message {
+            None => Ok(Number::Float(of_model.start)),
+            Some(message) => {
+                let number = variable.field.read(message);
+                number.ok_or_else(|| {
+                    format!("the newest sample has no `{}`: it has fewer values", of_model.name)
+                })
+            }
+        }
     }
 
     /// Hands the messages of the importer to the agent.
     fn act(&mut self) -> Result<(), String> {
         for (name, port) in &mut self.ports {
             if std::mem::take(&mut port.is_changed) {
-                self.actions.entry(self.model.agent.clone()).or_default().set(name, &port.message)?;
+                if !self.actions.contains_key(&self.model.agent) {
+                    self.actions.insert(self.model.agent.clone(), hummingbus::agent::Action::default());
+                }
+                let action = self.actions.get_mut(&self.model.agent).ok_or("the agent is gone")?;
+                action.set(name, &port.message)?;
             }
         }
         Ok(())
@@ -195,13 +227,12 @@ impl Simulation {
         &mut self,
         compute: impl FnOnce(&mut bus::Simulation) -> Result<(), BusError>,
     ) -> Result<(), String> {
+        if let Some(reason) = &self.ended {
+            return Err(format!("the simulation has ended: {reason}"));
+        }
         let simulation = self.running.as_mut().ok_or("the simulation is not initialized")?;
-        acting(&mut self.actions, || compute(simulation)).map_err(|error| error.to_string())
-    }
-
-    fn name(&self, reference: u32) -> String {
-        let variable = self.model.variables.get(variable_index(reference));
-        variable.map_or_else(|| reference.to_string(), |variable| variable.name.clone())
+        let computed = acting(&mut self.actions, || compute(simulation)).map_err(|error| error.to_string());
+        computed.inspect_err(|reason| self.ended = Some(reason.clone()))
     }
 }
 

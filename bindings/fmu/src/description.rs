@@ -2,7 +2,7 @@
 //!
 //! Read here and not with `fmi-schema`: its release 0.8 has no units of FMI 2.0, and refuses attributes that it does not know.
 
-use crate::units::BaseUnit;
+use crate::units::{BASE_UNITS, BaseUnit};
 use crate::values::ValueType;
 use anyhow::{Context, Result, bail};
 use roxmltree::{Document, Node};
@@ -26,6 +26,8 @@ pub enum Causality {
     Output,
     /// Set before the first step.
     Parameter,
+    /// Decides sizes of arrays, and is set in a mode of its own.
+    Structural,
     /// Anything else, such as a local variable.
     Other,
 }
@@ -43,6 +45,8 @@ pub struct Variable {
     pub causality: Causality,
     /// Name of its unit, if it has one.
     pub unit: Option<String>,
+    /// True if it is a difference, to which the offset of a unit does not apply.
+    pub is_relative: bool,
     /// Number of its elements: 1 for a scalar; `None` if parameters decide it.
     pub elements: Option<usize>,
 }
@@ -146,11 +150,13 @@ fn variable(node: Node<'_, '_>, version: Version, types: &BTreeMap<&str, &str>) 
         let causality = match node.attribute("causality") {
             Some("input") => Causality::Input,
             Some("output") => Causality::Output,
-            Some("parameter" | "structuralParameter") => Causality::Parameter,
+            Some("parameter") => Causality::Parameter,
+            Some("structuralParameter") => Causality::Structural,
             _ => Causality::Other,
         };
         let elements = elements(typed).with_context(|| format!("variable `{name}`"))?;
-        Ok(Variable { name, reference, value_type, causality, unit, elements })
+        let is_relative = is_true(typed, "relativeQuantity");
+        Ok(Variable { name, reference, value_type, causality, unit, is_relative, elements })
     })())
 }
 
@@ -200,8 +206,8 @@ fn units(root: Node<'_, '_>) -> Result<BTreeMap<String, BaseUnit>> {
     let mut units = BTreeMap::new();
     for unit in child(root, "UnitDefinitions").into_iter().flat_map(|list| list.children()) {
         let (Some(name), Some(base)) = (unit.attribute("name"), child(unit, "BaseUnit")) else { continue };
-        let mut exponents = [0; 7];
-        for (exponent, symbol) in exponents.iter_mut().zip(["kg", "m", "s", "A", "K", "mol", "cd"]) {
+        let mut exponents = [0; 8];
+        for (exponent, symbol) in exponents.iter_mut().zip(BASE_UNITS) {
             let Some(text) = base.attribute(symbol) else { continue };
             *exponent = text.parse().with_context(|| format!("unit `{name}` has {symbol} = `{text}`"))?;
         }
@@ -254,7 +260,7 @@ mod tests {
             (rate.reference, rate.causality, rate.unit.as_deref()),
             (3, Causality::Input, Some("deg/s"))
         );
-        assert_eq!(two.units["deg/s"].exponents, [0, 0, -1, 0, 0, 0, 0]);
+        assert_eq!(two.units["deg/s"].exponents, [0, 0, -1, 0, 0, 0, 0, 1]);
         assert_eq!(two.variable("on").unwrap().value_type, ValueType::Boolean);
 
         let three = r#"<fmiModelDescription fmiVersion="3.0.1" modelName="m" instantiationToken="t">

@@ -77,12 +77,12 @@ pub enum Source {
 }
 
 impl ModelVariable {
-    /// The variables of the message `schema` from `source`, under names that begin with `prefix`: all numbers but the stamp. Of
+    /// The variables of the message `schema` from `source`, under names that begin with `prefix`: all numbers but stamps and padding. Of
     /// a sequence those that `example` has. `example` gives their start values.
     #[must_use]
     pub fn all(prefix: &str, source: &Source, schema: &'static Schema, example: &[u8]) -> Vec<Self> {
-        let is_stamp = |field: &Field| field.path.split('.').any(|part| part == "stamp");
-        let fields = fields::all(schema).into_iter().filter(|field| !is_stamp(field));
+        let is_number = |part: &str| part != "stamp" && !part.starts_with("pad");
+        let fields = fields::all(schema).into_iter().filter(|field| field.path.split('.').all(is_number));
         let variables = fields.filter_map(|field| {
             let start = field.read(example)?.float();
             Some(Self {

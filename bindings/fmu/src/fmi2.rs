@@ -1,7 +1,7 @@
 //! Instances of FMI 2.0.
 
 use crate::description::Description;
-use crate::functions::{Component, StateFunctions, Status, check, functions, is_broken, load};
+use crate::functions::{Component, StateFunctions, Status, check, functions, has_failed, is_broken, load};
 use crate::instance::{Instance, c_text};
 use crate::said::{LOG_MESSAGE_2, LogMessage2, failed};
 use crate::values::Values;
@@ -9,6 +9,7 @@ use libloading::Library;
 use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
 use std::cell::Cell;
 use std::ffi::{CStr, c_char, c_int, c_void};
+use std::mem::ManuallyDrop;
 use std::path::Path;
 use std::ptr::{from_ref, null_mut};
 
@@ -65,7 +66,8 @@ pub struct Fmi2 {
     is_initialized: Cell<bool>,
     /// The FMU keeps a pointer to them.
     _callbacks: Box<Callbacks>,
-    _library: Library,
+    /// Never unloaded: few libraries bear that, and the process ends with the run.
+    _library: ManuallyDrop<Library>,
 }
 
 impl Fmi2 {
@@ -109,7 +111,14 @@ impl Fmi2 {
             return Err(failed("fmi2Instantiate", "no instance"));
         }
         let is_initialized = Cell::new(false);
-        Ok(Self { functions, states, component, is_initialized, _callbacks: callbacks, _library: library })
+        Ok(Self {
+            functions,
+            states,
+            component,
+            is_initialized,
+            _callbacks: callbacks,
+            _library: ManuallyDrop::new(library),
+        })
     }
 }
 
@@ -120,7 +129,7 @@ impl Drop for Fmi2 {
         }
         // SAFETY: the instance is alive, and is not used after this.
         unsafe {
-            if self.is_initialized.get() {
+            if self.is_initialized.get() && !has_failed() {
                 (self.functions.fmi2Terminate)(self.component);
             }
             (self.functions.fmi2FreeInstance)(self.component);
@@ -192,8 +201,9 @@ impl Instance for Fmi2 {
     }
 
     fn step(&self, time_s: f64, period_s: f64) -> Result<(), String> {
-        // SAFETY: the instance is alive. No state from before this point is restored during a step.
-        check("fmi2DoStep", unsafe { (self.functions.fmi2DoStep)(self.component, time_s, period_s, 1) })
+        // A state from before this point may be restored: a replay does so.
+        // SAFETY: the instance is alive.
+        check("fmi2DoStep", unsafe { (self.functions.fmi2DoStep)(self.component, time_s, period_s, 0) })
     }
 
     fn states(&self) -> Option<(&StateFunctions, Component)> {

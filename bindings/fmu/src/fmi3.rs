@@ -1,13 +1,14 @@
 //! Instances of FMI 3.0.
 
 use crate::description::Description;
-use crate::functions::{Component, StateFunctions, Status, check, functions, is_broken, load};
+use crate::functions::{Component, StateFunctions, Status, check, functions, has_failed, is_broken, load};
 use crate::instance::{Instance, c_text};
 use crate::said::{failed, log_message_3};
 use crate::values::Values;
 use libloading::Library;
 use std::cell::Cell;
 use std::ffi::{CStr, c_char, c_int, c_void};
+use std::mem::ManuallyDrop;
 use std::path::Path;
 use std::ptr::{null, null_mut};
 
@@ -34,7 +35,7 @@ functions! {
         fmi3EnterInitializationMode: fn(Component, bool, f64, f64, bool, f64) -> Status;
         fmi3ExitInitializationMode: fn(Component) -> Status;
         fmi3Terminate: fn(Component) -> Status;
-        fmi3DoStep: fn(Component, f64, f64, bool, *mut bool, *mut bool, *mut bool, *mut f64) -> Status;
+        fmi3DoStep: fn(Component, f64, f64, bool, *mut u8, *mut u8, *mut u8, *mut f64) -> Status;
         fmi3GetFloat64: fn(Component, *const u32, usize, *mut f64, usize) -> Status;
         fmi3SetFloat64: fn(Component, *const u32, usize, *const f64, usize) -> Status;
         fmi3GetFloat32: fn(Component, *const u32, usize, *mut f32, usize) -> Status;
@@ -55,8 +56,8 @@ functions! {
         fmi3SetUInt16: fn(Component, *const u32, usize, *const u16, usize) -> Status;
         fmi3GetUInt8: fn(Component, *const u32, usize, *mut u8, usize) -> Status;
         fmi3SetUInt8: fn(Component, *const u32, usize, *const u8, usize) -> Status;
-        fmi3GetBoolean: fn(Component, *const u32, usize, *mut bool, usize) -> Status;
-        fmi3SetBoolean: fn(Component, *const u32, usize, *const bool, usize) -> Status;
+        fmi3GetBoolean: fn(Component, *const u32, usize, *mut u8, usize) -> Status;
+        fmi3SetBoolean: fn(Component, *const u32, usize, *const u8, usize) -> Status;
         fmi3SetString: fn(Component, *const u32, usize, *const *const c_char, usize) -> Status;
     }
 }
@@ -67,7 +68,8 @@ pub struct Fmi3 {
     states: Option<StateFunctions>,
     component: Component,
     is_initialized: Cell<bool>,
-    _library: Library,
+    /// Never unloaded: few libraries bear that, and the process ends with the run.
+    _library: ManuallyDrop<Library>,
 }
 
 impl Fmi3 {
@@ -85,15 +87,16 @@ impl Fmi3 {
         let functions = Functions::of(&library)?;
         let states =
             description.saves_state.then(|| StateFunctions::of(&library, STATE_FUNCTIONS)).transpose()?;
-        // With the separator at its end, as the standard asks.
-        let resources = c_text(&format!("{}/", resources.display()))?;
+        // With the separator at its end, as the standard asks; null where there are none.
+        let path = resources.is_dir().then(|| c_text(&format!("{}/", resources.display()))).transpose()?;
+        let resources = path.as_ref().map_or(null(), |path| path.as_ptr());
         let (name, token) = (c_text(name)?, c_text(&description.token)?);
         // SAFETY: the texts live as long as the call.
         let component = unsafe {
             (functions.fmi3InstantiateCoSimulation)(
                 name.as_ptr(),
                 token.as_ptr(),
-                resources.as_ptr(),
+                resources,
                 false,
                 // Messages on: those that are no warnings are dropped by the callback.
                 true,
@@ -109,7 +112,13 @@ impl Fmi3 {
         if component.is_null() {
             return Err(failed("fmi3InstantiateCoSimulation", "no instance"));
         }
-        Ok(Self { functions, states, component, is_initialized: Cell::new(false), _library: library })
+        Ok(Self {
+            functions,
+            states,
+            component,
+            is_initialized: Cell::new(false),
+            _library: ManuallyDrop::new(library),
+        })
     }
 }
 
@@ -120,7 +129,7 @@ impl Drop for Fmi3 {
         }
         // SAFETY: the instance is alive, and is not used after this.
         unsafe {
-            if self.is_initialized.get() {
+            if self.is_initialized.get() && !has_failed() {
                 (self.functions.fmi3Terminate)(self.component);
             }
             (self.functions.fmi3FreeInstance)(self.component);
@@ -183,14 +192,15 @@ impl Instance for Fmi3 {
     }
 
     fn step(&self, time_s: f64, period_s: f64) -> Result<(), String> {
-        let (mut event, mut is_ended, mut is_early, mut reached_s) = (false, false, false, 0.0);
-        // SAFETY: the places live as long as the call. No state from before this point is restored during a step.
+        let (mut event, mut is_ended, mut is_early, mut reached_s) = (0, 0, 0, 0.0);
+        // A state from before this point may be restored: a replay does so.
+        // SAFETY: the places live as long as the call.
         let status = unsafe {
             (self.functions.fmi3DoStep)(
                 self.component,
                 time_s,
                 period_s,
-                true,
+                false,
                 &mut event,
                 &mut is_ended,
                 &mut is_early,
@@ -198,10 +208,15 @@ impl Instance for Fmi3 {
             )
         };
         check("fmi3DoStep", status)?;
-        if is_ended {
-            return Err(failed("fmi3DoStep", "terminateSimulation: the FMU ends the simulation"));
+        let asked = [
+            (is_ended, "terminateSimulation: the FMU ends the simulation"),
+            (is_early, "earlyReturn, which was not allowed"),
+            (event, "eventHandlingNeeded, and events are not handled here"),
+        ];
+        match asked.iter().find(|(flag, _)| *flag != 0) {
+            Some((_, what)) => Err(failed("fmi3DoStep", what)),
+            None => Ok(()),
         }
-        Ok(())
     }
 
     fn states(&self) -> Option<(&StateFunctions, Component)> {

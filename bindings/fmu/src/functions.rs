@@ -1,8 +1,9 @@
 //! Functions of an FMU's shared library. Their declarations are the standard's: FMI 2.0.4, `fmi2FunctionTypes.h`, and FMI
 //! 3.0.1, `fmi3FunctionTypes.h`.
 
-use crate::said::failed;
+use crate::said::{failed, forget_last};
 use libloading::Library;
+use libloading::os::unix::{Library as UnixLibrary, RTLD_LOCAL, RTLD_NOW};
 use std::ffi::{c_int, c_void};
 use std::path::Path;
 use std::ptr::null_mut;
@@ -10,6 +11,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Set when a function returned `fatal`: then the standard allows no further call, not even one that frees.
 static IS_BROKEN: AtomicBool = AtomicBool::new(false);
+
+/// Set when a function returned `error`: then an instance is not terminated, only freed.
+static HAS_FAILED: AtomicBool = AtomicBool::new(false);
+
+/// True if a function of the FMU has returned `error`.
+pub fn has_failed() -> bool {
+    HAS_FAILED.load(Ordering::Relaxed)
+}
 
 /// True if no function of the FMU may be called any more.
 pub fn is_broken() -> bool {
@@ -21,9 +30,10 @@ pub fn is_broken() -> bool {
 /// # Errors
 /// It cannot be loaded, such as for a library that it needs itself.
 pub fn load(path: &Path) -> Result<Library, String> {
+    // All symbols now: one that is missing would end the process at its first call.
     // SAFETY: the FMU is the user's choice; what it does when it is loaded is up to it.
-    let library = unsafe { Library::new(path) };
-    library.map_err(|error| {
+    let library = unsafe { UnixLibrary::open(Some(path), RTLD_NOW | RTLD_LOCAL) };
+    library.map(Library::from).map_err(|error| {
         let error = error.to_string();
         // FMUs of Python's tools expect that whoever loads them has the interpreter.
         let help = if error.contains("undefined symbol: _Py") || error.contains("undefined symbol: Py") {
@@ -182,9 +192,15 @@ impl StateFunctions {
 /// It is neither OK nor a warning, with what the FMU says.
 pub fn check(called: &str, status: Status) -> Result<(), String> {
     match status {
-        0 | 1 => Ok(()),
+        0 | 1 => {
+            forget_last();
+            Ok(())
+        }
         2 => Err(failed(called, "the status `discard`")),
-        3 => Err(failed(called, "the status `error`")),
+        3 => {
+            HAS_FAILED.store(true, Ordering::Relaxed);
+            Err(failed(called, "the status `error`"))
+        }
         4 => {
             IS_BROKEN.store(true, Ordering::Relaxed);
             Err(failed(called, "the status `fatal`"))

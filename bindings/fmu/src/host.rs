@@ -19,8 +19,9 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// Room for a saved state where the manifest does not say.
+/// Room for a saved state where the manifest does not say, and the largest.
 const STATE_BYTES: usize = 1 << 16;
+const STATE_BYTES_MAX: usize = 1 << 30;
 /// Type of the state, for messages.
 const STATE_TYPE: &str = "FMU state";
 /// Bytes before the FMU's own: the number of steps, and that of the bytes.
@@ -126,7 +127,7 @@ struct Host {
 
 /// A state that a replay has proved.
 struct SavedState {
-    /// Number of this FMU among all: the first bytes of its hash.
+    /// Number of this FMU with its start values and period among all.
     configuration: u64,
     /// Bytes of room.
     room: usize,
@@ -156,13 +157,15 @@ impl Host {
         let start = start_values(&description, &parameters.start)?;
         let make = || started(&archive, &description, node.name(), &start);
         let saves_state = saves_state(&description, parameters.state)?;
+        let room = parameters.state_bytes.unwrap_or(STATE_BYTES);
+        if room > STATE_BYTES_MAX {
+            return Err(format!("`parameters.state_bytes` is {room}; expected at most {STATE_BYTES_MAX}"));
+        }
         if saves_state {
             prove(&make, &description, parameters, period_s)?;
         }
-        let state = saves_state.then(|| SavedState {
-            configuration: u64::from_str_radix(&sha256(&bytes)[..16], 16).unwrap_or_default(),
-            room: parameters.state_bytes.unwrap_or(STATE_BYTES),
-        });
+        let state = saves_state
+            .then(|| SavedState { configuration: configuration(&bytes, &parameters.start, period_s), room });
         let instance = make()?;
         Ok(Self {
             instance,
@@ -181,6 +184,8 @@ impl Host {
         let state = self.instance.save()?;
         let (head, room) = bytes.split_at_mut(HEAD_BYTES);
         let found = state.len();
+        // Also of a state that does not fit, for whoever loads it.
+        head[8..].copy_from_slice(&(found as u64).to_le_bytes());
         let Some(place) = room.get_mut(..found) else {
             return Err(format!(
                 "the FMU's state has {found} bytes, and there is room for {}; give parameters.state_bytes, at least {found}",
@@ -188,7 +193,6 @@ impl Host {
             ));
         };
         place.copy_from_slice(&state);
-        head[8..].copy_from_slice(&(found as u64).to_le_bytes());
         Ok(())
     }
 }
@@ -207,19 +211,26 @@ impl Program for Host {
     fn save(&self, bytes: &mut [u8]) {
         bytes.fill(0);
         bytes[..8].copy_from_slice(&self.steps.to_le_bytes());
+        bytes[8..HEAD_BYTES].copy_from_slice(&UNSAVED.to_le_bytes());
         if let Err(reason) = self.write_state(bytes) {
-            bytes[8..HEAD_BYTES].copy_from_slice(&UNSAVED.to_le_bytes());
             self.unsaved.replace(Some(reason));
         }
     }
 
     fn load(&mut self, bytes: &[u8]) -> Result<(), StateError> {
+        StateError::check_size(STATE_TYPE, self.state_size().unwrap_or(0), bytes)?;
         let refused = |reason: String| StateError::Contents { type_name: STATE_TYPE, reason };
         let (head, state) = bytes.split_at(HEAD_BYTES);
         let word = |from: usize| u64::from_le_bytes(head[from..from + 8].try_into().unwrap_or_default());
-        let length = usize::try_from(word(8)).ok().filter(|length| *length <= state.len());
-        let length = length.ok_or_else(|| refused("the FMU did not save it".to_owned()))?;
-        self.instance.restore(&state[..length]).map_err(refused)?;
+        let (length, room) = (word(8), state.len());
+        if length == UNSAVED {
+            return Err(refused("the FMU before did not save it".to_owned()));
+        }
+        let state = usize::try_from(length).ok().and_then(|length| state.get(..length));
+        let state = state.ok_or_else(|| {
+            refused(format!("it has {length} bytes, and parameters.state_bytes leaves room for {room}"))
+        })?;
+        self.instance.restore(state).map_err(refused)?;
         self.steps = word(0);
         Ok(())
     }
@@ -240,6 +251,13 @@ impl Program for Host {
         }
         Ok(())
     }
+}
+
+/// A number that differs for another FMU, and for the same with other start values, which are part of its state, or another
+/// period, in which its time is counted.
+fn configuration(fmu: &[u8], start: &BTreeMap<String, Value>, period_s: f64) -> u64 {
+    let text = format!("{} {} {period_s:?}", sha256(fmu), serde_json::json!(start));
+    u64::from_str_radix(&sha256(text.as_bytes())[..16], 16).unwrap_or_default()
 }
 
 /// An instance after its initialization.
@@ -277,6 +295,9 @@ fn start_values(
 }
 
 fn start_value(description: &Description, variable: &Variable, given: &Value) -> Result<Start, String> {
+    if variable.causality == Causality::Structural {
+        return Err("it is a structural parameter, which is set in the tool that exports the FMU".to_owned());
+    }
     if let Value::String(text) = given {
         let is_text = variable.value_type == crate::values::ValueType::String;
         return if is_text {
@@ -321,14 +342,17 @@ fn require_step(description: &Description, period_s: f64) -> Result<(), String> 
 }
 
 fn saves_state(description: &Description, asked: Option<bool>) -> Result<bool, String> {
-    match asked {
-        Some(true) if !description.saves_state => {
-            Err("`parameters.state` is true, and the FMU does not say that it can save \
-                                                      its state (canSerializeFMUState)"
-                .to_owned())
+    let offered = match (description.saves_state, description.is_once_per_process) {
+        (true, false) => Ok(()),
+        (false, _) => Err("the FMU does not say that it can save its state (canSerializeFMUstate)"),
+        (true, true) => {
+            Err("a process holds only one instance of the FMU, so that its state cannot be proved on another")
         }
-        Some(asked) => Ok(asked),
-        None => Ok(description.saves_state),
+    };
+    match (asked, offered) {
+        (Some(true), Err(reason)) => Err(format!("`parameters.state` is true, and {reason}")),
+        (Some(asked), _) => Ok(asked),
+        (None, offered) => Ok(offered.is_ok()),
     }
 }
 
@@ -351,9 +375,9 @@ fn prove(
     let others = others.filter_map(|variable| probe(&variable.name).ok());
     let outputs: Vec<Probe> = outputs.into_iter().chain(others).collect();
     let first = make()?;
-    proof::replay(first, make, period_s, &inputs, &outputs, description.is_once_per_process).map_err(|reason| {
+    proof::replay(first, make, period_s, &inputs, &outputs).map_err(|reason| {
         format!(
-            "the FMU says that it saves its state, and a replay shows that it does not: {reason}. With parameters.state = false \
+            "the FMU says that it saves its state, and a replay does not prove it: {reason}. With parameters.state = false \
              it flies without: whoever takes its place begins anew, and a checkpoint does not hold it"
         )
     })

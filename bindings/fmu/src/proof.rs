@@ -1,4 +1,4 @@
-//! Whether a saved state is one: the FMU steps, and a replay from the state has to give the same values.
+//! Proof of a saved state: the FMU steps, and a replay from the state has to give the same values.
 //!
 //! Several tools export FMUs that say they save their state and leave part of it out. A controller that is swapped in, or a run
 //! that goes on from a checkpoint, would then differ without a word.
@@ -20,30 +20,37 @@ pub struct Probe {
     pub values: Values,
 }
 
-/// Steps `first`, saves its state and replays it: on the instance itself, and on another one of `make` unless `is_once`.
+/// Steps `first`, saves its state and replays it: on the instance itself, and on another one of `make`.
 /// `inputs` are set to different values at each step, `outputs` are compared.
 ///
 /// # Errors
-/// Reason why the state is not to be trusted.
+/// Reason why the state is not to be trusted, with what was found.
 pub fn replay(
     first: Box<dyn Instance>,
     make: &dyn Fn() -> Result<Box<dyn Instance>, String>,
     period_s: f64,
     inputs: &[Probe],
     outputs: &[Probe],
-    is_once: bool,
 ) -> Result<(), String> {
-    run(&*first, period_s, 0, inputs, outputs)?;
+    let flown = |reason| format!("it fails when it is stepped from its start values: {reason}");
+    let inputs = &started(&*first, inputs).map_err(flown)?;
+    run(&*first, period_s, 0, inputs, outputs).map_err(flown)?;
     let state = first.save()?;
-    let after = run(&*first, period_s, STEPS, inputs, outputs)?;
+    let after = run(&*first, period_s, STEPS, inputs, outputs).map_err(flown)?;
     first.restore(&state)?;
     same(&after, &run(&*first, period_s, STEPS, inputs, outputs)?, "the same instance")?;
-    if is_once {
-        return Ok(());
-    }
     let second = make()?;
     second.restore(&state)?;
     same(&after, &run(&*second, period_s, STEPS, inputs, outputs)?, "another instance")
+}
+
+/// The inputs with the values that the FMU has given them.
+fn started(instance: &dyn Instance, inputs: &[Probe]) -> Result<Vec<Probe>, String> {
+    let mut inputs = inputs.to_vec();
+    for input in &mut inputs {
+        instance.get(&[input.reference], &mut input.values)?;
+    }
+    Ok(inputs)
 }
 
 /// Values of the outputs after each step.
@@ -61,10 +68,13 @@ fn run(
         for (index, input) in inputs.iter().enumerate() {
             let mut values = input.values.clone();
             for element in 0..values.len() {
-                // A small number, another at each step and for each input; booleans and integers switch.
+                // A small change, another at each step and for each input; integers and booleans stay as they are.
                 let number = match values.get(element) {
-                    Number::Float(_) => Number::Float(0.01 * ((step * 7 + index * 3 + element) % 11) as f64),
-                    Number::Integer(_) => Number::Integer(((step + index + element) % 2) as i128),
+                    Number::Float(start) => {
+                        let part = 1e-3 * ((step * 7 + index * 3 + element) % 11) as f64;
+                        Number::Float(if start == 0.0 { part } else { start * (1.0 + part) })
+                    }
+                    integer => integer,
                 };
                 values.set(element, number);
             }
@@ -166,7 +176,7 @@ mod tests {
             let integrator = Integrator { input: Cell::new(0.0), sum: Cell::new(0.0), is_forgetful };
             Ok(Box::new(integrator))
         };
-        replay(make().unwrap(), &make, 0.001, &[probe("u")], &[probe("y")], false)
+        replay(make().unwrap(), &make, 0.001, &[probe("u")], &[probe("y")])
     }
 
     #[test]

@@ -1,13 +1,17 @@
 //! Messages of the FMU: warnings and errors go to the process's output, and the last one explains what fails.
 
 use std::ffi::{CStr, c_char, c_int, c_void};
+use std::io::Write as _;
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// `fmi2OK` and `fmi3OK`.
 const OK: c_int = 0;
 
-/// The last warning or error.
+/// The last warning or error since a function succeeded.
 static LAST: Mutex<String> = Mutex::new(String::new());
+/// True if there is one.
+static HAS_LAST: AtomicBool = AtomicBool::new(false);
 
 unsafe extern "C" {
     /// The callback for messages of FMI 2.0, in `logger.c`.
@@ -63,9 +67,20 @@ unsafe fn note(status: c_int, message: *const c_char) {
     // SAFETY: the caller's promise.
     let message = unsafe { CStr::from_ptr(message) }.to_string_lossy();
     let message = message.trim_end();
-    eprintln!("the FMU says: {message}");
+    // Nobody may read it.
+    let _ = writeln!(std::io::stderr(), "the FMU says: {message}");
     if let Ok(mut last) = LAST.lock() {
         message.clone_into(&mut last);
+        HAS_LAST.store(true, Ordering::Relaxed);
+    }
+}
+
+/// Forgets the last message: it explains nothing that comes later.
+pub fn forget_last() {
+    if HAS_LAST.swap(false, Ordering::Relaxed)
+        && let Ok(mut last) = LAST.lock()
+    {
+        last.clear();
     }
 }
 

@@ -61,8 +61,8 @@ pub enum Values {
     UInt16(Vec<u16>),
     /// Of `UInt8`.
     UInt8(Vec<u8>),
-    /// Of `Boolean` in FMI 3.0.
-    Boolean(Vec<bool>),
+    /// Of `Boolean` in FMI 3.0, of C's `bool`: a byte, whatever the FMU writes into it.
+    Boolean(Vec<u8>),
     /// Of `Boolean` in FMI 2.0, whose booleans are C's `int`.
     Boolean32(Vec<i32>),
 }
@@ -125,7 +125,7 @@ impl Values {
             ValueType::UInt16 => Self::UInt16(vec![0; count]),
             ValueType::UInt8 => Self::UInt8(vec![0; count]),
             ValueType::Boolean if is_fmi2 => Self::Boolean32(vec![0; count]),
-            ValueType::Boolean => Self::Boolean(vec![false; count]),
+            ValueType::Boolean => Self::Boolean(vec![0; count]),
             ValueType::String => return None,
         })
     }
@@ -160,7 +160,7 @@ impl Values {
             Self::UInt32(values) => Number::Integer(values[index].into()),
             Self::UInt16(values) => Number::Integer(values[index].into()),
             Self::UInt8(values) => Number::Integer(values[index].into()),
-            Self::Boolean(values) => Number::Integer(values[index].into()),
+            Self::Boolean(values) => Number::Integer(i128::from(values[index] != 0)),
             Self::Boolean32(values) => Number::Integer(i128::from(values[index] != 0)),
         }
     }
@@ -178,7 +178,7 @@ impl Values {
             Self::UInt32(values) => values[index] = number.integer()?,
             Self::UInt16(values) => values[index] = number.integer()?,
             Self::UInt8(values) => values[index] = number.integer()?,
-            Self::Boolean(values) => values[index] = number.boolean()?,
+            Self::Boolean(values) => values[index] = number.boolean()?.into(),
             Self::Boolean32(values) => values[index] = number.boolean()?.into(),
         }
         Some(())

@@ -2,7 +2,7 @@
 
 use crate::description::{Causality, Description, Variable, Version};
 use crate::fields::{self, Field};
-use crate::units::{self, Conversion};
+use crate::units::{self, BaseUnit, Conversion};
 use crate::values::{Number, Values};
 use bus::dynamic::DynamicTick;
 use bus::schema::Schema;
@@ -132,7 +132,7 @@ fn links(
     ports: &[Port],
 ) -> Result<Vec<Link>, String> {
     if direction == Direction::Inputs && variable.causality != Causality::Input {
-        return Err("is no input of the FMU".to_owned());
+        return Err("is no input of the FMU; parameters.start sets parameters".to_owned());
     }
     let elements =
         variable.elements.ok_or("is an array whose size parameters decide; fixed sizes are known here")?;
@@ -145,7 +145,7 @@ fn links(
         let (port, named) = fields_of(direction, path, ports)?;
         // A sequence has room for more than an array needs.
         let room = if named.iter().all(|field| field.sequence.is_some()) {
-            elements - links.len()
+            elements.saturating_sub(links.len()).max(1)
         } else {
             named.len()
         };
@@ -166,7 +166,9 @@ fn fields_of<'p>(
     path: &str,
     ports: &'p [Port],
 ) -> Result<(&'p Port, Vec<Field>), String> {
-    let (name, field) = path.split_once('.').unwrap_or((path, ""));
+    let Some((name, field)) = path.split_once('.') else {
+        return Err(format!("is `{path}`; a field is `PORT.FIELD`, such as `state.position.z`"));
+    };
     let Some(port) = ports.iter().find(|port| port.name == name) else {
         let names = ports.iter().map(|port| port.name.as_str());
         let help = did_you_mean(name, names, "they are");
@@ -183,7 +185,10 @@ fn fields_of<'p>(
 
 fn conversion(variable: &Variable, field: &Field, description: &Description) -> Result<Conversion, String> {
     let Some(unit) = &variable.unit else { return Ok(Conversion::NONE) };
-    units::conversion(field.unit, unit, description.units.get(unit).copied())
+    let defined = description.units.get(unit).copied();
+    let defined =
+        defined.map(|unit| if variable.is_relative { BaseUnit { offset: 0.0, ..unit } } else { unit });
+    units::conversion(field.unit, unit, defined)
 }
 
 /// Adds a variable to the group of its type; `None` for a string.

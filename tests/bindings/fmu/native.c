@@ -18,8 +18,8 @@ typedef void log_message(void *, int, const char *, const char *);
 void *fmi3InstantiateCoSimulation(const char *name, const char *token, const char *resources, bool visible, bool logging,
                                   bool events, bool early, const uint32_t *required, size_t count, void *environment,
                                   log_message *log, void *update) {
-  if (strcmp(token, "native") != 0 || resources[strlen(resources) - 1] != '/') {
-    log(environment, 3, "logStatusError", "the token or the path of the resources is wrong");
+  if (strcmp(token, "native") != 0 || resources != NULL) {
+    log(environment, 3, "logStatusError", "the token is wrong, or there is a path of resources that the archive does not have");
     return NULL;
   }
   return calloc(1, sizeof(struct model));

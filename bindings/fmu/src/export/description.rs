@@ -2,9 +2,12 @@
 
 use super::{FIRST_REFERENCE, Model, ModelVariable, SEED, SEED_REFERENCE, TIME_REFERENCE};
 use crate::description::Version;
-use crate::units::of_field;
+use crate::units::{BASE_UNITS, of_field};
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
+
+/// Categories of messages.
+const CATEGORIES: &str = "<LogCategories><Category name=\"logStatusError\"/></LogCategories>\n";
 
 /// The description of `model` in `version`.
 pub fn text(model: &Model, version: Version) -> String {
@@ -19,8 +22,8 @@ fn fmi2(model: &Model) -> String {
     let mut xml = format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
          <fmiModelDescription fmiVersion=\"2.0\" modelName=\"{name}\" guid=\"{token}\" generationTool=\"hummingbus\" \
-         variableNamingConvention=\"structured\">\n\
-         <CoSimulation modelIdentifier=\"{name}\" canHandleVariableCommunicationStepSize=\"true\"/>\n{}\
+         variableNamingConvention=\"flat\">\n\
+         <CoSimulation modelIdentifier=\"{name}\"/>\n{}{CATEGORIES}\
          <DefaultExperiment startTime=\"0\" stopTime=\"{duration_s}\" stepSize=\"{tick_s}\"/>\n<ModelVariables>\n\
          <ScalarVariable name=\"time\" valueReference=\"{TIME_REFERENCE}\" causality=\"independent\" variability=\"continuous\">\
          <Real/></ScalarVariable>\n\
@@ -51,11 +54,13 @@ fn fmi2(model: &Model) -> String {
     // Numbers of variables in the file, counted from 1. Outputs change in steps alone, so that none depends on an input of its instant.
     let outputs =
         || numbered(model).filter(|(_, variable)| !variable.is_input()).map(|(reference, _)| reference + 1);
-    let unknowns: String =
-        outputs().map(|index| format!("<Unknown index=\"{index}\" dependencies=\"\"/>")).collect();
+    let of = |attributes: &str| {
+        outputs().map(|index| format!("<Unknown index=\"{index}\"{attributes}/>")).collect::<String>()
+    };
+    let (unknowns, initial) = (of(" dependencies=\"\""), of(""));
     let _ = writeln!(
         xml,
-        "</ModelVariables>\n<ModelStructure><Outputs>{unknowns}</Outputs><InitialUnknowns>{unknowns}</InitialUnknowns>\
+        "</ModelVariables>\n<ModelStructure><Outputs>{unknowns}</Outputs><InitialUnknowns>{initial}</InitialUnknowns>\
          </ModelStructure>\n</fmiModelDescription>"
     );
     xml
@@ -66,9 +71,9 @@ fn fmi3(model: &Model) -> String {
     let mut xml = format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
          <fmiModelDescription fmiVersion=\"3.0\" modelName=\"{name}\" instantiationToken=\"{token}\" \
-         generationTool=\"hummingbus\" variableNamingConvention=\"structured\">\n\
+         generationTool=\"hummingbus\" variableNamingConvention=\"flat\">\n\
          <CoSimulation modelIdentifier=\"{name}\" canHandleVariableCommunicationStepSize=\"true\" \
-         fixedInternalStepSize=\"{tick_s}\"/>\n{}\
+         fixedInternalStepSize=\"{tick_s}\"/>\n{}{CATEGORIES}\
          <DefaultExperiment startTime=\"0\" stopTime=\"{duration_s}\" stepSize=\"{tick_s}\"/>\n<ModelVariables>\n\
          <Float64 name=\"time\" valueReference=\"{TIME_REFERENCE}\" causality=\"independent\" variability=\"continuous\"/>\n\
          <Int32 name=\"{SEED}\" valueReference=\"{SEED_REFERENCE}\" causality=\"parameter\" variability=\"fixed\" \
@@ -94,9 +99,9 @@ fn fmi3(model: &Model) -> String {
         );
     }
     xml += "</ModelVariables>\n<ModelStructure>";
-    for element in ["Output", "InitialUnknown"] {
+    for (element, dependencies) in [("Output", " dependencies=\"\""), ("InitialUnknown", "")] {
         for (reference, _) in numbered(model).filter(|(_, variable)| !variable.is_input()) {
-            let _ = write!(xml, "<{element} valueReference=\"{reference}\" dependencies=\"\"/>");
+            let _ = write!(xml, "<{element} valueReference=\"{reference}\"{dependencies}/>");
         }
     }
     xml += "</ModelStructure>\n</fmiModelDescription>\n";
@@ -117,7 +122,7 @@ fn units(model: &Model) -> String {
 fn definition(name: &str) -> String {
     let Some(unit) = of_field(name) else { return format!("<Unit name=\"{name}\"/>") };
     let mut base = String::new();
-    for (exponent, symbol) in unit.exponents.iter().zip(["kg", "m", "s", "A", "K", "mol", "cd"]) {
+    for (exponent, symbol) in unit.exponents.iter().zip(BASE_UNITS) {
         if *exponent != 0 {
             let _ = write!(base, " {symbol}=\"{exponent}\"");
         }
@@ -176,7 +181,7 @@ mod tests {
             assert_eq!((first.reference, first.causality), (2, Causality::Input));
             let height = read.variable("plant.state.position.z").unwrap();
             assert_eq!((height.unit.as_deref(), height.value_type), (Some("m"), ValueType::Float64));
-            assert_eq!(read.units["m/s"].exponents, [0, 1, -1, 0, 0, 0, 0]);
+            assert_eq!(read.units["m/s"].exponents, [0, 1, -1, 0, 0, 0, 0, 0]);
             assert!(read.variable("plant.state.rotor_speed[3]").is_some());
             assert!(
                 read.variable("plant.state.rotor_speed[4]").is_none()
