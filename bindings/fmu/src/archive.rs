@@ -48,7 +48,7 @@ impl Archive {
 fn extract(archive: &mut ZipArchive<Cursor<&[u8]>>, folder: &Path, mut room: u64) -> Result<()> {
     for index in 0..archive.len() {
         let mut entry = archive.by_index(index)?;
-        let name = entry.name().to_owned();
+        let name = entry.name()?.into_owned();
         let path =
             entry.enclosed_name().with_context(|| format!("its entry `{name}` leads out of the archive"))?;
         let path = folder.join(path);
