@@ -85,7 +85,7 @@ fn node<'p>(plan: &'p Plan, name: &str) -> Result<&'p NodePlan> {
     })
 }
 
-/// The topics that become outputs.
+/// The topics that become outputs: those that are asked for, else those that the process reads with the states of plants, else all.
 fn outputs(plan: &Plan, replaced: &NodePlan, asked: &[String]) -> Result<Vec<String>> {
     let name = |topic: usize| plan.topics[topic].name.clone();
     for asked in asked {
@@ -96,6 +96,10 @@ fn outputs(plan: &Plan, replaced: &NodePlan, asked: &[String]) -> Result<Vec<Str
     }
     if !asked.is_empty() {
         return Ok(asked.to_vec());
+    }
+    let is_own = |topic: usize| replaced.outputs.iter().any(|output| output.topic == topic);
+    if replaced.inputs.is_empty() {
+        return Ok((0..plan.topics.len()).filter(|topic| !is_own(*topic)).map(name).collect());
     }
     let read = replaced.inputs.iter().map(|input| name(input.topic));
     let states = plan.topics.iter().filter(|topic| topic.type_name.ends_with("/PlantState"));

@@ -34,6 +34,14 @@ pub struct ComponentsArguments {
 /// # Errors
 /// If there is no such component, or it cannot be printed.
 pub fn components(arguments: &ComponentsArguments) -> Result<bool> {
+    if let Some(program) = arguments.component.as_deref().and_then(|name| COMPONENTS.program(name)) {
+        if arguments.json {
+            print_json(&[program_json(program)])
+        } else {
+            print_file(&(table([].into_iter()) + &program_row(program)))
+        }?;
+        return Ok(true);
+    }
     let chosen = arguments.component.as_deref().map(find).transpose()?;
     match (chosen, arguments.json) {
         (None, true) => print_json(&all_json())?,
@@ -46,30 +54,32 @@ pub fn components(arguments: &ComponentsArguments) -> Result<bool> {
 
 /// The kinds that are programs, as rows of the table.
 fn programs() -> String {
-    let row = |program: &NodeProgram| {
-        let NodeProgram { name, summary, parameters, .. } = program;
-        let parameters = listed(parameters.iter().map(|name| format!("`{name}`")));
-        let ports = "those of the manifest";
-        format!(
-            "| **`{name}`**: {summary}; a process of its own | {ports} | {ports} | {parameters} | what it can save |\n"
-        )
-    };
-    COMPONENTS.programs().iter().map(row).collect()
+    COMPONENTS.programs().iter().map(program_row).collect()
+}
+
+fn program_row(program: &NodeProgram) -> String {
+    let NodeProgram { name, summary, parameters, .. } = program;
+    let parameters = listed(parameters.iter().map(|name| format!("`{name}`")));
+    let ports = "those of the manifest";
+    format!(
+        "| **`{name}`**: {summary}; a process of its own | {ports} | {ports} | {parameters} | what it can save |\n"
+    )
 }
 
 /// All kinds.
 fn all_json() -> Vec<Value> {
-    let program = |program: &NodeProgram| {
-        json!({
-            "name": program.name,
-            "summary": program.summary,
-            "inputs": "of the manifest",
-            "outputs": "of the manifest",
-            "parameters": program.parameters,
-            "state": "what it can save",
-        })
-    };
-    COMPONENTS.iter().map(json).chain(COMPONENTS.programs().iter().map(program)).collect()
+    COMPONENTS.iter().map(json).chain(COMPONENTS.programs().iter().map(program_json)).collect()
+}
+
+fn program_json(program: &NodeProgram) -> Value {
+    json!({
+        "name": program.name,
+        "summary": program.summary,
+        "inputs": "of the manifest",
+        "outputs": "of the manifest",
+        "parameters": program.parameters,
+        "state": "what it can save",
+    })
 }
 
 fn find(name: &str) -> Result<&'static Registration> {

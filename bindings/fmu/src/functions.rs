@@ -196,7 +196,10 @@ pub fn check(called: &str, status: Status) -> Result<(), String> {
             forget_last();
             Ok(())
         }
-        2 => Err(failed(called, "the status `discard`")),
+        2 => Err(failed(
+            called,
+            "the status `discard`: it did not compute (in PythonFMU do_step returns True if it did)",
+        )),
         3 => {
             HAS_FAILED.store(true, Ordering::Relaxed);
             Err(failed(called, "the status `error`"))

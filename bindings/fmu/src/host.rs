@@ -303,7 +303,7 @@ fn start_value(description: &Description, variable: &Variable, given: &Value) ->
         return if is_text {
             Ok(Start::Text(variable.reference, c_text(text)?))
         } else {
-            Err("it is no string".to_owned())
+            Err(format!("it is a number, found the text {text:?}"))
         };
     }
     let mut values = library::values_of(variable, description.version)?;
@@ -377,8 +377,8 @@ fn prove(
     let first = make()?;
     proof::replay(first, make, period_s, &inputs, &outputs).map_err(|reason| {
         format!(
-            "the FMU says that it saves its state, and a replay does not prove it: {reason}. With parameters.state = false \
-             it flies without: whoever takes its place begins anew, and a checkpoint does not hold it"
+            "the FMU says that it saves its state, and a replay does not prove it: {reason}. It leaves something out, or \
+             is not the same at every run. With parameters.state = false it flies without: whoever takes its place begins anew, and a checkpoint does not hold it"
         )
     })
 }

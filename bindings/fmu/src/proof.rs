@@ -7,7 +7,7 @@ use crate::instance::Instance;
 use crate::values::{Number, Values};
 
 /// Steps before the state is saved, and steps that are replayed.
-const STEPS: usize = 20;
+const STEPS: usize = 200;
 
 /// A variable of the proof: handle, name, and room for its value.
 #[derive(Clone, Debug)]
@@ -184,7 +184,7 @@ mod tests {
         assert_eq!(proved(false), Ok(()));
         let reason = proved(true).unwrap_err();
         assert!(
-            reason.contains("in the same instance, `y` is ") && reason.contains("at step 20"),
+            reason.contains("in the same instance, `y` is ") && reason.contains("at step 200"),
             "{reason}"
         );
     }

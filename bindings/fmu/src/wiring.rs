@@ -150,6 +150,9 @@ fn links(
             named.len()
         };
         for field in named.into_iter().take(room) {
+            if direction == Direction::Outputs && field.path.starts_with("stamp.") {
+                return Err(format!("is `{path}`: the bus fills in the stamp"));
+            }
             let conversion = conversion(variable, &field, description)?;
             links.push(Link { variable: variable.name.clone(), port: port.clone(), field, conversion });
         }

@@ -54,6 +54,10 @@ int fmi3SetFloat64(void *instance, const uint32_t *references, size_t count, con
 
 int fmi3GetFloat64(void *instance, const uint32_t *references, size_t count, double *values, size_t length) {
   struct model *model = instance;
+  if (count == 1 && references[0] == POSITION && length == 3) {
+    memcpy(values, model->position, sizeof model->position);
+    return 0;
+  }
   if (count != 1 || references[0] != PASSED || length != 4) {
     return 3;
   }
@@ -64,6 +68,11 @@ int fmi3GetFloat64(void *instance, const uint32_t *references, size_t count, dou
 
 int fmi3SetInt32(void *instance, const uint32_t *references, size_t count, const int32_t *values, size_t length) {
   ((struct model *)instance)->seconds = values[0];
+  return 0;
+}
+
+int fmi3GetInt32(void *instance, const uint32_t *references, size_t count, int32_t *values, size_t length) {
+  values[0] = ((struct model *)instance)->seconds;
   return 0;
 }
 
@@ -122,7 +131,6 @@ REFUSED(fmi3GetFloat32, float)
 REFUSED(fmi3SetFloat32, const float)
 REFUSED(fmi3GetInt64, int64_t)
 REFUSED(fmi3SetInt64, const int64_t)
-REFUSED(fmi3GetInt32, int32_t)
 REFUSED(fmi3SetInt16, const int16_t)
 REFUSED(fmi3GetInt8, int8_t)
 REFUSED(fmi3SetInt8, const int8_t)
