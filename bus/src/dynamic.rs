@@ -241,7 +241,7 @@ pub trait Program {
     /// Computes a tick.
     ///
     /// # Errors
-    /// What goes wrong: the run ends with it.
+    /// A reason, with which the run ends.
     fn step(&mut self, tick: &mut DynamicTick<'_, '_>) -> Result<(), String>;
 }
 

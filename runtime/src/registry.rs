@@ -38,7 +38,7 @@ pub struct Registry {
 pub struct NodeProgram {
     /// Name in manifests.
     pub name: &'static str,
-    /// What it does, in one line.
+    /// Purpose, in one line.
     pub summary: &'static str,
     /// The names of its parameters.
     pub parameters: &'static [&'static str],

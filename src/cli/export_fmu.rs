@@ -19,7 +19,7 @@ pub const HELP: &str = "Examples:
 const LIBRARY: &str = "libhummingbus_fmu.so";
 const FMU: Kind = Kind { name: "FMU", mark: Mark::Start(b"PK\x03\x04") };
 
-/// What `export-fmu` takes.
+/// Arguments of `export-fmu`.
 #[derive(Args)]
 pub struct ExportFmuArguments {
     /// A manifest, or a vehicle file.

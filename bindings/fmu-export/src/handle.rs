@@ -12,12 +12,12 @@ pub const ERROR: c_int = 3;
 
 /// The importer's callback for messages.
 pub enum Log {
-    /// Of FMI 2.0: environment, instance, status, category, message.
+    /// Callback of FMI 2.0: environment, instance, status, category, message.
     Two(
         unsafe extern "C" fn(*mut c_void, *const c_char, c_int, *const c_char, *const c_char, ...),
         *mut c_void,
     ),
-    /// Of FMI 3.0: environment, status, category, message.
+    /// Callback of FMI 3.0: environment, status, category, message.
     Three(unsafe extern "C" fn(*mut c_void, c_int, *const c_char, *const c_char), *mut c_void),
 }
 

@@ -133,7 +133,7 @@ impl Simulation {
     /// Goes back to where it was before it was initialized, with the start values.
     ///
     /// # Errors
-    /// None that could not have been before.
+    /// Never; the functions of the standard take a result.
     pub fn reset(&mut self) -> Result<(), String> {
         (self.running, self.ended, self.seed, self.actions) = (None, None, self.model.seed, Actions::new());
         for (variable, of_model) in self.variables.iter().zip(&self.model.variables) {

@@ -58,7 +58,7 @@ pub struct Description {
     pub version: Version,
     /// Name of its library, without the ending.
     pub model_identifier: String,
-    /// What the library compares: the GUID of FMI 2.0, the instantiation token of 3.0.
+    /// Text that the library compares: the GUID of FMI 2.0, the instantiation token of 3.0.
     pub token: String,
     /// Its variables, in the order of the file.
     pub variables: Vec<Variable>,

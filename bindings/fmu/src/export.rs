@@ -29,7 +29,7 @@ pub const FIRST_REFERENCE: u32 = 2;
 pub struct Model {
     /// Name of the model and of its library.
     pub name: String,
-    /// What the importer hands to the library, which compares it.
+    /// Text that the importer hands to the library, which compares it.
     pub token: String,
     /// Time of a tick, s.
     pub tick_s: f64,

@@ -126,7 +126,7 @@ impl StateFunctions {
     /// The state of `component` as bytes.
     ///
     /// # Errors
-    /// What the FMU says.
+    /// The reason that the FMU states.
     ///
     /// # Safety
     /// `component` is an instance of the library.
@@ -156,7 +156,7 @@ impl StateFunctions {
     /// Lets `component` go on from the bytes of a state.
     ///
     /// # Errors
-    /// What the FMU says.
+    /// The reason that the FMU states.
     ///
     /// # Safety
     /// `component` is an instance of the library.

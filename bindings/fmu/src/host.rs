@@ -47,7 +47,7 @@ struct Parameters {
     /// Values of variables before the FMU is initialized, in its own units.
     #[serde(default)]
     start: BTreeMap<String, Value>,
-    /// Whether the FMU's state is saved; where absent, if it says that it can.
+    /// True to save the FMU's state, false not to; where absent, the FMU decides.
     state: Option<bool>,
     /// Room for a saved state, in bytes.
     state_bytes: Option<usize>,

@@ -9,31 +9,31 @@ pub trait Instance {
     /// Sets variables.
     ///
     /// # Errors
-    /// What the FMU says.
+    /// The reason that the FMU states.
     fn set(&self, references: &[u32], values: &Values) -> Result<(), String>;
 
     /// Sets a variable of text.
     ///
     /// # Errors
-    /// What the FMU says.
+    /// The reason that the FMU states.
     fn set_text(&self, reference: u32, text: &CStr) -> Result<(), String>;
 
     /// Reads variables.
     ///
     /// # Errors
-    /// What the FMU says.
+    /// The reason that the FMU states.
     fn get(&self, references: &[u32], values: &mut Values) -> Result<(), String>;
 
     /// Computes the initial values, from time 0 on.
     ///
     /// # Errors
-    /// What the FMU says.
+    /// The reason that the FMU states.
     fn initialize(&self) -> Result<(), String>;
 
     /// Steps over `period_s` seconds from `time_s` on.
     ///
     /// # Errors
-    /// What the FMU says.
+    /// The reason that the FMU states.
     fn step(&self, time_s: f64, period_s: f64) -> Result<(), String>;
 
     /// Functions that save its state, if it says that it can.
@@ -42,7 +42,7 @@ pub trait Instance {
     /// Its state as bytes.
     ///
     /// # Errors
-    /// What the FMU says.
+    /// The reason that the FMU states.
     fn save(&self) -> Result<Vec<u8>, String> {
         let (states, component) = self.states().ok_or("it has no functions for its state")?;
         // SAFETY: the component is that of this instance.
@@ -52,7 +52,7 @@ pub trait Instance {
     /// Goes on from the bytes of a state.
     ///
     /// # Errors
-    /// What the FMU says.
+    /// The reason that the FMU states.
     fn restore(&self, state: &[u8]) -> Result<(), String> {
         let (states, component) = self.states().ok_or("it has no functions for its state")?;
         // SAFETY: the component is that of this instance.

@@ -41,29 +41,29 @@ pub enum Number {
 /// Values of variables of one type, as its functions of the standard take them.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Values {
-    /// Of `Float64`.
+    /// Values of `Float64`.
     Float64(Vec<f64>),
-    /// Of `Float32`.
+    /// Values of `Float32`.
     Float32(Vec<f32>),
-    /// Of `Int64`.
+    /// Values of `Int64`.
     Int64(Vec<i64>),
-    /// Of `Int32`.
+    /// Values of `Int32`.
     Int32(Vec<i32>),
-    /// Of `Int16`.
+    /// Values of `Int16`.
     Int16(Vec<i16>),
-    /// Of `Int8`.
+    /// Values of `Int8`.
     Int8(Vec<i8>),
-    /// Of `UInt64`.
+    /// Values of `UInt64`.
     UInt64(Vec<u64>),
-    /// Of `UInt32`.
+    /// Values of `UInt32`.
     UInt32(Vec<u32>),
-    /// Of `UInt16`.
+    /// Values of `UInt16`.
     UInt16(Vec<u16>),
-    /// Of `UInt8`.
+    /// Values of `UInt8`.
     UInt8(Vec<u8>),
-    /// Of `Boolean` in FMI 3.0, of C's `bool`: a byte, whatever the FMU writes into it.
+    /// Values of `Boolean` in FMI 3.0, of C's `bool`: a byte, whatever the FMU writes into it.
     Boolean(Vec<u8>),
-    /// Of `Boolean` in FMI 2.0, whose booleans are C's `int`.
+    /// Values of `Boolean` in FMI 2.0, whose booleans are C's `int`.
     Boolean32(Vec<i32>),
 }
 

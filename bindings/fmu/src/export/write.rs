@@ -12,7 +12,7 @@ use zip::write::SimpleFileOptions;
 /// Contents of an FMU.
 #[derive(Clone, Copy, Debug)]
 pub struct Contents<'c> {
-    /// What it is.
+    /// Model of the simulation.
     pub model: &'c Model,
     /// Version of the standard.
     pub version: Version,
