@@ -27,6 +27,7 @@
 //! - [`urdf`]: bodies of vehicles for other tools
 //! - [`new`]: vehicle files from models of other tools
 //! - [`rights`]: rights that a run lacks are named
+//! - [`autopilots`]: firmware in lockstep
 //! - [`skipped`]: tests that cannot run here
 //! - [`sensors`]: sensors read what they should, and hand over what is under way
 //! - [`surroundings`]: hosts that lack something
@@ -40,6 +41,7 @@
 //! - [`inputs`]: files that are edited after they were read
 
 mod as_printed;
+mod autopilots;
 mod backups;
 mod campaign;
 mod checkpoints;
