@@ -55,7 +55,7 @@ export class TimeControls {
     document.addEventListener("keydown", (event) => {
       const { target } = event;
       // These do something of their own with keys. A button does with the space bar alone, the slider with all but it.
-      const isTyping = target.closest("select, dialog, summary, input:not([type=range])");
+      const isTyping = target.closest("select, dialog[open], summary, input:not([type=range])");
       const isOwn = event.key === " " ? target.closest("button") : target === this.slider;
       if (isTyping || isOwn || event.ctrlKey || event.altKey || event.metaKey || !keys[event.key]) return;
       event.preventDefault();

@@ -34,6 +34,7 @@ assets! {
     "scopes.js": SCRIPT,
     "picker.js": SCRIPT,
     "controls.js": SCRIPT,
+    "run.js": SCRIPT,
     "palette.js": SCRIPT,
     "view.css": STYLE,
     "vendor/three.min.js": SCRIPT,
