@@ -23,10 +23,14 @@ impl Drop for Run {
 }
 
 impl Run {
-    /// The hover at real time, recorded to `recording`.
-    fn start(recording: &Path) -> Self {
+    /// A manifest at real time, recorded to `recording`.
+    fn start(manifest: &str, recording: &Path) -> Self {
         let mut command = Command::new(HUMMINGBUS);
-        command.arg("run").arg(Path::new(ROOT).join("manifests/hover.toml")).arg("--record").arg(recording);
+        command
+            .arg("run")
+            .arg(Path::new(ROOT).join("manifests").join(manifest))
+            .arg("--record")
+            .arg(recording);
         command.args(["--pace", "realtime", "--set", "run.duration_s=4000", "--view", "--no-open", "--json"]);
         let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         let mut errors = BufReader::new(child.stderr.take().unwrap());
@@ -62,7 +66,7 @@ fn a_browser_steers_a_run_with_mouse_and_keys_on_every_screen() {
     let folder = tempfile::tempdir().unwrap();
     for (number, looks) in [&["1280x900"][..], &["390x844", "dark"]].iter().enumerate() {
         let recording = folder.path().join(format!("steered-{number}.mcap"));
-        let run = Run::start(&recording);
+        let run = Run::start("hover.toml", &recording);
         let arguments: Vec<&OsStr> =
             std::iter::once(run.address.as_str()).chain(looks.iter().copied()).map(OsStr::new).collect();
         let seen = look(&readers, "read_run.mjs", &arguments);
@@ -103,4 +107,58 @@ fn require_controls(seen: &Value) {
     for look in ["running", "paused", "refused", "ended"] {
         assert_eq!(seen[look]["overflow"], 0, "{look}");
     }
+}
+
+#[test]
+fn a_browser_flies_a_run_by_sliders_keys_and_a_gamepad() {
+    let Some(readers) = readers() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    for size in ["1280x900", "390x844"] {
+        let recording = folder.path().join(format!("flown-{size}.mcap"));
+        let run = Run::start("by-hand.toml", &recording);
+        let seen = look(&readers, "read_hand.mjs", &[run.address.as_ref(), size.as_ref()]);
+        require_hand(&seen);
+        assert_eq!(run.end()["stopped_early"], true);
+        require_flown(&Recording::open(&recording).unwrap());
+    }
+}
+
+fn require_hand(seen: &Value) {
+    assert_eq!(seen["wrong"], json!([]));
+    let look = |key: &str| &seen[key];
+    let number = |key: &str, channel: &str| seen[key][channel].as_f64().unwrap();
+    let before = look("before");
+    assert_eq!(
+        (&before["isOn"], &before["sent"], &before["altitude"]),
+        (&json!(false), &json!(0), &json!(1.5))
+    );
+    assert_eq!(before["tilt"], "15", "the limits are those of the manifest");
+    assert_eq!((number("slider", "altitude"), number("held", "roll")), (4.0, -15.0));
+    assert_eq!(number("released", "roll"), 0.0, "a key that is let go asks for nothing");
+    assert_eq!((number("gamepad", "roll"), number("gamepad", "pitch")), (0.0, 7.5), "forwards is nose down");
+    assert!(look("gamepad")["pad"].as_str().unwrap().contains("Test pad"), "{}", look("gamepad"));
+    assert!(number("left", "yaw") > 20.0 && number("left", "altitude") < 3.9, "{}", look("left"));
+    let said = look("gone")["said"].as_str().unwrap();
+    assert!(
+        look("gone")["isOn"] == false && said.contains("gamepad has gone") && said.contains("level"),
+        "{said}"
+    );
+    assert!(number("later", "sent") - number("gone", "sent") <= 1.0, "nothing is sent any more");
+    for key in ["before", "gamepad", "gone"] {
+        assert_eq!(look(key)["overflow"], 0, "{key}");
+    }
+}
+
+/// The run has taken what the page asked for, and answered its silence.
+fn require_flown(recording: &Recording) {
+    let fields = ["altitude", "roll", "pitch", "yaw"].map(|field| ("/pilot/set_point", field));
+    let series = recording.series(&fields).unwrap();
+    let [altitude, roll, pitch, yaw] = [0, 1, 2, 3].map(|index| &series[index].value);
+    assert!(altitude[0] == 1.5 && altitude.contains(&4.0), "{altitude:?}");
+    let has = |values: &[f64], asked_deg: f64| {
+        values.iter().any(|value| (value.to_degrees() - asked_deg).abs() < 1e-9)
+    };
+    assert!(has(roll, -15.0) && has(pitch, 7.5));
+    assert_eq!((roll.last(), pitch.last()), (Some(&0.0), Some(&0.0)), "the fallback is level");
+    assert!(*yaw.last().unwrap() > 20_f64.to_radians(), "and holds the yaw");
 }

@@ -41,6 +41,8 @@ fn manifest(place: &Place) -> String {
          [process.clearance]\nkind = \"clearance\"\nscene = {room:?}\ninputs.state = \"/plant/state\"\n\
          [process.hold]\nkind = \"position-hold\"\n\
          inputs = {{ set_point = \"/pilot/set_point\", {estimate} }}\n\
+         [process.person]\nkind = \"operator\"\n\
+         parameters = {{ initial_altitude_m = 1.0, altitudes_m = [0.3, 4.0], tilt_max_deg = 15.0, fallback = \"land\" }}\n\
          [process.ideal]\nkind = \"ideal\"\ninputs.state = \"/plant/state\"\n\
          [process.stand]\nkind = \"propeller-stand\"\nvehicle = {vehicle:?}\n\
          parameters.speeds = [{{ at_s = 0.1, to_rpm = 3900.0 }}]\n\

@@ -132,15 +132,15 @@ fn a_run_that_is_not_alive_is_refused_in_words() {
 }
 
 /// A page as the server sees it: a stream of events, and requests beside it. Dropping it closes it.
-struct Page {
-    host: String,
-    path: String,
+pub struct Page {
+    pub host: String,
+    pub path: String,
     events: BufReader<TcpStream>,
 }
 
 impl Page {
     /// The page of a run that was started with `--view`.
-    fn of(launch: &Launch<'_>) -> Self {
+    pub fn of(launch: &Launch<'_>) -> Self {
         let address = poll("no address", || {
             let said = launch.errors();
             let line = said.lines().find_map(|line| line.strip_prefix("The run in the browser: http://"))?;
@@ -153,7 +153,7 @@ impl Page {
     }
 
     /// The next event for which `is_meant`.
-    fn await_event(&mut self, is_meant: impl Fn(&Value) -> bool) -> Value {
+    pub fn await_event(&mut self, is_meant: impl Fn(&Value) -> bool) -> Value {
         poll("no such event", || {
             let mut line = String::new();
             assert!(self.events.read_line(&mut line).unwrap() > 0, "the stream has ended");
@@ -162,25 +162,30 @@ impl Page {
         })
     }
 
-    fn ask(&self, request: &Value) -> Value {
+    /// Head and body of the answer to `request`.
+    pub fn post(&self, name: &str, request: &Value) -> (String, String) {
         let Self { host, path, .. } = self;
         let (body, mut stream) = (request.to_string(), TcpStream::connect(host).unwrap());
         write!(
             stream,
-            "POST {path}api/ctl HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\nContent-Type: application/json\r\n\
+            "POST {path}api/{name} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\nContent-Type: application/json\r\n\
              Content-Length: {}\r\n\r\n{body}",
             body.len()
         )
         .unwrap();
         let mut answer = String::new();
         stream.read_to_string(&mut answer).unwrap();
-        let (head, body) = answer.split_once("\r\n\r\n").unwrap();
-        assert!(head.starts_with("HTTP/1.1 200"), "{answer}");
-        serde_json::from_str(body).unwrap()
+        answer.split_once("\r\n\r\n").map(|(head, body)| (head.to_owned(), body.to_owned())).unwrap()
+    }
+
+    fn ask(&self, request: &Value) -> Value {
+        let (head, body) = self.post("ctl", request);
+        assert!(head.starts_with("HTTP/1.1 200"), "{head} {body}");
+        serde_json::from_str(&body).unwrap()
     }
 
     /// Asks for what the run does, and returns the tick after it.
-    fn done(&self, request: &Value) -> u64 {
+    pub fn done(&self, request: &Value) -> u64 {
         let answer = self.ask(request);
         assert_eq!(answer["answer"], "done", "{request}: {answer}");
         answer["tick"].as_u64().unwrap()

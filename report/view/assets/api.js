@@ -49,3 +49,9 @@ export async function ask(request) {
   const headers = { "content-type": "application/json" };
   return (await answered("api/ctl", { method: "POST", headers, body: JSON.stringify(request) })).json();
 }
+
+/** Hands set points to a node of the live run. */
+export async function fly(request) {
+  const headers = { "content-type": "application/json" };
+  await answered("api/fly", { method: "POST", headers, body: JSON.stringify(request) });
+}

@@ -116,17 +116,22 @@ async function awaited(report) {
   }
 }
 
-async function start() {
-  const run = new RunControls();
-  window.hummingbus.run = run;
-  const [heard, reportHeld] = [reporter("server"), reporter("held")];
-  await new Promise((isHeard) => {
+/** Hears of the live run from now on; waits for the first news. */
+function hearOf(run) {
+  const [reportServer, reportHeld] = [reporter("server"), reporter("held")];
+  return new Promise((isHeard) => {
     hear((told) => {
       run.take(told.run);
       reportHeld(run.status?.state === "paused" ? HELD : "");
       isHeard();
-    }, heard);
+    }, reportServer);
   });
+}
+
+async function start() {
+  const run = new RunControls();
+  window.hummingbus.run = run;
+  if ((await catalogue()).is_live) await hearOf(run);
   const recordings = await awaited(reporter("start"));
   head(recordings, run.status !== null);
   const durationNs = Math.max(...recordings.map((recording) => recording.duration_ns));

@@ -1,6 +1,7 @@
 // The live run: its state as the server tells it, and its controls.
 
 import { ask, described, GONE } from "./api.js";
+import { Hand } from "./hand.js";
 
 /** Paces that are offered beside the present one: the words of `hummingbus ctl pace`. */
 const PACES = ["0.1", "0.25", "0.5", "realtime", "2", "5", "10", "free"];
@@ -30,6 +31,7 @@ export class RunControls {
   constructor() {
     this.status = null;
     this.facts = null;
+    this.hand = new Hand();
     this.asking = 0;
     this.#listen();
     this.#listenToDialogs();
@@ -54,10 +56,13 @@ export class RunControls {
       for (const hear of this.#heardPace) hear(status.pace);
     }
     this.#show();
-    if (this.facts === null) {
+    if (OVER.includes(status.state)) this.hand.stop("The run has ended.");
+    // A node that is starting may not yet say that it can be flown by hand.
+    if (this.facts === null && status.state !== "starting") {
       this.facts = {};
       this.facts = await described();
-      const { processes } = this.facts;
+      const { processes, operators } = this.facts;
+      this.hand.learn(operators);
       get("swap-process").replaceChildren(...processes.map((name) => Object.assign(document.createElement("option"), { textContent: name })));
     }
   }

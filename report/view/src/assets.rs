@@ -35,6 +35,7 @@ assets! {
     "picker.js": SCRIPT,
     "controls.js": SCRIPT,
     "run.js": SCRIPT,
+    "hand.js": SCRIPT,
     "palette.js": SCRIPT,
     "view.css": STYLE,
     "vendor/three.min.js": SCRIPT,

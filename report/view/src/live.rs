@@ -1,13 +1,27 @@
 //! The live run behind a page: its state, and what the page asks of it.
 
-use anyhow::Result;
+use anyhow::{Context as _, Result, ensure};
+use bus::asked::{Asked, AskedFile};
 use bus::lockstep::LiveView;
 use bus::plan::Plan;
 use runtime::ctl::client;
 use runtime::ctl::protocol::{Answer, Request, State, Status};
 use runtime::run_dir::LiveRun;
+use serde::Deserialize;
 use serde_json::{Value, json};
 use std::sync::OnceLock;
+
+/// Set points that a page asks for.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Asking {
+    /// Node that sends them.
+    process: String,
+    altitude_m: f64,
+    roll_rad: f64,
+    pitch_rad: f64,
+    yaw_rad: f64,
+}
 
 /// A live run that a page shows and steers.
 #[derive(Debug)]
@@ -51,6 +65,44 @@ impl Live {
         client::ask(&self.run, request).unwrap_or_else(|error| Answer::refused(format!("{error:#}")))
     }
 
+    /// Hands set points to the node that sends them.
+    ///
+    /// # Errors
+    /// If they are not finite, or no node of this name takes any.
+    pub fn fly(&self, asking: &Asking) -> Result<()> {
+        let Asking { process, altitude_m, roll_rad, pitch_rad, yaw_rad } = asking;
+        let asked =
+            Asked { altitude_m: *altitude_m, roll_rad: *roll_rad, pitch_rad: *pitch_rad, yaw_rad: *yaw_rad };
+        ensure!(asked.is_finite(), "a set point is not finite");
+        ensure!(self.run.is_live(), "the run has ended");
+        ensure!(
+            self.plan.nodes.iter().any(|node| node.name == *process),
+            "the run has no process `{process}`"
+        );
+        let about =
+            || format!("`{process}` takes no set points of a person: expected a process of kind `operator`");
+        AskedFile::open(&self.run.entry.run_dir, process)
+            .and_then(|file| file.write(&asked))
+            .with_context(about)
+    }
+
+    /// Processes that a person can fly by hand, with their limits.
+    fn operators(&self) -> Vec<Value> {
+        let takes_some = |name: &str| AskedFile::open(&self.run.entry.run_dir, name).is_ok();
+        let operators = self.plan.nodes.iter().filter(|node| takes_some(&node.name));
+        let limits = operators.map(|node| {
+            let stated = |key: &str| node.parameters[key].clone();
+            json!({
+                "process": node.name,
+                "initial_altitude_m": stated("initial_altitude_m"),
+                "altitudes_m": stated("altitudes_m"),
+                "tilt_max_deg": stated("tilt_max_deg"),
+                "fallback": stated("fallback"),
+            })
+        });
+        limits.collect()
+    }
+
     /// Lasting facts about the run.
     pub fn described(&self) -> Value {
         let name = self.run.entry.manifest.file_name().unwrap_or_default().to_string_lossy();
@@ -60,6 +112,7 @@ impl Live {
             "manifest": name,
             "tick_s": self.plan.tick_s(),
             "processes": processes,
+            "operators": self.operators(),
         })
     }
 }

@@ -8,8 +8,9 @@
 //! | `GET  /token=…/api/growth` | JSON: of each recording its duration, blocks and number of topics, if it still grows, and the error that ended reading |
 //! | `POST /token=…/api/frames` | numbers: [`crate::frames`] |
 //! | `POST /token=…/api/curves` | numbers: [`crate::curves`]; the header `x-read` holds the part that was read for them |
-//! | `GET  /token=…/api/events` | events: state of the live run, number of recordings; open for as long as the page is |
+//! | `GET  /token=…/api/events` | events: state of the live run, number of recordings; open for as long as the page of a live run is |
 //! | `GET  /token=…/api/run` | JSON: manifest and processes of the live run; null without one |
+//! | `POST /token=…/api/fly` | nothing: takes set points of a person for a node of kind `operator` |
 //! | `POST /token=…/api/ctl` | JSON: the run's answer to a request of [`runtime::ctl::protocol`] |
 //!
 //! Numbers are 64-bit floats, little-endian, one after the other. It listens on the loopback alone, and answers requests
@@ -20,7 +21,7 @@ use crate::curves::{CurvesRequest, curves};
 use crate::entry::Entry;
 use crate::frames::{FramesRequest, frames};
 use crate::gate::Gate;
-use crate::live::Live;
+use crate::live::{Asking, Live};
 use crate::pages::{Pages, events};
 use crate::readers::Readers;
 use crate::shown::Shown;
@@ -78,6 +79,8 @@ pub struct Server {
 #[derive(Debug)]
 struct Content {
     gate: Gate,
+    /// True for the page of a live run, which hears of it for as long as it is open.
+    is_live: bool,
     /// Absent until the live run has recorded something.
     recordings: OnceLock<Vec<Entry>>,
     /// Absent for recordings that are shown by their names.
@@ -148,16 +151,20 @@ impl Server {
     /// # Errors
     /// If a recording is damaged or the port is taken.
     pub fn new(recordings: Vec<Shown>, port: u16) -> Result<Self> {
-        let server = Self::awaiting(port)?;
+        let server = Self::listening(port, false)?;
         server.handle().show(recordings)?;
         Ok(server)
     }
 
-    /// A server whose recordings come later, through its [`Handle`].
+    /// A server of a live run, which comes later through its [`Handle`], as does its recording.
     ///
     /// # Errors
     /// If the port is taken.
     pub fn awaiting(port: u16) -> Result<Self> {
+        Self::listening(port, true)
+    }
+
+    fn listening(port: u16, is_live: bool) -> Result<Self> {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).with_context(|| {
             format!("cannot listen at port {port} of 127.0.0.1: name another one with --port, or leave it out for any free one")
         })?;
@@ -166,6 +173,7 @@ impl Server {
             Gate::new(listener.local_addr()?.port()).map_err(|error| anyhow!("no random token: {error}"))?;
         let content = Content {
             gate,
+            is_live,
             recordings: OnceLock::new(),
             live: OnceLock::new(),
             refusal: OnceLock::new(),
@@ -241,6 +249,7 @@ fn routes(content: Arc<Content>) -> Router {
         .route("/{token}/api/curves", post(answer_curves))
         .route("/{token}/api/events", get(hear))
         .route("/{token}/api/run", get(described))
+        .route("/{token}/api/fly", post(fly))
         .route("/{token}/api/ctl", post(steer))
         .layer(DefaultBodyLimit::max(BODY_BYTES_MAX))
         .layer(from_fn_with_state(content.clone(), guard))
@@ -269,7 +278,11 @@ async fn file(Path((_, name)): Path<(String, String)>) -> Response {
 
 async fn catalogues(State(content): State<Arc<Content>>) -> Json<Value> {
     let catalogues = content.recordings().iter().map(|entry| entry.known().catalogue.clone());
-    Json(json!({ "recordings": catalogues.collect::<Vec<_>>(), "refusal": content.refusal.get() }))
+    Json(json!({
+        "recordings": catalogues.collect::<Vec<_>>(),
+        "refusal": content.refusal.get(),
+        "is_live": content.is_live,
+    }))
 }
 
 async fn growth(State(content): State<Arc<Content>>) -> Json<Value> {
@@ -283,6 +296,15 @@ async fn hear(State(content): State<Arc<Content>>) -> Response {
 
 async fn described(State(content): State<Arc<Content>>) -> Json<Value> {
     Json(content.live.get().map_or(Value::Null, Live::described))
+}
+
+/// A write of a few bytes to a file in memory or its cache: no thread of its own.
+async fn fly(State(content): State<Arc<Content>>, Json(asking): Json<Asking>) -> Response {
+    let live = content.live.get().context("this page shows no live run");
+    match live.and_then(|live| live.fly(&asking)) {
+        Ok(()) => StatusCode::NO_CONTENT.into_response(),
+        Err(error) => (StatusCode::CONFLICT, format!("{error:#}\n")).into_response(),
+    }
 }
 
 async fn steer(State(content): State<Arc<Content>>, Json(request): Json<Asked>) -> Response {

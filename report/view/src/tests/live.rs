@@ -116,7 +116,7 @@ fn a_server_without_a_recording_says_so_and_shows_the_one_that_comes() {
     let server = Server::awaiting(0).unwrap();
     let handle = server.handle();
     let server = Running::serving(server);
-    assert_eq!(server.get("api/catalogue"), json!({ "recordings": [], "refusal": null }));
+    assert_eq!(server.get("api/catalogue"), json!({ "recordings": [], "refusal": null, "is_live": true }));
     assert_eq!((server.get("api/growth"), server.get("api/run")), (json!([]), Value::Null));
     let request = json!({ "recording": 0, "from_ns": 0, "step_ns": MS, "count": 1, "fields": [] });
     assert_eq!(server.post("api/frames", &request), (400, b"no tick is recorded yet\n".to_vec()));
@@ -157,6 +157,8 @@ fn a_page_is_counted_while_its_stream_is_open() {
 #[test]
 fn a_page_without_a_run_steers_nothing_and_nonsense_is_refused() {
     let server = Running::of(Live::new().shown());
+    // Such a page opens no stream: nothing of it is live.
+    assert_eq!(server.get("api/catalogue")["is_live"], false);
     let asked = |request: &Value| {
         let (status, body) = server.post("api/ctl", request);
         (status, String::from_utf8(body).unwrap())
