@@ -212,10 +212,10 @@ impl Flight {
         let recording = Recording::of_bytes(bytes, path).map_err(|error| bad(&error))?;
         let of_type = recording.topics().iter().filter(|(_, found)| found.type_name == SET_POINT);
         let names: Vec<&str> = of_type.map(|(name, _)| name.as_str()).collect();
-        let own = format!("/{}/set_point", context.name);
+        let named = format!("/{}/set_point", context.name);
         let topic = match (topic, &names[..]) {
             (Some(topic), names) if names.contains(&topic) => topic,
-            (None, names) if names.contains(&own.as_str()) => &own,
+            (None, names) if names.contains(&named.as_str()) => &named,
             (None, [only]) => *only,
             (_, []) => return Err(bad(&"it has no set points; expected a topic of type SetPoint")),
             (wanted, names) => {

@@ -44,7 +44,7 @@ fn what_a_person_asks_is_recorded_and_flown_again_bit_for_bit() {
         "run.duration_s=4000",
     ]);
     let mut page = Page::of(&run);
-    let mut await_ticks = |page: &mut Page, ticks: u64| {
+    let await_ticks = |page: &mut Page, ticks: u64| {
         let begin =
             page.await_event(|event| event["run"]["state"] == "running")["run"]["tick"].as_u64().unwrap();
         page.await_event(|event| event["run"]["tick"].as_u64() > Some(begin + ticks))
