@@ -29,6 +29,7 @@ pub const COMPONENTS: Registry = Registry::new(&[
     Registration::of::<Controller<controllers::lqr::LqrLaw>>(),
     Registration::of::<Sensing<sensors::magnetometer::MagnetometerParams>>(),
     Registration::of::<Sensing<sensors::mocap::MocapParams>>(),
+    Registration::of::<crate::operator::Operator>(),
     Registration::of::<Controller<controllers::pid::PidLaw>>(),
     Registration::of::<controllers::pilot::Pilot>(),
     Registration::of::<plant::node::Plant>(),

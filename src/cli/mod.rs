@@ -13,6 +13,7 @@ mod identify;
 mod included_models;
 mod inherited;
 mod interrupts;
+mod live_page;
 mod new;
 mod node;
 mod output;

@@ -38,11 +38,13 @@
 //! - [`scenes`]: ground, walls, rigs and other vehicles
 //! - [`judging`]: runs without a recording are judged in flight
 //! - [`view`]: recordings in the browser: address, end, refusals
+//! - [`by_hand`]: set points of a person: sent, recorded, sent again
 //! - [`inputs`]: files that are edited after they were read
 
 mod as_printed;
 mod autopilots;
 mod backups;
+mod by_hand;
 mod campaign;
 mod checkpoints;
 mod clean;
