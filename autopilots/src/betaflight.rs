@@ -330,3 +330,78 @@ fn require_preloadable(program: &[u8]) -> Result<(), String> {
                   its answers would stall; build it with shared libraries";
     Err(reason.to_owned())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bus::messages::Quaternion;
+
+    fn hummingbird() -> Betaflight {
+        let vehicle = Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml").unwrap();
+        Betaflight {
+            layout: Layout::of(&vehicle.rotors).unwrap(),
+            vehicle,
+            firmware: Vec::new(),
+            configuration: "aux 0 0 0 1700 2100 0 0\n".to_owned(),
+            armed_by_channel: None,
+            period_ns: 1_000_000,
+            rc_ticks: 20,
+            reply_timeout: Duration::from_secs(1),
+            origin: Origin::default(),
+        }
+    }
+
+    /// Axes of the packets of SITL against body x forward, y left, z up.
+    #[test]
+    fn axes_and_units_are_those_of_the_packets() {
+        let imu = Imu {
+            angular_velocity: [0.1, 0.2, 0.3].into(),
+            specific_force: [1.0, 2.0, 9.81].into(),
+            ..Imu::default()
+        };
+        let attitude = Quaternion { x: 0.1, y: 0.2, z: 0.3, w: 0.9 };
+        let estimate = StateEstimate {
+            attitude,
+            velocity: [3.0, 4.0, 5.0].into(),
+            position: [0.0, 0.0, 12.0].into(),
+            ..StateEstimate::default()
+        };
+        let rc = RcChannels { pulse: [1500.4, 1500.6, 900.0, 9000.0, 2000.0].into(), ..RcChannels::default() };
+        let sensed = Sensed { time_s: 0.0, imu: &imu, estimate: &estimate, rc: &rc };
+        let betaflight = hummingbird();
+        let packets = betaflight.packets(20, &sensed);
+        let state = packets.state;
+        assert_eq!(state.time_s, 2.021, "the firmware's time goes on from its start");
+        assert_eq!(state.angular_velocity_rad_s, [0.1, -0.2, 0.3]);
+        assert_eq!(state.acceleration_m_s2, [-1.0, -2.0, -9.81]);
+        assert_eq!(state.attitude, [0.9, 0.1, -0.2, -0.3], "w first");
+        assert_eq!(state.velocity_m_s, [3.0, 4.0, 5.0], "east, north, up");
+        assert_eq!(state.place, [8.545_594, 47.397_742, 500.0]);
+        // ISO 2533: 95.46 kPa at 500 m.
+        assert!((state.pressure_Pa - 95_461.0).abs() < 5.0, "{}", state.pressure_Pa);
+        assert_eq!(packets.channels_us[..6], [1500, 1501, 900, 2200, 2000, 1000], "what is not sent is off");
+        let has_sticks = |step| betaflight.packets(step, &sensed).has_sticks;
+        assert_eq!([has_sticks(20), has_sticks(21), has_sticks(40)], [1, 0, 1], "50 packets a second");
+    }
+
+    #[test]
+    fn motors_reach_their_rotors_and_the_mixer_the_command_line() {
+        let betaflight = hummingbird();
+        let mut answer = Answer { motors: 4, ..Answer::default() };
+        // Rear, right, left, front.
+        answer.pulse_us[..4].copy_from_slice(&[1100.0, 1200.0, 1300.0, 1400.0]);
+        assert_eq!(betaflight.throttles(&answer), [0.4, 0.2, 0.1, 0.3], "front, right, rear, left");
+        let commands = "mixer QUADP\nset yaw_motors_reversed = OFF\naux 0 0 0 1700 2100 0 0\nsave\n";
+        assert_eq!(betaflight.commands(), commands);
+    }
+
+    /// Any bytes are refused in words.
+    #[test]
+    fn what_is_cut_is_no_program() {
+        let program = std::fs::read("/proc/self/exe").unwrap();
+        assert_eq!(require_preloadable(&program), Ok(()), "this test is linked with shared libraries");
+        for length in [0, 3, 6, 40, 64, 100] {
+            assert!(require_preloadable(&program[..length]).is_err(), "{length}");
+        }
+    }
+}
