@@ -130,7 +130,11 @@ fn follow(handle: &Handle, find: &dyn Fn() -> Option<LiveRun>, is_ended: &dyn Fn
     handle.steer(run, plan);
     match path {
         Ok(path) => {
-            let shown = || Shown::new(Recording::salvage(Path::new(&path)).ok()?).ok();
+            let shown = || {
+                // Before the run ends: its control segment goes with it.
+                handle.look();
+                Shown::new(Recording::salvage(Path::new(&path)).ok()?).ok()
+            };
             if let Some(shown) = first(shown, &|| is_ended() || !is_live()) {
                 handle.show(vec![shown])?;
             }

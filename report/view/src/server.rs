@@ -47,6 +47,8 @@ const BODY_BYTES_MAX: usize = 1 << 20;
 const READERS: usize = 4;
 /// Requests to the live run that wait for their answers at the same time.
 const ASKERS: usize = 8;
+/// Niceness of the threads that read recordings.
+const LOWEST: i32 = 19;
 /// Pause between two looks for the end.
 const LOOK: Duration = Duration::from_millis(50);
 /// Looks for the end between two looks for what a recording has grown by: half a second.
@@ -133,6 +135,12 @@ impl Handle {
         let _ = self.0.live.set(Live::of(run, plan));
     }
 
+    /// Looks at the live run, so that its state is known to the end, also to a page that is opened behind it. A run that has
+    /// ended cannot be looked at for the first time.
+    pub fn look(&self) {
+        let _ = self.0.live.get().map(Live::status);
+    }
+
     /// Tells pages why there is nothing to show.
     pub fn refuse(&self, reason: String) {
         let _ = self.0.refusal.set(reason);
@@ -201,7 +209,8 @@ impl Server {
     /// # Errors
     /// If the system refuses threads.
     pub fn serve(self, is_ended: &dyn Fn() -> bool) -> Result<()> {
-        let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
+        let mut builder = tokio::runtime::Builder::new_multi_thread();
+        let runtime = builder.worker_threads(2).enable_all().on_thread_start(step_back).build()?;
         let listener = {
             let _entered = runtime.enter();
             tokio::net::TcpListener::from_std(self.listener)?
@@ -224,6 +233,7 @@ impl Server {
 /// Reads the overviews, and goes on while recordings grow. Damage ends the overview: long windows of it are refused with
 /// the place of the damage.
 fn keep_up(content: &Content, is_over: &AtomicBool) {
+    step_back();
     let goes_on = || match content.recordings.get() {
         // Each has its turn, whether or not one before it grows.
         Some(recordings) => recordings.iter().filter(|entry| entry.keep_up(is_over)).count() > 0,
@@ -237,6 +247,12 @@ fn keep_up(content: &Content, is_over: &AtomicBool) {
             std::thread::sleep(LOOK);
         }
     }
+}
+
+/// Gives this thread, and no other, the lowest priority: where cores are short, a run that is watched has them first.
+fn step_back() {
+    // Nobody is refused a lower priority; without it, watching costs more.
+    let _ = rustix::process::setpriority_process(None, LOWEST);
 }
 
 fn routes(content: Arc<Content>) -> Router {
