@@ -1,6 +1,7 @@
 //! The command line: the table of commands, what is printed, exit codes.
 
 mod campaign;
+mod campaign_engine;
 mod cat;
 mod check;
 mod clean;

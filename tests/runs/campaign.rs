@@ -7,12 +7,12 @@ use serde_json::Value;
 use std::fs;
 
 /// A campaign of short hovers of varied mass.
-const HOVERS: &str = "flights = 12\nset = [\"run.duration_s=0.4\"]\n\
+pub const HOVERS: &str = "flights = 12\nset = [\"run.duration_s=0.4\"]\n\
                       [[vary]]\nkey = \"process.plant.vehicle.body.mass\"\nas = \"factor\"\nuniform = [0.8, 1.2]\n\
                       [[measure]]\nname = \"height\"\ntopic = \"/plant/state\"\nfield = \"position.z\"\nunit = \"m\"\nstatistic = \"last\"\n";
 
 /// Writes a campaign of the shipped hover without its conditions, which a short flight misses.
-fn written(place: &Place, name: &str, text: &str) -> String {
+pub fn written(place: &Place, name: &str, text: &str) -> String {
     let hover = fs::read_to_string(repository("manifests/hover.toml")).unwrap();
     let (head, _) = hover.split_once("[[pass]]").unwrap();
     let vehicles = repository("vehicles");
@@ -21,7 +21,7 @@ fn written(place: &Place, name: &str, text: &str) -> String {
 }
 
 /// The rows of a campaign by flight, without the host time.
-fn rows(folder: &str) -> Vec<Value> {
+pub fn rows(folder: &str) -> Vec<Value> {
     let text = fs::read_to_string(format!("{folder}/rows.jsonl")).unwrap();
     let mut rows: Vec<Value> = text.lines().skip(1).map(|line| serde_json::from_str(line).unwrap()).collect();
     rows.sort_by_key(|row| row["flight"].as_u64());

@@ -24,6 +24,7 @@
 //! - [`outputs`]: what runs and other commands write, where something is there already
 //! - [`profile`]: where the host time of a run's ticks goes
 //! - [`laps`], [`plot`]: recordings that are written, and pictures of them
+//! - [`slurm`]: campaigns on a Slurm cluster
 //! - [`urdf`]: bodies of vehicles for other tools
 //! - [`new`]: vehicle files from models of other tools
 //! - [`rights`]: rights that a run lacks are named
@@ -84,6 +85,7 @@ mod scenarios;
 mod scenes;
 mod sensors;
 mod skipped;
+mod slurm;
 #[allow(dead_code, reason = "shared with tests/faults")]
 mod support;
 mod surroundings;
