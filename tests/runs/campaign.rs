@@ -21,7 +21,7 @@ fn written(place: &Place, name: &str, text: &str) -> String {
 }
 
 /// The rows of a campaign by flight, without the host time.
-fn rows(folder: &str) -> Vec<Value> {
+pub fn rows(folder: &str) -> Vec<Value> {
     let text = fs::read_to_string(format!("{folder}/rows.jsonl")).unwrap();
     let mut rows: Vec<Value> = text.lines().skip(1).map(|line| serde_json::from_str(line).unwrap()).collect();
     rows.sort_by_key(|row| row["flight"].as_u64());
@@ -32,7 +32,7 @@ fn rows(folder: &str) -> Vec<Value> {
 }
 
 /// Height of the vehicle at the end of a recording, m.
-fn last_height(recording: &str) -> f64 {
+pub fn last_height(recording: &str) -> f64 {
     let series =
         Recording::open(recording.as_ref()).unwrap().series(&[("/plant/state", "position.z")]).unwrap();
     *series[0].value.last().unwrap()
