@@ -55,3 +55,25 @@ pub const COMPONENTS: Registry = Registry::new(&[
     parameters: &fmu::PARAMETERS,
     run: fmu::run,
 }]);
+
+#[cfg(test)]
+mod tests {
+    use super::COMPONENTS;
+    use bus::component::Transfer;
+
+    /// A checkpoint of a run refuses other values of them.
+    #[test]
+    fn parameters_that_count_at_the_start_alone_are_declared() {
+        for component in COMPONENTS.iter() {
+            let known = component.parameters();
+            assert!(component.initial.iter().all(|name| known.contains(name)), "{}", component.name);
+            // The place of the estimate's origin is added in every step.
+            let counts_later = |name: &str| name == "initial_level_position_m";
+            let is_stateless = matches!(component.transfer, Transfer::Nothing);
+            let named = known.iter().filter(|name| name.contains("initial") && !counts_later(name));
+            for name in named.filter(|_| !is_stateless) {
+                assert!(component.initial.contains(name), "{}: {name}", component.name);
+            }
+        }
+    }
+}

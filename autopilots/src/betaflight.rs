@@ -366,7 +366,8 @@ mod tests {
             position: [0.0, 0.0, 12.0].into(),
             ..StateEstimate::default()
         };
-        let rc = RcChannels { pulse: [1500.4, 1500.6, 900.0, 9000.0, 2000.0].into(), ..RcChannels::default() };
+        let rc =
+            RcChannels { pulse: [1500.4, 1500.6, 900.0, 9000.0, 2000.0].into(), ..RcChannels::default() };
         let sensed = Sensed { time_s: 0.0, imu: &imu, estimate: &estimate, rc: &rc };
         let betaflight = hummingbird();
         let packets = betaflight.packets(20, &sensed);

@@ -95,7 +95,10 @@ impl NodePart {
                     layout.as_ref().map_or("no state".to_owned(), ToString::to_string)
                 };
                 let (found, expected) = (text(found), text(expected));
-                let reason = format!("it holds {found}, and the node goes on from {expected}");
+                let reason = format!(
+                    "it holds {found}, and the node goes on from {expected}; what has another memory by another value begins with \
+                     the run"
+                );
                 return Err(refused(reason));
             }
         }

@@ -154,6 +154,8 @@ pub struct Info {
     pub summary: &'static str,
     /// What it does for the run.
     pub role: Role,
+    /// Parameters that count at the start alone, since its state begins with them.
+    pub initial: &'static [&'static str],
 }
 
 /// What a component does for a run.
@@ -171,7 +173,21 @@ impl Info {
     /// A component that computes outputs.
     #[must_use]
     pub const fn new(name: &'static str, summary: &'static str) -> Self {
-        Self { name, summary, role: Role::Compute }
+        Self { name, summary, role: Role::Compute, initial: &[] }
+    }
+
+    /// The same component, whose `parameters` count at the start alone. A run that goes on from a checkpoint refuses other
+    /// values of them.
+    ///
+    /// ```
+    /// use bus::component::Info;
+    ///
+    /// const TANK: Info = Info::new("tank", "drains").starting_with(&["initial_level_m"]);
+    /// assert_eq!(TANK.initial, ["initial_level_m"]);
+    /// ```
+    #[must_use]
+    pub const fn starting_with(self, parameters: &'static [&'static str]) -> Self {
+        Self { initial: parameters, ..self }
     }
 
     /// The same component as the one that writes the run's recording.

@@ -46,8 +46,8 @@ pub(crate) struct ConnectedNode {
     states_every_tick: bool,
     /// The tick of the plan's checkpoint that comes next; `u32::MAX` behind the last.
     next_checkpoint: u32,
-    /// The tick of the checkpoint that was asked for last and is written.
-    asked_checkpoint: u32,
+    /// Number of checkpoints that were asked for and are written.
+    asks_answered: u32,
     /// Host time of all its steps, ns.
     step_ns: u64,
     // The transport last: the ports give back what they hold while it stands.
@@ -63,6 +63,8 @@ pub(crate) enum Turn {
     Wait(Awaited),
     /// It follows a change of the membership first.
     Change,
+    /// It writes its part of a checkpoint of the tick at which the run is held.
+    Save,
     /// The run ends before its next tick, or its part in the run does.
     Leave,
 }
@@ -121,7 +123,7 @@ impl ConnectedNode {
             known_ticks: 0,
             states_every_tick: true,
             next_checkpoint: links.plan.checkpoint_after(links.plan.first_tick).unwrap_or(u32::MAX),
-            asked_checkpoint: 0,
+            asks_answered: 0,
             step_ns: 0,
             links,
         }
@@ -281,6 +283,9 @@ impl ConnectedNode {
         if lockstep.epoch() != self.epoch {
             return Ok(Turn::Change);
         }
+        if self.is_asked_at_hold() {
+            return Ok(Turn::Save);
+        }
         if lockstep.end_tick() <= tick {
             // A shadow that has come to the end of the run waits for its predecessor to get there: until then that may die,
             // and the samples of its last ticks are then the shadow's.
@@ -388,7 +393,7 @@ impl ConnectedNode {
     /// If the run is aborted.
     pub(crate) fn wait(&self, awaited: Awaited) -> Result<bool, BusError> {
         let (links, lockstep, tick) = (&self.links, &self.links.lockstep, self.tick);
-        let has_changed = || lockstep.epoch() != self.epoch;
+        let has_changed = || lockstep.epoch() != self.epoch || self.is_asked_at_hold();
         let waited = match awaited {
             Awaited::Count { need, sleep_for, .. } => {
                 let is_over = || lockstep.end_tick() <= tick || has_changed();

@@ -137,7 +137,7 @@ impl<'c> Executor<'c> {
                     self.leaving.push(member);
                 }
                 // The order may be another one; who has computed the tick is passed over.
-                Turn::Change | Turn::Wait(_) => index = 0,
+                Turn::Change | Turn::Wait(_) | Turn::Save => index = 0,
             }
         }
         Ok(())
@@ -159,6 +159,12 @@ impl<'c> Executor<'c> {
                     self.tell();
                     self.follow()?;
                     return Ok(Turn::Change);
+                }
+                // While the run is held, this member may be the only one that waits.
+                Turn::Save => {
+                    for Member { node, computation } in &mut self.members {
+                        node.write_at_hold(&self.locals, &**computation)?;
+                    }
                 }
                 turn => return Ok(turn),
             }

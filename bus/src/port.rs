@@ -203,8 +203,19 @@ impl InPort {
 
     /// Makes the newest sample stamped at or before `tick` minus the delay the current one.
     pub(crate) fn take(&mut self, tick: u32, node: &str) -> Result<(), BusError> {
-        self.newest_tick = self.limit(tick);
-        let Some(limit) = self.newest_tick else { return Ok(()) };
+        self.take_up_to(self.limit(tick), tick, node)
+    }
+
+    /// Makes the newest sample stamped before `tick` the current one, whatever the delay: a later tick reads it, or a newer
+    /// one.
+    pub(crate) fn take_before(&mut self, tick: u32, node: &str) -> Result<(), BusError> {
+        self.take_up_to(tick.checked_sub(1), tick, node)
+    }
+
+    /// Makes the newest sample stamped at or before `limit` the current one, at tick `tick`.
+    fn take_up_to(&mut self, limit: Option<u32>, tick: u32, node: &str) -> Result<(), BusError> {
+        self.newest_tick = limit;
+        let Some(limit) = limit else { return Ok(()) };
         // The samples between the current one and the newest are received too, so that gaps show.
         let newest_sequence = u64::from(limit / self.topic_period_ticks);
         self.pass_take_over(newest_sequence);

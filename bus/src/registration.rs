@@ -20,6 +20,8 @@ pub struct Registration {
     pub summary: &'static str,
     /// What it does for a run.
     pub role: Role,
+    /// Parameters that count at the start alone.
+    pub initial: &'static [&'static str],
     /// Inputs.
     pub inputs: Inputs,
     /// Outputs.
@@ -37,11 +39,12 @@ impl Registration {
     /// The component `C`.
     #[must_use]
     pub const fn of<C: Component + 'static>() -> Self {
-        let Info { name, summary, role } = C::INFO;
+        let Info { name, summary, role, initial } = C::INFO;
         Self {
             name,
             summary,
             role,
+            initial,
             inputs: <C::Inputs<'static> as InputPorts<'static>>::DECLARED,
             outputs: C::Outputs::DECLARED,
             transfer: C::State::TRANSFER,

@@ -67,6 +67,17 @@ impl Stepper {
         Ok(())
     }
 
+    /// Takes the samples that were sent before tick `before`, all of which are there.
+    ///
+    /// # Errors
+    /// As [`Stepper::gather`].
+    pub(crate) fn gather_before(&mut self, before: u32) -> Result<(), (usize, BusError)> {
+        for input in &mut self.inputs {
+            input.take_before(before, &self.node).map_err(|error| (input.topic, error))?;
+        }
+        Ok(())
+    }
+
     /// Lets its inputs read what was sent up to `tick`, where members of the same process send it.
     pub(crate) fn look_at(&mut self, tick: u32) {
         self.inputs.iter_mut().for_each(|input| input.look_at(tick));

@@ -1,15 +1,17 @@
 //! The manifest that all flights have in common, and the files it reads: read once.
 
-use crate::declaration::{Campaign, Meaning, Varied};
+use crate::declaration::{Campaign, Meaning, Start, Varied};
 use crate::draw::rounded;
 use crate::row::{columns, require_different};
 use anyhow::{Context, Result, bail};
 use diagnostics::{Diagnostic, ParameterError};
 use inputs::{InputFiles, sha256};
+use runtime::checkpoint::Checkpoint;
 use runtime::graph::Graph;
 use runtime::manifest::{Manifest, NO_RECORDING};
 use runtime::registry::Registry;
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
 /// The manifest of a campaign, not recorded, with the files that its flights read.
@@ -17,6 +19,8 @@ use std::sync::{Mutex, PoisonError};
 pub struct Base {
     /// The manifest with the overrides of all flights.
     pub manifest: Manifest,
+    /// The checkpoint that all flights go on from, if there is one.
+    pub from: Option<Checkpoint>,
     /// Files that were read.
     pub files: InputFiles,
     /// Digest of all texts and files, and of the meaning of the varied values.
@@ -31,28 +35,29 @@ impl Base {
     /// # Errors
     /// A problem in the manifest or a file, a request that needs a process of its own, or two columns with one name.
     pub fn read(campaign: &Campaign, registry: Registry) -> Result<Self> {
-        let files = InputFiles::default();
-        let path = &campaign.manifest;
-        let text =
-            files.text(path).with_context(|| format!("cannot read the manifest {}", path.display()))?;
-        // Measures are tables: they may stand behind everything else.
-        let text = if campaign.measures.is_empty() { text } else { format!("{text}\n{}", campaign.measures) };
         let forced = [format!("run.record={NO_RECORDING}"), "run.pace=free".to_owned()];
         let overrides = [&campaign.set[..], &forced].concat();
-        let manifest = Manifest::parse(text, path, &overrides, registry)?;
-        let graph = Graph::build_from(&manifest, files)?;
-        runtime::require_one_thread(&manifest, &graph)?;
+        let files = InputFiles::default();
+        let (manifest, from) = match &campaign.start {
+            Start::Manifest(path) => (read_manifest(path, campaign, &overrides, &files, registry)?, None),
+            Start::Checkpoint(path) => {
+                let from = Checkpoint::read(path)?;
+                let about = || format!("cannot go on from {}", path.display());
+                (from.load_manifest(&overrides, registry).with_context(about)?, Some(from))
+            }
+        };
+        let graph = runtime::require_flyable(&manifest, files, from.as_ref())?;
         require_judgement(&manifest)?;
         require_different(&campaign.vary, &columns(&manifest.content))?;
-        let fingerprint = fingerprint(campaign, &manifest, &graph);
-        Ok(Self { manifest, files: graph.files, fingerprint, declared: Mutex::default() })
+        let fingerprint = fingerprint(campaign, &manifest, from.as_ref(), &graph);
+        Ok(Self { manifest, from, files: graph.files, fingerprint, declared: Mutex::default() })
     }
 
     /// Values of `varied` for a drawn number: by key.
     ///
     /// # Errors
     /// If a factor or an offset has no declared number to act on.
-    pub fn values(&self, varied: &Varied, drawn: f64) -> Result<Vec<(String, f64)>, Diagnostic> {
+    pub fn values(&self, varied: &Varied, drawn: f64) -> Result<Vec<(String, f64)>> {
         let value = |key: &String| {
             if varied.meaning == Meaning::Value {
                 return Ok((key.clone(), drawn));
@@ -63,10 +68,8 @@ impl Base {
                     return refusal;
                 }
                 let message = format!("`{key}` has no declared number, which a factor or an offset needs");
-                varied.problem(
-                    ParameterError::conflict("key", message),
-                    "write as = \"value\", or correct the key",
-                )
+                let error = ParameterError::conflict("key", message);
+                varied.problem(error, "write as = \"value\", or correct the key").into()
             })?;
             let value = if varied.meaning == Meaning::Factor { declared * drawn } else { declared + drawn };
             Ok((key.clone(), rounded(value)))
@@ -87,9 +90,9 @@ impl Base {
     /// Checks the manifest of one flight, without flying it.
     ///
     /// # Errors
-    /// A [`Diagnostic`] that names the override or the file that does not fit.
-    pub fn check(&self, sets: &[String]) -> Result<(), Diagnostic> {
-        Graph::build_from(&self.of_flight(sets)?, self.files.branch()).map(drop)
+    /// The override or the file that does not fit, or the state in the checkpoint that does not fit the flight.
+    pub fn check(&self, sets: &[String]) -> Result<()> {
+        runtime::require_flyable(&self.of_flight(sets)?, self.files.branch(), self.from.as_ref()).map(drop)
     }
 
     /// The manifest of one flight.
@@ -97,19 +100,37 @@ impl Base {
     /// # Errors
     /// A [`Diagnostic`] that names the override that does not fit.
     pub fn of_flight(&self, sets: &[String]) -> Result<Manifest, Diagnostic> {
-        self.manifest.overridden(sets)
+        match &self.from {
+            Some(from) => from.fork_manifest(&self.manifest, sets),
+            None => self.manifest.overridden(sets),
+        }
     }
 }
 
+/// The manifest at `path`, with the measures of `campaign`.
+fn read_manifest(
+    path: &Path,
+    campaign: &Campaign,
+    overrides: &[String],
+    files: &InputFiles,
+    registry: Registry,
+) -> Result<Manifest> {
+    let text = files.text(path).with_context(|| format!("cannot read the manifest {}", path.display()))?;
+    // Measures are tables: they may stand behind everything else.
+    let text = if campaign.measures.is_empty() { text } else { format!("{text}\n{}", campaign.measures) };
+    Ok(Manifest::parse(text, path, overrides, registry)?)
+}
+
 /// Digest of everything but the drawn numbers that a row depends on.
-fn fingerprint(campaign: &Campaign, manifest: &Manifest, graph: &Graph) -> String {
+fn fingerprint(campaign: &Campaign, manifest: &Manifest, from: Option<&Checkpoint>, graph: &Graph) -> String {
     let texts: Vec<&str> = manifest.texts().collect();
     // Each node lists the files that it reads.
     let files: Vec<&str> =
         graph.plan.nodes.iter().flat_map(|node| &node.files).map(|file| file.sha256.as_str()).collect();
     let varied: Vec<_> =
         campaign.vary.iter().map(|varied| (&varied.name, &varied.keys, varied.meaning)).collect();
-    sha256(format!("{texts:?}{files:?}{varied:?}").as_bytes())
+    let from = from.map_or(String::new(), Checkpoint::sha256);
+    sha256(format!("{texts:?}{files:?}{varied:?}{from}").as_bytes())
 }
 
 fn require_judgement(manifest: &Manifest) -> Result<()> {

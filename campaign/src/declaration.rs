@@ -12,11 +12,11 @@ pub const FLIGHTS_MAX: u64 = 1_000_000;
 /// A campaign, as its file declares it.
 ///
 /// ```
-/// use campaign::declaration::Campaign;
+/// use campaign::declaration::{Campaign, Start};
 /// let text = "manifest = \"hover.toml\"\nflights = 100\n\
 ///             [[vary]]\nkey = \"process.plant.vehicle.body.mass\"\nas = \"factor\"\nuniform = [0.9, 1.1]";
 /// let campaign = Campaign::parse("campaigns/mass.toml".as_ref(), text)?;
-/// assert_eq!(campaign.manifest, std::path::Path::new("campaigns/hover.toml"));
+/// assert_eq!(campaign.start, Start::Manifest("campaigns/hover.toml".into()));
 /// assert_eq!(campaign.vary[0].name, "mass");
 /// # Ok::<(), diagnostics::Diagnostic>(())
 /// ```
@@ -24,8 +24,8 @@ pub const FLIGHTS_MAX: u64 = 1_000_000;
 pub struct Campaign {
     /// The campaign file.
     pub path: PathBuf,
-    /// The manifest that is flown.
-    pub manifest: PathBuf,
+    /// Start of all flights.
+    pub start: Start,
     /// Number of flights.
     pub flights: u64,
     /// Seed of the drawn values; each flight has a seed of its own, `run.seed`, unless that is varied.
@@ -40,6 +40,15 @@ pub struct Campaign {
     pub vary: Vec<Varied>,
     /// Host time after which a flight is given up, in seconds.
     pub timeout_s_host: f64,
+}
+
+/// Start of all flights of a campaign.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Start {
+    /// The first tick of this manifest.
+    Manifest(PathBuf),
+    /// The tick of this checkpoint: what was flown before is flown once.
+    Checkpoint(PathBuf),
 }
 
 /// Method by which the values of the flights are drawn.
@@ -90,7 +99,8 @@ pub struct Varied {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
-    manifest: Spanned<String>,
+    manifest: Option<Spanned<String>>,
+    from: Option<Spanned<String>>,
     flights: Option<Spanned<u64>>,
     #[serde(default = "first")]
     seed: u64,
@@ -173,15 +183,39 @@ impl Campaign {
             let error = ParameterError::conflict("set", message);
             return Err(at(&(0..0), error, "change `seed` of the campaign, or vary run.seed"));
         }
+        let start = start(&file, path).map_err(|(span, error)| {
+            at(&span, error, "name a manifest, or a checkpoint that all flights go on from")
+        })?;
+        if let (Start::Checkpoint(_), Some(measure)) = (&start, file.measure.first()) {
+            let name = measure.get("name").map_or(String::new(), |name| format!(" {name}"));
+            let message = format!("[[measure]]{name} would see the flight from the checkpoint on only");
+            let error = ParameterError::conflict("measure", message);
+            return Err(at(&(0..0), error, "write it into the manifest, and write the checkpoint anew"));
+        }
         let mut measures = toml::Table::new();
         if !file.measure.is_empty() {
             measures.insert("measure".into(), file.measure.into());
         }
-        let manifest = inputs::tidy(&path.parent().unwrap_or(Path::new("")).join(file.manifest.get_ref()));
         let (seed, sampling, set) = (file.seed, file.sampling, file.set);
         let path = path.to_owned();
         let measures = measures.to_string();
-        Ok(Self { path, manifest, flights, seed, sampling, set, measures, vary, timeout_s_host })
+        Ok(Self { path, start, flights, seed, sampling, set, measures, vary, timeout_s_host })
+    }
+}
+
+/// The manifest or the checkpoint that the campaign `file` at `path` names; an error has its span.
+fn start(file: &File, path: &Path) -> Result<Start, (std::ops::Range<usize>, ParameterError)> {
+    let resolve = |written: &str| inputs::tidy(&path.parent().unwrap_or(Path::new("")).join(written));
+    match (&file.manifest, &file.from) {
+        (Some(manifest), None) => Ok(Start::Manifest(resolve(manifest.get_ref()))),
+        (None, Some(from)) => Ok(Start::Checkpoint(resolve(from.get_ref()))),
+        (None, None) => {
+            Err((0..0, ParameterError::missing("manifest", "a manifest, or a checkpoint as `from`")))
+        }
+        (Some(_), Some(from)) => {
+            let message = "`manifest` and `from`: the manifest is that of the checkpoint";
+            Err((from.span(), ParameterError::conflict("from", message)))
+        }
     }
 }
 

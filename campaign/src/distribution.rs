@@ -1,7 +1,7 @@
 //! Distributions of a varied value.
 
 use diagnostics::ParameterError;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, Normal};
 
 /// Distribution of a varied value: exactly one of its keys is stated.
@@ -14,7 +14,7 @@ use statrs::distribution::{ContinuousCDF, Normal};
 /// assert_eq!((delay.at(0.0), delay.at(0.999)), (1.0, 20.0));
 /// # Ok::<(), toml::de::Error>(())
 /// ```
-#[derive(Clone, Debug, Deserialize, PartialEq)]
+#[derive(Clone, Debug, Deserialize, Serialize, PartialEq)]
 #[serde(rename_all = "snake_case")]
 pub enum Distribution {
     /// One of these values, each with the same chance; in a grid, all of them.

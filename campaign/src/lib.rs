@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`declaration`] | the campaign file: the manifest, the varied values, the number of flights |
 //! | [`distribution`] | distributions of a varied value |
+//! | [`fork`] | the campaign file of `run --from FILE --fork N --vary …` |
 //! | [`draw`] | values of all flights, drawn from the campaign's seed |
 //! | [`plan`] | the plan: the values of every flight, a CSV file that may be edited |
 //! | [`base`] | the manifest that all flights have in common, and the files it reads |
@@ -24,6 +25,7 @@ pub mod cluster;
 pub mod declaration;
 pub mod distribution;
 pub mod draw;
+pub mod fork;
 pub mod page;
 pub mod plan;
 pub mod pool;

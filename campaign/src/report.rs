@@ -1,7 +1,7 @@
 //! The report of a campaign: pass rate, failures, distributions, influences, worst flights; as text and as JSON.
 
 use crate::base::Base;
-use crate::declaration::Campaign;
+use crate::declaration::{Campaign, Start};
 use crate::plan::Plan;
 use crate::row::{Row, columns, count};
 use crate::statistics::{clopper_pearson, quantiles, rank_correlation};
@@ -28,6 +28,9 @@ pub struct Report {
     pub campaign: String,
     /// The manifest that was flown.
     pub manifest: String,
+    /// The checkpoint that all flights went on from.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub from: Option<String>,
     /// Flights in the plan.
     pub planned: u64,
     /// Flights with a row.
@@ -111,7 +114,11 @@ impl Report {
         let passed = rows.iter().filter(|row| row.passed).count() as u64;
         Ok(Self {
             campaign: campaign.path.display().to_string(),
-            manifest: campaign.manifest.display().to_string(),
+            manifest: base.manifest.path.display().to_string(),
+            from: match &campaign.start {
+                Start::Manifest(_) => None,
+                Start::Checkpoint(path) => Some(path.display().to_string()),
+            },
             planned: plan.flights.len() as u64,
             flights,
             passed,
@@ -247,9 +254,12 @@ fn again(campaign: &Campaign, folder: &Path, flight: u64) -> String {
 
 /// The `run` command of a flight: without the measures of the campaign file, and in no need of the folder.
 fn run(campaign: &Campaign, flight: u64, sets: &[String]) -> String {
-    let manifest = word(&campaign.manifest.display().to_string());
+    let start = match &campaign.start {
+        Start::Manifest(path) => word(&path.display().to_string()),
+        Start::Checkpoint(path) => format!("--from {}", word(&path.display().to_string())),
+    };
     let sets = campaign.set.iter().chain(sets).map(|set| format!(" --set {}", word(set)));
-    format!("hummingbus run {manifest} --record flight-{flight}.mcap{}", sets.collect::<String>())
+    format!("hummingbus run {start} --record flight-{flight}.mcap{}", sets.collect::<String>())
 }
 
 /// `text` as one word of a shell.

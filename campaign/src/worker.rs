@@ -114,7 +114,7 @@ fn fly(base: &Base, job: &Job, folder: &Path) -> Row {
 
 fn fly_once(base: &Base, job: &Job, folder: &Path) -> Result<Row> {
     let manifest = base.of_flight(&job.sets)?;
-    let mut outcome = runtime::fly_unrecorded(&manifest, base.files.branch(), folder)?;
+    let mut outcome = runtime::fly_unrecorded(&manifest, base.files.branch(), folder, base.from.as_ref())?;
     let figures = outcome.figures.take().context("the judge left no figures")?;
     let tick_s = 1.0 / f64::from(*manifest.content.run.rate_hz.get_ref());
     let mut summary = Summary::new(manifest.name(), outcome, tick_s);

@@ -57,7 +57,8 @@ const NO_STATE: &str = "it cannot take over from a plant of another backend, ano
                         fit the other; give both the same, other numbers of vehicle and effects may differ";
 
 impl Component for Plant {
-    const INFO: Info = Info::new("plant", "flies the vehicle of a vehicle file, freely or in a scene");
+    const INFO: Info = Info::new("plant", "flies the vehicle of a vehicle file, freely or in a scene")
+        .starting_with(&["initial_position_m", "initial_velocity_m_s", "initial_yaw_deg"]);
     type Parameters = Parameters;
     type Inputs<'a> = Inputs<'a>;
     type Outputs = Outputs;

@@ -4,6 +4,7 @@
 //! the SHA-256 of every file that the run has read. A run that goes on from it loads the manifest again and refuses texts
 //! and files that have changed since.
 
+use crate::fork;
 use crate::graph::Graph;
 use crate::manifest::Manifest;
 use crate::output_file::{self, Kind, Mark};
@@ -11,6 +12,7 @@ use crate::program::{BackupSpec, OnExit, Program};
 use crate::registry::Registry;
 use anyhow::{Context as _, Result, anyhow, bail};
 use bus::checkpoint::{NodePart, Parts};
+use diagnostics::Diagnostic;
 use inputs::{InputFile, sha256};
 use serde::{Deserialize, Serialize};
 use std::io::{Read as _, Write as _};
@@ -150,6 +152,10 @@ impl Checkpoint {
     pub fn load_manifest(&self, overrides: &[String], registry: Registry) -> Result<Manifest> {
         let all: Vec<String> = self.overrides.iter().chain(overrides).cloned().collect();
         let manifest = Manifest::load(&self.manifest, &all, registry)?;
+        if !overrides.is_empty() {
+            let before = Manifest::load(&self.manifest, &self.overrides, registry)?;
+            fork::require_effective(&before, &manifest, self.tick())?;
+        }
         for (path, found) in texts(&manifest) {
             let known = self.texts.iter().find(|(known, _)| *known == path);
             let (_, expected) = known.ok_or_else(|| {
@@ -163,12 +169,31 @@ impl Checkpoint {
         Ok(manifest)
     }
 
+    /// The manifest `before` with further `overrides`, of a run that goes on from here.
+    ///
+    /// # Errors
+    /// If a value does not fit, or counts at the start of a run alone.
+    pub fn fork_manifest(&self, before: &Manifest, overrides: &[String]) -> Result<Manifest, Diagnostic> {
+        let manifest = before.overridden(overrides)?;
+        fork::require_effective(before, &manifest, self.tick()).map(|()| manifest)
+    }
+
+    /// SHA-256 of all that it holds.
+    ///
+    /// # Panics
+    /// Never: its types serialise.
+    #[must_use]
+    pub fn sha256(&self) -> String {
+        let bytes = postcard::to_stdvec(self);
+        sha256(&bytes.unwrap_or_else(|error| unreachable!("its types serialise: {error}")))
+    }
+
     /// Makes the run of `graph` go on from here; `is_changed` says that it has other values than the run that has written the
     /// checkpoint.
     ///
     /// # Errors
     /// If it is another run: a file has changed, a node is not in it, or its ticks are others.
-    pub fn resume(self, graph: &mut Graph, is_changed: bool) -> Result<()> {
+    pub fn resume(&self, graph: &mut Graph, is_changed: bool) -> Result<()> {
         for InputFile { path, sha256, .. } in files(graph) {
             match self.files.iter().find(|(known, _)| known == path) {
                 // A copy with values of `--set` lies nowhere, and is another one by right.
@@ -211,6 +236,12 @@ impl Checkpoint {
         }
         let part = self.parts.nodes.iter().find(|part| part.name == name).cloned();
         part.ok_or_else(|| {
+            if program.is_judge() {
+                return anyhow!(
+                    "the checkpoint holds nothing of the conditions so far, since the run before was recorded and judged after \
+                     its end: fly it again with --checkpoint-every or [[checkpoint]]"
+                );
+            }
             let known: Vec<&str> = self.nodes().map(|(name, _)| name).collect();
             anyhow!("the checkpoint holds no state of `{name}`; it has {}", known.join(", "))
         })

@@ -1,5 +1,6 @@
 //! A run on the thread of its launcher: no processes, no shared memory, no clock service.
 
+use crate::checkpoint::Checkpoint;
 use crate::event::{Progress, RunEvent, StopToken};
 use crate::graph::Graph;
 use crate::host::{Host, panic_message};
@@ -148,32 +149,53 @@ struct Run<'a> {
     missed_deadlines: u32,
 }
 
-/// Refuses what [`fly_unrecorded`] cannot fly in `manifest`, whose graph is `graph`.
+/// Checks that [`fly_unrecorded`] can fly `manifest`, and go on `from` a checkpoint; flies nothing. Returns the graph.
 ///
 /// # Errors
-/// A request that needs a process of its own: an executable, a swap, a standby.
-pub fn require_one_thread(manifest: &Manifest, graph: &Graph) -> Result<()> {
-    require_host(&Host::InProcess, manifest, graph)
+/// As [`fly_unrecorded`], but for what goes wrong in flight.
+pub fn require_flyable(manifest: &Manifest, files: InputFiles, from: Option<&Checkpoint>) -> Result<Graph> {
+    let graph = graph_of(manifest, files, Path::new(FIGURES), from)?;
+    if let Some(parts) = &graph.from {
+        simulation(&graph, |_| true, manifest.registry().components())?.restore(parts)?;
+    }
+    Ok(graph)
 }
 
-/// Flies `manifest`, which is not recorded, on the calling thread; the files that `files` has read are not read again. Its
-/// judge writes into `folder`, and nothing else is written.
+/// Flies `manifest`, which is not recorded, on the calling thread, `from` a checkpoint where there is one; the files that
+/// `files` has read are not read again. Its judge writes into `folder`, and nothing else is written.
 ///
 /// # Errors
-/// A problem in the manifest, a request that needs a process of its own, a step that fails, or a component that panics.
-pub fn fly_unrecorded(manifest: &Manifest, files: InputFiles, folder: &Path) -> Result<Outcome> {
-    let mut graph = Graph::build_from(manifest, files)?;
-    require_host(&Host::InProcess, manifest, &graph)?;
+/// A problem in the manifest, a request that needs a process of its own (an executable, a swap, a standby), a checkpoint
+/// that does not fit, a step that fails, or a component that panics.
+pub fn fly_unrecorded(
+    manifest: &Manifest,
+    files: InputFiles,
+    folder: &Path,
+    from: Option<&Checkpoint>,
+) -> Result<Outcome> {
     let path = folder.join(FIGURES);
-    let judge = graph.programs.iter().position(Program::is_judge);
-    if let Some(judge) = judge {
-        graph.plan.nodes[judge].parameters["path"] = serde_json::json!(path);
-    }
+    let graph = graph_of(manifest, files, &path, from)?;
     let stop = StopToken::new();
     let mut outcome = fly(&graph, manifest.registry().components(), &stop, &mut |_| {}, &mut |_| {})?;
+    let has_judge = graph.programs.iter().any(Program::is_judge);
     let read = || std::fs::read(&path).context("cannot read the figures of the judge");
-    outcome.figures = judge.map(|_| read()).transpose()?;
+    outcome.figures = has_judge.then(read).transpose()?;
     Ok(outcome)
+}
+
+/// The graph of `manifest` for one thread, without checkpoints, whose judge writes its figures to `path`.
+fn graph_of(manifest: &Manifest, files: InputFiles, path: &Path, from: Option<&Checkpoint>) -> Result<Graph> {
+    let mut graph = Graph::build_from(manifest, files)?;
+    if let Some(from) = from {
+        from.resume(&mut graph, true)?;
+    }
+    require_host(&Host::InProcess, manifest, &graph)?;
+    graph.plan.checkpoint_ticks.clear();
+    graph.plan.checkpoint_period = None;
+    if let Some(judge) = graph.programs.iter().position(Program::is_judge) {
+        graph.plan.nodes[judge].parameters["path"] = serde_json::json!(path);
+    }
+    Ok(graph)
 }
 
 /// Ticks that were computed, and for each node with a simulated computing time its overruns and skipped steps.

@@ -11,6 +11,7 @@ mod describe_programs;
 pub mod event;
 mod file_lock;
 pub mod flight;
+mod fork;
 pub mod graph;
 pub mod host;
 mod host_limits;
@@ -46,7 +47,7 @@ mod watch_clock;
 mod world;
 
 pub use describe_programs::check_programs;
-pub use in_process::{fly_unrecorded, require_one_thread, simulate};
+pub use in_process::{fly_unrecorded, require_flyable, simulate};
 
 use bus::{BusError, Join};
 use registry::Registry;

@@ -66,7 +66,8 @@ sensor! {
 }
 
 impl Sensor for BarometerParams {
-    const INFO: Info = Info::new("barometer", "air pressure and altitude with noise, walking bias and delay");
+    const INFO: Info = Info::new("barometer", "air pressure and altitude with noise, walking bias and delay")
+        .starting_with(&["initial_bias_Pa"]);
     type Parameters = Self;
     type Inputs<'a> = TruthInputs<'a>;
     type Outputs = Outputs;

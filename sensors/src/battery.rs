@@ -83,7 +83,8 @@ impl Sensor for BatteryParams {
     const INFO: Info = Info::new(
         "battery",
         "battery monitor: voltage and current with noise, and the charge counted from it",
-    );
+    )
+    .starting_with(&["initial_charge"]);
     type Parameters = Self;
     type Inputs<'a> = BatteryInputs<'a>;
     type Outputs = Outputs;

@@ -68,6 +68,24 @@ pub struct CampaignArguments {
     task_of: Option<PathBuf>,
 }
 
+/// Campaign to fly, and the way to fly it.
+pub struct Flying {
+    /// The campaign file.
+    pub path: PathBuf,
+    /// Its text.
+    pub text: String,
+    /// Folder for the plan, the flights and the report.
+    pub folder: PathBuf,
+    /// True if the text is to be written to the path, which lies in the folder.
+    pub is_made: bool,
+    /// Engine that flies.
+    pub engine: EngineArguments,
+    /// Condition for exit code 0.
+    pub require: Option<Requirement>,
+    /// True for a report as JSON.
+    pub json: bool,
+}
+
 /// The command `campaign`; false if the requirement is not met.
 ///
 /// # Errors
@@ -81,62 +99,76 @@ pub fn campaign(arguments: &CampaignArguments) -> Result<bool> {
         return fly_task(folder).map(|()| true);
     }
     arguments.engine.check()?;
-    let path = arguments.campaign.as_deref().context("expected a campaign file")?;
-    let text = InputFiles::default().text(path).with_context(|| format!("cannot read {}", path.display()))?;
-    let campaign = Campaign::parse(path, &text)?;
-    let base = Base::read(&campaign, COMPONENTS)?;
+    let path = arguments.campaign.clone().context("expected a campaign file")?;
+    let text =
+        InputFiles::default().text(&path).with_context(|| format!("cannot read {}", path.display()))?;
     let folder = arguments.out.clone().unwrap_or_else(|| path.with_extension(""));
-    let figures = columns(&base.manifest.content);
-    let (store, plan, flown) = Store::open(&folder, &campaign, &base.fingerprint, &figures)?;
-    let mut opened = Opened { path, text, campaign, base, folder, figures, store, plan };
+    let CampaignArguments { require, json, .. } = *arguments;
+    let engine = arguments.engine.clone();
+    let opened = Opened::new(Flying { path, text, folder, is_made: false, engine, require, json })?;
     if arguments.plan_only {
-        let path = opened.folder.join(PLAN);
-        return print_text(&format!("{} flights: {}", opened.plan.flights.len(), path.display()))
+        let path = opened.0.flying.folder.join(PLAN);
+        return print_text(&format!("{} flights: {}", opened.0.plan.flights.len(), path.display()))
             .map(|()| true);
     }
-    if let Some(flight) = arguments.fly {
-        return fly_one(&opened, flight, arguments.json);
+    match arguments.fly {
+        Some(flight) => fly_one(&opened.0, flight),
+        None => fly_all(opened),
     }
-    let rows = opened.fly(arguments, flown)?;
+}
+
+/// Flies a campaign to its end, and reports it; false if its requirement is not met.
+///
+/// # Errors
+/// As [`campaign`].
+pub fn fly(flying: Flying) -> Result<bool> {
+    fly_all(Opened::new(flying)?)
+}
+
+fn fly_all((mut opened, flown): (Opened, BTreeMap<u64, Row>)) -> Result<bool> {
+    let rows = opened.fly(flown)?;
     let report = opened.write(&rows)?;
-    judge(&opened, arguments, &report)
+    judge(&opened, &report)
 }
 
 /// A campaign with its folder.
-struct Opened<'a> {
-    path: &'a Path,
-    text: String,
+struct Opened {
+    flying: Flying,
     campaign: Campaign,
     base: Base,
-    folder: PathBuf,
     figures: Vec<String>,
     store: Store,
     plan: Plan,
 }
 
-impl Opened<'_> {
+impl Opened {
+    /// The campaign, and the rows that were flown already.
+    fn new(flying: Flying) -> Result<(Self, BTreeMap<u64, Row>)> {
+        let Flying { path, text, folder, .. } = &flying;
+        let campaign = Campaign::parse(path, text)?;
+        let base = Base::read(&campaign, COMPONENTS)?;
+        let figures = columns(&base.manifest.content);
+        let (store, plan, flown) = Store::open(folder, &campaign, &base.fingerprint, &figures)?;
+        if let (true, Some(name)) = (flying.is_made, path.file_name().and_then(|name| name.to_str())) {
+            store.write(name, |file| Ok(file.write_all(text.as_bytes())?))?;
+        }
+        Ok((Self { flying, campaign, base, figures, store, plan }, flown))
+    }
+
     /// Flies the flights that have no row yet; all rows by flight.
-    fn fly(
-        &mut self,
-        arguments: &CampaignArguments,
-        mut rows: BTreeMap<u64, Row>,
-    ) -> Result<BTreeMap<u64, Row>> {
+    fn fly(&mut self, mut rows: BTreeMap<u64, Row>) -> Result<BTreeMap<u64, Row>> {
         let jobs = jobs(&self.campaign, &self.base, &self.plan, &rows)?;
         require_flyable(&self.base, &jobs)?;
-        let bar = progress::bar(BAR, arguments.json);
+        let bar = progress::bar(BAR, self.flying.json);
         bar.set_length(self.plan.flights.len() as u64);
         bar.set_position(rows.len() as u64);
-        let order = Order {
-            version: VERSION.to_owned(),
-            path: self.path.to_owned(),
-            text: self.text.clone(),
-            fingerprint: self.base.fingerprint.clone(),
-            folder: self.store.work_folder()?,
-        };
-        let flight = Flight { folder: &self.folder, order, timeout_s_host: self.campaign.timeout_s_host };
+        let Self { flying, campaign, base, plan, figures, store } = self;
+        let (path, text, fingerprint) = (flying.path.clone(), flying.text.clone(), base.fingerprint.clone());
+        let order =
+            Order { version: VERSION.to_owned(), path, text, fingerprint, folder: store.work_folder()? };
+        let flight = Flight { folder: &flying.folder, order, timeout_s_host: campaign.timeout_s_host };
         let tell = |text: &str| bar.suspend(|| say(text));
-        let Self { plan, figures, store, .. } = self;
-        let end = arguments.engine.fly(flight, jobs, &tell, |mut row| {
+        let end = flying.engine.fly(flight, jobs, &tell, |mut row| {
             row.drawn.clone_from(&plan.flights[row.flight as usize]);
             row.figures.resize(figures.len(), None);
             store.add(&row)?;
@@ -145,14 +177,14 @@ impl Opened<'_> {
             Ok(())
         });
         progress::finish(&bar);
-        end.with_context(|| format!("{} flights are kept in {}", rows.len(), self.folder.display()))?;
+        end.with_context(|| format!("{} flights are kept in {}", rows.len(), self.flying.folder.display()))?;
         Ok(rows)
     }
 
     /// Writes the table and the report.
     fn write(&self, rows: &BTreeMap<u64, Row>) -> Result<Report> {
         let rows: Vec<Row> = rows.values().cloned().collect();
-        let report = Report::of(&self.campaign, &self.base, &self.plan, &rows, &self.folder)?;
+        let report = Report::of(&self.campaign, &self.base, &self.plan, &rows, &self.flying.folder)?;
         let Self { store, plan, figures, .. } = self;
         store.write("flights.parquet", |file| table::write(file, plan, figures, &rows))?;
         store.write("report.json", |file| Ok(serde_json::to_writer_pretty(file, &report)?))?;
@@ -162,20 +194,21 @@ impl Opened<'_> {
 }
 
 /// Prints the report, and says if the requirement holds.
-fn judge(opened: &Opened<'_>, arguments: &CampaignArguments, report: &Report) -> Result<bool> {
-    let is_met = arguments.require.is_none_or(|required| required.is_met(report.passed, report.flights));
-    if arguments.json {
+fn judge(opened: &Opened, report: &Report) -> Result<bool> {
+    let Flying { folder, require, json, .. } = &opened.flying;
+    let is_met = require.is_none_or(|required| required.is_met(report.passed, report.flights));
+    if *json {
         let mut value = json!(report);
         value["requirement_met"] = json!(is_met);
         print_json(&value)?;
     } else {
-        print_text(&format!("{report}{}", next_steps(&opened.folder, report)))?;
+        print_text(&format!("{report}{}", next_steps(folder, report)))?;
     }
     let left = report.planned - report.flights;
     if left > 0 {
         bail!("the campaign was interrupted; the same command flies the other {left} flights");
     }
-    if let Some(required) = arguments.require.filter(|_| !is_met) {
+    if let Some(required) = require.filter(|_| !is_met) {
         let shown = required.shown(report.passed, report.flights);
         say(&format!("not met: {required}; these flights show {shown:.4}"));
     }
@@ -190,8 +223,8 @@ fn next_steps(folder: &Path, report: &Report) -> String {
 }
 
 /// Flies flight number `flight` of the plan on this thread, recorded; false if a condition does not hold.
-fn fly_one(opened: &Opened<'_>, flight: usize, is_json: bool) -> Result<bool> {
-    let Opened { campaign, base, plan, folder, .. } = opened;
+fn fly_one(opened: &Opened, flight: usize) -> Result<bool> {
+    let Opened { flying: Flying { folder, json, .. }, campaign, base, plan, .. } = opened;
     if flight >= plan.flights.len() {
         bail!("there is no flight {flight}: the plan has the flights 0 to {}", plan.flights.len() - 1);
     }
@@ -200,13 +233,24 @@ fn fly_one(opened: &Opened<'_>, flight: usize, is_json: bool) -> Result<bool> {
     let sets = [plan.sets(campaign, base, flight)?, vec![format!("run.record={record}")]].concat();
     let manifest = base.of_flight(&sets)?;
     let graph = Graph::build_from(&manifest, base.files.branch())?;
-    let launcher = Launcher::new(Host::InProcess).stopped_by(&stop_token()?).reading(base.files.branch());
-    let (outcome, flown) = launcher.fly(&manifest, &recording)?;
+    let mut launcher = Launcher::new(Host::InProcess).stopped_by(&stop_token()?).reading(base.files.branch());
+    if let Some(from) = &base.from {
+        launcher = launcher.going_on_from(from.clone());
+    }
+    let (mut outcome, flown) = launcher.fly(&manifest, &recording)?;
+    let figures = outcome.figures.take();
     let mut summary =
         Summary::new(format!("{} flight {flight}", manifest.name()), outcome, graph.plan.tick_s());
     let flown = flown.context("the manifest has no recorder: add one to see a flight")?;
-    summary.judge(&flown, &graph.plan, &manifest.content)?;
-    if is_json {
+    match figures {
+        // The judge has seen what was flown before the checkpoint, too.
+        Some(figures) => {
+            summary.judge_by(&figures, &manifest.content)?;
+            summary.describe(&flown, &graph.plan)?;
+        }
+        None => summary.judge(&flown, &graph.plan, &manifest.content)?,
+    }
+    if *json {
         print_json(&serde_json::to_value(&summary)?)?;
     } else {
         print_text(&summary.to_string())?;

@@ -33,7 +33,7 @@ pub enum Engine {
 }
 
 /// Arguments of the engines.
-#[derive(Args)]
+#[derive(Args, Clone)]
 pub struct EngineArguments {
     /// Engine that flies; `slurm` submits a job array on a host that may submit jobs.
     #[arg(long, value_enum, default_value = "local")]
@@ -63,6 +63,11 @@ pub struct Flight<'a> {
 }
 
 impl EngineArguments {
+    /// Worker processes on this machine: so many, or one for each core.
+    pub const fn local(workers: Option<u16>) -> Self {
+        Self { engine: Engine::Local, workers, chunk: None, sbatch: Vec::new(), node_command: None }
+    }
+
     /// Refuses options of Slurm for another engine.
     ///
     /// # Errors

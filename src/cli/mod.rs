@@ -10,6 +10,7 @@ mod components;
 mod diff;
 mod export_fmu;
 mod files;
+mod fork;
 mod identify;
 mod included_models;
 mod inherited;
@@ -53,8 +54,10 @@ struct Cli {
 
 commands! {
     /// Fly a manifest, record it, and judge the recording.
-    #[command(after_help = "Example: hummingbus run manifests/hover.toml --pace realtime --set run.seed=7")]
-    Run(run::RunArguments) => run::fly;
+    #[command(
+        after_help = "Examples: hummingbus run manifests/hover.toml --pace realtime --set run.seed=7\n          hummingbus run --from hover.6000.ckpt --fork 100 --vary process.plant.vehicle.body.mass=factor:uniform:0.9,1.1"
+    )]
+    Run(fork::RunOrForkArguments) => fork::run;
     /// Fly a manifest as `run` does, and tell where the host time of its ticks goes.
     #[command(
         after_help = "Example: hummingbus profile manifests/hover.toml --html profile.html --trace trace.json"

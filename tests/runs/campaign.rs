@@ -32,7 +32,7 @@ pub fn rows(folder: &str) -> Vec<Value> {
 }
 
 /// Height of the vehicle at the end of a recording, m.
-fn last_height(recording: &str) -> f64 {
+pub fn last_height(recording: &str) -> f64 {
     let series =
         Recording::open(recording.as_ref()).unwrap().series(&[("/plant/state", "position.z")]).unwrap();
     *series[0].value.last().unwrap()

@@ -274,10 +274,23 @@ fn a_live_run_writes_one_when_it_is_asked() {
     let tick = asked.with_code(0).json()["tick"].as_u64().unwrap();
     assert!(tick > 0);
     place.start(&["ctl", "pause", "--run", &run]).end_among_others().with_code(0);
-    let refused = place.start(&["ctl", "checkpoint", "--run", &run]).end_among_others();
-    refused.with_code(2).says(&["a paused run writes no checkpoint"]);
+    // A paused run writes one where it is, as often as it is asked, and stays there.
+    let status =
+        || place.start(&["ctl", "status", "--run", &run, "--json"]).end_among_others().with_code(0).json();
+    let paused = status();
+    let held = paused["tick"].as_u64().unwrap();
+    let of_pause = place.path("paused.ckpt");
+    for _ in 0..2 {
+        let asked =
+            place.start(&["ctl", "checkpoint", &of_pause, "--run", &run, "--json"]).end_among_others();
+        assert_eq!(asked.with_code(0).json()["tick"], held);
+    }
+    assert_eq!(status(), paused);
+    place.start(&["ctl", "step", "150", "--run", &run]).end_among_others().with_code(0);
     place.start(&["ctl", "stop", "--run", &run]).end_among_others().with_code(0);
     launch.end().with_code(1);
+    let fork = ["run", "--from", &file, "--fork", "2", "--set", "run.duration_s=1e3"];
+    place.call(&fork).with_code(2).says(&["holds nothing of the conditions so far", "--checkpoint-every"]);
     let end = ["--set", "run.duration_s=1e3", "--pace", "free", "--record"];
     let later = place.path("b.mcap");
     let mut goes_on = place.start(&[&["run", "--from", &file][..], &end, &[&later]].concat());
@@ -286,6 +299,45 @@ fn a_live_run_writes_one_when_it_is_asked() {
     goes_on.end().with_code(1).prints(&["from the checkpoint of tick"]);
     let compared = place.call(&["diff", &place.path("a.mcap"), &later]);
     compared.with_code(1).prints(&["begins at tick"]);
+    // Of the pause: up to the end of the first run, and no further.
+    let (short, end) = (place.path("c.mcap"), format!("run.duration_s={}", (held + 150) as f64 * 1e-3));
+    let args = ["run", "--from", &of_pause, "--pace", "free", "--set", &end, "--record", &short];
+    for host in HOSTS {
+        place.call(&[&args[..], host].concat()).flown();
+        require_goes_on(&place, &place.path("a.mcap"), &short, u32::try_from(held).unwrap());
+    }
+}
+
+/// In processes of several nodes, and where some compute seldom.
+#[test]
+fn a_paused_run_writes_a_checkpoint_under_every_composition() {
+    let place = Place::new();
+    let fast = repository("manifests/fast-loops.toml");
+    for compose in ["none", "all", "plant+imu,ekf+controller"] {
+        let record = place.path("a.mcap");
+        let args = ["run", &fast, "--record", &record, "--compose", compose, "--pace", "realtime"];
+        // As long as 32 bits of ticks allow.
+        let mut launch = place.start(&[&args[..], &["--set", "run.duration_s=400000"]].concat());
+        launch.await_ticks(200);
+        let run = place.run_id();
+        let ctl = |args: &[&str]| {
+            let all = [&["ctl"], args, &["--run", &run, "--json"]].concat();
+            place.start(&all).end_among_others().with_code(0).json()["tick"].as_u64().unwrap()
+        };
+        ctl(&["pause"]);
+        // Between the ticks of the slow loops.
+        let held = ctl(&["step", "13"]);
+        let file = place.path("held.ckpt");
+        assert_eq!(ctl(&["checkpoint", &file]), held);
+        ctl(&["step", "120"]);
+        ctl(&["stop"]);
+        launch.end().with_code(1);
+        let (later, end) = (place.path("b.mcap"), format!("run.duration_s={}", (held + 120) as f64 / 8000.0));
+        let args =
+            ["run", "--from", &file, "--pace", "free", "--set", &end, "--record", &later, "--in-process"];
+        place.call(&args).flown();
+        require_goes_on(&place, &record, &later, u32::try_from(held).unwrap());
+    }
 }
 
 #[test]

@@ -8,6 +8,7 @@
 //! - [`processors`]: nor does it depend on the processor
 //! - [`live`]: runs that are watched and steered
 //! - [`campaign`]: thousands of flights with varied values
+//! - [`forks`]: campaigns that go on from a checkpoint
 //! - [`clean`]: what dead runs left is removed, and nothing of live ones
 //! - [`terminal`]: a terminal for a program under test
 //! - [`loss`]: every sample is recorded
@@ -58,6 +59,7 @@ mod corpus;
 mod determinism;
 mod documentation;
 mod failures;
+mod forks;
 mod identify;
 mod in_process;
 mod inputs;

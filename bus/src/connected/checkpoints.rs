@@ -33,12 +33,41 @@ impl ConnectedNode {
             self.next_checkpoint = self.links.plan.checkpoint_after(of).unwrap_or(u32::MAX);
             self.write_checkpoint(of, tick, locals, computation)?;
         }
+        let asks = self.links.lockstep.checkpoint_asks();
         let asked = self.links.lockstep.checkpoint_tick();
-        if asked > self.asked_checkpoint && asked <= tick {
-            self.asked_checkpoint = asked;
+        if asks > self.asks_answered && asked <= tick {
+            self.asks_answered = asks;
             self.write_checkpoint(asked, tick, locals, computation)?;
         }
         Ok(())
+    }
+
+    /// True if a checkpoint was asked for of the tick at which the run is held: all samples before it are there.
+    pub(crate) fn is_asked_at_hold(&self) -> bool {
+        let lockstep = &self.links.lockstep;
+        lockstep.checkpoint_asks() > self.asks_answered
+            && lockstep.held_at() == Some(lockstep.checkpoint_tick())
+            && lockstep.checkpoint_tick() <= self.tick
+    }
+
+    /// Writes this node's part of the checkpoint of the tick at which the run is held, if it was asked for one.
+    ///
+    /// # Errors
+    /// If a sample is lost, or the part cannot be written.
+    pub(crate) fn write_at_hold(
+        &mut self,
+        locals: &Locals,
+        computation: &dyn Computation,
+    ) -> Result<(), BusError> {
+        if !self.is_asked_at_hold() {
+            return Ok(());
+        }
+        let lockstep = &self.links.lockstep;
+        let (asks, of) = (lockstep.checkpoint_asks(), lockstep.checkpoint_tick());
+        self.asks_answered = asks;
+        let taken = self.stepper.gather_before(of);
+        taken.inspect_err(|&(topic, _)| lockstep.count_gap(topic)).map_err(|(_, error)| error)?;
+        self.write_checkpoint(of, self.tick, locals, computation)
     }
 
     /// Writes this node's part of the checkpoint at tick `of` if `tick` is the first due tick from there on.

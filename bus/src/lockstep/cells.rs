@@ -45,6 +45,8 @@ cells! {
         epoch: AtomicU32,
         /// The tick before which every node writes its part of a checkpoint that was asked for; 0 where none was.
         checkpoint_tick: AtomicU32,
+        /// Number of checkpoints that were asked for.
+        checkpoint_asks: AtomicU32,
     }
 
     /// What the clock says.

@@ -54,6 +54,12 @@ impl LiveView {
         self.segment.head().run.epoch.load(Acquire)
     }
 
+    /// Number of checkpoints that were asked for.
+    #[must_use]
+    pub fn checkpoint_asks(&self) -> u32 {
+        self.segment.head().run.checkpoint_asks.load(Acquire)
+    }
+
     /// The tick before which every node writes its part of the checkpoint that was asked for last; 0 where none was.
     #[must_use]
     pub fn checkpoint_tick(&self) -> u32 {

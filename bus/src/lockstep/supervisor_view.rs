@@ -99,9 +99,14 @@ impl SupervisorView {
         }
     }
 
-    /// Makes every node write its part of a checkpoint before `tick`, at which the clock holds the run.
+    /// Makes every node write its part of a checkpoint before `tick`, at which the clock holds the run: at once, or at its
+    /// next step if the hold is lifted first.
     pub fn ask_for_checkpoint(&self, tick: u32) {
-        self.segment.head().run.checkpoint_tick.store(tick, Release);
+        let run = &self.segment.head().run;
+        // Who sees the number sees the tick.
+        run.checkpoint_tick.store(tick, Release);
+        run.checkpoint_asks.fetch_add(1, Release);
+        self.segment.wake_everybody();
     }
 
     /// Changes the pace; the clock follows at its next grant.

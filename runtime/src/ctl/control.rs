@@ -141,14 +141,15 @@ impl<'a> ControlServer<'a> {
         }
     }
 
-    /// Makes the nodes write the checkpoint of `tick`, at which the run is held, and lets it go on to `hold_tick`.
+    /// Makes the nodes write the checkpoint of `tick`, at which the run is held, and lets it go on to `hold_tick`; a run that
+    /// was paused before stays so.
     fn save(&mut self, path: Option<PathBuf>, tick: u32, hold_tick: u32, reply: Reply) {
         let refused = if tick == 0 {
             Some("tick 0 is the start of the run: there is nothing to go on from")
-        } else if hold_tick <= tick {
-            Some(
-                "a paused run writes no checkpoint, since every process writes its part at its next step; resume it",
-            )
+        } else if tick == self.plan.first_tick {
+            Some("the run has computed nothing since the checkpoint from which it goes on")
+        } else if !self.plan.goes_on_from(tick) {
+            Some("a process has computed its last step: nothing would go on from there")
         } else {
             None
         };
@@ -157,7 +158,7 @@ impl<'a> ControlServer<'a> {
             reply.send(&Answer::refused(reason));
             return;
         }
-        // Before the hold is lifted: every node sees it at its next tick.
+        // Before the hold is lifted: every node sees it in the hold, or at its next tick.
         self.control.ask_for_checkpoint(tick);
         self.control.set_hold_tick(hold_tick);
         self.wish = Some((Goal::Save { path, tick }, reply));
