@@ -23,6 +23,8 @@ use vehicles::Vehicle;
 
 /// The library that is preloaded.
 const LOCKSTEP: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/lockstep.so"));
+/// The library in the folder in which the firmware runs: a path with a blank or a colon could not be preloaded.
+const PRELOADED: &str = "./lockstep.so";
 /// Its variable: what the firmware's clock shows when it first waits for packets, in ns.
 const BOOT_VARIABLE: &str = "HUMMINGBUS_FIRMWARE_BOOT_NS";
 /// Time in which the firmware starts by itself, in s of its own clock.
@@ -183,13 +185,13 @@ impl Autopilot for Betaflight {
     fn boot(&self) -> Result<Link, String> {
         let scratch = Scratch::new("betaflight")?;
         let program = scratch.write("betaflight", &self.firmware)?;
-        let library = scratch.write("lockstep.so", LOCKSTEP)?;
+        scratch.write("lockstep.so", LOCKSTEP)?;
         let configuration = scratch.write("configuration", self.commands().as_bytes())?;
         let mut configure = scratch.command(&program)?;
-        configure.env("LD_PRELOAD", &library).arg("--config").arg(configuration);
+        configure.env("LD_PRELOAD", PRELOADED).arg("--config").arg(configuration);
         scratch.run(configure, CONFIGURATION_LIMIT).map_err(|error| format!("the configuration: {error}"))?;
         let mut command = scratch.command(&program)?;
-        command.env("LD_PRELOAD", &library).env(BOOT_VARIABLE, nanoseconds(BOOT_S).to_string());
+        command.env("LD_PRELOAD", PRELOADED).env(BOOT_VARIABLE, nanoseconds(BOOT_S).to_string());
         let firmware = Firmware::start(scratch, command, self.reply_timeout)?;
         let mut link = Link { firmware, steps: 0 };
         link.receive()?;

@@ -96,10 +96,10 @@ __attribute__((constructor)) static void begin(void)
     main_thread = pthread_self();
     /* The log of a firmware that is killed ends with its last line. */
     setvbuf(stdout, NULL, _IOLBF, 0);
+    /* Without its parent nobody is left to fly for. */
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
     const char *boot_ns = getenv("HUMMINGBUS_FIRMWARE_BOOT_NS");
     if (boot_ns) {
-        /* Nobody is left to fly for. */
-        prctl(PR_SET_PDEATHSIG, SIGKILL);
         is_lockstep = 1;
         end_ns = strtoull(boot_ns, NULL, 10);
     }
