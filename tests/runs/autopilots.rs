@@ -51,8 +51,8 @@ fn a_firmware_flies_the_hover_and_its_doublet_and_two_runs_are_the_same_bytes() 
     // The firmware's folder lies in a path that cannot be preloaded from as it is.
     let folder = place.path("a blank, a colon: ");
     fs::create_dir(&folder).unwrap();
-    let set = settings.iter().flat_map(|setting| ["--set", setting]);
     let manifest = manifest();
+    let set = settings.iter().flat_map(|setting| ["--set", setting]);
     let args: Vec<&str> =
         ["run", &manifest, "--record", &second, "--compose", "all"].into_iter().chain(set).collect();
     place.start_with(&args, &[("TMPDIR", &folder)]).end().with_code(0);

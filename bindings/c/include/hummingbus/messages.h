@@ -1112,6 +1112,18 @@ static const HbField HB_MOCAP_STATE_FIELDS[] = {
 
 static const HbMessage HB_MOCAP_STATE = { "hummingbus_msgs/msg/MocapState", "All that the sensor remembers.", sizeof(HbMocapState), HB_MOCAP_STATE_FIELDS, 2 };
 
+// All that `operator` remembers.
+typedef struct HbOperatorState {
+  // Altitude lost since the source fell silent. [m] in world
+  double lowered;
+} HbOperatorState;
+
+static const HbField HB_OPERATOR_STATE_FIELDS[] = {
+  { "lowered", "Altitude lost since the source fell silent.", "m", "world", offsetof(HbOperatorState, lowered), HB_F64, NULL, 0, 0, 0 },
+};
+
+static const HbMessage HB_OPERATOR_STATE = { "hummingbus_msgs/msg/OperatorState", "All that `operator` remembers.", sizeof(HbOperatorState), HB_OPERATOR_STATE_FIELDS, 1 };
+
 // All that it remembers.
 typedef struct HbPositionHoldState {
   // The place that is held; without meaning along an axis that is not locked. [m] in world

@@ -1068,6 +1068,17 @@ HUMMINGBUS_MESSAGE(hummingbus::msgs::MocapState, "hummingbus_msgs/msg/MocapState
     HUMMINGBUS_FIELD(queue, "", "", "The last measurements."));
 
 namespace hummingbus::msgs {
+// All that `operator` remembers.
+struct OperatorState {
+  // Altitude lost since the source fell silent. [m] in world
+  double lowered{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::OperatorState, "hummingbus_msgs/msg/OperatorState", "All that `operator` remembers.",
+    HUMMINGBUS_FIELD(lowered, "m", "world", "Altitude lost since the source fell silent."));
+
+namespace hummingbus::msgs {
 // All that it remembers.
 struct PositionHoldState {
   // The place that is held; without meaning along an axis that is not locked. [m] in world
