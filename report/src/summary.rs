@@ -9,6 +9,7 @@ use recorder::reader::Recording;
 use runtime::checkpoint::Written;
 use runtime::launcher::Outcome;
 use runtime::manifest::{Content, PassCondition};
+use runtime::rewind::Rewound;
 use serde::Serialize;
 use std::fmt;
 use std::path::PathBuf;
@@ -48,6 +49,8 @@ pub struct Summary {
     pub recording: Option<PathBuf>,
     /// Checkpoints that were written and kept.
     pub checkpoints: Vec<Written>,
+    /// Times at which the run went back in flight.
+    pub rewinds: Vec<Rewound>,
     /// True where the conditions are not judged: the run went on from a checkpoint that holds nothing of what was flown before.
     pub is_unjudged: bool,
     /// Pass conditions.
@@ -152,6 +155,7 @@ impl Summary {
             computing_times: outcome.overruns.into_iter().map(overruns).collect(),
             recording: None,
             checkpoints: outcome.checkpoints,
+            rewinds: outcome.rewinds,
             is_unjudged: false,
             pass: Vec::new(),
             measures: Vec::new(),
@@ -241,6 +245,7 @@ impl fmt::Display for Summary {
         if self.first_tick > 0 {
             writeln!(f, "  from the checkpoint of tick {} on", self.first_tick)?;
         }
+        self.rewinds.iter().try_for_each(|rewound| writeln!(f, "  {rewound}"))?;
         if self.stopped_early {
             writeln!(f, "  stopped before its end")?;
         }

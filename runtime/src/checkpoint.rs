@@ -122,6 +122,17 @@ impl Checkpoint {
         output_file::write(path, &CHECKPOINT, |out| out.write_all(&bytes))
     }
 
+    /// True if it is of the run that would write `other` now.
+    fn is_of_run_of(&self, other: &Self) -> bool {
+        let simulated = |checkpoint: &Self| -> Vec<String> {
+            let overrides = checkpoint.overrides.iter();
+            overrides.filter(|text| Manifest::is_of_simulation(text)).cloned().collect()
+        };
+        (&self.manifest, &self.texts, self.tick_ns) == (&other.manifest, &other.texts, other.tick_ns)
+            && simulated(self) == simulated(other)
+            && self.files == other.files
+    }
+
     /// The first tick that a run computes which goes on from here.
     #[must_use]
     pub fn tick(&self) -> u32 {
@@ -356,6 +367,52 @@ impl Writer<'_> {
         self.put(parts, &path)?;
         Parts::remove_written(self.run_dir, tick);
         Ok(Some(path))
+    }
+
+    /// The checkpoint in `file`, or that of `tick` beside the recording, or the newest there before tick `now`, to which the
+    /// run has come.
+    ///
+    /// # Errors
+    /// If there is none, it is one of another run, or it lies ahead.
+    pub(crate) fn find(&self, tick: Option<u32>, file: Option<&Path>, now: u32) -> Result<Checkpoint> {
+        let path = match (file, tick) {
+            (Some(file), _) => file.to_owned(),
+            (None, Some(tick)) => self::path(self.stem, tick),
+            (None, None) => self.newest_before(now).with_context(|| {
+                format!(
+                    "there is no checkpoint of this run before tick {now}: `run --checkpoint-every` and `ctl checkpoint` write \
+                     them; or name a file"
+                )
+            })?,
+        };
+        let found = Checkpoint::read(&path)?;
+        let own = Checkpoint::new(self.manifest, self.graph, Parts { tick: now, nodes: Vec::new() });
+        if !found.is_of_run_of(&own) {
+            bail!(
+                "{} is a checkpoint of another run: its manifest, one of its files or a value of --set is another one; \
+                 `hummingbus run --from {0}` goes on from it",
+                path.display()
+            );
+        }
+        if found.tick() >= now {
+            bail!(
+                "the checkpoint is of tick {}, and the run is at tick {now}: a rewind goes back",
+                found.tick()
+            );
+        }
+        Ok(found)
+    }
+
+    /// The file of the newest checkpoint before tick `now` beside the recording.
+    fn newest_before(&self, now: u32) -> Option<PathBuf> {
+        let stem = format!("{}.", self.stem.file_name()?.to_str()?);
+        let tick = |entry: std::fs::DirEntry| -> Option<u32> {
+            let name = entry.file_name();
+            name.to_str()?.strip_prefix(&stem)?.strip_suffix(".ckpt")?.parse().ok()
+        };
+        let entries = std::fs::read_dir(self.stem.parent()?).ok()?;
+        let ticks = entries.flatten().filter_map(tick).filter(|tick| *tick < now);
+        ticks.max().map(|tick| self::path(self.stem, tick))
     }
 
     /// True if the process that has written `part` is what the manifest says that node `index` is at `tick`.

@@ -93,6 +93,22 @@ impl Partial {
         self.location.rename(&self.real).with_context(cannot)
     }
 
+    /// Puts the file beside its place, with `suffix` in its name; returns the path.
+    ///
+    /// # Errors
+    /// If something lies there that must not be replaced, or the file was taken away.
+    pub fn set_aside(&self, suffix: &str) -> Result<PathBuf> {
+        let path = with_suffix(&self.real.path, suffix);
+        let cannot = || format!("cannot keep what was flown as {}", path.display());
+        if !self.is_there() {
+            bail!("{}: somebody removed or replaced it during the run", cannot());
+        }
+        check(&path, &RECORDING)?;
+        let aside = self.location.sibling(path.file_name().unwrap_or_default());
+        self.location.rename(&aside).with_context(cannot)?;
+        Ok(path)
+    }
+
     /// Its path by now.
     pub fn current_path(&self) -> PathBuf {
         self.location.current_path()

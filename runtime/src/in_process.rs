@@ -133,6 +133,7 @@ pub(crate) fn fly(
         flight: None,
         figures: None,
         checkpoints: Vec::new(),
+        rewinds: Vec::new(),
     })
 }
 

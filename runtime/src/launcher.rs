@@ -16,6 +16,7 @@ pub use crate::outcome::Outcome;
 use crate::outputs::Outputs;
 use crate::program::Program;
 pub use crate::replacement::{Purpose, Report};
+use crate::rewind::{self, Rewinds};
 use crate::run_dir::RunDir;
 use crate::supervision::Supervisor;
 use crate::world::Spent;
@@ -187,21 +188,34 @@ impl<'a> Launcher<'a> {
             Host::require_proc()?;
         }
         let place = Place::take(self.adopts_orphans)?;
-        let run_dir = RunDir::create(&manifest.path)?;
+        let mut run_dir = RunDir::create(&manifest.path)?;
+        let run_id = run_dir.run_id().to_owned();
         let mut on = std::mem::replace(&mut self.on, Box::new(|_| {}));
-        let flown = self.launch_in(&run_dir, &place, manifest, graph, outputs, &mut *on);
-        let flown = flown.map_err(|error| run_dir.blame_room(error));
-        run_dir.remove().iter().for_each(|left| on(RunEvent::Note(left)));
-        flown
+        let rewinds = Rewinds::default();
+        loop {
+            let flown = self.launch_in(&run_dir, &place, manifest, graph, outputs, &rewinds, &mut *on);
+            let flown = flown.map_err(|error| run_dir.blame_room(error));
+            run_dir.remove().iter().for_each(|left| on(RunEvent::Note(left)));
+            let outcome = flown?;
+            let Some(rewind) = rewinds.take_asked() else {
+                return Ok(Outcome { rewinds: rewinds.done().clone(), ..outcome });
+            };
+            let recording = outputs.set_aside(rewinds.done().len() + 1)?;
+            *graph = rebuilt(manifest, graph, &rewind.checkpoint)?;
+            rewinds.begin(rewind, recording, outcome.checkpoints);
+            run_dir = RunDir::create_again(&manifest.path, &run_id)?;
+        }
     }
 
+    #[allow(clippy::too_many_arguments, reason = "each is one thing of a run")]
     fn launch_in(
-        self,
+        &self,
         run_dir: &RunDir,
         place: &Place,
         manifest: &Manifest,
         graph: &mut Graph,
         outputs: &mut Outputs,
+        rewinds: &Rewinds,
         on: &mut dyn FnMut(RunEvent<'_>),
     ) -> Result<Outcome> {
         // Before anything is touched that an earlier run left.
@@ -212,7 +226,7 @@ impl<'a> Launcher<'a> {
         if let Some(kept) = outputs.kept() {
             on(RunEvent::Note(&format!("what an earlier run left unfinished is kept as {}", kept.display())));
         }
-        prepare(manifest, graph, outputs.partial(), run_dir)?;
+        prepare(manifest, graph, outputs.partial(), run_dir, rewinds.mark())?;
         graph.plan.run_id = run_dir.run_id().to_owned();
         graph.plan.store(run_dir.path())?;
         if let Some(parts) = &graph.from {
@@ -220,7 +234,8 @@ impl<'a> Launcher<'a> {
         }
         let graph = &*graph;
         let mut checkpoints = Collector::new(manifest, graph, run_dir.path(), &outputs.stem);
-        let flown = self.fly_in(run_dir, place, manifest, graph, &mut checkpoints, on);
+        checkpoints.written = rewinds.take_written();
+        let flown = self.fly_in(run_dir, place, manifest, graph, &mut checkpoints, rewinds, on);
         // Those of a run that broke are what somebody goes back to.
         let written = checkpoints.finish();
         if let (Err(_), Some(Written { tick, path })) = (&flown, written.iter().flatten().last()) {
@@ -231,13 +246,15 @@ impl<'a> Launcher<'a> {
         Ok(outcome)
     }
 
+    #[allow(clippy::too_many_arguments, reason = "each is one thing of a run")]
     fn fly_in(
-        self,
+        &self,
         run_dir: &RunDir,
         place: &Place,
         manifest: &Manifest,
         graph: &Graph,
         checkpoints: &mut Collector<'_>,
+        rewinds: &Rewinds,
         on: &mut dyn FnMut(RunEvent<'_>),
     ) -> Result<Outcome> {
         if self.host == Host::InProcess {
@@ -254,7 +271,7 @@ impl<'a> Launcher<'a> {
         // Dropped behind the supervisor, which ends the processes.
         let descendants = self.adopts_orphans.then(|| Descendants::of_run(place));
         let world = HostWorld {
-            host: self.host,
+            host: self.host.clone(),
             manifest,
             plan,
             files: &graph.files,
@@ -262,9 +279,10 @@ impl<'a> Launcher<'a> {
                 dir,
                 plan,
                 &control,
-                self.remote,
-                self.requests,
+                self.remote.clone(),
+                &self.requests,
                 checkpoints.writer,
+                rewinds,
             )?,
             control: control.clone(),
             run_dir: dir,
@@ -292,9 +310,28 @@ impl<'a> Launcher<'a> {
     }
 }
 
+/// The graph of `manifest` again, from `checkpoint` on; a shadow that the manifest does not name flies again.
+fn rebuilt(manifest: &Manifest, graph: &mut Graph, checkpoint: &Checkpoint) -> Result<Graph> {
+    let mut next = Graph::build_from(manifest, graph.files.branch())?;
+    for backup in std::mem::take(&mut graph.backups) {
+        let is_named = next.backups.iter().any(|other| other.node == backup.node);
+        if backup.take_over_tick.is_none() && !is_named {
+            next.backups.push(backup);
+        }
+    }
+    checkpoint.resume(&mut next, true)?;
+    Ok(next)
+}
+
 /// Puts the files that the nodes read into the run directory, and tells the recorders what to attach: the manifest, what
-/// it includes, and the models.
-fn prepare(manifest: &Manifest, graph: &mut Graph, recording: Option<&Path>, run_dir: &RunDir) -> Result<()> {
+/// it includes, and the models; and the `mark` of a run that went back.
+fn prepare(
+    manifest: &Manifest,
+    graph: &mut Graph,
+    recording: Option<&Path>,
+    run_dir: &RunDir,
+    mark: Option<String>,
+) -> Result<()> {
     let (files, recorded) = (graph.files.listing_anew(), run_dir.path().join("manifest.toml"));
     let whole = (manifest.path.as_path(), manifest.recorded_text.as_str(), recorded.as_path());
     let texts = manifest.included().map(|(path, text)| (path, text, path));
@@ -308,6 +345,12 @@ fn prepare(manifest: &Manifest, graph: &mut Graph, recording: Option<&Path>, run
     for path in &graph.models {
         attachments.push(attachment(path, path));
         files.bytes(path).with_context(|| format!("cannot attach {}", path.display()))?;
+    }
+    if let Some(mark) = mark {
+        let key = run_dir.path().join(rewind::MARK);
+        files.keep(&key, mark.into_bytes());
+        attachments.push(attachment(&key, &key));
+        files.bytes(&key)?;
     }
     for (program, node) in graph.programs.iter().zip(&mut graph.plan.nodes) {
         if program.is_recorder() {
@@ -364,5 +407,6 @@ fn outcome(plan: &Plan, control: &SupervisorView, supervisor: &Supervisor<'_, Ho
         flight: None,
         figures: None,
         checkpoints: Vec::new(),
+        rewinds: Vec::new(),
     }
 }

@@ -31,6 +31,7 @@ mod processes;
 mod program;
 pub mod registry;
 mod replacement;
+pub mod rewind;
 mod role;
 pub mod run_dir;
 mod sidecars;

@@ -160,6 +160,11 @@ impl Manifest {
         self.sources.overrides().map(|source| source.text.as_str())
     }
 
+    /// True for a value of `--set` that may change what is computed, not only where and how fast.
+    pub(crate) fn is_of_simulation(text: &str) -> bool {
+        !recorded::is_host_only(text)
+    }
+
     /// The files it includes, each once: their paths and texts.
     pub(crate) fn included(&self) -> impl Iterator<Item = (&Path, &str)> {
         self.sources.included()

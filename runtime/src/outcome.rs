@@ -3,6 +3,7 @@
 use crate::checkpoint::Written;
 use crate::flight::Flight;
 use crate::replacement::Report;
+use crate::rewind::Rewound;
 
 /// The outcome of a run, as [`Launcher::fly`](crate::launcher::Launcher::fly) returns it.
 #[derive(Debug)]
@@ -30,4 +31,6 @@ pub struct Outcome {
     pub figures: Option<Vec<u8>>,
     /// Files of the checkpoints that were written and kept, in their order.
     pub checkpoints: Vec<Written>,
+    /// Times at which the run went back in flight.
+    pub rewinds: Vec<Rewound>,
 }

@@ -118,11 +118,23 @@ impl Outputs {
             }
             self.partial = Some(partial);
         }
-        for log in &self.logs {
+        // A run that goes back goes on in its logs.
+        let is_first = self.claimed_logs.is_empty();
+        for log in self.logs.iter().filter(|_| is_first) {
             self.claimed_logs.push(log.claimed(LogClaim::claim)?);
         }
         self.publish(run_dir)?;
-        self.claimed_logs.iter_mut().try_for_each(LogClaim::begin)
+        let mut fresh = self.claimed_logs.iter_mut().filter(|_| is_first);
+        fresh.try_for_each(LogClaim::begin)
+    }
+
+    /// Keeps the recording of a run that goes back for the `number`th time beside its place; returns its path.
+    ///
+    /// # Errors
+    /// If something lies there that must not be replaced.
+    pub(crate) fn set_aside(&mut self, number: usize) -> Result<Option<PathBuf>> {
+        let Some(partial) = self.partial.take() else { return Ok(None) };
+        partial.set_aside(&format!(".rewind-{number}")).map(Some)
     }
 
     /// Lists what the run has claimed, for those who come to find it claimed.

@@ -44,7 +44,11 @@ pub struct Entry {
 impl Entry {
     /// What a new run of `manifest` has to say.
     fn new(manifest: &Path) -> Result<Self> {
-        let run_id = format!("{:x}-{:x}", std::process::id(), new_run_number());
+        Self::named(manifest, format!("{:x}-{:x}", std::process::id(), new_run_number()))
+    }
+
+    /// The same of a run that is called `run_id`.
+    fn named(manifest: &Path, run_id: String) -> Result<Self> {
         let run_dir = new_run_dir(&run_id)?;
         Ok(Self { run_id, run_dir, manifest: manifest.to_owned(), launcher: std::process::id() })
     }
@@ -114,9 +118,21 @@ impl RunDir {
     /// # Errors
     /// If shared memory or the folder for temporary files cannot be written to.
     pub fn create(manifest: &Path) -> Result<Self> {
+        Self::create_by(manifest, Entry::new)
+    }
+
+    /// The same of a run that goes on under its old name, `run_id`, after all of it was removed.
+    ///
+    /// # Errors
+    /// As [`RunDir::create`].
+    pub fn create_again(manifest: &Path, run_id: &str) -> Result<Self> {
+        Self::create_by(manifest, |manifest| Entry::named(manifest, run_id.to_owned()))
+    }
+
+    fn create_by(manifest: &Path, new: impl Fn(&Path) -> Result<Entry>) -> Result<Self> {
         let manifest = std::path::absolute(manifest)?;
         let (entry, registered) = loop {
-            let entry = Entry::new(&manifest)?;
+            let entry = new(&manifest)?;
             let registered =
                 register(&entry).with_context(|| format!("cannot register in {SHARED_MEMORY}"))?;
             if let Some(file) = registered {

@@ -4,6 +4,7 @@ use anyhow::{Result, anyhow};
 use recorder::reader::Recording;
 use runtime::checkpoint::Checkpoint;
 use runtime::output_file::{Kind, Mark};
+use runtime::rewind::MARK;
 use std::path::Path;
 
 /// A page, whatever it shows.
@@ -28,7 +29,22 @@ pub fn open_recording(path: &Path) -> Result<Recording> {
             path.display()
         ));
     }
+    // A recording without readable attachments has no mark.
+    let attachments = recording.attachments().unwrap_or_default();
+    if let Some((_, mark)) = attachments.iter().find(|(name, _)| name == MARK) {
+        super::output::say(&format!("{}: {}", path.display(), rewound(&String::from_utf8_lossy(mark))));
+    }
     Ok(recording)
+}
+
+/// What the mark of a recording says of the last rewind of its run.
+fn rewound(mark: &str) -> String {
+    let table: toml::Table = mark.parse().unwrap_or_default();
+    let last = table.get("rewind").and_then(|all| all.as_array()?.last());
+    let tick = |key: &str| last.and_then(|last| last.get(key)?.as_integer()).unwrap_or_default();
+    let recording = last.and_then(|last| last.get("recording")?.as_str());
+    let before = recording.map_or(String::new(), |name| format!("; what was flown up to there is in {name}"));
+    format!("its run went back in flight from tick {} to tick {}{before}", tick("from_tick"), tick("to_tick"))
 }
 
 /// The reason why a checkpoint is not read as a recording.

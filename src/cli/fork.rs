@@ -54,7 +54,8 @@ struct ForkArguments {
 /// As [`fly`], or as `campaign`.
 pub fn run(arguments: &RunOrForkArguments) -> Result<bool> {
     let RunOrForkArguments { run, fork } = arguments;
-    let (Some(from), Some(flights)) = (&run.from, fork.fork) else { return fly(run) };
+    let Some(flights) = fork.fork else { return fly(run) };
+    let from = run.from.as_ref().context("--fork flies from a checkpoint on: name it with --from")?;
     let folder = fork.out.clone().unwrap_or_else(|| from.with_extension("fork"));
     let from = std::path::absolute(from).with_context(|| format!("{} is not a path", from.display()))?;
     campaign::fly(Flying {

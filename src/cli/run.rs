@@ -165,7 +165,7 @@ pub fn run(
             summary.judge_by(&figures, &manifest.content)?;
             summary.describe(recording, &graph.plan)?;
         }
-        (Some(recording), None) if going_on.is_some() => {
+        (Some(recording), None) if summary.first_tick > 0 => {
             summary.is_unjudged = !manifest.content.conditions().topics().is_empty();
             summary.describe(recording, &graph.plan)?;
         }

@@ -50,6 +50,15 @@ enum CtlVerb {
         /// The file; beside the recording and called after the tick where absent.
         file: Option<PathBuf>,
     },
+    /// Go back in a paused run to one of its checkpoints, and wait until it is paused there.
+    #[command(
+        after_help = "Examples: hummingbus ctl rewind\n          hummingbus ctl rewind 6000\n          hummingbus ctl rewind before-the-wall.ckpt"
+    )]
+    Rewind {
+        /// Tick of a checkpoint beside the recording, or the file of one; the newest before the pause where absent.
+        #[arg(value_name = "TICK|FILE")]
+        to: Option<String>,
+    },
     /// End the run at the next tick boundary, as Ctrl-C does.
     Stop,
 }
@@ -65,6 +74,11 @@ impl CtlVerb {
             // The run has a working directory of its own.
             Self::Checkpoint { file } => {
                 Request::Checkpoint { path: file.as_ref().map(std::path::absolute).transpose()? }
+            }
+            Self::Rewind { to } => {
+                let tick = to.as_ref().and_then(|to| to.parse().ok());
+                let file = to.as_ref().filter(|_| tick.is_none());
+                Request::Rewind { tick, path: file.map(std::path::absolute).transpose()? }
             }
             Self::Stop => Request::Stop,
         })

@@ -9,6 +9,7 @@
 //! - [`live`]: runs that are watched and steered
 //! - [`campaign`]: thousands of flights with varied values
 //! - [`forks`]: campaigns that go on from a checkpoint
+//! - [`rewinds`]: paused runs that go back
 //! - [`clean`]: what dead runs left is removed, and nothing of live ones
 //! - [`terminal`]: a terminal for a program under test
 //! - [`loss`]: every sample is recorded
@@ -82,6 +83,7 @@ mod refused_conditions;
 mod refused_flights;
 mod refused_parameters;
 mod replay;
+mod rewinds;
 mod rights;
 mod scenarios;
 mod scenes;

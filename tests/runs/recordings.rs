@@ -21,6 +21,11 @@ pub fn open(path: &str) -> Recording {
     Recording::open(Path::new(path)).unwrap_or_else(|error| panic!("{error}"))
 }
 
+/// The tick of the first message of a recording.
+pub fn first_tick(path: &str) -> u64 {
+    open(path).messages().map(|record| u64::from(record.unwrap().tick)).min().unwrap()
+}
+
 /// All messages of the recording at `path`.
 #[track_caller]
 pub fn topics(path: &str) -> Topics {

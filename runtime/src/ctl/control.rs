@@ -3,7 +3,8 @@
 use crate::checkpoint::Writer;
 use crate::ctl::protocol::{Answer, Request, Status};
 use crate::ctl::server::{Asked, Remote, Reply, Server};
-use anyhow::Result;
+use crate::rewind::{Rewind, Rewinds};
+use anyhow::{Context as _, Result, bail};
 use bus::lockstep::SupervisorView;
 use bus::plan::Plan;
 use std::path::{Path, PathBuf};
@@ -18,9 +19,11 @@ const MAX_A_LOOK: usize = 16;
 pub struct ControlServer<'a> {
     plan: &'a Plan,
     control: &'a SupervisorView,
-    server: Server,
+    server: Server<'a>,
     /// Writes checkpoints.
     checkpoints: Writer<'a>,
+    /// Rewinds, which the launcher carries out.
+    rewinds: &'a Rewinds,
     /// What was asked for and has not happened yet: one thing at a time, the newest.
     wish: Option<(Goal, Reply)>,
 }
@@ -36,10 +39,12 @@ enum Goal {
     PauseToSave { path: Option<PathBuf>, hold_tick: u32 },
     /// To have the parts of the checkpoint of `tick`.
     Save { path: Option<PathBuf>, tick: u32 },
+    /// To be held at `to_tick`, from whose checkpoint the run starts again.
+    Rewind { from_tick: u32, to_tick: u32 },
 }
 
 impl<'a> ControlServer<'a> {
-    /// Opens the control socket in `run_dir`.
+    /// Opens the control socket in `run_dir`. A run that starts again after one of `rewinds` is held at its first tick.
     ///
     /// # Errors
     /// If the socket cannot be made.
@@ -48,11 +53,18 @@ impl<'a> ControlServer<'a> {
         plan: &'a Plan,
         control: &'a SupervisorView,
         remote: Remote,
-        requests: Receiver<Asked>,
+        requests: &'a Receiver<Asked>,
         checkpoints: Writer<'a>,
+        rewinds: &'a Rewinds,
     ) -> Result<Self> {
         let server = Server::start(run_dir, remote, requests)?;
-        Ok(Self { plan, control, server, checkpoints, wish: None })
+        let wish = rewinds.take_begun().map(|Rewind { checkpoint, from_tick, pace, reply }| {
+            let to_tick = checkpoint.tick();
+            control.set_hold_tick(to_tick);
+            control.set_pace(pace);
+            (Goal::Rewind { from_tick, to_tick }, reply)
+        });
+        Ok(Self { plan, control, server, checkpoints, rewinds, wish })
     }
 
     /// Serves what has been asked since the last look; returns a request that is not about the clock, a swap.
@@ -77,6 +89,7 @@ impl<'a> ControlServer<'a> {
                     let hold_tick = self.control.hold_tick();
                     self.wish(0, Goal::PauseToSave { path, hold_tick }, reply);
                 }
+                Request::Rewind { tick, path } => self.rewind(tick, path.as_deref(), reply),
                 Request::Swap { .. } => return Some((request, reply)),
             }
             self.grant_wish();
@@ -128,6 +141,12 @@ impl<'a> ControlServer<'a> {
                 let what = if held_at == Some(target) { "paused" } else { "ended" };
                 self.answer(reply, format!("{what} at tick {target}, {} on", ticks_in_words(ticks)));
             }
+            (Goal::Rewind { from_tick, to_tick }, Some(tick)) if tick == to_tick => {
+                self.answer(
+                    reply,
+                    format!("rewound from tick {from_tick} to tick {to_tick}, where it is paused"),
+                );
+            }
             (Goal::PauseToSave { path, hold_tick }, Some(tick)) => self.save(path, tick, hold_tick, reply),
             (Goal::Save { path, tick }, _) => match self.checkpoints.write(tick, path.as_deref()) {
                 Ok(Some(written)) => {
@@ -162,6 +181,27 @@ impl<'a> ControlServer<'a> {
         self.control.ask_for_checkpoint(tick);
         self.control.set_hold_tick(hold_tick);
         self.wish = Some((Goal::Save { path, tick }, reply));
+    }
+
+    /// Ends the run, so that the launcher starts it again from a checkpoint.
+    fn rewind(&mut self, tick: Option<u32>, file: Option<&Path>, reply: Reply) {
+        let paused_at = self.control.held_at().filter(|held| self.control.hold_tick() <= *held);
+        let found = paused_at.context("the run is not paused: pause it first, with `hummingbus ctl pause`");
+        let found = found.and_then(|now| {
+            if self.plan.profile {
+                bail!("a profile has each tick once: fly without it to go back");
+            }
+            Ok((now, self.checkpoints.find(tick, file, now)?))
+        });
+        match found {
+            Ok((from_tick, checkpoint)) => {
+                self.overtake();
+                let pace = self.control.pace();
+                self.rewinds.ask(Rewind { checkpoint, from_tick, pace, reply });
+                self.control.request_stop();
+            }
+            Err(error) => drop(reply.send(&Answer::refused(format!("{error:#}")))),
+        }
     }
 
     /// Lets the run, held at `tick`, go for `ticks` ticks.

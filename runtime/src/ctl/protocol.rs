@@ -43,6 +43,14 @@ pub enum Request {
         /// The file; beside the recording and called after the tick where absent.
         path: Option<PathBuf>,
     },
+    /// Go back in a paused run to one of its checkpoints; answered when the run is paused there. The newest one before where
+    /// neither is given.
+    Rewind {
+        /// The tick of a checkpoint beside the recording.
+        tick: Option<u32>,
+        /// The file of a checkpoint of this run.
+        path: Option<PathBuf>,
+    },
     /// Replace a process; answered when the backup has taken over.
     Swap {
         /// The process to replace.
@@ -203,6 +211,7 @@ mod tests {
         require_round_trip(r#"{"request":"status"}"#);
         require_round_trip(r#"{"request":"step","ticks":7}"#);
         require_round_trip(r#"{"request":"checkpoint","path":"/a/b.ckpt"}"#);
+        require_round_trip(r#"{"request":"rewind","tick":6000,"path":null}"#);
         require_round_trip(r#"{"request":"pace","pace":"free"}"#);
         require_round_trip(r#"{"request":"pace","pace":"realtime"}"#);
         require_round_trip(r#"{"request":"pace","pace":"0.25"}"#);

@@ -22,8 +22,8 @@ const MAX_WAITING: usize = 64;
 const WAIT: Duration = Duration::from_millis(1);
 
 /// The open socket of a run; dropping it closes it, and ends the threads that serve it.
-pub struct Server {
-    requests: Receiver<Asked>,
+pub struct Server<'a> {
+    requests: &'a Receiver<Asked>,
     listener: Arc<Listener>,
     thread: Option<JoinHandle<()>>,
 }
@@ -87,12 +87,12 @@ fn ended() -> Answer {
     Answer::refused("the run ended first")
 }
 
-impl Server {
+impl<'a> Server<'a> {
     /// Opens the socket in `run_dir`, which only this user may enter. Its requests come out with those of `remote`.
     ///
     /// # Errors
     /// If the socket cannot be made.
-    pub fn start(run_dir: &Path, remote: Remote, requests: Receiver<Asked>) -> Result<Self> {
+    pub fn start(run_dir: &Path, remote: Remote, requests: &'a Receiver<Asked>) -> Result<Self> {
         let folder = bus::user_file::open_folder(run_dir).context("cannot open the run directory")?;
         let socket = UnixListener::bind(socket_path(&folder)).context("cannot open the control socket")?;
         let listener = Arc::new(Listener { socket, is_closed: AtomicBool::new(false) });
@@ -189,7 +189,7 @@ fn thread() -> std::thread::Builder {
     std::thread::Builder::new().name("control".to_owned())
 }
 
-impl Drop for Server {
+impl Drop for Server<'_> {
     fn drop(&mut self) {
         self.listener.is_closed.store(true, Ordering::SeqCst);
         // Who waits for a client returns with an error.

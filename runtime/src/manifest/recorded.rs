@@ -66,7 +66,7 @@ pub fn text(sources: &Sources, processes: &Processes) -> Result<String, Diagnost
 }
 
 /// Whether an override touches only where and how fast a run computes.
-fn is_host_only(text: &str) -> bool {
+pub fn is_host_only(text: &str) -> bool {
     let path = text.split('=').next().unwrap_or_default();
     let keys: Vec<&str> = path.split('.').map(str::trim).collect();
     match keys.as_slice() {

@@ -1,0 +1,119 @@
+//! Paused runs that go back to one of their checkpoints: what is flown then is what a run from that checkpoint flies.
+
+use crate::recordings::first_tick;
+use crate::support::{Place, repository};
+use std::fs;
+
+/// What a request is answered with, as JSON.
+fn ctl(place: &Place, run: &str, args: &[&str]) -> serde_json::Value {
+    let all = [&["ctl"], args, &["--run", run, "--json"]].concat();
+    place.start(&all).end_among_others().with_code(0).json()
+}
+
+#[test]
+fn a_run_that_went_back_flies_as_one_from_the_checkpoint_and_its_recording_says_so() {
+    let place = Place::new();
+    let hover = repository("manifests/hover.toml");
+    for compose in ["none", "all"] {
+        let record = place.path("a.mcap");
+        let args = ["run", &hover, "--record", &record, "--checkpoint-every", "100ms", "--compose", compose];
+        let mut launch = place.start_endless(&args);
+        launch.await_ticks(450);
+        let run = place.run_id();
+        let refused = |args: &[&str], says: &str| {
+            let all = [&["ctl", "rewind"], args, &["--run", &run]].concat();
+            place.start(&all).end_among_others().with_code(2).says(&[says]);
+        };
+        refused(&[], "is not paused");
+        ctl(&place, &run, &["pause"]);
+        // A known distance behind a checkpoint.
+        let paused = ctl(&place, &run, &["status"])["tick"].as_u64().unwrap();
+        let end = (paused / 100 + 2) * 100 + 37;
+        ctl(&place, &run, &["step", &(end - paused).to_string()]);
+        refused(&["123"], "a.123.ckpt");
+        refused(&["50000"], "a.50000.ckpt");
+        let back = ctl(&place, &run, &["rewind"]);
+        assert_eq!(back["tick"], end - 37);
+        let status = ctl(&place, &run, &["status"]);
+        assert_eq!((status["tick"].as_u64(), status["state"].as_str()), (Some(end - 37), Some("paused")));
+        assert_eq!(status["pace"], "realtime");
+        ctl(&place, &run, &["step", "10"]);
+        let file = place.path("a.300.ckpt");
+        let text = ctl(&place, &run, &["rewind", &file])["text"].as_str().unwrap().to_owned();
+        assert_eq!(text, format!("rewound from tick {} to tick 300, where it is paused", end - 27));
+        refused(&["400"], "a rewind goes back");
+        ctl(&place, &run, &["step", &(end - 300).to_string()]);
+        ctl(&place, &run, &["stop"]);
+        let rewound =
+            [format!("rewound from tick {end} to tick {}", end - 37), "to tick 300; up to there".to_owned()];
+        let rewound: Vec<&str> = rewound.iter().map(String::as_str).collect();
+        launch.end().with_code(1).prints(&rewound);
+        let [first, second] = [1, 2].map(|number| place.path(&format!("a.rewind-{number}.mcap")));
+        assert_eq!([&first, &second, &record].map(|path| first_tick(path)), [0, end - 37, 300]);
+        let expected = "begins at tick 300, and from there on all messages are those of";
+        place.call(&["diff", &first, &record]).with_code(1).prints(&[expected]);
+        let said = format!(
+            "went back in flight from tick {} to tick 300; what was flown up to there is in a.rewind-2.mcap",
+            end - 27
+        );
+        place.call(&["cat", &record, "--topic", "/plant/state"]).with_code(0).says(&[&said]);
+        // As a run from the checkpoint.
+        let (single, until) = (place.path("b.mcap"), format!("run.duration_s={}", end as f64 * 1e-3));
+        let args = ["run", "--from", &file, "--pace", "free", "--set", &until, "--record", &single];
+        place.call(&[&args[..], &["--in-process"]].concat()).flown();
+        place.call(&["diff", &first, &single]).with_code(1).prints(&[expected]);
+    }
+}
+
+/// The judge goes back too: verdicts are those of one flight without a detour.
+#[test]
+fn a_run_that_went_back_is_judged_as_a_whole() {
+    let place = Place::new();
+    let hover = repository("manifests/hover.toml");
+    let undisturbed =
+        place.call(&["run", &hover, "--record", "none", "--in-process", "--json"]).with_code(0).json();
+    let manifest = place.write("m.toml", format!("include = [{hover:?}]\n"));
+    let args = ["run", &manifest, "--record", "none", "--checkpoint-every", "500ms", "--json", "--pace", "2"];
+    let mut launch = place.start(&args);
+    launch.await_ticks(1200);
+    let run = place.run_id();
+    ctl(&place, &run, &["pause"]);
+    let to = ctl(&place, &run, &["rewind", "1000"]);
+    assert_eq!(to["tick"], 1000);
+    ctl(&place, &run, &["pace", "free"]);
+    ctl(&place, &run, &["resume"]);
+    let summary = launch.end().with_code(0).json();
+    assert_eq!(summary["pass"], undisturbed["pass"]);
+    assert_eq!((&summary["rewinds"][0]["to_tick"], &summary["first_tick"]), (&1000.into(), &1000.into()));
+    let ticks: Vec<u64> =
+        summary["checkpoints"].as_array().unwrap().iter().map(|one| one["tick"].as_u64().unwrap()).collect();
+    assert!(ticks.starts_with(&[500, 1000, 1500, 2000]), "{ticks:?}");
+}
+
+#[test]
+fn a_checkpoint_of_another_run_is_refused() {
+    let place = Place::new();
+    let hover = repository("manifests/hover.toml");
+    let args = ["run", &hover, "--record", &place.path("other.mcap"), "--checkpoint-every", "100ms"];
+    place
+        .call(&[&args[..], &["--set", "run.seed=2", "--set", "run.duration_s=0.2", "--in-process"]].concat())
+        .flown();
+    let mut launch = place.start_endless(&["run", &hover, "--record", &place.path("a.mcap")]);
+    launch.await_ticks(200);
+    let run = place.run_id();
+    ctl(&place, &run, &["pause"]);
+    let refused = |to: &[&str], says: &str| {
+        let all = [&["ctl", "rewind"], to, &["--run", &run]].concat();
+        place.start(&all).end_among_others().with_code(2).says(&[says]);
+    };
+    refused(&[&place.path("other.100.ckpt")], "other.100.ckpt is a checkpoint of another run");
+    refused(&[], "there is no checkpoint of this run before tick");
+    fs::write(place.path("letter.ckpt"), "a letter").unwrap();
+    refused(&[&place.path("letter.ckpt")], "no checkpoint of hummingbus");
+    // It flies on, and writes one itself.
+    ctl(&place, &run, &["checkpoint"]);
+    ctl(&place, &run, &["step", "20"]);
+    ctl(&place, &run, &["rewind"]);
+    ctl(&place, &run, &["stop"]);
+    launch.end().with_code(1).prints(&["rewound from tick"]);
+}
