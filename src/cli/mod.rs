@@ -55,7 +55,7 @@ struct Cli {
 commands! {
     /// Fly a manifest, record it, and judge the recording.
     #[command(
-        after_help = "Examples: hummingbus run manifests/hover.toml --pace realtime --set run.seed=7\n          hummingbus run --from hover.6000.ckpt --fork 100 --vary process.plant.vehicle.body.mass=factor:uniform:0.9,1.1"
+        after_help = "Example: hummingbus run manifests/hover.toml --pace realtime --set run.seed=7\n         hummingbus run --from hover.6000.ckpt --fork 100 --vary process.plant.vehicle.body.mass=factor:uniform:0.9,1.1"
     )]
     Run(fork::RunOrForkArguments) => fork::run;
     /// Fly a manifest as `run` does, and tell where the host time of its ticks goes.
