@@ -249,12 +249,12 @@ mod tests {
     }
 
     /// Runs `test` with a server in a folder; one at a time, since a test counts the threads of this process.
-    fn with_server(test: impl FnOnce(Server, &Path)) {
+    fn with_server(test: impl FnOnce(Server<'_>, &Path)) {
         static ALONE: Mutex<()> = Mutex::new(());
         let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
         let folder = tempfile::tempdir().unwrap();
         let (sender, requests) = channel();
-        test(Server::start(folder.path(), Remote::new(sender), requests).unwrap(), folder.path());
+        test(Server::start(folder.path(), Remote::new(sender), &requests).unwrap(), folder.path());
     }
 
     /// A client that fails rather than waits without end.
