@@ -33,6 +33,9 @@ pub struct NodePart {
     pub name: String,
     /// Generation of the process that has written it: 0 unless another process has taken the first one's place.
     pub generation: u32,
+    /// True if another component goes on in its place, as a successor in flight does: from the state if it can load it, from
+    /// the samples that were sent last otherwise.
+    pub(crate) is_succeeded: bool,
     /// SHA-256 of that process's part of the plan.
     plan_sum: String,
     layout: Option<StateLayout>,
@@ -70,7 +73,16 @@ impl NodePart {
             computation.save(&mut state);
         }
         let (name, timing) = (name.to_owned(), timing.to_vec());
-        Self { name, generation: 0, plan_sum: String::new(), layout, state, timing, samples }
+        Self {
+            name,
+            generation: 0,
+            is_succeeded: false,
+            plan_sum: String::new(),
+            layout,
+            state,
+            timing,
+            samples,
+        }
     }
 
     /// Gives `computation`, the node's, the state of this part, and `timing` the words of its computing time.
@@ -102,6 +114,10 @@ impl NodePart {
                 return Err(refused(reason));
             }
         }
+        if self.is_succeeded && self.timing.len() != timing.len() {
+            // As in a swap, the words of the new component stay.
+            return Ok(());
+        }
         if self.timing.len() != timing.len() {
             return Err(refused(
                 "its steps take simulated time in one of the two and none in the other".to_owned(),
@@ -109,6 +125,15 @@ impl NodePart {
         }
         timing.copy_from_slice(&self.timing);
         Ok(())
+    }
+
+    /// True if `computation` can load the state of this part, as a successor in flight could.
+    pub(crate) fn fits(&self, transfer: Transfer, computation: &dyn Computation) -> bool {
+        let expected = StateLayout::saved(transfer, computation.state_size(), computation.configuration());
+        match (&self.layout, expected) {
+            (Some(found), Some(expected)) => found.fits(&expected, transfer),
+            _ => false,
+        }
     }
 
     /// The part that node `index` of the run in `run_dir` goes on from.
@@ -121,7 +146,22 @@ impl NodePart {
     pub fn stateless(name: &str) -> Self {
         let (layout, state) = (None, Vec::new());
         let (name, timing, samples) = (name.to_owned(), Vec::new(), Vec::new());
-        Self { name, generation: 0, plan_sum: String::new(), layout, state, timing, samples }
+        Self {
+            name,
+            generation: 0,
+            is_succeeded: false,
+            plan_sum: String::new(),
+            layout,
+            state,
+            timing,
+            samples,
+        }
+    }
+
+    /// The same part for another component, which goes on as a successor in flight does.
+    #[must_use]
+    pub fn succeeded(self) -> Self {
+        Self { is_succeeded: true, ..self }
     }
 
     /// The same part, of generation `generation` of the node, which flies by `plan`.
@@ -169,6 +209,12 @@ impl Samples {
 }
 
 impl Parts {
+    /// True if it holds a sample of the topic called `name`.
+    #[must_use]
+    pub fn has_sample_of(&self, name: &str) -> bool {
+        self.nodes.iter().flat_map(|part| &part.samples).any(|sample| sample.topic == name)
+    }
+
     /// The newest samples from before its tick.
     pub(crate) fn samples(&self) -> Samples {
         Samples::of(self)

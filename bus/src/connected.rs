@@ -31,6 +31,8 @@ pub(crate) struct ConnectedNode {
     state: HandOver,
     /// The tick from which on this process goes on by itself, no longer as its predecessor's shadow.
     take_over_tick: u32,
+    /// The tick at which it takes the place of another component that has written its part of a checkpoint.
+    succeeds_at: Option<u32>,
     /// The tick from which on a backup takes this process's place.
     retirement_tick: u32,
     first_tick: u32,
@@ -114,6 +116,7 @@ impl ConnectedNode {
             announcements: Vec::new(),
             state: HandOver::default(),
             take_over_tick: 0,
+            succeeds_at: None,
             retirement_tick: u32::MAX,
             first_tick,
             epoch,
@@ -618,6 +621,7 @@ impl ConnectedNode {
         computation: &mut dyn Computation,
     ) -> Result<(), BusError> {
         let takes_over = self.links.generation > 0 && tick == self.take_over_tick;
+        let takes_over = takes_over || self.succeeds_at == Some(tick);
         let words = self.state.more_words();
         let stepped = self.stepper.step(tick, takes_over, words, locals, computation)?;
         // Until then they are its predecessor's to count.

@@ -92,6 +92,11 @@ impl HandOver {
         NodePart::new(name, self.transfer, node, &self.words[self.state_words..], samples)
     }
 
+    /// True if `node` can load the state of `part`.
+    pub(crate) fn fits(&self, part: &NodePart, node: &dyn Computation) -> bool {
+        part.fits(self.transfer, node)
+    }
+
     /// Goes on from `part` of a checkpoint.
     ///
     /// # Errors

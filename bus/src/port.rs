@@ -166,6 +166,24 @@ impl InPort {
         }
     }
 
+    /// What another component sent last to `topic`, in whose place the node goes on from a checkpoint: `sample`, if it is laid
+    /// out as the node's own messages are.
+    pub(crate) fn of_predecessor(
+        output: &OutputPlan,
+        topic: &TopicPlan,
+        announcement: &Announcement,
+        sample: Option<&SavedSample>,
+    ) -> Self {
+        let (port, initial) = (output.port.clone(), None);
+        let input = InputPlan { port, topic: output.topic, delay_ticks: 1, initial };
+        let mut port = Self::new(&input, topic, announcement, None, Feed::Local { generation: 0 });
+        if let Some(sample) = sample {
+            // A sample of another layout is none of the node's.
+            let _ = port.restore(sample, "");
+        }
+        port
+    }
+
     /// The newest generation that this input is connected to.
     pub(crate) fn newest_generation(&self) -> u32 {
         self.backups.back().map_or(self.active.generation(), |backup| backup.source.generation)
@@ -364,7 +382,10 @@ impl InPort {
     fn received<'a>(&'a self, locals: &'a Locals) -> Option<(SampleHeader, &'a [u64])> {
         match &self.active {
             Feed::Shared(_) => self.current.as_ref().map(|sample| (*sample.header(), sample.words())),
-            Feed::Local { .. } => locals[self.topic].as_ref()?.at(self.newest_tick?),
+            Feed::Local { .. } => {
+                let tick = self.newest_tick?;
+                locals[self.topic].as_ref()?.at(tick)
+            }
             Feed::Ring(ring) => {
                 let tick = self.newest_tick?;
                 let sequence = u64::from(tick / self.topic_period_ticks);

@@ -46,6 +46,8 @@ struct Member {
     period_ticks: u32,
     /// Words of its simulated computing time.
     words: Vec<u64>,
+    /// True before its first step in the place of another component that has written its part of a checkpoint.
+    succeeds: bool,
     /// Steps that took longer than to the next due tick, and due ticks without a step.
     overruns: [u32; 2],
 }
@@ -208,7 +210,21 @@ impl Simulation {
             let part = parts.nodes.iter().find(|part| part.name == node);
             let missing =
                 || BusError::Checkpoint { node: node.clone(), reason: "it has no part of it".to_owned() };
-            member.restore(part.ok_or_else(missing)?)?;
+            let part = part.ok_or_else(missing)?;
+            member.stepper.predecessor.clear();
+            member.succeeds =
+                part.is_succeeded && !part.fits(member.part.transfer(), &member.part.computation());
+            if member.succeeds {
+                for output in &self.plan.nodes[member.node].outputs {
+                    let topic = &self.plan.topics[output.topic];
+                    if let Some(announced) = &self.announcements[output.topic] {
+                        let sent = InPort::of_predecessor(output, topic, announced, samples.get(&topic.name));
+                        member.stepper.predecessor.push(sent);
+                    }
+                }
+            } else {
+                member.restore(part)?;
+            }
             for input in &mut member.stepper.inputs {
                 if let Some(sample) = samples.get(&self.plan.topics[input.topic].name) {
                     input.restore(sample, &node)?;
@@ -305,11 +321,13 @@ impl Member {
     fn step(&mut self, tick: u32, samples: &mut [Option<LocalTopic>]) -> Result<(), BusError> {
         self.stepper.gather(tick).map_err(|(_, error)| error)?;
         let computation = &mut self.part.computation();
-        match self.stepper.step(tick, false, &mut self.words, samples, computation)? {
+        let takes_over = std::mem::take(&mut self.succeeds);
+        match self.stepper.step(tick, takes_over, &mut self.words, samples, computation)? {
             Stepped::InTime => {}
             Stepped::Overran => self.overruns[0] += 1,
             Stepped::Skipped => self.overruns[1] += 1,
         }
+        self.stepper.predecessor.clear();
         self.stepper.publish(tick, samples, |_| [0; 3], |_| {})
     }
 }
@@ -373,6 +391,7 @@ impl Declaration {
             stepper,
             period_ticks: node.period_ticks,
             words,
+            succeeds: false,
             overruns: [0; 2],
         })
     }

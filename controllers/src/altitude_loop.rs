@@ -70,6 +70,8 @@ impl AltitudeLoop<'_> {
         let acceleration_m_s2 = self.gains.loop_gains.demand(error_m, advanced_m_s2, measured.climb_rate_m_s);
         let wanted_N =
             self.vehicle.mass_kg * (self.vehicle.gravity_m_s2 + acceleration_m_s2) / tilt_cosine(measured);
+        // Upside down, all thrust pushes down.
+        let wanted_N = if is_upside_down(measured) { self.vehicle.thrust_min_N } else { wanted_N };
         let thrust_N = wanted_N.clamp(self.vehicle.thrust_min_N, self.vehicle.thrust_max_N);
         // Against wind-up: at a limit the integrator may only come back from it.
         if (wanted_N - thrust_N) * error_m <= 0.0 {
@@ -116,6 +118,11 @@ impl AltitudeLoop<'_> {
         let max_m_s2 = self.gains.integral_max_m_s2;
         self.gains.loop_gains.integrate(before_m_s2, error_m, self.period_s, max_m_s2)
     }
+}
+
+/// True if body z points down.
+fn is_upside_down(measured: &HoverMotion) -> bool {
+    libm::cos(measured.roll_rad) * libm::cos(measured.pitch_rad) < 0.0
 }
 
 /// The cosine of the angle between body z and world z, not below [`TILT_COSINE_MIN`].

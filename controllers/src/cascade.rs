@@ -1,7 +1,8 @@
 //! The cascade of the AscTec's onboard computer (thesis §5.3, Figs 5.16–5.19): command filter, attitude loop
 //! around rate loop, and the altitude loop beside them; from set point and measurement to a wrench.
 //!
-//! - Command filter: roll and pitch are cut to ±30° and filtered, x'' = ω²(c − x) − 2ζω x'. The yaw command
+//! - Command filter: roll and pitch are cut to ±30° and filtered, x'' = ω²(c − x) − 2ζω x'. Where half a turn is allowed,
+//!   nothing is cut, and the command comes round as the vehicle does: a ramp of 360° is a flip. The yaw command
 //!   turns towards the yaw that is asked for no faster than a yaw stick at full deflection would integrate
 //!   it, comes round at 360°, and is set to the measured yaw as long as no thrust is asked for.
 //! - Attitude loop: error of roll, pitch and yaw, times a gain, and a part of the filtered commands' own rates,
@@ -21,6 +22,7 @@ use crate::set_points::SetPoint;
 use bus::component::Info;
 use diagnostics::ParameterError;
 use nalgebra::Vector3;
+use std::f64::consts::PI;
 use std::path::Path;
 
 /// The law at one period: all that does not change during a run.
@@ -217,9 +219,13 @@ impl CascadeLaw {
 impl CommandFilter {
     /// Angle and rate `period_s` on. Implicit in the rate, so that it is stable at any period.
     fn moved(&self, angle_rad: f64, rate_rad_s: f64, asked_rad: f64, period_s: f64) -> (f64, f64) {
-        let asked_rad = asked_rad.clamp(-self.tilt_max_rad, self.tilt_max_rad);
+        let error_rad = if self.tilt_max_rad < PI {
+            asked_rad.clamp(-self.tilt_max_rad, self.tilt_max_rad) - angle_rad
+        } else {
+            wrap_rad(asked_rad - angle_rad)
+        };
         let step = self.natural_frequency_rad_s * period_s;
-        let pull_rad_s = self.natural_frequency_rad_s * step * (asked_rad - angle_rad);
+        let pull_rad_s = self.natural_frequency_rad_s * step * error_rad;
         let rate_rad_s = (rate_rad_s + pull_rad_s) / (1.0 + 2.0 * self.damping_ratio * step + step * step);
         (angle_rad + rate_rad_s * period_s, rate_rad_s)
     }
@@ -270,6 +276,27 @@ mod tests {
             output = law().demand(&mut state, &IN_FLIGHT, set_point, measured);
         }
         (state, output)
+    }
+
+    #[test]
+    fn where_half_a_turn_is_allowed_the_command_comes_round_and_nothing_pushes_down() {
+        let mut law = law();
+        law.gains.filter.tilt_max_rad = PI;
+        let asked = |roll_rad: f64| SetPoint { roll_rad, ..hold() };
+        let mut state = flying(&level());
+        for step in 0..=1000 {
+            law.demand(&mut state, &IN_FLIGHT, &asked(f64::from(step) * 1e-3 * 2.0 * PI), &level());
+        }
+        assert!(
+            state.attitude_command[0] > 5.5,
+            "it follows a ramp of a whole turn: {:?}",
+            state.attitude_command
+        );
+        (0..1000).for_each(|_| drop(law.demand(&mut state, &IN_FLIGHT, &hold(), &level())));
+        assert!((state.attitude_command[0] - 2.0 * PI).abs() < 1e-3, "level is one turn on, not back");
+        let upside_down = HoverMotion { roll_rad: PI, ..level() };
+        let wrench = law.demand(&mut state, &IN_FLIGHT, &hold(), &upside_down).wrench;
+        assert_eq!(wrench.thrust_N, law.vehicle.thrust_min_N);
     }
 
     #[test]

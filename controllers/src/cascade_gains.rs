@@ -44,8 +44,8 @@ gains! {
 gains! {
     /// The command filter: limits, and a second-order lag for roll and pitch.
     pub struct CommandFilter of file {
-        /// Roll and pitch commands are cut to this, rad.
-        tilt_max_rad: f64 = file.tilt("tilt_max"),
+        /// Roll and pitch commands are cut to this, rad; half a turn cuts none.
+        tilt_max_rad: f64 = file.tilt_or_turn("tilt_max"),
         /// The yaw command turns no faster than this, rad/s.
         yaw_rate_max_rad_s: f64 = file.limit("yaw_rate_max", SPEED),
         /// ω of x'' = ω²(c − x) − 2ζω x', rad/s.

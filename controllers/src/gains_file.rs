@@ -11,7 +11,7 @@ use diagnostics::{Diagnostic, Faults};
 use inputs::InputFiles;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
-use std::f64::consts::FRAC_PI_3;
+use std::f64::consts::{FRAC_PI_3, PI};
 use std::path::Path;
 use std::rc::Rc;
 use vehicles::reader::{Document, Quantity, Section};
@@ -189,9 +189,20 @@ impl Table<'_, '_> {
 
     /// A limit that is more than zero and less than `bound`, which `expected` describes.
     fn limit_below(&self, key: &'static str, of: Dimension, bound: f64, expected: &str) -> f64 {
+        self.limit_that(key, of, |number| number < bound, expected)
+    }
+
+    /// A limit that is more than zero and that `fits`, as `expected` describes.
+    fn limit_that(
+        &self,
+        key: &'static str,
+        of: Dimension,
+        fits: impl Fn(f64) -> bool,
+        expected: &str,
+    ) -> f64 {
         self.number(key, of, |number, doc| {
             let number = number.positive(doc)?.within(doc, &LIMIT)?;
-            let holds = number.si < bound;
+            let holds = fits(number.si);
             number.require(doc, holds, expected)
         })
     }
@@ -206,6 +217,13 @@ impl Table<'_, '_> {
     pub(crate) fn tilt(&self, key: &'static str) -> f64 {
         let expected = "an angle above 0 and below 60 degrees, up to which the thrust makes up for a tilt";
         self.limit_below(key, ANGLE, FRAC_PI_3, expected)
+    }
+
+    /// The same, or half a turn: then the vehicle may turn over.
+    pub(crate) fn tilt_or_turn(&self, key: &'static str) -> f64 {
+        let expected = "an angle above 0 and below 60 degrees, up to which the thrust makes up for a tilt, or 180 degrees";
+        let is_turn = |angle_rad: f64| (angle_rad - PI).abs() < 1e-9;
+        self.limit_that(key, ANGLE, |angle_rad| angle_rad < FRAC_PI_3 || is_turn(angle_rad), expected)
     }
 }
 

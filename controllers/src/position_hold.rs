@@ -10,6 +10,7 @@
 //! The acceleration is cut to what `tilt_max_deg` makes, and gravity turns it into pitch and roll (see `velocity`). The
 //! altitude and the yaw pass as they are. There is no integrator: a lasting push of 1 m/s² moves it by 1/(Kv·Kx) m.
 
+use crate::angle::wrap_rad;
 use crate::set_points::SetPoint as Values;
 use crate::velocity::{along_heading, tilt_rad};
 use bus::component::{Component, Info, StepError};
@@ -170,7 +171,8 @@ impl PositionHold {
         let velocity_m_s = along_heading([estimate.velocity.x, estimate.velocity.y], yaw_rad);
         // Pitch moves along the heading's x, roll along its y.
         let is_free =
-            [asked.pitch_rad, asked.roll_rad].map(|asked_rad| asked_rad.abs() <= self.stick_dead_band_rad);
+            // After a whole turn the pilot asks for none.
+            [asked.pitch_rad, asked.roll_rad].map(|asked_rad| wrap_rad(asked_rad).abs() <= self.stick_dead_band_rad);
         let from_m: [f64; 2] = std::array::from_fn(|axis| state.place[axis] - position_m[axis]);
         let mut error_m = along_heading(from_m, yaw_rad);
         for axis in 0..2 {

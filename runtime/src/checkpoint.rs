@@ -8,7 +8,7 @@ use crate::fork;
 use crate::graph::Graph;
 use crate::manifest::Manifest;
 use crate::output_file::{self, Kind, Mark};
-use crate::program::{BackupSpec, OnExit, Program};
+use crate::program::{BackupSpec, Executable, OnExit, Program};
 use crate::registry::Registry;
 use anyhow::{Context as _, Result, anyhow, bail};
 use bus::checkpoint::{NodePart, Parts};
@@ -19,7 +19,7 @@ use std::io::{Read as _, Write as _};
 use std::path::{Path, PathBuf};
 
 /// The first bytes of a checkpoint; the digit counts the changes of the format.
-const START: &[u8] = b"hummingbus checkpoint 1\n";
+const START: &[u8] = b"hummingbus checkpoint 2\n";
 /// Characters of a SHA-256 in hexadecimal, which the file ends with.
 const SUM_BYTES: usize = 64;
 /// The largest file that is read.
@@ -40,6 +40,8 @@ pub struct Checkpoint {
     texts: Vec<(PathBuf, String)>,
     /// The values of `--set`.
     overrides: Vec<String>,
+    /// Kind or command of each node at its tick, by name.
+    kinds: Vec<(String, String)>,
     /// Files that the run has read, with their SHA-256.
     files: Vec<(PathBuf, String)>,
     /// Simulated time of a tick, ns.
@@ -60,6 +62,7 @@ impl Checkpoint {
                 .filter(|text| !is_of_recording(text))
                 .map(str::to_owned)
                 .collect(),
+            kinds: kinds(graph, parts.tick),
             files: files(graph).cloned().map(file).collect(),
             tick_ns: graph.plan.tick_ns,
             parts,
@@ -229,6 +232,7 @@ impl Checkpoint {
         let nodes =
             plan.nodes.iter().zip(&graph.programs).map(|(node, program)| self.part(&node.name, program));
         let nodes = nodes.collect::<Result<Vec<_>>>()?;
+        self.require_samples(graph)?;
         let is_flown = |name: &str| plan.nodes.iter().any(|node| node.name == name);
         if let Some(part) =
             self.parts.nodes.iter().find(|part| part.state_bytes() > 0 && !is_flown(&part.name))
@@ -240,12 +244,39 @@ impl Checkpoint {
         Ok(())
     }
 
+    /// Refuses a graph of which a node reads what nothing has sent before the checkpoint, and nothing sends at its tick.
+    fn require_samples(&self, graph: &Graph) -> Result<()> {
+        let (tick, plan) = (self.tick(), &graph.plan);
+        for (node, program) in plan.nodes.iter().zip(&graph.programs) {
+            for input in node.inputs.iter().filter(|_| !program.is_recorder() && !program.is_judge()) {
+                let topic = &plan.topics[input.topic];
+                let due = tick.next_multiple_of(node.period_ticks.max(1));
+                let newest =
+                    due.checked_sub(input.delay_ticks).map(|limit| limit - limit % topic.period_ticks);
+                let is_sent_in_time = newest.is_some_and(|newest| newest >= tick);
+                if !is_sent_in_time && input.initial.is_none() && !self.parts.has_sample_of(&topic.name) {
+                    bail!(
+                        "`{}` reads {}, of which the checkpoint holds no sample, since nobody has read it before: record the run \
+                         that writes the checkpoint",
+                        node.name,
+                        topic.name
+                    );
+                }
+            }
+        }
+        Ok(())
+    }
+
     /// The part of the node `name`, which is `program`; an empty one for a recorder, which begins a file of its own.
     fn part(&self, name: &str, program: &Program) -> Result<NodePart> {
         if program.is_recorder() {
             return Ok(NodePart::stateless(name));
         }
         let part = self.parts.nodes.iter().find(|part| part.name == name).cloned();
+        let is_other = |(_, kind): &&(String, String)| *kind != kind_of(program);
+        if self.kinds.iter().filter(|(node, _)| node == name).any(|kind| is_other(&kind)) {
+            return part.map(NodePart::succeeded).context("it has a kind and no part");
+        }
         part.ok_or_else(|| {
             if program.is_judge() {
                 return anyhow!(
@@ -256,6 +287,24 @@ impl Checkpoint {
             let known: Vec<&str> = self.nodes().map(|(name, _)| name).collect();
             anyhow!("the checkpoint holds no state of `{name}`; it has {}", known.join(", "))
         })
+    }
+}
+
+/// Kind or command of each node of `graph` at `tick`, by name.
+fn kinds(graph: &Graph, tick: u32) -> Vec<(String, String)> {
+    let kind = |(index, program): (usize, &Program)| {
+        let is_swap = |backup: &&BackupSpec| backup.node == index && has_taken_over(backup, tick);
+        let program = graph.backups.iter().rfind(is_swap).map_or(program, |backup| &backup.program);
+        (graph.plan.nodes[index].name.clone(), kind_of(program))
+    };
+    graph.programs.iter().enumerate().map(kind).collect()
+}
+
+/// Kind or command of `program`.
+fn kind_of(program: &Program) -> String {
+    match (&program.executable, program.kind()) {
+        (Executable::Command(command), _) => command.join(" "),
+        (_, kind) => kind.unwrap_or_default().to_owned(),
     }
 }
 
@@ -386,8 +435,8 @@ impl Writer<'_> {
             })?,
         };
         let found = Checkpoint::read(&path)?;
-        let own = Checkpoint::new(self.manifest, self.graph, Parts { tick: now, nodes: Vec::new() });
-        if !found.is_of_run_of(&own) {
+        let of_now = Checkpoint::new(self.manifest, self.graph, Parts { tick: now, nodes: Vec::new() });
+        if !found.is_of_run_of(&of_now) {
             bail!(
                 "{} is a checkpoint of another run: its manifest, one of its files or a value of --set is another one; \
                  `hummingbus run --from {0}` goes on from it",
@@ -535,6 +584,7 @@ mod tests {
             manifest: "/a/hover.toml".into(),
             texts: vec![("/a/hover.toml".into(), sha256(b"[run]"))],
             overrides: vec!["run.seed=3".to_owned()],
+            kinds: Vec::new(),
             files: Vec::new(),
             tick_ns: 1_000_000,
             parts: Parts { tick: 6500, nodes },

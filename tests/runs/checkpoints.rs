@@ -219,6 +219,76 @@ fn a_fork_differs_from_the_tick_on_at_which_its_value_counts() {
     ]);
 }
 
+/// As a swap at that tick does: all laws have a state of one layout.
+#[test]
+fn another_law_goes_on_as_a_swap_has_it() {
+    let place = Place::new();
+    let laws = fs::read_to_string(repository("manifests/swap-laws.toml")).unwrap();
+    let laws = laws.replace("sets/flight.toml", &repository("manifests/sets/flight.toml"));
+    let laws = laws.replace("../vehicles", &repository("vehicles"));
+    let gains = repository("controllers/gains");
+    let laws = laws.replace("../controllers/gains", &gains).replace("duration_s = 12.0", "duration_s = 4.0");
+    let mut parts = laws.split("[[swap]]");
+    let (head, swap) = (parts.next().unwrap(), parts.next().unwrap());
+    let plain = place.write("plain.toml", format!("{head}[[checkpoint]]\nat_tick = 3000\n"));
+    let swapped = place.write("swapped.toml", format!("{head}[[swap]]{swap}"));
+    let whole = place.path("swapped.mcap");
+    place.call(&["run", &swapped, "--record", &whole]).with_code(0);
+    place.call(&["run", &plain, "--record", &place.path("a.mcap"), "--in-process"]).with_code(0);
+    let (file, fork) = (place.path("a.3000.ckpt"), place.path("fork.mcap"));
+    let gains = format!("process.controller.gains={gains}/cascade.toml");
+    let args = [
+        "run",
+        "--from",
+        &file,
+        "--record",
+        &fork,
+        "--set",
+        "process.controller.kind=cascade",
+        "--set",
+        &gains,
+    ];
+    for host in HOSTS {
+        place.call(&[&args[..], host].concat()).with_code(0);
+        require_goes_on(&place, &whole, &fork, 3000);
+    }
+    // One that reads something else.
+    let gains = repository("controllers/gains/geometric.toml");
+    let set = [
+        "process.controller.kind=geometric".to_owned(),
+        format!("process.controller.gains={gains}"),
+        "process.controller.inputs={ reference = \"/trajectory/reference\", estimate = \"/ekf/estimate\" }"
+            .to_owned(),
+    ];
+    let set: Vec<&str> = set.iter().flat_map(|set| ["--set", set]).collect();
+    let args = ["run", "--from", &file, "--record", &fork, "--in-process"];
+    place.call(&[&args[..], &set].concat()).with_code(0);
+    place.call(&["diff", &whole, &fork]).with_code(1).prints(&["topic /controller/command"]);
+}
+
+/// A filter with another state, or none, begins as a successor: under every host with the same messages.
+#[test]
+fn what_has_another_state_begins_as_a_successor() {
+    let place = Place::new();
+    let hover = repository("manifests/hover.toml");
+    let whole = place.path("a.mcap");
+    let args = ["run", &hover, "--record", &whole, "--in-process", "--checkpoint-every", "1s", "--keep", "1"];
+    place.call(&[&args[..], &["--set", "run.duration_s=2.5"]].concat()).flown();
+    let file = place.path("a.2000.ckpt");
+    let ideal = [
+        "process.ekf.kind=ideal",
+        "process.ekf.parameters={}",
+        "process.ekf.inputs={ state = \"/plant/state\" }",
+    ];
+    let ideal: Vec<&str> = ideal.iter().flat_map(|set| ["--set", set]).collect();
+    let forks = ["0", "1", "2"].map(|name| place.path(&format!("{name}.mcap")));
+    for (host, fork) in HOSTS.iter().zip(&forks) {
+        place.call(&[&["run", "--from", &file, "--record", fork], &ideal[..], host].concat()).flown();
+        place.call(&["diff", &whole, fork]).with_code(1).prints(&["tick 2000, topic /"]);
+        place.call(&["diff", &forks[0], fork]).with_code(0);
+    }
+}
+
 #[test]
 fn a_run_that_breaks_leaves_the_checkpoints_before() {
     let place = Place::new();

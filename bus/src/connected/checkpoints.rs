@@ -1,10 +1,11 @@
 //! The parts of checkpoints that a connected node writes, and the one that it goes on from.
 
 use super::ConnectedNode;
-use crate::checkpoint::{NodePart, store_part};
+use crate::announcement::{Announcement, topic_path};
+use crate::checkpoint::{NodePart, Samples, store_part};
 use crate::computation::Computation;
 use crate::error::BusError;
-use crate::port::Locals;
+use crate::port::{InPort, Locals};
 
 impl ConnectedNode {
     /// Goes on from the checkpoint from which the run does, if it does and this is the node's first process.
@@ -17,7 +18,24 @@ impl ConnectedNode {
             return Ok(());
         }
         let part = NodePart::of_run(&links.run_dir, links.index)?;
+        if part.is_succeeded && !self.state.fits(&part, computation) {
+            return self.succeed();
+        }
         self.state.restore(&part, computation)
+    }
+
+    /// Goes on from what another component sent last before the checkpoint.
+    fn succeed(&mut self) -> Result<(), BusError> {
+        let links = &self.links;
+        let restored = Samples::of_run(&links.run_dir, &links.plan)?;
+        for output in &links.node.outputs {
+            let topic = &links.plan.topics[output.topic];
+            let announced = Announcement::load(&topic_path(&links.run_dir, output.topic))?;
+            let sent = InPort::of_predecessor(output, topic, &announced, restored.get(&topic.name));
+            self.stepper.predecessor.push(sent);
+        }
+        self.succeeds_at = Some(self.tick);
+        Ok(())
     }
 
     /// Writes this node's parts of the checkpoints that fall between its last due tick and `tick`, whose inputs it has
