@@ -273,7 +273,11 @@ mod tests {
         let mut reader = Reader::default();
         let mut news = || {
             let mut found = Vec::new();
-            reader.read(&shared, None, |chunk, value: u64| Ok(found.push((chunk, value)))).unwrap();
+            let take = |chunk, value: u64| {
+                found.push((chunk, value));
+                Ok(())
+            };
+            reader.read(&shared, None, take).unwrap();
             found.sort_unstable();
             found
         };
