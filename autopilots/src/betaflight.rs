@@ -15,7 +15,7 @@ use bus::component::Info;
 use bus::context::NodeContext;
 use bus::messages::{Imu, RcChannels, StateEstimate};
 use diagnostics::ParameterError;
-use diagnostics::parameter::positive;
+use diagnostics::parameter::{positive, positive_up_to};
 use serde::Deserialize;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -35,8 +35,12 @@ const REST_S: f64 = 4.0;
 const ARMED_S: f64 = 1.0;
 /// Channels of a packet of the remote control, and motors of a packet of the outputs.
 const CHANNELS: usize = 16;
+/// Host time that an answer may take at most, s.
+const REPLY_TIMEOUT_MAX_S: f64 = 3600.0;
 /// Host time that loading the configuration may take.
 const CONFIGURATION_LIMIT: Duration = Duration::from_secs(20);
+/// Mark of a line of its command line about a command that it refuses.
+const REFUSED: &str = "###ERROR";
 /// Pressure at sea level, Pa, its decrease by height, 1/m, and the exponent: the troposphere of ISO 2533.
 const ATMOSPHERE: (f64, f64, f64) = (101_325.0, 2.255_77e-5, 5.255_88);
 
@@ -158,7 +162,8 @@ impl Autopilot for Betaflight {
         let configuration =
             configuration.map_or(String::new(), |bytes| String::from_utf8_lossy(&bytes).into_owned());
         positive("rc_rate_hz", parameters.rc_rate_hz)?;
-        positive("reply_timeout_s", parameters.reply_timeout_s)?;
+        positive_up_to("reply_timeout_s", parameters.reply_timeout_s, REPLY_TIMEOUT_MAX_S, "s")?;
+        parameters.origin.check()?;
         if let Some(channel) = armed_by_channel.filter(|channel| !(5..=CHANNELS).contains(channel)) {
             let message = format!(
                 "`armed_by_channel` is {channel}, expected 5 to {CHANNELS}: the first four are the sticks"
@@ -173,7 +178,8 @@ impl Autopilot for Betaflight {
             armed_by_channel,
             period_ns: context.tick_ns * u64::from(context.period_ticks),
             rc_ticks: steps(1.0 / parameters.rc_rate_hz, context.period_s()).max(1),
-            reply_timeout: Duration::from_secs_f64(parameters.reply_timeout_s),
+            // No socket waits for less than a microsecond.
+            reply_timeout: Duration::from_secs_f64(parameters.reply_timeout_s.max(1e-3)),
             origin: parameters.origin,
         })
     }
@@ -189,7 +195,12 @@ impl Autopilot for Betaflight {
         let configuration = scratch.write("configuration", self.commands().as_bytes())?;
         let mut configure = scratch.command(&program)?;
         configure.env("LD_PRELOAD", PRELOADED).arg("--config").arg(configuration);
-        scratch.run(configure, CONFIGURATION_LIMIT).map_err(|error| format!("the configuration: {error}"))?;
+        let printed = scratch
+            .run(configure, CONFIGURATION_LIMIT)
+            .map_err(|error| format!("the configuration: {error}"))?;
+        if let Some(line) = printed.lines().find(|line| line.contains(REFUSED)) {
+            return Err(format!("the configuration has a command that Betaflight refuses: {line}"));
+        }
         let mut command = scratch.command(&program)?;
         command.env("LD_PRELOAD", PRELOADED).env(BOOT_VARIABLE, nanoseconds(BOOT_S).to_string());
         let firmware = Firmware::start(scratch, command, self.reply_timeout)?;
@@ -204,19 +215,20 @@ impl Autopilot for Betaflight {
         link.steps += 1;
         link.firmware.send(bytemuck::bytes_of(&packets))?;
         let answer = link.receive()?;
-        Ok(self.throttles(&answer))
+        self.throttles(&answer).map_err(|words| link.firmware.complaint(&words))
     }
 }
 
 impl Betaflight {
-    /// Its command line's input: the mixer of the vehicle, the commands of the configuration, and `save`.
+    /// Input of its command line: the commands of the configuration, then the mixer of the vehicle, which they may not undo,
+    /// and `save`.
     fn commands(&self) -> String {
         let Layout { mixer, is_reversed, .. } = self.layout;
         let reversed = if is_reversed { "ON" } else { "OFF" };
-        format!(
-            "mixer {mixer}\nset yaw_motors_reversed = {reversed}\n{}\nsave\n",
-            self.configuration.trim_end()
-        )
+        let ends = |line: &&str| matches!(line.split_whitespace().next(), Some("save" | "exit" | "batch"));
+        let kept: String =
+            self.configuration.lines().filter(|line| !ends(line)).flat_map(|line| [line, "\n"]).collect();
+        format!("{kept}mixer {mixer}\nset yaw_motors_reversed = {reversed}\nsave\n")
     }
 
     /// Lets the firmware stand still, level and at the origin, until it is ready; armed, if it is to be.
@@ -250,7 +262,10 @@ impl Betaflight {
         let time_s = BOOT_S + (step + 1) as f64 * self.period_ns as f64 * 1e-9;
         let Sensed { imu, estimate, rc, .. } = sensed;
         let (rates, force, attitude) = (imu.angular_velocity, imu.specific_force, estimate.attitude);
-        let place = self.origin.place(estimate.position.into());
+        let position = estimate.position;
+        // SITL mirrors longitude and latitude about its first packet, since those of Gazebo are mirrored (`sitl.c`,
+        // ENABLE_GAZEBO_BRIDGE, on by default). The first packet is of the origin.
+        let place = self.origin.place([-position.x, -position.y, position.z]);
         let (sea_level_Pa, by_height_1_m, exponent) = ATMOSPHERE;
         let state = StatePacket {
             time_s,
@@ -274,12 +289,18 @@ impl Betaflight {
     }
 
     /// Outputs by rotor.
-    fn throttles(&self, answer: &Answer) -> Throttles {
-        let mut throttles = Throttles::filled(self.vehicle.rotors.len(), 0.0);
-        for (motor, rotor) in self.layout.motors.iter().enumerate() {
-            throttles[*rotor] = (f64::from(answer.pulse_us[motor]) - 1000.0).max(0.0) / 1000.0;
+    fn throttles(&self, answer: &Answer) -> Result<Throttles, String> {
+        let count = self.vehicle.rotors.len();
+        let pulses_us = &answer.pulse_us[..count];
+        if usize::from(answer.motors) < count || pulses_us.iter().any(|pulse| !pulse.is_finite()) {
+            let motors = answer.motors;
+            return Err(format!("it sends {motors} motor outputs, {pulses_us:?} us, for {count} rotors"));
         }
-        throttles
+        let mut throttles = Throttles::filled(count, 0.0);
+        for (pulse_us, rotor) in pulses_us.iter().zip(&self.layout.motors) {
+            throttles[*rotor] = (f64::from(*pulse_us) - 1000.0).max(0.0) / 1000.0;
+        }
+        Ok(throttles)
     }
 }
 
@@ -315,10 +336,8 @@ fn require_preloadable(program: &[u8]) -> Result<(), String> {
         Some(bytes.iter().rev().fold(0, |number, byte| (number << 8) | u64::from(*byte)))
     };
     if !program.starts_with(b"\x7fELF\x02\x01") {
-        return Err(
-            "it is no program of 64 bits for Linux; expected Betaflight's SITL, obj/main/betaflight_SITL.elf"
-                .to_owned(),
-        );
+        return Err("expected a 64-bit Linux program (ELF): Betaflight's SITL, obj/main/betaflight_SITL.elf"
+            .to_owned());
     }
     let headers = || {
         let (first, size, count) = (number(32, 8)?, number(54, 2)?, number(56, 2)?);
@@ -344,7 +363,7 @@ mod tests {
             layout: Layout::of(&vehicle.rotors).unwrap(),
             vehicle,
             firmware: Vec::new(),
-            configuration: "aux 0 0 0 1700 2100 0 0\n".to_owned(),
+            configuration: "aux 0 0 0 1700 2100 0 0\nsave\n".to_owned(),
             armed_by_channel: None,
             period_ns: 1_000_000,
             rc_ticks: 20,
@@ -365,7 +384,7 @@ mod tests {
         let estimate = StateEstimate {
             attitude,
             velocity: [3.0, 4.0, 5.0].into(),
-            position: [0.0, 0.0, 12.0].into(),
+            position: [0.0, 111.195, 12.0].into(),
             ..StateEstimate::default()
         };
         let rc =
@@ -379,7 +398,12 @@ mod tests {
         assert_eq!(state.acceleration_m_s2, [-1.0, -2.0, -9.81]);
         assert_eq!(state.attitude, [0.9, 0.1, -0.2, -0.3], "w first");
         assert_eq!(state.velocity_m_s, [3.0, 4.0, 5.0], "east, north, up");
-        assert_eq!(state.place, [8.545_594, 47.397_742, 500.0]);
+        let [longitude_deg, latitude_deg, altitude_m] = state.place;
+        assert_eq!((longitude_deg, altitude_m), (8.545_594, 500.0));
+        assert!(
+            (latitude_deg - 47.396_742).abs() < 1e-8,
+            "{latitude_deg}: 0.001 degrees to the north, mirrored"
+        );
         // ISO 2533: 95.46 kPa at 500 m.
         assert!((state.pressure_Pa - 95_461.0).abs() < 5.0, "{}", state.pressure_Pa);
         assert_eq!(packets.channels_us[..6], [1500, 1501, 900, 2200, 2000, 1000], "what is not sent is off");
@@ -393,8 +417,10 @@ mod tests {
         let mut answer = Answer { motors: 4, ..Answer::default() };
         // Rear, right, left, front.
         answer.pulse_us[..4].copy_from_slice(&[1100.0, 1200.0, 1300.0, 1400.0]);
-        assert_eq!(betaflight.throttles(&answer), [0.4, 0.2, 0.1, 0.3], "front, right, rear, left");
-        let commands = "mixer QUADP\nset yaw_motors_reversed = OFF\naux 0 0 0 1700 2100 0 0\nsave\n";
+        assert_eq!(betaflight.throttles(&answer).unwrap(), [0.4, 0.2, 0.1, 0.3], "front, right, rear, left");
+        answer.pulse_us[1] = f32::NAN;
+        assert!(betaflight.throttles(&answer).unwrap_err().contains("NaN"), "no output is taken for a stop");
+        let commands = "aux 0 0 0 1700 2100 0 0\nmixer QUADP\nset yaw_motors_reversed = OFF\nsave\n";
         assert_eq!(betaflight.commands(), commands);
     }
 

@@ -57,11 +57,7 @@ impl Layout {
             MIXERS.iter().find_map(|(mixer, motors)| Some((*mixer, *motors, assigned(rotors, motors)?)));
         let Some((mixer, motors, order)) = placed else {
             let names: Vec<&str> = MIXERS.iter().map(|(name, _)| *name).collect();
-            return Err(format!(
-                "its {} rotors stand in the places of none of the mixers {}",
-                rotors.len(),
-                names.join(", ")
-            ));
+            return Err(format!("its {} rotors match none of the mixers {}", rotors.len(), names.join(", ")));
         };
         let clockwise = order.iter().map(|rotor| rotors[*rotor].spin < 0.0);
         let reversed: Vec<bool> = clockwise.zip(motors).map(|(rotor, (_, mixer))| rotor != *mixer).collect();

@@ -1,5 +1,6 @@
 //! The place on the earth at which the world's origin lies: its x points east, its y north.
 
+use diagnostics::parameter::{ParameterError, refuse};
 use serde::Deserialize;
 
 /// Metres of a degree of latitude on a sphere of the earth's mean radius, 6 371 008.8 m (IUGG).
@@ -25,13 +26,30 @@ pub struct Origin {
 }
 
 impl Default for Origin {
-    /// The flying field of the examples of PX4 and ArduPilot's users: the Irchel in Zurich.
+    /// The default home position of PX4's simulations, in Zurich.
     fn default() -> Self {
         Self { latitude_deg: 47.397_742, longitude_deg: 8.545_594, altitude_m: 488.0 }
     }
 }
 
 impl Origin {
+    /// Refuses what is no place on the earth, and the poles, where there is no east.
+    ///
+    /// # Errors
+    /// The number that is not meant.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        for (key, value, limit) in [
+            ("latitude_deg", self.latitude_deg, 89.0),
+            ("longitude_deg", self.longitude_deg, 180.0),
+            ("altitude_m", self.altitude_m, 10_000.0),
+        ] {
+            refuse(!(-limit..=limit).contains(&value), "origin", || {
+                format!("`origin.{key}` is {value}, expected {} to {limit}", -limit)
+            })?;
+        }
+        Ok(())
+    }
+
     /// Longitude and latitude in degrees and altitude in metres of a position in the world, in metres: on a sphere, about the
     /// origin.
     #[must_use]

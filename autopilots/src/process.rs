@@ -68,30 +68,34 @@ impl Scratch {
         self.folder.path().join("log")
     }
 
+    /// All that it has printed.
+    fn printed(&self) -> String {
+        String::from_utf8_lossy(&fs::read(self.log()).unwrap_or_default()).into_owned()
+    }
+
     /// The end of the log, for an error.
     fn quoted(&self) -> String {
-        let bytes = fs::read(self.log()).unwrap_or_default();
-        let text = String::from_utf8_lossy(&bytes);
+        let text = self.printed();
         let lines: Vec<&str> = text.lines().collect();
         let last = &lines[lines.len().saturating_sub(QUOTED_LINES)..];
         if last.is_empty() {
             return format!("{} printed nothing", self.name);
         }
-        format!("the last that {} printed:\n  {}", self.name, last.join("\n  "))
+        format!("end of the log of {}:\n  {}", self.name, last.join("\n  "))
     }
 
-    /// Runs `command` to its end.
+    /// Runs `command` to its end; what it printed.
     ///
     /// # Errors
     /// It does not start, or not end within `limit`, or fails.
-    pub fn run(&self, mut command: Command, limit: Duration) -> Result<(), String> {
+    pub fn run(&self, mut command: Command, limit: Duration) -> Result<String, String> {
         let mut child = self.start(&mut command)?;
         for _ in 0..limit.as_millis() / NAP.as_millis() {
             let ended =
                 child.try_wait().map_err(|error| format!("cannot wait for {}: {error}", self.name))?;
             if let Some(status) = ended {
                 let told = || format!("{}; {}", ended_with(self.name, status), self.quoted());
-                return if status.success() { Ok(()) } else { Err(told()) };
+                return if status.success() { Ok(self.printed()) } else { Err(told()) };
             }
             std::thread::sleep(NAP);
         }

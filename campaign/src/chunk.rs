@@ -273,11 +273,11 @@ mod tests {
         let mut reader = Reader::default();
         let mut news = || {
             let mut found = Vec::new();
-            let keep = |chunk, value: u64| {
+            let take = |chunk, value: u64| {
                 found.push((chunk, value));
                 Ok(())
             };
-            reader.read(&shared, None, keep).unwrap();
+            reader.read(&shared, None, take).unwrap();
             found.sort_unstable();
             found
         };

@@ -3,6 +3,7 @@
 use crate::distribution::Distribution;
 use diagnostics::{Diagnostic, ParameterError, Place, read_toml};
 use serde::Deserialize;
+use serde::de::IgnoredAny;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
 
@@ -113,6 +114,9 @@ struct File {
     #[serde(default)]
     vary: Vec<Spanned<Vary>>,
     timeout_s_host: Option<Spanned<f64>>,
+    /// Read by [`crate::tuning`].
+    #[serde(default, rename = "tune")]
+    _tune: IgnoredAny,
 }
 
 #[derive(Deserialize)]

@@ -13,6 +13,7 @@
 //! | [`slurm`], [`chunk`], [`cluster`] | Slurm's commands, the flights of one task, and the process that submits tasks and takes their rows |
 //! | [`store`] | the output folder: lock, plan, rows flown so far |
 //! | [`table`] | all rows as Parquet |
+//! | [`tuning`], [`search`], [`flying`], [`gains_file`] | gains that cost less: the table `[tune]`, the optimiser, its flights, the new file |
 //! | [`statistics`], [`requirement`], [`report`], [`page`] | pass rate, distributions, rank correlations, the gate for continuous integration |
 //!
 //! A flight is a run on one thread of a worker process, without a recording. Its row depends on the plan alone: the number
@@ -25,15 +26,19 @@ pub mod cluster;
 pub mod declaration;
 pub mod distribution;
 pub mod draw;
+pub mod flying;
 pub mod fork;
+pub mod gains_file;
 pub mod page;
 pub mod plan;
 pub mod pool;
 pub mod report;
 pub mod requirement;
 pub mod row;
+pub mod search;
 pub mod slurm;
 pub mod statistics;
 pub mod store;
 pub mod table;
+pub mod tuning;
 pub mod worker;

@@ -203,7 +203,7 @@ impl RemoteControl {
         self.parameters.yaw_1_s * wrap_rad(set_point.yaw - yaw_rad)
     }
 
-    /// Throttle of this step, 0 to 1; the integral stays where it would carry it beyond.
+    /// Throttle of this step, 0 to 1; beyond these ends the integral does not grow.
     fn throttle(
         &self,
         set_point: &SetPoint,
@@ -215,7 +215,8 @@ impl RemoteControl {
         let asked_m_s = altitude_1_s * (set_point.altitude - estimate.position.z);
         let error_m_s = asked_m_s.clamp(-climb_max_m_s, climb_max_m_s) - estimate.velocity.z;
         let throttle = hover_throttle + climb_s_m * error_m_s + state.throttle;
-        if (0.0..=1.0).contains(&throttle) {
+        let is_beyond = throttle > 1.0 && error_m_s > 0.0 || throttle < 0.0 && error_m_s < 0.0;
+        if !is_beyond {
             state.throttle += climb_integral_1_m * error_m_s * self.period_s;
         }
         throttle.clamp(0.0, 1.0)
@@ -229,5 +230,52 @@ impl RemoteControl {
             .iter()
             .filter(|switch| switch.channel == channel && switch.at_s <= time_s);
         moves.max_by(|a, b| a.at_s.total_cmp(&b.at_s)).map_or(LOW_US, |switch| switch.pulse_us)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sticks(more: serde_json::Value) -> bus::Harness<RemoteControl> {
+        let mut parameters =
+            serde_json::json!({ "tilt_max_deg": 30, "yaw_rate_max_deg_s": 90, "hover_throttle": 0.4 });
+        parameters.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+        bus::Harness::from_json(&parameters).unwrap()
+    }
+
+    /// An integral beyond full throttle comes back when the vehicle is too high, also where nothing else answers.
+    #[test]
+    fn the_integral_comes_back_from_full_throttle() {
+        let mut sticks = sticks(serde_json::json!({ "climb_s_m": 0, "climb_integral_1_m": 2 }));
+        let mut throttle_us = |altitude: f64| {
+            let set_point = SetPoint { altitude, ..Default::default() };
+            let estimate = StateEstimate::default();
+            let mut step =
+                || sticks.step(Inputs { set_point: &set_point, estimate: &estimate }).unwrap().rc.pulse[2];
+            (0..1000).map(|_| step()).last().unwrap()
+        };
+        assert_eq!(throttle_us(10.0), 2000.0);
+        assert!(throttle_us(-10.0) < 1100.0);
+    }
+
+    /// A yaw to the left is a stick to the left; switches keep the pulses of their last move.
+    #[test]
+    fn yaw_and_switches_have_their_signs_and_times() {
+        let moves = serde_json::json!([
+            { "channel": 6, "at_s": 0.002, "pulse_us": 1500 },
+            { "channel": 6, "at_s": 0.001, "pulse_us": 2000 }
+        ]);
+        let mut sticks = sticks(serde_json::json!({ "switches": moves }));
+        let set_point = SetPoint { yaw: 0.1, ..Default::default() };
+        let estimate = StateEstimate::default();
+        let mut step =
+            || sticks.step(Inputs { set_point: &set_point, estimate: &estimate }).unwrap().rc.pulse;
+        let pulses = [step(), step(), step()];
+        assert!(pulses[0][3] < 1500.0, "{pulses:?}");
+        assert_eq!(
+            pulses.map(|pulse| [pulse[4], pulse[5]]),
+            [[1000.0, 1000.0], [1000.0, 2000.0], [1000.0, 1500.0]]
+        );
     }
 }

@@ -219,6 +219,12 @@ impl Manifest {
         self.sources.resolve(written)
     }
 
+    /// Path of the file `key`, which is `vehicle`, `scene` or `gains`, of the process `name`; `None` if it names none.
+    #[must_use]
+    pub fn file_path(&self, name: &str, key: &str) -> Option<PathBuf> {
+        self.resolve(self.file_of(name, key)?).ok()
+    }
+
     /// The file `key` of the process `name`, as it is written.
     fn file_of(&self, name: &str, key: &str) -> Option<&Spanned<String>> {
         let (_, process) = self.content.process.iter().find(|(other, _)| other.get_ref() == name)?;

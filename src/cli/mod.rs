@@ -31,6 +31,7 @@ mod shell;
 mod steer;
 mod table;
 mod top;
+mod tune;
 mod urdf;
 mod validate;
 mod view;
@@ -72,6 +73,9 @@ commands! {
     /// Fly a manifest thousands of times with varied values: pass rate, figures and worst flights.
     #[command(after_help = campaign::HELP)]
     Campaign(campaign::CampaignArguments) => campaign::campaign;
+    /// Tune gains: search those that make figures of many flights smaller, and judge them by other flights.
+    #[command(after_help = tune::HELP)]
+    Tune(tune::TuneArguments) => tune::tune;
     /// Check a manifest without running it, and print its graph.
     #[command(after_help = "Example: hummingbus check manifests/hover.toml")]
     Check(check::CheckArguments) => check::check;

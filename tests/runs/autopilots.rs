@@ -150,6 +150,13 @@ fn a_firmware_that_is_not_armed_is_told_before_tick_0() {
 }
 
 #[test]
+fn a_command_that_the_firmware_refuses_is_told_before_tick_0() {
+    let place = Place::new();
+    let ended = call(&place, "run", &manifest(), &stand_in(&place, "nonsense\n"), &["--record", "none"]);
+    ended.with_code(2).says(&["a command that Betaflight refuses: ###ERROR", "nonsense"]);
+}
+
+#[test]
 fn what_cannot_be_a_firmware_is_refused_by_check() {
     let place = Place::new();
     let unset = "process.controller.firmware=${HUMMINGBUS_UNSET}".to_owned();
@@ -158,14 +165,14 @@ fn what_cannot_be_a_firmware_is_refused_by_check() {
     let in_static = place.write("static", compiled(&["-static"]));
     let settings = stand_in(&place, "");
     let cases: [(&str, &[&str]); 6] = [
-        (&format!("process.controller.firmware={text}"), &["firmware", "no program of 64 bits for Linux"]),
+        (&format!("process.controller.firmware={text}"), &["firmware", "expected a 64-bit Linux program"]),
         (&format!("process.controller.firmware={in_static}"), &["linked statically", "would stall"]),
         ("process.controller.firmware=/nowhere/sitl", &["/nowhere/sitl", "No such file"]),
         ("process.controller.parameters.armed_by_channel=4", &["expected 5 to 16"]),
         ("process.controller.parameters.rc_rate_hz=0", &["rc_rate_hz"]),
         (
             &format!("process.controller.vehicle={}", repository("vehicles/tarot-t18.toml")),
-            &["stand in the places of none of the mixers QUADX, QUADP"],
+            &["rotors match none of the mixers QUADX, QUADP"],
         ),
     ];
     for (setting, told) in cases {

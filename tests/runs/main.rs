@@ -27,6 +27,7 @@
 //! - [`profile`]: where the host time of a run's ticks goes
 //! - [`laps`], [`plot`]: recordings that are written, and pictures of them
 //! - [`slurm`]: campaigns on a Slurm cluster
+//! - [`tune`]: gains that cost less
 //! - [`urdf`]: bodies of vehicles for other tools
 //! - [`new`]: vehicle files from models of other tools
 //! - [`rights`]: rights that a run lacks are named
@@ -95,6 +96,7 @@ mod support;
 mod surroundings;
 mod swap;
 mod terminal;
+mod tune;
 mod untrusted;
 mod urdf;
 mod validate;

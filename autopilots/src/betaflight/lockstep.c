@@ -1,8 +1,9 @@
 /* Preloaded into Betaflight's SITL: its time and its packets come from the simulation alone.
  *
  * The firmware reads a clock that is its own: it begins at 0, and each reading and each sleep of the main thread move it on. At the end
- * of a tick the main thread stops there, answers with its motors, and waits for the next tick's packets. One thread runs at a
- * time: the threads that take packets do so while the main thread waits for them. So a run is a function of its packets.
+ * of a tick the main thread stops there, answers with its motors, and waits for the next tick's packets. The
+ * threads that take packets do so while the main thread waits for them. So a run is a function of its packets, unless somebody
+ * connects to a serial port, whose thread keeps the time of the host.
  *
  * Standard input is a socket to the simulator: `struct tick` comes in, `struct answer` goes out, in the machine's byte order.
  * Without HUMMINGBUS_FIRMWARE_BOOT_NS in the environment there is no simulator: the clock runs free, and no packet comes. */
@@ -141,12 +142,15 @@ static void finish_tick(void)
     end_ns += tick.length_ns;
 }
 
-/* Moves the clock on by `ns`, by the main thread. */
+/* Moves the clock on by `ns`, by the main thread: to the end of the tick, where packets come, and from there on. */
 static void advance(uint64_t ns)
 {
-    now_ns += ns;
-    while (now_ns >= end_ns)
+    while (ns >= end_ns - now_ns) {
+        ns -= end_ns - now_ns;
+        now_ns = end_ns;
         finish_tick();
+    }
+    now_ns += ns;
 }
 
 int clock_gettime(clockid_t clock, struct timespec *time)

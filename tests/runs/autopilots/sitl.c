@@ -96,8 +96,11 @@ int main(int count, char **words)
     char text[4096] = "", *kept = "eeprom.bin";
     if (count == 3 && !strcmp(words[1], "--config")) {
         FILE *in = fopen(words[2], "r"), *out = fopen(kept, "w");
-        while (fgets(text, sizeof text, in))
+        while (fgets(text, sizeof text, in)) {
             fputs(text, out);
+            if (!strncmp(text, "nonsense", 8))
+                printf("###ERROR IN input: UNKNOWN COMMAND: nonsense###\n");
+        }
         return printf("kept\n"), fclose(out);
     }
     FILE *in = fopen(kept, "r");

@@ -1,0 +1,331 @@
+//! The `[tune]` table of a campaign file: the gains that are tuned, and the cost that is minimised.
+
+use crate::declaration::{Campaign, Sampling};
+use crate::draw::rounded_to;
+use diagnostics::{Diagnostic, ParameterError, Place, read_toml};
+use serde::Deserialize;
+use std::ops::Range;
+use std::path::Path;
+use toml::Spanned;
+
+/// Significant digits of a tuned gain: what is flown is what the gains file says.
+const DIGITS: usize = 4;
+/// First standard deviation of a candidate where the file does not say: a part of each range.
+const STEP: f64 = 0.15;
+/// Seed of the optimiser where the file does not say.
+const SEED: u64 = 1;
+const HELP: &str = "docs/tuning.md lists the keys of [tune]";
+
+/// A tuning, as its file declares it.
+///
+/// ```
+/// use campaign::tuning::Tuning;
+/// let text = "manifest = \"hover.toml\"\nflights = 4\n[tune]\ngains = \"process.controller.gains\"\nheld_out = 8\n\
+///             generations = 20\n[[tune.gain]]\nkey = \"roll.proportional\"\nfactor = [0.5, 2.0]\n\
+///             [[tune.minimise]]\nfigure = \"roll error, RMS\"\nweight = 1.0";
+/// let tuning = Tuning::parse("tune/hover.toml".as_ref(), text)?;
+/// assert_eq!(tuning.process, "controller");
+/// assert_eq!(tuning.held_out.flights, 8);
+/// assert_eq!(tuning.gains[0].value(16.0, 0.5), 16.0);
+/// # Ok::<(), diagnostics::Diagnostic>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Tuning {
+    /// Flights by which candidates are judged while they are tuned.
+    pub campaign: Campaign,
+    /// Flights by which the result is judged: other drawn values and other seeds.
+    pub held_out: Campaign,
+    /// Process whose gains file is tuned.
+    pub process: String,
+    /// Tuned gains.
+    pub gains: Vec<Tuned>,
+    /// Terms of the cost of a flight.
+    pub terms: Vec<Term>,
+    /// Costs of a flight in which a condition of the manifest does not hold.
+    pub failed_costs: f64,
+    /// Most generations of the optimiser.
+    pub generations: usize,
+    /// Candidates of a generation; the optimiser's own number where absent.
+    pub population: Option<usize>,
+    /// First standard deviation of a candidate, as a part of each range.
+    pub step: f64,
+    /// Seed of the optimiser.
+    pub seed: u64,
+}
+
+/// A tuned gain.
+#[derive(Clone, Debug)]
+pub struct Tuned {
+    /// Name in reports.
+    pub name: String,
+    /// Keys in the gains file that all get the value.
+    pub keys: Vec<String>,
+    /// Limits of the value.
+    pub limits: Limits,
+    place: Place,
+}
+
+/// Limits of a tuned gain.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Limits {
+    /// Least and greatest factor of the declared value.
+    Factor([f64; 2]),
+    /// Least and greatest value.
+    Value([f64; 2]),
+}
+
+/// A term of the cost of a flight: weight times figure.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Term {
+    /// Name of the figure.
+    pub figure: String,
+    /// Weight, in costs for each unit of the figure.
+    pub weight: f64,
+}
+
+#[derive(Deserialize)]
+struct File {
+    tune: Option<Spanned<Tune>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Tune {
+    gains: String,
+    held_out: u64,
+    generations: usize,
+    population: Option<usize>,
+    step: Option<f64>,
+    seed: Option<u64>,
+    #[serde(default)]
+    failed_costs: f64,
+    gain: Vec<Spanned<Gain>>,
+    minimise: Vec<Term>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Gain {
+    name: Option<String>,
+    key: Option<String>,
+    #[serde(default)]
+    keys: Vec<String>,
+    factor: Option<[f64; 2]>,
+    value: Option<[f64; 2]>,
+}
+
+impl Tuning {
+    /// The tuning in `text`, which stands at `path`.
+    ///
+    /// # Errors
+    /// A [`Diagnostic`] that names the place.
+    pub fn parse(path: &Path, text: &str) -> Result<Self, Diagnostic> {
+        let campaign = Campaign::parse(path, text)?;
+        let name = path.display().to_string();
+        let file: File = read_toml(&name, text)?;
+        let at = |span: &Range<usize>, error: ParameterError| {
+            Diagnostic::at(Place::of(name.clone(), text, span), error).help(HELP)
+        };
+        let Some(tune) = &file.tune else {
+            let message = "there is no [tune] table: hummingbus tune needs it";
+            return Err(Diagnostic::in_file(name, message).help(HELP));
+        };
+        let (span, tune) = (tune.span(), tune.get_ref());
+        let process = tune.check(&campaign).map_err(|error| at(&span, error))?;
+        let gains = Diagnostic::gather(tune.gain.iter().map(|gain| {
+            let place = Place::of(name.clone(), text, &gain.span());
+            Tuned::of(gain.get_ref(), &place).map_err(|error| Diagnostic::at(place.clone(), error).help(HELP))
+        }))?;
+        let held_out =
+            Campaign { flights: tune.held_out, seed: campaign.seed.wrapping_add(1), ..campaign.clone() };
+        Ok(Self {
+            campaign,
+            held_out,
+            process,
+            gains,
+            terms: tune.minimise.clone(),
+            failed_costs: tune.failed_costs,
+            generations: tune.generations,
+            population: tune.population,
+            step: tune.step.unwrap_or(STEP),
+            seed: tune.seed.unwrap_or(SEED),
+        })
+    }
+}
+
+impl Tune {
+    /// The process whose gains are tuned.
+    fn check(&self, campaign: &Campaign) -> Result<String, ParameterError> {
+        let error = |key: &str, expected: &str, found: &dyn std::fmt::Display| {
+            Err(ParameterError::value(key, expected, found))
+        };
+        let process = self.gains.strip_prefix("process.").and_then(|rest| rest.strip_suffix(".gains"));
+        let Some(process) = process.filter(|process| !process.is_empty()) else {
+            return error("gains", "process.NAME.gains", &self.gains);
+        };
+        if campaign.sampling == Sampling::Grid {
+            let message = "a grid has no other flights to judge by; choose another `sampling`";
+            return Err(ParameterError::conflict("sampling", message));
+        }
+        if campaign.vary.iter().any(|varied| varied.keys.iter().any(|key| key == "run.seed")) {
+            let message = "run.seed is varied: a tuning judges by other seeds than it tunes by; leave it out";
+            return Err(ParameterError::conflict("vary", message));
+        }
+        if !(1..=crate::declaration::FLIGHTS_MAX).contains(&self.held_out) {
+            return error("held_out", "at least 1 flight", &self.held_out);
+        }
+        if self.generations == 0 {
+            return error("generations", "at least 1", &0);
+        }
+        if let Some(population) = self.population.filter(|it| !(4..=10_000).contains(it)) {
+            return error("population", "4 to 10000 candidates", &population);
+        }
+        if let Some(step) = self.step.filter(|step| !(*step > 0.0 && *step <= 1.0)) {
+            return error("step", "above 0 and at most 1", &step);
+        }
+        if !(self.failed_costs >= 0.0 && self.failed_costs.is_finite()) {
+            return error("failed_costs", "0 or more", &self.failed_costs);
+        }
+        if self.gain.is_empty() {
+            return Err(ParameterError::missing("gain", "at least one [[tune.gain]]"));
+        }
+        if self.minimise.is_empty() {
+            return Err(ParameterError::missing("minimise", "at least one [[tune.minimise]]"));
+        }
+        match self.minimise.iter().find(|term| !(term.weight > 0.0 && term.weight.is_finite())) {
+            Some(term) => error("weight", "above 0", &term.weight),
+            None => Ok(process.to_owned()),
+        }
+    }
+}
+
+impl Tuned {
+    fn of(gain: &Gain, place: &Place) -> Result<Self, ParameterError> {
+        let keys: Vec<String> = gain.key.iter().chain(&gain.keys).cloned().collect();
+        let first =
+            keys.first().ok_or_else(|| ParameterError::missing("key", "a key of the gains file"))?.clone();
+        let limits = match (gain.factor, gain.value) {
+            (Some(factor), None) => Limits::Factor(factor),
+            (None, Some(value)) => Limits::Value(value),
+            _ => {
+                let expected = "either `factor` or `value`, two limits";
+                return Err(ParameterError::missing("factor", expected));
+            }
+        };
+        let (key, [low, high]) = limits.key();
+        let least = if key == "factor" { f64::MIN_POSITIVE } else { f64::MIN };
+        if !(low >= least && low < high && high.is_finite()) {
+            let expected = "a lower limit below the upper one, factors above 0";
+            return Err(ParameterError::value(key, expected, format!("[{low}, {high}]")));
+        }
+        Ok(Self { name: gain.name.clone().unwrap_or(first), keys, limits, place: place.clone() })
+    }
+
+    /// Value at the coordinate `x` of the range, 0 to 1, of a gain that is `declared`; four significant digits.
+    #[must_use]
+    pub fn value(&self, declared: f64, x: f64) -> f64 {
+        let between = |[low, high]: [f64; 2]| low + x.clamp(0.0, 1.0) * (high - low);
+        let value = match self.limits {
+            Limits::Factor(limits) => declared * libm::exp(between(limits.map(libm::log))),
+            Limits::Value(limits) => between(limits),
+        };
+        rounded_to(value, DIGITS)
+    }
+
+    /// Coordinate of the `declared` value in the range.
+    ///
+    /// # Errors
+    /// If it is outside, or a factor acts on 0.
+    pub fn start(&self, declared: f64) -> Result<f64, Diagnostic> {
+        let (key, [low, high]) = self.limits.key();
+        let (x, shown) = match self.limits {
+            Limits::Factor(limits) => {
+                let [low, high] = limits.map(libm::log);
+                (-low / (high - low), 1.0)
+            }
+            Limits::Value(_) => ((declared - low) / (high - low), declared),
+        };
+        let message = if declared == 0.0 && key == "factor" {
+            format!("`{}` is 0, which no factor changes; give the limits of its `value`", self.keys[0])
+        } else if (0.0..=1.0).contains(&x) {
+            return Ok(x);
+        } else {
+            format!(
+                "the search begins at {shown} for `{}`, which is outside of {low} to {high}",
+                self.keys[0]
+            )
+        };
+        Err(self.problem(message))
+    }
+
+    /// A problem with this gain, at its place in the file.
+    pub(crate) fn problem(&self, message: impl Into<String>) -> Diagnostic {
+        let (key, _) = self.limits.key();
+        Diagnostic::at(self.place.clone(), ParameterError::conflict(key, message.into())).help(HELP)
+    }
+}
+
+impl Limits {
+    fn key(self) -> (&'static str, [f64; 2]) {
+        match self {
+            Self::Factor(limits) => ("factor", limits),
+            Self::Value(limits) => ("value", limits),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Tuning;
+
+    const HEAD: &str = "manifest = \"a.toml\"\nflights = 2\n[tune]\ngenerations = 3\n";
+    const GAIN: &str = "[[tune.gain]]\nkey = \"roll.proportional\"\nfactor = [0.5, 2]\n";
+    const TERM: &str = "[[tune.minimise]]\nfigure = \"f\"\nweight = 2\n";
+
+    fn parse(text: &str) -> Result<Tuning, String> {
+        Tuning::parse("t.toml".as_ref(), text).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_gain_goes_through_its_range_and_begins_at_its_declared_value() {
+        let text = format!("{HEAD}gains = \"process.c.gains\"\nheld_out = 2\n{GAIN}{TERM}");
+        let tuning = parse(&text).unwrap();
+        let gain = &tuning.gains[0];
+        assert_eq!(gain.start(16.0).unwrap(), 0.5);
+        assert_eq!([0.0, 0.5, 1.0, 7.0].map(|x| gain.value(16.0, x)), [8.0, 16.0, 32.0, 32.0]);
+        assert!(gain.start(0.0).unwrap_err().to_string().contains("which no factor changes"));
+        // Flights that judge share no seed with those that tune.
+        assert_ne!(tuning.held_out.seed, tuning.campaign.seed);
+        let tuning = parse(&text.replace("factor = [0.5, 2]", "value = [0, 4]")).unwrap();
+        assert_eq!(tuning.gains[0].start(1.0).unwrap(), 0.25);
+        assert!(tuning.gains[0].start(5.0).unwrap_err().to_string().contains("outside of 0 to 4"));
+    }
+
+    #[test]
+    fn what_is_refused_has_its_line() {
+        let whole = format!("{HEAD}gains = \"process.c.gains\"\nheld_out = 2\n{GAIN}{TERM}");
+        for (from, to, expected) in [
+            ("[tune]", "[[measure]]\nname = \"a\"\n[tool]", "unknown"),
+            ("process.c.gains", "c.gains", "t.toml:3:1: `gains` must be process.NAME.gains"),
+            ("held_out = 2", "held_out = 0", "`held_out` must be at least 1 flight"),
+            ("generations = 3", "generations = 0", "`generations` must be at least 1"),
+            ("generations = 3", "generations = 3\npopulation = 3", "`population` must be 4 to 10000"),
+            ("generations = 3", "generations = 3\nstep = 0", "`step` must be above 0"),
+            ("weight = 2", "weight = -1", "`weight` must be above 0"),
+            ("factor = [0.5, 2]", "factor = [2, 0.5]", "t.toml:7:1: `factor` must be a lower limit"),
+            ("factor = [0.5, 2]", "factor = [0, 2]", "factors above 0"),
+            ("factor = [0.5, 2]", "", "missing key `factor`"),
+            (
+                "flights = 2",
+                "flights = 2\nsampling = \"random\"\n[[vary]]\nkey = \"run.seed\"\nintegers = [1, 9]",
+                "run.seed is varied",
+            ),
+        ] {
+            let found = parse(&whole.replace(from, to)).unwrap_err();
+            assert!(found.contains(expected), "{found}\nexpected {expected}");
+        }
+        let found = parse("manifest = \"a.toml\"\nflights = 2").unwrap_err();
+        assert!(found.contains("there is no [tune] table"), "{found}");
+    }
+}

@@ -1,0 +1,144 @@
+//! The command `tune`: gains that make a figure of many flights smaller.
+
+use super::campaign_engine::{cores, worker_command};
+use super::interrupts::stop_token;
+use super::output::{print_json, print_text};
+use super::progress;
+use anyhow::{Context, Result, bail};
+use campaign::base::Base;
+use campaign::flying::with_flights;
+use campaign::gains_file;
+use campaign::pool::Pool;
+use campaign::search::{Change, Comparison, Outcome, search};
+use campaign::tuning::Tuning;
+use campaign::worker::{Order, VERSION};
+use clap::Args;
+use hummingbus::COMPONENTS;
+use inputs::InputFiles;
+use runtime::output_file::{self, Kind, Mark};
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+pub const HELP: &str = "Example: hummingbus tune manifests/tune/hover.toml --out hover-gains.toml\n\n\
+                        Writes a gains file if the tuned gains cost less on flights that they were not tuned on; exit code 1 if \
+                        not. docs/tuning.md has the keys of tuning files.";
+
+/// The gains file.
+const GAINS: Kind = Kind { name: "tuned gains file", mark: Mark::Start(gains_file::START.as_bytes()) };
+/// Progress of a tuning.
+const BAR: &str = "{bar:30} {pos}/{len} generations, {eta} left  {msg}";
+
+/// Arguments of `tune`.
+#[derive(Args)]
+pub struct TuneArguments {
+    /// The tuning file: a campaign file with a table [tune].
+    tuning: PathBuf,
+    /// The gains file to write; NAME-gains.toml in the current folder where absent.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Number of worker processes; one for each core where absent.
+    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    workers: Option<u16>,
+    /// Print the result as JSON, and no progress.
+    #[arg(long)]
+    json: bool,
+}
+
+/// The command `tune`; false if the tuned gains are not better.
+///
+/// # Errors
+/// A problem in the tuning file, its manifest or the gains file, or an interrupted tuning.
+pub fn tune(arguments: &TuneArguments) -> Result<bool> {
+    let path = &arguments.tuning;
+    let text = InputFiles::default().text(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let tuning = Tuning::parse(path, &text)?;
+    let base = Base::read(&tuning.campaign, COMPONENTS)?;
+    let gains = base.manifest.file_path(&tuning.process, "gains").with_context(|| {
+        let process = &tuning.process;
+        format!("process `{process}` names no gains file; add process.{process}.gains=\"PATH\" to `set`")
+    })?;
+    let out = arguments.out.clone().unwrap_or_else(|| default_out(path));
+    if [path, &gains].into_iter().any(|input| output_file::is_same(&out, input)) {
+        bail!("{} is an input of the tuning; name another file with --out", out.display());
+    }
+    output_file::check(&out, &GAINS)?;
+    let outcome = fly(arguments, &tuning, &base, text)?;
+    let is_better = outcome.held_out.costs.after < outcome.held_out.costs.before;
+    if is_better {
+        let declared = base.files.text(&gains)?;
+        let text = gains_file::text(&declared, &gains, path, tuning.seed, &outcome)?;
+        output_file::write(&out, &GAINS, |file| file.write_all(text.as_bytes()))?;
+    }
+    if arguments.json {
+        print_json(&outcome)?;
+    } else {
+        print_text(&summary(&outcome, is_better.then_some(&*out))?)?;
+    }
+    Ok(is_better)
+}
+
+/// Flies the search.
+fn fly(arguments: &TuneArguments, tuning: &Tuning, base: &Base, text: String) -> Result<Outcome> {
+    let stop = stop_token()?;
+    let folder = tempfile::tempdir().context("cannot make a folder for the workers")?;
+    let order = Order {
+        version: VERSION.to_owned(),
+        path: arguments.tuning.clone(),
+        text,
+        fingerprint: base.fingerprint.clone(),
+        folder: folder.path().to_owned(),
+    };
+    let pool = Pool {
+        command: &worker_command()?,
+        workers: arguments.workers.map_or_else(cores, usize::from),
+        order: &order,
+        timeout: Duration::from_secs_f64(tuning.campaign.timeout_s_host),
+    };
+    let bar = progress::bar(BAR, arguments.json);
+    bar.set_length(tuning.generations as u64);
+    let tell = |generation: usize, costs: f64| {
+        bar.set_position(generation as u64);
+        bar.set_message(format!("lowest costs: {:.1} % of today's", 100.0 * costs));
+    };
+    let outcome = with_flights(&pool, &stop, |flying| search(tuning, base, flying, &tell));
+    progress::finish(&bar);
+    outcome
+}
+
+fn default_out(path: &Path) -> PathBuf {
+    PathBuf::from(format!("{}-gains.toml", path.file_stem().unwrap_or_default().to_string_lossy()))
+}
+
+/// The result for people; `out` is the gains file if one was written.
+fn summary(outcome: &Outcome, out: Option<&Path>) -> Result<String> {
+    let mut text = format!("{} generations, {} candidates\n\n", outcome.generations, outcome.candidates);
+    for gain in &outcome.gains {
+        writeln!(text, "  {}: {} → {}", gain.name, gain.before, gain.after)?;
+    }
+    writeln!(text, "\n{}", compared("tuned on", &outcome.tuned_on)?)?;
+    writeln!(text, "{}", compared("judged by other flights:", &outcome.held_out)?)?;
+    match out {
+        Some(out) => write!(text, "gains: {}", out.display())?,
+        None => write!(text, "no gains were written: today's are better on the other flights")?,
+    }
+    Ok(text)
+}
+
+fn compared(title: &str, comparison: &Comparison) -> Result<String> {
+    let Comparison { flights, costs, standard_error, failed, figures, .. } = comparison;
+    let percent = 100.0 * costs.relative();
+    let error = 100.0 * standard_error / costs.before;
+    let mut text = format!("{title} {flights} flights\n");
+    writeln!(
+        text,
+        "  costs: {:.5} → {:.5}, {percent:+.1} % (standard error {error:.1} %)",
+        costs.before, costs.after
+    )?;
+    for (figure, Change { before, after }) in figures {
+        writeln!(text, "  {figure}: {before:.5} → {after:.5}")?;
+    }
+    writeln!(text, "  flights with a condition that does not hold: {} → {}", failed.before, failed.after)?;
+    Ok(text)
+}
