@@ -292,7 +292,9 @@ mod tests {
             "it follows a ramp of a whole turn: {:?}",
             state.attitude_command
         );
-        (0..1000).for_each(|_| drop(law.demand(&mut state, &IN_FLIGHT, &hold(), &level())));
+        for _ in 0..1000 {
+            law.demand(&mut state, &IN_FLIGHT, &hold(), &level());
+        }
         assert!((state.attitude_command[0] - 2.0 * PI).abs() < 1e-3, "level is one turn on, not back");
         let upside_down = HoverMotion { roll_rad: PI, ..level() };
         let wrench = law.demand(&mut state, &IN_FLIGHT, &hold(), &upside_down).wrench;

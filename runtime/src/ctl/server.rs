@@ -254,7 +254,7 @@ mod tests {
         let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
         let folder = tempfile::tempdir().unwrap();
         let (sender, requests) = channel();
-        test(Server::start(folder.path(), Remote::new(sender), requests).unwrap(), folder.path());
+        test(Server::start(folder.path(), Remote::new(sender), &requests).unwrap(), folder.path());
     }
 
     /// A client that fails rather than waits without end.
