@@ -79,6 +79,7 @@ mod components;
 #[cfg(test)]
 mod extremes;
 pub mod fmu_export;
+pub mod operator;
 #[cfg(test)]
 mod properties;
 

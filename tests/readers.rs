@@ -18,6 +18,8 @@ mod plot;
 mod profile;
 #[path = "runs/skipped.rs"]
 mod skipped;
+#[path = "readers/steered.rs"]
+mod steered;
 #[path = "readers/urdf.rs"]
 mod urdf;
 #[path = "readers/view.rs"]

@@ -8,6 +8,7 @@
 extern crate self as bus;
 
 pub mod announcement;
+pub mod asked;
 mod bounded;
 pub mod checkpoint;
 #[doc(hidden)]

@@ -16,7 +16,7 @@ mod control;
 mod sensing;
 mod transform;
 
-pub use control::{ControlStatus, Reference};
+pub use control::{ControlStatus, RC_CHANNELS_MAX, RcChannels, Reference};
 pub use sensing::{
     Barometer, Battery, BodyStates, Clearance, Contact, Gps, Innovation, Magnetometer, Mocap, Ranges,
     RotorSpeeds, StateEstimate, Traffic, WallEstimate,

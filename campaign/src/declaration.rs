@@ -59,6 +59,9 @@ pub enum Sampling {
     /// (McKay, Beckman and Conover, Technometrics 21(2), 1979).
     #[default]
     LatinHypercube,
+    /// A Sobol sequence (directions of Joe and Kuo, SIAM J. Sci. Comput. 30(5), 2008) with a random digital shift: values fill
+    /// the space of all varied values evenly, best in 2^n flights.
+    Sobol,
     /// Independent values.
     Random,
     /// Every combination of `values` and `integers`.
@@ -107,6 +110,7 @@ struct File {
     set: Vec<String>,
     #[serde(default)]
     measure: Vec<toml::Table>,
+    #[serde(default)]
     vary: Vec<Spanned<Vary>>,
     timeout_s_host: Option<Spanned<f64>>,
 }
@@ -131,6 +135,8 @@ fn first() -> u64 {
     1
 }
 
+/// Most varied values of a Sobol sequence.
+pub const SOBOL_MAX: usize = 100;
 /// Longest host time of a flight that may be stated, s.
 const TIMEOUT_S_HOST_MAX: f64 = 1e6;
 /// Host time of a flight where the file does not say, s.
@@ -158,6 +164,10 @@ impl Campaign {
         let flights = flights(&file, &vary).map_err(|error| {
             let span = file.flights.as_ref().map_or(0..0, Spanned::span);
             at(&span, error, "docs/campaigns.md lists the keys of a campaign")
+        })?;
+        require_dimensions(&file).map_err(|error| {
+            let span = file.vary.get(SOBOL_MAX).map_or(0..0, Spanned::span);
+            at(&span, error, "choose another `sampling`")
         })?;
         let timeout_s_host = file.timeout_s_host.as_ref().map_or(TIMEOUT_S_HOST, |it| *it.get_ref());
         if !(timeout_s_host > 0.0 && timeout_s_host <= TIMEOUT_S_HOST_MAX) {
@@ -232,6 +242,15 @@ fn flights(file: &File, vary: &[Varied]) -> Result<u64, ParameterError> {
     } else {
         Err(ParameterError::value("flights", expected, flights))
     }
+}
+
+/// Refuses more varied values than a Sobol sequence has directions for.
+fn require_dimensions(file: &File) -> Result<(), ParameterError> {
+    if file.sampling == Sampling::Sobol && file.vary.len() > SOBOL_MAX {
+        let expected = format!("at most {SOBOL_MAX} varied values for `sampling = \"sobol\"`");
+        return Err(ParameterError::value("vary", expected, file.vary.len()));
+    }
+    Ok(())
 }
 
 fn require_names(vary: &[Varied]) -> Result<(), Diagnostic> {

@@ -10,6 +10,7 @@
 //! | [`base`] | the manifest that all flights have in common, and the files it reads |
 //! | [`row`] | the result of one flight |
 //! | [`worker`], [`pool`] | processes that fly, and the process that hands out flights |
+//! | [`slurm`], [`chunk`], [`cluster`] | Slurm's commands, the flights of one task, and the process that submits tasks and takes their rows |
 //! | [`store`] | the output folder: lock, plan, rows flown so far |
 //! | [`table`] | all rows as Parquet |
 //! | [`statistics`], [`requirement`], [`report`], [`page`] | pass rate, distributions, rank correlations, the gate for continuous integration |
@@ -19,6 +20,8 @@
 #![forbid(unsafe_code)]
 
 pub mod base;
+pub mod chunk;
+pub mod cluster;
 pub mod declaration;
 pub mod distribution;
 pub mod draw;
@@ -29,6 +32,7 @@ pub mod pool;
 pub mod report;
 pub mod requirement;
 pub mod row;
+pub mod slurm;
 pub mod statistics;
 pub mod store;
 pub mod table;

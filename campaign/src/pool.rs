@@ -5,6 +5,7 @@ use crate::row::Row;
 use crate::worker::{Greeting, Job, Order};
 use anyhow::{Context, Result, bail};
 use bus::host_time::monotonic_ns;
+use bus::process::hold_stop_signals;
 use runtime::event::StopToken;
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
@@ -156,13 +157,12 @@ struct Worker {
 impl Worker {
     fn spawn(command: &[String]) -> Result<Self> {
         let (program, arguments) = command.split_first().context("no command for the workers")?;
+        let mut command = Command::new(program);
         // A group of its own: Ctrl-C ends the campaign, and the flights under way end as they are.
-        let child = Command::new(program)
-            .args(arguments)
-            .process_group(0)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn();
+        command.args(arguments).process_group(0).stdin(Stdio::piped()).stdout(Stdio::piped());
+        // Slurm sends SIGTERM to all processes of a task: to the worker it would cost the flight under way.
+        hold_stop_signals(&mut command);
+        let child = command.spawn();
         let mut child = child.with_context(|| format!("cannot start the worker {program}"))?;
         let (input, output) = (child.stdin.take(), child.stdout.take());
         let (input, output) = input.zip(output).context("a worker has no pipes")?;

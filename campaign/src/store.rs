@@ -5,6 +5,7 @@
 use crate::declaration::Campaign;
 use crate::plan::Plan;
 use crate::row::Row;
+use crate::worker::VERSION;
 use anyhow::{Context, Result, bail};
 use inputs::sha256;
 use serde::{Deserialize, Serialize};
@@ -63,8 +64,11 @@ impl Store {
             forget(folder, &mut lock)?;
         }
         let plan = plan(folder, campaign, &mut lock)?;
-        let header =
-            Header { version: version(), fingerprint: fingerprint.to_owned(), figures: figures.to_owned() };
+        let header = Header {
+            version: VERSION.to_owned(),
+            fingerprint: fingerprint.to_owned(),
+            figures: figures.to_owned(),
+        };
         let path = folder.join(ROWS);
         let (mut flown, whole) = if path.exists() { read(&path, &header)? } else { (BTreeMap::new(), 0) };
         // The plan may have been edited since, and what the host ended is flown again.
@@ -105,10 +109,6 @@ impl Store {
         let written = self.rows.write_all(line.as_bytes());
         written.with_context(|| format!("cannot write {}", self.folder.join(ROWS).display()))
     }
-}
-
-fn version() -> String {
-    env!("CARGO_PKG_VERSION").to_owned()
 }
 
 /// Refuses a folder with other files: those of a campaign might take their place.

@@ -16,9 +16,14 @@ use std::fs::File;
 use std::io::{BufRead, Write};
 use std::path::{Path, PathBuf};
 
+/// Version of this hummingbus.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+
 /// Campaign that a worker flies for.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Order {
+    /// Version of hummingbus that the rows are of.
+    pub version: String,
     /// Path of the campaign file.
     pub path: PathBuf,
     /// Its text.
@@ -30,7 +35,7 @@ pub struct Order {
 }
 
 /// A flight to fly.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Job {
     /// Number of the flight.
     pub flight: u64,
@@ -87,6 +92,12 @@ fn answer(output: &mut impl Write, value: &impl Serialize) -> Result<()> {
 }
 
 fn prepare(order: &Order, registry: Registry) -> Result<Base> {
+    if order.version != VERSION {
+        bail!(
+            "this hummingbus is of version {VERSION}, the campaign's of version {}: install the same",
+            order.version
+        );
+    }
     let campaign = Campaign::parse(&order.path, &order.text)?;
     let base = Base::read(&campaign, registry)?;
     if base.fingerprint != order.fingerprint {

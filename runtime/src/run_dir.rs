@@ -430,6 +430,16 @@ pub fn find_live(run_id: Option<&str>) -> Result<LiveRun> {
     choose(live_runs(), run_id)
 }
 
+/// The run that the process `launcher` flies; the first one, if it flies several.
+///
+/// ```
+/// assert!(runtime::run_dir::run_of_launcher(std::process::id()).is_none(), "this process flies none");
+/// ```
+#[must_use]
+pub fn run_of_launcher(launcher: u32) -> Option<LiveRun> {
+    live_runs().into_iter().find(|run| run.entry.launcher == launcher)
+}
+
 fn choose(mut runs: Vec<LiveRun>, run_id: Option<&str>) -> Result<LiveRun> {
     let is_chosen = |run: &LiveRun| run_id.is_none_or(|run_id| run.entry.run_id == run_id);
     let index = runs.iter().position(is_chosen);

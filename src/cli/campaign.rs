@@ -1,5 +1,6 @@
 //! The command `campaign`: thousands of flights of one manifest, each with other values.
 
+use super::campaign_engine::{EngineArguments, Flight, fly_task};
 use super::interrupts::stop_token;
 use super::output::{print_json, print_text, say};
 use super::progress;
@@ -7,12 +8,11 @@ use anyhow::{Context, Result, bail};
 use campaign::base::Base;
 use campaign::declaration::Campaign;
 use campaign::plan::Plan;
-use campaign::pool::Pool;
 use campaign::report::Report;
 use campaign::requirement::Requirement;
 use campaign::row::{Row, columns};
 use campaign::store::{PLAN, Store};
-use campaign::worker::{Job, Order, serve, take_output};
+use campaign::worker::{Job, Order, VERSION, serve, take_output};
 use campaign::{page, table};
 use clap::Args;
 use hummingbus::COMPONENTS;
@@ -25,7 +25,6 @@ use serde_json::json;
 use std::collections::BTreeMap;
 use std::io::{Write as _, stdin};
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 pub const HELP: &str = "Example: hummingbus campaign manifests/campaigns/hover-robustness.toml --out robustness\n\n\
                         Writes plan.csv, flights.parquet, report.json and report.html into the folder. The same command goes \
@@ -37,21 +36,18 @@ const PAGE: &str = "report.html";
 const BAR: &str = "{bar:30} {pos}/{len} flights  {per_sec}, {eta} left  {msg}";
 /// Flights that are checked before the first one is flown.
 const CHECKED: usize = 3;
-/// The hidden argument of a worker.
-const WORKER: &str = "--worker";
 
 /// Arguments of `campaign`.
 #[derive(Args)]
 pub struct CampaignArguments {
     /// The campaign file.
-    #[arg(required_unless_present = "worker")]
+    #[arg(required_unless_present_any = ["worker", "task_of"])]
     campaign: Option<PathBuf>,
     /// Folder for the plan, the flights and the report; named like the campaign file where absent.
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
-    /// Number of worker processes; one for each core where absent.
-    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u16).range(1..=1024))]
-    workers: Option<u16>,
+    #[command(flatten)]
+    engine: EngineArguments,
     /// Draw and write the plan, and fly nothing.
     #[arg(long, conflicts_with = "require")]
     plan_only: bool,
@@ -67,6 +63,9 @@ pub struct CampaignArguments {
     /// Fly for a campaign that started this process.
     #[arg(long, hide = true)]
     worker: bool,
+    /// Fly a chunk for a campaign that submitted this task.
+    #[arg(long, hide = true, value_name = "FOLDER")]
+    task_of: Option<PathBuf>,
 }
 
 /// Campaign to fly, and the way to fly it.
@@ -79,8 +78,8 @@ pub struct Flying {
     pub folder: PathBuf,
     /// True if the text is to be written to the path, which lies in the folder.
     pub is_made: bool,
-    /// Number of worker processes; one for each core where absent.
-    pub workers: Option<u16>,
+    /// Engine that flies.
+    pub engine: EngineArguments,
     /// Condition for exit code 0.
     pub require: Option<Requirement>,
     /// True for a report as JSON.
@@ -96,12 +95,17 @@ pub fn campaign(arguments: &CampaignArguments) -> Result<bool> {
         let output = take_output().context("cannot keep standard output for answers")?;
         return serve(COMPONENTS, stdin().lock(), output).map(|()| true);
     }
+    if let Some(folder) = &arguments.task_of {
+        return fly_task(folder).map(|()| true);
+    }
+    arguments.engine.check()?;
     let path = arguments.campaign.clone().context("expected a campaign file")?;
     let text =
         InputFiles::default().text(&path).with_context(|| format!("cannot read {}", path.display()))?;
     let folder = arguments.out.clone().unwrap_or_else(|| path.with_extension(""));
-    let CampaignArguments { workers, require, json, .. } = *arguments;
-    let opened = Opened::new(Flying { path, text, folder, is_made: false, workers, require, json })?;
+    let CampaignArguments { require, json, .. } = *arguments;
+    let engine = arguments.engine.clone();
+    let opened = Opened::new(Flying { path, text, folder, is_made: false, engine, require, json })?;
     if arguments.plan_only {
         let path = opened.0.flying.folder.join(PLAN);
         return print_text(&format!("{} flights: {}", opened.0.plan.flights.len(), path.display()))
@@ -155,20 +159,16 @@ impl Opened {
     fn fly(&mut self, mut rows: BTreeMap<u64, Row>) -> Result<BTreeMap<u64, Row>> {
         let jobs = jobs(&self.campaign, &self.base, &self.plan, &rows)?;
         require_flyable(&self.base, &jobs)?;
-        let stop = stop_token()?;
         let bar = progress::bar(BAR, self.flying.json);
         bar.set_length(self.plan.flights.len() as u64);
         bar.set_position(rows.len() as u64);
-        let (path, text, fingerprint) =
-            (self.flying.path.clone(), self.flying.text.clone(), self.base.fingerprint.clone());
-        let pool = Pool {
-            command: &worker_command()?,
-            workers: workers(self.flying.workers, jobs.len()),
-            order: &Order { path, text, fingerprint, folder: self.store.work_folder()? },
-            timeout: Duration::from_secs_f64(self.campaign.timeout_s_host),
-        };
-        let Self { plan, figures, store, .. } = self;
-        let end = pool.fly(jobs.into_iter(), &stop, |mut row| {
+        let Self { flying, campaign, base, plan, figures, store } = self;
+        let (path, text, fingerprint) = (flying.path.clone(), flying.text.clone(), base.fingerprint.clone());
+        let order =
+            Order { version: VERSION.to_owned(), path, text, fingerprint, folder: store.work_folder()? };
+        let flight = Flight { folder: &flying.folder, order, timeout_s_host: campaign.timeout_s_host };
+        let tell = |text: &str| bar.suspend(|| say(text));
+        let end = flying.engine.fly(flight, jobs, &tell, |mut row| {
             row.drawn.clone_from(&plan.flights[row.flight as usize]);
             row.figures.resize(figures.len(), None);
             store.add(&row)?;
@@ -275,16 +275,4 @@ fn require_flyable(base: &Base, jobs: &[Job]) -> Result<()> {
         }
         _ => Ok(()),
     }
-}
-
-fn workers(workers: Option<u16>, jobs: usize) -> usize {
-    let cores = || std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-    workers.map_or_else(cores, usize::from).min(jobs)
-}
-
-/// The command that starts a worker.
-fn worker_command() -> Result<Vec<String>> {
-    let program = std::env::current_exe().context("cannot find this program")?;
-    let program = program.to_str().context("the path of this program is not UTF-8")?.to_owned();
-    Ok(vec![program, "campaign".to_owned(), WORKER.to_owned()])
 }

@@ -1,6 +1,7 @@
 //! `run --from FILE --fork N --vary …`: a campaign of flights that go on from a checkpoint.
 
 use super::campaign::{self, Flying};
+use super::campaign_engine::EngineArguments;
 use super::run::{RunArguments, fly};
 use ::campaign::fork::{Vary, text};
 use ::campaign::requirement::Requirement;
@@ -62,7 +63,7 @@ pub fn run(arguments: &RunOrForkArguments) -> Result<bool> {
         text: text(&from, flights, &run.set, &fork.vary)?,
         folder,
         is_made: true,
-        workers: fork.workers,
+        engine: EngineArguments::local(fork.workers),
         require: fork.require,
         json: run.json,
     })

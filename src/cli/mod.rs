@@ -1,6 +1,7 @@
 //! The command line: the table of commands, what is printed, exit codes.
 
 mod campaign;
+mod campaign_engine;
 mod cat;
 mod check;
 mod clean;
@@ -14,6 +15,7 @@ mod identify;
 mod included_models;
 mod inherited;
 mod interrupts;
+mod live_page;
 mod new;
 mod node;
 mod output;
@@ -53,7 +55,7 @@ struct Cli {
 commands! {
     /// Fly a manifest, record it, and judge the recording.
     #[command(
-        after_help = "Examples: hummingbus run manifests/hover.toml --pace realtime --set run.seed=7\n          hummingbus run --from hover.6000.ckpt --fork 100 --vary process.plant.vehicle.body.mass=factor:uniform:0.9,1.1"
+        after_help = "Example: hummingbus run manifests/hover.toml --pace realtime --set run.seed=7\n         hummingbus run --from hover.6000.ckpt --fork 100 --vary process.plant.vehicle.body.mass=factor:uniform:0.9,1.1"
     )]
     Run(fork::RunOrForkArguments) => fork::run;
     /// Fly a manifest as `run` does, and tell where the host time of its ticks goes.

@@ -1,7 +1,8 @@
 //! The command `run` and its kin: check a manifest, fly it, judge its recording, say what came of it.
 
 use super::interrupts::stop_token;
-use super::output::{message, print_json, print_text, print_warnings};
+use super::live_page::LivePage;
+use super::output::{message, print_json, print_text, print_warnings, say};
 use super::profile::Files;
 use super::progress::{self, RUN};
 use super::shell::command;
@@ -12,11 +13,13 @@ use hummingbus::COMPONENTS;
 use report::profile::Profile;
 use report::summary::Summary;
 use runtime::checkpoint::{Checkpoint, Written};
+use runtime::event::StopToken;
 use runtime::graph::{self, Graph, backup_of};
 use runtime::host::Host;
 use runtime::launcher::Launcher;
 use runtime::manifest::{Composition, Manifest, NO_RECORDING, PaceSetting};
 use runtime::outputs::Outputs;
+use runtime::run_dir::run_of_launcher;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -50,6 +53,12 @@ pub struct RunArguments {
     /// Step all nodes one after the other in this process: no shared memory, and a debugger sees them all.
     #[arg(long, conflicts_with_all = ["compose", "window"])]
     pub in_process: bool,
+    /// Show the run in the browser while it flies, at this port of 127.0.0.1 or at any free one.
+    #[arg(long, value_name = "PORT", num_args = 0..=1, require_equals = true, default_missing_value = "0")]
+    pub view: Option<u16>,
+    /// With --view: print the address, and open no browser.
+    #[arg(long, requires = "view")]
+    pub no_open: bool,
     /// Override a key of the manifest, such as run.seed=3.
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
@@ -134,6 +143,7 @@ pub fn run(
     let files = files.unwrap_or_else(|| Files::beside(&path));
     let pages = if graph.plan.profile { files.outputs() } else { Vec::new() };
     let mut outputs = Outputs::of(&manifest, &graph, &path, pages)?;
+    let page = arguments.view.map(|port| page(port, arguments.no_open, &graph)).transpose()?;
     let bar = progress::bar(RUN, arguments.json || arguments.quiet);
     let host = if arguments.in_process { Host::InProcess } else { Host::this_binary() };
     let launcher = Launcher::new(host)
@@ -180,7 +190,33 @@ pub fn run(
     } else if !(arguments.quiet && summary.passed) {
         print_text(&text)?;
     }
+    if let Some(page) = page {
+        stay(page, summary.recording.as_deref(), &stop)?;
+    }
     Ok(summary.passed)
+}
+
+/// Serves the page of the run of `graph`, which is about to start.
+fn page(port: u16, no_open: bool, graph: &Graph) -> Result<LivePage> {
+    if !graph.plan.nodes.iter().any(|node| node.is_recorder) {
+        bail!(
+            "--view shows a run by its recording, and this run records nothing: leave out --view, or let it record"
+        );
+    }
+    let mut page = LivePage::open(port, no_open)?;
+    page.follow(|| run_of_launcher(std::process::id()));
+    say(&format!("The run in the browser: {}", page.address()));
+    Ok(page)
+}
+
+/// Keeps the page of a run that has ended, for as long as somebody looks at it.
+fn stay(page: LivePage, recording: Option<&Path>, stop: &StopToken) -> Result<()> {
+    if stop.count() == 0 {
+        recording.map_or(Ok(()), |recording| page.show_whole(recording))?;
+        say("The page stays until it is closed. Ctrl-C ends it.");
+        page.stay(stop, true);
+    }
+    page.close()
 }
 
 /// What there is to say about a run that was refused or broke, with what is `left` of its recording; printed as JSON too

@@ -90,9 +90,9 @@ impl Fmus {
 }
 
 /// Topic of the controller's commands.
-const TOPIC: &str = "/controller/command";
+pub(crate) const TOPIC: &str = "/controller/command";
 
-fn fly(place: &Place, manifest: &str, name: &str) -> Ended {
+pub(crate) fn fly(place: &Place, manifest: &str, name: &str) -> Ended {
     place.call(&["run", manifest, "--record", &place.path(name)])
 }
 
@@ -133,13 +133,13 @@ fn one_of_fmi_3_flies_the_same_in_its_own_units() {
 }
 
 /// All commands of a recording, four by four.
-fn commands(place: &Place, name: &str, topic: &str) -> Vec<f64> {
+pub(crate) fn commands(place: &Place, name: &str, topic: &str) -> Vec<f64> {
     let columns = [0, 1, 2, 3].map(|index| column(place, name, topic, &format!("command[{index}]")));
     (0..columns[0].len()).flat_map(|row| columns.each_ref().map(|column| column[row])).collect()
 }
 
 /// The values of one field in a recording.
-fn column(place: &Place, name: &str, topic: &str, field: &str) -> Vec<f64> {
+pub(crate) fn column(place: &Place, name: &str, topic: &str, field: &str) -> Vec<f64> {
     let cat = ["cat", &place.path(name), "--topic", topic, "--csv"];
     let printed = place.call(&cat).with_code(0).output;
     let header = printed.lines().next().unwrap();
@@ -231,14 +231,14 @@ fn description() -> String {
 }
 
 /// The FMU of `native.c`.
-fn native(place: &Place) -> String {
+pub(crate) fn native(place: &Place) -> String {
     let folder = if cfg!(target_arch = "aarch64") { "aarch64-linux" } else { "x86_64-linux" };
     let path = format!("binaries/{folder}/native.so");
     archive(place, "native.fmu", &[("modelDescription.xml", description().as_bytes()), (&path, library())])
 }
 
 /// Mappings of a process that holds the FMU `native`, as the manifest below has them.
-const MAPPED: &str = "\
+pub(crate) const MAPPED: &str = "\
 inputs = { position = \"state.position\", seconds = \"state.stamp.sec\" }
 outputs = { passed = \"command.command\" }
 ";
@@ -508,129 +508,4 @@ fn the_reference_fmus_save_their_states_and_pass_their_inputs_through() {
                 && decayed.iter().zip(expected).all(|(x, expected)| (x - expected).abs() < 1e-12)
         );
     }
-}
-
-/// The table of `commands` for `step.py`.
-fn command_table(place: &Place, commands: &[f64]) -> String {
-    let mut text =
-        (0..4).map(|index| format!("controller.command.command[{index}]")).collect::<Vec<_>>().join(",")
-            + "\n";
-    for row in commands.chunks(4) {
-        text += &(row.iter().map(|command| format!("{command:?}")).collect::<Vec<_>>().join(",") + "\n");
-    }
-    place.write("commands.csv", text)
-}
-
-#[test]
-fn a_simulation_as_an_fmu_is_valid_and_its_trajectory_is_that_of_the_bus_bit_for_bit() {
-    let Some(readers) = std::env::var_os("HUMMINGBUS_READERS") else {
-        return crate::skipped::skip("HUMMINGBUS_READERS with FMPy is not set");
-    };
-    let place = Place::new();
-    let manifest = repository("manifests/hover.toml");
-    let short = ["--set", "run.duration_s=3"];
-    place.call(&[&["run", &manifest, "--record", &place.path("hover.mcap")], &short[..]].concat());
-    let table = command_table(&place, &commands(&place, "hover.mcap", TOPIC));
-    let fields = [
-        ("/plant/state", "position.x"),
-        ("/plant/state", "position.z"),
-        ("/plant/state", "rotor_speed[3]"),
-        ("/ekf/estimate", "velocity.y"),
-        ("/ekf/estimate", "attitude.w"),
-    ];
-    let names = fields.map(|(topic, field)| format!("{}.{field}", topic[1..].replace('/', ".")));
-    for version in ["2", "3"] {
-        let fmu = place.path(&format!("hover{version}.fmu"));
-        place
-            .call(&[&["export-fmu", &manifest, "--fmi", version, "--out", &fmu], &short[..]].concat())
-            .with_code(0);
-        let mut python = Command::new(Path::new(&readers).join("venv/bin/python3"));
-        python.args([&repository("tests/bindings/fmu/step.py"), &fmu, &table, "0.001"]).args(&names);
-        let stepped = crate::build::succeed(python);
-        let rows: Vec<Vec<f64>> = stepped
-            .lines()
-            .map(|line| line.split(',').map(|number| number.parse().unwrap()).collect())
-            .collect();
-        for (index, (topic, field)) in fields.iter().enumerate() {
-            let flown = column(&place, "hover.mcap", topic, field);
-            assert_eq!(flown.len(), 3000);
-            let differs =
-                flown.iter().zip(&rows).position(|(flown, row)| flown.to_bits() != row[index].to_bits());
-            assert_eq!((differs, rows.len()), (None, 3000), "{topic} {field} as FMI {version}");
-        }
-    }
-    // Two exports are the same bytes, also from another folder: nothing in it is of this machine.
-    for folder in ["manifests", "vehicles"] {
-        fs::create_dir(place.path(folder)).unwrap();
-    }
-    for file in ["manifests/hover.toml", "vehicles/hummingbird.toml"] {
-        fs::copy(repository(file), place.path(file)).unwrap();
-    }
-    let again = place.path("again.fmu");
-    let moved = place.path("manifests/hover.toml");
-    place.call(&[&["export-fmu", &moved, "--out", &again], &short[..]].concat()).with_code(0);
-    assert!(
-        fs::read(again).unwrap() == fs::read(place.path("hover2.fmu")).unwrap(),
-        "another export differs"
-    );
-}
-
-#[test]
-fn a_vehicle_as_an_fmu_joins_a_run_as_its_plant() {
-    let place = Place::new();
-    let fmu = place.path("hummingbird.fmu");
-    place.call(&["export-fmu", &repository("vehicles/hummingbird.toml"), "--out", &fmu]).with_code(0);
-    let commands: String =
-        (0..4).map(|rotor| format!("\"controller.command.command[{rotor}]\" = 77.5\n")).collect();
-    let text = format!(
-        "[run]\nrate_hz = 1000\nduration_s = 0.5\n[process.plant]\nkind = \"fmu\"\nfmu = {fmu:?}\n\
-         outputs.state = {{ type = \"hummingbus_msgs/msg/PlantState\" }}\n[process.plant.parameters.outputs]\n\
-         \"plant.state.position.z\" = \"state.position.z\"\n\"plant.state.velocity.z\" = \"state.velocity.z\"\n\
-         [process.plant.parameters.start]\nseed = 7\n{commands}[process.recorder]\nkind = \"recorder\"\n"
-    );
-    fly(&place, &place.write("plant.toml", text), "plant.mcap").with_code(0);
-    // Its inputs keep the commands that they begin with: 1 count above hover, with which it climbs.
-    let height = column(&place, "plant.mcap", "/plant/state", "position.z");
-    let climb = column(&place, "plant.mcap", "/plant/state", "velocity.z");
-    assert!(height.len() == 500 && (0.01..0.2).contains(&(height[499] - 1.0)), "{:?}", height.last());
-    assert!(climb.windows(2).all(|pair| pair[0] <= pair[1] + 1e-12), "it climbs ever faster");
-}
-
-#[test]
-fn an_export_that_cannot_be_is_refused_in_words() {
-    let place = Place::new();
-    let hover = repository("manifests/hover.toml");
-    let out = place.path("out.fmu");
-    let text = place.write("text.fmu", "not an FMU");
-    let custom = repository("manifests/fmu-controller.toml");
-    let computing = repository("manifests/computing-time.toml");
-    let cases: [(&[&str], &str); 11] = [
-        (&[&hover, "--without", "control"], "there is no process `control` to leave out; there are"),
-        (
-            &[&hover, "--without", "imu"],
-            "`imu` sends `imu` (hummingbus_msgs/msg/Imu), which an importer cannot",
-        ),
-        (&[&hover, "--without", "recorder"], "`recorder` sends nothing"),
-        (
-            &[&hover, "--without", "pilot", "--output", "/controller/command"],
-            "depends on what `pilot` sends in the same tick",
-        ),
-        (&[&hover, "--set", "run.seed=5000000000"], "is not one of 32 bits"),
-        (&[&computing, "--without", "t20/controller"], "has a `computing_time`"),
-        (&[&hover, "--output", "/no/topic"], "there is no topic /no/topic; there are"),
-        (&[&hover, "--fmi", "1"], "--fmi: expected 2 or 3, found 1"),
-        (&[&hover, "--out", &text], "text.fmu"),
-        (&[&custom, "--without", "pilot"], "needs a process of its own"),
-        (&["nowhere.toml"], "nowhere.toml"),
-    ];
-    for (arguments, words) in cases {
-        let out = if arguments.contains(&"--out") { &[][..] } else { &["--out", &out] };
-        let ended = place.call(&[&["export-fmu"], arguments, out].concat());
-        assert!(
-            ended.code == Some(2) && ended.error.contains(words),
-            "{arguments:?}: no {words:?} in\n{ended}"
-        );
-    }
-    assert!(!Path::new(&out).exists());
-    assert_eq!(fs::read_to_string(text).unwrap(), "not an FMU");
 }

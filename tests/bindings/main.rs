@@ -5,6 +5,7 @@
 //! - [`check`]: programs are asked for their ports
 //! - [`cpp`]: controllers in C++, and pilots in C
 //! - [`mod@fmu`]: controllers in FMUs
+//! - [`mod@fmu_export`]: simulations exported as FMUs
 //! - [`python`]: nodes, runs and recordings in Python
 //! - [`skipped`]: tests that cannot run here
 //! - [`headers`]: the headers are those of the messages
@@ -13,6 +14,7 @@ mod build;
 mod check;
 mod cpp;
 mod fmu;
+mod fmu_export;
 mod headers;
 mod python;
 #[path = "../runs/skipped.rs"]

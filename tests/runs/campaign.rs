@@ -7,12 +7,12 @@ use serde_json::Value;
 use std::fs;
 
 /// A campaign of short hovers of varied mass.
-const HOVERS: &str = "flights = 12\nset = [\"run.duration_s=0.4\"]\n\
+pub const HOVERS: &str = "flights = 12\nset = [\"run.duration_s=0.4\"]\n\
                       [[vary]]\nkey = \"process.plant.vehicle.body.mass\"\nas = \"factor\"\nuniform = [0.8, 1.2]\n\
                       [[measure]]\nname = \"height\"\ntopic = \"/plant/state\"\nfield = \"position.z\"\nunit = \"m\"\nstatistic = \"last\"\n";
 
 /// Writes a campaign of the shipped hover without its conditions, which a short flight misses.
-fn written(place: &Place, name: &str, text: &str) -> String {
+pub fn written(place: &Place, name: &str, text: &str) -> String {
     let hover = fs::read_to_string(repository("manifests/hover.toml")).unwrap();
     let (head, _) = hover.split_once("[[pass]]").unwrap();
     let vehicles = repository("vehicles");

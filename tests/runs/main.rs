@@ -26,9 +26,11 @@
 //! - [`outputs`]: what runs and other commands write, where something is there already
 //! - [`profile`]: where the host time of a run's ticks goes
 //! - [`laps`], [`plot`]: recordings that are written, and pictures of them
+//! - [`slurm`]: campaigns on a Slurm cluster
 //! - [`urdf`]: bodies of vehicles for other tools
 //! - [`new`]: vehicle files from models of other tools
 //! - [`rights`]: rights that a run lacks are named
+//! - [`autopilots`]: firmware in lockstep
 //! - [`skipped`]: tests that cannot run here
 //! - [`sensors`]: sensors read what they should, and hand over what is under way
 //! - [`surroundings`]: hosts that lack something
@@ -39,10 +41,13 @@
 //! - [`scenes`]: ground, walls, rigs and other vehicles
 //! - [`judging`]: runs without a recording are judged in flight
 //! - [`view`]: recordings in the browser: address, end, refusals
+//! - [`by_hand`]: set points of a person: sent, recorded, sent again
 //! - [`inputs`]: files that are edited after they were read
 
 mod as_printed;
+mod autopilots;
 mod backups;
+mod by_hand;
 mod campaign;
 mod checkpoints;
 mod clean;
@@ -84,6 +89,7 @@ mod scenarios;
 mod scenes;
 mod sensors;
 mod skipped;
+mod slurm;
 #[allow(dead_code, reason = "shared with tests/faults")]
 mod support;
 mod surroundings;

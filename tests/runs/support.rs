@@ -307,6 +307,11 @@ impl Launch<'_> {
         fs::read_to_string(&self.output).unwrap_or_default()
     }
 
+    /// Standard error so far.
+    pub fn errors(&self) -> String {
+        fs::read_to_string(&self.error).unwrap_or_default()
+    }
+
     /// Whether it has ended.
     pub fn has_ended(&mut self) -> bool {
         self.status = self.status.or_else(|| self.child.try_wait().unwrap());

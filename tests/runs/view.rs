@@ -1,8 +1,10 @@
 //! The command `view`: its address, its end, and what it refuses.
 
+use crate::recordings::require_same;
 use crate::support::{Launch, Place, poll, repository};
 use rustix::process::Signal;
-use std::io::{Read as _, Write as _};
+use serde_json::{Value, json};
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{TcpListener, TcpStream};
 
 /// A short recording of the hover.
@@ -107,14 +109,16 @@ fn a_live_run_is_shown_as_far_as_it_is_recorded() {
     let launch = place.start(&["view", "--run", &place.run_id(), "--no-open"]);
     let address = address(&launch);
     let (host, path) = address.split_at(address.find('/').unwrap());
-    let duration = || {
+    let duration = || -> Option<u64> {
         let (_, body) = answer(host, &format!("{path}api/growth"));
-        let told: serde_json::Value = serde_json::from_str(&body).unwrap();
-        assert_eq!(told[0]["is_growing"], true, "{told}");
-        told[0]["duration_ns"].as_u64().unwrap()
+        let told: Value = serde_json::from_str(&body).unwrap();
+        // Until the first second is recorded there is none.
+        let growing = told.get(0)?;
+        assert_eq!(growing["is_growing"], true, "{told}");
+        growing["duration_ns"].as_u64()
     };
-    let first = duration();
-    poll("the recording does not grow", || (duration() > first).then_some(()));
+    let first = poll("there is no recording", duration);
+    poll("the recording does not grow", || duration().filter(|now| *now > first));
     launch.signal(Signal::TERM);
     launch.end_among_others().with_code(0);
     run.signal(Signal::TERM);
@@ -125,4 +129,141 @@ fn a_live_run_is_shown_as_far_as_it_is_recorded() {
 fn a_run_that_is_not_alive_is_refused_in_words() {
     let place = Place::new();
     place.call(&["view", "--run", "0-0"]).with_code(2).says(&["alive"]);
+}
+
+/// A page as the server sees it: a stream of events, and requests beside it. Dropping it closes it.
+pub struct Page {
+    pub host: String,
+    pub path: String,
+    events: BufReader<TcpStream>,
+}
+
+impl Page {
+    /// The page of a run that was started with `--view`.
+    pub fn of(launch: &Launch<'_>) -> Self {
+        let address = poll("no address", || {
+            let said = launch.errors();
+            let line = said.lines().find_map(|line| line.strip_prefix("The run in the browser: http://"))?;
+            Some(line.to_owned())
+        });
+        let (host, path) = address.split_at(address.find('/').unwrap());
+        let mut stream = TcpStream::connect(host).unwrap();
+        write!(stream, "GET {path}api/events HTTP/1.1\r\nHost: {host}\r\n\r\n").unwrap();
+        Self { host: host.to_owned(), path: path.to_owned(), events: BufReader::new(stream) }
+    }
+
+    /// The next event for which `is_meant`.
+    pub fn await_event(&mut self, is_meant: impl Fn(&Value) -> bool) -> Value {
+        poll("no such event", || {
+            let mut line = String::new();
+            assert!(self.events.read_line(&mut line).unwrap() > 0, "the stream has ended");
+            let event = serde_json::from_str(line.strip_prefix("data: ")?).unwrap();
+            is_meant(&event).then_some(event)
+        })
+    }
+
+    /// Head and body of the answer to `request`.
+    pub fn post(&self, name: &str, request: &Value) -> (String, String) {
+        let Self { host, path, .. } = self;
+        let (body, mut stream) = (request.to_string(), TcpStream::connect(host).unwrap());
+        write!(
+            stream,
+            "POST {path}api/{name} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\nContent-Type: application/json\r\n\
+             Content-Length: {}\r\n\r\n{body}",
+            body.len()
+        )
+        .unwrap();
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer).unwrap();
+        answer.split_once("\r\n\r\n").map(|(head, body)| (head.to_owned(), body.to_owned())).unwrap()
+    }
+
+    fn ask(&self, request: &Value) -> Value {
+        let (head, body) = self.post("ctl", request);
+        assert!(head.starts_with("HTTP/1.1 200"), "{head} {body}");
+        serde_json::from_str(&body).unwrap()
+    }
+
+    /// Asks for what the run does, and returns the tick after it.
+    pub fn done(&self, request: &Value) -> u64 {
+        let answer = self.ask(request);
+        assert_eq!(answer["answer"], "done", "{request}: {answer}");
+        answer["tick"].as_u64().unwrap()
+    }
+}
+
+/// Arguments of a run of the hover at real time that is watched, and whose page no browser opens.
+fn watched<'a>(manifest: &'a str, recording: &'a str, duration: &'a str) -> Vec<&'a str> {
+    let pace = ["--pace", "realtime", "--set", duration, "--view", "--no-open"];
+    [&["run", manifest, "--record", recording][..], &pace].concat()
+}
+
+#[test]
+fn a_run_that_is_watched_and_steered_writes_the_same_bytes_and_ends_with_its_page() {
+    let place = Place::new();
+    let manifest = repository("manifests/hover.toml");
+    let (recording, alone) = (place.path("watched.mcap"), place.path("alone.mcap"));
+    let run = place.start(&watched(&manifest, &recording, "run.duration_s=30"));
+    let mut page = Page::of(&run);
+    let event = page.await_event(|event| event["run"]["tick"].as_u64() > Some(100));
+    assert_eq!((&event["run"]["pace"], &event["run"]["end_tick"]), (&json!("realtime"), &json!(30_000)));
+    let held = page.done(&json!({ "request": "pause" }));
+    assert_eq!(page.done(&json!({ "request": "step", "ticks": 7 })), held + 7);
+    assert_eq!(page.await_event(|event| event["run"]["state"] == "paused")["run"]["tick"], held + 7);
+    let refused = page.ask(&json!({ "request": "step", "ticks": 100_000 }));
+    assert!(refused["reason"].as_str().unwrap().contains("only"), "{refused}");
+    let refused = page.ask(&json!({ "request": "checkpoint", "path": place.path("no.ckpt") }));
+    assert!(refused["reason"].as_str().unwrap().contains("hummingbus ctl checkpoint"), "{refused}");
+    page.done(&json!({ "request": "pace", "pace": "free" }));
+    page.done(&json!({ "request": "resume" }));
+    // The run has ended, and its page is still there.
+    run.await_said("The page stays until it is closed");
+    page.await_event(|event| event["run"]["state"] == "ended" && event["recordings"] == 1);
+    assert_eq!(status(&page.host, &page.path), "HTTP/1.1 200 OK");
+    drop(page);
+    let ended = run.end().with_code(0);
+    assert!(ended.output.contains("view"), "the summary is printed: {ended}");
+    place.call(&["run", &manifest, "--record", &alone, "--set", "run.duration_s=30"]).with_code(0);
+    require_same(&std::fs::read(alone).unwrap(), &recording);
+}
+
+#[test]
+fn a_watched_run_ends_when_told_whether_it_flies_or_not() {
+    let place = Place::new();
+    let (manifest, recording) = (repository("manifests/hover.toml"), place.path("told.mcap"));
+    let mut run = place.start(&watched(&manifest, &recording, "run.duration_s=4000"));
+    run.await_ticks(10);
+    let _page = Page::of(&run);
+    run.signal(Signal::INT);
+    let ended = run.end().with_code(1);
+    assert!(!ended.error.contains("The page stays"), "{ended}");
+    // Over before anybody looks: the page waits for somebody.
+    let args = [
+        "run",
+        &manifest,
+        "--record",
+        &recording,
+        "--set",
+        "run.duration_s=0.1",
+        "--view",
+        "--no-open",
+        "--json",
+    ];
+    for host in [&[][..], &["--in-process"]] {
+        let run = place.start(&[&args[..], host].concat());
+        run.await_said("The page stays until it is closed");
+        let mut page = Page::of(&run);
+        page.await_event(|event| event["recordings"] == 1);
+        run.signal(Signal::TERM);
+        let summary = run.end().with_code(1).json();
+        assert_eq!(summary["ticks"], 100, "{summary}");
+    }
+}
+
+#[test]
+fn a_run_without_a_recording_cannot_be_watched() {
+    let place = Place::new();
+    let manifest = repository("manifests/hover.toml");
+    let ended = place.call(&["run", &manifest, "--record", "none", "--view", "--no-open"]).with_code(2);
+    ended.says(&["--view", "records nothing"]);
 }

@@ -1,7 +1,7 @@
 //! What guidance asks for beyond the pilot's set point, and what controllers say of themselves.
 
 use super::{Time, Vector3};
-use crate::Message;
+use crate::{Bounded, Message};
 
 /// A point of a trajectory.
 #[derive(Clone, Copy, Debug, Default, Message)]
@@ -31,6 +31,28 @@ pub struct Reference {
     /// Its rate of change.
     #[field(unit = "rad/s", frame = "world")]
     pub yaw_rate: f64,
+}
+
+/// The most channels of a remote control.
+pub const RC_CHANNELS_MAX: usize = 16;
+
+/// The channels of a remote control, as its receiver reports them.
+///
+/// ```
+/// use bus::messages::RcChannels;
+///
+/// let centred = RcChannels { pulse: [1500.0, 1500.0, 1000.0, 1500.0].into(), ..RcChannels::default() };
+/// assert_eq!(centred.pulse.len(), 4);
+/// ```
+#[derive(Clone, Copy, Debug, Default, Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/RcChannels")]
+pub struct RcChannels {
+    /// Simulation time.
+    pub stamp: Time,
+    /// Pulses, 1000 to 2000: roll, pitch, throttle and yaw, then the switches.
+    #[field(unit = "us")]
+    pub pulse: Bounded<f64, RC_CHANNELS_MAX>,
 }
 
 /// What a controller did at a tick: what it asked for, what the rotors could give, what state it is in.

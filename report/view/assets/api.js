@@ -1,6 +1,6 @@
 // Questions to the server. Addresses are relative: that of the page holds the token.
 
-const GONE = "The server does not answer: hummingbus view has ended. Start it again, and open its new address.";
+export const GONE = "The server does not answer: hummingbus view has ended. Start it again, and open its new address.";
 
 /** The answer of the server; an error with words for people without one. */
 async function answered(path, options) {
@@ -37,4 +37,21 @@ export async function frames(request, signal) {
 /** Two values for each of `bins` intervals between two times, field after field; and the part of the recording read for it. */
 export function curves(request, signal) {
   return numbers("api/curves", request, signal);
+}
+
+/** Lasting facts about the live run. */
+export async function described() {
+  return (await answered("api/run")).json();
+}
+
+/** The live run's answer to a request of `hummingbus ctl`. */
+export async function ask(request) {
+  const headers = { "content-type": "application/json" };
+  return (await answered("api/ctl", { method: "POST", headers, body: JSON.stringify(request) })).json();
+}
+
+/** Hands set points to a node of the live run. */
+export async function fly(request) {
+  const headers = { "content-type": "application/json" };
+  await answered("api/fly", { method: "POST", headers, body: JSON.stringify(request) });
 }

@@ -54,9 +54,9 @@ export class TimeControls {
     };
     document.addEventListener("keydown", (event) => {
       const { target } = event;
-      // These do something of their own with keys. A button does with the space bar alone, the slider with all but it.
-      const isTyping = target.closest("select, dialog, summary, input:not([type=range])");
-      const isOwn = event.key === " " ? target.closest("button") : target === this.slider;
+      // These do something of their own with keys. A button does with the space bar alone, a slider with all but it.
+      const isTyping = target.closest("select, dialog[open], summary, input:not([type=range])");
+      const isOwn = event.key === " " ? target.closest("button") : target.closest("input[type=range]");
       if (isTyping || isOwn || event.ctrlKey || event.altKey || event.metaKey || !keys[event.key]) return;
       event.preventDefault();
       keys[event.key](event);

@@ -4,13 +4,16 @@ import { catalogue, growth } from "./api.js";
 import { cameraControls, TimeControls } from "./controls.js";
 import { Columns, Feed } from "./feed.js";
 import { Picker } from "./picker.js";
-import { Playback } from "./playback.js";
+import { PACES, Playback } from "./playback.js";
 import { Room } from "./room.js";
+import { hear, RunControls } from "./run.js";
 import { defaultPlots, Scopes } from "./scopes.js";
 
 // Pause between two questions for the growth of a recording that is being written.
 const GROWTH_MS = 500;
 const GROWING = "The recording is not finished: End goes to its newest second.";
+const HELD = "The run is paused: the room shows its last recorded second.";
+const AWAITED = "Nothing is recorded yet: the recorder writes each second of simulated time.";
 const state = document.getElementById("state");
 // Kept for people at the console and for tests.
 const shown = { timeNs: null, vehicles: [], frames: 0, isFlat: false, scopesDrawn: false };
@@ -64,11 +67,12 @@ function legend(room) {
   };
 }
 
-function head(recordings) {
+function head(recordings, isLive) {
   const names = recordings.map(({ name }) => name).join(" against ");
   document.getElementById("title").textContent = names;
   document.title = `${names} · hummingbus view`;
-  const notes = recordings.flatMap((recording) => recording.notes);
+  // That a live run is not finished needs no words.
+  const notes = recordings.flatMap(({ cut, notes }) => (cut && !isLive ? [cut, ...notes] : notes));
   const list = document.getElementById("notes");
   list.hidden = notes.length === 0;
   list.replaceChildren(...notes.map((note) => Object.assign(document.createElement("li"), { textContent: note })));
@@ -102,9 +106,34 @@ async function newsOf(recordings) {
   return { news, isNew };
 }
 
+/** The recordings, once there is one: a live run has none before its first second. */
+async function awaited(report) {
+  for (;;) {
+    const { recordings, refusal } = await catalogue();
+    report(recordings.length ? "" : refusal ?? AWAITED);
+    if (recordings.length) return recordings;
+    await new Promise((resolve) => setTimeout(resolve, GROWTH_MS));
+  }
+}
+
+/** Hears of the live run from now on; waits for the first news. */
+function hearOf(run) {
+  const [reportServer, reportHeld] = [reporter("server"), reporter("held")];
+  return new Promise((isHeard) => {
+    hear((told) => {
+      run.take(told.run);
+      reportHeld(run.status?.state === "paused" ? HELD : "");
+      isHeard();
+    }, reportServer);
+  });
+}
+
 async function start() {
-  const { recordings } = await catalogue();
-  head(recordings);
+  const run = new RunControls();
+  window.hummingbus.run = run;
+  if ((await catalogue()).is_live) await hearOf(run);
+  const recordings = await awaited(reporter("start"));
+  head(recordings, run.status !== null);
   const durationNs = Math.max(...recordings.map((recording) => recording.duration_ns));
   const playback = new Playback(durationNs, recordings[0].tick_ns ?? 1e6);
   const columns = recordings.map((recording) => new Columns(recording));
@@ -153,7 +182,7 @@ async function start() {
     label(room, recordings);
     places = legend(room);
     camera.learn();
-    head(recordings);
+    head(recordings, run.status !== null);
     isStale = true;
   };
   follow(recordings, reporter("growth"), (isNew) => {
@@ -163,6 +192,10 @@ async function start() {
     feeds.forEach((feed, number) => feed.grow(recordings[number].duration_ns));
     scopes.grow();
     room.grow();
+  });
+  run.onPace((pace) => {
+    const factor = pace === "realtime" ? 1 : Number(pace);
+    if (PACES.includes(factor)) playback.setPace(factor);
   });
   let last = performance.now();
   const frame = (now) => {

@@ -34,6 +34,8 @@ assets! {
     "scopes.js": SCRIPT,
     "picker.js": SCRIPT,
     "controls.js": SCRIPT,
+    "run.js": SCRIPT,
+    "hand.js": SCRIPT,
     "palette.js": SCRIPT,
     "view.css": STYLE,
     "vendor/three.min.js": SCRIPT,

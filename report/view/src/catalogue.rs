@@ -62,6 +62,7 @@ pub fn catalogue(shown: &Shown, fields: &BTreeMap<String, Vec<Field>>, lasting: 
         "tick_ns": tick_ns,
         "blocks": shown.block_count(),
         "is_growing": shown.is_growing(),
+        "cut": cut(shown),
         "notes": notes(shown, vehicles.is_empty()),
         "topics": topics(shown, fields),
         "vehicles": vehicles,
@@ -91,15 +92,17 @@ fn bodies(shown: &Shown, fields: &BTreeMap<String, Vec<Field>>, lasting: &Lastin
 }
 
 /// Texts that people should read before they look.
+/// Text about a recording that its writer has not finished.
+fn cut(shown: &Shown) -> Option<String> {
+    let cut = shown.recording().cut()?;
+    let end = cut.last_tick.map_or("no message is whole".to_owned(), |tick| {
+        format!("the last whole tick was {tick} when it was opened")
+    });
+    Some(format!("{} is not finished: its recorder is at work, or was killed; {end}.", shown.name()))
+}
+
 fn notes(shown: &Shown, has_no_vehicle: bool) -> Vec<String> {
     let mut notes = Vec::new();
-    if let Some(cut) = shown.recording().cut() {
-        let end = cut.last_tick.map_or("no message is whole".to_owned(), |tick| {
-            format!("the last whole tick was {tick} when it was opened")
-        });
-        let name = shown.name();
-        notes.push(format!("{name} is not finished: its recorder is at work, or was killed; {end}."));
-    }
     if has_no_vehicle {
         notes.push(format!(
             "{} has no state of a vehicle: no topic of type PlantState, MeasuredState or StateEstimate. The room shows \

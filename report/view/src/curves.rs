@@ -13,6 +13,8 @@ use serde::Deserialize;
 const BINS_MAX: usize = 8192;
 /// Windows over more blocks are answered by the overview: a minute of a recording of ours, which has a block a second.
 const BLOCKS_MAX: usize = 64;
+/// The same while the recording grows: pages ask for the whole time at each growth.
+const GROWING_BLOCKS_MAX: usize = 8;
 
 /// A request of curves.
 #[derive(Clone, Debug, Deserialize)]
@@ -55,7 +57,8 @@ pub fn curves(shown: &Shown, overview: &Overview, request: &CurvesRequest) -> Re
     let mut columns = Columns::new(shown, &request.fields)?;
     let mut bins = Bins::new(request);
     let blocks = shown.blocks(from_ns, to_ns - 1);
-    if blocks.len() <= BLOCKS_MAX {
+    let blocks_max = if shown.is_growing() { GROWING_BLOCKS_MAX } else { BLOCKS_MAX };
+    if blocks.len() <= blocks_max {
         columns.read(shown, blocks, &mut |sample: Sample<'_>| {
             sample.values.iter().for_each(|(curve, value)| bins.add(*curve, sample.time_ns, *value));
         })?;

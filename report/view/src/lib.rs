@@ -12,6 +12,8 @@
 //! | `entry` | a recording of the server, which keeps up with its growth |
 //! | `readers` | threads that read recordings, a few at the same time |
 //! | `assets` | the files of the page, part of this program |
+//! | [`live`] | the live run behind a page: its state, and what the page asks of it |
+//! | `pages` | the pages that are open, and the events that they hear |
 //! | `gate` | requests that are let in |
 //! | [`server`] | the server: addresses and their answers |
 //! | [`browser`] | the user's browser |
@@ -27,8 +29,10 @@ mod entry;
 pub mod fields;
 pub mod frames;
 mod gate;
+pub mod live;
 mod marks;
 pub mod overview;
+mod pages;
 mod readers;
 pub mod server;
 pub mod shown;
@@ -36,5 +40,5 @@ pub mod shown;
 mod tests;
 mod vehicles;
 
-pub use server::Server;
+pub use server::{Handle, Server};
 pub use shown::Shown;

@@ -8,6 +8,10 @@
 //! | `GET  /token=…/api/growth` | JSON: of each recording its duration, blocks and number of topics, if it still grows, and the error that ended reading |
 //! | `POST /token=…/api/frames` | numbers: [`crate::frames`] |
 //! | `POST /token=…/api/curves` | numbers: [`crate::curves`]; the header `x-read` holds the part that was read for them |
+//! | `GET  /token=…/api/events` | events: state of the live run, number of recordings; open for as long as the page of a live run is |
+//! | `GET  /token=…/api/run` | JSON: manifest and processes of the live run; null without one |
+//! | `POST /token=…/api/fly` | nothing: takes set points of a person for a node of kind `operator` |
+//! | `POST /token=…/api/ctl` | JSON: the run's answer to a request of [`runtime::ctl::protocol`] |
 //!
 //! Numbers are 64-bit floats, little-endian, one after the other. It listens on the loopback alone, and answers requests
 //! that name it and know its token; all others get 403.
@@ -17,25 +21,34 @@ use crate::curves::{CurvesRequest, curves};
 use crate::entry::Entry;
 use crate::frames::{FramesRequest, frames};
 use crate::gate::Gate;
+use crate::live::{Asking, Live};
+use crate::pages::{Pages, events};
 use crate::readers::Readers;
 use crate::shown::Shown;
 use anyhow::{Context as _, Result, anyhow};
 use axum::extract::{DefaultBodyLimit, Path, Request, State};
 use axum::http::{HeaderName, HeaderValue, StatusCode, header};
 use axum::middleware::{Next, from_fn_with_state};
-use axum::response::{IntoResponse, Response};
+use axum::response::{IntoResponse, Response, Sse};
 use axum::routing::{get, post};
 use axum::{Json, Router};
+use bus::plan::Plan;
+use runtime::ctl::protocol::{Answer, Request as Asked};
+use runtime::run_dir::LiveRun;
 use serde_json::{Value, json};
 use std::net::{Ipv4Addr, TcpListener};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 /// Bytes of a request: fields by their names.
 const BODY_BYTES_MAX: usize = 1 << 20;
 /// Requests that read recordings at the same time.
 const READERS: usize = 4;
+/// Requests to the live run that wait for their answers at the same time.
+const ASKERS: usize = 8;
+/// Niceness of the threads that read recordings.
+const LOWEST: i32 = 19;
 /// Pause between two looks for the end.
 const LOOK: Duration = Duration::from_millis(50);
 /// Looks for the end between two looks for what a recording has grown by: half a second.
@@ -64,12 +77,80 @@ pub struct Server {
     content: Arc<Content>,
 }
 
-/// Recordings, and the gate in front of them.
+/// Recordings and live run, and the gate in front of them.
 #[derive(Debug)]
 struct Content {
     gate: Gate,
-    recordings: Vec<Entry>,
+    /// True for the page of a live run, which hears of it for as long as it is open.
+    is_live: bool,
+    /// Absent until the live run has recorded something.
+    recordings: OnceLock<Vec<Entry>>,
+    /// Absent for recordings that are shown by their names.
+    live: OnceLock<Live>,
+    /// Reason why there is no recording, and none will come.
+    refusal: OnceLock<String>,
+    pages: Pages,
     readers: Readers,
+    askers: Readers,
+}
+
+impl Content {
+    fn recordings(&self) -> &[Entry] {
+        self.recordings.get().map_or(&[], |recordings| recordings)
+    }
+}
+
+impl AsRef<Pages> for Content {
+    fn as_ref(&self) -> &Pages {
+        &self.pages
+    }
+}
+
+/// The way to a server at work: it takes what it is to show.
+#[derive(Clone, Debug)]
+pub struct Handle(Arc<Content>);
+
+impl Handle {
+    /// Shows these recordings from now on, unless it shows some already.
+    ///
+    /// # Errors
+    /// If a recording is damaged.
+    pub fn show(&self, recordings: Vec<Shown>) -> Result<()> {
+        if self.0.recordings.get().is_none() {
+            let entries = recordings.into_iter().map(Entry::of).collect::<Result<_>>()?;
+            // Another thread may have been faster with the same.
+            let _ = self.0.recordings.set(entries);
+        }
+        Ok(())
+    }
+
+    /// True once it shows recordings.
+    #[must_use]
+    pub fn has_recordings(&self) -> bool {
+        self.0.recordings.get().is_some()
+    }
+
+    /// Shows the state of `run`, which flies `plan`, and lets pages steer it.
+    pub fn steer(&self, run: LiveRun, plan: Plan) {
+        let _ = self.0.live.set(Live::of(run, plan));
+    }
+
+    /// Looks at the live run, so that its state is known to the end, also to a page that is opened behind it. A run that has
+    /// ended cannot be looked at for the first time.
+    pub fn look(&self) {
+        let _ = self.0.live.get().map(Live::status);
+    }
+
+    /// Tells pages why there is nothing to show.
+    pub fn refuse(&self, reason: String) {
+        let _ = self.0.refusal.set(reason);
+    }
+
+    /// Number of pages that are open, and of those that were ever opened.
+    #[must_use]
+    pub fn pages(&self) -> [usize; 2] {
+        [self.0.pages.open(), self.0.pages.seen()]
+    }
 }
 
 impl Server {
@@ -78,15 +159,43 @@ impl Server {
     /// # Errors
     /// If a recording is damaged or the port is taken.
     pub fn new(recordings: Vec<Shown>, port: u16) -> Result<Self> {
-        let recordings = recordings.into_iter().map(Entry::of).collect::<Result<_>>()?;
+        let server = Self::listening(port, false)?;
+        server.handle().show(recordings)?;
+        Ok(server)
+    }
+
+    /// A server of a live run, which comes later through its [`Handle`], as does its recording.
+    ///
+    /// # Errors
+    /// If the port is taken.
+    pub fn awaiting(port: u16) -> Result<Self> {
+        Self::listening(port, true)
+    }
+
+    fn listening(port: u16, is_live: bool) -> Result<Self> {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).with_context(|| {
             format!("cannot listen at port {port} of 127.0.0.1: name another one with --port, or leave it out for any free one")
         })?;
         listener.set_nonblocking(true)?;
         let gate =
             Gate::new(listener.local_addr()?.port()).map_err(|error| anyhow!("no random token: {error}"))?;
-        let content = Content { gate, recordings, readers: Readers::new(READERS) };
+        let content = Content {
+            gate,
+            is_live,
+            recordings: OnceLock::new(),
+            live: OnceLock::new(),
+            refusal: OnceLock::new(),
+            pages: Pages::default(),
+            readers: Readers::new(READERS),
+            askers: Readers::new(ASKERS),
+        };
         Ok(Self { listener, content: Arc::new(content) })
+    }
+
+    /// The way to this server while it serves.
+    #[must_use]
+    pub fn handle(&self) -> Handle {
+        Handle(self.content.clone())
     }
 
     /// The address of the page, with its token.
@@ -100,7 +209,8 @@ impl Server {
     /// # Errors
     /// If the system refuses threads.
     pub fn serve(self, is_ended: &dyn Fn() -> bool) -> Result<()> {
-        let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_io().build()?;
+        let mut builder = tokio::runtime::Builder::new_multi_thread();
+        let runtime = builder.worker_threads(2).enable_all().on_thread_start(step_back).build()?;
         let listener = {
             let _entered = runtime.enter();
             tokio::net::TcpListener::from_std(self.listener)?
@@ -123,8 +233,13 @@ impl Server {
 /// Reads the overviews, and goes on while recordings grow. Damage ends the overview: long windows of it are refused with
 /// the place of the damage.
 fn keep_up(content: &Content, is_over: &AtomicBool) {
-    // Each has its turn, whether or not one before it grows.
-    while content.recordings.iter().filter(|entry| entry.keep_up(is_over)).count() > 0 {
+    step_back();
+    let goes_on = || match content.recordings.get() {
+        // Each has its turn, whether or not one before it grows.
+        Some(recordings) => recordings.iter().filter(|entry| entry.keep_up(is_over)).count() > 0,
+        None => true,
+    };
+    while goes_on() {
         for _ in 0..GROWTH_LOOKS {
             if is_over.load(Ordering::Relaxed) {
                 return;
@@ -132,6 +247,12 @@ fn keep_up(content: &Content, is_over: &AtomicBool) {
             std::thread::sleep(LOOK);
         }
     }
+}
+
+/// Gives this thread, and no other, the lowest priority: where cores are short, a run that is watched has them first.
+fn step_back() {
+    // Nobody is refused a lower priority; without it, watching costs more.
+    let _ = rustix::process::setpriority_process(None, LOWEST);
 }
 
 fn routes(content: Arc<Content>) -> Router {
@@ -142,6 +263,10 @@ fn routes(content: Arc<Content>) -> Router {
         .route("/{token}/api/growth", get(growth))
         .route("/{token}/api/frames", post(answer_frames))
         .route("/{token}/api/curves", post(answer_curves))
+        .route("/{token}/api/events", get(hear))
+        .route("/{token}/api/run", get(described))
+        .route("/{token}/api/fly", post(fly))
+        .route("/{token}/api/ctl", post(steer))
         .layer(DefaultBodyLimit::max(BODY_BYTES_MAX))
         .layer(from_fn_with_state(content.clone(), guard))
         .with_state(content)
@@ -168,12 +293,48 @@ async fn file(Path((_, name)): Path<(String, String)>) -> Response {
 }
 
 async fn catalogues(State(content): State<Arc<Content>>) -> Json<Value> {
-    let catalogues = content.recordings.iter().map(|entry| entry.known().catalogue.clone());
-    Json(json!({ "recordings": catalogues.collect::<Vec<_>>() }))
+    let catalogues = content.recordings().iter().map(|entry| entry.known().catalogue.clone());
+    Json(json!({
+        "recordings": catalogues.collect::<Vec<_>>(),
+        "refusal": content.refusal.get(),
+        "is_live": content.is_live,
+    }))
 }
 
 async fn growth(State(content): State<Arc<Content>>) -> Json<Value> {
-    Json(content.recordings.iter().map(Entry::growth).collect())
+    Json(content.recordings().iter().map(Entry::growth).collect())
+}
+
+async fn hear(State(content): State<Arc<Content>>) -> Response {
+    Sse::new(events(content, |content: &Content| (content.live.get(), content.recordings().len())))
+        .into_response()
+}
+
+async fn described(State(content): State<Arc<Content>>) -> Json<Value> {
+    Json(content.live.get().map_or(Value::Null, Live::described))
+}
+
+/// A write of a few bytes to a file in memory or its cache: no thread of its own.
+async fn fly(State(content): State<Arc<Content>>, Json(asking): Json<Asking>) -> Response {
+    let live = content.live.get().context("this page shows no live run");
+    match live.and_then(|live| live.fly(&asking)) {
+        Ok(()) => StatusCode::NO_CONTENT.into_response(),
+        Err(error) => (StatusCode::CONFLICT, format!("{error:#}\n")).into_response(),
+    }
+}
+
+async fn steer(State(content): State<Arc<Content>>, Json(request): Json<Asked>) -> Response {
+    let asking = content.clone();
+    let work = move || match asking.live.get() {
+        Some(live) => live.ask(&request),
+        None => Answer::refused("this page shows no live run"),
+    };
+    match content.askers.run(work).await {
+        Ok(answer) => Json(answer).into_response(),
+        Err(_) => {
+            (StatusCode::INTERNAL_SERVER_ERROR, "asking ended by an error of the program\n").into_response()
+        }
+    }
 }
 
 async fn answer_frames(State(content): State<Arc<Content>>, Json(request): Json<FramesRequest>) -> Response {
@@ -196,8 +357,9 @@ async fn reading(
 ) -> Response {
     let reader = content.clone();
     let work = move || {
-        let entry = reader.recordings.get(recording).with_context(|| {
-            format!("there is no recording {recording}, expected 0 to {}", reader.recordings.len() - 1)
+        let entry = reader.recordings().get(recording).with_context(|| match reader.recordings().len() {
+            0 => "no tick is recorded yet".to_owned(),
+            count => format!("there is no recording {recording}, expected 0 to {}", count - 1),
         })?;
         read(entry)
     };

@@ -52,10 +52,11 @@ impl Shown {
         &self.recording
     }
 
-    /// The file's name.
+    /// The file's name; that which it will have, while its run flies.
     #[must_use]
     pub fn name(&self) -> String {
-        self.recording.path().file_name().unwrap_or_default().to_string_lossy().into_owned()
+        let name = self.recording.path().file_name().unwrap_or_default().to_string_lossy();
+        name.strip_suffix(".partial.mcap").map_or(name.clone().into_owned(), |stem| format!("{stem}.mcap"))
     }
 
     /// Time from the first message to the last, in ns.

@@ -215,7 +215,10 @@ impl Running {
     }
 
     fn of(shown: Shown) -> Self {
-        let server = Server::new(vec![shown], 0).unwrap();
+        Self::serving(Server::new(vec![shown], 0).unwrap())
+    }
+
+    fn serving(server: Server) -> Self {
         let (address, is_over) = (server.address(), Arc::new(AtomicBool::new(false)));
         let seen = is_over.clone();
         let serve = move || server.serve(&|| seen.load(Ordering::Relaxed)).unwrap();
@@ -331,7 +334,7 @@ fn the_catalogue_lists_fields_units_and_what_is_missing() {
         state["fields"].as_array().unwrap().contains(&json!({ "path": path, "unit": unit }))
     };
     assert!(has("position.z", "m") && has("attitude.yaw", "rad"), "{state}");
-    assert!(listed["notes"][0].as_str().unwrap().contains("the last whole tick was 4999"), "{listed}");
+    assert!(listed["cut"].as_str().unwrap().contains("the last whole tick was 4999"), "{listed}");
 }
 
 #[test]

@@ -249,7 +249,7 @@ mod tests {
     }
 
     /// Runs `test` with a server in a folder; one at a time, since a test counts the threads of this process.
-    fn with_server(test: impl FnOnce(Server, &Path)) {
+    fn with_server(test: impl FnOnce(Server<'_>, &Path)) {
         static ALONE: Mutex<()> = Mutex::new(());
         let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
         let folder = tempfile::tempdir().unwrap();

@@ -108,13 +108,15 @@ fn require_no_sidecar(
 }
 
 /// The keys of a process that name a file which becomes a parameter.
-pub fn files(process: &Process) -> [(&'static str, &Option<Spanned<String>>); 5] {
+pub fn files(process: &Process) -> [(&'static str, &Option<Spanned<String>>); 7] {
     [
         ("vehicle", &process.vehicle),
         ("scene", &process.scene),
         ("gains", &process.gains),
         ("data", &process.data),
         ("fmu", &process.fmu),
+        ("firmware", &process.firmware),
+        ("configuration", &process.configuration),
     ]
 }
 

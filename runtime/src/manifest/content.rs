@@ -152,6 +152,10 @@ pub struct Process {
     pub data: Option<Spanned<String>>,
     /// FMU, relative to the manifest.
     pub fmu: Option<Spanned<String>>,
+    /// Program of an autopilot's firmware, relative to the manifest.
+    pub firmware: Option<Spanned<String>>,
+    /// Configuration of a firmware, relative to the manifest.
+    pub configuration: Option<Spanned<String>>,
     /// Ticks between two computations.
     pub period_ticks: Option<Spanned<u32>>,
     /// Core it runs on.

@@ -8,7 +8,8 @@ use toml::de::{DeString, DeTable, DeValue};
 /// Keys that say what a process is: naming one anew leaves nothing of the other.
 const IDENTITY: [&str; 2] = ["kind", "command"];
 /// Keys that mean something only to what the process is.
-const PARAMETERS: [&str; 6] = ["computing_time", "data", "gains", "parameters", "scene", "vehicle"];
+const PARAMETERS: [&str; 9] =
+    ["computing_time", "configuration", "data", "firmware", "fmu", "gains", "parameters", "scene", "vehicle"];
 
 /// What `text` says; its places start at `base`.
 ///

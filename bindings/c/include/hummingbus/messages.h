@@ -545,6 +545,21 @@ static const HbField HB_RANGES_FIELDS[] = {
 
 static const HbMessage HB_RANGES = { "hummingbus_msgs/msg/Ranges", "What five range finders report, in the order +x, -x, +y, -y of the body, and down.", sizeof(HbRanges), HB_RANGES_FIELDS, 5 };
 
+// The channels of a remote control, as its receiver reports them.
+typedef struct HbRcChannels {
+  // Simulation time.
+  HbTime stamp;
+  // Pulses, 1000 to 2000: roll, pitch, throttle and yaw, then the switches. [us]
+  struct { uint32_t count; uint32_t pad; double values[16]; } pulse;
+} HbRcChannels;
+
+static const HbField HB_RC_CHANNELS_FIELDS[] = {
+  { "stamp", "Simulation time.", "", "", offsetof(HbRcChannels, stamp), HB_NESTED, &HB_TIME, 0, 0, 0 },
+  { "pulse", "Pulses, 1000 to 2000: roll, pitch, throttle and yaw, then the switches.", "us", "", offsetof(HbRcChannels, pulse), HB_F64, NULL, 0, 0, 16 },
+};
+
+static const HbMessage HB_RC_CHANNELS = { "hummingbus_msgs/msg/RcChannels", "The channels of a remote control, as its receiver reports them.", sizeof(HbRcChannels), HB_RC_CHANNELS_FIELDS, 2 };
+
 // A point of a trajectory.
 typedef struct HbReference {
   // Simulation time.
@@ -1097,6 +1112,18 @@ static const HbField HB_MOCAP_STATE_FIELDS[] = {
 
 static const HbMessage HB_MOCAP_STATE = { "hummingbus_msgs/msg/MocapState", "All that the sensor remembers.", sizeof(HbMocapState), HB_MOCAP_STATE_FIELDS, 2 };
 
+// All that `operator` remembers.
+typedef struct HbOperatorState {
+  // Altitude lost since the source fell silent. [m] in world
+  double lowered;
+} HbOperatorState;
+
+static const HbField HB_OPERATOR_STATE_FIELDS[] = {
+  { "lowered", "Altitude lost since the source fell silent.", "m", "world", offsetof(HbOperatorState, lowered), HB_F64, NULL, 0, 0, 0 },
+};
+
+static const HbMessage HB_OPERATOR_STATE = { "hummingbus_msgs/msg/OperatorState", "All that `operator` remembers.", sizeof(HbOperatorState), HB_OPERATOR_STATE_FIELDS, 1 };
+
 // All that it remembers.
 typedef struct HbPositionHoldState {
   // The place that is held; without meaning along an axis that is not locked. [m] in world
@@ -1240,6 +1267,18 @@ static const HbField HB_RANGE_STATE_FIELDS[] = {
 };
 
 static const HbMessage HB_RANGE_STATE = { "hummingbus_msgs/msg/RangeState", "All that the sensor remembers.", sizeof(HbRangeState), HB_RANGE_STATE_FIELDS, 2 };
+
+// All that it remembers.
+typedef struct HbRemoteControlState {
+  // Throttle that the integral has added to that of hover. [1]
+  double throttle;
+} HbRemoteControlState;
+
+static const HbField HB_REMOTE_CONTROL_STATE_FIELDS[] = {
+  { "throttle", "Throttle that the integral has added to that of hover.", "1", "", offsetof(HbRemoteControlState, throttle), HB_F64, NULL, 0, 0, 0 },
+};
+
+static const HbMessage HB_REMOTE_CONTROL_STATE = { "hummingbus_msgs/msg/RemoteControlState", "All that it remembers.", sizeof(HbRemoteControlState), HB_REMOTE_CONTROL_STATE_FIELDS, 1 };
 
 // All that the sensor remembers.
 typedef struct HbRpmState {

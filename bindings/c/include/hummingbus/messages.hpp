@@ -525,6 +525,20 @@ HUMMINGBUS_MESSAGE(hummingbus::msgs::Ranges, "hummingbus_msgs/msg/Ranges", "What
     HUMMINGBUS_FIELD(pad0, "", "", "Zero."));
 
 namespace hummingbus::msgs {
+// The channels of a remote control, as its receiver reports them.
+struct RcChannels {
+  // Simulation time.
+  Time stamp{};
+  // Pulses, 1000 to 2000: roll, pitch, throttle and yaw, then the switches. [us]
+  hummingbus::Bounded<double, 16> pulse{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::RcChannels, "hummingbus_msgs/msg/RcChannels", "The channels of a remote control, as its receiver reports them.",
+    HUMMINGBUS_FIELD(stamp, "", "", "Simulation time."),
+    HUMMINGBUS_FIELD(pulse, "us", "", "Pulses, 1000 to 2000: roll, pitch, throttle and yaw, then the switches."));
+
+namespace hummingbus::msgs {
 // A point of a trajectory.
 struct Reference {
   // Simulation time.
@@ -1054,6 +1068,17 @@ HUMMINGBUS_MESSAGE(hummingbus::msgs::MocapState, "hummingbus_msgs/msg/MocapState
     HUMMINGBUS_FIELD(queue, "", "", "The last measurements."));
 
 namespace hummingbus::msgs {
+// All that `operator` remembers.
+struct OperatorState {
+  // Altitude lost since the source fell silent. [m] in world
+  double lowered{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::OperatorState, "hummingbus_msgs/msg/OperatorState", "All that `operator` remembers.",
+    HUMMINGBUS_FIELD(lowered, "m", "world", "Altitude lost since the source fell silent."));
+
+namespace hummingbus::msgs {
 // All that it remembers.
 struct PositionHoldState {
   // The place that is held; without meaning along an axis that is not locked. [m] in world
@@ -1189,6 +1214,17 @@ struct RangeState {
 HUMMINGBUS_MESSAGE(hummingbus::msgs::RangeState, "hummingbus_msgs/msg/RangeState", "All that the sensor remembers.",
     HUMMINGBUS_FIELD(channel, "", "", "What is under way."),
     HUMMINGBUS_FIELD(queue, "", "", "The last measurements."));
+
+namespace hummingbus::msgs {
+// All that it remembers.
+struct RemoteControlState {
+  // Throttle that the integral has added to that of hover. [1]
+  double throttle{};
+};
+} // namespace hummingbus::msgs
+
+HUMMINGBUS_MESSAGE(hummingbus::msgs::RemoteControlState, "hummingbus_msgs/msg/RemoteControlState", "All that it remembers.",
+    HUMMINGBUS_FIELD(throttle, "1", "", "Throttle that the integral has added to that of hover."));
 
 namespace hummingbus::msgs {
 // All that the sensor remembers.

@@ -1,13 +1,15 @@
 //! A recording that grows is followed.
 
 use super::{MS, Running, await_some, cdr, overwrite};
-use crate::Shown;
+use crate::{Server, Shown};
 use bus::Message as _;
 use bus::announcement::Announcement;
 use bus::messages::PlantState;
 use recorder::reader::Recording;
 use recorder::writer::{ChannelId, RecordingWriter};
 use serde_json::{Value, json};
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::net::TcpStream;
 use std::path::PathBuf;
 use tempfile::TempDir;
 
@@ -105,4 +107,65 @@ fn a_late_vehicle_is_found_in_the_new_blocks_alone() {
     assert_eq!(names(&after, "vehicles"), ["/plant/state", "/late/plant/state"]);
     assert_eq!(after["recordings"][0]["marks"], before["recordings"][0]["marks"]);
     assert_eq!(server.growth("damage"), Value::Null);
+}
+
+/// The page of a run is there before the run has recorded anything.
+#[test]
+fn a_server_without_a_recording_says_so_and_shows_the_one_that_comes() {
+    let live = Live::new();
+    let server = Server::awaiting(0).unwrap();
+    let handle = server.handle();
+    let server = Running::serving(server);
+    assert_eq!(server.get("api/catalogue"), json!({ "recordings": [], "refusal": null, "is_live": true }));
+    assert_eq!((server.get("api/growth"), server.get("api/run")), (json!([]), Value::Null));
+    let request = json!({ "recording": 0, "from_ns": 0, "step_ns": MS, "count": 1, "fields": [] });
+    assert_eq!(server.post("api/frames", &request), (400, b"no tick is recorded yet\n".to_vec()));
+    handle.refuse("it ended too early".to_owned());
+    assert_eq!(server.get("api/catalogue")["refusal"], "it ended too early");
+    handle.show(vec![live.shown()]).unwrap();
+    // The first one stays.
+    handle.show(vec![live.shown(), live.shown()]).unwrap();
+    assert_eq!(server.get("api/catalogue")["recordings"].as_array().unwrap().len(), 1);
+    server.await_growth("duration_ns", &json!(99 * MS));
+}
+
+#[test]
+fn a_page_is_counted_while_its_stream_is_open() {
+    let live = Live::new();
+    let server = Server::new(vec![live.shown()], 0).unwrap();
+    let handle = server.handle();
+    let server = Running::serving(server);
+    assert_eq!(handle.pages(), [0, 0]);
+    let (host, page) = server.parts();
+    let open = || {
+        let mut stream = TcpStream::connect(host).unwrap();
+        write!(stream, "GET {page}api/events HTTP/1.1\r\nHost: {host}\r\n\r\n").unwrap();
+        let mut lines = BufReader::new(stream).lines();
+        let event = await_some(|| lines.next()?.ok()?.strip_prefix("data: ").map(str::to_owned));
+        assert_eq!(event, r#"{"run":null,"recordings":1}"#);
+        lines
+    };
+    let first = open();
+    let second = open();
+    assert_eq!(handle.pages(), [2, 2]);
+    drop(first);
+    await_some(|| (handle.pages() == [1, 2]).then_some(()));
+    drop(second);
+    await_some(|| (handle.pages() == [0, 2]).then_some(()));
+}
+
+#[test]
+fn a_page_without_a_run_steers_nothing_and_nonsense_is_refused() {
+    let server = Running::of(Live::new().shown());
+    // Such a page opens no stream: nothing of it is live.
+    assert_eq!(server.get("api/catalogue")["is_live"], false);
+    let asked = |request: &Value| {
+        let (status, body) = server.post("api/ctl", request);
+        (status, String::from_utf8(body).unwrap())
+    };
+    let (status, answer) = asked(&json!({ "request": "pause" }));
+    assert!(status == 200 && answer.contains("this page shows no live run"), "{answer}");
+    for nonsense in [json!({ "request": "fly" }), json!({ "request": "step" }), json!([])] {
+        assert_eq!(asked(&nonsense).0, 422, "{nonsense}");
+    }
 }

@@ -1,0 +1,410 @@
+//! Betaflight's software in the loop, SITL (`src/platform/SIMULATOR/sitl.c` of Betaflight; read at commit 301d01ab).
+//!
+//! Its own clock is the host's, stretched by what it sees of its packets: with that, no two runs agree, and one that waits for
+//! answers stalls. So a library is preloaded (`lockstep.c`), which gives it the run's time, hands it a tick's packets, and takes its
+//! motors' outputs. The firmware itself is as it was built.
+//!
+//! Axes as its packets have them, from x forward, y left, z up: angular velocity (p, −q, r), the specific force negated; the
+//! attitude's quaternion, for the compass, w first, conjugated by half a turn about x; velocity east, north, up.
+
+use crate::autopilot::{Autopilot, Sensed, Throttles};
+use crate::layout::Layout;
+use crate::origin::Origin;
+use crate::process::{Firmware, Scratch};
+use bus::component::Info;
+use bus::context::NodeContext;
+use bus::messages::{Imu, RcChannels, StateEstimate};
+use diagnostics::ParameterError;
+use diagnostics::parameter::positive;
+use serde::Deserialize;
+use std::path::PathBuf;
+use std::time::Duration;
+use vehicles::Vehicle;
+
+/// The library that is preloaded.
+const LOCKSTEP: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/lockstep.so"));
+/// The library in the folder in which the firmware runs: a path with a blank or a colon could not be preloaded.
+const PRELOADED: &str = "./lockstep.so";
+/// Its variable: what the firmware's clock shows when it first waits for packets, in ns.
+const BOOT_VARIABLE: &str = "HUMMINGBUS_FIRMWARE_BOOT_NS";
+/// Time in which the firmware starts by itself, in s of its own clock.
+const BOOT_S: f64 = 2.0;
+/// Rest on the ground before tick 0, in s: the gyroscope is calibrated within 1.25 s, then it may be armed.
+const REST_S: f64 = 4.0;
+/// The last part of that with the arming switch on.
+const ARMED_S: f64 = 1.0;
+/// Channels of a packet of the remote control, and motors of a packet of the outputs.
+const CHANNELS: usize = 16;
+/// Host time that loading the configuration may take.
+const CONFIGURATION_LIMIT: Duration = Duration::from_secs(20);
+/// Pressure at sea level, Pa, its decrease by height, 1/m, and the exponent: the troposphere of ISO 2533.
+const ATMOSPHERE: (f64, f64, f64) = (101_325.0, 2.255_77e-5, 5.255_88);
+
+/// Parameters of the firmware.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Parameters {
+    /// The vehicle that it flies.
+    vehicle: PathBuf,
+    /// Betaflight's program for SITL.
+    firmware: PathBuf,
+    /// Commands of its command line, before it flies.
+    configuration: Option<PathBuf>,
+    /// Channel whose switch arms, counted from 1, where the firmware is to be armed at tick 0; none where the pilot arms.
+    armed_by_channel: Option<usize>,
+    /// Packets of the remote control a second.
+    #[serde(default = "rc_rate_hz")]
+    rc_rate_hz: f64,
+    /// Host time that an answer may take, in s.
+    #[serde(default = "reply_timeout_s")]
+    reply_timeout_s: f64,
+    /// Place on the earth of the world's origin.
+    #[serde(default)]
+    origin: Origin,
+}
+
+/// As receivers of serial protocols send at least.
+fn rc_rate_hz() -> f64 {
+    50.0
+}
+
+fn reply_timeout_s() -> f64 {
+    5.0
+}
+
+/// A tick's packets, as `lockstep.c` reads them.
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+struct TickPackets {
+    length_ns: u64,
+    has_sticks: u64,
+    state: StatePacket,
+    sticks_time_s: f64,
+    channels_us: [u16; CHANNELS],
+}
+
+/// The packet of the flight dynamics.
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+struct StatePacket {
+    time_s: f64,
+    angular_velocity_rad_s: [f64; 3],
+    acceleration_m_s2: [f64; 3],
+    /// w, x, y, z.
+    attitude: [f64; 4],
+    velocity_m_s: [f64; 3],
+    /// Longitude and latitude in degrees, altitude in m.
+    place: [f64; 3],
+    pressure_Pa: f64,
+}
+
+/// The answer.
+#[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+struct Answer {
+    is_fresh: u32,
+    motors: u16,
+    padding: u16,
+    pulse_us: [f32; CHANNELS],
+}
+
+/// Betaflight as the manifest has it.
+#[derive(Debug)]
+pub struct Betaflight {
+    vehicle: Vehicle,
+    layout: Layout,
+    firmware: Vec<u8>,
+    configuration: String,
+    armed_by_channel: Option<usize>,
+    period_ns: u64,
+    /// Ticks between two packets of the remote control.
+    rc_ticks: u64,
+    reply_timeout: Duration,
+    origin: Origin,
+}
+
+/// The firmware that runs.
+#[derive(Debug)]
+pub struct Link {
+    firmware: Firmware,
+    /// Packets sent.
+    steps: u64,
+}
+
+impl Autopilot for Betaflight {
+    const INFO: Info = Info::new(
+        "betaflight",
+        "Betaflight's SITL, in lockstep: a process of its own that flies the vehicle",
+    );
+    type Parameters = Parameters;
+    type Link = Link;
+
+    fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
+        let Parameters { vehicle, firmware, configuration, armed_by_channel, .. } = parameters;
+        let read = |key: &'static str, path: &PathBuf| {
+            context.files.bytes(path).map_err(|error| {
+                ParameterError::conflict(key, format!("cannot read {}: {error}", path.display()))
+            })
+        };
+        let vehicle = Vehicle::load_from(&context.files, &vehicle)
+            .map_err(|error| ParameterError::conflict("vehicle", error))?;
+        let layout = Layout::of(&vehicle.rotors)
+            .map_err(|reason| ParameterError::conflict("vehicle", format!("{}: {reason}", vehicle.name)))?;
+        let program = read("firmware", &firmware)?.to_vec();
+        require_preloadable(&program).map_err(|reason| {
+            ParameterError::conflict("firmware", format!("{}: {reason}", firmware.display()))
+        })?;
+        let configuration = configuration.map(|path| read("configuration", &path)).transpose()?;
+        let configuration =
+            configuration.map_or(String::new(), |bytes| String::from_utf8_lossy(&bytes).into_owned());
+        positive("rc_rate_hz", parameters.rc_rate_hz)?;
+        positive("reply_timeout_s", parameters.reply_timeout_s)?;
+        if let Some(channel) = armed_by_channel.filter(|channel| !(5..=CHANNELS).contains(channel)) {
+            let message = format!(
+                "`armed_by_channel` is {channel}, expected 5 to {CHANNELS}: the first four are the sticks"
+            );
+            return Err(ParameterError::conflict("armed_by_channel", message));
+        }
+        Ok(Self {
+            vehicle,
+            layout,
+            firmware: program,
+            configuration,
+            armed_by_channel,
+            period_ns: context.tick_ns * u64::from(context.period_ticks),
+            rc_ticks: steps(1.0 / parameters.rc_rate_hz, context.period_s()).max(1),
+            reply_timeout: Duration::from_secs_f64(parameters.reply_timeout_s),
+            origin: parameters.origin,
+        })
+    }
+
+    fn vehicle(&self) -> &Vehicle {
+        &self.vehicle
+    }
+
+    fn boot(&self) -> Result<Link, String> {
+        let scratch = Scratch::new("betaflight")?;
+        let program = scratch.write("betaflight", &self.firmware)?;
+        scratch.write("lockstep.so", LOCKSTEP)?;
+        let configuration = scratch.write("configuration", self.commands().as_bytes())?;
+        let mut configure = scratch.command(&program)?;
+        configure.env("LD_PRELOAD", PRELOADED).arg("--config").arg(configuration);
+        scratch.run(configure, CONFIGURATION_LIMIT).map_err(|error| format!("the configuration: {error}"))?;
+        let mut command = scratch.command(&program)?;
+        command.env("LD_PRELOAD", PRELOADED).env(BOOT_VARIABLE, nanoseconds(BOOT_S).to_string());
+        let firmware = Firmware::start(scratch, command, self.reply_timeout)?;
+        let mut link = Link { firmware, steps: 0 };
+        link.receive()?;
+        self.rest(&mut link)?;
+        Ok(link)
+    }
+
+    fn exchange(&self, link: &mut Link, sensed: &Sensed<'_>) -> Result<Throttles, String> {
+        let packets = self.packets(link.steps, sensed);
+        link.steps += 1;
+        link.firmware.send(bytemuck::bytes_of(&packets))?;
+        let answer = link.receive()?;
+        Ok(self.throttles(&answer))
+    }
+}
+
+impl Betaflight {
+    /// Its command line's input: the mixer of the vehicle, the commands of the configuration, and `save`.
+    fn commands(&self) -> String {
+        let Layout { mixer, is_reversed, .. } = self.layout;
+        let reversed = if is_reversed { "ON" } else { "OFF" };
+        format!(
+            "mixer {mixer}\nset yaw_motors_reversed = {reversed}\n{}\nsave\n",
+            self.configuration.trim_end()
+        )
+    }
+
+    /// Lets the firmware stand still, level and at the origin, until it is ready; armed, if it is to be.
+    fn rest(&self, link: &mut Link) -> Result<(), String> {
+        let period_s = self.period_ns as f64 * 1e-9;
+        let imu = Imu { specific_force: [0.0, 0.0, self.vehicle.gravity_m_s2].into(), ..Imu::default() };
+        let estimate = StateEstimate::default();
+        let (all, armed) = (steps(REST_S, period_s), steps(ARMED_S, period_s));
+        let mut rc = RcChannels { pulse: [1500.0, 1500.0, 1000.0, 1500.0].into(), ..RcChannels::default() };
+        let mut throttles = Throttles::default();
+        for step in 0..all {
+            if step + armed == all
+                && let Some(channel) = self.armed_by_channel
+            {
+                let pulse = |at| [1500.0, 1500.0, 1000.0, 1500.0].get(at).copied().unwrap_or(1000.0);
+                rc.pulse =
+                    bus::Bounded::from_fn(channel, |at| if at + 1 == channel { 2000.0 } else { pulse(at) });
+            }
+            let time_s = (step as f64 - all as f64) * period_s;
+            throttles = self.exchange(link, &Sensed { time_s, imu: &imu, estimate: &estimate, rc: &rc })?;
+        }
+        if self.armed_by_channel.is_some() && throttles.iter().all(|throttle| *throttle == 0.0) {
+            let words = "it is not armed at tick 0: its motors stand still under `armed_by_channel` and the configuration";
+            return Err(link.firmware.complaint(words));
+        }
+        Ok(())
+    }
+
+    /// The packets of a tick, the `step`th of the firmware.
+    fn packets(&self, step: u64, sensed: &Sensed<'_>) -> TickPackets {
+        let time_s = BOOT_S + (step + 1) as f64 * self.period_ns as f64 * 1e-9;
+        let Sensed { imu, estimate, rc, .. } = sensed;
+        let (rates, force, attitude) = (imu.angular_velocity, imu.specific_force, estimate.attitude);
+        let place = self.origin.place(estimate.position.into());
+        let (sea_level_Pa, by_height_1_m, exponent) = ATMOSPHERE;
+        let state = StatePacket {
+            time_s,
+            angular_velocity_rad_s: [rates.x, -rates.y, rates.z],
+            acceleration_m_s2: [-force.x, -force.y, -force.z],
+            attitude: [attitude.w, attitude.x, -attitude.y, -attitude.z],
+            velocity_m_s: estimate.velocity.into(),
+            place,
+            pressure_Pa: sea_level_Pa * libm::pow(1.0 - by_height_1_m * place[2], exponent),
+        };
+        let channel = |at| rc.pulse.get(at).copied().unwrap_or(if at == 2 { 1000.0 } else { 1500.0 });
+        let switch =
+            |at: usize| if at < 4 { channel(at) } else { rc.pulse.get(at).copied().unwrap_or(1000.0) };
+        TickPackets {
+            length_ns: self.period_ns,
+            has_sticks: u64::from(step.is_multiple_of(self.rc_ticks)),
+            state,
+            sticks_time_s: time_s,
+            channels_us: std::array::from_fn(|at| pulse(switch(at))),
+        }
+    }
+
+    /// Outputs by rotor.
+    fn throttles(&self, answer: &Answer) -> Throttles {
+        let mut throttles = Throttles::filled(self.vehicle.rotors.len(), 0.0);
+        for (motor, rotor) in self.layout.motors.iter().enumerate() {
+            throttles[*rotor] = (f64::from(answer.pulse_us[motor]) - 1000.0).max(0.0) / 1000.0;
+        }
+        throttles
+    }
+}
+
+impl Link {
+    fn receive(&mut self) -> Result<Answer, String> {
+        let mut answer = Answer::default();
+        self.firmware.receive(bytemuck::bytes_of_mut(&mut answer))?;
+        Ok(answer)
+    }
+}
+
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 800 and 2200 by clamp")]
+fn pulse(us: f64) -> u16 {
+    us.clamp(800.0, 2200.0).round() as u16
+}
+
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive number")]
+fn steps(time_s: f64, period_s: f64) -> u64 {
+    (time_s / period_s).round() as u64
+}
+
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive number")]
+fn nanoseconds(time_s: f64) -> u64 {
+    (time_s * 1e9).round() as u64
+}
+
+/// Refuses what no library can be preloaded into: its clock would be the host's.
+fn require_preloadable(program: &[u8]) -> Result<(), String> {
+    /// Type of the program header that names the dynamic linker (ELF, `PT_INTERP`).
+    const INTERPRETER: u32 = 3;
+    let number = |at: usize, size: usize| -> Option<u64> {
+        let bytes = program.get(at..at.checked_add(size)?)?;
+        Some(bytes.iter().rev().fold(0, |number, byte| (number << 8) | u64::from(*byte)))
+    };
+    if !program.starts_with(b"\x7fELF\x02\x01") {
+        return Err(
+            "it is no program of 64 bits for Linux; expected Betaflight's SITL, obj/main/betaflight_SITL.elf"
+                .to_owned(),
+        );
+    }
+    let headers = || {
+        let (first, size, count) = (number(32, 8)?, number(54, 2)?, number(56, 2)?);
+        let at = |index: u64| usize::try_from(first.checked_add(size * index)?).ok();
+        Some((0..count).any(|index| at(index).and_then(|at| number(at, 4)) == Some(INTERPRETER.into())))
+    };
+    if headers() == Some(true) {
+        return Ok(());
+    }
+    let reason = "it is linked statically, so that its clock stays the host's: no two runs would agree, and a run that waits for \
+                  its answers would stall; build it with shared libraries";
+    Err(reason.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bus::messages::Quaternion;
+
+    fn hummingbird() -> Betaflight {
+        let vehicle = Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml").unwrap();
+        Betaflight {
+            layout: Layout::of(&vehicle.rotors).unwrap(),
+            vehicle,
+            firmware: Vec::new(),
+            configuration: "aux 0 0 0 1700 2100 0 0\n".to_owned(),
+            armed_by_channel: None,
+            period_ns: 1_000_000,
+            rc_ticks: 20,
+            reply_timeout: Duration::from_secs(1),
+            origin: Origin::default(),
+        }
+    }
+
+    /// Axes of the packets of SITL against body x forward, y left, z up.
+    #[test]
+    fn axes_and_units_are_those_of_the_packets() {
+        let imu = Imu {
+            angular_velocity: [0.1, 0.2, 0.3].into(),
+            specific_force: [1.0, 2.0, 9.81].into(),
+            ..Imu::default()
+        };
+        let attitude = Quaternion { x: 0.1, y: 0.2, z: 0.3, w: 0.9 };
+        let estimate = StateEstimate {
+            attitude,
+            velocity: [3.0, 4.0, 5.0].into(),
+            position: [0.0, 0.0, 12.0].into(),
+            ..StateEstimate::default()
+        };
+        let rc =
+            RcChannels { pulse: [1500.4, 1500.6, 900.0, 9000.0, 2000.0].into(), ..RcChannels::default() };
+        let sensed = Sensed { time_s: 0.0, imu: &imu, estimate: &estimate, rc: &rc };
+        let betaflight = hummingbird();
+        let packets = betaflight.packets(20, &sensed);
+        let state = packets.state;
+        assert_eq!(state.time_s, 2.021, "the firmware's time goes on from its start");
+        assert_eq!(state.angular_velocity_rad_s, [0.1, -0.2, 0.3]);
+        assert_eq!(state.acceleration_m_s2, [-1.0, -2.0, -9.81]);
+        assert_eq!(state.attitude, [0.9, 0.1, -0.2, -0.3], "w first");
+        assert_eq!(state.velocity_m_s, [3.0, 4.0, 5.0], "east, north, up");
+        assert_eq!(state.place, [8.545_594, 47.397_742, 500.0]);
+        // ISO 2533: 95.46 kPa at 500 m.
+        assert!((state.pressure_Pa - 95_461.0).abs() < 5.0, "{}", state.pressure_Pa);
+        assert_eq!(packets.channels_us[..6], [1500, 1501, 900, 2200, 2000, 1000], "what is not sent is off");
+        let has_sticks = |step| betaflight.packets(step, &sensed).has_sticks;
+        assert_eq!([has_sticks(20), has_sticks(21), has_sticks(40)], [1, 0, 1], "50 packets a second");
+    }
+
+    #[test]
+    fn motors_reach_their_rotors_and_the_mixer_the_command_line() {
+        let betaflight = hummingbird();
+        let mut answer = Answer { motors: 4, ..Answer::default() };
+        // Rear, right, left, front.
+        answer.pulse_us[..4].copy_from_slice(&[1100.0, 1200.0, 1300.0, 1400.0]);
+        assert_eq!(betaflight.throttles(&answer), [0.4, 0.2, 0.1, 0.3], "front, right, rear, left");
+        let commands = "mixer QUADP\nset yaw_motors_reversed = OFF\naux 0 0 0 1700 2100 0 0\nsave\n";
+        assert_eq!(betaflight.commands(), commands);
+    }
+
+    /// Any bytes are refused in words.
+    #[test]
+    fn what_is_cut_is_no_program() {
+        let program = std::fs::read("/proc/self/exe").unwrap();
+        assert_eq!(require_preloadable(&program), Ok(()), "this test is linked with shared libraries");
+        for length in [0, 3, 6, 40, 64, 100] {
+            assert!(require_preloadable(&program[..length]).is_err(), "{length}");
+        }
+    }
+}

@@ -1,0 +1,31 @@
+//! Autopilot firmware as nodes: a process of the firmware's own, in lockstep with the run, with motors, axes and units converted.
+//!
+//! - [`autopilot`]: what a firmware has to bring, and what it senses
+//! - [`bridge`]: the component that holds a firmware: its ports, its start before tick 0, an exchange a tick
+//! - [`process`]: a firmware's process: its scratch folder, its log, what it ended with
+//! - [`layout`]: which motor output drives which rotor
+//! - [`origin`]: the place on the earth at which the world's origin lies
+//! - [`mod@betaflight`]: Betaflight's software in the loop (SITL)
+//!
+//! ```
+//! use autopilots::layout::Layout;
+//!
+//! let vehicle = vehicles::Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml").unwrap();
+//! let layout = Layout::of(&vehicle.rotors).unwrap();
+//! assert_eq!((layout.mixer, layout.motors.as_slice()), ("QUADP", &[2, 1, 3, 0][..]), "rear, right, left, front");
+//! ```
+
+#![allow(
+    non_snake_case,
+    reason = "a trailing _B or _W names the frame that a vector is written in, and units keep their letters"
+)]
+
+pub mod autopilot;
+pub mod betaflight;
+pub mod bridge;
+pub mod layout;
+pub mod origin;
+pub mod process;
+
+/// Betaflight's SITL as a component.
+pub type Betaflight = bridge::Bridge<betaflight::Betaflight>;

@@ -1,0 +1,233 @@
+//! A pilot's thumbs: turns set points into the channels of a remote control, for autopilots that fly by sticks.
+//!
+//! Roll and pitch go to their sticks in proportion to the angle at which the firmware has full sticks. Yaw is held by a turn
+//! of the yaw stick, which asks for a rate. The altitude is held by the throttle, since an angle mode leaves it to the pilot:
+//! a climb of Kx·(altitude − height), and throttle = hover + Kv·(climb − measured) + integral of Ki·(climb − measured), as a
+//! pilot corrects what the battery takes. Switches move at their times.
+
+use crate::angle::wrap_rad;
+use bus::component::{Component, Info, StepError};
+use bus::context::{NodeContext, StepContext};
+use bus::messages::{RC_CHANNELS_MAX, RcChannels, SetPoint, StateEstimate};
+use bus::{Bounded, InputPorts, OutputPorts};
+use diagnostics::parameter::{ParameterError, not_negative, positive, refuse};
+use nalgebra::{Quaternion, UnitQuaternion};
+use serde::Deserialize;
+
+/// Channels before the first switch: roll, pitch, throttle, yaw.
+const STICKS: usize = 4;
+/// Pulses of a stick in its middle, and from there to its end, µs.
+const MIDDLE_US: f64 = 1500.0;
+const HALF_US: f64 = 500.0;
+/// Pulses of a throttle at its lower end, and over its whole way; a switch that is off has the former.
+const LOW_US: f64 = 1000.0;
+const WHOLE_US: f64 = 1000.0;
+
+/// Parameters of the remote control.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Parameters {
+    /// Roll or pitch at full stick, degrees: the firmware's limit of its angle mode.
+    tilt_max_deg: f64,
+    /// Yaw rate at full stick, degrees/s: the firmware's.
+    yaw_rate_max_deg_s: f64,
+    /// Throttle at hover, 0 to 1.
+    hover_throttle: f64,
+    /// Kx, 1/s.
+    #[serde(default = "altitude_1_s")]
+    altitude_1_s: f64,
+    /// It climbs and sinks no faster than this, m/s.
+    #[serde(default = "climb_max_m_s")]
+    climb_max_m_s: f64,
+    /// Kv, throttle for 1 m/s, s/m.
+    #[serde(default = "climb_s_m")]
+    climb_s_m: f64,
+    /// Ki, throttle for 1 m, 1/m.
+    #[serde(default = "climb_integral_1_m")]
+    climb_integral_1_m: f64,
+    /// Yaw rate for an error of the yaw, 1/s.
+    #[serde(default = "yaw_1_s")]
+    yaw_1_s: f64,
+    /// Switches.
+    #[serde(default)]
+    switches: Vec<Switch>,
+}
+
+fn altitude_1_s() -> f64 {
+    1.5
+}
+
+fn climb_max_m_s() -> f64 {
+    1.0
+}
+
+fn climb_s_m() -> f64 {
+    0.12
+}
+
+fn climb_integral_1_m() -> f64 {
+    0.06
+}
+
+fn yaw_1_s() -> f64 {
+    2.0
+}
+
+/// A switch that moves.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Switch {
+    /// Its channel, counted from 1.
+    channel: usize,
+    /// From this time on, s.
+    at_s: f64,
+    /// It sends these pulses, µs.
+    pulse_us: f64,
+}
+
+/// What the remote control reads.
+#[derive(Debug, InputPorts)]
+pub struct Inputs<'a> {
+    /// What the pilot wants.
+    pub set_point: &'a SetPoint,
+    /// The motion that he sees.
+    pub estimate: &'a StateEstimate,
+}
+
+/// What it sends.
+#[derive(Debug, OutputPorts)]
+pub struct Outputs {
+    /// Its channels.
+    pub rc: RcChannels,
+}
+
+/// All that it remembers.
+#[derive(Debug, Clone, Copy, Default, PartialEq, bus::Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/RemoteControlState")]
+pub struct RemoteControlState {
+    /// Throttle that the integral has added to that of hover.
+    #[field(unit = "1")]
+    pub throttle: f64,
+}
+
+/// The component `remote-control`.
+///
+/// ```
+/// use bus::messages::{SetPoint, StateEstimate};
+/// use controllers::remote_control::{Inputs, RemoteControl};
+///
+/// let parameters = serde_json::json!({ "tilt_max_deg": 30, "yaw_rate_max_deg_s": 90, "hover_throttle": 0.4,
+///     "switches": [{ "channel": 5, "at_s": 0.0, "pulse_us": 2000 }] });
+/// let mut sticks = bus::Harness::<RemoteControl>::from_json(&parameters).unwrap();
+/// let set_point = SetPoint { roll: 15_f64.to_radians(), ..Default::default() };
+/// let rc = sticks.step(Inputs { set_point: &set_point, estimate: &StateEstimate::default() }).unwrap().rc;
+/// assert_eq!(rc.pulse, [1750.0, 1500.0, 1400.0, 1500.0, 2000.0], "µs: half of the roll stick's way, hover, and the switch");
+/// ```
+#[derive(Debug, Clone)]
+pub struct RemoteControl {
+    parameters: Parameters,
+    period_s: f64,
+}
+
+impl Component for RemoteControl {
+    const INFO: Info = Info::new(
+        "remote-control",
+        "turns set points into the sticks and switches of a remote control, for autopilots",
+    );
+    type Parameters = Parameters;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = RemoteControlState;
+
+    fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
+        positive("tilt_max_deg", parameters.tilt_max_deg)?;
+        positive("yaw_rate_max_deg_s", parameters.yaw_rate_max_deg_s)?;
+        positive("climb_max_m_s", parameters.climb_max_m_s)?;
+        for (key, value) in [
+            ("altitude_1_s", parameters.altitude_1_s),
+            ("climb_s_m", parameters.climb_s_m),
+            ("climb_integral_1_m", parameters.climb_integral_1_m),
+            ("yaw_1_s", parameters.yaw_1_s),
+        ] {
+            not_negative(key, value)?;
+        }
+        let hover = parameters.hover_throttle;
+        refuse(!(0.0..=1.0).contains(&hover), "hover_throttle", || {
+            format!("`hover_throttle` is {hover}, expected 0 to 1")
+        })?;
+        for Switch { channel, at_s, pulse_us } in &parameters.switches {
+            let is_meant = (STICKS + 1..=RC_CHANNELS_MAX).contains(channel)
+                && (800.0..=2200.0).contains(pulse_us)
+                && at_s.is_finite();
+            refuse(!is_meant, "switches", || {
+                format!(
+                    "`switches`: channel {channel} at {at_s} s to {pulse_us} µs; expected a channel from {} to \
+                     {RC_CHANNELS_MAX} and pulses of 800 to 2200 µs",
+                    STICKS + 1
+                )
+            })?;
+        }
+        Ok(Self { parameters, period_s: context.period_s() })
+    }
+
+    fn initial(&self) -> RemoteControlState {
+        RemoteControlState::default()
+    }
+
+    fn step(
+        &self,
+        context: &StepContext<'_>,
+        Inputs { set_point, estimate }: Inputs<'_>,
+        state: &mut RemoteControlState,
+    ) -> Result<Outputs, StepError> {
+        let Parameters { tilt_max_deg, yaw_rate_max_deg_s, .. } = self.parameters;
+        let stick = |part: f64| MIDDLE_US + HALF_US * part.clamp(-1.0, 1.0);
+        let tilt = |angle_rad: f64| stick(angle_rad.to_degrees() / tilt_max_deg);
+        // To the right is clockwise from above, against the yaw.
+        let turn = -self.yaw_rate_rad_s(set_point, estimate).to_degrees() / yaw_rate_max_deg_s;
+        let throttle = self.throttle(set_point, estimate, state);
+        let sticks = [tilt(set_point.roll), tilt(set_point.pitch), LOW_US + WHOLE_US * throttle, stick(turn)];
+        let last = self.parameters.switches.iter().map(|switch| switch.channel).max().unwrap_or(STICKS);
+        let channel =
+            |at: usize| sticks.get(at).copied().unwrap_or_else(|| self.switched(at + 1, context.time_s()));
+        let pulse = Bounded::from_fn(last, channel);
+        Ok(Outputs { rc: RcChannels { pulse, ..Default::default() } })
+    }
+}
+
+impl RemoteControl {
+    fn yaw_rate_rad_s(&self, set_point: &SetPoint, estimate: &StateEstimate) -> f64 {
+        let bus::messages::Quaternion { x, y, z, w } = estimate.attitude;
+        let (_, _, yaw_rad) = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)).euler_angles();
+        self.parameters.yaw_1_s * wrap_rad(set_point.yaw - yaw_rad)
+    }
+
+    /// Throttle of this step, 0 to 1; the integral stays where it would carry it beyond.
+    fn throttle(
+        &self,
+        set_point: &SetPoint,
+        estimate: &StateEstimate,
+        state: &mut RemoteControlState,
+    ) -> f64 {
+        let Parameters { altitude_1_s, climb_max_m_s, climb_s_m, climb_integral_1_m, hover_throttle, .. } =
+            self.parameters;
+        let asked_m_s = altitude_1_s * (set_point.altitude - estimate.position.z);
+        let error_m_s = asked_m_s.clamp(-climb_max_m_s, climb_max_m_s) - estimate.velocity.z;
+        let throttle = hover_throttle + climb_s_m * error_m_s + state.throttle;
+        if (0.0..=1.0).contains(&throttle) {
+            state.throttle += climb_integral_1_m * error_m_s * self.period_s;
+        }
+        throttle.clamp(0.0, 1.0)
+    }
+
+    /// Pulses of the switch `channel` at `time_s`: those of its last move.
+    fn switched(&self, channel: usize, time_s: f64) -> f64 {
+        let moves = self
+            .parameters
+            .switches
+            .iter()
+            .filter(|switch| switch.channel == channel && switch.at_s <= time_s);
+        moves.max_by(|a, b| a.at_s.total_cmp(&b.at_s)).map_or(LOW_US, |switch| switch.pulse_us)
+    }
+}

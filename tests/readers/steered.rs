@@ -1,0 +1,164 @@
+//! A browser steers the live run that its page shows, with the mouse and with keys alone.
+
+use crate::{HUMMINGBUS, ROOT, look, readers};
+use recorder::reader::Recording;
+use serde_json::{Value, json};
+use std::ffi::OsStr;
+use std::io::{BufRead as _, BufReader, Read as _};
+use std::path::Path;
+use std::process::{Child, ChildStderr, Command, Stdio};
+
+/// A watched run; dropping it ends it.
+struct Run {
+    child: Child,
+    address: String,
+    errors: BufReader<ChildStderr>,
+}
+
+impl Drop for Run {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+impl Run {
+    /// A manifest at real time, recorded to `recording`.
+    fn start(manifest: &str, recording: &Path) -> Self {
+        let mut command = Command::new(HUMMINGBUS);
+        command
+            .arg("run")
+            .arg(Path::new(ROOT).join("manifests").join(manifest))
+            .arg("--record")
+            .arg(recording);
+        command.args(["--pace", "realtime", "--set", "run.duration_s=4000", "--view", "--no-open", "--json"]);
+        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let mut errors = BufReader::new(child.stderr.take().unwrap());
+        let mut said = String::new();
+        let address = loop {
+            said.clear();
+            assert!(errors.read_line(&mut said).unwrap() > 0, "the run has ended");
+            if let Some(address) = said.trim().strip_prefix("The run in the browser: ") {
+                break address.to_owned();
+            }
+        };
+        Self { child, address, errors }
+    }
+
+    /// The summary of the run, which ends by itself when its page was closed.
+    fn end(mut self) -> Value {
+        let mut text = String::new();
+        self.child.stdout.take().unwrap().read_to_string(&mut text).unwrap();
+        let mut said = String::new();
+        self.errors.read_to_string(&mut said).unwrap();
+        assert_eq!(self.child.wait().unwrap().code(), Some(1), "it was stopped: {said}");
+        serde_json::from_str(&text).unwrap()
+    }
+}
+
+fn tick(look: &Value) -> u64 {
+    look["tick"].as_u64().unwrap()
+}
+
+#[test]
+fn a_browser_steers_a_run_with_mouse_and_keys_on_every_screen() {
+    let Some(readers) = readers() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    for (number, looks) in [&["1280x900"][..], &["390x844", "dark"]].iter().enumerate() {
+        let recording = folder.path().join(format!("steered-{number}.mcap"));
+        let run = Run::start("hover.toml", &recording);
+        let arguments: Vec<&OsStr> =
+            std::iter::once(run.address.as_str()).chain(looks.iter().copied()).map(OsStr::new).collect();
+        let seen = look(&readers, "read_run.mjs", &arguments);
+        require_controls(&seen);
+        let summary = run.end();
+        assert_eq!((&summary["stopped_early"], &summary["ticks"]), (&json!(true), &seen["ended"]["tick"]));
+        // The page has seen the recording to its end.
+        let recorded = Recording::open(&recording).unwrap();
+        let states = &recorded.series(&[("/plant/state", "position.z")]).unwrap()[0];
+        assert_eq!(states.time_ns.last().copied(), seen["endNs"].as_u64());
+    }
+}
+
+fn require_controls(seen: &Value) {
+    assert_eq!(seen["wrong"], json!([]));
+    let [running, paused, stepped] = ["running", "paused", "stepped"].map(|key| &seen[key]);
+    assert_eq!((&running["shown"], &running["button"]), (&json!("running"), &json!("Pause")));
+    assert_eq!((&paused["shown"], &paused["button"]), (&json!("paused"), &json!("Go on")));
+    assert_eq!(paused["answer"], format!("paused at tick {}", tick(paused)));
+    assert!(paused["facts"].as_str().unwrap().starts_with(&format!("tick {} of 4000000 · ", tick(paused))));
+    assert_eq!(stepped["answer"], format!("paused at tick {}, 7 ticks on", tick(paused) + 109));
+    for (key, part) in [("refused", "only"), ("zero", "a whole number of at least 1")] {
+        assert_eq!((&seen[key]["isWrong"], tick(&seen[key])), (&json!(true), tick(stepped)), "{key}");
+        assert!(seen[key]["answer"].as_str().unwrap().contains(part), "{}", seen[key]);
+    }
+    assert_eq!(seen["playbackPace"], 2, "the page shows a faster run faster");
+    assert!(seen["noToml"].as_str().unwrap().contains("TOML"), "{}", seen["noToml"]);
+    assert!(seen["noKind"].as_str().unwrap().contains("kind"), "{}", seen["noKind"]);
+    let swapped = &seen["swapped"];
+    assert!(
+        swapped["answer"].as_str().unwrap().contains("controller") && swapped["isWrong"] == false,
+        "{swapped}"
+    );
+    assert_eq!(seen["other"]["shown"], "paused");
+    assert_eq!((&seen["kept"]["shown"], &seen["ended"]["shown"]), (&json!("paused"), &json!("ended")));
+    assert!(seen["ended"]["answer"].as_str().unwrap().contains("has ended at tick"), "{}", seen["ended"]);
+    assert_eq!(seen["disabled"], json!(vec![true; 6]));
+    for look in ["running", "paused", "refused", "ended"] {
+        assert_eq!(seen[look]["overflow"], 0, "{look}");
+    }
+}
+
+#[test]
+fn a_browser_flies_a_run_by_sliders_keys_and_a_gamepad() {
+    let Some(readers) = readers() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    for size in ["1280x900", "390x844"] {
+        let recording = folder.path().join(format!("flown-{size}.mcap"));
+        let run = Run::start("by-hand.toml", &recording);
+        let seen = look(&readers, "read_hand.mjs", &[run.address.as_ref(), size.as_ref()]);
+        require_hand(&seen);
+        assert_eq!(run.end()["stopped_early"], true);
+        require_flown(&Recording::open(&recording).unwrap());
+    }
+}
+
+fn require_hand(seen: &Value) {
+    assert_eq!(seen["wrong"], json!([]));
+    let look = |key: &str| &seen[key];
+    let number = |key: &str, channel: &str| seen[key][channel].as_f64().unwrap();
+    let before = look("before");
+    assert_eq!(
+        (&before["isOn"], &before["sent"], &before["altitude"]),
+        (&json!(false), &json!(0), &json!(1.5))
+    );
+    assert_eq!(before["tilt"], "15", "the limits are those of the manifest");
+    assert_eq!((number("slider", "altitude"), number("held", "roll")), (4.0, -15.0));
+    assert_eq!(number("released", "roll"), 0.0, "a key that is let go asks for nothing");
+    assert_eq!((number("gamepad", "roll"), number("gamepad", "pitch")), (0.0, 7.5), "forwards is nose down");
+    assert!(look("gamepad")["pad"].as_str().unwrap().contains("Test pad"), "{}", look("gamepad"));
+    assert!(number("left", "yaw") > 20.0 && number("left", "altitude") < 3.9, "{}", look("left"));
+    let said = look("gone")["said"].as_str().unwrap();
+    assert!(
+        look("gone")["isOn"] == false && said.contains("gamepad has gone") && said.contains("level"),
+        "{said}"
+    );
+    assert!(number("later", "sent") - number("gone", "sent") <= 1.0, "nothing is sent any more");
+    for key in ["before", "gamepad", "gone"] {
+        assert_eq!(look(key)["overflow"], 0, "{key}");
+    }
+}
+
+/// The run has taken what the page asked for, and answered its silence.
+fn require_flown(recording: &Recording) {
+    let fields = ["altitude", "roll", "pitch", "yaw"].map(|field| ("/pilot/set_point", field));
+    let series = recording.series(&fields).unwrap();
+    let [altitude, roll, pitch, yaw] = [0, 1, 2, 3].map(|index| &series[index].value);
+    assert!(altitude[0] == 1.5 && altitude.contains(&4.0), "{altitude:?}");
+    let has = |values: &[f64], asked_deg: f64| {
+        values.iter().any(|value| (value.to_degrees() - asked_deg).abs() < 1e-9)
+    };
+    assert!(has(roll, -15.0) && has(pitch, 7.5));
+    assert_eq!((roll.last(), pitch.last()), (Some(&0.0), Some(&0.0)), "the fallback is level");
+    assert!(*yaw.last().unwrap() > 20_f64.to_radians(), "and holds the yaw");
+}

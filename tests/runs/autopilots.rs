@@ -1,0 +1,203 @@
+//! Autopilots: a stand-in for Betaflight's SITL (`autopilots/sitl.c`) flies, and fails in every way; the real one where
+//! `HUMMINGBUS_BETAFLIGHT` names it.
+
+use crate::recordings::require_same;
+use crate::skipped::variable_or_skip;
+use crate::support::{Ended, Place, repository};
+use std::fs;
+use std::process::Command;
+use std::sync::OnceLock;
+
+/// The manifest of the hover and the doublet.
+fn manifest() -> String {
+    repository("manifests/autopilots/betaflight.toml")
+}
+
+/// The stand-in's program, linked with `more`.
+fn compiled(more: &[&str]) -> Vec<u8> {
+    let place = Place::new();
+    let program = place.path("sitl");
+    let mut compiler = Command::new("cc");
+    compiler.args(["-O1", "-o", &program, &repository("tests/runs/autopilots/sitl.c"), "-lpthread", "-lm"]);
+    let ended = compiler.args(more).output().unwrap();
+    assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+    fs::read(program).unwrap()
+}
+
+/// The stand-in in `place`, and its configuration of these words; as settings of the manifest.
+fn stand_in(place: &Place, words: &str) -> Vec<String> {
+    static PROGRAM: OnceLock<Vec<u8>> = OnceLock::new();
+    let program = place.write("sitl", PROGRAM.get_or_init(|| compiled(&[])));
+    let configuration = place.write("configuration", words);
+    vec![
+        format!("process.controller.firmware={program}"),
+        format!("process.controller.configuration={configuration}"),
+    ]
+}
+
+/// Runs `command` on `manifest` with `settings` and `more`.
+fn call(place: &Place, command: &str, manifest: &str, settings: &[String], more: &[&str]) -> Ended {
+    let settings = settings.iter().flat_map(|setting| ["--set", setting]);
+    let args: Vec<&str> =
+        [command, manifest].into_iter().chain(settings).chain(more.iter().copied()).collect();
+    place.call(&args)
+}
+
+#[test]
+fn a_firmware_flies_the_hover_and_its_doublet_and_two_runs_are_the_same_bytes() {
+    let place = Place::new();
+    let (settings, first, second) = (stand_in(&place, ""), place.path("a.mcap"), place.path("b.mcap"));
+    call(&place, "run", &manifest(), &settings, &["--record", &first]).with_code(0);
+    // The firmware's folder lies in a path that cannot be preloaded from as it is.
+    let folder = place.path("a blank, a colon: ");
+    fs::create_dir(&folder).unwrap();
+    let manifest = manifest();
+    let set = settings.iter().flat_map(|setting| ["--set", setting]);
+    let args: Vec<&str> =
+        ["run", &manifest, "--record", &second, "--compose", "all"].into_iter().chain(set).collect();
+    place.start_with(&args, &[("TMPDIR", &folder)]).end().with_code(0);
+    require_same(&fs::read(&first).unwrap(), &second);
+}
+
+#[test]
+fn a_controller_takes_over_from_a_firmware_and_gives_back() {
+    let place = Place::new();
+    let swap = repository("manifests/autopilots/betaflight-swap.toml");
+    let args = ["run", &swap, "--record", &place.path("a.mcap"), "--json"];
+    let program = place.write("sitl", compiled(&[]));
+    let ended = place.start_with(&args, &[("HUMMINGBUS_BETAFLIGHT", &program)]).end();
+    let summary = ended.with_code(0).json();
+    let kinds: Vec<&str> = summary["successions"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|it| it["hand_over"].as_str().unwrap())
+        .collect();
+    assert_eq!(kinds.len(), 2, "{summary}");
+}
+
+#[test]
+fn each_firmware_of_a_run_flies_its_own_vehicle() {
+    let place = Place::new();
+    let two = fs::read_to_string(manifest()).unwrap();
+    let second: String = two
+        .split("[process.recorder]")
+        .next()
+        .unwrap()
+        .split("[process.plant]")
+        .nth(1)
+        .map(|rest| format!("[process.plant]{rest}"))
+        .unwrap();
+    let names = ["plant", "imu", "mocap", "ekf", "controller", "sticks", "pilot"];
+    let second = names.iter().fold(second, |text, name| {
+        text.replace(&format!("[process.{name}"), &format!("[process.{name}2"))
+            .replace(&format!("\"/{name}/"), &format!("\"/{name}2/"))
+    });
+    let second = second.replace(
+        "outputs.pose = { every_ticks = 10 }\noutputs.tf = { topic = \"/tf\", every_ticks = 10 }\n",
+        "",
+    );
+    let place_of = |text: &str| text.replace("../../", &format!("{}/", repository("")));
+    let text = place_of(&format!("{two}\n{second}")).replace("\"betaflight.cli\"", "\"configuration\"");
+    let both = place.write("two.toml", text);
+    let program = place.write("sitl", compiled(&[]));
+    place.write("configuration", "");
+    let settings = [
+        format!("process.controller.firmware={program}"),
+        format!("process.controller2.firmware={program}"),
+        "run.duration_s=3".to_owned(),
+    ];
+    let recording = place.path("two.mcap");
+    call(&place, "run", &both, &settings, &["--record", &recording]).flown();
+    let height = |topic: &str| {
+        let out = place
+            .call(&["cat", &recording, "--topic", topic, "--field", "position.z", "--csv"])
+            .with_code(0)
+            .output;
+        out.lines().last().unwrap().rsplit(',').next().unwrap().parse::<f64>().unwrap()
+    };
+    // Their noise differs, so that no firmware has flown both.
+    let [first, second] = ["/plant/state", "/plant2/state"].map(height);
+    assert!((first - 1.4).abs() < 0.2 && (second - 1.4).abs() < 0.2 && first != second, "{first} {second}");
+}
+
+#[test]
+fn a_firmware_that_fails_ends_the_run_with_its_last_words() {
+    let cases: [(&str, &[&str]); 4] = [
+        // While it starts, and in flight: 6 s of its time are before tick 0.
+        ("ends 1\n", &["betaflight ended with exit code 3", "out of coffee"]),
+        ("ends 7\n", &["betaflight ended with exit code 3", "out of coffee"]),
+        ("crashes 7\n", &["betaflight was killed by signal 6"]),
+        ("hangs 7\n", &["betaflight runs and gave no answer for 0.5 s", "thinking"]),
+    ];
+    for (words, told) in cases {
+        let place = Place::new();
+        let mut settings = stand_in(&place, words);
+        settings.push("process.controller.parameters.reply_timeout_s=0.5".to_owned());
+        let recording = place.path("a.mcap");
+        let ended = call(&place, "run", &manifest(), &settings, &["--record", &recording]).with_code(2);
+        ended.says(told);
+        ended.says(&["node `controller`"]);
+        assert!(place.left().is_empty(), "{words}: {:?}", place.left());
+    }
+}
+
+#[test]
+fn a_firmware_that_is_not_armed_is_told_before_tick_0() {
+    let place = Place::new();
+    let ended = call(&place, "run", &manifest(), &stand_in(&place, "unarmed\n"), &["--record", "none"]);
+    ended.with_code(2).says(&["it is not armed at tick 0", "armed_by_channel"]);
+}
+
+#[test]
+fn what_cannot_be_a_firmware_is_refused_by_check() {
+    let place = Place::new();
+    let unset = "process.controller.firmware=${HUMMINGBUS_UNSET}".to_owned();
+    call(&place, "check", &manifest(), &[unset], &[]).with_code(2).says(&["HUMMINGBUS_UNSET is not set"]);
+    let text = place.write("text", "no program");
+    let in_static = place.write("static", compiled(&["-static"]));
+    let settings = stand_in(&place, "");
+    let cases: [(&str, &[&str]); 6] = [
+        (&format!("process.controller.firmware={text}"), &["firmware", "no program of 64 bits for Linux"]),
+        (&format!("process.controller.firmware={in_static}"), &["linked statically", "would stall"]),
+        ("process.controller.firmware=/nowhere/sitl", &["/nowhere/sitl", "No such file"]),
+        ("process.controller.parameters.armed_by_channel=4", &["expected 5 to 16"]),
+        ("process.controller.parameters.rc_rate_hz=0", &["rc_rate_hz"]),
+        (
+            &format!("process.controller.vehicle={}", repository("vehicles/tarot-t18.toml")),
+            &["stand in the places of none of the mixers QUADX, QUADP"],
+        ),
+    ];
+    for (setting, told) in cases {
+        let settings = [&settings[..], &[setting.to_owned()]].concat();
+        call(&place, "check", &manifest(), &settings, &[]).with_code(2).says(told);
+    }
+}
+
+#[test]
+fn a_checkpoint_of_a_firmware_is_refused_in_words() {
+    let place = Place::new();
+    let settings = stand_in(&place, "");
+    let recording = place.path("a.mcap");
+    let more = ["--record", &recording, "--checkpoint-every", "500ms", "--set", "run.duration_s=1"];
+    call(&place, "run", &manifest(), &settings, &more);
+    let later = place.call(&["run", "--from", &place.path("a.500.ckpt"), "--record", "none"]);
+    later.with_code(2).says(&["controller", "firmware"]);
+}
+
+#[test]
+fn betaflight_flies_the_hover_and_its_doublet() {
+    let Some(program) = variable_or_skip("HUMMINGBUS_BETAFLIGHT", "the program of Betaflight's SITL") else {
+        return;
+    };
+    let place = Place::new();
+    let settings = [format!("process.controller.firmware={program}")];
+    for manifest in ["betaflight", "betaflight-swap"] {
+        let path = repository(&format!("manifests/autopilots/{manifest}.toml"));
+        let [first, second] = ["a", "b"].map(|name| place.path(&format!("{manifest}-{name}.mcap")));
+        for recording in [&first, &second] {
+            call(&place, "run", &path, &settings, &["--record", recording]).with_code(0);
+        }
+        require_same(&fs::read(&first).unwrap(), &second);
+    }
+}
