@@ -25,7 +25,7 @@ use std::io::{Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// What all tasks need.
+/// Inputs and limits of all tasks.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Task {
     /// The campaign; the folder of its workers is the node's own.
@@ -56,7 +56,7 @@ pub struct Attempt {
     pub chunk: usize,
     /// Number of Slurm's job.
     pub job: String,
-    /// How often Slurm has started this job anew.
+    /// Number of times that Slurm has started this job anew.
     pub restarts: u64,
 }
 
@@ -117,7 +117,7 @@ impl Shared {
         std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
     }
 
-    /// What all tasks need.
+    /// Inputs and limits of all tasks.
     ///
     /// # Errors
     /// If the file is not there, or was written by another version.

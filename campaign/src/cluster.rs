@@ -36,7 +36,7 @@ pub struct Cluster<'a> {
     pub script: &'a str,
     /// Flights of a task.
     pub chunk: usize,
-    /// What all tasks need.
+    /// Inputs and limits of all tasks.
     pub task: &'a Task,
     /// Options of the user for `sbatch`.
     pub options: &'a [String],

@@ -40,7 +40,7 @@ struct Found {
 /// Calls `work` with flights on the workers of `pool`; its result.
 ///
 /// # Errors
-/// That of `work`, or of the workers.
+/// The error of `work`, or of the workers.
 pub fn with_flights<T: Send>(
     pool: &Pool<'_>,
     stop: &StopToken,

@@ -26,7 +26,7 @@ pub fn text(declared: &str, name: &Path, tuning: &Path, seed: u64, outcome: &Out
     Ok(format!("{}#\n{document}", header(&name, &tuning, seed, outcome)?))
 }
 
-/// What was tuned, by which flights, and what came of it.
+/// First lines of the file: the tuned file, the flights, and the figures before and after.
 fn header(name: &str, tuning: &str, seed: u64, outcome: &Outcome) -> Result<String> {
     let Outcome { generations, candidates, tuned_on, held_out, .. } = outcome;
     let mut text = format!("{START}\n");

@@ -161,7 +161,9 @@ pub fn search(
     // The mean of the last generation may be better than each candidate.
     let mean = values(search.mean());
     let mean_costs = course.fly(&mean)?.relative_costs(costs_today) + beyond(search.mean());
-    let tuned = if mean_costs < best.value { mean } else { values(&best.point) };
+    let (least, tuned) =
+        if mean_costs < best.value { (mean_costs, mean) } else { (best.value, values(&best.point)) };
+    let tuned = if least < 1.0 { tuned } else { declared.clone() };
     let held_out = Course::new(tuning, &tuning.held_out, base, flying)?;
     let gains = tuning.gains.iter().zip(declared.iter().zip(&tuned));
     Ok(Outcome {

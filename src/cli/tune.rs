@@ -121,7 +121,7 @@ fn summary(outcome: &Outcome, out: Option<&Path>) -> Result<String> {
     writeln!(text, "{}", compared("judged by other flights:", &outcome.held_out)?)?;
     match out {
         Some(out) => write!(text, "gains: {}", out.display())?,
-        None => write!(text, "no gains were written: today's are better on the other flights")?,
+        None => write!(text, "no gains were written: today's are as good or better on the other flights")?,
     }
     Ok(text)
 }

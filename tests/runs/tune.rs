@@ -73,7 +73,8 @@ fn another_seed_of_the_optimiser_flies_other_candidates() {
         let text = TUNING.replace("generations = 4", &format!("generations = 1\nseed = {seed}"));
         let file = tuning(&place, name, &text);
         let out = place.path("gains.toml");
-        place.call(&["tune", &file, "--out", &out, "--json"]).with_code(0).json()["gains"].clone()
+        // One generation may find nothing.
+        place.call(&["tune", &file, "--out", &out, "--json"]).json()["gains"].clone()
     };
     assert_ne!(tune("a.toml", "1"), tune("b.toml", "2"));
 }
@@ -94,7 +95,7 @@ fn gains_that_are_not_better_on_other_flights_are_not_written() {
     place
         .call(&["tune", &file, "--out", &out])
         .with_code(1)
-        .prints(&["no gains were written: today's are better"]);
+        .prints(&["no gains were written: today's are as good or better"]);
     assert!(!fs::exists(&out).unwrap());
 }
 
