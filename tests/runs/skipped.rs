@@ -18,6 +18,13 @@ pub fn skip(reason: &str) {
     }
 }
 
+/// True where `HUMMINGBUS_STEADY` says that nothing else runs on this machine; a skipped test elsewhere. For tests of what
+/// host time decides, such as the silence of a person who flies by hand.
+#[allow(dead_code, reason = "few crates' tests need it")]
+pub fn is_steady() -> bool {
+    variable_or_skip("HUMMINGBUS_STEADY", "which says that nothing else runs on this machine").is_some()
+}
+
 /// The value of an environment variable, or `None` and a skipped test where it is not set.
 #[allow(dead_code, reason = "not every crate's tests need a variable")]
 pub fn variable_or_skip(name: &str, meaning: &str) -> Option<String> {
