@@ -72,7 +72,8 @@ fn the_truth_as_an_estimate_is_flown_by_what_the_thesis_prints_and_by_nothing_el
     for file in files_below(&folder) {
         let name = file.strip_prefix(&folder).unwrap().to_str().unwrap().to_owned();
         // Campaign and tuning files name manifests; those of firmware need a program that is not shipped.
-        let is_other = ["thesis/", "campaigns/", "tune/", "autopilots/"].iter().any(|folder| name.starts_with(folder));
+        let is_other =
+            ["thesis/", "campaigns/", "tune/", "autopilots/"].iter().any(|folder| name.starts_with(folder));
         if !name.ends_with(".toml") || is_other {
             continue;
         }
