@@ -29,8 +29,9 @@ const PRELOADED: &str = "./lockstep.so";
 const BOOT_VARIABLE: &str = "HUMMINGBUS_FIRMWARE_BOOT_NS";
 /// Time in which the firmware starts by itself, in s of its own clock.
 const BOOT_S: f64 = 2.0;
-/// Rest on the ground before tick 0, in s: the gyroscope is calibrated within 1.25 s, then it may be armed.
-const REST_S: f64 = 4.0;
+/// Rest on the ground before tick 0, in s: the gyroscope is calibrated within 1.25 s, and 5 s after its start the firmware may be
+/// armed (its setting `pwr_on_arm_grace`).
+const REST_S: f64 = 5.0;
 /// The last part of that with the arming switch on.
 const ARMED_S: f64 = 1.0;
 /// Channels of a packet of the remote control, and motors of a packet of the outputs.

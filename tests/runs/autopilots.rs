@@ -124,11 +124,11 @@ fn each_firmware_of_a_run_flies_its_own_vehicle() {
 #[test]
 fn a_firmware_that_fails_ends_the_run_with_its_last_words() {
     let cases: [(&str, &[&str]); 4] = [
-        // While it starts, and in flight: 6 s of its time are before tick 0.
+        // While it starts, and in flight: 7 s of its time are before tick 0.
         ("ends 1\n", &["betaflight ended with exit code 3", "out of coffee"]),
-        ("ends 7\n", &["betaflight ended with exit code 3", "out of coffee"]),
-        ("crashes 7\n", &["betaflight was killed by signal 6"]),
-        ("hangs 7\n", &["betaflight runs and gave no answer for 0.5 s", "thinking"]),
+        ("ends 8\n", &["betaflight ended with exit code 3", "out of coffee"]),
+        ("crashes 8\n", &["betaflight was killed by signal 6"]),
+        ("hangs 8\n", &["betaflight runs and gave no answer for 0.5 s", "thinking"]),
     ];
     for (words, told) in cases {
         let place = Place::new();
