@@ -128,6 +128,7 @@ impl Summary {
     ///     flight: None,
     ///     figures: None,
     ///     checkpoints: Vec::new(),
+    ///     rewinds: Vec::new(),
     /// };
     /// let summary = Summary::new("hover".to_owned(), outcome, 1e-3);
     /// assert_eq!((summary.passed, summary.real_time_factor), (true, 4.0));
