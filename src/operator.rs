@@ -63,7 +63,7 @@ pub struct Outputs {
     pub set_point: SetPoint,
 }
 
-/// All that `operator` remembers.
+/// State of `operator`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, bus::Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/OperatorState")]

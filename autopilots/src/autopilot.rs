@@ -1,4 +1,4 @@
-//! An autopilot: what a firmware has to bring to be a node.
+//! The interface of an autopilot: one implementation for each firmware.
 
 use bus::Bounded;
 use bus::component::Info;
@@ -8,7 +8,7 @@ use diagnostics::ParameterError;
 use serde::de::DeserializeOwned;
 use vehicles::Vehicle;
 
-/// What a firmware senses at a tick: body x forward, y left, z up; the world's z up; SI units.
+/// Inputs of a firmware at a tick: body x forward, y left, z up; the world's z up; SI units.
 #[derive(Clone, Copy, Debug)]
 pub struct Sensed<'a> {
     /// Simulation time since tick 0, s; below 0 while the firmware starts.

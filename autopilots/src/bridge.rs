@@ -7,7 +7,7 @@ use bus::context::{NodeContext, StepContext};
 use bus::messages::{Imu, MotorCommand, RcChannels, StateEstimate};
 use bus::{InputPorts, OutputPorts, ParameterError};
 
-/// What a firmware reads.
+/// Inputs of a firmware.
 #[derive(Debug, InputPorts)]
 pub struct Inputs<'a> {
     /// Accelerometer and gyroscope.
@@ -18,7 +18,7 @@ pub struct Inputs<'a> {
     pub rc: &'a RcChannels,
 }
 
-/// What it sends.
+/// Outputs of a firmware.
 #[derive(Debug, OutputPorts)]
 pub struct Outputs {
     /// To the motors.
@@ -41,7 +41,7 @@ pub struct BridgeState<L>(Option<L>);
 impl<L: Send + 'static> State for BridgeState<L> {
     const TRANSFER: Transfer = Transfer::Bytes("a firmware");
 
-    /// Of this process alone: a successor begins with a firmware of its own.
+    /// A number of this process alone: a successor begins with a firmware of its own.
     fn configuration(&self) -> u64 {
         u64::from(std::process::id())
     }

@@ -1,6 +1,6 @@
 //! Autopilot firmware as nodes: a process of the firmware's own, in lockstep with the run, with motors, axes and units converted.
 //!
-//! - [`autopilot`]: what a firmware has to bring, and what it senses
+//! - [`autopilot`]: the trait that each firmware implements, and its inputs
 //! - [`bridge`]: the component that holds a firmware: its ports, its start before tick 0, an exchange a tick
 //! - [`process`]: a firmware's process: its scratch folder, its log, what it ended with
 //! - [`layout`]: which motor output drives which rotor

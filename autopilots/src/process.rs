@@ -68,7 +68,7 @@ impl Scratch {
         self.folder.path().join("log")
     }
 
-    /// All that it has printed.
+    /// Text that it has printed.
     fn printed(&self) -> String {
         String::from_utf8_lossy(&fs::read(self.log()).unwrap_or_default()).into_owned()
     }

@@ -85,23 +85,23 @@ struct Switch {
     pulse_us: f64,
 }
 
-/// What the remote control reads.
+/// Inputs of the remote control.
 #[derive(Debug, InputPorts)]
 pub struct Inputs<'a> {
-    /// What the pilot wants.
+    /// Set point of the pilot.
     pub set_point: &'a SetPoint,
     /// The motion that he sees.
     pub estimate: &'a StateEstimate,
 }
 
-/// What it sends.
+/// Outputs of the remote control.
 #[derive(Debug, OutputPorts)]
 pub struct Outputs {
     /// Its channels.
     pub rc: RcChannels,
 }
 
-/// All that it remembers.
+/// State of the remote control.
 #[derive(Debug, Clone, Copy, Default, PartialEq, bus::Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/RemoteControlState")]

@@ -86,7 +86,11 @@ impl<'a> ControlServer<'a> {
                     self.answer(reply, "stopping at the next tick boundary".to_owned());
                 }
                 Request::Checkpoint { path } => {
-                    let hold_tick = self.control.hold_tick();
+                    // One that is overtaken has set the hold already.
+                    let hold_tick = match &self.wish {
+                        Some((Goal::PauseToSave { hold_tick, .. }, _)) => *hold_tick,
+                        _ => self.control.hold_tick(),
+                    };
                     self.wish(0, Goal::PauseToSave { path, hold_tick }, reply);
                 }
                 Request::Rewind { tick, path } => self.rewind(tick, path.as_deref(), reply),
