@@ -1112,7 +1112,7 @@ static const HbField HB_MOCAP_STATE_FIELDS[] = {
 
 static const HbMessage HB_MOCAP_STATE = { "hummingbus_msgs/msg/MocapState", "All that the sensor remembers.", sizeof(HbMocapState), HB_MOCAP_STATE_FIELDS, 2 };
 
-// All that `operator` remembers.
+// State of `operator`.
 typedef struct HbOperatorState {
   // Altitude lost since the source fell silent. [m] in world
   double lowered;
@@ -1122,7 +1122,7 @@ static const HbField HB_OPERATOR_STATE_FIELDS[] = {
   { "lowered", "Altitude lost since the source fell silent.", "m", "world", offsetof(HbOperatorState, lowered), HB_F64, NULL, 0, 0, 0 },
 };
 
-static const HbMessage HB_OPERATOR_STATE = { "hummingbus_msgs/msg/OperatorState", "All that `operator` remembers.", sizeof(HbOperatorState), HB_OPERATOR_STATE_FIELDS, 1 };
+static const HbMessage HB_OPERATOR_STATE = { "hummingbus_msgs/msg/OperatorState", "State of `operator`.", sizeof(HbOperatorState), HB_OPERATOR_STATE_FIELDS, 1 };
 
 // All that it remembers.
 typedef struct HbPositionHoldState {
@@ -1268,7 +1268,7 @@ static const HbField HB_RANGE_STATE_FIELDS[] = {
 
 static const HbMessage HB_RANGE_STATE = { "hummingbus_msgs/msg/RangeState", "All that the sensor remembers.", sizeof(HbRangeState), HB_RANGE_STATE_FIELDS, 2 };
 
-// All that it remembers.
+// State of the remote control.
 typedef struct HbRemoteControlState {
   // Throttle that the integral has added to that of hover. [1]
   double throttle;
@@ -1278,7 +1278,7 @@ static const HbField HB_REMOTE_CONTROL_STATE_FIELDS[] = {
   { "throttle", "Throttle that the integral has added to that of hover.", "1", "", offsetof(HbRemoteControlState, throttle), HB_F64, NULL, 0, 0, 0 },
 };
 
-static const HbMessage HB_REMOTE_CONTROL_STATE = { "hummingbus_msgs/msg/RemoteControlState", "All that it remembers.", sizeof(HbRemoteControlState), HB_REMOTE_CONTROL_STATE_FIELDS, 1 };
+static const HbMessage HB_REMOTE_CONTROL_STATE = { "hummingbus_msgs/msg/RemoteControlState", "State of the remote control.", sizeof(HbRemoteControlState), HB_REMOTE_CONTROL_STATE_FIELDS, 1 };
 
 // All that the sensor remembers.
 typedef struct HbRpmState {

@@ -1068,14 +1068,14 @@ HUMMINGBUS_MESSAGE(hummingbus::msgs::MocapState, "hummingbus_msgs/msg/MocapState
     HUMMINGBUS_FIELD(queue, "", "", "The last measurements."));
 
 namespace hummingbus::msgs {
-// All that `operator` remembers.
+// State of `operator`.
 struct OperatorState {
   // Altitude lost since the source fell silent. [m] in world
   double lowered{};
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::OperatorState, "hummingbus_msgs/msg/OperatorState", "All that `operator` remembers.",
+HUMMINGBUS_MESSAGE(hummingbus::msgs::OperatorState, "hummingbus_msgs/msg/OperatorState", "State of `operator`.",
     HUMMINGBUS_FIELD(lowered, "m", "world", "Altitude lost since the source fell silent."));
 
 namespace hummingbus::msgs {
@@ -1216,14 +1216,14 @@ HUMMINGBUS_MESSAGE(hummingbus::msgs::RangeState, "hummingbus_msgs/msg/RangeState
     HUMMINGBUS_FIELD(queue, "", "", "The last measurements."));
 
 namespace hummingbus::msgs {
-// All that it remembers.
+// State of the remote control.
 struct RemoteControlState {
   // Throttle that the integral has added to that of hover. [1]
   double throttle{};
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::RemoteControlState, "hummingbus_msgs/msg/RemoteControlState", "All that it remembers.",
+HUMMINGBUS_MESSAGE(hummingbus::msgs::RemoteControlState, "hummingbus_msgs/msg/RemoteControlState", "State of the remote control.",
     HUMMINGBUS_FIELD(throttle, "1", "", "Throttle that the integral has added to that of hover."));
 
 namespace hummingbus::msgs {
