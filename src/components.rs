@@ -67,9 +67,8 @@ mod tests {
         for component in COMPONENTS.iter() {
             let known = component.parameters();
             assert!(component.initial.iter().all(|name| known.contains(name)), "{}", component.name);
-            // The place of the estimate's origin is added in every step; an operator sends its altitude until a person asks.
-            let counts_later =
-                |name: &str| name == "initial_level_position_m" || component.name == "operator";
+            // The place of the estimate's origin is added in every step.
+            let counts_later = |name: &str| name == "initial_level_position_m";
             let is_stateless = matches!(component.transfer, Transfer::Nothing);
             let named = known.iter().filter(|name| name.contains("initial") && !counts_later(name));
             for name in named.filter(|_| !is_stateless) {

@@ -68,9 +68,32 @@ pub struct Outputs {
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/OperatorState")]
 pub struct OperatorState {
+    /// Altitude that was asked for last, within its limits.
+    #[field(unit = "m", frame = "world")]
+    pub altitude: f64,
+    /// Roll that was asked for last, within its limit.
+    #[field(unit = "rad")]
+    pub roll: f64,
+    /// Pitch that was asked for last, positive nose down, within its limit.
+    #[field(unit = "rad")]
+    pub pitch: f64,
+    /// Yaw that was asked for last.
+    #[field(unit = "rad")]
+    pub yaw: f64,
     /// Altitude lost since the source fell silent.
     #[field(unit = "m", frame = "world")]
     pub lowered: f64,
+    /// 1 once somebody has asked.
+    pub is_asked: u32,
+    /// Zero.
+    pub reserved: u32,
+}
+
+impl OperatorState {
+    fn asked(&self) -> Asked {
+        let Self { altitude, roll, pitch, yaw, .. } = *self;
+        Asked { altitude_m: altitude, roll_rad: roll, pitch_rad: pitch, yaw_rad: yaw }
+    }
 }
 
 /// Source of set points.
@@ -103,7 +126,7 @@ struct Flight {
 /// ```
 #[derive(Debug)]
 pub struct Operator {
-    initial: Asked,
+    initial_altitude_m: f64,
     altitudes_m: [f64; 2],
     tilt_max_rad: f64,
     fallback: Fallback,
@@ -115,7 +138,8 @@ impl Component for Operator {
     const INFO: Info = Info::new(
         "operator",
         "set points of a person at the page of the run, or those of a recording of such a run",
-    );
+    )
+    .starting_with(&["initial_altitude_m"]);
     type Parameters = Parameters;
     type Inputs<'a> = ();
     type Outputs = Outputs;
@@ -144,7 +168,7 @@ impl Component for Operator {
             None => Source::Person(file(context)?),
         };
         Ok(Self {
-            initial: Asked { altitude_m: initial_altitude_m, ..Asked::default() },
+            initial_altitude_m,
             altitudes_m,
             tilt_max_rad: tilt_max_deg.to_radians(),
             fallback,
@@ -154,7 +178,7 @@ impl Component for Operator {
     }
 
     fn initial(&self) -> OperatorState {
-        OperatorState::default()
+        OperatorState { altitude: self.initial_altitude_m, ..OperatorState::default() }
     }
 
     fn step(
@@ -164,7 +188,7 @@ impl Component for Operator {
         state: &mut OperatorState,
     ) -> Result<Outputs, StepError> {
         let asked = match &self.source {
-            Source::Flight(flight) => flight.at(context.time_ns()).unwrap_or(self.initial),
+            Source::Flight(flight) => flight.at(context.time_ns()).unwrap_or_else(|| self.initial().asked()),
             Source::Person(file) => self.allowed(file.as_ref().and_then(AskedFile::read), state),
         };
         let Asked { altitude_m: altitude, roll_rad: roll, pitch_rad: pitch, yaw_rad: yaw } = asked;
@@ -184,22 +208,42 @@ fn file(context: &NodeContext<'_>) -> Result<Option<AskedFile>, ParameterError> 
 }
 
 impl Operator {
-    /// Values within the limits: those that are asked for, or the fallback where they are too old.
+    /// Values within the limits: those that are asked for, or the fallback where they are too old. In a run that goes on from
+    /// a checkpoint those from before it are too old.
     fn allowed(&self, read: Option<(Asked, Duration)>, state: &mut OperatorState) -> Asked {
-        let Some((asked, age)) = read.filter(|(asked, _)| asked.is_finite()) else { return self.initial };
-        let is_silent = age >= SILENCE;
-        let Asked { altitude_m, roll_rad, pitch_rad, yaw_rad } = asked;
-        let [lowest_m, highest_m] = self.altitudes_m;
+        let read = read.filter(|(asked, _)| asked.is_finite());
+        if let Some((asked, _)) = &read {
+            self.note(asked, state);
+        }
+        if state.is_asked == 0 {
+            return state.asked();
+        }
+        let is_silent = read.is_none_or(|(_, age)| age >= SILENCE);
+        let Asked { altitude_m, roll_rad, pitch_rad, yaw_rad } = state.asked();
         let tilt = |tilt_rad: f64| match self.fallback {
             Fallback::Level | Fallback::Land if is_silent => 0.0,
-            _ => tilt_rad.clamp(-self.tilt_max_rad, self.tilt_max_rad),
+            _ => tilt_rad,
         };
         state.lowered = match self.fallback {
             Fallback::Land if is_silent => state.lowered + LANDING_M_S * self.period_s,
             _ => 0.0,
         };
-        let altitude_m = (altitude_m.clamp(lowest_m, highest_m) - state.lowered).max(lowest_m);
+        let altitude_m = (altitude_m - state.lowered).max(self.altitudes_m[0]);
         Asked { altitude_m, roll_rad: tilt(roll_rad), pitch_rad: tilt(pitch_rad), yaw_rad }
+    }
+
+    /// Notes what is asked for, within the limits.
+    fn note(&self, asked: &Asked, state: &mut OperatorState) {
+        let [lowest_m, highest_m] = self.altitudes_m;
+        let tilt = |tilt_rad: f64| tilt_rad.clamp(-self.tilt_max_rad, self.tilt_max_rad);
+        *state = OperatorState {
+            altitude: asked.altitude_m.clamp(lowest_m, highest_m),
+            roll: tilt(asked.roll_rad),
+            pitch: tilt(asked.pitch_rad),
+            yaw: asked.yaw_rad,
+            is_asked: 1,
+            ..*state
+        };
     }
 }
 
@@ -246,6 +290,7 @@ impl Flight {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bus::component::State as _;
     use serde_json::{Value, json};
 
     fn parameters(fallback: &str) -> Value {
@@ -263,12 +308,30 @@ mod tests {
 
     #[test]
     fn what_is_asked_stays_within_the_limits() {
-        let (operator, mut state) = (operator("hold"), OperatorState::default());
+        let operator = operator("hold");
+        let mut state = operator.initial();
         let mut allowed = |asked| operator.allowed(Some((asked, Duration::ZERO)), &mut state);
+        assert_eq!(allowed(asked(f64::NAN, 0.0)), Asked { altitude_m: 1.5, ..Asked::default() });
         assert_eq!(allowed(asked(2.0, 0.1)), asked(2.0, 0.1));
         assert_eq!(allowed(asked(9.0, 2.0)), asked(3.0, 10_f64.to_radians()));
         assert_eq!(allowed(asked(-9.0, -2.0)), asked(0.5, -(10_f64.to_radians())));
-        assert_eq!(allowed(asked(f64::NAN, 0.0)), Asked { altitude_m: 1.5, ..Asked::default() });
+        assert_eq!(allowed(asked(f64::NAN, 0.0)), asked(0.5, -(10_f64.to_radians())));
+    }
+
+    #[test]
+    fn a_run_that_goes_on_keeps_the_last_values_and_answers_the_silence_before_it() {
+        let after = |fallback| {
+            let operator = operator(fallback);
+            let mut before = operator.initial();
+            assert_eq!(operator.allowed(None, &mut before).altitude_m, 1.5, "nobody has asked");
+            operator.allowed(Some((asked(2.0, 0.1), Duration::ZERO)), &mut before);
+            let mut state = OperatorState::default();
+            state.load(bytemuck::bytes_of(&before)).unwrap();
+            operator.allowed(None, &mut state)
+        };
+        assert_eq!(after("hold"), asked(2.0, 0.1));
+        assert_eq!(after("level"), Asked { roll_rad: 0.0, pitch_rad: 0.0, ..asked(2.0, 0.0) });
+        assert_eq!(after("land").altitude_m, 2.0 - LANDING_M_S * 1e-3);
     }
 
     #[test]
@@ -276,7 +339,8 @@ mod tests {
         let news = Some((asked(2.0, 0.1), SILENCE - Duration::from_millis(1)));
         let silent = Some((asked(2.0, 0.1), SILENCE));
         let after = |fallback, steps: usize| {
-            let (operator, mut state) = (operator(fallback), OperatorState::default());
+            let operator = operator(fallback);
+            let mut state = operator.initial();
             assert_eq!(operator.allowed(news, &mut state), asked(2.0, 0.1));
             let last = (0..steps).map(|_| operator.allowed(silent, &mut state)).last().unwrap();
             assert_eq!(operator.allowed(news, &mut state), asked(2.0, 0.1), "it is heard again");

@@ -34,6 +34,8 @@ const BOOT_S: f64 = 2.0;
 const REST_S: f64 = 5.0;
 /// The last part of that with the arming switch on.
 const ARMED_S: f64 = 1.0;
+/// Its time without motor outputs after which it flies no more, s: a hundred of its control steps.
+const STALE_S: f64 = 0.1;
 /// Channels of a packet of the remote control, and motors of a packet of the outputs.
 const CHANNELS: usize = 16;
 /// Host time that an answer may take at most, s.
@@ -134,6 +136,8 @@ pub struct Link {
     firmware: Firmware,
     /// Packets sent.
     steps: u64,
+    /// Steps since the last motor outputs came.
+    stale_steps: u64,
 }
 
 impl Autopilot for Betaflight {
@@ -205,7 +209,7 @@ impl Autopilot for Betaflight {
         let mut command = scratch.command(&program)?;
         command.env("LD_PRELOAD", PRELOADED).env(BOOT_VARIABLE, nanoseconds(BOOT_S).to_string());
         let firmware = Firmware::start(scratch, command, self.reply_timeout)?;
-        let mut link = Link { firmware, steps: 0 };
+        let mut link = Link { firmware, steps: 0, stale_steps: 0 };
         link.receive()?;
         self.rest(&mut link)?;
         Ok(link)
@@ -216,7 +220,13 @@ impl Autopilot for Betaflight {
         link.steps += 1;
         link.firmware.send(bytemuck::bytes_of(&packets))?;
         let answer = link.receive()?;
-        self.throttles(&answer).map_err(|words| link.firmware.complaint(&words))
+        link.stale_steps = if answer.is_fresh == 0 { link.stale_steps + 1 } else { 0 };
+        let throttles = if link.stale_steps < steps(STALE_S, self.period_ns as f64 * 1e-9).max(1) {
+            self.throttles(&answer)
+        } else {
+            Err(format!("it has sent no motor outputs for {STALE_S} s of its time"))
+        };
+        throttles.map_err(|words| link.firmware.complaint(&words))
     }
 }
 

@@ -35,27 +35,20 @@ pub struct Outputs {
 #[derive(Debug)]
 pub struct Bridge<A>(A);
 
-/// The firmware's process, once it runs. It cannot be saved: what a firmware remembers is its own.
+/// The firmware's process, once it runs: what a firmware remembers is its own.
 pub struct BridgeState<L>(Option<L>);
 
 impl<L: Send + 'static> State for BridgeState<L> {
-    const TRANSFER: Transfer = Transfer::Bytes("a firmware");
-
-    /// A number of this process alone: a successor begins with a firmware of its own.
-    fn configuration(&self) -> u64 {
-        u64::from(std::process::id())
-    }
+    const TRANSFER: Transfer = Transfer::External("a firmware");
 
     fn size(&self) -> usize {
-        size_of::<u64>()
+        0
     }
 
-    fn save(&self, bytes: &mut [u8]) {
-        bytes.fill(0);
-    }
+    fn save(&self, _: &mut [u8]) {}
 
     fn load(&mut self, _: &[u8]) -> Result<(), StateError> {
-        let reason = "it is a process, which cannot be saved; go on without it, from tick 0".to_owned();
+        let reason = "a firmware does not tell what it remembers".to_owned();
         Err(StateError::Contents { type_name: "a firmware", reason })
     }
 }

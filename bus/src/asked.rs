@@ -120,15 +120,23 @@ pub fn run_dir() -> Option<PathBuf> {
     hosted::join().map(|join| join.run_dir).or_else(|| std::env::var_os(RUN_VARIABLE).map(PathBuf::from))
 }
 
+/// Names of nodes have no dots, so that no two have one file.
 fn path(run_dir: &Path, node: &str) -> PathBuf {
-    run_dir.join(format!("asked-{}", node.replace('/', "-")))
+    run_dir.join(format!("asked-{}", node.replace('/', ".")))
 }
 
 #[cfg(test)]
 mod tests {
     use super::{Asked, AskedFile, path};
     use std::os::unix::fs::FileExt as _;
+    use std::path::Path;
     use std::sync::atomic::{AtomicBool, Ordering};
+
+    #[test]
+    fn no_two_nodes_have_one_file() {
+        let folder = Path::new("run");
+        assert_ne!(path(folder, "h1/pilot"), path(folder, "h1-pilot"));
+    }
 
     #[test]
     fn half_an_entry_is_none() {

@@ -17,6 +17,9 @@ pub enum Transfer {
     Growing(&'static str),
     /// The state is a file that is being written. No other process can continue it.
     File,
+    /// The state is in another program, which does not tell it. Another process can take the component's place and goes on
+    /// from its last outputs; a checkpoint cannot hold it. The text names the program.
+    External(&'static str),
 }
 
 /// The state of a component: everything that changes from tick to tick.

@@ -31,7 +31,7 @@ impl StateLayout {
         let (type_name, layout_hash) = match transfer {
             Transfer::Message(schema) => (schema.type_name, schema.layout_hash()),
             Transfer::Bytes(type_name) => (type_name, configuration),
-            Transfer::Nothing | Transfer::File | Transfer::Growing(_) => return None,
+            Transfer::Nothing | Transfer::File | Transfer::External(_) | Transfer::Growing(_) => return None,
         };
         Some(Self { type_name: type_name.to_owned(), size, layout_hash })
     }
@@ -195,6 +195,7 @@ mod tests {
         assert_ne!(of("plant", 96), StateLayout::of(Transfer::Bytes("plant"), 96, 8), "other effects");
         let message = |transfer| StateLayout::of(transfer, 40, 0);
         assert_ne!(message(SetPoint::TRANSFER), message(MotorCommand::TRANSFER));
-        assert_eq!((message(Transfer::Nothing), message(Transfer::File)), (None, None));
+        let unsaved = [Transfer::Nothing, Transfer::File, Transfer::External("a firmware")];
+        assert_eq!(unsaved.map(message), [None, None, None]);
     }
 }

@@ -19,7 +19,7 @@ use std::time::Duration;
 const LOOK: Duration = Duration::from_millis(200);
 /// Host time between two questions to Slurm: at first, and at most.
 const QUESTION_NS: (u64, u64) = (1_000_000_000, 16_000_000_000);
-/// Host time for which Slurm's controller may fail to answer.
+/// Host time for which Slurm's controller may fail to answer, or refuse what it took before.
 const SILENCE_NS: u64 = 900_000_000_000;
 /// Host time within which cancelled tasks end: Slurm's KillWait is 30 s.
 const END_NS: u64 = 45_000_000_000;
@@ -50,7 +50,7 @@ struct Chunk {
     missing: BTreeSet<u64>,
     /// The job array in which it is flown.
     array: String,
-    /// Attempts so far, since the last one that flew a flight.
+    /// Attempts so far, since the last one that flew a flight; 0 before the first.
     attempts: usize,
     has_flown: bool,
     ends_seen: usize,
@@ -64,7 +64,7 @@ impl Cluster<'_> {
     pub fn fly(&self, jobs: &[Job], stop: &StopToken, mut take: impl FnMut(Row) -> Result<()>) -> Result<()> {
         let mut flights = Flights { wanted: jobs.iter().map(|job| (job.flight, job)).collect(), flown: 0 };
         let shared = Shared::new(self.folder);
-        let mut array = match self.attach(&shared, &mut flights, &mut take)? {
+        let mut array = match self.attach(&shared, &mut flights, stop, &mut take)? {
             Some(array) => array,
             None if flights.wanted.is_empty() => return Ok(()),
             None => self.begin(shared, &flights)?,
@@ -86,6 +86,7 @@ impl Cluster<'_> {
         &self,
         shared: &Shared,
         flights: &mut Flights<'_>,
+        stop: &StopToken,
         take: &mut impl FnMut(Row) -> Result<()>,
     ) -> Result<Option<Array>> {
         if !self.folder.exists() {
@@ -106,7 +107,7 @@ impl Cluster<'_> {
                 // The newest array that has the chunk.
                 let with_it = |array: &&String| states.contains_key(&((*array).clone(), number));
                 let newest = arrays.iter().rev().find(with_it).or(arrays.last()).context("no job array")?;
-                array.add(number, missing, newest.clone());
+                array.add(number, missing, newest.clone(), 1);
             }
             (self.tell)(&format!("waiting for Slurm's job {} of an earlier call", arrays.join(", ")));
             return Ok(Some(array));
@@ -118,7 +119,8 @@ impl Cluster<'_> {
             if is_meant && !row.is_of_host { flights.take(row, take).map(drop) } else { Ok(()) }
         })?;
         if is_alive {
-            slurm::cancel(&arrays)?;
+            // They would write into a folder that is gone.
+            cancel(&arrays, stop)?;
         }
         let shown = self.folder.display();
         std::fs::remove_dir_all(self.folder).with_context(|| format!("cannot remove {shown}"))?;
@@ -132,7 +134,7 @@ impl Cluster<'_> {
         shared.make(self.task, &chunks, self.script)?;
         let mut array = Array::new(shared);
         for (number, jobs) in chunks.iter().enumerate() {
-            array.add(number, jobs.iter().map(|job| job.flight).collect(), String::new());
+            array.add(number, jobs.iter().map(|job| job.flight).collect(), String::new(), 0);
         }
         let all: Vec<usize> = (0..chunks.len()).collect();
         if let Err(error) = array.submit(self, &all) {
@@ -170,17 +172,19 @@ struct Array {
     /// Chunks that a person cancelled.
     cancelled: BTreeMap<usize, Chunk>,
     has_given_up: bool,
+    /// Host time since which Slurm refuses to take lost chunks again.
+    refused_ns: Option<u64>,
 }
 
 impl Array {
     fn new(shared: Shared) -> Self {
         let (reader, chunks, cancelled) = Default::default();
-        Self { shared, reader, chunks, cancelled, has_given_up: false }
+        Self { shared, reader, chunks, cancelled, has_given_up: false, refused_ns: None }
     }
 
-    fn add(&mut self, number: usize, missing: BTreeSet<u64>, array: String) {
+    fn add(&mut self, number: usize, missing: BTreeSet<u64>, array: String, attempts: usize) {
         if !missing.is_empty() {
-            let chunk = Chunk { missing, array, attempts: 1, has_flown: false, ends_seen: 0 };
+            let chunk = Chunk { missing, array, attempts, has_flown: false, ends_seen: 0 };
             self.chunks.insert(number, chunk);
         }
     }
@@ -194,11 +198,18 @@ impl Array {
             processors: cluster.task.workers,
             options: cluster.options,
         })?;
-        self.shared.add_array(&array)?;
+        if let Err(error) = self.shared.add_array(&array) {
+            // Nobody would know of it.
+            return Err(match slurm::cancel(std::slice::from_ref(&array)) {
+                Ok(()) => error,
+                Err(too) => error.context(format!("Slurm's job {array} still flies: {too:#}")),
+            });
+        }
         (cluster.tell)(&format!("submitted {} tasks to Slurm as job {array}", numbers.len()));
         for number in numbers {
             if let Some(chunk) = self.chunks.get_mut(number) {
                 chunk.array.clone_from(&array);
+                chunk.attempts = chunk.next_attempt();
                 (chunk.has_flown, chunk.ends_seen) = (false, 0);
             }
         }
@@ -293,17 +304,40 @@ impl Array {
         self.cancelled.extend(cancelled.collect::<Vec<_>>());
         let mut again = Vec::new();
         for (number, word) in lost {
-            let Some(chunk) = self.chunks.get_mut(&number) else { continue };
-            chunk.attempts = if chunk.has_flown { 1 } else { chunk.attempts + 1 };
-            if chunk.attempts <= ATTEMPTS {
+            let Some(chunk) = self.chunks.get(&number) else { continue };
+            if chunk.next_attempt() <= ATTEMPTS {
                 let left = chunk.missing.len();
-                (cluster.tell)(&format!("task {}_{number} ended before {left} flights: {word}", chunk.array));
+                // Said once, however often Slurm refuses them.
+                if chunk.ends_seen == ENDS_SEEN {
+                    (cluster.tell)(&format!(
+                        "task {}_{number} ended before {left} flights: {word}",
+                        chunk.array
+                    ));
+                }
                 again.push(number);
             } else {
                 self.give_up(number, &word, flights, take)?;
             }
         }
-        if again.is_empty() { Ok(false) } else { self.submit(cluster, &again).map(|()| true) }
+        if again.is_empty() { Ok(false) } else { self.submit_again(cluster, &again) }
+    }
+
+    /// Submits lost chunks; true if Slurm took them. What it refuses is tried again for some time: a controller that took
+    /// the first array may be busy.
+    fn submit_again(&mut self, cluster: &Cluster<'_>, numbers: &[usize]) -> Result<bool> {
+        let Err(error) = self.submit(cluster, numbers) else {
+            self.refused_ns = None;
+            return Ok(true);
+        };
+        let is_first = self.refused_ns.is_none();
+        let since_ns = *self.refused_ns.get_or_insert_with(monotonic_ns);
+        if monotonic_ns() - since_ns > SILENCE_NS {
+            return Err(error);
+        }
+        if is_first {
+            (cluster.tell)(&format!("they are submitted again later: {error:#}"));
+        }
+        Ok(false)
     }
 
     /// Gives up the flights of a chunk, or the campaign if no task has flown a flight.
@@ -349,19 +383,30 @@ impl Array {
         stop: &StopToken,
         take: &mut impl FnMut(Row) -> Result<()>,
     ) -> Result<()> {
-        let arrays = self.arrays();
-        if arrays.is_empty() {
-            return Ok(());
-        }
-        slurm::cancel(&arrays)?;
-        let end_ns = monotonic_ns() + END_NS;
-        let is_alive = || {
-            slurm::states(&arrays).is_ok_and(|states| states.values().any(|state| *state == TaskState::Alive))
-        };
-        // A second stop does not wait.
-        while stop.count() < 2 && monotonic_ns() < end_ns && is_alive() {
-            std::thread::sleep(LOOK);
-        }
+        // Tasks that Slurm was slow to tell of may fly in an earlier array.
+        cancel(&self.shared.arrays(), stop)?;
         self.gather(flights, take)
     }
+}
+
+impl Chunk {
+    /// Number of the attempt that comes.
+    const fn next_attempt(&self) -> usize {
+        if self.has_flown { 1 } else { self.attempts + 1 }
+    }
+}
+
+/// Cancels `arrays`, and waits for the ends of their tasks, but not with a second stop.
+fn cancel(arrays: &[String], stop: &StopToken) -> Result<()> {
+    if arrays.is_empty() {
+        return Ok(());
+    }
+    slurm::cancel(arrays)?;
+    let end_ns = monotonic_ns() + END_NS;
+    let is_alive =
+        || slurm::states(arrays).is_ok_and(|states| states.values().any(|state| *state == TaskState::Alive));
+    while stop.count() < 2 && monotonic_ns() < end_ns && is_alive() {
+        std::thread::sleep(LOOK);
+    }
+    Ok(())
 }

@@ -8,7 +8,7 @@ use crate::fork;
 use crate::graph::Graph;
 use crate::manifest::Manifest;
 use crate::output_file::{self, Kind, Mark};
-use crate::program::{BackupSpec, Executable, OnExit, Program};
+use crate::program::{BackupSpec, Executable, Program, flying};
 use crate::registry::Registry;
 use anyhow::{Context as _, Result, anyhow, bail};
 use bus::checkpoint::{NodePart, Parts};
@@ -126,7 +126,7 @@ impl Checkpoint {
     }
 
     /// True if it is of the run that would write `other` now.
-    fn is_of_run_of(&self, other: &Self) -> bool {
+    pub(crate) fn is_of_run_of(&self, other: &Self) -> bool {
         let simulated = |checkpoint: &Self| -> Vec<String> {
             let overrides = checkpoint.overrides.iter();
             overrides.filter(|text| Manifest::is_of_simulation(text)).cloned().collect()
@@ -292,10 +292,9 @@ impl Checkpoint {
 
 /// Kind or command of each node of `graph` at `tick`, by name.
 fn kinds(graph: &Graph, tick: u32) -> Vec<(String, String)> {
-    let kind = |(index, program): (usize, &Program)| {
-        let is_swap = |backup: &&BackupSpec| backup.node == index && has_taken_over(backup, tick);
-        let program = graph.backups.iter().rfind(is_swap).map_or(program, |backup| &backup.program);
-        (graph.plan.nodes[index].name.clone(), kind_of(program))
+    let kind = |(node, program): (usize, &Program)| {
+        let program = flying(node, program, &graph.backups, tick);
+        (graph.plan.nodes[node].name.clone(), kind_of(program))
     };
     graph.programs.iter().enumerate().map(kind).collect()
 }
@@ -308,18 +307,13 @@ fn kind_of(program: &Program) -> String {
     }
 }
 
-/// True if `backup` flies at `tick`.
-fn has_taken_over(backup: &BackupSpec, tick: u32) -> bool {
-    backup.take_over_tick.is_some_and(|at| at < tick)
-}
-
 /// Puts the processes that have taken over before `tick` into the place of those before them.
 ///
 /// # Errors
 /// If one is on the way in at `tick`.
 fn take_over(graph: &mut Graph, tick: u32) -> Result<()> {
     let (done, ahead): (Vec<_>, Vec<_>) =
-        std::mem::take(&mut graph.backups).into_iter().partition(|backup| has_taken_over(backup, tick));
+        std::mem::take(&mut graph.backups).into_iter().partition(|backup| backup.has_taken_over(tick));
     for BackupSpec { node, plan, program, .. } in done {
         for group in &mut graph.plan.groups {
             let place = group.members.iter().position(|member| member.node == node);
@@ -393,175 +387,6 @@ pub struct Written {
     pub tick: u32,
     /// The file.
     pub path: PathBuf,
-}
-
-/// Writes the checkpoints of a run.
-#[derive(Clone, Copy)]
-pub(crate) struct Writer<'a> {
-    manifest: &'a Manifest,
-    graph: &'a Graph,
-    run_dir: &'a Path,
-    /// Path of the files without `.TICK.ckpt`.
-    stem: &'a Path,
-}
-
-impl Writer<'_> {
-    /// Writes the checkpoint of `tick` to `path`, or beside the recording, once its nodes have written their parts; `None`
-    /// before.
-    pub(crate) fn write(&self, tick: u32, path: Option<&Path>) -> Result<Option<PathBuf>> {
-        let Some(parts) = Parts::written(self.run_dir, tick, self.graph.plan.nodes.len())? else {
-            return Ok(None);
-        };
-        let path = path.map_or_else(|| self::path(self.stem, tick), Path::to_owned);
-        self.put(parts, &path)?;
-        Parts::remove_written(self.run_dir, tick);
-        Ok(Some(path))
-    }
-
-    /// The checkpoint in `file`, or that of `tick` beside the recording, or the newest there before tick `now`, to which the
-    /// run has come.
-    ///
-    /// # Errors
-    /// If there is none, it is one of another run, or it lies ahead.
-    pub(crate) fn find(&self, tick: Option<u32>, file: Option<&Path>, now: u32) -> Result<Checkpoint> {
-        let path = match (file, tick) {
-            (Some(file), _) => file.to_owned(),
-            (None, Some(tick)) => self::path(self.stem, tick),
-            (None, None) => self.newest_before(now).with_context(|| {
-                format!(
-                    "there is no checkpoint of this run before tick {now}: `run --checkpoint-every` and `ctl checkpoint` write \
-                     them; or name a file"
-                )
-            })?,
-        };
-        let found = Checkpoint::read(&path)?;
-        let of_now = Checkpoint::new(self.manifest, self.graph, Parts { tick: now, nodes: Vec::new() });
-        if !found.is_of_run_of(&of_now) {
-            bail!(
-                "{} is a checkpoint of another run: its manifest, one of its files or a value of --set is another one; \
-                 `hummingbus run --from {0}` goes on from it",
-                path.display()
-            );
-        }
-        if found.tick() >= now {
-            bail!(
-                "the checkpoint is of tick {}, and the run is at tick {now}: a rewind goes back",
-                found.tick()
-            );
-        }
-        Ok(found)
-    }
-
-    /// The file of the newest checkpoint before tick `now` beside the recording.
-    fn newest_before(&self, now: u32) -> Option<PathBuf> {
-        let stem = format!("{}.", self.stem.file_name()?.to_str()?);
-        let tick = |entry: std::fs::DirEntry| -> Option<u32> {
-            let name = entry.file_name();
-            name.to_str()?.strip_prefix(&stem)?.strip_suffix(".ckpt")?.parse().ok()
-        };
-        let entries = std::fs::read_dir(self.stem.parent()?).ok()?;
-        let ticks = entries.flatten().filter_map(tick).filter(|tick| *tick < now);
-        ticks.max().map(|tick| self::path(self.stem, tick))
-    }
-
-    /// True if the process that has written `part` is what the manifest says that node `index` is at `tick`.
-    fn is_planned(&self, index: usize, part: &NodePart, tick: u32) -> bool {
-        let Graph { plan, backups, programs, .. } = self.graph;
-        let is_swap = |backup: &&BackupSpec| backup.node == index && has_taken_over(backup, tick);
-        let swaps: Vec<&BackupSpec> = backups.iter().filter(is_swap).collect();
-        let plan = swaps.last().map_or(&plan.nodes[index], |backup| &backup.plan);
-        // A process that was restarted is what its predecessor was.
-        let is_restarted = programs[index].on_exit == OnExit::Restart;
-        part.is_of(plan) && (is_restarted || part.generation as usize == swaps.len())
-    }
-
-    fn put(&self, parts: Parts, path: &Path) -> Result<()> {
-        for (index, part) in parts.nodes.iter().enumerate() {
-            if !self.is_planned(index, part, parts.tick) {
-                bail!(
-                    "no checkpoint of tick {}: another process has taken the place of `{}`, and the manifest, by which a run \
-                     goes on, does not say which",
-                    parts.tick,
-                    part.name
-                );
-            }
-        }
-        Checkpoint::new(self.manifest, self.graph, parts).write(path)
-    }
-}
-
-/// Puts together what the nodes of a run write for the checkpoints of its plan.
-pub(crate) struct Collector<'a> {
-    pub(crate) writer: Writer<'a>,
-    /// The checkpoint that comes next.
-    next: Option<u32>,
-    /// Files that were written and are still there, the oldest first.
-    pub(crate) written: Vec<Written>,
-    /// Why one could not be written.
-    failed: Option<anyhow::Error>,
-}
-
-impl<'a> Collector<'a> {
-    /// The collector of the run of `manifest` in `run_dir`, whose files are called after `stem`.
-    pub(crate) fn new(manifest: &'a Manifest, graph: &'a Graph, run_dir: &'a Path, stem: &'a Path) -> Self {
-        let writer = Writer { manifest, graph, run_dir, stem };
-        let next = graph.plan.checkpoint_after(graph.plan.first_tick);
-        Self { writer, next, written: Vec::new(), failed: None }
-    }
-
-    /// Writes the files of the checkpoints that are complete.
-    pub(crate) fn collect(&mut self) {
-        while self.failed.is_none()
-            && let Some(tick) = self.next
-        {
-            match self.writer.write(tick, None) {
-                Ok(Some(path)) => self.note(tick, path),
-                Ok(None) => return,
-                Err(error) => self.failed = Some(error),
-            }
-        }
-    }
-
-    /// Writes the file of `parts`.
-    pub(crate) fn add(&mut self, parts: Parts) {
-        let (tick, path) = (parts.tick, path(self.writer.stem, parts.tick));
-        match self.writer.put(parts, &path) {
-            Ok(()) => self.note(tick, path),
-            Err(error) => self.failed = self.failed.take().or(Some(error)),
-        }
-    }
-
-    /// Notes that the checkpoint of `tick` is written to `path`, and removes the oldest where fewer are kept.
-    fn note(&mut self, tick: u32, path: PathBuf) {
-        self.next = self.writer.graph.plan.checkpoint_after(tick);
-        self.written.push(Written { tick, path });
-        let keep = self
-            .writer
-            .manifest
-            .content
-            .run
-            .checkpoint_keep
-            .as_ref()
-            .map_or(usize::MAX, |keep| *keep.get_ref());
-        if self.written.len() > keep {
-            // Who has removed or replaced it meanwhile has done so on purpose.
-            let _ = std::fs::remove_file(self.written.remove(0).path);
-        }
-    }
-
-    /// The files that the run has left.
-    ///
-    /// # Errors
-    /// If one could not be written.
-    pub(crate) fn finish(mut self) -> Result<Vec<Written>> {
-        self.collect();
-        match self.failed.take() {
-            Some(error) => {
-                Err(error.context("the run was flown, but not every checkpoint of it was written"))
-            }
-            None => Ok(self.written),
-        }
-    }
 }
 
 /// The file of the checkpoint at `tick` of a run whose recording is `stem` with `.mcap`.

@@ -144,7 +144,7 @@ pub fn partial_path(real: &Path) -> Result<PathBuf> {
 }
 
 /// `path` with `suffix` in its name, in front of the extension.
-fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
+pub(crate) fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
     let mut name = path.file_stem().unwrap_or_default().to_owned();
     name.push(suffix);
     if let Some(extension) = path.extension() {

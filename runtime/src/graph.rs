@@ -127,7 +127,7 @@ impl Graph {
         evaluations::check(manifest, &plan, &programs, &mut notes)?;
         plan.groups = groups;
         let (models, warnings) = notes.into_parts(manifest);
-        checkpoints::add(manifest, &mut plan, &backups)?;
+        checkpoints::add(manifest, &mut plan, &programs, &backups)?;
         Ok(Self { plan, programs, backups, sidecars, models, files, from: None, warnings })
     }
 }

@@ -1,6 +1,7 @@
 //! Launches runs: from a checked manifest to the outcome of its run.
 
-use crate::checkpoint::{Checkpoint, Collector, Written};
+use crate::checkpoint::{Checkpoint, Written};
+use crate::checkpoint_writer::{Collector, Writer, WrittenFiles};
 use crate::ctl::control::ControlServer;
 use crate::ctl::{Asked, Remote};
 use crate::descendants::{Descendants, Place};
@@ -191,18 +192,22 @@ impl<'a> Launcher<'a> {
         let mut run_dir = RunDir::create(&manifest.path)?;
         let run_id = run_dir.run_id().to_owned();
         let mut on = std::mem::replace(&mut self.on, Box::new(|_| {}));
-        let rewinds = Rewinds::default();
+        let (rewinds, files) = (Rewinds::default(), WrittenFiles::default());
         loop {
-            let flown = self.launch_in(&run_dir, &place, manifest, graph, outputs, &rewinds, &mut *on);
+            let number = rewinds.done().len() + 1;
+            rewinds.keep_at(outputs.place_aside(number));
+            let flown =
+                self.launch_in(&run_dir, &place, manifest, graph, outputs, &rewinds, &files, &mut *on);
             let flown = flown.map_err(|error| run_dir.blame_room(error));
             run_dir.remove().iter().for_each(|left| on(RunEvent::Note(left)));
             let outcome = flown?;
-            let Some(rewind) = rewinds.take_asked() else {
+            let Some((rewind, next)) = rewinds.take_asked() else {
                 return Ok(Outcome { rewinds: rewinds.done().clone(), ..outcome });
             };
-            let recording = outputs.set_aside(rewinds.done().len() + 1)?;
-            *graph = rebuilt(manifest, graph, &rewind.checkpoint)?;
-            rewinds.begin(rewind, recording, outcome.checkpoints);
+            let recording = outputs.set_aside(number)?;
+            *graph = next;
+            files.go_back(rewind.to_tick);
+            rewinds.begin(rewind, recording);
             run_dir = RunDir::create_again(&manifest.path, &run_id)?;
         }
     }
@@ -216,6 +221,7 @@ impl<'a> Launcher<'a> {
         graph: &mut Graph,
         outputs: &mut Outputs,
         rewinds: &Rewinds,
+        files: &WrittenFiles,
         on: &mut dyn FnMut(RunEvent<'_>),
     ) -> Result<Outcome> {
         // Before anything is touched that an earlier run left.
@@ -233,8 +239,8 @@ impl<'a> Launcher<'a> {
             parts.store_for_run(run_dir.path())?;
         }
         let graph = &*graph;
-        let mut checkpoints = Collector::new(manifest, graph, run_dir.path(), &outputs.stem);
-        checkpoints.written = rewinds.take_written();
+        let (run_path, stem) = (run_dir.path(), &outputs.stem);
+        let mut checkpoints = Collector::new(Writer { manifest, graph, run_dir: run_path, stem, files });
         let flown = self.fly_in(run_dir, place, manifest, graph, &mut checkpoints, rewinds, on);
         // Those of a run that broke are what somebody goes back to.
         let written = checkpoints.finish();
@@ -308,19 +314,6 @@ impl<'a> Launcher<'a> {
         }
         Ok(outcome)
     }
-}
-
-/// The graph of `manifest` again, from `checkpoint` on; a shadow that the manifest does not name flies again.
-fn rebuilt(manifest: &Manifest, graph: &mut Graph, checkpoint: &Checkpoint) -> Result<Graph> {
-    let mut next = Graph::build_from(manifest, graph.files.branch())?;
-    for backup in std::mem::take(&mut graph.backups) {
-        let is_named = next.backups.iter().any(|other| other.node == backup.node);
-        if backup.take_over_tick.is_none() && !is_named {
-            next.backups.push(backup);
-        }
-    }
-    checkpoint.resume(&mut next, true)?;
-    Ok(next)
 }
 
 /// Puts the files that the nodes read into the run directory, and tells the recorders what to attach: the manifest, what

@@ -2,6 +2,7 @@
 //! everything down again.
 
 pub mod checkpoint;
+mod checkpoint_writer;
 mod claimed_file;
 pub mod clean;
 pub mod ctl;

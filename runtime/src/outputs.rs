@@ -3,7 +3,7 @@
 //! A second run that would write to one of them is refused at its start, and is told who does.
 
 use crate::checkpoint::{self, CHECKPOINT};
-use crate::claimed_file::{LogClaim, Partial, partial_path};
+use crate::claimed_file::{LogClaim, Partial, partial_path, with_suffix};
 use crate::graph::Graph;
 use crate::manifest::Manifest;
 use crate::output_file::{self, Kind, LOG, RECORDING, is_same};
@@ -128,13 +128,20 @@ impl Outputs {
         fresh.try_for_each(LogClaim::begin)
     }
 
+    /// Where the recording of a run that goes back for the `number`th time is kept, if it has one.
+    pub(crate) fn place_aside(&self, number: usize) -> Option<PathBuf> {
+        let recording = self.recording.as_ref()?;
+        let real = output_file::real_path(&recording.path).ok()?;
+        Some(with_suffix(&real, &aside(number)))
+    }
+
     /// Keeps the recording of a run that goes back for the `number`th time beside its place; returns its path.
     ///
     /// # Errors
     /// If something lies there that must not be replaced.
     pub(crate) fn set_aside(&mut self, number: usize) -> Result<Option<PathBuf>> {
         let Some(partial) = self.partial.take() else { return Ok(None) };
-        partial.set_aside(&format!(".rewind-{number}")).map(Some)
+        partial.set_aside(&aside(number)).map(Some)
     }
 
     /// Lists what the run has claimed, for those who come to find it claimed.
@@ -214,6 +221,11 @@ impl Output {
     fn refused(&self) -> String {
         format!("{} cannot be {}", self.path.display(), self.what)
     }
+}
+
+/// What the name of a recording ends with that is kept at the `number`th rewind.
+fn aside(number: usize) -> String {
+    format!(".rewind-{number}")
 }
 
 /// The checkpoint of `tick`, beside the recording.

@@ -3,8 +3,8 @@
 
 use crate::registry::NodeProgram;
 use bus::Registration;
-use bus::component::Role;
-use bus::plan::NodePlan;
+use bus::component::{Role, Transfer};
+use bus::plan::{NodePlan, Plan};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -122,4 +122,37 @@ pub struct BackupSpec {
     pub(crate) program: Program,
     /// What it reads about itself: the node's own plan with the backup's parameters and inputs.
     pub plan: NodePlan,
+}
+
+impl BackupSpec {
+    /// True if it flies at `tick`.
+    pub(crate) fn has_taken_over(&self, tick: u32) -> bool {
+        self.take_over_tick.is_some_and(|at| at < tick)
+    }
+}
+
+/// What flies at `tick` where node `node` begins as `program` and `backups` take over.
+pub(crate) fn flying<'a>(
+    node: usize,
+    program: &'a Program,
+    backups: &'a [BackupSpec],
+    tick: u32,
+) -> &'a Program {
+    let swap = backups.iter().rfind(|backup| backup.node == node && backup.has_taken_over(tick));
+    swap.map_or(program, |backup| &backup.program)
+}
+
+/// The node of `plan` that flies at `tick` and whose state is in another program, and that program: no checkpoint holds it.
+pub(crate) fn unsaved<'a>(
+    plan: &'a Plan,
+    programs: &[Program],
+    backups: &[BackupSpec],
+    tick: u32,
+) -> Option<(&'a str, &'static str)> {
+    plan.nodes.iter().zip(programs).enumerate().find_map(|(node, (plan, program))| {
+        match flying(node, program, backups, tick).component()?.transfer {
+            Transfer::External(what) => Some((&*plan.name, what)),
+            _ => None,
+        }
+    })
 }

@@ -113,7 +113,11 @@ impl Registry {
     pub fn states(&self) -> Vec<&'static Schema> {
         let state = |component: &Registration| match component.transfer {
             Transfer::Message(schema) => Some((schema.type_name, schema)),
-            Transfer::Nothing | Transfer::Bytes(_) | Transfer::Growing(_) | Transfer::File => None,
+            Transfer::Nothing
+            | Transfer::Bytes(_)
+            | Transfer::Growing(_)
+            | Transfer::File
+            | Transfer::External(_) => None,
         };
         let by_name: BTreeMap<_, _> = self.iter().filter_map(state).collect();
         by_name.into_values().collect()

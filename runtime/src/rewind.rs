@@ -1,7 +1,8 @@
 //! Going back in flight: a paused run ends in order, and starts again from one of its checkpoints, under the same name.
 
-use crate::checkpoint::{Checkpoint, Written};
 use crate::ctl::Reply;
+use crate::graph::Graph;
+use crate::output_file::{RECORDING, check};
 use bus::plan::Pace;
 use serde::Serialize;
 use std::cell::{Ref, RefCell};
@@ -12,10 +13,10 @@ pub const MARK: &str = "rewinds.toml";
 
 /// A rewind that is asked for or under way.
 pub(crate) struct Rewind {
-    /// The checkpoint to go on from.
-    pub checkpoint: Checkpoint,
     /// The tick at which the run was paused.
     pub from_tick: u32,
+    /// The tick of the checkpoint.
+    pub to_tick: u32,
     /// The pace that was asked for last.
     pub pace: Pace,
     /// The place of the answer, which is given when the run is paused again.
@@ -51,40 +52,48 @@ impl std::fmt::Display for Rewound {
 /// The rewinds of a run.
 #[derive(Default)]
 pub(crate) struct Rewinds {
-    asked: RefCell<Option<Rewind>>,
+    /// With the graph that goes on from the checkpoint.
+    asked: RefCell<Option<(Rewind, Graph)>>,
     begun: RefCell<Option<Rewind>>,
     done: RefCell<Vec<Rewound>>,
-    /// Checkpoints that were written before the one from which the run goes on.
-    written: RefCell<Vec<Written>>,
+    /// Place of the recording so far, if the run goes back.
+    place: RefCell<Option<PathBuf>>,
 }
 
 impl Rewinds {
-    /// Notes that the run is to end, and to go on from a checkpoint.
-    pub fn ask(&self, rewind: Rewind) {
-        self.asked.replace(Some(rewind));
+    /// Notes that the run is to end, and that `graph` goes on from a checkpoint.
+    pub fn ask(&self, rewind: Rewind, graph: Graph) {
+        self.asked.replace(Some((rewind, graph)));
     }
 
-    /// The rewind that was asked for.
-    pub fn take_asked(&self) -> Option<Rewind> {
+    /// The rewind that was asked for, and the graph that goes on.
+    pub fn take_asked(&self) -> Option<(Rewind, Graph)> {
         self.asked.take()
     }
 
-    /// Notes that the run, whose recording so far is `recording` and whose checkpoints are `written`, goes back.
-    pub fn begin(&self, rewind: Rewind, recording: Option<PathBuf>, written: Vec<Written>) {
-        let (from_tick, to_tick) = (rewind.from_tick, rewind.checkpoint.tick());
+    /// Notes where the recording so far is kept when the run goes back.
+    pub fn keep_at(&self, place: Option<PathBuf>) {
+        self.place.replace(place);
+    }
+
+    /// Refuses a rewind that cannot keep what was flown.
+    ///
+    /// # Errors
+    /// If something else lies there.
+    pub fn require_place(&self) -> anyhow::Result<()> {
+        self.place.borrow().as_ref().map_or(Ok(()), |place| check(place, &RECORDING))
+    }
+
+    /// Notes that the run, whose recording so far is `recording`, goes back.
+    pub fn begin(&self, rewind: Rewind, recording: Option<PathBuf>) {
+        let Rewind { from_tick, to_tick, .. } = rewind;
         self.done.borrow_mut().push(Rewound { from_tick, to_tick, recording });
-        self.written.replace(written.into_iter().filter(|written| written.tick <= to_tick).collect());
         self.begun.replace(Some(rewind));
     }
 
     /// The rewind from whose checkpoint the run starts now.
     pub fn take_begun(&self) -> Option<Rewind> {
         self.begun.take()
-    }
-
-    /// The checkpoints that were written before that one.
-    pub fn take_written(&self) -> Vec<Written> {
-        self.written.take()
     }
 
     /// All rewinds so far.

@@ -23,6 +23,19 @@ const CHUNK_MIN: usize = 50;
 /// Most tasks where their flights are not stated; Slurm's own limit (MaxArraySize) is 1001 where nobody changed it.
 const TASKS_MAX: usize = 500;
 
+/// Options of `sbatch` that the campaign gives itself, or that would send the array where nobody asks for it; each with what
+/// does it instead.
+const OPTIONS_OF_OURS: [(&str, &str, &str); 8] = [
+    ("--array", "-a", "--chunk sets the flights of a task"),
+    ("--cpus-per-task", "-c", "--workers sets the processors of a task"),
+    ("--output", "-o", "the tasks' output lies in the campaign's folder"),
+    ("--clusters", "-M", "the environment variable SLURM_CLUSTERS names a cluster for all commands of Slurm"),
+    ("--cluster", "-M", "the environment variable SLURM_CLUSTERS names a cluster for all commands of Slurm"),
+    ("--wait", "-W", "the campaign waits by itself"),
+    ("--parsable", "--parsable", "the campaign asks for it"),
+    ("--wrap", "--wrap", "the campaign brings the script"),
+];
+
 /// Engine that flies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Engine {
@@ -78,10 +91,17 @@ impl EngineArguments {
             ("--sbatch", !self.sbatch.is_empty()),
             ("--node-command", self.node_command.is_some()),
         ];
-        match stated.iter().find(|(_, is_stated)| *is_stated && self.engine != Engine::Slurm) {
-            Some((option, _)) => bail!("{option} needs --engine slurm"),
-            None => Ok(()),
+        if let Some((option, _)) =
+            stated.iter().find(|(_, is_stated)| *is_stated && self.engine != Engine::Slurm)
+        {
+            bail!("{option} needs --engine slurm");
         }
+        for option in &self.sbatch {
+            if let Some(instead) = instead_of(option) {
+                bail!("--sbatch={option} cannot be given: {instead}");
+            }
+        }
+        Ok(())
     }
 
     /// Flies `jobs`; hands each row to `take` as it comes.
@@ -135,6 +155,15 @@ impl EngineArguments {
     }
 }
 
+/// What is there instead of `option` of `sbatch`, if it cannot be given.
+fn instead_of(option: &str) -> Option<&'static str> {
+    let is_meant = |long: &str, short: &str| match option.strip_prefix("--") {
+        Some(_) => option.split('=').next() == Some(long),
+        None => option.starts_with(short),
+    };
+    OPTIONS_OF_OURS.iter().find(|(long, short, _)| is_meant(long, short)).map(|(_, _, instead)| *instead)
+}
+
 /// Flies the chunk of this task of a job array, whose shared folder is `folder`.
 ///
 /// # Errors
@@ -162,4 +191,32 @@ pub fn worker_command() -> Result<Vec<String>> {
     let program = std::env::current_exe().context("cannot find this program")?;
     let program = program.to_str().context("the path of this program is not UTF-8")?.to_owned();
     Ok(vec![program, "campaign".to_owned(), WORKER.to_owned()])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::instead_of;
+
+    #[test]
+    fn options_that_would_undo_those_of_the_campaign_are_known_in_each_spelling() {
+        for option in [
+            "--array=1-3",
+            "--array",
+            "-a1-3",
+            "-a",
+            "-c4",
+            "-o/tmp/x",
+            "-Mother",
+            "--clusters=other",
+            "-W",
+            "--wrap=ls",
+        ] {
+            assert!(instead_of(option).is_some(), "{option}");
+        }
+        for option in
+            ["--partition=fast", "-pfast", "--time=30", "--mem=4G", "--account=a", "-Qx", "--output-x"]
+        {
+            assert!(instead_of(option).is_none(), "{option}");
+        }
+    }
 }

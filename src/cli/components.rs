@@ -110,6 +110,7 @@ fn row(component: &Registration) -> String {
         Transfer::Bytes(type_name) => type_name,
         Transfer::Nothing => "–",
         Transfer::File | Transfer::Growing(_) => "cannot be replaced",
+        Transfer::External(_) => "cannot be saved",
     };
     format!("| **`{name}`**: {summary} | {inputs} | {outputs} | {parameters} | {state} |\n")
 }
@@ -127,6 +128,7 @@ fn json(component: &Registration) -> Value {
         Transfer::Bytes(type_name) => json!(type_name),
         Transfer::Nothing => json!("none"),
         Transfer::File => json!("file"),
+        Transfer::External(program) => json!({ "external": program }),
         Transfer::Growing(type_name) => json!({ "growing": type_name }),
     };
     json!({

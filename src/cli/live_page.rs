@@ -56,7 +56,8 @@ impl LivePage {
         self.redirect.is_some()
     }
 
-    /// Shows the run that `find` finds, once it does: its state at once, its recording from the first messages on.
+    /// Shows the run that `find` finds, once it does: its state at once, its recording from the first messages on. A run that
+    /// goes back is found again.
     pub fn follow(&mut self, find: impl Fn() -> Option<LiveRun> + Send + 'static) {
         let (handle, is_over) = (self.handle.clone(), self.is_over.clone());
         let is_ended = move || is_over.load(Ordering::Relaxed);
@@ -87,7 +88,7 @@ impl LivePage {
     /// Ends the page.
     ///
     /// # Errors
-    /// What ended the server before.
+    /// Reason that ended the server before.
     pub fn close(mut self) -> Result<()> {
         self.end()
     }
@@ -114,32 +115,34 @@ pub fn opened(address: &str) -> Option<Redirect> {
     })
 }
 
-/// Hands the run and its recording to the server as they come up.
+/// Hands the run and its recording to the server as they come up; once more after each rewind.
 fn follow(handle: &Handle, find: &dyn Fn() -> Option<LiveRun>, is_ended: &dyn Fn() -> bool) -> Result<()> {
     let found = || {
         let run = find()?;
         let plan = Plan::load(&run.entry.run_dir).ok()?;
-        Some((run, plan))
+        let watched = runtime::run_dir::find_live(Some(&run.entry.run_id)).ok()?;
+        Some((run, plan, watched))
     };
-    let Some((run, plan)) = first(found, is_ended) else { return Ok(()) };
-    let path = recording_of(&plan).map(str::to_owned);
-    let is_live = {
-        let watched = runtime::run_dir::find_live(Some(&run.entry.run_id)).ok();
-        move || watched.as_ref().is_some_and(LiveRun::is_live)
-    };
-    handle.steer(run, plan);
-    match path {
-        Ok(path) => {
-            let shown = || {
-                // Before the run ends: its control segment goes with it.
-                handle.look();
-                Shown::new(Recording::salvage(Path::new(&path)).ok()?).ok()
-            };
-            if let Some(shown) = first(shown, &|| is_ended() || !is_live()) {
-                handle.show(vec![shown])?;
+    while !is_ended()
+        && let Some((run, plan, watched)) = first(found, is_ended)
+    {
+        let is_over = || is_ended() || !watched.is_live();
+        let path = recording_of(&plan).map(str::to_owned);
+        handle.steer(run, plan);
+        match path {
+            Ok(path) => {
+                let shown = || {
+                    // Before the run ends: its control segment goes with it.
+                    handle.look();
+                    Shown::new(Recording::salvage(Path::new(&path)).ok()?).ok()
+                };
+                if let Some(shown) = first(shown, &is_over) {
+                    handle.show(vec![shown])?;
+                }
             }
+            Err(error) => handle.refuse(format!("{error:#}")),
         }
-        Err(error) => handle.refuse(format!("{error:#}")),
+        first(|| None::<()>, &is_over);
     }
     Ok(())
 }

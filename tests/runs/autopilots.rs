@@ -4,6 +4,7 @@
 use crate::recordings::require_same;
 use crate::skipped::variable_or_skip;
 use crate::support::{Ended, Place, repository};
+use serde_json::{Value, json};
 use std::fs;
 use std::process::Command;
 use std::sync::OnceLock;
@@ -67,13 +68,17 @@ fn a_controller_takes_over_from_a_firmware_and_gives_back() {
     let program = place.write("sitl", compiled(&[]));
     let ended = place.start_with(&args, &[("HUMMINGBUS_BETAFLIGHT", &program)]).end();
     let summary = ended.with_code(0).json();
-    let kinds: Vec<&str> = summary["successions"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|it| it["hand_over"].as_str().unwrap())
-        .collect();
-    assert_eq!(kinds.len(), 2, "{summary}");
+    let all = summary["successions"].as_array().unwrap();
+    let shapes: Vec<_> = all.iter().map(|it| (&it["take_over_tick"], it["hand_over"].as_str())).collect();
+    let last = Some("last output");
+    assert_eq!(
+        shapes,
+        [(&json!(4000), last), (&json!(10_000), last)],
+        "nobody knows what a firmware remembers"
+    );
+    // The controller goes on from the command before; the firmware from its own start, near it.
+    let jump = |succession: &Value| succession["steps"][0]["step"].as_f64().unwrap().abs();
+    assert!(jump(&all[0]) < 1e-9 && jump(&all[1]) < 15.0, "{summary}");
 }
 
 #[test]
@@ -123,11 +128,12 @@ fn each_firmware_of_a_run_flies_its_own_vehicle() {
 
 #[test]
 fn a_firmware_that_fails_ends_the_run_with_its_last_words() {
-    let cases: [(&str, &[&str]); 4] = [
+    let cases: [(&str, &[&str]); 5] = [
         // While it starts, and in flight: 7 s of its time are before tick 0.
         ("ends 1\n", &["betaflight ended with exit code 3", "out of coffee"]),
         ("ends 8\n", &["betaflight ended with exit code 3", "out of coffee"]),
         ("crashes 8\n", &["betaflight was killed by signal 6"]),
+        ("mute 8\n", &["it has sent no motor outputs for 0.1 s of its time"]),
         ("hangs 8\n", &["betaflight runs and gave no answer for 0.5 s", "thinking"]),
     ];
     for (words, told) in cases {
@@ -186,10 +192,21 @@ fn a_checkpoint_of_a_firmware_is_refused_in_words() {
     let place = Place::new();
     let settings = stand_in(&place, "");
     let recording = place.path("a.mcap");
-    let more = ["--record", &recording, "--checkpoint-every", "500ms", "--set", "run.duration_s=1"];
-    call(&place, "run", &manifest(), &settings, &more);
-    let later = place.call(&["run", "--from", &place.path("a.500.ckpt"), "--record", "none"]);
-    later.with_code(2).says(&["controller", "firmware"]);
+    let says = "the state of `controller` is in a firmware, which does not tell it";
+    let planned = ["--record", &recording, "--checkpoint-every", "500ms"];
+    call(&place, "run", &manifest(), &settings, &planned).with_code(2).says(&["at tick 500", says]);
+    // What is asked for in flight is refused, and the run flies on.
+    let manifest = manifest();
+    let mut args = vec!["run", &manifest, "--record", &recording, "--pace", "realtime"];
+    for setting in &settings {
+        args.extend(["--set", setting.as_str()]);
+    }
+    let mut launch = place.start(&args);
+    launch.await_ticks(100);
+    let run = place.run_id();
+    place.start(&["ctl", "checkpoint", "--run", &run]).end_among_others().with_code(2).says(&[says]);
+    place.start(&["ctl", "pace", "free", "--run", &run]).end_among_others().with_code(0);
+    launch.end().flown();
 }
 
 #[test]

@@ -30,8 +30,13 @@ fn a_run_that_went_back_flies_as_one_from_the_checkpoint_and_its_recording_says_
         let paused = ctl(&place, &run, &["status"])["tick"].as_u64().unwrap();
         let end = (paused / 100 + 2) * 100 + 37;
         ctl(&place, &run, &["step", &(end - paused).to_string()]);
-        refused(&["123"], "a.123.ckpt");
-        refused(&["50000"], "a.50000.ckpt");
+        refused(&["123"], "there is no checkpoint of this run of tick 123: it has those of 100, 200");
+        let aside = place.path("a.rewind-1.mcap");
+        if compose == "none" {
+            fs::write(&aside, "a letter").unwrap();
+            refused(&[], "a.rewind-1.mcap");
+            fs::remove_file(&aside).unwrap();
+        }
         let back = ctl(&place, &run, &["rewind"]);
         assert_eq!(back["tick"], end - 37);
         let status = ctl(&place, &run, &["status"]);
@@ -41,7 +46,8 @@ fn a_run_that_went_back_flies_as_one_from_the_checkpoint_and_its_recording_says_
         let file = place.path("a.300.ckpt");
         let text = ctl(&place, &run, &["rewind", &file])["text"].as_str().unwrap().to_owned();
         assert_eq!(text, format!("rewound from tick {} to tick 300, where it is paused", end - 27));
-        refused(&["400"], "a rewind goes back");
+        refused(&["400"], "of tick 400: it has those of 100, 200, 300");
+        refused(&[&place.path("a.400.ckpt")], "a rewind goes back");
         ctl(&place, &run, &["step", &(end - 300).to_string()]);
         ctl(&place, &run, &["stop"]);
         let rewound =
@@ -98,6 +104,9 @@ fn a_checkpoint_of_another_run_is_refused() {
     place
         .call(&[&args[..], &["--set", "run.seed=2", "--set", "run.duration_s=0.2", "--in-process"]].concat())
         .flown();
+    // An earlier run of the same manifest, under the same name.
+    let args = ["run", &hover, "--record", &place.path("a.mcap"), "--checkpoint-every", "100ms"];
+    place.call(&[&args[..], &["--set", "run.duration_s=0.15", "--in-process"]].concat()).flown();
     let mut launch = place.start_endless(&["run", &hover, "--record", &place.path("a.mcap")]);
     launch.await_ticks(200);
     let run = place.run_id();
@@ -107,7 +116,8 @@ fn a_checkpoint_of_another_run_is_refused() {
         place.start(&all).end_among_others().with_code(2).says(&[says]);
     };
     refused(&[&place.path("other.100.ckpt")], "other.100.ckpt is a checkpoint of another run");
-    refused(&[], "there is no checkpoint of this run before tick");
+    refused(&[], "it has written none");
+    refused(&["100"], "it has written none");
     fs::write(place.path("letter.ckpt"), "a letter").unwrap();
     refused(&[&place.path("letter.ckpt")], "no checkpoint of hummingbus");
     // It flies on, and writes one itself.

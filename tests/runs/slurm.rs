@@ -3,15 +3,19 @@
 
 use crate::campaign::{HOVERS, rows, written};
 use crate::skipped::skip;
-use crate::support::{Ended, HUMMINGBUS, Place, repository};
+use crate::support::{Ended, HUMMINGBUS, Launch, Place, repository};
+use rustix::process::Signal;
 use std::fs;
 use std::os::unix::fs::PermissionsExt as _;
 use std::process::Command;
 
 /// An `sbatch` that flies the tasks of an array before it returns, but for those of the file `lost`, which it empties line by
-/// line: a line a submission.
+/// line: a line a submission. The word `busy` in it has the submission refused; a task with a `?` behind it is pending for ever.
 const SBATCH: &str = r#"#!/bin/sh
 here=$(dirname "$0")
+case $(head -n 1 "$here/lost" 2>/dev/null) in
+  busy) sed -i 1d "$here/lost"; echo "sbatch: error: Socket timed out on send/recv operation" >&2; exit 1 ;;
+esac
 number=$(($(cat "$here/arrays" 2>/dev/null || echo 0) + 1))
 echo "$number" >"$here/arrays"
 for word in "$@"; do
@@ -28,6 +32,7 @@ sed -i 1d "$here/lost" 2>/dev/null
 for range in $(echo "$array" | tr , ' '); do
   for task in $(seq "${range%-*}" "${range#*-}"); do
     case $lost in
+      *" $task? "*) echo "$number $task PENDING" >>"$here/states" ;;
       *" $task "*) echo "$number $task NODE_FAIL" >>"$here/states" ;;
       *)
         SLURM_ARRAY_TASK_ID=$task SLURM_JOB_ID=$((1000 * number + task)) sh "$script" >"$logs/log-$task-$number.txt" 2>&1
@@ -38,19 +43,29 @@ done
 echo "$number"
 "#;
 const SQUEUE: &str = "#!/bin/sh\ncat \"$(dirname \"$0\")/states\"\n";
+/// Cancels what is pending, and notes the arrays.
+const SCANCEL: &str = r#"#!/bin/sh
+here=$(dirname "$0")
+echo "$*" >>"$here/cancelled"
+for number in "$@"; do sed -i "s/^$number \\(.*\\) PENDING/$number \\1 CANCELLED/" "$here/states"; done
+"#;
 
 /// A campaign of 12 short hovers in tasks of 5, by Slurm's commands in the folder `bin`.
 fn on_slurm(place: &Place, out: &str, more: &[&str]) -> Ended {
+    start_on_slurm(place, out, more).end()
+}
+
+fn start_on_slurm<'a>(place: &'a Place, out: &str, more: &[&str]) -> Launch<'a> {
     let campaign = written(place, "c.toml", HOVERS);
     let path = format!("{}:/usr/bin:/bin", place.path("bin"));
     let args = ["campaign", &campaign, "--out", out, "--engine", "slurm", "--chunk", "5"];
-    place.start_with(&[&args, more].concat(), &[("PATH", &path)]).end()
+    place.start_with(&[&args, more].concat(), &[("PATH", &path)])
 }
 
 /// Writes the scripts; `lost` has the tasks that the first submissions lose, a line each.
 fn stand_in(place: &Place, lost: &str) {
     fs::create_dir(place.path("bin")).unwrap();
-    for (name, text) in [("sbatch", SBATCH), ("squeue", SQUEUE), ("scancel", "#!/bin/sh\n"), ("lost", lost)] {
+    for (name, text) in [("sbatch", SBATCH), ("squeue", SQUEUE), ("scancel", SCANCEL), ("lost", lost)] {
         let path = place.write(&format!("bin/{name}"), text);
         fs::set_permissions(path, fs::Permissions::from_mode(0o755)).unwrap();
     }
@@ -97,6 +112,33 @@ fn the_chunks_of_a_lost_node_are_submitted_again_and_no_others() {
 }
 
 #[test]
+fn a_controller_that_is_busy_when_chunks_are_submitted_again_costs_nothing() {
+    let place = Place::new();
+    stand_in(&place, "0\nbusy\nbusy\n");
+    let ended = on_slurm(&place, &place.path("out"), &[]).with_code(0);
+    ended.prints(&["12 of 12 flights passed"]);
+    ended.says(&["they are submitted again later", "Socket timed out"]);
+    assert_eq!(fs::read_to_string(place.path("bin/submitted")).unwrap(), "1 0-2\n2 0\n");
+    assert_eq!(ended.error.matches("ended before 5 flights").count(), 1, "{ended}");
+}
+
+#[test]
+fn a_campaign_that_is_stopped_cancels_all_its_arrays_and_is_flown_by_the_next_call() {
+    let place = Place::new();
+    // Chunk 2 is lost, then pending; chunk 1 stays pending in the first array.
+    stand_in(&place, "1? 2\n2?\n");
+    let out = place.path("out");
+    let launch = start_on_slurm(&place, &out, &[]);
+    launch.await_said("submitted 1 tasks to Slurm as job 2");
+    launch.signal(Signal::INT);
+    launch.end().with_code(2).says(&["was interrupted; the same command flies the other 7 flights"]);
+    assert_eq!(fs::read_to_string(place.path("bin/cancelled")).unwrap(), "1 2\n");
+    let states = fs::read_to_string(place.path("bin/states")).unwrap();
+    assert!(states.contains("1 1 CANCELLED") && states.contains("2 2 CANCELLED"), "{states}");
+    on_slurm(&place, &out, &[]).with_code(0).prints(&["12 of 12 flights passed"]);
+}
+
+#[test]
 fn flights_of_a_chunk_that_is_always_lost_have_the_reason_and_are_flown_by_the_next_call() {
     let place = Place::new();
     stand_in(&place, "1\n1\n1\n");
@@ -135,6 +177,8 @@ fn what_slurm_lacks_or_refuses_is_said_in_its_words() {
     // Nothing of it is in the way of the next call.
     on_slurm(&place, &out, &[]).with_code(0).prints(&["12 of 12 flights passed"]);
 
+    let ended = on_slurm(&place, &out, &["--sbatch=--array=0-1"]).with_code(2);
+    ended.says(&["--sbatch=--array=0-1 cannot be given", "--chunk"]);
     for (option, value) in [("--chunk", "5"), ("--sbatch", "-Q"), ("--node-command", "x")] {
         let args = ["campaign", &campaign, "--out", &out, option, value];
         place.call(&args).with_code(2).says(&[&format!("{option} needs --engine slurm")]);

@@ -267,3 +267,30 @@ fn a_run_without_a_recording_cannot_be_watched() {
     let ended = place.call(&["run", &manifest, "--record", "none", "--view", "--no-open"]).with_code(2);
     ended.says(&["--view", "records nothing"]);
 }
+
+/// A run that goes back starts again: its page shows it from the checkpoint on.
+#[test]
+fn the_page_of_a_run_that_goes_back_shows_it_from_the_checkpoint_on() {
+    let place = Place::new();
+    let (manifest, recording) = (repository("manifests/hover.toml"), place.path("back.mcap"));
+    let mut args = watched(&manifest, &recording, "run.duration_s=4000");
+    args.extend(["--checkpoint-every", "100ms"]);
+    let run = place.start(&args);
+    let mut page = Page::of(&run);
+    page.await_event(|event| event["run"]["tick"].as_u64() > Some(1200) && event["recordings"] == 1);
+    let held = page.done(&json!({ "request": "pause" }));
+    let to = page.done(&json!({ "request": "rewind" }));
+    assert!(to < held && to.is_multiple_of(100), "from tick {held} to tick {to}");
+    let event = page.await_event(|event| event["starts"] == 2 && event["run"]["state"] == "paused");
+    assert_eq!((&event["run"]["tick"], &event["recordings"]), (&json!(to), &json!(0)));
+    page.done(&json!({ "request": "pace", "pace": "free" }));
+    page.done(&json!({ "request": "resume" }));
+    page.await_event(|event| event["recordings"] == 1);
+    let (_, body) = answer(&page.host, &format!("{}api/catalogue", page.path));
+    let catalogue: Value = serde_json::from_str(&body).unwrap();
+    assert_eq!(catalogue["recordings"][0]["start_s"], to as f64 * 1e-3, "{body}");
+    page.done(&json!({ "request": "stop" }));
+    page.await_event(|event| event["run"]["state"] == "ended");
+    drop(page);
+    run.end().with_code(1);
+}

@@ -119,8 +119,12 @@ async function awaited(report) {
 /** Hears of the live run from now on; waits for the first news. */
 function hearOf(run) {
   const [reportServer, reportHeld] = [reporter("server"), reporter("held")];
+  let starts = null;
   return new Promise((isHeard) => {
     hear((told) => {
+      // A run that has gone back begins another recording; the plots are in the address.
+      if (starts !== null && told.starts > starts && starts > 0) location.reload();
+      starts = told.starts;
       run.take(told.run);
       reportHeld(run.status?.state === "paused" ? HELD : "");
       isHeard();

@@ -3,10 +3,10 @@
 //! Each page keeps one stream of events open for its life. So the server knows that a page is there, also one in the
 //! background, whose timers a browser slows down.
 
-use crate::live::Live;
 use axum::response::sse::Event;
 use futures_util::stream::{self, Stream};
-use serde_json::json;
+use runtime::ctl::protocol::Status;
+use serde::Serialize;
 use std::convert::Infallible;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -55,20 +55,29 @@ impl<T: AsRef<Pages>> Drop for Place<T> {
     }
 }
 
-/// Events for one page, for as long as it listens: the state of the live run, which `look` finds in `content`, and the
-/// number of recordings.
+/// An event that a page hears.
+#[derive(Debug, Serialize)]
+pub struct News {
+    /// State of the live run; none without one, or where it cannot be steered.
+    pub run: Option<Status>,
+    /// Number of recordings.
+    pub recordings: usize,
+    /// Times that the live run has started.
+    pub starts: usize,
+}
+
+/// Events for one page, for as long as it listens: what `look` finds in `content`.
 pub fn events<T: AsRef<Pages> + Send + Sync + 'static>(
     content: Arc<T>,
-    look: impl Fn(&T) -> (Option<&Live>, usize) + Send + 'static,
+    look: impl Fn(&T) -> News + Send + 'static,
 ) -> impl Stream<Item = Result<Event, Infallible>> + Send + 'static {
     let start = (Place::take(content), look, true);
     stream::unfold(start, |(place, look, is_first)| async move {
         if !is_first {
             tokio::time::sleep(PERIOD).await;
         }
-        let (live, recordings) = look(&place.0);
-        let told = json!({ "run": live.and_then(Live::status), "recordings": recordings });
-        let event = Event::default().retry(RETRY).data(told.to_string());
-        Some((Ok(event), (place, look, false)))
+        let told = serde_json::to_string(&look(&place.0));
+        let told = told.unwrap_or_else(|error| unreachable!("its types serialise: {error}"));
+        Some((Ok(Event::default().retry(RETRY).data(told)), (place, look, false)))
     })
 }

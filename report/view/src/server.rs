@@ -8,7 +8,7 @@
 //! | `GET  /token=…/api/growth` | JSON: of each recording its duration, blocks and number of topics, if it still grows, and the error that ended reading |
 //! | `POST /token=…/api/frames` | numbers: [`crate::frames`] |
 //! | `POST /token=…/api/curves` | numbers: [`crate::curves`]; the header `x-read` holds the part that was read for them |
-//! | `GET  /token=…/api/events` | events: state of the live run, number of recordings; open for as long as the page of a live run is |
+//! | `GET  /token=…/api/events` | events: state of the live run, how often it has started, number of recordings; open for as long as the page of a live run is |
 //! | `GET  /token=…/api/run` | JSON: manifest and processes of the live run; null without one |
 //! | `POST /token=…/api/fly` | nothing: takes set points of a person for a node of kind `operator` |
 //! | `POST /token=…/api/ctl` | JSON: the run's answer to a request of [`runtime::ctl::protocol`] |
@@ -22,7 +22,7 @@ use crate::entry::Entry;
 use crate::frames::{FramesRequest, frames};
 use crate::gate::Gate;
 use crate::live::{Asking, Live};
-use crate::pages::{Pages, events};
+use crate::pages::{News, Pages, events};
 use crate::readers::Readers;
 use crate::shown::Shown;
 use anyhow::{Context as _, Result, anyhow};
@@ -37,8 +37,8 @@ use runtime::ctl::protocol::{Answer, Request as Asked};
 use runtime::run_dir::LiveRun;
 use serde_json::{Value, json};
 use std::net::{Ipv4Addr, TcpListener};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, OnceLock};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, OnceLock, PoisonError, RwLock};
 use std::time::Duration;
 
 /// Bytes of a request: fields by their names.
@@ -83,10 +83,12 @@ struct Content {
     gate: Gate,
     /// True for the page of a live run, which hears of it for as long as it is open.
     is_live: bool,
-    /// Absent until the live run has recorded something.
-    recordings: OnceLock<Vec<Entry>>,
+    /// None until the live run has recorded something.
+    recordings: RwLock<Arc<Vec<Entry>>>,
     /// Absent for recordings that are shown by their names.
-    live: OnceLock<Live>,
+    live: RwLock<Option<Arc<Live>>>,
+    /// Times that the live run has started: once more at each rewind.
+    starts: AtomicUsize,
     /// Reason why there is no recording, and none will come.
     refusal: OnceLock<String>,
     pages: Pages,
@@ -95,8 +97,24 @@ struct Content {
 }
 
 impl Content {
-    fn recordings(&self) -> &[Entry] {
-        self.recordings.get().map_or(&[], |recordings| recordings)
+    fn recordings(&self) -> Arc<Vec<Entry>> {
+        self.recordings.read().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    fn set_recordings(&self, recordings: Vec<Entry>) {
+        *self.recordings.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(recordings);
+    }
+
+    fn live(&self) -> Option<Arc<Live>> {
+        self.live.read().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    fn news(&self) -> News {
+        News {
+            run: self.live().and_then(|live| live.status()),
+            recordings: self.recordings().len(),
+            starts: self.starts.load(Ordering::Relaxed),
+        }
     }
 }
 
@@ -111,34 +129,34 @@ impl AsRef<Pages> for Content {
 pub struct Handle(Arc<Content>);
 
 impl Handle {
-    /// Shows these recordings from now on, unless it shows some already.
+    /// Shows these recordings from now on.
     ///
     /// # Errors
     /// If a recording is damaged.
     pub fn show(&self, recordings: Vec<Shown>) -> Result<()> {
-        if self.0.recordings.get().is_none() {
-            let entries = recordings.into_iter().map(Entry::of).collect::<Result<_>>()?;
-            // Another thread may have been faster with the same.
-            let _ = self.0.recordings.set(entries);
-        }
+        self.0.set_recordings(recordings.into_iter().map(Entry::of).collect::<Result<_>>()?);
         Ok(())
     }
 
     /// True once it shows recordings.
     #[must_use]
     pub fn has_recordings(&self) -> bool {
-        self.0.recordings.get().is_some()
+        !self.0.recordings().is_empty()
     }
 
-    /// Shows the state of `run`, which flies `plan`, and lets pages steer it.
+    /// Shows the state of `run`, which flies `plan`, and lets pages steer it. A run that has gone back is shown anew: what it
+    /// had recorded before goes.
     pub fn steer(&self, run: LiveRun, plan: Plan) {
-        let _ = self.0.live.set(Live::of(run, plan));
+        self.0.set_recordings(Vec::new());
+        let live = Some(Arc::new(Live::of(run, plan)));
+        *self.0.live.write().unwrap_or_else(PoisonError::into_inner) = live;
+        self.0.starts.fetch_add(1, Ordering::Relaxed);
     }
 
     /// Looks at the live run, so that its state is known to the end, also to a page that is opened behind it. A run that has
     /// ended cannot be looked at for the first time.
     pub fn look(&self) {
-        let _ = self.0.live.get().map(Live::status);
+        let _ = self.0.live().map(|live| live.status());
     }
 
     /// Tells pages why there is nothing to show.
@@ -182,8 +200,9 @@ impl Server {
         let content = Content {
             gate,
             is_live,
-            recordings: OnceLock::new(),
-            live: OnceLock::new(),
+            recordings: RwLock::default(),
+            live: RwLock::default(),
+            starts: AtomicUsize::new(0),
             refusal: OnceLock::new(),
             pages: Pages::default(),
             readers: Readers::new(READERS),
@@ -234,10 +253,10 @@ impl Server {
 /// the place of the damage.
 fn keep_up(content: &Content, is_over: &AtomicBool) {
     step_back();
-    let goes_on = || match content.recordings.get() {
-        // Each has its turn, whether or not one before it grows.
-        Some(recordings) => recordings.iter().filter(|entry| entry.keep_up(is_over)).count() > 0,
-        None => true,
+    // Each has its turn, whether or not one before it grows. A live run may go back, and begin another recording.
+    let goes_on = || {
+        let growing = content.recordings().iter().filter(|entry| entry.keep_up(is_over)).count();
+        growing > 0 || content.is_live
     };
     while goes_on() {
         for _ in 0..GROWTH_LOOKS {
@@ -293,7 +312,8 @@ async fn file(Path((_, name)): Path<(String, String)>) -> Response {
 }
 
 async fn catalogues(State(content): State<Arc<Content>>) -> Json<Value> {
-    let catalogues = content.recordings().iter().map(|entry| entry.known().catalogue.clone());
+    let recordings = content.recordings();
+    let catalogues = recordings.iter().map(|entry| entry.known().catalogue.clone());
     Json(json!({
         "recordings": catalogues.collect::<Vec<_>>(),
         "refusal": content.refusal.get(),
@@ -306,17 +326,16 @@ async fn growth(State(content): State<Arc<Content>>) -> Json<Value> {
 }
 
 async fn hear(State(content): State<Arc<Content>>) -> Response {
-    Sse::new(events(content, |content: &Content| (content.live.get(), content.recordings().len())))
-        .into_response()
+    Sse::new(events(content, Content::news)).into_response()
 }
 
 async fn described(State(content): State<Arc<Content>>) -> Json<Value> {
-    Json(content.live.get().map_or(Value::Null, Live::described))
+    Json(content.live().map_or(Value::Null, |live| live.described()))
 }
 
 /// A write of a few bytes to a file in memory or its cache: no thread of its own.
 async fn fly(State(content): State<Arc<Content>>, Json(asking): Json<Asking>) -> Response {
-    let live = content.live.get().context("this page shows no live run");
+    let live = content.live().context("this page shows no live run");
     match live.and_then(|live| live.fly(&asking)) {
         Ok(()) => StatusCode::NO_CONTENT.into_response(),
         Err(error) => (StatusCode::CONFLICT, format!("{error:#}\n")).into_response(),
@@ -325,7 +344,7 @@ async fn fly(State(content): State<Arc<Content>>, Json(asking): Json<Asking>) ->
 
 async fn steer(State(content): State<Arc<Content>>, Json(request): Json<Asked>) -> Response {
     let asking = content.clone();
-    let work = move || match asking.live.get() {
+    let work = move || match asking.live() {
         Some(live) => live.ask(&request),
         None => Answer::refused("this page shows no live run"),
     };
@@ -357,7 +376,8 @@ async fn reading(
 ) -> Response {
     let reader = content.clone();
     let work = move || {
-        let entry = reader.recordings().get(recording).with_context(|| match reader.recordings().len() {
+        let recordings = reader.recordings();
+        let entry = recordings.get(recording).with_context(|| match recordings.len() {
             0 => "no tick is recorded yet".to_owned(),
             count => format!("there is no recording {recording}, expected 0 to {}", count - 1),
         })?;

@@ -1,6 +1,6 @@
 //! What the launcher does with requests: holds, steps, paces and stops the run through its control segment.
 
-use crate::checkpoint::Writer;
+use crate::checkpoint_writer::Writer;
 use crate::ctl::protocol::{Answer, Request, Status};
 use crate::ctl::server::{Asked, Remote, Reply, Server};
 use crate::rewind::{Rewind, Rewinds};
@@ -58,8 +58,7 @@ impl<'a> ControlServer<'a> {
         rewinds: &'a Rewinds,
     ) -> Result<Self> {
         let server = Server::start(run_dir, remote, requests)?;
-        let wish = rewinds.take_begun().map(|Rewind { checkpoint, from_tick, pace, reply }| {
-            let to_tick = checkpoint.tick();
+        let wish = rewinds.take_begun().map(|Rewind { from_tick, to_tick, pace, reply }| {
             control.set_hold_tick(to_tick);
             control.set_pace(pace);
             (Goal::Rewind { from_tick, to_tick }, reply)
@@ -152,7 +151,7 @@ impl<'a> ControlServer<'a> {
                 );
             }
             (Goal::PauseToSave { path, hold_tick }, Some(tick)) => self.save(path, tick, hold_tick, reply),
-            (Goal::Save { path, tick }, _) => match self.checkpoints.write(tick, path.as_deref()) {
+            (Goal::Save { path, tick }, _) => match self.checkpoints.write_asked(tick, path.as_deref()) {
                 Ok(Some(written)) => {
                     let text = format!("the checkpoint of tick {tick} is {}", written.display());
                     self.answer(reply, text);
@@ -195,13 +194,14 @@ impl<'a> ControlServer<'a> {
             if self.plan.profile {
                 bail!("a profile has each tick once: fly without it to go back");
             }
+            self.rewinds.require_place()?;
             Ok((now, self.checkpoints.find(tick, file, now)?))
         });
         match found {
-            Ok((from_tick, checkpoint)) => {
+            Ok((from_tick, (checkpoint, graph))) => {
                 self.overtake();
-                let pace = self.control.pace();
-                self.rewinds.ask(Rewind { checkpoint, from_tick, pace, reply });
+                let (to_tick, pace) = (checkpoint.tick(), self.control.pace());
+                self.rewinds.ask(Rewind { from_tick, to_tick, pace, reply }, graph);
                 self.control.request_stop();
             }
             Err(error) => drop(reply.send(&Answer::refused(format!("{error:#}")))),

@@ -1,7 +1,7 @@
 //! Ticks of the checkpoints that a run writes.
 
 use crate::manifest::Manifest;
-use crate::program::BackupSpec;
+use crate::program::{BackupSpec, Program, unsaved};
 use bus::plan::Plan;
 use diagnostics::Diagnostic;
 use std::ops::Range;
@@ -9,12 +9,23 @@ use std::ops::Range;
 /// Makes the nodes of `plan` write the checkpoints that `manifest` asks for.
 ///
 /// # Errors
-/// A tick that is none of the run's, that a node does not reach, or that lies within a swap.
-pub fn add(manifest: &Manifest, plan: &mut Plan, backups: &[BackupSpec]) -> Result<(), Diagnostic> {
+/// A tick that is none of the run's, that a node does not reach, that lies within a swap, or at which a process flies whose
+/// state no checkpoint holds.
+pub fn add(
+    manifest: &Manifest,
+    plan: &mut Plan,
+    programs: &[Program],
+    backups: &[BackupSpec],
+) -> Result<(), Diagnostic> {
+    let require_flying = |plan: &Plan, tick, span: &Range<usize>| {
+        require_saved(manifest, plan, programs, backups, tick, span)?;
+        require_flying(manifest, backups, tick, span)
+    };
     let run = &manifest.content.run;
     for checkpoint in &manifest.content.checkpoint {
         let at = &checkpoint.get_ref().at_tick;
-        require(manifest, plan, backups, *at.get_ref(), &at.span())?;
+        require_within(manifest, plan, *at.get_ref(), &at.span())?;
+        require_flying(plan, *at.get_ref(), &at.span())?;
         plan.checkpoint_ticks.push(*at.get_ref());
     }
     plan.checkpoint_ticks.sort_unstable();
@@ -28,8 +39,10 @@ pub fn add(manifest: &Manifest, plan: &mut Plan, backups: &[BackupSpec]) -> Resu
             manifest.problem(&every.span(), message, "choose some time of at least one tick, such as 1.0")
         })?;
         let ticks = (1..).map_while(|number: u32| number.checked_mul(period));
-        let mut ticks = ticks.take_while(|&tick| !backups.is_empty() && plan.goes_on_from(tick));
-        ticks.try_for_each(|tick| require_flying(manifest, backups, tick, &every.span()))?;
+        // Where nobody takes over all ticks are like the first.
+        let count = if backups.is_empty() { 1 } else { usize::MAX };
+        let mut ticks = ticks.take(count).take_while(|&tick| plan.goes_on_from(tick));
+        ticks.try_for_each(|tick| require_flying(plan, tick, &every.span()))?;
         plan.checkpoint_period = Some(period);
     }
     Ok(())
@@ -45,10 +58,9 @@ fn period(ticks: f64) -> Option<u32> {
     (ticks >= 0.5 && ticks < f64::from(u32::MAX)).then(|| ticks.round() as u32)
 }
 
-fn require(
+fn require_within(
     manifest: &Manifest,
     plan: &Plan,
-    backups: &[BackupSpec],
     tick: u32,
     span: &Range<usize>,
 ) -> Result<(), Diagnostic> {
@@ -57,7 +69,23 @@ fn require(
         let help = "it lies before a tick that every process still computes, and behind the first: a run goes on from it";
         return Err(manifest.problem(span, message, help));
     }
-    require_flying(manifest, backups, tick, span)
+    Ok(())
+}
+
+/// Refuses a checkpoint at `tick`, asked for at `span`, at which a process flies whose state is in another program.
+fn require_saved(
+    manifest: &Manifest,
+    plan: &Plan,
+    programs: &[Program],
+    backups: &[BackupSpec],
+    tick: u32,
+    span: &Range<usize>,
+) -> Result<(), Diagnostic> {
+    let Some((node, program)) = unsaved(plan, programs, backups, tick) else { return Ok(()) };
+    let message = format!(
+        "a checkpoint at tick {tick}, and the state of `{node}` is in {program}, which does not tell it"
+    );
+    Err(manifest.problem(span, message, "leave checkpoints out: such a run flies from tick 0"))
 }
 
 /// Refuses a checkpoint at `tick`, asked for at `span`, at which a process is about to take another one's place.

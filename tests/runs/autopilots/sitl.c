@@ -1,5 +1,6 @@
 /* Stands in for Betaflight's SITL: the same sockets, threads and clock, and a law of a few lines for a quadrotor with a plus of arms.
- * `--config FILE` keeps the file's words, which say how it misbehaves: `ends SECONDS`, `hangs SECONDS`, `crashes SECONDS`, `unarmed`. */
+ * `--config FILE` keeps the file's words, which say how it misbehaves: `ends SECONDS`, `hangs SECONDS`, `crashes SECONDS`, `mute SECONDS`,
+ * `unarmed`. */
 #include <arpa/inet.h>
 #include <fcntl.h>
 #include <math.h>
@@ -106,8 +107,11 @@ int main(int count, char **words)
     FILE *in = fopen(kept, "r");
     char line[256];
     int is_unarmed = 0;
+    double mute = 1e9;
     while (in && fgets(line, sizeof line, in)) {
         is_unarmed |= !strncmp(line, "unarmed", 7);
+        if (!strncmp(line, "mute", 4))
+            mute = atof(line + 4);
         if (!strncmp(line, "ends", 4) || !strncmp(line, "hangs", 5) || !strncmp(line, "crashes", 7))
             strcpy(text, line);
     }
@@ -119,6 +123,9 @@ int main(int count, char **words)
     struct sockaddr_in to = { .sin_family = AF_INET, .sin_port = htons(9001) };
     motors.count = 4;
     for (double next = 0;;) {
+        /* As the firmware waits: it sleeps, then looks at its clock until the time has come. */
+        if (next - seconds() > 3e-4)
+            nanosleep(&(struct timespec){ .tv_nsec = 200000 }, NULL);
         while (seconds() < next)
             ;
         next += 1e-3;
@@ -128,6 +135,7 @@ int main(int count, char **words)
         else
             for (int motor = 0; motor < 4; motor++)
                 motors.pulse[motor] = 1000;
-        sendto(motor_socket, &motors, sizeof motors, 0, (struct sockaddr *)&to, sizeof to);
+        if (next < mute)
+            sendto(motor_socket, &motors, sizeof motors, 0, (struct sockaddr *)&to, sizeof to);
     }
 }

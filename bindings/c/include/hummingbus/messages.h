@@ -1114,15 +1114,33 @@ static const HbMessage HB_MOCAP_STATE = { "hummingbus_msgs/msg/MocapState", "All
 
 // State of `operator`.
 typedef struct HbOperatorState {
+  // Altitude that was asked for last, within its limits. [m] in world
+  double altitude;
+  // Roll that was asked for last, within its limit. [rad]
+  double roll;
+  // Pitch that was asked for last, positive nose down, within its limit. [rad]
+  double pitch;
+  // Yaw that was asked for last. [rad]
+  double yaw;
   // Altitude lost since the source fell silent. [m] in world
   double lowered;
+  // 1 once somebody has asked.
+  uint32_t is_asked;
+  // Zero.
+  uint32_t reserved;
 } HbOperatorState;
 
 static const HbField HB_OPERATOR_STATE_FIELDS[] = {
+  { "altitude", "Altitude that was asked for last, within its limits.", "m", "world", offsetof(HbOperatorState, altitude), HB_F64, NULL, 0, 0, 0 },
+  { "roll", "Roll that was asked for last, within its limit.", "rad", "", offsetof(HbOperatorState, roll), HB_F64, NULL, 0, 0, 0 },
+  { "pitch", "Pitch that was asked for last, positive nose down, within its limit.", "rad", "", offsetof(HbOperatorState, pitch), HB_F64, NULL, 0, 0, 0 },
+  { "yaw", "Yaw that was asked for last.", "rad", "", offsetof(HbOperatorState, yaw), HB_F64, NULL, 0, 0, 0 },
   { "lowered", "Altitude lost since the source fell silent.", "m", "world", offsetof(HbOperatorState, lowered), HB_F64, NULL, 0, 0, 0 },
+  { "is_asked", "1 once somebody has asked.", "", "", offsetof(HbOperatorState, is_asked), HB_U32, NULL, 0, 0, 0 },
+  { "reserved", "Zero.", "", "", offsetof(HbOperatorState, reserved), HB_U32, NULL, 0, 0, 0 },
 };
 
-static const HbMessage HB_OPERATOR_STATE = { "hummingbus_msgs/msg/OperatorState", "State of `operator`.", sizeof(HbOperatorState), HB_OPERATOR_STATE_FIELDS, 1 };
+static const HbMessage HB_OPERATOR_STATE = { "hummingbus_msgs/msg/OperatorState", "State of `operator`.", sizeof(HbOperatorState), HB_OPERATOR_STATE_FIELDS, 7 };
 
 // All that it remembers.
 typedef struct HbPositionHoldState {

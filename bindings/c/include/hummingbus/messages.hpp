@@ -1070,13 +1070,31 @@ HUMMINGBUS_MESSAGE(hummingbus::msgs::MocapState, "hummingbus_msgs/msg/MocapState
 namespace hummingbus::msgs {
 // State of `operator`.
 struct OperatorState {
+  // Altitude that was asked for last, within its limits. [m] in world
+  double altitude{};
+  // Roll that was asked for last, within its limit. [rad]
+  double roll{};
+  // Pitch that was asked for last, positive nose down, within its limit. [rad]
+  double pitch{};
+  // Yaw that was asked for last. [rad]
+  double yaw{};
   // Altitude lost since the source fell silent. [m] in world
   double lowered{};
+  // 1 once somebody has asked.
+  std::uint32_t is_asked{};
+  // Zero.
+  std::uint32_t reserved{};
 };
 } // namespace hummingbus::msgs
 
 HUMMINGBUS_MESSAGE(hummingbus::msgs::OperatorState, "hummingbus_msgs/msg/OperatorState", "State of `operator`.",
-    HUMMINGBUS_FIELD(lowered, "m", "world", "Altitude lost since the source fell silent."));
+    HUMMINGBUS_FIELD(altitude, "m", "world", "Altitude that was asked for last, within its limits."),
+    HUMMINGBUS_FIELD(roll, "rad", "", "Roll that was asked for last, within its limit."),
+    HUMMINGBUS_FIELD(pitch, "rad", "", "Pitch that was asked for last, positive nose down, within its limit."),
+    HUMMINGBUS_FIELD(yaw, "rad", "", "Yaw that was asked for last."),
+    HUMMINGBUS_FIELD(lowered, "m", "world", "Altitude lost since the source fell silent."),
+    HUMMINGBUS_FIELD(is_asked, "", "", "1 once somebody has asked."),
+    HUMMINGBUS_FIELD(reserved, "", "", "Zero."));
 
 namespace hummingbus::msgs {
 // All that it remembers.
