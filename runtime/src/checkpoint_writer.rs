@@ -164,7 +164,7 @@ pub(crate) struct Collector<'a> {
     pub(crate) writer: Writer<'a>,
     /// The checkpoint that comes next.
     next: Option<u32>,
-    /// Why one could not be written.
+    /// Error of the checkpoint that could not be written.
     failed: Option<anyhow::Error>,
 }
 

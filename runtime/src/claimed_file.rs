@@ -10,13 +10,13 @@ use std::io::{self, ErrorKind, Write as _};
 use std::os::unix::fs::FileExt as _;
 use std::path::{Path, PathBuf};
 
-/// What stands in the name of a recording in front of its extension while it is not complete.
+/// Part of a recording's name in front of its extension while the recording is incomplete.
 const PARTIAL: &str = ".partial";
 
-/// What came of trying to lock a file.
+/// Result of an attempt to lock a file.
 enum Attempt {
     Locked(File),
-    /// Somebody else holds it.
+    /// Another process holds it.
     Held,
     /// It was removed or renamed before it was locked.
     Gone,
@@ -36,18 +36,18 @@ fn try_lock(file: File, location: &Location) -> io::Result<Attempt> {
 pub struct Partial {
     real: Location,
     location: Location,
-    /// Where it is written.
+    /// Path of the file while it is being written.
     pub path: PathBuf,
     /// The file, whatever its name.
     pub file: File,
-    /// Where what a broken run left lies now, if there was something.
+    /// Path to which the remains of a broken run were moved, if there were any.
     pub kept: Option<PathBuf>,
 }
 
 impl Partial {
-    /// Claims the place `path` of a recording; `None` where somebody else writes there.
+    /// Claims the place `path` of a recording; `None` if another process writes there.
     ///
-    /// What a broken run left there gets another name, and is never lost.
+    /// Remains of a broken run at that place get another name and are never lost.
     ///
     /// # Errors
     /// If something is in the way that must not be replaced, or the folder cannot be written to.
@@ -61,12 +61,12 @@ impl Partial {
         Ok(claimed.map(|(file, kept)| Self { real, location, path, file, kept }))
     }
 
-    /// Whether it still lies where it is written.
+    /// True if the file is still at the place where it is written.
     pub fn is_there(&self) -> bool {
         self.location.holds(&self.file)
     }
 
-    /// Whether something was written.
+    /// True if the file is empty.
     pub fn is_empty(&self) -> bool {
         self.file.metadata().is_ok_and(|file| file.len() == 0)
     }

@@ -1,11 +1,11 @@
 //! `hummingbus clean`: removes what dead runs left, and nothing of live ones.
 //!
-//! Whatever is removed is claimed first: the claim is the lock of the run's entry, which a live launcher holds.
+//! Everything to be removed is claimed first: the claim is the lock of the run's entry, which a live launcher holds.
 //! A run registers before it creates anything else, so files without an entry belong to a dead run.
 //!
-//! What a process inherited proves nothing: another run may have been started by a process of the dead one. A process
-//! belongs to a dead run if it says so and holds a file of its directory open, as everything does that writes where
-//! the run had it write, and if no live launcher is above or below it.
+//! An inherited environment proves nothing: a process of the dead run may have started another run. A process belongs
+//! to a dead run if its environment names the run and it holds a file of the run's directory open. Everything that
+//! writes where the run had it write does so. No live launcher may be above or below it.
 #![allow(clippy::disallowed_methods, reason = "waiting for a killed process takes host time")]
 
 use crate::process_table::{ancestors, run_dir_of};
@@ -25,13 +25,13 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// How long a killed process may take to be gone.
+/// Longest time until a killed process is gone.
 const GRACE: Duration = Duration::from_secs(5);
-/// How long a process may take from its start to the beginning of its program.
+/// Longest time from the start of a process to the beginning of its program.
 const BEGINNING: Duration = Duration::from_secs(1);
 const POLL: Duration = Duration::from_millis(2);
 
-/// What there was to clean.
+/// Remains that were found.
 ///
 /// ```no_run
 /// let report = runtime::clean::clean(true)?;
@@ -40,7 +40,7 @@ const POLL: Duration = Duration::from_millis(2);
 /// ```
 #[derive(Debug, Serialize)]
 pub struct Report {
-    /// Whether everything was left as it was.
+    /// True if nothing was removed.
     pub dry_run: bool,
     /// Names of the runs that live.
     pub live: Vec<String>,
@@ -48,24 +48,25 @@ pub struct Report {
     pub dead: Vec<Remains>,
 }
 
-/// What a dead run left.
+/// Remains of a dead run.
 #[derive(Debug, Default, Serialize)]
 pub struct Remains {
     /// The run.
     pub run_id: String,
     /// Processes that outlived it.
     pub processes: Vec<i32>,
-    /// Processes that carry its name and hold none of its files: they may be anything that it started, and live on.
+    /// Processes that carry its name and hold none of its files. The run may have started them for any purpose, so
+    /// they live on.
     pub spared: Vec<i32>,
     /// Files and directories.
     pub paths: Vec<PathBuf>,
     /// Memory and disk space that these take.
     pub bytes: u64,
-    /// What could not be removed, and why.
+    /// Paths and processes that could not be removed, each with the reason.
     pub failures: Vec<String>,
 }
 
-/// Removes what dead runs of this user left; with `dry_run`, only tells.
+/// Removes the remains of this user's dead runs; with `dry_run`, only reports them.
 ///
 /// # Errors
 /// If the machine's processes cannot be listed.
@@ -101,13 +102,13 @@ fn claim(run_id: &str, run_dirs: &BTreeSet<PathBuf>) -> Option<Vec<File>> {
     }
 }
 
-/// Whether a process has the number of the run's launcher, with which the run's name begins.
+/// True if a process has the number of the run's launcher, with which the run's name begins.
 fn launcher_is_there(run_id: &str) -> bool {
     let number = run_id.split_once('-').and_then(|(launcher, _)| u32::from_str_radix(launcher, 16).ok());
     number.is_some_and(|number| Path::new("/proc").join(number.to_string()).exists())
 }
 
-/// Where a run was met: its directory, wherever its folder for temporary files was, and its processes.
+/// Traces of a run: its directories, in any folder for temporary files, and its processes.
 #[derive(Default)]
 struct Traces {
     run_dirs: BTreeSet<PathBuf>,
@@ -144,7 +145,7 @@ fn name_of(path: &Path) -> Option<&str> {
     path.file_name()?.to_str()
 }
 
-/// What lies in `folder` and belongs to this user; nothing where there is no such folder.
+/// This user's files in `folder`; empty if there is no such folder.
 fn own_files(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let is_own = |entry: &std::fs::DirEntry| entry.metadata().is_ok_and(|file| file.uid() == user_id());
@@ -169,12 +170,12 @@ fn processes_of_runs() -> Result<Vec<(Pid, PathBuf, bool)>> {
     Ok(entries.filter_map(process).collect())
 }
 
-/// What stands for the mounts that a process sees.
+/// Identifier of the mounts that a process sees.
 fn mounts_of(process: &Path) -> Option<PathBuf> {
     std::fs::read_link(process.join("ns/mnt")).ok()
 }
 
-/// Whether a process is a live launcher, or above or below one.
+/// Returns a predicate that is true for live launchers, their ancestors and their descendants.
 fn kin_of_live_launchers() -> impl Fn(Pid) -> bool {
     let launchers: BTreeSet<i32> = live_runs().iter().map(|run| run.entry.launcher.cast_signed()).collect();
     let above = launchers.iter().copied().filter_map(Pid::from_raw).flat_map(ancestors).map(number);
@@ -189,9 +190,9 @@ fn number(process: Pid) -> i32 {
     process.as_raw_nonzero().get()
 }
 
-/// Whether a process holds a file of `run_dir` open, also one that is removed by now.
+/// True if a process holds a file of `run_dir` open, also one that has been removed.
 fn holds_file_of(process: Pid, run_dir: &Path) -> bool {
-    // The kernel tells where a file lies without the links on the way there.
+    // The kernel reports the path of a file with all links resolved.
     let resolved = run_dir.parent().and_then(|folder| folder.canonicalize().ok());
     let resolved = resolved.zip(run_dir.file_name()).map(|(folder, name)| folder.join(name));
     let files = std::fs::read_dir(format!("/proc/{process}/fd")).into_iter().flatten().flatten();
@@ -263,7 +264,7 @@ fn end_process(process: i32, run_id: &str) -> Result<()> {
 }
 
 impl Report {
-    /// Whether nothing of a dead run is left, or nothing was to be removed.
+    /// True if nothing of a dead run is left, or nothing was to be removed.
     pub fn is_done(&self) -> bool {
         self.dead.iter().all(|remains| remains.failures.is_empty())
     }

@@ -1,7 +1,7 @@
-//! What the processes of a run started themselves: it dies with the run.
+//! Processes started by the processes of a run: they are ended with the run.
 //!
-//! The launcher makes itself their reaper (PR_SET_CHILD_SUBREAPER): whatever loses its parent becomes the launcher's
-//! child, however it was detached. So the launcher has only to end its children until there are none left.
+//! The launcher makes itself their reaper (PR_SET_CHILD_SUBREAPER): every process that loses its parent becomes the
+//! launcher's child, however it was detached. So the launcher only has to end its children until there are none left.
 
 use crate::process_table::{children, run_dir_of};
 use crate::watch_clock::WatchClock;
@@ -13,7 +13,7 @@ use rustix::process::{
 use std::sync::{RwLock, RwLockReadGuard, RwLockWriteGuard, TryLockError};
 use std::time::Duration;
 
-/// How long a process may take to end when it is asked to, and then to be gone once it was killed.
+/// Time that a process has to end when it is asked to, and then again after it was killed.
 const GRACE: Duration = Duration::from_secs(1);
 const POLL: Duration = Duration::from_millis(2);
 /// A look at the processes goes through them one after another: one whose parent ends meanwhile is seen as nobody's, and
@@ -47,7 +47,7 @@ impl Place {
     }
 }
 
-/// What was locked, also where a run panicked that had it: there is nothing that it could have left half done.
+/// The guard of a lock, also if a run panicked while it held the lock: no operation can be left half done.
 fn settled<G>(attempt: Result<G, TryLockError<G>>) -> Option<G> {
     match attempt {
         Ok(guard) => Some(guard),
@@ -74,8 +74,8 @@ impl Descendants {
         Self { before: children(), was_reaper }
     }
 
-    /// Whether a child was left by this run. Where the launcher had children before, those may leave some too: then
-    /// only a process that carries this run in its environment is.
+    /// True if `child` was left by this run. If the launcher had children before, those may leave some too. Then only
+    /// a process that carries this run in its environment counts.
     fn is_of_this_run(&self, child: Pid) -> bool {
         self.before.is_empty() || run_dir_of(child).is_some()
     }

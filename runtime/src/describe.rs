@@ -77,7 +77,7 @@ fn what(program: &Program) -> String {
     }
 }
 
-/// Who shadows, replaces or stands by for a node, and what follows its end.
+/// Text about the backups of a node, and about the consequence of its end.
 fn replacements(graph: &Graph, node: usize) -> String {
     let mut text = match graph.programs[node].on_exit {
         OnExit::Restart => "  if it ends, it is started again\n".to_owned(),

@@ -1,9 +1,9 @@
-//! What a launcher tells of a run while it flies, and how it is told to end it.
+//! Events that a launcher reports while a run flies, and the request to end the run.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// What happens in a run, for whoever follows it.
+/// An event of a run, for its listeners.
 ///
 /// ```
 /// use runtime::event::{Progress, RunEvent};
@@ -19,11 +19,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 pub enum RunEvent<'a> {
     /// A message that the user should see while the run goes on.
     Note(&'a str),
-    /// How far the run has come; every few milliseconds.
+    /// Progress of the run; every few milliseconds.
     Progress(Progress),
 }
 
-/// How far a run has come.
+/// Progress of a run.
 ///
 /// ```
 /// # use runtime::event::Progress;
@@ -68,7 +68,7 @@ impl StopToken {
         self.0.fetch_add(1, Ordering::SeqCst);
     }
 
-    /// How often a stop was asked for.
+    /// Number of times that a stop was requested.
     #[must_use]
     pub fn count(&self) -> usize {
         self.0.load(Ordering::SeqCst)

@@ -4,7 +4,7 @@ use rustix::io::Errno;
 use std::fs::{File, TryLockError};
 use std::io::{self, ErrorKind};
 
-/// What to do where two runs could not be kept apart.
+/// Advice for a file system on which two runs could not be kept apart.
 const NO_LOCKS: &str = "the file system cannot lock files (flock), as some network file systems cannot; write to a local \
                         folder and move the file afterwards";
 

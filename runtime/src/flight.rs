@@ -1,4 +1,4 @@
-//! What the processes of a run noted, and what follows from it with the plan.
+//! Host times noted by the processes of a run, and conclusions drawn from them and the plan.
 
 use crate::replacement::Report;
 use bus::BusError;
@@ -28,7 +28,7 @@ struct Era {
     noted: TickReader,
 }
 
-/// What a computation had to wait for last.
+/// The last condition that a computation waited for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
     /// A sample: its topic, and the tick that it is stamped with.
@@ -47,7 +47,7 @@ pub enum Cause {
 /// The last thing that a computation waited for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Waited {
-    /// What it was.
+    /// Cause of the wait.
     pub cause: Cause,
     /// Host time at which it was there.
     pub ready_ns: u64,
@@ -114,7 +114,7 @@ impl Flight {
         self.eras_at(node, tick).next().map_or(&[], |era| &era.inputs)
     }
 
-    /// All that `node` noted in the ticks of the run.
+    /// Host times that `node` noted in the ticks of the run.
     pub fn ticks_of(&self, node: usize) -> impl Iterator<Item = TickTimes<'_>> {
         let period = self.plan.nodes[node].period_ticks.max(1) as usize;
         (0..self.ticks).step_by(period).filter_map(move |tick| self.at(node, tick))
@@ -143,7 +143,7 @@ impl Flight {
         self.grants.of(tick)
     }
 
-    /// What the computation `times` of `node` waited for last. `None` where that was not noted.
+    /// The last condition that the computation `times` of `node` waited for. `None` if it was not noted.
     pub fn waited(&self, node: usize, times: &TickTimes<'_>) -> Option<Waited> {
         let itself = times.began_ns.map(|ready_ns| Waited { cause: Cause::Itself, ready_ns });
         let granted = self.grant(times.tick)?.granted_ns;
@@ -175,7 +175,7 @@ impl Flight {
             .map(|(node, _)| node)
     }
 
-    /// Whether what `from` sends comes to `to`, over any number of nodes; a node reaches itself.
+    /// True if samples of `from` reach `to`, over any number of nodes; a node reaches itself.
     fn reaches(&self, from: usize, to: usize) -> bool {
         let mut is_reached = vec![false; self.plan.nodes.len()];
         let mut open = vec![from];

@@ -62,13 +62,13 @@ const RATE_HZ_MAX: u32 = 1_000_000;
 /// ```
 #[derive(Debug)]
 pub struct Graph {
-    /// What the processes of the run read.
+    /// The plan, which the processes of the run read.
     pub plan: Plan,
-    /// What to start, in the order of the plan's nodes.
+    /// Programs to start, in the order of the plan's nodes.
     pub(crate) programs: Vec<Program>,
-    /// Who stands by or takes over, in the order in which they join.
+    /// Backups, in the order in which they join.
     pub backups: Vec<BackupSpec>,
-    /// Processes that take no part in the ticks: their names and what to start.
+    /// Sidecars: their names and programs.
     pub(crate) sidecars: Vec<(String, Program)>,
     /// The vehicle, scene and gains files the processes name, each once.
     pub(crate) models: Vec<PathBuf>,
@@ -76,7 +76,7 @@ pub struct Graph {
     pub files: InputFiles,
     /// Parts of the checkpoint from which the run goes on.
     pub(crate) from: Option<Parts>,
-    /// What is odd and flies all the same; `check` and `run` tell it.
+    /// Legal but unusual values; `check` and `run` print them.
     pub warnings: Vec<Diagnostic>,
 }
 
@@ -89,7 +89,7 @@ impl Graph {
     /// Checks `manifest` and resolves it. Files that it names are read from the disk, now and never again.
     ///
     /// # Errors
-    /// What is wrong with it, each with its place; what a fault hides from sight is not told beside it.
+    /// Every fault of the manifest with its place, except those that another fault hides.
     pub fn build(manifest: &Manifest) -> Result<Self, Diagnostic> {
         Self::build_from(manifest, InputFiles::default())
     }

@@ -14,17 +14,17 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// How long threads may take to notice that they are to end.
+/// Time that threads have to notice that they are to end.
 pub(crate) const GRACE: Duration = Duration::from_secs(2);
 const POLL: Duration = Duration::from_millis(1);
 /// As much as the main thread of a process has.
 const STACK_BYTES: usize = 8 << 20;
 
-/// Where the instances of a run's nodes live.
+/// Host of the instances of a run's nodes.
 ///
-/// Nodes on threads meet the faults of processes: one that panics or returns an error ends the run with its message, or
-/// is replaced where its manifest says so. One that hangs is given up by its watchdog: it cannot be killed, so its
-/// thread is left behind and ends, having sent nothing more, when it next waits.
+/// Nodes on threads meet the faults of processes: one that panics or returns an error ends the run with its message,
+/// or is replaced if its manifest says so. One that hangs is given up by its watchdog. A thread cannot be killed: it
+/// is left behind, sends nothing more, and ends at its next wait.
 ///
 /// ```
 /// use runtime::host::Host;
@@ -38,9 +38,9 @@ pub enum Host {
     /// Each component is a thread of this process, which the run leaves as it is otherwise. A `command`, and what only
     /// a process of its own can have (`nice`, `cpu`, …), is refused.
     Threads,
-    /// All components, the recorder too, are stepped one after the other by the thread that flies the run, without
-    /// shared memory and without a clock service. What threads cannot have is refused, and what changes processes in
-    /// flight too: swaps, standbys, restarts, requests.
+    /// The thread that flies the run steps all components one after the other, the recorder too. There is no shared
+    /// memory and no clock service. Everything that threads refuse is refused, and so are changes of processes in
+    /// flight: swaps, standbys, restarts, requests.
     InProcess,
 }
 
@@ -98,7 +98,7 @@ pub(crate) fn panic_message(panic: &(dyn Any + Send)) -> &str {
     text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("without a message")
 }
 
-/// How an instance ended.
+/// End of an instance.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum End {
     /// It returned, as a process with this exit code.
@@ -112,12 +112,12 @@ pub(crate) enum End {
 }
 
 impl End {
-    /// Whether nothing went wrong.
+    /// True if the instance ended without an error.
     pub fn success(&self) -> bool {
         *self == Self::Exited(0)
     }
 
-    /// How it ended before the run did.
+    /// Description of an end before that of the run.
     pub fn message(&self) -> String {
         match self {
             Self::Exited(0) => "ended with exit code 0 before the run did".to_owned(),
@@ -182,7 +182,7 @@ impl Thread {
         Ok(Self { handle: Some(handle), is_cancelled, control })
     }
 
-    /// How it ended, if it has.
+    /// End of the instance, if it has ended.
     pub fn end(&mut self) -> Option<End> {
         let handle = self.handle.take_if(|handle| handle.is_finished())?;
         Some(match handle.join() {

@@ -41,9 +41,9 @@ const MESSAGE_BYTES: usize = 4096;
 
 /// The world of a run on this host.
 pub struct HostWorld<'a> {
-    /// Where its instances live.
+    /// Host of its instances.
     pub host: Host,
-    /// What it flies.
+    /// Its manifest.
     pub manifest: &'a Manifest,
     /// Its plan.
     pub plan: &'a Plan,
@@ -51,13 +51,13 @@ pub struct HostWorld<'a> {
     pub files: &'a InputFiles,
     /// Its control segment.
     pub control: Arc<SupervisorView>,
-    /// Where it keeps its files.
+    /// Its run directory.
     pub run_dir: &'a Path,
     /// Serves requests.
     pub control_server: ControlServer<'a>,
-    /// What its processes started, where that is to end with the run.
+    /// Processes started by its processes, if those are to end with the run.
     pub descendants: Option<&'a Descendants>,
-    /// Where sidecars say that they are ready, by their number.
+    /// Sockets on which sidecars report that they are ready, by their number.
     pub sockets: BTreeMap<usize, UnixDatagram>,
     /// The processes of groups that were started, by the groups' names.
     pub groups: BTreeMap<String, Rc<RefCell<SharedBody>>>,

@@ -141,10 +141,9 @@ impl<'a> Launcher<'a> {
         self
     }
 
-    /// What the nodes' processes start themselves is ended with the run, however it was detached: this process becomes
-    /// the parent of orphans (`PR_SET_CHILD_SUBREAPER`) while the run flies. For a process that starts no other
-    /// children meanwhile: those would be ended with the run. While such a run flies the process flies no other, and
-    /// the launch of one is refused.
+    /// Ends with the run every process that the nodes' processes start, however it was detached. While the run flies,
+    /// this process is the parent of orphans (`PR_SET_CHILD_SUBREAPER`). It may start no other children meanwhile:
+    /// those would be ended with the run. While such a run flies, the launch of another in this process is refused.
     #[must_use]
     pub fn adopting_orphans(mut self) -> Self {
         self.adopts_orphans = true;

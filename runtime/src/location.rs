@@ -19,7 +19,7 @@ const LINKS_MAX: usize = 40;
 /// A folder that is opened to name files in it, not to list it.
 const FOLDER: OFlags = OFlags::PATH.union(OFlags::DIRECTORY).union(OFlags::NOFOLLOW).union(OFlags::CLOEXEC);
 
-/// Why a path names no location for a file.
+/// Reason why a path names no location for a file.
 #[derive(Debug, thiserror::Error)]
 pub enum Unlocated {
     /// Its last part is no name.

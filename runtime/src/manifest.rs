@@ -67,7 +67,7 @@ pub struct Manifest {
     pub path: PathBuf,
     /// The file's text that goes into the recording: with every `--set` but those of host-only keys.
     pub recorded_text: String,
-    /// What it says.
+    /// Content of the file with its includes and overrides.
     pub content: Content,
     pub(crate) sources: Sources,
     /// Values of files that `--set` replaces.
@@ -283,10 +283,10 @@ impl Manifest {
     }
 }
 
-/// What the whole `tree` says.
+/// Content of the whole `tree`.
 ///
 /// # Errors
-/// Where it cannot be read: what is wrong there, and with each process.
+/// The faults of the tree and of each process, if it cannot be read.
 fn content(sources: &Sources, tree: DeTable<'_>) -> Result<Content, Diagnostic> {
     let whole = Spanned::new(0..0, DeValue::Table(tree));
     let mut content = read_tree(&whole).map_err(|first| {

@@ -35,24 +35,24 @@ const DRAFTS_MAX: u32 = 100;
 /// ```
 #[derive(Debug)]
 pub struct Kind {
-    /// What it is, in messages.
+    /// Name of the kind, in messages.
     pub name: &'static str,
-    /// What is in every such file.
+    /// Mark that every file of the kind has.
     pub mark: Mark,
 }
 
-/// How a file is known.
+/// Mark by which a file is recognized.
 #[derive(Debug)]
 pub enum Mark {
-    /// It starts like this, or with the beginning of it where its writer was cut off.
+    /// The file starts with these bytes, or with the first of them if its writer was cut off.
     Start(&'static [u8]),
-    /// This is within its first bytes.
+    /// These bytes are within its first ones.
     Within(&'static [u8]),
 }
 
 /// The recording of a run.
 pub(crate) const RECORDING: Kind = Kind { name: "recording", mark: Mark::Start(recorder::writer::START) };
-/// What a process says.
+/// Output of a process.
 pub(crate) const LOG: Kind = Kind { name: "log", mark: Mark::Start(LOG_START.as_bytes()) };
 /// The first line of a log that a manifest names.
 pub(crate) const LOG_START: &str = "# What a process of a run said. Written by hummingbus.\n";
@@ -137,13 +137,13 @@ pub(crate) fn locate(path: &Path, kind: &Kind) -> Result<Location> {
     Ok(location)
 }
 
-/// Whether standard output or standard error goes to this file.
+/// True if standard output or standard error goes to this file.
 fn is_standard_stream(file: &Metadata) -> bool {
     let streams = ["/proc/self/fd/1", "/proc/self/fd/2"].map(std::fs::metadata);
     streams.iter().flatten().any(|stream| (stream.dev(), stream.ino()) == (file.dev(), file.ino()))
 }
 
-/// Whether two paths name one file, by any spelling, link, or second name of it.
+/// True if two paths name one file, by any spelling, link, or second name of it.
 pub fn is_same(a: &Path, b: &Path) -> bool {
     let is_same_path = matches!((real_path(a), real_path(b)), (Ok(a), Ok(b)) if a == b);
     let identity = |path: &Path| std::fs::metadata(path).map(|file| (file.dev(), file.ino()));

@@ -1,6 +1,6 @@
-//! All files that a run writes where its user said: checked before anything starts, claimed while it flies.
+//! Files that a run writes at its user's paths: checked before anything starts, claimed while the run flies.
 //!
-//! A second run that would write to one of them is refused at its start, and is told who does.
+//! A second run that would write to one of them is refused at its start; the error names the first run.
 
 use crate::checkpoint::{self, CHECKPOINT};
 use crate::claimed_file::{LogClaim, Partial, partial_path, with_suffix};
@@ -14,8 +14,8 @@ use recorder::reader::Recording;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// How often a claimed file is tried again where no run says that it is its own, and how long in between: who has it
-/// may be about to say so, or about to leave.
+/// Number of attempts to claim a file that no run lists as its own, and the pause between two attempts. Its owner may
+/// be about to list it, or about to leave.
 const ATTEMPTS: u32 = 100;
 const POLL: Duration = Duration::from_millis(20);
 /// Checkpoints whose places are looked at before the run: of a thousand more the names differ by a number only.
@@ -26,13 +26,13 @@ const LIST: &str = "outputs.json";
 /// A file that a run writes.
 #[derive(Debug)]
 pub struct Output {
-    /// What it is, in messages.
+    /// Description of the file, in messages.
     pub what: String,
-    /// How the user spelled it.
+    /// Path as the user spelled it.
     pub path: PathBuf,
     /// Its kind.
     pub kind: &'static Kind,
-    /// How to name another.
+    /// Advice for choosing another path.
     pub advice: String,
 }
 
@@ -128,7 +128,7 @@ impl Outputs {
         fresh.try_for_each(LogClaim::begin)
     }
 
-    /// Where the recording of a run that goes back for the `number`th time is kept, if it has one.
+    /// Path to which the recording of a run is moved at rewind `number`, if it has one.
     pub(crate) fn place_aside(&self, number: usize) -> Option<PathBuf> {
         let recording = self.recording.as_ref()?;
         let real = output_file::real_path(&recording.path).ok()?;
@@ -153,12 +153,12 @@ impl Outputs {
         std::fs::write(run_dir.path().join(LIST), text).context("cannot write to the run directory")
     }
 
-    /// Where what an earlier run left unfinished lies now, if there was something.
+    /// Path to which the unfinished recording of an earlier run was moved, if there was one.
     pub(crate) fn kept(&self) -> Option<&Path> {
         self.partial.as_ref()?.kept.as_deref()
     }
 
-    /// Where the recorder writes.
+    /// Path of the file that the recorder writes.
     pub(crate) fn partial(&self) -> Option<&Path> {
         self.partial.as_ref().map(|partial| &*partial.path)
     }
@@ -176,8 +176,8 @@ impl Outputs {
         Ok(Some(flown))
     }
 
-    /// What a broken run leaves of its recording, if anything. A file without a message, of a run that never flew, is
-    /// removed.
+    /// Path of the incomplete recording of a broken run, if there is one. A file without a message, of a run that
+    /// never flew, is removed.
     pub fn left(&mut self) -> Option<PathBuf> {
         let is_blank = |partial: &&Partial| {
             let whole = Recording::of_file(&partial.file, &partial.path);
@@ -200,7 +200,7 @@ impl Output {
         Ok(Self { what, path, kind: self.kind, advice: self.advice.clone() })
     }
 
-    /// What `claim` claims of it.
+    /// Claims its path with `claim`, and returns the result.
     fn claimed<T>(&self, claim: impl Fn(&Path) -> Result<Option<T>>) -> Result<T> {
         for _ in 0..ATTEMPTS {
             if let Some(claimed) = claim(&self.path)? {
@@ -223,7 +223,7 @@ impl Output {
     }
 }
 
-/// What the name of a recording ends with that is kept at the `number`th rewind.
+/// End of the name of a recording that is kept at rewind `number`.
 fn aside(number: usize) -> String {
     format!(".rewind-{number}")
 }

@@ -1,4 +1,4 @@
-//! What follows when a process of a run ends: decided on what is seen, without touching a process.
+//! Decisions about the end of a process: they follow from observations, and touch no process.
 
 use crate::program::OnExit;
 use crate::replacement::{InstanceRole, Replacements, Stage};
@@ -12,13 +12,13 @@ use bus::plan::{NodePlan, Plan};
 pub struct Death {
     /// Its name.
     pub name: String,
-    /// What it was for.
+    /// Its role.
     pub role: Role,
-    /// How it ended, with the last lines that it wrote.
+    /// Description of its end, with the last lines that it wrote.
     pub message: String,
 }
 
-/// Why the run ends at once.
+/// Reason why the run ends at once.
 #[derive(Clone, Debug)]
 pub struct Abort(pub String);
 
@@ -26,13 +26,13 @@ pub struct Abort(pub String);
 #[derive(Debug)]
 pub struct Overseer<'a> {
     plan: &'a Plan,
-    /// Where the run stands.
+    /// State of the run.
     pub state: State,
     /// Its backups and replacements.
     pub replacements: Replacements<'a>,
-    /// What the user should know, since it was told last.
+    /// Notes for the user that were not reported yet.
     pub notes: Vec<String>,
-    /// Whether a dead process is being replaced: the run may stand still meanwhile.
+    /// True if a dead process is being replaced: the run may stand still meanwhile.
     pub has_answered: bool,
 }
 
@@ -42,7 +42,7 @@ impl<'a> Overseer<'a> {
         Self { plan, state: State::Starting, replacements, notes: Vec::new(), has_answered: false }
     }
 
-    /// Whether an end without an error is one in good order.
+    /// True if a process with this role may end without an error now.
     pub fn has_done_its_part(&self, role: Role) -> bool {
         match role {
             Role::Sidecar { .. } => true,
@@ -130,8 +130,8 @@ impl<'a> Overseer<'a> {
         }
     }
 
-    /// Whether a process had completed its last tick when it died, and need not be missed by its node's policy: all
-    /// that it had to send is sent, and there is nothing left that another could do in its place.
+    /// True if a process had completed its last tick when it died, and its node's policy allows the run to go on.
+    /// Every sample that it had to send is sent, and another process could do nothing in its place.
     fn has_died_behind_the_end(&self, node: usize, generation: u32) -> bool {
         self.replacements.view.phase == Phase::Running
             && self.replacements.program(node).on_exit != OnExit::Stop

@@ -1,4 +1,4 @@
-//! What a process writes: its log in the run directory, bounded, and its last words, bounded and safe to print.
+//! Output of a process: its log in the run directory, bounded, and its last words, bounded and safe to print.
 
 use crate::output_file::LOG_START;
 use diagnostics::{printable_line, shortened};
@@ -18,14 +18,14 @@ const ERROR_LINES: usize = 160;
 /// Characters of a line that are shown: a line without end fills neither memory nor terminal.
 const LINE_CHARS: usize = 600;
 
-/// What the standard library writes when a thread panics.
+/// Words that the standard library writes when a thread panics.
 const PANIC: &[u8] = b"panicked at";
 /// Start of the line with which a program reports the error that ended it.
 const ERROR: &[u8] = b"error: ";
 
-/// The last lines of the log at `path`, with those from the last error on, or those from the last panic's message on; none where
-/// it cannot be read.
-/// Whatever a terminal would obey is escaped, and so is what is not UTF-8.
+/// Returns the last lines of the log at `path`; empty if it cannot be read. After a panic, the lines begin at the
+/// last panic's message. Otherwise they reach back to the last error, if that is near the end.
+/// Everything that a terminal would interpret is escaped, and so are bytes that are not UTF-8.
 pub fn last_words(path: &Path) -> Vec<String> {
     let (bytes, is_cut) = tail(path).unwrap_or_default();
     let bytes = bytes.strip_prefix(LOG_START.as_bytes()).unwrap_or(&bytes);

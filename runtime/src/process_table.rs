@@ -1,4 +1,4 @@
-//! What the kernel tells of processes: whose children they are, and which run they carry in their environment.
+//! Information of the kernel about processes: their parents, and the run named in their environment.
 
 use bus::process::RUN_VARIABLE;
 use rustix::process::Pid;

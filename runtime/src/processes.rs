@@ -8,7 +8,7 @@ use crate::world::{Body, World};
 use anyhow::Result;
 use std::time::Duration;
 
-/// How long processes have to leave by themselves after an abort.
+/// Time that processes have to leave by themselves after an abort.
 const GRACE: Duration = Duration::from_secs(2);
 const POLL: Duration = Duration::from_millis(2);
 
@@ -17,17 +17,17 @@ const POLL: Duration = Duration::from_millis(2);
 pub struct Process<B: Body> {
     /// The name in messages: that of its node, and for a backup its generation.
     pub name: String,
-    /// What it is for.
+    /// Its role.
     pub role: Role,
     /// Group whose process it shares.
     pub group: Option<String>,
-    /// What runs.
+    /// The process or thread itself.
     pub body: B,
-    /// How it ended.
+    /// Its end, if it has ended.
     pub end: Option<End>,
-    /// Whether the consequences of its end are drawn.
+    /// True if its end was dealt with.
     pub is_settled: bool,
-    /// Why the launcher killed it.
+    /// Reason why the launcher killed it.
     pub verdict: Option<String>,
 }
 
@@ -44,7 +44,7 @@ impl<B: Body> Processes<B> {
         self.running.iter_mut().try_for_each(Process::look)
     }
 
-    /// Whether every process has ended.
+    /// True if every process has ended.
     pub fn all_ended(&self) -> bool {
         self.running.iter().all(|process| process.end.is_some())
     }
@@ -143,7 +143,7 @@ impl<B: Body> Process<B> {
         }
     }
 
-    /// How the process ended before the run did, with the last lines it wrote.
+    /// Description of the end of a process before that of the run, with the last lines that it wrote.
     pub fn post_mortem(&self) -> String {
         let end = match (&self.verdict, &self.end) {
             (Some(verdict), _) => verdict.clone(),

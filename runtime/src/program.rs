@@ -1,4 +1,4 @@
-//! What the supervisor starts: the executable behind a node, how it runs on the host, and what follows its
+//! Programs that the supervisor starts: the executable of a node, its settings on the host, and the action at its
 //! end.
 
 use crate::registry::NodeProgram;
@@ -10,8 +10,8 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// How long a run may stand still because of one process where the manifest does not say. A tick takes
-/// microseconds.
+/// Longest time that a run may stand still because of one process, if the manifest does not state another. A tick
+/// takes microseconds.
 pub const WATCHDOG: Duration = Duration::from_secs(20);
 
 /// An executable behind a node.
@@ -25,7 +25,7 @@ pub enum Executable {
     Command(Vec<String>),
 }
 
-/// What follows when a process ends before the run does.
+/// Action when a process ends before the run does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum OnExit {
@@ -54,7 +54,7 @@ pub enum Readiness {
 /// A process to start.
 #[derive(Clone, Debug)]
 pub struct Program {
-    /// What is executed.
+    /// Its executable.
     pub executable: Executable,
     /// Environment variables beside the launcher's own.
     pub environment: BTreeMap<String, String>,
@@ -64,13 +64,13 @@ pub struct Program {
     pub nice: Option<i32>,
     /// Priority under SCHED_FIFO, 1 to 99.
     pub realtime_priority: Option<i32>,
-    /// What follows its end.
+    /// Action at its end.
     pub on_exit: OnExit,
-    /// How long the run may stand still because of it.
+    /// Longest time that the run may stand still because of it.
     pub watchdog: Duration,
     /// When a sidecar counts as ready.
     pub ready: Readiness,
-    /// Where its standard output and error go; into the run directory where absent.
+    /// File for its standard output and error; in the run directory where absent.
     pub log: Option<PathBuf>,
 }
 
@@ -116,11 +116,11 @@ pub struct BackupSpec {
     pub join_tick: u32,
     /// The tick from which on its outputs count; `None` for one that only shadows or stands by.
     pub take_over_tick: Option<u32>,
-    /// Whether it is promoted when the primary dies.
+    /// True if it is promoted when the primary dies.
     pub is_standby: bool,
-    /// What to start.
+    /// Program to start.
     pub(crate) program: Program,
-    /// What it reads about itself: the node's own plan with the backup's parameters and inputs.
+    /// Plan that the backup reads about itself: the node's own, with the backup's parameters and inputs.
     pub plan: NodePlan,
 }
 
@@ -131,7 +131,7 @@ impl BackupSpec {
     }
 }
 
-/// What flies at `tick` where node `node` begins as `program` and `backups` take over.
+/// Program that flies at `tick` if node `node` begins as `program` and `backups` take over.
 pub(crate) fn flying<'a>(
     node: usize,
     program: &'a Program,

@@ -71,13 +71,13 @@ impl Registry {
         self.programs.iter().find(|program| program.name == name)
     }
 
-    /// All components, as a node of a run is given them.
+    /// The components, as a node of a run receives them.
     #[must_use]
     pub const fn components(&self) -> &'static [Registration] {
         self.components
     }
 
-    /// All components.
+    /// Iterates over the components.
     pub fn iter(&self) -> impl Iterator<Item = &'static Registration> {
         self.components.iter()
     }

@@ -22,14 +22,14 @@ use bus::plan::{InputPlan, Plan};
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// How far a backup has come.
+/// Stage of a backup on its way into the run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd)]
 pub(crate) enum Stage {
     /// Its process starts and prepares its outputs, while the run flies on.
     Starting,
     /// The clock holds the tick; it connects its inputs.
     Joining,
-    /// The others are told and connect to it.
+    /// The others are informed and connect to it.
     Announced,
     /// It computes every tick; its samples are a shadow's until the take-over.
     Shadowing,
@@ -81,24 +81,24 @@ struct Node {
     backup: Option<Backup>,
     /// The highest generation that was started.
     newest_generation: u32,
-    /// Whether the primary is dead and not replaced yet.
+    /// True if the primary is dead and not replaced yet.
     is_vacant: bool,
 }
 
-/// All replacements of a run.
+/// The replacements of a run.
 #[derive(Debug)]
 pub(crate) struct Replacements<'a> {
     plan: &'a Plan,
-    /// What is seen of the run, with all that was commanded since.
+    /// The run as it was seen, with every command since.
     pub(crate) view: View,
     membership: Membership,
     nodes: Vec<Node>,
     pending: VecDeque<Pending>,
-    /// What became of those that are through.
+    /// Reports of the replacements that have ended.
     pub(crate) reports: Vec<Report>,
 }
 
-/// What a process is to its node.
+/// Role of an instance in its node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum InstanceRole {
     /// Its samples count.
@@ -157,12 +157,12 @@ impl<'a> Replacements<'a> {
         });
     }
 
-    /// Whether a backup of `node` waits or is on its way.
+    /// True if a backup of `node` waits or is on its way.
     pub(crate) fn is_busy(&self, node: usize) -> bool {
         self.nodes[node].backup.is_some() || self.pending.iter().any(|pending| pending.spec.node == node)
     }
 
-    /// What the process of a node's generation is to it now.
+    /// Current role of the instance `generation` of a node.
     pub(crate) fn role(&self, node: usize, generation: u32) -> InstanceRole {
         let backup = self.nodes[node].backup.as_ref();
         if self.membership.nodes[node].primary.generation == generation {
@@ -189,7 +189,7 @@ impl<'a> Replacements<'a> {
         self.plan.slot(node, generation)
     }
 
-    /// Whether every living instance has acknowledged the newest membership.
+    /// True if every living instance has acknowledged the newest membership.
     pub(crate) fn all_agree(&self) -> bool {
         self.disagreeing().is_none()
     }
@@ -285,8 +285,8 @@ impl<'a> Replacements<'a> {
             && self.all_agree()
     }
 
-    /// Whether the dead primary of `node` can be replaced now: a backup that is joining, its own included, has joined
-    /// or is refused first.
+    /// True if the dead primary of `node` can be replaced now. A backup that is joining, of this node or another,
+    /// must have joined or been refused first.
     pub(crate) fn may_replace(&self, node: usize) -> bool {
         let backup = self.nodes[node].backup.as_ref();
         let is_joining =
@@ -299,7 +299,7 @@ impl<'a> Replacements<'a> {
         self.view.free(node, generation, self.slot(node, generation));
     }
 
-    /// Whether the primary of `node` is dead and being replaced.
+    /// True if the primary of `node` is dead and being replaced.
     pub(crate) fn is_vacant(&self, node: usize) -> bool {
         self.nodes[node].is_vacant
     }
@@ -350,7 +350,7 @@ impl<'a> Replacements<'a> {
         }
     }
 
-    /// What became of all backups, those included that still shadow.
+    /// Reports of every backup, including those that still shadow.
     pub(crate) fn into_reports(mut self) -> Vec<Report> {
         for mut backup in self.nodes.into_iter().filter_map(|nodes| nodes.backup) {
             if backup.report.purpose == Purpose::Swap && backup.report.take_over_tick.is_none() {
@@ -362,7 +362,7 @@ impl<'a> Replacements<'a> {
     }
 }
 
-/// What the tick of a take-over must be a multiple of: so that the backup sends on every output at once, and a
+/// Number of which the tick of a take-over must be a multiple. The backup then sends on every output at once, and a
 /// process that joins later finds its samples.
 pub(crate) fn take_over_stride(plan: &Plan, node: usize) -> u32 {
     let periods = plan.nodes[node].outputs.iter().map(|output| plan.topics[output.topic].period_ticks);

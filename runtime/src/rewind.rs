@@ -96,7 +96,7 @@ impl Rewinds {
         self.begun.take()
     }
 
-    /// All rewinds so far.
+    /// Rewinds so far.
     pub fn done(&self) -> Ref<'_, Vec<Rewound>> {
         self.done.borrow()
     }

@@ -1,6 +1,6 @@
-//! What a process is for in its run.
+//! Role of a process in its run.
 
-/// What a process is for.
+/// Role of a process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
     /// The clock service.
@@ -9,7 +9,7 @@ pub enum Role {
     Node {
         /// Index in the plan.
         node: usize,
-        /// Counts the processes of this node.
+        /// Number of the process among those of this node.
         generation: u32,
     },
     /// A process that takes no part in the ticks.

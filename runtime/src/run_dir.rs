@@ -28,7 +28,7 @@ const SPARE_FILES: usize = 8;
 /// removed by then.
 const FULL_BYTES: u64 = 256 << 10;
 
-/// What a run says of itself in its entry.
+/// Entry of a run: its description of itself.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Entry {
     /// The run's name, unique on this machine.
@@ -42,18 +42,18 @@ pub struct Entry {
 }
 
 impl Entry {
-    /// What a new run of `manifest` has to say.
+    /// Entry of a new run of `manifest`.
     fn new(manifest: &Path) -> Result<Self> {
         Self::named(manifest, format!("{:x}-{:x}", std::process::id(), new_run_number()))
     }
 
-    /// The same of a run that is called `run_id`.
+    /// Entry of a new run of `manifest` that is called `run_id`.
     fn named(manifest: &Path, run_id: String) -> Result<Self> {
         let run_dir = new_run_dir(&run_id)?;
         Ok(Self { run_id, run_dir, manifest: manifest.to_owned(), launcher: std::process::id() })
     }
 
-    /// What stands in the file of the entry of run `run_id`; `None` for anything else.
+    /// Entry of run `run_id` in `file`; `None` for any other content.
     pub(crate) fn read(run_id: &str, file: &File) -> Option<Self> {
         let mut text = String::new();
         file.take(ENTRY_BYTES_MAX).read_to_string(&mut text).ok()?;
@@ -80,7 +80,7 @@ pub(crate) fn folders() -> Vec<PathBuf> {
     all.filter_map(|path: PathBuf| std::path::absolute(path).ok()).collect()
 }
 
-/// Where run `run_id` is to have its directory. One level below the folder: one shared by runs could vanish with
+/// Path for the directory of run `run_id`. It is one level below the folder: a level shared by runs could vanish with
 /// another run that ends.
 fn new_run_dir(run_id: &str) -> Result<PathBuf> {
     let folders = folders();
@@ -101,7 +101,7 @@ fn may_create(path: &Path) -> bool {
     path.parent().is_some_and(|folder| access(folder, Access::WRITE_OK | Access::EXEC_OK).is_ok())
 }
 
-/// Where a run keeps its files; dropping it removes them, the run's shared memory, and its entry.
+/// Files of a run; dropping it removes them, the run's shared memory, and its entry.
 #[derive(Debug)]
 pub(crate) struct RunDir {
     entry: Entry,
@@ -277,27 +277,27 @@ fn is_run_id(text: &str) -> bool {
     text.split_once('-').is_some_and(|(launcher, time)| is_hex(launcher) && is_hex(time))
 }
 
-/// Where the entry of run `run_id` lies.
+/// Path of the entry of run `run_id`.
 pub(crate) fn entry_path(run_id: &str) -> PathBuf {
     Path::new(SHARED_MEMORY).join(format!("{}run", shm_prefix(run_id)))
 }
 
-/// Whether this is a path to a directory of the name that run `run_id` gives its own.
+/// True if this is a path to a directory with the name that run `run_id` gives its own.
 pub(crate) fn is_run_dir_of(path: &Path, run_id: &str) -> bool {
     path.is_absolute() && path.file_name().and_then(OsStr::to_str).and_then(run_of_dir) == Some(run_id)
 }
 
-/// Whether there is a directory of this user, and no link to one.
+/// True if `path` is a directory of this user, and not a link to one.
 pub(crate) fn is_own_run_dir(path: &Path) -> bool {
     own(path).is_some_and(|found| found.is_dir())
 }
 
-/// Whether there is something of this user that is no folder: runs have none in shared memory.
+/// True if `path` exists, belongs to this user, and is not a folder: runs have no folders in shared memory.
 pub(crate) fn is_own_name(path: &Path) -> bool {
     own(path).is_some_and(|found| !found.is_dir())
 }
 
-/// What lies at `path` itself, no link followed, if it is this user's.
+/// Metadata of `path` itself, without following a link, if it belongs to this user.
 fn own(path: &Path) -> Option<Metadata> {
     path.symlink_metadata().ok().filter(|found| found.uid() == user_id())
 }
@@ -346,7 +346,7 @@ fn create_locked(run_dir: &Path) -> std::io::Result<File> {
         .inspect_err(|_| drop(std::fs::remove_dir(run_dir)))
 }
 
-/// Whether the launcher that locked `entry` lives. Asking does not disturb others who ask.
+/// True if the launcher that locked `entry` lives. The test does not disturb other processes that test it.
 fn is_locked(entry: &File) -> bool {
     let is_free = file_lock::try_shared(entry).unwrap_or(false);
     if is_free {
@@ -355,10 +355,11 @@ fn is_locked(entry: &File) -> bool {
     !is_free
 }
 
-/// Claims what run `run_id` left, with those of `run_dirs` that there are, by locking them; `None` if it is
+/// Claims the remains of run `run_id`, with the existing ones of `run_dirs`, by locking them. `None` if the run is
 /// alive. While the locks are held, no launcher can take up the run's entry.
 ///
-/// Without an entry nobody lives on this side of /dev/shm: it is made before everything else, and removed after.
+/// Without an entry no process of the run uses this /dev/shm: the entry is made before everything else, and removed
+/// after.
 pub(crate) fn try_claim(run_id: &str, run_dirs: &BTreeSet<PathBuf>) -> Option<Vec<File>> {
     let (mut locks, entry) = (Vec::new(), entry_path(run_id));
     let opened = std::iter::once(open_own(&entry, user_file::open(&entry, false)));
@@ -371,7 +372,7 @@ pub(crate) fn try_claim(run_id: &str, run_dirs: &BTreeSet<PathBuf>) -> Option<Ve
     Some(locks)
 }
 
-/// What was opened at `path`; `None` for nothing, and for what no run of this user has made: no lock can be on it.
+/// The file opened at `path`. `None` if there is none, or if no run of this user has made it: no lock can be on it.
 fn open_own(path: &Path, opened: std::io::Result<File>) -> std::io::Result<Option<File>> {
     match opened {
         Ok(file) => Ok(Some(file)),
@@ -391,13 +392,13 @@ fn open_own(path: &Path, opened: std::io::Result<File>) -> std::io::Result<Optio
 /// ```
 #[derive(Debug)]
 pub struct LiveRun {
-    /// What it says of itself.
+    /// Its entry.
     pub entry: Entry,
     file: File,
 }
 
 impl LiveRun {
-    /// Whether its launcher still lives.
+    /// True if its launcher still lives.
     pub fn is_live(&self) -> bool {
         is_locked(&self.file)
     }

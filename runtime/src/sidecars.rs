@@ -8,7 +8,7 @@ use crate::world::{Body, World};
 use anyhow::Result;
 use std::time::Duration;
 
-/// How long a sidecar must have lived for a restart to lead somewhere.
+/// Shortest life of a sidecar after which a restart makes progress.
 const LIFE_MIN: Duration = Duration::from_secs(1);
 
 /// The sidecars of a run; dropping them kills those that still live.
@@ -20,7 +20,7 @@ struct Sidecar<'a, B: Body> {
     program: &'a Program,
     process: Process<B>,
     is_ready: bool,
-    /// Whether the first tick need not wait for it any more.
+    /// True if the first tick need not wait for it any more.
     was_ready: bool,
     /// When its process was started, on the watchdogs' clock.
     started: Duration,
@@ -33,11 +33,11 @@ pub struct Failure {
     pub index: usize,
     /// Its name.
     pub name: String,
-    /// What its manifest says.
+    /// Policy of its manifest.
     pub policy: OnExit,
-    /// Whether a restart leads somewhere.
+    /// True if a restart makes progress.
     pub is_possible: bool,
-    /// How it ended, with the last lines that it wrote.
+    /// Description of its end, with the last lines that it wrote.
     pub message: String,
 }
 
@@ -97,7 +97,7 @@ impl<'a, B: Body> Sidecars<'a, B> {
         self.all.iter().map(|sidecar| &sidecar.process.body)
     }
 
-    /// Whether all that the first tick waits for are ready.
+    /// True if every sidecar that the first tick waits for is ready.
     pub fn all_ready(&self) -> bool {
         self.all.iter().all(|sidecar| sidecar.was_ready)
     }
@@ -159,7 +159,7 @@ impl<B: Body> Sidecar<'_, B> {
         }
     }
 
-    /// Whether it has ended in another way than one that has done its part.
+    /// True if it was killed, failed, or ended before it was ready.
     fn has_failed(&self) -> bool {
         self.process.end.as_ref().is_some_and(|end| !end.success() || !self.is_ready)
             || self.process.verdict.is_some()

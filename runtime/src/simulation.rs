@@ -1,6 +1,6 @@
 //! Whole runs, simulated: the supervisor of real runs in a world that is drawn from one seed.
 //!
-//! What is drawn:
+//! Drawn from the seed:
 //! - the run: restarts, standbys, swaps, shadows and sidecars
 //! - the order of all steps, also between the reads and writes of one pass of the supervisor
 //! - the faults: deaths, hangs, pauses, jumps of the clock, starts and files that fail, lost and spurious wake-ups
@@ -43,7 +43,7 @@ const SEEDS_OF_BUG: u64 = 300;
 /// Lines of the log of a run that fails.
 const LINES: usize = 60;
 
-/// How a run ended, and why backups were refused.
+/// End of a run, and the reasons why backups were refused.
 struct Life {
     state: State,
     refused: Vec<String>,
@@ -87,7 +87,7 @@ fn live(seed: u64, faults: Option<&[Fault]>, bug: Option<Bug>, log: &Log) -> Lif
     Life { state, refused }
 }
 
-/// How a run ended; the error is the rule that it broke.
+/// Last state of a run; the error is the rule that it broke.
 fn try_live(seed: u64, bug: Option<Bug>, log: &Log) -> Result<State, String> {
     let lived = catch_unwind(AssertUnwindSafe(|| live(seed, None, bug, log).state));
     lived.map_err(|panic| {

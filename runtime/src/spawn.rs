@@ -89,7 +89,7 @@ pub fn start(
     Ok((child, path))
 }
 
-/// What executes `program`: the binary `exe`, which becomes a component with these arguments, or a command.
+/// Command that executes `program`: the binary `exe`, which becomes a component with these arguments, or a command.
 fn command(exe: &Path, started: Started<'_>) -> Command {
     let program = started.program();
     let mut command = match program.map(|program| &program.executable) {
@@ -122,8 +122,8 @@ fn command(exe: &Path, started: Started<'_>) -> Command {
     command
 }
 
-/// Where a process's output goes: the file that the manifest names, to which a backup adds, or one in the
-/// run directory, of which a backup has its own.
+/// Log file of a process: the file that the manifest names, to which a backup appends, or one in the run directory.
+/// There a backup has its own.
 fn open_log(name: &str, role: Role, run_dir: &Path, log: Option<&Path>) -> Result<(File, PathBuf)> {
     let generation = role.generation();
     let number = if generation == 0 { String::new() } else { format!("#{generation}") };

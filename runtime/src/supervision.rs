@@ -27,11 +27,11 @@ use bus::lockstep::Phase;
 use bus::plan::{Plan, SLOTS_PER_NODE};
 use std::time::Duration;
 
-/// How long the supervisor sleeps at most between two looks at its processes.
+/// Longest sleep of the supervisor between two looks at its processes.
 const POLL: Duration = Duration::from_millis(2);
-/// How often the lengths of the processes' logs are looked at.
+/// Time between two checks of the lengths of the processes' logs.
 const LOG_PERIOD: Duration = Duration::from_millis(100);
-/// How often orphans that have ended are looked for.
+/// Time between two searches for orphans that have ended.
 const REAP_PERIOD: Duration = Duration::from_secs(5);
 
 /// Fisher-Yates with the bus's own generator: the same seed gives the same order.
@@ -49,7 +49,7 @@ fn shuffle<T>(items: &mut [T], seed: Option<u64>) {
 pub struct Supervisor<'a, W: World> {
     graph: &'a Graph,
     plan: &'a Plan,
-    /// What follows when something ends.
+    /// Decides the consequences of every end.
     pub overseer: Overseer<'a>,
     processes: Processes<W::Body>,
     sidecars: Sidecars<'a, W::Body>,
@@ -70,7 +70,7 @@ pub struct Supervisor<'a, W: World> {
 /// When the supervisor did what it does now and then, on the watchdogs' clock.
 #[derive(Debug, Default)]
 struct Timing {
-    /// How far the run had come when it last came on, and when that was.
+    /// Progress of the run at its last change, and the time of that change.
     last_change: (Advance, Duration),
     logs_bounded: Duration,
     reaped: Duration,
@@ -121,7 +121,7 @@ impl<'a, W: World> Supervisor<'a, W> {
     /// wrong, those that live may leave in order: the recorder finishes its file.
     ///
     /// # Errors
-    /// What ended the run before its time.
+    /// The error that ended the run before its time.
     pub fn fly(&mut self, start_order_seed: Option<u64>) -> Result<()> {
         let flown = self.start(start_order_seed).and_then(|()| self.watch());
         self.see();
@@ -285,7 +285,7 @@ impl<'a, W: World> Supervisor<'a, W> {
         self.processes.forget(node, generation);
     }
 
-    /// What all instances of `node` have spent.
+    /// Processor time, deadlines missed and steps missed of all instances of `node` together.
     pub fn spent_by(&self, node: usize) -> Spent {
         let slots = (0..SLOTS_PER_NODE).map(|slot| slot * self.plan.nodes.len() + node);
         slots.map(|slot| self.world.spent(slot)).fold(self.spent[node], Spent::plus)

@@ -1,10 +1,10 @@
-//! What the launcher does next: the states of a run, what can happen in each, and what follows.
+//! State machine of the launcher: the states of a run, the events in each, and the actions that follow.
 //!
 //! Nothing here touches a process: the whole table can be tested.
 
 use crate::program::OnExit;
 
-/// Where a run stands.
+/// State of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum State {
     /// Processes are being started.
@@ -36,25 +36,25 @@ pub enum Event {
     Interrupted,
     /// A process died, or hung and was killed, before it had done its part.
     Died {
-        /// What its manifest says.
+        /// Policy of its manifest.
         policy: OnExit,
-        /// Whether that can be done: a standby is there, a restart makes progress.
+        /// True if the policy can be carried out: a standby is there, or a restart makes progress.
         is_possible: bool,
     },
     /// A backup failed before it took over.
     BackupFailed,
     /// A sidecar ended with an error, was killed, or did not get ready.
     SidecarFailed {
-        /// What its manifest says.
+        /// Policy of its manifest.
         policy: OnExit,
-        /// Whether a restart leads somewhere.
+        /// True if a restart makes progress.
         is_possible: bool,
     },
     /// Every process has ended.
     AllEnded,
 }
 
-/// What the launcher does about it.
+/// Action of the launcher after an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Action {
     /// Nothing.
@@ -72,7 +72,7 @@ pub enum Action {
 }
 
 impl State {
-    /// Whether the run is over.
+    /// True if the run is over.
     pub fn is_over(self) -> bool {
         matches!(self, Self::Stopped | Self::Failed)
     }

@@ -1,4 +1,4 @@
-//! What the supervisor sees of a run, and what it commands.
+//! Observations of a run by the supervisor, and its commands.
 
 use crate::program::BackupSpec;
 use bus::lockstep::{LiveView, Phase, SlotState, TransferOutcome};
@@ -7,39 +7,39 @@ use bus::plan::{InputPlan, Pace, Plan, SLOTS_PER_NODE};
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-/// What is to be done to a run.
+/// Command of the supervisor.
 #[derive(Clone, Debug)]
 pub enum Command {
     /// Start an instance of a node.
     Spawn {
         /// The node.
         node: usize,
-        /// Which of its instances.
+        /// Generation of the instance.
         generation: u32,
-        /// What to start, and what it reads about itself.
+        /// Program to start, and the plan that it reads about itself.
         backup: Box<BackupSpec>,
     },
     /// Kill an instance, if it lives.
     Kill {
         /// The node.
         node: usize,
-        /// Which of its instances.
+        /// Generation of the instance.
         generation: u32,
-        /// Why, for the user; `None` where that is no failure.
+        /// Reason, for the user; `None` if it is not a failure.
         message: Option<String>,
     },
     /// The end of an instance needs no answer.
     Settle {
         /// The node.
         node: usize,
-        /// Which of its instances.
+        /// Generation of the instance.
         generation: u32,
     },
     /// Remove what an instance that has ended left behind, and clear its slot.
     Free {
         /// The node.
         node: usize,
-        /// Which of its instances.
+        /// Generation of the instance.
         generation: u32,
         /// Its slot.
         slot: usize,
@@ -50,7 +50,7 @@ pub enum Command {
     Write(SegmentWrite),
 }
 
-/// What is written to the control segment.
+/// Write to the control segment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SegmentWrite {
     /// Clear a slot for another instance.
@@ -73,20 +73,20 @@ pub enum SegmentWrite {
     Drained,
 }
 
-/// What is seen of a slot.
+/// Observation of a slot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SlotView {
-    /// What it holds.
+    /// State of the slot.
     pub state: SlotState,
-    /// How far its instance has joined.
+    /// Progress of its instance in joining.
     pub ready: Phase,
     /// Ticks that it has completed.
     pub done: u32,
     /// The membership that it has acknowledged.
     pub acknowledged: u32,
-    /// What it goes on from.
+    /// Origin of the state with which it goes on.
     pub transfer: TransferOutcome,
-    /// Whether it sleeps until the other instance of its node has come as far as it must.
+    /// True if it sleeps until the other instance of its node has advanced far enough.
     pub awaits_other: bool,
 }
 
@@ -102,7 +102,7 @@ impl SlotView {
     };
 }
 
-/// What is seen of a run at a moment; what is commanded afterwards counts as done already.
+/// Observation of a run at a moment; later commands count as done already.
 #[derive(Clone, Debug)]
 pub struct View {
     /// Time on the watchdogs' clock.
@@ -111,7 +111,7 @@ pub struct View {
     pub host: Duration,
     /// Host time of the first grant; zero until then.
     pub first_grant: Duration,
-    /// How far the first instances have joined.
+    /// Progress of the first instances in joining.
     pub phase: Phase,
     /// The pace at which the clock grants ticks.
     pub pace: Pace,
@@ -121,13 +121,13 @@ pub struct View {
     pub held_at: Option<u32>,
     /// The tick at which a user wants the clock to wait; `u32::MAX` if nobody does.
     pub hold_tick: u32,
-    /// Whether the clock has to act next.
+    /// True if the clock has to act next.
     pub awaits_clock: bool,
     /// The tick at which the run ends.
     pub end_tick: u32,
-    /// Whether a stop was asked for.
+    /// True if a stop was requested.
     pub is_stop_requested: bool,
-    /// Whether the run was aborted.
+    /// True if the run was aborted.
     pub is_aborted: bool,
     /// The number of the newest membership.
     pub epoch: u32,
@@ -137,12 +137,12 @@ pub struct View {
     pub slots: Vec<SlotView>,
     /// Instances that live: node and generation.
     pub living: BTreeSet<(usize, u32)>,
-    /// What was commanded since the look.
+    /// Commands since the observation.
     pub commands: Vec<Command>,
 }
 
 impl View {
-    /// What `control` shows of the run of `plan`; the living instances and the times are left out.
+    /// Observation of the run of `plan` through `control`; the living instances and the times are left out.
     pub fn of(plan: &Plan, control: &LiveView) -> Self {
         let phase = |slot| {
             let phases = [Phase::Running, Phase::Connecting];
@@ -182,12 +182,12 @@ impl View {
         self.now.saturating_sub(then)
     }
 
-    /// Whether the instance of a slot is ready for `phase`.
+    /// True if the instance of a slot is ready for `phase`.
     pub fn is_ready(&self, slot: usize, phase: Phase) -> bool {
         self.slots[slot].ready >= phase
     }
 
-    /// Whether the instance of a slot has completed the run.
+    /// True if the instance of a slot has completed the run.
     pub fn has_completed(&self, slot: usize) -> bool {
         self.slots[slot].done >= self.end_tick
     }
@@ -197,12 +197,12 @@ impl View {
         (0..self.slots.len()).filter(|&slot| self.slots[slot].state == SlotState::Taken)
     }
 
-    /// Whether an instance lives.
+    /// True if an instance lives.
     pub fn lives(&self, node: usize, generation: u32) -> bool {
         self.living.contains(&(node, generation))
     }
 
-    /// Whether the instance of a slot has all samples and the grant that its next tick needs.
+    /// True if the instance of a slot has every sample and the grant that its next tick needs.
     pub fn has_needs(&self, slot: usize, inputs: &[InputPlan]) -> bool {
         let tick = self.slots[slot].done;
         let is_sent = |input: &InputPlan| {

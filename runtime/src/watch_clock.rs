@@ -5,8 +5,8 @@
 
 use std::time::Duration;
 
-/// What a pause between two looks counts at most. The launcher looks every few milliseconds; on a busy host it may be
-/// kept waiting for some tenths of a second, and so may everybody else.
+/// Longest time that a pause between two looks counts. The launcher looks every few milliseconds. On a busy host it
+/// may be delayed by some tenths of a second, and so may every other process.
 const PAUSE_COUNTED_MAX: Duration = Duration::from_millis(100);
 
 /// A clock that goes on only while somebody looks at it often.

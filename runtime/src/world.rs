@@ -1,4 +1,4 @@
-//! What a supervisor needs of the world outside it: the control segment, processes, files, the host's clock, and
+//! Interface of a supervisor to the world outside it: the control segment, processes, files, the host's clock, and
 //! requests. `host_world.rs` is the real one; the simulation draws another from a seed.
 
 use crate::ctl::protocol::{Answer, Request};
@@ -13,7 +13,7 @@ use bus::plan::{InputPlan, NodePlan};
 use diagnostics::Diagnostic;
 use std::time::Duration;
 
-/// What an instance of a node has spent.
+/// Processor time and delays of an instance of a node.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Spent {
     /// Processor time.
@@ -38,17 +38,17 @@ impl Spent {
     }
 }
 
-/// What is outside a supervisor.
+/// The world outside a supervisor.
 pub trait World {
     /// A started process.
     type Body: Body;
-    /// Where the answer to a request goes.
+    /// Destination of the answer to a request.
     type Reply;
 
     /// The host's monotonic clock.
     fn now(&self) -> Duration;
 
-    /// What the control segment shows; who lives, and the time, is left out.
+    /// Observation of the control segment; the living instances and the time are left out.
     fn see(&self) -> View;
     /// The topic for which the instance in `slot`, whose inputs are `inputs`, sleeps.
     fn awaited_topic(&self, slot: usize, inputs: &[InputPlan]) -> Option<usize>;
@@ -58,7 +58,7 @@ pub trait World {
     fn notices(&self) -> u32;
     /// Sleeps until there is something to look at since `notices`, at most `timeout`.
     fn wait(&mut self, notices: u32, timeout: Duration);
-    /// What the instance in `slot` has spent.
+    /// Processor time and delays of the instance in `slot`.
     fn spent(&self, slot: usize) -> Spent;
 
     /// Starts a process; the clock where there is no program.
@@ -66,12 +66,12 @@ pub trait World {
     /// # Errors
     /// If it cannot be started.
     fn start(&mut self, name: &str, role: Role, program: Option<&Program>) -> Result<Self::Body>;
-    /// Whether sidecar `index` has said that it is ready since this was asked last.
+    /// True if sidecar `index` has reported that it is ready since the last call.
     fn hears_ready(&mut self, index: usize) -> bool;
-    /// Takes note of the end of orphans, but for the processes `known`, which are waited for elsewhere.
+    /// Takes note of orphans that have ended, except for the processes `known`, which are waited for elsewhere.
     fn reap(&self, known: &[u32]);
 
-    /// Writes what a backup of `node` reads about itself.
+    /// Writes the plan that a backup of `node` reads about itself.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -99,15 +99,15 @@ pub trait World {
 pub trait Body {
     /// Its process number, if it is a process of its own.
     fn id(&self) -> Option<u32>;
-    /// How it ended, if it has.
+    /// Its end, if it has ended.
     ///
     /// # Errors
     /// If it cannot be watched.
     fn end(&mut self) -> Result<Option<End>>;
     /// Asks a thread to end; a process is not asked.
     fn cancel(&self) {}
-    /// Kills it and its group, and waits for its end. `patience` is how long a thread may take, and what it took is
-    /// taken from it.
+    /// Kills it and its group, and waits for its end. `patience` is the longest time that a thread may take; the time
+    /// taken is subtracted from it.
     fn kill(&mut self, patience: &mut Duration) -> Option<End>;
     /// The last lines that it wrote.
     fn last_lines(&self) -> Vec<String>;

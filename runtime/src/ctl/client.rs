@@ -10,7 +10,7 @@ use std::io::{BufRead, BufReader, Write};
 use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant};
 
-/// How long a run may take from its registration to its socket.
+/// Longest time from the registration of a run to its socket.
 const START: Duration = Duration::from_secs(5);
 const POLL: Duration = Duration::from_millis(5);
 

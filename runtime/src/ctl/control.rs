@@ -1,4 +1,4 @@
-//! What the launcher does with requests: holds, steps, paces and stops the run through its control segment.
+//! Requests carried out by the launcher: it holds, steps, paces and stops the run through its control segment.
 
 use crate::checkpoint_writer::Writer;
 use crate::ctl::protocol::{Answer, Request, Status};
@@ -24,7 +24,7 @@ pub struct ControlServer<'a> {
     checkpoints: Writer<'a>,
     /// Rewinds, which the launcher carries out.
     rewinds: &'a Rewinds,
-    /// What was asked for and has not happened yet: one thing at a time, the newest.
+    /// Request that has not been carried out yet: one at a time, the newest.
     wish: Option<(Goal, Reply)>,
 }
 

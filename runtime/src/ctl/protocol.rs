@@ -1,4 +1,4 @@
-//! What can be asked of a live run: one JSON object a line, answered by one JSON object a line.
+//! Requests to a live run: one JSON object a line, answered by one JSON object a line.
 
 use crate::manifest::PaceSetting;
 use bus::lockstep::{LiveView, Phase};
@@ -9,7 +9,7 @@ use std::path::PathBuf;
 /// The name of the socket in the run directory.
 pub(crate) const SOCKET: &str = "ctl.sock";
 
-/// What can be asked of a run. On the socket each is a line of JSON.
+/// A request to a run. On the socket each is a line of JSON.
 ///
 /// ```
 /// use runtime::ctl::protocol::Request;
@@ -20,13 +20,13 @@ pub(crate) const SOCKET: &str = "ctl.sock";
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(tag = "request", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Request {
-    /// How far it has come.
+    /// Progress of the run.
     Status,
     /// Hold at the next tick boundary; answered when the run is held.
     Pause,
     /// Run this many ticks from the hold; answered when the run is held again.
     Step {
-        /// How many, at least 1.
+        /// Number of ticks, at least 1.
         ticks: u32,
     },
     /// Go on from the hold.
@@ -64,7 +64,7 @@ pub enum Request {
     },
 }
 
-/// What a run answers. On the socket each is a line of JSON.
+/// An answer of a run. On the socket each is a line of JSON.
 ///
 /// ```
 /// use runtime::ctl::protocol::Answer;
@@ -76,16 +76,16 @@ pub enum Request {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(tag = "answer", rename_all = "kebab-case")]
 pub enum Answer {
-    /// What was asked has happened.
+    /// The request was carried out.
     Done {
-        /// What happened, as a message.
+        /// Description of what happened.
         text: String,
         /// Ticks that every process has completed.
         tick: u32,
     },
-    /// How far the run has come.
+    /// Progress of the run.
     Status(Status),
-    /// What was asked did not happen.
+    /// The request was not carried out.
     Refused {
         /// Why.
         reason: String,
@@ -99,7 +99,7 @@ impl Answer {
     }
 }
 
-/// What a run is doing.
+/// State of a run.
 ///
 /// ```
 /// assert_eq!(runtime::ctl::protocol::State::Paused.to_string(), "paused");
@@ -124,7 +124,7 @@ pub enum State {
 }
 
 impl State {
-    /// What the run of `control` is doing.
+    /// State of the run of `control`.
     pub fn of(control: &LiveView) -> Self {
         let ticks = control.completed_ticks();
         match control.hold_tick() {
@@ -146,7 +146,7 @@ impl std::fmt::Display for State {
     }
 }
 
-/// How far a run has come.
+/// Progress of a run.
 ///
 /// ```
 /// let text = r#"{"run_id":"1-a","state":"paused","tick":500,"end_tick":1000,"time_s":0.5,"pace":"free","missed_deadlines":0}"#;
@@ -158,7 +158,7 @@ impl std::fmt::Display for State {
 pub struct Status {
     /// The run's name.
     pub run_id: String,
-    /// What it is doing.
+    /// State of the run.
     pub state: State,
     /// Ticks that every process has completed.
     pub tick: u32,
@@ -173,7 +173,7 @@ pub struct Status {
 }
 
 impl Status {
-    /// How far the run of `plan` has come.
+    /// Progress of the run of `plan`.
     pub fn of(plan: &Plan, control: &LiveView) -> Self {
         let tick = control.completed_ticks();
         Self {

@@ -12,7 +12,7 @@ use std::sync::{Arc, Weak};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// How long a client that does not read may hold the launcher up.
+/// Longest time for which a client that does not read may block the launcher.
 const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
 /// Between two attempts to let a client in.
 const PAUSE: Duration = Duration::from_millis(100);
@@ -107,7 +107,7 @@ impl<'a> Server<'a> {
     }
 }
 
-/// Whether this user, or root, is at the other end of `stream`.
+/// True if this user, or root, is at the other end of `stream`.
 pub fn is_own_user(stream: &UnixStream) -> bool {
     let peer = rustix::net::sockopt::socket_peercred(stream);
     peer.is_ok_and(|peer| peer.uid.is_root() || peer.uid.as_raw() == bus::process::user_id())
@@ -266,7 +266,7 @@ mod tests {
         Ok(client)
     }
 
-    /// What `look` finds, or nothing after ten seconds.
+    /// First result of `look`, or `None` after ten seconds.
     fn await_some<T>(look: impl Fn() -> Option<T>) -> Option<T> {
         let deadline = Instant::now() + Duration::from_secs(10);
         loop {

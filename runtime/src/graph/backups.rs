@@ -21,7 +21,7 @@ const REPEAT_MAX: u32 = 100_000;
 /// before has left.
 const SETTLE_TICKS: u64 = 2;
 
-/// What is known about the run that the backups join.
+/// The run that the backups join.
 struct Run<'m> {
     manifest: &'m Manifest,
     plan: &'m Plan,

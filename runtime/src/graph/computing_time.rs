@@ -25,10 +25,10 @@ const QUANTILES: [(f64, &str); 6] = [
     (1.0, "max_us"),
 ];
 
-/// How long the steps of `declared` take, if its manifest says so.
+/// Computing time of the steps of `declared`, if its manifest states it.
 ///
 /// # Errors
-/// An invalid time, or a file that does not hold any.
+/// An invalid time, or a file without any times.
 pub fn of(declared: &DeclaredNode<'_>) -> Result<Option<ComputingTime>, Diagnostic> {
     let DeclaredNode { manifest, files, name, process, .. } = declared;
     let Some(setting) = &process.computing_time else { return Ok(None) };

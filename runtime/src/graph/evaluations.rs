@@ -125,7 +125,7 @@ fn first_sample_s(from_s: f64, period_ticks: u32, tick_ns: u64) -> (f64, f64) {
     (number * period_s, period_s)
 }
 
-/// Why nothing can hold limits of what is never below `least`, and what to do.
+/// Reason why no value of at least `least` can hold the limits, and advice.
 fn impossible(min: Option<f64>, max: Option<f64>, least: Option<(f64, &str)>) -> Option<(String, String)> {
     match (min, max, least) {
         (Some(min), Some(max), _) if min > max => {
@@ -139,7 +139,7 @@ fn impossible(min: Option<f64>, max: Option<f64>, least: Option<(f64, &str)>) ->
     }
 }
 
-/// How often the publisher of `topic` is set to a measured state, if it is a plant that is.
+/// Interval at which the publisher of `topic` is set to a measured state, if it is a plant that is.
 fn reset_window_s(plan: &Plan, topic: &str) -> Option<f64> {
     let publishes =
         |node: &&NodePlan| node.outputs.iter().any(|output| plan.topics[output.topic].name == topic);
@@ -229,7 +229,7 @@ fn check_units(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) 
     Ok(())
 }
 
-/// Why a condition's `reference` does not fit its statistic, and what to do.
+/// Reason why a condition's `reference` does not fit its statistic, and advice.
 fn unfit_reference(condition: &PassCondition) -> Option<(String, &'static str)> {
     let name = match condition.statistic {
         Statistic::Gain => "gain",

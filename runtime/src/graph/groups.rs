@@ -162,7 +162,7 @@ impl Composer<'_> {
         }
     }
 
-    /// Why `node` needs a process of its own; `None` for one that can be a member of a group.
+    /// Reason why `node` needs a process of its own; `None` if it can be a member of a group.
     fn objection(&self, node: usize) -> Option<String> {
         let DeclaredNode { program, process, .. } = &self.declared_nodes[node];
         match program.executable {

@@ -85,7 +85,7 @@ fn input(
     Ok(InputPlan { port, topic, delay_ticks, initial: setting.initial.clone() })
 }
 
-/// What is wrong with the delay and the initial value of an input, and what helps.
+/// Fault in the delay and the initial value of an input, and advice.
 fn bad_delay(program: &Program, setting: &InputSetting) -> Option<(String, &'static str)> {
     let is_forwarded =
         program.component().is_some_and(|kind| matches!(kind.inputs, Inputs::Forwarded { .. }));

@@ -16,15 +16,15 @@ use toml::Spanned;
 pub struct Published {
     /// Index of the node that sends it.
     pub node: usize,
-    /// What it becomes in the plan.
+    /// Its topic in the plan.
     pub topic: TopicPlan,
-    /// The topic whose messages it forwards, if it does: theirs is its type.
+    /// The topic whose messages it forwards, if it does; its type is that of the forwarded messages.
     forwards: Option<String>,
     port: String,
     span: Range<usize>,
 }
 
-/// All outputs of `declared_nodes`, each with its topic; two on one topic are refused.
+/// Returns all outputs of `declared_nodes`, each with its topic; refuses two on one topic.
 pub fn publish_all(declared_nodes: &[DeclaredNode<'_>]) -> Result<Vec<Published>, Diagnostic> {
     let mut all: Vec<Published> = Vec::new();
     for (node, declared) in declared_nodes.iter().enumerate() {
@@ -136,7 +136,7 @@ fn published_by(node: usize, declared: &DeclaredNode<'_>) -> Result<Vec<Publishe
     published.collect()
 }
 
-/// What tells the type of an output.
+/// Source of an output's message type.
 enum Carries {
     /// The kind.
     Known(&'static Schema),

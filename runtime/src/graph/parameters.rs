@@ -15,20 +15,21 @@ use std::path::PathBuf;
 use toml::Spanned;
 use vehicles::Vehicle;
 
-/// What is noted on the way from a manifest to a plan.
+/// Notes taken while a manifest becomes a plan.
 #[derive(Debug, Default)]
 pub struct Notes {
     /// The vehicle, scene and gains files that the processes name.
     pub models: Vec<PathBuf>,
-    /// What is odd and flies all the same.
+    /// Legal but unusual values.
     pub warnings: Vec<Diagnostic>,
-    /// Whether something was left out of the warnings because the run was cut short.
+    /// True if warnings were left out because the run was cut short.
     has_cut: bool,
 }
 
 impl Notes {
-    /// Whether what stands at `span` lies behind the end only because `--set`, or a file that includes that one, says
-    /// how long the run is: then somebody looks at the start of it, and is told so once.
+    /// True if `span` lies behind the end only because another text states the duration: `--set`, or a file that
+    /// includes the one with `span`. The user then looks at the start of the run, and gets one warning about the
+    /// rest.
     pub fn is_cut(&mut self, manifest: &Manifest, span: &Range<usize>) -> bool {
         let is_cut = !manifest.sources.is_one_text(span.start, manifest.content.run.duration_s.span().start);
         self.has_cut |= is_cut;
@@ -148,7 +149,7 @@ fn read_named(files: &InputFiles, key: &str, named: &[PathBuf]) -> Result<(), St
     })
 }
 
-/// What the inputs of `declared` carry, as far as the registry knows it.
+/// Messages of the inputs of `declared`, as far as the registry knows them.
 fn messages<'a>(declared: &DeclaredNode<'a>, plan: &Plan) -> Vec<InputMessage<'a>> {
     let of = |(port, input): (&'a Spanned<String>, &'a InputSetting)| {
         let topic = plan.topics.iter().find(|topic| topic.name == input.topic)?;

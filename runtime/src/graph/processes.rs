@@ -26,9 +26,9 @@ pub struct DeclaredNode<'m> {
     pub files: &'m InputFiles,
     /// Its name.
     pub name: &'m Spanned<String>,
-    /// What the manifest says of it.
+    /// Its table in the manifest.
     pub process: &'m Process,
-    /// What is started.
+    /// Its program.
     pub program: Program,
 }
 
@@ -92,7 +92,7 @@ fn require_no_node(manifest: &Manifest, name: &Spanned<String>, process: &Proces
     manifest.require(&process.on_exit, |on_exit| *on_exit != OnExit::Standby, message, help)
 }
 
-/// What only a sidecar may say.
+/// Refuses keys that only a sidecar may have.
 fn require_no_sidecar(
     manifest: &Manifest,
     name: &Spanned<String>,
@@ -120,7 +120,7 @@ pub fn files(process: &Process) -> [(&'static str, &Option<Spanned<String>>); 7]
     ]
 }
 
-/// What `process` executes and how.
+/// Program of `process`, with its settings.
 ///
 /// # Errors
 /// If it cannot be started here.
@@ -217,7 +217,7 @@ fn command(
     Ok(std::iter::once(&path).chain(arguments).cloned().collect())
 }
 
-/// Why a file cannot be executed, and what to do.
+/// Reason why a file cannot be executed, and advice.
 fn objection(path: &Path) -> Option<(&'static str, &'static str)> {
     if !path.is_file() {
         let help = "build it, or correct the path, which is relative to the manifest";
@@ -233,12 +233,12 @@ fn objection(path: &Path) -> Option<(&'static str, &'static str)> {
     }
 }
 
-/// Whether no kernel can execute a file: it is text, and does not begin with `#!`. The C library would have a shell
-/// read it, whatever it is.
+/// True if no kernel can execute the file: it is text that does not begin with `#!`. The C library would pass any
+/// such file to a shell.
 fn is_text_without_interpreter(path: &Path) -> bool {
     let mut start = Vec::new();
     let read = File::open(path).and_then(|file| file.take(256).read_to_end(&mut start));
-    // One that can be executed and not be read is left to the kernel, and so is what has its own kind of program.
+    // A file that can be executed but not read is left to the kernel, as is one with another kind of program.
     read.is_ok() && !start.starts_with(b"#!") && !start.contains(&0)
 }
 
@@ -356,7 +356,7 @@ pub fn require_replaceable(declared: &DeclaredNode<'_>, node: &NodePlan) -> Resu
     declared.manifest.require(&declared.process.on_exit, |on_exit| *on_exit == OnExit::Stop, message, help)
 }
 
-/// Why another process cannot go on in the place of this one.
+/// Reason why another process cannot go on in the place of this one.
 pub fn irreplaceable(declared: &DeclaredNode<'_>, node: &NodePlan) -> Option<&'static str> {
     let component = declared.program.component();
     if declared.program.is_recorder() {

@@ -18,8 +18,8 @@ const fn range(end: &'static str, unit: &'static str, most: f64, why: &'static s
     Range { end, unit, most, why }
 }
 
-/// All are wide by intent, decades beyond what a source states: they keep products of a few numbers within what a
-/// double holds, and catch a wrong unit or a slipped digit of the exponent.
+/// The ranges are wide by intent, decades beyond what a source states. They keep products of a few numbers within the
+/// range of a double, and catch a wrong unit or a slipped digit of the exponent.
 const RANGES: [Range; 21] = [
     range("_sqrt_hz", "its unit/sqrt(Hz)", 1e3, "no inertial sensor is that noisy: a phone's has 1e-2"),
     range("_sqrt_s", "its unit/sqrt(s)", 1e5, "a bias that walks like that leaves any range in a second"),

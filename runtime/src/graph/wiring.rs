@@ -1,4 +1,4 @@
-//! All nodes of a run, wired to each other.
+//! The nodes of a run, wired to each other.
 
 use super::processes::{self, DeclaredNode};
 use super::{computing_time, inputs, outputs};
@@ -18,7 +18,7 @@ pub struct Wiring {
 /// for a cycle it is in.
 ///
 /// # Errors
-/// What is wrong with a port, and a cycle without a delay.
+/// A faulty port, or a cycle without a delay.
 pub fn wire(declared_nodes: &[DeclaredNode<'_>], changed: Option<usize>) -> Result<Wiring, Diagnostic> {
     let published = outputs::publish_all(declared_nodes)?;
     let topics: Vec<TopicPlan> = published.iter().map(|output| output.topic.clone()).collect();

@@ -28,7 +28,7 @@ pub struct GroupSetting {
 pub enum Composition {
     /// Each node has a process of its own.
     None,
-    /// All nodes share one process, but for the recorder and those that need a process of their own.
+    /// Every node shares one process, except the recorder and nodes that need a process of their own.
     All,
     /// The nodes of each vehicle share a process: those with the same text in front of the `/` of their names.
     Vehicles,

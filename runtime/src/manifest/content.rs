@@ -1,4 +1,4 @@
-//! What a manifest says, as types; places stay with the values that an error may name.
+//! Content of a manifest, as types; places stay with the values that an error may name.
 
 use super::composition::{Composition, GroupSetting};
 use crate::program::{OnExit, Readiness};
@@ -11,7 +11,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use toml::Spanned;
 
-/// What a manifest says.
+/// Content of a manifest.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Content {
@@ -109,10 +109,10 @@ pub struct Run {
     pub checkpoint_every_s: Option<Spanned<f64>>,
     /// Newest checkpoints that are kept; all where absent.
     pub checkpoint_keep: Option<Spanned<usize>>,
-    /// Whether every process notes the host times of its ticks.
+    /// True if every process notes the host times of its ticks.
     #[serde(default)]
     pub profile: bool,
-    /// Whether every process keeps its memory from being paged out.
+    /// True if every process keeps its memory from being paged out.
     #[serde(default)]
     pub lock_memory: bool,
 }
@@ -140,7 +140,7 @@ pub struct Process {
     pub kind: Option<Spanned<String>>,
     /// Any executable that links `bus`, with its arguments.
     pub command: Option<Spanned<Vec<String>>>,
-    /// Whether it takes part in the ticks; a sidecar, such as a viewer, does not.
+    /// True if it takes part in the ticks; a sidecar, such as a viewer, does not.
     pub lockstep: Option<Spanned<bool>>,
     /// Vehicle file, relative to the manifest.
     pub vehicle: Option<Spanned<String>>,
@@ -160,7 +160,7 @@ pub struct Process {
     pub period_ticks: Option<Spanned<u32>>,
     /// Core it runs on.
     pub cpu: Option<Spanned<usize>>,
-    /// How it waits.
+    /// Its way of waiting.
     pub wait: Option<Wait>,
     /// Environment variables beside the launcher's own.
     #[serde(default)]
@@ -171,25 +171,25 @@ pub struct Process {
     pub nice: Option<Spanned<i32>>,
     /// Priority under SCHED_FIFO.
     pub realtime_priority: Option<Spanned<i32>>,
-    /// What follows when it ends before the run does.
+    /// Action when it ends before the run does.
     pub on_exit: Option<Spanned<OnExit>>,
     /// The process that stands by for it, whole.
     pub standby: Option<Spanned<Box<Process>>>,
     /// When a sidecar counts as ready.
     pub ready: Option<Spanned<Readiness>>,
-    /// How long the run may stand still because of it, in milliseconds of host time.
+    /// Longest time that the run may stand still because of it, in milliseconds of host time.
     pub watchdog_ms_host: Option<Spanned<u64>>,
-    /// Where its standard output and error go, relative to the manifest.
+    /// File for its standard output and error, relative to the manifest.
     pub log: Option<Spanned<String>>,
-    /// How long its steps take on the processor that it stands for.
+    /// Computing time of its steps on the processor that it stands for.
     pub computing_time: Option<Spanned<ComputingTimeSetting>>,
     /// The node's own parameters.
     #[serde(default)]
     pub parameters: BTreeMap<Spanned<String>, serde_json::Value>,
-    /// What it reads, by input port.
+    /// Its inputs, by port.
     #[serde(default)]
     pub inputs: BTreeMap<Spanned<String>, InputSetting>,
-    /// What it sends, by output port; built-in nodes need it only to change something.
+    /// Its outputs, by port; built-in nodes need this only to change something.
     #[serde(default)]
     pub outputs: BTreeMap<Spanned<String>, OutputSetting>,
 }
@@ -223,7 +223,7 @@ pub enum ComputingTimeSetting {
         file: String,
         /// The process of the profile; the one of this name where absent.
         process: Option<String>,
-        /// What the times are multiplied by.
+        /// Factor of the times.
         scale: Option<f64>,
     },
 }
@@ -347,7 +347,7 @@ impl<'de> Deserialize<'de> for PaceSetting {
     }
 }
 
-/// What is computed from the samples of a pass condition.
+/// Statistic of the samples of a pass condition.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Statistic {
@@ -365,14 +365,14 @@ pub enum Statistic {
     Last,
     /// The largest sample less the smallest: how far a vehicle slid.
     Span,
-    /// How long the field comes behind a reference: where their normalized cross-correlation is largest.
+    /// Delay of the field behind a reference: the lag at which their normalized cross-correlation is largest.
     Lag,
-    /// How many times the reference the field is, shifted by that lag: the slope of the line of least squares.
+    /// Slope of the line of least squares of the field over the reference, shifted by that lag.
     Gain,
 }
 
 impl Statistic {
-    /// Whether it compares the field with a reference.
+    /// True if it compares the field with a reference.
     #[must_use]
     pub fn is_of_response(self) -> bool {
         matches!(self, Self::Lag | Self::Gain)
@@ -406,15 +406,15 @@ impl Statistic {
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct PassCondition {
-    /// What it means, for the summary.
+    /// Description, for the summary.
     pub name: String,
     /// Topic.
     pub topic: String,
     /// Field, such as `position.z`, or `attitude.roll` of a quaternion; `position`, a vector, is judged by its length.
     pub field: String,
-    /// What is taken off first, sample by sample.
+    /// Signal that is subtracted first, sample by sample.
     pub minus: Option<Signal>,
-    /// What a lag or a gain is measured against.
+    /// Reference of a lag or a gain.
     pub reference: Option<Reference>,
     /// Unit of the limits.
     pub unit: String,
@@ -426,7 +426,7 @@ pub struct PassCondition {
     /// Only samples while another signal is within limits.
     #[serde(rename = "while")]
     pub gate: Option<Gate>,
-    /// What is compared with the limits.
+    /// Statistic that is compared with the limits.
     pub statistic: Statistic,
     /// Lower limit.
     pub min: Option<f64>,
@@ -523,10 +523,10 @@ pub struct SwapSetting {
     pub at_tick: Option<Spanned<u32>>,
     /// The same as simulated time.
     pub at_s: Option<Spanned<f64>>,
-    /// How many ticks it computes beside the process before.
+    /// Number of ticks that it computes beside the process before.
     #[serde(default = "default_shadow_ticks")]
     pub shadow_ticks: u32,
-    /// How many times this happens.
+    /// Number of times that this happens.
     pub repeat: Option<Spanned<u32>>,
     /// Ticks between two times.
     pub every_ticks: Option<Spanned<u32>>,

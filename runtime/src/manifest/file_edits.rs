@@ -65,7 +65,7 @@ pub fn file_of<'p>(process: &'p Process, key: &str) -> Option<&'p Spanned<String
     files.into_iter().find(|(name, _)| *name == key)?.1.as_ref()
 }
 
-/// All values of files that are given with `--set`, in their order.
+/// Values in files that are given with `--set`, in their order.
 ///
 /// # Errors
 /// If there is no such process, or it names no such file.

@@ -108,7 +108,7 @@ fn includes(sources: &Sources) -> Result<Vec<Spanned<String>>, Diagnostic> {
     list.iter().map(name).collect()
 }
 
-/// All files merged: the including over the included, a later include over an earlier.
+/// Every file merged: the including over the included, a later include over an earlier.
 ///
 /// # Errors
 /// A text that is not TOML.
@@ -133,7 +133,7 @@ fn prepend_lists<'t>(table: &mut DeTable<'t>, below: &mut DeTable<'t>) {
     }
 }
 
-/// How many elements of the list `list` the included files give.
+/// Number of elements of the list `list` that the included files give.
 pub fn inherited(sources: &Sources, list: &str) -> Result<usize, Diagnostic> {
     let mut count = 0;
     for &file in sources.order.iter().filter(|&&file| file != 0) {

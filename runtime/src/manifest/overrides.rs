@@ -18,10 +18,10 @@ pub struct Override<'s> {
     value: Spanned<DeValue<'s>>,
 }
 
-/// Why a value has no place in the manifest, and what to do.
+/// Reason why a value has no place in the manifest, and advice.
 type Misplaced = (String, &'static str);
 
-/// All values given with `--set`, in their order.
+/// Values given with `--set`, in their order.
 pub fn all(sources: &Sources) -> Result<Vec<Override<'_>>, Diagnostic> {
     sources.overrides().map(|source| Override::parse(source, sources)).collect()
 }
@@ -41,7 +41,7 @@ impl<'s> Override<'s> {
         Ok(Self { keys, value: value_of(value, source.base + path.len() + 1) })
     }
 
-    /// Whether it changes a process that a vehicle's set becomes: such names hold a `/`.
+    /// True if it changes a process that comes from a vehicle's set: such names hold a `/`.
     pub fn is_of_an_expanded_process(&self) -> bool {
         matches!(self.names().as_slice(), ["process", name, ..] if name.contains('/'))
     }
@@ -119,7 +119,7 @@ fn put<'s>(
     Ok(())
 }
 
-/// What lies at `key` of `inside`, which is called `name`; a table where there is nothing.
+/// Value at `key` of `inside`, which is called `name`; a new table if there is none.
 fn slot<'v, 's>(
     inside: &'v mut DeValue<'s>,
     name: &str,
@@ -149,7 +149,7 @@ mod tests {
     use serde::Deserialize as _;
     use toml::Spanned;
 
-    /// What `text` says with `change` applied, or why not.
+    /// Content of `text` with `change` applied, or the error.
     fn changed(text: &str, change: &str) -> Result<serde_json::Value, Diagnostic> {
         let mut sources = Sources::default();
         sources.add(Origin::File("a.toml".into()), text.to_owned());

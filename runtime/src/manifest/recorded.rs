@@ -65,7 +65,7 @@ pub fn text(sources: &Sources, processes: &Processes) -> Result<String, Diagnost
     Ok(text + gap + &elsewhere)
 }
 
-/// Whether an override touches only where and how fast a run computes.
+/// True if an override changes only where and how fast a run computes.
 pub fn is_host_only(text: &str) -> bool {
     let path = text.split('=').next().unwrap_or_default();
     let keys: Vec<&str> = path.split('.').map(str::trim).collect();

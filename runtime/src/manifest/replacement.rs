@@ -43,7 +43,7 @@ fn complete_item<'s>(
     Ok(())
 }
 
-/// What a backup has otherwise.
+/// Takes the table at `key`: the keys in which a backup differs from its process.
 fn taken<'s>(table: &mut DeTable<'s>, key: &str, sources: &Sources) -> Result<DeTable<'s>, Diagnostic> {
     tree::take_table(table, key).map_err(|span| {
         let help = format!("write {key} = {{ parameters = {{ … }} }}, for example");

@@ -27,7 +27,7 @@ struct Vehicle {
     name: Spanned<String>,
     set: Spanned<String>,
     count: Option<Spanned<u32>>,
-    /// What differs from the set; merged as it stands.
+    /// Differences from the set; merged as they stand.
     #[serde(default, rename = "process")]
     _process: IgnoredAny,
 }
@@ -174,7 +174,7 @@ fn instances(vehicle: &Vehicle, sources: &Sources) -> Result<Vec<String>, Diagno
     Ok((1..=*count.get_ref()).map(|number| format!("{name}{number}")).collect())
 }
 
-/// Whether a process or a vehicle may be called so.
+/// True if `text` is a valid name of a process or a vehicle.
 pub fn is_name(text: &str) -> bool {
     let fits = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' || c == '_';
     !text.is_empty() && text.chars().all(fits)

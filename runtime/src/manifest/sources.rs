@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::DeTable;
 
-/// Where a text comes from.
+/// Origin of a text.
 #[derive(Clone, Debug)]
 pub enum Origin {
     /// A file.
@@ -37,7 +37,7 @@ impl Source {
     }
 }
 
-/// All texts; the first is the manifest's own file.
+/// The texts of a manifest; the first is the manifest's own file.
 #[derive(Clone, Debug, Default)]
 pub struct Sources {
     /// The texts.
@@ -66,18 +66,18 @@ impl Sources {
         &self.all[self.all.len() - 1]
     }
 
-    /// Where the text that was added last stands.
+    /// Place of the text that was added last.
     pub fn last_span(&self) -> Range<usize> {
         let last = self.last();
         last.base..last.base + last.text.len()
     }
 
-    /// What the text that was added last says.
+    /// Table of the text that was added last.
     pub fn last_table(&self) -> Result<DeTable<'_>, Diagnostic> {
         self.table(self.last())
     }
 
-    /// What one of the texts says, with places among all.
+    /// Table of one of the texts, with places among all texts.
     pub fn table<'s>(&self, source: &'s Source) -> Result<DeTable<'s>, Diagnostic> {
         tree::parse(&source.text, source.base).map_err(|misread| {
             self.problem(&misread.span(), misread.error, "docs/manifest.md shows how a manifest is written")
@@ -99,12 +99,12 @@ impl Sources {
         self.all.iter().filter(|source| matches!(source.origin, Origin::Override))
     }
 
-    /// Whether the place `offset` lies in a `--set`.
+    /// True if the place `offset` lies in a `--set`.
     pub fn is_override(&self, offset: usize) -> bool {
         matches!(self.at(offset).origin, Origin::Override)
     }
 
-    /// Whether two places lie in one text.
+    /// True if two places lie in one text.
     pub fn is_one_text(&self, a: usize, b: usize) -> bool {
         self.at(a).base == self.at(b).base
     }
@@ -131,7 +131,7 @@ impl Sources {
         Diagnostic::at(Place::of(file, &source.text, &span), error).help(help)
     }
 
-    /// What could not be read, where it stands.
+    /// Diagnostic for a value that could not be read, at its place.
     pub fn refused(&self, misread: Misread) -> Diagnostic {
         let help = match misread.error.meant() {
             Some(known) => format!("did you mean `{known}`?"),

@@ -11,10 +11,10 @@ const IDENTITY: [&str; 2] = ["kind", "command"];
 const PARAMETERS: [&str; 9] =
     ["computing_time", "configuration", "data", "firmware", "fmu", "gains", "parameters", "scene", "vehicle"];
 
-/// What `text` says; its places start at `base`.
+/// Table of `text`; its places start at `base`.
 ///
 /// # Errors
-/// Where it is not TOML, and why.
+/// The place at which it is not TOML, and the reason.
 pub fn parse(text: &str, base: usize) -> Result<DeTable<'_>, Misread> {
     let table = diagnostics::parse_toml(text).map_err(|misread| misread.shifted(base))?;
     Ok(shifted_table(table.into_inner(), base))
@@ -43,7 +43,7 @@ fn shifted_table<'t>(table: DeTable<'t>, base: usize) -> DeTable<'t> {
     table.into_iter().map(shift).collect()
 }
 
-/// How a table is put on top of another.
+/// Function that puts one table on top of another.
 type Merge<'t> = fn(&mut DeTable<'t>, DeTable<'t>);
 
 /// Puts the manifest `over`, or a set of it, on top of `base`.

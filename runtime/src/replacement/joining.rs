@@ -44,7 +44,7 @@ impl Replacements<'_> {
         backups.chain(pending).min().unwrap_or(u32::MAX)
     }
 
-    /// Whether the place of a dead process of `node` has just been taken.
+    /// True if the place of a dead process of `node` has just been taken.
     pub(super) fn is_recovering(&self, node: usize) -> bool {
         self.nodes[node].backup.as_ref().is_some_and(|backup| {
             let is_recovery = matches!(backup.pending.purpose, Purpose::Restart | Purpose::Standby);
@@ -52,7 +52,7 @@ impl Replacements<'_> {
         })
     }
 
-    /// Where the clock must wait for a backup: where it is, or at the node's next period.
+    /// Tick at which the clock must wait for a backup: the current hold, or the next period of the node.
     pub(super) fn next_boundary(&self, backup: &Backup) -> u32 {
         let period = backup.pending.spec.plan.period_ticks;
         self.view.held_at.map_or(0, |held| held.next_multiple_of(period))

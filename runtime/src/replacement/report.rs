@@ -1,9 +1,9 @@
-//! What became of the backups of a run.
+//! Reports about the backups of a run.
 
 use bus::plan::InputPlan;
 use serde::Serialize;
 
-/// Why a process joins a run that flies.
+/// Purpose of a process that joins a run in flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Purpose {
@@ -17,16 +17,16 @@ pub enum Purpose {
     Restart,
 }
 
-/// What became of a backup.
+/// Report about a backup.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     /// The node.
     pub process: String,
-    /// Counts the processes of the node; the first is 0.
+    /// Number of the process among those of the node; the first is 0.
     pub generation: u32,
-    /// Why it joined.
+    /// Purpose of the backup.
     pub purpose: Purpose,
-    /// Whether the manifest or a request names it; a restart and the next standby come by themselves.
+    /// True if the manifest or a request names it; false for a restart and the next standby.
     pub is_planned: bool,
     /// The request that asked for it.
     #[serde(skip)]
@@ -35,15 +35,15 @@ pub struct Report {
     pub join_tick: Option<u32>,
     /// The first tick whose outputs were its own.
     pub take_over_tick: Option<u32>,
-    /// What it went on from: `state` or `last output`.
+    /// Origin of its state: `state` or `last output`.
     pub hand_over: Option<&'static str>,
-    /// Host time from the start of its process until that was prepared to join, in milliseconds.
+    /// Host time from the start of its process until it was prepared to join, in milliseconds.
     pub start_ms: f64,
     /// Host time for which the clock held the tick, in milliseconds.
     pub hold_ms: f64,
-    /// Why it did not fly, if it was to.
+    /// Reason why it did not fly, if it was to.
     pub refused: Option<String>,
-    /// What it reads, for a profile of the run.
+    /// Its inputs, for a profile of the run.
     #[serde(skip)]
     pub inputs: Vec<InputPlan>,
 }

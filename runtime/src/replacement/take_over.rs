@@ -6,7 +6,7 @@ use bus::lockstep::SlotState;
 use bus::plan::OutputPlan;
 
 impl Replacements<'_> {
-    /// Whether the backup of `node` has completed its first tick that counts.
+    /// True if the backup of `node` has completed its first tick that counts.
     pub(super) fn has_flown(&self, node: usize) -> bool {
         let take_over_tick = self.membership.nodes[node].take_over_tick;
         self.nodes[node].backup.as_ref().is_some_and(|backup| {
@@ -25,8 +25,8 @@ impl Replacements<'_> {
         })
     }
 
-    /// Whether the backup of `node` has sent a sample that counts. Readers may have turned to it: even if it dies
-    /// now, there is no way back to its predecessor.
+    /// True if the backup of `node` has sent a sample that counts. Readers may already read it. Even if the backup
+    /// dies now, its predecessor cannot return.
     pub(crate) fn has_taken_over(&self, node: usize) -> bool {
         let membership = &self.membership.nodes[node];
         let is_shadowing = self.nodes[node].backup.as_ref().is_some_and(|c| c.stage == Stage::Shadowing);
@@ -68,7 +68,7 @@ impl Replacements<'_> {
         }
     }
 
-    /// Whether the predecessor has left and its last samples are read.
+    /// True if the predecessor has left and its last samples are read.
     pub(super) fn has_retired(&self, node: usize, backup: &Backup) -> bool {
         if backup.retired.is_some_and(|retired| self.view.lives(node, retired)) {
             return false;
@@ -76,7 +76,7 @@ impl Replacements<'_> {
         self.is_read(backup)
     }
 
-    /// Whether every instance has read the last samples of the process that `backup` has replaced.
+    /// True if every instance has read the last samples of the process that `backup` has replaced.
     pub(super) fn is_read(&self, backup: &Backup) -> bool {
         let longest = self.plan.nodes.iter().map(|node| node.period_ticks).max().unwrap_or(1);
         let taken = backup.report.take_over_tick.unwrap_or_default().saturating_add(longest + 1);
@@ -84,7 +84,7 @@ impl Replacements<'_> {
         self.view.computing().all(|slot| self.view.slots[slot].done >= taken)
     }
 
-    /// The predecessor is gone: its slot is free, and nothing of it stays.
+    /// The predecessor is gone: its slot is freed, and everything that it left is removed.
     pub(super) fn close(&mut self, node: usize) {
         let Some(backup) = self.nodes[node].backup.take() else { return };
         if let Some(retired) = backup.retired {
@@ -118,8 +118,7 @@ impl Replacements<'_> {
         self.close(node);
     }
 
-    /// Whether the backup of `node` can take the place of the primary at once. One that only shadows
-    /// cannot.
+    /// True if the backup of `node` can take the place of the primary at once. A backup that only shadows cannot.
     pub(crate) fn can_promote(&self, node: usize) -> bool {
         self.nodes[node].backup.as_ref().is_some_and(|backup| {
             backup.stage == Stage::Shadowing && backup.pending.purpose != Purpose::Shadow
@@ -131,7 +130,7 @@ impl Replacements<'_> {
         self.view.completed_by(self.slot(node, self.membership.nodes[node].primary.generation))
     }
 
-    /// Whether the primary of `node` has completed a tick since it joined: a restart leads somewhere.
+    /// True if the primary of `node` has completed a tick since it joined: a restart makes progress.
     pub(crate) fn has_come_on(&self, node: usize) -> bool {
         let primary = &self.membership.nodes[node].primary;
         primary.generation == 0

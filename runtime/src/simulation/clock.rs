@@ -5,7 +5,7 @@ use crate::host::End;
 use bus::lockstep::Phase;
 use std::time::Duration;
 
-/// How long it sleeps at most where it waits for a state, and in a hold.
+/// Longest sleep while it waits for a state, and in a hold.
 const STATE_NAP: Duration = Duration::from_millis(50);
 const HOLD_NAP: Duration = Duration::from_millis(100);
 

@@ -1,4 +1,4 @@
-//! What befalls a simulated run: faults, and what its users ask for.
+//! Events from outside a simulated run: faults, and requests of its users.
 
 use super::fault::Fault::{self, Death, Hang, Interrupt, Leap, NeverReady, Pause, Steer, Stop, Swap};
 use super::fault::HARMFUL;
@@ -10,7 +10,7 @@ use std::collections::BTreeSet;
 use std::time::Duration;
 
 impl Sim {
-    /// Whether `fault` is struck now, where it can be: once in so many times.
+    /// True if `fault` is struck now: it is drawn once in `one_in` times.
     pub(super) fn strikes(&mut self, fault: Fault, one_in: u64) -> bool {
         let strikes = self.is_drawn(fault, one_in);
         if strikes && HARMFUL.contains(&fault) {
@@ -108,7 +108,7 @@ impl Sim {
         );
     }
 
-    /// What a run must keep to when its supervisor has come to its end and is gone.
+    /// Checks the rules for the end of a run, after its supervisor has ended.
     pub(super) fn check_end(&self, aborted: Option<&anyhow::Error>) {
         let left = self.living().map(|instance| (instance.role, instance.doing));
         let left: Vec<(Role, Doing)> = left.collect();

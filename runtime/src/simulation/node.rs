@@ -208,7 +208,7 @@ impl Sim {
         (slot + nodes) % (2 * nodes)
     }
 
-    /// What an instance must wait for before it computes `tick`.
+    /// Condition that an instance must wait for before it computes `tick`.
     fn missing(&self, index: usize, slot: usize, tick: u32) -> Option<Need> {
         let (instance, other) = (&self.instances[index], self.other(slot));
         if instance.role.generation() > 0 && tick <= instance.take_over_tick {

@@ -15,7 +15,7 @@ const STEPS: u32 = 40;
 struct Run {
     recording: Partial,
     log: LogClaim,
-    /// What it has written.
+    /// Content that it has written.
     content: Option<Vec<u8>>,
 }
 

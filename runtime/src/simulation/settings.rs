@@ -1,4 +1,4 @@
-//! What flies in a simulated run: its plan and its programs, drawn from the seed.
+//! Plan and programs of a simulated run, drawn from the seed.
 
 use super::sim::{Draw, NODES, WINDOW};
 use crate::graph::Graph;

@@ -23,10 +23,10 @@ pub(super) const NEVER: u32 = u32::MAX;
 const QUIET: Duration = Duration::from_secs(60);
 /// Time for which a node, and then the clock, stands still while the run starts: less than a watchdog, more than half of one.
 pub(super) const SLOW_START: Duration = Duration::from_millis(300);
-/// What never ends by itself.
+/// Duration of a state that never ends by itself.
 pub(super) const FOR_EVER: Duration = Duration::MAX;
 
-/// What happened, where somebody wants to read it.
+/// Log of events, if one is kept.
 pub(super) type Log = Option<Rc<RefCell<Vec<String>>>>;
 
 /// Numbers drawn from the seed.
@@ -68,7 +68,7 @@ pub(super) enum Bug {
     KillMisses,
 }
 
-/// What an instance sleeps for.
+/// Condition that an instance sleeps for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Need {
     Samples(usize),
@@ -86,7 +86,7 @@ pub(super) enum Need {
     Nothing,
 }
 
-/// What an instance does next.
+/// Next action of an instance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Doing {
     Starting,
@@ -122,7 +122,7 @@ pub(super) enum Doing {
 pub(super) struct Instance {
     pub(super) role: Role,
     pub(super) doing: Doing,
-    /// What it sleeps for, and how long at most.
+    /// Condition that it sleeps for, and longest time.
     pub(super) sleep: Option<(Need, Duration)>,
     pub(super) frozen_until: Duration,
     pub(super) end: Option<End>,
@@ -136,7 +136,7 @@ pub(super) struct Instance {
     pub(super) shadows_until: Vec<u32>,
     /// The next tick that it computes.
     pub(super) tick: u32,
-    /// Whether a sidecar has said that it is ready, and nobody has heard it yet.
+    /// True if a sidecar has reported that it is ready, and the supervisor has not heard it yet.
     pub(super) says_ready: bool,
 }
 
@@ -151,7 +151,7 @@ pub(super) struct Sim {
     pub(super) now: Duration,
     /// The control segment.
     pub(super) segment: View,
-    /// Whether those that send have left an aborted run.
+    /// True if the senders have left an aborted run.
     pub(super) is_drained: bool,
     pub(super) join_tick: u32,
     pub(super) shadow: Vec<u32>,
@@ -160,12 +160,12 @@ pub(super) struct Sim {
     pub(super) instances: Vec<Instance>,
     /// The memberships in the run directory.
     pub(super) stored: BTreeMap<u32, Membership>,
-    /// Who wrote the sample that counts: by topic and tick.
+    /// Instance that wrote the sample that counts: by topic and tick.
     pub(super) writers: BTreeMap<(usize, u32), u32>,
-    /// What was struck that may end a run.
+    /// Faults that were struck and may end a run.
     pub(super) excuses: Vec<String>,
     pub(super) requests: VecDeque<Request>,
-    /// What requests were answered.
+    /// Answers to requests.
     pub(super) answers: Vec<Option<Answer>>,
     pub(super) looks: u32,
     /// The look at which a stop was asked for.
@@ -355,7 +355,7 @@ impl Sim {
         }
     }
 
-    /// Whether whoever has this role finds that the run was aborted and that nothing more comes.
+    /// True if an instance with this role finds that the run was aborted and that nothing more comes.
     fn leaves(&self, role: Role) -> bool {
         let reads_only = |node: usize| self.plan.nodes[node].outputs.is_empty();
         let stays = matches!(role, Role::Node { node, .. } if reads_only(node)) && !self.is_drained;

@@ -1,4 +1,4 @@
-//! What follows when processes and sidecars end, and when somebody interrupts.
+//! Reactions to the end of processes and sidecars, and to an interrupt.
 
 use super::Supervisor;
 use crate::overseer::Death;

@@ -53,8 +53,8 @@ impl<W: World> Supervisor<'_, W> {
         }
     }
 
-    /// How long the run may stand still because of `straggler`: for the clock, and where nobody is to blame, as long as
-    /// for the node that may take longest.
+    /// Longest time that the run may stand still because of `straggler`. For the clock, and if no process is to
+    /// blame, it is the longest time of all nodes.
     fn patience(&self, straggler: Option<Role>) -> Duration {
         match straggler {
             Some(Role::Node { node, generation }) => {

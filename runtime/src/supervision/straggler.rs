@@ -44,9 +44,9 @@ impl<W: World> Supervisor<'_, W> {
         slowest.map(|(node, generation)| Role::Node { node, generation })
     }
 
-    /// Whether an instance has all it needs for its next tick: if it does not advance then, it is at fault itself. One
-    /// that sleeps does not count: what it waits for has not been sent, or it would have been woken. A recorder sleeps
-    /// until samples have gathered that the tick alone does not need.
+    /// True if an instance has everything that its next tick needs: if it does not advance then, it is at fault
+    /// itself. An instance that sleeps does not count: its sample has not been sent, or it would have been woken. A
+    /// recorder sleeps until samples have gathered that the tick alone does not need.
     fn can_compute(&self, node: usize, generation: u32) -> bool {
         let slot = self.plan.slot(node, generation);
         let (view, inputs) =
@@ -89,7 +89,7 @@ impl<W: World> Supervisor<'_, W> {
         }
     }
 
-    /// Which processes have not come as far as the others, and what they wait for, as a message.
+    /// Message: the processes that are behind the others, and the conditions that they wait for.
     pub(super) fn describe_standstill(&self, straggler: Option<Role>, stood: Duration) -> String {
         let view = &self.overseer.replacements.view;
         let names = |phase| {
@@ -113,7 +113,7 @@ impl<W: World> Supervisor<'_, W> {
         format!("the run stood still for {:.1} s: {waiting}", stood.as_secs_f64())
     }
 
-    /// Which instances are awake and do not come on, and which topics the others sleep for.
+    /// Message: the instances that are awake and do not advance, and the topics that the others sleep for.
     fn describe_stuck(&self) -> String {
         let (plan, view) = (self.plan, &self.overseer.replacements.view);
         let slot = |&(node, generation): &(usize, u32)| plan.slot(node, generation);
