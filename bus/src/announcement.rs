@@ -1,4 +1,4 @@
-//! What a publisher announces about its topic before the run starts, and the check of every reader.
+//! Announcement of a topic by its publisher before the run starts, and the check of every reader.
 
 use crate::error::BusError;
 use crate::json_file;
@@ -19,7 +19,7 @@ pub struct Announcement {
     pub layout: String,
     /// The ROS 2 definition, for recordings.
     pub definition: String,
-    /// Where a message holds its stamp, if it has one.
+    /// Offset of a message's stamp in bytes, if it has one.
     pub stamp_offset: Option<usize>,
     /// The part of a message's bytes that counts; absent where it is all of them.
     #[serde(default)]
@@ -72,7 +72,7 @@ impl Announcement {
     }
 }
 
-/// Where the type of topic number `topic` is announced.
+/// Path of the file that announces the type of topic number `topic`.
 pub(crate) fn topic_path(run_dir: &Path, topic: usize) -> PathBuf {
     run_dir.join(format!("topic-{topic}.json"))
 }

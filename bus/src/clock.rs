@@ -8,7 +8,7 @@ use crate::profile::GrantWriter;
 use rustix::thread::clock_nanosleep_absolute;
 use std::cell::RefCell;
 
-/// How long the clock sleeps at most before it looks whether a stop was asked for.
+/// Longest sleep of the clock before it checks for a request to stop.
 const NAP_NS_MAX: u64 = 100_000_000;
 
 /// Runs the clock of this process's run until the run is over.

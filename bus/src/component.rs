@@ -8,7 +8,7 @@ use serde::de::DeserializeOwned;
 
 pub use crate::state::{State, StateError, Transfer};
 
-/// What goes wrong in a step, in words. Any error, and any text, becomes one by `?` or `into`.
+/// Error of a step, in words. Any error, and any text, becomes one by `?` or `into`.
 ///
 /// ```
 /// let too_low: bus::component::StepError = "the battery is empty".into();
@@ -77,13 +77,13 @@ pub type StepError = Box<dyn std::error::Error + Send + Sync>;
 /// assert_eq!(climb.step(Inputs { state: &state }).unwrap().set_point.altitude, 2.5);
 /// ```
 pub trait Component: Sized + Send {
-    /// Its name in manifests, and what it does.
+    /// Its name in manifests, and its summary.
     const INFO: Info;
-    /// What the manifest's `parameters` table holds: a struct that refuses unknown fields.
+    /// Content of the manifest's `parameters` table: a struct that refuses unknown fields.
     type Parameters: DeserializeOwned;
-    /// What it reads.
+    /// Inputs.
     type Inputs<'a>: InputPorts<'a>;
-    /// What it sends.
+    /// Outputs.
     type Outputs: OutputPorts;
     /// Everything that changes from tick to tick: a [`Message`](crate::Message), `()` if nothing changes, or a type that
     /// writes its own bytes.
@@ -95,10 +95,10 @@ pub trait Component: Sized + Send {
     /// A parameter or a file that cannot be meant.
     fn new(parameters: Self::Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError>;
 
-    /// Tries the component before a run, in a check: what goes wrong, or is odd, although each parameter can be meant.
+    /// Tries the component before a run, in a check: finds errors and oddities although each parameter is valid.
     ///
     /// # Errors
-    /// What goes wrong.
+    /// The error that the run would meet.
     fn rehearse(self, _context: &NodeContext<'_>) -> Result<(), ParameterError> {
         Ok(())
     }
@@ -106,10 +106,11 @@ pub trait Component: Sized + Send {
     /// The state before the first tick.
     fn initial(&self) -> Self::State;
 
-    /// Learns what its inputs carry, where these are [`AnyInputs`](crate::ports::AnyInputs): once, before the first tick.
+    /// Receives the message types of its inputs, if these are [`AnyInputs`](crate::ports::AnyInputs): once, before
+    /// the first tick.
     ///
     /// # Errors
-    /// What stands against it.
+    /// The reason why it cannot use them.
     fn connected(
         &self,
         _topics: &[(&str, &Announcement)],
@@ -121,7 +122,7 @@ pub trait Component: Sized + Send {
     /// Computes one tick.
     ///
     /// # Errors
-    /// What goes wrong: the run ends with it.
+    /// The error with which the run ends.
     fn step(
         &self,
         context: &StepContext<'_>,
@@ -129,16 +130,16 @@ pub trait Component: Sized + Send {
         state: &mut Self::State,
     ) -> Result<Self::Outputs, StepError>;
 
-    /// Ends what it has begun, after the last tick: also of a run that failed.
+    /// Finishes its work after the last tick, also in a run that failed.
     ///
     /// # Errors
-    /// What stands against it.
+    /// The reason why it could not finish.
     fn finish(&self, _state: &mut Self::State) -> Result<(), StepError> {
         Ok(())
     }
 }
 
-/// What is told of a component.
+/// Description of a component.
 ///
 /// ```
 /// use bus::component::{Info, Role};
@@ -150,15 +151,15 @@ pub trait Component: Sized + Send {
 pub struct Info {
     /// Name in manifests.
     pub name: &'static str,
-    /// What it does, in one line.
+    /// Summary in one line.
     pub summary: &'static str,
-    /// What it does for the run.
+    /// Its role in the run.
     pub role: Role,
     /// Parameters that count at the start alone, since its state begins with them.
     pub initial: &'static [&'static str],
 }
 
-/// What a component does for a run.
+/// Role of a component in a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
     /// It computes outputs.

@@ -1,4 +1,4 @@
-//! How long the steps of a node take on the processor that it stands for: a time drawn for each tick.
+//! Computing time of a node's steps on the processor that it stands for: a time drawn for each tick.
 
 use crate::random::{Stream, normal, uniform};
 use serde::{Deserialize, Serialize};
@@ -85,7 +85,7 @@ mod tests {
     use super::{ComputingTime, TICKS_MAX, at_fraction};
     use crate::random::stream;
 
-    /// What `time` draws, sorted.
+    /// Draws of `time`, sorted.
     fn drawn_us(time: &ComputingTime) -> Vec<f64> {
         let mut random = stream(3, "test");
         let mut all: Vec<f64> = (0..20_000).map(|_| time.draw_us(&mut random)).collect();

@@ -1,10 +1,10 @@
-//! What a component is told of its run when it is made, and of the tick when it steps.
+//! Information for a component: about its run when it is made, and about the tick when it steps.
 
 use crate::ports::{InputSamples, OutputPorts, SampleSource};
 use inputs::InputFiles;
 use std::cell::RefCell;
 
-/// What a component may know of its node and the run, and where it leaves its warnings.
+/// Information about a component's node and run, and the list of its warnings.
 ///
 /// ```
 /// let context = bus::context::NodeContext::new("imu", &["state"]).timed(1_000_000, 4, 30_000).seeded(7);
@@ -24,7 +24,8 @@ pub struct NodeContext<'a> {
     pub inputs: &'a [&'a str],
     /// The outputs that the manifest names.
     pub outputs: &'a [&'a str],
-    /// What the wired inputs carry, as far as a check of the manifest knows it; a run tells it when it has connected.
+    /// Messages of the wired inputs, as far as a check of the manifest knows them; a run reports them once it has
+    /// connected.
     pub messages: &'a [InputMessage<'a>],
     /// Nanoseconds a tick.
     pub tick_ns: u64,
@@ -37,7 +38,7 @@ pub struct NodeContext<'a> {
     warnings: RefCell<Vec<Warning>>,
 }
 
-/// What an input carries.
+/// Message type of an input.
 ///
 /// ```
 /// use bus::context::{InputMessage, NodeContext};
@@ -74,14 +75,14 @@ impl InputMessage<'_> {
     }
 }
 
-/// What is odd about a node in its run.
+/// Legal but unusual value of a node in its run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Warning {
-    /// The parameter that it is about; empty where it is none in particular.
+    /// Its parameter; empty if it is about none in particular.
     pub key: String,
-    /// What is odd.
+    /// Description of the value.
     pub message: String,
-    /// Whether it is odd only because the run ends so early.
+    /// True if it is unusual only because the run ends so early.
     pub is_behind_end: bool,
 }
 
@@ -126,7 +127,7 @@ impl<'a> NodeContext<'a> {
         Self { files: files.clone(), ..self }
     }
 
-    /// Whether an input is wired, or an output named.
+    /// True if `port` is a wired input or a named output.
     #[must_use]
     pub fn has(&self, port: &str) -> bool {
         self.inputs.contains(&port) || self.outputs.contains(&port)
@@ -178,12 +179,12 @@ impl<'a> NodeContext<'a> {
     }
 }
 
-/// What a step is told of its tick, beside the inputs.
+/// Information for a step about its tick, beside the inputs.
 #[derive(Clone, Copy)]
 pub struct StepContext<'a> {
     pub(crate) tick: u32,
     pub(crate) time_ns: u64,
-    /// What the predecessor sent last, by output.
+    /// Last samples of the predecessor, by output.
     pub(crate) predecessor: Option<&'a dyn SampleSource>,
 }
 
@@ -215,8 +216,8 @@ impl StepContext<'_> {
         self.time_ns as f64 * 1e-9
     }
 
-    /// What the process whose place this one takes sent last, at the tick at which it takes it and only where no state
-    /// was transferred: the command to go on from without a jump. `O` are the component's outputs.
+    /// Last outputs of the process that this one replaces: the command to go on from without a jump. They are present
+    /// only at the tick of the replacement, and only if no state was transferred. `O` are the component's outputs.
     #[must_use]
     pub fn predecessor<O: OutputPorts>(&self) -> Option<O> {
         self.predecessor.and_then(|sent| O::read(InputSamples(sent)))

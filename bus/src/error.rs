@@ -1,4 +1,4 @@
-//! What can go wrong on the bus, in words for the person who launched the run.
+//! Errors of the bus, in words for the person who launched the run.
 
 use std::path::PathBuf;
 use thiserror::Error;
@@ -34,26 +34,26 @@ pub enum BusError {
     /// A file of the run could not be read or written.
     #[error("cannot {action} {path}: {source}")]
     File {
-        /// What was tried.
+        /// Action that failed.
         action: &'static str,
-        /// Which file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why it failed.
+        /// Cause.
         source: std::io::Error,
     },
-    /// There is no room for what a run maps.
+    /// There is no room for the memory that a run maps.
     #[error(
         "no room for {what}: it takes {needed} bytes, and {} has {free} bytes free; make room there, or give it more \
          (`mount -o remount,size=SIZE {}`, `docker run --shm-size`)", folder.display(), folder.display()
     )]
     NoRoom {
-        /// What the room is for.
+        /// Purpose of the memory.
         what: String,
-        /// How much it takes.
+        /// Bytes needed.
         needed: u64,
-        /// Where.
+        /// Folder of the memory.
         folder: PathBuf,
-        /// How much there is.
+        /// Bytes free.
         free: u64,
     },
     /// Files may not become as large as the run needs them.
@@ -72,9 +72,9 @@ pub enum BusError {
         "{path} is not readable as {expected}: {found}. Was it written by another version of hummingbus?"
     )]
     Content {
-        /// Which file.
+        /// Path of the file.
         path: PathBuf,
-        /// What it should hold.
+        /// Expected content.
         expected: &'static str,
         /// Its fault.
         found: String,
@@ -186,9 +186,9 @@ pub enum BusError {
         node: String,
         /// Its port.
         port: String,
-        /// What the manifest states.
+        /// The type that the manifest states.
         expected: String,
-        /// What the node publishes.
+        /// The type that the node publishes.
         found: String,
     },
     /// The initial value of a delayed input does not fit its message.
@@ -200,7 +200,7 @@ pub enum BusError {
         port: String,
         /// The message type.
         type_name: &'static str,
-        /// What does not fit.
+        /// Fault of the value.
         reason: String,
     },
     /// The node's parameters are not what it reads.
@@ -208,7 +208,7 @@ pub enum BusError {
     Parameters {
         /// The node.
         node: String,
-        /// Which key, what was expected and found.
+        /// Key, expected value and found value.
         reason: String,
     },
     /// The transport refused something.
@@ -216,7 +216,7 @@ pub enum BusError {
     Transport {
         /// The node.
         node: String,
-        /// What was tried.
+        /// Action that failed.
         action: String,
         /// iceoryx2's answer.
         reason: String,
@@ -263,7 +263,7 @@ pub enum BusError {
         output: String,
         /// The field, with its place in an array.
         field: String,
-        /// What it holds: NaN, inf or -inf.
+        /// Its value: NaN, inf or -inf.
         value: f64,
         /// The tick.
         tick: u32,
@@ -307,11 +307,11 @@ pub enum BusError {
     /// The system does not allow what the manifest asks for.
     #[error("cannot {action}: {source}; {advice}")]
     Denied {
-        /// What was tried.
+        /// Action that failed.
         action: &'static str,
         /// The system's answer.
         source: std::io::Error,
-        /// Which right is missing and how to get it.
+        /// Missing right, and advice for getting it.
         advice: &'static str,
     },
     /// The launcher ended the run early.

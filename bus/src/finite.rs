@@ -1,4 +1,4 @@
-//! Which numbers of a message have to be finite, and whether they are: found once, looked at before every sample.
+//! Check that the numbers of a message are finite: the numbers are found once, and checked before every sample.
 
 use crate::schema::{Extent, Kind, Primitive, Schema, VALUES_START};
 
@@ -11,7 +11,7 @@ struct Span {
     is_double: bool,
 }
 
-/// Where a message has floating-point numbers.
+/// Places of the floating-point numbers in a message.
 #[derive(Debug)]
 pub(crate) struct Floats {
     spans: Vec<Span>,

@@ -46,7 +46,7 @@ impl<T> Clone for Output<T> {
 }
 impl<T> Copy for Output<T> {}
 
-/// How a node reads an input.
+/// Type with which a node reads an input.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Declared {
     Typed(&'static Schema),
@@ -77,7 +77,7 @@ impl Declared {
     }
 }
 
-/// Where the ports of a component are among those of its node, in the order in which it declares them.
+/// Indices of a component's ports among those of its node, in the order in which the component declares them.
 #[derive(Debug)]
 pub(crate) struct Wiring {
     pub(crate) inputs: Vec<Option<usize>>,

@@ -18,7 +18,7 @@ pub struct Harness<C: Component> {
     pub tick: u32,
     tick_ns: u64,
     period_ticks: u32,
-    /// What a predecessor sent last, until the next step.
+    /// Last samples of a predecessor, until the next step.
     predecessor: Option<SampleMemory>,
 }
 

@@ -8,13 +8,13 @@ use std::cell::RefCell;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// What a thread is in a run.
+/// Part of a thread in a run.
 #[derive(Clone, Debug)]
 pub struct Hosted {
-    /// Which part it takes; the clock has a name that no node has.
+    /// Run and node that it joins; the clock has a name that no node has.
     pub join: Join,
-    /// Whether the instance is to end: its waits return then as those of an aborted run do. Who sets it wakes the
-    /// sleepers ([`crate::lockstep::SupervisorView::set_epoch`] does).
+    /// True if the instance is to end: its waits then return as those of an aborted run do. The thread that sets it
+    /// wakes the sleepers ([`crate::lockstep::SupervisorView::set_epoch`] does).
     pub is_cancelled: Arc<AtomicBool>,
 }
 
@@ -38,7 +38,7 @@ impl Hosted {
     }
 }
 
-/// Whether this thread is an instance of a run beside others of its process.
+/// True if this thread is an instance of a run beside others of its process.
 pub(crate) fn is_hosted() -> bool {
     HOSTED.with_borrow(Option::is_some)
 }
@@ -48,7 +48,7 @@ pub(crate) fn join() -> Option<Join> {
     HOSTED.with_borrow(|hosted| hosted.as_ref().map(|hosted| hosted.join.clone()))
 }
 
-/// Whether this thread is to end.
+/// True if this thread is to end.
 pub(crate) fn is_cancelled() -> bool {
     HOSTED.with_borrow(|hosted| {
         hosted.as_ref().is_some_and(|hosted| hosted.is_cancelled.load(Ordering::SeqCst))

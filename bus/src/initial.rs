@@ -5,7 +5,7 @@ use crate::sample_memory::empty_sample;
 use crate::schema::{Kind, Primitive, Schema, VALUES_START};
 use serde_json::Value;
 
-/// What does not fit the message, by its path.
+/// Fault of an initial value, with the path of the field.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum InitialError {
     /// A value of another kind.
@@ -13,9 +13,9 @@ pub enum InitialError {
     Value {
         /// The field, such as `position.z` or `command[2]`; empty for the whole message.
         path: String,
-        /// What was given.
+        /// Value found.
         found: Value,
-        /// What is accepted.
+        /// Values accepted.
         expected: String,
     },
     /// A field that the message does not have.
@@ -23,7 +23,7 @@ pub enum InitialError {
     Unknown {
         /// The field.
         path: String,
-        /// Those that there are in its place.
+        /// The known fields in its place.
         known: Vec<&'static str>,
     },
     /// A field that has one value, always.
@@ -40,7 +40,7 @@ impl InitialError {
 /// A sample of `schema` whose fields have the values of `value` (a table) and are zero elsewhere.
 ///
 /// # Errors
-/// What does not fit: an unknown field, a value of another kind, an array of another length.
+/// The value that does not fit: an unknown field, a value of another kind, an array of another length.
 pub fn sample(schema: &Schema, value: &Value) -> Result<Box<[u64]>, InitialError> {
     let mut words = empty_sample(schema.size);
     write_message(schema, value, &mut bytemuck::cast_slice_mut(&mut words)[BODY_START..], "")?;

@@ -1,4 +1,4 @@
-//! Which part of which run a process or thread takes.
+//! The part that a process or thread takes in a run.
 
 use std::path::PathBuf;
 
@@ -8,13 +8,13 @@ pub const NODE_VARIABLE: &str = "HUMMINGBUS_NODE";
 /// The environment variable that counts the processes of a node: 0 for the first, backups count up.
 pub const GENERATION_VARIABLE: &str = "HUMMINGBUS_GENERATION";
 
-/// Which part of which run a process or thread takes.
+/// The part that a process or thread takes in a run.
 #[derive(Clone, Debug)]
 pub struct Join {
     /// The run directory.
     pub run_dir: PathBuf,
     /// The node's name.
     pub node: String,
-    /// Which instance of the node it is: 0 for the first, those that replace it count up.
+    /// Number of its instance of the node: 0 for the first; replacements count up.
     pub generation: u32,
 }

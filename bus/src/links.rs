@@ -1,4 +1,4 @@
-//! What ties a node to its run, and how its connections follow the membership.
+//! Connections of a node to its run: they follow the membership.
 
 use crate::claim::Claim;
 use crate::error::BusError;
@@ -11,7 +11,7 @@ use crate::transport::{Receiver, Sender, Transport};
 use std::path::PathBuf;
 use std::rc::Rc;
 
-/// What ties a node to its run.
+/// Connections of a node to its run.
 #[derive(Debug)]
 pub(crate) struct Links {
     pub(crate) run_dir: PathBuf,
@@ -25,7 +25,7 @@ pub(crate) struct Links {
 }
 
 impl Links {
-    /// What records the host times of the ticks from `first_tick` on, if the run is profiled.
+    /// Writer of the host times of the ticks from `first_tick` on, if the run is profiled.
     pub(crate) fn tick_writer(&self, first_tick: u32) -> Result<Option<TickWriter>, BusError> {
         let create =
             || TickWriter::create(&self.run_dir, &self.plan, self.index, self.generation, first_tick);

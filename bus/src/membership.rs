@@ -1,4 +1,4 @@
-//! Who flies and who shadows: the processes of a run from one change to the next.
+//! Primary and backup of every node of a run, from one change to the next.
 //!
 //! The supervisor writes the membership and raises the epoch; every node then makes its connections agree with
 //! it. A membership holds the whole state, not a change, so it does not matter which of them a node saw last.
@@ -39,7 +39,7 @@ pub struct Instance {
     pub generation: u32,
     /// The first tick it computes.
     pub join_tick: u32,
-    /// Whether it sends samples before the take-over; one that is started after a crash does not.
+    /// True if it sends samples before the take-over; false for one that is started after a crash.
     pub shadows: bool,
     /// Its inputs and parameters.
     pub plan: NodePlan,

@@ -62,9 +62,9 @@ pub trait Message: bytemuck::Pod + Send {
     const SCHEMA: &'static Schema;
 }
 
-/// Where the CDR encapsulation header starts in a sample's bytes.
+/// Offset of the CDR encapsulation header in a sample's bytes.
 pub const CDR_START: usize = 4;
-/// Where the message starts in a sample's bytes.
+/// Offset of the message in a sample's bytes.
 pub const BODY_START: usize = 8;
 
 /// The first word of every sample: four reserved bytes, then `00 01 00 00`.

@@ -1,11 +1,11 @@
-//! What the files and processes of a run are called.
+//! Names of the files and processes of a run.
 
 use std::path::{Path, PathBuf};
 
-/// Where shared memory lies.
+/// Folder of shared memory.
 pub const SHARED_MEMORY: &str = "/dev/shm";
 
-/// What the name of every shared-memory file of run `run_id` starts with.
+/// Prefix of the name of every shared-memory file of run `run_id`.
 #[must_use]
 pub fn shm_prefix(run_id: &str) -> String {
     format!("hb_{run_id}_")
@@ -16,7 +16,7 @@ pub(crate) fn shm_path(run_id: &str, name: &str) -> PathBuf {
     Path::new(SHARED_MEMORY).join(shm_prefix(run_id) + name)
 }
 
-/// What generation `generation` of node `node` is called.
+/// Name of the process of generation `generation` of node `node`.
 #[must_use]
 pub fn process_name(node: &str, generation: u32) -> String {
     if generation == 0 { node.to_owned() } else { format!("{node}.{generation}") }

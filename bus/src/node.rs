@@ -55,15 +55,15 @@ pub struct Node {
     /// The message type of each input, in the plan's order; `None` until declared.
     inputs: Vec<Option<Declared>>,
     outputs: Vec<Option<DeclaredOutput>>,
-    /// What was wrong with a declaration that does not return errors; connecting does.
+    /// First error of a declaration that does not return errors; connecting returns it.
     fault: Option<BusError>,
 }
 
-/// What a node sends on an output.
+/// Declaration of an output of a node.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DeclaredOutput {
     pub(crate) schema: &'static Schema,
-    /// Whether its samples are others' messages, which keep their stamps.
+    /// True if its samples are forwarded messages, which keep their stamps.
     is_forwarded: bool,
 }
 
@@ -236,7 +236,7 @@ impl Node {
         self.keep_fault(|node| is_wired.then(|| node.input(port)).transpose()).flatten()
     }
 
-    /// What `declare` gives; its error is kept for [`Node::connect`].
+    /// Returns the result of `declare`; keeps its error for [`Node::connect`].
     fn keep_fault<D>(&mut self, declare: impl FnOnce(&mut Self) -> Result<D, BusError>) -> Option<D> {
         let declared = declare(self);
         declared.map_err(|fault| self.fault = self.fault.take().or(Some(fault))).ok()

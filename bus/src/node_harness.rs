@@ -131,7 +131,7 @@ impl std::fmt::Debug for NodeHarness {
 /// A name and the message that is forwarded under it.
 type Forwarded<'a> = (&'a str, &'static Schema);
 
-/// What a node forwards, by name.
+/// Messages that a node forwards, by name.
 fn forwarded<'a>(
     component: &Registration,
     components: &'static [Registration],

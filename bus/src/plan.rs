@@ -13,7 +13,7 @@ pub const SLOTS_PER_NODE: usize = 2;
 /// out before the run.
 pub const INPUTS_RESERVED: usize = 8;
 
-/// How a topic's queues are sized.
+/// Sizes of a topic's queues.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Capacity {
     /// Samples that wait in a subscriber's queue at most.
@@ -26,7 +26,7 @@ pub(crate) struct Capacity {
     pub(crate) nodes: usize,
 }
 
-/// How time passes for the clock service.
+/// Pace of the clock service.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Pace {
@@ -36,7 +36,7 @@ pub enum Pace {
     Factor(f64),
 }
 
-/// How a process waits for what it needs.
+/// Way in which a process waits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Wait {
@@ -89,7 +89,7 @@ pub struct NodePlan {
     pub name: String,
     /// Ticks between two computations.
     pub period_ticks: u32,
-    /// How it waits.
+    /// Its way of waiting.
     pub wait: Wait,
     /// Cores it may run on; all where `None`.
     pub cpu: Option<usize>,
@@ -102,10 +102,10 @@ pub struct NodePlan {
     /// Files that the node reads: their copies lie in [`Plan::INPUTS`].
     #[serde(default)]
     pub files: Vec<InputFile>,
-    /// Whether another process is started in its place when it dies: its publishers then keep enough history.
+    /// True if another process is started in its place when it dies: its publishers then keep enough history.
     #[serde(default)]
     pub restarts: bool,
-    /// How long its steps take, where that is simulated.
+    /// Computing time of its steps, if that is simulated.
     #[serde(default)]
     pub computing_time: Option<ComputingTime>,
     /// True for the recorder: it takes every sample, of a group from rings in shared memory.
@@ -114,7 +114,7 @@ pub struct NodePlan {
 }
 
 impl NodePlan {
-    /// Reads what the process of generation `generation` of node `node` reads about itself.
+    /// Reads the plan that the process of generation `generation` of node `node` has of itself.
     ///
     /// # Errors
     /// If the file is missing or holds something else.
@@ -163,10 +163,10 @@ pub struct Plan {
     pub pace: Pace,
     /// Core of the clock service.
     pub clock_cpu: Option<usize>,
-    /// Whether every process notes the host times of its ticks.
+    /// True if every process notes the host times of its ticks.
     #[serde(default)]
     pub profile: bool,
-    /// Whether every process keeps its memory from being paged out.
+    /// True if every process keeps its memory from being paged out.
     #[serde(default)]
     pub lock_memory: bool,
     /// Topics.
@@ -206,7 +206,7 @@ impl GroupPlan {
     }
 }
 
-/// Where the plan of a backup lies.
+/// Path of the plan of a backup.
 #[must_use]
 pub fn backup_path(run_dir: &Path, node: usize, generation: u32) -> PathBuf {
     run_dir.join(format!("node-{node}.{generation}.json"))
@@ -293,9 +293,9 @@ impl Plan {
         (generation as usize % SLOTS_PER_NODE) * self.nodes.len() + node
     }
 
-    /// How the queues of topic `topic` are sized. A queue holds what a publisher can send before the slowest node
-    /// holds the grant back, and twice that for shadows, for whose samples nobody waits: one may be a window behind a
-    /// reader when that takes what there is, and a window ahead before it takes the next.
+    /// Sizes of the queues of topic `topic`. A queue holds the samples that a publisher can send before the slowest
+    /// node holds the grant back. For shadows it holds twice that, since no node waits for their samples. A shadow
+    /// may be a window behind a reader that takes its samples, and a window ahead before the reader takes the next.
     pub(crate) fn capacity(&self, topic: usize) -> Capacity {
         let reads = |node: &&NodePlan| node.inputs.iter().any(|input| input.topic == topic);
         let longest_period = self.nodes.iter().map(|node| node.period_ticks).max().unwrap_or(1);

@@ -25,12 +25,12 @@ pub(crate) struct Source {
     receiver: Receiver,
     /// The sequence number of the next sample.
     next_sequence: u64,
-    /// Whether what was received so far may be older than the next sample: the history that a subscriber gets
-    /// which joins later.
+    /// True if the samples received so far may be older than the next one: they are the history that a subscriber
+    /// gets when it joins later.
     has_history: bool,
 }
 
-/// What was found where the next sample was due.
+/// Sample or error found in the place of the next sample.
 #[derive(Debug, thiserror::Error)]
 enum Found {
     #[error("nothing")]
@@ -78,7 +78,7 @@ impl Source {
 #[derive(Debug)]
 struct Backup {
     source: Source,
-    /// Whether it sends samples before they count; one that is started after a crash does not.
+    /// True if it sends samples before they count; false for one that is started after a crash.
     shadows: bool,
     take_over_tick: u32,
 }
@@ -134,7 +134,7 @@ pub(crate) struct InPort {
     size: usize,
     layout_hash: u64,
     topic_period_ticks: u32,
-    /// Whether the node reads the shadow samples too, and so waits for them.
+    /// True if the node reads the shadow samples too, and so waits for them.
     pub(crate) reads_shadow: bool,
     pub(crate) topic: usize,
     pub(crate) delay_ticks: u32,
@@ -166,8 +166,8 @@ impl InPort {
         }
     }
 
-    /// What another component sent last to `topic`, in whose place the node goes on from a checkpoint: `sample`, if it is laid
-    /// out as the node's own messages are.
+    /// Input with the last sample that another component sent to `topic`. The node goes on in its place from a
+    /// checkpoint. The input holds `sample` if that has the layout of the node's own messages.
     pub(crate) fn of_predecessor(
         output: &OutputPlan,
         topic: &TopicPlan,
@@ -213,7 +213,7 @@ impl InPort {
         }
     }
 
-    /// Whether a shadow sample is due at `tick` that the node waits for.
+    /// True if the node waits for a shadow sample that is due at `tick`.
     pub(crate) fn awaits_shadow(&self, tick: u32) -> bool {
         let is_due = |backup: &Backup| backup.shadows && tick < backup.take_over_tick;
         self.reads_shadow && self.backups.back().is_some_and(is_due)
@@ -445,7 +445,7 @@ pub(crate) struct OutPort {
     /// The part of a message's bytes that counts.
     extent: Option<Extent>,
     stamp_offset: Option<usize>,
-    /// Whether a sample is taken at ticks at which none is sent: its node's steps take time, and send later.
+    /// True if a sample is taken at ticks at which none is sent: its node's steps take time, and send later.
     is_timed: bool,
     pub(crate) topic: usize,
     pub(crate) period_ticks: u32,
@@ -523,7 +523,7 @@ impl OutPort {
         tick.is_multiple_of(self.period_ticks)
     }
 
-    /// Whether a step at `tick` writes a sample.
+    /// True if a step at `tick` writes a sample.
     pub(crate) fn takes(&self, tick: u32) -> bool {
         self.is_timed || self.is_due(tick)
     }
@@ -533,10 +533,10 @@ impl OutPort {
         self.is_written
     }
 
-    /// What the step at `tick` wrote.
+    /// Sample that the step at `tick` wrote.
     ///
     /// # Errors
-    /// If it left an output unwritten that was due.
+    /// If it did not write an output that was due.
     pub(crate) fn written(&mut self, tick: u32, node: &str) -> Result<Option<&[u64]>, BusError> {
         if !self.is_written && self.is_due(tick) {
             return Err(self.unwritten(node, tick));
@@ -559,7 +559,7 @@ impl OutPort {
         BusError::UnwrittenOutput { node: node.to_owned(), port: self.port.clone(), tick }
     }
 
-    /// Whether a sample is sent at `tick`.
+    /// True if a sample is sent at `tick`.
     pub(crate) fn is_sent(&self, tick: u32) -> bool {
         self.is_due(tick) && tick >= self.sends_from
     }

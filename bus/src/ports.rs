@@ -1,4 +1,4 @@
-//! What a component declares about its ports, and how the inputs and outputs of a step reach them.
+//! Ports that a component declares, and the transport of the inputs and outputs of a step to them.
 
 use crate::error::BusError;
 use crate::message::{Message, view, view_mut};
@@ -23,15 +23,15 @@ use std::marker::PhantomData;
 pub struct PortSpec {
     /// Name in the component.
     pub name: &'static str,
-    /// What it is for, in one line.
+    /// Purpose in one line.
     pub doc: &'static str,
     /// Message type.
     pub schema: &'static Schema,
-    /// Whether the component needs it.
+    /// True if the component needs it.
     pub required: bool,
 }
 
-/// Which inputs a component has.
+/// Inputs of a component.
 #[derive(Clone, Copy, Debug)]
 pub enum Inputs {
     /// These.
@@ -101,7 +101,7 @@ pub trait OutputPorts: Sized {
     /// If shared memory cannot be had.
     fn write(self, samples: &mut OutputSamples<'_>) -> Result<(), BusError>;
 
-    /// What was sent last; `None` where one that is always there was never sent.
+    /// Outputs that were sent last; `None` if a required one was never sent.
     fn read(samples: InputSamples<'_>) -> Option<Self>;
 }
 
@@ -109,9 +109,9 @@ pub trait OutputPorts: Sized {
 #[derive(Clone, Copy)]
 pub struct InputSamples<'a>(pub(crate) &'a dyn SampleSource);
 
-/// Where samples come from: the bus, or whoever steps a component without it.
+/// Source of samples: the bus, or the caller that steps a component without it.
 pub(crate) trait SampleSource {
-    /// How many ports there are.
+    /// Number of ports.
     fn count(&self) -> usize;
     /// The newest sample of a port; `None` where that is not wired.
     fn words(&self, port: usize) -> Option<&[u64]>;
@@ -141,11 +141,11 @@ impl<'a> InputSamples<'a> {
     }
 }
 
-/// Where the samples of a step are written, by the numbers of its ports: the declared ones first, then those of
+/// Samples that a step may write, by the numbers of its ports: the declared ones first, then those of
 /// [`Inputs::Forwarded`] in the order of their names.
 pub struct OutputSamples<'a>(pub(crate) &'a mut dyn SampleSink);
 
-/// Where samples go: the bus, or whoever steps a component without it.
+/// Destination of samples: the bus, or the caller that steps a component without it.
 pub(crate) trait SampleSink {
     /// The words of a port's sample; `None` where that is not wired or not due.
     fn words(&mut self, port: usize) -> Result<Option<&mut [u64]>, BusError>;
@@ -174,7 +174,7 @@ impl std::fmt::Debug for OutputSamples<'_> {
 pub trait InputPort<'a>: Sized {
     /// The message that it reads.
     const SCHEMA: &'static Schema;
-    /// Whether it must be wired.
+    /// True if it must be wired.
     const REQUIRED: bool;
     /// The input at port `port`.
     fn read(samples: InputSamples<'a>, port: usize) -> Self;
@@ -204,14 +204,14 @@ impl<'a, T: Message> InputPort<'a> for Option<&'a T> {
 pub trait OutputPort: Sized {
     /// The message that it sends.
     const SCHEMA: &'static Schema;
-    /// Whether it is always there.
+    /// True if it is always sent.
     const REQUIRED: bool;
     /// Writes the output to port `port`.
     ///
     /// # Errors
     /// If shared memory cannot be had.
     fn write(self, samples: &mut OutputSamples<'_>, port: usize) -> Result<(), BusError>;
-    /// What was sent last on port `port`; `None` where a required output was never sent.
+    /// Output that was sent last on port `port`; `None` if a required output was never sent.
     fn read(samples: InputSamples<'_>, port: usize) -> Option<Self>;
 }
 

@@ -1,4 +1,4 @@
-//! What a process of a run does to itself: die with its launcher, stay on its core.
+//! Settings that a process of a run makes for itself: to die with its launcher, to stay on its core.
 
 use crate::error::BusError;
 use crate::join::{GENERATION_VARIABLE, Join, NODE_VARIABLE};
@@ -91,7 +91,7 @@ fn mask_stop_signals(how: libc::c_int) {
     }
 }
 
-/// Whether this process was asked to end.
+/// True if this process was asked to end.
 pub(crate) fn is_terminated() -> bool {
     // A signal is then its host's.
     !crate::hosted::is_hosted() && IS_TERMINATED.get().is_some_and(|flag| flag.load(Ordering::Relaxed))
@@ -114,10 +114,11 @@ fn die_with_parent() {
     }
 }
 
-/// From now on a write beyond the limit on the size of files is an error with a reason, and no end without a word.
-/// What this process starts dies of it as before: the kernel forgets a handler where another program begins.
+/// Makes a write beyond the limit on the size of files an error with a reason. Without it the signal ends the process
+/// silently.
+/// Programs that this process starts still die of it: the kernel drops a handler when another program begins.
 pub fn survive_file_limit() {
-    // Who had it ignored gets such errors already, in everything that is started as well.
+    // A process that ignored the signal gets such errors already, and so does every program that it starts.
     if is_ignored(libc::SIGXFSZ) {
         return;
     }
@@ -166,7 +167,7 @@ pub(crate) fn wait_for_turn() {
 /// Gives process `pid` a niceness, -20 to 19.
 ///
 /// # Errors
-/// What the system says, where it does not allow it.
+/// The system's answer, if it does not allow it.
 pub fn set_nice(pid: u32, nice: i32) -> io::Result<()> {
     let pid = i32::try_from(pid).ok().and_then(rustix::process::Pid::from_raw);
     Ok(rustix::process::setpriority_process(pid, nice)?)
@@ -175,7 +176,7 @@ pub fn set_nice(pid: u32, nice: i32) -> io::Result<()> {
 /// Gives process `pid` a priority under `SCHED_FIFO`, 1 to 99.
 ///
 /// # Errors
-/// What the system says, where it does not allow it.
+/// The system's answer, if it does not allow it.
 pub fn set_fifo(pid: u32, priority: i32) -> io::Result<()> {
     let parameters = libc::sched_param { sched_priority: priority };
     let pid = libc::pid_t::try_from(pid).map_err(io::Error::other)?;

@@ -121,7 +121,7 @@ impl GrantWriter {
     }
 }
 
-/// What one process of a node noted.
+/// Host times noted by one process of a node.
 #[derive(Debug)]
 pub struct TickReader {
     /// `None` if it ended before it could note anything.
@@ -130,7 +130,7 @@ pub struct TickReader {
 }
 
 impl TickReader {
-    /// Opens what generation `generation` of `node` noted in `run_dir`; its process must have ended.
+    /// Opens the file of generation `generation` of `node` in `run_dir`; its process must have ended.
     ///
     /// # Errors
     /// If the file cannot be read or is not one of this plan.
@@ -166,12 +166,12 @@ impl TickReader {
     }
 }
 
-/// What the clock noted.
+/// Grants noted by the clock.
 #[derive(Debug)]
 pub struct GrantReader(Option<RecordReader>);
 
 impl GrantReader {
-    /// Opens what the clock noted in `run_dir`; its process must have ended.
+    /// Opens the clock's file in `run_dir`; its process must have ended.
     ///
     /// # Errors
     /// If the file cannot be read or is not one of this program.
@@ -207,8 +207,8 @@ fn grant(record: &[u64]) -> Grant {
     }
 }
 
-/// Where process number `generation` of `writer` (a node's index, or the clock) notes its ticks. An index and
-/// no name, since names may hold what a file's name may not.
+/// Path of the file in which process number `generation` of `writer` (a node's index, or the clock) notes its ticks.
+/// Nodes have an index here because their names may hold characters that a file's name may not.
 fn path(run_dir: &Path, writer: &str, generation: u32) -> PathBuf {
     run_dir.join(format!("profile-{writer}.{generation}.bin"))
 }

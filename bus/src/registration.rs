@@ -16,9 +16,9 @@ use serde_json::Value;
 pub struct Registration {
     /// Name in manifests.
     pub name: &'static str,
-    /// What it does, in one line.
+    /// Summary in one line.
     pub summary: &'static str,
-    /// What it does for a run.
+    /// Its role in a run.
     pub role: Role,
     /// Parameters that count at the start alone.
     pub initial: &'static [&'static str],
@@ -66,7 +66,7 @@ impl Registration {
     /// Checks `parameters` and the files that they name for a node, without running it.
     ///
     /// # Errors
-    /// What cannot be meant.
+    /// The parameter or file that is not valid.
     pub fn check(&self, parameters: &Value, context: &NodeContext<'_>) -> Result<(), ParameterError> {
         (self.check)(parameters, context)
     }

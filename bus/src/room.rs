@@ -1,4 +1,4 @@
-//! Whether a run finds the shared memory that it takes.
+//! Check that a run has the shared memory that it takes.
 
 use crate::error::BusError;
 use crate::lockstep::segment_bytes;
@@ -27,7 +27,7 @@ fn bytes_at_least(plan: &Plan, known: &[&Schema]) -> (u64, u64) {
 /// `known` are the messages that this program knows.
 ///
 /// # Errors
-/// How much was needed, and how much there is.
+/// The bytes needed and the bytes free, or the limit.
 pub fn require(plan: &Plan, known: &[&Schema]) -> Result<(), BusError> {
     let (total, largest) = bytes_at_least(plan, known);
     let limit = rustix::process::getrlimit(rustix::process::Resource::Fsize).current.unwrap_or(u64::MAX);
@@ -41,7 +41,7 @@ pub fn require(plan: &Plan, known: &[&Schema]) -> Result<(), BusError> {
     )
 }
 
-/// What a signal says about room, for the words about a process that it killed; empty for most.
+/// Text about room for the message about a process that `signal` killed; empty for most signals.
 #[must_use]
 pub fn signal_message(signal: i32) -> String {
     let free = free_bytes(Path::new(SHARED_MEMORY));

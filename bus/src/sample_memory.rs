@@ -8,7 +8,7 @@ use crate::schema::Schema;
 /// Samples by port.
 #[derive(Debug, PartialEq)]
 pub(crate) struct SampleMemory {
-    /// What a port can be written as; empty where nothing is written.
+    /// Sizes in bytes of the messages that can be written, by port; empty if none is written.
     sizes: Vec<usize>,
     pub(crate) samples: Vec<Option<Box<[u64]>>>,
 }

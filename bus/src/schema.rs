@@ -1,4 +1,4 @@
-//! What a message's bytes mean: fields, units, frames, the layout hash, and the ROS 2 definition.
+//! Meaning of a message's bytes: fields, units, frames, the layout hash, and the ROS 2 definition.
 
 use crate::random::{FNV_OFFSET, fnv1a};
 use serde::{Deserialize, Serialize};
@@ -219,7 +219,7 @@ impl Extent {
 
 /// A type that can be a field of a message: plain bytes without padding.
 pub trait FieldType: bytemuck::Pod {
-    /// What the bytes are.
+    /// Type of the bytes.
     const KIND: Kind;
 }
 
@@ -242,7 +242,7 @@ impl<T: FieldType, const N: usize> FieldType for [T; N] {
 pub struct Field {
     /// Name as ROS 2 tools show it.
     pub name: &'static str,
-    /// What it is, in one line.
+    /// Description in one line.
     pub doc: &'static str,
     /// Unit of its numbers, `1` where they have none, empty where the enclosing field states it.
     pub unit: &'static str,
@@ -267,7 +267,7 @@ pub struct Field {
 pub struct Schema {
     /// Three-part ROS 2 name, `package/msg/Name`.
     pub type_name: &'static str,
-    /// What it is, in one line.
+    /// Description in one line.
     pub doc: &'static str,
     /// Size in bytes.
     pub size: usize,
@@ -284,7 +284,7 @@ impl Schema {
         fnv1a(self.layout().as_bytes(), FNV_OFFSET)
     }
 
-    /// Where the message holds its time stamp: its first `builtin_interfaces/Time`.
+    /// Offset of the message's time stamp in bytes: its first `builtin_interfaces/Time`.
     #[must_use]
     pub fn stamp_offset(&self) -> Option<usize> {
         self.fields.iter().find_map(|field| match field.kind {
@@ -318,7 +318,7 @@ impl Schema {
         bytes
     }
 
-    /// Whether the message, or one nested in it, has a string or a definition of its own.
+    /// True if the message, or one nested in it, has a string or a definition of its own.
     #[must_use]
     pub fn has_text(&self) -> bool {
         let is_text = |field: &Field| match field.kind {

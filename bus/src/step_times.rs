@@ -7,7 +7,7 @@ const UNIT_NS: u64 = 16;
 /// Buckets to an octave, as a power of two.
 const OCTAVE_BITS: u32 = 3;
 
-/// How often a node's step took how long, since its first tick or since an earlier look.
+/// Histogram of the durations of a node's steps, since its first tick or since an earlier look.
 ///
 /// Counts wrap; the difference of two looks is right as long as fewer than 2³² steps lie between them.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -51,7 +51,7 @@ impl Tick<'_> {
         self.inputs[input.index].host_times_ns(self.locals)
     }
 
-    /// Whether `output` is due at this tick.
+    /// True if `output` is due at this tick.
     #[must_use]
     pub fn is_due<T>(&self, output: Output<T>) -> bool {
         self.outputs[output.index].is_due(self.tick)

@@ -1,8 +1,9 @@
-//! A node whose steps take simulated time: what it computes is sent when it is done, and steps that are due meanwhile are
-//! skipped.
+//! A node whose steps take simulated time: its outputs are sent when a step is done, and steps that are due meanwhile
+//! are skipped.
 //!
-//! What is under way is kept in words behind the component's state, so that whoever takes the node's place goes on with
-//! it: the tick at which it is done, then for each output the sample that is sent and the one that is to follow.
+//! The step under way is kept in words behind the component's state, so that a process that takes the node's place
+//! goes on with it. The words hold the tick at which the step is done, then for each output the sample sent and the
+//! next one.
 
 use crate::computing_time::ComputingTime;
 use crate::error::BusError;
@@ -12,7 +13,7 @@ use crate::random::{Stream, stream};
 
 /// Words in front of the samples.
 const HEAD_WORDS: usize = 2;
-/// The tick at which what is under way is done, plus one; 0 where nothing is.
+/// The tick at which the step under way is done, plus one; 0 if there is none.
 const DONE: usize = 0;
 /// 1 from the first sample on.
 const HAS_SENT: usize = 1;
@@ -28,12 +29,12 @@ pub(crate) struct Timing {
     period_ticks: u32,
 }
 
-/// What becomes of a due tick.
+/// Treatment of a due tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Due {
     /// It is computed.
     Step,
-    /// The step before is under way: nothing is read and nothing computed.
+    /// The step before is under way: no inputs are read and nothing is computed.
     Skipped,
 }
 

@@ -41,7 +41,7 @@ pub(crate) const BORROWED_SAMPLES: usize = 2;
 /// service, 92 KiB and 304 KiB for all of a run; so there is room for what several processes make at a time.
 pub(crate) const PORT_MARGIN_BYTES: u64 = 256 << 10;
 
-/// What travels beside a sample: its place in the run, and host times that no recording holds.
+/// Header of a sample: its place in the run, and host times that no recording holds.
 #[derive(Clone, Copy, Debug, Default, ZeroCopySend)]
 #[repr(C)]
 pub struct SampleHeader {
@@ -72,7 +72,7 @@ pub fn limit_transport_log() {
     set_log_level(LogLevel::Error);
 }
 
-/// What iceoryx2 refused, by the name that it gives to it.
+/// Error of iceoryx2, by the name that it gives to it.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct IceoryxError(String);
@@ -103,7 +103,7 @@ fn config(run_dir: &Path, run_id: &str) -> Result<Config, IceoryxError> {
 /// Gives back what dead processes of the run hold: their ports and their shared memory.
 ///
 /// # Errors
-/// What iceoryx2 refuses.
+/// An error of iceoryx2.
 pub fn reap_dead(run_dir: &Path, run_id: &str) -> Result<(), IceoryxError> {
     let config = config(run_dir, run_id)?;
     let mut failure = None;
@@ -259,8 +259,8 @@ fn make_node_counter(config: &Config, run_id: &str) -> std::io::Result<()> {
     }
 }
 
-/// Whether iceoryx2 can keep the files of run `run_id` below `run_dir`: it takes no path beyond 255 bytes, even where it
-/// opens none, and not every character; it panics over the first.
+/// True if iceoryx2 can keep the files of run `run_id` below `run_dir`. It takes no path beyond 255 bytes, even if it
+/// opens none, and panics over longer ones. It does not take every character.
 #[must_use]
 pub fn takes_run_dir(run_dir: &Path, run_id: &str) -> bool {
     let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"/._-+,=@~ ".contains(&byte);
@@ -450,7 +450,7 @@ mod tests {
         assert!(error.contains("another process publishes on the topic"), "{error}");
     }
 
-    /// What lies in shared memory for `run`: the name, and what the kernel says of it.
+    /// Shared-memory files of `run`: name and metadata.
     fn files(run: &Run) -> Vec<(String, std::fs::Metadata)> {
         let entries = std::fs::read_dir("/dev/shm").unwrap().flatten();
         let named = entries.map(|entry| (entry.file_name().to_string_lossy().into_owned(), entry));

@@ -1,4 +1,4 @@
-//! Whatever a manifest gives as initial value, or stands in the place of a plan: it fits or is refused in words.
+//! Any initial value of a manifest, and any content in the place of a plan, fits or is refused with a message.
 
 use bus::Message;
 use bus::initial::sample;

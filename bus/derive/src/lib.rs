@@ -158,7 +158,7 @@ fn expand_outputs(input: &DeriveInput) -> Result<Tokens> {
     })
 }
 
-/// What a field declares, whose type is a `port`.
+/// Declaration of the port of a field whose type is a `port`.
 fn port_spec(field: &Field, port: &Tokens) -> Tokens {
     let Field { ident, ty, attrs, .. } = field;
     let (name, doc) = (ident.as_ref().map(ToString::to_string), doc_text(attrs));
@@ -256,7 +256,7 @@ fn field_schema(input: &DeriveInput, field: &Field) -> Result<Tokens> {
     })
 }
 
-/// Whether `ty` is `f32`, `f64`, or an array of either.
+/// True if `ty` is `f32`, `f64`, or an array of either.
 fn is_float(ty: &Type) -> bool {
     match ty {
         Type::Array(array) => is_float(&array.elem),
@@ -265,7 +265,7 @@ fn is_float(ty: &Type) -> bool {
     }
 }
 
-/// Whether `name` matches `^[a-z](_?[a-z0-9]+)*$`, the rule of ROS 2 field names.
+/// True if `name` matches `^[a-z](_?[a-z0-9]+)*$`, the rule of ROS 2 field names.
 fn is_field_name(name: &str) -> bool {
     name.starts_with(|c: char| c.is_ascii_lowercase())
         && name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_')

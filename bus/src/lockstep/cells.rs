@@ -1,12 +1,12 @@
 //! The layout of the control segment: cells of named atomics, each on cache lines of its own.
 //!
-//! What is written together by one party stands in one cell, and what the others read at every tick is not in a line
-//! that somebody else writes at every tick.
+//! Words that one party writes together stand in one cell. Words that other parties read at every tick are not in a
+//! cache line that somebody writes at every tick.
 
 use crate::step_times::BUCKETS;
 use std::sync::atomic::{AtomicU32, AtomicU64};
 
-/// Declares the cells, and what they declare as a text, of which the layout's number is made.
+/// Declares the cells, and a text of the declarations, from which the layout's number is computed.
 macro_rules! cells {
     ($($(#[$about:meta])* struct $cell:ident { $($(#[$field_about:meta])* $field:ident: $type:ty,)* })*) => {
         $(
@@ -30,8 +30,8 @@ cells! {
         notices: NoticeCell,
     }
 
-    /// What everybody reads at every tick; written at the start and at the end of the run, and when the membership
-    /// changes.
+    /// Words that every party reads at every tick. They are written at the start and at the end of the run, and when
+    /// the membership changes.
     struct RunCell {
         /// The layout's number, once all is there.
         magic: AtomicU32,
@@ -49,7 +49,7 @@ cells! {
         checkpoint_asks: AtomicU32,
     }
 
-    /// What the clock says.
+    /// Words written by the clock.
     struct ClockCell {
         /// Ticks that may be computed.
         granted: AtomicU32,
@@ -66,7 +66,7 @@ cells! {
         cpu_ns: AtomicU64,
     }
 
-    /// What the clock is asked for.
+    /// Requests to the clock.
     struct SteeringCell {
         /// Counts what changes here; the clock sleeps on it in a hold.
         changes: AtomicU32,
@@ -80,7 +80,7 @@ cells! {
         pace: AtomicU64,
     }
 
-    /// What the supervisor is told: that there is something to look at.
+    /// Notices for the supervisor that there is something to look at.
     struct NoticeCell {
         /// Counts the notices; the supervisor sleeps on it.
         count: AtomicU32,
@@ -108,7 +108,7 @@ cells! {
         published: AtomicU32,
         /// The newest membership that it has acknowledged.
         epoch: AtomicU32,
-        /// What it goes on from, a [`TransferOutcome`](super::TransferOutcome).
+        /// Origin of its state, a [`TransferOutcome`](super::TransferOutcome).
         transfer: AtomicU32,
         /// Deadlines at which it was late.
         late: AtomicU32,
@@ -151,7 +151,7 @@ cells! {
     }
 }
 
-/// What stands at the start of a segment of this layout: processes of different versions do not fly together.
+/// Number at the start of a segment of this layout: processes of different versions do not fly together.
 pub(super) const MAGIC: u32 = number_of(DECLARATIONS) ^ VERSION;
 
 /// To be raised when the queues change, or what a word means, and the declarations above do not.

@@ -1,4 +1,4 @@
-//! What the clock does to a run: it leads the processes through the phases, grants ticks, waits and holds.
+//! Actions of the clock on a run: it leads the processes through the phases, grants ticks, waits and holds.
 
 use super::live_view::LiveView;
 use super::states::{Phase, Waited};

@@ -1,4 +1,4 @@
-//! What a run shows of itself while it flies.
+//! State of a run as others see it in flight.
 
 use super::segment::Segment;
 use super::states::{Phase, SlotState, TransferOutcome};
@@ -9,7 +9,7 @@ use crate::step_times::StepTimes;
 use std::sync::atomic::AtomicU32;
 use std::sync::atomic::Ordering::{Acquire, Relaxed};
 
-/// The view of whoever looks at a run.
+/// The view of an observer of a run.
 #[derive(Debug)]
 pub struct LiveView {
     pub(super) segment: Segment,
@@ -36,13 +36,13 @@ impl LiveView {
         self.segment.head().run.end_tick.load(Acquire)
     }
 
-    /// Whether the run was aborted.
+    /// True if the run was aborted.
     #[must_use]
     pub fn is_aborted(&self) -> bool {
         self.segment.is_aborted()
     }
 
-    /// Whether a stop was asked for.
+    /// True if a stop was requested.
     #[must_use]
     pub fn is_stop_requested(&self) -> bool {
         self.segment.head().steering.is_stop_requested.load(Acquire) != 0
@@ -97,8 +97,8 @@ impl LiveView {
         Some(self.segment.head().clock.held_at.load(Acquire)).filter(|&tick| tick != NEVER)
     }
 
-    /// Whether the clock has to act next: every tick that it granted is completed, and no hold keeps it from granting
-    /// more, or it is still in a hold that was lifted.
+    /// True if the clock has to act next. Every tick that it granted is completed and no hold prevents the next
+    /// grant, or it is still in a hold that was lifted.
     #[must_use]
     pub fn awaits_clock(&self) -> bool {
         let granted = self.granted_ticks();
@@ -147,7 +147,7 @@ impl LiveView {
         self.segment.topics()[topic].gaps.load(Relaxed)
     }
 
-    /// What `slot` holds.
+    /// State of `slot`.
     #[must_use]
     pub fn slot_state(&self, slot: usize) -> SlotState {
         SlotState::of(self.segment.slots()[slot].state.load(Acquire))
@@ -158,7 +158,7 @@ impl LiveView {
         (0..self.segment.slots().len()).filter(|&slot| self.slot_state(slot) == SlotState::Taken)
     }
 
-    /// Whether the process in `slot` has reached `phase`.
+    /// True if the process in `slot` has reached `phase`.
     #[must_use]
     pub fn is_ready(&self, slot: usize, phase: Phase) -> bool {
         self.segment.slots()[slot].ready.load(Acquire) >= phase as u32
@@ -170,7 +170,7 @@ impl LiveView {
         self.segment.slots()[slot].epoch.load(Acquire)
     }
 
-    /// What the process in `slot` goes on from.
+    /// Origin of the state with which the process in `slot` goes on.
     #[must_use]
     pub fn transfer(&self, slot: usize) -> TransferOutcome {
         TransferOutcome::of(self.segment.slots()[slot].transfer.load(Acquire))
@@ -194,7 +194,7 @@ impl LiveView {
         self.done(slot).min(self.end_tick())
     }
 
-    /// Whether the process in `slot` has completed the run.
+    /// True if the process in `slot` has completed the run.
     #[must_use]
     pub fn has_completed(&self, slot: usize) -> bool {
         self.done(slot) >= self.end_tick()
@@ -233,7 +233,8 @@ impl LiveView {
         process(&self.segment.slots()[slot].process)
     }
 
-    /// How long the steps of the process in `slot` took, from its inputs being taken to its outputs being computed.
+    /// Histogram of the durations of the steps of the process in `slot`, from taking the inputs to the computed
+    /// outputs.
     #[must_use]
     pub fn step_times(&self, slot: usize) -> StepTimes {
         let counts = &self.segment.slots()[slot].steps.counts;
@@ -251,13 +252,13 @@ impl LiveView {
         awaited.map(|(input, _)| input.topic)
     }
 
-    /// Whether the process in `slot` sleeps until that in the other slot of its node has come as far as it must.
+    /// True if the process in `slot` sleeps until the one in the other slot of its node has advanced far enough.
     #[must_use]
     pub fn awaits_other(&self, slot: usize) -> bool {
         is_asleep(&self.segment.slots()[slot].other_waiter.word)
     }
 
-    /// Whether the process in `slot` sleeps until the clock grants its next tick.
+    /// True if the process in `slot` sleeps until the clock grants its next tick.
     #[must_use]
     pub fn awaits_grant(&self, slot: usize) -> bool {
         is_asleep(&self.segment.slots()[slot].grant_waiter.word)

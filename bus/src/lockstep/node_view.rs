@@ -1,4 +1,4 @@
-//! What a process of a node does to a run: it joins, waits for what its tick needs, and says how far it has come.
+//! Actions of a node's process on a run: it joins, waits for the needs of its tick, and reports its progress.
 
 use super::live_view::LiveView;
 use super::states::{Phase, SlotState, TransferOutcome, Waited};
@@ -97,18 +97,18 @@ impl NodeView {
         self.segment.slots()[self.slot].transfer.store(transfer as u32, Release);
     }
 
-    /// Whether the run was aborted, and what this process waits for will not come. Nobody waits for a node without
-    /// outputs, so it stays until those that send have left: what they still send is not lost.
+    /// True if the run was aborted and the samples that this process waits for will not come. No process waits for a
+    /// node without outputs. Such a node stays until the senders have left, so that none of their samples is lost.
     pub(crate) fn is_abandoned(&self) -> bool {
         if self.has_outputs { self.is_aborted() } else { self.segment.is_drained() }
     }
 
-    /// Whether a process computes in the other slot of this node.
+    /// True if a process computes in the other slot of this node.
     pub(crate) fn other_computes(&self) -> bool {
         self.slot_state(self.other_slot) == SlotState::Taken
     }
 
-    /// The sequence of `need`, and what this process sleeps on for it.
+    /// The sequence of `need`, and the word on which this process sleeps for it.
     fn sequence_and_waiter(&self, need: Need) -> (&AtomicU32, &AtomicU32) {
         let (segment, slot) = (&self.segment, &self.segment.slots()[self.slot]);
         let waiters = |input: usize| &segment.inputs()[self.first_input + input];

@@ -20,7 +20,7 @@ pub(super) struct Segment {
     counts: Counts,
 }
 
-/// How many cells of each kind follow the head.
+/// Numbers of cells of each kind behind the head.
 #[derive(Clone, Copy, Debug)]
 struct Counts {
     topics: usize,
@@ -130,12 +130,13 @@ impl Segment {
         words.chain([&head.run.phase, &head.steering.changes]).for_each(wake::Word::wake);
     }
 
-    /// Whether the run was aborted, or this instance is to end: what is not there yet may never come.
+    /// True if the run was aborted, or this instance is to end: a sample that is not there yet may never come.
     pub(super) fn is_aborted(&self) -> bool {
         self.head().run.abort.load(Acquire) >= Abort::Told as u32 || hosted::is_cancelled()
     }
 
-    /// Whether that is so, and those that send have left, too: what is not there yet never comes.
+    /// True if the run was aborted and the senders have left, or this instance is to end: a sample that is not there
+    /// yet never comes.
     pub(super) fn is_drained(&self) -> bool {
         self.head().run.abort.load(Acquire) >= Abort::Drained as u32 || hosted::is_cancelled()
     }

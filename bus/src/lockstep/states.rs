@@ -1,8 +1,8 @@
-//! What the words of the control segment say that are no counts.
+//! Words of the control segment that are not counts.
 
 use crate::error::BusError;
 
-/// How far the processes of a run have come together.
+/// Common progress of the processes of a run in joining.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd)]
 #[repr(u32)]
 pub enum Phase {
@@ -14,22 +14,22 @@ pub enum Phase {
     Running = 2,
 }
 
-/// How far the end of an aborted run has come.
+/// Progress of the end of an aborted run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub(super) enum Abort {
-    /// Nobody waits for what is not there yet, but for a node without outputs: those that send may still send what they
-    /// have the inputs of.
+    /// Only nodes without outputs still wait for samples. The senders may still send the samples whose inputs they
+    /// have.
     Told = 1,
-    /// Those that send have left: nothing more comes.
+    /// The senders have left: no more samples come.
     Drained = 2,
 }
 
-/// What a slot of a node holds.
+/// State of a slot of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum SlotState {
-    /// Nobody.
+    /// No process.
     Empty = 0,
     /// A process that may make its connections.
     Joining = 1,
@@ -37,7 +37,7 @@ pub enum SlotState {
     Taken = 2,
 }
 
-/// What the state transfer to a backup came to: what it goes on from.
+/// Outcome of the state transfer to a backup: the origin of its state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum TransferOutcome {
@@ -74,17 +74,17 @@ fn one_of<S: Copy + std::fmt::Debug, const N: usize>(states: [S; N], word: u32) 
     })
 }
 
-/// Why a wait ended.
+/// Reason why a wait ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Waited {
-    /// What was waited for is there.
+    /// The awaited count or state was reached.
     Reached,
-    /// The run is over (or aborted), and it will not come.
+    /// The run is over or aborted: it will not be reached.
     Over,
 }
 
 impl Waited {
-    /// Where nothing but an abort ends the wait early.
+    /// Returns an error if the wait ended early; for waits that only an abort ends early.
     pub(crate) fn or_aborted(self) -> Result<(), BusError> {
         if self == Self::Reached { Ok(()) } else { Err(BusError::Aborted) }
     }

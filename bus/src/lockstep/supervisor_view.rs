@@ -1,4 +1,5 @@
-//! What the supervisor does to a run: it makes the segment, changes the membership, steers the clock, and ends the run.
+//! Actions of the supervisor on a run: it makes the segment, changes the membership, steers the clock, and ends the
+//! run.
 
 use super::live_view::LiveView;
 use super::segment::Segment;

@@ -9,11 +9,11 @@ use std::sync::atomic::AtomicU32;
 use std::sync::atomic::Ordering::{Acquire, Release};
 use std::time::Duration;
 
-/// How long a reader with `wait = "adaptive"` polls before it sleeps: about five context switches.
+/// Time for which a reader with `wait = "adaptive"` polls before it sleeps: about five context switches.
 const ADAPTIVE_SPIN_NS: u64 = 10_000;
 /// Polls between two looks at the clock or two yields.
 const POLLS: u32 = 64;
-/// How long a process sleeps for a state before it looks whether the run was aborted.
+/// Longest sleep of a process that waits for a state, before it checks for an abort.
 const STATE_NAP: Duration = Duration::from_millis(50);
 
 /// Waits until `sequence` reaches `count`, or `is_over` says that it never will.

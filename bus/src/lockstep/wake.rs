@@ -14,9 +14,9 @@ use std::time::Duration;
 
 /// The value of a waiter on which nobody sleeps.
 pub(super) const AWAKE: u32 = u32::MAX;
-/// The tick of what does not come: of a hold while the clock runs.
+/// The tick of an event that does not come: of a hold while the clock runs.
 pub(super) const NEVER: u32 = u32::MAX;
-/// How long the clock sleeps in a hold before it looks whether the run was stopped.
+/// Longest sleep of the clock in a hold before it checks for a stop.
 const HOLD_NAP: Duration = Duration::from_millis(100);
 
 /// A word of memory that parties share and can sleep on: a futex, or what stands for one in a model.

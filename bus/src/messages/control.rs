@@ -1,4 +1,4 @@
-//! What guidance asks for beyond the pilot's set point, and what controllers say of themselves.
+//! Messages of guidance beyond the pilot's set point, and status messages of controllers.
 
 use super::{Time, Vector3};
 use crate::{Bounded, Message};

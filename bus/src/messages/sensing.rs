@@ -1,4 +1,4 @@
-//! What sensors beyond the IMU report, and what estimators make of it.
+//! Messages of sensors other than the IMU, and of estimators.
 //!
 //! A sensor sends a sample at each of its periods, as every publisher does. `valid` is 1 in a sample that holds
 //! a measurement and 0 where it was lost; the other fields then hold what was measured last.

@@ -10,7 +10,7 @@
 use super::{exponent_and_fraction, uniform};
 use rand_core::Rng;
 
-/// Where the bottom layer ends and the tail begins.
+/// Boundary between the bottom layer and the tail.
 const TAIL: f64 = EDGES[1];
 
 /// The next draw from the normal distribution of mean 0 and variance 1.
