@@ -24,7 +24,7 @@ const FRONT: f64 = 0.38;
 /// Corners that stand for the circle of a propeller in an outline: tuned, no source.
 const CORNERS: u32 = 24;
 
-/// What a part is made of.
+/// Shape of a part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Shape {
     /// A box with these edges along its own axes, in metres.
@@ -40,12 +40,12 @@ pub enum Shape {
     Ball(f64),
 }
 
-/// How a part is coloured.
+/// Colour of a part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Paint {
     /// As the frame.
     Frame,
-    /// As what is in front.
+    /// As the front.
     Front,
     /// As a propeller that turns counter-clockwise, seen from above.
     CounterClockwise,
@@ -56,15 +56,15 @@ pub enum Paint {
 /// A part of a vehicle, or of what it touches with.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Part {
-    /// What it is called; the rotors' parts begin with the rotor's name in the vehicle file.
+    /// Name; the rotors' parts begin with the rotor's name in the vehicle file.
     pub name: String,
-    /// What it is made of.
+    /// Its shape.
     pub shape: Shape,
     /// Its middle in the body frame, in metres.
     pub centre_B_m: Vector3<f64>,
-    /// How it is turned in the body frame, in rad: about the fixed axes x, y and z, one after another.
+    /// Its orientation in the body frame, in rad: rotations about the fixed axes x, y and z, one after another.
     pub roll_pitch_yaw_rad: [f64; 3],
-    /// How it is coloured.
+    /// Its colour.
     pub paint: Paint,
 }
 
@@ -81,7 +81,7 @@ pub struct Part {
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Body {
-    /// What the vehicle is called.
+    /// Name of the vehicle.
     pub name: String,
     /// Mass in kg.
     pub mass_kg: f64,
@@ -89,9 +89,9 @@ pub struct Body {
     pub inertia_B_kg_m2: Matrix3<f64>,
     /// Radius of its propellers, in metres.
     pub propeller_radius_m: f64,
-    /// What is seen.
+    /// Parts that are seen.
     pub seen: Vec<Part>,
-    /// What touches: that of the backend `rapier`.
+    /// Parts that touch: those of the backend `rapier`.
     pub touching: Vec<Part>,
     centre_B_m: Vector3<f64>,
     rotors_B_m: Vec<Vector3<f64>>,
@@ -99,8 +99,8 @@ pub struct Body {
 }
 
 impl Body {
-    /// The body of a vehicle as it flies, its effects included; nothing where all rotors are in one place, which gives the
-    /// vehicle no size.
+    /// The body of a vehicle as it flies, its effects included; `None` if all rotors are in one place, which gives
+    /// the vehicle no size.
     #[must_use]
     pub fn of(airframe: &Airframe) -> Option<Self> {
         let (vehicle, hull) = (airframe.vehicle(), Hull::of(airframe));
@@ -141,14 +141,14 @@ impl Body {
         arms.chain(self.rotors_B_m.iter().map(circle)).chain([nose]).collect()
     }
 
-    /// How far its propellers reach from the middle of its rotors, in metres.
+    /// Distance to which its propellers reach from the middle of its rotors, in metres.
     #[must_use]
     pub fn reach_m(&self) -> f64 {
         self.reach_m
     }
 }
 
-/// What the parts are measured by.
+/// Measures for the sizes of the parts.
 struct Size {
     hull: Hull,
     arm_m: f64,

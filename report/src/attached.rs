@@ -10,10 +10,10 @@ use std::path::Path;
 use toml::{Table, Value};
 use vehicles::Vehicle;
 
-/// What a recording has attached: the manifest, and the files that it names.
+/// Files attached to a recording: the manifest, and the files that it names.
 #[derive(Debug)]
 pub struct Attached {
-    /// The manifest with all that it includes.
+    /// The manifest with its includes.
     manifest: Table,
     /// The same file by file: the included ones first.
     tables: Vec<Table>,

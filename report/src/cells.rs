@@ -5,7 +5,7 @@ use std::fmt;
 /// A table: what its columns are called, and its rows. Its text has columns as wide as their longest cell.
 pub(crate) struct Cells {
     pub headings: Vec<String>,
-    /// Whether a column holds numbers, which stand right.
+    /// True for a column of numbers, which are aligned right.
     pub is_number: Vec<bool>,
     pub rows: Vec<Vec<String>>,
 }

@@ -1,4 +1,4 @@
-//! What an identification found: its page, and its predictions held against the same flown on the bus.
+//! Results of an identification: its page, and its predictions compared with flights on the bus.
 
 mod on_bus;
 mod page;

@@ -1,21 +1,21 @@
-//! What recordings and runs show: verdicts, summaries, figures, profiles and pages.
+//! Reports on recordings and runs: verdicts, summaries, figures, profiles and pages.
 //!
-//! | room | what it holds |
+//! | room | content |
 //! |---|---|
 //! | [`judge`] | pass conditions and comparisons, evaluated on a recording |
 //! | `response` | lag and gain of a signal behind another |
-//! | [`shadow`] | how outputs went on at take-overs, and what shadows asked for otherwise |
-//! | [`summary`] | all that there is to say about a run, as text and as JSON |
-//! | [`airframe`] | the body of a vehicle: what is seen of it, and what of it touches |
+//! | [`shadow`] | steps of outputs at take-overs, and differences of shadows |
+//! | [`summary`] | the summary of a run, as text and as JSON |
+//! | [`airframe`] | the body of a vehicle: the parts that are seen, and the parts that touch |
 //! | [`attached`] | the vehicles whose files a recording has attached |
 //! | [`topics`] | names of topics and of message types |
 //! | [`urdf`] | a vehicle as other tools show it |
 //! | [`plot`] | curves over time and paths in space, as a page, PNG or SVG |
-//! | [`profile`] | where the host time of ticks goes |
+//! | [`profile`] | host time of ticks, part by part |
 //! | [`validate`] | measured flights flown again, and their errors at the ends of windows |
 //! | [`top`] | a live run in the terminal |
 //! | [`identification`] | the page of an identification |
-//! | [`page`] | what all pages share |
+//! | [`page`] | the common part of all pages |
 //!
 //! Texts, JSON and bytes are returned: but for [`top::watch`], nothing here prints.
 #![forbid(unsafe_code)]

@@ -6,7 +6,7 @@
 
 use serde_json::Value;
 
-/// What every page has near its start.
+/// Mark near the start of every page.
 pub const MARK: &str = r#"<meta name="generator" content="hummingbus">"#;
 
 /// plotly.js with lines, bars and pies.

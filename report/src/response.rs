@@ -1,32 +1,34 @@
-//! How one sampled signal follows another: lag and gain.
+//! Lag and gain of one sampled signal behind another.
 //!
-//! The lag is where the normalized cross-correlation (Pearson's coefficient of the samples that overlap) is largest;
-//! the gain is the slope of the line of least squares through field over reference, shifted by that lag. Offsets of
-//! either change neither. After Ljung, System Identification, 2nd ed. 1999, section 6.1 (correlation analysis).
+//! The lag is the shift at which the normalized cross-correlation (Pearson's coefficient of the samples that overlap)
+//! is largest. The gain is the slope of the line of least squares through field over reference, shifted by that lag.
+//! Offsets of either signal change neither. After Ljung, System Identification, 2nd ed. 1999, section 6.1
+//! (correlation analysis).
 
 use std::fmt;
 use std::ops::Range;
 
-/// Below this correlation less than a quarter of the field's variance is the reference's: that is no answer to it. Own choice.
+/// Below this correlation the reference explains less than a quarter of the field's variance: that is no response.
+/// Own choice.
 const LEAST_CORRELATION: f64 = 0.5;
 
-/// How a field follows a reference.
+/// Lag and gain of a field behind a reference.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Response {
     /// Samples that the field is behind the reference; negative where it is ahead.
     pub lag_samples: isize,
-    /// How many times the reference it is.
+    /// Slope of the line of least squares of the field over the reference.
     pub gain: f64,
 }
 
-/// Why there is no lag.
+/// Reason why there is no lag.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum NoResponse {
     /// Fewer samples than the reach needs: at the greatest shift half of them are to overlap.
     TooShort,
-    /// The field does not change, or is no number somewhere.
+    /// The field does not change, or is NaN somewhere.
     ConstantField,
-    /// The reference does not change, or is no number somewhere.
+    /// The reference does not change, or is NaN somewhere.
     ConstantReference,
     /// The correlation still rises at the end of the reach.
     AtTheEnd,

@@ -1,5 +1,5 @@
-//! What backups did: how outputs went on at a take-over, and how a shadow's samples differ from those of the process
-//! that it shadows.
+//! Effects of backups: the steps of outputs at a take-over, and the differences between the samples of a shadow and
+//! those of the process that it shadows.
 
 use anyhow::{Result, bail};
 use bus::plan::Plan;
@@ -47,7 +47,7 @@ pub struct Difference {
     pub primary_deviation: f64,
 }
 
-/// What there is to say about a backup.
+/// Report about a backup.
 ///
 /// ```
 /// use report::shadow::Replacement;
@@ -71,21 +71,21 @@ pub struct Difference {
 /// ```
 #[derive(Debug, Serialize)]
 pub struct Replacement {
-    /// What became of it.
+    /// Its report from the run.
     #[serde(flatten)]
     pub report: Report,
-    /// How the outputs went on at its take-over.
+    /// Steps of the outputs at its take-over.
     pub steps: Vec<Step>,
 }
 
 impl Replacement {
-    /// Whether it was planned and did not come about, which fails the run.
+    /// True if it was planned and did not take part, which fails the run.
     pub(crate) fn has_failed(&self) -> bool {
         self.report.is_planned && self.report.refused.is_some()
     }
 }
 
-/// How an output went on at a take-over.
+/// Step of an output at a take-over.
 ///
 /// ```
 /// use report::shadow::Step;
@@ -106,7 +106,8 @@ pub struct Step {
     pub step: f64,
     /// The same one sample earlier, between two samples of the predecessor.
     pub step_before: f64,
-    /// What the backup asked for otherwise than its predecessor in its last shadow sample.
+    /// Difference between the backup's last shadow sample and its predecessor's sample of that tick, without its
+    /// sign.
     pub law_difference: Option<f64>,
 }
 

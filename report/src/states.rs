@@ -13,9 +13,9 @@ const VECTORS: [(&str, &[&str]); 4] = [
     ("angular_velocity", &["x", "y", "z"]),
 ];
 
-/// Fields of a state without its rates.
+/// Number of fields of a state without its rates.
 pub(crate) const FIELDS_OF_POSE: usize = 10;
-/// All fields of a state.
+/// Number of fields of a state.
 pub(crate) const FIELDS_OF_STATE: usize = 13;
 
 /// The states of one topic over time.

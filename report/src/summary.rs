@@ -18,12 +18,12 @@ use toml::Spanned;
 /// Replacements that the text shows.
 const REPLACEMENTS_SHOWN: usize = 5;
 
-/// What there is to say about a run: its text is for people, its JSON for programs.
+/// Summary of a run: its text is for people, its JSON for programs.
 #[derive(Debug, Serialize)]
 pub struct Summary {
     /// Name of the manifest.
     pub manifest: String,
-    /// Whether the run completed and every condition held.
+    /// True if the run completed and every condition held.
     pub passed: bool,
     /// The first tick of the run: that of the checkpoint from which it went on, or 0.
     pub first_tick: u32,
@@ -37,7 +37,7 @@ pub struct Summary {
     pub ticks_per_s: f64,
     /// Simulated time per host time.
     pub real_time_factor: f64,
-    /// Whether the run was stopped before its end.
+    /// True if the run was stopped before its end.
     pub stopped_early: bool,
     /// Deadlines missed.
     pub missed_deadlines: u32,
@@ -59,16 +59,16 @@ pub struct Summary {
     pub measures: Vec<Verdict>,
     /// Comparisons with measured states.
     pub compare: Vec<WindowErrors>,
-    /// Who joined the run, took over, or was refused.
+    /// Backups that joined the run, took over, or were refused.
     #[serde(rename = "successions")]
     pub replacements: Vec<Replacement>,
-    /// What shadows asked for otherwise than those they shadowed.
+    /// Differences between shadows and the processes that they shadowed.
     pub shadows: Vec<Difference>,
-    /// What `check` found odd; told before the flight.
+    /// Warnings of `check`; printed before the flight.
     pub warnings: Vec<Diagnostic>,
 }
 
-/// What there is to say about a process.
+/// Summary of a process.
 ///
 /// ```
 /// use report::summary::ProcessSummary;
@@ -86,7 +86,7 @@ pub struct ProcessSummary {
     pub late: u32,
 }
 
-/// What became of the steps of a process whose computing time is simulated; its text is a line of the summary.
+/// Steps of a process whose computing time is simulated; its text is a line of the summary.
 ///
 /// ```
 /// use report::summary::OverrunSummary;

@@ -27,7 +27,7 @@ use std::time::{Duration, Instant};
 
 /// Host time between two looks.
 const REFRESH: Duration = Duration::from_millis(250);
-/// What rates, shares and percentiles speak of: about the last second.
+/// Looks over which rates, shares and percentiles are computed: about the last second.
 const LOOKS: usize = 5;
 /// The same for `--once`.
 const ONCE: Duration = Duration::from_millis(500);

@@ -6,7 +6,7 @@
 use crate::airframe::{Body, Paint, Part, Shape};
 use std::fmt::Write as _;
 
-/// What is within the first bytes of every such file: no other file is replaced by one.
+/// Mark within the first bytes of every such file: a file without it is not replaced.
 pub const MARK: &str = "<!-- A vehicle of hummingbus";
 
 /// The names of the colours, and red, green, blue and opacity. Of Okabe and Ito, to be told apart without colour vision;

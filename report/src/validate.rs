@@ -23,7 +23,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use vehicles::Vehicle;
 
-/// How flights are flown again.
+/// Replay of measured flights on the bus, with its settings.
 ///
 /// ```
 /// use report::validate::{Errors, Validation};
@@ -46,7 +46,7 @@ pub struct Validation<'a> {
     pub components: Registry,
     /// Ends it.
     pub stop: &'a StopToken,
-    /// Where the runs' files are kept; they are gone afterwards where absent.
+    /// Folder in which the runs' files are kept; they are removed afterwards where absent.
     pub keep: Option<&'a Path>,
 }
 
@@ -103,7 +103,7 @@ fn require_distinct_folders(set: &FlightSet) -> Result<()> {
     Ok(())
 }
 
-/// What reports call the vehicles: the names of their files, or the whole paths where the names are the same.
+/// Names of the vehicles in reports: those of their files, or the whole paths if the names are the same.
 fn labels(vehicles: &[&Path]) -> Vec<String> {
     let stem = |path: &&Path| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let stems: Vec<String> = vehicles.iter().map(stem).collect();

@@ -1,4 +1,4 @@
-//! What an identification predicts, flown on the bus.
+//! Flights on the bus with the declared and the new vehicle of an identification.
 
 use crate::validate::Validation;
 use anyhow::Result;

@@ -106,7 +106,7 @@ fn apart(values: &[f64]) -> Vec<f64> {
     values.iter().step_by(APART).copied().collect()
 }
 
-/// How many lags that many windows allow.
+/// Number of lags that `windows` windows allow.
 fn lags(windows: usize) -> usize {
     LAGS.min(windows / 2)
 }
@@ -150,7 +150,8 @@ fn extremes(series: &[&Vec<f64>], points: usize) -> Vec<usize> {
     chosen.into_iter().collect()
 }
 
-/// Which of the chosen samples follow on a gap: a way between neighbours longer than one and a half times the shortest.
+/// Indices into `chosen` of the samples after a gap: an interval between neighbours longer than one and a half times
+/// the shortest.
 fn breaks(time_s: &[f64], chosen: &[usize]) -> Vec<usize> {
     let ways = || time_s.windows(2).map(|pair| pair[1] - pair[0]);
     let limit_s = 1.5 * ways().fold(f64::INFINITY, f64::min);

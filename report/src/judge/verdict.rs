@@ -30,7 +30,7 @@ pub struct Verdict {
     pub max: Option<f64>,
     /// True if it held.
     pub passed: bool,
-    /// Why there are no values, where more is to say than that there were no samples.
+    /// Reason why there are no values, if it is more than a lack of samples.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub why: Option<String>,
     /// Simulation time of the first sample by which it failed; none for a mean, an RMS and the like.

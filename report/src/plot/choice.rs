@@ -1,4 +1,4 @@
-//! What is plotted: chosen with `--plot`, or by the types of the recording's topics.
+//! Choice of the curves: named with `--plot`, or by the types of the recording's topics.
 
 use crate::plot::field::Channel;
 use crate::plot::request::Request;
@@ -13,17 +13,17 @@ use std::collections::BTreeSet;
 /// Points of a path in space.
 const TRAIL_POINTS_MAX: usize = 2000;
 
-/// What a curve stands for; it decides how its line looks.
+/// Meaning of a curve; it decides the look of its line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Role {
-    /// What happened: a full line.
+    /// Values of the flight itself: a full line.
     Flown,
-    /// What an estimator made of it: a thin line.
+    /// Estimates of an estimator: a thin line.
     Estimated,
-    /// What a sensor measured, or was measured in a real flight: a thin line.
+    /// Measurements of a sensor, or of a real flight: a thin line.
     Measured,
-    /// What was asked for: a dashed line.
+    /// Set points and references: a dashed line.
     Asked,
 }
 
@@ -42,7 +42,7 @@ impl Role {
         }
     }
 
-    /// Which line lies upon which: an estimator's noise must not hide what was flown, nor this what was asked for.
+    /// Layer of the line: an estimator's noise must not hide the flown line, nor that line the set point.
     pub fn layer(self) -> u8 {
         match self {
             Self::Estimated | Self::Measured => 0,
@@ -51,7 +51,7 @@ impl Role {
         }
     }
 
-    /// What distinguishes the curve's name from that of what was flown.
+    /// Suffix that distinguishes the curve's name from that of the flown one.
     pub fn suffix(self) -> &'static str {
         match self {
             Self::Flown => "",
@@ -62,10 +62,10 @@ impl Role {
     }
 }
 
-/// Figures that are drawn where the recording has topics of these types: title, what the vertical axis shows, and rows
-/// of types with the fields of theirs that belong there. Of the rows that ask for something, only the first that is there
-/// is drawn: mostly the others ask for the same. They are those in which the thesis shows a flight (its Figs 5.1–5.5),
-/// and the distances that its wall following uses.
+/// Figures that are drawn if the recording has topics of these types: title, label of the vertical axis, and rows of
+/// types with their fields for the figure. Of the rows of set points only the first one found is drawn: the others
+/// mostly hold the same values. The thesis shows a flight in these figures (its Figs 5.1–5.5), and its wall following
+/// uses the distances.
 const FIGURES: [(&str, &str, &[Row]); 7] = [
     ("Attitude", "angle", ATTITUDE),
     ("Body rates", "angular velocity in the body", &[(&TURNING, &["angular_velocity"])]),
@@ -102,9 +102,9 @@ pub struct Ask {
     pub topic: String,
     /// Field path.
     pub field: String,
-    /// What it stands for.
+    /// Its meaning.
     pub role: Role,
-    /// What was read of it: its channels with their curves; none where no message was in the span.
+    /// Samples read: its channels with their curves; empty if no message was in the span.
     pub curves: Vec<(Channel, Line)>,
 }
 
@@ -127,27 +127,28 @@ pub struct Wanted {
     pub vehicle: String,
     /// Title; empty where the fields say it.
     pub title: &'static str,
-    /// What the vertical axis shows; empty where the fields say it.
+    /// Label of the vertical axis; empty if the fields state it.
     pub label: &'static str,
-    /// What is drawn.
+    /// Fields to draw.
     pub asks: Vec<Ask>,
 }
 
-/// All that is drawn, and what was read of it.
+/// The curves and paths to draw, with the samples read for them.
 #[derive(Clone, Debug)]
 pub struct Choice {
     /// Axes over time, vehicle by vehicle.
     pub axes: Vec<Wanted>,
     /// Paths in space.
     pub trails: Vec<(Ask, Poses)>,
-    /// Whether people named the fields: then what is not there is an error.
+    /// True if the user named the fields: a missing one is then an error.
     pub is_named: bool,
     /// The number that the curves are drawn against instead of time.
     pub against: Option<Ask>,
 }
 
 impl Choice {
-    /// What the request's plots name, or else what the types of the topics suggest, of one vehicle or of all.
+    /// Returns the plots of the request, or else those that the types of the topics suggest, of one vehicle or of
+    /// all.
     ///
     /// # Errors
     /// If a topic or the vehicle is not there, or nothing is.
@@ -198,7 +199,7 @@ fn vehicles(recording: &Recording) -> Vec<String> {
     names.into_iter().map(|(_, name)| name.to_owned()).chain(no_name).collect()
 }
 
-/// Whether a topic is one of `vehicle`'s, or of no vehicle and so of all.
+/// True if a topic, other than a shadow's, belongs to `vehicle`, or to no vehicle and so to all.
 fn belongs(topic: &str, vehicle: &str, vehicles: &[String]) -> bool {
     let is_under = |vehicle: &str| {
         let rest = topic.strip_prefix('/').and_then(|topic| topic.strip_prefix(vehicle));
@@ -243,7 +244,7 @@ fn trails(recording: &Recording, is_shown: impl Fn(&str) -> bool) -> Vec<(Ask, P
     moving.chain(recording.topics().iter().flat_map(bodies)).collect()
 }
 
-/// What `--against` names: a topic and a number of it.
+/// Topic and number that `--against` names.
 fn number_of(recording: &Recording, against: &str) -> Result<Ask> {
     let Some((topic, field)) = against.split_once(':') else {
         bail!("--against {against}: it is not TOPIC:FIELD, such as /plant/state:rotor_speed[0]");

@@ -1,4 +1,4 @@
-//! All that a file shows, whatever its format.
+//! Content of a file with a drawing, whatever its format.
 
 use super::figure::{Across, Panel, Trail};
 use super::outline::Outline;
@@ -8,7 +8,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use std::fmt;
 
-/// All that a file shows; its text says how much that is.
+/// Content of a file with a drawing; its text states the amounts.
 #[derive(Debug, Serialize)]
 pub struct Drawing {
     #[serde(skip)]
@@ -25,7 +25,7 @@ pub struct Drawing {
 }
 
 impl Drawing {
-    /// What is drawn: names, units and numbers of points.
+    /// Names, units and numbers of points of the drawing.
     #[must_use]
     pub fn json(&self) -> Value {
         json!(self)

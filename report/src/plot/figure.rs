@@ -1,4 +1,4 @@
-//! What is drawn, ready for any kind of file: axes with named, coloured curves of one unit, and paths in space.
+//! Figures, ready for any kind of file: axes with named, coloured curves of one unit, and paths in space.
 
 use crate::plot::choice::{Ask, Choice, Role, Wanted};
 use crate::plot::thin;
@@ -18,7 +18,7 @@ pub struct Line<P> {
     /// Field path of a line over time.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub field: String,
-    /// What it stands for.
+    /// Its meaning.
     pub role: Role,
     /// Colour, as HTML writes it.
     pub colour: &'static str,
@@ -39,7 +39,7 @@ pub type Trail = Line<[f64; 3]>;
 pub struct Axes {
     /// Title.
     pub title: String,
-    /// What the vertical axis shows.
+    /// Label of the vertical axis.
     pub label: String,
     /// Its unit.
     pub unit: String,
@@ -47,16 +47,16 @@ pub struct Axes {
     pub curves: Vec<Curve>,
 }
 
-/// The axis across: time, or what the curves are drawn against.
+/// The axis across: time, or the number that the curves are drawn against.
 #[derive(Clone, Debug, Serialize)]
 pub struct Across {
-    /// What it shows, with its unit.
+    /// Label of the axis, with its unit.
     pub label: String,
     /// Its unit.
     pub unit: String,
     /// Its ends.
     pub range: [f64; 2],
-    /// Whether that is time.
+    /// True if the axis is time.
     pub is_time: bool,
 }
 

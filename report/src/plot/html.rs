@@ -16,7 +16,7 @@ pub fn page(drawing: &Drawing) -> Vec<u8> {
     crate::page::page(include_str!("page.html"), PLOTLY_3D, include_str!("page.js"), &data(drawing))
 }
 
-/// What the page's script draws: the drawing with its points.
+/// Data for the page's script: the drawing with its points.
 fn data(drawing: &Drawing) -> Value {
     let views = drawing.views_or(&[View::Time, View::Path, View::Top, View::Side]);
     let panels = drawing.panels.iter().filter(|_| views.contains(&View::Time));

@@ -46,17 +46,17 @@ pub fn letters<'a>(size: u32) -> TextStyle<'a> {
     ("sans-serif", px(size)).into_font().color(&INK)
 }
 
-/// How a line looks.
+/// Look of a line.
 #[derive(Clone, Copy)]
 pub struct Look {
     colour: RGBColor,
     width: u32,
-    /// Whether it is dashed.
+    /// True if it is dashed.
     pub is_dashed: bool,
 }
 
 impl Look {
-    /// That of a line; what is beside the flown one is darker, to be told from it.
+    /// Look of `line`; lines other than the flown one are darker, to be distinguished from it.
     pub fn of<P>(line: &Line<P>) -> Self {
         let colour = rgb(line.colour);
         let darker = RGBColor(colour.0 / 2, colour.1 / 2, colour.2 / 2);
@@ -114,15 +114,15 @@ pub fn draw_legend<'a, P>(area: &Area<'a>, width: u32, lines: &[Line<P>]) -> Res
     Ok(plots)
 }
 
-/// What flat axes look like.
+/// Look of flat axes.
 pub struct Flat<'a> {
     /// Title.
     pub title: &'a str,
-    /// What the axes across and up show, the first only where it has room.
+    /// Labels of the axes across and up; the first is drawn only where it has room.
     pub names: [String; 2],
     /// Their ends.
     pub ranges: [Range<f64>; 2],
-    /// How many numbers stand along them.
+    /// Numbers of labels along them.
     pub labels: [usize; 2],
     /// Room beside them in pixels: left, right, below.
     pub margins: [u32; 3],

@@ -22,9 +22,9 @@ pub struct Outline {
     pub topic: String,
     /// The colour of its path, as HTML writes it.
     pub colour: &'static str,
-    /// Where its centre of mass is, in metres.
+    /// Positions of its centre of mass, in metres.
     pub places: Vec<[f64; 3]>,
-    /// Its lines at all these places, in metres.
+    /// Its lines at each of these positions, in metres.
     #[serde(skip)]
     pub lines: Vec<Vec<[f64; 3]>>,
 }

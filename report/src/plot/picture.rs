@@ -27,7 +27,7 @@ const AXES_HEIGHT: u32 = 190;
 const TIME_AXIS_HEIGHT: u32 = 34;
 const LETTER_WIDTH: u32 = 7;
 const TITLE_SIZE: u32 = 18;
-/// What says in an SVG picture who wrote it: a comment.
+/// Comment of an SVG picture that names its writer.
 pub const SVG_MARK: &str = "<!-- Written by hummingbus plot -->";
 /// The same in a PNG picture: a chunk "tEXt" with its length and CRC-32 (PNG specification, 11.3.3.3) behind the
 /// signature and the chunk "IHDR".

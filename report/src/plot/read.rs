@@ -21,24 +21,24 @@ const PROGRESS_EVERY: u64 = 4096;
 /// Channels that a field has, as a guess before the first message is there.
 const CHANNELS_PER_ASK: usize = 3;
 
-/// What a topic is read for.
+/// Uses of a topic.
 #[derive(Default)]
 struct Uses<'a> {
-    /// The number that all is drawn against is this topic's.
+    /// The number of this topic that the curves are drawn against.
     against: Option<&'a mut Ask>,
     asks: Vec<&'a mut Ask>,
     /// Paths in space, each with the field that it is of.
     trails: Vec<(&'a str, &'a mut Poses)>,
 }
 
-/// How the numbers of a recording become points.
+/// Settings for turning the numbers of a recording into points.
 struct Drawn<'a> {
     /// Bins of a curve over time.
     bins: usize,
     request: &'a Request,
-    /// Whether people named the fields: then what is not there is an error.
+    /// True if the user named the fields: a missing one is then an error.
     is_named: bool,
-    /// What curves are drawn against, as it was last; not a number before it came.
+    /// Last value of the number that curves are drawn against; NaN before the first.
     against: f64,
 }
 

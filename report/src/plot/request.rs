@@ -1,8 +1,8 @@
-//! What people ask for of a recording.
+//! Requests for a drawing of a recording.
 
 use serde::Serialize;
 
-/// What is drawn of a recording.
+/// Request for a drawing of a recording.
 ///
 /// ```
 /// use report::plot::{Request, Span, View};

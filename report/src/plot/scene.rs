@@ -111,8 +111,8 @@ impl Solid {
         self
     }
 
-    /// What is seen of it along an axis: the closed outline of a box, or the edges of a mesh. `across` and `up` are the axes
-    /// of the view.
+    /// Its lines as seen along an axis: the closed outline of a box, or the edges of a mesh. `across` and `up` are
+    /// the axes of the view.
     pub fn outlines(&self, across: usize, up: usize) -> Vec<Vec<(f64, f64)>> {
         let seen = |corner: &[f64; 3]| (corner[across], corner[up]);
         if !self.is_box {
@@ -130,7 +130,7 @@ impl Solid {
     }
 }
 
-/// What stands still in the scene of a recording, whose file and meshes are attached; nothing where it has none.
+/// Fixed things in the scene of a recording, whose file and meshes are attached; empty if it has no scene.
 ///
 /// # Errors
 /// If the recording is damaged.
@@ -151,7 +151,7 @@ pub fn bodies_of(recording: &Recording) -> Result<Vec<Solid>, RecordingError> {
     Ok(bodies.collect())
 }
 
-/// What the free bodies of a recording's scene are called; none where it has no scene that can be read.
+/// Names of the free bodies of a recording's scene; empty if it has no scene that can be read.
 pub fn body_names(recording: &Recording) -> Vec<String> {
     let Ok(Some(scene)) = read_scene(recording) else { return Vec::new() };
     scene.bodies().filter_map(|(number, _)| scene.name_of(number)).map(str::to_owned).collect()

@@ -16,7 +16,7 @@ use std::ops::Range;
 const MARGINS: [u32; 4] = [80, 12, 34, 50];
 const FLAT_HEIGHT: Range<u32> = 260..760;
 const PATH_HEIGHT: u32 = 640;
-/// How the paths are looked at in three dimensions, in rad: from the right of -y, and from above.
+/// Direction of view of the paths in three dimensions, in rad: from the right of -y, and from above.
 const YAW: f64 = 0.6;
 const PITCH: f64 = 0.45;
 const SOLID: RGBColor = RGBColor(120, 120, 120);
@@ -136,7 +136,7 @@ where
     Ok(())
 }
 
-/// How many numbers stand along an axis of this length: as many in a metre of either axis.
+/// Number of labels along an axis of this length: the same number per metre on either axis.
 fn labels(units: u32) -> usize {
     (units / px(70)) as usize
 }

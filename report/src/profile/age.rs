@@ -1,4 +1,4 @@
-//! How old the samples are that a command rests on when it is sent.
+//! Age of the samples that a command rests on when it is sent.
 
 use crate::profile::times::Times;
 use runtime::flight::Flight;

@@ -1,4 +1,4 @@
-//! All figures of a profiled run.
+//! The figures of a profiled run.
 
 use super::age::{Age, ages};
 use super::latency::{NodeLatency, Transport, latencies};
@@ -7,7 +7,7 @@ use super::path::CriticalPath;
 use runtime::flight::Flight;
 use serde::Serialize;
 
-/// Where the host time of a run went; its text is a table for each part.
+/// Host time of a run, part by part; its text is a table for each part.
 ///
 /// ```
 /// use report::profile::Profile;

@@ -1,4 +1,4 @@
-//! What a tick costs a node, and a sample on its way.
+//! Host time of the parts of a node's tick, and of a sample's transport.
 
 use crate::profile::times::Times;
 use bus::profile::TickTimes;
@@ -71,7 +71,7 @@ pub const PARTS: [&str; 4] = ["wait", "wake-up", "compute", "publish"];
 pub struct Part {
     pub start_ns: u64,
     pub end_ns: u64,
-    /// What the node waited for.
+    /// Cause of the node's wait.
     pub cause: Option<Cause>,
 }
 
@@ -88,7 +88,7 @@ pub fn parts(flight: &Flight, node: usize, times: &TickTimes<'_>) -> [Part; 4] {
     })
 }
 
-/// What people call the cause of a wait.
+/// Name of the cause of a wait, for reports.
 pub fn cause_name(flight: &Flight, cause: Cause) -> &str {
     match cause {
         Cause::Sample { topic, .. } => flight.topic_name(topic),

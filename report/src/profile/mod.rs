@@ -1,12 +1,12 @@
-//! Where the host time of a run's ticks goes.
+//! Host time of a run's ticks, part by part.
 //!
 //! - `times`: histograms of host times
 //! - `latency`: wait, wake-up, computation and sending per node; transport per topic
-//! - `age`: how old the measurements are that a command rests on
+//! - `age`: age of the measurements that a command rests on
 //! - `path`: the nodes and hops that the end of a tick waited for
 //! - `pacing`: deadlines of a paced run
-//! - `figures`: all of these
-//! - `table`: all of it on the terminal
+//! - `figures`: the figures of all these
+//! - `table`: the figures on the terminal
 //! - `trace`: a timeline for Perfetto
 //! - `page`: a page with histograms and the slowest ticks
 

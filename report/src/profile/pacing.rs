@@ -5,7 +5,7 @@ use bus::profile::TickTimes;
 use runtime::flight::Flight;
 use serde::Serialize;
 
-/// How the clock and the nodes kept the deadlines.
+/// Deadlines of a paced run: jitter of the clock, missed deadlines, and overruns of the nodes.
 #[derive(Debug, Serialize)]
 pub struct Pacing {
     /// From a deadline to its grant.
@@ -48,7 +48,7 @@ impl Pacing {
     }
 }
 
-/// Whether host time `ns` lies after the deadline of the tick after `tick`.
+/// True if host time `ns` lies after the deadline of the tick after `tick`.
 fn is_after_next(flight: &Flight, tick: u32, ns: u64) -> bool {
     let next = flight.grant(tick + 1).and_then(|grant| grant.deadline_ns);
     next.is_some_and(|deadline_ns| ns > deadline_ns)

@@ -64,7 +64,7 @@ fn slowest(flight: &Flight, profile: &Profile) -> Vec<Value> {
     ticks.into_iter().filter_map(|tick| timeline(flight, &closing, tick)).collect()
 }
 
-/// What every node does while the critical path of `tick` is walked, in µs from the path's start.
+/// Activities of every node while the critical path of `tick` is walked, in µs from the path's start.
 fn timeline(flight: &Flight, closing: &[usize], tick: u32) -> Option<Value> {
     let path = Path::of(flight, closing, tick)?;
     let (origin_ns, end_ns) = path.span_ns();

@@ -37,7 +37,7 @@ impl Place {
 /// A stretch of a critical path, in nanoseconds of the monotonic clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stretch {
-    /// Where the time was spent.
+    /// Place at which the time was spent.
     pub place: Place,
     pub start_ns: u64,
     pub end_ns: u64,
@@ -79,14 +79,14 @@ impl Path {
         (self.0[0].start_ns, self.0[self.0.len() - 1].end_ns)
     }
 
-    /// How long it is.
+    /// Length of the path.
     pub fn length_ns(&self) -> u64 {
         let (start_ns, end_ns) = self.span_ns();
         end_ns.saturating_sub(start_ns)
     }
 }
 
-/// The node with which `tick` ends, and when it does.
+/// The node with which `tick` ends, and the host time of that end.
 fn last(flight: &Flight, closing: &[usize], tick: u32) -> Option<(usize, u64)> {
     if closing.is_empty() {
         let nodes = 0..flight.plan.nodes.len();
@@ -102,14 +102,14 @@ fn last(flight: &Flight, closing: &[usize], tick: u32) -> Option<(usize, u64)> {
 pub struct CriticalPath {
     /// The length of the path, tick by tick.
     pub tick_time: Times,
-    /// Where it leads along, the largest share first.
+    /// Places along the paths, the largest share first.
     pub places: Vec<PlaceShare>,
     /// Ticks with the lengths of their paths in ns, in the order of the ticks.
     #[serde(skip)]
     pub lengths_ns: Vec<(u32, u64)>,
 }
 
-/// What one place contributes to the critical paths.
+/// Contribution of one place to the critical paths.
 #[derive(Debug, Serialize)]
 pub struct PlaceShare {
     /// The place.
@@ -163,7 +163,7 @@ fn shares(flight: &Flight, places: BTreeMap<Place, (u64, Times)>) -> Vec<PlaceSh
     places.into_iter().map(share).collect()
 }
 
-/// What people call a place.
+/// Name of a place, for reports.
 pub fn name(flight: &Flight, place: Place) -> String {
     match place {
         Place::Node(node) => flight.node_name(node).to_owned(),

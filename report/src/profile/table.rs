@@ -69,7 +69,7 @@ fn table<'a>(title: &str, rows: impl Iterator<Item = Row<'a>>) -> Cells {
     Cells::new(&[title, "count", "p50", "p90", "p99", "p99.9", "max"], 1, rows.map(row).collect())
 }
 
-/// How many times there are, and their quantiles in µs where there are any; with room for ten milliseconds.
+/// Number of times, and their quantiles in µs if there are any; with room for ten milliseconds.
 fn numbers(times: &Times) -> Vec<String> {
     let Quantiles { count, p50_us, p90_us, p99_us, p99_9_us, max_us, .. } = times.quantiles();
     let values = [p50_us, p90_us, p99_us, p99_9_us, max_us];

@@ -18,7 +18,7 @@ pub struct Times {
 /// The quantiles of some times, in microseconds; all 0 where there is none.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Quantiles {
-    /// How many times there are.
+    /// Number of times.
     pub count: u64,
     pub p50_us: f64,
     pub p90_us: f64,
@@ -51,7 +51,7 @@ impl Times {
         self.max_ns = self.max_ns.max(ns);
     }
 
-    /// Whether there is none.
+    /// True if there are no times.
     pub fn is_empty(&self) -> bool {
         self.histogram.is_empty()
     }
@@ -86,7 +86,7 @@ impl Times {
         bins
     }
 
-    /// What was added, in ascending order; exact below two thousand units.
+    /// Values that were added, in ascending order; exact below two thousand units.
     #[cfg(test)]
     pub fn values(&self) -> Vec<u64> {
         let times = |value: hdrhistogram::iterators::IterationValue<u64>| {

@@ -17,7 +17,7 @@ const COMPUTATIONS_MAX: usize = 60_000;
 /// The clock's process in the trace; node n is process n + 2.
 const CLOCK: usize = 1;
 
-/// How every trace begins: `otherData` is where the format has room for who wrote it.
+/// Start of every trace: the format has room for the writer in `otherData`.
 pub const START: &str = r#"{"otherData":{"writer":"hummingbus"},"#;
 
 impl Profile {
@@ -51,7 +51,7 @@ struct Trace<'a, W: Write> {
     ticks: &'a BTreeSet<u32>,
     origin_ns: u64,
     flows: u64,
-    /// What stands before the next event.
+    /// Text in front of the next event.
     separator: &'static str,
     out: &'a mut W,
 }

@@ -1,4 +1,4 @@
-//! What the keys do: requests to the run, sent beside the drawing, since an answer may take long.
+//! Actions of the keys: requests to the run, sent beside the drawing, since an answer may take long.
 
 use bus::plan::Pace;
 use ratatui::crossterm::event::{Event, KeyCode, KeyModifiers};
@@ -20,7 +20,7 @@ pub struct Keys {
     asks_to_stop: bool,
     /// Rows that are scrolled over.
     pub scroll: usize,
-    /// Whether the user has left.
+    /// True if the user has left.
     pub has_left: bool,
 }
 

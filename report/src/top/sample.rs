@@ -1,4 +1,4 @@
-//! What a run shows at a moment: read from its control segment and from the kernel, without disturbing it.
+//! State of a run at a moment: read from its control segment and from the kernel, without disturbing it.
 
 use crate::top::view::{ProcessRow, TopicRow, View};
 use anyhow::{Context, Result};
@@ -14,7 +14,7 @@ use rustix::param::clock_ticks_per_second;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// How long a run may take from its registration to its control segment.
+/// Longest time from the registration of a run to its control segment.
 const START: Duration = Duration::from_secs(5);
 const POLL: Duration = Duration::from_millis(5);
 
@@ -25,11 +25,11 @@ pub struct Source {
     control: LiveView,
 }
 
-/// What a run shows at a moment.
+/// State of a run at a moment.
 pub struct Sample {
-    /// When, by the host's monotonic clock.
+    /// Time, by the host's monotonic clock.
     at_ns: u64,
-    /// The run; what takes two looks, such as rates, is missing.
+    /// The run; values that need two looks, such as rates, are missing.
     view: View,
     /// By process: processor time in ticks of the kernel, `None` where the process is gone, and the times of the steps.
     used: Vec<(Option<u64>, Option<StepTimes>)>,
@@ -56,7 +56,7 @@ impl Source {
         })
     }
 
-    /// What the run shows now.
+    /// State of the run now.
     pub fn sample(&self) -> Sample {
         let mut status = Status::of(&self.plan, &self.control);
         if !self.run.is_live() {
@@ -75,7 +75,7 @@ impl Source {
         Sample { at_ns: monotonic_ns(), view, used }
     }
 
-    /// What `before` and `after` say about the time between them.
+    /// View of the run with the rates between `before` and `after`.
     pub fn between(&self, before: &Sample, after: &Sample) -> View {
         let mut view = after.view.clone();
         view.span_s = after.at_ns.saturating_sub(before.at_ns) as f64 * 1e-9;
@@ -161,8 +161,8 @@ fn process(name: &str, process: Option<u32>, tick: u32, state: String) -> (Proce
     (ProcessRow { name: name.to_owned(), process, state, tick, ..ProcessRow::default() }, cpu_ticks)
 }
 
-/// What keeps a process from computing, and its processor time, from the line of /proc/PID/stat: the name in brackets may
-/// hold anything, brackets and spaces too.
+/// Obstacle that keeps a process from computing, and its processor time, from the line of /proc/PID/stat. The name in
+/// brackets may hold any characters, brackets and spaces too.
 fn kernel_view(line: &str) -> Option<(Option<&'static str>, u64)> {
     let mut fields = line.rsplit_once(')')?.1.split_whitespace();
     let trouble = match fields.next()? {

@@ -1,4 +1,4 @@
-//! How a view is drawn: title, processes, topics, and what the keys do. 80 × 24 characters are enough for hover.toml.
+//! Drawing of a view: title, processes, topics, and the keys. 80 × 24 characters are enough for hover.toml.
 
 use crate::cells::Cells;
 use crate::top::view::{View, processes, title, topics};
@@ -11,15 +11,15 @@ use ratatui::widgets::{Cell, Row, Table, Widget};
 use runtime::ctl::protocol::State;
 
 const KEYS: &str = "space pause  s step  S 100  + - speed  f free  r realtime  x stop  q leave";
-/// How wide the columns are: those of numbers in characters, those of text as shares of what is left.
+/// Widths of the columns: of numbers in characters, of text as shares of the remaining width.
 const PROCESS_WIDTHS: [u16; 7] = [3, 7, 9, 5, 7, 7, 5];
 const TOPIC_WIDTHS: [u16; 5] = [2, 1, 9, 10, 5];
 
 /// A view on its way to the screen.
 pub struct Screen<'a> {
-    /// What is shown.
+    /// The view.
     pub view: &'a View,
-    /// What there is to tell or to ask the user.
+    /// Notice or question for the user.
     pub notice: &'a str,
     /// Rows of each table that are scrolled over.
     pub scroll: usize,

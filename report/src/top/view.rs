@@ -23,7 +23,7 @@ use std::path::Path;
 pub struct View {
     /// The manifest that it flies.
     pub manifest: String,
-    /// How far it has come.
+    /// Progress of the run.
     #[serde(flatten)]
     pub status: Status,
     /// Host time between the looks, in seconds.
@@ -46,7 +46,7 @@ pub struct ProcessRow {
     pub group: Option<String>,
     /// Process number.
     pub process: Option<u32>,
-    /// What it does or waits for.
+    /// Its activity, or the event that it waits for.
     pub state: String,
     /// Ticks that it has completed.
     pub tick: u32,
@@ -106,7 +106,7 @@ fn topic(row: &TopicRow) -> Vec<String> {
     vec![row.name.clone(), row.publisher.clone(), rate, row.samples.to_string(), row.lost.to_string()]
 }
 
-/// What stands above the tables: the run, and how far it has come.
+/// Lines above the tables: the run and its progress.
 pub fn title(view: &View) -> [String; 2] {
     let status = &view.status;
     let missed = format!("{} deadlines missed", status.missed_deadlines);

@@ -1,4 +1,4 @@
-//! What came of a validation: errors by flight, horizon and channel, for people and for programs.
+//! Results of a validation: errors by flight, horizon and channel, for people and for programs.
 
 use crate::cells::Cells;
 use flights::Role;
@@ -21,7 +21,7 @@ use std::fmt;
 /// ```
 #[derive(Debug)]
 pub struct Errors {
-    /// What the vehicles are called.
+    /// Names of the vehicles.
     pub vehicles: Vec<String>,
     /// The flights, in the order of the flights file.
     pub flights: Vec<FlightErrors>,
@@ -32,7 +32,7 @@ pub struct Errors {
 pub struct FlightErrors {
     /// The flight's name.
     pub name: String,
-    /// What it is for.
+    /// Role of the flight.
     pub role: Role,
     /// The errors by the length of the windows, shortest first.
     pub horizons: Vec<HorizonErrors>,
@@ -43,18 +43,18 @@ pub struct FlightErrors {
 pub struct HorizonErrors {
     /// Length of the windows, in ms.
     pub horizon_ms: u32,
-    /// How many windows count.
+    /// Number of windows that count.
     pub windows: usize,
     /// Number of windows that do not, since a measured channel has a gap there or ends, or the rotors' speeds are not known yet.
     pub left_out: usize,
-    /// The errors by channel; only channels that the flight tells of.
+    /// The errors by channel; only channels that the flight has.
     pub channels: Vec<ChannelErrors>,
 }
 
 /// The errors of one channel.
 #[derive(Debug)]
 pub struct ChannelErrors {
-    /// Which channel.
+    /// The channel.
     pub quantity: StateQuantity,
     /// Root mean square over the windows, of each vehicle, in the quantity's unit.
     pub rms: Vec<f64>,
@@ -89,7 +89,7 @@ impl HorizonErrors {
 }
 
 impl Errors {
-    /// All errors by the flights' names; numbers that are not finite are null.
+    /// The errors by the flights' names; numbers that are not finite are null.
     #[must_use]
     pub fn json(&self) -> Value {
         let horizons = |flight: &FlightErrors| -> Map<String, Value> {

@@ -37,13 +37,13 @@ const MANIFEST_START: &str = "# A measured flight, flown again in windows. Writt
 const WRITTEN: Kind = Kind { name: "manifest of a replay", mark: Mark::Start(MANIFEST_START.as_bytes()) };
 const CSV: Kind = Kind { name: "flight in SI", mark: Mark::Start(flights::HEADER_START.as_bytes()) };
 
-/// What plants of the vehicles are called.
+/// First parts of the names of the vehicles' plants.
 const VEHICLES: [&str; 2] = ["first", "second"];
 
 /// A flight that is ready to be flown.
 #[derive(Debug)]
 pub struct Replay {
-    /// Where its files are.
+    /// Folder of its files.
     pub folder: PathBuf,
     manifest: ManifestBuilder,
     /// The rows that the player plays; tick 0 lies at its first row.
@@ -112,7 +112,7 @@ impl Replay {
         Ok((outcome.host_s, recording))
     }
 
-    /// How long the run is, in seconds.
+    /// Duration of the run, in seconds.
     pub fn duration_s(&self) -> f64 {
         f64::from(self.ticks - 1) / f64::from(RATE_HZ)
     }

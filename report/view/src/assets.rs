@@ -17,7 +17,7 @@ const STYLE: &str = "text/css; charset=utf-8";
 /// Assets by their names.
 macro_rules! assets {
     ($($name:literal: $media:expr,)*) => {
-        /// All files beside the page.
+        /// The files beside the page.
         pub const ASSETS: &[Asset] =
             &[$(Asset { name: $name, media: $media, content: include_str!(concat!("../assets/", $name)) },)*];
     };

@@ -10,7 +10,7 @@ const TOKEN_BYTES: usize = 16;
 /// Begins the part of the path that holds the token.
 const PREFIX: &str = "token=";
 
-/// Why a request is refused.
+/// Reason why a request is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refusal {
     /// The header `Host` names another server.
