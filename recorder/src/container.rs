@@ -38,7 +38,7 @@ const HEAD_BYTES: usize = 1 + 8;
 /// The footer with its head, at the end of every file in front of the magic bytes.
 const FOOTER_BYTES: usize = HEAD_BYTES + 8 + 8 + 4;
 
-/// What is wrong with the bytes of an MCAP file, and where.
+/// Fault in the bytes of an MCAP file, with its place.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{place}: {reason}")]
 pub struct Damage {
@@ -51,7 +51,7 @@ pub struct Damage {
 /// Some bytes of a file, with the word for their places.
 struct Bytes<'a> {
     source: Source<'a>,
-    /// What the bytes belong to, such as ` of the chunk at byte 77`; nothing for the file itself.
+    /// Owner of the bytes, such as ` of the chunk at byte 77`; empty for the file itself.
     of: &'a str,
 }
 
@@ -125,7 +125,7 @@ enum Part {
     Texts,
 }
 
-/// What a record is called, and what its body holds; behind that, and in records of other kinds, may stand anything.
+/// Name of a record, and the layout of its body. Any bytes may follow behind that, and in records of other kinds.
 fn kind(opcode: u8) -> (&'static str, &'static [Part]) {
     use Part::{Fixed, Long32, Long64, Texts};
     match opcode {
@@ -148,7 +148,7 @@ fn kind(opcode: u8) -> (&'static str, &'static [Part]) {
     }
 }
 
-/// What is wrong with a record or a chunk, whose name stands before it.
+/// Fault of a record or a chunk, whose name stands before it.
 #[derive(Debug, thiserror::Error)]
 enum Fault {
     #[error("says that {length} bytes follow, {left} are left in it")]

@@ -1,4 +1,4 @@
-//! What a ROS 2 message definition (`ros2msg`) says about the bytes of a CDR message.
+//! Layout of a CDR message by its ROS 2 message definition (`ros2msg`).
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ pub enum DefinitionError {
     /// A line without a type and a name.
     #[error("not a field: {0:?}")]
     Field(String),
-    /// What stands between the brackets of an array.
+    /// Text between the brackets of an array that is not a length.
     #[error("not an array length: {0:?}")]
     Length(String),
 }
@@ -49,7 +49,7 @@ pub enum DecodeError {
         end: usize,
         /// The bytes of the value.
         size: usize,
-        /// Where it should be.
+        /// The byte at which it is due.
         at: usize,
     },
     /// A string, by its length in bytes, that is longer than the rest of the message.
@@ -208,9 +208,9 @@ enum Repeat {
     Sequence,
 }
 
-/// How deep messages may stand in messages; ROS 2's own stay below ten.
+/// Greatest depth of messages in messages; ROS 2's own stay below ten.
 const DEPTH_MAX: usize = 64;
-/// How long the paths of values may be for each byte of the message, which counts as DEPTH_MAX bytes longer.
+/// Bytes of the values' paths and units for each byte of the message, which counts as DEPTH_MAX bytes longer.
 const PATH_BYTES_MAX: usize = 1024;
 
 /// Bytes that the paths and units of the values of one message may have.
@@ -292,12 +292,12 @@ impl Definition {
     }
 }
 
-/// Whether a line parts two definitions.
+/// True if a line separates two definitions.
 fn is_rule(line: &str) -> bool {
     line.len() > 8 && line.bytes().all(|byte| byte == b'=')
 }
 
-/// Types that are no messages.
+/// Types that are not messages.
 const PRIMITIVES: [&str; 15] = [
     "bool", "byte", "char", "float32", "float64", "int8", "uint8", "int16", "uint16", "int32", "uint32",
     "int64", "uint64", "string", "wstring",

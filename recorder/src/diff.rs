@@ -1,4 +1,4 @@
-//! Where two recordings first differ.
+//! The first difference between two recordings.
 
 use crate::error::RecordingError;
 use crate::reader::{Record, Recording};
@@ -16,12 +16,12 @@ pub enum Difference {
         topic: String,
         /// Field path; `None` where the whole message is in one recording only.
         field: Option<String>,
-        /// What is there in the first recording.
+        /// Value in the first recording.
         a: String,
-        /// What is there in the second recording.
+        /// Value in the second recording.
         b: String,
     },
-    /// All messages of one recording are the first ones of the other, which goes on.
+    /// One recording is the beginning of the other, which goes on.
     Prefix {
         /// The recording that ends first.
         shorter: PathBuf,

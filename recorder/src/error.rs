@@ -1,4 +1,4 @@
-//! What can go wrong with a recording.
+//! Errors about a recording.
 
 use crate::definition::{DecodeError, Leaf};
 use std::path::{Path, PathBuf};
@@ -15,11 +15,11 @@ pub enum RecordingError {
     /// The file cannot be opened, created or written.
     #[error("cannot {action} the recording {path}: {source}")]
     File {
-        /// What was tried.
+        /// Action that failed.
         action: &'static str,
         /// The file.
         path: PathBuf,
-        /// Why it failed.
+        /// Cause.
         source: std::io::Error,
     },
     /// The file is not a complete MCAP file.
@@ -30,7 +30,7 @@ pub enum RecordingError {
     Content {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// Fault of the content.
         reason: String,
     },
     /// The MCAP writer failed.
@@ -38,7 +38,7 @@ pub enum RecordingError {
     Write {
         /// The file.
         path: PathBuf,
-        /// What the writer said.
+        /// Answer of the writer.
         reason: String,
     },
     /// A message does not fit its definition.
@@ -48,7 +48,7 @@ pub enum RecordingError {
         topic: String,
         /// The message type.
         type_name: String,
-        /// What does not fit.
+        /// Fault of the message.
         reason: DecodeError,
     },
     /// There is no such topic.
@@ -72,7 +72,7 @@ pub enum RecordingError {
 }
 
 impl RecordingError {
-    /// What the system refused when `action` was tried on the file at `path`.
+    /// Error of the system, for `action` on the file at `path`.
     pub(crate) fn file(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Self {
         move |source| Self::File { action, path: path.to_owned(), source }
     }

@@ -42,8 +42,7 @@ pub struct AttachedFile {
     pub path: PathBuf,
 }
 
-/// What stands in front of a topic's name where the samples of a process are recorded that shadows its
-/// publisher.
+/// Prefix of a topic's name under which the samples of a process are recorded that shadows its publisher.
 pub const SHADOW_PREFIX: &str = "/shadow";
 
 /// The recorder of a run.

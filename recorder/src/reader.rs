@@ -101,7 +101,7 @@ impl Content {
     }
 }
 
-/// How a recording ends whose writer did not finish it.
+/// End of a recording that its writer did not finish.
 ///
 /// ```
 /// # use bus::{Message, announcement::Announcement, messages::SetPoint};
@@ -189,7 +189,7 @@ impl Recording {
         Ok(Self { path: path.to_owned(), content, channels, topics, cut: Some(Cut { last_tick }) })
     }
 
-    /// How the file ends, where its writer did not finish it.
+    /// End of the file, if its writer did not finish it.
     #[must_use]
     pub fn cut(&self) -> Option<&Cut> {
         self.cut.as_ref()
@@ -260,8 +260,8 @@ impl Recording {
         Ok(whole)
     }
 
-    /// All messages in the order of the file: by tick, then by topic. A damaged chunk is an error in front of any
-    /// of its messages; a recording that was cut ends in front of it.
+    /// Iterates over the messages in the order of the file: by tick, then by topic. A damaged chunk is an error in
+    /// front of any of its messages; a recording that was cut ends in front of it.
     pub fn messages(&self) -> impl Iterator<Item = Result<Record, RecordingError>> {
         self.whole(Messages::of(self.source()))
     }

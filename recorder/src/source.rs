@@ -12,7 +12,7 @@ const BLOCK_BYTES: usize = 1 << 20;
 /// The bytes of a recording.
 #[derive(Clone, Copy)]
 pub enum Source<'a> {
-    /// All of them.
+    /// The bytes themselves.
     Memory(&'a [u8]),
     /// The first `length` bytes of a file.
     File {

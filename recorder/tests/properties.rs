@@ -1,4 +1,4 @@
-//! Whatever stands in a recording or a definition: it reads, or is refused in words; nothing panics, runs for ever or
+//! Any content of a recording or a definition is read, or refused with a message. Nothing panics, runs for ever or
 //! takes memory without bound.
 
 use bus::Message;
@@ -19,8 +19,8 @@ use std::sync::LazyLock;
 
 const SCHEMAS: [&Schema; 5] =
     [BodyTransform::SCHEMA, Imu::SCHEMA, MotorCommand::SCHEMA, PlantState::SCHEMA, PoseStamped::SCHEMA];
-/// What may be taken while a file of a few kilobytes is read, whatever lengths it states: its chunks, its messages and
-/// the comparison with another. A claim of 4 GiB, or of a chunk of 256 MiB, is far beyond.
+/// Bytes that may be held while a file of a few kilobytes is read, whatever lengths it states: its chunks, its
+/// messages and the comparison with another. A claim of 4 GiB, or of a chunk of 256 MiB, is far beyond.
 const HELD_BYTES_MAX: isize = 2 << 20;
 
 /// Counts the bytes that each thread holds.
@@ -77,7 +77,7 @@ static WHOLE: LazyLock<Vec<u8>> = LazyLock::new(|| {
     std::fs::read(path).unwrap()
 });
 
-/// What other writers make: no compression, messages beside chunks, metadata, an attachment.
+/// File as other writers make it: no compression, messages beside chunks, metadata, an attachment.
 static PLAIN: LazyLock<Vec<u8>> = LazyLock::new(|| {
     let mut file = std::io::Cursor::new(Vec::new());
     let mut writer =
