@@ -12,7 +12,7 @@ use std::path::Path;
 /// graph is what `hummingbus check` prints.
 ///
 /// # Errors
-/// What is wrong, each with its place and what to do.
+/// The faults, each with its place and advice.
 ///
 /// ```
 /// # use std::path::Path;
@@ -53,7 +53,7 @@ pub fn check_with_programs(path: &Path, overrides: &[String]) -> anyhow::Result<
 /// Checks `text` as the manifest at `path`, which need not exist: paths written in it start at its folder.
 ///
 /// # Errors
-/// What is wrong, each with its place and what to do.
+/// The faults, each with its place and advice.
 ///
 /// ```
 /// # use std::path::Path;

@@ -1,7 +1,7 @@
 //! Extreme numbers at every key of every file that is shipped: refused in words, or of no harm to what they make.
 //!
-//! What `check` accepts it has tried: it has stepped the plant and the law with it ("rehearsed"). So a panic, or a
-//! number that overflows on the way, shows here without a process.
+//! `check` has tried every value that it accepts: it has stepped the plant and the law with it ("rehearsed"). So a
+//! panic, or a number that overflows on the way, shows here without a process.
 
 use crate::COMPONENTS;
 use bus::Registration;
@@ -12,7 +12,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
-/// What is put in the place of a number.
+/// Values that replace a number.
 const EXTREMES: [Value; 9] = [
     Value::Float(1e308),
     Value::Float(-1e308),
@@ -100,7 +100,7 @@ fn with(tree: &Value, path: &[String], new: &Value) -> Value {
     changed
 }
 
-/// What became of an extreme number.
+/// Outcome of a trial with an extreme number.
 enum Outcome {
     Accepted,
     Refused,

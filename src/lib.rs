@@ -105,7 +105,7 @@ use std::path::Path;
 /// Reads the manifest at `path`, which may name the components of this package ([`COMPONENTS`]).
 ///
 /// # Errors
-/// All problems, each with its place and what to do.
+/// The faults, each with its place and advice.
 ///
 /// ```
 /// let problem = hummingbus::load("nowhere.toml").unwrap_err();
@@ -115,7 +115,7 @@ pub fn load(path: impl AsRef<Path>) -> Result<Manifest, Diagnostic> {
     Manifest::load(path.as_ref(), &[], COMPONENTS)
 }
 
-/// What the README shows compiles.
+/// The examples of the README, to be compiled.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

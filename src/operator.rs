@@ -1,7 +1,7 @@
 //! The component `operator`: set points of a person who flies by hand at the page of the run, or those of a recorded flight.
 //!
-//! What was asked enters the run as the samples of its output, so that a recording has it. A run of the same manifest with
-//! `data`, that recording, sends the same samples again, at the same ticks.
+//! The set points enter the run as the samples of its output, so that a recording has them. A run of the same
+//! manifest with `data`, that recording, sends the same samples again, at the same ticks.
 
 use bus::OutputPorts;
 use bus::asked::{Asked, AskedFile, run_dir};

@@ -1,4 +1,4 @@
-//! What holds for any manifest: it is accepted or refused with words, and never brings the program down.
+//! Properties of any manifest: it is accepted or refused with a message, and never brings the program down.
 
 use crate::COMPONENTS;
 use diagnostics::Diagnostic;
@@ -107,7 +107,7 @@ fn shipped(name: &str) -> String {
     std::fs::read_to_string(repository(&format!("manifests/{name}.toml"))).unwrap()
 }
 
-/// What is done to a text.
+/// Change of a text.
 #[derive(Clone, Debug)]
 enum Mutation {
     RemoveLine,

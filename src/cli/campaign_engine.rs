@@ -155,7 +155,7 @@ impl EngineArguments {
     }
 }
 
-/// What is there instead of `option` of `sbatch`, if it cannot be given.
+/// Alternative to `option` of `sbatch`, if the option is not allowed.
 fn instead_of(option: &str) -> Option<&'static str> {
     let is_meant = |long: &str, short: &str| match option.strip_prefix("--") {
         Some(_) => option.split('=').next() == Some(long),

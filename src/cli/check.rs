@@ -5,7 +5,7 @@ use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
 
-/// What `check` takes.
+/// Arguments of `check`.
 #[derive(Args)]
 pub struct CheckArguments {
     /// The manifest.
@@ -24,7 +24,7 @@ pub struct CheckArguments {
 /// Checks a manifest and prints its graph.
 ///
 /// # Errors
-/// What is wrong with it.
+/// The faults of the manifest.
 pub fn check(arguments: &CheckArguments) -> Result<bool> {
     let CheckArguments { manifest, set, .. } = arguments;
     let checked = if arguments.no_programs {

@@ -4,7 +4,7 @@ use super::output::{print_json, print_text};
 use anyhow::Result;
 use clap::Args;
 
-/// What `clean` takes.
+/// Arguments of `clean`.
 #[derive(Args)]
 pub struct CleanArguments {
     /// Only tell what would be removed.

@@ -11,7 +11,7 @@ use hummingbus::COMPONENTS;
 use runtime::registry::NodeProgram;
 use serde_json::{Value, json};
 
-/// What stands above the table.
+/// Text above the table.
 const HEAD: &str = "# Components
 What a node can be, as the components declare it themselves: `hummingbus components >docs/components.md` writes this page.
 What the parameters mean is in [manifest.md](manifest.md#built-in-kinds); their names end with their units. What the messages
@@ -66,7 +66,7 @@ fn program_row(program: &NodeProgram) -> String {
     )
 }
 
-/// All kinds.
+/// Every kind, as JSON.
 fn all_json() -> Vec<Value> {
     COMPONENTS.iter().map(json).chain(COMPONENTS.programs().iter().map(program_json)).collect()
 }

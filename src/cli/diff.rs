@@ -6,7 +6,7 @@ use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
 
-/// What `diff` takes.
+/// Arguments of `diff`.
 #[derive(Args)]
 pub struct DiffArguments {
     /// The first recording.

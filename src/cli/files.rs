@@ -37,7 +37,7 @@ pub fn open_recording(path: &Path) -> Result<Recording> {
     Ok(recording)
 }
 
-/// What the mark of a recording says of the last rewind of its run.
+/// Text about the last rewind of a run, from the `mark` of its recording.
 fn rewound(mark: &str) -> String {
     let table: toml::Table = mark.parse().unwrap_or_default();
     let last = table.get("rewind").and_then(|all| all.as_array()?.last());

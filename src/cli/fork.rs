@@ -12,7 +12,7 @@ use std::path::PathBuf;
 /// The campaign file in the folder.
 const FILE: &str = "campaign.toml";
 
-/// What `run` takes.
+/// Arguments of `run`.
 #[derive(Args)]
 pub struct RunOrForkArguments {
     #[command(flatten)]

@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use vehicles::Vehicle;
 
-/// What `--help` shows behind the options.
+/// Text of `--help` behind the options.
 pub const HELP: &str = "Examples: hummingbus identify flights/nanobench.toml --out identified\n          \
     hummingbus identify rotor flights/stands/esc-test-f40.toml --out rotor\n\n\
     Writes report.html, report.json and vehicle.toml into the folder. See docs/identify.md.";
@@ -36,7 +36,7 @@ const TABLES: Kind = Kind {
     mark: Mark::Start(b"# Tables of a vehicle file, identified from a thrust stand: "),
 };
 
-/// What `identify` takes.
+/// Arguments of `identify`.
 #[derive(Args)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 pub struct IdentifyArguments {
@@ -45,7 +45,7 @@ pub struct IdentifyArguments {
     /// The flights file: the declared vehicle, and flights to fit and to test on.
     #[arg(required = true)]
     flights: Option<PathBuf>,
-    /// Where the report and the new vehicle file go; made if it is not there.
+    /// Folder of the report and the new vehicle file; made if it is not there.
     #[arg(long, value_name = "DIR", required = true)]
     out: Option<PathBuf>,
     /// Print the report as JSON, and no progress.
@@ -62,7 +62,7 @@ enum Part {
     Rotor {
         /// The stand file.
         stand: PathBuf,
-        /// Where rotor.toml and rotor.json go; made if it is not there.
+        /// Folder of rotor.toml and rotor.json; made if it is not there.
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
         /// Print the report as JSON.

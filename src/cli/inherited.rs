@@ -1,11 +1,12 @@
-//! What a command inherited from the run that it was started in, forgotten: it is no process of that run.
+//! Variables that a command inherited from the run that started it are dropped: the command is not a process of that
+//! run.
 
 use bus::process::{LAUNCHER_VARIABLE, RUN_VARIABLE};
 use bus::{GENERATION_VARIABLE, NODE_VARIABLE};
 use std::os::unix::process::CommandExt;
 use std::process::Command;
 
-/// What a launcher tells its processes by.
+/// Environment variables of a launcher for its processes.
 const VARIABLES: [&str; 4] = [RUN_VARIABLE, LAUNCHER_VARIABLE, NODE_VARIABLE, GENERATION_VARIABLE];
 
 /// Begins this command anew without the variables of another run, if it has one: the kernel shows the variables with

@@ -4,7 +4,7 @@ use anyhow::Result;
 use clap::Args;
 use hummingbus::COMPONENTS;
 
-/// What `node` takes.
+/// Arguments of `node`.
 #[derive(Args)]
 pub struct NodeArguments {
     /// The kind of node.

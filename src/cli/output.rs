@@ -57,8 +57,8 @@ pub fn say(text: &str) {
     let _ = writeln!(std::io::stderr(), "{}", readable(text));
 }
 
-/// What went wrong and why, with the lines of files that are to blame; a cause that the text holds already is not said
-/// twice.
+/// Message of an error with its causes and the lines of the files concerned; a cause that the text already contains
+/// is not repeated.
 pub fn message(error: &anyhow::Error) -> String {
     let first = error.chain().next().map_or(String::new(), |first| format!("{first:#}"));
     error.chain().skip(1).fold(first, |text, cause| {

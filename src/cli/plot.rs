@@ -25,7 +25,7 @@ const MESSAGES_QUICK: u64 = 200_000;
 const PNG: Kind = Kind { name: "PNG picture", mark: Mark::Within(PNG_MARK) };
 const SVG: Kind = Kind { name: "SVG picture", mark: Mark::Within(SVG_MARK.as_bytes()) };
 
-/// What `plot` takes.
+/// Arguments of `plot`.
 #[derive(Args)]
 pub struct PlotArguments {
     /// The recording.

@@ -1,4 +1,4 @@
-//! How far a command has come, on the terminal.
+//! Progress of a command on the terminal.
 
 use super::output::say;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -6,7 +6,7 @@ use runtime::event::RunEvent;
 
 /// Times a second a bar is drawn at most.
 const DRAW_HZ: u8 = 10;
-/// What is told of a run.
+/// Template of the bar of a run.
 pub const RUN: &str = "{bar:30} {pos}/{len} ticks  {msg}";
 
 /// A bar like `template`; hidden where `is_quiet` or where standard error is no terminal.
@@ -17,7 +17,7 @@ pub fn bar(template: &str, is_quiet: bool) -> ProgressBar {
     ProgressBar::with_draw_target(None, target).with_style(style)
 }
 
-/// Draws what a run tells: its ticks, their rate and the real-time factor.
+/// Shows an event of a run: its ticks, their rate and the real-time factor.
 pub fn show(bar: &ProgressBar, event: RunEvent<'_>) {
     match event {
         RunEvent::Note(text) => bar.suspend(|| say(text)),

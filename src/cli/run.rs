@@ -23,7 +23,7 @@ use runtime::run_dir::run_of_launcher;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-/// What `run` and its kin take.
+/// Arguments of `run`, and common arguments of the commands that fly a manifest.
 #[derive(Args)]
 pub struct RunArguments {
     /// The manifest; with --from it is that of the checkpoint.
@@ -70,7 +70,7 @@ pub struct RunArguments {
     pub quiet: bool,
 }
 
-/// What `profile` takes.
+/// Arguments of `profile`.
 #[derive(Args)]
 pub struct ProfileArguments {
     #[command(flatten)]
@@ -219,8 +219,8 @@ fn stay(page: LivePage, recording: Option<&Path>, stop: &StopToken) -> Result<()
     page.close()
 }
 
-/// What there is to say about a run that was refused or broke, with what is `left` of its recording; printed as JSON too
-/// where that is asked for.
+/// Error of a run that was refused or broke, with the path `left` of the rest of its recording. It is printed as JSON
+/// too if that is requested.
 fn broken(manifest: &Manifest, error: &Error, left: Option<&Path>, is_json: bool) -> Result<Error> {
     let mut text = message(error);
     if let Some(path) = left {

@@ -8,7 +8,7 @@ use clap::Args;
 use recorder::reader::Recording;
 use std::path::PathBuf;
 
-/// What `shadow` takes.
+/// Arguments of `shadow`.
 #[derive(Args)]
 pub struct ShadowArguments {
     #[command(flatten)]
@@ -16,7 +16,7 @@ pub struct ShadowArguments {
     /// The process to shadow; left out where a recording is read.
     #[arg(long)]
     process: Option<String>,
-    /// What the shadow has otherwise: a TOML file, or TOML text, with the keys of a process in a manifest.
+    /// Differences of the shadow: a TOML file, or TOML text, with the keys of a process in a manifest.
     #[arg(long, value_name = "FILE|TOML", default_value = "")]
     with: String,
 }

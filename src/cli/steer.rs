@@ -32,7 +32,7 @@ enum CtlVerb {
     /// Run exactly this many ticks from the hold, and wait until it is held again; pauses a running run first.
     #[command(after_help = "Example: hummingbus ctl step 100")]
     Step {
-        /// How many.
+        /// Number of ticks.
         #[arg(value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
         ticks: u32,
     },
@@ -98,8 +98,7 @@ pub fn ctl(arguments: &CtlArguments) -> Result<bool> {
 pub struct SwapArguments {
     /// The process to replace.
     process: String,
-    /// What its backup has otherwise: a TOML file, or TOML text, with the keys of a process in a manifest;
-    /// nothing where absent.
+    /// Differences of its backup: a TOML file, or TOML text, with the keys of a process; none where absent.
     #[arg(long, value_name = "FILE|TOML", default_value = "")]
     with: String,
     /// Ticks that the backup computes beside the process before it takes over.

@@ -1,6 +1,6 @@
-//! What makes commands of a table.
+//! Macro that makes the commands of a table.
 
-/// Makes the commands of a table: their names and help, what they take, and the function that does it; it returns false
+/// Makes the commands of a table: names, help texts, arguments, and the function of each; the function returns false
 /// for exit code 1.
 macro_rules! commands {
     ($($(#[$help:meta])* $name:ident($arguments:ty) => $function:path;)*) => {

@@ -10,17 +10,17 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// What `top --help` ends with.
+/// End of the text of `top --help`.
 pub const HELP: &str =
     "Keys: space pauses and resumes, s and S step 1 and 100 ticks, + and - double and halve the
 speed, f runs free, r in real time, arrows scroll, x stops the run, q leaves it flying.
 
 Example: hummingbus top --once --json";
 
-/// How long the drawing has to end after a signal.
+/// Time that the drawing has to end after a signal.
 const LEAVE: Duration = Duration::from_secs(2);
 
-/// What `top` takes.
+/// Arguments of `top`.
 #[derive(Args)]
 pub struct TopArguments {
     /// The run; needed only if several are alive.

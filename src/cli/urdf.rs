@@ -20,7 +20,7 @@ pub const HELP: &str = "Examples:
 
 const URDF: Kind = Kind { name: "URDF file", mark: Mark::Within(report::urdf::MARK.as_bytes()) };
 
-/// What `urdf` takes.
+/// Arguments of `urdf`.
 #[derive(Args)]
 pub struct UrdfArguments {
     /// The vehicle file, or a recording (.mcap), which has the files of its vehicles attached.

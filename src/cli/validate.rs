@@ -9,12 +9,12 @@ use hummingbus::COMPONENTS;
 use report::validate::Validation;
 use std::path::{Path, PathBuf};
 
-/// What `--help` shows behind the options.
+/// Text of `--help` behind the options.
 pub const HELP: &str = "Example: hummingbus validate vehicles/hummingbird.toml fitted.toml flights.toml\n\n\
     At the start of each window of 0.1, 0.5 and 1 s the simulated vehicle is set to the measured state; the table shows \
     the root mean square of its errors at the windows' ends. See docs/replay.md.";
 
-/// What `validate` takes.
+/// Arguments of `validate`.
 #[derive(Args)]
 pub struct ValidateArguments {
     /// One or two vehicle files, then the flights file.
