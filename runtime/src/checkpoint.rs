@@ -1,8 +1,8 @@
-//! Checkpoint files: all that another run needs to go on from a tick, written beside their place and renamed.
+//! Checkpoint files: everything that another run needs to go on from a tick, written beside their place and renamed.
 //!
-//! A file holds what the nodes have saved, the manifest's path with the SHA-256 of its texts, the values of `--set`, and
-//! the SHA-256 of every file that the run has read. A run that goes on from it loads the manifest again and refuses texts
-//! and files that have changed since.
+//! A file holds the saved parts of the nodes, the manifest's path with the SHA-256 of its texts, and the values of
+//! `--set`. It also holds the SHA-256 of every file that the run has read. A run that goes on from it loads the
+//! manifest again and refuses texts and files that have changed since.
 
 use crate::fork;
 use crate::graph::Graph;
@@ -36,7 +36,7 @@ pub struct Checkpoint {
     version: String,
     /// The manifest's file, absolute.
     manifest: PathBuf,
-    /// The manifest and what it includes, with their SHA-256.
+    /// The manifest and its includes, with their SHA-256.
     texts: Vec<(PathBuf, String)>,
     /// The values of `--set`.
     overrides: Vec<String>,
@@ -72,12 +72,12 @@ impl Checkpoint {
     /// Reads the checkpoint at `path`.
     ///
     /// # Errors
-    /// If it cannot be read, is no checkpoint of this version of the program, or is damaged.
+    /// If it cannot be read, is not a checkpoint of this version of the program, or is damaged.
     pub fn read(path: &Path) -> Result<Self> {
         let about = || format!("cannot go on from {}", path.display());
         let mut bytes = Vec::new();
         let mut file = std::fs::File::open(path).with_context(about)?;
-        // Of a file that is no checkpoint no more than its beginning is read.
+        // Of a file that is not a checkpoint only the beginning is read.
         (&mut file).take(START.len() as u64).read_to_end(&mut bytes).with_context(about)?;
         if bytes == START {
             file.take(BYTES_MAX).read_to_end(&mut bytes).with_context(about)?;
@@ -244,7 +244,8 @@ impl Checkpoint {
         Ok(())
     }
 
-    /// Refuses a graph of which a node reads what nothing has sent before the checkpoint, and nothing sends at its tick.
+    /// Refuses a graph in which a node reads a topic without a sample before the checkpoint and without one at its
+    /// tick.
     fn require_samples(&self, graph: &Graph) -> Result<()> {
         let (tick, plan) = (self.tick(), &graph.plan);
         for (node, program) in plan.nodes.iter().zip(&graph.programs) {

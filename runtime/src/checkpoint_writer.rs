@@ -1,4 +1,4 @@
-//! Checkpoints that a run writes: those of its plan, and those that are asked for in flight.
+//! Checkpoints that a run writes: those of its plan, and those requested in flight.
 
 use crate::checkpoint::{Checkpoint, Written, path};
 use crate::graph::Graph;
@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 pub(crate) struct WrittenFiles {
     /// Those of its plan that are still there.
     planned: RefCell<Vec<Written>>,
-    /// Those that were asked for.
+    /// The requested ones.
     asked: RefCell<Vec<Written>>,
 }
 
@@ -64,7 +64,7 @@ pub(crate) struct Writer<'a> {
 }
 
 impl Writer<'_> {
-    /// Writes the checkpoint of `tick`, which was asked for, to `path`, or beside the recording, once its nodes have written
+    /// Writes the requested checkpoint of `tick` to `path`, or beside the recording, once its nodes have written
     /// their parts; `None` before.
     pub(crate) fn write_asked(&self, tick: u32, path: Option<&Path>) -> Result<Option<PathBuf>> {
         let written = self.write(tick, path)?;
@@ -128,13 +128,13 @@ impl Writer<'_> {
         Ok(again)
     }
 
-    /// True if the process that has written `part` is what the manifest says that node `index` is at `tick`.
+    /// True if the process that has written `part` is the one that the manifest states for node `index` at `tick`.
     fn is_planned(&self, index: usize, part: &NodePart, tick: u32) -> bool {
         let Graph { plan, backups, programs, .. } = self.graph;
         let is_swap = |backup: &&BackupSpec| backup.node == index && backup.has_taken_over(tick);
         let swaps: Vec<&BackupSpec> = backups.iter().filter(is_swap).collect();
         let plan = swaps.last().map_or(&plan.nodes[index], |backup| &backup.plan);
-        // A process that was restarted is what its predecessor was.
+        // A restarted process is the same as its predecessor.
         let is_restarted = programs[index].on_exit == OnExit::Restart;
         part.is_of(plan) && (is_restarted || part.generation as usize == swaps.len())
     }
@@ -159,7 +159,7 @@ impl Writer<'_> {
     }
 }
 
-/// Puts together what the nodes of a run write for the checkpoints of its plan.
+/// Collects the parts that the nodes of a run write for the checkpoints of its plan.
 pub(crate) struct Collector<'a> {
     pub(crate) writer: Writer<'a>,
     /// The checkpoint that comes next.
@@ -205,7 +205,7 @@ impl<'a> Collector<'a> {
         written.push(Written { tick, path });
         let keep = manifest.content.run.checkpoint_keep.as_ref().map_or(usize::MAX, |keep| *keep.get_ref());
         if written.len() > keep {
-            // Who has removed or replaced it meanwhile has done so on purpose.
+            // A user who has removed or replaced it meanwhile has done so on purpose.
             let _ = std::fs::remove_file(written.remove(0).path);
         }
     }

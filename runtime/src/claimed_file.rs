@@ -30,15 +30,15 @@ fn try_lock(file: File, location: &Location) -> io::Result<Attempt> {
     })
 }
 
-/// A recording that is being written, under another name beside its place, and locked; dropping it leaves what was
-/// written there, or nothing where nothing was.
+/// A recording that is being written, under another name beside its place, and locked. Dropping it leaves the file,
+/// unless the file is empty.
 #[derive(Debug)]
 pub struct Partial {
     real: Location,
     location: Location,
     /// Path of the file while it is being written.
     pub path: PathBuf,
-    /// The file, whatever its name.
+    /// The file, under any name.
     pub file: File,
     /// Path to which the remains of a broken run were moved, if there were any.
     pub kept: Option<PathBuf>,
@@ -154,10 +154,11 @@ pub(crate) fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
     path.with_file_name(name)
 }
 
-/// A new file at `location`, locked, and where what lay there before is kept; `None` where somebody else has one there.
+/// A new file at `location`, locked, and the new path of the file that lay there before; `None` if another process
+/// has one there.
 ///
-/// Of any number of processes that try at once exactly one gets it: only who has locked what lies there removes it, and
-/// who has created it and then finds it locked or gone has lost it to another.
+/// Of any number of processes that try at once exactly one gets it. Only the process that has locked the old file
+/// removes it. A process that has created the file and then finds it locked or gone has lost it to another.
 fn claim_new(location: &Location) -> io::Result<Option<(File, Option<PathBuf>)>> {
     let mut kept = None;
     loop {
@@ -169,7 +170,7 @@ fn claim_new(location: &Location) -> io::Result<Option<(File, Option<PathBuf>)>>
         match old {
             Attempt::Held => return Ok(None),
             Attempt::Gone => {}
-            // Locked until its name is gone: nobody removes what came after it.
+            // Locked until its name is gone: no process removes the file that came after it.
             Attempt::Locked(old) => {
                 RECORDING.require(&old)?;
                 kept = keep_aside(&old, location)?.or(kept);
@@ -217,7 +218,7 @@ pub struct LogClaim {
 }
 
 impl LogClaim {
-    /// Claims the log at `path`, which keeps what it holds for now; `None` where another run writes to it.
+    /// Claims the log at `path`, which keeps its content for now; `None` if another run writes to it.
     ///
     /// # Errors
     /// If something is there that must not be replaced, or the file cannot be created.
@@ -238,7 +239,7 @@ impl LogClaim {
         }
     }
 
-    /// Removes what an earlier run wrote.
+    /// Removes the content of an earlier run.
     ///
     /// # Errors
     /// If it cannot be written to.

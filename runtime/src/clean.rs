@@ -1,4 +1,4 @@
-//! `hummingbus clean`: removes what dead runs left, and nothing of live ones.
+//! `hummingbus clean`: removes the remains of dead runs, and nothing of live ones.
 //!
 //! Everything to be removed is claimed first: the claim is the lock of the run's entry, which a live launcher holds.
 //! A run registers before it creates anything else, so files without an entry belong to a dead run.
@@ -89,8 +89,8 @@ pub fn clean(dry_run: bool) -> Result<Report> {
     Ok(report)
 }
 
-/// Claims what a run left; `None` if it is alive. What a launcher was just starting when it was killed holds its locks,
-/// too, until it has begun as another program: that is waited for.
+/// Claims the remains of a run; `None` if it is alive. A process that a launcher was starting when it was killed
+/// holds the locks too, until it has begun as another program. The claim waits for that.
 fn claim(run_id: &str, run_dirs: &BTreeSet<PathBuf>) -> Option<Vec<File>> {
     let start = Instant::now();
     loop {
@@ -245,8 +245,8 @@ impl Remains {
 /// Kills a process that carries a run directory, and waits until it is gone.
 fn end_process(process: i32, run_id: &str) -> Result<()> {
     let Some(process) = Pid::from_raw(process) else { return Ok(()) };
-    // The handle stays with the process, whoever gets its number next; so what carries the run directory now
-    // is what the signal goes to.
+    // The handle stays with the process, even if another process gets its number: the signal goes to the process that
+    // carries the run directory now.
     let Ok(handle) = pidfd_open(process, PidfdFlags::empty()) else { return Ok(()) };
     let is_of_run = |run_dir: &PathBuf| is_run_dir_of(run_dir, run_id) && holds_file_of(process, run_dir);
     if run_dir_of(process).filter(is_of_run).is_none() {

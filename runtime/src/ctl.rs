@@ -1,8 +1,8 @@
 //! A live run is paused, stepped, paced, swapped and stopped from outside.
 //!
-//! - [`protocol`]: what can be asked of a run, and what it answers
+//! - [`protocol`]: requests to a run, and its answers
 //! - `server`: the launcher's socket in the run directory
-//! - `control`: what the launcher does with a request
+//! - `control`: requests carried out by the launcher
 //! - [`client`]: the other end of the socket
 
 pub mod client;

@@ -16,12 +16,12 @@ use std::time::Duration;
 /// Time that a process has to end when it is asked to, and then again after it was killed.
 const GRACE: Duration = Duration::from_secs(1);
 const POLL: Duration = Duration::from_millis(2);
-/// A look at the processes goes through them one after another: one whose parent ends meanwhile is seen as nobody's, and
-/// only the next look finds it. So many looks in a row that find nothing are believed.
+/// A look goes through the processes one after another. A process whose parent ends meanwhile is missed, and only the
+/// next look finds it. So many looks in a row without a find are believed.
 const EMPTY_LOOKS: u32 = 2;
 
-/// The place of a run among those of its process: an orphan does not say whose it is, so a run that adopts orphans
-/// flies alone.
+/// The place of a run among those of its process. An orphan does not say to which run it belongs, so a run that
+/// adopts orphans flies alone.
 #[derive(Debug)]
 pub struct Place {
     _alone: Option<RwLockWriteGuard<'static, ()>>,
@@ -66,10 +66,11 @@ pub struct Descendants {
 }
 
 impl Descendants {
-    /// Has this process inherit what the processes of its run leave behind.
+    /// Makes this process the parent of the orphans of its run.
     pub fn of_run(_: &Place) -> Self {
         let was_reaper = child_subreaper().is_ok_and(|reaper| reaper.is_some());
-        // Refused by no system that has it; one that has not leaves the processes' own groups to be killed.
+        // A system that has the option does not refuse it. On one that has not, only the processes' own groups are
+        // killed.
         let _ = set_child_subreaper(Some(rustix::process::getpid()));
         Self { before: children(), was_reaper }
     }

@@ -105,7 +105,7 @@ fn replacements(graph: &Graph, node: usize) -> String {
 }
 
 impl Graph {
-    /// The graph as JSON: the plan, with who replaces whom and who takes no part.
+    /// The graph as JSON: the plan, the backups, and the sidecars.
     pub fn json(&self) -> serde_json::Value {
         let backup = |backup: &BackupSpec| {
             serde_json::json!({

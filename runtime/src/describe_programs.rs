@@ -1,4 +1,4 @@
-//! Programs of a manifest are asked for their ports, so that a check finds what a run would.
+//! Ports of a manifest's programs: each program is asked for them, so that a check finds the errors of a run.
 //!
 //! Each `command` that takes part in the ticks is started once, in a temporary run directory, and ends where it would connect
 //! ([`bus::description`]).
@@ -36,9 +36,9 @@ struct Asked<'g> {
     program: &'g Program,
 }
 
-/// Starts the programs that `graph`, the checked `manifest`, names as a `command`, and those of `exe`, the binary that brings
-/// the kinds of the manifest; and compares what they declare with the
-/// manifest and with each other. Returns warnings of those that tell nothing.
+/// Starts the programs that `graph`, the checked `manifest`, names as a `command`, and those of `exe`, the binary
+/// with the kinds of the manifest. Compares their declarations with the manifest and with each other. Returns
+/// warnings of the programs without a declaration.
 ///
 /// # Errors
 /// The problem of the first program that would not fly, or the reason why none can be started.
@@ -87,7 +87,7 @@ impl Drop for SharedMemory<'_> {
     }
 }
 
-/// The programs of `graph` that are no components, with those that take their places.
+/// The programs of `graph` that are not components, with those that take their places.
 fn asked(graph: &Graph) -> Vec<Asked<'_>> {
     let first = graph.plan.nodes.iter().zip(&graph.programs).enumerate();
     let first = first.map(|(node, (plan, program))| Asked { node, generation: 0, plan, program });
@@ -119,13 +119,13 @@ fn known_messages(manifest: &Manifest, graph: &Graph) -> BTreeMap<usize, Announc
 /// Answer of a program.
 enum Answer {
     Described(Description),
-    /// It has told nothing, and may fly all the same.
+    /// It has declared nothing, but may fly.
     Silent(Box<Diagnostic>),
 }
 
 fn ask(manifest: &Manifest, exe: &Path, run_dir: &Path, asked: Asked<'_>) -> Result<Answer> {
     let Asked { node, generation, plan, program } = asked;
-    // Where the manifest has the output of its runs is no place for that of a check.
+    // The place where the manifest has the output of its runs is not for that of a check.
     let mut program = Program { log: None, ..program.clone() };
     program.environment.insert(DESCRIBE_VARIABLE.to_owned(), "1".to_owned());
     let role = Role::Node { node, generation };
@@ -172,7 +172,7 @@ fn wait(child: &mut Child) -> Option<ExitStatus> {
     None
 }
 
-/// Requires that what `asked` reads and sends is laid out as what others send on the same topics.
+/// Requires that the inputs and outputs of `asked` have the layouts of the others on the same topics.
 fn compare(
     manifest: &Manifest,
     graph: &Graph,

@@ -57,13 +57,13 @@ pub struct Progress {
 pub struct StopToken(Arc<AtomicUsize>);
 
 impl StopToken {
-    /// A token that asks for nothing yet.
+    /// A token without a request.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Asks for a stop at the next tick boundary; if that was done before, for an end at once.
+    /// Requests a stop at the next tick boundary; if that was done before, an end at once.
     pub fn stop(&self) {
         self.0.fetch_add(1, Ordering::SeqCst);
     }

@@ -16,7 +16,7 @@ pub fn try_exclusive(file: &File) -> io::Result<bool> {
     lock(|| file.try_lock())
 }
 
-/// Locks `file` against those who want it alone; false where one of them has it.
+/// Locks `file` against processes that want it alone; false if one of them has it.
 ///
 /// # Errors
 /// If the file system has no locks.

@@ -22,7 +22,7 @@ pub struct Flight {
 /// The time in which one process was a node: its samples counted.
 #[derive(Debug)]
 struct Era {
-    /// The first tick that was its own. A backup noted ticks before, as a shadow: nobody read those.
+    /// The first tick that was its own. A backup noted ticks before, as a shadow: no node read their samples.
     first_tick: u32,
     inputs: Vec<InputPlan>,
     noted: TickReader,
@@ -54,11 +54,12 @@ pub struct Waited {
 }
 
 impl Flight {
-    /// Opens what the processes of `plan` noted in `run_dir`; `replacements` says which instance took over from which.
+    /// Opens the files that the processes of `plan` wrote in `run_dir`; `replacements` state which instance took over
+    /// from which.
     /// The files may be removed while this lives.
     ///
     /// # Errors
-    /// If a file cannot be read or does not hold what it should.
+    /// If a file cannot be read or does not have the expected content.
     pub fn open(plan: &Plan, run_dir: &Path, ticks: u32, replacements: &[Report]) -> Result<Self, BusError> {
         let nodes = (0..plan.nodes.len()).map(|node| eras(plan, run_dir, node, replacements));
         Ok(Self {

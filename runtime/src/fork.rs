@@ -1,5 +1,4 @@
-//! Values that a run which goes on from a checkpoint cannot have otherwise than the run before: those that count at the start
-//! alone.
+//! Values that a run from a checkpoint must share with the run before: those that count at the start alone.
 
 use crate::manifest::Manifest;
 use diagnostics::Diagnostic;
@@ -24,7 +23,7 @@ pub(crate) fn require_effective(before: &Manifest, now: &Manifest, tick: u32) ->
             continue;
         };
         let kinds = [process, other].map(|process| process.kind.as_ref().map(|kind| kind.get_ref().as_str()));
-        // What takes the place of another kind begins with what it is given.
+        // A node of another kind begins with its own parameters.
         if kinds[0] != kinds[1] {
             continue;
         }

@@ -1,15 +1,15 @@
 //! From a manifest to the plan of a run, checked before anything starts.
 //!
-//! - `processes`: what each process executes, and how it runs on the host
+//! - `processes`: the executable of each process, and its settings on the host
 //! - `outputs`, `inputs`, `wiring`: topics and edges
-//! - `computing_time`: how long steps take
-//! - `parameters`, `recorders`: what each node is given
-//! - `periods`: nodes and outputs that compute once or never count on
+//! - `computing_time`: computing time of the steps
+//! - `parameters`, `recorders`: parameters and files of each node
+//! - `periods`: nodes and outputs that compute only once, or whose ticks would overflow
 //! - `ranges`: ranges of numbers by their units
 //! - `groups`: nodes that share a process
-//! - `evaluations`: what is judged after the run
+//! - `evaluations`: conditions and measures after the run
 //! - `checkpoints`: ticks at which the nodes write their states
-//! - `backups`: who shadows, takes over or stands by
+//! - `backups`: processes that shadow, take over or stand by
 
 mod backups;
 mod checkpoints;
@@ -43,11 +43,11 @@ use wiring::{Wiring, wire};
 const DEFAULT_WINDOW_TICKS: u32 = 64;
 /// The same with groups, which compute many ticks between two waits: measured, a composed hover is a quarter faster.
 const GROUPS_WINDOW_TICKS: u32 = 512;
-/// More would only grow the queues: a window's samples are what shared memory must hold.
+/// More would only grow the queues: shared memory must hold the samples of a window.
 pub const WINDOW_TICKS_MAX: u32 = 4096;
 const RATE_HZ_MAX: u32 = 1_000_000;
 
-/// A checked manifest. Its text says which nodes run how often, and what they read and send.
+/// A checked manifest. Its text lists the nodes with their rates, inputs and outputs.
 ///
 /// ```
 /// use bus::Registration;

@@ -35,8 +35,8 @@ const STACK_BYTES: usize = 8 << 20;
 pub enum Host {
     /// Each component is a process that executes this binary with the arguments `node KIND`.
     Exe(PathBuf),
-    /// Each component is a thread of this process, which the run leaves as it is otherwise. A `command`, and what only
-    /// a process of its own can have (`nice`, `cpu`, …), is refused.
+    /// Each component is a thread of this process, which the run otherwise leaves unchanged. A `command` is refused,
+    /// and so are settings that only a process of its own can have (`nice`, `cpu`, …).
     Threads,
     /// The thread that flies the run steps all components one after the other, the recorder too. There is no shared
     /// memory and no clock service. Everything that threads refuse is refused, and so are changes of processes in
@@ -52,7 +52,7 @@ impl Host {
         Self::Exe("/proc/self/exe".into())
     }
 
-    /// Refuses a host on which the kernel does not tell of processes.
+    /// Refuses a host on which the kernel does not report processes.
     pub(crate) fn require_proc() -> Result<()> {
         if Path::new("/proc/self/fd").is_dir() {
             return Ok(());
@@ -63,7 +63,7 @@ impl Host {
         )
     }
 
-    /// Refuses what `program`, the process `name`, asks for and cannot have here.
+    /// Refuses settings of `program`, the process `name`, that it cannot have here.
     pub(crate) fn require(&self, name: &str, program: &Program) -> Result<()> {
         if matches!(self, Self::Exe(_)) {
             return Ok(());

@@ -6,7 +6,7 @@ use crate::manifest::Manifest;
 use crate::program::{OnExit, Program};
 use anyhow::{Result, bail};
 
-/// Refuses what `host` cannot do.
+/// Refuses a run that `host` cannot fly.
 pub(crate) fn require_host(host: &Host, manifest: &Manifest, graph: &Graph) -> Result<()> {
     if matches!(host, Host::Exe(_)) {
         return Ok(());
@@ -32,7 +32,7 @@ pub(crate) fn require_host(host: &Host, manifest: &Manifest, graph: &Graph) -> R
     }
 }
 
-/// Refuses what a run on one thread cannot do: what changes instances in flight, or watches them.
+/// Refuses backups, restarts and profiles, which a run on one thread cannot have.
 fn require_one_thread(graph: &Graph) -> Result<()> {
     let replaced = graph.backups.first().map(|backup| format!("another process for `{}`", backup.plan.name));
     let named = |is_asked: fn(&Program) -> bool, what: &str| {

@@ -34,7 +34,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Messages of a sidecar that are read in one look, so that one that never ends keeps nobody waiting.
+/// Messages of a sidecar that are read in one look, so that a sender that never ends does not block the launcher.
 const MESSAGES_MAX: usize = 32;
 /// The longest message of sd_notify(3) that is looked at.
 const MESSAGE_BYTES: usize = 4096;
@@ -226,7 +226,7 @@ impl World for HostWorld<'_> {
 
     fn remove_traces(&mut self, node: usize, generation: u32, was_killed: bool) {
         if was_killed {
-            // Its ports would keep their places; what cannot be removed now goes with the run.
+            // Its ports would keep their places; those that cannot be removed now go with the run.
             let _ = bus::reap_dead(self.run_dir, &self.plan.run_id);
         }
         bus::state_transfer::remove(self.run_dir, self.plan, node, generation);
@@ -330,7 +330,7 @@ fn has_exited(child: &Child, options: WaitIdOptions) -> bool {
     match waitid(WaitId::Pid(Pid::from_child(child)), options) {
         Ok(Some(status)) => status.exited() || status.killed() || status.dumped(),
         Ok(None) | Err(Errno::INTR) => false,
-        // Somebody else has waited for it: `wait` says what follows.
+        // Another caller has waited for it: `wait` returns the consequence.
         Err(_) => true,
     }
 }

@@ -72,7 +72,7 @@ const NAP_NS: u64 = 20_000_000;
 /// ```
 ///
 /// # Errors
-/// A problem in the manifest, or what needs a process of its own: an executable, a swap, a standby.
+/// A problem in the manifest, or a node that needs a process of its own: an executable, a swap, a standby.
 pub fn simulate(manifest: &Manifest) -> Result<Simulation> {
     let graph = Graph::build(manifest)?;
     require_host(&Host::InProcess, manifest, &graph)?;
@@ -82,7 +82,7 @@ pub fn simulate(manifest: &Manifest) -> Result<Simulation> {
 /// The nodes of `graph` of which `is_member` is true, in one simulation.
 ///
 /// # Errors
-/// If a node is no component of this program, or the plan and a component do not fit.
+/// If a node is not a component of this program, or the plan and a component do not fit.
 fn simulation(
     graph: &Graph,
     is_member: impl Fn(&Registration) -> bool,
@@ -153,7 +153,7 @@ struct Run<'a> {
 /// Checks that [`fly_unrecorded`] can fly `manifest`, and go on `from` a checkpoint; flies nothing. Returns the graph.
 ///
 /// # Errors
-/// As [`fly_unrecorded`], but for what goes wrong in flight.
+/// As [`fly_unrecorded`], except for errors in flight.
 pub fn require_flyable(manifest: &Manifest, files: InputFiles, from: Option<&Checkpoint>) -> Result<Graph> {
     let graph = graph_of(manifest, files, Path::new(FIGURES), from)?;
     if let Some(parts) = &graph.from {
@@ -231,8 +231,8 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Sleeps until tick `tick` is due; false if a stop was asked for meanwhile. A tick whose predecessor was done behind
-    /// its own deadline is a missed one.
+    /// Sleeps until tick `tick` is due; false if a stop was requested meanwhile. A tick whose predecessor was done
+    /// behind its own deadline is a missed one.
     fn await_deadline(&mut self, tick: u32, factor: f64) -> bool {
         let due_ns =
             self.start_ns + deadline_ns(tick - self.graph.plan.first_tick, self.graph.plan.tick_ns, factor);

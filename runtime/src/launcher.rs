@@ -134,7 +134,7 @@ impl<'a> Launcher<'a> {
         self
     }
 
-    /// `listener` hears what happens in the run, on the thread that flies it.
+    /// Calls `listener` for every event of the run, on the thread that flies it.
     #[must_use]
     pub fn followed_by(mut self, listener: impl FnMut(RunEvent<'_>) + 'a) -> Self {
         self.on = Box::new(listener);
@@ -176,7 +176,7 @@ impl<'a> Launcher<'a> {
     ///
     /// # Errors
     /// If another run writes to one of its files, or a process fails, stalls, or cannot be started; the error holds
-    /// what it wrote last.
+    /// the last lines that the process wrote.
     pub fn launch(
         mut self,
         manifest: &Manifest,
@@ -241,7 +241,7 @@ impl<'a> Launcher<'a> {
         let (run_path, stem) = (run_dir.path(), &outputs.stem);
         let mut checkpoints = Collector::new(Writer { manifest, graph, run_dir: run_path, stem, files });
         let flown = self.fly_in(run_dir, place, manifest, graph, &mut checkpoints, rewinds, on);
-        // Those of a run that broke are what somebody goes back to.
+        // A user goes back to those of a run that broke.
         let written = checkpoints.finish();
         if let (Err(_), Some(Written { tick, path })) = (&flown, written.iter().flatten().last()) {
             on(RunEvent::Note(&format!("the last checkpoint is {}, of tick {tick}", path.display())));
@@ -315,8 +315,8 @@ impl<'a> Launcher<'a> {
     }
 }
 
-/// Puts the files that the nodes read into the run directory, and tells the recorders what to attach: the manifest, what
-/// it includes, and the models; and the `mark` of a run that went back.
+/// Puts the files that the nodes read into the run directory. Gives the recorders their attachments: the manifest,
+/// its includes, the models, and the `mark` of a run that went back.
 fn prepare(
     manifest: &Manifest,
     graph: &mut Graph,

@@ -1,5 +1,5 @@
-//! The location that a path names: an opened folder and a name in it. Once it is found, nobody can redirect it, whatever
-//! happens to the path.
+//! The location that a path names: an opened folder and a name in it. Once it is found, no change of the path can
+//! redirect it.
 //!
 //! In a folder that everybody may write to, sticky or not, a link is followed only if it belongs to this user or to the
 //! owner of the folder, as by a kernel with `fs.protected_symlinks`.
@@ -22,13 +22,13 @@ const FOLDER: OFlags = OFlags::PATH.union(OFlags::DIRECTORY).union(OFlags::NOFOL
 /// Reason why a path names no location for a file.
 #[derive(Debug, thiserror::Error)]
 pub enum Unlocated {
-    /// Its last part is no name.
+    /// Its last part is not a name.
     #[error("it names a folder")]
     Folder,
     /// A folder on the way is missing, or is something else.
     #[error("there is no folder {}", .0.display())]
     NoFolder(PathBuf),
-    /// A link that somebody else may have planted.
+    /// A link that another user may have planted.
     #[error(
         "{} is a link of user {owner} in a folder that everybody may write to, and is not followed; remove it, or name \
          another file", .link.display()
@@ -111,7 +111,7 @@ impl Location {
         Ok(rustix::fs::unlinkat(&self.folder, &self.name, AtFlags::empty())?)
     }
 
-    /// Moves the file to `to`, in the place of what is there.
+    /// Moves the file to `to`, replacing the file there.
     pub fn rename(&self, to: &Self) -> io::Result<()> {
         Ok(rustix::fs::renameat(&self.folder, &self.name, &to.folder, &to.name)?)
     }
@@ -184,7 +184,7 @@ impl Walk {
         Ok(())
     }
 
-    /// Puts the target of the link `name` in front of the parts that are still to come; false if it is no link.
+    /// Puts the target of the link `name` in front of the parts that are still to come; false if it is not a link.
     fn follow(&mut self, name: &OsStr) -> Result<bool, Unlocated> {
         let flags = OFlags::PATH | OFlags::NOFOLLOW | OFlags::CLOEXEC;
         let link = match rustix::fs::openat(&self.folder, name, flags, Mode::empty()) {
@@ -192,7 +192,7 @@ impl Walk {
             Err(Errno::NOENT) => return Ok(false),
             Err(error) => return Err(self.refused(name, error)),
         };
-        // Owner and target of the same link, whatever lies there by now.
+        // Owner and target of the same link, even if the name has another file by now.
         let found = rustix::fs::fstat(&link).map_err(|error| self.refused(name, error))?;
         if FileType::from_raw_mode(found.st_mode) != FileType::Symlink {
             return Ok(false);

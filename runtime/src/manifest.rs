@@ -1,4 +1,4 @@
-//! The manifest: what a user writes to describe a run, read with the place of every value.
+//! The manifest: a user's description of a run, read with the place of every value.
 //!
 //! - `sources`: the texts it is made of, laid end to end, so that one offset names a place in any of them
 //! - `mod@include`: reads the file and the files it includes
@@ -75,7 +75,7 @@ pub struct Manifest {
 }
 
 impl Manifest {
-    /// Reads the manifest at `path` with what it includes, and applies `overrides` (`key.path=value`).
+    /// Reads the manifest at `path` with its includes, and applies `overrides` (`key.path=value`).
     ///
     /// # Errors
     /// A [`Diagnostic`] that names the place.
@@ -160,7 +160,7 @@ impl Manifest {
         self.sources.overrides().map(|source| source.text.as_str())
     }
 
-    /// True for a value of `--set` that may change what is computed, not only where and how fast.
+    /// True for a value of `--set` that may change the results, not only the host and the speed.
     pub(crate) fn is_of_simulation(text: &str) -> bool {
         !recorded::is_host_only(text)
     }
@@ -225,7 +225,7 @@ impl Manifest {
         self.resolve(self.file_of(name, key)?).ok()
     }
 
-    /// The file `key` of the process `name`, as it is written.
+    /// The file `key` of the process `name`, as written.
     fn file_of(&self, name: &str, key: &str) -> Option<&Spanned<String>> {
         let (_, process) = self.content.process.iter().find(|(other, _)| other.get_ref() == name)?;
         file_edits::file_of(process, key)
@@ -305,7 +305,7 @@ fn content(sources: &Sources, tree: DeTable<'_>) -> Result<Content, Diagnostic> 
 
 /// Everything that the sources say, with sets expanded and backups made whole.
 fn whole_tree(sources: &Sources) -> Result<DeTable<'_>, Diagnostic> {
-    // In every file, also where another one's number takes the place of what is none.
+    // In every file, also where another file's number replaces one that is not finite.
     sources.files().try_for_each(|file| finite::require(&sources.table(file)?, "", sources))?;
     let mut tree = include::merged(sources)?;
     let (late, early): (Vec<_>, Vec<_>) = overrides::all(sources)?

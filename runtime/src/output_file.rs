@@ -150,11 +150,11 @@ pub fn is_same(a: &Path, b: &Path) -> bool {
     is_same_path || matches!((identity(a), identity(b)), (Ok(a), Ok(b)) if a == b)
 }
 
-/// Fills a file beside `path` with what `write` writes and puts it in the place of the file of `kind` that is there;
-/// returns what `write` returns.
+/// Fills a file beside `path` with the output of `write` and puts it in the place of the file of `kind` that is
+/// there; returns the result of `write`.
 ///
 /// # Errors
-/// If it cannot be written: then what was there is as it was.
+/// If it cannot be written: the file that was there is then unchanged.
 pub fn write<T>(
     path: &Path,
     kind: &Kind,

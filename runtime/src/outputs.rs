@@ -20,7 +20,7 @@ const ATTEMPTS: u32 = 100;
 const POLL: Duration = Duration::from_millis(20);
 /// Checkpoints whose places are looked at before the run: of a thousand more the names differ by a number only.
 const CHECKPOINTS_CHECKED: usize = 100;
-/// The file in a run directory that lists what the run writes.
+/// The file in a run directory that lists the files that the run writes.
 const LIST: &str = "outputs.json";
 
 /// A file that a run writes.
@@ -68,7 +68,7 @@ impl Outputs {
     /// The recording of `graph` at `recording`, if it has a recorder, and its logs; `pages` are written behind the run.
     ///
     /// # Errors
-    /// If one of them would replace what is not of its kind, an input of the run, or another of them.
+    /// If one of them would replace a file of another kind, an input of the run, or another of them.
     pub fn of(manifest: &Manifest, graph: &Graph, recording: &Path, pages: Vec<Output>) -> Result<Self> {
         let stem = recording.with_extension("");
         let has_recorder = graph.programs.iter().any(Program::is_recorder);
@@ -144,7 +144,7 @@ impl Outputs {
         partial.set_aside(&aside(number)).map(Some)
     }
 
-    /// Lists what the run has claimed, for those who come to find it claimed.
+    /// Lists the files that the run has claimed, for runs that find them claimed.
     fn publish(&self, run_dir: &RunDir) -> Result<()> {
         let all = self.recording.iter().chain(&self.logs);
         let paths = all.map(|output| output_file::real_path(&output.path));
@@ -163,8 +163,8 @@ impl Outputs {
         self.partial.as_ref().map(|partial| &*partial.path)
     }
 
-    /// Puts the recording of a run that has ended in order in its place; returns it, read from the file that this run
-    /// has written, whatever lies at its path by now.
+    /// Puts the recording of a run that has ended in order in its place. Returns it, read from the file that this run
+    /// has written, even if its path has another file by now.
     ///
     /// # Errors
     /// If it is not complete, or something must not be replaced: then it stays where it was written.

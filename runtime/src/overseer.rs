@@ -22,7 +22,7 @@ pub struct Death {
 #[derive(Clone, Debug)]
 pub struct Abort(pub String);
 
-/// Decides what follows: the states of the run, and those of its replacements.
+/// Decides the consequences of events: the states of the run, and those of its replacements.
 #[derive(Debug)]
 pub struct Overseer<'a> {
     plan: &'a Plan,
@@ -70,7 +70,7 @@ impl<'a> Overseer<'a> {
         }
     }
 
-    /// Tells the state machine what happened; an abort is left to the caller, which can say why.
+    /// Passes an event to the state machine; an abort is left to the caller, which knows the reason.
     pub fn tell(&mut self, event: Event) -> Action {
         let (state, action) = self.state.after(event);
         self.state = state;
@@ -80,7 +80,7 @@ impl<'a> Overseer<'a> {
         action
     }
 
-    /// The run ends: nothing can answer what has happened.
+    /// The run ends: no action can answer the event.
     fn fail(&mut self, message: String) -> Abort {
         self.tell(Event::Died { policy: OnExit::Stop, is_possible: false });
         Abort(message)

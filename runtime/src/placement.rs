@@ -43,8 +43,8 @@ pub fn depths(nodes: &[NodePlan], publisher: impl Fn(usize) -> usize) -> Vec<usi
     depths
 }
 
-/// Gives every node that has none a core: each feedback loop has one of its own while they last, and what is
-/// in no loop (pilots, players, recorders, the clock) shares the last. More loops than that take turns on all
+/// Gives a core to every node without one. Each feedback loop has a core of its own while they last. Nodes in no loop
+/// (pilots, players, recorders, the clock) share the last core. If there are more loops, they take turns on all
 /// cores, the last included.
 ///
 /// A loop is a serial chain: on one core a hop costs a context switch, across cores it costs an
@@ -61,7 +61,7 @@ pub fn place(plan: &mut Plan, clock_cpu: Option<usize>) {
     let loop_cores = if count < cores.len() { &cores[..cores.len() - 1] } else { &cores[..] };
     plan.clock_cpu = clock_cpu.or(Some(last));
     for (index, (node, in_loop)) in plan.nodes.iter_mut().zip(loops).enumerate() {
-        // Without a loop there is no serial chain to keep together: what computes is spread instead.
+        // Without a loop there is no serial chain to keep together: nodes that compute are spread instead.
         let spread = (!has_loop && !node.outputs.is_empty()).then_some(index);
         let default = in_loop.or(spread).map_or(last, |number| loop_cores[number % loop_cores.len()]);
         node.cpu = node.cpu.or(Some(default));

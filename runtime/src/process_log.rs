@@ -9,11 +9,11 @@ use std::path::Path;
 
 /// Bytes of a log in the run directory that may take up room: that folder is often memory.
 const KEPT_BYTES: u64 = 16 * 1024 * 1024;
-/// Bytes at the end of a log that are looked at: a panic's message stands in front of its backtrace.
+/// Bytes at the end of a log that are read: a panic's message stands in front of its backtrace.
 const TAIL_BYTES: u64 = 64 * 1024;
 /// Lines that are shown.
 const LINES: usize = 20;
-/// The same where the line that says what went wrong stands above them: layouts of two messages are as long.
+/// The same if the line with the error stands above them: layouts of two messages are as long.
 const ERROR_LINES: usize = 160;
 /// Characters of a line that are shown: a line without end fills neither memory nor terminal.
 const LINE_CHARS: usize = 600;
@@ -48,8 +48,8 @@ pub fn last_words(path: &Path) -> Vec<String> {
     lines[last.min(error.unwrap_or(last))..].iter().map(|line| printable(line)).collect()
 }
 
-/// Gives back the room of all but the end of the log at `path`. Its length stays as it is, so that whoever writes to it
-/// goes on behind its end; what is gone reads as zeros. A file system that cannot do this keeps it all.
+/// Gives back the room of all but the end of the log at `path`. Its length does not change, so that its writer goes
+/// on behind its end. The removed part reads as zeros. A file system that cannot do this keeps the whole log.
 pub fn bound(path: &Path) {
     let Ok(length) = path.metadata().map(|log| log.len()) else { return };
     let Some(gone) = length.checked_sub(KEPT_BYTES).filter(|&gone| gone > KEPT_BYTES) else { return };

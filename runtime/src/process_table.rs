@@ -22,7 +22,7 @@ pub fn ancestors(process: Pid) -> impl Iterator<Item = Pid> {
 /// The parent of a process; `None` for one that is gone, and for the first one.
 fn parent_of(process: Pid) -> Option<Pid> {
     let stat = std::fs::read(format!("/proc/{process}/stat")).ok()?;
-    // The name stands in brackets and may hold anything; behind it come the state and the parent (proc_pid_stat(5)).
+    // The name stands in brackets and may hold any bytes; behind it come the state and the parent (proc_pid_stat(5)).
     let behind = stat.iter().rposition(|&byte| byte == b')')? + 1;
     let mut fields = stat[behind..].split(u8::is_ascii_whitespace).filter(|field| !field.is_empty());
     std::str::from_utf8(fields.nth(1)?).ok()?.parse().ok().and_then(Pid::from_raw)

@@ -71,7 +71,7 @@ impl<B: Body> Processes<B> {
         }
     }
 
-    /// Forgets the process of a node's generation, whose end is settled, and what it wrote into the run directory.
+    /// Forgets the process of a node's generation, whose end is settled, and removes its log from the run directory.
     pub fn forget(&mut self, node: usize, generation: u32) {
         if let Some(process) = self.of(node, generation) {
             process.body.remove_log();

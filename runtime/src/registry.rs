@@ -5,7 +5,7 @@ use bus::schema::Schema;
 use bus::{BusError, Registration};
 use std::collections::BTreeMap;
 
-/// The components that a manifest may name: whoever checks or launches one says which there are.
+/// The components that a manifest may name: the caller that checks or launches a manifest states them.
 ///
 /// ```
 /// use bus::{BusError, Registration};

@@ -1,12 +1,12 @@
 //! Replacements: backups are started, join, shadow the primary, take over, and outlive it.
 //!
-//! A pure state machine: what it sees of the run is a `View`, what it wants done are `Command`s.
+//! A pure state machine: its observations of the run are a `View`, its actions are `Command`s.
 //! Each node has at most one backup at a time, which goes through the stages below. A change of the run is a new
 //! membership: it is written, every instance acknowledges it, and only then the next one is made.
 //!
 //! - `joining`: from the start of its process to its first tick
 //! - `take_over`: from its first tick that counts to the end of its predecessor, planned or after a death
-//! - `report`: what became of it
+//! - `report`: reports about the backups
 
 mod joining;
 mod report;
@@ -54,7 +54,7 @@ struct Pending {
     purpose: Purpose,
     is_planned: bool,
     join: Join,
-    /// The request that asked for it.
+    /// The request for it.
     request: Option<u32>,
 }
 
@@ -174,7 +174,7 @@ impl<'a> Replacements<'a> {
         }
     }
 
-    /// The program of the primary of `node`, which says what follows its end.
+    /// The program of the primary of `node`, with the action at its end.
     pub(crate) fn program(&self, node: usize) -> &Program {
         &self.nodes[node].program
     }
@@ -294,7 +294,7 @@ impl<'a> Replacements<'a> {
         !is_joining && self.may_change(node)
     }
 
-    /// Removes what a process that has ended left behind, and frees its slot.
+    /// Removes the remains of a process that has ended, and frees its slot.
     fn free(&mut self, node: usize, generation: u32) {
         self.view.free(node, generation, self.slot(node, generation));
     }
@@ -316,7 +316,7 @@ impl<'a> Replacements<'a> {
         self.reports.push(backup.report);
     }
 
-    /// Takes the backup of `node`, which had come to `stage`, out of the membership.
+    /// Takes the backup of `node`, which had reached `stage`, out of the membership.
     fn withdraw(&mut self, node: usize, stage: Stage) {
         let membership = &mut self.membership.nodes[node];
         if membership.backup.take().is_some() {

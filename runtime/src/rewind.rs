@@ -11,13 +11,13 @@ use std::path::PathBuf;
 /// Name of the attachment that says where a recording's run went back.
 pub const MARK: &str = "rewinds.toml";
 
-/// A rewind that is asked for or under way.
+/// A rewind that is requested or under way.
 pub(crate) struct Rewind {
     /// The tick at which the run was paused.
     pub from_tick: u32,
     /// The tick of the checkpoint.
     pub to_tick: u32,
-    /// The pace that was asked for last.
+    /// The pace that was requested last.
     pub pace: Pace,
     /// The place of the answer, which is given when the run is paused again.
     pub reply: Reply,
@@ -35,7 +35,7 @@ pub struct Rewound {
     pub from_tick: u32,
     /// The tick of the checkpoint, from which it went on.
     pub to_tick: u32,
-    /// The recording of what was flown up to `from_tick`.
+    /// The recording of the flight up to `from_tick`.
     pub recording: Option<PathBuf>,
 }
 
@@ -66,7 +66,7 @@ impl Rewinds {
         self.asked.replace(Some((rewind, graph)));
     }
 
-    /// The rewind that was asked for, and the graph that goes on.
+    /// The requested rewind, and the graph that goes on.
     pub fn take_asked(&self) -> Option<(Rewind, Graph)> {
         self.asked.take()
     }
@@ -76,7 +76,7 @@ impl Rewinds {
         self.place.replace(place);
     }
 
-    /// Refuses a rewind that cannot keep what was flown.
+    /// Refuses a rewind that cannot keep the recording of the flight.
     ///
     /// # Errors
     /// If something else lies there.

@@ -1,8 +1,8 @@
-//! The run directory and the registry of runs: who flies, and who left something behind.
+//! The run directory and the registry of runs: the live runs, and those with remains.
 //!
 //! A run registers before it creates anything else and signs off after it has removed everything else. Its entry
 //! is a file in /dev/shm that the launcher holds locked for its life. The kernel gives the lock back when the
-//! launcher dies, however it dies: so who can have the lock knows that the run is dead.
+//! launcher dies, in any way: so a process that can get the lock knows that the run is dead.
 
 use crate::file_lock;
 use anyhow::{Context, Result, anyhow, bail};
@@ -24,7 +24,7 @@ const ENTRY_BYTES_MAX: u64 = 64 << 10;
 
 /// Files that are kept open for the removal of a run directory: one for each folder in a folder, and one for a list.
 const SPARE_FILES: usize = 8;
-/// Below this much the folder for temporary files is told with an error: what a process could not write may have been
+/// With less than this free, errors mention the folder for temporary files: a file that did not fit may have been
 /// removed by then.
 const FULL_BYTES: u64 = 256 << 10;
 
@@ -85,7 +85,7 @@ pub(crate) fn folders() -> Vec<PathBuf> {
 fn new_run_dir(run_id: &str) -> Result<PathBuf> {
     let folders = folders();
     let mut paths = folders.iter().map(|folder| folder.join(dir_name(run_id))).enumerate();
-    // The folder that is wanted is taken: creating the directory says what is wrong with it.
+    // The first folder is taken even if it cannot be written to: creating the directory then reports the fault.
     let is_usable = |(index, path): &(usize, PathBuf)| {
         bus::takes_run_dir(path, run_id) && (*index == 0 || may_create(path))
     };
@@ -107,7 +107,7 @@ pub(crate) struct RunDir {
     entry: Entry,
     /// The entry and the directory, locked until the process ends.
     _locks: [File; 2],
-    /// Kept open so that there is room to look at what is to be removed, however many files this process may open.
+    /// Kept open so that there is a descriptor for listing the remains, however many files this process may open.
     spare: Vec<File>,
     is_removed: bool,
 }
@@ -183,7 +183,7 @@ impl RunDir {
         )
     }
 
-    /// Removes everything; returns what could not be removed, each as a sentence.
+    /// Removes everything; returns the failures, each as a sentence.
     pub fn remove(mut self) -> Vec<String> {
         self.clear()
     }
@@ -199,7 +199,7 @@ impl RunDir {
             _ => None,
         };
         let directory = told(self.path(), std::fs::remove_dir_all(self.path()));
-        // The entry last: what has no entry belongs to nobody.
+        // The entry last: a file without an entry belongs to no run.
         let files = shared_memory_of(self.run_id()).into_iter().chain([entry_path(self.run_id())]);
         directory
             .into_iter()
@@ -328,7 +328,7 @@ fn lock_and_write(mut file: File, text: &[u8]) -> std::io::Result<Option<File>> 
     if file.metadata()?.nlink() == 0 {
         return Ok(None);
     }
-    // Whatever the umask takes away.
+    // Even if the umask would take them away.
     file.set_permissions(std::fs::Permissions::from_mode(0o600))?;
     file.write_all(text)?;
     Ok(Some(file))
@@ -338,7 +338,7 @@ fn lock_and_write(mut file: File, text: &[u8]) -> std::io::Result<Option<File>> 
 /// not /dev/shm, neither sees the other's entries.
 fn create_locked(run_dir: &Path) -> std::io::Result<File> {
     std::fs::DirBuilder::new().mode(0o700).create(run_dir)?;
-    // Whatever the umask takes away.
+    // Even if the umask would take them away.
     let opened = std::fs::set_permissions(run_dir, std::fs::Permissions::from_mode(0o700))
         .and_then(|()| user_file::open_folder(run_dir));
     opened
@@ -426,7 +426,7 @@ fn live_run(path: &Path) -> Option<LiveRun> {
 /// The live run named `run_id`, or the only one.
 ///
 /// # Errors
-/// If there is no such run, or several to choose from; the error lists those that there are.
+/// If there is no such run, or several to choose from; the error lists the live runs.
 pub fn find_live(run_id: Option<&str>) -> Result<LiveRun> {
     choose(live_runs(), run_id)
 }

@@ -37,10 +37,10 @@ impl<'a> Started<'a> {
     }
 }
 
-/// The process `name` of the run in `run_dir`, and the file that its output goes to.
+/// The process `name` of the run in `run_dir`, and the file of its output.
 ///
 /// # Errors
-/// If it cannot be started, or the niceness or priority that it asks for is not allowed.
+/// If it cannot be started, or its niceness or priority is not allowed.
 pub fn start(
     exe: &Path,
     run_dir: &Path,
@@ -106,7 +106,8 @@ fn command(exe: &Path, started: Started<'_>) -> Command {
             };
             let mut command = Command::new(exe);
             command.arg0("hummingbus").args(["node", kind]);
-            // A `command` may be a shell that starts others first, who would not hear these signals either.
+            // A `command` may be a shell that starts other programs first, which would not receive these signals
+            // either.
             bus::process::hold_stop_signals(&mut command);
             command
         }

@@ -1,9 +1,9 @@
-//! Watching over a run: starts its processes, answers what happens, and takes everything down again.
+//! Supervision of a run: starts its processes, reacts to events, and ends everything again.
 //!
-//! - `requests`: swaps that are asked for in flight
-//! - `ends`: what follows when processes and sidecars end
+//! - `requests`: swaps requested in flight
+//! - `ends`: reactions to the end of processes and sidecars
 //! - `standstill`: runs that stand still, and backups that do not join
-//! - `straggler`: because of whom a run stands still
+//! - `straggler`: the instance on which a run waits
 
 mod ends;
 mod requests;
@@ -45,7 +45,7 @@ fn shuffle<T>(items: &mut [T], seed: Option<u64>) {
     }
 }
 
-/// Watches over a run: what happens is told to the state machine, and what that answers is done.
+/// Supervisor of a run: passes events to the state machine, and carries out its actions.
 pub struct Supervisor<'a, W: World> {
     graph: &'a Graph,
     plan: &'a Plan,
@@ -58,7 +58,7 @@ pub struct Supervisor<'a, W: World> {
     clock: WatchClock,
     /// Per node: processor time in nanoseconds, and deadlines missed, of the instances that have left.
     spent: Vec<Spent>,
-    /// Swaps that were asked for and have not come to their end: the request, and where its answer goes.
+    /// Swaps that were requested and have not ended: the request, and the place of its answer.
     swaps: Vec<(u32, W::Reply)>,
     requests: u32,
     stop: &'a StopToken,
@@ -67,7 +67,7 @@ pub struct Supervisor<'a, W: World> {
     timing: Timing,
 }
 
-/// When the supervisor did what it does now and then, on the watchdogs' clock.
+/// Times of the supervisor's periodic actions, on the watchdogs' clock.
 #[derive(Debug, Default)]
 struct Timing {
     /// Progress of the run at its last change, and the time of that change.
@@ -76,7 +76,7 @@ struct Timing {
     reaped: Duration,
 }
 
-/// Progress of a run. Whatever of it changes, another process has its turn, and its watchdog begins anew.
+/// Progress of a run. After any change of it another process has its turn, and its watchdog begins anew.
 #[derive(Debug, Default, PartialEq)]
 struct Advance {
     /// Progress of the first instances' joining; none before the first look.
@@ -117,8 +117,8 @@ impl<'a, W: World> Supervisor<'a, W> {
         }
     }
 
-    /// Starts all processes, in the order of `start_order_seed`, and watches until they have ended. Whatever goes
-    /// wrong, those that live may leave in order: the recorder finishes its file.
+    /// Starts all processes, in the order of `start_order_seed`, and watches until they have ended. After any error
+    /// the live processes may still leave in order: the recorder finishes its file.
     ///
     /// # Errors
     /// The error that ended the run before its time.
@@ -164,7 +164,7 @@ impl<'a, W: World> Supervisor<'a, W> {
         Ok(())
     }
 
-    /// The tick at which the clock must wait: for those who join, and for sidecars that are not ready.
+    /// The tick at which the clock must wait for joining instances, and for sidecars that are not ready.
     fn join_tick(&self) -> u32 {
         if self.sidecars.all_ready() { self.overseer.replacements.hold_tick() } else { 0 }
     }
@@ -179,7 +179,7 @@ impl<'a, W: World> Supervisor<'a, W> {
         Ok(())
     }
 
-    /// Looks once at everything, and does what follows.
+    /// Looks once at everything, and carries out the consequences.
     fn look(&mut self) -> Result<()> {
         self.clock.look(self.world.now());
         self.processes.look()?;
@@ -197,7 +197,7 @@ impl<'a, W: World> Supervisor<'a, W> {
         }
         let ended = self.overseer.note_too_late();
         self.follow(ended)?;
-        // Before `advance` too: what is held now must stay held while a backup joins.
+        // Before `advance` too: a held run must stay held while a backup joins.
         self.see();
         self.world.write(SegmentWrite::JoinTick(self.join_tick()));
         self.see();
@@ -216,7 +216,7 @@ impl<'a, W: World> Supervisor<'a, W> {
         (self.listener)(RunEvent::Note(text));
     }
 
-    /// Tells how far the run has come.
+    /// Reports the progress of the run.
     fn tell_progress(&mut self) {
         let view = &self.overseer.replacements.view;
         let has_begun = !view.first_grant.is_zero();
@@ -237,7 +237,7 @@ impl<'a, W: World> Supervisor<'a, W> {
         self.overseer.replacements.view = view;
     }
 
-    /// Does what the replacements want done.
+    /// Carries out the commands of the replacements.
     fn carry_out(&mut self) -> Result<()> {
         while !self.overseer.replacements.view.commands.is_empty() {
             for command in std::mem::take(&mut self.overseer.replacements.view.commands) {
@@ -275,7 +275,7 @@ impl<'a, W: World> Supervisor<'a, W> {
         Ok(())
     }
 
-    /// Removes what a process that has ended left behind, and frees its slot.
+    /// Removes the remains of a process that has ended, and frees its slot.
     fn free(&mut self, node: usize, generation: u32, slot: usize) {
         self.spent[node] = self.spent[node].plus(self.world.spent(slot));
         self.world.write(SegmentWrite::Clear(slot));
@@ -309,14 +309,14 @@ impl<'a, W: World> Supervisor<'a, W> {
         }
     }
 
-    /// Tells the state machine what happened, and does what follows.
+    /// Passes an event to the state machine, and carries out the consequences.
     fn tell(&mut self, event: Event) -> Result<Action> {
         let action = self.overseer.tell(event);
         self.carry_out()?;
         Ok(action)
     }
 
-    /// Does what was decided, and ends the run if that was it.
+    /// Carries out a decision, and ends the run if that was it.
     fn follow<T>(&mut self, decided: Result<T, Abort>) -> Result<T> {
         for note in std::mem::take(&mut self.overseer.notes) {
             self.say(&note);
@@ -333,7 +333,7 @@ impl<'a, W: World> Supervisor<'a, W> {
         Err(anyhow!(message))
     }
 
-    /// Ends all processes. A failure is only noted: the run's error stays what ended it.
+    /// Ends all processes. A failure is only noted: the error of the run stays the one that ended it.
     fn take_down(&mut self) {
         let nodes = self.plan.nodes.iter().enumerate();
         let readers: Vec<_> =

@@ -30,9 +30,9 @@ pub enum Event {
     Gathered,
     /// The last tick was granted.
     EndReached,
-    /// Somebody asked for a stop: Ctrl-C, SIGTERM, `ctl stop`.
+    /// A stop was requested: Ctrl-C, SIGTERM, `ctl stop`.
     StopRequested,
-    /// Somebody asked a second time.
+    /// A stop was requested a second time.
     Interrupted,
     /// A process died, or hung and was killed, before it had done its part.
     Died {
@@ -77,7 +77,7 @@ impl State {
         matches!(self, Self::Stopped | Self::Failed)
     }
 
-    /// The state after `event`, and what to do.
+    /// The state after `event`, and the action.
     pub fn after(self, event: Event) -> (Self, Action) {
         use Action::{Abort, Nothing, Promote, Refuse, RequestStop, Restart};
         use State::{Draining, Failed, Gathering, Running, Starting, Stopped};
@@ -96,7 +96,7 @@ impl State {
             }
             (_, Event::Died { .. }) => (Failed, Abort),
             (_, Event::BackupFailed) => (self, Refuse),
-            // Nobody needs it any more; it may have ended because the nodes have.
+            // The sidecar is not needed any more; it may have ended because the nodes have.
             (Draining, Event::SidecarFailed { .. }) => (self, Nothing),
             (_, Event::SidecarFailed { policy: OnExit::Restart, is_possible: true }) => (self, Restart),
             (_, Event::SidecarFailed { policy: OnExit::Ignore, .. }) => (self, Nothing),

@@ -35,7 +35,7 @@ pub enum Command {
         /// Generation of the instance.
         generation: u32,
     },
-    /// Remove what an instance that has ended left behind, and clear its slot.
+    /// Remove the remains of an instance that has ended, and clear its slot.
     Free {
         /// The node.
         node: usize,
@@ -55,7 +55,7 @@ pub enum Command {
 pub enum SegmentWrite {
     /// Clear a slot for another instance.
     Clear(usize),
-    /// State what a slot holds.
+    /// Set the state of a slot.
     SetSlot(usize, SlotState),
     /// Have the instance in a slot begin at a tick.
     FirstTick(usize, u32),
@@ -63,7 +63,7 @@ pub enum SegmentWrite {
     StartShadow(usize, u32),
     /// Make this membership the newest one.
     Publish(u32),
-    /// Have the clock wait at this tick for those who join; `u32::MAX` for none.
+    /// Have the clock wait at this tick for joining instances; `u32::MAX` for none.
     JoinTick(u32),
     /// Have the clock end the run at the next tick boundary.
     RequestStop,
@@ -119,7 +119,7 @@ pub struct View {
     pub granted: u32,
     /// The tick at which the clock waits.
     pub held_at: Option<u32>,
-    /// The tick at which a user wants the clock to wait; `u32::MAX` if nobody does.
+    /// The tick at which a user wants the clock to wait; `u32::MAX` for none.
     pub hold_tick: u32,
     /// True if the clock has to act next.
     pub awaits_clock: bool,
@@ -265,7 +265,7 @@ impl View {
         self.write(SegmentWrite::Clear(slot));
     }
 
-    /// Commands what a slot holds.
+    /// Commands a new state of a slot.
     pub fn set_slot_state(&mut self, slot: usize, state: SlotState) {
         self.slots[slot].state = state;
         self.write(SegmentWrite::SetSlot(slot, state));

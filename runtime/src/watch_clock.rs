@@ -1,7 +1,7 @@
 //! The time that watchdogs count: host time in which the launcher itself was running.
 //!
-//! When everything is frozen for a while (a paused container, a closed lid, a debugger), nobody could have come on, and
-//! nobody is to blame. The launcher cannot see that it was frozen; it sees that it looked late.
+//! While everything is frozen (a paused container, a closed lid, a debugger), no process can advance, and none is to
+//! blame. The launcher cannot see that it was frozen; it sees that it looked late.
 
 use std::time::Duration;
 
@@ -9,7 +9,7 @@ use std::time::Duration;
 /// may be delayed by some tenths of a second, and so may every other process.
 const PAUSE_COUNTED_MAX: Duration = Duration::from_millis(100);
 
-/// A clock that goes on only while somebody looks at it often.
+/// A clock that goes on only while it is looked at often.
 #[derive(Clone, Copy, Debug)]
 pub struct WatchClock {
     counted: Duration,

@@ -52,7 +52,7 @@ pub trait World {
     fn see(&self) -> View;
     /// The topic for which the instance in `slot`, whose inputs are `inputs`, sleeps.
     fn awaited_topic(&self, slot: usize, inputs: &[InputPlan]) -> Option<usize>;
-    /// Writes to the control segment, and wakes those who wait for it.
+    /// Writes to the control segment, and wakes the processes that wait for it.
     fn write(&mut self, write: SegmentWrite);
     /// The count of the supervisor's notices: to be read before a look at the run, and waited on after it.
     fn notices(&self) -> u32;
@@ -61,7 +61,7 @@ pub trait World {
     /// Processor time and delays of the instance in `slot`.
     fn spent(&self, slot: usize) -> Spent;
 
-    /// Starts a process; the clock where there is no program.
+    /// Starts a process; the clock if `program` is `None`.
     ///
     /// # Errors
     /// If it cannot be started.
@@ -81,17 +81,17 @@ pub trait World {
     /// # Errors
     /// If the file cannot be written.
     fn store_membership(&mut self, membership: &Membership) -> Result<(), BusError>;
-    /// Removes what an instance that has ended left behind; one that was killed has removed nothing itself.
+    /// Removes the remains of an instance that has ended; one that was killed has removed nothing itself.
     fn remove_traces(&mut self, node: usize, generation: u32, was_killed: bool);
 
-    /// Serves what has been asked of the run; returns a request that is for the supervisor, a swap.
+    /// Serves the requests to the run; returns one that is for the supervisor, a swap.
     fn next_request(&mut self) -> Option<(Request, Self::Reply)>;
     /// Answers a request.
     fn answer(&mut self, reply: Self::Reply, answer: &Answer);
     /// The backup of `process` that a request describes as `with`.
     ///
     /// # Errors
-    /// If there is no such process, or that cannot replace it.
+    /// If there is no such process, or the backup cannot replace it.
     fn backup_of(&self, process: &str, with: &str) -> Result<BackupSpec, Diagnostic>;
 }
 

@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 const START: Duration = Duration::from_secs(5);
 const POLL: Duration = Duration::from_millis(5);
 
-/// Asks `run`, and waits for its answer, which may take as long as what is asked.
+/// Sends `request` to `run`, and waits for its answer, which may take as long as the action.
 ///
 /// # Errors
 /// If the run has ended.

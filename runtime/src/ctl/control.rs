@@ -66,7 +66,7 @@ impl<'a> ControlServer<'a> {
         Ok(Self { plan, control, server, checkpoints, rewinds, wish })
     }
 
-    /// Serves what has been asked since the last look; returns a request that is not about the clock, a swap.
+    /// Serves the requests since the last look; returns one that is not about the clock, a swap.
     pub fn serve(&mut self) -> Option<Asked> {
         self.grant_wish();
         for _ in 0..MAX_A_LOOK {
@@ -108,7 +108,7 @@ impl<'a> ControlServer<'a> {
         reply.send(&Answer::Done { text, tick: self.control.completed_ticks() });
     }
 
-    /// Tells who waits for something that a later request undoes; true if there was somebody.
+    /// Refuses the waiting request that a later one replaces; true if there was one.
     fn overtake(&mut self) -> bool {
         let overtaken = self.wish.take();
         overtaken.map(|(_, reply)| reply.send(&Answer::refused("a later request took its place"))).is_some()
@@ -229,7 +229,7 @@ fn ticks_in_words(ticks: u32) -> String {
 
 impl Drop for ControlServer<'_> {
     fn drop(&mut self) {
-        // A step may have come to the run's end since the last look.
+        // A step may have reached the run's end since the last look.
         self.grant_wish();
     }
 }

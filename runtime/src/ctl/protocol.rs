@@ -166,7 +166,7 @@ pub struct Status {
     pub end_tick: u32,
     /// Simulated time, in seconds.
     pub time_s: f64,
-    /// The pace that is asked for.
+    /// The requested pace.
     pub pace: PaceSetting,
     /// Deadlines missed (paced runs).
     pub missed_deadlines: u32,
@@ -200,7 +200,7 @@ impl std::fmt::Display for Status {
 mod tests {
     use super::{Answer, Request};
 
-    /// Requires that `line` is what a request is written as and read from.
+    /// Requires that `line` is the text of a request, and that a request is written as `line`.
     fn require_round_trip(line: &str) {
         let request: Request = serde_json::from_str(line).unwrap_or_else(|error| panic!("{line}: {error}"));
         assert_eq!(serde_json::to_string(&request).unwrap(), line);

@@ -33,14 +33,14 @@ struct Listener {
     is_closed: AtomicBool,
 }
 
-/// A client, and the thread that reads what it asks. The stream belongs to that thread and to the answers that are
+/// A client, and the thread that reads its requests. The stream belongs to that thread and to the answers that are
 /// due, so that it closes behind the last of them.
 type Client = (Weak<UnixStream>, JoinHandle<()>);
 
-/// A request, and where its answer goes.
+/// A request, and the place of its answer.
 pub type Asked = (Request, Reply);
 
-/// The place of one answer; dropping it without an answer tells the client that the run has ended.
+/// The place of one answer; dropping it without an answer sends the client the message that the run has ended.
 #[derive(Debug)]
 pub struct Reply(Option<Place>);
 
@@ -72,12 +72,12 @@ impl Remote {
         Self(sender)
     }
 
-    /// Asks the run, and waits for its answer, which may take as long as what is asked. A run that has not begun
-    /// answers once it flies; one that has ended refuses.
+    /// Sends a request to the run, and waits for its answer, which may take as long as the action. A run that has not
+    /// begun answers once it flies; one that has ended refuses.
     #[must_use]
     pub fn ask(&self, request: Request) -> Answer {
         let (sender, answer) = channel();
-        // A reply that nobody takes is dropped, and answers by that.
+        // A reply that is not taken is dropped, and dropping it answers.
         drop(self.0.send((request, Reply(Some(Place::Thread(sender))))));
         answer.recv().unwrap_or_else(|_| ended())
     }
@@ -120,15 +120,15 @@ pub fn socket_path(run_dir: &std::fs::File) -> PathBuf {
 }
 
 impl Listener {
-    /// Reads what the client at the other end of `stream` asks, until it leaves, does not take an answer, or the
-    /// socket is closed.
+    /// Reads the requests of the client at the other end of `stream`, until it leaves, does not take an answer, or
+    /// the socket is closed.
     fn read_requests(&self, stream: &Arc<UnixStream>, sender: &Sender<Asked>) {
         let _ = stream.set_write_timeout(Some(WRITE_TIMEOUT));
         for line in BufReader::new(&**stream).lines() {
             let Ok(line) = line else { return };
             let reply = Reply(Some(Place::Stream(stream.clone())));
             let is_heard = match serde_json::from_str(&line) {
-                // The launcher that no longer takes requests drops the reply, and so tells the client.
+                // The launcher that no longer takes requests drops the reply, and so answers the client.
                 Ok(request) => {
                     drop(sender.send((request, reply)));
                     true
@@ -172,9 +172,9 @@ impl Listener {
         }
     }
 
-    /// Has a thread read what the client at the other end of `stream` asks.
+    /// Starts a thread that reads the requests of the client at the other end of `stream`.
     fn client(self: &Arc<Self>, stream: UnixStream, remote: &Remote) -> std::io::Result<Option<Client>> {
-        // Nobody else gets through the run directory; root does everywhere.
+        // The run directory is closed to other users, except root.
         if !is_own_user(&stream) {
             return Ok(None);
         }
@@ -192,7 +192,7 @@ fn thread() -> std::thread::Builder {
 impl Drop for Server<'_> {
     fn drop(&mut self) {
         self.listener.is_closed.store(true, Ordering::SeqCst);
-        // Who waits for a client returns with an error.
+        // A thread that waits for a client returns with an error.
         let _ = rustix::net::shutdown(&self.listener.socket, rustix::net::Shutdown::Both);
         self.thread.take().map(JoinHandle::join);
     }

@@ -28,13 +28,13 @@ struct Run<'m> {
     declared_nodes: &'m [DeclaredNode<'m>],
 }
 
-/// A backup and the place that asks for it.
+/// A backup and the place in the manifest that declares it.
 type Placed = (BackupSpec, Range<usize>);
 
 /// Every backup that the manifest asks for, in the order in which they join.
 ///
 /// # Errors
-/// One that cannot join, or cannot be what it is asked to be.
+/// One that cannot join, or cannot have the declared purpose.
 pub fn all(
     manifest: &Manifest,
     plan: &Plan,
@@ -65,12 +65,12 @@ pub fn all(
     Ok(placed.into_iter().map(|(backup, _)| backup).collect())
 }
 
-/// The backup of `process` in a run of `manifest` by `plan` that is under way; `with_text` is TOML that says in what
-/// it differs, as `with` does. When it joins and takes over is left open. It reads the run's `files`; one that the run has
-/// not read yet is read now.
+/// The backup of `process` in a run of `manifest` by `plan` that is under way; `with_text` is TOML with its
+/// differences, as in `with`. The ticks at which it joins and takes over are left open. It reads the run's `files`;
+/// one that the run has not read yet is read now.
 ///
 /// # Errors
-/// If there is no such process, or it cannot be succeeded by that.
+/// If there is no such process, or the backup cannot succeed it.
 pub fn backup_of(
     manifest: &Manifest,
     plan: &Plan,
@@ -149,7 +149,7 @@ impl Run<'_> {
         self.plan.nodes[node].outputs.iter().map(output).collect()
     }
 
-    /// Refuses a kind that does not publish what `node` publishes.
+    /// Refuses a kind that does not publish the outputs of `node`.
     fn require_same_outputs(
         &self,
         node: usize,

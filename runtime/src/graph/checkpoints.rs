@@ -6,10 +6,10 @@ use bus::plan::Plan;
 use diagnostics::Diagnostic;
 use std::ops::Range;
 
-/// Makes the nodes of `plan` write the checkpoints that `manifest` asks for.
+/// Makes the nodes of `plan` write the checkpoints of `manifest`.
 ///
 /// # Errors
-/// A tick that is none of the run's, that a node does not reach, that lies within a swap, or at which a process flies whose
+/// A tick outside the run, that a node does not reach, that lies within a swap, or at which a process flies whose
 /// state no checkpoint holds.
 pub fn add(
     manifest: &Manifest,
@@ -39,7 +39,7 @@ pub fn add(
             manifest.problem(&every.span(), message, "choose some time of at least one tick, such as 1.0")
         })?;
         let ticks = (1..).map_while(|number: u32| number.checked_mul(period));
-        // Where nobody takes over all ticks are like the first.
+        // Without take-overs every tick is like the first.
         let count = if backups.is_empty() { 1 } else { usize::MAX };
         let mut ticks = ticks.take(count).take_while(|&tick| plan.goes_on_from(tick));
         ticks.try_for_each(|tick| require_flying(plan, tick, &every.span()))?;
@@ -72,7 +72,7 @@ fn require_within(
     Ok(())
 }
 
-/// Refuses a checkpoint at `tick`, asked for at `span`, at which a process flies whose state is in another program.
+/// Refuses a checkpoint at `tick`, declared at `span`, at which a process flies whose state is in another program.
 fn require_saved(
     manifest: &Manifest,
     plan: &Plan,
@@ -88,7 +88,7 @@ fn require_saved(
     Err(manifest.problem(span, message, "leave checkpoints out: such a run flies from tick 0"))
 }
 
-/// Refuses a checkpoint at `tick`, asked for at `span`, at which a process is about to take another one's place.
+/// Refuses a checkpoint at `tick`, declared at `span`, at which a process is about to take another one's place.
 fn require_flying(
     manifest: &Manifest,
     backups: &[BackupSpec],

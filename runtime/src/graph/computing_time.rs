@@ -1,4 +1,4 @@
-//! Computing times: how long the steps of a process take, from its manifest and from what was measured.
+//! Computing times: the time of a process's steps, from its manifest or from measurements.
 
 use super::processes::DeclaredNode;
 use crate::manifest::ComputingTimeSetting;
@@ -10,9 +10,9 @@ use serde_json::Value;
 use std::path::Path;
 use toml::Spanned;
 
-/// Longer is no step of a loop: more likely µs were written for ms.
+/// A longer time is not that of a loop's step: more likely µs were written for ms.
 const MS_MAX: f64 = 1e5;
-/// Of more measured times than these no run draws all.
+/// With more measured times than these no run draws all of them.
 const TIMES_MAX: usize = 100_000;
 /// The fractions of a profile's quantiles, with their keys. Shorter times than the median are not in a profile: half of
 /// the steps take the median.
@@ -89,7 +89,7 @@ fn measured(
     Ok(ComputingTime::Measured { fraction_us: points })
 }
 
-/// The quantiles of the computing time of `process` in what `hummingbus profile --json` printed.
+/// The quantiles of the computing time of `process` in the output of `hummingbus profile --json`.
 fn quantiles(report: &Value, process: &str) -> Result<Vec<[f64; 2]>, String> {
     let nodes = report.pointer("/profile/nodes").and_then(Value::as_array);
     let nodes = nodes.ok_or("it holds no profile: print one with `hummingbus profile MANIFEST --json`")?;

@@ -66,8 +66,8 @@ fn check_limits(manifest: &Manifest, pass: &Spanned<PassCondition>) -> Result<()
     }
 }
 
-/// Refuses a span in which nothing can be judged; tells one that the run ends in. Where the run was cut short by other
-/// than the condition's own file, it is not refused.
+/// Refuses a span in which nothing can be judged, and warns of one that contains the end of the run. If another file
+/// than the condition's own cut the run short, the span is not refused.
 fn check_span(
     manifest: &Manifest,
     plan: &Plan,
@@ -276,7 +276,7 @@ fn unit_of(
     recorder::series::unit_of(schema, topic, field)
 }
 
-/// Refuses a condition on a topic that nobody publishes, or that neither the recorder nor a judge takes.
+/// Refuses a condition on a topic without a publisher, or that neither the recorder nor a judge takes.
 fn check_taken(manifest: &Manifest, plan: &Plan, programs: &[Program]) -> Result<(), Diagnostic> {
     let content = &manifest.content;
     let passes = content.pass.iter().chain(&content.measure);

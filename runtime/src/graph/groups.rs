@@ -8,7 +8,7 @@ use diagnostics::{Diagnostic, did_you_mean};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// The groups of a run of `nodes`: those that `run.compose` asks for, or else the manifest's `[group]` tables.
+/// The groups of a run of `nodes`: those of `run.compose`, or else the manifest's `[group]` tables.
 ///
 /// # Errors
 /// A group that is not well formed, and a member that needs a process of its own.

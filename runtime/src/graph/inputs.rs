@@ -1,4 +1,4 @@
-//! Inputs: who reads which topic, how late, and in which order a node waits for them.
+//! Inputs: the readers of each topic, their delays, and the order in which a node waits for its inputs.
 
 use super::outputs::{Published, require_known_ports};
 use super::processes::DeclaredNode;
@@ -106,7 +106,7 @@ fn bad_delay(program: &Program, setting: &InputSetting) -> Option<(String, &'sta
     Some((what.to_owned(), help))
 }
 
-/// The type that a built-in node reads on `port`; none where it reads any.
+/// The type that a built-in node reads on `port`; `None` if it reads any.
 fn expected_type(program: &Program, port: &str) -> Option<&'static str> {
     match program.component()?.inputs {
         Inputs::Ports(ports) => {

@@ -47,7 +47,7 @@ pub fn publish_all(declared_nodes: &[DeclaredNode<'_>]) -> Result<Vec<Published>
 
 /// Gives the outputs that forward a topic its type.
 fn resolve_forwarded(declared_nodes: &[DeclaredNode<'_>], all: &mut [Published]) -> Result<(), Diagnostic> {
-    // What is forwarded may be forwarded already: each pass knows one sender more.
+    // A forwarded message may be forwarded again: each pass finds the type of one sender more.
     for _ in 0..all.len() {
         for index in 0..all.len() {
             let Some(forwards) = &all[index].forwards else { continue };
@@ -78,7 +78,7 @@ fn resolve_forwarded(declared_nodes: &[DeclaredNode<'_>], all: &mut [Published])
     Err(declared.manifest.problem(&unknown.span, message, help))
 }
 
-/// Refuses to forward what the process cannot carry, or under another type.
+/// Refuses to forward messages that the process cannot carry, or under another type.
 fn require_forwardable(
     declared: &DeclaredNode<'_>,
     output: &Published,

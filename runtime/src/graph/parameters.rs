@@ -1,4 +1,4 @@
-//! Parameters: what each node reads about itself, checked by its kind.
+//! Parameters: the values that each node reads about itself, checked by its kind.
 
 use super::processes::{DeclaredNode, files};
 use super::ranges;
@@ -53,9 +53,9 @@ impl Notes {
     }
 }
 
-/// The parameters of `declared`, files resolved, checked for a node that computes every `period_ticks` of the run of
-/// `plan` where its kind is built in, and the files that it reads; notes its vehicle file, what that is based on, its scene
-/// and its gains file, and what is odd.
+/// The parameters of `declared`, with resolved files, and the files that it reads. If its kind is built in, they are
+/// checked for a node that computes every `period_ticks` of the run of `plan`. Notes its vehicle file with that
+/// file's base, its scene and gains files, and unusual values.
 ///
 /// # Errors
 /// A file or a parameter that is refused.
@@ -139,7 +139,7 @@ fn named_files(files: &InputFiles, key: &str, path: PathBuf) -> Vec<PathBuf> {
     std::iter::once(path).chain(others).collect()
 }
 
-/// Reads the files that a command names, which nobody checks before it starts. The program alone knows what its `data` is:
+/// Reads the files that a command names, which are not checked before it starts. The program alone knows its `data`:
 /// a device or a folder is left to it.
 fn read_named(files: &InputFiles, key: &str, named: &[PathBuf]) -> Result<(), String> {
     let is_left = |path: &&PathBuf| key == "data" && !path.is_file();

@@ -1,4 +1,5 @@
-//! Periods against the length of the run: what would overflow the count of ticks, and what computes only once.
+//! Periods against the length of the run: periods that would overflow the count of ticks, and nodes that compute only
+//! once.
 
 use super::parameters::Notes;
 use super::processes::DeclaredNode;
@@ -7,7 +8,7 @@ use bus::plan::Plan;
 use diagnostics::Diagnostic;
 use std::ops::Range;
 
-/// Refuses periods with which the tick behind the last cannot be counted, and tells those as long as the run.
+/// Refuses periods with which the tick behind the last cannot be counted, and warns of those as long as the run.
 ///
 /// # Errors
 /// The process or output, and its period.

@@ -1,4 +1,4 @@
-//! Processes: what each executes, and how it runs on the host.
+//! Processes: the executable of each, and its settings on the host.
 
 use crate::manifest::{Manifest, Process, is_name};
 use crate::output_file;
@@ -35,7 +35,7 @@ pub struct DeclaredNode<'m> {
 /// The processes that take part in the ticks, by name; they read from `files`.
 ///
 /// # Errors
-/// If there is none, or one says what only a sidecar can, or cannot be started.
+/// If there is none, or one has a key that only a sidecar may have, or cannot be started.
 pub fn declared_nodes<'m>(
     manifest: &'m Manifest,
     files: &'m InputFiles,
@@ -57,7 +57,7 @@ pub fn declared_nodes<'m>(
 /// The processes that do not, by name.
 ///
 /// # Errors
-/// If one says what only a node can, or cannot be started.
+/// If one has a key that only a node may have, or cannot be started.
 pub fn sidecars(manifest: &Manifest) -> Result<Vec<(String, Program)>, Diagnostic> {
     let sidecars = manifest.content.process.iter().filter(|(_, process)| !takes_part(process));
     Diagnostic::gather(sidecars.map(|(name, process)| {
@@ -174,7 +174,7 @@ fn executable(
     }
 }
 
-/// A process that nothing says what it is: most likely a name in a `--set` that is no process's.
+/// Error of a process without `kind` and `command`: most likely a name in a `--set` that no process has.
 fn nameless(manifest: &Manifest, name: &Spanned<String>) -> Diagnostic {
     let found = name.get_ref();
     if !manifest.sources.is_override(name.span().start) {

@@ -1,5 +1,5 @@
-//! Ranges of numbers by the unit that their keys end in: what no vehicle, sensor or room has is refused before a
-//! kind reads it. Kinds and files have narrower bounds where they know more.
+//! Ranges of numbers by the unit at the end of their keys: a value that no vehicle, sensor or room has is refused
+//! before a kind reads it. Kinds and files have narrower bounds where they know more.
 
 use crate::manifest::{Manifest, Process};
 use diagnostics::{Diagnostic, ParameterError};
@@ -44,7 +44,7 @@ const RANGES: [Range; 21] = [
     range("", "", 1e12, "no number without a unit is that large"),
 ];
 
-/// Less than this, other than 0, is an accident: its inverse or its square leave what a double holds.
+/// A smaller magnitude, other than 0, is an accident: its inverse or its square leaves the range of a double.
 const LEAST: f64 = 1e-30;
 
 /// Refuses the first number of the parameters and initial values of process `name` that is out of all range.

@@ -6,8 +6,8 @@ use diagnostics::Diagnostic;
 use std::path::Path;
 use toml::{Table, Value};
 
-/// Builds a manifest key by key. What it says is checked when it is complete, as that of a file is; the recording of
-/// its run holds it as TOML, which is what it prints.
+/// Builds a manifest key by key. The content is checked when it is complete, as that of a file is. The recording of
+/// its run holds it as TOML, which its text is too.
 ///
 /// ```
 /// use runtime::manifest::ManifestBuilder;
@@ -27,7 +27,7 @@ impl ManifestBuilder {
         Self::default()
     }
 
-    /// Sets `key`, such as `process.plant.kind`. A value on the way to it that is no table gives way.
+    /// Sets `key`, such as `process.plant.kind`. A value on the way to it that is not a table is replaced by one.
     #[must_use]
     pub fn set(mut self, key: &str, value: impl Into<Value>) -> Self {
         let mut path: Vec<&str> = key.split('.').collect();

@@ -125,7 +125,7 @@ fn default_rate_hz() -> Spanned<u32> {
 pub const NO_RECORDING: &str = "none";
 
 impl Run {
-    /// True if the run is not recorded, whatever recorder the manifest has.
+    /// True if the run is not recorded, even if the manifest has a recorder.
     #[must_use]
     pub fn is_unrecorded(&self) -> bool {
         self.record.as_ref().is_some_and(|record| record.get_ref() == NO_RECORDING)
@@ -217,7 +217,7 @@ pub enum ComputingTimeSetting {
         /// Standard deviation of the natural logarithm.
         sigma: f64,
     },
-    /// As in a file: what `profile --json` printed, or times in µs.
+    /// As in a file: the output of `profile --json`, or times in µs.
     Measured {
         /// The file, relative to the manifest.
         file: String,
@@ -291,8 +291,8 @@ pub struct OutputSetting {
 #[derive(Clone, Copy, Debug)]
 pub struct PaceSetting(pub Pace);
 
-/// Simulated seconds per second of a paced run: a tick of 1 ms then takes 10 s at most, half of what the watchdog
-/// allows, and 0.1 µs at least, less than any process needs for it.
+/// Simulated seconds per second of a paced run. A tick of 1 ms then takes 10 s at most, half of the watchdog's limit,
+/// and 0.1 µs at least, less than any process needs for it.
 const FACTOR_MIN: f64 = 1e-4;
 const FACTOR_MAX: f64 = 1e4;
 

@@ -68,7 +68,7 @@ pub fn file_of<'p>(process: &'p Process, key: &str) -> Option<&'p Spanned<String
 /// Values in files that are given with `--set`, in their order.
 ///
 /// # Errors
-/// If there is no such process, or it names no such file.
+/// If there is no such process, or it does not name such a file.
 pub fn all(sources: &Sources, content: &Content) -> Result<Vec<FileEdit>, Diagnostic> {
     let edits = sources.overrides().filter_map(|source| FileEdit::parse(&source.text, source.base));
     let require = |edit: FileEdit| edit.require_file(sources, content).map(|()| edit);
@@ -84,7 +84,7 @@ pub fn edited<'e>(
     edits: &[&'e FileEdit],
     base: &dyn Fn(&str) -> Option<String>,
 ) -> Result<String, (&'e FileEdit, String)> {
-    // The reader of the file says where it is no TOML.
+    // The reader of the file reports the place at which it is not TOML.
     let Ok(mut document) = text.parse::<DocumentMut>() else { return Ok(text.to_owned()) };
     for edit in edits {
         edit.inherit(&mut document, base);
@@ -94,7 +94,7 @@ pub fn edited<'e>(
 }
 
 impl FileEdit {
-    /// The edit that the text of a `--set` asks for, if it leads into a file.
+    /// The edit in the text of a `--set`, if it leads into a file.
     fn parse(text: &str, base: usize) -> Option<Self> {
         let (path, value) = text.split_once('=')?;
         let keys: Vec<&str> = path.split('.').map(str::trim).collect();

@@ -33,7 +33,7 @@ pub fn text(path: &Path) -> Result<String, Diagnostic> {
     })
 }
 
-/// Reads, file by file, what `text`, the manifest at `path`, includes; a file that is included twice is read once.
+/// Reads, file by file, the includes of `text`, the manifest at `path`; a file that is included twice is read once.
 ///
 /// # Errors
 /// A file that cannot be read or includes itself, at the place of the include.

@@ -82,7 +82,7 @@ fn keys(path: &str, base: usize) -> Vec<Spanned<&str>> {
     path.split('.').map(key).collect()
 }
 
-/// A value as TOML; what is none is a string: a path needs no quotes on the command line.
+/// A value as TOML; any other text is a string: a path needs no quotes on the command line.
 fn value_of(text: &str, base: usize) -> Spanned<DeValue<'_>> {
     let base = base + (text.len() - text.trim_start().len());
     let text = text.trim();
@@ -99,7 +99,7 @@ fn require_process(root: &DeTable<'_>, name: &Spanned<&str>, sources: &Sources) 
     Err(sources.problem(&name.span(), format!("there is no process `{}`", name.get_ref()), help))
 }
 
-/// Puts `value` at `key` of what lies at `path` below `inside`.
+/// Puts `value` at `key` of the value at `path` below `inside`.
 fn put<'s>(
     mut inside: &mut DeValue<'s>,
     path: &[Spanned<&'s str>],

@@ -7,7 +7,7 @@ use toml_edit::{Item, Table};
 pub fn put(item: &mut Item, keys: &[String], mut value: toml_edit::Value) -> Option<()> {
     let (last, path) = keys.split_last()?;
     let inside = keys.iter().skip(1).zip(path).try_fold(item, |item, (next, key)| {
-        // What is missing on the way is a table; a list that is missing has no elements.
+        // A missing value on the way is a table; a missing list has no elements.
         let empty = || if next.parse::<usize>().is_ok() { Item::None } else { Item::Table(Table::new()) };
         slot(item, key, empty).filter(|found| !found.is_none())
     })?;

@@ -1,5 +1,4 @@
-//! The manifest's text as the recording holds it: the user's own, comments and all, with what `--set`
-//! changed.
+//! The manifest's text as the recording holds it: the user's own, with its comments and the changes of `--set`.
 
 use super::content::Process;
 use super::file_edits;
@@ -15,7 +14,7 @@ use toml::Spanned;
 /// The processes of the manifest by name.
 type Processes = BTreeMap<Spanned<String>, Process>;
 
-/// Keys of `[run]` that change how fast or where a run computes, never what: they stay out of the recording.
+/// Keys of `[run]` that change the speed or the host of a run, never its results: they stay out of the recording.
 const HOST_ONLY_KEYS: [&str; 10] = [
     "checkpoint_every_s",
     "checkpoint_keep",
@@ -40,7 +39,7 @@ const HOST_ONLY_PROCESS_KEYS: [&str; 8] = [
     "working_directory",
 ];
 
-/// The manifest's own text with those values of `--set` that may change what is simulated.
+/// The manifest's own text with those values of `--set` that may change the simulation.
 ///
 /// # Errors
 /// If an included file is not TOML.
@@ -55,7 +54,7 @@ pub fn text(sources: &Sources, processes: &Processes) -> Result<String, Diagnost
     let mut elsewhere = String::new();
     for text in simulated {
         if is_of_a_file(text) || !set(&mut document, text, sources)? {
-            // It changes another file, or what an included file or a set holds, which has no line of its own here.
+            // It changes another file, or a value in an included file or a set, which has no line of its own here.
             elsewhere += &format!("# --set {}\n", text.replace('\n', "\\n"));
         }
     }
@@ -89,7 +88,7 @@ fn is_of_a_file(text: &str) -> bool {
 fn set(document: &mut toml_edit::DocumentMut, text: &str, sources: &Sources) -> Result<bool, Diagnostic> {
     let Some((path, value)) = text.split_once('=') else { return Ok(false) };
     let value = value.trim();
-    // What counts as TOML is decided as when it is read.
+    // A text counts as TOML here if it does when it is read.
     let parsed = tree::parse_value(value, 0).and_then(|_| value.parse::<toml_edit::Value>().ok());
     let value = parsed.unwrap_or_else(|| value.into());
     let mut keys: Vec<String> = path.split('.').map(|key| key.trim().to_owned()).collect();

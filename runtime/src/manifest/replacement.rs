@@ -1,4 +1,4 @@
-//! Backups: what `with` and `standby` change is put on top of the process they succeed.
+//! Backups: the changes of `with` and `standby` are put on top of the process that they succeed.
 
 use super::sources::Sources;
 use super::tree;
@@ -72,7 +72,7 @@ fn complete_standbys(root: &mut DeTable<'_>, sources: &Sources) -> Result<(), Di
 /// The process `name` of `root` as its backup is, which differs by `with`.
 ///
 /// # Errors
-/// If there is no such process, or it cannot differ in that.
+/// If there is no such process, or it cannot have these differences.
 pub fn whole<'s>(
     sources: &Sources,
     root: &DeTable<'s>,

@@ -65,7 +65,7 @@ pub fn expand<'s>(root: &mut DeTable<'s>, sources: &Sources) -> Result<(), Diagn
     Ok(())
 }
 
-/// Takes out the processes whose names hold a `/`: they only adjust what a vehicle becomes.
+/// Takes out the processes whose names hold a `/`: they only adjust the processes of a vehicle.
 fn take_expanded<'s>(root: &mut DeTable<'s>) -> Vec<(Spanned<DeString<'s>>, Spanned<DeValue<'s>>)> {
     let Some(processes) = tree::table_mut(root, "process") else { return Vec::new() };
     let names: Vec<String> = processes.keys().map(|key| key.get_ref().to_string()).collect();
@@ -88,7 +88,7 @@ fn sets<'s>(root: &mut DeTable<'s>, sources: &Sources) -> Result<BTreeMap<String
     Ok(sets)
 }
 
-/// The vehicles, each with what differs from its set.
+/// The vehicles, each with its differences from its set.
 fn vehicles<'s>(
     value: Option<Spanned<DeValue<'s>>>,
     sources: &Sources,
@@ -140,7 +140,7 @@ fn add_vehicle<'s>(
     Ok(())
 }
 
-/// The processes of a set with what differs in a vehicle.
+/// The processes of a set with the differences of a vehicle.
 fn differing<'s>(
     set: &DeTable<'s>,
     differences: DeTable<'s>,
@@ -235,7 +235,7 @@ fn rename(value: Option<&mut Spanned<DeValue<'_>>>, name: impl Fn(&str) -> Optio
     }
 }
 
-/// Puts what a table `[process."h1/plant"]` says on top of what the vehicle made.
+/// Puts the content of a table `[process."h1/plant"]` on top of the vehicle's process.
 fn adjust<'s>(
     expanded: &mut DeTable<'s>,
     name: &Spanned<DeString<'s>>,

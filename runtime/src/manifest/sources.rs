@@ -42,7 +42,7 @@ impl Source {
 pub struct Sources {
     /// The texts.
     pub all: Vec<Source>,
-    /// The files in the order in which they are merged: what is included goes before what includes it.
+    /// The files in the order in which they are merged: an included file goes before the one that includes it.
     pub order: Vec<usize>,
     /// The components that they may name.
     pub registry: Registry,

@@ -5,9 +5,9 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeString, DeTable, DeValue};
 
-/// Keys that say what a process is: naming one anew leaves nothing of the other.
+/// Keys that identify a process: a new value for one of them removes the other.
 const IDENTITY: [&str; 2] = ["kind", "command"];
-/// Keys that mean something only to what the process is.
+/// Keys that have a meaning only together with those.
 const PARAMETERS: [&str; 9] =
     ["computing_time", "configuration", "data", "firmware", "fmu", "gains", "parameters", "scene", "vehicle"];
 
@@ -66,8 +66,8 @@ pub fn merge_processes<'t>(base: &mut DeTable<'t>, over: DeTable<'t>) {
     over.into_iter().for_each(|(name, process)| put(base, name, process, merge_process));
 }
 
-/// Puts the process `over` on top of `base`. Where it says what it is, with `kind` or `command`, nothing is
-/// left of the parameters of what it was.
+/// Puts the process `over` on top of `base`. If it has another `kind` or `command`, the parameters of the former one
+/// are removed.
 pub fn merge_process<'t>(base: &mut DeTable<'t>, over: DeTable<'t>) {
     forget_identity(base, &over);
     merge(base, over);
@@ -120,7 +120,7 @@ pub fn table<'v, 't>(table: &'v DeTable<'t>, key: &str) -> Option<&'v DeTable<'t
 /// Takes the table at `key` out of `table`; an empty one where there is none.
 ///
 /// # Errors
-/// The place of what is no table.
+/// The place of a value that is not a table.
 pub fn take_table<'t>(table: &mut DeTable<'t>, key: &str) -> Result<DeTable<'t>, Range<usize>> {
     match table.remove(key).map(|value| (value.span(), value.into_inner())) {
         None => Ok(DeTable::new()),
@@ -159,7 +159,7 @@ pub fn string<'v>(table: &'v DeTable<'_>, key: &str) -> Option<&'v str> {
     table.get(key)?.get_ref().as_str()
 }
 
-/// Removes from a process what it was, if `over` says that it is something else.
+/// Removes the identity and parameters of a process, if `over` has another identity.
 fn forget_identity(process: &mut DeTable<'_>, over: &DeTable<'_>) {
     let is_changed = |key: &str| over.contains_key(key) && !is_same(process.get(key), over.get(key));
     if IDENTITY.iter().any(|key| is_changed(key)) {

@@ -241,7 +241,7 @@ impl Replacements<'_> {
         }
     }
 
-    /// Everybody is connected: it computes from its tick on.
+    /// Every instance is connected: the backup computes from its tick on.
     pub(super) fn let_compute(&mut self, node: usize) {
         let host = self.view.host;
         let Some(backup) = &mut self.nodes[node].backup else { return };

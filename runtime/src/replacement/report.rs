@@ -28,7 +28,7 @@ pub struct Report {
     pub purpose: Purpose,
     /// True if the manifest or a request names it; false for a restart and the next standby.
     pub is_planned: bool,
-    /// The request that asked for it.
+    /// The request for it.
     #[serde(skip)]
     pub request: Option<u32>,
     /// The first tick it computed.

@@ -1,4 +1,4 @@
-//! Swaps that are asked for while the run flies.
+//! Swaps requested while the run flies.
 
 use super::Supervisor;
 use crate::ctl::protocol::{Answer, Request};
@@ -14,7 +14,7 @@ const SHADOW_TICKS: u32 = 100;
 /// Swaps that are taken a look at most, for the supervisor has more to look after.
 const MAX_SWAPS_A_LOOK: usize = 16;
 
-/// The answer to a swap that has come to its end.
+/// The answer to a swap that has ended.
 fn answer(report: &Report) -> Answer {
     match (&report.refused, report.take_over_tick) {
         (Some(reason), _) => Answer::refused(reason.clone()),
@@ -32,7 +32,7 @@ fn answer(report: &Report) -> Answer {
 }
 
 impl<W: World> Supervisor<'_, W> {
-    /// Serves what was asked of the run, and answers swaps that have come to their end.
+    /// Serves the requests to the run, and answers swaps that have ended.
     pub(super) fn serve_requests(&mut self) {
         for _ in 0..MAX_SWAPS_A_LOOK {
             let Some((request, reply)) = self.world.next_request() else { break };
@@ -51,7 +51,7 @@ impl<W: World> Supervisor<'_, W> {
         }
     }
 
-    /// Checks a swap that was asked for, and has its backup started; returns the number of the request.
+    /// Checks a requested swap, and has its backup started; returns the number of the request.
     fn request_swap(
         &mut self,
         process: &str,
@@ -107,7 +107,7 @@ impl<W: World> Supervisor<'_, W> {
         Ok(())
     }
 
-    /// Refuses a log of its own to a backup that was asked for in flight: this run has not claimed the file.
+    /// Refuses a log of its own to a backup requested in flight: this run has not claimed the file.
     fn require_claimed_log(&self, backup: &BackupSpec) -> Result<()> {
         let planned = self.graph.backups.iter().filter(|other| other.node == backup.node);
         let mut known = planned.map(|other| &other.program).chain([&self.graph.programs[backup.node]]);

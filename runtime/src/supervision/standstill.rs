@@ -14,7 +14,7 @@ impl<W: World> Supervisor<'_, W> {
     /// Looks whether the run stands still, and because of whom.
     pub(super) fn note_stall(&mut self) -> Result<()> {
         let view = &self.overseer.replacements.view;
-        // A paused run stands still because it was told to.
+        // A paused run stands still on request.
         let is_paused = view.held_at.is_some_and(|held| view.hold_tick <= held);
         // A sidecar that does not get ready has a watchdog of its own.
         let is_waiting = view.held_at.is_some() && !self.sidecars.all_ready();

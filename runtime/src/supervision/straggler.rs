@@ -1,4 +1,4 @@
-//! A run that stands still: because of whom, and what the others wait for.
+//! The cause of a standstill: the straggler, and the conditions that the others wait for.
 
 use super::Supervisor;
 use crate::role::Role;
