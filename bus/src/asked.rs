@@ -1,4 +1,4 @@
-//! Set points that a person asks for while a run flies, on their way from a page to the node that sends them.
+//! Set points that a person requests while a run flies, on their way from a page to the node that sends them.
 //!
 //! A file of the run directory holds the newest ones, and the host time at which they were written. It is as long as one
 //! entry; a sum over the entry tells a reader that it has read half of one and half of the next.
@@ -18,7 +18,7 @@ const WORDS: usize = 6;
 /// Attempts to read an entry that is being written.
 const ATTEMPTS: usize = 8;
 
-/// Values that a person asks for.
+/// Values that a person requests.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Asked {
     /// Altitude of the centre of mass, m.
@@ -75,7 +75,7 @@ impl AskedFile {
         user_file::open(&path(run_dir, node), true).map(Self)
     }
 
-    /// Asks for `asked` from now on.
+    /// Requests `asked` from now on.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -87,7 +87,7 @@ impl AskedFile {
         self.0.write_all_at(words.map(u64::to_le_bytes).as_flattened(), 0)
     }
 
-    /// The newest values and their age by the host's clock. `None` if nobody has asked yet.
+    /// The newest values and their age by the host's clock. `None` if none were requested yet.
     #[must_use]
     pub fn read(&self) -> Option<(Asked, Duration)> {
         let words = (0..ATTEMPTS).find_map(|_| self.words())?;

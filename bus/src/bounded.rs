@@ -7,7 +7,7 @@ use std::ops::{Deref, DerefMut};
 /// Up to `N` values: their count, and room for all. The values behind the count are defaults (zeros).
 ///
 /// It dereferences to the slice of the values that count. As the last field of a message it is the bounded sequence
-/// `float64[<=N]` of ROS 2: what a recording holds of the message ends behind the last value that counts.
+/// `float64[<=N]` of ROS 2: a recording holds the message up to the last value that counts.
 ///
 /// ```
 /// use bus::Bounded;

@@ -1,8 +1,9 @@
 //! Checkpoints: what the nodes of a run need so that another run goes on from a tick.
 //!
-//! Every node writes its part at its first due tick from the checkpoint's tick on, when it has taken its inputs and before
-//! it steps. Until then its state is what it was when that tick began, so that nobody waits for anybody. A part holds the
-//! state, the words of a simulated computing time, and the newest sample of each input that was sent before the tick.
+//! Every node writes its part at its first due tick from the checkpoint's tick on, when it has taken its inputs and
+//! before it steps. Its state is then still that of the checkpoint's tick, so that no node waits for another. A part
+//! holds the state, the words of a simulated computing time, and the newest sample of each input that was sent before
+//! the tick.
 
 use crate::component::Transfer;
 use crate::computation::Computation;
@@ -244,14 +245,14 @@ impl Parts {
         Ok(Some(Self { tick, nodes }))
     }
 
-    /// Removes what the nodes have written for `tick`.
+    /// Removes the parts that the nodes have written for `tick`.
     pub fn remove_written(run_dir: &Path, tick: u32) {
         // It goes with the run directory otherwise.
         let _ = std::fs::remove_dir_all(run_dir.join(FOLDER).join(tick.to_string()));
     }
 }
 
-/// SHA-256 of what `plan` says of what a process computes.
+/// SHA-256 of the entries of `plan` that decide what a process computes.
 fn plan_sum(plan: &NodePlan) -> String {
     let NodePlan { period_ticks, inputs, parameters, computing_time, .. } = plan;
     let text = serde_json::to_string(&(period_ticks, inputs, parameters, computing_time));

@@ -108,7 +108,7 @@ impl Clock<'_> {
         }
     }
 
-    /// Grants as far as the window reaches beyond the slowest node; returns what is granted then.
+    /// Grants as far as the window reaches beyond the slowest node; returns the ticks granted then.
     fn grant_window(&self, granted: u32, end: u32) -> Result<u32, BusError> {
         let window = self.plan.window_ticks.max(1);
         // Granting half a window at a time lets fast nodes go on while the slowest catches up.
@@ -122,7 +122,7 @@ impl Clock<'_> {
         Ok(target)
     }
 
-    /// Grants tick `tick` at its deadline; returns what is granted then: `tick` itself if a stop came first.
+    /// Grants tick `tick` at its deadline; returns the ticks granted then: `tick` itself if a stop came first.
     fn grant_at_deadline(&self, tick: u32, deadlines: &mut Deadlines) -> Result<u32, BusError> {
         let deadline_ns = deadlines.of(tick, self.plan.tick_ns);
         if !self.sleep_until(tick, deadline_ns, deadlines.factor) {
@@ -141,7 +141,7 @@ impl Clock<'_> {
         Ok(tick + 1)
     }
 
-    /// The end tick, moved to `granted` if a stop was asked for.
+    /// The end tick, moved to `granted` if a stop was requested.
     fn end_after(&self, granted: u32) -> u32 {
         if self.is_stop_asked_for() && granted < self.lockstep.end_tick() {
             self.lockstep.set_end_tick(granted);
@@ -149,8 +149,8 @@ impl Clock<'_> {
         self.lockstep.end_tick()
     }
 
-    /// Sleeps until `deadline_ns`; false if a stop, a hold or another pace was asked for, which at a slow pace
-    /// comes long before.
+    /// Sleeps until `deadline_ns`; false if a stop, a hold or another pace was requested, which at a slow pace comes
+    /// long before.
     fn sleep_until(&self, tick: u32, deadline_ns: u64, factor: f64) -> bool {
         loop {
             if self.is_stop_asked_for()

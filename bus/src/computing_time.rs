@@ -55,7 +55,7 @@ impl ComputingTime {
         }
     }
 
-    /// A time in ticks of `tick_ns`, rounded up: what is computed within a tick is there at its end.
+    /// A time in ticks of `tick_ns`, rounded up: the results of a step within a tick are there at its end.
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,

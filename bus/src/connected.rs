@@ -1,5 +1,5 @@
-//! A connected node: what its next tick needs, gather → step → publish, and how it follows the changes of the run. Who
-//! calls it is the [executor](crate::executor). `checkpoints` has its parts of checkpoints.
+//! A connected node: it waits for the needs of its next tick, gathers, steps and publishes, and follows the changes
+//! of the run. The [executor](crate::executor) calls it. `checkpoints` has its parts of checkpoints.
 
 mod checkpoints;
 
@@ -48,11 +48,11 @@ pub(crate) struct ConnectedNode {
     states_every_tick: bool,
     /// The tick of the plan's checkpoint that comes next; `u32::MAX` behind the last.
     next_checkpoint: u32,
-    /// Number of checkpoints that were asked for and are written.
+    /// Number of requested checkpoints that are written.
     asks_answered: u32,
     /// Host time of all its steps, ns.
     step_ns: u64,
-    // The transport last: the ports give back what they hold while it stands.
+    // The transport last: the ports give back their resources while it exists.
     links: Links,
 }
 
@@ -183,8 +183,8 @@ impl ConnectedNode {
         (&self.links.plan.topics[topic].name, &self.announcements[input])
     }
 
-    /// Makes ready to hand over the state of `computation` as `transfer` says: to whoever takes this node's place, and from
-    /// whom it takes it.
+    /// Prepares the transfer of the state of `computation` as `transfer` says: to the process that takes this node's
+    /// place, and from its predecessor.
     ///
     /// # Errors
     /// If shared memory cannot be had.
@@ -198,7 +198,7 @@ impl ConnectedNode {
         self.state.create(&self.links)
     }
 
-    /// Opens the state of the process that this one succeeds, or else what it sends.
+    /// Opens the state of the process that this one succeeds, or else its outputs.
     fn open_predecessor(&mut self) -> Result<(), BusError> {
         let links = &self.links;
         if links.generation == 0 {
@@ -230,12 +230,12 @@ impl ConnectedNode {
         links.transport.reserve()
     }
 
-    /// Tells that this node can begin, with the state of `computation`.
+    /// Reports that this node can begin, with the state of `computation`.
     ///
     /// # Errors
     /// If its memory cannot be locked.
     pub(crate) fn begin(&mut self, computation: &dyn Computation) -> Result<(), BusError> {
-        // Last, when all that the ticks use is mapped: a mapping that exceeds the limit later fails without words.
+        // Last, when everything that the ticks use is mapped: a mapping that exceeds the limit later fails silently.
         if self.links.plan.lock_memory {
             crate::process::lock_memory()?;
         }
@@ -260,7 +260,7 @@ impl ConnectedNode {
         waited.or_aborted()
     }
 
-    /// Tells that this node computes no more.
+    /// Reports that this node computes no more.
     pub(crate) fn complete(&mut self, cpu_ns: u64) {
         self.tell();
         self.links.lockstep.note_cpu(cpu_ns);
@@ -268,10 +268,10 @@ impl ConnectedNode {
         self.links.lockstep.completed(u32::MAX - 1);
     }
 
-    /// Publishes the state at the start of `tick`, for whoever takes over there.
+    /// Publishes the state at the start of `tick`, for a process that takes over there.
     fn publish_state(&mut self, tick: u32, computation: &dyn Computation) {
         if self.state.publish(tick, computation) {
-            // A count of zero is no state.
+            // A count of zero means that there is no state.
             self.links.lockstep.state_published(tick + 1);
         }
     }
@@ -290,7 +290,7 @@ impl ConnectedNode {
             return Ok(Turn::Save);
         }
         if lockstep.end_tick() <= tick {
-            // A shadow that has come to the end of the run waits for its predecessor to get there: until then that may die,
+            // A shadow at the end of the run waits until its predecessor gets there: the predecessor may die before,
             // and the samples of its last ticks are then the shadow's.
             let is_shadow = self.links.generation > 0 && self.take_over_tick >= tick;
             let awaits = is_shadow && !lockstep.has(Need::OtherDone, tick);
@@ -316,7 +316,7 @@ impl ConnectedNode {
         if self.links.lockstep.is_aborted() { Err(BusError::Aborted) } else { Ok(Turn::Leave) }
     }
 
-    /// The first of what the next tick needs that is not there: the predecessor, the inputs, the shadows, the grant.
+    /// The first missing need of the next tick: the predecessor, the inputs, the shadows, the grant.
     fn missing(&mut self, computation: &mut dyn Computation) -> Result<Option<Awaited>, BusError> {
         if let Some(awaited) = self.missing_predecessor(computation)? {
             return Ok(Some(awaited));
@@ -361,15 +361,15 @@ impl ConnectedNode {
         sent.fold(lockstep.granted_ticks(), u32::min)
     }
 
-    /// Ticks whose samples a node may let gather before it wakes: one without outputs holds nobody up.
+    /// Ticks whose samples a node may let gather before it wakes: no node waits for one without outputs.
     fn gathered(&self, tick: u32) -> u32 {
         let links = &self.links;
         let batch = if links.node.outputs.is_empty() { (links.plan.window_ticks / 4).max(1) } else { 1 };
         (tick + batch).min(links.lockstep.granted_ticks())
     }
 
-    /// As a shadow, starts the tick from the state of the predecessor, if that states one: what this process
-    /// sends then is what it would send if it took over here.
+    /// As a shadow, starts the tick from the state of the predecessor, if that states one: this process then sends
+    /// what it would send if it took over here.
     fn missing_predecessor(
         &mut self,
         computation: &mut dyn Computation,
@@ -390,7 +390,7 @@ impl ConnectedNode {
         Ok(awaits.then_some(Awaited::count(Need::OtherDone, tick)))
     }
 
-    /// Sleeps until what is `awaited` may be there; false if it will not come: the run ends before the next tick.
+    /// Sleeps until the `awaited` need may be met; false if it will not be: the run ends before the next tick.
     ///
     /// # Errors
     /// If the run is aborted.
@@ -469,7 +469,7 @@ impl ConnectedNode {
         Membership::load(&self.links.run_dir, self.links.lockstep.epoch())
     }
 
-    /// Tells that the connections agree with the membership that was followed.
+    /// Reports that the connections agree with the membership that was followed.
     pub(crate) fn acknowledge(&self) -> Result<(), BusError> {
         self.links.transport.reserve()?;
         self.links.lockstep.acknowledge(self.epoch);
@@ -506,7 +506,7 @@ impl ConnectedNode {
         self.step_ns
     }
 
-    /// Sends to the readers that `membership` names from now on, and to new ones what was sent last.
+    /// Sends to the readers that `membership` names from now on, and the last sample to new ones.
     fn connect_readers(&mut self, membership: &Membership, locals: &Locals) -> Result<(), BusError> {
         let links = &self.links;
         for output in &mut self.stepper.outputs {
@@ -570,8 +570,8 @@ impl ConnectedNode {
         Ok(())
     }
 
-    /// Computes the next tick; returns the host time at which it was done. `before_ns` is the host time of a look at the
-    /// clock after which nobody waited.
+    /// Computes the next tick; returns the host time at which it was done. `before_ns` is the host time of a look at
+    /// the clock, if no node has waited since.
     ///
     /// # Errors
     /// If a sample is lost, the step fails, or a due output stays unwritten.
@@ -583,7 +583,7 @@ impl ConnectedNode {
     ) -> Result<u64, BusError> {
         let tick = self.tick;
         if self.links.generation > 0 && tick <= self.take_over_tick.max(self.first_tick) {
-            // What it begins with is its predecessor's, not what it came to itself.
+            // It begins with the state of its predecessor, not with its own.
             self.publish_state(tick, computation);
         }
         let lockstep = &self.links.lockstep;
@@ -593,19 +593,19 @@ impl ConnectedNode {
         let received_ns = before_ns.unwrap_or_else(monotonic_ns);
         self.step(tick, locals, computation)?;
         if crate::hosted::is_cancelled() {
-            // Another instance may have been told to go on in its place by now.
+            // Another instance may have been asked to go on in its place by now.
             return Err(BusError::Aborted);
         }
         let done_ns = monotonic_ns();
         self.step_ns += done_ns - received_ns;
         self.links.lockstep.count_step(done_ns - received_ns);
         if self.states_every_tick {
-            // Before anything is sent: whoever sees the sample can go on from the state after it.
+            // Before anything is sent: a process that sees the sample can go on from the state after it.
             self.publish_state(tick + self.links.node.period_ticks, computation);
         }
         self.publish(tick, received_ns, done_ns, locals)?;
         if tick >= self.take_over_tick {
-            // The predecessor leaves; nothing of it is read any more.
+            // The predecessor leaves; its samples are not read any more.
             self.stepper.predecessor.clear();
             self.state.leave_predecessor();
         }
@@ -613,7 +613,7 @@ impl ConnectedNode {
         Ok(done_ns)
     }
 
-    /// Computes the component's step, which writes what is due.
+    /// Computes the component's step, which writes the due outputs.
     fn step(
         &mut self,
         tick: u32,
@@ -674,7 +674,7 @@ impl Awaited {
         Self::Count { need, count, sleep_for: count }
     }
 
-    /// True if what was needed is there, although what was slept for is not.
+    /// True if the need is met, although the count that was slept for is not reached.
     fn is_there(self, lockstep: &NodeView) -> bool {
         matches!(self, Self::Count { need, count, .. } if lockstep.has(need, count))
     }

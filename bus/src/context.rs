@@ -158,12 +158,12 @@ impl<'a> NodeContext<'a> {
         (1_000_000_000 / self.tick_ns.max(1)) as u32
     }
 
-    /// Leaves a warning: what is odd about the parameter `key` and flies all the same.
+    /// Adds a warning about the parameter `key`: its value is legal but unusual.
     pub fn warn(&self, key: &str, message: impl Into<String>) {
         self.push(key, message.into(), false);
     }
 
-    /// Leaves a warning of what a longer run would come to.
+    /// Adds a warning that a longer run would not give.
     pub fn warn_behind_end(&self, key: &str, message: impl Into<String>) {
         self.push(key, message.into(), true);
     }

@@ -22,7 +22,7 @@ pub struct Description {
 }
 
 impl Description {
-    /// Reads what generation `generation` of node `node` has told; `None` if it has told nothing.
+    /// Reads the description of generation `generation` of node `node`; `None` if it has written none.
     ///
     /// # Errors
     /// If it cannot be read.

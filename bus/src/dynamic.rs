@@ -1,8 +1,8 @@
 //! A node whose ports and state are known at run time: the part that bindings to other languages stand on.
 //!
-//! A program declares its ports with [schemas](MessageDescription), and reads and writes messages as bytes. The layouts are
-//! compared as for Rust. The state is a block of bytes that the program changes in place; the bus copies it for whoever
-//! takes the node's place, and into checkpoints.
+//! A program declares its ports with [schemas](MessageDescription), and reads and writes messages as bytes. The
+//! layouts are compared as for Rust. The state is a block of bytes that the program changes in place. The bus copies
+//! it for a process that takes the node's place, and into checkpoints.
 
 mod message;
 
@@ -139,9 +139,9 @@ impl DynamicNode {
         Ok(self.outputs.len() - 1)
     }
 
-    /// Declares the state as one value of `schema`; returns its memory, zeros aligned to eight bytes, which stay where they
-    /// are as long as the process lives. All that changes from tick to tick belongs there: whoever takes the node's
-    /// place goes on from it. The bus reads and writes it between steps.
+    /// Declares the state as one value of `schema`; returns its memory, zeros aligned to eight bytes, which stay
+    /// where they are as long as the process lives. Everything that changes from tick to tick belongs there: a
+    /// process that takes the node's place goes on from it. The bus reads and writes it between steps.
     ///
     /// # Errors
     /// If the node declared it before.
@@ -361,8 +361,8 @@ impl DynamicTick<'_, '_> {
         Ok(Some(message))
     }
 
-    /// The message that the process whose place this one takes sent last on output `output`, at the tick at which it takes
-    /// it and only where no state was handed over: the command to go on from without a jump.
+    /// Last message on output `output` of the process that this one replaces: the command to go on from without a
+    /// jump. It is present only at the tick of the replacement, and only if no state was transferred.
     ///
     /// # Errors
     /// If there is no such output.

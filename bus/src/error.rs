@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use thiserror::Error;
 
-/// An error of the bus; its text names the node, the topic and what to do.
+/// An error of the bus; its text names the node, the topic and the remedy.
 ///
 /// ```
 /// // A node that nobody launched says so, and what to do.
@@ -67,7 +67,7 @@ pub enum BusError {
         /// The limit.
         limit: u64,
     },
-    /// A file of the run does not hold what it should.
+    /// A file of the run does not hold the expected content.
     #[error(
         "{path} is not readable as {expected}: {found}. Was it written by another version of hummingbus?"
     )]
@@ -90,7 +90,7 @@ pub enum BusError {
     /// The plan has no node of this name.
     #[error("the run has no node named `{node}`; it has {known}")]
     UnknownNode {
-        /// The name asked for.
+        /// The name requested.
         node: String,
         /// The names there are.
         known: String,
@@ -98,7 +98,7 @@ pub enum BusError {
     /// No node sends a topic of this name.
     #[error("no node of the run sends {topic}; it has {known}")]
     UnknownTopic {
-        /// The name asked for.
+        /// The name requested.
         topic: String,
         /// The names there are.
         known: String,
@@ -203,7 +203,7 @@ pub enum BusError {
         /// Fault of the value.
         reason: String,
     },
-    /// The node's parameters are not what it reads.
+    /// The manifest's parameters do not fit the node.
     #[error("node `{node}`: {reason}")]
     Parameters {
         /// The node.
@@ -304,7 +304,7 @@ pub enum BusError {
         /// The node's own words.
         reason: String,
     },
-    /// The system does not allow what the manifest asks for.
+    /// The system does not allow a setting of the manifest.
     #[error("cannot {action}: {source}; {advice}")]
     Denied {
         /// Action that failed.

@@ -16,7 +16,7 @@ use std::time::Duration;
 
 /// Sleep of a process that has completed its ticks, between two looks whether its last samples were taken.
 const RETIREMENT_NAP: Duration = Duration::from_millis(1);
-/// A group tells others how far it has come this many times a window, so that the clock's window never runs out meanwhile.
+/// A group reports its progress this many times a window, so that the clock's window never runs out meanwhile.
 const TELLS_PER_WINDOW: u32 = 8;
 
 /// A node of this process.
@@ -54,9 +54,9 @@ pub(crate) struct Executor<'c> {
     leaving: Vec<Member<'c>>,
     /// The topics of a group, by their numbers in the plan.
     locals: Vec<Option<LocalTopic>>,
-    /// Ticks between two times at which a group tells others how far it has come.
+    /// Ticks between two reports of a group's progress.
     tell_ticks: u32,
-    /// Host time of the last look at the clock, if nobody has waited since.
+    /// Host time of the last look at the clock, if no node has waited since.
     now_ns: Option<u64>,
 }
 
@@ -122,7 +122,7 @@ impl<'c> Executor<'c> {
                 Turn::Compute => {
                     let Member { node, computation } = &mut self.members[index];
                     let done_ns = node.compute(self.now_ns, &mut self.locals, &mut **computation)?;
-                    // A profile tells when inputs were there; a process of its own may have got them since.
+                    // A profile states when inputs were there; a process of its own may have got them since.
                     let is_shared = !self.locals.is_empty() && !node.links().plan.profile;
                     self.now_ns = is_shared.then_some(done_ns);
                     index += 1;
@@ -130,13 +130,14 @@ impl<'c> Executor<'c> {
                 Turn::Leave => {
                     let mut member = self.members.remove(index);
                     let is_alone = self.locals.is_empty();
-                    // The members of a group share the processor time of their process: each is told its steps.
+                    // The members of a group share the processor time of their process: each counts the time of its
+                    // steps.
                     let cpu_ns =
                         if is_alone { process_cpu_ns() - cpu_start_ns } else { member.node.step_ns() };
                     member.node.complete(cpu_ns);
                     self.leaving.push(member);
                 }
-                // The order may be another one; who has computed the tick is passed over.
+                // The order may have changed; members that have computed the tick are passed over.
                 Turn::Change | Turn::Wait(_) | Turn::Save => index = 0,
             }
         }

@@ -34,7 +34,7 @@ impl Floats {
         }
     }
 
-    /// Adds what is at `offset`; returns nothing of text and integers.
+    /// Adds the numbers of `kind` at `offset`; text and integers add none.
     fn add(&mut self, kind: &Kind, offset: usize) {
         match kind {
             Kind::Primitive(Primitive::F64) => self.add_span(Span { offset, count: 1, is_double: true }),
@@ -64,7 +64,7 @@ impl Floats {
         }
     }
 
-    /// The first number in the message `bytes` that is not finite: its place in bytes, and what it is.
+    /// The first number in the message `bytes` that is not finite: its place in bytes, and its value.
     pub(crate) fn first_not_finite(&self, bytes: &[u8]) -> Option<(usize, f64)> {
         let named = || {
             let place = self.named?.tail_of(bytes);
@@ -80,7 +80,7 @@ impl Floats {
     }
 }
 
-/// The first of `numbers`, of `width` bytes each, that is not finite: its place in bytes, and what it is.
+/// The first of `numbers`, of `width` bytes each, that is not finite: its place in bytes, and its value.
 fn first_in(numbers: &[u8], width: usize) -> Option<(usize, f64)> {
     let mut numbers = numbers.chunks_exact(width).map(number);
     let index = numbers.clone().position(|number| !number.is_finite())?;

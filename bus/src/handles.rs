@@ -1,4 +1,4 @@
-//! Handles of declared ports: what a node reads and writes them by.
+//! Handles of declared ports, with which a node reads and writes them.
 
 use crate::error::BusError;
 use crate::initial;

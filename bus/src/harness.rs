@@ -1,4 +1,4 @@
-//! A component stepped without a run: for tests, and for whoever wants its numbers alone.
+//! A component stepped without a run: for tests, and for uses that need its numbers alone.
 
 use crate::component::{Component, State, StepError};
 use crate::context::{NodeContext, StepContext};
@@ -39,7 +39,7 @@ impl<C: Component> Harness<C> {
         Self::new(diagnostics::read(parameters)?)
     }
 
-    /// A component as the node that `context` tells of.
+    /// A component as the node that `context` describes.
     ///
     /// # Errors
     /// As [`Component::new`].

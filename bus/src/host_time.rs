@@ -1,4 +1,4 @@
-//! The host's clocks. What a node computes from them is not reproducible.
+//! The host's clocks. Numbers that a node computes from them are not reproducible.
 
 use crate::hosted::is_hosted;
 use rustix::time::{ClockId, Timespec};

@@ -1,7 +1,7 @@
 //! Nodes and the clock on threads of the launcher's own process.
 //!
-//! Such a thread is told by its launcher what a process reads from its environment, and it leaves its process as it is:
-//! signals, memory, cores and priorities belong to whoever owns the process.
+//! Such a thread gets from its launcher the values that a process reads from its environment. It does not change its
+//! process: signals, memory, cores and priorities belong to the owner of the process.
 
 use crate::join::Join;
 use std::cell::RefCell;

@@ -1,8 +1,8 @@
 //! The lockstep bus: messages, ports, the node loop and the clock service.
 //!
-//! Whoever writes a component needs [`Component`], its [contexts](context), [messages] or a [message of its
-//! own](Message), and [`run_process`]; whoever tests one, [`Harness`]. Modules without documentation serve launchers:
-//! they change without notice.
+//! To write a component, use [`Component`], its [contexts](context), [messages] or a [message of its own](Message),
+//! and [`run_process`]; to test one, [`Harness`]. Modules without documentation serve launchers: they change without
+//! notice.
 
 // The derive names this crate `bus` also when it is used inside it.
 extern crate self as bus;

@@ -115,7 +115,7 @@ impl Links {
             let receiver = self.subscriber(input.topic, backup.generation)?;
             let first_tick = if backup.shadows { backup.join_tick } else { take_over_tick };
             let period_ticks = self.plan.topics[input.topic].period_ticks;
-            // A reader that joined later than the shadow starts with what its own first tick reads.
+            // A reader that joined later than the shadow starts with the sample that its own first tick reads.
             let first_tick = first_tick.max(tick.saturating_sub(input.delay_ticks));
             let source = Source::new(backup.generation, receiver, first_tick, period_ticks);
             input.drop_backups_beyond(publisher.primary.generation);

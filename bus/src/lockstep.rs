@@ -1,7 +1,7 @@
 //! The lockstep's memory: a control segment that all processes of a run map, and by which they pace each other.
 //!
-//! Each party has a view of it with only what that party may do. Everybody may look; nothing of a look is waited for, and
-//! nothing of it reaches a message, so it never disturbs a run.
+//! Each party has a view of it with only the actions of that party. Every party may look. No process waits for a
+//! look, and no message depends on one, so a look never disturbs a run.
 
 mod cells;
 mod clock_view;
@@ -29,7 +29,7 @@ mod tests {
     use crate::names::shm_path;
     use crate::plan::{InputPlan, NodePlan, OutputPlan, Plan, TopicPlan, Wait};
 
-    /// The views of a run in which `sender` sends what `reader` reads.
+    /// The views of a run in which `reader` reads the topic of `sender`.
     struct Views {
         supervisor: SupervisorView,
         clock: ClockView,
@@ -102,7 +102,7 @@ mod tests {
                 supervisor.abort();
                 assert_eq!(sends.join().unwrap(), Waited::Over);
             });
-            // Who only reads still takes what comes, until nothing more does.
+            // A node that only reads still takes samples, until no more come.
             std::thread::scope(|scope| {
                 let reads = scope.spawn(|| [1, 2].map(|n| reader.wait(SAMPLES, n, Wait::Block, || false)));
                 sender.samples_sent(0, 1, readers);

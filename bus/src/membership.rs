@@ -66,13 +66,13 @@ impl Membership {
     /// Reads membership number `epoch` of the run in `run_dir`.
     ///
     /// # Errors
-    /// If the file is missing or is no membership.
+    /// If the file is missing or is not a membership.
     pub fn load(run_dir: &Path, epoch: u32) -> Result<Self, BusError> {
         json_file::load(&path(run_dir, epoch), "the membership of a run")
     }
 
-    /// Writes the membership into `run_dir`, and removes the one before the one before it, which nobody reads
-    /// any more: every node agrees with a membership before the next is made.
+    /// Writes the membership into `run_dir`, and removes the one before the one before it. No node reads that one any
+    /// more: every node agrees with a membership before the next is made.
     ///
     /// # Errors
     /// If the file cannot be written.

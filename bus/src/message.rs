@@ -1,4 +1,4 @@
-//! The `Message` trait and how a message stands in a shared-memory sample.
+//! The `Message` trait and the layout of a message in a shared-memory sample.
 //!
 //! A sample is a slice of 64-bit words: one word whose last four bytes are the CDR encapsulation
 //! header `00 01 00 00` (little-endian XCDR1), then the message. A recorder therefore writes the

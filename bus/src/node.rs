@@ -242,8 +242,8 @@ impl Node {
         declared.map_err(|fault| self.fault = self.fault.take().or(Some(fault))).ok()
     }
 
-    /// The error for a port that the node declares a second time: the first handle would read or write bytes of
-    /// the second one's type. The node cannot connect any more, whatever it does with the error.
+    /// The error for a port that the node declares a second time: the first handle would read or write bytes of the
+    /// second one's type. The node cannot connect any more, even if it ignores the error.
     fn declared_twice(
         &mut self,
         direction: &'static str,
@@ -263,7 +263,7 @@ impl Node {
         error()
     }
 
-    /// Declares every input, in the order of what `key` gives of them.
+    /// Declares every input, in the order of their `key`s.
     fn declare_all(
         &mut self,
         declared: Declared,
@@ -368,7 +368,7 @@ impl Node {
         self.announce(transport)?.connect()
     }
 
-    /// Tells the declared ports to a check of the manifest.
+    /// Writes the declared ports for a check of the manifest.
     fn describe(mut self) -> Result<(), BusError> {
         let (inputs, outputs) = self.declared()?;
         let message = |declared: &Declared| match declared {
@@ -383,7 +383,7 @@ impl Node {
         description.store(&self.run_dir, self.index, self.generation)
     }
 
-    /// Creates the outputs, and tells that it did: the first half of connecting.
+    /// Creates the outputs, and reports that they exist: the first half of connecting.
     ///
     /// # Errors
     /// As [`Node::connect`].
@@ -440,7 +440,7 @@ impl Node {
         Ok(())
     }
 
-    /// Announces the type of a topic, or checks that a backup sends what was announced.
+    /// Announces the type of a topic, or checks that a backup sends the announced type.
     fn announce_topic(&self, topic: usize, schema: &Schema) -> Result<(), BusError> {
         let path = announcement::topic_path(&self.run_dir, topic);
         if self.generation == 0 {
@@ -510,7 +510,7 @@ impl AnnouncedNode {
             Membership::first(&links.plan)
         } else {
             links.lockstep.wait_slot(SlotState::Joining).or_aborted()?;
-            // It names this process already; the others are told when this one has connected.
+            // It names this process already; the others follow it when this one has connected.
             Membership::load(&links.run_dir, links.lockstep.epoch() + 1)?
         };
         ConnectedNode::new(links, inputs.into_iter(), outputs, &membership)
@@ -664,7 +664,7 @@ mod tests {
         let both = "as hummingbus_msgs/msg/MotorCommand and as hummingbus_msgs/msg/PlantState";
         assert!(words.contains("declares its input `command` twice") && words.contains(both), "{words}");
 
-        // Where the declaration returns no error, or nobody looks at it, connecting does.
+        // If the declaration returns no error, or the caller ignores it, connecting returns it.
         let late: [fn(&mut Node); 2] = [
             |node| drop(node.input::<PlantState>("command")),
             |node| assert!(node.optional_input::<PlantState>("command").is_none()),

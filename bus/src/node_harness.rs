@@ -1,4 +1,5 @@
-//! A node of a plan, stepped without a run: what it reads is given to it as recorded bytes, and so is what it sends.
+//! A node of a plan, stepped without a run: its inputs are given as recorded bytes, and its outputs are returned as
+//! such.
 
 use crate::announcement::Announcement;
 use crate::component::{StateError, StepError};
@@ -16,7 +17,7 @@ use inputs::InputFiles;
 
 /// A node of a plan, stepped without a run.
 ///
-/// It reads and sends CDR bytes, as recordings hold them, so that any component can be stepped on what was recorded.
+/// It reads and sends CDR bytes, as recordings hold them, so that any component can be stepped on a recording.
 pub struct NodeHarness {
     instance: Box<dyn Instance>,
     tick_ns: u64,
@@ -45,7 +46,8 @@ struct OutputWire {
 pub type Sample = (usize, Vec<u8>);
 
 impl NodeHarness {
-    /// Node number `node` of `plan`, which is one of `component`; what it forwards are messages of `components`.
+    /// Node number `node` of `plan`, which is one of `component`; the messages that it forwards are those of
+    /// `components`.
     ///
     /// # Errors
     /// As [`Component::new`](crate::Component::new).
@@ -92,7 +94,8 @@ impl NodeHarness {
         self.instance.load(state)
     }
 
-    /// Computes `tick`: `newest` gives the newest sample of a topic that was sent up to a tick. Returns what is sent.
+    /// Computes `tick`: `newest` gives the newest sample of a topic that was sent up to a tick. Returns the samples
+    /// sent.
     ///
     /// # Errors
     /// As [`Component::step`](crate::Component::step).
@@ -150,7 +153,7 @@ fn forwarded<'a>(
     Ok(all)
 }
 
-/// Tells a component what it forwards.
+/// Announces to a component the messages that it forwards.
 fn connect(instance: &mut dyn Instance, forwarded: &[Forwarded<'_>]) -> Result<(), ParameterError> {
     let all: Vec<_> = forwarded.iter().map(|(name, schema)| (*name, Announcement::of(schema))).collect();
     let all: Vec<_> = all.iter().map(|(name, announcement)| (*name, announcement)).collect();

@@ -3,15 +3,15 @@
 use serde::de::{DeserializeOwned, Deserializer, Error as _, Visitor, value::Error};
 use serde::forward_to_deserialize_any;
 
-/// The fields of `P`; none where it is no struct.
+/// The fields of `P`; empty if it is not a struct.
 pub(crate) fn of<P: DeserializeOwned>() -> &'static [&'static str] {
     let mut names: &'static [&'static str] = &[];
-    // Refused in any case: it has told its fields by then.
+    // Refused in any case: it has named its fields by then.
     let _ = P::deserialize(Question(&mut names));
     names
 }
 
-/// Hears what a type would read, and gives it nothing.
+/// Receives the request of a type for its fields, and gives it nothing.
 struct Question<'a>(&'a mut &'static [&'static str]);
 
 impl<'de> Deserializer<'de> for Question<'_> {

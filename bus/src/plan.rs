@@ -1,4 +1,4 @@
-//! The resolved plan of a run: what the launcher writes and every process of the run reads.
+//! The resolved plan of a run: the launcher writes it, and every process of the run reads it.
 
 use crate::computing_time::ComputingTime;
 use crate::error::BusError;
@@ -304,11 +304,11 @@ impl Plan {
             let samples = ticks.div_ceil(u64::from(self.topics[topic].period_ticks)) + 2;
             usize::try_from(samples).unwrap_or(usize::MAX)
         };
-        // Whoever joins is handed the history first: beside it there must be room for what is sent before that
-        // has been taken.
+        // A subscriber that joins gets the history first: beside it there must be room for the samples that are sent
+        // before it has taken the history.
         let queued_samples = 2 * samples(ticks);
-        // Who joins at a tick boundary needs the newest sample; who takes the place of a crashed process
-        // needs all that was sent since.
+        // A process that joins at a tick boundary needs the newest sample; one that takes the place of a crashed
+        // process needs every sample since.
         let restarts = self.nodes.iter().any(|node| node.restarts);
         Capacity {
             queued_samples,

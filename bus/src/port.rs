@@ -1,4 +1,4 @@
-//! The two ends of a connection inside a node: what may be read at a tick, and what must be sent.
+//! The two ends of a connection inside a node: the samples to read at a tick, and the samples to send.
 
 use crate::announcement::Announcement;
 use crate::error::BusError;
@@ -224,8 +224,8 @@ impl InPort {
         self.take_up_to(self.limit(tick), tick, node)
     }
 
-    /// Makes the newest sample stamped before `tick` the current one, whatever the delay: a later tick reads it, or a newer
-    /// one.
+    /// Makes the newest sample stamped before `tick` the current one, for any delay: a later tick reads it, or a
+    /// newer one.
     pub(crate) fn take_before(&mut self, tick: u32, node: &str) -> Result<(), BusError> {
         self.take_up_to(tick.checked_sub(1), tick, node)
     }
@@ -287,7 +287,7 @@ impl InPort {
         }
     }
 
-    /// Receives what backups have sent so far, so that their queues cannot run full; the error is the
+    /// Receives the samples that backups have sent so far, so that their queues cannot run full; the error is the
     /// sequence number that was due, and what was found.
     fn take_shadow(&mut self, newest_sequence: u64) -> Result<(), (u64, Found)> {
         for Backup { source, .. } in &mut self.backups {
@@ -353,7 +353,7 @@ impl InPort {
         Ok(())
     }
 
-    /// Lets a feed of this process show what was sent up to `tick`.
+    /// Makes the samples of this process up to `tick` visible to a local feed.
     pub(crate) fn look_at(&mut self, tick: u32) {
         self.newest_tick = Some(tick);
     }
@@ -609,7 +609,7 @@ impl OutPort {
         Some((header, self.ring.as_ref()?.at(tick)?))
     }
 
-    /// Forgets what was written at a tick at which nothing was due.
+    /// Forgets a sample that was written at a tick at which none was due.
     pub(crate) fn forget(&mut self) {
         self.is_written = false;
     }

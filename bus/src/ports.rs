@@ -78,7 +78,7 @@ pub trait InputPorts<'a>: Sized {
 /// The outputs of a component at one tick; implement it with `#[derive(bus::OutputPorts)]`.
 ///
 /// Each field is a port of the same name: `T` one that is always there, `Option<T>` one that is there where the
-/// manifest names it. What is not there or not due is dropped; a due output that is `None` ends the run.
+/// manifest names it. An output that is not there or not due is dropped; a due output that is `None` ends the run.
 ///
 /// ```
 /// use bus::messages::{ControlStatus, MotorCommand};
@@ -328,8 +328,8 @@ impl<'a> InputPorts<'a> for AnyInputs<'a> {
     }
 }
 
-/// The inputs of a component that forwards messages as bytes, in the order of their names; what it makes of them it sends
-/// on outputs of the same names ([`OutputSamples::write_bytes`]), and a message keeps the stamp of its first sender.
+/// The inputs of a component that forwards messages as bytes, in the order of their names. It sends its results on
+/// outputs of the same names ([`OutputSamples::write_bytes`]), and a message keeps the stamp of its first sender.
 ///
 /// ```
 /// use bus::ports::ForwardedInputs;

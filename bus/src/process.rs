@@ -11,7 +11,7 @@ use std::process::Command;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
-/// The environment variable that tells a process who its launcher is.
+/// The environment variable with the process number of the launcher.
 pub const LAUNCHER_VARIABLE: &str = "HUMMINGBUS_LAUNCHER_PID";
 
 /// The environment variable that names the run directory.
@@ -63,8 +63,8 @@ fn note_signals() {
 /// The signals that ask a process to end.
 const STOP_SIGNALS: [libc::c_int; 2] = [libc::SIGTERM, libc::SIGINT];
 
-/// Has SIGTERM and SIGINT wait until what `command` starts joins the run: before that it could not note them, and would
-/// die of a signal that is to stop the run in order.
+/// Blocks SIGTERM and SIGINT until the process that `command` starts joins the run: before that it could not note
+/// them, and would die of a signal that is to stop the run in order.
 pub fn hold_stop_signals(command: &mut Command) {
     let block = || {
         mask_stop_signals(libc::SIG_BLOCK);
@@ -74,7 +74,7 @@ pub fn hold_stop_signals(command: &mut Command) {
     unsafe { command.pre_exec(block) };
 }
 
-/// Has this process hear SIGTERM and SIGINT although whoever started it had them wait.
+/// Unblocks SIGTERM and SIGINT, which the starter of this process may have blocked.
 pub fn hear_stop_signals() {
     mask_stop_signals(libc::SIG_UNBLOCK);
 }
@@ -100,7 +100,7 @@ pub(crate) fn is_terminated() -> bool {
 /// Has the kernel kill this process when its launcher dies, even by `kill -9`.
 fn die_with_parent() {
     let _ = set_parent_process_death_signal(Some(Signal::KILL));
-    // The launcher may have died before the line above; then nobody would ever send that signal.
+    // The launcher may have died before the line above; that signal would then never come.
     let launcher = std::env::var(LAUNCHER_VARIABLE).ok().and_then(|pid| pid.parse::<i32>().ok());
     let parent = getppid().map(|pid| pid.as_raw_nonzero().get());
     if launcher.is_some() && launcher != parent {
@@ -187,13 +187,13 @@ pub fn set_fifo(pid: u32, priority: i32) -> io::Result<()> {
     }
 }
 
-/// Has the kernel kill what `command` starts when this process dies: for executables that know nothing of a
-/// launcher.
+/// Makes the kernel kill the program that `command` starts when this process dies: for executables that do not know
+/// their launcher.
 pub fn die_with_this_one(command: &mut Command) {
     let launcher = rustix::process::getpid();
     let bind = move || {
         set_parent_process_death_signal(Some(Signal::KILL))?;
-        // The launcher may have died before the line above; then nobody would ever send that signal.
+        // The launcher may have died before the line above; that signal would then never come.
         if getppid() == Some(launcher) { Ok(()) } else { Err(io::ErrorKind::NotFound.into()) }
     };
     // SAFETY: between fork and exec the closure makes two system calls and touches no lock and no heap.
@@ -225,7 +225,7 @@ pub fn kill_group(leader: u32) {
     }
 }
 
-/// The cores this process may run on, in ascending order; empty where the system does not tell.
+/// The cores this process may run on, in ascending order; empty if the system does not report them.
 #[must_use]
 pub fn allowed_cores() -> Vec<usize> {
     let set = sched_getaffinity(None).unwrap_or_else(|_| CpuSet::new());

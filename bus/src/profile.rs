@@ -1,8 +1,8 @@
 //! Host times of the ticks of a run: every process notes its own in a file of the run directory.
 //!
-//! A file is a header and records of a fixed number of words, mapped, reserved and touched before the first
-//! tick: noting a tick is a look at the clock and a few stores. What a node waited for is not noted: it follows
-//! from the plan and from what the other processes noted.
+//! A file is a header and records of a fixed number of words, mapped, reserved and touched before the first tick:
+//! noting a tick is a look at the clock and a few stores. The cause of a node's wait is not noted: it follows from
+//! the plan and from the notes of the other processes.
 
 use crate::error::BusError;
 use crate::host_time::monotonic_ns;
@@ -226,7 +226,7 @@ struct RecordWriter {
 impl RecordWriter {
     fn create(path: PathBuf, words: usize, records: u32) -> Result<Self, BusError> {
         let capacity = records.min(NOTED_TICKS_MAX) as usize;
-        // One more than counts: when the file is full, that one takes what is not noted.
+        // One more than counts: when the file is full, that one takes the notes that are left out.
         let bytes = WORD_BYTES * (HEADER_WORDS + words * (capacity + 1));
         let file = crate::reserve::create(&path, bytes as u64)?;
         // SAFETY: the file was created by this call in the run's own directory; others read it only after

@@ -1,7 +1,7 @@
-//! Space for files that are mapped: it is reserved before anybody writes into it.
+//! Space for files that are mapped: it is reserved before any process writes into it.
 //!
-//! A page that cannot be had kills the process that touches it (SIGBUS), without a message. So what the bus maps itself
-//! is reserved when it is made, and what iceoryx2 made, right after: in flight every page is there.
+//! A page that cannot be had kills the process that touches it (SIGBUS), without a message. So the bus reserves its
+//! own mappings when it makes them, and those of iceoryx2 right after: in flight every page is there.
 
 use crate::error::BusError;
 use crate::names::{SHARED_MEMORY, shm_prefix};
@@ -56,7 +56,7 @@ fn no_room(what: String, needed: u64, folder: &Path) -> BusError {
 }
 
 /// Reserves the pages of the shared-memory files of run `run_id` that iceoryx2 has made and whose names `are_meant`;
-/// `what` is what they are for.
+/// `what` is their purpose.
 pub(crate) fn reserve_files(
     run_id: &str,
     are_meant: impl Fn(&str) -> bool,
@@ -70,7 +70,7 @@ pub(crate) fn reserve_files(
         };
         let length = file.metadata().map_err(|source| cannot_reserve(path, source))?.len();
         match allocate(&file, length) {
-            // One that is empty is just being made: who makes it reserves it.
+            // An empty file is just being made: its maker reserves it.
             Ok(()) | Err(Errno::OPNOTSUPP) => {}
             Err(Errno::INVAL) if length == 0 => {}
             Err(Errno::NOSPC) => return Err(no_room(what.to_owned(), missing_bytes(&files), folder)),
@@ -80,7 +80,7 @@ pub(crate) fn reserve_files(
     Ok(())
 }
 
-/// To write only: while it makes a file, iceoryx2 lets nobody read it.
+/// To write only: while iceoryx2 makes a file, the file cannot be read.
 fn open_to_reserve(path: &Path) -> std::io::Result<File> {
     let owner = path.symlink_metadata()?.uid();
     if owner != user_id() {

@@ -12,8 +12,8 @@ use std::path::Path;
 /// Below this much a SIGBUS is put down to a full /dev/shm.
 const FULL_BYTES: u64 = 256 << 10;
 
-/// The shared memory that the run of `plan` takes at least, and its largest file. Not in it: the states that nodes
-/// hand over, and messages that are not `known`; who makes those finds the room or says so.
+/// The shared memory that the run of `plan` takes at least, and its largest file. It does not include the states that
+/// nodes hand over, and messages that are not `known`: their makers find the room or report an error.
 fn bytes_at_least(plan: &Plan, known: &[&Schema]) -> (u64, u64) {
     let topics = plan.topics.iter().enumerate().map(|(index, topic)| {
         let schema = known.iter().find(|schema| schema.type_name == topic.type_name);

@@ -27,7 +27,7 @@ pub fn run_process<C: Component + 'static>() -> Result<(), BusError> {
 
 impl Registration {
     /// Runs the component as the node that `join` names, until the run ends or another process has taken its place.
-    /// `components` are those of the program: what a component forwards are messages of theirs.
+    /// `components` are those of the program: forwarded messages are of their types.
     ///
     /// # Errors
     /// If the manifest and the component do not fit, a step fails, or the run is aborted.
@@ -101,7 +101,7 @@ impl Part {
         Member::new(connected, transfer, Box::new(self.computation()))
     }
 
-    /// Tells the component the names and the messages of its inputs' topics, by `announced`.
+    /// Announces to the component the names and the messages of its inputs' topics, by `announced`.
     ///
     /// # Errors
     /// The component's objection.
@@ -114,13 +114,13 @@ impl Part {
         told.map_err(|error| failed(&self.name, &error))
     }
 
-    /// The component with its state, as what steps at each tick.
+    /// The component with its state, as the computation that steps at each tick.
     pub(crate) fn computation(&mut self) -> Wired<'_> {
         Wired { instance: &mut *self.instance, wiring: &self.wiring }
     }
 }
 
-/// Ends the components of `parts`, whose ticks have come to `end`.
+/// Finishes the components of `parts`, whose ticks ended with `end`.
 pub(crate) fn finish(
     parts: impl IntoIterator<Item = Part>,
     end: Result<(), BusError>,
@@ -132,7 +132,7 @@ pub(crate) fn finish(
     }
     match end {
         Ok(()) | Err(BusError::Aborted) => finished.and(end),
-        // What made a step fail makes the end fail too: the first error counts.
+        // The cause of a failed step makes the end fail too: the first error counts.
         Err(error) => Err(error),
     }
 }

@@ -1,4 +1,4 @@
-//! Samples by port in a process's own memory: what a step without a run reads and sends.
+//! Samples by port in a process's own memory: the inputs and outputs of a step without a run.
 
 use crate::error::BusError;
 use crate::message::{ENCAPSULATION_WORD, sample_words};

@@ -1,9 +1,11 @@
-//! The samples of a topic in shared memory that outlives its publisher: how the recorder reads what members of a group send.
+//! The samples of a topic in shared memory that outlives its publisher: the recorder reads the samples of group
+//! members there.
 //!
-//! A member that writes here needs neither a loan nor a queue, and the recorder reads the bytes where they lie. The control
-//! segment orders the two: a reader looks at the sample of a tick when the topic's count says that it is sent, and the
-//! publisher comes back to its place in the ring when the reader has completed that tick, since the clock grants no tick more
-//! than a window ahead of the slowest node. What is counted is there, also when the publisher dies right after.
+//! A member that writes here needs neither a loan nor a queue, and the recorder reads the bytes where they lie. The
+//! control segment orders the two: a reader looks at the sample of a tick when the topic's count says that it is
+//! sent. The publisher comes back to its place in the ring when the reader has completed that tick, since the clock
+//! grants no tick more than a window ahead of the slowest node. A sample that is counted is there, even if the
+//! publisher dies right after.
 
 use crate::error::BusError;
 use crate::message::sample_words;

@@ -188,7 +188,7 @@ impl Extent {
         self.tail(self.count(message))
     }
 
-    /// The place of what follows `count` values.
+    /// The place of the bytes behind `count` values.
     fn tail(&self, count: usize) -> Range<usize> {
         let end = self.values_offset + count.min(self.values_max) * self.value_bytes;
         let start = if self.tail_bytes == 0 { end } else { end.next_multiple_of(8) };
@@ -406,7 +406,7 @@ fn comment(field: &Field) -> String {
         .join(" ")
 }
 
-/// The type as it stands in a ROS 2 definition; nested types with their two-part name.
+/// The type as a ROS 2 definition writes it; nested types with their two-part name.
 fn ros_type(kind: &Kind) -> String {
     match kind {
         Kind::Primitive(primitive) => primitive.ros_name().to_owned(),

@@ -11,7 +11,7 @@ pub(crate) fn create(path: &Path, bytes: usize) -> Result<MmapRaw, BusError> {
     MmapRaw::map_raw(&file).map_err(|source| BusError::File { action: "map", path: path.to_owned(), source })
 }
 
-/// Maps the file `path`, which must have `bytes` bytes; `expected` says what it is.
+/// Maps the file `path`, which must have `bytes` bytes; `expected` describes it.
 pub(crate) fn open(path: &Path, bytes: usize, expected: &'static str) -> Result<MmapRaw, BusError> {
     let map = user_file::open(path, true).and_then(|file| MmapRaw::map_raw(&file));
     let map = map.map_err(|source| BusError::File { action: "open", path: path.to_owned(), source })?;

@@ -21,7 +21,7 @@ use std::marker::PhantomData;
 /// The nodes of a plan, stepped one after the other on the calling thread: the samples are those that processes of the
 /// same plan send, bit for bit.
 ///
-/// A debugger, a test and whoever wants to look between two ticks step it; nothing flies unless they do. A run with
+/// A debugger, a test, or a program that looks between two ticks steps it; nothing flies without a call. A run with
 /// processes has a launcher.
 pub struct Simulation {
     plan: Plan,
@@ -74,7 +74,7 @@ impl Simulation {
     /// If the plan and a component do not fit.
     ///
     /// # Panics
-    /// If a member reads what a node sends that is left out.
+    /// If a member reads a topic of a node that is left out.
     pub fn new(
         plan: &Plan,
         members: impl IntoIterator<Item = (usize, &'static Registration)>,
@@ -119,8 +119,9 @@ impl Simulation {
         f64::from(self.tick) * self.plan.tick_s()
     }
 
-    /// Lets the node `name`, and those that read it in the same tick, step behind all others: [`Simulation::begin_step`]
-    /// computes the others, so that whoever decides what this node sends sees first what they have sent.
+    /// Lets the node `name`, and those that read it in the same tick, step behind all others.
+    /// [`Simulation::begin_step`] computes the others, so that a caller that decides the outputs of this node first
+    /// sees theirs.
     ///
     /// # Errors
     /// If there is no such node.
@@ -173,8 +174,8 @@ impl Simulation {
     /// Computes the next tick of every node that is due.
     ///
     /// # Errors
-    /// If a step fails, or leaves a due output unwritten or with what no message may hold. Nothing more can be computed
-    /// then.
+    /// If a step fails, leaves a due output unwritten, or writes a value that no message may hold. Nothing more can
+    /// be computed then.
     pub fn step(&mut self) -> Result<(), BusError> {
         self.compute(self.members.len())?;
         self.tick += 1;
@@ -285,7 +286,7 @@ impl Simulation {
         timed.map(|member| (member.part.name().to_owned(), member.overruns[0], member.overruns[1])).collect()
     }
 
-    /// Ends the components, whose ticks have come to `end`: a recorder closes its file.
+    /// Finishes the components, whose ticks ended with `end`: a recorder closes its file.
     ///
     /// # Errors
     /// The error of `end`, or a component's.

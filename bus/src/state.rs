@@ -6,7 +6,7 @@ use crate::schema::Schema;
 /// Transfer of a component's state to the process that takes its place.
 #[derive(Clone, Copy, Debug)]
 pub enum Transfer {
-    /// The state is one message, copied as it is.
+    /// The state is one message, copied bit for bit.
     Message(&'static Schema),
     /// The component has no state.
     Nothing,
@@ -17,16 +17,16 @@ pub enum Transfer {
     Growing(&'static str),
     /// The state is a file that is being written. No other process can continue it.
     File,
-    /// The state is in another program, which does not tell it. Another process can take the component's place and goes on
-    /// from its last outputs; a checkpoint cannot hold it. The text names the program.
+    /// The state is in another program, which does not export it. Another process can take the component's place and
+    /// goes on from its last outputs; a checkpoint cannot hold it. The text names the program.
     External(&'static str),
 }
 
 /// The state of a component: everything that changes from tick to tick.
 ///
-/// A [`Message`] is a state as it is, and so is `()`. A type with other contents, for example vectors whose length follows
-/// from the parameters, writes its own bytes. Buffers that every step overwrites may be part of it; they need not be
-/// saved.
+/// A [`Message`] is a state by itself, and so is `()`. A type with other contents, for example vectors whose length
+/// follows from the parameters, writes its own bytes. Buffers that every step overwrites may be part of it; they need
+/// not be saved.
 ///
 /// ```
 /// use bus::component::{State, StateError, Transfer};

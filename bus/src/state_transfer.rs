@@ -1,8 +1,8 @@
 //! The state that a node hands over: stated after every tick, in shared memory that outlives the process.
 //!
-//! A ring holds the state at the start of each of the last ticks, as many as a slot can be ahead of its
-//! backup. It is stated before the tick's outputs are sent: whatever was sent, the state that follows it
-//! can be read, also when the process died right after.
+//! A ring holds the state at the start of each of the last ticks, as many as a slot can be ahead of its backup. It is
+//! stated before the tick's outputs are sent: after any sample, the state that follows it can be read, even if the
+//! process died right after.
 
 use crate::component::Transfer;
 use crate::error::BusError;
@@ -173,7 +173,7 @@ fn announcement_path(run_dir: &Path, node: usize, generation: u32) -> PathBuf {
     run_dir.join(format!("state-{node}.{generation}.json"))
 }
 
-/// Removes what generation `generation` of node `node` stated, once nobody reads it any more.
+/// Removes the state of generation `generation` of node `node`, once no process reads it any more.
 pub fn remove(run_dir: &Path, plan: &Plan, node: usize, generation: u32) {
     // A process without a state has neither.
     let _ = std::fs::remove_file(ring_path(plan, node, generation));

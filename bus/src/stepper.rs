@@ -56,7 +56,7 @@ impl Stepper {
     /// Takes the inputs of `tick`.
     ///
     /// # Errors
-    /// The number of a topic of which a sample is missing, and what was found.
+    /// The number of a topic of which a sample is missing, and the sample that was found.
     pub(crate) fn gather(&mut self, tick: u32) -> Result<(), (usize, BusError)> {
         for input in &mut self.inputs {
             input.take(tick, &self.node).map_err(|error| (input.topic, error))?;
@@ -78,7 +78,7 @@ impl Stepper {
         Ok(())
     }
 
-    /// Lets its inputs read what was sent up to `tick`, where members of the same process send it.
+    /// Lets its inputs read the samples that members of the same process sent up to `tick`.
     pub(crate) fn look_at(&mut self, tick: u32) {
         self.inputs.iter_mut().for_each(|input| input.look_at(tick));
     }
@@ -88,8 +88,8 @@ impl Stepper {
         self.inputs.iter().filter_map(|input| input.sample_before(before, locals)).collect()
     }
 
-    /// Computes the step of `tick` unless the one before is under way, and writes what is due. `words` are those of
-    /// [`Stepper::words`]. A node that `takes_over` goes on from what its predecessor sent last.
+    /// Computes the step of `tick` unless the one before is under way, and writes the due outputs. `words` are those
+    /// of [`Stepper::words`]. A node that `takes_over` goes on from its predecessor's last outputs.
     ///
     /// # Errors
     /// If the step fails, or left a due output unwritten.
@@ -102,7 +102,7 @@ impl Stepper {
         computation: &mut dyn Computation,
     ) -> Result<Stepped, BusError> {
         if takes_over && !self.predecessor.is_empty() {
-            // It goes on from what its predecessor sent last, not from a step of its own as a shadow.
+            // It goes on from its predecessor's last outputs, not from a step of its own as a shadow.
             words.fill(0);
         }
         let due = self.timing.as_ref().map_or(Due::Step, |timing| timing.begin(tick, words, &self.outputs));
@@ -140,10 +140,10 @@ impl Stepper {
     }
 
     /// Sends the outputs that are due at `tick`. `times_ns` returns the host times of a sample, by the number of its
-    /// output; `sent` hears of each sample that was sent.
+    /// output; `sent` is called for each sample that was sent.
     ///
     /// # Errors
-    /// If a due output was not written or holds what no message may, or cannot be sent.
+    /// If a due output was not written, holds a value that no message may hold, or cannot be sent.
     pub(crate) fn publish(
         &mut self,
         tick: u32,
@@ -158,7 +158,7 @@ impl Stepper {
             sent(output);
         }
         self.outputs.iter_mut().for_each(OutPort::forget);
-        // Readers are awake by now: what the next tick needs is fetched while they compute.
+        // Readers are awake by now: the memory for the next tick is fetched while they compute.
         self.outputs.iter_mut().try_for_each(|output| output.prepare(&self.node))
     }
 }

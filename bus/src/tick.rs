@@ -1,4 +1,4 @@
-//! One computation of a node: what it reads and writes at a tick.
+//! One computation of a node: the inputs and outputs of a tick.
 
 use crate::error::BusError;
 use crate::handles::{Input, Output};
@@ -14,8 +14,8 @@ pub struct Tick<'a> {
     pub(crate) inputs: &'a [InPort],
     pub(crate) locals: &'a Locals,
     pub(crate) outputs: &'a mut [OutPort],
-    /// At the first tick whose outputs count, unless a state was handed over: what the predecessor sent, by
-    /// output.
+    /// The predecessor's last samples, by output: at the first tick whose outputs count, unless a state was
+    /// transferred.
     pub(crate) predecessor: &'a [InPort],
 }
 
@@ -44,8 +44,8 @@ impl Tick<'_> {
         view(self.inputs[input.index].words(self.locals))
     }
 
-    /// Host times of the newest sample: when its sender had its inputs, was done, and sent it. For
-    /// profiling only: what a node computes from them is not reproducible. Zero for an initial value.
+    /// Host times of the newest sample: when its sender had its inputs, was done, and sent it. For profiling only:
+    /// numbers that a node computes from them are not reproducible. Zero for an initial value.
     #[must_use]
     pub fn host_times_ns<T: Message>(&self, input: Input<T>) -> [u64; 3] {
         self.inputs[input.index].host_times_ns(self.locals)

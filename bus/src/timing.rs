@@ -42,7 +42,7 @@ impl Timing {
     /// That of `node`, if its steps take time.
     pub(crate) fn of(plan: &Plan, node: &NodePlan) -> Option<Self> {
         let time = node.computing_time.clone()?;
-        // No node has a space in its name: the stream is nobody else's.
+        // No node has a space in its name: no other node has this stream.
         let random = stream(plan.seed, &format!("{} computing time", node.name));
         Some(Self { time, random, tick_ns: plan.tick_ns, period_ticks: node.period_ticks })
     }
@@ -52,7 +52,7 @@ impl Timing {
         HEAD_WORDS + 2 * outputs.iter().map(OutPort::sample_words).sum::<usize>()
     }
 
-    /// Has what is done by `tick` be what is sent, and tells whether the node steps.
+    /// Makes the outputs of a step that is done by `tick` the ones to send; returns whether the node steps.
     pub(crate) fn begin(&self, tick: u32, words: &mut [u64], outputs: &[OutPort]) -> Due {
         match words[DONE] {
             0 => Due::Step,
@@ -69,8 +69,8 @@ impl Timing {
         }
     }
 
-    /// Takes what the step at `tick` wrote, to be sent when it is done; true where that is beyond the next due tick. The
-    /// first step of all is done at once: before it there is nothing that could be sent.
+    /// Takes the samples that the step at `tick` wrote, to be sent when it is done; true if that is beyond the next
+    /// due tick. The first step of all is done at once: before it there is no sample to send.
     pub(crate) fn end(
         &mut self,
         tick: u32,

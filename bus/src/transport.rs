@@ -1,7 +1,7 @@
 //! The only room that knows iceoryx2: one service per topic, its publisher and its subscribers.
 //!
-//! Each run has its own root path and its own prefix for shared-memory files, so runs never meet, and
-//! whatever a killed process leaves behind is found by name.
+//! Each run has its own root path and its own prefix for shared-memory files. So runs never meet, and the remains of
+//! a killed process are found by name.
 
 use crate::error::BusError;
 use crate::message::{ENCAPSULATION_WORD, sample_words};
@@ -36,9 +36,10 @@ const PATH_BYTES_MAX: usize = 255;
 /// Samples a subscriber holds at a time: the current one and the one that replaces it.
 pub(crate) const BORROWED_SAMPLES: usize = 2;
 
-/// Asked for beside the samples: what iceoryx2 touches while it makes the files of a port would kill the process that
-/// lacks it. Measured with manifests/hover.toml and manifests/swarm.toml: at most 4 KiB for each connection and each
-/// service, 92 KiB and 304 KiB for all of a run; so there is room for what several processes make at a time.
+/// Required beside the samples: the memory that iceoryx2 touches while it makes the files of a port. Without it the
+/// process would be killed. Measured with manifests/hover.toml and manifests/swarm.toml: at most 4 KiB for each
+/// connection and each service, 92 KiB and 304 KiB for all of a run. So there is room for several processes that make
+/// ports at a time.
 pub(crate) const PORT_MARGIN_BYTES: u64 = 256 << 10;
 
 /// Header of a sample: its place in the run, and host times that no recording holds.
@@ -100,7 +101,7 @@ fn config(run_dir: &Path, run_id: &str) -> Result<Config, IceoryxError> {
     Ok(config)
 }
 
-/// Gives back what dead processes of the run hold: their ports and their shared memory.
+/// Gives back the resources of dead processes of the run: their ports and their shared memory.
 ///
 /// # Errors
 /// An error of iceoryx2.
@@ -142,8 +143,8 @@ impl Transport {
         Ok(Self { node, node_name, run_id, new_ports: RefCell::default() })
     }
 
-    /// The service of a topic's samples from one generation of its publisher. Each generation has its own:
-    /// who reads the topic knows for each tick whose sample counts.
+    /// The service of a topic's samples from one generation of its publisher. Each generation has its own: a reader
+    /// of the topic knows for each tick whose sample counts.
     fn service(&self, topic: &str, generation: u32, capacity: Capacity) -> Result<Factory, BusError> {
         let fail = |reason: IceoryxError| {
             transport_error(&self.node_name, &format!("opening topic {topic}"), &reason)
@@ -181,7 +182,7 @@ impl Transport {
             .publisher_builder()
             .initial_max_slice_len(sample_words(size))
             .max_loaned_samples(1)
-            // Only the queue of a reader that died or hangs can be full: nobody may wait for it. A living
+            // Only the queue of a reader that died or hangs can be full: no publisher may wait for it. A living
             // reader that lost a sample would miss its sequence number and stop the run.
             .backpressure_strategy(BackpressureStrategy::DiscardData)
             .create()
@@ -215,8 +216,8 @@ impl Transport {
         Ok(Receiver { subscriber })
     }
 
-    /// Reserves the pages of what was made for the ports since the last call: from then on, no sample can find that a
-    /// page cannot be had.
+    /// Reserves the pages of the files made for the ports since the last call: from then on, no sample can find that
+    /// a page cannot be had.
     pub(crate) fn reserve(&self) -> Result<(), BusError> {
         let ports = std::mem::take(&mut *self.new_ports.borrow_mut());
         if ports.is_empty() {
@@ -234,8 +235,8 @@ impl Transport {
 /// The type that iceoryx2 0.10 keeps in the counter of its nodes; its hash is part of the file's name.
 const COUNTER_TYPE: &str = "iceoryx2::node::global_management_segment::State";
 
-/// Makes the counter of the run's nodes, open to this user alone, where it is not there yet. iceoryx2 0.10 would make it
-/// itself otherwise, and open it to everybody, whatever the umask says.
+/// Makes the counter of the run's nodes, open to this user alone, if it is not there yet. Otherwise iceoryx2 0.10
+/// would make it itself, and open it to every user for any umask.
 fn make_node_counter(config: &Config, run_id: &str) -> std::io::Result<()> {
     use std::io::Write as _;
     let version = PackageVersion::get();
@@ -246,7 +247,7 @@ fn make_node_counter(config: &Config, run_id: &str) -> std::io::Result<()> {
     // In one step, and never over another's: nodes that come at the same time share one counter.
     let folder = path.parent().unwrap_or(Path::new(SHARED_MEMORY));
     let mut draft = tempfile::Builder::new().prefix(&shm_prefix(run_id)).tempfile_in(folder)?;
-    // Whatever the umask takes away.
+    // Even if the umask would take them away.
     draft.as_file().set_permissions(std::fs::Permissions::from_mode(0o600))?;
     // The version that wrote it, and the count, each in 8 bytes.
     draft.write_all(&[version.to_u64().to_ne_bytes(), [0; 8]].concat())?;

@@ -1,7 +1,7 @@
 //! Files that are opened by name where others may write: only plain files and folders of this user.
 //!
-//! Anybody can put a pipe, a device or a link of any name into /dev/shm. So who owns a name is asked before it is
-//! opened, the open neither follows a link nor waits, and what was opened is asked once more.
+//! Any user can put a pipe, a device or a link of any name into /dev/shm. So the owner of a name is checked before it
+//! is opened, the open neither follows a link nor waits, and the opened file is checked once more.
 
 use crate::process::user_id;
 use std::fs::{File, Metadata, OpenOptions};
@@ -9,7 +9,7 @@ use std::io::{Error, ErrorKind, Read as _, Result};
 use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
 use std::path::Path;
 
-/// The longest text that a run writes about itself; whatever is longer is none of it.
+/// The longest text that a run writes about itself; a longer one is from another writer.
 const TEXT_BYTES_MAX: u64 = 64 << 20;
 
 /// Not through a link, and without waiting for the other end of a pipe.
@@ -18,7 +18,7 @@ pub(crate) const FLAGS: i32 = libc::O_NOFOLLOW | libc::O_NONBLOCK | libc::O_NOCT
 /// Opens the plain file of this user at `path`, to read it, and to write into it where `writes` is set.
 ///
 /// # Errors
-/// If there is none, or what is there is no plain file of this user.
+/// If there is none, or it is not a plain file of this user.
 pub fn open(path: &Path, writes: bool) -> Result<File> {
     require_file(&path.symlink_metadata()?)?;
     let file = OpenOptions::new().read(true).write(writes).custom_flags(FLAGS).open(path)?;
@@ -29,7 +29,7 @@ pub fn open(path: &Path, writes: bool) -> Result<File> {
 /// Opens the folder of this user at `path`.
 ///
 /// # Errors
-/// If there is none, or what is there is no folder of this user.
+/// If there is none, or it is not a folder of this user.
 pub fn open_folder(path: &Path) -> Result<File> {
     require_folder(&path.symlink_metadata()?)?;
     let folder = OpenOptions::new().read(true).custom_flags(FLAGS | libc::O_DIRECTORY).open(path)?;
@@ -77,7 +77,7 @@ mod tests {
     use std::os::unix::net::UnixListener;
     use std::path::Path;
 
-    /// A name of every kind that is no plain file.
+    /// A name of every kind of file that is not a plain file.
     fn strange_names(folder: &Path) -> Vec<std::path::PathBuf> {
         let names = ["pipe", "socket", "link", "folder", "loop"].map(|name| folder.join(name));
         let [pipe, socket, link, inner, around] = &names;

@@ -24,7 +24,7 @@ impl ConnectedNode {
         self.state.restore(&part, computation)
     }
 
-    /// Goes on from what another component sent last before the checkpoint.
+    /// Goes on from the last sample of another component before the checkpoint.
     fn succeed(&mut self) -> Result<(), BusError> {
         let links = &self.links;
         let restored = Samples::of_run(&links.run_dir, &links.plan)?;
@@ -60,7 +60,7 @@ impl ConnectedNode {
         Ok(())
     }
 
-    /// True if a checkpoint was asked for of the tick at which the run is held: all samples before it are there.
+    /// True if a checkpoint of the tick at which the run is held was requested: every sample before it is there.
     pub(crate) fn is_asked_at_hold(&self) -> bool {
         let lockstep = &self.links.lockstep;
         lockstep.checkpoint_asks() > self.asks_answered
@@ -68,7 +68,7 @@ impl ConnectedNode {
             && lockstep.checkpoint_tick() <= self.tick
     }
 
-    /// Writes this node's part of the checkpoint of the tick at which the run is held, if it was asked for one.
+    /// Writes this node's part of the checkpoint of the tick at which the run is held, if one was requested.
     ///
     /// # Errors
     /// If a sample is lost, or the part cannot be written.

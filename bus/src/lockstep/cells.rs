@@ -43,9 +43,9 @@ cells! {
         abort: AtomicU32,
         /// The number of the newest membership.
         epoch: AtomicU32,
-        /// The tick before which every node writes its part of a checkpoint that was asked for; 0 where none was.
+        /// The tick before which every node writes its part of a requested checkpoint; 0 if none was requested.
         checkpoint_tick: AtomicU32,
-        /// Number of checkpoints that were asked for.
+        /// Number of checkpoints that were requested.
         checkpoint_asks: AtomicU32,
     }
 
@@ -68,7 +68,7 @@ cells! {
 
     /// Requests to the clock.
     struct SteeringCell {
-        /// Counts what changes here; the clock sleeps on it in a hold.
+        /// Counts the changes in this cell; the clock sleeps on it in a hold.
         changes: AtomicU32,
         /// The boundary at which a user wants the clock to wait.
         hold_tick: AtomicU32,
@@ -154,7 +154,7 @@ cells! {
 /// Number at the start of a segment of this layout: processes of different versions do not fly together.
 pub(super) const MAGIC: u32 = number_of(DECLARATIONS) ^ VERSION;
 
-/// To be raised when the queues change, or what a word means, and the declarations above do not.
+/// To be raised when the queues or the meaning of a word change, and the declarations above do not.
 const VERSION: u32 = 0;
 
 /// The Fowler-Noll-Vo hash of `text`.

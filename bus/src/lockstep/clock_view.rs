@@ -36,7 +36,7 @@ impl ClockView {
         wait::wait_for_state(&self.segment, &self.segment.slots()[slot].ready, phase as u32)
     }
 
-    /// Moves the run to `phase` and wakes those who wait for it.
+    /// Moves the run to `phase` and wakes the processes that wait for it.
     pub(crate) fn set_phase(&self, phase: Phase) {
         wait::set_state(&self.segment.head().run.phase, phase as u32);
     }
@@ -62,7 +62,7 @@ impl ClockView {
         wake::hold(&head.clock.held_at, tick, &head.steering.changes, is_lifted, tell);
     }
 
-    /// Ends the run at `tick`, which nobody may have passed.
+    /// Ends the run at `tick`, which no process may have passed.
     pub(crate) fn set_end_tick(&self, tick: u32) {
         self.segment.head().run.end_tick.store(tick, Release);
         self.segment.wake_everybody();
@@ -73,7 +73,7 @@ impl ClockView {
         self.segment.request_stop();
     }
 
-    /// Counts a missed deadline, and the slots that were late; none where the clock itself was.
+    /// Counts a missed deadline, and the slots that were late; no slots if the clock itself was late.
     pub(crate) fn count_missed_deadline(&self, late: impl Iterator<Item = usize>) {
         self.segment.head().clock.missed_deadlines.fetch_add(1, Relaxed);
         late.for_each(|slot| {

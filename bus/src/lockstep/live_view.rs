@@ -54,13 +54,13 @@ impl LiveView {
         self.segment.head().run.epoch.load(Acquire)
     }
 
-    /// Number of checkpoints that were asked for.
+    /// Number of checkpoints that were requested.
     #[must_use]
     pub fn checkpoint_asks(&self) -> u32 {
         self.segment.head().run.checkpoint_asks.load(Acquire)
     }
 
-    /// The tick before which every node writes its part of the checkpoint that was asked for last; 0 where none was.
+    /// The tick before which every node writes its part of the checkpoint that was requested last; 0 if none was.
     #[must_use]
     pub fn checkpoint_tick(&self) -> u32 {
         self.segment.head().run.checkpoint_tick.load(Acquire)
@@ -79,7 +79,7 @@ impl LiveView {
         if factor > 0.0 { Pace::Factor(factor) } else { Pace::Free }
     }
 
-    /// The tick boundary at which a user wants the clock to wait; `u32::MAX` if nobody does.
+    /// The tick boundary at which a user wants the clock to wait; `u32::MAX` for none.
     #[must_use]
     pub fn hold_tick(&self) -> u32 {
         self.segment.head().steering.hold_tick.load(Acquire)

@@ -92,7 +92,7 @@ impl NodeView {
         self.segment.notify_supervisor();
     }
 
-    /// Notes what this process goes on from.
+    /// Notes the origin of the state with which this process goes on.
     pub(crate) fn set_transfer(&self, transfer: TransferOutcome) {
         self.segment.slots()[self.slot].transfer.store(transfer as u32, Release);
     }

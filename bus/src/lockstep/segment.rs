@@ -61,14 +61,14 @@ fn path(plan: &Plan) -> PathBuf {
 }
 
 impl Segment {
-    /// Creates the control segment of `plan`, readable and writable by this user alone. Nobody can open it before
-    /// it is [published](Segment::publish).
+    /// Creates the control segment of `plan`, readable and writable by this user alone. It cannot be opened before it
+    /// is [published](Segment::publish).
     pub(super) fn create(plan: &Plan) -> Result<Self, BusError> {
         let counts = Counts::of(plan);
         Ok(Self { map: shared_file::create(&path(plan), counts.bytes())?, counts })
     }
 
-    /// Has others find the segment: who opens it earlier finds no segment rather than half of one.
+    /// Lets others find the segment: a process that opens it earlier finds no segment rather than half of one.
     pub(super) fn publish(&self) {
         self.head().run.magic.store(MAGIC, Release);
     }
@@ -122,7 +122,8 @@ impl Segment {
         slots.chain(inputs).map(|waiter| &waiter.word)
     }
 
-    /// Wakes every sleeper, so that it looks at what was stored before: whether the run is over, or another membership.
+    /// Wakes every sleeper, so that it sees a change that was stored before: the end of the run, or another
+    /// membership.
     pub(super) fn wake_everybody(&self) {
         wake::wake_everybody(self.waiters());
         let words = self.slots().iter().flat_map(|slot| [&slot.ready, &slot.state]);
@@ -146,7 +147,7 @@ impl Segment {
         self.head().steering.is_stop_requested.store(1, Relaxed);
     }
 
-    /// Tells the supervisor that there is something to look at.
+    /// Notifies the supervisor that there is something to look at.
     pub(super) fn notify_supervisor(&self) {
         wake::notify(&self.head().notices.count);
     }

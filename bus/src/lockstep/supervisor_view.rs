@@ -12,7 +12,7 @@ use std::ops::Deref;
 use std::sync::atomic::Ordering::{Acquire, Relaxed, Release};
 use std::time::Duration;
 
-/// The supervisor's view of a run, which is also that of who steers it.
+/// The supervisor's view of a run, and that of a user who steers it.
 #[derive(Debug)]
 pub struct SupervisorView {
     live: LiveView,
@@ -65,12 +65,13 @@ impl SupervisorView {
         Ok(Self { live: LiveView::open(plan)? })
     }
 
-    /// Ends the run at once: every wait returns, but those of nodes without outputs, which take what is still sent.
+    /// Ends the run at once: every wait returns, except those of nodes without outputs, which take the remaining
+    /// samples.
     pub fn abort(&self) {
         self.end_at_once(Abort::Told);
     }
 
-    /// Has every wait of an aborted run return: those that send have left.
+    /// Makes every wait of an aborted run return: the senders have left.
     pub fn note_drained(&self) {
         self.end_at_once(Abort::Drained);
     }
@@ -104,7 +105,7 @@ impl SupervisorView {
     /// next step if the hold is lifted first.
     pub fn ask_for_checkpoint(&self, tick: u32) {
         let run = &self.segment.head().run;
-        // Who sees the number sees the tick.
+        // A reader that sees the number sees the tick.
         run.checkpoint_tick.store(tick, Release);
         run.checkpoint_asks.fetch_add(1, Release);
         self.segment.wake_everybody();
@@ -116,7 +117,7 @@ impl SupervisorView {
         self.segment.head().steering.pace.store(factor.to_bits(), Release);
     }
 
-    /// States what a slot holds, and wakes the process that waits for it.
+    /// Sets the state of a slot, and wakes the process that waits for it.
     pub fn set_slot_state(&self, slot: usize, state: SlotState) {
         set_state(&self.segment.slots()[slot].state, state as u32);
     }
@@ -127,7 +128,8 @@ impl SupervisorView {
         let cell = &self.segment.slots()[slot];
         cell.ready.store(Phase::Announcing as u32, Relaxed);
         cell.transfer.store(TransferOutcome::Unknown as u32, Relaxed);
-        // Who sees a count of 0 sees that the slot is empty: the clock does not wait for who has left.
+        // A reader that sees a count of 0 sees that the slot is empty: the clock does not wait for an instance that
+        // has left.
         for count in [
             &cell.late,
             &cell.epoch,
@@ -152,7 +154,7 @@ impl SupervisorView {
         self.segment.topics()[topic].shadow.word.store(tick, Release);
     }
 
-    /// Makes the membership number `epoch` the newest one, and wakes everybody to look at it.
+    /// Makes the membership number `epoch` the newest one, and wakes every process to look at it.
     pub fn set_epoch(&self, epoch: u32) {
         self.segment.head().run.epoch.store(epoch, Release);
         self.segment.wake_everybody();

@@ -60,13 +60,13 @@ fn poll(sequence: &AtomicU32, count: u32) {
     rustix::thread::sched_yield();
 }
 
-/// Sets `word` to `state`, and wakes those who wait for it.
+/// Sets `word` to `state`, and wakes the processes that wait for it.
 pub(super) fn set_state(word: &AtomicU32, state: u32) {
     word.store(state, Release);
     word.wake();
 }
 
-/// Waits until `word` is as far as `state`; only for joining, where nobody counts microseconds.
+/// Waits until `word` is at least `state`; only for joining, which is not timed to the microsecond.
 pub(super) fn wait_for_state(segment: &Segment, word: &AtomicU32, state: u32) -> Waited {
     loop {
         let found = word.load(Acquire);

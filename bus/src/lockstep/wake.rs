@@ -1,25 +1,27 @@
-//! The wake-up protocol: whoever sleeps for a sequence is woken when it reaches the count, and nobody for nothing.
+//! The wake-up protocol: a reader that sleeps for a sequence is woken when it reaches the count, and never without
+//! cause.
 //!
 //! A *sequence* counts ticks that are complete. A *waiter* belongs to one reader of one sequence and holds the count
-//! that this reader sleeps for. A writer stores its sequence, then looks at the waiters that read it, and wakes only
-//! those whose count is reached: nobody pays a system call for a reader that is awake.
+//! for which this reader sleeps. A writer stores its sequence, then looks at the waiters that read it, and wakes only
+//! those whose count is reached: a reader that is awake costs no system call.
 //!
 //! Both sides store, and then load what the other side stores; between the two stands a fence. All parties see the
-//! fences in one order. If the reader's comes later, the reader finds the new count and does not sleep; if the writer's
-//! does, the writer finds what the reader sleeps for. `wake_model.rs` explores the orders in which this can happen.
+//! fences in one order. If the reader's comes later, the reader finds the new count and does not sleep. If the
+//! writer's comes later, the writer finds the reader's count. `wake_model.rs` explores the orders in which this can
+//! happen.
 
 use std::sync::atomic::AtomicU32;
 use std::sync::atomic::Ordering::{self, Acquire, Relaxed, Release};
 use std::time::Duration;
 
-/// The value of a waiter on which nobody sleeps.
+/// The value of a waiter on which no reader sleeps.
 pub(super) const AWAKE: u32 = u32::MAX;
 /// The tick of an event that does not come: of a hold while the clock runs.
 pub(super) const NEVER: u32 = u32::MAX;
 /// Longest sleep of the clock in a hold before it checks for a stop.
 const HOLD_NAP: Duration = Duration::from_millis(100);
 
-/// A word of memory that parties share and can sleep on: a futex, or what stands for one in a model.
+/// A word of memory that parties share and can sleep on: a futex, or its substitute in a model.
 pub(super) trait Word {
     fn load(&self, order: Ordering) -> u32;
     fn store(&self, value: u32, order: Ordering);
@@ -29,7 +31,7 @@ pub(super) trait Word {
     fn fence();
     /// Sleeps until woken, or until `timeout`, if the word holds `seen`; it may also return for no reason.
     fn sleep(&self, seen: u32, timeout: Option<Duration>);
-    /// Wakes whoever sleeps on the word.
+    /// Wakes the sleepers on the word.
     fn wake(&self);
 }
 
@@ -57,7 +59,7 @@ impl Word for AtomicU32 {
     fn sleep(&self, seen: u32, timeout: Option<Duration>) {
         use rustix::thread::futex;
         let timeout = timeout.map(crate::host_time::timespec);
-        // Whatever ended it, the caller looks again.
+        // In any case the caller looks again.
         let _ = futex::wait(self, futex::Flags::empty(), seen, timeout.as_ref());
     }
 
@@ -69,7 +71,7 @@ impl Word for AtomicU32 {
 
 /// Stores `count` in `sequence`, and wakes those of its `waiters` whose count is reached.
 pub(super) fn advance<'w, W: Word + 'w>(sequence: &W, count: u32, waiters: impl IntoIterator<Item = &'w W>) {
-    // Who finds the count finds what was written before it.
+    // A reader that finds the count finds everything written before it.
     sequence.store(count, Release);
     W::fence();
     for waiter in waiters {
@@ -97,12 +99,12 @@ pub(super) fn sleep<W: Word>(sequence: &W, count: u32, waiter: &W, is_over: impl
     if sequence.load(Acquire) < count && !is_over() {
         waiter.sleep(count, None);
     }
-    // Nothing is ordered by this: a writer that misses it wakes somebody who is awake.
+    // No order depends on this: a writer that misses it wakes a reader that is awake.
     waiter.swap(AWAKE, Relaxed);
 }
 
-/// Wakes everybody, so that they look at what was stored before. A process that died may have noted that it wakes
-/// somebody and not have done it any more: so what the waiters say does not count.
+/// Wakes every sleeper, so that it sees what was stored before. A process that died may have noted a wake-up without
+/// carrying it out, so the values of the waiters do not count.
 pub(super) fn wake_everybody<'w, W: Word + 'w>(waiters: impl IntoIterator<Item = &'w W>) {
     W::fence();
     for waiter in waiters {
@@ -111,7 +113,7 @@ pub(super) fn wake_everybody<'w, W: Word + 'w>(waiters: impl IntoIterator<Item =
     }
 }
 
-/// Counts an event, and wakes those who sleep until there is one.
+/// Counts an event, and wakes the processes that sleep until there is one.
 pub(super) fn notify<W: Word>(events: &W) {
     events.increment(Release);
     events.wake();
@@ -137,14 +139,14 @@ pub(super) fn hold<W: Word>(
         }
         held_at.store(NEVER, Relaxed);
         W::fence();
-        // Who asked for another hold before that store may have taken the lifted one for it: so it is kept.
+        // A user who requested another hold before that store may have taken the lifted one for it: so it is kept.
         if is_lifted() {
             return;
         }
     }
 }
 
-/// Asks for a hold at `tick`, or lifts it. Whoever then finds the clock in a hold that keeps `tick` has it.
+/// Requests a hold at `tick`, or lifts it. A user who then finds the clock in a hold that keeps `tick` has it.
 pub(super) fn ask_for_hold<W: Word>(hold_tick: &W, tick: u32, changes: &W) {
     hold_tick.store(tick, Release);
     W::fence();

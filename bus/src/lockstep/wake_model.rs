@@ -2,8 +2,8 @@
 //! the kernel's futexes allow, with up to three parties. A wake-up that is lost leaves a thread asleep for ever, which
 //! `loom` reports as a deadlock.
 //!
-//! Models that must not hold stand beside those that must: without the fence between a store and the load after it,
-//! somebody sleeps for ever, and a tick is granted in a hold. So the models see what they are there for.
+//! Models that must fail stand beside those that must hold: without the fence between a store and the load after it,
+//! a thread sleeps for ever, and a tick is granted in a hold. So the models find the errors that they are made for.
 //!
 //! The larger models explore only the orders in which threads are interrupted at most twice against their will.
 
@@ -14,15 +14,15 @@ use loom::thread;
 use std::sync::atomic::Ordering::{self, Acquire, Relaxed, Release};
 use std::time::Duration;
 
-/// A futex of the model: the kernel compares the word and falls asleep in one step, under a lock that whoever wakes
-/// takes too. Timeouts never come, so that nothing rests on them.
+/// A futex of the model: the kernel compares the word and falls asleep in one step, under a lock that the waking
+/// thread takes too. Timeouts never come, so that nothing rests on them.
 struct Futex<const HAS_FENCES: bool> {
     word: AtomicU32,
     lock: Mutex<()>,
     sleepers: Condvar,
 }
 
-/// The protocol as it is.
+/// The protocol with its fences.
 type Fenced = Futex<true>;
 
 impl<const HAS_FENCES: bool> Futex<HAS_FENCES> {
