@@ -1,8 +1,8 @@
-//! The body of a vehicle as it is seen, and what of it touches: boxes, cylinders and balls in the body frame (x forward,
-//! y left, z up, from the centre of mass).
+//! The body of a vehicle: the parts that are seen, and the parts that touch. They are boxes, cylinders and balls in
+//! the body frame (x forward, y left, z up, from the centre of mass).
 //!
-//! Vehicle files give the places of the rotors and no more. The radius of the propellers, the disc and the feet are those
-//! of the [`Hull`] that a vehicle touches the world with; what else is seen is scaled with the longest arm.
+//! Vehicle files give only the places of the rotors. The radius of the propellers, the disc and the feet are those of
+//! the [`Hull`] with which a vehicle touches the world; the other parts are scaled with the longest arm.
 
 use nalgebra::{Matrix3, Vector3};
 use plant::Airframe;
@@ -53,7 +53,7 @@ pub enum Paint {
     Clockwise,
 }
 
-/// A part of a vehicle, or of what it touches with.
+/// A part of a vehicle, seen or touching.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Part {
     /// Name; the rotors' parts begin with the rotor's name in the vehicle file.
@@ -68,7 +68,7 @@ pub struct Part {
     pub paint: Paint,
 }
 
-/// A vehicle as it is seen, and as it touches.
+/// A vehicle with its seen and its touching parts.
 ///
 /// ```
 /// use report::airframe::Body;
@@ -125,8 +125,8 @@ impl Body {
         })
     }
 
-    /// The lines that tell the body where it is small, in the body frame, in metres: an arm to each rotor, the circle of its
-    /// propeller, and a line to the front that is longer than the arms.
+    /// Lines that show the body where it is small, in the body frame, in metres: an arm to each rotor, the circle of
+    /// its propeller, and a line to the front that is longer than the arms.
     #[must_use]
     pub fn outline_B_m(&self) -> Vec<Vec<Vector3<f64>>> {
         let circle = |at_B_m: &Vector3<f64>| {

@@ -28,7 +28,7 @@ impl Attached {
     /// If the recording is damaged.
     pub fn to(recording: &Recording) -> Result<Self, RecordingError> {
         let files = recording.attachments()?.into_iter();
-        // Meshes are no text.
+        // Meshes are not text.
         let files = files.filter_map(|(name, bytes)| Some((name, String::from_utf8(bytes).ok()?)));
         Ok(Self::of(files.collect()))
     }
@@ -38,7 +38,7 @@ impl Attached {
         let is_of_manifest =
             |table: &Table| ["process", "set", "vehicle"].iter().any(|key| table.contains_key(*key));
         let mut tables: Vec<Table> = tables.filter(is_of_manifest).collect();
-        // The manifest comes first, and what stands in it counts before what it includes.
+        // The manifest comes first, and its own values count before those of its includes.
         tables.reverse();
         let manifest = tables.iter().cloned().fold(Table::new(), |mut lower, upper| {
             put(&mut lower, upper);
@@ -47,7 +47,7 @@ impl Attached {
         Self { manifest, tables, files }
     }
 
-    /// The names of the vehicles; none where the manifest has but one, without a name.
+    /// The names of the vehicles; empty if the manifest has only one, without a name.
     #[must_use]
     pub fn names(&self) -> Vec<&str> {
         self.vehicles().filter_map(|vehicle| vehicle.get("name")?.as_str()).collect()
@@ -81,7 +81,7 @@ impl Attached {
         self.manifest.get("vehicle").and_then(Value::as_array).into_iter().flatten()
     }
 
-    /// The vehicle file of the plant, by its name alone, as it is attached.
+    /// The vehicle file of the plant, by the name alone under which it is attached.
     fn file_of(&self, name: &str) -> Option<String> {
         let merged = if name.is_empty() {
             self.manifest.clone()
@@ -127,7 +127,7 @@ impl Attached {
         self.files.iter().filter(move |(attached, _)| attached == name).map(|(_, text)| &**text)
     }
 
-    /// The one that is attached, where the manifest does not tell.
+    /// The attached vehicle, if the manifest does not name it and there is only one.
     fn only_vehicle(&self) -> Option<Vehicle> {
         let names: BTreeSet<_> = self.files.iter().map(|(name, _)| name).collect();
         let mut found = names.into_iter().filter_map(|name| self.vehicle(name));
@@ -135,7 +135,7 @@ impl Attached {
     }
 }
 
-/// Puts what stands in `upper` over what stands in `lower`.
+/// Puts the values of `upper` over those of `lower`.
 fn put(lower: &mut Table, upper: Table) {
     for (key, value) in upper {
         match (lower.get_mut(&key), value) {

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// A table: what its columns are called, and its rows. Its text has columns as wide as their longest cell.
+/// A table: the names of its columns, and its rows. Its text has columns as wide as their longest cell.
 pub(crate) struct Cells {
     pub headings: Vec<String>,
     /// True for a column of numbers, which are aligned right.

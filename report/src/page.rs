@@ -1,8 +1,8 @@
-//! HTML pages that need no network: one template with a style and a script for all, and what each page has of its own.
+//! HTML pages that need no network: one template with a style and a script for all, and the content of each page.
 //!
-//! plotly.js is kept in `page/` as it is published (npm packages `plotly.js-basic-dist-min` and
-//! `plotly.js-gl3d-dist-min` 4.1.1, MIT): the crate `plotly` embeds the whole library and two MathJax bundles, which
-//! makes a page of 7.5 MB and brings fifty more packages.
+//! plotly.js is kept in `page/` as published (npm packages `plotly.js-basic-dist-min` and `plotly.js-gl3d-dist-min`
+//! 4.1.1, MIT). The crate `plotly` embeds the whole library and two MathJax bundles, which makes a page of 7.5 MB and
+//! brings fifty more packages.
 
 use serde_json::Value;
 
@@ -14,8 +14,8 @@ pub const PLOTLY_BASIC: &str = include_str!("page/plotly-basic.min.js");
 /// plotly.js with lines, and lines and bodies in space.
 pub(crate) const PLOTLY_3D: &str = include_str!("page/plotly-gl3d.min.js");
 
-/// The page with this `body` of headings, texts and the places of tables and plots, on which `script` draws `data` with a
-/// bundle of plotly.js and what `kit.js` offers.
+/// The page with this `body` of headings, texts and the places of tables and plots. `script` draws `data` on it with
+/// a bundle of plotly.js and the functions of `kit.js`.
 #[must_use]
 pub fn page(body: &str, plotly: &str, script: &str, data: &Value) -> Vec<u8> {
     format!(

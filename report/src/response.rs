@@ -24,11 +24,11 @@ pub(crate) struct Response {
 /// Reason why there is no lag.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum NoResponse {
-    /// Fewer samples than the reach needs: at the greatest shift half of them are to overlap.
+    /// Fewer samples than the reach needs: at the greatest shift half of them must overlap.
     TooShort,
-    /// The field does not change, or is NaN somewhere.
+    /// The field does not change, or is not finite somewhere.
     ConstantField,
-    /// The reference does not change, or is NaN somewhere.
+    /// The reference does not change, or is not finite somewhere.
     ConstantReference,
     /// The correlation still rises at the end of the reach.
     AtTheEnd,
@@ -68,7 +68,7 @@ struct Sums {
 }
 
 impl Sums {
-    /// None where the signal does not change, or is no number somewhere.
+    /// `None` if the signal does not change, or is not finite somewhere.
     fn of(signal: &[f64]) -> Option<Self> {
         let mean = signal.iter().sum::<f64>() / signal.len() as f64;
         if !mean.is_finite() || signal.iter().all(|value| *value == signal[0]) {
@@ -183,7 +183,7 @@ mod tests {
         for (lag, gain) in [(0, 1.0), (1, 0.2), (150, 0.45), (-87, 2.0), (-399, 1.0), (399, 1.0)] {
             let found = Response::of(&follower(&reference, lag, gain, 0.0, 9), &reference, 400).unwrap();
             assert_eq!(found.lag_samples, lag);
-            // What was clamped at either end is left out by the shift.
+            // Samples that were clamped at either end are left out by the shift.
             assert!((found.gain / gain - 1.0).abs() < 1e-9, "lag {lag}: {found:?}");
         }
     }

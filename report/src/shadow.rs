@@ -42,7 +42,7 @@ pub struct Difference {
     pub max: f64,
     /// The tick of the greatest difference.
     pub max_tick: u32,
-    /// Root mean square of the primary's values about their mean: what the difference is to be measured by.
+    /// Root mean square of the primary's values about their mean: the scale for the difference.
     #[serde(rename = "active_deviation")]
     pub primary_deviation: f64,
 }
@@ -156,7 +156,7 @@ pub(crate) fn differences(recording: &Recording, joins: &Joins<'_>) -> Result<Ve
     Ok(all)
 }
 
-/// The samples of each of the shadows that joined at these ticks: what was sent before the second joined is the first one's.
+/// The samples of each of the shadows that joined at these ticks: those before the second joined are the first one's.
 fn by_shadow(samples: &Series, joined: &[u32]) -> Vec<Series> {
     let ends: Vec<u32> = joined.iter().skip(1).copied().chain([u32::MAX]).collect();
     let starts = std::iter::once(0).chain(ends.iter().copied());

@@ -51,7 +51,7 @@ pub struct Summary {
     pub checkpoints: Vec<Written>,
     /// Times at which the run went back in flight.
     pub rewinds: Vec<Rewound>,
-    /// True where the conditions are not judged: the run went on from a checkpoint that holds nothing of what was flown before.
+    /// True if the conditions are not judged: the run went on from a checkpoint without figures of the flight before.
     pub is_unjudged: bool,
     /// Pass conditions.
     pub pass: Vec<Verdict>,
@@ -167,11 +167,11 @@ impl Summary {
         }
     }
 
-    /// Judges the `recording` of the run: its shadows, its replacements, and the conditions in `content`, of which a run
-    /// that was stopped has not flown what they speak of.
+    /// Judges the `recording` of the run: its shadows, its replacements, and the conditions in `content`. A run that
+    /// was stopped has not flown the spans of its conditions, so these are left out.
     ///
     /// # Errors
-    /// If the recording is damaged, or lacks what a condition judges.
+    /// If the recording is damaged, or lacks data that a condition judges.
     pub fn judge(&mut self, recording: &Recording, plan: &Plan, content: &Content) -> Result<()> {
         if !self.stopped_early {
             self.add(&judge::figures(&content.conditions(), recording)?, content)?;
@@ -179,7 +179,7 @@ impl Summary {
         self.describe(recording, plan)
     }
 
-    /// Adds what the `recording` of the run says of its shadows and replacements.
+    /// Adds the shadows and replacements in the `recording` of the run.
     ///
     /// # Errors
     /// If the recording is damaged.

@@ -1,9 +1,9 @@
 //! A live run in the terminal, steered from the keyboard.
 //!
-//! - `view`: a run as it is shown, for screen and paper
-//! - `sample`: what a run shows at a moment, and what two moments say about the time between them
-//! - `screen`: how it is drawn
-//! - `keys`: what the keys do
+//! - `view`: a run as shown, for screen and paper
+//! - `sample`: the state of a run at a moment, and the rates between two moments
+//! - `screen`: the drawing of a view
+//! - `keys`: actions of the keys
 #![allow(clippy::disallowed_methods, reason = "rates are per host time")]
 
 mod keys;
@@ -55,7 +55,7 @@ pub fn watch(run: &Arc<LiveRun>, is_terminated: &AtomicBool) -> Result<()> {
     result
 }
 
-/// Leaves the terminal as it was before [`watch`], for whoever ends the process meanwhile.
+/// Restores the terminal as it was before [`watch`], for code that ends the process meanwhile.
 pub fn restore_terminal() {
     ratatui::restore();
 }

@@ -11,7 +11,7 @@ pub fn short_name(type_name: &str) -> &str {
     type_name.strip_prefix("hummingbus_msgs/msg/").unwrap_or_default()
 }
 
-/// The vehicle of a topic, which stands in front of the process; empty where the run has one vehicle without a name.
+/// The vehicle of a topic, which stands in front of the process; empty if the run has one vehicle without a name.
 ///
 /// ```
 /// assert_eq!(report::topics::vehicle("/h1/plant/state"), "h1");

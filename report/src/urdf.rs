@@ -9,8 +9,8 @@ use std::fmt::Write as _;
 /// Mark within the first bytes of every such file: a file without it is not replaced.
 pub const MARK: &str = "<!-- A vehicle of hummingbus";
 
-/// The names of the colours, and red, green, blue and opacity. Of Okabe and Ito, to be told apart without colour vision;
-/// which stands for what, and how much of a propeller is seen through, is tuned, no source.
+/// The names of the colours, and red, green, blue and opacity. The colours are those of Okabe and Ito,
+/// distinguishable without colour vision. Their assignment and the opacity of a propeller are tuned, no source.
 const COLOURS: [(Paint, &str, &str); 4] = [
     (Paint::Frame, "frame", "0.25 0.25 0.25 1"),
     (Paint::Front, "front", "0.835 0.369 0 1"),
@@ -83,7 +83,7 @@ fn numbers(values: [f64; 3]) -> String {
     values.map(|value| (value + 0.0).to_string()).join(" ")
 }
 
-/// A name as the value of an attribute. What XML cannot hold is replaced.
+/// A name as the value of an attribute. Characters that XML cannot hold are replaced.
 fn escaped(name: &str) -> String {
     name.chars().fold(String::new(), |mut text, letter| {
         match letter {

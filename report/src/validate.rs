@@ -1,11 +1,11 @@
-//! Measured flights flown again: the commands of flights on the bus with one or two vehicle files, and how far the state
-//! at the ends of windows lies from the measured one.
+//! Measured flights flown again: the commands of flights on the bus with one or two vehicle files, and the distance
+//! of the state at the ends of windows from the measured one.
 //!
-//! | room | what it holds |
+//! | room | content |
 //! |---|---|
 //! | `replay` | one flight as a run: its files, its manifest, the flight itself |
 //! | `windows` | errors at the ends of the windows, read from the recording |
-//! | `mod@errors` | what came of it, as a table and as JSON |
+//! | `mod@errors` | the results, as a table and as JSON |
 
 mod errors;
 mod replay;
@@ -52,10 +52,11 @@ pub struct Validation<'a> {
 
 impl Validation<'_> {
     /// Flies the measured commands of every flight with each of `vehicles`, all vehicles of a flight in one run, and
-    /// compares; `tell` hears a line for each flight. Vehicle files that `flights` has read are not read again.
+    /// compares; `tell` is called with a line for each flight. Vehicle files that `flights` has read are not read
+    /// again.
     ///
     /// # Errors
-    /// A file that cannot be read, a flight without what a replay needs, a run that fails or is stopped.
+    /// A file that cannot be read, a flight without data that a replay needs, a run that fails or is stopped.
     pub fn errors(
         &self,
         vehicles: &[&Path],

@@ -12,8 +12,8 @@ use std::path::Path;
 /// A shorter flight holds none of the windows of a replay.
 const LEAST_REPLAY_S: f64 = 2.0;
 
-/// Flies the measured commands with the declared and the new vehicle on the bus, and compares what comes of it with the
-/// predictions of the report; `None` where no flight has what a replay needs.
+/// Flies the measured commands with the declared and the new vehicle on the bus, and compares the errors with the
+/// predictions of the report; `None` if no flight can be replayed.
 ///
 /// # Errors
 /// As [`Validation::errors`].
@@ -62,7 +62,8 @@ fn predicted(report: &Report, flight: &str, horizon: &str, channel: &str) -> Opt
     Some((change.before, change.after))
 }
 
-/// The flights that can be replayed, without `errors` of their sensors and without what the alignment took off.
+/// The flights that can be replayed, without `errors` of their sensors and without the offsets that the alignment
+/// removed.
 fn corrected(set: &FlightSet, outcome: &Outcome, errors: &SensorErrors) -> FlightSet {
     let flight = |flight: &Flight| {
         errors.taken_off(flight, &outcome.late.get(&flight.name).copied().unwrap_or_default())

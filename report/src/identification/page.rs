@@ -1,4 +1,4 @@
-//! The page of an identification, which needs no network: what was found, and the residuals behind it.
+//! The page of an identification, which needs no network: the results, and the residuals behind them.
 //!
 //! It is drawn by `page.js` with plotly.js ([`crate::page`]).
 
@@ -20,7 +20,7 @@ const CLOUD_POINTS: (usize, usize) = (1500, 40_000);
 /// Fewest points of a curve or cloud, however many there are.
 const POINTS_MIN: usize = 300;
 
-/// The page of `outcome`; `flown` is what came of it on the bus, as in the report's `bus`, where it was flown.
+/// The page of `outcome`; `flown` are the results on the bus, as in the report's `bus`, if it was flown.
 #[must_use]
 pub fn page(outcome: &Outcome, flown: Option<&Value>) -> Vec<u8> {
     crate::page::page(include_str!("page.html"), PLOTLY_BASIC, include_str!("page.js"), &data(outcome, flown))
@@ -34,8 +34,8 @@ fn data(outcome: &Outcome, flown: Option<&Value>) -> Value {
     json!({ "report": outcome.report, "bus": flown, "flights": flights.collect::<Vec<_>>() })
 }
 
-/// A flight's residuals, and what they are looked at against, as curves and clouds of up to so many points; `None` where
-/// nothing was compared.
+/// A flight's residuals, and the quantities that they are plotted against, as curves and clouds of up to so many
+/// points; `None` if nothing was compared.
 fn flight(outcome: &Outcome, name: &str, [curve, cloud]: [usize; 2]) -> Option<Value> {
     let pictures: Vec<&Picture> = outcome.pictures.iter().filter(|picture| picture.flight == name).collect();
     let first = pictures.first()?;
@@ -168,7 +168,7 @@ fn short(values: &[f64]) -> Vec<Value> {
     values.iter().map(|value| digits(*value)).collect()
 }
 
-/// Five digits: finer than any plot. What is no number is null.
+/// Five digits: finer than any plot. A value that is not finite is null.
 fn digits(value: f64) -> Value {
     format!("{value:.4e}").parse::<f64>().map_or(Value::Null, Value::from)
 }

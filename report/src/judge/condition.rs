@@ -87,7 +87,7 @@ impl Condition {
         KeptSamples { name, factor: *factor, samples: *samples, pairs, lost_ns: *lost_ns }
     }
 
-    /// Goes on from what another evaluation of the condition has `kept`.
+    /// Goes on from the samples that another evaluation of the condition has `kept`.
     ///
     /// # Errors
     /// If it is of another condition.
@@ -191,7 +191,7 @@ impl Condition {
         time_s >= from_s - 5e-10 && to_s.is_none_or(|to_s| time_s <= to_s + 5e-10)
     }
 
-    /// True if the condition fails by this sample, whatever comes behind it.
+    /// True if the condition fails by this sample, for any samples behind it.
     fn is_lost_by(&self, value: f64) -> bool {
         let PassCondition { min, max, .. } = self.pass;
         match self.pass.statistic {
@@ -237,8 +237,8 @@ fn count(count: f64) -> usize {
     count.round() as usize
 }
 
-/// The judged value of a sample: a number less the one that is taken off, or the length of such a vector; `None` before
-/// the first sample of what is taken off.
+/// The judged value of a sample: a number less the one that is subtracted, or the length of such a vector; `None`
+/// before the first sample of the subtracted signal.
 fn difference(judged: &[f64], taken: Option<Option<&[f64]>>) -> Option<f64> {
     let off = |part: usize| match taken {
         None => Some(0.0),

@@ -109,8 +109,8 @@ impl Evaluator {
         postcard::to_stdvec(&kept).unwrap_or_else(|error| unreachable!("numbers serialise: {error}"))
     }
 
-    /// Goes on from what [`Evaluator::save`] returned for the same conditions; [`Evaluator::hold`] gives it the newest
-    /// samples.
+    /// Goes on from the bytes that [`Evaluator::save`] returned for the same conditions; [`Evaluator::hold`] gives it
+    /// the newest samples.
     ///
     /// # Errors
     /// If it is of other conditions.

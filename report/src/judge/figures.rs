@@ -29,7 +29,8 @@ pub struct Found {
     pub values: Vec<f64>,
     /// Reason why there are none, if it is another.
     pub why: Option<String>,
-    /// Time of the first sample by which the condition fails whatever comes behind it; none for a mean, an RMS and the like.
+    /// Time of the first sample by which the condition fails for any later samples; `None` for a mean, an RMS and the
+    /// like.
     pub lost_s: Option<f64>,
 }
 
@@ -50,7 +51,7 @@ impl Figures {
     /// The figures as bytes, every number exactly.
     ///
     /// # Errors
-    /// If there is no memory for them.
+    /// If there is not enough memory.
     pub fn to_bytes(&self) -> anyhow::Result<Vec<u8>> {
         Ok(postcard::to_stdvec(self)?)
     }

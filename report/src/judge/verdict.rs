@@ -33,7 +33,7 @@ pub struct Verdict {
     /// Reason why there are no values, if it is more than a lack of samples.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub why: Option<String>,
-    /// Simulation time of the first sample by which it failed; none for a mean, an RMS and the like.
+    /// Simulation time of the first sample by which it failed; `None` for a mean, an RMS and the like.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub failed_at_s: Option<f64>,
 }
@@ -142,7 +142,7 @@ impl fmt::Display for Verdict {
     }
 }
 
-/// Four digits behind the point, or four that are not zero; what is whole without any.
+/// Four digits behind the point, or four that are not zero; whole numbers without any.
 fn shown(value: f64) -> String {
     if value.fract() == 0.0 && value.abs() < 1e15 {
         return format!("{value:.0}");

@@ -28,12 +28,12 @@ pub enum Role {
 }
 
 impl Role {
-    /// The role of `field` in what a topic of type `type_name` carries.
+    /// The role of `field` in a topic of type `type_name`.
     fn of(type_name: &str, field: &str) -> Self {
         let name = field.split('[').next().unwrap_or_default();
         match short_name(type_name) {
             "SetPoint" | "Reference" => Self::Asked,
-            // The rest of it is what the controller does.
+            // Its other fields are actions of the controller.
             "ControlStatus" if name.ends_with("set_point") => Self::Asked,
             "MeasuredState" | "Imu" | "Gps" | "Mocap" | "Barometer" | "Magnetometer" | "Ranges"
             | "Battery" => Self::Measured,
@@ -87,15 +87,15 @@ const POSITION: &[Row] = &[
     (&["SetPoint"], &["altitude"]),
 ];
 
-/// Message types, and fields of theirs.
+/// Message types, and fields of these.
 type Row = (&'static [&'static str], &'static [&'static str]);
 
-/// The types of what turns, which have an attitude and an angular velocity.
+/// The types with an attitude and an angular velocity.
 const TURNING: [&str; 4] = ["PlantState", "MeasuredState", "AttitudeEstimate", "StateEstimate"];
-/// The types of what moves, which have a field `position`; the first two make a vehicle.
+/// The types with a field `position`; the first two make a vehicle.
 const MOVING: [&str; 4] = ["PlantState", "MeasuredState", "StateEstimate", "Reference"];
 
-/// A field of a topic that is asked for: a number, or something that is made of numbers.
+/// A requested field of a topic: a number, or a value that is made of numbers.
 #[derive(Clone, Debug)]
 pub struct Ask {
     /// Topic.

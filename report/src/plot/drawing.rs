@@ -1,4 +1,4 @@
-//! Content of a file with a drawing, whatever its format.
+//! Content of a file with a drawing, for any format.
 
 use super::figure::{Across, Panel, Trail};
 use super::outline::Outline;
@@ -31,7 +31,7 @@ impl Drawing {
         json!(self)
     }
 
-    /// The views that were asked for, or else those of `usual` that there is something for.
+    /// The requested views, or else those of `usual` that have content.
     pub(super) fn views_or(&self, usual: &[View]) -> Vec<View> {
         let has_some =
             |view: &View| if *view == View::Time { !self.panels.is_empty() } else { !self.trails.is_empty() };

@@ -19,7 +19,7 @@ pub struct Channel {
 }
 
 /// The channels of `field` in a message with these leaves: one for a number, three angles for a quaternion, and one
-/// for each number of anything else. Counts are drawn in % of `full_throttle` counts where that is given. `None` where
+/// for each number of any other value. Counts are drawn in % of `full_throttle` counts if that is given. `None` if
 /// there is no such field.
 pub fn channels(leaves: &[Leaf], field: &str, full_throttle: Option<f64>) -> Option<Vec<Channel>> {
     let channel = |path: &str, unit: &str| match full_throttle.filter(|_| unit == COUNT) {
@@ -80,7 +80,7 @@ impl Continued {
     fn next(&mut self, angle: f64) -> f64 {
         if angle.is_finite() {
             let jump = angle - self.last.unwrap_or(angle);
-            // A step by less than half a turn was asked for; a longer one is the same angle counted otherwise.
+            // A step by less than half a turn is a real one; a longer one is the same angle counted otherwise.
             if jump.abs() > PI {
                 self.turns -= (jump / TAU).round();
             }

@@ -141,7 +141,7 @@ fn distinct<T: PartialEq>(items: impl Iterator<Item = T>) -> Vec<T> {
     })
 }
 
-/// The axis across all curves: the time that was read, or the span of what they are drawn against.
+/// The axis across all curves: the time that was read, or the span of the number that they are drawn against.
 ///
 /// # Errors
 /// If that is not one number.
@@ -179,8 +179,8 @@ fn short(path: &str) -> &str {
     path.rsplit_once('.').map_or(path, |(_, last)| last)
 }
 
-/// Names what is flown by its component, and every other by that and its role; by topic and field where two would be
-/// called the same.
+/// Names a flown curve by its component, and every other by that and its role; by topic and field if two would have
+/// the same name.
 fn name(curves: &mut [Curve]) {
     let named = |curve: &Curve| {
         let is_fellow = |other: &&Curve| {
@@ -197,7 +197,7 @@ fn name(curves: &mut [Curve]) {
     }
 }
 
-/// The axis, angle or rotor that a field is of: what flies and what was asked for share the colour.
+/// The axis, angle or rotor that a field is of: a flown curve and its set point share the colour.
 fn component(field: &str) -> Option<usize> {
     let short = short(field);
     match short.strip_suffix("_set_point").unwrap_or(short) {

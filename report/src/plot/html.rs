@@ -70,7 +70,7 @@ fn solid(solid: &Solid) -> Value {
     with(solid, [("top", json!(solid.outlines(0, 1))), ("side", json!(solid.outlines(0, 2)))])
 }
 
-/// A number as short as a float of 32 bits is written: finer than any plot. What is no number is a gap.
+/// A number as short as a float of 32 bits is written: finer than any plot. A value that is not finite is a gap.
 fn short(value: f64) -> Value {
     #[allow(clippy::cast_possible_truncation, reason = "that is the purpose")]
     let single = value as f32;

@@ -97,8 +97,8 @@ where
     Ok(())
 }
 
-/// Draws a legend, `width` pixels wide, at the right side of an area; returns what is left of it. Beside the curves it
-/// hides none.
+/// Draws a legend, `width` pixels wide, at the right side of an area; returns the rest of the area. Beside the curves
+/// it hides none.
 pub fn draw_legend<'a, P>(area: &Area<'a>, width: u32, lines: &[Line<P>]) -> Result<Area<'a>> {
     let (plots, legend) = area.split_horizontally(px(WIDTH - width));
     let anchor = Pos::new(HPos::Left, VPos::Center);

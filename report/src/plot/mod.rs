@@ -1,14 +1,14 @@
 //! Pictures of a recording: curves over time, and paths in space.
 //!
-//! - `request`: what people ask for
-//! - `choice`: what is plotted, by `--plot` or by the types of the topics
+//! - `request`: the request for a drawing
+//! - `choice`: the choice of the curves, by `--plot` or by the types of the topics
 //! - `field`: the numbers that a field is drawn as, in the units that people read
 //! - `read`: the one pass over the recording
 //! - `thin`: long curves as few points
 //! - `figure`: named and coloured curves on axes of one unit
-//! - `scene`: what stands around the vehicles
+//! - `scene`: the things around the vehicles
 //! - `outline`: the vehicles along their paths
-//! - `drawing`: all that a file shows
+//! - `drawing`: the content of a file
 //! - `html`: the page
 //! - `ink`: lines, letters and legends of pictures
 //! - `picture`, `space`: the same as SVG and PNG: sheets, time plots; views of the paths

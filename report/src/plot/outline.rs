@@ -29,7 +29,7 @@ pub struct Outline {
     pub lines: Vec<Vec<[f64; 3]>>,
 }
 
-/// The outlines along what was flown, of the vehicles whose files are attached.
+/// The outlines along the flown paths, of the vehicles whose files are attached.
 pub fn outlines(read: &[(Ask, Poses)], trails: &[Trail], attached: &Attached) -> Vec<Outline> {
     let flown = read.iter().filter(|(ask, poses)| ask.role == Role::Flown && poses.body().is_none());
     let outline = |(ask, poses): &(Ask, Poses)| {
@@ -54,7 +54,7 @@ struct Pose {
 }
 
 impl Pose {
-    /// Nothing of what is no pose: many topics have places alone.
+    /// `None` for values that are not a pose: many topics have positions only.
     fn of([x, y, z, i, j, k, w]: [f64; 7]) -> Option<Self> {
         let attitude_WB = UnitQuaternion::try_new(Quaternion::new(w, i, j, k), 0.5)?;
         let is_finite = [x, y, z, i, j, k, w].iter().all(|value| value.is_finite());

@@ -77,7 +77,7 @@ pub fn svg(drawing: &Drawing) -> Result<String> {
         }
         sheet.present()?;
     }
-    // The units are for plotters only: whoever shows the picture is told its size in pixels.
+    // The units are for plotters only: a viewer of the picture gets its size in pixels.
     let units = format!(r#"width="{}" height="{}""#, px(WIDTH), px(height));
     let text = text.replacen(&units, &format!(r#"width="{WIDTH}" height="{height}""#), 1);
     // Behind the start of the root element.
@@ -166,7 +166,7 @@ fn least(from: f64) -> f64 {
 fn range(values: impl Iterator<Item = f64>) -> Range<f64> {
     let ends = values.filter(|value| value.is_finite()).map(|value| (value, value));
     let (low, high) = ends.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))).unwrap_or((0.0, 0.0));
-    // What hardly moves is drawn as a line, not as noise over the whole height.
+    // A value that hardly changes is drawn as a line, not as noise over the whole height.
     let room = ((high - low) * 0.06).max(low.abs().max(high.abs()).max(1.0) * 0.005);
     low - room..high + room
 }

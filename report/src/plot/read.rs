@@ -42,8 +42,8 @@ struct Drawn<'a> {
     against: f64,
 }
 
-/// Reads what `choice` and `request` ask for; returns the first and the last time of it, in seconds. `progress` hears the
-/// number of messages read, now and then.
+/// Reads the samples for `choice` and `request`; returns their first and last time, in seconds. `progress` is called
+/// with the number of messages read, now and then.
 ///
 /// # Errors
 /// If the file is damaged, a named field is not there, or nothing is in the span.
@@ -75,7 +75,7 @@ pub fn read(
 }
 
 impl Drawn<'_> {
-    /// Takes what is wanted out of a message with these leaves.
+    /// Takes the wanted values out of a message with these leaves.
     fn push(&mut self, uses: &mut Uses<'_>, time_s: f64, leaves: &[Leaf]) -> Result<()> {
         if let Some(ask) = &mut uses.against {
             self.begin(ask, true, leaves)?;
@@ -130,7 +130,7 @@ fn uses(choice: &mut Choice) -> BTreeMap<String, Uses<'_>> {
     uses
 }
 
-/// Position and attitude, of a body where `field` is the position of one; what the message lacks is not a number.
+/// Position and attitude, of a body if `field` is the position of one; values that the message lacks are NaN.
 fn pose(leaves: &[Leaf], field: &str) -> [f64; 7] {
     let attitude = field.replacen("position", "attitude", 1);
     let places = ["x", "y", "z"].map(|axis| format!("{field}.{axis}"));

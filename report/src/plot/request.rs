@@ -12,7 +12,7 @@ use serde::Serialize;
 /// ```
 #[derive(Clone, Debug, Default)]
 pub struct Request {
-    /// Axes over time, each as `TOPIC:FIELD[,TOPIC:FIELD…]`; what the types of the topics suggest where empty.
+    /// Axes over time, each as `TOPIC:FIELD[,TOPIC:FIELD…]`; if empty, those for the types of the topics.
     pub plots: Vec<String>,
     /// Views; where empty, a page has all and a picture has curves over time.
     pub views: Vec<View>,

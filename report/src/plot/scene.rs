@@ -1,4 +1,4 @@
-//! The scene of a recording, as what stands still in it is drawn: boxes, meshes and balls by their corners and edges.
+//! The scene of a recording, as its fixed things are drawn: boxes, meshes and balls by their corners and edges.
 
 use nalgebra::Vector3;
 use recorder::RecordingError;
@@ -8,7 +8,7 @@ use serde::Serialize;
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
-/// A thing that stands on or above the ground, as it is drawn.
+/// A thing that stands on or above the ground, as drawn.
 #[derive(Clone, Debug, Serialize)]
 pub struct Solid {
     /// Name in the scene file.
@@ -44,7 +44,7 @@ const BOX_FACES: [[u32; 3]; 12] = [
     [0, 2, 1],
 ];
 
-/// Corners around a ball as it is drawn, and rings of them between its poles.
+/// Corners around a ball as drawn, and rings of them between its poles.
 const AROUND: usize = 24;
 const RINGS: usize = 11;
 
@@ -140,8 +140,8 @@ pub fn scene_of(recording: &Recording) -> Result<Vec<Solid>, RecordingError> {
     Ok(still.map(|thing| Solid::of(&thing)).collect())
 }
 
-/// The free bodies of a recording's scene, drawn along their own axes from their centres of mass, in the order of the
-/// numbers that `BodyStates` counts them by; none where it has no scene that can be read.
+/// The free bodies of a recording's scene, drawn along their own axes from their centres of mass, in the order of
+/// their numbers in `BodyStates`; empty if it has no scene that can be read.
 ///
 /// # Errors
 /// If the recording is damaged.

@@ -20,10 +20,10 @@ const PATH_HEIGHT: u32 = 640;
 const YAW: f64 = 0.6;
 const PITCH: f64 = 0.45;
 const SOLID: RGBColor = RGBColor(120, 120, 120);
-/// The shortest edge of what is shown, in metres: a hover in one place has an extent of millimetres.
+/// The shortest edge of the view, in metres: a hover in one place has an extent of millimetres.
 const EXTENT_MIN_M: f64 = 1.0;
 
-/// The ends along the three axes of what is shown, the ground included.
+/// The ends along the three axes of the view, the ground included.
 fn extent(drawing: &Drawing) -> [Range<f64>; 3] {
     let points = drawing.trails.iter().flat_map(|trail| &trail.points);
     let corners = drawing.solids.iter().flat_map(|solid| &solid.corners);
@@ -110,7 +110,7 @@ fn draw_flat(plots: &Area<'_>, drawing: &Drawing, view: View) -> Result<()> {
     draw_trails(&mut chart, drawing, |point| (point[axes[0]], point[axes[1]]))
 }
 
-/// Draws the vehicles, the paths and where they start, those on top last: an estimate must not hide what was flown.
+/// Draws the vehicles, the paths and their starts, those on top last: an estimate must not hide the flown path.
 fn draw_trails<'a, T: CoordTranslate>(
     chart: &mut ChartContext<'a, SVGBackend<'a>, T>,
     drawing: &Drawing,

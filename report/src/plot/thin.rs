@@ -3,8 +3,8 @@
 /// A time in seconds and a value.
 pub type Sample = (f64, f64);
 
-/// The first, the lowest, the highest and the last sample of a stretch, and one that is no number, where the line breaks
-/// off; in the order of time, and some of them the same.
+/// The first, the lowest, the highest and the last sample of a stretch, and one that is NaN, where the line breaks
+/// off. They are in the order of time, and some of them may be the same.
 type Bin = [Sample; 5];
 
 /// A curve that keeps the extremes, ends and gaps of each of its bins. Drawn over no more pixels than it has bins, it is
@@ -195,7 +195,7 @@ mod tests {
         }
     }
 
-    /// A bin of 8 samples, whatever else is in it.
+    /// A bin of 8 samples, with any others in it.
     fn bin_with_gap(index: usize) -> Vec<(f64, f64)> {
         let mut values = [1.0, 5.0, 2.0, 0.0, 2.0, -4.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0];
         values[index] = f64::NAN;

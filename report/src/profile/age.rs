@@ -56,7 +56,7 @@ pub fn ages(flight: &Flight) -> Vec<Age> {
 /// A stamp for each topic, where there is one.
 type Stamps = Vec<Option<u32>>;
 
-/// The oldest stamps that go into what `node` computes at `tick`, given those in the newest samples.
+/// The oldest stamps that `node` uses at `tick`, given those in the newest samples.
 fn oldest(flight: &Flight, node: usize, tick: u32, in_samples: &[Stamps]) -> Stamps {
     let mut oldest = vec![None; in_samples.len()];
     let mut keep_older =

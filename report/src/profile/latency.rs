@@ -32,7 +32,7 @@ pub struct Transport {
     pub transport: Times,
 }
 
-/// The latencies of every node, and of every topic that somebody waited for.
+/// The latencies of every node, and of every topic that a node waited for.
 pub fn latencies(flight: &Flight) -> (Vec<NodeLatency>, Vec<Transport>) {
     let mut transport = BTreeMap::new();
     let nodes = (0..flight.plan.nodes.len()).map(|node| latency(flight, node, &mut transport)).collect();

@@ -1,8 +1,8 @@
 //! The critical path of a tick: the chain of nodes and hops that its end waited for.
 //!
-//! It ends where the tick closes a feedback loop, or, in a run without one, with the node that ends last. From
-//! there it goes back over what each node waited for last, until that lies before the tick: a sample of an
-//! earlier tick, the clock's grant, or the node's own computation before.
+//! It ends where the tick closes a feedback loop, or, in a run without one, with the node that ends last. From there
+//! it goes back along the last wait of each node, until that lies before the tick: a sample of an earlier tick, the
+//! clock's grant, or the node's own computation before.
 
 use crate::profile::times::Times;
 use runtime::flight::{Cause, Flight};

@@ -1,4 +1,4 @@
-//! A flight whose host times are known: what is computed of it must be these numbers.
+//! A flight whose host times are known: the figures of it must be these numbers.
 //!
 //! A plant, an IMU at half the rate and a controller in a loop, four ticks. The pictures in the tests' numbers:
 //! each node has its inputs, has computed, has sent, and has ended.
@@ -114,7 +114,7 @@ fn require(times: &Times, expected: &[u64]) {
 fn a_tick_splits_into_wait_wake_up_compute_and_publish() {
     let (nodes, _) = latencies(&free_flight());
     let [plant, imu, controller] = &nodes[..] else { panic!("{nodes:?}") };
-    // Nobody knows when a node began to wait for its first tick.
+    // The time at which a node began to wait for its first tick is not known.
     require(&plant.wait, &[1450 - 1250, 1900 - 1700, 2150 - 2010]);
     require(&plant.wake_up, &[1550 - 1450, 1910 - 1900, 2155 - 2150]);
     require(&plant.compute, &[100, 100, 90, 5]);

@@ -1,4 +1,4 @@
-//! A histogram of host times, and what is printed of it.
+//! A histogram of host times, and its printed figures.
 
 use hdrhistogram::Histogram;
 use serde::{Serialize, Serializer};
@@ -11,11 +11,11 @@ const DIGITS: u8 = 3;
 pub struct Times {
     histogram: Histogram<u64>,
     unit_ns: u64,
-    /// The longest as it is: the histogram knows three digits of it.
+    /// The longest time exactly: the histogram keeps three digits of it.
     max_ns: u64,
 }
 
-/// The quantiles of some times, in microseconds; all 0 where there is none.
+/// The quantiles of some times, in microseconds; all 0 if there are none.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Quantiles {
     /// Number of times.
@@ -38,7 +38,7 @@ impl Default for Times {
 impl Times {
     /// Times that are multiples of `unit_ns`; up to two thousand units are kept exactly.
     pub fn in_units(unit_ns: u64) -> Self {
-        // It grows with what is added: most of a profile's many histograms stay small.
+        // It grows with its values: most of a profile's many histograms stay small.
         let histogram = Histogram::new(DIGITS);
         let histogram = histogram.unwrap_or_else(|error| unreachable!("{DIGITS} is a constant: {error}"));
         Self { histogram, unit_ns: unit_ns.max(1), max_ns: 0 }

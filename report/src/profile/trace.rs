@@ -86,7 +86,7 @@ impl<W: Write> Trace<'_, W> {
         for grant in self.flight.grants().filter(is_in) {
             let name = format!("grant {}…{}", grant.first_tick, grant.end_tick - 1);
             if let Some(deadline_ns) = grant.deadline_ns {
-                // From the deadline to the grant, without what it shares with a late grant before it.
+                // From the deadline to the grant, without the part that it shares with a late grant before it.
                 let late_us = grant.granted_ns.saturating_sub(deadline_ns) as f64 / 1e3;
                 let start_ns = deadline_ns.max(free_from_ns);
                 self.slice(CLOCK, &name, [start_ns, grant.granted_ns], &json!({ "late_us": late_us }))?;

@@ -11,7 +11,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 
 const STOP_QUESTION: &str = "stop the run? y / n";
 
-/// The keyboard of `top`, and what came of the keys.
+/// The keyboard of `top`, and the results of the keys.
 pub struct Keys {
     run: Arc<LiveRun>,
     answers: Receiver<String>,
@@ -32,7 +32,7 @@ impl Keys {
         Self { run, answers, sender, notice, asks_to_stop: false, scroll: 0, has_left: false }
     }
 
-    /// The newest thing to tell the user.
+    /// The newest notice for the user.
     pub fn notice(&mut self) -> &str {
         if let Some(answer) = self.answers.try_iter().last().filter(|_| !self.asks_to_stop) {
             self.notice = answer;
@@ -40,7 +40,7 @@ impl Keys {
         &self.notice
     }
 
-    /// Does what `event` asks for of a run that is as `status` says.
+    /// Carries out `event` on a run whose state is `status`.
     pub fn press(&mut self, event: &Event, status: &Status) {
         let Event::Key(key) = event else { return };
         if !key.is_press() {

@@ -153,7 +153,7 @@ impl Source {
     }
 }
 
-/// A process and its processor time; `state` is what it does if nothing keeps it from computing.
+/// A process and its processor time; `state` is its activity if no obstacle keeps it from computing.
 fn process(name: &str, process: Option<u32>, tick: u32, state: String) -> (ProcessRow, Option<u64>) {
     let stat = process.and_then(|process| std::fs::read_to_string(format!("/proc/{process}/stat")).ok());
     let (trouble, cpu_ticks) = stat.and_then(|line| kernel_view(&line)).unzip();

@@ -49,8 +49,8 @@ impl Widget for Screen<'_> {
     }
 }
 
-/// Lines for the processes of `height` lines for both tables, each with its heading: what both need if there is
-/// room, else at least half.
+/// Lines for the processes of `height` lines for both tables, each with its heading: the lines that both need if
+/// there is room, else at least half.
 fn share_of(height: u16, processes: usize, topics: usize) -> u16 {
     let lines = |rows: usize| u16::try_from(rows + 1).unwrap_or(u16::MAX);
     lines(processes).min((height / 2).max(height.saturating_sub(lines(topics))))

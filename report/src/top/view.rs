@@ -1,4 +1,4 @@
-//! A run as it is shown: in words for screen and paper, and as JSON.
+//! A run as shown: in words for screen and paper, and as JSON.
 
 use crate::cells::Cells;
 use runtime::ctl::protocol::Status;
@@ -6,7 +6,7 @@ use serde::Serialize;
 use std::fmt;
 use std::path::Path;
 
-/// A run as it is shown; its text is a table of its processes and one of its topics.
+/// A run as shown; its text is a table of its processes and one of its topics.
 ///
 /// ```
 /// use bus::plan::Pace;
@@ -36,7 +36,7 @@ pub struct View {
     pub topics: Vec<TopicRow>,
 }
 
-/// A process as it is shown.
+/// A process as shown.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct ProcessRow {
     /// Name.
@@ -60,7 +60,7 @@ pub struct ProcessRow {
     pub late: u32,
 }
 
-/// A topic as it is shown.
+/// A topic as shown.
 #[derive(Clone, Debug, Serialize)]
 pub struct TopicRow {
     /// Name.

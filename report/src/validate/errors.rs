@@ -69,7 +69,7 @@ impl ChannelErrors {
 }
 
 impl HorizonErrors {
-    /// The horizon as it is written: `0.5`.
+    /// The horizon as written: `0.5`.
     pub(crate) fn horizon(&self) -> String {
         (f64::from(self.horizon_ms) * 1e-3).to_string()
     }

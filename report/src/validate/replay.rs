@@ -60,7 +60,7 @@ pub fn plant(vehicle: usize, horizon_ms: u32) -> String {
 }
 
 impl Replay {
-    /// Writes what a run of `flight` with `vehicles` needs into a folder of its own in `folder`.
+    /// Writes the files for a run of `flight` with `vehicles` into a folder of its own in `folder`.
     ///
     /// # Errors
     /// A flight without commands or shorter than the shortest window, or a folder that cannot be written to.
@@ -78,7 +78,7 @@ impl Replay {
         let ticks = ticks(end_s - start_s)?;
         let initial = command_at(flight, start_s).context("it has no motor commands")?;
         let manifest = manifest(ticks, &flights::columns(flight.rotors), &initial, vehicles)?;
-        // For whoever keeps the folder, and flies it once more.
+        // For a user who keeps the folder, and flies it once more.
         output_file::write(&folder.join(MANIFEST), &WRITTEN, |out| {
             write!(out, "{MANIFEST_START}\n\n{manifest}")
         })?;
@@ -97,7 +97,7 @@ impl Replay {
         tell: &mut dyn FnMut(&str),
     ) -> Result<(f64, Recording)> {
         let manifest = self.manifest.build(&self.folder.join(MANIFEST), components)?;
-        // What the run reads beside them is its own.
+        // The other files that the run reads are its own.
         let launcher = Launcher::new(Host::this_binary()).reading(files.branch());
         let launcher = launcher.stopped_by(stop).adopting_orphans().followed_by(|event| {
             if let RunEvent::Note(text) = event {

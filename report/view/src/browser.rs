@@ -98,7 +98,7 @@ fn start(program: &str, arguments: &[impl AsRef<OsStr>]) -> bool {
     command.args(arguments).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
     match command.spawn() {
         Ok(mut child) => {
-            // A child that nobody waits for stays in the table of processes.
+            // A child that is not waited for stays in the table of processes.
             std::thread::spawn(move || child.wait());
             true
         }

@@ -1,4 +1,4 @@
-//! The catalogue: all that the page needs to know before it asks for values.
+//! The catalogue: everything that the page needs to know before it requests values.
 
 use crate::fields::Field;
 use crate::marks::marks;
@@ -113,8 +113,8 @@ fn notes(shown: &Shown, has_no_vehicle: bool) -> Vec<String> {
     notes
 }
 
-/// Time of a tick: that between the first two messages with different ticks, divided by these; `None` where that is no
-/// whole number of ns, as in recordings of others.
+/// Time of a tick: that between the first two messages with different ticks, divided by the difference. `None` if
+/// that is not a whole number of ns, as in recordings of other programs.
 fn tick_ns(shown: &Shown) -> Result<Option<u64>> {
     let mut first = None;
     for block in 0..shown.block_count().min(8) {

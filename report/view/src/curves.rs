@@ -42,10 +42,10 @@ pub struct Curves {
     pub read: f64,
 }
 
-/// The curves that are asked for, with all samples of a short window, and by the overview of a long one.
+/// The requested curves, with all samples of a short window, and by the overview of a long one.
 ///
 /// # Errors
-/// If the recording is damaged, has no such topic, or too much is asked for. A long window of a damaged recording is
+/// If the recording is damaged, has no such topic, or too much is requested. A long window of a damaged recording is
 /// refused, wherever the damage is.
 pub fn curves(shown: &Shown, overview: &Overview, request: &CurvesRequest) -> Result<Curves> {
     let CurvesRequest { from_ns, to_ns, bins, .. } = *request;

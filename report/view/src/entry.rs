@@ -19,7 +19,7 @@ pub struct Entry {
     pub overview: Overview,
 }
 
-/// A recording as far as it is known, and its catalogue.
+/// The part of a recording read so far, and its catalogue.
 #[derive(Debug)]
 pub struct Known {
     /// The recording.
@@ -49,7 +49,7 @@ impl Entry {
         })
     }
 
-    /// The recording as far as it is known.
+    /// The part of the recording read so far.
     pub fn known(&self) -> Arc<Known> {
         self.known.read().unwrap_or_else(PoisonError::into_inner).clone()
     }

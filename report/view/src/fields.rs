@@ -17,7 +17,7 @@ const FIELDS_MAX: usize = 16_384;
 /// Fields of one request.
 pub const ASKED_MAX: usize = 512;
 
-/// A field of a topic that is asked for.
+/// A requested field of a topic.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize)]
 pub struct Asked {
     /// The topic.
@@ -142,7 +142,7 @@ impl Columns {
     /// The fields that are `asked` for.
     ///
     /// # Errors
-    /// If a topic is not in the recording, or too many fields are asked for.
+    /// If a topic is not in the recording, or too many fields are requested.
     pub fn new(shown: &Shown, asked: &[Asked]) -> Result<Self> {
         if asked.len() > ASKED_MAX {
             bail!("{} fields are asked for, expected at most {ASKED_MAX}", asked.len());
@@ -194,7 +194,7 @@ impl Columns {
         Ok(())
     }
 
-    /// Calls `visit` with the sample of one message, if it is of a topic that is asked for.
+    /// Calls `visit` with the sample of one message, if it is of a requested topic.
     pub fn read_message(&mut self, record: &Record, visit: &mut dyn FnMut(Sample<'_>)) {
         let is_of = |group: &Group| group.fields.topic() == record.topic;
         let Some(group) = self.groups.iter().position(is_of) else { return };

@@ -41,10 +41,10 @@ struct Grid<'a> {
 }
 
 /// The values of all fields at each frame, frame after frame: those of the newest message at or before its time; NaN
-/// where there is none.
+/// if there is none.
 ///
 /// # Errors
-/// If the recording is damaged, has no such topic, or too much is asked for.
+/// If the recording is damaged, has no such topic, or too much is requested.
 pub fn frames(shown: &Shown, request: &FramesRequest) -> Result<Vec<f64>> {
     let mut columns = Columns::new(shown, &request.fields)?;
     let FramesRequest { from_ns, step_ns, count, .. } = *request;

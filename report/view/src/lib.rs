@@ -1,19 +1,19 @@
 //! Recordings in the browser: a server on the loopback, and the page that it serves.
 //!
-//! | room | what it holds |
+//! | room | content |
 //! |---|---|
 //! | [`shown`] | a recording that is shown, with its index by time |
 //! | [`fields`] | the fields of its topics, and messages read for some of them |
 //! | [`frames`] | the newest values at evenly spaced times, as the room shows them |
 //! | [`curves`] | the lowest and highest values in intervals of time, as scopes draw them |
 //! | [`overview`] | the same over the whole recording, read once in the background |
-//! | [`catalogue`] | all that the page needs to know before it asks for values |
+//! | [`catalogue`] | everything that the page needs to know before it requests values |
 //! | `vehicles`, `marks` | the vehicles of a recording; its swaps and pass conditions |
 //! | `entry` | a recording of the server, which keeps up with its growth |
 //! | `readers` | threads that read recordings, a few at the same time |
 //! | `assets` | the files of the page, part of this program |
-//! | [`live`] | the live run behind a page: its state, and what the page asks of it |
-//! | `pages` | the pages that are open, and the events that they hear |
+//! | [`live`] | the live run behind a page: its state, and the requests of the page |
+//! | `pages` | the pages that are open, and their events |
 //! | `gate` | requests that are let in |
 //! | [`server`] | the server: addresses and their answers |
 //! | [`browser`] | the user's browser |

@@ -1,4 +1,4 @@
-//! The live run behind a page: its state, and what the page asks of it.
+//! The live run behind a page: its state, and the requests of the page.
 
 use anyhow::{Context as _, Result, ensure};
 use bus::asked::{Asked, AskedFile};
@@ -11,7 +11,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 use std::sync::OnceLock;
 
-/// Set points that a page asks for.
+/// Set points that a page requests.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Asking {
@@ -57,7 +57,7 @@ impl Live {
         self.control.get()
     }
 
-    /// The run's answer to `request`; waits for it, which takes as long as what is asked.
+    /// The run's answer to `request`; waits for it, which may take as long as the action.
     pub fn ask(&self, request: &Request) -> Answer {
         if let Request::Checkpoint { .. } = request {
             return Answer::refused("the page writes no files; `hummingbus ctl checkpoint` does");

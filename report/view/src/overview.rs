@@ -1,5 +1,5 @@
-//! The overview: the lowest and highest values of every field over the whole recording, in a bounded number of bins. It is
-//! read once, in the background, and goes on where the recording grows; it holds what was read so far.
+//! The overview: the lowest and highest values of every field over the whole recording, in a bounded number of bins.
+//! It is read once, in the background, and goes on as the recording grows; it holds the part read so far.
 
 use crate::fields::{Asked, Columns, Field, Sample};
 use crate::shown::Shown;
@@ -61,7 +61,7 @@ impl Overview {
         overview
     }
 
-    /// Takes fields of topics that had no message before. All topics have fewer bins then, if the budget asks for it.
+    /// Takes fields of topics that had no message before. If the budget requires it, all topics then have fewer bins.
     pub fn add_fields(&self, fields: &BTreeMap<String, Vec<Field>>) {
         let mut state = self.state();
         for (topic, fields) in fields {
@@ -81,7 +81,7 @@ impl Overview {
     pub fn fill(&self, shown: &Shown, is_ended: &AtomicBool) -> Result<()> {
         let mut state = self.state();
         state.blocks = shown.block_count();
-        // Topic by topic, so that none has more fields than may be asked for at once.
+        // Topic by topic, so that none has more fields than may be requested at once.
         let mut columns = Vec::new();
         for (topic, fields) in &state.fields {
             let asked = |field: &Field| Asked { topic: topic.clone(), field: field.path.clone() };

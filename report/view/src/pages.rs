@@ -14,7 +14,7 @@ use std::time::Duration;
 
 /// Host time between two events.
 const PERIOD: Duration = Duration::from_millis(125);
-/// Host time after which a page that lost its stream asks for another one.
+/// Host time after which a page that lost its stream requests another one.
 const RETRY: Duration = Duration::from_millis(500);
 
 /// Counts pages.
@@ -66,7 +66,7 @@ pub struct News {
     pub starts: usize,
 }
 
-/// Events for one page, for as long as it listens: what `look` finds in `content`.
+/// Events for one page, for as long as it listens: the results of `look` on `content`.
 pub fn events<T: AsRef<Pages> + Send + Sync + 'static>(
     content: Arc<T>,
     look: impl Fn(&T) -> News + Send + 'static,

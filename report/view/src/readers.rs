@@ -14,8 +14,8 @@ impl Readers {
         Self(Arc::new(Semaphore::new(count)))
     }
 
-    /// The result of `work`, which waits for its turn. Work that has begun goes on and keeps its turn, also if nobody waits
-    /// for its result any more.
+    /// The result of `work`, which waits for its turn. Work that has begun goes on and keeps its turn, even if its
+    /// result is not awaited any more.
     ///
     /// # Errors
     /// If `work` panicked.
@@ -40,7 +40,7 @@ mod tests {
     use std::sync::{Arc, mpsc};
     use std::time::Duration;
 
-    /// A page asks, asks for something else and drops the first question, again and again.
+    /// A page sends a request, sends another and drops the first, again and again.
     #[test]
     fn dropped_questions_keep_their_turns_while_they_are_read() {
         let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).build().unwrap();

@@ -51,7 +51,7 @@ const ASKERS: usize = 8;
 const LOWEST: i32 = 19;
 /// Pause between two looks for the end.
 const LOOK: Duration = Duration::from_millis(50);
-/// Looks for the end between two looks for what a recording has grown by: half a second.
+/// Looks for the end between two checks of a recording's growth: half a second.
 const GROWTH_LOOKS: u32 = 10;
 /// Time that answers under way have at the end.
 const LEAVE: Duration = Duration::from_millis(500);
@@ -81,9 +81,9 @@ pub struct Server {
 #[derive(Debug)]
 struct Content {
     gate: Gate,
-    /// True for the page of a live run, which hears of it for as long as it is open.
+    /// True for the page of a live run, which gets its events for as long as it is open.
     is_live: bool,
-    /// None until the live run has recorded something.
+    /// `None` until the live run has recorded something.
     recordings: RwLock<Arc<Vec<Entry>>>,
     /// Absent for recordings that are shown by their names.
     live: RwLock<Option<Arc<Live>>>,
@@ -124,7 +124,7 @@ impl AsRef<Pages> for Content {
     }
 }
 
-/// The way to a server at work: it takes what it is to show.
+/// The way to a server at work: it receives the recordings to show.
 #[derive(Clone, Debug)]
 pub struct Handle(Arc<Content>);
 
@@ -144,8 +144,8 @@ impl Handle {
         !self.0.recordings().is_empty()
     }
 
-    /// Shows the state of `run`, which flies `plan`, and lets pages steer it. A run that has gone back is shown anew: what it
-    /// had recorded before goes.
+    /// Shows the state of `run`, which flies `plan`, and lets pages steer it. A run that has gone back is shown anew:
+    /// its recordings so far are removed from the page.
     pub fn steer(&self, run: LiveRun, plan: Plan) {
         self.0.set_recordings(Vec::new());
         let live = Some(Arc::new(Live::of(run, plan)));
@@ -159,7 +159,7 @@ impl Handle {
         let _ = self.0.live().map(|live| live.status());
     }
 
-    /// Tells pages why there is nothing to show.
+    /// Sends pages the reason why there is nothing to show.
     pub fn refuse(&self, reason: String) {
         let _ = self.0.refusal.set(reason);
     }
@@ -270,7 +270,7 @@ fn keep_up(content: &Content, is_over: &AtomicBool) {
 
 /// Gives this thread, and no other, the lowest priority: where cores are short, a run that is watched has them first.
 fn step_back() {
-    // Nobody is refused a lower priority; without it, watching costs more.
+    // A lower priority is never refused; without it, watching costs more.
     let _ = rustix::process::setpriority_process(None, LOWEST);
 }
 

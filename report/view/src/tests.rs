@@ -1,4 +1,4 @@
-//! Answers of the server against what was written into a recording.
+//! Answers of the server compared with the messages that were written into a recording.
 
 mod live;
 
