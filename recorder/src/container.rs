@@ -1,9 +1,9 @@
 //! The records of an MCAP file (its specification, "Records"), each held against the bytes that there are.
 //!
-//! mcap 0.26 takes memory for a length that a file states before it sees that the file is shorter, and computes with such
-//! lengths unchecked. So a record goes to it only where every length in it fits into it, and a chunk is unpacked as far
-//! as its bytes go, whatever its header says. What a file unpacks to and declares is bounded by its own length: a few
-//! bytes can be compressed from gigabytes.
+//! mcap 0.26 takes memory for a length that a file states before it sees that the file is shorter, and computes with
+//! such lengths unchecked. So it gets a record only if every length in the record fits into it. A chunk is unpacked
+//! as far as its bytes go, for any length in its header. The unpacked and declared sizes of a file are bounded by its
+//! own length: a few bytes can be compressed from gigabytes.
 
 pub(crate) mod blocks;
 pub(crate) mod summary;
@@ -31,7 +31,7 @@ const DECLARED_BYTES: u64 = 4 << 20;
 const DECLARED_RATIO: u64 = 4;
 /// Longer names of topics and types are refused: they stand beside every value that is read.
 const NAME_BYTES_MAX: usize = 4096;
-/// Compressors look back over 8 MiB up to their level 19, however short what they compress is.
+/// Compressors look back over 8 MiB up to their level 19, even for shorter input.
 const WINDOW_LOG: u32 = 23;
 /// Opcode and length, in front of every record.
 const HEAD_BYTES: usize = 1 + 8;
@@ -219,8 +219,8 @@ fn long32<'a>(rest: &mut &'a [u8]) -> Result<&'a [u8], Fault> {
     take(rest, length)
 }
 
-/// The messages of an MCAP file, whoever wrote it. A damaged chunk is an error in front of any of its messages; nothing
-/// follows an error. The memory taken is that of one chunk, as far as it was written.
+/// The messages of an MCAP file of any writer. A damaged chunk is an error in front of any of its messages; no
+/// message follows an error. The memory taken is that of one chunk, as far as it was written.
 ///
 /// ```
 /// let mut messages = recorder::reader::Messages::new(b"PK\x03\x04, as archives begin");
@@ -231,7 +231,7 @@ fn long32<'a>(rest: &mut &'a [u8]) -> Result<&'a [u8], Fault> {
 pub struct Messages<'a> {
     source: Source<'a>,
     at: usize,
-    /// The byte that reading stops in front of; none where it goes on to the footer.
+    /// The byte in front of which reading stops; `None` if it goes on to the footer.
     end: Option<usize>,
     chunk: Option<Chunk>,
     /// Bytes that further chunks may unpack to.
@@ -442,10 +442,10 @@ fn zstd_decoder(data: &[u8], size: u64) -> Result<impl Read, Fault> {
     Ok(decoder)
 }
 
-/// The content of a chunk, which is `size` bytes; the memory grows with what there is.
+/// The content of a chunk, which is `size` bytes; the memory grows with the bytes found.
 fn read_all(decoder: impl Read, size: u64) -> Result<Vec<u8>, Fault> {
     let mut content = Vec::new();
-    // One byte more tells that there is more.
+    // One byte more shows that there is more.
     let read = decoder.take(size.saturating_add(1)).read_to_end(&mut content)?;
     if read as u64 == size {
         return Ok(content);

@@ -239,13 +239,13 @@ pub struct Definition {
 }
 
 impl Definition {
-    /// Parses the text of a `ros2msg` schema of the type `name`, such as `geometry_msgs/msg/Pose`. Constants and defaults
-    /// count for nothing, bounds neither, and a type without a package is of the package that it stands in.
+    /// Parses the text of a `ros2msg` schema of the type `name`, such as `geometry_msgs/msg/Pose`. Constants,
+    /// defaults and bounds are ignored. A type without a package is of the package of its definition.
     ///
     /// # Errors
     /// The line that is not understood.
     pub fn parse(name: &str, text: &str) -> Result<Self, DefinitionError> {
-        // Of each message its name, in two parts and as it is written, and its fields; the first is the root.
+        // For each message its name, in two parts and as written, and its fields; the first is the root.
         let mut messages = vec![(String::new(), name, Vec::new())];
         let mut lines = text.lines().map(str::trim_end);
         while let Some(line) = lines.next() {
@@ -272,7 +272,7 @@ impl Definition {
         self.decode_with_layout(cdr).map(|(leaves, _)| leaves)
     }
 
-    /// Decodes a message, and tells the places of its leaves.
+    /// Decodes a message, and returns the places of its leaves.
     ///
     /// # Errors
     /// As [`Definition::decode`].
@@ -303,7 +303,8 @@ const PRIMITIVES: [&str; 15] = [
     "int64", "uint64", "string", "wstring",
 ];
 
-/// The field in a line of a message of `package`, the unit from its comment; none where the line is a constant or empty.
+/// The field in a line of a message of `package`, the unit from its comment; `None` if the line is a constant or
+/// empty.
 fn parse_field(line: &str, package: &str) -> Result<Option<Field>, DefinitionError> {
     let (code, comment) = line.split_once('#').unwrap_or((line, ""));
     let code = code.trim();

@@ -4,7 +4,7 @@ use crate::definition::{DecodeError, Leaf};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// An error about a recording; its text names the file and what to do.
+/// An error about a recording; its text names the file and the remedy.
 ///
 /// ```
 /// let error = recorder::reader::Recording::open("no/such.mcap".as_ref()).unwrap_err();
@@ -54,7 +54,7 @@ pub enum RecordingError {
     /// There is no such topic.
     #[error("the recording has no topic {topic}; it has {known}")]
     UnknownTopic {
-        /// The topic asked for.
+        /// The topic requested.
         topic: String,
         /// The topics there are.
         known: String,
@@ -64,7 +64,7 @@ pub enum RecordingError {
     UnknownField {
         /// The topic.
         topic: String,
-        /// The field asked for.
+        /// The field requested.
         field: String,
         /// The fields there are.
         known: String,

@@ -9,8 +9,8 @@ use bus::schema::Extent;
 
 /// Fields of one topic and their newest values.
 ///
-/// The first message tells the places of the fields in its bytes. Reading further messages of the same layout does not
-/// allocate.
+/// The first message gives the places of the fields in its bytes. Reading further messages of the same layout does
+/// not allocate.
 ///
 /// ```
 /// use bus::Message;

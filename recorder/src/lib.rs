@@ -2,7 +2,7 @@
 //!
 //! - [`node`]: the process that records a run
 //! - [`writer`]: the MCAP file it writes
-//! - [`definition`]: what a ROS 2 message definition says about bytes
+//! - [`definition`]: the layout of a message by its ROS 2 definition
 //! - `source`: the bytes of a recording, in memory or in a file
 //! - `container`: the records of an MCAP file, their lengths checked before memory is taken for them
 //! - [`reader`]: a recording's topics, messages and attachments

@@ -11,7 +11,7 @@ use inputs::InputFiles;
 use serde::Deserialize;
 use std::path::PathBuf;
 
-/// Simulated time between two forced chunk ends: what a killed recorder can lose at most.
+/// Simulated time between two forced chunk ends: the longest part that a killed recorder can lose.
 const FLUSH_PERIOD_S: f64 = 1.0;
 
 /// Parameters of the recorder.
@@ -127,7 +127,7 @@ impl Component for Recorder {
         Ok(if is_last_of_chunk { writer.flush() } else { writer.end_tick() }?)
     }
 
-    /// Also a run that failed leaves a whole file of what was recorded.
+    /// A run that failed leaves a complete file of its samples, too.
     fn finish(&self, RecorderState(recording): &mut RecorderState) -> Result<(), StepError> {
         Ok(recording.take().map_or(Ok(()), |recording| recording.writer.finish())?)
     }
@@ -158,7 +158,7 @@ impl Recording {
         Ok(Self { writer, topics })
     }
 
-    /// Writes what was sent at this tick: what counts first, then what shadows send.
+    /// Writes the samples that were sent at this tick: first those that count, then those of shadows.
     fn record(&mut self, context: &StepContext<'_>, inputs: AnyInputs<'_>) -> Result<(), RecordingError> {
         let (tick, time_ns) = (context.tick(), context.time_ns());
         for (input, topic) in self.topics.iter().enumerate() {

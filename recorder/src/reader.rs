@@ -72,7 +72,7 @@ enum Content {
     /// Those of a file, read as they are needed.
     File {
         file: File,
-        /// Bytes of the file when it was opened; what is appended later does not belong to it.
+        /// Bytes of the file when it was opened; bytes appended later do not belong to it.
         length: usize,
     },
     /// Those that were read before.
@@ -157,11 +157,11 @@ impl Recording {
         Ok(Self { path: path.to_owned(), content, channels, topics, cut: None })
     }
 
-    /// Opens the recording at `path`, or what is whole of it if its writer did not come to the end of the file:
-    /// then [`Recording::cut`] says so. A complete file that is damaged is refused as by [`Recording::open`].
+    /// Opens the recording at `path`, or its whole part if its writer did not come to the end of the file: then
+    /// [`Recording::cut`] is present. A complete file that is damaged is refused as by [`Recording::open`].
     ///
     /// # Errors
-    /// If the file cannot be read or is no MCAP file.
+    /// If the file cannot be read or is not an MCAP file.
     pub fn salvage(path: &Path) -> Result<Self, RecordingError> {
         let file = File::open(path).map_err(RecordingError::file("open", path))?;
         let content = Content::of_file(&file, path)?;
@@ -228,7 +228,7 @@ impl Recording {
         })
     }
 
-    /// The same recording of all bytes that its file has by now; `None` where these are no more.
+    /// The same recording with all bytes that its file has by now; `None` if it has not grown.
     pub(crate) fn longer(&self) -> Result<Option<Self>, RecordingError> {
         let Content::File { file, length } = &self.content else { return Ok(None) };
         let content = Content::of_file(file, &self.path)?;

@@ -57,7 +57,7 @@ impl Recording {
         Ok(series)
     }
 
-    /// The numbers that `field` on `topic` is: itself, or the parts `x`, `y` and `z` of a vector.
+    /// The numbers of `field` on `topic`: itself, or the parts `x`, `y` and `z` of a vector.
     ///
     /// # Errors
     /// If there is no such topic, or neither such a field nor such a vector.
@@ -83,7 +83,7 @@ pub(crate) fn parts(leaves: &[Leaf], topic: &str, field: &str) -> Result<Vec<Str
 }
 
 /// The unit of `field` in messages of `schema`, that of its parts for a vector, known before anything is recorded;
-/// `None` where the message has strings or sequences without a bound, whose fields are known only from data.
+/// `None` if the message has strings or sequences without a bound, whose fields are known only from data.
 ///
 /// # Errors
 /// If there is no such field; the error lists those there are.
@@ -168,7 +168,7 @@ impl<P> Made<P> {
         }
     }
 
-    /// The same made of others; `None` where there is no other for one.
+    /// The same made of other parts; `None` if one part has no other.
     pub(crate) fn map<Q: Copy>(&self, other: impl Fn(&P) -> Option<Q>) -> Option<Made<Q>> {
         Some(match self {
             Self::Number(one) => Made::Number(other(one)?),

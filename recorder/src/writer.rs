@@ -54,8 +54,8 @@ impl RecordingWriter {
             .compression_level(ZSTD_LEVEL)
             // Worker threads would cost determinism nothing, but a core that the nodes need.
             .compression_threads(0)
-            // Chunks are closed between ticks, by `end_tick` and `flush`: what a killed recorder leaves ends
-            // with a whole tick.
+            // Chunks are closed between ticks, by `end_tick` and `flush`: the file of a killed recorder ends with a
+            // whole tick.
             .chunk_size(None)
             .create(BufWriter::with_capacity(FILE_BUFFER_BYTES, file))
             .map_err(|error| write_error(path, &error))?;
@@ -121,7 +121,7 @@ impl RecordingWriter {
         if self.chunk_bytes < CHUNK_BYTES { Ok(()) } else { self.flush() }
     }
 
-    /// Closes the chunk and hands it to the kernel: what was written so far survives a killed process.
+    /// Closes the chunk and hands it to the kernel: everything written so far survives a killed process.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -148,13 +148,13 @@ fn open_empty(path: &Path) -> std::io::Result<File> {
         // To open a pipe or a device is to do something to it.
         Ok(old) if !old.is_file() => refused("it exists and is not a regular file"),
         Ok(old) if old.len() > 0 => refused("it exists and is not empty; name another file"),
-        // Whoever put a link in its place meanwhile leads nowhere.
+        // A link that was put in its place meanwhile is not followed.
         Ok(_) => File::options().write(true).custom_flags(NO_LINK).open(path),
         Err(_) => File::create_new(path),
     }
 }
 
-/// The error with its deepest cause, which says what the system refused.
+/// The error with its deepest cause, which is the system's refusal.
 fn write_error(path: &Path, error: &mcap::McapError) -> RecordingError {
     let mut cause: &dyn std::error::Error = error;
     while let Some(deeper) = cause.source() {

@@ -87,8 +87,8 @@ pub fn scanned(source: Source<'_>, mut at: usize, is_cut: bool) -> Result<Vec<Bl
     }
 }
 
-/// Names and contents of the attachments in front of the first message: those of a file whose end is missing, where its
-/// index of them would be. Each is a part of the file, so that all are no longer than that.
+/// Names and contents of the attachments in front of the first message: those of a file whose end with their index is
+/// missing. Each is a part of the file, so that all are no longer than that.
 pub fn leading_attachments(source: Source<'_>) -> Result<Vec<(String, Vec<u8>)>, Damage> {
     let file = Bytes { source, of: "" };
     let (mut attachments, mut at) = (Vec::new(), MAGIC.len());

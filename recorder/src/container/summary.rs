@@ -11,11 +11,11 @@ pub struct Summary {
     pub channels: Channels,
     /// Places of the attachments.
     pub attachments: Vec<AttachmentIndex>,
-    /// Places of the chunks; none where the file does not list all of them.
+    /// Places of the chunks; `None` if the file does not list all of them.
     pub chunks: Option<Vec<ChunkIndex>>,
 }
 
-/// The summary of a file; `None` where it has none.
+/// The summary of a file; `None` if it has none.
 pub fn summary(source: Source<'_>) -> Result<Option<Summary>, Damage> {
     let file = Bytes { source, of: "" };
     magic(&file, 0)?;
