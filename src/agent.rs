@@ -1,5 +1,5 @@
-//! The component `agent`: a controller or pilot that is whoever steps a simulation, such as a program in Python or the importer
-//! of an FMU.
+//! The component `agent`: a controller or pilot in the program that steps a simulation, such as a program in Python
+//! or the importer of an FMU.
 //!
 //! ```
 //! use bus::messages::{MotorCommand, PlantState};
@@ -82,7 +82,7 @@ pub fn acting<R>(actions: &mut Actions, step: impl FnOnce() -> R) -> R {
     stepped
 }
 
-/// A node that sends what the host of the simulation has set.
+/// A node that sends the values that the host of the simulation has set.
 #[derive(Debug)]
 pub struct Agent {
     name: String,

@@ -1,4 +1,4 @@
-//! Backups that are asked for in flight, checked against a manifest of this package.
+//! Backups requested in flight, checked against a manifest of this package.
 
 use crate::COMPONENTS;
 use runtime::graph::{Graph, backup_of};

@@ -8,8 +8,8 @@ use scenes::Scene;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// Checks the manifest at `path` and every file that it names, with `overrides` as `--set` has them. The text of the
-/// graph is what `hummingbus check` prints.
+/// Checks the manifest at `path` and every file that it names, with `overrides` as in `--set`. The text of the graph
+/// is the output of `hummingbus check`.
 ///
 /// # Errors
 /// The faults, each with its place and advice.

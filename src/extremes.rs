@@ -1,4 +1,4 @@
-//! Extreme numbers at every key of every file that is shipped: refused in words, or of no harm to what they make.
+//! Extreme numbers at every key of every file that is shipped: refused with a message, or harmless.
 //!
 //! `check` has tried every value that it accepts: it has stepped the plant and the law with it ("rehearsed"). So a
 //! panic, or a number that overflows on the way, shows here without a process.
@@ -25,7 +25,7 @@ const EXTREMES: [Value; 9] = [
     Value::Integer(u32::MAX as i64),
 ];
 
-/// The repository's files that say what flies, in a folder of their own.
+/// The repository's files that describe vehicles and runs, in a folder of their own.
 struct Folder(tempfile::TempDir);
 
 impl Folder {

@@ -43,8 +43,8 @@ pub struct Exported {
 /// The FMU of the manifest or vehicle file at `path`, with the library `library` of `bindings/fmu-export`.
 ///
 /// # Errors
-/// The manifest has a problem, the process is not in it or sends what no importer can, a node needs a process of its own, or
-/// a topic is not there.
+/// The manifest has a problem, the process is not in it or sends messages that no importer can send, a node needs a
+/// process of its own, or a topic is not there.
 pub fn export(path: &Path, wishes: &Wishes<'_>, library: &[u8]) -> Result<Exported> {
     let load = |overrides: &[String]| load(path, overrides);
     let declared = Graph::build(&load(wishes.overrides)?)?;
@@ -85,7 +85,8 @@ fn node<'p>(plan: &'p Plan, name: &str) -> Result<&'p NodePlan> {
     })
 }
 
-/// The topics that become outputs: those that are asked for, else those that the process reads with the states of plants, else all.
+/// The topics that become outputs: the requested ones, else those that the process reads with the states of plants,
+/// else all.
 fn outputs(plan: &Plan, replaced: &NodePlan, asked: &[String]) -> Result<Vec<String>> {
     let name = |topic: usize| plan.topics[topic].name.clone();
     for asked in asked {
@@ -137,8 +138,8 @@ fn agent(plan: &Plan, replaced: &NodePlan) -> Result<String> {
     Ok(format!("process.{name}={{ kind = \"agent\", period_ticks = {period}, outputs = {{ {outputs} }} }}"))
 }
 
-/// Variables of the simulation: inputs from what the agent sends, outputs from the topics, with their values before the
-/// first step.
+/// Variables of the simulation: inputs from the outputs of the agent, outputs from the topics, with their values
+/// before the first step.
 fn variables(
     plan: &Plan,
     mut simulation: bus::Simulation,
@@ -231,8 +232,8 @@ fn write(
     Ok(Exported { bytes: bytes.into_inner(), model })
 }
 
-/// The plan without what is this machine's: paths begin at `/fmu` instead of the folder that all files lie in, no node has a core, and
-/// the memory of the run has no name.
+/// The plan without references to this machine: paths begin at `/fmu` instead of the folder that all files lie in, no
+/// node has a core, and the memory of the run has no name.
 fn portable(plan: &Plan) -> Plan {
     let mut plan = Plan { run_id: "fmu".to_owned(), clock_cpu: None, ..plan.clone() };
     let paths: Vec<PathBuf> =

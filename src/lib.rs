@@ -1,7 +1,7 @@
 //! hummingbus: a vehicle simulation as independent components in deterministic lockstep, on a zero-copy bus.
 //!
-//! A manifest says which components fly together, and how they are wired. [`load`] reads one, [`Launcher`] flies it, in
-//! processes, on threads or in one thread, and what comes back is the recording and what there is to say about the run:
+//! A manifest says which components fly together, and how they are wired. [`load`] reads one. [`Launcher`] flies it,
+//! in processes, on threads or in one thread, and returns the outcome of the run and its recording:
 //!
 //! ```
 //! use hummingbus::{Host, Launcher};
@@ -35,10 +35,11 @@
 //! ```
 //!
 //! A run is followed with [`Launcher::followed_by`], steered from another thread with [`Launcher::remote`], and ended
-//! early with a [`StopToken`]. [`check()`] and [`check_text`] check a manifest and all that it names without flying it.
+//! early with a [`StopToken`]. [`check()`] and [`check_text`] check a manifest and every file that it names without
+//! flying it.
 //!
-//! A simulation is a value: what it saves at a tick, another one of the same manifest goes on from, as often as you like.
-//! [`Checkpoint`] is the same in a file, for runs under any host:
+//! A simulation is a value: from its state saved at a tick another one of the same manifest goes on, as often as you
+//! like. [`Checkpoint`] is the same in a file, for runs under any host:
 //!
 //! ```
 //! use bus::messages::PlantState;
@@ -59,16 +60,16 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! | crate | what it holds |
+//! | crate | content |
 //! |---|---|
 //! | [`bus`] | components, messages, the lockstep |
 //! | [`runtime`] | manifests, plans, the launcher |
 //! | [`recorder`] | recordings, written and read |
 //! | [`report`] | verdicts, figures and pages from recordings |
 //! | [`plant`], [`sensors`], [`controllers`] | the components that this package brings |
-//! | [`vehicles`], [`scenes`] | files that describe what flies, and where |
+//! | [`vehicles`], [`scenes`] | files that describe vehicles, and their surroundings |
 //! | [`inputs`] | files that are read once, for a run or a fit |
-//! | [`flights`], [`identify`] | measured flights, and what they show that a vehicle file lacks |
+//! | [`flights`], [`identify`] | measured flights, and the effects in them that a vehicle file lacks |
 #![forbid(unsafe_code)]
 
 pub mod agent;

@@ -1,4 +1,5 @@
-//! The component `operator`: set points of a person who flies by hand at the page of the run, or those of a recorded flight.
+//! The component `operator`: set points of a person who flies by hand at the page of the run, or those of a recorded
+//! flight.
 //!
 //! The set points enter the run as the samples of its output, so that a recording has them. A run of the same
 //! manifest with `data`, that recording, sends the same samples again, at the same ticks.
@@ -30,11 +31,11 @@ const SET_POINT: &str = "hummingbus_msgs/msg/SetPoint";
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Parameters {
-    /// Altitude until somebody asks for another one; the angles are zero.
+    /// Altitude until another one is requested; the angles are zero.
     initial_altitude_m: f64,
-    /// Lowest and highest altitude that can be asked for.
+    /// Lowest and highest altitude that can be requested.
     altitudes_m: [f64; 2],
-    /// Roll and pitch that can be asked for at most.
+    /// Largest roll and pitch that can be requested.
     tilt_max_deg: f64,
     /// Answer to a source that has fallen silent.
     fallback: Fallback,
@@ -59,7 +60,7 @@ enum Fallback {
 /// Outputs of `operator`.
 #[derive(Debug, OutputPorts)]
 pub struct Outputs {
-    /// Set point that is asked for.
+    /// Requested set point.
     pub set_point: SetPoint,
 }
 
@@ -208,7 +209,7 @@ fn file(context: &NodeContext<'_>) -> Result<Option<AskedFile>, ParameterError> 
 }
 
 impl Operator {
-    /// Values within the limits: those that are asked for, or the fallback where they are too old. In a run that goes on from
+    /// Values within the limits: the requested ones, or the fallback if they are too old. In a run that goes on from
     /// a checkpoint those from before it are too old.
     fn allowed(&self, read: Option<(Asked, Duration)>, state: &mut OperatorState) -> Asked {
         let read = read.filter(|(asked, _)| asked.is_finite());
@@ -232,7 +233,7 @@ impl Operator {
         Asked { altitude_m, roll_rad: tilt(roll_rad), pitch_rad: tilt(pitch_rad), yaw_rad }
     }
 
-    /// Notes what is asked for, within the limits.
+    /// Notes the requested values, within the limits.
     fn note(&self, asked: &Asked, state: &mut OperatorState) {
         let [lowest_m, highest_m] = self.altitudes_m;
         let tilt = |tilt_rad: f64| tilt_rad.clamp(-self.tilt_max_rad, self.tilt_max_rad);

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 const SHIPPED: [&str; 7] =
     ["custom-controller", "hover", "replay-nanobench", "standby", "swap-gains", "swap-identical", "swarm"];
 
-/// Words that mean something in a manifest, and some that are at the edge of what TOML can say.
+/// Words with a meaning in a manifest, and some at the limits of TOML.
 const WORDS: [&str; 48] = [
     "[run]",
     "[process.plant]",
@@ -90,7 +90,7 @@ impl Folder {
         Ok((manifest, graph))
     }
 
-    /// Checks `text`, and has whatever is wrong with it said.
+    /// Checks `text`, and requires a message about any problem.
     fn survives(&self, text: &[u8], settings: &[String]) {
         match self.check(text, settings) {
             Ok((_, graph)) => assert!(!graph.to_string().is_empty()),

@@ -243,7 +243,7 @@ fn fly_one(opened: &Opened, flight: usize) -> Result<bool> {
         Summary::new(format!("{} flight {flight}", manifest.name()), outcome, graph.plan.tick_s());
     let flown = flown.context("the manifest has no recorder: add one to see a flight")?;
     match figures {
-        // The judge has seen what was flown before the checkpoint, too.
+        // The judge has seen the flight before the checkpoint, too.
         Some(figures) => {
             summary.judge_by(&figures, &manifest.content)?;
             summary.describe(&flown, &graph.plan)?;

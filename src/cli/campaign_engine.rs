@@ -20,11 +20,11 @@ const TASK_OF: &str = "--task-of";
 const SHARED: &str = "slurm";
 /// Least number of flights of a task that is not stated: a task takes seconds to start.
 const CHUNK_MIN: usize = 50;
-/// Most tasks where their flights are not stated; Slurm's own limit (MaxArraySize) is 1001 where nobody changed it.
+/// Most tasks if their flights are not stated; Slurm's own limit (MaxArraySize) is 1001 by default.
 const TASKS_MAX: usize = 500;
 
-/// Options of `sbatch` that the campaign gives itself, or that would send the array where nobody asks for it; each with what
-/// does it instead.
+/// Options of `sbatch` that the campaign gives itself, or that would send the array to a cluster that was not
+/// requested; each with its alternative.
 const OPTIONS_OF_OURS: [(&str, &str, &str); 8] = [
     ("--array", "-a", "--chunk sets the flights of a task"),
     ("--cpus-per-task", "-c", "--workers sets the processors of a task"),

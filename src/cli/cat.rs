@@ -123,7 +123,7 @@ impl CatArguments {
         records.map(|record| record.context("cannot read on"))
     }
 
-    /// The fields that are asked for, in the order of the definition.
+    /// The requested fields, in the order of the definition.
     fn leaves(&self, recording: &Recording, record: &Record) -> Result<Vec<Leaf>> {
         let mut leaves = recording.decode(record)?;
         leaves.retain(|leaf| !is_padding(&leaf.path));

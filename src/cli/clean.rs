@@ -15,10 +15,10 @@ pub struct CleanArguments {
     json: bool,
 }
 
-/// Removes what dead runs left; false if something of it is still there.
+/// Removes the remains of dead runs; false if something of them is still there.
 ///
 /// # Errors
-/// If what is there cannot be looked at.
+/// If the remains cannot be listed.
 pub fn clean(arguments: &CleanArguments) -> Result<bool> {
     let report = runtime::clean::clean(arguments.dry_run)?;
     if arguments.json { print_json(&report) } else { print_text(&report.to_string()) }?;

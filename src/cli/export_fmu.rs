@@ -47,7 +47,7 @@ pub struct ExportFmuArguments {
 /// Writes a simulation as an FMU, for Simulink, OpenModelica, Dymola and others.
 ///
 /// # Errors
-/// If the manifest has a problem, what is asked for is not in it, or the file cannot be written.
+/// If the manifest has a problem, a requested process or topic is not in it, or the file cannot be written.
 pub fn export_fmu(arguments: &ExportFmuArguments) -> Result<bool> {
     let Some(version) = fmu::export::version_of(&arguments.fmi) else {
         bail!("--fmi: expected 2 or 3, found {}", arguments.fmi);

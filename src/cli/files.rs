@@ -7,10 +7,10 @@ use runtime::output_file::{Kind, Mark};
 use runtime::rewind::MARK;
 use std::path::Path;
 
-/// A page, whatever it shows.
+/// A page of any kind.
 pub const PAGE: Kind = Kind { name: "page", mark: Mark::Within(report::page::MARK.as_bytes()) };
 
-/// Opens a recording, or what is whole of one that was cut off, and then says so.
+/// Opens a recording, or the whole part of one that was cut off, and then reports that.
 pub fn open_recording(path: &Path) -> Result<Recording> {
     let recording = Recording::salvage(path).map_err(|error| {
         let is_toml = path.is_file() && path.extension().is_some_and(|extension| extension == "toml");

@@ -1,4 +1,4 @@
-//! The command `identify`: what flights show that the declared model lacks, and the model with it.
+//! The command `identify`: effects that flights show and the declared model lacks, and the model with them.
 
 use super::files::PAGE;
 use super::interrupts::stop_token;
@@ -25,7 +25,7 @@ pub const HELP: &str = "Examples: hummingbus identify flights/nanobench.toml --o
     hummingbus identify rotor flights/stands/esc-test-f40.toml --out rotor\n\n\
     Writes report.html, report.json and vehicle.toml into the folder. See docs/identify.md.";
 
-/// A report as JSON: who wrote it comes first.
+/// A report as JSON: its writer comes first.
 const REPORT: Kind = Kind { name: "report", mark: Mark::Start(b"{\n  \"writer\": \"hummingbus\",") };
 /// The new vehicle file.
 const VEHICLE: Kind =
@@ -71,7 +71,7 @@ enum Part {
     },
 }
 
-/// Runs the command; what it could not do is an error, so that `true` says that the files are written.
+/// Runs the command; every failure is an error, so that `true` means that the files are written.
 ///
 /// # Errors
 /// A file that cannot be read or written, flights that cannot be used, a run on the bus that fails.

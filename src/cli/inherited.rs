@@ -9,8 +9,8 @@ use std::process::Command;
 /// Environment variables of a launcher for its processes.
 const VARIABLES: [&str; 4] = [RUN_VARIABLE, LAUNCHER_VARIABLE, NODE_VARIABLE, GENERATION_VARIABLE];
 
-/// Begins this command anew without the variables of another run, if it has one: the kernel shows the variables with
-/// which a program began, whatever it does with them later, and `clean` goes by what the kernel shows.
+/// Begins this command anew without the variables of another run, if it has one. The kernel shows the variables with
+/// which a program began, even if it changes them later, and `clean` uses those of the kernel.
 pub fn forget() {
     if VARIABLES.iter().all(|variable| std::env::var_os(variable).is_none()) {
         return;

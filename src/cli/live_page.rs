@@ -1,4 +1,4 @@
-//! The page of a live run, served by a thread beside what this process does.
+//! The page of a live run, served by a thread of this process.
 
 use super::output::say;
 use anyhow::Result;
@@ -31,8 +31,8 @@ pub struct LivePage {
 }
 
 impl LivePage {
-    /// Serves the page at `port`, and opens a browser unless `no_open`. For a run of this process, before it starts: what
-    /// is started while a run flies ends with it.
+    /// Serves the page at `port`, and opens a browser unless `no_open`. For a run of this process, before it starts:
+    /// a browser started while a run flies ends with it.
     ///
     /// # Errors
     /// If the port is taken.
@@ -102,7 +102,7 @@ impl LivePage {
 
 impl Drop for LivePage {
     fn drop(&mut self) {
-        // Whoever wants to hear of errors closes it.
+        // A caller that wants to see errors closes it.
         let _ = self.end();
     }
 }

@@ -1,4 +1,4 @@
-//! The command line: the table of commands, what is printed, exit codes.
+//! The command line: the table of commands, printing, exit codes.
 
 mod campaign;
 mod campaign_engine;
@@ -135,7 +135,7 @@ commands! {
     Node(node::NodeArguments) => node::node;
 }
 
-/// Parses the arguments of this process, does what they ask for, and says with which code the process ends.
+/// Parses the arguments of this process, runs the command, and returns the exit code of the process.
 pub fn main() -> ExitCode {
     let command = match Cli::try_parse() {
         Ok(cli) => cli.command,

@@ -11,10 +11,10 @@ pub struct NodeArguments {
     kind: String,
 }
 
-/// Runs a process of a run; what it says goes to the launcher's log.
+/// Runs a process of a run; its output goes to the launcher's log.
 ///
 /// # Errors
-/// If there is no such component, or what it says.
+/// If there is no such component, or the component's own error.
 pub fn node(NodeArguments { kind }: &NodeArguments) -> Result<bool> {
     runtime::node(kind, COMPONENTS).map(|()| true)
 }

@@ -1,4 +1,5 @@
-//! Standard output and standard error: the one place that prints. Whatever a terminal would obey is escaped here.
+//! Standard output and standard error: the one place that prints. Everything that a terminal would interpret is
+//! escaped here.
 
 use anyhow::{Context, Result};
 use diagnostics::{Diagnostic, printable, printable_json, short_lines};
@@ -31,7 +32,7 @@ pub fn write_json_line(out: &mut impl std::io::Write, value: &serde_json::Value)
     writeln!(out, "{}", printable_json(&value.to_string()))
 }
 
-/// Text of a message as people can read it, whatever names and contents of files are in it.
+/// Text of a message as people can read it, for any names and contents of files in it.
 pub fn readable(text: &str) -> Cow<'_, str> {
     match short_lines(text) {
         Cow::Borrowed(text) => printable(text),
@@ -43,7 +44,7 @@ fn print(text: &str) -> Result<()> {
     writeln!(std::io::stdout(), "{}", text.trim_end()).or_else(|error| gone_or_failed(error).map(|_| ()))
 }
 
-/// A reader that has gone away (`| head`) is no error; a full disk is one.
+/// A reader that has gone away (`| head`) is not an error; a full disk is one.
 pub fn gone_or_failed(error: std::io::Error) -> Result<bool> {
     if error.kind() == std::io::ErrorKind::BrokenPipe {
         Ok(true)
@@ -52,7 +53,7 @@ pub fn gone_or_failed(error: std::io::Error) -> Result<bool> {
     }
 }
 
-/// Says something on standard error. Where that is closed or full there is nobody to tell.
+/// Prints a line on standard error. If that is closed or full, the line is lost.
 pub fn say(text: &str) {
     let _ = writeln!(std::io::stderr(), "{}", readable(text));
 }
@@ -70,7 +71,7 @@ pub fn message(error: &anyhow::Error) -> String {
     })
 }
 
-/// Tells people of what is odd, on standard error.
+/// Prints warnings on standard error.
 pub fn print_warnings(warnings: &[Diagnostic]) {
     warnings.iter().for_each(|warning| say(&format!("warning: {warning}")));
 }

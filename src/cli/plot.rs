@@ -97,7 +97,7 @@ impl From<Figure> for View {
 /// Plots a recording; false if it was cut off.
 ///
 /// # Errors
-/// If something that was asked for is not in the recording, or a file cannot be written.
+/// If a requested topic or field is not in the recording, or a file cannot be written.
 pub fn plot(arguments: &PlotArguments) -> Result<bool> {
     let files = outputs(arguments)?;
     let request = Request {

@@ -31,7 +31,7 @@ impl Files {
         Self { trace: file("trace.json"), html: file("profile.html") }
     }
 
-    /// Those that were asked for, to be checked before a run is flown for them.
+    /// The requested files, to be checked before a run is flown for them.
     pub fn outputs(&self) -> Vec<Output> {
         let output = |what: &str, path: &Option<PathBuf>, kind, flag: &str| {
             let advice = format!("name another with {flag} FILE");
@@ -41,7 +41,7 @@ impl Files {
         trace.into_iter().chain(output("the page", &self.html, &PAGE, "--html")).collect()
     }
 
-    /// Writes those that were asked for; returns a line for each that says what it holds.
+    /// Writes the requested files; returns a line about the content of each.
     ///
     /// # Errors
     /// If one cannot be written.

@@ -9,7 +9,7 @@ const DRAW_HZ: u8 = 10;
 /// Template of the bar of a run.
 pub const RUN: &str = "{bar:30} {pos}/{len} ticks  {msg}";
 
-/// A bar like `template`; hidden where `is_quiet` or where standard error is no terminal.
+/// A bar like `template`; hidden if `is_quiet`, or if standard error is not a terminal.
 pub fn bar(template: &str, is_quiet: bool) -> ProgressBar {
     let target =
         if is_quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr_with_hz(DRAW_HZ) };
@@ -37,7 +37,7 @@ pub fn show(bar: &ProgressBar, event: RunEvent<'_>) {
 pub fn finish(bar: &ProgressBar) {
     bar.abandon();
     if !bar.is_hidden() {
-        // What is printed next starts on a line of its own.
+        // The next output starts on a line of its own.
         say("");
     }
 }

@@ -1,4 +1,4 @@
-//! The command `run` and its kin: check a manifest, fly it, judge its recording, say what came of it.
+//! The command `run` and related ones: check a manifest, fly it, judge its recording, print the results.
 
 use super::interrupts::stop_token;
 use super::live_page::LivePage;
@@ -95,14 +95,14 @@ pub fn profile(arguments: &ProfileArguments) -> Result<bool> {
     run(&arguments.run, Some(arguments.files.clone()), None)
 }
 
-/// Flies a manifest, profiled where `files` are given, with an `extra_shadow` (a process, and TOML with what the shadow
-/// has otherwise) where one is asked for; false if a condition did not hold.
+/// Flies a manifest, profiled if `files` are given, with an `extra_shadow` (a process, and TOML with the differences
+/// of the shadow) if one is requested; false if a condition did not hold.
 pub fn run(
     arguments: &RunArguments,
     files: Option<Files>,
     extra_shadow: Option<(&str, &str)>,
 ) -> Result<bool> {
-    // First, so that who stops the run early hears that it was stopped.
+    // First, so that a user who stops the run early sees that it was stopped.
     let stop = stop_token()?;
     let record = arguments.record.as_deref();
     let from = arguments.from.as_deref().map(Checkpoint::read).transpose()?;
@@ -133,11 +133,11 @@ pub fn run(
     }
     let mut path = recording_path(&manifest, record)?;
     if extra_shadow.is_some() && arguments.record.is_none() {
-        // That of the manifest itself stays as it is.
+        // The recording of the manifest itself is not replaced.
         path.set_extension("shadow.mcap");
     }
     if let (Some(tick), None) = (going_on, record) {
-        // The recording of the run before stays as it is.
+        // The recording of the run before is not replaced.
         path.set_extension(format!("from-{tick}.mcap"));
     }
     let files = files.unwrap_or_else(|| Files::beside(&path));
@@ -160,7 +160,7 @@ pub fn run(
     let profile = flight.as_ref().map(|flight| Profile::of(flight, outcome.missed_deadlines));
     let mut summary = Summary::new(manifest.name(), outcome, graph.plan.tick_s());
     match (&recording, figures) {
-        // A recording holds what was flown from the checkpoint on; its judge has seen the ticks before, too.
+        // A recording holds the flight from the checkpoint on; its judge has seen the ticks before, too.
         (Some(recording), Some(figures)) => {
             summary.judge_by(&figures, &manifest.content)?;
             summary.describe(recording, &graph.plan)?;
@@ -209,7 +209,7 @@ fn page(port: u16, no_open: bool, graph: &Graph) -> Result<LivePage> {
     Ok(page)
 }
 
-/// Keeps the page of a run that has ended, for as long as somebody looks at it.
+/// Keeps the page of a run that has ended, for as long as it is open in a browser.
 fn stay(page: LivePage, recording: Option<&Path>, stop: &StopToken) -> Result<()> {
     if stop.count() == 0 {
         recording.map_or(Ok(()), |recording| page.show_whole(recording))?;

@@ -21,7 +21,7 @@ pub struct ShadowArguments {
     with: String,
 }
 
-/// Flies a manifest with a shadow more, or tells what the shadows of a recording did otherwise.
+/// Flies a manifest with an additional shadow, or reports the differences of the shadows of a recording.
 ///
 /// # Errors
 /// As `run`; or a recording cannot be read.

@@ -85,7 +85,7 @@ impl CtlVerb {
     }
 }
 
-/// Asks a live run what `arguments` say, and prints its answer.
+/// Sends the request of `arguments` to a live run, and prints its answer.
 ///
 /// # Errors
 /// If there is no such run, or it refuses.
@@ -115,10 +115,10 @@ pub struct SwapArguments {
     json: bool,
 }
 
-/// Has a live run replace one of its processes, and prints what came of it.
+/// Has a live run replace one of its processes, and prints the result.
 ///
 /// # Errors
-/// If there is no such run, the backup's description is no TOML, or the run refuses.
+/// If there is no such run, the backup's description is not TOML, or the run refuses.
 pub fn swap(arguments: &SwapArguments) -> Result<bool> {
     let request = Request::Swap {
         process: arguments.process.clone(),
@@ -154,7 +154,7 @@ fn ask(run_id: Option<&str>, request: &Request, json: bool) -> Result<()> {
         Answer::Refused { reason } => bail!("{reason}"),
         _ if json => Ok(()),
         Answer::Done { text, .. } if run_id.is_some() => output::print_text(&text),
-        // Nobody named the run: the answer does.
+        // The user did not name the run: the answer does.
         Answer::Done { text, .. } => {
             let manifest = run.entry.manifest.file_name().unwrap_or_default().display();
             output::print_text(&format!("run {} ({manifest}): {text}", run.entry.run_id))

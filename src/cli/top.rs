@@ -50,8 +50,8 @@ pub fn top(arguments: &TopArguments) -> Result<bool> {
     }
     let is_terminated = Arc::new(AtomicBool::new(false));
     let flag = is_terminated.clone();
-    // Without it a signal would leave the terminal as it is while it is drawn on. Where the terminal itself is gone, the
-    // reader of its keys does not come back: then it is left behind.
+    // Without it a signal would leave the terminal in the state in which it is drawn on. If the terminal itself is
+    // gone, the reader of its keys does not come back: then it is left behind.
     ctrlc::set_handler(move || {
         flag.store(true, Ordering::SeqCst);
         std::thread::sleep(LEAVE);

@@ -77,7 +77,7 @@ fn of_file(path: &Path) -> Result<Body> {
 fn of_recording(path: &Path, name: Option<&str>) -> Result<(String, Body)> {
     let recording = open_recording(path)?;
     let attached = Attached::to(&recording)?;
-    // Of one without a manifest the topics tell.
+    // The topics show the vehicles of a recording without a manifest.
     let has_topics = |name: &str| {
         let prefix = format!("/{name}/");
         recording.topics().keys().any(|topic| topic.starts_with(&prefix))

@@ -28,7 +28,8 @@ pub struct ValidateArguments {
     keep: Option<PathBuf>,
 }
 
-/// Flies all flights and prints the errors; every error is one of flying, so that `true` says that all was flown.
+/// Flies all flights and prints the errors; every failure is an error, so that `true` means that every flight was
+/// flown.
 ///
 /// # Errors
 /// If a file cannot be read, or a flight cannot be flown.
