@@ -55,8 +55,7 @@ pub struct Waited {
 
 impl Flight {
     /// Opens the files that the processes of `plan` wrote in `run_dir`; `replacements` state which instance took over
-    /// from which.
-    /// The files may be removed while this lives.
+    /// from which. The files may be removed while this lives.
     ///
     /// # Errors
     /// If a file cannot be read or does not have the expected content.
