@@ -88,7 +88,7 @@ pub struct Agent {
     name: String,
 }
 
-/// It has none.
+/// Parameters: none.
 #[derive(Debug, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Parameters {}

@@ -49,13 +49,13 @@ impl<T: Copy + Default, const N: usize> Bounded<T, N> {
         Self::from_fn(count, |_| value)
     }
 
-    /// These values; `None` if they are more than `N`.
+    /// The sequence of `values`; `None` if they are more than `N`.
     #[must_use]
     pub fn of(values: &[T]) -> Option<Self> {
         (values.len() <= N).then(|| Self::from_fn(values.len(), |index| values[index]))
     }
 
-    /// As many values, each made from one of these.
+    /// The sequence of the values that `value` makes of these.
     #[must_use]
     pub fn map<U: Copy + Default>(&self, mut value: impl FnMut(T) -> U) -> Bounded<U, N> {
         Bounded::from_fn(self.len(), |index| value(self[index]))

@@ -51,7 +51,7 @@ pub struct NodePart {
 pub struct Parts {
     /// The first tick that is computed.
     pub tick: u32,
-    /// In the order of the plan's nodes.
+    /// Parts of the nodes, in the order of the plan's nodes.
     pub nodes: Vec<NodePart>,
 }
 

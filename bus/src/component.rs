@@ -16,7 +16,7 @@ pub use crate::state::{State, StateError, Transfer};
 /// ```
 pub type StepError = Box<dyn std::error::Error + Send + Sync>;
 
-/// Everything that runs at ticks: sensors, controllers, the plant, the recorder.
+/// A type that runs at ticks: a sensor, a controller, the plant, the recorder.
 ///
 /// The keys of a manifest, the check and the process that runs the component follow from this declaration.
 ///

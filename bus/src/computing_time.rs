@@ -20,7 +20,7 @@ const TICKS_MAX: u32 = 1 << 30;
 pub enum ComputingTime {
     /// Always the same.
     Constant {
-        /// That time, µs.
+        /// The time, µs.
         us: f64,
     },
     /// Anything between two times, evenly.
@@ -37,7 +37,7 @@ pub enum ComputingTime {
         /// Standard deviation of the natural logarithm.
         sigma: f64,
     },
-    /// As measured: a fraction of the steps took at most so long; between the points on straight lines.
+    /// A measured distribution: a fraction of the steps took at most so long; between the points on straight lines.
     Measured {
         /// Fraction and time in µs, both ascending, from fraction 0 to fraction 1.
         fraction_us: Vec<[f64; 2]>,

@@ -85,7 +85,7 @@ pub(crate) enum Awaited {
     },
     /// Its backup's first tick, or the refusal of that backup.
     Backup,
-    /// As a shadow behind the end of the run: its predecessor's end.
+    /// The predecessor's end, for a shadow behind the end of the run.
     Predecessor,
 }
 

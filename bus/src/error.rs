@@ -143,7 +143,7 @@ pub enum BusError {
         port: String,
         /// The message type of the first declaration.
         first: &'static str,
-        /// That of the second.
+        /// The message type of the second declaration.
         second: &'static str,
     },
     /// Publisher and subscriber disagree on the bytes.

@@ -48,9 +48,9 @@ impl<'c> Member<'c> {
 
 /// The nodes of a process, on one thread.
 pub(crate) struct Executor<'c> {
-    /// Those that compute, in the order in which they step.
+    /// Members that compute, in the order in which they step.
     members: Vec<Member<'c>>,
-    /// Those that have completed their ticks, and whose last samples are not all taken yet.
+    /// Members that have completed their ticks, and whose last samples are not all taken yet.
     leaving: Vec<Member<'c>>,
     /// The topics of a group, by their numbers in the plan.
     locals: Vec<Option<LocalTopic>>,

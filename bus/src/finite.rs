@@ -20,7 +20,7 @@ pub(crate) struct Floats {
 }
 
 impl Floats {
-    /// Those of `schema`.
+    /// The floating-point numbers of `schema`.
     pub(crate) fn of(schema: &Schema) -> Self {
         let named = schema.extent().filter(|extent| extent.tail_bytes > 0);
         let mut floats = Self { spans: Vec::new(), named };

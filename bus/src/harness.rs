@@ -31,7 +31,7 @@ impl<C: Component> Harness<C> {
         Self::in_context(parameters, &NodeContext::new(C::INFO.name, &[]))
     }
 
-    /// The same, with the parameters as a manifest says them.
+    /// A component by itself, with the parameters as in a manifest.
     ///
     /// # Errors
     /// They do not fit, or as [`Component::new`].
@@ -56,7 +56,7 @@ impl<C: Component> Harness<C> {
         &self.component
     }
 
-    /// Has the next step take the place of a process that sent `outputs` last and transferred no state.
+    /// Makes the next step take the place of a process that sent `outputs` last and transferred no state.
     pub fn replaces(&mut self, outputs: C::Outputs) {
         self.predecessor = Some(SampleMemory::of(outputs));
     }

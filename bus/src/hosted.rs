@@ -25,7 +25,7 @@ thread_local! {
 impl Hosted {
     /// Runs `node` on this thread as this instance: [`Join::from_environment`] and [`crate::clock::run`] join its run.
     pub fn run<R>(self, node: impl FnOnce() -> R) -> R {
-        /// Also where the node panics.
+        /// Guard that clears the instance at the end, also if the node panics.
         struct Forget;
         impl Drop for Forget {
             fn drop(&mut self) {

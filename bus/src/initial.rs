@@ -47,7 +47,7 @@ pub fn sample(schema: &Schema, value: &Value) -> Result<Box<[u64]>, InitialError
     Ok(words)
 }
 
-/// The same as the bytes of the message alone.
+/// The bytes of the message alone, with the values of `value`.
 ///
 /// ```
 /// use bus::Message;

@@ -125,7 +125,7 @@ impl Links {
         Ok(())
     }
 
-    /// Has the samples of `output` count from the take-over on, also those that were sent already.
+    /// Makes the samples of `output` count from the take-over on, also those that were sent already.
     pub(crate) fn promote(&self, output: &mut OutPort, instances: &NodeInstances, index: usize, tick: u32) {
         output.counts_from = instances.take_over_ticks[index];
         let shadows = instances.backup.as_ref().is_some_and(|backup| backup.shadows);

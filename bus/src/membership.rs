@@ -27,8 +27,8 @@ pub struct NodeInstances {
     pub backup: Option<Instance>,
     /// The tick from which on the backup goes on by itself; `u32::MAX` where it only shadows.
     pub take_over_tick: u32,
-    /// Per output: the tick from which on the backup's samples count. After a crash some outputs of the
-    /// take-over tick may have been sent already.
+    /// The tick from which on the backup's samples count, by output. After a crash some outputs of the take-over tick
+    /// may have been sent already.
     pub take_over_ticks: Vec<u32>,
 }
 

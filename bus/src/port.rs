@@ -125,7 +125,7 @@ pub(crate) struct InPort {
     active: Feed,
     /// The newest tick that a sample of a member may have.
     newest_tick: Option<u32>,
-    /// Those that succeed it, in order: more than one where a backup died before this node turned to it.
+    /// Publishers that succeed it, in order: more than one if a backup died before this node turned to it.
     backups: VecDeque<Backup>,
     initial: Option<Box<[u64]>>,
     /// The newest sample from before the run went on from a checkpoint.
@@ -206,7 +206,7 @@ impl InPort {
         self.backups.retain(|backup| backup.source.generation <= generation);
     }
 
-    /// Has the backup's samples count from `tick` on.
+    /// Makes the backup's samples count from `tick` on.
     pub(crate) fn set_take_over_tick(&mut self, tick: u32) {
         if let Some(backup) = self.backups.back_mut() {
             backup.take_over_tick = tick;
@@ -331,7 +331,7 @@ impl InPort {
         self.restored.as_ref().map(|(header, words)| (*header, &**words))
     }
 
-    /// The same as CDR bytes.
+    /// The newest sample from before the run went on from a checkpoint, as CDR bytes.
     pub(crate) fn restored_cdr(&self) -> Option<&[u8]> {
         self.restored().map(|(_, words)| cdr_bytes(words, self.size))
     }
@@ -405,12 +405,12 @@ impl InPort {
         [header.received_ns, header.done_ns, header.sent_ns]
     }
 
-    /// The same sample as CDR bytes with its sequence number, if it was sent at `tick`.
+    /// The sample that the tick reads, as CDR bytes with its sequence number, if it was sent at `tick`.
     pub(crate) fn fresh<'a>(&'a self, tick: u32, locals: &'a Locals) -> Option<(&'a [u8], u64)> {
         self.cdr(self.sample(locals), tick)
     }
 
-    /// The same of the process that shadows the publisher.
+    /// The sample of the process that shadows the publisher, in the same form, if it was sent at `tick`.
     pub(crate) fn fresh_shadow(&self, tick: u32) -> Option<(&[u8], u64)> {
         self.cdr(self.shadow.as_ref().map(|sample| (*sample.header(), sample.words())), tick)
     }
@@ -494,7 +494,7 @@ impl OutPort {
         }
     }
 
-    /// The same port, whose samples are others' messages and keep the stamps of their senders.
+    /// This port for forwarded messages, which keep the stamps of their senders.
     pub(crate) fn keeping_stamps(self) -> Self {
         Self { stamp_offset: None, ..self }
     }
@@ -504,7 +504,7 @@ impl OutPort {
         self.ring = Some(ring);
     }
 
-    /// Has the port take a sample at every step.
+    /// Makes the port take a sample at every step.
     pub(crate) fn set_timed(&mut self) {
         self.is_timed = true;
     }

@@ -34,7 +34,7 @@ pub struct PortSpec {
 /// Inputs of a component.
 #[derive(Clone, Copy, Debug)]
 pub enum Inputs {
-    /// These.
+    /// The listed ports.
     Ports(&'static [PortSpec]),
     /// One or more of this message, under names that the manifest chooses.
     Many(&'static Schema),
@@ -123,7 +123,7 @@ pub(crate) trait SampleSource {
     fn restored(&self, _port: usize) -> Option<&[u8]> {
         None
     }
-    /// The same of the process that shadows the publisher.
+    /// The CDR bytes of the sample of the process that shadows the publisher, if it was sent at this tick.
     fn fresh_shadow(&self, port: usize) -> Option<&[u8]>;
 }
 
@@ -313,7 +313,7 @@ impl<'a> AnyInputs<'a> {
         self.0.0.restored(input)
     }
 
-    /// The same of the process that shadows the publisher of the input.
+    /// The sample of the process that shadows the publisher of the input, as CDR bytes, if it was sent at this tick.
     #[must_use]
     pub fn fresh_shadow(&self, input: usize) -> Option<&'a [u8]> {
         self.0.0.fresh_shadow(input)

@@ -50,8 +50,8 @@ pub(crate) fn join() -> Result<PathBuf, BusError> {
 
 static IS_TERMINATED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
 
-/// From now on SIGTERM and SIGINT are noted and end the run at a tick boundary: a process that died at
-/// once would take the recording's end with it.
+/// Makes SIGTERM and SIGINT end the run at a tick boundary from now on: a process that died at once would take the
+/// recording's end with it.
 fn note_signals() {
     let flag = IS_TERMINATED.get_or_init(Arc::default);
     for signal in STOP_SIGNALS {
@@ -97,7 +97,7 @@ pub(crate) fn is_terminated() -> bool {
     !crate::hosted::is_hosted() && IS_TERMINATED.get().is_some_and(|flag| flag.load(Ordering::Relaxed))
 }
 
-/// Has the kernel kill this process when its launcher dies, even by `kill -9`.
+/// Makes the kernel kill this process when its launcher dies, even by `kill -9`.
 fn die_with_parent() {
     let _ = set_parent_process_death_signal(Some(Signal::KILL));
     // The launcher may have died before the line above; that signal would then never come.
@@ -146,7 +146,7 @@ pub fn stay_on(cpu: Option<usize>) {
     }
 }
 
-/// Has this process, when it is woken, wait its turn instead of interrupting the one that woke it.
+/// Makes this process, when it is woken, wait its turn instead of interrupting the one that woke it.
 ///
 /// On a core that the nodes of a loop share, an interrupted waker needs the core once more before it can
 /// sleep; measured, a tick of the hover run takes 4.0 context switches this way and 5.7 without.

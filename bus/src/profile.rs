@@ -28,15 +28,15 @@ const GRANT_WORDS: usize = 4;
 pub struct TickTimes<'a> {
     /// The tick.
     pub tick: u32,
-    /// When the node ended the computation before and began to wait; `None` for the first it noted.
+    /// Time at which the node ended the computation before and began to wait; `None` for the first it noted.
     pub began_ns: Option<u64>,
-    /// When it had its inputs.
+    /// Time at which it had its inputs.
     pub received_ns: u64,
-    /// When it had computed.
+    /// Time at which it had computed.
     pub done_ns: u64,
-    /// When its outputs were sent and the memory of the next ones was taken.
+    /// Time at which its outputs were sent and the memory of the next ones was taken.
     pub ended_ns: u64,
-    /// When each output was sent; 0 for one that was not due.
+    /// Time at which each output was sent; 0 for one that was not due.
     pub sent_ns: &'a [u64],
 }
 

@@ -9,7 +9,7 @@ use crate::schema::Schema;
 use crate::transport::{PORT_MARGIN_BYTES, samples_bytes};
 use std::path::Path;
 
-/// Below this much a SIGBUS is put down to a full /dev/shm.
+/// Free bytes below which a SIGBUS is attributed to a full /dev/shm.
 const FULL_BYTES: u64 = 256 << 10;
 
 /// The shared memory that the run of `plan` takes at least, and its largest file. It does not include the states that

@@ -14,13 +14,13 @@ pub(crate) struct SampleMemory {
 }
 
 impl SampleMemory {
-    /// No samples yet, to be written to ports of `schemas`.
+    /// An empty memory, to be written to ports of `schemas`.
     pub(crate) fn empty(schemas: impl Iterator<Item = &'static Schema>) -> Self {
         let sizes: Vec<usize> = schemas.map(|schema| schema.size).collect();
         Self { samples: vec![None; sizes.len()], sizes }
     }
 
-    /// These samples, to be read.
+    /// A memory with `samples`, to be read.
     pub(crate) fn given(samples: Vec<Option<Box<[u64]>>>) -> Self {
         Self { sizes: Vec::new(), samples }
     }

@@ -195,7 +195,7 @@ impl Extent {
         start..start + self.tail_bytes
     }
 
-    /// The same of `cdr`, a message behind the header of its encapsulation.
+    /// The bytes of `cdr` that count; `cdr` is a message behind the header of its encapsulation.
     #[must_use]
     pub fn of_cdr<'a>(&self, cdr: &'a [u8]) -> &'a [u8] {
         match cdr.split_at_checked(CDR_HEADER_BYTES) {

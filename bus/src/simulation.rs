@@ -25,9 +25,9 @@ use std::marker::PhantomData;
 /// processes has a launcher.
 pub struct Simulation {
     plan: Plan,
-    /// In the order in which they step: a reader of a sample of the same tick comes behind its publisher.
+    /// Members in the order in which they step: a reader of a sample of the same tick comes behind its publisher.
     members: Vec<Member>,
-    /// Samples by topic; absent where no member sends any.
+    /// Samples by topic; absent if no member sends any.
     samples: Vec<Option<LocalTopic>>,
     announcements: Vec<Option<Announcement>>,
     tick: u32,

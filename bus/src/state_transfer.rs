@@ -36,7 +36,7 @@ impl StateLayout {
         Some(Self { type_name: type_name.to_owned(), size, layout_hash })
     }
 
-    /// The same of a state that a checkpoint holds.
+    /// Layout of a state that a checkpoint holds; `None` if it holds none.
     pub(crate) fn saved(transfer: Transfer, size: usize, configuration: u64) -> Option<Self> {
         match transfer {
             Transfer::Growing(name) => {

@@ -39,7 +39,7 @@ pub(crate) enum Due {
 }
 
 impl Timing {
-    /// That of `node`, if its steps take time.
+    /// The timing of `node`, if its steps take time.
     pub(crate) fn of(plan: &Plan, node: &NodePlan) -> Option<Self> {
         let time = node.computing_time.clone()?;
         // No node has a space in its name: no other node has this stream.
@@ -114,7 +114,7 @@ impl Timing {
     }
 }
 
-/// Of the samples in `rest` those of `output`: the one that is sent, and the one that follows it.
+/// The two samples of `output` at the start of `rest`: the one that is sent, and the one that follows it.
 fn next_samples<'a>(rest: &mut &'a mut [u64], output: &OutPort) -> [&'a mut [u64]; 2] {
     let length = output.sample_words();
     let (both, behind) = std::mem::take(rest).split_at_mut(2 * length);

@@ -68,7 +68,7 @@ pub(crate) struct Transport {
     new_ports: RefCell<Vec<String>>,
 }
 
-/// Has iceoryx2 print errors only, in all of this process: for a program that is hummingbus's own.
+/// Makes iceoryx2 print errors only, in all of this process: for a program that is hummingbus's own.
 pub fn limit_transport_log() {
     set_log_level(LogLevel::Error);
 }

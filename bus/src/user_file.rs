@@ -12,7 +12,7 @@ use std::path::Path;
 /// The longest text that a run writes about itself; a longer one is from another writer.
 const TEXT_BYTES_MAX: u64 = 64 << 20;
 
-/// Not through a link, and without waiting for the other end of a pipe.
+/// Flags for opening: not through a link, and without waiting for the other end of a pipe.
 pub(crate) const FLAGS: i32 = libc::O_NOFOLLOW | libc::O_NONBLOCK | libc::O_NOCTTY;
 
 /// Opens the plain file of this user at `path`, to read it, and to write into it where `writes` is set.

@@ -115,7 +115,7 @@ impl<'a> Bytes<'a> {
 
 /// A part of a record's body.
 enum Part {
-    /// So many bytes.
+    /// A fixed number of bytes.
     Fixed(u64),
     /// A length in 32 bits and as many bytes: a text or a table of numbers.
     Long32,
@@ -358,7 +358,7 @@ fn linked(
     Ok(None)
 }
 
-/// So many bytes, and `ratio` for each byte of the file.
+/// The sum of `bytes`, and of `ratio` for each byte of the file.
 fn limit(source: &Source<'_>, bytes: u64, ratio: u64) -> u64 {
     bytes.saturating_add(ratio.saturating_mul(source.len() as u64))
 }

@@ -169,7 +169,7 @@ impl Place {
 /// Places of the leaves of one message, which are those of every message with the same lengths in it.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Layout {
-    /// By leaf; `None` for a string.
+    /// Place of each leaf; `None` for a string.
     pub(crate) places: Vec<Option<Place>>,
     /// Places of the lengths of strings and sequences, and these lengths.
     lengths: Vec<(Place, u32)>,

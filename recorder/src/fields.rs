@@ -47,7 +47,7 @@ struct Field {
 }
 
 impl TopicFields {
-    /// No field yet of `topic`, whose messages are as `announcement` says.
+    /// An empty set of fields of `topic`, whose messages are as in `announcement`.
     ///
     /// # Errors
     /// If its definition is not understood.
@@ -145,7 +145,7 @@ impl TopicFields {
 }
 
 impl Recording {
-    /// No field yet of `topic`, to be read from its messages.
+    /// An empty set of fields of `topic`, to be read from its messages.
     ///
     /// # Errors
     /// If there is no such topic; the error lists those there are.

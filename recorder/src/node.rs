@@ -79,7 +79,8 @@ struct Recording {
 #[derive(Debug)]
 struct Topic {
     channel: ChannelId,
-    /// That of the process that shadows the publisher: added with its first sample, whose tick is a function of the run.
+    /// Channel of the process that shadows the publisher: added with its first sample, whose tick is a function of
+    /// the run.
     shadow_channel: Option<ChannelId>,
     shadow_name: String,
     announcement: Announcement,

@@ -69,13 +69,13 @@ pub struct Recording {
 /// The bytes of a recording.
 #[derive(Debug)]
 enum Content {
-    /// Those of a file, read as they are needed.
+    /// Bytes of a file, read as they are needed.
     File {
         file: File,
         /// Bytes of the file when it was opened; bytes appended later do not belong to it.
         length: usize,
     },
-    /// Those that were read before.
+    /// Bytes that were read before.
     Read(Arc<[u8]>),
 }
 
@@ -266,7 +266,7 @@ impl Recording {
         self.whole(Messages::of(self.source()))
     }
 
-    /// These messages, as far as the recording is whole.
+    /// The messages, as far as the recording is whole.
     pub(crate) fn whole<'a>(
         &'a self,
         messages: Messages<'a>,

@@ -121,11 +121,11 @@ pub fn value<'a>(leaves: &'a [Leaf], field: &str) -> Option<(f64, &'a str)> {
 /// The numbers of a message of which a field is made, each a `P`: an index among its leaves, or a place in its bytes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Made<P> {
-    /// It is one of them.
+    /// The number itself.
     Number(P),
-    /// It is the angle of this number of a quaternion, in the order x, y, z, w.
+    /// The angle of this number of a quaternion, in the order x, y, z, w.
     Angle([P; 4], usize),
-    /// It is the component along this axis of the body of a velocity in the world.
+    /// The component along this axis of the body of a velocity in the world.
     AlongBody([P; 3], [P; 4], usize),
 }
 
@@ -168,7 +168,7 @@ impl<P> Made<P> {
         }
     }
 
-    /// The same made of other parts; `None` if one part has no other.
+    /// The parts converted by `other`; `None` if it gives none for one of them.
     pub(crate) fn map<Q: Copy>(&self, other: impl Fn(&P) -> Option<Q>) -> Option<Made<Q>> {
         Some(match self {
             Self::Number(one) => Made::Number(other(one)?),

@@ -32,7 +32,7 @@ pub struct RecordingWriter {
     path: PathBuf,
     /// Bytes of messages in the open chunk.
     chunk_bytes: usize,
-    /// By channel, the part of its messages that is written.
+    /// The part of a channel's messages that is written, by channel.
     extents: BTreeMap<u16, Extent>,
 }
 

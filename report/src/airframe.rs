@@ -43,13 +43,13 @@ pub enum Shape {
 /// Colour of a part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Paint {
-    /// As the frame.
+    /// The frame.
     Frame,
-    /// As the front.
+    /// The front.
     Front,
-    /// As a propeller that turns counter-clockwise, seen from above.
+    /// A propeller that turns counter-clockwise, seen from above.
     CounterClockwise,
-    /// As a propeller that turns clockwise, seen from above.
+    /// A propeller that turns clockwise, seen from above.
     Clockwise,
 }
 

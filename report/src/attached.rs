@@ -15,7 +15,7 @@ use vehicles::Vehicle;
 pub struct Attached {
     /// The manifest with its includes.
     manifest: Table,
-    /// The same file by file: the included ones first.
+    /// The manifest file by file: the included ones first.
     tables: Vec<Table>,
     /// Texts by file names.
     files: Vec<(String, String)>,

@@ -108,7 +108,7 @@ impl Sums {
     }
 }
 
-/// In four sums, added up in a fixed order: one alone would wait for itself at every sample.
+/// The scalar product in four sums, added up in a fixed order: a single sum would wait for itself at every sample.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 4];
     let (a_fours, b_fours) = (a.chunks_exact(4), b.chunks_exact(4));

@@ -104,7 +104,7 @@ pub struct Step {
     pub unit: String,
     /// The backup's first value minus its predecessor's last, without its sign.
     pub step: f64,
-    /// The same one sample earlier, between two samples of the predecessor.
+    /// The step one sample earlier, between two samples of the predecessor.
     pub step_before: f64,
     /// Difference between the backup's last shadow sample and its predecessor's sample of that tick, without its
     /// sign.
@@ -119,7 +119,7 @@ type Values = BTreeMap<(String, String), (String, Series)>;
 /// The ticks at which shadows joined, by topic.
 pub(crate) type Joins<'a> = BTreeMap<&'a str, Vec<u32>>;
 
-/// When the shadows of a run joined.
+/// Ticks at which the shadows of a run joined, by topic.
 pub(crate) fn joins<'a>(plan: &'a Plan, replacements: &[Replacement]) -> Joins<'a> {
     let mut joins = Joins::new();
     for report in replacements.iter().map(|replacement| &replacement.report) {

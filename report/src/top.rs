@@ -29,7 +29,7 @@ use std::time::{Duration, Instant};
 const REFRESH: Duration = Duration::from_millis(250);
 /// Looks over which rates, shares and percentiles are computed: about the last second.
 const LOOKS: usize = 5;
-/// The same for `--once`.
+/// Host time between the two looks of `--once`.
 const ONCE: Duration = Duration::from_millis(500);
 
 /// Looks at `run` for half a second.

@@ -13,9 +13,9 @@ use std::path::{Path, PathBuf};
 /// they are of a flight that it has left.
 #[derive(Default)]
 pub(crate) struct WrittenFiles {
-    /// Those of its plan that are still there.
+    /// Checkpoints of its plan that still exist.
     planned: RefCell<Vec<Written>>,
-    /// The requested ones.
+    /// Requested checkpoints.
     asked: RefCell<Vec<Written>>,
 }
 

@@ -18,7 +18,7 @@ enum Attempt {
     Locked(File),
     /// Another process holds it.
     Held,
-    /// It was removed or renamed before it was locked.
+    /// The file was removed or renamed before it was locked.
     Gone,
 }
 

@@ -152,8 +152,8 @@ fn own_files(folder: &Path) -> Vec<PathBuf> {
     entries.filter(is_own).map(|entry| entry.path()).collect()
 }
 
-/// This user's processes that carry a run directory, and whether they hold a file of it; except this one and those that
-/// see another /dev/shm.
+/// This user's processes that carry a run directory, each with a flag: true if it holds a file of that directory.
+/// This process and those that see another /dev/shm are left out.
 fn processes_of_runs() -> Result<Vec<(Pid, PathBuf, bool)>> {
     let (own_mounts, is_kin) = (mounts_of(Path::new("/proc/self")), kin_of_live_launchers());
     let entries = std::fs::read_dir("/proc")?.flatten();

@@ -41,9 +41,10 @@ use wiring::{Wiring, wire};
 
 /// Ticks that a fast node may be ahead of the slowest where the manifest does not say.
 const DEFAULT_WINDOW_TICKS: u32 = 64;
-/// The same with groups, which compute many ticks between two waits: measured, a composed hover is a quarter faster.
+/// Default window with groups, which compute many ticks between two waits: measured, a composed hover is a quarter
+/// faster.
 const GROUPS_WINDOW_TICKS: u32 = 512;
-/// More would only grow the queues: shared memory must hold the samples of a window.
+/// Largest window. A larger one would only grow the queues: shared memory must hold the samples of a window.
 pub const WINDOW_TICKS_MAX: u32 = 4096;
 const RATE_HZ_MAX: u32 = 1_000_000;
 

@@ -17,7 +17,7 @@ use std::time::Duration;
 /// Time that threads have to notice that they are to end.
 pub(crate) const GRACE: Duration = Duration::from_secs(2);
 const POLL: Duration = Duration::from_millis(1);
-/// As much as the main thread of a process has.
+/// Stack of a node's thread: as large as that of the main thread of a process.
 const STACK_BYTES: usize = 8 << 20;
 
 /// Host of the instances of a run's nodes.
@@ -45,8 +45,8 @@ pub enum Host {
 }
 
 impl Host {
-    /// This program's own binary, also after its file has been replaced: for programs that hand the arguments
-    /// `node KIND` to [`crate::node()`].
+    /// This program's own binary, even after its file has been replaced: for programs that pass the arguments `node
+    /// KIND` to [`crate::node()`].
     #[must_use]
     pub fn this_binary() -> Self {
         Self::Exe("/proc/self/exe".into())
@@ -101,7 +101,7 @@ pub(crate) fn panic_message(panic: &(dyn Any + Send)) -> &str {
 /// End of an instance.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum End {
-    /// It returned, as a process with this exit code.
+    /// Its code returned, as a process with this exit code.
     Exited(i32),
     /// A signal killed its process.
     Signalled(i32),
@@ -192,7 +192,7 @@ impl Thread {
         })
     }
 
-    /// Has it end at its next wait, which returns at once.
+    /// Ends it at its next wait, which returns at once.
     pub fn cancel(&self) {
         self.is_cancelled.store(true, Ordering::SeqCst);
         self.control.set_epoch(self.control.epoch());

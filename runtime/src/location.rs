@@ -57,7 +57,7 @@ pub enum Unlocated {
 pub struct Location {
     folder: Arc<OwnedFd>,
     name: OsString,
-    /// The same as a path without links.
+    /// The location as a path without links.
     pub path: PathBuf,
 }
 

@@ -83,7 +83,7 @@ impl Manifest {
         Self::parse(include::text(path)?, path, overrides, registry)
     }
 
-    /// The same for `text` that stands, or is to stand, at `path`.
+    /// Reads `text` as the manifest at `path`, which need not exist, as [`Manifest::load`] does.
     ///
     /// # Errors
     /// A [`Diagnostic`] that names the place.

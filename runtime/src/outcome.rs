@@ -18,10 +18,10 @@ pub struct Outcome {
     pub host_s: f64,
     /// Deadlines missed (paced runs).
     pub missed_deadlines: u32,
-    /// Per process: name, processor share of one core, deadlines at which it was late.
+    /// Name, processor share of one core, and deadlines at which it was late, for each process.
     pub processes: Vec<(String, f64, u32)>,
-    /// Per process whose steps take simulated time: name, steps that took longer than to its next due tick, and due ticks
-    /// without a step.
+    /// Name, overruns and skipped steps of each process whose steps take simulated time. An overrun is a step that
+    /// took longer than to the next due tick; a skipped step is a due tick without a step.
     pub overruns: Vec<(String, u32, u32)>,
     /// Results of backups.
     pub replacements: Vec<Report>,

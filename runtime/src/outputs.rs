@@ -58,7 +58,7 @@ pub struct Outputs {
     recording: Option<Output>,
     /// The recording's path without its ending, or that which it would have.
     pub(crate) stem: PathBuf,
-    /// In the order of their real paths, so that no two runs wait for each other.
+    /// The logs in the order of their real paths, so that no two runs wait for each other.
     logs: Vec<Output>,
     partial: Option<Partial>,
     claimed_logs: Vec<LogClaim>,

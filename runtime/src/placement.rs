@@ -68,7 +68,7 @@ pub fn place(plan: &mut Plan, clock_cpu: Option<usize>) {
     }
 }
 
-/// For each node the number of the feedback loop it is in: nodes that reach each other, delays included.
+/// Number of the feedback loop of each node, if it is in one: nodes that reach each other, delays included.
 fn feedback_loops(plan: &Plan) -> Vec<Option<usize>> {
     let count = plan.nodes.len();
     let mut reaches = vec![vec![false; count]; count];

@@ -13,7 +13,7 @@ const KEPT_BYTES: u64 = 16 * 1024 * 1024;
 const TAIL_BYTES: u64 = 64 * 1024;
 /// Lines that are shown.
 const LINES: usize = 20;
-/// The same if the line with the error stands above them: layouts of two messages are as long.
+/// Lines that are shown if the line with the error stands above them: layouts of two messages are as long.
 const ERROR_LINES: usize = 160;
 /// Characters of a line that are shown: a line without end fills neither memory nor terminal.
 const LINE_CHARS: usize = 600;

@@ -34,7 +34,7 @@ pub struct Process<B: Body> {
 /// The processes of a run; dropping them kills those that still live.
 #[derive(Debug)]
 pub struct Processes<B: Body> {
-    /// Those that were started and whose end is not settled.
+    /// Processes that were started and whose end is not settled.
     pub running: Vec<Process<B>>,
 }
 

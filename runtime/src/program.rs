@@ -40,14 +40,14 @@ pub enum OnExit {
     Ignore,
 }
 
-/// When a sidecar counts as ready: tick 0 waits for it.
+/// Condition for a sidecar to count as ready: tick 0 waits for it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Readiness {
     /// Once it was started.
     #[default]
     Started,
-    /// When it says so: it sends `READY=1` to the socket named by `NOTIFY_SOCKET`, as sd_notify(3) does.
+    /// The sidecar reports it: it sends `READY=1` to the socket named by `NOTIFY_SOCKET`, as sd_notify(3) does.
     Notify,
 }
 
@@ -68,7 +68,7 @@ pub struct Program {
     pub on_exit: OnExit,
     /// Longest time that the run may stand still because of it.
     pub watchdog: Duration,
-    /// When a sidecar counts as ready.
+    /// Condition for a sidecar to count as ready.
     pub ready: Readiness,
     /// File for its standard output and error; in the run directory where absent.
     pub log: Option<PathBuf>,

@@ -53,7 +53,7 @@ impl Registry {
         Self { components, programs: &[] }
     }
 
-    /// The same with `programs`.
+    /// This registry with `programs`.
     #[must_use]
     pub const fn with_programs(self, programs: &'static [NodeProgram]) -> Self {
         Self { programs, ..self }

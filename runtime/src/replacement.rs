@@ -37,7 +37,7 @@ pub(crate) enum Stage {
     Retiring,
 }
 
-/// When a backup joins.
+/// Tick at which a backup joins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Join {
     /// At this tick.
@@ -63,7 +63,7 @@ struct Backup {
     pending: Pending,
     generation: u32,
     stage: Stage,
-    /// When its process could begin to join, and when the present stage began, on the clock of the watchdogs.
+    /// Times on the watchdogs' clock: when its process could begin to join, and when the present stage began.
     started: Duration,
     stage_began: Duration,
     /// Host time at which its process was started, and since when the run waits for it: for the report.

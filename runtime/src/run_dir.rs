@@ -19,7 +19,7 @@ use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt, PermissionsE
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// More than any entry has: two paths and a few numbers.
+/// Largest size of an entry; more than any entry has: two paths and a few numbers.
 const ENTRY_BYTES_MAX: u64 = 64 << 10;
 
 /// Files that are kept open for the removal of a run directory: one for each folder in a folder, and one for a list.
@@ -107,7 +107,8 @@ pub(crate) struct RunDir {
     entry: Entry,
     /// The entry and the directory, locked until the process ends.
     _locks: [File; 2],
-    /// Kept open so that there is a descriptor for listing the remains, however many files this process may open.
+    /// Files kept open so that there is a descriptor for listing the remains, however many files this process may
+    /// open.
     spare: Vec<File>,
     is_removed: bool,
 }
@@ -121,7 +122,8 @@ impl RunDir {
         Self::create_by(manifest, Entry::new)
     }
 
-    /// The same of a run that goes on under its old name, `run_id`, after all of it was removed.
+    /// Registers a run that goes on under its old name, `run_id`, after its files were removed; creates its
+    /// directory.
     ///
     /// # Errors
     /// As [`RunDir::create`].

@@ -22,7 +22,7 @@ struct Sidecar<'a, B: Body> {
     is_ready: bool,
     /// True if the first tick need not wait for it any more.
     was_ready: bool,
-    /// When its process was started, on the watchdogs' clock.
+    /// Time at which its process was started, on the watchdogs' clock.
     started: Duration,
 }
 
@@ -42,7 +42,7 @@ pub struct Failure {
 }
 
 impl<'a, B: Body> Sidecars<'a, B> {
-    /// No sidecars yet.
+    /// An empty set of sidecars.
     pub fn new() -> Self {
         Self { all: Vec::new() }
     }

@@ -56,7 +56,7 @@ pub struct Supervisor<'a, W: World> {
     // After the processes, which end first.
     world: W,
     clock: WatchClock,
-    /// Per node: processor time in nanoseconds, and deadlines missed, of the instances that have left.
+    /// Processor time in nanoseconds, and deadlines missed, of each node's instances that have left.
     spent: Vec<Spent>,
     /// Swaps that were requested and have not ended: the request, and the place of its answer.
     swaps: Vec<(u32, W::Reply)>,

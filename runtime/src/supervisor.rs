@@ -21,7 +21,7 @@ pub enum State {
     Failed,
 }
 
-/// Something that happened.
+/// Event of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
     /// Every process was started.

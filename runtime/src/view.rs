@@ -69,7 +69,7 @@ pub enum SegmentWrite {
     RequestStop,
     /// End the run at once: every wait returns, but those of nodes without outputs.
     Abort,
-    /// Those that send have left: every wait returns.
+    /// The senders have left: every wait returns.
     Drained,
 }
 
@@ -131,7 +131,7 @@ pub struct View {
     pub is_aborted: bool,
     /// The number of the newest membership.
     pub epoch: u32,
-    /// Per topic: ticks whose sample has been sent.
+    /// Ticks whose sample has been sent, by topic.
     pub sent: Vec<u32>,
     /// The slots.
     pub slots: Vec<SlotView>,

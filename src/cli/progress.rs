@@ -33,7 +33,7 @@ pub fn show(bar: &ProgressBar, event: RunEvent<'_>) {
     }
 }
 
-/// Leaves the bar standing.
+/// Leaves the bar on the terminal.
 pub fn finish(bar: &ProgressBar) {
     bar.abandon();
     if !bar.is_hidden() {

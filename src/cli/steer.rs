@@ -115,7 +115,7 @@ pub struct SwapArguments {
     json: bool,
 }
 
-/// Has a live run replace one of its processes, and prints the result.
+/// Makes a live run replace one of its processes, and prints the result.
 ///
 /// # Errors
 /// If there is no such run, the backup's description is not TOML, or the run refuses.

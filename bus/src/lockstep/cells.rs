@@ -154,7 +154,8 @@ cells! {
 /// Number at the start of a segment of this layout: processes of different versions do not fly together.
 pub(super) const MAGIC: u32 = number_of(DECLARATIONS) ^ VERSION;
 
-/// To be raised when the queues or the meaning of a word change, and the declarations above do not.
+/// Part of the number. It must be raised when the queues or the meaning of a word change, and the declarations above
+/// do not.
 const VERSION: u32 = 0;
 
 /// The Fowler-Noll-Vo hash of `text`.

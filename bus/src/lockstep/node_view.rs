@@ -140,27 +140,28 @@ impl NodeView {
         wait_for_count(&self.segment, sequence, count, waiter, wait, is_over)
     }
 
-    /// The ticks before `count` have their samples of `topic`: `readers` wait for them, inputs among those of all slots.
+    /// Reports that the ticks before `count` have their samples of `topic`: `readers` wait for them, inputs among
+    /// those of all slots.
     pub(crate) fn samples_sent(&self, topic: usize, count: u32, readers: &[usize]) {
         let inputs = self.segment.inputs();
         let waiters = readers.iter().map(|&input| &inputs[input].samples.word);
         wake::advance(&self.segment.topics()[topic].sent, count, waiters);
     }
 
-    /// The same of shadow samples.
+    /// Reports shadow samples in the same way.
     pub(crate) fn shadow_sent(&self, topic: usize, count: u32, readers: &[usize]) {
         let inputs = self.segment.inputs();
         let waiters = readers.iter().map(|&input| &inputs[input].shadow.word);
         wake::advance(&self.segment.topics()[topic].shadow.word, count, waiters);
     }
 
-    /// This process has published the state at the start of the ticks before `count`.
+    /// Reports that this process has published the state at the start of the ticks before `count`.
     pub(crate) fn state_published(&self, count: u32) {
         let slots = self.segment.slots();
         wake::advance(&slots[self.slot].published, count, [&slots[self.other_slot].other_waiter.word]);
     }
 
-    /// This process has completed the ticks before `count`.
+    /// Reports that this process has completed the ticks before `count`.
     pub(crate) fn completed(&self, count: u32) {
         let slots = self.segment.slots();
         let waiters = [&slots[self.slot].done_waiter.word, &slots[self.other_slot].other_waiter.word];

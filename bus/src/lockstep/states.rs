@@ -41,7 +41,7 @@ pub enum SlotState {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum TransferOutcome {
-    /// Nothing is known yet.
+    /// The outcome is not known yet.
     Unknown = 0,
     /// The state of its predecessor: both know the same type.
     State = 1,

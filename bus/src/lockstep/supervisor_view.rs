@@ -86,14 +86,13 @@ impl SupervisorView {
         self.segment.request_stop();
     }
 
-    /// Has the clock wait at the boundary before `tick`, or where it is if it has come further; `u32::MAX`
-    /// lets it run.
+    /// Makes the clock wait at the boundary before `tick`, or at its own if that is later; `u32::MAX` lets it run.
     pub fn set_hold_tick(&self, tick: u32) {
         let steering = &self.segment.head().steering;
         wake::ask_for_hold(&steering.hold_tick, tick, &steering.changes);
     }
 
-    /// The same where a process joins.
+    /// Makes the clock wait in the same way for a process that joins.
     pub fn set_join_tick(&self, tick: u32) {
         let steering = &self.segment.head().steering;
         if steering.join_tick.load(Relaxed) != tick {
@@ -144,12 +143,12 @@ impl SupervisorView {
         cell.cpu_ns.store(0, Relaxed);
     }
 
-    /// Has the process in a slot begin at `tick`.
+    /// Makes the process in a slot begin at `tick`.
     pub fn set_first_tick(&self, slot: usize, tick: u32) {
         self.segment.slots()[slot].done.store(tick, Release);
     }
 
-    /// Has the shadow samples of `topic` begin at `tick`.
+    /// Makes the shadow samples of `topic` begin at `tick`.
     pub fn start_shadow(&self, topic: usize, tick: u32) {
         self.segment.topics()[topic].shadow.word.store(tick, Release);
     }

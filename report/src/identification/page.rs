@@ -126,7 +126,7 @@ fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }
 
-/// Up to `points` of so many samples, evenly.
+/// Indices of up to `points` of `count` samples, evenly spaced.
 fn evenly(count: usize, points: usize) -> Vec<usize> {
     (0..count).step_by(count.div_ceil(points).max(1)).collect()
 }

@@ -19,7 +19,7 @@ pub struct Condition {
     minus: Option<Signal>,
     reference: Option<Signal>,
     gate: Option<Signal>,
-    /// From the unit of the statistic to that of the limits; known from the first sample on.
+    /// Factor from the unit of the statistic to that of the limits; known from the first sample on.
     factor: Option<f64>,
     samples: Samples,
     pairs: Pairs,
@@ -80,7 +80,7 @@ impl Condition {
         }
     }
 
-    /// Everything that it keeps of the samples so far.
+    /// The samples and figures kept so far.
     pub fn kept(&self) -> KeptSamples {
         let Self { pass, factor, samples, pairs, lost_ns, .. } = self;
         let (name, pairs) = (pass.name.clone(), pairs.clone());
@@ -154,7 +154,7 @@ impl Condition {
         }
     }
 
-    /// From the unit of the statistic of a field in `field_unit` to that of the limits.
+    /// Factor from the unit of the statistic of a field in `field_unit` to that of the limits.
     fn factor(&self, field_unit: &str) -> Result<f64> {
         let PassCondition { name, statistic, unit, .. } = &self.pass;
         diagnostics::convert(statistic.unit(field_unit), unit).map_err(|error| anyhow!("`{name}`: {error}"))

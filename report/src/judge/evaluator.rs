@@ -100,7 +100,7 @@ impl Evaluator {
         self.signals.hold(topic, cdr)
     }
 
-    /// Everything that it keeps of the samples so far, but the newest of each topic.
+    /// The samples and figures kept so far, without the newest sample of each topic.
     #[must_use]
     pub fn save(&self) -> Vec<u8> {
         let conditions = self.pass.iter().chain(&self.measures).map(Condition::kept).collect();

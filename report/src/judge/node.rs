@@ -47,7 +47,7 @@ const NAME: &str = "Judge";
 #[derive(Debug)]
 struct Judging {
     evaluator: Evaluator,
-    /// By input, the number of its topic in the evaluator.
+    /// Number of its topic in the evaluator, by input.
     topics: Vec<Option<usize>>,
     /// True before the first step after a checkpoint, whose samples are still to be read.
     is_restored: bool,

@@ -35,7 +35,7 @@ pub const fn px(pixels: u32) -> u32 {
     pixels * UNITS_PER_PIXEL
 }
 
-/// The same for a place.
+/// Units for `pixels`, as a coordinate.
 #[allow(clippy::cast_possible_wrap, reason = "a picture is far smaller than 2^31 units")]
 pub const fn at(pixels: u32) -> i32 {
     px(pixels) as i32
@@ -65,7 +65,7 @@ impl Look {
         Self { colour, width, is_dashed: line.role == Role::Asked }
     }
 
-    /// As plotters wants it.
+    /// The style of the line for plotters.
     pub fn style(self) -> ShapeStyle {
         self.colour.stroke_width(self.width)
     }
@@ -120,7 +120,7 @@ pub struct Flat<'a> {
     pub title: &'a str,
     /// Labels of the axes across and up; the first is drawn only where it has room.
     pub names: [String; 2],
-    /// Their ends.
+    /// Ends of the axes.
     pub ranges: [Range<f64>; 2],
     /// Numbers of labels along them.
     pub labels: [usize; 2],

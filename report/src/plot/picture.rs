@@ -29,7 +29,7 @@ const LETTER_WIDTH: u32 = 7;
 const TITLE_SIZE: u32 = 18;
 /// Comment of an SVG picture that names its writer.
 pub const SVG_MARK: &str = "<!-- Written by hummingbus plot -->";
-/// The same in a PNG picture: a chunk "tEXt" with its length and CRC-32 (PNG specification, 11.3.3.3) behind the
+/// Mark of a PNG picture: a chunk "tEXt" with its length and CRC-32 (PNG specification, 11.3.3.3) behind the
 /// signature and the chunk "IHDR".
 pub const PNG_MARK: &[u8; 31] = b"\0\0\0\x13tEXtSoftware\0hummingbus\x9d\xd2\xdf\x05";
 const PNG_HEAD_BYTES: usize = 8 + 25;
@@ -150,7 +150,7 @@ fn legend_width(drawing: &Drawing, axes: &[Axes], views: &[View]) -> u32 {
     (longest * LETTER_WIDTH + 52).clamp(130, WIDTH / 2)
 }
 
-/// As many points as a picture shows: a page has more, to zoom into.
+/// The points, reduced to the number that a picture shows: a page has more, to zoom into.
 fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let mut curve = thin::Curve::new(BINS);
     points.iter().for_each(|(time_s, value)| curve.push(*time_s, *value));

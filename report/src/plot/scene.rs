@@ -101,7 +101,7 @@ impl Solid {
         Self { name: mesh.name.clone(), corners, faces, edges: mesh.edges(), is_box: false }
     }
 
-    /// The same along the axes of a body, from its centre of mass.
+    /// The solid along the axes of a body, from its centre of mass.
     fn seen_from(mut self, pose: &BodyPose) -> Self {
         let seen = |corner: &[f64; 3]| -> [f64; 3] {
             pose.attitude_W.inverse_transform_vector(&(Vector3::from(*corner) - pose.position_W_m)).into()

@@ -123,7 +123,7 @@ impl<const N: usize> Trail<N> {
         Self { points: Vec::new(), last: None, points_max, every: 1, samples: 0, body: None }
     }
 
-    /// The same for a free body of this name.
+    /// This path for a free body of this name.
     pub fn of_body(self, name: String) -> Self {
         Self { body: Some(name), ..self }
     }

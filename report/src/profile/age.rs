@@ -11,9 +11,9 @@ pub struct Age {
     pub source: String,
     /// The topic that closes a feedback loop.
     pub command: String,
-    /// From the stamp of the oldest sample that goes into a command to the command's own.
+    /// Simulated time from the stamp of the oldest sample that goes into a command to the command's own.
     pub simulated: Times,
-    /// From the sending of that sample to the sending of the command.
+    /// Host time from the sending of that sample to the sending of the command.
     pub host: Times,
 }
 

@@ -11,13 +11,13 @@ use std::collections::BTreeMap;
 pub struct NodeLatency {
     /// The node.
     pub name: String,
-    /// From the end of the computation before until the last thing it needs was there; 0 where it was already.
+    /// Time from the end of the computation before until the last need was met; 0 if it was met already.
     pub wait: Times,
-    /// From then until it had its inputs; only ticks at which it waited.
+    /// Time from then until it had its inputs; only ticks at which it waited.
     pub wake_up: Times,
-    /// From having its inputs to having computed.
+    /// Time from having its inputs to having computed.
     pub compute: Times,
-    /// From then until its outputs were sent and the memory of the next ones was taken.
+    /// Time from then until its outputs were sent and the memory of the next ones was taken.
     pub publish: Times,
 }
 
@@ -28,7 +28,7 @@ pub struct Transport {
     pub topic: String,
     /// The node that reads it.
     pub reader: String,
-    /// From being sent to being taken, where the reader waited for this sample last.
+    /// Time from sending to taking a sample, for ticks at which the reader waited for this sample last.
     pub transport: Times,
 }
 

@@ -8,7 +8,7 @@ use serde::Serialize;
 /// Deadlines of a paced run: jitter of the clock, missed deadlines, and overruns of the nodes.
 #[derive(Debug, Serialize)]
 pub struct Pacing {
-    /// From a deadline to its grant.
+    /// Time from a deadline to its grant.
     pub jitter: Times,
     /// Grants that came after the next deadline.
     pub late_grants: u64,

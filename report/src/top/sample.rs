@@ -31,7 +31,7 @@ pub struct Sample {
     at_ns: u64,
     /// The run; values that need two looks, such as rates, are missing.
     view: View,
-    /// By process: processor time in ticks of the kernel, `None` where the process is gone, and the times of the steps.
+    /// Processor time in ticks of the kernel, `None` if the process is gone, and times of the steps, by process.
     used: Vec<(Option<u64>, Option<StepTimes>)>,
 }
 

@@ -13,7 +13,7 @@ use serde::Deserialize;
 const BINS_MAX: usize = 8192;
 /// Windows over more blocks are answered by the overview: a minute of a recording of ours, which has a block a second.
 const BLOCKS_MAX: usize = 64;
-/// The same while the recording grows: pages ask for the whole time at each growth.
+/// The limit while the recording grows: pages request the whole time at each growth.
 const GROWING_BLOCKS_MAX: usize = 8;
 
 /// A request of curves.

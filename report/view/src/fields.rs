@@ -98,7 +98,7 @@ impl Listed {
     }
 }
 
-/// The same fields with the angles of each quaternion behind it.
+/// The fields with the angles of each quaternion behind it.
 fn with_angles(fields: Vec<Field>) -> Vec<Field> {
     let quaternion = |field: &Field| {
         let whole = field.path.strip_suffix(".w")?.to_owned();

@@ -56,7 +56,7 @@ impl Gate {
         format!("http://127.0.0.1:{}/{PREFIX}{}/", self.port, self.token)
     }
 
-    /// Lets in a request for `path` with this header `Host`; or says why not.
+    /// Lets in a request for `path` with this header `Host`, or refuses it.
     ///
     /// # Errors
     /// The reason.

@@ -54,7 +54,7 @@ impl Overview {
         Self::with_budget(fields, BYTES_MAX)
     }
 
-    /// The same with bins that take this many bytes, unless that is fewer than the least number of bins.
+    /// The overview with bins that take this many bytes, unless that is fewer than the least number of bins.
     pub(crate) fn with_budget(fields: &BTreeMap<String, Vec<Field>>, bytes: usize) -> Self {
         let overview = Self { budget_bytes: bytes, state: Mutex::default() };
         overview.add_fields(fields);

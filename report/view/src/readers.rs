@@ -9,7 +9,7 @@ use tokio::task::{JoinError, spawn_blocking};
 pub struct Readers(Arc<Semaphore>);
 
 impl Readers {
-    /// As many as `count` at the same time.
+    /// Allows up to `count` readers at the same time.
     pub fn new(count: usize) -> Self {
         Self(Arc::new(Semaphore::new(count)))
     }

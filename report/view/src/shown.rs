@@ -31,7 +31,7 @@ impl Shown {
         Ok(Self { recording, index, span_ns })
     }
 
-    /// The same with all that its writer has added since; `None` where that is nothing.
+    /// The recording with everything that its writer has added since; `None` if it has not grown.
     ///
     /// # Errors
     /// If the file cannot be read.

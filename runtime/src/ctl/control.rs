@@ -29,17 +29,17 @@ pub struct ControlServer<'a> {
 }
 
 enum Goal {
-    /// To be held.
+    /// The run is to be held.
     Pause,
-    /// To be held, then to be let go for this many ticks.
+    /// The run is to be held, then let go for this many ticks.
     PauseToStep(u32),
-    /// To be held again at the boundary before `target`, `ticks` after it was let go.
+    /// The run is to be held again at the boundary before `target`, `ticks` after it was let go.
     Step { ticks: u32, target: u32 },
-    /// To be held, for a checkpoint; the hold before was `hold_tick`.
+    /// The run is to be held, for a checkpoint; the hold before was `hold_tick`.
     PauseToSave { path: Option<PathBuf>, hold_tick: u32 },
-    /// To have the parts of the checkpoint of `tick`.
+    /// The parts of the checkpoint of `tick` are to be written.
     Save { path: Option<PathBuf>, tick: u32 },
-    /// To be held at `to_tick`, from whose checkpoint the run starts again.
+    /// The run is to be held at `to_tick`, from whose checkpoint it starts again.
     Rewind { from_tick: u32, to_tick: u32 },
 }
 

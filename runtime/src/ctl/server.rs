@@ -14,11 +14,11 @@ use std::time::Duration;
 
 /// Longest time for which a client that does not read may block the launcher.
 const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
-/// Between two attempts to let a client in.
+/// Time between two attempts to let a client in.
 const PAUSE: Duration = Duration::from_millis(100);
 /// Requests of one client that may wait for their answers; its next ones are not read before.
 const MAX_WAITING: usize = 64;
-/// Between two looks whether a client has fewer of them.
+/// Time between two checks whether a client has fewer of them.
 const WAIT: Duration = Duration::from_millis(1);
 
 /// The open socket of a run; dropping it closes it, and ends the threads that serve it.
@@ -148,7 +148,7 @@ impl Listener {
         self.is_closed.load(Ordering::SeqCst)
     }
 
-    /// Lets clients in until the socket is closed, and then has those that are there leave.
+    /// Lets clients in until the socket is closed, and then disconnects the present ones.
     fn serve(self: &Arc<Self>, remote: &Remote) {
         let mut clients: Vec<Client> = Vec::new();
         for stream in self.socket.incoming() {

@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use toml::Spanned;
 
-/// More swaps of one kind than any run has use for.
+/// Largest number of swaps of one kind, beyond the use of any run.
 const REPEAT_MAX: u32 = 100_000;
 /// Ticks between a take-over and the next joining, beside two of the longest periods: until then the process
 /// before has left.
@@ -198,7 +198,7 @@ impl Run<'_> {
         Err(self.manifest.problem(span, message, help))
     }
 
-    /// When a swap's backups join and take over.
+    /// Ticks at which a swap's backups join and take over.
     fn times(&self, node: usize, swap: &Spanned<SwapSetting>) -> Result<Vec<(u32, u32)>, Diagnostic> {
         let setting = swap.get_ref();
         let (at_tick, span) = self.at_tick(swap)?;

@@ -8,9 +8,9 @@ use diagnostics::Diagnostic;
 
 /// Topics and nodes, wired to each other.
 pub struct Wiring {
-    /// In the order of their publishers.
+    /// The topics, in the order of their publishers.
     pub topics: Vec<TopicPlan>,
-    /// In the order of the declared_nodes.
+    /// The nodes, in the order of the declared nodes.
     pub nodes: Vec<NodePlan>,
 }
 

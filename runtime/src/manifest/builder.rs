@@ -64,7 +64,7 @@ impl ManifestBuilder {
     }
 }
 
-/// As TOML.
+/// The manifest as TOML.
 impl std::fmt::Display for ManifestBuilder {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         self.0.fmt(f)

@@ -175,7 +175,7 @@ pub struct Process {
     pub on_exit: Option<Spanned<OnExit>>,
     /// The process that stands by for it, whole.
     pub standby: Option<Spanned<Box<Process>>>,
-    /// When a sidecar counts as ready.
+    /// Condition for a sidecar to count as ready.
     pub ready: Option<Spanned<Readiness>>,
     /// Longest time that the run may stand still because of it, in milliseconds of host time.
     pub watchdog_ms_host: Option<Spanned<u64>>,
@@ -200,7 +200,7 @@ pub struct Process {
 pub enum ComputingTimeSetting {
     /// Always the same.
     Constant {
-        /// That time, ms.
+        /// The time, ms.
         ms: f64,
     },
     /// Evenly between two times.
@@ -217,7 +217,7 @@ pub enum ComputingTimeSetting {
         /// Standard deviation of the natural logarithm.
         sigma: f64,
     },
-    /// As in a file: the output of `profile --json`, or times in µs.
+    /// The distribution in a file: the output of `profile --json`, or times in µs.
     Measured {
         /// The file, relative to the manifest.
         file: String,
@@ -423,7 +423,7 @@ pub struct PassCondition {
     pub from_s: f64,
     /// End of the span, itself included; the end of the run where absent.
     pub to_s: Option<f64>,
-    /// Only samples while another signal is within limits.
+    /// Condition on another signal: only samples while it is within limits count.
     #[serde(rename = "while")]
     pub gate: Option<Gate>,
     /// Statistic that is compared with the limits.
@@ -507,9 +507,9 @@ pub struct Comparison {
     pub window_s: f64,
     /// Upper limit of the RMS position error; no limit where absent.
     pub max_position_m: Option<f64>,
-    /// The same for velocity.
+    /// Upper limit of the RMS velocity error; no limit where absent.
     pub max_velocity_m_s: Option<f64>,
-    /// The same for attitude.
+    /// Upper limit of the RMS attitude error; no limit where absent.
     pub max_attitude_deg: Option<f64>,
 }
 
@@ -521,7 +521,7 @@ pub struct SwapSetting {
     pub process: Spanned<String>,
     /// The tick at which it takes over.
     pub at_tick: Option<Spanned<u32>>,
-    /// The same as simulated time.
+    /// The tick as simulated time.
     pub at_s: Option<Spanned<f64>>,
     /// Number of ticks that it computes beside the process before.
     #[serde(default = "default_shadow_ticks")]

@@ -1,4 +1,5 @@
-//! No number of a manifest is infinite or none: found where it stands, before anything makes a `null` of it.
+//! Check that every number of a manifest is finite: a fault is found at its place, before the number becomes a
+//! `null`.
 
 use super::sources::Sources;
 use diagnostics::Diagnostic;

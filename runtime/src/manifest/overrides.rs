@@ -8,7 +8,7 @@ use std::borrow::Cow;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// No key of a manifest lies as deep.
+/// Greatest depth of a key; no key of a manifest lies as deep.
 const DEPTH_MAX: usize = 32;
 
 /// A value and the path of keys at which it belongs.

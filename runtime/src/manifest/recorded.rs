@@ -27,7 +27,7 @@ const HOST_ONLY_KEYS: [&str; 10] = [
     "start_order_seed",
     "window_ticks",
 ];
-/// The same for keys of a process.
+/// Keys of a process that change only its speed or its host.
 const HOST_ONLY_PROCESS_KEYS: [&str; 8] = [
     "cpu",
     "environment",

@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 use toml::Spanned;
 use toml::de::{DeString, DeTable, DeValue};
 
-/// More would not fit on a machine, let alone on a page of `check`.
+/// Largest number of vehicles of a set. More would not fit on a machine, let alone on a page of `check`.
 const COUNT_MAX: u32 = 256;
 
 /// `[[vehicle]]`.

@@ -151,7 +151,7 @@ impl Sources {
         Ok(self.folder(written.span().start).join(expanded))
     }
 
-    /// The same, from the root on; the processes of a run are given it as text.
+    /// The path from the root on; the processes of a run get it as text.
     pub fn resolve(&self, written: &Spanned<String>) -> Result<PathBuf, Diagnostic> {
         let path = self.path(written)?;
         let path = std::path::absolute(&path).unwrap_or(path);
