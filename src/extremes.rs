@@ -106,9 +106,9 @@ enum Outcome {
     Refused,
 }
 
-/// Puts every extreme at every `stride`-th place of the file `file` of `folder` for a number and has `check` look at
-/// it; no case is a panic, every refusal has words, and no number that is none is accepted. Returns how many were
-/// accepted and refused.
+/// Tries every `stride`-th case, an extreme in the place of a number of the file `file` of `folder`, with `check`. No
+/// case panics, every refusal has a place, and no number that is not finite is accepted. Returns the counts of
+/// accepted and refused cases.
 fn try_all(
     folder: &Folder,
     file: &str,

@@ -1,7 +1,7 @@
 //! Set points that a person requests while a run flies, on their way from a page to the node that sends them.
 //!
 //! A file of the run directory holds the newest ones, and the host time at which they were written. It is as long as one
-//! entry; a sum over the entry tells a reader that it has read half of one and half of the next.
+//! entry; a sum over the entry lets a reader detect that it has read half of one and half of the next.
 
 use crate::host_time::monotonic_ns;
 use crate::hosted;

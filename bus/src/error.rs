@@ -250,7 +250,7 @@ pub enum BusError {
         /// The tick.
         tick: u32,
     },
-    /// A node wrote a sample that holds a number that is none.
+    /// A node wrote a sample with a number that is not finite.
     #[error(
         "node `{node}` failed at tick {tick} (t = {time_s:.3} s): its output {output} holds {field} = {value}, \
          expected a finite number; the sample was not sent. What the node read last, and its own numbers \

@@ -178,7 +178,7 @@ impl InPort {
         let input = InputPlan { port, topic: output.topic, delay_ticks: 1, initial };
         let mut port = Self::new(&input, topic, announcement, None, Feed::Local { generation: 0 });
         if let Some(sample) = sample {
-            // A sample of another layout is none of the node's.
+            // A sample of another layout is not one of the node's.
             let _ = port.restore(sample, "");
         }
         port

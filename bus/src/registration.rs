@@ -11,7 +11,7 @@ use diagnostics::ParameterError;
 use inputs::InputFiles;
 use serde_json::Value;
 
-/// A component in a table of components: all that a launcher must know of it.
+/// A component in a table of components, with everything that a launcher must know about it.
 #[derive(Clone, Copy, Debug)]
 pub struct Registration {
     /// Name in manifests.

@@ -501,7 +501,7 @@ mod tests {
                 data.len()
             );
         }
-        // What is asked for before is neither more than is taken nor far from it.
+        // The estimate before is neither more than the memory taken nor far from it.
         let largest = files.iter().map(|(_, data)| data.len()).max().unwrap();
         let asked = super::samples_bytes(1000, capacity);
         assert!(largest > asked && largest < asked + asked / 4, "asked for {asked} bytes, took {largest}");

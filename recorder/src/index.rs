@@ -75,8 +75,8 @@ impl Index {
         Self { blocks, reached_ns, channels: recording.channels().clone() }
     }
 
-    /// The recording that this is the index of, and its index, with all that its writer has added since; `None` where that
-    /// is nothing, or the writer has finished.
+    /// The indexed recording, and its index, with everything that its writer has added since; `None` if nothing was
+    /// added, or the writer has finished.
     ///
     /// ```
     /// # use bus::{Message, announcement::Announcement, messages::SetPoint};

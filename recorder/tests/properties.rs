@@ -19,7 +19,7 @@ use std::sync::LazyLock;
 
 const SCHEMAS: [&Schema; 5] =
     [BodyTransform::SCHEMA, Imu::SCHEMA, MotorCommand::SCHEMA, PlantState::SCHEMA, PoseStamped::SCHEMA];
-/// Bytes that may be held while a file of a few kilobytes is read, whatever lengths it states: its chunks, its
+/// Bytes that may be held while a file of a few kilobytes is read, for any lengths that it states: its chunks, its
 /// messages and the comparison with another. A claim of 4 GiB, or of a chunk of 256 MiB, is far beyond.
 const HELD_BYTES_MAX: isize = 2 << 20;
 

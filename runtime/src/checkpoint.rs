@@ -192,7 +192,7 @@ impl Checkpoint {
         fork::require_effective(before, &manifest, self.tick()).map(|()| manifest)
     }
 
-    /// SHA-256 of all that it holds.
+    /// SHA-256 of its content.
     ///
     /// # Panics
     /// Never: its types serialise.

@@ -84,11 +84,11 @@ impl Writer<'_> {
         Ok(Some(path))
     }
 
-    /// The checkpoint in `file`, or that of `tick` which this run has written, or the newest of it before tick `now`, to which
-    /// the run has come; with the graph that goes on from it.
+    /// The checkpoint in `file`, or that of `tick` which this run has written, or its newest one before tick `now`,
+    /// which the run has reached; with the graph that goes on from it.
     ///
     /// # Errors
-    /// If there is none, it is one of another run, it lies ahead, or nothing can go on from it.
+    /// If there is none, it belongs to another run, it lies ahead, or no run can go on from it.
     pub(crate) fn find(
         &self,
         tick: Option<u32>,

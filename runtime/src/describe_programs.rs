@@ -78,7 +78,7 @@ pub fn check_programs(manifest: &Manifest, graph: &Graph, exe: &Path) -> Result<
     Ok(warnings)
 }
 
-/// Shared memory that a program of an older version may leave, which joins a run although there is none.
+/// Shared memory that a program of an older version may leave: such a program joins as if there were a run.
 struct SharedMemory<'p>(&'p str);
 
 impl Drop for SharedMemory<'_> {

@@ -80,8 +80,8 @@ impl<B: Body> Processes<B> {
         self.running.retain(|process| process.role != role || process.end.is_none());
     }
 
-    /// Aborts the run and gives the processes time to leave: first those that send, then those of `readers`, the nodes
-    /// that only read and so record all that was sent.
+    /// Aborts the run and gives the processes time to leave: first the senders, then those of `readers`, the nodes
+    /// that only read and so record the last samples.
     pub fn take_down(&mut self, world: &mut impl World, readers: &[usize]) -> Result<()> {
         let reads = |role: Role| matches!(role, Role::Node { node, .. } if readers.contains(&node));
         world.write(SegmentWrite::Abort);

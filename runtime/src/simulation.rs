@@ -8,14 +8,14 @@
 //!
 //! After a drawn number of steps no more faults occur, and the run must end. The rules that are checked on the way:
 //! - One instance writes each sample that counts, and no tick is skipped.
-//! - Whoever sends to an instance that joins knows it; no sample that it needs is lost.
+//! - A publisher knows an instance that joins; no sample that the instance needs is lost.
 //! - Memberships change one at a time; no slot is cleared while a process is in it.
-//! - A stop that was asked for takes effect, and a swap that was reported took place.
+//! - A requested stop takes effect, and a swap that was reported took place.
 //! - A watchdog expires only where a process hangs; a run is aborted only after a fault that may end it.
 //! - No process outlives the supervisor.
 //!
-//! A seed that fails is flown again with a log, and the command that repeats it is printed. `SIMULATED_RUNS` says how
-//! many seeds are flown, and `SIMULATED_SEED` with which they begin.
+//! A seed that fails is flown again with a log, and the command that repeats it is printed. `SIMULATED_RUNS` is the
+//! number of seeds, and `SIMULATED_SEED` the first of them.
 
 mod clock;
 mod fault;

@@ -45,7 +45,7 @@ impl Component for First {
     }
 }
 
-/// Adds 100 to what its predecessor sent last, then 1000 a tick; its state is no state of `First`.
+/// Adds 100 to its predecessor's last output, then 1000 a tick; its state is not a state of `First`.
 struct Second;
 impl Component for Second {
     const INFO: Info = Info::new("second", "goes on from what its predecessor sent");

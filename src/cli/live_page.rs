@@ -107,7 +107,7 @@ impl Drop for LivePage {
     }
 }
 
-/// The browser that shows `address`; `None` if there is none, or it could not be led there.
+/// The browser that shows `address`; `None` if there is none, or it could not be opened.
 pub fn opened(address: &str) -> Option<Redirect> {
     browser::open(address).unwrap_or_else(|error| {
         say(&format!("warning: no browser was opened: {error:#}"));

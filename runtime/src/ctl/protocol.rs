@@ -132,7 +132,7 @@ impl State {
             _ if ticks >= control.end_tick() => Self::Ended,
             _ if control.is_stop_requested() || control.is_aborted() => Self::Stopping,
             u32::MAX => Self::Running,
-            // A hold for a process that joins is none of the user's.
+            // A hold for a process that joins is not one of the user's.
             hold_tick if control.held_at().is_some_and(|held| hold_tick <= held) => Self::Paused,
             hold_tick if hold_tick > ticks => Self::Stepping,
             _ => Self::Pausing,

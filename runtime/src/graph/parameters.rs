@@ -36,7 +36,7 @@ impl Notes {
         is_cut
     }
 
-    /// The warnings, with one about all that a run that was cut short leaves out.
+    /// The warnings, with one about everything that a run that was cut short leaves out.
     pub fn into_parts(mut self, manifest: &Manifest) -> (Vec<PathBuf>, Vec<Diagnostic>) {
         if self.has_cut {
             let duration = &manifest.content.run.duration_s;

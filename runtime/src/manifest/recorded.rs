@@ -116,7 +116,7 @@ fn name_copies(document: &mut toml_edit::DocumentMut, sources: &Sources, process
         let Some(written) = found.and_then(|(_, found)| file_edits::file_of(found, file)) else { continue };
         let copy = file_edits::edited_path(Path::new(written.get_ref()), process);
         let keys = ["process", process, file].map(str::to_owned);
-        // It fails only where `process` is no table, and then there is no process.
+        // It fails only if `process` is not a table, and then there is no process.
         let _ = put(document.as_item_mut(), &keys, copy.to_string_lossy().into_owned().into());
     }
 }

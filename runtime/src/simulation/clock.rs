@@ -84,7 +84,7 @@ impl Sim {
         }
     }
 
-    /// A stop that was asked for comes to the clock within a few looks of the supervisor.
+    /// A requested stop comes to the clock within a few looks of the supervisor.
     fn check_stop(&self) {
         let is_due = self.stop_look.is_some_and(|look| self.looks > look + 3);
         assert!(!is_due, "ticks are granted long after a stop was asked for");

@@ -3,20 +3,20 @@
 /// Something that may happen at any step while the storm lasts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Fault {
-    // A run goes on whatever of these happens.
+    // A run goes on in spite of any of these.
     /// A process stands still for a while.
     Pause,
-    /// The host's clock jumps, or everybody was frozen.
+    /// The host's clock jumps, or every process was frozen.
     Leap,
     /// The supervisor does not hear of a change.
     LostNotice,
-    /// Somebody wakes for nothing.
+    /// A process wakes without cause.
     SpuriousWakeUp,
-    /// Somebody asks for a swap.
+    /// A user requests a swap.
     Swap,
-    /// Somebody pauses the run, steps it, or lets it go on.
+    /// A user pauses the run, steps it, or lets it go on.
     Steer,
-    /// Somebody asks for a stop.
+    /// A user requests a stop.
     Stop,
     /// The plan of a backup cannot be written.
     StoreBackup,
@@ -24,7 +24,7 @@ pub(super) enum Fault {
     /// watchdog.
     SlowStart,
     // These may end it.
-    /// Somebody asks for a second stop.
+    /// A user requests a second stop.
     Interrupt,
     /// A process dies.
     Death,

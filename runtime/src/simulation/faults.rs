@@ -28,7 +28,7 @@ impl Sim {
         self.excuses.push(format!("{fault:?}"));
     }
 
-    /// Strikes what is drawn for this step.
+    /// Strikes the faults that are drawn for this step.
     pub(super) fn strike(&mut self) {
         if self.faults.is_empty() || self.instances.is_empty() {
             return;
@@ -65,7 +65,7 @@ impl Sim {
             self.notify();
         } else if self.is_drawn(Hang, 2000) {
             self.note(|sim| format!("{:?} hangs", sim.instances[victim]));
-            // Nobody waits for a sidecar that is ready: its hang may not end the run.
+            // No process waits for a sidecar that is ready: its hang may not end the run.
             if self.instances[victim].doing != Doing::Idle {
                 self.excuse(Hang);
             }
@@ -90,7 +90,7 @@ impl Sim {
         self.wake(Need::Steering);
     }
 
-    /// Nothing more happens, and what was paused is let go: from now on, the run must come to its end.
+    /// No more faults are struck, and a paused run is let go: from now on, the run must come to its end.
     pub(super) fn calm(&mut self) {
         self.note(|_| "the storm is over".to_owned());
         self.faults = BTreeSet::new();
@@ -129,8 +129,8 @@ impl Sim {
         }
     }
 
-    /// Whoever was told that a swap took over at `tick` finds that it did. A predecessor that died there may have sent
-    /// the sample of that tick before.
+    /// Checks that a swap that was reported to take over at `tick` did so. A predecessor that died there may have
+    /// sent the sample of that tick before.
     pub(super) fn check_swap(&self, node: usize, tick: u32) {
         for output in &self.plan.nodes[node].outputs {
             let period = self.plan.topics[output.topic].period_ticks;

@@ -68,7 +68,7 @@ impl Sim {
         let role = self.instances[index].role;
         let Role::Node { node, generation } = role else { return };
         let Some(membership) = self.stored.get(&epoch) else {
-            // What it was to join by has been taken back: it ends with an error.
+            // The membership by which it was to join has been taken back: it ends with an error.
             self.instances[index].end = Some(End::Exited(1));
             return;
         };
@@ -89,7 +89,7 @@ impl Sim {
         self.instances[index].doing = Doing::Connected;
     }
 
-    /// Whoever sends to an instance that joins must have connected to it: else its first samples are lost.
+    /// A publisher of an instance that joins must have connected to it: else its first samples are lost.
     fn check_publishers(&self, index: usize) {
         let (role, epoch) = (self.instances[index].role, self.instances[index].epoch);
         let publishers = self.inputs(role).iter().map(|input| self.plan.publisher(input.topic));

@@ -30,7 +30,7 @@ pub(super) struct SimBody {
     index: usize,
 }
 
-/// A request, and what it asks for: the node.
+/// A request, and its node.
 pub(super) struct Asked {
     number: usize,
     process: String,
@@ -246,7 +246,7 @@ impl Sim {
         }
     }
 
-    /// One change at a time: whoever computes has acknowledged the one before.
+    /// One change at a time: every instance that computes has acknowledged the one before.
     fn publish(&mut self, epoch: u32) {
         let last = self.segment.epoch;
         assert!(epoch == last || epoch == last + 1, "from membership {last} to {epoch}");

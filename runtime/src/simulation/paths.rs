@@ -1,4 +1,5 @@
-//! Runs that write to one path: who begins, writes, ends or dies when is drawn from a seed; the files are real ones.
+//! Runs that write to one path: the run that begins, writes, ends or dies next is drawn from a seed; the files are
+//! real ones.
 
 use super::sim::Draw;
 use crate::claimed_file::{LogClaim, Partial};
@@ -28,7 +29,7 @@ fn begin(path: &Path, log: &Path) -> Option<Run> {
     Some(Run { recording: recording?, log, content: None })
 }
 
-/// Flies runs to one path; what was recorded in the end.
+/// Flies runs to one path, and checks the recordings in the end.
 fn live(seed: u64) {
     let folder = tempfile::tempdir().unwrap();
     let (path, log) = (folder.path().join("a.mcap"), folder.path().join("a.log"));
@@ -56,7 +57,7 @@ fn live(seed: u64) {
                 run.recording.finish().unwrap();
                 finished = run.content;
             }
-            // It dies: its locks go with it, and what it wrote stays.
+            // It dies: its locks go with it, and its file stays.
             (_, Some(Run { recording, log, content })) => {
                 drop((recording, log));
                 left.extend(content);

@@ -7,10 +7,10 @@ use bus::plan::{InputPlan, NodePlan, OutputPlan, Pace, Plan, TopicPlan, Wait};
 use std::time::Duration;
 
 const TICKS: u32 = 60;
-/// Longer than everybody may be frozen for a while, and shorter than a run may take to end.
+/// Longer than all processes may be frozen for a while, and shorter than a run may take to end.
 pub(super) const WATCHDOG: Duration = Duration::from_millis(500);
 
-/// A program that nobody starts.
+/// A program that is never started.
 pub(super) fn program(on_exit: OnExit) -> Program {
     Program {
         executable: Executable::Command(Vec::new()),

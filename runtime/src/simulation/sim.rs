@@ -60,7 +60,7 @@ pub(super) enum Bug {
     AwaitsNobody,
     /// A backup is promoted at a tick that its predecessor has sent.
     PromotesTwo,
-    /// A new membership wakes nobody.
+    /// A new membership wakes no process.
     LosesWakeUp,
     /// A stop never comes to the clock.
     ForgetsStop,
@@ -76,7 +76,7 @@ pub(super) enum Need {
     Grant,
     /// The other instance of its node.
     Other(usize),
-    /// Completed ticks: what the clock waits for.
+    /// Completed ticks: the clock waits for these.
     Done,
     /// A phase, or the state of a slot.
     State,
@@ -107,7 +107,7 @@ pub(super) enum Doing {
     },
     /// It follows the run no more, and its program goes on for a while.
     Left,
-    /// The clock waits until everybody is ready for a phase.
+    /// The clock waits until every instance is ready for a phase.
     Gathering(Phase),
     /// The clock waits until these ticks are completed.
     Awaiting(u32),
@@ -126,7 +126,7 @@ pub(super) struct Instance {
     pub(super) sleep: Option<(Need, Duration)>,
     pub(super) frozen_until: Duration,
     pub(super) end: Option<End>,
-    /// The membership that it follows, and what that says of it.
+    /// The membership that it follows, and its entries for this instance.
     pub(super) epoch: u32,
     pub(super) take_over_tick: u32,
     pub(super) retirement_tick: u32,
@@ -168,7 +168,7 @@ pub(super) struct Sim {
     /// Answers to requests.
     pub(super) answers: Vec<Option<Answer>>,
     pub(super) looks: u32,
-    /// The look at which a stop was asked for.
+    /// The look at which a stop was requested.
     pub(super) stop_look: Option<u32>,
     pub(super) stop: StopToken,
     pub(super) log: Log,
@@ -287,7 +287,7 @@ impl Sim {
         self.segment.computing().map(|slot| self.segment.slots[slot].done).min().unwrap_or(NEVER)
     }
 
-    /// Wakes those who sleep for `need`.
+    /// Wakes the instances that sleep for `need`.
     pub(super) fn wake(&mut self, need: Need) {
         for instance in &mut self.instances {
             instance.sleep.take_if(|(other, _)| *other == need);
@@ -298,7 +298,7 @@ impl Sim {
         self.instances.iter_mut().for_each(|instance| instance.sleep = None);
     }
 
-    /// Tells the supervisor that there is something to look at.
+    /// Notifies the supervisor that there is something to look at.
     pub(super) fn notify(&mut self) {
         if !self.strikes(Fault::LostNotice, 3) {
             self.notices += 1;
@@ -312,7 +312,7 @@ impl Sim {
         }
     }
 
-    /// Somebody does something, while the supervisor is busy.
+    /// Lets others act, while the supervisor is busy.
     pub(super) fn preempt(&mut self) {
         while self.draw.one_in(4) {
             self.step(self.now + Duration::from_micros(50));
