@@ -43,8 +43,8 @@ pub struct Exported {
 /// The FMU of the manifest or vehicle file at `path`, with the library `library` of `bindings/fmu-export`.
 ///
 /// # Errors
-/// The manifest has a problem, the process is not in it or sends messages that no importer can send, a node needs a
-/// process of its own, or a topic is not there.
+/// The manifest has a problem, the process is not in it, a node needs a process of its own, or a topic is not there.
+/// It also fails if the process sends messages that no importer can send.
 pub fn export(path: &Path, wishes: &Wishes<'_>, library: &[u8]) -> Result<Exported> {
     let load = |overrides: &[String]| load(path, overrides);
     let declared = Graph::build(&load(wishes.overrides)?)?;
@@ -232,7 +232,7 @@ fn write(
     Ok(Exported { bytes: bytes.into_inner(), model })
 }
 
-/// The plan without references to this machine: paths begin at `/fmu` instead of the folder that all files lie in, no
+/// The plan without references to this machine. Paths begin at `/fmu` instead of the folder that all files lie in, no
 /// node has a core, and the memory of the run has no name.
 fn portable(plan: &Plan) -> Plan {
     let mut plan = Plan { run_id: "fmu".to_owned(), clock_cpu: None, ..plan.clone() };

@@ -3,8 +3,8 @@
 use crate::membership::Membership;
 use crate::plan::Plan;
 
-/// For each node, the length of the longest chain of inputs without delay that ends in its first instance, where a backup
-/// counts as a publisher beside the instance that it shadows.
+/// Length of the longest chain of inputs without delay that ends in the first instance of each node. A backup counts
+/// as a publisher beside the instance that it shadows.
 pub(crate) fn depths(plan: &Plan, membership: &Membership) -> Vec<usize> {
     let publishers: Vec<usize> = (0..plan.topics.len()).map(|topic| plan.publisher(topic)).collect();
     // Depths of the primary and of the backup.

@@ -94,8 +94,8 @@ impl<C: Component> Harness<C> {
         bytes
     }
 
-    /// Steps a component, loads its state into a second one amid the run, and requires the same outputs and the same
-    /// bytes of the state from both after that. `inputs` returns the inputs of a step.
+    /// Steps a component, loads its state into a second one amid the run, and steps both. Requires the same outputs
+    /// and the same bytes of the state from both. `inputs` returns the inputs of a step.
     ///
     /// # Panics
     /// If they differ, or a step fails.

@@ -21,8 +21,8 @@ pub type Stream = ChaCha8Rng;
 
 /// The random stream of the node named `node` in a run whose seed is `run_seed`.
 ///
-/// The 32-byte ChaCha key is the run seed followed by three FNV-1a hashes of the name, each started
-/// from another offset, so that two names share a stream only if all three collide.
+/// The 32-byte ChaCha key is the run seed followed by three FNV-1a hashes of the name, each started from another
+/// offset. Two names share a stream only if all three collide.
 #[must_use]
 pub fn stream(run_seed: u64, node: &str) -> Stream {
     let mut key = [0; 32];

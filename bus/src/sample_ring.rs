@@ -3,9 +3,9 @@
 //!
 //! A member that writes here needs neither a loan nor a queue, and the recorder reads the bytes where they lie. The
 //! control segment orders the two: a reader looks at the sample of a tick when the topic's count says that it is
-//! sent. The publisher comes back to its place in the ring when the reader has completed that tick, since the clock
-//! grants no tick more than a window ahead of the slowest node. A sample that is counted is there, even if the
-//! publisher dies right after.
+//! sent. The publisher comes back to its place in the ring when the reader has completed that tick: the clock grants
+//! no tick more than a window ahead of the slowest node. A sample that is counted is there, even if the publisher
+//! dies right after.
 
 use crate::error::BusError;
 use crate::message::sample_words;

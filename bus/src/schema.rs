@@ -73,8 +73,8 @@ pub enum Kind {
     Sequence(&'static Kind, usize),
     /// A string of constant length, stored as ROS 2 stores it (length with its NUL, then the bytes).
     Text,
-    /// A string of at most so many bytes, its NUL included, and so many doubles, which begin behind the string at a multiple
-    /// of 8 bytes: the last field of a message.
+    /// A string of at most so many bytes, its NUL included, and so many doubles: the last field of a message. The
+    /// doubles begin behind the string at a multiple of 8 bytes.
     NamedNumbers(usize, usize),
 }
 

@@ -80,8 +80,8 @@ pub(crate) struct StateRing {
 }
 
 impl StateRing {
-    /// Creates the ring of generation `generation` of node `node`, whose state is laid out as `layout` with `more_words` of
-    /// the bus behind it, and announces it.
+    /// Creates the ring of generation `generation` of node `node`, and announces it. The state is laid out as
+    /// `layout`, with `more_words` of the bus behind it.
     pub(crate) fn create(
         run_dir: &Path,
         plan: &Plan,

@@ -269,8 +269,9 @@ pub fn takes_run_dir(run_dir: &Path, run_id: &str) -> bool {
     bytes.iter().copied().all(is_plain) && bytes.len() <= run_dir_bytes_max(run_id)
 }
 
-/// Behind the run directory the longest path has `/iceoryx2/`, the prefix, the hash of a service (40 characters), a
-/// publisher and a subscriber (numbers of 128 bits, up to 39 digits) and `.connection`, with `_` between them.
+/// Longest run directory that fits. Behind it the longest path has `/iceoryx2/`, the prefix, the hash of a service
+/// (40 characters), a publisher and a subscriber, and `.connection`. Publisher and subscriber are numbers of 128
+/// bits, up to 39 digits, with `_` between them.
 fn run_dir_bytes_max(run_id: &str) -> usize {
     const LONGEST: usize = "/iceoryx2/".len() + 40 + "_".len() + 39 + "_".len() + 39 + ".connection".len();
     PATH_BYTES_MAX.saturating_sub(LONGEST + shm_prefix(run_id).len())

@@ -1,7 +1,7 @@
 //! Files that are opened by name where others may write: only plain files and folders of this user.
 //!
 //! Any user can put a pipe, a device or a link of any name into /dev/shm. So the owner of a name is checked before it
-//! is opened, the open neither follows a link nor waits, and the opened file is checked once more.
+//! is opened. The open neither follows a link nor waits, and the opened file is checked once more.
 
 use crate::process::user_id;
 use std::fs::{File, Metadata, OpenOptions};

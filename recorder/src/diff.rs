@@ -30,8 +30,8 @@ pub enum Difference {
         /// The recording that goes on.
         longer: PathBuf,
     },
-    /// One recording begins later, as that of a run which goes on from a checkpoint does, and holds the same messages as the
-    /// other from there on.
+    /// One recording begins later, as that of a run from a checkpoint does, and holds the same messages as the other
+    /// from there on.
     Later {
         /// The recording that begins later.
         later: PathBuf,

@@ -1,8 +1,8 @@
 //! One field of one topic over time.
 //!
-//! Some fields have parts more than the message, in which people judge a flight: a quaternion its angles `roll`,
-//! `pitch` and `yaw` (z-y-x sequence, in radians), and a `velocity` in the world beside an `attitude` its components
-//! `u`, `v` and `w` along the body's x, y and z.
+//! Some fields have additional parts, in which people judge a flight. A quaternion has the angles `roll`, `pitch` and
+//! `yaw` (z-y-x sequence, in radians). A `velocity` in the world beside an `attitude` has the components `u`, `v` and
+//! `w` along the body's x, y and z.
 
 use crate::definition::{DecodeError, Definition, Leaf, number};
 use crate::error::RecordingError;

@@ -1,5 +1,5 @@
-//! Measured flights flown again: the commands of flights on the bus with one or two vehicle files, and the distance
-//! of the state at the ends of windows from the measured one.
+//! Measured flights flown again: their commands on the bus with one or two vehicle files. The distance of the state
+//! from the measured one is taken at the ends of windows.
 //!
 //! | room | content |
 //! |---|---|

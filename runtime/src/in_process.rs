@@ -162,12 +162,12 @@ pub fn require_flyable(manifest: &Manifest, files: InputFiles, from: Option<&Che
     Ok(graph)
 }
 
-/// Flies `manifest`, which is not recorded, on the calling thread, `from` a checkpoint where there is one; the files that
+/// Flies `manifest`, which is not recorded, on the calling thread, `from` a checkpoint if there is one. Files that
 /// `files` has read are not read again. Its judge writes into `folder`, and nothing else is written.
 ///
 /// # Errors
-/// A problem in the manifest, a request that needs a process of its own (an executable, a swap, a standby), a checkpoint
-/// that does not fit, a step that fails, or a component that panics.
+/// A problem in the manifest, a checkpoint that does not fit, a step that fails, or a component that panics. Also a
+/// request that needs a process of its own: an executable, a swap, a standby.
 pub fn fly_unrecorded(
     manifest: &Manifest,
     files: InputFiles,

@@ -1,8 +1,8 @@
 //! The location that a path names: an opened folder and a name in it. Once it is found, no change of the path can
 //! redirect it.
 //!
-//! In a folder that everybody may write to, sticky or not, a link is followed only if it belongs to this user or to the
-//! owner of the folder, as by a kernel with `fs.protected_symlinks`.
+//! Any folder that everybody may write to is treated as by a kernel with `fs.protected_symlinks`, sticky or not. A
+//! link in it is followed only if it belongs to this user or to the owner of the folder.
 
 use rustix::fs::{AtFlags, CWD, FileType, Mode, OFlags, Stat};
 use rustix::io::Errno;

@@ -96,11 +96,11 @@ fn located(path: &Path) -> Result<Location> {
     Location::find(path).map_err(|reason| anyhow!("cannot create {}: {reason}", path.display()))
 }
 
-/// Refuses a file of `kind` at `path` where something else would be lost.
+/// Refuses a file of `kind` at `path` if it would replace another kind of file.
 ///
 /// # Errors
-/// If its folder is not there, a link on the way is not to be trusted, or something is in its place that is neither
-/// empty nor of this kind.
+/// If its folder is missing, a link on the way cannot be trusted, or the file in its place is neither empty nor of
+/// this kind.
 pub fn check(path: &Path, kind: &Kind) -> Result<()> {
     locate(path, kind).map(drop)
 }

@@ -147,7 +147,8 @@ impl<B: Body> Drop for Sidecars<'_, B> {
 }
 
 impl<B: Body> Sidecar<'_, B> {
-    /// An end with code 0 is one of a sidecar that has done its part, but for one that was to say that it is ready.
+    /// Notes an end with code 0 of a sidecar that had to report that it is ready, and did not. Any other end with
+    /// code 0 is in order.
     fn note_early_end(&mut self) {
         if !self.is_ready
             && self.process.verdict.is_none()

@@ -38,8 +38,8 @@ impl ConnectedNode {
         Ok(())
     }
 
-    /// Writes this node's parts of the checkpoints that fall between its last due tick and `tick`, whose inputs it has
-    /// taken, unless another process is the node.
+    /// Writes this node's parts of the checkpoints between its last due tick and `tick`, whose inputs it has taken.
+    /// It writes none if another process is the node.
     pub(super) fn write_checkpoints(
         &mut self,
         tick: u32,

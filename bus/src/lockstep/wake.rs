@@ -92,7 +92,7 @@ fn rouse<W: Word>(waiter: &W) {
 /// early, so the caller looks again.
 ///
 /// Both changes of the waiter are swaps: beside a system call they cost nothing, and the model can follow them over
-/// several counts, while of plain stores it lets a writer see its own older swap.
+/// several counts. With plain stores the model lets a writer see its own older swap.
 pub(super) fn sleep<W: Word>(sequence: &W, count: u32, waiter: &W, is_over: impl Fn() -> bool) {
     waiter.swap(count, Relaxed);
     W::fence();

@@ -9,8 +9,8 @@ use std::ops::Range;
 /// Makes the nodes of `plan` write the checkpoints of `manifest`.
 ///
 /// # Errors
-/// A tick outside the run, that a node does not reach, that lies within a swap, or at which a process flies whose
-/// state no checkpoint holds.
+/// A tick outside the run, that a node does not reach, or that lies within a swap. A tick at which a process flies
+/// whose state no checkpoint holds.
 pub fn add(
     manifest: &Manifest,
     plan: &mut Plan,

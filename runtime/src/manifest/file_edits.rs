@@ -1,7 +1,7 @@
 //! Values of vehicle, scene and gains files that `--set` replaces: `--set process.plant.vehicle.body.mass=0.5`.
 //!
-//! The file on the disk stays as it is. The process reads an edited copy under a path of its own beside the original, so
-//! that a controller of the same vehicle file still reads the original.
+//! The file on the disk is not changed. The process reads an edited copy under a path of its own beside the original.
+//! A controller of the same vehicle file still reads the original.
 
 use super::content::{Content, Process};
 use super::put::put;

@@ -140,8 +140,8 @@ impl Sources {
         self.problem(&misread.span(), misread.error, help)
     }
 
-    /// A path as written: `${NAME:-default}` is the environment's NAME, and a relative path starts at the
-    /// folder of the file it is written in, or of the manifest where it was given as an argument.
+    /// A path as written: `${NAME:-default}` is the environment's NAME. A relative path starts at the folder of the
+    /// file it is written in, or of the manifest if it was given as an argument.
     pub fn path(&self, written: &Spanned<String>) -> Result<PathBuf, Diagnostic> {
         let expanded = vehicles::variables::expand(written.get_ref(), |name| std::env::var(name).ok())
             .map_err(|message| {
