@@ -60,7 +60,7 @@ enum Fallback {
 /// Outputs of `operator`.
 #[derive(Debug, OutputPorts)]
 pub struct Outputs {
-    /// Requested set point.
+    /// Set point that is asked for.
     pub set_point: SetPoint,
 }
 
