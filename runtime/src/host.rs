@@ -45,8 +45,8 @@ pub enum Host {
 }
 
 impl Host {
-    /// This program's own binary, even after its file has been replaced: for programs that pass the arguments `node
-    /// KIND` to [`crate::node()`].
+    /// This program's own binary, even after its file has been replaced: for programs that pass the arguments
+    /// `node KIND` to [`crate::node()`].
     #[must_use]
     pub fn this_binary() -> Self {
         Self::Exe("/proc/self/exe".into())
