@@ -26,8 +26,8 @@ const LEAST_BLOCKS: usize = 5;
 /// An offset is real beyond so many standard deviations.
 const SURE: f64 = 4.0;
 
-/// How samples lie on the grid decides how much noise their interpolation leaves, which pulls at the offset by up to this
-/// part of the period of what is moved (docs/validation.md), beyond what blocks of time can show.
+/// Bias of an offset due to the samples' positions on the grid, as a part of the period of the shifted channel
+/// (docs/validation.md). It comes from the noise that interpolation leaves; blocks of time do not show it.
 const BETWEEN_SAMPLES: f64 = 0.1;
 /// A channel that is later than this is not on the same flight.
 const LATE_MAX_S: f64 = 0.4;
@@ -60,19 +60,19 @@ pub type Offsets = BTreeMap<&'static str, Option<Offset>>;
 struct Found {
     late_s: f64,
     deviation_s: f64,
-    /// What the places of samples on the grid make of it at most.
+    /// Greatest bias due to the samples' positions on the grid.
     between_s: f64,
 }
 
 impl Found {
-    /// Whether what it has beyond `other` is more than chance and the grid make of none.
+    /// True if its difference from `other` exceeds chance, the bias of both due to the grid, and `least_s`.
     fn is_beyond(&self, other: &Found, least_s: f64) -> bool {
         let own_s = (self.late_s - other.late_s).abs();
         let deviation_s = libm::hypot(self.deviation_s, other.deviation_s);
         own_s > SURE * deviation_s && own_s > least_s.max(self.between_s).max(other.between_s)
     }
 
-    /// Of several the mean; zero of none.
+    /// Returns the mean of the offsets; zero without any.
     fn mean(all: &[Found]) -> Found {
         let part = 1.0 / (all.len() as f64).max(1.0);
         Found {
@@ -96,9 +96,9 @@ fn of_attitude(problem: &Problem, flight: &Prepared) -> Option<Found> {
     })
 }
 
-/// The offset of position or velocity from what the accelerometer reads, turned by an attitude that is `attitude_s` late.
-/// What is moved is the inertial side: a position's second derivative is noise for the most part, and that of a moved one
-/// would depend on how its samples lie on the grid.
+/// Returns the offset of position or velocity from the accelerometer, whose readings are rotated by an attitude
+/// that is `attitude_s` late. The inertial side is shifted, not the position: a position's second derivative is
+/// mostly noise, and that of a shifted position would depend on how its samples lie on the grid.
 fn of_translation(
     problem: &Problem,
     flight: &Prepared,
@@ -167,7 +167,7 @@ fn kinematic_noises() -> Noises {
         .collect()
 }
 
-/// What was found of one flight.
+/// Offsets found for one flight.
 struct Clocks {
     attitude: Option<Found>,
     position: Option<Found>,
@@ -182,7 +182,7 @@ impl Clocks {
         Self { attitude, position: of(Translation::Position), velocity: of(Translation::Velocity) }
     }
 
-    /// What is taken off where `shared` is the attitudes' lateness that all flights share.
+    /// Returns the lateness to remove, where `shared` is the attitudes' lateness that all flights share.
     fn taken_off(&self, shared: &Found, least_s: f64) -> Lateness {
         let shift = self.attitude.filter(|shift| shift.is_beyond(shared, least_s));
         let attitude_s = shift.map_or(0.0, |shift| shift.late_s - shared.late_s);

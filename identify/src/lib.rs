@@ -79,7 +79,7 @@ pub use regressor::Regressor;
 pub use sensing::SensorErrors;
 pub use unusable::Unusable;
 
-/// What tests look at between the steps of an identification.
+/// Parts for tests that look between the steps of an identification.
 #[doc(hidden)]
 pub mod steps {
     pub use crate::fit::Problem;

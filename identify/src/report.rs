@@ -1,4 +1,4 @@
-//! What identification found, for programs (`report.json`) and for people.
+//! Results of an identification, for programs (`report.json`) and for people.
 
 use crate::align::Offsets;
 use crate::candidate::Unidentifiable;
@@ -49,7 +49,7 @@ pub struct Report {
     pub fitted: Changes,
     /// White noise of each channel, and the prediction error that it alone makes at each horizon.
     pub noise_floor: BTreeMap<&'static str, Noise>,
-    /// What no candidate explains: the size of the part of the residual that is not noise, by equation.
+    /// Root mean square of the part of the residual that is not noise and that no candidate explains, by equation.
     pub unexplained: BTreeMap<&'static str, Unexplained>,
     /// Effects that these flights cannot show, or sensors' parts of them, and what they would need.
     pub not_identifiable: Vec<Unidentifiable>,
@@ -81,18 +81,18 @@ pub struct FlightReport {
     pub window_s: f64,
     /// The equations that its channels allow.
     pub equations: Vec<&'static str>,
-    /// What was assumed instead of measured.
+    /// Assumptions in place of measurements.
     pub assumed: Vec<String>,
-    /// What the reader noticed.
+    /// Notes of the reader.
     pub notes: Vec<String>,
 }
 
 /// An effect as it came out.
 #[derive(Debug, Clone, Serialize)]
 pub struct EffectReport {
-    /// Whether it was accepted.
+    /// True if it was accepted.
     pub accepted: bool,
-    /// Whether its parameters and its gain are what the linearised equations promise, and not those of a fit.
+    /// True if its parameters and its gain come from the linearised equations, not from a fit.
     pub linearised: bool,
     /// Its fitted parameters.
     pub parameters: BTreeMap<&'static str, Estimate>,
@@ -118,9 +118,9 @@ pub struct Estimate {
     pub low: f64,
     /// Upper end.
     pub high: f64,
-    /// Whether the estimate stopped at the greatest or least value that the effect may have.
+    /// True if the estimate stopped at the greatest or least value that the effect may have.
     pub at_bound: bool,
-    /// Whether these flights say anything of it: its interval does not hold all that the effect may be.
+    /// True if these flights determine it: its interval does not cover all values that the effect may have.
     pub determined: bool,
 }
 
@@ -152,12 +152,12 @@ const ENOUGH_BLOCKS: usize = 12;
 const WORSE: f64 = 1.2;
 
 impl Report {
-    /// Whether the verdict is empty only because the validation data are short.
+    /// True if the verdict is empty and the validation data are too short to accept an effect.
     fn is_undecided(&self) -> bool {
         self.verdict.is_empty() && self.validation_blocks < ENOUGH_BLOCKS
     }
 
-    /// What was assumed and noticed, each with its flights.
+    /// Returns assumptions and the reader's notes, each with its flights.
     fn notes(&self) -> Vec<(&str, Vec<&str>)> {
         let mut notes: Vec<(&str, Vec<&str>)> = Vec::new();
         for flight in &self.flights {

@@ -41,7 +41,7 @@ const SPACING_MAX_S: f64 = 0.5;
 const OTHER_FLIGHTS: &str =
     "fly manoeuvres in which the two differ: other speeds, rates, heights or loads than in these flights";
 
-/// Why flights cannot be identified on.
+/// Reason why flights cannot be used for identification.
 ///
 /// ```
 /// let vehicle = "../vehicles/hummingbird.toml".into();
@@ -64,7 +64,7 @@ pub enum IdentifyError {
     },
 }
 
-/// What was found, with what is needed to draw it.
+/// Results of an identification, with the data that their plots need.
 #[derive(Debug)]
 pub struct Outcome {
     /// The report.
@@ -73,9 +73,10 @@ pub struct Outcome {
     pub effects: Vec<Effect>,
     /// Residuals for pictures: by flight and equation.
     pub pictures: Vec<Picture>,
-    /// What each flight did meanwhile, by name: at the same instants as its pictures.
+    /// Regressors of each flight, by name: at the same instants as its pictures.
     pub regressors: BTreeMap<String, Vec<Regressor>>,
-    /// What the alignment took off each flight, by name; for the flights before they are flown again.
+    /// Lateness that the alignment found in each flight, by name; to be removed from the flights before they
+    /// are simulated again.
     pub late: BTreeMap<String, Lateness>,
     /// Accepted delays and biases of sensors, for the same.
     pub sensor_errors: SensorErrors,
@@ -94,7 +95,7 @@ pub struct Picture {
     pub equation: Equation,
     /// Middles of the windows, in s.
     pub time_s: Vec<f64>,
-    /// What was measured, by component.
+    /// Measured values, by component.
     pub measured: Vec<Vec<f64>>,
     /// Residual of the declared model.
     pub before: Vec<Vec<f64>>,

@@ -1,4 +1,4 @@
-//! Attribution: which candidates the flights ask for, one after the other.
+//! Attribution: selection of the candidates that the flights support, one after the other.
 //!
 //! In each round every candidate is fitted, together with what was accepted before, on the estimation data, and judged
 //! on the validation data, or without these by cross-validation over blocks of the estimation data. It is accepted only if four things hold:
@@ -16,9 +16,9 @@
 //! In the end effects are withdrawn, and the search goes on without them: those of which a parameter stopped at a bound, those
 //! that are no longer beyond chance beside the others, and those without which predictions are better (`foresight`).
 //!
-//! Where a round accepts nothing although much is left that candidates together would take away, two are looked for that
-//! only gain together, under the same tests; the chance of a false acceptance in that search is [`FALSE_RATE`] once more.
-//! The rounds end when nothing changes any more.
+//! If a round accepts nothing although all candidates together would reduce the cost much, pairs are tried that
+//! gain only together. They face the same tests; the chance of a false acceptance in that search is
+//! [`FALSE_RATE`] once more. The rounds end when nothing changes any more.
 
 use crate::candidate::{Candidate, free_parameters};
 use crate::fit::{FitResult, Problem};
@@ -64,11 +64,11 @@ pub struct Judged {
     pub gain: f64,
     /// Chance of as much without the effect.
     pub p_value: f64,
-    /// Whether it was accepted.
+    /// True if it was accepted.
     pub is_accepted: bool,
     /// True if it would be, but for the logging of the commands, which explains it.
     pub is_logging: bool,
-    /// Whether `fitted` is no fit but what the linearised equations promise.
+    /// True if `fitted` comes from the linearised equations, not from a fit.
     pub is_promise: bool,
 }
 
@@ -77,12 +77,12 @@ pub struct Judged {
 pub struct Round {
     /// Everything judged in it.
     pub judged: Vec<Judged>,
-    /// Which of it was taken.
+    /// Index of the one that was taken.
     pub taken: Option<usize>,
 }
 
 impl Round {
-    /// What was taken.
+    /// Returns the candidate that was taken.
     pub fn taken(&self) -> Option<&Judged> {
         self.taken.map(|at| &self.judged[at])
     }
@@ -97,10 +97,10 @@ pub struct Withdrawn {
     pub reason: String,
 }
 
-/// What a selection came to.
+/// Result of a selection.
 #[derive(Debug, Clone)]
 pub struct Selection {
-    /// What was accepted, in order.
+    /// Accepted candidates, in order.
     pub accepted: Vec<Candidate>,
     /// The declared model.
     pub before: FitResult,
@@ -161,7 +161,7 @@ pub fn select(problem: &mut Problem, candidates: &[Candidate], progress: &mut dy
     Selection { accepted, before, after, refined, rounds, withdrawn }
 }
 
-/// How far a selection has come.
+/// State of a selection.
 struct StepwiseSearch {
     accepted: Vec<Candidate>,
     rounds: Vec<Round>,
@@ -368,8 +368,8 @@ fn judged(
     }
 }
 
-/// Whether one of its parameters is large enough to be more than an artefact of the grid: a delay of more than half a
-/// step, anything else at least [`LEAST_PART`] of what is plausible.
+/// True if one of its parameters is too large to be an artefact of the grid: a delay of more than half a step,
+/// or another parameter of more than [`LEAST_PART`] of a plausible change.
 fn is_seen(problem: &Problem, candidate: &Candidate, fitted: &FitResult) -> bool {
     candidate.free.iter().any(|at| {
         let entry = &problem.model.parameters.all[*at];
@@ -378,8 +378,8 @@ fn is_seen(problem: &Problem, candidate: &Candidate, fitted: &FitResult) -> bool
     })
 }
 
-/// Whether every parameter that moved stopped at a bound: then more is asked for than the effect can be, and so another
-/// is at work.
+/// True if every parameter that moved stopped at a bound: the flights ask for more than the effect can be, so another
+/// effect is at work.
 #[allow(clippy::float_cmp, reason = "values that stop at a bound are the bound")]
 fn is_beyond_bounds(problem: &Problem, candidate: &Candidate, fitted: &FitResult) -> bool {
     candidate.free.iter().all(|at| {
@@ -460,7 +460,7 @@ fn best(problem: &Problem, judged: &[Judged]) -> Option<usize> {
     accepted.iter().filter(is_alike).min_by(|a, b| size(**a).cmp(&size(**b)).then(by_gain(b, a))).copied()
 }
 
-/// Whether `fitted` is worse on the validation data than `other`, beyond chance.
+/// True if `fitted` is worse on the validation data than `other`, beyond chance.
 fn is_worse(fitted: &FitResult, other: &FitResult) -> bool {
     p_value(&fitted.validation_costs, &other.validation_costs) < CONFOUNDED_LEVEL
 }
@@ -481,7 +481,7 @@ fn without_idle(problem: &Problem, mut base: FitResult, accepted: &mut Vec<Candi
     base
 }
 
-/// What the linearised equations promise of each candidate.
+/// Linearised equations from which the fit of each candidate is predicted.
 struct Screen {
     columns: Vec<usize>,
     estimation: Vec<normal::Block>,

@@ -1,4 +1,4 @@
-//! What is wrong with a flight's sensors, and the flight as sensors without it would have logged it.
+//! Errors of a flight's sensors, and the flight as sensors without them would have logged it.
 
 use crate::clock::Lateness;
 use crate::parameter::Parameters;
@@ -48,13 +48,13 @@ impl SensorErrors {
         }
     }
 
-    /// What turns a vector of the vehicle's B into the frame that the attitude sensor takes for it.
+    /// Returns the rotation from the vehicle's B to the frame that the attitude sensor takes for B.
     pub fn mounting(&self) -> UnitQuaternion<f64> {
         let [x, y] = self.attitude_bias_rad;
         UnitQuaternion::from_scaled_axis(-Vector3::new(x, y, 0.0))
     }
 
-    /// `flight` without these errors, and without what it is `late` by besides.
+    /// Returns `flight` without these errors and without the lateness `late`.
     pub fn taken_off(&self, flight: &Flight, late: &Lateness) -> Flight {
         let mut flight = flight.clone();
         earlier(&mut flight.position, self.pose_delay_s + late.position_s);

@@ -1,4 +1,4 @@
-//! What is left of a residual: whether it is noise, and how large the part of it is that is not.
+//! Whiteness of a residual: its test, and the size of the part that is not noise.
 
 use crate::fit::Problem;
 use crate::prepared::Equation;

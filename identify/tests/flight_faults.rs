@@ -92,7 +92,7 @@ fn flights_without_a_fault_have_none() {
     }
 }
 
-/// Whatever effect is true and undeclared, also at thrice the noise, it is no fault of a flight.
+/// A true but undeclared effect is never taken for a fault of a flight, also at thrice the noise.
 #[test]
 fn undeclared_effects_are_no_faults() {
     let cases: Vec<Case> = EFFECTS
@@ -310,7 +310,7 @@ fn commands_that_are_frozen_swapped_or_scaled() {
     }
 }
 
-/// Whatever the numbering of the logger: each order is found as the one that puts the columns right.
+/// Each order of the logged motors is found as the one that puts the columns right.
 #[test]
 fn every_order_of_the_motors_is_found() {
     let orders = (0..256_usize).map(|code| [code / 64, code / 16 % 4, code / 4 % 4, code % 4]);

@@ -1,4 +1,4 @@
-//! What can be logged differently: channels left out, slow, held, late, broken.
+//! Variations of the logging: channels left out, slow, held, late, broken.
 mod simulated;
 
 use flights::{Channel, Flight, FlightSet};
@@ -115,7 +115,7 @@ fn gaps_cost_time_and_nothing_else() {
     assert!(found.flights.iter().all(|flight| flight.compared_s < DURATION_S - 0.9), "{found}");
 }
 
-/// What a reader leaves of a channel that was logged more often than it was sampled: samples at uneven times.
+/// A reader leaves samples at uneven times of a channel that was logged more often than it was sampled.
 #[test]
 fn repeated_samples_left_out_do_not_matter() {
     let found = changed(&heavy_with_drag(18), |flight| {
@@ -283,7 +283,7 @@ fn the_riddle_of_the_late_rig_is_solved() {
     }
 }
 
-/// How fast the rotors turn at the first sample, and what was commanded before it, nobody knows.
+/// The speeds of the rotors at the first sample, and the commands before it, are unknown.
 #[test]
 fn a_log_may_begin_in_mid_flight() {
     let found = changed(&riddle(), |flight| {
@@ -328,7 +328,7 @@ fn the_new_vehicle_file_has_the_bytes_that_were_fitted() {
     assert!(text.contains("mass = { value = 0.480,"), "{text}");
 }
 
-/// How high the centre of mass lies shows only where something pushes the vehicle to the side.
+/// The height of the centre of mass shows only if something pushes the vehicle to the side.
 #[test]
 fn what_flights_do_not_determine_is_said() {
     let mut case = Case::of(&["com-offset"], 0.3, 26, DURATION_S);

@@ -418,7 +418,7 @@ fn esc_test(stand: &str) -> Option<RotorReport> {
     Some(rotor::run(&path).unwrap().report)
 }
 
-/// Whether some finding of the report has `text`.
+/// True if the text of the report contains `text`.
 fn says(report: &RotorReport, text: &str) -> bool {
     report.to_string().contains(text)
 }

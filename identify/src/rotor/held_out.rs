@@ -1,4 +1,4 @@
-//! Whether the logs to test on are held out: none is a log that is fitted on, a copy of one, or a part of one.
+//! Check that the logs to test on are held out: none is a log that is fitted on, a copy of one, or a part of one.
 
 use diagnostics::unit::SPEED;
 use flights::{Channel, Comparison, Role, same_file, twin};
@@ -54,7 +54,7 @@ fn check_pairs<'s>(logs: impl Iterator<Item = Log<'s>>) -> Result<(), RotorError
 }
 
 impl Log<'_> {
-    /// How the file of another log is this log's; two topics of a recording are two logs.
+    /// Returns how the file of another log equals this log's file; two topics of a recording are two logs.
     fn same_file(&self, other: &Self) -> Option<&'static str> {
         let (one, other) = (&self.source, &other.source);
         let have_same_bytes = || {

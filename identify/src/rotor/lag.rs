@@ -24,7 +24,7 @@ const STARTS: i32 = 14;
 /// Onsets lie at most this many rows from the row in which the command is first seen.
 pub const ONSET_ROWS_MAX: f64 = 1.0;
 
-/// How many parameters a motor has.
+/// Order of a motor's model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Order {
@@ -39,7 +39,7 @@ pub enum Order {
 pub struct Fit {
     /// The motor.
     pub lag: Lag,
-    /// What the motor would be without each of the steps.
+    /// Motors fitted without each of the steps in turn.
     pub without_one: Vec<Lag>,
 }
 
@@ -48,7 +48,7 @@ pub struct Fit {
 pub struct Match {
     /// When the command took effect, from the row in which it is first seen, in s.
     pub onset_s: f64,
-    /// Whether that is the end of what is allowed.
+    /// True if the onset is at the end of the range that is allowed.
     pub is_clamped: bool,
     /// Predicted minus measured, in rad/s.
     pub errors: Vec<f64>,

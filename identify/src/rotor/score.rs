@@ -1,8 +1,8 @@
-//! How well a model does on what was not fitted.
+//! Scores of a model on data that were not fitted.
 
 use serde::Serialize;
 
-/// How often an interval shall hold the truth.
+/// Level of confidence of the intervals.
 pub const LEVEL: f64 = 0.95;
 
 /// Errors of predictions.

@@ -9,7 +9,7 @@ use super::error::RotorError;
 use super::recorded::Recorded;
 use super::stand::{Column, Source, short_name};
 
-/// How a recording begins (MCAP's specification, "Magic").
+/// First bytes of a recording (MCAP's specification, "Magic").
 const RECORDING: &[u8] = b"\x89MCAP0\r\n";
 
 /// The times and the numbers of a log.
@@ -19,7 +19,7 @@ pub struct LogTable {
     content: Content,
 }
 
-/// What a log is made of.
+/// Content of a log.
 enum Content {
     /// The cells of a table.
     Table(Table),
