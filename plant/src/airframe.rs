@@ -61,7 +61,7 @@ impl Airframe {
     /// The airframe of `vehicle` with the effects of its file, and behind them those of a scene's.
     ///
     /// # Errors
-    /// What is wrong with an effect, and where.
+    /// The fault of an effect, and its place.
     pub fn from_files(vehicle: Vehicle, scene: &[EffectEntry]) -> Result<Self, Diagnostic> {
         let entries: Vec<_> = vehicle.effects.iter().chain(scene).cloned().collect();
         let airframe = Self::with_effects(vehicle, entry::resolve(&entries)?);
@@ -88,7 +88,7 @@ impl Airframe {
         &self.vehicle
     }
 
-    /// How far the effects have moved the frame, seen from the centre of mass, from where it is declared.
+    /// Returns the frame's displacement by the effects from its declared place, seen from the centre of mass.
     pub(crate) fn frame_shift_B_m(&self) -> &Vector3<f64> {
         &self.frame_shift_B_m
     }
@@ -159,7 +159,7 @@ impl Airframe {
         })
     }
 
-    /// What acts under `commands` in still air, without the state of effects.
+    /// Returns the actuation under `commands` in still air, without the state of effects.
     pub(crate) fn commanded(&self, commands: &[f64]) -> Actuation {
         let speed = |(rotor, command): (usize, &f64)| self.vehicle.commanded_speed_rad_s(rotor, *command);
         Actuation::of(commands.iter().enumerate().map(speed).collect())
@@ -171,8 +171,8 @@ impl Airframe {
         paired(&state.rotors, &actuation.targets_rad_s, |rotor, target| motor::rates(motor, rotor, *target))
     }
 
-    /// All forces but gravity and contacts, and their torques about the centre of mass. The effects are added in
-    /// their order; the order is part of the result, as float addition is not associative.
+    /// Returns all forces but gravity and contacts, and their torques about the centre of mass. The effects are added
+    /// in their order; the order is part of the result, as float addition is not associative.
     pub(crate) fn wrench(
         &self,
         actuation: &Actuation,

@@ -1,4 +1,4 @@
-//! What a vehicle must be to fly at all, looked at before a run: `check` refuses what cannot, and tells what is odd.
+//! Checks of a vehicle before a run: `check` refuses a vehicle that cannot fly, and reports odd values.
 
 use crate::backend::Backend;
 use crate::newton_euler::NewtonEuler;
@@ -164,7 +164,7 @@ pub(crate) fn places(numbers: &[&Provenance]) -> String {
 /// way does so here, and not in flight. The backend is of no use afterwards.
 ///
 /// # Errors
-/// Which number is none, and after how many ticks.
+/// The quantity that is not a finite number, and the ticks after which.
 pub(crate) fn rehearse(
     backend: &mut dyn Backend,
     model: &NewtonEuler,

@@ -18,7 +18,7 @@ use bus::messages::{self, FRAME_BYTES_MAX, FrameName, MeasuredState, MotorComman
 use diagnostics::ParameterError;
 use nalgebra::{UnitQuaternion, Vector3};
 
-/// What the plant reads.
+/// Inputs of the plant.
 #[derive(Debug, InputPorts)]
 pub struct Inputs<'a> {
     /// The motors' command.

@@ -1,4 +1,4 @@
-//! Which vehicles of the traffic are others: all but the one that is where this plant's vehicle is.
+//! Other vehicles of the traffic: all but the one that is where this plant's vehicle is.
 
 use crate::backend::{Neighbour, TRAFFIC_MAX};
 use crate::saved::{Reader, Saved, Unfit, Writer};

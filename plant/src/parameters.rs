@@ -1,4 +1,4 @@
-//! What manifests say of a plant, and the backend that follows.
+//! Parameters of a plant in manifests, and the backend that follows from them.
 
 use crate::airframe::Airframe;
 use crate::airworthy;
@@ -25,7 +25,7 @@ pub struct Parameters {
     vehicle: PathBuf,
     /// Scene file; nothing but the ground where it is left out.
     scene: Option<PathBuf>,
-    /// What moves the vehicle.
+    /// Physics that moves the vehicle.
     #[serde(default)]
     backend: BackendName,
     /// Position of the centre of mass at tick 0, in the world.
@@ -55,7 +55,7 @@ enum BackendName {
     Rapier,
 }
 
-/// What a Hummingbird bears, as far as anybody knows: tuned, no source.
+/// Greatest speed of an impact that a Hummingbird bears, as far as anybody knows: tuned, no source.
 const CRASH_SPEED_M_S: f64 = 1.0;
 
 /// More steps than these gain nothing at 1 kHz, and would look like a run that hangs: tuned, no source.
@@ -162,7 +162,7 @@ impl Parameters {
     /// seed and the node's name.
     ///
     /// # Errors
-    /// What cannot be meant, or cannot fly.
+    /// The invalid parameter, or the reason why the vehicle cannot fly.
     pub(crate) fn origin(&self, run: &NodeContext<'_>) -> Result<Origin, ParameterError> {
         self.check(run)?;
         let (airframe, scene) = self.airframe(&run.files)?;

@@ -100,7 +100,7 @@ pub struct Rapier {
     configuration: Fingerprint,
 }
 
-/// What contacts and joints changed over the last tick, against free flight.
+/// Change of the motion over the last tick by contacts and joints, against free flight.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 struct Reaction {
     acceleration_W_m_s2: Vector3<f64>,
@@ -166,7 +166,7 @@ impl Rapier {
         world.overlap(&state.body, &free_bodies.states)
     }
 
-    /// What of the scene's joints cannot be meant, with the vehicle and the bodies where they are.
+    /// Returns a fault of the scene's joints, with the vehicle and the bodies where they are.
     pub(crate) fn misfit(&self) -> Option<Misfit> {
         self.motion.free_bodies.misfit(&self.motion.model, &self.motion.state.body)
     }
@@ -195,7 +195,7 @@ impl Rapier {
         }
     }
 
-    /// Whether ground or rig keep the vehicle from accelerating freely.
+    /// True if ground or rig keep the vehicle from accelerating freely.
     fn is_carried(&self, free_W_m_s2: &Vector3<f64>) -> bool {
         let vehicle = self.motion.model.vehicle();
         match &self.motion.rig {

@@ -4,7 +4,7 @@ use crate::saved::{Reader, Saved, Unfit, Writer};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// Why a snapshot could not be taken or read.
+/// Reason why a snapshot could not be taken or read.
 #[derive(Debug, Error)]
 pub enum SnapshotError {
     /// The bytes are not a snapshot.
@@ -29,7 +29,7 @@ pub enum SnapshotError {
     Misfit {
         /// Its name.
         component: &'static str,
-        /// Why not.
+        /// The reason.
         cause: Unfit,
     },
 }

@@ -27,7 +27,7 @@ pub struct Traffic;
 #[serde(deny_unknown_fields)]
 pub struct Parameters {}
 
-/// What it sends.
+/// Outputs of the traffic.
 #[derive(Debug, OutputPorts)]
 pub struct Outputs {
     /// The states, in the order of the inputs' names.

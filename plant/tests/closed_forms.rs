@@ -135,7 +135,7 @@ fn slope(slope_rad: f64, friction: f64) -> Scene {
     Scene::parse_with(&text, "test.toml", &read).unwrap()
 }
 
-/// How far it gets down a slope in two seconds, and its speed then.
+/// Returns the way down a slope in two seconds, and the speed then.
 fn down(slope_rad: f64, friction: f64) -> (f64, f64) {
     let attitude_WB = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), slope_rad);
     let start_W_m = Vector3::z() * 20.0 + attitude_WB * (Vector3::z() * stand_m());

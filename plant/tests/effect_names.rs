@@ -1,10 +1,10 @@
-//! What is known of an effect stands in its own file: nowhere else is its name a text of the program.
+//! The facts about an effect stand in its own file: nowhere else is its name a text of the program.
 
 use plant::effects::CATALOGUE;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// All Rust files of the library and the crates around it, without tests, examples and benchmarks.
+/// Collects the Rust files of the library and the crates around it, without tests, examples and benchmarks.
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();

@@ -30,7 +30,7 @@ fn hanging(scene: &Scene, yaw_deg: f64) -> Rapier {
     common::rapier(NewtonEuler::new(hummingbird(), 1), scene, &body, 1.0)
 }
 
-/// Where the bearing's centre is, seen from the lower end of its travel.
+/// Returns the place of the bearing's centre, seen from the lower end of its travel.
 fn bearing_W_m(plant: &Rapier, rig: &Rig) -> Vector3<f64> {
     let body = plant.state().body;
     body.position_W_m + body.attitude_WB * rig.mount_B_m - rig.bearing_W_m
@@ -40,7 +40,7 @@ fn tilt_deg(plant: &Rapier) -> f64 {
     (plant.state().body.attitude_WB * Vector3::z()).angle(&Vector3::z()).to_degrees()
 }
 
-/// What the rig promises at every tick: the bearing on its line and within its travel, the tilt within its cone.
+/// Asserts the rig's promises at a tick: the bearing on its line and within its travel, the tilt within its cone.
 #[track_caller]
 fn assert_held(plant: &Rapier, rig: &Rig, tick: usize) {
     let bearing_W_m = bearing_W_m(plant, rig);

@@ -1,4 +1,4 @@
-//! What the functions of effects are functions of: how the vehicle moves through which air, how high.
+//! Arguments of the functions of effects: the motion of the vehicle, the air that it moves through, and the height.
 
 use crate::rotation::rotated_back;
 use crate::rotor;

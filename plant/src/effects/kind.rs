@@ -17,45 +17,46 @@ pub type Values = [f64; PARAMETERS_MAX];
 /// An effect as the catalogue knows it. It is the same as another only if it is the very same static.
 #[derive(Debug)]
 pub struct EffectKind {
-    /// What files call it.
+    /// Its name in files.
     pub name: &'static str,
-    /// What it does, in one line.
+    /// Its summary, in one line.
     pub summary: &'static str,
     /// Its equation, in the symbols of its parameters.
     pub equation: &'static str,
-    /// Where the equation is from.
+    /// Source of the equation.
     pub source: &'static str,
-    /// Where it holds, and what it leaves out.
+    /// Its range of validity, and what it leaves out.
     pub validity: &'static str,
     /// Its parameters.
     pub parameters: &'static [ParameterSpec],
-    /// What it does to the simulation.
+    /// Its actions on the simulation.
     pub actions: &'static [Action],
-    /// What has to be measured for it to show.
+    /// Quantities that have to be measured for it to show.
     pub needs: &'static [Quantity],
-    /// What has to be computed anew when one of its parameters changes.
+    /// First stage that has to be computed anew when one of its parameters changes.
     pub stage: Stage,
-    /// Whether a fit could follow it.
+    /// Its use of random numbers, which no fit could follow.
     pub randomness: Randomness,
-    /// What of it makes sense alone.
+    /// Parts of it that make sense alone.
     pub fit_as: FitAs,
-    /// Whether it shows in the mean forces and torques of a flight, and can be told there from all other effects.
+    /// True if it shows in the mean forces and torques of a flight, and can be told there from all other effects.
     pub steady_state: bool,
-    /// Whether it turns the vehicle steadily, so that it can explain a trim.
+    /// True if it turns the vehicle steadily, so that it can explain a trim.
     pub turns_steadily: bool,
-    /// Whether its parameters shift a signal in time: then the flight's grid says how small a value can be seen.
+    /// True if its parameters shift a signal in time: then the flight's grid limits how small a value can be seen.
     pub is_delay: bool,
     /// True if it changes how the rotors follow their commands.
     pub changes_drive: bool,
-    /// Whether equations linearised about the neutral values tell what it can explain.
+    /// True if equations linearised about the neutral values predict what it can explain.
     pub is_linear: bool,
-    /// Where a fit may start, each a value for each fitted parameter. None: the neutral values are a start.
+    /// Initial guesses of a fit, each a value for each fitted parameter. If there are none, it starts at the
+    /// neutral values.
     pub guesses: &'static [&'static [f64]],
     /// Fits nominal values, which are a Hummingbird's, to a vehicle of another size.
     pub scale_to: Option<fn(&Vehicle, &mut Values)>,
     /// Effects that look like it, and how to tell them apart. Each pair stands with one of the two.
     pub confounded_with: &'static [Confounder],
-    /// What must be true of the vehicle that it acts on; in words if it is not.
+    /// Requirement on the vehicle that it acts on, if it has one.
     pub require: Option<Requirement>,
     /// True if its parameters are one for each rotor: those behind the vehicle's last rotor have to be neutral.
     pub is_per_rotor: bool,
@@ -67,9 +68,9 @@ pub type Requirement = fn(&Vehicle) -> Result<(), &'static str>;
 /// One parameter of an effect.
 #[derive(Debug)]
 pub struct ParameterSpec {
-    /// What files call it.
+    /// Its name in files.
     pub name: &'static str,
-    /// What it means, with its symbol.
+    /// Its meaning, with its symbol.
     pub meaning: &'static str,
     /// Its units; bounds and values are in the first, which is that of the SI.
     pub dimension: Dimension,
@@ -82,11 +83,11 @@ pub struct ParameterSpec {
     pub neutral: Option<f64>,
     /// A plausible value.
     pub nominal: f64,
-    /// Where the plausible value is from.
+    /// Source of the plausible value.
     pub nominal_source: &'static str,
 }
 
-/// What an effect acts on. All but the state of [`Action::Tick`] are pure functions.
+/// Action of an effect. All but the state of [`Action::Tick`] are pure functions.
 #[derive(Debug, Clone, Copy)]
 pub enum Action {
     /// Changes what the vehicle is, once, before it flies.
@@ -103,20 +104,20 @@ pub enum Action {
     Battery(fn(&Values, &EffectState, &Vehicle, &[f64]) -> Battery),
 }
 
-/// What an effect sees and changes when a tick begins.
+/// Arguments of an effect's function when a tick begins.
 #[derive(Debug)]
 pub struct Advance<'a> {
     /// The vehicle at the beginning of the tick, in the air as the effects before this one moved it.
     pub condition: FlightCondition<'a>,
-    /// What acts over the tick.
+    /// Actuation over the tick.
     pub actuation: &'a mut Actuation,
-    /// What the effect carries from tick to tick.
+    /// State that the effect carries from tick to tick.
     pub state: &'a mut EffectState,
     /// Length of the tick.
     pub dt_s: f64,
 }
 
-/// What a flight must have measured for an effect to show.
+/// Quantity that a flight must have measured for an effect to show.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
     /// Forces: by position, velocity or specific force.
@@ -135,7 +136,7 @@ pub enum Quantity {
     Rig,
     /// Two clocks that can be held against each other.
     TwoClocks,
-    /// What the accelerometer reads.
+    /// Reading of the accelerometer.
     SpecificForce,
     /// The same rotation by gyroscope and by attitude.
     TwoRotations,
@@ -147,18 +148,18 @@ pub enum Quantity {
     Pose,
 }
 
-/// What has to be computed anew when a parameter changes; the later stages follow from the earlier ones.
+/// Stage that has to be computed anew when a parameter changes; the later stages follow from the earlier ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
-    /// When samples were taken.
+    /// Times at which samples were taken.
     Sampling,
-    /// What the rotors make of the commands.
+    /// Response of the rotors to the commands.
     Rotors,
-    /// Forces, torques, and what sensors read of them.
+    /// Forces, torques, and the sensors' readings of them.
     Body,
 }
 
-/// Whether an effect draws random numbers.
+/// Use of random numbers by an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Randomness {
     /// A function of parameters and flight.
@@ -167,12 +168,12 @@ pub enum Randomness {
     Stochastic,
 }
 
-/// What of an effect is a candidate by itself.
+/// Parts of an effect that are candidates by themselves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FitAs {
-    /// All of its parameters together.
+    /// Its parameters together, as one candidate.
     Whole,
-    /// Each of its parameters.
+    /// Each of its parameters, as a candidate.
     EachParameter,
 }
 
@@ -196,14 +197,14 @@ pub struct Confounder {
 /// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Effect {
-    /// What it is.
+    /// Its kind.
     pub kind: &'static EffectKind,
     /// Its parameters in SI.
     pub values: Values,
 }
 
 impl Quantity {
-    /// What it is measured by, and for what.
+    /// Describes the channels that it is measured by, and their purpose.
     #[must_use]
     pub fn describe(self) -> &'static str {
         match self {
@@ -231,7 +232,7 @@ impl PartialEq for EffectKind {
 }
 
 impl EffectKind {
-    /// What most effects are, to be completed by texts, parameters, actions and needs: a deterministic, near linear
+    /// Defaults of an effect, to be completed by texts, parameters, actions and needs: a deterministic, near linear
     /// effect on forces and torques that is fitted as a whole.
     pub const PLAIN: Self = Self {
         name: "",

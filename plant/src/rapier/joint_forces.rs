@@ -23,7 +23,7 @@ pub(super) struct JointForces {
     /// The rows, with the number of the joint that each is of.
     lines: Vec<(usize, Line)>,
     damped: Vec<(Line, f64)>,
-    /// What the impulse of each row changes the twists of its ends by.
+    /// Change of the twists of its ends by a unit impulse of each row.
     answers: Vec<[Vector6<f64>; 2]>,
     /// J W Jᵀ, row by row, and then its Cholesky factor in the lower triangle.
     matrix: Vec<f64>,

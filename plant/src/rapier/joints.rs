@@ -10,7 +10,7 @@ use crate::state::RigidBody;
 use nalgebra::{Unit, UnitQuaternion, Vector3, Vector6};
 use scenes::{Axis, End, Freedom, Joint as Told};
 
-/// Where the gap to a limit of an angle is measured: at a lever of this length, so that it is one in metres. Tuned, no
+/// Length of the lever at which the gap to a limit of an angle is measured, so that the gap is in metres. Tuned, no
 /// source.
 const LEVER_M: f64 = 0.1;
 
@@ -18,7 +18,7 @@ const LEVER_M: f64 = 0.1;
 #[derive(Debug, Clone)]
 pub(super) struct Joint {
     pub ends: [usize; 2],
-    /// Where it holds each, seen from its centre of mass, in its own axes.
+    /// Anchors on both ends, each seen from its end's centre of mass, in the end's own axes.
     anchors_m: [Vector3<f64>; 2],
     /// Directions along which the anchors stay together, and about which the child does not turn, in the parent's axes.
     along: Vec<Vector3<f64>>,
@@ -30,7 +30,7 @@ pub(super) struct Joint {
     pub drive: Option<Drive>,
 }
 
-/// What a joint leaves free, in the parent's axes.
+/// Freedom that a joint leaves, in the parent's axes.
 #[derive(Debug, Clone, Copy)]
 enum Way {
     Nothing,
@@ -45,9 +45,9 @@ enum Way {
 pub(super) struct Line {
     pub ends: [usize; 2],
     pub jacobian: [Vector6<f64>; 2],
-    /// What of the second derivative is left without accelerations.
+    /// Part of the second derivative that does not depend on accelerations.
     pub bias: f64,
-    /// How far it is off, m or rad.
+    /// Error of the constraint, m or rad.
     pub off: f64,
 }
 
@@ -58,7 +58,7 @@ impl Line {
     }
 }
 
-/// Where a joint's ends are.
+/// Places and rates of a joint's ends.
 struct Placed {
     /// From each centre of mass to its anchor.
     arms_W_m: [Vector3<f64>; 2],
@@ -117,7 +117,7 @@ impl Joint {
         }
     }
 
-    /// Whether it is a rope: all others keep two bodies from touching each other.
+    /// True if it is a rope: all other joints keep two bodies from touching each other.
     pub(super) fn is_rope(&self) -> bool {
         matches!(self.motion, Way::Rope { .. })
     }
@@ -203,7 +203,7 @@ impl Joint {
         Some(Line { ends: self.ends, jacobian, bias, off: distance_m - length_m })
     }
 
-    /// How far the child is turned about the direction `number` of those that are held, rad.
+    /// Returns the child's rotation about the direction `number` of those that are held, rad.
     fn turned_off(&self, frames: &[RigidBody], number: usize) -> f64 {
         let turned = self.turned(frames);
         match self.motion {
@@ -213,7 +213,7 @@ impl Joint {
         }
     }
 
-    /// How the child is turned since the start, in the parent's axes.
+    /// Returns the child's rotation since the start, in the parent's axes.
     fn turned(&self, frames: &[RigidBody]) -> UnitQuaternion<f64> {
         let [parent, child] = self.ends.map(|end| frames[end].attitude_WB);
         parent.inverse() * child * self.start.inverse()
@@ -258,7 +258,7 @@ impl Joint {
         angle_rad - std::f64::consts::TAU * (angle_rad / std::f64::consts::TAU).round()
     }
 
-    /// How far a rope's ends may still go apart, and how fast they do; none of another joint.
+    /// Returns the slack of a rope, and the rate at which its ends go apart; `None` for another joint.
     pub(super) fn slack(&self, frames: &[RigidBody]) -> Option<(f64, f64)> {
         let Way::Rope { length_m } = self.motion else { return None };
         let placed = self.placed(frames);

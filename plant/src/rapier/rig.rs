@@ -18,7 +18,7 @@ use scenes::Rig;
 /// A bearing that starts lower than this above the lower end of its travel is there: tuned, no source.
 const LOWER_END_M: f64 = 1e-6;
 
-/// Where the gap to the cone is measured: at a lever of this length, so that it is one in metres. Tuned, no source.
+/// Length of the lever at which the gap to the cone is measured, so that the gap is in metres. Tuned, no source.
 const LEVER_M: f64 = 0.1;
 
 /// For each axis of the world 1 where the slider moves along it, and 0 where it is held.
@@ -164,7 +164,8 @@ impl<'a> Mounted<'a> {
     }
 }
 
-/// What dry and viscous friction take of a motion over a step; at most all that a body of this inertia has of it.
+/// Returns the momentum that dry and viscous friction take of a motion over a step; at most all that this
+/// inertia has.
 fn against(rate: f64, (dry, viscous): (f64, f64), inertia: f64, span_s: f64) -> f64 {
     ((dry + viscous * rate) * span_s).min(inertia * rate)
 }
@@ -175,7 +176,7 @@ pub(super) fn numbers(rig: &Rig) -> Vec<f64> {
     places.copied().chain([rig.heave_m, rig.sway_m, rig.tilt_max_rad, rig.moving_mass_kg]).collect()
 }
 
-/// How far the vehicle's mount is from the lower end of the bearing's travel.
+/// Returns the vector from the lower end of the bearing's travel to the vehicle's mount.
 pub(super) fn off_W_m(rig: &Rig, vehicle: &RigidBody) -> Vector3<f64> {
     vehicle.position_W_m + vehicle.attitude_WB * rig.mount_B_m - rig.bearing_W_m
 }
@@ -191,8 +192,9 @@ pub(super) fn hung(rig: &Rig, body: &RigidBody) -> RigidBody {
     RigidBody { position_W_m: bearing_W_m - arm_W_m, velocity_W_m_s: mount_W_m_s - turning_W_m_s, ..*body }
 }
 
-/// Whether the rig keeps a vehicle at rest where it is: always where it does not heave, and at the lower end of its
-/// travel unless `lift_N`, the force on the vehicle beyond its weight, raises what hangs there.
+/// True if the rig keeps a vehicle at rest where it is. A rig that does not heave always does. Any other does
+/// so at the lower end of its travel, unless `lift_N`, the force on the vehicle beyond its weight, raises the
+/// mass that hangs there.
 pub(super) fn holds(rig: &Rig, body: &RigidBody, lift_N: f64, gravity_m_s2: f64) -> bool {
     let raised_m = off_W_m(rig, &hung(rig, body)).z;
     let needed_N = rig.moving_mass_kg * gravity_m_s2 + rig.slide_friction_N;

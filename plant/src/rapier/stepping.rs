@@ -29,23 +29,23 @@ use scenes::Rig;
 /// Gaps that are not closed any further: what stands on several points stands on all of them. Tuned, no source.
 const LEVEL_M: f64 = 1e-9;
 
-/// What meets something slower than gravity makes it in this many steps does not bounce: 2 cm/s at two steps of half a
+/// Steps in which gravity makes the speed below which an impact does not bounce: 2 cm/s at two steps of half a
 /// millisecond. Tuned, no source.
 const SLOW_STEPS: f64 = 4.0;
 
 /// A step is cut at this many impacts at most; those that follow are inelastic. Tuned, no source.
 const IMPACTS_MAX: usize = 24;
 
-/// What is this near is looked at, beyond what a step may bring nearer: a contact lasts until there is a millimetre
+/// Distance within which contacts are searched, beyond the way of a step: a contact lasts until there is a millimetre
 /// of air. Tuned, no source.
 const MARGIN_M: f64 = 2e-3;
 
-/// What is farther is not looked at, however fast the vehicle is: what moves this far in a step flies through things.
-/// Tuned, no source.
+/// Greatest distance within which contacts are searched, however fast the vehicle is: a vehicle that moves this
+/// far in a step flies through things. Tuned, no source.
 const MARGIN_MAX_M: f64 = 2.0;
 
-/// How fast a vehicle that was put inside of something comes out of it; it takes none of that speed along. Tuned, no
-/// source.
+/// Speed at which a vehicle that was put inside an object comes out of it; it takes none of that speed along.
+/// Tuned, no source.
 const PUSH_OUT_M_S: f64 = 1.0;
 
 /// Impulses of contacts that are kept for each free body; the search for more begins with none. Tuned, no source: the most
@@ -220,7 +220,7 @@ impl Motion {
         Free { held: twist(&state.body) - twist(&unheld.body), state }
     }
 
-    /// Whether a rig or joints hold the vehicle.
+    /// True if a rig or joints hold the vehicle.
     pub(super) fn is_held(&self) -> bool {
         self.rig.is_some() || self.free_bodies.is_vehicle_tied()
     }
@@ -250,14 +250,14 @@ impl Motion {
         self.state = free;
     }
 
-    /// Whether nothing holds the vehicle, no body moves, and nothing is near on the way to `free`.
+    /// True if nothing holds the vehicle, no body moves, and nothing is near on the way to `free`.
     fn is_clear(&self, free: &RigidBody, span_s: f64, others: &[Neighbour]) -> bool {
         let margin_m = MARGIN_M + self.way_m(free, span_s);
         let is_alone = self.rig.is_none() && self.free_bodies.is_empty();
         is_alone && self.world.is_clear(&self.state.body.position_W_m, others, span_s, margin_m)
     }
 
-    /// How far any point of the vehicle gets over a step at most, with half of it to spare.
+    /// Returns the longest way of any point of the vehicle over a step, with half of it to spare.
     fn way_m(&self, free: &RigidBody, span_s: f64) -> f64 {
         let reach_m = self.world.reach_m();
         1.5 * span_s * fastest_m_s(&self.state.body, reach_m).max(fastest_m_s(free, reach_m))
@@ -611,7 +611,7 @@ impl Motion {
     }
 }
 
-/// How fast the fastest point of a body is that reaches this far.
+/// Returns the greatest speed of any point of a body that reaches this far.
 fn fastest_m_s(body: &RigidBody, reach_m: f64) -> f64 {
     body.velocity_W_m_s.norm() + body.angular_velocity_B_rad_s.norm() * reach_m
 }

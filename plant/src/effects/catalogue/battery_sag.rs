@@ -54,7 +54,7 @@ effect_parameters! {
 
 const DISCHARGE: &str = "log the voltage, and fly from a full battery until it is nearly empty";
 
-/// What weighs less flies on one lithium-polymer cell, as a Crazyflie 2.1 does (Bitcraze: 250 mAh).
+/// A lighter vehicle flies on one lithium-polymer cell, as a Crazyflie 2.1 does (Bitcraze: 250 mAh).
 const SMALL_KG: f64 = 0.1;
 
 fn scale_to(vehicle: &Vehicle, values: &mut Values) {
