@@ -22,7 +22,7 @@ const PRESSURE_MIN_PA: f64 = 1.0e3;
 const PRESSURE_MAX_PA: f64 = 1.2e5;
 
 parameters! {
-    /// What a barometer makes of the truth; the defaults are a MEAS Switzerland (TE Connectivity) MS5611-01BA03.
+    /// Parameters of a barometer; the defaults are a MEAS Switzerland (TE Connectivity) MS5611-01BA03.
     ///
     /// Its data sheet (DA5611-01BA03): resolution 0.012 mbar RMS at an oversampling ratio of 4096, which is its noise;
     /// the compensated reading in steps of 0.01 mbar; conversions of pressure and temperature of 8.22 ms each, one

@@ -13,7 +13,7 @@ use scenes::{BodyPose, RayCaster};
 use std::f64::consts::{PI, TAU};
 use std::path::PathBuf;
 
-/// How far a wall is looked for, m.
+/// Distance within which walls are searched, m.
 const REACH_M: f64 = 1000.0;
 
 /// Nearer to the world's origin than this no laps are counted, m.
@@ -44,16 +44,16 @@ pub struct ClearanceState {
     laps: f64,
 }
 
-/// What the component reads.
+/// Inputs of the component.
 #[derive(Debug, InputPorts)]
 pub struct Inputs<'a> {
     /// The truth.
     pub state: &'a PlantState,
-    /// Where the scene's free bodies are; for a scene that has some.
+    /// Poses of the scene's free bodies; for a scene that has some.
     pub bodies: Option<&'a BodyStates>,
 }
 
-/// What the component sends.
+/// Outputs of the component.
 #[derive(Debug, OutputPorts)]
 pub struct Outputs {
     /// The distances.

@@ -35,7 +35,7 @@ use std::f64::consts::{PI, TAU};
 const PITCH_BLEND_MAX_RAD: f64 = 1.4;
 
 parameters! {
-    /// How much the accelerometer is trusted.
+    /// Parameters of the filter: its trust in the accelerometer.
     #[derive(Copy)]
     pub struct ComplementaryParams {
         /// Time constant with which roll and pitch follow the accelerometer, s. Default 30 (tuned, no
@@ -172,14 +172,14 @@ impl Complementary {
     }
 }
 
-/// What the filter reads.
+/// Inputs of the filter.
 #[derive(Debug, InputPorts)]
 pub struct ImuInputs<'a> {
     /// Readings of the inertial measurement unit.
     pub imu: &'a Imu,
 }
 
-/// What the filter sends.
+/// Outputs of the filter.
 #[derive(Debug, OutputPorts)]
 pub struct Outputs {
     /// The attitude.
@@ -245,7 +245,7 @@ mod tests {
         ImuReading { specific_force_B_m_s2: force_B, angular_velocity_B_rad_s: rate_B }
     }
 
-    /// What an IMU at rest at these angles reads.
+    /// Returns the reading of an IMU at rest at these angles.
     fn at_rest(roll_rad: f64, pitch_rad: f64) -> ImuReading {
         let attitude_WB = UnitQuaternion::from_euler_angles(roll_rad, pitch_rad, 0.4);
         reading(attitude_WB.inverse() * Vector3::new(0.0, 0.0, 9.81), Vector3::zeros())

@@ -17,7 +17,7 @@ use inputs::InputFiles;
 use nalgebra::Vector3;
 
 parameters! {
-    /// What a satellite receiver makes of the truth; the defaults are a u-blox NEO-M8N.
+    /// Parameters of a satellite receiver; the defaults are a u-blox NEO-M8N.
     ///
     /// Its data sheet (UBX-15031086): 10 Hz; horizontal position within 2.5 m half of the time, which for equal axes
     /// is σ = 2.5 m / 1.177 = 2.1 m each; velocity within 0.05 m/s half of the time, σ = 0.05 / 0.6745 = 0.074 m/s.

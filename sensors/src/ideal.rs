@@ -18,7 +18,7 @@ use serde::Deserialize;
 #[serde(deny_unknown_fields)]
 pub struct Parameters {}
 
-/// What it sends.
+/// Outputs of the component.
 #[derive(Debug, OutputPorts)]
 pub struct Outputs {
     /// The truth; its standard deviations are 0.

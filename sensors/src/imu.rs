@@ -106,7 +106,7 @@ impl Remembered for ImuState {
     }
 }
 
-/// What the IMU sends.
+/// Outputs of the IMU.
 #[derive(Debug, OutputPorts)]
 pub struct Outputs {
     /// The reading that arrived last.
@@ -218,14 +218,14 @@ mod tests {
         Harness::in_context(params, &NodeContext::new("imu", &[]).seeded(7)).unwrap()
     }
 
-    /// What the model reads of the truth, tick by tick.
+    /// Returns the model's readings of the truth, tick by tick.
     fn read(params: ImuParams, ticks: u32) -> Vec<Imu> {
         let model = ImuModel::new(params, 1000.0).unwrap();
         let mut state = model.initial_state(7, "imu");
         (0..ticks).map(|tick| message(&model.read(&mut state, &truth(&truth_at(tick))))).collect()
     }
 
-    /// What is sent, and what was read, tick by tick.
+    /// Returns the readings that are sent and those that were made, tick by tick.
     fn flown(params: ImuParams, ticks: u32) -> Vec<(Imu, Imu)> {
         let mut imu = imu(params);
         let sent = (0..ticks).map(|tick| imu.step(TruthInputs { state: &truth_at(tick) }).unwrap().imu);

@@ -1,8 +1,8 @@
-//! What an IMU's mounting and its mechanics make of the motion, before noise: where it sits, how it is shaken by the
-//! rotors, how fast it follows, how its axes lie, and how it drifts as it warms up; and its resolution, after noise.
+//! Effects of an IMU's mounting and mechanics on its readings before noise: position, vibration by the rotors,
+//! bandwidth, alignment of the axes, and drift as it warms up; and its resolution, after noise.
 //!
-//! In the order of the signal: lever arm, vibration, bandwidth, then alignment and scale, then what acceleration and
-//! temperature add to the biases. All of it is off by default.
+//! In the order of the signal: lever arm, vibration, bandwidth, then alignment and scale, then the biases due to
+//! acceleration and temperature. All are off by default.
 
 use crate::imu_model::{ImuParams, ImuReading};
 use crate::steps::in_steps;
@@ -35,12 +35,12 @@ pub struct ImuPart {
     /// Takes what is felt in body axes to what the axes of each triad read.
     force_axes: Matrix3<f64>,
     rate_axes: Matrix3<f64>,
-    /// How much of what is new the filters take over in a period; 1 where there is none.
+    /// Share of a new value that the filters take over in a period; 1 without a filter.
     force_share: f64,
     rate_share: f64,
 }
 
-/// What the part remembers from one reading to the next.
+/// State of the part from one reading to the next.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ImuPartState {
     /// Readings so far.
@@ -49,7 +49,7 @@ pub struct ImuPartState {
     pub rotor_angles_rad: [f64; ROTORS_MAX],
     /// The true angular velocity at the last reading.
     pub last_B_rad_s: Vector3<f64>,
-    /// What has come through the filters.
+    /// Outputs of the filters.
     pub filtered: ImuReading,
 }
 
@@ -90,7 +90,7 @@ impl ImuPart {
         }
     }
 
-    /// What the triads feel, in their own axes, without noise.
+    /// Returns the quantities that the triads feel, in their own axes, without noise.
     pub fn feel(&self, state: &mut ImuPartState, truth: &ImuMotion) -> ImuReading {
         let shaken = self.shaken(state, truth, &self.at_its_place(state, &truth.motion));
         let is_first = state.readings == 0;
@@ -205,7 +205,7 @@ mod tests {
         }
     }
 
-    /// What is felt of one reading of `truth`.
+    /// Returns the quantities that are felt in one reading of `truth`.
     fn felt(params: ImuParams, truth: &ImuMotion) -> ImuReading {
         part(params).feel(&mut ImuPartState::default(), truth)
     }

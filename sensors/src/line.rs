@@ -15,7 +15,7 @@ pub const STREAMS: usize = 16;
 /// Packets that wait or are under way at most.
 pub const PACKETS: usize = 64;
 
-/// What a [`Packet`] is.
+/// States of a [`Packet`].
 const FREE: u32 = 0;
 const QUEUED: u32 = 1;
 const UNDER_WAY: u32 = 2;
@@ -122,7 +122,7 @@ impl Default for LineState {
 )]
 pub struct NoPlace;
 
-/// What a line is.
+/// Settings of a line.
 #[derive(Debug)]
 pub struct Line {
     /// Bits a second.
@@ -133,11 +133,11 @@ pub struct Line {
     pub queue_bytes: u32,
     /// Time from the last bit of a message to its arrival.
     pub latency_ns: u64,
-    /// What is added to it at most, evenly drawn.
+    /// Greatest addition to it, evenly drawn.
     pub jitter_ns: u64,
-    /// The fraction of messages that are lost.
+    /// Fraction of messages that are lost.
     pub loss: f64,
-    /// Which stream goes first: the higher number.
+    /// Priorities of the streams: the highest goes first.
     pub priorities: Vec<u32>,
     /// The random stream that fates are drawn from.
     pub random: Stream,
@@ -207,7 +207,7 @@ impl Line {
         first.map(|(index, _)| (index, start_ns))
     }
 
-    /// How long the message that is sent as number `number` travels behind its last bit, and whether it is lost.
+    /// Returns the time in ns that message `number` travels behind its last bit, and whether it is lost.
     fn fate(&self, number: u64) -> (u64, bool) {
         // Two draws of two words of 32 bits each.
         let mut random = random::at(&self.random, u128::from(number) * 4);

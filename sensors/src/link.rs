@@ -29,10 +29,11 @@ use std::collections::BTreeMap;
 const BAUD: f64 = 57_600.0;
 /// 8 data bits, a start bit and a stop bit, no parity (thesis §2.2).
 const BITS_PER_BYTE: u32 = 10;
-/// What AscTec's serial protocol puts around a message: `>*>`, two bytes of length, one of type, two of checksum, `<#<`
-/// (`ASCTEC_PACKET_OVERHEAD_BYTES` of the `asctec` driver for ROS by Kushleyev and Michael, University of Pennsylvania).
+/// Overhead of AscTec's serial protocol for a message: `>*>`, two bytes of length, one of type, two of
+/// checksum, `<#<` (`ASCTEC_PACKET_OVERHEAD_BYTES` of the `asctec` driver for ROS by Kushleyev and Michael,
+/// University of Pennsylvania).
 const OVERHEAD_BYTES: u32 = 11;
-/// What an XBee of the 802.15.4 series buffers of its serial input (Digi, "XBee/XBee-PRO RF Modules 802.15.4 Product
+/// Serial input buffer of an XBee of the 802.15.4 series (Digi, "XBee/XBee-PRO RF Modules 802.15.4 Product
 /// Manual", "DI buffer").
 const QUEUE_BYTES: u32 = 202;
 /// Faster is no serial line, and the bits of a run are to stay countable.
@@ -68,13 +69,13 @@ pub struct Parameters {
     /// Time from a message's last bit to its arrival, ms.
     #[serde(default)]
     pub latency_ms: f64,
-    /// What is added to that at most, evenly drawn for each message, ms.
+    /// Greatest addition to that, evenly drawn for each message, ms.
     #[serde(default)]
     pub jitter_ms: f64,
     /// Fraction of the messages that are lost on the way.
     #[serde(default)]
     pub loss: f64,
-    /// What differs of a stream, by the name of its input.
+    /// Parameters of single streams, by the name of their input.
     #[serde(default)]
     pub streams: BTreeMap<String, StreamParameters>,
 }
@@ -103,7 +104,7 @@ pub struct StreamParameters {
     bytes: Option<u32>,
     /// Messages a second that are sent at most; each that is new where absent.
     rate_hz: Option<f64>,
-    /// Which stream goes first where several wait: the higher number.
+    /// Priority of the stream: of several that wait, the highest goes first.
     #[serde(default)]
     priority: u32,
 }
@@ -175,7 +176,7 @@ pub struct LinkState {
     taken_period: [u64; STREAMS],
 }
 
-/// What a link sends: its statistics, and the newest message of each stream.
+/// Outputs of a link: its statistics, and the newest message of each stream.
 ///
 /// ```
 /// use bus::ports::OutputPorts;
@@ -438,7 +439,7 @@ impl Forwarded {
         }
     }
 
-    /// Whether `message` is an initial value that another link repeats.
+    /// True if `message` is an initial value that another link repeats.
     fn is_none(&self, message: &[u8]) -> bool {
         self.stamp_offset.is_some_and(|offset| message[offset..].starts_with(bytemuck::bytes_of(&NEVER)))
     }

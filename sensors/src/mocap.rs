@@ -14,7 +14,7 @@ use inputs::InputFiles;
 use nalgebra::{UnitQuaternion, Vector3};
 
 parameters! {
-    /// What motion capture does to the truth; the defaults are a Vicon system of MX cameras.
+    /// Parameters of motion capture; the defaults are a Vicon system of MX cameras.
     ///
     /// *Position*: Merriaux et al., "A study of Vicon system positioning performance" (Sensors 17(7), 2017), find a
     /// mean error of 0.15 mm at rest and below 2 mm in motion; 0.5 mm lies between. *Attitude*: 0.5 mm seen on

@@ -73,7 +73,7 @@ pub(crate) fn standard_normal(random: &mut Stream) -> Vector3<f64> {
     Vector3::new(x, y, z)
 }
 
-/// How far a random stream has been drawn, in words of 32 bits: the low and the high half of the count.
+/// Returns the number of words of 32 bits drawn from a random stream: the low and the high half of the count.
 pub(crate) fn drawn_words(random: &Stream) -> [u64; 2] {
     let words = random.get_word_pos();
     [words as u64, (words >> 64) as u64]

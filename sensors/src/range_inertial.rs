@@ -13,7 +13,7 @@ use diagnostics::ParameterError;
 use filter::{RangeInertial, RangeInertialInputs, RangeInertialState};
 use params::RangeInertialParams;
 
-/// What the estimator sends.
+/// Outputs of the estimator.
 #[derive(Debug, OutputPorts)]
 pub struct Outputs {
     /// Walls, height and velocities.

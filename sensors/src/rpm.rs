@@ -14,7 +14,7 @@ use diagnostics::parameter::{ParameterError, not_negative, require};
 use inputs::InputFiles;
 
 parameters! {
-    /// What the motors' controllers make of the truth.
+    /// Parameters of the rotor speeds that the motors' controllers measure.
     ///
     /// *Resolution*: telemetry of electronic speed controllers (KISS, BLHeli_32) counts hundreds of electrical revolutions
     /// a minute; with 7 pole pairs, usual for motors of this size, these are 14.3 rpm, 1.5 rad/s. *Noise* and *rate* are

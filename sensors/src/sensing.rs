@@ -39,7 +39,7 @@ macro_rules! sensor {
             }
         }
 
-        /// What the sensor sends.
+        /// Outputs of the sensor.
         #[derive(Debug, bus::OutputPorts)]
         pub struct Outputs {
             /// The measurement that arrived last.
@@ -54,9 +54,10 @@ macro_rules! sensor {
     };
 }
 
-/// What sensors send.
+/// Messages that sensors send.
 pub trait Measurement: Copy {
-    /// What is sent of what was `measured` after `last`, `None` where there was nothing to measure.
+    /// Returns the message that is sent after `last` for what was `measured`; `None` means that there was
+    /// nothing to measure.
     fn sent(measured: Option<Self>, last: &Self, chance: &mut Chance<'_>) -> Self;
 }
 
@@ -89,13 +90,13 @@ impl Measurement for Ranges {
 pub trait Sensor: Sized + Send {
     /// Its name in manifests, and what it does.
     const INFO: Info;
-    /// What the manifest's `parameters` table holds.
+    /// Parameters in the manifest.
     type Parameters: Parameters;
-    /// What it reads.
+    /// Inputs.
     type Inputs<'a>: InputPorts<'a>;
-    /// What it sends.
+    /// Outputs.
     type Outputs: OutputPorts + From<Sent<Self>>;
-    /// All that it remembers from tick to tick.
+    /// State from tick to tick.
     type State: Message + Default + Remembered<Measurement: Measurement>;
 
     /// Makes the sensor of parameters that are within their ranges, and of the files that they name.
@@ -125,7 +126,7 @@ pub trait Sensor: Sized + Send {
         Ok(())
     }
 
-    /// What it measures after `last`, at the times when it does; `None` where there is nothing to measure.
+    /// Measures after `last`, at the times when a measurement is due; `None` where there is nothing to measure.
     fn measure(
         &self,
         state: &mut Self::State,
@@ -135,10 +136,10 @@ pub trait Sensor: Sized + Send {
     ) -> Option<Sent<Self>>;
 }
 
-/// What a sensor sends.
+/// Message that a sensor sends.
 pub(crate) type Sent<S> = <<S as Sensor>::State as Remembered>::Measurement;
 
-/// What most sensors read.
+/// Inputs of most sensors.
 #[derive(Debug, InputPorts)]
 pub struct TruthInputs<'a> {
     /// The truth.

@@ -205,7 +205,7 @@ fn nees(sample: &Sample<'_>) -> f64 {
     errors.dot(&covariance.cholesky().expect("a covariance is positive").solve(&errors))
 }
 
-/// How the filter fares over all seeds.
+/// Consistency of the filter over all seeds.
 struct Consistency {
     /// By sensor: how many runs had their summed NIS within its 95 % bounds.
     runs_within: [usize; 4],
@@ -271,7 +271,7 @@ fn consistency(timings: &[Timing], true_params: EkfParams, believed: EkfParams) 
 }
 
 impl Consistency {
-    /// Whether the innovations and the errors are as large as the filter believes. Of 20 runs 19 are within their
+    /// True if the innovations and the errors are as large as the filter believes. Of 20 runs 19 are within their
     /// 95 % bounds on average, and 16 or fewer once in 60 times; of the seconds, which are not independent, three
     /// in four must be.
     fn holds(&self, timings: &[Timing]) -> bool {
@@ -430,7 +430,7 @@ fn without_a_magnetometer_gps_tells_the_yaw_of_a_vehicle_that_is_pushed_about_an
     assert!(hovering_deg > 4.5, "{hovering_deg}");
 }
 
-/// What it is told to begin with is off by far more than it is told too: motion capture is refused at first.
+/// The start that the filter is told is off by far more than its stated error: motion capture is refused at first.
 #[test]
 fn a_filter_that_is_told_a_wrong_start_finds_its_way() {
     let flight = fly(excited, [0.0, 0.0, 5.0], 3_000);
@@ -469,7 +469,7 @@ fn conditioning(timings: &[Timing]) -> (f64, bool) {
     (least, is_symmetric)
 }
 
-/// Why the update of the covariance needs no Joseph's form: docs/decisions/011 has an hour of it.
+/// The update of the covariance needs no Joseph's form: docs/decisions/011 has an hour of it.
 #[test]
 fn the_covariance_stays_well_conditioned() {
     for (timings, expected) in [(&[MOCAP][..], 0.03), (&OUTDOORS, 5e-5)] {

@@ -37,7 +37,7 @@ impl Run {
     }
 }
 
-/// What a range finder at the vehicle reads: the nearest of the walls and the floor, to a centimetre.
+/// Returns the reading of a range finder at the vehicle: the nearest of the walls and the floor, to a centimetre.
 fn range_m(truth: &Truth, direction_B: Vector3<f64>, walls: [Option<f64>; 4], random: &mut Stream) -> f64 {
     let (from, along) = (truth.position_W_m, truth.attitude_WB * direction_B);
     let plane = |at: f64, axis: usize| (at - from[axis]) / along[axis];
@@ -61,8 +61,8 @@ fn estimate(flight: &[Truth], room: Room, seed: u64, judge: impl FnMut(&Run)) {
     estimate_with(flight, room, None, seed, judge);
 }
 
-/// What a receiver tells at sample `k` that is so many samples late: a velocity every 100 ms, 0.074 m/s off along each axis
-/// (RMS, the thesis's receiver, ch. 4).
+/// Returns the message of a receiver at sample `k` that is `late` samples late: a velocity every 100 ms, 0.074
+/// m/s off along each axis (RMS, the thesis's receiver, ch. 4).
 fn told(flight: &[Truth], k: usize, late: usize, random: &mut Stream) -> Gps {
     let Some(measured) = k.checked_sub(late) else { return Gps::default() };
     let noise = Vector3::from_fn(|_, _| 0.074 * normal(random));

@@ -39,10 +39,10 @@ const NEVER: u64 = u64::MAX;
 /// motion capture, 2 s of GPS.
 const REFUSED_IN_ROW_MAX: u32 = 20;
 
-/// What the estimator remembers, as it is handed over.
+/// State of the estimator, as it is handed over.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EkfState {
-    /// What it remembers besides the last readings.
+    /// State besides the last readings.
     pub kept: Kept,
     /// The last readings.
     readings: Readings,
@@ -365,7 +365,7 @@ impl EkfState {
         &self.kept.present
     }
 
-    /// Whether the filter has begun: before, there is no estimate.
+    /// True once the filter has begun: before, there is no estimate.
     #[must_use]
     pub fn has_begun(&self) -> bool {
         self.kept.has_begun == 1
@@ -390,7 +390,7 @@ fn reduced<const N: usize>(
     symmetric(&(covariance - gain * cross.transpose()))
 }
 
-/// How many standard deviations a chi-square of `degrees` of freedom is from what it is on average: its cube root
+/// Returns the deviation of a chi-square of `degrees` of freedom from its mean, in standard deviations: its cube root
 /// is nearly normal (Wilson and Hilferty, "The distribution of chi-square", PNAS 17, 1931).
 #[must_use]
 pub fn deviation(chi_square: f64, degrees: usize) -> f64 {

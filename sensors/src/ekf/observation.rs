@@ -1,4 +1,4 @@
-//! What each sensor should measure, and how that depends on the filter's errors.
+//! Expected measurement of each sensor, and its dependence on the filter's errors.
 
 use super::history::Measurement;
 use super::motion::Motion;
@@ -12,7 +12,7 @@ use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
 pub struct Observation<const N: usize> {
     /// Measured less expected.
     pub innovation: SVector<f64, N>,
-    /// How it depends on the errors.
+    /// Its derivatives with respect to the errors.
     pub jacobian: SMatrix<f64, N, STATES>,
     /// Variances of the measurement's own errors.
     pub variance: SVector<f64, N>,

@@ -1,7 +1,7 @@
-//! Where the filter begins: at the first position that is known, with the attitude that gravity shows.
+//! Start of the filter: at the first position that is known, with the attitude that gravity shows.
 //!
-//! What a measurement says is taken for the motion with hardly any confidence, and the same measurement, used as
-//! any other, then gives it the confidence that it deserves.
+//! A measurement is first taken for the motion with hardly any confidence. Used again as any other measurement,
+//! it then gives the motion the confidence that it deserves.
 
 use super::history::{Measurement, Newest, Reading, Readings, Source};
 use super::motion::Motion;

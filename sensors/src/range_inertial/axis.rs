@@ -63,15 +63,15 @@ impl Side {
 /// A distance that was measured some time ago.
 #[derive(Clone, Copy, Debug)]
 pub struct Echo {
-    /// Where to.
+    /// Direction of the measurement.
     pub side: Side,
     /// Distance when it was measured, m.
     pub distance_m: f64,
     /// Its standard deviation, m.
     pub sigma_m: f64,
-    /// How long ago, s.
+    /// Time since the measurement, s.
     pub age_s: f64,
-    /// How far the path has grown since, m.
+    /// Growth of the path since, m.
     pub moved_m: f64,
 }
 
@@ -198,7 +198,7 @@ impl Axis {
     }
 }
 
-/// How an echo depends on the errors of the present state: the velocity at its time was another.
+/// Returns the derivatives of an echo by the errors of the present state: the velocity at its time was another.
 fn observation(echo: &Echo) -> Mean {
     let mut observation = Mean::zeros();
     observation[AHEAD + echo.side.index()] = 1.0;

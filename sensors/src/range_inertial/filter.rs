@@ -34,7 +34,7 @@ const LEVEL_BEAMS: [[f64; 3]; 4] = [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0
 /// The place of the beam that looks down.
 const DOWN: usize = 4;
 
-/// How many samples the filter can look back for the place of an echo.
+/// Number of samples that the filter can look back for the place of an echo.
 const PAST: usize = 128;
 
 /// A measurement came too late to be of use.
@@ -111,7 +111,7 @@ pub struct RangeInertialState {
     past: [Past; PAST],
 }
 
-/// What the estimator reads.
+/// Inputs of the estimator.
 #[derive(Debug, InputPorts)]
 pub struct RangeInertialInputs<'a> {
     /// Measurements of the range finders.
@@ -235,7 +235,7 @@ impl RangeInertial {
         }
     }
 
-    /// How fast the attitude estimate's leaning towards the accelerometer changes the bias.
+    /// Returns the rate at which the attitude estimate's leaning towards the accelerometer changes the bias.
     fn lean_m_s3(&self, acceleration_W_m_s2: &Vector3<f64>, force_m_s2: f64) -> Vector3<f64> {
         let gravity_m_s2 = self.params.gravity_m_s2;
         if (force_m_s2 - gravity_m_s2).abs() > GRAVITY_TOLERANCE * gravity_m_s2 {
@@ -285,7 +285,7 @@ impl RangeInertial {
         Ok(())
     }
 
-    /// Whether an echo, in a room of known size, is not that of the wall.
+    /// True if an echo, in a room of known size, is not that of the wall.
     fn is_obstacle(&self, axis: &Axis, echo: &Echo) -> bool {
         let wall_m = axis.distance[echo.side.index()];
         self.params.room_m.is_some() && (echo.now_m() - wall_m).abs() > OBSTACLE_M
@@ -325,7 +325,7 @@ impl RangeInertial {
         (0.5 * nearest_m, libm::hypot(self.params.range_sigma_m, nearest_m / 12.0_f64.sqrt()))
     }
 
-    /// How far a beam's lower edge goes before it meets the floor, m.
+    /// Returns the way of a beam's lower edge to the floor, m.
     fn floor_m(&self, state: &RangeInertialState, beam_W: &Vector3<f64>) -> f64 {
         let dive_rad = self.params.half_angle_deg.to_radians() - libm::asin(beam_W.z.clamp(-1.0, 1.0));
         if dive_rad > 0.0 { state.height_m() / libm::sin(dive_rad) } else { f64::INFINITY }
@@ -348,7 +348,8 @@ impl RangeInertial {
         }
     }
 
-    /// What is around, in the order of `LEVEL_BEAMS` along the heading at `yaw_rad`; the reach where nothing is in sight.
+    /// Returns the walls in the order of `LEVEL_BEAMS` along the heading at `yaw_rad`; the reach where nothing
+    /// is in sight.
     #[must_use]
     pub fn walls(&self, state: &RangeInertialState, yaw_rad: f64, now_ns: u64) -> WallEstimate {
         let heading = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw_rad);
@@ -418,7 +419,7 @@ impl RangeInertialState {
         self.samples += 1;
     }
 
-    /// Where the vehicle was `samples` samples ago, if that is remembered.
+    /// Returns the vehicle's place `samples` samples ago, if that is remembered.
     fn past(&self, samples: f64) -> Option<Past> {
         let back = samples.round() as u64;
         let is_known = back < self.samples.min(PAST as u64);

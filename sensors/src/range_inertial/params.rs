@@ -4,15 +4,15 @@ use crate::parameters::within;
 use diagnostics::parameter::{ParameterError, finite, not_negative, positive};
 
 parameters! {
-    /// What the range finders, the IMU and the attitude are worth, and where the vehicle starts.
+    /// Uncertainties of the range finders, the IMU and the attitude, and the start of the vehicle.
     #[derive(Copy)]
     pub struct RangeInertialParams {
         /// Standard deviation of a range, m. Default 0.0104: the noise of the kind `range`, 0.01 m, and rounding
         /// to its centimetre, 0.01 m / √12.
         range_sigma_m: f64 = 0.0104 => positive,
-        /// What a range finder reads where it meets nothing, m. Default 7.65, the MB1300 (thesis §5.5).
+        /// Reading of a range finder that meets nothing, m. Default 7.65, the MB1300 (thesis §5.5).
         reach_m: f64 = 7.65 => positive,
-        /// What a range finder reads of anything nearer, m. Default 0.20 (MB1300 data sheet).
+        /// Reading of a range finder for anything nearer, m. Default 0.20 (MB1300 data sheet).
         nearest_m: f64 = 0.20 => not_negative,
         /// Half angle of the beams' cones, degrees: a wall that is turned by less is met at right angles.
         /// Default 5, as of the kind `range`.
@@ -23,7 +23,7 @@ parameters! {
         /// A range further than this many standard deviations from what was expected comes from something
         /// new: a wall that is passed, or another vehicle. Default 4 (tuned, no source), one wall in 16 000 echoes.
         gate_sigma: f64 = 4.0 => positive,
-        /// How long a wall stays in sight without an echo, s. Default 0.5, five of the MB1300's readings.
+        /// Time that a wall stays in sight without an echo, s. Default 0.5, five of the MB1300's readings.
         sight_hold_s: f64 = 0.5 => positive,
         /// Time constant with which the attitude estimate follows the accelerometer, s: what it does so to
         /// the level acceleration is taken off. Default 30, as of the kind `attitude`.
@@ -44,7 +44,8 @@ parameters! {
         /// Standard deviation of a level velocity of the input `gps` along each axis, m/s. Default 0.074, as of the kind
         /// `gps`.
         gps_velocity_sigma_m_s: f64 = 0.074 => positive,
-        /// Where the vehicle starts, along the world's x and y, m: the estimate's position begins there. Default 0, 0.
+        /// Place of the vehicle at the start, along the world's x and y, m: the estimate's position begins
+        /// there. Default 0, 0.
         initial_level_position_m: [f64; 2] = [0.0; 2] => finite,
         /// Height at the start, m. Default 0.0.
         initial_height_m: f64 = 0.0 => not_negative,
