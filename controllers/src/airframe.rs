@@ -45,7 +45,7 @@ impl ControlledVehicle {
         Ok(Self { vehicle, allocation })
     }
 
-    /// What the loops about hover have to know of it. Products of inertia are left to the loops.
+    /// Returns its model for the loops about hover. Products of inertia are left to the loops.
     #[must_use]
     pub fn hover_model(&self) -> HoverModel {
         let (thrust_min_N, thrust_max_N) = self.allocation.thrust_range_N(THRUST_RESERVE);

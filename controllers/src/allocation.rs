@@ -163,7 +163,7 @@ pub struct Allocated {
 }
 
 impl Allocated {
-    /// Whether any of the demand was given up.
+    /// True if any of the demand was given up.
     #[must_use]
     pub fn is_saturated(&self) -> bool {
         self.thrust_error_N != 0.0 || self.roll_pitch_part != 1.0 || self.yaw_part != 1.0

@@ -1,4 +1,4 @@
-//! How fast to come near a wall: from the distance still to go to a velocity.
+//! Speed of the approach to a wall: from the distance still to go to a velocity.
 //!
 //! Near the end the velocity is proportional to the distance, v = k·e; further away it is that from which the
 //! deceleration a stops in time, v = √(2a·(e − a/2k²)). The two meet at e = a/k² with the same slope, so that

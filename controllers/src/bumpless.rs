@@ -43,7 +43,7 @@ pub struct BumplessTransfer {
     id: LawId,
     thrust_max_N: f64,
     torque_max_N_m: Vector3<f64>,
-    /// What one period leaves of what fades.
+    /// Factor by which a residual shrinks in one period.
     fade: f64,
 }
 
@@ -79,7 +79,7 @@ impl BumplessTransfer {
         output
     }
 
-    /// Where this is the first tick after another law flew, goes on from what that one asked for.
+    /// Continues from the wrench of another law, if this is the first tick after that law flew.
     fn take_over<L: Law>(
         &self,
         law: &L,

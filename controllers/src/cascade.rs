@@ -261,7 +261,7 @@ mod tests {
         SetPoint { altitude_m: 1.0, ..SetPoint::default() }
     }
 
-    /// What was asked for in flight, so that the yaw command is not reset.
+    /// Wrench that was asked for in flight, so that the yaw command is not reset.
     const IN_FLIGHT: RotorWrench = RotorWrench { thrust_N: 5.0, torque_B_N_m: Vector3::new(0.0, 0.0, 0.0) };
 
     fn flying(measured: &HoverMotion) -> CascadeState {

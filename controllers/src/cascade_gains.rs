@@ -21,7 +21,7 @@ use diagnostics::unit::{ANGULAR_ACCELERATION, PER_SECOND, PER_SECOND_2, PURE_NUM
 gains! {
     /// Gains and limits of the inner loops.
     pub struct CascadeGains of file, built in "cascade.toml" {
-        /// What is done to the commands first.
+        /// Filter of the commands.
         filter: CommandFilter = CommandFilter::read(&file.table("command_filter")),
         /// Errors of roll, pitch and yaw (rad) to their commanded rates of change (rad/s), 1/s.
         attitude_1_s: [f64; 3] = ["attitude.roll", "attitude.pitch", "attitude.yaw"].map(|key| file.gain(key, PER_SECOND)),

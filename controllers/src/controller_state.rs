@@ -64,7 +64,7 @@ pub struct ControllerState {
 }
 
 impl ControllerState {
-    /// Whether no law has left it yet.
+    /// True if no law has left it yet.
     pub(crate) fn is_new(&self) -> bool {
         self.id == LawId::default()
     }

@@ -33,7 +33,7 @@ pub struct ObserverState {
     pub velocity_foreseen: [f64; 3],
 }
 
-/// What it believes, in the world.
+/// Estimate of the observer, in the world.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Disturbance {
     /// d̂.
@@ -86,7 +86,7 @@ mod tests {
         MotionEstimate { position_W_m: zero, velocity_W_m_s, attitude_WB, angular_velocity_B_rad_s: zero }
     }
 
-    /// What it believes after `time_s` of `true_W_m_s2` while the model says 1 m/s² along x.
+    /// Returns the estimate after `time_s` of `true_W_m_s2` while the model says 1 m/s² along x.
     fn believed(true_W_m_s2: Vector3<f64>, time_s: f64) -> Vector3<f64> {
         let mut velocity_W_m_s = Vector3::zeros();
         let mut state = ObserverState::at(&moving(velocity_W_m_s));

@@ -8,7 +8,7 @@
 use diagnostics::unit::LENGTH;
 
 gains! {
-    /// How the tilt falls.
+    /// Fall of the tilt with the distance.
     pub struct FreeFlight of file {
         /// The distance still to go over which it falls from the full one to none, m.
         fall_m: f64 = file.limit("fall", LENGTH),

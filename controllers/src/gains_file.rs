@@ -72,7 +72,7 @@ macro_rules! gains {
     };
 }
 
-/// What makes gains of a file's root table.
+/// Function that makes gains of a file's root table.
 pub(crate) type Reader<G> = fn(&Table<'_, '_>) -> G;
 
 /// The gains in the file at `path` among `files`, the manifest's parameter `gains`.
@@ -90,7 +90,7 @@ pub(crate) fn load<G>(files: &InputFiles, path: &Path, read: Reader<G>) -> Resul
 /// The gains in `text`; `file_name` is for messages only.
 ///
 /// # Errors
-/// All that is missing, unknown or no gain in the text.
+/// Each key of the text that is missing, unknown or no gain.
 pub(crate) fn parse<G>(text: &str, file_name: &str, read: Reader<G>) -> Result<G, Diagnostic> {
     let doc = Document::new(file_name, text);
     let tree = doc.tree()?;
@@ -144,7 +144,7 @@ const LIMIT: Bounds = Bounds {
 };
 
 impl Table<'_, '_> {
-    /// Whether it has `name`.
+    /// True if it has `name`.
     pub(crate) fn has(&self, name: &'static str) -> bool {
         self.section.as_ref().is_some_and(|section| section.has(name))
     }

@@ -54,7 +54,7 @@ pub struct GeometricLaw {
     foresight: Foresight,
 }
 
-/// How the model has the vehicle move, in the world.
+/// Motion of the vehicle by the model, in the world.
 struct Push {
     acceleration_W_m_s2: Vector3<f64>,
     jerk_W_m_s3: Vector3<f64>,
@@ -89,7 +89,7 @@ impl GeometricLaw {
         (RotorWrench { thrust_N: self.foresight.limited_N(hurried.thrust_N), ..hurried }, target)
     }
 
-    /// What the model makes of the vehicle's motion: rotors as foreseen, gravity, and drag where it is stated.
+    /// Returns the vehicle's motion by the model: rotors as foreseen, gravity, and drag where it is stated.
     fn push(&self, made: &Made, motion: &MotionEstimate) -> Push {
         let z_W = motion.attitude_WB * Vector3::z();
         let turning_W = motion.attitude_WB * motion.angular_velocity_B_rad_s.cross(&Vector3::z());

@@ -47,7 +47,7 @@ pub struct LqrLaw {
     foresight: Foresight,
 }
 
-/// What the reference needs.
+/// Attitude, wrench and rate of the thrust that the reference needs.
 struct Needed {
     attitude: Target,
     wrench: RotorWrench,

@@ -57,16 +57,16 @@ impl Default for Parameters {
     }
 }
 
-/// What the hold reads.
+/// Inputs of the hold.
 #[derive(Debug, InputPorts)]
 pub struct Inputs<'a> {
-    /// What the pilot asks for.
+    /// Set point of the pilot.
     pub set_point: &'a SetPoint,
     /// The motion.
     pub estimate: &'a StateEstimate,
 }
 
-/// What it sends.
+/// Outputs of the hold.
 #[derive(Debug, OutputPorts)]
 pub struct Outputs {
     /// The pilot's set point with the tilt that holds the place.

@@ -25,11 +25,11 @@ const DIVERGES: f64 = 2.0;
 /// held take 14° and more at the loop's own bandwidth.
 const COARSE: f64 = 0.5;
 
-/// Refuses numbers with which `law` diverges or asks for what is no number; warns of a vehicle that cannot hover, and of
-/// a coarse period.
+/// Refuses numbers with which `law` diverges or asks for NaN; warns of a vehicle that cannot hover, and of a coarse
+/// period.
 ///
 /// # Errors
-/// What goes wrong, and which keys are to blame.
+/// The failure, and the keys that may cause it.
 pub(crate) fn check<L: Law>(
     law: &L,
     craft: &ControlledVehicle,

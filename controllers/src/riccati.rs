@@ -90,7 +90,7 @@ fn relative_residual<const N: usize, const M: usize>(
     (next - cost).norm() / cost.norm()
 }
 
-/// Whether x ← M·x fades: M^(2^n) vanishes.
+/// True if x ← M·x fades: M^(2^n) vanishes.
 fn is_stable<const N: usize>(step: &SMatrix<f64, N, N>) -> bool {
     let mut power = *step;
     for _ in 0..DOUBLINGS_MAX {

@@ -11,7 +11,7 @@
 //!   So the velocity command turns in a corner without changing its length, and there is no jump in it.
 //!   An integrator over that error takes up what a tilted attitude estimate leaves.
 //!
-//! Where the room's size is known ([`Room`]), other vehicles in the beams are told from walls, and one that is
+//! If the room's size is known ([`Room`]), other vehicles in the beams are told from walls, and one that is
 //! ahead slows the vehicle down to a stop.
 
 use crate::allocation::RotorWrench;
@@ -51,7 +51,7 @@ gains! {
     }
 }
 
-/// How the velocity along the walls is chosen.
+/// Choice of the velocity along the walls.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Mode {
@@ -61,12 +61,12 @@ pub enum Mode {
     Constant,
 }
 
-/// What is known of the room beforehand, for a vehicle that shares it with others.
+/// Room that is known beforehand, for a vehicle that shares it with others.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shared {
     /// The room.
     pub room: Room,
-    /// Where the vehicle starts, from the walls at -x and -y, m; what the beams tell where it is not given.
+    /// Place of the vehicle at the start, from the walls at -x and -y, m; that by the beams where it is not given.
     pub start_m: Option<[f64; 2]>,
     /// It stops where something ahead is nearer than this, and flies at full speed from twice this on, m.
     pub ahead_min_m: f64,
@@ -92,7 +92,7 @@ pub struct WallFollowLaw {
     pub gains: WallFollowGains,
     /// The loops inside.
     pub velocity: VelocityLoop,
-    /// How the velocity is chosen.
+    /// Choice of the velocity.
     pub mode: Mode,
     /// The constant speed, or the most of the varying one, m/s.
     pub speed_m_s: f64,
@@ -154,7 +154,7 @@ pub struct Parameters {
     start_state: u32,
     /// Size of the room, where it is shared with other vehicles.
     room_m: Option<[f64; 2]>,
-    /// Where it starts, from the walls at -x and -y.
+    /// Place at the start, from the walls at -x and -y.
     start_in_room_m: Option<[f64; 2]>,
     /// Least distance to a vehicle ahead.
     ahead_min_m: Option<f64>,

@@ -30,8 +30,8 @@ pub const BRAKING: u32 = 2;
 /// Holding the distance.
 pub const HOLDING: u32 = 3;
 
-/// How far a holding vehicle may be from the distance, in units of what makes it holding, before it counts as
-/// braking again. Tuned, no source: so far that no noise does it.
+/// Factor of the holding limit within which a vehicle goes on holding; beyond it, it counts as braking again.
+/// Tuned, no source: so large that no noise exceeds it.
 const HOLDING_LEFT_FACTOR: f64 = 3.0;
 
 gains! {
@@ -143,8 +143,8 @@ fn default_distance_m() -> f64 {
 
 /// Beyond this the sensors' reach of 7.65 m (thesis §5.5) leaves too little to brake in.
 const DISTANCE_MAX_M: f64 = 5.0;
-/// Where no wall is in sight, the estimate's distance is the sensors' reach, and the approach to a wall there
-/// keeps the speed below this in any case.
+/// Greatest cruise speed. If no wall is in sight, the estimate's distance is the sensors' reach, and
+/// the approach to a wall there keeps the speed below this in any case.
 const SPEED_MAX_M_S: f64 = 3.0;
 
 impl Law for WallStopLaw {

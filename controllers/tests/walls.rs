@@ -44,7 +44,7 @@ fn wall_follow(mode: Mode, speed_m_s: f64) -> WallFollowLaw {
     }
 }
 
-/// How a flight to a wall went.
+/// Result of a flight to a wall.
 #[derive(Default)]
 struct Stop {
     nearest_m: f64,
@@ -55,7 +55,7 @@ struct Stop {
     last_speed_m_s: f64,
     /// Greatest speed towards the wall after the speed fell below [`STOPPED_M_S`] for the first time.
     again_m_s: f64,
-    /// How far it ever was from where it began, along the wall.
+    /// Greatest distance from its start, along the wall.
     aside_m: f64,
     state: u32,
     altitude_error_m: f64,
@@ -157,7 +157,7 @@ fn it_stops_at_another_distance_and_from_within_the_room() {
     }
 }
 
-/// What a flight in the room came to.
+/// Result of a flight in the room.
 #[derive(Default)]
 struct Laps {
     nearest_m: f64,
@@ -169,7 +169,7 @@ struct Laps {
     altitude_error_m: f64,
 }
 
-/// How far from the walls the walls' nearest is at a place of the room.
+/// Returns the distance of the nearest wall from a place of the room.
 fn clearance_m(at: &Vector3<f64>) -> f64 {
     5.0 - at.x.abs().max(at.y.abs())
 }
