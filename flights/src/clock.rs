@@ -33,7 +33,7 @@ pub enum NotForward {
         /// The indices of the first two times that fall.
         first: [usize; 2],
     },
-    /// All times are the same.
+    /// Every time is the same.
     Stands,
 }
 

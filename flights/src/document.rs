@@ -30,7 +30,7 @@ impl Document {
         })
     }
 
-    /// Where `span` begins.
+    /// Returns the place at which `span` begins.
     pub fn place(&self, span: &Range<usize>) -> Place {
         Place::of(self.path.display().to_string(), &self.text, span)
     }

@@ -1,4 +1,4 @@
-//! What is found where values are compared with physics.
+//! Findings of a comparison of values with physics.
 
 use crate::quantity::Quantity;
 
@@ -9,6 +9,6 @@ pub struct Finding {
     pub channel: Quantity,
     /// The unit, frame or order that would fit, if the mismatch is clear; otherwise it is only worth a note.
     pub fits: Option<String>,
-    /// All this as text, with numbers.
+    /// The whole finding as text, with numbers.
     pub message: String,
 }

@@ -10,7 +10,7 @@ use vehicles::gaps::of_held;
 
 use crate::quantity::Quantity;
 
-/// What a flight is for.
+/// Role of a flight.
 ///
 /// ```
 /// assert_eq!(flights::Role::Select.name(), "select");
@@ -57,13 +57,13 @@ pub struct Channel<const N: usize> {
 /// A flight. A channel that was not logged has no samples.
 #[derive(Debug, Clone)]
 pub struct Flight {
-    /// What reports call it.
+    /// Its name in reports.
     pub name: String,
     /// The file it was read from.
     pub file: PathBuf,
     /// Further files it was read from: later parts of its log, and the logs of single channels.
     pub other_files: Vec<PathBuf>,
-    /// What it is for.
+    /// Its role.
     pub role: Role,
     /// Number of rotors of its vehicle: behind so many, commands and speeds are zero.
     pub rotors: usize,
@@ -89,14 +89,14 @@ pub struct Flight {
     pub specific_force: Channel<3>,
     /// Voltage of the battery in V.
     pub battery_voltage: Channel<1>,
-    /// What the flights file has assumed instead of a measurement, such as a level attitude.
+    /// Assumptions of the flights file in place of measurements, such as a level attitude.
     pub assumed: Vec<String>,
-    /// What the reader noticed: repeated samples left out, gaps, values that look like another unit.
+    /// Notes of the reader: repeated samples left out, gaps, values that look like another unit.
     pub notes: Vec<String>,
 }
 
 impl<const N: usize> Channel<N> {
-    /// Whether the quantity was not logged.
+    /// True if the quantity was not logged.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.time_s.is_empty()
@@ -177,7 +177,7 @@ impl Flight {
         if all.is_empty() { "no channel".to_owned() } else { all.join(", ") }
     }
 
-    /// All files it was read from.
+    /// Iterates over the files that it was read from.
     pub fn files(&self) -> impl Iterator<Item = &Path> {
         std::iter::once(&self.file).chain(&self.other_files).map(PathBuf::as_path)
     }

@@ -76,7 +76,7 @@ fn without_jumps<const N: usize>(
 struct Step {
     from: usize,
     span_s: f64,
-    /// How much longer it is than the speed before and after would have it.
+    /// Length of its deviation from a step as the one before and the one behind would have it.
     excess: f64,
 }
 

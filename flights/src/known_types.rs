@@ -6,8 +6,8 @@ use crate::log::Log;
 use crate::name::Name;
 use crate::quantity::Quantity;
 
-/// Where a type of message holds a quantity. In `fields`, `*` stands for x, y, z (and w) in turn, and `#` for the
-/// indices from 0 on.
+/// Fields in which a type of message holds a quantity. In `fields`, `*` stands for x, y, z (and w) in turn, and
+/// `#` for the indices from 0 on.
 struct Known {
     kind: &'static str,
     quantity: Quantity,

@@ -17,30 +17,30 @@ const MATCHING: MatchOptions =
 
 /// A log that becomes a flight.
 pub struct Log<'a> {
-    /// What the flights file says of it.
+    /// Its entry in the flights file.
     pub entry: &'a Spanned<FlightEntry>,
-    /// Which entry that is, from 0.
+    /// Index of that entry, from 0.
     pub index: usize,
-    /// What reports call the flight.
+    /// Name of the flight in reports.
     pub name: String,
     /// The files of the log, in the order of time; one at least.
     pub files: Vec<PathBuf>,
 }
 
 impl Log<'_> {
-    /// Where the name comes from.
+    /// Returns the place of the name.
     pub fn name_span(&self) -> Range<usize> {
         let entry = self.entry.get_ref();
         entry.name.as_ref().map_or(entry.file.span(), Spanned::span)
     }
 }
 
-/// Whether files are looked for, or a pattern is taken for a name.
+/// Treatment of patterns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Patterns {
-    /// In the folders of this machine.
+    /// A pattern is searched for in the folders of this machine.
     Find,
-    /// Where there are no folders.
+    /// A pattern is taken for a name, where there are no folders.
     Literal,
 }
 

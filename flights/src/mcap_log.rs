@@ -33,7 +33,7 @@ struct Topic {
     definition: Result<Definition, NoDefinition>,
 }
 
-/// Why a topic's messages cannot be read.
+/// Reason why a topic's messages cannot be read.
 #[derive(Debug, thiserror::Error)]
 enum NoDefinition {
     #[error("no schema")]

@@ -30,7 +30,7 @@ const CHOOSE_BESIDE: &str =
 /// Advice where the clock of a part starts again.
 const CUT: &str = "a part of a log has one recording: cut the file there";
 
-/// All that is needed to open the logs of a flights file.
+/// Arguments for the opening of the logs of a flights file.
 pub struct Opening<'a> {
     /// The flights file.
     pub document: &'a Document,

@@ -43,9 +43,9 @@ const AGAINST: f64 = 0.3;
 const CLEARLY: f64 = 0.3;
 /// And two that are nearer than this cannot be told apart.
 const ALIKE: f64 = 0.1;
-/// What would make it good, as text and in numbers.
+/// Correction that would make it good, as text and in numbers.
 type Mistake<T> = (&'static str, fn(T) -> T);
-/// What is mistaken about the Euler angles roll and pitch.
+/// Possible mistakes about the Euler angles roll and pitch.
 const ANGLE_MISTAKES: [Mistake<(f64, f64)>; 5] = [
     ("a `-` before the pitch", |(roll, pitch)| (roll, -pitch)),
     ("a `-` before the roll", |(roll, pitch)| (-roll, pitch)),
@@ -62,7 +62,7 @@ const POSITION_MISTAKES: [Mistake<[f64; 3]>; 4] = [
 ];
 /// Speeds are those that hover needs within this factor: it is the root of the one within which thrust and mass are known.
 const ROTOR_SPEED_TOLERANCE: f64 = 1.25;
-/// How many pole pairs motors of vehicles have.
+/// Numbers of pole pairs that motors of vehicles have.
 const POLE_PAIRS: std::ops::RangeInclusive<f64> = 2.0..=24.0;
 /// Voltages that a battery of a vehicle can have, from one cell to fourteen.
 const VOLTAGE_RANGE_V: (f64, f64) = (2.0, 62.0);
@@ -367,7 +367,7 @@ impl Judge<'_> {
         (off < libm::log(LEANING_TOLERANCE)).then(|| format!("{} of `attitude`", of_unit(name)))
     }
 
-    /// How much smaller a position can be than its true one, if its unit is declared too large.
+    /// Returns the ratio of a position to its true value, if its unit is declared too large.
     fn position_scale(&self) -> f64 {
         let declared = self.units.factor(Quantity::Position);
         let largest = Quantity::Position.dimension().units.iter().map(|unit| unit.1).fold(declared, f64::max);
@@ -384,7 +384,7 @@ impl Judge<'_> {
         (speed > SPEED_MAX_M_S).then(|| finding(quantity, fits, &what))
     }
 
-    /// All numbers of the rotors that the vehicle has.
+    /// Iterates over the numbers of the rotors that the vehicle has.
     fn of_rotors<'c>(&self, channel: &'c Channel<ROTORS_MAX>) -> impl Iterator<Item = f64> + Clone + use<'c> {
         let count = self.vehicle.rotors.len();
         channel.values.iter().flat_map(move |each| each.iter().take(count).copied())
@@ -463,7 +463,7 @@ impl Judge<'_> {
         is_near.then(|| "mechanical speeds, without `pole_pairs`,".to_owned())
     }
 
-    /// How many there are is known of the motor, and not from a hover that is known but roughly.
+    /// Returns a hint at `pole_pairs`. Their number is known from the motor; a hover shows it only roughly.
     fn hint_of_poles(&self, factor: f64) -> String {
         let declared =
             self.units.declared(Quantity::RotorSpeed).and_then(|entry| entry.pole_pairs).unwrap_or(1);
@@ -503,7 +503,7 @@ fn with_angles(attitude: &Channel<4>, change: fn((f64, f64)) -> (f64, f64)) -> C
     Channel { time_s: attitude.time_s.clone(), values: attitude.values.iter().map(changed).collect() }
 }
 
-/// What of two would fit, where not both are wrong.
+/// Joins the fits of two as text; if only one has a fit, returns that.
 fn either(here: Option<String>, there: Option<String>) -> Option<String> {
     match (here, there) {
         (Some(here), Some(there)) => Some(format!("{here} here or {there}")),

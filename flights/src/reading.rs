@@ -44,17 +44,17 @@ pub struct Part {
     pub to_s: f64,
 }
 
-/// What is needed to read a flight.
+/// Arguments for the reading of a flight.
 pub struct Reading<'a> {
     /// The flights file.
     pub document: &'a Document,
     /// The declared vehicle.
     pub vehicle: &'a Vehicle,
-    /// What reports call the flight.
+    /// Name of the flight in reports.
     pub name: &'a str,
     /// The flight as declared.
     pub entry: &'a FlightEntry,
-    /// Where that stands.
+    /// Place of its entry.
     pub at: Range<usize>,
     /// The log's format.
     pub format: Format,
@@ -396,7 +396,8 @@ impl Reading<'_> {
         self.log_error(&self.declaration_of(quantity), Some(quantity), cause)
     }
 
-    /// Where a channel is declared; the flight, for one that was taken by default and stands nowhere in the file.
+    /// Returns the place of a channel's declaration. For a channel that was taken by default, returns that of
+    /// the flight.
     fn declaration_of(&self, quantity: Quantity) -> Range<usize> {
         let declared = self.channels.get(&quantity).map(Spanned::span).filter(|span| !span.is_empty());
         declared.unwrap_or(self.at.clone())
@@ -448,7 +449,7 @@ fn say_command_gaps(time_s: &[f64], notes: &mut Vec<String>) {
     ));
 }
 
-/// What several channels have in common is said once.
+/// Merges equal notes of several channels into one.
 fn merged(notes: &[String]) -> Vec<String> {
     let mut said: Vec<(Vec<&str>, &str)> = Vec::new();
     for note in notes {

@@ -133,7 +133,7 @@ fn vehicle(path: &Path, read: &ReadFile<'_>, files: &InputFiles) -> Result<Vehic
     Vehicle::parse_with(&read, &file, &text)
 }
 
-/// What is wrong with the values of keys, before any log is read.
+/// Returns the faults in the values of keys, before any log is read.
 fn check_keys(document: &Document, flights: &[Spanned<FlightEntry>]) -> Vec<FlightsError> {
     let mut errors = Vec::new();
     if flights.is_empty() {

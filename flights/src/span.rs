@@ -31,17 +31,17 @@ const SHORT_S: f64 = 10.0;
     gap[1]
 )]
 pub struct Sparse {
-    /// How many the channel with the most has.
+    /// Number of samples of the channel with the most.
     pub samples: usize,
-    /// The time in which those of all channels lie.
+    /// Time in which the samples of all channels lie.
     pub span_s: f64,
     /// The longest time without any, of one channel.
     pub gap_s: f64,
-    /// Where it begins and ends.
+    /// Its beginning and its end.
     pub gap: [Moment; 2],
     /// The channel.
     pub channel: Quantity,
-    /// How far they may be apart on average.
+    /// Greatest mean distance of samples that is accepted.
     pub spacing_max_s: f64,
 }
 
@@ -50,7 +50,7 @@ pub struct Sparse {
 pub struct Moment {
     /// From the flight's start, or from the log's first sample where that is known.
     pub time_s: f64,
-    /// Whether it is from the log's first sample.
+    /// True if it is counted from the log's first sample.
     pub is_in_log: bool,
     /// The line of the log.
     pub line: Option<u64>,

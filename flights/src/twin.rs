@@ -1,4 +1,4 @@
-//! Whether two channels hold the same measurements: a copy, rows saved again, a part of them, at other times.
+//! Comparison of two channels for the same measurements: a copy, rows saved again, a part of them, at other times.
 //!
 //! Noise makes measured vectors all but unique. Those that two channels have in common vote for the offset between their
 //! clocks; at the offset with the most votes a copy agrees sample by sample, and another flight does not, however alike it
@@ -21,9 +21,9 @@ const NEIGHBOURS_MAX: usize = 16;
 /// The same measurements in two channels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Twin {
-    /// How many samples of the second are the same as those of the first at their time.
+    /// Number of samples of the second that are the same as those of the first at their time.
     pub same: usize,
-    /// Of so many.
+    /// Number of samples that were compared.
     pub compared: usize,
     /// First and last of them, in the first channel's time.
     pub in_first_s: (f64, f64),
@@ -31,7 +31,7 @@ pub struct Twin {
     pub in_second_s: (f64, f64),
 }
 
-/// What two channels have in common.
+/// Result of the comparison of two channels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Comparison {
     /// The second holds measurements of the first.
@@ -67,7 +67,7 @@ pub fn twin<const N: usize>(first: &Channel<N>, second: &Channel<N>) -> Comparis
     found.map_or(Comparison::Other, Comparison::Same)
 }
 
-/// What makes a difference, on each axis; zero where the channel stands still.
+/// Smallest differences that count, on each axis; zero where the channel stands still.
 struct Steps<const N: usize> {
     /// Values in one step are the same for a start.
     key: [f64; N],

@@ -1,4 +1,5 @@
-//! Whatever bytes a log has, reading it ends, with a flight or with words, and takes memory by the size of the file.
+//! Reading a log of any bytes ends, with a flight or with an error in words, and takes memory by the size of
+//! the file.
 
 #[path = "support/dataflash.rs"]
 #[allow(dead_code, reason = "other tests use the rest")]
@@ -19,8 +20,9 @@ use parquet::basic::{Compression, Encoding};
 use parquet::file::properties::{WriterProperties, WriterPropertiesBuilder, WriterVersion};
 use support::{Motion, crc32};
 
-/// What reading may hold for each byte of a log, and besides: rows of two bytes make rows of numbers, and the definition of
-/// an array in a few bytes makes a table of its 65536 elements. A row of commands has room for twelve rotors.
+/// Memory that reading may hold for each byte of a log, and besides: rows of two bytes make rows of numbers, and the
+/// definition of an array in a few bytes makes a table of its 65536 elements. A row of commands has room for
+/// twelve rotors.
 const HELD_PER_BYTE: usize = 1000;
 const HELD_BESIDES: usize = 40 << 20;
 

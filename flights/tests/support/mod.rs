@@ -74,7 +74,7 @@ impl Motion {
         Vector3::new(1.96 * libm::cos(1.4 * time), -2.0 * libm::sin(2.0 * time), 0.2 * libm::cos(time))
     }
 
-    /// What thrust has to make of it.
+    /// Returns the specific force in the world that the thrust has to make.
     fn force(time: f64) -> Vector3<f64> {
         Vector3::new(
             -2.744 * libm::sin(1.4 * time),
