@@ -7,7 +7,7 @@ use diagnostics::unit::{ANGULAR_VELOCITY, MASS, VELOCITY};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use vehicles::reader::Section;
 
-/// What a thing that moves weighs, and how it starts. Its mass is spread evenly over its volume.
+/// Mass and start of a thing that moves. Its mass is spread evenly over its volume.
 ///
 /// ```
 /// let scene = scenes::Scene::parse(scenes::reference::SLUNG_LOAD, "slung-load.toml")?;
@@ -23,7 +23,7 @@ pub struct FreeBody {
     pub inertia_kg_m2: Matrix3<f64>,
     /// Its centre of mass at the start, in the world; or as seen from the vehicle, of what hangs from that.
     pub centre_W_m: Vector3<f64>,
-    /// How its axes are turned at the start; those of a mesh are the file's.
+    /// Its attitude at the start; the axes of a mesh are those of the file.
     pub attitude_W: UnitQuaternion<f64>,
     /// The velocity of its centre of mass at the start; of what hangs from the vehicle beside that of the vehicle.
     pub velocity_W_m_s: Vector3<f64>,
@@ -31,7 +31,7 @@ pub struct FreeBody {
     pub angular_velocity_W_rad_s: Vector3<f64>,
 }
 
-/// Where a free body is.
+/// Pose of a free body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BodyPose {
     /// Its centre of mass, in the world.
@@ -41,7 +41,7 @@ pub struct BodyPose {
 }
 
 impl FreeBody {
-    /// Where it starts.
+    /// Returns its pose at the start.
     #[must_use]
     pub fn start(&self) -> BodyPose {
         BodyPose { position_W_m: self.centre_W_m, attitude_W: self.attitude_W }

@@ -8,7 +8,7 @@ use crate::triangles::Triangles;
 use crate::{glb, obj, stl};
 use std::path::Path;
 
-/// What a mesh file may be, by the end of its name.
+/// Formats of mesh files, by the end of their names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Format {
     Obj,

@@ -1,11 +1,11 @@
-//! What hangs from what: free bodies, by the joints of their scene.
+//! Free bodies that hang from the vehicle, by the joints of their scene.
 
 use crate::joint::{End, Freedom};
 use crate::scene::Scene;
 
 impl Scene {
-    /// Which of [`Scene::bodies`] hang from the vehicle, by joints to it or to others that do; the world ties nothing
-    /// together.
+    /// Tells for each of [`Scene::bodies`] whether it hangs from the vehicle, by joints to it or to others that
+    /// do; the world ties nothing together.
     #[must_use]
     pub fn hanging(&self) -> Vec<bool> {
         let mut hangs = vec![false; self.bodies().count()];
@@ -29,7 +29,7 @@ impl Scene {
         hangs
     }
 
-    /// Whether a joint ties the vehicle.
+    /// True if a joint ties the vehicle.
     #[must_use]
     pub fn is_vehicle_tied(&self) -> bool {
         self.joints.iter().any(|joint| [joint.parent, joint.child].contains(&End::Vehicle))
