@@ -1,4 +1,4 @@
-//! What the parts share: medians with spread, a table, a run of a manifest as JSON.
+//! Helpers that the parts share: medians with spread, a table, a run of a manifest as JSON.
 
 use std::path::Path;
 use std::process::Command;

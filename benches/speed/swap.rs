@@ -1,4 +1,4 @@
-//! What a swap costs: the start of the backup, the clock's hold, and the run as a whole.
+//! Cost of a swap: the start of the backup, the clock's hold, and the run as a whole.
 
 use crate::report::{Result, Spread, number, run_manifest};
 use serde_json::Value;

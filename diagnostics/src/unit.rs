@@ -199,7 +199,7 @@ const OF_MESSAGES: [&[Dimension]; 2] = [
     &[TIME, VOLTAGE, CURRENT, FLUX_DENSITY, PRESSURE, PURE_NUMBER, COUNT],
 ];
 
-/// Why a number cannot be converted from one unit to another.
+/// Reason why a number cannot be converted from one unit to another.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ConversionError {
     /// The units are of two dimensions.

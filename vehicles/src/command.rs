@@ -23,7 +23,7 @@ pub struct CommandMap {
     pub speed_at_min_rad_s: f64,
     /// Steady rotor speed at `max`, in rad/s.
     pub speed_at_max_rad_s: f64,
-    /// Whether a command of zero or less switches the motor off (speed 0) instead of saturating at `min`.
+    /// True if a command of zero or less switches the motor off (speed 0) instead of saturating at `min`.
     pub zero_is_off: bool,
 }
 

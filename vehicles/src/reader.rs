@@ -16,7 +16,7 @@ use diagnostics::{Diagnostic, ParameterError, Place, parse_toml};
 pub struct Document<'t> {
     file: &'t str,
     text: &'t str,
-    /// Where every number came from, in the order of reading.
+    /// Provenance of every number, in the order of reading.
     pub provenance: RefCell<Vec<Provenance>>,
 }
 
@@ -55,7 +55,7 @@ pub struct Quantity {
     pub si: f64,
     /// The whole dotted key.
     pub key: String,
-    /// Where the number stands, in bytes.
+    /// Place of the number, in bytes.
     pub at: Range<usize>,
     unit: &'static str,
 }
@@ -97,7 +97,7 @@ impl Quantity {
     }
 }
 
-/// Whether a number describes what is there or was chosen by somebody.
+/// Origin of a number: known of something that exists, or chosen by somebody.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Origin {
     Known,
@@ -121,7 +121,7 @@ pub struct Section<'d, 't> {
     pub doc: &'d Document<'t>,
     /// The whole dotted key of the table; empty for the root.
     pub path: String,
-    /// Where the table stands, in bytes.
+    /// Place of the table, in bytes.
     pub at: Range<usize>,
     table: &'d DeTable<'t>,
     asked: RefCell<BTreeSet<&'d str>>,
@@ -149,7 +149,7 @@ impl<'d, 't> Section<'d, 't> {
         self.find(name).ok_or_else(|| Diagnostic::at(self.doc.place(&self.at), missing()))
     }
 
-    /// Whether the file has `name`.
+    /// True if the file has `name`.
     pub fn has(&self, name: &'d str) -> bool {
         self.find(name).is_some()
     }
@@ -308,13 +308,13 @@ impl<'d, 't> Section<'d, 't> {
         });
     }
 
-    /// Where a number comes from.
+    /// Returns the source of a number.
     pub(crate) fn source(&self) -> Result<&'d str, Diagnostic> {
         self.need("source", "a text, or \"none\" for a number without a source")?;
         self.text("source")
     }
 
-    /// How well a number is known; of one without a source it need not be said.
+    /// Returns the uncertainty of a number; a number without a source need not have one.
     fn uncertainty(&self, factor: f64) -> Result<Uncertainty, Diagnostic> {
         if self.source()? == NO_SOURCE && !self.has("uncertainty") {
             return Ok(Uncertainty::Said("not stated".to_owned()));
@@ -358,7 +358,7 @@ impl<'d, 't> Section<'d, 't> {
         self.doc.bad(&value.span(), key, expected, format!("a TOML {}", value.get_ref().type_str()))
     }
 
-    /// Where the value of `name` stands, in bytes; the table itself where it has none.
+    /// Returns the place of the value of `name`, in bytes; that of the table itself where it has none.
     pub fn at_of(&self, name: &str) -> Range<usize> {
         self.table.get(name).map_or(self.at.clone(), Spanned::span)
     }

@@ -3,7 +3,7 @@
 use crate::foreign::Foreign;
 use crate::quotes::StrayQuote;
 
-/// Why a file is no table.
+/// Reason why a file is no table.
 #[derive(Debug, thiserror::Error)]
 pub enum TableError {
     /// It is of another format.
@@ -97,7 +97,7 @@ pub enum TableError {
     },
 }
 
-/// Why a table has no column of a name.
+/// Reason why a table has no column of a name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ColumnError {
     /// It has none of that name.

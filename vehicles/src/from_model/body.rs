@@ -12,7 +12,7 @@ use crate::file::is_rigid;
 /// digits.
 const TRIANGLE_SLACK: f64 = 1e-3;
 
-/// All links as one rigid body.
+/// The links of a model as one rigid body.
 pub struct Body {
     /// Sum of the masses.
     pub mass_kg: f64,
