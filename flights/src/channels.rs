@@ -205,7 +205,7 @@ fn named(quantity: Quantity, entry: &Entry, rotors: usize) -> Result<(Cow<'_, [N
     Ok((names, shape))
 }
 
-/// Returns the kind of a specific force as declared; refuses one that is declared of another quantity.
+/// Returns the kind of a specific force as declared; refuses one for another quantity.
 fn holds(quantity: Quantity, entry: &Entry) -> Result<Holds, LogError> {
     if entry.holds.is_some() && quantity != Quantity::SpecificForce {
         let (expected, advice) = ("`specific_force` alone to have it", "remove it");

@@ -367,7 +367,7 @@ impl Judge<'_> {
         (off < libm::log(LEANING_TOLERANCE)).then(|| format!("{} of `attitude`", of_unit(name)))
     }
 
-    /// Returns the ratio of a position to its true value, if its unit is declared too large.
+    /// Returns the least ratio that the position as read may have to its true value, if the log has another unit.
     fn position_scale(&self) -> f64 {
         let declared = self.units.factor(Quantity::Position);
         let largest = Quantity::Position.dimension().units.iter().map(|unit| unit.1).fold(declared, f64::max);
