@@ -17,7 +17,7 @@ const NOISES: [f64; 3] = [0.3, 1.0, 3.0];
 const DURATION_S: f64 = 12.0;
 const NULLS: u64 = 200;
 
-/// A case with what names it in the tables.
+/// A case with its name in the tables.
 type Row = (Vec<&'static str>, f64, f64, Judgement);
 /// The same, without a judgement where the vehicle could not be flown.
 type Flown = (Vec<&'static str>, f64, f64, Option<Judgement>);

@@ -1,10 +1,11 @@
-//! Clocks of a flight against each other: how late attitude and position are against the inertial unit, by the sensors
-//! alone.
+//! Offsets between the clocks of a flight: lateness of attitude and position against the inertial unit, by the
+//! sensors alone.
 //!
-//! The attitude's rate of change and the gyroscope's reading are the same quantity, and so are the position's second
-//! derivative and the accelerometer's reading turned by the attitude, less gravity: no model is needed to see by how much
-//! one lags. What the attitudes of all flights share is left to the candidate `sensor-delay`; what a single one has beyond
-//! that is taken off, and so is what position and velocity have beyond it.
+//! The attitude's rate of change and the gyroscope's reading are the same quantity. So are the position's
+//! second derivative and the accelerometer's reading, rotated by the attitude, less gravity. No model is needed
+//! to see by how much one lags. The lateness that the attitudes of all flights share is left to the candidate
+//! `sensor-delay`. A flight's own lateness beyond that is removed, and so is that of position and velocity
+//! beyond it.
 
 use crate::clock::Lateness;
 use crate::fit::Problem;
@@ -19,7 +20,7 @@ use std::collections::BTreeMap;
 
 /// Gauss-Newton steps.
 const STEPS: usize = 40;
-/// None is longer: a line through a course is good for a fraction of its quickest turn.
+/// No step is longer: a linearisation of the motion holds for a fraction of its fastest oscillation.
 const STEP_MAX_S: f64 = 0.02;
 /// From fewer blocks no deviation can be told.
 const LEAST_BLOCKS: usize = 5;
@@ -41,7 +42,7 @@ pub struct Offset {
     pub low: f64,
     /// Upper end.
     pub high: f64,
-    /// The part of it that was taken off before the fit.
+    /// The part of it that was removed before the fit.
     pub taken_off: f64,
 }
 
@@ -52,7 +53,7 @@ impl Offset {
     }
 }
 
-/// Offsets by channel; `None` where the flight has not what it takes, or too little of it.
+/// Offsets by channel; `None` where the flight lacks the channels that it takes, or has too little of them.
 pub type Offsets = BTreeMap<&'static str, Option<Offset>>;
 
 /// An offset that was found.
@@ -195,9 +196,10 @@ impl Clocks {
     }
 }
 
-/// Takes off each flight's attitude what it is late beyond the mean of the estimation data, and its position and its velocity
-/// what they are late beyond that mean if they are apart from the attitude; they come with it if they are not. Only what
-/// is sure is taken off. Says what was found for each flight of `fit` and then of `test`.
+/// Removes from each flight the lateness of its attitude beyond the mean of the estimation data. Position and
+/// velocity move with the attitude; if they differ from it, their own lateness beyond that mean is removed.
+/// Only offsets that are certain are removed. Returns the offsets that were found for each flight of `fit` and
+/// then of `test`.
 pub fn align(problem: &mut Problem) -> Vec<(String, Offsets)> {
     let noises = std::mem::replace(&mut problem.noises, kinematic_noises());
     let flights: Vec<&Prepared> = problem.flights().collect();

@@ -337,7 +337,7 @@ fn held_step(total: &Block, held: &[Option<f64>]) -> DVector<f64> {
 struct Left {
     column: Vec<f64>,
     stretches: Vec<(usize, usize)>,
-    /// Sum of the squares of what was measured.
+    /// Sum of the squares of the measured values.
     signal: f64,
 }
 
@@ -444,7 +444,7 @@ impl Problem<'_> {
         flights.iter().map(of).sum::<usize>().max(1)
     }
 
-    /// The shortest delay that the grids can tell from none.
+    /// The shortest delay that the grids can tell from zero.
     pub fn least_delay_s(&self) -> f64 {
         0.5 * self.flights().map(|flight| flight.layout.clock.step_s).fold(0.0, f64::max)
     }

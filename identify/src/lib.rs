@@ -1,7 +1,7 @@
-//! Closing the loop: what real flights show that the declared model lacks.
+//! Closing the loop: effects that real flights show and that the declared model lacks.
 //!
 //! Measurement and model are put into the same equations of motion, seen through the same smooth window
-//! (`window`, `prepared`, `model`); what is left is regressed on the candidates' effects (`fit`), and judged on
+//! (`window`, `prepared`, `model`). The residual is regressed on the candidates' effects (`fit`), and judged on
 //! flights that nothing was fitted on (`select`).
 //!
 //! | room | what it holds |

@@ -22,7 +22,7 @@ pub struct Rotors {
     pub commanded: Vec<EachRotor>,
 }
 
-/// The declared vehicle with all that may be changed of it.
+/// The declared vehicle, with the parameters that a fit may change.
 #[derive(Debug)]
 pub struct Model {
     /// The vehicle as it is declared.
@@ -43,8 +43,8 @@ impl Model {
         flight.tracks(errors.pose_delay_s, errors.inertial_delay_s)
     }
 
-    /// The rotors of `flight` under these values. Where speeds were measured, the difference to what follows from the
-    /// commands is smoothed before it is believed: the noise of a sensor, differentiated, would pass for spin-up.
+    /// The rotors of `flight` under these values. Where speeds were measured, their difference from the
+    /// commanded speeds is smoothed first: the noise of a sensor, differentiated, would pass for spin-up.
     pub fn rotors(&self, flight: &Prepared, values: &[f64]) -> Rotors {
         let pose_s = SensorErrors::of(&self.parameters, values).pose_delay_s;
         if flight.flight.command.is_empty() {

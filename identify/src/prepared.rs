@@ -130,7 +130,7 @@ const END_MARGIN_S: f64 = 0.2;
 const GAP_MARGIN_S: f64 = 0.1;
 const WORTH: f64 = 0.9;
 
-/// Far below any tick, and above what is left of a time of which seconds since 1970 were taken off.
+/// Far below any tick, and above the rounding of times from which seconds since 1970 were subtracted.
 const SLACK_S: f64 = 1e-6;
 
 /// No rig lets a vehicle go further to the side.
@@ -500,7 +500,7 @@ impl<'c> Held<'c> {
         std::array::from_fn(|i| before[i] + part * (after[i] - before[i]))
     }
 
-    /// The mean of what holds from `from_s` to `to_s`; times have to grow from call to call.
+    /// The mean of the held values from `from_s` to `to_s`; times have to grow from call to call.
     pub fn mean(&mut self, from_s: f64, to_s: f64) -> EachRotor {
         let (mut at_s, mut sum) = (from_s, [0.0; ROTORS_MAX]);
         loop {
@@ -585,7 +585,7 @@ fn common_span(flight: &Flight, equations: &[Equation]) -> Option<(f64, f64)> {
         .filter(|(start, end)| end > start)
 }
 
-/// The longest of the periods of what is compared.
+/// The longest of the periods of the compared channels.
 fn slowest_period_s(flight: &Flight) -> Option<f64> {
     let periods = [
         flight.position.period_s(),

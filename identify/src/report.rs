@@ -34,8 +34,8 @@ pub struct Report {
     pub effects: BTreeMap<&'static str, EffectReport>,
     /// The residuals on the validation data.
     pub whiteness: BeforeAfter<BTreeMap<&'static str, Whiteness>>,
-    /// Clocks of each flight: attitude, position and velocity against the inertial unit; `null` where it has not what
-    /// that takes, or too little of it.
+    /// Clocks of each flight: attitude, position and velocity against the inertial unit; `null` where the
+    /// flight lacks the channels, or has too little of them.
     pub time_offsets_s: BTreeMap<String, Offsets>,
     /// Faulty channels and actuators, flight by flight.
     pub faults: Vec<Fault>,
@@ -51,7 +51,7 @@ pub struct Report {
     pub noise_floor: BTreeMap<&'static str, Noise>,
     /// Root mean square of the part of the residual that is not noise and that no candidate explains, by equation.
     pub unexplained: BTreeMap<&'static str, Unexplained>,
-    /// Effects that these flights cannot show, or sensors' parts of them, and what they would need.
+    /// Effects, or sensors' parts of them, that these flights cannot show, and the data that would be needed.
     pub not_identifiable: Vec<Unidentifiable>,
     /// Length of the blocks that count as independent.
     pub block_s: f64,
@@ -75,7 +75,7 @@ pub struct FlightReport {
     pub name: String,
     /// `fit`, `select` or `test`.
     pub role: flights::Role,
-    /// Length of what was compared, in s.
+    /// Length of the compared part, in s.
     pub compared_s: f64,
     /// Width of the windows in which measurement and model are compared, in s.
     pub window_s: f64,
@@ -96,14 +96,14 @@ pub struct EffectReport {
     pub linearised: bool,
     /// Its fitted parameters.
     pub parameters: BTreeMap<&'static str, Estimate>,
-    /// Weighted root mean square of the residual on the validation data, in units of what all candidates together leave:
-    /// without and with it.
+    /// Weighted root mean square of the residual on the validation data, without and with it, in units of the
+    /// residual that all candidates together leave.
     pub held_out: BeforeAfter<f64>,
     /// Chance of as much gain without it, by resampled blocks.
     pub chance: f64,
     /// Effects that would do as well in its place.
     pub confused_with: Vec<&'static str>,
-    /// The experiment that would tell it from them.
+    /// The experiment that would separate it from them.
     pub experiment: Option<String>,
 }
 
@@ -251,7 +251,7 @@ impl Report {
         })
     }
 
-    /// The answer where predictions lose: no verdict, and what to measure.
+    /// The answer where predictions lose: no verdict, but advice what to measure.
     fn write_losses(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "\nverdict: this vehicle file does not describe these flights. Its predictions lose:")?;
         for Loss { flight, horizon, channel, rival, new, other, unit } in &self.losses {

@@ -7,11 +7,11 @@
 //!    candidates of the round together (Bonferroni; one-sided percentile bootstrap over blocks, Efron 1979).
 //! 2. Its parameters together differ from their baselines beyond chance on the estimation data, at the same level.
 //! 3. The gain matters: it is at least [`LEAST_GAIN`] of the squared error.
-//! 4. It is not for an effect of which more is asked than it can be: not all parameters that moved stopped at a bound.
+//! 4. The effect is not asked for more than it can be: not all parameters that moved stopped at a bound.
 //!
-//! Of the accepted the one with the greatest gain is taken, but one with fewer parameters where the difference is not
-//! beyond chance. Then those taken before have to pass the first test again, as a later effect may explain what an
-//! earlier one stood in for.
+//! Of the accepted the one with the greatest gain is taken, or one with fewer parameters if the difference is not
+//! beyond chance. Then those taken before have to pass the first test again, as a later effect may explain the
+//! residual that an earlier one explained by mistake.
 //!
 //! In the end effects are withdrawn, and the search goes on without them: those of which a parameter stopped at a bound, those
 //! that are no longer beyond chance beside the others, and those without which predictions are better (`foresight`).
@@ -32,16 +32,16 @@ use plant::effects::EffectKind;
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// A smaller part of the squared error does not matter, however certain it is: what the comparison itself leaves at
-/// its joints is of the order of a tenth of it.
+/// A smaller part of the squared error does not matter, however certain it is: the comparison's own error at its
+/// joints is of the order of a tenth of it.
 const LEAST_GAIN: f64 = 0.002;
-/// A smaller part of a plausible value is none worth naming.
+/// A smaller part of a plausible value is not worth naming.
 const LEAST_PART: f64 = 0.01;
 /// Chance of a false acceptance in a round.
 const FALSE_RATE: f64 = 0.01;
 /// Two candidates whose difference is within this one-sided level cannot be told apart.
 const CONFOUNDED_LEVEL: f64 = 0.05;
-/// So many candidates of a round are fitted in earnest.
+/// Number of candidates of a round that are fitted fully.
 const CONFIRMED: usize = 4;
 /// A confounded effect has at least this part of the gain.
 const NEAR: f64 = 0.5;
@@ -50,7 +50,7 @@ const ROUNDS_MAX: usize = 12;
 /// Two that mask each other are looked for where this many times the cost is left that all candidates together
 /// would leave on the estimation data.
 const MUCH_LEFT: f64 = 1.5;
-/// So many candidates are tried as the first of two.
+/// Number of candidates that are tried as the first of two.
 const FIRSTS: usize = 4;
 
 /// A candidate that was fitted and judged.
@@ -104,7 +104,7 @@ pub struct Selection {
     pub accepted: Vec<Candidate>,
     /// The declared model.
     pub before: FitResult,
-    /// The model with all that was accepted.
+    /// The model with all accepted effects.
     pub after: FitResult,
     /// The same, refined by prediction errors; `None` where that does not predict better.
     pub refined: Option<FitResult>,
@@ -245,7 +245,7 @@ impl StepwiseSearch {
         }
     }
 
-    /// Accepts what the last round took.
+    /// Accepts the candidate that the last round took.
     fn take(&mut self, problem: &Problem) -> bool {
         let Some(taken) = self.rounds.last().and_then(Round::taken).cloned() else { return false };
         self.accepted.push(taken.candidate);
@@ -254,7 +254,7 @@ impl StepwiseSearch {
     }
 
     /// Accepts two that only gain together: of two strong effects each can make the blocks worse in which the other
-    /// acts. The firsts that are tried are chosen on the estimation data, the second in a round with the first, and then
+    /// acts. The firsts that are tried are chosen on the estimation data, the second in a round with the first. Then
     /// the first has to pass a round with the second.
     fn take_two(&mut self, problem: &Problem, candidates: &[Candidate]) -> bool {
         let Some(last) = self.rounds.last() else { return false };
@@ -465,7 +465,7 @@ fn is_worse(fitted: &FitResult, other: &FitResult) -> bool {
     p_value(&fitted.validation_costs, &other.validation_costs) < CONFOUNDED_LEVEL
 }
 
-/// Takes back what no longer gains anything.
+/// Takes back effects that no longer gain anything.
 fn without_idle(problem: &Problem, mut base: FitResult, accepted: &mut Vec<Candidate>) -> FitResult {
     let mut at = 0;
     // The newest has just passed.
@@ -537,7 +537,7 @@ pub fn confounded(problem: &Problem, selection: &Selection, at: usize) -> Vec<&'
     near.par_iter().filter(|candidate| is_alike(candidate)).map(|candidate| candidate.kind).collect()
 }
 
-/// The candidates of other effects that gained at least [`NEAR`] of what `candidate` did in the round that took it.
+/// The candidates of other effects with at least [`NEAR`] of the gain of `candidate`, in the round that took it.
 fn near<'s>(selection: &'s Selection, candidate: &Candidate) -> Vec<&'s Candidate> {
     let took = |round: &&Round| round.taken().is_some_and(|taken| taken.candidate == *candidate);
     let Some(round) = selection.rounds.iter().find(took) else { return Vec::new() };

@@ -27,12 +27,12 @@ pub struct SensorErrors {
     pub accelerometer_bias_m_s2: [f64; 3],
     /// Bias of the gyroscope in B, in rad/s.
     pub gyroscope_bias_rad_s: [f64; 3],
-    /// By how much the attitude sensor is turned in its mount about x and y of B, in rad.
+    /// Rotation of the attitude sensor in its mount about x and y of B, in rad.
     pub attitude_bias_rad: [f64; 2],
 }
 
 impl SensorErrors {
-    /// Those of `values`.
+    /// Creates the errors from `values`.
     pub fn of(parameters: &Parameters, values: &[f64]) -> Self {
         let [pose_delay_s, ..] = parameters.values_of(&POSE_DELAY, values);
         let [inertial_delay_s, ..] = parameters.values_of(&IMU_DELAY, values);

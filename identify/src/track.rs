@@ -12,7 +12,7 @@ const GAP_PERIODS: f64 = 3.5;
 /// A quantity on the grid.
 #[derive(Debug, Clone, Default)]
 pub struct Track<const N: usize> {
-    /// One value for each instant; what stands at an instant that is not valid means nothing.
+    /// One value for each instant; a value at an instant that is not valid means nothing.
     pub values: Vec<[f64; N]>,
     /// True for instants with samples about them.
     pub valid: Vec<bool>,

@@ -16,7 +16,7 @@ const COUNT: u64 = 6;
 /// The flight that gets a fault; the last is the one that is tested on.
 const FAULTY: usize = 2;
 
-/// Flights of a heavier vehicle with drag that nobody declared.
+/// Flights of a heavier vehicle with undeclared drag.
 fn flown(has_rotor_speeds: bool) -> FlightSet {
     static WITH: OnceLock<FlightSet> = OnceLock::new();
     static WITHOUT: OnceLock<FlightSet> = OnceLock::new();
@@ -43,7 +43,7 @@ fn found(set: &FlightSet) -> Vec<Fault> {
     faults(set).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// A fault of one flight is found there, once, as what it is.
+/// Requires that a fault of one flight is found there, once, and as that fault.
 #[track_caller]
 fn require(set: &FlightSet, channel: &str, kind: &str) -> Fault {
     let found = found(set);
@@ -75,7 +75,7 @@ fn each<const N: usize>(channel: &mut Channel<N>, change: impl Fn(&mut [f64; N])
     channel.values.iter_mut().for_each(change);
 }
 
-/// Repeats what the channel had at `from_s` until `to_s`.
+/// Repeats the channel's value at `from_s` until `to_s`.
 fn freeze<const N: usize>(channel: &mut Channel<N>, from_s: f64, to_s: f64, axes: &[usize]) {
     let first = channel.time_s.partition_point(|time_s| *time_s < from_s);
     let last = channel.time_s.partition_point(|time_s| *time_s < to_s);

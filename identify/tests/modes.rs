@@ -130,8 +130,8 @@ fn repeated_samples_left_out_do_not_matter() {
     require_named(&found, &["mass-error", "rotor-drag"]);
 }
 
-/// Seconds since 1970, of which a reader takes off the first: what is left of the times is out by 0.1 us, and every command
-/// is found at its tick all the same.
+/// Seconds since 1970, from which a reader subtracts the first: the times that remain are out by 0.1 us, and
+/// yet every command is found at its tick.
 #[test]
 fn large_times_do_not_matter() {
     const SINCE_1970_S: f64 = 1.7e9;
@@ -199,7 +199,7 @@ fn differentiated(position: &Channel<3>) -> Channel<3> {
     Channel { time_s: time_s[inside.clone()].to_vec(), values: inside.map(slope).collect() }
 }
 
-/// Nobody can say which of the two is late.
+/// Without a gyroscope it is unknown which of the two is late.
 #[test]
 fn without_a_gyroscope_there_is_no_clock_to_be_late_against() {
     let found = changed(&heavy_with_drag(25), |flight| flight.angular_velocity = Channel::default());
@@ -259,7 +259,7 @@ fn in_a_calm_hover_mass_and_thrust_are_told_to_be_alike() {
     println!("{name}, confused with {:?}: {experiment}", found.effects[name].confused_with);
 }
 
-/// An old log from a rig, of which nobody knows that it is one, with commands that act 150 ms late.
+/// An old log from a rig that is not declared as one, with commands that act 150 ms late.
 fn riddle() -> Case {
     let mut case = Case::of(&["rig-pendulum", "bearing-friction"], 1.0, 24, 20.0);
     case.plan.truth = vec![

@@ -1,4 +1,4 @@
-//! The statistics say what SciPy and statsmodels say, and the intervals hold the truth as often as they promise.
+//! The statistics agree with SciPy and statsmodels, and the intervals hold the truth as often as they promise.
 
 #[path = "../../tests/runs/skipped.rs"]
 mod skipped;

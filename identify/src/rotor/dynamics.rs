@@ -230,7 +230,7 @@ fn one_step(step: &Step) -> Option<OneStep> {
     })
 }
 
-/// Returns what the fits show about the data; `preferred` is the motor of the preferred order.
+/// Returns findings of the fits about the data; `preferred` is the motor of the preferred order.
 fn more_findings(dynamics: &Dynamics, steps: &[Step], preferred: Lag) -> Vec<String> {
     let matches: Vec<Match> = steps.iter().map(|step| matched(step, preferred)).collect();
     // In ms with one digit; 0 after a minus would read as a number.

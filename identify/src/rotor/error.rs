@@ -18,12 +18,12 @@ pub enum RotorError {
     /// is taken from.
     #[error(transparent)]
     File(#[from] Diagnostic),
-    /// A log is no table.
+    /// A log is not a table.
     #[error("{file}: {cause}")]
     Table {
         /// The log.
         file: String,
-        /// Where, and what to do.
+        /// The place, and advice.
         #[source]
         cause: TableError,
     },

@@ -14,8 +14,8 @@ struct Log<'s> {
     columns: [Option<(&'s Column, f64)>; 3],
 }
 
-/// Refuses a stand whose logs to test on hold rows that are fitted on. What is fitted on static logs is tested on static
-/// ones, and so with dynamic ones.
+/// Refuses a stand whose logs to test on hold rows that are fitted on. Fits of static logs are tested on static
+/// logs, and fits of dynamic logs on dynamic ones.
 pub fn check(stand: &Stand) -> Result<(), RotorError> {
     let speed = |column| Some((column, Column::factor(column, SPEED)));
     check_pairs(stand.statics.iter().map(|log| {

@@ -1,4 +1,4 @@
-//! The motor that answers all steps best.
+//! Fit of the motor whose response is nearest to all steps.
 //!
 //! A step is modelled as w(t) = w0 + dw s(t - d), with s the motor's unit step. The levels w0 and dw and the onset d
 //! belong to the step: a log tells when a command took effect only to one row. So they are fitted to every step, for
@@ -231,7 +231,7 @@ fn total(blocks: &[Normal]) -> Normal {
     })
 }
 
-/// The motor after a damped Gauss-Newton step, inside of what is physical.
+/// The motor after a damped Gauss-Newton step, within physical values.
 fn moved(lag: Lag, sum: &Normal, damping: f64, order: Order) -> Option<Lag> {
     let damped = sum.hessian + Matrix2::from_diagonal(&sum.hessian.diagonal()) * damping;
     let change = solved(damped, sum.gradient, order)?;

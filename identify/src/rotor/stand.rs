@@ -1,4 +1,4 @@
-//! The stand file: which logs, which columns, and what is held out.
+//! The stand file: logs, columns, and the parts that are held out.
 
 use std::path::{Path, PathBuf};
 
@@ -121,7 +121,7 @@ pub enum Clock {
     /// The log's own stamps.
     #[default]
     Stamps,
-    /// Rows lie at equal distances, and stamps tell only the mean distance: for logs whose stamps are the times at
+    /// Rows lie at equal distances, and stamps give only the mean distance: for logs whose stamps are the times at
     /// which rows arrived in groups.
     Rows,
 }
@@ -134,14 +134,14 @@ pub struct Column {
     column: Option<String>,
     /// The path of the field in the messages of a recording's topic.
     field: Option<String>,
-    /// Its unit; what a recording states has to be the same.
+    /// Its unit; the unit that a recording states has to be the same.
     pub unit: String,
     /// Pole pairs of the motor, for an electrical speed: the rotor's is this many times smaller.
     #[serde(default = "one")]
     pub pole_pairs: f64,
 }
 
-/// A log as it is read: its file, and all of it that is asked for.
+/// A log as it is read: its file, and the columns that are asked for.
 pub struct Source<'s> {
     /// The files of the fit.
     pub files: &'s InputFiles,
@@ -381,8 +381,8 @@ fn expanded(key: &str, written: &Path) -> Result<String, ParameterError> {
     })
 }
 
-/// Tells for each of `count` segments whether it is held out: spread evenly, so that a share of them is, and
-/// the first is not.
+/// Tells for each of `count` segments whether it is held out. Of a log to fit on, `share` of them are, spread
+/// evenly, and the first is not. Of a log to test on, all are.
 pub fn held_out(count: usize, role: Role, share: f64) -> Vec<bool> {
     let passed = |index: usize| (index as f64 * share + 1e-9).floor();
     (0..count).map(|index| role == Role::Test || passed(index + 1) > passed(index)).collect()

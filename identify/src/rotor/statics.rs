@@ -31,7 +31,7 @@ pub struct Statics {
     pub findings: Vec<String>,
 }
 
-/// Numbers without dimension, which tell wrong units from right ones.
+/// Numbers without dimension, by which wrong units are noticed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Plausibility {
     /// C_T = T / (rho n^2 D^4); propellers at rest have about 0.05 to 0.25.
@@ -100,7 +100,7 @@ impl<'s> Log<'s> {
         Ok(log)
     }
 
-    /// Notes how much of the log is steady, and what is odd about its speed.
+    /// Notes how much of the log is steady, and any oddity of its speed.
     fn look(&self, findings: &mut Vec<String>) {
         let steady: usize = self.plateaus.rows.iter().map(std::iter::ExactSizeIterator::len).sum();
         let spikes = self.plateaus.is_spike.iter().filter(|spike| **spike).count();

@@ -107,7 +107,7 @@ impl Cut {
     }
 }
 
-/// Changes of the command that are no usable steps, by reason.
+/// Changes of the command that cannot be used as steps, by reason.
 #[derive(Default)]
 struct LeftOut {
     stopped: usize,

@@ -1,4 +1,4 @@
-//! Cases whose answer is known: what is true, what identification makes of it, and how that is judged.
+//! Cases whose answer is known: the truth, the result of an identification, and its judgement.
 #![allow(non_snake_case, reason = "N is the newton")]
 
 use super::{Plan, Sensors, fly, vehicle_file};
@@ -56,7 +56,7 @@ pub const PAIRS: [[&str; 2]; 12] = [
     ["rig-pendulum", "bearing-friction"],
 ];
 
-/// A vehicle file, what is true beyond it, and how it is flown.
+/// A vehicle file, the truth beyond it, and the plan of its flights.
 #[derive(Debug, Clone)]
 pub struct Case {
     /// The declared vehicle.
@@ -168,7 +168,7 @@ impl Case {
         FlightSet { vehicle: vehicle_file(self.vehicle), flights, files: Default::default() }
     }
 
-    /// Names of what is true and undeclared.
+    /// Names of the true and undeclared effects.
     pub fn effects(&self) -> Vec<&'static str> {
         let Sensors { pose_delay_s, accelerometer_bias_m_s2, .. } = self.plan.sensors;
         let mut names: Vec<&'static str> = self.plan.truth.iter().map(|effect| effect.kind.name).collect();
@@ -195,7 +195,7 @@ impl Case {
         parameters.all.iter().map(value).collect()
     }
 
-    /// Flies the case, identifies on it, and compares what comes out with the truth.
+    /// Flies the case, identifies on it, and compares the result with the truth.
     pub fn judged(&self) -> Judgement {
         let set = self.flights();
         let report = identify(&set, &mut |_| ()).expect("flights to identify on").report;

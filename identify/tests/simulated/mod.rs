@@ -16,7 +16,7 @@ pub mod cases;
 pub mod feedback;
 
 const TICK_S: f64 = 0.001;
-/// A vehicle further away than this has got out of control: its flight says nothing of any other.
+/// A vehicle further away than this has got out of control: its flight does not compare with any other.
 const FAR_M: f64 = 12.0;
 /// Over this time a course comes up to speed.
 const RUN_UP_S: f64 = 3.0;
@@ -250,7 +250,7 @@ fn padded(values: &PerRotor<f64>) -> [f64; ROTORS_MAX] {
     std::array::from_fn(|rotor| values.get(rotor).copied().unwrap_or_default())
 }
 
-/// A tracking controller with the gains of somebody careful: bounded for all truths of the cases.
+/// A tracking controller with careful gains: bounded for all truths of the cases.
 struct Pilot {
     allocation: Allocation,
     /// Wanted speeds of the rotors, a moment ago.
