@@ -1,10 +1,11 @@
-//! The airframe: what the motors, the rotors, the air and the effects do to the body. Every backend moves the body
+//! The airframe: the forces and torques on the body by motors, rotors, air and effects. Every backend moves the body
 //! by the forces that this room gives.
 //!
 //! A backend owns a [`State`] and an [`AirframeState`]. Once per tick it calls [`Airframe::begin_tick`], which
-//! advances the effects' states and settles what changes slowly against a tick, the [`Actuation`]: commands, how the
-//! air moves, the battery. The rest is a function of actuation and state, evaluated at every stage of an integrator. Mass, inertia
-//! and rotors are those of [`Airframe::vehicle`], which is the vehicle as it flies, its effects included.
+//! advances the effects' states and fixes the slow quantities for the tick, the [`Actuation`]: commands, motion
+//! of the air, the battery. The rest is a function of actuation and state, evaluated at every stage of an
+//! integrator. Mass, inertia and rotors are those of [`Airframe::vehicle`], which is the vehicle as it flies,
+//! its effects included.
 //!
 //! ```
 //! # use plant::{Airframe, PerRotor, RigidBody, RotorState, State};
@@ -93,8 +94,8 @@ impl Airframe {
         &self.frame_shift_B_m
     }
 
-    /// Fingerprint of what the state of its flight with the backend `backend` depends on: the kinds of its effects and the
-    /// number of its rotors.
+    /// Fingerprint of the facts that the state of its flight with the backend `backend` depends on: the kinds
+    /// of its effects and the number of its rotors.
     pub(crate) fn fingerprint(&self, backend: &'static str) -> Fingerprint {
         let kinds = self.effects.iter().map(|effect| effect.kind.name);
         Fingerprint::of(std::iter::once(backend).chain(kinds))
@@ -192,8 +193,8 @@ impl Airframe {
         sum
     }
 
-    /// The rotors at the end of a tick of `dt_s` that began with `actuation`, whatever the body does: one Runge-Kutta
-    /// step of fourth order.
+    /// The rotors at the end of a tick of `dt_s` that began with `actuation`, independent of the body: one
+    /// Runge-Kutta step of fourth order.
     #[must_use]
     pub fn spun(
         &self,

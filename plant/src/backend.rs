@@ -52,7 +52,7 @@ pub trait Backend: Send {
     /// Hash of backend, scene and kinds of effects: only a state of the same can be loaded.
     fn configuration(&self) -> u64;
 
-    /// Tells `note` every part of the state that the next ticks depend on, by name, in a fixed order.
+    /// Passes to `note` every part of the state that the next ticks depend on, by name, in a fixed order.
     fn parts(&self, note: &mut dyn FnMut(&'static str, &dyn Saved));
 
     /// As [`Backend::parts`], to be changed; the first error ends it.
@@ -75,7 +75,7 @@ pub trait Backend: Send {
     /// error the backend is as it was.
     ///
     /// # Errors
-    /// If the bytes are no such snapshot.
+    /// If the bytes are not such a snapshot.
     fn restore(&mut self, snapshot: &[u8]) -> Result<(), SnapshotError> {
         let snapshot = Snapshot::read(snapshot, self.name())?;
         let mut before = Snapshot::of(self.name());
@@ -104,7 +104,7 @@ pub struct Neighbour {
     pub velocity_W_m_s: Vector3<f64>,
 }
 
-/// Contacts of the vehicle; `bus::messages::Contact` says what each field means.
+/// Contacts of the vehicle; `bus::messages::Contact` describes each field.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ContactReport {
     /// Sum of the contact forces over the last tick.

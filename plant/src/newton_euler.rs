@@ -36,7 +36,7 @@ pub struct NewtonEuler {
 /// Accelerations of the body at an instant, as sensors at the centre of mass measure them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Accelerations {
-    /// (all forces but gravity) / m, in the body frame: what an accelerometer at the centre of mass measures.
+    /// (all forces but gravity) / m, in the body frame: the reading of an accelerometer at the centre of mass.
     pub specific_force_B_m_s2: Vector3<f64>,
     /// Rate of change of the angular velocity, in the body frame.
     pub angular_acceleration_B_rad_s2: Vector3<f64>,
@@ -120,7 +120,7 @@ impl NewtonEuler {
         self.accelerations_under(&Actuation::none(state.rotors.len()), state)
     }
 
-    /// Specific force and angular acceleration at `state`, with what acts over the tick that ends there.
+    /// Specific force and angular acceleration at `state`, with the actuation over the tick that ends there.
     pub fn accelerations_under(&self, actuation: &Actuation, state: &State) -> Accelerations {
         // Those that a rotor state itself shows, where no target is at hand.
         let shown_rates = state.rotors.map(|RotorState { acceleration_rad_s2, .. }| RotorRates {

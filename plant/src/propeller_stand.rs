@@ -130,7 +130,7 @@ pub struct PropellerStand {
     noise: Noise,
 }
 
-/// White noise of the sensors. That of a tick follows from seed, name and tick, so that there is nothing to hand over.
+/// White noise of the sensors. The noise of a tick follows from seed, name and tick: there is no state to hand over.
 #[derive(Debug)]
 struct Noise {
     /// Of the force, N, the torque, N·m, and the speed, rad/s.

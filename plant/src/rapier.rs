@@ -1,6 +1,6 @@
 //! The backend `rapier`: the same forces as in free flight, in a world that can be touched.
 //!
-//! Rapier finds what is near; where nothing is, the vehicle moves exactly as with `newton-euler`. What touches, and the
+//! Rapier finds what is near; where nothing is, the vehicle moves exactly as with `newton-euler`. Contacts, and the
 //! joints of a rig, are solved here, not by rapier's own solver (docs/decisions/008-two-backends.md says why).
 //!
 //! | room | what it holds |
@@ -181,8 +181,8 @@ impl Rapier {
         self.motion.contacts.place(stands.then_some(world::GROUND), world::FEET);
     }
 
-    /// Before anything has moved, what carries a vehicle at rest is what takes its free acceleration away: so its
-    /// accelerometer feels g from the first tick on.
+    /// Before anything has moved, a vehicle at rest is carried by the acceleration opposite to its free one: so its
+    /// accelerometer reads g from the first tick on.
     fn lean_on_support(&mut self) {
         let free = self.motion.model.accelerations_under(&self.effects.actuation, &self.motion.state);
         let body = &self.motion.state.body;
@@ -219,7 +219,7 @@ impl Rapier {
     }
 }
 
-/// Numbers that tell a scene and a vehicle from others.
+/// Numbers that distinguish a scene and a vehicle from others.
 fn numbers(motion: &Motion) -> Vec<f64> {
     let mut numbers = motion.world.numbers();
     numbers.extend(motion.free_bodies.numbers());

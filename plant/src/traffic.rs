@@ -22,7 +22,7 @@ use serde::Deserialize;
 #[derive(Debug)]
 pub struct Traffic;
 
-/// It has no parameters.
+/// Parameters of the traffic: none.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Parameters {}

@@ -20,7 +20,7 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// The program in a file: what stands before its tests, without comments.
+/// The program in a file: the lines before its tests, without comments.
 fn program(path: &Path) -> String {
     let text = fs::read_to_string(path).unwrap();
     let before = text.split("#[cfg(test)]\nmod tests").next().unwrap().to_owned();

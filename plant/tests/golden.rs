@@ -1,4 +1,4 @@
-//! The declared model flies as it always did, to the last bit: what is added to the plant must not disturb it.
+//! The declared model flies as it always did, to the last bit: additions to the plant must not disturb it.
 //!
 //! If the physics is changed on purpose, mint the digest anew and say why.
 

@@ -1,4 +1,4 @@
-//! The thesis's rigs: what they hold, what they leave free.
+//! The thesis's rigs: the motions that they hold, and those that they leave free.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 mod common;

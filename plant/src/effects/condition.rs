@@ -6,7 +6,7 @@ use crate::state::{PerRotor, State};
 use nalgebra::Vector3;
 use vehicles::Vehicle;
 
-/// A vehicle at an instant: what forces depend on.
+/// A vehicle at an instant: the quantities that forces depend on.
 ///
 /// ```
 /// use nalgebra::Vector3;

@@ -1,4 +1,4 @@
-//! The facts of an effect: what it does, by which numbers, and how it can be seen in measured flights.
+//! The facts of an effect: its physics, its parameters, and how it can be seen in measured flights.
 
 use super::condition::FlightCondition;
 use crate::actuation::{Actuation, Battery};
@@ -62,7 +62,7 @@ pub struct EffectKind {
     pub is_per_rotor: bool,
 }
 
-/// A condition on the vehicle that an effect acts on; the error says what it is in words.
+/// A condition on the vehicle that an effect acts on; the error describes it in words.
 pub type Requirement = fn(&Vehicle) -> Result<(), &'static str>;
 
 /// One parameter of an effect.
@@ -78,8 +78,9 @@ pub struct ParameterSpec {
     pub min: f64,
     /// The most that it may be.
     pub max: f64,
-    /// The value that it has where a file leaves it out. With all of these the effect is nothing. `None` where
-    /// none is more natural than another: a file has to give it, and the effect is nothing whatever it is.
+    /// The value that it has where a file leaves it out. With all of these the effect does nothing. `None`
+    /// where no value is neutral: a file has to give it, and at any value the effect does nothing if the others
+    /// are neutral.
     pub neutral: Option<f64>,
     /// A plausible value.
     pub nominal: f64,
@@ -90,17 +91,17 @@ pub struct ParameterSpec {
 /// Action of an effect. All but the state of [`Action::Tick`] are pure functions.
 #[derive(Debug, Clone, Copy)]
 pub enum Action {
-    /// Changes what the vehicle is, once, before it flies.
+    /// Changes the vehicle, once, before it flies.
     Vehicle(fn(&Values, &mut Vehicle)),
     /// Delays the motor commands by so many seconds.
     Delay(fn(&Values) -> f64),
-    /// Advances the effect's state by a tick, and changes what acts over the tick.
+    /// Advances the effect's state by a tick, and changes the actuation over the tick.
     Tick(fn(&Values, &mut Advance)),
     /// Adds so many newtons to the thrust of a rotor.
     Thrust(fn(&Values, &FlightCondition, usize) -> f64),
     /// Adds a force and a torque.
     Wrench(fn(&Values, &FlightCondition) -> Wrench),
-    /// Tells how the battery is under these speeds of the rotors.
+    /// Returns the state of the battery under these speeds of the rotors.
     Battery(fn(&Values, &EffectState, &Vehicle, &[f64]) -> Battery),
 }
 
@@ -132,7 +133,7 @@ pub enum Quantity {
     Attitude,
     /// The motor commands.
     Command,
-    /// A rig holds the vehicle. What such an effect stands for, the joints of a scene's rig have by themselves.
+    /// A rig that holds the vehicle. The joints of a scene's rig have by themselves what such an effect models.
     Rig,
     /// Two clocks that can be held against each other.
     TwoClocks,
@@ -140,7 +141,7 @@ pub enum Quantity {
     SpecificForce,
     /// The same rotation by gyroscope and by attitude.
     TwoRotations,
-    /// The direction of forces that the attitude says, and one that is measured.
+    /// The direction of forces according to the attitude, and a measured one.
     TwoDirections,
     /// An inertial unit.
     InertialUnit,
@@ -164,7 +165,7 @@ pub enum Stage {
 pub enum Randomness {
     /// A function of parameters and flight.
     Deterministic,
-    /// It draws from a stream of its own: no fit can follow it, and what it leaves is unexplained.
+    /// It draws from a stream of its own: no fit can follow it, and its residual is unexplained.
     Stochastic,
 }
 
@@ -182,7 +183,7 @@ pub enum FitAs {
 pub struct Confounder {
     /// The other effect.
     pub effect: &'static EffectKind,
-    /// The experiment that tells the two apart.
+    /// The experiment that distinguishes the two.
     pub experiment: &'static str,
 }
 
@@ -287,7 +288,7 @@ impl EffectKind {
         self.with(|spec| spec.nominal)
     }
 
-    /// The experiment that tells it from `other`, if the two look alike.
+    /// The experiment that distinguishes it from `other`, if the two look alike.
     #[must_use]
     pub fn experiment_against(&self, other: &Self) -> Option<&'static str> {
         let found = |one: &Self, other: &Self| {

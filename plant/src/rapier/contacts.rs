@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 /// Tuned, no source.
 const LIFT_M: f64 = 1e-3;
 
-/// Something near one of the vehicle's colliders, and what the two did to each other.
+/// Something near one of the vehicle's colliders, and the impulse between the two.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sighting {
     pub near: Near,
@@ -96,8 +96,8 @@ impl Contacts {
         }
     }
 
-    /// Starts anew with `parts` of the vehicle at rest on `object`, or free. What it stands on at first did not
-    /// begin.
+    /// Starts anew with `parts` of the vehicle at rest on `object`, or free. The contact at the start does not
+    /// count as begun.
     pub(super) fn place(&mut self, object: Option<u32>, parts: u32) {
         self.touches.clear();
         self.touches.extend(object.into_iter().map(|object| Touch {
@@ -110,7 +110,7 @@ impl Contacts {
         self.impact_speed_m_s = 0.0;
     }
 
-    /// Takes in what a step found, with the vehicle's motion just before it.
+    /// Takes in the contacts that a step found, with the vehicle's motion just before it.
     pub(super) fn note(
         &mut self,
         before: &RigidBody,
@@ -136,7 +136,7 @@ impl Contacts {
         self.forget_impact();
     }
 
-    /// Notes what pushes a part of the vehicle, unless that part touched it before.
+    /// Notes the contact that pushes a part of the vehicle, unless that part touched it before.
     fn meet(&mut self, sighting: &Sighting, speed_m_s: f64) {
         let touching = self.touches.as_slice().iter().find(|touch| touch.object == sighting.near.object);
         if touching.is_some_and(|touch| touch.parts & sighting.near.part != 0) {

@@ -25,13 +25,14 @@ pub(super) const FIRST_BODY: usize = 2;
 /// Number of the first thing of a scene in contacts.
 pub(super) const FIRST_THING: u32 = 2;
 
-/// A rope with no more slack than this is taut, as what is no farther apart touches.
+/// A rope with no more slack than this is taut.
 pub(super) const TAUT_M: f64 = 1e-6;
 
 /// A taut rope whose ends come nearer than this is not. Tuned, no source.
 const SLACKENING_M_S: f64 = 1e-9;
 
-/// Times that errors of the joints' places are projected away: once would leave what is of second order. Tuned, no source.
+/// Times that errors of the joints' places are projected away: one would leave errors of second order. Tuned,
+/// no source.
 const PROJECTIONS: usize = 2;
 
 /// The weights of the classic Runge-Kutta scheme's stages.
@@ -101,8 +102,8 @@ pub(crate) enum Misfit {
 const PARTING: f64 = 1e-6;
 
 impl FreeBodies {
-    /// Those of `scene`, where its file puts them; `shift_B_m` is how far the vehicle's frame is from where its file has
-    /// it, seen from its centre of mass.
+    /// The bodies of `scene`, where its file puts them; `shift_B_m` is the vehicle's frame relative to its
+    /// place in the file, seen from the centre of mass.
     pub(super) fn new(scene: &Scene, shift_B_m: &Vector3<f64>) -> Self {
         let hanging = scene.hanging();
         let builds: Vec<_> =
@@ -149,7 +150,7 @@ impl FreeBodies {
         ties.map(|[parent, child]| [parent.min(child), parent.max(child)]).collect()
     }
 
-    /// Numbers that tell these bodies and joints from others.
+    /// Numbers that distinguish these bodies and joints from others.
     pub(super) fn numbers(&self) -> Vec<f64> {
         let builds = self.builds.iter().flat_map(|build| {
             build.inertia.iter().copied().chain([build.mass_kg, f64::from(u8::from(build.hangs))])
@@ -330,7 +331,8 @@ impl FreeBodies {
         });
     }
 
-    /// Takes what is off in the joints away, from the vehicle and `bodies`: positions, and then velocities.
+    /// Removes the errors of the joints from the vehicle and `bodies`: those of positions, and then those of
+    /// velocities.
     fn project(
         &self,
         model: &NewtonEuler,

@@ -1,8 +1,9 @@
 //! Joints between free bodies, the vehicle and the world: the rows of their constraints.
 //!
 //! A joint with its anchors p on both, and a direction d that turns with the parent, holds d · (p_child - p_parent) at 0,
-//! or the child's rotation about d. A row's Jacobian takes the twists of the two to the rate of that; its bias is what of the
-//! second derivative is left without accelerations (R. Featherstone, Rigid Body Dynamics Algorithms, 2008, section 8.2).
+//! or the child's rotation about d. A row's Jacobian maps the twists of the two to the rate of that. Its bias
+//! is the part of the second derivative that does not depend on accelerations (R. Featherstone, Rigid Body
+//! Dynamics Algorithms, 2008, section 8.2).
 
 use super::drive::Drive;
 use super::solver::{Body, Row, Unilateral, join, stop};
@@ -122,7 +123,7 @@ impl Joint {
         matches!(self.motion, Way::Rope { .. })
     }
 
-    /// Numbers that tell it from others.
+    /// Numbers that distinguish it from others.
     pub(super) fn numbers(&self) -> impl Iterator<Item = f64> {
         let (axis, limits) = match self.motion {
             Way::Nothing => (Vector3::zeros(), [0.0; 2]),
@@ -190,7 +191,7 @@ impl Joint {
         }
     }
 
-    /// None where the anchors are in one place: it leads nowhere.
+    /// `None` where the anchors are in one place: then the rope has no direction.
     fn line_of_rope(&self, placed: &Placed, length_m: f64) -> Option<Line> {
         let (Placed { arms_W_m, apart_W_m, apart_W_m_s, .. }, [parent, child]) =
             (placed, placed.spins_W_rad_s);
@@ -234,8 +235,8 @@ impl Joint {
         }
     }
 
-    /// The row of the motion about or along the axis of a revolute or prismatic joint: it is off by the angle, from -pi to
-    /// pi, or the way since the start. None of others.
+    /// The row of the motion about or along the axis of a revolute or prismatic joint. Its error is the angle,
+    /// from -pi to pi, or the way since the start. `None` for other joints.
     pub(super) fn axial(&self, frames: &[RigidBody]) -> Option<Line> {
         let parent = &frames[self.ends[0]];
         match self.motion {

@@ -10,7 +10,7 @@
 
 use nalgebra::{Matrix2, Matrix3, Matrix6, Vector2, Vector3, Vector6};
 
-/// Iterations end when none changes a velocity by more: far below what anybody measures, far above rounding.
+/// Iterations end when none changes a velocity by more: far below anything measurable, far above rounding.
 const SETTLED_M_S: f64 = 1e-11;
 
 /// Iterations that relax normal and friction of a contact one after the other: four feet that slide take about 60.
@@ -239,7 +239,7 @@ impl Friction {
     }
 
     /// Steps against the slip, equally far along both axes: only so does the iteration end with a force that is
-    /// opposite to the slip, whatever the bodies' inertia. Returns by how much that changed the slip at most.
+    /// opposite to the slip at any inertia of the bodies. Returns the greatest change of the slip.
     fn relax(&mut self, all: &mut [Body], normal_N_s: f64) -> f64 {
         let change_N_s = self.change_N_s(all, normal_N_s);
         self.push(all, &change_N_s);

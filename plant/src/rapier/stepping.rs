@@ -2,10 +2,10 @@
 //!
 //! The free flight over the step is computed first, by the integrator of [`crate::NewtonEuler`]. Where nothing is
 //! near and no rig holds the vehicle, that is the step. Otherwise the step is cut at each impact, at the instant at
-//! which the gap closes: free flight up to it, then Newton's law of restitution. What touches already is held by the
+//! which the gap closes: free flight up to it, then Newton's law of restitution. Contacts that last are held by the
 //! impulses of `solver`: they change the free step's velocities, and, as a constant force would, half of that
-//! change times the step is added to its pose. Free bodies are moved and held the same way; what nothing pushes moves as in
-//! free flight.
+//! change times the step is added to its pose. Free bodies are moved and held the same way. Bodies that nothing
+//! pushes move as in free flight.
 
 use super::body::{lay_out, mobility, set_twist, shift, twist};
 use super::contacts::{Contacts, Sighting};
@@ -26,7 +26,8 @@ use crate::state::{RigidBody, State};
 use nalgebra::{Matrix6, Vector3, Vector6};
 use scenes::Rig;
 
-/// Gaps that are not closed any further: what stands on several points stands on all of them. Tuned, no source.
+/// Gaps that are not closed any further: a body that stands on several points stands on all of them. Tuned, no
+/// source.
 const LEVEL_M: f64 = 1e-9;
 
 /// Steps in which gravity makes the speed below which an impact does not bounce: 2 cm/s at two steps of half a
@@ -97,7 +98,7 @@ impl Held {
 /// The end of a step without contacts and stops.
 struct Free {
     state: State,
-    /// By how much the bearing or joints changed the vehicle's twist.
+    /// Change of the vehicle's twist by the bearing or joints.
     held: Vector6<f64>,
 }
 
@@ -124,7 +125,7 @@ pub(super) struct Motion {
     pub scratch: Scratch,
 }
 
-/// By how much contacts and joints changed the velocities since the tick began.
+/// Changes of the velocities by contacts and joints since the tick began.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Changed {
     pub velocity_W_m_s: Vector3<f64>,
@@ -273,7 +274,7 @@ impl Motion {
         1.5 * span_s * both.map(fastest).fold(0.0, f64::max)
     }
 
-    /// Finds what is near, and makes a constraint of each point and each stop.
+    /// Finds the contacts that are near, and makes a constraint of each point and each stop.
     fn look_around(&mut self, scratch: &mut Scratch, free: &Free, span_s: f64, others: &[Neighbour]) {
         let Scratch { near, constraints, now, then, frames, ropes, free_bodies, .. } = scratch;
         let ends = &free_bodies.free;
@@ -361,8 +362,9 @@ impl Motion {
         }
     }
 
-    /// A step of `span_s` that ends as `free`, but for what the constraints do; what comes nearer at a rate below
-    /// `ahead_m_s` and does not touch yet is none. Returns whether the vehicle was pushed.
+    /// A step of `span_s` that ends as `free`, but for the impulses of the constraints. A contact that comes
+    /// nearer at a rate below `ahead_m_s` and does not touch yet is not a constraint. Returns whether the
+    /// vehicle was pushed.
     fn constrain(&mut self, scratch: &mut Scratch, free: &Free, span_s: f64, ahead_m_s: f64) -> bool {
         for constraint in &mut scratch.constraints {
             let rate_m_s = constraint.normal.rate(&scratch.now);
@@ -420,8 +422,8 @@ impl Motion {
         is_pushed
     }
 
-    /// The impact of all that touch, by Newton's law: what met at a rate leaves with the restitution's part of it, as far
-    /// as that makes no energy (Moreau). Returns whether its impulses were found.
+    /// The impact of all contacts that touch, by Newton's law: the restitution's part of the rate of approach
+    /// is left, as far as that makes no energy (Moreau). Returns whether its impulses were found.
     fn impact(&mut self, scratch: &mut Scratch, slow_m_s: f64) -> bool {
         for constraint in &mut scratch.constraints {
             let rate_m_s = constraint.normal.rate(&scratch.now);
@@ -448,7 +450,7 @@ impl Motion {
         off_m_s <= FOUND_M_S
     }
 
-    /// Notes impulses that are not what they have to be. Others that push do work.
+    /// Notes impulses that do not satisfy the laws. Others that push do work.
     fn judge(&mut self, scratch: &Scratch, off_m_s: f64, start_J: f64) {
         let end_J = self.energy_J(&scratch.then, &scratch.then);
         let gain_J = if scratch.is_among_others() { 0.0 } else { end_J - start_J - scratch.lent_J() };
@@ -503,7 +505,7 @@ impl Motion {
         0.5 * vehicle.mass_kg * v.dot(&other_v) + spin_J + slider_J + bodies_J
     }
 
-    /// Has the solver begin with the impulses of the step before: the first point of a part with the first of it then.
+    /// Starts the solver with the impulses of the step before: the first point of a part with the first of it then.
     fn warm_start(&self, scratch: &mut Scratch) {
         let Scratch { near, constraints, .. } = scratch;
         let (contacts, stops) = constraints.split_at_mut(near.len());
@@ -543,7 +545,7 @@ impl Motion {
         self.held.stops_N_s.extend(stops.iter().map(|stop| stop.impulse_N_s));
     }
 
-    /// Tells the contacts what the vehicle touches and what it was pushed with.
+    /// Passes the contacts of the vehicle and their impulses to the list of contacts.
     fn note(&mut self, scratch: &Scratch) {
         let both = scratch.near.iter().zip(&scratch.constraints);
         let sightings = both.filter(|(near, _)| near.bodies[1] == VEHICLE).map(|(near, contact)| {
@@ -585,7 +587,8 @@ impl Motion {
         }
     }
 
-    /// Moves the vehicle and the bodies out of what the order of the step left it inside of; no velocity is changed by that.
+    /// Moves the vehicle and the bodies out of overlaps that the order of the step left; no velocity is changed
+    /// by that.
     fn push_out(&mut self, scratch: &mut Scratch, span_s: f64) {
         let mut is_exact = true;
         let asked = scratch.constraints.iter_mut().filter(|constraint| constraint.bound_m_s.is_finite());

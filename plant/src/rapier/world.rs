@@ -29,9 +29,9 @@ const FIRST_NEIGHBOUR: u32 = 1000;
 /// Free bodies that overlap more than this at the start are told: tuned, no source.
 const OVERLAP_M: f64 = 1e-4;
 
-/// The vehicle and what is around it.
+/// The vehicle and its surroundings.
 pub(super) struct World {
-    /// The ground, then what stands still.
+    /// The ground, then the still things.
     things: Vec<Still>,
     bodies: Vec<Moving>,
     /// Pairs of bodies that a joint keeps from touching each other.
@@ -196,8 +196,8 @@ impl World {
         }
     }
 
-    /// The same for points where free bodies, at `states`, may touch each other, the vehicle at `vehicle`, or what stands
-    /// still, after what is `found` already.
+    /// The same for points where free bodies, at `states`, may touch each other, the vehicle at `vehicle`, or
+    /// still things, after the points that are `found` already.
     pub(super) fn find_near_bodies(
         &mut self,
         vehicle: &RigidBody,
@@ -239,8 +239,8 @@ impl World {
         }
     }
 
-    /// The first two that overlap, as `bus::messages::Contact` numbers them: a free body with another, with what stands
-    /// still, or with the vehicle, 0.
+    /// The first two that overlap, as `bus::messages::Contact` numbers them: a free body with another, with a
+    /// still thing, or with the vehicle, 0.
     pub(super) fn overlap(&mut self, vehicle: &RigidBody, states: &[RigidBody]) -> Option<[u32; 2]> {
         let mut found = Vec::new();
         self.find_near_bodies(vehicle, states, 0.0, &mut found);
@@ -254,7 +254,7 @@ impl World {
         self.bodies.iter().map(|body| body.reach_m)
     }
 
-    /// Numbers that tell this scene and vehicle from others: places, surfaces, shapes.
+    /// Numbers that distinguish this scene and vehicle from others: places, surfaces, shapes.
     pub(super) fn numbers(&self) -> Vec<f64> {
         let things = self.things.iter().map(|thing| &thing.collider);
         let bodies = self.bodies.iter().map(|body| &body.collider);
@@ -275,7 +275,7 @@ impl World {
     }
 }
 
-/// Tells `note` of every point where a part, second, is within `margin_m` of something, first.
+/// Passes to `note` every point where a part, second, is within `margin_m` of something, first.
 fn meet(
     thing: (&Collider, &Pose),
     part: (&Collider, &Pose),
