@@ -1,9 +1,9 @@
 //! The battery monitor node: voltage and current at the battery's terminals, and the charge that is left.
 //!
-//! Reading = truth + bias + white noise, in steps of the part's resolution. The charge is what a monitor can know
-//! of it: the measured current counted from `initial_charge` on. `crate::channel` says when it measures, how
-//! measurements are delayed and lost; the count goes on through losses. Where the truth is not valid, since the plant
-//! has no model of its battery, nothing is measured and `valid` is 0.
+//! Reading = truth + bias + white noise, in steps of the part's resolution. The charge is as a monitor can know it:
+//! the measured current counted from `initial_charge` on. `crate::channel` gives the times, delays and losses of
+//! measurements; the count goes on through losses. If the truth is not valid, since the plant has no model of its
+//! battery, nothing is measured and `valid` is 0.
 
 use crate::channel::Chance;
 use crate::parameters::within;

@@ -1,10 +1,10 @@
-//! From measuring to arriving: when a sensor measures, how long its measurements travel, and which are lost.
+//! From measuring to arriving: the times of a sensor's measurements, their delays, and their losses.
 //!
 //! A sensor's node computes at each of its periods. It *measures* at the first of them at or after each multiple
 //! of 1 / `rate_hz`; a measurement *arrives* at the first at or after `delay_ms` later. In between it waits in a
-//! queue that is part of the node's hand-over state, so that a backup goes on with what is under way. Rate
+//! queue that is part of the node's hand-over state, so that a backup goes on with the measurements under way. Rate
 //! and delay are therefore exact where they are multiples of the node's period, and rounded up to it elsewhere;
-//! a measurement always holds the truth of the time that it states.
+//! a measurement always holds the truth of its stated time.
 //!
 //! Losses follow a two-state Markov chain (Gilbert, "Capacity of a burst-noise channel", Bell System Technical
 //! Journal 39, 1960): with probability `dropout` a measurement is lost, and losses last `dropout_mean_s` on
@@ -16,8 +16,8 @@ use bus::context::NodeContext;
 use bus::random::{Stream, stream, uniform};
 use diagnostics::parameter::{ParameterError, not_negative, positive, refuse, require};
 
-/// Steps of a node between two measurements below which it tells that they are not evenly spaced: a fifth of the interval.
-/// Tuned, no source.
+/// Steps of a node between two measurements below which it warns that they are not evenly spaced: a fifth of
+/// the interval. Tuned, no source.
 const UNEVEN_SHARE: f64 = 5.0;
 
 /// Capacity of a queue of measurements: those under way, and the one that arrived last.
@@ -185,7 +185,7 @@ impl Chance<'_> {
 }
 
 impl Channel {
-    /// The channel of the node that `context` tells of; warns where measurements would be uneven or never arrive.
+    /// The channel of the node of `context`; warns if measurements would be uneven or never arrive.
     ///
     /// # Errors
     /// As [`Timing::check`].

@@ -1,4 +1,4 @@
-//! The clearance node: how far a vehicle truly is from what stands in the scene. It is no sensor: a judge reads it,
+//! The clearance node: true distance of a vehicle from the things of the scene. It is not a sensor: a judge reads it,
 //! and plots; controllers have no port for it.
 
 use crate::cone::{caster, check_bodies, check_told};
@@ -24,7 +24,7 @@ parameters! {
     pub struct Parameters {
         /// Scene file; there is no default.
         scene: Option<PathBuf> = None,
-        /// The distance from the wall that is to be kept, m.
+        /// The distance to keep from the wall, m.
         keep_m: f64 = 3.0 => not_negative,
         /// Along a side, the wall ahead and the wall behind are at least this much farther than `keep_m`, m.
         corner_m: f64 = 0.75 => not_negative,

@@ -29,7 +29,7 @@ pub fn caster(files: &InputFiles, path: Option<&Path>) -> Result<RayCaster, Para
     Ok(RayCaster::new(&scene))
 }
 
-/// Refuses a scene with free bodies where the input `bodies` does not tell where they are, and that input elsewhere.
+/// Refuses a scene with free bodies without the input `bodies`, and that input for a scene without free bodies.
 ///
 /// # Errors
 /// The two do not go together.

@@ -1,4 +1,4 @@
-//! The extended Kalman filter as a node: position, velocity and attitude from an IMU and what else measures.
+//! The extended Kalman filter as a node: position, velocity and attitude from an IMU and other sensors.
 
 pub mod filter;
 pub mod history;

@@ -1,6 +1,6 @@
-//! The IMU node: reads the plant's true motion, publishes what an inertial measurement unit makes of it.
+//! The IMU node: reads the plant's true motion, publishes the readings of an inertial measurement unit.
 //!
-//! It reads at each of its periods. `crate::channel` says how readings are delayed and lost; a lost one repeats the
+//! It reads at each of its periods. `crate::channel` gives the delays and losses of readings; a lost one repeats the
 //! one before.
 
 use crate::channel::{Channel, ChannelState, QUEUE, Remembered};
@@ -54,7 +54,7 @@ pub struct ImuState {
 }
 
 impl ImuState {
-    /// Before the first reading: until it arrives, the IMU says that it rests level.
+    /// Before the first reading: until it arrives, the IMU reads rest and level.
     fn new(model: &ImuModelState) -> Self {
         let at_rest = Imu { specific_force: [0.0, 0.0, STANDARD_GRAVITY_M_S2].into(), ..Default::default() };
         let mut state = Self { queue: [at_rest; QUEUE], ..Self::default() };

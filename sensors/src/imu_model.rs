@@ -1,8 +1,8 @@
 //! The inertial measurement unit: specific force and angular rate in, a noisy reading out.
 //!
-//! Reading = what is felt + bias + white noise, cut off at the range of the part; see [`crate::noise`]. The
-//! axes are those of the body (x forward, y left, z up); what is felt is the truth at the centre of mass unless
-//! [`crate::imu_part`] makes something else of it.
+//! Reading = true quantity + bias + white noise, cut off at the range of the part; see [`crate::noise`]. The
+//! axes are those of the body (x forward, y left, z up). The true quantity is that at the centre of mass unless
+//! [`crate::imu_part`] changes it.
 
 use crate::channel::Timing;
 use crate::noise::{BiasWalk, WhiteNoise};
@@ -121,7 +121,7 @@ impl From<&Imu> for ImuReading {
     }
 }
 
-/// The IMU at one sample rate: all that does not change during a run.
+/// The IMU at one sample rate, with everything that does not change during a run.
 ///
 /// ```
 /// use nalgebra::Vector3;
@@ -187,7 +187,7 @@ impl ImuModel {
 
     /// The reading of `truth`; the biases then walk one step on.
     ///
-    /// The stream is drawn in a fixed order whatever the parameters, so that changing one of them does
+    /// The stream is drawn in a fixed order under any parameters, so that changing one of them does
     /// not reshuffle the noise of the others.
     pub fn read(&self, state: &mut ImuModelState, truth: &ImuReading) -> ImuReading {
         let random = &mut state.random;

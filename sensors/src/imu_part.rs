@@ -32,7 +32,7 @@ const START_ANGLES_RAD: [f64; ROTORS_MAX] =
 pub struct ImuPart {
     params: ImuParams,
     period_s: f64,
-    /// Takes what is felt in body axes to what the axes of each triad read.
+    /// Rotation of vectors in body axes to the readings of the axes of each triad.
     force_axes: Matrix3<f64>,
     rate_axes: Matrix3<f64>,
     /// Share of a new value that the filters take over in a period; 1 without a filter.
@@ -114,7 +114,7 @@ impl ImuPart {
         self.in_its_axes(&state.filtered, truth.time_s)
     }
 
-    /// The specific force where the part sits: f + α × r + ω × (ω × r). α is what ω changed by since the reading
+    /// The specific force at the part's place: f + α × r + ω × (ω × r). α is the change of ω since the reading
     /// before, so it is half a period late.
     fn at_its_place(&self, state: &ImuPartState, motion: &ImuReading) -> ImuReading {
         let (arm_B_m, spin_B_rad_s) =

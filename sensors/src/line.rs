@@ -3,7 +3,7 @@
 //!
 //! Time is counted in whole nanoseconds, and within a busy stretch of the wire in bits since its start, so that no rounding
 //! adds up: after any time the wire has carried as many bits as its rate says. A message is whole: it waits until the wire
-//! is free, is sent without a break, and arrives behind those that were sent before it. What becomes of the n-th message
+//! is free, is sent without a break, and arrives behind those that were sent before it. The fate of the n-th message
 //! that is sent depends on the seed, the node's name and n alone.
 
 use bus::Message;
@@ -178,7 +178,7 @@ impl Line {
         Ok(())
     }
 
-    /// Sends what waits, up to `until_ns`.
+    /// Sends the messages that wait, up to `until_ns`.
     pub fn send(&self, state: &mut LineState, until_ns: u64) {
         while let Some((index, start_ns)) = self.next(state).filter(|(_, start_ns)| *start_ns < until_ns) {
             if start_ns > state.free_ns {
@@ -224,7 +224,7 @@ impl Line {
         (u128::from(bits) * NS_PER_S).div_ceil(u128::from(self.bits_s)) as u64
     }
 
-    /// Takes out what has arrived by `now_ns`.
+    /// Takes out the messages that have arrived by `now_ns`.
     pub fn arrive(state: &mut LineState, now_ns: u64) {
         let arrived = |packet: &&mut Packet| packet.stage == UNDER_WAY && packet.arrival_ns <= now_ns;
         // In the order of arrival, of a stream the newest stays.

@@ -1,9 +1,10 @@
 //! A data link: messages of any type, carried as a serial radio carries them.
 //!
-//! Each input is a *stream*: what its topic carries comes out on the output of the same name, later, less often, and not
-//! all of it. The streams share one `line`. A message that comes out is the sender's own, stamp included: a consumer
-//! tells a new one by its stamp, and its age by that too. A message without a stamp is new whenever its topic's publisher
-//! sends. Until the first has come, the output is the input's initial value with a stamp of -1 s.
+//! Each input is a *stream*: the messages of its topic come out on the output of the same name, later, less
+//! often, and not all of them. The streams share one `line`. A message that comes out is the sender's own,
+//! stamp included: a consumer recognises a new one, and its age, by its stamp. A message without a stamp is new
+//! whenever its topic's publisher sends. Until the first has come, the output is the input's initial value with
+//! a stamp of -1 s.
 //!
 //! A message that is sent at tick k is queued at the time of that tick, and is out at the first tick of the link at which
 //! it has arrived. The link itself adds nothing to that: its inputs are a tick late because no message arrives in the tick
@@ -36,7 +37,7 @@ const OVERHEAD_BYTES: u32 = 11;
 /// Serial input buffer of an XBee of the 802.15.4 series (Digi, "XBee/XBee-PRO RF Modules 802.15.4 Product
 /// Manual", "DI buffer").
 const QUEUE_BYTES: u32 = 202;
-/// Faster is no serial line, and the bits of a run are to stay countable.
+/// Greatest rate of a serial line; the bits of a run also have to stay countable.
 const BAUD_MAX: f64 = 1e9;
 
 /// The stamp of an initial value: nothing was sent yet. Before the run, so that another link does not take it for a
@@ -432,7 +433,7 @@ impl Forwarded {
         self.extent.map_or(message.len(), |extent| extent.of(message).len())
     }
 
-    /// Gives `message`, an initial value, the stamp of what was never sent.
+    /// Gives `message`, an initial value, the stamp of a message that was never sent.
     fn mark_as_none(&self, message: &mut [u8]) {
         if let Some(offset) = self.stamp_offset {
             message[offset..offset + size_of::<Time>()].copy_from_slice(bytemuck::bytes_of(&NEVER));
@@ -471,8 +472,8 @@ impl Parameters {
         require("loss", self.loss, (0.0..=1.0).contains(&self.loss), "a fraction from 0 to 1")
     }
 
-    /// Refuses a stream whose messages never fit into the queue, and more messages under way than a link holds; tells
-    /// streams that together exceed the line.
+    /// Refuses a stream whose messages never fit into the queue, and more messages under way than a link holds;
+    /// warns of streams that together exceed the line.
     fn check_load(&self, context: &NodeContext<'_>) -> Result<(), ParameterError> {
         let (mut offered_bytes_s, mut offered_hz) = (0.0, 0.0);
         for message in context.messages {

@@ -1,7 +1,7 @@
 //! The magnetometer node: the earth's magnetic field in body axes, as the vehicle's own iron lets it through.
 //!
 //! Reading = soft-iron scale · field in body axes + hard iron + white noise, in steps of the part's resolution and
-//! cut off at its range. `crate::channel` says when it measures, how measurements are delayed and lost.
+//! cut off at its range. `crate::channel` gives the times, delays and losses of measurements.
 
 use crate::channel::Chance;
 use crate::earth_field;
@@ -41,7 +41,7 @@ parameters! {
         inclination_deg: f64 = earth_field::INCLINATION_DEG => within(-90.0..=90.0, "from -90 to 90"),
         /// Declination: angle of magnetic north east of the world's x axis, degrees.
         declination_deg: f64 = earth_field::DECLINATION_DEG => finite,
-        /// Field of what is magnetised on the vehicle, body axes, T.
+        /// Field of the vehicle's magnetised parts, body axes, T.
         hard_iron_T: [f64; 3] = [0.0; 3] => finite,
         /// Share of the field that is left along each body axis.
         soft_iron_scale: [f64; 3] = [1.0; 3] => finite,

@@ -1,7 +1,7 @@
 //! The motion capture node: position and attitude as cameras around the room see them.
 //!
-//! Reading = truth + bias + white noise, the attitude's as a rotation in body axes. `crate::channel` says when
-//! it measures, how measurements are delayed and lost.
+//! Reading = truth + bias + white noise, the attitude's as a rotation in body axes. `crate::channel` gives the
+//! times, delays and losses of measurements.
 
 use crate::channel::Chance;
 use crate::noise::standard_normal;

@@ -47,7 +47,7 @@ impl BiasWalk {
     /// A walk of `density` (unit/s/√Hz, which is unit/√s) in steps of 1/`rate_hz`.
     ///
     /// The standard deviation of a step is density·√dt, so the variance grows by density² a second
-    /// whatever the rate.
+    /// at any rate.
     #[must_use]
     pub fn new(density: f64, rate_hz: f64) -> Self {
         Self { step_sigma: density / rate_hz.sqrt() }

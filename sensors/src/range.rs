@@ -1,9 +1,9 @@
 //! The range node: five ultrasonic range finders along the body's +x, −x, +y, −y and −z axes.
 //!
-//! The beams tilt with the body. Each reads the nearest of what stands in its cone (`crate::cone`): the ground,
+//! The beams tilt with the body. Each reads the nearest object in its cone (`crate::cone`): the ground,
 //! the things of the scene and, with the input `traffic`, the other vehicles. Reading = distance + bias + white
 //! noise, in steps of the part's resolution; each beam has its own noise and is lost on its own.
-//! `crate::channel` says when they measure, how measurements are delayed and lost.
+//! `crate::channel` gives the times, delays and losses of measurements.
 //!
 //! The beams fire together and do not hear each other. An echo comes back from every surface in the cone at any
 //! angle of incidence; a real beam that grazes a smooth floor or wall hears none.
@@ -76,7 +76,7 @@ parameters! {
     }
 }
 
-/// The five range finders in their scene: all that does not change during a run.
+/// The five range finders in their scene, with everything that does not change during a run.
 #[derive(Debug, Clone)]
 pub struct RangeFinders {
     params: RangeParams,
@@ -183,8 +183,8 @@ impl Sensor for RangeFinders {
         RangeState { queue: [nothing; QUEUE], ..RangeState::default() }
     }
 
-    /// The noise is drawn whether or not a beam meets anything, so that what one of them sees does not reshuffle the
-    /// others' noise.
+    /// The noise is drawn whether or not a beam meets anything, so that the reading of one of them does not
+    /// reshuffle the others' noise.
     fn measure(
         &self,
         _: &mut RangeState,

@@ -1,4 +1,4 @@
-//! A sensor as a component: it measures what its inputs hold, and a channel says when, and what becomes of it.
+//! A sensor as a component: it measures its inputs, and a channel has the times, delays and losses of measurements.
 
 use crate::channel::{Chance, Channel, Remembered};
 use crate::parameters::Parameters;
@@ -10,7 +10,7 @@ use bus::{InputPorts, Message};
 use diagnostics::ParameterError;
 use inputs::InputFiles;
 
-/// Declares what a sensor remembers, `type_name` on the bus, and what it sends: the message at the port that is named.
+/// Declares the state of a sensor, `type_name` on the bus, and its output: the message at the port that is named.
 macro_rules! sensor {
     (
         pub struct $State:ident as $type_name:literal sends $port:ident: $Message:ident {
@@ -86,9 +86,9 @@ impl Measurement for Ranges {
     }
 }
 
-/// A sensor: all of it that does not change during a run.
+/// A sensor, with everything that does not change during a run.
 pub trait Sensor: Sized + Send {
-    /// Its name in manifests, and what it does.
+    /// Its name in manifests, and its description.
     const INFO: Info;
     /// Parameters in the manifest.
     type Parameters: Parameters;
@@ -113,7 +113,7 @@ pub trait Sensor: Sized + Send {
     /// Refuses ports that do not go with its parameters.
     ///
     /// # Errors
-    /// Which, and what to do.
+    /// The ports, and advice.
     fn check(&self, _run: &NodeContext<'_>) -> Result<(), ParameterError> {
         Ok(())
     }
@@ -121,7 +121,7 @@ pub trait Sensor: Sized + Send {
     /// Refuses inputs that do not go with its parameters.
     ///
     /// # Errors
-    /// Which, and what to do.
+    /// The inputs, and advice.
     fn check_inputs(&self, _inputs: &Self::Inputs<'_>) -> Result<(), StepError> {
         Ok(())
     }

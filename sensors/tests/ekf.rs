@@ -1,4 +1,4 @@
-//! The extended Kalman filter against known flights: its covariance must be what its errors make true.
+//! The extended Kalman filter against known flights: its covariance must agree with its errors.
 //!
 //! Two figures are chi-square where a filter is consistent (Bar-Shalom, Li and Kirubarajan, "Estimation with
 //! Applications to Tracking and Navigation", 2001, §5.4): the normalised innovation squared (NIS) of a sensor, summed
@@ -46,7 +46,7 @@ const MOCAP: Timing = Timing { sensor: Source::Mocap, period: 10, delay: 10 };
 const BAROMETER: Timing = Timing { sensor: Source::Barometer, period: 20, delay: 16 };
 const MAGNETOMETER: Timing = Timing { sensor: Source::Magnetometer, period: 10, delay: 6 };
 
-/// The sensors of a flight, which are worth what `params` says.
+/// The sensors of a flight, with the uncertainties of `params`.
 struct World {
     params: EkfParams,
     imu: ImuModel,
@@ -211,7 +211,7 @@ struct Consistency {
     runs_within: [usize; 4],
     /// By sensor: mean NIS for each degree of freedom, which should be 1.
     nis: [f64; 4],
-    /// At each second, NEES summed over the runs, in standard deviations from what it should be.
+    /// At each second, NEES summed over the runs, in standard deviations from its expected value.
     nees_deviations: Vec<f64>,
     /// Mean NEES for each degree of freedom, which should be 1.
     nees: f64,
@@ -320,7 +320,7 @@ fn measurements_that_are_200_ms_late_are_as_consistent_as_prompt_ones() {
     assert!(found.holds(&late) && found.refused == 0, "{found}");
 }
 
-/// Without this, the tests above might pass whatever the filter believes.
+/// Without this, the tests above might pass with any belief of the filter.
 #[test]
 fn a_filter_that_believes_a_wrong_noise_is_found_out() {
     let wrong = |change: fn(&mut EkfParams)| {

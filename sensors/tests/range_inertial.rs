@@ -178,7 +178,7 @@ fn a_wall_is_met_within_two_centimetres_after_a_flight_at_two_metres_a_second() 
     assert!(worst_m_s < 0.03, "{worst_m_s}");
 }
 
-/// Pitching and braking by 20°: what the receiver told of the time before the manoeuvre is not taken for the present.
+/// Pitching and braking by 20°: the receiver's velocity from before the manoeuvre is not taken for the present one.
 #[test]
 fn a_late_receiver_tells_the_velocity_along_a_wall_and_spoils_nothing_that_the_wall_tells() {
     let flight = fly(to_the_wall, [0.0, 0.0, 1.5], 20_000);

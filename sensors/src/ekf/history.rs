@@ -52,7 +52,7 @@ impl Reading {
 
 /// The last readings, one a period.
 ///
-/// They are kept in single precision, since what a node hands over is written at every tick: it rounds a reading by
+/// They are kept in single precision, since a node's hand-over state is written at every tick: it rounds a reading by
 /// 10⁻⁷ of itself, four orders below its noise. The filter sees no other readings than these.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Readings {
@@ -90,7 +90,7 @@ pub(crate) fn places(span_s: f64, period_s: f64) -> Option<usize> {
 }
 
 impl Readings {
-    /// None yet, of those that will come every `period_ns`, with `places` places.
+    /// Creates an empty memory for readings that will come every `period_ns`, with `places` places.
     #[must_use]
     pub fn every(period_ns: u64, places: usize) -> Self {
         Self { head: ReadingsHead::default(), period_ns, ring: vec![[0.0; 6]; places].into_boxed_slice() }
@@ -102,7 +102,7 @@ impl Readings {
         self.period_ns
     }
 
-    /// The part that has the same size whatever is remembered, and the bytes of the rest.
+    /// The part whose size does not depend on the number of readings, and the bytes of the rest.
     pub fn parts(&self) -> (ReadingsHead, &[u8]) {
         (self.head, bytemuck::cast_slice(&self.ring))
     }
@@ -168,7 +168,7 @@ impl Readings {
     }
 }
 
-/// A sensor that measures what the filter estimates, in the order of `bus::messages::Innovation`.
+/// A sensor of quantities that the filter estimates, in the order of `bus::messages::Innovation`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
     /// A satellite receiver.

@@ -7,7 +7,7 @@ use super::transition::{ATTITUDE, BAROMETER, GPS, POSITION, STATES, VELOCITY};
 use crate::wire::{attitude, vector};
 use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
 
-/// A measurement of `N` numbers against what was expected.
+/// A measurement of `N` numbers against the expected one.
 #[derive(Clone, Copy, Debug)]
 pub struct Observation<const N: usize> {
     /// Measured less expected.

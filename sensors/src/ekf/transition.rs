@@ -6,8 +6,8 @@
 //! dp/dt = v,  dv/dt = −f_W × θ − R·(b_a + n_a),  dθ/dt = −R·(b_g + n_g)
 //!
 //! (Solà, "Quaternion kinematics for the error-state Kalman filter", 2017, §7, global angular errors). The
-//! matrix of this system is nilpotent: its transition from one time to another is made of a few integrals over
-//! the flown attitude and specific force, whatever the number of samples between. So the integrals are summed up
+//! matrix of this system is nilpotent: its transition from one time to another consists of a few integrals over
+//! the flown attitude and specific force, for any number of samples between. So the integrals are summed up
 //! at each sample, and the covariance is carried over only where it is needed.
 
 use super::params::EkfParams;

@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 /// Number of sums that are kept.
 const KEPT: usize = 128;
 
-/// Time between two that are kept at least, s, in whole samples. What lies between is taken for a line.
+/// Time between two that are kept at least, s, in whole samples. Between them, the gain is taken as linear.
 /// So at least 1.27 s can be looked back: more than the delay of any receiver (u-blox NEO-M8 data sheet: a navigation
 /// rate of 5 Hz and more).
 const SPACING_S: f64 = 0.01;
@@ -39,12 +39,12 @@ impl Default for Gains {
     }
 }
 
-/// It was too long ago to be known; how far back it is known, s.
+/// The time was too long ago; holds the longest time that is known, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct TooLongAgo(pub(super) f64);
 
 impl Gains {
-    /// Adds what a sample says.
+    /// Adds the gain of a sample.
     pub(super) fn add(&mut self, gained_W_m_s: &Vector3<f64>, period_s: f64) {
         self.total = vector_message(vector(self.total) + gained_W_m_s);
         let stride = stride(period_s);
