@@ -4,7 +4,7 @@ use crate::report::{Result, Spread, number, run_manifest};
 use serde_json::Value;
 use std::path::Path;
 
-/// Swaps of one run: the first take-over, and what is between two.
+/// Swaps of one run: the first take-over, and the ticks between two.
 const SWAPS: usize = 20;
 const FIRST_TICK: u32 = 1000;
 const EVERY_TICKS: u32 = 500;

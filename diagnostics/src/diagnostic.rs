@@ -43,7 +43,7 @@ pub struct Diagnostic {
     pub file: String,
     /// Place in the file; none where the fault is of the whole.
     pub place: Option<Place>,
-    /// The key, what was expected and what was found.
+    /// The key, the expected value and the value that was found.
     pub error: ParameterError,
     /// Advice; empty where the message says it.
     pub help: String,
@@ -73,7 +73,7 @@ impl Diagnostic {
             .help("check the path and that it is UTF-8 text")
     }
 
-    /// The same with `help` as what to do.
+    /// The same with `help` as advice.
     #[must_use]
     pub fn help(self, help: impl Into<String>) -> Self {
         Self { help: help.into(), ..self }
@@ -85,7 +85,7 @@ impl Diagnostic {
         self.error.key()
     }
 
-    /// This and whatever else is wrong, each on its own.
+    /// Iterates over this fault and the others of the file, each on its own.
     pub fn all(&self) -> impl Iterator<Item = Self> + '_ {
         let alone = Self { others: Vec::new(), ..self.clone() };
         std::iter::once(alone).chain(self.others.iter().cloned())

@@ -43,7 +43,7 @@ pub enum ParameterError {
     /// Parameters, ports or files that do not go together, or a file that is refused.
     #[error("{message}")]
     Conflict {
-        /// The dotted key that is to blame first; empty where it is none in particular.
+        /// The dotted key that is to blame first; empty where no key is.
         key: String,
         /// Contradiction, and advice.
         message: String,
@@ -57,7 +57,7 @@ impl ParameterError {
         Self::Value { key: key.into(), expected: expected.into(), found: found.to_string() }
     }
 
-    /// A parameter that is needed and not given; `expected` is what it should hold, empty where that is not known.
+    /// A parameter that is needed and not given; `expected` describes its value, empty where that is not known.
     #[must_use]
     pub fn missing(key: impl Into<String>, expected: impl Into<String>) -> Self {
         Self::Missing { key: key.into(), expected: expected.into() }
@@ -173,7 +173,7 @@ fn list(names: &[String]) -> String {
 /// Passes a number that `is_good`.
 ///
 /// # Errors
-/// It is not; `expected` says what is accepted.
+/// It is not; `expected` describes the accepted numbers.
 ///
 /// ```
 /// use diagnostics::parameter::require;
@@ -194,7 +194,7 @@ pub fn require(
 /// Refuses parameters that do not go together; `key` is to blame first.
 ///
 /// # Errors
-/// They do not, as `is_wrong` says; `message` tells what, and what to do.
+/// They do not, as `is_wrong` says; `message` has the contradiction, and advice.
 ///
 /// ```
 /// use diagnostics::parameter::refuse;

@@ -1,4 +1,4 @@
-//! Reads types from JSON and TOML, so that an error carries its key, what was expected there and where it stands.
+//! Reads types from JSON and TOML, so that an error carries its key, its place and the expected value.
 
 use crate::diagnostic::Diagnostic;
 use crate::parameter::ParameterError;
@@ -39,7 +39,7 @@ pub fn read<P: DeserializeOwned>(parameters: &Value) -> Result<P, ParameterError
 /// Reads the TOML `text` of `file` as a `T`.
 ///
 /// # Errors
-/// The first place where it is no TOML, or does not hold what `T` has there.
+/// The first place where it is not TOML, or does not hold the value that `T` has there.
 ///
 /// ```
 /// #[derive(Debug, serde::Deserialize)]
@@ -77,7 +77,7 @@ pub fn parse_toml(text: &str) -> Result<Spanned<DeTable<'_>>, Misread> {
 /// Reads a part of a TOML file as a `T`.
 ///
 /// # Errors
-/// The first place where it does not hold what `T` has there.
+/// The first place where it does not hold the value that `T` has there.
 ///
 /// ```
 /// let table = diagnostics::parse_toml("wheel = { radius_m = true }").unwrap();
@@ -93,7 +93,7 @@ pub fn read_tree<T: DeserializeOwned>(tree: &Spanned<DeValue<'_>>) -> Result<T, 
 #[derive(Debug, thiserror::Error)]
 #[error("{error}")]
 pub struct Misread {
-    /// The key, what was expected and what was found.
+    /// The key, the expected value and the value that was found.
     pub error: ParameterError,
     span: Option<Range<usize>>,
 }
@@ -112,7 +112,7 @@ impl Misread {
         Self { span: Some(base + span.start..base + span.end), ..self }
     }
 
-    /// The same of what stands in the table `table`.
+    /// The same error, in the table `table`.
     #[must_use]
     pub fn within(self, table: &str) -> Self {
         Self { error: self.error.within(table), ..self }

@@ -177,7 +177,7 @@ impl Scene {
         Ok(())
     }
 
-    /// The mesh files that the scene file at `path` names; what is wrong with it is told where it is read.
+    /// The mesh files that the scene file at `path` names; its faults are reported where it is read.
     #[must_use]
     pub fn mesh_files(files: &InputFiles, path: &Path) -> Vec<PathBuf> {
         let table = files.text(path).ok().and_then(|text| text.parse::<toml::Table>().ok());

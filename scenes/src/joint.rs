@@ -1,4 +1,4 @@
-//! Joints: what ties free bodies to the world, to each other and to the vehicle.
+//! Joints, which tie free bodies to the world, to each other and to the vehicle.
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
 use crate::drive::{self, Drive};

@@ -1,4 +1,4 @@
-//! Things of any shape: triangles in the world, as what a ray meets and a vehicle touches.
+//! Things of any shape: triangles in the world, for rays and for contacts with vehicles.
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
 use crate::body::FreeBody;
@@ -50,16 +50,16 @@ pub struct Mesh {
 }
 
 impl Mesh {
-    /// The shape, in the world, as rays and distances meet it.
+    /// The shape, in the world, for rays and distances.
     ///
     /// # Errors
-    /// In words, where no such shape can be made: every triangle is a line, or what is to be convex is not.
+    /// In words, where no such shape can be made: every triangle is a line, or a mesh that is to be convex is not.
     pub fn shape(&self) -> Result<SharedShape, String> {
         self.shape_with(TriMeshFlags::empty())
     }
 
-    /// The shape, in the world, as vehicles touch it: what slides over the edge between two triangles of one face does not
-    /// stumble there.
+    /// The shape, in the world, for contacts with vehicles: a body that slides over the edge between two
+    /// triangles of one face does not catch there.
     ///
     /// # Errors
     /// As [`Mesh::shape`].

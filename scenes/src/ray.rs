@@ -1,4 +1,4 @@
-//! The distance from a point along a direction to what is met first.
+//! Distance from a point along a direction to the first object.
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
 use crate::body::BodyPose;
@@ -54,7 +54,7 @@ impl RayCaster {
         &self.objects
     }
 
-    /// True if something of it moves.
+    /// True if some of its things move.
     #[must_use]
     pub fn has_bodies(&self) -> bool {
         !self.bodies.is_empty()

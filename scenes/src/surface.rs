@@ -10,7 +10,7 @@ pub struct Surface {
 }
 
 impl Default for Surface {
-    /// That of a scene which does not say: tuned, no source.
+    /// Surface of a scene that states none: tuned, no source.
     fn default() -> Self {
         Self { friction: 0.5, restitution: 0.2 }
     }

@@ -35,7 +35,7 @@ impl Scene {
         self.joints.iter().any(|joint| [joint.parent, joint.child].contains(&End::Vehicle))
     }
 
-    /// The first joint other than a rope that ties the vehicle, or what hangs from it, to the world.
+    /// The first joint other than a rope that ties the vehicle, or a body that hangs from it, to the world.
     pub(crate) fn joint_that_pins_the_vehicle(&self) -> Option<usize> {
         let hangs = self.hanging();
         self.joints.iter().position(|joint| {
