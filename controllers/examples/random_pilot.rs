@@ -4,10 +4,10 @@
 //! `… -- pitch 2 > manifests/sticks/pitch.csv` wrote the two that are stored; a test writes them anew.
 //!
 //! The hand makes one move after another, drawn at random: a rest, a pulse, a step held for a while, each of the
-//! latter two followed by its opposite, so that the vehicle stays near its place. What it wants passes through
-//! its own slowness, a critically damped lag of second order, and through the tremor that it adds; the stick has
-//! its stops. All numbers are tuned, no source, but for the stops (thesis §5.3). Nothing but sums, products and
-//! the bus's random stream is used, so that every machine writes the same bytes.
+//! latter two followed by its opposite, so that the vehicle stays near its place. The wanted angle passes through
+//! the hand's slowness, a critically damped lag of second order, and a tremor is added; the stick has
+//! its stops. All numbers are tuned, no source, but for the stops (thesis §5.3). Only sums, products and
+//! the bus's random stream are used, so that every machine writes the same bytes.
 
 use rand_core::Rng;
 

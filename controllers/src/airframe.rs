@@ -1,4 +1,4 @@
-//! The vehicle as its controllers know it: its file, the allocation to its rotors, and what the loops need of both.
+//! The vehicle as its controllers know it: its file, the allocation to its rotors, and the models for the loops.
 
 use crate::allocation::{Allocation, AllocationError, THRUST_RESERVE};
 use diagnostics::ParameterError;

@@ -291,7 +291,7 @@ impl Source<'_> {
     }
 }
 
-/// The number of a cell times `factor`, or what was expected there.
+/// The number of a cell times `factor`, or a description of the expected one.
 fn number(cell: Option<f64>, factor: f64) -> Result<f64, &'static str> {
     match cell.filter(|number| number.is_finite()) {
         Some(number) if (number * factor).abs() <= CELL_MAX => Ok(number * factor),

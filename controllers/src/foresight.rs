@@ -65,7 +65,7 @@ impl ForesightState {
     }
 }
 
-/// A law that asked for more than a hundred times what the rotors make had lost its way: tuned, no source.
+/// A law that asked for more than a hundred times the rotors' wrench had lost its way: tuned, no source.
 const PART_MADE_MIN: f64 = 0.01;
 
 /// Model for the foresight of a vehicle at one period.
@@ -161,7 +161,7 @@ impl Foresight {
         RotorWrench { thrust_N: (self.mass_kg * self.gravity_m_s2), ..RotorWrench::default() }
     }
 
-    /// The part of `wrench` that the rotors can make; hover, if it is no number or far beyond their limits.
+    /// The part of `wrench` that the rotors can make; hover, if it is NaN or far beyond their limits.
     fn possible(&self, wrench: &RotorWrench) -> RotorWrench {
         let allocated = self.allocation.allocate(wrench);
         let made = allocated.wrench;
@@ -172,8 +172,8 @@ impl Foresight {
         if is_finite && !is_far { made } else { self.hover() }
     }
 
-    /// The same of a wrench that changes. A lag that rises evenly is its delay behind what was asked for, so that much
-    /// ahead is another wrench that the rotors can make.
+    /// The same of a wrench that changes. A lag that rises evenly is its delay behind the demand, so the wrench
+    /// that is that much ahead has to be one that the rotors can make.
     fn possible_change(&self, made: &Made) -> Made {
         let (now, delay_s) = (self.possible(&made.wrench), self.lag.delay_s());
         let ahead = self.possible(&RotorWrench {

@@ -12,11 +12,11 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 
-/// A control law at one period, with all that does not change during a run.
+/// A control law at one period, with everything that does not change during a run.
 ///
 /// [`crate::controller::Controller`] makes a component of it.
 pub trait Law: Sized + Send {
-    /// Its name in manifests, and what it does.
+    /// Its name in manifests, and its description.
     const INFO: Info;
     /// Parameters, as the manifest's `parameters` table holds them.
     type Parameters: DeserializeOwned;
@@ -31,10 +31,10 @@ pub trait Law: Sized + Send {
     /// Makes the law.
     ///
     /// # Errors
-    /// A parameter or a file that cannot be meant.
+    /// An invalid parameter or file.
     fn new(parameters: &Self::Parameters, context: &LawContext<'_>) -> Result<Self, ParameterError>;
 
-    /// The greatest angular acceleration that it asks for against a body rate, 1/s: with the period it tells whether
+    /// The greatest angular acceleration that it asks for against a body rate, 1/s: with the period it shows whether
     /// the loop can be closed at all. 0 where the law is made for its period.
     fn rate_gain_1_s(&self) -> f64 {
         0.0
@@ -58,7 +58,7 @@ pub trait Law: Sized + Send {
 /// The law that flew before, as far as it is known.
 #[derive(Debug, Clone, Copy)]
 pub struct Predecessor<'a, S> {
-    /// The wrench that it asked for last. It may be a broken law, and the wrench no number.
+    /// The wrench that it asked for last. It may be a broken law, and the wrench may be NaN.
     pub wrench: RotorWrench,
     /// Outputs of its integrators; `None` where only its last command is known.
     pub integrals: Option<Integrals>,

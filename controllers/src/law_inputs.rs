@@ -16,7 +16,7 @@ pub struct SetPointInputs<'a> {
     pub set_point: &'a SetPointMessage,
     /// The motion.
     pub estimate: &'a StateEstimate,
-    /// Attitude and rates, where another estimator tells them.
+    /// Attitude and rates, where another estimator gives them.
     pub attitude: Option<&'a AttitudeEstimate>,
 }
 
@@ -27,7 +27,7 @@ pub struct ReferenceInputs<'a> {
     pub reference: &'a Reference,
     /// The motion.
     pub estimate: &'a StateEstimate,
-    /// Attitude and rates, where another estimator tells them.
+    /// Attitude and rates, where another estimator gives them.
     pub attitude: Option<&'a AttitudeEstimate>,
 }
 
@@ -36,7 +36,7 @@ pub struct ReferenceInputs<'a> {
 pub struct VelocityInputs<'a> {
     /// The motion.
     pub estimate: &'a StateEstimate,
-    /// Attitude and rates, where another estimator tells them.
+    /// Attitude and rates, where another estimator gives them.
     pub attitude: Option<&'a AttitudeEstimate>,
     /// The velocity, where it is not a parameter.
     pub reference: Option<&'a Reference>,

@@ -23,7 +23,7 @@ impl Beam {
 pub(crate) struct Leg {
     /// Direction of the flight.
     pub(crate) ahead: Beam,
-    /// None in the first state, which has no wall beside yet.
+    /// Wall beside the flight; `None` in the first state, which has none yet.
     pub(crate) beside: Option<Beam>,
 }
 

@@ -1,4 +1,4 @@
-//! The motors' lag as a control law sees it: what the rotors make of a demand, foreseen, and a demand that hurries
+//! The motors' lag as a control law sees it: the rotors' answer to a demand, foreseen, and a demand that hurries
 //! them.
 //!
 //! Near hover every component of the wrench follows its demand as a rotor's speed follows its command:

@@ -100,7 +100,7 @@ impl PidGains {
         }
     }
 
-    /// Refuses what a gains file could not say either.
+    /// Refuses values that a gains file could not have either.
     fn check(&self) -> Result<(), ParameterError> {
         let loops =
             [("altitude", self.altitude), ("roll", self.roll), ("pitch", self.pitch), ("yaw", self.yaw)];

@@ -12,7 +12,7 @@ use bus::messages::WallEstimate;
 /// dead reckoning gathers along a side, below a vehicle's size and gap.
 const GATE_M: f64 = 0.5;
 
-/// Two beams that tell the same place within this see both walls, m. Tuned, no source.
+/// Greatest difference between the places by two beams that both see walls, m. Tuned, no source.
 const AGREEMENT_M: f64 = 0.15;
 
 /// Time constant with which the place follows a beam that is believed, s. Tuned, no source: two or three
@@ -34,7 +34,7 @@ pub struct Room {
 }
 
 impl Room {
-    /// The distances from the walls at -x and -y as the beams tell them, where the vehicle begins.
+    /// The distances from the walls at -x and -y by the beams, at the start of the vehicle.
     #[must_use]
     pub fn begun_m(&self, walls: &WallEstimate) -> [f64; 2] {
         std::array::from_fn(|axis| match self.beam_places_m(axis, walls) {

@@ -1,9 +1,9 @@
 //! The pilot's set points: steps, ramps and doublets on four channels, over integer ticks.
 //!
 //! A step or a ramp leads a channel to a new value, which it keeps; a doublet is added on top and leaves
-//! nothing behind. The thesis's "10 degree roll doublet in 1 sec" (§5.1) does not say what the second
-//! covers; here a doublet is `+amplitude` for `duration_s`, then `−amplitude` for `duration_s`, then
-//! nothing, so that one of 1 s lasts 2 s as a whole. Pulses of half a second bring the Hummingbird to
+//! no change behind. The thesis's "10 degree roll doublet in 1 sec" (§5.1) leaves open what the second
+//! covers. Here a doublet is `+amplitude` for `duration_s`, then `−amplitude` for `duration_s`, then
+//! zero, so that one of 1 s lasts 2 s as a whole. Pulses of half a second bring the Hummingbird to
 //! 9.1° and −8.8° only, behind its motors' lag (gains 16 and 6); with the thesis's 25 and 6, to 14.2° and −17.9°.
 
 use diagnostics::ParameterError;
@@ -246,7 +246,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// A value of the channel in SI, within what a vehicle can be asked for.
+    /// A value of the channel in SI, within its range.
     fn value(
         &self,
         key: &'static str,

@@ -67,7 +67,7 @@ impl Sticks {
     /// The recording at `path` among `files`, the parameter `data`.
     ///
     /// # Errors
-    /// It cannot be read, or holds what no sticks can ask for.
+    /// It cannot be read, or holds values that no sticks can ask for.
     pub fn load(files: &InputFiles, path: &Path) -> Result<Self, ParameterError> {
         let file = path.display().to_string();
         let bytes = files.bytes(path).map_err(|cause| {

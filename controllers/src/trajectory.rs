@@ -109,7 +109,7 @@ enum Way {
 }
 
 impl Trajectory {
-    /// The trajectory of `entries`, read one by one so that what is wrong with one names its place.
+    /// The trajectory of `entries`, read one by one so that the fault of an entry names its place.
     ///
     /// # Errors
     /// An entry of unknown kind, one that lacks a key or has an unknown one, a number out of its range: in words.

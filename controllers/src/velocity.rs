@@ -50,7 +50,7 @@ impl VelocityGains {
 }
 
 gains! {
-    /// The gains of the velocity loops and of the cascade inside: what a file leaves out is built in.
+    /// The gains of the velocity loops and of the cascade inside: gains that a file leaves out are those built in.
     pub struct LoopsGains of file, built in "velocity.toml" {
         /// Of the velocity loops.
         velocity: VelocityGains = VelocityGains::read_or_built_in(file),

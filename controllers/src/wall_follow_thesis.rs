@@ -68,7 +68,7 @@ pub struct WallFollowThesisLaw {
     pub ahead: Ahead,
     /// Level distance from a wall at which the next state begins, m.
     pub distance_m: f64,
-    /// Height above what is below, m.
+    /// Height above the ground below, m.
     pub altitude_m: f64,
     /// Yaw, rad.
     pub heading_rad: f64,
@@ -109,7 +109,7 @@ pub struct Parameters {
     gains: Option<PathBuf>,
     /// "varying" or "constant".
     mode: Mode,
-    /// Height above what is below.
+    /// Height above the ground below.
     altitude_m: f64,
     /// Mode varying: tilt far from the wall ahead.
     tilt_deg: Option<f64>,

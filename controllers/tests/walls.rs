@@ -51,7 +51,7 @@ struct Stop {
     /// Of the last five seconds.
     worst_error_m: f64,
     fastest_m_s: f64,
-    /// The greatest speed then, whatever its direction.
+    /// The greatest speed then, in any direction.
     last_speed_m_s: f64,
     /// Greatest speed towards the wall after the speed fell below [`STOPPED_M_S`] for the first time.
     again_m_s: f64,
@@ -69,7 +69,7 @@ fn stop<L: Law>(law: &L, distance_m: f64, seed: u64, away_m: f64, seconds: u64) 
     stop_of(vehicle(), law, distance_m, seed, away_m, seconds)
 }
 
-/// In a hall of 10 m, whose side walls tell the speed along the wall ahead.
+/// In a hall of 10 m, whose side walls show the speed along the wall ahead.
 fn stop_of<L: Law>(flown: Vehicle, law: &L, distance_m: f64, seed: u64, away_m: f64, seconds: u64) -> Stop {
     let walls = [away_m, f64::INFINITY, 5.0, 5.0];
     let mut flight = Loop::of(flown, Vector3::new(0.0, 0.0, 1.5), Senses::new(seed, walls, NOISY));

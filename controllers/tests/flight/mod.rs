@@ -46,7 +46,7 @@ pub struct RangeErrors {
     pub wandering_s: f64,
 }
 
-/// Twice what the sensor's resolution makes, and what 10 Hz of it leave of the velocity.
+/// Twice the error of the sensor's resolution, and the error of the velocity at 10 Hz.
 pub const NOISY: RangeErrors =
     RangeErrors { distance_m: 0.01, velocity_m_s: 0.02, blind_velocity_m_s: 0.05, wandering_s: 2.0 };
 
