@@ -1,5 +1,4 @@
-//! Agreement of two measurements of the same vector, whatever their units: one logged, one derived from another
-//! channel.
+//! Agreement of two measurements of the same vector in any units: one logged, one derived from another channel.
 
 use nalgebra::Vector3;
 
@@ -137,7 +136,7 @@ pub struct Agreement {
     pub correlation: f64,
 }
 
-/// By how much the velocity changes from the middle of the first to that of the second half of a window, twice: as over the
+/// Change of the velocity from the middle of the first to that of the second half of a window, twice: as over the
 /// whole window.
 fn velocity_change(position: &Channel<3>, from: usize, to: usize) -> Option<Vector3<f64>> {
     let (time_s, p) = (&position.time_s, |index: usize| Vector3::from(position.values[index]));

@@ -29,8 +29,8 @@ pub struct Read<const N: usize> {
     pub seams: SeamList,
 }
 
-/// Reads `quantity` as `entry` says; an attitude in the order w, x, y, z. Angles that no vehicle flies at are refused,
-/// unless they are trusted.
+/// Reads `quantity` as `entry` declares it; an attitude in the order w, x, y, z. Angles at which no vehicle
+/// flies are refused, unless they are trusted.
 pub fn read<const N: usize>(
     log: &dyn Log,
     quantity: Quantity,

@@ -57,7 +57,7 @@ pub struct FlightEntry {
     /// Channels that differ from those of the whole file.
     #[serde(default)]
     pub channels: ChannelMap,
-    /// By how much each channel is late, in seconds.
+    /// Lateness of each channel, in seconds.
     #[serde(default)]
     pub delay_s: BTreeMap<Quantity, Spanned<f64>>,
     /// Assumption in place of a measurement that the log does not have.
@@ -158,7 +158,7 @@ pub struct Entry {
     pub holds: Option<Holds>,
     /// True if a log writes a `command` only when it changes.
     pub on_change: Option<bool>,
-    /// By what electrical rotor speeds are divided: half the number of a motor's magnets.
+    /// Divisor of electrical rotor speeds: half the number of a motor's magnets.
     pub pole_pairs: Option<u32>,
 }
 
@@ -195,7 +195,7 @@ pub enum Frame {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Holds {
-    /// That itself, in the body: an accelerometer's reading.
+    /// Specific force in the body: an accelerometer's reading.
     #[default]
     SpecificForce,
     /// The acceleration along the axes of the body: 0 at rest, as gravity was taken off.

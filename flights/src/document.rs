@@ -35,7 +35,7 @@ impl Document {
         Place::of(self.path.display().to_string(), &self.text, span)
     }
 
-    /// A value that cannot be meant.
+    /// An invalid value.
     pub fn bad(
         &self,
         span: &Range<usize>,

@@ -23,7 +23,7 @@ use crate::span::Sparse;
 /// ```
 #[derive(Debug, thiserror::Error)]
 pub enum FlightsError {
-    /// The flights file cannot be read, is no TOML, or has a key or a value that cannot be meant.
+    /// The flights file cannot be read, is not TOML, or has an invalid key or value.
     #[error(transparent)]
     File(#[from] Diagnostic),
     /// The vehicle file is not usable.
@@ -35,7 +35,7 @@ pub enum FlightsError {
         #[source]
         cause: Box<Diagnostic>,
     },
-    /// A log cannot be read, or does not have what the flights file asks of it.
+    /// A log cannot be read, or does not have the channels that the flights file asks for.
     #[error("{place}: flight `{flight}`, log {}: {}{cause}", file.display(), named(*channel))]
     Log {
         /// The line of the flights file that asks.
@@ -161,10 +161,10 @@ pub enum LogError {
     /// The file cannot be read at all.
     #[error("cannot read it: {0}; check the path and its variables")]
     Unreadable(#[source] io::Error),
-    /// It is no table.
+    /// It is not a table.
     #[error(transparent)]
     Table(#[from] TableError),
-    /// It has nothing of a name.
+    /// It has no column, topic or field of a name.
     #[error("no {kind} `{name}`; it has {}; correct {key}", shortened(known))]
     Missing {
         /// Kind of the item that was searched: a column, a topic.
@@ -173,7 +173,7 @@ pub enum LogError {
         name: String,
         /// The names there are.
         known: Vec<String>,
-        /// The key of the flights file that says the name.
+        /// The key of the flights file that has the name.
         key: &'static str,
     },
     /// Something else than expected.

@@ -2,7 +2,7 @@
 
 use crate::quantity::Quantity;
 
-/// Values that contradict what the flights file declares.
+/// Values that contradict the declarations of the flights file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Finding {
     /// The channel.

@@ -70,9 +70,9 @@ pub struct Flight {
     /// Raw motor commands, in the unit of the vehicle file's command map and in its order of rotors. A command
     /// holds until the next.
     pub command: Channel<ROTORS_MAX>,
-    /// True if the log writes commands only on change: then a time without commands is no gap.
+    /// True if the log writes commands only on change: then a time without commands is not a gap.
     pub commands_on_change: bool,
-    /// Times between the files of such a log, in which nobody knows if a command changed.
+    /// Times between the files of such a log, in which it is unknown if a command changed.
     pub command_breaks_s: Vec<(f64, f64)>,
     /// Speeds of the rotors in rad/s, in the order of the commands.
     pub rotor_speed: Channel<ROTORS_MAX>,
@@ -124,7 +124,7 @@ impl<const N: usize> Channel<N> {
     }
 }
 
-/// A channel whatever the size of its samples.
+/// A channel with samples of any size.
 pub(crate) trait AnyChannel {
     fn time_s(&mut self) -> &mut Vec<f64>;
     /// Leaves the samples for which `is_kept` holds of their index.

@@ -1,5 +1,5 @@
-//! Doubts what a log holds as specific force: compared is the acceleration that it means, by what it may be, with that of
-//! the velocity or the position.
+//! Doubts about the kind of specific force in a log: the acceleration of each possible kind is compared with
+//! that of the velocity or the position.
 
 use vehicles::Vehicle;
 
@@ -15,7 +15,7 @@ const WINDOW_S: f64 = 0.4;
 const QUIET_M_S2: f64 = 0.2;
 /// Above this correlation both accelerations are the same.
 const SAME: f64 = 0.7;
-/// It is clearly something else where that has less than this share of the residual.
+/// Another kind is clearly the right one if it leaves less than this share of the residual.
 const CLEARLY: f64 = 0.5;
 /// And within this factor two cannot be told apart.
 const ALIKE: f64 = 1.3;
@@ -53,7 +53,7 @@ pub struct ForceDoubt<'a> {
 }
 
 impl<'a> ForceDoubt<'a> {
-    /// Of a flight that has what is compared; an attitude that was assumed tells nothing.
+    /// The comparison for a flight with the channels that it takes; an assumed attitude does not count.
     pub fn of(flight: &'a Flight, vehicle: &'a Vehicle, entry: &Entry) -> Option<Self> {
         let declared =
             Kind { holds: entry.holds.unwrap_or_default(), frame: entry.frame.unwrap_or_default() };

@@ -1,4 +1,4 @@
-//! A log, whatever its format: samples of numbers by name.
+//! A log of any format: samples of numbers by name.
 
 use crate::error::LogError;
 use crate::number_rows::NumberRows;

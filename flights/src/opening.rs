@@ -46,7 +46,7 @@ pub struct Opening<'a> {
 struct Asked<'b> {
     /// Its files.
     files: &'b [PathBuf],
-    /// The format that the flights file says.
+    /// The format in the flights file.
     format: Option<Format>,
     /// Its declared form.
     form: Form<'b>,

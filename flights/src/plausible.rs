@@ -1,4 +1,4 @@
-//! Compares measured values with physics: what looks like another unit, frame or order is said.
+//! Compares measured values with physics: values that look like another unit, frame or order are reported.
 //!
 //! A mismatch is clear where a known factor, frame or order explains it; otherwise it is only worth a note.
 
@@ -39,7 +39,7 @@ const PERIOD_RANGE_S: (f64, f64) = (2e-4, 0.25);
 const SPAN_RANGE_S: (f64, f64) = (1.0, 3600.0);
 /// Below this correlation a vector does not follow its twin at all.
 const AGAINST: f64 = 0.3;
-/// It follows clearly better another way where that adds this much.
+/// It follows another kind clearly better if the correlation grows by this much.
 const CLEARLY: f64 = 0.3;
 /// And two that are nearer than this cannot be told apart.
 const ALIKE: f64 = 0.1;
@@ -137,7 +137,7 @@ impl Judge<'_> {
         Some(finding(quantity, Some(kinds.join(" or ")), &what))
     }
 
-    /// An acceleration without gravity, of which gravity tells no unit, is that of the vehicle.
+    /// An acceleration without gravity, whose unit does not show by gravity, is that of the vehicle.
     fn acceleration(&self, force: &ForceDoubt<'_>) -> Option<Finding> {
         if !force.declared.holds.is_without_gravity() {
             return None;
@@ -456,7 +456,7 @@ impl Judge<'_> {
             .then(|| format!("{} with the motor's `pole_pairs`, here about {pairs:.0},", of_hundreds()))
     }
 
-    /// That the log has mechanical speeds, where they are divided by pole pairs and would be right without.
+    /// Tells that the log has mechanical speeds, if they are divided by pole pairs and would be right without.
     fn mechanical(&self, factor: f64) -> Option<String> {
         let pairs = self.units.declared(Quantity::RotorSpeed)?.pole_pairs.filter(|pairs| *pairs > 1)?;
         let is_near = libm::log(factor * f64::from(pairs)).abs() < libm::log(ROTOR_SPEED_TOLERANCE);
@@ -511,7 +511,7 @@ fn either(here: Option<String>, there: Option<String>) -> Option<String> {
     }
 }
 
-/// The keys that declare what a specific force is made of.
+/// The keys that declare the kind of a specific force.
 fn of_kind(kind: Kind, declared: Kind) -> String {
     let holds = format!("`holds = \"{}\"`", kind.holds.name());
     let frame = if kind.frame == Frame::FrdNed { "frd-ned" } else { "flu-enu" };

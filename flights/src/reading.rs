@@ -86,8 +86,8 @@ struct Said {
 }
 
 impl Reading<'_> {
-    /// Reads the flight from `log`; says which part of the log's own time it is, too. The memory of the log is free before the
-    /// flight is judged.
+    /// Reads the flight from `log`; also returns its part of the log's own time. The memory of the log is free
+    /// before the flight is judged.
     ///
     /// # Errors
     /// Those of all channels at once.
@@ -323,7 +323,7 @@ impl Reading<'_> {
         self.entry.to_s.as_ref().map_or(f64::INFINITY, |to_s| *to_s.get_ref() - self.start_s())
     }
 
-    /// Fills in what the flights file assumes instead of a measurement.
+    /// Fills in the assumptions of the flights file in place of measurements.
     fn assume(&self, flight: &mut Flight, yaw: Option<Channel<1>>) -> Result<(), FlightsError> {
         let Some(assume) = &self.entry.assume else { return Ok(()) };
         let Assumption::Hover = assume.get_ref();
@@ -353,7 +353,7 @@ impl Reading<'_> {
         Ok(())
     }
 
-    /// Makes a specific force of what the log holds in its place.
+    /// Converts the logged vectors to a specific force.
     fn turn_force(&self, flight: &mut Flight) -> Result<(), FlightsError> {
         let Some(entry) = self.declared(Quantity::SpecificForce) else { return Ok(()) };
         let meaning =
@@ -375,7 +375,7 @@ impl Reading<'_> {
         FlightsError::gather(lost.collect())
     }
 
-    /// Notes what is not clear, or is to be trusted; the rest is an error.
+    /// Notes findings that are not clear, or that the flights file trusts; the rest is an error.
     fn settle(&self, flight: &mut Flight, findings: Vec<Finding>) -> Result<(), FlightsError> {
         let (clear, vague): (Vec<_>, Vec<_>) =
             findings.into_iter().partition(|finding| finding.fits.is_some());

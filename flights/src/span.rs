@@ -1,5 +1,5 @@
-//! The time that a flight's samples lie in. Whatever is computed on a grid in time costs as much as that time is long,
-//! so that it has to be bounded by the samples there are: a stamp in the wrong unit must not ask for a year.
+//! The time that a flight's samples lie in. A computation on a grid in time costs as much as that time is long.
+//! So it has to be bounded by the number of samples: a stamp in the wrong unit must not ask for a year.
 
 use std::fmt;
 
@@ -66,9 +66,9 @@ impl fmt::Display for Moment {
 }
 
 impl Flight {
-    /// Holds the time that the flight lasts against the number of its samples, `spacing_max_s` apart on average: what is
-    /// computed on a grid in time must cost no more than the samples allow for. Flights that were read from files have
-    /// passed with 2 s.
+    /// Compares the time that the flight lasts with the number of its samples, `spacing_max_s` apart on
+    /// average: a computation on a grid in time must cost no more than the samples allow for. Flights that were
+    /// read from files have passed with 2 s.
     ///
     /// # Errors
     /// If the samples are further apart.

@@ -1,4 +1,4 @@
-//! Specific force and what logs hold in its place: accelerations, with or without gravity, along other axes.
+//! Specific force and its substitutes in logs: accelerations, with or without gravity, along other axes.
 //!
 //! With R the attitude, body to world, and g up the gravity in the world, the specific force in the body is
 //! f = R^T (a + g), where a is the acceleration in the world: R b where the log holds b along the axes of the body.
@@ -45,7 +45,7 @@ impl Meaning {
     }
 }
 
-/// Turns what the log holds into the specific force in the body; samples without an attitude about are left out.
+/// Turns the logged vectors into the specific force in the body; samples without an attitude about are left out.
 ///
 /// # Errors
 /// If there is none for any.

@@ -9,7 +9,7 @@ use crate::flight::Channel;
 /// Values that differ by less than this part of the channel's spread are the same, and those that differ by less than the
 /// digits of one of the two: a copy may have fewer.
 const SAME: f64 = 1e-3;
-/// A vector that a channel has more often, as at rest, says nothing about when it was measured.
+/// A vector that a channel has more often, as at rest, does not show when it was measured.
 const REPEATS_MAX: usize = 4;
 /// Fewer samples in common prove nothing.
 const COMMON_MIN: usize = 10;
@@ -36,9 +36,9 @@ pub struct Twin {
 pub enum Comparison {
     /// The second holds measurements of the first.
     Same(Twin),
-    /// It does not.
+    /// The second does not hold measurements of the first.
     Other,
-    /// Too few of their samples tell, as of what stands still.
+    /// Too few of their samples are conclusive, such as those of a channel that stands still.
     Unknown,
 }
 
@@ -101,7 +101,7 @@ fn digit<const N: usize>(channel: &Channel<N>, axis: usize) -> f64 {
     gaps.min_by(f64::total_cmp).unwrap_or(0.0)
 }
 
-/// The samples of a channel that few others of it are the same as.
+/// The samples of a channel whose values it has only a few times.
 struct Telling<const N: usize> {
     /// The values in steps with the index of the sample, sorted.
     keys: Vec<([i64; N], usize)>,

@@ -1,4 +1,4 @@
-//! Made-up logs of every format: what is read from them, and what is said about wrong ones.
+//! Made-up logs of every format: the flights that are read from them, and the errors for wrong ones.
 
 mod support;
 

@@ -40,7 +40,7 @@ impl Place {
     }
 }
 
-/// A flight of 10 s at 100 Hz whose channels agree; the units of what is logged can be wrong.
+/// A flight of 10 s at 100 Hz whose channels agree; the units of the logged channels can be wrong.
 pub struct Motion {
     pub rate_unit: f64,
     pub force_unit: f64,
@@ -225,7 +225,8 @@ pub fn ulog_of(samples: std::ops::Range<u32>) -> Vec<u8> {
     bytes
 }
 
-/// The start of `sensor_msgs/msg/BatteryState`, with what our own definitions do not have: constants and short names.
+/// The start of `sensor_msgs/msg/BatteryState`, with constants and short names, which our own definitions do
+/// not have.
 const BATTERY_STATE: &str = "\
 # A constant:
 uint8 POWER_SUPPLY_STATUS_UNKNOWN = 0
