@@ -2,8 +2,8 @@
 //!
 //! The ends are RoboBee (80 mg, 3 cm; Ma et al., "Controlled flight of a biologically inspired, insect-scale robot",
 //! Science 340, 2013) and the Mil Mi-26 (56 t, rotor of 32 m at 132 rpm; Jane's All the World's Aircraft), a decade or
-//! more beyond either. They are no design limits: they catch slipped exponents and wrong units, and keep the products
-//! of the physics within what a double holds.
+//! more beyond either. They are not design limits: they catch slipped exponents and wrong units, and keep the
+//! products of the physics within the range of a double.
 
 use diagnostics::parameter::Bounds;
 

@@ -39,14 +39,14 @@ pub struct Provenance {
 }
 
 impl Provenance {
-    /// True if the file cites a source; it says `source = "none"` where there is none.
+    /// True if the file cites a source; otherwise it has `source = "none"`.
     #[must_use]
     pub fn has_source(&self) -> bool {
         self.source != NO_SOURCE
     }
 }
 
-/// A number with everything that the file says of it.
+/// A number with its facts in the file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stated {
     /// Its name.

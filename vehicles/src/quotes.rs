@@ -6,7 +6,7 @@
 
 use crate::lines;
 
-/// A quotation mark that would swallow what follows it.
+/// A quotation mark that would swallow the cells behind it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
     "line {line}, cell {cell}: expected a cell on one line, found a quotation mark (\") that opens one and has none \

@@ -1,4 +1,4 @@
-//! Walks the TOML tree of a vehicle file, keeps positions, and refuses every key nobody asked for.
+//! Walks the TOML tree of a vehicle file, keeps positions, and refuses every key that is not read.
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -36,7 +36,7 @@ impl<'t> Document<'t> {
         Place::of(self.file, self.text, span)
     }
 
-    /// A value that cannot be meant.
+    /// An invalid value.
     pub fn bad(
         &self,
         at: &Range<usize>,
@@ -75,7 +75,7 @@ impl Quantity {
         self.pass(doc, positive)
     }
 
-    /// Refuses what lies outside of `bounds`.
+    /// Refuses a number outside of `bounds`.
     pub fn within(self, doc: &Document, bounds: &Bounds) -> Result<Self, Diagnostic> {
         self.pass(doc, |key, si| bounds.check(key, si))
     }
@@ -97,7 +97,7 @@ impl Quantity {
     }
 }
 
-/// Origin of a number: known of something that exists, or chosen by somebody.
+/// Origin of a number: known of something that exists, or chosen.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Origin {
     Known,
@@ -201,7 +201,7 @@ impl<'d, 't> Section<'d, 't> {
         }
     }
 
-    /// A text that has to be one of `choices`; returns what stands beside it.
+    /// A text that has to be one of `choices`; returns the value beside it.
     pub fn choice<T: Copy>(&self, name: &'d str, choices: &[(&str, T)]) -> Result<T, Diagnostic> {
         let text = self.text(name)?;
         if let Some((_, chosen)) = choices.iter().find(|(name, _)| *name == text) {
@@ -228,8 +228,8 @@ impl<'d, 't> Section<'d, 't> {
         Ok(self.quantity(name, dimension)?.within(self.doc, bounds)?.si)
     }
 
-    /// A number that somebody chose, such as a gain: as [`Self::quantity`], but it has an `uncertainty` only
-    /// where the file says so.
+    /// A number that was chosen, such as a gain: as [`Self::quantity`], but it has an `uncertainty` only
+    /// if the file has one.
     pub fn chosen(&self, name: &'d str, dimension: Dimension) -> Result<Quantity, Diagnostic> {
         self.number_of(name, dimension, Origin::Chosen)
     }
@@ -363,7 +363,7 @@ impl<'d, 't> Section<'d, 't> {
         self.table.get(name).map_or(self.at.clone(), Spanned::span)
     }
 
-    /// Refuses every key that nobody asked for, in the file's order.
+    /// Refuses every key that was not read, in the file's order.
     pub fn finish(&self) -> Result<(), Diagnostic> {
         let asked = self.asked.borrow();
         let unknown = self.table.keys().filter(|key| !asked.contains(key.get_ref().as_ref()));

@@ -45,7 +45,7 @@ pub struct Vehicle {
     /// Map from a raw motor command to a commanded speed.
     pub command: CommandMap,
     /// The effects that act beyond all this, in the file's order. Only a plant that flies them reads their
-    /// meaning: what else is in this structure is the vehicle as it is declared, without them.
+    /// meaning: the rest of this structure is the vehicle as it is declared, without them.
     pub effects: Vec<EffectEntry>,
     /// Provenance of every number, in the file's order of reading.
     pub provenance: Vec<Provenance>,
@@ -62,10 +62,10 @@ pub struct Rotor {
     pub axis: Vector3<f64>,
     /// Sense of rotation seen from the tip of the axis: +1 counter-clockwise, -1 clockwise.
     pub spin: f64,
-    /// This rotor's drag torque as a multiple of what c_Q makes of its speed: 1 unless the file says otherwise. Only the
+    /// This rotor's drag torque as a multiple of that by c_Q at its speed: 1 unless the file says otherwise. Only the
     /// physics knows it; controllers count on rotors that are alike.
     pub torque_scale: f64,
-    /// True for a rotor that has failed: it stands still whatever is commanded.
+    /// True for a rotor that has failed: it stands still under any command.
     pub has_failed: bool,
 }
 

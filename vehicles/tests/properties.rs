@@ -48,7 +48,7 @@ fn paths(value: &Value, path: &[String], all: &mut Vec<Vec<String>>) {
     }
 }
 
-/// Replaces what stands at `path`, or removes it.
+/// Replaces the value at `path`, or removes it.
 fn change(value: &mut Value, path: &[String], new: Option<Value>) {
     let [key, rest @ ..] = path else { return };
     match value {
