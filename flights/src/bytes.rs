@@ -4,7 +4,7 @@ use std::ops::Range;
 
 /// A place in the bytes of a log.
 pub struct Cursor<'a> {
-    /// The whole of the bytes.
+    /// Bytes of the log.
     pub bytes: &'a [u8],
     /// The next byte.
     pub at: usize,

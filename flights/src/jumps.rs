@@ -78,7 +78,7 @@ fn without_jumps<const N: usize>(
 struct Step {
     from: usize,
     span_s: f64,
-    /// Length of its deviation from a step as the one before and the one behind would have it.
+    /// Difference from the mean of the steps before and behind, by speed or by way: the smaller of the two.
     excess: f64,
 }
 

@@ -258,8 +258,8 @@ impl Absent {
         Self { is_found: vec![false; names.len()], known: Vec::new() }
     }
 
-    /// The numbers of a message; NaN where its array is too short, or where the message of one of our sensors
-    /// is lost.
+    /// The numbers of a message; NaN where its array is too short, or where a sensor of ours marks the sample
+    /// as lost.
     fn row(&mut self, leaves: &[Leaf], names: &[String]) -> Result<Vec<f64>, LogError> {
         let lost = number(leaves, "measured_ns").is_some() && number(leaves, "valid") == Some(0.0);
         let row: Vec<Option<f64>> = names.iter().map(|name| number(leaves, name)).collect();

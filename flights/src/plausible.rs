@@ -456,7 +456,7 @@ impl Judge<'_> {
             .then(|| format!("{} with the motor's `pole_pairs`, here about {pairs:.0},", of_hundreds()))
     }
 
-    /// Tells that the log has mechanical speeds, if they are divided by pole pairs and would be right without.
+    /// Returns the words for mechanical speeds, if the log's are divided by pole pairs and would be right without.
     fn mechanical(&self, factor: f64) -> Option<String> {
         let pairs = self.units.declared(Quantity::RotorSpeed)?.pole_pairs.filter(|pairs| *pairs > 1)?;
         let is_near = libm::log(factor * f64::from(pairs)).abs() < libm::log(ROTOR_SPEED_TOLERANCE);
