@@ -10,7 +10,7 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// How long a look at the run sleeps before the next: short against what is measured, and next to no load.
+/// Sleep between two looks at the run: short against the measured times, and next to no load.
 const POLL: Duration = Duration::from_micros(200);
 const WATCHDOG: Duration = Duration::from_secs(120);
 
@@ -32,7 +32,7 @@ pub struct Stages {
     pub granted_s: f64,
 }
 
-/// What a run takes of the memory.
+/// Memory that a run takes.
 #[derive(Clone, Copy, Debug)]
 pub struct Memory {
     /// Private memory and the run's share of files, such as the executable's, over all its processes.
@@ -73,7 +73,7 @@ impl Flying {
         self.poll(|| (control.completed_ticks() >= ticks).then_some(()))
     }
 
-    /// What the run takes of the memory now.
+    /// Returns the memory that the run takes now.
     pub fn memory(&self) -> Result<Memory> {
         let (plan, _) = self.control().ok_or("the run is over")?;
         let processes = std::fs::read_dir("/proc")?

@@ -1,4 +1,4 @@
-//! What a paced run costs while it waits: processor share per process.
+//! Cost of a paced run while it waits: processor share per process.
 
 use crate::report::{Result, number, run_manifest};
 use std::path::Path;

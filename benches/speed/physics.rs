@@ -18,7 +18,7 @@ const DT_S: f64 = 1e-3;
 /// quaternion 30, the state moved 80), and 120 to sum and normalise. Within a fifth.
 const STEP_OPERATIONS: f64 = 1300.0;
 
-/// Prints what a step and a cast take.
+/// Prints the times of a step and of a cast.
 pub fn report() -> Result<()> {
     println!(
         "\nphysics: ns, median (min … max) of {REPETITIONS} rounds of {STEPS}; and against a multiply-add"
@@ -101,7 +101,7 @@ fn cast_ns(caster: &RayCaster) -> f64 {
     per_step_ns(start)
 }
 
-/// A chain of multiply-adds, each of which needs the one before: what arithmetic costs that cannot overlap.
+/// A chain of multiply-adds, each of which needs the one before: the cost of arithmetic that cannot overlap.
 fn multiply_add_ns() -> f64 {
     let (mut sum, factor) = (black_box(1.0_f64), black_box(0.999));
     let start = Instant::now();

@@ -1,4 +1,4 @@
-//! What profiling costs: ticks per second of the hover manifest with and without it.
+//! Cost of profiling: ticks per second of the hover manifest with and without it.
 
 use crate::report::{Result, Spread, fly_manifest, number};
 use std::path::Path;

@@ -50,7 +50,7 @@ trait Counted: Message {
 
 #[derive(Deserialize)]
 struct Parameters {
-    /// Where to write the latencies of this hop, one line of nanoseconds.
+    /// File for the latencies of this hop, one line of nanoseconds.
     latency_file: Option<PathBuf>,
 }
 

@@ -1,4 +1,4 @@
-//! What the parts share: medians with spread, a table, a run of a manifest as JSON.
+//! Helpers that the parts share: medians with spread, a table, a run of a manifest as JSON.
 
 use std::path::Path;
 use std::process::Command;
@@ -26,7 +26,7 @@ impl std::fmt::Display for Spread {
     }
 }
 
-/// Prints what machine this is.
+/// Prints the facts of this machine.
 pub fn print_machine() {
     let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = info.lines().find(|line| line.starts_with("model name")).unwrap_or("unknown processor");

@@ -1,4 +1,4 @@
-//! How much faster than the world the wall scenarios fly: one vehicle with all its sensors and the recorder, and ten in
+//! Speed of the wall scenarios relative to the world: one vehicle with all its sensors and the recorder, and ten in
 //! one room.
 
 use crate::report::{Result, Spread, number, run_manifest};

@@ -1,10 +1,10 @@
-//! What a swap costs: the start of the backup, the clock's hold, and the run as a whole.
+//! Cost of a swap: the start of the backup, the clock's hold, and the run as a whole.
 
 use crate::report::{Result, Spread, number, run_manifest};
 use serde_json::Value;
 use std::path::Path;
 
-/// Swaps of one run: the first take-over, and what is between two.
+/// Swaps of one run: the first take-over, and the ticks between two.
 const SWAPS: usize = 20;
 const FIRST_TICK: u32 = 1000;
 const EVERY_TICKS: u32 = 500;

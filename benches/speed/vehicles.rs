@@ -8,7 +8,7 @@ const VEHICLES: [u32; 6] = [1, 2, 4, 8, 16, 32];
 const REPETITIONS: usize = 3;
 /// Ticks of all vehicles of a run together, so that each run takes one to two seconds.
 const VEHICLE_TICKS: u32 = 48_000;
-/// Every process has computed and touched what it needs by then.
+/// By then every process has computed, and has touched the memory that it needs.
 const WARM_TICKS: u32 = 200;
 
 /// Prints rates, host time per tick against that of one vehicle, the exponent, and the memory.

@@ -4,10 +4,10 @@
 //! `… -- pitch 2 > manifests/sticks/pitch.csv` wrote the two that are stored; a test writes them anew.
 //!
 //! The hand makes one move after another, drawn at random: a rest, a pulse, a step held for a while, each of the
-//! latter two followed by its opposite, so that the vehicle stays near its place. What it wants passes through
-//! its own slowness, a critically damped lag of second order, and through the tremor that it adds; the stick has
-//! its stops. All numbers are tuned, no source, but for the stops (thesis §5.3). Nothing but sums, products and
-//! the bus's random stream is used, so that every machine writes the same bytes.
+//! latter two followed by its opposite, so that the vehicle stays near its place. The wanted angle passes through
+//! the hand's slowness, a critically damped lag of second order, and a tremor is added; the stick has
+//! its stops. All numbers are tuned, no source, but for the stops (thesis §5.3). Only sums, products and
+//! the bus's random stream are used, so that every machine writes the same bytes.
 
 use rand_core::Rng;
 
@@ -18,13 +18,13 @@ const LENGTH_S: f64 = 30.0;
 const REST_S: f64 = 1.5;
 /// The stops of the stick (thesis §5.3).
 const STOP_DEG: f64 = 30.0;
-/// How fast a hand follows what it wants: about 2 Hz.
+/// Speed with which a hand follows its intention: about 2 Hz.
 const HAND_RAD_S: f64 = 12.0;
 /// Size and quickness of its tremor.
 const TREMOR_DEG: f64 = 0.25;
 const TREMOR_FOLLOWING: f64 = 0.3;
 
-/// What the hand wants for a while.
+/// Angle that the hand wants for a while.
 struct Move {
     angle_deg: f64,
     seconds: f64,
@@ -58,7 +58,7 @@ impl Pilot {
         [Move { angle_deg, seconds }, Move { angle_deg: -angle_deg, seconds }, rest]
     }
 
-    /// What the hand wants at every row.
+    /// Returns the wanted angle at every row.
     fn wanted_deg(&mut self) -> Vec<f64> {
         let rows = |seconds: f64| (seconds / ROW_S) as usize;
         let mut wanted = vec![0.0; rows(REST_S)];
@@ -72,7 +72,7 @@ impl Pilot {
         wanted
     }
 
-    /// What the stick does of it.
+    /// Returns the angle of the stick at every row, as the hand moves it.
     fn stick_deg(&mut self) -> Vec<f64> {
         let wanted = self.wanted_deg();
         let (mut stick_deg, mut rate_deg_s, mut tremor_deg) = (0.0_f64, 0.0_f64, 0.0_f64);

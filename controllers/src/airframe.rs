@@ -1,4 +1,4 @@
-//! The vehicle as its controllers know it: its file, the allocation to its rotors, and what the loops need of both.
+//! The vehicle as its controllers know it: its file, the allocation to its rotors, and the models for the loops.
 
 use crate::allocation::{Allocation, AllocationError, THRUST_RESERVE};
 use diagnostics::ParameterError;
@@ -45,7 +45,7 @@ impl ControlledVehicle {
         Ok(Self { vehicle, allocation })
     }
 
-    /// What the loops about hover have to know of it. Products of inertia are left to the loops.
+    /// Returns its model for the loops about hover. Products of inertia are left to the loops.
     #[must_use]
     pub fn hover_model(&self) -> HoverModel {
         let (thrust_min_N, thrust_max_N) = self.allocation.thrust_range_N(THRUST_RESERVE);

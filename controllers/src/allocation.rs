@@ -1,4 +1,4 @@
-//! Control allocation: a wrench to the speeds of the rotors, and what is given up at their limits.
+//! Control allocation: a wrench to the speeds of the rotors, and the parts of it that are given up at their limits.
 //!
 //! A rotor at r from the centre of mass with the axis a that turns at ω makes the thrust c_T·ω²·a. Its torque on the body is
 //! r × a·c_T·ω², and against its own sense of turning −spin·c_Q·ω²·a. With axes along body z this is eq. 3.7 of the thesis
@@ -7,9 +7,10 @@
 //!
 //! Four rotors have one set of squared speeds for each wrench: the effectiveness matrix B is inverted. More rotors have many
 //! sets: the one with the least sum of squares is taken, Bᵀ(BBᵀ)⁻¹ (Moore-Penrose; Johansen and Fossen, Control allocation: a
-//! survey, Automatica 49, 2013, section 2.2). Where that is beyond the limits of a rotor, the torques are first cut to what fits
-//! beside the thrust, or to a share of what fits in hover if that is more: yaw first, then roll and pitch. Then the speeds within
-//! the limits make these torques, and come as near to the thrust as that leaves (`bounded`).
+//! survey, Automatica 49, 2013, section 2.2). If that is beyond the limits of a rotor, the torques are first
+//! cut to the part that fits beside the thrust, or to a share of the part that fits in hover if that is more:
+//! yaw first, then roll and pitch. Then the speeds within the limits make these torques, and come as near to
+//! the thrust as that allows (`bounded`).
 
 use crate::bounded::{BoundedLeastSquares, Parts};
 use bus::Bounded;
@@ -30,7 +31,7 @@ const TORQUE_SHARE: f64 = 0.5;
 /// lower priorities move a higher one.
 const MISSED_MIN: f64 = 5e-4;
 /// The torque that rotors must make both ways while they carry the weight, against that of all rotors together. Tuned, no
-/// source: less is no control.
+/// source: less does not control.
 const HELD_MIN: f64 = 0.01;
 
 /// A thrust along body z and a torque about the centre of mass in body axes.
@@ -141,13 +142,13 @@ pub struct Allocation {
     inverse: [PerRotor; 4],
     /// The same beyond the limits.
     bounded: BoundedLeastSquares,
-    /// Squared speeds of hover: those of the weight, or of as much of it as the rotors lift with room for torques.
+    /// Squared speeds of hover: those of the weight, or of the part of it that the rotors lift with room for torques.
     hover: PerRotor,
     square_min_rad2_s2: f64,
     square_max_rad2_s2: f64,
 }
 
-/// The speeds for a wrench, and how much of it they make.
+/// The speeds for a wrench, and the part of it that they make.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Allocated {
     /// Rotor speeds within their limits, rad/s.
@@ -163,7 +164,7 @@ pub struct Allocated {
 }
 
 impl Allocated {
-    /// Whether any of the demand was given up.
+    /// True if any of the demand was given up.
     #[must_use]
     pub fn is_saturated(&self) -> bool {
         self.thrust_error_N != 0.0 || self.roll_pitch_part != 1.0 || self.yaw_part != 1.0
@@ -219,8 +220,8 @@ impl Allocation {
     }
 
     /// The speeds that make `demand`. Beyond the limits of the rotors, roll and pitch torque come first, keeping their direction,
-    /// then yaw torque, each up to a share of what the rotors make in hover. Thrust comes last: it moves towards hover, and not
-    /// beyond.
+    /// then yaw torque, each up to a share of the rotors' torque in hover. Thrust comes last: it moves towards
+    /// hover, and not beyond.
     #[must_use]
     pub fn allocate(&self, demand: &RotorWrench) -> Allocated {
         let squares = self.squares(demand);
@@ -232,7 +233,7 @@ impl Allocation {
         Allocated { speeds_rad_s, wrench, thrust_error_N: 0.0, roll_pitch_part: 1.0, yaw_part: 1.0 }
     }
 
-    /// Squared speeds that make `demand`, whatever the limits.
+    /// Squared speeds that make `demand`, without regard to the limits.
     fn squares(&self, demand: &RotorWrench) -> PerRotor {
         let for_thrust = self.inverse[0].map(|square| square * demand.thrust_N);
         let for_attitude = each(&for_thrust, &self.for_roll_pitch(demand), |square, more| square + more);
@@ -267,7 +268,8 @@ impl Allocation {
         }
     }
 
-    /// `demand` with the torques cut to the larger of what fits beside its thrust, and a share of what fits in hover.
+    /// `demand` with the torques cut to the larger of two: the part that fits beside its thrust, and a share of
+    /// that in hover.
     fn cut(&self, demand: &RotorWrench) -> RotorWrench {
         let beside_thrust = self.inverse[0].map(|square| self.clamp(square * demand.thrust_N));
         let (kept, in_hover) = (self.fitting(&beside_thrust, demand), self.fitting(&self.hover, demand));
@@ -363,10 +365,10 @@ fn effectiveness(vehicle: &Vehicle) -> Bounded<Vector4<f64>, ROTORS_MAX> {
     rotors.collect()
 }
 
-/// Length of what is left of a row of length 1 below which the row counts as dependent on the others.
+/// Remaining length of a row of length 1 below which the row counts as dependent on the others.
 const INDEPENDENT_MIN: f64 = 1e-6;
 
-/// The first of thrust, roll, pitch and yaw that follows from those before it, whatever the speeds: its row of the
+/// The first of thrust, roll, pitch and yaw that follows from those before it at any speeds: its row of the
 /// effectiveness matrix is a combination of theirs (Gram-Schmidt).
 fn dependent(effectiveness: &[Vector4<f64>]) -> Option<Part> {
     let mut before: Bounded<[f64; ROTORS_MAX], 4> = Bounded::default();

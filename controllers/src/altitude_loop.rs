@@ -80,9 +80,9 @@ impl AltitudeLoop<'_> {
         thrust_N
     }
 
-    /// What the integrators ask for after another law: what the other's asked for, where this law has a gain for it.
-    /// Where only its last thrust is known, the lift is what it takes to ask for that. `turn_gains` and `turn_max_rad_s2`
-    /// are those of the law's own attitude loops.
+    /// Returns the integrals after another law: those of the other, where this law has a gain for them. If only its
+    /// last thrust is known, the lift is chosen so that the loop asks for that thrust. `turn_gains` and
+    /// `turn_max_rad_s2` are those of the law's own attitude loops.
     pub fn continued<S>(
         &self,
         from: &Predecessor<'_, S>,

@@ -1,4 +1,4 @@
-//! How fast to come near a wall: from the distance still to go to a velocity.
+//! Speed of the approach to a wall: from the distance still to go to a velocity.
 //!
 //! Near the end the velocity is proportional to the distance, v = k·e; further away it is that from which the
 //! deceleration a stops in time, v = √(2a·(e − a/2k²)). The two meet at e = a/k² with the same slope, so that
@@ -30,8 +30,8 @@ impl Approach {
         if v < a / k { v / k } else { v * v / (2.0 * a) + 0.5 * a / (k * k) }
     }
 
-    /// The rate of change of [`Self::speed_m_s`] while the distance shrinks by `closing_m_s`: what a vehicle
-    /// that follows the curve has to accelerate by.
+    /// The rate of change of [`Self::speed_m_s`] while the distance shrinks by `closing_m_s`: the acceleration
+    /// of a vehicle that follows the curve.
     pub fn acceleration_m_s2(&self, distance_m: f64, closing_m_s: f64) -> f64 {
         let (k, a, away_m) = (self.slope_1_s, self.deceleration_m_s2, distance_m.abs());
         let slope_1_s = if away_m < a / (k * k) { k } else { a / self.speed_m_s(away_m) };

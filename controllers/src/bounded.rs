@@ -1,25 +1,25 @@
 //! Least squares within bounds: the squared speeds that come nearest to a demand beyond the rotors' limits.
 //!
 //! Minimises |W (B x − d)|² + ε² |x|² over least ≤ x ≤ 1, where x are the squared speeds in parts of the greatest, and the
-//! rows of B and d are roll, pitch, yaw and thrust, each divided by its size. The weights W make the priorities: what a part
-//! of higher priority needs costs any amount of the lower ones. Solved by an active set: the rotors at a bound are held
-//! there while the others solve the unbounded problem, and one is released where that brings the demand nearer
-//! (Härkegård, Efficient active set algorithms for solving constrained least squares problems in aircraft control
-//! allocation, CDC 2002; Smeur, de Wagter and Höppener, Prioritized control allocation for quadrotors subject to
-//! saturation, IMAV 2017).
+//! rows of B and d are roll, pitch, yaw and thrust, each divided by its size. The weights W make the
+//! priorities: a part of higher priority may cost any amount of the lower ones. Solved by an active set: the
+//! rotors at a bound are held there while the others solve the unbounded problem, and one is released where
+//! that brings the demand nearer (Härkegård, Efficient active set algorithms for solving constrained least
+//! squares problems in aircraft control allocation, CDC 2002; Smeur, de Wagter and Höppener, Prioritized
+//! control allocation for quadrotors subject to saturation, IMAV 2017).
 
 use nalgebra::{SMatrix, SVector, Vector4};
 use vehicles::ROTORS_MAX;
 
-/// Weights of roll, pitch, yaw and thrust. Tuned, no source: a part of lower priority moves a higher one by 1e-4 of what it
-/// lacks itself.
+/// Weights of roll, pitch, yaw and thrust. Tuned, no source: a part of lower priority moves a higher one by
+/// 1e-4 of its own error.
 const WEIGHTS: [f64; 4] = [1.0, 1.0, 1e-2, 1e-4];
 /// Weight of the least sum of squares, below all others.
 const SMALL: f64 = 1e-6;
 /// Roll and pitch demands are cut to this multiple of their size: beyond it rounding would hide the lower priorities.
 const TILT_MAX: f64 = 100.0;
-/// Yaw and thrust demands are cut to this multiple of theirs: a dozen rotors reach the square root of 12, and what lacks
-/// beyond that would move the higher priorities.
+/// Yaw and thrust demands are cut to this multiple of theirs: a dozen rotors reach the square root of 12, and
+/// larger errors would move the higher priorities.
 const DEMAND_MAX: f64 = 4.0;
 /// Slopes below this are rounding.
 const SLOPE_MIN: f64 = 1e-12;
@@ -172,7 +172,8 @@ mod tests {
     }
 
     /// The optimum of a convex problem with bounds: no rotor can move alone, nor any two together, to a smaller sum. The sums
-    /// are taken part by part in the order of the priorities, so that the weights themselves are not what is tested.
+    /// are taken part by part in the order of the priorities, so that the test does not depend on the weights
+    /// themselves.
     #[test]
     fn no_rotor_and_no_two_rotors_can_bring_a_demand_nearer() {
         let mut random = 1_u64;

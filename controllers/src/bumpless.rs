@@ -1,9 +1,9 @@
 //! Bumpless transfer (K. J. Åström and T. Hägglund, "Advanced PID Control", section 3.5): a law goes on after another
 //! without a jump of the demanded wrench.
 //!
-//! A law finds its own state as it left it. Of another's it takes what means the same to all, the integrators, and
-//! sets the rest by what is measured. What was asked for last and the backup does not ask for is added to its demand
-//! and fades out (`TIME_CONSTANT_S`).
+//! A law finds its own state as it left it. From another law's state it takes the integrators, which mean the
+//! same to all laws, and sets the rest by the measurement. The part of the last wrench that the backup does not
+//! ask for is added to its demand and fades out (`TIME_CONSTANT_S`).
 
 use crate::allocation::RotorWrench;
 use crate::control::{ControlInput, ControlOutput, within};
@@ -12,11 +12,11 @@ use crate::law::{Law, Predecessor};
 use nalgebra::Vector3;
 use vehicles::Vehicle;
 
-/// With which time constant the part of a predecessor's wrench fades that its backup does not ask for, s.
+/// Time constant with which the part of a predecessor's wrench fades that its backup does not ask for, s.
 /// Tuned, no source: about that of the Hummingbird's motors, which would smooth a jump likewise.
 const TIME_CONSTANT_S: f64 = 0.1;
 
-/// The most of a predecessor's acceleration that fades, m/s². Tuned, no source: what is more is a fault that
+/// The most of a predecessor's acceleration that fades, m/s². Tuned, no source: a greater one is a fault that
 /// is not to be prolonged.
 const ACCELERATION_MAX_M_S2: f64 = 3.0;
 
@@ -43,7 +43,7 @@ pub struct BumplessTransfer {
     id: LawId,
     thrust_max_N: f64,
     torque_max_N_m: Vector3<f64>,
-    /// What one period leaves of what fades.
+    /// Factor by which a residual shrinks in one period.
     fade: f64,
 }
 
@@ -59,9 +59,9 @@ impl BumplessTransfer {
         }
     }
 
-    /// One step of `law`, the one that this transfer was made for: takes over where another law flew before, asks, and
-    /// remembers what it asked for. `last_wrench` is that of the predecessor's last command, where no state was
-    /// transferred.
+    /// One step of `law`, the one that this transfer was made for: takes over where another law flew before,
+    /// asks for a wrench, and remembers it. `last_wrench` is that of the predecessor's last command, where no
+    /// state was transferred.
     pub fn step<L: Law>(
         &self,
         law: &L,
@@ -79,7 +79,7 @@ impl BumplessTransfer {
         output
     }
 
-    /// Where this is the first tick after another law flew, goes on from what that one asked for.
+    /// Continues from the wrench of another law, if this is the first tick after that law flew.
     fn take_over<L: Law>(
         &self,
         law: &L,
@@ -106,7 +106,7 @@ impl BumplessTransfer {
         }
     }
 
-    /// Notes what of `wrench` the law does not ask for itself, within what a sane law asks for.
+    /// Notes the part of `wrench` that the law does not ask for itself, within the limits of a sane law.
     fn keep_residual(&self, state: &mut ControllerState, wrench: &RotorWrench, asked: &RotorWrench) {
         let missing_B_N_m = wrench.torque_B_N_m - asked.torque_B_N_m;
         state.residual_thrust = within(wrench.thrust_N - asked.thrust_N, self.thrust_max_N);
@@ -114,7 +114,7 @@ impl BumplessTransfer {
             std::array::from_fn(|axis| within(missing_B_N_m[axis], self.torque_max_N_m[axis]));
     }
 
-    /// `asked` with what is left of the predecessor's wrench, which fades by one period.
+    /// `asked` with the residual of the predecessor's wrench, which fades by one period.
     fn with_residual(&self, state: &mut ControllerState, asked: &RotorWrench) -> RotorWrench {
         let wrench = RotorWrench {
             thrust_N: asked.thrust_N + state.residual_thrust,

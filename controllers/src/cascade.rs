@@ -3,7 +3,7 @@
 //!
 //! - Command filter: roll and pitch are cut to ±30° and filtered, x'' = ω²(c − x) − 2ζω x'. Where half a turn is allowed,
 //!   nothing is cut, and the command comes round as the vehicle does: a ramp of 360° is a flip. The yaw command
-//!   turns towards the yaw that is asked for no faster than a yaw stick at full deflection would integrate
+//!   turns towards the yaw set point no faster than a yaw stick at full deflection would integrate
 //!   it, comes round at 360°, and is set to the measured yaw as long as no thrust is asked for.
 //! - Attitude loop: error of roll, pitch and yaw, times a gain, and a part of the filtered commands' own rates,
 //!   to their rates of change, and by the kinematics of the z-y-x sequence to body rates (the inverse of thesis eq. 3.18).
@@ -25,7 +25,7 @@ use nalgebra::Vector3;
 use std::f64::consts::PI;
 use std::path::Path;
 
-/// The law at one period: all that does not change during a run.
+/// The law at one period, with everything that does not change during a run.
 ///
 /// ```
 /// use bus::messages::{SetPoint, StateEstimate};
@@ -261,7 +261,7 @@ mod tests {
         SetPoint { altitude_m: 1.0, ..SetPoint::default() }
     }
 
-    /// What was asked for in flight, so that the yaw command is not reset.
+    /// Wrench that was asked for in flight, so that the yaw command is not reset.
     const IN_FLIGHT: RotorWrench = RotorWrench { thrust_N: 5.0, torque_B_N_m: Vector3::new(0.0, 0.0, 0.0) };
 
     fn flying(measured: &HoverMotion) -> CascadeState {

@@ -1,4 +1,4 @@
-//! The gains of the cascade's loops: which signal each multiplies, and why ours are not the thesis's.
+//! The gains of the cascade's loops: the signal that each multiplies, and the reason why ours are not the thesis's.
 //!
 //! Table 5.1 read as a cascade has an attitude gain of 25/6 = 4.2 1/s on a rate gain of 6 1/s, and no
 //! derivative of the rate. Behind the motors' lag (ω_n = 15.08 rad/s, ζ = 0.603, thesis §4.2), broken at the
@@ -21,7 +21,7 @@ use diagnostics::unit::{ANGULAR_ACCELERATION, PER_SECOND, PER_SECOND_2, PURE_NUM
 gains! {
     /// Gains and limits of the inner loops.
     pub struct CascadeGains of file, built in "cascade.toml" {
-        /// What is done to the commands first.
+        /// Filter of the commands.
         filter: CommandFilter = CommandFilter::read(&file.table("command_filter")),
         /// Errors of roll, pitch and yaw (rad) to their commanded rates of change (rad/s), 1/s.
         attitude_1_s: [f64; 3] = ["attitude.roll", "attitude.pitch", "attitude.yaw"].map(|key| file.gain(key, PER_SECOND)),

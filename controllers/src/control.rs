@@ -1,4 +1,4 @@
-//! What a control law reads and answers at a tick.
+//! Inputs and outputs of a control law at a tick.
 
 use crate::allocation::RotorWrench;
 use crate::set_points::SetPoint;
@@ -18,29 +18,29 @@ pub struct MotionEstimate {
     pub angular_velocity_B_rad_s: Vector3<f64>,
 }
 
-/// What a law reads at a tick.
+/// Inputs of a law at a tick.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ControlInput {
     /// The vehicle's motion.
     pub motion: MotionEstimate,
-    /// What the pilot asks for; the default where no pilot is wired.
+    /// Set point of the pilot; the default where no pilot is wired.
     pub set_point: SetPoint,
-    /// Where the trajectory is; zero where none is wired.
+    /// Point of the trajectory; zero where none is wired.
     pub reference: Reference,
-    /// What the range finders see; zero where none are wired.
+    /// Walls that the range finders see; zero where none are wired.
     pub walls: WallEstimate,
 }
 
-/// What a law answers: the wrench to make, and what it reports beside it.
+/// Outputs of a law: the wrench to make, and its report beside it.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ControlOutput {
     /// The wrench.
     pub wrench: RotorWrench,
-    /// What of it the integrators ask for.
+    /// Part of it that the integrators ask for.
     pub integrals: Integrals,
-    /// What the inner loops hold.
+    /// Set point of the inner loops.
     pub set_point: SetPoint,
-    /// What the outer loop asks for: velocity along the heading's level x and y, m/s.
+    /// Set point of the outer loop: velocity along the heading's level x and y, m/s.
     pub velocity_m_s: [f64; 2],
     /// The state of the guidance; each guidance numbers its own.
     pub phase: u32,

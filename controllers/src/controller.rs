@@ -13,12 +13,12 @@ use bus::context::{NodeContext, StepContext};
 use bus::messages::{ControlStatus, MotorCommand};
 use diagnostics::ParameterError;
 
-/// What every controller sends.
+/// Outputs of every controller.
 #[derive(Debug, OutputPorts)]
 pub struct Outputs {
     /// To the motors.
     pub command: MotorCommand,
-    /// What the law asks for, and what the rotors make of it.
+    /// Demand of the law, and the rotors' answer to it.
     pub status: Option<ControlStatus>,
 }
 

@@ -1,7 +1,7 @@
 //! The state of a controller: laid out alike for all laws, so that any of them can take over from any other.
 //!
-//! It holds what means the same to all laws, and room for the law's own state, which only a law with the same type of
-//! state reads.
+//! It holds the quantities that mean the same to all laws, and room for the law's own state, which only a law
+//! with the same type of state reads.
 
 use crate::allocation::RotorWrench;
 use crate::control::Integrals;
@@ -64,7 +64,7 @@ pub struct ControllerState {
 }
 
 impl ControllerState {
-    /// Whether no law has left it yet.
+    /// True if no law has left it yet.
     pub(crate) fn is_new(&self) -> bool {
         self.id == LawId::default()
     }

@@ -37,7 +37,7 @@ pub enum Shape {
 pub struct Curve {
     /// The shape.
     pub shape: Shape,
-    /// Where it starts and ends.
+    /// Point at which it starts and ends.
     pub start_W_m: Vector3<f64>,
     /// Direction of its x axis, counter-clockwise from the world's x seen from above.
     pub direction_rad: f64,
@@ -50,9 +50,9 @@ pub struct Curve {
 pub struct PhaseClock {
     /// θ′ between the ramps, rad/s.
     pub rate_rad_s: f64,
-    /// How long the rise of θ′ takes, and its fall, s.
+    /// Duration of the rise of θ′, and of its fall, s.
     pub ramp_s: f64,
-    /// How long the whole takes, s.
+    /// Duration of the whole, s.
     pub duration_s: f64,
 }
 

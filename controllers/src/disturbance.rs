@@ -1,10 +1,10 @@
-//! The acceleration that the model does not explain: drag, wind, a mass or a thrust that is off.
+//! The acceleration that the model does not explain: drag, wind, an error of mass or thrust.
 //!
 //! An observer of Luenberger's kind (K. J. Åström and R. M. Murray, "Feedback Systems", section 8.2) runs the velocity
-//! along, v̂′ = a + d̂ + 2ω·(v − v̂) and d̂′ = ω²·(v − v̂), where a is what the thrust that the rotors are foreseen to make
-//! means at the estimated attitude. Both of its poles lie at ω. Where the model holds, d̂ stays zero however the vehicle
-//! is steered, so it takes nothing from the margins of the loop that it serves; held against the disturbance it does
-//! an integrator's work without one's overshoot.
+//! along, v̂′ = a + d̂ + 2ω·(v − v̂) and d̂′ = ω²·(v − v̂), where a is the acceleration by the foreseen thrust
+//! of the rotors at the estimated attitude. Both of its poles lie at ω. Where the model holds, d̂ stays zero
+//! however the vehicle is steered, so it takes nothing from the margins of the loop that it serves. Against the
+//! disturbance it does an integrator's work without an integrator's overshoot.
 
 use crate::control::MotionEstimate;
 use diagnostics::unit::ACCELERATION;
@@ -33,7 +33,7 @@ pub struct ObserverState {
     pub velocity_foreseen: [f64; 3],
 }
 
-/// What it believes, in the world.
+/// Estimate of the observer, in the world.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Disturbance {
     /// d̂.
@@ -86,7 +86,7 @@ mod tests {
         MotionEstimate { position_W_m: zero, velocity_W_m_s, attitude_WB, angular_velocity_B_rad_s: zero }
     }
 
-    /// What it believes after `time_s` of `true_W_m_s2` while the model says 1 m/s² along x.
+    /// Returns the estimate after `time_s` of `true_W_m_s2`, with 1 m/s² along x by the model.
     fn believed(true_W_m_s2: Vector3<f64>, time_s: f64) -> Vector3<f64> {
         let mut velocity_W_m_s = Vector3::zeros();
         let mut state = ObserverState::at(&moving(velocity_W_m_s));

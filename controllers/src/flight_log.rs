@@ -11,7 +11,7 @@ use std::path::Path;
 use vehicles::table::{self, Dialect, Table};
 use vehicles::{ROTORS_MAX, gaps};
 
-/// Which columns of a file hold a quantity, and in which unit.
+/// Columns of a file that hold a quantity, and their unit.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Columns<const N: usize> {
@@ -203,7 +203,7 @@ const CELL_MAX: f64 = 1e12;
 /// A quaternion this short has no direction left; logs write 1, or 0 where there is none.
 const NORM_MIN: f64 = 1e-3;
 
-/// What is wrong with the flight at `path`, behind its name.
+/// Returns the error that the flight at `path` has `fault`, which stands behind its name.
 fn refused(path: &Path, fault: impl Display) -> ParameterError {
     ParameterError::conflict("data", format_args!("the flight {}{fault}", path.display()))
 }
@@ -291,7 +291,7 @@ impl Source<'_> {
     }
 }
 
-/// The number of a cell times `factor`, or what was expected there.
+/// The number of a cell times `factor`, or a description of the expected one.
 fn number(cell: Option<f64>, factor: f64) -> Result<f64, &'static str> {
     match cell.filter(|number| number.is_finite()) {
         Some(number) if (number * factor).abs() <= CELL_MAX => Ok(number * factor),

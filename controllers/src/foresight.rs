@@ -1,8 +1,8 @@
-//! What `lqr` and `geometric` remember, and how it begins: the wrench that the rotors are foreseen to make, and the
+//! State of `lqr` and `geometric`, and its start: the wrench that the rotors are foreseen to make, and the
 //! observer of disturbances.
 //!
-//! A predecessor may be a broken law, so nothing of its state is gone on from that this vehicle could not have: neither
-//! numbers that are none nor wrenches that its rotors cannot make.
+//! A predecessor may be a broken law. So only values of its state are used that this vehicle could have: no NaN, no
+//! infinity, and no wrench that its rotors cannot make.
 
 use crate::airframe::ControlledVehicle;
 use crate::allocation::{Allocation, RotorWrench, THRUST_RESERVE};
@@ -12,7 +12,7 @@ use crate::law::Predecessor;
 use crate::motor_lag::{Made, MotorLag};
 use nalgebra::{Matrix3, Vector3};
 
-/// How far the velocity that was foreseen may be from the one that is estimated, m/s. Tuned, no source: so far off is an
+/// Greatest difference between the foreseen velocity and the estimated one, m/s. Tuned, no source: so far off is an
 /// observer of 5 rad/s against a disturbance that exceeds its limit by gravity.
 const VELOCITY_MISSED_MAX_M_S: f64 = 1.0;
 
@@ -59,21 +59,21 @@ impl ForesightState {
         self.torque_made_rate = made.rate.torque_B_N_m.into();
     }
 
-    /// What the observer lifts, as an integrator of another law would.
+    /// Returns the lift of the observer, as an integrator of another law would have it.
     pub(crate) fn integrals(&self) -> Integrals {
         Integrals { lift: self.observer.answer[2], turn: [0.0; 3] }
     }
 }
 
-/// A law that asked for more than a hundred times what the rotors make had lost its way: tuned, no source.
+/// A law that asked for more than a hundred times the rotors' wrench had lost its way: tuned, no source.
 const PART_MADE_MIN: f64 = 0.01;
 
-/// What is foreseen of a vehicle at one period.
+/// Model for the foresight of a vehicle at one period.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Foresight {
-    /// What the rotors can make.
+    /// Wrenches that the rotors can make.
     allocation: Allocation,
-    /// How fast they can.
+    /// Lag with which they make them.
     pub lag: MotorLag,
     /// Mass, kg.
     pub mass_kg: f64,
@@ -88,7 +88,7 @@ pub(crate) struct Foresight {
 }
 
 impl Foresight {
-    /// What is foreseen of `craft` by a law that is stepped every `period_s` with `observer`.
+    /// Creates the foresight of `craft` for a law that is stepped every `period_s` with `observer`.
     #[must_use]
     pub fn new(craft: &ControlledVehicle, observer: &Observer, period_s: f64) -> Self {
         Self {
@@ -102,7 +102,8 @@ impl Foresight {
         }
     }
 
-    /// What the rotors make now, one period after `last` was asked for: they followed it as far as the allocation allows.
+    /// Returns the rotors' wrench now, one period after `last` was asked for: they followed it as far as the
+    /// allocation allows.
     pub fn advance(&self, state: &mut ForesightState, last: &RotorWrench) -> Made {
         let made = self.lag.advance(&state.made(), &self.allocation.allocate(last).wrench);
         state.set_made(&made);
@@ -116,8 +117,8 @@ impl Foresight {
         thrust_N.clamp(min_N, max_N)
     }
 
-    /// What is remembered before the first tick, where the rotors carry the weight, or after another law. They are taken
-    /// to make what it asked for where it did not foresee.
+    /// Returns the state before the first tick, where the rotors carry the weight, or after another law. If
+    /// that law did not foresee, the rotors are assumed to make the wrench that it asked for.
     #[must_use]
     pub fn start(
         &self,
@@ -139,7 +140,7 @@ impl Foresight {
         }
     }
 
-    /// What the rotors are taken to have been asked for last, where another law asked for `before`.
+    /// Returns the wrench that the rotors were asked for last, by assumption, if another law asked for `before`.
     #[must_use]
     pub fn last_wrench(&self, before: Option<&RotorWrench>) -> RotorWrench {
         before.map_or_else(|| self.hover(), |before| self.possible(before))
@@ -160,7 +161,7 @@ impl Foresight {
         RotorWrench { thrust_N: (self.mass_kg * self.gravity_m_s2), ..RotorWrench::default() }
     }
 
-    /// The part of `wrench` that the rotors can make; hover, if it is no number or far beyond their limits.
+    /// The part of `wrench` that the rotors can make; hover, if it is NaN or far beyond their limits.
     fn possible(&self, wrench: &RotorWrench) -> RotorWrench {
         let allocated = self.allocation.allocate(wrench);
         let made = allocated.wrench;
@@ -171,8 +172,8 @@ impl Foresight {
         if is_finite && !is_far { made } else { self.hover() }
     }
 
-    /// The same of a wrench that changes. A lag that rises evenly is its delay behind what was asked for, so that much
-    /// ahead is another wrench that the rotors can make.
+    /// The same of a wrench that changes. A lag that rises evenly is its delay behind the demand, so the wrench
+    /// that is that much ahead has to be one that the rotors can make.
     fn possible_change(&self, made: &Made) -> Made {
         let (now, delay_s) = (self.possible(&made.wrench), self.lag.delay_s());
         let ahead = self.possible(&RotorWrench {

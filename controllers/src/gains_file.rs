@@ -1,8 +1,8 @@
 //! Gains files: TOML as vehicle files are, every number with its unit and source, positions in the errors.
 //!
-//! `gains!` declares the gains of a law: the fields, and where in the file each stands. The file that a law is tuned with
-//! is built in, and serves where the manifest names none. A file is read to its end whatever is wrong with it, so that
-//! all its faults are told at once.
+//! `gains!` declares the gains of a law: the fields, and their places in the file. The file that a law is tuned with
+//! is built in, and serves where the manifest names none. A file is read to its end despite its faults, so that
+//! all of them are reported at once.
 
 use diagnostics::ParameterError;
 use diagnostics::parameter::Bounds;
@@ -35,7 +35,7 @@ macro_rules! gains {
             /// The gains in the file at `path` among `files`, or those built in.
             ///
             /// # Errors
-            /// The file cannot be read, or holds what no gains can be; all its faults.
+            /// The file cannot be read, or holds invalid gains; all its faults.
             pub fn load(
                 files: &inputs::InputFiles,
                 path: Option<&std::path::Path>,
@@ -72,13 +72,13 @@ macro_rules! gains {
     };
 }
 
-/// What makes gains of a file's root table.
+/// Function that makes gains of a file's root table.
 pub(crate) type Reader<G> = fn(&Table<'_, '_>) -> G;
 
 /// The gains in the file at `path` among `files`, the manifest's parameter `gains`.
 ///
 /// # Errors
-/// The file cannot be read, or holds what no gains can be; all its faults.
+/// The file cannot be read, or holds invalid gains; all its faults.
 pub(crate) fn load<G>(files: &InputFiles, path: &Path, read: Reader<G>) -> Result<G, ParameterError> {
     let file = path.display().to_string();
     let text = files.text(path);
@@ -90,7 +90,7 @@ pub(crate) fn load<G>(files: &InputFiles, path: &Path, read: Reader<G>) -> Resul
 /// The gains in `text`; `file_name` is for messages only.
 ///
 /// # Errors
-/// All that is missing, unknown or no gain in the text.
+/// Each key of the text that is missing, unknown or no gain.
 pub(crate) fn parse<G>(text: &str, file_name: &str, read: Reader<G>) -> Result<G, Diagnostic> {
     let doc = Document::new(file_name, text);
     let tree = doc.tree()?;
@@ -105,7 +105,7 @@ pub(crate) fn parse<G>(text: &str, file_name: &str, read: Reader<G>) -> Result<G
     faults.finish(Some(gains))
 }
 
-/// The tables of a file that were asked for, and what was wrong so far.
+/// The tables of a file that were asked for, and the faults so far.
 struct Opened<'d, 't> {
     tables: RefCell<BTreeMap<String, Option<Rc<Section<'d, 't>>>>>,
     faults: RefCell<Faults>,
@@ -120,7 +120,7 @@ impl Opened<'_, '_> {
 /// A table of a gains file. A number that is missing or no gain is noted, and read as no number.
 #[derive(Clone)]
 pub(crate) struct Table<'d, 't> {
-    /// None where the file has no such table, which is noted.
+    /// `None` where the file has no such table, which is noted.
     section: Option<Rc<Section<'d, 't>>>,
     opened: Rc<Opened<'d, 't>>,
 }
@@ -144,7 +144,7 @@ const LIMIT: Bounds = Bounds {
 };
 
 impl Table<'_, '_> {
-    /// Whether it has `name`.
+    /// True if it has `name`.
     pub(crate) fn has(&self, name: &'static str) -> bool {
         self.section.as_ref().is_some_and(|section| section.has(name))
     }

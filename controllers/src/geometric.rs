@@ -13,8 +13,8 @@
 //! | torque = J·(−k_R·e_R − k_Ω·e_Ω) + Ω × JΩ − J·(Ω × RᵀR_c·Ω_c − RᵀR_c·Ω_c′) | M |
 //!
 //! Ω_c and its rate follow from the first two derivatives of t, which hold the reference's jerk and snap and those of
-//! the errors: the paper leaves open where the errors of acceleration and jerk come from; here they are what the
-//! thrust that the rotors are foreseen to make (`motor_lag`) means at the estimated attitude and rates, and d̂.
+//! the errors. The paper leaves open where the errors of acceleration and jerk come from. Here they follow from
+//! d̂ and the foreseen thrust of the rotors (`motor_lag`), at the estimated attitude and rates.
 
 use crate::airframe::ControlledVehicle;
 use crate::allocation::RotorWrench;
@@ -33,7 +33,7 @@ use diagnostics::ParameterError;
 use nalgebra::Vector3;
 use std::path::Path;
 
-/// The law at one period: all that does not change during a run.
+/// The law at one period, with everything that does not change during a run.
 ///
 /// ```
 /// use bus::messages::{Reference, StateEstimate};
@@ -54,7 +54,7 @@ pub struct GeometricLaw {
     foresight: Foresight,
 }
 
-/// How the model has the vehicle move, in the world.
+/// Motion of the vehicle by the model, in the world.
 struct Push {
     acceleration_W_m_s2: Vector3<f64>,
     jerk_W_m_s3: Vector3<f64>,
@@ -89,7 +89,7 @@ impl GeometricLaw {
         (RotorWrench { thrust_N: self.foresight.limited_N(hurried.thrust_N), ..hurried }, target)
     }
 
-    /// What the model makes of the vehicle's motion: rotors as foreseen, gravity, and drag where it is stated.
+    /// Returns the vehicle's motion by the model: rotors as foreseen, gravity, and drag where it is stated.
     fn push(&self, made: &Made, motion: &MotionEstimate) -> Push {
         let z_W = motion.attitude_WB * Vector3::z();
         let turning_W = motion.attitude_WB * motion.angular_velocity_B_rad_s.cross(&Vector3::z());

@@ -1,4 +1,4 @@
-//! What a control law is: how it is made, its inputs and state, how it begins and goes on after another law, its step.
+//! Definition of a control law: its making, inputs and state, its start, also after another law, and its step.
 
 use crate::airframe::ControlledVehicle;
 use crate::allocation::RotorWrench;
@@ -12,17 +12,17 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 
-/// A control law at one period, with all that does not change during a run.
+/// A control law at one period, with everything that does not change during a run.
 ///
 /// [`crate::controller::Controller`] makes a component of it.
 pub trait Law: Sized + Send {
-    /// Its name in manifests, and what it does.
+    /// Its name in manifests, and its description.
     const INFO: Info;
-    /// What the manifest's `parameters` table holds.
+    /// Parameters, as the manifest's `parameters` table holds them.
     type Parameters: DeserializeOwned;
-    /// What it reads.
+    /// Inputs.
     type Inputs<'a>: InputPorts<'a> + Into<ControlInput>;
-    /// All that it remembers between ticks.
+    /// State between ticks.
     type State: Message;
 
     /// The vehicle file that `parameters` name.
@@ -31,18 +31,18 @@ pub trait Law: Sized + Send {
     /// Makes the law.
     ///
     /// # Errors
-    /// A parameter or a file that cannot be meant.
+    /// An invalid parameter or file.
     fn new(parameters: &Self::Parameters, context: &LawContext<'_>) -> Result<Self, ParameterError>;
 
-    /// The greatest angular acceleration that it asks for against a body rate, 1/s: with the period it tells whether
+    /// The greatest angular acceleration that it asks for against a body rate, 1/s: with the period it shows whether
     /// the loop can be closed at all. 0 where the law is made for its period.
     fn rate_gain_1_s(&self) -> f64 {
         0.0
     }
 
-    /// What it begins with: before the first tick of a run, or after another law, `from`. It need not ask for the other's
-    /// last wrench, since [`crate::bumpless::BumplessTransfer`] makes up for the rest, and an integrator should not take
-    /// that up: it would keep amid a manoeuvre what is gone a moment later.
+    /// Returns its first state: before the first tick of a run, or after another law, `from`. It need not ask for the
+    /// other's last wrench, since [`crate::bumpless::BumplessTransfer`] makes up for the rest. An integrator
+    /// should not take that up: it would keep amid a manoeuvre a wrench that is gone a moment later.
     fn start(&self, from: Option<&Predecessor<'_, Self::State>>, input: &ControlInput) -> Self::State;
 
     /// The wrench that the rotors are taken to have been asked for one period before it begins, where another law asked
@@ -55,18 +55,18 @@ pub trait Law: Sized + Send {
     fn step(&self, state: &mut Self::State, last: &RotorWrench, input: &ControlInput) -> ControlOutput;
 }
 
-/// What is known of the law that flew before.
+/// The law that flew before, as far as it is known.
 #[derive(Debug, Clone, Copy)]
 pub struct Predecessor<'a, S> {
-    /// The wrench that it asked for last. It may be a broken law, and the wrench no number.
+    /// The wrench that it asked for last. It may be a broken law, and the wrench may be NaN.
     pub wrench: RotorWrench,
-    /// What its integrators asked for; `None` where only its last command is known.
+    /// Outputs of its integrators; `None` where only its last command is known.
     pub integrals: Option<Integrals>,
     /// Its state, where that is of the same type as that of the law that takes over.
     pub state: Option<&'a S>,
 }
 
-/// What a law is made for.
+/// Vehicle and node that a law is made for.
 #[derive(Debug, Clone, Copy)]
 pub struct LawContext<'a> {
     /// The vehicle that it flies.

@@ -1,4 +1,4 @@
-//! What laws read from the bus.
+//! Inputs of laws from the bus.
 
 use crate::control::{ControlInput, MotionEstimate};
 use crate::set_points::SetPoint;
@@ -9,40 +9,40 @@ use bus::messages::{
 };
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-/// What a law around a pilot's set points reads.
+/// Inputs of a law around a pilot's set points.
 #[derive(Debug, InputPorts)]
 pub struct SetPointInputs<'a> {
-    /// What the pilot asks for.
+    /// Set point of the pilot.
     pub set_point: &'a SetPointMessage,
     /// The motion.
     pub estimate: &'a StateEstimate,
-    /// Attitude and rates, where another estimator tells them.
+    /// Attitude and rates, where another estimator gives them.
     pub attitude: Option<&'a AttitudeEstimate>,
 }
 
-/// What a law that follows a trajectory reads.
+/// Inputs of a law that follows a trajectory.
 #[derive(Debug, InputPorts)]
 pub struct ReferenceInputs<'a> {
-    /// Where the trajectory is.
+    /// Point of the trajectory.
     pub reference: &'a Reference,
     /// The motion.
     pub estimate: &'a StateEstimate,
-    /// Attitude and rates, where another estimator tells them.
+    /// Attitude and rates, where another estimator gives them.
     pub attitude: Option<&'a AttitudeEstimate>,
 }
 
-/// What a law that follows a velocity reads.
+/// Inputs of a law that follows a velocity.
 #[derive(Debug, InputPorts)]
 pub struct VelocityInputs<'a> {
     /// The motion.
     pub estimate: &'a StateEstimate,
-    /// Attitude and rates, where another estimator tells them.
+    /// Attitude and rates, where another estimator gives them.
     pub attitude: Option<&'a AttitudeEstimate>,
     /// The velocity, where it is not a parameter.
     pub reference: Option<&'a Reference>,
 }
 
-/// What a law that is guided by range finders reads.
+/// Inputs of a law that is guided by range finders.
 #[derive(Debug, InputPorts)]
 pub struct WallInputs<'a> {
     /// Walls, height and velocities.

@@ -18,12 +18,12 @@ impl Beam {
     }
 }
 
-/// Where a state flies.
+/// Direction of a state's flight, and the wall beside it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Leg {
-    /// The way it flies.
+    /// Direction of the flight.
     pub(crate) ahead: Beam,
-    /// None in the first state, which has no wall beside yet.
+    /// Wall beside the flight; `None` in the first state, which has none yet.
     pub(crate) beside: Option<Beam>,
 }
 

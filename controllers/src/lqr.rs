@@ -25,7 +25,7 @@ use diagnostics::ParameterError;
 use nalgebra::{Rotation3, SMatrix, SVector, Vector3};
 use std::path::Path;
 
-/// The law at one period: all that does not change during a run.
+/// The law at one period, with everything that does not change during a run.
 ///
 /// ```
 /// use bus::messages::{Reference, StateEstimate};
@@ -47,7 +47,7 @@ pub struct LqrLaw {
     foresight: Foresight,
 }
 
-/// What the reference needs.
+/// Attitude, wrench and rate of the thrust that the reference needs.
 struct Needed {
     attitude: Target,
     wrench: RotorWrench,
@@ -76,7 +76,7 @@ impl LqrLaw {
         Ok(Self { gains, gain: regulator.gain, foresight })
     }
 
-    /// K: what each state's deviation takes off the demanded thrust (N) and torque (N·m).
+    /// K: reduction of the demanded thrust (N) and torque (N·m) by each state's deviation.
     #[must_use]
     pub fn gain(&self) -> &SMatrix<f64, INPUTS, STATES> {
         &self.gain

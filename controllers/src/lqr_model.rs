@@ -21,7 +21,7 @@ pub const INPUTS: usize = 4;
 /// Both in one.
 const BOTH: usize = STATES + INPUTS;
 
-/// Where the parts of the state begin.
+/// Indices of the parts of the state.
 pub const VELOCITY: usize = 3;
 /// The rotation vector.
 pub const ROTATION: usize = 6;
@@ -35,9 +35,9 @@ pub const MADE_RATE: usize = 16;
 /// One period: x ← transition·x + input·u.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Step {
-    /// What becomes of the state.
+    /// Factor of the state.
     pub transition: SMatrix<f64, STATES, STATES>,
-    /// What a held demand adds.
+    /// Factor of a held demand.
     pub input: SMatrix<f64, STATES, INPUTS>,
 }
 

@@ -17,7 +17,7 @@ use nalgebra::{DMatrix, SMatrix, Vector3};
 /// Coefficients of a polynomial of degree 7.
 const COEFFICIENTS: usize = 8;
 
-/// How far the solved equations may be off, relative to the greatest coordinate.
+/// Greatest residual of the solved equations, relative to the greatest coordinate.
 const RESIDUAL_MAX: f64 = 1e-9;
 
 /// A path through waypoints.
@@ -55,7 +55,7 @@ impl MinimumSnap {
         Some(Self { legs: legs.collect() })
     }
 
-    /// How long the whole takes, s.
+    /// Returns the duration of the whole, s.
     pub fn duration_s(&self) -> f64 {
         self.legs.iter().map(|leg| leg.span_s).sum()
     }

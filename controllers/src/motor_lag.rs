@@ -1,4 +1,4 @@
-//! The motors' lag as a control law sees it: what the rotors make of a demand, foreseen, and a demand that hurries
+//! The motors' lag as a control law sees it: the rotors' answer to a demand, foreseen, and a demand that hurries
 //! them.
 //!
 //! Near hover every component of the wrench follows its demand as a rotor's speed follows its command:
@@ -19,12 +19,12 @@ pub struct MotorLag {
     model: MotorModel,
     /// Takes a component and its rate over one period.
     transition: Matrix2<f64>,
-    /// What a demand of one, held over the period, adds.
+    /// Addition by a demand of one, held over the period.
     input: Vector2<f64>,
 }
 
 gains! {
-    /// How fast the lag is to be: its poles as placed anew.
+    /// Wanted lag: its poles as placed anew.
     pub struct LagTarget of file {
         /// ω_f, rad/s.
         natural_frequency_rad_s: f64 = file.bandwidth("natural_frequency"),
@@ -58,7 +58,7 @@ impl MotorLag {
         }
     }
 
-    /// What the rotors make one period after `made` under the demand `asked`.
+    /// Returns the rotors' wrench one period after `made` under the demand `asked`.
     pub fn advance(&self, made: &Made, asked: &RotorWrench) -> Made {
         let step = |value: f64, rate: f64, asked: f64| {
             let next = self.transition * Vector2::new(value, rate) + self.input * asked;
@@ -84,7 +84,7 @@ impl MotorLag {
         }
     }
 
-    /// How far a demand that rises evenly is ahead of what is made, s: 2ζ/ω_n, or τ.
+    /// Returns the time by which the wrench lags a demand that rises evenly, s: 2ζ/ω_n, or τ.
     pub fn delay_s(&self) -> f64 {
         match self.model {
             MotorModel::SecondOrder { natural_frequency_rad_s: wn, damping_ratio: zn } => 2.0 * zn / wn,

@@ -18,7 +18,7 @@ use serde::Deserialize;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-/// The law at one period: all that does not change during a run.
+/// The law at one period, with everything that does not change during a run.
 ///
 /// ```
 /// use controllers::airframe::ControlledVehicle;

@@ -23,7 +23,7 @@
 //! | roll 16, 0, 6 | 35° | 2.4 | swings to −10.1° |
 //!
 //! The altitude's integral gain is raised because 1 takes 12 s to make up for a mass that is 5 % off.
-//! All of ours are tuned on that model, no source. The numbers are in `controllers/gains/pid.toml` and
+//! Our gains are all tuned on that model, no source. The numbers are in `controllers/gains/pid.toml` and
 //! `pid-thesis.toml`; the former is built in.
 
 use crate::altitude_loop::{AltitudeGains, LoopGains};
@@ -91,7 +91,7 @@ impl PidGains {
         }
     }
 
-    /// What the altitude loop needs of these.
+    /// Returns the gains of the altitude loop.
     pub(crate) fn altitude_gains(&self) -> AltitudeGains {
         AltitudeGains {
             loop_gains: self.altitude,
@@ -100,7 +100,7 @@ impl PidGains {
         }
     }
 
-    /// Refuses what a gains file could not say either.
+    /// Refuses values that a gains file could not have either.
     fn check(&self) -> Result<(), ParameterError> {
         let loops =
             [("altitude", self.altitude), ("roll", self.roll), ("pitch", self.pitch), ("yaw", self.yaw)];

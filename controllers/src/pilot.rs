@@ -38,14 +38,14 @@ fn warn_of_late(entries: &[SetPointEntry], run: &NodeContext<'_>) {
     }
 }
 
-/// What the pilot sends.
+/// Outputs of the pilot.
 #[derive(Debug, OutputPorts)]
 pub struct Outputs {
-    /// What it asks for.
+    /// Set point of the pilot.
     pub set_point: SetPoint,
 }
 
-/// What the pilot asks for over time.
+/// Pilot: a schedule of set points over time.
 ///
 /// ```
 /// use controllers::pilot::Pilot;

@@ -26,7 +26,7 @@ pub struct Parameters {
     gaps: Gaps,
 }
 
-/// Treatment of gaps: times without rows, in which nobody knows the commands.
+/// Treatment of gaps: times without rows, in which the commands are unknown.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum Gaps {

@@ -1,5 +1,5 @@
-//! Holds the place while the pilot asks for no tilt, between a pilot and a law about hover such as `pid` or `cascade`,
-//! which hold an attitude and no place: whatever pushes the vehicle, they let it drift.
+//! Holds the place while the pilot asks for no tilt, between a pilot and a law about hover such as `pid` or
+//! `cascade`. Such laws hold an attitude but no place: under any push the vehicle drifts.
 //!
 //! Along each of the heading's level axes for itself, as autopilots' position modes do:
 //! - While the pilot asks for roll, or for pitch, that angle passes as it is. Sticks at rest are never quite at zero: up
@@ -7,7 +7,7 @@
 //! - When he lets go of it, the velocity along that axis is brought to zero, a = −Kv·v. Where it is below
 //!   `lock_speed_m_s`, the place is locked, and held from then on: a = Kv·(Kx·(place − position) − v).
 //!
-//! The acceleration is cut to what `tilt_max_deg` makes, and gravity turns it into pitch and roll (see `velocity`). The
+//! The acceleration is cut to that of `tilt_max_deg`, and gravity turns it into pitch and roll (see `velocity`). The
 //! altitude and the yaw pass as they are. There is no integrator: a lasting push of 1 m/s² moves it by 1/(Kv·Kx) m.
 
 use crate::angle::wrap_rad;
@@ -33,9 +33,9 @@ pub struct Parameters {
     position_1_s: f64,
     /// Kv: from the error of that velocity (m/s) to an acceleration (m/s²), 1/s. Default 1.5.
     velocity_1_s: f64,
-    /// It returns to its place no faster than this, m/s. Default 1.0.
+    /// Greatest speed of the return to its place, m/s. Default 1.0.
     speed_max_m_s: f64,
-    /// It tilts by no more than this, degrees. Default 10.
+    /// Greatest tilt, degrees. Default 10.
     tilt_max_deg: f64,
     /// Below this speed along an axis it locks the place, m/s. Default 0.1.
     lock_speed_m_s: f64,
@@ -57,16 +57,16 @@ impl Default for Parameters {
     }
 }
 
-/// What the hold reads.
+/// Inputs of the hold.
 #[derive(Debug, InputPorts)]
 pub struct Inputs<'a> {
-    /// What the pilot asks for.
+    /// Set point of the pilot.
     pub set_point: &'a SetPoint,
     /// The motion.
     pub estimate: &'a StateEstimate,
 }
 
-/// What it sends.
+/// Outputs of the hold.
 #[derive(Debug, OutputPorts)]
 pub struct Outputs {
     /// The pilot's set point with the tilt that holds the place.

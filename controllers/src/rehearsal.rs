@@ -1,7 +1,7 @@
 //! A law tried before a run, in `check`: numbers with which no vehicle can be held are found before it flies.
 //!
-//! The law is stepped at its own period on motions that any flight meets. What it asks for has to be a number; what
-//! the vehicle then does is not looked at: that is flying.
+//! The law is stepped at its own period on motions that any flight meets. Its demand has to be finite. The vehicle's
+//! answer is not computed: that would be a flight.
 
 use crate::airframe::ControlledVehicle;
 use crate::bumpless::BumplessTransfer;
@@ -18,18 +18,18 @@ use nalgebra::{UnitQuaternion, Vector3};
 const STEPS: u32 = 1100;
 
 /// A gain against a rate, times the period, at which the rate changes its sign and grows from step to step: of
-/// w ← (1 − kT)·w, whatever the vehicle.
+/// w ← (1 − kT)·w, for any vehicle.
 const DIVERGES: f64 = 2.0;
 
 /// The same product from which on little is left of the phase margin: kT of 0.5 and the half period that a command is
 /// held take 14° and more at the loop's own bandwidth.
 const COARSE: f64 = 0.5;
 
-/// Refuses numbers with which `law` diverges or asks for what is no number; warns of a vehicle that cannot hover, and of
-/// a coarse period.
+/// Refuses numbers with which `law` diverges or asks for NaN; warns of a vehicle that cannot hover, and of a coarse
+/// period.
 ///
 /// # Errors
-/// What goes wrong, and which keys are to blame.
+/// The failure, and the keys that may cause it.
 pub(crate) fn check<L: Law>(
     law: &L,
     craft: &ControlledVehicle,

@@ -36,7 +36,7 @@ pub struct Parameters {
     /// Kx, 1/s.
     #[serde(default = "altitude_1_s")]
     altitude_1_s: f64,
-    /// It climbs and sinks no faster than this, m/s.
+    /// Greatest speed of climbing and sinking, m/s.
     #[serde(default = "climb_max_m_s")]
     climb_max_m_s: f64,
     /// Kv, throttle for 1 m/s, s/m.

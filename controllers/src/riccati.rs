@@ -13,12 +13,12 @@ use nalgebra::{Const, DimMin, SMatrix, ToTypenum};
 
 /// Doublings: after n the algorithm has looked 2^n steps ahead.
 const DOUBLINGS_MAX: usize = 40;
-/// It has converged when a doubling changes the solution by less than this, relatively.
+/// Relative change of the solution by a doubling below which it has converged.
 const CHANGE_MAX: f64 = 1e-14;
 /// The equation must hold to this, relatively.
 const RESIDUAL_MAX: f64 = 1e-9;
 
-/// A regulator of N states and M inputs: what the equation's solution says.
+/// A regulator of N states and M inputs, from the solution of the equation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Regulator<const N: usize, const M: usize> {
     /// X: the cost that a state x has still to come is xᵀXx.
@@ -78,7 +78,7 @@ where
     None
 }
 
-/// By how much the equation fails, against the size of its solution.
+/// Residual of the equation, against the size of its solution.
 fn relative_residual<const N: usize, const M: usize>(
     A: &SMatrix<f64, N, N>,
     B: &SMatrix<f64, N, M>,
@@ -90,7 +90,7 @@ fn relative_residual<const N: usize, const M: usize>(
     (next - cost).norm() / cost.norm()
 }
 
-/// Whether x ← M·x fades: M^(2^n) vanishes.
+/// True if x ← M·x fades: M^(2^n) vanishes.
 fn is_stable<const N: usize>(step: &SMatrix<f64, N, N>) -> bool {
     let mut power = *step;
     for _ in 0..DOUBLINGS_MAX {

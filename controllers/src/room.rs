@@ -1,9 +1,9 @@
-//! Where the walls of a room of known size must be, although other vehicles stand in the beams.
+//! Places of the walls of a room of known size, although other vehicles stand in the beams.
 //!
 //! Along each of the heading's level axes two beams look at two walls whose distance from each other is known,
-//! so each tells the vehicle's place on the axis. What stands in a beam makes it shorter, and the place that it
-//! tells wrong. The place is therefore carried on by the velocity and corrected by the beam that tells nearly
-//! the same; a beam that tells something else is not believed, unless both tell it together, which they do
+//! so each beam shows the vehicle's place on the axis. An object in a beam shortens it, and the place that it
+//! shows is wrong. The place is therefore carried on by the velocity and corrected by the beam that shows nearly
+//! the same. A beam that shows another place is not believed, unless both show it together, which they do
 //! where they see both walls. With both beams blocked the place goes on by velocity alone.
 
 use bus::messages::WallEstimate;
@@ -12,7 +12,7 @@ use bus::messages::WallEstimate;
 /// dead reckoning gathers along a side, below a vehicle's size and gap.
 const GATE_M: f64 = 0.5;
 
-/// Two beams that tell the same place within this see both walls, m. Tuned, no source.
+/// Greatest difference between the places by two beams that both see walls, m. Tuned, no source.
 const AGREEMENT_M: f64 = 0.15;
 
 /// Time constant with which the place follows a beam that is believed, s. Tuned, no source: two or three
@@ -34,7 +34,7 @@ pub struct Room {
 }
 
 impl Room {
-    /// The distances from the walls at -x and -y as the beams tell them, where the vehicle begins.
+    /// The distances from the walls at -x and -y by the beams, at the start of the vehicle.
     #[must_use]
     pub fn begun_m(&self, walls: &WallEstimate) -> [f64; 2] {
         std::array::from_fn(|axis| match self.beam_places_m(axis, walls) {
@@ -85,7 +85,7 @@ mod tests {
 
     const ROOM: Room = Room { size_m: [10.0, 8.0] };
 
-    /// What is seen at 7 m from the wall at -x and 3 m from that at -y.
+    /// Returns the estimate of walls at 7 m from the wall at -x and 3 m from that at -y.
     fn seen() -> WallEstimate {
         WallEstimate { distance: [3.0, 7.0, 5.0, 3.0], in_sight: [1; 4], ..WallEstimate::default() }
     }

@@ -1,9 +1,9 @@
 //! The pilot's set points: steps, ramps and doublets on four channels, over integer ticks.
 //!
 //! A step or a ramp leads a channel to a new value, which it keeps; a doublet is added on top and leaves
-//! nothing behind. The thesis's "10 degree roll doublet in 1 sec" (§5.1) does not say what the second
-//! covers; here a doublet is `+amplitude` for `duration_s`, then `−amplitude` for `duration_s`, then
-//! nothing, so that one of 1 s lasts 2 s as a whole. Pulses of half a second bring the Hummingbird to
+//! no change behind. The thesis's "10 degree roll doublet in 1 sec" (§5.1) leaves open what the second
+//! covers. Here a doublet is `+amplitude` for `duration_s`, then `−amplitude` for `duration_s`, then
+//! zero, so that one of 1 s lasts 2 s as a whole. Pulses of half a second bring the Hummingbird to
 //! 9.1° and −8.8° only, behind its motors' lag (gains 16 and 6); with the thesis's 25 and 6, to 14.2° and −17.9°.
 
 use diagnostics::ParameterError;
@@ -13,7 +13,7 @@ use nalgebra::UnitQuaternion;
 use serde::Deserialize;
 use std::ops::RangeInclusive;
 
-/// What the controllers are asked to hold.
+/// Set point of the controllers.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SetPoint {
     /// Height in the world, m.
@@ -46,17 +46,17 @@ pub struct SetPointEntry {
     pub kind: String,
     /// "altitude", "roll", "pitch" or "yaw".
     pub channel: String,
-    /// When it begins, s; it acts from the first tick that is not earlier.
+    /// Start, s; it acts from the first tick that is not earlier.
     pub at_s: f64,
     /// The unit of `to` and `amplitude`: "m" for altitude, "rad" or "deg" for the angles.
     pub unit: String,
     /// The value that a step or ramp leads to.
     pub to: Option<f64>,
-    /// How long a ramp takes, s.
+    /// Duration of a ramp, s.
     pub over_s: Option<f64>,
     /// The size of a doublet's pulses; a negative one starts downwards.
     pub amplitude: Option<f64>,
-    /// How long each of a doublet's two pulses takes, s.
+    /// Duration of each of a doublet's two pulses, s.
     pub duration_s: Option<f64>,
 }
 
@@ -109,7 +109,7 @@ pub(crate) const ALTITUDES_EXPECTED: &str = "-20 000 m to 20 000 m: no rotorcraf
 /// Angles that a set point may ask for, rad: a hundred turns of yaw.
 const ANGLES_RAD: RangeInclusive<f64> = -628.4..=628.4;
 
-/// What may be asked for on a channel.
+/// Range of the set points on a channel.
 struct Channel {
     name: &'static str,
     units: Dimension,
@@ -246,7 +246,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// A value of the channel in SI, within what a vehicle can be asked for.
+    /// A value of the channel in SI, within its range.
     fn value(
         &self,
         key: &'static str,

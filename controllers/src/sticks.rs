@@ -47,7 +47,7 @@ struct Row {
     altitude_m: f64,
 }
 
-/// What is wrong with the recording `file`, behind its name.
+/// Returns the error that the recording `file` has `fault`, which stands behind its name.
 fn refused(file: &str, fault: impl Display) -> ParameterError {
     ParameterError::conflict("data", format_args!("{file}{fault}"))
 }
@@ -67,7 +67,7 @@ impl Sticks {
     /// The recording at `path` among `files`, the parameter `data`.
     ///
     /// # Errors
-    /// It cannot be read, or holds what no sticks can ask for.
+    /// It cannot be read, or holds values that no sticks can ask for.
     pub fn load(files: &InputFiles, path: &Path) -> Result<Self, ParameterError> {
         let file = path.display().to_string();
         let bytes = files.bytes(path).map_err(|cause| {
@@ -98,7 +98,7 @@ impl Sticks {
         Ok(Self { rows, has_yaw_rate: places[3].is_some(), has_altitude: places[4].is_some() })
     }
 
-    /// Whether the recording has the set point's `channel`.
+    /// True if the recording has the set point's `channel`.
     #[must_use]
     pub fn has(&self, channel: &str) -> bool {
         match channel {
@@ -109,7 +109,7 @@ impl Sticks {
         }
     }
 
-    /// What the sticks ask for at `time_s`; `beside` on the channels that the recording does not have.
+    /// Returns the set point of the sticks at `time_s`; `beside` on the channels that the recording does not have.
     #[must_use]
     pub fn at(&self, time_s: f64, beside: &SetPoint) -> SetPoint {
         let row = self.row_at(time_s);

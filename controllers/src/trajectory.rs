@@ -53,7 +53,7 @@ enum SegmentEntry {
     },
 }
 
-/// Where a trajectory starts.
+/// Start of a trajectory.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Start {
     /// Position in the world, m.
@@ -109,7 +109,7 @@ enum Way {
 }
 
 impl Trajectory {
-    /// The trajectory of `entries`, read one by one so that what is wrong with one names its place.
+    /// The trajectory of `entries`, read one by one so that the fault of an entry names its place.
     ///
     /// # Errors
     /// An entry of unknown kind, one that lacks a key or has an unknown one, a number out of its range: in words.
@@ -145,7 +145,7 @@ impl Trajectory {
     /// Refuses a trajectory that no vehicle flies: each segment is looked at in `LOOKS` places.
     ///
     /// # Errors
-    /// Which segment asks for how much, and where.
+    /// The segment, and the limit that it exceeds.
     pub(crate) fn require_flyable(&self) -> Result<(), ParameterError> {
         self.segments.iter().enumerate().try_for_each(|(index, segment)| {
             let times = (0..=LOOKS).map(|look| segment.duration_s * f64::from(look) / f64::from(LOOKS));
@@ -179,7 +179,7 @@ fn at_rest(position_W_m: Vector3<f64>) -> Path {
 /// In how many places of a segment a trajectory is looked at before a run.
 const LOOKS: u32 = 200;
 
-/// What a reference may ask for at most, with its unit and why. Tuned, no source, a decade above what any vehicle does:
+/// Limits of a reference, each with its unit and the reason. Tuned, no source, a decade above what any vehicle does:
 /// a racing quadrotor reaches 100 m/s and 15 g; shock tests of electronics begin at 100 g.
 const ASKED_MAX: [(f64, &str); 3] = [
     (1e6, "m from the world's origin; beyond 1000 km nanometres are lost in a double"),
@@ -295,7 +295,7 @@ impl SegmentEntry {
     }
 }
 
-/// What the entries of closed curves share.
+/// Keys that the entries of closed curves share.
 struct Laps {
     speed_m_s: f64,
     laps: u32,

@@ -12,7 +12,7 @@ use serde::Deserialize;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Parameters {
-    /// Where it starts, in the world.
+    /// Position at its start, in the world.
     initial_position_m: [f64; 3],
     /// Yaw at its start.
     #[serde(default)]
@@ -33,10 +33,10 @@ fn warn_of_late(trajectory: &Trajectory, run: &NodeContext<'_>) {
     }
 }
 
-/// What the node sends.
+/// Outputs of the node.
 #[derive(Debug, OutputPorts)]
 pub struct Outputs {
-    /// Where the trajectory is.
+    /// Point of the trajectory.
     pub reference: Reference,
 }
 

@@ -50,7 +50,7 @@ impl VelocityGains {
 }
 
 gains! {
-    /// The gains of the velocity loops and of the cascade inside: what a file leaves out is built in.
+    /// The gains of the velocity loops and of the cascade inside: gains that a file leaves out are those built in.
     pub struct LoopsGains of file, built in "velocity.toml" {
         /// Of the velocity loops.
         velocity: VelocityGains = VelocityGains::read_or_built_in(file),
@@ -59,14 +59,14 @@ gains! {
     }
 }
 
-/// What the velocity loops are asked to hold.
+/// Set point of the velocity loops.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct VelocitySetPoint {
     /// Velocity along the heading's level x and y, m/s.
     pub velocity_m_s: [f64; 2],
     /// Acceleration that following it takes, m/s².
     pub feed_forward_m_s2: [f64; 2],
-    /// What the guidance's integrators ask for, m/s².
+    /// Acceleration that the guidance's integrators ask for, m/s².
     pub integral_m_s2: [f64; 2],
     /// Height, m.
     pub altitude_m: f64,
@@ -122,7 +122,7 @@ impl VelocityLoop {
         self.accelerate(state, last, asked, &acceleration_m_s2, measured)
     }
 
-    /// What the PD on both axes asks for; advances its filters by one period.
+    /// Returns the accelerations that the PD on both axes asks for; advances its filters by one period.
     pub(crate) fn accelerations_m_s2(
         &self,
         state: &mut VelocityState,
@@ -220,7 +220,7 @@ pub(crate) fn tilt_rad(acceleration_m_s2: &[f64; 2], gravity_m_s2: f64) -> (f64,
 pub struct VelocityLaw {
     /// The loops.
     pub velocity: VelocityLoop,
-    /// What is flown where no reference is wired.
+    /// Set point where no reference is wired.
     pub constant: Option<VelocitySetPoint>,
 }
 

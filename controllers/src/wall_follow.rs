@@ -1,17 +1,17 @@
 //! Guidance along the walls of a room, around velocity PD and cascade: ours, in the thesis's five states (`legs`).
 //! `wall_follow_thesis` has the thesis's own (§5.5, Figs 5.36 and 5.46); docs/walls.md flies both.
 //!
-//! A state gives way to the next where the wall ahead is as near as the wall that is followed is to be.
+//! A state gives way to the next where the wall ahead is as near as the wall beside is to be.
 //!
 //! - Mode *varying*: the velocity ahead shrinks with the distance to the wall ahead, and with it the tilt; the
 //!   velocity across is held at zero. Nothing holds the distance to the wall beside.
 //! - Mode *constant*: the velocity across is the `Approach` curve over the error of the distance to the wall
-//!   beside, and the velocity ahead is what is left of the constant speed, √(v² − v_across²). The next state
+//!   beside, and the velocity ahead is the rest of the constant speed, √(v² − v_across²). The next state
 //!   begins where the curve's velocity towards the wall ahead, which is then the one beside, equals the speed.
 //!   So the velocity command turns in a corner without changing its length, and there is no jump in it.
-//!   An integrator over that error takes up what a tilted attitude estimate leaves.
+//!   An integrator over that error compensates a tilted attitude estimate.
 //!
-//! Where the room's size is known ([`Room`]), other vehicles in the beams are told from walls, and one that is
+//! If the room's size is known ([`Room`]), other vehicles in the beams are told from walls, and one that is
 //! ahead slows the vehicle down to a stop.
 
 use crate::allocation::RotorWrench;
@@ -51,7 +51,7 @@ gains! {
     }
 }
 
-/// How the velocity along the walls is chosen.
+/// Choice of the velocity along the walls.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Mode {
@@ -61,14 +61,14 @@ pub enum Mode {
     Constant,
 }
 
-/// What is known of the room beforehand, for a vehicle that shares it with others.
+/// Room that is known beforehand, for a vehicle that shares it with others.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shared {
     /// The room.
     pub room: Room,
-    /// Where the vehicle starts, from the walls at -x and -y, m; what the beams tell where it is not given.
+    /// Place of the vehicle at the start, from the walls at -x and -y, m; that by the beams where it is not given.
     pub start_m: Option<[f64; 2]>,
-    /// It stops where something ahead is nearer than this, and flies at full speed from twice this on, m.
+    /// It stops where an object ahead is nearer than this, and flies at full speed from twice this on, m.
     pub ahead_min_m: f64,
 }
 
@@ -92,13 +92,13 @@ pub struct WallFollowLaw {
     pub gains: WallFollowGains,
     /// The loops inside.
     pub velocity: VelocityLoop,
-    /// How the velocity is chosen.
+    /// Choice of the velocity.
     pub mode: Mode,
     /// The constant speed, or the most of the varying one, m/s.
     pub speed_m_s: f64,
     /// Level distance from the walls, m.
     pub distance_m: f64,
-    /// Height above what is below, m.
+    /// Height above the ground below, m.
     pub altitude_m: f64,
     /// Yaw, rad.
     pub heading_rad: f64,
@@ -139,7 +139,7 @@ pub struct Parameters {
     gains: Option<PathBuf>,
     /// "varying" or "constant".
     mode: Mode,
-    /// Height above what is below.
+    /// Height above the ground below.
     altitude_m: f64,
     /// The constant speed, or the most of the varying one.
     speed_m_s: Option<f64>,
@@ -154,7 +154,7 @@ pub struct Parameters {
     start_state: u32,
     /// Size of the room, where it is shared with other vehicles.
     room_m: Option<[f64; 2]>,
-    /// Where it starts, from the walls at -x and -y.
+    /// Place at the start, from the walls at -x and -y.
     start_in_room_m: Option<[f64; 2]>,
     /// Least distance to a vehicle ahead.
     ahead_min_m: Option<f64>,
@@ -289,7 +289,7 @@ impl Law for WallFollowLaw {
 }
 
 impl WallFollowLaw {
-    /// Distances of the walls at +x, −x, +y, −y: by the room's size where that is known, else what the beams see.
+    /// Distances of the walls at +x, −x, +y, −y: by the room's size where that is known, else those of the beams.
     fn wall_distances_m(&self, state: &mut WallFollowState, walls: &WallEstimate) -> [f64; 4] {
         let Some(Shared { room, .. }) = self.shared else { return walls.distance };
         let period_s = self.velocity.cascade.period_s;

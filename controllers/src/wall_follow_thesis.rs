@@ -32,7 +32,7 @@ gains! {
     }
 }
 
-/// What each state asks for towards the wall ahead.
+/// Demand of each state towards the wall ahead.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Ahead {
     /// Mode varying: this tilt, far from the wall, rad.
@@ -64,11 +64,11 @@ pub struct WallFollowThesisLaw {
     pub gains: WallFollowThesisGains,
     /// The loops inside.
     pub velocity: VelocityLoop,
-    /// What each state asks for.
+    /// Demand of each state towards the wall ahead.
     pub ahead: Ahead,
     /// Level distance from a wall at which the next state begins, m.
     pub distance_m: f64,
-    /// Height above what is below, m.
+    /// Height above the ground below, m.
     pub altitude_m: f64,
     /// Yaw, rad.
     pub heading_rad: f64,
@@ -91,7 +91,7 @@ pub struct WallFollowThesisState {
     pub laps: u32,
 }
 
-/// How it flies.
+/// Mode of the flight.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum Mode {
@@ -109,7 +109,7 @@ pub struct Parameters {
     gains: Option<PathBuf>,
     /// "varying" or "constant".
     mode: Mode,
-    /// Height above what is below.
+    /// Height above the ground below.
     altitude_m: f64,
     /// Mode varying: tilt far from the wall ahead.
     tilt_deg: Option<f64>,
@@ -239,7 +239,7 @@ impl Law for WallFollowThesisLaw {
 }
 
 impl WallFollowThesisLaw {
-    /// What the PD is set to: in mode constant the speed ahead, and nothing else.
+    /// Returns the set point of the PD: in mode constant the speed ahead, and nothing else.
     fn asked(&self, ahead: Beam) -> VelocitySetPoint {
         let (altitude_m, yaw_rad) = (self.altitude_m, self.heading_rad);
         let mut asked = VelocitySetPoint { altitude_m, yaw_rad, ..VelocitySetPoint::default() };

@@ -7,7 +7,7 @@
 //! without rising again. Once it has arrived, an integrator over the distance compensates a tilted attitude estimate.
 //!
 //! Along y it holds its place by the integral of the estimated velocity, as well as that is known: well with a wall
-//! beside in sight, and not at all in the open, where the ranges tell nothing about it.
+//! beside in sight, and not at all in the open, where no range depends on it.
 //!
 //! It knows the wall by the range finders' estimate alone, and its height by the beam downwards.
 
@@ -30,8 +30,8 @@ pub const BRAKING: u32 = 2;
 /// Holding the distance.
 pub const HOLDING: u32 = 3;
 
-/// How far a holding vehicle may be from the distance, in units of what makes it holding, before it counts as
-/// braking again. Tuned, no source: so far that no noise does it.
+/// Factor of the holding limit within which a vehicle goes on holding; beyond it, it counts as braking again.
+/// Tuned, no source: so large that no noise exceeds it.
 const HOLDING_LEFT_FACTOR: f64 = 3.0;
 
 gains! {
@@ -41,7 +41,7 @@ gains! {
         approach: Approach = Approach::read(&file.table("approach")),
         /// Time by which the fed-forward acceleration is ahead of the velocity command, s.
         lead_s: f64 = file.limit("approach.lead", TIME),
-        /// Back from a wall that is too near, and back along it, no faster than this, m/s.
+        /// Greatest speed back from a wall that is too near, and back along it, m/s.
         retreat_max_m_s: f64 = file.limit("approach.retreat_max", VELOCITY),
         /// Error of distance (m) held for one second to acceleration (m/s²), 1/s³.
         integral_1_s3: f64 = file.gain("hold.integral", PER_SECOND_3),
@@ -53,7 +53,7 @@ gains! {
         holding_speed_m_s: f64 = file.limit("hold.speed", VELOCITY),
         /// Displacement along y (m) to a velocity back (m/s), 1/s.
         aside_1_s: f64 = file.gain("hold.aside", PER_SECOND),
-        /// That displacement counts up to this, m.
+        /// Greatest displacement that counts, m.
         aside_max_m: f64 = file.limit("hold.aside_max", LENGTH),
         /// The loops inside.
         loops: LoopsGains = LoopsGains::read(file),
@@ -83,7 +83,7 @@ pub struct WallStopLaw {
     pub cruise_speed_m_s: f64,
     /// Level distance from the wall at which it stops, m.
     pub distance_m: f64,
-    /// Height above what is below, m.
+    /// Height above the ground below, m.
     pub altitude_m: f64,
     /// Yaw, rad.
     pub heading_rad: f64,
@@ -118,7 +118,7 @@ pub struct Parameters {
     vehicle: PathBuf,
     /// Gains file; the built-in `controllers/gains/wall-stop.toml` where there is none.
     gains: Option<PathBuf>,
-    /// Height above what is below.
+    /// Height above the ground below.
     altitude_m: f64,
     /// Speed towards the wall.
     #[serde(default = "default_cruise_speed_m_s")]
@@ -143,8 +143,8 @@ fn default_distance_m() -> f64 {
 
 /// Beyond this the sensors' reach of 7.65 m (thesis §5.5) leaves too little to brake in.
 const DISTANCE_MAX_M: f64 = 5.0;
-/// Where no wall is in sight, the estimate's distance is the sensors' reach, and the approach to a wall there
-/// keeps the speed below this in any case.
+/// Greatest cruise speed. If no wall is in sight, the estimate's distance is the sensors' reach, and
+/// the approach to a wall there keeps the speed below this in any case.
 const SPEED_MAX_M_S: f64 = 3.0;
 
 impl Law for WallStopLaw {
@@ -212,7 +212,7 @@ impl WallStopLaw {
         }
     }
 
-    /// Only a vehicle that holds integrates: while it approaches, the distance still to go is no error.
+    /// Only a vehicle that holds integrates: while it approaches, the distance still to go is not an error.
     fn integrate(&self, state: &mut WallStopState, to_go_m: f64) {
         if state.phase == HOLDING {
             let step_m_s2 = self.gains.integral_1_s3 * to_go_m * self.velocity.cascade.period_s;

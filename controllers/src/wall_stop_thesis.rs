@@ -67,7 +67,7 @@ pub struct WallStopThesisLaw {
     pub pitch_rad: f64,
     /// Level distance from the wall at which it stops, m.
     pub distance_m: f64,
-    /// Height above what is below, m.
+    /// Height above the ground below, m.
     pub altitude_m: f64,
     /// Yaw, rad.
     pub heading_rad: f64,
@@ -96,7 +96,7 @@ pub struct Parameters {
     vehicle: PathBuf,
     /// Gains file; the built-in `controllers/gains/wall-stop-thesis.toml` where there is none.
     gains: Option<PathBuf>,
-    /// Height above what is below.
+    /// Height above the ground below.
     altitude_m: f64,
     /// Pitch of free flight, far from the wall.
     #[serde(default = "default_pitch_deg")]

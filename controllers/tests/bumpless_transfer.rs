@@ -158,7 +158,7 @@ fn every_law_takes_over_from_every_other_without_a_jump_in_the_demanded_wrench()
     }
 }
 
-/// What makes the test above hold: amid a manoeuvre two laws ask for different torques at the same state.
+/// The test above relies on this: amid a manoeuvre two laws ask for different torques at the same state.
 #[test]
 fn a_take_over_amid_a_doublet_does_not_jump_either_and_fades_out() {
     let [(_, pid), (_, cascade), ..] = laws();

@@ -1,4 +1,5 @@
-//! What the controllers and the pilot accept and refuse before a start, and that the documentation says so.
+//! Parameters that the controllers and the pilot accept and refuse before a start, and that the documentation
+//! says so.
 
 use bus::Registration;
 use bus::context::NodeContext;

@@ -46,7 +46,7 @@ struct Flight {
     yaws_deg: Vec<f64>,
 }
 
-/// What a flight may differ in.
+/// Settings in which flights differ.
 #[derive(Clone, Copy, Default)]
 struct Setup {
     gains: PidGains,
@@ -194,7 +194,7 @@ fn the_scenario_is_flown_by_vehicles_that_differ_from_their_file() {
     }
 }
 
-/// Why the gains are ours: those of the thesis overshoot a reversal by more than a quarter of it.
+/// Reason for our own gains: those of the thesis overshoot a reversal by more than a quarter of it.
 #[test]
 fn the_gains_of_the_thesis_overshoot_the_doublet() {
     let flight = fly(vehicle(), &Setup { gains: PidGains::thesis(), ..Setup::default() });
@@ -202,7 +202,7 @@ fn the_gains_of_the_thesis_overshoot_the_doublet() {
     assert!(flight.roll_min_deg(7000..8000) < -12.5);
 }
 
-/// Why the time constant is ours: with the thesis's weight at 1 kHz the roll is not felt and runs away.
+/// Reason for our own time constant: with the thesis's weight at 1 kHz the roll is not felt and runs away.
 #[test]
 fn the_filter_of_the_thesis_loses_the_doublet() {
     let filter = ComplementaryParams { time_constant_s: 0.049, ..ComplementaryParams::default() };

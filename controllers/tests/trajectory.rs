@@ -137,8 +137,8 @@ fn cost(trajectory: &Trajectory) -> f64 {
     (0..steps).map(|ms| trajectory.at((ms as f64 + 0.5) * 1e-3).path_W[4].norm_squared() * 1e-3).sum()
 }
 
-/// A path that visits the same points at the same times, but also another on the way, has to cost more, and one that
-/// visits a point which it meets anyway the same.
+/// A path that visits the same points at the same times, but also another on the way, has to cost more. One that
+/// visits a point which it meets anyway has to cost the same.
 #[test]
 fn no_path_through_the_waypoints_has_less_snap() {
     let entry = |times: &str, points: &str| {

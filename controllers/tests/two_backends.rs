@@ -1,4 +1,4 @@
-//! Where nothing is touched both backends fly the same flight, to the last bit.
+//! Both backends fly the same flight to the last bit, if nothing is touched.
 #![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in")]
 
 use bus::messages::PerRotor;

@@ -44,18 +44,18 @@ fn wall_follow(mode: Mode, speed_m_s: f64) -> WallFollowLaw {
     }
 }
 
-/// How a flight to a wall went.
+/// Result of a flight to a wall.
 #[derive(Default)]
 struct Stop {
     nearest_m: f64,
     /// Of the last five seconds.
     worst_error_m: f64,
     fastest_m_s: f64,
-    /// The greatest speed then, whatever its direction.
+    /// The greatest speed then, in any direction.
     last_speed_m_s: f64,
     /// Greatest speed towards the wall after the speed fell below [`STOPPED_M_S`] for the first time.
     again_m_s: f64,
-    /// How far it ever was from where it began, along the wall.
+    /// Greatest distance from its start, along the wall.
     aside_m: f64,
     state: u32,
     altitude_error_m: f64,
@@ -69,7 +69,7 @@ fn stop<L: Law>(law: &L, distance_m: f64, seed: u64, away_m: f64, seconds: u64) 
     stop_of(vehicle(), law, distance_m, seed, away_m, seconds)
 }
 
-/// In a hall of 10 m, whose side walls tell the speed along the wall ahead.
+/// In a hall of 10 m, whose side walls show the speed along the wall ahead.
 fn stop_of<L: Law>(flown: Vehicle, law: &L, distance_m: f64, seed: u64, away_m: f64, seconds: u64) -> Stop {
     let walls = [away_m, f64::INFINITY, 5.0, 5.0];
     let mut flight = Loop::of(flown, Vector3::new(0.0, 0.0, 1.5), Senses::new(seed, walls, NOISY));
@@ -157,7 +157,7 @@ fn it_stops_at_another_distance_and_from_within_the_room() {
     }
 }
 
-/// What a flight in the room came to.
+/// Result of a flight in the room.
 #[derive(Default)]
 struct Laps {
     nearest_m: f64,
@@ -169,7 +169,7 @@ struct Laps {
     altitude_error_m: f64,
 }
 
-/// How far from the walls the walls' nearest is at a place of the room.
+/// Returns the distance of the nearest wall from a place of the room.
 fn clearance_m(at: &Vector3<f64>) -> f64 {
     5.0 - at.x.abs().max(at.y.abs())
 }

@@ -1,4 +1,4 @@
-//! What is wrong with a file that somebody wrote: where, what was expected, what was found, what to do.
+//! Fault of a file that somebody wrote: the place, what was expected, what was found, what to do.
 
 use crate::parameter::ParameterError;
 use crate::place::Place;
@@ -6,7 +6,7 @@ use serde::ser::{Serialize, SerializeStruct, Serializer};
 use std::fmt;
 use std::io;
 
-/// What is wrong at a place in a file, and what else is.
+/// Fault at a place in a file, and the other faults of the file.
 ///
 /// ```
 /// use diagnostics::{Diagnostic, ParameterError, Place};
@@ -41,18 +41,18 @@ use std::io;
 pub struct Diagnostic {
     /// The file's name as it was given to the reader; empty where it is about none.
     pub file: String,
-    /// Where in the file; none where it is about the whole.
+    /// Place in the file; none where the fault is of the whole.
     pub place: Option<Place>,
-    /// The key, what was expected and what was found.
+    /// The key, the expected value and the value that was found.
     pub error: ParameterError,
-    /// What to do; empty where the message says it.
+    /// Advice; empty where the message says it.
     pub help: String,
-    /// What else is wrong.
+    /// Other faults of the file.
     others: Vec<Diagnostic>,
 }
 
 impl Diagnostic {
-    /// What is wrong with the whole file.
+    /// Creates a fault of the whole file.
     #[must_use]
     pub fn in_file(file: impl Into<String>, error: impl Into<ParameterError>) -> Self {
         let error = error.into();
@@ -60,7 +60,7 @@ impl Diagnostic {
         Self { file: file.into(), place: None, error, help, others: Vec::new() }
     }
 
-    /// What is wrong at `place`.
+    /// Creates a fault at `place`.
     #[must_use]
     pub fn at(place: Place, error: impl Into<ParameterError>) -> Self {
         Self { place: Some(place.clone()), ..Self::in_file(place.file, error) }
@@ -73,7 +73,7 @@ impl Diagnostic {
             .help("check the path and that it is UTF-8 text")
     }
 
-    /// The same with `help` as what to do.
+    /// The same with `help` as advice.
     #[must_use]
     pub fn help(self, help: impl Into<String>) -> Self {
         Self { help: help.into(), ..self }
@@ -85,7 +85,7 @@ impl Diagnostic {
         self.error.key()
     }
 
-    /// This and whatever else is wrong, each on its own.
+    /// Iterates over this fault and the others of the file, each on its own.
     pub fn all(&self) -> impl Iterator<Item = Self> + '_ {
         let alone = Self { others: Vec::new(), ..self.clone() };
         std::iter::once(alone).chain(self.others.iter().cloned())
@@ -102,7 +102,7 @@ impl Diagnostic {
         self
     }
 
-    /// What all `checks` came to.
+    /// Gathers the results of all `checks`.
     ///
     /// # Errors
     /// Those of all checks as one, so that one look shows every fault.
@@ -127,7 +127,7 @@ impl Diagnostic {
 pub struct Faults(Vec<Diagnostic>);
 
 impl Faults {
-    /// What was read; none where it is faulty, which is kept.
+    /// Returns the value that was read; keeps the fault and returns `None`, if it is faulty.
     pub fn keep<T>(&mut self, read: Result<T, Diagnostic>) -> Option<T> {
         read.map_err(|fault| self.0.push(fault)).ok()
     }
@@ -138,7 +138,7 @@ impl Faults {
     /// The faults there were.
     ///
     /// # Panics
-    /// Where there is neither a value nor a fault.
+    /// If there is neither a value nor a fault.
     pub fn finish<T>(self, value: Option<T>) -> Result<T, Diagnostic> {
         let mut faults = self.0.into_iter();
         match faults.next() {

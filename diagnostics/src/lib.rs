@@ -1,10 +1,10 @@
-//! What can be wrong with what people write, as data until it is printed; and the units in which they write it.
+//! Faults of texts that people write, as data until they are printed; and the units in which people write.
 //!
 //! | room | what it holds |
 //! |---|---|
-//! | [`Diagnostic`] | what is wrong with a file: where, what was expected, what was found, what to do |
-//! | `nearest` | which of the names that there are was meant |
-//! | `place` | where something stands in a file |
+//! | [`Diagnostic`] | fault of a file: the place, what was expected, what was found, what to do |
+//! | `nearest` | the known name that was probably meant |
+//! | `place` | position in a file |
 //! | `printable` | untrusted text as a terminal shows it |
 //! | [`mod@parameter`] | parameters of components: the error, and the checks that raise it |
 //! | `read` | types from JSON and TOML, whose errors carry their keys and places |

@@ -1,4 +1,4 @@
-//! Which of the names that there are was meant.
+//! Search for the known name that was probably meant.
 
 /// The name among `known` that `found` was probably meant to be.
 ///
@@ -13,7 +13,8 @@ pub fn nearest<'a>(found: &str, known: impl IntoIterator<Item = &'a str>) -> Opt
     scored.filter(|(distance, name)| *distance <= name.len().div_ceil(3)).min().map(|(_, name)| name)
 }
 
-/// What to do about the name `found` that is none of `known`: the one that was probably meant, else `all` and the names.
+/// Returns advice on the name `found` that is none of `known`: the one that was probably meant, else `all` and
+/// the names.
 ///
 /// ```
 /// use diagnostics::did_you_mean;

@@ -19,9 +19,9 @@ pub enum ParameterError {
     Value {
         /// The dotted key, as the manifest has it.
         key: String,
-        /// What is accepted, so that "must be" can stand before it.
+        /// Accepted values, so that "must be" can stand before them.
         expected: String,
-        /// What is there.
+        /// Value that was found.
         found: String,
     },
     /// A parameter that is needed and not given.
@@ -29,7 +29,7 @@ pub enum ParameterError {
     Missing {
         /// The dotted key.
         key: String,
-        /// What it should hold; empty where that is not known.
+        /// Values that it should hold; empty where that is not known.
         expected: String,
     },
     /// A parameter that the component does not have.
@@ -43,9 +43,9 @@ pub enum ParameterError {
     /// Parameters, ports or files that do not go together, or a file that is refused.
     #[error("{message}")]
     Conflict {
-        /// The dotted key that is to blame first; empty where it is none in particular.
+        /// The dotted key that is to blame first; empty where no key is.
         key: String,
-        /// What does not go together, and what to do.
+        /// Contradiction, and advice.
         message: String,
     },
 }
@@ -57,7 +57,7 @@ impl ParameterError {
         Self::Value { key: key.into(), expected: expected.into(), found: found.to_string() }
     }
 
-    /// A parameter that is needed and not given; `expected` is what it should hold, empty where that is not known.
+    /// A parameter that is needed and not given; `expected` describes its value, empty where that is not known.
     #[must_use]
     pub fn missing(key: impl Into<String>, expected: impl Into<String>) -> Self {
         Self::Missing { key: key.into(), expected: expected.into() }
@@ -69,7 +69,7 @@ impl ParameterError {
         Self::Unknown { key: key.into(), known: known.into_iter().map(str::to_owned).collect() }
     }
 
-    /// What does not go together, of which `key` is to blame first; empty where none is.
+    /// Creates the error for a contradiction, of which `key` is to blame first; empty where none is.
     #[must_use]
     pub fn conflict(key: impl Into<String>, message: impl Display) -> Self {
         Self::Conflict { key: key.into(), message: message.to_string() }
@@ -85,7 +85,7 @@ impl ParameterError {
         key
     }
 
-    /// What to do about it; empty for a conflict, which says it in its message.
+    /// Returns advice; empty for a conflict, which has it in its message.
     #[must_use]
     pub fn help(&self) -> String {
         match self {
@@ -173,7 +173,7 @@ fn list(names: &[String]) -> String {
 /// Passes a number that `is_good`.
 ///
 /// # Errors
-/// It is not; `expected` says what is accepted.
+/// It is not; `expected` describes the accepted numbers.
 ///
 /// ```
 /// use diagnostics::parameter::require;
@@ -194,7 +194,7 @@ pub fn require(
 /// Refuses parameters that do not go together; `key` is to blame first.
 ///
 /// # Errors
-/// They do not, as `is_wrong` says; `message` tells what, and what to do.
+/// They do not, as `is_wrong` says; `message` has the contradiction, and advice.
 ///
 /// ```
 /// use diagnostics::parameter::refuse;
@@ -263,7 +263,7 @@ pub fn all(
     values.iter().try_for_each(|value| check(key, *value))
 }
 
-/// What a quantity can be, in SI, and why it is not more or less.
+/// Range of a quantity in SI, and the reason for its ends.
 ///
 /// ```
 /// use diagnostics::parameter::Bounds;
@@ -281,12 +281,12 @@ pub struct Bounds {
     pub max: f64,
     /// Their unit.
     pub unit: &'static str,
-    /// What has the most and the least, or why nothing that flies has more.
+    /// The things that have the most and the least, or the reason why nothing that flies has more.
     pub why: &'static str,
 }
 
 impl Bounds {
-    /// Whether `si` lies within, both ends included; no NaN does.
+    /// True if `si` lies within, both ends included; no NaN does.
     fn contains(&self, si: f64) -> bool {
         (self.min..=self.max).contains(&si)
     }

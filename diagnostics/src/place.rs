@@ -1,4 +1,4 @@
-//! Where something stands in a file.
+//! Place in a file.
 
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use std::fmt;

@@ -1,4 +1,4 @@
-//! Reads types from JSON and TOML, so that an error carries its key, what was expected there and where it stands.
+//! Reads types from JSON and TOML, so that an error carries its key, its place and the expected value.
 
 use crate::diagnostic::Diagnostic;
 use crate::parameter::ParameterError;
@@ -39,7 +39,7 @@ pub fn read<P: DeserializeOwned>(parameters: &Value) -> Result<P, ParameterError
 /// Reads the TOML `text` of `file` as a `T`.
 ///
 /// # Errors
-/// The first place where it is no TOML, or does not hold what `T` has there.
+/// The first place where it is not TOML, or does not hold the value that `T` has there.
 ///
 /// ```
 /// #[derive(Debug, serde::Deserialize)]
@@ -63,10 +63,10 @@ pub fn read_toml<T: DeserializeOwned>(file: &str, text: &str) -> Result<T, Diagn
     read_tree(&Spanned::new(span, DeValue::Table(table.into_inner()))).map_err(misread)
 }
 
-/// What `text` says.
+/// Parses `text`.
 ///
 /// # Errors
-/// Where it is not TOML, and why.
+/// The place at which it is not TOML, and the reason.
 pub fn parse_toml(text: &str) -> Result<Spanned<DeTable<'_>>, Misread> {
     DeTable::parse(text).map_err(|error| {
         let message = format!("not valid TOML: {}", error.message().trim());
@@ -77,7 +77,7 @@ pub fn parse_toml(text: &str) -> Result<Spanned<DeTable<'_>>, Misread> {
 /// Reads a part of a TOML file as a `T`.
 ///
 /// # Errors
-/// The first place where it does not hold what `T` has there.
+/// The first place where it does not hold the value that `T` has there.
 ///
 /// ```
 /// let table = diagnostics::parse_toml("wheel = { radius_m = true }").unwrap();
@@ -89,17 +89,17 @@ pub fn read_tree<T: DeserializeOwned>(tree: &Spanned<DeValue<'_>>) -> Result<T, 
     T::deserialize(Tree::of_toml(tree))
 }
 
-/// What is not as the type to be read has it.
+/// A value that the type to be read does not accept.
 #[derive(Debug, thiserror::Error)]
 #[error("{error}")]
 pub struct Misread {
-    /// The key, what was expected and what was found.
+    /// The key, the expected value and the value that was found.
     pub error: ParameterError,
     span: Option<Range<usize>>,
 }
 
 impl Misread {
-    /// Which bytes of the text are to blame; the very first where it is none in particular.
+    /// Returns the bytes of the text that are to blame; the very first where none are in particular.
     #[must_use]
     pub fn span(&self) -> Range<usize> {
         self.span.clone().unwrap_or(0..0)
@@ -112,7 +112,7 @@ impl Misread {
         Self { span: Some(base + span.start..base + span.end), ..self }
     }
 
-    /// The same of what stands in the table `table`.
+    /// The same error, in the table `table`.
     #[must_use]
     pub fn within(self, table: &str) -> Self {
         Self { error: self.error.within(table), ..self }
@@ -129,7 +129,7 @@ struct Tree<'v> {
     span: Option<Range<usize>>,
 }
 
-/// What a value is, in either language.
+/// Shape of a value, in either language.
 enum Shape<'v> {
     Null,
     Bool(bool),
@@ -137,7 +137,7 @@ enum Shape<'v> {
     Signed(i64),
     Float(f64),
     Text(&'v str),
-    /// What no type is read from.
+    /// A value that no type is read from.
     Other(&'static str),
     List(Vec<Tree<'v>>),
     Table(Vec<Entry<'v>>),
@@ -334,7 +334,7 @@ impl From<ParameterError> for Misread {
     }
 }
 
-/// What serde has to say, with the key that it is about; the tables on the way are put in front on the way out.
+/// Errors of serde, with the key that they are about; the tables on the way are put in front on the way out.
 impl de::Error for Misread {
     fn custom<T: Display>(message: T) -> Self {
         ParameterError::conflict("", message).into()

@@ -193,13 +193,13 @@ pub const COUNT: Dimension = Dimension::of("count", &[("count", 1.0)]);
 /// Raw commands, or shares of their range.
 pub const COMMAND: Dimension = Dimension::of("command", &[("count", 1.0), ("fraction", 1.0), ("%", 1e-2)]);
 
-/// The dimensions of what a message can hold: a field of any of these can be judged and drawn in its other units.
+/// The dimensions of the fields of messages: a field of any of these can be judged and drawn in its other units.
 const OF_MESSAGES: [&[Dimension]; 2] = [
     &[LENGTH, ANGLE, SPEED, VELOCITY, ACCELERATION, JERK, FORCE, TORQUE],
     &[TIME, VOLTAGE, CURRENT, FLUX_DENSITY, PRESSURE, PURE_NUMBER, COUNT],
 ];
 
-/// Why a number cannot be converted from one unit to another.
+/// Reason why a number cannot be converted from one unit to another.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ConversionError {
     /// The units are of two dimensions.

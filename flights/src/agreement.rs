@@ -1,4 +1,4 @@
-//! How two measurements of the same vector agree, whatever their units: one logged, one derived from another channel.
+//! Agreement of two measurements of the same vector in any units: one logged, one derived from another channel.
 
 use nalgebra::Vector3;
 
@@ -31,7 +31,7 @@ impl Pairs {
         Self::over_windows(&position.time_s, velocity, window_s, |from, to| Some(p(to) - p(from)))
     }
 
-    /// How the vehicle leans, as an acceleration in the horizontal plane under `gravity_m_s2`, against the position's
+    /// The vehicle's leaning, as an acceleration in the horizontal plane under `gravity_m_s2`, against the position's
     /// over windows of `window_s`.
     pub fn leaning(attitude: &Channel<4>, position: &Channel<3>, gravity_m_s2: f64, window_s: f64) -> Self {
         let lean = |wxyz: &[f64; 4]| {
@@ -91,13 +91,13 @@ impl Pairs {
         Self { logged: self.logged.iter().map(turn).collect(), derived: self.derived.clone() }
     }
 
-    /// The root mean square of what the two differ by.
+    /// The root mean square of the difference between the two.
     pub fn residual(&self) -> f64 {
         let squares = self.logged.iter().zip(&self.derived).map(|(a, b)| (a - b).norm_squared());
         (squares.sum::<f64>() / self.derived.len() as f64).sqrt()
     }
 
-    /// How the pairs agree; `None` where there are few, or the derived vector is mostly below `quiet`.
+    /// Returns the agreement of the pairs; `None` if there are few, or the derived vector is mostly below `quiet`.
     pub fn agreement(&self, quiet: f64) -> Option<Agreement> {
         let dot =
             |a: &[Vector3<f64>], b: &[Vector3<f64>]| a.iter().zip(b).map(|(a, b)| a.dot(b)).sum::<f64>();
@@ -127,7 +127,7 @@ impl Pairs {
     }
 }
 
-/// How a logged vector agrees with a derived one.
+/// Agreement of a logged vector with a derived one.
 #[derive(Debug, Clone, Copy)]
 pub struct Agreement {
     /// Size of the logged over that of the derived vector, with the sign of their correlation.
@@ -136,7 +136,7 @@ pub struct Agreement {
     pub correlation: f64,
 }
 
-/// By how much the velocity changes from the middle of the first to that of the second half of a window, twice: as over the
+/// Change of the velocity from the middle of the first to that of the second half of a window, twice: as over the
 /// whole window.
 fn velocity_change(position: &Channel<3>, from: usize, to: usize) -> Option<Vector3<f64>> {
     let (time_s, p) = (&position.time_s, |index: usize| Vector3::from(position.values[index]));

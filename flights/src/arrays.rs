@@ -15,7 +15,7 @@ pub fn parts(name: &Name, size: usize) -> Vec<Name> {
 }
 
 /// The numbers in a cell such as `[0.1, 0.2, 0.3]`, with blanks or semicolons between them too, and in round brackets;
-/// NaN for a part that is no number. `None` where the cell holds no array.
+/// NaN for a part that is not a number. `None` where the cell holds no array.
 pub fn numbers(cell: &str) -> Option<Vec<f64>> {
     let cell = cell.trim();
     let of = |open: char, close: char| cell.strip_prefix(open)?.strip_suffix(close);

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 /// A place in the bytes of a log.
 pub struct Cursor<'a> {
-    /// All bytes.
+    /// Bytes of the log.
     pub bytes: &'a [u8],
     /// The next byte.
     pub at: usize,
@@ -90,7 +90,7 @@ impl Number {
         NUMBERS.iter().find(|known| known.1.split(' ').any(|known| known == character)).map(|known| known.2)
     }
 
-    /// How many bytes it takes.
+    /// Returns the number of bytes that it takes.
     pub fn size(self) -> usize {
         match self {
             Self::Signed(size) | Self::Unsigned(size) => size,

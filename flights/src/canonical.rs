@@ -31,12 +31,12 @@ pub const HEADER_START: &str = "t,m1,";
 /// Samples to either side of one at which a derivative is fitted.
 pub const HALF_WINDOW: usize = 3;
 
-/// What was written.
+/// Result of the writing of a canonical file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Canonical {
-    /// How many rows.
+    /// Number of rows.
     pub rows: usize,
-    /// What was derived, filled in or left out.
+    /// Notes on values that were derived, filled in or left out.
     pub notes: Vec<String>,
 }
 

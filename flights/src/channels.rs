@@ -29,8 +29,8 @@ pub struct Read<const N: usize> {
     pub seams: SeamList,
 }
 
-/// Reads `quantity` as `entry` says; an attitude in the order w, x, y, z. Angles that no vehicle flies at are refused,
-/// unless they are trusted.
+/// Reads `quantity` as `entry` declares it; an attitude in the order w, x, y, z. Angles at which no vehicle
+/// flies are refused, unless they are trusted.
 pub fn read<const N: usize>(
     log: &dyn Log,
     quantity: Quantity,
@@ -90,12 +90,12 @@ enum Shape {
     Matrix,
 }
 
-/// Which numbers of the log make a sample, and how.
+/// Numbers of the log that make a sample, and their conversion.
 struct Layout<'a> {
     quantity: Quantity,
     names: Cow<'a, [Name]>,
     shape: Shape,
-    /// What a number is multiplied by, and what is added then.
+    /// Factor of a number, and the offset that is added then.
     factor: f64,
     offset: f64,
     frame: Frame,
@@ -205,7 +205,7 @@ fn named(quantity: Quantity, entry: &Entry, rotors: usize) -> Result<(Cow<'_, [N
     Ok((names, shape))
 }
 
-/// What a specific force is made of.
+/// Returns the kind of a specific force as declared; refuses one for another quantity.
 fn holds(quantity: Quantity, entry: &Entry) -> Result<Holds, LogError> {
     if entry.holds.is_some() && quantity != Quantity::SpecificForce {
         let (expected, advice) = ("`specific_force` alone to have it", "remove it");
@@ -222,7 +222,7 @@ fn require_command_on_change(quantity: Quantity, entry: &Entry) -> Result<(), Lo
     Err(LogError::unexpected(Spot::Key("on_change"), "`command` alone to have it", "it", "remove it"))
 }
 
-/// How many times faster than the rotor its electrical field turns; 1 where the log has mechanical speeds.
+/// Returns the ratio of the electrical to the mechanical speed; 1 where the log has mechanical speeds.
 fn pole_pairs(quantity: Quantity, entry: &Entry) -> Result<f64, LogError> {
     let at = Spot::Key("pole_pairs");
     match entry.pole_pairs {

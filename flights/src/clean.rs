@@ -1,4 +1,4 @@
-//! Cleaning of a channel: what is left out, counted and said.
+//! Cleaning of a channel: faulty samples are left out, counted and noted.
 
 use vehicles::gaps::GAP_PERIODS;
 
@@ -8,10 +8,10 @@ use crate::flight::{Channel, median, period_s};
 use crate::held;
 use crate::quantity::Quantity;
 
-/// A quaternion whose length is further from one than this is no attitude.
+/// A quaternion whose length is further from one than this is not an attitude.
 const NORM_TOLERANCE: f64 = 0.1;
 
-/// Leaves out samples that are no numbers, whose time does not grow, or that only repeat the one before.
+/// Leaves out samples that are not finite, whose time does not grow, or that only repeat the one before.
 ///
 /// # Errors
 /// If nothing is left.
@@ -71,7 +71,7 @@ pub fn without_absent<const N: usize>(
     Ok(kept)
 }
 
-/// Says how many samples were left out, and why.
+/// Notes how many samples were left out, and the reason.
 pub fn say_dropped<const N: usize>(
     quantity: Quantity,
     before: &Channel<N>,
@@ -158,7 +158,7 @@ fn unheld<const N: usize>(quantity: Quantity, channel: Channel<N>, notes: &mut V
     kept
 }
 
-/// Says where a channel has no samples for long.
+/// Notes the times at which a channel has no samples for long.
 pub fn say_gaps(quantity: Quantity, time_s: &[f64], notes: &mut Vec<String>) {
     let gaps = gaps(time_s);
     let Some(longest) = gaps.iter().map(|(from, to)| to - from).max_by(f64::total_cmp) else { return };

@@ -4,7 +4,7 @@ use crate::flight::median;
 
 /// Number of samples to both sides of a step back that are compared: a stray stamp or a late batch is shorter.
 const WINDOW: usize = 50;
-/// Fewer samples are no recording.
+/// Fewer samples are not a recording.
 const RECORDING_MIN: usize = 5;
 
 /// The indices of the samples with which the clock starts again. Times without a number are passed over.
@@ -33,7 +33,7 @@ pub enum NotForward {
         /// The indices of the first two times that fall.
         first: [usize; 2],
     },
-    /// All times are the same.
+    /// Every time is the same.
     Stands,
 }
 

@@ -77,7 +77,7 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    /// Reads all messages; says what was left out.
+    /// Reads all messages; returns notes on bytes that were left out.
     fn read(&mut self) -> Vec<String> {
         let (mut at, mut places, mut first, mut lost) = (0, 0_usize, 0, 0);
         let end = self.bytes.len();
@@ -190,7 +190,7 @@ impl Field {
     }
 }
 
-/// The size of a field, its number, and what it is multiplied by if FMTU does not say so.
+/// The size of a field, its number, and its factor if FMTU does not give one.
 fn field_type(character: char) -> Option<(usize, Option<Number>, f64)> {
     let number = |number: Number, scale| Some((number.size(), Some(number), scale));
     match character {
@@ -223,7 +223,7 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(&bytes[..end]).into_owned()
 }
 
-/// Takes over what FMTU and MULT say of the fields: multipliers, and which has the number of a sensor.
+/// Takes over the facts of the fields in FMTU and MULT: multipliers, and the field with the number of a sensor.
 fn scale(formats: &mut BTreeMap<u8, Format>, bytes: &[u8]) {
     let by_name = |name: &str| formats.values().find(|format| format.name == name);
     let each = |name| {

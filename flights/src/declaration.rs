@@ -1,4 +1,4 @@
-//! What a flights file says, as it is written.
+//! Content of a flights file, as it is written.
 
 use std::collections::BTreeMap;
 use std::num::NonZero;
@@ -36,11 +36,11 @@ pub struct Declaration {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FlightEntry {
-    /// What reports call it, or the begin of that for the logs of a pattern; else the log's name.
+    /// Its name in reports, or the beginning of the names for the logs of a pattern; else the log's name.
     pub name: Option<Spanned<String>>,
     /// The log, relative to the flights file, or a pattern of logs that become a flight each, or a list of a log's parts.
     pub file: Spanned<Files>,
-    /// What it is for.
+    /// Its role.
     pub role: Role,
     /// Format of the log.
     pub format: Option<Format>,
@@ -57,12 +57,12 @@ pub struct FlightEntry {
     /// Channels that differ from those of the whole file.
     #[serde(default)]
     pub channels: ChannelMap,
-    /// By how much each channel is late, in seconds.
+    /// Lateness of each channel, in seconds.
     #[serde(default)]
     pub delay_s: BTreeMap<Quantity, Spanned<f64>>,
-    /// What stands in for a measurement that the log does not have.
+    /// Assumption in place of a measurement that the log does not have.
     pub assume: Option<Spanned<Assumption>>,
-    /// Whether values that contradict their units are only noted.
+    /// True if values that contradict their units are only noted.
     #[serde(default)]
     pub trust_units: bool,
 }
@@ -114,7 +114,7 @@ pub enum Clock {
     Stamp,
 }
 
-/// What stands in for an attitude and an angular velocity that were not logged.
+/// Assumption in place of an attitude and an angular velocity that were not logged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Assumption {
@@ -125,7 +125,7 @@ pub enum Assumption {
 /// The channels by quantity.
 pub type ChannelMap = BTreeMap<Quantity, Spanned<Entry>>;
 
-/// Where a log holds a quantity, and how.
+/// Place of a quantity in a log, and its form there.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Entry {
@@ -154,11 +154,11 @@ pub struct Entry {
     pub unit: Option<String>,
     /// Frames of the numbers in the log.
     pub frame: Option<Frame>,
-    /// What a `specific_force` is made of.
+    /// Kind of a `specific_force`.
     pub holds: Option<Holds>,
     /// True if a log writes a `command` only when it changes.
     pub on_change: Option<bool>,
-    /// By what electrical rotor speeds are divided: half the number of a motor's magnets.
+    /// Divisor of electrical rotor speeds: half the number of a motor's magnets.
     pub pole_pairs: Option<u32>,
 }
 
@@ -191,11 +191,11 @@ pub enum Frame {
     FrdNed,
 }
 
-/// What the numbers of a specific force are in the log.
+/// Kind of the numbers of a specific force in the log.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Holds {
-    /// That itself, in the body: an accelerometer's reading.
+    /// Specific force in the body: an accelerometer's reading.
     #[default]
     SpecificForce,
     /// The acceleration along the axes of the body: 0 at rest, as gravity was taken off.
@@ -221,12 +221,12 @@ impl Holds {
         }
     }
 
-    /// Whether the axes are those of the world.
+    /// True if the axes are those of the world.
     pub fn is_in_world(self) -> bool {
         matches!(self, Self::WorldAcceleration | Self::WorldSpecificForce)
     }
 
-    /// Whether gravity was taken off.
+    /// True if gravity was taken off.
     pub fn is_without_gravity(self) -> bool {
         matches!(self, Self::BodyAcceleration | Self::WorldAcceleration)
     }

@@ -30,12 +30,12 @@ impl Document {
         })
     }
 
-    /// Where `span` begins.
+    /// Returns the place at which `span` begins.
     pub fn place(&self, span: &Range<usize>) -> Place {
         Place::of(self.path.display().to_string(), &self.text, span)
     }
 
-    /// A value that cannot be meant.
+    /// An invalid value.
     pub fn bad(
         &self,
         span: &Range<usize>,

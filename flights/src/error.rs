@@ -1,4 +1,4 @@
-//! What can be wrong with a flights file or with a log that it names.
+//! Errors of a flights file, or of a log that it names.
 
 use std::fmt::{self, Display as _};
 use std::io;
@@ -11,7 +11,7 @@ use crate::finding::Finding;
 use crate::quantity::Quantity;
 use crate::span::Sparse;
 
-/// Why flights cannot be used: which file, where, what was expected and found, and what to do.
+/// Reason why flights cannot be used: the file, the place, what was expected and found, and what to do.
 ///
 /// ```
 /// use flights::{FlightSet, FlightsError};
@@ -23,19 +23,19 @@ use crate::span::Sparse;
 /// ```
 #[derive(Debug, thiserror::Error)]
 pub enum FlightsError {
-    /// The flights file cannot be read, is no TOML, or has a key or a value that cannot be meant.
+    /// The flights file cannot be read, is not TOML, or has an invalid key or value.
     #[error(transparent)]
     File(#[from] Diagnostic),
     /// The vehicle file is not usable.
     #[error(fmt = vehicle)]
     Vehicle {
-        /// Where the flights file names it.
+        /// Place at which the flights file names it.
         place: Place,
         /// Its fault.
         #[source]
         cause: Box<Diagnostic>,
     },
-    /// A log cannot be read, or does not have what the flights file asks of it.
+    /// A log cannot be read, or does not have the channels that the flights file asks for.
     #[error("{place}: flight `{flight}`, log {}: {}{cause}", file.display(), named(*channel))]
     Log {
         /// The line of the flights file that asks.
@@ -46,7 +46,7 @@ pub enum FlightsError {
         file: PathBuf,
         /// The channel, where it is about one.
         channel: Option<Quantity>,
-        /// What is wrong and what to do.
+        /// The fault, with advice.
         #[source]
         cause: LogError,
     },
@@ -64,7 +64,7 @@ pub enum FlightsError {
         flight: String,
         /// The log.
         file: PathBuf,
-        /// What contradicts.
+        /// Contradictions.
         findings: Vec<Finding>,
     },
     /// A flight that is to be held out holds samples of one that parameters are fitted or effects are chosen on.
@@ -80,7 +80,7 @@ pub enum FlightsError {
         flight: (String, &'static str),
         /// Name and role of the other flight.
         other: (String, &'static str),
-        /// What they have in common.
+        /// Relation of the two, as text.
         reason: String,
     },
     /// A canonical file cannot be written.
@@ -133,7 +133,8 @@ impl FlightsError {
         Self::gather_with(Ok(()), errors)
     }
 
-    /// What `result` has, if there are no `errors` besides; else all of them as one, the one of `result` last.
+    /// Returns the value of `result`, if there are no `errors` besides. Else returns all errors as one, that of
+    /// `result` last.
     pub(crate) fn gather_with<T>(result: Result<T, Self>, mut errors: Vec<Self>) -> Result<T, Self> {
         match result {
             Ok(value) if errors.is_empty() => Ok(value),
@@ -146,7 +147,7 @@ impl FlightsError {
     }
 }
 
-/// What is wrong with a log, or with what is asked of it.
+/// Fault of a log, or of a request to it.
 ///
 /// ```
 /// use flights::{LogError, Spot};
@@ -160,19 +161,19 @@ pub enum LogError {
     /// The file cannot be read at all.
     #[error("cannot read it: {0}; check the path and its variables")]
     Unreadable(#[source] io::Error),
-    /// It is no table.
+    /// It is not a table.
     #[error(transparent)]
     Table(#[from] TableError),
-    /// It has nothing of a name.
+    /// It has no column, topic or field of a name.
     #[error("no {kind} `{name}`; it has {}; correct {key}", shortened(known))]
     Missing {
-        /// What was looked for: a column, a topic.
+        /// Kind of the item that was searched: a column, a topic.
         kind: &'static str,
         /// Its name.
         name: String,
         /// The names there are.
         known: Vec<String>,
-        /// The key of the flights file that says the name.
+        /// The key of the flights file that has the name.
         key: &'static str,
     },
     /// Something else than expected.
@@ -180,11 +181,11 @@ pub enum LogError {
     Unexpected {
         /// Where.
         at: Spot,
-        /// What would be accepted.
+        /// Values that would be accepted.
         expected: String,
-        /// What is there.
+        /// Value that was found.
         found: String,
-        /// What to do.
+        /// Advice.
         advice: &'static str,
     },
     /// Samples that are too far apart for a flight.
@@ -201,7 +202,7 @@ pub enum LogError {
     },
 }
 
-/// Where in a log, or in what the flights file says of it.
+/// Place in a log, or in its entry in the flights file.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Spot {
     /// The whole log or channel.

@@ -10,7 +10,7 @@ use vehicles::gaps::of_held;
 
 use crate::quantity::Quantity;
 
-/// What a flight is for.
+/// Role of a flight.
 ///
 /// ```
 /// assert_eq!(flights::Role::Select.name(), "select");
@@ -57,22 +57,22 @@ pub struct Channel<const N: usize> {
 /// A flight. A channel that was not logged has no samples.
 #[derive(Debug, Clone)]
 pub struct Flight {
-    /// What reports call it.
+    /// Its name in reports.
     pub name: String,
     /// The file it was read from.
     pub file: PathBuf,
     /// Further files it was read from: later parts of its log, and the logs of single channels.
     pub other_files: Vec<PathBuf>,
-    /// What it is for.
+    /// Its role.
     pub role: Role,
     /// Number of rotors of its vehicle: behind so many, commands and speeds are zero.
     pub rotors: usize,
     /// Raw motor commands, in the unit of the vehicle file's command map and in its order of rotors. A command
     /// holds until the next.
     pub command: Channel<ROTORS_MAX>,
-    /// True if the log writes commands only on change: then a time without commands is no gap.
+    /// True if the log writes commands only on change: then a time without commands is not a gap.
     pub commands_on_change: bool,
-    /// Times between the files of such a log, in which nobody knows if a command changed.
+    /// Times between the files of such a log, in which it is unknown if a command changed.
     pub command_breaks_s: Vec<(f64, f64)>,
     /// Speeds of the rotors in rad/s, in the order of the commands.
     pub rotor_speed: Channel<ROTORS_MAX>,
@@ -89,14 +89,14 @@ pub struct Flight {
     pub specific_force: Channel<3>,
     /// Voltage of the battery in V.
     pub battery_voltage: Channel<1>,
-    /// What the flights file has assumed instead of a measurement, such as a level attitude.
+    /// Assumptions of the flights file in place of measurements, such as a level attitude.
     pub assumed: Vec<String>,
-    /// What the reader noticed: repeated samples left out, gaps, values that look like another unit.
+    /// Notes of the reader: repeated samples left out, gaps, values that look like another unit.
     pub notes: Vec<String>,
 }
 
 impl<const N: usize> Channel<N> {
-    /// Whether the quantity was not logged.
+    /// True if the quantity was not logged.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.time_s.is_empty()
@@ -124,7 +124,7 @@ impl<const N: usize> Channel<N> {
     }
 }
 
-/// A channel whatever the size of its samples.
+/// A channel with samples of any size.
 pub(crate) trait AnyChannel {
     fn time_s(&mut self) -> &mut Vec<f64>;
     /// Leaves the samples for which `is_kept` holds of their index.
@@ -177,7 +177,7 @@ impl Flight {
         if all.is_empty() { "no channel".to_owned() } else { all.join(", ") }
     }
 
-    /// All files it was read from.
+    /// Iterates over the files that it was read from.
     pub fn files(&self) -> impl Iterator<Item = &Path> {
         std::iter::once(&self.file).chain(&self.other_files).map(PathBuf::as_path)
     }

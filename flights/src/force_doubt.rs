@@ -1,5 +1,5 @@
-//! Doubts what a log holds as specific force: compared is the acceleration that it means, by what it may be, with that of
-//! the velocity or the position.
+//! Doubts about the kind of specific force in a log: the acceleration of each possible kind is compared with
+//! that of the velocity or the position.
 
 use vehicles::Vehicle;
 
@@ -15,24 +15,24 @@ const WINDOW_S: f64 = 0.4;
 const QUIET_M_S2: f64 = 0.2;
 /// Above this correlation both accelerations are the same.
 const SAME: f64 = 0.7;
-/// It is clearly something else where that has less than this share of the residual.
+/// Another kind is clearly the right one if it leaves less than this share of the residual.
 const CLEARLY: f64 = 0.5;
 /// And within this factor two cannot be told apart.
 const ALIKE: f64 = 1.3;
 
-/// What a log may hold, and in which frame.
+/// Kind of force that a log may hold, and its frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Kind {
-    /// What.
+    /// Kind of the force.
     pub holds: Holds,
-    /// In which frame.
+    /// Frame of the force.
     pub frame: Frame,
 }
 
-/// What the log holds rather than what is declared.
+/// Kinds that the log may hold instead of the declared one.
 #[derive(Debug)]
 pub struct Doubt {
-    /// What would fit, the best first.
+    /// Kinds that would fit, the best first.
     pub fits: Vec<Kind>,
     /// The correlation of the best with the acceleration.
     pub correlation: f64,
@@ -42,18 +42,18 @@ pub struct Doubt {
     pub declared_m_s2: f64,
 }
 
-/// How a specific force agrees with the acceleration of the velocity or the position.
+/// Comparison of a specific force with the acceleration of the velocity or the position.
 pub struct ForceDoubt<'a> {
     /// The flight, its specific force in the body.
     pub flight: &'a Flight,
     /// The vehicle.
     pub vehicle: &'a Vehicle,
-    /// What is declared.
+    /// Declared kind.
     pub declared: Kind,
 }
 
 impl<'a> ForceDoubt<'a> {
-    /// Of a flight that has what is compared; an attitude that was assumed tells nothing.
+    /// The comparison for a flight with the channels that it takes; an assumed attitude does not count.
     pub fn of(flight: &'a Flight, vehicle: &'a Vehicle, entry: &Entry) -> Option<Self> {
         let declared =
             Kind { holds: entry.holds.unwrap_or_default(), frame: entry.frame.unwrap_or_default() };
@@ -62,7 +62,7 @@ impl<'a> ForceDoubt<'a> {
         (has_motion && is_measured).then_some(Self { flight, vehicle, declared })
     }
 
-    /// How the declared kind agrees.
+    /// Returns the agreement of the declared kind.
     pub fn agreement(&self) -> Option<Agreement> {
         self.pairs(self.declared).agreement(QUIET_M_S2)
     }

@@ -40,8 +40,8 @@ pub fn parse(
     }
 }
 
-/// Returns the format of the log at `path` with these bytes: by the first of them, else by its name; CSV where neither says
-/// more, and for a format that has no reader.
+/// Returns the format of the log at `path` with these bytes: by the first of them, else by its name; CSV if neither
+/// shows it, and for a format that has no reader.
 pub fn guess(path: &Path, bytes: &[u8]) -> Format {
     match bytes {
         [0x89, b'M', b'C', b'A', b'P', b'0', b'\r', b'\n', ..] => Format::Mcap,

@@ -19,7 +19,7 @@ pub struct Clash {
     pub used: usize,
     /// The index of the flight that is to be held out from it: with role `select` or `test`.
     pub held_out: usize,
-    /// What they have in common, as text.
+    /// Relation of the two, as text.
     pub reason: String,
 }
 
@@ -56,8 +56,8 @@ fn shared<'a>(pair: [&'a Flight; 2], sha256: impl Fn(&Path) -> Option<String>) -
     })
 }
 
-/// Whether both, of one log, have some of its time in common. Their samples need not be compared then: a course that comes
-/// round has the same ones again.
+/// Returns the time that both, of one log, have in common, as text. Their samples need not be compared then: a
+/// course that comes round has the same ones again.
 fn same_part([(_, fit_part), (_, test_part)]: [(&Flight, &Part); 2], shared: &Shared<'_>) -> Option<String> {
     // On the log's own clock: the first samples of two choices of channels, and of parts of a log, can be others.
     let begin_s = |part: &Part| part.clock_s + part.origin_s;
@@ -81,7 +81,8 @@ fn same_part([(_, fit_part), (_, test_part)]: [(&Flight, &Part); 2], shared: &Sh
     })
 }
 
-/// True if two paths lead to one file, or `have_same_bytes` says that the same bytes were read from both; how, as text.
+/// Returns as text how two paths lead to one file, or, by `have_same_bytes`, to copies of the same bytes;
+/// `None` if they do not.
 ///
 /// ```
 /// let (here, there) = ("Cargo.toml".as_ref(), "src/../Cargo.toml".as_ref());
@@ -99,9 +100,9 @@ pub fn same_file(a: &Path, b: &Path, have_same_bytes: impl FnOnce() -> bool) -> 
     have_same_bytes().then_some("copies of the same bytes")
 }
 
-/// Whether the test flight holds measurements of the fit flight, whatever files they are in. Each channel of motion that
-/// both have and that tells has to agree: commands can be the same in two flights. Quaternions are made of length one, so
-/// that how they were rounded is not seen: where they do not agree, others that do may still.
+/// Returns as text the measurements of the fit flight that the test flight holds, in any files. Each channel of
+/// motion that both have, and that is conclusive, has to agree: commands can be the same in two flights.
+/// Quaternions are normalised, so their rounding is not seen: if they do not agree, others may still do so.
 fn same_samples([(fit, fit_part), (test, test_part)]: [(&Flight, &Part); 2]) -> Option<String> {
     let channels: [(Quantity, &dyn Fn() -> Comparison); 5] = [
         (Quantity::AngularVelocity, &|| twin(&fit.angular_velocity, &test.angular_velocity)),

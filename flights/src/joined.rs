@@ -6,7 +6,7 @@ use crate::clean::longest_growing;
 use crate::error::{LogError, Spot};
 use crate::log::{Log, Samples};
 
-/// Advice on parts that are no parts of one log.
+/// Advice on files that are not parts of one log.
 const ADVICE: &str = "write all parts with the same columns and types, or make a flight of each file";
 
 /// A part of a log.

@@ -1,15 +1,17 @@
 //! Jumps of a pose: swapped markers, an estimator that starts anew. No vehicle moves so. The samples about a jump are
-//! left out, so that whatever reads the channel meets a gap there.
+//! left out, so that every reader of the channel meets a gap there.
 
 use crate::flight::{Channel, Flight, median};
 use crate::quantity::Quantity;
 
-/// So many samples to both sides of a jump are left out: together more than the [`crate::clean::GAP_PERIODS`] of a gap.
+/// Samples that are left out on each side of a jump: together more than the [`crate::clean::GAP_PERIODS`] of a gap.
 const REACH: usize = 3;
-/// A step is a jump if it differs from its neighbours' by more than this many times what is usual: noise does not.
+/// A step is a jump if it differs from its neighbours' by more than this many times the usual difference: noise
+/// does not.
 const UNUSUAL: f64 = 12.0;
 
-/// The least jump, and the greatest acceleration of a vehicle that still flies: what one step can differ from the next.
+/// The least jump, and the greatest acceleration of a vehicle that still flies: limits of the difference
+/// between two steps.
 struct Limits {
     least: f64,
     acceleration: f64,
@@ -24,7 +26,7 @@ const ATTITUDE: Limits = Limits { least: 0.0873, acceleration: 250.0 };
 /// Note on jumps, after the channel's name.
 const NOTE: &str = "jumps as no vehicle moves";
 
-/// Leaves out the samples about jumps of position and attitude, and says so in the flight's notes.
+/// Leaves out the samples about jumps of position and attitude, and notes them in the flight's notes.
 pub fn leave_out_jumps(flight: &mut Flight) {
     let notes = &mut flight.notes;
     flight.position =
@@ -76,7 +78,7 @@ fn without_jumps<const N: usize>(
 struct Step {
     from: usize,
     span_s: f64,
-    /// How much longer it is than the speed before and after would have it.
+    /// Difference from the mean of the steps before and behind, by speed or by way: the smaller of the two.
     excess: f64,
 }
 

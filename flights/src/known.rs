@@ -1,13 +1,13 @@
-//! Known rotors: the stretches of a flight in which its commands determine how fast the rotors turn.
+//! Known rotors: the stretches of a flight in which its commands determine the speeds of the rotors.
 //!
-//! A command holds until the next. In a gap of the commands nobody knows it, and behind the gap the rotors need time to
+//! A command holds until the next. In a gap of the commands it is unknown, and behind the gap the rotors need time to
 //! follow again. `identify` compares, a window predicts and a replay counts within these stretches alone.
 
 use vehicles::gaps::{held_period_s, of_held};
 
 use crate::flight::Flight;
 
-/// Time after which the rotors follow the commands, whatever their speeds were before.
+/// Time after which the rotors follow the commands, from any speeds before.
 pub const SETTLE_S: f64 = 0.5;
 
 /// Slack at the ends of a stretch: times are differences of decimal fractions.

@@ -6,8 +6,8 @@ use crate::log::Log;
 use crate::name::Name;
 use crate::quantity::Quantity;
 
-/// Where a type of message holds a quantity. In `fields`, `*` stands for x, y, z (and w) in turn, and `#` for the
-/// indices from 0 on.
+/// Fields in which a type of message holds a quantity. In `fields`, `*` stands for x, y, z (and w) in turn, and
+/// `#` for the indices from 0 on.
 struct Known {
     kind: &'static str,
     quantity: Quantity,
@@ -36,7 +36,7 @@ struct Validity {
     quantity: Quantity,
     /// Their names, divided by blanks.
     fields: &'static str,
-    /// True if a field with this number says that the message does not.
+    /// True if a field with this number means that the message does not hold the quantity.
     is_absent: fn(f64) -> bool,
 }
 
@@ -163,7 +163,7 @@ pub fn absent(log: &dyn Log, quantity: Quantity, entry: &Entry) -> Option<Absent
     Some(Absent { messages, fields: validity.fields })
 }
 
-/// `entry` with what need not be said about a known type of message, of a vehicle with so many `rotors`.
+/// `entry` completed by the facts of a known type of message, of a vehicle with so many `rotors`.
 ///
 /// # Errors
 /// If the entry names a topic alone and its type is not known to hold the quantity.
@@ -190,7 +190,7 @@ pub fn complete(log: &dyn Log, quantity: Quantity, entry: &Entry, rotors: usize)
 }
 
 /// The channels of a log for which the flights file declares none: for each quantity the preferred type that
-/// exactly one topic has. The notes say what was taken and what was not clear.
+/// exactly one topic has. The notes name the channels that were taken, and those that were not clear.
 pub fn defaults(log: &dyn Log, format: Format, rotors: usize) -> (ChannelMap, Vec<String>) {
     let (mut channels, mut notes) = (ChannelMap::new(), Vec::new());
     if !matches!(format, Format::Mcap | Format::Ulog | Format::Dataflash) {

@@ -1,4 +1,4 @@
-//! Measured flights: what was logged, in SI units and in the frames of this project, whatever file it came from.
+//! Measured flights from any log: their channels in SI units and in the frames of this project.
 //!
 //! | room | what it holds |
 //! |---|---|

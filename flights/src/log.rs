@@ -1,4 +1,4 @@
-//! A log, whatever its format: samples of numbers by name.
+//! A log of any format: samples of numbers by name.
 
 use crate::error::LogError;
 use crate::number_rows::NumberRows;
@@ -11,14 +11,14 @@ pub struct Samples {
     pub time_s: Vec<f64>,
     /// The numbers in the order they were asked for; NaN where the log has none.
     pub rows: NumberRows,
-    /// What a reader of the samples should know, such as which stamp was taken.
+    /// Notes on the samples, such as which stamp was taken.
     pub notes: Vec<String>,
     /// Seams of a log in several files: for each, the time of the last sample before it, and of the first behind it. Infinite
     /// where there is none.
     pub seams: SeamList,
 }
 
-/// What every format can do.
+/// Interface of every format.
 pub trait Log {
     /// The samples of `names` on `topic`.
     fn samples(&self, topic: Option<&str>, names: &[String]) -> Result<Samples, LogError>;

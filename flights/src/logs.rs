@@ -17,30 +17,30 @@ const MATCHING: MatchOptions =
 
 /// A log that becomes a flight.
 pub struct Log<'a> {
-    /// What the flights file says of it.
+    /// Its entry in the flights file.
     pub entry: &'a Spanned<FlightEntry>,
-    /// Which entry that is, from 0.
+    /// Index of that entry, from 0.
     pub index: usize,
-    /// What reports call the flight.
+    /// Name of the flight in reports.
     pub name: String,
     /// The files of the log, in the order of time; one at least.
     pub files: Vec<PathBuf>,
 }
 
 impl Log<'_> {
-    /// Where the name comes from.
+    /// Returns the place of the name.
     pub fn name_span(&self) -> Range<usize> {
         let entry = self.entry.get_ref();
         entry.name.as_ref().map_or(entry.file.span(), Spanned::span)
     }
 }
 
-/// Whether files are looked for, or a pattern is taken for a name.
+/// Treatment of patterns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Patterns {
-    /// In the folders of this machine.
+    /// A pattern is searched for in the folders of this machine.
     Find,
-    /// Where there are no folders.
+    /// A pattern is taken for a name, where there are no folders.
     Literal,
 }
 
@@ -74,7 +74,7 @@ pub fn of_entry<'a>(
 }
 
 /// The files of one log that the value of the key names, in its order; those that a pattern in a list finds in the order of
-/// their paths. A name that is no list is no pattern.
+/// their paths. A name outside a list is not a pattern.
 pub fn parts(
     document: &Document,
     key: &str,
@@ -96,7 +96,7 @@ pub fn parts(
 enum Found {
     /// The one with this name.
     File(PathBuf),
-    /// Those that a pattern finds, sorted.
+    /// Files that a pattern finds, sorted.
     ByPattern {
         /// Their paths.
         files: Vec<PathBuf>,
@@ -105,7 +105,7 @@ enum Found {
     },
 }
 
-/// Files for what is written at a place.
+/// Files of the name or pattern at a place.
 fn found(
     document: &Document,
     key: &str,
@@ -139,7 +139,7 @@ fn has_wildcard(path: &Path) -> bool {
     path.to_string_lossy().contains(['*', '?'])
 }
 
-/// The files that a pattern finds, sorted; else what was found instead.
+/// The files that a pattern finds, sorted; else a description of the fault.
 fn find(pattern: &Path) -> Result<Vec<PathBuf>, String> {
     // Brackets stand in names of folders and logs, and so for themselves.
     let text = pattern.to_string_lossy().replace('[', "[[]");

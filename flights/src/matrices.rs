@@ -10,7 +10,7 @@ use crate::number_rows::NumberRows;
 /// Greatest element of R^T R - I of a rotation matrix that was rounded.
 const TOLERANCE: f64 = 0.05;
 
-/// Refuses samples of which most are no rotation matrices.
+/// Refuses samples of which most are not rotation matrices.
 pub fn check(rows: &NumberRows) -> Result<(), LogError> {
     let read: Vec<Matrix3<f64>> =
         rows.iter().filter_map(matrix).filter(|matrix| matrix.iter().all(|part| part.is_finite())).collect();

@@ -16,7 +16,7 @@ const CLOCK_SAMPLES: usize = 200;
 /// Clocks that are further apart than this are two: receiving a message takes less.
 const ONE_CLOCK_S: f64 = 1.0;
 
-/// A log, with what its topics are.
+/// A log, with the definitions of its topics.
 pub struct McapLog {
     bytes: Vec<u8>,
     topics: BTreeMap<String, Topic>,
@@ -29,11 +29,11 @@ pub struct McapLog {
 
 struct Topic {
     kind: String,
-    /// The parsed definition, or what there is instead.
+    /// The parsed definition, or the reason why there is none.
     definition: Result<Definition, NoDefinition>,
 }
 
-/// Why a topic's messages cannot be read.
+/// Reason why a topic's messages cannot be read.
 #[derive(Debug, thiserror::Error)]
 enum NoDefinition {
     #[error("no schema")]
@@ -258,7 +258,8 @@ impl Absent {
         Self { is_found: vec![false; names.len()], known: Vec::new() }
     }
 
-    /// The numbers of a message; NaN where its array is too short, or a sensor of ours says that the sample was lost.
+    /// The numbers of a message; NaN where its array is too short, or where a sensor of ours marks the sample
+    /// as lost.
     fn row(&mut self, leaves: &[Leaf], names: &[String]) -> Result<Vec<f64>, LogError> {
         let lost = number(leaves, "measured_ns").is_some() && number(leaves, "valid") == Some(0.0);
         let row: Vec<Option<f64>> = names.iter().map(|name| number(leaves, name)).collect();

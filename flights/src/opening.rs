@@ -30,7 +30,7 @@ const CHOOSE_BESIDE: &str =
 /// Advice where the clock of a part starts again.
 const CUT: &str = "a part of a log has one recording: cut the file there";
 
-/// All that is needed to open the logs of a flights file.
+/// Arguments for the opening of the logs of a flights file.
 pub struct Opening<'a> {
     /// The flights file.
     pub document: &'a Document,
@@ -46,7 +46,7 @@ pub struct Opening<'a> {
 struct Asked<'b> {
     /// Its files.
     files: &'b [PathBuf],
-    /// The format that the flights file says.
+    /// The format in the flights file.
     format: Option<Format>,
     /// Its declared form.
     form: Form<'b>,

@@ -1,4 +1,4 @@
-//! Compares measured values with physics: what looks like another unit, frame or order is said.
+//! Compares measured values with physics: values that look like another unit, frame or order are reported.
 //!
 //! A mismatch is clear where a known factor, frame or order explains it; otherwise it is only worth a note.
 
@@ -39,13 +39,13 @@ const PERIOD_RANGE_S: (f64, f64) = (2e-4, 0.25);
 const SPAN_RANGE_S: (f64, f64) = (1.0, 3600.0);
 /// Below this correlation a vector does not follow its twin at all.
 const AGAINST: f64 = 0.3;
-/// It follows clearly better another way where that adds this much.
+/// It follows another kind clearly better if the correlation grows by this much.
 const CLEARLY: f64 = 0.3;
 /// And two that are nearer than this cannot be told apart.
 const ALIKE: f64 = 0.1;
-/// What would make it good, as text and in numbers.
+/// Correction that would make it good, as text and in numbers.
 type Mistake<T> = (&'static str, fn(T) -> T);
-/// What is mistaken about the Euler angles roll and pitch.
+/// Possible mistakes about the Euler angles roll and pitch.
 const ANGLE_MISTAKES: [Mistake<(f64, f64)>; 5] = [
     ("a `-` before the pitch", |(roll, pitch)| (roll, -pitch)),
     ("a `-` before the roll", |(roll, pitch)| (-roll, pitch)),
@@ -62,7 +62,7 @@ const POSITION_MISTAKES: [Mistake<[f64; 3]>; 4] = [
 ];
 /// Speeds are those that hover needs within this factor: it is the root of the one within which thrust and mass are known.
 const ROTOR_SPEED_TOLERANCE: f64 = 1.25;
-/// How many pole pairs motors of vehicles have.
+/// Numbers of pole pairs that motors of vehicles have.
 const POLE_PAIRS: std::ops::RangeInclusive<f64> = 2.0..=24.0;
 /// Voltages that a battery of a vehicle can have, from one cell to fourteen.
 const VOLTAGE_RANGE_V: (f64, f64) = (2.0, 62.0);
@@ -137,7 +137,7 @@ impl Judge<'_> {
         Some(finding(quantity, Some(kinds.join(" or ")), &what))
     }
 
-    /// An acceleration without gravity, of which gravity tells no unit, is that of the vehicle.
+    /// An acceleration without gravity, whose unit does not show by gravity, is that of the vehicle.
     fn acceleration(&self, force: &ForceDoubt<'_>) -> Option<Finding> {
         if !force.declared.holds.is_without_gravity() {
             return None;
@@ -367,7 +367,7 @@ impl Judge<'_> {
         (off < libm::log(LEANING_TOLERANCE)).then(|| format!("{} of `attitude`", of_unit(name)))
     }
 
-    /// How much smaller a position can be than its true one, if its unit is declared too large.
+    /// Returns the least ratio that the position as read may have to its true value, if the log has another unit.
     fn position_scale(&self) -> f64 {
         let declared = self.units.factor(Quantity::Position);
         let largest = Quantity::Position.dimension().units.iter().map(|unit| unit.1).fold(declared, f64::max);
@@ -384,7 +384,7 @@ impl Judge<'_> {
         (speed > SPEED_MAX_M_S).then(|| finding(quantity, fits, &what))
     }
 
-    /// All numbers of the rotors that the vehicle has.
+    /// Iterates over the numbers of the rotors that the vehicle has.
     fn of_rotors<'c>(&self, channel: &'c Channel<ROTORS_MAX>) -> impl Iterator<Item = f64> + Clone + use<'c> {
         let count = self.vehicle.rotors.len();
         channel.values.iter().flat_map(move |each| each.iter().take(count).copied())
@@ -456,14 +456,14 @@ impl Judge<'_> {
             .then(|| format!("{} with the motor's `pole_pairs`, here about {pairs:.0},", of_hundreds()))
     }
 
-    /// That the log has mechanical speeds, where they are divided by pole pairs and would be right without.
+    /// Returns the words for mechanical speeds, if the log's are divided by pole pairs and would be right without.
     fn mechanical(&self, factor: f64) -> Option<String> {
         let pairs = self.units.declared(Quantity::RotorSpeed)?.pole_pairs.filter(|pairs| *pairs > 1)?;
         let is_near = libm::log(factor * f64::from(pairs)).abs() < libm::log(ROTOR_SPEED_TOLERANCE);
         is_near.then(|| "mechanical speeds, without `pole_pairs`,".to_owned())
     }
 
-    /// How many there are is known of the motor, and not from a hover that is known but roughly.
+    /// Returns a hint at `pole_pairs`. Their number is known from the motor; a hover shows it only roughly.
     fn hint_of_poles(&self, factor: f64) -> String {
         let declared =
             self.units.declared(Quantity::RotorSpeed).and_then(|entry| entry.pole_pairs).unwrap_or(1);
@@ -503,7 +503,7 @@ fn with_angles(attitude: &Channel<4>, change: fn((f64, f64)) -> (f64, f64)) -> C
     Channel { time_s: attitude.time_s.clone(), values: attitude.values.iter().map(changed).collect() }
 }
 
-/// What of two would fit, where not both are wrong.
+/// Joins the fits of two as text; if only one has a fit, returns that.
 fn either(here: Option<String>, there: Option<String>) -> Option<String> {
     match (here, there) {
         (Some(here), Some(there)) => Some(format!("{here} here or {there}")),
@@ -511,7 +511,7 @@ fn either(here: Option<String>, there: Option<String>) -> Option<String> {
     }
 }
 
-/// The keys that declare what a specific force is made of.
+/// The keys that declare the kind of a specific force.
 fn of_kind(kind: Kind, declared: Kind) -> String {
     let holds = format!("`holds = \"{}\"`", kind.holds.name());
     let frame = if kind.frame == Frame::FrdNed { "frd-ned" } else { "flu-enu" };

@@ -45,7 +45,7 @@ pub const FRACTION: &str = "fraction";
 pub const PERCENT: &str = "%";
 
 impl Quantity {
-    /// All that are samples over time, in the order of [`crate::Flight`].
+    /// Quantities that are samples over time, in the order of [`crate::Flight`].
     pub const CHANNELS: [Self; 8] = [
         Self::Command,
         Self::RotorSpeed,

@@ -44,17 +44,17 @@ pub struct Part {
     pub to_s: f64,
 }
 
-/// What is needed to read a flight.
+/// Arguments for the reading of a flight.
 pub struct Reading<'a> {
     /// The flights file.
     pub document: &'a Document,
     /// The declared vehicle.
     pub vehicle: &'a Vehicle,
-    /// What reports call the flight.
+    /// Name of the flight in reports.
     pub name: &'a str,
     /// The flight as declared.
     pub entry: &'a FlightEntry,
-    /// Where that stands.
+    /// Place of its entry.
     pub at: Range<usize>,
     /// The log's format.
     pub format: Format,
@@ -86,8 +86,8 @@ struct Said {
 }
 
 impl Reading<'_> {
-    /// Reads the flight from `log`; says which part of the log's own time it is, too. The memory of the log is free before the
-    /// flight is judged.
+    /// Reads the flight from `log`; also returns its part of the log's own time. The memory of the log is free
+    /// before the flight is judged.
     ///
     /// # Errors
     /// Those of all channels at once.
@@ -323,7 +323,7 @@ impl Reading<'_> {
         self.entry.to_s.as_ref().map_or(f64::INFINITY, |to_s| *to_s.get_ref() - self.start_s())
     }
 
-    /// Fills in what the flights file assumes instead of a measurement.
+    /// Fills in the assumptions of the flights file in place of measurements.
     fn assume(&self, flight: &mut Flight, yaw: Option<Channel<1>>) -> Result<(), FlightsError> {
         let Some(assume) = &self.entry.assume else { return Ok(()) };
         let Assumption::Hover = assume.get_ref();
@@ -353,7 +353,7 @@ impl Reading<'_> {
         Ok(())
     }
 
-    /// Makes a specific force of what the log holds in its place.
+    /// Converts the logged vectors to a specific force.
     fn turn_force(&self, flight: &mut Flight) -> Result<(), FlightsError> {
         let Some(entry) = self.declared(Quantity::SpecificForce) else { return Ok(()) };
         let meaning =
@@ -375,7 +375,7 @@ impl Reading<'_> {
         FlightsError::gather(lost.collect())
     }
 
-    /// Notes what is not clear, or is to be trusted; the rest is an error.
+    /// Notes findings that are not clear, or that the flights file trusts; the rest is an error.
     fn settle(&self, flight: &mut Flight, findings: Vec<Finding>) -> Result<(), FlightsError> {
         let (clear, vague): (Vec<_>, Vec<_>) =
             findings.into_iter().partition(|finding| finding.fits.is_some());
@@ -396,7 +396,8 @@ impl Reading<'_> {
         self.log_error(&self.declaration_of(quantity), Some(quantity), cause)
     }
 
-    /// Where a channel is declared; the flight, for one that was taken by default and stands nowhere in the file.
+    /// Returns the place of a channel's declaration. For a channel that was taken by default, returns that of
+    /// the flight.
     fn declaration_of(&self, quantity: Quantity) -> Range<usize> {
         let declared = self.channels.get(&quantity).map(Spanned::span).filter(|span| !span.is_empty());
         declared.unwrap_or(self.at.clone())
@@ -448,7 +449,7 @@ fn say_command_gaps(time_s: &[f64], notes: &mut Vec<String>) {
     ));
 }
 
-/// What several channels have in common is said once.
+/// Merges equal notes of several channels into one.
 fn merged(notes: &[String]) -> Vec<String> {
     let mut said: Vec<(Vec<&str>, &str)> = Vec::new();
     for note in notes {

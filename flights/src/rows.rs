@@ -32,7 +32,7 @@ pub fn time_column<'e>(time: Option<&'e Entry>, file: &str) -> Result<(&'e Entry
     Ok((time, column))
 }
 
-/// The factor of times to s; `others` names what else is accepted.
+/// The factor of times to s; `others` names other accepted units.
 pub fn time_factor(unit: Option<&str>, others: &str) -> Result<f64, LogError> {
     let (dimension, unit) = (Quantity::Time.dimension(), unit.unwrap_or("(none)"));
     dimension.factor(unit).ok_or_else(|| {

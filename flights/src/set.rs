@@ -64,8 +64,8 @@ impl FlightSet {
     /// no folders in which a pattern would find logs: it is a name as any other.
     ///
     /// # Errors
-    /// If a key or a name in a log is wrong, values contradict their units, a test flight holds what parameters are
-    /// fitted on, or `read` fails.
+    /// If a key or a name in a log is wrong, values contradict their units, a test flight holds samples that
+    /// parameters are fitted on, or `read` fails.
     pub fn parse(path: &Path, text: String, read: &ReadFile<'_>) -> Result<Self, FlightsError> {
         Self::read(path, text, read, Patterns::Literal)
     }
@@ -122,7 +122,7 @@ impl FlightSet {
     }
 }
 
-/// The vehicle in the file at `path`; what is read becomes part of `files`.
+/// The vehicle in the file at `path`; the bytes that are read become part of `files`.
 fn vehicle(path: &Path, read: &ReadFile<'_>, files: &InputFiles) -> Result<Vehicle, Diagnostic> {
     let file = path.display().to_string();
     let text = |path: &Path| {
@@ -133,7 +133,7 @@ fn vehicle(path: &Path, read: &ReadFile<'_>, files: &InputFiles) -> Result<Vehic
     Vehicle::parse_with(&read, &file, &text)
 }
 
-/// What is wrong with the values of keys, before any log is read.
+/// Returns the faults in the values of keys, before any log is read.
 fn check_keys(document: &Document, flights: &[Spanned<FlightEntry>]) -> Vec<FlightsError> {
     let mut errors = Vec::new();
     if flights.is_empty() {
@@ -175,7 +175,7 @@ fn check_names(document: &Document, logs: &[Log<'_>]) -> Vec<FlightsError> {
     again.map(refused).collect()
 }
 
-/// The bound of a flight's part that cannot be meant, where it stands, and its value.
+/// The invalid bound of a flight's part, its place, and its value.
 fn bad_window(entry: &FlightEntry) -> Option<(&'static str, Range<usize>, f64)> {
     let from_s = entry.from_s.as_ref().map_or(0.0, |from_s| *from_s.get_ref());
     let to_s = entry.to_s.as_ref().map_or(f64::INFINITY, |to_s| *to_s.get_ref());

@@ -1,5 +1,5 @@
-//! The time that a flight's samples lie in. Whatever is computed on a grid in time costs as much as that time is long,
-//! so that it has to be bounded by the samples there are: a stamp in the wrong unit must not ask for a year.
+//! The time that a flight's samples lie in. A computation on a grid in time costs as much as that time is long.
+//! So it has to be bounded by the number of samples: a stamp in the wrong unit must not ask for a year.
 
 use std::fmt;
 
@@ -31,17 +31,17 @@ const SHORT_S: f64 = 10.0;
     gap[1]
 )]
 pub struct Sparse {
-    /// How many the channel with the most has.
+    /// Number of samples of the channel with the most.
     pub samples: usize,
-    /// The time in which those of all channels lie.
+    /// Time in which the samples of all channels lie.
     pub span_s: f64,
     /// The longest time without any, of one channel.
     pub gap_s: f64,
-    /// Where it begins and ends.
+    /// Its beginning and its end.
     pub gap: [Moment; 2],
     /// The channel.
     pub channel: Quantity,
-    /// How far they may be apart on average.
+    /// Greatest mean distance of samples that is accepted.
     pub spacing_max_s: f64,
 }
 
@@ -50,7 +50,7 @@ pub struct Sparse {
 pub struct Moment {
     /// From the flight's start, or from the log's first sample where that is known.
     pub time_s: f64,
-    /// Whether it is from the log's first sample.
+    /// True if it is counted from the log's first sample.
     pub is_in_log: bool,
     /// The line of the log.
     pub line: Option<u64>,
@@ -66,9 +66,9 @@ impl fmt::Display for Moment {
 }
 
 impl Flight {
-    /// Holds the time that the flight lasts against the number of its samples, `spacing_max_s` apart on average: what is
-    /// computed on a grid in time must cost no more than the samples allow for. Flights that were read from files have
-    /// passed with 2 s.
+    /// Compares the time that the flight lasts with the number of its samples, `spacing_max_s` apart on
+    /// average: a computation on a grid in time must cost no more than the samples allow for. Flights that were
+    /// read from files have passed with 2 s.
     ///
     /// # Errors
     /// If the samples are further apart.

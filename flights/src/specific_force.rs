@@ -1,4 +1,4 @@
-//! Specific force and what logs hold in its place: accelerations, with or without gravity, along other axes.
+//! Specific force and its substitutes in logs: accelerations, with or without gravity, along other axes.
 //!
 //! With R the attitude, body to world, and g up the gravity in the world, the specific force in the body is
 //! f = R^T (a + g), where a is the acceleration in the world: R b where the log holds b along the axes of the body.
@@ -12,10 +12,10 @@ use crate::error::{LogError, Spot};
 use crate::flight::{Channel, period_s};
 use crate::quantity::Quantity;
 
-/// What the log holds, and what it takes to turn it.
+/// Meaning of the vectors in the log, and gravity to convert them.
 #[derive(Debug, Clone, Copy)]
 pub struct Meaning {
-    /// What it is.
+    /// Kind of the vectors.
     pub holds: Holds,
     /// Gravity, in m/s^2.
     pub gravity_m_s2: f64,
@@ -33,7 +33,7 @@ impl Meaning {
         attitude.inverse() * (self.acceleration(logged, attitude) + self.gravity())
     }
 
-    /// What was logged for a specific force in the body.
+    /// Returns the vector that is logged for a specific force in the body.
     pub fn logged(self, force: Vector3<f64>, attitude: &UnitQuaternion<f64>) -> Vector3<f64> {
         let turned = attitude * force;
         let without = if self.holds.is_without_gravity() { turned - self.gravity() } else { turned };
@@ -45,7 +45,7 @@ impl Meaning {
     }
 }
 
-/// Turns what the log holds into the specific force in the body; samples without an attitude about are left out.
+/// Turns the logged vectors into the specific force in the body; samples without an attitude about are left out.
 ///
 /// # Errors
 /// If there is none for any.

@@ -1,4 +1,4 @@
-//! How far the simulated state of a vehicle is from the measured one: what comparisons at the ends of windows sum up.
+//! Differences between simulated and measured states of a vehicle, which comparisons at the ends of windows sum up.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use crate::flight::Flight;
@@ -42,7 +42,7 @@ impl StateQuantity {
         }
     }
 
-    /// Whether `flight` tells of it, by a measurement or by the change of one; an assumption tells nothing.
+    /// True if `flight` shows it, by a measurement or by the change of one; an assumption does not count.
     #[must_use]
     pub fn is_measured(self, flight: &Flight) -> bool {
         // Without an attitude nobody knows where thrust points; one that was assumed is no measurement.
@@ -71,7 +71,7 @@ pub struct VehicleState {
 }
 
 impl VehicleState {
-    /// How far it is from `measured`, in the unit of `quantity`.
+    /// Returns its distance from `measured`, in the unit of `quantity`.
     ///
     /// ```
     /// # use flights::state::{StateQuantity, VehicleState};

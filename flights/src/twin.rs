@@ -1,4 +1,4 @@
-//! Whether two channels hold the same measurements: a copy, rows saved again, a part of them, at other times.
+//! Comparison of two channels for the same measurements: a copy, rows saved again, a part of them, at other times.
 //!
 //! Noise makes measured vectors all but unique. Those that two channels have in common vote for the offset between their
 //! clocks; at the offset with the most votes a copy agrees sample by sample, and another flight does not, however alike it
@@ -9,7 +9,7 @@ use crate::flight::Channel;
 /// Values that differ by less than this part of the channel's spread are the same, and those that differ by less than the
 /// digits of one of the two: a copy may have fewer.
 const SAME: f64 = 1e-3;
-/// A vector that a channel has more often, as at rest, says nothing about when it was measured.
+/// A vector that a channel has more often, as at rest, does not show when it was measured.
 const REPEATS_MAX: usize = 4;
 /// Fewer samples in common prove nothing.
 const COMMON_MIN: usize = 10;
@@ -21,9 +21,9 @@ const NEIGHBOURS_MAX: usize = 16;
 /// The same measurements in two channels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Twin {
-    /// How many samples of the second are the same as those of the first at their time.
+    /// Number of samples of the second that are the same as those of the first at their time.
     pub same: usize,
-    /// Of so many.
+    /// Number of samples that were compared.
     pub compared: usize,
     /// First and last of them, in the first channel's time.
     pub in_first_s: (f64, f64),
@@ -31,14 +31,14 @@ pub struct Twin {
     pub in_second_s: (f64, f64),
 }
 
-/// What two channels have in common.
+/// Result of the comparison of two channels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Comparison {
     /// The second holds measurements of the first.
     Same(Twin),
-    /// It does not.
+    /// The second does not hold measurements of the first.
     Other,
-    /// Too few of their samples tell, as of what stands still.
+    /// Too few of their samples are conclusive, such as those of a channel that stands still.
     Unknown,
 }
 
@@ -67,7 +67,7 @@ pub fn twin<const N: usize>(first: &Channel<N>, second: &Channel<N>) -> Comparis
     found.map_or(Comparison::Other, Comparison::Same)
 }
 
-/// What makes a difference, on each axis; zero where the channel stands still.
+/// Smallest differences that count, on each axis; zero where the channel stands still.
 struct Steps<const N: usize> {
     /// Values in one step are the same for a start.
     key: [f64; N],
@@ -101,7 +101,7 @@ fn digit<const N: usize>(channel: &Channel<N>, axis: usize) -> f64 {
     gaps.min_by(f64::total_cmp).unwrap_or(0.0)
 }
 
-/// The samples of a channel that few others of it are the same as.
+/// The samples of a channel whose values it has only a few times.
 struct Telling<const N: usize> {
     /// The values in steps with the index of the sample, sorted.
     keys: Vec<([i64; N], usize)>,

@@ -113,7 +113,7 @@ impl Formats {
     }
 }
 
-/// The shape of `format`. Each format is computed once, whatever formats it stands in.
+/// The shape of `format`. Each format is computed once, even if several formats contain it.
 fn shape(
     fields: &BTreeMap<String, Vec<Field>>,
     shapes: &mut BTreeMap<String, Option<Shape>>,

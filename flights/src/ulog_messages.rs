@@ -1,8 +1,9 @@
-//! Messages of a ULog one after the other, and the way back to them behind bytes that are none.
+//! Messages of a ULog one after the other, and the way back to them behind damaged bytes.
 //!
-//! A message is u16 length, u8 type, content. Nothing marks its begin: behind a wrong length everything is read out of
-//! step. So each message is held against what is known of its type, and behind one that does not fit, reading goes on
-//! where messages fit again: at the next sync message (S), which begins with fixed bytes, or before it.
+//! A message is u16 length, u8 type, content. No mark shows its beginning: behind a wrong length everything is
+//! read out of step. So each message is compared with the known facts of its type. Behind one that does not
+//! fit, reading goes on where messages fit again: at the next sync message (S), which begins with fixed bytes,
+//! or before it.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -28,7 +29,7 @@ pub struct Content {
     pub topics: Vec<Topic>,
     /// Lost time of the logger, in ms, once for each time.
     pub dropouts_ms: Vec<u16>,
-    /// Bytes that are no messages, with messages behind them.
+    /// Bytes that are not messages, with messages behind them.
     pub damage: Damage,
     /// Number of bytes behind the last message.
     pub bytes_left: usize,
@@ -38,7 +39,7 @@ pub struct Content {
     is_behind_damage: bool,
 }
 
-/// Messages of one name and instance, whatever ids they were subscribed under.
+/// Messages of one name and instance, under any ids that they were subscribed with.
 pub struct Topic {
     /// Name, with `:1` and so on behind it for further instances.
     pub name: String,
@@ -224,7 +225,7 @@ impl Content {
         self.by_id.get(&id).map(|index| &self.topics[*index])
     }
 
-    /// A name and instance that are subscribed again, under whatever id, stay the same topic.
+    /// A name and instance that are subscribed again, under any id, stay the same topic.
     fn subscribe(&mut self, id: u16, instance: u8, format: String) {
         let name = if instance == 0 { format.clone() } else { format!("{format}:{instance}") };
         let index = *self.by_name.entry(name.clone()).or_insert(self.topics.len());

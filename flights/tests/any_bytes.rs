@@ -1,4 +1,5 @@
-//! Whatever bytes a log has, reading it ends, with a flight or with words, and takes memory by the size of the file.
+//! Reading a log of any bytes ends, with a flight or with an error in words, and takes memory by the size of
+//! the file.
 
 #[path = "support/dataflash.rs"]
 #[allow(dead_code, reason = "other tests use the rest")]
@@ -19,8 +20,9 @@ use parquet::basic::{Compression, Encoding};
 use parquet::file::properties::{WriterProperties, WriterPropertiesBuilder, WriterVersion};
 use support::{Motion, crc32};
 
-/// What reading may hold for each byte of a log, and besides: rows of two bytes make rows of numbers, and the definition of
-/// an array in a few bytes makes a table of its 65536 elements. A row of commands has room for twelve rotors.
+/// Memory that reading may hold for each byte of a log, and besides: rows of two bytes make rows of numbers, and the
+/// definition of an array in a few bytes makes a table of its 65536 elements. A row of commands has room for
+/// twelve rotors.
 const HELD_PER_BYTE: usize = 1000;
 const HELD_BESIDES: usize = 40 << 20;
 
@@ -123,7 +125,7 @@ fn read(head: &str, log: &[u8]) -> Result<FlightSet, FlightsError> {
     read_as(head, "trust_units = true", log)
 }
 
-/// The same with other keys of the flight; checks what reading holds.
+/// The same with other keys of the flight; checks the memory that reading holds.
 fn read_as(head: &str, keys: &str, log: &[u8]) -> Result<FlightSet, FlightsError> {
     let text = format!(
         "vehicle = \"v.toml\"\n{head}[[flight]]\nname = \"f\"\nfile = \"log\"\nrole = \"fit\"\n{keys}\n"
@@ -172,7 +174,7 @@ impl Chance {
         from..(from + 1 + self.below(64)).min(length)
     }
 
-    /// Changes `bytes` in a way that damages lengths, numbers or the order of what stands in them.
+    /// Changes `bytes` in a way that damages lengths, numbers or the order of their parts.
     fn change(&mut self, bytes: &mut Vec<u8>, words: &[&[u8]]) {
         if bytes.is_empty() {
             return;
@@ -202,7 +204,7 @@ impl Chance {
     }
 }
 
-/// Reads `count` logs, each of `whole` with one to five changes; says how many of them gave a flight.
+/// Reads `count` logs, each of `whole` with one to five changes; returns how many of them gave a flight.
 fn mutated(head: &str, whole: &[u8], words: &[&[u8]], count: usize, close: impl Fn(&mut Vec<u8>)) -> usize {
     let mut chance = Chance(0x9E37_79B9_7F4A_7C15);
     let mut flights = 0;

@@ -13,7 +13,7 @@ attitude = { columns = ["qx", "qy", "qz", "qw"] }
 angular_velocity = { columns = ["wx", "wy", "wz"], unit = "rad/s" }
 "#;
 
-/// The made-up flight of 10 s whose commands are there where `is_logged` says so.
+/// The made-up flight of 10 s whose commands are there where `is_logged` is true.
 fn read(is_logged: impl Fn(f64) -> bool, channels: &str, extra: &str) -> Result<Flight, FlightsError> {
     let text = Motion::default().csv();
     let (header, rows) = text.split_once('\n').expect("a header");

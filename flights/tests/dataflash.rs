@@ -1,4 +1,4 @@
-//! Dataflash logs of ArduPilot: what is read from them, and what is said about damaged ones.
+//! Dataflash logs of ArduPilot: the flights that are read from them, and the errors for damaged ones.
 
 #[path = "support/dataflash.rs"]
 mod dataflash;

@@ -1,4 +1,4 @@
-//! A test flight that holds what parameters are fitted on is refused, however it is written down.
+//! A test flight that holds samples that parameters are fitted on is refused, in any form of log.
 
 #[allow(dead_code, reason = "other tests use the rest")]
 mod support;

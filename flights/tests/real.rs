@@ -248,7 +248,7 @@ fn a_real_acceleration_in_the_world_is_refused_as_one() {
     }
 }
 
-/// The root mean square of what two channels at the same times differ by.
+/// The root mean square of the difference between two channels at the same times.
 fn rms(a: &Channel<3>, b: &Channel<3>) -> f64 {
     let pairs = a.time_s.iter().zip(&a.values).filter_map(|(time_s, a)| {
         let index = b.time_s.iter().position(|other_s| (other_s - time_s).abs() < 1e-6)?;

@@ -1,4 +1,4 @@
-//! Made-up logs of every format: what is read from them, and what is said about wrong ones.
+//! Made-up logs of every format: the flights that are read from them, and the errors for wrong ones.
 
 mod support;
 
@@ -28,7 +28,7 @@ fn refused(channels: &str, extra: &str) -> String {
     read(&Motion::default(), channels, extra).unwrap_err().to_string()
 }
 
-/// What contradicts in the flight.
+/// Returns the contradictions in the flight, each with the correction that fits.
 fn findings(motion: &Motion, channels: &str) -> Vec<(Quantity, String)> {
     match read(motion, channels, "") {
         Err(FlightsError::Implausible { findings, .. }) => findings

@@ -1,4 +1,4 @@
-//! ULogs that are damaged, cut or subscribed again: what is read from them, and what is said.
+//! ULogs that are damaged, cut or subscribed again: the flights that are read from them, and the notes.
 
 #[allow(dead_code, reason = "other tests use the rest")]
 mod support;

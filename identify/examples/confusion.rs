@@ -17,7 +17,7 @@ const NOISES: [f64; 3] = [0.3, 1.0, 3.0];
 const DURATION_S: f64 = 12.0;
 const NULLS: u64 = 200;
 
-/// A case with what names it in the tables.
+/// A case with its name in the tables.
 type Row = (Vec<&'static str>, f64, f64, Judgement);
 /// The same, without a judgement where the vehicle could not be flown.
 type Flown = (Vec<&'static str>, f64, f64, Option<Judgement>);
@@ -52,7 +52,7 @@ fn print_tables(sets: &[Vec<&'static str>], noises: &[f64], first_seed: u64) {
     print_floor(&rows);
 }
 
-/// All strengths of these effects together, each under all noises.
+/// Flies all strengths of these effects together, each under all noises.
 fn flown(names: &[&'static str], noises: &[f64], first_seed: u64) -> Vec<Flown> {
     let wanted: Vec<(f64, f64)> =
         STRENGTHS.iter().flat_map(|strength| noises.iter().map(|noise| (*strength, *noise))).collect();
@@ -66,7 +66,7 @@ fn flown(names: &[&'static str], noises: &[f64], first_seed: u64) -> Vec<Flown> 
     wanted.into_par_iter().enumerate().map(one).collect()
 }
 
-/// What became of one case, for a cell of the table.
+/// Returns the table's cell for one case.
 fn verdict(judged: &Judgement) -> String {
     let invented = judged.invented();
     if judged.is_declared_swap() {
@@ -157,7 +157,7 @@ fn print_floor(rows: &[Row]) {
     }
 }
 
-/// What is named where the declared vehicle is the true one.
+/// Returns the effects that are named where the declared vehicle is the true one.
 fn named_of_nothing(seed: u64, noise: f64) -> Vec<&'static str> {
     let mut case = Case::null(seed, DURATION_S).with_noise(noise);
     case.plan.sensors.pose_ticks = 10;

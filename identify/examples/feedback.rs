@@ -1,4 +1,4 @@
-//! Flights under feedback with disturbances of many spectra: what identification makes of the inertia.
+//! Flights under feedback with disturbances of many spectra: the inertia that identification finds.
 //!
 //! ```sh
 //! cargo run --release -p hummingbus-identify --example feedback            # the search, flight by flight

@@ -1,4 +1,4 @@
-//! How long an hour of flight at 1 kHz takes: 3.6 million rows through all candidates, flown in this process.
+//! Identification time of an hour of flight at 1 kHz: 3.6 million rows through all candidates, flown in this process.
 //!
 //! ```sh
 //! cargo run --release -p hummingbus-identify --example hour          # or with a number of minutes

@@ -1,10 +1,11 @@
-//! Clocks of a flight against each other: how late attitude and position are against the inertial unit, by the sensors
-//! alone.
+//! Offsets between the clocks of a flight: lateness of attitude and position against the inertial unit, by the
+//! sensors alone.
 //!
-//! The attitude's rate of change and the gyroscope's reading are the same quantity, and so are the position's second
-//! derivative and the accelerometer's reading turned by the attitude, less gravity: no model is needed to see by how much
-//! one lags. What the attitudes of all flights share is left to the candidate `sensor-delay`; what a single one has beyond
-//! that is taken off, and so is what position and velocity have beyond it.
+//! The attitude's rate of change and the gyroscope's reading are the same quantity. So are the position's
+//! second derivative and the accelerometer's reading, rotated by the attitude, less gravity. No model is needed
+//! to see by how much one lags. The lateness that the attitudes of all flights share is left to the candidate
+//! `sensor-delay`. A flight's own lateness beyond that is removed, and so is that of position and velocity
+//! beyond it.
 
 use crate::clock::Lateness;
 use crate::fit::Problem;
@@ -19,15 +20,15 @@ use std::collections::BTreeMap;
 
 /// Gauss-Newton steps.
 const STEPS: usize = 40;
-/// None is longer: a line through a course is good for a fraction of its quickest turn.
+/// No step is longer: a linearisation of the motion holds for a fraction of its fastest oscillation.
 const STEP_MAX_S: f64 = 0.02;
 /// From fewer blocks no deviation can be told.
 const LEAST_BLOCKS: usize = 5;
 /// An offset is real beyond so many standard deviations.
 const SURE: f64 = 4.0;
 
-/// How samples lie on the grid decides how much noise their interpolation leaves, which pulls at the offset by up to this
-/// part of the period of what is moved (docs/validation.md), beyond what blocks of time can show.
+/// Bias of an offset due to the samples' positions on the grid, as a part of the period of the shifted channel
+/// (docs/validation.md). It comes from the noise that interpolation leaves; blocks of time do not show it.
 const BETWEEN_SAMPLES: f64 = 0.1;
 /// A channel that is later than this is not on the same flight.
 const LATE_MAX_S: f64 = 0.4;
@@ -41,7 +42,7 @@ pub struct Offset {
     pub low: f64,
     /// Upper end.
     pub high: f64,
-    /// The part of it that was taken off before the fit.
+    /// The part of it that was removed before the fit.
     pub taken_off: f64,
 }
 
@@ -52,7 +53,7 @@ impl Offset {
     }
 }
 
-/// Offsets by channel; `None` where the flight has not what it takes, or too little of it.
+/// Offsets by channel; `None` where the flight lacks the channels that it takes, or has too little of them.
 pub type Offsets = BTreeMap<&'static str, Option<Offset>>;
 
 /// An offset that was found.
@@ -60,19 +61,19 @@ pub type Offsets = BTreeMap<&'static str, Option<Offset>>;
 struct Found {
     late_s: f64,
     deviation_s: f64,
-    /// What the places of samples on the grid make of it at most.
+    /// Greatest bias due to the samples' positions on the grid.
     between_s: f64,
 }
 
 impl Found {
-    /// Whether what it has beyond `other` is more than chance and the grid make of none.
+    /// True if its difference from `other` exceeds chance, the bias of both due to the grid, and `least_s`.
     fn is_beyond(&self, other: &Found, least_s: f64) -> bool {
         let own_s = (self.late_s - other.late_s).abs();
         let deviation_s = libm::hypot(self.deviation_s, other.deviation_s);
         own_s > SURE * deviation_s && own_s > least_s.max(self.between_s).max(other.between_s)
     }
 
-    /// Of several the mean; zero of none.
+    /// Returns the mean of the offsets; zero without any.
     fn mean(all: &[Found]) -> Found {
         let part = 1.0 / (all.len() as f64).max(1.0);
         Found {
@@ -96,9 +97,9 @@ fn of_attitude(problem: &Problem, flight: &Prepared) -> Option<Found> {
     })
 }
 
-/// The offset of position or velocity from what the accelerometer reads, turned by an attitude that is `attitude_s` late.
-/// What is moved is the inertial side: a position's second derivative is noise for the most part, and that of a moved one
-/// would depend on how its samples lie on the grid.
+/// Returns the offset of position or velocity from the accelerometer, whose readings are rotated by an attitude
+/// that is `attitude_s` late. The inertial side is shifted, not the position: a position's second derivative is
+/// mostly noise, and that of a shifted position would depend on how its samples lie on the grid.
 fn of_translation(
     problem: &Problem,
     flight: &Prepared,
@@ -167,7 +168,7 @@ fn kinematic_noises() -> Noises {
         .collect()
 }
 
-/// What was found of one flight.
+/// Offsets found for one flight.
 struct Clocks {
     attitude: Option<Found>,
     position: Option<Found>,
@@ -182,7 +183,7 @@ impl Clocks {
         Self { attitude, position: of(Translation::Position), velocity: of(Translation::Velocity) }
     }
 
-    /// What is taken off where `shared` is the attitudes' lateness that all flights share.
+    /// Returns the lateness to remove, where `shared` is the attitudes' lateness that all flights share.
     fn taken_off(&self, shared: &Found, least_s: f64) -> Lateness {
         let shift = self.attitude.filter(|shift| shift.is_beyond(shared, least_s));
         let attitude_s = shift.map_or(0.0, |shift| shift.late_s - shared.late_s);
@@ -195,9 +196,10 @@ impl Clocks {
     }
 }
 
-/// Takes off each flight's attitude what it is late beyond the mean of the estimation data, and its position and its velocity
-/// what they are late beyond that mean if they are apart from the attitude; they come with it if they are not. Only what
-/// is sure is taken off. Says what was found for each flight of `fit` and then of `test`.
+/// Removes from each flight the lateness of its attitude beyond the mean of the estimation data. Position and
+/// velocity move with the attitude; if they differ from it, their own lateness beyond that mean is removed.
+/// Only offsets that are certain are removed. Returns the offsets that were found for each flight of `fit` and
+/// then of `test`.
 pub fn align(problem: &mut Problem) -> Vec<(String, Offsets)> {
     let noises = std::mem::replace(&mut problem.noises, kinematic_noises());
     let flights: Vec<&Prepared> = problem.flights().collect();

@@ -18,7 +18,7 @@ pub struct Candidate {
 }
 
 impl Candidate {
-    /// Whether it is what most trims are: a torque that is the same whatever the thrust.
+    /// True if it resembles most trims: a torque that is the same at any thrust.
     pub fn is_trim(&self) -> bool {
         self.kind.steady_state && self.kind.turns_steadily
     }
@@ -34,7 +34,7 @@ pub fn free_parameters(candidates: &[Candidate]) -> Vec<usize> {
 pub struct Unidentifiable {
     /// The effect.
     pub effect: &'static str,
-    /// What is missing.
+    /// Quantity or condition that is missing.
     pub needs: &'static str,
 }
 
@@ -52,7 +52,7 @@ pub fn candidates(parameters: &Parameters, flights: &[&Prepared]) -> (Vec<Candid
     (seen, unidentifiable)
 }
 
-/// What `flights` lack to show an effect.
+/// Returns the first requirement of an effect that `flights` do not meet; `None` if they meet all.
 fn missing(kind: &EffectKind, flights: &[&Prepared]) -> Option<&'static str> {
     let is_slow = flights.iter().any(|flight| flight.slow_period_s.is_some());
     if is_slow && needs_fast_commands(kind) {
@@ -72,7 +72,7 @@ fn needs_fast_commands(kind: &EffectKind) -> bool {
     kind.needs.contains(&Quantity::Torque) || kind.is_delay || kind.changes_drive || kind.turns_steadily
 }
 
-/// Whether a flight shows a quantity.
+/// True if a flight shows a quantity.
 fn has(prepared: &Prepared, quantity: Quantity) -> bool {
     let flight = prepared.flight;
     let allows = |equation| prepared.offset_of(equation).is_some();

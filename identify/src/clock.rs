@@ -7,7 +7,7 @@ pub struct Clock {
     pub start_s: f64,
     /// Time between two instants.
     pub step_s: f64,
-    /// How many instants there are.
+    /// Number of instants.
     pub count: usize,
 }
 
@@ -24,7 +24,7 @@ impl Clock {
     }
 }
 
-/// What is taken off the clocks of one flight.
+/// Lateness that is removed from the clocks of one flight.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Lateness {
     /// Lateness of the attitude in s.

@@ -40,14 +40,15 @@ pub struct Problem<'f> {
     pub noises: Noises,
     /// Length of the blocks that count as independent.
     pub block_s: f64,
-    /// What the attitudes of all flights are late by according to the gyroscopes, in s: where a fit of their delay starts.
+    /// Mean lateness of the attitudes of the estimation data against the gyroscopes, in s: a fit of their delay
+    /// starts there.
     pub shared_late_s: f64,
 }
 
-/// What came of a fit.
+/// Result of a fit.
 #[derive(Debug, Clone)]
 pub struct FitResult {
-    /// All values, those that were held included.
+    /// Values of all parameters, those that were held included.
     pub values: Vec<f64>,
     /// The free parameters, which were fitted.
     pub free: Vec<usize>,
@@ -98,7 +99,7 @@ impl FitResult {
 }
 
 impl<'f> Problem<'f> {
-    /// All flights, those that are fitted on first.
+    /// Iterates over all flights, the estimation data first.
     pub fn flights(&self) -> impl Iterator<Item = &Prepared<'f>> {
         self.estimation.iter().chain(&self.validation).chain(&self.test)
     }
@@ -164,7 +165,8 @@ impl<'f> Problem<'f> {
         self.moved(&fitted.values, &fitted.free, &step)
     }
 
-    /// Whether a step is a small part of every parameter's standard deviation, if all rows were independent.
+    /// True if a step is a small part of every parameter's standard deviation, assuming that all rows are
+    /// independent.
     fn is_small(&self, step: &DVector<f64>, blocks: &[Block]) -> bool {
         let variances = normal::inverse(&normal::sum(blocks).gram).diagonal();
         step.iter()
@@ -335,7 +337,7 @@ fn held_step(total: &Block, held: &[Option<f64>]) -> DVector<f64> {
 struct Left {
     column: Vec<f64>,
     stretches: Vec<(usize, usize)>,
-    /// Sum of the squares of what was measured.
+    /// Sum of the squares of the measured values.
     signal: f64,
 }
 
@@ -433,7 +435,7 @@ impl Problem<'_> {
         self.rows(if self.validation.is_empty() { &self.estimation } else { &self.validation })
     }
 
-    /// How many rows of `flights` count, at least one.
+    /// Returns the number of rows of `flights` that have a weight, at least one.
     pub fn rows(&self, flights: &[Prepared]) -> usize {
         let of = |flight: &Prepared| {
             flight.layout.knots.len()
@@ -442,7 +444,7 @@ impl Problem<'_> {
         flights.iter().map(of).sum::<usize>().max(1)
     }
 
-    /// The shortest delay that the grids can tell from none.
+    /// The shortest delay that the grids can tell from zero.
     pub fn least_delay_s(&self) -> f64 {
         0.5 * self.flights().map(|flight| flight.layout.clock.step_s).fold(0.0, f64::max)
     }

@@ -1,8 +1,8 @@
 //! Predictions as a judge: no effect is kept with which the vehicle predicts worse than without it.
 //!
-//! An effect can make the residual of the equations smaller and yet predictions worse: it then stands in for something else
-//! than it says. Judged are the flights with role `select`, or else those that parameters are fitted on, each with
-//! parameters that were fitted on the others.
+//! An effect can make the residual of the equations smaller and yet predictions worse: it then absorbs the
+//! influence of another cause. The judged flights are those with role `select`, or else those that parameters
+//! are fitted on, each with parameters that were fitted on the others.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use crate::fit::{FitResult, Problem};
@@ -61,7 +61,7 @@ pub struct Foresight {
 }
 
 impl Foresight {
-    /// Prediction errors of the judged flights under what was `fitted`; empty where no attitude was measured.
+    /// Prediction errors of the judged flights under the fit; empty where no attitude was measured.
     pub fn of(problem: &Problem, fitted: &FitResult) -> Self {
         let flights: Vec<(&Prepared, Vec<f64>)> = if problem.validation.is_empty() {
             let without = |at| problem.values_without(fitted, at);

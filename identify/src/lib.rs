@@ -1,7 +1,7 @@
-//! Closing the loop: what real flights show that the declared model lacks.
+//! Closing the loop: effects that real flights show and that the declared model lacks.
 //!
 //! Measurement and model are put into the same equations of motion, seen through the same smooth window
-//! (`window`, `prepared`, `model`); what is left is regressed on the candidates' effects (`fit`), and judged on
+//! (`window`, `prepared`, `model`). The residual is regressed on the candidates' effects (`fit`), and judged on
 //! flights that nothing was fitted on (`select`).
 //!
 //! | room | what it holds |
@@ -79,7 +79,7 @@ pub use regressor::Regressor;
 pub use sensing::SensorErrors;
 pub use unusable::Unusable;
 
-/// What tests look at between the steps of an identification.
+/// Parts for tests that look between the steps of an identification.
 #[doc(hidden)]
 pub mod steps {
     pub use crate::fit::Problem;

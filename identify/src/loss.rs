@@ -30,8 +30,8 @@ pub struct Loss {
     pub unit: &'static str,
 }
 
-/// The losses among `errors` of test flights. The part of an error that sensors' noise makes of the measured start is no
-/// loss: a vehicle that hardly moves is predicted best by persistence.
+/// The losses among `errors` of test flights. The error that the sensors' noise causes through the measured
+/// start does not count as a loss: a vehicle that hardly moves is predicted best by persistence.
 pub fn losses(errors: &Changes, noise: &BTreeMap<&'static str, Noise>) -> Vec<Loss> {
     let mut losses = Vec::new();
     for (flight, horizons) in errors {

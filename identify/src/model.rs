@@ -1,4 +1,4 @@
-//! What the model says of a flight: the rows of every equation under given parameters.
+//! Predictions of the model for a flight: the rows of every equation under given parameters.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use crate::parameter::Parameters;
@@ -16,18 +16,18 @@ const MOTOR_STEP_S: f64 = 0.001;
 /// The rotors over a flight, on its grid.
 #[derive(Debug, Clone)]
 pub struct Rotors {
-    /// What turns the vehicle: measured where it was, else what follows from the commands.
+    /// Rotors that act on the vehicle: measured where speeds were logged, else computed from the commands.
     pub flown: Vec<PerRotor<RotorState>>,
     /// Rotor speeds that follow from the commands; zeros behind the last rotor.
     pub commanded: Vec<EachRotor>,
 }
 
-/// The declared vehicle with all that may be changed of it.
+/// The declared vehicle, with the parameters that a fit may change.
 #[derive(Debug)]
 pub struct Model {
     /// The vehicle as it is declared.
     pub vehicle: Vehicle,
-    /// What may be changed.
+    /// Parameters that a fit may change.
     pub parameters: Parameters,
 }
 
@@ -43,8 +43,8 @@ impl Model {
         flight.tracks(errors.pose_delay_s, errors.inertial_delay_s)
     }
 
-    /// The rotors of `flight` under these values. Where speeds were measured, the difference to what follows from the
-    /// commands is smoothed before it is believed: the noise of a sensor, differentiated, would pass for spin-up.
+    /// The rotors of `flight` under these values. Where speeds were measured, their difference from the
+    /// commanded speeds is smoothed first: the noise of a sensor, differentiated, would pass for spin-up.
     pub fn rotors(&self, flight: &Prepared, values: &[f64]) -> Rotors {
         let pose_s = SensorErrors::of(&self.parameters, values).pose_delay_s;
         if flight.flight.command.is_empty() {
@@ -166,7 +166,7 @@ struct Sides {
     angular_B: Vec<[f64; 3]>,
 }
 
-/// How the air moves: what the steady effects make of it, which is the same at every instant.
+/// Returns the motion of the air under the steady effects, which is the same at every instant.
 fn air(airframe: &Airframe, step_s: f64) -> Actuation {
     let count = airframe.vehicle().rotors.len();
     let rotors = PerRotor::filled(count, RotorState::default());

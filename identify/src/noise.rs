@@ -1,4 +1,4 @@
-//! What sensors scatter, and what follows from it for a prediction that starts at a measured state.
+//! Noise of sensors, and the error that it makes in a prediction that starts at a measured state.
 
 use crate::prepared::Prepared;
 use flights::{Channel, Flight};

@@ -1,5 +1,5 @@
-//! The noise of an equation's residual: autoregressive, so that what is slow and what the windows share counts as what
-//! it is.
+//! The noise of an equation's residual: autoregressive, so that slow noise, and noise that windows share, is weighed
+//! correctly.
 //!
 //! A vehicle is flown by feedback: the controller answers a slow disturbance, so that command and disturbance are
 //! correlated, and least squares that takes the residual for white finds too little torque gain. The direct method is
@@ -54,7 +54,7 @@ impl NoiseModel {
         model
     }
 
-    /// The variance of what cannot be predicted from the samples before.
+    /// The variance of the part that cannot be predicted from the samples before.
     pub fn innovation_variance(&self) -> f64 {
         self.predictors[self.predictors.len() - 1].1
     }

@@ -1,6 +1,6 @@
-//! Least squares over blocks of time: normal equations that remember which stretch of which flight they are from.
+//! Least squares over blocks of time: normal equations with the stretch of the flight that they are from.
 //!
-//! Residuals of neighbouring windows are correlated, so what is counted as independent are blocks of time: the
+//! Residuals of neighbouring windows are correlated, so blocks of time count as independent, not windows: the
 //! covariance of a fit is the jackknife over them.
 #![allow(
     clippy::disallowed_types,
@@ -113,9 +113,10 @@ pub fn inverse(gram: &DMatrix<f64>) -> DMatrix<f64> {
 }
 
 /// The covariance of the parameters fitted on `blocks`, at whose solution the blocks are given: the jackknife over
-/// blocks. Each block is left out in turn and the others are solved again (one linear step); what the solutions scatter,
-/// times the number of blocks, is the variance (CV3 of MacKinnon, Nielsen and Webb, J. Econometrics 232(2), 2023). A
-/// sandwich of the same blocks is too short where a few violent ones hold most of the evidence.
+/// blocks. Each block is left out in turn and the others are solved again (one linear step). The scatter of the
+/// solutions, times the number of blocks, is the variance (CV3 of MacKinnon, Nielsen and Webb, J. Econometrics
+/// 232(2), 2023). A sandwich of the same blocks is too short where a few violent ones hold most of the
+/// evidence.
 pub fn covariance(blocks: &[Block]) -> DMatrix<f64> {
     let total = sum(blocks);
     let size = total.gradient.len();

@@ -1,7 +1,7 @@
-//! What identification may change: the parameters of all candidate effects, in one list.
+//! Parameters that identification may change: those of all candidate effects, in one list.
 //!
 //! Effects of the plant's catalogue and those of sensors carry their bounds and neutral values with them. Stochastic
-//! effects are no candidates, for they have no course that a fit could follow: what they leave is reported as
+//! effects are not candidates, since no fit can follow their course: the residual that they cause is reported as
 //! unexplained.
 
 use crate::sensor_effects::SENSOR_EFFECTS;
@@ -17,13 +17,13 @@ pub struct Parameter {
     pub index: usize,
     /// The value of the baseline model.
     pub baseline: f64,
-    /// How far a plausible value is from none.
+    /// Size of a plausible change from the neutral value.
     pub scale: f64,
     /// A change that is small and yet well above rounding.
     pub step: f64,
 }
 
-/// All parameters, and what is not fitted of the plant's effects.
+/// Parameters of all candidates, and the values of the plant's effects that are not fitted.
 #[derive(Debug, Clone)]
 pub struct Parameters {
     /// The parameters.
@@ -96,7 +96,7 @@ impl Parameters {
 }
 
 impl Parameter {
-    /// What files say of it.
+    /// Returns its specification, with unit and bounds.
     pub fn spec(&self) -> &'static ParameterSpec {
         &self.kind.parameters[self.index]
     }

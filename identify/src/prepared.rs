@@ -20,13 +20,13 @@ use vehicles::{CommandMap, MotorModel, ROTORS_MAX, Vehicle};
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Equation {
-    /// What the accelerometer reads, in B: forces.
+    /// Specific force in B, read by the accelerometer: forces.
     SpecificForce,
     /// Acceleration in W, from position or else from velocity: forces and gravity.
     Acceleration,
     /// Angular acceleration in B, from the gyroscope or else from the attitude: torques.
     AngularAcceleration,
-    /// What the gyroscope reads against the attitude's rate of change, in B: the sensors alone.
+    /// Angular velocity in B from the gyroscope against the attitude's rate of change: the sensors alone.
     Gyroscope,
     /// Measured speeds of the rotors against those that follow from the commands.
     /// It has so many rotors.
@@ -37,13 +37,13 @@ pub enum Equation {
 pub type EachRotor = [f64; ROTORS_MAX];
 
 impl Equation {
-    /// How many components it has.
+    /// Returns the number of its components.
     #[must_use]
     pub fn size(self) -> usize {
         if let Equation::RotorSpeed(count) = self { count } else { 3 }
     }
 
-    /// What reports call it.
+    /// Returns its name in reports.
     #[must_use]
     pub fn name(self) -> &'static str {
         self.name_and_unit().0
@@ -93,7 +93,7 @@ impl Translation {
     }
 }
 
-/// How the channels of a flight are read.
+/// Grid, windows and equations with which a flight is read.
 #[derive(Debug, Clone)]
 pub struct Layout {
     /// The grid.
@@ -106,7 +106,7 @@ pub struct Layout {
     pub windows: Vec<(Window, Window)>,
 }
 
-/// What was measured, on the grid.
+/// Measured channels on the grid.
 #[derive(Debug, Clone)]
 pub struct Tracks {
     /// Position in W.
@@ -130,7 +130,7 @@ const END_MARGIN_S: f64 = 0.2;
 const GAP_MARGIN_S: f64 = 0.1;
 const WORTH: f64 = 0.9;
 
-/// Far below any tick, and above what is left of a time of which seconds since 1970 were taken off.
+/// Far below any tick, and above the rounding of times from which seconds since 1970 were subtracted.
 const SLACK_S: f64 = 1e-6;
 
 /// No rig lets a vehicle go further to the side.
@@ -141,9 +141,9 @@ const RIG_M: f64 = 0.3;
 pub struct Prepared<'f> {
     /// The flight.
     pub flight: &'f Flight,
-    /// How it is read.
+    /// Its layout.
     pub layout: Layout,
-    /// What its pose is late by, beyond what `sensor-delay` has.
+    /// Lateness of its pose beyond that of `sensor-delay`.
     pub late: Lateness,
     /// Rotors whose measured speed is not believed.
     pub distrusted: [bool; ROTORS_MAX],
@@ -207,12 +207,12 @@ impl<'f> Prepared<'f> {
         }
     }
 
-    /// Whether its attitude or its rates were assumed instead of measured.
+    /// True if its attitude or its rates were assumed instead of measured.
     pub fn is_assumed(&self) -> bool {
         !self.flight.assumed.is_empty()
     }
 
-    /// Whether the vehicle moves further than any rig lets it.
+    /// True if the vehicle moves further to the side than any rig allows.
     pub fn moves_freely(&self) -> bool {
         let positions = &self.flight.position.values;
         (0..2).any(|axis| {
@@ -231,17 +231,17 @@ impl<'f> Prepared<'f> {
         Equation::RotorSpeed(self.flight.rotors)
     }
 
-    /// Where the rows of `equation` start within a knot.
+    /// Returns the index of the first row of `equation` within a knot.
     pub fn offset_of(&self, equation: Equation) -> Option<usize> {
         let at = self.layout.equations.iter().position(|known| *known == equation)?;
         Some(self.layout.equations[..at].iter().map(|equation| equation.size()).sum())
     }
 
-    /// What was measured, with the pose late by `pose_s` and the inertial unit by `imu_s`.
+    /// Returns the measured channels, with the pose late by `pose_s` and the inertial unit by `imu_s`.
     ///
-    /// The instants are those of the pose's stamps, so that another delay of the pose moves all but the pose: how a slow
-    /// and noisy channel's samples lie on the grid decides how much noise their interpolation leaves, and a fit would
-    /// move them to where that is least.
+    /// The instants are those of the pose's stamps, so another delay of the pose shifts all channels but the
+    /// pose. The noise that interpolation leaves depends on how the samples of a slow and noisy channel lie on
+    /// the grid. If the pose were shifted, a fit would move its samples to where that noise is least.
     pub fn tracks(&self, pose_s: f64, imu_s: f64) -> Tracks {
         let (flight, clock) = (self.flight, &self.layout.clock);
         let imu_s = imu_s - pose_s;
@@ -435,13 +435,15 @@ impl Propulsion {
     }
 }
 
-/// Whether a channel was sampled at each instant if it is `late_s` late; `None` where it is not, or was not logged.
+/// Returns for each instant whether a channel that is `late_s` late was sampled there; `None` if it is not late
+/// or not logged.
 fn sampled_if_late<const N: usize>(channel: &Channel<N>, late_s: f64, clock: &Clock) -> Option<Vec<bool>> {
     (late_s != 0.0 && !channel.is_empty()).then(|| Track::sampled(channel, late_s, clock).valid)
 }
 
-/// Whether a channel was sampled at each instant, and at `gap_margin_s` before and after it; not at its ends. `None` where
-/// it is not compared, or was not logged.
+/// Returns for each instant whether a channel was sampled there, and at `gap_margin_s` before and after it.
+/// Instants at the channel's ends do not count as sampled. `None` if the channel is not compared, or was not
+/// logged.
 fn sampled_about<const N: usize>(
     channel: &Channel<N>,
     is_compared: bool,
@@ -476,7 +478,8 @@ impl<'c> Held<'c> {
         Self { channel, next: 0 }
     }
 
-    /// What holds at `at_s`; times have to grow from call to call. Before the first sample, the first.
+    /// Returns the sample that holds at `at_s`, before the first sample the first. Times have to grow from call
+    /// to call.
     pub fn at(&mut self, at_s: f64) -> EachRotor {
         // Times are differences of decimal fractions since 1970: the slack puts an instant on its own sample.
         while self.next < self.channel.time_s.len() && self.channel.time_s[self.next] <= at_s + SLACK_S {
@@ -497,7 +500,7 @@ impl<'c> Held<'c> {
         std::array::from_fn(|i| before[i] + part * (after[i] - before[i]))
     }
 
-    /// The mean of what holds from `from_s` to `to_s`; times have to grow from call to call.
+    /// The mean of the held values from `from_s` to `to_s`; times have to grow from call to call.
     pub fn mean(&mut self, from_s: f64, to_s: f64) -> EachRotor {
         let (mut at_s, mut sum) = (from_s, [0.0; ROTORS_MAX]);
         loop {
@@ -519,7 +522,7 @@ impl<'c> Held<'c> {
     }
 }
 
-/// Whether accelerations come from the velocity.
+/// True if accelerations come from the velocity.
 fn of_velocity(flight: &Flight) -> bool {
     uses_pose(flight) && flight.position.is_empty()
 }
@@ -582,7 +585,7 @@ fn common_span(flight: &Flight, equations: &[Equation]) -> Option<(f64, f64)> {
         .filter(|(start, end)| end > start)
 }
 
-/// The longest of the periods of what is compared.
+/// The longest of the periods of the compared channels.
 fn slowest_period_s(flight: &Flight) -> Option<f64> {
     let periods = [
         flight.position.period_s(),

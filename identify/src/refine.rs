@@ -1,9 +1,10 @@
 //! Refinement by prediction errors: the accepted parameters moved to where predictions are best.
 //!
-//! Equations see each instant alone; where a vehicle has more than they hold (a log that misses commands, torques that no
-//! effect has), the parameters that explain most of their rows are not those that predict best (Ljung, System
-//! Identification, 2nd ed., sections 3.2 and 7.2). So the fit of the equations is moved on, by least squares of
-//! the errors at the ends of windows, and taken if it predicts better what it was not moved on.
+//! Equations see each instant alone. A vehicle may have more than they hold (a log that misses commands,
+//! torques that no effect has). Then the parameters that explain most of their rows are not those that predict
+//! best (Ljung, System Identification, 2nd ed., sections 3.2 and 7.2). So the fit of the equations is moved on,
+//! by least squares of the errors at the ends of windows. It is taken if it predicts flights better on which it
+//! was not moved.
 #![allow(
     clippy::disallowed_types,
     reason = "not in a component: reports of flights, whose products are summed by hand"
@@ -138,7 +139,7 @@ impl Refinement<'_, '_> {
         self.residuals(flights, values).iter().flatten().flat_map(|(_, row)| row).map(|r| loss(*r)).sum()
     }
 
-    /// Residuals in units of what persistence errs by.
+    /// Residuals in units of persistence's errors.
     fn residuals(&self, flights: &[&Prepared], values: &[f64]) -> Vec<Residuals> {
         let jobs: Vec<(&Prepared, f64)> =
             flights.iter().flat_map(|flight| HORIZONS_S.map(|horizon_s| (*flight, horizon_s))).collect();
@@ -198,7 +199,7 @@ impl Refinement<'_, '_> {
         (blocks, 6 * now.iter().map(Vec::len).sum::<usize>())
     }
 
-    /// The result at `values`; what was not moved keeps its variance.
+    /// The result at `values`; parameters that were not moved keep their variance.
     fn result(&self, fitted: &FitResult, values: Vec<f64>, blocks: &[Block]) -> FitResult {
         let of_moved = normal::covariance(blocks);
         let place = |at: &usize| self.free.iter().position(|free| free == at);

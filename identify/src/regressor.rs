@@ -1,4 +1,4 @@
-//! What a vehicle was doing at the knots of its flight, to look at residuals against.
+//! Quantities of a vehicle's motion at the knots of its flight, to plot residuals against.
 
 use crate::model::Model;
 use crate::prepared::Prepared;

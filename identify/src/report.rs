@@ -1,4 +1,4 @@
-//! What identification found, for programs (`report.json`) and for people.
+//! Results of an identification, for programs (`report.json`) and for people.
 
 use crate::align::Offsets;
 use crate::candidate::Unidentifiable;
@@ -34,8 +34,8 @@ pub struct Report {
     pub effects: BTreeMap<&'static str, EffectReport>,
     /// The residuals on the validation data.
     pub whiteness: BeforeAfter<BTreeMap<&'static str, Whiteness>>,
-    /// Clocks of each flight: attitude, position and velocity against the inertial unit; `null` where it has not what
-    /// that takes, or too little of it.
+    /// Clocks of each flight: attitude, position and velocity against the inertial unit; `null` where the
+    /// flight lacks the channels, or has too little of them.
     pub time_offsets_s: BTreeMap<String, Offsets>,
     /// Faulty channels and actuators, flight by flight.
     pub faults: Vec<Fault>,
@@ -49,9 +49,9 @@ pub struct Report {
     pub fitted: Changes,
     /// White noise of each channel, and the prediction error that it alone makes at each horizon.
     pub noise_floor: BTreeMap<&'static str, Noise>,
-    /// What no candidate explains: the size of the part of the residual that is not noise, by equation.
+    /// Root mean square of the part of the residual that is not noise and that no candidate explains, by equation.
     pub unexplained: BTreeMap<&'static str, Unexplained>,
-    /// Effects that these flights cannot show, or sensors' parts of them, and what they would need.
+    /// Effects, or sensors' parts of them, that these flights cannot show, and the data that would be needed.
     pub not_identifiable: Vec<Unidentifiable>,
     /// Length of the blocks that count as independent.
     pub block_s: f64,
@@ -75,35 +75,35 @@ pub struct FlightReport {
     pub name: String,
     /// `fit`, `select` or `test`.
     pub role: flights::Role,
-    /// Length of what was compared, in s.
+    /// Length of the compared part, in s.
     pub compared_s: f64,
     /// Width of the windows in which measurement and model are compared, in s.
     pub window_s: f64,
     /// The equations that its channels allow.
     pub equations: Vec<&'static str>,
-    /// What was assumed instead of measured.
+    /// Assumptions in place of measurements.
     pub assumed: Vec<String>,
-    /// What the reader noticed.
+    /// Notes of the reader.
     pub notes: Vec<String>,
 }
 
 /// An effect as it came out.
 #[derive(Debug, Clone, Serialize)]
 pub struct EffectReport {
-    /// Whether it was accepted.
+    /// True if it was accepted.
     pub accepted: bool,
-    /// Whether its parameters and its gain are what the linearised equations promise, and not those of a fit.
+    /// True if its parameters and its gain come from the linearised equations, not from a fit.
     pub linearised: bool,
     /// Its fitted parameters.
     pub parameters: BTreeMap<&'static str, Estimate>,
-    /// Weighted root mean square of the residual on the validation data, in units of what all candidates together leave:
-    /// without and with it.
+    /// Weighted root mean square of the residual on the validation data, without and with it, in units of the
+    /// residual that all candidates together leave.
     pub held_out: BeforeAfter<f64>,
     /// Chance of as much gain without it, by resampled blocks.
     pub chance: f64,
     /// Effects that would do as well in its place.
     pub confused_with: Vec<&'static str>,
-    /// The experiment that would tell it from them.
+    /// The experiment that would separate it from them.
     pub experiment: Option<String>,
 }
 
@@ -118,9 +118,9 @@ pub struct Estimate {
     pub low: f64,
     /// Upper end.
     pub high: f64,
-    /// Whether the estimate stopped at the greatest or least value that the effect may have.
+    /// True if the estimate stopped at the greatest or least value that the effect may have.
     pub at_bound: bool,
-    /// Whether these flights say anything of it: its interval does not hold all that the effect may be.
+    /// True if these flights determine it: its interval does not cover all values that the effect may have.
     pub determined: bool,
 }
 
@@ -152,12 +152,12 @@ const ENOUGH_BLOCKS: usize = 12;
 const WORSE: f64 = 1.2;
 
 impl Report {
-    /// Whether the verdict is empty only because the validation data are short.
+    /// True if the verdict is empty and the validation data are too short to accept an effect.
     fn is_undecided(&self) -> bool {
         self.verdict.is_empty() && self.validation_blocks < ENOUGH_BLOCKS
     }
 
-    /// What was assumed and noticed, each with its flights.
+    /// Returns assumptions and the reader's notes, each with its flights.
     fn notes(&self) -> Vec<(&str, Vec<&str>)> {
         let mut notes: Vec<(&str, Vec<&str>)> = Vec::new();
         for flight in &self.flights {
@@ -251,7 +251,7 @@ impl Report {
         })
     }
 
-    /// The answer where predictions lose: no verdict, and what to measure.
+    /// The answer where predictions lose: no verdict, but advice what to measure.
     fn write_losses(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "\nverdict: this vehicle file does not describe these flights. Its predictions lose:")?;
         for Loss { flight, horizon, channel, rival, new, other, unit } in &self.losses {

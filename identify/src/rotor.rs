@@ -45,7 +45,7 @@ pub use report::RotorReport;
 pub use score::{LEVEL, Score};
 pub use statics::{Plausibility, Statics};
 
-/// What came of a stand.
+/// Results of a stand's identification.
 #[derive(Debug, Clone)]
 pub struct Found {
     /// Everything that was found.

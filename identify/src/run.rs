@@ -33,15 +33,15 @@ const POSE_BOX_S: f64 = 0.04;
 /// A residual is worth telling where its persistent part is beyond this part of its noise.
 const UNEXPLAINED: f64 = 0.3;
 
-/// Samples of motion that are further apart, on average, say nothing about it; what is computed tick by tick would cost
-/// time and memory beyond what there is to compare.
+/// Greatest mean distance of samples of motion: beyond it they show nothing, and the computation of every tick
+/// would cost more time and memory than the comparison is worth.
 const SPACING_MAX_S: f64 = 0.5;
 
 /// The experiment for two effects of which no better one is known.
 const OTHER_FLIGHTS: &str =
     "fly manoeuvres in which the two differ: other speeds, rates, heights or loads than in these flights";
 
-/// Why flights cannot be identified on.
+/// Reason why flights cannot be used for identification.
 ///
 /// ```
 /// let vehicle = "../vehicles/hummingbird.toml".into();
@@ -64,7 +64,7 @@ pub enum IdentifyError {
     },
 }
 
-/// What was found, with what is needed to draw it.
+/// Results of an identification, with the data that their plots need.
 #[derive(Debug)]
 pub struct Outcome {
     /// The report.
@@ -73,9 +73,10 @@ pub struct Outcome {
     pub effects: Vec<Effect>,
     /// Residuals for pictures: by flight and equation.
     pub pictures: Vec<Picture>,
-    /// What each flight did meanwhile, by name: at the same instants as its pictures.
+    /// Regressors of each flight, by name: at the same instants as its pictures.
     pub regressors: BTreeMap<String, Vec<Regressor>>,
-    /// What the alignment took off each flight, by name; for the flights before they are flown again.
+    /// Lateness that the alignment found in each flight, by name; to be removed from the flights before they
+    /// are simulated again.
     pub late: BTreeMap<String, Lateness>,
     /// Accepted delays and biases of sensors, for the same.
     pub sensor_errors: SensorErrors,
@@ -83,7 +84,7 @@ pub struct Outcome {
     pub believed: Option<FlightSet>,
 }
 
-/// The residuals of one equation of one flight, before and after, and what was measured.
+/// The residuals of one equation of one flight, before and after, and the measured values.
 #[derive(Debug)]
 pub struct Picture {
     /// The flight.
@@ -94,7 +95,7 @@ pub struct Picture {
     pub equation: Equation,
     /// Middles of the windows, in s.
     pub time_s: Vec<f64>,
-    /// What was measured, by component.
+    /// Measured values, by component.
     pub measured: Vec<Vec<f64>>,
     /// Residual of the declared model.
     pub before: Vec<Vec<f64>>,
@@ -102,7 +103,7 @@ pub struct Picture {
     pub after: Vec<Vec<f64>>,
 }
 
-/// Identifies what the flights of `set` show beyond their vehicle file; `progress` hears of each step.
+/// Identifies the effects that the flights of `set` show beyond their vehicle file; `progress` is told each step.
 ///
 /// # Errors
 /// If the vehicle file cannot be read, or no flight of a role can be used.
@@ -162,7 +163,7 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
     Ok(Outcome { pictures, regressors, effects, late, sensor_errors, report, believed })
 }
 
-/// The errors of flights whose attitude was measured: under an assumed one a prediction says nothing of the vehicle.
+/// The errors of flights whose attitude was measured: under an assumed one a prediction does not judge the vehicle.
 fn of_measured_attitude(problem: &Problem, errors: &Changes) -> Changes {
     let is_measured =
         |name: &str| problem.flights().any(|flight| flight.flight.name == name && !flight.is_assumed());
@@ -432,7 +433,7 @@ fn accepted_effects(
     }
 }
 
-/// Effects of slowly logged commands, with intervals that hold all that they can be.
+/// Effects of slowly logged commands, with intervals that cover all values that they may have.
 fn undetermined_effects(
     problem: &Problem,
     selection: &Selection,

@@ -1,4 +1,4 @@
-//! Attribution: which candidates the flights ask for, one after the other.
+//! Attribution: selection of the candidates that the flights support, one after the other.
 //!
 //! In each round every candidate is fitted, together with what was accepted before, on the estimation data, and judged
 //! on the validation data, or without these by cross-validation over blocks of the estimation data. It is accepted only if four things hold:
@@ -7,18 +7,18 @@
 //!    candidates of the round together (Bonferroni; one-sided percentile bootstrap over blocks, Efron 1979).
 //! 2. Its parameters together differ from their baselines beyond chance on the estimation data, at the same level.
 //! 3. The gain matters: it is at least [`LEAST_GAIN`] of the squared error.
-//! 4. It is not for an effect of which more is asked than it can be: not all parameters that moved stopped at a bound.
+//! 4. The effect is not asked for more than it can be: not all parameters that moved stopped at a bound.
 //!
-//! Of the accepted the one with the greatest gain is taken, but one with fewer parameters where the difference is not
-//! beyond chance. Then those taken before have to pass the first test again, as a later effect may explain what an
-//! earlier one stood in for.
+//! Of the accepted the one with the greatest gain is taken, or one with fewer parameters if the difference is not
+//! beyond chance. Then those taken before have to pass the first test again, as a later effect may explain the
+//! residual that an earlier one explained by mistake.
 //!
 //! In the end effects are withdrawn, and the search goes on without them: those of which a parameter stopped at a bound, those
 //! that are no longer beyond chance beside the others, and those without which predictions are better (`foresight`).
 //!
-//! Where a round accepts nothing although much is left that candidates together would take away, two are looked for that
-//! only gain together, under the same tests; the chance of a false acceptance in that search is [`FALSE_RATE`] once more.
-//! The rounds end when nothing changes any more.
+//! If a round accepts nothing although all candidates together would reduce the cost much, pairs are tried that
+//! gain only together. They face the same tests; the chance of a false acceptance in that search is
+//! [`FALSE_RATE`] once more. The rounds end when nothing changes any more.
 
 use crate::candidate::{Candidate, free_parameters};
 use crate::fit::{FitResult, Problem};
@@ -32,16 +32,16 @@ use plant::effects::EffectKind;
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// A smaller part of the squared error does not matter, however certain it is: what the comparison itself leaves at
-/// its joints is of the order of a tenth of it.
+/// A smaller part of the squared error does not matter, however certain it is: the comparison's own error at its
+/// joints is of the order of a tenth of it.
 const LEAST_GAIN: f64 = 0.002;
-/// A smaller part of a plausible value is none worth naming.
+/// A smaller part of a plausible value is not worth naming.
 const LEAST_PART: f64 = 0.01;
 /// Chance of a false acceptance in a round.
 const FALSE_RATE: f64 = 0.01;
 /// Two candidates whose difference is within this one-sided level cannot be told apart.
 const CONFOUNDED_LEVEL: f64 = 0.05;
-/// So many candidates of a round are fitted in earnest.
+/// Number of candidates of a round that are fitted fully.
 const CONFIRMED: usize = 4;
 /// A confounded effect has at least this part of the gain.
 const NEAR: f64 = 0.5;
@@ -50,7 +50,7 @@ const ROUNDS_MAX: usize = 12;
 /// Two that mask each other are looked for where this many times the cost is left that all candidates together
 /// would leave on the estimation data.
 const MUCH_LEFT: f64 = 1.5;
-/// So many candidates are tried as the first of two.
+/// Number of candidates that are tried as the first of two.
 const FIRSTS: usize = 4;
 
 /// A candidate that was fitted and judged.
@@ -64,11 +64,11 @@ pub struct Judged {
     pub gain: f64,
     /// Chance of as much without the effect.
     pub p_value: f64,
-    /// Whether it was accepted.
+    /// True if it was accepted.
     pub is_accepted: bool,
     /// True if it would be, but for the logging of the commands, which explains it.
     pub is_logging: bool,
-    /// Whether `fitted` is no fit but what the linearised equations promise.
+    /// True if `fitted` comes from the linearised equations, not from a fit.
     pub is_promise: bool,
 }
 
@@ -77,12 +77,12 @@ pub struct Judged {
 pub struct Round {
     /// Everything judged in it.
     pub judged: Vec<Judged>,
-    /// Which of it was taken.
+    /// Index of the one that was taken.
     pub taken: Option<usize>,
 }
 
 impl Round {
-    /// What was taken.
+    /// Returns the candidate that was taken.
     pub fn taken(&self) -> Option<&Judged> {
         self.taken.map(|at| &self.judged[at])
     }
@@ -97,14 +97,14 @@ pub struct Withdrawn {
     pub reason: String,
 }
 
-/// What a selection came to.
+/// Result of a selection.
 #[derive(Debug, Clone)]
 pub struct Selection {
-    /// What was accepted, in order.
+    /// Accepted candidates, in order.
     pub accepted: Vec<Candidate>,
     /// The declared model.
     pub before: FitResult,
-    /// The model with all that was accepted.
+    /// The model with all accepted effects.
     pub after: FitResult,
     /// The same, refined by prediction errors; `None` where that does not predict better.
     pub refined: Option<FitResult>,
@@ -161,7 +161,7 @@ pub fn select(problem: &mut Problem, candidates: &[Candidate], progress: &mut dy
     Selection { accepted, before, after, refined, rounds, withdrawn }
 }
 
-/// How far a selection has come.
+/// State of a selection.
 struct StepwiseSearch {
     accepted: Vec<Candidate>,
     rounds: Vec<Round>,
@@ -245,7 +245,7 @@ impl StepwiseSearch {
         }
     }
 
-    /// Accepts what the last round took.
+    /// Accepts the candidate that the last round took.
     fn take(&mut self, problem: &Problem) -> bool {
         let Some(taken) = self.rounds.last().and_then(Round::taken).cloned() else { return false };
         self.accepted.push(taken.candidate);
@@ -254,7 +254,7 @@ impl StepwiseSearch {
     }
 
     /// Accepts two that only gain together: of two strong effects each can make the blocks worse in which the other
-    /// acts. The firsts that are tried are chosen on the estimation data, the second in a round with the first, and then
+    /// acts. The firsts that are tried are chosen on the estimation data, the second in a round with the first. Then
     /// the first has to pass a round with the second.
     fn take_two(&mut self, problem: &Problem, candidates: &[Candidate]) -> bool {
         let Some(last) = self.rounds.last() else { return false };
@@ -368,8 +368,8 @@ fn judged(
     }
 }
 
-/// Whether one of its parameters is large enough to be more than an artefact of the grid: a delay of more than half a
-/// step, anything else at least [`LEAST_PART`] of what is plausible.
+/// True if one of its parameters is too large to be an artefact of the grid: a delay of more than half a step,
+/// or another parameter of more than [`LEAST_PART`] of a plausible change.
 fn is_seen(problem: &Problem, candidate: &Candidate, fitted: &FitResult) -> bool {
     candidate.free.iter().any(|at| {
         let entry = &problem.model.parameters.all[*at];
@@ -378,8 +378,8 @@ fn is_seen(problem: &Problem, candidate: &Candidate, fitted: &FitResult) -> bool
     })
 }
 
-/// Whether every parameter that moved stopped at a bound: then more is asked for than the effect can be, and so another
-/// is at work.
+/// True if every parameter that moved stopped at a bound: the flights ask for more than the effect can be, so another
+/// effect is at work.
 #[allow(clippy::float_cmp, reason = "values that stop at a bound are the bound")]
 fn is_beyond_bounds(problem: &Problem, candidate: &Candidate, fitted: &FitResult) -> bool {
     candidate.free.iter().all(|at| {
@@ -460,12 +460,12 @@ fn best(problem: &Problem, judged: &[Judged]) -> Option<usize> {
     accepted.iter().filter(is_alike).min_by(|a, b| size(**a).cmp(&size(**b)).then(by_gain(b, a))).copied()
 }
 
-/// Whether `fitted` is worse on the validation data than `other`, beyond chance.
+/// True if `fitted` is worse on the validation data than `other`, beyond chance.
 fn is_worse(fitted: &FitResult, other: &FitResult) -> bool {
     p_value(&fitted.validation_costs, &other.validation_costs) < CONFOUNDED_LEVEL
 }
 
-/// Takes back what no longer gains anything.
+/// Takes back effects that no longer gain anything.
 fn without_idle(problem: &Problem, mut base: FitResult, accepted: &mut Vec<Candidate>) -> FitResult {
     let mut at = 0;
     // The newest has just passed.
@@ -481,7 +481,7 @@ fn without_idle(problem: &Problem, mut base: FitResult, accepted: &mut Vec<Candi
     base
 }
 
-/// What the linearised equations promise of each candidate.
+/// Linearised equations from which the fit of each candidate is predicted.
 struct Screen {
     columns: Vec<usize>,
     estimation: Vec<normal::Block>,
@@ -537,7 +537,7 @@ pub fn confounded(problem: &Problem, selection: &Selection, at: usize) -> Vec<&'
     near.par_iter().filter(|candidate| is_alike(candidate)).map(|candidate| candidate.kind).collect()
 }
 
-/// The candidates of other effects that gained at least [`NEAR`] of what `candidate` did in the round that took it.
+/// The candidates of other effects with at least [`NEAR`] of the gain of `candidate`, in the round that took it.
 fn near<'s>(selection: &'s Selection, candidate: &Candidate) -> Vec<&'s Candidate> {
     let took = |round: &&Round| round.taken().is_some_and(|taken| taken.candidate == *candidate);
     let Some(round) = selection.rounds.iter().find(took) else { return Vec::new() };

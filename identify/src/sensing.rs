@@ -1,4 +1,4 @@
-//! What is wrong with a flight's sensors, and the flight as sensors without it would have logged it.
+//! Errors of a flight's sensors, and the flight as sensors without them would have logged it.
 
 use crate::clock::Lateness;
 use crate::parameter::Parameters;
@@ -27,12 +27,12 @@ pub struct SensorErrors {
     pub accelerometer_bias_m_s2: [f64; 3],
     /// Bias of the gyroscope in B, in rad/s.
     pub gyroscope_bias_rad_s: [f64; 3],
-    /// By how much the attitude sensor is turned in its mount about x and y of B, in rad.
+    /// Rotation of the attitude sensor in its mount about x and y of B, in rad.
     pub attitude_bias_rad: [f64; 2],
 }
 
 impl SensorErrors {
-    /// Those of `values`.
+    /// Creates the errors from `values`.
     pub fn of(parameters: &Parameters, values: &[f64]) -> Self {
         let [pose_delay_s, ..] = parameters.values_of(&POSE_DELAY, values);
         let [inertial_delay_s, ..] = parameters.values_of(&IMU_DELAY, values);
@@ -48,13 +48,13 @@ impl SensorErrors {
         }
     }
 
-    /// What turns a vector of the vehicle's B into the frame that the attitude sensor takes for it.
+    /// Returns the rotation from the vehicle's B to the frame that the attitude sensor takes for B.
     pub fn mounting(&self) -> UnitQuaternion<f64> {
         let [x, y] = self.attitude_bias_rad;
         UnitQuaternion::from_scaled_axis(-Vector3::new(x, y, 0.0))
     }
 
-    /// `flight` without these errors, and without what it is `late` by besides.
+    /// Returns `flight` without these errors and without the lateness `late`.
     pub fn taken_off(&self, flight: &Flight, late: &Lateness) -> Flight {
         let mut flight = flight.clone();
         earlier(&mut flight.position, self.pose_delay_s + late.position_s);

@@ -1,4 +1,4 @@
-//! What is wrong with sensors, as effects beside the plant's: they change nothing that flies, but what flights show.
+//! Errors of sensors, as effects beside the plant's: they change the logs of a flight, not its motion.
 
 use diagnostics::unit::{ACCELERATION, ANGLE, SPEED, TIME};
 use plant::effect_parameters;
@@ -9,7 +9,7 @@ pub const SENSOR_DELAY: &str = "sensor-delay";
 /// The bias of sensors, as an effect.
 pub const SENSOR_BIAS: &str = "sensor-bias";
 
-/// All of them, each a part that makes sense alone; several have a name in common.
+/// Effects of sensors, each a part that makes sense alone; several share a name.
 pub static SENSOR_EFFECTS: [&EffectKind; 5] =
     [&POSE_DELAY, &IMU_DELAY, &ACCELEROMETER_BIAS, &GYROSCOPE_BIAS, &ATTITUDE_BIAS];
 
@@ -54,7 +54,7 @@ pub static ACCELEROMETER_BIAS: EffectKind =
 /// The gyroscope's bias.
 pub static GYROSCOPE_BIAS: EffectKind =
     EffectKind { parameters: Gyroscope::SPECS, needs: &[Quantity::TwoRotations], ..BIAS };
-/// How the attitude's sensor is turned in its mount.
+/// Rotation of the attitude's sensor in its mount.
 pub static ATTITUDE_BIAS: EffectKind =
     EffectKind { parameters: Attitude::SPECS, needs: &[Quantity::TwoDirections], ..BIAS };
 

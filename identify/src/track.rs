@@ -12,9 +12,9 @@ const GAP_PERIODS: f64 = 3.5;
 /// A quantity on the grid.
 #[derive(Debug, Clone, Default)]
 pub struct Track<const N: usize> {
-    /// One value for each instant; what stands at an instant that is not valid means nothing.
+    /// One value for each instant; a value at an instant that is not valid means nothing.
     pub values: Vec<[f64; N]>,
-    /// Whether there were samples about the instant.
+    /// True for instants with samples about them.
     pub valid: Vec<bool>,
 }
 
@@ -63,7 +63,7 @@ impl<const N: usize> Track<N> {
     }
 }
 
-/// Whether all within `reach` instants to both sides are valid, so far as there are any.
+/// Returns for each instant whether all instants within `reach` to both sides are valid, so far as they exist.
 pub fn valid_about(valid: &[bool], reach: usize) -> Vec<bool> {
     let mut bad = vec![0_usize];
     for is_valid in valid {

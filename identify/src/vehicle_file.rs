@@ -56,7 +56,7 @@ fn replace_tables(document: &mut DocumentMut, upper: &str) {
     }
 }
 
-/// Where a value comes from that is nominal for a vehicle of this size, and not of the Hummingbird.
+/// Source of a value that is nominal for a vehicle of this size, not for the Hummingbird.
 const SCALED: &str = "typical of a vehicle of this size (`scale_to` of the effect)";
 
 #[allow(clippy::float_cmp, reason = "a value that was not touched is the same")]

@@ -1,4 +1,4 @@
-//! What is left of a residual: whether it is noise, and how large the part of it is that is not.
+//! Whiteness of a residual: its test, and the size of the part that is not noise.
 
 use crate::fit::Problem;
 use crate::prepared::Equation;
@@ -17,7 +17,7 @@ const LAGS: usize = 25;
 pub struct Whiteness {
     /// Root mean square over all components.
     pub rms: f64,
-    /// The same without any model: of what was measured, less its mean over each flight.
+    /// The same without any model: of the measured values, less their mean over each flight.
     pub no_model: f64,
     /// Its unit.
     pub unit: &'static str,
@@ -27,7 +27,7 @@ pub struct Whiteness {
     /// Probability of as much autocorrelation in white noise (Ljung and Box), the least over components, times their
     /// number.
     pub p_value: f64,
-    /// Root mean square of what neighbouring windows have in common: the residual that is not noise.
+    /// Root mean square of the part that neighbouring windows have in common: the residual that is not noise.
     pub persistent: f64,
 }
 
@@ -53,7 +53,7 @@ pub fn whiteness(problem: &Problem, values: &[f64]) -> BTreeMap<&'static str, Wh
 struct Column {
     equation: Equation,
     residual: Vec<f64>,
-    /// Standard deviation of what was measured.
+    /// Standard deviation of the measured values.
     spread: f64,
 }
 

@@ -28,7 +28,7 @@ impl Window {
         Self(folded(&self.0, &stencil))
     }
 
-    /// How many instants it reaches to both sides of its knot.
+    /// Returns the number of instants that it covers on each side of its knot.
     pub fn reach(&self) -> usize {
         self.0.len() / 2
     }
@@ -58,9 +58,9 @@ pub fn central_difference(step_s: f64) -> [f64; 3] {
     [-part, 0.0, part]
 }
 
-/// What a second difference averages an acceleration by.
+/// Stencil by which a second difference averages an acceleration.
 pub const NUMEROV: [f64; 3] = [1.0 / 12.0, 10.0 / 12.0, 1.0 / 12.0];
-/// What a central difference averages a derivative by.
+/// Stencil by which a central difference averages a derivative.
 pub const SIMPSON: [f64; 3] = [1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0];
 
 fn folded(a: &[f64], b: &[f64]) -> Vec<f64> {

@@ -11,7 +11,7 @@ const NOISE: f64 = 3.5;
 const SEEDS: u64 = 10;
 
 /// The attitude's offset in both flights of a case whose pose is late by `late_s`: value, lower and upper end of its
-/// interval, and what was taken off.
+/// interval, and the part that was removed.
 fn offsets(seed: u64, late_s: f64) -> Vec<[f64; 4]> {
     let mut case = Case::null(seed, DURATION_S).with_noise(NOISE);
     case.plan.sensors.pose_ticks = 10;

@@ -189,7 +189,7 @@ fn commands_slower_than_the_motors_determine_no_lag_delay_or_inertia() {
     assert!(report.to_string().contains(note), "{report}");
 }
 
-/// Some of the commands of a controller at 500 Hz: they act late by half of the period, which is no effect.
+/// Some of the commands of a controller at 500 Hz: they act late by half of the period, which is not an effect.
 #[test]
 fn what_the_logging_of_commands_makes_is_not_named() {
     for every in [5, 20] {

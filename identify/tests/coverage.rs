@@ -8,7 +8,7 @@ use simulated::cases::Case;
 const CASES: u64 = 200;
 const DURATION_S: f64 = 8.0;
 
-/// Whether the intervals of the true effects' parameters hold the truth in the case of one seed.
+/// Tells for each parameter of the true effects whether its interval holds the truth, in the case of one seed.
 fn holds(seed: u64) -> Vec<(&'static str, bool)> {
     let mut case = Case::of(&["rotor-drag", "mass-error"], 1.0, seed, DURATION_S);
     case.plan.sensors.pose_ticks = 10;

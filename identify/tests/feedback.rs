@@ -1,5 +1,5 @@
-//! A slow disturbance under feedback is no inertia, and an inertia beside one is found. The whole table is made by
-//! `cargo run --release -p hummingbus-identify --example feedback`, see docs/validation.md.
+//! A slow disturbance under feedback is not taken for an inertia, and an inertia beside one is found. The whole
+//! table is made by `cargo run --release -p hummingbus-identify --example feedback`, see docs/validation.md.
 mod simulated;
 
 use rayon::prelude::*;

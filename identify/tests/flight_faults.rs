@@ -16,7 +16,7 @@ const COUNT: u64 = 6;
 /// The flight that gets a fault; the last is the one that is tested on.
 const FAULTY: usize = 2;
 
-/// Flights of a heavier vehicle with drag that nobody declared.
+/// Flights of a heavier vehicle with undeclared drag.
 fn flown(has_rotor_speeds: bool) -> FlightSet {
     static WITH: OnceLock<FlightSet> = OnceLock::new();
     static WITHOUT: OnceLock<FlightSet> = OnceLock::new();
@@ -43,7 +43,7 @@ fn found(set: &FlightSet) -> Vec<Fault> {
     faults(set).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// A fault of one flight is found there, once, as what it is.
+/// Requires that a fault of one flight is found there, once, and as that fault.
 #[track_caller]
 fn require(set: &FlightSet, channel: &str, kind: &str) -> Fault {
     let found = found(set);
@@ -75,7 +75,7 @@ fn each<const N: usize>(channel: &mut Channel<N>, change: impl Fn(&mut [f64; N])
     channel.values.iter_mut().for_each(change);
 }
 
-/// Repeats what the channel had at `from_s` until `to_s`.
+/// Repeats the channel's value at `from_s` until `to_s`.
 fn freeze<const N: usize>(channel: &mut Channel<N>, from_s: f64, to_s: f64, axes: &[usize]) {
     let first = channel.time_s.partition_point(|time_s| *time_s < from_s);
     let last = channel.time_s.partition_point(|time_s| *time_s < to_s);
@@ -92,7 +92,7 @@ fn flights_without_a_fault_have_none() {
     }
 }
 
-/// Whatever effect is true and undeclared, also at thrice the noise, it is no fault of a flight.
+/// A true but undeclared effect is never taken for a fault of a flight, also at thrice the noise.
 #[test]
 fn undeclared_effects_are_no_faults() {
     let cases: Vec<Case> = EFFECTS
@@ -310,7 +310,7 @@ fn commands_that_are_frozen_swapped_or_scaled() {
     }
 }
 
-/// Whatever the numbering of the logger: each order is found as the one that puts the columns right.
+/// Each order of the logged motors is found as the one that puts the columns right.
 #[test]
 fn every_order_of_the_motors_is_found() {
     let orders = (0..256_usize).map(|code| [code / 64, code / 16 % 4, code / 4 % 4, code % 4]);

@@ -1,4 +1,4 @@
-//! What can be logged differently: channels left out, slow, held, late, broken.
+//! Variations of the logging: channels left out, slow, held, late, broken.
 mod simulated;
 
 use flights::{Channel, Flight, FlightSet};
@@ -115,7 +115,7 @@ fn gaps_cost_time_and_nothing_else() {
     assert!(found.flights.iter().all(|flight| flight.compared_s < DURATION_S - 0.9), "{found}");
 }
 
-/// What a reader leaves of a channel that was logged more often than it was sampled: samples at uneven times.
+/// A reader leaves samples at uneven times of a channel that was logged more often than it was sampled.
 #[test]
 fn repeated_samples_left_out_do_not_matter() {
     let found = changed(&heavy_with_drag(18), |flight| {
@@ -130,8 +130,8 @@ fn repeated_samples_left_out_do_not_matter() {
     require_named(&found, &["mass-error", "rotor-drag"]);
 }
 
-/// Seconds since 1970, of which a reader takes off the first: what is left of the times is out by 0.1 us, and every command
-/// is found at its tick all the same.
+/// Seconds since 1970, from which a reader subtracts the first: the times that remain are out by 0.1 us, and
+/// yet every command is found at its tick.
 #[test]
 fn large_times_do_not_matter() {
     const SINCE_1970_S: f64 = 1.7e9;
@@ -199,7 +199,7 @@ fn differentiated(position: &Channel<3>) -> Channel<3> {
     Channel { time_s: time_s[inside.clone()].to_vec(), values: inside.map(slope).collect() }
 }
 
-/// Nobody can say which of the two is late.
+/// Without a gyroscope it is unknown which of the two is late.
 #[test]
 fn without_a_gyroscope_there_is_no_clock_to_be_late_against() {
     let found = changed(&heavy_with_drag(25), |flight| flight.angular_velocity = Channel::default());
@@ -259,7 +259,7 @@ fn in_a_calm_hover_mass_and_thrust_are_told_to_be_alike() {
     println!("{name}, confused with {:?}: {experiment}", found.effects[name].confused_with);
 }
 
-/// An old log from a rig, of which nobody knows that it is one, with commands that act 150 ms late.
+/// An old log from a rig that is not declared as one, with commands that act 150 ms late.
 fn riddle() -> Case {
     let mut case = Case::of(&["rig-pendulum", "bearing-friction"], 1.0, 24, 20.0);
     case.plan.truth = vec![
@@ -283,7 +283,7 @@ fn the_riddle_of_the_late_rig_is_solved() {
     }
 }
 
-/// How fast the rotors turn at the first sample, and what was commanded before it, nobody knows.
+/// The speeds of the rotors at the first sample, and the commands before it, are unknown.
 #[test]
 fn a_log_may_begin_in_mid_flight() {
     let found = changed(&riddle(), |flight| {
@@ -328,7 +328,7 @@ fn the_new_vehicle_file_has_the_bytes_that_were_fitted() {
     assert!(text.contains("mass = { value = 0.480,"), "{text}");
 }
 
-/// How high the centre of mass lies shows only where something pushes the vehicle to the side.
+/// The height of the centre of mass shows only if something pushes the vehicle to the side.
 #[test]
 fn what_flights_do_not_determine_is_said() {
     let mut case = Case::of(&["com-offset"], 0.3, 26, DURATION_S);

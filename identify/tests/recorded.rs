@@ -34,7 +34,7 @@ command = { field = "rotor_speed_commanded", unit = "rad/s" }
 
 const VEHICLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
 
-/// What the stand reads of rotor `number` at a second of rest, and at eight speeds for three seconds each.
+/// Returns the stand's readings of rotor `number`: two seconds at rest, then eight speeds for three seconds each.
 fn loads(number: usize) -> Vec<RotorLoad> {
     let rpm = [1500.0, 3900.0, 2600.0, 5000.0, 3900.0, 6500.0, 3200.0, 4500.0];
     let speeds: Vec<_> = rpm

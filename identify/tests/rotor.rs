@@ -1,5 +1,5 @@
 //! Stands of known rotors: the truth lies in the intervals as often as they promise, and the right order is chosen.
-//! The stand of esc-test: what it says, and what is wrong with it.
+//! The stand of esc-test: its figures and its faults.
 
 #[path = "../../tests/runs/skipped.rs"]
 mod skipped;
@@ -59,7 +59,7 @@ fn static_log(draws: &mut Draws, sign_of_torque: f64) -> String {
     text
 }
 
-/// A motor 1 / (a2 s^2 + a1 s + 1) and what it is doing.
+/// A motor 1 / (a2 s^2 + a1 s + 1) and its present motion.
 struct Motor {
     a1_s: f64,
     a2_s2: f64,
@@ -418,7 +418,7 @@ fn esc_test(stand: &str) -> Option<RotorReport> {
     Some(rotor::run(&path).unwrap().report)
 }
 
-/// Whether some finding of the report has `text`.
+/// True if the text of the report contains `text`.
 fn says(report: &RotorReport, text: &str) -> bool {
     report.to_string().contains(text)
 }

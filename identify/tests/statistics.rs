@@ -1,4 +1,4 @@
-//! The statistics say what SciPy and statsmodels say, and the intervals hold the truth as often as they promise.
+//! The statistics agree with SciPy and statsmodels, and the intervals hold the truth as often as they promise.
 
 #[path = "../../tests/runs/skipped.rs"]
 mod skipped;
@@ -102,7 +102,7 @@ fn ljung_box_rejects_white_noise_at_its_rate() {
     assert!(ljung_box(&remembering(300, 0.6, 5), 20).p_value < 1e-6);
 }
 
-/// How often the 95 % interval holds the mean, which is 0, of 400 samples that remember about four.
+/// Returns the share of 95 % intervals that hold the mean, which is 0, of 400 samples that remember about four.
 fn coverage(block: usize) -> f64 {
     const CASES: u64 = 300;
     let how = |seed| Bootstrap { block, resamples: 400, seed, level: 0.95 };

@@ -1,17 +1,17 @@
-//! What acts on an airframe over a tick.
+//! Actuation of an airframe over a tick, and its battery.
 
 use crate::saved::saved_fields;
 use crate::state::PerRotor;
 use nalgebra::Vector3;
 
-/// What acts on an airframe over one tick.
+/// Actuation of an airframe over one tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Actuation {
     /// Rotor speeds that the motors are asked for.
     pub targets_rad_s: PerRotor<f64>,
-    /// How the air moves.
+    /// Velocity of the air.
     pub air_velocity_W_m_s: Vector3<f64>,
-    /// By which part of itself the thrust of each rotor is more than it should be.
+    /// Relative deviation of the thrust of each rotor.
     pub thrust_deviation: PerRotor<f64>,
 }
 
@@ -38,6 +38,6 @@ pub struct Battery {
     pub voltage_V: f64,
     /// Current drawn.
     pub current_A: f64,
-    /// What is left of the capacity, 0 to 1.
+    /// Share of the capacity that is left, 0 to 1.
     pub charge: f64,
 }

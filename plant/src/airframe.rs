@@ -1,10 +1,11 @@
-//! The airframe: what the motors, the rotors, the air and the effects do to the body. Every backend moves the body
+//! The airframe: the forces and torques on the body by motors, rotors, air and effects. Every backend moves the body
 //! by the forces that this room gives.
 //!
 //! A backend owns a [`State`] and an [`AirframeState`]. Once per tick it calls [`Airframe::begin_tick`], which
-//! advances the effects' states and settles what changes slowly against a tick, the [`Actuation`]: commands, how the
-//! air moves, the battery. The rest is a function of actuation and state, evaluated at every stage of an integrator. Mass, inertia
-//! and rotors are those of [`Airframe::vehicle`], which is the vehicle as it flies, its effects included.
+//! advances the effects' states and fixes the slow quantities for the tick, the [`Actuation`]: commands, motion
+//! of the air, the battery. The rest is a function of actuation and state, evaluated at every stage of an
+//! integrator. Mass, inertia and rotors are those of [`Airframe::vehicle`], which is the vehicle as it flies,
+//! its effects included.
 //!
 //! ```
 //! # use plant::{Airframe, PerRotor, RigidBody, RotorState, State};
@@ -61,7 +62,7 @@ impl Airframe {
     /// The airframe of `vehicle` with the effects of its file, and behind them those of a scene's.
     ///
     /// # Errors
-    /// What is wrong with an effect, and where.
+    /// The fault of an effect, and its place.
     pub fn from_files(vehicle: Vehicle, scene: &[EffectEntry]) -> Result<Self, Diagnostic> {
         let entries: Vec<_> = vehicle.effects.iter().chain(scene).cloned().collect();
         let airframe = Self::with_effects(vehicle, entry::resolve(&entries)?);
@@ -88,13 +89,13 @@ impl Airframe {
         &self.vehicle
     }
 
-    /// How far the effects have moved the frame, seen from the centre of mass, from where it is declared.
+    /// Returns the frame's displacement by the effects from its declared place, seen from the centre of mass.
     pub(crate) fn frame_shift_B_m(&self) -> &Vector3<f64> {
         &self.frame_shift_B_m
     }
 
-    /// Fingerprint of what the state of its flight with the backend `backend` depends on: the kinds of its effects and the
-    /// number of its rotors.
+    /// Fingerprint of the facts that the state of its flight with the backend `backend` depends on: the kinds
+    /// of its effects and the number of its rotors.
     pub(crate) fn fingerprint(&self, backend: &'static str) -> Fingerprint {
         let kinds = self.effects.iter().map(|effect| effect.kind.name);
         Fingerprint::of(std::iter::once(backend).chain(kinds))
@@ -159,7 +160,7 @@ impl Airframe {
         })
     }
 
-    /// What acts under `commands` in still air, without the state of effects.
+    /// Returns the actuation under `commands` in still air, without the state of effects.
     pub(crate) fn commanded(&self, commands: &[f64]) -> Actuation {
         let speed = |(rotor, command): (usize, &f64)| self.vehicle.commanded_speed_rad_s(rotor, *command);
         Actuation::of(commands.iter().enumerate().map(speed).collect())
@@ -171,8 +172,8 @@ impl Airframe {
         paired(&state.rotors, &actuation.targets_rad_s, |rotor, target| motor::rates(motor, rotor, *target))
     }
 
-    /// All forces but gravity and contacts, and their torques about the centre of mass. The effects are added in
-    /// their order; the order is part of the result, as float addition is not associative.
+    /// Returns all forces but gravity and contacts, and their torques about the centre of mass. The effects are added
+    /// in their order; the order is part of the result, as float addition is not associative.
     pub(crate) fn wrench(
         &self,
         actuation: &Actuation,
@@ -192,8 +193,8 @@ impl Airframe {
         sum
     }
 
-    /// The rotors at the end of a tick of `dt_s` that began with `actuation`, whatever the body does: one Runge-Kutta
-    /// step of fourth order.
+    /// The rotors at the end of a tick of `dt_s` that began with `actuation`, independent of the body: one
+    /// Runge-Kutta step of fourth order.
     #[must_use]
     pub fn spun(
         &self,

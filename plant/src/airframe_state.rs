@@ -8,11 +8,11 @@ use crate::saved::{Reader, Saved, Unfit, Writer, saved_fields};
 use crate::state::{PerRotor, paired};
 use bus::random::{Stream, normal};
 
-/// What the effects of one airframe carry from tick to tick; made by
+/// State of an airframe's effects from tick to tick; made by
 /// [`Airframe::initial_state`](crate::Airframe::initial_state). Only its making allocates.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AirframeState {
-    /// What acts over the tick that began last.
+    /// Actuation over the tick that began last.
     pub actuation: Actuation,
     pub(crate) commands: DelayLine,
     /// One for each effect, in their order.
@@ -21,7 +21,7 @@ pub struct AirframeState {
 
 saved_fields!(AirframeState { actuation, commands, effects });
 
-/// What one effect carries from tick to tick.
+/// State of one effect from tick to tick.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EffectState {
     /// The effect's own numbers, zeros at the start.

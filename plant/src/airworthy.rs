@@ -1,4 +1,4 @@
-//! What a vehicle must be to fly at all, looked at before a run: `check` refuses what cannot, and tells what is odd.
+//! Checks of a vehicle before a run: `check` refuses a vehicle that cannot fly, and reports odd values.
 
 use crate::backend::Backend;
 use crate::newton_euler::NewtonEuler;
@@ -7,8 +7,8 @@ use bus::context::NodeContext;
 use diagnostics::parameter::{ParameterError, refuse};
 use vehicles::{CommandMap, MotorModel, Provenance, Vehicle};
 
-/// Below this thrust to weight a vehicle hovers and has next to nothing left to climb, tilt or brake with: 1.2 is what
-/// is left to a tilt of 34°. Tuned, no source; multirotors are built with 2 and more.
+/// Below this thrust to weight a vehicle hovers and has next to nothing left to climb, tilt or brake with: at
+/// 1.2 a tilt of 34° is possible. Tuned, no source; multirotors are built with 2 and more.
 const LIFT_ODD: f64 = 1.2;
 
 /// From here on a thrust to weight on Earth is odd, and from there on none: racing quadrotors reach 15. Tuned, no source.
@@ -27,10 +27,10 @@ const POLE_STEPS_ODD: f64 = 0.5;
 /// Steps of a rehearsal, less where a tick has many.
 const REHEARSAL_STEPS: u32 = 300;
 
-/// Refuses steps of `span_s` in which the motors' lag cannot be integrated, and tells coarse ones.
+/// Refuses steps of `span_s` in which the motors' lag cannot be integrated, and warns of coarse ones.
 ///
 /// # Errors
-/// The lag, the step, and what to do.
+/// The lag, the step, and advice.
 pub(crate) fn check_steps(
     vehicle: &Vehicle,
     span_s: f64,
@@ -53,7 +53,7 @@ pub(crate) fn check_steps(
     Ok(())
 }
 
-/// Tells which numbers of the vehicle have no source.
+/// Warns of the numbers of the vehicle that have no source.
 pub(crate) fn tell_unsourced(vehicle: &Vehicle, run: &NodeContext<'_>) {
     let unsourced: Vec<_> = vehicle.provenance.iter().filter(|number| !number.has_source()).collect();
     if !unsourced.is_empty() {
@@ -160,11 +160,11 @@ pub(crate) fn places(numbers: &[&Provenance]) -> String {
     numbers.iter().map(place).collect::<Vec<_>>().join(", ")
 }
 
-/// Flies `backend` for a moment with rotors at their fastest, at hover and at their slowest: what overflows on the
-/// way does so here, and not in flight. The backend is of no use afterwards.
+/// Flies `backend` for a moment with rotors at their fastest, at hover and at their slowest: a quantity that
+/// overflows does so here, and not in flight. The backend is of no use afterwards.
 ///
 /// # Errors
-/// Which number is none, and after how many ticks.
+/// The quantity that is not a finite number, and the ticks after which.
 pub(crate) fn rehearse(
     backend: &mut dyn Backend,
     model: &NewtonEuler,

@@ -1,4 +1,4 @@
-//! What a plant can do, whichever physics moves it.
+//! Interface of a plant, whichever physics moves it.
 
 use crate::actuation::Battery;
 use crate::newton_euler::Accelerations;
@@ -15,7 +15,7 @@ pub trait Backend: Send {
     /// Body and rotors at the end of the last tick.
     fn state(&self) -> &State;
 
-    /// What sensors at the centre of mass measure at the end of the last tick.
+    /// Returns the accelerations that sensors at the centre of mass measure at the end of the last tick.
     fn accelerations(&self) -> Accelerations;
 
     /// Moves the vehicle by one tick of `dt_s` under raw motor `commands`, one for each rotor, held over it. `traffic` are the other
@@ -28,7 +28,7 @@ pub trait Backend: Send {
     /// Puts the body where it is said to be; the rotors stay as they are.
     fn set_body(&mut self, body: &RigidBody);
 
-    /// What was touched over the last tick.
+    /// Returns the contacts over the last tick.
     fn contact(&self) -> ContactReport;
 
     /// The free bodies of the scene, in its order: where they are and how they move.
@@ -52,7 +52,7 @@ pub trait Backend: Send {
     /// Hash of backend, scene and kinds of effects: only a state of the same can be loaded.
     fn configuration(&self) -> u64;
 
-    /// Tells `note` every part of the state that the next ticks depend on, by name, in a fixed order.
+    /// Passes to `note` every part of the state that the next ticks depend on, by name, in a fixed order.
     fn parts(&self, note: &mut dyn FnMut(&'static str, &dyn Saved));
 
     /// As [`Backend::parts`], to be changed; the first error ends it.
@@ -75,7 +75,7 @@ pub trait Backend: Send {
     /// error the backend is as it was.
     ///
     /// # Errors
-    /// If the bytes are no such snapshot.
+    /// If the bytes are not such a snapshot.
     fn restore(&mut self, snapshot: &[u8]) -> Result<(), SnapshotError> {
         let snapshot = Snapshot::read(snapshot, self.name())?;
         let mut before = Snapshot::of(self.name());
@@ -104,7 +104,7 @@ pub struct Neighbour {
     pub velocity_W_m_s: Vector3<f64>,
 }
 
-/// What the vehicle touches; `bus::messages::Contact` says what each field means.
+/// Contacts of the vehicle; `bus::messages::Contact` describes each field.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ContactReport {
     /// Sum of the contact forces over the last tick.
@@ -113,10 +113,11 @@ pub struct ContactReport {
     pub impact_speed_m_s: f64,
     /// Number of things touched.
     pub count: u32,
-    /// What is touched first: 0 nothing, 1 the ground, 2 + i the scene's thing i, 1000 + i the other vehicle i.
+    /// Object that is touched first: 0 nothing, 1 the ground, 2 + i the scene's thing i, 1000 + i the other
+    /// vehicle i.
     pub object: u32,
     /// Contacts that began since the start.
     pub began: u32,
-    /// Whether an impact was faster than the vehicle bears.
+    /// True if an impact was faster than the vehicle bears.
     pub crashed: bool,
 }

@@ -1,4 +1,4 @@
-//! Vehicle physics: what moves, and by which equations; and the node that puts it on the bus.
+//! Vehicle physics: the motion and its equations; and the node that puts it on the bus.
 //!
 //! | room | what it holds |
 //! |---|---|

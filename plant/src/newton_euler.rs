@@ -3,7 +3,7 @@
 //! Newton: v' = g + R_WB F_B / m, in the world frame (thesis eq. 3.12 forgets the division by m).
 //! Euler: J w' = tau - w x J w, in the body frame (thesis eq. 3.17).
 //! Attitude: q' = 1/2 q (0, w), a quaternion, where thesis eq. 3.18 is singular at a pitch of 90 degrees.
-//! All of it and the motors are integrated together by the classic fourth-order Runge-Kutta scheme.
+//! The motions of body and motors are integrated together by the classic fourth-order Runge-Kutta scheme.
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use vehicles::Vehicle;
@@ -33,10 +33,10 @@ pub struct NewtonEuler {
     substeps: u32,
 }
 
-/// What the body feels at an instant: what sensors at the centre of mass measure.
+/// Accelerations of the body at an instant, as sensors at the centre of mass measure them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Accelerations {
-    /// (all forces but gravity) / m, in the body frame: what an accelerometer at the centre of mass measures.
+    /// (all forces but gravity) / m, in the body frame: the reading of an accelerometer at the centre of mass.
     pub specific_force_B_m_s2: Vector3<f64>,
     /// Rate of change of the angular velocity, in the body frame.
     pub angular_acceleration_B_rad_s2: Vector3<f64>,
@@ -68,7 +68,7 @@ impl NewtonEuler {
         self.airframe.vehicle()
     }
 
-    /// How many integration steps a tick has.
+    /// Returns the number of integration steps in a tick.
     pub(crate) fn substeps(&self) -> u32 {
         self.substeps
     }
@@ -120,7 +120,7 @@ impl NewtonEuler {
         self.accelerations_under(&Actuation::none(state.rotors.len()), state)
     }
 
-    /// Specific force and angular acceleration at `state`, with what acts over the tick that ends there.
+    /// Specific force and angular acceleration at `state`, with the actuation over the tick that ends there.
     pub fn accelerations_under(&self, actuation: &Actuation, state: &State) -> Accelerations {
         // Those that a rotor state itself shows, where no target is at hand.
         let shown_rates = state.rotors.map(|RotorState { acceleration_rad_s2, .. }| RotorRates {

@@ -1,7 +1,7 @@
 //! The plant: steps the vehicle from tick to tick under the motor command of the tick before.
 //!
 //! At tick k it moves the state from k − 1 to k under the command stamped k − 1, then publishes it. With a
-//! `measured` input it is set to the measured state at the start of each window, after publishing: what it
+//! `measured` input it is set to the measured state at the start of each window, after publishing: the state that it
 //! publishes at that tick is the end of the window before.
 
 use crate::airworthy;
@@ -18,7 +18,7 @@ use bus::messages::{self, FRAME_BYTES_MAX, FrameName, MeasuredState, MotorComman
 use diagnostics::ParameterError;
 use nalgebra::{UnitQuaternion, Vector3};
 
-/// What the plant reads.
+/// Inputs of the plant.
 #[derive(Debug, InputPorts)]
 pub struct Inputs<'a> {
     /// The motors' command.
@@ -47,7 +47,7 @@ pub struct Plant {
     origin: Origin,
     /// The frame of the vehicle's body.
     frame: FrameName,
-    /// Ticks between two settings to what is measured.
+    /// Ticks between two settings to the measured state.
     window_ticks: u32,
     dt_s: f64,
 }

@@ -10,8 +10,8 @@ use vehicles::{MotorModel, Vehicle};
 const ARM_MAX_M: f64 = 10.0;
 /// Rotors nearer to each other than this part of the longest arm are in one place; coaxial ones have a gap. Tuned, no source.
 const APART_MIN: f64 = 1e-3;
-/// A radius of gyration above this multiple of the longest arm is odd: what is on the arms is within them. Tuned, no source;
-/// shipped vehicles have 0.2 to 0.8.
+/// A radius of gyration above this multiple of the longest arm is odd: all parts lie within the arms. Tuned, no
+/// source; shipped vehicles have 0.2 to 0.8.
 const GYRATION_MAX: f64 = 1.5;
 /// One below this multiple is odd: motors are at the ends of the arms. Tuned, no source.
 const GYRATION_MIN: f64 = 0.03;

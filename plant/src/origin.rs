@@ -8,7 +8,7 @@ use crate::rapier::Rapier;
 use crate::state::RigidBody;
 use scenes::Scene;
 
-/// Everything that a plant is made of. It does not change during a run.
+/// Everything that a plant consists of. It does not change during a run.
 pub(crate) struct Origin {
     /// The equations of motion.
     pub model: NewtonEuler,

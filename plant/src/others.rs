@@ -1,4 +1,4 @@
-//! Which vehicles of the traffic are others: all but the one that is where this plant's vehicle is.
+//! Other vehicles of the traffic: all but the one that is where this plant's vehicle is.
 
 use crate::backend::{Neighbour, TRAFFIC_MAX};
 use crate::saved::{Reader, Saved, Unfit, Writer};
@@ -81,7 +81,7 @@ impl Others {
     }
 }
 
-/// The one that is exactly where this vehicle is: the traffic copies what the plants publish.
+/// The one that is exactly where this vehicle is: the traffic copies the states that the plants publish.
 fn place(traffic: &Traffic, count: usize, position_W_m: &Vector3<f64>) -> Result<usize, OthersError> {
     let is_here =
         |number: &usize| Vector3::from(<[f64; 3]>::from(traffic.position[*number])) == *position_W_m;

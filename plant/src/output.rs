@@ -1,4 +1,4 @@
-//! What a plant publishes.
+//! Outputs of a plant.
 
 use crate::backend::Backend;
 use bus::OutputPorts;
@@ -17,7 +17,7 @@ pub struct Outputs {
     pub pose: Option<PoseStamped>,
     /// The transform of the body, for 3-D views.
     pub tf: Option<BodyTransform>,
-    /// What is touched; with the backend `rapier`.
+    /// Contacts of the vehicle; with the backend `rapier`.
     pub contact: Option<Contact>,
     /// The scene's free bodies; with the backend `rapier`.
     pub bodies: Option<BodyStates>,

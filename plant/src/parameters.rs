@@ -1,4 +1,4 @@
-//! What manifests say of a plant, and the backend that follows.
+//! Parameters of a plant in manifests, and the backend that follows from them.
 
 use crate::airframe::Airframe;
 use crate::airworthy;
@@ -25,7 +25,7 @@ pub struct Parameters {
     vehicle: PathBuf,
     /// Scene file; nothing but the ground where it is left out.
     scene: Option<PathBuf>,
-    /// What moves the vehicle.
+    /// Physics that moves the vehicle.
     #[serde(default)]
     backend: BackendName,
     /// Position of the centre of mass at tick 0, in the world.
@@ -55,7 +55,7 @@ enum BackendName {
     Rapier,
 }
 
-/// What a Hummingbird bears, as far as anybody knows: tuned, no source.
+/// Greatest speed of an impact that a Hummingbird bears, as far as anybody knows: tuned, no source.
 const CRASH_SPEED_M_S: f64 = 1.0;
 
 /// More steps than these gain nothing at 1 kHz, and would look like a run that hangs: tuned, no source.
@@ -105,7 +105,7 @@ impl Parameters {
         })
     }
 
-    /// Refuses what cannot be meant.
+    /// Refuses invalid parameters.
     fn check(&self, run: &NodeContext<'_>) -> Result<(), ParameterError> {
         all(finite, "initial_position_m", &self.initial_position_m)?;
         all(finite, "initial_velocity_m_s", &self.initial_velocity_m_s)?;
@@ -144,7 +144,7 @@ impl Parameters {
         })
     }
 
-    /// Ticks of `tick_s` between two settings to what is measured; longer than any run without.
+    /// Ticks of `tick_s` between two settings to the measured state; longer than any run without.
     pub(crate) fn window_ticks(&self, tick_s: f64) -> Result<u32, ParameterError> {
         let Some(window_s) = self.window_s else { return Ok(u32::MAX) };
         let ticks = (window_s / tick_s).round();
@@ -162,7 +162,7 @@ impl Parameters {
     /// seed and the node's name.
     ///
     /// # Errors
-    /// What cannot be meant, or cannot fly.
+    /// The invalid parameter, or the reason why the vehicle cannot fly.
     pub(crate) fn origin(&self, run: &NodeContext<'_>) -> Result<Origin, ParameterError> {
         self.check(run)?;
         let (airframe, scene) = self.airframe(&run.files)?;
@@ -217,7 +217,7 @@ impl Parameters {
         })
     }
 
-    /// The vehicle as it flies, and what stands around it.
+    /// The vehicle as it flies, and the scene around it.
     fn airframe(&self, files: &InputFiles) -> Result<(Airframe, Scene), ParameterError> {
         let refused = |error| ParameterError::conflict("vehicle", error);
         let vehicle = Vehicle::load_from(files, &self.vehicle).map_err(refused)?;
@@ -228,7 +228,7 @@ impl Parameters {
         Ok((Airframe::from_files(vehicle, &scene.effects).map_err(refused)?, scene))
     }
 
-    /// Refuses a start inside of a box or a mesh, unless a measured flight says where the vehicle starts.
+    /// Refuses a start inside a box or a mesh, unless a measured flight gives the start.
     fn refuse_inside(&self, rapier: &Rapier, scene: &Scene) -> Result<(), ParameterError> {
         let Some(name) = rapier.thing_around().and_then(|number| scene.name_of(number)) else {
             return Ok(());
@@ -242,8 +242,8 @@ impl Parameters {
         })
     }
 
-    /// Refuses free bodies that start inside of something, and joints that do not fit; where a measured flight says where
-    /// the vehicle starts, only what it has no part in.
+    /// Refuses free bodies that start inside of something, and joints that do not fit. If a measured flight gives the
+    /// vehicle's start, overlaps with the vehicle and ropes that are too short are not refused.
     fn refuse_bodies(&self, rapier: &mut Rapier, scene: &Scene, dt_s: f64) -> Result<(), ParameterError> {
         let name = |object: u32| match object {
             0 => "the vehicle".to_owned(),
@@ -307,7 +307,7 @@ impl Parameters {
     }
 }
 
-/// Refuses effects that stand for what the joints of a rig do.
+/// Refuses effects that model the joints of a rig, if the scene has one.
 fn refuse_double_rig(vehicle: &Vehicle, scene: &Scene) -> Result<(), ParameterError> {
     let is_rig_effect = |entry: &&EffectEntry| {
         effects::find(&entry.name).is_some_and(|kind| kind.needs.contains(&Quantity::Rig))

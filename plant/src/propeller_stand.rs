@@ -30,7 +30,7 @@ const WORDS_PER_TICK: u128 = 1 << 10;
 pub struct Parameters {
     /// Vehicle file.
     vehicle: PathBuf,
-    /// Which of its rotors, from 1.
+    /// Number of the vehicle's rotor on the stand, from 1.
     #[serde(default = "first")]
     rotor: usize,
     /// The commanded speed over time; 0 before the first.
@@ -50,16 +50,16 @@ fn first() -> usize {
     1
 }
 
-/// Where the commanded speed goes, and when.
+/// Change of the commanded speed.
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SpeedEntry {
-    /// When it begins to change, s; not before the change ahead of it is over.
+    /// Start of the change, s; not before the change ahead of it is over.
     at_s: f64,
-    /// How long the change takes, s; 0 for a step.
+    /// Duration of the change, s; 0 for a step.
     #[serde(default)]
     over_s: f64,
-    /// The speed that it leads to: 0, or one that the vehicle's motors can be asked for.
+    /// Speed after the change: 0, or one that the vehicle's motors can be asked for.
     to_rpm: f64,
 }
 
@@ -100,7 +100,7 @@ pub struct StandState {
     acceleration: f64,
 }
 
-/// What it sends.
+/// Outputs of the stand.
 #[derive(Debug, OutputPorts)]
 pub struct Outputs {
     /// Speed, thrust and torques.
@@ -130,7 +130,7 @@ pub struct PropellerStand {
     noise: Noise,
 }
 
-/// White noise of the sensors. That of a tick follows from seed, name and tick, so that there is nothing to hand over.
+/// White noise of the sensors. The noise of a tick follows from seed, name and tick: there is no state to hand over.
 #[derive(Debug)]
 struct Noise {
     /// Of the force, N, the torque, N·m, and the speed, rad/s.
@@ -139,8 +139,8 @@ struct Noise {
 }
 
 impl Noise {
-    /// What is added to force, torque and speed at a tick. All are drawn always, so that one's noise does not reshuffle
-    /// the others'.
+    /// Returns the noise of force, torque and speed at a tick. All three are always drawn, so that one's noise does
+    /// not reshuffle the others'.
     fn at(&self, tick: u32) -> [f64; 3] {
         let mut random = random::at(&self.random, u128::from(tick) * WORDS_PER_TICK);
         self.sigmas.map(|sigma| sigma * normal(&mut random))
@@ -231,7 +231,7 @@ impl PropellerStand {
 }
 
 impl PropellerStand {
-    /// What the sensors make of the truth at a tick.
+    /// Returns the sensors' reading of the truth at a tick.
     fn read(&self, truth: &RotorLoad, tick: u32) -> RotorLoad {
         let [force_N, torque_N_m, speed_rad_s] = self.noise.at(tick);
         let against_spin = -self.vehicle.rotors[self.rotor].spin;

@@ -1,6 +1,6 @@
 //! The backend `rapier`: the same forces as in free flight, in a world that can be touched.
 //!
-//! Rapier finds what is near; where nothing is, the vehicle moves exactly as with `newton-euler`. What touches, and the
+//! Rapier finds what is near; where nothing is, the vehicle moves exactly as with `newton-euler`. Contacts, and the
 //! joints of a rig, are solved here, not by rapier's own solver (docs/decisions/008-two-backends.md says why).
 //!
 //! | room | what it holds |
@@ -100,7 +100,7 @@ pub struct Rapier {
     configuration: Fingerprint,
 }
 
-/// What contacts and joints changed over the last tick, against free flight.
+/// Change of the motion over the last tick by contacts and joints, against free flight.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 struct Reaction {
     acceleration_W_m_s2: Vector3<f64>,
@@ -166,7 +166,7 @@ impl Rapier {
         world.overlap(&state.body, &free_bodies.states)
     }
 
-    /// What of the scene's joints cannot be meant, with the vehicle and the bodies where they are.
+    /// Returns a fault of the scene's joints, with the vehicle and the bodies where they are.
     pub(crate) fn misfit(&self) -> Option<Misfit> {
         self.motion.free_bodies.misfit(&self.motion.model, &self.motion.state.body)
     }
@@ -181,8 +181,8 @@ impl Rapier {
         self.motion.contacts.place(stands.then_some(world::GROUND), world::FEET);
     }
 
-    /// Before anything has moved, what carries a vehicle at rest is what takes its free acceleration away: so its
-    /// accelerometer feels g from the first tick on.
+    /// Before anything has moved, a vehicle at rest is carried by the acceleration opposite to its free one: so its
+    /// accelerometer reads g from the first tick on.
     fn lean_on_support(&mut self) {
         let free = self.motion.model.accelerations_under(&self.effects.actuation, &self.motion.state);
         let body = &self.motion.state.body;
@@ -195,7 +195,7 @@ impl Rapier {
         }
     }
 
-    /// Whether ground or rig keep the vehicle from accelerating freely.
+    /// True if ground or rig keep the vehicle from accelerating freely.
     fn is_carried(&self, free_W_m_s2: &Vector3<f64>) -> bool {
         let vehicle = self.motion.model.vehicle();
         match &self.motion.rig {
@@ -219,7 +219,7 @@ impl Rapier {
     }
 }
 
-/// Numbers that tell a scene and a vehicle from others.
+/// Numbers that distinguish a scene and a vehicle from others.
 fn numbers(motion: &Motion) -> Vec<f64> {
     let mut numbers = motion.world.numbers();
     numbers.extend(motion.free_bodies.numbers());

@@ -1,4 +1,4 @@
-//! What the spinning rotors do to the body: thrust, drag torque, spin-up reaction, gyroscopic torque.
+//! Forces and torques of the spinning rotors on the body: thrust, drag torque, spin-up reaction, gyroscopic torque.
 //!
 //! Signs. A rotor of spin s (+1 counter-clockwise from the tip of its axis a) and speed w turns at s w about a. The
 //! air's drag on it, c_Q w^2 against the rotation, reaches the body as -s c_Q w^2 about a (the yaw row of thesis

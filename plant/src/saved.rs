@@ -325,7 +325,7 @@ impl<T: Saved + Copy + Default> Saved for Bounded<T> {
 pub(crate) struct Fingerprint(u64);
 
 impl Fingerprint {
-    /// The fingerprint of what is called by these `names`.
+    /// The fingerprint of parts with these `names`.
     pub(crate) fn of<'n>(names: impl Iterator<Item = &'n str>) -> Self {
         // No name has the byte 255, so that no two names are taken for one.
         let hash = |hash, name: &str| bus::random::fnv1a(&[255], bus::random::fnv1a(name.as_bytes(), hash));

@@ -1,10 +1,10 @@
-//! A backend's state as bytes: named components, so that two snapshots that differ tell where.
+//! A backend's state as bytes: named components, so that two snapshots that differ show where.
 
 use crate::saved::{Reader, Saved, Unfit, Writer};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// Why a snapshot could not be taken or read.
+/// Reason why a snapshot could not be taken or read.
 #[derive(Debug, Error)]
 pub enum SnapshotError {
     /// The bytes are not a snapshot.
@@ -29,7 +29,7 @@ pub enum SnapshotError {
     Misfit {
         /// Its name.
         component: &'static str,
-        /// Why not.
+        /// The reason.
         cause: Unfit,
     },
 }
@@ -84,7 +84,7 @@ impl Snapshot {
 /// The name of the first component in which two snapshots differ; `None` where they are the same.
 ///
 /// # Errors
-/// If one of them is no snapshot.
+/// If one of them is not a snapshot.
 ///
 /// ```
 /// use plant::{Airframe, Backend, FreeFlight, NewtonEuler, RigidBody, snapshot::first_difference};

@@ -77,7 +77,7 @@ impl RigidBody {
         self.attitude_WB * self.angular_velocity_B_rad_s
     }
 
-    /// Whether pose and motion are numbers.
+    /// True if all numbers of pose and motion are finite.
     pub fn is_finite(&self) -> bool {
         let vectors = [&self.position_W_m, &self.velocity_W_m_s, &self.angular_velocity_B_rad_s];
         let numbers = vectors.into_iter().flatten().chain(self.attitude_WB.coords.iter());

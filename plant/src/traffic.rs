@@ -22,12 +22,12 @@ use serde::Deserialize;
 #[derive(Debug)]
 pub struct Traffic;
 
-/// It has no parameters.
+/// Parameters of the traffic: none.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Parameters {}
 
-/// What it sends.
+/// Outputs of the traffic.
 #[derive(Debug, OutputPorts)]
 pub struct Outputs {
     /// The states, in the order of the inputs' names.

@@ -1,4 +1,4 @@
-//! How often a tick takes memory: never in free flight, and where something is touched inside rapier.
+//! Allocations of a tick: none in free flight, and only rapier's where something is touched.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 mod common;
@@ -42,7 +42,7 @@ fn rapier(scene: &str, start_W_m: Vector3<f64>) -> Rapier {
     common::rapier(model(), &scene, &RigidBody::level_at(start_W_m), 1.0)
 }
 
-/// How often 1000 ticks take memory, after 1000 that may fill buffers.
+/// Returns the number of allocations in 1000 ticks, after 1000 that may fill buffers.
 fn taken(plant: &mut dyn Backend, command: f64, traffic: &[Neighbour]) -> u64 {
     plant.settle_rotors(&[command; 4]);
     (0..1_000).for_each(|_| plant.step(&[command; 4], TICK_S, traffic));

@@ -28,7 +28,7 @@ fn energy_J(body: &RigidBody) -> f64 {
         + vehicle.mass_kg * vehicle.gravity_m_s2 * body.position_W_m.z
 }
 
-/// How far the hull reaches along `direction`, from the origin.
+/// Returns the greatest coordinate of the hull along `direction_W`.
 fn reach_m(body: &RigidBody, direction_W: &Vector3<f64>) -> f64 {
     let hull = Hull::of(&Airframe::new(hummingbird()));
     let lean = (body.attitude_WB * Vector3::z()).dot(direction_W);

@@ -1,6 +1,6 @@
 //! Contacts and stops against closed forms: bounce, slide, rest, tip over an edge, the stops and the swing of a rig.
 //!
-//! `docs/world.md` has the same with the figures, and beside them what MuJoCo finds.
+//! `docs/world.md` has the same with the figures, beside those of MuJoCo.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 mod common;
@@ -135,7 +135,7 @@ fn slope(slope_rad: f64, friction: f64) -> Scene {
     Scene::parse_with(&text, "test.toml", &read).unwrap()
 }
 
-/// How far it gets down a slope in two seconds, and its speed then.
+/// Returns the way down a slope in two seconds, and the speed then.
 fn down(slope_rad: f64, friction: f64) -> (f64, f64) {
     let attitude_WB = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), slope_rad);
     let start_W_m = Vector3::z() * 20.0 + attitude_WB * (Vector3::z() * stand_m());
@@ -179,8 +179,8 @@ fn table() -> Scene {
     Scene::parse(&text, "test.toml").unwrap()
 }
 
-/// With its rear feet on the table and its front feet over the edge it rolls over the balls of its rear feet: what it
-/// loses in height turns it, about the point where the balls touch the table.
+/// With its rear feet on the table and its front feet over the edge it rolls over the balls of its rear feet.
+/// The height that it loses turns it, about the point where the balls touch the table.
 #[test]
 fn it_tips_over_an_edge_as_fast_as_the_height_that_it_loses_says() {
     let hull = Hull::of(&Airframe::new(vehicle()));

@@ -1,4 +1,4 @@
-//! What the rapier backend touches, and what it reports of it.
+//! Contacts of the rapier backend, and its reports of them.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 mod common;
@@ -174,7 +174,7 @@ fn lift_off_ends_the_contact_and_leaves_none_counted() {
     assert_eq!(last.force_W_N, Vector3::zeros());
 }
 
-/// How far the vehicle's disc reaches along `direction`.
+/// Returns the greatest coordinate of the vehicle's disc along `direction`.
 fn reach_m(plant: &Rapier, hull: &Hull, direction: &Vector3<f64>) -> f64 {
     let body = plant.state().body;
     let lean = (body.attitude_WB * Vector3::z()).dot(direction).abs();

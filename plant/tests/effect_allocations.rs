@@ -1,4 +1,4 @@
-//! A tick allocates nothing, whatever effects act.
+//! A tick allocates nothing under any effects.
 
 mod common;
 

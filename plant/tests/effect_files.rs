@@ -1,4 +1,4 @@
-//! Effects as vehicle and scene files list them, and what every fault is answered with.
+//! Effects as vehicle and scene files list them, and the errors for every fault.
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
 mod common;
@@ -28,7 +28,7 @@ fn airframe(vehicle: &str, scene: &str) -> Result<Airframe, String> {
     Airframe::from_files(vehicle, &scene.effects).map_err(|error| error.to_string())
 }
 
-/// The fault is reported on `line` of what is added to the Hummingbird's file, with all these words.
+/// The fault is reported on `line` of the text that is added to the Hummingbird's file, with all these words.
 fn assert_refused(effects: &str, line: usize, words: &[&str]) {
     let message = airframe(effects, "").unwrap_err().to_string();
     let start = format!("bird.toml:{}:", HUMMINGBIRD.lines().count() + line);

@@ -1,10 +1,10 @@
-//! What is known of an effect stands in its own file: nowhere else is its name a text of the program.
+//! The facts about an effect stand in its own file: nowhere else is its name a text of the program.
 
 use plant::effects::CATALOGUE;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// All Rust files of the library and the crates around it, without tests, examples and benchmarks.
+/// Collects the Rust files of the library and the crates around it, without tests, examples and benchmarks.
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
@@ -20,7 +20,7 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// The program in a file: what stands before its tests, without comments.
+/// The program in a file: the lines before its tests, without comments.
 fn program(path: &Path) -> String {
     let text = fs::read_to_string(path).unwrap();
     let before = text.split("#[cfg(test)]\nmod tests").next().unwrap().to_owned();

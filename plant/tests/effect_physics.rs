@@ -45,7 +45,7 @@ impl Flight {
         }
     }
 
-    /// What it feels now, once a tick has begun.
+    /// Returns its accelerations now, once a tick has begun.
     fn accelerations(&mut self) -> Accelerations {
         let hover = hummingbird().hover_command();
         let actuation = self.model.airframe().begin_tick(&mut self.effects, &self.state, &[hover; 4], TICK_S);

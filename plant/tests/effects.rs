@@ -1,4 +1,4 @@
-//! What every effect of the catalogue promises.
+//! Promises of every effect of the catalogue.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 mod common;

@@ -1,4 +1,4 @@
-//! Free bodies and joints against closed forms, and what they do to the vehicle.
+//! Free bodies and joints against closed forms, and their forces on the vehicle.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 mod common;

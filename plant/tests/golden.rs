@@ -1,6 +1,6 @@
-//! The declared model flies as it always did, to the last bit: what is added to the plant must not disturb it.
+//! The declared model flies as it always did, to the last bit: additions to the plant must not disturb it.
 //!
-//! Where the physics is changed on purpose, mint the digest anew and say why.
+//! If the physics is changed on purpose, mint the digest anew and say why.
 
 mod common;
 

@@ -1,4 +1,4 @@
-//! The thesis's rigs: what they hold, what they leave free.
+//! The thesis's rigs: the motions that they hold, and those that they leave free.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 mod common;
@@ -30,7 +30,7 @@ fn hanging(scene: &Scene, yaw_deg: f64) -> Rapier {
     common::rapier(NewtonEuler::new(hummingbird(), 1), scene, &body, 1.0)
 }
 
-/// Where the bearing's centre is, seen from the lower end of its travel.
+/// Returns the place of the bearing's centre, seen from the lower end of its travel.
 fn bearing_W_m(plant: &Rapier, rig: &Rig) -> Vector3<f64> {
     let body = plant.state().body;
     body.position_W_m + body.attitude_WB * rig.mount_B_m - rig.bearing_W_m
@@ -40,7 +40,7 @@ fn tilt_deg(plant: &Rapier) -> f64 {
     (plant.state().body.attitude_WB * Vector3::z()).angle(&Vector3::z()).to_degrees()
 }
 
-/// What the rig promises at every tick: the bearing on its line and within its travel, the tilt within its cone.
+/// Asserts the rig's promises at a tick: the bearing on its line and within its travel, the tilt within its cone.
 #[track_caller]
 fn assert_held(plant: &Rapier, rig: &Rig, tick: usize) {
     let bearing_W_m = bearing_W_m(plant, rig);

@@ -1,4 +1,4 @@
-//! A positive command gives a positive angle, and what is symmetric stays symmetric.
+//! A positive command gives a positive angle, and a symmetric flight stays symmetric.
 //!
 //! In a body frame with x forward, y left and z up: positive roll (about x) raises the left side, positive pitch
 //! (about y) lowers the nose, positive yaw (about z) turns counter-clockwise seen from above.

@@ -22,7 +22,7 @@ fn nobody(_: u32) -> Vec<Neighbour> {
     Vec::new()
 }
 
-/// Somebody who flies through the room, to and fro.
+/// A vehicle that flies through the room, to and fro.
 fn somebody(tick: u32) -> Vec<Neighbour> {
     let angle = f64::from(tick) * 2e-3;
     let position_W_m = Vector3::new(3.9 + 1.0 * libm::cos(angle), 0.2 * libm::sin(angle), 0.1);

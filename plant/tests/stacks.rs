@@ -91,7 +91,7 @@ impl Stack {
         (fastest_m_s, farthest_m)
     }
 
-    /// Energy that a tick may gain: what touches may overlap by a micrometre, and is lifted out of that.
+    /// Energy that a tick may gain: contacts may overlap by a micrometre, and are lifted out of that.
     fn may_gain_J(&self, heaviest_kg: f64) -> f64 {
         1e-6 * (1.0 + self.energy_J().abs()) + 2e-6 * G_M_S2 * heaviest_kg
     }

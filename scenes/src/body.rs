@@ -7,7 +7,7 @@ use diagnostics::unit::{ANGULAR_VELOCITY, MASS, VELOCITY};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use vehicles::reader::Section;
 
-/// What a thing that moves weighs, and how it starts. Its mass is spread evenly over its volume.
+/// Mass and start of a thing that moves. Its mass is spread evenly over its volume.
 ///
 /// ```
 /// let scene = scenes::Scene::parse(scenes::reference::SLUNG_LOAD, "slung-load.toml")?;
@@ -21,17 +21,18 @@ pub struct FreeBody {
     pub mass_kg: f64,
     /// Its inertia about its centre of mass, along its own axes.
     pub inertia_kg_m2: Matrix3<f64>,
-    /// Its centre of mass at the start, in the world; or as seen from the vehicle, of what hangs from that.
+    /// Its centre of mass at the start, in the world; or as seen from the vehicle, for bodies that hang from it.
     pub centre_W_m: Vector3<f64>,
-    /// How its axes are turned at the start; those of a mesh are the file's.
+    /// Its attitude at the start; the axes of a mesh are those of the file.
     pub attitude_W: UnitQuaternion<f64>,
-    /// The velocity of its centre of mass at the start; of what hangs from the vehicle beside that of the vehicle.
+    /// The velocity of its centre of mass at the start; for bodies that hang from the vehicle, beside that of
+    /// the vehicle.
     pub velocity_W_m_s: Vector3<f64>,
     /// Its angular velocity at the start, in the world's axes.
     pub angular_velocity_W_rad_s: Vector3<f64>,
 }
 
-/// Where a free body is.
+/// Pose of a free body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BodyPose {
     /// Its centre of mass, in the world.
@@ -41,7 +42,7 @@ pub struct BodyPose {
 }
 
 impl FreeBody {
-    /// Where it starts.
+    /// Returns its pose at the start.
     #[must_use]
     pub fn start(&self) -> BodyPose {
         BodyPose { position_W_m: self.centre_W_m, attitude_W: self.attitude_W }
@@ -116,9 +117,9 @@ pub(crate) fn ball_inertia_m2(radius_m: f64) -> Matrix3<f64> {
     Matrix3::from_diagonal_element(0.4 * radius_m * radius_m)
 }
 
-/// The centre of what closed triangles enclose, and the inertia for each kilogram about it: the sum over the tetrahedra
-/// between the first corner and each triangle, whose second moments are V/20 (Σ v vᵀ + s sᵀ), with s = Σ v (F. Tonon,
-/// Explicit exact formulas for the 3-D tetrahedron inertia tensor, 2004).
+/// The centre of the volume that closed triangles enclose, and the inertia for each kilogram about it. It is
+/// the sum over the tetrahedra between the first corner and each triangle, whose second moments are V/20 (Σ v
+/// vᵀ + s sᵀ), with s = Σ v (F. Tonon, Explicit exact formulas for the 3-D tetrahedron inertia tensor, 2004).
 pub(crate) fn solid_moments(corners_m: &[[f64; 3]], faces: &[[u32; 3]]) -> (Vector3<f64>, Matrix3<f64>) {
     let corner = |number: u32| Vector3::from(corners_m[number as usize]);
     let first_m = corner(faces[0][0]);

@@ -149,7 +149,7 @@ impl Dimensions {
     }
 }
 
-/// Those of a revolute joint.
+/// Dimensions of a revolute joint.
 pub(crate) const ROTARY: Dimensions = Dimensions {
     position: ANGLE,
     speed: SPEED,
@@ -158,7 +158,7 @@ pub(crate) const ROTARY: Dimensions = Dimensions {
     force: TORQUE,
 };
 
-/// Those of a prismatic joint.
+/// Dimensions of a prismatic joint.
 pub(crate) const LINEAR: Dimensions = Dimensions {
     position: LENGTH,
     speed: VELOCITY,

@@ -1,4 +1,4 @@
-//! Which keys a scene file has, and in which dimension.
+//! Keys of a scene file, and their dimensions.
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
 use crate::body::{self, Keys};
@@ -28,7 +28,7 @@ const SIZE: Bounds = Bounds {
 /// Ten turns.
 const YAW: Bounds = Bounds { min: -63.0, max: 63.0, unit: "rad", why: "ten turns, in case of a wrong unit" };
 
-/// How long a unit of a mesh file is.
+/// Length of a unit of a mesh file.
 const SCALE: Bounds = Bounds {
     min: 1e-6,
     max: 1e3,
@@ -69,7 +69,7 @@ impl Scene {
     /// Reads and checks a scene file, and the meshes that it names, from the disk.
     ///
     /// # Errors
-    /// What is wrong with the file, and where.
+    /// The fault of the file, and its place.
     pub fn load(path: &Path) -> Result<Self, Diagnostic> {
         Self::load_from(&InputFiles::default(), path)
     }
@@ -90,7 +90,7 @@ impl Scene {
     /// meshes are looked for beside it.
     ///
     /// # Errors
-    /// What is wrong with the text or a mesh, and where.
+    /// The fault of the text or a mesh, and its place.
     pub fn parse(text: &str, file_name: &str) -> Result<Self, Diagnostic> {
         Self::parse_with(text, file_name, &inputs::read_bytes)
     }
@@ -98,7 +98,7 @@ impl Scene {
     /// As [`Scene::parse`], with the bytes of its meshes from `read`, which gets their paths.
     ///
     /// # Errors
-    /// What is wrong with the text or a mesh, and where.
+    /// The fault of the text or a mesh, and its place.
     pub fn parse_with(
         text: &str,
         file_name: &str,
@@ -177,7 +177,7 @@ impl Scene {
         Ok(())
     }
 
-    /// The mesh files that the scene file at `path` names; what is wrong with it is told where it is read.
+    /// The mesh files that the scene file at `path` names; its faults are reported where it is read.
     #[must_use]
     pub fn mesh_files(files: &InputFiles, path: &Path) -> Vec<PathBuf> {
         let table = files.text(path).ok().and_then(|text| text.parse::<toml::Table>().ok());
@@ -289,7 +289,7 @@ fn check_size(mesh: &Mesh, scale_m: f64) -> Result<(), String> {
     ))
 }
 
-/// What `section` says of its surface, and what `otherwise` says where it is silent.
+/// Reads the surface of `section`; keys that it does not have are those of `otherwise`.
 fn surface(section: &Section, otherwise: &Surface) -> Result<Surface, Diagnostic> {
     let number = |name, bounds, otherwise| {
         if section.has(name) { section.bounded(name, RATIO, bounds) } else { Ok(otherwise) }

@@ -7,7 +7,7 @@ use nalgebra::{Matrix4, Point3};
 /// The triangles that `bytes` hold.
 ///
 /// # Errors
-/// In words: what is wrong with the bytes.
+/// In words: the fault of the bytes.
 pub(crate) fn read(bytes: &[u8]) -> Result<Triangles, String> {
     let file = gltf::Gltf::from_slice(bytes).map_err(|error| error.to_string())?;
     let scene = file.default_scene().or_else(|| file.scenes().next()).ok_or("it holds no scene")?;

@@ -1,4 +1,4 @@
-//! Joints: what ties free bodies to the world, to each other and to the vehicle.
+//! Joints, which tie free bodies to the world, to each other and to the vehicle.
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
 use crate::drive::{self, Drive};
@@ -9,10 +9,10 @@ use diagnostics::unit::{ANGLE, LENGTH, LINEAR_DAMPING, PURE_NUMBER, ROTARY_DAMPI
 use nalgebra::Vector3;
 use vehicles::reader::{Quantity, Section};
 
-/// What a joint ties.
+/// Body at an end of a joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum End {
-    /// The ground and all that stands still.
+    /// The ground and everything that stands still.
     World,
     /// The vehicle of the run.
     Vehicle,
@@ -20,12 +20,12 @@ pub enum End {
     Body(usize),
 }
 
-/// What a joint leaves free.
+/// Freedom that a joint leaves.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Freedom {
     /// Nothing.
     Fixed,
-    /// All rotations.
+    /// Any rotation.
     Ball,
     /// The rotation about an axis, by an angle from 0 at the start.
     Revolute(Axis),
@@ -62,17 +62,18 @@ pub struct Axis {
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Joint {
-    /// What the file calls it.
+    /// Its name in the file.
     pub name: String,
-    /// What the axis and the angles are seen from.
+    /// Body from which the axis and the angles are seen.
     pub parent: End,
-    /// What moves on it.
+    /// Body that moves on it.
     pub child: End,
-    /// Where the two meet at the start: in the world; or as seen from the vehicle, of what hangs from that.
+    /// Point at which the two meet at the start: in the world; or as seen from the vehicle, for bodies that
+    /// hang from it.
     pub anchor_W_m: Vector3<f64>,
-    /// What it leaves free.
+    /// Freedom that it leaves.
     pub freedom: Freedom,
-    /// Viscous friction of what is free: N m s of rotations, N s/m of a way.
+    /// Viscous friction of the free motion: N m s of rotations, N s/m of a way.
     pub damping: f64,
     /// Motor of a revolute or a prismatic joint, if it has one.
     pub drive: Option<Drive>,
@@ -111,7 +112,7 @@ const WAY: Bounds = Bounds { min: -1e4, max: 1e4, unit: "m", why: "10 km to eith
 const TURN: Bounds =
     Bounds { min: -3.1, max: 3.1, unit: "rad", why: "less than half a turn to either side, 177 deg" };
 
-/// What a kind is called, to be looked up.
+/// Kind of a freedom, to be looked up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Kind {
     Fixed,

@@ -1,4 +1,4 @@
-//! Scene files: what stands around the vehicles; and what a ray meets there.
+//! Scene files: the things around the vehicles; and the distances that rays measure there.
 //!
 //! The ground is the plane z = 0 of the world, solid below. Boxes, meshes and balls stand still, turned about the vertical
 //! only, or are free bodies that start so.

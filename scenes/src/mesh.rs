@@ -1,4 +1,4 @@
-//! Things of any shape: triangles in the world, as what a ray meets and a vehicle touches.
+//! Things of any shape: triangles in the world, for rays and for contacts with vehicles.
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
 use crate::body::FreeBody;
@@ -12,7 +12,7 @@ use std::path::PathBuf;
 /// Two triangles that meet at less than this are one face to the eye: 10 degrees; tuned, no source.
 const SMOOTH_RAD: f64 = 0.17;
 
-/// What is less than this of a body's extent is rounding: that of a file of single precision is 1e-7.
+/// Part of a body's extent below which a length is rounding: that of a file of single precision is 1e-7.
 const FLAT: f64 = 1e-6;
 
 /// Each triangle of a convex mesh is held against each corner.
@@ -21,19 +21,19 @@ const CONVEX_MAX: usize = 2000;
 /// A triangle less high than this, over its longest side, is a line: as far as rounding goes.
 const LINE_MAX: f64 = 1e-9;
 
-/// What of a mesh is solid.
+/// Solid part of a mesh.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Solidity {
-    /// The triangles themselves, a shell without thickness: walls, rooms, what is hollow.
+    /// The triangles themselves, a shell without thickness: walls, rooms, hollow things.
     Triangles,
-    /// All that the triangles enclose, which is to be convex. Faster, and nothing gets inside.
+    /// The volume that the triangles enclose, which is to be convex. Faster, and nothing gets inside.
     Convex,
 }
 
 /// A thing made of triangles.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mesh {
-    /// What the scene file calls it, such as `desk`.
+    /// Its name in the scene file, such as `desk`.
     pub name: String,
     /// The file that the triangles come from.
     pub file: PathBuf,
@@ -41,25 +41,25 @@ pub struct Mesh {
     pub corners_W_m: Vec<[f64; 3]>,
     /// Its triangles, as numbers of corners, counter-clockwise from outside.
     pub faces: Vec<[u32; 3]>,
-    /// What of it is solid.
+    /// Its solid part.
     pub solidity: Solidity,
-    /// How it answers to what touches it.
+    /// Friction and restitution of its surface.
     pub surface: Surface,
-    /// How it moves; nothing where it stands still.
+    /// Its mass and motion; nothing where it stands still.
     pub body: Option<FreeBody>,
 }
 
 impl Mesh {
-    /// The shape, in the world, as rays and distances meet it.
+    /// The shape, in the world, for rays and distances.
     ///
     /// # Errors
-    /// In words, where no such shape can be made: every triangle is a line, or what is to be convex is not.
+    /// In words, where no such shape can be made: every triangle is a line, or a mesh that is to be convex is not.
     pub fn shape(&self) -> Result<SharedShape, String> {
         self.shape_with(TriMeshFlags::empty())
     }
 
-    /// The shape, in the world, as vehicles touch it: what slides over the edge between two triangles of one face does not
-    /// stumble there.
+    /// The shape, in the world, for contacts with vehicles: a body that slides over the edge between two
+    /// triangles of one face does not catch there.
     ///
     /// # Errors
     /// As [`Mesh::shape`].

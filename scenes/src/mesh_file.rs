@@ -1,14 +1,14 @@
 //! Triangles of a file: Wavefront OBJ, STL and binary glTF.
 //!
-//! OBJ and STL say neither their unit nor which axis is up: their numbers are taken as they are, and the scene file's
-//! `scale` says how long one of them is. glTF is in metres with y up and x to the left of what looks along z (glTF 2.0
-//! specification, section 3.4): it is turned so that z is up and x is kept.
+//! OBJ and STL state neither their unit nor the axis that is up: their numbers are taken as they are, and the
+//! scene file's `scale` is the length of one of them. glTF is in metres with y up, and x to the left of a
+//! viewer along z (glTF 2.0 specification, section 3.4): it is turned so that z is up and x is kept.
 
 use crate::triangles::Triangles;
 use crate::{glb, obj, stl};
 use std::path::Path;
 
-/// What a mesh file may be, by the end of its name.
+/// Formats of mesh files, by the end of their names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Format {
     Obj,
@@ -31,7 +31,7 @@ impl Format {
     /// The triangles that `bytes` hold.
     ///
     /// # Errors
-    /// In words: what is wrong with the bytes.
+    /// In words: the fault of the bytes.
     pub(crate) fn read(self, bytes: &[u8]) -> Result<Triangles, String> {
         let triangles = match self {
             Self::Obj => obj::read(bytes),

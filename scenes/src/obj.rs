@@ -17,7 +17,7 @@ const LINE_MAX: f64 = 1e-9;
 /// The triangles that `bytes` hold.
 ///
 /// # Errors
-/// In words: the line, and what is wrong with it.
+/// In words: the line, and its fault.
 pub(crate) fn read(bytes: &[u8]) -> Result<Triangles, String> {
     let text = String::from_utf8_lossy(bytes);
     let mut triangles = Triangles::default();

@@ -1,4 +1,4 @@
-//! The distance from a point along a direction to what is met first.
+//! Distance from a point along a direction to the first object.
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
 use crate::body::BodyPose;
@@ -24,7 +24,7 @@ pub struct RayCaster {
     /// The free bodies' shapes, seen from their centres of mass.
     bodies: Vec<(SharedShape, Pose)>,
     objects: Vec<u32>,
-    /// Where the free bodies start.
+    /// Poses of the free bodies at the start.
     starts: Vec<BodyPose>,
 }
 
@@ -48,21 +48,21 @@ impl RayCaster {
         Self { still, bodies, objects, starts }
     }
 
-    /// What contacts call its free bodies, in their order: 2 + i of the scene's thing i.
+    /// Returns the numbers of its free bodies in contacts, in their order: 2 + i of the scene's thing i.
     #[must_use]
     pub fn body_objects(&self) -> &[u32] {
         &self.objects
     }
 
-    /// Whether something of it moves.
+    /// True if some of its things move.
     #[must_use]
     pub fn has_bodies(&self) -> bool {
         !self.bodies.is_empty()
     }
 
-    /// How far it is from `from_W_m` along the unit vector `along_W` to the ground or a thing, at most `max_m`; `None`
-    /// where nothing is met. From inside of something solid or below the ground it is 0; a mesh of triangles has no
-    /// inside. Free bodies are where they start.
+    /// Returns the distance from `from_W_m` along the unit vector `along_W` to the ground or a thing, at most
+    /// `max_m`; `None` if nothing is met. From inside of something solid or below the ground it is 0; a mesh of
+    /// triangles has no inside. Free bodies are where they start.
     #[must_use]
     pub fn distance_m(&self, from_W_m: &Vector3<f64>, along_W: &Vector3<f64>, max_m: f64) -> Option<f64> {
         self.distance_among_m(&self.starts, from_W_m, along_W, max_m)
@@ -85,8 +85,8 @@ impl RayCaster {
         still.chain(moving).chain(ground_m).reduce(f64::min)
     }
 
-    /// How far `point_W_m` is from the nearest thing, the ground left out; 0 within what is solid, infinite where there
-    /// is none. Free bodies are where they start.
+    /// Returns the distance of `point_W_m` from the nearest thing, the ground left out; 0 within a solid thing,
+    /// infinite if there is none. Free bodies are where they start.
     #[must_use]
     pub fn clearance_m(&self, point_W_m: &Vector3<f64>) -> f64 {
         self.clearance_among_m(&self.starts, point_W_m)

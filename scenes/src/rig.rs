@@ -22,9 +22,9 @@ pub struct Rig {
     pub mount_B_m: Vector3<f64>,
     /// The most that body z leans away from world z, in whichever direction.
     pub tilt_max_rad: f64,
-    /// How far the bearing travels up; 0 where it does not.
+    /// Travel of the bearing upwards; 0 where it does not heave.
     pub heave_m: f64,
-    /// How far the bearing may move from its line along either horizontal axis of the world; 0 where it may not.
+    /// Travel of the bearing from its line along either horizontal axis of the world; 0 where it does not move so.
     pub sway_m: f64,
     /// Mass that travels with the bearing, beside the vehicle.
     pub moving_mass_kg: f64,
@@ -38,7 +38,7 @@ pub struct Rig {
     pub slide_damping_N_s_m: f64,
 }
 
-/// Where things of a scene stand.
+/// Places of the things of a scene.
 pub(crate) const PLACE: Bounds = Bounds {
     min: -1e6,
     max: 1e6,
@@ -46,7 +46,7 @@ pub(crate) const PLACE: Bounds = Bounds {
     why: "beyond 1000 km the ground is not flat, and contacts of a double lose their micrometres",
 };
 
-/// Where the vehicle is mounted, seen from its centre of mass.
+/// Place of the vehicle's mount, seen from its centre of mass.
 const MOUNT: Bounds = Bounds {
     min: -100.0,
     max: 100.0,

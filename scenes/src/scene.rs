@@ -9,10 +9,10 @@ use crate::surface::Surface;
 use nalgebra::Vector3;
 use vehicles::EffectEntry;
 
-/// What stands around the vehicles, beside the ground at z = 0.
+/// Things around the vehicles, beside the ground at z = 0.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Scene {
-    /// What the scene is called.
+    /// Name of the scene.
     pub name: String,
     /// The boxes, in the file's order.
     pub boxes: Vec<Cuboid>,
@@ -20,24 +20,24 @@ pub struct Scene {
     pub meshes: Vec<Mesh>,
     /// The balls, in the file's order.
     pub balls: Vec<Ball>,
-    /// What ties free bodies, in the file's order.
+    /// Joints that tie free bodies, in the file's order.
     pub joints: Vec<Joint>,
     /// Effects on every vehicle in the scene, such as wind; they act after those of its own file.
     pub effects: Vec<EffectEntry>,
-    /// What the vehicle hangs from, if anything.
+    /// Rig that the vehicle hangs from, if there is one.
     pub rig: Option<Rig>,
-    /// How the ground, and all that has no surface of its own, answers to what touches it.
+    /// Surface of the ground, and of all things that have none of their own.
     pub surface: Surface,
 }
 
 impl Scene {
-    /// All things, by their numbers: boxes first, then meshes, then balls.
+    /// Iterates over the things, by their numbers: boxes first, then meshes, then balls.
     pub fn things(&self) -> impl Iterator<Item = Thing<'_>> {
         let boxes = self.boxes.iter().map(Thing::Cuboid);
         boxes.chain(self.meshes.iter().map(Thing::Mesh)).chain(self.balls.iter().map(Thing::Ball))
     }
 
-    /// What the thing with this number is called; boxes are counted first, then meshes, then balls.
+    /// Returns the name of the thing with this number; boxes are counted first, then meshes, then balls.
     ///
     /// ```
     /// let room = scenes::Scene::parse(scenes::reference::ROOM, "room.toml")?;
@@ -49,7 +49,7 @@ impl Scene {
         self.things().nth(number).map(|thing| thing.name())
     }
 
-    /// How many things stand in the scene, the ground left out.
+    /// Returns the number of things in the scene, the ground left out.
     #[must_use]
     pub fn thing_count(&self) -> usize {
         self.boxes.len() + self.meshes.len() + self.balls.len()
@@ -64,36 +64,36 @@ impl Scene {
 /// A solid box.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cuboid {
-    /// What the file calls it, such as `wall +x`.
+    /// Its name in the file, such as `wall +x`.
     pub name: String,
     /// Its centre, in the world.
     pub centre_W_m: Vector3<f64>,
     /// Half of its lengths along its own axes.
     pub half_extents_m: Vector3<f64>,
-    /// How far its x axis is turned from that of the world, counter-clockwise from above.
+    /// Angle of its x axis from that of the world, counter-clockwise from above.
     pub yaw_rad: f64,
-    /// How it answers to what touches it.
+    /// Friction and restitution of its surface.
     pub surface: Surface,
-    /// How it moves; nothing where it stands still.
+    /// Its mass and motion; nothing where it stands still.
     pub body: Option<FreeBody>,
 }
 
 /// A solid ball.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ball {
-    /// What the file calls it.
+    /// Its name in the file.
     pub name: String,
     /// Its centre, in the world.
     pub centre_W_m: Vector3<f64>,
     /// Its radius.
     pub radius_m: f64,
-    /// How it answers to what touches it.
+    /// Friction and restitution of its surface.
     pub surface: Surface,
-    /// How it moves; nothing where it stands still.
+    /// Its mass and motion; nothing where it stands still.
     pub body: Option<FreeBody>,
 }
 
-/// What a thing needs to be drawn and met where it is.
+/// A thing of the scene, with all that drawing and contacts need.
 #[derive(Debug, Clone, Copy)]
 pub enum Thing<'a> {
     /// A box.
@@ -105,7 +105,7 @@ pub enum Thing<'a> {
 }
 
 impl<'a> Thing<'a> {
-    /// What the file calls it.
+    /// Returns its name in the file.
     #[must_use]
     pub fn name(&self) -> &'a str {
         match self {
@@ -115,7 +115,7 @@ impl<'a> Thing<'a> {
         }
     }
 
-    /// How it moves, if it does.
+    /// Returns its mass and motion, if it moves.
     #[must_use]
     pub fn body(&self) -> Option<&'a FreeBody> {
         match self {

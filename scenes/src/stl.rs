@@ -10,7 +10,7 @@ const TRIANGLE_BYTES: usize = 12 * 4 + 2;
 /// The triangles that `bytes` hold.
 ///
 /// # Errors
-/// In words: what is wrong with the bytes, and where.
+/// In words: the fault of the bytes, and its place.
 pub(crate) fn read(bytes: &[u8]) -> Result<Triangles, String> {
     let stated = bytes.get(80..HEAD_BYTES).and_then(|number| number.try_into().ok()).map(u32::from_le_bytes);
     let length = |count: u32| HEAD_BYTES as u64 + u64::from(count) * TRIANGLE_BYTES as u64;

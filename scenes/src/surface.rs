@@ -1,6 +1,6 @@
-//! How things answer to what touches them.
+//! Friction and restitution of things.
 
-/// How something answers to what touches it.
+/// Friction and restitution of a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Surface {
     /// Coulomb's coefficient of friction: the force along the surface is at most this times that across.
@@ -10,7 +10,7 @@ pub struct Surface {
 }
 
 impl Default for Surface {
-    /// That of a scene which does not say: tuned, no source.
+    /// Surface of a scene that states none: tuned, no source.
     fn default() -> Self {
         Self { friction: 0.5, restitution: 0.2 }
     }

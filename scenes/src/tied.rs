@@ -1,11 +1,11 @@
-//! What hangs from what: free bodies, by the joints of their scene.
+//! Free bodies that hang from the vehicle, by the joints of their scene.
 
 use crate::joint::{End, Freedom};
 use crate::scene::Scene;
 
 impl Scene {
-    /// Which of [`Scene::bodies`] hang from the vehicle, by joints to it or to others that do; the world ties nothing
-    /// together.
+    /// Tells for each of [`Scene::bodies`] whether it hangs from the vehicle, by joints to it or to others that
+    /// do; the world ties nothing together.
     #[must_use]
     pub fn hanging(&self) -> Vec<bool> {
         let mut hangs = vec![false; self.bodies().count()];
@@ -29,13 +29,13 @@ impl Scene {
         hangs
     }
 
-    /// Whether a joint ties the vehicle.
+    /// True if a joint ties the vehicle.
     #[must_use]
     pub fn is_vehicle_tied(&self) -> bool {
         self.joints.iter().any(|joint| [joint.parent, joint.child].contains(&End::Vehicle))
     }
 
-    /// The first joint other than a rope that ties the vehicle, or what hangs from it, to the world.
+    /// The first joint other than a rope that ties the vehicle, or a body that hangs from it, to the world.
     pub(crate) fn joint_that_pins_the_vehicle(&self) -> Option<usize> {
         let hangs = self.hanging();
         self.joints.iter().position(|joint| {

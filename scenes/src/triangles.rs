@@ -43,7 +43,7 @@ impl Triangles {
         Err(format!("it holds {} triangles, and at most {TRIANGLES_MAX} are read", self.faces.len()))
     }
 
-    /// The same, checked for what no format may hold.
+    /// The same, checked for the faults of any format.
     pub(crate) fn checked(self) -> Result<Self, String> {
         if self.faces.is_empty() {
             return Err("it holds no triangle".to_owned());

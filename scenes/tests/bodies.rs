@@ -1,4 +1,4 @@
-//! Free bodies and joints of a scene file: what they are, and what is refused.
+//! Free bodies and joints of a scene file: their values, and the faults that are refused.
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
 use nalgebra::Vector3;

@@ -1,4 +1,4 @@
-//! Meshes in scenes: three formats of one shape, where a ray meets them, and what is refused.
+//! Meshes in scenes: three formats of one shape, the points where a ray meets them, and the faults that are refused.
 
 use nalgebra::Vector3;
 use scenes::{Mesh, RayCaster, Scene, Solidity};
@@ -319,7 +319,7 @@ fn a_mesh_file_that_is_not_there_is_named() {
     assert!(told.contains("labyrinth.stl") && told.contains("No such file"), "{told}");
 }
 
-/// As scripts/furniture says them.
+/// As scripts/furniture places them.
 #[test]
 fn the_furniture_of_the_office_is_where_its_file_puts_it() {
     let scene = Scene::load(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/office.toml"))).unwrap();

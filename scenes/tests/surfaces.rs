@@ -1,4 +1,4 @@
-//! Friction and restitution of a scene file: whose they are, what they may be.
+//! Friction and restitution of a scene file: the things that they belong to, and their values.
 
 use scenes::{Scene, Surface};
 

@@ -1,9 +1,9 @@
-//! The barometer node: air pressure, and the height that it means.
+//! The barometer node: air pressure, and the height that follows from it.
 //!
 //! Reading = pressure at the centre of mass in the standard atmosphere (`crate::atmosphere`) + bias + white
 //! noise, in steps of the part's resolution and cut off at its range; the bias walks at random, as weather and
-//! temperature move it. The altitude follows from the reading and a reference pressure. `crate::channel` says
-//! when it measures, how measurements are delayed and lost.
+//! temperature move it. The altitude follows from the reading and a reference pressure. `crate::channel` gives the
+//! times, delays and losses of measurements.
 
 use crate::atmosphere::{SEA_LEVEL_PRESSURE_PA, height_m, pressure_Pa};
 use crate::channel::Chance;
@@ -22,7 +22,7 @@ const PRESSURE_MIN_PA: f64 = 1.0e3;
 const PRESSURE_MAX_PA: f64 = 1.2e5;
 
 parameters! {
-    /// What a barometer makes of the truth; the defaults are a MEAS Switzerland (TE Connectivity) MS5611-01BA03.
+    /// Parameters of a barometer; the defaults are a MEAS Switzerland (TE Connectivity) MS5611-01BA03.
     ///
     /// Its data sheet (DA5611-01BA03): resolution 0.012 mbar RMS at an oversampling ratio of 4096, which is its noise;
     /// the compensated reading in steps of 0.01 mbar; conversions of pressure and temperature of 8.22 ms each, one

@@ -1,9 +1,9 @@
 //! The battery monitor node: voltage and current at the battery's terminals, and the charge that is left.
 //!
-//! Reading = truth + bias + white noise, in steps of the part's resolution. The charge is what a monitor can know
-//! of it: the measured current counted from `initial_charge` on. `crate::channel` says when it measures, how
-//! measurements are delayed and lost; the count goes on through losses. Where the truth is not valid, since the plant
-//! has no model of its battery, nothing is measured and `valid` is 0.
+//! Reading = truth + bias + white noise, in steps of the part's resolution. The charge is as a monitor can know it:
+//! the measured current counted from `initial_charge` on. `crate::channel` gives the times, delays and losses of
+//! measurements; the count goes on through losses. If the truth is not valid, since the plant has no model of its
+//! battery, nothing is measured and `valid` is 0.
 
 use crate::channel::Chance;
 use crate::parameters::within;
@@ -17,7 +17,7 @@ use diagnostics::parameter::{ParameterError, finite, not_negative, positive};
 use inputs::InputFiles;
 
 parameters! {
-    /// What a battery monitor makes of the truth; the defaults are a Texas Instruments INA226 with a shunt of 2 mΩ.
+    /// Parameters of a battery monitor; the defaults are a Texas Instruments INA226 with a shunt of 2 mΩ.
     ///
     /// Its data sheet (SBOS547): 1.25 mV a count of voltage, 2.5 µV a count of shunt voltage, which is 1.25 mA; 1.1 ms
     /// for each of the two conversions. It states no noise: one count of each, no source. The rate is 10 Hz, tuned, no
@@ -72,7 +72,7 @@ sensor! {
     }
 }
 
-/// What the monitor reads.
+/// Inputs of the monitor.
 #[derive(Debug, InputPorts)]
 pub struct BatteryInputs<'a> {
     /// The truth.

@@ -1,10 +1,10 @@
-//! From measuring to arriving: when a sensor measures, how long its measurements travel, and which are lost.
+//! From measuring to arriving: the times of a sensor's measurements, their delays, and their losses.
 //!
 //! A sensor's node computes at each of its periods. It *measures* at the first of them at or after each multiple
 //! of 1 / `rate_hz`; a measurement *arrives* at the first at or after `delay_ms` later. In between it waits in a
-//! queue that is part of the node's hand-over state, so that a backup goes on with what is under way. Rate
+//! queue that is part of the node's hand-over state, so that a backup goes on with the measurements under way. Rate
 //! and delay are therefore exact where they are multiples of the node's period, and rounded up to it elsewhere;
-//! a measurement always holds the truth of the time that it states.
+//! a measurement always holds the truth of its stated time.
 //!
 //! Losses follow a two-state Markov chain (Gilbert, "Capacity of a burst-noise channel", Bell System Technical
 //! Journal 39, 1960): with probability `dropout` a measurement is lost, and losses last `dropout_mean_s` on
@@ -16,27 +16,27 @@ use bus::context::NodeContext;
 use bus::random::{Stream, stream, uniform};
 use diagnostics::parameter::{ParameterError, not_negative, positive, refuse, require};
 
-/// Steps of a node between two measurements below which it tells that they are not evenly spaced: a fifth of the interval.
-/// Tuned, no source.
+/// Steps of a node between two measurements below which it warns that they are not evenly spaced: a fifth of
+/// the interval. Tuned, no source.
 const UNEVEN_SHARE: f64 = 5.0;
 
-/// How many measurements a queue holds: those under way, and the one that arrived last.
+/// Capacity of a queue of measurements: those under way, and the one that arrived last.
 pub const QUEUE: usize = 32;
 
-/// How many measurements may be under way: one place of the queue is for the one that arrived last, and one for
+/// Number of measurements that may be under way: one place of the queue is for the one that arrived last, and one for
 /// a delay that is rounded up to the node's period.
 const UNDER_WAY_MAX: f64 = (QUEUE - 2) as f64;
 
-/// When a sensor measures, and what becomes of it on the way.
+/// Times at which a sensor measures, and the delays and losses of its measurements.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Timing {
     /// Measurements a second.
     pub rate_hz: f64,
-    /// How long after measuring a measurement arrives.
+    /// Time from a measurement to its arrival.
     pub delay_ms: f64,
-    /// The fraction of measurements that are lost.
+    /// Fraction of measurements that are lost.
     pub dropout: f64,
-    /// How long losses last on average; 0 where each is independent of the one before.
+    /// Mean duration of losses; 0 where each is independent of the one before.
     pub dropout_mean_s: f64,
 }
 
@@ -58,7 +58,7 @@ impl Timing {
         require("dropout_mean_s", self.dropout_mean_s, mean_is_good, expected)
     }
 
-    /// Whether a node of `run` can measure so often; warns where measurements would be uneven or never arrive.
+    /// Refuses a rate at which a node of `run` cannot measure; warns if measurements would be uneven or never arrive.
     ///
     /// # Errors
     /// The sensor measures more often than its node computes, or as [`Timing::validate`].
@@ -151,12 +151,12 @@ pub struct Channel {
     loss: Stream,
 }
 
-/// What a sensor remembers, the measurements under way among it.
+/// State of a sensor, the measurements under way among it.
 pub trait Remembered {
-    /// What it sends.
+    /// Message that it sends.
     type Measurement: Copy;
 
-    /// What is under way, and the last measurements, which start as what is sent until the first arrives.
+    /// Returns the measurements under way, and the last ones, which start as what is sent until the first arrives.
     fn under_way(&mut self) -> (&mut ChannelState, &mut [Self::Measurement; QUEUE]);
 }
 
@@ -169,12 +169,12 @@ pub struct Chance<'a> {
     pub noise: &'a mut Stream,
     loss: &'a mut Stream,
     losses: Losses,
-    /// Which parts of the last measurement were lost, a bit for each.
+    /// Parts of the last measurement that were lost, a bit for each.
     lost: u32,
 }
 
 impl Chance<'_> {
-    /// Whether part `part` of the measurement, numbered from 0, is lost; to be asked once for each.
+    /// Draws whether part `part` of the measurement, numbered from 0, is lost; to be asked once for each.
     pub fn is_lost(&mut self, part: u32) -> bool {
         let was_lost = self.lost >> part & 1 == 1;
         let chance = if was_lost { self.losses.stay } else { self.losses.begin };
@@ -185,7 +185,7 @@ impl Chance<'_> {
 }
 
 impl Channel {
-    /// The channel of the node that `context` tells of; warns where measurements would be uneven or never arrive.
+    /// The channel of the node of `context`; warns if measurements would be uneven or never arrive.
     ///
     /// # Errors
     /// As [`Timing::check`].
@@ -199,8 +199,8 @@ impl Channel {
         Ok(Self { interval_ns, delay_ns, losses: Losses::new(timing), noise, loss })
     }
 
-    /// What has arrived by `now_ns`, a tick of its node. Where a measurement is due, `measure` makes it from the one
-    /// before.
+    /// Returns the measurement that has arrived by `now_ns`, a tick of its node. If one is due, `measure` makes
+    /// it from the one before.
     pub(crate) fn measure<S: Remembered>(
         &self,
         now_ns: u64,

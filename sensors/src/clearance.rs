@@ -1,4 +1,4 @@
-//! The clearance node: how far a vehicle truly is from what stands in the scene. It is no sensor: a judge reads it,
+//! The clearance node: true distance of a vehicle from the things of the scene. It is not a sensor: a judge reads it,
 //! and plots; controllers have no port for it.
 
 use crate::cone::{caster, check_bodies, check_told};
@@ -13,7 +13,7 @@ use scenes::{BodyPose, RayCaster};
 use std::f64::consts::{PI, TAU};
 use std::path::PathBuf;
 
-/// How far a wall is looked for, m.
+/// Distance within which walls are searched, m.
 const REACH_M: f64 = 1000.0;
 
 /// Nearer to the world's origin than this no laps are counted, m.
@@ -24,7 +24,7 @@ parameters! {
     pub struct Parameters {
         /// Scene file; there is no default.
         scene: Option<PathBuf> = None,
-        /// The distance from the wall that is to be kept, m.
+        /// The distance to keep from the wall, m.
         keep_m: f64 = 3.0 => not_negative,
         /// Along a side, the wall ahead and the wall behind are at least this much farther than `keep_m`, m.
         corner_m: f64 = 0.75 => not_negative,
@@ -44,16 +44,16 @@ pub struct ClearanceState {
     laps: f64,
 }
 
-/// What the component reads.
+/// Inputs of the component.
 #[derive(Debug, InputPorts)]
 pub struct Inputs<'a> {
     /// The truth.
     pub state: &'a PlantState,
-    /// Where the scene's free bodies are; for a scene that has some.
+    /// Poses of the scene's free bodies; for a scene that has some.
     pub bodies: Option<&'a BodyStates>,
 }
 
-/// What the component sends.
+/// Outputs of the component.
 #[derive(Debug, OutputPorts)]
 pub struct Outputs {
     /// The distances.

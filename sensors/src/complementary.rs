@@ -10,11 +10,11 @@
 //! *Its value.* 0.98 at 1 kHz is τ = 49 ms. In free flight that follows the accelerometer, and the
 //! accelerometer cannot see tilt there: it measures all forces but gravity, which without drag are the
 //! rotors' thrust along body z, so it reads "level" at any attitude. A roll of 10° held for 1 s would be
-//! estimated as about 0°, and a controller would roll on. What leaks away in time t is t/τ of the angle,
-//! what the gyroscope's noise density n adds is n·√(τ/2), and what its bias b adds is b·τ. The default,
-//! τ = 30 s, loses 0.33° of 10° in 1 s and adds 0.04° of noise with the default IMU. No value of τ cures
-//! the cause: a controller that holds the estimate at zero lets the truth drift at the bias b for as long
-//! as nothing but thrust acts on the accelerometer. Drag makes tilt visible again, with its own delay.
+//! estimated as about 0°, and a controller would roll on. In time t the part t/τ of the angle leaks away. The
+//! gyroscope's noise density n adds n·√(τ/2), and its bias b adds b·τ. The default, τ = 30 s, loses 0.33° of
+//! 10° in 1 s and adds 0.04° of noise with the default IMU. No value of τ cures the cause: a controller that
+//! holds the estimate at zero lets the truth drift at the bias b for as long as nothing but thrust acts on the
+//! accelerometer. Drag makes tilt visible again, with its own delay.
 //!
 //! *Rates.* The gyroscope gives body rates p, q, r; the angles' own rates follow from them by eq. 3.18,
 //! singular at ±90° of pitch. A unit quaternion is propagated instead, which is the same to first order
@@ -35,7 +35,7 @@ use std::f64::consts::{PI, TAU};
 const PITCH_BLEND_MAX_RAD: f64 = 1.4;
 
 parameters! {
-    /// How much the accelerometer is trusted.
+    /// Parameters of the filter: its trust in the accelerometer.
     #[derive(Copy)]
     pub struct ComplementaryParams {
         /// Time constant with which roll and pitch follow the accelerometer, s. Default 30 (tuned, no
@@ -44,7 +44,7 @@ parameters! {
         /// In place of the time constant: the gyroscope's weight once a sample, as the thesis's 0.98 (§4.3) is
         /// printed. The filter then depends on its period: see the head of this file. Default: none.
         gyroscope_weight: Option<f64> = None => within(f64::EPSILON..1.0, "above 0 and below 1"),
-        /// The accelerometer is left out while the size of what it reads differs from gravity by more than
+        /// The accelerometer is left out while the size of its reading differs from gravity by more than
         /// this fraction: then it surely measures more than gravity. Default 0.2 (tuned, no source).
         gravity_tolerance: f64 = 0.2 => not_negative,
         /// Gravity, m/s². Default 9.81 (thesis §3.1).
@@ -66,7 +66,7 @@ pub(crate) fn tilt_rad(specific_force_B: &Vector3<f64>) -> (f64, f64) {
     (libm::atan2(y, z), libm::atan2(-x, libm::hypot(y, z)))
 }
 
-/// The filter at one sample period: all that does not change during a run.
+/// The filter at one sample period, with everything that does not change during a run.
 ///
 /// ```
 /// use nalgebra::Vector3;
@@ -147,7 +147,7 @@ impl Complementary {
         UnitQuaternion::new_normalize(turned.into_inner())
     }
 
-    /// `attitude` with roll and pitch drawn to what the accelerometer reads, if it can be trusted.
+    /// `attitude` with roll and pitch drawn to the accelerometer's, if it can be trusted.
     fn blend(
         &self,
         attitude: UnitQuaternion<f64>,
@@ -172,14 +172,14 @@ impl Complementary {
     }
 }
 
-/// What the filter reads.
+/// Inputs of the filter.
 #[derive(Debug, InputPorts)]
 pub struct ImuInputs<'a> {
     /// Readings of the inertial measurement unit.
     pub imu: &'a Imu,
 }
 
-/// What the filter sends.
+/// Outputs of the filter.
 #[derive(Debug, OutputPorts)]
 pub struct Outputs {
     /// The attitude.
@@ -245,7 +245,7 @@ mod tests {
         ImuReading { specific_force_B_m_s2: force_B, angular_velocity_B_rad_s: rate_B }
     }
 
-    /// What an IMU at rest at these angles reads.
+    /// Returns the reading of an IMU at rest at these angles.
     fn at_rest(roll_rad: f64, pitch_rad: f64) -> ImuReading {
         let attitude_WB = UnitQuaternion::from_euler_angles(roll_rad, pitch_rad, 0.4);
         reading(attitude_WB.inverse() * Vector3::new(0.0, 0.0, 9.81), Vector3::zeros())

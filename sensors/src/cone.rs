@@ -1,4 +1,4 @@
-//! What an ultrasonic beam meets: the nearest of what stands in its cone.
+//! Ultrasonic beam: the nearest object in its cone.
 //!
 //! A beam widens from the body's centre of mass about one of its axes. Flat things, the ground and the boxes of a
 //! scene, are found with rays: one along the axis, eight at half of the cone's half angle and eight at its edge.
@@ -29,7 +29,7 @@ pub fn caster(files: &InputFiles, path: Option<&Path>) -> Result<RayCaster, Para
     Ok(RayCaster::new(&scene))
 }
 
-/// Refuses a scene with free bodies where the input `bodies` does not tell where they are, and that input elsewhere.
+/// Refuses a scene with free bodies without the input `bodies`, and that input for a scene without free bodies.
 ///
 /// # Errors
 /// The two do not go together.
@@ -88,8 +88,8 @@ impl Cone {
         Self { axis_B: *axis_B, half_angle_rad, rays_B }
     }
 
-    /// How far it is from `from_W_m`, with the body at `attitude_WB`, to the nearest thing of the scene in the
-    /// cone, at most `reach_m`, with the scene's free bodies at `bodies`.
+    /// Returns the distance from `from_W_m`, with the body at `attitude_WB`, to the nearest thing of the scene in the
+    /// cone, if it is at most `reach_m`. The scene's free bodies are at `bodies`.
     pub fn scene_distance_m(
         &self,
         (scene, bodies): (&RayCaster, &[BodyPose]),
@@ -103,8 +103,8 @@ impl Cone {
             .reduce(f64::min)
     }
 
-    /// How far it is to the nearest point in the cone of a sphere of `radius_m` whose centre is at `centre_B_m`
-    /// from the cone's tip; 0 from inside of it.
+    /// Returns the distance from the cone's tip to the nearest point in the cone of a sphere of `radius_m`
+    /// whose centre is at `centre_B_m`; 0 from inside the sphere.
     pub fn sphere_distance_m(&self, centre_B_m: &Vector3<f64>, radius_m: f64) -> Option<f64> {
         let centre_m = centre_B_m.norm();
         if centre_m <= radius_m {

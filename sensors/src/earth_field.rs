@@ -5,9 +5,9 @@ use nalgebra::Vector3;
 /// Magnetic flux density in Krailling near Munich, where the Hummingbird was made, T: 48.09° N, 11.41° E, 550 m, at the
 /// beginning of 2025, from the World Magnetic Model 2025 (NOAA NCEI and BGS).
 pub const FIELD_T: f64 = 48.709e-6;
-/// How far the field points below the horizon there, degrees.
+/// Inclination of the field there, below the horizon, degrees.
 pub const INCLINATION_DEG: f64 = 64.33;
-/// How far magnetic north lies east of geographic north there, degrees.
+/// Declination there: angle of magnetic north east of geographic north, degrees.
 pub const DECLINATION_DEG: f64 = 4.11;
 
 /// The field in the world: x north, y west, z up. An eastern declination turns it clockwise seen from above.

@@ -1,4 +1,4 @@
-//! The extended Kalman filter as a node: position, velocity and attitude from an IMU and what else measures.
+//! The extended Kalman filter as a node: position, velocity and attitude from an IMU and other sensors.
 
 pub mod filter;
 pub mod history;
@@ -27,7 +27,7 @@ const UNKNOWN_SIGMA: f64 = 1e6;
 /// Degrees of freedom of the measurements, in the order of [`Source::ALL`].
 const DEGREES_OF_FREEDOM: [u32; 4] = [6, 6, 1, 3];
 
-/// What the filter reads.
+/// Inputs of the filter.
 #[derive(Debug, InputPorts)]
 pub struct EkfInputs<'a> {
     /// Readings of the inertial measurement unit.
@@ -42,12 +42,12 @@ pub struct EkfInputs<'a> {
     pub magnetometer: Option<&'a Magnetometer>,
 }
 
-/// What the filter sends.
+/// Outputs of the filter.
 #[derive(Debug, OutputPorts)]
 pub struct Outputs {
     /// The motion.
     pub estimate: StateEstimate,
-    /// How well the measurements agree with it.
+    /// Agreement of the measurements with it.
     pub innovation: Option<Innovation>,
     /// The attitude alone, for controllers that take it from another estimator than the position.
     pub attitude: Option<AttitudeEstimate>,

@@ -3,7 +3,7 @@
 //! Position = truth + bias + drift + white noise; velocity = truth + white noise. The drift stands for orbits,
 //! clocks and the ionosphere, which move the position slowly: a first-order Gauss–Markov process, stationary from
 //! the first measurement on, d' = e^(−Δt/τ) d + σ √(1 − e^(−2Δt/τ)) n (Gelb, "Applied Optimal Estimation", MIT
-//! Press 1974, §3.6). `crate::channel` says when it measures, how measurements are delayed and lost.
+//! Press 1974, §3.6). `crate::channel` gives the times, delays and losses of measurements.
 
 use crate::channel::Chance;
 use crate::noise::standard_normal;
@@ -17,7 +17,7 @@ use inputs::InputFiles;
 use nalgebra::Vector3;
 
 parameters! {
-    /// What a satellite receiver makes of the truth; the defaults are a u-blox NEO-M8N.
+    /// Parameters of a satellite receiver; the defaults are a u-blox NEO-M8N.
     ///
     /// Its data sheet (UBX-15031086): 10 Hz; horizontal position within 2.5 m half of the time, which for equal axes
     /// is σ = 2.5 m / 1.177 = 2.1 m each; velocity within 0.05 m/s half of the time, σ = 0.05 / 0.6745 = 0.074 m/s.
@@ -52,7 +52,7 @@ parameters! {
 }
 
 impl GpsParams {
-    /// The drift one measurement after `drift_W_m`; there is none before the first.
+    /// The drift one measurement after `drift_W_m`, which is `None` before the first.
     fn drift(&self, drift_W_m: Option<Vector3<f64>>, random: &mut Stream) -> Vector3<f64> {
         let sigma_m = Vector3::from(self.position_drift_m);
         let new_W_m = sigma_m.component_mul(&standard_normal(random));

@@ -1,9 +1,9 @@
 //! The ideal estimator: hands the truth on as an estimate, without error, noise or delay.
 //!
 //! The thesis's main script reads the positions and velocities of its simulator and sends them to the controller (§4.4).
-//! This is the one way in which a controller can be told as much here. It is there to fly what the thesis prints
-//! (`manifests/thesis`), and to tell an estimator's share in an error from a controller's; a result that it had a part in
-//! holds for no vehicle.
+//! Only this node gives a controller the truth. It serves for flights as the thesis prints them
+//! (`manifests/thesis`), and separates an estimator's share in an error from a controller's. A result that it
+//! had a part in holds for no vehicle.
 
 use crate::sensing::TruthInputs;
 use bus::OutputPorts;
@@ -13,12 +13,12 @@ use bus::messages::StateEstimate;
 use diagnostics::ParameterError;
 use serde::Deserialize;
 
-/// It has no parameters.
+/// Parameters of the estimator: none.
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Parameters {}
 
-/// What it sends.
+/// Outputs of the component.
 #[derive(Debug, OutputPorts)]
 pub struct Outputs {
     /// The truth; its standard deviations are 0.

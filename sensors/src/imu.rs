@@ -1,6 +1,6 @@
-//! The IMU node: reads the plant's true motion, publishes what an inertial measurement unit makes of it.
+//! The IMU node: reads the plant's true motion, publishes the readings of an inertial measurement unit.
 //!
-//! It reads at each of its periods. `crate::channel` says how readings are delayed and lost; a lost one repeats the
+//! It reads at each of its periods. `crate::channel` gives the delays and losses of readings; a lost one repeats the
 //! one before.
 
 use crate::channel::{Channel, ChannelState, QUEUE, Remembered};
@@ -54,7 +54,7 @@ pub struct ImuState {
 }
 
 impl ImuState {
-    /// Before the first reading: until it arrives, the IMU says that it rests level.
+    /// Before the first reading: until it arrives, the IMU reads rest and level.
     fn new(model: &ImuModelState) -> Self {
         let at_rest = Imu { specific_force: [0.0, 0.0, STANDARD_GRAVITY_M_S2].into(), ..Default::default() };
         let mut state = Self { queue: [at_rest; QUEUE], ..Self::default() };
@@ -106,7 +106,7 @@ impl Remembered for ImuState {
     }
 }
 
-/// What the IMU sends.
+/// Outputs of the IMU.
 #[derive(Debug, OutputPorts)]
 pub struct Outputs {
     /// The reading that arrived last.
@@ -218,14 +218,14 @@ mod tests {
         Harness::in_context(params, &NodeContext::new("imu", &[]).seeded(7)).unwrap()
     }
 
-    /// What the model reads of the truth, tick by tick.
+    /// Returns the model's readings of the truth, tick by tick.
     fn read(params: ImuParams, ticks: u32) -> Vec<Imu> {
         let model = ImuModel::new(params, 1000.0).unwrap();
         let mut state = model.initial_state(7, "imu");
         (0..ticks).map(|tick| message(&model.read(&mut state, &truth(&truth_at(tick))))).collect()
     }
 
-    /// What is sent, and what was read, tick by tick.
+    /// Returns the readings that are sent and those that were made, tick by tick.
     fn flown(params: ImuParams, ticks: u32) -> Vec<(Imu, Imu)> {
         let mut imu = imu(params);
         let sent = (0..ticks).map(|tick| imu.step(TruthInputs { state: &truth_at(tick) }).unwrap().imu);

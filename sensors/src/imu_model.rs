@@ -1,8 +1,8 @@
 //! The inertial measurement unit: specific force and angular rate in, a noisy reading out.
 //!
-//! Reading = what is felt + bias + white noise, cut off at the range of the part; see [`crate::noise`]. The
-//! axes are those of the body (x forward, y left, z up); what is felt is the truth at the centre of mass unless
-//! [`crate::imu_part`] makes something else of it.
+//! Reading = true quantity + bias + white noise, cut off at the range of the part; see [`crate::noise`]. The
+//! axes are those of the body (x forward, y left, z up). The true quantity is that at the centre of mass unless
+//! [`crate::imu_part`] changes it.
 
 use crate::channel::Timing;
 use crate::noise::{BiasWalk, WhiteNoise};
@@ -14,7 +14,7 @@ use diagnostics::parameter::{ParameterError, finite, not_negative, positive};
 use nalgebra::Vector3;
 
 parameters! {
-    /// What an IMU does to the truth; the defaults are an Analog Devices ADIS16448.
+    /// Parameters of an IMU; the defaults are an Analog Devices ADIS16448.
     ///
     /// The noise densities and bias walks are those that the EuRoC micro aerial vehicle data set gives for
     /// its ADIS16448 (Burri et al., "The EuRoC micro aerial vehicle datasets", IJRR 2016, file
@@ -40,51 +40,51 @@ parameters! {
         gyroscope_initial_bias_rad_s: [f64; 3] = [0.0; 3] => finite,
         /// The gyroscope reads no more than this on any axis, rad/s.
         gyroscope_range_rad_s: f64 = 1000.0_f64.to_radians() => positive,
-        /// Where the part sits, seen from the centre of mass, body axes, m.
+        /// Position of the part, seen from the centre of mass, body axes, m.
         position_m: [f64; 3] = [0.0; 3] => within(-10.0..=10.0, "-10 to 10 m"),
-        /// How the part is turned against the body, as a rotation vector, degrees.
+        /// Rotation of the part against the body, as a rotation vector, degrees.
         misalignment_deg: [f64; 3] = [0.0; 3] => within(-180.0..=180.0, "-180 to 180 deg"),
         /// Errors of the accelerometer's scale, of each axis.
         accelerometer_scale_error: [f64; 3] = [0.0; 3] => within(-0.5..=0.5, "-0.5 to 0.5"),
-        /// What the accelerometer's axes read of what is along others: x of y, x of z, y of x, y of z, z of x, z of y.
+        /// Cross-axis sensitivities of the accelerometer: x of y, x of z, y of x, y of z, z of x, z of y.
         accelerometer_cross_axis: [f64; 6] = [0.0; 6] => within(-0.5..=0.5, "-0.5 to 0.5"),
         /// Corner frequency of the accelerometer's low pass of first order, Hz; 0 where there is none.
         accelerometer_bandwidth_hz: f64 = 0.0 => not_negative,
         /// The accelerometer reads whole multiples of this, m/s²; 0 where it resolves all.
         accelerometer_resolution_m_s2: f64 = 0.0 => not_negative,
-        /// How the accelerometer's bias drifts with temperature, of each axis, m/s²/K.
+        /// Drift of the accelerometer's bias with temperature, of each axis, m/s²/K.
         accelerometer_bias_drift_m_s2_k: [f64; 3] = [0.0; 3] => within(-1.0..=1.0, "-1 to 1 m/s^2/K"),
-        /// How far the unbalance of a rotor shakes the part, m.
+        /// Amplitude with which the unbalance of a rotor shakes the part, m.
         accelerometer_vibration_m: f64 = 0.0 => within(0.0..=1e-3, "0 to 1e-3 m"),
         /// Errors of the gyroscope's scale, of each axis.
         gyroscope_scale_error: [f64; 3] = [0.0; 3] => within(-0.5..=0.5, "-0.5 to 0.5"),
-        /// What the gyroscope's axes read of turns about others, in the order of the accelerometer's.
+        /// Cross-axis sensitivities of the gyroscope, in the order of the accelerometer's.
         gyroscope_cross_axis: [f64; 6] = [0.0; 6] => within(-0.5..=0.5, "-0.5 to 0.5"),
         /// Corner frequency of the gyroscope's low pass of first order, Hz; 0 where there is none.
         gyroscope_bandwidth_hz: f64 = 0.0 => not_negative,
         /// The gyroscope reads whole multiples of this, rad/s; 0 where it resolves all.
         gyroscope_resolution_rad_s: f64 = 0.0 => not_negative,
-        /// How the gyroscope's bias drifts with temperature, of each axis, rad/s/K.
+        /// Drift of the gyroscope's bias with temperature, of each axis, rad/s/K.
         gyroscope_bias_drift_rad_s_k: [f64; 3] = [0.0; 3] => within(-0.1..=0.1, "-0.1 to 0.1 rad/s/K"),
-        /// What the gyroscope's axes read of the specific force along themselves, rad/s per m/s².
+        /// Sensitivity of the gyroscope's axes to the specific force along themselves, rad/s per m/s².
         gyroscope_g_sensitivity: [f64; 3] = [0.0; 3] => within(-0.1..=0.1, "-0.1 to 0.1 rad/s per m/s^2"),
-        /// By what angle the unbalance of a rotor shakes the part, rad.
+        /// Angle by which the unbalance of a rotor shakes the part, rad.
         gyroscope_vibration_rad: f64 = 0.0 => within(0.0..=0.01, "0 to 0.01 rad"),
-        /// How much the part warms up after it is switched on, at tick 0, K.
+        /// Rise of the part's temperature after it is switched on, at tick 0, K.
         warming_k: f64 = 0.0 => within(-100.0..=100.0, "-100 to 100 K"),
         /// The time constant of its warming up, s.
         warming_time_s: f64 = 300.0 => positive,
-        /// How long after it is made a reading arrives, ms.
+        /// Time from a reading to its arrival, ms.
         delay_ms: f64 = 0.0,
-        /// The fraction of readings that are lost.
+        /// Fraction of readings that are lost.
         dropout: f64 = 0.0,
-        /// How long losses last on average, s; 0 where each is independent of the one before.
+        /// Mean duration of losses, s; 0 where each is independent of the one before.
         dropout_mean_s: f64 = 0.0,
     }
 }
 
 impl ImuParams {
-    /// What becomes of readings, `rate_hz` of which are made in a second, on their way.
+    /// Returns the timing and the losses of readings, `rate_hz` of which are made in a second.
     pub(crate) fn timing(&self, rate_hz: f64) -> Timing {
         let Self { delay_ms, dropout, dropout_mean_s, .. } = *self;
         Timing { rate_hz, delay_ms, dropout, dropout_mean_s }
@@ -121,7 +121,7 @@ impl From<&Imu> for ImuReading {
     }
 }
 
-/// The IMU at one sample rate: all that does not change during a run.
+/// The IMU at one sample rate, with everything that does not change during a run.
 ///
 /// ```
 /// use nalgebra::Vector3;
@@ -146,7 +146,7 @@ pub struct ImuModel {
     gyroscope_walk: BiasWalk,
 }
 
-/// All that does change: where the biases have walked to, and the node's random stream.
+/// Variable part of the model: the biases as they have walked, and the node's random stream.
 #[derive(Debug, Clone)]
 pub struct ImuModelState {
     /// The accelerometer's bias at the next reading, body axes, m/s².
@@ -187,7 +187,7 @@ impl ImuModel {
 
     /// The reading of `truth`; the biases then walk one step on.
     ///
-    /// The stream is drawn in a fixed order whatever the parameters, so that changing one of them does
+    /// The stream is drawn in a fixed order under any parameters, so that changing one of them does
     /// not reshuffle the noise of the others.
     pub fn read(&self, state: &mut ImuModelState, truth: &ImuReading) -> ImuReading {
         let random = &mut state.random;

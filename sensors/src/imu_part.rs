@@ -1,8 +1,8 @@
-//! What an IMU's mounting and its mechanics make of the motion, before noise: where it sits, how it is shaken by the
-//! rotors, how fast it follows, how its axes lie, and how it drifts as it warms up; and its resolution, after noise.
+//! Effects of an IMU's mounting and mechanics on its readings before noise: position, vibration by the rotors,
+//! bandwidth, alignment of the axes, and drift as it warms up; and its resolution, after noise.
 //!
-//! In the order of the signal: lever arm, vibration, bandwidth, then alignment and scale, then what acceleration and
-//! temperature add to the biases. All of it is off by default.
+//! In the order of the signal: lever arm, vibration, bandwidth, then alignment and scale, then the biases due to
+//! acceleration and temperature. All are off by default.
 
 use crate::imu_model::{ImuParams, ImuReading};
 use crate::steps::in_steps;
@@ -32,15 +32,15 @@ const START_ANGLES_RAD: [f64; ROTORS_MAX] =
 pub struct ImuPart {
     params: ImuParams,
     period_s: f64,
-    /// Takes what is felt in body axes to what the axes of each triad read.
+    /// Rotation of vectors in body axes to the readings of the axes of each triad.
     force_axes: Matrix3<f64>,
     rate_axes: Matrix3<f64>,
-    /// How much of what is new the filters take over in a period; 1 where there is none.
+    /// Share of a new value that the filters take over in a period; 1 without a filter.
     force_share: f64,
     rate_share: f64,
 }
 
-/// What the part remembers from one reading to the next.
+/// State of the part from one reading to the next.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ImuPartState {
     /// Readings so far.
@@ -49,7 +49,7 @@ pub struct ImuPartState {
     pub rotor_angles_rad: [f64; ROTORS_MAX],
     /// The true angular velocity at the last reading.
     pub last_B_rad_s: Vector3<f64>,
-    /// What has come through the filters.
+    /// Outputs of the filters.
     pub filtered: ImuReading,
 }
 
@@ -90,7 +90,7 @@ impl ImuPart {
         }
     }
 
-    /// What the triads feel, in their own axes, without noise.
+    /// Returns the quantities that the triads feel, in their own axes, without noise.
     pub fn feel(&self, state: &mut ImuPartState, truth: &ImuMotion) -> ImuReading {
         let shaken = self.shaken(state, truth, &self.at_its_place(state, &truth.motion));
         let is_first = state.readings == 0;
@@ -114,7 +114,7 @@ impl ImuPart {
         self.in_its_axes(&state.filtered, truth.time_s)
     }
 
-    /// The specific force where the part sits: f + α × r + ω × (ω × r). α is what ω changed by since the reading
+    /// The specific force at the part's place: f + α × r + ω × (ω × r). α is the change of ω since the reading
     /// before, so it is half a period late.
     fn at_its_place(&self, state: &ImuPartState, motion: &ImuReading) -> ImuReading {
         let (arm_B_m, spin_B_rad_s) =
@@ -205,7 +205,7 @@ mod tests {
         }
     }
 
-    /// What is felt of one reading of `truth`.
+    /// Returns the quantities that are felt in one reading of `truth`.
     fn felt(params: ImuParams, truth: &ImuMotion) -> ImuReading {
         part(params).feel(&mut ImuPartState::default(), truth)
     }

@@ -3,7 +3,7 @@
 //!
 //! Time is counted in whole nanoseconds, and within a busy stretch of the wire in bits since its start, so that no rounding
 //! adds up: after any time the wire has carried as many bits as its rate says. A message is whole: it waits until the wire
-//! is free, is sent without a break, and arrives behind those that were sent before it. What becomes of the n-th message
+//! is free, is sent without a break, and arrives behind those that were sent before it. The fate of the n-th message
 //! that is sent depends on the seed, the node's name and n alone.
 
 use bus::Message;
@@ -15,7 +15,7 @@ pub const STREAMS: usize = 16;
 /// Packets that wait or are under way at most.
 pub const PACKETS: usize = 64;
 
-/// What a [`Packet`] is.
+/// States of a [`Packet`].
 const FREE: u32 = 0;
 const QUEUED: u32 = 1;
 const UNDER_WAY: u32 = 2;
@@ -122,7 +122,7 @@ impl Default for LineState {
 )]
 pub struct NoPlace;
 
-/// What a line is.
+/// Settings of a line.
 #[derive(Debug)]
 pub struct Line {
     /// Bits a second.
@@ -133,11 +133,11 @@ pub struct Line {
     pub queue_bytes: u32,
     /// Time from the last bit of a message to its arrival.
     pub latency_ns: u64,
-    /// What is added to it at most, evenly drawn.
+    /// Greatest addition to it, evenly drawn.
     pub jitter_ns: u64,
-    /// The fraction of messages that are lost.
+    /// Fraction of messages that are lost.
     pub loss: f64,
-    /// Which stream goes first: the higher number.
+    /// Priorities of the streams: the highest goes first.
     pub priorities: Vec<u32>,
     /// The random stream that fates are drawn from.
     pub random: Stream,
@@ -178,7 +178,7 @@ impl Line {
         Ok(())
     }
 
-    /// Sends what waits, up to `until_ns`.
+    /// Sends the messages that wait, up to `until_ns`.
     pub fn send(&self, state: &mut LineState, until_ns: u64) {
         while let Some((index, start_ns)) = self.next(state).filter(|(_, start_ns)| *start_ns < until_ns) {
             if start_ns > state.free_ns {
@@ -207,7 +207,7 @@ impl Line {
         first.map(|(index, _)| (index, start_ns))
     }
 
-    /// How long the message that is sent as number `number` travels behind its last bit, and whether it is lost.
+    /// Returns the time in ns that message `number` travels behind its last bit, and whether it is lost.
     fn fate(&self, number: u64) -> (u64, bool) {
         // Two draws of two words of 32 bits each.
         let mut random = random::at(&self.random, u128::from(number) * 4);
@@ -224,7 +224,7 @@ impl Line {
         (u128::from(bits) * NS_PER_S).div_ceil(u128::from(self.bits_s)) as u64
     }
 
-    /// Takes out what has arrived by `now_ns`.
+    /// Takes out the messages that have arrived by `now_ns`.
     pub fn arrive(state: &mut LineState, now_ns: u64) {
         let arrived = |packet: &&mut Packet| packet.stage == UNDER_WAY && packet.arrival_ns <= now_ns;
         // In the order of arrival, of a stream the newest stays.

@@ -1,9 +1,10 @@
 //! A data link: messages of any type, carried as a serial radio carries them.
 //!
-//! Each input is a *stream*: what its topic carries comes out on the output of the same name, later, less often, and not
-//! all of it. The streams share one `line`. A message that comes out is the sender's own, stamp included: a consumer
-//! tells a new one by its stamp, and its age by that too. A message without a stamp is new whenever its topic's publisher
-//! sends. Until the first has come, the output is the input's initial value with a stamp of -1 s.
+//! Each input is a *stream*: the messages of its topic come out on the output of the same name, later, less
+//! often, and not all of them. The streams share one `line`. A message that comes out is the sender's own,
+//! stamp included: a consumer recognises a new one, and its age, by its stamp. A message without a stamp is new
+//! whenever its topic's publisher sends. Until the first has come, the output is the input's initial value with
+//! a stamp of -1 s.
 //!
 //! A message that is sent at tick k is queued at the time of that tick, and is out at the first tick of the link at which
 //! it has arrived. The link itself adds nothing to that: its inputs are a tick late because no message arrives in the tick
@@ -29,13 +30,14 @@ use std::collections::BTreeMap;
 const BAUD: f64 = 57_600.0;
 /// 8 data bits, a start bit and a stop bit, no parity (thesis §2.2).
 const BITS_PER_BYTE: u32 = 10;
-/// What AscTec's serial protocol puts around a message: `>*>`, two bytes of length, one of type, two of checksum, `<#<`
-/// (`ASCTEC_PACKET_OVERHEAD_BYTES` of the `asctec` driver for ROS by Kushleyev and Michael, University of Pennsylvania).
+/// Overhead of AscTec's serial protocol for a message: `>*>`, two bytes of length, one of type, two of
+/// checksum, `<#<` (`ASCTEC_PACKET_OVERHEAD_BYTES` of the `asctec` driver for ROS by Kushleyev and Michael,
+/// University of Pennsylvania).
 const OVERHEAD_BYTES: u32 = 11;
-/// What an XBee of the 802.15.4 series buffers of its serial input (Digi, "XBee/XBee-PRO RF Modules 802.15.4 Product
+/// Serial input buffer of an XBee of the 802.15.4 series (Digi, "XBee/XBee-PRO RF Modules 802.15.4 Product
 /// Manual", "DI buffer").
 const QUEUE_BYTES: u32 = 202;
-/// Faster is no serial line, and the bits of a run are to stay countable.
+/// Greatest rate of a serial line; the bits of a run also have to stay countable.
 const BAUD_MAX: f64 = 1e9;
 
 /// The stamp of an initial value: nothing was sent yet. Before the run, so that another link does not take it for a
@@ -68,13 +70,13 @@ pub struct Parameters {
     /// Time from a message's last bit to its arrival, ms.
     #[serde(default)]
     pub latency_ms: f64,
-    /// What is added to that at most, evenly drawn for each message, ms.
+    /// Greatest addition to that, evenly drawn for each message, ms.
     #[serde(default)]
     pub jitter_ms: f64,
     /// Fraction of the messages that are lost on the way.
     #[serde(default)]
     pub loss: f64,
-    /// What differs of a stream, by the name of its input.
+    /// Parameters of single streams, by the name of their input.
     #[serde(default)]
     pub streams: BTreeMap<String, StreamParameters>,
 }
@@ -103,7 +105,7 @@ pub struct StreamParameters {
     bytes: Option<u32>,
     /// Messages a second that are sent at most; each that is new where absent.
     rate_hz: Option<f64>,
-    /// Which stream goes first where several wait: the higher number.
+    /// Priority of the stream: of several that wait, the highest goes first.
     #[serde(default)]
     priority: u32,
 }
@@ -175,7 +177,7 @@ pub struct LinkState {
     taken_period: [u64; STREAMS],
 }
 
-/// What a link sends: its statistics, and the newest message of each stream.
+/// Outputs of a link: its statistics, and the newest message of each stream.
 ///
 /// ```
 /// use bus::ports::OutputPorts;
@@ -431,14 +433,14 @@ impl Forwarded {
         self.extent.map_or(message.len(), |extent| extent.of(message).len())
     }
 
-    /// Gives `message`, an initial value, the stamp of what was never sent.
+    /// Gives `message`, an initial value, the stamp of a message that was never sent.
     fn mark_as_none(&self, message: &mut [u8]) {
         if let Some(offset) = self.stamp_offset {
             message[offset..offset + size_of::<Time>()].copy_from_slice(bytemuck::bytes_of(&NEVER));
         }
     }
 
-    /// Whether `message` is an initial value that another link repeats.
+    /// True if `message` is an initial value that another link repeats.
     fn is_none(&self, message: &[u8]) -> bool {
         self.stamp_offset.is_some_and(|offset| message[offset..].starts_with(bytemuck::bytes_of(&NEVER)))
     }
@@ -470,8 +472,8 @@ impl Parameters {
         require("loss", self.loss, (0.0..=1.0).contains(&self.loss), "a fraction from 0 to 1")
     }
 
-    /// Refuses a stream whose messages never fit into the queue, and more messages under way than a link holds; tells
-    /// streams that together exceed the line.
+    /// Refuses a stream whose messages never fit into the queue, and more messages under way than a link holds;
+    /// warns of streams that together exceed the line.
     fn check_load(&self, context: &NodeContext<'_>) -> Result<(), ParameterError> {
         let (mut offered_bytes_s, mut offered_hz) = (0.0, 0.0);
         for message in context.messages {

@@ -1,7 +1,7 @@
 //! The magnetometer node: the earth's magnetic field in body axes, as the vehicle's own iron lets it through.
 //!
 //! Reading = soft-iron scale · field in body axes + hard iron + white noise, in steps of the part's resolution and
-//! cut off at its range. `crate::channel` says when it measures, how measurements are delayed and lost.
+//! cut off at its range. `crate::channel` gives the times, delays and losses of measurements.
 
 use crate::channel::Chance;
 use crate::earth_field;
@@ -17,7 +17,7 @@ use inputs::InputFiles;
 use nalgebra::Vector3;
 
 parameters! {
-    /// What a magnetometer makes of the earth's field; the defaults are a Honeywell HMC5883L.
+    /// Parameters of a magnetometer; the defaults are a Honeywell HMC5883L.
     ///
     /// Its data sheet (900405): noise floor 2 mG, 1090 counts per gauss in its default range of ±1.3 gauss, up to
     /// 160 Hz in single measurements of 6 ms each. The default field is that of Krailling near Munich.
@@ -37,13 +37,13 @@ parameters! {
     pub struct MagnetometerParams timed { rate_hz: 100.0, delay_ms: 6.0 } {
         /// Magnetic flux density of the earth's field, T.
         field_T: f64 = earth_field::FIELD_T => not_negative,
-        /// How far the earth's field points below the horizon, degrees.
+        /// Inclination of the earth's field, below the horizon, degrees.
         inclination_deg: f64 = earth_field::INCLINATION_DEG => within(-90.0..=90.0, "from -90 to 90"),
-        /// How far magnetic north lies east of the world's x axis, degrees.
+        /// Declination: angle of magnetic north east of the world's x axis, degrees.
         declination_deg: f64 = earth_field::DECLINATION_DEG => finite,
-        /// Field of what is magnetised on the vehicle, body axes, T.
+        /// Field of the vehicle's magnetised parts, body axes, T.
         hard_iron_T: [f64; 3] = [0.0; 3] => finite,
-        /// What is left of the field along each body axis.
+        /// Share of the field that is left along each body axis.
         soft_iron_scale: [f64; 3] = [1.0; 3] => finite,
         /// Standard deviation of each axis, T.
         noise_T: f64 = 2.0e-7 => not_negative,

@@ -1,7 +1,7 @@
 //! The motion capture node: position and attitude as cameras around the room see them.
 //!
-//! Reading = truth + bias + white noise, the attitude's as a rotation in body axes. `crate::channel` says when
-//! it measures, how measurements are delayed and lost.
+//! Reading = truth + bias + white noise, the attitude's as a rotation in body axes. `crate::channel` gives the
+//! times, delays and losses of measurements.
 
 use crate::channel::Chance;
 use crate::noise::standard_normal;
@@ -14,7 +14,7 @@ use inputs::InputFiles;
 use nalgebra::{UnitQuaternion, Vector3};
 
 parameters! {
-    /// What motion capture does to the truth; the defaults are a Vicon system of MX cameras.
+    /// Parameters of motion capture; the defaults are a Vicon system of MX cameras.
     ///
     /// *Position*: Merriaux et al., "A study of Vicon system positioning performance" (Sensors 17(7), 2017), find a
     /// mean error of 0.15 mm at rest and below 2 mm in motion; 0.5 mm lies between. *Attitude*: 0.5 mm seen on

@@ -47,7 +47,7 @@ impl BiasWalk {
     /// A walk of `density` (unit/s/√Hz, which is unit/√s) in steps of 1/`rate_hz`.
     ///
     /// The standard deviation of a step is density·√dt, so the variance grows by density² a second
-    /// whatever the rate.
+    /// at any rate.
     #[must_use]
     pub fn new(density: f64, rate_hz: f64) -> Self {
         Self { step_sigma: density / rate_hz.sqrt() }
@@ -73,7 +73,7 @@ pub(crate) fn standard_normal(random: &mut Stream) -> Vector3<f64> {
     Vector3::new(x, y, z)
 }
 
-/// How far a random stream has been drawn, in words of 32 bits: the low and the high half of the count.
+/// Returns the number of words of 32 bits drawn from a random stream: the low and the high half of the count.
 pub(crate) fn drawn_words(random: &Stream) -> [u64; 2] {
     let words = random.get_word_pos();
     [words as u64, (words >> 64) as u64]

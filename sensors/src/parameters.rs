@@ -19,11 +19,11 @@ macro_rules! parameters {
             pub struct $name {
                 /// Measurements a second.
                 rate_hz: f64 = $rate_hz,
-                /// How long after measuring a measurement arrives, ms.
+                /// Time from a measurement to its arrival, ms.
                 delay_ms: f64 = $delay_ms,
-                /// The fraction of measurements that are lost.
+                /// Fraction of measurements that are lost.
                 dropout: f64 = 0.0,
-                /// How long losses last on average, s; 0 where each is independent of the one before.
+                /// Mean duration of losses, s; 0 where each is independent of the one before.
                 dropout_mean_s: f64 = 0.0,
                 $($fields)*
             }
@@ -70,9 +70,9 @@ macro_rules! parameters {
     };
 }
 
-/// What the manifest's `parameters` table of a sensor holds.
+/// Parameters of a sensor, as the manifest's `parameters` table holds them.
 pub trait Parameters: DeserializeOwned {
-    /// When it measures, and what becomes of it on the way.
+    /// Returns the times at which it measures, and the delays and losses of its measurements.
     fn timing(&self) -> Timing;
 
     /// Refuses a parameter that is outside its range.
@@ -82,7 +82,7 @@ pub trait Parameters: DeserializeOwned {
     fn validate(&self) -> Result<(), ParameterError>;
 }
 
-/// What holds numbers to check.
+/// Numbers to check.
 pub(crate) trait Numbers {
     /// Asks `check` for each.
     fn check(&self, check: &dyn Fn(f64) -> Result<(), ParameterError>) -> Result<(), ParameterError>;

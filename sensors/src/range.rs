@@ -1,9 +1,9 @@
 //! The range node: five ultrasonic range finders along the body's +x, −x, +y, −y and −z axes.
 //!
-//! The beams tilt with the body. Each reads the nearest of what stands in its cone (`crate::cone`): the ground,
+//! The beams tilt with the body. Each reads the nearest object in its cone (`crate::cone`): the ground,
 //! the things of the scene and, with the input `traffic`, the other vehicles. Reading = distance + bias + white
 //! noise, in steps of the part's resolution; each beam has its own noise and is lost on its own.
-//! `crate::channel` says when they measure, how measurements are delayed and lost.
+//! `crate::channel` gives the times, delays and losses of measurements.
 //!
 //! The beams fire together and do not hear each other. An echo comes back from every surface in the cone at any
 //! angle of incidence; a real beam that grazes a smooth floor or wall hears none.
@@ -31,7 +31,7 @@ const BEAMS: usize = 5;
 const SELF_MAX_M: f64 = 0.01;
 
 parameters! {
-    /// What the range finders make of the truth; the defaults are five MaxBotix XL-MaxSonar-AE0 (MB1300).
+    /// Parameters of the range finders; the defaults are five MaxBotix XL-MaxSonar-AE0 (MB1300).
     ///
     /// *Reach, resolution, nearest reading and rate* are the data sheet's (PD11840): 7.65 m, 1 cm, 20 cm, which it
     /// reads from anything nearer too, and 10 Hz. *Delay*: sound takes 45 ms to the end of the reach and back, and
@@ -63,20 +63,20 @@ parameters! {
         resolution_m: f64 = 0.01 => not_negative,
         /// Nothing beyond this is met, m.
         reach_m: f64 = 7.65 => positive,
-        /// Whatever is nearer reads as this, m.
+        /// Reading of anything nearer than this, m.
         nearest_m: f64 = 0.20,
         /// Half angle of the beams' cones, degrees, below 90.
         half_angle_deg: f64 = 5.0 => within(0.0..90.0, "zero or more and below 90"),
         /// Radius of the spheres that other vehicles are, m.
         vehicle_radius_m: f64 = 0.27 => positive,
-        /// Which of the vehicles in the traffic is this one, numbered from 0; where absent, it is one that is nearer
-        /// than 1 cm.
+        /// Index of this vehicle in the traffic, numbered from 0; where absent, that of the vehicle that is
+        /// nearer than 1 cm.
         #[serde(rename = "self")]
         self_index: Option<u32> = None,
     }
 }
 
-/// The five range finders in their scene: all that does not change during a run.
+/// The five range finders in their scene, with everything that does not change during a run.
 #[derive(Debug, Clone)]
 pub struct RangeFinders {
     params: RangeParams,
@@ -85,7 +85,7 @@ pub struct RangeFinders {
 }
 
 impl RangeFinders {
-    /// What each beam meets first, within its reach.
+    /// Returns the distance to the first object that each beam meets within its reach, m.
     fn distances_m(&self, inputs: &RangeInputs<'_>) -> [Option<f64>; BEAMS] {
         let (truth, traffic) = (inputs.state, inputs.traffic);
         let (poses, count) = body_poses(inputs.bodies);
@@ -109,7 +109,7 @@ impl RangeFinders {
         })
     }
 
-    /// Where the other vehicles are, from this one, in its own axes.
+    /// Iterates over the positions of the other vehicles, seen from this one, in its own axes.
     fn others(
         &self,
         traffic: Option<&Traffic>,
@@ -141,14 +141,14 @@ sensor! {
     pub struct RangeState as "hummingbus_msgs/msg/RangeState" sends ranges: Ranges {}
 }
 
-/// What the range finders read.
+/// Inputs of the range finders.
 #[derive(Debug, InputPorts)]
 pub struct RangeInputs<'a> {
     /// The truth.
     pub state: &'a PlantState,
-    /// Where all vehicles of the run are.
+    /// Positions of all vehicles of the run.
     pub traffic: Option<&'a Traffic>,
-    /// Where the scene's free bodies are; for a scene that has some.
+    /// Poses of the scene's free bodies; for a scene that has some.
     pub bodies: Option<&'a BodyStates>,
 }
 
@@ -183,8 +183,8 @@ impl Sensor for RangeFinders {
         RangeState { queue: [nothing; QUEUE], ..RangeState::default() }
     }
 
-    /// The noise is drawn whether or not a beam meets anything, so that what one of them sees does not reshuffle the
-    /// others' noise.
+    /// The noise is drawn whether or not a beam meets anything, so that the reading of one of them does not
+    /// reshuffle the others' noise.
     fn measure(
         &self,
         _: &mut RangeState,

@@ -13,7 +13,7 @@ use diagnostics::ParameterError;
 use filter::{RangeInertial, RangeInertialInputs, RangeInertialState};
 use params::RangeInertialParams;
 
-/// What the estimator sends.
+/// Outputs of the estimator.
 #[derive(Debug, OutputPorts)]
 pub struct Outputs {
     /// Walls, height and velocities.
@@ -83,8 +83,8 @@ mod tests {
         Harness::<RangeInertial>::from_json(&json!({})).unwrap();
     }
 
-    /// At rest by the accelerometer, which is off by 0.2 m/s^2, ranges to nothing, and a receiver that tells `told` with
-    /// this delay every 100 ms: the velocity after 20 s, and the worst since 5 s.
+    /// At rest by the accelerometer, which is off by 0.2 m/s^2, ranges to nothing, and a receiver that reports
+    /// `told` with this delay every 100 ms: the velocity after 20 s, and the worst since 5 s.
     fn with_late_receiver(delay_ms: u64, told: [f64; 2]) -> ([f64; 2], f64) {
         let parameters =
             json!({ "initial_velocity_sigma_m_s": 0.5, "initial_acceleration_bias_sigma_m_s2": 0.3 });

@@ -1,7 +1,7 @@
 //! The rotor speed node: the speed of each rotor as its motor's controller counts it.
 //!
-//! Reading = truth + white noise, in steps of the part's resolution, never below zero. `crate::channel` says when it
-//! measures, how measurements are delayed and lost. Two faults can be put in, to see whether they are taken for
+//! Reading = truth + white noise, in steps of the part's resolution, never below zero. `crate::channel` gives
+//! the times, delays and losses of measurements. Two faults can be put in, to see whether they are taken for
 //! physics of the vehicle: a rotor whose reading is stuck, and one of which half is read.
 
 use crate::channel::Chance;
@@ -14,7 +14,7 @@ use diagnostics::parameter::{ParameterError, not_negative, require};
 use inputs::InputFiles;
 
 parameters! {
-    /// What the motors' controllers make of the truth.
+    /// Parameters of the rotor speeds that the motors' controllers measure.
     ///
     /// *Resolution*: telemetry of electronic speed controllers (KISS, BLHeli_32) counts hundreds of electrical revolutions
     /// a minute; with 7 pole pairs, usual for motors of this size, these are 14.3 rpm, 1.5 rad/s. *Noise* and *rate* are
@@ -38,7 +38,7 @@ parameters! {
         noise_rad_s: f64 = 1.5 => not_negative,
         /// Speeds are multiples of this, rad/s; 0 for any.
         resolution_rad_s: f64 = 1.5 => not_negative,
-        /// The rotor, from 1, that reads for ever what it read first; 0 for none.
+        /// The rotor, from 1, whose reading is stuck at the first one; 0 for none.
         stuck_rotor: usize = 0 => rotor,
         /// The rotor, from 1, of whose speed half is read; 0 for none.
         half_reading_rotor: usize = 0 => rotor,

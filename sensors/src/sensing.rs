@@ -1,4 +1,4 @@
-//! A sensor as a component: it measures what its inputs hold, and a channel says when, and what becomes of it.
+//! A sensor as a component: it measures its inputs, and a channel has the times, delays and losses of measurements.
 
 use crate::channel::{Chance, Channel, Remembered};
 use crate::parameters::Parameters;
@@ -10,7 +10,7 @@ use bus::{InputPorts, Message};
 use diagnostics::ParameterError;
 use inputs::InputFiles;
 
-/// Declares what a sensor remembers, `type_name` on the bus, and what it sends: the message at the port that is named.
+/// Declares the state of a sensor, `type_name` on the bus, and its output: the message at the port that is named.
 macro_rules! sensor {
     (
         pub struct $State:ident as $type_name:literal sends $port:ident: $Message:ident {
@@ -39,7 +39,7 @@ macro_rules! sensor {
             }
         }
 
-        /// What the sensor sends.
+        /// Outputs of the sensor.
         #[derive(Debug, bus::OutputPorts)]
         pub struct Outputs {
             /// The measurement that arrived last.
@@ -54,9 +54,10 @@ macro_rules! sensor {
     };
 }
 
-/// What sensors send.
+/// Messages that sensors send.
 pub trait Measurement: Copy {
-    /// What is sent of what was `measured` after `last`, `None` where there was nothing to measure.
+    /// Returns the message that is sent after `last` for what was `measured`; `None` means that there was
+    /// nothing to measure.
     fn sent(measured: Option<Self>, last: &Self, chance: &mut Chance<'_>) -> Self;
 }
 
@@ -85,17 +86,17 @@ impl Measurement for Ranges {
     }
 }
 
-/// A sensor: all of it that does not change during a run.
+/// A sensor, with everything that does not change during a run.
 pub trait Sensor: Sized + Send {
-    /// Its name in manifests, and what it does.
+    /// Its name in manifests, and its description.
     const INFO: Info;
-    /// What the manifest's `parameters` table holds.
+    /// Parameters in the manifest.
     type Parameters: Parameters;
-    /// What it reads.
+    /// Inputs.
     type Inputs<'a>: InputPorts<'a>;
-    /// What it sends.
+    /// Outputs.
     type Outputs: OutputPorts + From<Sent<Self>>;
-    /// All that it remembers from tick to tick.
+    /// State from tick to tick.
     type State: Message + Default + Remembered<Measurement: Measurement>;
 
     /// Makes the sensor of parameters that are within their ranges, and of the files that they name.
@@ -112,7 +113,7 @@ pub trait Sensor: Sized + Send {
     /// Refuses ports that do not go with its parameters.
     ///
     /// # Errors
-    /// Which, and what to do.
+    /// The ports, and advice.
     fn check(&self, _run: &NodeContext<'_>) -> Result<(), ParameterError> {
         Ok(())
     }
@@ -120,12 +121,12 @@ pub trait Sensor: Sized + Send {
     /// Refuses inputs that do not go with its parameters.
     ///
     /// # Errors
-    /// Which, and what to do.
+    /// The inputs, and advice.
     fn check_inputs(&self, _inputs: &Self::Inputs<'_>) -> Result<(), StepError> {
         Ok(())
     }
 
-    /// What it measures after `last`, at the times when it does; `None` where there is nothing to measure.
+    /// Measures after `last`, at the times when a measurement is due; `None` where there is nothing to measure.
     fn measure(
         &self,
         state: &mut Self::State,
@@ -135,10 +136,10 @@ pub trait Sensor: Sized + Send {
     ) -> Option<Sent<Self>>;
 }
 
-/// What a sensor sends.
+/// Message that a sensor sends.
 pub(crate) type Sent<S> = <<S as Sensor>::State as Remembered>::Measurement;
 
-/// What most sensors read.
+/// Inputs of most sensors.
 #[derive(Debug, InputPorts)]
 pub struct TruthInputs<'a> {
     /// The truth.

@@ -1,4 +1,4 @@
-//! What is left of a value at a resolution.
+//! Rounding of a value to a resolution.
 
 /// The multiple of `step` that is nearest to `value`; any value where `step` is 0.
 pub(crate) fn in_steps(value: f64, step: f64) -> f64 {

@@ -1,4 +1,4 @@
-//! What the tests of sensors share.
+//! Helpers that the tests of sensors share.
 
 use crate::sensing::{Sensing, Sensor};
 use bus::Harness;
@@ -13,7 +13,7 @@ pub(crate) fn harness<S: Sensor>(parameters: S::Parameters, interval_ms: u64) ->
     Harness::in_context(parameters, &context).unwrap()
 }
 
-/// Why a sensor refuses a parameter.
+/// Returns the error with which a sensor refuses parameters.
 pub(crate) fn refusal<S: Sensor>(parameters: &serde_json::Value) -> String {
     Harness::<Sensing<S>>::from_json(parameters).err().expect("it is refused").to_string()
 }

@@ -1,4 +1,4 @@
-//! The extended Kalman filter against known flights: its covariance must be what its errors make true.
+//! The extended Kalman filter against known flights: its covariance must agree with its errors.
 //!
 //! Two figures are chi-square where a filter is consistent (Bar-Shalom, Li and Kirubarajan, "Estimation with
 //! Applications to Tracking and Navigation", 2001, §5.4): the normalised innovation squared (NIS) of a sensor, summed
@@ -46,7 +46,7 @@ const MOCAP: Timing = Timing { sensor: Source::Mocap, period: 10, delay: 10 };
 const BAROMETER: Timing = Timing { sensor: Source::Barometer, period: 20, delay: 16 };
 const MAGNETOMETER: Timing = Timing { sensor: Source::Magnetometer, period: 10, delay: 6 };
 
-/// The sensors of a flight, which are worth what `params` says.
+/// The sensors of a flight, with the uncertainties of `params`.
 struct World {
     params: EkfParams,
     imu: ImuModel,
@@ -205,13 +205,13 @@ fn nees(sample: &Sample<'_>) -> f64 {
     errors.dot(&covariance.cholesky().expect("a covariance is positive").solve(&errors))
 }
 
-/// How the filter fares over all seeds.
+/// Consistency of the filter over all seeds.
 struct Consistency {
     /// By sensor: how many runs had their summed NIS within its 95 % bounds.
     runs_within: [usize; 4],
     /// By sensor: mean NIS for each degree of freedom, which should be 1.
     nis: [f64; 4],
-    /// At each second, NEES summed over the runs, in standard deviations from what it should be.
+    /// At each second, NEES summed over the runs, in standard deviations from its expected value.
     nees_deviations: Vec<f64>,
     /// Mean NEES for each degree of freedom, which should be 1.
     nees: f64,
@@ -271,7 +271,7 @@ fn consistency(timings: &[Timing], true_params: EkfParams, believed: EkfParams) 
 }
 
 impl Consistency {
-    /// Whether the innovations and the errors are as large as the filter believes. Of 20 runs 19 are within their
+    /// True if the innovations and the errors are as large as the filter believes. Of 20 runs 19 are within their
     /// 95 % bounds on average, and 16 or fewer once in 60 times; of the seconds, which are not independent, three
     /// in four must be.
     fn holds(&self, timings: &[Timing]) -> bool {
@@ -320,7 +320,7 @@ fn measurements_that_are_200_ms_late_are_as_consistent_as_prompt_ones() {
     assert!(found.holds(&late) && found.refused == 0, "{found}");
 }
 
-/// Without this, the tests above might pass whatever the filter believes.
+/// Without this, the tests above might pass with any belief of the filter.
 #[test]
 fn a_filter_that_believes_a_wrong_noise_is_found_out() {
     let wrong = |change: fn(&mut EkfParams)| {
@@ -430,7 +430,7 @@ fn without_a_magnetometer_gps_tells_the_yaw_of_a_vehicle_that_is_pushed_about_an
     assert!(hovering_deg > 4.5, "{hovering_deg}");
 }
 
-/// What it is told to begin with is off by far more than it is told too: motion capture is refused at first.
+/// The start that the filter is told is off by far more than its stated error: motion capture is refused at first.
 #[test]
 fn a_filter_that_is_told_a_wrong_start_finds_its_way() {
     let flight = fly(excited, [0.0, 0.0, 5.0], 3_000);
@@ -469,7 +469,7 @@ fn conditioning(timings: &[Timing]) -> (f64, bool) {
     (least, is_symmetric)
 }
 
-/// Why the update of the covariance needs no Joseph's form: docs/decisions/011 has an hour of it.
+/// The update of the covariance needs no Joseph's form: docs/decisions/011 has an hour of it.
 #[test]
 fn the_covariance_stays_well_conditioned() {
     for (timings, expected) in [(&[MOCAP][..], 0.03), (&OUTDOORS, 5e-5)] {

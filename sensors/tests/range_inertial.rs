@@ -37,7 +37,7 @@ impl Run {
     }
 }
 
-/// What a range finder at the vehicle reads: the nearest of the walls and the floor, to a centimetre.
+/// Returns the reading of a range finder at the vehicle: the nearest of the walls and the floor, to a centimetre.
 fn range_m(truth: &Truth, direction_B: Vector3<f64>, walls: [Option<f64>; 4], random: &mut Stream) -> f64 {
     let (from, along) = (truth.position_W_m, truth.attitude_WB * direction_B);
     let plane = |at: f64, axis: usize| (at - from[axis]) / along[axis];
@@ -61,8 +61,8 @@ fn estimate(flight: &[Truth], room: Room, seed: u64, judge: impl FnMut(&Run)) {
     estimate_with(flight, room, None, seed, judge);
 }
 
-/// What a receiver tells at sample `k` that is so many samples late: a velocity every 100 ms, 0.074 m/s off along each axis
-/// (RMS, the thesis's receiver, ch. 4).
+/// Returns the message of a receiver at sample `k` that is `late` samples late: a velocity every 100 ms, 0.074
+/// m/s off along each axis (RMS, the thesis's receiver, ch. 4).
 fn told(flight: &[Truth], k: usize, late: usize, random: &mut Stream) -> Gps {
     let Some(measured) = k.checked_sub(late) else { return Gps::default() };
     let noise = Vector3::from_fn(|_, _| 0.074 * normal(random));
@@ -178,7 +178,7 @@ fn a_wall_is_met_within_two_centimetres_after_a_flight_at_two_metres_a_second() 
     assert!(worst_m_s < 0.03, "{worst_m_s}");
 }
 
-/// Pitching and braking by 20°: what the receiver told of the time before the manoeuvre is not taken for the present.
+/// Pitching and braking by 20°: the receiver's velocity from before the manoeuvre is not taken for the present one.
 #[test]
 fn a_late_receiver_tells_the_velocity_along_a_wall_and_spoils_nothing_that_the_wall_tells() {
     let flight = fly(to_the_wall, [0.0, 0.0, 1.5], 20_000);

@@ -1,9 +1,9 @@
-//! What the numbers of a vehicle can be: wide enough for everything with rotors that has flown, from 80 mg to 56 t.
+//! Bounds for the numbers of a vehicle: wide enough for everything with rotors that has flown, from 80 mg to 56 t.
 //!
 //! The ends are RoboBee (80 mg, 3 cm; Ma et al., "Controlled flight of a biologically inspired, insect-scale robot",
 //! Science 340, 2013) and the Mil Mi-26 (56 t, rotor of 32 m at 132 rpm; Jane's All the World's Aircraft), a decade or
-//! more beyond either. They are no design limits: they catch slipped exponents and wrong units, and keep the products
-//! of the physics within what a double holds.
+//! more beyond either. They are not design limits: they catch slipped exponents and wrong units, and keep the
+//! products of the physics within the range of a double.
 
 use diagnostics::parameter::Bounds;
 
@@ -33,7 +33,7 @@ pub const TORQUE_SCALE: Bounds = bounds(0.5, 2.0, "", "the rotors of one vehicle
 /// Moment of inertia of a rotor.
 pub const ROTOR_INERTIA: Bounds =
     bounds(0.0, 1e7, "kg*m^2", "eight blades of 375 kg and 16 m make 2.6e5 kg*m^2");
-/// Where hubs are.
+/// Places of hubs.
 pub const HUB: Bounds = bounds(-100.0, 100.0, "m", "the longest helicopter measures 40 m over its rotors");
 /// Components of the direction of a rotor's thrust, whose length does not matter.
 pub const AXIS: Bounds = bounds(-1e3, 1e3, "", "give a direction, such as [0, 0.2, 1]");

@@ -23,7 +23,7 @@ pub struct CommandMap {
     pub speed_at_min_rad_s: f64,
     /// Steady rotor speed at `max`, in rad/s.
     pub speed_at_max_rad_s: f64,
-    /// Whether a command of zero or less switches the motor off (speed 0) instead of saturating at `min`.
+    /// True if a command of zero or less switches the motor off (speed 0) instead of saturating at `min`.
     pub zero_is_off: bool,
 }
 
@@ -40,7 +40,7 @@ impl CommandMap {
         between(self.speed_at_min_rad_s, self.speed_at_max_rad_s, share)
     }
 
-    /// The raw command that asks for `speed_rad_s`, saturated to what the motor can do.
+    /// The raw command that asks for `speed_rad_s`, saturated at the limits of the motor.
     pub fn command(&self, speed_rad_s: f64) -> f64 {
         if self.zero_is_off && speed_rad_s <= 0.0 {
             return 0.0;

@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-/// Form of a CSV file. What is absent is found in the file.
+/// Form of a CSV file. Absent keys are found from the file.
 ///
 /// ```
 /// let dialect: vehicles::table::Dialect = toml::from_str("header_line = 4\ndelimiter = \";\"\ndecimal = \",\"").unwrap();

@@ -1,6 +1,6 @@
 //! The effects that a vehicle or scene file lists, as they are written: names, numbers with their units, places.
 //!
-//! What an effect is, which parameters it has and in which units, is the business of the plant's catalogue
+//! The kinds of effects, their parameters and units are the business of the plant's catalogue
 //! (`plant::effects`): here any name will do.
 
 use crate::provenance::Stated;
@@ -20,13 +20,13 @@ use diagnostics::{Diagnostic, Place};
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct EffectEntry {
-    /// Which effect.
+    /// Name of the effect.
     pub name: String,
     /// The dotted key of the table, such as `effects.0`.
     pub key: String,
-    /// Where the table stands.
+    /// Place of the table.
     pub place: Place,
-    /// Where its name stands.
+    /// Place of its name.
     pub name_place: Place,
     /// Its parameters, by name.
     pub parameters: Vec<Stated>,

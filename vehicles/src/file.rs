@@ -1,4 +1,4 @@
-//! Which keys a vehicle file has, in which dimension, and what is physical.
+//! Keys of a vehicle file, their dimensions, and the values that are physical.
 
 use nalgebra::{Matrix3, Vector3};
 use std::io;
@@ -17,7 +17,7 @@ use diagnostics::unit::{
 use diagnostics::{Diagnostic, Faults};
 use inputs::InputFiles;
 
-/// How far a published tensor may miss the triangle inequality through rounding, relative to its size.
+/// Part of its size by which a published tensor may miss the triangle inequality through rounding.
 const TRIANGLE_SLACK: f64 = 1e-9;
 
 impl Vehicle {
@@ -253,7 +253,7 @@ fn product(section: &Section, name: &'static str) -> Result<f64, Diagnostic> {
     if section.has(name) { section.bounded(name, INERTIA, &bounds::INERTIA_PRODUCT) } else { Ok(0.0) }
 }
 
-/// Whether a rigid body can have this tensor of inertia.
+/// True if a rigid body can have this tensor of inertia.
 pub fn is_rigid(inertia_kg_m2: &Matrix3<f64>) -> bool {
     is_physical(&principal_moments(inertia_kg_m2))
 }

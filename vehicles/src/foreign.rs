@@ -112,7 +112,7 @@ const ZIPPED: [Magic; 6] = [
     ),
 ];
 
-/// Beginnings of texts that are no tables, after blanks, in lower case.
+/// Beginnings of texts that are not tables, after blanks, in lower case.
 const TEXTS: [Magic; 8] = [
     (b"<!doctype html", "a web page (HTML)", "download the file itself; the page may ask for a login"),
     (b"<html", "a web page (HTML)", "download the file itself; the page may ask for a login"),
@@ -133,7 +133,7 @@ const ROBOTS: [(&[u8], &str); 3] = [
 
 /// Number of bytes that are looked at for the kind of a file.
 const LOOKED_AT: usize = 4096;
-/// Share of control characters among the first bytes above which they are no text.
+/// Share of control characters among the first bytes above which they are not text.
 const CONTROL_SHARE: f64 = 0.1;
 /// Offset and mark of a tar archive.
 const TAR: (usize, &[u8]) = (257, b"ustar");
@@ -193,7 +193,7 @@ fn begins_with(text: &[u8], begin: &[u8]) -> bool {
     text.get(..begin.len()).is_some_and(|found| found.eq_ignore_ascii_case(begin))
 }
 
-/// Returns the name of the robot description that a text begins, whatever stands above its first element.
+/// Returns the name of the robot description that a text begins, behind anything above its first element.
 #[must_use]
 pub fn robot(text: &[u8]) -> Option<&'static str> {
     let first = &text[..text.len().min(LOOKED_AT)];
@@ -207,7 +207,7 @@ pub fn is_converted(name: &str) -> bool {
     ROBOTS[..2].iter().any(|(_, converted)| *converted == name)
 }
 
-/// Bytes that are no text: only zeros, or too many control characters. UTF-16 is a text.
+/// Bytes that are not text: only zeros, or too many control characters. UTF-16 is a text.
 fn binary(bytes: &[u8]) -> Option<Foreign> {
     let first = &bytes[..bytes.len().min(LOOKED_AT)];
     if first.iter().all(|byte| *byte == 0) {

@@ -1,4 +1,5 @@
-//! Finds the header, the delimiter and the first row of a CSV file, whatever its program wrote above them.
+//! Finds the header, the delimiter and the first row of a CSV file, below any lines that its program wrote
+//! above them.
 
 use std::borrow::Cow;
 

@@ -1,4 +1,4 @@
-//! Lines of a text, whatever system wrote their ends.
+//! Lines of a text, with the ends of lines of any system.
 
 use std::ops::Range;
 

@@ -1,16 +1,16 @@
-//! Where a number of a vehicle file came from: kept beside the physics for reports and refits.
+//! Provenance of the numbers of a vehicle file: kept beside the physics for reports and refits.
 
 use diagnostics::Place;
 
-/// What a file says as the source of a number that has none.
+/// Text of a file for a number that has no source.
 pub const NO_SOURCE: &str = "none";
 
-/// How well a number is known.
+/// Uncertainty of a number.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Uncertainty {
     /// One standard deviation, converted to SI like the value itself.
     OneSigma(f64),
-    /// What the file says in words, such as "not stated".
+    /// Text of the file, such as "not stated".
     Said(String),
 }
 
@@ -34,33 +34,33 @@ pub struct Provenance {
     pub unit: String,
     /// The source as the file cites it.
     pub source: String,
-    /// How well it is known.
+    /// Its uncertainty.
     pub uncertainty: Uncertainty,
 }
 
 impl Provenance {
-    /// Whether the file cites a source; it says `source = "none"` where there is none.
+    /// True if the file cites a source; otherwise it has `source = "none"`.
     #[must_use]
     pub fn has_source(&self) -> bool {
         self.source != NO_SOURCE
     }
 }
 
-/// A number with everything that the file says of it.
+/// A number with its facts in the file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stated {
-    /// What it is called.
+    /// Its name.
     pub name: String,
     /// The number, in the file's unit.
     pub value: f64,
     /// The file's unit.
     pub unit: String,
-    /// Where it comes from.
+    /// Its source.
     pub source: String,
-    /// How well it is known, in the file's unit.
+    /// Its uncertainty, in the file's unit.
     pub uncertainty: Uncertainty,
-    /// Where the number stands.
+    /// Place of the number.
     pub place: Place,
-    /// Where the unit stands.
+    /// Place of the unit.
     pub unit_place: Place,
 }

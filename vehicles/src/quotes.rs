@@ -6,7 +6,7 @@
 
 use crate::lines;
 
-/// A quotation mark that would swallow what follows it.
+/// A quotation mark that would swallow the cells behind it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
     "line {line}, cell {cell}: expected a cell on one line, found a quotation mark (\") that opens one and has none \
@@ -29,7 +29,7 @@ pub struct StrayQuote {
 /// ```
 ///
 /// # Errors
-/// Where it stands.
+/// The line and the number of the cell.
 pub fn check(text: &[u8], delimiter: u8) -> Result<(), StrayQuote> {
     for line in lines::of(text) {
         let row = &text[line.content];
@@ -53,8 +53,8 @@ fn check_row(mut rest: &[u8], delimiter: u8) -> Result<(), u64> {
     }
 }
 
-/// Where the cell ends whose text begins with `quoted`: its mark is followed by a delimiter or the line's end, but for
-/// blanks. Two marks are one of the text.
+/// Returns the end of the cell whose text begins with `quoted`: its mark is followed by a delimiter or the
+/// line's end, but for blanks. Two marks are one of the text.
 fn closed(quoted: &[u8], delimiter: u8) -> Option<usize> {
     let mut at = 0;
     loop {

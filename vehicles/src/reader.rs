@@ -1,4 +1,4 @@
-//! Walks the TOML tree of a vehicle file, keeps positions, and refuses every key nobody asked for.
+//! Walks the TOML tree of a vehicle file, keeps positions, and refuses every key that is not read.
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -16,7 +16,7 @@ use diagnostics::{Diagnostic, ParameterError, Place, parse_toml};
 pub struct Document<'t> {
     file: &'t str,
     text: &'t str,
-    /// Where every number came from, in the order of reading.
+    /// Provenance of every number, in the order of reading.
     pub provenance: RefCell<Vec<Provenance>>,
 }
 
@@ -36,7 +36,7 @@ impl<'t> Document<'t> {
         Place::of(self.file, self.text, span)
     }
 
-    /// A value that cannot be meant.
+    /// An invalid value.
     pub fn bad(
         &self,
         at: &Range<usize>,
@@ -55,7 +55,7 @@ pub struct Quantity {
     pub si: f64,
     /// The whole dotted key.
     pub key: String,
-    /// Where the number stands, in bytes.
+    /// Place of the number, in bytes.
     pub at: Range<usize>,
     unit: &'static str,
 }
@@ -75,7 +75,7 @@ impl Quantity {
         self.pass(doc, positive)
     }
 
-    /// Refuses what lies outside of `bounds`.
+    /// Refuses a number outside of `bounds`.
     pub fn within(self, doc: &Document, bounds: &Bounds) -> Result<Self, Diagnostic> {
         self.pass(doc, |key, si| bounds.check(key, si))
     }
@@ -97,7 +97,7 @@ impl Quantity {
     }
 }
 
-/// Whether a number describes what is there or was chosen by somebody.
+/// Origin of a number: known of something that exists, or chosen.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Origin {
     Known,
@@ -121,7 +121,7 @@ pub struct Section<'d, 't> {
     pub doc: &'d Document<'t>,
     /// The whole dotted key of the table; empty for the root.
     pub path: String,
-    /// Where the table stands, in bytes.
+    /// Place of the table, in bytes.
     pub at: Range<usize>,
     table: &'d DeTable<'t>,
     asked: RefCell<BTreeSet<&'d str>>,
@@ -149,7 +149,7 @@ impl<'d, 't> Section<'d, 't> {
         self.find(name).ok_or_else(|| Diagnostic::at(self.doc.place(&self.at), missing()))
     }
 
-    /// Whether the file has `name`.
+    /// True if the file has `name`.
     pub fn has(&self, name: &'d str) -> bool {
         self.find(name).is_some()
     }
@@ -201,7 +201,7 @@ impl<'d, 't> Section<'d, 't> {
         }
     }
 
-    /// A text that has to be one of `choices`; returns what stands beside it.
+    /// A text that has to be one of `choices`; returns the value beside it.
     pub fn choice<T: Copy>(&self, name: &'d str, choices: &[(&str, T)]) -> Result<T, Diagnostic> {
         let text = self.text(name)?;
         if let Some((_, chosen)) = choices.iter().find(|(name, _)| *name == text) {
@@ -228,8 +228,8 @@ impl<'d, 't> Section<'d, 't> {
         Ok(self.quantity(name, dimension)?.within(self.doc, bounds)?.si)
     }
 
-    /// A number that somebody chose, such as a gain: as [`Self::quantity`], but it has an `uncertainty` only
-    /// where the file says so.
+    /// A number that was chosen, such as a gain: as [`Self::quantity`], but it has an `uncertainty` only
+    /// if the file has one.
     pub fn chosen(&self, name: &'d str, dimension: Dimension) -> Result<Quantity, Diagnostic> {
         self.number_of(name, dimension, Origin::Chosen)
     }
@@ -308,13 +308,13 @@ impl<'d, 't> Section<'d, 't> {
         });
     }
 
-    /// Where a number comes from.
+    /// Returns the source of a number.
     pub(crate) fn source(&self) -> Result<&'d str, Diagnostic> {
         self.need("source", "a text, or \"none\" for a number without a source")?;
         self.text("source")
     }
 
-    /// How well a number is known; of one without a source it need not be said.
+    /// Returns the uncertainty of a number; a number without a source need not have one.
     fn uncertainty(&self, factor: f64) -> Result<Uncertainty, Diagnostic> {
         if self.source()? == NO_SOURCE && !self.has("uncertainty") {
             return Ok(Uncertainty::Said("not stated".to_owned()));
@@ -358,12 +358,12 @@ impl<'d, 't> Section<'d, 't> {
         self.doc.bad(&value.span(), key, expected, format!("a TOML {}", value.get_ref().type_str()))
     }
 
-    /// Where the value of `name` stands, in bytes; the table itself where it has none.
+    /// Returns the place of the value of `name`, in bytes; that of the table itself where it has none.
     pub fn at_of(&self, name: &str) -> Range<usize> {
         self.table.get(name).map_or(self.at.clone(), Spanned::span)
     }
 
-    /// Refuses every key that nobody asked for, in the file's order.
+    /// Refuses every key that was not read, in the file's order.
     pub fn finish(&self) -> Result<(), Diagnostic> {
         let asked = self.asked.borrow();
         let unknown = self.table.keys().filter(|key| !asked.contains(key.get_ref().as_ref()));

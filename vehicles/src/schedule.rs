@@ -13,8 +13,8 @@ const POINTS: &str = "an array of one or more points [time in s, value]";
 
 impl<'d, 't> Section<'d, 't> {
     /// A parameter whose value is an array of points `[time, value]`, the times in s and not falling, the values of
-    /// `dimension`; both in SI and each within its `bounds`. Somebody chose it: it has an `uncertainty` only where the file
-    /// says so.
+    /// `dimension`; both in SI and each within its `bounds`. It was chosen, so it has an `uncertainty` only if
+    /// the file has one.
     ///
     /// # Errors
     /// The first point that is not one, with its place.

@@ -3,13 +3,13 @@
 use crate::foreign::Foreign;
 use crate::quotes::StrayQuote;
 
-/// Why a file is no table.
+/// Reason why a file is not a table.
 #[derive(Debug, thiserror::Error)]
 pub enum TableError {
     /// It is of another format.
     #[error(transparent)]
     Foreign(#[from] Foreign),
-    /// A quotation mark makes one cell of what are many.
+    /// A quotation mark joins many cells to one.
     #[error(transparent)]
     Quote(#[from] StrayQuote),
     /// It cannot be taken apart into cells.
@@ -97,7 +97,7 @@ pub enum TableError {
     },
 }
 
-/// Why a table has no column of a name.
+/// Reason why a table has no column of a name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ColumnError {
     /// It has none of that name.

@@ -57,7 +57,7 @@ impl Rows {
         self.places.get(index).map_or(0, |place| place.line)
     }
 
-    /// All rows.
+    /// Iterates over the rows.
     pub fn iter(&self) -> impl DoubleEndedIterator<Item = Row<'_>> + ExactSizeIterator + Clone {
         self.places.iter().map(|place| self.row(place))
     }
@@ -113,7 +113,7 @@ impl<'a> Row<'a> {
         }
     }
 
-    /// All cells.
+    /// Iterates over the cells.
     pub fn cells(self) -> impl Iterator<Item = &'a str> {
         (0..self.ends.len()).map(move |column| self.cell(column))
     }

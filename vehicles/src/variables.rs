@@ -16,7 +16,7 @@ pub enum VariableError {
     },
 }
 
-/// Replaces `${NAME}` and `${NAME:-default}` in `text` by what `variable` says.
+/// Replaces `${NAME}` and `${NAME:-default}` in `text` by the values of `variable`.
 ///
 /// ```
 /// let text = vehicles::variables::expand("${LOGS:-../logs}/a.csv", |_| None)?;

@@ -24,7 +24,7 @@ pub const ROTORS_MAX: usize = 12;
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Vehicle {
-    /// What the vehicle is called.
+    /// Name of the vehicle.
     pub name: String,
     /// Take-off mass.
     pub mass_kg: f64,
@@ -40,21 +40,21 @@ pub struct Vehicle {
     pub torque_coefficient: f64,
     /// Moment of inertia of one rotor about its axis (I_m of thesis eq. 3.11).
     pub rotor_inertia_kg_m2: f64,
-    /// How the rotor speed follows the commanded speed.
+    /// Dynamics from the commanded speed to the rotor speed.
     pub motor: MotorModel,
-    /// How a raw motor command becomes a commanded speed.
+    /// Map from a raw motor command to a commanded speed.
     pub command: CommandMap,
     /// The effects that act beyond all this, in the file's order. Only a plant that flies them reads their
-    /// meaning: what else is in this structure is the vehicle as it is declared, without them.
+    /// meaning: the rest of this structure is the vehicle as it is declared, without them.
     pub effects: Vec<EffectEntry>,
-    /// Where every number came from, in the file's order of reading.
+    /// Provenance of every number, in the file's order of reading.
     pub provenance: Vec<Provenance>,
 }
 
 /// One rotor's place and sense of rotation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rotor {
-    /// What the file calls it, such as `front`.
+    /// Its name in the file, such as `front`.
     pub name: String,
     /// The hub, seen from the centre of mass, body frame.
     pub position_m: Vector3<f64>,
@@ -62,14 +62,14 @@ pub struct Rotor {
     pub axis: Vector3<f64>,
     /// Sense of rotation seen from the tip of the axis: +1 counter-clockwise, -1 clockwise.
     pub spin: f64,
-    /// This rotor's drag torque as a multiple of what c_Q makes of its speed: 1 unless the file says otherwise. Only the
+    /// This rotor's drag torque as a multiple of that by c_Q at its speed: 1 unless the file says otherwise. Only the
     /// physics knows it; controllers count on rotors that are alike.
     pub torque_scale: f64,
-    /// True for a rotor that has failed: it stands still whatever is commanded.
+    /// True for a rotor that has failed: it stands still under any command.
     pub has_failed: bool,
 }
 
-/// How the rotor speed follows the commanded speed. Both have unit gain at rest: the thesis's gain of
+/// Dynamics from the commanded speed to the rotor speed. Both have unit gain at rest: the thesis's gain of
 /// 3.5 (section 4.2) has no unit and does not map a speed onto the same speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum MotorModel {

@@ -1,4 +1,4 @@
-//! The two vehicle files, and what every fault in a file is answered with.
+//! The two vehicle files, and the error for every fault in a file.
 #![allow(non_snake_case, reason = "units stand last in names, and the newton is N")]
 
 use diagnostics::Diagnostic;

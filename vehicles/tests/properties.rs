@@ -1,4 +1,4 @@
-//! Whatever stands in a vehicle file: it is refused with file, line and key, or what it says is physical.
+//! Any content of a vehicle file is refused with file, line and key, or describes a physical vehicle.
 
 use diagnostics::Diagnostic;
 use proptest::prelude::*;
@@ -18,7 +18,7 @@ const FILES: [&str; 3] = [
     ),
 ];
 
-/// What a key may be replaced with.
+/// Returns the values that a key may be replaced with.
 fn value() -> impl Strategy<Value = Value> {
     prop_oneof![
         prop::num::f64::ANY.prop_map(Value::Float),
@@ -48,7 +48,7 @@ fn paths(value: &Value, path: &[String], all: &mut Vec<Vec<String>>) {
     }
 }
 
-/// Replaces what stands at `path`, or removes it.
+/// Replaces the value at `path`, or removes it.
 fn change(value: &mut Value, path: &[String], new: Option<Value>) {
     let [key, rest @ ..] = path else { return };
     match value {

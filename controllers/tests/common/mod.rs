@@ -46,7 +46,7 @@ pub fn trajectory_from(yaw_rad: f64) -> Trajectory {
     Trajectory::read(&[], Start { position_W_m: Vector3::z(), yaw_rad }).unwrap()
 }
 
-/// What the law flies and in what air.
+/// Vehicle that the law flies, and its air.
 #[derive(Clone)]
 pub struct Craft {
     pub vehicle: Vehicle,
@@ -128,7 +128,7 @@ pub struct Loop {
     pub set_point: SetPoint,
     /// The last demand.
     pub demand: RotorWrench,
-    /// Whether the last demand was beyond the rotors.
+    /// True if the last demand was beyond the rotors.
     pub saturated: bool,
 }
 

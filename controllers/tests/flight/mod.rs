@@ -46,11 +46,11 @@ pub struct RangeErrors {
     pub wandering_s: f64,
 }
 
-/// Twice what the sensor's resolution makes, and what 10 Hz of it leave of the velocity.
+/// Twice the error of the sensor's resolution, and the error of the velocity at 10 Hz.
 pub const NOISY: RangeErrors =
     RangeErrors { distance_m: 0.01, velocity_m_s: 0.02, blind_velocity_m_s: 0.05, wandering_s: 2.0 };
 
-/// Where walls stand: at +x, -x, +y, -y of the world's origin; none where infinite.
+/// Places of the walls: at +x, -x, +y, -y of the world's origin; none where infinite.
 pub type Walls = [f64; 4];
 
 /// The thesis's room.
@@ -67,7 +67,7 @@ pub struct Senses {
     random: bus::random::Stream,
     velocity_error_m_s: [f64; 3],
     seen: WallEstimate,
-    /// What stands in the beams beside walls.
+    /// Objects that stand in the beams beside walls.
     pub others_W_m: Vec<Vector3<f64>>,
 }
 
@@ -101,7 +101,7 @@ impl Senses {
         self.filter.update(&mut self.filter_state, &reading)
     }
 
-    /// What the estimator of walls believes; the heading is the world's x.
+    /// Returns the belief of the estimator of walls; the heading is the world's x.
     pub fn walls(&mut self, tick: u64, body: &RigidBody) -> WallEstimate {
         if tick.is_multiple_of(100) {
             self.measure(body);
@@ -150,7 +150,7 @@ pub struct Loop {
     pub state: State,
     pub senses: Senses,
     pub law_state: ControllerState,
-    /// What the law answered last.
+    /// Last output of the law.
     pub output: ControlOutput,
     pub believed: ControlledVehicle,
     pub set_point: SetPoint,

@@ -1,4 +1,4 @@
-//! Meaning of the whole numbers of a column, which its type says.
+//! Meaning of the whole numbers of a column, according to its type.
 
 use parquet::basic::{ConvertedType, LogicalType, TimeUnit, Type};
 use parquet::schema::types::ColumnDescriptor;

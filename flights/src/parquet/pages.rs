@@ -11,7 +11,7 @@ use super::thrift::{Cursor, STRUCT};
 const BYTES_PER_VALUE: usize = 16;
 const BYTES_FREE: usize = 4096;
 
-/// Words for what is wrong with a column.
+/// Words for the fault of a column.
 pub type Fault = String;
 
 /// A page of a column.
@@ -159,7 +159,7 @@ impl<'a> Pages<'a> {
     }
 }
 
-/// Appends what `packed` unpacks to; no more than a byte beyond `length`.
+/// Appends the unpacked bytes of `packed`; no more than a byte beyond `length`.
 fn unpack(compression: Compression, packed: &[u8], length: usize, to: &mut Vec<u8>) -> Result<(), Fault> {
     let from = to.len();
     if let Compression::GZIP(_) = compression {
@@ -222,7 +222,7 @@ fn encoding(number: Option<i64>) -> Result<Encoding, Fault> {
     }
 }
 
-/// A size that a header says.
+/// A size from a header.
 fn size(number: Option<i64>) -> Result<usize, Fault> {
     let size =
         number.and_then(|number| i32::try_from(number).ok()).and_then(|number| usize::try_from(number).ok());

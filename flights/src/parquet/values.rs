@@ -1,4 +1,4 @@
-//! Numbers of a column, whatever type and encoding it has.
+//! Numbers of a column of any type and encoding.
 
 use std::borrow::Cow;
 
@@ -43,7 +43,7 @@ struct Column {
 }
 
 impl Column {
-    /// The column; else what it holds in place of numbers.
+    /// The column; else a description of the values that it holds in place of numbers.
     fn of(descriptor: &ColumnDescriptor) -> Result<Self, &'static str> {
         let kind = Kind::of(descriptor);
         let physical = descriptor.physical_type();

@@ -40,7 +40,7 @@ impl Place {
     }
 }
 
-/// A flight of 10 s at 100 Hz whose channels agree; the units of what is logged can be wrong.
+/// A flight of 10 s at 100 Hz whose channels agree; the units of the logged channels can be wrong.
 pub struct Motion {
     pub rate_unit: f64,
     pub force_unit: f64,
@@ -74,7 +74,7 @@ impl Motion {
         Vector3::new(1.96 * libm::cos(1.4 * time), -2.0 * libm::sin(2.0 * time), 0.2 * libm::cos(time))
     }
 
-    /// What thrust has to make of it.
+    /// Returns the specific force in the world that the thrust has to make.
     fn force(time: f64) -> Vector3<f64> {
         Vector3::new(
             -2.744 * libm::sin(1.4 * time),
@@ -225,7 +225,8 @@ pub fn ulog_of(samples: std::ops::Range<u32>) -> Vec<u8> {
     bytes
 }
 
-/// The start of `sensor_msgs/msg/BatteryState`, with what our own definitions do not have: constants and short names.
+/// The start of `sensor_msgs/msg/BatteryState`, with constants and short names, which our own definitions do
+/// not have.
 const BATTERY_STATE: &str = "\
 # A constant:
 uint8 POWER_SUPPLY_STATUS_UNKNOWN = 0

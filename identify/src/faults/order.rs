@@ -54,7 +54,7 @@ struct Arrangement {
 }
 
 impl Arrangement {
-    /// All that are tried of so many rotors, the declared one first.
+    /// Returns the arrangements of so many rotors that are tried, the declared one first.
     fn all(rotors: usize) -> Vec<Self> {
         let both =
             |order: Vec<usize>| [false, true].map(|is_reversed| Self { order: order.clone(), is_reversed });

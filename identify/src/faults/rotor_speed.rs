@@ -2,7 +2,7 @@
 //!
 //! A measured speed that disagrees with its command is either wrong, or the rotor does turn so. The motion of the vehicle
 //! decides: the speed that explains the measured forces and torques better is believed. This is done flight by flight: a
-//! sensor that reads half in one of six flights reads 0.917 in the mean, which no threshold shows.
+//! sensor that reads half in one of six flights reads 0.917 in the mean, which no threshold detects.
 
 use super::fault::{Fault, Part};
 use super::twin::is_off_scale;

@@ -15,7 +15,7 @@ pub struct Point {
     pub squared: f64,
     /// Mean thrust in N or torque in N*m.
     pub force: f64,
-    /// Which log it is of: its plateaus share a tare.
+    /// Number of its log: the plateaus of a log share a tare.
     pub log: usize,
 }
 

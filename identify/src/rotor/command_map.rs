@@ -21,7 +21,7 @@ pub struct CommandLine {
     pub speed_at_min_rad_s: Estimate,
     /// The line's speed at the largest command, in rad/s.
     pub speed_at_max_rad_s: Estimate,
-    /// Whether the motor stood still at a command of 0.
+    /// True if the motor stood still at a command of 0.
     pub zero_is_off: bool,
     /// The command at which the line misses most, and by how much (measured minus line), in rad/s.
     pub worst: (f64, f64),

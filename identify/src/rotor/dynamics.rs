@@ -21,14 +21,14 @@ const RESAMPLES: usize = 4000;
 /// Seed of the comparison; any number would do, a fixed one makes runs equal.
 const SEED: u64 = 1989;
 
-/// What the dynamic logs say.
+/// Results of the dynamic logs.
 #[derive(Debug, Clone, Serialize)]
 pub struct Dynamics {
     /// The motor of first order.
     pub first: Fitted,
     /// The motor of second order.
     pub second: Fitted,
-    /// Which of them is preferred, and why.
+    /// Preferred one of the two, with the reason.
     pub comparison: Comparison,
     /// Time constant in s of rising steps alone, of all roles; absent with fewer than three.
     pub rising_s: Option<Estimate>,
@@ -42,7 +42,7 @@ pub struct Dynamics {
     pub steps: Vec<OneStep>,
     /// The commands that were held.
     pub holds: Vec<Hold>,
-    /// What is wrong with the data, and what was left out.
+    /// Faults of the data, and data that were left out.
     pub findings: Vec<String>,
 }
 
@@ -86,7 +86,7 @@ pub struct OneStep {
     pub from: f64,
     /// The command after.
     pub to: f64,
-    /// Whether it was held out.
+    /// True if it was held out.
     pub is_test: bool,
     /// Steady speed after minus before, in rad/s.
     pub height_rad_s: f64,
@@ -230,7 +230,7 @@ fn one_step(step: &Step) -> Option<OneStep> {
     })
 }
 
-/// What the fits say about the data; `preferred` is the motor of the order that is preferred.
+/// Returns findings of the fits about the data; `preferred` is the motor of the preferred order.
 fn more_findings(dynamics: &Dynamics, steps: &[Step], preferred: Lag) -> Vec<String> {
     let matches: Vec<Match> = steps.iter().map(|step| matched(step, preferred)).collect();
     // In ms with one digit; 0 after a minus would read as a number.

@@ -1,10 +1,10 @@
-//! What can be wrong with a stand file, its logs, or the folder of the results.
+//! Errors of a stand file, of its logs, or of the folder of the results.
 
 use diagnostics::Diagnostic;
 use recorder::RecordingError;
 use vehicles::table::TableError;
 
-/// Why a rotor could not be identified.
+/// Reason why a rotor could not be identified.
 ///
 /// ```
 /// use identify::rotor::RotorError;
@@ -14,15 +14,16 @@ use vehicles::table::TableError;
 /// ```
 #[derive(Debug, thiserror::Error)]
 pub enum RotorError {
-    /// A file, also the vehicle's that the rest is taken from, cannot be read, is no TOML, or has a key or a value that cannot be meant.
+    /// A file cannot be read, is not TOML, or has an invalid key or value; also the vehicle file that the rest
+    /// is taken from.
     #[error(transparent)]
     File(#[from] Diagnostic),
-    /// A log is no table.
+    /// A log is not a table.
     #[error("{file}: {cause}")]
     Table {
         /// The log.
         file: String,
-        /// Where, and what to do.
+        /// The place, and advice.
         #[source]
         cause: TableError,
     },
@@ -34,7 +35,7 @@ pub enum RotorError {
     NoField {
         /// The log.
         file: String,
-        /// What there is in its place.
+        /// The missing topic or field, and those that exist.
         #[source]
         cause: RecordingError,
     },
@@ -73,7 +74,7 @@ pub enum RotorError {
         file: String,
         /// The line and the column of a table, or the sample of a recording.
         place: String,
-        /// What is wrong with its time.
+        /// Fault of its time.
         found: &'static str,
     },
     /// A log to test on holds rows that are fitted on.
@@ -86,19 +87,19 @@ pub enum RotorError {
         test: String,
         /// The log to fit on.
         fit: String,
-        /// What they have in common.
+        /// Relation of the two logs.
         reason: String,
     },
     /// There is too little to fit, or a log's rows are too few or too far apart to show a step.
     #[error("{what}: expected {expected}, found {found}; {advice}")]
     TooLittle {
-        /// What was to be fitted, or the log.
+        /// Quantity to be fitted, or the log.
         what: String,
-        /// What is needed.
+        /// Amount that is needed.
         expected: String,
-        /// What there is.
+        /// Amount that was found.
         found: String,
-        /// What to do.
+        /// Advice.
         advice: &'static str,
     },
     /// The figures could not be written as JSON.

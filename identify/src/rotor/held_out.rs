@@ -1,4 +1,4 @@
-//! Whether the logs to test on are held out: none is a log that is fitted on, a copy of one, or a part of one.
+//! Check that the logs to test on are held out: none is a log that is fitted on, a copy of one, or a part of one.
 
 use diagnostics::unit::SPEED;
 use flights::{Channel, Comparison, Role, same_file, twin};
@@ -14,8 +14,8 @@ struct Log<'s> {
     columns: [Option<(&'s Column, f64)>; 3],
 }
 
-/// Refuses a stand whose logs to test on hold rows that are fitted on. What is fitted on static logs is tested on static
-/// ones, and so with dynamic ones.
+/// Refuses a stand whose logs to test on hold rows that are fitted on. Fits of static logs are tested on static
+/// logs, and fits of dynamic logs on dynamic ones.
 pub fn check(stand: &Stand) -> Result<(), RotorError> {
     let speed = |column| Some((column, Column::factor(column, SPEED)));
     check_pairs(stand.statics.iter().map(|log| {
@@ -54,7 +54,7 @@ fn check_pairs<'s>(logs: impl Iterator<Item = Log<'s>>) -> Result<(), RotorError
 }
 
 impl Log<'_> {
-    /// How the file of another log is this log's; two topics of a recording are two logs.
+    /// Returns how the file of another log equals this log's file; two topics of a recording are two logs.
     fn same_file(&self, other: &Self) -> Option<&'static str> {
         let (one, other) = (&self.source, &other.source);
         let have_same_bytes = || {

@@ -1,4 +1,4 @@
-//! The motor that answers all steps best.
+//! Fit of the motor whose response is nearest to all steps.
 //!
 //! A step is modelled as w(t) = w0 + dw s(t - d), with s the motor's unit step. The levels w0 and dw and the onset d
 //! belong to the step: a log tells when a command took effect only to one row. So they are fitted to every step, for
@@ -24,7 +24,7 @@ const STARTS: i32 = 14;
 /// Onsets lie at most this many rows from the row in which the command is first seen.
 pub const ONSET_ROWS_MAX: f64 = 1.0;
 
-/// How many parameters a motor has.
+/// Order of a motor's model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Order {
@@ -39,7 +39,7 @@ pub enum Order {
 pub struct Fit {
     /// The motor.
     pub lag: Lag,
-    /// What the motor would be without each of the steps.
+    /// Motors fitted without each of the steps in turn.
     pub without_one: Vec<Lag>,
 }
 
@@ -48,7 +48,7 @@ pub struct Fit {
 pub struct Match {
     /// When the command took effect, from the row in which it is first seen, in s.
     pub onset_s: f64,
-    /// Whether that is the end of what is allowed.
+    /// True if the onset is at the end of the range that is allowed.
     pub is_clamped: bool,
     /// Predicted minus measured, in rad/s.
     pub errors: Vec<f64>,
@@ -231,7 +231,7 @@ fn total(blocks: &[Normal]) -> Normal {
     })
 }
 
-/// The motor after a damped Gauss-Newton step, inside of what is physical.
+/// The motor after a damped Gauss-Newton step, within physical values.
 fn moved(lag: Lag, sum: &Normal, damping: f64, order: Order) -> Option<Lag> {
     let damped = sum.hessian + Matrix2::from_diagonal(&sum.hessian.diagonal()) * damping;
     let change = solved(damped, sum.gradient, order)?;

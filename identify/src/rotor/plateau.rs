@@ -1,4 +1,4 @@
-//! Where a log stands still, and what it reads there.
+//! Plateaus of a log's speed, and the readings there.
 
 use statrs::statistics::{Data, OrderStatistics};
 use std::collections::VecDeque;
@@ -123,7 +123,7 @@ pub fn median(values: &[f64]) -> f64 {
     Data::new(values.to_vec()).median()
 }
 
-/// What to say of a log whose speeds repeat themselves.
+/// Returns a finding about a log whose speeds repeat themselves.
 pub fn stuck_finding(log: &str, speed: &[f64]) -> Option<String> {
     let (stuck, top) = stuck(speed, STUCK_READINGS);
     (stuck > 0).then(|| {
@@ -134,8 +134,8 @@ pub fn stuck_finding(log: &str, speed: &[f64]) -> Option<String> {
     })
 }
 
-/// How many readings stand in runs of at least `shortest` equal ones while the rotor turns, and how many of these
-/// are the largest reading of all.
+/// Counts the readings in runs of at least `shortest` equal ones while the rotor turns, and those among them
+/// that equal the largest reading of all.
 fn stuck(values: &[f64], shortest: usize) -> (usize, usize) {
     let largest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let runs = values.chunk_by(|a, b| a == b).filter(|run| run.len() >= shortest && run[0] > REST_RAD_S);

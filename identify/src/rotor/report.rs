@@ -15,7 +15,7 @@ use crate::statistics::Estimate;
 /// Everything that a stand told.
 #[derive(Debug, Clone, Serialize)]
 pub struct RotorReport {
-    /// What was measured.
+    /// Name of the measured object.
     pub name: String,
     /// Thrust and torque; absent without static logs.
     pub statics: Option<Statics>,
@@ -24,7 +24,7 @@ pub struct RotorReport {
 }
 
 impl RotorReport {
-    /// All figures as JSON, behind who wrote them; an end of an interval that is not known is `null`.
+    /// Returns all figures as JSON, behind the name of the writer; an unknown end of an interval is `null`.
     pub(super) fn json(&self) -> Result<String, RotorError> {
         let mut all = serde_json::Map::from_iter([("writer".to_owned(), "hummingbus".into())]);
         all.extend(serde_json::to_value(self)?.as_object().cloned().unwrap_or_default());

@@ -1,4 +1,4 @@
-//! How a motor 1 / (a2 s^2 + a1 s + 1) answers a unit step of its command.
+//! Response of a motor 1 / (a2 s^2 + a1 s + 1) to a unit step of its command.
 
 /// Damping this near to 1 counts as 1, where the formulas on both sides lose digits.
 const NEAR_CRITICAL: f64 = 1e-8;

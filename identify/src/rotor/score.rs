@@ -1,8 +1,8 @@
-//! How well a model does on what was not fitted.
+//! Scores of a model on data that were not fitted.
 
 use serde::Serialize;
 
-/// How often an interval shall hold the truth.
+/// Level of confidence of the intervals.
 pub const LEVEL: f64 = 0.95;
 
 /// Errors of predictions.
@@ -15,7 +15,7 @@ pub const LEVEL: f64 = 0.95;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Score {
-    /// Root of the mean square error, in the unit of what is predicted.
+    /// Root of the mean square error, in the unit of the prediction.
     pub rms: f64,
     /// The share of the variance that is predicted; 1 is all of it.
     pub r_squared: f64,
@@ -24,7 +24,7 @@ pub struct Score {
 }
 
 impl Score {
-    /// The score of pairs of a prediction and what was measured; `None` without any.
+    /// The score of pairs of a predicted and a measured value; `None` without any.
     pub fn of(pairs: &[(f64, f64)]) -> Option<Self> {
         let n = pairs.len() as f64;
         let mean = pairs.iter().map(|(_, measured)| measured).sum::<f64>() / n;

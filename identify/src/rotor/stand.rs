@@ -1,4 +1,4 @@
-//! The stand file: which logs, which columns, and what is held out.
+//! The stand file: logs, columns, and the parts that are held out.
 
 use std::path::{Path, PathBuf};
 
@@ -19,7 +19,7 @@ use super::error::RotorError;
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Stand {
-    /// What was measured, as text.
+    /// Name of the measured object.
     pub name: String,
     /// Diameter of the propeller in m, if the file says it.
     #[serde(rename = "propeller_diameter_m")]
@@ -35,7 +35,7 @@ pub struct Stand {
 
 /// The vehicle file that the rest is taken over from.
 pub struct VehicleFile {
-    /// What it is called in texts.
+    /// Its name in texts.
     pub name: String,
     /// The vehicle.
     pub vehicle: Vehicle,
@@ -50,30 +50,30 @@ pub struct StaticLog {
     pub files: InputFiles,
     /// The log; made a path by [`Stand::read`].
     pub file: PathBuf,
-    /// Where the log is a recording: the topic whose fields are read.
+    /// Topic whose fields are read, if the log is a recording.
     pub topic: Option<String>,
     /// Form of a CSV file that does not show it.
     #[serde(default)]
     pub csv: Dialect,
-    /// What it is for.
+    /// Role of the log.
     #[serde(default = "fit")]
     pub role: Role,
     /// Share of the plateaus of a log with the role `fit` that are held out.
     #[serde(default)]
     pub held_out: f64,
-    /// How long the speed has to have been steady before a reading of thrust or torque counts.
+    /// Time for which the speed has to have been steady before a reading of thrust or torque counts, in s.
     #[serde(default = "settle_s")]
     pub settle_s: f64,
-    /// By which part of itself the speed may change within that time.
+    /// Part of itself by which the speed may change within that time.
     #[serde(default = "steady")]
     pub steady: f64,
-    /// Where the time stands; absent for a recording, whose samples have theirs.
+    /// Column of the time; absent for a recording, whose samples have times.
     pub time: Option<Column>,
-    /// Where the speed stands.
+    /// Column or field of the speed.
     pub speed: Column,
-    /// Where the thrust stands.
+    /// Column or field of the thrust.
     pub thrust: Option<Column>,
-    /// Where the torque stands.
+    /// Column or field of the torque.
     pub torque: Option<Column>,
 }
 
@@ -86,42 +86,42 @@ pub struct DynamicLog {
     pub files: InputFiles,
     /// The log; made a path by [`Stand::read`].
     pub file: PathBuf,
-    /// Where the log is a recording: the topic whose fields are read.
+    /// Topic whose fields are read, if the log is a recording.
     pub topic: Option<String>,
     /// Form of a CSV file that does not show it.
     #[serde(default)]
     pub csv: Dialect,
-    /// What it is for.
+    /// Role of the log.
     #[serde(default = "fit")]
     pub role: Role,
     /// Share of the steps of a log with the role `fit` that are held out.
     #[serde(default)]
     pub held_out: f64,
-    /// Which clock the steps are judged on.
+    /// Clock on which the steps are judged.
     #[serde(default)]
     pub clock: Clock,
-    /// How long the command has to have been constant before a step.
+    /// Time for which the command has to have been constant before a step, in s.
     #[serde(default = "before_s")]
     pub before_s: f64,
-    /// How long after a step the speed is looked at; the command has to stay constant.
+    /// Time after a step over which the speed is compared, in s; the command has to stay constant.
     #[serde(default = "after_s")]
     pub after_s: f64,
-    /// Where the time stands; absent for a recording, whose samples have theirs.
+    /// Column of the time; absent for a recording, whose samples have times.
     pub time: Option<Column>,
-    /// Where the speed stands.
+    /// Column or field of the speed.
     pub speed: Column,
-    /// Where the command stands.
+    /// Column or field of the command.
     pub command: Column,
 }
 
-/// Where the times of rows come from.
+/// Source of the times of rows.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Clock {
     /// The log's own stamps.
     #[default]
     Stamps,
-    /// Rows lie at equal distances, and stamps tell only the mean distance: for logs whose stamps are the times at
+    /// Rows lie at equal distances, and stamps give only the mean distance: for logs whose stamps are the times at
     /// which rows arrived in groups.
     Rows,
 }
@@ -134,24 +134,24 @@ pub struct Column {
     column: Option<String>,
     /// The path of the field in the messages of a recording's topic.
     field: Option<String>,
-    /// Its unit; what a recording states has to be the same.
+    /// Its unit; the unit that a recording states has to be the same.
     pub unit: String,
     /// Pole pairs of the motor, for an electrical speed: the rotor's is this many times smaller.
     #[serde(default = "one")]
     pub pole_pairs: f64,
 }
 
-/// A log as it is read: its file, and all of it that is asked for.
+/// A log as it is read: its file, and the columns that are asked for.
 pub struct Source<'s> {
     /// The files of the fit.
     pub files: &'s InputFiles,
     /// The log.
     pub file: &'s Path,
-    /// Where it is a recording: the topic.
+    /// Topic, if it is a recording.
     pub topic: Option<&'s str>,
     /// Form of a table.
     pub csv: &'s Dialect,
-    /// Where the time of a table stands.
+    /// Column of the time of a table.
     pub time: Option<&'s Column>,
     /// The columns by their keys in the stand file.
     pub columns: Vec<(&'static str, &'s Column)>,
@@ -191,12 +191,12 @@ impl DynamicLog {
         }
     }
 
-    /// Whether the command is the speed that the rotor is asked for, and not the vehicle's own command.
+    /// True if the command is the speed that the rotor is asked for, and not the vehicle's own command.
     pub fn is_commanded_in_speed(&self) -> bool {
         SPEED.factor(&self.command.unit).is_some()
     }
 
-    /// What takes a command that is a speed to rad/s; any other is kept as the log has it.
+    /// Returns the factor from a command that is a speed to rad/s; 1 for any other command.
     pub fn command_factor(&self) -> f64 {
         if self.is_commanded_in_speed() { self.command.factor(SPEED) } else { 1.0 }
     }
@@ -251,23 +251,24 @@ impl Stand {
     }
 }
 
-/// What a file is called in reports: its name without folders.
+/// Returns the name of a file in reports: without folders.
 pub fn short_name(path: &Path) -> String {
     path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }
 
 impl Column {
-    /// What it is called in its log; known to be there after [`Stand::read`].
+    /// Returns its name in the log; known to exist after [`Stand::read`].
     pub fn name(&self) -> &str {
         self.field.as_deref().or(self.column.as_deref()).unwrap_or_default()
     }
 
-    /// Whether its cells are times as `YYYY-MM-DD HH:MM:SS:mmm`.
+    /// True if its cells are times as `YYYY-MM-DD HH:MM:SS:mmm`.
     pub fn is_wall_clock(&self) -> bool {
         self.unit == wall_clock::UNIT
     }
 
-    /// What takes its cells to SI, a speed to that of the rotor; known to be right after [`Stand::read`].
+    /// Returns the factor from its cells to SI, for a speed to that of the rotor; known to be valid after
+    /// [`Stand::read`].
     pub fn factor(&self, dimension: Dimension) -> f64 {
         dimension.factor(&self.unit).unwrap_or(f64::NAN) / self.pole_pairs
     }
@@ -276,7 +277,7 @@ impl Column {
 type Check = Result<(), ParameterError>;
 
 impl Stand {
-    /// What each value came to.
+    /// Returns the result of the check of each value.
     fn checks(&self) -> Vec<Check> {
         let logs = self.statics.len() + self.dynamics.len();
         let mut checks = vec![require("static, dynamic", "none", logs > 0, "at least one log")];
@@ -310,7 +311,7 @@ impl Stand {
     }
 }
 
-/// Whether time and columns are named as the log has them: the columns of a table, the fields of a recording.
+/// Checks that time and columns are named as the log has them: the columns of a table, the fields of a recording.
 fn names(log: &str, source: &Source) -> Vec<Check> {
     let time = match (source.topic, source.time) {
         (None, Some(time)) => named(&format!("{log}.time"), time, None).and_then(|()| time_unit(log, time)),
@@ -380,7 +381,8 @@ fn expanded(key: &str, written: &Path) -> Result<String, ParameterError> {
     })
 }
 
-/// Which of `count` segments are held out: spread evenly, so that a share of them is, and the first is not.
+/// Tells for each of `count` segments whether it is held out. Of a log to fit on, `share` of them are, spread
+/// evenly, and the first is not. Of a log to test on, all are.
 pub fn held_out(count: usize, role: Role, share: f64) -> Vec<bool> {
     let passed = |index: usize| (index as f64 * share + 1e-9).floor();
     (0..count).map(|index| role == Role::Test || passed(index + 1) > passed(index)).collect()

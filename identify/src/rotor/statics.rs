@@ -16,22 +16,22 @@ use crate::statistics::mean;
 /// Density of air for the check of plausibility, in kg/m^3 (15 degrees C at sea level, ISO 2533).
 const AIR_KG_M3: f64 = 1.225;
 
-/// What the static logs say.
+/// Results of the static logs.
 #[derive(Debug, Clone, Serialize)]
 pub struct Statics {
     /// c_T.
     pub thrust: Option<Coefficient>,
     /// c_Q.
     pub torque: Option<Coefficient>,
-    /// Whether a propeller can do this; only where the stand file has its diameter.
+    /// Plausibility of the figures for a propeller; only if the stand file has its diameter.
     pub plausibility: Option<Plausibility>,
     /// Slowest and fastest plateau fitted, in rad/s.
     pub speeds_rad_s: (f64, f64),
-    /// What is wrong with the data or with the law, and what was left out.
+    /// Faults of the data or of the law, and data that were left out.
     pub findings: Vec<String>,
 }
 
-/// Numbers without dimension, which tell wrong units from right ones.
+/// Numbers without dimension, by which wrong units are noticed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Plausibility {
     /// C_T = T / (rho n^2 D^4); propellers at rest have about 0.05 to 0.25.
@@ -100,7 +100,7 @@ impl<'s> Log<'s> {
         Ok(log)
     }
 
-    /// Notes how much of the log is steady, and what is odd about its speed.
+    /// Notes how much of the log is steady, and any oddity of its speed.
     fn look(&self, findings: &mut Vec<String>) {
         let steady: usize = self.plateaus.rows.iter().map(std::iter::ExactSizeIterator::len).sum();
         let spikes = self.plateaus.is_spike.iter().filter(|spike| **spike).count();
@@ -168,8 +168,8 @@ impl<'s> Log<'s> {
         Ok(Some((points.into_iter().zip(is_test).collect(), tare_sigma)))
     }
 
-    /// What the stand reads at rest before the run. What it reads after it only tells how far it drifts: by then a
-    /// stand is warm, and somebody may be at it. With its standard error, which the readings' scatter tells.
+    /// Returns the stand's reading at rest before the run, with its standard error from the readings' scatter. A rest
+    /// after the run only shows the drift: by then a stand is warm, and somebody may be at it.
     fn tare(
         &self,
         quantity: &Quantity,
@@ -233,7 +233,7 @@ fn coefficient(
     Ok(Some(coefficient))
 }
 
-/// What speaks against the law y = c w^2.
+/// Returns a finding if the data contradict the law y = c w^2.
 fn law(quantity: &Quantity, coefficient: &Coefficient) -> Option<String> {
     let Coefficient { exponent, intercept, at_slowest, at_fastest, .. } = coefficient;
     let holds = exponent.low <= 2.0 && 2.0 <= exponent.high;
@@ -257,7 +257,7 @@ impl Plausibility {
         })
     }
 
-    /// What no propeller can do.
+    /// Returns a finding if no propeller can have these figures.
     fn finding(&self) -> Option<String> {
         let is_thrust_odd = !(0.02..0.4).contains(&self.thrust_number);
         let is_merit_odd = self.figure_of_merit.is_some_and(|merit| !(0.15..1.0).contains(&merit));

@@ -28,7 +28,7 @@ pub struct Step {
     pub from: f64,
     /// The command after.
     pub to: f64,
-    /// Whether it is held out.
+    /// True if it is held out.
     pub is_test: bool,
     /// The mean distance of rows.
     pub period_s: f64,
@@ -51,20 +51,20 @@ pub struct Hold {
     pub command: f64,
     /// Median speed, the start of the hold left out, in rad/s.
     pub speed_rad_s: f64,
-    /// Whether it is held out.
+    /// True if it is held out.
     pub is_test: bool,
 }
 
-/// What logs of steps hold.
+/// Steps and holds of logs.
 #[derive(Default)]
 pub struct Cut {
     /// Its usable steps.
     pub steps: Vec<Step>,
     /// The commands that were held long enough; none of a log whose command is a speed.
     pub holds: Vec<Hold>,
-    /// Whether the motor stands still at a command of 0.
+    /// True if the motor stands still at a command of 0.
     pub zero_is_off: bool,
-    /// What was noticed and left out.
+    /// Findings, and data that were left out.
     pub findings: Vec<String>,
 }
 
@@ -107,7 +107,7 @@ impl Cut {
     }
 }
 
-/// Changes of the command that are no usable steps, by reason.
+/// Changes of the command that cannot be used as steps, by reason.
 #[derive(Default)]
 struct LeftOut {
     stopped: usize,
@@ -150,13 +150,13 @@ impl<'s> Log<'s> {
         Err(RotorError::too_little(&self.name, expected, format!("one in {} s", self.period_s), advice))
     }
 
-    /// Whether the command of `row` is another than before.
+    /// True if the command of `row` differs from that of the row before.
     #[allow(clippy::float_cmp, reason = "a held command is the same number in every row")]
     fn changes(&self, row: usize) -> bool {
         self.command[row] != self.command[row - 1]
     }
 
-    /// How many rows `seconds` are; at most one more than there are, whatever the stamps say.
+    /// Returns the number of rows in `seconds`, but at most one more than the log has, whatever the stamps say.
     fn rows(&self, seconds: f64) -> usize {
         ((seconds / self.period_s).round() as usize).min(self.speed.len() + 1)
     }
@@ -228,7 +228,7 @@ impl<'s> Log<'s> {
         findings
     }
 
-    /// How even the stamps are.
+    /// Describes how even the stamps are.
     fn stamps(&self) -> String {
         let mut gaps_s: Vec<f64> = self.time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
         gaps_s.sort_by(f64::total_cmp);
@@ -247,7 +247,7 @@ impl<'s> Log<'s> {
     }
 }
 
-/// What to say of a log whose command is the speed that is asked for.
+/// Returns a finding about a log whose command is the speed that is asked for.
 fn speed_command_finding(log: &str, holds: &[Hold]) -> Option<String> {
     let misses = holds.iter().map(|hold| (hold.speed_rad_s - hold.command).abs());
     let most = misses.reduce(f64::max)?;
@@ -266,7 +266,7 @@ fn period(time_s: &[f64]) -> Option<f64> {
     Some(median(&periods)).filter(|period| *period > 0.0)
 }
 
-/// Whether stamps after a step lie later against the rows than those before, by more than groups explain.
+/// True if the stamps shift against the rows from before a step to after it by more than groups explain.
 fn has_lost_rows(stamps_s: &[f64], rows_s: &[f64], before: usize, period_s: f64) -> bool {
     let late: Vec<f64> = stamps_s.iter().zip(rows_s).map(|(stamp, row)| stamp - row).collect();
     let shift = median(&late[late.len() - before.max(1)..]) - median(&late[..before]);

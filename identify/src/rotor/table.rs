@@ -9,7 +9,7 @@ use super::error::RotorError;
 use super::recorded::Recorded;
 use super::stand::{Column, Source, short_name};
 
-/// How a recording begins (MCAP's specification, "Magic").
+/// First bytes of a recording (MCAP's specification, "Magic").
 const RECORDING: &[u8] = b"\x89MCAP0\r\n";
 
 /// The times and the numbers of a log.
@@ -19,7 +19,7 @@ pub struct LogTable {
     content: Content,
 }
 
-/// What a log is made of.
+/// Content of a log.
 enum Content {
     /// The cells of a table.
     Table(Table),
@@ -109,7 +109,7 @@ fn times(file: &str, table: &Table, column: &Column) -> Result<Vec<f64>, RotorEr
     Ok(wall_clock::times(table.rows.iter().map(|row| row.cell(index))))
 }
 
-/// Refuses rows without a time, and times that go back; `place` tells where a row stands.
+/// Refuses rows without a time, and times that go back; `place` describes the place of a row.
 fn check_times(file: &str, time_s: &[f64], place: impl Fn(usize) -> String) -> Result<(), RotorError> {
     let fault = |row: usize, found: &'static str| {
         Err(RotorError::Time { file: file.to_owned(), place: place(row), found })

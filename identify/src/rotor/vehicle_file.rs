@@ -10,7 +10,7 @@ use super::stand::VehicleFile;
 use super::statics::Statics;
 use crate::statistics::Estimate;
 
-/// The text of `rotor.toml`. What the stand does not tell comes from `vehicle`, and is left out without one.
+/// The text of `rotor.toml`. Values that the stand does not give come from `vehicle`, and are left out without one.
 pub fn text(report: &RotorReport, vehicle: Option<&VehicleFile>) -> String {
     let head = format!(
         "# Tables of a vehicle file, identified from a thrust stand: {}.\n\
@@ -36,7 +36,7 @@ fn identified(name: &str, estimate: &Estimate, unit: &str, source: &str) -> Stri
     parameter(name, estimate.value, unit, &format!("{source}; {interval}"), &uncertainty)
 }
 
-/// A line with what the vehicle file has, or a comment that there is none.
+/// A line with the value of the vehicle file, or a comment that it has none.
 fn taken(vehicle: Option<&VehicleFile>, table: &str, name: &str, unit: &str, value: f64) -> String {
     let Some(file) = vehicle else { return format!("# {name}: the stand does not tell\n") };
     let key = format!("{table}.{name}");

@@ -5,16 +5,16 @@ use rand_core::{Rng, SeedableRng};
 
 use super::correlation::mean;
 
-/// How to resample.
+/// Settings of the resampling.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bootstrap {
     /// Samples a block: longer than the samples remember; 1 for independent samples.
     pub block: usize,
-    /// How many resampled series.
+    /// Number of resampled series.
     pub resamples: usize,
     /// Seed of the draws.
     pub seed: u64,
-    /// How often the interval shall hold the mean, such as 0.95.
+    /// Share of intervals that shall hold the mean, such as 0.95.
     pub level: f64,
 }
 

@@ -35,7 +35,7 @@ pub fn cross_correlation(x: &[f64], y: &[f64], max_lag: usize) -> Vec<f64> {
     (0..=max_lag).map(|lag| product(x.get(lag..).unwrap_or_default(), &y) / scale).collect()
 }
 
-/// How far the correlations of `n` samples of white noise stray from 0, at a share of `level` of all lags:
+/// Returns the bound that the correlations of `n` samples of white noise keep at a share of `level` of all lags:
 /// z / sqrt(n) (Bartlett 1946). 1.96 / sqrt(n) at 0.95; MATLAB's `resid` draws the bound of 0.99.
 #[must_use]
 pub fn white_noise_bound(n: usize, level: f64) -> f64 {

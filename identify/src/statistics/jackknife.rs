@@ -16,8 +16,8 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// The estimate with an error more that no block shows, of standard deviation `sigma` and independent of what the
-    /// interval of `level` holds already: half widths add as squares do.
+    /// The estimate with a further error that no block shows. It has the standard deviation `sigma` and is
+    /// independent of the errors in the interval of `level`: half widths add as squares do.
     pub(crate) fn with_error(self, sigma: f64, level: f64) -> Self {
         let more = sigma * normal_quantile(0.5 + 0.5 * level);
         let wider = |width: f64| (width * width + more * more).sqrt();

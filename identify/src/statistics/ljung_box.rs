@@ -3,12 +3,12 @@
 use super::correlation::autocorrelation;
 use super::quantile::chi_square_tail;
 
-/// What the test found.
+/// Result of the test.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct LjungBox {
     /// Q, large where the samples are correlated.
     pub statistic: f64,
-    /// How often white noise shows a Q of this size or more.
+    /// Probability of a Q of this size or more for white noise.
     pub p_value: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Cases whose answer is known: what is true, what identification makes of it, and how that is judged.
+//! Cases whose answer is known: the truth, the result of an identification, and its judgement.
 #![allow(non_snake_case, reason = "N is the newton")]
 
 use super::{Plan, Sensors, fly, vehicle_file};
@@ -17,7 +17,7 @@ pub const MATTERS: f64 = 0.01;
 /// Delay that a vehicle in free flight may have and still fly.
 pub const FREE_DELAY_S: f64 = 0.02;
 
-/// All effects that are candidates.
+/// Names of the effects that are candidates.
 pub const EFFECTS: [&str; 19] = [
     "rotor-drag",
     "parasitic-drag",
@@ -56,21 +56,21 @@ pub const PAIRS: [[&str; 2]; 12] = [
     ["rig-pendulum", "bearing-friction"],
 ];
 
-/// A vehicle file, what is true beyond it, and how it is flown.
+/// A vehicle file, the truth beyond it, and the plan of its flights.
 #[derive(Debug, Clone)]
 pub struct Case {
     /// The declared vehicle.
     pub vehicle: &'static str,
-    /// How it is flown; the truth holds the undeclared effects only.
+    /// Plan of its flights; the truth holds the undeclared effects only.
     pub plan: Plan,
 }
 
-/// What became of a case.
+/// Verdict on a case.
 #[derive(Debug, Clone)]
 pub struct Judgement {
     /// The undeclared effects, each with the part of the test flights' squared error that only it takes away.
     pub true_gains: Vec<(&'static str, f64)>,
-    /// What was named.
+    /// Effects that were named.
     pub named: Vec<&'static str>,
     /// Effects that the report says would do as well as those named.
     pub confused_with: Vec<&'static str>,
@@ -78,7 +78,7 @@ pub struct Judgement {
     pub intervals: Vec<(String, bool)>,
     /// Held-out prediction error after, in units of the true model's: the greatest over channels and horizons.
     pub of_floor: f64,
-    /// All that was reported.
+    /// The whole report.
     pub report: Report,
 }
 
@@ -95,7 +95,7 @@ impl Judgement {
         self.named.iter().copied().filter(|name| !is_true(name)).collect()
     }
 
-    /// Whether what is wrong with it is a swap that the report itself names.
+    /// True if every missed effect is one that the report itself names as confounded.
     pub fn is_declared_swap(&self) -> bool {
         let missed = self.missed();
         !missed.is_empty() && missed.iter().all(|name| self.confused_with.contains(name))
@@ -168,7 +168,7 @@ impl Case {
         FlightSet { vehicle: vehicle_file(self.vehicle), flights, files: Default::default() }
     }
 
-    /// Names of what is true and undeclared.
+    /// Names of the true and undeclared effects.
     pub fn effects(&self) -> Vec<&'static str> {
         let Sensors { pose_delay_s, accelerometer_bias_m_s2, .. } = self.plan.sensors;
         let mut names: Vec<&'static str> = self.plan.truth.iter().map(|effect| effect.kind.name).collect();
@@ -195,7 +195,7 @@ impl Case {
         parameters.all.iter().map(value).collect()
     }
 
-    /// Flies the case, identifies on it, and compares what comes out with the truth.
+    /// Flies the case, identifies on it, and compares the result with the truth.
     pub fn judged(&self) -> Judgement {
         let set = self.flights();
         let report = identify(&set, &mut |_| ()).expect("flights to identify on").report;
@@ -216,7 +216,8 @@ impl Case {
         }
     }
 
-    /// What only the effect `name` takes away of the squared error: the other true effects do their best without it.
+    /// Returns the part of the squared error that only the effect `name` takes away: the other true effects are
+    /// fitted without it.
     fn true_gain(&self, problem: &Problem, values: &[f64], name: &str) -> f64 {
         let parameters = &problem.model.parameters;
         let mut without = values.to_vec();

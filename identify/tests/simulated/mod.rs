@@ -16,7 +16,7 @@ pub mod cases;
 pub mod feedback;
 
 const TICK_S: f64 = 0.001;
-/// A vehicle further away than this has got out of control: its flight says nothing of any other.
+/// A vehicle further away than this has got out of control: its flight does not compare with any other.
 const FAR_M: f64 = 12.0;
 /// Over this time a course comes up to speed.
 const RUN_UP_S: f64 = 3.0;
@@ -30,9 +30,9 @@ pub struct Sensors {
     pub pose_ticks: usize,
     /// Ticks from one sample of the inertial unit to the next.
     pub imu_ticks: usize,
-    /// Whether the rotors' speeds are logged.
+    /// True if the rotors' speeds are logged.
     pub has_rotor_speeds: bool,
-    /// How late the pose is stamped.
+    /// Delay of the pose's stamps.
     pub pose_delay_s: f64,
     /// Bias of the accelerometer.
     pub accelerometer_bias_m_s2: [f64; 3],
@@ -57,19 +57,19 @@ impl Default for Sensors {
 /// A flight to simulate.
 #[derive(Debug, Clone)]
 pub struct Plan {
-    /// What is true beyond the declared vehicle.
+    /// Effects that are true beyond the declared vehicle.
     pub truth: Vec<Effect>,
     /// The sensors.
     pub sensors: Sensors,
-    /// Which course and which noise.
+    /// Seed of the course and of the noise.
     pub seed: u64,
     /// Length.
     pub duration_s: f64,
     /// Height about which it flies.
     pub height_m: f64,
-    /// Whether a bearing holds its position: then neither position nor specific force is logged.
+    /// True if a bearing holds its position: then neither position nor specific force is logged.
     pub is_on_rig: bool,
-    /// Whether it does no more than drift about a hover.
+    /// True if it only drifts about a hover.
     pub is_calm: bool,
     /// Ticks from one command to the next.
     pub control_ticks: usize,
@@ -206,13 +206,13 @@ pub fn fly(declared: &Vehicle, plan: &Plan, role: Role) -> Flight {
     log.flight(plan, role)
 }
 
-/// What the bearing of a rig does: the vehicle turns, and goes nowhere.
+/// Holds the vehicle as the bearing of a rig does: it turns, but does not move.
 fn hold(plant: &mut FreeFlight, position_W_m: Vector3<f64>) {
     let body = RigidBody { position_W_m, velocity_W_m_s: Vector3::zeros(), ..plant.state().body };
     plant.set_body(&body);
 }
 
-/// How long a pilot on a rig holds the sticks before moving them.
+/// Time for which a pilot on a rig holds the sticks before moving them.
 const STICK_S: f64 = 0.3;
 
 /// Kicks of a pilot's sticks: torques and a part of the weight as thrust, held for [`STICK_S`] each.
@@ -250,7 +250,7 @@ fn padded(values: &PerRotor<f64>) -> [f64; ROTORS_MAX] {
     std::array::from_fn(|rotor| values.get(rotor).copied().unwrap_or_default())
 }
 
-/// A tracking controller with the gains of somebody careful: bounded for all truths of the cases.
+/// A tracking controller with careful gains: bounded for all truths of the cases.
 struct Pilot {
     allocation: Allocation,
     /// Wanted speeds of the rotors, a moment ago.
@@ -263,7 +263,7 @@ struct Pilot {
     lead_s: f64,
 }
 
-/// What takes the motors' lag back: a lead over the slower part of it.
+/// Lead that takes the motors' lag back, over the slower part of it.
 const LEAD_S: f64 = 0.08;
 const LEAD_FILTER_S: f64 = 0.01;
 

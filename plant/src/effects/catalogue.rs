@@ -22,7 +22,7 @@ mod turbulence;
 mod weak_rotor;
 mod wind;
 
-/// All effects.
+/// The effects of the catalogue.
 pub static CATALOGUE: &[&EffectKind] = &[
     &rotor_drag::EFFECT,
     &parasitic_drag::EFFECT,

@@ -1,4 +1,4 @@
-//! What the functions of effects are functions of: how the vehicle moves through which air, how high.
+//! Arguments of the functions of effects: the motion of the vehicle, the air that it moves through, and the height.
 
 use crate::rotation::rotated_back;
 use crate::rotor;
@@ -6,7 +6,7 @@ use crate::state::{PerRotor, State};
 use nalgebra::Vector3;
 use vehicles::Vehicle;
 
-/// A vehicle at an instant: what forces depend on.
+/// A vehicle at an instant: the quantities that forces depend on.
 ///
 /// ```
 /// use nalgebra::Vector3;

@@ -82,7 +82,7 @@ fn within_bounds(spec: &ParameterSpec, stated: &Stated, entry: &EffectEntry) -> 
     Err(Diagnostic::at(stated.place.clone(), error))
 }
 
-/// Refuses `vehicle`, which has these effects, if one of them must not have made it what it is.
+/// Refuses `vehicle`, which has these effects, if it does not meet the requirements of one of them.
 pub(crate) fn require(
     vehicle: &Vehicle,
     effects: &[Effect],

@@ -1,4 +1,4 @@
-//! The facts of an effect: what it does, by which numbers, and how it can be seen in measured flights.
+//! The facts of an effect: its physics, its parameters, and how it can be seen in measured flights.
 
 use super::condition::FlightCondition;
 use crate::actuation::{Actuation, Battery};
@@ -17,59 +17,60 @@ pub type Values = [f64; PARAMETERS_MAX];
 /// An effect as the catalogue knows it. It is the same as another only if it is the very same static.
 #[derive(Debug)]
 pub struct EffectKind {
-    /// What files call it.
+    /// Its name in files.
     pub name: &'static str,
-    /// What it does, in one line.
+    /// Its summary, in one line.
     pub summary: &'static str,
     /// Its equation, in the symbols of its parameters.
     pub equation: &'static str,
-    /// Where the equation is from.
+    /// Source of the equation.
     pub source: &'static str,
-    /// Where it holds, and what it leaves out.
+    /// Its range of validity, and what it leaves out.
     pub validity: &'static str,
     /// Its parameters.
     pub parameters: &'static [ParameterSpec],
-    /// What it does to the simulation.
+    /// Its actions on the simulation.
     pub actions: &'static [Action],
-    /// What has to be measured for it to show.
+    /// Quantities that have to be measured for it to show.
     pub needs: &'static [Quantity],
-    /// What has to be computed anew when one of its parameters changes.
+    /// First stage that has to be computed anew when one of its parameters changes.
     pub stage: Stage,
-    /// Whether a fit could follow it.
+    /// Its use of random numbers, which no fit could follow.
     pub randomness: Randomness,
-    /// What of it makes sense alone.
+    /// Parts of it that make sense alone.
     pub fit_as: FitAs,
-    /// Whether it shows in the mean forces and torques of a flight, and can be told there from all other effects.
+    /// True if it shows in the mean forces and torques of a flight, and can be told there from all other effects.
     pub steady_state: bool,
-    /// Whether it turns the vehicle steadily, so that it can explain a trim.
+    /// True if it turns the vehicle steadily, so that it can explain a trim.
     pub turns_steadily: bool,
-    /// Whether its parameters shift a signal in time: then the flight's grid says how small a value can be seen.
+    /// True if its parameters shift a signal in time: then the flight's grid limits how small a value can be seen.
     pub is_delay: bool,
     /// True if it changes how the rotors follow their commands.
     pub changes_drive: bool,
-    /// Whether equations linearised about the neutral values tell what it can explain.
+    /// True if equations linearised about the neutral values predict what it can explain.
     pub is_linear: bool,
-    /// Where a fit may start, each a value for each fitted parameter. None: the neutral values are a start.
+    /// Initial guesses of a fit, each a value for each fitted parameter. If there are none, it starts at the
+    /// neutral values.
     pub guesses: &'static [&'static [f64]],
     /// Fits nominal values, which are a Hummingbird's, to a vehicle of another size.
     pub scale_to: Option<fn(&Vehicle, &mut Values)>,
     /// Effects that look like it, and how to tell them apart. Each pair stands with one of the two.
     pub confounded_with: &'static [Confounder],
-    /// What must be true of the vehicle that it acts on; in words if it is not.
+    /// Requirement on the vehicle that it acts on, if it has one.
     pub require: Option<Requirement>,
     /// True if its parameters are one for each rotor: those behind the vehicle's last rotor have to be neutral.
     pub is_per_rotor: bool,
 }
 
-/// A condition on the vehicle that an effect acts on; the error says what it is in words.
+/// A condition on the vehicle that an effect acts on; the error describes it in words.
 pub type Requirement = fn(&Vehicle) -> Result<(), &'static str>;
 
 /// One parameter of an effect.
 #[derive(Debug)]
 pub struct ParameterSpec {
-    /// What files call it.
+    /// Its name in files.
     pub name: &'static str,
-    /// What it means, with its symbol.
+    /// Its meaning, with its symbol.
     pub meaning: &'static str,
     /// Its units; bounds and values are in the first, which is that of the SI.
     pub dimension: Dimension,
@@ -77,46 +78,47 @@ pub struct ParameterSpec {
     pub min: f64,
     /// The most that it may be.
     pub max: f64,
-    /// The value that it has where a file leaves it out. With all of these the effect is nothing. `None` where
-    /// none is more natural than another: a file has to give it, and the effect is nothing whatever it is.
+    /// The value that it has where a file leaves it out. With all of these the effect does nothing. `None`
+    /// where no value is neutral: a file has to give it, and at any value the effect does nothing if the others
+    /// are neutral.
     pub neutral: Option<f64>,
     /// A plausible value.
     pub nominal: f64,
-    /// Where the plausible value is from.
+    /// Source of the plausible value.
     pub nominal_source: &'static str,
 }
 
-/// What an effect acts on. All but the state of [`Action::Tick`] are pure functions.
+/// Action of an effect. All but the state of [`Action::Tick`] are pure functions.
 #[derive(Debug, Clone, Copy)]
 pub enum Action {
-    /// Changes what the vehicle is, once, before it flies.
+    /// Changes the vehicle, once, before it flies.
     Vehicle(fn(&Values, &mut Vehicle)),
     /// Delays the motor commands by so many seconds.
     Delay(fn(&Values) -> f64),
-    /// Advances the effect's state by a tick, and changes what acts over the tick.
+    /// Advances the effect's state by a tick, and changes the actuation over the tick.
     Tick(fn(&Values, &mut Advance)),
     /// Adds so many newtons to the thrust of a rotor.
     Thrust(fn(&Values, &FlightCondition, usize) -> f64),
     /// Adds a force and a torque.
     Wrench(fn(&Values, &FlightCondition) -> Wrench),
-    /// Tells how the battery is under these speeds of the rotors.
+    /// Returns the state of the battery under these speeds of the rotors.
     Battery(fn(&Values, &EffectState, &Vehicle, &[f64]) -> Battery),
 }
 
-/// What an effect sees and changes when a tick begins.
+/// Arguments of an effect's function when a tick begins.
 #[derive(Debug)]
 pub struct Advance<'a> {
     /// The vehicle at the beginning of the tick, in the air as the effects before this one moved it.
     pub condition: FlightCondition<'a>,
-    /// What acts over the tick.
+    /// Actuation over the tick.
     pub actuation: &'a mut Actuation,
-    /// What the effect carries from tick to tick.
+    /// State that the effect carries from tick to tick.
     pub state: &'a mut EffectState,
     /// Length of the tick.
     pub dt_s: f64,
 }
 
-/// What a flight must have measured for an effect to show.
+/// Quantity that a flight must have measured for an effect to show.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
     /// Forces: by position, velocity or specific force.
@@ -131,15 +133,15 @@ pub enum Quantity {
     Attitude,
     /// The motor commands.
     Command,
-    /// A rig holds the vehicle. What such an effect stands for, the joints of a scene's rig have by themselves.
+    /// A rig that holds the vehicle. The joints of a scene's rig have by themselves what such an effect models.
     Rig,
     /// Two clocks that can be held against each other.
     TwoClocks,
-    /// What the accelerometer reads.
+    /// Reading of the accelerometer.
     SpecificForce,
     /// The same rotation by gyroscope and by attitude.
     TwoRotations,
-    /// The direction of forces that the attitude says, and one that is measured.
+    /// The direction of forces according to the attitude, and a measured one.
     TwoDirections,
     /// An inertial unit.
     InertialUnit,
@@ -147,32 +149,32 @@ pub enum Quantity {
     Pose,
 }
 
-/// What has to be computed anew when a parameter changes; the later stages follow from the earlier ones.
+/// Stage that has to be computed anew when a parameter changes; the later stages follow from the earlier ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
-    /// When samples were taken.
+    /// Times at which samples were taken.
     Sampling,
-    /// What the rotors make of the commands.
+    /// Response of the rotors to the commands.
     Rotors,
-    /// Forces, torques, and what sensors read of them.
+    /// Forces, torques, and the sensors' readings of them.
     Body,
 }
 
-/// Whether an effect draws random numbers.
+/// Use of random numbers by an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Randomness {
     /// A function of parameters and flight.
     Deterministic,
-    /// It draws from a stream of its own: no fit can follow it, and what it leaves is unexplained.
+    /// It draws from a stream of its own: no fit can follow it, and its residual is unexplained.
     Stochastic,
 }
 
-/// What of an effect is a candidate by itself.
+/// Parts of an effect that are candidates by themselves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FitAs {
-    /// All of its parameters together.
+    /// Its parameters together, as one candidate.
     Whole,
-    /// Each of its parameters.
+    /// Each of its parameters, as a candidate.
     EachParameter,
 }
 
@@ -181,7 +183,7 @@ pub enum FitAs {
 pub struct Confounder {
     /// The other effect.
     pub effect: &'static EffectKind,
-    /// The experiment that tells the two apart.
+    /// The experiment that distinguishes the two.
     pub experiment: &'static str,
 }
 
@@ -196,14 +198,14 @@ pub struct Confounder {
 /// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Effect {
-    /// What it is.
+    /// Its kind.
     pub kind: &'static EffectKind,
     /// Its parameters in SI.
     pub values: Values,
 }
 
 impl Quantity {
-    /// What it is measured by, and for what.
+    /// Describes the channels that it is measured by, and their purpose.
     #[must_use]
     pub fn describe(self) -> &'static str {
         match self {
@@ -231,7 +233,7 @@ impl PartialEq for EffectKind {
 }
 
 impl EffectKind {
-    /// What most effects are, to be completed by texts, parameters, actions and needs: a deterministic, near linear
+    /// Defaults of an effect, to be completed by texts, parameters, actions and needs: a deterministic, near linear
     /// effect on forces and torques that is fitted as a whole.
     pub const PLAIN: Self = Self {
         name: "",
@@ -286,7 +288,7 @@ impl EffectKind {
         self.with(|spec| spec.nominal)
     }
 
-    /// The experiment that tells it from `other`, if the two look alike.
+    /// The experiment that distinguishes it from `other`, if the two look alike.
     #[must_use]
     pub fn experiment_against(&self, other: &Self) -> Option<&'static str> {
         let found = |one: &Self, other: &Self| {

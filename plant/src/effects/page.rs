@@ -69,7 +69,7 @@ fn section(page: &mut String, kind: &EffectKind) {
     kind.parameters.iter().for_each(|spec| row(page, spec));
 }
 
-/// How an identification fits it, in words.
+/// Describes how an identification fits it.
 fn fitted(kind: &EffectKind) -> String {
     if kind.randomness == Randomness::Stochastic {
         return "not at all: no fit can follow random numbers, what it leaves counts as unexplained"

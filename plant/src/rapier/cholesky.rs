@@ -1,7 +1,7 @@
 //! Cholesky's factorisation of symmetric matrices whose size is known at run time, in memory that the caller keeps.
 
-/// The Cholesky factor L of a matrix of `count` rows, in the place of its lower triangle. `pivot` takes what is left of a
-/// row's diagonal, and the diagonal itself, to the square of the factor's.
+/// The Cholesky factor L of a matrix of `count` rows, in the place of its lower triangle. `pivot` takes the
+/// remainder of a row's diagonal, and the diagonal itself, to the square of the factor's.
 pub(super) fn factorise(matrix: &mut [f64], count: usize, pivot: impl Fn(f64, f64) -> f64) {
     for row in 0..count {
         let diagonal = matrix[row * count + row];

@@ -1,4 +1,4 @@
-//! What the vehicle touches: when a contact begins and ends, how fast it was met, whether that was a crash.
+//! Contacts of the vehicle: their beginning and end, the speed of their impact, and whether that was a crash.
 
 use super::world::Near;
 use crate::backend::ContactReport;
@@ -10,11 +10,11 @@ use nalgebra::Vector3;
 /// Tuned, no source.
 const LIFT_M: f64 = 1e-3;
 
-/// Something near one of the vehicle's colliders, and what the two did to each other.
+/// Something near one of the vehicle's colliders, and the impulse between the two.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sighting {
     pub near: Near,
-    /// What they pushed each other with along the normal.
+    /// Impulse between the two along the normal.
     pub impulse_N_s: f64,
     /// The object's velocity.
     pub velocity_W_m_s: Vector3<f64>,
@@ -34,9 +34,9 @@ struct Touch {
     parts: u32,
     /// Those of them that the last step still saw.
     parts_seen: u32,
-    /// Whether the last step still saw it.
+    /// True if the last step still saw it.
     seen: bool,
-    /// Whether something of it was met since the tick began: so that what is met and left within a tick is told.
+    /// True if some part of it was met since the tick began: so a contact that ends within its tick is reported.
     met: bool,
 }
 
@@ -60,9 +60,9 @@ pub(super) struct Contacts {
     crashed: bool,
     /// The speed of approach of the newest impact; 0 where nothing is touched.
     impact_speed_m_s: f64,
-    /// Whether that was in this tick.
+    /// True if that impact was in this tick.
     is_impact_new: bool,
-    /// What the contacts pushed with along their normals since the tick began.
+    /// Sum of the contacts' impulses along their normals since the tick began.
     pub(super) normal_impulse_W_N_s: Vector3<f64>,
 }
 
@@ -96,8 +96,8 @@ impl Contacts {
         }
     }
 
-    /// Starts anew with `parts` of the vehicle at rest on `object`, or free. What it stands on at first did not
-    /// begin.
+    /// Starts anew with `parts` of the vehicle at rest on `object`, or free. The contact at the start does not
+    /// count as begun.
     pub(super) fn place(&mut self, object: Option<u32>, parts: u32) {
         self.touches.clear();
         self.touches.extend(object.into_iter().map(|object| Touch {
@@ -110,7 +110,7 @@ impl Contacts {
         self.impact_speed_m_s = 0.0;
     }
 
-    /// Takes in what a step found, with the vehicle's motion just before it.
+    /// Takes in the contacts that a step found, with the vehicle's motion just before it.
     pub(super) fn note(
         &mut self,
         before: &RigidBody,
@@ -136,7 +136,7 @@ impl Contacts {
         self.forget_impact();
     }
 
-    /// Notes what pushes a part of the vehicle, unless that part touched it before.
+    /// Notes the contact that pushes a part of the vehicle, unless that part touched it before.
     fn meet(&mut self, sighting: &Sighting, speed_m_s: f64) {
         let touching = self.touches.as_slice().iter().find(|touch| touch.object == sighting.near.object);
         if touching.is_some_and(|touch| touch.parts & sighting.near.part != 0) {
@@ -165,7 +165,7 @@ impl Contacts {
     }
 }
 
-/// How fast the vehicle's point came nearer to the object.
+/// Returns the speed at which the vehicle's point approached the object.
 fn approach_m_s(before: &RigidBody, sighting: &Sighting) -> f64 {
     let angular_velocity_W_rad_s = before.attitude_WB * before.angular_velocity_B_rad_s;
     let arm_W_m = sighting.near.point_W_m - before.position_W_m;

@@ -1,11 +1,12 @@
 //! The impulses of contacts that push each other, found together where the sweeps of `solver` do not converge.
 //!
-//! With friction cones scaled to be their own duals, and a shift of each rate along its normal by μ times the slip, Coulomb's
-//! and Signorini's laws say that impulse and shifted rate lie in the cone and are orthogonal (G. De Saxcé and Z.-Q. Feng, The
-//! bipotential method, 1998). For a given shift that is a convex problem, which an interior-point method solves however far
-//! apart the masses are (Mehrotra's predictor and corrector, in the scaling of Nesterov and Todd); the shift is then found by
-//! fixed-point iteration (F. Cadoux, An optimization-based algorithm for Coulomb's frictional contact, 2009). Whatever the
-//! shift, the impulses make no energy.
+//! Friction cones are scaled to be their own duals, and each rate is shifted along its normal by μ times the
+//! slip. Then Coulomb's and Signorini's laws say that impulse and shifted rate lie in the cone and are
+//! orthogonal (G. De Saxcé and Z.-Q. Feng, The bipotential method, 1998). For a given shift that is a convex
+//! problem, which an interior-point method solves for any ratio of the masses (Mehrotra's predictor and
+//! corrector, in the scaling of Nesterov and Todd). The shift is then found by fixed-point iteration (F.
+//! Cadoux, An optimization-based algorithm for Coulomb's frictional contact, 2009). The impulses make no energy
+//! at any shift.
 //!
 //! Unknowns are the bodies' twists in units of the square root of energy, so that a matrix has six rows for each body, and
 //! masses do not show in it.
@@ -40,7 +41,7 @@ const EXACT: f64 = 1e-12;
 /// any way, and then the matrix is nearly singular. Tuned, no source.
 const NEARLY_EXACT: f64 = 1e-9;
 
-/// Steps without half the residual after which rounding is what is left. Tuned, no source.
+/// Steps without half the residual after which only rounding is left. Tuned, no source.
 const STALLED_STEPS: usize = 5;
 
 /// Bound of the error of the shifts. Tuned, no source.
@@ -127,7 +128,7 @@ struct Cone {
     history: History,
     z: Vector3<f64>,
     s: Vector3<f64>,
-    /// By how much `s` is not what the twists make.
+    /// Difference between `s` and the value that the twists make.
     off: Vector3<f64>,
     scaling: Scaling,
     /// The eigenvectors of the scaling's square, and the inverses of what it is in the matrix.
@@ -145,7 +146,7 @@ struct History {
     shift: f64,
     /// Slip that it led to, less the shift.
     off: f64,
-    /// By how much each round changed both.
+    /// Changes of both in each round.
     by: [f64; DEPTH],
     off_by: [f64; DEPTH],
 }
@@ -273,8 +274,8 @@ impl Direct {
         })
     }
 
-    /// Finds shifts that are what they lead to, by Anderson's acceleration (D. Anderson, Iterative procedures for nonlinear
-    /// integral equations, 1965).
+    /// Finds shifts that lead to themselves, by Anderson's acceleration (D. Anderson, Iterative procedures for
+    /// nonlinear integral equations, 1965).
     fn find(&mut self) {
         let (mut known, mut before_m_s) = (0, 0.0);
         for round in 0..SHIFTS_MAX {
@@ -296,7 +297,7 @@ impl Direct {
         }
     }
 
-    /// The next shifts, from how they and what they lead to changed in the last `known` rounds.
+    /// The next shifts, from the changes of the shifts and of their images in the last `known` rounds.
     fn change_shifts(&mut self, known: usize) {
         let (mut products, mut right) = (Matrix3::<f64>::zeros(), Vector3::<f64>::zeros());
         for history in self.cones.iter().map(|cone| &cone.history) {
@@ -453,7 +454,7 @@ impl Direct {
         }
     }
 
-    /// Gives the impulses to the constraints, and what they do to the bodies.
+    /// Gives the impulses to the constraints, and their effect to the bodies.
     fn hand_out(&mut self, all: &mut [Body], constraints: &mut [Unilateral]) {
         let change = &mut self.off;
         change.iter_mut().for_each(|it| *it = 0.0);

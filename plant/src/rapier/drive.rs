@@ -49,7 +49,7 @@ impl Drive {
         [self.told.stiffness, self.told.damping]
     }
 
-    /// Numbers that tell it from others.
+    /// Numbers that distinguish it from others.
     pub(super) fn numbers(&self) -> impl Iterator<Item = f64> {
         let Told { mode, stiffness, damping, limit, schedule } = &self.told;
         let mode = f64::from(u8::from(*mode == Mode::Position));

@@ -1,8 +1,9 @@
 //! The free bodies of a scene, and one step of them and the vehicle without contacts.
 //!
-//! All are integrated together by the classic Runge-Kutta scheme. At each of its stages the forces of the joints are those
-//! that keep their constraints (an index-1 DAE with its multipliers); what the order of the scheme leaves is projected away
-//! after the step, positions and velocities. A rope is a joint while it is taut and pulls.
+//! Bodies and vehicle are integrated together by the classic Runge-Kutta scheme. At each of its stages the
+//! forces of the joints keep their constraints (an index-1 DAE with its multipliers). The error that the scheme
+//! leaves is projected away after the step, of positions and velocities. A rope is a joint while it is taut and
+//! pulls.
 
 use super::body::{add_twist, mobility, shift, twist};
 use super::drive::Instant;
@@ -21,16 +22,17 @@ pub(super) const WORLD: usize = 0;
 pub(super) const VEHICLE: usize = 1;
 pub(super) const FIRST_BODY: usize = 2;
 
-/// What contacts call the first thing of a scene.
+/// Number of the first thing of a scene in contacts.
 pub(super) const FIRST_THING: u32 = 2;
 
-/// A rope with no more slack than this is taut, as what is no farther apart touches.
+/// A rope with no more slack than this is taut.
 pub(super) const TAUT_M: f64 = 1e-6;
 
 /// A taut rope whose ends come nearer than this is not. Tuned, no source.
 const SLACKENING_M_S: f64 = 1e-9;
 
-/// Times that errors of the joints' places are projected away: once would leave what is of second order. Tuned, no source.
+/// Times that errors of the joints' places are projected away: one would leave errors of second order. Tuned,
+/// no source.
 const PROJECTIONS: usize = 2;
 
 /// The weights of the classic Runge-Kutta scheme's stages.
@@ -42,7 +44,7 @@ struct Build {
     mass_kg: f64,
     inertia: Matrix3<f64>,
     inverse_inertia: Matrix3<f64>,
-    /// Where it starts: in the world, or seen from the vehicle that it hangs from.
+    /// Its state at the start: in the world, or seen from the vehicle that it hangs from.
     start: RigidBody,
     hangs: bool,
 }
@@ -51,23 +53,23 @@ struct Build {
 pub(super) struct FreeBodies {
     builds: Vec<Build>,
     pub joints: Vec<Joint>,
-    /// Whether a joint ties the vehicle.
+    /// True if a joint ties the vehicle.
     is_vehicle_tied: bool,
     /// From where the vehicle's file has its centre of mass to where it is; the other way round in `shift_B_m`.
     shift_B_m: Vector3<f64>,
     pub states: Vec<RigidBody>,
-    /// What contacts call them.
+    /// Their numbers in contacts.
     pub objects: Vec<u32>,
 }
 
-/// What a step of the bodies works with: kept, so that it takes no memory.
+/// Buffers for a step of the bodies: kept, so that a step takes no memory.
 #[derive(Default)]
 pub(super) struct Work {
     /// The bodies at the end of the free step.
     pub free: Vec<RigidBody>,
-    /// Which joints act: all but slack ropes.
+    /// True for each joint that acts: all but slack ropes.
     acting: Vec<bool>,
-    /// What each rope pulled with over the free step, N s; 0 of other joints.
+    /// Impulse of each rope over the free step, N s; 0 of other joints.
     pub pulls_N_s: Vec<f64>,
     stage: Vec<RigidBody>,
     rates: [Vec<BodyRates>; 4],
@@ -75,7 +77,7 @@ pub(super) struct Work {
     forces: JointForces,
 }
 
-/// What the vehicle is, to the bodies that hang from it.
+/// The vehicle, as the bodies that hang from it need it.
 pub(super) struct Carrier<'a> {
     pub model: &'a NewtonEuler,
     pub rig: Option<&'a Rig>,
@@ -84,15 +86,15 @@ pub(super) struct Carrier<'a> {
     pub when: Instant,
 }
 
-/// What a start or a joint cannot be.
+/// Limits of a start or of a joint that are not kept.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Misfit {
     /// A rope is longer than it may be.
     Overstretched { joint: usize, over_m: f64 },
-    /// What a joint ties moves apart, at a speed in m/s or rad/s.
+    /// The ends that a joint ties move apart, at a speed in m/s or rad/s.
     Parting { joint: usize, rate: f64 },
-    /// The joint that is damped and driven fastest, as the rate of a pole: it is for the step to tell whether that is too
-    /// fast.
+    /// The joint that is damped and driven fastest, as the rate of a pole: the length of a step decides whether that
+    /// is too fast.
     Fast { joint: usize, per_s: f64 },
 }
 
@@ -100,8 +102,8 @@ pub(crate) enum Misfit {
 const PARTING: f64 = 1e-6;
 
 impl FreeBodies {
-    /// Those of `scene`, where its file puts them; `shift_B_m` is how far the vehicle's frame is from where its file has
-    /// it, seen from its centre of mass.
+    /// The bodies of `scene`, where its file puts them; `shift_B_m` is the vehicle's frame relative to its
+    /// place in the file, seen from the centre of mass.
     pub(super) fn new(scene: &Scene, shift_B_m: &Vector3<f64>) -> Self {
         let hanging = scene.hanging();
         let builds: Vec<_> =
@@ -137,7 +139,7 @@ impl FreeBodies {
         self.builds.is_empty() && self.joints.is_empty()
     }
 
-    /// Whether joints act on the vehicle.
+    /// True if joints act on the vehicle.
     pub(super) fn is_vehicle_tied(&self) -> bool {
         self.is_vehicle_tied
     }
@@ -148,7 +150,7 @@ impl FreeBodies {
         ties.map(|[parent, child]| [parent.min(child), parent.max(child)]).collect()
     }
 
-    /// Numbers that tell these bodies and joints from others.
+    /// Numbers that distinguish these bodies and joints from others.
     pub(super) fn numbers(&self) -> Vec<f64> {
         let builds = self.builds.iter().flat_map(|build| {
             build.inertia.iter().copied().chain([build.mass_kg, f64::from(u8::from(build.hangs))])
@@ -156,7 +158,7 @@ impl FreeBodies {
         builds.chain(self.joints.iter().flat_map(Joint::numbers)).collect()
     }
 
-    /// Where the vehicle has to be for what hangs from it to be where its file puts it.
+    /// Returns the state of the vehicle at which the bodies that hang from it are where its file puts them.
     pub(super) fn carrier_at_start(&self) -> RigidBody {
         RigidBody::level_at(-self.shift_B_m)
     }
@@ -181,7 +183,7 @@ impl FreeBodies {
         }
     }
 
-    /// What of the joints cannot be meant, with the vehicle here: a place among them, and by how much.
+    /// Returns the first joint whose ends do not fit with the vehicle here, and by how much; else the fastest joint.
     pub(super) fn misfit(&self, model: &NewtonEuler, vehicle: &RigidBody) -> Option<Misfit> {
         let mut forces = JointForces::default();
         self.see(model, vehicle, &self.states, &mut forces);
@@ -263,7 +265,7 @@ impl FreeBodies {
         end
     }
 
-    /// Which ropes are joints in this step: those that are taut and would pull.
+    /// Finds the ropes that are joints in this step: those that are taut and would pull.
     fn find_taut(&self, carrier: &Carrier<'_>, vehicle: &State, work: &mut Work) {
         self.see(carrier.model, &vehicle.body, &self.states, &mut work.forces);
         let Work { acting, forces, .. } = &mut *work;
@@ -329,7 +331,8 @@ impl FreeBodies {
         });
     }
 
-    /// Takes what is off in the joints away, from the vehicle and `bodies`: positions, and then velocities.
+    /// Removes the errors of the joints from the vehicle and `bodies`: those of positions, and then those of
+    /// velocities.
     fn project(
         &self,
         model: &NewtonEuler,

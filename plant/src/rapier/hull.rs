@@ -1,4 +1,4 @@
-//! How much room a vehicle takes: a flat disc around its propellers, and four feet below.
+//! Shape of a vehicle for contacts: a flat disc around its propellers, and four feet below.
 //!
 //! Vehicle files give the rotors' places, but neither propellers nor feet. Those of the Hummingbird are scaled
 //! with the length of the arms; for a Crazyflie 2.1 that gives propellers of 2.7 cm instead of 2.3 cm. Where an
@@ -13,10 +13,10 @@ const HUMMINGBIRD_ARM_M: f64 = 0.17;
 const HUMMINGBIRD_PROPELLER_M: f64 = 0.1016;
 /// Half of the disc's thickness: tuned, no source; about a motor with its propeller.
 const HUMMINGBIRD_DISC_HALF_M: f64 = 0.015;
-/// How far below the centre of mass the feet stand: half of `body_height`, 0.12 m (RotorS,
+/// Distance from the centre of mass down to the ground under the feet: half of `body_height`, 0.12 m (RotorS,
 /// rotors_description/urdf/hummingbird.xacro).
 const HUMMINGBIRD_STAND_M: f64 = 0.06;
-/// How far the feet are out along body x and y: half of `body_width`, 0.1 m (the same file).
+/// Distance of the feet from the middle along body x and y: half of `body_width`, 0.1 m (the same file).
 const HUMMINGBIRD_FOOT_OUT_M: f64 = 0.05;
 /// Radius of the balls that the feet end in: tuned, no source.
 const HUMMINGBIRD_FOOT_RADIUS_M: f64 = 0.01;
@@ -72,7 +72,7 @@ impl Hull {
         self.foot_radius_m - self.feet_B_m[0].z
     }
 
-    /// How far any point of it is from the centre of mass.
+    /// Returns the greatest distance of any point of it from the centre of mass.
     #[must_use]
     pub fn reach_m(&self) -> f64 {
         let rim_m = self.centre_B_m.norm() + self.disc_radius_m + self.disc_half_m;

@@ -61,8 +61,9 @@ impl Islands {
         }
     }
 
-    /// Solves the island that begins with the body `first` directly, if it is one and the sweeps left it unsettled. What is
-    /// not better than what they found is not taken. Returns by how much one of its rates is off at most.
+    /// Solves the island that begins with the body `first` directly, if it is one and the sweeps left it
+    /// unsettled. A result that is not better than that of the sweeps is not taken. Returns the greatest error
+    /// of one of its rates.
     fn settle(
         &mut self,
         first: usize,
@@ -112,7 +113,7 @@ fn moves(body: &Body) -> bool {
     body.mobility != Matrix6::zeros()
 }
 
-/// By how much a rate of the rows between bodies that are `asked` is off at most.
+/// Greatest error of the rates of the rows between bodies that are `asked`.
 fn off_m_s(
     all: &[Body],
     constraints: &[Unilateral],

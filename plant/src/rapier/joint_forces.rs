@@ -1,4 +1,4 @@
-//! The impulses of all joints at once: those that take the rates of their rows to what is wanted.
+//! The impulses of all joints at once: those that change the rates of their rows to the wanted ones.
 //!
 //! With the Jacobian J of all rows and the bodies' mobility W they are the solution of (J W Jᵀ) λ = wanted, whose matrix is
 //! symmetric and positive semidefinite. Forces over accelerations, and shifts over distances, are found the same way.
@@ -10,11 +10,11 @@ use super::poles::{self, Spring};
 use crate::state::RigidBody;
 use nalgebra::{Matrix6, Vector6};
 
-/// A row of which the others leave less than this part says what they say already, as in a closed chain in a plane: it
-/// gets no force. Tuned, no source.
+/// A row of which the others leave less than this part is redundant, as in a closed chain in a plane: it gets
+/// no force. Tuned, no source.
 const REDUNDANT: f64 = 1e-12;
 
-/// Joints and what they tie, as they are at one instant. Kept from step to step, so that it takes no memory.
+/// Joints and the bodies that they tie, at one instant. Kept from step to step, so that it takes no memory.
 #[derive(Default)]
 pub(super) struct JointForces {
     /// The world, the vehicle and the bodies.
@@ -23,7 +23,7 @@ pub(super) struct JointForces {
     /// The rows, with the number of the joint that each is of.
     lines: Vec<(usize, Line)>,
     damped: Vec<(Line, f64)>,
-    /// What the impulse of each row changes the twists of its ends by.
+    /// Change of the twists of its ends by a unit impulse of each row.
     answers: Vec<[Vector6<f64>; 2]>,
     /// J W Jᵀ, row by row, and then its Cholesky factor in the lower triangle.
     matrix: Vec<f64>,
@@ -63,7 +63,7 @@ impl JointForces {
         self.answers.extend(self.lines.iter().map(|(_, line)| answer(line)));
     }
 
-    /// Finds the impulses that change the rate of each row by what is `wanted`.
+    /// Finds the impulses that change the rate of each row by `wanted`.
     pub(super) fn find(&mut self, wanted: impl Fn(&Line, &[RigidBody]) -> f64) {
         let count = self.lines.len();
         let mut matrix = std::mem::take(&mut self.matrix);
@@ -80,7 +80,7 @@ impl JointForces {
         self.matrix = matrix;
     }
 
-    /// By how much an impulse of the row `column` changes the rate of the row `row`.
+    /// Change of the rate of the row `row` by a unit impulse of the row `column`.
     fn coupling(&self, row: usize, column: usize) -> f64 {
         let (line, other, answer) = (&self.lines[row].1, &self.lines[column].1, &self.answers[column]);
         let mut sum = 0.0;
@@ -94,7 +94,7 @@ impl JointForces {
         sum
     }
 
-    /// Tells of each row's ends by how much its impulse changes them.
+    /// Passes the change of each row's ends by its impulse to `change`.
     pub(super) fn push(&self, mut change: impl FnMut(usize, &Vector6<f64>)) {
         for (((_, line), answer), impulse) in self.lines.iter().zip(&self.answers).zip(&self.impulses) {
             for (end, answer) in line.ends.iter().zip(answer) {
@@ -119,8 +119,9 @@ impl JointForces {
         }
     }
 
-    /// The joint whose damping and drive are the fastest against the inertia of what they move, and a bound of the rate of
-    /// the fastest pole, 1/s. The bodies count as free, which they are not where other joints hold them.
+    /// The joint whose damping and drive are the fastest against the inertia of the bodies that they move, and
+    /// a bound of the rate of the fastest pole, 1/s. The bodies count as free, which they are not where other
+    /// joints hold them.
     pub(super) fn fastest_pole(&mut self, joints: &[Joint]) -> Option<(usize, f64)> {
         let mut springs = Vec::new();
         for (number, joint) in joints.iter().enumerate() {
@@ -144,7 +145,7 @@ impl JointForces {
         rows.max_by(|(_, one), (_, other)| one.total_cmp(other))
     }
 
-    /// Adds what the drives of the joints do to the accelerations, at this time.
+    /// Adds the accelerations by the drives of the joints, at this time.
     pub(super) fn drive(&self, joints: &[Joint], when: &Instant, accelerations: &mut [Vector6<f64>]) {
         for joint in joints {
             let Some((drive, line)) = joint.drive.as_ref().zip(joint.axial(&self.frames)) else { continue };
@@ -156,7 +157,7 @@ impl JointForces {
         }
     }
 
-    /// Adds what the damping of the joints does to the accelerations.
+    /// Adds the accelerations by the damping of the joints.
     pub(super) fn damp(&mut self, joints: &[Joint], accelerations: &mut [Vector6<f64>]) {
         let Self { frames, mobilities, damped, .. } = self;
         damped.clear();

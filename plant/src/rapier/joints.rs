@@ -1,8 +1,9 @@
 //! Joints between free bodies, the vehicle and the world: the rows of their constraints.
 //!
 //! A joint with its anchors p on both, and a direction d that turns with the parent, holds d · (p_child - p_parent) at 0,
-//! or the child's rotation about d. A row's Jacobian takes the twists of the two to the rate of that; its bias is what of the
-//! second derivative is left without accelerations (R. Featherstone, Rigid Body Dynamics Algorithms, 2008, section 8.2).
+//! or the child's rotation about d. A row's Jacobian maps the twists of the two to the rate of that. Its bias
+//! is the part of the second derivative that does not depend on accelerations (R. Featherstone, Rigid Body
+//! Dynamics Algorithms, 2008, section 8.2).
 
 use super::drive::Drive;
 use super::solver::{Body, Row, Unilateral, join, stop};
@@ -10,7 +11,7 @@ use crate::state::RigidBody;
 use nalgebra::{Unit, UnitQuaternion, Vector3, Vector6};
 use scenes::{Axis, End, Freedom, Joint as Told};
 
-/// Where the gap to a limit of an angle is measured: at a lever of this length, so that it is one in metres. Tuned, no
+/// Length of the lever at which the gap to a limit of an angle is measured, so that the gap is in metres. Tuned, no
 /// source.
 const LEVER_M: f64 = 0.1;
 
@@ -18,7 +19,7 @@ const LEVER_M: f64 = 0.1;
 #[derive(Debug, Clone)]
 pub(super) struct Joint {
     pub ends: [usize; 2],
-    /// Where it holds each, seen from its centre of mass, in its own axes.
+    /// Anchors on both ends, each seen from its end's centre of mass, in the end's own axes.
     anchors_m: [Vector3<f64>; 2],
     /// Directions along which the anchors stay together, and about which the child does not turn, in the parent's axes.
     along: Vec<Vector3<f64>>,
@@ -30,7 +31,7 @@ pub(super) struct Joint {
     pub drive: Option<Drive>,
 }
 
-/// What a joint leaves free, in the parent's axes.
+/// Freedom that a joint leaves, in the parent's axes.
 #[derive(Debug, Clone, Copy)]
 enum Way {
     Nothing,
@@ -45,9 +46,9 @@ enum Way {
 pub(super) struct Line {
     pub ends: [usize; 2],
     pub jacobian: [Vector6<f64>; 2],
-    /// What of the second derivative is left without accelerations.
+    /// Part of the second derivative that does not depend on accelerations.
     pub bias: f64,
-    /// How far it is off, m or rad.
+    /// Error of the constraint, m or rad.
     pub off: f64,
 }
 
@@ -58,7 +59,7 @@ impl Line {
     }
 }
 
-/// Where a joint's ends are.
+/// Places and rates of a joint's ends.
 struct Placed {
     /// From each centre of mass to its anchor.
     arms_W_m: [Vector3<f64>; 2],
@@ -117,12 +118,12 @@ impl Joint {
         }
     }
 
-    /// Whether it is a rope: all others keep two bodies from touching each other.
+    /// True if it is a rope: all other joints keep two bodies from touching each other.
     pub(super) fn is_rope(&self) -> bool {
         matches!(self.motion, Way::Rope { .. })
     }
 
-    /// Numbers that tell it from others.
+    /// Numbers that distinguish it from others.
     pub(super) fn numbers(&self) -> impl Iterator<Item = f64> {
         let (axis, limits) = match self.motion {
             Way::Nothing => (Vector3::zeros(), [0.0; 2]),
@@ -190,7 +191,7 @@ impl Joint {
         }
     }
 
-    /// None where the anchors are in one place: it leads nowhere.
+    /// `None` where the anchors are in one place: then the rope has no direction.
     fn line_of_rope(&self, placed: &Placed, length_m: f64) -> Option<Line> {
         let (Placed { arms_W_m, apart_W_m, apart_W_m_s, .. }, [parent, child]) =
             (placed, placed.spins_W_rad_s);
@@ -203,7 +204,7 @@ impl Joint {
         Some(Line { ends: self.ends, jacobian, bias, off: distance_m - length_m })
     }
 
-    /// How far the child is turned about the direction `number` of those that are held, rad.
+    /// Returns the child's rotation about the direction `number` of those that are held, rad.
     fn turned_off(&self, frames: &[RigidBody], number: usize) -> f64 {
         let turned = self.turned(frames);
         match self.motion {
@@ -213,7 +214,7 @@ impl Joint {
         }
     }
 
-    /// How the child is turned since the start, in the parent's axes.
+    /// Returns the child's rotation since the start, in the parent's axes.
     fn turned(&self, frames: &[RigidBody]) -> UnitQuaternion<f64> {
         let [parent, child] = self.ends.map(|end| frames[end].attitude_WB);
         parent.inverse() * child * self.start.inverse()
@@ -234,8 +235,8 @@ impl Joint {
         }
     }
 
-    /// The row of the motion about or along the axis of a revolute or prismatic joint: it is off by the angle, from -pi to
-    /// pi, or the way since the start. None of others.
+    /// The row of the motion about or along the axis of a revolute or prismatic joint. Its error is the angle,
+    /// from -pi to pi, or the way since the start. `None` for other joints.
     pub(super) fn axial(&self, frames: &[RigidBody]) -> Option<Line> {
         let parent = &frames[self.ends[0]];
         match self.motion {
@@ -258,7 +259,7 @@ impl Joint {
         angle_rad - std::f64::consts::TAU * (angle_rad / std::f64::consts::TAU).round()
     }
 
-    /// How far a rope's ends may still go apart, and how fast they do; none of another joint.
+    /// Returns the slack of a rope, and the rate at which its ends go apart; `None` for another joint.
     pub(super) fn slack(&self, frames: &[RigidBody]) -> Option<(f64, f64)> {
         let Way::Rope { length_m } = self.motion else { return None };
         let placed = self.placed(frames);

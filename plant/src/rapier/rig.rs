@@ -1,7 +1,7 @@
 //! A test rig: a slider on the vertical, and a bearing that the vehicle hangs from.
 //!
 //! The slider only moves up and down, and sideways where the rig sways: level within a square, as the lower end of a
-//! long tube does for small angles, with no friction and nothing that leads it back. What hangs with the bearing is
+//! long tube does for small angles, without friction or a restoring force. The mass that hangs with the bearing is
 //! lumped in its centre. A ball joint ties the vehicle's mount to it and leaves all three rotations free. So the slider
 //! has no state of its own: it is where the mount is, and its mass is one that the mount carries along the axes that
 //! are free, and that holds it along the others.
@@ -18,7 +18,7 @@ use scenes::Rig;
 /// A bearing that starts lower than this above the lower end of its travel is there: tuned, no source.
 const LOWER_END_M: f64 = 1e-6;
 
-/// Where the gap to the cone is measured: at a lever of this length, so that it is one in metres. Tuned, no source.
+/// Length of the lever at which the gap to the cone is measured, so that the gap is in metres. Tuned, no source.
 const LEVER_M: f64 = 0.1;
 
 /// For each axis of the world 1 where the slider moves along it, and 0 where it is held.
@@ -82,7 +82,7 @@ impl<'a> Mounted<'a> {
         Self { rig, mount, free }
     }
 
-    /// The mobility in the rig: what the slider's mass and its guides leave of that in free flight (the
+    /// The mobility in the rig: the mobility in free flight, reduced by the slider's mass and its guides (the
     /// Sherman-Morrison-Woodbury formula, with the inverse mass that the slider adds along each axis: 0 where it is held).
     pub(super) fn mobility(&self) -> Matrix6<f64> {
         let added = Matrix3::from_diagonal(&(freedom(self.rig) / self.rig.moving_mass_kg));
@@ -115,8 +115,8 @@ impl<'a> Mounted<'a> {
         0.5 * self.rig.moving_mass_kg * (self.mount * one).component_mul(&free).dot(&(self.mount * other))
     }
 
-    /// The rig's stops, after what `constraints` holds: ends of the heave and the sway, and the cone that `vehicle`, with
-    /// the number `body` among `all`, tilts in.
+    /// The rig's stops, after the constraints in `constraints`: ends of the heave and the sway, and the cone in
+    /// which `vehicle`, with the number `body` among `all`, tilts.
     pub(super) fn stops(
         &self,
         all: &[Body],
@@ -164,18 +164,19 @@ impl<'a> Mounted<'a> {
     }
 }
 
-/// What dry and viscous friction take of a motion over a step; at most all that a body of this inertia has of it.
+/// Returns the momentum that dry and viscous friction take of a motion over a step; at most all that this
+/// inertia has.
 fn against(rate: f64, (dry, viscous): (f64, f64), inertia: f64, span_s: f64) -> f64 {
     ((dry + viscous * rate) * span_s).min(inertia * rate)
 }
 
-/// Numbers that tell this rig from others: where it holds, and what hangs there.
+/// Numbers that distinguish this rig from others: the place of its bearing, and the mass that hangs there.
 pub(super) fn numbers(rig: &Rig) -> Vec<f64> {
     let places = rig.bearing_W_m.iter().chain(rig.mount_B_m.iter());
     places.copied().chain([rig.heave_m, rig.sway_m, rig.tilt_max_rad, rig.moving_mass_kg]).collect()
 }
 
-/// How far the vehicle's mount is from the lower end of the bearing's travel.
+/// Returns the vector from the lower end of the bearing's travel to the vehicle's mount.
 pub(super) fn off_W_m(rig: &Rig, vehicle: &RigidBody) -> Vector3<f64> {
     vehicle.position_W_m + vehicle.attitude_WB * rig.mount_B_m - rig.bearing_W_m
 }
@@ -191,8 +192,9 @@ pub(super) fn hung(rig: &Rig, body: &RigidBody) -> RigidBody {
     RigidBody { position_W_m: bearing_W_m - arm_W_m, velocity_W_m_s: mount_W_m_s - turning_W_m_s, ..*body }
 }
 
-/// Whether the rig keeps a vehicle at rest where it is: always where it does not heave, and at the lower end of its
-/// travel unless `lift_N`, the force on the vehicle beyond its weight, raises what hangs there.
+/// True if the rig keeps a vehicle at rest where it is. A rig that does not heave always does. Any other does
+/// so at the lower end of its travel, unless `lift_N`, the force on the vehicle beyond its weight, raises the
+/// mass that hangs there.
 pub(super) fn holds(rig: &Rig, body: &RigidBody, lift_N: f64, gravity_m_s2: f64) -> bool {
     let raised_m = off_W_m(rig, &hung(rig, body)).z;
     let needed_N = rig.moving_mass_kg * gravity_m_s2 + rig.slide_friction_N;

@@ -12,13 +12,13 @@ const FLAT: f64 = 0.1;
 /// Points that are nearer to each other are one. Tuned, no source.
 const SAME_M: f64 = 1e-4;
 
-/// Part of a gap that the nearest point of the same contact may be beside its normal, and what rounding of the normal adds.
-/// Tuned, no source.
+/// Part of a gap that the nearest point of the same contact may be beside its normal, and the rounding error of
+/// the normal. Tuned, no source.
 const ASIDE: f64 = 0.05;
 const ASIDE_M: f64 = 1e-6;
 
-/// Tells of the ends of the rim's line that are not among those `found`, with the nearest point of `thing` first, and the
-/// gap. `normal` points from the thing to the disc; parts that are no discs have none.
+/// Passes to `tell` the ends of the rim's line that are not among those `found`, with the nearest point of
+/// `thing` first, and the gap. `normal` points from the thing to the disc; parts that are not discs have none.
 pub(super) fn missing_ends(
     thing: (&Collider, &Pose),
     part: (&Collider, &Pose),

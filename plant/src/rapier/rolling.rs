@@ -8,8 +8,8 @@ use nalgebra::{Matrix3, Vector3};
 /// 0.005; a rim of propeller guards is rougher. Tuned, no source.
 const LEAD: f64 = 0.02;
 
-/// Takes from the spin of a disc of this radius, across each contact, what its normal impulse in the step before resists; at
-/// most all of it. The impulses are those that `constraints` start from.
+/// Reduces the spin of a disc of this radius, across each contact, by the rolling resistance of its normal
+/// impulse in the step before; at most to zero. The impulses are those that `constraints` start from.
 pub(super) fn resist(near: &[Near], constraints: &[Unilateral], bodies: &mut [Body], radius_m: f64) {
     for (near, constraint) in near.iter().zip(constraints) {
         if near.part != DISC || constraint.impulse_N_s <= 0.0 {

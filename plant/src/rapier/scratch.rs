@@ -9,7 +9,7 @@ use crate::backend::TRAFFIC_MAX;
 use crate::state::RigidBody;
 use nalgebra::Vector3;
 
-/// Greatest gap of a contact: far below what anybody sees, far above rounding. Tuned, no source.
+/// Greatest gap of a contact: far below anything visible, far above rounding. Tuned, no source.
 pub(super) const TOUCH_M: f64 = 1e-6;
 
 /// As many constraints as a vehicle has in a corner among others, and as many again: more take memory.
@@ -51,8 +51,9 @@ impl Scratch {
         self.near.iter().any(|near| near.neighbour.is_some())
     }
 
-    /// Finds the impulses and gives them to the bodies at the step's end. Where another vehicle would drive this one into
-    /// what stands, no impulses do both: the other is left out, and flies into it. Returns by how much a rate is off at most.
+    /// Finds the impulses and gives them to the bodies at the step's end. If another vehicle would drive this
+    /// one into a still object, no impulses satisfy both: the other is left out, and flies into it. Returns the
+    /// greatest error of a rate.
     pub(super) fn solve(&mut self) -> f64 {
         let is_among_others = self.is_among_others();
         if is_among_others {
@@ -77,8 +78,8 @@ impl Scratch {
         self.islands.solve(&mut self.then, &self.now, &mut self.constraints, &self.joints)
     }
 
-    /// Hands what ropes pulled with over the free step to their stops, which may pull less where contacts carry: so that the
-    /// ends part no faster than they did. Where nothing else pushes, that leaves all as it is.
+    /// Hands the ropes' impulses over the free step to their stops, which may pull less where contacts carry:
+    /// so that the ends part no faster than they did. Where nothing else pushes, that leaves all as it is.
     pub(super) fn let_ropes_yield(&mut self) {
         for [constraint, joint] in &self.ropes {
             let pull_N_s = self.free_bodies.pulls_N_s[*joint];

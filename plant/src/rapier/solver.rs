@@ -10,7 +10,7 @@
 
 use nalgebra::{Matrix2, Matrix3, Matrix6, Vector2, Vector3, Vector6};
 
-/// Iterations end when none changes a velocity by more: far below what anybody measures, far above rounding.
+/// Iterations end when none changes a velocity by more: far below anything measurable, far above rounding.
 const SETTLED_M_S: f64 = 1e-11;
 
 /// Iterations that relax normal and friction of a contact one after the other: four feet that slide take about 60.
@@ -51,9 +51,9 @@ pub(super) fn part(joined: &Vector6<f64>) -> [Vector3<f64>; 2] {
 pub(super) struct Row {
     pub bodies: [usize; 2],
     pub jacobian: [Vector6<f64>; 2],
-    /// What an impulse of 1 N s changes each body's twist by.
+    /// Change of each body's twist by an impulse of 1 N s.
     answer: [Vector6<f64>; 2],
-    /// What it changes the rate by, 1/kg.
+    /// Change of the rate by that impulse, 1/kg.
     inverse_mass_per_kg: f64,
 }
 
@@ -81,7 +81,7 @@ impl Row {
         Self { bodies, jacobian, answer, inverse_mass_per_kg }
     }
 
-    /// Whether it acts on the body with this number.
+    /// True if it acts on the body with this number.
     pub(super) fn is_on(&self, body: usize) -> bool {
         self.bodies.contains(&body)
     }
@@ -97,25 +97,25 @@ impl Row {
         }
     }
 
-    /// How much an impulse along this row changes the rate of `other`, between the same bodies.
+    /// Returns the change of the rate of `other`, between the same bodies, by a unit impulse along this row.
     fn coupling(&self, other: &Self) -> f64 {
         other.jacobian[0].dot(&self.answer[0]) + other.jacobian[1].dot(&self.answer[1])
     }
 }
 
-/// A unilateral constraint: what keeps two bodies from coming nearer than they may, a contact or a stop.
+/// A unilateral constraint, a contact or a stop: it keeps two bodies from coming nearer than they may.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Unilateral {
     /// Its rate is that of the gap.
     pub normal: Row,
-    /// How far the two may still come nearer.
+    /// Distance by which the two may still come nearer.
     pub gap_m: f64,
     /// Newton's coefficient: the fraction of the rate of approach that an impact leaves.
     pub restitution: f64,
     pub friction: Option<Friction>,
-    /// What the rate has to be at least; minus infinity where the constraint is not asked.
+    /// Lower bound of the rate; minus infinity where the constraint is not asked.
     pub bound_m_s: f64,
-    /// What it pushed with.
+    /// Impulse of the constraint.
     pub impulse_N_s: f64,
 }
 
@@ -173,7 +173,7 @@ pub(super) struct Friction {
     pub coefficient: f64,
     pub slips: [Row; 2],
     pub impulses_N_s: Vector2<f64>,
-    /// Which way it slips, where it does: a unit vector.
+    /// Direction of the slip, where it slips: a unit vector.
     direction: Vector2<f64>,
     /// The contact's Delassus matrix, which takes its impulses (normal, and along the two) to its rates; and its
     /// inverse.
@@ -214,7 +214,7 @@ impl Friction {
         self.impulses_N_s = along.into();
     }
 
-    /// What it pushes the second body with.
+    /// Returns its impulse on the second body.
     pub(super) fn impulse_W_N_s(&self) -> Vector3<f64> {
         let [first, second] =
             self.slips.each_ref().map(|row| row.jacobian[1].fixed_rows::<3>(0).into_owned());
@@ -239,7 +239,7 @@ impl Friction {
     }
 
     /// Steps against the slip, equally far along both axes: only so does the iteration end with a force that is
-    /// opposite to the slip, whatever the bodies' inertia. Returns by how much that changed the slip at most.
+    /// opposite to the slip at any inertia of the bodies. Returns the greatest change of the slip.
     fn relax(&mut self, all: &mut [Body], normal_N_s: f64) -> f64 {
         let change_N_s = self.change_N_s(all, normal_N_s);
         self.push(all, &change_N_s);
@@ -337,7 +337,7 @@ fn iterate(
     }
 }
 
-/// How far a rate is below its bound at most.
+/// Returns the greatest amount by which a rate is below its bound; 0 if all are kept.
 fn unmet_m_s(all: &[Body], constraints: &[Unilateral]) -> f64 {
     let asked = constraints.iter().filter(|constraint| constraint.bound_m_s > f64::NEG_INFINITY);
     asked.map(|constraint| constraint.bound_m_s - constraint.normal.rate(all)).fold(0.0, f64::max)

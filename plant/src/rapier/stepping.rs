@@ -2,10 +2,10 @@
 //!
 //! The free flight over the step is computed first, by the integrator of [`crate::NewtonEuler`]. Where nothing is
 //! near and no rig holds the vehicle, that is the step. Otherwise the step is cut at each impact, at the instant at
-//! which the gap closes: free flight up to it, then Newton's law of restitution. What touches already is held by the
+//! which the gap closes: free flight up to it, then Newton's law of restitution. Contacts that last are held by the
 //! impulses of `solver`: they change the free step's velocities, and, as a constant force would, half of that
-//! change times the step is added to its pose. Free bodies are moved and held the same way; what nothing pushes moves as in
-//! free flight.
+//! change times the step is added to its pose. Free bodies are moved and held the same way. Bodies that nothing
+//! pushes move as in free flight.
 
 use super::body::{lay_out, mobility, set_twist, shift, twist};
 use super::contacts::{Contacts, Sighting};
@@ -26,26 +26,27 @@ use crate::state::{RigidBody, State};
 use nalgebra::{Matrix6, Vector3, Vector6};
 use scenes::Rig;
 
-/// Gaps that are not closed any further: what stands on several points stands on all of them. Tuned, no source.
+/// Gaps that are not closed any further: a body that stands on several points stands on all of them. Tuned, no
+/// source.
 const LEVEL_M: f64 = 1e-9;
 
-/// What meets something slower than gravity makes it in this many steps does not bounce: 2 cm/s at two steps of half a
+/// Steps in which gravity makes the speed below which an impact does not bounce: 2 cm/s at two steps of half a
 /// millisecond. Tuned, no source.
 const SLOW_STEPS: f64 = 4.0;
 
 /// A step is cut at this many impacts at most; those that follow are inelastic. Tuned, no source.
 const IMPACTS_MAX: usize = 24;
 
-/// What is this near is looked at, beyond what a step may bring nearer: a contact lasts until there is a millimetre
+/// Distance within which contacts are searched, beyond the way of a step: a contact lasts until there is a millimetre
 /// of air. Tuned, no source.
 const MARGIN_M: f64 = 2e-3;
 
-/// What is farther is not looked at, however fast the vehicle is: what moves this far in a step flies through things.
-/// Tuned, no source.
+/// Greatest distance within which contacts are searched, however fast the vehicle is: a vehicle that moves this
+/// far in a step flies through things. Tuned, no source.
 const MARGIN_MAX_M: f64 = 2.0;
 
-/// How fast a vehicle that was put inside of something comes out of it; it takes none of that speed along. Tuned, no
-/// source.
+/// Speed at which a vehicle that was put inside an object comes out of it; it takes none of that speed along.
+/// Tuned, no source.
 const PUSH_OUT_M_S: f64 = 1.0;
 
 /// Impulses of contacts that are kept for each free body; the search for more begins with none. Tuned, no source: the most
@@ -97,7 +98,7 @@ impl Held {
 /// The end of a step without contacts and stops.
 struct Free {
     state: State,
-    /// By how much the bearing or joints changed the vehicle's twist.
+    /// Change of the vehicle's twist by the bearing or joints.
     held: Vector6<f64>,
 }
 
@@ -124,7 +125,7 @@ pub(super) struct Motion {
     pub scratch: Scratch,
 }
 
-/// By how much contacts and joints changed the velocities since the tick began.
+/// Changes of the velocities by contacts and joints since the tick began.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Changed {
     pub velocity_W_m_s: Vector3<f64>,
@@ -220,7 +221,7 @@ impl Motion {
         Free { held: twist(&state.body) - twist(&unheld.body), state }
     }
 
-    /// Whether a rig or joints hold the vehicle.
+    /// True if a rig or joints hold the vehicle.
     pub(super) fn is_held(&self) -> bool {
         self.rig.is_some() || self.free_bodies.is_vehicle_tied()
     }
@@ -250,14 +251,14 @@ impl Motion {
         self.state = free;
     }
 
-    /// Whether nothing holds the vehicle, no body moves, and nothing is near on the way to `free`.
+    /// True if nothing holds the vehicle, no body moves, and nothing is near on the way to `free`.
     fn is_clear(&self, free: &RigidBody, span_s: f64, others: &[Neighbour]) -> bool {
         let margin_m = MARGIN_M + self.way_m(free, span_s);
         let is_alone = self.rig.is_none() && self.free_bodies.is_empty();
         is_alone && self.world.is_clear(&self.state.body.position_W_m, others, span_s, margin_m)
     }
 
-    /// How far any point of the vehicle gets over a step at most, with half of it to spare.
+    /// Returns the longest way of any point of the vehicle over a step, with half of it to spare.
     fn way_m(&self, free: &RigidBody, span_s: f64) -> f64 {
         let reach_m = self.world.reach_m();
         1.5 * span_s * fastest_m_s(&self.state.body, reach_m).max(fastest_m_s(free, reach_m))
@@ -273,7 +274,7 @@ impl Motion {
         1.5 * span_s * both.map(fastest).fold(0.0, f64::max)
     }
 
-    /// Finds what is near, and makes a constraint of each point and each stop.
+    /// Finds the contacts that are near, and makes a constraint of each point and each stop.
     fn look_around(&mut self, scratch: &mut Scratch, free: &Free, span_s: f64, others: &[Neighbour]) {
         let Scratch { near, constraints, now, then, frames, ropes, free_bodies, .. } = scratch;
         let ends = &free_bodies.free;
@@ -361,8 +362,9 @@ impl Motion {
         }
     }
 
-    /// A step of `span_s` that ends as `free`, but for what the constraints do; what comes nearer at a rate below
-    /// `ahead_m_s` and does not touch yet is none. Returns whether the vehicle was pushed.
+    /// A step of `span_s` that ends as `free`, but for the impulses of the constraints. A contact that comes
+    /// nearer at a rate below `ahead_m_s` and does not touch yet is not a constraint. Returns whether the
+    /// vehicle was pushed.
     fn constrain(&mut self, scratch: &mut Scratch, free: &Free, span_s: f64, ahead_m_s: f64) -> bool {
         for constraint in &mut scratch.constraints {
             let rate_m_s = constraint.normal.rate(&scratch.now);
@@ -420,8 +422,8 @@ impl Motion {
         is_pushed
     }
 
-    /// The impact of all that touch, by Newton's law: what met at a rate leaves with the restitution's part of it, as far
-    /// as that makes no energy (Moreau). Returns whether its impulses were found.
+    /// The impact of all contacts that touch, by Newton's law: the restitution's part of the rate of approach
+    /// is left, as far as that makes no energy (Moreau). Returns whether its impulses were found.
     fn impact(&mut self, scratch: &mut Scratch, slow_m_s: f64) -> bool {
         for constraint in &mut scratch.constraints {
             let rate_m_s = constraint.normal.rate(&scratch.now);
@@ -448,7 +450,7 @@ impl Motion {
         off_m_s <= FOUND_M_S
     }
 
-    /// Notes impulses that are not what they have to be. Others that push do work.
+    /// Notes impulses that do not satisfy the laws. Others that push do work.
     fn judge(&mut self, scratch: &Scratch, off_m_s: f64, start_J: f64) {
         let end_J = self.energy_J(&scratch.then, &scratch.then);
         let gain_J = if scratch.is_among_others() { 0.0 } else { end_J - start_J - scratch.lent_J() };
@@ -503,7 +505,7 @@ impl Motion {
         0.5 * vehicle.mass_kg * v.dot(&other_v) + spin_J + slider_J + bodies_J
     }
 
-    /// Has the solver begin with the impulses of the step before: the first point of a part with the first of it then.
+    /// Starts the solver with the impulses of the step before: the first point of a part with the first of it then.
     fn warm_start(&self, scratch: &mut Scratch) {
         let Scratch { near, constraints, .. } = scratch;
         let (contacts, stops) = constraints.split_at_mut(near.len());
@@ -543,7 +545,7 @@ impl Motion {
         self.held.stops_N_s.extend(stops.iter().map(|stop| stop.impulse_N_s));
     }
 
-    /// Tells the contacts what the vehicle touches and what it was pushed with.
+    /// Passes the contacts of the vehicle and their impulses to the list of contacts.
     fn note(&mut self, scratch: &Scratch) {
         let both = scratch.near.iter().zip(&scratch.constraints);
         let sightings = both.filter(|(near, _)| near.bodies[1] == VEHICLE).map(|(near, contact)| {
@@ -585,7 +587,8 @@ impl Motion {
         }
     }
 
-    /// Moves the vehicle and the bodies out of what the order of the step left it inside of; no velocity is changed by that.
+    /// Moves the vehicle and the bodies out of overlaps that the order of the step left; no velocity is changed
+    /// by that.
     fn push_out(&mut self, scratch: &mut Scratch, span_s: f64) {
         let mut is_exact = true;
         let asked = scratch.constraints.iter_mut().filter(|constraint| constraint.bound_m_s.is_finite());
@@ -611,7 +614,7 @@ impl Motion {
     }
 }
 
-/// How fast the fastest point of a body is that reaches this far.
+/// Returns the greatest speed of any point of a body that reaches this far.
 fn fastest_m_s(body: &RigidBody, reach_m: f64) -> f64 {
     body.velocity_W_m_s.norm() + body.angular_velocity_B_rad_s.norm() * reach_m
 }

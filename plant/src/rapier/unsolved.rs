@@ -1,4 +1,4 @@
-//! Impulses that were not found, and the energy that impulses made: what ends a run.
+//! Impulses that were not found, and energy that impulses made: both end a run.
 
 use super::free_bodies::{FIRST_BODY, VEHICLE};
 use super::scratch::Scratch;
@@ -12,7 +12,7 @@ const GAIN_MOST: f64 = 1e-6;
 /// The result of a search for impulses.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Outcome {
-    /// By how much a rate is off at most.
+    /// Greatest error of a rate.
     pub off_m_s: f64,
     /// Kinetic energy before the impulses.
     pub start_J: f64,

@@ -1,7 +1,7 @@
-//! What stands and moves around the vehicle, as rapier's colliders; and what of it is near.
+//! Surroundings of the vehicle, still and moving, as rapier's colliders; and the points of them that are near.
 //!
-//! Rapier finds where two shapes are near each other. What it would remember from one search to the next is taken away,
-//! so that what is found depends on the poses alone.
+//! Rapier finds where two shapes are near each other. Its memory from one search to the next is cleared, so that the
+//! result depends on the poses alone.
 
 use super::body::{self, from_rapier, to_rapier};
 use super::free_bodies::{FIRST_BODY, FIRST_THING, VEHICLE, WORLD};
@@ -18,7 +18,7 @@ use rapier3d_f64::parry::query::{DefaultQueryDispatcher, PersistentQueryDispatch
 use scenes::{Scene, Surface, Thing};
 use std::f64::consts::FRAC_PI_2;
 
-/// What a collider is, as `bus::messages::Contact` numbers it; the vehicle's own colliders are 0.
+/// Number of the ground, as `bus::messages::Contact` counts objects; the vehicle's own colliders are 0.
 pub(super) const GROUND: u32 = 1;
 /// The vehicle's feet, as [`Near::part`] numbers its colliders.
 pub(super) const FEET: u32 = 0b1111;
@@ -29,9 +29,9 @@ const FIRST_NEIGHBOUR: u32 = 1000;
 /// Free bodies that overlap more than this at the start are told: tuned, no source.
 const OVERLAP_M: f64 = 1e-4;
 
-/// The vehicle and what is around it.
+/// The vehicle and its surroundings.
 pub(super) struct World {
-    /// The ground, then what stands still.
+    /// The ground, then the still things.
     things: Vec<Still>,
     bodies: Vec<Moving>,
     /// Pairs of bodies that a joint keeps from touching each other.
@@ -40,7 +40,7 @@ pub(super) struct World {
     hull: [Collider; 5],
     /// Another vehicle, at the origin: all are taken to be alike.
     other: Collider,
-    /// How far any point of the hull is from the centre of mass.
+    /// Greatest distance of any point of the hull from the centre of mass.
     reach_m: f64,
     manifolds: Vec<Manifold>,
 }
@@ -87,19 +87,19 @@ struct Moving {
 /// A point where the vehicle or a free body may touch something.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Near {
-    /// What it is, as `bus::messages::Contact` numbers it.
+    /// Number of the object, as `bus::messages::Contact` counts them.
     pub object: u32,
-    /// The numbers of the two bodies: what it is, and what it is near.
+    /// The numbers of the two bodies: the object, and the body that is near it.
     pub bodies: [usize; 2],
-    /// Which of the vehicle's colliders it is near: a bit for each; 0 of a free body.
+    /// Vehicle's colliders that it is near: a bit for each; 0 of a free body.
     pub part: u32,
-    /// Which of the other vehicles it is, if any, counted as they were given.
+    /// Index of the other vehicle, if it is one, counted as they were given.
     pub neighbour: Option<usize>,
-    /// Where the two are nearest to each other.
+    /// Point at which the two are nearest to each other.
     pub point_W_m: Vector3<f64>,
     /// The normal, which points from the first of the bodies to the second.
     pub normal_W: Vector3<f64>,
-    /// How far they are apart; negative where they overlap.
+    /// Distance between the two; negative where they overlap.
     pub gap_m: f64,
     pub friction: f64,
     pub restitution: f64,
@@ -136,13 +136,13 @@ impl World {
         }
     }
 
-    /// How far any point of the vehicle is from its centre of mass at most.
+    /// Returns the greatest distance of any point of the vehicle from its centre of mass.
     pub(super) fn reach_m(&self) -> f64 {
         self.reach_m
     }
 
-    /// Whether nothing at all is nearer than `margin_m` to a vehicle at `position_W_m`, however it is turned, nor gets
-    /// nearer within `span_s`.
+    /// True if nothing is nearer than `margin_m` to a vehicle at `position_W_m` in any attitude, or gets nearer
+    /// within `span_s`.
     pub(super) fn is_clear(
         &self,
         position_W_m: &Vector3<f64>,
@@ -196,8 +196,8 @@ impl World {
         }
     }
 
-    /// The same for points where free bodies, at `states`, may touch each other, the vehicle at `vehicle`, or what stands
-    /// still, after what is `found` already.
+    /// The same for points where free bodies, at `states`, may touch each other, the vehicle at `vehicle`, or
+    /// still things, after the points that are `found` already.
     pub(super) fn find_near_bodies(
         &mut self,
         vehicle: &RigidBody,
@@ -239,8 +239,8 @@ impl World {
         }
     }
 
-    /// The first two that overlap, as `bus::messages::Contact` numbers them: a free body with another, with what stands
-    /// still, or with the vehicle, 0.
+    /// The first two that overlap, as `bus::messages::Contact` numbers them: a free body with another, with a
+    /// still thing, or with the vehicle, 0.
     pub(super) fn overlap(&mut self, vehicle: &RigidBody, states: &[RigidBody]) -> Option<[u32; 2]> {
         let mut found = Vec::new();
         self.find_near_bodies(vehicle, states, 0.0, &mut found);
@@ -249,12 +249,12 @@ impl World {
         Some([near.object, second.map_or(0, |body| body.collider.user_data as u32)])
     }
 
-    /// How far any point of each free body is from its centre of mass at most.
+    /// Iterates over the greatest distance of any point of each free body from its centre of mass.
     pub(super) fn body_reaches_m(&self) -> impl Iterator<Item = f64> {
         self.bodies.iter().map(|body| body.reach_m)
     }
 
-    /// Numbers that tell this scene and vehicle from others: places, surfaces, shapes.
+    /// Numbers that distinguish this scene and vehicle from others: places, surfaces, shapes.
     pub(super) fn numbers(&self) -> Vec<f64> {
         let things = self.things.iter().map(|thing| &thing.collider);
         let bodies = self.bodies.iter().map(|body| &body.collider);
@@ -275,7 +275,7 @@ impl World {
     }
 }
 
-/// Tells `note` of every point where a part, second, is within `margin_m` of something, first.
+/// Passes to `note` every point where a part, second, is within `margin_m` of something, first.
 fn meet(
     thing: (&Collider, &Pose),
     part: (&Collider, &Pose),

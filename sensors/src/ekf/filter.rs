@@ -1,19 +1,19 @@
-//! The extended Kalman filter: motion and sensor errors from an IMU and whatever else measures.
+//! The extended Kalman filter: motion and sensor errors from an IMU and any other sensors.
 //!
 //! *Two times.* Measurements arrive late, and not in the order in which they were measured. The filter proper
 //! therefore stays at the time up to which nothing can arrive any more, and uses every measurement at its own
-//! time, in order; what it publishes is its motion carried on to the present with the readings since, and its
-//! covariance carried on likewise. That is exact, where correcting the present by an old innovation is not, and
-//! cheap: readings are integrated twice, and a covariance is carried once for each measurement. The price is
-//! that a fast sensor waits for the slow ones' delay, in which the present drifts by what the IMU's noise makes
-//! of it: with the default IMU and 200 ms, 1 mm/s and 0.005°.
+//! time, in order. It publishes its motion and its covariance, carried on to the present with the readings since.
+//! Using a measurement at its own time is exact, where correcting the present by an old innovation is not. It is
+//! also cheap: readings are integrated twice, and a covariance is carried once for each measurement. The price is
+//! that a fast sensor waits for the slow ones' delay. Meanwhile the present drifts by the IMU's noise: with the
+//! default IMU and 200 ms, by 1 mm/s and 0.005°.
 //!
 //! *What waits.* A measurement is used as soon as every sensor has shown one at least as late, and at the latest
 //! when it is `delay_max_ms` old. One that arrives later than that is refused.
 //!
 //! *Outliers.* A measurement is refused if its normalised innovation squared is unlikely. Each refusal leaves the
-//! covariance growing, so a filter that is wrong comes to accept what it refused; after twenty refusals of a position in
-//! a row the filter takes itself for lost: it keeps its motion with hardly any confidence.
+//! covariance growing, so a filter that is wrong comes to accept what it refused. After twenty refusals of a
+//! position in a row the filter counts as lost: it keeps its motion with hardly any confidence.
 
 use super::history::{Newest, Reading, Readings, ReadingsHead, Source, Waiting, places};
 use super::motion::Motion;
@@ -35,14 +35,14 @@ const STATE: &str = "EkfState";
 /// No measurement was seen.
 const NEVER: u64 = u64::MAX;
 
-/// So many refusals of a position in a row mean that the filter is wrong, not the sensor. Tuned, no source: 0.2 s of
-/// motion capture, 2 s of GPS.
+/// Number of refusals of a position in a row that mean that the filter is wrong, not the sensor. Tuned, no
+/// source: 0.2 s of motion capture, 2 s of GPS.
 const REFUSED_IN_ROW_MAX: u32 = 20;
 
-/// What the estimator remembers, as it is handed over.
+/// State of the estimator, as it is handed over.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EkfState {
-    /// What it remembers besides the last readings.
+    /// State besides the last readings.
     pub kept: Kept,
     /// The last readings.
     readings: Readings,
@@ -88,7 +88,7 @@ pub struct Kept {
     pad0: u32,
 }
 
-/// The filter at one sample period: all that does not change during a run.
+/// The filter at one sample period, with everything that does not change during a run.
 ///
 /// ```
 /// use bus::Harness;
@@ -154,7 +154,7 @@ impl Ekf {
         EkfState { kept, readings: Readings::every(self.period_ns, self.places) }
     }
 
-    /// Moves `state` on to `reading`, with what the sensors have measured last.
+    /// Moves `state` on to `reading`, with the last measurements of the sensors.
     pub fn update_to(&self, state: &mut EkfState, reading: &Reading, newest: &Newest) {
         let last = state.readings.newest();
         // Without a reading that can be used, the last one goes on.
@@ -185,7 +185,7 @@ impl Ekf {
         true
     }
 
-    /// Puts what is new among the measurements that wait; whether some had to be used early to make room.
+    /// Puts new measurements among those that wait. Returns true if some had to be used early to make room.
     fn collect(&self, state: &mut EkfState, newest: &Newest) -> bool {
         let mut was_full = false;
         for measurement in newest.iter().flatten().flatten() {
@@ -365,7 +365,7 @@ impl EkfState {
         &self.kept.present
     }
 
-    /// Whether the filter has begun: before, there is no estimate.
+    /// True once the filter has begun: before, there is no estimate.
     #[must_use]
     pub fn has_begun(&self) -> bool {
         self.kept.has_begun == 1
@@ -390,7 +390,7 @@ fn reduced<const N: usize>(
     symmetric(&(covariance - gain * cross.transpose()))
 }
 
-/// How many standard deviations a chi-square of `degrees` of freedom is from what it is on average: its cube root
+/// Returns the deviation of a chi-square of `degrees` of freedom from its mean, in standard deviations: its cube root
 /// is nearly normal (Wilson and Hilferty, "The distribution of chi-square", PNAS 17, 1931).
 #[must_use]
 pub fn deviation(chi_square: f64, degrees: usize) -> f64 {

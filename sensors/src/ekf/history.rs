@@ -1,4 +1,4 @@
-//! What the filter remembers of the recent past: the IMU's readings, and measurements that wait their turn.
+//! Recent past, as the filter remembers it: the IMU's readings, and measurements that wait their turn.
 
 use bus::Message;
 use bus::messages::Vector3;
@@ -7,7 +7,7 @@ use bus::messages::Vector3;
 const READINGS_MIN: usize = 256;
 /// Readings that are remembered at most: 100 MB of them.
 const READINGS_MAX: usize = 4 << 20;
-/// How many measurements can wait.
+/// Number of measurements that can wait.
 pub(crate) const WAITING: usize = 48;
 
 /// A reading of the IMU.
@@ -42,7 +42,7 @@ impl Reading {
         }
     }
 
-    /// Whether it holds numbers only.
+    /// True if all of its numbers are finite.
     #[must_use]
     pub fn is_finite(&self) -> bool {
         let all = [self.specific_force, self.angular_velocity].map(<[f64; 3]>::from);
@@ -52,7 +52,7 @@ impl Reading {
 
 /// The last readings, one a period.
 ///
-/// They are kept in single precision, since what a node hands over is written at every tick: it rounds a reading by
+/// They are kept in single precision, since a node's hand-over state is written at every tick: it rounds a reading by
 /// 10⁻⁷ of itself, four orders below its noise. The filter sees no other readings than these.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Readings {
@@ -90,7 +90,7 @@ pub(crate) fn places(span_s: f64, period_s: f64) -> Option<usize> {
 }
 
 impl Readings {
-    /// None yet, of those that will come every `period_ns`, with `places` places.
+    /// Creates an empty memory for readings that will come every `period_ns`, with `places` places.
     #[must_use]
     pub fn every(period_ns: u64, places: usize) -> Self {
         Self { head: ReadingsHead::default(), period_ns, ring: vec![[0.0; 6]; places].into_boxed_slice() }
@@ -102,7 +102,7 @@ impl Readings {
         self.period_ns
     }
 
-    /// The part that has the same size whatever is remembered, and the bytes of the rest.
+    /// The part whose size does not depend on the number of readings, and the bytes of the rest.
     pub fn parts(&self) -> (ReadingsHead, &[u8]) {
         (self.head, bytemuck::cast_slice(&self.ring))
     }
@@ -168,7 +168,7 @@ impl Readings {
     }
 }
 
-/// A sensor that measures what the filter estimates, in the order of `bus::messages::Innovation`.
+/// A sensor of quantities that the filter estimates, in the order of `bus::messages::Innovation`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
     /// A satellite receiver.
@@ -191,7 +191,7 @@ impl Source {
         self as usize
     }
 
-    /// Whether it tells the whole position.
+    /// True if it measures the whole position.
     pub(crate) fn tells_position(self) -> bool {
         matches!(self, Self::Gps | Self::Mocap)
     }
@@ -224,7 +224,7 @@ pub struct Measurement {
 }
 
 impl Measurement {
-    /// What `sensor` measured at `measured_ns`; `values` are at most seven.
+    /// Creates the measurement of `sensor` at `measured_ns`; `values` are at most seven.
     #[must_use]
     pub fn new(sensor: Source, measured_ns: u64, values: &[f64]) -> Self {
         let mut measurement = Self { measured_ns, sensor: sensor as u32, ..Default::default() };
@@ -269,7 +269,7 @@ impl Waiting {
         self.count += 1;
     }
 
-    /// Whether there is no room for another.
+    /// True if there is no room for another.
     #[must_use]
     pub fn is_full(&self) -> bool {
         self.count as usize == WAITING

@@ -38,8 +38,8 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// Goes on from the time of `from` to that of `to`, the readings taken for straight lines between; what the
-    /// errors do meanwhile is added to `transition`.
+    /// Goes on from the time of `from` to that of `to`, the readings taken for straight lines between; the growth of
+    /// the errors meanwhile is added to `transition`.
     pub fn travel(&mut self, from: &Reading, to: &Reading, gravity_m_s2: f64, transition: &mut Transition) {
         let period_s = (to.time_ns - from.time_ns) as f64 * 1e-9;
         let rate_B = 0.5 * (vector(from.angular_velocity) + vector(to.angular_velocity));

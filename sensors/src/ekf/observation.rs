@@ -1,4 +1,4 @@
-//! What each sensor should measure, and how that depends on the filter's errors.
+//! Expected measurement of each sensor, and its dependence on the filter's errors.
 
 use super::history::Measurement;
 use super::motion::Motion;
@@ -7,12 +7,12 @@ use super::transition::{ATTITUDE, BAROMETER, GPS, POSITION, STATES, VELOCITY};
 use crate::wire::{attitude, vector};
 use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
 
-/// A measurement of `N` numbers against what was expected.
+/// A measurement of `N` numbers against the expected one.
 #[derive(Clone, Copy, Debug)]
 pub struct Observation<const N: usize> {
     /// Measured less expected.
     pub innovation: SVector<f64, N>,
-    /// How it depends on the errors.
+    /// Its derivatives with respect to the errors.
     pub jacobian: SMatrix<f64, N, STATES>,
     /// Variances of the measurement's own errors.
     pub variance: SVector<f64, N>,

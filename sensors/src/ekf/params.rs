@@ -5,10 +5,10 @@ use diagnostics::parameter::{ParameterError, finite, not_negative, positive, req
 use nalgebra::Vector3;
 
 parameters! {
-    /// What the sensors are worth, and where the vehicle starts. The sensors' figures default to those of the
+    /// Uncertainties of the sensors, and the start of the vehicle. The sensors' figures default to those of the
     /// built-in kinds, whose rooms name their sources, with the rounding to the part's resolution included: a variance of
     /// resolution² / 12. The barometer's are its pascals in metres at sea level, where the air weighs 12.01 N/m³.
-    /// What the start is worth is tuned, no source.
+    /// The uncertainties of the start are tuned, no source.
     #[derive(Copy)]
     pub struct EkfParams {
         /// White noise of the accelerometer, m/s²/√Hz.
@@ -43,9 +43,9 @@ parameters! {
         magnetometer_hard_iron_T: [f64; 3] = [0.0; 3] => finite,
         /// Magnetic flux density of the earth's field, T.
         field_T: f64 = earth_field::FIELD_T => positive,
-        /// How far it points below the horizon, degrees.
+        /// Inclination of the field, below the horizon, degrees.
         inclination_deg: f64 = earth_field::INCLINATION_DEG => below_vertical,
-        /// How far magnetic north lies east of the world's x axis, degrees.
+        /// Declination: angle of magnetic north east of the world's x axis, degrees.
         declination_deg: f64 = earth_field::DECLINATION_DEG => finite,
         /// The position at the start, m; where absent, the first one measured.
         initial_position_m: Option<[f64; 3]> = None => finite,
@@ -63,7 +63,7 @@ parameters! {
         initial_gyroscope_bias_sigma_rad_s: f64 = 1.0e-3 => not_negative,
         /// Standard deviation of the accelerometer's bias at the start, m/s².
         initial_accelerometer_bias_sigma_m_s2: f64 = 0.02 => not_negative,
-        /// How late a measurement may arrive, ms.
+        /// Greatest delay with which a measurement may arrive, ms.
         delay_max_ms: f64 = 200.0 => not_negative,
         /// A measurement less likely than one so many standard deviations off is refused.
         gate_sigma: f64 = 5.0 => positive,

@@ -1,7 +1,7 @@
-//! Where the filter begins: at the first position that is known, with the attitude that gravity shows.
+//! Start of the filter: at the first position that is known, with the attitude that gravity shows.
 //!
-//! What a measurement says is taken for the motion with hardly any confidence, and the same measurement, used as
-//! any other, then gives it the confidence that it deserves.
+//! A measurement is first taken for the motion with hardly any confidence. Used again as any other measurement,
+//! it then gives the motion the confidence that it deserves.
 
 use super::history::{Measurement, Newest, Reading, Readings, Source};
 use super::motion::Motion;
@@ -22,7 +22,7 @@ const ATTITUDE_UNKNOWN_SIGMA_RAD: f64 = 0.5;
 /// filter's.
 const GRAVITY_TOLERANCE: f64 = 0.2;
 
-/// A motion to begin with, and what it is worth.
+/// A motion to begin with, and its uncertainty.
 #[derive(Clone, Copy, Debug)]
 pub struct Start {
     /// The motion.
@@ -125,7 +125,7 @@ pub fn start(newest: &Newest, readings: &Readings, params: &EkfParams) -> Option
     Some((reading, Start::at_fix(&fix, field.as_ref(), &reading, params)))
 }
 
-/// At rest, with roll and pitch as gravity shows them; level, where what is felt is not gravity.
+/// At rest, with roll and pitch as gravity shows them; level, if the reading is not that of gravity.
 fn upright(reading: &Reading, yaw_rad: f64) -> Motion {
     let felt_m_s2 = vector(reading.specific_force);
     let is_gravity = (felt_m_s2.norm() / STANDARD_GRAVITY_M_S2 - 1.0).abs() < GRAVITY_TOLERANCE;

@@ -1,4 +1,4 @@
-//! How the filter's errors grow from one time to a later one.
+//! Growth of the filter's errors from one time to a later one.
 //!
 //! With the attitude's error as a rotation about the *world's* axes, R_true = exp(θ×)·R, the errors of
 //! position, velocity and attitude and of the biases of gyroscope and accelerometer follow
@@ -6,8 +6,8 @@
 //! dp/dt = v,  dv/dt = −f_W × θ − R·(b_a + n_a),  dθ/dt = −R·(b_g + n_g)
 //!
 //! (Solà, "Quaternion kinematics for the error-state Kalman filter", 2017, §7, global angular errors). The
-//! matrix of this system is nilpotent: its transition from one time to another is made of a few integrals over
-//! the flown attitude and specific force, whatever the number of samples between. So the integrals are summed up
+//! matrix of this system is nilpotent: its transition from one time to another consists of a few integrals over
+//! the flown attitude and specific force, for any number of samples between. So the integrals are summed up
 //! at each sample, and the covariance is carried over only where it is needed.
 
 use super::params::EkfParams;
@@ -20,7 +20,7 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 pub const STATES: usize = 19;
 /// Number of the first of them: position, velocity and attitude.
 pub(super) const MOTION: usize = 9;
-/// Where the errors of each quantity begin.
+/// Index of the first error of each quantity.
 pub(super) const POSITION: usize = 0;
 pub(super) const VELOCITY: usize = 3;
 pub(super) const ATTITUDE: usize = 6;
@@ -77,7 +77,7 @@ impl Transition {
         self.time += period_s;
     }
 
-    /// How long it spans, s.
+    /// Returns the time that it spans, s.
     pub fn time_s(&self) -> f64 {
         self.time
     }
@@ -138,7 +138,7 @@ impl Transition {
         applied
     }
 
-    /// What the noises have added. Their way through the attitude within the span is left out: it is three
+    /// Adds the covariance of the noises. Their way through the attitude within the span is left out: it is three
     /// orders below the rest in the 20 ms that the filter carries its covariance at most.
     fn add_noise(&self, covariance: &mut Covariance, params: &EkfParams) {
         let time_s = self.time;

@@ -54,7 +54,7 @@ impl Side {
         self as usize
     }
 
-    /// By how much the path grows when the distance shrinks by 1.
+    /// Growth of the path when the distance shrinks by 1.
     fn sign(self) -> f64 {
         if self == Self::Ahead { 1.0 } else { -1.0 }
     }
@@ -63,15 +63,15 @@ impl Side {
 /// A distance that was measured some time ago.
 #[derive(Clone, Copy, Debug)]
 pub struct Echo {
-    /// Where to.
+    /// Direction of the measurement.
     pub side: Side,
     /// Distance when it was measured, m.
     pub distance_m: f64,
     /// Its standard deviation, m.
     pub sigma_m: f64,
-    /// How long ago, s.
+    /// Time since the measurement, s.
     pub age_s: f64,
-    /// How far the path has grown since, m.
+    /// Growth of the path since, m.
     pub moved_m: f64,
 }
 
@@ -124,8 +124,8 @@ impl Axis {
         self.covariance = flat(&covariance);
     }
 
-    /// Corrects the axis by `echo`. One further than `gate_sigma` from what was expected comes from
-    /// something else than before: its distance is taken as it is, and says nothing about the velocity.
+    /// Corrects the axis by `echo`. An echo further than `gate_sigma` from the expected one comes from
+    /// another object than before: its distance is taken as it is, and the velocity is not corrected.
     pub fn correct(&mut self, echo: &Echo, gate_sigma: f64) {
         let side = echo.side.index();
         let now_m = echo.now_m();
@@ -139,8 +139,8 @@ impl Axis {
         self.take_up(&cross, innovation_m, variance);
     }
 
-    /// Corrects the axis by a velocity that was measured `age_s` ago with `sigma_m_s`. `told_m_s` is that velocity and what
-    /// the accelerometer says was gained since: what the velocity is now, but for the bias. One that is no number is left
+    /// Corrects the axis by a velocity that was measured `age_s` ago with `sigma_m_s`. `told_m_s` is that
+    /// velocity plus the gain since by the accelerometer: the present velocity, but for the bias. A NaN is left
     /// out.
     pub fn correct_velocity(&mut self, told_m_s: f64, sigma_m_s: f64, age_s: f64) {
         let innovation_m_s = told_m_s - (self.velocity + self.bias * age_s);
@@ -175,7 +175,7 @@ impl Axis {
         self.in_sight[side.index()] = 1;
     }
 
-    /// Forgets what was in sight.
+    /// Forgets the wall in sight.
     pub fn lose(&mut self, side: Side) {
         self.in_sight[side.index()] = 0;
     }
@@ -198,7 +198,7 @@ impl Axis {
     }
 }
 
-/// How an echo depends on the errors of the present state: the velocity at its time was another.
+/// Returns the derivatives of an echo by the errors of the present state: the velocity at its time was another.
 fn observation(echo: &Echo) -> Mean {
     let mut observation = Mean::zeros();
     observation[AHEAD + echo.side.index()] = 1.0;

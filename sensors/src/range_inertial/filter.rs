@@ -3,20 +3,21 @@
 //! *Frames.* The filter works along the world's axes, as the attitude estimate has them: a velocity along
 //! them does not turn with the vehicle, and an error of the attitude stands still in them. Walls are taken
 //! to stand at right angles to these axes, as in the thesis's room; a range is that of the wall whose normal
-//! is nearest to the beam. What is told to controllers is turned to the heading.
+//! is nearest to the beam. The estimate for controllers is turned to the heading.
 //!
 //! *Acceleration.* a_W = R_WB·f_B − g. With the attitude wrong by a rotation e_W it is wrong by e_W × a_W,
 //! nearly g·(e_y, −e_x, 0): the bias of each axis. The complementary filter leans towards the accelerometer
-//! by de_W/dt = f_W × z /(|f|·τ), which makes db/dt = −a/τ. That part is known, and taken off: what it does
-//! to the velocity in a flight of 1 s at 10° is 0.06 m/s² of bias for the rest of the flight.
+//! by de_W/dt = f_W × z /(|f|·τ), which makes db/dt = −a/τ. That part is known, and removed: a flight of 1 s at 10°
+//! would otherwise leave 0.06 m/s² of bias for the rest of the flight.
 //!
 //! *Ranges.* A beam that meets a wall at the angle γ from its normal reads distance/cos γ; if the beam is a
 //! cone, some of it meets the wall up to half the opening angle nearer to the normal. A reading no shorter
 //! than the beam's way to the floor is not one of a wall.
 //!
-//! *GPS.* Five ranges and an IMU do not observe a velocity along an axis with no wall across it: nothing that they read
-//! depends on it. There the velocity is the integral of an acceleration whose error, a tilt of 0.1°, makes 1 m/s of it in a
-//! minute. Where a receiver is wired, its level velocity is one more measurement of it; its position is left out.
+//! *GPS.* Five ranges and an IMU do not observe a velocity along an axis with no wall across it: none of their
+//! readings depends on it. There the velocity is the integral of an acceleration whose error, a tilt of 0.1°,
+//! makes 1 m/s of it in a minute. If a receiver is wired, its level velocity is a further measurement; its
+//! position is not used.
 
 use super::axis::{AHEAD, Axis, Echo, PATH, Side, VELOCITY};
 use super::gains::{Gains, TooLongAgo};
@@ -34,7 +35,7 @@ const LEVEL_BEAMS: [[f64; 3]; 4] = [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0
 /// The place of the beam that looks down.
 const DOWN: usize = 4;
 
-/// How many samples the filter can look back for the place of an echo.
+/// Number of samples that the filter can look back for the place of an echo.
 const PAST: usize = 128;
 
 /// A measurement came too late to be of use.
@@ -111,7 +112,7 @@ pub struct RangeInertialState {
     past: [Past; PAST],
 }
 
-/// What the estimator reads.
+/// Inputs of the estimator.
 #[derive(Debug, InputPorts)]
 pub struct RangeInertialInputs<'a> {
     /// Measurements of the range finders.
@@ -124,7 +125,7 @@ pub struct RangeInertialInputs<'a> {
     pub gps: Option<&'a Gps>,
 }
 
-/// The estimator at one sample period: all that does not change during a run.
+/// The estimator at one sample period, with everything that does not change during a run.
 ///
 /// ```
 /// use bus::Harness;
@@ -235,7 +236,7 @@ impl RangeInertial {
         }
     }
 
-    /// How fast the attitude estimate's leaning towards the accelerometer changes the bias.
+    /// Returns the rate at which the attitude estimate's leaning towards the accelerometer changes the bias.
     fn lean_m_s3(&self, acceleration_W_m_s2: &Vector3<f64>, force_m_s2: f64) -> Vector3<f64> {
         let gravity_m_s2 = self.params.gravity_m_s2;
         if (force_m_s2 - gravity_m_s2).abs() > GRAVITY_TOLERANCE * gravity_m_s2 {
@@ -285,7 +286,7 @@ impl RangeInertial {
         Ok(())
     }
 
-    /// Whether an echo, in a room of known size, is not that of the wall.
+    /// True if an echo, in a room of known size, is not that of the wall.
     fn is_obstacle(&self, axis: &Axis, echo: &Echo) -> bool {
         let wall_m = axis.distance[echo.side.index()];
         self.params.room_m.is_some() && (echo.now_m() - wall_m).abs() > OBSTACLE_M
@@ -315,7 +316,7 @@ impl RangeInertial {
         Some((axis, side, reading_m * libm::cos(incidence_rad), libm::hypot(sigma_m, turn_sigma_m)))
     }
 
-    /// A reading and its standard deviation; the nearest says only that something is within it.
+    /// A reading and its standard deviation; the nearest reading only shows that something is within it.
     fn reading(&self, reading_m: f64) -> (f64, f64) {
         let nearest_m = self.params.nearest_m;
         if reading_m > nearest_m {
@@ -325,7 +326,7 @@ impl RangeInertial {
         (0.5 * nearest_m, libm::hypot(self.params.range_sigma_m, nearest_m / 12.0_f64.sqrt()))
     }
 
-    /// How far a beam's lower edge goes before it meets the floor, m.
+    /// Returns the way of a beam's lower edge to the floor, m.
     fn floor_m(&self, state: &RangeInertialState, beam_W: &Vector3<f64>) -> f64 {
         let dive_rad = self.params.half_angle_deg.to_radians() - libm::asin(beam_W.z.clamp(-1.0, 1.0));
         if dive_rad > 0.0 { state.height_m() / libm::sin(dive_rad) } else { f64::INFINITY }
@@ -348,7 +349,8 @@ impl RangeInertial {
         }
     }
 
-    /// What is around, in the order of `LEVEL_BEAMS` along the heading at `yaw_rad`; the reach where nothing is in sight.
+    /// Returns the walls in the order of `LEVEL_BEAMS` along the heading at `yaw_rad`; the reach where nothing
+    /// is in sight.
     #[must_use]
     pub fn walls(&self, state: &RangeInertialState, yaw_rad: f64, now_ns: u64) -> WallEstimate {
         let heading = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw_rad);
@@ -371,7 +373,8 @@ impl RangeInertial {
         }
     }
 
-    /// The motion, at the attitude that is fed in: level displacement since the start, and height above what is below.
+    /// The motion, at the attitude that is fed in: level displacement since the start, and height above the
+    /// ground below.
     #[must_use]
     pub fn motion(&self, state: &RangeInertialState, attitude: &AttitudeEstimate) -> StateEstimate {
         let [x, y, z] = &state.axes;
@@ -389,7 +392,7 @@ impl RangeInertial {
         }
     }
 
-    /// The distance to what hides the wall, or to the wall.
+    /// The distance to the object that hides the wall, or to the wall.
     fn in_front_m(&self, state: &RangeInertialState, axis: usize, side: Side, now_ns: u64) -> f64 {
         let side = side.index();
         let seen_ns = state.obstacle_ns[axis][side];
@@ -406,7 +409,7 @@ impl RangeInertialState {
         Vector3::from(self.axes.map(|axis| axis.velocity))
     }
 
-    /// Height above what is below, m.
+    /// Height above the ground below, m.
     #[must_use]
     pub fn height_m(&self) -> f64 {
         self.axes[2].distance[Side::Behind.index()]
@@ -418,7 +421,7 @@ impl RangeInertialState {
         self.samples += 1;
     }
 
-    /// Where the vehicle was `samples` samples ago, if that is remembered.
+    /// Returns the vehicle's place `samples` samples ago, if that is remembered.
     fn past(&self, samples: f64) -> Option<Past> {
         let back = samples.round() as u64;
         let is_known = back < self.samples.min(PAST as u64);

@@ -1,19 +1,19 @@
-//! By how much the accelerometer says that the velocity has changed since an earlier time, for measurements that come late.
+//! Changes of the velocity since an earlier time by the accelerometer, for measurements that come late.
 //!
-//! A late velocity is compared with what is believed *now* of the velocity then: that of now, less what was gained since.
-//! What was believed then would not do: corrections since, by the samples before, would be found missing again and made
-//! once more (Bar-Shalom, Li and Kirubarajan, Estimation with Applications to Tracking and Navigation, section 7.7, on
-//! measurements that are out of sequence).
+//! A late velocity is compared with the *present* estimate of the velocity then: that of now, less the gain
+//! since. The estimate of that time would not do. Corrections made since, by earlier samples, would be found
+//! missing again and made once more (Bar-Shalom, Li and Kirubarajan, Estimation with Applications to Tracking
+//! and Navigation, section 7.7, on measurements that are out of sequence).
 
 use crate::wire::{vector, vector_message};
 use bus::Message;
 use bus::messages::Vector3 as Vector3Message;
 use nalgebra::Vector3;
 
-/// How many are kept.
+/// Number of sums that are kept.
 const KEPT: usize = 128;
 
-/// Time between two that are kept at least, s, in whole samples. What lies between is taken for a line.
+/// Time between two that are kept at least, s, in whole samples. Between them, the gain is taken as linear.
 /// So at least 1.27 s can be looked back: more than the delay of any receiver (u-blox NEO-M8 data sheet: a navigation
 /// rate of 5 Hz and more).
 const SPACING_S: f64 = 0.01;
@@ -39,12 +39,12 @@ impl Default for Gains {
     }
 }
 
-/// It was too long ago to be known; how far back it is known, s.
+/// The time was too long ago; holds the longest time that is known, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct TooLongAgo(pub(super) f64);
 
 impl Gains {
-    /// Adds what a sample says.
+    /// Adds the gain of a sample.
     pub(super) fn add(&mut self, gained_W_m_s: &Vector3<f64>, period_s: f64) {
         self.total = vector_message(vector(self.total) + gained_W_m_s);
         let stride = stride(period_s);
@@ -54,7 +54,7 @@ impl Gains {
         self.samples += 1;
     }
 
-    /// What was gained over the last `age_s`, m/s along the world's axes; none where that is longer than the flight.
+    /// Returns the gain over the last `age_s`, m/s along the world's axes; `None` if that is longer than the flight.
     pub(super) fn since(&self, age_s: f64, period_s: f64) -> Result<Option<Vector3<f64>>, TooLongAgo> {
         let stride = stride(period_s);
         let newest = self.samples.saturating_sub(1);

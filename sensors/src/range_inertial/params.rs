@@ -4,15 +4,15 @@ use crate::parameters::within;
 use diagnostics::parameter::{ParameterError, finite, not_negative, positive};
 
 parameters! {
-    /// What the range finders, the IMU and the attitude are worth, and where the vehicle starts.
+    /// Uncertainties of the range finders, the IMU and the attitude, and the start of the vehicle.
     #[derive(Copy)]
     pub struct RangeInertialParams {
         /// Standard deviation of a range, m. Default 0.0104: the noise of the kind `range`, 0.01 m, and rounding
         /// to its centimetre, 0.01 m / √12.
         range_sigma_m: f64 = 0.0104 => positive,
-        /// What a range finder reads where it meets nothing, m. Default 7.65, the MB1300 (thesis §5.5).
+        /// Reading of a range finder that meets nothing, m. Default 7.65, the MB1300 (thesis §5.5).
         reach_m: f64 = 7.65 => positive,
-        /// What a range finder reads of anything nearer, m. Default 0.20 (MB1300 data sheet).
+        /// Reading of a range finder for anything nearer, m. Default 0.20 (MB1300 data sheet).
         nearest_m: f64 = 0.20 => not_negative,
         /// Half angle of the beams' cones, degrees: a wall that is turned by less is met at right angles.
         /// Default 5, as of the kind `range`.
@@ -20,13 +20,14 @@ parameters! {
         /// A range is left out if its beam meets the wall further than this from the right angle, rad.
         /// Default 0.6 (tuned, no source).
         incidence_max_rad: f64 = 0.6 => positive,
-        /// A range further than this many standard deviations from what was expected comes from something
-        /// new: a wall that is passed, or another vehicle. Default 4 (tuned, no source), one wall in 16 000 echoes.
+        /// A range further than this many standard deviations from the expected one comes from a new
+        /// object: a wall that is passed, or another vehicle. Default 4 (tuned, no source), one wall in 16 000
+        /// echoes.
         gate_sigma: f64 = 4.0 => positive,
-        /// How long a wall stays in sight without an echo, s. Default 0.5, five of the MB1300's readings.
+        /// Time that a wall stays in sight without an echo, s. Default 0.5, five of the MB1300's readings.
         sight_hold_s: f64 = 0.5 => positive,
-        /// Time constant with which the attitude estimate follows the accelerometer, s: what it does so to
-        /// the level acceleration is taken off. Default 30, as of the kind `attitude`.
+        /// Time constant with which the attitude estimate follows the accelerometer, s: its effect on
+        /// the level acceleration is removed. Default 30, as of the kind `attitude`.
         attitude_time_constant_s: f64 = 30.0 => positive,
         /// Standard deviation of the estimated attitude, rad, by which ranges at an angle are trusted less.
         /// Default 0.01 (tuned, no source).
@@ -44,12 +45,14 @@ parameters! {
         /// Standard deviation of a level velocity of the input `gps` along each axis, m/s. Default 0.074, as of the kind
         /// `gps`.
         gps_velocity_sigma_m_s: f64 = 0.074 => positive,
-        /// Where the vehicle starts, along the world's x and y, m: the estimate's position begins there. Default 0, 0.
+        /// Place of the vehicle at the start, along the world's x and y, m: the estimate's position begins
+        /// there. Default 0, 0.
         initial_level_position_m: [f64; 2] = [0.0; 2] => finite,
         /// Height at the start, m. Default 0.0.
         initial_height_m: f64 = 0.0 => not_negative,
         /// Size of the room along the world's x and y, m, where it is shared with other vehicles: an echo that is not
-        /// that of a wall then says nothing about the velocity. Without it whatever is in sight is taken to stand still.
+        /// that of a wall then does not correct the velocity. Without it every object in sight is taken to
+        /// stand still.
         room_m: Option<[f64; 2]> = None,
         /// With it: where the vehicle starts, from the walls at -x and -y, m.
         start_in_room_m: Option<[f64; 2]> = None,

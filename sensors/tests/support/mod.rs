@@ -11,7 +11,7 @@ pub const PERIOD_S: f64 = 1e-3;
 pub const PERIOD_NS: u64 = 1_000_000;
 pub const GRAVITY_M_S2: f64 = 9.81;
 
-/// Where the vehicle is and what it feels at one instant.
+/// Motion of the vehicle and its IMU's exact reading at one instant.
 #[derive(Clone, Copy, Debug)]
 pub struct Truth {
     pub position_W_m: Vector3<f64>,
@@ -20,7 +20,7 @@ pub struct Truth {
     pub felt: ImuReading,
 }
 
-/// What the pilot does at a time (s): roll, pitch, yaw (rad) and upward acceleration (m/s²).
+/// Manoeuvre of the pilot at a time (s): roll, pitch, yaw (rad) and upward acceleration (m/s²).
 pub type Manoeuvre = fn(f64) -> [f64; 4];
 
 /// The flight of `samples` samples from `position_W_m` at rest: rotors push along body z and nothing else

@@ -8,11 +8,11 @@ use super::text::plain;
 use crate::bounds;
 use crate::file::is_rigid;
 
-/// By how much the principal moments of a link may miss the triangle inequality, relative to their sum: files print few
-/// digits.
+/// Violation of the triangle inequality that the principal moments of a link may have, relative to their sum:
+/// files print few digits.
 const TRIANGLE_SLACK: f64 = 1e-3;
 
-/// All links as one rigid body.
+/// The links of a model as one rigid body.
 pub struct Body {
     /// Sum of the masses.
     pub mass_kg: f64,
@@ -24,7 +24,7 @@ pub struct Body {
     pub links: Vec<String>,
 }
 
-/// Joins all links, whatever joints they have, at the joints' zero.
+/// Joins all links by any joints, at the joints' zero.
 ///
 /// # Errors
 /// If a mass or tensor is not physical or not within bounds, a link is far away, or no link has mass.

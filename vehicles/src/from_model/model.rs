@@ -1,4 +1,4 @@
-//! Content of descriptions of robots, whatever the format: links with mass, joints between them, motors.
+//! Content of descriptions of robots in any format: links with mass, joints between them, motors.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
 use std::ops::Range;

@@ -12,7 +12,7 @@ pub const GRAVITY_M_S2: f64 = 9.80665;
 pub struct Parts<'m> {
     /// The model.
     pub model: &'m Model<'m>,
-    /// All links as one body.
+    /// The links as one body.
     pub body: Body,
     /// The rotors, in the order of the commands.
     pub rotors: Vec<Rotor<'m>>,

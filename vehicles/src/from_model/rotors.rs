@@ -181,7 +181,7 @@ fn require_bounds(model: &Model, rotor: &Rotor) -> Result<(), Diagnostic> {
     })
 }
 
-/// Refuses a plugin whose link does not point upwards: Gazebo pushes along z of the link, whatever the joint's axis.
+/// Refuses a plugin whose link does not point upwards: Gazebo pushes along z of the link, not along the joint's axis.
 fn require_upward(model: &Model, joint: &Joint, link: &Link) -> Result<(), Diagnostic> {
     let up = link.pose * Vector3::z();
     if up.z > 0.5 && up.xy().norm() <= TILT_MAX {

@@ -93,7 +93,7 @@ impl Scope<'_, '_> {
         self.prefix.strip_suffix("::").unwrap_or(MODEL)
     }
 
-    /// The full name of what is called `name` in this model.
+    /// The full name of the part `name` in this model.
     fn full(&self, name: &str) -> String {
         match name {
             MODEL => self.frame().to_owned(),
@@ -114,7 +114,7 @@ fn included_model(source: Source, include: Node) -> Diagnostic {
 }
 
 impl Frames {
-    /// Adds the model of `scope`, if it lies within another, and what it holds.
+    /// Adds the model of `scope`, if it lies within another, and its content.
     fn add_all(&mut self, source: Source, scope: &Scope) -> Result<(), Diagnostic> {
         if !scope.prefix.is_empty() {
             let outer =

@@ -1,4 +1,4 @@
-//! The text of a vehicle file, with a comment on each line that says what its number comes from.
+//! The text of a vehicle file, with a comment on each line about the source of its number.
 
 use diagnostics::{printable_line, shortened};
 use std::fmt::Write as _;

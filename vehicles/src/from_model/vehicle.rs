@@ -10,7 +10,7 @@ use super::text::{Origin, Text, digits, listed, plain, quoted};
 use crate::bounds;
 use crate::vehicle::MotorModel;
 
-/// By how much the numbers of the rotors may differ, relative to the largest: a vehicle file has one for all.
+/// Relative difference that the numbers of the rotors may have, against the largest: a vehicle file has one for all.
 const ALIKE: f64 = 1e-3;
 
 impl Parts<'_> {

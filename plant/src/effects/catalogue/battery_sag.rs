@@ -54,7 +54,7 @@ effect_parameters! {
 
 const DISCHARGE: &str = "log the voltage, and fly from a full battery until it is nearly empty";
 
-/// What weighs less flies on one lithium-polymer cell, as a Crazyflie 2.1 does (Bitcraze: 250 mAh).
+/// A lighter vehicle flies on one lithium-polymer cell, as a Crazyflie 2.1 does (Bitcraze: 250 mAh).
 const SMALL_KG: f64 = 0.1;
 
 fn scale_to(vehicle: &Vehicle, values: &mut Values) {
@@ -71,7 +71,7 @@ fn sag(values: &Values, advance: &mut Advance) {
     advance.actuation.targets_rad_s = advance.actuation.targets_rad_s.map(|target| target * share);
 }
 
-/// The battery when as much has been drawn since the start as the first of the effect's numbers says, in coulomb.
+/// The battery when the charge drawn since the start is the first of the effect's numbers, in coulomb.
 fn battery(values: &Values, state: &EffectState, vehicle: &Vehicle, speeds_rad_s: &[f64]) -> Battery {
     let parameters = Parameters::from(values);
     let charge = (1.0 - parameters.discharged - state.numbers[0] / parameters.capacity).max(0.0);
@@ -87,8 +87,8 @@ fn shaft_power_W(vehicle: &Vehicle, speeds_rad_s: &[f64]) -> f64 {
     each.map(|(place, speed)| (rotor::drag_torque_N_m(vehicle, place, *speed) * speed).abs()).sum()
 }
 
-/// The smaller root of U I = P with U = U_oc - R I, in the form that holds for R = 0 too. Beyond the power that
-/// the battery has, it gives what it can: half of its voltage at the terminals.
+/// The smaller root of U I = P with U = U_oc - R I, in the form that holds for R = 0 too. Beyond its greatest power
+/// the battery gives that: half of its voltage at the terminals.
 fn current_A(open_V: f64, resistance_ohm: f64, power_W: f64) -> f64 {
     if open_V == 0.0 {
         return 0.0;

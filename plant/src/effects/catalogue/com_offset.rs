@@ -26,7 +26,7 @@ pub static EFFECT: EffectKind = EffectKind {
     ..EffectKind::PLAIN
 };
 
-/// Where each nominal value is from.
+/// Source of each nominal value.
 const STRAPPED: &str = "tuned, no source: a battery that is not strapped in the middle";
 
 effect_parameters! {

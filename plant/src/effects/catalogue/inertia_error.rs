@@ -18,7 +18,7 @@ pub static EFFECT: EffectKind = EffectKind {
     ..EffectKind::PLAIN
 };
 
-/// Where each nominal value is from.
+/// Source of each nominal value.
 const PUBLISHED: &str = "tuned, no source: published Hummingbirds differ by 50 %";
 
 effect_parameters! {

@@ -1,4 +1,4 @@
-//! All rotors alike.
+//! Error of the thrust coefficient, the same for each rotor.
 
 use crate::effects::kind::{Action, EffectKind, Values};
 use diagnostics::unit::RATIO;

@@ -18,7 +18,7 @@ pub static EFFECT: EffectKind = EffectKind {
     ..EffectKind::PLAIN
 };
 
-/// Where each nominal value is from.
+/// Source of each nominal value.
 const CHIPPED: &str = "tuned, no source: a chipped propeller";
 
 effect_parameters! {

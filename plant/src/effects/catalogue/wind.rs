@@ -17,7 +17,7 @@ pub static EFFECT: EffectKind = EffectKind {
     ..EffectKind::PLAIN
 };
 
-/// Where each nominal value is from.
+/// Source of each nominal value.
 const BREEZE: &str = "a light breeze: 3 m/s is Beaufort 2";
 
 effect_parameters! {
