@@ -2,23 +2,9 @@
 
 use crate::plan::Plan;
 use crate::row::Row;
-use anyhow::{Context, Result};
-use parquet::basic::{LogicalType, Repetition, Type as Physical};
-use parquet::data_type::{BoolType, ByteArray, ByteArrayType, DoubleType, Int64Type};
-use parquet::file::metadata::KeyValue;
-use parquet::file::properties::WriterProperties;
-use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
-use parquet::schema::types::{Type, TypePtr};
+use anyhow::Result;
+use report::columns::{Column, write_parquet};
 use std::fs::File;
-use std::sync::Arc;
-
-/// A column with the values of all rows.
-enum Column {
-    Whole(Vec<i64>),
-    Truth(Vec<bool>),
-    Number(Vec<Option<f64>>),
-    Text(Vec<Option<String>>),
-}
 
 /// Writes the `rows` of `plan` to `file`. `figures` names the figures of the rows.
 ///
@@ -28,21 +14,7 @@ enum Column {
 /// # Errors
 /// If the file cannot be written.
 pub fn write(file: &mut File, plan: &Plan, figures: &[String], rows: &[Row]) -> Result<()> {
-    let columns = columns(plan, figures, rows);
-    let fields = columns.iter().map(|(name, column)| field(name, column)).collect::<Result<_>>()?;
-    let schema = Arc::new(Type::group_type_builder("flights").with_fields(fields).build()?);
-    let version = KeyValue::new("hummingbus".to_owned(), env!("CARGO_PKG_VERSION").to_owned());
-    let properties = WriterProperties::builder().set_key_value_metadata(Some(vec![version])).build();
-    let mut writer = SerializedFileWriter::new(file, schema, Arc::new(properties))?;
-    let mut group = writer.next_row_group()?;
-    for (_, column) in &columns {
-        let mut open = group.next_column()?.context("more columns than fields")?;
-        put(&mut open, column)?;
-        open.close()?;
-    }
-    group.close()?;
-    writer.close()?;
-    Ok(())
+    write_parquet(file, "flights", &columns(plan, figures, rows), &[])
 }
 
 fn columns(plan: &Plan, figures: &[String], rows: &[Row]) -> Vec<(String, Column)> {
@@ -62,37 +34,4 @@ fn columns(plan: &Plan, figures: &[String], rows: &[Row]) -> Vec<(String, Column
     }
     columns.push(("wall_s".to_owned(), numbers(&|row| Some(row.wall_s))));
     columns
-}
-
-fn field(name: &str, column: &Column) -> Result<TypePtr> {
-    let (physical, repetition) = match column {
-        Column::Whole(_) => (Physical::INT64, Repetition::REQUIRED),
-        Column::Truth(_) => (Physical::BOOLEAN, Repetition::REQUIRED),
-        Column::Number(_) => (Physical::DOUBLE, Repetition::OPTIONAL),
-        Column::Text(_) => (Physical::BYTE_ARRAY, Repetition::OPTIONAL),
-    };
-    let text = matches!(column, Column::Text(_)).then_some(LogicalType::String);
-    let builder = Type::primitive_type_builder(name, physical).with_repetition(repetition);
-    Ok(Arc::new(builder.with_logical_type(text).build()?))
-}
-
-fn put(writer: &mut SerializedColumnWriter<'_>, column: &Column) -> Result<()> {
-    match column {
-        Column::Whole(values) => writer.typed::<Int64Type>().write_batch(values, None, None)?,
-        Column::Truth(values) => writer.typed::<BoolType>().write_batch(values, None, None)?,
-        Column::Number(values) => {
-            let known: Vec<f64> = values.iter().flatten().copied().collect();
-            writer.typed::<DoubleType>().write_batch(&known, Some(&levels(values)), None)?
-        }
-        Column::Text(values) => {
-            let known: Vec<ByteArray> = values.iter().flatten().map(|text| text.as_str().into()).collect();
-            writer.typed::<ByteArrayType>().write_batch(&known, Some(&levels(values)), None)?
-        }
-    };
-    Ok(())
-}
-
-/// Definition levels: 1 where there is a value.
-fn levels<T>(values: &[Option<T>]) -> Vec<i16> {
-    values.iter().map(|value| i16::from(value.is_some())).collect()
 }

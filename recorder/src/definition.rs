@@ -97,6 +97,14 @@ pub fn number(leaves: &[Leaf], path: &str) -> Option<f64> {
     leaves.iter().find(|leaf| leaf.path == path)?.value.as_f64()
 }
 
+/// True for a field that fills a gap of the layout: `pad0`, `pad1`, …
+#[must_use]
+pub fn is_padding(path: &str) -> bool {
+    let name = path.rsplit('.').next().unwrap_or(path);
+    let digits = name.split('[').next().and_then(|name| name.strip_prefix("pad"));
+    digits.is_some_and(|digits| !digits.is_empty() && digits.bytes().all(|byte| byte.is_ascii_digit()))
+}
+
 /// A leaf field of a message.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Leaf {
@@ -463,12 +471,18 @@ impl Cursor<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Definition, Value};
+    use super::{Definition, Value, is_padding};
     use bus::Message;
     use bus::messages::{BodyTransform, FrameName, MotorCommand, Orientation, Point, PoseStamped, Time};
 
     fn cdr<T: Message>(message: &T) -> Vec<u8> {
         [&[0, 1, 0, 0], bytemuck::bytes_of(message)].concat()
+    }
+
+    #[test]
+    fn padding_is_known_by_its_name() {
+        assert!(is_padding("pad0") && is_padding("status.pad12") && is_padding("pad0[3]"));
+        assert!(!is_padding("pad") && !is_padding("padding") && !is_padding("pad0.x"));
     }
 
     #[test]

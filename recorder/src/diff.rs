@@ -2,11 +2,13 @@
 
 use crate::error::RecordingError;
 use crate::reader::{Record, Recording};
+use serde::Serialize;
 use std::fmt;
 use std::path::PathBuf;
 
 /// The first difference of two recordings.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Difference {
     /// A message, or a field of it.
     Message {
@@ -43,7 +45,10 @@ pub enum Difference {
         ends: Option<(PathBuf, u32)>,
     },
     /// The messages are the same; an attachment or the container differs.
-    Container(String),
+    Container {
+        /// Description of the difference.
+        difference: String,
+    },
 }
 
 impl fmt::Display for Difference {
@@ -73,7 +78,7 @@ impl fmt::Display for Difference {
                     None => Ok(()),
                 }
             }
-            Self::Container(what) => write!(f, "all messages are the same; {what}"),
+            Self::Container { difference } => write!(f, "all messages are the same; {difference}"),
         }
     }
 }
@@ -129,20 +134,25 @@ pub fn first_difference(a: &Recording, b: &Recording) -> Result<Option<Differenc
 }
 
 /// Messages of a recording, of which the next can be looked at.
-type Messages<I> = std::iter::Peekable<I>;
+pub(crate) type Messages<I> = std::iter::Peekable<I>;
 
 /// The next of `messages`, which stays the next.
-fn first_of(messages: &mut Messages<impl Iterator<Item = Result<Record, RecordingError>>>) -> Option<Record> {
+pub(crate) fn first_of(
+    messages: &mut Messages<impl Iterator<Item = Result<Record, RecordingError>>>,
+) -> Option<Record> {
     messages.peek()?.as_ref().ok().cloned()
 }
 
 /// Passes over those of `messages` before `tick`; false if none is left.
-fn skip_to(messages: &mut Messages<impl Iterator<Item = Result<Record, RecordingError>>>, tick: u32) -> bool {
+pub(crate) fn skip_to(
+    messages: &mut Messages<impl Iterator<Item = Result<Record, RecordingError>>>,
+    tick: u32,
+) -> bool {
     while messages.next_if(|record| record.as_ref().is_ok_and(|record| record.tick < tick)).is_some() {}
     messages.peek().is_some()
 }
 
-fn same_message(x: &Record, y: &Record) -> bool {
+pub(crate) fn same_message(x: &Record, y: &Record) -> bool {
     (x.tick, x.time_ns, &x.topic, &x.cdr) == (y.tick, y.time_ns, &y.topic, &y.cdr)
 }
 
@@ -172,7 +182,7 @@ fn field_difference(
     })
 }
 
-fn message_difference(x: &Record, y: &Record) -> Difference {
+pub(crate) fn message_difference(x: &Record, y: &Record) -> Difference {
     let describe = |record: &Record| format!("a message of {} at tick {}", record.topic, record.tick);
     let earlier = if (x.tick, &x.topic) <= (y.tick, &y.topic) { x } else { y };
     let (tick, topic) = (earlier.tick, earlier.topic.clone());
@@ -182,13 +192,15 @@ fn message_difference(x: &Record, y: &Record) -> Difference {
 fn container_difference(a: &Recording, b: &Recording) -> Result<Difference, RecordingError> {
     if let Some(cut) = [a, b].into_iter().find(|recording| recording.cut().is_some()) {
         let path = cut.path().display();
-        return Ok(Difference::Container(format!("{path} was cut off behind its last message")));
+        let difference = format!("{path} was cut off behind its last message");
+        return Ok(Difference::Container { difference });
     }
     let (left, right) = (a.attachments()?, b.attachments()?);
     let differing = left.iter().find(|attachment| !right.contains(attachment));
     let differing = differing.or_else(|| right.iter().find(|attachment| !left.contains(attachment)));
-    Ok(Difference::Container(match differing {
+    let difference = match differing {
         Some((name, _)) => format!("the attachment `{name}` differs"),
         None => "the bytes of the container differ (compression, library or chunks)".to_owned(),
-    }))
+    };
+    Ok(Difference::Container { difference })
 }

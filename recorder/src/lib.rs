@@ -9,6 +9,7 @@
 //! - [`index`]: a recording by time, read stretch by stretch
 //! - [`fields`]: newest values of the fields of a topic, read message by message
 //! - [`series`]: one field of one topic over time
+//! - [`comparison`]: comparison of two recordings within a tolerance
 //! - [`diff`]: where two recordings first differ
 //!
 //! A recording holds each message as ROS 2 tools expect it, stamped with simulation time and numbered by tick:
@@ -48,6 +49,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod comparison;
 mod container;
 pub mod definition;
 pub mod diff;

@@ -8,6 +8,7 @@
 //! | [`summary`] | the summary of a run, as text and as JSON |
 //! | [`airframe`] | the body of a vehicle: the parts that are seen, and the parts that touch |
 //! | [`attached`] | the vehicles whose files a recording has attached |
+//! | [`columns`], [`export`] | recordings as tables: Parquet and CSV |
 //! | [`topics`] | names of topics and of message types |
 //! | [`urdf`] | a vehicle as other tools show it |
 //! | [`plot`] | curves over time and paths in space, as a page, PNG or SVG |
@@ -24,6 +25,8 @@
 pub mod airframe;
 pub mod attached;
 mod cells;
+pub mod columns;
+pub mod export;
 pub mod identification;
 pub mod judge;
 pub mod page;

@@ -4,7 +4,7 @@ use super::files::open_recording;
 use super::output::{gone_or_failed, write_json_line};
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use recorder::definition::{Leaf, Value};
+use recorder::definition::{Leaf, Value, is_padding};
 use recorder::reader::{Record, Recording};
 use std::io::Write as _;
 use std::path::PathBuf;
@@ -145,13 +145,6 @@ fn is_part(path: &str, of: &str) -> bool {
     path.strip_prefix(of).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
 }
 
-/// True for a field that fills a gap of the layout: `pad0`, `pad1`, …
-fn is_padding(path: &str) -> bool {
-    let name = path.rsplit('.').next().unwrap_or(path);
-    let digits = name.split('[').next().and_then(|name| name.strip_prefix("pad"));
-    digits.is_some_and(|digits| !digits.is_empty() && digits.bytes().all(|byte| byte.is_ascii_digit()))
-}
-
 /// A value of a recording as JSON; JSON has no NaN and no infinity, so these are strings.
 fn json_value(value: &Value) -> serde_json::Value {
     match value {
@@ -167,7 +160,7 @@ fn json_value(value: &Value) -> serde_json::Value {
 
 #[cfg(test)]
 mod tests {
-    use super::{cell_of, is_padding, is_part};
+    use super::{cell_of, is_part};
 
     #[test]
     fn a_field_has_the_fields_below_it() {
@@ -177,12 +170,6 @@ mod tests {
                 && is_part("command[2]", "command")
         );
         assert!(!is_part("position_error.z", "position") && !is_part("position", "position.z"));
-    }
-
-    #[test]
-    fn padding_is_known_by_its_name() {
-        assert!(is_padding("pad0") && is_padding("status.pad12") && is_padding("pad0[3]"));
-        assert!(!is_padding("pad") && !is_padding("padding") && !is_padding("pad0.x"));
     }
 
     #[test]

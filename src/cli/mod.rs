@@ -8,6 +8,7 @@ mod clean;
 mod completions;
 mod components;
 mod diff;
+mod export;
 mod export_fmu;
 mod files;
 mod fork;
@@ -79,12 +80,15 @@ commands! {
     /// Check a manifest without running it, and print its graph.
     #[command(after_help = "Example: hummingbus check manifests/hover.toml")]
     Check(check::CheckArguments) => check::check;
-    /// Compare two recordings; exit code 1 if they differ.
-    #[command(after_help = "Example: hummingbus diff a.mcap b.mcap")]
+    /// Compare two recordings, byte by byte or within a tolerance; exit code 1 if they differ.
+    #[command(after_help = diff::HELP)]
     Diff(diff::DiffArguments) => diff::diff;
     /// Print a recording's messages, one JSON object a line.
     #[command(after_help = "Example: hummingbus cat hover.mcap --topic /plant/state | head")]
     Cat(cat::CatArguments) => cat::cat;
+    /// Write a recording's messages as tables, a file for each topic: Parquet or CSV.
+    #[command(after_help = export::HELP)]
+    Export(export::ExportArguments) => export::export;
     /// Draw a recording: a page with curves over time and the paths in space, or pictures of them.
     #[command(after_help = plot::HELP)]
     Plot(plot::PlotArguments) => plot::plot;

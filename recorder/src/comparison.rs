@@ -1,0 +1,241 @@
+//! Comparison of two recordings within a tolerance: the largest difference of each field.
+
+use crate::definition::{Leaf, Value};
+use crate::diff::{Difference, first_of, message_difference, same_message, skip_to};
+use crate::error::RecordingError;
+use crate::reader::{Record, Recording};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Differences of a field between two recordings.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FieldDifference {
+    /// Topic.
+    pub topic: String,
+    /// Path of the field.
+    pub field: String,
+    /// Unit; empty for a field without one.
+    pub unit: String,
+    /// Number of messages in which it differs.
+    pub messages: u64,
+    /// First tick at which it differs.
+    pub first_tick: u32,
+    /// Largest absolute difference, in the field's unit; infinite for a text, and where only one of the two values is NaN.
+    pub largest: f64,
+    /// Tick of the largest difference.
+    pub largest_tick: u32,
+}
+
+/// Comparison of two recordings.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Comparison {
+    /// Number of messages that were compared.
+    pub messages: u64,
+    /// Fields that differ, by topic and path.
+    pub fields: Vec<FieldDifference>,
+    /// Difference that no tolerance allows, such as a missing message; the comparison ends there.
+    pub refused: Option<Difference>,
+}
+
+impl Comparison {
+    /// True if all differences are at most `tolerance`, each in its field's unit.
+    #[must_use]
+    pub fn is_within(&self, tolerance: f64) -> bool {
+        self.refused.is_none() && self.fields.iter().all(|field| field.largest <= tolerance)
+    }
+}
+
+/// Compares `a` and `b` message by message. If one of them begins later, as the recording of a run from a checkpoint does,
+/// the comparison begins there.
+///
+/// ```
+/// use bus::announcement::Announcement;
+/// use bus::messages::PlantState;
+/// use bus::Message as _;
+/// use recorder::{comparison::compare, reader::Recording, writer::RecordingWriter};
+///
+/// let folder = tempfile::tempdir()?;
+/// let recorded = |name: &str, height_m: f64| -> Result<Recording, Box<dyn std::error::Error>> {
+///     let path = folder.path().join(name);
+///     let mut writer = RecordingWriter::create(&path)?;
+///     let channel = writer.add_channel("/plant/state", &Announcement::of(PlantState::SCHEMA))?;
+///     let state = PlantState { position: [0.0, 0.0, height_m].into(), ..PlantState::default() };
+///     writer.write(channel, 0, 0, &[&[0, 1, 0, 0], bytemuck::bytes_of(&state)].concat())?;
+///     writer.finish()?;
+///     Ok(Recording::open(&path)?)
+/// };
+/// let found = compare(&recorded("a.mcap", 1.5)?, &recorded("b.mcap", 1.5001)?)?;
+/// assert_eq!((found.fields.len(), found.fields[0].field.as_str()), (1, "position.z"));
+/// assert!(found.is_within(1e-3) && !found.is_within(1e-5));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// If one of them is damaged.
+pub fn compare(a: &Recording, b: &Recording) -> Result<Comparison, RecordingError> {
+    let (mut left, mut right) = (a.messages().peekable(), b.messages().peekable());
+    if let (Some(x), Some(y)) = (first_of(&mut left), first_of(&mut right)) {
+        // Messages of one recording alone are found below.
+        skip_to(&mut left, y.tick);
+        skip_to(&mut right, x.tick);
+    }
+    let mut fields = Fields::default();
+    let (mut messages, mut last_tick) = (0, None);
+    let ends = |shorter: &Recording, last_tick, longer: &Recording| Difference::Prefix {
+        shorter: shorter.path().to_owned(),
+        last_tick,
+        longer: longer.path().to_owned(),
+    };
+    let refused = loop {
+        match (left.next().transpose()?, right.next().transpose()?) {
+            (None, None) => break None,
+            (None, Some(_)) => break Some(ends(a, last_tick, b)),
+            (Some(_), None) => break Some(ends(b, last_tick, a)),
+            (Some(x), Some(y)) => {
+                if !same_message(&x, &y)
+                    && let Some(refused) = fields.add(a, b, &x, &y)?
+                {
+                    break Some(refused);
+                }
+                messages += 1;
+                last_tick = Some(x.tick);
+            }
+        }
+    };
+    Ok(Comparison { messages, fields: fields.0.into_values().collect(), refused })
+}
+
+/// Differences by topic and path.
+#[derive(Default)]
+struct Fields(BTreeMap<(String, String), FieldDifference>);
+
+impl Fields {
+    /// Adds the differences of two messages; returns one that no tolerance allows.
+    fn add(
+        &mut self,
+        a: &Recording,
+        b: &Recording,
+        x: &Record,
+        y: &Record,
+    ) -> Result<Option<Difference>, RecordingError> {
+        if (x.tick, x.time_ns, &x.topic) != (y.tick, y.time_ns, &y.topic) {
+            return Ok(Some(message_difference(x, y)));
+        }
+        let (p, q) = (a.decode(x)?, b.decode(y)?);
+        let differs = |path: Option<&str>, a: String, b: String| Difference::Message {
+            tick: x.tick,
+            topic: x.topic.clone(),
+            field: path.map(str::to_owned),
+            a,
+            b,
+        };
+        for (l, r) in p.iter().zip(&q) {
+            if l.path != r.path {
+                return Ok(Some(differs(None, format!("a field {}", l.path), format!("a field {}", r.path))));
+            }
+            if let Some(difference) = difference_of(&l.value, &r.value) {
+                self.note(x, l, difference);
+            }
+        }
+        let lengths = format!("{} fields", p.len());
+        Ok((p.len() != q.len()).then(|| differs(None, lengths, format!("{} fields", q.len()))))
+    }
+
+    fn note(&mut self, record: &Record, leaf: &Leaf, difference: f64) {
+        let tick = record.tick;
+        let new = || FieldDifference {
+            topic: record.topic.clone(),
+            field: leaf.path.clone(),
+            unit: leaf.unit.clone(),
+            messages: 0,
+            first_tick: tick,
+            largest: difference,
+            largest_tick: tick,
+        };
+        let noted = self.0.entry((record.topic.clone(), leaf.path.clone())).or_insert_with(new);
+        noted.messages += 1;
+        if difference > noted.largest {
+            (noted.largest, noted.largest_tick) = (difference, tick);
+        }
+    }
+}
+
+/// Absolute difference of two values; `None` if they are the same, as two NaNs are.
+fn difference_of(a: &Value, b: &Value) -> Option<f64> {
+    if a.to_string() == b.to_string() {
+        return None;
+    }
+    let difference = match (a.as_f64(), b.as_f64()) {
+        (Some(a), Some(b)) => (a - b).abs(),
+        _ => f64::INFINITY,
+    };
+    Some(if difference.is_nan() { f64::INFINITY } else { difference })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{compare, difference_of};
+    use crate::definition::Value;
+    use crate::diff::Difference;
+    use crate::reader::Recording;
+    use crate::writer::RecordingWriter;
+    use bus::Message as _;
+    use bus::announcement::Announcement;
+    use bus::messages::PlantState;
+    use std::ops::Range;
+    use std::path::Path;
+
+    /// A climb of 1 m a tick, `above_m` higher at tick 7.
+    fn climb(folder: &Path, name: &str, ticks: Range<u32>, above_m: f64) -> Recording {
+        let path = folder.join(name);
+        let mut writer = RecordingWriter::create(&path).unwrap();
+        let channel = writer.add_channel("/plant/state", &Announcement::of(PlantState::SCHEMA)).unwrap();
+        for tick in ticks {
+            let z = f64::from(tick) + if tick == 7 { above_m } else { 0.0 };
+            let state = PlantState { position: [0.0, 0.0, z].into(), ..PlantState::default() };
+            let cdr = [&[0, 1, 0, 0], bytemuck::bytes_of(&state)].concat();
+            writer.write(channel, tick, u64::from(tick) * 1_000_000, &cdr).unwrap();
+        }
+        writer.finish().unwrap();
+        Recording::open(&path).unwrap()
+    }
+
+    #[test]
+    fn the_largest_difference_of_each_field_is_found_and_judged() {
+        let folder = tempfile::tempdir().unwrap();
+        let first = climb(folder.path(), "a.mcap", 0..20, 0.0);
+        let second = climb(folder.path(), "b.mcap", 0..20, 0.25);
+        let found = compare(&first, &second).unwrap();
+        assert_eq!((found.messages, found.fields.len(), found.refused.is_none()), (20, 1, true));
+        let field = &found.fields[0];
+        assert_eq!((field.field.as_str(), field.unit.as_str()), ("position.z", "m"));
+        assert_eq!((field.messages, field.first_tick, field.largest_tick), (1, 7, 7));
+        assert_eq!(field.largest, 0.25);
+        assert!(found.is_within(0.25) && !found.is_within(0.249));
+        assert!(compare(&first, &first).unwrap().is_within(0.0));
+    }
+
+    #[test]
+    fn a_recording_that_ends_earlier_is_within_no_tolerance_and_one_that_begins_later_is_compared_from_there()
+    {
+        let folder = tempfile::tempdir().unwrap();
+        let whole = climb(folder.path(), "a.mcap", 0..20, 0.0);
+        let short = climb(folder.path(), "b.mcap", 0..12, 0.0);
+        let found = compare(&whole, &short).unwrap();
+        assert!(!found.is_within(f64::INFINITY));
+        assert!(matches!(found.refused, Some(Difference::Prefix { last_tick: Some(11), .. })), "{found:?}");
+        let later = climb(folder.path(), "c.mcap", 5..20, 0.5);
+        let found = compare(&later, &whole).unwrap();
+        assert_eq!((found.messages, found.is_within(0.5)), (15, true));
+    }
+
+    #[test]
+    fn values_that_have_no_difference_are_infinitely_far_apart() {
+        let float = |number| Value::Float(number);
+        assert_eq!(difference_of(&float(f64::NAN), &float(f64::NAN)), None);
+        assert_eq!(difference_of(&float(f64::NAN), &float(1.0)), Some(f64::INFINITY));
+        assert_eq!(difference_of(&Value::Text("a".into()), &Value::Text("b".into())), Some(f64::INFINITY));
+        assert_eq!(difference_of(&float(0.0), &float(-0.0)), Some(0.0));
+        assert_eq!(difference_of(&Value::Integer(3), &Value::Integer(5)), Some(2.0));
+    }
+}

@@ -1,0 +1,96 @@
+//! The command `export`.
+
+use super::files::open_recording;
+use super::output::{print_text, say};
+use anyhow::{Context as _, Result, bail};
+use clap::Args;
+use report::columns::PARQUET_START;
+use report::export::{CSV_START, Table, tables};
+use runtime::output_file::{self, Kind, Mark};
+use std::path::{Path, PathBuf};
+
+/// Examples that `--help` shows.
+pub const HELP: &str = "Examples:
+  hummingbus export hover.mcap                                  writes hover/plant.state.parquet and a file for each other topic
+  hummingbus export hover.mcap --topic /plant/state --csv
+  hummingbus export hover.mcap --out tables";
+
+const PARQUET: Kind = Kind { name: "Parquet file", mark: Mark::Start(PARQUET_START) };
+const CSV: Kind = Kind { name: "CSV file", mark: Mark::Start(CSV_START.as_bytes()) };
+
+/// Arguments of `export`.
+#[derive(Args)]
+pub struct ExportArguments {
+    /// The recording.
+    recording: PathBuf,
+    /// Only this topic; repeatable.
+    #[arg(long)]
+    topic: Vec<String>,
+    /// Write CSV instead of Parquet.
+    #[arg(long)]
+    csv: bool,
+    /// Folder of the files; the recording's path without its ending if left out.
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
+}
+
+/// Writes the messages of a recording as tables, a file for each topic; false if the recording was cut off.
+///
+/// # Errors
+/// If the recording cannot be read or has no such topic, or a file cannot be written.
+pub fn export(arguments: &ExportArguments) -> Result<bool> {
+    let recording = open_recording(&arguments.recording)?;
+    let tables = tables(&recording, &arguments.topic)?;
+    let folder = arguments.out.clone().unwrap_or_else(|| arguments.recording.with_extension(""));
+    if folder == arguments.recording {
+        bail!("{} has no ending to leave out: name a folder with --out", folder.display());
+    }
+    std::fs::create_dir_all(&folder)
+        .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    let (ending, kind) = if arguments.csv { ("csv", &CSV) } else { ("parquet", &PARQUET) };
+    let files: Vec<(PathBuf, &Table)> =
+        tables.iter().map(|(topic, table)| (folder.join(file_name(topic, ending)), table)).collect();
+    // Before the first is written.
+    for (path, _) in &files {
+        output_file::check(path, kind)?;
+        if files.iter().filter(|(other, _)| other == path).count() > 1 {
+            bail!("two topics would be written to {}: name one with --topic", path.display());
+        }
+    }
+    for (path, table) in &files {
+        write(path, kind, table, arguments.csv)?;
+        print_text(&format!("{}: {} messages", path.display(), table.rows()))?;
+    }
+    if files.is_empty() {
+        say("the recording has no messages: nothing was written");
+    }
+    Ok(recording.cut().is_none())
+}
+
+fn write(path: &Path, kind: &Kind, table: &Table, is_csv: bool) -> Result<()> {
+    output_file::write(path, kind, |out| {
+        let written = if is_csv { table.write_csv(out) } else { table.write_parquet(out) };
+        written.map_err(|error| std::io::Error::other(format!("{error:#}")))
+    })
+}
+
+/// Name of the file of `topic`: `plant.state.parquet` of `/plant/state`.
+fn file_name(topic: &str, ending: &str) -> String {
+    let safe = |c: char| if c.is_alphanumeric() || "-_".contains(c) { c } else { '.' };
+    let name: String = topic.trim_start_matches('/').chars().map(safe).collect();
+    // A name of dots alone would be a folder.
+    let name = if name.trim_matches('.').is_empty() { "topic".to_owned() } else { name };
+    format!("{name}.{ending}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::file_name;
+
+    #[test]
+    fn a_file_is_called_after_its_topic_and_stays_in_its_folder() {
+        assert_eq!(file_name("/plant/state", "csv"), "plant.state.csv");
+        assert_eq!(file_name("/../../etc/passwd", "csv"), "......etc.passwd.csv");
+        assert_eq!(file_name("/..", "parquet"), "topic.parquet");
+    }
+}
