@@ -8,7 +8,7 @@ use bus::messages::{MotorCommand, Quaternion, SetPoint, StateEstimate};
 use bus::{BusError, InputPorts, OutputPorts, ParameterError};
 use serde::Deserialize;
 
-/// What the manifest's `parameters` table holds; gains from an error to motor counts.
+/// The manifest's `parameters` table: gains from an error to motor counts.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Gains {

@@ -14,7 +14,7 @@ use vehicles::{MotorModel, Rotor, Vehicle};
 
 const TICK_S: f64 = 1e-3;
 const HOVER_RAD_S: f64 = 411.6;
-/// What rotor speeds swing by in chirps: up to 66 and 178 degrees of tilt.
+/// Amplitudes of the rotor speeds in chirps: up to 66 and 178 degrees of tilt.
 const GENTLE_RAD_S: f64 = 15.0;
 const HARD_RAD_S: f64 = 250.0;
 
@@ -122,7 +122,7 @@ fn rig(text: &str) -> Scene {
 /// A box of a chain: name, centre, size, mass, and the joint that it hangs by with its anchor.
 type Link = (&'static str, [f64; 3], [f64; 3], f64, &'static str, [f64; 3]);
 
-/// What hangs in a chain from the vehicle.
+/// Bodies that hang in a chain from the vehicle.
 const CHAIN: [Link; 4] = [
     ("a", [0.05, 0.02, -0.25], [0.1, 0.2, 0.3], 0.3, "ball", [0.0, 0.0, -0.08]),
     ("b", [0.05, 0.1, -0.55], [0.2, 0.1, 0.2], 0.2, "revolute", [0.05, 0.05, -0.42]),

@@ -1,4 +1,4 @@
-//! What the fuzzers call: each function reads bytes as one kind of input, as hummingbus does.
+//! Functions that the fuzzers call: each reads bytes as one kind of input, as hummingbus does.
 //!
 //! An input is accepted or refused with words that name its file; it never panics, never hangs and never takes memory
 //! without bound. The functions say which of the two it was: the seeds of `corpus/` that are named `accepted-…` must
@@ -213,7 +213,7 @@ impl Place {
         std::fs::write(self.path(name), bytes).expect("the temporary folder can be written");
     }
 
-    /// Whether the shipped `manifest` is accepted with the file under test at `key`.
+    /// True if the shipped `manifest` is accepted with the file under test at `key`.
     fn is_flown_by(&self, manifest: &str, key: &str) -> bool {
         let manifest = repository().join("manifests").join(manifest);
         let path = self.path("under-test.toml");
@@ -221,7 +221,7 @@ impl Place {
         said(hummingbus::check(&manifest, &overrides), "hover").is_some()
     }
 
-    /// Whether the log of `format` is read with `channels`, and can be written as one table.
+    /// True if the log of `format` is read with `channels`, and can be written as one table.
     fn reads_log(&self, format: &str, channels: &str) -> bool {
         let text = format!(
             "vehicle = \"vehicles/hummingbird.toml\"\nformat = \"{format}\"\n[channels]\n{channels}\n[[flight]]\n\

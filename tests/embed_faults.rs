@@ -31,9 +31,9 @@ struct Outputs {
     command: MotorCommand,
 }
 
-/// Whether a fault is still to come: a process that is started again does not meet it again.
+/// True while a fault is still to come: a process that is started again does not meet it again.
 static IS_ARMED: AtomicBool = AtomicBool::new(false);
-/// Whether those that hang may go on.
+/// True if the threads that hang may go on.
 static IS_RELEASED: AtomicBool = AtomicBool::new(false);
 
 fn hang() {
@@ -147,7 +147,7 @@ const COMPONENTS: Registry = Registry::new(&[
     Registration::of::<recorder::node::Recorder>(),
 ]);
 
-/// What the threads of a run are called.
+/// Names of the threads of a run.
 const THREADS: [&str; 5] = ["clock", "source", "sink", "recorder", "control"];
 
 /// Two nodes and a recorder for `ticks` ticks; `fault` strikes the source at tick 50.
@@ -214,7 +214,7 @@ fn require_threads(expected: &[&str]) {
     assert_eq!(threads(), expected);
 }
 
-/// What runs of this process have left in shared memory, and among temporary files.
+/// Returns the names of the files that runs of this process have left in shared memory and among temporary files.
 fn files() -> Vec<String> {
     let pid = std::process::id();
     let of_runs = [format!("hb_{pid:x}-"), format!("hummingbus-{}-{pid:x}-", bus::process::user_id())];
@@ -348,7 +348,7 @@ fn a_thread_is_restarted_with_the_state_of_the_one_that_ended() {
     }
 }
 
-/// What is under way goes on in the thread that takes over, at whatever of the node's ticks the first one ended.
+/// A step under way goes on in the thread that takes over, at any of the node's ticks at which the first one ended.
 #[test]
 fn a_computing_time_goes_on_in_a_restarted_thread_and_in_a_standby() {
     let time = toml::toml! { distribution = "uniform"
@@ -381,7 +381,7 @@ fn a_computing_time_goes_on_in_a_restarted_thread_and_in_a_standby() {
     }
 }
 
-/// Whatever the heir had under way as a shadow when it takes over.
+/// The heir starts from the last outputs, with any step under way in it as a shadow when it takes over.
 #[test]
 fn what_takes_over_from_last_outputs_has_them_however_long_its_steps_take() {
     for at_tick in 200..208 {

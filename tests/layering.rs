@@ -16,7 +16,7 @@ type Names = Vec<String>;
 #[derive(Default)]
 struct Module {
     file: PathBuf,
-    /// What it defines, but for modules.
+    /// Names that it defines, but for modules.
     defined: BTreeSet<String>,
     children: BTreeSet<String>,
     /// Imported names with their paths.

@@ -1,4 +1,4 @@
-//! Which motor output drives which rotor: by the rotors' places and spins, and the firmware's numbering.
+//! Finds the motor output of each rotor from the rotors' places and spins, and the firmware's numbering.
 
 use vehicles::Rotor;
 

@@ -244,7 +244,7 @@ impl FieldType for MapFrame {
     const KIND: Kind = Kind::Text;
 }
 
-/// What an inertial measurement unit reports.
+/// Reading of an inertial measurement unit.
 #[derive(Clone, Copy, Debug, Default, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/Imu")]
@@ -283,7 +283,7 @@ pub struct AttitudeEstimate {
     pub angular_velocity: Vector3,
 }
 
-/// What a pilot or a planner asks of the controller.
+/// Set points that a pilot or a planner gives to the controller.
 #[derive(Clone, Copy, Debug, Default, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/SetPoint")]

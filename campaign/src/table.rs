@@ -1,4 +1,4 @@
-//! All rows as Parquet: one row a flight, in the order of the plan.
+//! Writes all rows as Parquet: one row a flight, in the order of the plan.
 
 use crate::plan::Plan;
 use crate::row::Row;

@@ -49,12 +49,12 @@ pub struct CascadeLaw {
     pub period_s: f64,
 }
 
-/// All that the law remembers.
+/// State of the law.
 #[derive(Debug, Clone, Copy, PartialEq, Default, bus::Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/CascadeState")]
 pub struct CascadeState {
-    /// What the integrators of altitude and rates ask for.
+    /// Outputs of the integrators of altitude and rates.
     pub integrals: Integrals,
     /// The command filter's roll, pitch and yaw.
     #[field(unit = "rad", frame = "world")]

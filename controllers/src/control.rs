@@ -48,7 +48,7 @@ pub struct ControlOutput {
     pub laps: u32,
 }
 
-/// What the integrators of a law ask for, in units that mean the same to all laws.
+/// Outputs of the integrators of a law, in units that mean the same to all laws.
 ///
 /// They are accelerations, not integrals of an error, so that a backup with other gains goes on without a jump.
 #[derive(Debug, Clone, Copy, PartialEq, Default, bus::Message)]

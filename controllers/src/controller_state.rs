@@ -14,7 +14,7 @@ const WORDS_MAX: usize = 32;
 /// The most bytes of a law's name.
 const NAME_MAX: usize = 24;
 
-/// Which law a state belongs to; zero before the first tick.
+/// Law that a state belongs to; zero before the first tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/LawId")]
@@ -37,7 +37,7 @@ impl LawId {
     }
 }
 
-/// All that a controller remembers between ticks.
+/// State of a controller between ticks.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/ControllerState")]
@@ -50,9 +50,9 @@ pub struct ControllerState {
     /// Torque that was demanded last.
     #[field(unit = "N*m", frame = "body")]
     pub torque: [f64; 3],
-    /// What the law's integrators ask for.
+    /// Outputs of the law's integrators.
     pub integrals: Integrals,
-    /// What is left of the predecessor's thrust that this law does not ask for itself.
+    /// Remaining part of the predecessor's thrust that this law does not ask for itself.
     #[field(unit = "N", frame = "body")]
     pub residual_thrust: f64,
     /// The same of its torque.

@@ -20,7 +20,7 @@ gains! {
     }
 }
 
-/// What it remembers.
+/// State of the observer.
 #[derive(Debug, Clone, Copy, PartialEq, Default, bus::Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/ObserverState")]

@@ -16,7 +16,7 @@ use nalgebra::{Matrix3, Vector3};
 /// observer of 5 rad/s against a disturbance that exceeds its limit by gravity.
 const VELOCITY_MISSED_MAX_M_S: f64 = 1.0;
 
-/// All that the laws that foresee remember.
+/// State of a law that foresees.
 #[derive(Debug, Clone, Copy, PartialEq, Default, bus::Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/ForesightState")]

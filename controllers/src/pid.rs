@@ -42,12 +42,12 @@ pub struct PidLaw {
     pub period_s: f64,
 }
 
-/// All that the law remembers.
+/// State of the law.
 #[derive(Debug, Clone, Copy, PartialEq, Default, bus::Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/PidState")]
 pub struct PidState {
-    /// What its integrators ask for.
+    /// Outputs of its integrators.
     pub integrals: Integrals,
 }
 

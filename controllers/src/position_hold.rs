@@ -73,7 +73,7 @@ pub struct Outputs {
     pub set_point: SetPoint,
 }
 
-/// All that it remembers.
+/// State of the position hold.
 #[derive(Debug, Clone, Copy, Default, PartialEq, bus::Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/PositionHoldState")]

@@ -74,7 +74,7 @@ pub struct VelocitySetPoint {
     pub yaw_rad: f64,
 }
 
-/// All that the velocity loops and the law around them remember.
+/// State of the velocity loops and of the law around them.
 #[derive(Debug, Clone, Copy, PartialEq, Default, bus::Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/VelocityState")]

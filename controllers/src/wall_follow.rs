@@ -108,7 +108,7 @@ pub struct WallFollowLaw {
     pub shared: Option<Shared>,
 }
 
-/// All that the law remembers.
+/// State of the law.
 #[derive(Debug, Clone, Copy, PartialEq, Default, bus::Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/WallFollowState")]

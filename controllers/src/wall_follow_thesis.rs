@@ -76,7 +76,7 @@ pub struct WallFollowThesisLaw {
     pub start_state: u32,
 }
 
-/// All that the law remembers.
+/// State of the law.
 #[derive(Debug, Clone, Copy, PartialEq, Default, bus::Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/WallFollowThesisState")]

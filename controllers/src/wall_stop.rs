@@ -89,7 +89,7 @@ pub struct WallStopLaw {
     pub heading_rad: f64,
 }
 
-/// All that the law remembers.
+/// State of the law.
 #[derive(Debug, Clone, Copy, PartialEq, Default, bus::Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/WallStopState")]

@@ -73,7 +73,7 @@ pub struct WallStopThesisLaw {
     pub heading_rad: f64,
 }
 
-/// All that the law remembers.
+/// State of the law.
 #[derive(Debug, Clone, Copy, PartialEq, Default, bus::Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/WallStopThesisState")]

@@ -28,7 +28,7 @@ class Controller(Fmi2Slave):
         self.altitude_gain = 12.0
         fixed = {"causality": Fmi2Causality.parameter, "variability": Fmi2Variability.tunable}
         self.register_variable(Real("altitude_gain", **fixed))
-        # What changes from step to step is a variable, so that it is part of the state that is saved.
+        # A value that changes from step to step is a variable, so that it is part of the state that is saved.
         self.lift = 0.0
         self.register_variable(Real("lift", causality=Fmi2Causality.local))
 

@@ -88,7 +88,7 @@ pub enum FlightsError {
     Write {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Cause.
         #[source]
         cause: io::Error,
     },
@@ -179,7 +179,7 @@ pub enum LogError {
     /// Something else than expected.
     #[error("{at}expected {expected}, found {found}; {advice}")]
     Unexpected {
-        /// Where.
+        /// Place in the log or in its entry.
         at: Spot,
         /// Values that would be accepted.
         expected: String,

@@ -63,7 +63,7 @@ pub struct SpeedEntry {
     to_rpm: f64,
 }
 
-/// What the stand's sensors read.
+/// Readings of the stand's sensors.
 #[derive(Clone, Copy, Debug, Default, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/RotorLoad")]
@@ -87,7 +87,7 @@ pub struct RotorLoad {
     pub mount_torque: f64,
 }
 
-/// All that the component remembers.
+/// State of the component.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/PropellerStandState")]

@@ -22,7 +22,7 @@ class Campaign:
     folder: Path
     report: Mapping[str, Any]
     holds: bool
-    """Whether the condition `require` holds; true without one."""
+    """True if the condition `require` holds, and without one."""
 
     def polars(self) -> polars.DataFrame:
         """A row for each flight: varied values, verdict, figures, first failing condition."""

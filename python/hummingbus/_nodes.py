@@ -64,7 +64,7 @@ class Parameters(dict):
 
 @dataclass(frozen=True)
 class Node:
-    """What a component may know of its node.
+    """Facts of a node that its component may know.
 
     `period_s` is the simulated time between two steps, `seed` that of the run.
     """
@@ -165,7 +165,7 @@ def _run(component: Any, inputs: Any, outputs: Any, state: Any) -> None:
     of_node = Node(node.name, node.period_s, node.seed, parameters, node)
     step = component(of_node).step if is_class else component
     parameters._require_all_read()
-    # What is there now stays: the collector need not look at it again at every tick.
+    # Objects that are there now stay: the collector need not look at them again at every tick.
     gc.collect()
     gc.freeze()
     node.run(step if not absent else lambda tick, **messages: step(tick, **messages, **absent))

@@ -61,7 +61,7 @@ class Run:
         raise _native.Error("the run has ended: " + self._texts()[1].strip())
 
     def status(self) -> Mapping[str, Any]:
-        """How far the run has come."""
+        """Returns the progress of the run."""
         return self._ask("status")
 
     def pause(self) -> Mapping[str, Any]:

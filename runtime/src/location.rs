@@ -47,7 +47,7 @@ pub enum Unlocated {
     System {
         /// The part of the path.
         at: PathBuf,
-        /// Why.
+        /// Cause.
         cause: io::Error,
     },
 }

@@ -110,7 +110,7 @@ impl Losses {
     }
 }
 
-/// What is remembered of a channel from tick to tick, beside the queue of measurements.
+/// State of a channel from tick to tick, beside the queue of measurements.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/ChannelState")]
@@ -121,7 +121,7 @@ pub struct ChannelState {
     /// Measurements so far; number n is at place n modulo the length of the queue.
     #[field(unit = "1")]
     measured: u64,
-    /// How many of them have arrived.
+    /// Number of measurements that have arrived.
     #[field(unit = "1")]
     arrived: u64,
     /// When those in the queue arrive.
@@ -133,7 +133,7 @@ pub struct ChannelState {
     /// The same of the stream of losses.
     #[field(unit = "1")]
     loss_words: [u64; 2],
-    /// Which parts of the last measurement were lost, a bit for each.
+    /// Lost parts of the last measurement, a bit for each.
     #[field(unit = "1")]
     lost: u32,
     /// Zero.

@@ -31,7 +31,7 @@ parameters! {
     }
 }
 
-/// All that the component remembers.
+/// State of the component.
 #[derive(Debug, Clone, Copy, Default, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/ClearanceState")]

@@ -89,7 +89,7 @@ pub struct Complementary {
     period_s: f64,
 }
 
-/// What the filter knows between two samples.
+/// State of the filter between two samples.
 #[derive(Debug, Clone, Copy, PartialEq, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/ComplementaryState")]

@@ -17,8 +17,7 @@ use bus::{Message, OutputPorts};
 use diagnostics::ParameterError;
 use diagnostics::unit::STANDARD_GRAVITY_M_S2;
 
-/// All that the IMU remembers: its biases, how far its random stream was drawn, and the readings
-/// under way.
+/// State of the IMU: its biases, the place in its random stream, and the readings under way.
 #[derive(Debug, Clone, Copy, Default, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/ImuState")]
@@ -41,13 +40,13 @@ pub struct ImuState {
     /// The true angular velocity at the last reading.
     #[field(unit = "rad/s", frame = "body")]
     last_angular_velocity: Vector3,
-    /// What has come through the accelerometer's low pass.
+    /// Specific force behind the accelerometer's low pass.
     #[field(unit = "m/s^2", frame = "body")]
     filtered_specific_force: Vector3,
-    /// What has come through the gyroscope's low pass.
+    /// Angular velocity behind the gyroscope's low pass.
     #[field(unit = "rad/s", frame = "body")]
     filtered_angular_velocity: Vector3,
-    /// What is under way.
+    /// Measurements that are under way.
     channel: ChannelState,
     /// The last readings.
     queue: [Imu; QUEUE],

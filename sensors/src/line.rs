@@ -53,7 +53,7 @@ pub struct Packet {
     message: [u8; FORWARDED_BYTES_MAX],
 }
 
-/// What a line remembers.
+/// State of a line.
 #[derive(Clone, Copy, Debug, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/LineState")]
@@ -63,7 +63,7 @@ pub struct LineState {
     /// The newest message of each stream that has arrived.
     #[field(unit = "1")]
     pub(crate) newest: [[u8; FORWARDED_BYTES_MAX]; STREAMS],
-    /// What has happened so far.
+    /// Counts so far.
     pub(crate) counts: LineCounts,
     /// Messages queued so far.
     #[field(unit = "1")]
@@ -82,7 +82,7 @@ pub struct LineState {
     last_arrival_ns: u64,
 }
 
-/// What a line has carried.
+/// Traffic that a line has carried.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/LineCounts")]
@@ -102,7 +102,7 @@ pub struct LineCounts {
     /// Messages for which the queue had no room, by stream.
     #[field(unit = "1")]
     pub dropped: [u32; STREAMS],
-    /// How long the message that arrived last had taken since it was queued.
+    /// Time from queueing to arrival of the message that arrived last.
     #[field(unit = "ns")]
     pub delay_ns: u64,
 }

@@ -110,7 +110,7 @@ pub struct StreamParameters {
     priority: u32,
 }
 
-/// What a link says of itself, from its first tick on; arrays by the names of the streams.
+/// Statistics of a link, from its first tick on; arrays by the names of the streams.
 ///
 /// ```
 /// let statistics = sensors::link::LinkStatistics::default();
@@ -131,7 +131,7 @@ pub struct LinkStatistics {
     /// Messages that wait for the wire.
     #[field(unit = "1")]
     pub queued: u32,
-    /// How long the message that arrived last had taken since it was queued.
+    /// Time from queueing to arrival of the message that arrived last.
     #[field(unit = "s")]
     pub delay: f64,
     /// Messages that are on the wire or behind it.
@@ -157,7 +157,7 @@ pub struct LinkStatistics {
     pub stream_dropped: [u32; STREAMS],
 }
 
-/// What a link remembers: what it last took from each input, and what is on its line.
+/// State of a link: marks of the messages that it took last from its inputs, and its line.
 ///
 /// ```
 /// use bus::Message;

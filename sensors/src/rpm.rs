@@ -52,7 +52,7 @@ fn rotor(key: &str, number: f64) -> Result<(), ParameterError> {
 
 sensor! {
     pub struct RpmState as "hummingbus_msgs/msg/RpmState" sends speeds: RotorSpeeds {
-        /// What was read last, whether it was lost or not.
+        /// Speeds that were read last, lost ones included.
         #[field(unit = "rad/s")]
         read: [f64; ROTORS_MAX],
         /// 1 from the first reading on.

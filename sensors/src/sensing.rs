@@ -17,12 +17,12 @@ macro_rules! sensor {
             $($(#[$field_meta:meta])* $field:ident: $type:ty,)*
         }
     ) => {
-        /// All that the sensor remembers.
+        /// State of the sensor.
         #[derive(Debug, Clone, Copy, Default, bus::Message)]
         #[repr(C)]
         #[message(type_name = $type_name, role = "state")]
         pub struct $State {
-            /// What is under way.
+            /// Measurements that are under way.
             channel: $crate::channel::ChannelState,
             /// The last measurements.
             queue: [$Message; $crate::channel::QUEUE],

@@ -132,7 +132,7 @@ fn one_of_fmi_3_flies_the_same_in_its_own_units() {
     assert!(two.len() == 4 * 8000 && two.len() == three.len() && difference < 1e-6, "{difference}");
 }
 
-/// All commands of a recording, four by four.
+/// Returns all commands of a recording, four by four.
 pub(crate) fn commands(place: &Place, name: &str, topic: &str) -> Vec<f64> {
     let columns = [0, 1, 2, 3].map(|index| column(place, name, topic, &format!("command[{index}]")));
     (0..columns[0].len()).flat_map(|row| columns.each_ref().map(|column| column[row])).collect()

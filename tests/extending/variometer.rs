@@ -9,7 +9,7 @@ use diagnostics::ParameterError;
 use diagnostics::parameter::{not_negative, positive};
 use serde::Deserialize;
 
-/// What the variometer makes of the truth. Tuned, no source.
+/// Parameters of the variometer. Tuned, no source.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Parameters {
@@ -20,21 +20,21 @@ pub struct Parameters {
     noise_m_s: f64,
 }
 
-/// What it reads.
+/// Inputs.
 #[derive(Debug, InputPorts)]
 pub struct Inputs<'a> {
     /// The truth.
     pub state: &'a PlantState,
 }
 
-/// What it sends.
+/// Outputs.
 #[derive(Debug, OutputPorts)]
 pub struct Outputs {
     /// The reading.
     pub climb: Climb,
 }
 
-/// What it remembers.
+/// State.
 #[derive(Debug, Clone, Copy, Default, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/VariometerState")]

@@ -42,7 +42,7 @@ fn side(hunk: &[String], mark: char) -> String {
     of_side.map(|line| format!("{}\n", line.get(1..).unwrap_or_default())).collect()
 }
 
-/// Where the file of a walk-through is compiled: its name in this folder or one below.
+/// Returns the compiled file with the name of a walk-through's file, from this folder or one below.
 fn compiled(path: &str) -> Option<String> {
     let name = Path::new(path).file_name()?;
     let folders = ["", "messages", "effects/catalogue", "cli"];

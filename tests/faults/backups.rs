@@ -107,7 +107,7 @@ fn a_backup_that_waits_for_its_tick_is_not_late() {
     assert_eq!(ended.json()["successions"][0]["take_over_tick"], 3990, "{ended}");
 }
 
-/// Who is struck.
+/// Target of a strike.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Target {
     /// The process that flies.
@@ -176,7 +176,7 @@ impl Case {
     }
 }
 
-/// Where the backup stood when it or another was struck, as far as the striker can tell.
+/// Stage of the backup when it or another was struck, as far as the striker can tell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd)]
 enum Stage {
     Starting,
@@ -331,7 +331,7 @@ fn hit(case: &Case, watched: &Watched, struck: Pid) {
     watched.control.set_hold_tick(u32::MAX);
 }
 
-/// Where the backup stands while the clock waits before `tick`.
+/// Returns the stage of the backup while the clock waits before `tick`.
 fn stage_at(tick: u32) -> Stage {
     match tick {
         ..JOIN_TICK => Stage::Starting,

@@ -134,7 +134,7 @@ impl Watched {
         self.plan.nodes.iter().position(|node| node.name == name)
     }
 
-    /// Who is in the slots of `node` now, once everybody has been told of them.
+    /// Returns the instances in the slots of `node` now, once all nodes have been told of them.
     pub fn instances(&self, place: &Place, node: usize) -> NodeInstances {
         self.look("no membership", || {
             let run_dir = place.run_dirs().into_iter().next()?;

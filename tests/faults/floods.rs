@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 
 /// Address space of the launcher, and of each process that it starts: less than a flood.
 const LAUNCHER_KIB: u32 = 280_000;
-/// What the launcher prints at most of a run that fails.
+/// Most bytes that the launcher prints of a run that fails.
 const SAID_BYTES: usize = 16 * 1024;
 
 /// Flies with a sidecar that writes and then fails.

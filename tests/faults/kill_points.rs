@@ -20,7 +20,7 @@ pub const GUARD_TICKS: u32 = 500;
 /// Ticks around which something else happens: the first, a full window, a flush, the next chunk.
 pub const EDGES: [u32; 10] = [0, 1, 63, 64, 65, 998, 999, 1000, 1001, 2000];
 
-/// What is done to the victim.
+/// Blow to the victim.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Blow {
     Signal(Signal),
@@ -71,12 +71,12 @@ impl Case {
         }
     }
 
-    /// Whether the run is only asked to end.
+    /// True if the run is only asked to end.
     fn is_request(&self) -> bool {
         matches!(self.blow, Blow::Signal(Signal::TERM | Signal::INT))
     }
 
-    /// Whether the recorder has no time to finish its file.
+    /// True if the recorder has no time to finish its file.
     fn cuts_recording(&self) -> bool {
         !self.is_request() && matches!(self.victim, Process::Launcher | Process::Node("recorder"))
     }
@@ -110,7 +110,7 @@ fn draw_blow(victim: Process, moment: Moment, below: &mut impl FnMut(usize) -> u
     }
 }
 
-/// What a kill point cost.
+/// Losses by kill points.
 #[derive(Clone, Copy, Debug, Default)]
 struct Loss {
     strikes: u64,

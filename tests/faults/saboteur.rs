@@ -12,10 +12,10 @@ pub const TICK_VARIABLE: &str = "HUMMINGBUS_TEST_FAULT_TICK";
 pub const MARK_VARIABLE: &str = "HUMMINGBUS_TEST_FAULT_MARK";
 /// The file for which a [`Fault::Await`] waits.
 pub const AWAITED_VARIABLE: &str = "HUMMINGBUS_TEST_FAULT_AWAITED";
-/// How many processes of the node fail, from the first on; all where it is not said.
+/// Number of processes of the node that fail, from the first on; all if it is not set.
 pub const GENERATIONS_VARIABLE: &str = "HUMMINGBUS_TEST_FAULT_GENERATIONS";
 
-/// What the saboteur sends while it behaves.
+/// Report of the saboteur while it behaves.
 #[derive(Clone, Copy, Default, Message)]
 #[repr(C)]
 #[message(type_name = "test_msgs/msg/Report")]
@@ -37,7 +37,7 @@ struct OtherReport {
     climb: f64,
 }
 
-/// How a node fails from the inside.
+/// Failure of a node from the inside.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
     Error,

@@ -1,4 +1,4 @@
-//! What the nodes of a run started themselves: it dies with the run, however it was detached.
+//! Processes that the nodes of a run started themselves: they die with the run, however they were detached.
 
 use crate::flight::write_manifest;
 use crate::saboteur;

@@ -21,7 +21,7 @@ const TICKS_BETWEEN: u32 = GUARD_TICKS + 100;
 /// Of the victim of a SIGSTOP: long enough for a process to start in on a machine that is busy.
 const WATCHDOG_MS_HOST: &str = "5000";
 
-/// What is to follow the end of a process.
+/// Policy for the end of a process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Policy {
     Restart,
@@ -79,7 +79,7 @@ impl Case {
         Self { policy, victim, blow, moment, second }
     }
 
-    /// Whether what one of two has sent may be lost to the other.
+    /// True if messages that one of two victims has sent may be lost to the other.
     fn may_be_too_much(&self) -> bool {
         matches!((self.moment, self.second), (Moment::Flight(_), Some(Second::Together(_))))
     }
@@ -187,8 +187,8 @@ fn panic_again_and_again(policy: Policy) -> Ended {
     ended
 }
 
-/// What was recorded is the beginning of what would have been. Of a standby that died the last messages may be missing,
-/// since nobody waits for those of a shadow.
+/// Requires that the recording is the beginning of `reference`. The last messages of a dead standby may be missing,
+/// since no node waits for those of a shadow.
 fn require_prefix(place: &Place, policy: Policy, recording: &str, reference: &str) {
     if policy == Policy::Standby {
         let (kept, whole) = (messages(recording), messages(reference));

@@ -73,7 +73,7 @@ fn require_private(path: &Path) {
 /// Runs that start while another user tries to open whatever of them it sees.
 const RACED_RUNS: usize = 100;
 
-/// What another user tried.
+/// Attempts of another user.
 #[derive(Debug, Default)]
 struct Race {
     opened: Vec<String>,

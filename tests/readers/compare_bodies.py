@@ -19,7 +19,7 @@ import numpy as np
 
 G_M_S2 = 9.81
 STEPS_S = (2e-4, 1e-4)
-# What ours may be off at the end, by kind: of each box its position, m, and its attitude, rad.
+# Largest deviation of ours at the end, by kind: of each box its position, m, and its attitude, rad.
 MAY_BE = {"stack": (0.02, 0.06), "slide": (0.05, 0.4), "throw": (0.1, 0.4)}
 
 # Part of the cases of a kind that may be farther apart.

@@ -141,7 +141,7 @@ def compare_plain_chirps(told, cases):
 
 
 def bounce_apex(told, height, damping):
-    """How high MuJoCo's first bounce gets, with a spring and damper of 1 kHz as contact."""
+    """Height of MuJoCo's first bounce, with a spring and damper of 1 kHz as contact."""
     start = [0, 0, 0, told["stand"] + height, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0]
     stiffness = (2 * np.pi * 1000) ** 2
     contact = f'solref="{-stiffness} {-damping}" solimp="0.9999 0.9999 1e-6"'
@@ -320,7 +320,7 @@ def actuators(drives):
 
 
 def chain_apart(told, states, drives):
-    """How far the bodies of a chain that falls freely get from MuJoCo's, in m and in rad."""
+    """Distances of the bodies of a chain that falls freely from MuJoCo's, in m and in rad."""
     axis = " ".join(str(number) for number in told["chain axis"])
     kinds = {"ball": '<joint name="{1}" type="ball" pos="{0}"/>',
              "revolute": f'<joint name="{{1}}" type="hinge" axis="{axis}" pos="{{0}}"/>',
@@ -356,7 +356,7 @@ def chain_apart(told, states, drives):
 
 
 def compare_chain(told, cases):
-    """What hangs from the vehicle by a ball joint, a hinge, a slide and a fixed joint, all in free fall."""
+    """Compares the vehicle and a chain below it, by a ball joint, a hinge, a slide and a fixed joint, in free fall."""
     off, turned = chain_apart(told, cases["chain"], [])
     what = "vehicle and a chain of four by a ball joint, a hinge, a slide and a fixed joint, 2.4 s of free fall"
     apart(f"{what}: position", "m", mujoco=(off, 1e-9))

@@ -1,4 +1,4 @@
-"""What hummingbus's own reader found in a recording, against which every other reader is compared."""
+"""Content of a recording by hummingbus's own reader, against which every other reader is compared."""
 
 import json
 import math
@@ -65,7 +65,7 @@ def fail(reason):
 
 
 def same(ours, theirs):
-    """Whether two leaves are equal: floats bit by bit, except that all NaN are one."""
+    """True if two leaves are equal: floats bit by bit, except that all NaN are one."""
     if isinstance(theirs, str):
         return ours == theirs
     if isinstance(theirs, float):

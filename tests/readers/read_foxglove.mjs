@@ -24,7 +24,7 @@ function* leaves(value, path = "") {
   }
 }
 
-/** Whether two leaves are equal: numbers bit by bit, except that all NaN are one. */
+/** True if two leaves are equal: numbers bit by bit, except that all NaN are one. */
 function same(ours, theirs) {
   if (typeof theirs === "string") return ours === theirs;
   // JSON has no NaN and no infinity: they come as strings.

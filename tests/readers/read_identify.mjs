@@ -7,7 +7,7 @@ const [file, screenshot] = process.argv.slice(2);
 const PLOTS = ["residual", "sides", "against", "agreement", "auto", "cross"];
 const CHOICES = ["flight", "equation", "component", "input"];
 
-/** What is drawn: for each plot its title, its axes and the number of marks that have an extent; each table's rows. */
+/** Returns the drawn parts: each plot's title, axes and number of marks that have an extent; each table's rows. */
 function look([plots, choices]) {
   const extent = (mark) => {
     const box = mark.getBBox();

@@ -5,7 +5,7 @@ import { withPage } from "./browser.mjs";
 
 const [file, screenshot] = process.argv.slice(2);
 
-/** What is drawn: for each plot the number of marks that have an extent, for each table its rows. */
+/** Returns the drawn parts: for each plot the number of marks that have an extent, for each table its rows. */
 function look() {
   const extent = (mark) => {
     const box = mark.getBBox();

@@ -8,7 +8,7 @@ const [file, ...rest] = process.argv.slice(2);
 const withoutWebGl = rest.includes("no-webgl");
 const screenshot = rest.find((word) => word.endsWith(".png"));
 
-/** What is drawn: of each flat plot its titles and lines, of the space its traces and how many colours are seen. */
+/** Returns the drawn parts: titles and lines of each flat plot, traces and number of colours of the space. */
 function look() {
   const shown = (id) => !document.getElementById(id).hidden && document.getElementById(id).data !== undefined;
   const extent = (path) => path.getBBox().width > 0 || path.getBBox().height > 0;

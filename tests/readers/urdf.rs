@@ -65,7 +65,7 @@ fn a_full_tensor_and_names_that_xml_would_take_for_its_own_are_read_as_they_are(
     assert_eq!(vehicle.inertia_kg_m2[(0, 2)], -2e-4);
 }
 
-/// What a reader finds of a vehicle file's URDF, which lies in the folder.
+/// Returns the content of a vehicle file's URDF by a reader, and the folder of the URDF.
 fn read(readers: &Path, file: &str, more: &[&str]) -> (TempDir, Value) {
     let folder = tempfile::tempdir().unwrap();
     let urdf = folder.path().join("vehicle.urdf");

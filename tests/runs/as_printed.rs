@@ -1,4 +1,4 @@
-//! What the thesis prints: flown by manifests/thesis, whose controllers alone are told the truth; docs/as-printed.md.
+//! Flights as the thesis prints them: manifests/thesis, whose controllers alone are told the truth; docs/as-printed.md.
 
 use crate::manifests::graph;
 use crate::scenarios::{TRUTHS, kind, nodes, readers_of};
@@ -32,7 +32,7 @@ fn the_family_flies_as_its_conditions_say() {
     }
 }
 
-/// What `check` refuses: parts that manifests include, and files that are none.
+/// Files that `check` refuses: parts that manifests include, and files that are not manifests.
 const NO_MANIFESTS: [&str; 17] = [
     "identify/course.toml",
     "identify/flight.toml",

@@ -1,4 +1,4 @@
-//! What dead runs left is removed, and nothing of live ones, wherever their temporary files lie.
+//! Files of dead runs are removed, and none of live runs, wherever their temporary files lie.
 
 use crate::skipped::skip;
 use crate::support::{ENDLESS, Launch, Place, poll, repository};

@@ -16,7 +16,7 @@ const TICKS: u32 = 1000;
 /// The tick at whose start another instance goes on from the state of the first.
 const TRANSFER_TICK: u32 = 500;
 
-/// All components in one run: the hover that every sensor watches, with the other estimators and laws beside it.
+/// Returns a manifest of all components: the hover that every sensor watches, with the other estimators and laws.
 fn manifest(place: &Place) -> String {
     let (vehicle, room) = (repository("vehicles/hummingbird.toml"), repository("scenes/room.toml"));
     let (include, flight) = (repository("manifests/sensors.toml"), place.write("flight.csv", flight()));

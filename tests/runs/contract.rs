@@ -1,4 +1,4 @@
-//! What a node sees and sends at a tick (docs/architecture.md, the timeline of one tick).
+//! Samples that a node sees and sends at a tick (docs/architecture.md, the timeline of one tick).
 
 use crate::nodes::{manifest, sender, table};
 use crate::recordings::{Row, rows, topics};

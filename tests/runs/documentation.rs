@@ -32,7 +32,7 @@ fn pages() -> Vec<String> {
     pages.chain(["README.md", "CONTRIBUTING.md", "CHANGELOG.md"].map(str::to_owned)).collect()
 }
 
-/// Whether `path` names a file of the repository: one that is stored, in one of its folders.
+/// True if `path` names a file of the repository: one that is stored, in one of its folders.
 fn is_stored(path: &str) -> bool {
     let is_made = [".mcap", ".html"].iter().any(|extension| path.ends_with(extension));
     let is_form = path.contains(|c: char| c.is_whitespace() || "*<>=${}…:".contains(c));

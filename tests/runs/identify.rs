@@ -126,7 +126,7 @@ fn simulated_stand(place: &Place, name: &str) -> Value {
     place.start_with(&args, &[("HUMMINGBUS_STAND", &recording)]).end().with_code(0).json()
 }
 
-/// What the thesis prints (§4.2), in SI, with what came back: c_T, c_Q, natural frequency and damping.
+/// Returns the values of the thesis (§4.2), in SI, with those of the report: c_T, c_Q, natural frequency and damping.
 fn printed(report: &Value) -> [(f64, &Value); 4] {
     let per_rpm2 = (30.0 / PI).powi(2);
     let (statics, motor) = (&report["statics"], &report["dynamics"]["second"]);

@@ -58,7 +58,7 @@ fn write<T: Message>(writer: &mut RecordingWriter, channel: ChannelId, tick: u32
     writer.write(channel, tick, u64::from(tick) * TICK_NS, &cdr).unwrap();
 }
 
-/// What the vehicle with this number does, and what was asked of it: a lap at 3 m from the walls of the room, nose
+/// Returns the state of the vehicle with this number and its reference: a lap at 3 m from the walls of the room, nose
 /// ahead, so that its yaw goes round with it.
 fn sample(tick: u32, vehicle: usize) -> (PlantState, Reference) {
     let time_s = f64::from(tick) * TICK_NS as f64 * 1e-9;

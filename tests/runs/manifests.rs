@@ -1,4 +1,4 @@
-//! What a manifest can say beyond a flat list of processes: includes, sets of processes, settings of any key.
+//! Manifests beyond a flat list of processes: includes, sets of processes, settings of any key.
 
 use crate::nodes::{manifest, sender, table};
 use crate::recordings::{open, require_same};

@@ -8,7 +8,7 @@ use bus::{BusError, Input, Message, NODE_VARIABLE, Node, Tick};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
-/// What a test node sends: when it computed, and what it saw.
+/// Message of a test node: its tick, and the note that it saw.
 #[derive(Clone, Copy, Default, Message)]
 #[repr(C)]
 #[message(type_name = "test_msgs/msg/Note")]
@@ -49,7 +49,7 @@ struct Parameters {
     fault: Option<Fault>,
     #[serde(default)]
     at_tick: u32,
-    /// How long the node sleeps at that tick.
+    /// Time that the node sleeps at that tick.
     #[serde(default)]
     nap_ms: u64,
     /// A file, and the text that has to be in it.

@@ -1,4 +1,4 @@
-//! What runs and other commands write, where something is there already: another run's file, somebody's own, a link.
+//! Outputs of runs and other commands in place of a file: another run's, a user's own, a link.
 
 use crate::laps;
 use crate::nodes::{manifest, sender, table};
@@ -16,7 +16,7 @@ fn short(place: &Place) -> String {
     place.write("short.toml", manifest(50, &[sender("source", 1, "")]))
 }
 
-/// What refuses a second run: the first one's name and process, and what to do.
+/// Requires that a second run is refused with the first one's name and process, and with advice.
 fn require_named(refused: &Ended, first: &Launch<'_>, run_id: &str, advice: &str) {
     assert_eq!(refused.code, Some(2), "{refused}");
     let launcher = format!("(launcher {})", first.id());

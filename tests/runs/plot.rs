@@ -24,7 +24,7 @@ fn refused(ended: Ended, message: &str) {
     ended.with_code(2).says(&[message]);
 }
 
-/// What a page draws, as it holds it.
+/// Returns the data that a page draws, as the page holds it.
 fn page(path: &str) -> Value {
     let text = fs::read_to_string(path).unwrap();
     let (_, data) = text.split_once("<script type=\"application/json\" id=\"data\">").unwrap();

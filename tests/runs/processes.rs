@@ -128,7 +128,7 @@ fn niceness_and_generation_reach_the_process() {
     assert!(environment.split('\0').any(|variable| variable == "HUMMINGBUS_GENERATION=0"), "{environment}");
 }
 
-/// What `look` finds in the folder of /proc of the IMU, amid a long run of `text`.
+/// Returns the result of `look` for the folder of /proc of the IMU, amid a long run of `text`.
 fn running<T>(place: &Place, text: &str, look: impl Fn(&str) -> T) -> T {
     let text = text.replace("duration_s = 0.1", "duration_s = 60\npace = \"realtime\"");
     let mut launch = place.start(&["run", &place.write("running.toml", text)]);

@@ -12,7 +12,7 @@ use std::process::Command;
 use std::{env, fs};
 use vehicles::Vehicle;
 
-/// What hides newer instructions from glibc, whose functions for older processors are taken then.
+/// Setting that hides newer instructions from glibc, whose functions for older processors are taken then.
 const OLDER: (&str, &str) = ("GLIBC_TUNABLES", "glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4,-AVX2_Usable,-FMA_Usable");
 
 /// Ticks of a flight: behind the first differences that functions of the C library made, at tick 420 (ten vehicles) to
@@ -37,7 +37,7 @@ const ALIKE: [&str; 7] = [
 /// (docs/decisions/009-numbers.md).
 const ALLOWED: [(&str, &str); 3] = [("log2", "controller"), ("log2", "plant"), ("acos", "plant")];
 
-/// Where the witness, `c_library.c`, writes which functions are called.
+/// Names the file to which the witness, `c_library.c`, writes the functions that are called.
 const CALLS: &str = "HUMMINGBUS_TEST_CALLS";
 /// Asks this program for the C library's values.
 const ASKED: &str = "HUMMINGBUS_TEST_C_LIBRARY";
@@ -123,8 +123,8 @@ fn difference(place: &Place, args: &[String]) -> Option<String> {
     })
 }
 
-/// Whether a line of the witness changes nothing of a recording: that a process has begun, one of [`ALLOWED`], or what
-/// the launcher calls for its progress bar and its tables.
+/// True if a line of the witness changes nothing of a recording: the start of a process, one of [`ALLOWED`], or a call
+/// of the launcher for its progress bar and its tables.
 fn is_allowed(line: &str) -> bool {
     let (function, node) = line.split_once(' ').unwrap();
     function == "loaded"

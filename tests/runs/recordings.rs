@@ -26,7 +26,7 @@ pub fn first_tick(path: &str) -> u64 {
     open(path).messages().map(|record| u64::from(record.unwrap().tick)).min().unwrap()
 }
 
-/// All messages of the recording at `path`.
+/// Returns all messages of the recording at `path`.
 #[track_caller]
 pub fn topics(path: &str) -> Topics {
     let recording = open(path);

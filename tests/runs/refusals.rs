@@ -220,7 +220,7 @@ fn a_cycle_without_delay() {
     assert!(cycles.iter().any(|cycle| names_cycle(&ended, cycle)), "{ended}");
 }
 
-/// Whether a cycle is named in the direction of the data, from any of its nodes on.
+/// True if a cycle is named in the direction of the data, from any of its nodes on.
 fn names_cycle(ended: &Ended, nodes: &[&str]) -> bool {
     (0..nodes.len()).any(|start| {
         let path: Vec<_> = (0..=nodes.len()).map(|step| nodes[(start + step) % nodes.len()]).collect();

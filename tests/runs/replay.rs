@@ -9,7 +9,7 @@ use std::path::Path;
 
 const MANIFEST: &str = "manifests/replay-nanobench.toml";
 const FLIGHT: &str = "nanobench/B3_figure8_fast_rep1.csv";
-/// Where in the flight tick 0 lies: the manifest's `from_s`.
+/// Time of tick 0 in the flight: the manifest's `from_s`.
 const FROM_S: f64 = 6.0;
 /// The plants with the length of their windows.
 const PLANTS: [(&str, u32); 3] = [("plant-100ms", 100), ("plant-500ms", 500), ("plant-1s", 1000)];

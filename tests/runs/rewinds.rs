@@ -4,7 +4,7 @@ use crate::recordings::first_tick;
 use crate::support::{Place, repository};
 use std::fs;
 
-/// What a request is answered with, as JSON.
+/// Returns the answer to a request, as JSON.
 fn ctl(place: &Place, run: &str, args: &[&str]) -> serde_json::Value {
     let all = [&["ctl"], args, &["--run", run, "--json"]].concat();
     place.start(&all).end_among_others().with_code(0).json()

@@ -1,4 +1,4 @@
-//! What a run asks of the system and may not have is refused, with the right that it takes.
+//! Requests to the system that a run has no right to are refused with the name of the right.
 
 use crate::skipped::skip;
 use crate::support::{Ended, HUMMINGBUS, Place, repository};

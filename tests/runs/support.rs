@@ -25,7 +25,7 @@ pub fn repository(path: &str) -> String {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(path).to_string_lossy().into_owned()
 }
 
-/// Where a broken run leaves what it recorded to `recording`, whose own place it must not have taken.
+/// Returns the path of the recording of a broken run, which must not have taken the place of `recording` itself.
 #[track_caller]
 pub fn partial(recording: &str) -> String {
     assert!(!Path::new(recording).exists(), "a broken run has put its recording into its place");
@@ -168,7 +168,7 @@ impl Place {
         entries(&self.temporary())
     }
 
-    /// What the runs of `launcher` left, and everything in the folder for temporary files.
+    /// Returns the processes and files that the runs of `launcher` left, and all entries for temporary files.
     pub fn left_behind(&self, launcher: u32) -> Vec<String> {
         let processes = self.processes().into_iter().map(|(pid, node)| format!("process {pid:?} ({node})"));
         let files = entries(&self.temporary()).into_iter().chain(shared_memory(launcher));
@@ -290,7 +290,7 @@ impl Launch<'_> {
         SupervisorView::open(&Plan::load(self.place.run_dirs().first()?).ok()?).ok()
     }
 
-    /// What the run's own control segment says; `None` while it is not there yet.
+    /// Returns the completed ticks by the run's own control segment; `None` while it is not there yet.
     fn completed_ticks(&self) -> Option<u32> {
         self.control().map(|control| control.completed_ticks())
     }
@@ -312,7 +312,7 @@ impl Launch<'_> {
         fs::read_to_string(&self.error).unwrap_or_default()
     }
 
-    /// Whether it has ended.
+    /// True if the launch has ended.
     pub fn has_ended(&mut self) -> bool {
         self.status = self.status.or_else(|| self.child.try_wait().unwrap());
         self.status.is_some()
@@ -403,7 +403,7 @@ impl Ended {
         self
     }
 
-    /// Whether nothing but warnings was said.
+    /// True if standard error holds nothing but warnings.
     pub fn is_quiet(&self) -> bool {
         let is_of_a_warning = |line: &str| line.starts_with("warning: ") || line.starts_with("  help: ");
         self.error.lines().all(is_of_a_warning)

@@ -240,7 +240,7 @@ fn held(place: &Place) -> (usize, usize) {
     (descriptors, files.filter(|file| file.file_name().to_string_lossy().starts_with(&prefix)).count())
 }
 
-/// What is held once it does not change any more.
+/// Returns the numbers of [`held`] once they do not change any more.
 fn settled(place: &Place) -> (usize, usize) {
     let mut last = held(place);
     let mut unchanged = 0;

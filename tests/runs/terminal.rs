@@ -52,7 +52,7 @@ impl Terminal {
         kill_process(Pid::from_child(&self.child), signal).unwrap();
     }
 
-    /// What stands on the screen.
+    /// Returns the text on the screen.
     pub fn content(&self) -> String {
         self.screen.lock().unwrap().screen().contents()
     }
@@ -65,7 +65,7 @@ impl Terminal {
         });
     }
 
-    /// Whether the screen is the program's own, which it gives back when it leaves.
+    /// True if the screen is the program's own, which it gives back when it leaves.
     pub fn is_taken(&self) -> bool {
         self.screen.lock().unwrap().screen().alternate_screen()
     }

@@ -40,7 +40,7 @@ impl Parameters {
         if keys.is_empty() { "none".to_owned() } else { keys.join(", ") }
     }
 
-    /// All of them, which count as read.
+    /// Returns all parameters, which then count as read.
     pub fn all(&mut self) -> &Value {
         self.read.extend(self.value.as_object().into_iter().flatten().map(|(key, _)| key.clone()));
         &self.value

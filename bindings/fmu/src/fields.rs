@@ -21,7 +21,7 @@ pub struct Field {
     pub sequence: Option<(usize, usize)>,
 }
 
-/// All numbers of the messages of `schema`, in memory order. Texts are left out.
+/// Returns all numbers of the messages of `schema`, in memory order. Texts are left out.
 pub fn all(schema: &'static Schema) -> Vec<Field> {
     let mut fields = Vec::new();
     add_message(schema, "", "", 0, &mut fields);

@@ -1,4 +1,4 @@
-//! Which variable of the FMU is which field of which port.
+//! Wiring of the variables of the FMU to the fields of the ports.
 
 use crate::description::{Causality, Description, Variable, Version};
 use crate::fields::{self, Field};

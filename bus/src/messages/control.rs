@@ -55,7 +55,7 @@ pub struct RcChannels {
     pub pulse: Bounded<f64, RC_CHANNELS_MAX>,
 }
 
-/// What a controller did at a tick: what it asked for, what the rotors could give, what state it is in.
+/// Status of a controller at a tick: its set points, its demand, the part of it that the rotors make, and its state.
 #[derive(Clone, Copy, Debug, Default, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/ControlStatus")]

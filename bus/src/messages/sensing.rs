@@ -6,7 +6,7 @@
 use super::{PerRotor, Quaternion, Time, Vector3};
 use crate::Message;
 
-/// What a satellite receiver reports, in the world's axes.
+/// Reading of a satellite receiver, in the world's axes.
 #[derive(Clone, Copy, Debug, Default, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/Gps")]
@@ -30,7 +30,7 @@ pub struct Gps {
     pub pad0: u32,
 }
 
-/// What a barometer reports.
+/// Reading of a barometer.
 #[derive(Clone, Copy, Debug, Default, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/Barometer")]
@@ -54,7 +54,7 @@ pub struct Barometer {
     pub pad0: u32,
 }
 
-/// What a magnetometer reports.
+/// Reading of a magnetometer.
 #[derive(Clone, Copy, Debug, Default, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/Magnetometer")]
@@ -75,7 +75,7 @@ pub struct Magnetometer {
     pub pad0: u32,
 }
 
-/// What a motion-capture system reports.
+/// Reading of a motion-capture system.
 #[derive(Clone, Copy, Debug, Default, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/Mocap")]
@@ -99,7 +99,7 @@ pub struct Mocap {
     pub pad0: u32,
 }
 
-/// What five range finders report, in the order +x, -x, +y, -y of the body, and down.
+/// Readings of five range finders, in the order +x, -x, +y, -y of the body, and down.
 #[derive(Clone, Copy, Debug, Default, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/Ranges")]
@@ -120,7 +120,7 @@ pub struct Ranges {
     pub pad0: u32,
 }
 
-/// What the controllers of the motors report.
+/// Readings of the motor controllers.
 #[derive(Clone, Copy, Debug, Default, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/RotorSpeeds")]
@@ -157,7 +157,7 @@ pub struct Battery {
     /// Current drawn.
     #[field(unit = "A")]
     pub current: f64,
-    /// What is left of the capacity, 0 to 1.
+    /// Remaining part of the capacity, 0 to 1.
     #[field(unit = "1")]
     pub charge: f64,
     /// 1 if this sample holds a measurement, 0 if it was lost or the plant has no model of its battery.
@@ -168,7 +168,7 @@ pub struct Battery {
     pub pad0: u32,
 }
 
-/// What the plant touches, whatever else is in the scene.
+/// Contacts of the plant with the ground, the scene's things and other vehicles.
 #[derive(Clone, Copy, Debug, Default, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/Contact")]
@@ -185,7 +185,7 @@ pub struct Contact {
     /// Number of things touched: the ground, boxes, other vehicles.
     #[field(unit = "1")]
     pub count: u32,
-    /// What is touched first: 0 nothing, 1 the ground, 2 + i the scene's thing i (boxes first, then meshes), 1000 + i the other vehicle i.
+    /// Object of the first contact: 0 nothing, 1 the ground, 2 + i the scene's thing i (boxes first, then meshes), 1000 + i the other vehicle i.
     #[field(unit = "1")]
     pub object: u32,
     /// Contacts that began since the run started, resting on the ground at the start left out.
@@ -196,7 +196,7 @@ pub struct Contact {
     pub crashed: u32,
 }
 
-/// How far a vehicle truly is from what stands in the scene: for judging and plotting, not for controllers.
+/// True distances from a vehicle to the things of the scene: for judging and plotting, not for controllers.
 #[derive(Clone, Copy, Debug, Default, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/Clearance")]
@@ -223,14 +223,14 @@ pub struct Clearance {
     pub pad0: u32,
 }
 
-/// Where the vehicles of a run are, for those that share a room.
+/// Positions and velocities of the vehicles of a run, for vehicles that share a room.
 #[derive(Clone, Copy, Debug, Default, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/Traffic")]
 pub struct Traffic {
     /// Simulation time.
     pub stamp: Time,
-    /// How many vehicles there are.
+    /// Number of vehicles.
     #[field(unit = "1")]
     pub count: u32,
     /// Zero.
@@ -244,14 +244,14 @@ pub struct Traffic {
     pub velocity: [Vector3; 32],
 }
 
-/// Where the free bodies of a scene are, and how they move, in the order of the scene: those beyond `count` are zeros.
+/// Poses and velocities of the free bodies of a scene, in the order of the scene: those beyond `count` are zeros.
 #[derive(Clone, Copy, Debug, Default, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/BodyStates")]
 pub struct BodyStates {
     /// Simulation time.
     pub stamp: Time,
-    /// How many bodies there are.
+    /// Number of bodies.
     #[field(unit = "1")]
     pub count: u32,
     /// Zero.
@@ -274,7 +274,7 @@ pub struct BodyStates {
     pub angular_velocity: [Vector3; 16],
 }
 
-/// What an estimator believes of the vehicle's motion.
+/// Estimate of the vehicle's motion.
 #[derive(Clone, Copy, Debug, Default, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/StateEstimate")]
@@ -304,7 +304,7 @@ pub struct StateEstimate {
     pub attitude_sigma: Vector3,
 }
 
-/// How well an estimator's predictions met its measurements: the last update of each sensor.
+/// Agreement of an estimator's predictions with its measurements: the last update of each sensor.
 #[derive(Clone, Copy, Debug, Default, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/Innovation")]
@@ -325,7 +325,7 @@ pub struct Innovation {
     pub refused: [u32; 4],
 }
 
-/// What an estimator makes of range finders: level distances to what stands around.
+/// Estimate from range finders: level distances to the surroundings, height and velocity.
 #[derive(Clone, Copy, Debug, Default, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/WallEstimate")]

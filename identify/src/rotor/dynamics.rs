@@ -73,7 +73,7 @@ pub struct Comparison {
     pub first_minus_second: Option<MeanInterval>,
     /// The second only if its error is smaller beyond the interval, since it has a parameter more.
     pub preferred: Order,
-    /// Why.
+    /// Reason of the preference.
     pub reason: &'static str,
 }
 

@@ -1,4 +1,4 @@
-// What flights show that the declared model lacks, and the residuals behind it.
+// Effects that flights show and the declared model lacks, and the residuals behind them.
 
 const report = data.report;
 
@@ -66,7 +66,7 @@ function drawSummary() {
 function drawFlights() {
   fillTable("flights", [left("flight"), left("used to"), "compared [s]", "windows [s]", left("equations")], report.flights.map((flight) =>
     [left(flight.name), left(flight.role), flight.compared_s.toFixed(1), flight.window_s.toFixed(3), long(list(flight.equations.map(spaced)))]));
-  // What the reader noticed; what holds for several flights is said once.
+  // Notes of the reader; a note that holds for several flights is shown once.
   const flightsOf = new Map();
   for (const { name, assumed, notes } of report.flights) {
     for (const note of [...assumed.map((what) => `assumed: ${what}`), ...notes]) flightsOf.set(note, [...(flightsOf.get(note) ?? []), name]);
@@ -178,7 +178,7 @@ function drawWhiteness() {
       grouped(spaced(name), MODELS.map((model) => cells(model, report.whiteness[model][name])))));
 }
 
-// What is chosen: a flight, an equation of it, a component of that, and what it is looked at against.
+// Returns the choice: a flight, an equation of it, a component of that, and the input that it is drawn over.
 function chosen() {
   const flight = data.flights[element("flight").value];
   const equation = flight.equations[element("equation").value];
@@ -204,7 +204,7 @@ function cloud(x, y, key, hovertemplate) {
   return { mode: "markers", name: NAMES[key], x, y, marker: { color: COLOURS[key], size: 4, opacity: 0.5 }, hovertemplate };
 }
 
-// What a model says: the measured less its residual.
+// Prediction of a model: the measured values less its residual.
 const predicted = (curve, model) => curve.measured.map((value, at) => value - curve[model][at]);
 
 function drawOverTime({ equation, component: { name, curve }, unit }) {

@@ -1,4 +1,4 @@
-// What every page is made of: its data, numbers as people read them, tables, legends, choices and plots.
+// Parts of every page: its data, numbers as people read them, tables, legends, choices and plots.
 "use strict";
 
 const data = JSON.parse(document.getElementById("data").textContent);

@@ -2,7 +2,7 @@
 
 const SPACE = config(["toImage", "zoom3d", "pan3d", "orbitRotation", "tableRotation", "resetCameraDefault3d"]);
 const SOLID = "#787878";
-// Which line lies upon which: an estimator's noise must not hide what was flown, nor this what was asked for.
+// Layers of the lines: an estimator's noise must not hide the flown line, nor that the line that was asked for.
 const LAYERS = { estimated: 1, measured: 1, flown: 2, asked: 3 };
 const LEGEND = { x: 1.01, y: 1, font: { size: 12 }, itemwidth: 30 };
 // So wide that the longest name has room, and the same for all plots: their axes of time are then as long.
@@ -12,7 +12,7 @@ const LEGEND_WIDTH = 7 * Math.max(12, ...data.panels.flatMap((panel) => panel.ax
 const trails = [...data.trails].sort((a, b) => LAYERS[a.role] - LAYERS[b.role]);
 const column = (rows, index) => rows.map((row) => row[index]);
 
-// What is beside the flown line is darker, to be told from it.
+// Returns a darker colour, for lines beside the flown line.
 function darker(colour) {
   const parts = [1, 3, 5].map((at) => Math.floor(parseInt(colour.slice(at, at + 2), 16) / 2));
   return `rgb(${parts.join(",")})`;

@@ -1,4 +1,4 @@
-// Where the host time of a run's ticks goes.
+// Host time of a run's ticks, by its use.
 
 const profile = data.profile;
 

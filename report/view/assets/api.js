@@ -19,7 +19,7 @@ async function numbers(path, request, signal) {
   return { values, read: Number(response.headers.get("x-read")) };
 }
 
-/** All that is known of the recordings before values are asked for. */
+/** Facts of the recordings that are known before values are asked for. */
 export async function catalogue() {
   return (await answered("api/catalogue")).json();
 }

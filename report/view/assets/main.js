@@ -175,7 +175,7 @@ async function start() {
   playback.seek((Number(asked.get("t")) - recordings[0].start_s) * 1e9 || 0);
   playback.isGrowing = recordings.some((recording) => recording.is_growing);
   if (playback.isGrowing && !asked.has("t")) {
-    // What is live is seen at its newest, and goes on.
+    // A live recording is shown at its newest time, and goes on.
     playback.seek(durationNs);
     playback.toggle();
   }

@@ -87,7 +87,7 @@ pub enum Answer {
     Status(Status),
     /// The request was not carried out.
     Refused {
-        /// Why.
+        /// Reason of the refusal.
         reason: String,
     },
 }

@@ -48,7 +48,7 @@ pub struct EkfState {
     readings: Readings,
 }
 
-/// What it remembers besides the last readings.
+/// State of the filter besides the last readings.
 #[derive(Clone, Copy, Debug, PartialEq, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/EkfKept")]
@@ -62,7 +62,7 @@ pub struct Kept {
     covariance: [f64; STATES * STATES],
     /// The motion at the newest reading.
     present: Motion,
-    /// What the errors do from the filter's time to the newest reading.
+    /// Transition of the errors from the filter's time to the newest reading.
     since: Transition,
     /// Measurements that wait.
     waiting: Waiting,

@@ -212,7 +212,7 @@ pub struct Measurement {
     /// When it was measured.
     #[field(unit = "ns")]
     pub measured_ns: u64,
-    /// What was measured: position and velocity, position and quaternion, altitude, or field.
+    /// Measured values: position and velocity, position and quaternion, altitude, or field.
     #[field(unit = "")]
     pub values: [f64; 7],
     /// The sensor's place in `Source::ALL`.

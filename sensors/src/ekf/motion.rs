@@ -29,7 +29,7 @@ pub struct Motion {
     /// Bias of the accelerometer.
     #[field(unit = "m/s^2", frame = "body")]
     pub accelerometer_bias: Vector3Message,
-    /// How far GPS positions have drifted.
+    /// Drift of GPS positions.
     #[field(unit = "m", frame = "world")]
     pub gps_drift: Vector3Message,
     /// Bias of the barometer.

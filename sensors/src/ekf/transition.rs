@@ -41,7 +41,7 @@ pub(crate) type MotionCovariance = SMatrix<f64, MOTION, MOTION>;
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/EkfTransition")]
 pub struct Transition {
-    /// How long.
+    /// Length of that time.
     #[field(unit = "s")]
     time: f64,
     /// Specific force, once and twice over time.

@@ -14,7 +14,7 @@ pub(super) const AHEAD: usize = 3;
 type Mean = SVector<f64, STATES>;
 type Covariance = SMatrix<f64, STATES, STATES>;
 
-/// What the filter knows of one axis.
+/// Estimate along one axis.
 #[derive(Clone, Copy, Debug, PartialEq, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/RangeInertialAxis")]
@@ -22,7 +22,7 @@ pub struct Axis {
     /// Velocity.
     #[field(unit = "m/s", frame = "world")]
     pub velocity: f64,
-    /// What is wrong with the acceleration that is fed in.
+    /// Error of the acceleration that is fed in.
     #[field(unit = "m/s^2", frame = "world")]
     pub bias: f64,
     /// Displacement since the start.

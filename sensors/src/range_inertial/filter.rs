@@ -66,7 +66,7 @@ const START_SIGMA_M: f64 = 0.05;
 /// A reading longer than this part of the beam's way to the floor may be the floor's.
 const FLOOR_MARGIN: f64 = 0.9;
 
-/// Where the vehicle was at a sample.
+/// Pose of the vehicle at a sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/RangeInertialPast")]
@@ -79,7 +79,7 @@ struct Past {
     attitude: Quaternion,
 }
 
-/// What the estimator remembers, as it is handed over.
+/// State of the estimator, as it is handed over.
 #[derive(Clone, Copy, Debug, PartialEq, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/RangeInertialState")]
@@ -106,7 +106,7 @@ pub struct RangeInertialState {
     acceleration: Vector3Message,
     /// The axes of the world; the ground is behind the third.
     axes: [Axis; 3],
-    /// What the velocity gained.
+    /// Gains of the velocity.
     gains: Gains,
     /// The last samples, sample k at the place k modulo the number of places.
     past: [Past; PAST],

@@ -18,7 +18,7 @@ HUMMINGBUS_MESSAGE(Cells, "test_msgs/msg/Cells", "Voltages of a battery.",
                    HUMMINGBUS_FIELD(voltage, "V", "", "Voltage at the terminals."),
                    HUMMINGBUS_FIELD(cells, "V", "", "Voltages of the cells."));
 
-// What SetPoint was before a field was added.
+// SetPoint as it was before a field was added.
 struct OldSetPoint {
   Time stamp{};
   double altitude{};

@@ -6,7 +6,7 @@ use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
 
-/// What `topics` takes.
+/// Arguments of `topics`.
 #[derive(Args)]
 pub struct TopicsArguments {
     /// The recording.

@@ -1,9 +1,9 @@
-//! How fast a vehicle rises.
+//! Rate at which a vehicle rises.
 
 use super::Time;
 use bus::Message;
 
-/// What a variometer reads.
+/// Reading of a variometer.
 #[derive(Clone, Copy, Debug, Default, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/Climb")]

@@ -20,7 +20,7 @@
 
 namespace hummingbus {
 
-// What went wrong, in words. `is_abort` where the launcher ended the run early, and knows why.
+// A failure, in words. `is_abort` is true if the launcher ended the run early, and knows the reason.
 class Error : public std::runtime_error {
  public:
   explicit Error(const std::string& text, bool is_abort = false) : std::runtime_error(text), is_abort_(is_abort) {}
@@ -147,7 +147,7 @@ class Tick {
     if (T* memory = this->output(output)) *memory = message;
   }
 
-  // What the process whose place this one takes sent last, where no state was handed over; null at every other tick.
+  // The last message of the process whose place this one takes, if no state was handed over; null at every other tick.
   template <typename T>
   const T* predecessor(Output<T> output) const {
     return static_cast<const T*>(hb_tick_predecessor(tick_, output.number));

@@ -89,7 +89,7 @@ static const HbField HB_ATTITUDE_ESTIMATE_FIELDS[] = {
 
 static const HbMessage HB_ATTITUDE_ESTIMATE = { "hummingbus_msgs/msg/AttitudeEstimate", "Estimated attitude and angular velocity.", sizeof(HbAttitudeEstimate), HB_ATTITUDE_ESTIMATE_FIELDS, 6 };
 
-// What a barometer reports.
+// Reading of a barometer.
 typedef struct HbBarometer {
   // Simulation time of sending.
   HbTime stamp;
@@ -114,7 +114,7 @@ static const HbField HB_BAROMETER_FIELDS[] = {
   { "pad0", "Zero.", "", "", offsetof(HbBarometer, pad0), HB_U32, NULL, 0, 0, 0 },
 };
 
-static const HbMessage HB_BAROMETER = { "hummingbus_msgs/msg/Barometer", "What a barometer reports.", sizeof(HbBarometer), HB_BAROMETER_FIELDS, 6 };
+static const HbMessage HB_BAROMETER = { "hummingbus_msgs/msg/Barometer", "Reading of a barometer.", sizeof(HbBarometer), HB_BAROMETER_FIELDS, 6 };
 
 // Voltage and current of the battery, true or measured.
 typedef struct HbBattery {
@@ -126,7 +126,7 @@ typedef struct HbBattery {
   double voltage;
   // Current drawn. [A]
   double current;
-  // What is left of the capacity, 0 to 1. [1]
+  // Remaining part of the capacity, 0 to 1. [1]
   double charge;
   // 1 if this sample holds a measurement, 0 if it was lost or the plant has no model of its battery. [1]
   uint32_t valid;
@@ -139,18 +139,18 @@ static const HbField HB_BATTERY_FIELDS[] = {
   { "measured_ns", "Simulation time at which it was measured.", "ns", "", offsetof(HbBattery, measured_ns), HB_U64, NULL, 0, 0, 0 },
   { "voltage", "Voltage at the terminals.", "V", "", offsetof(HbBattery, voltage), HB_F64, NULL, 0, 0, 0 },
   { "current", "Current drawn.", "A", "", offsetof(HbBattery, current), HB_F64, NULL, 0, 0, 0 },
-  { "charge", "What is left of the capacity, 0 to 1.", "1", "", offsetof(HbBattery, charge), HB_F64, NULL, 0, 0, 0 },
+  { "charge", "Remaining part of the capacity, 0 to 1.", "1", "", offsetof(HbBattery, charge), HB_F64, NULL, 0, 0, 0 },
   { "valid", "1 if this sample holds a measurement, 0 if it was lost or the plant has no model of its battery.", "1", "", offsetof(HbBattery, valid), HB_U32, NULL, 0, 0, 0 },
   { "pad0", "Zero.", "", "", offsetof(HbBattery, pad0), HB_U32, NULL, 0, 0, 0 },
 };
 
 static const HbMessage HB_BATTERY = { "hummingbus_msgs/msg/Battery", "Voltage and current of the battery, true or measured.", sizeof(HbBattery), HB_BATTERY_FIELDS, 7 };
 
-// Where the free bodies of a scene are, and how they move, in the order of the scene: those beyond `count` are zeros.
+// Poses and velocities of the free bodies of a scene, in the order of the scene: those beyond `count` are zeros.
 typedef struct HbBodyStates {
   // Simulation time.
   HbTime stamp;
-  // How many bodies there are. [1]
+  // Number of bodies. [1]
   uint32_t count;
   // Zero.
   uint32_t pad0;
@@ -168,7 +168,7 @@ typedef struct HbBodyStates {
 
 static const HbField HB_BODY_STATES_FIELDS[] = {
   { "stamp", "Simulation time.", "", "", offsetof(HbBodyStates, stamp), HB_NESTED, &HB_TIME, 0, 0, 0 },
-  { "count", "How many bodies there are.", "1", "", offsetof(HbBodyStates, count), HB_U32, NULL, 0, 0, 0 },
+  { "count", "Number of bodies.", "1", "", offsetof(HbBodyStates, count), HB_U32, NULL, 0, 0, 0 },
   { "pad0", "Zero.", "", "", offsetof(HbBodyStates, pad0), HB_U32, NULL, 0, 0, 0 },
   { "object", "Their numbers among the things of the scene, as `Contact` counts them: 2 + i of the thing i.", "1", "", offsetof(HbBodyStates, object), HB_U32, NULL, 16, 0, 0 },
   { "position", "Positions of their centres of mass.", "m", "world", offsetof(HbBodyStates, position), HB_NESTED, &HB_VECTOR3, 16, 0, 0 },
@@ -177,9 +177,9 @@ static const HbField HB_BODY_STATES_FIELDS[] = {
   { "angular_velocity", "Angular velocities.", "rad/s", "world", offsetof(HbBodyStates, angular_velocity), HB_NESTED, &HB_VECTOR3, 16, 0, 0 },
 };
 
-static const HbMessage HB_BODY_STATES = { "hummingbus_msgs/msg/BodyStates", "Where the free bodies of a scene are, and how they move, in the order of the scene: those beyond `count` are zeros.", sizeof(HbBodyStates), HB_BODY_STATES_FIELDS, 8 };
+static const HbMessage HB_BODY_STATES = { "hummingbus_msgs/msg/BodyStates", "Poses and velocities of the free bodies of a scene, in the order of the scene: those beyond `count` are zeros.", sizeof(HbBodyStates), HB_BODY_STATES_FIELDS, 8 };
 
-// How far a vehicle truly is from what stands in the scene: for judging and plotting, not for controllers.
+// True distances from a vehicle to the things of the scene: for judging and plotting, not for controllers.
 typedef struct HbClearance {
   // Simulation time.
   HbTime stamp;
@@ -207,9 +207,9 @@ static const HbField HB_CLEARANCE_FIELDS[] = {
   { "pad0", "Zero.", "", "", offsetof(HbClearance, pad0), HB_U32, NULL, 0, 0, 0 },
 };
 
-static const HbMessage HB_CLEARANCE = { "hummingbus_msgs/msg/Clearance", "How far a vehicle truly is from what stands in the scene: for judging and plotting, not for controllers.", sizeof(HbClearance), HB_CLEARANCE_FIELDS, 7 };
+static const HbMessage HB_CLEARANCE = { "hummingbus_msgs/msg/Clearance", "True distances from a vehicle to the things of the scene: for judging and plotting, not for controllers.", sizeof(HbClearance), HB_CLEARANCE_FIELDS, 7 };
 
-// What the plant touches, whatever else is in the scene.
+// Contacts of the plant with the ground, the scene's things and other vehicles.
 typedef struct HbContact {
   // Simulation time.
   HbTime stamp;
@@ -219,7 +219,7 @@ typedef struct HbContact {
   double impact_speed;
   // Number of things touched: the ground, boxes, other vehicles. [1]
   uint32_t count;
-  // What is touched first: 0 nothing, 1 the ground, 2 + i the scene's thing i (boxes first, then meshes), 1000 + i the other vehicle i. [1]
+  // Object of the first contact: 0 nothing, 1 the ground, 2 + i the scene's thing i (boxes first, then meshes), 1000 + i the other vehicle i. [1]
   uint32_t object;
   // Contacts that began since the run started, resting on the ground at the start left out. [1]
   uint32_t began;
@@ -232,14 +232,14 @@ static const HbField HB_CONTACT_FIELDS[] = {
   { "force", "Sum of the contact forces over the last tick.", "N", "world", offsetof(HbContact, force), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
   { "impact_speed", "Speed of approach just before the newest impact: a part of the vehicle, a foot or the disc of propellers, touched something that it had not touched. The fastest of those within a tick; 0 without a contact.", "m/s", "", offsetof(HbContact, impact_speed), HB_F64, NULL, 0, 0, 0 },
   { "count", "Number of things touched: the ground, boxes, other vehicles.", "1", "", offsetof(HbContact, count), HB_U32, NULL, 0, 0, 0 },
-  { "object", "What is touched first: 0 nothing, 1 the ground, 2 + i the scene's thing i (boxes first, then meshes), 1000 + i the other vehicle i.", "1", "", offsetof(HbContact, object), HB_U32, NULL, 0, 0, 0 },
+  { "object", "Object of the first contact: 0 nothing, 1 the ground, 2 + i the scene's thing i (boxes first, then meshes), 1000 + i the other vehicle i.", "1", "", offsetof(HbContact, object), HB_U32, NULL, 0, 0, 0 },
   { "began", "Contacts that began since the run started, resting on the ground at the start left out.", "1", "", offsetof(HbContact, began), HB_U32, NULL, 0, 0, 0 },
   { "crashed", "1 from the first impact on that was faster than the vehicle bears.", "1", "", offsetof(HbContact, crashed), HB_U32, NULL, 0, 0, 0 },
 };
 
-static const HbMessage HB_CONTACT = { "hummingbus_msgs/msg/Contact", "What the plant touches, whatever else is in the scene.", sizeof(HbContact), HB_CONTACT_FIELDS, 7 };
+static const HbMessage HB_CONTACT = { "hummingbus_msgs/msg/Contact", "Contacts of the plant with the ground, the scene's things and other vehicles.", sizeof(HbContact), HB_CONTACT_FIELDS, 7 };
 
-// What a controller did at a tick: what it asked for, what the rotors could give, what state it is in.
+// Status of a controller at a tick: its set points, its demand, the part of it that the rotors make, and its state.
 typedef struct HbControlStatus {
   // Simulation time.
   HbTime stamp;
@@ -285,9 +285,9 @@ static const HbField HB_CONTROL_STATUS_FIELDS[] = {
   { "pad0", "Zero.", "", "", offsetof(HbControlStatus, pad0), HB_U32, NULL, 0, 0, 0 },
 };
 
-static const HbMessage HB_CONTROL_STATUS = { "hummingbus_msgs/msg/ControlStatus", "What a controller did at a tick: what it asked for, what the rotors could give, what state it is in.", sizeof(HbControlStatus), HB_CONTROL_STATUS_FIELDS, 13 };
+static const HbMessage HB_CONTROL_STATUS = { "hummingbus_msgs/msg/ControlStatus", "Status of a controller at a tick: its set points, its demand, the part of it that the rotors make, and its state.", sizeof(HbControlStatus), HB_CONTROL_STATUS_FIELDS, 13 };
 
-// What a satellite receiver reports, in the world's axes.
+// Reading of a satellite receiver, in the world's axes.
 typedef struct HbGps {
   // Simulation time of sending.
   HbTime stamp;
@@ -312,9 +312,9 @@ static const HbField HB_GPS_FIELDS[] = {
   { "pad0", "Zero.", "", "", offsetof(HbGps, pad0), HB_U32, NULL, 0, 0, 0 },
 };
 
-static const HbMessage HB_GPS = { "hummingbus_msgs/msg/Gps", "What a satellite receiver reports, in the world's axes.", sizeof(HbGps), HB_GPS_FIELDS, 6 };
+static const HbMessage HB_GPS = { "hummingbus_msgs/msg/Gps", "Reading of a satellite receiver, in the world's axes.", sizeof(HbGps), HB_GPS_FIELDS, 6 };
 
-// What an inertial measurement unit reports.
+// Reading of an inertial measurement unit.
 typedef struct HbImu {
   // Simulation time.
   HbTime stamp;
@@ -330,9 +330,9 @@ static const HbField HB_IMU_FIELDS[] = {
   { "angular_velocity", "Measured angular velocity.", "rad/s", "body", offsetof(HbImu, angular_velocity), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
 };
 
-static const HbMessage HB_IMU = { "hummingbus_msgs/msg/Imu", "What an inertial measurement unit reports.", sizeof(HbImu), HB_IMU_FIELDS, 3 };
+static const HbMessage HB_IMU = { "hummingbus_msgs/msg/Imu", "Reading of an inertial measurement unit.", sizeof(HbImu), HB_IMU_FIELDS, 3 };
 
-// How well an estimator's predictions met its measurements: the last update of each sensor.
+// Agreement of an estimator's predictions with its measurements: the last update of each sensor.
 typedef struct HbInnovation {
   // Simulation time.
   HbTime stamp;
@@ -354,9 +354,9 @@ static const HbField HB_INNOVATION_FIELDS[] = {
   { "refused", "Measurements refused as outliers so far.", "1", "", offsetof(HbInnovation, refused), HB_U32, NULL, 4, 0, 0 },
 };
 
-static const HbMessage HB_INNOVATION = { "hummingbus_msgs/msg/Innovation", "How well an estimator's predictions met its measurements: the last update of each sensor.", sizeof(HbInnovation), HB_INNOVATION_FIELDS, 5 };
+static const HbMessage HB_INNOVATION = { "hummingbus_msgs/msg/Innovation", "Agreement of an estimator's predictions with its measurements: the last update of each sensor.", sizeof(HbInnovation), HB_INNOVATION_FIELDS, 5 };
 
-// What a link says of itself, from its first tick on; arrays by the names of the streams.
+// Statistics of a link, from its first tick on; arrays by the names of the streams.
 typedef struct HbLinkStatistics {
   // Simulation time.
   HbTime stamp;
@@ -366,7 +366,7 @@ typedef struct HbLinkStatistics {
   uint32_t queued_bytes;
   // Messages that wait for the wire. [1]
   uint32_t queued;
-  // How long the message that arrived last had taken since it was queued. [s]
+  // Time from queueing to arrival of the message that arrived last. [s]
   double delay;
   // Messages that are on the wire or behind it. [1]
   uint32_t under_way;
@@ -389,7 +389,7 @@ static const HbField HB_LINK_STATISTICS_FIELDS[] = {
   { "sent_bytes", "Whole bytes that the wire has carried.", "1", "", offsetof(HbLinkStatistics, sent_bytes), HB_U64, NULL, 0, 0, 0 },
   { "queued_bytes", "Bytes that wait for the wire.", "1", "", offsetof(HbLinkStatistics, queued_bytes), HB_U32, NULL, 0, 0, 0 },
   { "queued", "Messages that wait for the wire.", "1", "", offsetof(HbLinkStatistics, queued), HB_U32, NULL, 0, 0, 0 },
-  { "delay", "How long the message that arrived last had taken since it was queued.", "s", "", offsetof(HbLinkStatistics, delay), HB_F64, NULL, 0, 0, 0 },
+  { "delay", "Time from queueing to arrival of the message that arrived last.", "s", "", offsetof(HbLinkStatistics, delay), HB_F64, NULL, 0, 0, 0 },
   { "under_way", "Messages that are on the wire or behind it.", "1", "", offsetof(HbLinkStatistics, under_way), HB_U32, NULL, 0, 0, 0 },
   { "arrived", "Messages that have arrived.", "1", "", offsetof(HbLinkStatistics, arrived), HB_U32, NULL, 0, 0, 0 },
   { "lost", "Messages that were lost on the way; counted when they would have arrived.", "1", "", offsetof(HbLinkStatistics, lost), HB_U32, NULL, 0, 0, 0 },
@@ -399,9 +399,9 @@ static const HbField HB_LINK_STATISTICS_FIELDS[] = {
   { "stream_dropped", "Messages that were dropped because the queue was full, by stream.", "1", "", offsetof(HbLinkStatistics, stream_dropped), HB_U32, NULL, 16, 0, 0 },
 };
 
-static const HbMessage HB_LINK_STATISTICS = { "hummingbus_msgs/msg/LinkStatistics", "What a link says of itself, from its first tick on; arrays by the names of the streams.", sizeof(HbLinkStatistics), HB_LINK_STATISTICS_FIELDS, 12 };
+static const HbMessage HB_LINK_STATISTICS = { "hummingbus_msgs/msg/LinkStatistics", "Statistics of a link, from its first tick on; arrays by the names of the streams.", sizeof(HbLinkStatistics), HB_LINK_STATISTICS_FIELDS, 12 };
 
-// What a magnetometer reports.
+// Reading of a magnetometer.
 typedef struct HbMagnetometer {
   // Simulation time of sending.
   HbTime stamp;
@@ -423,7 +423,7 @@ static const HbField HB_MAGNETOMETER_FIELDS[] = {
   { "pad0", "Zero.", "", "", offsetof(HbMagnetometer, pad0), HB_U32, NULL, 0, 0, 0 },
 };
 
-static const HbMessage HB_MAGNETOMETER = { "hummingbus_msgs/msg/Magnetometer", "What a magnetometer reports.", sizeof(HbMagnetometer), HB_MAGNETOMETER_FIELDS, 5 };
+static const HbMessage HB_MAGNETOMETER = { "hummingbus_msgs/msg/Magnetometer", "Reading of a magnetometer.", sizeof(HbMagnetometer), HB_MAGNETOMETER_FIELDS, 5 };
 
 // A vehicle's state as measured in a real flight.
 typedef struct HbMeasuredState {
@@ -449,7 +449,7 @@ static const HbField HB_MEASURED_STATE_FIELDS[] = {
 
 static const HbMessage HB_MEASURED_STATE = { "hummingbus_msgs/msg/MeasuredState", "A vehicle's state as measured in a real flight.", sizeof(HbMeasuredState), HB_MEASURED_STATE_FIELDS, 5 };
 
-// What a motion-capture system reports.
+// Reading of a motion-capture system.
 typedef struct HbMocap {
   // Simulation time of sending.
   HbTime stamp;
@@ -474,7 +474,7 @@ static const HbField HB_MOCAP_FIELDS[] = {
   { "pad0", "Zero.", "", "", offsetof(HbMocap, pad0), HB_U32, NULL, 0, 0, 0 },
 };
 
-static const HbMessage HB_MOCAP = { "hummingbus_msgs/msg/Mocap", "What a motion-capture system reports.", sizeof(HbMocap), HB_MOCAP_FIELDS, 6 };
+static const HbMessage HB_MOCAP = { "hummingbus_msgs/msg/Mocap", "Reading of a motion-capture system.", sizeof(HbMocap), HB_MOCAP_FIELDS, 6 };
 
 // Motor commands in the vehicle's own raw counts (Hummingbird 1…200, Crazyflie 0…65535).
 typedef struct HbMotorCommand {
@@ -521,7 +521,7 @@ static const HbField HB_PLANT_STATE_FIELDS[] = {
 
 static const HbMessage HB_PLANT_STATE = { "hummingbus_msgs/msg/PlantState", "The true state of a vehicle and its rotors. Sensors and recorders read it; estimators do not.", sizeof(HbPlantState), HB_PLANT_STATE_FIELDS, 7 };
 
-// What five range finders report, in the order +x, -x, +y, -y of the body, and down.
+// Readings of five range finders, in the order +x, -x, +y, -y of the body, and down.
 typedef struct HbRanges {
   // Simulation time of sending.
   HbTime stamp;
@@ -543,7 +543,7 @@ static const HbField HB_RANGES_FIELDS[] = {
   { "pad0", "Zero.", "", "", offsetof(HbRanges, pad0), HB_U32, NULL, 0, 0, 0 },
 };
 
-static const HbMessage HB_RANGES = { "hummingbus_msgs/msg/Ranges", "What five range finders report, in the order +x, -x, +y, -y of the body, and down.", sizeof(HbRanges), HB_RANGES_FIELDS, 5 };
+static const HbMessage HB_RANGES = { "hummingbus_msgs/msg/Ranges", "Readings of five range finders, in the order +x, -x, +y, -y of the body, and down.", sizeof(HbRanges), HB_RANGES_FIELDS, 5 };
 
 // The channels of a remote control, as its receiver reports them.
 typedef struct HbRcChannels {
@@ -593,7 +593,7 @@ static const HbField HB_REFERENCE_FIELDS[] = {
 
 static const HbMessage HB_REFERENCE = { "hummingbus_msgs/msg/Reference", "A point of a trajectory.", sizeof(HbReference), HB_REFERENCE_FIELDS, 8 };
 
-// What the stand's sensors read.
+// Readings of the stand's sensors.
 typedef struct HbRotorLoad {
   // Simulation time.
   HbTime stamp;
@@ -618,9 +618,9 @@ static const HbField HB_ROTOR_LOAD_FIELDS[] = {
   { "mount_torque", "Torque on what the motor is bolted to, about the axis that points up: the air's drag and what speeds the rotor up.", "N*m", "body", offsetof(HbRotorLoad, mount_torque), HB_F64, NULL, 0, 0, 0 },
 };
 
-static const HbMessage HB_ROTOR_LOAD = { "hummingbus_msgs/msg/RotorLoad", "What the stand's sensors read.", sizeof(HbRotorLoad), HB_ROTOR_LOAD_FIELDS, 6 };
+static const HbMessage HB_ROTOR_LOAD = { "hummingbus_msgs/msg/RotorLoad", "Readings of the stand's sensors.", sizeof(HbRotorLoad), HB_ROTOR_LOAD_FIELDS, 6 };
 
-// What the controllers of the motors report.
+// Readings of the motor controllers.
 typedef struct HbRotorSpeeds {
   // Simulation time of sending.
   HbTime stamp;
@@ -642,9 +642,9 @@ static const HbField HB_ROTOR_SPEEDS_FIELDS[] = {
   { "rotor_speed", "Speeds of the rotors, in the order of the vehicle file.", "rad/s", "", offsetof(HbRotorSpeeds, rotor_speed), HB_F64, NULL, 0, 0, 12 },
 };
 
-static const HbMessage HB_ROTOR_SPEEDS = { "hummingbus_msgs/msg/RotorSpeeds", "What the controllers of the motors report.", sizeof(HbRotorSpeeds), HB_ROTOR_SPEEDS_FIELDS, 5 };
+static const HbMessage HB_ROTOR_SPEEDS = { "hummingbus_msgs/msg/RotorSpeeds", "Readings of the motor controllers.", sizeof(HbRotorSpeeds), HB_ROTOR_SPEEDS_FIELDS, 5 };
 
-// What a pilot or a planner asks of the controller.
+// Set points that a pilot or a planner gives to the controller.
 typedef struct HbSetPoint {
   // Simulation time.
   HbTime stamp;
@@ -666,9 +666,9 @@ static const HbField HB_SET_POINT_FIELDS[] = {
   { "yaw", "Yaw.", "rad", "world", offsetof(HbSetPoint, yaw), HB_F64, NULL, 0, 0, 0 },
 };
 
-static const HbMessage HB_SET_POINT = { "hummingbus_msgs/msg/SetPoint", "What a pilot or a planner asks of the controller.", sizeof(HbSetPoint), HB_SET_POINT_FIELDS, 5 };
+static const HbMessage HB_SET_POINT = { "hummingbus_msgs/msg/SetPoint", "Set points that a pilot or a planner gives to the controller.", sizeof(HbSetPoint), HB_SET_POINT_FIELDS, 5 };
 
-// What an estimator believes of the vehicle's motion.
+// Estimate of the vehicle's motion.
 typedef struct HbStateEstimate {
   // Simulation time.
   HbTime stamp;
@@ -699,13 +699,13 @@ static const HbField HB_STATE_ESTIMATE_FIELDS[] = {
   { "attitude_sigma", "Standard deviation of the attitude, as a rotation vector.", "rad", "body", offsetof(HbStateEstimate, attitude_sigma), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
 };
 
-static const HbMessage HB_STATE_ESTIMATE = { "hummingbus_msgs/msg/StateEstimate", "What an estimator believes of the vehicle's motion.", sizeof(HbStateEstimate), HB_STATE_ESTIMATE_FIELDS, 8 };
+static const HbMessage HB_STATE_ESTIMATE = { "hummingbus_msgs/msg/StateEstimate", "Estimate of the vehicle's motion.", sizeof(HbStateEstimate), HB_STATE_ESTIMATE_FIELDS, 8 };
 
-// Where the vehicles of a run are, for those that share a room.
+// Positions and velocities of the vehicles of a run, for vehicles that share a room.
 typedef struct HbTraffic {
   // Simulation time.
   HbTime stamp;
-  // How many vehicles there are. [1]
+  // Number of vehicles. [1]
   uint32_t count;
   // Zero.
   uint32_t pad0;
@@ -717,15 +717,15 @@ typedef struct HbTraffic {
 
 static const HbField HB_TRAFFIC_FIELDS[] = {
   { "stamp", "Simulation time.", "", "", offsetof(HbTraffic, stamp), HB_NESTED, &HB_TIME, 0, 0, 0 },
-  { "count", "How many vehicles there are.", "1", "", offsetof(HbTraffic, count), HB_U32, NULL, 0, 0, 0 },
+  { "count", "Number of vehicles.", "1", "", offsetof(HbTraffic, count), HB_U32, NULL, 0, 0, 0 },
   { "pad0", "Zero.", "", "", offsetof(HbTraffic, pad0), HB_U32, NULL, 0, 0, 0 },
   { "position", "Positions of their centres of mass, in the order of the inputs' names.", "m", "world", offsetof(HbTraffic, position), HB_NESTED, &HB_VECTOR3, 32, 0, 0 },
   { "velocity", "Their velocities.", "m/s", "world", offsetof(HbTraffic, velocity), HB_NESTED, &HB_VECTOR3, 32, 0, 0 },
 };
 
-static const HbMessage HB_TRAFFIC = { "hummingbus_msgs/msg/Traffic", "Where the vehicles of a run are, for those that share a room.", sizeof(HbTraffic), HB_TRAFFIC_FIELDS, 5 };
+static const HbMessage HB_TRAFFIC = { "hummingbus_msgs/msg/Traffic", "Positions and velocities of the vehicles of a run, for vehicles that share a room.", sizeof(HbTraffic), HB_TRAFFIC_FIELDS, 5 };
 
-// What an estimator makes of range finders: level distances to what stands around.
+// Estimate from range finders: level distances to the surroundings, height and velocity.
 typedef struct HbWallEstimate {
   // Simulation time.
   HbTime stamp;
@@ -750,15 +750,15 @@ static const HbField HB_WALL_ESTIMATE_FIELDS[] = {
   { "climb_rate", "Rate of climb.", "m/s", "", offsetof(HbWallEstimate, climb_rate), HB_F64, NULL, 0, 0, 0 },
 };
 
-static const HbMessage HB_WALL_ESTIMATE = { "hummingbus_msgs/msg/WallEstimate", "What an estimator makes of range finders: level distances to what stands around.", sizeof(HbWallEstimate), HB_WALL_ESTIMATE_FIELDS, 6 };
+static const HbMessage HB_WALL_ESTIMATE = { "hummingbus_msgs/msg/WallEstimate", "Estimate from range finders: level distances to the surroundings, height and velocity.", sizeof(HbWallEstimate), HB_WALL_ESTIMATE_FIELDS, 6 };
 
-// What is remembered of a channel from tick to tick, beside the queue of measurements.
+// State of a channel from tick to tick, beside the queue of measurements.
 typedef struct HbChannelState {
   // Simulation time from which on the next measurement is due. [ns]
   uint64_t next_ns;
   // Measurements so far; number n is at place n modulo the length of the queue. [1]
   uint64_t measured;
-  // How many of them have arrived. [1]
+  // Number of measurements that have arrived. [1]
   uint64_t arrived;
   // When those in the queue arrive. [ns]
   uint64_t arrival_ns[32];
@@ -766,7 +766,7 @@ typedef struct HbChannelState {
   uint64_t noise_words[2];
   // The same of the stream of losses. [1]
   uint64_t loss_words[2];
-  // Which parts of the last measurement were lost, a bit for each. [1]
+  // Lost parts of the last measurement, a bit for each. [1]
   uint32_t lost;
   // Zero.
   uint32_t pad0;
@@ -775,19 +775,19 @@ typedef struct HbChannelState {
 static const HbField HB_CHANNEL_STATE_FIELDS[] = {
   { "next_ns", "Simulation time from which on the next measurement is due.", "ns", "", offsetof(HbChannelState, next_ns), HB_U64, NULL, 0, 0, 0 },
   { "measured", "Measurements so far; number n is at place n modulo the length of the queue.", "1", "", offsetof(HbChannelState, measured), HB_U64, NULL, 0, 0, 0 },
-  { "arrived", "How many of them have arrived.", "1", "", offsetof(HbChannelState, arrived), HB_U64, NULL, 0, 0, 0 },
+  { "arrived", "Number of measurements that have arrived.", "1", "", offsetof(HbChannelState, arrived), HB_U64, NULL, 0, 0, 0 },
   { "arrival_ns", "When those in the queue arrive.", "ns", "", offsetof(HbChannelState, arrival_ns), HB_U64, NULL, 32, 0, 0 },
   { "noise_words", "Words of 32 bits drawn from the noise stream: the low and the high half of the count.", "1", "", offsetof(HbChannelState, noise_words), HB_U64, NULL, 2, 0, 0 },
   { "loss_words", "The same of the stream of losses.", "1", "", offsetof(HbChannelState, loss_words), HB_U64, NULL, 2, 0, 0 },
-  { "lost", "Which parts of the last measurement were lost, a bit for each.", "1", "", offsetof(HbChannelState, lost), HB_U32, NULL, 0, 0, 0 },
+  { "lost", "Lost parts of the last measurement, a bit for each.", "1", "", offsetof(HbChannelState, lost), HB_U32, NULL, 0, 0, 0 },
   { "pad0", "Zero.", "", "", offsetof(HbChannelState, pad0), HB_U32, NULL, 0, 0, 0 },
 };
 
-static const HbMessage HB_CHANNEL_STATE = { "hummingbus_msgs/msg/ChannelState", "What is remembered of a channel from tick to tick, beside the queue of measurements.", sizeof(HbChannelState), HB_CHANNEL_STATE_FIELDS, 8 };
+static const HbMessage HB_CHANNEL_STATE = { "hummingbus_msgs/msg/ChannelState", "State of a channel from tick to tick, beside the queue of measurements.", sizeof(HbChannelState), HB_CHANNEL_STATE_FIELDS, 8 };
 
-// All that the sensor remembers.
+// State of the sensor.
 typedef struct HbBarometerState {
-  // What is under way.
+  // Measurements that are under way.
   HbChannelState channel;
   // The last measurements.
   HbBarometer queue[32];
@@ -796,16 +796,16 @@ typedef struct HbBarometerState {
 } HbBarometerState;
 
 static const HbField HB_BAROMETER_STATE_FIELDS[] = {
-  { "channel", "What is under way.", "", "", offsetof(HbBarometerState, channel), HB_NESTED, &HB_CHANNEL_STATE, 0, 0, 0 },
+  { "channel", "Measurements that are under way.", "", "", offsetof(HbBarometerState, channel), HB_NESTED, &HB_CHANNEL_STATE, 0, 0, 0 },
   { "queue", "The last measurements.", "", "", offsetof(HbBarometerState, queue), HB_NESTED, &HB_BAROMETER, 32, 0, 0 },
   { "bias", "The bias at the next measurement.", "Pa", "", offsetof(HbBarometerState, bias), HB_F64, NULL, 0, 0, 0 },
 };
 
-static const HbMessage HB_BAROMETER_STATE = { "hummingbus_msgs/msg/BarometerState", "All that the sensor remembers.", sizeof(HbBarometerState), HB_BAROMETER_STATE_FIELDS, 3 };
+static const HbMessage HB_BAROMETER_STATE = { "hummingbus_msgs/msg/BarometerState", "State of the sensor.", sizeof(HbBarometerState), HB_BAROMETER_STATE_FIELDS, 3 };
 
-// All that the sensor remembers.
+// State of the sensor.
 typedef struct HbBatteryMonitorState {
-  // What is under way.
+  // Measurements that are under way.
   HbChannelState channel;
   // The last measurements.
   HbBattery queue[32];
@@ -816,15 +816,15 @@ typedef struct HbBatteryMonitorState {
 } HbBatteryMonitorState;
 
 static const HbField HB_BATTERY_MONITOR_STATE_FIELDS[] = {
-  { "channel", "What is under way.", "", "", offsetof(HbBatteryMonitorState, channel), HB_NESTED, &HB_CHANNEL_STATE, 0, 0, 0 },
+  { "channel", "Measurements that are under way.", "", "", offsetof(HbBatteryMonitorState, channel), HB_NESTED, &HB_CHANNEL_STATE, 0, 0, 0 },
   { "queue", "The last measurements.", "", "", offsetof(HbBatteryMonitorState, queue), HB_NESTED, &HB_BATTERY, 32, 0, 0 },
   { "charge", "The charge that is left.", "1", "", offsetof(HbBatteryMonitorState, charge), HB_F64, NULL, 0, 0, 0 },
   { "counted_ns", "Until when it is counted; the end of time before the first measurement.", "ns", "", offsetof(HbBatteryMonitorState, counted_ns), HB_U64, NULL, 0, 0, 0 },
 };
 
-static const HbMessage HB_BATTERY_MONITOR_STATE = { "hummingbus_msgs/msg/BatteryMonitorState", "All that the sensor remembers.", sizeof(HbBatteryMonitorState), HB_BATTERY_MONITOR_STATE_FIELDS, 4 };
+static const HbMessage HB_BATTERY_MONITOR_STATE = { "hummingbus_msgs/msg/BatteryMonitorState", "State of the sensor.", sizeof(HbBatteryMonitorState), HB_BATTERY_MONITOR_STATE_FIELDS, 4 };
 
-// All that the component remembers.
+// State of the component.
 typedef struct HbClearanceState {
   // Bearing of the vehicle from the world's origin at the last tick; not a number before the first. [rad] in world
   double bearing;
@@ -837,9 +837,9 @@ static const HbField HB_CLEARANCE_STATE_FIELDS[] = {
   { "laps", "Turns flown clockwise.", "1", "", offsetof(HbClearanceState, laps), HB_F64, NULL, 0, 0, 0 },
 };
 
-static const HbMessage HB_CLEARANCE_STATE = { "hummingbus_msgs/msg/ClearanceState", "All that the component remembers.", sizeof(HbClearanceState), HB_CLEARANCE_STATE_FIELDS, 2 };
+static const HbMessage HB_CLEARANCE_STATE = { "hummingbus_msgs/msg/ClearanceState", "State of the component.", sizeof(HbClearanceState), HB_CLEARANCE_STATE_FIELDS, 2 };
 
-// What the filter knows between two samples.
+// State of the filter between two samples.
 typedef struct HbComplementaryState {
   // The estimated attitude at the last sample, body to world. in world
   HbQuaternion attitude;
@@ -852,9 +852,9 @@ static const HbField HB_COMPLEMENTARY_STATE_FIELDS[] = {
   { "last_angular_velocity", "The last sample's angular rate; not a number before the first.", "rad/s", "body", offsetof(HbComplementaryState, last_angular_velocity), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
 };
 
-static const HbMessage HB_COMPLEMENTARY_STATE = { "hummingbus_msgs/msg/ComplementaryState", "What the filter knows between two samples.", sizeof(HbComplementaryState), HB_COMPLEMENTARY_STATE_FIELDS, 2 };
+static const HbMessage HB_COMPLEMENTARY_STATE = { "hummingbus_msgs/msg/ComplementaryState", "State of the filter between two samples.", sizeof(HbComplementaryState), HB_COMPLEMENTARY_STATE_FIELDS, 2 };
 
-// Which law a state belongs to; zero before the first tick.
+// Law that a state belongs to; zero before the first tick.
 typedef struct HbLawId {
   // The law's name, zeros behind. [1]
   uint8_t name[24];
@@ -867,9 +867,9 @@ static const HbField HB_LAW_ID_FIELDS[] = {
   { "state", "Layout hash of its state.", "1", "", offsetof(HbLawId, state), HB_U64, NULL, 0, 0, 0 },
 };
 
-static const HbMessage HB_LAW_ID = { "hummingbus_msgs/msg/LawId", "Which law a state belongs to; zero before the first tick.", sizeof(HbLawId), HB_LAW_ID_FIELDS, 2 };
+static const HbMessage HB_LAW_ID = { "hummingbus_msgs/msg/LawId", "Law that a state belongs to; zero before the first tick.", sizeof(HbLawId), HB_LAW_ID_FIELDS, 2 };
 
-// What the integrators of a law ask for, in units that mean the same to all laws.
+// Outputs of the integrators of a law, in units that mean the same to all laws.
 typedef struct HbControlIntegrals {
   // Vertical acceleration. [m/s^2] in world
   double lift;
@@ -882,9 +882,9 @@ static const HbField HB_CONTROL_INTEGRALS_FIELDS[] = {
   { "turn", "Angular accelerations for roll, pitch and yaw; zero under `lqr` and `geometric`, which observe a lift alone.", "rad/s^2", "body", offsetof(HbControlIntegrals, turn), HB_F64, NULL, 3, 0, 0 },
 };
 
-static const HbMessage HB_CONTROL_INTEGRALS = { "hummingbus_msgs/msg/ControlIntegrals", "What the integrators of a law ask for, in units that mean the same to all laws.", sizeof(HbControlIntegrals), HB_CONTROL_INTEGRALS_FIELDS, 2 };
+static const HbMessage HB_CONTROL_INTEGRALS = { "hummingbus_msgs/msg/ControlIntegrals", "Outputs of the integrators of a law, in units that mean the same to all laws.", sizeof(HbControlIntegrals), HB_CONTROL_INTEGRALS_FIELDS, 2 };
 
-// All that a controller remembers between ticks.
+// State of a controller between ticks.
 typedef struct HbControllerState {
   // The law that left it.
   HbLawId id;
@@ -892,9 +892,9 @@ typedef struct HbControllerState {
   double thrust;
   // Torque that was demanded last. [N*m] in body
   double torque[3];
-  // What the law's integrators ask for.
+  // Outputs of the law's integrators.
   HbControlIntegrals integrals;
-  // What is left of the predecessor's thrust that this law does not ask for itself. [N] in body
+  // Remaining part of the predecessor's thrust that this law does not ask for itself. [N] in body
   double residual_thrust;
   // The same of its torque. [N*m] in body
   double residual_torque[3];
@@ -906,17 +906,17 @@ static const HbField HB_CONTROLLER_STATE_FIELDS[] = {
   { "id", "The law that left it.", "", "", offsetof(HbControllerState, id), HB_NESTED, &HB_LAW_ID, 0, 0, 0 },
   { "thrust", "Thrust that was demanded last.", "N", "body", offsetof(HbControllerState, thrust), HB_F64, NULL, 0, 0, 0 },
   { "torque", "Torque that was demanded last.", "N*m", "body", offsetof(HbControllerState, torque), HB_F64, NULL, 3, 0, 0 },
-  { "integrals", "What the law's integrators ask for.", "", "", offsetof(HbControllerState, integrals), HB_NESTED, &HB_CONTROL_INTEGRALS, 0, 0, 0 },
-  { "residual_thrust", "What is left of the predecessor's thrust that this law does not ask for itself.", "N", "body", offsetof(HbControllerState, residual_thrust), HB_F64, NULL, 0, 0, 0 },
+  { "integrals", "Outputs of the law's integrators.", "", "", offsetof(HbControllerState, integrals), HB_NESTED, &HB_CONTROL_INTEGRALS, 0, 0, 0 },
+  { "residual_thrust", "Remaining part of the predecessor's thrust that this law does not ask for itself.", "N", "body", offsetof(HbControllerState, residual_thrust), HB_F64, NULL, 0, 0, 0 },
   { "residual_torque", "The same of its torque.", "N*m", "body", offsetof(HbControllerState, residual_torque), HB_F64, NULL, 3, 0, 0 },
   { "law_state", "The law's own state in the first words.", "1", "", offsetof(HbControllerState, law_state), HB_U64, NULL, 32, 0, 0 },
 };
 
-static const HbMessage HB_CONTROLLER_STATE = { "hummingbus_msgs/msg/ControllerState", "All that a controller remembers between ticks.", sizeof(HbControllerState), HB_CONTROLLER_STATE_FIELDS, 7 };
+static const HbMessage HB_CONTROLLER_STATE = { "hummingbus_msgs/msg/ControllerState", "State of a controller between ticks.", sizeof(HbControllerState), HB_CONTROLLER_STATE_FIELDS, 7 };
 
-// All that the sensor remembers.
+// State of the sensor.
 typedef struct HbGpsState {
-  // What is under way.
+  // Measurements that are under way.
   HbChannelState channel;
   // The last measurements.
   HbGps queue[32];
@@ -925,14 +925,14 @@ typedef struct HbGpsState {
 } HbGpsState;
 
 static const HbField HB_GPS_STATE_FIELDS[] = {
-  { "channel", "What is under way.", "", "", offsetof(HbGpsState, channel), HB_NESTED, &HB_CHANNEL_STATE, 0, 0, 0 },
+  { "channel", "Measurements that are under way.", "", "", offsetof(HbGpsState, channel), HB_NESTED, &HB_CHANNEL_STATE, 0, 0, 0 },
   { "queue", "The last measurements.", "", "", offsetof(HbGpsState, queue), HB_NESTED, &HB_GPS, 32, 0, 0 },
   { "drift", "The drift at the last measurement; not a number before the first.", "m", "world", offsetof(HbGpsState, drift), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
 };
 
-static const HbMessage HB_GPS_STATE = { "hummingbus_msgs/msg/GpsState", "All that the sensor remembers.", sizeof(HbGpsState), HB_GPS_STATE_FIELDS, 3 };
+static const HbMessage HB_GPS_STATE = { "hummingbus_msgs/msg/GpsState", "State of the sensor.", sizeof(HbGpsState), HB_GPS_STATE_FIELDS, 3 };
 
-// All that the IMU remembers: its biases, how far its random stream was drawn, and the readings under way.
+// State of the IMU: its biases, the place in its random stream, and the readings under way.
 typedef struct HbImuState {
   // The accelerometer's bias at the next reading. [m/s^2] in body
   HbVector3 accelerometer_bias;
@@ -946,11 +946,11 @@ typedef struct HbImuState {
   double rotor_angles[12];
   // The true angular velocity at the last reading. [rad/s] in body
   HbVector3 last_angular_velocity;
-  // What has come through the accelerometer's low pass. [m/s^2] in body
+  // Specific force behind the accelerometer's low pass. [m/s^2] in body
   HbVector3 filtered_specific_force;
-  // What has come through the gyroscope's low pass. [rad/s] in body
+  // Angular velocity behind the gyroscope's low pass. [rad/s] in body
   HbVector3 filtered_angular_velocity;
-  // What is under way.
+  // Measurements that are under way.
   HbChannelState channel;
   // The last readings.
   HbImu queue[32];
@@ -963,13 +963,13 @@ static const HbField HB_IMU_STATE_FIELDS[] = {
   { "readings", "Readings so far.", "1", "", offsetof(HbImuState, readings), HB_U64, NULL, 0, 0, 0 },
   { "rotor_angles", "The angle of each rotor, from where it started.", "rad", "", offsetof(HbImuState, rotor_angles), HB_F64, NULL, 12, 0, 0 },
   { "last_angular_velocity", "The true angular velocity at the last reading.", "rad/s", "body", offsetof(HbImuState, last_angular_velocity), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
-  { "filtered_specific_force", "What has come through the accelerometer's low pass.", "m/s^2", "body", offsetof(HbImuState, filtered_specific_force), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
-  { "filtered_angular_velocity", "What has come through the gyroscope's low pass.", "rad/s", "body", offsetof(HbImuState, filtered_angular_velocity), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
-  { "channel", "What is under way.", "", "", offsetof(HbImuState, channel), HB_NESTED, &HB_CHANNEL_STATE, 0, 0, 0 },
+  { "filtered_specific_force", "Specific force behind the accelerometer's low pass.", "m/s^2", "body", offsetof(HbImuState, filtered_specific_force), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
+  { "filtered_angular_velocity", "Angular velocity behind the gyroscope's low pass.", "rad/s", "body", offsetof(HbImuState, filtered_angular_velocity), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
+  { "channel", "Measurements that are under way.", "", "", offsetof(HbImuState, channel), HB_NESTED, &HB_CHANNEL_STATE, 0, 0, 0 },
   { "queue", "The last readings.", "", "", offsetof(HbImuState, queue), HB_NESTED, &HB_IMU, 32, 0, 0 },
 };
 
-static const HbMessage HB_IMU_STATE = { "hummingbus_msgs/msg/ImuState", "All that the IMU remembers: its biases, how far its random stream was drawn, and the readings under way.", sizeof(HbImuState), HB_IMU_STATE_FIELDS, 10 };
+static const HbMessage HB_IMU_STATE = { "hummingbus_msgs/msg/ImuState", "State of the IMU: its biases, the place in its random stream, and the readings under way.", sizeof(HbImuState), HB_IMU_STATE_FIELDS, 10 };
 
 // A message on the line, waiting or under way.
 typedef struct HbLinkPacket {
@@ -1004,7 +1004,7 @@ static const HbField HB_LINK_PACKET_FIELDS[] = {
 
 static const HbMessage HB_LINK_PACKET = { "hummingbus_msgs/msg/LinkPacket", "A message on the line, waiting or under way.", sizeof(HbLinkPacket), HB_LINK_PACKET_FIELDS, 8 };
 
-// What a line has carried.
+// Traffic that a line has carried.
 typedef struct HbLineCounts {
   // Bytes of the messages whose sending has begun. [1]
   uint64_t begun_bytes;
@@ -1016,7 +1016,7 @@ typedef struct HbLineCounts {
   uint32_t lost[16];
   // Messages for which the queue had no room, by stream. [1]
   uint32_t dropped[16];
-  // How long the message that arrived last had taken since it was queued. [ns]
+  // Time from queueing to arrival of the message that arrived last. [ns]
   uint64_t delay_ns;
 } HbLineCounts;
 
@@ -1026,18 +1026,18 @@ static const HbField HB_LINE_COUNTS_FIELDS[] = {
   { "arrived", "Messages that have arrived, by stream.", "1", "", offsetof(HbLineCounts, arrived), HB_U32, NULL, 16, 0, 0 },
   { "lost", "Messages that were lost on the way, by stream; counted when they would have arrived.", "1", "", offsetof(HbLineCounts, lost), HB_U32, NULL, 16, 0, 0 },
   { "dropped", "Messages for which the queue had no room, by stream.", "1", "", offsetof(HbLineCounts, dropped), HB_U32, NULL, 16, 0, 0 },
-  { "delay_ns", "How long the message that arrived last had taken since it was queued.", "ns", "", offsetof(HbLineCounts, delay_ns), HB_U64, NULL, 0, 0, 0 },
+  { "delay_ns", "Time from queueing to arrival of the message that arrived last.", "ns", "", offsetof(HbLineCounts, delay_ns), HB_U64, NULL, 0, 0, 0 },
 };
 
-static const HbMessage HB_LINE_COUNTS = { "hummingbus_msgs/msg/LineCounts", "What a line has carried.", sizeof(HbLineCounts), HB_LINE_COUNTS_FIELDS, 6 };
+static const HbMessage HB_LINE_COUNTS = { "hummingbus_msgs/msg/LineCounts", "Traffic that a line has carried.", sizeof(HbLineCounts), HB_LINE_COUNTS_FIELDS, 6 };
 
-// What a line remembers.
+// State of a line.
 typedef struct HbLineState {
   // The messages that wait or are under way, in any order.
   HbLinkPacket packets[64];
   // The newest message of each stream that has arrived. [1]
   uint8_t newest[16][256];
-  // What has happened so far.
+  // Counts so far.
   HbLineCounts counts;
   // Messages queued so far. [1]
   uint64_t queued;
@@ -1054,7 +1054,7 @@ typedef struct HbLineState {
 static const HbField HB_LINE_STATE_FIELDS[] = {
   { "packets", "The messages that wait or are under way, in any order.", "", "", offsetof(HbLineState, packets), HB_NESTED, &HB_LINK_PACKET, 64, 0, 0 },
   { "newest", "The newest message of each stream that has arrived.", "1", "", offsetof(HbLineState, newest), HB_U8, NULL, 16, 256, 0 },
-  { "counts", "What has happened so far.", "", "", offsetof(HbLineState, counts), HB_NESTED, &HB_LINE_COUNTS, 0, 0, 0 },
+  { "counts", "Counts so far.", "", "", offsetof(HbLineState, counts), HB_NESTED, &HB_LINE_COUNTS, 0, 0, 0 },
   { "queued", "Messages queued so far.", "1", "", offsetof(HbLineState, queued), HB_U64, NULL, 0, 0, 0 },
   { "busy_since_ns", "When the wire began to be busy without a break.", "ns", "", offsetof(HbLineState, busy_since_ns), HB_U64, NULL, 0, 0, 0 },
   { "busy_bits", "Bits that it carries from then on.", "1", "", offsetof(HbLineState, busy_bits), HB_U64, NULL, 0, 0, 0 },
@@ -1062,9 +1062,9 @@ static const HbField HB_LINE_STATE_FIELDS[] = {
   { "last_arrival_ns", "When the message that was sent last arrives: the next does not overtake it.", "ns", "", offsetof(HbLineState, last_arrival_ns), HB_U64, NULL, 0, 0, 0 },
 };
 
-static const HbMessage HB_LINE_STATE = { "hummingbus_msgs/msg/LineState", "What a line remembers.", sizeof(HbLineState), HB_LINE_STATE_FIELDS, 8 };
+static const HbMessage HB_LINE_STATE = { "hummingbus_msgs/msg/LineState", "State of a line.", sizeof(HbLineState), HB_LINE_STATE_FIELDS, 8 };
 
-// What a link remembers: what it last took from each input, and what is on its line.
+// State of a link: marks of the messages that it took last from its inputs, and its line.
 typedef struct HbLinkState {
   // 
   HbLineState line;
@@ -1080,37 +1080,37 @@ static const HbField HB_LINK_STATE_FIELDS[] = {
   { "taken_period", "The period of its rate in which it was taken; all bits set before the first.", "1", "", offsetof(HbLinkState, taken_period), HB_U64, NULL, 16, 0, 0 },
 };
 
-static const HbMessage HB_LINK_STATE = { "hummingbus_msgs/msg/LinkState", "What a link remembers: what it last took from each input, and what is on its line.", sizeof(HbLinkState), HB_LINK_STATE_FIELDS, 3 };
+static const HbMessage HB_LINK_STATE = { "hummingbus_msgs/msg/LinkState", "State of a link: marks of the messages that it took last from its inputs, and its line.", sizeof(HbLinkState), HB_LINK_STATE_FIELDS, 3 };
 
-// All that the sensor remembers.
+// State of the sensor.
 typedef struct HbMagnetometerState {
-  // What is under way.
+  // Measurements that are under way.
   HbChannelState channel;
   // The last measurements.
   HbMagnetometer queue[32];
 } HbMagnetometerState;
 
 static const HbField HB_MAGNETOMETER_STATE_FIELDS[] = {
-  { "channel", "What is under way.", "", "", offsetof(HbMagnetometerState, channel), HB_NESTED, &HB_CHANNEL_STATE, 0, 0, 0 },
+  { "channel", "Measurements that are under way.", "", "", offsetof(HbMagnetometerState, channel), HB_NESTED, &HB_CHANNEL_STATE, 0, 0, 0 },
   { "queue", "The last measurements.", "", "", offsetof(HbMagnetometerState, queue), HB_NESTED, &HB_MAGNETOMETER, 32, 0, 0 },
 };
 
-static const HbMessage HB_MAGNETOMETER_STATE = { "hummingbus_msgs/msg/MagnetometerState", "All that the sensor remembers.", sizeof(HbMagnetometerState), HB_MAGNETOMETER_STATE_FIELDS, 2 };
+static const HbMessage HB_MAGNETOMETER_STATE = { "hummingbus_msgs/msg/MagnetometerState", "State of the sensor.", sizeof(HbMagnetometerState), HB_MAGNETOMETER_STATE_FIELDS, 2 };
 
-// All that the sensor remembers.
+// State of the sensor.
 typedef struct HbMocapState {
-  // What is under way.
+  // Measurements that are under way.
   HbChannelState channel;
   // The last measurements.
   HbMocap queue[32];
 } HbMocapState;
 
 static const HbField HB_MOCAP_STATE_FIELDS[] = {
-  { "channel", "What is under way.", "", "", offsetof(HbMocapState, channel), HB_NESTED, &HB_CHANNEL_STATE, 0, 0, 0 },
+  { "channel", "Measurements that are under way.", "", "", offsetof(HbMocapState, channel), HB_NESTED, &HB_CHANNEL_STATE, 0, 0, 0 },
   { "queue", "The last measurements.", "", "", offsetof(HbMocapState, queue), HB_NESTED, &HB_MOCAP, 32, 0, 0 },
 };
 
-static const HbMessage HB_MOCAP_STATE = { "hummingbus_msgs/msg/MocapState", "All that the sensor remembers.", sizeof(HbMocapState), HB_MOCAP_STATE_FIELDS, 2 };
+static const HbMessage HB_MOCAP_STATE = { "hummingbus_msgs/msg/MocapState", "State of the sensor.", sizeof(HbMocapState), HB_MOCAP_STATE_FIELDS, 2 };
 
 // State of `operator`.
 typedef struct HbOperatorState {
@@ -1142,7 +1142,7 @@ static const HbField HB_OPERATOR_STATE_FIELDS[] = {
 
 static const HbMessage HB_OPERATOR_STATE = { "hummingbus_msgs/msg/OperatorState", "State of `operator`.", sizeof(HbOperatorState), HB_OPERATOR_STATE_FIELDS, 7 };
 
-// All that it remembers.
+// State of the position hold.
 typedef struct HbPositionHoldState {
   // The place that is held; without meaning along an axis that is not locked. [m] in world
   double place[2];
@@ -1155,9 +1155,9 @@ static const HbField HB_POSITION_HOLD_STATE_FIELDS[] = {
   { "locked", "1 where the place along the heading's x, or y, is locked.", "1", "", offsetof(HbPositionHoldState, locked), HB_U32, NULL, 2, 0, 0 },
 };
 
-static const HbMessage HB_POSITION_HOLD_STATE = { "hummingbus_msgs/msg/PositionHoldState", "All that it remembers.", sizeof(HbPositionHoldState), HB_POSITION_HOLD_STATE_FIELDS, 2 };
+static const HbMessage HB_POSITION_HOLD_STATE = { "hummingbus_msgs/msg/PositionHoldState", "State of the position hold.", sizeof(HbPositionHoldState), HB_POSITION_HOLD_STATE_FIELDS, 2 };
 
-// All that the component remembers.
+// State of the component.
 typedef struct HbPropellerStandState {
   // Speed of the rotor. [rad/s]
   double speed;
@@ -1170,13 +1170,13 @@ static const HbField HB_PROPELLER_STAND_STATE_FIELDS[] = {
   { "acceleration", "Its rate of change.", "rad/s^2", "", offsetof(HbPropellerStandState, acceleration), HB_F64, NULL, 0, 0, 0 },
 };
 
-static const HbMessage HB_PROPELLER_STAND_STATE = { "hummingbus_msgs/msg/PropellerStandState", "All that the component remembers.", sizeof(HbPropellerStandState), HB_PROPELLER_STAND_STATE_FIELDS, 2 };
+static const HbMessage HB_PROPELLER_STAND_STATE = { "hummingbus_msgs/msg/PropellerStandState", "State of the component.", sizeof(HbPropellerStandState), HB_PROPELLER_STAND_STATE_FIELDS, 2 };
 
-// What the filter knows of one axis.
+// Estimate along one axis.
 typedef struct HbRangeInertialAxis {
   // Velocity. [m/s] in world
   double velocity;
-  // What is wrong with the acceleration that is fed in. [m/s^2] in world
+  // Error of the acceleration that is fed in. [m/s^2] in world
   double bias;
   // Displacement since the start. [m] in world
   double path;
@@ -1190,14 +1190,14 @@ typedef struct HbRangeInertialAxis {
 
 static const HbField HB_RANGE_INERTIAL_AXIS_FIELDS[] = {
   { "velocity", "Velocity.", "m/s", "world", offsetof(HbRangeInertialAxis, velocity), HB_F64, NULL, 0, 0, 0 },
-  { "bias", "What is wrong with the acceleration that is fed in.", "m/s^2", "world", offsetof(HbRangeInertialAxis, bias), HB_F64, NULL, 0, 0, 0 },
+  { "bias", "Error of the acceleration that is fed in.", "m/s^2", "world", offsetof(HbRangeInertialAxis, bias), HB_F64, NULL, 0, 0, 0 },
   { "path", "Displacement since the start.", "m", "world", offsetof(HbRangeInertialAxis, path), HB_F64, NULL, 0, 0, 0 },
   { "distance", "Distances to what stands ahead and behind; without meaning where nothing is in sight.", "m", "world", offsetof(HbRangeInertialAxis, distance), HB_F64, NULL, 2, 0, 0 },
   { "in_sight", "1 where something is in sight.", "1", "", offsetof(HbRangeInertialAxis, in_sight), HB_U32, NULL, 2, 0, 0 },
   { "covariance", "Covariance of the errors of the above, in their order and units.", "", "", offsetof(HbRangeInertialAxis, covariance), HB_F64, NULL, 25, 0, 0 },
 };
 
-static const HbMessage HB_RANGE_INERTIAL_AXIS = { "hummingbus_msgs/msg/RangeInertialAxis", "What the filter knows of one axis.", sizeof(HbRangeInertialAxis), HB_RANGE_INERTIAL_AXIS_FIELDS, 6 };
+static const HbMessage HB_RANGE_INERTIAL_AXIS = { "hummingbus_msgs/msg/RangeInertialAxis", "Estimate along one axis.", sizeof(HbRangeInertialAxis), HB_RANGE_INERTIAL_AXIS_FIELDS, 6 };
 
 // Sums of the acceleration, its bias not taken off.
 typedef struct HbRangeInertialGains {
@@ -1217,7 +1217,7 @@ static const HbField HB_RANGE_INERTIAL_GAINS_FIELDS[] = {
 
 static const HbMessage HB_RANGE_INERTIAL_GAINS = { "hummingbus_msgs/msg/RangeInertialGains", "Sums of the acceleration, its bias not taken off.", sizeof(HbRangeInertialGains), HB_RANGE_INERTIAL_GAINS_FIELDS, 3 };
 
-// Where the vehicle was at a sample.
+// Pose of the vehicle at a sample.
 typedef struct HbRangeInertialPast {
   // Displacement since the start. [m] in world
   HbVector3 path;
@@ -1230,9 +1230,9 @@ static const HbField HB_RANGE_INERTIAL_PAST_FIELDS[] = {
   { "attitude", "Attitude, body to world.", "", "world", offsetof(HbRangeInertialPast, attitude), HB_NESTED, &HB_QUATERNION, 0, 0, 0 },
 };
 
-static const HbMessage HB_RANGE_INERTIAL_PAST = { "hummingbus_msgs/msg/RangeInertialPast", "Where the vehicle was at a sample.", sizeof(HbRangeInertialPast), HB_RANGE_INERTIAL_PAST_FIELDS, 2 };
+static const HbMessage HB_RANGE_INERTIAL_PAST = { "hummingbus_msgs/msg/RangeInertialPast", "Pose of the vehicle at a sample.", sizeof(HbRangeInertialPast), HB_RANGE_INERTIAL_PAST_FIELDS, 2 };
 
-// What the estimator remembers, as it is handed over.
+// State of the estimator, as it is handed over.
 typedef struct HbRangeInertialState {
   // Samples so far.
   uint64_t samples;
@@ -1250,7 +1250,7 @@ typedef struct HbRangeInertialState {
   HbVector3 acceleration;
   // The axes of the world; the ground is behind the third.
   HbRangeInertialAxis axes[3];
-  // What the velocity gained.
+  // Gains of the velocity.
   HbRangeInertialGains gains;
   // The last samples, sample k at the place k modulo the number of places.
   HbRangeInertialPast past[128];
@@ -1265,26 +1265,26 @@ static const HbField HB_RANGE_INERTIAL_STATE_FIELDS[] = {
   { "obstacle_ns", "See above; 0 for never.", "ns", "", offsetof(HbRangeInertialState, obstacle_ns), HB_U64, NULL, 2, 2, 0 },
   { "acceleration", "The last sample's acceleration.", "m/s^2", "world", offsetof(HbRangeInertialState, acceleration), HB_NESTED, &HB_VECTOR3, 0, 0, 0 },
   { "axes", "The axes of the world; the ground is behind the third.", "", "", offsetof(HbRangeInertialState, axes), HB_NESTED, &HB_RANGE_INERTIAL_AXIS, 3, 0, 0 },
-  { "gains", "What the velocity gained.", "", "", offsetof(HbRangeInertialState, gains), HB_NESTED, &HB_RANGE_INERTIAL_GAINS, 0, 0, 0 },
+  { "gains", "Gains of the velocity.", "", "", offsetof(HbRangeInertialState, gains), HB_NESTED, &HB_RANGE_INERTIAL_GAINS, 0, 0, 0 },
   { "past", "The last samples, sample k at the place k modulo the number of places.", "", "", offsetof(HbRangeInertialState, past), HB_NESTED, &HB_RANGE_INERTIAL_PAST, 128, 0, 0 },
 };
 
-static const HbMessage HB_RANGE_INERTIAL_STATE = { "hummingbus_msgs/msg/RangeInertialState", "What the estimator remembers, as it is handed over.", sizeof(HbRangeInertialState), HB_RANGE_INERTIAL_STATE_FIELDS, 10 };
+static const HbMessage HB_RANGE_INERTIAL_STATE = { "hummingbus_msgs/msg/RangeInertialState", "State of the estimator, as it is handed over.", sizeof(HbRangeInertialState), HB_RANGE_INERTIAL_STATE_FIELDS, 10 };
 
-// All that the sensor remembers.
+// State of the sensor.
 typedef struct HbRangeState {
-  // What is under way.
+  // Measurements that are under way.
   HbChannelState channel;
   // The last measurements.
   HbRanges queue[32];
 } HbRangeState;
 
 static const HbField HB_RANGE_STATE_FIELDS[] = {
-  { "channel", "What is under way.", "", "", offsetof(HbRangeState, channel), HB_NESTED, &HB_CHANNEL_STATE, 0, 0, 0 },
+  { "channel", "Measurements that are under way.", "", "", offsetof(HbRangeState, channel), HB_NESTED, &HB_CHANNEL_STATE, 0, 0, 0 },
   { "queue", "The last measurements.", "", "", offsetof(HbRangeState, queue), HB_NESTED, &HB_RANGES, 32, 0, 0 },
 };
 
-static const HbMessage HB_RANGE_STATE = { "hummingbus_msgs/msg/RangeState", "All that the sensor remembers.", sizeof(HbRangeState), HB_RANGE_STATE_FIELDS, 2 };
+static const HbMessage HB_RANGE_STATE = { "hummingbus_msgs/msg/RangeState", "State of the sensor.", sizeof(HbRangeState), HB_RANGE_STATE_FIELDS, 2 };
 
 // State of the remote control.
 typedef struct HbRemoteControlState {
@@ -1298,25 +1298,25 @@ static const HbField HB_REMOTE_CONTROL_STATE_FIELDS[] = {
 
 static const HbMessage HB_REMOTE_CONTROL_STATE = { "hummingbus_msgs/msg/RemoteControlState", "State of the remote control.", sizeof(HbRemoteControlState), HB_REMOTE_CONTROL_STATE_FIELDS, 1 };
 
-// All that the sensor remembers.
+// State of the sensor.
 typedef struct HbRpmState {
-  // What is under way.
+  // Measurements that are under way.
   HbChannelState channel;
   // The last measurements.
   HbRotorSpeeds queue[32];
-  // What was read last, whether it was lost or not. [rad/s]
+  // Speeds that were read last, lost ones included. [rad/s]
   double read[12];
   // 1 from the first reading on. [1]
   uint64_t has_read;
 } HbRpmState;
 
 static const HbField HB_RPM_STATE_FIELDS[] = {
-  { "channel", "What is under way.", "", "", offsetof(HbRpmState, channel), HB_NESTED, &HB_CHANNEL_STATE, 0, 0, 0 },
+  { "channel", "Measurements that are under way.", "", "", offsetof(HbRpmState, channel), HB_NESTED, &HB_CHANNEL_STATE, 0, 0, 0 },
   { "queue", "The last measurements.", "", "", offsetof(HbRpmState, queue), HB_NESTED, &HB_ROTOR_SPEEDS, 32, 0, 0 },
-  { "read", "What was read last, whether it was lost or not.", "rad/s", "", offsetof(HbRpmState, read), HB_F64, NULL, 12, 0, 0 },
+  { "read", "Speeds that were read last, lost ones included.", "rad/s", "", offsetof(HbRpmState, read), HB_F64, NULL, 12, 0, 0 },
   { "has_read", "1 from the first reading on.", "1", "", offsetof(HbRpmState, has_read), HB_U64, NULL, 0, 0, 0 },
 };
 
-static const HbMessage HB_RPM_STATE = { "hummingbus_msgs/msg/RpmState", "All that the sensor remembers.", sizeof(HbRpmState), HB_RPM_STATE_FIELDS, 4 };
+static const HbMessage HB_RPM_STATE = { "hummingbus_msgs/msg/RpmState", "State of the sensor.", sizeof(HbRpmState), HB_RPM_STATE_FIELDS, 4 };
 
 #endif // HUMMINGBUS_MESSAGES_H

@@ -85,7 +85,7 @@ HUMMINGBUS_MESSAGE(hummingbus::msgs::AttitudeEstimate, "hummingbus_msgs/msg/Atti
     HUMMINGBUS_FIELD(angular_velocity, "rad/s", "body", "Angular velocity."));
 
 namespace hummingbus::msgs {
-// What a barometer reports.
+// Reading of a barometer.
 struct Barometer {
   // Simulation time of sending.
   Time stamp{};
@@ -102,7 +102,7 @@ struct Barometer {
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::Barometer, "hummingbus_msgs/msg/Barometer", "What a barometer reports.",
+HUMMINGBUS_MESSAGE(hummingbus::msgs::Barometer, "hummingbus_msgs/msg/Barometer", "Reading of a barometer.",
     HUMMINGBUS_FIELD(stamp, "", "", "Simulation time of sending."),
     HUMMINGBUS_FIELD(measured_ns, "ns", "", "Simulation time at which it was measured."),
     HUMMINGBUS_FIELD(pressure, "Pa", "", "Static pressure."),
@@ -121,7 +121,7 @@ struct Battery {
   double voltage{};
   // Current drawn. [A]
   double current{};
-  // What is left of the capacity, 0 to 1. [1]
+  // Remaining part of the capacity, 0 to 1. [1]
   double charge{};
   // 1 if this sample holds a measurement, 0 if it was lost or the plant has no model of its battery. [1]
   std::uint32_t valid{};
@@ -135,16 +135,16 @@ HUMMINGBUS_MESSAGE(hummingbus::msgs::Battery, "hummingbus_msgs/msg/Battery", "Vo
     HUMMINGBUS_FIELD(measured_ns, "ns", "", "Simulation time at which it was measured."),
     HUMMINGBUS_FIELD(voltage, "V", "", "Voltage at the terminals."),
     HUMMINGBUS_FIELD(current, "A", "", "Current drawn."),
-    HUMMINGBUS_FIELD(charge, "1", "", "What is left of the capacity, 0 to 1."),
+    HUMMINGBUS_FIELD(charge, "1", "", "Remaining part of the capacity, 0 to 1."),
     HUMMINGBUS_FIELD(valid, "1", "", "1 if this sample holds a measurement, 0 if it was lost or the plant has no model of its battery."),
     HUMMINGBUS_FIELD(pad0, "", "", "Zero."));
 
 namespace hummingbus::msgs {
-// Where the free bodies of a scene are, and how they move, in the order of the scene: those beyond `count` are zeros.
+// Poses and velocities of the free bodies of a scene, in the order of the scene: those beyond `count` are zeros.
 struct BodyStates {
   // Simulation time.
   Time stamp{};
-  // How many bodies there are. [1]
+  // Number of bodies. [1]
   std::uint32_t count{};
   // Zero.
   std::uint32_t pad0{};
@@ -161,9 +161,9 @@ struct BodyStates {
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::BodyStates, "hummingbus_msgs/msg/BodyStates", "Where the free bodies of a scene are, and how they move, in the order of the scene: those beyond `count` are zeros.",
+HUMMINGBUS_MESSAGE(hummingbus::msgs::BodyStates, "hummingbus_msgs/msg/BodyStates", "Poses and velocities of the free bodies of a scene, in the order of the scene: those beyond `count` are zeros.",
     HUMMINGBUS_FIELD(stamp, "", "", "Simulation time."),
-    HUMMINGBUS_FIELD(count, "1", "", "How many bodies there are."),
+    HUMMINGBUS_FIELD(count, "1", "", "Number of bodies."),
     HUMMINGBUS_FIELD(pad0, "", "", "Zero."),
     HUMMINGBUS_FIELD(object, "1", "", "Their numbers among the things of the scene, as `Contact` counts them: 2 + i of the thing i."),
     HUMMINGBUS_FIELD(position, "m", "world", "Positions of their centres of mass."),
@@ -172,7 +172,7 @@ HUMMINGBUS_MESSAGE(hummingbus::msgs::BodyStates, "hummingbus_msgs/msg/BodyStates
     HUMMINGBUS_FIELD(angular_velocity, "rad/s", "world", "Angular velocities."));
 
 namespace hummingbus::msgs {
-// How far a vehicle truly is from what stands in the scene: for judging and plotting, not for controllers.
+// True distances from a vehicle to the things of the scene: for judging and plotting, not for controllers.
 struct Clearance {
   // Simulation time.
   Time stamp{};
@@ -191,7 +191,7 @@ struct Clearance {
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::Clearance, "hummingbus_msgs/msg/Clearance", "How far a vehicle truly is from what stands in the scene: for judging and plotting, not for controllers.",
+HUMMINGBUS_MESSAGE(hummingbus::msgs::Clearance, "hummingbus_msgs/msg/Clearance", "True distances from a vehicle to the things of the scene: for judging and plotting, not for controllers.",
     HUMMINGBUS_FIELD(stamp, "", "", "Simulation time."),
     HUMMINGBUS_FIELD(nearest, "m", "world", "Distance from the centre of mass to the nearest box."),
     HUMMINGBUS_FIELD(wall, "m", "world", "Distances to what stands along the world's +x, -x, +y, -y; 1000 where nothing does."),
@@ -201,7 +201,7 @@ HUMMINGBUS_MESSAGE(hummingbus::msgs::Clearance, "hummingbus_msgs/msg/Clearance",
     HUMMINGBUS_FIELD(pad0, "", "", "Zero."));
 
 namespace hummingbus::msgs {
-// What the plant touches, whatever else is in the scene.
+// Contacts of the plant with the ground, the scene's things and other vehicles.
 struct Contact {
   // Simulation time.
   Time stamp{};
@@ -211,7 +211,7 @@ struct Contact {
   double impact_speed{};
   // Number of things touched: the ground, boxes, other vehicles. [1]
   std::uint32_t count{};
-  // What is touched first: 0 nothing, 1 the ground, 2 + i the scene's thing i (boxes first, then meshes), 1000 + i the other vehicle i. [1]
+  // Object of the first contact: 0 nothing, 1 the ground, 2 + i the scene's thing i (boxes first, then meshes), 1000 + i the other vehicle i. [1]
   std::uint32_t object{};
   // Contacts that began since the run started, resting on the ground at the start left out. [1]
   std::uint32_t began{};
@@ -220,17 +220,17 @@ struct Contact {
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::Contact, "hummingbus_msgs/msg/Contact", "What the plant touches, whatever else is in the scene.",
+HUMMINGBUS_MESSAGE(hummingbus::msgs::Contact, "hummingbus_msgs/msg/Contact", "Contacts of the plant with the ground, the scene's things and other vehicles.",
     HUMMINGBUS_FIELD(stamp, "", "", "Simulation time."),
     HUMMINGBUS_FIELD(force, "N", "world", "Sum of the contact forces over the last tick."),
     HUMMINGBUS_FIELD(impact_speed, "m/s", "", "Speed of approach just before the newest impact: a part of the vehicle, a foot or the disc of propellers, touched something that it had not touched. The fastest of those within a tick; 0 without a contact."),
     HUMMINGBUS_FIELD(count, "1", "", "Number of things touched: the ground, boxes, other vehicles."),
-    HUMMINGBUS_FIELD(object, "1", "", "What is touched first: 0 nothing, 1 the ground, 2 + i the scene's thing i (boxes first, then meshes), 1000 + i the other vehicle i."),
+    HUMMINGBUS_FIELD(object, "1", "", "Object of the first contact: 0 nothing, 1 the ground, 2 + i the scene's thing i (boxes first, then meshes), 1000 + i the other vehicle i."),
     HUMMINGBUS_FIELD(began, "1", "", "Contacts that began since the run started, resting on the ground at the start left out."),
     HUMMINGBUS_FIELD(crashed, "1", "", "1 from the first impact on that was faster than the vehicle bears."));
 
 namespace hummingbus::msgs {
-// What a controller did at a tick: what it asked for, what the rotors could give, what state it is in.
+// Status of a controller at a tick: its set points, its demand, the part of it that the rotors make, and its state.
 struct ControlStatus {
   // Simulation time.
   Time stamp{};
@@ -261,7 +261,7 @@ struct ControlStatus {
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::ControlStatus, "hummingbus_msgs/msg/ControlStatus", "What a controller did at a tick: what it asked for, what the rotors could give, what state it is in.",
+HUMMINGBUS_MESSAGE(hummingbus::msgs::ControlStatus, "hummingbus_msgs/msg/ControlStatus", "Status of a controller at a tick: its set points, its demand, the part of it that the rotors make, and its state.",
     HUMMINGBUS_FIELD(stamp, "", "", "Simulation time."),
     HUMMINGBUS_FIELD(altitude_set_point, "m", "world", "Altitude that its inner loops hold: the pilot's, or its outer loop's."),
     HUMMINGBUS_FIELD(attitude_set_point, "rad", "world", "Roll, pitch and yaw that its inner loops hold."),
@@ -277,7 +277,7 @@ HUMMINGBUS_MESSAGE(hummingbus::msgs::ControlStatus, "hummingbus_msgs/msg/Control
     HUMMINGBUS_FIELD(pad0, "", "", "Zero."));
 
 namespace hummingbus::msgs {
-// What a satellite receiver reports, in the world's axes.
+// Reading of a satellite receiver, in the world's axes.
 struct Gps {
   // Simulation time of sending.
   Time stamp{};
@@ -294,7 +294,7 @@ struct Gps {
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::Gps, "hummingbus_msgs/msg/Gps", "What a satellite receiver reports, in the world's axes.",
+HUMMINGBUS_MESSAGE(hummingbus::msgs::Gps, "hummingbus_msgs/msg/Gps", "Reading of a satellite receiver, in the world's axes.",
     HUMMINGBUS_FIELD(stamp, "", "", "Simulation time of sending."),
     HUMMINGBUS_FIELD(measured_ns, "ns", "", "Simulation time at which it was measured."),
     HUMMINGBUS_FIELD(position, "m", "world", "Position of the centre of mass."),
@@ -303,7 +303,7 @@ HUMMINGBUS_MESSAGE(hummingbus::msgs::Gps, "hummingbus_msgs/msg/Gps", "What a sat
     HUMMINGBUS_FIELD(pad0, "", "", "Zero."));
 
 namespace hummingbus::msgs {
-// What an inertial measurement unit reports.
+// Reading of an inertial measurement unit.
 struct Imu {
   // Simulation time.
   Time stamp{};
@@ -314,13 +314,13 @@ struct Imu {
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::Imu, "hummingbus_msgs/msg/Imu", "What an inertial measurement unit reports.",
+HUMMINGBUS_MESSAGE(hummingbus::msgs::Imu, "hummingbus_msgs/msg/Imu", "Reading of an inertial measurement unit.",
     HUMMINGBUS_FIELD(stamp, "", "", "Simulation time."),
     HUMMINGBUS_FIELD(specific_force, "m/s^2", "body", "Measured specific force (at rest: +g along z)."),
     HUMMINGBUS_FIELD(angular_velocity, "rad/s", "body", "Measured angular velocity."));
 
 namespace hummingbus::msgs {
-// How well an estimator's predictions met its measurements: the last update of each sensor.
+// Agreement of an estimator's predictions with its measurements: the last update of each sensor.
 struct Innovation {
   // Simulation time.
   Time stamp{};
@@ -335,7 +335,7 @@ struct Innovation {
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::Innovation, "hummingbus_msgs/msg/Innovation", "How well an estimator's predictions met its measurements: the last update of each sensor.",
+HUMMINGBUS_MESSAGE(hummingbus::msgs::Innovation, "hummingbus_msgs/msg/Innovation", "Agreement of an estimator's predictions with its measurements: the last update of each sensor.",
     HUMMINGBUS_FIELD(stamp, "", "", "Simulation time."),
     HUMMINGBUS_FIELD(normalised_squared, "1", "", "Normalised innovation squared of the last update by GPS, motion capture, barometer, magnetometer."),
     HUMMINGBUS_FIELD(degrees_of_freedom, "1", "", "Its degrees of freedom, which it should equal on average."),
@@ -343,7 +343,7 @@ HUMMINGBUS_MESSAGE(hummingbus::msgs::Innovation, "hummingbus_msgs/msg/Innovation
     HUMMINGBUS_FIELD(refused, "1", "", "Measurements refused as outliers so far."));
 
 namespace hummingbus::msgs {
-// What a link says of itself, from its first tick on; arrays by the names of the streams.
+// Statistics of a link, from its first tick on; arrays by the names of the streams.
 struct LinkStatistics {
   // Simulation time.
   Time stamp{};
@@ -353,7 +353,7 @@ struct LinkStatistics {
   std::uint32_t queued_bytes{};
   // Messages that wait for the wire. [1]
   std::uint32_t queued{};
-  // How long the message that arrived last had taken since it was queued. [s]
+  // Time from queueing to arrival of the message that arrived last. [s]
   double delay{};
   // Messages that are on the wire or behind it. [1]
   std::uint32_t under_way{};
@@ -372,12 +372,12 @@ struct LinkStatistics {
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::LinkStatistics, "hummingbus_msgs/msg/LinkStatistics", "What a link says of itself, from its first tick on; arrays by the names of the streams.",
+HUMMINGBUS_MESSAGE(hummingbus::msgs::LinkStatistics, "hummingbus_msgs/msg/LinkStatistics", "Statistics of a link, from its first tick on; arrays by the names of the streams.",
     HUMMINGBUS_FIELD(stamp, "", "", "Simulation time."),
     HUMMINGBUS_FIELD(sent_bytes, "1", "", "Whole bytes that the wire has carried."),
     HUMMINGBUS_FIELD(queued_bytes, "1", "", "Bytes that wait for the wire."),
     HUMMINGBUS_FIELD(queued, "1", "", "Messages that wait for the wire."),
-    HUMMINGBUS_FIELD(delay, "s", "", "How long the message that arrived last had taken since it was queued."),
+    HUMMINGBUS_FIELD(delay, "s", "", "Time from queueing to arrival of the message that arrived last."),
     HUMMINGBUS_FIELD(under_way, "1", "", "Messages that are on the wire or behind it."),
     HUMMINGBUS_FIELD(arrived, "1", "", "Messages that have arrived."),
     HUMMINGBUS_FIELD(lost, "1", "", "Messages that were lost on the way; counted when they would have arrived."),
@@ -387,7 +387,7 @@ HUMMINGBUS_MESSAGE(hummingbus::msgs::LinkStatistics, "hummingbus_msgs/msg/LinkSt
     HUMMINGBUS_FIELD(stream_dropped, "1", "", "Messages that were dropped because the queue was full, by stream."));
 
 namespace hummingbus::msgs {
-// What a magnetometer reports.
+// Reading of a magnetometer.
 struct Magnetometer {
   // Simulation time of sending.
   Time stamp{};
@@ -402,7 +402,7 @@ struct Magnetometer {
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::Magnetometer, "hummingbus_msgs/msg/Magnetometer", "What a magnetometer reports.",
+HUMMINGBUS_MESSAGE(hummingbus::msgs::Magnetometer, "hummingbus_msgs/msg/Magnetometer", "Reading of a magnetometer.",
     HUMMINGBUS_FIELD(stamp, "", "", "Simulation time of sending."),
     HUMMINGBUS_FIELD(measured_ns, "ns", "", "Simulation time at which it was measured."),
     HUMMINGBUS_FIELD(field, "T", "body", "Magnetic flux density."),
@@ -433,7 +433,7 @@ HUMMINGBUS_MESSAGE(hummingbus::msgs::MeasuredState, "hummingbus_msgs/msg/Measure
     HUMMINGBUS_FIELD(angular_velocity, "rad/s", "body", "Angular velocity."));
 
 namespace hummingbus::msgs {
-// What a motion-capture system reports.
+// Reading of a motion-capture system.
 struct Mocap {
   // Simulation time of sending.
   Time stamp{};
@@ -450,7 +450,7 @@ struct Mocap {
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::Mocap, "hummingbus_msgs/msg/Mocap", "What a motion-capture system reports.",
+HUMMINGBUS_MESSAGE(hummingbus::msgs::Mocap, "hummingbus_msgs/msg/Mocap", "Reading of a motion-capture system.",
     HUMMINGBUS_FIELD(stamp, "", "", "Simulation time of sending."),
     HUMMINGBUS_FIELD(measured_ns, "ns", "", "Simulation time at which it was measured."),
     HUMMINGBUS_FIELD(position, "m", "world", "Position of the centre of mass."),
@@ -502,7 +502,7 @@ HUMMINGBUS_MESSAGE(hummingbus::msgs::PlantState, "hummingbus_msgs/msg/PlantState
     HUMMINGBUS_FIELD(rotor_speed, "rad/s", "", "Rotor speeds, in the order of the vehicle file."));
 
 namespace hummingbus::msgs {
-// What five range finders report, in the order +x, -x, +y, -y of the body, and down.
+// Readings of five range finders, in the order +x, -x, +y, -y of the body, and down.
 struct Ranges {
   // Simulation time of sending.
   Time stamp{};
@@ -517,7 +517,7 @@ struct Ranges {
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::Ranges, "hummingbus_msgs/msg/Ranges", "What five range finders report, in the order +x, -x, +y, -y of the body, and down.",
+HUMMINGBUS_MESSAGE(hummingbus::msgs::Ranges, "hummingbus_msgs/msg/Ranges", "Readings of five range finders, in the order +x, -x, +y, -y of the body, and down.",
     HUMMINGBUS_FIELD(stamp, "", "", "Simulation time of sending."),
     HUMMINGBUS_FIELD(measured_ns, "ns", "", "Simulation time at which it was measured."),
     HUMMINGBUS_FIELD(distance, "m", "body", "Distances; the sensor's reach where nothing is met."),
@@ -571,7 +571,7 @@ HUMMINGBUS_MESSAGE(hummingbus::msgs::Reference, "hummingbus_msgs/msg/Reference",
     HUMMINGBUS_FIELD(yaw_rate, "rad/s", "world", "Its rate of change."));
 
 namespace hummingbus::msgs {
-// What the stand's sensors read.
+// Readings of the stand's sensors.
 struct RotorLoad {
   // Simulation time.
   Time stamp{};
@@ -588,7 +588,7 @@ struct RotorLoad {
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::RotorLoad, "hummingbus_msgs/msg/RotorLoad", "What the stand's sensors read.",
+HUMMINGBUS_MESSAGE(hummingbus::msgs::RotorLoad, "hummingbus_msgs/msg/RotorLoad", "Readings of the stand's sensors.",
     HUMMINGBUS_FIELD(stamp, "", "", "Simulation time."),
     HUMMINGBUS_FIELD(rotor_speed_commanded, "rad/s", "", "The speed that the motor is asked for."),
     HUMMINGBUS_FIELD(rotor_speed, "rad/s", "", "Speed of the rotor, positive in its own sense of rotation."),
@@ -597,7 +597,7 @@ HUMMINGBUS_MESSAGE(hummingbus::msgs::RotorLoad, "hummingbus_msgs/msg/RotorLoad",
     HUMMINGBUS_FIELD(mount_torque, "N*m", "body", "Torque on what the motor is bolted to, about the axis that points up: the air's drag and what speeds the rotor up."));
 
 namespace hummingbus::msgs {
-// What the controllers of the motors report.
+// Readings of the motor controllers.
 struct RotorSpeeds {
   // Simulation time of sending.
   Time stamp{};
@@ -612,7 +612,7 @@ struct RotorSpeeds {
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::RotorSpeeds, "hummingbus_msgs/msg/RotorSpeeds", "What the controllers of the motors report.",
+HUMMINGBUS_MESSAGE(hummingbus::msgs::RotorSpeeds, "hummingbus_msgs/msg/RotorSpeeds", "Readings of the motor controllers.",
     HUMMINGBUS_FIELD(stamp, "", "", "Simulation time of sending."),
     HUMMINGBUS_FIELD(measured_ns, "ns", "", "Simulation time at which it was measured."),
     HUMMINGBUS_FIELD(valid, "1", "", "1 if this sample holds a measurement, 0 if it was lost."),
@@ -620,7 +620,7 @@ HUMMINGBUS_MESSAGE(hummingbus::msgs::RotorSpeeds, "hummingbus_msgs/msg/RotorSpee
     HUMMINGBUS_FIELD(rotor_speed, "rad/s", "", "Speeds of the rotors, in the order of the vehicle file."));
 
 namespace hummingbus::msgs {
-// What a pilot or a planner asks of the controller.
+// Set points that a pilot or a planner gives to the controller.
 struct SetPoint {
   // Simulation time.
   Time stamp{};
@@ -635,7 +635,7 @@ struct SetPoint {
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::SetPoint, "hummingbus_msgs/msg/SetPoint", "What a pilot or a planner asks of the controller.",
+HUMMINGBUS_MESSAGE(hummingbus::msgs::SetPoint, "hummingbus_msgs/msg/SetPoint", "Set points that a pilot or a planner gives to the controller.",
     HUMMINGBUS_FIELD(stamp, "", "", "Simulation time."),
     HUMMINGBUS_FIELD(altitude, "m", "world", "Altitude of the centre of mass."),
     HUMMINGBUS_FIELD(roll, "rad", "world", "Roll."),
@@ -643,7 +643,7 @@ HUMMINGBUS_MESSAGE(hummingbus::msgs::SetPoint, "hummingbus_msgs/msg/SetPoint", "
     HUMMINGBUS_FIELD(yaw, "rad", "world", "Yaw."));
 
 namespace hummingbus::msgs {
-// What an estimator believes of the vehicle's motion.
+// Estimate of the vehicle's motion.
 struct StateEstimate {
   // Simulation time.
   Time stamp{};
@@ -664,7 +664,7 @@ struct StateEstimate {
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::StateEstimate, "hummingbus_msgs/msg/StateEstimate", "What an estimator believes of the vehicle's motion.",
+HUMMINGBUS_MESSAGE(hummingbus::msgs::StateEstimate, "hummingbus_msgs/msg/StateEstimate", "Estimate of the vehicle's motion.",
     HUMMINGBUS_FIELD(stamp, "", "", "Simulation time."),
     HUMMINGBUS_FIELD(position, "m", "world", "Position of the centre of mass."),
     HUMMINGBUS_FIELD(velocity, "m/s", "world", "Velocity of the centre of mass."),
@@ -675,11 +675,11 @@ HUMMINGBUS_MESSAGE(hummingbus::msgs::StateEstimate, "hummingbus_msgs/msg/StateEs
     HUMMINGBUS_FIELD(attitude_sigma, "rad", "body", "Standard deviation of the attitude, as a rotation vector."));
 
 namespace hummingbus::msgs {
-// Where the vehicles of a run are, for those that share a room.
+// Positions and velocities of the vehicles of a run, for vehicles that share a room.
 struct Traffic {
   // Simulation time.
   Time stamp{};
-  // How many vehicles there are. [1]
+  // Number of vehicles. [1]
   std::uint32_t count{};
   // Zero.
   std::uint32_t pad0{};
@@ -690,15 +690,15 @@ struct Traffic {
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::Traffic, "hummingbus_msgs/msg/Traffic", "Where the vehicles of a run are, for those that share a room.",
+HUMMINGBUS_MESSAGE(hummingbus::msgs::Traffic, "hummingbus_msgs/msg/Traffic", "Positions and velocities of the vehicles of a run, for vehicles that share a room.",
     HUMMINGBUS_FIELD(stamp, "", "", "Simulation time."),
-    HUMMINGBUS_FIELD(count, "1", "", "How many vehicles there are."),
+    HUMMINGBUS_FIELD(count, "1", "", "Number of vehicles."),
     HUMMINGBUS_FIELD(pad0, "", "", "Zero."),
     HUMMINGBUS_FIELD(position, "m", "world", "Positions of their centres of mass, in the order of the inputs' names."),
     HUMMINGBUS_FIELD(velocity, "m/s", "world", "Their velocities."));
 
 namespace hummingbus::msgs {
-// What an estimator makes of range finders: level distances to what stands around.
+// Estimate from range finders: level distances to the surroundings, height and velocity.
 struct WallEstimate {
   // Simulation time.
   Time stamp{};
@@ -715,7 +715,7 @@ struct WallEstimate {
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::WallEstimate, "hummingbus_msgs/msg/WallEstimate", "What an estimator makes of range finders: level distances to what stands around.",
+HUMMINGBUS_MESSAGE(hummingbus::msgs::WallEstimate, "hummingbus_msgs/msg/WallEstimate", "Estimate from range finders: level distances to the surroundings, height and velocity.",
     HUMMINGBUS_FIELD(stamp, "", "", "Simulation time."),
     HUMMINGBUS_FIELD(distance, "m", "", "Level distances along the heading's +x, -x, +y, -y; the sensor's reach where nothing is in sight."),
     HUMMINGBUS_FIELD(in_sight, "1", "", "1 where a wall is in sight."),
@@ -724,13 +724,13 @@ HUMMINGBUS_MESSAGE(hummingbus::msgs::WallEstimate, "hummingbus_msgs/msg/WallEsti
     HUMMINGBUS_FIELD(climb_rate, "m/s", "", "Rate of climb."));
 
 namespace hummingbus::msgs {
-// What is remembered of a channel from tick to tick, beside the queue of measurements.
+// State of a channel from tick to tick, beside the queue of measurements.
 struct ChannelState {
   // Simulation time from which on the next measurement is due. [ns]
   std::uint64_t next_ns{};
   // Measurements so far; number n is at place n modulo the length of the queue. [1]
   std::uint64_t measured{};
-  // How many of them have arrived. [1]
+  // Number of measurements that have arrived. [1]
   std::uint64_t arrived{};
   // When those in the queue arrive. [ns]
   std::array<std::uint64_t, 32> arrival_ns{};
@@ -738,27 +738,27 @@ struct ChannelState {
   std::array<std::uint64_t, 2> noise_words{};
   // The same of the stream of losses. [1]
   std::array<std::uint64_t, 2> loss_words{};
-  // Which parts of the last measurement were lost, a bit for each. [1]
+  // Lost parts of the last measurement, a bit for each. [1]
   std::uint32_t lost{};
   // Zero.
   std::uint32_t pad0{};
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::ChannelState, "hummingbus_msgs/msg/ChannelState", "What is remembered of a channel from tick to tick, beside the queue of measurements.",
+HUMMINGBUS_MESSAGE(hummingbus::msgs::ChannelState, "hummingbus_msgs/msg/ChannelState", "State of a channel from tick to tick, beside the queue of measurements.",
     HUMMINGBUS_FIELD(next_ns, "ns", "", "Simulation time from which on the next measurement is due."),
     HUMMINGBUS_FIELD(measured, "1", "", "Measurements so far; number n is at place n modulo the length of the queue."),
-    HUMMINGBUS_FIELD(arrived, "1", "", "How many of them have arrived."),
+    HUMMINGBUS_FIELD(arrived, "1", "", "Number of measurements that have arrived."),
     HUMMINGBUS_FIELD(arrival_ns, "ns", "", "When those in the queue arrive."),
     HUMMINGBUS_FIELD(noise_words, "1", "", "Words of 32 bits drawn from the noise stream: the low and the high half of the count."),
     HUMMINGBUS_FIELD(loss_words, "1", "", "The same of the stream of losses."),
-    HUMMINGBUS_FIELD(lost, "1", "", "Which parts of the last measurement were lost, a bit for each."),
+    HUMMINGBUS_FIELD(lost, "1", "", "Lost parts of the last measurement, a bit for each."),
     HUMMINGBUS_FIELD(pad0, "", "", "Zero."));
 
 namespace hummingbus::msgs {
-// All that the sensor remembers.
+// State of the sensor.
 struct BarometerState {
-  // What is under way.
+  // Measurements that are under way.
   ChannelState channel{};
   // The last measurements.
   std::array<Barometer, 32> queue{};
@@ -767,15 +767,15 @@ struct BarometerState {
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::BarometerState, "hummingbus_msgs/msg/BarometerState", "All that the sensor remembers.",
-    HUMMINGBUS_FIELD(channel, "", "", "What is under way."),
+HUMMINGBUS_MESSAGE(hummingbus::msgs::BarometerState, "hummingbus_msgs/msg/BarometerState", "State of the sensor.",
+    HUMMINGBUS_FIELD(channel, "", "", "Measurements that are under way."),
     HUMMINGBUS_FIELD(queue, "", "", "The last measurements."),
     HUMMINGBUS_FIELD(bias, "Pa", "", "The bias at the next measurement."));
 
 namespace hummingbus::msgs {
-// All that the sensor remembers.
+// State of the sensor.
 struct BatteryMonitorState {
-  // What is under way.
+  // Measurements that are under way.
   ChannelState channel{};
   // The last measurements.
   std::array<Battery, 32> queue{};
@@ -786,14 +786,14 @@ struct BatteryMonitorState {
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::BatteryMonitorState, "hummingbus_msgs/msg/BatteryMonitorState", "All that the sensor remembers.",
-    HUMMINGBUS_FIELD(channel, "", "", "What is under way."),
+HUMMINGBUS_MESSAGE(hummingbus::msgs::BatteryMonitorState, "hummingbus_msgs/msg/BatteryMonitorState", "State of the sensor.",
+    HUMMINGBUS_FIELD(channel, "", "", "Measurements that are under way."),
     HUMMINGBUS_FIELD(queue, "", "", "The last measurements."),
     HUMMINGBUS_FIELD(charge, "1", "", "The charge that is left."),
     HUMMINGBUS_FIELD(counted_ns, "ns", "", "Until when it is counted; the end of time before the first measurement."));
 
 namespace hummingbus::msgs {
-// All that the component remembers.
+// State of the component.
 struct ClearanceState {
   // Bearing of the vehicle from the world's origin at the last tick; not a number before the first. [rad] in world
   double bearing{};
@@ -802,12 +802,12 @@ struct ClearanceState {
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::ClearanceState, "hummingbus_msgs/msg/ClearanceState", "All that the component remembers.",
+HUMMINGBUS_MESSAGE(hummingbus::msgs::ClearanceState, "hummingbus_msgs/msg/ClearanceState", "State of the component.",
     HUMMINGBUS_FIELD(bearing, "rad", "world", "Bearing of the vehicle from the world's origin at the last tick; not a number before the first."),
     HUMMINGBUS_FIELD(laps, "1", "", "Turns flown clockwise."));
 
 namespace hummingbus::msgs {
-// What the filter knows between two samples.
+// State of the filter between two samples.
 struct ComplementaryState {
   // The estimated attitude at the last sample, body to world. in world
   Quaternion attitude{};
@@ -816,12 +816,12 @@ struct ComplementaryState {
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::ComplementaryState, "hummingbus_msgs/msg/ComplementaryState", "What the filter knows between two samples.",
+HUMMINGBUS_MESSAGE(hummingbus::msgs::ComplementaryState, "hummingbus_msgs/msg/ComplementaryState", "State of the filter between two samples.",
     HUMMINGBUS_FIELD(attitude, "", "world", "The estimated attitude at the last sample, body to world."),
     HUMMINGBUS_FIELD(last_angular_velocity, "rad/s", "body", "The last sample's angular rate; not a number before the first."));
 
 namespace hummingbus::msgs {
-// Which law a state belongs to; zero before the first tick.
+// Law that a state belongs to; zero before the first tick.
 struct LawId {
   // The law's name, zeros behind. [1]
   std::array<std::uint8_t, 24> name{};
@@ -830,12 +830,12 @@ struct LawId {
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::LawId, "hummingbus_msgs/msg/LawId", "Which law a state belongs to; zero before the first tick.",
+HUMMINGBUS_MESSAGE(hummingbus::msgs::LawId, "hummingbus_msgs/msg/LawId", "Law that a state belongs to; zero before the first tick.",
     HUMMINGBUS_FIELD(name, "1", "", "The law's name, zeros behind."),
     HUMMINGBUS_FIELD(state, "1", "", "Layout hash of its state."));
 
 namespace hummingbus::msgs {
-// What the integrators of a law ask for, in units that mean the same to all laws.
+// Outputs of the integrators of a law, in units that mean the same to all laws.
 struct ControlIntegrals {
   // Vertical acceleration. [m/s^2] in world
   double lift{};
@@ -844,12 +844,12 @@ struct ControlIntegrals {
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::ControlIntegrals, "hummingbus_msgs/msg/ControlIntegrals", "What the integrators of a law ask for, in units that mean the same to all laws.",
+HUMMINGBUS_MESSAGE(hummingbus::msgs::ControlIntegrals, "hummingbus_msgs/msg/ControlIntegrals", "Outputs of the integrators of a law, in units that mean the same to all laws.",
     HUMMINGBUS_FIELD(lift, "m/s^2", "world", "Vertical acceleration."),
     HUMMINGBUS_FIELD(turn, "rad/s^2", "body", "Angular accelerations for roll, pitch and yaw; zero under `lqr` and `geometric`, which observe a lift alone."));
 
 namespace hummingbus::msgs {
-// All that a controller remembers between ticks.
+// State of a controller between ticks.
 struct ControllerState {
   // The law that left it.
   LawId id{};
@@ -857,9 +857,9 @@ struct ControllerState {
   double thrust{};
   // Torque that was demanded last. [N*m] in body
   std::array<double, 3> torque{};
-  // What the law's integrators ask for.
+  // Outputs of the law's integrators.
   ControlIntegrals integrals{};
-  // What is left of the predecessor's thrust that this law does not ask for itself. [N] in body
+  // Remaining part of the predecessor's thrust that this law does not ask for itself. [N] in body
   double residual_thrust{};
   // The same of its torque. [N*m] in body
   std::array<double, 3> residual_torque{};
@@ -868,19 +868,19 @@ struct ControllerState {
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::ControllerState, "hummingbus_msgs/msg/ControllerState", "All that a controller remembers between ticks.",
+HUMMINGBUS_MESSAGE(hummingbus::msgs::ControllerState, "hummingbus_msgs/msg/ControllerState", "State of a controller between ticks.",
     HUMMINGBUS_FIELD(id, "", "", "The law that left it."),
     HUMMINGBUS_FIELD(thrust, "N", "body", "Thrust that was demanded last."),
     HUMMINGBUS_FIELD(torque, "N*m", "body", "Torque that was demanded last."),
-    HUMMINGBUS_FIELD(integrals, "", "", "What the law's integrators ask for."),
-    HUMMINGBUS_FIELD(residual_thrust, "N", "body", "What is left of the predecessor's thrust that this law does not ask for itself."),
+    HUMMINGBUS_FIELD(integrals, "", "", "Outputs of the law's integrators."),
+    HUMMINGBUS_FIELD(residual_thrust, "N", "body", "Remaining part of the predecessor's thrust that this law does not ask for itself."),
     HUMMINGBUS_FIELD(residual_torque, "N*m", "body", "The same of its torque."),
     HUMMINGBUS_FIELD(law_state, "1", "", "The law's own state in the first words."));
 
 namespace hummingbus::msgs {
-// All that the sensor remembers.
+// State of the sensor.
 struct GpsState {
-  // What is under way.
+  // Measurements that are under way.
   ChannelState channel{};
   // The last measurements.
   std::array<Gps, 32> queue{};
@@ -889,13 +889,13 @@ struct GpsState {
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::GpsState, "hummingbus_msgs/msg/GpsState", "All that the sensor remembers.",
-    HUMMINGBUS_FIELD(channel, "", "", "What is under way."),
+HUMMINGBUS_MESSAGE(hummingbus::msgs::GpsState, "hummingbus_msgs/msg/GpsState", "State of the sensor.",
+    HUMMINGBUS_FIELD(channel, "", "", "Measurements that are under way."),
     HUMMINGBUS_FIELD(queue, "", "", "The last measurements."),
     HUMMINGBUS_FIELD(drift, "m", "world", "The drift at the last measurement; not a number before the first."));
 
 namespace hummingbus::msgs {
-// All that the IMU remembers: its biases, how far its random stream was drawn, and the readings under way.
+// State of the IMU: its biases, the place in its random stream, and the readings under way.
 struct ImuState {
   // The accelerometer's bias at the next reading. [m/s^2] in body
   Vector3 accelerometer_bias{};
@@ -909,27 +909,27 @@ struct ImuState {
   std::array<double, 12> rotor_angles{};
   // The true angular velocity at the last reading. [rad/s] in body
   Vector3 last_angular_velocity{};
-  // What has come through the accelerometer's low pass. [m/s^2] in body
+  // Specific force behind the accelerometer's low pass. [m/s^2] in body
   Vector3 filtered_specific_force{};
-  // What has come through the gyroscope's low pass. [rad/s] in body
+  // Angular velocity behind the gyroscope's low pass. [rad/s] in body
   Vector3 filtered_angular_velocity{};
-  // What is under way.
+  // Measurements that are under way.
   ChannelState channel{};
   // The last readings.
   std::array<Imu, 32> queue{};
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::ImuState, "hummingbus_msgs/msg/ImuState", "All that the IMU remembers: its biases, how far its random stream was drawn, and the readings under way.",
+HUMMINGBUS_MESSAGE(hummingbus::msgs::ImuState, "hummingbus_msgs/msg/ImuState", "State of the IMU: its biases, the place in its random stream, and the readings under way.",
     HUMMINGBUS_FIELD(accelerometer_bias, "m/s^2", "body", "The accelerometer's bias at the next reading."),
     HUMMINGBUS_FIELD(gyroscope_bias, "rad/s", "body", "The gyroscope's bias at the next reading."),
     HUMMINGBUS_FIELD(random_words, "1", "", "Words of 32 bits drawn from the random stream: the low and the high half of the count."),
     HUMMINGBUS_FIELD(readings, "1", "", "Readings so far."),
     HUMMINGBUS_FIELD(rotor_angles, "rad", "", "The angle of each rotor, from where it started."),
     HUMMINGBUS_FIELD(last_angular_velocity, "rad/s", "body", "The true angular velocity at the last reading."),
-    HUMMINGBUS_FIELD(filtered_specific_force, "m/s^2", "body", "What has come through the accelerometer's low pass."),
-    HUMMINGBUS_FIELD(filtered_angular_velocity, "rad/s", "body", "What has come through the gyroscope's low pass."),
-    HUMMINGBUS_FIELD(channel, "", "", "What is under way."),
+    HUMMINGBUS_FIELD(filtered_specific_force, "m/s^2", "body", "Specific force behind the accelerometer's low pass."),
+    HUMMINGBUS_FIELD(filtered_angular_velocity, "rad/s", "body", "Angular velocity behind the gyroscope's low pass."),
+    HUMMINGBUS_FIELD(channel, "", "", "Measurements that are under way."),
     HUMMINGBUS_FIELD(queue, "", "", "The last readings."));
 
 namespace hummingbus::msgs {
@@ -965,7 +965,7 @@ HUMMINGBUS_MESSAGE(hummingbus::msgs::LinkPacket, "hummingbus_msgs/msg/LinkPacket
     HUMMINGBUS_FIELD(message, "1", "", "The message."));
 
 namespace hummingbus::msgs {
-// What a line has carried.
+// Traffic that a line has carried.
 struct LineCounts {
   // Bytes of the messages whose sending has begun. [1]
   std::uint64_t begun_bytes{};
@@ -977,27 +977,27 @@ struct LineCounts {
   std::array<std::uint32_t, 16> lost{};
   // Messages for which the queue had no room, by stream. [1]
   std::array<std::uint32_t, 16> dropped{};
-  // How long the message that arrived last had taken since it was queued. [ns]
+  // Time from queueing to arrival of the message that arrived last. [ns]
   std::uint64_t delay_ns{};
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::LineCounts, "hummingbus_msgs/msg/LineCounts", "What a line has carried.",
+HUMMINGBUS_MESSAGE(hummingbus::msgs::LineCounts, "hummingbus_msgs/msg/LineCounts", "Traffic that a line has carried.",
     HUMMINGBUS_FIELD(begun_bytes, "1", "", "Bytes of the messages whose sending has begun."),
     HUMMINGBUS_FIELD(begun, "1", "", "Those messages."),
     HUMMINGBUS_FIELD(arrived, "1", "", "Messages that have arrived, by stream."),
     HUMMINGBUS_FIELD(lost, "1", "", "Messages that were lost on the way, by stream; counted when they would have arrived."),
     HUMMINGBUS_FIELD(dropped, "1", "", "Messages for which the queue had no room, by stream."),
-    HUMMINGBUS_FIELD(delay_ns, "ns", "", "How long the message that arrived last had taken since it was queued."));
+    HUMMINGBUS_FIELD(delay_ns, "ns", "", "Time from queueing to arrival of the message that arrived last."));
 
 namespace hummingbus::msgs {
-// What a line remembers.
+// State of a line.
 struct LineState {
   // The messages that wait or are under way, in any order.
   std::array<LinkPacket, 64> packets{};
   // The newest message of each stream that has arrived. [1]
   std::array<std::array<std::uint8_t, 256>, 16> newest{};
-  // What has happened so far.
+  // Counts so far.
   LineCounts counts{};
   // Messages queued so far. [1]
   std::uint64_t queued{};
@@ -1012,10 +1012,10 @@ struct LineState {
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::LineState, "hummingbus_msgs/msg/LineState", "What a line remembers.",
+HUMMINGBUS_MESSAGE(hummingbus::msgs::LineState, "hummingbus_msgs/msg/LineState", "State of a line.",
     HUMMINGBUS_FIELD(packets, "", "", "The messages that wait or are under way, in any order."),
     HUMMINGBUS_FIELD(newest, "1", "", "The newest message of each stream that has arrived."),
-    HUMMINGBUS_FIELD(counts, "", "", "What has happened so far."),
+    HUMMINGBUS_FIELD(counts, "", "", "Counts so far."),
     HUMMINGBUS_FIELD(queued, "1", "", "Messages queued so far."),
     HUMMINGBUS_FIELD(busy_since_ns, "ns", "", "When the wire began to be busy without a break."),
     HUMMINGBUS_FIELD(busy_bits, "1", "", "Bits that it carries from then on."),
@@ -1023,7 +1023,7 @@ HUMMINGBUS_MESSAGE(hummingbus::msgs::LineState, "hummingbus_msgs/msg/LineState",
     HUMMINGBUS_FIELD(last_arrival_ns, "ns", "", "When the message that was sent last arrives: the next does not overtake it."));
 
 namespace hummingbus::msgs {
-// What a link remembers: what it last took from each input, and what is on its line.
+// State of a link: marks of the messages that it took last from its inputs, and its line.
 struct LinkState {
   // 
   LineState line{};
@@ -1034,37 +1034,37 @@ struct LinkState {
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::LinkState, "hummingbus_msgs/msg/LinkState", "What a link remembers: what it last took from each input, and what is on its line.",
+HUMMINGBUS_MESSAGE(hummingbus::msgs::LinkState, "hummingbus_msgs/msg/LinkState", "State of a link: marks of the messages that it took last from its inputs, and its line.",
     HUMMINGBUS_FIELD(line, "", "", ""),
     HUMMINGBUS_FIELD(taken_mark, "1", "", "The mark of the message that was taken last from each input; all bits set before the first."),
     HUMMINGBUS_FIELD(taken_period, "1", "", "The period of its rate in which it was taken; all bits set before the first."));
 
 namespace hummingbus::msgs {
-// All that the sensor remembers.
+// State of the sensor.
 struct MagnetometerState {
-  // What is under way.
+  // Measurements that are under way.
   ChannelState channel{};
   // The last measurements.
   std::array<Magnetometer, 32> queue{};
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::MagnetometerState, "hummingbus_msgs/msg/MagnetometerState", "All that the sensor remembers.",
-    HUMMINGBUS_FIELD(channel, "", "", "What is under way."),
+HUMMINGBUS_MESSAGE(hummingbus::msgs::MagnetometerState, "hummingbus_msgs/msg/MagnetometerState", "State of the sensor.",
+    HUMMINGBUS_FIELD(channel, "", "", "Measurements that are under way."),
     HUMMINGBUS_FIELD(queue, "", "", "The last measurements."));
 
 namespace hummingbus::msgs {
-// All that the sensor remembers.
+// State of the sensor.
 struct MocapState {
-  // What is under way.
+  // Measurements that are under way.
   ChannelState channel{};
   // The last measurements.
   std::array<Mocap, 32> queue{};
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::MocapState, "hummingbus_msgs/msg/MocapState", "All that the sensor remembers.",
-    HUMMINGBUS_FIELD(channel, "", "", "What is under way."),
+HUMMINGBUS_MESSAGE(hummingbus::msgs::MocapState, "hummingbus_msgs/msg/MocapState", "State of the sensor.",
+    HUMMINGBUS_FIELD(channel, "", "", "Measurements that are under way."),
     HUMMINGBUS_FIELD(queue, "", "", "The last measurements."));
 
 namespace hummingbus::msgs {
@@ -1097,7 +1097,7 @@ HUMMINGBUS_MESSAGE(hummingbus::msgs::OperatorState, "hummingbus_msgs/msg/Operato
     HUMMINGBUS_FIELD(reserved, "", "", "Zero."));
 
 namespace hummingbus::msgs {
-// All that it remembers.
+// State of the position hold.
 struct PositionHoldState {
   // The place that is held; without meaning along an axis that is not locked. [m] in world
   std::array<double, 2> place{};
@@ -1106,12 +1106,12 @@ struct PositionHoldState {
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::PositionHoldState, "hummingbus_msgs/msg/PositionHoldState", "All that it remembers.",
+HUMMINGBUS_MESSAGE(hummingbus::msgs::PositionHoldState, "hummingbus_msgs/msg/PositionHoldState", "State of the position hold.",
     HUMMINGBUS_FIELD(place, "m", "world", "The place that is held; without meaning along an axis that is not locked."),
     HUMMINGBUS_FIELD(locked, "1", "", "1 where the place along the heading's x, or y, is locked."));
 
 namespace hummingbus::msgs {
-// All that the component remembers.
+// State of the component.
 struct PropellerStandState {
   // Speed of the rotor. [rad/s]
   double speed{};
@@ -1120,16 +1120,16 @@ struct PropellerStandState {
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::PropellerStandState, "hummingbus_msgs/msg/PropellerStandState", "All that the component remembers.",
+HUMMINGBUS_MESSAGE(hummingbus::msgs::PropellerStandState, "hummingbus_msgs/msg/PropellerStandState", "State of the component.",
     HUMMINGBUS_FIELD(speed, "rad/s", "", "Speed of the rotor."),
     HUMMINGBUS_FIELD(acceleration, "rad/s^2", "", "Its rate of change."));
 
 namespace hummingbus::msgs {
-// What the filter knows of one axis.
+// Estimate along one axis.
 struct RangeInertialAxis {
   // Velocity. [m/s] in world
   double velocity{};
-  // What is wrong with the acceleration that is fed in. [m/s^2] in world
+  // Error of the acceleration that is fed in. [m/s^2] in world
   double bias{};
   // Displacement since the start. [m] in world
   double path{};
@@ -1142,9 +1142,9 @@ struct RangeInertialAxis {
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::RangeInertialAxis, "hummingbus_msgs/msg/RangeInertialAxis", "What the filter knows of one axis.",
+HUMMINGBUS_MESSAGE(hummingbus::msgs::RangeInertialAxis, "hummingbus_msgs/msg/RangeInertialAxis", "Estimate along one axis.",
     HUMMINGBUS_FIELD(velocity, "m/s", "world", "Velocity."),
-    HUMMINGBUS_FIELD(bias, "m/s^2", "world", "What is wrong with the acceleration that is fed in."),
+    HUMMINGBUS_FIELD(bias, "m/s^2", "world", "Error of the acceleration that is fed in."),
     HUMMINGBUS_FIELD(path, "m", "world", "Displacement since the start."),
     HUMMINGBUS_FIELD(distance, "m", "world", "Distances to what stands ahead and behind; without meaning where nothing is in sight."),
     HUMMINGBUS_FIELD(in_sight, "1", "", "1 where something is in sight."),
@@ -1168,7 +1168,7 @@ HUMMINGBUS_MESSAGE(hummingbus::msgs::RangeInertialGains, "hummingbus_msgs/msg/Ra
     HUMMINGBUS_FIELD(kept, "m/s", "world", "The sum as it was every 10 ms, the k-th of these at the place k modulo the number of places."));
 
 namespace hummingbus::msgs {
-// Where the vehicle was at a sample.
+// Pose of the vehicle at a sample.
 struct RangeInertialPast {
   // Displacement since the start. [m] in world
   Vector3 path{};
@@ -1177,12 +1177,12 @@ struct RangeInertialPast {
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::RangeInertialPast, "hummingbus_msgs/msg/RangeInertialPast", "Where the vehicle was at a sample.",
+HUMMINGBUS_MESSAGE(hummingbus::msgs::RangeInertialPast, "hummingbus_msgs/msg/RangeInertialPast", "Pose of the vehicle at a sample.",
     HUMMINGBUS_FIELD(path, "m", "world", "Displacement since the start."),
     HUMMINGBUS_FIELD(attitude, "", "world", "Attitude, body to world."));
 
 namespace hummingbus::msgs {
-// What the estimator remembers, as it is handed over.
+// State of the estimator, as it is handed over.
 struct RangeInertialState {
   // Samples so far.
   std::uint64_t samples{};
@@ -1200,14 +1200,14 @@ struct RangeInertialState {
   Vector3 acceleration{};
   // The axes of the world; the ground is behind the third.
   std::array<RangeInertialAxis, 3> axes{};
-  // What the velocity gained.
+  // Gains of the velocity.
   RangeInertialGains gains{};
   // The last samples, sample k at the place k modulo the number of places.
   std::array<RangeInertialPast, 128> past{};
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::RangeInertialState, "hummingbus_msgs/msg/RangeInertialState", "What the estimator remembers, as it is handed over.",
+HUMMINGBUS_MESSAGE(hummingbus::msgs::RangeInertialState, "hummingbus_msgs/msg/RangeInertialState", "State of the estimator, as it is handed over.",
     HUMMINGBUS_FIELD(samples, "", "", "Samples so far."),
     HUMMINGBUS_FIELD(measured_ns, "ns", "", "When the newest ranges were measured; the largest number before the first."),
     HUMMINGBUS_FIELD(gps_measured_ns, "ns", "", "When the newest velocity of a receiver was measured; the largest number before the first."),
@@ -1216,21 +1216,21 @@ HUMMINGBUS_MESSAGE(hummingbus::msgs::RangeInertialState, "hummingbus_msgs/msg/Ra
     HUMMINGBUS_FIELD(obstacle_ns, "ns", "", "See above; 0 for never."),
     HUMMINGBUS_FIELD(acceleration, "m/s^2", "world", "The last sample's acceleration."),
     HUMMINGBUS_FIELD(axes, "", "", "The axes of the world; the ground is behind the third."),
-    HUMMINGBUS_FIELD(gains, "", "", "What the velocity gained."),
+    HUMMINGBUS_FIELD(gains, "", "", "Gains of the velocity."),
     HUMMINGBUS_FIELD(past, "", "", "The last samples, sample k at the place k modulo the number of places."));
 
 namespace hummingbus::msgs {
-// All that the sensor remembers.
+// State of the sensor.
 struct RangeState {
-  // What is under way.
+  // Measurements that are under way.
   ChannelState channel{};
   // The last measurements.
   std::array<Ranges, 32> queue{};
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::RangeState, "hummingbus_msgs/msg/RangeState", "All that the sensor remembers.",
-    HUMMINGBUS_FIELD(channel, "", "", "What is under way."),
+HUMMINGBUS_MESSAGE(hummingbus::msgs::RangeState, "hummingbus_msgs/msg/RangeState", "State of the sensor.",
+    HUMMINGBUS_FIELD(channel, "", "", "Measurements that are under way."),
     HUMMINGBUS_FIELD(queue, "", "", "The last measurements."));
 
 namespace hummingbus::msgs {
@@ -1245,21 +1245,21 @@ HUMMINGBUS_MESSAGE(hummingbus::msgs::RemoteControlState, "hummingbus_msgs/msg/Re
     HUMMINGBUS_FIELD(throttle, "1", "", "Throttle that the integral has added to that of hover."));
 
 namespace hummingbus::msgs {
-// All that the sensor remembers.
+// State of the sensor.
 struct RpmState {
-  // What is under way.
+  // Measurements that are under way.
   ChannelState channel{};
   // The last measurements.
   std::array<RotorSpeeds, 32> queue{};
-  // What was read last, whether it was lost or not. [rad/s]
+  // Speeds that were read last, lost ones included. [rad/s]
   std::array<double, 12> read{};
   // 1 from the first reading on. [1]
   std::uint64_t has_read{};
 };
 } // namespace hummingbus::msgs
 
-HUMMINGBUS_MESSAGE(hummingbus::msgs::RpmState, "hummingbus_msgs/msg/RpmState", "All that the sensor remembers.",
-    HUMMINGBUS_FIELD(channel, "", "", "What is under way."),
+HUMMINGBUS_MESSAGE(hummingbus::msgs::RpmState, "hummingbus_msgs/msg/RpmState", "State of the sensor.",
+    HUMMINGBUS_FIELD(channel, "", "", "Measurements that are under way."),
     HUMMINGBUS_FIELD(queue, "", "", "The last measurements."),
-    HUMMINGBUS_FIELD(read, "rad/s", "", "What was read last, whether it was lost or not."),
+    HUMMINGBUS_FIELD(read, "rad/s", "", "Speeds that were read last, lost ones included."),
     HUMMINGBUS_FIELD(has_read, "1", "", "1 from the first reading on."));

@@ -1,0 +1,100 @@
+//! Doc comments of this repository begin with a noun or a verb, not with a question word.
+//!
+//! The first line of a comment and the first line of each of its paragraphs count. Their other lines are free.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Words that no paragraph of a doc comment begins with.
+const QUESTIONS: [&str; 8] = ["What", "Whatever", "Who", "Whether", "How", "Which", "Where", "Why"];
+
+/// Folders that hold files of other projects or of builds.
+const FOREIGN: [&str; 3] = ["target", "vendor", "node_modules"];
+
+/// Returns the marker and the content of a line of a doc comment.
+fn doc_line(line: &str) -> Option<(&str, &str)> {
+    let (marker, content) = line.trim_start().split_at_checked(3)?;
+    // A fourth slash makes an ordinary comment.
+    let is_doc = matches!(marker, "///" | "//!") && !content.starts_with('/');
+    is_doc.then_some((marker, content.trim()))
+}
+
+/// True if a text begins with one of [`QUESTIONS`].
+fn is_question(content: &str) -> bool {
+    let first = content.split(|c: char| !c.is_alphabetic()).next().unwrap_or_default();
+    QUESTIONS.contains(&first)
+}
+
+/// Numbers of the lines of `text`, from 1, in which a paragraph of a doc comment begins with a question word.
+fn questions(text: &str) -> Vec<usize> {
+    let mut found = Vec::new();
+    // The marker of the paragraph that the line before belongs to.
+    let mut paragraph = None;
+    for (number, line) in (1..).zip(text.lines()) {
+        let doc = doc_line(line).filter(|(_, content)| !content.is_empty());
+        if let Some((marker, content)) = doc
+            && paragraph != Some(marker)
+            && is_question(content)
+        {
+            found.push(number);
+        }
+        paragraph = doc.map(|(marker, _)| marker);
+    }
+    found
+}
+
+/// Adds the Rust files in `folder` and below to `files`, in the order of their names.
+fn add_files(folder: &Path, files: &mut Vec<PathBuf>) {
+    let mut entries: Vec<_> = fs::read_dir(folder).unwrap().map(Result::unwrap).collect();
+    entries.sort_by_key(fs::DirEntry::file_name);
+    for entry in entries {
+        let (path, name) = (entry.path(), entry.file_name());
+        let name = name.to_string_lossy();
+        if entry.file_type().unwrap().is_dir() {
+            if !name.starts_with('.') && !FOREIGN.contains(&&*name) {
+                add_files(&path, files);
+            }
+        } else if name.ends_with(".rs") {
+            files.push(path);
+        }
+    }
+}
+
+#[test]
+fn doc_comments_begin_with_a_noun_or_a_verb() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut files = Vec::new();
+    add_files(root, &mut files);
+    assert!(files.len() > 500, "found only {} files", files.len());
+    let mut found = String::new();
+    for file in files {
+        let text = fs::read_to_string(&file).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
+        let short = file.strip_prefix(root).unwrap().display();
+        for number in questions(&text) {
+            found += &format!("{short}:{number}: {}\n", text.lines().nth(number - 1).unwrap().trim());
+        }
+    }
+    assert!(
+        found.is_empty(),
+        "begin these with a noun (\"Number of …\", \"True if …\") or a verb (\"Returns …\"):\n{found}"
+    );
+}
+
+#[test]
+fn a_question_word_that_begins_a_paragraph_is_found() {
+    let cases: [(&str, &str, &[usize]); 10] = [
+        ("the first line", "/// What it reads.\nfn a() {}\n", &[1]),
+        ("a line of a module", "//! How it flies.\n\n//! Why.\n", &[1, 3]),
+        ("an indented line", "struct A {\n    /// Whether it flies.\n    a: bool,\n}\n", &[2]),
+        ("a paragraph behind a blank line", "/// Flies.\n///\n/// Where it lands is open.\n", &[3]),
+        ("a paragraph behind code", "/// Number of ticks.\nconst N: u8 = 1;\n/// Which rotor.\n", &[3]),
+        ("another marker", "//! Rotors.\n/// Who turns them.\n", &[2]),
+        ("each word", "/// Whatever.\n\n/// Who\n\n/// Which: this.\n", &[1, 3, 5]),
+        ("a noun", "/// Inputs.\n///\n/// Whole numbers, whichever.\nstruct Whatever;\n", &[]),
+        ("a line that goes on", "/// Reads the inputs.\n/// What it reads is kept.\n", &[]),
+        ("other comments", "// What it reads.\n//// Why.\nlet what = \"/// What\"; // How.\n", &[]),
+    ];
+    for (what, text, expected) in cases {
+        assert_eq!(questions(text), expected, "{what}");
+    }
+}
