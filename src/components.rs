@@ -13,6 +13,7 @@ use sensors::sensing::Sensing;
 /// assert!(imu.parameters().contains(&"gyroscope_range_rad_s"));
 /// ```
 pub const COMPONENTS: Registry = Registry::new(&[
+    Registration::of::<autopilots::ArduPilot>(),
     Registration::of::<sensors::complementary::Complementary>(),
     Registration::of::<Sensing<sensors::barometer::BarometerParams>>(),
     Registration::of::<Sensing<sensors::battery::BatteryParams>>(),

@@ -7,15 +7,20 @@
 //! Axes as its packets have them, from x forward, y left, z up: angular velocity (p, −q, r), the specific force negated; the
 //! attitude's quaternion, for the compass, w first, conjugated by half a turn about x; velocity east, north, up.
 
+pub mod mixers;
+
 use crate::autopilot::{Autopilot, Sensed, Throttles};
 use crate::layout::Layout;
 use crate::origin::Origin;
-use crate::process::{Firmware, Scratch};
+use crate::process::Scratch;
+use crate::rest::{Rest, pulse_us, steps};
+use crate::settings;
+use crate::stream::Stream;
 use bus::component::Info;
 use bus::context::NodeContext;
-use bus::messages::{Imu, RcChannels, StateEstimate};
 use diagnostics::ParameterError;
-use diagnostics::parameter::{positive, positive_up_to};
+use diagnostics::parameter::positive;
+use mixers::MIXERS;
 use serde::Deserialize;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -38,8 +43,6 @@ const ARMED_S: f64 = 1.0;
 const STALE_S: f64 = 0.1;
 /// Channels of a packet of the remote control, and motors of a packet of the outputs.
 const CHANNELS: usize = 16;
-/// Host time that an answer may take at most, s.
-const REPLY_TIMEOUT_MAX_S: f64 = 3600.0;
 /// Host time that loading the configuration may take.
 const CONFIGURATION_LIMIT: Duration = Duration::from_secs(20);
 /// Mark of a line of its command line about a command that it refuses.
@@ -63,7 +66,7 @@ pub struct Parameters {
     #[serde(default = "rc_rate_hz")]
     rc_rate_hz: f64,
     /// Host time that an answer may take, in s.
-    #[serde(default = "reply_timeout_s")]
+    #[serde(default = "settings::reply_timeout_s")]
     reply_timeout_s: f64,
     /// Place on the earth of the world's origin.
     #[serde(default)]
@@ -73,10 +76,6 @@ pub struct Parameters {
 /// As receivers of serial protocols send at least.
 fn rc_rate_hz() -> f64 {
     50.0
-}
-
-fn reply_timeout_s() -> f64 {
-    5.0
 }
 
 /// A tick's packets, as `lockstep.c` reads them.
@@ -133,7 +132,7 @@ pub struct Betaflight {
 /// The firmware that runs.
 #[derive(Debug)]
 pub struct Link {
-    firmware: Firmware,
+    stream: Stream,
     /// Packets sent.
     steps: u64,
     /// Steps since the last motor outputs came.
@@ -150,41 +149,25 @@ impl Autopilot for Betaflight {
 
     fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         let Parameters { vehicle, firmware, configuration, armed_by_channel, .. } = parameters;
-        let read = |key: &'static str, path: &PathBuf| {
-            context.files.bytes(path).map_err(|error| {
-                ParameterError::conflict(key, format!("cannot read {}: {error}", path.display()))
-            })
-        };
-        let vehicle = Vehicle::load_from(&context.files, &vehicle)
-            .map_err(|error| ParameterError::conflict("vehicle", error))?;
-        let layout = Layout::of(&vehicle.rotors)
-            .map_err(|reason| ParameterError::conflict("vehicle", format!("{}: {reason}", vehicle.name)))?;
-        let program = read("firmware", &firmware)?.to_vec();
+        let vehicle = settings::vehicle(context, &vehicle)?;
+        let layout = Layout::of(&vehicle.rotors, &MIXERS)
+            .map_err(|reason| settings::refused_vehicle(&vehicle, &reason))?;
+        let program = settings::file(context, "firmware", &firmware)?;
         require_preloadable(&program).map_err(|reason| {
             ParameterError::conflict("firmware", format!("{}: {reason}", firmware.display()))
         })?;
-        let configuration = configuration.map(|path| read("configuration", &path)).transpose()?;
-        let configuration =
-            configuration.map_or(String::new(), |bytes| String::from_utf8_lossy(&bytes).into_owned());
         positive("rc_rate_hz", parameters.rc_rate_hz)?;
-        positive_up_to("reply_timeout_s", parameters.reply_timeout_s, REPLY_TIMEOUT_MAX_S, "s")?;
         parameters.origin.check()?;
-        if let Some(channel) = armed_by_channel.filter(|channel| !(5..=CHANNELS).contains(channel)) {
-            let message = format!(
-                "`armed_by_channel` is {channel}, expected 5 to {CHANNELS}: the first four are the sticks"
-            );
-            return Err(ParameterError::conflict("armed_by_channel", message));
-        }
+        settings::check_arming(armed_by_channel, CHANNELS)?;
         Ok(Self {
             vehicle,
             layout,
             firmware: program,
-            configuration,
+            configuration: settings::configuration(context, configuration.as_deref())?,
             armed_by_channel,
             period_ns: context.tick_ns * u64::from(context.period_ticks),
             rc_ticks: steps(1.0 / parameters.rc_rate_hz, context.period_s()).max(1),
-            // No socket waits for less than a microsecond.
-            reply_timeout: Duration::from_secs_f64(parameters.reply_timeout_s.max(1e-3)),
+            reply_timeout: settings::reply_timeout(parameters.reply_timeout_s)?,
             origin: parameters.origin,
         })
     }
@@ -208,17 +191,20 @@ impl Autopilot for Betaflight {
         }
         let mut command = scratch.command(&program)?;
         command.env("LD_PRELOAD", PRELOADED).env(BOOT_VARIABLE, nanoseconds(BOOT_S).to_string());
-        let firmware = Firmware::start(scratch, command, self.reply_timeout)?;
-        let mut link = Link { firmware, steps: 0, stale_steps: 0 };
+        let stream = Stream::start(scratch, command, self.reply_timeout)?;
+        let mut link = Link { stream, steps: 0, stale_steps: 0 };
         link.receive()?;
-        self.rest(&mut link)?;
-        Ok(link)
+        if self.rest().of(self, &mut link)? {
+            return Ok(link);
+        }
+        let words = "it is not armed at tick 0: its motors stand still under `armed_by_channel` and the configuration";
+        Err(link.stream.firmware().complaint(words))
     }
 
     fn exchange(&self, link: &mut Link, sensed: &Sensed<'_>) -> Result<Throttles, String> {
         let packets = self.packets(link.steps, sensed);
         link.steps += 1;
-        link.firmware.send(bytemuck::bytes_of(&packets))?;
+        link.stream.send(bytemuck::bytes_of(&packets))?;
         let answer = link.receive()?;
         link.stale_steps = if answer.is_fresh == 0 { link.stale_steps + 1 } else { 0 };
         let throttles = if link.stale_steps < steps(STALE_S, self.period_ns as f64 * 1e-9).max(1) {
@@ -226,7 +212,7 @@ impl Autopilot for Betaflight {
         } else {
             Err(format!("it has sent no motor outputs for {STALE_S} s of its time"))
         };
-        throttles.map_err(|words| link.firmware.complaint(&words))
+        throttles.map_err(|words| link.stream.firmware().complaint(&words))
     }
 }
 
@@ -234,7 +220,7 @@ impl Betaflight {
     /// Input of its command line: the commands of the configuration, then the mixer of the vehicle, which they may not undo,
     /// and `save`.
     fn commands(&self) -> String {
-        let Layout { mixer, is_reversed, .. } = self.layout;
+        let Layout { frame: mixer, is_reversed, .. } = self.layout;
         let reversed = if is_reversed { "ON" } else { "OFF" };
         let ends = |line: &&str| matches!(line.split_whitespace().next(), Some("save" | "exit" | "batch"));
         let kept: String =
@@ -242,30 +228,13 @@ impl Betaflight {
         format!("{kept}mixer {mixer}\nset yaw_motors_reversed = {reversed}\nsave\n")
     }
 
-    /// Lets the firmware stand still, level and at the origin, until it is ready; armed, if it is to be.
-    fn rest(&self, link: &mut Link) -> Result<(), String> {
-        let period_s = self.period_ns as f64 * 1e-9;
-        let imu = Imu { specific_force: [0.0, 0.0, self.vehicle.gravity_m_s2].into(), ..Imu::default() };
-        let estimate = StateEstimate::default();
-        let (all, armed) = (steps(REST_S, period_s), steps(ARMED_S, period_s));
-        let mut rc = RcChannels { pulse: [1500.0, 1500.0, 1000.0, 1500.0].into(), ..RcChannels::default() };
-        let mut throttles = Throttles::default();
-        for step in 0..all {
-            if step + armed == all
-                && let Some(channel) = self.armed_by_channel
-            {
-                let pulse = |at| [1500.0, 1500.0, 1000.0, 1500.0].get(at).copied().unwrap_or(1000.0);
-                rc.pulse =
-                    bus::Bounded::from_fn(channel, |at| if at + 1 == channel { 2000.0 } else { pulse(at) });
-            }
-            let time_s = (step as f64 - all as f64) * period_s;
-            throttles = self.exchange(link, &Sensed { time_s, imu: &imu, estimate: &estimate, rc: &rc })?;
+    fn rest(&self) -> Rest {
+        Rest {
+            time_s: REST_S,
+            armed_s: ARMED_S,
+            armed_by_channel: self.armed_by_channel,
+            period_s: self.period_ns as f64 * 1e-9,
         }
-        if self.armed_by_channel.is_some() && throttles.iter().all(|throttle| *throttle == 0.0) {
-            let words = "it is not armed at tick 0: its motors stand still under `armed_by_channel` and the configuration";
-            return Err(link.firmware.complaint(words));
-        }
-        Ok(())
     }
 
     /// The packets of a tick, the `step`th of the firmware.
@@ -287,15 +256,12 @@ impl Betaflight {
             place,
             pressure_Pa: sea_level_Pa * libm::pow(1.0 - by_height_1_m * place[2], exponent),
         };
-        let channel = |at| rc.pulse.get(at).copied().unwrap_or(if at == 2 { 1000.0 } else { 1500.0 });
-        let switch =
-            |at: usize| if at < 4 { channel(at) } else { rc.pulse.get(at).copied().unwrap_or(1000.0) };
         TickPackets {
             length_ns: self.period_ns,
             has_sticks: u64::from(step.is_multiple_of(self.rc_ticks)),
             state,
             sticks_time_s: time_s,
-            channels_us: std::array::from_fn(|at| pulse(switch(at))),
+            channels_us: std::array::from_fn(|at| pulse_us(rc, at)),
         }
     }
 
@@ -318,19 +284,9 @@ impl Betaflight {
 impl Link {
     fn receive(&mut self) -> Result<Answer, String> {
         let mut answer = Answer::default();
-        self.firmware.receive(bytemuck::bytes_of_mut(&mut answer))?;
+        self.stream.receive(bytemuck::bytes_of_mut(&mut answer))?;
         Ok(answer)
     }
-}
-
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 800 and 2200 by clamp")]
-fn pulse(us: f64) -> u16 {
-    us.clamp(800.0, 2200.0).round() as u16
-}
-
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive number")]
-fn steps(time_s: f64, period_s: f64) -> u64 {
-    (time_s / period_s).round() as u64
 }
 
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive number")]
@@ -366,12 +322,12 @@ fn require_preloadable(program: &[u8]) -> Result<(), String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bus::messages::Quaternion;
+    use bus::messages::{Imu, Quaternion, RcChannels, StateEstimate};
 
     fn hummingbird() -> Betaflight {
         let vehicle = Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml").unwrap();
         Betaflight {
-            layout: Layout::of(&vehicle.rotors).unwrap(),
+            layout: Layout::of(&vehicle.rotors, &MIXERS).unwrap(),
             vehicle,
             firmware: Vec::new(),
             configuration: "aux 0 0 0 1700 2100 0 0\nsave\n".to_owned(),

@@ -1,11 +1,9 @@
 //! A firmware's process: it has a folder of its own, which goes with it, and a log, whose end explains its end.
 
-use bus::process::RUN_VARIABLE;
+use bus::process::{RUN_VARIABLE, die_with_this_one};
 use std::fs::{self, File};
-use std::io::{self, Read, Write};
-use std::os::fd::OwnedFd;
+use std::io;
 use std::os::unix::fs::PermissionsExt;
-use std::os::unix::net::UnixStream;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -61,7 +59,15 @@ impl Scratch {
             log.map_err(|error| format!("cannot write {}: {error}", self.log().display()))?;
         let mut command = Command::new(path);
         command.current_dir(&self.folder).env_clear().stdin(Stdio::null()).stdout(output).stderr(error);
+        // A firmware that waits for an answer does not notice that nobody is left to give it.
+        die_with_this_one(&mut command);
         Ok(command)
+    }
+
+    /// Its name in errors.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        self.name
     }
 
     fn log(&self) -> PathBuf {
@@ -124,69 +130,48 @@ fn ended_with(name: &str, status: ExitStatus) -> String {
     }
 }
 
-/// A firmware that runs, and the socket at its standard input. It ends with this value.
+/// A firmware that runs, with its folder. It ends with this value.
 #[derive(Debug)]
 pub struct Firmware {
     scratch: Scratch,
     child: Child,
-    socket: UnixStream,
-    limit: Duration,
 }
 
 impl Firmware {
-    /// Starts `command`; each of its answers is waited for as long as `limit`.
+    /// Starts `command`.
     ///
     /// # Errors
     /// It does not start.
-    pub fn start(scratch: Scratch, mut command: Command, limit: Duration) -> Result<Self, String> {
-        let name = scratch.name;
-        let pair = UnixStream::pair().and_then(|(socket, other)| {
-            socket.set_read_timeout(Some(limit))?;
-            socket.set_write_timeout(Some(limit))?;
-            Ok((socket, other))
-        });
-        let (socket, other) = pair.map_err(|error| format!("no socket to {name}: {error}"))?;
-        let child = scratch.start(command.stdin(OwnedFd::from(other)))?;
-        // The command holds the other end: without it, the end of the firmware ends the reading.
-        drop(command);
-        Ok(Self { scratch, child, socket, limit })
+    pub fn start(scratch: Scratch, mut command: Command) -> Result<Self, String> {
+        let child = scratch.start(&mut command)?;
+        Ok(Self { scratch, child })
     }
 
-    /// Sends `bytes`.
-    ///
-    /// # Errors
-    /// The firmware has ended, or takes nothing.
-    pub fn send(&mut self, bytes: &[u8]) -> Result<(), String> {
-        let sent = self.socket.write_all(bytes);
-        sent.map_err(|error| self.failed(&error))
+    /// Its end, with that of its log, if it has ended.
+    pub fn ended(&mut self) -> Option<String> {
+        let status = self.child.try_wait().ok().flatten()?;
+        Some(self.complaint(&ended_with(self.scratch.name, status)))
     }
 
-    /// Fills `bytes` with what the firmware answers.
-    ///
-    /// # Errors
-    /// The firmware has ended, or does not answer.
-    pub fn receive(&mut self, bytes: &mut [u8]) -> Result<(), String> {
-        let received = self.socket.read_exact(bytes);
-        received.map_err(|error| self.failed(&error))
-    }
-
-    /// Reason of a failed transfer.
-    fn failed(&mut self, error: &io::Error) -> String {
-        let name = self.scratch.name;
-        if !matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) {
+    /// The reason of a transfer that failed: the firmware's end, or else that it gave no answer for `limit`.
+    pub fn failed(&mut self, error: &io::Error, limit: Duration) -> String {
+        if !is_silence(error) {
             // Its end follows the end of its socket.
             for _ in 0..STARTS_MAX {
-                if let Ok(Some(status)) = self.child.try_wait() {
-                    return format!("{}; {}", ended_with(name, status), self.scratch.quoted());
+                if let Some(words) = self.ended() {
+                    return words;
                 }
                 std::thread::sleep(NAP);
             }
         }
-        let seconds = self.limit.as_secs_f64();
-        match self.child.try_wait() {
-            Ok(Some(status)) => format!("{}; {}", ended_with(name, status), self.scratch.quoted()),
-            _ => format!("{name} runs and gave no answer for {seconds} s; {}", self.scratch.quoted()),
-        }
+        self.ended().unwrap_or_else(|| self.silence(limit))
+    }
+
+    /// A firmware that runs and gave no answer for `limit`.
+    #[must_use]
+    pub fn silence(&self, limit: Duration) -> String {
+        let (name, seconds) = (self.scratch.name, limit.as_secs_f64());
+        self.complaint(&format!("{name} runs and gave no answer for {seconds} s"))
     }
 
     /// A failure of the firmware in `words`, with the end of its log.
@@ -194,6 +179,12 @@ impl Firmware {
     pub fn complaint(&self, words: &str) -> String {
         format!("{words}; {}", self.scratch.quoted())
     }
+}
+
+/// True if a transfer failed by the time that it took alone.
+#[must_use]
+pub fn is_silence(error: &io::Error) -> bool {
+    matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut)
 }
 
 impl Drop for Firmware {

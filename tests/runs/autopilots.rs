@@ -1,5 +1,7 @@
 //! Autopilots: a stand-in for Betaflight's SITL (`autopilots/sitl.c`) flies, and fails in every way; the real one where
-//! `HUMMINGBUS_BETAFLIGHT` names it.
+//! `HUMMINGBUS_BETAFLIGHT` names it. [`ardupilot`] has the same for ArduPilot.
+
+mod ardupilot;
 
 use crate::recordings::require_same;
 use crate::skipped::variable_or_skip;
@@ -14,12 +16,13 @@ fn manifest() -> String {
     repository("manifests/autopilots/betaflight.toml")
 }
 
-/// The stand-in's program, linked with `more`.
-fn compiled(more: &[&str]) -> Vec<u8> {
+/// The program of the stand-in `source`, linked with `more`.
+fn compiled(source: &str, more: &[&str]) -> Vec<u8> {
     let place = Place::new();
     let program = place.path("sitl");
     let mut compiler = Command::new("cc");
-    compiler.args(["-O1", "-o", &program, &repository("tests/runs/autopilots/sitl.c"), "-lpthread", "-lm"]);
+    let source = repository(&format!("tests/runs/autopilots/{source}"));
+    compiler.args(["-O1", "-o", &program, &source, "-lpthread", "-lm"]);
     let ended = compiler.args(more).output().unwrap();
     assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
     fs::read(program).unwrap()
@@ -28,7 +31,7 @@ fn compiled(more: &[&str]) -> Vec<u8> {
 /// The stand-in in `place`, and its configuration of these words; as settings of the manifest.
 fn stand_in(place: &Place, words: &str) -> Vec<String> {
     static PROGRAM: OnceLock<Vec<u8>> = OnceLock::new();
-    let program = place.write("sitl", PROGRAM.get_or_init(|| compiled(&[])));
+    let program = place.write("sitl", PROGRAM.get_or_init(|| compiled("sitl.c", &[])));
     let configuration = place.write("configuration", words);
     vec![
         format!("process.controller.firmware={program}"),
@@ -65,7 +68,7 @@ fn a_controller_takes_over_from_a_firmware_and_gives_back() {
     let place = Place::new();
     let swap = repository("manifests/autopilots/betaflight-swap.toml");
     let args = ["run", &swap, "--record", &place.path("a.mcap"), "--json"];
-    let program = place.write("sitl", compiled(&[]));
+    let program = place.write("sitl", compiled("sitl.c", &[]));
     let ended = place.start_with(&args, &[("HUMMINGBUS_BETAFLIGHT", &program)]).end();
     let summary = ended.with_code(0).json();
     let all = summary["successions"].as_array().unwrap();
@@ -81,10 +84,9 @@ fn a_controller_takes_over_from_a_firmware_and_gives_back() {
     assert!(jump(&all[0]) < 1e-9 && jump(&all[1]) < 15.0, "{summary}");
 }
 
-#[test]
-fn each_firmware_of_a_run_flies_its_own_vehicle() {
-    let place = Place::new();
-    let two = fs::read_to_string(manifest()).unwrap();
+/// Flies `manifest` with `settings`, and a second vehicle beside it with a firmware of its own.
+fn each_flies_its_own(place: &Place, manifest: &str, settings: &[String]) {
+    let two = fs::read_to_string(manifest).unwrap();
     let second: String = two
         .split("[process.recorder]")
         .next()
@@ -102,18 +104,14 @@ fn each_firmware_of_a_run_flies_its_own_vehicle() {
         "outputs.pose = { every_ticks = 10 }\noutputs.tf = { topic = \"/tf\", every_ticks = 10 }\n",
         "",
     );
-    let place_of = |text: &str| text.replace("../../", &format!("{}/", repository("")));
-    let text = place_of(&format!("{two}\n{second}")).replace("\"betaflight.cli\"", "\"configuration\"");
-    let both = place.write("two.toml", text);
-    let program = place.write("sitl", compiled(&[]));
-    place.write("configuration", "");
-    let settings = [
-        format!("process.controller.firmware={program}"),
-        format!("process.controller2.firmware={program}"),
-        "run.duration_s=3".to_owned(),
-    ];
+    let both = format!("{two}\n{second}").replace("../../", &format!("{}/", repository("")));
+    let both = place.write("two.toml", both);
+    let others =
+        settings.iter().map(|setting| setting.replace("process.controller.", "process.controller2."));
+    let short = "run.duration_s=3".to_owned();
+    let settings: Vec<String> = settings.iter().cloned().chain(others).chain([short]).collect();
     let recording = place.path("two.mcap");
-    call(&place, "run", &both, &settings, &["--record", &recording]).flown();
+    call(place, "run", &both, &settings, &["--record", &recording]).flown();
     let height = |topic: &str| {
         let out = place
             .call(&["cat", &recording, "--topic", topic, "--field", "position.z", "--csv"])
@@ -124,6 +122,12 @@ fn each_firmware_of_a_run_flies_its_own_vehicle() {
     // Their noise differs, so that no firmware has flown both.
     let [first, second] = ["/plant/state", "/plant2/state"].map(height);
     assert!((first - 1.4).abs() < 0.2 && (second - 1.4).abs() < 0.2 && first != second, "{first} {second}");
+}
+
+#[test]
+fn each_firmware_of_a_run_flies_its_own_vehicle() {
+    let place = Place::new();
+    each_flies_its_own(&place, &manifest(), &stand_in(&place, ""));
 }
 
 #[test]
@@ -168,7 +172,7 @@ fn what_cannot_be_a_firmware_is_refused_by_check() {
     let unset = "process.controller.firmware=${HUMMINGBUS_UNSET}".to_owned();
     call(&place, "check", &manifest(), &[unset], &[]).with_code(2).says(&["HUMMINGBUS_UNSET is not set"]);
     let text = place.write("text", "no program");
-    let in_static = place.write("static", compiled(&["-static"]));
+    let in_static = place.write("static", compiled("sitl.c", &["-static"]));
     let settings = stand_in(&place, "");
     let cases: [(&str, &[&str]); 6] = [
         (&format!("process.controller.firmware={text}"), &["firmware", "expected a 64-bit Linux program"]),
@@ -178,7 +182,7 @@ fn what_cannot_be_a_firmware_is_refused_by_check() {
         ("process.controller.parameters.rc_rate_hz=0", &["rc_rate_hz"]),
         (
             &format!("process.controller.vehicle={}", repository("vehicles/tarot-t18.toml")),
-            &["rotors match none of the mixers QUADX, QUADP"],
+            &["rotors match none of the frames QUADX, QUADP"],
         ),
     ];
     for (setting, told) in cases {

@@ -1,0 +1,254 @@
+//! ArduCopter's software in the loop, SITL, by its JSON interface (`libraries/SITL/SIM_JSON.cpp` of ArduPilot; read in several
+//! versions, not flown).
+//!
+//! The firmware sends first: a packet of its outputs. Then it waits for the answer, which is the tick's sensors as JSON, and whose
+//! timestamp is its clock. So it is in lockstep by itself.
+//!
+//! Axes as its answer has them: body forward, right, down; world north, east, down. The world's x is east, its y north
+//! ([`crate::origin`]).
+
+mod answer;
+mod frames;
+mod outputs;
+mod parameter_file;
+
+use crate::autopilot::{Autopilot, Sensed, Throttles};
+use crate::datagrams::{self, Datagrams};
+use crate::layout::Layout;
+use crate::origin::Origin;
+use crate::process::Scratch;
+use crate::rest::Rest;
+use crate::settings;
+use bus::component::Info;
+use bus::context::NodeContext;
+use diagnostics::ParameterError;
+use diagnostics::parameter::{positive_up_to, refuse};
+use frames::{FRAMES, FrameNumbers};
+use outputs::Outputs;
+use serde::Deserialize;
+use std::path::PathBuf;
+use std::process::Command;
+use std::time::Duration;
+use vehicles::Vehicle;
+
+/// Part of the rest with the arming switch on, s: the motors of ArduCopter stand still for 2 s after it is armed
+/// (`ARMING_DELAY_SEC`), and are then spun up.
+const ARMED_S: f64 = 4.0;
+/// Longest rest, s.
+const REST_MAX_S: f64 = 3600.0;
+/// Longest step of the firmware's clock, s; a longer one is not taken (`SIM_JSON.cpp`).
+const PERIOD_MAX_S: f64 = 0.1;
+/// Heading of the vehicle that rests, degrees from north: its x points east.
+const HEADING_DEG: f64 = 90.0;
+/// Name of the parameter file in the folder of the firmware.
+const PARAMETER_FILE: &str = "hummingbus.parm";
+/// Serial ports that stay closed: by default 0 waits for a connection, and 0 to 2 have fixed TCP ports, on which a second
+/// firmware would fail. Ports 3 and 4 are the simulated GPS.
+const CLOSED_PORTS: [u8; 7] = [0, 1, 2, 5, 6, 7, 8];
+
+/// Parameters of the firmware.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Parameters {
+    /// The vehicle that it flies.
+    vehicle: PathBuf,
+    /// ArduCopter's program for SITL.
+    firmware: PathBuf,
+    /// File of its parameters.
+    configuration: Option<PathBuf>,
+    /// Further arguments of the program; they count more than those of this component.
+    #[serde(default)]
+    arguments: Vec<String>,
+    /// Channel whose switch arms, counted from 1, where the firmware is to be armed at tick 0; none where the pilot arms.
+    armed_by_channel: Option<usize>,
+    /// Simulated time before tick 0 in which its estimator settles, s.
+    #[serde(default = "rest_s")]
+    rest_s: f64,
+    /// Host time that an answer may take, in s.
+    #[serde(default = "settings::reply_timeout_s")]
+    reply_timeout_s: f64,
+    /// Place on the earth of the world's origin.
+    #[serde(default)]
+    origin: Origin,
+}
+
+/// The estimator (EKF3) aligns its attitude within seconds, and waits 10 s for a GPS whose errors stay small before it uses it;
+/// about 30 s pass until ArduPilot's own tests find it ready.
+fn rest_s() -> f64 {
+    40.0
+}
+
+/// ArduCopter as the manifest has it.
+#[derive(Debug)]
+pub struct ArduPilot {
+    vehicle: Vehicle,
+    layout: Layout,
+    firmware: Vec<u8>,
+    /// Text of the parameter file.
+    parameters: String,
+    arguments: Vec<String>,
+    rest: Rest,
+    reply_timeout: Duration,
+    origin: Origin,
+}
+
+/// The firmware that runs.
+#[derive(Debug)]
+pub struct Link {
+    datagrams: Datagrams,
+    /// Answers sent.
+    steps: u64,
+    /// Frame count of its last packet.
+    frame: u32,
+}
+
+impl Autopilot for ArduPilot {
+    const INFO: Info =
+        Info::new("ardupilot", "ArduCopter's SITL, in lockstep: a process of its own that flies the vehicle");
+    type Parameters = Parameters;
+    type Link = Link;
+
+    fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
+        let Parameters { vehicle, firmware, configuration, armed_by_channel, rest_s, .. } = parameters;
+        let vehicle = settings::vehicle(context, &vehicle)?;
+        let refused = |reason: String| settings::refused_vehicle(&vehicle, &reason);
+        let layout = Layout::of(&vehicle.rotors, &FRAMES).map_err(refused)?;
+        let numbers = FrameNumbers::of(&layout).map_err(refused)?;
+        let program = settings::file(context, "firmware", &firmware)?;
+        refuse(!program.starts_with(b"\x7fELF\x02\x01"), "firmware", || {
+            let path = firmware.display();
+            format!(
+                "{path}: expected a 64-bit Linux program (ELF): ArduCopter's SITL, build/sitl/bin/arducopter"
+            )
+        })?;
+        settings::check_arming(armed_by_channel, answer::CHANNELS)?;
+        positive_up_to("rest_s", rest_s, REST_MAX_S, "s")?;
+        parameters.origin.check()?;
+        let period_s = context.period_s();
+        refuse(period_s >= PERIOD_MAX_S, "period_ticks", || {
+            format!(
+                "the period is {period_s} s, expected less than {PERIOD_MAX_S} s: ArduPilot's clock takes no longer step"
+            )
+        })?;
+        let configured = settings::configuration(context, configuration.as_deref())?;
+        let text = parameter_file::text(&configured, &numbers, vehicle.rotors.len())
+            .map_err(|reason| ParameterError::conflict("configuration", reason))?;
+        Ok(Self {
+            layout,
+            vehicle,
+            firmware: program,
+            parameters: text,
+            arguments: parameters.arguments,
+            rest: Rest { time_s: rest_s, armed_s: ARMED_S, armed_by_channel, period_s },
+            reply_timeout: settings::reply_timeout(parameters.reply_timeout_s)?,
+            origin: parameters.origin,
+        })
+    }
+
+    fn vehicle(&self) -> &Vehicle {
+        &self.vehicle
+    }
+
+    fn boot(&self) -> Result<Link, String> {
+        let scratch = Scratch::new("ardupilot")?;
+        let program = scratch.write("ardupilot", &self.firmware)?;
+        scratch.write(PARAMETER_FILE, self.parameters.as_bytes())?;
+        let socket = datagrams::bound().map_err(|error| format!("no socket to ardupilot: {error}"))?;
+        let port = socket.local_addr().map_err(|error| format!("no port to ardupilot: {error}"))?.port();
+        let mut command = scratch.command(&program)?;
+        self.add_arguments(&mut command, port)?;
+        let mut datagrams = Datagrams::start(scratch, command, socket, self.reply_timeout)?;
+        let first = datagrams.receive(|bytes| Outputs::read(bytes).map(Some))?;
+        let mut link = Link { datagrams, steps: 0, frame: first.frame };
+        if self.rest.of(self, &mut link)? {
+            return Ok(link);
+        }
+        let words = "it is not armed at tick 0: its motors stand still under `armed_by_channel` and the configuration";
+        Err(link.datagrams.firmware().complaint(words))
+    }
+
+    fn exchange(&self, link: &mut Link, sensed: &Sensed<'_>) -> Result<Throttles, String> {
+        link.steps += 1;
+        let time_s = answer::timestamp_s(link.steps, self.rest.period_s);
+        link.datagrams.send(answer::text(time_s, sensed).as_bytes())?;
+        let last = link.frame;
+        let outputs = link.datagrams.receive(|bytes| Outputs::read(bytes)?.after(last))?;
+        link.frame = outputs.frame;
+        Ok(self.throttles(&outputs))
+    }
+}
+
+impl ArduPilot {
+    /// Arguments of the program, which sends to `port`.
+    fn add_arguments(&self, command: &mut Command, port: u16) -> Result<(), String> {
+        let free = datagrams::free_ports().map_err(|error| format!("no port for ardupilot: {error}"))?;
+        let [input, rc, beacon] = free;
+        let Origin { latitude_deg, longitude_deg, altitude_m } = self.origin;
+        command.args(["--model", "JSON:127.0.0.1", "--speedup", "1", "--defaults", PARAMETER_FILE]);
+        command.arg("--home").arg(format!("{latitude_deg},{longitude_deg},{altitude_m},{HEADING_DEG}"));
+        let ports =
+            [("sim-port-out", port), ("sim-port-in", input), ("rc-in-port", rc), ("irlock-port", beacon)];
+        for (name, port) in ports {
+            command.arg(format!("--{name}")).arg(port.to_string());
+        }
+        for port in CLOSED_PORTS {
+            command.arg(format!("--serial{port}")).arg("none:0");
+        }
+        command.args(&self.arguments);
+        Ok(())
+    }
+
+    /// Outputs by rotor.
+    fn throttles(&self, outputs: &Outputs) -> Throttles {
+        let mut throttles = Throttles::filled(self.vehicle.rotors.len(), 0.0);
+        for (pulse_us, rotor) in outputs.pulse_us.iter().zip(&self.layout.motors) {
+            throttles[*rotor] = (f64::from(*pulse_us) - parameter_file::PULSE_MIN_US).max(0.0)
+                / parameter_file::PULSE_RANGE_US;
+        }
+        throttles
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn hummingbird() -> ArduPilot {
+        let vehicle = Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml").unwrap();
+        ArduPilot {
+            layout: Layout::of(&vehicle.rotors, &FRAMES).unwrap(),
+            vehicle,
+            firmware: Vec::new(),
+            parameters: String::new(),
+            arguments: vec!["--serial0".to_owned(), "tcp:0".to_owned()],
+            rest: Rest { time_s: 40.0, armed_s: ARMED_S, armed_by_channel: None, period_s: 1e-3 },
+            reply_timeout: Duration::from_secs(1),
+            origin: Origin::default(),
+        }
+    }
+
+    #[test]
+    fn motors_reach_their_rotors() {
+        // Right, left, front, rear.
+        let mut pulse_us = [1500; outputs::CHANNELS_MAX];
+        pulse_us[..4].copy_from_slice(&[1200, 1300, 1400, 0]);
+        let throttles = hummingbird().throttles(&Outputs { frame: 0, pulse_us });
+        assert_eq!(throttles, [0.4, 0.2, 0.0, 0.3], "front, right, rear, left");
+    }
+
+    #[test]
+    fn arguments_name_the_ports_and_the_users_are_last() {
+        let mut command = Command::new("arducopter");
+        hummingbird().add_arguments(&mut command, 4711).unwrap();
+        let arguments: Vec<&str> = command.get_args().map(|argument| argument.to_str().unwrap()).collect();
+        let text = arguments.join(" ");
+        assert!(
+            text.contains("--home 47.397742,8.545594,488,90 --sim-port-out 4711 --sim-port-in "),
+            "{text}"
+        );
+        assert!(
+            text.contains("--serial0 none:0 --serial1 none:0 ") && text.ends_with(" --serial0 tcp:0"),
+            "{text}"
+        );
+    }
+}

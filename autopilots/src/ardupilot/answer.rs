@@ -1,0 +1,180 @@
+//! The answer to the firmware: a line of JSON with the tick's sensors.
+//!
+//! Most versions do not parse it as JSON: they look for each key by its text, and read the number two characters behind the key. So
+//! no blank follows a colon, and a key that begins another one (`rc_1`, `rc_10`) stands before it.
+
+use crate::autopilot::Sensed;
+use crate::rest::pulse_us;
+use bus::messages::{Quaternion, Vector3};
+use nalgebra::Quaternion as Product;
+use std::f64::consts::FRAC_1_SQRT_2;
+use std::fmt::Write as _;
+
+/// Channels of its remote control.
+pub const CHANNELS: usize = 12;
+/// Excess of its clock over that of the run, as a part: the firmware cuts each step to whole microseconds, and a step that is
+/// rounded to just below them would lose one.
+const EXCESS: f64 = 1e-8;
+
+/// Time of the `step`th answer, counted from 1, on the firmware's clock.
+pub fn timestamp_s(step: u64, period_s: f64) -> f64 {
+    step as f64 * period_s * (1.0 + EXCESS)
+}
+
+/// The answer at a time of the firmware's clock.
+pub fn text(time_s: f64, sensed: &Sensed<'_>) -> String {
+    let Sensed { imu, estimate, rc, .. } = sensed;
+    let (gyro, force) = (body(imu.angular_velocity), body(imu.specific_force));
+    let (position, velocity) = (world(estimate.position), world(estimate.velocity));
+    let attitude = attitude(estimate.attitude);
+    // The line begins and ends with an end of line: the firmware takes what lies between the last two of them.
+    let mut text = format!("\n{{\"timestamp\":{time_s},\"imu\":{{");
+    let _ = write!(text, "\"gyro\":{},\"accel_body\":{}}},", list(&gyro), list(&force));
+    let _ = write!(text, "\"position\":{},\"velocity\":{},", list(&position), list(&velocity));
+    // The firmware is not to pace itself: the run has its pace. A number, since older versions read `true` as 0.
+    let _ = write!(text, "\"quaternion\":{},\"no_time_sync\":1,\"rc\":{{", list(&attitude));
+    for channel in 0..CHANNELS {
+        let separator = if channel == 0 { "" } else { "," };
+        let _ = write!(text, "{separator}\"rc_{}\":{}", channel + 1, pulse_us(rc, channel));
+    }
+    text.push_str("}}\n");
+    text
+}
+
+/// Forward, right, down of a vector of the body: forward, left, up.
+fn body(vector: Vector3) -> [f64; 3] {
+    [vector.x, -vector.y, -vector.z]
+}
+
+/// North, east, down of a vector of the world: east, north, up.
+fn world(vector: Vector3) -> [f64; 3] {
+    [vector.y, vector.x, -vector.z]
+}
+
+/// Attitude from forward, right, down to north, east, down; w, x, y, z.
+fn attitude(attitude: Quaternion) -> [f64; 4] {
+    let Quaternion { x, y, z, w } = attitude;
+    // Half a turn about the line between east and north changes the world's axes, half a turn about x the body's.
+    let north_east_down = Product::new(0.0, FRAC_1_SQRT_2, FRAC_1_SQRT_2, 0.0);
+    let forward_right_down = Product::new(0.0, 1.0, 0.0, 0.0);
+    let product = north_east_down * Product::new(w, x, y, z) * forward_right_down;
+    // The two quaternions of an attitude differ by their sign.
+    let sign = if product.w < 0.0 { -1.0 } else { 1.0 };
+    [product.w, product.i, product.j, product.k].map(|part| sign * part)
+}
+
+/// A list of numbers, without exponents, to nine digits behind the point: positions to a nanometre.
+fn list(numbers: &[f64]) -> String {
+    let numbers: Vec<String> = numbers.iter().map(|number| format!("{number:.9}")).collect();
+    format!("[{}]", numbers.join(","))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bus::messages::{Imu, RcChannels, StateEstimate};
+    use nalgebra::UnitQuaternion;
+    use serde_json::{Value, json};
+
+    fn sample(attitude: UnitQuaternion<f64>) -> (Imu, StateEstimate, RcChannels) {
+        let imu = Imu {
+            angular_velocity: [0.1, 0.2, 0.3].into(),
+            specific_force: [1.0, 2.0, 9.81].into(),
+            ..Imu::default()
+        };
+        let attitude = Quaternion { x: attitude.i, y: attitude.j, z: attitude.k, w: attitude.w };
+        let estimate = StateEstimate {
+            attitude,
+            velocity: [3.0, 4.0, 5.0].into(),
+            position: [6.0, 7.0, 8.0].into(),
+            ..StateEstimate::default()
+        };
+        let rc =
+            RcChannels { pulse: [1500.4, 1500.6, 900.0, 1100.0, 2000.0].into(), ..RcChannels::default() };
+        (imu, estimate, rc)
+    }
+
+    fn line(attitude: UnitQuaternion<f64>) -> String {
+        let (imu, estimate, rc) = sample(attitude);
+        text(1.5, &Sensed { time_s: 0.0, imu: &imu, estimate: &estimate, rc: &rc })
+    }
+
+    /// Roll, pitch and yaw that the firmware reads: to the right, nose up, clockwise from north, degrees.
+    fn read_deg(attitude: UnitQuaternion<f64>) -> [f64; 3] {
+        let value: Value = serde_json::from_str(&line(attitude)).unwrap();
+        let part = |at: usize| value["quaternion"][at].as_f64().unwrap();
+        let read = UnitQuaternion::from_quaternion(Product::new(part(0), part(1), part(2), part(3)));
+        let (roll, pitch, yaw) = read.euler_angles();
+        [roll, pitch, yaw].map(f64::to_degrees)
+    }
+
+    #[test]
+    fn the_line_has_the_firmwares_axes() {
+        let line = line(UnitQuaternion::identity());
+        assert!(line.starts_with("\n{\"timestamp\":1.5,") && line.ends_with("}}\n"), "{line}");
+        assert_eq!(line.matches('\n').count(), 2);
+        let value: Value = serde_json::from_str(&line).unwrap();
+        assert_eq!(value["imu"]["gyro"], json!([0.1, -0.2, -0.3]), "forward, right, down");
+        assert_eq!(value["imu"]["accel_body"], json!([1.0, -2.0, -9.81]));
+        assert_eq!(value["position"], json!([7.0, 6.0, -8.0]), "north, east, down");
+        assert_eq!(value["velocity"], json!([4.0, 3.0, -5.0]));
+        assert_eq!(value["no_time_sync"], json!(1), "a number");
+        let pulses: Vec<u64> = (1..=12).map(|at| value["rc"][format!("rc_{at}")].as_u64().unwrap()).collect();
+        assert_eq!(pulses[..6], [1500, 1501, 900, 1100, 2000, 1000], "what is not sent is off");
+    }
+
+    /// As most versions find a key: its first occurrence, then the number two characters behind its end.
+    #[test]
+    fn each_key_is_first_found_where_it_stands() {
+        let line = line(UnitQuaternion::identity());
+        for (key, begins) in [
+            ("timestamp", "1.5,"),
+            ("gyro", "[0.1"),
+            ("accel_body", "[1.0"),
+            ("position", "[7.0"),
+            ("velocity", "[4.0"),
+            ("quaternion", "[0.7"),
+            ("no_time_sync", "1,"),
+            ("rc_1", "1500,"),
+            ("rc_2", "1501,"),
+            ("rc_12", "1000}"),
+        ] {
+            let at = line.find(key).unwrap() + key.len() + 2;
+            assert!(line[at..].starts_with(begins), "{key}: {}", &line[at..]);
+        }
+    }
+
+    #[test]
+    fn attitudes_have_their_signs() {
+        let near = |found: [f64; 3], expected: [f64; 3]| {
+            let is_near = found.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1e-6);
+            assert!(is_near, "{found:?}, expected {expected:?}");
+        };
+        // Ours is about x forward, y left, z up: the nose goes down with a positive pitch, and to the left with a positive yaw.
+        let of = |roll: f64, pitch: f64, yaw: f64| {
+            UnitQuaternion::from_euler_angles(roll.to_radians(), pitch.to_radians(), yaw.to_radians())
+        };
+        near(read_deg(of(0.0, 0.0, 0.0)), [0.0, 0.0, 90.0]);
+        near(read_deg(of(10.0, 0.0, 0.0)), [10.0, 0.0, 90.0]);
+        near(read_deg(of(0.0, 10.0, 0.0)), [0.0, -10.0, 90.0]);
+        near(read_deg(of(0.0, 0.0, 30.0)), [0.0, 0.0, 60.0]);
+        near(read_deg(of(0.0, 0.0, 90.0)), [0.0, 0.0, 0.0]);
+        near(read_deg(of(5.0, -8.0, 130.0)), [5.0, 8.0, -40.0]);
+    }
+
+    /// The firmware adds the whole microseconds of each step.
+    #[test]
+    fn no_step_loses_a_microsecond() {
+        for period_us in [125_u32, 1000, 2500, 4000] {
+            let period_s = f64::from(period_us) * 1e-6;
+            let read = |step| timestamp_s(step, period_s).to_string().parse::<f64>().unwrap();
+            let mut last_s = 0.0;
+            for step in 1..=500_000 {
+                let now_s = read(step);
+                let step_us = ((now_s - last_s) * 1e6).trunc();
+                assert_eq!(step_us, f64::from(period_us), "step {step}");
+                last_s = now_s;
+            }
+        }
+    }
+}

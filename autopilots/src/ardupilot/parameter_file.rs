@@ -1,0 +1,94 @@
+//! The firmware's parameters: the user's, and those that follow from the vehicle, which the user's cannot undo.
+
+use super::frames::FrameNumbers;
+use std::fmt::Write as _;
+
+/// Pulse of a motor that is off, and the way to full thrust, us.
+pub const PULSE_MIN_US: f64 = 1000.0;
+pub const PULSE_RANGE_US: f64 = 1000.0;
+/// Longest name (`AP_MAX_NAME_SIZE`).
+const NAME_LENGTH_MAX: usize = 16;
+/// Characters between a name and its value.
+const SEPARATORS: [char; 5] = [' ', ',', '=', '\t', '\r'];
+/// Function of an output that drives the first motor (`SERVOn_FUNCTION`); those of the next motors follow.
+const FIRST_MOTOR: usize = 33;
+/// A firmware that is not paced takes its attitude from the simulation (10), unless it is told to estimate it (3: EKF3).
+const ESTIMATOR: (&str, &str) = ("AHRS_EKF_TYPE", "3");
+
+/// Text of the file with the user's parameters of `configured`, for a frame of `motors` motors.
+///
+/// # Errors
+/// A line is not a name and a number.
+pub fn text(configured: &str, frame: &FrameNumbers, motors: usize) -> Result<String, String> {
+    let follows = follows(frame, motors);
+    let mut lines = Vec::new();
+    for (at, line) in configured.lines().enumerate() {
+        let read = read(line).map_err(|reason| format!("line {}: {reason}", at + 1))?;
+        // The firmware does not say which one of two values of a name counts.
+        lines.extend(
+            read.filter(|(name, _)| !follows.iter().any(|(other, _)| other.eq_ignore_ascii_case(name))),
+        );
+    }
+    let mut text = String::new();
+    if !lines.iter().any(|(name, _)| name.eq_ignore_ascii_case(ESTIMATOR.0)) {
+        lines.insert(0, ESTIMATOR);
+    }
+    let follows = follows.iter().map(|(name, value)| (name.as_str(), value.as_str()));
+    for (name, value) in lines.into_iter().chain(follows) {
+        let _ = writeln!(text, "{name} {value}");
+    }
+    Ok(text)
+}
+
+/// Parameters that follow from the vehicle.
+fn follows(frame: &FrameNumbers, motors: usize) -> Vec<(String, String)> {
+    let frame = [
+        ("FRAME_CLASS", frame.class.to_string()),
+        ("FRAME_TYPE", frame.kind.to_string()),
+        ("MOT_PWM_MIN", PULSE_MIN_US.to_string()),
+        ("MOT_PWM_MAX", (PULSE_MIN_US + PULSE_RANGE_US).to_string()),
+    ];
+    let frame = frame.into_iter().map(|(name, value)| (name.to_owned(), value));
+    let outputs =
+        (0..motors).map(|motor| (format!("SERVO{}_FUNCTION", motor + 1), (FIRST_MOTOR + motor).to_string()));
+    frame.chain(outputs).collect()
+}
+
+/// Name and value of a line; none of an empty line or a comment.
+fn read(line: &str) -> Result<Option<(&str, &str)>, String> {
+    let mut words = line.split(SEPARATORS).filter(|word| !word.is_empty());
+    let Some(name) = words.next().filter(|name| !name.starts_with('#')) else { return Ok(None) };
+    let value = words.next().filter(|value| value.parse::<f64>().is_ok_and(f64::is_finite));
+    match value {
+        Some(value) if name.len() <= NAME_LENGTH_MAX => Ok(Some((name, value))),
+        _ => Err(format!(
+            "expected a name of at most {NAME_LENGTH_MAX} characters and a number (`FS_THR_ENABLE 0`), found `{line}`"
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PLUS: FrameNumbers = FrameNumbers { class: 1, kind: 0 };
+
+    #[test]
+    fn the_users_parameters_are_kept_but_for_those_of_the_vehicle() {
+        let user =
+            "# Hummingbird\n\nRC5_OPTION 153\nFRAME_TYPE,1\nSERVO2_FUNCTION=0\r\nPSC_X\t-1.5e-1  # why\n";
+        let expected = "AHRS_EKF_TYPE 3\nRC5_OPTION 153\nPSC_X -1.5e-1\nFRAME_CLASS 1\nFRAME_TYPE 0\nMOT_PWM_MIN 1000\n\
+                        MOT_PWM_MAX 2000\nSERVO1_FUNCTION 33\nSERVO2_FUNCTION 34\nSERVO3_FUNCTION 35\nSERVO4_FUNCTION 36\n";
+        assert_eq!(text(user, &PLUS, 4).unwrap(), expected);
+        let other = text("AHRS_EKF_TYPE 10\n", &PLUS, 4).unwrap();
+        assert!(other.starts_with("AHRS_EKF_TYPE 10\nFRAME_CLASS"), "{other}");
+    }
+
+    #[test]
+    fn lines_that_are_no_parameters_are_named() {
+        for line in ["RC5_OPTION", "RC5_OPTION on", "RC5_OPTION nan", "A_NAME_THAT_IS_TOO_LONG 1"] {
+            let error = text(&format!("RC5_OPTION 153\n{line}\n"), &PLUS, 4).unwrap_err();
+            assert!(error.starts_with("line 2: ") && error.contains(line), "{error}");
+        }
+    }
+}

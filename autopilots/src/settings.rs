@@ -1,0 +1,77 @@
+//! Parameters and files that firmwares have in common.
+
+use bus::context::NodeContext;
+use diagnostics::ParameterError;
+use diagnostics::parameter::{positive_up_to, refuse};
+use std::path::Path;
+use std::time::Duration;
+use vehicles::Vehicle;
+
+/// First channel of a switch; those before are the sticks.
+const FIRST_SWITCH: usize = 5;
+/// Longest host time that an answer may take, s.
+const REPLY_TIMEOUT_MAX_S: f64 = 3600.0;
+
+/// Host time that an answer may take, unless a manifest says otherwise, s.
+#[must_use]
+pub fn reply_timeout_s() -> f64 {
+    5.0
+}
+
+/// The bytes of the file at `path`, which `key` names.
+///
+/// # Errors
+/// It cannot be read.
+pub fn file(context: &NodeContext<'_>, key: &'static str, path: &Path) -> Result<Vec<u8>, ParameterError> {
+    let bytes = context
+        .files
+        .bytes(path)
+        .map_err(|error| ParameterError::conflict(key, format!("cannot read {}: {error}", path.display())))?;
+    Ok(bytes.to_vec())
+}
+
+/// The text of the configuration at `path`; empty without one.
+///
+/// # Errors
+/// It cannot be read.
+pub fn configuration(context: &NodeContext<'_>, path: Option<&Path>) -> Result<String, ParameterError> {
+    let bytes = path.map(|path| file(context, "configuration", path)).transpose()?;
+    Ok(bytes.map_or(String::new(), |bytes| String::from_utf8_lossy(&bytes).into_owned()))
+}
+
+/// The vehicle at `path`.
+///
+/// # Errors
+/// It is refused.
+pub fn vehicle(context: &NodeContext<'_>, path: &Path) -> Result<Vehicle, ParameterError> {
+    Vehicle::load_from(&context.files, path).map_err(|error| ParameterError::conflict("vehicle", error))
+}
+
+/// The refusal of a vehicle.
+#[must_use]
+pub fn refused_vehicle(vehicle: &Vehicle, reason: &str) -> ParameterError {
+    ParameterError::conflict("vehicle", format!("{}: {reason}", vehicle.name))
+}
+
+/// Checks that the arming switch is one of the switches among `channels`.
+///
+/// # Errors
+/// It is a stick, or there is no such channel.
+pub fn check_arming(channel: Option<usize>, channels: usize) -> Result<(), ParameterError> {
+    let Some(channel) = channel else { return Ok(()) };
+    refuse(!(FIRST_SWITCH..=channels).contains(&channel), "armed_by_channel", || {
+        format!(
+            "`armed_by_channel` is {channel}, expected {FIRST_SWITCH} to {channels}: the first four are the sticks"
+        )
+    })
+}
+
+/// Time that an answer may take.
+///
+/// # Errors
+/// It is not positive, or longer than an hour.
+pub fn reply_timeout(seconds: f64) -> Result<Duration, ParameterError> {
+    positive_up_to("reply_timeout_s", seconds, REPLY_TIMEOUT_MAX_S, "s")?;
+    // No socket waits for less than a microsecond.
+    Ok(Duration::from_secs_f64(seconds.max(1e-3)))
+}

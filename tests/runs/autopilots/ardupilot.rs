@@ -1,0 +1,139 @@
+//! ArduPilot: a stand-in for ArduCopter's SITL (`ardupilot.c`) flies, and fails in every way; the real one where
+//! `HUMMINGBUS_ARDUPILOT` names it.
+
+use super::{call, compiled, each_flies_its_own};
+use crate::recordings::{require_same, topics};
+use crate::skipped::variable_or_skip;
+use crate::support::{Place, repository};
+use std::fs;
+use std::sync::OnceLock;
+
+/// The manifest of the hover and the doublet.
+fn manifest() -> String {
+    repository("manifests/autopilots/ardupilot.toml")
+}
+
+fn program() -> &'static [u8] {
+    static PROGRAM: OnceLock<Vec<u8>> = OnceLock::new();
+    PROGRAM.get_or_init(|| compiled("ardupilot.c", &[]))
+}
+
+/// The stand-in in `place`, with the parameters of the manifest and `more`; as settings of the manifest.
+fn stand_in(place: &Place, more: &str) -> Vec<String> {
+    let program = place.write("arducopter", program());
+    let parameters = fs::read_to_string(repository("manifests/autopilots/ardupilot.parm")).unwrap();
+    let configuration = place.write("ardupilot.parm", parameters + more);
+    vec![
+        format!("process.controller.firmware={program}"),
+        format!("process.controller.configuration={configuration}"),
+        "process.controller.parameters.rest_s=6".to_owned(),
+    ]
+}
+
+/// A flight of the stand-in with the parameters `more`.
+fn flight(place: &Place, more: &str, name: &str) -> String {
+    let recording = place.path(name);
+    call(place, "run", &manifest(), &stand_in(place, more), &["--record", &recording]).with_code(0);
+    recording
+}
+
+#[test]
+fn ardupilot_flies_the_hover_and_its_doublet_and_two_runs_are_the_same_bytes() {
+    let place = Place::new();
+    let first = flight(&place, "", "a.mcap");
+    let (settings, second) = (stand_in(&place, ""), place.path("b.mcap"));
+    let folder = place.path("a blank, a colon: ");
+    fs::create_dir(&folder).unwrap();
+    let manifest = manifest();
+    let set = settings.iter().flat_map(|setting| ["--set", setting]);
+    let args: Vec<&str> =
+        ["run", &manifest, "--record", &second, "--compose", "all"].into_iter().chain(set).collect();
+    place.start_with(&args, &[("TMPDIR", &folder)]).end().with_code(0);
+    require_same(&fs::read(&first).unwrap(), &second);
+}
+
+#[test]
+fn packets_that_come_twice_or_late_or_from_others_change_nothing() {
+    let place = Place::new();
+    let undisturbed = topics(&flight(&place, "", "undisturbed.mcap"));
+    for more in ["RESENDS 1\n", "LATE 1\n", "FOREIGN 1\n"] {
+        let disturbed = topics(&flight(&place, more, "disturbed.mcap"));
+        assert!(disturbed == undisturbed, "{more}");
+    }
+}
+
+#[test]
+fn each_ardupilot_of_a_run_flies_its_own_vehicle() {
+    let place = Place::new();
+    let settings = stand_in(&place, "");
+    each_flies_its_own(&place, &manifest(), &settings);
+}
+
+#[test]
+fn an_ardupilot_that_fails_ends_the_run_with_its_last_words() {
+    let cases: [(&str, &[&str]); 9] = [
+        ("MUTE 1\n", &["ardupilot runs and gave no answer for 0.5 s", "Stands in for ArduCopter"]),
+        // While it rests, and in flight: 6 s of its time are before tick 0.
+        ("ENDS 1\n", &["ardupilot ended with exit code 3", "out of coffee"]),
+        ("ENDS 8\n", &["ardupilot ended with exit code 3", "out of coffee"]),
+        ("CRASHES 8\n", &["ardupilot was killed by signal 6"]),
+        ("HANGS 8\n", &["ardupilot runs and gave no answer for 0.5 s", "thinking"]),
+        ("WRONG_MAGIC 8\n", &["magic number 4711, expected 18458"]),
+        ("SHORT 8\n", &["a packet of 39 bytes, expected 40 (16 channels) or 72 (32 channels)"]),
+        ("GOES_BACK 8\n", &["its frame count went back from ", " to 1, expected "]),
+        ("UNARMED 1\n", &["it is not armed at tick 0", "armed_by_channel"]),
+    ];
+    for (more, told) in cases {
+        let place = Place::new();
+        let mut settings = stand_in(&place, more);
+        settings.push("process.controller.parameters.reply_timeout_s=0.5".to_owned());
+        let recording = place.path("a.mcap");
+        let ended = call(&place, "run", &manifest(), &settings, &["--record", &recording]).with_code(2);
+        ended.says(told);
+        ended.says(&["node `controller`"]);
+        assert!(place.left().is_empty(), "{more}: {:?}", place.left());
+    }
+}
+
+#[test]
+fn what_cannot_be_an_ardupilot_is_refused_by_check() {
+    let place = Place::new();
+    let settings = stand_in(&place, "");
+    let [text, wrong] =
+        [place.write("text", "no program"), place.write("wrong.parm", "# one\nFRAME_CLASS\n")];
+    let octa = repository("vehicles/tarot-t18.toml");
+    let cases: [(&str, &[&str]); 8] = [
+        ("process.controller.firmware=${HUMMINGBUS_UNSET}", &["HUMMINGBUS_UNSET is not set"]),
+        (&format!("process.controller.firmware={text}"), &["firmware", "build/sitl/bin/arducopter"]),
+        (&format!("process.controller.configuration={wrong}"), &["line 2: expected a name", "FRAME_CLASS"]),
+        ("process.controller.parameters.armed_by_channel=13", &["expected 5 to 12"]),
+        ("process.controller.parameters.rest_s=0", &["rest_s", "above 0"]),
+        ("process.controller.parameters.origin.latitude_deg=90", &["origin.latitude_deg"]),
+        ("process.controller.period_ticks=100", &["the period is 0.1 s, expected less than 0.1 s"]),
+        (&format!("process.controller.vehicle={octa}"), &["octa X", "each turns the other way than there"]),
+    ];
+    for (setting, told) in cases {
+        let settings = [&settings[..], &[setting.to_owned()]].concat();
+        call(&place, "check", &manifest(), &settings, &[]).with_code(2).says(told);
+    }
+}
+
+#[test]
+fn a_checkpoint_of_an_ardupilot_is_refused_in_words() {
+    let place = Place::new();
+    let planned = ["--record", &place.path("a.mcap"), "--checkpoint-every", "500ms"];
+    let says = "the state of `controller` is in a firmware, which does not tell it";
+    call(&place, "run", &manifest(), &stand_in(&place, ""), &planned)
+        .with_code(2)
+        .says(&["at tick 500", says]);
+}
+
+#[test]
+fn arducopter_flies_the_hover_and_its_doublet() {
+    let Some(program) = variable_or_skip("HUMMINGBUS_ARDUPILOT", "the program of ArduCopter's SITL") else {
+        return;
+    };
+    let place = Place::new();
+    let settings = [format!("process.controller.firmware={program}")];
+    call(&place, "run", &manifest(), &settings, &["--record", &place.path("a.mcap")]).with_code(0);
+}
