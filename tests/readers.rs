@@ -7,6 +7,8 @@
 mod campaign;
 #[path = "readers/dataflash.rs"]
 mod dataflash;
+#[path = "readers/export.rs"]
+mod export;
 #[path = "readers/identify.rs"]
 mod identify;
 #[path = "runs/laps.rs"]

@@ -11,10 +11,9 @@ use serde_json::{Value, json};
 use std::path::PathBuf;
 
 /// Examples that `--help` shows.
-pub const HELP: &str = "Examples:
-  hummingbus diff a.mcap b.mcap
-  hummingbus diff a.mcap b.mcap --tolerance 1e-9
-  hummingbus diff a.mcap b.mcap --tolerance 1e-9 --json";
+pub const HELP: &str = "Example: hummingbus diff a.mcap b.mcap
+         hummingbus diff a.mcap b.mcap --tolerance 1e-9
+         hummingbus diff a.mcap b.mcap --tolerance 1e-9 --json";
 /// Fields that are printed; `--json` lists all.
 const FIELDS_PRINTED: usize = 20;
 

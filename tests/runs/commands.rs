@@ -269,6 +269,65 @@ fn a_recording_with_a_wrong_byte_is_never_identical_and_never_a_crash() {
 }
 
 #[test]
+fn a_tolerance_is_in_the_unit_of_each_field_and_json_has_every_field() {
+    let place = Place::new();
+    let hover = repository("manifests/hover.toml");
+    let flown = |name: &str, more: &[&str]| {
+        let path = place.path(name);
+        let args = ["run", &hover, "--in-process", "--record", &path, "--set", "run.duration_s=0.5"];
+        place.call(&[&args[..], more].concat()).flown();
+        path
+    };
+    let (first, same) = (flown("a.mcap", &[]), flown("b.mcap", &[]));
+    // A start that is a nanometre higher.
+    let other =
+        flown("c.mcap", &["--set", "process.plant.parameters.initial_position_m=[0.0, 0.0, 1.000000001]"]);
+    let short = flown("d.mcap", &["--set", "run.duration_s=0.2"]);
+    place.call(&["diff", &first, &same, "--json"]).with_code(0).prints(&["\"identical\": true"]);
+    place.call(&["diff", &first, &same, "--tolerance", "0"]).with_code(0).prints(&["messages are the same"]);
+    place.call(&["diff", &first, &other]).with_code(1);
+    let ended = place.call(&["diff", &first, &other, "--tolerance", "1e-3"]).with_code(0);
+    ended.prints(&["are within 0.001", "/plant/state position.z: at most", " m (tick"]);
+    let ended = place.call(&["diff", &first, &other, "--tolerance", "1e-12"]).with_code(1);
+    ended.prints(&["are beyond 1e-12", "/plant/state position.z"]);
+    let told = place.call(&["diff", &first, &other, "--tolerance", "1e-3", "--json"]).with_code(0).json();
+    let fields = told["fields"].as_array().unwrap();
+    let height =
+        fields.iter().find(|it| it["topic"] == "/plant/state" && it["field"] == "position.z").unwrap();
+    assert_eq!(
+        (&told["within"], &height["unit"], &height["first_tick"]),
+        (&true.into(), &"m".into(), &0.into())
+    );
+    assert!(height["largest"].as_f64().unwrap() < 1e-3, "{height}");
+    let ended = place.call(&["diff", &first, &short, "--tolerance", "1e9"]).with_code(1);
+    ended.prints(&["no tolerance allows this", "d.mcap is a prefix of"]);
+    for wrong in ["-1", "inf", "much"] {
+        place
+            .call(&["diff", &first, &same, &format!("--tolerance={wrong}")])
+            .with_code(2)
+            .says(&["from 0 on"]);
+    }
+}
+
+#[test]
+fn an_export_replaces_no_file_of_another_kind_and_names_an_unknown_topic() {
+    let place = Place::new();
+    let recording = recording(&place);
+    let out = place.path("tables");
+    let args = ["export", &recording, "--out", &out, "--topic", "/plant/state", "--csv"];
+    place.call(&args).with_code(0).prints(&["plant.state.csv: ", " messages"]);
+    // A second time in the place of the first.
+    place.call(&args).with_code(0);
+    let file = format!("{out}/plant.state.csv");
+    assert!(fs::read_to_string(&file).unwrap().starts_with("tick,time_ns,"));
+    fs::write(&file, "a letter").unwrap();
+    place.call(&args).with_code(2).says(&["plant.state.csv"]);
+    assert_eq!(fs::read_to_string(&file).unwrap(), "a letter");
+    let unknown = place.call(&["export", &recording, "--out", &out, "--topic", "/none"]).with_code(2);
+    unknown.says(&["/none", "/plant/state"]);
+}
+
+#[test]
 fn what_is_no_recording_is_refused() {
     let place = Place::new();
     let (empty, text) = (place.write("empty.mcap", ""), place.write("text.mcap", "hello\n".repeat(100)));
