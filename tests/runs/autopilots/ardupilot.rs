@@ -4,7 +4,7 @@
 use super::{call, compiled, each_flies_its_own};
 use crate::recordings::{require_same, topics};
 use crate::skipped::variable_or_skip;
-use crate::support::{Place, repository};
+use crate::support::{Place, poll, repository};
 use std::fs;
 use std::sync::OnceLock;
 
@@ -93,6 +93,30 @@ fn an_ardupilot_that_fails_ends_the_run_with_its_last_words() {
         ended.says(&["node `controller`"]);
         assert!(place.left().is_empty(), "{more}: {:?}", place.left());
     }
+}
+
+/// Firmwares that run out of `place`.
+fn firmwares(place: &Place) -> usize {
+    let folder = fs::canonicalize(place.path("")).unwrap();
+    let processes = fs::read_dir("/proc").unwrap().flatten();
+    let programs = processes.filter_map(|process| fs::read_link(process.path().join("exe")).ok());
+    programs
+        .filter(|program| program.starts_with(&folder) && program.to_string_lossy().contains("/ardupilot"))
+        .count()
+}
+
+#[test]
+fn no_ardupilot_outlives_a_killed_launcher() {
+    let place = Place::new();
+    let (manifest, recording) = (manifest(), place.path("killed.mcap"));
+    let mut args = vec!["run", &manifest, "--record", &recording, "--pace", "realtime"];
+    let settings = stand_in(&place, "");
+    args.extend(settings.iter().flat_map(|setting| ["--set", setting]));
+    let mut launch = place.start(&args);
+    launch.await_ticks(100);
+    assert_eq!(firmwares(&place), 1);
+    launch.kill();
+    poll("the end of the firmware", || (firmwares(&place) == 0).then_some(()));
 }
 
 #[test]
