@@ -287,9 +287,14 @@ fn a_tolerance_is_in_the_unit_of_each_field_and_json_has_every_field() {
     place.call(&["diff", &first, &same, "--tolerance", "0"]).with_code(0).prints(&["messages are the same"]);
     place.call(&["diff", &first, &other]).with_code(1);
     let ended = place.call(&["diff", &first, &other, "--tolerance", "1e-3"]).with_code(0);
-    ended.prints(&["are within 0.001", "/plant/state position.z: at most", " m (tick"]);
+    ended.prints(&[
+        "are within 0.001",
+        "/controller/command command[0]: at most",
+        " count (tick",
+        "--json lists all",
+    ]);
     let ended = place.call(&["diff", &first, &other, "--tolerance", "1e-12"]).with_code(1);
-    ended.prints(&["are beyond 1e-12", "/plant/state position.z"]);
+    ended.prints(&["are beyond 1e-12", "/controller/command command[0]"]);
     let told = place.call(&["diff", &first, &other, "--tolerance", "1e-3", "--json"]).with_code(0).json();
     let fields = told["fields"].as_array().unwrap();
     let height =
