@@ -40,6 +40,7 @@ pub const COMPONENTS: Registry = Registry::new(&[
     Registration::of::<Sensing<sensors::range::RangeFinders>>(),
     Registration::of::<sensors::range_inertial::filter::RangeInertial>(),
     Registration::of::<recorder::node::Recorder>(),
+    Registration::of::<controllers::rc::Rc>(),
     Registration::of::<controllers::remote_control::RemoteControl>(),
     Registration::of::<Sensing<sensors::rpm::RpmParams>>(),
     Registration::of::<plant::traffic::Traffic>(),

@@ -220,7 +220,8 @@ impl Operator {
             return state.asked();
         }
         let is_silent = read.is_none_or(|(_, age)| age >= SILENCE);
-        let Asked { altitude_m, roll_rad, pitch_rad, yaw_rad } = state.asked();
+        // A run from a checkpoint may have other limits.
+        let Asked { altitude_m, roll_rad, pitch_rad, yaw_rad } = self.within_limits(&state.asked());
         let tilt = |tilt_rad: f64| match self.fallback {
             Fallback::Level | Fallback::Land if is_silent => 0.0,
             _ => tilt_rad,
@@ -233,18 +234,22 @@ impl Operator {
         Asked { altitude_m, roll_rad: tilt(roll_rad), pitch_rad: tilt(pitch_rad), yaw_rad }
     }
 
-    /// Notes the requested values, within the limits.
-    fn note(&self, asked: &Asked, state: &mut OperatorState) {
+    fn within_limits(&self, asked: &Asked) -> Asked {
         let [lowest_m, highest_m] = self.altitudes_m;
         let tilt = |tilt_rad: f64| tilt_rad.clamp(-self.tilt_max_rad, self.tilt_max_rad);
-        *state = OperatorState {
-            altitude: asked.altitude_m.clamp(lowest_m, highest_m),
-            roll: tilt(asked.roll_rad),
-            pitch: tilt(asked.pitch_rad),
-            yaw: asked.yaw_rad,
-            is_asked: 1,
-            ..*state
-        };
+        Asked {
+            altitude_m: asked.altitude_m.clamp(lowest_m, highest_m),
+            roll_rad: tilt(asked.roll_rad),
+            pitch_rad: tilt(asked.pitch_rad),
+            yaw_rad: asked.yaw_rad,
+        }
+    }
+
+    /// Stores the requested values in the state, within the limits.
+    fn note(&self, asked: &Asked, state: &mut OperatorState) {
+        let Asked { altitude_m: altitude, roll_rad: roll, pitch_rad: pitch, yaw_rad: yaw } =
+            self.within_limits(asked);
+        *state = OperatorState { altitude, roll, pitch, yaw, is_asked: 1, ..*state };
     }
 }
 
@@ -333,6 +338,13 @@ mod tests {
         assert_eq!(after("hold"), asked(2.0, 0.1));
         assert_eq!(after("level"), Asked { roll_rad: 0.0, pitch_rad: 0.0, ..asked(2.0, 0.0) });
         assert_eq!(after("land").altitude_m, 2.0 - LANDING_M_S * 1e-3);
+        let mut state = OperatorState { altitude: 9.0, roll: 1.0, is_asked: 1, ..OperatorState::default() };
+        let within = operator("hold").allowed(None, &mut state);
+        assert_eq!(
+            (within.altitude_m, within.roll_rad),
+            (3.0, 10_f64.to_radians()),
+            "the limits are those of this run"
+        );
     }
 
     #[test]

@@ -21,6 +21,8 @@ fn doc_line(line: &str) -> Option<(&str, &str)> {
 
 /// True if a text begins with one of [`QUESTIONS`].
 fn is_question(content: &str) -> bool {
+    // Items of a list and cells of a table begin behind their marks.
+    let content = content.trim_start_matches(['-', '*', '|', ' ']);
     let first = content.split(|c: char| !c.is_alphabetic()).next().unwrap_or_default();
     QUESTIONS.contains(&first)
 }
@@ -30,8 +32,15 @@ fn questions(text: &str) -> Vec<usize> {
     let mut found = Vec::new();
     // The marker of the paragraph that the line before belongs to.
     let mut paragraph = None;
+    let mut is_code = false;
     for (number, line) in (1..).zip(text.lines()) {
         let doc = doc_line(line).filter(|(_, content)| !content.is_empty());
+        if doc.is_some_and(|(_, content)| content.starts_with("```")) {
+            is_code = !is_code;
+        }
+        if is_code {
+            continue;
+        }
         if let Some((marker, content)) = doc
             && paragraph != Some(marker)
             && is_question(content)
@@ -82,7 +91,7 @@ fn doc_comments_begin_with_a_noun_or_a_verb() {
 
 #[test]
 fn a_question_word_that_begins_a_paragraph_is_found() {
-    let cases: [(&str, &str, &[usize]); 10] = [
+    let cases: [(&str, &str, &[usize]); 12] = [
         ("the first line", "/// What it reads.\nfn a() {}\n", &[1]),
         ("a line of a module", "//! How it flies.\n\n//! Why.\n", &[1, 3]),
         ("an indented line", "struct A {\n    /// Whether it flies.\n    a: bool,\n}\n", &[2]),
@@ -90,6 +99,8 @@ fn a_question_word_that_begins_a_paragraph_is_found() {
         ("a paragraph behind code", "/// Number of ticks.\nconst N: u8 = 1;\n/// Which rotor.\n", &[3]),
         ("another marker", "//! Rotors.\n/// Who turns them.\n", &[2]),
         ("each word", "/// Whatever.\n\n/// Who\n\n/// Which: this.\n", &[1, 3, 5]),
+        ("an item of a list", "/// Inputs:\n///\n/// - What it reads\n", &[3]),
+        ("code", "/// Example:\n///\n/// ```text\n///\n/// What it prints\n/// ```\n", &[]),
         ("a noun", "/// Inputs.\n///\n/// Whole numbers, whichever.\nstruct Whatever;\n", &[]),
         ("a line that goes on", "/// Reads the inputs.\n/// What it reads is kept.\n", &[]),
         ("other comments", "// What it reads.\n//// Why.\nlet what = \"/// What\"; // How.\n", &[]),

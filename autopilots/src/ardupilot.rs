@@ -130,6 +130,18 @@ impl Autopilot for ArduPilot {
                 "the period is {period_s} s, expected less than {PERIOD_MAX_S} s: ArduPilot's clock takes no longer step"
             )
         })?;
+        let period_us = period_s * 1e6;
+        refuse((period_us - period_us.round()).abs() > 1e-6, "period_ticks", || {
+            format!(
+                "the period is {period_us} us, expected whole microseconds: ArduPilot's clock cuts each step to them"
+            )
+        })?;
+        refuse(armed_by_channel.is_some() && rest_s <= ARMED_S, "rest_s", || {
+            format!(
+                "`rest_s` is {rest_s} s, expected more than {ARMED_S} s with `armed_by_channel`: the switch moves {ARMED_S} s before \
+                 tick 0, and ArduPilot arms when it sees it move"
+            )
+        })?;
         let configured = settings::configuration(context, configuration.as_deref())?;
         let text = parameter_file::text(&configured, &numbers, vehicle.rotors.len())
             .map_err(|reason| ParameterError::conflict("configuration", reason))?;

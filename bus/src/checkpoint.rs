@@ -18,8 +18,6 @@ use serde::{Deserialize, Serialize};
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
-/// The folder in a run directory with the parts of its checkpoints, a folder for each tick.
-const FOLDER: &str = "checkpoints";
 /// The folder in a run directory with the parts that its nodes go on from.
 const FROM: &str = "from";
 /// The file with the samples among them.
@@ -44,6 +42,25 @@ pub struct NodePart {
     /// Words of a step under way that takes simulated time.
     timing: Vec<u64>,
     samples: Vec<SavedSample>,
+}
+
+/// Cause of a checkpoint. The nodes write the parts of each cause in a place of their own, so that a tick may have both.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cause {
+    /// The plan of the run names its tick.
+    Plan,
+    /// A request in flight.
+    Request,
+}
+
+impl Cause {
+    /// Folder in a run directory with the parts, a folder for each tick.
+    const fn folder(self) -> &'static str {
+        match self {
+            Self::Plan => "checkpoints",
+            Self::Request => "requested-checkpoints",
+        }
+    }
 }
 
 /// Contents of a checkpoint: the parts of the nodes.
@@ -236,8 +253,8 @@ impl Parts {
     ///
     /// # Errors
     /// If one of them cannot be read.
-    pub fn written(run_dir: &Path, tick: u32, nodes: usize) -> Result<Option<Self>, BusError> {
-        let paths: Vec<PathBuf> = (0..nodes).map(|index| part_path(run_dir, tick, index)).collect();
+    pub fn written(run_dir: &Path, cause: Cause, tick: u32, nodes: usize) -> Result<Option<Self>, BusError> {
+        let paths: Vec<PathBuf> = (0..nodes).map(|index| part_path(run_dir, cause, tick, index)).collect();
         if !paths.iter().all(|path| path.exists()) {
             return Ok(None);
         }
@@ -246,9 +263,9 @@ impl Parts {
     }
 
     /// Removes the parts that the nodes have written for `tick`.
-    pub fn remove_written(run_dir: &Path, tick: u32) {
+    pub fn remove_written(run_dir: &Path, cause: Cause, tick: u32) {
         // It goes with the run directory otherwise.
-        let _ = std::fs::remove_dir_all(run_dir.join(FOLDER).join(tick.to_string()));
+        let _ = std::fs::remove_dir_all(run_dir.join(cause.folder()).join(tick.to_string()));
     }
 }
 
@@ -260,12 +277,18 @@ fn plan_sum(plan: &NodePlan) -> String {
 }
 
 /// Writes the part of node `index` of the checkpoint at `tick` into `run_dir`.
-pub(crate) fn store_part(run_dir: &Path, tick: u32, index: usize, part: &NodePart) -> Result<(), BusError> {
-    store(&part_path(run_dir, tick, index), part)
+pub(crate) fn store_part(
+    run_dir: &Path,
+    cause: Cause,
+    tick: u32,
+    index: usize,
+    part: &NodePart,
+) -> Result<(), BusError> {
+    store(&part_path(run_dir, cause, tick, index), part)
 }
 
-fn part_path(run_dir: &Path, tick: u32, index: usize) -> PathBuf {
-    run_dir.join(FOLDER).join(tick.to_string()).join(index.to_string())
+fn part_path(run_dir: &Path, cause: Cause, tick: u32, index: usize) -> PathBuf {
+    run_dir.join(cause.folder()).join(tick.to_string()).join(index.to_string())
 }
 
 /// Writes `value` to `path` in one step, in a folder that is made where it is missing.

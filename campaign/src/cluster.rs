@@ -397,15 +397,28 @@ impl Chunk {
 }
 
 /// Cancels `arrays`, and waits for the ends of their tasks, but not with a second stop.
+///
+/// # Errors
+/// If they are not cancelled, or have not ended in time.
 fn cancel(arrays: &[String], stop: &StopToken) -> Result<()> {
     if arrays.is_empty() {
         return Ok(());
     }
     slurm::cancel(arrays)?;
-    let end_ns = monotonic_ns() + END_NS;
-    let is_alive =
-        || slurm::states(arrays).is_ok_and(|states| states.values().any(|state| *state == TaskState::Alive));
-    while stop.count() < 2 && monotonic_ns() < end_ns && is_alive() {
+    let (end_ns, mut question_ns) = (monotonic_ns() + END_NS, 0);
+    while stop.count() < 2 {
+        let now_ns = monotonic_ns();
+        if now_ns >= question_ns {
+            // A controller that does not answer says nothing of the tasks.
+            match slurm::states(arrays) {
+                Ok(states) if states.values().all(|state| *state != TaskState::Alive) => return Ok(()),
+                Err(error) if now_ns >= end_ns => return Err(error),
+                Ok(_) if now_ns >= end_ns => {
+                    bail!("Slurm's job {} was cancelled and its tasks still run", arrays.join(", "))
+                }
+                _ => question_ns = now_ns + QUESTION_NS.0,
+            }
+        }
         std::thread::sleep(LOOK);
     }
     Ok(())

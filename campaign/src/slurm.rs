@@ -40,12 +40,16 @@ pub type States = BTreeMap<(String, usize), TaskState>;
 /// If there is no `sbatch`, or it refuses the array; the message has its words.
 pub fn submit(submission: &Submission<'_>) -> Result<String> {
     let mut command = Command::new("sbatch");
+    // Ours stand behind the user's: the last one counts. Variables would undo what is refused as an option.
     command
-        .args(["--parsable", "--job-name=hummingbus", "--requeue", "--open-mode=append"])
+        .env_remove("SBATCH_CLUSTERS")
+        .env_remove("SBATCH_WAIT")
+        .arg("--job-name=hummingbus")
+        .args(submission.options)
+        .args(["--parsable", "--requeue", "--open-mode=append"])
         .arg(format!("--array={}", ranges(submission.tasks)))
         .arg(format!("--cpus-per-task={}", submission.processors))
         .arg(format!("--output={}", submission.logs.join("log-%a-%A.txt").display()))
-        .args(submission.options)
         .arg(submission.script);
     let output = called(&mut command)?;
     if !output.status.success() {
@@ -81,17 +85,20 @@ pub fn states(arrays: &[String]) -> Result<States> {
     if why.contains("Invalid job id") { Ok(States::new()) } else { bail!("squeue: {why}") }
 }
 
-/// Cancels `arrays`.
+/// Cancels `arrays`, one after another: one that Slurm has forgotten must not hide that another one flies on.
 ///
 /// # Errors
 /// If there is no `scancel`, or it fails.
 pub fn cancel(arrays: &[String]) -> Result<()> {
-    let output = called(Command::new("scancel").args(arrays))?;
-    // One that has ended is as good as cancelled.
-    if output.status.success() || said(&output).contains("Invalid job id") {
-        return Ok(());
+    let mut failed = None;
+    for array in arrays {
+        let output = called(Command::new("scancel").arg(array))?;
+        // One that has ended is as good as cancelled.
+        if !output.status.success() && !said(&output).contains("Invalid job id") {
+            failed = failed.or(Some(format!("scancel {array}: {}", said(&output))));
+        }
     }
-    bail!("scancel: {}", said(&output))
+    failed.map_or(Ok(()), |failed| bail!("{failed}"))
 }
 
 fn called(command: &mut Command) -> Result<Output> {

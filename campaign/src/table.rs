@@ -14,7 +14,10 @@ use std::fs::File;
 /// # Errors
 /// If the file cannot be written.
 pub fn write(file: &mut File, plan: &Plan, figures: &[String], rows: &[Row]) -> Result<()> {
-    write_parquet(file, "flights", &columns(plan, figures, rows), &[])
+    let columns = columns(plan, figures, rows);
+    let columns: Vec<(&str, &Column)> =
+        columns.iter().map(|(name, column)| (name.as_str(), column)).collect();
+    write_parquet(file, "flights", &columns, &[])
 }
 
 fn columns(plan: &Plan, figures: &[String], rows: &[Row]) -> Vec<(String, Column)> {

@@ -4,7 +4,7 @@ use crate::definition::{Leaf, Value};
 use crate::diff::{Difference, first_of, message_difference, same_message, skip_to};
 use crate::error::RecordingError;
 use crate::reader::{Record, Recording};
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
 
 /// Differences of a field between two recordings.
@@ -20,10 +20,17 @@ pub struct FieldDifference {
     pub messages: u64,
     /// First tick at which it differs.
     pub first_tick: u32,
-    /// Largest absolute difference, in the field's unit; infinite for a text, and where only one of the two values is NaN.
+    /// Largest absolute difference, in the field's unit; infinite for a text, and where only one of the two values is NaN. An
+    /// infinite one serialises as the text `inf`: JSON has no such number.
+    #[serde(serialize_with = "number_or_text")]
     pub largest: f64,
     /// Tick of the largest difference.
     pub largest_tick: u32,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde's interface")]
+fn number_or_text<S: Serializer>(number: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+    if number.is_finite() { serializer.serialize_f64(*number) } else { serializer.collect_str(number) }
 }
 
 /// Comparison of two recordings.
@@ -75,13 +82,15 @@ impl Comparison {
 pub fn compare(a: &Recording, b: &Recording) -> Result<Comparison, RecordingError> {
     let (mut left, mut right) = (a.messages().peekable(), b.messages().peekable());
     if let (Some(x), Some(y)) = (first_of(&mut left), first_of(&mut right)) {
-        // Messages of one recording alone are found below.
-        skip_to(&mut left, y.tick);
-        skip_to(&mut right, x.tick);
+        if !(skip_to(&mut left, y.tick) && skip_to(&mut right, x.tick)) {
+            // One ends before the other begins.
+            let refused = Some(message_difference(&x, &y));
+            return Ok(Comparison { messages: 0, fields: Vec::new(), refused });
+        }
     }
     let mut fields = Fields::default();
     let (mut messages, mut last_tick) = (0, None);
-    let ends = |shorter: &Recording, last_tick, longer: &Recording| Difference::Prefix {
+    let ends = |shorter: &Recording, last_tick, longer: &Recording| Difference::Ends {
         shorter: shorter.path().to_owned(),
         last_tick,
         longer: longer.path().to_owned(),
@@ -121,6 +130,7 @@ impl Fields {
         if (x.tick, x.time_ns, &x.topic) != (y.tick, y.time_ns, &y.topic) {
             return Ok(Some(message_difference(x, y)));
         }
+        let (type_a, type_b) = (&a.topic(&x.topic)?.type_name, &b.topic(&y.topic)?.type_name);
         let (p, q) = (a.decode(x)?, b.decode(y)?);
         let differs = |path: Option<&str>, a: String, b: String| Difference::Message {
             tick: x.tick,
@@ -129,9 +139,13 @@ impl Fields {
             a,
             b,
         };
+        if type_a != type_b {
+            return Ok(Some(differs(Some("(message type)"), type_a.clone(), type_b.clone())));
+        }
         for (l, r) in p.iter().zip(&q) {
-            if l.path != r.path {
-                return Ok(Some(differs(None, format!("a field {}", l.path), format!("a field {}", r.path))));
+            if (&l.path, &l.unit) != (&r.path, &r.unit) {
+                let text = |leaf: &Leaf| format!("a field {} in {:?}", leaf.path, leaf.unit);
+                return Ok(Some(differs(None, text(l), text(r))));
             }
             if let Some(difference) = difference_of(&l.value, &r.value) {
                 self.note(x, l, difference);
@@ -161,13 +175,15 @@ impl Fields {
 }
 
 /// Absolute difference of two values; `None` if they are the same, as two NaNs are.
+#[allow(clippy::cast_precision_loss, reason = "a difference is not zero for being large")]
 fn difference_of(a: &Value, b: &Value) -> Option<f64> {
     if a.to_string() == b.to_string() {
         return None;
     }
-    let difference = match (a.as_f64(), b.as_f64()) {
-        (Some(a), Some(b)) => (a - b).abs(),
-        _ => f64::INFINITY,
+    let difference = match (a, b) {
+        // Doubles do not tell large integers apart.
+        (Value::Integer(a), Value::Integer(b)) => a.abs_diff(*b) as f64,
+        _ => a.as_f64().zip(b.as_f64()).map_or(f64::INFINITY, |(a, b)| (a - b).abs()),
     };
     Some(if difference.is_nan() { f64::INFINITY } else { difference })
 }
@@ -223,7 +239,7 @@ mod tests {
         let short = climb(folder.path(), "b.mcap", 0..12, 0.0);
         let found = compare(&whole, &short).unwrap();
         assert!(!found.is_within(f64::INFINITY));
-        assert!(matches!(found.refused, Some(Difference::Prefix { last_tick: Some(11), .. })), "{found:?}");
+        assert!(matches!(found.refused, Some(Difference::Ends { last_tick: Some(11), .. })), "{found:?}");
         let later = climb(folder.path(), "c.mcap", 5..20, 0.5);
         let found = compare(&later, &whole).unwrap();
         assert_eq!((found.messages, found.is_within(0.5)), (15, true));
@@ -237,5 +253,7 @@ mod tests {
         assert_eq!(difference_of(&Value::Text("a".into()), &Value::Text("b".into())), Some(f64::INFINITY));
         assert_eq!(difference_of(&float(0.0), &float(-0.0)), Some(0.0));
         assert_eq!(difference_of(&Value::Integer(3), &Value::Integer(5)), Some(2.0));
+        let large = 1 << 60;
+        assert_eq!(difference_of(&Value::Integer(large), &Value::Integer(large + 1)), Some(1.0));
     }
 }

@@ -32,6 +32,15 @@ pub enum Difference {
         /// The recording that goes on.
         longer: PathBuf,
     },
+    /// One recording ends before the other, in a comparison within a tolerance.
+    Ends {
+        /// The recording that ends first.
+        shorter: PathBuf,
+        /// Its last tick; `None` if it has no message.
+        last_tick: Option<u32>,
+        /// The recording that goes on.
+        longer: PathBuf,
+    },
     /// One recording begins later, as that of a run from a checkpoint does, and holds the same messages as the other
     /// from there on.
     Later {
@@ -66,6 +75,13 @@ impl fmt::Display for Difference {
                     }
                     None => write!(f, "it ends before the first message"),
                 }
+            }
+            Self::Ends { shorter, last_tick, longer } => {
+                let tick = last_tick.map_or_else(
+                    || "before its first message".to_owned(),
+                    |tick| format!("after tick {tick}"),
+                );
+                write!(f, "{} ends {tick}, and {} goes on", shorter.display(), longer.display())
             }
             Self::Later { later, first_tick, earlier, ends } => {
                 let (later, earlier) = (later.display(), earlier.display());

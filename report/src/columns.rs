@@ -35,7 +35,7 @@ pub enum Column {
 /// use report::columns::{Column, PARQUET_START, write_parquet};
 ///
 /// let height = Column::Number(vec![Some(0.0), None, Some(1.5)]);
-/// let columns = [("tick".to_owned(), Column::Whole(vec![0, 1, 2])), ("position.z".to_owned(), height)];
+/// let columns = [("tick", &Column::Whole(vec![0, 1, 2])), ("position.z", &height)];
 /// let mut bytes = Vec::new();
 /// write_parquet(&mut bytes, "flight", &columns, &[("unit of position.z", "m".to_owned())])?;
 /// assert!(bytes.starts_with(PARQUET_START));
@@ -47,7 +47,7 @@ pub enum Column {
 pub fn write_parquet(
     out: impl Write + Send,
     name: &str,
-    columns: &[(String, Column)],
+    columns: &[(&str, &Column)],
     facts: &[(&str, String)],
 ) -> Result<()> {
     let fields = columns.iter().map(|(name, column)| field(name, column)).collect::<Result<_>>()?;

@@ -4,7 +4,6 @@ use crate::columns::{Column, write_parquet};
 use anyhow::Result;
 use recorder::definition::{Leaf, Value, is_padding};
 use recorder::reader::Recording;
-use std::collections::BTreeMap;
 use std::io::Write;
 
 /// First bytes of an exported CSV file.
@@ -26,9 +25,9 @@ pub const CSV_START: &str = "tick,time_ns";
 /// writer.write(pilot, 3, 3_000_000, &[&[0, 1, 0, 0], bytemuck::bytes_of(&set_point)].concat())?;
 /// writer.finish()?;
 ///
-/// let tables = report::export::tables(&Recording::open(&path)?, &[])?;
+/// let table = report::export::table(&Recording::open(&path)?, "/pilot/set_point")?;
 /// let mut text = Vec::new();
-/// tables["/pilot/set_point"].write_csv(&mut text)?;
+/// table.write_csv(&mut text)?;
 /// assert!(String::from_utf8(text)?.ends_with("\n3,3000000,0,0,1.5,0.0,0.0,0.0\n"));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -47,24 +46,20 @@ struct Field {
     column: Column,
 }
 
-/// Returns the tables of `topics` of `recording`; of all topics if none is named.
+/// Returns the table of `topic` of `recording`, whole in memory: 16 bytes for each value.
 ///
 /// # Errors
 /// If the recording is damaged, or has no such topic.
-pub fn tables(recording: &Recording, topics: &[String]) -> Result<BTreeMap<String, Table>> {
-    for topic in topics {
-        recording.topic(topic)?;
-    }
-    let mut tables: BTreeMap<String, Table> = BTreeMap::new();
+pub fn table(recording: &Recording, topic: &str) -> Result<Table> {
+    recording.topic(topic)?;
+    let mut table = Table::default();
     for record in recording.messages() {
         let record = record?;
-        if topics.is_empty() || topics.contains(&record.topic) {
-            let leaves = recording.decode(&record)?;
-            let table = tables.entry(record.topic.clone()).or_default();
-            table.add(record.tick, record.time_ns, &leaves);
+        if record.topic == topic {
+            table.add(record.tick, record.time_ns, &recording.decode(&record)?);
         }
     }
-    Ok(tables)
+    Ok(table)
 }
 
 impl Table {
@@ -116,9 +111,10 @@ impl Table {
     /// If `out` cannot be written to.
     pub fn write_parquet(&self, out: impl Write + Send) -> Result<()> {
         let stamps = [("tick", &self.tick), ("time_ns", &self.time_ns)]
-            .map(|(name, values)| (name.to_owned(), Column::Whole(values.clone())));
-        let fields = self.fields.iter().map(|field| (field.path.clone(), field.column.clone()));
-        let columns: Vec<(String, Column)> = stamps.into_iter().chain(fields).collect();
+            .map(|(name, values)| (name, Column::Whole(values.clone())));
+        let stamps = stamps.iter().map(|(name, column)| (*name, column));
+        let fields = self.fields.iter().map(|field| (field.path.as_str(), &field.column));
+        let columns: Vec<(&str, &Column)> = stamps.chain(fields).collect();
         let units = self.fields.iter().filter(|field| !field.unit.is_empty());
         let units: Vec<(String, String)> =
             units.map(|field| (format!("unit of {}", field.path), field.unit.clone())).collect();

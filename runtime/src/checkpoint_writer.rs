@@ -5,7 +5,7 @@ use crate::graph::Graph;
 use crate::manifest::Manifest;
 use crate::program::{BackupSpec, OnExit, unsaved};
 use anyhow::{Context as _, Result, anyhow, bail};
-use bus::checkpoint::{NodePart, Parts};
+use bus::checkpoint::{Cause, NodePart, Parts};
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
@@ -20,24 +20,50 @@ pub(crate) struct WrittenFiles {
 }
 
 impl WrittenFiles {
-    /// Forgets those behind `tick`.
-    pub(crate) fn go_back(&self, tick: u32) {
-        for files in [&self.planned, &self.asked] {
-            files.borrow_mut().retain(|written| written.tick <= tick);
+    /// Forgets those behind `tick`, to whose checkpoint in `path` the run goes back. If `path` is of another flight, all are
+    /// forgotten but it: those before it are of a flight that the run no longer continues.
+    pub(crate) fn go_back(&self, tick: u32, path: &Path) {
+        let lists = [&self.planned, &self.asked];
+        let is_known = lists.iter().any(|files| files.borrow().iter().any(|written| written.path == path));
+        for files in lists {
+            files.borrow_mut().retain(|written| is_known && written.tick <= tick);
         }
+        if !is_known {
+            self.asked.borrow_mut().push(Written { tick, path: path.to_owned() });
+        }
+    }
+
+    /// Adds a checkpoint that was asked for. Another one in its file is gone.
+    fn add_asked(&self, written: Written) {
+        for files in [&self.planned, &self.asked] {
+            files.borrow_mut().retain(|other| other.path != written.path);
+        }
+        self.asked.borrow_mut().push(written);
+    }
+
+    /// Adds a checkpoint of the plan, and returns the oldest if there are more than `keep`. One that was also asked for stays
+    /// in the other list, so that it is not removed.
+    fn add_planned(&self, written: Written, keep: usize) -> Option<Written> {
+        if self.asked.borrow().contains(&written) {
+            return None;
+        }
+        self.asked.borrow_mut().retain(|other| other.path != written.path);
+        let mut planned = self.planned.borrow_mut();
+        planned.push(written);
+        (planned.len() > keep).then(|| planned.remove(0))
     }
 
     /// The newest before tick `now`: that of `tick`, if it is given.
     ///
     /// # Errors
     /// If there is none.
-    fn newest(&self, tick: Option<u32>, now: u32) -> Result<PathBuf> {
+    fn newest(&self, tick: Option<u32>, now: u32) -> Result<Written> {
         let (planned, asked) = (self.planned.borrow(), self.asked.borrow());
         let mut all: Vec<&Written> = planned.iter().chain(&*asked).collect();
         all.sort_by_key(|written| written.tick);
         let fits = |written: &&&Written| tick.map_or(written.tick < now, |tick| written.tick == tick);
         if let Some(found) = all.iter().rfind(fits) {
-            return Ok(found.path.clone());
+            return Ok((**found).clone());
         }
         let wanted = tick.map_or_else(|| format!("before tick {now}"), |tick| format!("of tick {tick}"));
         let ticks: Vec<String> = all.iter().map(|written| written.tick.to_string()).collect();
@@ -50,6 +76,16 @@ impl WrittenFiles {
              or name a file"
         ))
     }
+}
+
+/// Checkpoint that a run can go back to.
+pub(crate) struct Found {
+    /// The first tick that is computed again.
+    pub tick: u32,
+    /// Its file.
+    pub path: PathBuf,
+    /// The graph of the run that goes on from it.
+    pub graph: Graph,
 }
 
 /// Writes the checkpoints of a run.
@@ -67,36 +103,45 @@ impl Writer<'_> {
     /// Writes the requested checkpoint of `tick` to `path`, or beside the recording, once its nodes have written
     /// their parts; `None` before.
     pub(crate) fn write_asked(&self, tick: u32, path: Option<&Path>) -> Result<Option<PathBuf>> {
-        let written = self.write(tick, path)?;
-        if let Some(path) = &written {
-            self.files.asked.borrow_mut().push(Written { tick, path: path.clone() });
-        }
-        Ok(written)
-    }
-
-    fn write(&self, tick: u32, path: Option<&Path>) -> Result<Option<PathBuf>> {
-        let Some(parts) = Parts::written(self.run_dir, tick, self.graph.plan.nodes.len())? else {
-            return Ok(None);
-        };
         let path = path.map_or_else(|| self::path(self.stem, tick), Path::to_owned);
-        self.put(parts, &path)?;
-        Parts::remove_written(self.run_dir, tick);
-        Ok(Some(path))
+        let is_written = self.write(Cause::Request, tick, &path)?;
+        if is_written {
+            self.files.add_asked(Written { tick, path: path.clone() });
+        }
+        Ok(is_written.then_some(path))
     }
 
-    /// The checkpoint in `file`, or that of `tick` which this run has written, or its newest one before tick `now`,
-    /// which the run has reached; with the graph that goes on from it.
+    /// Writes the checkpoint of `tick` to `path`, once its nodes have written their parts; false before.
+    fn write(&self, cause: Cause, tick: u32, path: &Path) -> Result<bool> {
+        let Some(parts) = Parts::written(self.run_dir, cause, tick, self.graph.plan.nodes.len())? else {
+            return Ok(false);
+        };
+        self.put(parts, path)?;
+        Parts::remove_written(self.run_dir, cause, tick);
+        Ok(true)
+    }
+
+    /// The checkpoint in `file`, or that of `tick` which this run has written, or the newest of it before tick `now`, to which
+    /// the run has come.
     ///
     /// # Errors
-    /// If there is none, it belongs to another run, it lies ahead, or no run can go on from it.
-    pub(crate) fn find(
-        &self,
-        tick: Option<u32>,
-        file: Option<&Path>,
-        now: u32,
-    ) -> Result<(Checkpoint, Graph)> {
-        let path = file.map_or_else(|| self.files.newest(tick, now), |file| Ok(file.to_owned()))?;
+    /// If there is none, it is one of another run, it lies ahead, or nothing can go on from it.
+    pub(crate) fn find(&self, tick: Option<u32>, file: Option<&Path>, now: u32) -> Result<Found> {
+        let written = match file {
+            Some(_) => None,
+            None => Some(self.files.newest(tick, now)?),
+        };
+        let path =
+            file.or(written.as_ref().map(|written| &*written.path)).unwrap_or(Path::new("")).to_owned();
         let found = Checkpoint::read(&path)?;
+        if let Some(Written { tick, .. }) = written
+            && found.tick() != tick
+        {
+            let (path, found) = (path.display(), found.tick());
+            bail!(
+                "{path} was replaced since this run has written it: it is of tick {found}, and was of tick {tick}"
+            );
+        }
         let of_now = Checkpoint::new(self.manifest, self.graph, Parts { tick: now, nodes: Vec::new() });
         if !found.is_of_run_of(&of_now) {
             bail!(
@@ -111,8 +156,8 @@ impl Writer<'_> {
                 found.tick()
             );
         }
-        let again = self.from(&found).with_context(|| format!("cannot go back to {}", path.display()))?;
-        Ok((found, again))
+        let graph = self.from(&found).with_context(|| format!("cannot go back to {}", path.display()))?;
+        Ok(Found { tick: found.tick(), path, graph })
     }
 
     /// The graph of the run again, from `checkpoint` on; a shadow that the manifest does not name flies again.
@@ -141,11 +186,6 @@ impl Writer<'_> {
 
     fn put(&self, parts: Parts, path: &Path) -> Result<()> {
         let (graph, tick) = (self.graph, parts.tick);
-        if let Some((node, program)) = unsaved(&graph.plan, &graph.programs, &graph.backups, tick) {
-            bail!(
-                "no checkpoint of tick {tick}: the state of `{node}` is in {program}, which does not tell it"
-            );
-        }
         for (index, part) in parts.nodes.iter().enumerate() {
             if !self.is_planned(index, part, tick) {
                 bail!(
@@ -154,6 +194,11 @@ impl Writer<'_> {
                     part.name
                 );
             }
+        }
+        if let Some((node, program)) = unsaved(&graph.plan, &graph.programs, &graph.backups, tick) {
+            bail!(
+                "no checkpoint of tick {tick}: the state of `{node}` is in {program}, which does not tell it"
+            );
         }
         Checkpoint::new(self.manifest, graph, parts).write(path)
     }
@@ -180,9 +225,10 @@ impl<'a> Collector<'a> {
         while self.failed.is_none()
             && let Some(tick) = self.next
         {
-            match self.writer.write(tick, None) {
-                Ok(Some(path)) => self.note(tick, path),
-                Ok(None) => return,
+            let path = path(self.writer.stem, tick);
+            match self.writer.write(Cause::Plan, tick, &path) {
+                Ok(true) => self.note(tick, path),
+                Ok(false) => return,
                 Err(error) => self.failed = Some(error),
             }
         }
@@ -201,12 +247,10 @@ impl<'a> Collector<'a> {
     fn note(&mut self, tick: u32, path: PathBuf) {
         let Writer { manifest, graph, files, .. } = self.writer;
         self.next = graph.plan.checkpoint_after(tick);
-        let mut written = files.planned.borrow_mut();
-        written.push(Written { tick, path });
         let keep = manifest.content.run.checkpoint_keep.as_ref().map_or(usize::MAX, |keep| *keep.get_ref());
-        if written.len() > keep {
+        if let Some(oldest) = files.add_planned(Written { tick, path }, keep) {
             // A user who has removed or replaced it meanwhile has done so on purpose.
-            let _ = std::fs::remove_file(written.remove(0).path);
+            let _ = std::fs::remove_file(oldest.path);
         }
     }
 
@@ -228,6 +272,7 @@ impl<'a> Collector<'a> {
 #[cfg(test)]
 mod tests {
     use super::{Written, WrittenFiles};
+    use std::path::Path;
 
     fn written(tick: u32) -> Written {
         Written { tick, path: format!("a.{tick}.ckpt").into() }
@@ -238,15 +283,36 @@ mod tests {
         let files = WrittenFiles::default();
         let error = files.newest(None, 500).unwrap_err().to_string();
         assert!(error.contains("before tick 500: it has written none"), "{error}");
-        files.planned.borrow_mut().extend([100, 300, 500].map(written));
-        files.asked.borrow_mut().push(written(200));
-        let tick_of = |tick, now| files.newest(tick, now).unwrap();
-        assert_eq!(tick_of(None, 500), written(300).path);
-        assert_eq!(tick_of(None, 300), written(200).path);
-        assert_eq!(tick_of(Some(100), 500), written(100).path);
-        files.go_back(200);
-        assert_eq!(tick_of(None, 900), written(200).path);
+        for tick in [100, 300, 500] {
+            assert_eq!(files.add_planned(written(tick), 9), None);
+        }
+        files.add_asked(written(200));
+        let newest = |tick, now| files.newest(tick, now).unwrap();
+        assert_eq!(newest(None, 500), written(300));
+        assert_eq!(newest(None, 300), written(200));
+        assert_eq!(newest(Some(100), 500), written(100));
+        files.go_back(200, &written(200).path);
+        assert_eq!(newest(None, 900), written(200));
         let error = files.newest(Some(300), 900).unwrap_err().to_string();
         assert!(error.contains("of tick 300: it has those of 100, 200;"), "{error}");
+        // To a checkpoint that it has not written: the flight before it is another one.
+        files.go_back(150, Path::new("other.ckpt"));
+        assert_eq!(newest(None, 900).path, Path::new("other.ckpt"));
+        assert!(files.newest(Some(100), 900).is_err());
+    }
+
+    #[test]
+    fn a_file_has_one_checkpoint_and_one_that_was_asked_for_is_kept() {
+        let files = WrittenFiles::default();
+        let in_one_file = |tick| Written { tick, path: "x.ckpt".into() };
+        files.add_asked(in_one_file(100));
+        files.add_asked(in_one_file(250));
+        assert!(files.newest(Some(100), 400).is_err(), "its file has that of tick 250");
+        assert_eq!(files.newest(Some(250), 400).unwrap(), in_one_file(250));
+        files.add_asked(written(300));
+        assert_eq!(files.add_planned(written(300), 1), None);
+        assert_eq!(files.add_planned(written(400), 1), None);
+        assert_eq!(files.add_planned(written(500), 1), Some(written(400)));
+        assert_eq!(files.newest(Some(300), 900).unwrap(), written(300));
     }
 }

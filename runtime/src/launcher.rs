@@ -205,7 +205,7 @@ impl<'a> Launcher<'a> {
             };
             let recording = outputs.set_aside(number)?;
             *graph = next;
-            files.go_back(rewind.to_tick);
+            files.go_back(rewind.to_tick, &rewind.path);
             rewinds.begin(rewind, recording);
             run_dir = RunDir::create_again(&manifest.path, &run_id)?;
         }
@@ -242,7 +242,12 @@ impl<'a> Launcher<'a> {
         let mut checkpoints = Collector::new(Writer { manifest, graph, run_dir: run_path, stem, files });
         let flown = self.fly_in(run_dir, place, manifest, graph, &mut checkpoints, rewinds, on);
         // A user goes back to those of a run that broke.
-        let written = checkpoints.finish();
+        let mut written = checkpoints.finish();
+        if let (Err(error), true) = (&written, rewinds.is_asked()) {
+            // The run goes back to a checkpoint that is there.
+            on(RunEvent::Note(&format!("{error:#}")));
+            written = Ok(Vec::new());
+        }
         if let (Err(_), Some(Written { tick, path })) = (&flown, written.iter().flatten().last()) {
             on(RunEvent::Note(&format!("the last checkpoint is {}, of tick {tick}", path.display())));
         }

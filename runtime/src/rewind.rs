@@ -17,6 +17,8 @@ pub(crate) struct Rewind {
     pub from_tick: u32,
     /// The tick of the checkpoint.
     pub to_tick: u32,
+    /// File of the checkpoint.
+    pub path: PathBuf,
     /// The pace that was requested last.
     pub pace: Pace,
     /// The place of the answer, which is given when the run is paused again.
@@ -64,6 +66,11 @@ impl Rewinds {
     /// Notes that the run is to end, and that `graph` goes on from a checkpoint.
     pub fn ask(&self, rewind: Rewind, graph: Graph) {
         self.asked.replace(Some((rewind, graph)));
+    }
+
+    /// True if a rewind was asked for.
+    pub fn is_asked(&self) -> bool {
+        self.asked.borrow().is_some()
     }
 
     /// The requested rewind, and the graph that goes on.

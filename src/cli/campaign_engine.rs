@@ -23,18 +23,25 @@ const CHUNK_MIN: usize = 50;
 /// Most tasks if their flights are not stated; Slurm's own limit (MaxArraySize) is 1001 by default.
 const TASKS_MAX: usize = 500;
 
-/// Options of `sbatch` that the campaign gives itself, or that would send the array to a cluster that was not
-/// requested; each with its alternative.
-const OPTIONS_OF_OURS: [(&str, &str, &str); 8] = [
-    ("--array", "-a", "--chunk sets the flights of a task"),
-    ("--cpus-per-task", "-c", "--workers sets the processors of a task"),
-    ("--output", "-o", "the tasks' output lies in the campaign's folder"),
-    ("--clusters", "-M", "the environment variable SLURM_CLUSTERS names a cluster for all commands of Slurm"),
-    ("--cluster", "-M", "the environment variable SLURM_CLUSTERS names a cluster for all commands of Slurm"),
-    ("--wait", "-W", "the campaign waits by itself"),
-    ("--parsable", "--parsable", "the campaign asks for it"),
-    ("--wrap", "--wrap", "the campaign brings the script"),
+/// Options of `sbatch` that the campaign gives itself, or that would undo what it relies on; each with its short form and what is
+/// there instead.
+const OPTIONS_OF_OURS: [(&str, Option<char>, &str); 9] = [
+    ("--array", Some('a'), "--chunk sets the flights of a task"),
+    ("--cpus-per-task", Some('c'), "--workers sets the processors of a task"),
+    ("--output", Some('o'), "the tasks' output lies in the campaign's folder"),
+    ("--error", Some('e'), "the tasks' output lies in the campaign's folder"),
+    (
+        "--clusters",
+        Some('M'),
+        "the environment variable SLURM_CLUSTERS names a cluster for all commands of Slurm",
+    ),
+    ("--wait", Some('W'), "the campaign waits by itself"),
+    ("--parsable", None, "the campaign asks for it"),
+    ("--wrap", None, "the campaign brings the script"),
+    ("--test-only", None, "nothing would be flown"),
 ];
+/// Short options of `sbatch` without a value, behind which another one may stand.
+const FLAGS: &str = "hHkOQsvV";
 
 /// Engine that flies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -155,13 +162,25 @@ impl EngineArguments {
     }
 }
 
-/// Alternative to `option` of `sbatch`, if the option is not allowed.
+/// Text of what is there instead of `option` of `sbatch`, if it cannot be given.
 fn instead_of(option: &str) -> Option<&'static str> {
-    let is_meant = |long: &str, short: &str| match option.strip_prefix("--") {
-        Some(_) => option.split('=').next() == Some(long),
-        None => option.starts_with(short),
+    let of = |is_meant: &dyn Fn(&str, Option<char>) -> bool| {
+        OPTIONS_OF_OURS.iter().find(|(long, short, _)| is_meant(long, *short)).map(|(_, _, instead)| *instead)
     };
-    OPTIONS_OF_OURS.iter().find(|(long, short, _)| is_meant(long, short)).map(|(_, _, instead)| *instead)
+    if option.starts_with("--") {
+        // sbatch takes the beginning of an option for the option.
+        let name = option.split('=').next().unwrap_or(option);
+        let is_meant = |long: &str, _| name.len() > "--".len() && long.starts_with(name);
+        // `--ar` is ours, `--a` may be `--account`: sbatch refuses it as ambiguous.
+        return of(&is_meant);
+    }
+    match option.strip_prefix('-').filter(|letters| !letters.is_empty()) {
+        Some(letters) => {
+            let letter = letters.chars().find(|letter| !FLAGS.contains(*letter))?;
+            of(&|_, short| short == Some(letter))
+        }
+        None => Some("it is no option; expected one such as --partition=fast"),
+    }
 }
 
 /// Flies the chunk of this task of a job array, whose shared folder is `folder`.
@@ -199,23 +218,44 @@ mod tests {
 
     #[test]
     fn options_that_would_undo_those_of_the_campaign_are_known_in_each_spelling() {
-        for option in [
+        let refused = [
             "--array=1-3",
             "--array",
+            "--arr=0-1",
             "-a1-3",
             "-a",
+            "-Qa0-1",
+            "-QW",
             "-c4",
             "-o/tmp/x",
+            "--out=x",
+            "--error=x",
             "-Mother",
             "--clusters=other",
-            "-W",
+            "--cluster=other",
+            "--wait",
             "--wrap=ls",
-        ] {
+            "--test-only",
+            "other.sh",
+            "-",
+            "",
+        ];
+        for option in refused {
             assert!(instead_of(option).is_some(), "{option}");
         }
-        for option in
-            ["--partition=fast", "-pfast", "--time=30", "--mem=4G", "--account=a", "-Qx", "--output-x"]
-        {
+        let taken = [
+            "--partition=fast",
+            "-pfast",
+            "-pWide",
+            "--time=30",
+            "--mem=4G",
+            "--account=a",
+            "-Q",
+            "-QHpfast",
+            "--output-x",
+            "--no-requeue",
+        ];
+        for option in taken {
             assert!(instead_of(option).is_none(), "{option}");
         }
     }

@@ -1,11 +1,11 @@
 //! The command `export`.
 
 use super::files::open_recording;
-use super::output::{print_text, say};
+use super::output::print_text;
 use anyhow::{Context as _, Result, bail};
 use clap::Args;
 use report::columns::PARQUET_START;
-use report::export::{CSV_START, Table, tables};
+use report::export::{CSV_START, Table, table};
 use runtime::output_file::{self, Kind, Mark};
 use std::path::{Path, PathBuf};
 
@@ -40,16 +40,20 @@ pub struct ExportArguments {
 /// If the recording cannot be read or has no such topic, or a file cannot be written.
 pub fn export(arguments: &ExportArguments) -> Result<bool> {
     let recording = open_recording(&arguments.recording)?;
-    let tables = tables(&recording, &arguments.topic)?;
+    for topic in &arguments.topic {
+        recording.topic(topic)?;
+    }
     let folder = arguments.out.clone().unwrap_or_else(|| arguments.recording.with_extension(""));
     if folder == arguments.recording {
         bail!("{} has no ending to leave out: name a folder with --out", folder.display());
     }
+    let (ending, kind) = if arguments.csv { ("csv", &CSV) } else { ("parquet", &PARQUET) };
+    let is_wanted = |topic: &&String| arguments.topic.is_empty() || arguments.topic.contains(topic);
+    let topics = recording.topics().keys().filter(is_wanted);
+    let files: Vec<(PathBuf, &String)> =
+        topics.map(|topic| (folder.join(file_name(topic, ending)), topic)).collect();
     std::fs::create_dir_all(&folder)
         .with_context(|| format!("cannot make the folder {}", folder.display()))?;
-    let (ending, kind) = if arguments.csv { ("csv", &CSV) } else { ("parquet", &PARQUET) };
-    let files: Vec<(PathBuf, &Table)> =
-        tables.iter().map(|(topic, table)| (folder.join(file_name(topic, ending)), table)).collect();
     // Before the first is written.
     for (path, _) in &files {
         output_file::check(path, kind)?;
@@ -57,12 +61,11 @@ pub fn export(arguments: &ExportArguments) -> Result<bool> {
             bail!("two topics would be written to {}: name one with --topic", path.display());
         }
     }
-    for (path, table) in &files {
-        write(path, kind, table, arguments.csv)?;
+    // One after another: a table is whole in memory.
+    for (path, topic) in &files {
+        let table = table(&recording, topic)?;
+        write(path, kind, &table, arguments.csv)?;
         print_text(&format!("{}: {} messages", path.display(), table.rows()))?;
-    }
-    if files.is_empty() {
-        say("the recording has no messages: nothing was written");
     }
     Ok(recording.cut().is_none())
 }

@@ -17,6 +17,8 @@ use view::{Handle, Server, Shown};
 
 /// Pause between two looks: for the run, for its first messages, for the end.
 const LOOK: Duration = Duration::from_millis(50);
+/// Pause between two looks for a run that goes back: its page may stay open for hours after its end.
+const LATER_LOOK: Duration = Duration::from_millis(500);
 /// Looks without an open page after which the page is closed: it may be reloading. Two seconds.
 const DESERTED_LOOKS: u32 = 40;
 
@@ -123,8 +125,9 @@ fn follow(handle: &Handle, find: &dyn Fn() -> Option<LiveRun>, is_ended: &dyn Fn
         let watched = runtime::run_dir::find_live(Some(&run.entry.run_id)).ok()?;
         Some((run, plan, watched))
     };
+    let mut pause = LOOK;
     while !is_ended()
-        && let Some((run, plan, watched)) = first(found, is_ended)
+        && let Some((run, plan, watched)) = first(found, pause, is_ended)
     {
         let is_over = || is_ended() || !watched.is_live();
         let path = recording_of(&plan).map(str::to_owned);
@@ -136,24 +139,27 @@ fn follow(handle: &Handle, find: &dyn Fn() -> Option<LiveRun>, is_ended: &dyn Fn
                     handle.look();
                     Shown::new(Recording::salvage(Path::new(&path)).ok()?).ok()
                 };
-                if let Some(shown) = first(shown, &is_over) {
-                    handle.show(vec![shown])?;
+                if let Some(shown) = first(shown, LOOK, &is_over)
+                    && let Err(error) = handle.show(vec![shown])
+                {
+                    handle.refuse(format!("{error:#}"));
                 }
             }
             Err(error) => handle.refuse(format!("{error:#}")),
         }
-        first(|| None::<()>, &is_over);
+        first(|| None::<()>, LOOK, &is_over);
+        pause = LATER_LOOK;
     }
     Ok(())
 }
 
 /// The first value of `look`; `None` if `is_ended` before.
-fn first<T>(look: impl Fn() -> Option<T>, is_ended: &dyn Fn() -> bool) -> Option<T> {
+fn first<T>(look: impl Fn() -> Option<T>, pause: Duration, is_ended: &dyn Fn() -> bool) -> Option<T> {
     loop {
         let found = look();
         if found.is_some() || is_ended() {
             return found;
         }
-        std::thread::sleep(LOOK);
+        std::thread::sleep(pause);
     }
 }

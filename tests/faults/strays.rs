@@ -37,7 +37,8 @@ fn require_gone(detached: &str, signal: Option<Signal>, code: i32) {
         kill_process(place.process_of("saboteur"), signal).unwrap();
     }
     launch.end_among_others().with_code(code);
-    assert!(test_kill_process(stray).is_err(), "{stray:?} outlives its run: {detached}");
+    // On a loaded machine the system may take its time with a process that was killed.
+    poll(&format!("{stray:?} outlives its run: {detached}"), || test_kill_process(stray).err());
 }
 
 const SESSION: &str = "setsid sh -c 'echo $$ > stray; exec sleep 600' &";

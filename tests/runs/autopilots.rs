@@ -124,6 +124,35 @@ fn each_flies_its_own(place: &Place, manifest: &str, settings: &[String]) {
     assert!((first - 1.4).abs() < 0.2 && (second - 1.4).abs() < 0.2 && first != second, "{first} {second}");
 }
 
+/// As the log of a receiver: the channels of one flight fly it again.
+#[test]
+fn recorded_channels_fly_the_flight_again() {
+    let place = Place::new();
+    let settings = [&stand_in(&place, "")[..], &["run.duration_s=3".to_owned()]].concat();
+    let (first, second) = (place.path("a.mcap"), place.path("b.mcap"));
+    call(&place, "run", &manifest(), &settings, &["--record", &first]).flown();
+    let cat = |recording: &str, topic: &str| {
+        place.call(&["cat", recording, "--topic", topic, "--csv"]).with_code(0).output
+    };
+    let mut rows = "time_s,ch1,ch2,ch3,ch4,ch5\n".to_owned();
+    for line in cat(&first, "/sticks/rc").lines().skip(1) {
+        let cells: Vec<&str> = line.split(',').collect();
+        // Half a tick before the tick that sends it.
+        let time_s = (cells[0].parse::<f64>().unwrap() - 0.5) * 1e-3;
+        rows += &format!("{time_s},{}\n", cells[cells.len() - 5..].join(","));
+    }
+    let data = place.write("receiver.csv", rows);
+    let text = fs::read_to_string(manifest()).unwrap().replace("../../", &repository(""));
+    let (before, sticks) = text.split_once("[process.sticks]").unwrap();
+    let behind = &sticks[sticks.find("[process.").unwrap()..];
+    let sticks = format!("[process.sticks]\nkind = \"rc\"\ndata = {data:?}\n");
+    let again = place.write("again.toml", format!("{before}{sticks}{behind}"));
+    call(&place, "run", &again, &settings, &["--record", &second]).flown();
+    for topic in ["/sticks/rc", "/controller/command", "/plant/state"] {
+        assert!(cat(&first, topic) == cat(&second, topic), "{topic} differs");
+    }
+}
+
 #[test]
 fn each_firmware_of_a_run_flies_its_own_vehicle() {
     let place = Place::new();

@@ -44,6 +44,8 @@ fn manifest(place: &Place) -> String {
          [process.sticks]\nkind = \"remote-control\"\n\
          inputs = {{ set_point = \"/pilot/set_point\", {estimate} }}\n\
          parameters = {{ tilt_max_deg = 30, yaw_rate_max_deg_s = 90, hover_throttle = 0.38 }}\n\
+         [process.receiver]\nkind = \"rc\"\n\
+         parameters.script = [{{ channel = 3, at_s = 0.1, pulse_us = 1400, over_s = 0.2 }}]\n\
          [process.person]\nkind = \"operator\"\n\
          parameters = {{ initial_altitude_m = 1.0, altitudes_m = [0.3, 4.0], tilt_max_deg = 15.0, fallback = \"land\" }}\n\
          [process.ideal]\nkind = \"ideal\"\ninputs.state = \"/plant/state\"\n\

@@ -132,7 +132,7 @@ fn a_campaign_that_is_stopped_cancels_all_its_arrays_and_is_flown_by_the_next_ca
     launch.await_said("submitted 1 tasks to Slurm as job 2");
     launch.signal(Signal::INT);
     launch.end().with_code(2).says(&["was interrupted; the same command flies the other 7 flights"]);
-    assert_eq!(fs::read_to_string(place.path("bin/cancelled")).unwrap(), "1 2\n");
+    assert_eq!(fs::read_to_string(place.path("bin/cancelled")).unwrap(), "1\n2\n");
     let states = fs::read_to_string(place.path("bin/states")).unwrap();
     assert!(states.contains("1 1 CANCELLED") && states.contains("2 2 CANCELLED"), "{states}");
     on_slurm(&place, &out, &[]).with_code(0).prints(&["12 of 12 flights passed"]);

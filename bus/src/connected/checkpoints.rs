@@ -2,7 +2,7 @@
 
 use super::ConnectedNode;
 use crate::announcement::{Announcement, topic_path};
-use crate::checkpoint::{NodePart, Samples, store_part};
+use crate::checkpoint::{Cause, NodePart, Samples, store_part};
 use crate::computation::Computation;
 use crate::error::BusError;
 use crate::port::{InPort, Locals};
@@ -49,13 +49,13 @@ impl ConnectedNode {
         while self.next_checkpoint <= tick {
             let of = self.next_checkpoint;
             self.next_checkpoint = self.links.plan.checkpoint_after(of).unwrap_or(u32::MAX);
-            self.write_checkpoint(of, tick, locals, computation)?;
+            self.write_checkpoint(Cause::Plan, of, tick, locals, computation)?;
         }
         let asks = self.links.lockstep.checkpoint_asks();
         let asked = self.links.lockstep.checkpoint_tick();
         if asks > self.asks_answered && asked <= tick {
             self.asks_answered = asks;
-            self.write_checkpoint(asked, tick, locals, computation)?;
+            self.write_checkpoint(Cause::Request, asked, tick, locals, computation)?;
         }
         Ok(())
     }
@@ -85,12 +85,13 @@ impl ConnectedNode {
         self.asks_answered = asks;
         let taken = self.stepper.gather_before(of);
         taken.inspect_err(|&(topic, _)| lockstep.count_gap(topic)).map_err(|(_, error)| error)?;
-        self.write_checkpoint(of, self.tick, locals, computation)
+        self.write_checkpoint(Cause::Request, of, self.tick, locals, computation)
     }
 
     /// Writes this node's part of the checkpoint at tick `of` if `tick` is the first due tick from there on.
     fn write_checkpoint(
         &self,
+        cause: Cause,
         of: u32,
         tick: u32,
         locals: &Locals,
@@ -103,6 +104,6 @@ impl ConnectedNode {
         let samples = self.stepper.samples_before(of, locals);
         let part = self.state.part(&links.node.name, samples, computation);
         let part = part.of_process(links.generation, &links.node);
-        store_part(&links.run_dir, of, links.index, &part)
+        store_part(&links.run_dir, cause, of, links.index, &part)
     }
 }

@@ -1,6 +1,6 @@
 //! Requests carried out by the launcher: it holds, steps, paces and stops the run through its control segment.
 
-use crate::checkpoint_writer::Writer;
+use crate::checkpoint_writer::{Found, Writer};
 use crate::ctl::protocol::{Answer, Request, Status};
 use crate::ctl::server::{Asked, Remote, Reply, Server};
 use crate::rewind::{Rewind, Rewinds};
@@ -58,7 +58,7 @@ impl<'a> ControlServer<'a> {
         rewinds: &'a Rewinds,
     ) -> Result<Self> {
         let server = Server::start(run_dir, remote, requests)?;
-        let wish = rewinds.take_begun().map(|Rewind { from_tick, to_tick, pace, reply }| {
+        let wish = rewinds.take_begun().map(|Rewind { from_tick, to_tick, pace, reply, .. }| {
             control.set_hold_tick(to_tick);
             control.set_pace(pace);
             (Goal::Rewind { from_tick, to_tick }, reply)
@@ -198,10 +198,10 @@ impl<'a> ControlServer<'a> {
             Ok((now, self.checkpoints.find(tick, file, now)?))
         });
         match found {
-            Ok((from_tick, (checkpoint, graph))) => {
+            Ok((from_tick, Found { tick: to_tick, path, graph })) => {
                 self.overtake();
-                let (to_tick, pace) = (checkpoint.tick(), self.control.pace());
-                self.rewinds.ask(Rewind { from_tick, to_tick, pace, reply }, graph);
+                let pace = self.control.pace();
+                self.rewinds.ask(Rewind { from_tick, to_tick, path, pace, reply }, graph);
                 self.control.request_stop();
             }
             Err(error) => drop(reply.send(&Answer::refused(format!("{error:#}")))),

@@ -8,7 +8,7 @@
 //! that a fast sensor waits for the slow ones' delay. Meanwhile the present drifts by the IMU's noise: with the
 //! default IMU and 200 ms, by 1 mm/s and 0.005°.
 //!
-//! *What waits.* A measurement is used as soon as every sensor has shown one at least as late, and at the latest
+//! *Waiting measurements.* A measurement is used as soon as every sensor has shown one at least as late, and at the latest
 //! when it is `delay_max_ms` old. One that arrives later than that is refused.
 //!
 //! *Outliers.* A measurement is refused if its normalised innovation squared is unlikely. Each refusal leaves the

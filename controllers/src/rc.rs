@@ -1,0 +1,343 @@
+//! Raw channels of a remote control: a script of pulses, a recording of a receiver, or both on different channels.
+//!
+//! A recording is a CSV file with the columns `time_s` and `ch1`, `ch2`, …, in µs. Between two rows the pulses of the earlier
+//! one hold, as those of a receiver do.
+
+use bus::component::{Component, Info, StepError};
+use bus::context::{NodeContext, StepContext};
+use bus::messages::{RC_CHANNELS_MAX, RcChannels};
+use bus::{Bounded, OutputPorts};
+use diagnostics::parameter::{ParameterError, refuse};
+use inputs::InputFiles;
+use serde::Deserialize;
+use std::ops::RangeInclusive;
+use std::path::{Path, PathBuf};
+use vehicles::table::{Dialect, Table, names, shown};
+
+/// Number of the throttle's channel, from 1.
+const THROTTLE: usize = 3;
+/// Pulses of sticks before the script moves them, µs; the throttle and all switches begin at the lower end.
+const MIDDLE_US: f64 = 1500.0;
+const LOW_US: f64 = 1000.0;
+/// Channels of the sticks: roll, pitch, throttle, yaw.
+const STICKS: usize = 4;
+/// Pulses that receivers send, µs.
+const PULSES_US: RangeInclusive<f64> = 800.0..=2200.0;
+
+/// Parameters of `rc`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Parameters {
+    /// Number of channels; the highest one of script and recording, at least 4, if left out.
+    channels: Option<usize>,
+    /// Moves of channels.
+    #[serde(default)]
+    script: Vec<Move>,
+    /// Recording of a receiver, whose channels the script leaves alone.
+    data: Option<PathBuf>,
+    /// Time in the recording at which tick 0 lies, s.
+    #[serde(default)]
+    from_s: f64,
+}
+
+/// Move of a channel.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Move {
+    /// Number of the channel, from 1.
+    channel: usize,
+    /// Start, s.
+    at_s: f64,
+    /// Pulses at its end, µs.
+    pulse_us: f64,
+    /// Duration, s; 0 for a step.
+    #[serde(default)]
+    over_s: f64,
+}
+
+/// Outputs of `rc`.
+#[derive(Debug, OutputPorts)]
+pub struct Outputs {
+    /// Channels of the remote control.
+    pub rc: RcChannels,
+}
+
+/// The component `rc`.
+///
+/// ```
+/// let parameters = serde_json::json!({ "script": [
+///     { "channel": 3, "at_s": 0.001, "pulse_us": 1400, "over_s": 0.002 },
+///     { "channel": 5, "at_s": 0.0, "pulse_us": 2000 },
+/// ] });
+/// let mut rc = bus::Harness::<controllers::rc::Rc>::from_json(&parameters).unwrap();
+/// let throttle_us = [0, 1, 2, 3, 4].map(|_| rc.step(()).unwrap().rc.pulse[2]);
+/// assert_eq!(throttle_us, [1000.0, 1000.0, 1200.0, 1400.0, 1400.0]);
+/// assert_eq!(rc.step(()).unwrap().rc.pulse, [1500.0, 1500.0, 1400.0, 1500.0, 2000.0]);
+/// ```
+#[derive(Debug)]
+pub struct Rc {
+    channels: usize,
+    /// By their starts.
+    script: Vec<Segment>,
+    recording: Option<Recording>,
+    from_s: f64,
+}
+
+impl Component for Rc {
+    const INFO: Info = Info::new(
+        "rc",
+        "raw channels of a remote control: a script of pulses from the manifest, or a recording of a receiver",
+    );
+    type Parameters = Parameters;
+    type Inputs<'a> = ();
+    type Outputs = Outputs;
+    type State = ();
+
+    fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
+        let Parameters { channels, mut script, data, from_s } = parameters;
+        script.iter().try_for_each(Move::check)?;
+        refuse(!from_s.is_finite() || from_s != 0.0 && data.is_none(), "from_s", || {
+            format!("`from_s` is {from_s} s, expected a time of the recording in `data`")
+        })?;
+        let recording = data.map(|path| Recording::load(&context.files, &path)).transpose()?;
+        let of_recording = |channel: usize| recording.as_ref().is_some_and(|it| it.has(channel));
+        if let Some(Move { channel, .. }) = script.iter().find(|it| of_recording(it.channel)) {
+            let message =
+                format!("`script` moves channel {channel}, which `data` records; leave one of them out");
+            return Err(ParameterError::conflict("script", message));
+        }
+        let recorded = recording.iter().flat_map(|recording| recording.channels.iter().copied());
+        let highest = script.iter().map(|it| it.channel).chain(recorded).max().unwrap_or(0).max(STICKS);
+        let channels = channels.unwrap_or(highest);
+        refuse(!(highest..=RC_CHANNELS_MAX).contains(&channels), "channels", || {
+            format!(
+                "`channels` is {channels}, expected {highest} to {RC_CHANNELS_MAX}: channel {highest} is used"
+            )
+        })?;
+        script.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
+        let end_s = context.duration_s();
+        for Move { channel, at_s, .. } in script.iter().filter(|it| it.at_s >= end_s) {
+            let message = format!(
+                "`script`: channel {channel} moves at {at_s} s, and the run ends at {end_s} s: it never acts"
+            );
+            context.warn_behind_end("script", message);
+        }
+        Ok(Self { channels, script: segments(&script), recording, from_s })
+    }
+
+    fn initial(&self) {}
+
+    fn step(&self, context: &StepContext<'_>, (): (), (): &mut ()) -> Result<Outputs, StepError> {
+        let time_s = context.time_s();
+        let row = self.recording.as_ref().map(|recording| recording.row(self.from_s + time_s));
+        let pulse = |at: usize| {
+            let recorded = self.recording.as_ref().zip(row).and_then(|(it, row)| it.pulse_us(row, at + 1));
+            recorded.unwrap_or_else(|| self.scripted_us(at + 1, time_s))
+        };
+        Ok(Outputs { rc: RcChannels { pulse: Bounded::from_fn(self.channels, pulse), ..Default::default() } })
+    }
+}
+
+impl Rc {
+    /// Returns the pulses that the script has on `channel` at `time_s`.
+    fn scripted_us(&self, channel: usize, time_s: f64) -> f64 {
+        let begun = |it: &&Segment| it.to.channel == channel && it.to.at_s <= time_s;
+        self.script.iter().rfind(begun).map_or_else(|| neutral_us(channel), |it| it.reached_us(time_s))
+    }
+}
+
+/// A move with the pulses from which it begins.
+#[derive(Clone, Copy, Debug)]
+struct Segment {
+    from_us: f64,
+    to: Move,
+}
+
+impl Segment {
+    fn reached_us(&self, time_s: f64) -> f64 {
+        let Move { at_s, pulse_us, over_s, .. } = self.to;
+        let passed_s = time_s - at_s;
+        if passed_s >= over_s {
+            return pulse_us;
+        }
+        self.from_us + (pulse_us - self.from_us) * passed_s / over_s
+    }
+}
+
+/// Returns `script`, which is sorted by start, with the pulses at which each move begins: those that the move before it on the
+/// channel has reached by then.
+fn segments(script: &[Move]) -> Vec<Segment> {
+    let mut segments: Vec<Segment> = Vec::new();
+    for to in script {
+        let before = segments.iter().rfind(|it| it.to.channel == to.channel);
+        let from_us = before.map_or_else(|| neutral_us(to.channel), |it| it.reached_us(to.at_s));
+        segments.push(Segment { from_us, to: *to });
+    }
+    segments
+}
+
+fn neutral_us(channel: usize) -> f64 {
+    if channel <= STICKS && channel != THROTTLE { MIDDLE_US } else { LOW_US }
+}
+
+impl Move {
+    fn check(&self) -> Result<(), ParameterError> {
+        let Self { channel, at_s, pulse_us, over_s } = *self;
+        let is_valid = (1..=RC_CHANNELS_MAX).contains(&channel)
+            && PULSES_US.contains(&pulse_us)
+            && at_s.is_finite()
+            && (0.0..=1e9).contains(&over_s);
+        refuse(!is_valid, "script", || {
+            format!(
+                "`script`: channel {channel} at {at_s} s to {pulse_us} µs over {over_s} s; expected a channel from 1 to \
+                 {RC_CHANNELS_MAX}, pulses of 800 to 2200 µs, and a duration from 0 on"
+            )
+        })
+    }
+}
+
+/// Recording of a receiver, at least one row.
+#[derive(Debug)]
+struct Recording {
+    /// Numbers of the channels, from 1.
+    channels: Vec<usize>,
+    times_s: Vec<f64>,
+    /// Pulses of each row, in the order of `channels`.
+    pulses_us: Vec<Vec<f64>>,
+}
+
+impl Recording {
+    fn load(files: &InputFiles, path: &Path) -> Result<Self, ParameterError> {
+        let file = path.display();
+        let refused = |fault: String| ParameterError::conflict("data", format!("{file}{fault}"));
+        let bytes = files
+            .bytes(path)
+            .map_err(|cause| refused(format!(": cannot read it: {cause}; check the path")))?;
+        Self::read(&bytes).map_err(refused)
+    }
+
+    fn read(bytes: &[u8]) -> Result<Self, String> {
+        let known: Vec<String> = (1..=RC_CHANNELS_MAX).map(|channel| format!("ch{channel}")).collect();
+        let wanted: Vec<&str> = std::iter::once("time_s").chain(known.iter().map(String::as_str)).collect();
+        let table =
+            Table::parse(bytes, &wanted, &Dialect::default()).map_err(|cause| format!(": {cause}"))?;
+        let time = table.column("time_s").map_err(|cause| format!(": {cause}"))?;
+        let place = |(index, name): (usize, &String)| Some((index + 1, table.column(name).ok()?));
+        let places: Vec<(usize, usize)> = known.iter().enumerate().filter_map(place).collect();
+        let line = table.header_line.unwrap_or(1);
+        if places.is_empty() || places.len() + 1 != table.headers.len() {
+            let found = names(&table.headers);
+            return Err(format!(
+                ":{line}: expected the columns time_s and ch1 to ch{RC_CHANNELS_MAX}, each once, found {found}"
+            ));
+        }
+        let mut read = Self {
+            channels: places.iter().map(|(channel, _)| *channel).collect(),
+            times_s: Vec::new(),
+            pulses_us: Vec::new(),
+        };
+        for row in table.rows.iter() {
+            let number = |place: usize, is_valid: &dyn Fn(f64) -> bool, expected: &str| {
+                let cell = row.cell(place);
+                table.number(cell).filter(|number| is_valid(*number)).ok_or_else(|| {
+                    let column = &table.headers[place];
+                    format!(
+                        ":{}: column `{column}`: expected {expected}, found \"{}\"",
+                        row.line,
+                        shown(cell)
+                    )
+                })
+            };
+            if row.len() != table.headers.len() {
+                let (expected, found) = (table.headers.len(), row.len());
+                return Err(format!(
+                    ":{}: expected {expected} cells as in the header, found {found}",
+                    row.line
+                ));
+            }
+            let before = read.times_s.last().copied().unwrap_or(f64::NEG_INFINITY);
+            let is_later = |time_s: f64| time_s.is_finite() && time_s > before;
+            read.times_s.push(number(time, &is_later, "a time after the row before")?);
+            let is_pulse = |pulse_us: f64| PULSES_US.contains(&pulse_us);
+            let pulses =
+                places.iter().map(|(_, place)| number(*place, &is_pulse, "pulses of 800 to 2200 µs"));
+            read.pulses_us.push(pulses.collect::<Result<_, _>>()?);
+        }
+        if read.times_s.is_empty() {
+            Err(": expected at least one row, found none".to_owned())
+        } else {
+            Ok(read)
+        }
+    }
+
+    fn has(&self, channel: usize) -> bool {
+        self.channels.contains(&channel)
+    }
+
+    /// Returns the index of the newest row at `time_s`; of the first one before it.
+    fn row(&self, time_s: f64) -> usize {
+        self.times_s.partition_point(|row_s| *row_s <= time_s).saturating_sub(1)
+    }
+
+    fn pulse_us(&self, row: usize, channel: usize) -> Option<f64> {
+        let place = self.channels.iter().position(|known| *known == channel)?;
+        Some(self.pulses_us[row][place])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rc(text: &str) -> Result<Rc, ParameterError> {
+        Rc::new(toml::from_str(text).unwrap(), &NodeContext::new("rc", &[]))
+    }
+
+    #[test]
+    fn a_move_begins_where_the_one_before_has_come_to() {
+        let rc = rc("script = [
+            { channel = 1, at_s = 2.0, pulse_us = 1500 },
+            { channel = 1, at_s = 1.0, pulse_us = 2000, over_s = 2.0 },
+        ]")
+        .unwrap();
+        let at = |time_s| rc.scripted_us(1, time_s);
+        assert_eq!([0.0, 1.0, 1.5, 1.999].map(at)[..3], [1500.0, 1500.0, 1625.0]);
+        assert!((at(1.999) - 1749.75).abs() < 1e-9);
+        assert_eq!(at(2.0), 1500.0);
+        let ramps = "script = [{ channel = 3, at_s = 0.0, pulse_us = 1400, over_s = 2.0 }, { channel = 3, at_s = 1.0, pulse_us = 1000, over_s = 1.0 }]";
+        let ramps = super::tests::rc(ramps).unwrap();
+        assert_eq!(
+            [0.5, 1.0, 1.5, 2.0].map(|time_s| ramps.scripted_us(3, time_s)),
+            [1100.0, 1200.0, 1100.0, 1000.0]
+        );
+    }
+
+    #[test]
+    fn pulses_of_a_receiver_hold_from_row_to_row() {
+        let read = Recording::read(b"time_s,ch1,ch5\n1,1500,1000\n1.02,1600,2000\n").unwrap();
+        let pulses = |time_s| [1, 5, 2].map(|channel| read.pulse_us(read.row(time_s), channel));
+        assert_eq!(pulses(0.0), [Some(1500.0), Some(1000.0), None]);
+        assert_eq!(pulses(1.019), [Some(1500.0), Some(1000.0), None]);
+        assert_eq!(pulses(1.02), [Some(1600.0), Some(2000.0), None]);
+        assert_eq!(pulses(99.0), [Some(1600.0), Some(2000.0), None]);
+    }
+
+    #[test]
+    fn values_that_no_receiver_sends_are_refused_with_their_place() {
+        let refused = |text: &str| Recording::read(text.as_bytes()).unwrap_err();
+        assert!(refused("time_s,ch1\n0,1500\n0,1500\n").contains(":3: column `time_s`"));
+        assert!(refused("time_s,ch1\n0,15\n").contains("column `ch1`: expected pulses of 800 to 2200 µs"));
+        assert!(refused("time_s,ch1,roll\n0,1500,1\n").contains("ch1 to ch16"));
+        assert!(refused("time_s,ch1\n").contains("at least one row"));
+        for text in [
+            "script = [{ channel = 17, at_s = 0.0, pulse_us = 1500 }]",
+            "script = [{ channel = 1, at_s = 0.0, pulse_us = 500 }]",
+            "script = [{ channel = 1, at_s = 0.0, pulse_us = 1500, over_s = -1.0 }]",
+            "channels = 3",
+            "from_s = 1.0",
+        ] {
+            assert!(rc(text).is_err(), "{text}");
+        }
+        assert_eq!(rc("").unwrap().channels, 4);
+    }
+}
