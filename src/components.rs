@@ -37,6 +37,7 @@ pub const COMPONENTS: Registry = Registry::new(&[
     Registration::of::<controllers::player::Player>(),
     Registration::of::<controllers::position_hold::PositionHold>(),
     Registration::of::<plant::propeller_stand::PropellerStand>(),
+    Registration::of::<autopilots::Px4>(),
     Registration::of::<Sensing<sensors::range::RangeFinders>>(),
     Registration::of::<sensors::range_inertial::filter::RangeInertial>(),
     Registration::of::<recorder::node::Recorder>(),

@@ -9,6 +9,7 @@
 
 pub mod mixers;
 
+use crate::atmosphere::pressure_Pa;
 use crate::autopilot::{Autopilot, Sensed, Throttles};
 use crate::layout::Layout;
 use crate::origin::Origin;
@@ -47,8 +48,6 @@ const CHANNELS: usize = 16;
 const CONFIGURATION_LIMIT: Duration = Duration::from_secs(20);
 /// Mark of a line of its command line about a command that it refuses.
 const REFUSED: &str = "###ERROR";
-/// Pressure at sea level, Pa, its decrease by height, 1/m, and the exponent: the troposphere of ISO 2533.
-const ATMOSPHERE: (f64, f64, f64) = (101_325.0, 2.255_77e-5, 5.255_88);
 
 /// Parameters of the firmware.
 #[derive(Debug, Deserialize)]
@@ -246,7 +245,6 @@ impl Betaflight {
         // SITL mirrors longitude and latitude about its first packet, since those of Gazebo are mirrored (`sitl.c`,
         // ENABLE_GAZEBO_BRIDGE, on by default). The first packet is of the origin.
         let place = self.origin.place([-position.x, -position.y, position.z]);
-        let (sea_level_Pa, by_height_1_m, exponent) = ATMOSPHERE;
         let state = StatePacket {
             time_s,
             angular_velocity_rad_s: [rates.x, -rates.y, rates.z],
@@ -254,7 +252,7 @@ impl Betaflight {
             attitude: [attitude.w, attitude.x, -attitude.y, -attitude.z],
             velocity_m_s: estimate.velocity.into(),
             place,
-            pressure_Pa: sea_level_Pa * libm::pow(1.0 - by_height_1_m * place[2], exponent),
+            pressure_Pa: pressure_Pa(place[2]),
         };
         TickPackets {
             length_ns: self.period_ns,

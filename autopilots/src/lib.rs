@@ -5,12 +5,17 @@
 //! - [`process`]: a firmware's process: its scratch folder, its log, what it ended with
 //! - [`stream`]: a firmware that speaks over a socket at its standard input
 //! - [`datagrams`]: a firmware that speaks by datagrams (UDP)
+//! - [`connection`]: a firmware that connects to this process (TCP)
 //! - [`rest`]: the rest on the ground before tick 0, in which a firmware is armed
 //! - [`settings`]: parameters and files that firmwares have in common
+//! - [`parameter_lines`]: a file of parameters
+//! - [`axes`]: axes of ArduPilot and PX4
+//! - [`atmosphere`]: pressure and temperature by altitude
 //! - [`layout`]: which motor output drives which rotor
 //! - [`origin`]: the place on the earth at which the world's origin lies
 //! - [`mod@betaflight`]: Betaflight's software in the loop (SITL)
 //! - [`mod@ardupilot`]: ArduCopter's software in the loop, by its JSON interface
+//! - [`mod@px4`]: PX4's software in the loop, by its simulator's MAVLink interface
 //!
 //! ```
 //! use autopilots::betaflight::mixers::MIXERS;
@@ -27,13 +32,18 @@
 )]
 
 pub mod ardupilot;
+pub mod atmosphere;
 pub mod autopilot;
+pub mod axes;
 pub mod betaflight;
 pub mod bridge;
+pub mod connection;
 pub mod datagrams;
 pub mod layout;
 pub mod origin;
+pub mod parameter_lines;
 pub mod process;
+pub mod px4;
 pub mod rest;
 pub mod settings;
 pub mod stream;
@@ -43,3 +53,6 @@ pub type ArduPilot = bridge::Bridge<ardupilot::ArduPilot>;
 
 /// Betaflight's SITL as a component.
 pub type Betaflight = bridge::Bridge<betaflight::Betaflight>;
+
+/// PX4's SITL as a component.
+pub type Px4 = bridge::Bridge<px4::Px4>;

@@ -1,9 +1,10 @@
 //! A firmware's process: it has a folder of its own, which goes with it, and a log, whose end explains its end.
 
 use bus::process::{RUN_VARIABLE, die_with_this_one};
+use std::ffi::OsStr;
 use std::fs::{self, File};
 use std::io;
-use std::os::unix::fs::PermissionsExt;
+use std::os::unix::fs::{PermissionsExt, symlink};
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -47,6 +48,25 @@ impl Scratch {
             .and_then(|()| fs::set_permissions(&path, fs::Permissions::from_mode(0o700)));
         written.map_err(|error| format!("cannot write {}: {error}", path.display()))?;
         Ok(path)
+    }
+
+    /// Makes the folder `name`.
+    ///
+    /// # Errors
+    /// It cannot be made.
+    pub fn add_folder(&self, name: &str) -> Result<PathBuf, String> {
+        let path = self.folder.path().join(name);
+        fs::create_dir(&path).map_err(|error| format!("cannot make {}: {error}", path.display()))?;
+        Ok(path)
+    }
+
+    /// Links the file `name` to `to`.
+    ///
+    /// # Errors
+    /// It cannot be made.
+    pub fn link(&self, name: &OsStr, to: &Path) -> Result<(), String> {
+        let path = self.folder.path().join(name);
+        symlink(to, &path).map_err(|error| format!("cannot link {}: {error}", path.display()))
     }
 
     /// The program `path` of this folder, which runs in it with nothing of this process's environment.

@@ -3,6 +3,7 @@
 use crate::autopilot::{Autopilot, Sensed, Throttles};
 use bus::Bounded;
 use bus::messages::{Imu, RcChannels, StateEstimate};
+use vehicles::Vehicle;
 
 /// Pulses of the sticks at rest: roll, pitch, throttle and yaw, us.
 const STICKS_US: [f64; 4] = [1500.0, 1500.0, 1000.0, 1500.0];
@@ -29,8 +30,7 @@ impl Rest {
     /// # Errors
     /// An exchange fails.
     pub fn of<A: Autopilot>(&self, autopilot: &A, link: &mut A::Link) -> Result<bool, String> {
-        let imu =
-            Imu { specific_force: [0.0, 0.0, autopilot.vehicle().gravity_m_s2].into(), ..Imu::default() };
+        let imu = imu_at_rest(autopilot.vehicle());
         let estimate = StateEstimate::default();
         let (all, armed) = (steps(self.time_s, self.period_s), steps(self.armed_s, self.period_s));
         let mut throttles = Throttles::default();
@@ -53,6 +53,12 @@ impl Rest {
         };
         RcChannels { pulse: Bounded::from_fn(channels, pulse), ..RcChannels::default() }
     }
+}
+
+/// Accelerometer and gyroscope of a vehicle that stands on level ground.
+#[must_use]
+pub fn imu_at_rest(vehicle: &Vehicle) -> Imu {
+    Imu { specific_force: [0.0, 0.0, vehicle.gravity_m_s2].into(), ..Imu::default() }
 }
 
 /// Pulse of a channel, us; a stick that is not sent is at rest, a switch that is not sent is off.

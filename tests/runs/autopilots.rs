@@ -1,7 +1,8 @@
 //! Autopilots: a stand-in for Betaflight's SITL (`autopilots/sitl.c`) flies, and fails in every way; the real one where
-//! `HUMMINGBUS_BETAFLIGHT` names it. [`ardupilot`] has the same for ArduPilot.
+//! `HUMMINGBUS_BETAFLIGHT` names it. [`ardupilot`] and [`px4`] have the same for ArduPilot and PX4.
 
 mod ardupilot;
+mod px4;
 
 use crate::recordings::require_same;
 use crate::skipped::variable_or_skip;

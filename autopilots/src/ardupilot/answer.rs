@@ -4,10 +4,8 @@
 //! no blank follows a colon, and a key that begins another one (`rc_1`, `rc_10`) stands before it.
 
 use crate::autopilot::Sensed;
+use crate::axes::{attitude, forward_right_down, north_east_down};
 use crate::rest::pulse_us;
-use bus::messages::{Quaternion, Vector3};
-use nalgebra::Quaternion as Product;
-use std::f64::consts::FRAC_1_SQRT_2;
 use std::fmt::Write as _;
 
 /// Channels of its remote control.
@@ -24,8 +22,8 @@ pub fn timestamp_s(step: u64, period_s: f64) -> f64 {
 /// The answer at a time of the firmware's clock.
 pub fn text(time_s: f64, sensed: &Sensed<'_>) -> String {
     let Sensed { imu, estimate, rc, .. } = sensed;
-    let (gyro, force) = (body(imu.angular_velocity), body(imu.specific_force));
-    let (position, velocity) = (world(estimate.position), world(estimate.velocity));
+    let (gyro, force) = (forward_right_down(imu.angular_velocity), forward_right_down(imu.specific_force));
+    let (position, velocity) = (north_east_down(estimate.position), north_east_down(estimate.velocity));
     let attitude = attitude(estimate.attitude);
     // The line begins and ends with an end of line: the firmware takes what lies between the last two of them.
     let mut text = format!("\n{{\"timestamp\":{time_s},\"imu\":{{");
@@ -41,28 +39,6 @@ pub fn text(time_s: f64, sensed: &Sensed<'_>) -> String {
     text
 }
 
-/// Forward, right, down of a vector of the body: forward, left, up.
-fn body(vector: Vector3) -> [f64; 3] {
-    [vector.x, -vector.y, -vector.z]
-}
-
-/// North, east, down of a vector of the world: east, north, up.
-fn world(vector: Vector3) -> [f64; 3] {
-    [vector.y, vector.x, -vector.z]
-}
-
-/// Attitude from forward, right, down to north, east, down; w, x, y, z.
-fn attitude(attitude: Quaternion) -> [f64; 4] {
-    let Quaternion { x, y, z, w } = attitude;
-    // Half a turn about the line between east and north changes the world's axes, half a turn about x the body's.
-    let north_east_down = Product::new(0.0, FRAC_1_SQRT_2, FRAC_1_SQRT_2, 0.0);
-    let forward_right_down = Product::new(0.0, 1.0, 0.0, 0.0);
-    let product = north_east_down * Product::new(w, x, y, z) * forward_right_down;
-    // The two quaternions of an attitude differ by their sign.
-    let sign = if product.w < 0.0 { -1.0 } else { 1.0 };
-    [product.w, product.i, product.j, product.k].map(|part| sign * part)
-}
-
 /// A list of numbers, without exponents, to nine digits behind the point: positions to a nanometre.
 fn list(numbers: &[f64]) -> String {
     let numbers: Vec<String> = numbers.iter().map(|number| format!("{number:.9}")).collect();
@@ -72,8 +48,8 @@ fn list(numbers: &[f64]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bus::messages::{Imu, RcChannels, StateEstimate};
-    use nalgebra::UnitQuaternion;
+    use bus::messages::{Imu, Quaternion, RcChannels, StateEstimate};
+    use nalgebra::{Quaternion as Product, UnitQuaternion};
     use serde_json::{Value, json};
 
     fn sample(attitude: UnitQuaternion<f64>) -> (Imu, StateEstimate, RcChannels) {

@@ -1,15 +1,12 @@
 //! The firmware's parameters: the user's, and those that follow from the vehicle, which the user's cannot undo.
 
 use super::frames::FrameNumbers;
+use crate::parameter_lines;
 use std::fmt::Write as _;
 
 /// Pulse of a motor that is off, and the way to full thrust, us.
 pub const PULSE_MIN_US: f64 = 1000.0;
 pub const PULSE_RANGE_US: f64 = 1000.0;
-/// Longest name (`AP_MAX_NAME_SIZE`).
-const NAME_LENGTH_MAX: usize = 16;
-/// Characters between a name and its value.
-const SEPARATORS: [char; 5] = [' ', ',', '=', '\t', '\r'];
 /// Function of an output that drives the first motor (`SERVOn_FUNCTION`); those of the next motors follow.
 const FIRST_MOTOR: usize = 33;
 /// A firmware that is not paced takes its attitude from the simulation (10), unless it is told to estimate it (3: EKF3).
@@ -21,14 +18,9 @@ const ESTIMATOR: (&str, &str) = ("AHRS_EKF_TYPE", "3");
 /// A line is not a name and a number.
 pub fn text(configured: &str, frame: &FrameNumbers, motors: usize) -> Result<String, String> {
     let follows = follows(frame, motors);
-    let mut lines = Vec::new();
-    for (at, line) in configured.lines().enumerate() {
-        let read = read(line).map_err(|reason| format!("line {}: {reason}", at + 1))?;
-        // The firmware does not say which one of two values of a name counts.
-        lines.extend(
-            read.filter(|(name, _)| !follows.iter().any(|(other, _)| other.eq_ignore_ascii_case(name))),
-        );
-    }
+    let mut lines = parameter_lines::read(configured)?;
+    // The firmware does not say which one of two values of a name counts.
+    lines.retain(|(name, _)| !follows.iter().any(|(other, _)| other.eq_ignore_ascii_case(name)));
     let mut text = String::new();
     if !lines.iter().any(|(name, _)| name.eq_ignore_ascii_case(ESTIMATOR.0)) {
         lines.insert(0, ESTIMATOR);
@@ -54,19 +46,6 @@ fn follows(frame: &FrameNumbers, motors: usize) -> Vec<(String, String)> {
     frame.chain(outputs).collect()
 }
 
-/// Name and value of a line; none of an empty line or a comment.
-fn read(line: &str) -> Result<Option<(&str, &str)>, String> {
-    let mut words = line.split(SEPARATORS).filter(|word| !word.is_empty());
-    let Some(name) = words.next().filter(|name| !name.starts_with('#')) else { return Ok(None) };
-    let value = words.next().filter(|value| value.parse::<f64>().is_ok_and(f64::is_finite));
-    match value {
-        Some(value) if name.len() <= NAME_LENGTH_MAX => Ok(Some((name, value))),
-        _ => Err(format!(
-            "expected a name of at most {NAME_LENGTH_MAX} characters and a number (`FS_THR_ENABLE 0`), found `{line}`"
-        )),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -82,13 +61,5 @@ mod tests {
         assert_eq!(text(user, &PLUS, 4).unwrap(), expected);
         let other = text("AHRS_EKF_TYPE 10\n", &PLUS, 4).unwrap();
         assert!(other.starts_with("AHRS_EKF_TYPE 10\nFRAME_CLASS"), "{other}");
-    }
-
-    #[test]
-    fn lines_that_are_no_parameters_are_named() {
-        for line in ["RC5_OPTION", "RC5_OPTION on", "RC5_OPTION nan", "A_NAME_THAT_IS_TOO_LONG 1"] {
-            let error = text(&format!("RC5_OPTION 153\n{line}\n"), &PLUS, 4).unwrap_err();
-            assert!(error.starts_with("line 2: ") && error.contains(line), "{error}");
-        }
     }
 }

@@ -1,0 +1,66 @@
+//! A file of a firmware's parameters: a name and a number a line.
+
+/// Longest name, in ArduPilot (`AP_MAX_NAME_SIZE`) and in PX4.
+const NAME_LENGTH_MAX: usize = 16;
+/// Characters between a name and its value.
+const SEPARATORS: [char; 5] = [' ', ',', '=', '\t', '\r'];
+
+/// Names and values of `text`, in its order.
+///
+/// # Errors
+/// A line is not a name and a number.
+pub fn read(text: &str) -> Result<Vec<(&str, &str)>, String> {
+    let mut read = Vec::new();
+    for (at, line) in text.lines().enumerate() {
+        read.extend(read_line(line).map_err(|reason| format!("line {}: {reason}", at + 1))?);
+    }
+    Ok(read)
+}
+
+/// Name and value of a line; none of an empty line or a comment.
+fn read_line(line: &str) -> Result<Option<(&str, &str)>, String> {
+    let mut words = line.split(SEPARATORS).filter(|word| !word.is_empty());
+    let Some(name) = words.next().filter(|name| !name.starts_with('#')) else { return Ok(None) };
+    let value = words.next().filter(|value| value.parse::<f64>().is_ok_and(f64::is_finite));
+    match value {
+        Some(value) if is_name(name) => Ok(Some((name, value))),
+        _ => Err(format!(
+            "expected a name of at most {NAME_LENGTH_MAX} letters, digits and underscores, and a number (`FS_THR_ENABLE 0`), \
+             found `{line}`"
+        )),
+    }
+}
+
+/// True for letters, digits and underscores: a name becomes a part of PX4's start-up script.
+fn is_name(name: &str) -> bool {
+    name.len() <= NAME_LENGTH_MAX && name.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_and_values_are_read_in_order() {
+        let text =
+            "# Hummingbird\n\nRC5_OPTION 153\nFRAME_TYPE,1\nSERVO2_FUNCTION=0\r\nPSC_X\t-1.5e-1  # why\n";
+        let expected =
+            [("RC5_OPTION", "153"), ("FRAME_TYPE", "1"), ("SERVO2_FUNCTION", "0"), ("PSC_X", "-1.5e-1")];
+        assert_eq!(read(text).unwrap(), expected);
+    }
+
+    #[test]
+    fn lines_that_are_no_parameters_are_named() {
+        for line in [
+            "RC5_OPTION",
+            "RC5_OPTION on",
+            "RC5_OPTION nan",
+            "A_NAME_THAT_IS_TOO_LONG 1",
+            "A;reboot 1",
+            "$(A) 1",
+        ] {
+            let error = read(&format!("RC5_OPTION 153\n{line}\n")).unwrap_err();
+            assert!(error.starts_with("line 2: ") && error.contains(line), "{error}");
+        }
+    }
+}

@@ -1,0 +1,192 @@
+//! PX4: a stand-in for its SITL (`px4.c`) flies, and fails in every way; the real one where `HUMMINGBUS_PX4` names it.
+
+use super::{call, compiled, each_flies_its_own};
+use crate::recordings::{require_same, topics};
+use crate::skipped::variable_or_skip;
+use crate::support::{Place, poll, repository};
+use std::fs;
+use std::os::unix::fs::symlink;
+use std::path::Path;
+use std::sync::OnceLock;
+
+/// The manifest of the hover and the doublet.
+fn manifest() -> String {
+    repository("manifests/autopilots/px4.toml")
+}
+
+fn program() -> &'static [u8] {
+    static PROGRAM: OnceLock<Vec<u8>> = OnceLock::new();
+    PROGRAM.get_or_init(|| compiled("px4.c", &[]))
+}
+
+/// A folder of a build of PX4 in `place`, with the stand-in as its program, which is returned.
+fn build(place: &Place) -> String {
+    let folder = place.path("build");
+    let [bin, scripts] = ["bin", "etc/init.d-posix"].map(|name| Path::new(&folder).join(name));
+    if !bin.exists() {
+        fs::create_dir_all(&bin).unwrap();
+        fs::create_dir_all(&scripts).unwrap();
+        fs::write(scripts.join("rcS"), "").unwrap();
+        fs::write(bin.join("px4"), program()).unwrap();
+        fs::write(bin.join("px4-alias.sh"), "").unwrap();
+        symlink("px4", bin.join("px4-param")).unwrap();
+    }
+    bin.join("px4").to_str().unwrap().to_owned()
+}
+
+/// The stand-in in `place`, with the parameters of the manifest and `more`; as settings of the manifest.
+fn stand_in(place: &Place, more: &str) -> Vec<String> {
+    let program = build(place);
+    let parameters = fs::read_to_string(repository("manifests/autopilots/px4.parm")).unwrap();
+    let configuration = place.write("px4.parm", parameters + more);
+    vec![
+        format!("process.controller.firmware={program}"),
+        format!("process.controller.configuration={configuration}"),
+        "process.controller.parameters.rest_s=6".to_owned(),
+    ]
+}
+
+/// A flight of the stand-in with the parameters `more`.
+fn flight(place: &Place, more: &str, name: &str) -> String {
+    let recording = place.path(name);
+    call(place, "run", &manifest(), &stand_in(place, more), &["--record", &recording]).with_code(0);
+    recording
+}
+
+#[test]
+fn px4_flies_the_hover_and_its_doublet_and_two_runs_are_the_same_bytes() {
+    let place = Place::new();
+    let first = flight(&place, "", "a.mcap");
+    let (settings, second) = (stand_in(&place, ""), place.path("b.mcap"));
+    let folder = place.path("a blank, a colon: ");
+    fs::create_dir(&folder).unwrap();
+    let manifest = manifest();
+    let set = settings.iter().flat_map(|setting| ["--set", setting]);
+    let args: Vec<&str> =
+        ["run", &manifest, "--record", &second, "--compose", "all"].into_iter().chain(set).collect();
+    place.start_with(&args, &[("TMPDIR", &folder)]).end().with_code(0);
+    require_same(&fs::read(&first).unwrap(), &second);
+}
+
+#[test]
+fn messages_that_come_in_pieces_twice_late_or_among_garbage_change_nothing() {
+    let place = Place::new();
+    let undisturbed = topics(&flight(&place, "", "undisturbed.mcap"));
+    for more in ["GARBAGE 1\n", "SPLITS 1\n", "TWICE 1\n", "LATE 1\n", "OLD_CLOCK 1\n"] {
+        let disturbed = topics(&flight(&place, more, "disturbed.mcap"));
+        assert!(disturbed == undisturbed, "{more}");
+    }
+}
+
+#[test]
+fn each_px4_of_a_run_flies_its_own_vehicle() {
+    let place = Place::new();
+    let settings = stand_in(&place, "");
+    each_flies_its_own(&place, &manifest(), &settings);
+}
+
+#[test]
+fn a_px4_that_fails_ends_the_run_with_its_last_words() {
+    let cases: [(&str, &[&str]); 11] = [
+        ("NEVER_CONNECTS 1", &["has not connected to the port 4", " within 2 s", "Stands in for PX4"]),
+        ("NEVER_BOOTS 1", &["has connected and not answered each message of the sensors within 2 s"]),
+        // While it starts, and in flight: about 7.2 s of its time are before tick 0.
+        ("ENDS 0.5", &["px4 ended with exit code 3", "out of coffee"]),
+        ("ENDS 8.5", &["px4 ended with exit code 3", "out of coffee"]),
+        ("CRASHES 8.5", &["px4 was killed by signal 6"]),
+        ("HANGS 8.5", &["px4 runs and gave no answer for 0.5 s", "thinking"]),
+        ("MUTE 8.5", &["px4 runs and gave no answer for 0.5 s"]),
+        ("WRONG_CRC 8.5", &["gave no answer for 0.5 s; 1 of its messages had a wrong checksum"]),
+        ("NOT_A_NUMBER 8.5", &["it sends the motor outputs [", "NaN"]),
+        ("NO_LOCKSTEP 1", &["it was built without lockstep"]),
+        ("UNARMED 1", &["it is not armed at tick 0", "armed_by_channel"]),
+    ];
+    for (more, told) in cases {
+        let place = Place::new();
+        let mut settings = stand_in(&place, more);
+        settings.push("process.controller.parameters.reply_timeout_s=0.5".to_owned());
+        if more.starts_with("NEVER") {
+            settings.push("process.controller.parameters.boot_timeout_s=2".to_owned());
+        }
+        let recording = place.path("a.mcap");
+        let ended = call(&place, "run", &manifest(), &settings, &["--record", &recording]).with_code(2);
+        ended.says(told);
+        ended.says(&["node `controller`"]);
+        assert!(place.left().is_empty(), "{more}: {:?}", place.left());
+    }
+}
+
+/// Number of processes whose program is that of the firmware's folder in `place`.
+fn firmwares(place: &Place) -> usize {
+    let folder = fs::canonicalize(place.path("")).unwrap();
+    let processes = fs::read_dir("/proc").unwrap().flatten();
+    let programs = processes.filter_map(|process| fs::read_link(process.path().join("exe")).ok());
+    programs
+        .filter(|program| program.starts_with(&folder) && program.to_string_lossy().contains("/px4-"))
+        .count()
+}
+
+#[test]
+fn no_px4_outlives_a_killed_launcher() {
+    let place = Place::new();
+    let (manifest, recording) = (manifest(), place.path("killed.mcap"));
+    let mut args = vec!["run", &manifest, "--record", &recording, "--pace", "realtime"];
+    let settings = stand_in(&place, "");
+    args.extend(settings.iter().flat_map(|setting| ["--set", setting]));
+    let mut launch = place.start(&args);
+    launch.await_ticks(100);
+    assert_eq!(firmwares(&place), 1);
+    launch.kill();
+    poll("the end of the firmware", || (firmwares(&place) == 0).then_some(()));
+}
+
+#[test]
+fn what_cannot_be_a_px4_is_refused_by_check() {
+    let place = Place::new();
+    let settings = stand_in(&place, "");
+    let [text, wrong] = [place.write("text", "no program"), place.write("wrong.parm", "# one\nMC_ROLL_P\n")];
+    let cases: [(&str, &[&str]); 9] = [
+        ("process.controller.firmware=${HUMMINGBUS_UNSET}", &["HUMMINGBUS_UNSET is not set"]),
+        (&format!("process.controller.firmware={text}"), &["firmware", "build/px4_sitl_default/bin/px4"]),
+        (&format!("process.controller.configuration={wrong}"), &["line 2: expected a name", "MC_ROLL_P"]),
+        ("process.controller.parameters.armed_by_channel=19", &["expected 5 to 18"]),
+        ("process.controller.parameters.rest_s=0", &["rest_s", "above 0"]),
+        ("process.controller.parameters.boot_timeout_s=0", &["boot_timeout_s", "above 0"]),
+        ("process.controller.parameters.origin.latitude_deg=90", &["origin.latitude_deg"]),
+        ("process.controller.parameters.magnetic_field.field_T=0.5", &["magnetic_field.field_T"]),
+        ("process.controller.period_ticks=3", &["the period is 0.003 s", "4 ms is a multiple"]),
+    ];
+    for (setting, told) in cases {
+        let settings = [&settings[..], &[setting.to_owned()]].concat();
+        call(&place, "check", &manifest(), &settings, &[]).with_code(2).says(told);
+    }
+}
+
+#[test]
+fn a_px4_without_its_start_up_script_is_told_before_tick_0() {
+    let place = Place::new();
+    let mut settings = stand_in(&place, "");
+    settings[0] = format!("process.controller.firmware={}", place.write("px4", program()));
+    let ended = call(&place, "run", &manifest(), &settings, &["--record", "none"]);
+    ended.with_code(2).says(&["etc/init.d-posix/rcS: PX4 needs the folder `etc` of its build"]);
+}
+
+#[test]
+fn a_checkpoint_of_a_px4_is_refused_in_words() {
+    let place = Place::new();
+    let planned = ["--record", &place.path("a.mcap"), "--checkpoint-every", "500ms"];
+    let says = "the state of `controller` is in a firmware, which does not tell it";
+    call(&place, "run", &manifest(), &stand_in(&place, ""), &planned)
+        .with_code(2)
+        .says(&["at tick 500", says]);
+}
+
+#[test]
+fn the_real_px4_flies_the_hover_and_its_doublet() {
+    let Some(program) = variable_or_skip("HUMMINGBUS_PX4", "the program of PX4's SITL") else {
+        return;
+    };
+    let place = Place::new();
+    let settings = [format!("process.controller.firmware={program}")];
+    call(&place, "run", &manifest(), &settings, &["--record", &place.path("a.mcap")]).with_code(0);
+}
