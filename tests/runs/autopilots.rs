@@ -135,17 +135,17 @@ fn recorded_channels_fly_the_flight_again() {
     let cat = |recording: &str, topic: &str| {
         place.call(&["cat", recording, "--topic", topic, "--csv"]).with_code(0).output
     };
-    let mut rows = "time_s,ch1,ch2,ch3,ch4,ch5\n".to_owned();
+    let mut rows = "time_s,ch1,ch2,ch3,ch4,ch5,ch6\n".to_owned();
     for line in cat(&first, "/sticks/rc").lines().skip(1) {
         let cells: Vec<&str> = line.split(',').collect();
         // Half a tick before the tick that sends it.
         let time_s = (cells[0].parse::<f64>().unwrap() - 0.5) * 1e-3;
-        rows += &format!("{time_s},{}\n", cells[cells.len() - 5..].join(","));
+        rows += &format!("{time_s},{}\n", cells[cells.len() - 6..].join(","));
     }
     let data = place.write("receiver.csv", rows);
     let text = fs::read_to_string(manifest()).unwrap().replace("../../", &repository(""));
     let (before, sticks) = text.split_once("[process.sticks]").unwrap();
-    let behind = &sticks[sticks.find("[process.").unwrap()..];
+    let behind = &sticks[sticks.find("[process.pilot]").unwrap()..];
     let sticks = format!("[process.sticks]\nkind = \"rc\"\ndata = {data:?}\n");
     let again = place.write("again.toml", format!("{before}{sticks}{behind}"));
     call(&place, "run", &again, &settings, &["--record", &second]).flown();
