@@ -81,12 +81,12 @@ impl Comparison {
 /// If one of them is damaged.
 pub fn compare(a: &Recording, b: &Recording) -> Result<Comparison, RecordingError> {
     let (mut left, mut right) = (a.messages().peekable(), b.messages().peekable());
-    if let (Some(x), Some(y)) = (first_of(&mut left), first_of(&mut right)) {
-        if !(skip_to(&mut left, y.tick) && skip_to(&mut right, x.tick)) {
-            // One ends before the other begins.
-            let refused = Some(message_difference(&x, &y));
-            return Ok(Comparison { messages: 0, fields: Vec::new(), refused });
-        }
+    if let (Some(x), Some(y)) = (first_of(&mut left), first_of(&mut right))
+        && !(skip_to(&mut left, y.tick) && skip_to(&mut right, x.tick))
+    {
+        // One ends before the other begins.
+        let refused = Some(message_difference(&x, &y));
+        return Ok(Comparison { messages: 0, fields: Vec::new(), refused });
     }
     let mut fields = Fields::default();
     let (mut messages, mut last_tick) = (0, None);
