@@ -90,6 +90,8 @@ impl Connection {
         };
         match received {
             Ok(length) => self.buffer.extend_from_slice(&chunk[..length]),
+            // A process that was stopped and goes on (SIGSTOP, SIGCONT).
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
             Err(error) if is_silence(&error) => return self.firmware.ended().map_or(Ok(false), Err),
             Err(error) => return Err(self.firmware.failed(&error, self.limit)),
         }

@@ -22,8 +22,10 @@ fn read_line(line: &str) -> Result<Option<(&str, &str)>, String> {
     let mut words = line.split(SEPARATORS).filter(|word| !word.is_empty());
     let Some(name) = words.next().filter(|name| !name.starts_with('#')) else { return Ok(None) };
     let value = words.next().filter(|value| value.parse::<f64>().is_ok_and(f64::is_finite));
+    // Ground stations export tables, whose first columns are the vehicle's and the component's numbers.
+    let is_last = words.next().is_none_or(|word| word.starts_with('#'));
     match value {
-        Some(value) if is_name(name) => Ok(Some((name, value))),
+        Some(value) if is_name(name) && is_last => Ok(Some((name, value))),
         _ => Err(format!(
             "expected a name of at most {NAME_LENGTH_MAX} letters, digits and underscores, and a number (`FS_THR_ENABLE 0`), \
              found `{line}`"
@@ -31,9 +33,11 @@ fn read_line(line: &str) -> Result<Option<(&str, &str)>, String> {
     }
 }
 
-/// True for letters, digits and underscores: a name becomes a part of PX4's start-up script.
+/// True for letters, digits and underscores behind a first letter: a name becomes a part of PX4's start-up script.
 fn is_name(name: &str) -> bool {
-    name.len() <= NAME_LENGTH_MAX && name.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_')
+    name.len() <= NAME_LENGTH_MAX
+        && name.starts_with(|first: char| first.is_ascii_alphabetic())
+        && name.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_')
 }
 
 #[cfg(test)]
@@ -58,6 +62,8 @@ mod tests {
             "A_NAME_THAT_IS_TOO_LONG 1",
             "A;reboot 1",
             "$(A) 1",
+            "1\t1\tMC_ROLL_P\t6.5\t9",
+            "MC_ROLL_P 3.5 4.5",
         ] {
             let error = read(&format!("RC5_OPTION 153\n{line}\n")).unwrap_err();
             assert!(error.starts_with("line 2: ") && error.contains(line), "{error}");

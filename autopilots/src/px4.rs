@@ -22,7 +22,7 @@ use crate::rest::{Rest, imu_at_rest};
 use crate::settings;
 use bus::component::Info;
 use bus::context::NodeContext;
-use bus::messages::{RcChannels, StateEstimate};
+use bus::messages::{RC_CHANNELS_MAX, RcChannels, StateEstimate};
 use diagnostics::ParameterError;
 use diagnostics::parameter::{positive_up_to, refuse};
 use field::MagneticField;
@@ -166,7 +166,8 @@ impl Autopilot for Px4 {
                 "{path}: expected a 64-bit Linux program (ELF): PX4's SITL, build/px4_sitl_default/bin/px4"
             )
         })?;
-        settings::check_arming(armed_by_channel, messages::CHANNELS)?;
+        // A message of the bus has fewer channels than MAVLink's.
+        settings::check_arming(armed_by_channel, messages::CHANNELS.min(RC_CHANNELS_MAX))?;
         positive_up_to("rest_s", rest_s, REST_MAX_S, "s")?;
         positive_up_to("boot_timeout_s", parameters.boot_timeout_s, REST_MAX_S, "s")?;
         parameters.origin.check()?;

@@ -100,6 +100,9 @@ impl Component for Rc {
             format!("`from_s` is {from_s} s, expected a time of the recording in `data`")
         })?;
         let recording = data.map(|path| Recording::load(&context.files, &path)).transpose()?;
+        if let Some(recording) = &recording {
+            recording.check_times(from_s, context)?;
+        }
         let of_recording = |channel: usize| recording.as_ref().is_some_and(|it| it.has(channel));
         if let Some(Move { channel, .. }) = script.iter().find(|it| of_recording(it.channel)) {
             let message =
@@ -268,6 +271,22 @@ impl Recording {
         } else {
             Ok(read)
         }
+    }
+
+    /// Refuses a start behind the end of the recording, and warns of a run that is longer.
+    fn check_times(&self, from_s: f64, context: &NodeContext<'_>) -> Result<(), ParameterError> {
+        let last_s = self.times_s.last().copied().unwrap_or_default();
+        refuse(from_s > last_s, "from_s", || {
+            format!("`from_s` is {from_s} s, expected at most {last_s} s, the time of the last row of `data`")
+        })?;
+        let end_s = last_s - from_s;
+        if end_s < context.duration_s() {
+            context.warn(
+                "data",
+                format!("`data` ends at {end_s} s of the run: its last pulses hold from there on"),
+            );
+        }
+        Ok(())
     }
 
     fn has(&self, channel: usize) -> bool {

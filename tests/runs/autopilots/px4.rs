@@ -149,7 +149,7 @@ fn what_cannot_be_a_px4_is_refused_by_check() {
         ("process.controller.firmware=${HUMMINGBUS_UNSET}", &["HUMMINGBUS_UNSET is not set"]),
         (&format!("process.controller.firmware={text}"), &["firmware", "build/px4_sitl_default/bin/px4"]),
         (&format!("process.controller.configuration={wrong}"), &["line 2: expected a name", "MC_ROLL_P"]),
-        ("process.controller.parameters.armed_by_channel=19", &["expected 5 to 18"]),
+        ("process.controller.parameters.armed_by_channel=17", &["expected 5 to 16"]),
         ("process.controller.parameters.rest_s=0", &["rest_s", "above 0"]),
         ("process.controller.parameters.boot_timeout_s=0", &["boot_timeout_s", "above 0"]),
         ("process.controller.parameters.origin.latitude_deg=90", &["origin.latitude_deg"]),
