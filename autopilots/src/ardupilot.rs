@@ -22,7 +22,7 @@ use crate::settings;
 use bus::component::Info;
 use bus::context::NodeContext;
 use diagnostics::ParameterError;
-use diagnostics::parameter::{positive_up_to, refuse};
+use diagnostics::parameter::refuse;
 use frames::{FRAMES, FrameNumbers};
 use outputs::Outputs;
 use serde::Deserialize;
@@ -34,8 +34,6 @@ use vehicles::Vehicle;
 /// Part of the rest with the arming switch on, s: the motors of ArduCopter stand still for 2 s after it is armed
 /// (`ARMING_DELAY_SEC`), and are then spun up.
 const ARMED_S: f64 = 4.0;
-/// Longest rest, s.
-const REST_MAX_S: f64 = 3600.0;
 /// Longest step of the firmware's clock, s; a longer one is not taken (`SIM_JSON.cpp`).
 const PERIOD_MAX_S: f64 = 0.1;
 /// Heading of the vehicle that rests, degrees from north: its x points east.
@@ -114,15 +112,9 @@ impl Autopilot for ArduPilot {
         let refused = |reason: String| settings::refused_vehicle(&vehicle, &reason);
         let layout = Layout::of(&vehicle.rotors, &FRAMES).map_err(refused)?;
         let numbers = FrameNumbers::of(&layout).map_err(refused)?;
-        let program = settings::file(context, "firmware", &firmware)?;
-        refuse(!program.starts_with(b"\x7fELF\x02\x01"), "firmware", || {
-            let path = firmware.display();
-            format!(
-                "{path}: expected a 64-bit Linux program (ELF): ArduCopter's SITL, build/sitl/bin/arducopter"
-            )
-        })?;
+        let program = settings::program(context, &firmware, "ArduCopter's SITL, build/sitl/bin/arducopter")?;
         settings::check_arming(armed_by_channel, answer::CHANNELS)?;
-        positive_up_to("rest_s", rest_s, REST_MAX_S, "s")?;
+        settings::check_rest(rest_s, ARMED_S, armed_by_channel)?;
         parameters.origin.check()?;
         let period_s = context.period_s();
         refuse(period_s >= PERIOD_MAX_S, "period_ticks", || {
@@ -134,12 +126,6 @@ impl Autopilot for ArduPilot {
         refuse((period_us - period_us.round()).abs() > 1e-6, "period_ticks", || {
             format!(
                 "the period is {period_us} us, expected whole microseconds: ArduPilot's clock cuts each step to them"
-            )
-        })?;
-        refuse(armed_by_channel.is_some() && rest_s <= ARMED_S, "rest_s", || {
-            format!(
-                "`rest_s` is {rest_s} s, expected more than {ARMED_S} s with `armed_by_channel`: the switch moves {ARMED_S} s before \
-                 tick 0, and ArduPilot arms when it sees it move"
             )
         })?;
         let configured = settings::configuration(context, configuration.as_deref())?;

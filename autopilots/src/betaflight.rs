@@ -300,7 +300,7 @@ fn require_preloadable(program: &[u8]) -> Result<(), String> {
         let bytes = program.get(at..at.checked_add(size)?)?;
         Some(bytes.iter().rev().fold(0, |number, byte| (number << 8) | u64::from(*byte)))
     };
-    if !program.starts_with(b"\x7fELF\x02\x01") {
+    if !program.starts_with(settings::ELF_64) {
         return Err("expected a 64-bit Linux program (ELF): Betaflight's SITL, obj/main/betaflight_SITL.elf"
             .to_owned());
     }

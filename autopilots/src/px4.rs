@@ -58,8 +58,8 @@ const BOOT_PACE: Duration = Duration::from_millis(20);
 const IN_STEP: u64 = 250;
 /// Part of the rest with the arming switch on, s: motors stand still for 1 s after it is armed (`COM_SPOOLUP_TIME`).
 const ARMED_S: f64 = 4.0;
-/// Longest rest, s.
-const REST_MAX_S: f64 = 3600.0;
+/// Longest host time that a start may take, s.
+const BOOT_TIMEOUT_MAX_S: f64 = 3600.0;
 /// Port of the instance 0, and the instances that are tried. A user's own firmwares have the first ones.
 const FIRST_PORT: u16 = 4560;
 const INSTANCES: std::ops::Range<u16> = 100..200;
@@ -159,17 +159,11 @@ impl Autopilot for Px4 {
     fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         let Parameters { vehicle, firmware, configuration, armed_by_channel, rest_s, .. } = parameters;
         let vehicle = settings::vehicle(context, &vehicle)?;
-        let program = settings::file(context, "firmware", &firmware)?;
-        refuse(!program.starts_with(b"\x7fELF\x02\x01"), "firmware", || {
-            let path = firmware.display();
-            format!(
-                "{path}: expected a 64-bit Linux program (ELF): PX4's SITL, build/px4_sitl_default/bin/px4"
-            )
-        })?;
+        let program = settings::program(context, &firmware, "PX4's SITL, build/px4_sitl_default/bin/px4")?;
         // A message of the bus has fewer channels than MAVLink's.
         settings::check_arming(armed_by_channel, messages::CHANNELS.min(RC_CHANNELS_MAX))?;
-        positive_up_to("rest_s", rest_s, REST_MAX_S, "s")?;
-        positive_up_to("boot_timeout_s", parameters.boot_timeout_s, REST_MAX_S, "s")?;
+        settings::check_rest(rest_s, ARMED_S, armed_by_channel)?;
+        positive_up_to("boot_timeout_s", parameters.boot_timeout_s, BOOT_TIMEOUT_MAX_S, "s")?;
         parameters.origin.check()?;
         parameters.magnetic_field.check()?;
         let period_ns = context.tick_ns * u64::from(context.period_ticks);

@@ -9,6 +9,10 @@ use vehicles::Vehicle;
 
 /// First channel of a switch; those before are the sticks.
 const FIRST_SWITCH: usize = 5;
+/// Longest rest before tick 0, s.
+const REST_MAX_S: f64 = 3600.0;
+/// First bytes of a program for 64-bit Linux on a little-endian processor.
+pub const ELF_64: &[u8] = b"\x7fELF\x02\x01";
 /// Longest host time that an answer may take, s.
 const REPLY_TIMEOUT_MAX_S: f64 = 3600.0;
 
@@ -28,6 +32,18 @@ pub fn file(context: &NodeContext<'_>, key: &'static str, path: &Path) -> Result
         .bytes(path)
         .map_err(|error| ParameterError::conflict(key, format!("cannot read {}: {error}", path.display())))?;
     Ok(bytes.to_vec())
+}
+
+/// The 64-bit Linux program at `path`; `expected` says which, and where a build puts it.
+///
+/// # Errors
+/// It cannot be read, or is no such program.
+pub fn program(context: &NodeContext<'_>, path: &Path, expected: &str) -> Result<Vec<u8>, ParameterError> {
+    let program = file(context, "firmware", path)?;
+    refuse(!program.starts_with(ELF_64), "firmware", || {
+        format!("{}: expected a 64-bit Linux program (ELF): {expected}", path.display())
+    })?;
+    Ok(program)
 }
 
 /// The text of the configuration at `path`; empty without one.
@@ -62,6 +78,20 @@ pub fn check_arming(channel: Option<usize>, channels: usize) -> Result<(), Param
     refuse(!(FIRST_SWITCH..=channels).contains(&channel), "armed_by_channel", || {
         format!(
             "`armed_by_channel` is {channel}, expected {FIRST_SWITCH} to {channels}: the first four are the sticks"
+        )
+    })
+}
+
+/// Checks the rest before tick 0, of whose last `armed_s` the arming switch is on: a firmware arms when it sees the switch move.
+///
+/// # Errors
+/// It is not positive, longer than an hour, or too short for the switch to be seen off.
+pub fn check_rest(rest_s: f64, armed_s: f64, armed_by_channel: Option<usize>) -> Result<(), ParameterError> {
+    positive_up_to("rest_s", rest_s, REST_MAX_S, "s")?;
+    refuse(armed_by_channel.is_some() && rest_s <= armed_s, "rest_s", || {
+        format!(
+            "`rest_s` is {rest_s} s, expected more than {armed_s} s with `armed_by_channel`: the switch moves {armed_s} s before tick \
+             0, and a firmware arms when it sees it move"
         )
     })
 }

@@ -9,7 +9,7 @@
 //! 3. The gain matters: it is at least [`LEAST_GAIN`] of the squared error.
 //! 4. The effect is not asked for more than it can be: not all parameters that moved stopped at a bound.
 //!
-//! Of the accepted the one with the greatest gain is taken, or one with fewer parameters if the difference is not
+//! The accepted candidate with the greatest gain is taken, or one with fewer parameters if the difference is not
 //! beyond chance. Then those taken before have to pass the first test again, as a later effect may explain the
 //! residual that an earlier one explained by mistake.
 //!

@@ -127,19 +127,18 @@ impl Writer<'_> {
     /// # Errors
     /// If there is none, it is one of another run, it lies ahead, or nothing can go on from it.
     pub(crate) fn find(&self, tick: Option<u32>, file: Option<&Path>, now: u32) -> Result<Found> {
-        let written = match file {
-            Some(_) => None,
-            None => Some(self.files.newest(tick, now)?),
+        let (path, expected) = match file {
+            Some(file) => (file.to_owned(), None),
+            None => {
+                let Written { tick, path } = self.files.newest(tick, now)?;
+                (path, Some(tick))
+            }
         };
-        let path =
-            file.or(written.as_ref().map(|written| &*written.path)).unwrap_or(Path::new("")).to_owned();
         let found = Checkpoint::read(&path)?;
-        if let Some(Written { tick, .. }) = written
-            && found.tick() != tick
-        {
+        if let Some(expected) = expected.filter(|expected| *expected != found.tick()) {
             let (path, found) = (path.display(), found.tick());
             bail!(
-                "{path} was replaced since this run has written it: it is of tick {found}, and was of tick {tick}"
+                "{path} was replaced since this run has written it: it is of tick {found}, and was of tick {expected}"
             );
         }
         let of_now = Checkpoint::new(self.manifest, self.graph, Parts { tick: now, nodes: Vec::new() });

@@ -157,7 +157,7 @@ pub(crate) fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
 /// A new file at `location`, locked, and the new path of the file that lay there before; `None` if another process
 /// has one there.
 ///
-/// Of any number of processes that try at once exactly one gets it. Only the process that has locked the old file
+/// Exactly one of the processes that try at once gets it. Only the process that has locked the old file
 /// removes it. A process that has created the file and then finds it locked or gone has lost it to another.
 fn claim_new(location: &Location) -> io::Result<Option<(File, Option<PathBuf>)>> {
     let mut kept = None;

@@ -168,10 +168,9 @@ fn instead_of(option: &str) -> Option<&'static str> {
         OPTIONS_OF_OURS.iter().find(|(long, short, _)| is_meant(long, *short)).map(|(_, _, instead)| *instead)
     };
     if option.starts_with("--") {
-        // sbatch takes the beginning of an option for the option.
+        // sbatch takes the beginning of an option for the option. One that may be several, such as `--a`, it refuses itself.
         let name = option.split('=').next().unwrap_or(option);
         let is_meant = |long: &str, _| name.len() > "--".len() && long.starts_with(name);
-        // `--ar` is ours, `--a` may be `--account`: sbatch refuses it as ambiguous.
         return of(&is_meant);
     }
     match option.strip_prefix('-').filter(|letters| !letters.is_empty()) {
