@@ -72,6 +72,7 @@ fn anchors(page: &str) -> Vec<String> {
     headings.map(|heading| anchor(heading).replace(' ', "-")).collect()
 }
 
+/// Links as GitHub resolves them; `scripts/site` checks those of the built site.
 #[test]
 fn every_link_of_a_page_leads_somewhere() {
     let mut count = 0;
