@@ -11,7 +11,7 @@ mod sample;
 mod screen;
 mod view;
 
-pub use view::View;
+pub use view::{ProcessRow, View};
 
 use anyhow::Result;
 use keys::Keys;
@@ -29,6 +29,8 @@ use std::time::{Duration, Instant};
 const REFRESH: Duration = Duration::from_millis(250);
 /// Looks over which rates, shares and percentiles are computed: about the last second.
 const LOOKS: usize = 5;
+/// Host time over which a [`Watcher`] computes them.
+const SPAN: Duration = Duration::from_secs(1);
 /// Host time between the two looks of `--once`.
 const ONCE: Duration = Duration::from_millis(500);
 
@@ -41,6 +43,36 @@ pub fn look(run: &Arc<LiveRun>) -> Result<View> {
     let before = source.sample();
     std::thread::sleep(ONCE);
     Ok(source.between(&before, &source.sample()))
+}
+
+/// Looks at a run again and again, at any times.
+pub struct Watcher {
+    source: Source,
+    looks: VecDeque<(Instant, Sample)>,
+}
+
+impl Watcher {
+    /// Opens `run`, which may just be starting.
+    ///
+    /// # Errors
+    /// If it has ended.
+    pub fn open(run: &Arc<LiveRun>) -> Result<Self> {
+        Ok(Self { source: Source::open(run)?, looks: VecDeque::new() })
+    }
+
+    /// State of the run now, and its rates over about the last second; without rates at the first look.
+    pub fn look(&mut self) -> View {
+        let (now, newest) = (Instant::now(), self.source.sample());
+        // The oldest look that stays is one from a second ago, or the one before it.
+        while self.looks.get(1).is_some_and(|(at, _)| now.duration_since(*at) >= SPAN) {
+            self.looks.pop_front();
+        }
+        let view = self.source.between(self.looks.front().map_or(&newest, |(_, oldest)| oldest), &newest);
+        if self.looks.back().is_none_or(|(at, _)| now.duration_since(*at) >= REFRESH) {
+            self.looks.push_back((now, newest));
+        }
+        view
+    }
 }
 
 /// Shows `run` in the terminal and lets the keys steer it until the user leaves, or `is_terminated` becomes true.

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 /// Examples that `--help` shows.
 pub const HELP: &str =
-    "Examples: hummingbus new drone\n          hummingbus new vehicle --from quad.urdf -o quad.toml";
+    "Examples: hummingbus new drone\n          hummingbus new drone --language python\n          hummingbus new vehicle --from quad.urdf -o quad.toml";
 /// Example that the help of `new vehicle` shows.
 const VEHICLE_HELP: &str = "Example: hummingbus new vehicle --from quad.urdf -o quad.toml";
 
@@ -23,9 +23,12 @@ const VEHICLE: Kind = Kind { name: "vehicle file", mark: Mark::Start(from_model:
 #[derive(Args)]
 #[command(args_conflicts_with_subcommands = true)]
 pub struct NewArguments {
-    /// Folder of a new project: vehicle, manifest, gains, campaign, and a controller in Rust.
+    /// Folder of a new project: vehicle, manifest, gains, campaign, and a controller.
     #[arg(required = true, value_name = "NAME")]
     folder: Option<PathBuf>,
+    /// Language of the project's controller.
+    #[arg(long, value_enum, default_value_t)]
+    language: project::Language,
     /// Checkout of hummingbus that the project's controller builds against.
     #[arg(long, value_name = "FOLDER")]
     sources: Option<PathBuf>,
@@ -59,17 +62,18 @@ struct VehicleArguments {
 pub fn new(arguments: &NewArguments) -> Result<bool> {
     match (&arguments.file, &arguments.folder) {
         (Some(NewFile::Vehicle(arguments)), _) => vehicle(arguments),
-        (None, Some(folder)) => new_project(folder, arguments.sources.as_deref()),
+        (None, Some(folder)) => new_project(folder, arguments.language, arguments.sources.as_deref()),
         (None, None) => bail!("name the folder of the new project: hummingbus new drone"),
     }
 }
 
-fn new_project(folder: &Path, sources: Option<&Path>) -> Result<bool> {
-    project::make(folder, sources)?;
+fn new_project(folder: &Path, language: project::Language, sources: Option<&Path>) -> Result<bool> {
+    project::make(folder, language, sources)?;
     let shown = quoted(folder);
     print_text(&format!(
-        "{shown}: a project with a vehicle, a manifest, gains, a campaign and a controller in Rust\n\
+        "{shown}: a project with a vehicle, a manifest, gains, a campaign and a controller in {}\n\
          to fly it: {}\nnext steps: {shown}/README.md",
+        language.title(),
         command("run", &folder.join("hover.toml"))
     ))?;
     Ok(true)

@@ -1,38 +1,123 @@
 //! A project folder for a vehicle of one's own: templates, and the folder that is made from them.
 
 use anyhow::{Context, Result, bail};
+use clap::ValueEnum;
+use super::shell::quoted;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Name of the project in the templates.
 const TEMPLATE_NAME: &str = "drone";
-/// Folder of the templates as their own test names it, and the same in a project, both relative to the Cargo package.
+/// Folder of the Rust templates as their own test names it, and the same in a project, both relative to the Cargo package.
 const FOLDERS: (&str, &str) = ("/src/cli/project/", "/../");
+/// Lines of CMake for the library of an installed hummingbus, or else of its sources.
+const BUILT_LIBRARY: &str = "\
+find_package(hummingbus QUIET)
+if(NOT hummingbus_FOUND)
+  # Cargo builds it from the sources of hummingbus.
+  add_subdirectory([==[@path@]==] hummingbus)
+endif()
+";
 /// Longest name of a project.
 const NAME_BYTES_MAX: usize = 64;
 /// Sources that this program was built from.
 const BUILT_FROM: &str = env!("CARGO_MANIFEST_DIR");
 
-/// Files of a project: path and template.
-const FILES: [(&str, &str); 10] = [
+/// Files of every project: path and template.
+const FILES: [(&str, &str); 6] = [
     (".gitignore", include_str!("project/gitignore")),
     ("README.md", include_str!("project/README.md")),
     ("campaign.toml", include_str!("project/campaign.toml")),
-    ("controller/Cargo.toml", include_str!("project/controller/Cargo.toml.in")),
-    ("controller/src/hover_test.rs", include_str!("project/controller/src/hover_test.rs")),
-    ("controller/src/main.rs", include_str!("project/controller/src/main.rs")),
     ("gains.toml", include_str!("project/gains.toml")),
-    ("hover-rust.toml", include_str!("project/hover-rust.toml")),
     ("hover.toml", include_str!("project/hover.toml")),
     ("vehicle.toml", include_str!("project/vehicle.toml")),
 ];
 
-/// Makes the project `folder`, whose controller builds against the `sources` of hummingbus; where absent, against the sources
-/// of this program if they are still there, or else against its published version.
+/// Language of a project's controller.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Language {
+    /// Rust, built with Cargo.
+    #[default]
+    Rust,
+    /// C++17, built with CMake.
+    Cpp,
+    /// Python with numpy.
+    Python,
+}
+
+/// What a project's controller adds to the files of every project.
+struct Templates {
+    /// Name of the language for people.
+    title: &'static str,
+    /// Manifest that flies the controller.
+    manifest: &'static str,
+    /// Keys of the process that is the controller, for `swap`.
+    program: &'static str,
+    /// Section of README.md: how to build, fly and test it.
+    section: &'static str,
+    /// Files: path and template.
+    files: &'static [(&'static str, &'static str)],
+}
+
+const RUST: Templates = Templates {
+    title: "Rust",
+    manifest: "hover-rust.toml",
+    program: r#"command = ["controller/target/release/controller"]"#,
+    section: include_str!("project/rust/section.md"),
+    files: &[
+        ("controller/Cargo.toml", include_str!("project/rust/Cargo.toml.in")),
+        ("controller/src/hover_test.rs", include_str!("project/rust/src/hover_test.rs")),
+        ("controller/src/main.rs", include_str!("project/rust/src/main.rs")),
+        ("hover-rust.toml", include_str!("project/hover-rust.toml")),
+    ],
+};
+
+const CPP: Templates = Templates {
+    title: "C++",
+    manifest: "hover-cpp.toml",
+    program: r#"command = ["controller/build/controller"]"#,
+    section: include_str!("project/cpp/section.md"),
+    files: &[
+        ("controller/CMakeLists.txt", include_str!("project/cpp/CMakeLists.txt")),
+        ("controller/controller.cpp", include_str!("project/cpp/controller.cpp")),
+        ("hover-cpp.toml", include_str!("project/hover-cpp.toml")),
+    ],
+};
+
+const PYTHON: Templates = Templates {
+    title: "Python",
+    manifest: "hover-python.toml",
+    program: r#"command = ["controller/venv/bin/python", "controller.py"], working_directory = "controller""#,
+    section: include_str!("project/python/section.md"),
+    files: &[
+        ("controller/controller.py", include_str!("project/python/controller.py")),
+        ("controller/test_hover.py", include_str!("project/python/test_hover.py")),
+        ("hover-python.toml", include_str!("project/hover-python.toml")),
+    ],
+};
+
+impl Language {
+    fn templates(self) -> &'static Templates {
+        match self {
+            Self::Rust => &RUST,
+            Self::Cpp => &CPP,
+            Self::Python => &PYTHON,
+        }
+    }
+
+    /// Name for people.
+    #[must_use]
+    pub fn title(self) -> &'static str {
+        self.templates().title
+    }
+}
+
+/// Makes the project `folder` with a controller in `language`. The controller builds against the `sources` of hummingbus; where
+/// absent, against the sources of this program if they are still there, or else against its published version.
 ///
 /// # Errors
 /// If the name is not suitable, the folder exists, its parent does not, or it cannot be written. Nothing is left then.
-pub fn make(folder: &Path, sources: Option<&Path>) -> Result<()> {
+pub fn make(folder: &Path, language: Language, sources: Option<&Path>) -> Result<()> {
     let name = name_of(folder)?;
     if folder.symlink_metadata().is_ok() {
         bail!("{} already exists; choose another name, or remove it first", folder.display());
@@ -44,8 +129,9 @@ pub fn make(folder: &Path, sources: Option<&Path>) -> Result<()> {
         .with_context(|| format!("cannot make a folder in {}", parent.display()))?;
     // A folder within: the temporary folder is closed to other users, the project has the rights of the umask.
     let whole = draft.path().join(name);
-    for (path, template) in FILES {
-        write(&whole.join(path), &filled(template, name, sources.as_deref()))?;
+    let templates = language.templates();
+    for (path, template) in FILES.iter().chain(templates.files) {
+        write(&whole.join(path), &filled(template, name, templates, sources.as_deref()))?;
     }
     fs::rename(&whole, folder).with_context(|| format!("cannot make {}", folder.display()))
 }
@@ -89,21 +175,30 @@ fn required(sources: &Path) -> Result<PathBuf> {
     sources.canonicalize().with_context(|| format!("cannot read {}", sources.display()))
 }
 
-/// A template with the project's name, and the dependencies of its controller.
-fn filled(template: &str, name: &str, sources: Option<&Path>) -> String {
-    let dependency = |crate_folder: &str| match sources {
-        Some(sources) => {
-            let path = sources.join(crate_folder);
-            format!("path = {}", toml::Value::from(path.to_string_lossy().trim_end_matches('/')))
-        }
+/// A template with the project's name, its language, and what its controller builds against.
+fn filled(template: &str, name: &str, language: &Templates, sources: Option<&Path>) -> String {
+    let path = |folder: &str| sources.map(|sources| sources.join(folder).to_string_lossy().trim_end_matches('/').to_owned());
+    let dependency = |folder: &str| match path(folder) {
+        Some(path) => format!("path = {}", toml::Value::from(path)),
         None => format!("version = {:?}", env!("CARGO_PKG_VERSION")),
     };
-    // The name last of all but the paths: a path may have the template's name in it.
+    let library = match path("bindings/c") {
+        Some(path) => BUILT_LIBRARY.replace("@path@", &path),
+        None => format!("find_package(hummingbus {} REQUIRED)\n", env!("CARGO_PKG_VERSION")),
+    };
+    let package = path("python").map_or_else(|| "hummingbus".to_owned(), |path| quoted(Path::new(&path)));
+    // The paths last: one may have the project's name in it.
     template
+        .replace("@section@\n", language.section)
+        .replace("@manifest@", language.manifest)
+        .replace("@program@", language.program)
+        .replace("@language@", language.title)
         .replace(FOLDERS.0, FOLDERS.1)
         .replace(TEMPLATE_NAME, name)
         .replace("@bus@", &dependency("bus"))
         .replace("@hummingbus@", &dependency(""))
+        .replace("@library@\n", &library)
+        .replace("@package@", &package)
 }
 
 fn write(path: &Path, text: &str) -> Result<()> {

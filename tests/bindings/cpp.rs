@@ -1,8 +1,9 @@
 //! Nodes in C++ and C: same bytes, hand-over of state, own messages, and what is said where one fails.
 
 use crate::build::{built, succeed};
-use crate::support::{Ended, Place, repository};
+use crate::support::{Ended, HUMMINGBUS, Place, repository};
 use std::fs;
+use std::path::Path;
 use std::process::Command;
 
 /// The shipped manifest `name`, flown by the controller that the tests have built.
@@ -65,6 +66,29 @@ fn a_controller_in_cpp_takes_over_from_pid_with_its_state_and_pid_from_it() {
     let shadows = summary["shadows"].as_array().unwrap().iter().filter(|shadow| shadow["from_tick"] == 2800);
     let rms: Vec<f64> = shadows.map(|shadow| shadow["rms"].as_f64().unwrap()).collect();
     assert!(rms.len() == 4 && rms.iter().all(|count| *count < 1e-6), "{rms:?}\n{ended}");
+}
+
+#[test]
+fn a_new_project_in_cpp_is_built_and_passes_its_own_test() {
+    let place = Place::new();
+    let folder = place.path("my-quad");
+    place.call(&["new", &folder, "--language", "cpp", "--sources", &repository("")]).with_code(0);
+    let build = format!("{folder}/controller/build");
+    let mut configure = Command::new("cmake");
+    configure.args(["-S", &format!("{folder}/controller"), "-B", &build]);
+    configure.arg(format!("-DCMAKE_PREFIX_PATH={}", built().prefix.display()));
+    succeed(configure);
+    let mut make = Command::new("cmake");
+    make.args(["--build", &build]);
+    succeed(make);
+    // The test calls the program by its name.
+    let programs = Path::new(HUMMINGBUS).parent().unwrap().display().to_string();
+    let path = format!("{programs}:{}", std::env::var("PATH").unwrap_or_default());
+    let mut test = Command::new("ctest");
+    test.args(["--test-dir", &build, "--output-on-failure"]).env("PATH", path);
+    place.mark(&mut test);
+    let said = succeed(test);
+    assert!(said.contains("100% tests passed"), "{said}");
 }
 
 #[test]

@@ -136,6 +136,25 @@ fn a_controller_in_python_takes_over_from_pid_with_its_state_and_pid_from_it() {
 }
 
 #[test]
+fn a_new_project_in_python_passes_its_own_test() {
+    let Some(python) = python() else { return };
+    let place = Place::new();
+    let folder = place.path("my-quad");
+    place.call(&["new", &folder, "--language", "python", "--sources", &repository("")]).with_code(0);
+    // In the place of an environment with the package: the interpreter of the tests, which finds it.
+    let bin = format!("{folder}/controller/venv/bin");
+    fs::create_dir_all(&bin).unwrap();
+    let interpreter = format!("{bin}/python");
+    fs::write(&interpreter, format!("#!/bin/sh\nexec '{}' \"$@\"\n", python.interpreter.display())).unwrap();
+    fs::set_permissions(&interpreter, std::os::unix::fs::PermissionsExt::from_mode(0o755)).unwrap();
+    let mut test = Command::new(&interpreter);
+    test.arg(format!("{folder}/controller/test_hover.py")).envs(python.variables());
+    let ended = place.mark(&mut test).output().unwrap();
+    let said = String::from_utf8_lossy(&ended.stderr);
+    assert!(ended.status.success() && said.contains("Ran 1 test"), "{said}");
+}
+
+#[test]
 fn a_message_and_a_state_of_the_program_s_own() {
     let Some(python) = python() else { return };
     let place = Place::new();

@@ -35,6 +35,19 @@ const seen = await withPage(address, async (page, wrong) => {
   found.running = await look();
   await shoot("running");
 
+  // The schedule, which asks the server while it is open.
+  await page.click("#schedule > summary");
+  await page.waitForFunction(() => document.querySelectorAll("#schedule-rows tr").length > 3 && document.getElementById("schedule-facts").textContent.includes("takes"));
+  await page.waitForFunction(() => [...document.querySelectorAll("#schedule-rows tr")].some((row) => row.cells[7].textContent !== "–"));
+  found.schedule = await page.evaluate(() => ({
+    rows: [...document.querySelectorAll("#schedule-rows tr")].map((row) => [...row.cells].map((cell) => cell.textContent)),
+    left: Object.fromEntries([...document.querySelectorAll("#schedule-rows tr")].map((row) => [row.cells[0].textContent, row.querySelector(".bar").getBoundingClientRect().left])),
+    facts: document.getElementById("schedule-facts").textContent,
+    overflow: document.documentElement.scrollWidth - document.documentElement.clientWidth,
+  }));
+  await shoot("schedule");
+  await page.click("#schedule > summary");
+
   // With the mouse.
   await page.click("#run-pause");
   await awaitAnswer("paused at tick");

@@ -92,6 +92,7 @@ fn require_controls(seen: &Value) {
         assert_eq!((&seen[key]["isWrong"], tick(&seen[key])), (&json!(true), tick(stepped)), "{key}");
         assert!(seen[key]["answer"].as_str().unwrap().contains(part), "{}", seen[key]);
     }
+    require_schedule(&seen["schedule"]);
     assert_eq!(seen["playbackPace"], 2, "the page shows a faster run faster");
     assert!(seen["noToml"].as_str().unwrap().contains("TOML"), "{}", seen["noToml"]);
     assert!(seen["noKind"].as_str().unwrap().contains("kind"), "{}", seen["noKind"]);
@@ -107,6 +108,28 @@ fn require_controls(seen: &Value) {
     for look in ["running", "paused", "refused", "ended"] {
         assert_eq!(seen[look]["overflow"], 0, "{look}");
     }
+}
+
+/// The processes of the hover stand in the order in which they compute, and each bar begins where those end that it waits for.
+fn require_schedule(seen: &Value) {
+    let rows: Vec<Vec<&str>> = seen["rows"].as_array().unwrap().iter().map(|row| texts(row)).collect();
+    let row = |name: &str| rows.iter().position(|row| row[0] == name).unwrap();
+    let chain = ["plant", "imu", "ekf", "controller", "recorder"];
+    assert!(chain.is_sorted_by_key(|name| row(name)), "{rows:?}");
+    let orders = chain.map(|name| rows[row(name)][1].parse::<u32>().unwrap());
+    assert!(orders.windows(2).all(|pair| pair[0] < pair[1]), "{orders:?}");
+    let left = |name: &str| seen["left"][name].as_f64().unwrap();
+    assert!(left("plant") < left("ekf") && left("ekf") < left("controller"), "{}", seen["left"]);
+    let controller = &rows[row("controller")];
+    assert_eq!((controller[2], controller[4], controller[5]), ("own process", "1", "–"), "{controller:?}");
+    let [median, most] = [7, 8].map(|cell| controller[cell].parse::<f64>().unwrap());
+    assert!(0.0 < median && median <= most, "{controller:?}");
+    assert!(seen["facts"].as_str().unwrap().contains("1000.0 µs of host time"), "{}", seen["facts"]);
+    assert_eq!(seen["overflow"], 0);
+}
+
+fn texts(row: &Value) -> Vec<&str> {
+    row.as_array().unwrap().iter().map(|cell| cell.as_str().unwrap()).collect()
 }
 
 #[test]

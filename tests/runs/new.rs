@@ -3,7 +3,7 @@
 use crate::support::{HUMMINGBUS, Place, repository};
 use recorder::reader::Recording;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use vehicles::Vehicle;
 
@@ -99,8 +99,14 @@ fn a_file_that_exists_stays_and_what_is_wrong_leaves_no_file() {
 
 /// A new project in `place`, as its folder.
 fn project(place: &Place) -> String {
+    project_in(place, "rust")
+}
+
+/// A new project in `place` with a controller in `language`, as its folder.
+fn project_in(place: &Place, language: &str) -> String {
     let folder = place.path("my-quad");
-    let made = place.call(&["new", &folder, "--sources", &repository("")]).with_code(0);
+    let args = ["new", &folder, "--language", language, "--sources", &repository("")];
+    let made = place.call(&args).with_code(0);
     assert!(made.output.contains("hover.toml") && made.output.contains("README.md"), "{}", made.output);
     folder
 }
@@ -161,15 +167,32 @@ fn the_package_of_a_new_project_stands_on_the_stated_sources() {
 }
 
 #[test]
-fn files_that_a_new_project_names_exist() {
+fn files_that_a_new_project_names_exist_and_no_placeholder_is_left() {
+    for (language, title) in [("rust", "Rust"), ("cpp", "C++"), ("python", "Python")] {
+        let place = Place::new();
+        let folder = project_in(&place, language);
+        let readme = fs::read_to_string(format!("{folder}/README.md")).unwrap();
+        assert!(readme.starts_with("# my-quad\n"), "{readme}");
+        assert!(readme.contains(&format!("a controller in {title}, ")), "{readme}");
+        let rows: Vec<_> =
+            readme.lines().filter_map(|line| line.strip_prefix("| `")?.split('`').next()).collect();
+        assert!(rows.len() > 5, "{rows:?}");
+        rows.iter().for_each(|row| assert!(Path::new(&format!("{folder}/{row}")).exists(), "{row}"));
+        for path in files(Path::new(&folder)) {
+            let text = fs::read_to_string(&path).unwrap();
+            let has_name = |word: &str| word.len() > 2 && word.chars().all(|c| c.is_ascii_lowercase());
+            let left: Vec<_> = text.split('@').skip(1).filter(|word| has_name(word)).collect();
+            assert!(left.is_empty() && !text.contains("drone"), "{}: {left:?}", path.display());
+        }
+    }
     let place = Place::new();
-    let folder = project(&place);
-    let readme = fs::read_to_string(format!("{folder}/README.md")).unwrap();
-    assert!(readme.starts_with("# my-quad\n"), "{readme}");
-    let rows: Vec<_> =
-        readme.lines().filter_map(|line| line.strip_prefix("| `")?.split('`').next()).collect();
-    assert!(rows.len() > 5, "{rows:?}");
-    rows.iter().for_each(|row| assert!(Path::new(&format!("{folder}/{row}")).exists(), "{row}"));
+    place.call(&["new", &place.path("quad"), "--language", "ada"]).with_code(2).says(&["ada", "python"]);
+}
+
+/// All files below `folder`.
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    entries.flat_map(|path| if path.is_dir() { files(&path) } else { vec![path] }).collect()
 }
 
 #[test]

@@ -44,6 +44,11 @@ export async function described() {
   return (await answered("api/run")).json();
 }
 
+/** The tick of the live run as planned, and as it goes; null without one. */
+export async function schedule() {
+  return (await answered("api/schedule")).json();
+}
+
 /** The live run's answer to a request of `hummingbus ctl`. */
 export async function ask(request) {
   const headers = { "content-type": "application/json" };

@@ -2,6 +2,7 @@
 
 import { ask, described, GONE } from "./api.js";
 import { Hand } from "./hand.js";
+import { Schedule } from "./schedule.js";
 
 /** Paces that are offered beside the present one: the words of `hummingbus ctl pace`. */
 const PACES = ["0.1", "0.25", "0.5", "realtime", "2", "5", "10", "free"];
@@ -32,6 +33,7 @@ export class RunControls {
     this.status = null;
     this.facts = null;
     this.hand = new Hand();
+    this.schedule = new Schedule(() => this.isOver);
     this.asking = 0;
     this.#listen();
     this.#listenToDialogs();

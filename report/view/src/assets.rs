@@ -36,6 +36,7 @@ assets! {
     "controls.js": SCRIPT,
     "run.js": SCRIPT,
     "hand.js": SCRIPT,
+    "schedule.js": SCRIPT,
     "palette.js": SCRIPT,
     "view.css": STYLE,
     "vendor/three.min.js": SCRIPT,

@@ -13,6 +13,7 @@
 //! | `readers` | threads that read recordings, a few at the same time |
 //! | `assets` | the files of the page, part of this program |
 //! | [`live`] | the live run behind a page: its state, and the requests of the page |
+//! | `schedule` | the tick of that run as planned, and as it goes |
 //! | `pages` | the pages that are open, and their events |
 //! | `gate` | requests that are let in |
 //! | [`server`] | the server: addresses and their answers |
@@ -34,6 +35,7 @@ mod marks;
 pub mod overview;
 mod pages;
 mod readers;
+mod schedule;
 pub mod server;
 pub mod shown;
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! The live run behind a page: its state, and the requests of the page.
 
 use anyhow::{Context as _, Result, ensure};
+use crate::schedule::Schedule;
 use bus::asked::{Asked, AskedFile};
 use bus::lockstep::LiveView;
 use bus::plan::Plan;
@@ -9,7 +10,7 @@ use runtime::ctl::protocol::{Answer, Request, State, Status};
 use runtime::run_dir::LiveRun;
 use serde::Deserialize;
 use serde_json::{Value, json};
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 /// Set points that a page requests.
 #[derive(Debug, Deserialize)]
@@ -26,8 +27,9 @@ pub struct Asking {
 /// A live run that a page shows and steers.
 #[derive(Debug)]
 pub struct Live {
-    run: LiveRun,
+    run: Arc<LiveRun>,
     plan: Plan,
+    schedule: Schedule,
     /// Opened at the first look that finds it.
     control: OnceLock<LiveView>,
 }
@@ -35,7 +37,7 @@ pub struct Live {
 impl Live {
     /// The run that flies `plan`.
     pub fn of(run: LiveRun, plan: Plan) -> Self {
-        Self { run, plan, control: OnceLock::new() }
+        Self { run: Arc::new(run), plan, schedule: Schedule::default(), control: OnceLock::new() }
     }
 
     /// State, tick and pace now. `None` until the run has a control segment; one on a single thread has none.
@@ -45,6 +47,11 @@ impl Live {
             status.state = State::Ended;
         }
         Some(status)
+    }
+
+    /// The tick as planned and as it goes. It may wait for a run that is starting.
+    pub fn schedule(&self) -> Value {
+        self.schedule.look(&self.run, &self.plan)
     }
 
     fn control(&self) -> Option<&LiveView> {

@@ -10,6 +10,7 @@
 //! | `POST /token=…/api/curves` | numbers: [`crate::curves`]; the header `x-read` holds the part that was read for them |
 //! | `GET  /token=…/api/events` | events: state of the live run, how often it has started, number of recordings; open for as long as the page of a live run is |
 //! | `GET  /token=…/api/run` | JSON: manifest and processes of the live run; null without one |
+//! | `GET  /token=…/api/schedule` | JSON: the tick of the live run as planned, and as it goes; null without one |
 //! | `POST /token=…/api/fly` | nothing: takes set points of a person for a node of kind `operator` |
 //! | `POST /token=…/api/ctl` | JSON: the run's answer to a request of [`runtime::ctl::protocol`] |
 //!
@@ -284,6 +285,7 @@ fn routes(content: Arc<Content>) -> Router {
         .route("/{token}/api/curves", post(answer_curves))
         .route("/{token}/api/events", get(hear))
         .route("/{token}/api/run", get(described))
+        .route("/{token}/api/schedule", get(scheduled))
         .route("/{token}/api/fly", post(fly))
         .route("/{token}/api/ctl", post(steer))
         .layer(DefaultBodyLimit::max(BODY_BYTES_MAX))
@@ -331,6 +333,18 @@ async fn hear(State(content): State<Arc<Content>>) -> Response {
 
 async fn described(State(content): State<Arc<Content>>) -> Json<Value> {
     Json(content.live().map_or(Value::Null, |live| live.described()))
+}
+
+/// The kernel is asked for each process: a thread of its own.
+async fn scheduled(State(content): State<Arc<Content>>) -> Response {
+    let asking = content.clone();
+    let work = move || asking.live().map_or(Value::Null, |live| live.schedule());
+    match content.askers.run(work).await {
+        Ok(found) => Json(found).into_response(),
+        Err(_) => {
+            (StatusCode::INTERNAL_SERVER_ERROR, "looking ended by an error of the program\n").into_response()
+        }
+    }
 }
 
 /// A write of a few bytes to a file in memory or its cache: no thread of its own.

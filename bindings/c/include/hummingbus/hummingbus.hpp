@@ -206,6 +206,10 @@ class Node {
     detail::require(hb_node_numbers(node_, key, values.data(), N));
     return values;
   }
+  template <std::size_t N>
+  std::array<double, N> numbers(const char* key, const std::array<double, N>& otherwise) {
+    return has_parameter(key) ? numbers<N>(key) : otherwise;
+  }
   std::string text(const char* key) { return texts(hb_node_text, key); }
   // Contents of the file that the parameter names, as it was when the run began.
   std::string file(const char* key) { return texts(hb_node_file, key); }
