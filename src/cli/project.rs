@@ -1,8 +1,8 @@
 //! A project folder for a vehicle of one's own: templates, and the folder that is made from them.
 
+use super::shell::quoted;
 use anyhow::{Context, Result, bail};
 use clap::ValueEnum;
-use super::shell::quoted;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -12,9 +12,9 @@ const TEMPLATE_NAME: &str = "drone";
 const FOLDERS: (&str, &str) = ("/src/cli/project/", "/../");
 /// Lines of CMake for the library of an installed hummingbus, or else of its sources.
 const BUILT_LIBRARY: &str = "\
+# The library of hummingbus: the installed one, or else one that Cargo builds from its sources.
 find_package(hummingbus QUIET)
 if(NOT hummingbus_FOUND)
-  # Cargo builds it from the sources of hummingbus.
   add_subdirectory([==[@path@]==] hummingbus)
 endif()
 ";
@@ -45,7 +45,7 @@ pub enum Language {
     Python,
 }
 
-/// What a project's controller adds to the files of every project.
+/// Additions of a project's controller to the files of every project.
 struct Templates {
     /// Name of the language for people.
     title: &'static str,
@@ -87,7 +87,7 @@ const CPP: Templates = Templates {
 const PYTHON: Templates = Templates {
     title: "Python",
     manifest: "hover-python.toml",
-    program: r#"command = ["controller/venv/bin/python", "controller.py"], working_directory = "controller""#,
+    program: "command = [\"controller/venv/bin/python\", \"controller.py\"]\nworking_directory = \"controller\"",
     section: include_str!("project/python/section.md"),
     files: &[
         ("controller/controller.py", include_str!("project/python/controller.py")),
@@ -177,14 +177,19 @@ fn required(sources: &Path) -> Result<PathBuf> {
 
 /// A template with the project's name, its language, and what its controller builds against.
 fn filled(template: &str, name: &str, language: &Templates, sources: Option<&Path>) -> String {
-    let path = |folder: &str| sources.map(|sources| sources.join(folder).to_string_lossy().trim_end_matches('/').to_owned());
+    let path = |folder: &str| {
+        sources.map(|sources| sources.join(folder).to_string_lossy().trim_end_matches('/').to_owned())
+    };
     let dependency = |folder: &str| match path(folder) {
         Some(path) => format!("path = {}", toml::Value::from(path)),
         None => format!("version = {:?}", env!("CARGO_PKG_VERSION")),
     };
     let library = match path("bindings/c") {
         Some(path) => BUILT_LIBRARY.replace("@path@", &path),
-        None => format!("find_package(hummingbus {} REQUIRED)\n", env!("CARGO_PKG_VERSION")),
+        None => format!(
+            "# The installed library of hummingbus.\nfind_package(hummingbus {} REQUIRED)\n",
+            env!("CARGO_PKG_VERSION")
+        ),
     };
     let package = path("python").map_or_else(|| "hummingbus".to_owned(), |path| quoted(Path::new(&path)));
     // The paths last: one may have the project's name in it.
