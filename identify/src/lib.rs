@@ -24,7 +24,7 @@
 //! | `foresight`, `loss` | predictions as a judge of effects and of the verdict |
 //! | `refine` | parameters moved to where predictions are best |
 //! | `regressor` | what residuals are looked at against |
-//! | [`report`], [`vehicle_file`] | what is written down |
+//! | [`report`], [`brief`], [`vehicle_file`] | what is written down |
 //! | [`rotor`] | the rotor from a thrust stand |
 //!
 //! ```no_run
@@ -39,6 +39,7 @@
 //! ```
 
 mod align;
+pub mod brief;
 mod candidate;
 mod clock;
 mod faults;

@@ -153,7 +153,7 @@ const WORSE: f64 = 1.2;
 
 impl Report {
     /// True if the verdict is empty and the validation data are too short to accept an effect.
-    fn is_undecided(&self) -> bool {
+    pub(crate) fn is_undecided(&self) -> bool {
         self.verdict.is_empty() && self.validation_blocks < ENOUGH_BLOCKS
     }
 
@@ -361,7 +361,7 @@ impl Report {
 }
 
 /// Four digits.
-fn rounded(value: f64) -> String {
+pub(crate) fn rounded(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }
@@ -376,14 +376,10 @@ fn rounded(value: f64) -> String {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_new_vehicle_that_predicts_worse_is_told() {
-        let change = |before, after| Change { before, after, persistence: 1.0, own_trim: after, unit: "m" };
-        let channels = BTreeMap::from([("position", change(0.1, 0.25)), ("velocity", change(0.1, 0.11))]);
-        let mut report = Report {
+impl Report {
+    /// A report of flights that were long enough and show nothing.
+    pub(crate) fn of_nothing() -> Self {
+        Self {
             vehicle: String::new(),
             flights: Vec::new(),
             verdict: Vec::new(),
@@ -396,13 +392,28 @@ mod tests {
             faults: Vec::new(),
             trims: Vec::new(),
             selected: Changes::new(),
-            held_out: Changes::from([("leg 2".to_owned(), BTreeMap::from([("0.5".to_owned(), channels)]))]),
+            held_out: Changes::new(),
             fitted: Changes::new(),
             noise_floor: BTreeMap::new(),
             unexplained: BTreeMap::new(),
             not_identifiable: Vec::new(),
             block_s: 1.0,
             validation_blocks: 20,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_new_vehicle_that_predicts_worse_is_told() {
+        let change = |before, after| Change { before, after, persistence: 1.0, own_trim: after, unit: "m" };
+        let channels = BTreeMap::from([("position", change(0.1, 0.25)), ("velocity", change(0.1, 0.11))]);
+        let mut report = Report {
+            held_out: Changes::from([("leg 2".to_owned(), BTreeMap::from([("0.5".to_owned(), channels)]))]),
+            ..Report::of_nothing()
         };
         let line = "warning: the new vehicle predicts worse than the declared one: position after 0.5 s of leg 2, 0.1000 -> \
                     0.2500 m\n";

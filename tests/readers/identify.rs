@@ -15,6 +15,7 @@ fn a_browser_draws_residuals_and_errors_without_a_network() {
     assert_eq!(seen["wrong"], json!([]));
     let (first, last) = (&seen["first"], &seen["last"]);
     assert!(first["verdict"].as_str().unwrap().contains("mass-error"), "{}", first["verdict"]);
+    require_brief(first);
     require_tables(&first["tables"]);
 
     // Four channels at three horizons, each with a bar before and one after for the one flight.
@@ -48,6 +49,19 @@ fn a_browser_draws_residuals_and_errors_without_a_network() {
 
 fn marks(plot: &Value) -> u64 {
     plot["marks"].as_u64().unwrap()
+}
+
+/// The page begins with what a pilot reads.
+fn require_brief(seen: &Value) {
+    assert!(seen["answer"].as_str().unwrap().starts_with("The declared vehicle file lacks "), "{}", seen["answer"]);
+    let sentences = |part: &str| -> Vec<&str> {
+        seen["brief"][part].as_array().unwrap().iter().map(|sentence| sentence.as_str().unwrap()).collect()
+    };
+    assert!(sentences("missing").iter().any(|line| line.starts_with("mass-error: ") && line.contains("error ")), "{seen}");
+    assert!(sentences("certainty").iter().any(|line| line.starts_with("mass-error: ") && line.contains("resamplings")), "{seen}");
+    let changes = sentences("changes");
+    assert!(changes.len() == 3 && changes[0].starts_with("attitude: ") && changes[0].contains(" deg with the new file, "), "{changes:?}");
+    assert!(sentences("next").iter().any(|line| line.contains("hummingbus validate")), "{seen}");
 }
 
 fn require_tables(tables: &Value) {

@@ -22,6 +22,8 @@ function look([plots, choices]) {
   return {
     title: document.querySelector("h1").textContent,
     verdict: document.getElementById("verdict").textContent,
+    answer: document.getElementById("answer").textContent,
+    brief: Object.fromEntries(["missing", "certainty", "changes", "next"].map((id) => [id, [...document.querySelectorAll(`#${id} > li`)].map((item) => item.textContent)])),
     errors: [...document.querySelectorAll("#errors .js-plotly-plot")].map(seen),
     plots: Object.fromEntries(plots.map((id) => [id, seen(document.getElementById(id))])),
     tables: Object.fromEntries([...document.querySelectorAll("table")].map((table) => [table.id, table.rows.length])),

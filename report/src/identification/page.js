@@ -44,6 +44,16 @@ function verdictText() {
   return "The flights ask for nothing: no effect makes the equations fit better beyond chance.";
 }
 
+// What a pilot reads: sentences of the program.
+function drawBrief() {
+  const { answer, ...parts } = data.brief;
+  element("answer").textContent = answer;
+  for (const [id, sentences] of Object.entries(parts)) {
+    element(`${id}-part`).hidden = !sentences.length;
+    for (const sentence of sentences) addItem(id, sentence.replaceAll("`", ""));
+  }
+}
+
 function drawSummary() {
   title(`${report.vehicle.split(/[\\/]/).pop().replace(/\.toml$/, "")}: what flights show beyond the declared model`);
   element("verdict").textContent = verdictText();
@@ -300,4 +310,4 @@ function drawResiduals() {
   zoomTogether(["residual", "sides"].map(element));
 }
 
-for (const part of [drawSummary, drawFlights, drawClocks, drawFaults, drawEffects, drawErrors, drawNoise, drawWhiteness, drawResiduals]) part();
+for (const part of [drawBrief, drawSummary, drawFlights, drawClocks, drawFaults, drawEffects, drawErrors, drawNoise, drawWhiteness, drawResiduals]) part();

@@ -3,6 +3,7 @@
 //! It is drawn by `page.js` with plotly.js ([`crate::page`]).
 
 use crate::page::PLOTLY_BASIC;
+use identify::brief::Brief;
 use identify::run::{Outcome, Picture};
 use identify::statistics::{autocorrelation, cross_correlation, white_noise_bound};
 use identify::{Equation, Regressor};
@@ -31,7 +32,7 @@ fn data(outcome: &Outcome, flown: Option<&Value>) -> Value {
     let share = |(most, all): (usize, usize)| (all / components.max(1)).clamp(POINTS_MIN, most);
     let points = [share(CURVE_POINTS), share(CLOUD_POINTS)];
     let flights = outcome.report.flights.iter().filter_map(|found| flight(outcome, &found.name, points));
-    json!({ "report": outcome.report, "bus": flown, "flights": flights.collect::<Vec<_>>() })
+    json!({ "brief": Brief::of(&outcome.report), "report": outcome.report, "bus": flown, "flights": flights.collect::<Vec<_>>() })
 }
 
 /// A flight's residuals, and the quantities that they are plotted against, as curves and clouds of up to so many

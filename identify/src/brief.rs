@@ -1,0 +1,220 @@
+//! The first page of a report, for people who fly: the answer, what is missing, how sure that is, what it changes, and what
+//! to do next.
+
+use crate::horizons::Change;
+use crate::loss::advice;
+use crate::report::{EffectReport, Estimate, Report, rounded};
+use crate::sensor_effects::SENSOR_EFFECTS;
+use serde::Serialize;
+use std::collections::BTreeSet;
+
+/// Horizon of the prediction errors that are told.
+const HORIZON: &str = "0.5";
+/// Channels that are told, in this order.
+const CHANNELS: [&str; 3] = ["attitude", "velocity", "position"];
+
+/// The first page of a report: sentences.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Brief {
+    /// The answer in one sentence.
+    pub answer: String,
+    /// Effects that the declared vehicle lacks.
+    pub missing: Vec<String>,
+    /// Certainty of each of them.
+    pub certainty: Vec<String>,
+    /// Prediction errors half a second ahead, on flights that decided nothing.
+    pub changes: Vec<String>,
+    /// Next steps, the weightiest first.
+    pub next: Vec<String>,
+}
+
+impl Brief {
+    /// The first page of `report`.
+    #[must_use]
+    pub fn of(report: &Report) -> Self {
+        let accepted: Vec<_> =
+            report.verdict.iter().filter_map(|name| Some((*name, report.effects.get(name)?))).collect();
+        Self {
+            answer: answer(report),
+            missing: accepted.iter().map(|(name, effect)| missing(name, effect)).collect(),
+            certainty: accepted.iter().map(|(name, effect)| certainty(name, effect)).collect(),
+            changes: CHANNELS.iter().filter_map(|channel| change(report, channel)).collect(),
+            next: next(report, &accepted),
+        }
+    }
+}
+
+fn answer(report: &Report) -> String {
+    let count = report.verdict.len();
+    let effects = if count == 1 { "one effect".to_owned() } else { format!("{count} effects") };
+    if report.is_undecided() {
+        "These flights are too short to tell.".to_owned()
+    } else if !report.losses.is_empty() {
+        "Do not use the new vehicle file: its predictions of these flights lose to simpler ones.".to_owned()
+    } else if count == 0 {
+        "The declared vehicle file says all that these flights can show.".to_owned()
+    } else if !report.worse().is_empty() {
+        format!("The declared vehicle file lacks {effects}, but the new one does not predict everything better.")
+    } else {
+        format!("The declared vehicle file lacks {effects}. The new one predicts these flights better.")
+    }
+}
+
+fn missing(name: &str, effect: &EffectReport) -> String {
+    let sensor_effect = || SENSOR_EFFECTS.into_iter().find(|kind| kind.name == name);
+    let summary = plant::effects::find(name).or_else(sensor_effect).map_or("", |kind| kind.summary);
+    let values: Vec<_> = effect.parameters.iter().map(|(name, estimate)| value(name, estimate)).collect();
+    format!("{name}: {summary}; {}.", values.join(", "))
+}
+
+fn value(name: &str, estimate: &Estimate) -> String {
+    let unit = if estimate.unit == "1" { String::new() } else { format!(" {}", estimate.unit) };
+    let [value, low, high] = [estimate.value, estimate.low, estimate.high].map(rounded);
+    format!("{} {value}{unit} ({low} to {high})", name.replace('_', " "))
+}
+
+fn certainty(name: &str, effect: &EffectReport) -> String {
+    // 20,000 resampled flights without a loss leave less.
+    let share = if effect.chance < 1e-4 { "all".to_owned() } else { format!("{:.1} %", 100.0 * (1.0 - effect.chance)) };
+    let rivals = match effect.confused_with.as_slice() {
+        [] => String::new(),
+        rivals => format!("; these flights cannot tell it from {}", rivals.join(", ")),
+    };
+    let is_loose = effect.parameters.values().any(|estimate| !estimate.determined);
+    let loose = if is_loose { "; a value of it is not determined" } else { "" };
+    format!("{name}: the model is better with it in {share} of 20,000 resamplings of these flights{rivals}{loose}.")
+}
+
+/// The errors of a channel over all test flights; `None` where it was not measured.
+fn change(report: &Report, channel: &str) -> Option<String> {
+    let found: Vec<&Change> =
+        report.held_out.values().filter_map(|horizons| horizons.get(HORIZON)?.get(channel)).collect();
+    let unit = found.first()?.unit;
+    let range = |of: fn(&Change) -> f64| {
+        let values = found.iter().map(|change| of(change));
+        let (low, high) = values.fold((f64::INFINITY, 0.0_f64), |(low, high), value| (low.min(value), high.max(value)));
+        let (low, high) = (rounded(low), rounded(high));
+        if low == high { format!("{low} {unit}") } else { format!("{low} to {high} {unit}") }
+    };
+    Some(format!(
+        "{channel}: {} with the new file, {} with the declared one; {} without any model.",
+        range(|change| change.after),
+        range(|change| change.before),
+        range(|change| change.persistence)
+    ))
+}
+
+fn next(report: &Report, accepted: &[(&str, &EffectReport)]) -> Vec<String> {
+    let mut steps = Vec::new();
+    if report.is_undecided() {
+        steps.push(format!(
+            "Fly longer: the flights to choose effects on have {} blocks of {} s, and a dozen are needed.",
+            report.validation_blocks, report.block_s
+        ));
+    }
+    for fault in &report.faults {
+        steps.push(format!("Look at {} of {}: {}.", fault.channel, fault.flight, fault.advice));
+    }
+    // By channel: several losses of one have one remedy.
+    let lost: BTreeSet<&str> = report.losses.iter().map(|loss| loss.channel).collect();
+    steps.extend(lost.iter().map(|channel| format!("Measure, for {}.", advice(channel))));
+    if !report.trims.is_empty() {
+        steps.push("Weigh and balance the vehicle before each flight: these flights differ in trim.".to_owned());
+    }
+    for (name, effect) in accepted {
+        if let (Some(experiment), Some(rival)) = (&effect.experiment, effect.confused_with.first()) {
+            steps.push(format!("To tell {name} from {rival}: {experiment}."));
+        }
+    }
+    if report.losses.is_empty() && !accepted.is_empty() {
+        steps.push("Fly once more, and let `hummingbus validate` judge the new file on that flight.".to_owned());
+    }
+    for unseen in &report.not_identifiable {
+        steps.push(format!("To see {}: it needs {}.", unseen.effect, unseen.needs));
+    }
+    steps
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Brief;
+    use crate::horizons::{Change, Changes};
+    use crate::loss::Loss;
+    use crate::report::{BeforeAfter, EffectReport, Estimate, Report};
+    use std::collections::BTreeMap;
+
+    fn effect() -> EffectReport {
+        let coefficient =
+            Estimate { value: 1.4137e-6, unit: "N*s^2/(m*rad)", low: 1.362e-6, high: 1.465e-6, at_bound: false, determined: true };
+        EffectReport {
+            accepted: true,
+            linearised: false,
+            parameters: BTreeMap::from([("coefficient", coefficient)]),
+            held_out: BeforeAfter { before: 1.35, after: 1.06 },
+            chance: 5e-5,
+            confused_with: vec!["blade-flapping"],
+            experiment: Some("fly with a load".to_owned()),
+        }
+    }
+
+    fn report() -> Report {
+        let change = |before, after| Change { before, after, persistence: 9.0, own_trim: after, unit: "deg" };
+        let flight = |before, after| BTreeMap::from([("0.5".to_owned(), BTreeMap::from([("attitude", change(before, after))]))]);
+        Report {
+            verdict: vec!["rotor-drag"],
+            effects: BTreeMap::from([("rotor-drag", effect())]),
+            held_out: Changes::from([("one".to_owned(), flight(20.0, 2.0)), ("two".to_owned(), flight(30.0, 5.0))]),
+            ..Report::of_nothing()
+        }
+    }
+
+    #[test]
+    fn a_missing_effect_is_told_with_its_size_certainty_worth_and_rival() {
+        let Brief { answer, missing, certainty, changes, next } = Brief::of(&report());
+        assert_eq!(answer, "The declared vehicle file lacks one effect. The new one predicts these flights better.");
+        assert_eq!(
+            missing,
+            ["rotor-drag: the air that crosses a spinning rotor drags at its hub, linear in both speeds; coefficient 1.414e-6 \
+              N*s^2/(m*rad) (1.362e-6 to 1.465e-6)."]
+        );
+        assert_eq!(
+            certainty,
+            ["rotor-drag: the model is better with it in all of 20,000 resamplings of these flights; these flights cannot tell it \
+              from blade-flapping."]
+        );
+        assert_eq!(
+            changes,
+            ["attitude: 2.000 to 5.000 deg with the new file, 20.00 to 30.00 deg with the declared one; 9.000 deg without any model."]
+        );
+        assert_eq!(next[0], "To tell rotor-drag from blade-flapping: fly with a load.");
+        assert!(next[1].contains("hummingbus validate"), "{next:?}");
+    }
+
+    #[test]
+    fn a_model_that_loses_is_not_to_be_used_and_what_to_measure_is_said_once() {
+        let loss = |flight: &str| Loss {
+            flight: flight.to_owned(),
+            horizon: "0.5",
+            channel: "attitude",
+            rival: "persistence",
+            new: 40.0,
+            other: 9.0,
+            unit: "deg",
+        };
+        let brief = Brief::of(&Report { losses: vec![loss("one"), loss("two")], ..report() });
+        assert!(brief.answer.starts_with("Do not use the new vehicle file"), "{}", brief.answer);
+        let measure: Vec<_> = brief.next.iter().filter(|step| step.starts_with("Measure, for torques")).collect();
+        assert_eq!(measure.len(), 1, "{:?}", brief.next);
+        assert!(!brief.next.iter().any(|step| step.contains("validate")), "{:?}", brief.next);
+    }
+
+    #[test]
+    fn flights_that_show_nothing_or_too_little_are_told_apart() {
+        let nothing = Brief::of(&Report::of_nothing());
+        assert_eq!(nothing.answer, "The declared vehicle file says all that these flights can show.");
+        assert!(nothing.missing.is_empty() && nothing.changes.is_empty(), "{nothing:?}");
+        let short = Brief::of(&Report { validation_blocks: 3, ..Report::of_nothing() });
+        assert_eq!(short.answer, "These flights are too short to tell.");
+        assert!(short.next[0].starts_with("Fly longer: "), "{:?}", short.next);
+    }
+}
