@@ -50,11 +50,15 @@ fn answer(report: &Report) -> String {
     if report.is_undecided() {
         "These flights are too short to tell.".to_owned()
     } else if !report.losses.is_empty() {
-        "Do not use the new vehicle file: its predictions of these flights lose to simpler ones.".to_owned()
+        "Do not use the new vehicle file: its predictions of these flights lose to simpler ones. The equations ask for the effects below, \
+         which are no findings."
+            .to_owned()
     } else if count == 0 {
         "The declared vehicle file says all that these flights can show.".to_owned()
     } else if !report.worse().is_empty() {
-        format!("The declared vehicle file lacks {effects}, but the new one does not predict everything better.")
+        format!(
+            "The declared vehicle file lacks {effects}, but the new one does not predict everything better."
+        )
     } else {
         format!("The declared vehicle file lacks {effects}. The new one predicts these flights better.")
     }
@@ -75,14 +79,20 @@ fn value(name: &str, estimate: &Estimate) -> String {
 
 fn certainty(name: &str, effect: &EffectReport) -> String {
     // 20,000 resampled flights without a loss leave less.
-    let share = if effect.chance < 1e-4 { "all".to_owned() } else { format!("{:.1} %", 100.0 * (1.0 - effect.chance)) };
+    let share = if effect.chance < 1e-4 {
+        "all".to_owned()
+    } else {
+        format!("{:.1} %", 100.0 * (1.0 - effect.chance))
+    };
     let rivals = match effect.confused_with.as_slice() {
         [] => String::new(),
         rivals => format!("; these flights cannot tell it from {}", rivals.join(", ")),
     };
     let is_loose = effect.parameters.values().any(|estimate| !estimate.determined);
     let loose = if is_loose { "; a value of it is not determined" } else { "" };
-    format!("{name}: the model is better with it in {share} of 20,000 resamplings of these flights{rivals}{loose}.")
+    format!(
+        "{name}: the model is better with it in {share} of 20,000 resamplings of these flights{rivals}{loose}."
+    )
 }
 
 /// The errors of a channel over all test flights; `None` where it was not measured.
@@ -92,7 +102,8 @@ fn change(report: &Report, channel: &str) -> Option<String> {
     let unit = found.first()?.unit;
     let range = |of: fn(&Change) -> f64| {
         let values = found.iter().map(|change| of(change));
-        let (low, high) = values.fold((f64::INFINITY, 0.0_f64), |(low, high), value| (low.min(value), high.max(value)));
+        let (low, high) =
+            values.fold((f64::INFINITY, 0.0_f64), |(low, high), value| (low.min(value), high.max(value)));
         let (low, high) = (rounded(low), rounded(high));
         if low == high { format!("{low} {unit}") } else { format!("{low} to {high} {unit}") }
     };
@@ -119,7 +130,9 @@ fn next(report: &Report, accepted: &[(&str, &EffectReport)]) -> Vec<String> {
     let lost: BTreeSet<&str> = report.losses.iter().map(|loss| loss.channel).collect();
     steps.extend(lost.iter().map(|channel| format!("Measure, for {}.", advice(channel))));
     if !report.trims.is_empty() {
-        steps.push("Weigh and balance the vehicle before each flight: these flights differ in trim.".to_owned());
+        steps.push(
+            "Weigh and balance the vehicle before each flight: these flights differ in trim.".to_owned(),
+        );
     }
     for (name, effect) in accepted {
         if let (Some(experiment), Some(rival)) = (&effect.experiment, effect.confused_with.first()) {
@@ -127,10 +140,9 @@ fn next(report: &Report, accepted: &[(&str, &EffectReport)]) -> Vec<String> {
         }
     }
     if report.losses.is_empty() && !accepted.is_empty() {
-        steps.push("Fly once more, and let `hummingbus validate` judge the new file on that flight.".to_owned());
-    }
-    for unseen in &report.not_identifiable {
-        steps.push(format!("To see {}: it needs {}.", unseen.effect, unseen.needs));
+        steps.push(
+            "Fly once more, and let `hummingbus validate` judge the new file on that flight.".to_owned(),
+        );
     }
     steps
 }
@@ -144,8 +156,14 @@ mod tests {
     use std::collections::BTreeMap;
 
     fn effect() -> EffectReport {
-        let coefficient =
-            Estimate { value: 1.4137e-6, unit: "N*s^2/(m*rad)", low: 1.362e-6, high: 1.465e-6, at_bound: false, determined: true };
+        let coefficient = Estimate {
+            value: 1.4137e-6,
+            unit: "N*s^2/(m*rad)",
+            low: 1.362e-6,
+            high: 1.465e-6,
+            at_bound: false,
+            determined: true,
+        };
         EffectReport {
             accepted: true,
             linearised: false,
@@ -159,11 +177,16 @@ mod tests {
 
     fn report() -> Report {
         let change = |before, after| Change { before, after, persistence: 9.0, own_trim: after, unit: "deg" };
-        let flight = |before, after| BTreeMap::from([("0.5".to_owned(), BTreeMap::from([("attitude", change(before, after))]))]);
+        let flight = |before, after| {
+            BTreeMap::from([("0.5".to_owned(), BTreeMap::from([("attitude", change(before, after))]))])
+        };
         Report {
             verdict: vec!["rotor-drag"],
             effects: BTreeMap::from([("rotor-drag", effect())]),
-            held_out: Changes::from([("one".to_owned(), flight(20.0, 2.0)), ("two".to_owned(), flight(30.0, 5.0))]),
+            held_out: Changes::from([
+                ("one".to_owned(), flight(20.0, 2.0)),
+                ("two".to_owned(), flight(30.0, 5.0)),
+            ]),
             ..Report::of_nothing()
         }
     }
@@ -171,20 +194,29 @@ mod tests {
     #[test]
     fn a_missing_effect_is_told_with_its_size_certainty_worth_and_rival() {
         let Brief { answer, missing, certainty, changes, next } = Brief::of(&report());
-        assert_eq!(answer, "The declared vehicle file lacks one effect. The new one predicts these flights better.");
+        assert_eq!(
+            answer,
+            "The declared vehicle file lacks one effect. The new one predicts these flights better."
+        );
         assert_eq!(
             missing,
-            ["rotor-drag: the air that crosses a spinning rotor drags at its hub, linear in both speeds; coefficient 1.414e-6 \
-              N*s^2/(m*rad) (1.362e-6 to 1.465e-6)."]
+            [
+                "rotor-drag: the air that crosses a spinning rotor drags at its hub, linear in both speeds; coefficient 1.414e-6 \
+              N*s^2/(m*rad) (1.362e-6 to 1.465e-6)."
+            ]
         );
         assert_eq!(
             certainty,
-            ["rotor-drag: the model is better with it in all of 20,000 resamplings of these flights; these flights cannot tell it \
-              from blade-flapping."]
+            [
+                "rotor-drag: the model is better with it in all of 20,000 resamplings of these flights; these flights cannot tell it \
+              from blade-flapping."
+            ]
         );
         assert_eq!(
             changes,
-            ["attitude: 2.000 to 5.000 deg with the new file, 20.00 to 30.00 deg with the declared one; 9.000 deg without any model."]
+            [
+                "attitude: 2.000 to 5.000 deg with the new file, 20.00 to 30.00 deg with the declared one; 9.000 deg without any model."
+            ]
         );
         assert_eq!(next[0], "To tell rotor-drag from blade-flapping: fly with a load.");
         assert!(next[1].contains("hummingbus validate"), "{next:?}");
@@ -203,7 +235,8 @@ mod tests {
         };
         let brief = Brief::of(&Report { losses: vec![loss("one"), loss("two")], ..report() });
         assert!(brief.answer.starts_with("Do not use the new vehicle file"), "{}", brief.answer);
-        let measure: Vec<_> = brief.next.iter().filter(|step| step.starts_with("Measure, for torques")).collect();
+        let measure: Vec<_> =
+            brief.next.iter().filter(|step| step.starts_with("Measure, for torques")).collect();
         assert_eq!(measure.len(), 1, "{:?}", brief.next);
         assert!(!brief.next.iter().any(|step| step.contains("validate")), "{:?}", brief.next);
     }

@@ -53,14 +53,31 @@ fn marks(plot: &Value) -> u64 {
 
 /// The page begins with what a pilot reads.
 fn require_brief(seen: &Value) {
-    assert!(seen["answer"].as_str().unwrap().starts_with("The declared vehicle file lacks "), "{}", seen["answer"]);
+    assert!(
+        seen["answer"].as_str().unwrap().starts_with("The declared vehicle file lacks "),
+        "{}",
+        seen["answer"]
+    );
     let sentences = |part: &str| -> Vec<&str> {
         seen["brief"][part].as_array().unwrap().iter().map(|sentence| sentence.as_str().unwrap()).collect()
     };
-    assert!(sentences("missing").iter().any(|line| line.starts_with("mass-error: ") && line.contains("error ")), "{seen}");
-    assert!(sentences("certainty").iter().any(|line| line.starts_with("mass-error: ") && line.contains("resamplings")), "{seen}");
+    assert!(
+        sentences("missing").iter().any(|line| line.starts_with("mass-error: ") && line.contains("error ")),
+        "{seen}"
+    );
+    assert!(
+        sentences("certainty")
+            .iter()
+            .any(|line| line.starts_with("mass-error: ") && line.contains("resamplings")),
+        "{seen}"
+    );
     let changes = sentences("changes");
-    assert!(changes.len() == 3 && changes[0].starts_with("attitude: ") && changes[0].contains(" deg with the new file, "), "{changes:?}");
+    assert!(
+        changes.len() == 3
+            && changes[0].starts_with("attitude: ")
+            && changes[0].contains(" deg with the new file, "),
+        "{changes:?}"
+    );
     assert!(sentences("next").iter().any(|line| line.contains("hummingbus validate")), "{seen}");
 }
 
