@@ -33,6 +33,10 @@
 #include <time.h>
 #include <unistd.h>
 
+#ifndef SYS_pidfd_open
+#define SYS_pidfd_open 434
+#endif
+
 enum { THREADS_MAX = 512, FILES_MAX = 1024, BYTES_MAX = 65536, FIRST_PORT = 4560, PORTS = 256 };
 
 /* The clock of the host as PX4 sees it begins on 2025-01-01. */
@@ -99,8 +103,10 @@ DECLARE(pthread_cond_broadcast)
 
 static void *next_version(const char *name, void **place)
 {
+#ifdef __GLIBC__
     if (!*place)
         *place = dlvsym(RTLD_NEXT, name, "GLIBC_2.3.2");
+#endif
     return next(name, place);
 }
 
@@ -505,7 +511,9 @@ static void await_step(void)
 }
 
 /* The declaration of `poll` says that it only writes to the files. */
+#ifndef __clang__
 #pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
+#endif
 
 int poll(struct pollfd *files, nfds_t count, int timeout_ms)
 {
