@@ -121,11 +121,11 @@ static void fly(float *outputs)
     double w = attitude[0], x = attitude[1], y = attitude[2], z = attitude[3];
     double roll = atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)), pitch = asin(2 * (w * y - z * x));
     double full = parameter("MPC_MAN_TILT_MAX", 0) * M_PI / 180, turn = parameter("MPC_MAN_Y_MAX", 0) * M_PI / 180;
-    double hover = parameter("MPC_THR_HOVER", 0), stick = (rc[2] - 1000) / 1000.0, bend = (0.5 - hover) / 0.375;
+    double thrust = (rc[2] - 1000) / 1000.0, square = parameter("THR_MDL_FAC", 0), line = 1 - square;
     double to_roll = 0.078 * ((rc[0] - 1500) / 500.0 * full - roll) - 0.03 * rate[0];
     double to_pitch = 0.078 * (-(rc[1] - 1500) / 500.0 * full - pitch) - 0.03 * rate[1];
     double to_yaw = 0.06 * ((rc[3] - 1500) / 500.0 * turn - rate[2]);
-    double thrust = stick * (1 - bend) + stick * stick * stick * bend, base = (sqrt(thrust) - 0.125) / 0.875;
+    double base = (sqrt(line * line + 4 * square * thrust) - line) / (2 * square);
     for (int at = 0; at < 4; at++) {
         double px = rotor(at, "PX"), py = rotor(at, "PY"), arm = hypot(px, py);
         outputs[at] = clamped(base - py / arm * to_roll + px / arm * to_pitch + copysign(1, rotor(at, "KM")) * to_yaw);
