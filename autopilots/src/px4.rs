@@ -97,6 +97,9 @@ pub struct Parameters {
     /// True if it sends to ground stations.
     #[serde(default)]
     ground_station: bool,
+    /// Place of the rest before tick 0, m.
+    #[serde(default)]
+    start_position_m: [f64; 3],
     /// Place on the earth of the world's origin.
     #[serde(default)]
     origin: Origin,
@@ -133,6 +136,7 @@ pub struct Px4 {
     boot_timeout: Duration,
     model: String,
     has_ground_station: bool,
+    start_position_m: [f64; 3],
     origin: Origin,
     magnetic_field: MagneticField,
 }
@@ -150,6 +154,8 @@ pub struct Link {
     /// Messages to send, and what came.
     messages: Vec<u8>,
     received: Vec<u8>,
+    /// True before tick 0.
+    is_at_rest: bool,
     /// True if the start-up script has ended.
     is_started: bool,
     is_armed: bool,
@@ -184,6 +190,9 @@ impl Autopilot for Px4 {
         settings::check_rest(rest_s, ARMED_S, armed_by_channel)?;
         positive_up_to("boot_timeout_s", parameters.boot_timeout_s, BOOT_TIMEOUT_MAX_S, "s")?;
         parameters.origin.check()?;
+        refuse(!parameters.start_position_m.iter().all(|part| part.is_finite()), "start_position_m", || {
+            format!("`start_position_m` is {:?}, expected numbers", parameters.start_position_m)
+        })?;
         parameters.magnetic_field.check()?;
         let period_ns = context.tick_ns * u64::from(context.period_ticks);
         refuse(!SENSOR_PERIOD_NS.is_multiple_of(period_ns), "period_ticks", || {
@@ -205,6 +214,7 @@ impl Autopilot for Px4 {
             boot_timeout: Duration::from_secs_f64(parameters.boot_timeout_s),
             model,
             has_ground_station: parameters.ground_station,
+            start_position_m: parameters.start_position_m,
             origin: parameters.origin,
             magnetic_field: parameters.magnetic_field,
         })
@@ -222,6 +232,7 @@ impl Autopilot for Px4 {
             sequence: 0,
             messages: Vec::new(),
             received: Vec::new(),
+            is_at_rest: true,
             is_started: false,
             is_armed: false,
             stale: 0,
@@ -233,7 +244,7 @@ impl Autopilot for Px4 {
         }
         link.stream.limit(self.reply_timeout)?;
         self.rest.of(self, &mut link)?;
-        link.exchanges = 0;
+        (link.exchanges, link.is_at_rest) = (0, false);
         // An armed firmware may keep its motors at 0.
         if link.is_armed || self.rest.armed_by_channel.is_none() {
             return Ok(link);
@@ -302,10 +313,13 @@ impl Px4 {
 
     /// Messages of a step. That of the sensors is the last one: it sets the clock.
     fn write_messages(&self, link: &mut Link, time_us: u64, sensed: &Sensed<'_>) {
-        let Link { sent, sequence, messages: bytes, .. } = link;
+        let Link { sent, sequence, messages: bytes, is_at_rest, .. } = link;
         let estimate = sensed.estimate;
         let field_B_T = self.magnetic_field.vector_B_T(estimate.attitude);
-        let place = self.origin.place(estimate.position.into());
+        // At rest, a position is one from the place of the rest.
+        let start_m = if *is_at_rest { self.start_position_m } else { [0.0; 3] };
+        let position: [f64; 3] = estimate.position.into();
+        let place = self.origin.place(std::array::from_fn(|axis| start_m[axis] + position[axis]));
         let sample = Sample { time_us, count: *sent, sensed, place, field_B_T };
         bytes.clear();
         bytes.extend(bytemuck::bytes_of(&Head::default()));

@@ -62,7 +62,8 @@ impl Build {
         let folder = bin.parent().unwrap_or(bin);
         let mut names = Vec::new();
         for scripts in SCRIPTS {
-            names.extend(file_names(&folder.join(scripts)).map(|name| Path::new(scripts).join(name)));
+            let used = file_names(&folder.join(scripts)).filter(|name| is_script(scripts, name));
+            names.extend(used.map(|name| Path::new(scripts).join(name)));
         }
         let airframe = file_names(&folder.join(AIRFRAMES)).find(|name| is_airframe(name, model));
         let airframe = airframe.map(|name| Path::new(AIRFRAMES).join(name)).ok_or_else(|| {
@@ -122,6 +123,12 @@ impl Build {
     }
 }
 
+/// True for a script that the start-up may run; the other `rcS` is for boards.
+fn is_script(folder: &str, name: &OsStr) -> bool {
+    let name = name.to_string_lossy();
+    name.starts_with("rc.") || name.starts_with("px4-rc.") || Path::new(folder).join(&*name) == Path::new(START_UP)
+}
+
 /// Names of the files in `folder`, sorted; empty if it cannot be read.
 fn file_names(folder: &Path) -> impl Iterator<Item = std::ffi::OsString> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
@@ -169,6 +176,13 @@ mod tests {
         assert_eq!(commands(aliases).collect::<Vec<_>>(), ["px4-ekf2", "px4-x"]);
         assert!(relative(aliases).starts_with("R=./\nalias set=_set\n"));
         assert_eq!(in_order("if a\n\tekf2 start &\nb && c\n"), "if a\n\tekf2 start\nb && c\n");
+    }
+
+    #[test]
+    fn scripts_are_those_of_the_simulation() {
+        let is = |folder: &str, name: &str| is_script(folder, OsStr::new(name));
+        assert!(is(SCRIPTS[1], "rcS") && is(SCRIPTS[1], "px4-rc.simulator") && is(SCRIPTS[0], "rc.mc_apps"));
+        assert!(!is(SCRIPTS[0], "rcS") && !is(SCRIPTS[1], "CMakeLists.txt"));
     }
 
     #[test]

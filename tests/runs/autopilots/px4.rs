@@ -195,8 +195,8 @@ fn the_files_of_the_start_are_attached() {
     let recording = place.path("a.mcap");
     call(&place, "run", &manifest(), &settings, &["--record", &recording]).flown();
     let bytes = fs::read(&recording).unwrap();
-    for name in ["bin/px4", "px4-alias.sh", "init.d-posix/rcS", "airframes/10016_none_iris"] {
-        assert!(bytes.windows(name.len()).any(|window| window == name.as_bytes()), "{name}");
+    for text in [START_UP.as_bytes(), b"alias simulator='px4-simulator", b"param set CA_ROTOR_COUNT 6"] {
+        assert!(bytes.windows(text.len()).any(|window| window == text), "{}", text.escape_ascii());
     }
 }
 
