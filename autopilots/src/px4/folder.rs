@@ -4,7 +4,7 @@ use crate::process::Scratch;
 use crate::settings;
 use bus::context::NodeContext;
 use diagnostics::ParameterError;
-use std::ffi::OsStr;
+use std::ffi::{OsStr, OsString};
 use std::fmt::Write as _;
 use std::fs;
 use std::io;
@@ -130,7 +130,7 @@ fn is_script(folder: &str, name: &OsStr) -> bool {
 }
 
 /// Names of the files in `folder`, sorted; empty if it cannot be read.
-fn file_names(folder: &Path) -> impl Iterator<Item = std::ffi::OsString> {
+fn file_names(folder: &Path) -> std::vec::IntoIter<OsString> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let files = entries.filter(|entry| entry.path().is_file());
     let mut names: Vec<_> = files.map(|entry| entry.file_name()).collect();

@@ -216,10 +216,13 @@ fn the_real_px4_flies_the_hover_and_its_doublet() {
         return;
     };
     let place = Place::new();
-    let settings = [format!("process.controller.firmware={program}")];
-    let [first, second] = ["a.mcap", "b.mcap"].map(|name| place.path(name));
-    for recording in [&first, &second] {
-        call(&place, "run", &manifest(), &settings, &["--record", recording]).with_code(0);
+    for manifest in ["px4", "px4-swap"] {
+        let path = repository(&format!("manifests/autopilots/{manifest}.toml"));
+        let [first, second] = ["a", "b"].map(|name| place.path(&format!("{manifest}-{name}.mcap")));
+        for recording in [&first, &second] {
+            let args = ["run", &path, "--record", recording];
+            place.start_with(&args, &[("HUMMINGBUS_PX4", &program)]).end().with_code(0);
+        }
+        require_same(&fs::read(&first).unwrap(), &second);
     }
-    require_same(&fs::read(&first).unwrap(), &second);
 }
