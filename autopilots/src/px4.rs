@@ -428,7 +428,8 @@ mod tests {
 
     #[test]
     fn a_parameter_that_is_not_there_is_found_in_the_log() {
-        let log = "ERROR [param] Parameter UXRCE_DDS_KEY not found.\nERROR [param] Parameter MC_ROL_P not found.\n";
+        let log =
+            "ERROR [param] Parameter UXRCE_DDS_KEY not found.\nERROR [param] Parameter MC_ROL_P not found.\n";
         assert_eq!(refused(log, "param set MC_ROLL_P 3\n"), None);
         let line = Some("ERROR [param] Parameter MC_ROL_P not found.".to_owned());
         assert_eq!(refused(log, "param set MC_ROL_P 3\n"), line);

@@ -50,7 +50,11 @@ pub fn program(context: &NodeContext<'_>, path: &Path, expected: &str) -> Result
 ///
 /// # Errors
 /// It cannot be read, or is no such program.
-pub fn preloadable(context: &NodeContext<'_>, path: &Path, expected: &str) -> Result<Vec<u8>, ParameterError> {
+pub fn preloadable(
+    context: &NodeContext<'_>,
+    path: &Path,
+    expected: &str,
+) -> Result<Vec<u8>, ParameterError> {
     let program = program(context, path, expected)?;
     refuse(!has_interpreter(&program), "firmware", || {
         format!(

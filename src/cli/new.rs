@@ -12,8 +12,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 /// Examples that `--help` shows.
-pub const HELP: &str =
-    "Examples: hummingbus new drone\n          hummingbus new drone --language python\n          hummingbus new vehicle --from quad.urdf -o quad.toml";
+pub const HELP: &str = "Examples: hummingbus new drone\n          hummingbus new drone --language python\n          hummingbus new vehicle --from quad.urdf -o quad.toml";
 /// Example that the help of `new vehicle` shows.
 const VEHICLE_HELP: &str = "Example: hummingbus new vehicle --from quad.urdf -o quad.toml";
 

@@ -1,8 +1,8 @@
 //! A project folder for a vehicle of one's own: templates, and the folder that is made from them.
 
+use super::shell::quoted;
 use anyhow::{Context, Result, bail};
 use clap::ValueEnum;
-use super::shell::quoted;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -177,7 +177,9 @@ fn required(sources: &Path) -> Result<PathBuf> {
 
 /// A template with the project's name, its language, and what its controller builds against.
 fn filled(template: &str, name: &str, language: &Templates, sources: Option<&Path>) -> String {
-    let path = |folder: &str| sources.map(|sources| sources.join(folder).to_string_lossy().trim_end_matches('/').to_owned());
+    let path = |folder: &str| {
+        sources.map(|sources| sources.join(folder).to_string_lossy().trim_end_matches('/').to_owned())
+    };
     let dependency = |folder: &str| match path(folder) {
         Some(path) => format!("path = {}", toml::Value::from(path)),
         None => format!("version = {:?}", env!("CARGO_PKG_VERSION")),

@@ -48,8 +48,7 @@ impl Build {
     /// # Errors
     /// A file is missing.
     pub fn read(context: &NodeContext<'_>, firmware: &Path, model: &str) -> Result<Self, ParameterError> {
-        let program =
-            settings::preloadable(context, firmware, "PX4's SITL, build/px4_sitl_default/bin/px4")?;
+        let program = settings::preloadable(context, firmware, "PX4's SITL, build/px4_sitl_default/bin/px4")?;
         let refused = |reason: String| ParameterError::conflict("firmware", reason);
         let unread = |path: &Path, error: io::Error| {
             let path = path.display();
@@ -126,7 +125,9 @@ impl Build {
 /// True for a script that the start-up may run; the other `rcS` is for boards.
 fn is_script(folder: &str, name: &OsStr) -> bool {
     let name = name.to_string_lossy();
-    name.starts_with("rc.") || name.starts_with("px4-rc.") || Path::new(folder).join(&*name) == Path::new(START_UP)
+    name.starts_with("rc.")
+        || name.starts_with("px4-rc.")
+        || Path::new(folder).join(&*name) == Path::new(START_UP)
 }
 
 /// Names of the files in `folder`, sorted; empty if it cannot be read.
@@ -162,7 +163,8 @@ fn commands(aliases: &str) -> impl Iterator<Item = &str> {
 /// The start-up script with all of its commands one after the other: it starts the estimator beside the commands that follow, in an
 /// order that would depend on the host.
 fn in_order(script: &str) -> String {
-    let line = |line: &str| format!("{}\n", if line.ends_with(" start &") { &line[..line.len() - 2] } else { line });
+    let line =
+        |line: &str| format!("{}\n", if line.ends_with(" start &") { &line[..line.len() - 2] } else { line });
     script.lines().map(line).collect()
 }
 
@@ -172,7 +174,8 @@ mod tests {
 
     #[test]
     fn scripts_are_independent_of_the_folder_and_run_in_order() {
-        let aliases = "R=\"`pwd`/\"\nalias set=_set\nalias ekf2='px4-ekf2 --instance $px4_instance'\nalias x='px4-x'\n";
+        let aliases =
+            "R=\"`pwd`/\"\nalias set=_set\nalias ekf2='px4-ekf2 --instance $px4_instance'\nalias x='px4-x'\n";
         assert_eq!(commands(aliases).collect::<Vec<_>>(), ["px4-ekf2", "px4-x"]);
         assert!(relative(aliases).starts_with("R=./\nalias set=_set\n"));
         assert_eq!(in_order("if a\n\tekf2 start &\nb && c\n"), "if a\n\tekf2 start\nb && c\n");

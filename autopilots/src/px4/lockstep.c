@@ -81,8 +81,8 @@ static char is_client[FILES_MAX], is_command[FILES_MAX];
 static uint8_t input[BYTES_MAX], output[BYTES_MAX];
 static size_t input_length, input_read, output_length;
 
+/* The functions of the same names in the C library. */
 #define NEXT(name) ((__typeof__(&name))next(#name, (void **)&next_##name))
-#define DECLARE(name) static void *next_##name;
 
 static void *next(const char *name, void **place)
 {
@@ -91,12 +91,11 @@ static void *next(const char *name, void **place)
     return *place;
 }
 
-DECLARE(pthread_create) DECLARE(pthread_setschedparam) DECLARE(gettimeofday) DECLARE(pthread_join) DECLARE(pthread_kill) DECLARE(pthread_mutex_lock) DECLARE(pthread_mutex_unlock)
-DECLARE(usleep) DECLARE(sleep) DECLARE(nanosleep) DECLARE(clock_nanosleep) DECLARE(clock_gettime) DECLARE(clock_settime) DECLARE(poll)
-DECLARE(read) DECLARE(recv) DECLARE(recvfrom) DECLARE(send) DECLARE(sendto) DECLARE(connect) DECLARE(bind) DECLARE(unlink)
-DECLARE(open) DECLARE(open64) DECLARE(accept) DECLARE(shutdown) DECLARE(system)
-DECLARE(pthread_cond_wait) DECLARE(pthread_cond_timedwait) DECLARE(pthread_cond_clockwait) DECLARE(pthread_cond_signal)
-DECLARE(pthread_cond_broadcast)
+static void *next_pthread_create, *next_pthread_join, *next_pthread_kill, *next_pthread_setschedparam, *next_pthread_mutex_lock,
+    *next_pthread_mutex_unlock, *next_pthread_cond_wait, *next_pthread_cond_timedwait, *next_pthread_cond_clockwait, *next_pthread_cond_signal,
+    *next_pthread_cond_broadcast, *next_usleep, *next_sleep, *next_nanosleep, *next_clock_nanosleep, *next_clock_gettime, *next_clock_settime,
+    *next_gettimeofday, *next_poll, *next_read, *next_recv, *next_recvfrom, *next_send, *next_sendto, *next_connect, *next_bind, *next_unlink,
+    *next_open, *next_open64, *next_accept, *next_shutdown, *next_system;
 
 /* Conditions have an older version, which a search without a version may find. */
 #define NEXT_CONDITION(name) ((__typeof__(&name))next_version(#name, (void **)&next_##name))
@@ -688,15 +687,15 @@ int unlink(const char *path)
     return NEXT(unlink)(moved(path, place, sizeof place));
 }
 
-#define OPEN(name)                                                                                                                                 \
-    int name(const char *path, int flags, ...)                                                                                                     \
-    {                                                                                                                                              \
-        va_list rest;                                                                                                                              \
-        va_start(rest, flags);                                                                                                                     \
-        mode_t mode = flags & (O_CREAT | O_TMPFILE) ? va_arg(rest, mode_t) : 0;                                                                    \
-        va_end(rest);                                                                                                                              \
-        char place[PATH_MAX];                                                                                                                      \
-        return NEXT(name)(moved(path, place, sizeof place), flags, mode);                                                                          \
+#define OPEN(name) \
+    int name(const char *path, int flags, ...) \
+    { \
+        va_list rest; \
+        va_start(rest, flags); \
+        mode_t mode = flags & (O_CREAT | O_TMPFILE) ? va_arg(rest, mode_t) : 0; \
+        va_end(rest); \
+        char place[PATH_MAX]; \
+        return NEXT(name)(moved(path, place, sizeof place), flags, mode); \
     }
 OPEN(open)
 OPEN(open64)

@@ -249,8 +249,7 @@ mod tests {
 
     #[test]
     fn sensors_have_the_firmwares_axes_and_units() {
-        let payload =
-            payload(|sample, payload| sample.sensor(INERTIAL_FIELDS | MAGNETIC_FIELDS, payload));
+        let payload = payload(|sample, payload| sample.sensor(INERTIAL_FIELDS | MAGNETIC_FIELDS, payload));
         let floats: Vec<f32> = (0..13).map(|at| float(&payload, 8 + 4 * at)).collect();
         let near = |from: usize, expected: [f32; 3], noise: f64| {
             let differs = |(found, expected): (&f32, f32)| f64::from((found - expected).abs()) > noise + 1e-6;

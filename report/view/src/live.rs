@@ -1,7 +1,7 @@
 //! The live run behind a page: its state, and the requests of the page.
 
-use anyhow::{Context as _, Result, ensure};
 use crate::schedule::Schedule;
+use anyhow::{Context as _, Result, ensure};
 use bus::asked::{Asked, AskedFile};
 use bus::lockstep::LiveView;
 use bus::plan::Plan;

@@ -82,7 +82,11 @@ mod tests {
     #[test]
     fn a_computing_time_is_told_in_words() {
         let measured = ComputingTime::Measured { fraction_us: vec![[0.0, 100.0], [1.0, 1900.0]] };
-        let times = [ComputingTime::Constant { us: 1500.0 }, ComputingTime::Uniform { min_us: 1.0, max_us: 2.5 }, measured];
+        let times = [
+            ComputingTime::Constant { us: 1500.0 },
+            ComputingTime::Uniform { min_us: 1.0, max_us: 2.5 },
+            measured,
+        ];
         assert_eq!(times.map(|time| text(&time)), ["1500 µs", "1 to 2.5 µs", "measured, up to 1900 µs"]);
     }
 }

@@ -170,12 +170,12 @@ static void within(const char *what, double found, double min, double max)
 /* A sensor whose numbers stay the same is broken: PX4 counts the equal ones, in the steps of its simulated sensors. */
 static void refuse_constants(const float *floats, uint32_t fields)
 {
-    static const double steps[13] = { 9.80665 / 2048, 9.80665 / 2048, 9.80665 / 2048, 1.0652644e-3, 1.0652644e-3, 1.0652644e-3, 1e-6, 1e-6, 1e-6, 1e-8 };
-    static double before[13];
-    static int equal[13];
+    static const double steps[] = { 9.80665 / 2048, 2000.0 / 32768 * M_PI / 180, 1e-6, 1e-8 };
+    static double before[10];
+    static int equal[10];
     for (int at = 0; at < 10; at++)
         if (fields & 1u << at) {
-            double value = trunc(floats[at] / steps[at]);
+            double value = trunc(floats[at] / steps[at / 3]);
             equal[at] = value == before[at] ? equal[at] + 1 : 0;
             before[at] = value;
             within("equal values of a sensor", equal[at], 0, 33);
