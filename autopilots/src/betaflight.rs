@@ -151,10 +151,8 @@ impl Autopilot for Betaflight {
         let vehicle = settings::vehicle(context, &vehicle)?;
         let layout = Layout::of(&vehicle.rotors, &MIXERS)
             .map_err(|reason| settings::refused_vehicle(&vehicle, &reason))?;
-        let program = settings::file(context, "firmware", &firmware)?;
-        require_preloadable(&program).map_err(|reason| {
-            ParameterError::conflict("firmware", format!("{}: {reason}", firmware.display()))
-        })?;
+        let program =
+            settings::preloadable(context, &firmware, "Betaflight's SITL, obj/main/betaflight_SITL.elf")?;
         positive("rc_rate_hz", parameters.rc_rate_hz)?;
         parameters.origin.check()?;
         settings::check_arming(armed_by_channel, CHANNELS)?;
@@ -292,31 +290,6 @@ fn nanoseconds(time_s: f64) -> u64 {
     (time_s * 1e9).round() as u64
 }
 
-/// Refuses what no library can be preloaded into: its clock would be the host's.
-fn require_preloadable(program: &[u8]) -> Result<(), String> {
-    /// Type of the program header that names the dynamic linker (ELF, `PT_INTERP`).
-    const INTERPRETER: u32 = 3;
-    let number = |at: usize, size: usize| -> Option<u64> {
-        let bytes = program.get(at..at.checked_add(size)?)?;
-        Some(bytes.iter().rev().fold(0, |number, byte| (number << 8) | u64::from(*byte)))
-    };
-    if !program.starts_with(settings::ELF_64) {
-        return Err("expected a 64-bit Linux program (ELF): Betaflight's SITL, obj/main/betaflight_SITL.elf"
-            .to_owned());
-    }
-    let headers = || {
-        let (first, size, count) = (number(32, 8)?, number(54, 2)?, number(56, 2)?);
-        let at = |index: u64| usize::try_from(first.checked_add(size * index)?).ok();
-        Some((0..count).any(|index| at(index).and_then(|at| number(at, 4)) == Some(INTERPRETER.into())))
-    };
-    if headers() == Some(true) {
-        return Ok(());
-    }
-    let reason = "it is linked statically, so that its clock stays the host's: no two runs would agree, and a run that waits for \
-                  its answers would stall; build it with shared libraries";
-    Err(reason.to_owned())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -387,15 +360,5 @@ mod tests {
         assert!(betaflight.throttles(&answer).unwrap_err().contains("NaN"), "no output is taken for a stop");
         let commands = "aux 0 0 0 1700 2100 0 0\nmixer QUADP\nset yaw_motors_reversed = OFF\nsave\n";
         assert_eq!(betaflight.commands(), commands);
-    }
-
-    /// Any bytes are refused in words.
-    #[test]
-    fn what_is_cut_is_no_program() {
-        let program = std::fs::read("/proc/self/exe").unwrap();
-        assert_eq!(require_preloadable(&program), Ok(()), "this test is linked with shared libraries");
-        for length in [0, 3, 6, 40, 64, 100] {
-            assert!(require_preloadable(&program[..length]).is_err(), "{length}");
-        }
     }
 }

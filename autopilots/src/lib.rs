@@ -5,7 +5,6 @@
 //! - [`process`]: a firmware's process: its scratch folder, its log, what it ended with
 //! - [`stream`]: a firmware that speaks over a socket at its standard input
 //! - [`datagrams`]: a firmware that speaks by datagrams (UDP)
-//! - [`connection`]: a firmware that connects to this process (TCP)
 //! - [`rest`]: the rest on the ground before tick 0, in which a firmware is armed
 //! - [`settings`]: parameters and files that firmwares have in common
 //! - [`parameter_lines`]: a file of parameters
@@ -37,7 +36,6 @@ pub mod autopilot;
 pub mod axes;
 pub mod betaflight;
 pub mod bridge;
-pub mod connection;
 pub mod datagrams;
 pub mod layout;
 pub mod origin;

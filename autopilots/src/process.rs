@@ -173,18 +173,25 @@ impl Firmware {
         Some(self.complaint(&ended_with(self.scratch.name, status)))
     }
 
-    /// The reason of a transfer that failed: the firmware's end, or else that it gave no answer for `limit`.
+    /// The reason of a transfer that failed: the firmware's end, or else that it gave no answer for `limit`, or closed its socket.
     pub fn failed(&mut self, error: &io::Error, limit: Duration) -> String {
-        if !is_silence(error) {
-            // Its end follows the end of its socket.
-            for _ in 0..STARTS_MAX {
-                if let Some(words) = self.ended() {
-                    return words;
-                }
-                std::thread::sleep(NAP);
-            }
+        if is_silence(error) {
+            return self.ended().unwrap_or_else(|| self.silence(limit));
         }
-        self.ended().unwrap_or_else(|| self.silence(limit))
+        // Its end follows the end of its socket.
+        for _ in 0..STARTS_MAX {
+            if let Some(words) = self.ended() {
+                return words;
+            }
+            std::thread::sleep(NAP);
+        }
+        self.complaint(&format!("{} runs and has closed its connection: {error}", self.scratch.name))
+    }
+
+    /// Text that it has printed.
+    #[must_use]
+    pub fn printed(&self) -> String {
+        self.scratch.printed()
     }
 
     /// A firmware that runs and gave no answer for `limit`.

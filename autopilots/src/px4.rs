@@ -1,9 +1,10 @@
 //! PX4's software in the loop, SITL, by its simulator's MAVLink interface (`SimulatorMavlink.cpp` and the start-up script
-//! `init.d-posix/rcS` of PX4; read in several versions, not flown).
+//! `init.d-posix/rcS` of PX4; read at commit a70a5583).
 //!
-//! PX4 connects to the simulator by TCP. A message of the sensors sets its clock, and each one is answered with the motors' outputs,
-//! so that it is in lockstep by itself. While it boots, messages are sent without waiting for long; from then on, each answer is
-//! waited for.
+//! A message of the sensors sets PX4's clock, and PX4 answers it with the motors' outputs. Its threads run beside each other all the same,
+//! and its start-up script runs by the time of the host, so that no two runs would agree. So a library is preloaded (`lockstep.c`): it lets
+//! one thread run at a time, in an order that depends on the messages alone, hands PX4 a step's messages when all threads wait, and
+//! returns what PX4 has sent by then. The firmware itself is as it was built.
 //!
 //! Axes of its messages: body forward, right, down; world north, east, down. The world's x is east, its y north
 //! ([`crate::origin`]).
@@ -15,59 +16,59 @@ mod mavlink;
 mod messages;
 
 use crate::autopilot::{Autopilot, Sensed, Throttles};
-use crate::connection::Connection;
 use crate::origin::Origin;
 use crate::process::Scratch;
 use crate::rest::{Rest, imu_at_rest};
 use crate::settings;
+use crate::stream::Stream;
 use bus::component::Info;
 use bus::context::NodeContext;
 use bus::messages::{RC_CHANNELS_MAX, RcChannels, StateEstimate};
 use diagnostics::ParameterError;
 use diagnostics::parameter::{positive_up_to, refuse};
 use field::MagneticField;
-use folder::Folder;
-use mavlink::{Kind, Reader, add_frame};
+use folder::Build;
+use mavlink::{Kind, add_frame, frames};
 use messages::{
     HIL_ACTUATOR_CONTROLS, HIL_GPS, HIL_SENSOR, HIL_STATE_QUATERNION, INERTIAL_FIELDS, MAGNETIC_FIELDS,
     Outputs, PRESSURE_FIELDS, RC_CHANNELS, Sample,
 };
 use serde::Deserialize;
-use std::net::{Ipv4Addr, TcpListener};
+use std::net::{Ipv4Addr, UdpSocket};
 use std::path::PathBuf;
 use std::time::Duration;
 use vehicles::Vehicle;
 
-/// Time between two messages of the sensors: PX4's start-up script sets its own rate for simulators to 250 Hz (`IMU_INTEG_RATE`),
-/// and a firmware that drops samples of a faster sensor (`IMU_GYRO_RATEMAX`) would leave messages without an answer.
+/// The library that is preloaded.
+const LOCKSTEP: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/px4_lockstep.so"));
+/// Time between two messages of the sensors: PX4's start-up script sets its own rate for simulators to 250 Hz (`IMU_INTEG_RATE`).
 const SENSOR_PERIOD_NS: u64 = 4_000_000;
-const SENSOR_PERIOD_US: u64 = SENSOR_PERIOD_NS / 1000;
-/// The first time of its clock, us: not 0, which PX4 takes for a clock that is not set. Some versions count from there on, so that
-/// the times in their answers are behind by this, which is less than half of a period.
+const SENSOR_PERIOD_US: u32 = 4000;
+/// The first time of its clock, us: not 0, which PX4 takes for a clock that is not set.
 const FIRST_TIME_US: u64 = 1000;
 /// Messages of the sensors for each one of satellite navigation (10 Hz), the remote control (50 Hz), the compass and the barometer.
 const GPS_EVERY: u64 = 25;
 const CHANNELS_EVERY: u64 = 5;
 const MAGNETIC_EVERY: u64 = 4;
 const PRESSURE_EVERY: u64 = 5;
-/// Messages of the sensors after which all of these begin anew.
-const ALL_EVERY: u64 = 100;
-/// Host time that an answer may take while PX4 boots: it may not answer at all.
-const BOOT_PACE: Duration = Duration::from_millis(20);
-/// Messages in a row that are answered once PX4 has booted: one second of its time.
-const IN_STEP: u64 = 250;
+/// Messages of the sensors in which the start-up script has to end: two minutes of simulated time. It takes less than a second.
+const START_UP_MAX: u64 = 30_000;
+/// Messages of the sensors without motor outputs after which it flies no more: 0.1 s.
+const STALE_MAX: u64 = 25;
 /// Part of the rest with the arming switch on, s: motors stand still for 1 s after it is armed (`COM_SPOOLUP_TIME`).
 const ARMED_S: f64 = 4.0;
 /// Longest host time that a start may take, s.
 const BOOT_TIMEOUT_MAX_S: f64 = 3600.0;
-/// Port of the instance 0, and the instances that are tried. A user's own firmwares have the first ones.
-const FIRST_PORT: u16 = 4560;
+/// Port of the instance 0 for ground stations, and the instances that are tried. A user's own firmwares have the first ones.
+const FIRST_PORT: u16 = 18570;
 const INSTANCES: std::ops::Range<u16> = 100..200;
 /// Path for the start-up script: first the folder with the program, from the one in which it runs. A relative path, since one with a
 /// colon could not be searched.
 const PATH: &str = "..:/usr/local/bin:/usr/bin:/bin";
 /// The airframe of the start-up script: a quadrotor that no simulator is started for. The vehicle's parameters replace its geometry.
 const MODEL: &str = "none_iris";
+/// Most bytes of an answer.
+const ANSWER_MAX: usize = 1 << 16;
 
 /// Parameters of the firmware.
 #[derive(Debug, Deserialize)]
@@ -87,12 +88,18 @@ pub struct Parameters {
     /// Host time that an answer may take, in s.
     #[serde(default = "settings::reply_timeout_s")]
     reply_timeout_s: f64,
-    /// Host time in which it connects, and in which its modules then start, in s.
+    /// Host time that an answer may take while its start-up script runs, in s.
     #[serde(default = "boot_timeout_s")]
     boot_timeout_s: f64,
     /// Airframe of its start-up script.
     #[serde(default = "model")]
     model: String,
+    /// True if it sends to ground stations.
+    #[serde(default)]
+    ground_station: bool,
+    /// Place of the rest before tick 0, m.
+    #[serde(default)]
+    start_position_m: [f64; 3],
     /// Place on the earth of the world's origin.
     #[serde(default)]
     origin: Origin,
@@ -119,9 +126,7 @@ fn model() -> String {
 #[derive(Debug)]
 pub struct Px4 {
     vehicle: Vehicle,
-    firmware: Vec<u8>,
-    /// Path from which the program was read: its build has the start-up script.
-    source: PathBuf,
+    build: Build,
     /// Commands that set its parameters.
     parameters: String,
     /// Exchanges for each message of the sensors.
@@ -130,6 +135,8 @@ pub struct Px4 {
     reply_timeout: Duration,
     boot_timeout: Duration,
     model: String,
+    has_ground_station: bool,
+    start_position_m: [f64; 3],
     origin: Origin,
     magnetic_field: MagneticField,
 }
@@ -137,17 +144,35 @@ pub struct Px4 {
 /// The firmware that runs.
 #[derive(Debug)]
 pub struct Link {
-    connection: Connection,
-    reader: Reader,
+    stream: Stream,
     /// Exchanges since tick 0, or since the rest began.
     exchanges: u64,
     /// Messages of the sensors sent.
     sent: u64,
     /// Sequence number of the next message.
     sequence: u8,
+    /// Messages to send, and what came.
+    messages: Vec<u8>,
+    received: Vec<u8>,
+    /// True before tick 0.
+    is_at_rest: bool,
+    /// True if the start-up script has ended.
+    is_started: bool,
     is_armed: bool,
+    /// Messages of the sensors since the last outputs.
+    stale: u64,
     /// Outputs by rotor of the last answer.
     throttles: Throttles,
+}
+
+/// Head of what `lockstep.c` reads and writes.
+#[derive(Clone, Copy, Default, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+struct Head {
+    /// Bytes that follow.
+    length: u32,
+    /// To PX4: length of the step, us. From PX4: 1 if the start-up script has ended.
+    value: u32,
 }
 
 impl Autopilot for Px4 {
@@ -157,14 +182,17 @@ impl Autopilot for Px4 {
     type Link = Link;
 
     fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
-        let Parameters { vehicle, firmware, configuration, armed_by_channel, rest_s, .. } = parameters;
+        let Parameters { vehicle, firmware, configuration, armed_by_channel, rest_s, model, .. } = parameters;
         let vehicle = settings::vehicle(context, &vehicle)?;
-        let program = settings::program(context, &firmware, "PX4's SITL, build/px4_sitl_default/bin/px4")?;
+        let build = Build::read(context, &firmware, &model)?;
         // A message of the bus has fewer channels than MAVLink's.
         settings::check_arming(armed_by_channel, messages::CHANNELS.min(RC_CHANNELS_MAX))?;
         settings::check_rest(rest_s, ARMED_S, armed_by_channel)?;
         positive_up_to("boot_timeout_s", parameters.boot_timeout_s, BOOT_TIMEOUT_MAX_S, "s")?;
         parameters.origin.check()?;
+        refuse(!parameters.start_position_m.iter().all(|part| part.is_finite()), "start_position_m", || {
+            format!("`start_position_m` is {:?}, expected numbers", parameters.start_position_m)
+        })?;
         parameters.magnetic_field.check()?;
         let period_ns = context.tick_ns * u64::from(context.period_ticks);
         refuse(!SENSOR_PERIOD_NS.is_multiple_of(period_ns), "period_ticks", || {
@@ -178,14 +206,15 @@ impl Autopilot for Px4 {
             .map_err(|reason| ParameterError::conflict("configuration", reason))?;
         Ok(Self {
             vehicle,
-            firmware: program,
-            source: firmware,
+            build,
             parameters: script,
             every: SENSOR_PERIOD_NS / period_ns,
             rest: Rest { time_s: rest_s, armed_s: ARMED_S, armed_by_channel, period_s: context.period_s() },
             reply_timeout: settings::reply_timeout(parameters.reply_timeout_s)?,
             boot_timeout: Duration::from_secs_f64(parameters.boot_timeout_s),
-            model: parameters.model,
+            model,
+            has_ground_station: parameters.ground_station,
+            start_position_m: parameters.start_position_m,
             origin: parameters.origin,
             magnetic_field: parameters.magnetic_field,
         })
@@ -196,106 +225,142 @@ impl Autopilot for Px4 {
     }
 
     fn boot(&self) -> Result<Link, String> {
-        let connection = self.start()?;
-        let reader = Reader::new(HIL_ACTUATOR_CONTROLS);
-        let throttles = Throttles::filled(self.vehicle.rotors.len(), 0.0);
-        let mut link =
-            Link { connection, reader, exchanges: 0, sent: 0, sequence: 0, is_armed: false, throttles };
-        self.await_modules(&mut link)?;
+        let mut link = Link {
+            stream: self.start()?,
+            exchanges: 0,
+            sent: 0,
+            sequence: 0,
+            messages: Vec::new(),
+            received: Vec::new(),
+            is_at_rest: true,
+            is_started: false,
+            is_armed: false,
+            stale: 0,
+            throttles: Throttles::filled(self.vehicle.rotors.len(), 0.0),
+        };
+        self.await_start(&mut link)?;
+        if let Some(line) = refused(&link.stream.firmware().printed(), &self.parameters) {
+            return Err(format!("the configuration has a parameter that PX4 refuses: {line}"));
+        }
+        link.stream.limit(self.reply_timeout)?;
         self.rest.of(self, &mut link)?;
-        link.exchanges = 0;
+        (link.exchanges, link.is_at_rest) = (0, false);
         // An armed firmware may keep its motors at 0.
         if link.is_armed || self.rest.armed_by_channel.is_none() {
             return Ok(link);
         }
         let words = "it is not armed at tick 0 under `armed_by_channel` and the configuration";
-        Err(link.connection.firmware().complaint(words))
+        Err(link.stream.firmware().complaint(words))
     }
 
     fn exchange(&self, link: &mut Link, sensed: &Sensed<'_>) -> Result<Throttles, String> {
         let is_due = link.exchanges.is_multiple_of(self.every);
         link.exchanges += 1;
-        if is_due && !self.sense(link, sensed, self.reply_timeout)? {
-            return Err(self.silence(link));
+        if is_due {
+            self.sense(link, sensed)?;
         }
-        Ok(link.throttles)
+        if link.stale < STALE_MAX {
+            return Ok(link.throttles);
+        }
+        let words = "it has sent no motor outputs for 0.1 s of its time";
+        Err(link.stream.firmware().complaint(words))
     }
 }
 
 impl Px4 {
-    /// The firmware, connected.
-    fn start(&self) -> Result<Connection, String> {
+    /// The firmware.
+    fn start(&self) -> Result<Stream, String> {
         let scratch = Scratch::new("px4")?;
-        let folder = Folder::fill(&scratch, &self.firmware, &self.source, &self.parameters)?;
-        let (instance, listener) = listener()?;
+        let folder = self.build.fill(&scratch, LOCKSTEP, &self.parameters, self.has_ground_station)?;
+        let instance = if self.has_ground_station { instance()? } else { 0 };
         let mut command = scratch.command(&folder.program)?;
-        command.current_dir(&folder.root).env("PATH", PATH).env("PX4_SIM_MODEL", &self.model);
-        command.args(["-d", "-i", &instance.to_string(), "-w"]).arg(&folder.root).arg(&folder.etc);
-        Connection::start(scratch, command, listener, self.boot_timeout, self.reply_timeout)
+        command.current_dir(&folder.root).env("LD_PRELOAD", folder::PRELOADED);
+        command.env("PATH", PATH).env("PX4_SIM_MODEL", &self.model);
+        command.args(["-d", "-i", &instance.to_string(), "-w"]).arg(&folder.root).arg("../etc");
+        Stream::start(scratch, command, self.boot_timeout)
     }
 
-    /// Lets the firmware sense a level ground until its modules have started: until it has answered for a while.
-    fn await_modules(&self, link: &mut Link) -> Result<(), String> {
+    /// Lets the firmware sense a level ground until its start-up script has ended and it sends outputs.
+    fn await_start(&self, link: &mut Link) -> Result<(), String> {
         let (imu, estimate, rc) =
             (imu_at_rest(&self.vehicle), StateEstimate::default(), RcChannels::default());
         let sensed = Sensed { time_s: 0.0, imu: &imu, estimate: &estimate, rc: &rc };
-        let mut silent = self.boot_timeout.as_micros().div_ceil(BOOT_PACE.as_micros());
-        let mut answered = 0;
-        while silent > 0 {
-            if self.sense(link, &sensed, BOOT_PACE)? {
-                answered += 1;
-            } else {
-                (answered, silent) = (0, silent - 1);
-            }
-            // So the rest begins with the same messages, however long the start took.
-            if answered >= IN_STEP && link.sent.is_multiple_of(ALL_EVERY) {
+        self.receive(link)?;
+        while link.sent < START_UP_MAX {
+            self.sense(link, &sensed)?;
+            if link.is_started && link.stale == 0 {
                 return Ok(());
             }
         }
-        let seconds = self.boot_timeout.as_secs_f64();
-        let words =
-            format!("it has connected and not answered each message of the sensors within {seconds} s");
-        Err(link.connection.firmware().complaint(&words))
+        let seconds = START_UP_MAX * SENSOR_PERIOD_NS / 1_000_000_000;
+        let words = if link.is_started {
+            format!("it sends no motor outputs within {seconds} s of its time")
+        } else {
+            format!("its start-up script has not ended within {seconds} s of its time")
+        };
+        Err(link.stream.firmware().complaint(&words))
     }
 
-    /// Sends a tick's messages, and waits for the answer; false if there is none within `limit`.
-    fn sense(&self, link: &mut Link, sensed: &Sensed<'_>, limit: Duration) -> Result<bool, String> {
-        let time_us = FIRST_TIME_US + link.sent * SENSOR_PERIOD_US;
-        let bytes = self.messages(link, time_us, sensed);
+    /// Sends a step's messages, and waits for the answer.
+    fn sense(&self, link: &mut Link, sensed: &Sensed<'_>) -> Result<(), String> {
+        let time_us = FIRST_TIME_US + link.sent * u64::from(SENSOR_PERIOD_US);
+        self.write_messages(link, time_us, sensed);
         link.sent += 1;
-        link.connection.send(&bytes)?;
-        let reader = &mut link.reader;
-        let outputs = link.connection.receive(limit, |bytes| answer(reader, bytes, time_us))?;
-        let Some(outputs) = outputs else { return Ok(false) };
-        link.is_armed = outputs.is_armed;
-        link.throttles =
-            self.throttles(&outputs).map_err(|words| link.connection.firmware().complaint(&words))?;
-        Ok(true)
+        link.stale += 1;
+        link.stream.send(&link.messages)?;
+        self.receive(link)
     }
 
-    /// Messages of a tick. That of the sensors is the last one: it sets the clock, and is answered.
-    fn messages(&self, link: &mut Link, time_us: u64, sensed: &Sensed<'_>) -> Vec<u8> {
-        let Link { sent, sequence, .. } = link;
+    /// Messages of a step. That of the sensors is the last one: it sets the clock.
+    fn write_messages(&self, link: &mut Link, time_us: u64, sensed: &Sensed<'_>) {
+        let Link { sent, sequence, messages: bytes, is_at_rest, .. } = link;
         let estimate = sensed.estimate;
         let field_B_T = self.magnetic_field.vector_B_T(estimate.attitude);
-        let sample =
-            Sample { time_us, sensed, place: self.origin.place(estimate.position.into()), field_B_T };
-        let mut bytes = Vec::new();
-        let mut add = |kind: Kind, payload: &[u8]| {
-            add_frame(&mut bytes, kind, *sequence, payload);
+        // At rest, a position is one from the place of the rest.
+        let start_m = if *is_at_rest { self.start_position_m } else { [0.0; 3] };
+        let position: [f64; 3] = estimate.position.into();
+        let place = self.origin.place(std::array::from_fn(|axis| start_m[axis] + position[axis]));
+        let sample = Sample { time_us, count: *sent, sensed, place, field_B_T };
+        bytes.clear();
+        bytes.extend(bytemuck::bytes_of(&Head::default()));
+        let mut add = |kind: Kind, payload: &dyn Fn(&mut Vec<u8>)| {
+            add_frame(bytes, kind, *sequence, payload);
             *sequence = sequence.wrapping_add(1);
         };
         if sent.is_multiple_of(GPS_EVERY) {
-            add(HIL_GPS, &sample.gps());
+            add(HIL_GPS, &|payload| sample.gps(payload));
         }
         if sent.is_multiple_of(CHANNELS_EVERY) {
-            add(RC_CHANNELS, &sample.channels());
+            add(RC_CHANNELS, &|payload| sample.channels(payload));
         }
-        add(HIL_STATE_QUATERNION, &sample.state());
+        add(HIL_STATE_QUATERNION, &|payload| sample.state(payload));
         let magnetic = if sent.is_multiple_of(MAGNETIC_EVERY) { MAGNETIC_FIELDS } else { 0 };
         let pressure = if sent.is_multiple_of(PRESSURE_EVERY) { PRESSURE_FIELDS } else { 0 };
-        add(HIL_SENSOR, &sample.sensor(INERTIAL_FIELDS | magnetic | pressure));
-        bytes
+        add(HIL_SENSOR, &|payload| sample.sensor(INERTIAL_FIELDS | magnetic | pressure, payload));
+        let head = Head { length: length(bytes.len() - size_of::<Head>()), value: SENSOR_PERIOD_US };
+        bytes[..size_of::<Head>()].copy_from_slice(bytemuck::bytes_of(&head));
+    }
+
+    /// Waits until all of the firmware's threads wait, and reads what it has sent by then.
+    fn receive(&self, link: &mut Link) -> Result<(), String> {
+        let mut head = Head::default();
+        link.stream.receive(bytemuck::bytes_of_mut(&mut head))?;
+        let bytes = usize::try_from(head.length).unwrap_or(usize::MAX);
+        if bytes > ANSWER_MAX {
+            return Err(link.stream.firmware().complaint(&format!("it sends {bytes} bytes in a step")));
+        }
+        link.received.resize(bytes, 0);
+        link.stream.receive(&mut link.received)?;
+        link.is_started = head.value != 0;
+        let answer = answer(&link.received).and_then(|outputs| {
+            outputs.map(|outputs| Ok((outputs.is_armed, self.throttles(&outputs)?))).transpose()
+        });
+        if let Some((is_armed, throttles)) =
+            answer.map_err(|words| link.stream.firmware().complaint(&words))?
+        {
+            (link.is_armed, link.throttles, link.stale) = (is_armed, throttles, 0);
+        }
+        Ok(())
     }
 
     /// Outputs by rotor.
@@ -306,42 +371,42 @@ impl Px4 {
         }
         Ok(Throttles::from_fn(motors.len(), |rotor| f64::from(motors[rotor]).max(0.0)))
     }
-
-    /// A firmware that runs and has not answered.
-    fn silence(&self, link: &Link) -> String {
-        let firmware = link.connection.firmware();
-        match link.reader.wrong {
-            0 => firmware.silence(self.reply_timeout),
-            wrong => firmware.complaint(&format!(
-                "px4 runs and gave no answer for {} s; {wrong} of its messages had a wrong checksum",
-                self.reply_timeout.as_secs_f64()
-            )),
-        }
-    }
 }
 
-/// Outputs in `bytes` that answer the sensors of `time_us`; those of earlier times are dropped.
-fn answer(reader: &mut Reader, bytes: &mut Vec<u8>, time_us: u64) -> Result<Option<Outputs>, String> {
-    while let Some(payload) = reader.next(bytes) {
-        let outputs = Outputs::read(&payload);
+#[allow(clippy::cast_possible_truncation, reason = "some hundred bytes")]
+fn length(bytes: usize) -> u32 {
+    bytes as u32
+}
+
+/// The first line of the log about a parameter that `commands` set and PX4 does not have. It sets others of itself without having them.
+fn refused(log: &str, commands: &str) -> Option<String> {
+    let line = log.lines().find(|line| {
+        let name = line.split_once("Parameter ").and_then(|(_, rest)| rest.split_once(" not found"));
+        name.is_some_and(|(name, _)| commands.contains(&format!("param set {name} ")))
+    });
+    line.map(str::to_owned)
+}
+
+/// The last outputs in `bytes`.
+fn answer(bytes: &[u8]) -> Result<Option<Outputs>, String> {
+    let mut last = None;
+    for payload in frames(HIL_ACTUATOR_CONTROLS, bytes) {
+        let outputs = Outputs::read(payload?);
         if !outputs.is_lockstep {
             return Err("it was built without lockstep (ENABLE_LOCKSTEP_SCHEDULER), expected a SITL with it"
                 .to_owned());
         }
-        if outputs.time_us + SENSOR_PERIOD_US / 2 >= time_us {
-            return Ok(Some(outputs));
-        }
+        last = Some(outputs);
     }
-    Ok(None)
+    Ok(last)
 }
 
-/// A free instance, and the listener at its port, which keeps others from taking it.
-fn listener() -> Result<(u16, TcpListener), String> {
-    let bound = |instance| TcpListener::bind((Ipv4Addr::LOCALHOST, FIRST_PORT + instance)).ok();
-    let free = INSTANCES.into_iter().find_map(|instance| Some((instance, bound(instance)?)));
-    free.ok_or_else(|| {
+/// An instance whose port for ground stations is free.
+fn instance() -> Result<u16, String> {
+    let is_free = |instance: &u16| UdpSocket::bind((Ipv4Addr::UNSPECIFIED, FIRST_PORT + instance)).is_ok();
+    INSTANCES.into_iter().find(is_free).ok_or_else(|| {
         let (first, last) = (FIRST_PORT + INSTANCES.start, FIRST_PORT + INSTANCES.end - 1);
-        format!("no port for px4: {first} to {last} are in use")
+        format!("no port for px4's ground stations: the UDP ports {first} to {last} are in use")
     })
 }
 
@@ -349,59 +414,32 @@ fn listener() -> Result<(u16, TcpListener), String> {
 mod tests {
     use super::*;
 
-    fn hummingbird() -> Px4 {
-        Px4 {
-            vehicle: Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml").unwrap(),
-            firmware: Vec::new(),
-            source: PathBuf::new(),
-            parameters: String::new(),
-            every: 4,
-            rest: Rest { time_s: 20.0, armed_s: ARMED_S, armed_by_channel: None, period_s: 1e-3 },
-            reply_timeout: Duration::from_secs(1),
-            boot_timeout: Duration::from_secs(1),
-            model: model(),
-            origin: Origin::default(),
-            magnetic_field: MagneticField::default(),
-        }
-    }
-
-    /// A message of outputs at a time.
-    fn message(time_us: u64, flags: u8) -> Vec<u8> {
-        let mut payload = vec![0; HIL_ACTUATOR_CONTROLS.length];
-        payload[..8].copy_from_slice(&time_us.to_le_bytes());
-        payload[8] = flags;
+    /// A message of outputs.
+    fn message(flags: u8, motor: f32) -> Vec<u8> {
         let mut bytes = Vec::new();
-        add_frame(&mut bytes, HIL_ACTUATOR_CONTROLS, 0, &payload);
+        add_frame(&mut bytes, HIL_ACTUATOR_CONTROLS, 0, |payload| {
+            payload.extend([0; 8]);
+            payload.extend([flags, 0, 0, 0, 0, 0, 0, 0]);
+            payload.extend(motor.to_le_bytes());
+            payload.extend([0; 61]);
+        });
         bytes
     }
 
     #[test]
-    fn an_answer_is_that_of_the_time_with_either_beginning_of_the_clock() {
-        let mut reader = Reader::new(HIL_ACTUATOR_CONTROLS);
-        for begins_us in [0, FIRST_TIME_US] {
-            let of = |sent: u64| FIRST_TIME_US + sent * SENSOR_PERIOD_US;
-            let mut bytes = [message(of(6) - begins_us, 1), message(of(7) - begins_us, 1)].concat();
-            let found = answer(&mut reader, &mut bytes, of(7)).unwrap().unwrap();
-            assert_eq!(found.time_us, of(7) - begins_us);
-            assert_eq!(answer(&mut reader, &mut bytes, of(7)), Ok(None));
-        }
-        let error = answer(&mut reader, &mut message(1000, 0), 1000).unwrap_err();
-        assert!(error.contains("without lockstep"), "{error}");
+    fn a_parameter_that_is_not_there_is_found_in_the_log() {
+        let log =
+            "ERROR [param] Parameter UXRCE_DDS_KEY not found.\nERROR [param] Parameter MC_ROL_P not found.\n";
+        assert_eq!(refused(log, "param set MC_ROLL_P 3\n"), None);
+        let line = Some("ERROR [param] Parameter MC_ROL_P not found.".to_owned());
+        assert_eq!(refused(log, "param set MC_ROL_P 3\n"), line);
     }
 
     #[test]
-    fn motors_are_the_rotors_in_order_and_none_is_no_number() {
-        let mut motors = [0.0; messages::MOTORS];
-        motors[..4].copy_from_slice(&[0.25, 0.5, -0.1, 1.0]);
-        let outputs = Outputs { time_us: 0, is_lockstep: true, is_armed: true, motors };
-        assert_eq!(hummingbird().throttles(&outputs).unwrap(), [0.25, 0.5, 0.0, 1.0]);
-        motors[3] = f32::NAN;
-        assert!(hummingbird().throttles(&Outputs { motors, ..outputs }).unwrap_err().contains("NaN"));
-    }
-
-    #[test]
-    fn instances_are_different() {
-        let [(first, _held), (second, _)] = [listener().unwrap(), listener().unwrap()];
-        assert!(first != second && INSTANCES.contains(&first), "{first} {second}");
+    fn the_last_outputs_count() {
+        assert_eq!(answer(&[]), Ok(None));
+        let bytes = [message(1, 0.25), message(1, 0.5)].concat();
+        assert_eq!(answer(&bytes).unwrap().unwrap().motors[0], 0.5);
+        assert!(answer(&message(0, 0.5)).unwrap_err().contains("without lockstep"));
     }
 }

@@ -12,7 +12,7 @@ const FIRST_SWITCH: usize = 5;
 /// Longest rest before tick 0, s.
 const REST_MAX_S: f64 = 3600.0;
 /// First bytes of a program for 64-bit Linux on a little-endian processor.
-pub const ELF_64: &[u8] = b"\x7fELF\x02\x01";
+const ELF_64: &[u8] = b"\x7fELF\x02\x01";
 /// Longest host time that an answer may take, s.
 const REPLY_TIMEOUT_MAX_S: f64 = 3600.0;
 
@@ -44,6 +44,42 @@ pub fn program(context: &NodeContext<'_>, path: &Path, expected: &str) -> Result
         format!("{}: expected a 64-bit Linux program (ELF): {expected}", path.display())
     })?;
     Ok(program)
+}
+
+/// The program at `path`, into which a library can be preloaded; `expected` as for [`program`].
+///
+/// # Errors
+/// It cannot be read, or is no such program.
+pub fn preloadable(
+    context: &NodeContext<'_>,
+    path: &Path,
+    expected: &str,
+) -> Result<Vec<u8>, ParameterError> {
+    let program = program(context, path, expected)?;
+    refuse(!has_interpreter(&program), "firmware", || {
+        format!(
+            "{}: it is linked statically, so that its clock stays the host's: no two runs would agree, and a run that waits for its \
+             answers would stall; build it with shared libraries",
+            path.display()
+        )
+    })?;
+    Ok(program)
+}
+
+/// True for an ELF program with a program header that names the dynamic linker.
+fn has_interpreter(program: &[u8]) -> bool {
+    /// Type of that header (`PT_INTERP`).
+    const INTERPRETER: u32 = 3;
+    let number = |at: usize, size: usize| -> Option<u64> {
+        let bytes = program.get(at..at.checked_add(size)?)?;
+        Some(bytes.iter().rev().fold(0, |number, byte| (number << 8) | u64::from(*byte)))
+    };
+    let headers = || {
+        let (first, size, count) = (number(32, 8)?, number(54, 2)?, number(56, 2)?);
+        let at = |index: u64| usize::try_from(first.checked_add(size * index)?).ok();
+        Some((0..count).any(|index| at(index).and_then(|at| number(at, 4)) == Some(INTERPRETER.into())))
+    };
+    headers() == Some(true)
 }
 
 /// The text of the configuration at `path`; empty without one.
@@ -104,4 +140,19 @@ pub fn reply_timeout(seconds: f64) -> Result<Duration, ParameterError> {
     positive_up_to("reply_timeout_s", seconds, REPLY_TIMEOUT_MAX_S, "s")?;
     // No socket waits for less than a microsecond.
     Ok(Duration::from_secs_f64(seconds.max(1e-3)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Any bytes are answered.
+    #[test]
+    fn what_is_cut_is_no_program() {
+        let program = std::fs::read("/proc/self/exe").unwrap();
+        assert!(has_interpreter(&program), "this test is linked with shared libraries");
+        for length in [0, 3, 6, 40, 64, 100] {
+            assert!(!has_interpreter(&program[..length]), "{length}");
+        }
+    }
 }

@@ -33,6 +33,18 @@ impl Stream {
         Ok(Self { firmware, socket, limit })
     }
 
+    /// Sets the time that an answer may take.
+    ///
+    /// # Errors
+    /// The socket refuses it.
+    pub fn limit(&mut self, limit: Duration) -> Result<(), String> {
+        let set = self.socket.set_read_timeout(Some(limit));
+        set.and_then(|()| self.socket.set_write_timeout(Some(limit)))
+            .map_err(|error| format!("no time limit for the firmware: {error}"))?;
+        self.limit = limit;
+        Ok(())
+    }
+
     /// Sends `bytes`.
     ///
     /// # Errors

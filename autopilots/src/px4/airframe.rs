@@ -12,6 +12,9 @@ const FIRST_MOTOR: usize = 101;
 /// The geometry is that of the rotors alone (`CA_AIRFRAME`: multirotor).
 const MULTIROTOR: usize = 0;
 
+/// Parameters that the user's may replace: no log, whose folder goes with the run; one estimator, since there is one of each sensor.
+const FIRST: [(&str, i32); 3] = [("SDLOG_MODE", -1), ("SENS_IMU_MODE", 1), ("EKF2_MULTI_IMU", 0)];
+
 /// Commands of the start-up script that set the user's parameters of `configured` and those of `vehicle`.
 ///
 /// # Errors
@@ -21,6 +24,9 @@ pub fn script(configured: &str, vehicle: &Vehicle) -> Result<String, String> {
     let mut set = |name: &str, value: &dyn std::fmt::Display| {
         let _ = writeln!(text, "param set {name} {value}");
     };
+    for (name, value) in FIRST {
+        set(name, &value);
+    }
     for (name, value) in parameter_lines::read(configured)? {
         set(name, &value);
     }
@@ -56,7 +62,8 @@ mod tests {
     fn rotors_keep_their_order_and_the_vehicle_counts_last() {
         let vehicle = Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml").unwrap();
         let text = script("# gains\nMC_ROLL_P 3.5\nCA_ROTOR_COUNT 6\n", &vehicle).unwrap();
-        assert!(text.starts_with("param set MC_ROLL_P 3.5\nparam set CA_ROTOR_COUNT 6\n"), "{text}");
+        assert!(text.starts_with("param set SDLOG_MODE -1\n"), "{text}");
+        assert!(text.contains("param set MC_ROLL_P 3.5\nparam set CA_ROTOR_COUNT 6\n"), "{text}");
         let last = |name: &str| -> f64 {
             let begin = format!("param set {name} ");
             text.lines().rev().find_map(|line| line.strip_prefix(&begin)).unwrap().parse().unwrap()

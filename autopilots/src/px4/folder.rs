@@ -1,61 +1,197 @@
-//! The folder of a PX4 that runs: its program, the commands of its start-up script, and the parameters.
+//! A build of PX4, and the folder in which it runs: its program, its start-up scripts, and the parameters.
 
 use crate::process::Scratch;
+use crate::settings;
+use bus::context::NodeContext;
+use diagnostics::ParameterError;
+use std::ffi::{OsStr, OsString};
+use std::fmt::Write as _;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Script with parameters of the user, which PX4's start-up script runs in its middle from wherever the search path has it first.
-const PARAMETER_SCRIPT: &str = "px4-rc.params";
-/// PX4's start-up script in the folder `etc` of its build.
-const START_UP_SCRIPT: &str = "init.d-posix/rcS";
-/// Beginning of the names of the start-up script's commands, which are PX4's program under other names.
-const COMMANDS: &str = "px4-";
+/// Scripts of the start-up, beside the folder of the program.
+const SCRIPTS: [&str; 2] = ["etc/init.d", "etc/init.d-posix"];
+const AIRFRAMES: &str = "etc/init.d-posix/airframes";
+const START_UP: &str = "etc/init.d-posix/rcS";
+/// Names of the start-up's commands, in the folder of the program.
+const ALIASES: &str = "px4-alias.sh";
+/// Start of PX4's links to ground stations. The script is replaced by an empty one, since a link takes ports and time.
+const LINKS: &str = "px4-rc.mavlink";
+/// The library in the folder above that in which PX4 runs: a path with a blank or a colon could not be preloaded.
+const LIBRARY: &str = "lockstep.so";
+pub const PRELOADED: &str = "../lockstep.so";
+
+/// The files of a build that a start needs, as they are attached to the recording.
+#[derive(Debug)]
+pub struct Build {
+    program: Vec<u8>,
+    aliases: String,
+    /// Scripts by their paths from the folder of the build.
+    scripts: Vec<(PathBuf, Vec<u8>)>,
+    /// The airframe among the scripts.
+    airframe: PathBuf,
+}
 
 /// Paths of the folder.
 #[derive(Debug)]
 pub struct Folder {
     /// The program.
     pub program: PathBuf,
-    /// The folder `etc` of the build.
-    pub etc: PathBuf,
     /// The folder in which it runs.
     pub root: PathBuf,
 }
 
-impl Folder {
-    /// Fills the folder of `scratch` with the program, which was built as `source`, and the commands that set its parameters.
+impl Build {
+    /// Reads the build of the program at `firmware`, with the airframe `model`.
     ///
     /// # Errors
-    /// A file of the build is not there, or one of the folder cannot be written.
-    pub fn fill(scratch: &Scratch, program: &[u8], source: &Path, parameters: &str) -> Result<Self, String> {
-        let source =
-            fs::canonicalize(source).map_err(|error| format!("cannot find {}: {error}", source.display()))?;
-        let build = source.parent().unwrap_or(&source);
-        let etc = build.with_file_name("etc");
-        if !etc.join(START_UP_SCRIPT).is_file() {
-            let (etc, script) = (etc.display(), START_UP_SCRIPT);
-            return Err(format!(
-                "no file {etc}/{script}: PX4 needs the folder `etc` of its build beside that of its program, bin/px4"
-            ));
+    /// A file is missing.
+    pub fn read(context: &NodeContext<'_>, firmware: &Path, model: &str) -> Result<Self, ParameterError> {
+        let program = settings::preloadable(context, firmware, "PX4's SITL, build/px4_sitl_default/bin/px4")?;
+        let refused = |reason: String| ParameterError::conflict("firmware", reason);
+        let unread = |path: &Path, error: io::Error| {
+            let path = path.display();
+            refused(format!(
+                "cannot read {path}: {error}: PX4 needs the folder `etc` of its build beside that of its program, bin/px4"
+            ))
+        };
+        let source = fs::canonicalize(firmware).map_err(|error| unread(firmware, error))?;
+        let bin = source.parent().unwrap_or(&source);
+        let folder = bin.parent().unwrap_or(bin);
+        let mut names = Vec::new();
+        for scripts in SCRIPTS {
+            let used = file_names(&folder.join(scripts)).filter(|name| is_script(scripts, name));
+            names.extend(used.map(|name| Path::new(scripts).join(name)));
         }
-        let program = scratch.write("px4", program)?;
-        link_commands(scratch, build)?;
-        scratch.write(PARAMETER_SCRIPT, parameters.as_bytes())?;
-        Ok(Self { program, etc, root: scratch.add_folder("rootfs")? })
+        let airframe = file_names(&folder.join(AIRFRAMES)).find(|name| is_airframe(name, model));
+        let airframe = airframe.map(|name| Path::new(AIRFRAMES).join(name)).ok_or_else(|| {
+            let airframes = folder.join(AIRFRAMES);
+            refused(format!(
+                "no airframe with the name `{model}` (parameter `model`) in {}: PX4 needs the folder `etc` of its build beside that \
+                 of its program, bin/px4",
+                airframes.display()
+            ))
+        })?;
+        names.push(airframe.clone());
+        let read = |path: &Path| context.files.bytes(path).map_err(|error| unread(path, error));
+        let script = |name: PathBuf| {
+            let bytes = read(&folder.join(&name))?;
+            Ok((name, bytes.to_vec()))
+        };
+        let aliases = String::from_utf8_lossy(&read(&bin.join(ALIASES))?).into_owned();
+        let scripts = names.into_iter().map(script).collect::<Result<_, ParameterError>>()?;
+        Ok(Self { program, aliases, scripts, airframe })
+    }
+
+    /// Fills the folder of `scratch`; `parameters` are commands that set parameters.
+    ///
+    /// # Errors
+    /// A file cannot be written.
+    pub fn fill(
+        &self,
+        scratch: &Scratch,
+        library: &[u8],
+        parameters: &str,
+        has_links: bool,
+    ) -> Result<Folder, String> {
+        let program = scratch.write("px4", &self.program)?;
+        scratch.write(LIBRARY, library)?;
+        scratch.write(ALIASES, relative(&self.aliases).as_bytes())?;
+        for command in commands(&self.aliases) {
+            scratch.link(OsStr::new(command), Path::new("px4"))?;
+        }
+        if !has_links {
+            scratch.write(LINKS, b"")?;
+        }
+        for folder in ["etc"].into_iter().chain(SCRIPTS).chain([AIRFRAMES]) {
+            scratch.add_folder(folder)?;
+        }
+        for (name, bytes) in &self.scripts {
+            let mut text = String::from_utf8_lossy(bytes).into_owned();
+            if name == Path::new(START_UP) {
+                text = in_order(&text);
+            }
+            // Behind the airframe's own parameters, and before a module starts.
+            if *name == self.airframe {
+                let _ = write!(text, "\n{parameters}");
+            }
+            scratch.write(&name.to_string_lossy(), text.as_bytes())?;
+        }
+        Ok(Folder { program, root: scratch.add_folder("rootfs")? })
     }
 }
 
-/// Links the commands of the start-up script: most of them are links to the program.
-fn link_commands(scratch: &Scratch, build: &Path) -> Result<(), String> {
-    let unread = |error: io::Error| format!("cannot read {}: {error}", build.display());
-    for entry in fs::read_dir(build).map_err(unread)? {
-        let entry = entry.map_err(unread)?;
-        let (name, path) = (entry.file_name(), entry.path());
-        if name.to_string_lossy().starts_with(COMMANDS) && name != PARAMETER_SCRIPT {
-            let to = if path.is_symlink() { Path::new("px4") } else { &path };
-            scratch.link(&name, to)?;
-        }
+/// True for a script that the start-up may run; the other `rcS` is for boards.
+fn is_script(folder: &str, name: &OsStr) -> bool {
+    let name = name.to_string_lossy();
+    name.starts_with("rc.")
+        || name.starts_with("px4-rc.")
+        || Path::new(folder).join(&*name) == Path::new(START_UP)
+}
+
+/// Names of the files in `folder`, sorted; empty if it cannot be read.
+fn file_names(folder: &Path) -> std::vec::IntoIter<OsString> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let files = entries.filter(|entry| entry.path().is_file());
+    let mut names: Vec<_> = files.map(|entry| entry.file_name()).collect();
+    names.sort();
+    names.into_iter()
+}
+
+/// True for a number, `_` and the name of `model`.
+fn is_airframe(name: &OsStr, model: &str) -> bool {
+    let name = name.to_string_lossy();
+    let number = name.strip_suffix(model).and_then(|rest| rest.strip_suffix('_'));
+    number.is_some_and(|number| !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit()))
+}
+
+/// The aliases with the folder in which PX4 runs as a relative path: a script would take a blank in the absolute one for its end.
+fn relative(aliases: &str) -> String {
+    let line = |line: &str| if line.starts_with("R=") { "R=./\n".to_owned() } else { format!("{line}\n") };
+    aliases.lines().map(line).collect()
+}
+
+/// Programs of the commands in the aliases: the first words of their values.
+fn commands(aliases: &str) -> impl Iterator<Item = &str> {
+    aliases.lines().filter_map(|line| {
+        let (_, value) = line.strip_prefix("alias ")?.split_once("='")?;
+        value.split([' ', '\'']).next().filter(|command| command.starts_with("px4-"))
+    })
+}
+
+/// The start-up script with all of its commands one after the other: it starts the estimator beside the commands that follow, in an
+/// order that would depend on the host.
+fn in_order(script: &str) -> String {
+    let line =
+        |line: &str| format!("{}\n", if line.ends_with(" start &") { &line[..line.len() - 2] } else { line });
+    script.lines().map(line).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scripts_are_independent_of_the_folder_and_run_in_order() {
+        let aliases =
+            "R=\"`pwd`/\"\nalias set=_set\nalias ekf2='px4-ekf2 --instance $px4_instance'\nalias x='px4-x'\n";
+        assert_eq!(commands(aliases).collect::<Vec<_>>(), ["px4-ekf2", "px4-x"]);
+        assert!(relative(aliases).starts_with("R=./\nalias set=_set\n"));
+        assert_eq!(in_order("if a\n\tekf2 start &\nb && c\n"), "if a\n\tekf2 start\nb && c\n");
     }
-    Ok(())
+
+    #[test]
+    fn scripts_are_those_of_the_simulation() {
+        let is = |folder: &str, name: &str| is_script(folder, OsStr::new(name));
+        assert!(is(SCRIPTS[1], "rcS") && is(SCRIPTS[1], "px4-rc.simulator") && is(SCRIPTS[0], "rc.mc_apps"));
+        assert!(!is(SCRIPTS[0], "rcS") && !is(SCRIPTS[1], "CMakeLists.txt"));
+    }
+
+    #[test]
+    fn an_airframe_is_found_by_its_name() {
+        let is = |name: &str| is_airframe(OsStr::new(name), "none_iris");
+        assert!(is("10016_none_iris"));
+        assert!(!is("10016_none_iris.post") && !is("_none_iris") && !is("10016_gz_none_iris"));
+    }
 }

@@ -6,6 +6,9 @@ const START: u8 = 0xFD;
 /// Bytes before the payload: the start, the payload's length, two flags, a sequence number, system, component, and the message's
 /// number in three bytes.
 const HEAD: usize = 10;
+/// First byte of a frame of MAVLink 1, and bytes before its payload.
+const START_1: u8 = 0xFE;
+const HEAD_1: usize = 6;
 /// Bytes of the checksum.
 const CHECKSUM: usize = 2;
 /// Flag of a frame with a signature, and the bytes of that behind the checksum.
@@ -37,90 +40,66 @@ fn checksum(bytes: impl IntoIterator<Item = u8>) -> u16 {
     })
 }
 
-/// Adds the frame of a payload to `bytes`.
+/// Adds a frame to `bytes`; `add_payload` adds its payload.
 #[allow(clippy::cast_possible_truncation, reason = "no payload is longer than 255 bytes")]
-pub fn add_frame(bytes: &mut Vec<u8>, kind: Kind, sequence: u8, payload: &[u8]) {
-    debug_assert_eq!(payload.len(), kind.length);
-    let length = payload.iter().rposition(|byte| *byte != 0).map_or(1, |last| last + 1);
+pub fn add_frame(bytes: &mut Vec<u8>, kind: Kind, sequence: u8, add_payload: impl FnOnce(&mut Vec<u8>)) {
     let from = bytes.len();
     let [system, component] = SENDER;
-    bytes.extend([START, length as u8, 0, 0, sequence, system, component, kind.id, 0, 0]);
-    bytes.extend(&payload[..length]);
+    bytes.extend([START, 0, 0, 0, sequence, system, component, kind.id, 0, 0]);
+    add_payload(bytes);
+    let payload = &bytes[from + HEAD..];
+    debug_assert_eq!(payload.len(), kind.length);
+    let length = payload.iter().rposition(|byte| *byte != 0).map_or(1, |last| last + 1);
+    bytes.truncate(from + HEAD + length);
+    bytes[from + 1] = length as u8;
     let sum = checksum(bytes[from + 1..].iter().copied().chain([kind.extra]));
     bytes.extend(sum.to_le_bytes());
 }
 
-/// Reader of the frames of one kind in a stream of bytes. Other frames, and bytes that are none, are skipped.
-#[derive(Clone, Copy, Debug)]
-pub struct Reader {
-    kind: Kind,
-    /// Frames of this kind with a wrong checksum.
-    pub wrong: u64,
-}
-
-impl Reader {
-    /// Reads frames of `kind`.
-    #[must_use]
-    pub fn new(kind: Kind) -> Self {
-        Self { kind, wrong: 0 }
-    }
-
-    /// Payload of the next frame in `bytes`, with its zeros, and removes it and all before it; `None` if it is not there yet.
-    pub fn next(&mut self, bytes: &mut Vec<u8>) -> Option<Vec<u8>> {
-        let mut at = 0;
-        let mut found = None;
-        while found.is_none() && at < bytes.len() {
-            match self.look(&bytes[at..]) {
-                Look::Other => at += 1,
-                Look::Wrong => (at, self.wrong) = (at + 1, self.wrong + 1),
-                Look::Part => break,
-                Look::Frame(length, payload) => (at, found) = (at + length, Some(payload)),
+/// Payloads of the frames of `kind` in `bytes`, without their zeros at the end. Frames of other kinds are skipped.
+///
+/// # Errors
+/// The bytes are not frames from one end to the other, or a frame of the kind has a wrong checksum.
+pub fn frames(kind: Kind, mut bytes: &[u8]) -> impl Iterator<Item = Result<&[u8], String>> {
+    std::iter::from_fn(move || {
+        while !bytes.is_empty() {
+            let (frame, rest) = match bytes.split_at_checked(frame_length(bytes)) {
+                Some(split) if !split.0.is_empty() => split,
+                _ => {
+                    let found = &bytes[..bytes.len().min(HEAD)];
+                    let error = format!("it sends {found:02x?}, expected a frame of MAVLink");
+                    bytes = &[];
+                    return Some(Err(error));
+                }
+            };
+            bytes = rest;
+            if frame[0] == START && frame[7..HEAD] == [kind.id, 0, 0] {
+                return Some(payload(kind, frame));
             }
         }
-        bytes.drain(..at);
-        found
-    }
+        None
+    })
+}
 
-    /// The frame at the beginning of `bytes`.
-    fn look(&self, bytes: &[u8]) -> Look {
-        let Kind { id, extra, length: length_max } = self.kind;
-        // A frame of another kind, or a start byte by chance, is not waited for to its end.
-        let is_possible = |at: usize, fits: &dyn Fn(u8) -> bool| bytes.get(at).is_none_or(|byte| fits(*byte));
-        let is_ours = is_possible(0, &|byte| byte == START)
-            && is_possible(1, &|length| usize::from(length) <= length_max)
-            && is_possible(2, &|flags| flags & !SIGNED == 0)
-            && is_possible(7, &|byte| byte == id)
-            && is_possible(8, &|byte| byte == 0)
-            && is_possible(9, &|byte| byte == 0);
-        if !is_ours {
-            return Look::Other;
+/// Length of the frame at the beginning of `bytes`; 0 if there is none.
+fn frame_length(bytes: &[u8]) -> usize {
+    match *bytes {
+        [START, length, flags, ..] => {
+            HEAD + usize::from(length) + CHECKSUM + if flags & SIGNED == 0 { 0 } else { SIGNATURE }
         }
-        let [_, length, flags, ..] = bytes else { return Look::Part };
-        let end = HEAD + usize::from(*length);
-        let signature = if flags & SIGNED == 0 { 0 } else { SIGNATURE };
-        if bytes.len() < end + CHECKSUM + signature {
-            return Look::Part;
-        }
-        let sum = checksum(bytes[1..end].iter().copied().chain([extra]));
-        if bytes[end..end + CHECKSUM] != sum.to_le_bytes() {
-            return Look::Wrong;
-        }
-        let mut payload = bytes[HEAD..end].to_vec();
-        payload.resize(length_max, 0);
-        Look::Frame(end + CHECKSUM + signature, payload)
+        [START_1, length, ..] => HEAD_1 + usize::from(length) + CHECKSUM,
+        _ => 0,
     }
 }
 
-/// Beginning of a stream of bytes.
-enum Look {
-    /// No frame of the kind.
-    Other,
-    /// A part of a frame of the kind.
-    Part,
-    /// A frame of the kind with a wrong checksum.
-    Wrong,
-    /// A frame, with its length and its payload.
-    Frame(usize, Vec<u8>),
+/// Payload of a frame of `kind`.
+fn payload(kind: Kind, frame: &[u8]) -> Result<&[u8], String> {
+    let end = HEAD + usize::from(frame[1]);
+    let sum = checksum(frame[1..end].iter().copied().chain([kind.extra]));
+    if frame[end..end + CHECKSUM] == sum.to_le_bytes() {
+        return Ok(&frame[HEAD..end]);
+    }
+    Err(format!("its message {} has a wrong checksum", kind.id))
 }
 
 #[cfg(test)]
@@ -129,9 +108,9 @@ mod tests {
 
     const KIND: Kind = Kind { id: 93, extra: 47, length: 81 };
 
-    fn framed(sequence: u8, payload: &[u8]) -> Vec<u8> {
+    fn framed(kind: Kind, payload: &[u8]) -> Vec<u8> {
         let mut bytes = Vec::new();
-        add_frame(&mut bytes, KIND, sequence, payload);
+        add_frame(&mut bytes, kind, 7, |bytes| bytes.extend(payload));
         bytes
     }
 
@@ -144,44 +123,40 @@ mod tests {
     #[test]
     fn zeros_at_the_end_of_a_payload_are_not_sent() {
         let mut payload = [0; 81];
-        assert_eq!(framed(7, &payload).len(), HEAD + 1 + CHECKSUM, "the first byte is sent always");
+        assert_eq!(framed(KIND, &payload).len(), HEAD + 1 + CHECKSUM, "the first byte is sent always");
         payload[4] = 9;
-        let bytes = framed(7, &payload);
+        let bytes = framed(KIND, &payload);
         assert_eq!(bytes[..HEAD], [0xFD, 5, 0, 0, 7, 1, 200, 93, 0, 0]);
-        assert_eq!(Reader::new(KIND).next(&mut bytes.clone()).unwrap(), payload);
+        assert_eq!(frames(KIND, &bytes).next().unwrap().unwrap(), &payload[..5]);
     }
 
     #[test]
-    fn frames_are_found_among_others_and_in_pieces() {
-        let payload: Vec<u8> = (1..=81).collect();
-        let frame = framed(3, &payload);
-        let mut other = Vec::new();
-        add_frame(&mut other, Kind { id: 0, extra: 50, length: 9 }, 2, &[1, 2, 3, 4, 5, 6, 7, 8, 9]);
-        let mut reader = Reader::new(KIND);
-        // The bytes before the frame begin frames that never end.
-        for before in [&b""[..], &[0xFD], &[0xFD, 0xFF], &[0xFD, 81, 0, 0], &[0xFE, 0xFD, 80, 1], &other] {
-            let mut bytes = [before, &frame].concat();
-            for cut in 0..bytes.len() {
-                let mut part = bytes[..cut].to_vec();
-                assert_eq!(reader.next(&mut part), None, "{before:?}, {cut} bytes");
-                part.extend(&bytes[cut..]);
-                assert_eq!(reader.next(&mut part).as_ref(), Some(&payload), "{before:?}, {cut} bytes");
-            }
-            bytes.extend(&frame);
-            assert!(reader.next(&mut bytes).is_some() && reader.next(&mut bytes).is_some());
-            assert!(bytes.is_empty());
+    fn frames_are_found_among_others() {
+        // Its payload has the beginning of a frame of the kind.
+        let other = framed(Kind { id: 0, extra: 50, length: 9 }, &[0xFD, 81, 0, 0, 1, 1, 1, 93, 2]);
+        let old = [&[0xFE, 1, 0, 1, 1, 0, 5][..], &[0, 0]].concat();
+        let mut signed = framed(KIND, &[6; 81]);
+        signed[2] |= SIGNED;
+        let sum = checksum(signed[1..HEAD + 81].iter().copied().chain([KIND.extra]));
+        signed.truncate(HEAD + 81);
+        signed.extend(sum.to_le_bytes());
+        signed.extend([0xFD; SIGNATURE]);
+        let bytes = [&other, &old, &framed(KIND, &[5; 81])[..], &signed, &other].concat();
+        let found: Result<Vec<_>, _> = frames(KIND, &bytes).collect();
+        assert_eq!(found.unwrap(), [&[5; 81][..], &[6; 81]]);
+    }
+
+    #[test]
+    fn other_bytes_and_wrong_checksums_are_told() {
+        let frame = framed(KIND, &[5; 81]);
+        let mut wrong = frame.clone();
+        wrong[20] ^= 1;
+        let told = |bytes: &[u8]| frames(KIND, bytes).find_map(Result::err).unwrap_or_default();
+        assert!(told(&wrong).contains("message 93 has a wrong checksum"));
+        assert!(told(&[&frame[..], b"px4"].concat()).contains("it sends [70, 78, 34]"));
+        for cut in 1..frame.len() {
+            assert!(told(&frame[..cut]).contains("expected a frame"), "{cut}");
         }
-        assert_eq!(reader.wrong, 0);
-    }
-
-    #[test]
-    fn a_wrong_checksum_is_counted_and_the_next_frame_is_found() {
-        let frame = framed(3, &[5; 81]);
-        let mut bytes = frame.clone();
-        bytes[20] ^= 1;
-        bytes.extend(&frame);
-        let mut reader = Reader::new(KIND);
-        assert!(reader.next(&mut bytes).is_some());
-        assert_eq!((reader.wrong, bytes.len()), (1, 0));
+        assert_eq!(told(&frame), "");
     }
 }

@@ -71,8 +71,10 @@ pub fn of(
         process.parameters.iter().map(|(key, value)| (key.get_ref().as_str(), value.clone())).collect();
     // Copies of files with the values of `--set`, and their originals.
     let mut edited: Vec<(String, String)> = Vec::new();
+    let mut has_firmware = false;
     for (key, file) in files(process) {
         let Some(file) = file else { continue };
+        has_firmware |= key == "firmware";
         // As the node gets it.
         let original = manifest.resolve(file)?;
         let path = manifest.with_edits(declared.files, name.get_ref(), key, original.clone())?;
@@ -119,6 +121,10 @@ pub fn of(
             }
         };
         kind.check(&parameters, &context).map_err(|error| copies(refused(declared, &error)))?;
+        // A firmware has files beside its program.
+        if has_firmware {
+            notes.models.extend(read.used().into_iter().map(|file| file.path));
+        }
         for warning in context.into_warnings() {
             let at = place(declared, &warning.key);
             if !(warning.is_behind_end && notes.is_cut(manifest, &at)) {
