@@ -1,8 +1,8 @@
 //! ArduCopter's software in the loop, SITL, by its JSON interface (`libraries/SITL/SIM_JSON.cpp` of ArduPilot; read in several
-//! versions, not flown).
+//! versions, flown with 4.6.0-dev).
 //!
 //! The firmware sends first: a packet of its outputs. Then it waits for the answer, which is the tick's sensors as JSON, and whose
-//! timestamp is its clock. So it is in lockstep by itself.
+//! timestamp is its clock. So it is in lockstep by itself. The remote control has a port of its own ([`remote_control`]).
 //!
 //! Axes as its answer has them: body forward, right, down; world north, east, down. The world's x is east, its y north
 //! ([`crate::origin`]).
@@ -11,6 +11,7 @@ mod answer;
 mod frames;
 mod outputs;
 mod parameter_file;
+mod remote_control;
 
 use crate::autopilot::{Autopilot, Sensed, Throttles};
 use crate::datagrams::{self, Datagrams};
@@ -25,7 +26,9 @@ use diagnostics::ParameterError;
 use diagnostics::parameter::refuse;
 use frames::{FRAMES, FrameNumbers};
 use outputs::Outputs;
+use remote_control::RemoteControl;
 use serde::Deserialize;
+use std::io;
 use std::path::PathBuf;
 use std::process::Command;
 use std::time::Duration;
@@ -38,6 +41,8 @@ const ARMED_S: f64 = 4.0;
 const PERIOD_MAX_S: f64 = 0.1;
 /// Heading of the vehicle that rests, degrees from north: its x points east.
 const HEADING_DEG: f64 = 90.0;
+/// Date of the firmware's start, by which its GPS tells the time: 2025-01-01T00:00:00Z, in seconds since 1970. Without it, it is the host's.
+const START_TIME_S: u32 = 1_735_689_600;
 /// Name of the parameter file in the folder of the firmware.
 const PARAMETER_FILE: &str = "hummingbus.parm";
 /// Serial ports that stay closed: by default 0 waits for a connection, and 0 to 2 have fixed TCP ports, on which a second
@@ -70,10 +75,10 @@ pub struct Parameters {
     origin: Origin,
 }
 
-/// The estimator (EKF3) aligns its attitude within seconds, and waits 10 s for a GPS whose errors stay small before it uses it;
-/// about 30 s pass until ArduPilot's own tests find it ready.
+/// The estimator (EKF3) aligns its attitude within 6 s, and uses its GPS from 41 s on (measured, ArduCopter 4.6.0-dev); the last 4 s are
+/// for arming.
 fn rest_s() -> f64 {
-    40.0
+    45.0
 }
 
 /// ArduCopter as the manifest has it.
@@ -90,10 +95,24 @@ pub struct ArduPilot {
     origin: Origin,
 }
 
+/// Ports of the loopback by which the firmware talks to the simulator.
+#[derive(Debug)]
+struct Ports {
+    /// Of this process, to which it sends its outputs.
+    output: u16,
+    /// For its sensors; it has none with the JSON interface, but needs a number.
+    input: u16,
+    /// For its remote control.
+    rc: u16,
+    /// For its landing beacon.
+    beacon: u16,
+}
+
 /// The firmware that runs.
 #[derive(Debug)]
 pub struct Link {
     datagrams: Datagrams,
+    remote_control: RemoteControl,
     /// Answers sent.
     steps: u64,
     /// Frame count of its last packet.
@@ -113,7 +132,7 @@ impl Autopilot for ArduPilot {
         let layout = Layout::of(&vehicle.rotors, &FRAMES).map_err(refused)?;
         let numbers = FrameNumbers::of(&layout).map_err(refused)?;
         let program = settings::program(context, &firmware, "ArduCopter's SITL, build/sitl/bin/arducopter")?;
-        settings::check_arming(armed_by_channel, answer::CHANNELS)?;
+        settings::check_arming(armed_by_channel, remote_control::CHANNELS)?;
         settings::check_rest(rest_s, ARMED_S, armed_by_channel)?;
         parameters.origin.check()?;
         let period_s = context.period_s();
@@ -151,13 +170,17 @@ impl Autopilot for ArduPilot {
         let scratch = Scratch::new("ardupilot")?;
         let program = scratch.write("ardupilot", &self.firmware)?;
         scratch.write(PARAMETER_FILE, self.parameters.as_bytes())?;
-        let socket = datagrams::bound().map_err(|error| format!("no socket to ardupilot: {error}"))?;
-        let port = socket.local_addr().map_err(|error| format!("no port to ardupilot: {error}"))?.port();
+        let no_socket = |error: io::Error| format!("no socket to ardupilot: {error}");
+        let (socket, sticks) =
+            (datagrams::bound().map_err(no_socket)?, datagrams::bound().map_err(no_socket)?);
+        let output = socket.local_addr().map_err(no_socket)?.port();
+        let [input, rc, beacon] = datagrams::free_ports().map_err(no_socket)?;
         let mut command = scratch.command(&program)?;
-        self.add_arguments(&mut command, port)?;
+        self.add_arguments(&mut command, &Ports { output, input, rc, beacon });
         let mut datagrams = Datagrams::start(scratch, command, socket, self.reply_timeout)?;
         let first = datagrams.receive(|bytes| Outputs::read(bytes).map(Some))?;
-        let mut link = Link { datagrams, steps: 0, frame: first.frame };
+        let remote_control = RemoteControl::new(sticks, rc);
+        let mut link = Link { datagrams, remote_control, steps: 0, frame: first.frame };
         if self.rest.of(self, &mut link)? {
             return Ok(link);
         }
@@ -167,6 +190,7 @@ impl Autopilot for ArduPilot {
 
     fn exchange(&self, link: &mut Link, sensed: &Sensed<'_>) -> Result<Throttles, String> {
         link.steps += 1;
+        link.remote_control.send(sensed.rc)?;
         let time_s = answer::timestamp_s(link.steps, self.rest.period_s);
         link.datagrams.send(answer::text(time_s, sensed).as_bytes())?;
         let last = link.frame;
@@ -177,15 +201,15 @@ impl Autopilot for ArduPilot {
 }
 
 impl ArduPilot {
-    /// Arguments of the program, which sends to `port`.
-    fn add_arguments(&self, command: &mut Command, port: u16) -> Result<(), String> {
-        let free = datagrams::free_ports().map_err(|error| format!("no port for ardupilot: {error}"))?;
-        let [input, rc, beacon] = free;
+    /// Arguments of the program.
+    fn add_arguments(&self, command: &mut Command, ports: &Ports) {
         let Origin { latitude_deg, longitude_deg, altitude_m } = self.origin;
         command.args(["--model", "JSON:127.0.0.1", "--speedup", "1", "--defaults", PARAMETER_FILE]);
         command.arg("--home").arg(format!("{latitude_deg},{longitude_deg},{altitude_m},{HEADING_DEG}"));
+        command.arg("--start-time").arg(START_TIME_S.to_string());
+        let Ports { output, input, rc, beacon } = ports;
         let ports =
-            [("sim-port-out", port), ("sim-port-in", input), ("rc-in-port", rc), ("irlock-port", beacon)];
+            [("sim-port-out", output), ("sim-port-in", input), ("rc-in-port", rc), ("irlock-port", beacon)];
         for (name, port) in ports {
             command.arg(format!("--{name}")).arg(port.to_string());
         }
@@ -193,7 +217,6 @@ impl ArduPilot {
             command.arg(format!("--serial{port}")).arg("none:0");
         }
         command.args(&self.arguments);
-        Ok(())
     }
 
     /// Outputs by rotor.
@@ -219,7 +242,7 @@ mod tests {
             firmware: Vec::new(),
             parameters: String::new(),
             arguments: vec!["--serial0".to_owned(), "tcp:0".to_owned()],
-            rest: Rest { time_s: 40.0, armed_s: ARMED_S, armed_by_channel: None, period_s: 1e-3 },
+            rest: Rest { time_s: 45.0, armed_s: ARMED_S, armed_by_channel: None, period_s: 1e-3 },
             reply_timeout: Duration::from_secs(1),
             origin: Origin::default(),
         }
@@ -237,11 +260,12 @@ mod tests {
     #[test]
     fn arguments_name_the_ports_and_the_users_are_last() {
         let mut command = Command::new("arducopter");
-        hummingbird().add_arguments(&mut command, 4711).unwrap();
+        hummingbird().add_arguments(&mut command, &Ports { output: 4711, input: 1, rc: 4712, beacon: 2 });
         let arguments: Vec<&str> = command.get_args().map(|argument| argument.to_str().unwrap()).collect();
         let text = arguments.join(" ");
         assert!(
-            text.contains("--home 47.397742,8.545594,488,90 --sim-port-out 4711 --sim-port-in "),
+            text.contains("--home 47.397742,8.545594,488,90 --start-time 1735689600 --sim-port-out 4711 ")
+                && text.contains(" --rc-in-port 4712 "),
             "{text}"
         );
         assert!(

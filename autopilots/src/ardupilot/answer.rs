@@ -1,15 +1,12 @@
 //! The answer to the firmware: a line of JSON with the tick's sensors.
 //!
 //! Most versions do not parse it as JSON: they look for each key by its text, and read the number two characters behind the key. So
-//! no blank follows a colon, and a key that begins another one (`rc_1`, `rc_10`) stands before it.
+//! no blank follows a colon, and a key that begins another one stands before it.
 
 use crate::autopilot::Sensed;
 use crate::axes::{attitude, forward_right_down, north_east_down};
-use crate::rest::pulse_us;
 use std::fmt::Write as _;
 
-/// Channels of its remote control.
-pub const CHANNELS: usize = 12;
 /// Excess of the timestamps over the run's time, as a part: the firmware cuts each step to whole microseconds, and a step that
 /// is rounded to just below them would lose one. At 8 kHz it is above the rounding of a double for 30 days.
 const EXCESS: f64 = 1e-6;
@@ -21,7 +18,7 @@ pub fn timestamp_s(step: u64, period_s: f64) -> f64 {
 
 /// The answer at a time of the firmware's clock.
 pub fn text(time_s: f64, sensed: &Sensed<'_>) -> String {
-    let Sensed { imu, estimate, rc, .. } = sensed;
+    let Sensed { imu, estimate, .. } = sensed;
     let (gyro, force) = (forward_right_down(imu.angular_velocity), forward_right_down(imu.specific_force));
     let (position, velocity) = (north_east_down(estimate.position), north_east_down(estimate.velocity));
     let attitude = attitude(estimate.attitude);
@@ -30,12 +27,7 @@ pub fn text(time_s: f64, sensed: &Sensed<'_>) -> String {
     let _ = write!(text, "\"gyro\":{},\"accel_body\":{}}},", list(&gyro), list(&force));
     let _ = write!(text, "\"position\":{},\"velocity\":{},", list(&position), list(&velocity));
     // The firmware is not to pace itself: the run has its pace. A number, since older versions read `true` as 0.
-    let _ = write!(text, "\"quaternion\":{},\"no_time_sync\":1,\"rc\":{{", list(&attitude));
-    for channel in 0..CHANNELS {
-        let separator = if channel == 0 { "" } else { "," };
-        let _ = write!(text, "{separator}\"rc_{}\":{}", channel + 1, pulse_us(rc, channel));
-    }
-    text.push_str("}}\n");
+    let _ = writeln!(text, "\"quaternion\":{},\"no_time_sync\":1}}", list(&attitude));
     text
 }
 
@@ -52,7 +44,7 @@ mod tests {
     use nalgebra::{Quaternion as Product, UnitQuaternion};
     use serde_json::{Value, json};
 
-    fn sample(attitude: UnitQuaternion<f64>) -> (Imu, StateEstimate, RcChannels) {
+    fn sample(attitude: UnitQuaternion<f64>) -> (Imu, StateEstimate) {
         let imu = Imu {
             angular_velocity: [0.1, 0.2, 0.3].into(),
             specific_force: [1.0, 2.0, 9.81].into(),
@@ -65,14 +57,12 @@ mod tests {
             position: [6.0, 7.0, 8.0].into(),
             ..StateEstimate::default()
         };
-        let rc =
-            RcChannels { pulse: [1500.4, 1500.6, 900.0, 1100.0, 2000.0].into(), ..RcChannels::default() };
-        (imu, estimate, rc)
+        (imu, estimate)
     }
 
     fn line(attitude: UnitQuaternion<f64>) -> String {
-        let (imu, estimate, rc) = sample(attitude);
-        text(1.5, &Sensed { time_s: 0.0, imu: &imu, estimate: &estimate, rc: &rc })
+        let (imu, estimate) = sample(attitude);
+        text(1.5, &Sensed { time_s: 0.0, imu: &imu, estimate: &estimate, rc: &RcChannels::default() })
     }
 
     /// Roll, pitch and yaw that the firmware reads: to the right, nose up, clockwise from north, degrees.
@@ -87,7 +77,7 @@ mod tests {
     #[test]
     fn the_line_has_the_firmwares_axes() {
         let line = line(UnitQuaternion::identity());
-        assert!(line.starts_with("\n{\"timestamp\":1.5,") && line.ends_with("}}\n"), "{line}");
+        assert!(line.starts_with("\n{\"timestamp\":1.5,") && line.ends_with(":1}\n"), "{line}");
         assert_eq!(line.matches('\n').count(), 2);
         let value: Value = serde_json::from_str(&line).unwrap();
         assert_eq!(value["imu"]["gyro"], json!([0.1, -0.2, -0.3]), "forward, right, down");
@@ -95,8 +85,6 @@ mod tests {
         assert_eq!(value["position"], json!([7.0, 6.0, -8.0]), "north, east, down");
         assert_eq!(value["velocity"], json!([4.0, 3.0, -5.0]));
         assert_eq!(value["no_time_sync"], json!(1), "a number");
-        let pulses: Vec<u64> = (1..=12).map(|at| value["rc"][format!("rc_{at}")].as_u64().unwrap()).collect();
-        assert_eq!(pulses[..6], [1500, 1501, 900, 1100, 2000, 1000], "what is not sent is off");
     }
 
     /// As most versions find a key: its first occurrence, then the number two characters behind its end.
@@ -110,10 +98,7 @@ mod tests {
             ("position", "[7.0"),
             ("velocity", "[4.0"),
             ("quaternion", "[0.7"),
-            ("no_time_sync", "1,"),
-            ("rc_1", "1500,"),
-            ("rc_2", "1501,"),
-            ("rc_12", "1000}"),
+            ("no_time_sync", "1}"),
         ] {
             let at = line.find(key).unwrap() + key.len() + 2;
             assert!(line[at..].starts_with(begins), "{key}: {}", &line[at..]);

@@ -9,8 +9,9 @@ pub const PULSE_MIN_US: f64 = 1000.0;
 pub const PULSE_RANGE_US: f64 = 1000.0;
 /// Function of an output that drives the first motor (`SERVOn_FUNCTION`); those of the next motors follow.
 const FIRST_MOTOR: usize = 33;
-/// A firmware that is not paced takes its attitude from the simulation (10), unless it is told to estimate it (3: EKF3).
-const ESTIMATOR: (&str, &str) = ("AHRS_EKF_TYPE", "3");
+/// Values of this component where the user has none. A firmware that is not paced takes its attitude from the simulation (10), unless
+/// it is told to estimate it (3: EKF3). Its log would go with its folder, and is written by a thread whose locks its main thread awaits.
+const DEFAULTS: [(&str, &str); 2] = [("AHRS_EKF_TYPE", "3"), ("LOG_BACKEND_TYPE", "0")];
 
 /// Text of the file with the user's parameters of `configured`, for a frame of `motors` motors.
 ///
@@ -22,9 +23,11 @@ pub fn text(configured: &str, frame: &FrameNumbers, motors: usize) -> Result<Str
     // The firmware does not say which one of two values of a name counts.
     lines.retain(|(name, _)| !follows.iter().any(|(other, _)| other.eq_ignore_ascii_case(name)));
     let mut text = String::new();
-    if !lines.iter().any(|(name, _)| name.eq_ignore_ascii_case(ESTIMATOR.0)) {
-        lines.insert(0, ESTIMATOR);
-    }
+    let absent = DEFAULTS
+        .into_iter()
+        .filter(|(name, _)| !lines.iter().any(|(other, _)| other.eq_ignore_ascii_case(name)));
+    let absent: Vec<_> = absent.collect();
+    lines.splice(0..0, absent);
     let follows = follows.iter().map(|(name, value)| (name.as_str(), value.as_str()));
     for (name, value) in lines.into_iter().chain(follows) {
         let _ = writeln!(text, "{name} {value}");
@@ -56,10 +59,10 @@ mod tests {
     fn the_users_parameters_are_kept_but_for_those_of_the_vehicle() {
         let user =
             "# Hummingbird\n\nRC5_OPTION 153\nFRAME_TYPE,1\nSERVO2_FUNCTION=0\r\nPSC_X\t-1.5e-1  # why\n";
-        let expected = "AHRS_EKF_TYPE 3\nRC5_OPTION 153\nPSC_X -1.5e-1\nFRAME_CLASS 1\nFRAME_TYPE 0\nMOT_PWM_MIN 1000\n\
+        let expected = "AHRS_EKF_TYPE 3\nLOG_BACKEND_TYPE 0\nRC5_OPTION 153\nPSC_X -1.5e-1\nFRAME_CLASS 1\nFRAME_TYPE 0\nMOT_PWM_MIN 1000\n\
                         MOT_PWM_MAX 2000\nSERVO1_FUNCTION 33\nSERVO2_FUNCTION 34\nSERVO3_FUNCTION 35\nSERVO4_FUNCTION 36\n";
         assert_eq!(text(user, &PLUS, 4).unwrap(), expected);
-        let other = text("AHRS_EKF_TYPE 10\n", &PLUS, 4).unwrap();
-        assert!(other.starts_with("AHRS_EKF_TYPE 10\nFRAME_CLASS"), "{other}");
+        let other = text("AHRS_EKF_TYPE 10\nLOG_BACKEND_TYPE 1\n", &PLUS, 4).unwrap();
+        assert!(other.starts_with("AHRS_EKF_TYPE 10\nLOG_BACKEND_TYPE 1\nFRAME_CLASS"), "{other}");
     }
 }

@@ -11,7 +11,10 @@
 #include <unistd.h>
 
 static struct { uint16_t magic, rate; uint32_t frame; uint16_t pulse[16]; } packet = { .magic = 18458, .rate = 1000 };
-static double now, gyro[3], force[3], position[3], velocity[3], attitude[4], rc[12];
+static double now, gyro[3], force[3], position[3], velocity[3], attitude[4];
+/* As the firmware has them until the first packet comes. */
+static double rc[16] = { 1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800 };
+static int rc_port;
 static char parameters[100][2][40];
 static int count;
 
@@ -62,7 +65,7 @@ static void read_parameters(const char *path)
             fail("no parameter", line);
     fclose(in);
     require("FRAME_CLASS", 1), require("FRAME_TYPE", 0), require("MOT_PWM_MIN", 1000), require("MOT_PWM_MAX", 2000);
-    require("SERVO1_FUNCTION", 33), require("SERVO4_FUNCTION", 36), require("AHRS_EKF_TYPE", 3);
+    require("SERVO1_FUNCTION", 33), require("SERVO4_FUNCTION", 36), require("AHRS_EKF_TYPE", 3), require("LOG_BACKEND_TYPE", 0);
 }
 
 /* Two firmwares with the same port fail. */
@@ -100,10 +103,25 @@ static void take(char *text, ssize_t length)
     numbers(text, "no_time_sync", &unpaced, 1);
     if (unpaced != 1 || !(now > last) || !(now - last < 0.1))
         fail("another clock", text);
-    for (int channel = 0; channel < 12; channel++) {
-        char key[8];
-        snprintf(key, sizeof key, "rc_%d", channel + 1);
-        numbers(text, key, &rc[channel], 1);
+}
+
+/* As the firmware does: every 10 ms it takes the newest packet that is there, and it opens the port when it first looks. */
+static void take_rc(void)
+{
+    static double next = 0.01;
+    static int fd = -1;
+    uint16_t taken[16];
+    if (now < next)
+        return;
+    next = now + 0.01;
+    if (fd < 0)
+        fd = bound(rc_port);
+    for (ssize_t length; (length = recv(fd, taken, sizeof taken, MSG_DONTWAIT | MSG_TRUNC)) >= 0;) {
+        if (length != sizeof taken)
+            fail("another length", "remote control");
+        for (int channel = 0; channel < 16; channel++)
+            if (taken[channel])
+                rc[channel] = taken[channel];
     }
 }
 
@@ -148,7 +166,7 @@ static void misbehave(void)
 
 int main(int words_count, char **words)
 {
-    const char *others[] = { "--sim-port-in", "--rc-in-port", "--irlock-port" };
+    const char *others[] = { "--sim-port-in", "--irlock-port" };
     struct sockaddr_in to = { .sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK) };
     setvbuf(stdout, NULL, _IOLBF, 0);
     if (strcmp(argument(words_count, words, "--model"), "JSON:127.0.0.1") || strcmp(argument(words_count, words, "--speedup"), "1"))
@@ -159,8 +177,11 @@ int main(int words_count, char **words)
     /* The first serial port would wait for a connection. */
     if (strcmp(argument(words_count, words, "--serial0"), "none:0"))
         fail("an open port", "--serial0");
-    for (int at = 0; at < 3; at++)
+    /* Without it, the firmware's GPS tells the host's time. */
+    argument(words_count, words, "--start-time");
+    for (int at = 0; at < 2; at++)
         bound(atoi(argument(words_count, words, others[at])));
+    rc_port = atoi(argument(words_count, words, "--rc-in-port"));
     to.sin_port = htons(atoi(argument(words_count, words, "--sim-port-out")));
     read_parameters(argument(words_count, words, "--defaults"));
     printf("Stands in for ArduCopter\n");
@@ -169,7 +190,7 @@ int main(int words_count, char **words)
     if (parameter("MUTE", 0))
         pause();
     int arming = 0;
-    for (int channel = 5; channel <= 12; channel++) {
+    for (int channel = 5; channel <= 16; channel++) {
         char name[16];
         snprintf(name, sizeof name, "RC%d_OPTION", channel);
         arming = parameter(name, 0) == 153 ? channel : arming;
@@ -195,5 +216,6 @@ int main(int words_count, char **words)
         }
         char text[4096] = "";
         take(text, recv(fd, text, sizeof text - 1, 0));
+        take_rc();
     }
 }
