@@ -211,7 +211,7 @@ impl Autopilot for Px4 {
             every: SENSOR_PERIOD_NS / period_ns,
             rest: Rest { time_s: rest_s, armed_s: ARMED_S, armed_by_channel, period_s: context.period_s() },
             reply_timeout: settings::reply_timeout(parameters.reply_timeout_s)?,
-            boot_timeout: Duration::from_secs_f64(parameters.boot_timeout_s),
+            boot_timeout: Duration::from_secs_f64(parameters.boot_timeout_s.max(1e-3)),
             model,
             has_ground_station: parameters.ground_station,
             start_position_m: parameters.start_position_m,

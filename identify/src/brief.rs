@@ -8,9 +8,9 @@ use crate::sensor_effects::SENSOR_EFFECTS;
 use serde::Serialize;
 use std::collections::BTreeSet;
 
-/// Horizon of the prediction errors that are told.
+/// Horizon of the prediction errors on the page, s.
 const HORIZON: &str = "0.5";
-/// Channels that are told, in this order.
+/// Channels on the page, in this order.
 const CHANNELS: [&str; 3] = ["attitude", "velocity", "position"];
 
 /// The first page of a report: sentences.
@@ -34,10 +34,12 @@ impl Brief {
     pub fn of(report: &Report) -> Self {
         let accepted: Vec<_> =
             report.verdict.iter().filter_map(|name| Some((*name, report.effects.get(name)?))).collect();
+        let findings = if report.losses.is_empty() { accepted.as_slice() } else { &[] };
         Self {
             answer: answer(report),
-            missing: accepted.iter().map(|(name, effect)| missing(name, effect)).collect(),
-            certainty: accepted.iter().map(|(name, effect)| certainty(name, effect)).collect(),
+            // Effects of a model that loses are no findings.
+            missing: findings.iter().map(|(name, effect)| missing(name, effect)).collect(),
+            certainty: findings.iter().map(|(name, effect)| certainty(name, effect)).collect(),
             changes: CHANNELS.iter().filter_map(|channel| change(report, channel)).collect(),
             next: next(report, &accepted),
         }
@@ -49,10 +51,11 @@ fn answer(report: &Report) -> String {
     let effects = if count == 1 { "one effect".to_owned() } else { format!("{count} effects") };
     if report.is_undecided() {
         "These flights are too short to tell.".to_owned()
-    } else if !report.losses.is_empty() {
-        "Do not use the new vehicle file: its predictions of these flights lose to simpler ones. The equations ask for the effects below, \
-         which are no findings."
+    } else if !report.losses.is_empty() && count == 0 {
+        "The declared vehicle file does not describe these flights: simpler predictions are better."
             .to_owned()
+    } else if !report.losses.is_empty() {
+        "Do not use the new vehicle file: simpler predictions of these flights are better.".to_owned()
     } else if count == 0 {
         "The declared vehicle file says all that these flights can show.".to_owned()
     } else if !report.worse().is_empty() {
@@ -78,21 +81,16 @@ fn value(name: &str, estimate: &Estimate) -> String {
 }
 
 fn certainty(name: &str, effect: &EffectReport) -> String {
-    // 20,000 resampled flights without a loss leave less.
-    let share = if effect.chance < 1e-4 {
-        "all".to_owned()
-    } else {
-        format!("{:.1} %", 100.0 * (1.0 - effect.chance))
-    };
     let rivals = match effect.confused_with.as_slice() {
         [] => String::new(),
         rivals => format!("; these flights cannot tell it from {}", rivals.join(", ")),
     };
     let is_loose = effect.parameters.values().any(|estimate| !estimate.determined);
     let loose = if is_loose { "; a value of it is not determined" } else { "" };
-    format!(
-        "{name}: the model is better with it in {share} of 20,000 resamplings of these flights{rivals}{loose}."
-    )
+    // The search draws 20,000 resamplings: none of them says less.
+    let chance =
+        if effect.chance < 1e-4 { "below 0.0001".to_owned() } else { format!("{:.4}", effect.chance) };
+    format!("{name}: the chance that it makes the model no better is {chance}{rivals}{loose}.")
 }
 
 /// The errors of a channel over all test flights; `None` where it was not measured.
@@ -208,8 +206,7 @@ mod tests {
         assert_eq!(
             certainty,
             [
-                "rotor-drag: the model is better with it in all of 20,000 resamplings of these flights; these flights cannot tell it \
-              from blade-flapping."
+                "rotor-drag: the chance that it makes the model no better is below 0.0001; these flights cannot tell it from blade-flapping."
             ]
         );
         assert_eq!(
@@ -239,6 +236,12 @@ mod tests {
             brief.next.iter().filter(|step| step.starts_with("Measure, for torques")).collect();
         assert_eq!(measure.len(), 1, "{:?}", brief.next);
         assert!(!brief.next.iter().any(|step| step.contains("validate")), "{:?}", brief.next);
+        assert!(
+            brief.missing.is_empty() && brief.certainty.is_empty(),
+            "its effects are no findings: {brief:?}"
+        );
+        let nothing = Report { losses: vec![loss("one")], ..Report::of_nothing() };
+        assert!(Brief::of(&nothing).answer.starts_with("The declared vehicle file does not describe"));
     }
 
     #[test]

@@ -63,6 +63,10 @@ impl Watcher {
     /// State of the run now, and its rates over about the last second; without rates at the first look.
     pub fn look(&mut self) -> View {
         let (now, newest) = (Instant::now(), self.source.sample());
+        // A look from before a long pause says nothing about the last second.
+        if self.looks.back().is_some_and(|(at, _)| now.duration_since(*at) >= 2 * SPAN) {
+            self.looks.clear();
+        }
         // The oldest look that stays is one from a second ago, or the one before it.
         while self.looks.get(1).is_some_and(|(at, _)| now.duration_since(*at) >= SPAN) {
             self.looks.pop_front();

@@ -68,7 +68,7 @@ fn require_brief(seen: &Value) {
     assert!(
         sentences("certainty")
             .iter()
-            .any(|line| line.starts_with("mass-error: ") && line.contains("resamplings")),
+            .any(|line| line.starts_with("mass-error: ") && line.contains("the chance that it makes")),
         "{seen}"
     );
     let changes = sentences("changes");

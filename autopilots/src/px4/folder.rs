@@ -20,6 +20,7 @@ const ALIASES: &str = "px4-alias.sh";
 const LINKS: &str = "px4-rc.mavlink";
 /// The library in the folder above that in which PX4 runs: a path with a blank or a colon could not be preloaded.
 const LIBRARY: &str = "lockstep.so";
+/// Its path from the folder in which PX4 runs.
 pub const PRELOADED: &str = "../lockstep.so";
 
 /// The files of a build that a start needs, as they are attached to the recording.

@@ -75,7 +75,7 @@ static __thread struct thread *self;
 static pthread_key_t end_key;
 static uint64_t turn, now_us;
 static int link_fd = -1, simulator_fd = -1, mutex_waiters;
-/* The start-up script runs; it has ended; commands of it that PX4 runs; files that such commands came from. */
+/* The start-up script runs; it has ended; number of its commands that PX4 runs at present; connections that they came over. */
 static int is_starting, is_started, commands;
 static char is_client[FILES_MAX], is_command[FILES_MAX];
 static uint8_t input[BYTES_MAX], output[BYTES_MAX];
@@ -130,10 +130,11 @@ static void make_ready(struct thread *thread)
     thread->since = turn++;
 }
 
-/* Moves the clock of sleepers to `time_us`. */
+/* Moves the clock of sleepers to `time_us`. A deadline may lie in the past: the clock never goes back. */
 static void move_clock(uint64_t time_us)
 {
-    now_us = time_us;
+    if (time_us > now_us)
+        now_us = time_us;
     for (;;) {
         struct thread *first = NULL;
         for (struct thread *at = threads; at < threads + thread_count; at++)
@@ -146,6 +147,12 @@ static void move_clock(uint64_t time_us)
     }
 }
 
+static void give_up(const char *reason)
+{
+    dprintf(2, "hummingbus: %s\n", reason);
+    _exit(1);
+}
+
 /* Answers, and reads the messages of the next step. */
 static void exchange(struct thread *taker)
 {
@@ -155,7 +162,7 @@ static void exchange(struct thread *taker)
     output_length = 0;
     transfer(0, &head, sizeof head);
     if (head.length > sizeof input)
-        _exit(1);
+        give_up("a step of the simulator is longer than 65536 bytes");
     transfer(0, input, head.length);
     input_length = head.length;
     input_read = 0;
@@ -163,11 +170,12 @@ static void exchange(struct thread *taker)
     move_clock(now_us + head.value);
 }
 
-/* Makes a thread ready that waits for files of which one is ready within `timeout_ms`; false if there is none. */
+/* Waits up to `timeout_ms` for a file, and makes the thread ready that waits for it; false if there is none. One thread runs at a time, so
+ * that all can use the same arrays: the stacks of PX4's threads are small. */
 static int look_at_files(int timeout_ms)
 {
-    struct pollfd files[FILES_MAX];
-    struct thread *owners[FILES_MAX];
+    static struct pollfd files[FILES_MAX];
+    static struct thread *owners[FILES_MAX];
     nfds_t count = 0;
     for (struct thread *at = threads; at < threads + thread_count; at++)
         for (nfds_t file = 0; at->state == WAITS_FILES && file < at->file_count && count < FILES_MAX; file++) {
@@ -509,6 +517,11 @@ static void await_step(void)
         wait_for(WAITS_STEP, NULL, NEVER);
 }
 
+static int is_simulator(int fd)
+{
+    return self && fd >= 0 && fd == simulator_fd;
+}
+
 /* The declaration of `poll` says that it only writes to the files. */
 #ifndef __clang__
 #pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
@@ -519,7 +532,7 @@ int poll(struct pollfd *files, nfds_t count, int timeout_ms)
     if (!self)
         return NEXT(poll)(files, count, timeout_ms);
     for (nfds_t at = 0; at < count; at++)
-        if (files[at].fd == simulator_fd) {
+        if (is_simulator(files[at].fd)) {
             await_step();
             for (nfds_t other = 0; other < count; other++)
                 files[other].revents = 0;
@@ -557,15 +570,10 @@ static ssize_t take(void *bytes, size_t size)
 static ssize_t give(const void *bytes, size_t size)
 {
     if (size > sizeof output - output_length)
-        _exit(1);
+        give_up("PX4's answers to one step are longer than 65536 bytes");
     memcpy(output + output_length, bytes, size);
     output_length += size;
     return (ssize_t)size;
-}
-
-static int is_simulator(int fd)
-{
-    return self && fd >= 0 && fd == simulator_fd;
 }
 
 ssize_t read(int fd, void *bytes, size_t size)
@@ -626,8 +634,12 @@ ssize_t sendto(int fd, const void *bytes, size_t size, int flags, const struct s
 int accept(int fd, struct sockaddr *from, socklen_t *length)
 {
     int client = NEXT(accept)(fd, from, length);
-    if (self && client >= 0 && client < FILES_MAX)
+    if (self && client >= 0 && client < FILES_MAX) {
+        /* A client before it may have gone without `shutdown`. */
+        commands -= is_command[client];
+        is_command[client] = 0;
         is_client[client] = 1;
+    }
     return client;
 }
 
@@ -654,9 +666,14 @@ static const struct sockaddr *moved_address(const struct sockaddr *address, stru
     if (address->sa_family != AF_UNIX)
         return address;
     const struct sockaddr_un *from = (const struct sockaddr_un *)address;
+    /* The path may lack its final zero. */
+    char path[sizeof place->sun_path + 1], new_path[sizeof place->sun_path];
+    snprintf(path, sizeof path, "%.*s", (int)sizeof from->sun_path, from->sun_path);
+    const char *to = moved(path, new_path, sizeof new_path);
+    if (to == path)
+        return address;
     *place = (struct sockaddr_un) { .sun_family = AF_UNIX };
-    char path[sizeof place->sun_path];
-    snprintf(place->sun_path, sizeof place->sun_path, "%s", moved(from->sun_path, path, sizeof path));
+    snprintf(place->sun_path, sizeof place->sun_path, "%s", to);
     return (const struct sockaddr *)place;
 }
 
@@ -692,7 +709,7 @@ int unlink(const char *path)
     { \
         va_list rest; \
         va_start(rest, flags); \
-        mode_t mode = flags & (O_CREAT | O_TMPFILE) ? va_arg(rest, mode_t) : 0; \
+        mode_t mode = flags & O_CREAT || (flags & O_TMPFILE) == O_TMPFILE ? va_arg(rest, mode_t) : 0; \
         va_end(rest); \
         char place[PATH_MAX]; \
         return NEXT(name)(moved(path, place, sizeof place), flags, mode); \
@@ -700,7 +717,7 @@ int unlink(const char *path)
 OPEN(open)
 OPEN(open64)
 
-/* The start-up script. */
+/* The start-up script: the first one that PX4 runs. */
 int system(const char *line)
 {
     if (!self || !line)
@@ -714,10 +731,14 @@ int system(const char *line)
     if (child_fd < 0)
         return -1;
     struct pollfd file = { child_fd, POLLIN, 0 };
-    is_starting = 1;
+    int is_first = !is_starting && !is_started;
+    if (is_first)
+        is_starting = 1;
     wait_for_files(&file, 1, NEVER);
-    is_starting = 0;
-    is_started = 1;
+    if (is_first) {
+        is_starting = 0;
+        is_started = 1;
+    }
     while (waitpid(child, &status, 0) < 0 && errno == EINTR)
         ;
     close(child_fd);

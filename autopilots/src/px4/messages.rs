@@ -20,10 +20,11 @@ pub const HIL_ACTUATOR_CONTROLS: Kind = Kind { id: 93, extra: 47, length: 81 };
 
 /// Channels of its remote control.
 pub const CHANNELS: usize = 18;
-/// Fields of the accelerometer and the gyroscope in `fields_updated`, those of the magnetometer, and those of the barometer with
-/// the temperature.
+/// Fields of the accelerometer and the gyroscope in `fields_updated`.
 pub const INERTIAL_FIELDS: u32 = 0b11_1111;
+/// Fields of the magnetometer.
 pub const MAGNETIC_FIELDS: u32 = 0b1_1100_0000;
+/// Fields of the barometer, with the temperature.
 pub const PRESSURE_FIELDS: u32 = 0b1_1010_0000_0000;
 
 /// Gauss in a tesla, and pascals in a hectopascal.

@@ -33,12 +33,13 @@ const lossText = ({ flight, horizon, channel, rival, other, unit, ...loss }) =>
   `${channel} after ${horizon} s of ${flight}: new ${withUnit(loss.new, unit)}, ${rival} ${withUnit(other, unit)}`;
 
 function verdictText() {
-  if (report.losses.length) {
+  const isUndecided = !report.verdict.length && report.validation_blocks < 12;
+  if (report.losses.length && !isUndecided) {
     const asked = report.verdict.length ? ` The equations ask for ${report.verdict.join(", ")}: not to be acted on.` : "";
     return `This vehicle file does not describe these flights: its predictions lose.${asked}`;
   }
   if (report.verdict.length) return `The flights ask for ${report.verdict.join(", ")}.`;
-  if (report.validation_blocks < 12) {
+  if (isUndecided) {
     return `Undecided: the flights that effects are chosen on have ${report.validation_blocks} blocks of ${report.block_s} s, and with less than a dozen nothing is beyond chance.`;
   }
   return "The flights ask for nothing: no effect makes the equations fit better beyond chance.";

@@ -49,9 +49,9 @@ impl Live {
         Some(status)
     }
 
-    /// The tick as planned and as it goes. It may wait for a run that is starting.
+    /// The tick as planned and as it goes; null until the run has a control segment.
     pub fn schedule(&self) -> Value {
-        self.schedule.look(&self.run, &self.plan)
+        if self.control().is_none() { Value::Null } else { self.schedule.look(&self.run, &self.plan) }
     }
 
     fn control(&self) -> Option<&LiveView> {

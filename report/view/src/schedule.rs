@@ -1,6 +1,6 @@
 //! The tick of a live run as it is planned, beside the tick as it goes.
 //!
-//! The plan of the run has hosts, cores, periods, and the samples of a tick that each node waits for. The last second is read
+//! The plan of the run, as it was at its start, has hosts, cores, periods, and the samples of a tick that each node waits for. The last second is read
 //! from the control segment and the kernel, as by `hummingbus top`, which disturbs no process.
 
 use bus::computing_time::ComputingTime;
@@ -36,8 +36,9 @@ fn described(plan: &Plan, seen: &View) -> Value {
     let nodes = nodes.map(|((index, node), row)| {
         json!({
             "name": node.name,
-            "group": plan.group_of(index).map(|group| &group.name),
-            "core": plan.group_of(index).map_or(node.cpu, |group| group.cpu),
+            // A member's successor has a process of its own.
+            "group": row.group,
+            "core": plan.group_of(index).filter(|_| row.group.is_some()).map_or(node.cpu, |group| group.cpu),
             "period_ticks": node.period_ticks,
             "computing_time": node.computing_time.as_ref().map(text),
             "after": awaited(plan, node),

@@ -146,8 +146,14 @@ static void answer(void)
         fly(controls.outputs);
     if (is_due("NOT_A_NUMBER"))
         controls.outputs[1] = NAN;
-    for (int turn = 0; turn < (parameter("TWICE", 0) ? 2 : 1); turn++)
+    if (parameter("TWICE", 0)) {
+        float outputs[16];
+        memcpy(outputs, controls.outputs, sizeof outputs);
+        memset(controls.outputs, 0, sizeof outputs);
         send_message(CONTROLS, &controls, 81);
+        memcpy(controls.outputs, outputs, sizeof outputs);
+    }
+    send_message(CONTROLS, &controls, 81);
 }
 
 static void misbehave(void)

@@ -119,8 +119,11 @@ fn a_px4_that_fails_ends_the_run_with_its_last_words() {
     for (more, told) in cases {
         let place = Place::new();
         let mut settings = stand_in(&place, more);
-        settings.push("process.controller.parameters.reply_timeout_s=0.5".to_owned());
-        if more.starts_with("NEVER") {
+        // Short limits only where they are to pass: a loaded host answers late.
+        if more.starts_with("HANGS") {
+            settings.push("process.controller.parameters.reply_timeout_s=0.5".to_owned());
+        }
+        if more.starts_with("NEVER_CONNECTS") {
             settings.push("process.controller.parameters.boot_timeout_s=2".to_owned());
         }
         let recording = place.path("a.mcap");

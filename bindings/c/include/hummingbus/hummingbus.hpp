@@ -206,6 +206,7 @@ class Node {
     detail::require(hb_node_numbers(node_, key, values.data(), N));
     return values;
   }
+  // The numbers, or `otherwise` if the manifest does not give the parameter.
   template <std::size_t N>
   std::array<double, N> numbers(const char* key, const std::array<double, N>& otherwise) {
     return has_parameter(key) ? numbers<N>(key) : otherwise;
