@@ -2,7 +2,7 @@
 //! versions, flown with 4.6.0-dev).
 //!
 //! The firmware sends first: a packet of its outputs. Then it waits for the answer, which is the tick's sensors as JSON, and whose
-//! timestamp is its clock. So it is in lockstep by itself. The remote control has a port of its own ([`remote_control`]).
+//! timestamp is its clock. So it is in lockstep by itself. The remote control has a port of its own (`remote_control`).
 //!
 //! Axes as its answer has them: body forward, right, down; world north, east, down. The world's x is east, its y north
 //! ([`crate::origin`]).
