@@ -98,7 +98,7 @@ pub struct ArduPilot {
 /// Ports of the loopback by which the firmware talks to the simulator.
 #[derive(Debug)]
 struct Ports {
-    /// Of this process, to which it sends its outputs.
+    /// Port of this process, to which it sends its outputs.
     output: u16,
     /// For its sensors; it has none with the JSON interface, but needs a number.
     input: u16,
