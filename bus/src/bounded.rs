@@ -36,6 +36,7 @@ pub struct Bounded<T, const N: usize> {
 impl<T: Copy + Default, const N: usize> Bounded<T, N> {
     /// `count` values, each made from its index; at most `N`.
     #[must_use]
+    #[inline]
     pub fn from_fn(count: usize, mut value: impl FnMut(usize) -> T) -> Self {
         let mut all = Self::default();
         let used = all.values.iter_mut().take(count);
@@ -45,6 +46,7 @@ impl<T: Copy + Default, const N: usize> Bounded<T, N> {
 
     /// `count` times the same value; at most `N` times.
     #[must_use]
+    #[inline]
     pub fn filled(count: usize, value: T) -> Self {
         Self::from_fn(count, |_| value)
     }
@@ -57,6 +59,7 @@ impl<T: Copy + Default, const N: usize> Bounded<T, N> {
 
     /// The sequence of the values that `value` makes of these.
     #[must_use]
+    #[inline]
     pub fn map<U: Copy + Default>(&self, mut value: impl FnMut(T) -> U) -> Bounded<U, N> {
         Bounded::from_fn(self.len(), |index| value(self[index]))
     }
@@ -91,6 +94,7 @@ impl<T: Copy + Default, const M: usize, const N: usize> From<[T; M]> for Bounded
 
 /// The first `N` of the iterator's values.
 impl<T: Copy + Default, const N: usize> FromIterator<T> for Bounded<T, N> {
+    #[inline]
     fn from_iter<I: IntoIterator<Item = T>>(values: I) -> Self {
         let mut all = Self::default();
         let pairs = all.values.iter_mut().zip(values);

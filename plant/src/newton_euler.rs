@@ -149,11 +149,11 @@ impl NewtonEuler {
         hold: impl Fn(&State, Rates) -> Rates,
     ) -> State {
         let rates = |state: &State| hold(state, self.rates(state, actuation));
-        let k1 = rates(state);
-        let k2 = rates(&state.moved(&k1, span_s / 2.0));
+        let mut sum = rates(state);
+        let k2 = rates(&state.moved(&sum, span_s / 2.0));
         let k3 = rates(&state.moved(&k2, span_s / 2.0));
         let k4 = rates(&state.moved(&k3, span_s));
-        let sum = k1.plus(&k2, 2.0).plus(&k3, 2.0).plus(&k4, 1.0);
+        [(&k2, 2.0), (&k3, 2.0), (&k4, 1.0)].into_iter().for_each(|(rates, weight)| sum.add(rates, weight));
         state.moved(&sum, span_s / 6.0)
     }
 

@@ -125,17 +125,17 @@ pub(crate) fn paired<A, B, T: Copy + Default>(
 }
 
 impl Rates {
-    /// `self + factor * other`, the only arithmetic a Runge-Kutta step needs.
-    pub fn plus(&self, other: &Rates, factor: f64) -> Rates {
-        Rates {
-            body: self.body.plus(&other.body, factor),
-            rotors: paired(&self.rotors, &other.rotors, |rates, other| rates.plus(other, factor)),
+    /// Adds `factor * other`, the only arithmetic a Runge-Kutta step needs.
+    pub fn add(&mut self, other: &Rates, factor: f64) {
+        self.body = self.body.plus(&other.body, factor);
+        for (rates, other) in self.rotors.iter_mut().zip(&other.rotors) {
+            *rates = rates.plus(other, factor);
         }
     }
 }
 
 impl BodyRates {
-    /// As [`Rates::plus`].
+    /// `self + factor * other`.
     pub fn plus(&self, other: &BodyRates, factor: f64) -> BodyRates {
         BodyRates {
             velocity_W_m_s: self.velocity_W_m_s + other.velocity_W_m_s * factor,
@@ -159,10 +159,12 @@ impl RotorRates {
 impl State {
     /// This state moved along `rates` for `span_s`.
     pub(crate) fn moved(&self, rates: &Rates, span_s: f64) -> State {
-        State {
-            body: self.body.moved(&rates.body, span_s),
-            rotors: paired(&self.rotors, &rates.rotors, |rotor, rates| rotor.moved(rates, span_s)),
+        let mut moved = *self;
+        moved.body = self.body.moved(&rates.body, span_s);
+        for (rotor, rates) in moved.rotors.iter_mut().zip(&rates.rotors) {
+            *rotor = rotor.moved(rates, span_s);
         }
+        moved
     }
 }
 

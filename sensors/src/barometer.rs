@@ -88,8 +88,8 @@ impl Sensor for BarometerParams {
         chance: &mut Chance<'_>,
         inputs: TruthInputs<'_>,
     ) -> Option<Barometer> {
-        let noise = normal(chance.noise);
-        let step = normal(chance.noise);
+        let noise = normal(chance.noise());
+        let step = normal(chance.noise());
         let true_Pa = pressure_Pa(inputs.state.position.z, self.ground_pressure_Pa);
         let read_Pa = true_Pa + state.bias + self.noise_Pa * noise;
         state.bias += BiasWalk::new(self.bias_walk_Pa_sqrt_s, self.rate_hz).step_sigma() * step;

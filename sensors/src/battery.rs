@@ -57,7 +57,7 @@ parameters! {
 
 /// One quantity as a converter reads it.
 fn read(truth: f64, bias: f64, sigma: f64, step: f64, chance: &mut Chance<'_>) -> f64 {
-    let noise = normal(chance.noise);
+    let noise = normal(chance.noise());
     in_steps(truth + bias + sigma * noise, step)
 }
 

@@ -10,7 +10,7 @@
 //! Journal 39, 1960): with probability `dropout` a measurement is lost, and losses last `dropout_mean_s` on
 //! average. They are drawn from a stream of their own: switching them on does not reshuffle the noise.
 
-use crate::noise::{drawn, drawn_words};
+use crate::noise::LazyStream;
 use bus::Message;
 use bus::context::NodeContext;
 use bus::random::{Stream, stream, uniform};
@@ -99,6 +99,9 @@ struct Losses {
 }
 
 impl Losses {
+    /// Those of a sensor that loses nothing.
+    const NONE: Self = Self { begin: 0.0, stay: 0.0 };
+
     /// In the long run begin · (1 − dropout) = (1 − stay) · dropout, and losses last 1 / (1 − stay).
     fn new(timing: &Timing) -> Self {
         let dropout = timing.dropout;
@@ -165,20 +168,24 @@ pub trait Remembered {
 pub struct Chance<'a> {
     /// Simulation time.
     pub now_ns: u64,
-    /// The node's random stream.
-    pub noise: &'a mut Stream,
-    loss: &'a mut Stream,
+    noise: LazyStream<'a>,
+    loss: LazyStream<'a>,
     losses: Losses,
     /// Parts of the last measurement that were lost, a bit for each.
     lost: u32,
 }
 
 impl Chance<'_> {
+    /// The node's random stream.
+    pub fn noise(&mut self) -> &mut Stream {
+        self.noise.get()
+    }
+
     /// Draws whether part `part` of the measurement, numbered from 0, is lost; to be asked once for each.
     pub fn is_lost(&mut self, part: u32) -> bool {
         let was_lost = self.lost >> part & 1 == 1;
         let chance = if was_lost { self.losses.stay } else { self.losses.begin };
-        let is_lost = uniform(self.loss) < chance;
+        let is_lost = self.losses != Losses::NONE && uniform(self.loss.get()) < chance;
         self.lost = self.lost & !(1 << part) | u32::from(is_lost) << part;
         is_lost
     }
@@ -210,18 +217,16 @@ impl Channel {
         let (under_way, queue) = state.under_way();
         if now_ns >= under_way.next_ns {
             let last = queue[before(under_way.measured)];
-            let mut noise = drawn(&self.noise, under_way.noise_words);
-            let mut loss = drawn(&self.loss, under_way.loss_words);
-            let (losses, lost) = (self.losses, under_way.lost);
-            let mut chance = Chance { now_ns, noise: &mut noise, loss: &mut loss, losses, lost };
+            let noise = LazyStream::new(&self.noise, under_way.noise_words);
+            let loss = LazyStream::new(&self.loss, under_way.loss_words);
+            let mut chance = Chance { now_ns, noise, loss, losses: self.losses, lost: under_way.lost };
             let measurement = measure(state, &last, &mut chance);
-            let lost = chance.lost;
             let (under_way, queue) = state.under_way();
             let number = place(under_way.measured);
             queue[number] = measurement;
-            under_way.lost = lost;
-            under_way.noise_words = drawn_words(&noise);
-            under_way.loss_words = drawn_words(&loss);
+            under_way.lost = chance.lost;
+            under_way.noise_words = chance.noise.words();
+            under_way.loss_words = chance.loss.words();
             under_way.arrival_ns[number] = now_ns.saturating_add(self.delay_ns);
             under_way.measured += 1;
             under_way.next_ns = (now_ns / self.interval_ns + 1).saturating_mul(self.interval_ns);

@@ -19,7 +19,6 @@ use diagnostics::ParameterError;
 use filter::{Ekf, EkfState};
 use history::{Measurement, Reading, Source};
 use params::EkfParams;
-use transition::{ATTITUDE, MotionCovariance, POSITION, VELOCITY};
 
 /// The position's standard deviation before the filter has begun, m, and likewise of all else: nothing is known.
 const UNKNOWN_SIGMA: f64 = 1e6;
@@ -133,7 +132,9 @@ fn magnetometer(sample: &Magnetometer) -> Option<Measurement> {
 
 fn state_estimate(filter: &Ekf, state: &EkfState) -> StateEstimate {
     let motion = state.motion();
-    let sigma = state.has_begun().then(|| sigmas(&filter.motion_covariance(state), state));
+    let sigma = state
+        .has_begun()
+        .then(|| filter.motion_variances(state).map(|variances| vector_message(variances.map(f64::sqrt))));
     let [position_sigma, velocity_sigma, attitude_sigma] = sigma.unwrap_or([[UNKNOWN_SIGMA; 3].into(); 3]);
     StateEstimate {
         position: motion.position,
@@ -145,14 +146,6 @@ fn state_estimate(filter: &Ekf, state: &EkfState) -> StateEstimate {
         attitude_sigma,
         ..Default::default()
     }
-}
-
-/// Standard deviations of position, velocity and attitude, the last about the body's axes.
-fn sigmas(covariance: &MotionCovariance, state: &EkfState) -> [Vector3; 3] {
-    let block = |from: usize| covariance.fixed_view::<3, 3>(from, from).into_owned();
-    let to_body = attitude(state.motion().attitude).inverse().to_rotation_matrix();
-    let turned = to_body * block(ATTITUDE) * to_body.transpose();
-    [block(POSITION), block(VELOCITY), turned].map(|block| vector_message(block.diagonal().map(f64::sqrt)))
 }
 
 fn angular_velocity(state: &EkfState) -> Vector3 {

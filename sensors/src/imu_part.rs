@@ -133,12 +133,16 @@ impl ImuPart {
         if state.readings == 0 {
             state.rotor_angles_rad = START_ANGLES_RAD;
         }
+        let shakes = self.params.accelerometer_vibration_m != 0.0 || self.params.gyroscope_vibration_rad != 0.0;
         let senses = [1.0, -1.0].into_iter().cycle();
         let rotors = state.rotor_angles_rad.iter_mut().zip(truth.rotor_speeds_rad_s).zip(senses);
         for ((angle_rad, speed_rad_s), sense) in rotors {
             if state.readings > 0 {
                 let turned = (*angle_rad + speed_rad_s * self.period_s) / TAU;
                 *angle_rad = (turned - turned.floor()) * TAU;
+            }
+            if !shakes {
+                continue;
             }
             let (sine, cosine) = libm::sincos(*angle_rad);
             let along = Vector3::new(cosine, sense * sine, cosine * cosine - sine * sine);

@@ -80,7 +80,7 @@ impl Sensor for MagnetometerParams {
         let field_W_T = earth_field::vector_W_T(self.field_T, self.inclination_deg, self.declination_deg);
         let field_B_T = attitude(inputs.state.attitude).inverse_transform_vector(&field_W_T);
         let through_B_T = field_B_T.component_mul(&Vector3::from(self.soft_iron_scale));
-        let noise_B_T = self.noise_T * standard_normal(chance.noise);
+        let noise_B_T = self.noise_T * standard_normal(chance.noise());
         let read_B_T = through_B_T + Vector3::from(self.hard_iron_T) + noise_B_T;
         let cut = |axis_T| in_steps(axis_T, self.resolution_T).clamp(-self.range_T, self.range_T);
         Some(Magnetometer { field: vector_message(read_B_T.map(cut)), ..Default::default() })

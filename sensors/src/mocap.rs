@@ -71,9 +71,9 @@ impl Sensor for MocapParams {
     ) -> Option<Mocap> {
         let truth = inputs.state;
         let position_error_W_m =
-            Vector3::from(self.position_bias_m) + self.position_noise_m * standard_normal(chance.noise);
+            Vector3::from(self.position_bias_m) + self.position_noise_m * standard_normal(chance.noise());
         let turn_B_deg =
-            Vector3::from(self.attitude_bias_deg) + self.attitude_noise_deg * standard_normal(chance.noise);
+            Vector3::from(self.attitude_bias_deg) + self.attitude_noise_deg * standard_normal(chance.noise());
         let turn = UnitQuaternion::from_scaled_axis(turn_B_deg.map(f64::to_radians));
         let position = vector_message(vector(truth.position) + position_error_W_m);
         let attitude = attitude_message(attitude(truth.attitude) * turn);

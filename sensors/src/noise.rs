@@ -84,6 +84,32 @@ pub(crate) fn drawn(random: &Stream, [low, high]: [u64; 2]) -> Stream {
     random::at(random, u128::from(high) << 64 | u128::from(low))
 }
 
+/// A node's random stream, taken up where it was drawn so far once something is drawn: that costs as much as dozens of
+/// draws, and many a measurement needs none.
+#[derive(Debug)]
+pub(crate) struct LazyStream<'a> {
+    start: &'a Stream,
+    words: [u64; 2],
+    stream: Option<Stream>,
+}
+
+impl<'a> LazyStream<'a> {
+    /// The stream that begins as `start`, `words` behind its start.
+    pub fn new(start: &'a Stream, words: [u64; 2]) -> Self {
+        Self { start, words, stream: None }
+    }
+
+    /// The stream.
+    pub fn get(&mut self) -> &mut Stream {
+        self.stream.get_or_insert_with(|| drawn(self.start, self.words))
+    }
+
+    /// Returns the number of words drawn so far.
+    pub fn words(&self) -> [u64; 2] {
+        self.stream.as_ref().map_or(self.words, drawn_words)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

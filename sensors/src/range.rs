@@ -194,7 +194,7 @@ impl Sensor for RangeFinders {
     ) -> Option<Ranges> {
         let mut ranges = *last;
         for (beam, distance_m) in self.distances_m(&inputs).into_iter().enumerate() {
-            let noise = normal(chance.noise);
+            let noise = normal(chance.noise());
             let read_m = self.reading_m(beam, distance_m, noise);
             let is_lost = chance.is_lost(beam as u32);
             ranges.valid[beam] = u32::from(read_m.is_some() && !is_lost);

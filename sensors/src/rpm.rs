@@ -96,7 +96,7 @@ impl Sensor for RpmParams {
     ) -> Option<RotorSpeeds> {
         for (rotor, truth_rad_s) in inputs.state.rotor_speed.into_iter().enumerate() {
             // Drawn whatever the fault is: a fault reshuffles no noise.
-            let noise = normal(chance.noise);
+            let noise = normal(chance.noise());
             if rotor + 1 != self.stuck_rotor || state.has_read == 0 {
                 let part = if rotor + 1 == self.half_reading_rotor { 0.5 } else { 1.0 };
                 let speed_rad_s = truth_rad_s + self.noise_rad_s * noise;

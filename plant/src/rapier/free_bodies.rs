@@ -248,7 +248,8 @@ impl FreeBodies {
             forces.add_pulls(WEIGHTS[stage] * span_s, &self.joints, pulls_N_s);
         }
         let [Some(k1), Some(k2), Some(k3), Some(k4)] = &ks else { return *vehicle };
-        let sum = k1.plus(k2, 2.0).plus(k3, 2.0).plus(k4, 1.0);
+        let mut sum = *k1;
+        [(k2, 2.0), (k3, 2.0), (k4, 1.0)].into_iter().for_each(|(rates, weight)| sum.add(rates, weight));
         work.free.clear();
         for (number, body) in self.states.iter().enumerate() {
             let [k1, k2, k3, k4] = work.rates.each_ref().map(|rates| rates[number]);

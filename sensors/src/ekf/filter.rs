@@ -20,11 +20,12 @@ use super::motion::Motion;
 use super::observation::{self, Observation};
 use super::params::EkfParams;
 use super::start::{lost_covariance, start};
-use super::transition::{Covariance, MotionCovariance, STATES, Transition, symmetric};
+use super::transition::{Covariance, CovarianceView, STATES, Transition};
+use crate::wire::attitude;
 use bus::Message;
 use bus::component::{State, StateError, Transfer};
 use diagnostics::parameter::{ParameterError, positive, require};
-use nalgebra::SMatrix;
+use nalgebra::{SMatrix, Vector3};
 
 /// The covariance is carried over spans of at most this, since noise acts through the attitude in longer ones.
 const SPAN_MAX_NS: u64 = 20_000_000;
@@ -177,7 +178,7 @@ impl Ekf {
     fn begin(&self, state: &mut EkfState, newest: &Newest) -> bool {
         let Some((reading, start)) = start(newest, &state.readings, &self.params) else { return false };
         (state.kept.at, state.kept.settled) = (reading, start.motion);
-        state.kept.covariance = flat(&start.covariance(&self.params));
+        state.kept.covariance = flat(start.covariance(&self.params));
         for earlier in newest.iter().flatten().flatten().filter(|m| m.measured_ns < reading.time_ns) {
             state.kept.newest_ns[earlier.sensor().index()] = earlier.measured_ns;
         }
@@ -267,7 +268,7 @@ impl Ekf {
             }
             state.kept.settled.travel(&from, &end, self.params.gravity_m_s2, &mut span);
             state.kept.settled.fade_gps_drift(span.time_s(), self.params.gps_position_drift_time_s);
-            state.kept.covariance = flat(&span.carry(&state.covariance(), &self.params));
+            state.kept.covariance = flat(span.carry(&state.covariance(), &self.params));
             state.kept.at = end;
         }
         true
@@ -286,10 +287,8 @@ impl Ekf {
     /// The Kalman update, or the refusal of an outlier.
     fn update<const N: usize>(&self, state: &mut EkfState, sensor: Source, observed: &Observation<N>) {
         let index = sensor.index();
-        let covariance = state.covariance();
-        let cross = covariance * observed.jacobian.transpose();
-        let mut spread = observed.jacobian * cross;
-        (0..N).for_each(|row| spread[(row, row)] += observed.variance[row]);
+        let cross = observed.cross_covariance(&state.covariance());
+        let spread = observed.spread(&cross);
         let Some(spread) = spread.cholesky() else {
             state.kept.refused[index] += 1;
             return;
@@ -303,14 +302,14 @@ impl Ekf {
                 return;
             }
             // It is not the sensor that is wrong.
-            state.kept.covariance = flat(&lost_covariance(&self.params));
+            state.kept.covariance = flat(lost_covariance(&self.params));
             state.kept.refused_in_row[index] = 0;
             return self.update(state, sensor, observed);
         }
         state.kept.refused_in_row[index] = 0;
         let gain = cross * spread.inverse();
         state.kept.settled.correct(&(gain * observed.innovation));
-        state.kept.covariance = flat(&reduced(&covariance, &gain, &cross));
+        state.kept.covariance = flat(reduced(&state.covariance(), &gain, &cross));
         state.kept.updates[index] += 1;
     }
 
@@ -320,9 +319,11 @@ impl Ekf {
         state.kept.since.carry(&state.covariance(), &self.params)
     }
 
-    /// The covariance of the errors of the present position, velocity and attitude.
-    pub(crate) fn motion_covariance(&self, state: &EkfState) -> MotionCovariance {
-        state.kept.since.carry_motion(&state.covariance(), &self.params)
+    /// The variances of the errors of the present position, m², velocity, m²/s², and attitude, rad²; the last about the
+    /// body's axes.
+    pub(crate) fn motion_variances(&self, state: &EkfState) -> [Vector3<f64>; 3] {
+        let turn_BW = attitude(state.kept.present.attitude).inverse().to_rotation_matrix();
+        state.kept.since.motion_variances(&state.covariance(), turn_BW.matrix(), &self.params)
     }
 }
 
@@ -376,18 +377,29 @@ impl EkfState {
         self.readings.newest().unwrap_or_default()
     }
 
-    fn covariance(&self) -> Covariance {
-        Covariance::from_column_slice(&self.kept.covariance)
+    fn covariance(&self) -> CovarianceView<'_> {
+        CovarianceView::from_slice(&self.kept.covariance)
     }
 }
 
-/// The covariance after an update: the short form, for which docs/decisions/011 has the figures.
+/// The covariance after an update: the short form, for which docs/decisions/011 has the figures. One half is computed, the
+/// other is the same.
 fn reduced<const N: usize>(
-    covariance: &Covariance,
+    covariance: &CovarianceView<'_>,
     gain: &SMatrix<f64, STATES, N>,
     cross: &SMatrix<f64, STATES, N>,
 ) -> Covariance {
-    symmetric(&(covariance - gain * cross.transpose()))
+    let mut reduced = covariance.into_owned();
+    for state in 0..STATES {
+        for number in 0..N {
+            let (gains, cross) = (gain.column(number), cross[(state, number)]);
+            for other in state..STATES {
+                reduced[(other, state)] -= gains[other] * cross;
+            }
+        }
+    }
+    reduced.fill_upper_triangle_with_lower_triangle();
+    reduced
 }
 
 /// Returns the deviation of a chi-square of `degrees` of freedom from its mean, in standard deviations: its cube root
@@ -399,8 +411,11 @@ pub fn deviation(chi_square: f64, degrees: usize) -> f64 {
     (libm::cbrt(chi_square / degrees) - (1.0 - variance)) / variance.sqrt()
 }
 
-fn flat(covariance: &Covariance) -> [f64; STATES * STATES] {
-    std::array::from_fn(|index| covariance[index])
+/// The numbers of the covariance, column by column.
+fn flat(covariance: Covariance) -> [f64; STATES * STATES] {
+    let mut numbers = [0.0; STATES * STATES];
+    numbers.copy_from_slice(covariance.as_slice());
+    numbers
 }
 
 #[cfg(test)]
@@ -420,7 +435,7 @@ mod tests {
             filter.update_to(&mut state, &reading, &[None, Some(Some(pose)), None, None]);
         }
         assert_eq!(state.kept.updates[Source::Mocap.index()], 100);
-        (state.kept.settled, state.covariance())
+        (state.kept.settled, state.covariance().into_owned())
     }
 
     const POSE: [f64; 7] = [1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0];
@@ -436,7 +451,8 @@ mod tests {
         let gain = cross * (observed.jacobian * cross + noise).cholesky().unwrap().inverse();
         let left = Covariance::identity() - gain * observed.jacobian;
         let joseph = left * covariance * left.transpose() + gain * noise * gain.transpose();
-        let short = reduced(&covariance, &gain, &cross);
+        assert!((observed.cross_covariance(&covariance.as_view()) - cross).amax() < 1e-15);
+        let short = reduced(&covariance.as_view(), &gain, &cross);
         let sigma = joseph.diagonal().map(f64::sqrt);
         let worst = (short - joseph).component_div(&(sigma * sigma.transpose())).amax();
         assert!(worst < 1e-12, "{worst}");

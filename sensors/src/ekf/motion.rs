@@ -45,14 +45,15 @@ impl Motion {
         let rate_B = 0.5 * (vector(from.angular_velocity) + vector(to.angular_velocity));
         let turn_B = (rate_B - vector(self.gyroscope_bias)) * period_s;
         let before_WB = attitude(self.attitude);
-        let after_WB = before_WB * UnitQuaternion::from_scaled_axis(turn_B);
+        let half_turn = UnitQuaternion::from_scaled_axis(0.5 * turn_B);
+        let middle_WB = before_WB * half_turn;
+        let after_WB = middle_WB * half_turn;
         let bias_B = vector(self.accelerometer_bias);
         let first_W = before_WB * (vector(from.specific_force) - bias_B);
         let force_W = 0.5 * (first_W + after_WB * (vector(to.specific_force) - bias_B));
         self.push(&(force_W - Vector3::new(0.0, 0.0, gravity_m_s2)), period_s);
         // Rounding would let the norm wander over a long run.
         self.attitude = attitude_message(UnitQuaternion::new_normalize(after_WB.into_inner()));
-        let middle_WB = before_WB * UnitQuaternion::from_scaled_axis(0.5 * turn_B);
         transition.extend(&middle_WB.to_rotation_matrix().into_inner(), &force_W, period_s);
     }
 

@@ -3,7 +3,7 @@
 use super::history::Measurement;
 use super::motion::Motion;
 use super::params::EkfParams;
-use super::transition::{ATTITUDE, BAROMETER, GPS, POSITION, STATES, VELOCITY};
+use super::transition::{ATTITUDE, BAROMETER, CovarianceView, GPS, POSITION, STATES, VELOCITY};
 use crate::wire::{attitude, vector};
 use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
 
@@ -28,6 +28,33 @@ impl<const N: usize> Observation<N> {
     fn with(mut self, row: usize, state: usize, block: &Matrix3<f64>) -> Self {
         self.jacobian.fixed_view_mut::<3, 3>(row, state).copy_from(block);
         self
+    }
+}
+
+impl<const N: usize> Observation<N> {
+    /// The covariance of the filter's errors with those of the expected measurement: `covariance` times the transposed
+    /// derivatives, most of which are zero.
+    pub fn cross_covariance(&self, covariance: &CovarianceView<'_>) -> SMatrix<f64, STATES, N> {
+        let mut cross = SMatrix::<f64, STATES, N>::zeros();
+        for (row, state, derivative) in self.derivatives() {
+            cross.column_mut(row).axpy(derivative, &covariance.column(state), 1.0);
+        }
+        cross
+    }
+
+    /// The covariance of the innovation, from the covariance `cross` of the filter's errors with the expected measurement.
+    pub fn spread(&self, cross: &SMatrix<f64, STATES, N>) -> SMatrix<f64, N, N> {
+        let mut spread = SMatrix::<f64, N, N>::from_diagonal(&self.variance);
+        for (row, state, derivative) in self.derivatives() {
+            (0..N).for_each(|other| spread[(row, other)] += derivative * cross[(state, other)]);
+        }
+        spread
+    }
+
+    /// The derivatives that are not zero, each with its row and its error's number.
+    fn derivatives(&self) -> impl Iterator<Item = (usize, usize, f64)> {
+        let all = self.jacobian.iter().enumerate();
+        all.filter(|(_, derivative)| **derivative != 0.0).map(|(place, derivative)| (place % N, place / N, *derivative))
     }
 }
 

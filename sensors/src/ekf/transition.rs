@@ -14,12 +14,10 @@ use super::params::EkfParams;
 use crate::wire::{vector, vector_message};
 use bus::Message;
 use bus::messages::Vector3 as Vector3Message;
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{Matrix3, SMatrix, SMatrixView, SVector, Vector3};
 
 /// Number of errors.
 pub const STATES: usize = 19;
-/// Number of the first of them: position, velocity and attitude.
-pub(super) const MOTION: usize = 9;
 /// Index of the first error of each quantity.
 pub(super) const POSITION: usize = 0;
 pub(super) const VELOCITY: usize = 3;
@@ -33,8 +31,13 @@ pub(super) const BAROMETER: usize = 18;
 pub type Errors = SVector<f64, STATES>;
 /// Their covariance.
 pub type Covariance = SMatrix<f64, STATES, STATES>;
-/// The covariance of the errors of position, velocity and attitude.
-pub(crate) type MotionCovariance = SMatrix<f64, MOTION, MOTION>;
+/// Number of the errors that act on position and velocity through the attitude: of attitude, gyroscope and
+/// accelerometer, one after the other.
+const TILTS: usize = GPS - ATTITUDE;
+/// A number for each of them.
+type Tilts = SVector<f64, TILTS>;
+/// The covariance where a state keeps it.
+pub(super) type CovarianceView<'a> = SMatrixView<'a, f64, STATES, STATES>;
 
 /// The integrals, each over the time from the filter's to a later one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Message)]
@@ -83,43 +86,63 @@ impl Transition {
     }
 
     /// The covariance at the end of what the integrals span, from that at its beginning.
-    pub fn carry(&self, covariance: &Covariance, params: &EkfParams) -> Covariance {
+    pub fn carry(&self, covariance: &CovarianceView<'_>, params: &EkfParams) -> Covariance {
         if self.time == 0.0 {
-            return *covariance;
+            return covariance.into_owned();
         }
         let fade = libm::exp(-self.time / params.gps_position_drift_time_s);
         let half = self.apply(covariance, fade).transpose();
-        let mut carried = self.apply(&half, fade);
+        let mut carried = self.apply(&half.as_view(), fade);
         self.add_noise(&mut carried, params);
         symmetric(&carried)
     }
 
-    /// The covariance of the errors of position, velocity and attitude alone: as [`Self::carry`], for less than half of the
-    /// work.
-    pub fn carry_motion(&self, covariance: &Covariance, params: &EkfParams) -> MotionCovariance {
-        if self.time == 0.0 {
-            return covariance.fixed_view::<MOTION, MOTION>(0, 0).into_owned();
-        }
-        let half = self.rows_of_motion(covariance).transpose();
-        let mut carried = self.rows_of_motion(&half);
-        self.add_noise_of_motion(&mut carried, params);
-        0.5 * (carried + carried.transpose())
-    }
-
-    /// The transition matrix times `columns`.
-    fn apply(&self, columns: &Covariance, gps_fade: f64) -> Covariance {
-        let mut applied = *columns;
-        applied.fixed_rows_mut::<MOTION>(0).copy_from(&self.rows_of_motion(columns));
-        applied.fixed_rows_mut::<3>(GPS).scale_mut(gps_fade);
-        applied
-    }
-
-    /// The first rows of the transition matrix, those of position, velocity and attitude, times `columns`.
-    fn rows_of_motion<const N: usize>(&self, columns: &SMatrix<f64, STATES, N>) -> SMatrix<f64, MOTION, N> {
+    /// The variances of the errors at the end: of position and velocity along the world's axes, and of the attitude
+    /// about the axes to which `turn_BW` turns. As by [`Self::carry`], for a fifth of the work: each error at the end is one of
+    /// position, velocity or neither at the beginning, and a weighted sum of those of attitude and biases.
+    pub(crate) fn motion_variances(
+        &self,
+        covariance: &CovarianceView<'_>,
+        turn_BW: &Matrix3<f64>,
+        params: &EkfParams,
+    ) -> [Vector3<f64>; 3] {
         let (shift, push) = (vector(self.shift).cross_matrix(), vector(self.push).cross_matrix());
         let [turn, turn_twice, tilt, tilt_twice] =
             [&self.turn, &self.turn_twice, &self.tilt, &self.tilt_twice].map(matrix);
-        let mut applied = columns.fixed_rows::<MOTION>(0).into_owned();
+        let tilts = covariance.fixed_view::<TILTS, TILTS>(ATTITUDE, ATTITUDE);
+        // The variance of a sum that has `own` of its errors besides the weighted ones.
+        let sum = |own: f64, with_own: &Tilts, weights: &Tilts| {
+            own + 2.0 * weights.dot(with_own) + weights.dot(&(tilts * weights))
+        };
+        let with = |state: usize| covariance.fixed_view::<TILTS, 1>(ATTITUDE, state).into_owned();
+        let position = |axis: usize| {
+            let (p, v) = (POSITION + axis, VELOCITY + axis);
+            let own = covariance[(p, p)]
+                + self.time * (2.0 * covariance[(p, v)] + self.time * covariance[(v, v)]);
+            sum(own, &(with(p) + self.time * with(v)), &weights([&-shift, &tilt_twice, &-turn_twice], axis))
+        };
+        let velocity = |axis: usize| {
+            let v = VELOCITY + axis;
+            sum(covariance[(v, v)], &with(v), &weights([&-push, &tilt, &-turn], axis))
+        };
+        let body_turn = -turn_BW * turn;
+        let attitude = |axis: usize| {
+            sum(0.0, &Tilts::zeros(), &weights([turn_BW, &body_turn, &Matrix3::zeros()], axis))
+        };
+        let noises = self.motion_noises(params);
+        [
+            Vector3::from_fn(|axis, _| position(axis) + noises.position),
+            Vector3::from_fn(|axis, _| velocity(axis) + noises.velocity),
+            Vector3::from_fn(|axis, _| attitude(axis) + noises.attitude),
+        ]
+    }
+
+    /// The transition matrix times `columns`.
+    fn apply(&self, columns: &CovarianceView<'_>, gps_fade: f64) -> Covariance {
+        let (shift, push) = (vector(self.shift).cross_matrix(), vector(self.push).cross_matrix());
+        let [turn, turn_twice, tilt, tilt_twice] =
+            [&self.turn, &self.turn_twice, &self.tilt, &self.tilt_twice].map(matrix);
+        let mut applied = columns.into_owned();
         // Column by column: products of three by three stay in registers.
         for (column, mut applied) in columns.column_iter().zip(applied.column_iter_mut()) {
             let part = |from: usize| column.fixed_rows::<3>(from).into_owned();
@@ -135,6 +158,7 @@ impl Transition {
             add(VELOCITY, &velocity);
             add(ATTITUDE, &(-turn * gyroscope));
         }
+        applied.fixed_rows_mut::<3>(GPS).scale_mut(gps_fade);
         applied
     }
 
@@ -142,10 +166,19 @@ impl Transition {
     /// orders below the rest in the 20 ms that the filter carries its covariance at most.
     fn add_noise(&self, covariance: &mut Covariance, params: &EkfParams) {
         let time_s = self.time;
-        self.add_noise_of_motion(covariance, params);
+        let noises = self.motion_noises(params);
+        for axis in 0..3 {
+            let (position, velocity) = (POSITION + axis, VELOCITY + axis);
+            covariance[(position, velocity)] += noises.position_velocity;
+            covariance[(velocity, position)] += noises.position_velocity;
+        }
         let fade = libm::exp(-2.0 * time_s / params.gps_position_drift_time_s);
-        let mut add =
-            |from: usize, count: usize, variance: f64| add_variance(covariance, from, count, variance);
+        let mut add = |from: usize, count: usize, variance: f64| {
+            (from..from + count).for_each(|state| covariance[(state, state)] += variance);
+        };
+        add(POSITION, 3, noises.position);
+        add(VELOCITY, 3, noises.velocity);
+        add(ATTITUDE, 3, noises.attitude);
         add(GYROSCOPE, 3, params.gyroscope_bias_walk_rad_s2_sqrt_hz.powi(2) * time_s);
         add(ACCELEROMETER, 3, params.accelerometer_bias_walk_m_s3_sqrt_hz.powi(2) * time_s);
         add(BAROMETER, 1, params.barometer_bias_walk_m_sqrt_s.powi(2) * time_s);
@@ -154,33 +187,37 @@ impl Transition {
         }
     }
 
-    /// The part of that in the errors of position, velocity and attitude.
-    fn add_noise_of_motion<const N: usize>(&self, covariance: &mut SMatrix<f64, N, N>, params: &EkfParams) {
-        let time_s = self.time;
+    /// What the IMU's noise adds to the covariance of position, velocity and attitude, the same along every axis.
+    fn motion_noises(&self, params: &EkfParams) -> MotionNoises {
         let force = params.accelerometer_noise_density_m_s2_sqrt_hz.powi(2);
-        for axis in 0..3 {
-            let (position, velocity) = (POSITION + axis, VELOCITY + axis);
-            covariance[(position, position)] += force * time_s.powi(3) / 3.0;
-            covariance[(position, velocity)] += force * time_s.powi(2) / 2.0;
-            covariance[(velocity, position)] += force * time_s.powi(2) / 2.0;
+        MotionNoises {
+            position: force * self.time.powi(3) / 3.0,
+            position_velocity: force * self.time.powi(2) / 2.0,
+            velocity: force * self.time,
+            attitude: params.gyroscope_noise_density_rad_s_sqrt_hz.powi(2) * self.time,
         }
-        add_variance(covariance, VELOCITY, 3, force * time_s);
-        add_variance(covariance, ATTITUDE, 3, params.gyroscope_noise_density_rad_s_sqrt_hz.powi(2) * time_s);
     }
 }
 
-/// Adds `variance` to `count` errors from number `from` on.
-fn add_variance<const N: usize>(
-    covariance: &mut SMatrix<f64, N, N>,
-    from: usize,
-    count: usize,
-    variance: f64,
-) {
-    (from..from + count).for_each(|state| covariance[(state, state)] += variance);
+/// Variances along each axis, and the covariance of position and velocity along the same.
+struct MotionNoises {
+    /// m².
+    position: f64,
+    /// m²/s.
+    position_velocity: f64,
+    /// m²/s².
+    velocity: f64,
+    /// rad².
+    attitude: f64,
+}
+
+/// The weights in row `row` of the matrices of attitude, gyroscope bias and accelerometer bias.
+fn weights(matrices: [&Matrix3<f64>; 3], row: usize) -> Tilts {
+    Tilts::from_fn(|state, _| matrices[state / 3][(row, state % 3)])
 }
 
 /// The mean of a matrix and its transpose, which rounding has let drift apart.
-pub(super) fn symmetric(covariance: &Covariance) -> Covariance {
+fn symmetric(covariance: &Covariance) -> Covariance {
     0.5 * (covariance + covariance.transpose())
 }
 
@@ -190,4 +227,31 @@ fn matrix(flat: &[f64; 9]) -> Matrix3<f64> {
 
 fn add(flat: &mut [f64; 9], change: &Matrix3<f64>) {
     flat.iter_mut().zip(change).for_each(|(value, change)| *value += change);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Rotation3;
+
+    #[test]
+    fn the_variances_of_the_motion_are_those_of_the_whole_covariance() {
+        let params = EkfParams::default();
+        let mut transition = Transition::default();
+        for sample in 0..40 {
+            let turn_WB = Rotation3::from_euler_angles(0.01 * f64::from(sample), 0.3, -0.2);
+            transition.extend(turn_WB.matrix(), &Vector3::new(1.0, -2.0, 9.0 + f64::from(sample)), 2e-3);
+        }
+        let root = Covariance::from_fn(|row, column| ((3 * row + 7 * column) % 11) as f64 - 4.0);
+        let covariance = root * root.transpose();
+        let carried = transition.carry(&covariance.as_view(), &params);
+        let turn_BW = Rotation3::from_euler_angles(0.5, -0.4, 2.0).into_inner();
+        let block = |from: usize| carried.fixed_view::<3, 3>(from, from).into_owned();
+        let attitude = turn_BW * block(ATTITUDE) * turn_BW.transpose();
+        let expected = [block(POSITION), block(VELOCITY), attitude].map(|block| block.diagonal());
+        let variances = transition.motion_variances(&covariance.as_view(), &turn_BW, &params);
+        for (found, expected) in variances.iter().zip(&expected) {
+            assert!((found - expected).amax() < 1e-12 * expected.amax(), "{found} for {expected}");
+        }
+    }
 }
