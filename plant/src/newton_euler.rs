@@ -150,27 +150,32 @@ impl NewtonEuler {
     ) -> State {
         let rates = |state: &State| hold(state, self.rates(state, actuation));
         let mut sum = rates(state);
-        let k2 = rates(&state.moved(&sum, span_s / 2.0));
-        let k3 = rates(&state.moved(&k2, span_s / 2.0));
-        let k4 = rates(&state.moved(&k3, span_s));
-        [(&k2, 2.0), (&k3, 2.0), (&k4, 1.0)].into_iter().for_each(|(rates, weight)| sum.add(rates, weight));
-        state.moved(&sum, span_s / 6.0)
+        let mut stage = state.moved(&sum, span_s / 2.0);
+        for (weight, share) in [(2.0, 0.5), (2.0, 1.0)] {
+            let middle = rates(&stage);
+            sum.add(&middle, weight);
+            stage.move_from(state, &middle, share * span_s);
+        }
+        sum.add(&rates(&stage), 1.0);
+        stage.move_from(state, &sum, span_s / 6.0);
+        stage
     }
 
     /// Rates of free flight.
     pub(crate) fn rates(&self, state: &State, actuation: &Actuation) -> Rates {
-        let rotors = self.airframe.rotor_rates(actuation, state);
-        let wrench = self.airframe.wrench(actuation, state, &rotors);
+        let mut rates =
+            Rates { body: BodyRates::default(), rotors: self.airframe.rotor_rates(actuation, state) };
+        let wrench = self.airframe.wrench(actuation, state, &rates.rotors);
         let attitude_WB = state.body.attitude_WB.as_ref();
         let force_W_N = rotated(attitude_WB, &wrench.force_B_N);
-        let body = BodyRates {
+        rates.body = BodyRates {
             velocity_W_m_s: state.body.velocity_W_m_s,
             acceleration_W_m_s2: self.gravity_W_m_s2 + force_W_N / self.vehicle().mass_kg,
             // 1/2 q (0, w), with w in the body frame.
             attitude_WB_per_s: attitude_WB * Quaternion::from_imag(state.body.angular_velocity_B_rad_s * 0.5),
             angular_acceleration_B_rad_s2: self.angular_acceleration(state, &wrench.torque_B_N_m),
         };
-        Rates { body, rotors }
+        rates
     }
 
     /// J^-1 (tau - w x J w).

@@ -100,7 +100,7 @@ pub(crate) struct Rates {
 }
 
 /// Rates of change of every component of a [`RigidBody`].
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct BodyRates {
     pub velocity_W_m_s: Vector3<f64>,
     pub acceleration_W_m_s2: Vector3<f64>,
@@ -160,11 +160,16 @@ impl State {
     /// This state moved along `rates` for `span_s`.
     pub(crate) fn moved(&self, rates: &Rates, span_s: f64) -> State {
         let mut moved = *self;
-        moved.body = self.body.moved(&rates.body, span_s);
-        for (rotor, rates) in moved.rotors.iter_mut().zip(&rates.rotors) {
-            *rotor = rotor.moved(rates, span_s);
-        }
+        moved.move_from(self, rates, span_s);
         moved
+    }
+
+    /// Becomes `start`, which has as many rotors, moved along `rates` for `span_s`.
+    pub(crate) fn move_from(&mut self, start: &State, rates: &Rates, span_s: f64) {
+        self.body = start.body.moved(&rates.body, span_s);
+        for ((rotor, start), rates) in self.rotors.iter_mut().zip(&start.rotors).zip(&rates.rotors) {
+            *rotor = start.moved(rates, span_s);
+        }
     }
 }
 

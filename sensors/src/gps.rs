@@ -96,7 +96,8 @@ impl Sensor for GpsParams {
         let last_W_m = vector(state.drift);
         let drift_W_m = self.drift((!last_W_m.x.is_nan()).then_some(last_W_m), chance.noise());
         state.drift = vector_message(drift_W_m);
-        let mut noise = |sigma: [f64; 3]| Vector3::from(sigma).component_mul(&standard_normal(chance.noise()));
+        let mut noise =
+            |sigma: [f64; 3]| Vector3::from(sigma).component_mul(&standard_normal(chance.noise()));
         let position_error_W_m =
             Vector3::from(self.position_bias_m) + drift_W_m + noise(self.position_noise_m);
         let velocity_error_W_m_s = noise(self.velocity_noise_m_s);

@@ -133,7 +133,8 @@ impl ImuPart {
         if state.readings == 0 {
             state.rotor_angles_rad = START_ANGLES_RAD;
         }
-        let shakes = self.params.accelerometer_vibration_m != 0.0 || self.params.gyroscope_vibration_rad != 0.0;
+        let shakes =
+            self.params.accelerometer_vibration_m != 0.0 || self.params.gyroscope_vibration_rad != 0.0;
         let senses = [1.0, -1.0].into_iter().cycle();
         let rotors = state.rotor_angles_rad.iter_mut().zip(truth.rotor_speeds_rad_s).zip(senses);
         for ((angle_rad, speed_rad_s), sense) in rotors {

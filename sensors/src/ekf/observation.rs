@@ -54,7 +54,8 @@ impl<const N: usize> Observation<N> {
     /// The derivatives that are not zero, each with its row and its error's number.
     fn derivatives(&self) -> impl Iterator<Item = (usize, usize, f64)> {
         let all = self.jacobian.iter().enumerate();
-        all.filter(|(_, derivative)| **derivative != 0.0).map(|(place, derivative)| (place % N, place / N, *derivative))
+        all.filter(|(_, derivative)| **derivative != 0.0)
+            .map(|(place, derivative)| (place % N, place / N, *derivative))
     }
 }
 

@@ -117,8 +117,8 @@ impl Transition {
         let with = |state: usize| covariance.fixed_view::<TILTS, 1>(ATTITUDE, state).into_owned();
         let position = |axis: usize| {
             let (p, v) = (POSITION + axis, VELOCITY + axis);
-            let own = covariance[(p, p)]
-                + self.time * (2.0 * covariance[(p, v)] + self.time * covariance[(v, v)]);
+            let own =
+                covariance[(p, p)] + self.time * (2.0 * covariance[(p, v)] + self.time * covariance[(v, v)]);
             sum(own, &(with(p) + self.time * with(v)), &weights([&-shift, &tilt_twice, &-turn_twice], axis))
         };
         let velocity = |axis: usize| {
@@ -126,9 +126,8 @@ impl Transition {
             sum(covariance[(v, v)], &with(v), &weights([&-push, &tilt, &-turn], axis))
         };
         let body_turn = -turn_BW * turn;
-        let attitude = |axis: usize| {
-            sum(0.0, &Tilts::zeros(), &weights([turn_BW, &body_turn, &Matrix3::zeros()], axis))
-        };
+        let attitude =
+            |axis: usize| sum(0.0, &Tilts::zeros(), &weights([turn_BW, &body_turn, &Matrix3::zeros()], axis));
         let noises = self.motion_noises(params);
         [
             Vector3::from_fn(|axis, _| position(axis) + noises.position),
