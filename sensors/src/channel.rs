@@ -389,7 +389,7 @@ mod tests {
             let mut state = nothing_measured(0);
             let measure = |_: &mut _, _: &u64, chance: &mut Chance<'_>| {
                 chance.is_lost(0);
-                chance.noise.next_u64()
+                chance.noise().next_u64()
             };
             [0, 1, 2].map(|n| channel.measure(n * 100 * TICK_NS, &mut state, measure))
         };
@@ -400,7 +400,7 @@ mod tests {
     fn a_state_that_is_handed_over_goes_on_as_the_one_it_was_taken_from() {
         let timing = Timing { rate_hz: 250.0, delay_ms: 50.0, dropout: 0.3, dropout_mean_s: 0.02 };
         let measure = |_: &mut _, _: &u64, chance: &mut Chance<'_>| {
-            if chance.is_lost(0) { 0 } else { chance.noise.next_u64() }
+            if chance.is_lost(0) { 0 } else { chance.noise().next_u64() }
         };
         let first = channel(&timing, 1, 3, "gps").unwrap();
         let mut state = nothing_measured(1);
