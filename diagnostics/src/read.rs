@@ -28,7 +28,7 @@ use toml::de::{DeString, DeTable, DeValue};
 /// let read = |text| diagnostics::read::<Gains>(&serde_json::from_str(text).unwrap());
 /// assert_eq!(read(r#"{ "roll": 2.0 }"#).unwrap().roll, 2.0);
 /// let error = read(r#"{ "roll": "two" }"#).unwrap_err();
-/// assert_eq!((error.key(), error.to_string().as_str()), ("roll", "`roll` must be f64, found string \"two\""));
+/// assert_eq!((error.key(), error.to_string().as_str()), ("roll", "`roll` must be a number, found the text \"two\""));
 /// let error = read(r#"{ "rol": 2.0 }"#).unwrap_err();
 /// assert_eq!((error.key(), error.to_string().as_str()), ("rol", "unknown key `rol`, expected `roll`"));
 /// ```
@@ -54,7 +54,7 @@ pub fn read<P: DeserializeOwned>(parameters: &Value) -> Result<P, ParameterError
 ///     "a.toml:2:1: unknown key `sede`, expected `seed`\n  help: did you mean `seed`?"
 /// );
 /// let error = diagnostics::read_toml::<Run>("a.toml", "seed = 'x'").unwrap_err();
-/// assert_eq!(error.to_string().lines().next(), Some("a.toml:1:8: `seed` must be u64, found string \"x\""));
+/// assert_eq!(error.to_string().lines().next(), Some("a.toml:1:8: `seed` must be a whole number, at least 0, found the text \"x\""));
 /// ```
 pub fn read_toml<T: DeserializeOwned>(file: &str, text: &str) -> Result<T, Diagnostic> {
     let misread = |misread: Misread| Diagnostic::at(Place::of(file, text, &misread.span()), misread.error);
@@ -341,7 +341,7 @@ impl de::Error for Misread {
     }
 
     fn invalid_type(found: Unexpected<'_>, expected: &dyn de::Expected) -> Self {
-        ParameterError::value("", expected.to_string(), found).into()
+        ParameterError::value("", in_words(expected), seen(found)).into()
     }
 
     fn invalid_value(found: Unexpected<'_>, expected: &dyn de::Expected) -> Self {
@@ -349,7 +349,7 @@ impl de::Error for Misread {
     }
 
     fn invalid_length(length: usize, expected: &dyn de::Expected) -> Self {
-        ParameterError::value("", expected.to_string(), format_args!("a list of {length}")).into()
+        ParameterError::value("", in_words(expected), format_args!("a list of {length}")).into()
     }
 
     fn unknown_variant(variant: &str, expected: &'static [&'static str]) -> Self {
@@ -363,6 +363,39 @@ impl de::Error for Misread {
 
     fn missing_field(field: &'static str) -> Self {
         ParameterError::missing(field, "").into()
+    }
+}
+
+/// A type as people call it who do not know Rust's names.
+fn in_words(expected: &dyn de::Expected) -> String {
+    let name = expected.to_string();
+    match name.as_str() {
+        "f32" | "f64" => "a number".to_owned(),
+        "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number, at least 0".to_owned(),
+        "i8" | "i16" | "i32" | "i64" | "isize" => "a whole number".to_owned(),
+        "a boolean" => "true or false".to_owned(),
+        "a map" => "a table".to_owned(),
+        "a sequence" => "a list".to_owned(),
+        other if other.starts_with("struct ") => "a table".to_owned(),
+        other => match other.strip_prefix("an array of length ") {
+            Some(length) => format!("a list of {length}"),
+            None => name,
+        },
+    }
+}
+
+/// A value as it stands in a file.
+fn seen(found: Unexpected<'_>) -> String {
+    match found {
+        Unexpected::Bool(flag) => flag.to_string(),
+        Unexpected::Unsigned(number) => number.to_string(),
+        Unexpected::Signed(number) => number.to_string(),
+        Unexpected::Float(number) => number.to_string(),
+        Unexpected::Str(text) => format!("the text {text:?}"),
+        Unexpected::Map => "a table".to_owned(),
+        Unexpected::Seq => "a list".to_owned(),
+        Unexpected::Unit | Unexpected::Option => "nothing".to_owned(),
+        other => other.to_string(),
     }
 }
 
@@ -394,9 +427,9 @@ mod tests {
             let (place, error) = refused(text);
             format!("{place} {error}")
         };
-        assert_eq!(told("[[a]]\nradius_m = 'x'"), "2:12 `a.0.radius_m` must be f64, found string \"x\"");
+        assert_eq!(told("[[a]]\nradius_m = 'x'"), "2:12 `a.0.radius_m` must be a number, found the text \"x\"");
         assert_eq!(told("[[a]]\nradius_m = 1\n[[a]]"), "3:1 missing key `a.1.radius_m`");
-        assert_eq!(told("a = 3"), "1:5 `a` must be a sequence, found integer `3`");
+        assert_eq!(told("a = 3"), "1:5 `a` must be a list, found 3");
     }
 
     #[test]

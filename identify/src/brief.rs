@@ -3,7 +3,7 @@
 
 use crate::horizons::Change;
 use crate::loss::advice;
-use crate::report::{EffectReport, Estimate, Report, rounded};
+use crate::report::{EffectReport, Estimate, Report, UNCHECKED, rounded};
 use crate::sensor_effects::SENSOR_EFFECTS;
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -58,6 +58,8 @@ fn answer(report: &Report) -> String {
         "Do not use the new vehicle file: simpler predictions of these flights are better.".to_owned()
     } else if count == 0 {
         "The declared vehicle file says all that these flights can show.".to_owned()
+    } else if report.is_unchecked() {
+        format!("The declared vehicle file seems to lack {effects}. No prediction could check that.")
     } else if !report.worse().is_empty() {
         format!(
             "The declared vehicle file lacks {effects}, but the new one does not predict everything better."
@@ -132,6 +134,9 @@ fn next(report: &Report, accepted: &[(&str, &EffectReport)]) -> Vec<String> {
             "Weigh and balance the vehicle before each flight: these flights differ in trim.".to_owned(),
         );
     }
+    if report.is_unchecked() && !accepted.is_empty() {
+        steps.push(format!("Log more, so that predictions can check the answer: {UNCHECKED}."));
+    }
     for (name, effect) in accepted {
         if let (Some(experiment), Some(rival)) = (&effect.experiment, effect.confused_with.first()) {
             steps.push(format!("To tell {name} from {rival}: {experiment}."));
@@ -187,6 +192,16 @@ mod tests {
             ]),
             ..Report::of_nothing()
         }
+    }
+
+    #[test]
+    fn a_verdict_that_no_prediction_checks_says_so() {
+        let brief = Brief::of(&Report { held_out: Changes::new(), ..report() });
+        assert_eq!(
+            brief.answer,
+            "The declared vehicle file seems to lack one effect. No prediction could check that."
+        );
+        assert!(brief.next.iter().any(|step| step.contains("measured attitude")), "{:?}", brief.next);
     }
 
     #[test]

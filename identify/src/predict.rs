@@ -1,12 +1,14 @@
 //! Prediction over horizons: the model, set to the measured state at the start of each window, flown on the measured
-//! commands to its end. The same windows as those of the plant node with an input `measured`.
+//! commands to its end. The same windows as those of the plant node with an input `measured`. A flight without commands is
+//! flown with its measured rotor speeds.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use flights::state::{StateQuantity, VehicleState, WindowEndErrors};
-use flights::{Flight, Played, Row};
+use flights::{Channel, Flight, Played, Row};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use plant::{Airframe, Backend, FreeFlight, NewtonEuler, RigidBody};
+use plant::{Airframe, Backend, FreeFlight, NewtonEuler, PerRotor, RigidBody, RotorState};
 use std::collections::BTreeMap;
+use vehicles::ROTORS_MAX;
 
 /// Length of a tick.
 const TICK_S: f64 = 0.001;
@@ -17,6 +19,8 @@ const SLACK_S: f64 = 1e-9;
 #[derive(Debug)]
 pub struct Measured {
     played: Played,
+    /// Rotor speeds in place of commands.
+    rotor_speed: Option<Channel<ROTORS_MAX>>,
     /// Longest time from the first sample that is predicted, in s.
     span_s: f64,
 }
@@ -38,12 +42,14 @@ pub struct WindowEnd {
 }
 
 impl Measured {
-    /// The states of `flight`; `None` where it has no commands, or no motion.
+    /// The states of `flight`; `None` where it has neither commands nor rotor speeds, or no motion.
     pub fn of(flight: &Flight) -> Option<Self> {
-        if flight.command.is_empty() {
+        let is_commanded = !flight.command.is_empty();
+        if !is_commanded && flight.rotor_speed.is_empty() {
             return None;
         }
-        Some(Self { played: Played::of(flight).ok()?, span_s: f64::INFINITY })
+        let rotor_speed = (!is_commanded).then(|| flight.rotor_speed.clone());
+        Some(Self { played: Played::of(flight).ok()?, rotor_speed, span_s: f64::INFINITY })
     }
 
     /// The first `span_s` of it.
@@ -71,8 +77,15 @@ impl Measured {
         plant.settle_rotors(&before.command[..count]);
         let (mut ends, mut pushing) = (Vec::new(), push(start_s));
         let span_s = (end_s - start_s + SLACK_S).min(self.span_s);
+        let mut speed_hint = 0;
         for tick in 1..=(span_s / TICK_S) as usize {
-            plant.step(&before.command[..count], TICK_S, &[]);
+            match &self.rotor_speed {
+                None => plant.step(&before.command[..count], TICK_S, &[]),
+                Some(speeds) => {
+                    let rotors = rotors_at(speeds, at_s(tick - 1), &mut speed_hint);
+                    plant.step_with_rotors(&PerRotor::from_fn(count, |rotor| rotors[rotor]), TICK_S);
+                }
+            }
             if pushing != [0.0; 6] {
                 let pushed = pushed(&plant.state().body, &pushing);
                 plant.set_body(&pushed);
@@ -95,6 +108,27 @@ impl Measured {
         }
         ends
     }
+}
+
+/// The rotors at `time_s`, on straight lines between the samples of their speeds. `hint` is an index near, kept between calls
+/// at growing times.
+fn rotors_at(speeds: &Channel<ROTORS_MAX>, time_s: f64, hint: &mut usize) -> [RotorState; ROTORS_MAX] {
+    let (times_s, last) = (&speeds.time_s, speeds.time_s.len() - 1);
+    while *hint < last && times_s[*hint + 1] <= time_s + SLACK_S {
+        *hint += 1;
+    }
+    let (before, next) = (*hint, (*hint + 1).min(last));
+    let (since_s, span_s) = (time_s - times_s[before], times_s[next] - times_s[before]);
+    // Before the first sample and behind the last one the rotors keep their speeds.
+    let is_between = span_s > 0.0 && (0.0..=span_s).contains(&since_s);
+    std::array::from_fn(|rotor| {
+        let (from, to) = (speeds.values[before][rotor], speeds.values[next][rotor]);
+        let slope = if is_between { (to - from) / span_s } else { 0.0 };
+        RotorState {
+            speed_rad_s: if is_between { from + slope * since_s } else { from },
+            acceleration_rad_s2: slope,
+        }
+    })
 }
 
 /// Errors of a state `of` each end, for the quantities that `flight` has a measurement of; none without ends.

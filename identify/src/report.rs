@@ -148,6 +148,9 @@ impl fmt::Display for Report {
 
 /// With fewer blocks of validation data nothing is beyond chance.
 const ENOUGH_BLOCKS: usize = 12;
+/// Reason why predictions do not judge a verdict.
+pub(crate) const UNCHECKED: &str =
+    "no test flight has both a measured attitude and commands or rotor speeds, so that a wrong verdict may stand";
 /// Ratio of prediction errors, new by declared, above which the new vehicle predicts worse.
 const WORSE: f64 = 1.2;
 
@@ -155,6 +158,13 @@ impl Report {
     /// True if the verdict is empty and the validation data are too short to accept an effect.
     pub(crate) fn is_undecided(&self) -> bool {
         self.verdict.is_empty() && self.validation_blocks < ENOUGH_BLOCKS
+    }
+
+    /// True if no prediction judges the verdict: no test flight was predicted from a measured attitude.
+    pub(crate) fn is_unchecked(&self) -> bool {
+        let is_assumed =
+            |name: &String| self.flights.iter().any(|flight| flight.name == *name && !flight.assumed.is_empty());
+        self.held_out.keys().all(is_assumed)
     }
 
     /// Returns assumptions and the reader's notes, each with its flights.
@@ -213,6 +223,9 @@ impl Report {
             writeln!(f, "\nverdict: nothing. No candidate makes the equations fit better beyond chance.")?;
         } else {
             writeln!(f, "\nverdict: {}", self.verdict.join(", "))?;
+            if self.is_unchecked() {
+                writeln!(f, "  (not checked by predictions: {UNCHECKED})")?;
+            }
         }
         if self.refined {
             writeln!(

@@ -3,10 +3,11 @@
 use crate::actuation::Battery;
 use crate::airframe_state::AirframeState;
 use crate::backend::{Backend, ContactReport, Neighbour, NotePart};
+use crate::motor;
 use crate::newton_euler::{Accelerations, NewtonEuler};
 use crate::saved::{Fingerprint, Saved};
 use crate::snapshot::SnapshotError;
-use crate::state::{RigidBody, State};
+use crate::state::{PerRotor, RigidBody, RotorState, State};
 
 const NAME: &str = "newton-euler";
 
@@ -42,6 +43,18 @@ impl FreeFlight {
         let state = model.start(body, 0.0);
         let configuration = model.airframe().fingerprint(NAME);
         Self { model, state, effects, configuration }
+    }
+
+    /// Moves the vehicle by one tick of `dt_s` in which its rotors turn as `rotors` say, one for each, and as no command
+    /// asks: their speeds at the begin of the tick, which grow by their accelerations.
+    pub fn step_with_rotors(&mut self, rotors: &PerRotor<RotorState>, dt_s: f64) {
+        let airframe = self.model.airframe();
+        let unasked = PerRotor::filled(rotors.len(), 0.0);
+        self.state.rotors = *rotors;
+        let mut actuation = airframe.begin_tick(&mut self.effects, &self.state, &unasked, dt_s);
+        actuation.targets_rad_s = rotors.map(|rotor| motor::target_of(&airframe.vehicle().motor, &rotor));
+        self.effects.actuation = actuation;
+        self.model.advance(&mut self.state, &actuation, dt_s);
     }
 }
 

@@ -18,6 +18,15 @@ pub(crate) fn rates(model: &MotorModel, rotor: &RotorState, target_rad_s: f64) -
     }
 }
 
+/// The target at which `rotor` goes on with its acceleration.
+pub(crate) fn target_of(model: &MotorModel, rotor: &RotorState) -> f64 {
+    let ahead_s = match *model {
+        MotorModel::SecondOrder { natural_frequency_rad_s: wn, damping_ratio: zeta } => 2.0 * zeta / wn,
+        MotorModel::FirstOrder { time_constant_s } => time_constant_s,
+    };
+    rotor.speed_rad_s + ahead_s * rotor.acceleration_rad_s2
+}
+
 /// The rotor after `span_s` towards `target_rad_s`: one classic Runge-Kutta step of fourth order.
 pub(crate) fn moved(model: &MotorModel, rotor: &RotorState, target_rad_s: f64, span_s: f64) -> RotorState {
     let k1 = rates(model, rotor, target_rad_s);

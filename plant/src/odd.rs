@@ -1,7 +1,8 @@
 //! Oddities of a vehicle that may fly all the same: `check` warns of them, with the lines of the file.
 
-use crate::airframe::amid_rotors_B_m;
+use crate::airframe::{Airframe, amid_rotors_B_m};
 use crate::airworthy::places;
+use crate::effects::{Action, Effect, Quantity};
 use bus::context::NodeContext;
 use vehicles::{MotorModel, Vehicle};
 
@@ -18,9 +19,17 @@ const GYRATION_MIN: f64 = 0.03;
 /// Motors with a slower pole are odd: those of multirotors take 0.01 to 0.3 s. Tuned, no source.
 const SLOW_MAX_S: f64 = 1.0;
 
-/// Warns of everything odd about `vehicle`.
-pub(crate) fn tell(vehicle: &Vehicle, run: &NodeContext<'_>) {
-    let odd = [arms(vehicle), one_place(vehicle), one_way(vehicle), inertia(vehicle), slow_motors(vehicle)];
+/// Warns of everything odd about the vehicle of `airframe` and its effects.
+pub(crate) fn tell(airframe: &Airframe, run: &NodeContext<'_>) {
+    let vehicle = airframe.vehicle();
+    let odd = [
+        arms(vehicle),
+        one_place(vehicle),
+        one_way(vehicle),
+        inertia(vehicle),
+        slow_motors(vehicle),
+        unfelt_wind(airframe.effects()),
+    ];
     for what in odd.into_iter().flatten() {
         run.warn("vehicle", format!("`vehicle` \"{}\" {what}", vehicle.name));
     }
@@ -108,6 +117,20 @@ fn slow_motors(vehicle: &Vehicle) -> Option<String> {
     (slowest_s > SLOW_MAX_S).then(message)
 }
 
+/// Finds wind that no effect feels: the vehicle flies as in still air.
+fn unfelt_wind(effects: &[Effect]) -> Option<String> {
+    let is_force = |action: &Action| matches!(action, Action::Wrench(_) | Action::Thrust(_));
+    let mut airs = effects.iter().filter(|effect| effect.kind.needs.contains(&Quantity::Airspeed)).peekable();
+    let wind = airs.peek()?.kind.name;
+    let message = || {
+        format!(
+            "flies in moving air (`{wind}`) that none of its effects feels, expected one that does: it flies as in still air; add \
+             `rotor-drag` or `parasitic-drag`"
+        )
+    };
+    airs.all(|effect| !effect.kind.actions.iter().any(is_force)).then(message)
+}
+
 /// The lines of the file in which the numbers `keys` are.
 fn lines(vehicle: &Vehicle, keys: &[&str]) -> String {
     let stated = vehicle.provenance.iter().filter(|number| keys.contains(&number.key.as_str()));
@@ -125,7 +148,7 @@ mod tests {
 
     fn told(vehicle: &Vehicle) -> Vec<String> {
         let run = NodeContext::new("plant", &[]);
-        tell(vehicle, &run);
+        tell(&Airframe::new(vehicle.clone()), &run);
         run.into_warnings().into_iter().map(|warning| warning.message).collect()
     }
 
@@ -171,6 +194,24 @@ mod tests {
             let message = of.unwrap_or_else(|| panic!("{expected:?} in {messages:?}"));
             assert!(expected.iter().all(|word| message.contains(word)), "{message}");
         }
+    }
+
+    #[test]
+    fn wind_needs_an_effect_that_feels_it() {
+        let told = |names: &[&str]| {
+            let effects = names.iter().map(|name| crate::effects::find(name).unwrap().nominal()).collect();
+            let run = NodeContext::new("plant", &[]);
+            tell(&Airframe::with_effects(load("hummingbird.toml"), effects), &run);
+            run.into_warnings().into_iter().map(|warning| warning.message).collect::<Vec<_>>()
+        };
+        for wind in ["wind", "turbulence"] {
+            let [message] = &told(&[wind])[..] else { panic!("{wind}: one warning") };
+            assert!(message.contains(&format!("`{wind}`")) && message.contains("`rotor-drag`"), "{message}");
+            for felt in ["rotor-drag", "parasitic-drag", "blade-flapping", "translational-lift"] {
+                assert_eq!(told(&[wind, felt]), [""; 0], "{wind} and {felt}");
+            }
+        }
+        assert_eq!(told(&["mass-error"]), [""; 0]);
     }
 
     #[test]

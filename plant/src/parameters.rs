@@ -170,7 +170,7 @@ impl Parameters {
         refuse_initial(airframe.vehicle(), run)?;
         // Before the backend, which a vehicle that is none might not survive.
         airworthy::tell_unsourced(airframe.vehicle(), run);
-        odd::tell(airframe.vehicle(), run);
+        odd::tell(&airframe, run);
         airworthy::check_rotor_inertia(airframe.vehicle())?;
         let dt_s = run.tick_s() / f64::from(self.substeps);
         airworthy::check_steps(airframe.vehicle(), dt_s, run)?;

@@ -10,7 +10,7 @@ use common::{
     momentum_W,
 };
 use nalgebra::{UnitQuaternion, Vector3};
-use plant::{NewtonEuler, RigidBody, State};
+use plant::{Airframe, Backend, FreeFlight, NewtonEuler, RigidBody, State};
 use vehicles::Vehicle;
 
 #[test]
@@ -165,4 +165,34 @@ fn commands_that_are_not_numbers_leave_the_state_finite() {
     fly(&model, &mut state, &[f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -1e300], 100);
     assert!(state.body.position_W_m.iter().all(|x| x.is_finite()));
     assert!(state.rotors.iter().all(|rotor| rotor.speed_rad_s.is_finite()));
+}
+
+/// A vehicle whose rotors are turned as those of a commanded one moves as that one: thrust, torque and the reaction of rotors
+/// that spin up.
+#[test]
+fn turned_rotors_move_it_as_commanded_ones_do() {
+    for vehicle in [hummingbird(), crazyflie()] {
+        let hover = vehicle.hover_command();
+        let airframe = Airframe::new(vehicle);
+        let flight = || {
+            let memory = airframe.initial_state(0, "plant", TICK_S);
+            FreeFlight::new(NewtonEuler::flying(airframe.clone(), 1), RigidBody::level_at(Vector3::z()), memory)
+        };
+        let (mut commanded, mut turned) = (flight(), flight());
+        commanded.settle_rotors(&[hover; 4]);
+        for tick in 0..1000 {
+            // Roll, pitch and yaw one after the other, each to both sides.
+            let (axis, side) = (tick / 200 % 3, if tick % 200 < 100 { 0.03 } else { -0.03 });
+            let signs = [[1.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, -1.0], [1.0, -1.0, 1.0, -1.0]][axis];
+            let rotors = commanded.state().rotors;
+            turned.step_with_rotors(&rotors, TICK_S);
+            commanded.step(&signs.map(|sign| hover * (1.0 + side * sign)), TICK_S, &[]);
+        }
+        let [one, other] = [&commanded, &turned].map(|flight| flight.state().body);
+        assert!(one.attitude_WB.angle() > 0.05, "it has turned: {one:?}");
+        assert!(one.attitude_WB.angle_to(&other.attitude_WB) < 2e-3, "{one:?}\n{other:?}");
+        assert!((one.velocity_W_m_s - other.velocity_W_m_s).norm() < 5e-3, "{one:?}\n{other:?}");
+        let spin = one.angular_velocity_B_rad_s - other.angular_velocity_B_rad_s;
+        assert!(spin.norm() < 1e-2 * (0.1 + one.angular_velocity_B_rad_s.norm()), "{one:?}\n{other:?}");
+    }
 }

@@ -87,8 +87,8 @@ impl Host {
 /// The reason why a run whose nodes live in this process cannot have `what`.
 pub(crate) fn needs_process(what: &str) -> anyhow::Error {
     anyhow!(
-        "{what} needs a process of its own, and the nodes of this run share the launcher's; leave it out, or fly without \
-         `--in-process` (in Rust: with Host::Exe, which executes a binary for each node)"
+        "{what} needs a process of its own, and the nodes of this run share one: those of `run --in-process`, `campaign` and `tune` do; \
+         leave it out, or fly it with `hummingbus run` (in Rust: with Host::Exe, which executes a binary for each node)"
     )
 }
 

@@ -148,7 +148,7 @@ fn a_backup_that_would_not_fit_the_graph() {
     ended.says(&["input `estimate` of `controller`: nobody publishes /plant/stat"]);
     let ended = swap("parameters.§gain = 3");
     ended.says(&["process `controller`", "unknown key `gain`"]);
-    swap("parameters = §3").says(&["with.parameters` must be a map, found integer `3`"]);
+    swap("parameters = §3").says(&["with.parameters` must be a table, found 3"]);
     let at_swap = |with: &str| {
         let head = "\n§[[swap]]\nprocess = \"controller\"\nat_tick = 50\nshadow_ticks = 9\n";
         refused_with(&format!("{head}[swap.with]\n{with}\n"))

@@ -97,8 +97,8 @@ fn host_settings_that_no_system_has() {
     ended.says(&["`log`: `imu` writes to the file of `ekf`"]);
     with("environment.§HUMMINGBUS_RUN = \"x\"").says(&["HUMMINGBUS_RUN is set by the launcher"]);
     with("environment.§\"A=B\" = \"x\"").says(&["cannot be an environment variable"]);
-    with("environment.A = §3").says(&["environment.A` must be a string, found integer `3`"]);
-    with("lockstep = §3").says(&["lockstep` must be a boolean, found integer `3`"]);
+    with("environment.A = §3").says(&["environment.A` must be a string, found 3"]);
+    with("lockstep = §3").says(&["lockstep` must be true or false, found 3"]);
     with("command = §[\"sleep\"]").says(&["process `imu` has both `kind` and `command`"]);
 }
 

@@ -38,7 +38,7 @@ fn a_parameter_of_another_type_is_named() {
     let place = Place::new();
     let path = place.write("type.toml", good().replace("altitude_m = 1.0", "altitude_m = \"high\""));
     let ended = refused_args(&["run", &path], &path);
-    ended.says(&["process `pilot`", "initial_altitude_m", "\"high\"", "must be f64"]);
+    ended.says(&["process `pilot`", "initial_altitude_m", "\"high\"", "must be a number, found the text"]);
 }
 
 #[test]
@@ -74,7 +74,7 @@ fn a_run_of_no_length() {
     with("-1.0").says(&["`duration_s` is -1 s"]);
     with("nan").says(&["`run.duration_s` is nan, expected a finite number"]);
     with("1e9").says(&["`duration_s` is 1000000000 s"]);
-    with("\"long\"").says(&["`run.duration_s` must be f64, found string \"long\""]);
+    with("\"long\"").says(&["`run.duration_s` must be a number, found the text \"long\""]);
 }
 
 #[test]

@@ -84,7 +84,8 @@ pub fn of(
         let path = path.to_string_lossy().into_owned();
         if parameters.insert(key, path.as_str().into()).is_some() {
             let message = format!("`{}` has `{key}` twice: as a file, and in its parameters", name.get_ref());
-            return Err(manifest.problem(&file.span(), message, "leave one of them out"));
+            let help = "leave one of them out; a swap that changes gains names another gains file: gains = \"PATH\"";
+            return Err(manifest.problem(&file.span(), message, help));
         }
         let named = named_files(&read, key, path.into());
         if program.component().is_none() {

@@ -15,6 +15,8 @@ use toml_edit::{DocumentMut, Item, Table, Value};
 
 /// Keys of a process whose value is a TOML file.
 const FILES: [&str; 3] = ["vehicle", "scene", "gains"];
+/// Key of the list of effects in a vehicle or scene file.
+const EFFECTS: &str = "effects";
 /// Key of the number or the vector in a quantity of a vehicle file.
 const VALUE: &str = "value";
 
@@ -145,9 +147,31 @@ impl FileEdit {
     }
 
     fn apply(&self, document: &mut DocumentMut) -> Result<(), String> {
+        self.require_effect(document)?;
         let keys = self.keys_in(document.as_item());
         put(document.as_item_mut(), &keys, self.value.clone())
             .ok_or_else(|| format!("the {} file has no place `{}`", self.file, self.keys.join(".")))
+    }
+
+    /// Refuses an effect that the file does not list: its other parameters, their units and its place among the effects would
+    /// be unknown.
+    fn require_effect(&self, document: &DocumentMut) -> Result<(), String> {
+        let [list, name, ..] = self.keys.as_slice() else { return Ok(()) };
+        if list != EFFECTS || name.parse::<usize>().is_ok() {
+            return Ok(());
+        }
+        let listed = document.get(EFFECTS).and_then(Item::as_array_of_tables);
+        let names: Vec<&str> =
+            listed.into_iter().flatten().filter_map(|effect| effect.get("name")?.as_str()).collect();
+        if names.contains(&name.as_str()) {
+            return Ok(());
+        }
+        let known = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+        Err(format!(
+            "the {} file lists no effect `{name}` (it lists {known}); add [[effects]] with name = \"{name}\" and its parameters to \
+             that file, and set one of them",
+            self.file
+        ))
     }
 
     /// The keys to the number itself: a quantity keeps its unit and source.
@@ -272,12 +296,25 @@ mod tests {
     #[test]
     fn a_missing_key_is_added_and_an_impossible_one_refused() {
         let quantity = "{ value = 0.1, unit = \"1\" }";
-        let found = changed(&format!("process.plant.vehicle.effects.lift={quantity}")).unwrap();
-        assert!(found.contains("[effects]") && found.contains(&format!("lift = {quantity}")), "{found}");
+        let found = changed(&format!("process.plant.vehicle.rotor.lift={quantity}")).unwrap();
+        assert!(found.contains("[rotor]") && found.contains(&format!("lift = {quantity}")), "{found}");
         for keys in ["rotors.3.position", "body.mass.value.deep"] {
             let message = changed(&format!("process.plant.vehicle.{keys}=1")).unwrap_err();
             assert_eq!(message, format!("the vehicle file has no place `{keys}`"));
         }
+    }
+
+    #[test]
+    fn an_effect_that_the_file_does_not_list_is_refused_by_name() {
+        let message = changed("process.plant.vehicle.effects.wind.x=3").unwrap_err();
+        assert!(message.starts_with("the vehicle file lists no effect `wind` (it lists none)"), "{message}");
+        let text = format!("{VEHICLE}[[effects]]\nname = \"wind\"\nx = {{ value = 0, unit = \"m/s\" }}\n");
+        let edit = |set| FileEdit::parse(set, 0).unwrap();
+        let set = edit("process.plant.vehicle.effects.wind.x=3");
+        assert_eq!(edited(&text, &[&set], &|_| None).unwrap(), text.replace("value = 0,", "value = 3,"));
+        let gust = edit("process.plant.vehicle.effects.gust.x=3");
+        let (_, message) = edited(&text, &[&gust], &|_| None).unwrap_err();
+        assert!(message.contains("`gust` (it lists wind)"), "{message}");
     }
 
     #[test]
