@@ -269,13 +269,25 @@ fn require_names(vary: &[Varied]) -> Result<(), Diagnostic> {
     Ok(())
 }
 
+/// Columns of the results of every campaign.
+pub const COLUMNS: [&str; 6] = ["flight", "passed", "failed", "failed_at_s", "error", "wall_s"];
+
+/// Name of the value at `key`: its last part, with the one before it where that is a column of every campaign, such as the
+/// `error` of the effect `mass-error`.
+fn default_name(key: &str) -> String {
+    let mut parts = key.rsplit('.');
+    match (parts.next().unwrap_or(key), parts.next()) {
+        (last, Some(before)) if COLUMNS.contains(&last) => format!("{before}.{last}"),
+        (last, _) => last.to_owned(),
+    }
+}
+
 impl Varied {
     fn of(vary: &Vary, place: &Place) -> Result<Self, ParameterError> {
         let keys: Vec<String> = vary.key.iter().chain(&vary.keys).cloned().collect();
         let first =
             keys.first().ok_or_else(|| ParameterError::missing("key", "a key, as `--set` takes it"))?;
-        let last = first.rsplit('.').next().unwrap_or(first);
-        let name = vary.name.clone().unwrap_or_else(|| last.to_owned());
+        let name = vary.name.clone().unwrap_or_else(|| default_name(first));
         let distribution = vary.distribution()?;
         distribution.check()?;
         Ok(Self { name, keys, meaning: vary.meaning, distribution, place: place.clone() })
@@ -316,6 +328,17 @@ mod tests {
     fn parse(text: &str) -> Result<Campaign, String> {
         let text = format!("manifest = \"a.toml\"\n{text}");
         Campaign::parse("c.toml".as_ref(), &text).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_value_is_called_by_the_end_of_its_key() {
+        for (key, name) in
+            [("run.seed", "seed"), ("process.plant.vehicle.effects.mass-error.error", "mass-error.error")]
+        {
+            let campaign =
+                parse(&format!("flights = 2\n[[vary]]\nkey = \"{key}\"\nuniform = [0, 1]")).unwrap();
+            assert_eq!(campaign.vary[0].name, name);
+        }
     }
 
     #[test]

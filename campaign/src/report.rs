@@ -288,7 +288,7 @@ impl fmt::Display for Report {
                 error.lines().next().unwrap_or_default()
             )?;
         }
-        writeln!(f, "  least, 5 %, median, 95 %, greatest:")?;
+        writeln!(f, "  minimum, 5th percentile, median, 95th percentile, maximum:")?;
         self.figures.iter().try_for_each(|spread| writeln!(f, "    {spread}"))?;
         writeln!(f, "  rank correlations (Spearman), strongest first:")?;
         for Influence { varied, figure, rank_correlation, .. } in self.influences.iter().take(WORST) {

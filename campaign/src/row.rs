@@ -1,6 +1,6 @@
 //! The result of one flight.
 
-use crate::declaration::Varied;
+use crate::declaration::{COLUMNS, Varied};
 use diagnostics::{Diagnostic, ParameterError};
 use report::summary::Summary;
 use runtime::manifest::{Content, Statistic};
@@ -30,9 +30,6 @@ pub struct Row {
     #[serde(default)]
     pub is_of_host: bool,
 }
-
-/// Columns of every campaign.
-pub const COLUMNS: [&str; 6] = ["flight", "passed", "failed", "failed_at_s", "error", "wall_s"];
 
 /// Refuses two columns with one name: `varied` values, `figures`, and the columns of every campaign.
 ///

@@ -427,7 +427,10 @@ mod tests {
             let (place, error) = refused(text);
             format!("{place} {error}")
         };
-        assert_eq!(told("[[a]]\nradius_m = 'x'"), "2:12 `a.0.radius_m` must be a number, found the text \"x\"");
+        assert_eq!(
+            told("[[a]]\nradius_m = 'x'"),
+            "2:12 `a.0.radius_m` must be a number, found the text \"x\""
+        );
         assert_eq!(told("[[a]]\nradius_m = 1\n[[a]]"), "3:1 missing key `a.1.radius_m`");
         assert_eq!(told("a = 3"), "1:5 `a` must be a list, found 3");
     }

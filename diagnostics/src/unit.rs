@@ -100,6 +100,9 @@ pub const ANGULAR_VELOCITY: Dimension =
 pub const ANGULAR_ACCELERATION: Dimension =
     Dimension::of("angular acceleration", &[("rad/s^2", 1.0), ("deg/s^2", PI / 180.0)]);
 
+/// Frequencies.
+pub const FREQUENCY: Dimension = Dimension::of("frequency", &[("Hz", 1.0), ("kHz", 1e3)]);
+
 /// Gains from a quantity to its rate of change.
 pub const PER_SECOND: Dimension = Dimension::of("gain per time", &[("1/s", 1.0)]);
 

@@ -48,6 +48,18 @@ impl Document {
         FlightsError::File(Diagnostic::at(self.place(span), error).help(advice))
     }
 
+    /// Names of the variables in the file that are not set, so that their defaults are taken; each once.
+    pub fn defaults(&self) -> Vec<String> {
+        let mut names = Vec::new();
+        for inside in self.text.split("${").skip(1) {
+            let name = inside.split([':', '}']).next().unwrap_or_default();
+            if std::env::var_os(name).is_none() && !names.iter().any(|known| known == name) {
+                names.push(name.to_owned());
+            }
+        }
+        names
+    }
+
     /// A path as written: `${NAME:-default}` is the environment's NAME, and a relative path starts at the folder
     /// of the flights file.
     pub fn resolve(&self, key: &str, written: &str, place: &Range<usize>) -> Result<PathBuf, FlightsError> {

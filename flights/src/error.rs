@@ -159,8 +159,14 @@ impl FlightsError {
 #[derive(Debug, thiserror::Error)]
 pub enum LogError {
     /// The file cannot be read at all.
-    #[error("cannot read it: {0}; check the path and its variables")]
-    Unreadable(#[source] io::Error),
+    #[error("cannot read it: {cause}; {advice}")]
+    Unreadable {
+        /// The error of the system.
+        #[source]
+        cause: io::Error,
+        /// Advice what to do.
+        advice: String,
+    },
     /// It is not a table.
     #[error(transparent)]
     Table(#[from] TableError),

@@ -183,7 +183,10 @@ impl Opening<'_> {
         reader: &mut LogReader<'_>,
     ) -> Result<Box<dyn Log>, LogError> {
         let bytes = if asked.is_beside { reader.read_beside(file) } else { reader.read(file) };
-        let bytes = bytes.map_err(LogError::Unreadable)?;
+        let bytes = bytes.map_err(|cause| LogError::Unreadable {
+            cause,
+            advice: unreadable_advice(&self.document.defaults()),
+        })?;
         let format = asked.format.unwrap_or_else(|| formats::guess(file, &bytes));
         check_format(*first.get_or_insert(format), format, &asked.files[0])?;
         if !asked.is_beside && asked.entry.csv.is_some() && format != Format::Csv {
@@ -204,6 +207,17 @@ impl Opening<'_> {
     ) -> FlightsError {
         let place = self.document.place(place);
         FlightsError::Log { place, flight: declared.name.clone(), file, channel, cause }
+    }
+}
+
+/// Advice for a log that cannot be read, in a flights file that takes the defaults of these variables.
+fn unreadable_advice(defaults: &[String]) -> String {
+    match defaults {
+        [] => "check the path".to_owned(),
+        [name] => format!(
+            "{name} is not set, and its default is taken; set it to the folder of the logs: {name}=FOLDER"
+        ),
+        names => format!("check the path and its variables, which are not set: {}", names.join(", ")),
     }
 }
 

@@ -413,6 +413,13 @@ impl Judge<'_> {
             return Some(finding(quantity, Some(of_unit(unit)), &what));
         }
         let outside = high > map.max + tolerance || low < (map.min - tolerance).min(0.0);
+        if outside && low.total_cmp(&high).is_eq() {
+            let what = format!(
+                "its commands stay at {low} from begin to end, the vehicle's go from {} to {}: the motors were probably not armed",
+                map.min, map.max
+            );
+            return Some(finding(quantity, None, &what));
+        }
         let far = high > 1.5 * map.max + tolerance;
         let fits = far.then(|| "a vehicle file with their range in its `[command]`".to_owned());
         (outside || high < map.min).then(|| finding(quantity, fits, &what))

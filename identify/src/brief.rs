@@ -40,7 +40,11 @@ impl Brief {
             // Effects of a model that loses are no findings.
             missing: findings.iter().map(|(name, effect)| missing(name, effect)).collect(),
             certainty: findings.iter().map(|(name, effect)| certainty(name, effect)).collect(),
-            changes: CHANNELS.iter().filter_map(|channel| change(report, channel)).collect(),
+            changes: CHANNELS
+                .iter()
+                .filter_map(|channel| change(report, channel))
+                .chain(judged_in(report))
+                .collect(),
             next: next(report, &accepted),
         }
     }
@@ -113,6 +117,12 @@ fn change(report: &Report, channel: &str) -> Option<String> {
         range(|change| change.before),
         range(|change| change.persistence)
     ))
+}
+
+/// The envelope of the test flights; `None` where nothing of it is known.
+fn judged_in(report: &Report) -> Option<String> {
+    let words = (!report.envelope.is_empty()).then(|| report.envelope_in_words())?;
+    Some(format!("Judged in flights with {words}; beyond that nobody knows."))
 }
 
 fn next(report: &Report, accepted: &[(&str, &EffectReport)]) -> Vec<String> {

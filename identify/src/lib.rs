@@ -24,6 +24,7 @@
 //! | `foresight`, `loss` | predictions as a judge of effects and of the verdict |
 //! | `refine` | parameters moved to where predictions are best |
 //! | `regressor` | what residuals are looked at against |
+//! | `envelope` | the ranges of the test flights, in which the verdict was judged |
 //! | [`report`], [`brief`], [`vehicle_file`] | what is written down |
 //! | [`rotor`] | the rotor from a thrust stand |
 //!
@@ -42,6 +43,7 @@ mod align;
 pub mod brief;
 mod candidate;
 mod clock;
+mod envelope;
 mod faults;
 mod fit;
 mod foresight;
@@ -74,6 +76,7 @@ mod whitening;
 mod window;
 
 pub use clock::Lateness;
+pub use envelope::Reached;
 pub use faults::Fault;
 pub use prepared::Equation;
 pub use regressor::Regressor;

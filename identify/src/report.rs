@@ -2,6 +2,7 @@
 
 use crate::align::Offsets;
 use crate::candidate::Unidentifiable;
+use crate::envelope::Reached;
 use crate::faults::Fault;
 use crate::loss::{Loss, advice};
 use crate::select::Withdrawn;
@@ -47,6 +48,8 @@ pub struct Report {
     pub selected: Changes,
     /// The same of the flights that parameters are fitted on.
     pub fitted: Changes,
+    /// The envelope in which the verdict was judged: limits of the test flights, by the keys of `[envelope]` in a vehicle file.
+    pub envelope: BTreeMap<&'static str, Reached>,
     /// White noise of each channel, and the prediction error that it alone makes at each horizon.
     pub noise_floor: BTreeMap<&'static str, Noise>,
     /// Root mean square of the part of the residual that is not noise and that no candidate explains, by equation.
@@ -149,8 +152,7 @@ impl fmt::Display for Report {
 /// With fewer blocks of validation data nothing is beyond chance.
 const ENOUGH_BLOCKS: usize = 12;
 /// Reason why predictions do not judge a verdict.
-pub(crate) const UNCHECKED: &str =
-    "no test flight has both a measured attitude and commands or rotor speeds, so that a wrong verdict may stand";
+pub(crate) const UNCHECKED: &str = "no test flight has both a measured attitude and commands or rotor speeds, so that a wrong verdict may stand";
 /// Ratio of prediction errors, new by declared, above which the new vehicle predicts worse.
 const WORSE: f64 = 1.2;
 
@@ -162,9 +164,24 @@ impl Report {
 
     /// True if no prediction judges the verdict: no test flight was predicted from a measured attitude.
     pub(crate) fn is_unchecked(&self) -> bool {
-        let is_assumed =
-            |name: &String| self.flights.iter().any(|flight| flight.name == *name && !flight.assumed.is_empty());
+        let is_assumed = |name: &String| {
+            self.flights.iter().any(|flight| flight.name == *name && !flight.assumed.is_empty())
+        };
         self.held_out.keys().all(is_assumed)
+    }
+
+    /// The envelope as the end of a sentence.
+    pub(crate) fn envelope_in_words(&self) -> String {
+        let limits = self.envelope.iter();
+        let one = |(key, Reached { value, unit }): (&&str, &Reached)| {
+            let (name, word) = match key.rsplit_once('_') {
+                Some((name, "min")) => (name, "at least"),
+                Some((name, _)) => (name, "at most"),
+                None => (*key, ""),
+            };
+            format!("{} {word} {} {unit}", name.replace('_', " "), rounded(*value))
+        };
+        limits.map(one).collect::<Vec<_>>().join(", ")
     }
 
     /// Returns assumptions and the reader's notes, each with its flights.
@@ -236,7 +253,10 @@ impl Report {
         for name in &self.verdict {
             let Some(effect) = self.effects.get(name) else { continue };
             let [without, with] = [effect.held_out.before, effect.held_out.after].map(rounded);
-            writeln!(f, "  {name}: held-out residual {without} without it, {with} with all")?;
+            writeln!(
+                f,
+                "  {name}: normalised residual on held-out data {without} without it, {with} with all effects"
+            )?;
             for (parameter, estimate) in &effect.parameters {
                 let [value, low, high] = [estimate.value, estimate.low, estimate.high].map(rounded);
                 let doubt = match estimate {
@@ -246,7 +266,8 @@ impl Report {
                     }
                     _ => "",
                 };
-                writeln!(f, "    {parameter} = {value} {}  (95 %: {low} ... {high}){doubt}", estimate.unit)?;
+                let unit = if estimate.unit == "1" { String::new() } else { format!(" {}", estimate.unit) };
+                writeln!(f, "    {parameter} = {value}{unit}  (95 %: {low} ... {high}){doubt}")?;
             }
             if !effect.confused_with.is_empty() {
                 writeln!(f, "    cannot be told from: {}", effect.confused_with.join(", "))?;
@@ -364,8 +385,11 @@ impl Report {
             let [rms, before] = [*rms, *before].map(rounded);
             writeln!(
                 f,
-                "unexplained: {name}: {rms} {unit} are no noise and no candidate's (before: {before})"
+                "unexplained: {name}: {rms} {unit} are explained neither by noise nor by any effect (before: {before})"
             )?;
+        }
+        if !self.envelope.is_empty() {
+            writeln!(f, "judged in flights with {}", self.envelope_in_words())?;
         }
         self.not_identifiable.iter().try_for_each(|Unidentifiable { effect, needs }| {
             writeln!(f, "not identifiable here: {effect} needs {needs}")
@@ -407,6 +431,7 @@ impl Report {
             selected: Changes::new(),
             held_out: Changes::new(),
             fitted: Changes::new(),
+            envelope: BTreeMap::new(),
             noise_floor: BTreeMap::new(),
             unexplained: BTreeMap::new(),
             not_identifiable: Vec::new(),

@@ -3,6 +3,7 @@
 use crate::align::{Offsets, align};
 use crate::candidate::{Candidate, FAST_COMMANDS, Unidentifiable, candidates, free_parameters};
 use crate::clock::Lateness;
+use crate::envelope;
 use crate::faults::{self, Fault};
 use crate::fit::{FitResult, Problem};
 use crate::horizons::{of_role, predictions};
@@ -11,7 +12,7 @@ use crate::loss::losses;
 use crate::model::Model;
 use crate::noise;
 use crate::parameter::{Parameter, Parameters};
-use crate::prepared::{BOX_STEPS, Equation, Prepared, Propulsion};
+use crate::prepared::{BOX_STEPS, Equation, Layout, Prepared, Propulsion};
 use crate::regressor::{Regressor, regressors};
 use crate::report::{BeforeAfter, Changes, EffectReport, Estimate, FlightReport, Report, Unexplained};
 use crate::rows::column;
@@ -132,9 +133,9 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
         before: whiteness(&problem, &selection.before.values),
         after: whiteness(&problem, values),
     };
+    let envelope = envelope::of(problem.test.iter().map(|flight| (flight.flight, window_s(&flight.layout))));
     let report = Report {
         vehicle: set.vehicle.display().to_string(),
-        flights: flight_reports,
         verdict: verdict(&problem, &selection),
         losses: losses(&of_measured_attitude(&problem, &held_out), &noise_floor),
         withdrawn: selection.withdrawn.clone(),
@@ -148,6 +149,8 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
         held_out,
         selected: of_role(&predictions, Role::Select),
         fitted: of_role(&predictions, Role::Fit),
+        envelope,
+        flights: flight_reports,
         noise_floor,
         not_identifiable: unidentifiable,
         block_s: problem.block_s,
@@ -313,13 +316,18 @@ fn compared_s(flight: &Prepared) -> f64 {
     layout.knots.len() as f64 * BOX_STEPS as f64 * layout.clock.step_s
 }
 
+/// Width of the windows in which measurement and model are compared, s.
+fn window_s(layout: &Layout) -> f64 {
+    4.0 * BOX_STEPS as f64 * layout.clock.step_s
+}
+
 fn flight_report(flight: &Flight, prepared: Option<&Prepared>) -> FlightReport {
     let layout = prepared.map(|prepared| &prepared.layout);
     FlightReport {
         name: flight.name.clone(),
         role: flight.role,
         compared_s: prepared.map_or(0.0, compared_s),
-        window_s: layout.map_or(0.0, |layout| 4.0 * BOX_STEPS as f64 * layout.clock.step_s),
+        window_s: layout.map_or(0.0, window_s),
         equations: layout
             .iter()
             .flat_map(|layout| &layout.equations)

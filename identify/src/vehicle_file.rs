@@ -1,6 +1,7 @@
 //! The new vehicle file: the declared one with the effects that were accepted.
 
-use crate::report::{Estimate, Report};
+use crate::envelope::Reached;
+use crate::report::{Estimate, Report, rounded};
 use diagnostics::Diagnostic;
 use inputs::InputFiles;
 use plant::effects::Effect;
@@ -29,10 +30,15 @@ pub fn text(
         replace_tables(&mut document, &files.text(declared).map_err(unreadable)?);
     }
     document.remove("effects");
+    document.remove("envelope");
     document["name"] = value(format!("{}, identified", vehicle.name));
     let mut tables = ArrayOfTables::new();
     effects.iter().for_each(|effect| tables.push(table(effect, &vehicle, report)));
     let mut added = DocumentMut::new();
+    // A model that loses was not validated anywhere.
+    if report.losses.is_empty() && !report.envelope.is_empty() {
+        added["envelope"] = Item::Table(envelope(report));
+    }
     added["effects"] = Item::ArrayOfTables(tables);
     // A comment holds no control character.
     let file = diagnostics::printable_line(&file);
@@ -54,6 +60,20 @@ fn replace_tables(document: &mut DocumentMut, upper: &str) {
     for (key, item) in upper.iter().filter(|(_, item)| item.is_table() || item.is_array_of_tables()) {
         document[key] = item.clone();
     }
+}
+
+/// The ranges of the test flights.
+fn envelope(report: &Report) -> Table {
+    let tests =
+        report.flights.iter().filter(|flight| flight.role == flights::Role::Test && flight.compared_s > 0.0);
+    let names = tests.map(|flight| flight.name.as_str()).collect::<Vec<_>>().join(", ");
+    let mut table = Table::new();
+    for (key, Reached { value, unit }) in &report.envelope {
+        let said = if *key == "frequency_max" { "one cycle a window" } else { "within it 99 % of the time" };
+        let value = rounded(*value).parse().unwrap_or(*value);
+        table[key] = parameter(value, unit, &format!("test flights {names}"), said.into());
+    }
+    table
 }
 
 /// Source of a value that is nominal for a vehicle of this size, not for the Hummingbird.
@@ -96,7 +116,7 @@ fn source(report: &Report) -> String {
     };
     let (fit, select) = (of_role(flights::Role::Fit), of_role(flights::Role::Select));
     let chosen = if select.is_empty() {
-        "cross-validated on their blocks".to_owned()
+        "cross-validated on blocks of it".to_owned()
     } else {
         format!("accepted for its gain on {select}")
     };
@@ -110,7 +130,7 @@ fn of_estimate(estimate: &Estimate, source: &str) -> Item {
         _ => "",
     };
     let interval =
-        format!("{doubt}95 % interval {:e} to {:e} {}", estimate.low, estimate.high, estimate.unit);
+        format!("{doubt}95 % interval {:.3e} to {:.3e} {}", estimate.low, estimate.high, estimate.unit);
     parameter(estimate.value, estimate.unit, source, interval.into())
 }
 
@@ -158,6 +178,7 @@ mod tests {
             held_out: BTreeMap::new(),
             selected: BTreeMap::new(),
             fitted: BTreeMap::new(),
+            envelope: BTreeMap::new(),
             noise_floor: BTreeMap::new(),
             unexplained: BTreeMap::new(),
             not_identifiable: Vec::new(),

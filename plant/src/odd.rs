@@ -2,7 +2,7 @@
 
 use crate::airframe::{Airframe, amid_rotors_B_m};
 use crate::airworthy::places;
-use crate::effects::{Action, Effect, Quantity};
+use crate::effects::{Effect, Quantity};
 use bus::context::NodeContext;
 use vehicles::{MotorModel, Vehicle};
 
@@ -119,16 +119,15 @@ fn slow_motors(vehicle: &Vehicle) -> Option<String> {
 
 /// Finds wind that no effect feels: the vehicle flies as in still air.
 fn unfelt_wind(effects: &[Effect]) -> Option<String> {
-    let is_force = |action: &Action| matches!(action, Action::Wrench(_) | Action::Thrust(_));
-    let mut airs = effects.iter().filter(|effect| effect.kind.needs.contains(&Quantity::Airspeed)).peekable();
-    let wind = airs.peek()?.kind.name;
+    let wind = effects.iter().find(|effect| effect.kind.moves_air)?.kind.name;
+    let feels = |effect: &Effect| !effect.kind.moves_air && effect.kind.needs.contains(&Quantity::Airspeed);
     let message = || {
         format!(
             "flies in moving air (`{wind}`) that none of its effects feels, expected one that does: it flies as in still air; add \
              `rotor-drag` or `parasitic-drag`"
         )
     };
-    airs.all(|effect| !effect.kind.actions.iter().any(is_force)).then(message)
+    (!effects.iter().any(feels)).then(message)
 }
 
 /// The lines of the file in which the numbers `keys` are.

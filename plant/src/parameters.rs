@@ -2,6 +2,7 @@
 
 use crate::airframe::Airframe;
 use crate::airworthy;
+use crate::beyond;
 use crate::effects::{self, Quantity};
 use crate::newton_euler::NewtonEuler;
 use crate::odd;
@@ -171,6 +172,7 @@ impl Parameters {
         // Before the backend, which a vehicle that is none might not survive.
         airworthy::tell_unsourced(airframe.vehicle(), run);
         odd::tell(&airframe, run);
+        beyond::tell(airframe.vehicle(), airframe.effects(), &self.start(), run);
         airworthy::check_rotor_inertia(airframe.vehicle())?;
         let dt_s = run.tick_s() / f64::from(self.substeps);
         airworthy::check_steps(airframe.vehicle(), dt_s, run)?;

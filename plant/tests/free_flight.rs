@@ -176,7 +176,11 @@ fn turned_rotors_move_it_as_commanded_ones_do() {
         let airframe = Airframe::new(vehicle);
         let flight = || {
             let memory = airframe.initial_state(0, "plant", TICK_S);
-            FreeFlight::new(NewtonEuler::flying(airframe.clone(), 1), RigidBody::level_at(Vector3::z()), memory)
+            FreeFlight::new(
+                NewtonEuler::flying(airframe.clone(), 1),
+                RigidBody::level_at(Vector3::z()),
+                memory,
+            )
         };
         let (mut commanded, mut turned) = (flight(), flight());
         commanded.settle_rotors(&[hover; 4]);

@@ -8,6 +8,7 @@
 //! | [`summary`] | the summary of a run, as text and as JSON |
 //! | [`airframe`] | the body of a vehicle: the parts that are seen, and the parts that touch |
 //! | [`attached`] | the vehicles whose files a recording has attached |
+//! | [`beyond`] | time of a flight beyond the validated envelope of its vehicle |
 //! | [`columns`], [`export`] | recordings as tables: Parquet and CSV |
 //! | [`topics`] | names of topics and of message types |
 //! | [`urdf`] | a vehicle as other tools show it |
@@ -24,6 +25,7 @@
 
 pub mod airframe;
 pub mod attached;
+pub mod beyond;
 mod cells;
 pub mod columns;
 pub mod export;

@@ -282,7 +282,7 @@ impl fmt::Display for Difference {
         write!(
             f,
             "  {topic} {field}: shadow − primary: rms {rms:.4} {unit}, mean {mean:+.4}, max {max:.4} at tick {max_tick} \
-             ({samples} samples from tick {from_tick} on; the primary deviates by {primary_deviation:.4})"
+             ({samples} samples from tick {from_tick} on; standard deviation of the primary {primary_deviation:.4})"
         )
     }
 }
@@ -295,7 +295,9 @@ impl fmt::Display for Step {
             "    {topic} {field}: step {step:.4} {unit} at the take-over, {step_before:.4} one sample earlier"
         )?;
         match self.law_difference {
-            Some(difference) => write!(f, "; the new law asked for {difference:.4} otherwise there"),
+            Some(difference) => {
+                write!(f, "; the output of the new controller differs by {difference:.4} at that tick")
+            }
             None => Ok(()),
         }
     }

@@ -37,6 +37,11 @@ impl Track {
         errors
     }
 
+    /// The states, each with its time in ns.
+    pub fn states(&self) -> impl Iterator<Item = (u64, VehicleState)> {
+        self.time_ns().iter().filter_map(|&time_ns| Some((time_ns, self.at(time_ns)?)))
+    }
+
     /// The state stamped `time_ns`; fields that were not read are 0.
     fn at(&self, time_ns: u64) -> Option<VehicleState> {
         let index = self.time_ns().binary_search(&time_ns).ok()?;

@@ -1,5 +1,6 @@
 //! The summary of a run: for people, and as JSON for programs.
 
+use crate::beyond::{self, Beyond};
 use crate::judge::{self, Figures, Found, Verdict, WindowErrors};
 use crate::shadow::{self, Difference, Replacement};
 use anyhow::Result;
@@ -62,6 +63,8 @@ pub struct Summary {
     /// Backups that joined the run, took over, or were refused.
     #[serde(rename = "successions")]
     pub replacements: Vec<Replacement>,
+    /// Quantities beyond the envelope in which the vehicle's model was validated; of recorded flights only.
+    pub beyond: Vec<Beyond>,
     /// Differences between shadows and the processes that they shadowed.
     pub shadows: Vec<Difference>,
     /// Warnings of `check`; printed before the flight.
@@ -162,6 +165,7 @@ impl Summary {
             measures: Vec::new(),
             compare: Vec::new(),
             replacements,
+            beyond: Vec::new(),
             shadows: Vec::new(),
             warnings: Vec::new(),
         }
@@ -186,6 +190,7 @@ impl Summary {
     pub fn describe(&mut self, recording: &Recording, plan: &Plan) -> Result<()> {
         shadow::add_steps(recording, plan, &mut self.replacements)?;
         self.shadows = shadow::differences(recording, &shadow::joins(plan, &self.replacements))?;
+        self.beyond = beyond::of(recording)?;
         self.recording = Some(recording.path().to_owned());
         Ok(())
     }
@@ -254,12 +259,15 @@ impl fmt::Display for Summary {
             writeln!(f, "  {} deadlines missed", self.missed_deadlines)?;
         }
         let share = |process: &ProcessSummary| format!("{} {:.0} %", process.name, process.cpu_share * 100.0);
-        writeln!(f, "  cpu: {}", self.processes.iter().map(share).collect::<Vec<_>>().join(", "))?;
+        if !self.processes.is_empty() {
+            writeln!(f, "  cpu: {}", self.processes.iter().map(share).collect::<Vec<_>>().join(", "))?;
+        }
         self.computing_times.iter().try_for_each(|overruns| writeln!(f, "{overruns}"))?;
         self.write_replacements(f)?;
         self.shadows.iter().try_for_each(|difference| writeln!(f, "{difference}"))?;
         self.compare.iter().try_for_each(|errors| writeln!(f, "{errors}"))?;
         self.pass.iter().chain(&self.measures).try_for_each(|verdict| writeln!(f, "{verdict}"))?;
+        self.beyond.iter().try_for_each(|beyond| writeln!(f, "{beyond}"))?;
         if self.is_unjudged {
             let why = "the run before had no judge in flight; one that writes checkpoints by itself has";
             writeln!(f, "  conditions: not judged, {why}")?;
@@ -273,6 +281,7 @@ impl fmt::Display for Summary {
         let refused = self.replacements.iter().filter(|replacement| replacement.has_failed()).count();
         match (self.passed, refused) {
             (true, _) => write!(f, "passed"),
+            (false, 0) if self.stopped_early => write!(f, "FAILED: stopped before its end"),
             (false, 0) => write!(f, "FAILED"),
             (false, 1) => write!(f, "FAILED: a backup was refused"),
             (false, _) => write!(f, "FAILED: {refused} backups were refused"),

@@ -217,7 +217,7 @@ fn judge(opened: &Opened, report: &Report) -> Result<bool> {
 
 /// Last lines of the summary: the page, and the command that flies the worst flight again.
 fn next_steps(folder: &Path, report: &Report) -> String {
-    let page = format!("to see it: {}", folder.join(PAGE).display());
+    let page = format!("report: {}", folder.join(PAGE).display());
     let Some(worst) = report.worst.first() else { return page };
     format!("to fly the worst again, recorded: {}\n{page}", worst.command)
 }

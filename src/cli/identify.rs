@@ -21,7 +21,8 @@ use std::time::Duration;
 use vehicles::Vehicle;
 
 /// Text of `--help` behind the options.
-pub const HELP: &str = "Examples: hummingbus identify flights/nanobench.toml --out identified\n          \
+pub const HELP: &str = "Examples: hummingbus identify flights.toml --out identified\n          \
+    HUMMINGBUS_DATA=data hummingbus identify flights/nanobench.toml --out identified\n          \
     hummingbus identify rotor flights/stands/esc-test-f40.toml --out rotor\n\n\
     Writes report.html, report.json and vehicle.toml into the folder. See docs/identify.md.";
 
@@ -176,7 +177,7 @@ fn summary(report: &Report, flown: Option<&Value>, out: &Path) -> String {
     });
     if let Some((away, at)) = furthest {
         text += &format!(
-            "flown again on the bus with both vehicle files: every error within {:.1} % of these; furthest {at}\n",
+            "flown again on the bus with both vehicle files: all errors agree with these within {:.1} %; the largest difference: {at}\n",
             away * 100.0
         );
     }

@@ -95,7 +95,7 @@ commands! {
     /// Show a recording in the browser: the vehicles in their room, and any field over time.
     #[command(after_help = view::HELP)]
     View(view::ViewArguments) => view::view;
-    /// Write a vehicle's body as URDF, which Foxglove, Rerun and RViz show: what is seen, mass and inertia, what touches.
+    /// Write a vehicle's body as URDF, which Foxglove, Rerun and RViz show: visual, inertial and collision elements.
     #[command(after_help = urdf::HELP)]
     Urdf(urdf::UrdfArguments) => urdf::urdf;
     /// Write a simulation as an FMU, for Simulink, OpenModelica, Dymola and others.
@@ -113,7 +113,7 @@ commands! {
     /// Find what measured flights show that the declared vehicle lacks; or fit a rotor to a thrust stand.
     #[command(after_help = identify::HELP)]
     Identify(identify::IdentifyArguments) => identify::run;
-    /// Fly the measured commands of flights with one or two vehicle files, and tell how far they go astray.
+    /// Fly the measured commands of flights with one or two vehicle files, and report the prediction errors.
     #[command(after_help = validate::HELP)]
     Validate(validate::ValidateArguments) => validate::validate;
     /// Watch a live run and steer it: ticks, processes, topics.

@@ -36,6 +36,7 @@
 //! - [`sensors`]: sensors read what they should, and hand over what is under way
 //! - [`surroundings`]: hosts that lack something
 //! - [`untrusted`]: names and contents of files that others made
+//! - [`envelope`]: flights beyond the envelope in which a model was validated
 //! - [`replay`]: the measured flight
 //! - [`validate`]: measured commands flown by vehicles side by side
 //! - [`scenarios`]: the thesis's scenarios and those beyond
@@ -60,6 +61,7 @@ mod contract;
 mod corpus;
 mod determinism;
 mod documentation;
+mod envelope;
 mod failures;
 mod forks;
 mod identify;

@@ -119,7 +119,7 @@ fn a_new_project_flies_as_it_is() {
     let args = ["run", &format!("{folder}/hover.toml"), "--record", &recording];
     let flown = place.call(&args).with_code(0);
     assert!(!flown.error.contains("warning"), "{}", flown.error);
-    flown.prints(&["ok     height within 5 %", "ok     roll reaches", "passed"]);
+    flown.prints(&["ok     altitude within 5 %", "ok     roll reaches", "passed"]);
 }
 
 /// The controller's template is built with the tests, as an example of this package.

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use crate::bounds;
 use crate::command::CommandMap;
 use crate::effects;
+use crate::envelope;
 use crate::foreign;
 use crate::provenance::{Provenance, Uncertainty};
 use crate::reader::{Document, Quantity, Section};
@@ -115,6 +116,8 @@ fn on_base(
     let (name, file) = (title(root)?, path.display().to_string());
     let more = effects::read(root)?;
     let tables = Tables::read(root)?;
+    // That of the base is of another model.
+    let envelope = envelope::read(root)?;
     root.finish()?;
     let text = read(path).map_err(|cause| {
         let expected = "the path of a vehicle file, relative to this one";
@@ -130,7 +133,7 @@ fn on_base(
     }
     let base = complete(&doc, &lower)?;
     let effects = [base.effects.clone(), more].concat();
-    Ok(tables.replacing(Vehicle { name, effects, ..base }, root.doc.provenance.take()))
+    Ok(tables.replacing(Vehicle { name, effects, envelope, ..base }, root.doc.provenance.take()))
 }
 
 /// The tables that a file on a base has of its own.
@@ -197,6 +200,7 @@ fn complete(doc: &Document, root: &Section) -> Result<Vehicle, Diagnostic> {
     let motor = faults.keep(root.section("motor").and_then(|section| motor(&section)));
     let command = faults.keep(root.section("command").and_then(|section| command(&section)));
     let effects = faults.keep(effects::read(root));
+    let envelope = faults.keep(envelope::read(root));
     faults.keep(root.finish());
     let vehicle = (|| {
         let (mass_kg, inertia_kg_m2, gravity_m_s2) = body?;
@@ -213,6 +217,7 @@ fn complete(doc: &Document, root: &Section) -> Result<Vehicle, Diagnostic> {
             motor: motor?,
             command: command?,
             effects: effects?,
+            envelope: envelope?,
             provenance: doc.provenance.take(),
         })
     })();

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`vehicle`] | the immutable [`Vehicle`] that the physics uses |
 //! | [`command`] | the map between a raw motor command and a rotor speed |
+//! | `envelope` | the flight envelope in which a model was validated |
 //! | [`provenance`] | where each number came from, kept for reports |
 //! | [`effects`] | the effects that a vehicle or scene file lists, as they are written |
 //! | `bounds` | what the numbers of a vehicle can be, and why |
@@ -34,6 +35,7 @@ pub mod command;
 mod dialect;
 pub mod effects;
 pub mod encoding;
+mod envelope;
 mod file;
 pub mod foreign;
 pub mod from_model;
@@ -54,6 +56,7 @@ pub mod wall_clock;
 
 pub use command::CommandMap;
 pub use effects::EffectEntry;
+pub use envelope::Envelope;
 pub use file::is_rigid;
 pub use provenance::{Provenance, Stated, Uncertainty};
 pub use vehicle::{MotorModel, ROTORS_MAX, Rotor, Vehicle};

@@ -6,6 +6,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::command::CommandMap;
 use crate::effects::EffectEntry;
+use crate::envelope::Envelope;
 use crate::provenance::Provenance;
 
 /// The most rotors that a vehicle has.
@@ -47,6 +48,8 @@ pub struct Vehicle {
     /// The effects that act beyond all this, in the file's order. Only a plant that flies them reads their
     /// meaning: the rest of this structure is the vehicle as it is declared, without them.
     pub effects: Vec<EffectEntry>,
+    /// The flight envelope in which these numbers were validated, if the file states one.
+    pub envelope: Option<Envelope>,
     /// Provenance of every number, in the file's order of reading.
     pub provenance: Vec<Provenance>,
 }

@@ -58,6 +58,8 @@ pub struct EffectKind {
     pub confounded_with: &'static [Confounder],
     /// Requirement on the vehicle that it acts on, if it has one.
     pub require: Option<Requirement>,
+    /// True if it moves the air, which takes an effect that feels the air to be seen.
+    pub moves_air: bool,
     /// True if its parameters are one for each rotor: those behind the vehicle's last rotor have to be neutral.
     pub is_per_rotor: bool,
 }
@@ -256,6 +258,7 @@ impl EffectKind {
         scale_to: None,
         confounded_with: &[],
         require: None,
+        moves_air: false,
         is_per_rotor: false,
     };
 

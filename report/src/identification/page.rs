@@ -249,6 +249,7 @@ mod tests {
             held_out: BTreeMap::new(),
             selected: BTreeMap::new(),
             fitted: BTreeMap::new(),
+            envelope: BTreeMap::new(),
             noise_floor: BTreeMap::new(),
             unexplained: BTreeMap::new(),
             not_identifiable: Vec::new(),

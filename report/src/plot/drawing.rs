@@ -49,7 +49,7 @@ impl fmt::Display for Drawing {
         let curves: usize = axes.clone().map(|axes| axes.curves.len()).sum();
         let (axes, paths, things, [from_s, to_s]) =
             (axes.count(), self.trails.len(), self.solids.len(), self.span_s);
-        write!(f, "axes: {axes} with {curves} curves; paths: {paths}; things in the scene: {things}; ")?;
+        write!(f, "axes: {axes} with {curves} curves; paths: {paths}; objects in the scene: {things}; ")?;
         write!(f, "from {from_s:.3} s to {to_s:.3} s")
     }
 }

@@ -41,7 +41,7 @@ impl Notes {
         if self.has_cut {
             let duration = &manifest.content.run.duration_s;
             let message = format!(
-                "`duration_s` is {} s, and set points, segments or conditions lie behind that",
+                "`duration_s` is {} s, and set points, segments or conditions come after that",
                 duration.get_ref()
             );
             let help = "set points do not act; a condition without a sample does not pass";
@@ -84,7 +84,8 @@ pub fn of(
         let path = path.to_string_lossy().into_owned();
         if parameters.insert(key, path.as_str().into()).is_some() {
             let message = format!("`{}` has `{key}` twice: as a file, and in its parameters", name.get_ref());
-            let help = "leave one of them out; a swap that changes gains names another gains file: gains = \"PATH\"";
+            let help =
+                "leave one of them out; a swap that changes gains names another gains file: gains = \"PATH\"";
             return Err(manifest.problem(&file.span(), message, help));
         }
         let named = named_files(&read, key, path.into());

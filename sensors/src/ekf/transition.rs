@@ -186,7 +186,7 @@ impl Transition {
         }
     }
 
-    /// What the IMU's noise adds to the covariance of position, velocity and attitude, the same along every axis.
+    /// Growth of the covariance of position, velocity and attitude by the IMU's noise, the same along every axis.
     fn motion_noises(&self, params: &EkfParams) -> MotionNoises {
         let force = params.accelerometer_noise_density_m_s2_sqrt_hz.powi(2);
         MotionNoises {

@@ -15,6 +15,7 @@ pub static EFFECT: EffectKind = EffectKind {
                on the run's seed, starts from still air, and needs an effect that feels the air",
     parameters: Parameters::SPECS,
     actions: &[Action::Tick(gust)],
+    moves_air: true,
     randomness: Randomness::Stochastic,
     ..EffectKind::PLAIN
 };

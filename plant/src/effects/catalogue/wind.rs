@@ -13,6 +13,7 @@ pub static EFFECT: EffectKind = EffectKind {
                it does nothing",
     parameters: Parameters::SPECS,
     actions: &[Action::Tick(blow)],
+    moves_air: true,
     needs: &[Quantity::Airspeed, Quantity::Force],
     ..EffectKind::PLAIN
 };

@@ -1,0 +1,133 @@
+//! The flight envelope in which a verdict was judged: the ranges of the test flights.
+#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
+
+use flights::state::StateQuantity;
+use flights::{Flight, Played};
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Time between two looks at a flight, s.
+const STEP_S: f64 = 0.01;
+/// Part of the time within a range: what is left out are outliers and moments.
+const SHARE: f64 = 0.99;
+
+/// A limit of the envelope.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Reached {
+    /// Value.
+    pub value: f64,
+    /// Unit.
+    pub unit: &'static str,
+}
+
+/// Values of all judged flights, by quantity.
+#[derive(Default)]
+struct Seen {
+    speed_m_s: Vec<f64>,
+    tilt_deg: Vec<f64>,
+    angular_velocity_rad_s: Vec<f64>,
+    specific_force_m_s2: Vec<f64>,
+    height_m: Vec<f64>,
+}
+
+/// The envelope of the judged `flights`, each with the width of the windows in which it was compared, in s: limits by the keys
+/// of `[envelope]` in a vehicle file, of what was measured. Values are within them in 99 % of the time. What is faster than one
+/// cycle in the narrowest window was not compared.
+pub fn of<'f>(flights: impl Iterator<Item = (&'f Flight, f64)>) -> BTreeMap<&'static str, Reached> {
+    let (mut seen, mut narrowest_s) = (Seen::default(), f64::INFINITY);
+    for (flight, window_s) in flights {
+        narrowest_s = narrowest_s.min(window_s);
+        seen.look_at(flight);
+    }
+    let frequency_hz = (narrowest_s.is_finite() && narrowest_s > 0.0).then(|| narrowest_s.recip());
+    let limits = [
+        ("speed_max", quantile(&mut seen.speed_m_s, SHARE), "m/s"),
+        ("tilt_max", quantile(&mut seen.tilt_deg, SHARE), "deg"),
+        ("angular_velocity_max", quantile(&mut seen.angular_velocity_rad_s, SHARE), "rad/s"),
+        ("specific_force_max", quantile(&mut seen.specific_force_m_s2, SHARE), "m/s^2"),
+        ("height_min", quantile(&mut seen.height_m, 1.0 - SHARE), "m"),
+        ("height_max", quantile(&mut seen.height_m, SHARE), "m"),
+        ("frequency_max", frequency_hz, "Hz"),
+    ];
+    let known =
+        limits.into_iter().filter_map(|(key, value, unit)| Some((key, Reached { value: value?, unit })));
+    known.collect()
+}
+
+impl Seen {
+    fn look_at(&mut self, flight: &Flight) {
+        self.specific_force_m_s2.extend(flight.specific_force.values.iter().map(|value| norm(value)));
+        let Ok(played) = Played::of(flight) else { return };
+        let has = |quantity: StateQuantity| quantity.is_measured(flight);
+        let ((start_s, end_s), mut hint) = (played.span_s(), 0);
+        for step in 0..((end_s - start_s) / STEP_S) as usize {
+            let time_s = start_s + step as f64 * STEP_S;
+            let row = played.at(time_s, &mut hint);
+            if !played.counts(time_s, time_s + STEP_S) {
+                continue;
+            }
+            if has(StateQuantity::Velocity) {
+                self.speed_m_s.push(norm(&row.velocity_m_s));
+            }
+            if has(StateQuantity::Attitude) {
+                let [x, y, z, w] = row.attitude;
+                let up_W = UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z)) * Vector3::z();
+                self.tilt_deg.push(libm::acos(up_W.z.clamp(-1.0, 1.0)).to_degrees());
+            }
+            if has(StateQuantity::Rates) {
+                self.angular_velocity_rad_s.push(norm(&row.angular_velocity_rad_s));
+            }
+            if has(StateQuantity::Position) {
+                self.height_m.push(row.position_m[2]);
+            }
+        }
+    }
+}
+
+fn norm(vector: &[f64; 3]) -> f64 {
+    vector.iter().map(|value| value * value).sum::<f64>().sqrt()
+}
+
+/// The value below which `share` of `values` lie; sorts them.
+fn quantile(values: &mut [f64], share: f64) -> Option<f64> {
+    values.sort_unstable_by(f64::total_cmp);
+    let last = values.len().checked_sub(1)?;
+    values.get((share * last as f64).round() as usize).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flights::Role;
+
+    #[test]
+    fn the_limits_hold_for_nearly_all_of_the_test_flights() {
+        // A circle of 1 m at 2 rad/s, 1.5 m high, tilted by 10°, with one wild sample.
+        let mut flight = Flight::new("circle", "log.csv", Role::Test);
+        let time_s: Vec<f64> = (0..1000).map(|sample| f64::from(sample) * 0.01).collect();
+        let (sine, cosine) = libm::sincos(5_f64.to_radians());
+        flight.attitude.values = vec![[cosine, sine, 0.0, 0.0]; 1000];
+        let at = |time_s: &f64| [libm::cos(2.0 * time_s), libm::sin(2.0 * time_s), 1.5];
+        flight.position.values = time_s.iter().map(at).collect();
+        flight.specific_force.values = vec![[0.0, 0.0, 9.9]; 1000];
+        flight.specific_force.values[500] = [0.0, 0.0, 80.0];
+        flight.command.values = vec![[100.0; vehicles::ROTORS_MAX]; 1000];
+        flight.attitude.time_s = time_s.clone();
+        flight.position.time_s = time_s.clone();
+        flight.command.time_s = time_s.clone();
+        flight.specific_force.time_s = time_s;
+        let limits = of([(&flight, 0.1), (&flight, 0.08)].into_iter());
+        let near = |key: &str, expected: f64| {
+            let Reached { value, .. } = limits[key];
+            assert!((value - expected).abs() < 0.02 * expected, "{key}: {value}");
+        };
+        near("speed_max", 2.0);
+        near("tilt_max", 10.0);
+        near("specific_force_max", 9.9);
+        near("height_min", 1.5);
+        near("height_max", 1.5);
+        near("frequency_max", 12.5);
+        assert!(of(std::iter::empty()).is_empty(), "no flight was judged");
+    }
+}

@@ -1,0 +1,48 @@
+//! Flights beyond the envelope in which the model of a vehicle was validated.
+
+use crate::support::{Place, repository};
+
+/// The hover with a vehicle whose envelope is `limits`.
+fn hover(place: &Place, limits: &str) -> Vec<String> {
+    let base = toml::Value::from(repository("vehicles/hummingbird.toml"));
+    let text = format!("name = \"validated\"\nbase = {base}\n\n[envelope]\n{limits}");
+    let vehicle = format!("process.plant.vehicle={}", place.write("validated.toml", text));
+    ["--set", "run.duration_s=4", "--set", &vehicle].map(str::to_owned).to_vec()
+}
+
+fn limit(key: &str, value: f64, unit: &str) -> String {
+    format!("{key} = {{ value = {value:?}, unit = \"{unit}\", source = \"test\", uncertainty = \"none\" }}\n")
+}
+
+#[test]
+fn a_flight_beyond_it_is_told_before_and_after() {
+    let place = Place::new();
+    let narrow =
+        [limit("height_max", 1.2, "m"), limit("height_min", 1.1, "m"), limit("tilt_max", 45.0, "deg")];
+    let changes = hover(&place, &narrow.concat());
+    let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
+    let manifest = repository("manifests/hover.toml");
+    let checked = place.call(&[&["check", &manifest], &changes[..]].concat()).with_code(0);
+    checked.says(&["starts with a height of 1.000 m", "validated from 1.100 up to 1.200 m"]);
+    let recording = place.path("hover.mcap");
+    let flown = place.call(&[&["run", &manifest, "--record", &recording], &changes[..]].concat());
+    // It stands at 1 m for two seconds, and climbs to 1.5 m: below and then above.
+    flown.prints(&[
+        "beyond the validated envelope: height on /plant/state for",
+        "(limit 1.100 m)",
+        "(limit 1.200 m)",
+    ]);
+    assert!(!flown.output.contains("tilt on"), "{}", flown.output);
+}
+
+#[test]
+fn a_flight_within_it_says_nothing() {
+    let place = Place::new();
+    let wide = [limit("height_max", 3.0, "m"), limit("speed_max", 5.0, "m/s")];
+    let changes = hover(&place, &wide.concat());
+    let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
+    let manifest = repository("manifests/hover.toml");
+    let recording = place.path("hover.mcap");
+    let flown = place.call(&[&["run", &manifest, "--record", &recording], &changes[..]].concat());
+    assert!(!flown.output.contains("envelope"), "{}", flown.output);
+}
