@@ -57,7 +57,7 @@ pub fn of<'f>(flights: impl Iterator<Item = (&'f Flight, f64)>) -> BTreeMap<&'st
 
 impl Seen {
     fn look_at(&mut self, flight: &Flight) {
-        self.specific_force_m_s2.extend(flight.specific_force.values.iter().map(|value| norm(value)));
+        self.specific_force_m_s2.extend(flight.specific_force.values.iter().map(norm));
         let Ok(played) = Played::of(flight) else { return };
         let has = |quantity: StateQuantity| quantity.is_measured(flight);
         let ((start_s, end_s), mut hint) = (played.span_s(), 0);

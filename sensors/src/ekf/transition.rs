@@ -110,16 +110,16 @@ impl Transition {
         let [turn, turn_twice, tilt, tilt_twice] =
             [&self.turn, &self.turn_twice, &self.tilt, &self.tilt_twice].map(matrix);
         let tilts = covariance.fixed_view::<TILTS, TILTS>(ATTITUDE, ATTITUDE);
-        // The variance of a sum that has `own` of its errors besides the weighted ones.
-        let sum = |own: f64, with_own: &Tilts, weights: &Tilts| {
-            own + 2.0 * weights.dot(with_own) + weights.dot(&(tilts * weights))
+        // The variance of a first error, which varies by `first`, plus the weighted ones, with which it varies by `with_first`.
+        let sum = |first: f64, with_first: &Tilts, weights: &Tilts| {
+            first + 2.0 * weights.dot(with_first) + weights.dot(&(tilts * weights))
         };
         let with = |state: usize| covariance.fixed_view::<TILTS, 1>(ATTITUDE, state).into_owned();
         let position = |axis: usize| {
             let (p, v) = (POSITION + axis, VELOCITY + axis);
-            let own =
+            let first =
                 covariance[(p, p)] + self.time * (2.0 * covariance[(p, v)] + self.time * covariance[(v, v)]);
-            sum(own, &(with(p) + self.time * with(v)), &weights([&-shift, &tilt_twice, &-turn_twice], axis))
+            sum(first, &(with(p) + self.time * with(v)), &weights([&-shift, &tilt_twice, &-turn_twice], axis))
         };
         let velocity = |axis: usize| {
             let v = VELOCITY + axis;
