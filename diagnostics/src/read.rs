@@ -366,7 +366,7 @@ impl de::Error for Misread {
     }
 }
 
-/// A type as people call it who do not know Rust's names.
+/// Plain name of a type.
 fn in_words(expected: &dyn de::Expected) -> String {
     let name = expected.to_string();
     match name.as_str() {
@@ -390,7 +390,8 @@ fn seen(found: Unexpected<'_>) -> String {
         Unexpected::Bool(flag) => flag.to_string(),
         Unexpected::Unsigned(number) => number.to_string(),
         Unexpected::Signed(number) => number.to_string(),
-        Unexpected::Float(number) => number.to_string(),
+        // With its decimal point: 3.0 is no whole number.
+        Unexpected::Float(number) => format!("{number:?}"),
         Unexpected::Str(text) => format!("the text {text:?}"),
         Unexpected::Map => "a table".to_owned(),
         Unexpected::Seq => "a list".to_owned(),

@@ -51,7 +51,8 @@ impl Document {
     /// Names of the variables in the file that are not set, so that their defaults are taken; each once.
     pub fn defaults(&self) -> Vec<String> {
         let mut names = Vec::new();
-        for inside in self.text.split("${").skip(1) {
+        let lines = self.text.lines().filter(|line| !line.trim_start().starts_with('#'));
+        for inside in lines.flat_map(|line| line.split("${").skip(1)) {
             let name = inside.split([':', '}']).next().unwrap_or_default();
             if std::env::var_os(name).is_none() && !names.iter().any(|known| known == name) {
                 names.push(name.to_owned());

@@ -1,5 +1,6 @@
 //! Opens the logs of a flight: its own, and those of channels that are in other files.
 
+use std::io;
 use std::num::NonZero;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -183,10 +184,8 @@ impl Opening<'_> {
         reader: &mut LogReader<'_>,
     ) -> Result<Box<dyn Log>, LogError> {
         let bytes = if asked.is_beside { reader.read_beside(file) } else { reader.read(file) };
-        let bytes = bytes.map_err(|cause| LogError::Unreadable {
-            cause,
-            advice: unreadable_advice(&self.document.defaults()),
-        })?;
+        let bytes =
+            bytes.map_err(|cause| LogError::Unreadable { advice: self.unreadable_advice(&cause), cause })?;
         let format = asked.format.unwrap_or_else(|| formats::guess(file, &bytes));
         check_format(*first.get_or_insert(format), format, &asked.files[0])?;
         if !asked.is_beside && asked.entry.csv.is_some() && format != Format::Csv {
@@ -198,6 +197,19 @@ impl Opening<'_> {
         formats::parse(bytes, format, &asked.form, clock)
     }
 
+    /// Advice for a log that cannot be read: a variable that is not set may be why a file is not there.
+    fn unreadable_advice(&self, cause: &io::Error) -> String {
+        let defaults =
+            if cause.kind() == io::ErrorKind::NotFound { self.document.defaults() } else { Vec::new() };
+        match defaults.as_slice() {
+            [] => "check the path".to_owned(),
+            names => format!(
+                "check the path; these variables of the file are not set, and their defaults are taken: {}",
+                names.join(", ")
+            ),
+        }
+    }
+
     fn broken(
         &self,
         declared: &logs::Log<'_>,
@@ -207,17 +219,6 @@ impl Opening<'_> {
     ) -> FlightsError {
         let place = self.document.place(place);
         FlightsError::Log { place, flight: declared.name.clone(), file, channel, cause }
-    }
-}
-
-/// Advice for a log that cannot be read, in a flights file that takes the defaults of these variables.
-fn unreadable_advice(defaults: &[String]) -> String {
-    match defaults {
-        [] => "check the path".to_owned(),
-        [name] => format!(
-            "{name} is not set, and its default is taken; set it to the folder of the logs: {name}=FOLDER"
-        ),
-        names => format!("check the path and its variables, which are not set: {}", names.join(", ")),
     }
 }
 

@@ -396,8 +396,10 @@ impl Judge<'_> {
         let map = self.vehicle.command;
         let (low, high) = range(self.of_rotors(&self.flight.command))?;
         let tolerance = 0.05 * (map.max - map.min);
+        let constant =
+            if low.total_cmp(&high).is_eq() { " and never change (motors that are not armed?)" } else { "" };
         let what = format!(
-            "its commands go from {low} to {high}, the vehicle's from {} to {} (hover {:.1})",
+            "its commands go from {low} to {high}{constant}, the vehicle's from {} to {} (hover {:.1})",
             map.min,
             map.max,
             self.vehicle.hover_command()
@@ -413,13 +415,6 @@ impl Judge<'_> {
             return Some(finding(quantity, Some(of_unit(unit)), &what));
         }
         let outside = high > map.max + tolerance || low < (map.min - tolerance).min(0.0);
-        if outside && low.total_cmp(&high).is_eq() {
-            let what = format!(
-                "its commands stay at {low} from begin to end, the vehicle's go from {} to {}: the motors were probably not armed",
-                map.min, map.max
-            );
-            return Some(finding(quantity, None, &what));
-        }
         let far = high > 1.5 * map.max + tolerance;
         let fits = far.then(|| "a vehicle file with their range in its `[command]`".to_owned());
         (outside || high < map.min).then(|| finding(quantity, fits, &what))

@@ -122,7 +122,7 @@ fn change(report: &Report, channel: &str) -> Option<String> {
 /// The envelope of the test flights; `None` where nothing of it is known.
 fn judged_in(report: &Report) -> Option<String> {
     let words = (!report.envelope.is_empty()).then(|| report.envelope_in_words())?;
-    Some(format!("Judged in flights with {words}; beyond that nobody knows."))
+    Some(format!("Validated in flights with {words}. The model was not validated beyond these limits."))
 }
 
 fn next(report: &Report, accepted: &[(&str, &EffectReport)]) -> Vec<String> {

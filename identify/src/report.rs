@@ -152,7 +152,7 @@ impl fmt::Display for Report {
 /// With fewer blocks of validation data nothing is beyond chance.
 const ENOUGH_BLOCKS: usize = 12;
 /// Reason why predictions do not judge a verdict.
-pub(crate) const UNCHECKED: &str = "no test flight has both a measured attitude and commands or rotor speeds, so that a wrong verdict may stand";
+pub(crate) const UNCHECKED: &str = "no test flight has both a measured attitude and commands or rotor speeds, so that predictions could not refute a wrong verdict";
 /// Ratio of prediction errors, new by declared, above which the new vehicle predicts worse.
 const WORSE: f64 = 1.2;
 
@@ -389,7 +389,7 @@ impl Report {
             )?;
         }
         if !self.envelope.is_empty() {
-            writeln!(f, "judged in flights with {}", self.envelope_in_words())?;
+            writeln!(f, "validated in flights with {}", self.envelope_in_words())?;
         }
         self.not_identifiable.iter().try_for_each(|Unidentifiable { effect, needs }| {
             writeln!(f, "not identifiable here: {effect} needs {needs}")

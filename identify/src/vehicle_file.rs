@@ -69,7 +69,11 @@ fn envelope(report: &Report) -> Table {
     let names = tests.map(|flight| flight.name.as_str()).collect::<Vec<_>>().join(", ");
     let mut table = Table::new();
     for (key, Reached { value, unit }) in &report.envelope {
-        let said = if *key == "frequency_max" { "one cycle a window" } else { "within it 99 % of the time" };
+        let said = if *key == "frequency_max" {
+            "one cycle in the widest window of the comparison"
+        } else {
+            "within it 99 % of the time"
+        };
         let value = rounded(*value).parse().unwrap_or(*value);
         table[key] = parameter(value, unit, &format!("test flights {names}"), said.into());
     }

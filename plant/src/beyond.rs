@@ -3,6 +3,7 @@
 use crate::effects::Effect;
 use crate::state::RigidBody;
 use bus::context::NodeContext;
+use nalgebra::Vector3;
 use vehicles::Vehicle;
 
 /// Warns of a start, or a steady wind, beyond the envelope of `vehicle`, which has these effects.
@@ -10,15 +11,21 @@ pub(crate) fn tell(vehicle: &Vehicle, effects: &[Effect], start: &RigidBody, run
     let Some(envelope) = vehicle.envelope else { return };
     let wind_m_s = steady_wind_m_s(effects);
     let found = [
-        ("initial_velocity_m_s", "speed", start.velocity_W_m_s.norm(), "m/s", (None, envelope.speed_max_m_s)),
+        (
+            "initial_velocity_m_s",
+            "initial speed",
+            start.velocity_W_m_s.norm(),
+            "m/s",
+            (None, envelope.speed_max_m_s),
+        ),
         (
             "initial_position_m",
-            "height",
+            "initial height",
             start.position_W_m.z,
             "m",
             (envelope.height_min_m, envelope.height_max_m),
         ),
-        ("vehicle", "wind", wind_m_s, "m/s", (None, envelope.speed_max_m_s)),
+        ("vehicle", "steady wind", wind_m_s, "m/s", (None, envelope.speed_max_m_s)),
     ];
     for (key, what, value, unit, (low, high)) in found {
         if low.is_some_and(|low| value < low) || high.is_some_and(|high| value > high) {
@@ -27,8 +34,8 @@ pub(crate) fn tell(vehicle: &Vehicle, effects: &[Effect], start: &RigidBody, run
             run.warn(
                 key,
                 format!(
-                    "`vehicle` \"{}\" starts with a {what} of {value:.3} {unit}, and its model was validated {low}{high}: \
-                     `[envelope]` of its file",
+                    "`vehicle` \"{}\": the {what} of {value:.3} {unit} is beyond the envelope in which its model was validated, \
+                     {low}{high} (`[envelope]` of its file)",
                     vehicle.name
                 ),
             );
@@ -39,13 +46,12 @@ pub(crate) fn tell(vehicle: &Vehicle, effects: &[Effect], start: &RigidBody, run
 /// Speed of the steady wind among `effects`.
 fn steady_wind_m_s(effects: &[Effect]) -> f64 {
     let winds = effects.iter().filter(|effect| effect.kind.name == "wind");
-    winds.map(|wind| wind.values.iter().map(|value| value * value).sum::<f64>().sqrt()).sum()
+    winds.map(|wind| Vector3::from_column_slice(&wind.values[..3])).sum::<Vector3<f64>>().norm()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Vector3;
     use vehicles::Envelope;
 
     #[test]
@@ -72,14 +78,15 @@ mod tests {
         let messages = told(&vehicle);
         assert_eq!(messages.len(), 3, "{messages:?}");
         assert!(
-            messages[0].contains("speed of 3.000 m/s") && messages[0].contains("up to 2.000 m/s"),
+            messages[0].contains("initial speed of 3.000 m/s") && messages[0].contains("up to 2.000 m/s"),
             "{messages:?}"
         );
         assert!(
-            messages[1].contains("height of 5.000 m") && messages[1].contains("from 0.500 up to 4.000 m"),
+            messages[1].contains("initial height of 5.000 m")
+                && messages[1].contains("from 0.500 up to 4.000 m"),
             "{messages:?}"
         );
-        assert!(messages[2].contains("a wind of 3.1"), "{messages:?}");
+        assert!(messages[2].contains("steady wind of 3.1"), "{messages:?}");
         vehicle.envelope =
             Some(Envelope { speed_max_m_s: Some(4.0), height_max_m: Some(6.0), ..Envelope::default() });
         assert_eq!(told(&vehicle), [""; 0]);

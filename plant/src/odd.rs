@@ -119,7 +119,8 @@ fn slow_motors(vehicle: &Vehicle) -> Option<String> {
 
 /// Finds wind that no effect feels: the vehicle flies as in still air.
 fn unfelt_wind(effects: &[Effect]) -> Option<String> {
-    let wind = effects.iter().find(|effect| effect.kind.moves_air)?.kind.name;
+    let is_calm = |effect: &Effect| effect.values.iter().all(|value| *value == 0.0);
+    let wind = effects.iter().find(|effect| effect.kind.moves_air && !is_calm(effect))?.kind.name;
     let feels = |effect: &Effect| !effect.kind.moves_air && effect.kind.needs.contains(&Quantity::Airspeed);
     let message = || {
         format!(

@@ -4,6 +4,7 @@ use crate::attached::Attached;
 use crate::states::{FIELDS_OF_STATE, tracks};
 use anyhow::Result;
 use flights::state::VehicleState;
+use recorder::node::SHADOW_PREFIX;
 use recorder::reader::Recording;
 use serde::Serialize;
 use std::fmt;
@@ -110,7 +111,9 @@ pub(crate) fn of(recording: &Recording) -> Result<Vec<Beyond>> {
         let prefix = format!("/{name}{}", if name.is_empty() { "" } else { "/" });
         let of_vehicle = recording.topics().iter();
         let topics: Vec<String> = of_vehicle
-            .filter(|(topic, kind)| kind.type_name == STATE && topic.starts_with(&prefix))
+            .filter(|(topic, kind)| {
+                kind.type_name == STATE && topic.starts_with(&prefix) && !topic.starts_with(SHADOW_PREFIX)
+            })
             .map(|(topic, _)| topic.clone())
             .collect();
         for (topic, track) in topics.iter().zip(tracks(recording, &topics, FIELDS_OF_STATE)?) {
@@ -124,17 +127,18 @@ pub(crate) fn of(recording: &Recording) -> Result<Vec<Beyond>> {
 fn of_states(topic: &str, envelope: &Envelope, states: &[(u64, VehicleState)]) -> Vec<Beyond> {
     let one = |Limit { quantity, unit, value, limit, sign }: Limit| {
         let limit = limit?;
-        let (mut duration_ns, mut farthest) = (0, limit);
-        for pair in states.windows(2) {
-            let found = value(&pair[0].1);
+        let (mut duration_ns, mut farthest, mut is_beyond) = (0, limit, false);
+        for (place, (from_ns, state)) in states.iter().enumerate() {
+            let found = value(state);
             if sign * found > sign * limit {
-                duration_ns += pair[1].0 - pair[0].0;
+                let until_ns = states.get(place + 1).map_or(*from_ns, |next| next.0);
+                (duration_ns, is_beyond) = (duration_ns + until_ns - from_ns, true);
                 farthest = if sign * found > sign * farthest { found } else { farthest };
             }
         }
         let duration_s = duration_ns as f64 * 1e-9;
         let topic = topic.to_owned();
-        (duration_ns > 0).then_some(Beyond { topic, quantity, unit, farthest, limit, duration_s })
+        is_beyond.then_some(Beyond { topic, quantity, unit, farthest, limit, duration_s })
     };
     limits(envelope).into_iter().filter_map(one).collect()
 }
@@ -162,7 +166,7 @@ mod tests {
             ..Envelope::default()
         };
         let states =
-            [state(2.0, 1.0, 0.0), state(0.5, 2.5, 0.3), state(0.25, 3.0, 0.1), state(2.0, 1.0, 0.0)];
+            [state(2.0, 1.0, 0.0), state(0.5, 2.5, 0.3), state(0.25, 3.0, 0.1), state(2.0, 1.0, 0.4)];
         let times_ns = [0, 100_000_000, 200_000_000, 500_000_000];
         let states: Vec<_> = times_ns.into_iter().zip(states).collect();
         let found = of_states("/plant/state", &envelope, &states);
@@ -170,7 +174,10 @@ mod tests {
         assert_eq!(found.len(), 3, "{found:?}");
         assert_eq!((of("speed").duration_s, of("speed").farthest), (0.4, 3.0));
         assert_eq!((of("height").duration_s, of("height").farthest, of("height").limit), (0.4, 0.25, 1.0));
-        assert!((of("tilt").farthest - 0.3_f64.to_degrees()).abs() < 1e-9 && of("tilt").duration_s == 0.1);
+        assert!(
+            (of("tilt").farthest - 0.4_f64.to_degrees()).abs() < 1e-9 && of("tilt").duration_s == 0.1,
+            "the last state counts"
+        );
         assert!(of_states("/plant/state", &Envelope::default(), &states).is_empty());
     }
 }

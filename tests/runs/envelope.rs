@@ -23,7 +23,7 @@ fn a_flight_beyond_it_is_told_before_and_after() {
     let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
     let manifest = repository("manifests/hover.toml");
     let checked = place.call(&[&["check", &manifest], &changes[..]].concat()).with_code(0);
-    checked.says(&["starts with a height of 1.000 m", "validated from 1.100 up to 1.200 m"]);
+    checked.says(&["the initial height of 1.000 m", "validated, from 1.100 up to 1.200 m"]);
     let recording = place.path("hover.mcap");
     let flown = place.call(&[&["run", &manifest, "--record", &recording], &changes[..]].concat());
     // It stands at 1 m for two seconds, and climbs to 1.5 m: below and then above.

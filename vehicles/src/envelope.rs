@@ -18,7 +18,7 @@ use diagnostics::unit::{ACCELERATION, ANGLE, Dimension, FREQUENCY, LENGTH, SPEED
 /// ```
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Envelope {
-    /// Greatest speed over ground.
+    /// Greatest speed in the world.
     pub speed_max_m_s: Option<f64>,
     /// Greatest angle between the body's z axis and the vertical.
     pub tilt_max_rad: Option<f64>,
@@ -26,9 +26,9 @@ pub struct Envelope {
     pub angular_velocity_max_rad_s: Option<f64>,
     /// Greatest specific force: 9.81 m/s² in hover, more under load.
     pub specific_force_max_m_s2: Option<f64>,
-    /// Least height.
+    /// Least height: z of the world, as the logs of the validation have it.
     pub height_min_m: Option<f64>,
-    /// Greatest height.
+    /// Greatest height, as the least one.
     pub height_max_m: Option<f64>,
     /// Frequency up to which residuals were compared.
     pub frequency_max_hz: Option<f64>,
@@ -61,7 +61,13 @@ pub(crate) fn read(root: &Section) -> Result<Option<Envelope>, Diagnostic> {
     let (section, mut envelope) = (root.section("envelope")?, Envelope::default());
     for (key, dimension, number) in Envelope::NUMBERS {
         if section.has(key) {
-            *number(&mut envelope) = Some(section.quantity(key, dimension)?.si);
+            let quantity = section.quantity(key, dimension)?;
+            // Heights may lie below the origin of the world.
+            let quantity =
+                if key.starts_with("height") { quantity } else { quantity.positive(section.doc)? };
+            let is_above = envelope.height_min_m.is_none_or(|low| key != "height_max" || quantity.si > low);
+            *number(&mut envelope) =
+                Some(quantity.require(section.doc, is_above, "a height above `envelope.height_min`")?.si);
         }
     }
     section.finish()?;
