@@ -522,6 +522,16 @@ impl<'c> Held<'c> {
     }
 }
 
+/// Windows of flights without an inertial unit: twice a derivative of a position needs more of it.
+const POSE_BOX_S: f64 = 0.04;
+
+/// The box of a flight's windows, in s; `None` for that of its slowest channel.
+pub fn box_s(flight: &Flight) -> Option<f64> {
+    let has_imu = !flight.angular_velocity.is_empty() || !flight.specific_force.is_empty();
+    let period_s = flight.attitude.period_s().unwrap_or(0.0).max(flight.position.period_s().unwrap_or(0.0));
+    (!has_imu).then_some((3.0 * period_s).max(POSE_BOX_S))
+}
+
 /// True if accelerations come from the velocity.
 fn of_velocity(flight: &Flight) -> bool {
     uses_pose(flight) && flight.position.is_empty()

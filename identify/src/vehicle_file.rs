@@ -161,6 +161,7 @@ mod tests {
             noise_floor: BTreeMap::new(),
             unexplained: BTreeMap::new(),
             not_identifiable: Vec::new(),
+            next_flight: None,
             block_s: 0.0,
             validation_blocks: 0,
         }
