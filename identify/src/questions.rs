@@ -8,7 +8,7 @@ use crate::log_rates::LogRates;
 use crate::model::Model;
 use crate::normal::{self, Block};
 use crate::parameter::Parameters;
-use crate::prepared::Propulsion;
+use crate::prepared::{Equation, Prepared, Propulsion};
 use crate::select::Selection;
 use crate::sensing::SensorErrors;
 use plant::effects::Effect;
@@ -88,8 +88,14 @@ pub struct OpenQuestions {
 }
 
 impl OpenQuestions {
-    /// The questions that `selection` leaves open, where `rivals` are those of each accepted candidate; `None` if there is none.
+    /// The questions that `selection` leaves open, where `rivals` are those of each accepted candidate; `None` if there is none,
+    /// or if the flights have no position and attitude, as on a rig: no flight in the open is proposed on these.
     pub(crate) fn of(problem: &Problem, selection: &Selection, rivals: &[Vec<Rival>]) -> Option<Self> {
+        let is_free =
+            |flight: &Prepared| flight.offset_of(Equation::Acceleration).is_some() && !flight.is_assumed();
+        if !problem.estimation.iter().all(is_free) {
+            return None;
+        }
         let mut hypotheses = vec![hypothesis(problem, "", &selection.after)];
         let mut asked = Vec::new();
         for (candidate, rivals) in selection.accepted.iter().zip(rivals) {

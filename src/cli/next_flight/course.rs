@@ -11,7 +11,7 @@ use std::path::Path;
 use toml::{Table, toml};
 
 /// Hover before the first manoeuvre, s: motors and controller settle, and the comparison begins behind it.
-const BEFORE_S: f64 = 1.0;
+pub const BEFORE_S: f64 = 1.0;
 /// Hover behind each manoeuvre, s.
 const BEHIND_S: f64 = 0.5;
 /// Time between two rows of the set points, s.

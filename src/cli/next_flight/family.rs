@@ -30,15 +30,15 @@ pub struct Manoeuvre {
 }
 
 /// Levels of most manoeuvres.
-const LEVELS: &[f64] = &[0.9, 0.6, 0.35];
+const LEVELS: &[f64] = &[0.9, 0.55, 0.3];
 /// Levels of fast ones.
-const FAST: &[f64] = &[0.85, 0.5];
+const FAST: &[f64] = &[0.8, 0.4];
 /// Part of the free way that is used: the vehicle overshoots.
 const OF_WAY: f64 = 0.9;
 /// Vertical acceleration of climbs and of short steps of height, m/s^2: a quarter and a half of gravity.
 const CLIMB_M_S2: [f64; 2] = [2.5, 5.0];
 /// Times from rest to rest of short moves, s.
-const SHORT_S: [f64; 2] = [0.5, 0.8];
+const SHORT_S: [f64; 2] = [0.7, 1.1];
 /// Greatest speed and acceleration of a minimum-snap move from rest to rest, in units of distance by time and its square:
 /// 35 t^4 - 84 t^5 + 70 t^6 - 20 t^7.
 const SNAP: [f64; 2] = [2.1875, 7.513];
@@ -130,7 +130,7 @@ pub const FAMILY: &[Manoeuvre] = &[
     },
     Manoeuvre {
         name: "slow roll and pitch doublets",
-        description: "moves of 0.8 s along both diagonals, one after another without a rest",
+        description: "moves of 1.1 s along both diagonals, one after another without a rest",
         levels: FAST,
         segments: |space, level| {
             [[0.7, 0.7], [0.7, -0.7]]

@@ -30,10 +30,22 @@ pub use course::SET_POINTS_START;
 
 /// First line of the manifest.
 pub const MANIFEST_START: &str = "# Next flight, proposed by hummingbus identify.";
+/// Further lines of its comment.
+const HEAD: &str = "\
+It flies the identified vehicle as it is: hummingbus run next-flight.toml
+A real vehicle flies the set points of next-flight.csv. Add the log to the flights file with role = \"fit\", and identify again.
+Separations are what simulations under the rival names expect, in standard errors of the comparison that identify makes.
+";
 /// Name of the manifest in the folder.
 pub const MANIFEST: &str = "next-flight.toml";
 /// Name of the set points in the folder.
 pub const SET_POINTS: &str = "next-flight.csv";
+
+/// A smaller separation by every manoeuvre says that none shows the effect.
+const NOTHING: f64 = 1e-3;
+/// Advice where no limit helps.
+const NOT_SHOWN: &str = "no manoeuvre shows what stays open, with raised limits either: another sensor, load or declared \
+    effect is needed";
 
 /// A proposal and its files.
 pub struct NextFlight {
@@ -104,10 +116,12 @@ struct Chosen {
 fn best(simulator: &Simulator<'_>, bounds: &Bounds, flown: &[Flown]) -> Result<Option<Found>> {
     let questions = simulator.questions;
     let mut chosen = search::combined(questions, flown, bounds.duration_s);
+    let never = StopToken::new();
+    let last = simulator.unstopped(&never);
     // What keeps the limits alone may leave them behind another: then the last is left out.
     while !chosen.is_empty() {
         let course = search::course(bounds, simulator.facts.gravity_m_s2, flown, &chosen)?;
-        let Some((flights, reached)) = simulator.fly(&course, bounds) else {
+        let Some((flights, reached)) = last.fly(&course, bounds) else {
             chosen.pop();
             continue;
         };
@@ -154,6 +168,12 @@ fn raised<T: Fn(usize, usize) + Sync>(
 ) -> String {
     let questions = simulator.questions;
     let open: Vec<usize> = (0..now.len()).filter(|at| now[*at] < SEPARATED).collect();
+    let alone = (0..flown.len()).map(|at| search::separations(questions, flown, &[at]));
+    let most =
+        alone.flat_map(|found| open.iter().map(move |at| found[*at]).collect::<Vec<_>>()).fold(0.0, f64::max);
+    if !flown.is_empty() && most < NOTHING {
+        return NOT_SHOWN.to_owned();
+    }
     let mut best: Option<(usize, f64, String)> = None;
     for raised in Raised::ALL {
         let (bounds, text) = raised.on(bounds);
@@ -181,9 +201,7 @@ fn raised<T: Fn(usize, usize) + Sync>(
     }
     match best {
         Some((answered, _, text)) if answered > 0 => text,
-        _ => "no limit that was raised (length, speed, tilt, room) separates what stays open: another sensor or load is \
-              needed"
-            .to_owned(),
+        _ => NOT_SHOWN.to_owned(),
     }
 }
 
@@ -219,7 +237,7 @@ fn written(
     };
     proposal.course = course.parts_s.iter().zip(names).map(part).collect();
     let manifest = within(course.manifest("vehicle.toml", "vehicle.toml", simulator.facts), &limits);
-    let head = format!("{}\n{proposal}", MANIFEST_START.trim_start_matches("# "));
+    let head = format!("{}\n{HEAD}{proposal}", MANIFEST_START.trim_start_matches("# "));
     let files = proposal.is_worth_flying().then(|| (commented(&head, &manifest), course.set_points()));
     NextFlight { proposal, files }
 }
