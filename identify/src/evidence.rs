@@ -6,7 +6,8 @@
 //! those of the truth. The simulated channels have no noise, so that the excess is an expected value. The verdict
 //! compares the squares block by block: an excess g of a block has the variance 4 g by the noise, and the blocks
 //! differ. So the separation is the mean excess in units of its standard error, as Vuong's test (Econometrica 57, 1989) has it.
-//! Both directions are computed, and the smaller counts.
+//! Both directions are computed, and the smaller counts. Squares that the true hypothesis leaves on channels without noise are errors
+//! of the comparison, which the noise of an identification with this flight will include: the excess is divided by as much.
 //!
 //! **Parameters.** The separation is a plausible change in units of the expected standard error, by the information of all
 //! flights together.
@@ -29,6 +30,8 @@ const LEAST_INFORMATION: f64 = 1e-9;
 pub struct Evidence {
     /// By the true hypothesis, then by the fitted one; `None` where no question asks for the pair.
     blocks: Vec<Vec<Option<Vec<Block>>>>,
+    /// Number of compared rows of a flight, by the true hypothesis.
+    rows: Vec<f64>,
 }
 
 impl OpenQuestions {
@@ -37,7 +40,7 @@ impl OpenQuestions {
     /// # Errors
     /// If a flight cannot be compared with a model.
     pub fn evidence(&self, flights: &[Flight]) -> Result<Evidence, Unusable> {
-        let mut blocks = Vec::with_capacity(flights.len());
+        let (mut blocks, mut rows) = (Vec::with_capacity(flights.len()), Vec::with_capacity(flights.len()));
         for (truth, flight) in flights.iter().enumerate() {
             let flight = self.sensor_errors(truth).put_on(flight);
             let prepared = self.prepared(&flight)?;
@@ -46,8 +49,9 @@ impl OpenQuestions {
                 self.is_asked(truth, at).then(|| self.problem.blocks_of(&prepared, values, free))
             };
             blocks.push(self.hypotheses.iter().enumerate().map(of).collect());
+            rows.push(self.problem.rows(&[prepared]) as f64);
         }
-        Ok(Evidence { blocks })
+        Ok(Evidence { blocks, rows })
     }
 
     /// The separation that each question has after flights with this evidence, in standard errors.
@@ -109,6 +113,7 @@ impl OpenQuestions {
         Costs {
             known: hypothesis.known.cost_after(&step),
             blocks: blocks.iter().map(|block| block.cost_after(&step)).collect(),
+            rows: evidence.iter().map(|one| one.rows[truth]).sum(),
         }
     }
 
@@ -132,14 +137,16 @@ impl OpenQuestions {
             }
             (values, now) = (next, after);
         }
-        Costs { known: now.0.cost, blocks: now.1.iter().map(|block| block.cost).collect() }
+        let rows = problem.rows(std::slice::from_ref(flight)) as f64;
+        Costs { known: now.0.cost, blocks: now.1.iter().map(|block| block.cost).collect(), rows }
     }
 
     /// The mean excess of the rival's squares over its standard error; blocks of the measured flights count among the others.
     fn separation(&self, rival: &Costs, truth: &Costs) -> f64 {
-        let mut gains: Vec<f64> = rival.blocks.iter().zip(&truth.blocks).map(|(a, b)| a - b).collect();
-        let of_known = (rival.known - truth.known) / self.blocks.max(1) as f64;
-        gains.extend(std::iter::repeat_n(of_known, self.blocks));
+        let noise = 1.0 + truth.blocks.iter().sum::<f64>() / truth.rows.max(1.0);
+        let excess = rival.blocks.iter().zip(&truth.blocks).map(|(rival, truth)| (rival - truth) / noise);
+        let of_known = (rival.known - truth.known) / self.blocks as f64;
+        let gains: Vec<f64> = excess.chain(std::iter::repeat_n(of_known, self.blocks)).collect();
         let total: f64 = gains.iter().sum();
         let mean = total / gains.len().max(1) as f64;
         let variance: f64 =
@@ -164,6 +171,8 @@ struct Costs {
     known: f64,
     /// On each block of the simulated flights.
     blocks: Vec<f64>,
+    /// Number of rows of these.
+    rows: f64,
 }
 
 fn total<'b>(known: &Block, blocks: impl Iterator<Item = &'b Block>) -> Block {

@@ -8,7 +8,7 @@ use crate::log_rates::LogRates;
 use crate::model::Model;
 use crate::normal::{self, Block};
 use crate::parameter::Parameters;
-use crate::prepared::{Equation, Prepared, Propulsion};
+use crate::prepared::{Equation, Prepared, Propulsion, block_s};
 use crate::select::Selection;
 use crate::sensing::SensorErrors;
 use plant::effects::Effect;
@@ -82,7 +82,9 @@ pub struct OpenQuestions {
     pub(crate) hypotheses: Vec<Hypothesis>,
     pub(crate) asked: Vec<(Question, Asked)>,
     pub(crate) propulsion: Propulsion,
-    /// Number of blocks of time that the flights have.
+    /// Length of the compared parts of the measured flights, s.
+    known_s: f64,
+    /// Number of blocks of time that they have beside a further flight.
     pub(crate) blocks: usize,
     rates: LogRates,
 }
@@ -122,9 +124,19 @@ impl OpenQuestions {
             problem: empty,
             hypotheses,
             asked,
+            known_s: problem.estimation.iter().map(Prepared::compared_s).sum(),
             blocks: selection.after.estimation_costs.len(),
             rates: LogRates::of(&problem.estimation),
         })
+    }
+
+    /// The same questions before a further flight of `duration_s`: the blocks of time are those of an identification with it.
+    #[must_use]
+    pub fn expecting(mut self, duration_s: f64) -> Self {
+        let block_s = block_s(self.known_s + duration_s);
+        self.problem.block_s = block_s;
+        self.blocks = ((self.known_s / block_s).round() as usize).max(1);
+        self
     }
 
     /// Iterates over the questions.

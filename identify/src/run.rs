@@ -12,7 +12,7 @@ use crate::loss::losses;
 use crate::model::Model;
 use crate::noise;
 use crate::parameter::{Parameter, Parameters};
-use crate::prepared::{BOX_STEPS, Equation, Prepared, Propulsion, box_s};
+use crate::prepared::{BOX_STEPS, Equation, Prepared, Propulsion, block_s, box_s};
 use crate::questions::OpenQuestions;
 use crate::regressor::{Regressor, regressors};
 use crate::report::{BeforeAfter, Changes, EffectReport, Estimate, FlightReport, Report, Unexplained};
@@ -253,10 +253,10 @@ pub fn problem<'f>(
             return Err(no_flight(role, &reasons));
         }
     }
-    let total_s: f64 = estimation.iter().map(compared_s).sum();
-    let block_s = (total_s / 40.0).clamp(0.5, 2.0);
+    let total_s: f64 = estimation.iter().map(Prepared::compared_s).sum();
     let model = Model { vehicle: vehicle.clone(), parameters };
     let noises = Noises::new();
+    let block_s = block_s(total_s);
     let problem = Problem { model, estimation, validation, test, noises, block_s, shared_late_s: 0.0 };
     Ok((problem, reports))
 }
@@ -309,17 +309,12 @@ fn no_flight(role: Role, reasons: &[(&Flight, String)]) -> IdentifyError {
     IdentifyError::NoFlight { role: role.name(), reason }
 }
 
-fn compared_s(flight: &Prepared) -> f64 {
-    let layout = &flight.layout;
-    layout.knots.len() as f64 * BOX_STEPS as f64 * layout.clock.step_s
-}
-
 fn flight_report(flight: &Flight, prepared: Option<&Prepared>) -> FlightReport {
     let layout = prepared.map(|prepared| &prepared.layout);
     FlightReport {
         name: flight.name.clone(),
         role: flight.role,
-        compared_s: prepared.map_or(0.0, compared_s),
+        compared_s: prepared.map_or(0.0, Prepared::compared_s),
         window_s: layout.map_or(0.0, |layout| 4.0 * BOX_STEPS as f64 * layout.clock.step_s),
         equations: layout
             .iter()

@@ -48,7 +48,7 @@ fn a_lively_flight_is_expected_to_separate_what_calm_ones_cannot_and_does() {
         files: Default::default(),
     };
     let outcome = identify(&set, &mut |_| ()).expect("flights to identify on");
-    let questions = outcome.questions.expect("rivals of rotor drag");
+    let questions = outcome.questions.expect("rivals of rotor drag").expecting(16.0);
 
     let evidence =
         |seed, is_calm| questions.evidence(&under_each(&questions, seed, is_calm)).expect("flights");

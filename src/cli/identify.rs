@@ -145,13 +145,14 @@ fn flights_of(arguments: &IdentifyArguments, file: &Path, out: &Path) -> Result<
     };
     remove_proposal(out)?;
     let questions = outcome.questions.take().filter(|_| !arguments.no_next_flight);
-    if let Some(questions) = &questions {
+    let is_searched = questions.is_some();
+    if let Some(questions) = questions {
         let next = next_flight::propose(&set, &outcome, questions, &vehicle, &stop_token()?, &say)?;
         write_proposal(out, &next)?;
         outcome.report.next_flight = Some(next.proposal);
         report = serde_json::to_value(&outcome.report)?;
     }
-    if flown.is_some() || questions.is_some() {
+    if flown.is_some() || is_searched {
         write_page(&outcome, flown.as_ref())?;
     }
     bar.finish_and_clear();

@@ -106,6 +106,12 @@ pub const FAMILY: &[Manoeuvre] = &[
         segments: low_runs,
     },
     Manoeuvre {
+        name: "waves",
+        description: "runs forwards and backwards that rise and sink by a few decimetres all the way",
+        levels: FAST,
+        segments: waves,
+    },
+    Manoeuvre {
         name: "pitch doublets",
         description: "short sharp moves forwards and backwards, one after another without a rest",
         levels: FAST,
@@ -263,6 +269,42 @@ fn doublets(space: &Space, level: f64, way: [f64; 2], time_s: f64) -> Vec<Table>
     let half = |part: f64| to(space, at(part), time_s, None);
     vec![half(1.0), half(0.0), half(-1.0), half(0.0), half(1.0), half(0.0)]
 }
+
+/// Runs to both ends along x, on which the thrust swings: heights alternate from point to point.
+fn waves(space: &Space, level: f64) -> Vec<Table> {
+    let length_m = OF_WAY * OF_WAY * space.free_m[0];
+    let speed_m_s = (0.6 * level * space.speed_m_s).min(0.3 * level * space.level_m_s2);
+    let swing_m = level * CLIMB_M_S2[1] * (WAVE_S / std::f64::consts::PI).powi(2);
+    let swing_m = swing_m.min(OF_WAY * OF_WAY * space.free_m[2].min(space.free_m[3]));
+    let steps = (2.0 * length_m / (speed_m_s * WAVE_S)).ceil().clamp(3.0, WAVES_MAX);
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few dozen")]
+    let count = steps as usize;
+    let run = |from_m: f64| {
+        let height_m = |step: usize| if step == count { 0.0 } else { swing_m * [1.0, -1.0][step % 2] };
+        let point = |step: usize| {
+            let part = step as f64 / steps;
+            let away_m = [from_m * (1.0 - 2.0 * part), 0.0, height_m(step)];
+            let at: Vec<f64> =
+                space.home_m.iter().zip(away_m).map(|(home, away)| round(home + away)).collect();
+            toml::Value::from(at)
+        };
+        let span_s = (2.0 * length_m / steps / speed_m_s.max(1e-3)).max(WAVE_S);
+        // It starts and stops within a longer span.
+        let time_s = |step: usize| round(if step == 1 || step == count { 2.0 * span_s } else { span_s });
+        let mut segment = toml! { kind = "minimum-snap" };
+        segment.insert("waypoints_m".to_owned(), (1..=count).map(point).collect::<Vec<_>>().into());
+        segment.insert("times_s".to_owned(), (1..=count).map(time_s).collect::<Vec<_>>().into());
+        segment
+    };
+    let aside_s = move_s(length_m, level * space.speed_m_s, level * space.level_m_s2);
+    let at = |away_m: f64| to(space, [away_m, 0.0, 0.0], aside_s, None);
+    vec![at(length_m), run(length_m), run(-length_m), at(0.0)]
+}
+
+/// Time from one turning point of a wave to the next, s.
+const WAVE_S: f64 = 0.6;
+/// Most turning points of a run.
+const WAVES_MAX: f64 = 24.0;
 
 fn height_doublets(space: &Space, level: f64) -> Vec<Table> {
     let time_s = SHORT_S[0];

@@ -63,11 +63,13 @@ pub struct NextFlight {
 pub fn propose(
     set: &FlightSet,
     outcome: &Outcome,
-    questions: &OpenQuestions,
+    questions: OpenQuestions,
     vehicle: &Path,
     stop: &StopToken,
     say: &(dyn Fn(&str) + Sync),
 ) -> Result<NextFlight> {
+    let bounds = Bounds::of(set);
+    let questions = questions.expecting(bounds.duration_s);
     let files = set.files.branch();
     let folder = vehicle.parent().unwrap_or(Path::new("."));
     let facts = Vehicle::load_from(&files, vehicle)?;
@@ -79,9 +81,14 @@ pub fn propose(
         vehicles.push(path);
     }
     let manifest = std::path::absolute(folder.join(MANIFEST))?;
-    let simulator =
-        Simulator { questions, vehicles: &vehicles, facts: &facts, files: &files, path: &manifest, stop };
-    let bounds = Bounds::of(set);
+    let simulator = Simulator {
+        questions: &questions,
+        vehicles: &vehicles,
+        facts: &facts,
+        files: &files,
+        path: &manifest,
+        stop,
+    };
     let tell = |text: &str| {
         let text = text.to_owned();
         move |done: usize, all: usize| say(&format!("next flight{text}: {done} of {all} manoeuvres"))
