@@ -18,6 +18,7 @@ mod inherited;
 mod interrupts;
 mod live_page;
 mod new;
+mod next_flight;
 mod node;
 mod output;
 mod plot;
