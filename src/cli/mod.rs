@@ -12,6 +12,7 @@ mod export;
 mod export_fmu;
 mod files;
 mod fork;
+mod foxglove;
 mod identify;
 mod included_models;
 mod inherited;
