@@ -86,6 +86,7 @@ mod timing;
 mod transport;
 #[doc(hidden)]
 pub mod user_file;
+pub mod watch;
 
 pub use bounded::Bounded;
 pub use bus_derive::{InputPorts, Message, OutputPorts};

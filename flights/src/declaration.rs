@@ -9,6 +9,7 @@ use vehicles::table::Dialect;
 
 use crate::files::Files;
 use crate::flight::Role;
+use crate::limits::NextFlight;
 use crate::name::Name;
 use crate::quantity::Quantity;
 
@@ -27,6 +28,8 @@ pub struct Declaration {
     /// Channels of the logs; a flight's own come first.
     #[serde(default)]
     pub channels: ChannelMap,
+    /// Limits of the flight that an identification proposes.
+    pub next_flight: Option<Spanned<NextFlight>>,
     /// The flights.
     #[serde(default)]
     pub flight: Vec<Spanned<FlightEntry>>,

@@ -14,6 +14,7 @@ use crate::document::Document;
 use crate::error::FlightsError;
 use crate::flight::Flight;
 use crate::held_out;
+use crate::limits::NextFlight;
 use crate::log_reader::{LogReader, ReadFile};
 use crate::logs::{self, Log, Patterns};
 use crate::opening::Opening;
@@ -45,6 +46,8 @@ pub struct FlightSet {
     pub vehicle: PathBuf,
     /// The flights.
     pub flights: Vec<Flight>,
+    /// Limits of the flight that an identification proposes.
+    pub next_flight: NextFlight,
     /// Files that were read: the vehicle file and its base. Whoever needs them again reads these bytes.
     pub files: InputFiles,
 }
@@ -79,6 +82,7 @@ impl FlightSet {
         let (document, files) = (Document::new(path, text), InputFiles::default());
         let declaration: Declaration = document.parse()?;
         let mut errors = check_keys(&document, &declaration.flight);
+        errors.extend(check_limits(&document, &declaration));
         let mut logs = Vec::new();
         for (index, entry) in declaration.flight.iter().enumerate() {
             match logs::of_entry(&document, index, entry, patterns) {
@@ -118,7 +122,9 @@ impl FlightSet {
             }
         });
         FlightsError::gather(clashes.collect())?;
-        Ok(Self { vehicle: vehicle_path, flights, files })
+        let next_flight =
+            declaration.next_flight.as_ref().map_or_else(NextFlight::default, |it| *it.get_ref());
+        Ok(Self { vehicle: vehicle_path, flights, next_flight, files })
     }
 }
 
@@ -162,6 +168,13 @@ fn check_keys(document: &Document, flights: &[Spanned<FlightEntry>]) -> Vec<Flig
         }
     }
     errors
+}
+
+/// The limit of the proposed flight that no flight can keep.
+fn check_limits(document: &Document, declaration: &Declaration) -> Option<FlightsError> {
+    let limits = declaration.next_flight.as_ref()?;
+    let (key, expected, found) = limits.get_ref().refusal()?;
+    Some(document.bad(&limits.span(), format!("next_flight.{key}"), expected, found, "correct it"))
 }
 
 /// Names that several flights have.

@@ -26,7 +26,12 @@ fn main() {
         fly(&vehicle, &plan, role)
     });
     let rows: usize = flights.iter().map(|flight| flight.command.time_s.len()).sum();
-    let set = FlightSet { vehicle: file, flights: flights.to_vec(), files: Default::default() };
+    let set = FlightSet {
+        vehicle: file,
+        flights: flights.to_vec(),
+        next_flight: Default::default(),
+        files: Default::default(),
+    };
     println!("{rows} rows of 1 ms in {} flights", set.flights.len());
     let start = Instant::now();
     let mut stages: Vec<(String, f64)> = Vec::new();

@@ -1,9 +1,10 @@
 //! The first page of a report, for people who fly: the answer, what is missing, how sure that is, what it changes, and what
 //! to do next.
 
+use crate::digits::rounded;
 use crate::horizons::Change;
 use crate::loss::advice;
-use crate::report::{EffectReport, Estimate, Report, UNCHECKED, rounded};
+use crate::report::{EffectReport, Estimate, Report, UNCHECKED};
 use crate::sensor_effects::SENSOR_EFFECTS;
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -151,6 +152,18 @@ fn next(report: &Report, accepted: &[(&str, &EffectReport)]) -> Vec<String> {
         if let (Some(experiment), Some(rival)) = (&effect.experiment, effect.confused_with.first()) {
             steps.push(format!("To tell {name} from {rival}: {experiment}."));
         }
+    }
+    if let Some(proposal) = &report.next_flight {
+        let sentences = proposal.sentences().join(". ");
+        steps.push(if proposal.is_worth_flying() {
+            format!(
+                "Fly next-flight.toml ({:.0} s; set points in next-flight.csv), and identify again with it among the flights to \
+                 fit. {sentences}.",
+                proposal.duration_s
+            )
+        } else {
+            format!("No flight within the limits would decide. {sentences}.")
+        });
     }
     if report.losses.is_empty() && !accepted.is_empty() {
         steps.push(

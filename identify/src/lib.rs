@@ -16,7 +16,9 @@
 //! | `noise_model`, `whitening` | the noise of a residual: autoregressive within a flight, trims between flights |
 //! | `normal`, `fit` | generalised least squares over blocks of time: an estimation problem and its result |
 //! | `logging` | timing errors that slowly logged commands make |
-//! | `select` | the stepwise search for the effects that the flights ask for |
+//! | `select`, `confounded` | the stepwise search for the effects that the flights ask for, and their rivals |
+//! | `questions`, `evidence`, `log_rates` | open questions, and what a simulated flight would say on them |
+//! | [`proposal`] | the next flight, as reports hold it |
 //! | `align`, `faults`, `trim` | clocks, sensors and trims, before anything is fitted |
 //! | `sensing` | the sensors' delays and biases, and a flight without them |
 //! | `whiteness`, `noise`, [`statistics`] | what is left, and what noise alone would leave |
@@ -26,6 +28,7 @@
 //! | `regressor` | what residuals are looked at against |
 //! | `envelope` | the ranges of the test flights, in which the verdict was judged |
 //! | [`report`], [`brief`], [`vehicle_file`] | what is written down |
+//! | `digits` | numbers in texts for people |
 //! | [`rotor`] | the rotor from a thrust stand |
 //!
 //! ```no_run
@@ -43,11 +46,15 @@ mod align;
 pub mod brief;
 mod candidate;
 mod clock;
+mod confounded;
+mod digits;
 mod envelope;
+mod evidence;
 mod faults;
 mod fit;
 mod foresight;
 mod horizons;
+mod log_rates;
 mod logging;
 mod loss;
 mod model;
@@ -57,6 +64,8 @@ mod normal;
 mod parameter;
 mod predict;
 mod prepared;
+pub mod proposal;
+mod questions;
 mod refine;
 mod regressor;
 pub mod report;
@@ -77,8 +86,11 @@ mod window;
 
 pub use clock::Lateness;
 pub use envelope::Reached;
+pub use evidence::Evidence;
 pub use faults::Fault;
+pub use log_rates::LogRates;
 pub use prepared::Equation;
+pub use questions::{OpenQuestions, Question};
 pub use regressor::Regressor;
 pub use sensing::SensorErrors;
 pub use unusable::Unusable;

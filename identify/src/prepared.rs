@@ -221,6 +221,11 @@ impl<'f> Prepared<'f> {
         })
     }
 
+    /// Length of the compared part, in s.
+    pub fn compared_s(&self) -> f64 {
+        self.layout.knots.len() as f64 * BOX_STEPS as f64 * self.layout.clock.step_s
+    }
+
     /// Rows of one knot.
     pub fn width(&self) -> usize {
         self.layout.equations.iter().map(|equation| equation.size()).sum()
@@ -520,6 +525,21 @@ impl<'c> Held<'c> {
             at_s = end_s;
         }
     }
+}
+
+/// Windows of flights without an inertial unit: twice a derivative of a position needs more of it.
+const POSE_BOX_S: f64 = 0.04;
+
+/// The box of a flight's windows, in s; `None` for that of its slowest channel.
+pub fn box_s(flight: &Flight) -> Option<f64> {
+    let has_imu = !flight.angular_velocity.is_empty() || !flight.specific_force.is_empty();
+    let period_s = flight.attitude.period_s().unwrap_or(0.0).max(flight.position.period_s().unwrap_or(0.0));
+    (!has_imu).then_some((3.0 * period_s).max(POSE_BOX_S))
+}
+
+/// Length of the blocks of time that count as independent, where so much is compared: about 40 of them.
+pub fn block_s(total_s: f64) -> f64 {
+    (total_s / 40.0).clamp(0.5, 2.0)
 }
 
 /// True if accelerations come from the velocity.

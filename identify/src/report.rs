@@ -2,9 +2,11 @@
 
 use crate::align::Offsets;
 use crate::candidate::Unidentifiable;
+use crate::digits::rounded;
 use crate::envelope::Reached;
 use crate::faults::Fault;
 use crate::loss::{Loss, advice};
+use crate::proposal::Proposal;
 use crate::select::Withdrawn;
 use crate::trim::Trim;
 use crate::whiteness::Whiteness;
@@ -56,6 +58,8 @@ pub struct Report {
     pub unexplained: BTreeMap<&'static str, Unexplained>,
     /// Effects, or sensors' parts of them, that these flights cannot show, and the data that would be needed.
     pub not_identifiable: Vec<Unidentifiable>,
+    /// The proposed next flight; `None` if no question is open, or none was searched.
+    pub next_flight: Option<Proposal>,
     /// Length of the blocks that count as independent.
     pub block_s: f64,
     /// Number of these blocks in the flights that effects are chosen on.
@@ -145,7 +149,8 @@ impl fmt::Display for Report {
         self.write_trims(f)?;
         self.write_errors(f)?;
         self.write_residuals(f)?;
-        self.write_rest(f)
+        self.write_rest(f)?;
+        self.next_flight.iter().try_for_each(|proposal| write!(f, "{proposal}"))
     }
 }
 
@@ -397,21 +402,6 @@ impl Report {
     }
 }
 
-/// Four digits.
-pub(crate) fn rounded(value: f64) -> String {
-    if value == 0.0 {
-        return "0".to_owned();
-    }
-    let digits = 3 - libm::log10(value.abs()).floor() as i32;
-    if (0..9).contains(&digits) {
-        format!("{value:.*}", digits as usize)
-    } else if (-3..0).contains(&digits) {
-        format!("{value:.0}")
-    } else {
-        format!("{value:.3e}")
-    }
-}
-
 #[cfg(test)]
 impl Report {
     /// A report of flights that were long enough and show nothing.
@@ -435,6 +425,7 @@ impl Report {
             noise_floor: BTreeMap::new(),
             unexplained: BTreeMap::new(),
             not_identifiable: Vec::new(),
+            next_flight: None,
             block_s: 1.0,
             validation_blocks: 20,
         }

@@ -3,6 +3,7 @@
 use crate::align::{Offsets, align};
 use crate::candidate::{Candidate, FAST_COMMANDS, Unidentifiable, candidates, free_parameters};
 use crate::clock::Lateness;
+use crate::confounded::{Rival, rivals};
 use crate::envelope;
 use crate::faults::{self, Fault};
 use crate::fit::{FitResult, Problem};
@@ -12,11 +13,12 @@ use crate::loss::losses;
 use crate::model::Model;
 use crate::noise;
 use crate::parameter::{Parameter, Parameters};
-use crate::prepared::{BOX_STEPS, Equation, Layout, Prepared, Propulsion};
+use crate::prepared::{BOX_STEPS, Equation, Layout, Prepared, Propulsion, block_s, box_s};
+use crate::questions::OpenQuestions;
 use crate::regressor::{Regressor, regressors};
 use crate::report::{BeforeAfter, Changes, EffectReport, Estimate, FlightReport, Report, Unexplained};
 use crate::rows::column;
-use crate::select::{Selection, confounded, select};
+use crate::select::{Selection, select};
 use crate::sensing::SensorErrors;
 use crate::trim;
 use crate::whiteness::{Whiteness, whiteness};
@@ -29,8 +31,6 @@ use vehicles::Vehicle;
 
 pub use crate::horizons::HORIZONS_S;
 
-/// Windows of flights without an inertial unit: twice a derivative of a position needs more of it.
-const POSE_BOX_S: f64 = 0.04;
 /// A residual is worth telling where its persistent part is beyond this part of its noise.
 const UNEXPLAINED: f64 = 0.3;
 
@@ -46,7 +46,7 @@ const OTHER_FLIGHTS: &str =
 ///
 /// ```
 /// let vehicle = "../vehicles/hummingbird.toml".into();
-/// let set = flights::FlightSet { vehicle, flights: Vec::new(), files: Default::default() };
+/// let set = flights::FlightSet { vehicle, flights: Vec::new(), next_flight: Default::default(), files: Default::default() };
 /// let error = identify::run::identify(&set, &mut |_| ()).unwrap_err();
 /// assert!(error.to_string().starts_with("no flight with role \"fit\" can be used: there is none."));
 /// ```
@@ -83,6 +83,8 @@ pub struct Outcome {
     pub sensor_errors: SensorErrors,
     /// The flights without their faulty channels; `None` if no channel has a fault.
     pub believed: Option<FlightSet>,
+    /// Questions that a further flight may answer; `None` if none is open.
+    pub questions: Option<OpenQuestions>,
 }
 
 /// The residuals of one equation of one flight, before and after, and the measured values.
@@ -120,7 +122,8 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
     let selection = select(&mut problem, &open, progress);
     progress("confounded effects");
     let mut effects = judged_effects(&problem, &selection);
-    accepted_effects(&problem, &selection, &mut effects);
+    let rivals = rivals(&problem, &selection);
+    accepted_effects(&problem, &selection, &rivals, &mut effects);
     undetermined_effects(&problem, &selection, &unidentifiable, &mut effects);
     note_logging(&problem, &selection, &mut flight_reports);
     progress("predictions");
@@ -153,6 +156,7 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
         flights: flight_reports,
         noise_floor,
         not_identifiable: unidentifiable,
+        next_flight: None,
         block_s: problem.block_s,
         validation_blocks: selection.after.validation_costs.len(),
     };
@@ -162,8 +166,11 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
     let regressors =
         problem.flights().map(|flight| (name(flight), regressors(&problem.model, flight, values))).collect();
     let pictures = pictures(&problem, &selection);
+    // A model that loses is not worth another flight of its effects.
+    let is_found = report.losses.is_empty() && !report.verdict.is_empty();
+    let questions = OpenQuestions::of(&problem, &selection, &rivals).filter(|_| is_found);
     drop(problem);
-    Ok(Outcome { pictures, regressors, effects, late, sensor_errors, report, believed })
+    Ok(Outcome { pictures, regressors, effects, late, sensor_errors, report, believed, questions })
 }
 
 /// The errors of flights whose attitude was measured: under an assumed one a prediction does not judge the vehicle.
@@ -249,10 +256,10 @@ pub fn problem<'f>(
             return Err(no_flight(role, &reasons));
         }
     }
-    let total_s: f64 = estimation.iter().map(compared_s).sum();
-    let block_s = (total_s / 40.0).clamp(0.5, 2.0);
+    let total_s: f64 = estimation.iter().map(Prepared::compared_s).sum();
     let model = Model { vehicle: vehicle.clone(), parameters };
     let noises = Noises::new();
+    let block_s = block_s(total_s);
     let problem = Problem { model, estimation, validation, test, noises, block_s, shared_late_s: 0.0 };
     Ok((problem, reports))
 }
@@ -305,17 +312,6 @@ fn no_flight(role: Role, reasons: &[(&Flight, String)]) -> IdentifyError {
     IdentifyError::NoFlight { role: role.name(), reason }
 }
 
-fn box_s(flight: &Flight) -> Option<f64> {
-    let has_imu = !flight.angular_velocity.is_empty() || !flight.specific_force.is_empty();
-    let period_s = flight.attitude.period_s().unwrap_or(0.0).max(flight.position.period_s().unwrap_or(0.0));
-    (!has_imu).then_some((3.0 * period_s).max(POSE_BOX_S))
-}
-
-fn compared_s(flight: &Prepared) -> f64 {
-    let layout = &flight.layout;
-    layout.knots.len() as f64 * BOX_STEPS as f64 * layout.clock.step_s
-}
-
 /// Width of the windows in which measurement and model are compared, s.
 fn window_s(layout: &Layout) -> f64 {
     4.0 * BOX_STEPS as f64 * layout.clock.step_s
@@ -326,7 +322,7 @@ fn flight_report(flight: &Flight, prepared: Option<&Prepared>) -> FlightReport {
     FlightReport {
         name: flight.name.clone(),
         role: flight.role,
-        compared_s: prepared.map_or(0.0, compared_s),
+        compared_s: prepared.map_or(0.0, Prepared::compared_s),
         window_s: layout.map_or(0.0, window_s),
         equations: layout
             .iter()
@@ -402,6 +398,7 @@ fn judged_effects(problem: &Problem, selection: &Selection) -> BTreeMap<&'static
 fn accepted_effects(
     problem: &Problem,
     selection: &Selection,
+    rivals: &[Vec<Rival>],
     effects: &mut BTreeMap<&'static str, EffectReport>,
 ) {
     for name in verdict(problem, selection) {
@@ -418,7 +415,7 @@ fn accepted_effects(
         }
         let without = problem.fitted(&start, &free_parameters(&others));
         let mut alike: Vec<&'static EffectKind> =
-            indices.iter().flat_map(|at| confounded(problem, selection, *at)).collect();
+            indices.iter().flat_map(|at| &rivals[*at]).map(|rival| rival.candidate.kind).collect();
         alike.sort_by_key(|kind| kind.name);
         alike.dedup_by_key(|kind| kind.name);
         let experiment = alike.first().map(|other| {

@@ -28,7 +28,6 @@ use crate::normal::{self, Block};
 use crate::refine;
 use crate::sensor_effects::POSE_DELAY;
 use crate::statistics::{chance_of_no_gain, fisher_tail};
-use plant::effects::EffectKind;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -43,8 +42,6 @@ const FALSE_RATE: f64 = 0.01;
 const CONFOUNDED_LEVEL: f64 = 0.05;
 /// Number of candidates of a round that are fitted fully.
 const CONFIRMED: usize = 4;
-/// A confounded effect has at least this part of the gain.
-const NEAR: f64 = 0.5;
 /// More rounds than there are effects worth naming.
 const ROUNDS_MAX: usize = 12;
 /// Two that mask each other are looked for where this many times the cost is left that all candidates together
@@ -290,7 +287,7 @@ impl StepwiseSearch {
 }
 
 /// The fit of `accepted` but that at `at`, from `base` on.
-fn without(problem: &Problem, base: &FitResult, accepted: &[Candidate], at: usize) -> FitResult {
+pub fn without(problem: &Problem, base: &FitResult, accepted: &[Candidate], at: usize) -> FitResult {
     let mut others = accepted.to_vec();
     let dropped = others.remove(at);
     let mut start = base.values.clone();
@@ -403,7 +400,12 @@ fn at_bound(problem: &Problem, candidate: &Candidate, fitted: &FitResult) -> Opt
 }
 
 /// The candidate's parameters fitted together with the accepted ones, from the best of its starts.
-fn fitted(problem: &Problem, base: &FitResult, accepted: &[Candidate], candidate: &Candidate) -> FitResult {
+pub fn fitted(
+    problem: &Problem,
+    base: &FitResult,
+    accepted: &[Candidate],
+    candidate: &Candidate,
+) -> FitResult {
     let mut all = free_parameters(accepted);
     all.extend(&candidate.free);
     let mut start = base.values.clone();
@@ -461,7 +463,7 @@ fn best(problem: &Problem, judged: &[Judged]) -> Option<usize> {
 }
 
 /// True if `fitted` is worse on the validation data than `other`, beyond chance.
-fn is_worse(fitted: &FitResult, other: &FitResult) -> bool {
+pub fn is_worse(fitted: &FitResult, other: &FitResult) -> bool {
     p_value(&fitted.validation_costs, &other.validation_costs) < CONFOUNDED_LEVEL
 }
 
@@ -522,30 +524,4 @@ impl Screen {
             free: wanted,
         }
     }
-}
-
-/// For an accepted candidate: the effects that would do as well in its place, of those that were anywhere near it when
-/// it was taken.
-pub fn confounded(problem: &Problem, selection: &Selection, at: usize) -> Vec<&'static EffectKind> {
-    let candidate = &selection.accepted[at];
-    let mut others = selection.accepted.clone();
-    others.remove(at);
-    let base = without(problem, &selection.after, &selection.accepted, at);
-    let is_alike =
-        |candidate: &&Candidate| !is_worse(&fitted(problem, &base, &others, candidate), &selection.after);
-    let near = near(selection, candidate);
-    near.par_iter().filter(|candidate| is_alike(candidate)).map(|candidate| candidate.kind).collect()
-}
-
-/// The candidates of other effects with at least [`NEAR`] of the gain of `candidate`, in the round that took it.
-fn near<'s>(selection: &'s Selection, candidate: &Candidate) -> Vec<&'s Candidate> {
-    let took = |round: &&Round| round.taken().is_some_and(|taken| taken.candidate == *candidate);
-    let Some(round) = selection.rounds.iter().find(took) else { return Vec::new() };
-    let gain = round.taken().map_or(0.0, |taken| taken.gain);
-    let is_near = |judged: &&Judged| {
-        judged.gain > NEAR * gain
-            && judged.candidate.kind.name != candidate.kind.name
-            && !selection.accepted.contains(&judged.candidate)
-    };
-    round.judged.iter().filter(is_near).map(|judged| &judged.candidate).collect()
 }

@@ -72,6 +72,29 @@ impl SensorErrors {
         }
         flight
     }
+
+    /// Returns `flight` as sensors with these errors would have logged it.
+    ///
+    /// ```
+    /// use flights::{Channel, Flight, Role};
+    /// use identify::SensorErrors;
+    ///
+    /// let mut flight = Flight::new("true", "", Role::Fit);
+    /// flight.specific_force = Channel { time_s: vec![1.0], values: vec![[0.0, 0.0, 9.81]] };
+    /// let errors = SensorErrors { accelerometer_bias_m_s2: [0.5, 0.0, 0.0], ..SensorErrors::default() };
+    /// assert_eq!(errors.put_on(&flight).specific_force.values[0][0], 0.5);
+    /// ```
+    #[must_use]
+    pub fn put_on(&self, flight: &Flight) -> Flight {
+        let negated = Self {
+            pose_delay_s: -self.pose_delay_s,
+            inertial_delay_s: -self.inertial_delay_s,
+            accelerometer_bias_m_s2: self.accelerometer_bias_m_s2.map(|bias| -bias),
+            gyroscope_bias_rad_s: self.gyroscope_bias_rad_s.map(|bias| -bias),
+            attitude_bias_rad: self.attitude_bias_rad.map(|turn| -turn),
+        };
+        negated.taken_off(flight, &Lateness::default())
+    }
 }
 
 fn earlier<const N: usize>(channel: &mut Channel<N>, by_s: f64) {

@@ -1,7 +1,8 @@
 //! The new vehicle file: the declared one with the effects that were accepted.
 
+use crate::digits::rounded;
 use crate::envelope::Reached;
-use crate::report::{Estimate, Report, rounded};
+use crate::report::{Estimate, Report};
 use diagnostics::Diagnostic;
 use inputs::InputFiles;
 use plant::effects::Effect;
@@ -186,6 +187,7 @@ mod tests {
             noise_floor: BTreeMap::new(),
             unexplained: BTreeMap::new(),
             not_identifiable: Vec::new(),
+            next_flight: None,
             block_s: 0.0,
             validation_blocks: 0,
         }

@@ -36,7 +36,12 @@ fn several(case: &Case) -> FlightSet {
         fly(&vehicle, &plan, if number + 1 == COUNT { Role::Test } else { Role::Fit })
     };
     let flights = (0..COUNT).into_par_iter().map(one).collect();
-    FlightSet { vehicle: simulated::vehicle_file(case.vehicle), flights, files: Default::default() }
+    FlightSet {
+        vehicle: simulated::vehicle_file(case.vehicle),
+        flights,
+        next_flight: Default::default(),
+        files: Default::default(),
+    }
 }
 
 fn found(set: &FlightSet) -> Vec<Fault> {

@@ -66,7 +66,12 @@ fn trims_that_differ_are_no_offset_of_the_centre_of_mass() {
         flights.push(flight);
         vehicle.get_or_insert(set.vehicle);
     }
-    let set = FlightSet { vehicle: vehicle.expect("a vehicle"), flights, files: Default::default() };
+    let set = FlightSet {
+        vehicle: vehicle.expect("a vehicle"),
+        flights,
+        next_flight: Default::default(),
+        files: Default::default(),
+    };
     let found = identify(&set, &mut |_| ()).expect("flights to identify on").report;
     let offset = found.effects.get("com-offset");
     let x = offset.and_then(|effect| effect.parameters.get("x"));

@@ -2,6 +2,7 @@
 //!
 //! - [`node`]: the process that records a run
 //! - [`writer`]: the MCAP file it writes
+//! - `watched`: its samples for those who watch the run
 //! - [`definition`]: the layout of a message by its ROS 2 definition
 //! - `source`: the bytes of a recording, in memory or in a file
 //! - `container`: the records of an MCAP file, their lengths checked before memory is taken for them
@@ -60,6 +61,7 @@ pub mod node;
 pub mod reader;
 pub mod series;
 mod source;
+mod watched;
 pub mod writer;
 
 pub use error::RecordingError;

@@ -1,11 +1,13 @@
 //! The recorder: takes every sample of its inputs and writes their bytes to the file.
 
 use crate::error::RecordingError;
+use crate::watched::Watched;
 use crate::writer::{ChannelId, RecordingWriter};
 use bus::announcement::Announcement;
 use bus::component::{Component, Info, State, StateError, StepError, Transfer};
 use bus::context::{NodeContext, StepContext};
 use bus::ports::AnyInputs;
+use bus::watch::WatchFiles;
 use diagnostics::ParameterError;
 use inputs::InputFiles;
 use serde::Deserialize;
@@ -30,6 +32,9 @@ pub struct Parameters {
     /// Files to attach.
     #[serde(default)]
     pub attachments: Vec<AttachedFile>,
+    /// Files by which others watch the run; absent where nobody can.
+    #[serde(default)]
+    pub watch: Option<WatchFiles>,
 }
 
 /// A file to attach.
@@ -73,11 +78,13 @@ impl State for RecorderState {
 struct Recording {
     writer: RecordingWriter,
     topics: Vec<Topic>,
+    watched: Watched,
 }
 
 /// A topic that is recorded.
 #[derive(Debug)]
 struct Topic {
+    name: String,
     channel: ChannelId,
     /// Channel of the process that shadows the publisher: added with its first sample, whose tick is a function of
     /// the run.
@@ -153,18 +160,21 @@ impl Recording {
         let topic = |&(name, announcement): &(&str, &Announcement)| {
             let shadow_name = format!("{SHADOW_PREFIX}{name}");
             let channel = writer.add_channel(name, announcement)?;
-            Ok(Topic { channel, shadow_channel: None, shadow_name, announcement: announcement.clone() })
+            let (name, announcement) = (name.to_owned(), announcement.clone());
+            Ok(Topic { name, channel, shadow_channel: None, shadow_name, announcement })
         };
         let topics = topics.iter().map(topic).collect::<Result<_, RecordingError>>()?;
-        Ok(Self { writer, topics })
+        Ok(Self { writer, topics, watched: Watched::by(parameters.watch.as_ref()) })
     }
 
     /// Writes the samples that were sent at this tick: first those that count, then those of shadows.
     fn record(&mut self, context: &StepContext<'_>, inputs: AnyInputs<'_>) -> Result<(), RecordingError> {
         let (tick, time_ns) = (context.tick(), context.time_ns());
+        self.watched.look(tick, self.topics.iter().map(|topic| (topic.name.as_str(), &topic.announcement)));
         for (input, topic) in self.topics.iter().enumerate() {
             if let Some(cdr) = inputs.fresh(input) {
                 self.writer.write(topic.channel, tick, time_ns, cdr)?;
+                self.watched.write(tick, time_ns, &topic.name, self.writer.counting(topic.channel, cdr));
             }
         }
         for (input, topic) in self.topics.iter_mut().enumerate() {
@@ -176,6 +186,7 @@ impl Recording {
                     .insert(self.writer.add_channel(&topic.shadow_name, &topic.announcement)?),
             };
             self.writer.write(channel, tick, time_ns, cdr)?;
+            self.watched.write(tick, time_ns, &topic.shadow_name, self.writer.counting(channel, cdr));
         }
         Ok(())
     }

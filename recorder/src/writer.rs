@@ -22,6 +22,10 @@ const ZSTD_LEVEL: u32 = 1;
 /// The bytes with which every recording of ours starts, by MCAP's specification: "Magic", then the record "Header" with
 /// the profile and the library that are written here.
 pub const START: &[u8] = b"\x89MCAP0\r\n\x01\x16\0\0\0\0\0\0\0\x04\0\0\0ros2\x0a\0\0\0hummingbus";
+/// Encoding of the schemas: definitions of ROS 2.
+pub const SCHEMA_ENCODING: &str = "ros2msg";
+/// Encoding of the messages.
+pub const MESSAGE_ENCODING: &str = "cdr";
 /// `O_NOFOLLOW` of the kernel.
 const NO_LINK: i32 = rustix::fs::OFlags::NOFOLLOW.bits().cast_signed();
 const FILE_BUFFER_BYTES: usize = 1024 * 1024;
@@ -82,14 +86,11 @@ impl RecordingWriter {
     /// # Errors
     /// If the file cannot be written.
     pub fn add_channel(&mut self, topic: &str, message: &Announcement) -> Result<ChannelId, RecordingError> {
-        let metadata = BTreeMap::from([
-            ("offered_qos_profiles".to_owned(), String::new()),
-            ("layout_hash".to_owned(), format!("{:016x}", message.layout_hash)),
-        ]);
+        let metadata = channel_metadata(message);
         let channel = self
             .mcap
-            .add_schema(&message.type_name, "ros2msg", message.definition.as_bytes())
-            .and_then(|schema| self.mcap.add_channel(schema, topic, "cdr", &metadata))
+            .add_schema(&message.type_name, SCHEMA_ENCODING, message.definition.as_bytes())
+            .and_then(|schema| self.mcap.add_channel(schema, topic, MESSAGE_ENCODING, &metadata))
             .map_err(|error| write_error(&self.path, &error))?;
         self.extents.extend(message.extent.map(|extent| (channel, extent)));
         Ok(ChannelId(channel))
@@ -108,9 +109,15 @@ impl RecordingWriter {
     ) -> Result<(), RecordingError> {
         let header =
             MessageHeader { channel_id: channel.0, sequence: tick, log_time: time_ns, publish_time: time_ns };
-        let cdr = self.extents.get(&channel.0).map_or(cdr, |extent| extent.of_cdr(cdr));
+        let cdr = self.counting(channel, cdr);
         self.chunk_bytes += cdr.len();
         self.mcap.write_to_known_channel(&header, cdr).map_err(|error| write_error(&self.path, &error))
+    }
+
+    /// The part of `cdr`, a message of `channel`, that is written: the values that count.
+    #[must_use]
+    pub fn counting<'a>(&self, channel: ChannelId, cdr: &'a [u8]) -> &'a [u8] {
+        self.extents.get(&channel.0).map_or(cdr, |extent| extent.of_cdr(cdr))
     }
 
     /// Ends a tick: closes the chunk if it is full.
@@ -139,6 +146,15 @@ impl RecordingWriter {
         let mut file = self.mcap.into_inner();
         std::io::Write::flush(&mut file).map_err(RecordingError::file("write", &self.path))
     }
+}
+
+/// Metadata of the channel of a topic with this message.
+#[must_use]
+pub fn channel_metadata(message: &Announcement) -> BTreeMap<String, String> {
+    BTreeMap::from([
+        ("offered_qos_profiles".to_owned(), String::new()),
+        ("layout_hash".to_owned(), format!("{:016x}", message.layout_hash)),
+    ])
 }
 
 /// Opens the empty file at `path`, which is created if nothing is there.

@@ -74,7 +74,15 @@ const NAP_NS: u64 = 20_000_000;
 /// # Errors
 /// A problem in the manifest, or a node that needs a process of its own: an executable, a swap, a standby.
 pub fn simulate(manifest: &Manifest) -> Result<Simulation> {
-    let graph = Graph::build(manifest)?;
+    simulate_reading(manifest, InputFiles::default())
+}
+
+/// The same; files that `files` has read are not read again.
+///
+/// # Errors
+/// As [`simulate`].
+pub fn simulate_reading(manifest: &Manifest, files: InputFiles) -> Result<Simulation> {
+    let graph = Graph::build_from(manifest, files)?;
     require_host(&Host::InProcess, manifest, &graph)?;
     simulation(&graph, |component| component.role == Role::Compute, manifest.registry().components())
 }

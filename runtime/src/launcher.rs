@@ -24,6 +24,7 @@ use crate::world::Spent;
 use anyhow::{Context, Result};
 use bus::lockstep::SupervisorView;
 use bus::plan::Plan;
+use bus::watch::WatchFiles;
 use inputs::InputFiles;
 use recorder::reader::Recording;
 use std::collections::BTreeMap;
@@ -351,7 +352,9 @@ fn prepare(
     }
     for (program, node) in graph.programs.iter().zip(&mut graph.plan.nodes) {
         if program.is_recorder() {
-            node.parameters = serde_json::json!({ "path": recording, "attachments": attachments });
+            let watch = WatchFiles::of(run_dir.path(), run_dir.run_id());
+            node.parameters =
+                serde_json::json!({ "path": recording, "attachments": attachments, "watch": watch });
             node.files = files.used();
         }
     }

@@ -49,7 +49,7 @@ mod watch_clock;
 mod world;
 
 pub use describe_programs::check_programs;
-pub use in_process::{fly_unrecorded, require_flyable, simulate};
+pub use in_process::{fly_unrecorded, require_flyable, simulate, simulate_reading};
 
 use bus::{BusError, Join};
 use registry::Registry;

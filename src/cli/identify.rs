@@ -2,20 +2,23 @@
 
 use super::files::PAGE;
 use super::interrupts::stop_token;
+use super::next_flight::{self, NextFlight};
 use super::output::{print_json, print_text, readable};
 use super::progress;
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand};
 use flights::FlightSet;
 use hummingbus::COMPONENTS;
+use identify::proposal::Proposal;
 use identify::report::Report;
+use identify::run::Outcome;
 use identify::vehicle_file;
 use report::identification;
 use report::validate::Validation;
 use runtime::output_file::{self, Kind, Mark, is_same};
 use serde_json::{Value, json};
 use std::fs::File;
-use std::io::Write as _;
+use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use vehicles::Vehicle;
@@ -31,6 +34,11 @@ const REPORT: Kind = Kind { name: "report", mark: Mark::Start(b"{\n  \"writer\":
 /// The new vehicle file.
 const VEHICLE: Kind =
     Kind { name: "identified vehicle", mark: Mark::Start(b"# Written by hummingbus identify.") };
+/// The manifest of the next flight.
+const NEXT: Kind = Kind { name: "next flight", mark: Mark::Start(next_flight::MANIFEST_START.as_bytes()) };
+/// Its set points.
+const SET_POINTS: Kind =
+    Kind { name: "set points of a next flight", mark: Mark::Start(next_flight::SET_POINTS_START.as_bytes()) };
 /// Tables for a vehicle file.
 const TABLES: Kind = Kind {
     name: "table of a rotor",
@@ -55,6 +63,9 @@ pub struct IdentifyArguments {
     /// Do not fly the declared and the new vehicle on the bus.
     #[arg(long)]
     no_bus: bool,
+    /// Do not search the next flight, which separates what these flights leave open.
+    #[arg(long)]
+    no_next_flight: bool,
 }
 
 #[derive(Subcommand)]
@@ -105,18 +116,25 @@ fn flights_of(arguments: &IdentifyArguments, file: &Path, out: &Path) -> Result<
     let base = Vehicle::base(&set.files, &set.vehicle);
     let inputs: Vec<&Path> =
         [Some(file), Some(&set.vehicle), base.as_deref()].into_iter().flatten().collect();
-    let files = [("vehicle.toml", &VEHICLE), ("report.html", &PAGE), ("report.json", &REPORT)];
+    let files = [
+        ("vehicle.toml", &VEHICLE),
+        ("report.html", &PAGE),
+        ("report.json", &REPORT),
+        (next_flight::MANIFEST, &NEXT),
+        (next_flight::SET_POINTS, &SET_POINTS),
+    ];
     let _lock = claim(out, &files, &inputs)?;
-    let outcome = identify::run::identify(&set, &mut |step| say(step))?;
+    let mut outcome = identify::run::identify(&set, &mut |step| say(step))?;
     let vehicle = out.join("vehicle.toml");
     let text = vehicle_file::text(&set.files, &set.vehicle, &outcome.effects, &outcome.report)?;
     write(out, "vehicle.toml", &VEHICLE, &text)?;
     // It is flown as it was written.
     set.files.keep(&vehicle, text.into_bytes());
     // All is written before anything is flown, so that a run that fails loses nothing.
-    let write_page =
-        |flown: Option<&Value>| write(out, "report.html", &PAGE, identification::page(&outcome, flown));
-    write_page(None)?;
+    let write_page = |outcome: &Outcome, flown: Option<&Value>| {
+        write(out, "report.html", &PAGE, identification::page(outcome, flown))
+    };
+    write_page(&outcome, None)?;
     let mut report = serde_json::to_value(&outcome.report)?;
     write_json(out, &report)?;
     let flown = if arguments.no_bus {
@@ -126,8 +144,17 @@ fn flights_of(arguments: &IdentifyArguments, file: &Path, out: &Path) -> Result<
         let mut tell = |line: &str| say(&format!("on the bus: {line}"));
         identification::fly_again(&set, &vehicle, &outcome, &how, &mut tell)?
     };
-    if flown.is_some() {
-        write_page(flown.as_ref())?;
+    remove_proposal(out)?;
+    let questions = outcome.questions.take().filter(|_| !arguments.no_next_flight);
+    let is_searched = questions.is_some();
+    if let Some(questions) = questions {
+        let next = next_flight::propose(&set, &outcome, questions, &vehicle, &stop_token()?, &say)?;
+        write_proposal(out, &next)?;
+        outcome.report.next_flight = Some(next.proposal);
+        report = serde_json::to_value(&outcome.report)?;
+    }
+    if flown.is_some() || is_searched {
+        write_page(&outcome, flown.as_ref())?;
     }
     bar.finish_and_clear();
     report["bus"] = flown.clone().unwrap_or(Value::Null);
@@ -138,6 +165,25 @@ fn flights_of(arguments: &IdentifyArguments, file: &Path, out: &Path) -> Result<
         print_text(&summary(&outcome.report, flown.as_ref(), out))?;
     }
     Ok(true)
+}
+
+/// Removes the next flight that an earlier command proposed: it would pass for that of this one.
+fn remove_proposal(out: &Path) -> Result<()> {
+    for name in [next_flight::MANIFEST, next_flight::SET_POINTS] {
+        match std::fs::remove_file(out.join(name)) {
+            Err(error) if error.kind() != ErrorKind::NotFound => {
+                return Err(error).with_context(|| format!("cannot remove {}", out.join(name).display()));
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+fn write_proposal(out: &Path, next: &NextFlight) -> Result<()> {
+    let Some((manifest, set_points)) = &next.files else { return Ok(()) };
+    write(out, next_flight::MANIFEST, &NEXT, manifest)?;
+    write(out, next_flight::SET_POINTS, &SET_POINTS, set_points)
 }
 
 /// Makes the folder `out`, claims it for this command, and checks that `files` can lie in it.
@@ -181,7 +227,10 @@ fn summary(report: &Report, flown: Option<&Value>, out: &Path) -> String {
             away * 100.0
         );
     }
-    let files =
-        ["report.html", "report.json", "vehicle.toml"].map(|name| out.join(name).display().to_string());
+    let mut names = vec!["report.html", "report.json", "vehicle.toml"];
+    if report.next_flight.as_ref().is_some_and(Proposal::is_worth_flying) {
+        names.extend([next_flight::MANIFEST, next_flight::SET_POINTS]);
+    }
+    let files: Vec<String> = names.iter().map(|name| out.join(name).display().to_string()).collect();
     text + &format!("\nwritten: {}", files.join(", "))
 }

@@ -16,9 +16,9 @@ use view::live::recording_of;
 use view::{Handle, Server, Shown};
 
 /// Pause between two looks: for the run, for its first messages, for the end.
-const LOOK: Duration = Duration::from_millis(50);
+pub const LOOK: Duration = Duration::from_millis(50);
 /// Pause between two looks for a run that goes back: its page may stay open for hours after its end.
-const LATER_LOOK: Duration = Duration::from_millis(500);
+pub const LATER_LOOK: Duration = Duration::from_millis(500);
 /// Looks without an open page after which the page is closed: it may be reloading. Two seconds.
 const DESERTED_LOOKS: u32 = 40;
 
@@ -154,7 +154,7 @@ fn follow(handle: &Handle, find: &dyn Fn() -> Option<LiveRun>, is_ended: &dyn Fn
 }
 
 /// The first value of `look`; `None` if `is_ended` before.
-fn first<T>(look: impl Fn() -> Option<T>, pause: Duration, is_ended: &dyn Fn() -> bool) -> Option<T> {
+pub fn first<T>(look: impl Fn() -> Option<T>, pause: Duration, is_ended: &dyn Fn() -> bool) -> Option<T> {
     loop {
         let found = look();
         if found.is_some() || is_ended() {

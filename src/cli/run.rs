@@ -1,5 +1,6 @@
 //! The command `run` and related ones: check a manifest, fly it, judge its recording, print the results.
 
+use super::foxglove::{self, LiveFoxglove};
 use super::interrupts::stop_token;
 use super::live_page::LivePage;
 use super::output::{message, print_json, print_text, print_warnings, say};
@@ -21,6 +22,7 @@ use runtime::manifest::{Composition, Manifest, NO_RECORDING, PaceSetting};
 use runtime::outputs::Outputs;
 use runtime::run_dir::run_of_launcher;
 use serde_json::{Value, json};
+use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 
 /// Arguments of `run`, and common arguments of the commands that fly a manifest.
@@ -59,6 +61,17 @@ pub struct RunArguments {
     /// With --view: print the address, and open no browser.
     #[arg(long, requires = "view")]
     pub no_open: bool,
+    /// Show the run in Foxglove or Lichtblick while it flies, at this address of this machine; at 127.0.0.1:8765 without
+    /// one.
+    #[arg(
+        long,
+        value_name = "ADDRESS",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "127.0.0.1",
+        value_parser = foxglove::address
+    )]
+    pub foxglove: Option<SocketAddr>,
     /// Override a key of the manifest, such as run.seed=3.
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
@@ -144,6 +157,7 @@ pub fn run(
     let pages = if graph.plan.profile { files.outputs() } else { Vec::new() };
     let mut outputs = Outputs::of(&manifest, &graph, &path, pages)?;
     let page = arguments.view.map(|port| page(port, arguments.no_open, &graph)).transpose()?;
+    let topics = arguments.foxglove.map(|address| topics(address, &manifest, &graph)).transpose()?;
     let bar = progress::bar(RUN, arguments.json || arguments.quiet);
     let host = if arguments.in_process { Host::InProcess } else { Host::this_binary() };
     let launcher = Launcher::new(host)
@@ -154,6 +168,11 @@ pub fn run(
         progress::finish(&bar);
         Ok((outcome, outputs.finish()?))
     });
+    if let Some(topics) = topics
+        && let Err(error) = topics.close()
+    {
+        say(&format!("warning: Foxglove has not seen the whole run: {error:#}"));
+    }
     let (mut outcome, recording) =
         flown.or_else(|error| Err(broken(&manifest, &error, outputs.left().as_deref(), arguments.json)?))?;
     let (flight, figures) = (outcome.flight.take(), outcome.figures.take());
@@ -198,15 +217,27 @@ pub fn run(
 
 /// Serves the page of the run of `graph`, which is about to start.
 fn page(port: u16, no_open: bool, graph: &Graph) -> Result<LivePage> {
-    if !graph.plan.nodes.iter().any(|node| node.is_recorder) {
-        bail!(
-            "--view shows a run by its recording, and this run records nothing: leave out --view, or let it record"
-        );
-    }
+    require_recorder(graph, "--view")?;
     let mut page = LivePage::open(port, no_open)?;
     page.follow(|| run_of_launcher(std::process::id()));
     say(&format!("The run in the browser: {}", page.address()));
     Ok(page)
+}
+
+/// Serves the topics of the run of `graph`, which is about to start, to Foxglove.
+fn topics(address: SocketAddr, manifest: &Manifest, graph: &Graph) -> Result<LiveFoxglove> {
+    require_recorder(graph, "--foxglove")?;
+    LiveFoxglove::open(address, &graph.plan, &manifest.name(), || run_of_launcher(std::process::id()))
+}
+
+/// Refuses an `option` that shows the samples of a recorder in a run without one.
+fn require_recorder(graph: &Graph, option: &str) -> Result<()> {
+    if graph.plan.nodes.iter().any(|node| node.is_recorder) {
+        return Ok(());
+    }
+    bail!(
+        "{option} shows a run by its recording, and this run records nothing: leave out {option}, or let it record"
+    )
 }
 
 /// Keeps the page of a run that has ended, for as long as it is open in a browser.

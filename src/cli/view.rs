@@ -1,15 +1,17 @@
 //! The command `view`.
 
 use super::files::open_recording;
+use super::foxglove::{self, LiveFoxglove};
 use super::interrupts::stop_token;
-use super::live_page::{LivePage, opened};
+use super::live_page::{LOOK, LivePage, opened};
 use super::output::{print_text, say};
 use anyhow::{Context, Result};
 use bus::plan::Plan;
 use clap::Args;
 use runtime::event::StopToken;
 use runtime::run_dir::find_live;
-use std::path::PathBuf;
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
 use view::live::recording_of;
 use view::{Server, Shown};
 
@@ -18,7 +20,8 @@ pub const HELP: &str = "Examples:
   hummingbus view hover.mcap                  opens the page in the browser, and ends with Ctrl-C
   hummingbus view after.mcap before.mcap      the second recording flies as a ghost
   hummingbus view hover.mcap --no-open        prints the address only
-  hummingbus view                             shows the live run, and steers it";
+  hummingbus view                             shows the live run, and steers it
+  hummingbus view --foxglove                  shows the live run in Foxglove or Lichtblick";
 
 /// Arguments of `view`.
 #[derive(Args)]
@@ -35,6 +38,17 @@ pub struct ViewArguments {
     /// Print the address, and open no browser.
     #[arg(long)]
     no_open: bool,
+    /// Show the live run in Foxglove or Lichtblick instead, at this address of this machine; at 127.0.0.1:8765 without one.
+    #[arg(
+        long,
+        value_name = "ADDRESS",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "127.0.0.1",
+        value_parser = foxglove::address,
+        conflicts_with_all = ["recordings", "port", "no_open"]
+    )]
+    foxglove: Option<SocketAddr>,
 }
 
 /// Shows recordings in the browser until Ctrl-C or SIGTERM.
@@ -72,6 +86,12 @@ fn live(arguments: &ViewArguments, stop: &StopToken) -> Result<bool> {
     let plan = Plan::load(&run.entry.run_dir)
         .with_context(|| format!("run {id} has ended, or does not fly yet: try again"))?;
     recording_of(&plan)?;
+    if let Some(address) = arguments.foxglove {
+        let name = run.entry.manifest.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let launcher = run.entry.launcher;
+        let topics = LiveFoxglove::open(address, &plan, &name, move || find_live(Some(&id)).ok())?;
+        return stay(topics, launcher, stop);
+    }
     let mut page = LivePage::open(arguments.port, arguments.no_open)?;
     page.follow(move || find_live(Some(&id)).ok());
     print_text(page.address())?;
@@ -79,4 +99,15 @@ fn live(arguments: &ViewArguments, stop: &StopToken) -> Result<bool> {
     page.stay(stop, false);
     page.close()?;
     Ok(true)
+}
+
+/// Shows the run of the process `launcher` in Foxglove until the run has ended, or Ctrl-C.
+fn stay(topics: LiveFoxglove, launcher: u32, stop: &StopToken) -> Result<bool> {
+    say("It ends with the run, or by Ctrl-C.");
+    // A run that goes back has no entry for a moment.
+    let launcher = Path::new("/proc").join(launcher.to_string());
+    while stop.count() == 0 && launcher.exists() && !topics.has_ended() {
+        std::thread::sleep(LOOK);
+    }
+    topics.close().map(|()| true)
 }

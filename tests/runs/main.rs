@@ -43,6 +43,7 @@
 //! - [`scenes`]: ground, walls, rigs and other vehicles
 //! - [`judging`]: runs without a recording are judged in flight
 //! - [`view`]: recordings in the browser: address, end, refusals
+//! - [`foxglove`]: live runs in Foxglove
 //! - [`by_hand`]: set points of a person: sent, recorded, sent again
 //! - [`inputs`]: files that are edited after they were read
 
@@ -64,6 +65,7 @@ mod documentation;
 mod envelope;
 mod failures;
 mod forks;
+mod foxglove;
 mod identify;
 mod in_process;
 mod inputs;

@@ -165,7 +165,12 @@ impl Case {
         all.extend(&self.plan.truth);
         let with = |seed, role| fly(&vehicle, &Plan { truth: all.clone(), seed, ..self.plan.clone() }, role);
         let flights = vec![with(self.plan.seed, Role::Fit), with(self.plan.seed + 100_000, Role::Test)];
-        FlightSet { vehicle: vehicle_file(self.vehicle), flights, files: Default::default() }
+        FlightSet {
+            vehicle: vehicle_file(self.vehicle),
+            flights,
+            next_flight: Default::default(),
+            files: Default::default(),
+        }
     }
 
     /// Names of the true and undeclared effects.

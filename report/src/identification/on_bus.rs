@@ -76,5 +76,10 @@ fn corrected(set: &FlightSet, outcome: &Outcome, errors: &SensorErrors) -> Fligh
             && outcome.report.flights.iter().any(was_used)
     };
     let flights = set.flights.iter().filter(can_fly).map(flight).collect();
-    FlightSet { vehicle: set.vehicle.clone(), flights, files: set.files.clone() }
+    FlightSet {
+        vehicle: set.vehicle.clone(),
+        flights,
+        next_flight: set.next_flight,
+        files: set.files.clone(),
+    }
 }

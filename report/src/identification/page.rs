@@ -253,6 +253,7 @@ mod tests {
             noise_floor: BTreeMap::new(),
             unexplained: BTreeMap::new(),
             not_identifiable: Vec::new(),
+            next_flight: None,
             block_s: 1.0,
             validation_blocks: 20,
         }
@@ -279,6 +280,7 @@ mod tests {
             regressors: BTreeMap::from(regressors),
             sensor_errors: SensorErrors::default(),
             believed: None,
+            questions: None,
         };
         let page = page(&outcome, None);
         assert!((4_000_000..8_000_000).contains(&page.len()), "{} bytes", page.len());

@@ -18,6 +18,8 @@
 //! | `gate` | requests that are let in |
 //! | [`server`] | the server: addresses and their answers |
 //! | [`browser`] | the user's browser |
+//! | `foxglove_server` | a live run in Foxglove and Lichtblick; with the feature of this name |
+//! | `priority` | the priority of the threads that serve watchers |
 //!
 //! Times that the page sends and gets are nanoseconds since the recording's first message.
 #![forbid(unsafe_code)]
@@ -28,12 +30,15 @@ pub mod catalogue;
 pub mod curves;
 mod entry;
 pub mod fields;
+#[cfg(feature = "foxglove")]
+pub mod foxglove_server;
 pub mod frames;
 mod gate;
 pub mod live;
 mod marks;
 pub mod overview;
 mod pages;
+mod priority;
 mod readers;
 mod schedule;
 pub mod server;

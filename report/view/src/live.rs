@@ -40,6 +40,11 @@ impl Live {
         Self { run: Arc::new(run), plan, schedule: Schedule::default(), control: OnceLock::new() }
     }
 
+    /// True while the launcher of the run lives.
+    pub fn is_live(&self) -> bool {
+        self.run.is_live()
+    }
+
     /// State, tick and pace now. `None` until the run has a control segment; one on a single thread has none.
     pub fn status(&self) -> Option<Status> {
         let mut status = Status::of(&self.plan, self.control()?);

@@ -24,6 +24,7 @@ use crate::frames::{FramesRequest, frames};
 use crate::gate::Gate;
 use crate::live::{Asking, Live};
 use crate::pages::{News, Pages, events};
+use crate::priority::step_back;
 use crate::readers::Readers;
 use crate::shown::Shown;
 use anyhow::{Context as _, Result, anyhow};
@@ -48,8 +49,6 @@ const BODY_BYTES_MAX: usize = 1 << 20;
 const READERS: usize = 4;
 /// Requests to the live run that wait for their answers at the same time.
 const ASKERS: usize = 8;
-/// Niceness of the threads that read recordings.
-const LOWEST: i32 = 19;
 /// Pause between two looks for the end.
 const LOOK: Duration = Duration::from_millis(50);
 /// Looks for the end between two checks of a recording's growth: half a second.
@@ -267,12 +266,6 @@ fn keep_up(content: &Content, is_over: &AtomicBool) {
             std::thread::sleep(LOOK);
         }
     }
-}
-
-/// Gives this thread, and no other, the lowest priority: where cores are short, a run that is watched has them first.
-fn step_back() {
-    // A lower priority is never refused; without it, watching costs more.
-    let _ = rustix::process::setpriority_process(None, LOWEST);
 }
 
 fn routes(content: Arc<Content>) -> Router {

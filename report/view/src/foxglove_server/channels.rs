@@ -1,0 +1,103 @@
+//! The topics of a run as channels of the server, and their newest samples for clients that subscribe later.
+
+use anyhow::{Context as _, Result};
+use bus::announcement::Announcement;
+use bus::watch::WatchedSample;
+use foxglove::{ChannelId, Context, PartialMetadata, RawChannel, Schema, SinkId};
+use recorder::node::SHADOW_PREFIX;
+use recorder::writer::{MESSAGE_ENCODING, SCHEMA_ENCODING, channel_metadata};
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// The channels of a server.
+pub struct Channels {
+    context: Arc<Context>,
+    topics: Mutex<BTreeMap<String, Topic>>,
+}
+
+/// A topic of the run.
+struct Topic {
+    channel: Arc<RawChannel>,
+    announcement: Announcement,
+    /// The newest sample: its time and its bytes. Empty before the first one.
+    newest: (u64, Vec<u8>),
+}
+
+impl Channels {
+    /// The channels of the server of `context`; none yet.
+    pub fn new(context: Arc<Context>) -> Self {
+        Self { context, topics: Mutex::default() }
+    }
+
+    /// True once the topics of the run are known.
+    pub fn are_open(&self) -> bool {
+        !self.topics().is_empty()
+    }
+
+    /// Opens a channel for each of these topics.
+    ///
+    /// # Errors
+    /// If the server refuses one.
+    pub fn open(&self, topics: Vec<(String, Announcement)>) -> Result<()> {
+        let mut open = self.topics();
+        for (name, announcement) in topics {
+            let topic = self.topic(&name, announcement)?;
+            open.insert(name, topic);
+        }
+        Ok(())
+    }
+
+    /// A topic with a channel as its recording has it.
+    fn topic(&self, name: &str, announcement: Announcement) -> Result<Topic> {
+        let schema = Schema::new(
+            announcement.type_name.clone(),
+            SCHEMA_ENCODING,
+            announcement.definition.clone().into_bytes(),
+        );
+        let channel = self
+            .context
+            .channel_builder(name)
+            .message_encoding(MESSAGE_ENCODING)
+            .schema(schema)
+            .metadata(channel_metadata(&announcement))
+            .build_raw()
+            .with_context(|| format!("the server takes no topic {name}"))?;
+        Ok(Topic { channel, announcement, newest: (0, Vec::new()) })
+    }
+
+    /// Sends a sample to the clients that have subscribed to its topic. A topic of a shadow opens with its first sample.
+    ///
+    /// # Errors
+    /// If the server refuses its topic.
+    pub fn send(&self, sample: &WatchedSample<'_>) -> Result<()> {
+        let mut topics = self.topics();
+        if !topics.contains_key(sample.topic) {
+            let shadowed = sample.topic.strip_prefix(SHADOW_PREFIX).and_then(|name| topics.get(name));
+            let Some(announcement) = shadowed.map(|topic| topic.announcement.clone()) else { return Ok(()) };
+            topics.insert(sample.topic.to_owned(), self.topic(sample.topic, announcement)?);
+        }
+        if let Some(topic) = topics.get_mut(sample.topic) {
+            topic.channel.log_with_meta(sample.cdr, PartialMetadata::with_log_time(sample.time_ns));
+            topic.newest.0 = sample.time_ns;
+            topic.newest.1.clear();
+            topic.newest.1.extend_from_slice(sample.cdr);
+        }
+        Ok(())
+    }
+
+    /// Sends the newest sample of a topic to a client that has just subscribed to it: in a paused run no other one comes.
+    pub fn send_newest(&self, client: Option<SinkId>, channel: ChannelId) {
+        let topics = self.topics();
+        if let Some(topic) = topics.values().find(|topic| topic.channel.id() == channel)
+            && !topic.newest.1.is_empty()
+        {
+            let (time_ns, cdr) = &topic.newest;
+            let time = PartialMetadata::with_log_time(*time_ns);
+            topic.channel.log_with_meta_to_sink(cdr, time, client);
+        }
+    }
+
+    fn topics(&self) -> MutexGuard<'_, BTreeMap<String, Topic>> {
+        self.topics.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}

@@ -1,0 +1,190 @@
+//! Live runs in Foxglove: what a client sees, and that no client changes or holds up a run.
+
+use crate::recordings::require_same;
+use crate::support::{Launch, Place, poll, repository};
+use rustix::process::Signal;
+use serde_json::{Value, json};
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::net::{TcpListener, TcpStream};
+
+/// A client of the protocol `foxglove.sdk.v1`.
+struct Client(BufReader<TcpStream>);
+
+/// A message of the server.
+enum Said {
+    Text(Value),
+    /// Time in ns, and the bytes behind it.
+    Sample(u64, Vec<u8>),
+    Other,
+}
+
+impl Client {
+    /// A client of the server that `launch` has announced.
+    fn of(launch: &Launch<'_>) -> Self {
+        let host = poll("no address", || {
+            let said = launch.errors();
+            said.lines()
+                .find_map(|line| line.split_once("ws://")?.1.split_whitespace().next().map(str::to_owned))
+        });
+        let mut stream = TcpStream::connect(&host).unwrap();
+        let upgrade = "Connection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n\
+             Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Protocol: foxglove.sdk.v1";
+        write!(stream, "GET / HTTP/1.1\r\nHost: {host}\r\n{upgrade}\r\n\r\n").unwrap();
+        let mut client = Self(BufReader::new(stream));
+        let mut line = String::new();
+        client.0.read_line(&mut line).unwrap();
+        assert!(line.starts_with("HTTP/1.1 101"), "{line}");
+        while line != "\r\n" {
+            line.clear();
+            client.0.read_line(&mut line).unwrap();
+        }
+        client
+    }
+
+    fn send(&mut self, text: &str) {
+        let length = u16::try_from(text.len()).unwrap().to_be_bytes();
+        // The last frame of a text, masked with zeros.
+        let frame = [&[0x81, 0xfe], &length[..], &[0; 4], text.as_bytes()].concat();
+        self.0.get_mut().write_all(&frame).unwrap();
+    }
+
+    fn next(&mut self) -> Said {
+        let mut head = [0; 2];
+        self.0.read_exact(&mut head).unwrap();
+        let mut long = vec![
+            0;
+            match head[1] {
+                126 => 2,
+                127 => 8,
+                _ => 0,
+            }
+        ];
+        self.0.read_exact(&mut long).unwrap();
+        let length = if long.is_empty() {
+            usize::from(head[1])
+        } else {
+            long.iter().fold(0, |sum, byte| sum << 8 | usize::from(*byte))
+        };
+        let mut content = vec![0; length];
+        self.0.read_exact(&mut content).unwrap();
+        match (head[0] & 15, content.first()) {
+            (1, _) => Said::Text(serde_json::from_slice(&content).unwrap()),
+            (2, Some(1)) => {
+                let time_ns = u64::from_le_bytes(content[5..13].try_into().unwrap());
+                Said::Sample(time_ns, content.split_off(13))
+            }
+            _ => Said::Other,
+        }
+    }
+
+    /// Subscribes to all topics; returns their number.
+    fn subscribe(&mut self) -> usize {
+        loop {
+            if let Said::Text(text) = self.next()
+                && text["op"] == "advertise"
+            {
+                let channels = text["channels"].as_array().unwrap();
+                let ids =
+                    channels.iter().map(|channel| json!({ "id": channel["id"], "channelId": channel["id"] }));
+                let subscriptions: Vec<Value> = ids.collect();
+                self.send(&json!({ "op": "subscribe", "subscriptions": subscriptions }).to_string());
+                return channels.len();
+            }
+        }
+    }
+
+    fn sample(&mut self) -> (u64, Vec<u8>) {
+        loop {
+            if let Said::Sample(time_ns, content) = self.next() {
+                return (time_ns, content);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_run_that_is_watched_writes_the_same_bytes_though_a_client_does_not_read() {
+    let manifest = repository("manifests/hover.toml");
+    for host in [&[][..], &["--compose", "all"], &["--in-process"]] {
+        let place = Place::new();
+        let (recording, alone) = (place.path("watched.mcap"), place.path("alone.mcap"));
+        let args = ["run", &manifest, "--set", "run.duration_s=8", "--record"];
+        let run = place.start(&[&args[..], &[&recording, "--foxglove=0", "--pace", "4"], host].concat());
+        // A client that takes all, and one that takes nothing any more.
+        let mut quick = Client::of(&run);
+        assert_eq!(quick.subscribe(), 8);
+        let mut stuck = Client::of(&run);
+        stuck.subscribe();
+        let mut newest_ns = 0;
+        while newest_ns < 7_000_000_000 {
+            let (time_ns, content) = quick.sample();
+            assert!(
+                time_ns.is_multiple_of(1_000_000) && content.starts_with(&[0, 1, 0, 0]),
+                "{time_ns} {content:?}"
+            );
+            newest_ns = time_ns;
+        }
+        drop(quick);
+        run.end().flown();
+        place.call(&[&args[..], &[&alone]].concat()).flown();
+        require_same(&std::fs::read(alone).unwrap(), &recording);
+    }
+}
+
+#[test]
+fn a_run_that_flies_already_is_shown_too() {
+    let place = Place::new();
+    let recording = place.path("live.mcap");
+    let mut run = place.start_endless(&["run", &repository("manifests/hover.toml"), "--record", &recording]);
+    run.await_ticks(10);
+    for _ in 0..2 {
+        let shown = place.start(&["view", "--run", &place.run_id(), "--foxglove=0"]);
+        let mut client = Client::of(&shown);
+        assert_eq!(client.subscribe(), 8);
+        let (first_ns, _) = client.sample();
+        while client.sample().0 < first_ns + 100_000_000 {}
+        shown.signal(Signal::TERM);
+        shown.end_among_others().with_code(0);
+    }
+    let shown = place.start(&["view", "--run", &place.run_id(), "--foxglove=0"]);
+    shown.await_said("ends with the run");
+    run.signal(Signal::TERM);
+    run.end_among_others();
+    shown.end().with_code(0);
+}
+
+#[test]
+fn an_address_that_is_taken_wrong_or_without_a_recording_is_refused_in_words() {
+    let place = Place::new();
+    let taken = TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = taken.local_addr().unwrap().port();
+    let run = |args: &[&str]| {
+        let manifest = repository("manifests/hover.toml");
+        let recording = place.path("refused.mcap");
+        place.call(&[&["run", &manifest, "--record", &recording][..], args].concat()).with_code(2)
+    };
+    run(&[&format!("--foxglove={port}")]).says(&[
+        &format!("cannot listen at 127.0.0.1:{port} for Foxglove"),
+        &format!("--foxglove={}", port + 1),
+        "in use",
+    ]);
+    run(&["--foxglove=nowhere"]).says(&["nowhere", "expected a port, an IP address or both"]);
+    run(&["--foxglove=192.0.2.1:0"]).says(&["cannot listen at 192.0.2.1:0", "assign requested address"]);
+    let unrecorded = ["run", &repository("manifests/hover.toml"), "--record", "none", "--foxglove"];
+    place
+        .call(&unrecorded)
+        .with_code(2)
+        .says(&["--foxglove shows a run by its recording", "records nothing"]);
+    place.call(&["view", "--foxglove", "--run", "0-0"]).with_code(2).says(&["alive"]);
+    place.call(&["view", "a.mcap", "--foxglove"]).with_code(2).says(&["cannot be used with"]);
+    let open = place.start_endless(&[
+        "run",
+        &repository("manifests/hover.toml"),
+        "--record",
+        &place.path("open.mcap"),
+        "--foxglove=0.0.0.0:0",
+    ]);
+    open.await_said("warning: everybody who reaches port");
+    open.signal(Signal::TERM);
+    open.end();
+}
