@@ -268,24 +268,27 @@ mod tests {
     use std::sync::atomic::{AtomicBool, Ordering};
 
     /// Files of a run, which go with it.
-    struct Run(tempfile::TempDir, WatchFiles);
+    struct Run {
+        files: WatchFiles,
+        _folder: tempfile::TempDir,
+    }
 
     impl Run {
         fn new(name: &str) -> Self {
             let folder = tempfile::tempdir().unwrap();
             let files = WatchFiles::of(folder.path(), &format!("{:x}-{name}", std::process::id()));
-            Self(folder, files)
+            Self { files, _folder: folder }
         }
 
         fn ends(&self) -> (WatchReader, WatchWriter) {
-            let reader = self.1.watch().unwrap();
-            (reader, WatchWriter::attach(&self.1, &[]).unwrap())
+            let reader = self.files.watch().unwrap();
+            (reader, WatchWriter::attach(&self.files, &[]).unwrap())
         }
     }
 
     impl Drop for Run {
         fn drop(&mut self) {
-            self.1.remove();
+            self.files.remove();
         }
     }
 
@@ -299,7 +302,7 @@ mod tests {
     fn samples_of_any_length_come_out_as_they_went_in() {
         let run = Run::new("a1");
         let (mut reader, mut writer) = run.ends();
-        assert!(reader.is_attached() && run.1.topics().unwrap().is_empty());
+        assert!(reader.is_attached() && run.files.topics().unwrap().is_empty());
         let bytes: Vec<u8> = (0..=255).collect();
         for length in 0..40 {
             writer.write(
@@ -325,9 +328,9 @@ mod tests {
         let run = Run::new("b2");
         let (mut first, mut writer) = run.ends();
         writer.write(0, 0, "/a", &[1]);
-        let mut second = run.1.watch().unwrap();
+        let mut second = run.files.watch().unwrap();
         drop(writer);
-        let mut writer = WatchWriter::attach(&run.1, &[]).unwrap();
+        let mut writer = WatchWriter::attach(&run.files, &[]).unwrap();
         writer.write(1, 1, "/a", &[1]);
         assert_eq!((ticks(&mut first), ticks(&mut second)), ((0, vec![0, 1]), (0, vec![1])));
     }

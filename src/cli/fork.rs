@@ -30,7 +30,9 @@ struct ForkArguments {
         value_name = "FLIGHTS",
         requires = "from",
         value_parser = clap::value_parser!(u64).range(1..=::campaign::declaration::FLIGHTS_MAX),
-        conflicts_with_all = ["record", "pace", "window", "compose", "in_process", "checkpoint_every", "quiet"]
+        conflicts_with_all = [
+            "record", "pace", "window", "compose", "in_process", "checkpoint_every", "view", "foxglove", "quiet",
+        ]
     )]
     fork: Option<u64>,
     /// Vary a value of the flights, such as process.plant.vehicle.body.mass=uniform:0.4,0.6 or run.seed=integers:1,9; with

@@ -95,7 +95,7 @@ fn a_client_of_foxglove_sees_the_recording_live_and_pauses_steps_and_paces_the_r
 
 /// The comparison notices one byte, one schema and one time that are another.
 fn require_falsified(readers: &Path, found: &mut Value, recording: &str, path: &Path) {
-    let mut refused = |found: &Value, reason: &str| {
+    let refused = |found: &Value, reason: &str| {
         fs::write(path, found.to_string()).unwrap();
         let output = client(readers, ["compare", path.to_str().unwrap(), recording]);
         let said = String::from_utf8_lossy(&output.stderr);

@@ -18,7 +18,7 @@
 //! | `gate` | requests that are let in |
 //! | [`server`] | the server: addresses and their answers |
 //! | [`browser`] | the user's browser |
-//! | `foxglove_server` | a live run in Foxglove and Lichtblick; with the feature of this name |
+//! | [`foxglove_server`] | a live run in Foxglove and Lichtblick |
 //! | `priority` | the priority of the threads that serve watchers |
 //!
 //! Times that the page sends and gets are nanoseconds since the recording's first message.
@@ -30,7 +30,6 @@ pub mod catalogue;
 pub mod curves;
 mod entry;
 pub mod fields;
-#[cfg(feature = "foxglove")]
 pub mod foxglove_server;
 pub mod frames;
 mod gate;

@@ -101,3 +101,41 @@ impl Channels {
         self.topics.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Channels;
+    use bus::Message as _;
+    use bus::announcement::Announcement;
+    use bus::messages::SetPoint;
+    use bus::watch::WatchedSample;
+    use foxglove::Context;
+
+    #[test]
+    fn topics_are_those_of_the_recording_and_that_of_a_shadow_opens_with_its_first_sample() {
+        let context = Context::new();
+        let channels = Channels::new(context.clone());
+        assert!(!channels.are_open());
+        let announcement = Announcement::of(SetPoint::SCHEMA);
+        channels.open(vec![("/pilot/set_point".to_owned(), announcement.clone())]).unwrap();
+        let open = |topic| context.get_channel_by_topic(topic);
+        for topic in ["/shadow/pilot/set_point", "/shadow/other", "/other"] {
+            assert!(open(topic).is_none());
+            channels.send(&WatchedSample { tick: 0, time_ns: 0, topic, cdr: &[0, 1, 0, 0] }).unwrap();
+        }
+        for topic in ["/pilot/set_point", "/shadow/pilot/set_point"] {
+            let channel = open(topic).unwrap();
+            let schema = channel.schema().unwrap();
+            assert_eq!(
+                (schema.name.as_str(), schema.encoding.as_str()),
+                (&*announcement.type_name, "ros2msg")
+            );
+            assert_eq!(
+                (&*schema.data, channel.message_encoding()),
+                (announcement.definition.as_bytes(), "cdr")
+            );
+            assert_eq!(channel.metadata()["layout_hash"], format!("{:016x}", announcement.layout_hash));
+        }
+        assert!(open("/shadow/other").is_none() && open("/other").is_none(), "no recording has them");
+    }
+}
