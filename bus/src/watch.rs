@@ -17,12 +17,16 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering::{Acquire, Relaxed, Release};
 use std::sync::atomic::{AtomicU64, fence};
+use std::time::Duration;
 
 /// Words in front of the samples.
 const HEAD_WORDS: usize = 8;
 /// Words of samples that the ring holds: 16 MiB, some seconds of a run at real time.
 const RING_WORDS: usize = 1 << 21;
 const RING_BYTES: usize = (HEAD_WORDS + RING_WORDS) * size_of::<u64>();
+/// Looks for a ring that another watcher is making, and the pause between two.
+const RING_LOOKS: u32 = 200;
+const RING_LOOK: Duration = Duration::from_millis(5);
 /// Words of the head, by their places.
 const ATTACHED: usize = 0;
 const BEGUN: usize = 1;
@@ -53,6 +57,7 @@ impl WatchFiles {
         let (map, at) = match shared_file::create(&self.ring, RING_BYTES) {
             Ok(map) => (map, Some(0)),
             Err(BusError::File { source, .. }) if source.kind() == ErrorKind::AlreadyExists => {
+                self.await_ring();
                 (self.open()?, None)
             }
             Err(error) => return Err(error),
@@ -60,6 +65,16 @@ impl WatchFiles {
         let ring = Ring(map);
         let at = at.unwrap_or_else(|| ring.head(WRITTEN).load(Acquire));
         Ok(WatchReader { ring, at, copy: Vec::new() })
+    }
+
+    /// Waits until another watcher has made the ring, but not for one that died over it.
+    fn await_ring(&self) {
+        for _ in 0..RING_LOOKS {
+            if self.is_there() {
+                return;
+            }
+            std::thread::sleep(RING_LOOK);
+        }
     }
 
     /// Removes the ring: for a watcher whose run has ended while it made the ring.
@@ -385,6 +400,9 @@ mod tests {
                 }
             }
         });
-        assert!(seen > 0 && (missed > 0 || seen == 4000), "{seen} seen, {missed} bytes missed");
+        assert!(missed > 0 || seen == 4000, "{seen} seen, {missed} bytes missed");
+        // The writer may have been through before the first look.
+        writer.write(4000, 160, "/wide", &[160; 100]);
+        assert_eq!(ticks(&mut reader), (0, vec![4000]));
     }
 }

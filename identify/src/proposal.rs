@@ -109,8 +109,14 @@ impl fmt::Display for Proposal {
         let stopped = if self.was_stopped { " (the search was stopped)" } else { "" };
         if self.course.is_empty() {
             writeln!(f, "\nnext flight: none within the limits{stopped}")?;
-        } else {
+        } else if self.is_worth_flying() {
             writeln!(f, "\nnext flight: {:.1} s, next-flight.toml{stopped}", self.duration_s)?;
+        } else {
+            writeln!(
+                f,
+                "\nnext flight: none worth flying within the limits; the best has {:.1} s{stopped}",
+                self.duration_s
+            )?;
         }
         writeln!(f, "  limits:  {}", self.limits)?;
         if !self.course.is_empty() {

@@ -174,7 +174,9 @@ impl Recording {
         for (input, topic) in self.topics.iter().enumerate() {
             if let Some(cdr) = inputs.fresh(input) {
                 self.writer.write(topic.channel, tick, time_ns, cdr)?;
-                self.watched.write(tick, time_ns, &topic.name, self.writer.counting(topic.channel, cdr));
+                if self.watched.is_open() {
+                    self.watched.write(tick, time_ns, &topic.name, self.writer.counting(topic.channel, cdr));
+                }
             }
         }
         for (input, topic) in self.topics.iter_mut().enumerate() {
@@ -186,7 +188,9 @@ impl Recording {
                     .insert(self.writer.add_channel(&topic.shadow_name, &topic.announcement)?),
             };
             self.writer.write(channel, tick, time_ns, cdr)?;
-            self.watched.write(tick, time_ns, &topic.shadow_name, self.writer.counting(channel, cdr));
+            if self.watched.is_open() {
+                self.watched.write(tick, time_ns, &topic.shadow_name, self.writer.counting(channel, cdr));
+            }
         }
         Ok(())
     }

@@ -46,6 +46,11 @@ impl Watched {
         Ok(Some(Self::Open(WatchWriter::attach(files, &topics)?)))
     }
 
+    /// True if somebody watches.
+    pub fn is_open(&self) -> bool {
+        matches!(self, Self::Open(_))
+    }
+
     /// Copies a sample for the watchers, if there are any.
     pub fn write(&mut self, tick: u32, time_ns: u64, topic: &str, cdr: &[u8]) {
         if let Self::Open(writer) = self {

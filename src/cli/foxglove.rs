@@ -2,7 +2,7 @@
 
 use super::live_page::{LATER_LOOK, LOOK, first};
 use super::output::say;
-use anyhow::Result;
+use anyhow::{Result, anyhow};
 use bus::plan::Plan;
 use runtime::run_dir::LiveRun;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
@@ -76,7 +76,9 @@ impl LiveFoxglove {
 
     fn end(&mut self) -> Result<()> {
         self.is_over.store(true, Ordering::Relaxed);
-        self.thread.take().map_or(Ok(()), |thread| thread.join().unwrap_or(Ok(())))
+        let panicked =
+            |_| Err(anyhow!("the server for Foxglove failed in a way that is a defect of hummingbus"));
+        self.thread.take().map_or(Ok(()), |thread| thread.join().unwrap_or_else(panicked))
     }
 }
 

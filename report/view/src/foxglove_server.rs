@@ -18,7 +18,7 @@ use bus::plan::Plan;
 use bus::watch::{WatchFiles, WatchReader};
 use channels::Channels;
 use foxglove::websocket::{
-    Capability, ChannelView, Client, PlaybackControlRequest, PlaybackState, ServerListener,
+    Capability, ChannelView, Client, PlaybackControlRequest, PlaybackState, ServerListener, Status,
 };
 use foxglove::{Context, FoxgloveError, WebSocketServer, WebSocketServerHandle};
 use playback::Playback;
@@ -34,6 +34,8 @@ const BACKLOG: usize = 16_384;
 const LOOK: Duration = Duration::from_millis(10);
 /// Looks between two messages with the time of the run: about thirty a second.
 const TIME_LOOKS: u32 = 3;
+/// Looks after which a run without samples is told of: two seconds.
+const SILENT_LOOKS: u32 = 200;
 /// Time that clients have at the end to take what waits for them.
 const LEAVE: Duration = Duration::from_millis(500);
 
@@ -121,6 +123,11 @@ impl Foxglove {
                 Err(_) if !live.is_live() => is_over = true,
                 looked => looked?,
             }
+            if looks == SILENT_LOOKS && !self.shared.channels.are_open() {
+                self.handle.publish_status(Status::warning(
+                    "no samples yet: a paused run shows its topics once it goes on; a run that records nothing shows none",
+                ));
+            }
             self.tell(looks.is_multiple_of(TIME_LOOKS) || is_over);
             looks = looks.wrapping_add(1);
             std::thread::sleep(LOOK);
@@ -192,7 +199,8 @@ fn refused(error: FoxgloveError, address: &SocketAddr) -> anyhow::Error {
         error => anyhow!(error),
     };
     cause.context(format!(
-        "cannot listen at {address} for Foxglove: name another port, such as --foxglove={}, or 0 for any free one",
+        "cannot listen at {address} for Foxglove: name another port, such as --foxglove={}:{}, or an address of this machine",
+        host_of(address),
         address.port().wrapping_add(1).max(1024)
     ))
 }

@@ -137,6 +137,14 @@ pub fn within(manifest: ManifestBuilder, limits: &Limits) -> ManifestBuilder {
             name = name topic = "/plant/state" field = field unit = "m" statistic = "every" min = min max = max
         })
     });
+    // Neither roll nor pitch is greater than the tilt.
+    let tilt_deg = limits.tilt_max_deg;
+    let manifest = ["attitude.roll", "attitude.pitch"].into_iter().fold(manifest, |manifest, field| {
+        let (name, min) = (format!("{field} stays within the limit of the tilt"), -tilt_deg);
+        manifest.add("pass", toml! {
+            name = name topic = "/plant/state" field = field unit = "deg" statistic = "every" min = min max = tilt_deg
+        })
+    });
     let most = limits.speed_max_m_s;
     manifest.add("pass", toml! {
         name = "the speed stays within its limit" topic = "/plant/state" field = "velocity" unit = "m/s" statistic = "max"

@@ -36,7 +36,9 @@ pub fn fly(
         let state = simulation.newest(state).context("the plant sent no state")?;
         let command = simulation.newest(command).context("the controller sent no command")?;
         log.add(f64::from(tick) * tick_s, state, command);
-        if !log.reached.tilt_max_deg.is_finite() || log.reached.tilt_max_deg > OUT_OF_CONTROL_DEG {
+        let position_m: [f64; 3] = state.position.into();
+        let is_finite = position_m.iter().all(|value| value.is_finite());
+        if !is_finite || log.reached.tilt_max_deg > OUT_OF_CONTROL_DEG {
             bail!("the vehicle got out of control at {:.2} s", f64::from(tick) * tick_s);
         }
     }

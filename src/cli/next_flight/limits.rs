@@ -47,13 +47,13 @@ impl Raised {
         let mut raised = *bounds;
         let limits = &mut raised.limits;
         if self == Self::Duration {
-            raised.duration_s *= 4.0;
+            raised.duration_s = (4.0 * raised.duration_s).min(600.0);
             let text = format!("duration_s from {:.0} to {:.0}", bounds.duration_s, raised.duration_s);
             return (raised, text);
         }
         let mut texts = Vec::new();
         if matches!(self, Self::Speed | Self::All) {
-            limits.speed_max_m_s = (2.5 * limits.speed_max_m_s).max(0.5);
+            limits.speed_max_m_s = (2.5 * limits.speed_max_m_s).clamp(0.5, 50.0);
             texts.push(format!(
                 "speed_max_m_s from {:.2} to {:.2}",
                 bounds.limits.speed_max_m_s, limits.speed_max_m_s
@@ -90,7 +90,7 @@ impl Bounds {
         let longest_s = set.flights.iter().map(length_s).fold(0.0, f64::max);
         Self {
             limits: Limits {
-                room_m: room_m.unwrap_or(reached.room_m),
+                room_m: room_m.unwrap_or_else(|| above_ground(reached.room_m)),
                 speed_max_m_s: speed_max_m_s.unwrap_or(reached.speed_max_m_s),
                 tilt_max_deg: tilt_max_deg.unwrap_or(reached.tilt_max_deg),
             },
@@ -120,6 +120,14 @@ impl Bounds {
     }
 }
 
+/// The room without what is near the ground: flights begin and end there, and a proposed one does not know it.
+fn above_ground(mut room_m: [[f64; 2]; 3]) -> [[f64; 2]; 3] {
+    let [low, high] = &mut room_m[2];
+    *low = low.max(LEAST_HEIGHT_M);
+    *high = high.max(*low + 2.0 * LEAST_ROOM_M);
+    room_m
+}
+
 fn length_s(flight: &Flight) -> f64 {
     flight.attitude.span_s().map_or(0.0, |(first_s, last_s)| last_s - first_s)
 }
@@ -131,7 +139,11 @@ fn reached(flights: &[Flight]) -> Limits {
         let (from_s, to_s) = played.span_s();
         let mut hint = 0;
         for look in 0..((to_s - from_s) / LOOK_S) as usize {
-            let row = played.at(from_s + look as f64 * LOOK_S, &mut hint);
+            let time_s = from_s + look as f64 * LOOK_S;
+            let row = played.at(time_s, &mut hint);
+            if !played.counts(time_s, time_s + LOOK_S) {
+                continue;
+            }
             let [x, y, z, w] = row.attitude;
             positions.iter_mut().zip(row.position_m).for_each(|(all, at): (&mut Vec<f64>, f64)| all.push(at));
             speeds.push(row.velocity_m_s.iter().map(|part| part * part).sum::<f64>().sqrt());

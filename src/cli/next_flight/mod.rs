@@ -41,8 +41,6 @@ pub const MANIFEST: &str = "next-flight.toml";
 /// Name of the set points in the folder.
 pub const SET_POINTS: &str = "next-flight.csv";
 
-/// A smaller separation by every manoeuvre says that none shows the effect.
-const NOTHING: f64 = 1e-3;
 /// Advice where no limit helps.
 const NOT_SHOWN: &str = "no manoeuvre shows what stays open, with raised limits either: another sensor, load or declared \
     effect is needed";
@@ -103,7 +101,7 @@ pub fn propose(
                 Some((_, answers)) => answers.iter().map(|answer| answer.separation).collect(),
                 None => vec![0.0; questions.questions().count()],
             };
-            Some(raised(&simulator, &bounds, &flown, &now, &tell))
+            raised(&simulator, &bounds, &flown, &now, &tell)
         }
     };
     Ok(written(&simulator, &bounds, found, advice, stop))
@@ -165,25 +163,24 @@ fn answers(questions: &OpenQuestions, flown: &[Flown], chosen: &[usize], separat
     questions.questions().zip(separations).enumerate().map(of).collect()
 }
 
-/// The limit to raise so that the questions that `now` leaves open are answered.
+/// The limit to raise so that the questions that `now` leaves open are answered; `None` if the search was stopped before it
+/// found one.
 fn raised<T: Fn(usize, usize) + Sync>(
     simulator: &Simulator<'_>,
     bounds: &Bounds,
     flown: &[Flown],
     now: &[f64],
     tell: &dyn Fn(&str) -> T,
-) -> String {
+) -> Option<String> {
     let questions = simulator.questions;
     let open: Vec<usize> = (0..now.len()).filter(|at| now[*at] < SEPARATED).collect();
-    let alone = (0..flown.len()).map(|at| search::separations(questions, flown, &[at]));
-    let most =
-        alone.flat_map(|found| open.iter().map(move |at| found[*at]).collect::<Vec<_>>()).fold(0.0, f64::max);
-    if !flown.is_empty() && most < NOTHING {
-        return NOT_SHOWN.to_owned();
-    }
     let mut best: Option<(usize, f64, String)> = None;
     for raised in Raised::ALL {
-        let (bounds, text) = raised.on(bounds);
+        let (raised_bounds, text) = raised.on(bounds);
+        if raised_bounds == *bounds {
+            continue;
+        }
+        let bounds = raised_bounds;
         let again;
         let flown = if raised == Raised::Duration {
             flown
@@ -207,8 +204,9 @@ fn raised<T: Fn(usize, usize) + Sync>(
         }
     }
     match best {
-        Some((answered, _, text)) if answered > 0 => text,
-        _ => NOT_SHOWN.to_owned(),
+        Some((answered, _, text)) if answered > 0 => Some(text),
+        _ if simulator.stop.count() > 0 => None,
+        _ => Some(NOT_SHOWN.to_owned()),
     }
 }
 
