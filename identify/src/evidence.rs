@@ -22,6 +22,8 @@ use nalgebra::{DMatrix, DVector};
 
 /// Steps of a fit to a whole flight.
 const STEPS: usize = 8;
+/// A fit is done when a step takes away less than this part of the squares.
+const DONE: f64 = 1e-6;
 /// A smaller part of a parameter's information is rounding.
 const LEAST_INFORMATION: f64 = 1e-9;
 
@@ -45,8 +47,8 @@ impl OpenQuestions {
             let flight = self.sensor_errors(truth).put_on(flight);
             let prepared = self.prepared(&flight)?;
             let of = |(at, hypothesis): (usize, &Hypothesis)| {
-                let Hypothesis { values, free, .. } = hypothesis;
-                self.is_asked(truth, at).then(|| self.problem.blocks_of(&prepared, values, free))
+                let values = hypothesis.start(truth == at);
+                self.is_asked(truth, at).then(|| self.problem.blocks_of(&prepared, values, &hypothesis.free))
             };
             blocks.push(self.hypotheses.iter().enumerate().map(of).collect());
             rows.push(self.problem.rows(&[prepared]) as f64);
@@ -80,7 +82,7 @@ impl OpenQuestions {
             flights.iter().enumerate().map(|(at, flight)| self.sensor_errors(at).put_on(flight)).collect();
         let prepared = seen.iter().map(|flight| self.prepared(flight)).collect::<Result<Vec<_>, _>>()?;
         let between = |truth: usize, rival: usize| {
-            let of = |at: usize| self.full_fit(&self.hypotheses[at], &prepared[truth]);
+            let of = |at: usize| self.full_fit(at, truth, &prepared[truth]);
             self.separation(&of(rival), &of(truth))
         };
         for (separation, (_, asked)) in found.iter_mut().zip(&self.asked) {
@@ -109,7 +111,7 @@ impl OpenQuestions {
         let blocks: Vec<&Block> =
             evidence.iter().filter_map(|one| one.blocks[truth][at].as_ref()).flatten().collect();
         let total = total(&hypothesis.known, blocks.iter().copied());
-        let step = self.problem.step(&[total], &hypothesis.values, &hypothesis.free);
+        let step = self.problem.step(&[total], hypothesis.start(truth == at), &hypothesis.free);
         Costs {
             known: hypothesis.known.cost_after(&step),
             blocks: blocks.iter().map(|block| block.cost_after(&step)).collect(),
@@ -117,28 +119,46 @@ impl OpenQuestions {
         }
     }
 
-    /// The costs of the fit of a hypothesis to one flight, by Gauss-Newton steps.
-    fn full_fit(&self, hypothesis: &Hypothesis, flight: &Prepared) -> Costs {
-        let Hypothesis { values: start, free, known, .. } = hypothesis;
+    /// The costs of the fit of hypothesis `at` to a flight under `truth`: the best of those from its own values and from its plainest.
+    fn full_fit(&self, at: usize, truth: usize, flight: &Prepared) -> Costs {
+        let hypothesis = &self.hypotheses[at];
+        let centre = hypothesis.start(truth == at);
+        let fits = [centre, &hypothesis.plain].map(|start| self.descended(hypothesis, centre, start, flight));
+        let [one, other] = fits;
+        let (known, blocks) = if sum(&other) < sum(&one) { other } else { one };
+        let rows = self.problem.rows(std::slice::from_ref(flight)) as f64;
+        Costs { known: known.cost, blocks: blocks.iter().map(|block| block.cost).collect(), rows }
+    }
+
+    /// The normal equations at the end of a descent from `start`, where the measured flights prefer `centre`.
+    fn descended(
+        &self,
+        hypothesis: &Hypothesis,
+        centre: &[f64],
+        start: &[f64],
+        flight: &Prepared,
+    ) -> (Block, Vec<Block>) {
+        let Hypothesis { free, known, .. } = hypothesis;
         let problem: &Problem = &self.problem;
-        let costs_at = |values: &[f64]| {
-            let away = DVector::from_iterator(free.len(), free.iter().map(|at| values[*at] - start[*at]));
+        let equations = |values: &[f64]| {
+            let away = DVector::from_iterator(free.len(), free.iter().map(|at| values[*at] - centre[*at]));
             (known.after(&away), problem.blocks_of(flight, values, free))
         };
-        let sum =
-            |(known, blocks): &(Block, Vec<Block>)| known.cost + blocks.iter().map(|it| it.cost).sum::<f64>();
-        let (mut values, mut now) = (start.clone(), costs_at(start));
+        let (mut values, mut now) = (start.to_vec(), equations(start));
         for _ in 0..STEPS {
             let step = problem.step(&[total(&now.0, now.1.iter())], &values, free);
-            let next = problem.moved(&values, free, &step);
-            let after = costs_at(&next);
-            if sum(&after) >= sum(&now) * (1.0 - 1e-9) {
+            // A part of the step, where the whole of it leads upwards.
+            let tried =
+                [1.0, 0.25, 0.06].into_iter().map(|part| problem.moved(&values, free, &(&step * part)));
+            let better = tried.map(|next| (equations(&next), next)).find(|(after, _)| sum(after) < sum(&now));
+            let Some((after, next)) = better else { break };
+            let is_done = sum(&now) - sum(&after) < DONE * sum(&now);
+            (values, now) = (next, after);
+            if is_done {
                 break;
             }
-            (values, now) = (next, after);
         }
-        let rows = problem.rows(std::slice::from_ref(flight)) as f64;
-        Costs { known: now.0.cost, blocks: now.1.iter().map(|block| block.cost).collect(), rows }
+        now
     }
 
     /// The mean excess of the rival's squares over its standard error; blocks of the measured flights count among the others.
@@ -173,6 +193,18 @@ struct Costs {
     blocks: Vec<f64>,
     /// Number of rows of these.
     rows: f64,
+}
+
+/// The squares that equations leave.
+fn sum((known, blocks): &(Block, Vec<Block>)) -> f64 {
+    known.cost + blocks.iter().map(|block| block.cost).sum::<f64>()
+}
+
+impl Hypothesis {
+    /// The values about which it is fitted: to its own simulated flights about those that they were simulated with.
+    fn start(&self, is_true: bool) -> &[f64] {
+        if is_true { &self.plain } else { &self.values }
+    }
 }
 
 fn total<'b>(known: &Block, blocks: impl Iterator<Item = &'b Block>) -> Block {

@@ -17,11 +17,14 @@ use serde::Serialize;
 /// Rivals of one effect that count, those that fit best first: beyond them a report is no longer read.
 const RIVALS_MAX: usize = 4;
 
+/// A parameter is weak within so many standard errors of its baseline.
+const WEAK: f64 = 2.0;
+
 /// A question that the flights leave open.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Question {
-    /// Which of two effects is true.
+    /// The true one of two effects.
     Names {
         /// The effect of the verdict, or a rival of it.
         effect: &'static str,
@@ -58,7 +61,10 @@ impl std::fmt::Display for Question {
 pub(crate) struct Hypothesis {
     /// The effect that stands in it for the one in question.
     pub(crate) effect: &'static str,
+    /// Its fit to the flights.
     pub(crate) values: Vec<f64>,
+    /// The plainest values that explain the flights as well: the truth of a simulation.
+    pub(crate) plain: Vec<f64>,
     pub(crate) free: Vec<usize>,
     /// Information of the flights about the free parameters.
     pub(crate) known: Block,
@@ -159,13 +165,13 @@ impl OpenQuestions {
     /// The plant's effects under hypothesis number `at`.
     #[must_use]
     pub fn effects(&self, at: usize) -> Vec<Effect> {
-        self.parameters().effects_under(&self.hypotheses[at].values)
+        self.parameters().effects_under(&self.hypotheses[at].plain)
     }
 
     /// Errors of the sensors under hypothesis number `at`.
     #[must_use]
     pub fn sensor_errors(&self, at: usize) -> SensorErrors {
-        SensorErrors::of(self.parameters(), &self.hypotheses[at].values)
+        SensorErrors::of(self.parameters(), &self.hypotheses[at].plain)
     }
 
     /// The rates at which the flights were logged.
@@ -188,7 +194,32 @@ fn hypothesis(problem: &Problem, effect: &'static str, fitted: &FitResult) -> Hy
     // The fit is at its minimum, and only what a further flight adds counts.
     known.gradient.fill(0.0);
     known.cost = 0.0;
-    Hypothesis { effect, values: values.clone(), free: free.clone(), known }
+    Hypothesis { effect, values: values.clone(), plain: plainest(problem, fitted), free: free.clone(), known }
+}
+
+/// The values of `fitted` with each weak parameter at its baseline, if the others then explain the flights as well: a value that is
+/// only noise would promise a difference that the vehicle does not have.
+fn plainest(problem: &Problem, fitted: &FitResult) -> Vec<f64> {
+    let all = &problem.model.parameters.all;
+    let most = fitted.estimation_cost() + WEAK * WEAK;
+    let size = |at: &usize| {
+        let error = fitted.standard_error(*at).unwrap_or(f64::INFINITY);
+        (fitted.values[*at] - all[*at].baseline).abs() / error
+    };
+    let mut weak: Vec<(f64, usize)> = fitted.free.iter().map(|at| (size(at), *at)).collect();
+    weak.retain(|(size, _)| !(*size >= WEAK));
+    weak.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut now = fitted.clone();
+    for (_, at) in weak {
+        let mut start = now.values.clone();
+        start[at] = all[at].baseline;
+        let others: Vec<usize> = now.free.iter().copied().filter(|free| *free != at).collect();
+        let without = problem.fitted(&start, &others);
+        if without.estimation_cost() < most {
+            now = without;
+        }
+    }
+    now.values
 }
 
 /// The best fit of each rival effect, the best of all first.

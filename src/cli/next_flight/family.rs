@@ -7,7 +7,7 @@ use toml::{Table, toml};
 /// Room and agility that a manoeuvre may use.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Space {
-    /// Where manoeuvres begin and end: the middle of the room, in the world, m.
+    /// Begin and end of manoeuvres: the middle of the room, in the world, m.
     pub home_m: [f64; 3],
     /// Free way from there along x and y, to both sides, and down and up, m.
     pub free_m: [f64; 4],

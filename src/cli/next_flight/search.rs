@@ -33,7 +33,7 @@ const EASED: f64 = 0.8;
 /// A manoeuvre that adds less to a flight is left out.
 const LEAST_WORTH: f64 = 1e-3;
 
-/// What flights are simulated with.
+/// Means to simulate flights.
 pub struct Simulator<'a> {
     /// The open questions.
     pub questions: &'a OpenQuestions,
