@@ -11,6 +11,10 @@
 //!
 //! **Parameters.** The separation is a plausible change in units of the expected standard error, by the information of all
 //! flights together.
+#![allow(
+    clippy::disallowed_types,
+    reason = "as many parameters as a hypothesis has; the products are written out, and depend on no kernel"
+)]
 
 use crate::fit::Problem;
 use crate::normal::{self, Block};
@@ -218,7 +222,7 @@ fn total<'b>(known: &Block, blocks: impl Iterator<Item = &'b Block>) -> Block {
 
 /// Information about one parameter with the others unknown: Schur's complement.
 fn information(gram: &DMatrix<f64>, at: usize) -> f64 {
-    let own = gram[(at, at)];
+    let alone = gram[(at, at)];
     let others: Vec<usize> = (0..gram.nrows()).filter(|other| *other != at).collect();
     let inverse =
         normal::inverse(&DMatrix::from_fn(others.len(), others.len(), |i, j| gram[(others[i], others[j])]));
@@ -226,6 +230,6 @@ fn information(gram: &DMatrix<f64>, at: usize) -> f64 {
         .flat_map(|i| (0..others.len()).map(move |j| (i, j)))
         .map(|(i, j)| gram[(at, others[i])] * inverse[(i, j)] * gram[(others[j], at)])
         .sum();
-    let left = own - shared;
-    if left > LEAST_INFORMATION * own { left } else { 0.0 }
+    let left = alone - shared;
+    if left > LEAST_INFORMATION * alone { left } else { 0.0 }
 }

@@ -207,7 +207,7 @@ fn plainest(problem: &Problem, fitted: &FitResult) -> Vec<f64> {
         (fitted.values[*at] - all[*at].baseline).abs() / error
     };
     let mut weak: Vec<(f64, usize)> = fitted.free.iter().map(|at| (size(at), *at)).collect();
-    weak.retain(|(size, _)| !(*size >= WEAK));
+    weak.retain(|(size, _)| size.is_nan() || *size < WEAK);
     weak.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut now = fitted.clone();
     for (_, at) in weak {

@@ -29,6 +29,7 @@ const TIMES_MAX: usize = 2;
 const TRIES: usize = 4;
 /// Exchanges of manoeuvres at most.
 const EXCHANGES_MAX: usize = 20;
+/// Part of its size with which a manoeuvre that leaves the limits is tried again.
 const EASED: f64 = 0.8;
 /// A manoeuvre that adds less to a flight is left out.
 const LEAST_WORTH: f64 = 1e-3;
