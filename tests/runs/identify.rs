@@ -85,8 +85,7 @@ fn the_next_flight_leaves_one_name() {
     place.call(&["check", &manifest]).with_code(0);
     let text = std::fs::read_to_string(&manifest).unwrap();
     assert!(text.contains("# ") && text.contains("expected separation"), "{text}");
-    let set_points =
-        std::fs::read_to_string(place.path("cases/drag-slow/first/next-flight.csv")).unwrap();
+    let set_points = std::fs::read_to_string(place.path("cases/drag-slow/first/next-flight.csv")).unwrap();
     let inside = |line: &str| {
         let values: Vec<f64> = line.split(',').map(|value| value.parse().unwrap()).collect();
         values[1].abs() <= 3.0 && values[2].abs() <= 3.0 && (0.3..=3.5).contains(&values[3])
