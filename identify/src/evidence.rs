@@ -6,8 +6,8 @@
 //! those of the truth. The simulated channels have no noise, so that the excess is an expected value. The verdict
 //! compares the squares block by block: an excess g of a block has the variance 4 g by the noise, and the blocks
 //! differ. So the separation is the mean excess in units of its standard error, as Vuong's test (Econometrica 57, 1989) has it.
-//! Both directions are computed, and the smaller counts. Squares that the true hypothesis leaves on channels without noise are errors
-//! of the comparison, which the noise of an identification with this flight will include: the excess is divided by as much.
+//! Both directions are computed, and the smaller counts. What the true hypothesis leaves on channels without noise is the error of the
+//! comparison: a rival is fitted to the rest, and as the noise of the next identification includes it, the excess is divided by as much.
 //!
 //! **Parameters.** The separation is a plausible change in units of the expected standard error, by the information of all
 //! flights together.
@@ -36,8 +36,15 @@ const LEAST_INFORMATION: f64 = 1e-9;
 pub struct Evidence {
     /// By the true hypothesis, then by the fitted one; `None` where no question asks for the pair.
     blocks: Vec<Vec<Option<Vec<Block>>>>,
-    /// Number of compared rows of a flight, by the true hypothesis.
-    rows: Vec<f64>,
+    /// Errors of the comparison, by the true hypothesis.
+    noise: Vec<OwnNoise>,
+}
+
+/// Squares that the true hypothesis leaves on channels without noise.
+#[derive(Debug, Clone, Copy)]
+struct OwnNoise {
+    squares: f64,
+    rows: f64,
 }
 
 impl OpenQuestions {
@@ -46,26 +53,39 @@ impl OpenQuestions {
     /// # Errors
     /// If a flight cannot be compared with a model.
     pub fn evidence(&self, flights: &[Flight]) -> Result<Evidence, Unusable> {
-        let (mut blocks, mut rows) = (Vec::with_capacity(flights.len()), Vec::with_capacity(flights.len()));
+        let (mut blocks, mut noise) = (Vec::with_capacity(flights.len()), Vec::with_capacity(flights.len()));
         for (truth, flight) in flights.iter().enumerate() {
             let flight = self.sensor_errors(truth).put_on(flight);
             let prepared = self.prepared(&flight)?;
-            let of = |(at, hypothesis): (usize, &Hypothesis)| {
-                let values = hypothesis.start(truth == at);
-                self.is_asked(truth, at).then(|| self.problem.blocks_of(&prepared, values, &hypothesis.free))
+            let own = self.own_rows(truth, &prepared);
+            let of = |(at, Hypothesis { values, plain, free, .. }): (usize, &Hypothesis)| {
+                let start = if at == truth { plain } else { values };
+                self.is_asked(truth, at).then(|| self.problem.blocks_beyond(&prepared, start, free, &own))
             };
             blocks.push(self.hypotheses.iter().enumerate().map(of).collect());
-            rows.push(self.problem.rows(&[prepared]) as f64);
+            noise.push(self.own_noise(truth, &prepared));
         }
-        Ok(Evidence { blocks, rows })
+        Ok(Evidence { blocks, noise })
+    }
+
+    /// The residual of a flight under its own hypothesis: errors of the comparison. Rivals are compared beyond these.
+    fn own_rows(&self, truth: usize, flight: &Prepared) -> Vec<f64> {
+        self.problem.model.residual_under(flight, &self.hypotheses[truth].plain)
+    }
+
+    /// Squares of that residual, and the number of rows.
+    fn own_noise(&self, truth: usize, flight: &Prepared) -> OwnNoise {
+        let blocks = self.problem.blocks_of(flight, &self.hypotheses[truth].plain, &[]);
+        let squares = blocks.iter().map(|block| block.cost).sum();
+        OwnNoise { squares, rows: self.problem.rows(std::slice::from_ref(flight)) as f64 }
     }
 
     /// The separation that each question has after flights with this evidence, in standard errors.
     #[must_use]
     pub fn separations(&self, evidence: &[&Evidence]) -> Vec<f64> {
         let between = |truth: usize, rival: usize| {
-            let of = |at: usize| self.linear_fit(at, evidence, truth);
-            self.separation(&of(rival), &of(truth))
+            let noise: Vec<OwnNoise> = evidence.iter().map(|one| one.noise[truth]).collect();
+            self.separation(&self.linear_fit(rival, evidence, truth), &noise)
         };
         self.asked
             .iter()
@@ -86,8 +106,8 @@ impl OpenQuestions {
             flights.iter().enumerate().map(|(at, flight)| self.sensor_errors(at).put_on(flight)).collect();
         let prepared = seen.iter().map(|flight| self.prepared(flight)).collect::<Result<Vec<_>, _>>()?;
         let between = |truth: usize, rival: usize| {
-            let of = |at: usize| self.full_fit(at, truth, &prepared[truth]);
-            self.separation(&of(rival), &of(truth))
+            let noise = [self.own_noise(truth, &prepared[truth])];
+            self.separation(&self.full_fit(rival, truth, &prepared[truth]), &noise)
         };
         for (separation, (_, asked)) in found.iter_mut().zip(&self.asked) {
             if let Asked::Pair(first, second) = asked {
@@ -115,38 +135,29 @@ impl OpenQuestions {
         let blocks: Vec<&Block> =
             evidence.iter().filter_map(|one| one.blocks[truth][at].as_ref()).flatten().collect();
         let total = total(&hypothesis.known, blocks.iter().copied());
-        let step = self.problem.step(&[total], hypothesis.start(truth == at), &hypothesis.free);
+        let step = self.problem.step(&[total], &hypothesis.values, &hypothesis.free);
         Costs {
             known: hypothesis.known.cost_after(&step),
             blocks: blocks.iter().map(|block| block.cost_after(&step)).collect(),
-            rows: evidence.iter().map(|one| one.rows[truth]).sum(),
         }
     }
 
     /// The costs of the fit of hypothesis `at` to a flight under `truth`: the best of those from its own values and from its plainest.
     fn full_fit(&self, at: usize, truth: usize, flight: &Prepared) -> Costs {
-        let hypothesis = &self.hypotheses[at];
-        let centre = hypothesis.start(truth == at);
-        let fits = [centre, &hypothesis.plain].map(|start| self.descended(hypothesis, centre, start, flight));
-        let [one, other] = fits;
+        let Hypothesis { values, plain, .. } = &self.hypotheses[at];
+        let own = self.own_rows(truth, flight);
+        let [one, other] = [values, plain].map(|start| self.descended(at, start, flight, &own));
         let (known, blocks) = if sum(&other) < sum(&one) { other } else { one };
-        let rows = self.problem.rows(std::slice::from_ref(flight)) as f64;
-        Costs { known: known.cost, blocks: blocks.iter().map(|block| block.cost).collect(), rows }
+        Costs { known: known.cost, blocks: blocks.iter().map(|block| block.cost).collect() }
     }
 
-    /// The normal equations at the end of a descent from `start`, where the measured flights prefer `centre`.
-    fn descended(
-        &self,
-        hypothesis: &Hypothesis,
-        centre: &[f64],
-        start: &[f64],
-        flight: &Prepared,
-    ) -> (Block, Vec<Block>) {
-        let Hypothesis { free, known, .. } = hypothesis;
+    /// The normal equations at the end of a descent of hypothesis `at` from `start`, beyond the rows `own`.
+    fn descended(&self, at: usize, start: &[f64], flight: &Prepared, own: &[f64]) -> (Block, Vec<Block>) {
+        let Hypothesis { values: centre, free, known, .. } = &self.hypotheses[at];
         let problem: &Problem = &self.problem;
         let equations = |values: &[f64]| {
             let away = DVector::from_iterator(free.len(), free.iter().map(|at| values[*at] - centre[*at]));
-            (known.after(&away), problem.blocks_of(flight, values, free))
+            (known.after(&away), problem.blocks_beyond(flight, values, free, own))
         };
         let (mut values, mut now) = (start.to_vec(), equations(start));
         for _ in 0..STEPS {
@@ -166,10 +177,11 @@ impl OpenQuestions {
     }
 
     /// The mean excess of the rival's squares over its standard error; blocks of the measured flights count among the others.
-    fn separation(&self, rival: &Costs, truth: &Costs) -> f64 {
-        let noise = 1.0 + truth.blocks.iter().sum::<f64>() / truth.rows.max(1.0);
-        let excess = rival.blocks.iter().zip(&truth.blocks).map(|(rival, truth)| (rival - truth) / noise);
-        let of_known = (rival.known - truth.known) / self.blocks as f64;
+    fn separation(&self, rival: &Costs, own: &[OwnNoise]) -> f64 {
+        let sum = |of: fn(&OwnNoise) -> f64| own.iter().map(of).sum::<f64>();
+        let noise = 1.0 + sum(|own| own.squares) / sum(|own| own.rows).max(1.0);
+        let excess = rival.blocks.iter().map(|cost| cost / noise);
+        let of_known = rival.known / self.blocks as f64;
         let gains: Vec<f64> = excess.chain(std::iter::repeat_n(of_known, self.blocks)).collect();
         let total: f64 = gains.iter().sum();
         let mean = total / gains.len().max(1) as f64;
@@ -195,20 +207,11 @@ struct Costs {
     known: f64,
     /// On each block of the simulated flights.
     blocks: Vec<f64>,
-    /// Number of rows of these.
-    rows: f64,
 }
 
 /// The squares that equations leave.
 fn sum((known, blocks): &(Block, Vec<Block>)) -> f64 {
     known.cost + blocks.iter().map(|block| block.cost).sum::<f64>()
-}
-
-impl Hypothesis {
-    /// The values about which it is fitted: to its own simulated flights about those that they were simulated with.
-    fn start(&self, is_true: bool) -> &[f64] {
-        if is_true { &self.plain } else { &self.values }
-    }
 }
 
 fn total<'b>(known: &Block, blocks: impl Iterator<Item = &'b Block>) -> Block {

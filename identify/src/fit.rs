@@ -275,8 +275,20 @@ impl<'f> Problem<'f> {
 
     /// The normal equations of the blocks of one flight.
     pub fn blocks_of(&self, flight: &Prepared, values: &[f64], free: &[usize]) -> Vec<Block> {
+        self.blocks_beyond(flight, values, free, &[])
+    }
+
+    /// The same for the residual less that of another model, whose rows are `other`; nothing is taken off by no rows.
+    pub fn blocks_beyond(
+        &self,
+        flight: &Prepared,
+        values: &[f64],
+        free: &[usize],
+        other: &[f64],
+    ) -> Vec<Block> {
         use rayon::prelude::*;
         let (mut residual, mut columns) = self.linearised(flight, values, free);
+        residual.iter_mut().zip(other).for_each(|(residual, other)| *residual -= other);
         let whitening = Whitening::of(flight, &self.noises);
         std::iter::once(&mut residual).chain(&mut columns).for_each(|rows| whitening.apply(rows));
         let (width, weights) = (flight.width(), self.row_weights(flight));
