@@ -207,7 +207,7 @@ fn an_address_that_is_taken_wrong_or_without_a_recording_is_refused_in_words() {
     };
     run(&[&format!("--foxglove={port}")]).says(&[
         &format!("cannot listen at 127.0.0.1:{port} for Foxglove"),
-        &format!("--foxglove={}", port + 1),
+        &format!("--foxglove=127.0.0.1:{}", port + 1),
         "in use",
     ]);
     run(&["--foxglove=nowhere"]).says(&["nowhere", "expected a port, an IP address or both"]);

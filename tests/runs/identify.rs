@@ -70,22 +70,23 @@ fn the_riddle_of_the_thesis_delay_and_rig_are_told_apart_and_measured() {
     assert!(std::fs::metadata(place.path("out/report.html")).unwrap().len() > 100_000);
 }
 
-/// Slow runs cannot tell rotor drag from flapping blades; the proposed flight, flown with the truth, leaves the right name.
+/// A hover without inertial sensors cannot tell a mass error from a thrust scale; the proposed flight, flown with the truth, leaves
+/// the right name.
 #[test]
 fn the_next_flight_leaves_one_name() {
     let place = Place::new();
     let mut command = Command::new("python3");
-    command.args([&repository("scripts/next_flight_cases"), &place.path("cases"), "--case", "drag-slow"]);
+    command.args([&repository("scripts/next_flight_cases"), &place.path("cases"), "--case", "mass-hover"]);
     command.env("HUMMINGBUS", env!("CARGO_BIN_EXE_hummingbus"));
     let output = place.mark(&mut command).output().unwrap();
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(output.status.success(), "{said}{}", String::from_utf8_lossy(&output.stderr));
-    assert!(said.contains("rotor-drag or blade-flapping") && said.contains("1 of 1 cases"), "{said}");
-    let manifest = place.path("cases/drag-slow/first/next-flight.toml");
+    assert!(said.contains("mass-error or thrust-scale") && said.contains("1 of 1 cases"), "{said}");
+    let manifest = place.path("cases/mass-hover/first/next-flight.toml");
     place.call(&["check", &manifest]).with_code(0);
     let text = std::fs::read_to_string(&manifest).unwrap();
     assert!(text.contains("# ") && text.contains("expected separation"), "{text}");
-    let set_points = std::fs::read_to_string(place.path("cases/drag-slow/first/next-flight.csv")).unwrap();
+    let set_points = std::fs::read_to_string(place.path("cases/mass-hover/first/next-flight.csv")).unwrap();
     let inside = |line: &str| {
         let values: Vec<f64> = line.split(',').map(|value| value.parse().unwrap()).collect();
         values[1].abs() <= 3.0 && values[2].abs() <= 3.0 && (0.3..=3.5).contains(&values[3])
