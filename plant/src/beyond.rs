@@ -1,6 +1,6 @@
 //! Flights beyond the envelope in which a vehicle's model was validated: `check` warns of what it can know before a flight.
 
-use crate::effects::Effect;
+use crate::effects::{Effect, WIND};
 use crate::state::RigidBody;
 use bus::context::NodeContext;
 use nalgebra::Vector3;
@@ -45,7 +45,7 @@ pub(crate) fn tell(vehicle: &Vehicle, effects: &[Effect], start: &RigidBody, run
 
 /// Speed of the steady wind among `effects`.
 fn steady_wind_m_s(effects: &[Effect]) -> f64 {
-    let winds = effects.iter().filter(|effect| effect.kind.name == "wind");
+    let winds = effects.iter().filter(|effect| *effect.kind == WIND);
     winds.map(|wind| Vector3::from_column_slice(&wind.values[..3])).sum::<Vector3<f64>>().norm()
 }
 

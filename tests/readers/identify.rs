@@ -73,9 +73,10 @@ fn require_brief(seen: &Value) {
     );
     let changes = sentences("changes");
     assert!(
-        changes.len() == 3
+        changes.len() == 4
             && changes[0].starts_with("attitude: ")
-            && changes[0].contains(" deg with the new file, "),
+            && changes[0].contains(" deg with the new file, ")
+            && changes[3].starts_with("Validated in flights with "),
         "{changes:?}"
     );
     assert!(sentences("next").iter().any(|line| line.contains("hummingbus validate")), "{seen}");

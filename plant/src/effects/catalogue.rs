@@ -20,7 +20,7 @@ mod thrust_scale;
 mod translational_lift;
 mod turbulence;
 mod weak_rotor;
-mod wind;
+pub(super) mod wind;
 
 /// The effects of the catalogue.
 pub static CATALOGUE: &[&EffectKind] = &[
