@@ -120,7 +120,7 @@ struct Chosen {
 /// The best flight of the manoeuvres that were `flown`; `None` if none says anything.
 fn best(simulator: &Simulator<'_>, bounds: &Bounds, flown: &[Flown]) -> Result<Option<Found>> {
     let questions = simulator.questions;
-    let mut chosen = search::combined(questions, flown, bounds.duration_s);
+    let mut chosen = search::combined(questions, flown, bounds.duration_s, search::EXCHANGES_MAX);
     let never = StopToken::new();
     let last = simulator.unstopped(&never);
     // What keeps the limits alone may leave them behind another: then the last is left out.
@@ -188,7 +188,8 @@ fn raised<T: Fn(usize, usize) + Sync>(
             again = simulator.family(&bounds, &tell(&format!(", limits raised ({text})")));
             &again[..]
         };
-        let chosen = search::combined(questions, flown, bounds.duration_s);
+        // It only says whether a limit helps.
+        let chosen = search::combined(questions, flown, bounds.duration_s, 0);
         let found = search::separations(questions, flown, &chosen);
         let answered = open.iter().filter(|at| found[**at] >= SEPARATED).count();
         let worst = open.iter().map(|at| found[*at]).fold(f64::INFINITY, f64::min);

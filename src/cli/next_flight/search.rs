@@ -28,7 +28,7 @@ const TIMES_MAX: usize = 2;
 /// Levels at which a manoeuvre that leaves the limits is tried, each a part of the one before.
 const TRIES: usize = 4;
 /// Exchanges of manoeuvres at most.
-const EXCHANGES_MAX: usize = 20;
+pub const EXCHANGES_MAX: usize = 6;
 /// Part of its size with which a manoeuvre that leaves the limits is tried again.
 const EASED: f64 = 0.8;
 /// A manoeuvre that adds less to a flight is left out.
@@ -137,11 +137,11 @@ impl Simulator<'_> {
 /// The manoeuvres that together say most within `duration_s`, by their places in `flown`; some come several times.
 ///
 /// They are joined one after another, that which adds most for its time first; then each is exchanged for another as long as
-/// that says more.
-pub fn combined(questions: &OpenQuestions, flown: &[Flown], duration_s: f64) -> Vec<usize> {
+/// that says more, up to so many `exchanges`.
+pub fn combined(questions: &OpenQuestions, flown: &[Flown], duration_s: f64, exchanges: usize) -> Vec<usize> {
     let choice = Choice { questions, flown, duration_s: duration_s - BEFORE_S };
     let mut chosen = choice.joined(Vec::new());
-    for _ in 0..EXCHANGES_MAX {
+    for _ in 0..exchanges {
         let Some(better) = choice.exchanged(&chosen) else { break };
         chosen = choice.joined(better);
     }
