@@ -57,10 +57,11 @@ impl OpenQuestions {
         for (truth, flight) in flights.iter().enumerate() {
             let flight = self.sensor_errors(truth).put_on(flight);
             let prepared = self.prepared(&flight)?;
-            let own = self.own_rows(truth, &prepared);
+            let of_truth = self.own_rows(truth, &prepared);
             let of = |(at, Hypothesis { values, plain, free, .. }): (usize, &Hypothesis)| {
                 let start = if at == truth { plain } else { values };
-                self.is_asked(truth, at).then(|| self.problem.blocks_beyond(&prepared, start, free, &own))
+                self.is_asked(truth, at)
+                    .then(|| self.problem.blocks_beyond(&prepared, start, free, &of_truth))
             };
             blocks.push(self.hypotheses.iter().enumerate().map(of).collect());
             noise.push(self.own_noise(truth, &prepared));
@@ -145,19 +146,25 @@ impl OpenQuestions {
     /// The costs of the fit of hypothesis `at` to a flight under `truth`: the best of those from its own values and from its plainest.
     fn full_fit(&self, at: usize, truth: usize, flight: &Prepared) -> Costs {
         let Hypothesis { values, plain, .. } = &self.hypotheses[at];
-        let own = self.own_rows(truth, flight);
-        let [one, other] = [values, plain].map(|start| self.descended(at, start, flight, &own));
+        let of_truth = self.own_rows(truth, flight);
+        let [one, other] = [values, plain].map(|start| self.descended(at, start, flight, &of_truth));
         let (known, blocks) = if sum(&other) < sum(&one) { other } else { one };
         Costs { known: known.cost, blocks: blocks.iter().map(|block| block.cost).collect() }
     }
 
-    /// The normal equations at the end of a descent of hypothesis `at` from `start`, beyond the rows `own`.
-    fn descended(&self, at: usize, start: &[f64], flight: &Prepared, own: &[f64]) -> (Block, Vec<Block>) {
+    /// The normal equations at the end of a descent of hypothesis `at` from `start`, beyond the rows `of_truth`.
+    fn descended(
+        &self,
+        at: usize,
+        start: &[f64],
+        flight: &Prepared,
+        of_truth: &[f64],
+    ) -> (Block, Vec<Block>) {
         let Hypothesis { values: centre, free, known, .. } = &self.hypotheses[at];
         let problem: &Problem = &self.problem;
         let equations = |values: &[f64]| {
             let away = DVector::from_iterator(free.len(), free.iter().map(|at| values[*at] - centre[*at]));
-            (known.after(&away), problem.blocks_beyond(flight, values, free, own))
+            (known.after(&away), problem.blocks_beyond(flight, values, free, of_truth))
         };
         let (mut values, mut now) = (start.to_vec(), equations(start));
         for _ in 0..STEPS {
@@ -177,9 +184,9 @@ impl OpenQuestions {
     }
 
     /// The mean excess of the rival's squares over its standard error; blocks of the measured flights count among the others.
-    fn separation(&self, rival: &Costs, own: &[OwnNoise]) -> f64 {
-        let sum = |of: fn(&OwnNoise) -> f64| own.iter().map(of).sum::<f64>();
-        let noise = 1.0 + sum(|own| own.squares) / sum(|own| own.rows).max(1.0);
+    fn separation(&self, rival: &Costs, of_truth: &[OwnNoise]) -> f64 {
+        let sum = |of: fn(&OwnNoise) -> f64| of_truth.iter().map(of).sum::<f64>();
+        let noise = 1.0 + sum(|of_truth| of_truth.squares) / sum(|of_truth| of_truth.rows).max(1.0);
         let excess = rival.blocks.iter().map(|cost| cost / noise);
         let of_known = rival.known / self.blocks as f64;
         let gains: Vec<f64> = excess.chain(std::iter::repeat_n(of_known, self.blocks)).collect();
