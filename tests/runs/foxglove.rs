@@ -173,7 +173,6 @@ fn a_client_follows_a_run_that_goes_back() {
     };
     ctl(&["pause"]);
     ctl(&["rewind", "100"]);
-    ctl(&["resume"]);
     // The client is told to forget what it knows, and the samples go on behind the checkpoint.
     loop {
         if let Said::Text(text) = client.next()
@@ -182,6 +181,7 @@ fn a_client_follows_a_run_that_goes_back() {
             break;
         }
     }
+    ctl(&["resume"]);
     // Samples that have waited for the client come first; they are later than these.
     let first_ns = loop {
         let time_ns = client.sample().0;
