@@ -184,7 +184,7 @@ pub struct WatchedSample<'a> {
 /// let missed = watcher.read(|sample| seen.push((sample.tick, sample.time_ns, sample.cdr.to_vec())));
 /// assert_eq!((missed, seen), (0, vec![(7, 7_000_000, vec![0, 1, 0, 0, 42])]));
 /// # files.remove();
-/// # Ok::<(), bus::BusError>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug)]
 pub struct WatchReader {

@@ -1,6 +1,6 @@
 //! The server of a live run for Foxglove and Lichtblick, on a thread of this process.
 
-use super::live_page::{LATER_LOOK, LOOK, first};
+use super::live_page::{LOOK, first};
 use super::output::say;
 use anyhow::{Result, anyhow};
 use bus::plan::Plan;
@@ -104,12 +104,10 @@ fn follow(server: &Foxglove, find: &dyn Fn() -> Option<LiveRun>, is_ended: &dyn 
         let plan = Plan::load(&run.entry.run_dir).ok()?;
         Some((run, plan))
     };
-    let mut pause = LOOK;
     while !is_ended()
-        && let Some((run, plan)) = first(found, pause, is_ended)
+        && let Some((run, plan)) = first(found, LOOK, is_ended)
     {
         server.follow(run, plan, is_ended)?;
-        pause = LATER_LOOK;
     }
     Ok(())
 }

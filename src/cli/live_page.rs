@@ -18,7 +18,7 @@ use view::{Handle, Server, Shown};
 /// Pause between two looks: for the run, for its first messages, for the end.
 pub const LOOK: Duration = Duration::from_millis(50);
 /// Pause between two looks for a run that goes back: its page may stay open for hours after its end.
-pub const LATER_LOOK: Duration = Duration::from_millis(500);
+const LATER_LOOK: Duration = Duration::from_millis(500);
 /// Looks without an open page after which the page is closed: it may be reloading. Two seconds.
 const DESERTED_LOOKS: u32 = 40;
 

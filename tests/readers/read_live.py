@@ -22,7 +22,7 @@ STATE = struct.Struct("<BBQfBI")
 ENOUGH = 20
 TIMEOUT_S = 60
 # Time in which a paused run would send messages, if it were not.
-SILENCE_S = 0.5
+SILENCE_S = 1
 
 
 class Watcher(WebSocketBridgeClient):
@@ -52,6 +52,18 @@ class Watcher(WebSocketBridgeClient):
         await self._websocket.send(REQUEST.pack(*asked) + name.encode())
         return await self.until(lambda: next((state for state in self.states if state.request_id == name), None), name)
 
+    async def shows(self, status, speed=1.0):
+        """Waits until the newest state has this status and this speed: a busy run answers later than the server."""
+        is_meant = lambda state: (state.status, state.playback_speed) == (status, speed)
+        await self.until(lambda: is_meant(self.states[-1]), f"a state {status} at speed {speed}")
+
+    async def silence(self):
+        """Waits until nothing has come for a while."""
+        before = None
+        while before != self.counts():
+            before = self.counts()
+            await asyncio.sleep(SILENCE_S)
+
     async def until(self, look, what):
         for _ in range(TIMEOUT_S * 100):
             if found := look():
@@ -72,11 +84,10 @@ async def watch(address):
     channels = await watcher.until(lambda: watcher.channels, "the topics")
     await watcher.until(lambda: len(watcher.messages) == len(channels) and min(watcher.counts().values()) >= ENOUGH, "messages")
 
-    paused = await watcher.ask("pause", PlaybackCommand.PAUSE)
-    if paused.status != PlaybackStatus.PAUSED:
-        fail(f"the run is not paused: {paused}")
+    await watcher.ask("pause", PlaybackCommand.PAUSE)
+    await watcher.shows(PlaybackStatus.PAUSED)
     # Samples of the last ticks may be under way.
-    await asyncio.sleep(SILENCE_S)
+    await watcher.silence()
     held, held_ns = watcher.counts(), watcher.newest_ns()
     await asyncio.sleep(SILENCE_S)
     if watcher.counts() != held:
@@ -85,7 +96,7 @@ async def watch(address):
     late = Watcher(address)
     await late.connect()
     await late.until(lambda: len(late.messages) == len(channels), "the newest message of each topic")
-    await asyncio.sleep(SILENCE_S / 5)
+    await late.silence()
     if set(late.counts().values()) != {1} or late.newest_ns() != held_ns:
         fail(f"a client that came later has not the newest messages: {late.counts()}, {late.newest_ns()}, {held_ns}")
     await late.disconnect()
@@ -94,9 +105,8 @@ async def watch(address):
     await watcher.until(lambda: watcher.newest_ns() == held_ns + 50_000_000, "fifty ticks more")
     await watcher.ask("back", PlaybackCommand.PAUSE, seek_ns=0)
     await watcher.until(lambda: any("ctl rewind" in text for text in watcher.notices), "the refusal to go back")
-    faster = await watcher.ask("faster", PlaybackCommand.PLAY, speed=2.0)
-    if (faster.status, faster.playback_speed) != (PlaybackStatus.PLAYING, 2.0):
-        fail(f"the run does not fly twice as fast: {faster}")
+    await watcher.ask("faster", PlaybackCommand.PLAY, speed=2.0)
+    await watcher.shows(PlaybackStatus.PLAYING, 2.0)
     await watcher.until(lambda: watcher.newest_ns() > held_ns + 500_000_000, "messages of the resumed run")
     info = watcher.server_info
     await watcher.disconnect()

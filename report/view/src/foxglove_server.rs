@@ -23,6 +23,7 @@ use foxglove::websocket::{
 use foxglove::{Context, FoxgloveError, WebSocketServer, WebSocketServerHandle};
 use playback::Playback;
 use runtime::run_dir::{LiveRun, find_live};
+use std::collections::BTreeSet;
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
@@ -76,7 +77,8 @@ impl Foxglove {
     /// If the address is taken or is not one of this machine.
     pub fn listen(address: SocketAddr, plan: &Plan, name: &str) -> Result<Self> {
         let mut builder = Builder::new_multi_thread();
-        let runtime = builder.worker_threads(2).enable_all().on_thread_start(step_back).build()?;
+        // One, so that `on_worker` holds back what is sent.
+        let runtime = builder.worker_threads(1).enable_all().on_thread_start(step_back).build()?;
         let context = Context::new();
         let shared =
             Arc::new(Shared { channels: Channels::new(context.clone()), playback: Playback::new(plan) });
@@ -136,9 +138,6 @@ impl Foxglove {
             // The run may have ended while the ring was made.
             files.remove();
         }
-        if self.handle.client_count() > 0 {
-            std::thread::sleep(LEAVE);
-        }
         Ok(())
     }
 
@@ -149,19 +148,31 @@ impl Foxglove {
             if !samples.is_attached() {
                 return Ok(());
             }
-            channels.open(files.topics()?)?;
+            let topics = files.topics()?;
+            self.on_worker(move |channels| channels.open(topics))??;
         }
-        let (mut newest_ns, mut failed) = (None, Ok(()));
+        let (mut newest_ns, mut unknown) = (None, BTreeSet::new());
         samples.read(|sample| {
             newest_ns = Some(sample.time_ns);
-            if failed.is_ok() {
-                failed = channels.send(sample);
+            if !channels.send(sample) {
+                unknown.insert(sample.topic.to_owned());
             }
         });
+        for topic in unknown {
+            self.on_worker(move |channels| channels.open_shadow(&topic))??;
+        }
         if let Some(newest_ns) = newest_ns {
             playback.reached(newest_ns);
         }
-        failed
+        Ok(())
+    }
+
+    /// Does `work` on the thread that serves the clients. `foxglove` 0.30 sends the offer of a new channel before it takes
+    /// subscriptions to it: nothing is sent while that thread is busy.
+    fn on_worker<T: Send + 'static>(&self, work: impl FnOnce(&Channels) -> T + Send + 'static) -> Result<T> {
+        let shared = self.shared.clone();
+        let task = self.runtime.spawn(async move { work(&shared.channels) });
+        self.runtime.block_on(task).context("the server for Foxglove failed")
     }
 
     /// Sends the state of the run where it has changed, and its time if it `is_time`.
@@ -178,8 +189,11 @@ impl Foxglove {
         }
     }
 
-    /// Ends the server.
+    /// Ends the server, once its clients have had time to take what waits for them.
     pub fn close(self) {
+        if self.handle.client_count() > 0 {
+            std::thread::sleep(LEAVE);
+        }
         drop(self.handle.stop());
         self.runtime.shutdown_timeout(LEAVE);
     }

@@ -65,24 +65,28 @@ impl Channels {
         Ok(Topic { channel, announcement, newest: (0, Vec::new()) })
     }
 
-    /// Sends a sample to the clients that have subscribed to its topic. A topic of a shadow opens with its first sample.
+    /// Opens the channel of a topic of a shadow, with the message of the topic that it shadows. Other topics are left out.
     ///
     /// # Errors
-    /// If the server refuses its topic.
-    pub fn send(&self, sample: &WatchedSample<'_>) -> Result<()> {
+    /// If the server refuses it.
+    pub fn open_shadow(&self, name: &str) -> Result<()> {
         let mut topics = self.topics();
-        if !topics.contains_key(sample.topic) {
-            let shadowed = sample.topic.strip_prefix(SHADOW_PREFIX).and_then(|name| topics.get(name));
-            let Some(announcement) = shadowed.map(|topic| topic.announcement.clone()) else { return Ok(()) };
-            topics.insert(sample.topic.to_owned(), self.topic(sample.topic, announcement)?);
-        }
-        if let Some(topic) = topics.get_mut(sample.topic) {
-            topic.channel.log_with_meta(sample.cdr, PartialMetadata::with_log_time(sample.time_ns));
-            topic.newest.0 = sample.time_ns;
-            topic.newest.1.clear();
-            topic.newest.1.extend_from_slice(sample.cdr);
+        let shadowed = name.strip_prefix(SHADOW_PREFIX).and_then(|name| topics.get(name));
+        if let Some(announcement) = shadowed.map(|topic| topic.announcement.clone()) {
+            topics.insert(name.to_owned(), self.topic(name, announcement)?);
         }
         Ok(())
+    }
+
+    /// Sends a sample to the clients that have subscribed to its topic; false if the topic has no channel yet.
+    pub fn send(&self, sample: &WatchedSample<'_>) -> bool {
+        let mut topics = self.topics();
+        let Some(topic) = topics.get_mut(sample.topic) else { return false };
+        topic.channel.log_with_meta(sample.cdr, PartialMetadata::with_log_time(sample.time_ns));
+        topic.newest.0 = sample.time_ns;
+        topic.newest.1.clear();
+        topic.newest.1.extend_from_slice(sample.cdr);
+        true
     }
 
     /// Sends the newest sample of a topic to a client that has just subscribed to it: in a paused run no other one comes.
@@ -112,7 +116,7 @@ mod tests {
     use foxglove::Context;
 
     #[test]
-    fn topics_are_those_of_the_recording_and_that_of_a_shadow_opens_with_its_first_sample() {
+    fn topics_are_those_of_the_recording_and_that_of_a_shadow_opens_behind_its_first_sample() {
         let context = Context::new();
         let channels = Channels::new(context.clone());
         assert!(!channels.are_open());
@@ -120,8 +124,10 @@ mod tests {
         channels.open(vec![("/pilot/set_point".to_owned(), announcement.clone())]).unwrap();
         let open = |topic| context.get_channel_by_topic(topic);
         for topic in ["/shadow/pilot/set_point", "/shadow/other", "/other"] {
-            assert!(open(topic).is_none());
-            channels.send(&WatchedSample { tick: 0, time_ns: 0, topic, cdr: &[0, 1, 0, 0] }).unwrap();
+            let sample = WatchedSample { tick: 0, time_ns: 0, topic, cdr: &[0, 1, 0, 0] };
+            assert!(open(topic).is_none() && !channels.send(&sample));
+            channels.open_shadow(topic).unwrap();
+            assert_eq!(channels.send(&sample), open(topic).is_some());
         }
         for topic in ["/pilot/set_point", "/shadow/pilot/set_point"] {
             let channel = open(topic).unwrap();
