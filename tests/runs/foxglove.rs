@@ -160,6 +160,42 @@ fn a_run_that_flies_already_is_shown_too() {
 }
 
 #[test]
+fn a_client_follows_a_run_that_goes_back() {
+    let place = Place::new();
+    let args = ["run", &repository("manifests/hover.toml"), "--record", &place.path("back.mcap")];
+    let run = place.start_endless(&[&args[..], &["--checkpoint-every", "100ms", "--foxglove=0"]].concat());
+    let mut client = Client::of(&run);
+    client.subscribe();
+    while client.sample().0 < 250_000_000 {}
+    let id = place.run_id();
+    let ctl = |verb: &[&str]| {
+        place.start(&[&["ctl"], verb, &["--run", &id]].concat()).end_among_others().with_code(0);
+    };
+    ctl(&["pause"]);
+    ctl(&["rewind", "100"]);
+    // The client is told to forget what it knows, and the samples go on behind the checkpoint.
+    loop {
+        if let Said::Text(text) = client.next()
+            && text["op"] == "serverInfo"
+        {
+            break;
+        }
+    }
+    ctl(&["resume"]);
+    // Samples that have waited for the client come first; they are later than these.
+    let first_ns = loop {
+        let time_ns = client.sample().0;
+        if time_ns < 200_000_000 {
+            break time_ns;
+        }
+    };
+    assert!(first_ns >= 100_000_000, "{first_ns}");
+    while client.sample().0 < first_ns + 300_000_000 {}
+    run.signal(Signal::TERM);
+    run.end().with_code(1);
+}
+
+#[test]
 fn an_address_that_is_taken_wrong_or_without_a_recording_is_refused_in_words() {
     let place = Place::new();
     let taken = TcpListener::bind("127.0.0.1:0").unwrap();
