@@ -56,6 +56,23 @@ impl StateQuantity {
     }
 }
 
+/// Angle between the body's z axis and the vertical, in degrees, at an attitude of length one in the order x, y, z, w.
+///
+/// ```
+/// let (sine, cosine) = libm::sincos(15_f64.to_radians());
+/// assert!((flights::state::tilt_deg(&[sine, 0.0, 0.0, cosine]) - 30.0).abs() < 1e-9);
+/// ```
+#[must_use]
+pub fn tilt_deg([x, y, ..]: &[f64; 4]) -> f64 {
+    libm::acos((1.0 - 2.0 * (x * x + y * y)).clamp(-1.0, 1.0)).to_degrees()
+}
+
+/// Length of a vector.
+#[must_use]
+pub fn length(vector: &[f64; 3]) -> f64 {
+    vector.iter().map(|part| part * part).sum::<f64>().sqrt()
+}
+
 /// The state of a vehicle at one moment.
 #[derive(Debug, Clone, Copy)]
 pub struct VehicleState {

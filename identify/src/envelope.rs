@@ -1,9 +1,7 @@
 //! The flight envelope in which a verdict was judged: the ranges of the test flights.
-#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
-use flights::state::StateQuantity;
+use flights::state::{StateQuantity, length, tilt_deg};
 use flights::{Flight, Played};
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -60,7 +58,7 @@ impl Seen {
         let Ok(played) = Played::of(flight) else { return };
         let forces = flight.specific_force.time_s.iter().zip(&flight.specific_force.values);
         let forces = forces.filter(|(time_s, _)| played.counts(**time_s, **time_s));
-        self.specific_force_m_s2.extend(forces.map(|(_, force)| norm(force)));
+        self.specific_force_m_s2.extend(forces.map(|(_, force)| length(force)));
         let has = |quantity: StateQuantity| quantity.is_measured(flight);
         let ((start_s, end_s), mut hint) = (played.span_s(), 0);
         for step in 0..((end_s - start_s) / STEP_S) as usize {
@@ -70,25 +68,19 @@ impl Seen {
                 continue;
             }
             if has(StateQuantity::Velocity) {
-                self.speed_m_s.push(norm(&row.velocity_m_s));
+                self.speed_m_s.push(length(&row.velocity_m_s));
             }
             if has(StateQuantity::Attitude) {
-                let [x, y, z, w] = row.attitude;
-                let up_W = UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z)) * Vector3::z();
-                self.tilt_deg.push(libm::acos(up_W.z.clamp(-1.0, 1.0)).to_degrees());
+                self.tilt_deg.push(tilt_deg(&row.attitude));
             }
             if has(StateQuantity::Rates) {
-                self.angular_velocity_rad_s.push(norm(&row.angular_velocity_rad_s));
+                self.angular_velocity_rad_s.push(length(&row.angular_velocity_rad_s));
             }
             if has(StateQuantity::Position) {
                 self.height_m.push(row.position_m[2]);
             }
         }
     }
-}
-
-fn norm(vector: &[f64; 3]) -> f64 {
-    vector.iter().map(|value| value * value).sum::<f64>().sqrt()
 }
 
 /// The value below which `share` of `values` lie; sorts them.

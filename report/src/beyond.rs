@@ -3,7 +3,7 @@
 use crate::attached::Attached;
 use crate::states::{FIELDS_OF_STATE, tracks};
 use anyhow::Result;
-use flights::state::VehicleState;
+use flights::state::{VehicleState, length, tilt_deg};
 use recorder::node::SHADOW_PREFIX;
 use recorder::reader::Recording;
 use serde::Serialize;
@@ -71,27 +71,22 @@ fn limits(envelope: &Envelope) -> [Limit; 5] {
     let upper = |quantity, unit, value, limit| Limit { quantity, unit, value, limit, sign: 1.0 };
     let height = |state: &VehicleState| state.position_W_m[2];
     [
-        upper("speed", "m/s", |state| norm(&state.velocity_W_m_s), envelope.speed_max_m_s),
-        upper("tilt", "deg", tilt_deg, envelope.tilt_max_rad.map(f64::to_degrees)),
+        upper("speed", "m/s", |state| length(&state.velocity_W_m_s), envelope.speed_max_m_s),
+        upper(
+            "tilt",
+            "deg",
+            |state| tilt_deg(&state.attitude_WB),
+            envelope.tilt_max_rad.map(f64::to_degrees),
+        ),
         upper(
             "angular velocity",
             "rad/s",
-            |state| norm(&state.angular_velocity_B_rad_s),
+            |state| length(&state.angular_velocity_B_rad_s),
             envelope.angular_velocity_max_rad_s,
         ),
         upper("height", "m", height, envelope.height_max_m),
         Limit { sign: -1.0, ..upper("height", "m", height, envelope.height_min_m) },
     ]
-}
-
-fn norm(vector: &[f64; 3]) -> f64 {
-    vector.iter().map(|value| value * value).sum::<f64>().sqrt()
-}
-
-/// Angle between the body's z axis and the vertical.
-fn tilt_deg(state: &VehicleState) -> f64 {
-    let [x, y, ..] = state.attitude_WB;
-    libm::acos((1.0 - 2.0 * (x * x + y * y)).clamp(-1.0, 1.0)).to_degrees()
 }
 
 /// Quantities in `recording` that left the envelope of their vehicle, by topic; none for vehicles without an envelope.

@@ -1,8 +1,9 @@
 //! Simulated flights in this process, as a logger without noise keeps them.
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use bus::messages::{MotorCommand, PlantState};
 use hummingbus::bus;
+use hummingbus::flights::state::{length, tilt_deg};
 use hummingbus::flights::{Channel, Flight, Role};
 use hummingbus::inputs::InputFiles;
 use identify::LogRates;
@@ -10,16 +11,16 @@ use identify::proposal::Limits;
 use runtime::event::StopToken;
 use runtime::manifest::Manifest;
 
-/// Flies `manifest` to its end.
+/// Flies `manifest` to its end; `None` if the vehicle got out of control or the flight was stopped.
 ///
 /// # Errors
-/// If it cannot be flown, or a step fails: of a vehicle that got out of control, too.
+/// If the manifest cannot be flown.
 pub fn fly(
     manifest: &Manifest,
     files: InputFiles,
     rates: &LogRates,
     stop: &StopToken,
-) -> Result<(Flight, Limits)> {
+) -> Result<Option<(Flight, Limits)>> {
     let mut simulation = runtime::simulate_reading(manifest, files)?;
     let state = simulation.topic::<PlantState>("/plant/state")?;
     let command = simulation.topic::<MotorCommand>("/controller/command")?;
@@ -30,19 +31,22 @@ pub fn fly(
     log.flight.rotors = rates.rotors;
     for tick in 0..ticks {
         if tick % LOOK_TICKS == 0 && stop.count() > 0 {
-            bail!("the search was stopped");
+            return Ok(None);
         }
-        simulation.step()?;
+        // A vehicle that tumbles soon has a motion that is no number.
+        if simulation.step().is_err() {
+            return Ok(None);
+        }
         let state = simulation.newest(state).context("the plant sent no state")?;
         let command = simulation.newest(command).context("the controller sent no command")?;
         log.add(f64::from(tick) * tick_s, state, command);
         let position_m: [f64; 3] = state.position.into();
         let is_finite = position_m.iter().all(|value| value.is_finite());
         if !is_finite || log.reached.tilt_max_deg > OUT_OF_CONTROL_DEG {
-            bail!("the vehicle got out of control at {:.2} s", f64::from(tick) * tick_s);
+            return Ok(None);
         }
     }
-    Ok((rates.logged(log.flight, tick_s), log.reached))
+    Ok(Some((rates.logged(log.flight, tick_s), log.reached)))
 }
 
 /// Ticks between two looks at the stop token.
@@ -70,11 +74,12 @@ impl Log {
         push(&mut flight.angular_velocity, time_s, state.angular_velocity.into());
         push(&mut flight.specific_force, time_s, state.specific_force.into());
         let q = state.attitude;
+        let tilted = [q.x, q.y, q.z, q.w];
         let q = [q.w, q.x, q.y, q.z];
         let last = flight.attitude.values.last().copied().unwrap_or(q);
         let is_turned = q.iter().zip(&last).map(|(a, b)| a * b).sum::<f64>() < 0.0;
         push(&mut flight.attitude, time_s, if is_turned { q.map(|part| -part) } else { q });
-        reach(&mut self.reached, position, velocity, tilt_deg(&q));
+        reach(&mut self.reached, position, velocity, tilt_deg(&tilted));
     }
 }
 
@@ -83,17 +88,11 @@ fn push<const N: usize>(channel: &mut Channel<N>, time_s: f64, value: [f64; N]) 
     channel.values.push(value);
 }
 
-/// The angle between the body's z and the vertical, of an attitude w, x, y, z.
-pub fn tilt_deg([_, x, y, _]: &[f64; 4]) -> f64 {
-    libm::acos((1.0 - 2.0 * (x * x + y * y)).clamp(-1.0, 1.0)).to_degrees()
-}
-
 /// Widens `reached` by a state.
 pub fn reach(reached: &mut Limits, position_m: [f64; 3], velocity_m_s: [f64; 3], tilt_deg: f64) {
     for (range, at) in reached.room_m.iter_mut().zip(position_m) {
         *range = [range[0].min(at), range[1].max(at)];
     }
-    let speed_m_s = velocity_m_s.iter().map(|part| part * part).sum::<f64>().sqrt();
-    reached.speed_max_m_s = reached.speed_max_m_s.max(speed_m_s);
+    reached.speed_max_m_s = reached.speed_max_m_s.max(length(&velocity_m_s));
     reached.tilt_max_deg = reached.tilt_max_deg.max(tilt_deg);
 }

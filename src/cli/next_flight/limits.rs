@@ -1,7 +1,7 @@
 //! Limits of the next flight: those of the flights file, or what the measured flights reached.
 
 use super::family::Space;
-use super::flying::tilt_deg;
+use hummingbus::flights::state::{length, tilt_deg};
 use hummingbus::flights::{Flight, FlightSet, NextFlight, Played};
 use identify::proposal::Limits;
 
@@ -144,10 +144,9 @@ fn reached(flights: &[Flight]) -> Limits {
             if !played.counts(time_s, time_s + LOOK_S) {
                 continue;
             }
-            let [x, y, z, w] = row.attitude;
             positions.iter_mut().zip(row.position_m).for_each(|(all, at): (&mut Vec<f64>, f64)| all.push(at));
-            speeds.push(row.velocity_m_s.iter().map(|part| part * part).sum::<f64>().sqrt());
-            tilts.push(tilt_deg(&[w, x, y, z]));
+            speeds.push(length(&row.velocity_m_s));
+            tilts.push(tilt_deg(&row.attitude));
         }
     }
     let mut limits = Limits { room_m: [[0.0; 2]; 3], speed_max_m_s: 0.0, tilt_max_deg: 0.0 };

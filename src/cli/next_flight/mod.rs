@@ -91,7 +91,7 @@ pub fn propose(
         let text = text.to_owned();
         move |done: usize, all: usize| say(&format!("next flight{text}: {done} of {all} manoeuvres"))
     };
-    let flown = simulator.family(&bounds, &tell(""));
+    let flown = simulator.family(&bounds, &tell(""))?;
     let found = best(&simulator, &bounds, &flown)?;
     let advice = match &found {
         Some((_, answers)) if answers.iter().all(Answer::is_separated) => None,
@@ -101,7 +101,7 @@ pub fn propose(
                 Some((_, answers)) => answers.iter().map(|answer| answer.separation).collect(),
                 None => vec![0.0; questions.questions().count()],
             };
-            raised(&simulator, &bounds, &flown, &now, &tell)
+            raised(&simulator, &bounds, &flown, &now, &tell)?
         }
     };
     Ok(written(&simulator, &bounds, found, advice, stop))
@@ -126,7 +126,7 @@ fn best(simulator: &Simulator<'_>, bounds: &Bounds, flown: &[Flown]) -> Result<O
     // What keeps the limits alone may leave them behind another: then the last is left out.
     while !chosen.is_empty() {
         let course = search::course(bounds, simulator.facts.gravity_m_s2, flown, &chosen)?;
-        let Some((flights, reached)) = last.fly(&course, bounds) else {
+        let Some((flights, reached)) = last.fly(&course, bounds)? else {
             chosen.pop();
             continue;
         };
@@ -165,13 +165,16 @@ fn answers(questions: &OpenQuestions, flown: &[Flown], chosen: &[usize], separat
 
 /// The limit to raise so that the questions that `now` leaves open are answered; `None` if the search was stopped before it
 /// found one.
+///
+/// # Errors
+/// As [`Simulator::family`].
 fn raised<T: Fn(usize, usize) + Sync>(
     simulator: &Simulator<'_>,
     bounds: &Bounds,
     flown: &[Flown],
     now: &[f64],
     tell: &dyn Fn(&str) -> T,
-) -> Option<String> {
+) -> Result<Option<String>> {
     let questions = simulator.questions;
     let open: Vec<usize> = (0..now.len()).filter(|at| now[*at] < SEPARATED).collect();
     let mut best: Option<(usize, f64, String)> = None;
@@ -185,7 +188,7 @@ fn raised<T: Fn(usize, usize) + Sync>(
         let flown = if raised == Raised::Duration {
             flown
         } else {
-            again = simulator.family(&bounds, &tell(&format!(", limits raised ({text})")));
+            again = simulator.family(&bounds, &tell(&format!(", limits raised ({text})")))?;
             &again[..]
         };
         // It only says whether a limit helps.
@@ -204,11 +207,11 @@ fn raised<T: Fn(usize, usize) + Sync>(
             break;
         }
     }
-    match best {
+    Ok(match best {
         Some((answered, _, text)) if answered > 0 => Some(text),
         _ if simulator.stop.count() > 0 => None,
         _ => Some(NOT_SHOWN.to_owned()),
-    }
+    })
 }
 
 /// The proposal and its files.

@@ -5,7 +5,7 @@ use super::course::{BEFORE_S, Course};
 use super::family::{FAMILY, Manoeuvre};
 use super::flying::fly;
 use super::limits::Bounds;
-use anyhow::Result;
+use anyhow::{Context as _, Result};
 use hummingbus::COMPONENTS;
 use hummingbus::flights::Flight;
 use hummingbus::inputs::InputFiles;
@@ -23,7 +23,7 @@ use toml::Table;
 const ENOUGH: f64 = 2.0 * SEPARATED;
 /// Worth of a standard error beyond [`ENOUGH`].
 const BEYOND: f64 = 0.02;
-/// A manoeuvre comes so many times at most: a flight of one manoeuvre would leave much else open.
+/// A manoeuvre comes so many times at most, at whichever levels: a flight of one manoeuvre would leave much else open.
 const TIMES_MAX: usize = 2;
 /// Levels at which a manoeuvre that leaves the limits is tried, each a part of the one before.
 const TRIES: usize = 4;
@@ -71,27 +71,31 @@ impl Simulator<'_> {
         Simulator { questions, vehicles, facts, files, path, stop: never }
     }
 
-    /// Flies `course` under each hypothesis; `None` if one of the flights leaves `bounds`, cannot be flown or was stopped.
-    pub fn fly(&self, course: &Course, bounds: &Bounds) -> Option<(Vec<Flight>, Limits)> {
+    /// Flies `course` under each hypothesis; `None` if one of the flights leaves `bounds`, gets out of control or was stopped.
+    ///
+    /// # Errors
+    /// If a flight cannot begin.
+    pub fn fly(&self, course: &Course, bounds: &Bounds) -> Result<Option<(Vec<Flight>, Limits)>> {
         let mut flights = Vec::new();
         let mut first = None;
         for vehicle in self.vehicles {
             let manifest = course.manifest(vehicle, &self.vehicles[0], self.facts);
-            let manifest = manifest.build(self.path, COMPONENTS).ok()?;
-            // A vehicle that gets out of control is not a candidate's.
-            let (flight, reached) =
-                fly(&manifest, self.files.branch(), &self.questions.rates(), self.stop).ok()?;
-            if !bounds.hold(&reached) {
-                return None;
-            }
+            let manifest = manifest.build(self.path, COMPONENTS)?;
+            let flown = fly(&manifest, self.files.branch(), &self.questions.rates(), self.stop)?;
+            let Some((flight, reached)) = flown.filter(|(_, reached)| bounds.hold(reached)) else {
+                return Ok(None);
+            };
             flights.push(flight);
             first.get_or_insert(reached);
         }
-        Some((flights, first?))
+        Ok(first.map(|reached| (flights, reached)))
     }
 
     /// Flies every manoeuvre of the family at each of its levels on all cores; `tell` hears how many are done.
-    pub fn family(&self, bounds: &Bounds, tell: &(dyn Fn(usize, usize) + Sync)) -> Vec<Flown> {
+    ///
+    /// # Errors
+    /// If a flight cannot begin, or cannot be compared with a model.
+    pub fn family(&self, bounds: &Bounds, tell: &(dyn Fn(usize, usize) + Sync)) -> Result<Vec<Flown>> {
         let rows: Vec<(&'static Manoeuvre, f64)> =
             FAMILY.iter().flat_map(|row| row.levels.iter().map(move |level| (row, *level))).collect();
         let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
@@ -102,9 +106,9 @@ impl Simulator<'_> {
                 let Some((manoeuvre, level)) = rows.get(at).filter(|_| self.stop.count() == 0) else {
                     return;
                 };
-                if let Some(one) = self.one(manoeuvre, *level, bounds) {
-                    flown.lock().unwrap_or_else(PoisonError::into_inner).push((at, one));
-                }
+                let one = self.one(manoeuvre, *level, bounds);
+                let one = one.with_context(|| format!("the manoeuvre {} of the next flight", manoeuvre.name));
+                flown.lock().unwrap_or_else(PoisonError::into_inner).push((at, one));
                 tell(done.fetch_add(1, Ordering::Relaxed) + 1, rows.len());
             }
         };
@@ -113,24 +117,24 @@ impl Simulator<'_> {
         let mut flown = flown.into_inner().unwrap_or_else(PoisonError::into_inner);
         // In the order of the family, whichever was done first.
         flown.sort_by_key(|(at, _)| *at);
-        flown.into_iter().map(|(_, one)| one).collect()
+        flown.into_iter().filter_map(|(_, one)| one.transpose()).collect()
     }
 
     /// The manoeuvre at `level`, or at the greatest level below at which it keeps the limits.
-    fn one(&self, manoeuvre: &'static Manoeuvre, level: f64, bounds: &Bounds) -> Option<Flown> {
+    fn one(&self, manoeuvre: &'static Manoeuvre, level: f64, bounds: &Bounds) -> Result<Option<Flown>> {
         let space = bounds.space(self.facts.gravity_m_s2);
         let mut level = level;
         for _ in 0..TRIES {
             let segments = (manoeuvre.segments)(&space, level);
-            let course = Course::of(&space, [&segments]).ok()?;
-            if let Some((flights, _)) = self.fly(&course, bounds) {
-                let evidence = self.questions.evidence(&flights).ok()?;
+            let course = Course::of(&space, [&segments])?;
+            if let Some((flights, _)) = self.fly(&course, bounds)? {
+                let evidence = self.questions.evidence(&flights)?;
                 let duration_s = course.duration_s() - BEFORE_S;
-                return Some(Flown { manoeuvre, level, segments, duration_s, evidence });
+                return Ok(Some(Flown { manoeuvre, level, segments, duration_s, evidence }));
             }
             level = (100.0 * EASED * level).round() / 100.0;
         }
-        None
+        Ok(None)
     }
 }
 
@@ -165,7 +169,8 @@ impl Choice<'_> {
     /// True if these manoeuvres fit into the flight, none of them too often.
     fn fits(&self, chosen: &[usize]) -> bool {
         let length_s: f64 = chosen.iter().map(|at| self.flown[*at].duration_s).sum();
-        let times = |at: &usize| chosen.iter().filter(|other| *other == at).count();
+        let name = |at: &usize| self.flown[*at].manoeuvre.name;
+        let times = |at: &usize| chosen.iter().filter(|other| name(other) == name(at)).count();
         length_s <= self.duration_s && chosen.iter().all(|at| times(at) <= TIMES_MAX)
     }
 
