@@ -281,8 +281,8 @@ fn a_component_that_returns_an_error_ends_the_run_with_it() {
 fn those_that_hang_are_left_behind_by_their_watchdog_and_nothing_else_is() {
     alone(|folder| {
         let plan = plan(1000, "hang")
-            .set("process.source.watchdog_ms_host", 200)
-            .set("process.sink.watchdog_ms_host", 200)
+            .set("process.source.watchdog_ms_host", 2000)
+            .set("process.sink.watchdog_ms_host", 2000)
             .set("process.sink.parameters.fault", "hang")
             .set("process.sink.parameters.at_tick", 49);
         let message = flown(&plan, folder).unwrap_err();
@@ -413,7 +413,7 @@ fn a_thread_that_hangs_is_replaced_and_sends_nothing_once_it_goes_on() {
         alone(|folder| {
             let mut plan = plan(3000, "hang")
                 .set("run.pace", 10.0)
-                .set("process.source.watchdog_ms_host", 200)
+                .set("process.source.watchdog_ms_host", 2000)
                 .set("process.source.on_exit", on_exit);
             if on_exit == "standby" {
                 plan = plan.set("process.source.standby.parameters.fault", "none");

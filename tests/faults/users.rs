@@ -105,6 +105,15 @@ fn race(prefix: &Mutex<String>, folder: &Path, is_over: &AtomicBool) -> Race {
     race
 }
 
+/// Ends the race where it is dropped: an assertion that fails must not leave the racer to run for ever.
+struct Finish<'a>(&'a AtomicBool);
+
+impl Drop for Finish<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
 fn uid(number: u32) -> rustix::fs::Uid {
     rustix::fs::Uid::from_raw(number)
 }
@@ -126,6 +135,7 @@ fn another_user_who_tries_at_every_moment_opens_no_file_of_a_run() {
         (Mutex::new("/nowhere".to_owned()), AtomicBool::new(false), place.path("tmp"));
     let race = std::thread::scope(|scope| {
         let racer = scope.spawn(|| race(&prefix, Path::new(&folder), &is_over));
+        let finish = Finish(&is_over);
         for _ in 0..RACED_RUNS {
             let recording = place.path("raced.mcap");
             let args = ["run", &manifest, "--record", &recording, "--set", "run.duration_s=0.01"];
@@ -140,7 +150,7 @@ fn another_user_who_tries_at_every_moment_opens_no_file_of_a_run() {
             assert_eq!(mode & 0o777, 0o666, "the recording has mode {mode:o}");
             std::fs::remove_file(recording).unwrap();
         }
-        is_over.store(true, Ordering::Relaxed);
+        drop(finish);
         racer.join().unwrap()
     });
     assert!(race.opened.is_empty(), "{:?}", race.opened);
