@@ -7,6 +7,7 @@ use crate::error::{LogError, Spot};
 use crate::flight::{Channel, median, period_s};
 use crate::held;
 use crate::quantity::Quantity;
+use crate::spikes;
 
 /// A quaternion whose length is further from one than this is not an attitude.
 const NORM_TOLERANCE: f64 = 0.1;
@@ -25,6 +26,7 @@ pub fn clean<const N: usize>(
     check_clock(&channel.time_s)?;
     let channel = growing(quantity, channel, notes);
     let channel = if quantity == Quantity::Command { channel } else { unheld(quantity, channel, notes) };
+    let channel = if quantity == Quantity::RotorSpeed { unspiked(channel, notes) } else { channel };
     if channel.is_empty() {
         let why = notes.last().map_or("the log has none", String::as_str);
         let (expected, found) = ("samples that can be used", format!("none of {total} ({why})"));
@@ -42,6 +44,14 @@ fn finite<const N: usize>(quantity: Quantity, channel: Channel<N>, notes: &mut V
     }
     let kept = channel.kept(is_finite);
     say_dropped(quantity, &channel, &kept, "have no finite number", notes);
+    kept
+}
+
+/// Leaves out rotor speeds with a spike.
+fn unspiked<const N: usize>(channel: Channel<N>, notes: &mut Vec<String>) -> Channel<N> {
+    let is_kept = spikes::without(&channel);
+    let kept = channel.kept(|index| is_kept[index]);
+    say_dropped(Quantity::RotorSpeed, &channel, &kept, "have a spike, which no rotor can follow", notes);
     kept
 }
 

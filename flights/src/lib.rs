@@ -14,7 +14,7 @@
 //! | `form`, `rows` | tables, CSV and Parquet: their declared form, and rows on one clock |
 //! | `known_types` | messages whose fields and units need not be said |
 //! | `name`, `scaling`, `matrices`, `clock` | names of numbers, their factors, rotation matrices, clocks that start again |
-//! | `channels`, `clean`, `held`, `jumps`, `reading` | from a log's numbers to a flight |
+//! | `channels`, `clean`, `held`, `jumps`, `spikes`, `reading` | from a log's numbers to a flight |
 //! | `specific_force` | specific force from what logs hold in its place |
 //! | `plausible`, `agreement`, `force_doubt`, `still`, `units`, `finding` | values against physics |
 //! | `span` | times against the number of samples |
@@ -71,6 +71,7 @@ mod seams;
 mod set;
 mod span;
 mod specific_force;
+mod spikes;
 pub mod state;
 mod still;
 mod twin;

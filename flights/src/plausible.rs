@@ -12,6 +12,7 @@ use crate::flight::{Channel, Flight, median};
 use crate::force_doubt::{ForceDoubt, Kind};
 use crate::frame;
 use crate::quantity::{FRACTION, PERCENT, Quantity};
+use crate::spikes::usual_greatest;
 use crate::still;
 use crate::units::{HUNDREDS, Units, finding, is_gross, of_hundreds, of_unit};
 use diagnostics::unit::{ANGLE, ROTOR_SPEED};
@@ -423,7 +424,8 @@ impl Judge<'_> {
     /// The rotors turn about as fast as hover needs.
     fn rotor_speed(&self) -> Option<Finding> {
         let speeds = self.of_rotors(&self.flight.rotor_speed);
-        let (_, high) = range(speeds.clone())?;
+        // One spike must not make all others look like rotors at rest.
+        let high = usual_greatest(speeds.clone())?;
         let turning = median(speeds.filter(|speed| *speed > 0.3 * high))?;
         let hover = self.vehicle.hover_speed_rad_s();
         let factor = turning / hover;
