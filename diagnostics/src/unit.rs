@@ -151,6 +151,10 @@ pub const TORQUE: Dimension = Dimension::of("torque", &[("N*m", 1.0), ("N*mm", 1
 pub const ROTARY_DAMPING: Dimension =
     Dimension::of("torque per rotation speed", &[("N*m*s/rad", 1.0), ("N*m*s", 1.0)]);
 
+/// Torques linear in a velocity.
+pub const VELOCITY_TORQUE: Dimension =
+    Dimension::of("torque per velocity", &[("N*m*s/m", 1.0), ("N*s", 1.0)]);
+
 /// Forces against a way.
 pub const LINEAR_STIFFNESS: Dimension = Dimension::of("force per length", &[("N/m", 1.0), ("N/mm", 1e3)]);
 

@@ -90,6 +90,7 @@ fn has(prepared: &Prepared, quantity: Quantity) -> bool {
         Quantity::TwoRotations => allows(Equation::Gyroscope),
         Quantity::TwoDirections => has_attitude && has(prepared, Quantity::Force),
         Quantity::InertialUnit => !flight.angular_velocity.is_empty() || !flight.specific_force.is_empty(),
+        Quantity::RotorSpeed => !flight.rotor_speed.is_empty(),
         Quantity::Pose => has_attitude || !flight.position.is_empty(),
     }
 }

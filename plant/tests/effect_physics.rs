@@ -108,6 +108,34 @@ fn flapping_pushes_back_and_turns_the_nose_up() {
 }
 
 #[test]
+fn a_velocity_torque_turns_the_vehicle_away_from_its_motion_through_the_air() {
+    let mut flight = Flight::hovering(vec![effect("velocity-torque", &[3e-3, 4e-3])]);
+    flight.state.body.velocity_W_m_s = Vector3::new(2.0, 1.0, 3.0);
+    let motion = flight.accelerations();
+    let expected = Vector3::new(3e-3, -4e-3 * 2.0, 0.0) / 5.6e-3;
+    assert!((motion.angular_acceleration_B_rad_s2 - expected).norm() < 1e-9, "{motion:?}");
+    assert!((motion.specific_force_B_m_s2 - Vector3::z() * 9.81).norm() < 1e-9, "a torque alone: {motion:?}");
+    let headwind = effect("wind", &[-2.0, -1.0, 0.0]);
+    let still = Flight::hovering(vec![headwind, effect("velocity-torque", &[3e-3, 4e-3])]).accelerations();
+    assert!((still.angular_acceleration_B_rad_s2 - expected).norm() < 1e-9, "as in a wind: {still:?}");
+}
+
+#[test]
+fn under_rate_damping_each_rate_fades_with_its_own_time_constant() {
+    for axis in 0..3 {
+        let inertia_kg_m2 = free_body().inertia_kg_m2[(axis, axis)];
+        let mut values = [0.0; 3];
+        values[axis] = 2.0 * inertia_kg_m2;
+        let mut flight = Flight::new(free_body(), vec![effect("rate-damping", &values)], 1.0);
+        flight.state.body.angular_velocity_B_rad_s[axis] = 2.0;
+        flight.fly(1.0, 1_000);
+        let left_rad_s = flight.state.body.angular_velocity_B_rad_s;
+        let expected_rad_s = Vector3::ith(axis, 2.0 * libm::exp(-2.0));
+        assert!((left_rad_s - expected_rad_s).norm() < 1e-9, "axis {axis}: {left_rad_s}");
+    }
+}
+
+#[test]
 fn a_radius_above_the_ground_thrust_is_a_fifteenth_more() {
     let mut flight = Flight::hovering(vec![effect("ground-effect", &[1.0, 0.1016])]);
     flight.state.body.position_W_m.z = 0.1016;

@@ -19,6 +19,8 @@ const NAMES: &[&str] = &[
     "parasitic-drag",
     "translational-lift",
     "blade-flapping",
+    "velocity-torque",
+    "rate-damping",
     "ground-effect",
     "ground-turbulence",
     "wind",
@@ -37,11 +39,13 @@ const NAMES: &[&str] = &[
 ];
 
 /// Those that know neither where up is nor where the ground is, so that the laboratory may be turned at will.
-const FREE_OF_THE_VERTICAL: [&str; 6] = [
+const FREE_OF_THE_VERTICAL: [&str; 8] = [
     "rotor-drag",
     "parasitic-drag",
     "translational-lift",
     "blade-flapping",
+    "velocity-torque",
+    "rate-damping",
     "weak-rotor",
     "bearing-friction",
 ];
@@ -383,7 +387,7 @@ proptest! {
     ) {
         let vehicle = hummingbird();
         let situation = FlightCondition::new(&vehicle, &state, &air_W_m_s);
-        for name in ["rotor-drag", "parasitic-drag", "bearing-friction"] {
+        for name in ["rotor-drag", "parasitic-drag", "rate-damping", "bearing-friction"] {
             let wrench = wrench(&between_bounds(find(name).unwrap(), &shares), &situation);
             prop_assert!(power_W(&wrench, &situation) <= 0.0, "{name}");
         }

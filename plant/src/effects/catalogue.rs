@@ -14,11 +14,13 @@ mod inertia_error;
 mod mass_error;
 mod motor_lag;
 mod parasitic_drag;
+mod rate_damping;
 mod rig_pendulum;
 mod rotor_drag;
 mod thrust_scale;
 mod translational_lift;
 mod turbulence;
+mod velocity_torque;
 mod weak_rotor;
 pub(super) mod wind;
 
@@ -28,6 +30,8 @@ pub static CATALOGUE: &[&EffectKind] = &[
     &parasitic_drag::EFFECT,
     &translational_lift::EFFECT,
     &blade_flapping::EFFECT,
+    &velocity_torque::EFFECT,
+    &rate_damping::EFFECT,
     &ground_effect::EFFECT,
     &ground_turbulence::EFFECT,
     &wind::EFFECT,

@@ -149,6 +149,8 @@ pub enum Quantity {
     InertialUnit,
     /// A pose.
     Pose,
+    /// The speeds of the rotors.
+    RotorSpeed,
 }
 
 /// Stage that has to be computed anew when a parameter changes; the later stages follow from the earlier ones.
@@ -224,6 +226,9 @@ impl Quantity {
             Self::TwoDirections => "attitude with position, velocity or specific force, for the attitude's",
             Self::InertialUnit => "an inertial unit, for its own",
             Self::Pose => "attitude or position, for the pose's",
+            Self::RotorSpeed => {
+                "rotor speeds: torques that follow from commands alone are late by unknown times, which passes for a damping"
+            }
         }
     }
 }
