@@ -150,7 +150,27 @@ impl<'f> Problem<'f> {
             let step = self.step_of(&total.without(&normal::sum(fold)), values, free);
             fold.iter().map(|block| block.cost_after(&step)).collect()
         };
-        blocks.chunks(blocks.len().div_ceil(FOLDS).max(1)).flat_map(of_fold).collect()
+        folds(blocks).flat_map(of_fold).collect()
+    }
+
+    /// The costs of the data that effects are chosen on, as the equations about a fit promise them with the parameters `dropped` at
+    /// their baselines and the others fitted to that.
+    pub fn promised_without(&self, fitted: &FitResult, dropped: &[usize]) -> Vec<f64> {
+        let baseline = |at: &usize| self.model.parameters.all[*at].baseline - fitted.values[*at];
+        let held: Vec<Option<f64>> =
+            fitted.free.iter().map(|at| dropped.contains(at).then(|| baseline(at))).collect();
+        let blocks = |flights| self.blocks(flights, &fitted.values, &fitted.free);
+        let estimation = blocks(&self.estimation);
+        let total = normal::sum(&estimation);
+        if !self.validation.is_empty() {
+            let step = held_step(&total, &held);
+            return blocks(&self.validation).iter().map(|block| block.cost_after(&step)).collect();
+        }
+        let of_fold = |fold: &[Block]| -> Vec<f64> {
+            let step = held_step(&total.without(&normal::sum(fold)), &held);
+            fold.iter().map(|block| block.cost_after(&step)).collect()
+        };
+        folds(&estimation).flat_map(of_fold).collect()
     }
 
     /// The values that were `fitted`, without the estimation flight at `flight`, by a step from the equations about them. With
@@ -286,9 +306,36 @@ impl<'f> Problem<'f> {
         free: &[usize],
         other: &[f64],
     ) -> Vec<Block> {
-        use rayon::prelude::*;
-        let (mut residual, mut columns) = self.linearised(flight, values, free);
+        let (mut residual, columns) = self.linearised(flight, values, free);
         residual.iter_mut().zip(other).for_each(|(residual, other)| *residual -= other);
+        self.blocks_from(flight, residual, columns)
+    }
+
+    /// The normal equations of all blocks of `flights` about `values`, with the derivatives by `accepted` as they are at `base`: near it
+    /// they hardly differ, and are known.
+    pub fn blocks_near(
+        &self,
+        flights: &[Prepared],
+        base: (&[f64], &[usize]),
+        values: &[f64],
+        free: &[usize],
+    ) -> Vec<Block> {
+        let of_flight = |flight: &Prepared| {
+            let (residual, own) = self.linearised(flight, values, free);
+            let (_, accepted) = self.linearised(flight, base.0, base.1);
+            self.blocks_from(flight, residual, [accepted, own].concat())
+        };
+        flights.iter().flat_map(of_flight).collect()
+    }
+
+    /// The normal equations of the blocks of one flight, from a residual and its derivatives.
+    fn blocks_from(
+        &self,
+        flight: &Prepared,
+        mut residual: Vec<f64>,
+        mut columns: Vec<Vec<f64>>,
+    ) -> Vec<Block> {
+        use rayon::prelude::*;
         let whitening = Whitening::of(flight, &self.noises);
         std::iter::once(&mut residual).chain(&mut columns).for_each(|rows| whitening.apply(rows));
         let (width, weights) = (flight.width(), self.row_weights(flight));
@@ -333,6 +380,11 @@ impl<'f> Problem<'f> {
         }
         blocks
     }
+}
+
+/// The folds of a cross-validation: stretches of time.
+fn folds(blocks: &[Block]) -> std::slice::Chunks<'_, Block> {
+    blocks.chunks(blocks.len().div_ceil(FOLDS).max(1))
 }
 
 /// The step of the parameters that are not held, while the others go where they are held.
@@ -423,7 +475,7 @@ impl Problem<'_> {
         for (column, step) in columns.iter().zip(step.iter()) {
             left.iter_mut().zip(column).for_each(|(left, slope)| *left += slope * step);
         }
-        let measured = self.model.tracks(flight, values).rows;
+        let measured = &self.model.tracks(flight, values).rows;
         let width = flight.width();
         let of = |rows: &[f64], offset: usize| -> Vec<f64> {
             rows[offset..].iter().step_by(width).copied().collect()

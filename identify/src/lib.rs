@@ -10,7 +10,8 @@
 //! | `clock`, `track` | measured channels on a grid of instants |
 //! | `window` | the window, and differences that lose nothing |
 //! | `prepared`, `rows` | a flight, the equations that it allows, and their rows |
-//! | `model` | the model's side of the equations |
+//! | `model`, `memo` | the model's side of the equations, and what was computed of it lately |
+//! | [`steps_ahead`] | errors of multi-step predictions |
 //! | `parameter`, `sensor_effects` | what may be changed of the model; sensors' errors as effects beside the plant's |
 //! | `candidate` | which effects these flights can show |
 //! | `noise_model`, `whitening` | the noise of a residual: autoregressive within a flight, trims between flights |
@@ -57,6 +58,7 @@ mod horizons;
 mod log_rates;
 mod logging;
 mod loss;
+mod memo;
 mod model;
 mod noise;
 mod noise_model;
@@ -76,6 +78,7 @@ mod select;
 mod sensing;
 mod sensor_effects;
 pub mod statistics;
+pub mod steps_ahead;
 mod track;
 mod trim;
 mod unusable;

@@ -1,6 +1,7 @@
 //! Predictions of the model for a flight: the rows of every equation under given parameters.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
+use crate::memo::{Key, Rows};
 use crate::parameter::Parameters;
 use crate::prepared::{BOX_STEPS, EachRotor, Equation, Held, Prepared, Tracks};
 use crate::sensing::SensorErrors;
@@ -8,6 +9,7 @@ use crate::track::Track;
 use nalgebra::Vector3;
 use plant::effects::Stage;
 use plant::{Actuation, Airframe, NewtonEuler, PerRotor, RigidBody, RotorState, State};
+use std::sync::Arc;
 use vehicles::Vehicle;
 
 /// The motors are simulated in steps of at most this length.
@@ -38,7 +40,7 @@ impl Model {
     }
 
     /// The measured channels of `flight` under these values.
-    pub fn tracks(&self, flight: &Prepared, values: &[f64]) -> Tracks {
+    pub fn tracks(&self, flight: &Prepared, values: &[f64]) -> Arc<Tracks> {
         let errors = SensorErrors::of(&self.parameters, values);
         flight.tracks(errors.pose_delay_s, errors.inertial_delay_s)
     }
@@ -48,8 +50,8 @@ impl Model {
     pub fn rotors(&self, flight: &Prepared, values: &[f64]) -> Rotors {
         let pose_s = SensorErrors::of(&self.parameters, values).pose_delay_s;
         if flight.flight.command.is_empty() {
-            let flown = measured_rotors(flight, pose_s);
-            return Rotors { commanded: flown.iter().map(speeds).collect(), flown };
+            let flown = flight.recent_rotors.at(pose_s, || measured_rotors(flight, pose_s));
+            return Rotors { commanded: flown.iter().map(speeds).collect(), flown: flown.to_vec() };
         }
         let mut flown = spun(&self.airframe(values), flight, pose_s);
         let commanded: Vec<EachRotor> = flown.iter().map(speeds).collect();
@@ -123,38 +125,75 @@ impl Model {
 
     /// The residual under `values`, and its derivative by each parameter of `free`: one column each.
     pub fn linearised(&self, flight: &Prepared, values: &[f64], free: &[usize]) -> (Vec<f64>, Vec<Vec<f64>>) {
-        let tracks = self.tracks(flight, values);
-        let rotors = self.rotors(flight, values);
-        let residual = self.residual(flight, &tracks, &rotors, values);
-        let column = |&parameter: &usize| {
-            let entry = &self.parameters.all[parameter];
-            let mut changed = values.to_vec();
-            let up = values[parameter] + entry.step <= entry.spec().max;
-            let step = if up { entry.step } else { -entry.step };
-            changed[parameter] += step;
-            let moved = match entry.kind.stage {
-                Stage::Sampling => {
-                    // The derivative holds the sensor's noise as well: of a difference to one side it would be
-                    // correlated with the residual's, and every delay would come out too long.
-                    let mut back = values.to_vec();
-                    back[parameter] -= step;
-                    let (ahead, behind) =
-                        (self.residual_under(flight, &changed), self.residual_under(flight, &back));
-                    return ahead.iter().zip(&behind).map(|(a, b)| (a - b) / (2.0 * step)).collect();
-                }
-                Stage::Rotors => self.residual(flight, &tracks, &self.rotors(flight, &changed), &changed),
-                Stage::Body => self.residual(flight, &tracks, &rotors, &changed),
-            };
-            moved.iter().zip(&residual).map(|(moved, before)| (moved - before) / step).collect()
-        };
         use rayon::prelude::*;
-        let columns = free.par_iter().map(column).collect();
-        (residual, columns)
+        let key = Key { values: values.to_vec(), late: flight.late, distrusted: flight.distrusted };
+        let (residual, columns) = match flight.memo.known(&key, free) {
+            Some((residual, columns)) if columns.iter().all(Option::is_some) => {
+                (residual, columns.into_iter().flatten().collect())
+            }
+            known => {
+                let (residual, columns) = known.unzip();
+                let about = About::of(self, flight, values, residual);
+                let known = columns.unwrap_or_else(|| vec![None; free.len()]);
+                let column = |(&parameter, known): (&usize, Option<Rows>)| {
+                    known.unwrap_or_else(|| Arc::new(about.column(parameter)))
+                };
+                let columns: Vec<Rows> = free.par_iter().zip(known).map(column).collect();
+                (about.residual, columns)
+            }
+        };
+        flight.memo.keep(key, &residual, free.iter().copied().zip(columns.iter().cloned()));
+        (residual.to_vec(), columns.iter().map(|column| column.to_vec()).collect())
     }
 
     /// The residual under `values`.
     pub fn residual_under(&self, flight: &Prepared, values: &[f64]) -> Vec<f64> {
         self.residual(flight, &self.tracks(flight, values), &self.rotors(flight, values), values)
+    }
+}
+
+/// A flight under values of the parameters, about which derivatives are taken.
+struct About<'m, 'p, 'f> {
+    model: &'m Model,
+    flight: &'p Prepared<'f>,
+    values: &'m [f64],
+    tracks: Arc<Tracks>,
+    rotors: Rotors,
+    residual: Rows,
+}
+
+impl<'m, 'p, 'f> About<'m, 'p, 'f> {
+    /// The flight with its `residual` where that is known.
+    fn of(model: &'m Model, flight: &'p Prepared<'f>, values: &'m [f64], residual: Option<Rows>) -> Self {
+        let (tracks, rotors) = (model.tracks(flight, values), model.rotors(flight, values));
+        let residual = residual.unwrap_or_else(|| Arc::new(model.residual(flight, &tracks, &rotors, values)));
+        Self { model, flight, values, tracks, rotors, residual }
+    }
+
+    /// The derivative of the residual by one parameter.
+    fn column(&self, parameter: usize) -> Vec<f64> {
+        let (model, flight) = (self.model, self.flight);
+        let entry = &model.parameters.all[parameter];
+        let up = self.values[parameter] + entry.step <= entry.spec().max;
+        let step = if up { entry.step } else { -entry.step };
+        let moved_by = |by: f64| {
+            let mut values = self.values.to_vec();
+            values[parameter] += by;
+            values
+        };
+        let ahead = moved_by(step);
+        let moved = match entry.kind.stage {
+            Stage::Sampling => {
+                // The derivative holds the sensor's noise as well: of a difference to one side it would be
+                // correlated with the residual's, and every delay would come out too long.
+                let ahead = model.residual_under(flight, &ahead);
+                let behind = model.residual_under(flight, &moved_by(-step));
+                return ahead.iter().zip(&behind).map(|(a, b)| (a - b) / (2.0 * step)).collect();
+            }
+            Stage::Rotors => model.residual(flight, &self.tracks, &model.rotors(flight, &ahead), &ahead),
+            Stage::Body => model.residual(flight, &self.tracks, &self.rotors, &ahead),
+        };
+        moved.iter().zip(self.residual.iter()).map(|(moved, before)| (moved - before) / step).collect()
     }
 }
 

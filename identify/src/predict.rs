@@ -112,7 +112,11 @@ impl Measured {
 
 /// The rotors at `time_s`, on straight lines between the samples of their speeds. `hint` is an index near, kept between calls
 /// at growing times.
-fn rotors_at(speeds: &Channel<ROTORS_MAX>, time_s: f64, hint: &mut usize) -> [RotorState; ROTORS_MAX] {
+pub(crate) fn rotors_at(
+    speeds: &Channel<ROTORS_MAX>,
+    time_s: f64,
+    hint: &mut usize,
+) -> [RotorState; ROTORS_MAX] {
     let (times_s, last) = (&speeds.time_s, speeds.time_s.len() - 1);
     while *hint < last && times_s[*hint + 1] <= time_s + SLACK_S {
         *hint += 1;
@@ -152,7 +156,7 @@ fn pushed(body: &RigidBody, push: &[f64; 6]) -> RigidBody {
     }
 }
 
-fn state(body: &RigidBody) -> VehicleState {
+pub(crate) fn state(body: &RigidBody) -> VehicleState {
     VehicleState {
         position_W_m: body.position_W_m.into(),
         velocity_W_m_s: body.velocity_W_m_s.into(),
@@ -161,7 +165,7 @@ fn state(body: &RigidBody) -> VehicleState {
     }
 }
 
-fn body(row: &Row) -> RigidBody {
+pub(crate) fn body(row: &Row) -> RigidBody {
     let [x, y, z, w] = row.attitude;
     RigidBody {
         position_W_m: row.position_m.into(),

@@ -2,11 +2,14 @@
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use crate::clock::{Clock, Lateness};
+use crate::memo::{Memo, Recent};
 use crate::track::{Track, valid_about};
 use crate::unusable::Unusable;
 use crate::window::{NUMEROV, SIMPSON, Window, central_difference, second_difference};
 use flights::{Channel, Flight, KnownRotors, SETTLE_S};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use plant::{PerRotor, RotorState};
+use std::sync::Arc;
 use vehicles::gaps::held_period_s;
 use vehicles::{CommandMap, MotorModel, ROTORS_MAX, Vehicle};
 
@@ -149,6 +152,12 @@ pub struct Prepared<'f> {
     pub distrusted: [bool; ROTORS_MAX],
     /// The period of commands that are logged slower than the motors follow, without measured speeds.
     pub slow_period_s: Option<f64>,
+    /// Rows that were computed lately.
+    pub memo: Memo,
+    /// Tracks, by the delays of pose and inertial unit, and the lateness of the pose.
+    recent_tracks: Recent<(f64, f64, Lateness), Tracks>,
+    /// Measured rotors, by the delay of the pose.
+    pub recent_rotors: Recent<f64, Vec<PerRotor<RotorState>>>,
 }
 
 impl<'f> Prepared<'f> {
@@ -176,7 +185,16 @@ impl<'f> Prepared<'f> {
         let windows = equations.iter().map(|equation| windows(*equation, flight, step_s)).collect();
         let layout = Layout { clock, knots: Vec::new(), equations, windows };
         let (late, distrusted) = (Lateness::default(), [false; ROTORS_MAX]);
-        let mut prepared = Self { flight, layout, late, distrusted, slow_period_s };
+        let mut prepared = Self {
+            flight,
+            layout,
+            late,
+            distrusted,
+            slow_period_s,
+            memo: Memo::default(),
+            recent_tracks: Recent::default(),
+            recent_rotors: Recent::default(),
+        };
         prepared.layout.knots = prepared.knots(propulsion);
         if prepared.layout.knots.len() >= 3 { Ok(prepared) } else { Err(prepared.unusable(propulsion)) }
     }
@@ -247,7 +265,11 @@ impl<'f> Prepared<'f> {
     /// The instants are those of the pose's stamps, so another delay of the pose shifts all channels but the
     /// pose. The noise that interpolation leaves depends on how the samples of a slow and noisy channel lie on
     /// the grid. If the pose were shifted, a fit would move its samples to where that noise is least.
-    pub fn tracks(&self, pose_s: f64, imu_s: f64) -> Tracks {
+    pub fn tracks(&self, pose_s: f64, imu_s: f64) -> Arc<Tracks> {
+        self.recent_tracks.at((pose_s, imu_s, self.late), || self.sampled(pose_s, imu_s))
+    }
+
+    fn sampled(&self, pose_s: f64, imu_s: f64) -> Tracks {
         let (flight, clock) = (self.flight, &self.layout.clock);
         let imu_s = imu_s - pose_s;
         let position = Track::sampled(&flight.position, self.late.position_s, clock);
@@ -332,6 +354,8 @@ impl<'f> Prepared<'f> {
             let about = valid_about(&is_valid, reach);
             self.layout.knots.retain(|knot| about[*knot]);
         }
+        // Their rows are those of the knots before.
+        (self.memo, self.recent_tracks) = Default::default();
     }
 
     fn reach(&self) -> usize {

@@ -507,7 +507,7 @@ fn pictures(problem: &Problem, selection: &Selection) -> Vec<Picture> {
     for flight in problem.flights() {
         let before = problem.model.residual_under(flight, &selection.before.values);
         let after = problem.model.residual_under(flight, &selection.flown().values);
-        let measured = problem.model.tracks(flight, &selection.flown().values).rows;
+        let measured = &problem.model.tracks(flight, &selection.flown().values).rows;
         for equation in &flight.layout.equations {
             let columns = |rows: &[f64]| {
                 (0..equation.size()).map(|axis| column(flight, rows, *equation, axis)).collect()

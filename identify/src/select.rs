@@ -40,6 +40,10 @@ const LEAST_PART: f64 = 0.01;
 const FALSE_RATE: f64 = 0.01;
 /// Two candidates whose difference is within this one-sided level cannot be told apart.
 const CONFOUNDED_LEVEL: f64 = 0.05;
+/// Level at which an effect is kept without a fit, where the equations promise a loss without it.
+const CLEARLY_WORSE: f64 = 0.001;
+/// Steps of a promise from a guess: nothing but the candidate's own derivatives is computed again.
+const PROMISE_STEPS: usize = 3;
 /// Number of candidates of a round that are fitted fully.
 const CONFIRMED: usize = 4;
 /// More rounds than there are effects worth naming.
@@ -307,13 +311,15 @@ fn round(
     let level = rate / open.len().max(1) as f64;
     let screen = Screen::of(problem, base, accepted, &open);
     let judge = |candidate: &&Candidate| {
-        let is_promise = candidate.kind.guesses.is_empty();
-        let fitted = if is_promise {
-            screen.promised(problem, base, candidate)
-        } else {
-            fitted(problem, base, accepted, candidate)
+        // What acts on time is far from linear, and each such candidate is a rival of all others: no promise will do.
+        let is_timing = candidate.kind.is_delay || candidate.kind.changes_drive;
+        let is_guessed = !candidate.kind.guesses.is_empty();
+        let found = match (is_guessed, is_timing) {
+            (false, _) => screen.promised(problem, base, candidate),
+            (true, false) => promised_from_guess(problem, base, accepted, candidate),
+            (true, true) => fitted(problem, base, accepted, candidate),
         };
-        Judged { is_promise, ..judged(problem, base, candidate, fitted, level) }
+        Judged { is_promise: !(is_guessed && is_timing), ..judged(problem, base, candidate, found, level) }
     };
     let mut all: Vec<Judged> = open.par_iter().map(judge).collect();
     confirm(problem, base, accepted, &mut all, level);
@@ -321,14 +327,19 @@ fn round(
     Round { judged: all, taken }
 }
 
-/// Has those of whom the linearised equations promise most fitted in earnest; a promise alone is not accepted.
+/// Has those of whom the linearised equations promise most fitted in earnest; a promise alone is not accepted. Those that start at a
+/// guess are far from linear, so that their place among promises says little: all of them are fitted that promise enough.
 fn confirm(problem: &Problem, base: &FitResult, accepted: &[Candidate], all: &mut [Judged], level: f64) {
-    let mut promises: Vec<&mut Judged> =
-        all.iter_mut().filter(|judged| judged.is_accepted && judged.is_promise).collect();
-    promises.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let mut promises: Vec<&mut Judged> = all
+        .iter_mut()
+        .filter(|judged| judged.is_promise && (judged.is_accepted || judged.is_logging))
+        .collect();
+    let is_guessed = |judged: &Judged| !judged.candidate.kind.guesses.is_empty();
+    promises.sort_by(|a, b| is_guessed(b).cmp(&is_guessed(a)).then(b.gain.total_cmp(&a.gain)));
+    let guessed = promises.iter().filter(|judged| is_guessed(judged)).count();
     promises.into_par_iter().enumerate().for_each(|(place, promise)| {
-        if place < CONFIRMED {
-            let fitted = fitted(problem, base, accepted, &promise.candidate);
+        if place < guessed + CONFIRMED {
+            let fitted = fitted_from(problem, base, accepted, &promise.candidate, &promise.fitted.values);
             *promise = judged(problem, base, &promise.candidate, fitted, level);
         } else {
             promise.is_accepted = false;
@@ -406,8 +417,26 @@ pub fn fitted(
     accepted: &[Candidate],
     candidate: &Candidate,
 ) -> FitResult {
-    let mut all = free_parameters(accepted);
-    all.extend(&candidate.free);
+    let all = [free_parameters(accepted), candidate.free.clone()].concat();
+    problem.fitted(&start(problem, base, candidate).0, &all)
+}
+
+/// The same from the values that a promise led to, if they are better than all other starts.
+fn fitted_from(
+    problem: &Problem,
+    base: &FitResult,
+    accepted: &[Candidate],
+    candidate: &Candidate,
+    promised: &[f64],
+) -> FitResult {
+    let all = [free_parameters(accepted), candidate.free.clone()].concat();
+    let (start, least) = start(problem, base, candidate);
+    let cost = problem.costs(&problem.estimation, promised).iter().sum::<f64>();
+    problem.fitted(if cost < least { promised } else { &start }, &all)
+}
+
+/// The best start of a candidate's fit, and its cost: that of `base` for one that starts at the baseline.
+fn start(problem: &Problem, base: &FitResult, candidate: &Candidate) -> (Vec<f64>, f64) {
     let mut start = base.values.clone();
     let mut least = base.estimation_cost();
     let by_clocks: &[f64] = &[problem.shared_late_s];
@@ -421,7 +450,33 @@ pub fn fitted(
             (start, least) = (tried, cost.min(least));
         }
     }
-    problem.fitted(&start, &all)
+    (start, least)
+}
+
+/// The fit that a few steps from the best start promise, with the derivatives by the accepted parameters as they are at `base`.
+fn promised_from_guess(
+    problem: &Problem,
+    base: &FitResult,
+    accepted: &[Candidate],
+    candidate: &Candidate,
+) -> FitResult {
+    let accepted = free_parameters(accepted);
+    let all = [accepted.clone(), candidate.free.clone()].concat();
+    let blocks = |flights, values: &[f64]| {
+        problem.blocks_near(flights, (&base.values, &accepted), values, &candidate.free)
+    };
+    let mut values = start(problem, base, candidate).0;
+    let mut estimation = blocks(&problem.estimation, &values);
+    for _ in 0..PROMISE_STEPS {
+        let next = problem.moved(&values, &all, &problem.step(&estimation, &values, &all));
+        let after = blocks(&problem.estimation, &next);
+        if normal::sum(&after).cost >= normal::sum(&estimation).cost {
+            break;
+        }
+        (values, estimation) = (next, after);
+    }
+    let validation = blocks(&problem.validation, &values);
+    promise(problem, &values, all, &estimation, &validation)
 }
 
 /// Chance that the candidate's parameters are as far from their baselines together if they are there in truth: Wald's test
@@ -472,6 +527,11 @@ fn without_idle(problem: &Problem, mut base: FitResult, accepted: &mut Vec<Candi
     let mut at = 0;
     // The newest has just passed.
     while at + 1 < accepted.len() {
+        let promised = problem.promised_without(&base, &accepted[at].free);
+        if p_value(&promised, &base.validation_costs) < CLEARLY_WORSE {
+            at += 1;
+            continue;
+        }
         let fitted = without(problem, &base, accepted, at);
         if is_worse(&fitted, &base) {
             at += 1;
@@ -508,20 +568,31 @@ impl Screen {
             wanted.iter().filter_map(|p| self.columns.iter().position(|column| column == p)).collect();
         let of = |blocks: &[Block]| -> Vec<Block> { blocks.iter().map(|block| block.of(&at)).collect() };
         let (fit, test) = (of(&self.estimation), of(&self.validation));
-        let step = problem.step(&fit, &base.values, &wanted);
-        let after =
-            |blocks: &[Block]| -> Vec<f64> { blocks.iter().map(|block| block.cost_after(&step)).collect() };
-        let moved: Vec<Block> = fit.iter().map(|block| block.after(&step)).collect();
-        FitResult {
-            values: problem.moved(&base.values, &wanted, &step),
-            covariance: normal::covariance(&moved),
-            validation_costs: if problem.validation.is_empty() {
-                problem.cross_validated(&fit, &base.values, &wanted)
-            } else {
-                after(&test)
-            },
-            estimation_costs: after(&fit),
-            free: wanted,
-        }
+        promise(problem, &base.values, wanted, &fit, &test)
+    }
+}
+
+/// The fit that the equations about `values` promise.
+fn promise(
+    problem: &Problem,
+    values: &[f64],
+    free: Vec<usize>,
+    estimation: &[Block],
+    validation: &[Block],
+) -> FitResult {
+    let step = problem.step(estimation, values, &free);
+    let after =
+        |blocks: &[Block]| -> Vec<f64> { blocks.iter().map(|block| block.cost_after(&step)).collect() };
+    let moved: Vec<Block> = estimation.iter().map(|block| block.after(&step)).collect();
+    FitResult {
+        values: problem.moved(values, &free, &step),
+        covariance: normal::covariance(&moved),
+        validation_costs: if problem.validation.is_empty() {
+            problem.cross_validated(estimation, values, &free)
+        } else {
+            after(validation)
+        },
+        estimation_costs: after(estimation),
+        free,
     }
 }

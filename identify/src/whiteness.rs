@@ -36,7 +36,7 @@ pub fn whiteness(problem: &Problem, values: &[f64]) -> BTreeMap<&'static str, Wh
     let mut columns: BTreeMap<&'static str, Vec<Column>> = BTreeMap::new();
     for flight in &problem.test {
         let residual = problem.model.residual_under(flight, values);
-        let measured = problem.model.tracks(flight, values).rows;
+        let measured = &problem.model.tracks(flight, values).rows;
         for equation in &flight.layout.equations {
             for axis in 0..equation.size() {
                 let [residual, measured] =

@@ -6,15 +6,21 @@
 //! | `replay` | one flight as a run: its files, its manifest, the flight itself |
 //! | `windows` | errors at the ends of the windows, read from the recording |
 //! | `mod@errors` | the results, as a table and as JSON |
+//! | `steps_ahead` | errors of multi-step predictions, made in this process |
+//! | `labels` | names of the vehicles in both |
 
 mod errors;
+mod labels;
 mod replay;
+mod steps_ahead;
 mod windows;
 
 pub use errors::{ChannelErrors, Errors, FlightErrors, HorizonErrors};
+pub use steps_ahead::{FlightSteps, StepsAheadErrors};
 
 use anyhow::{Context, Result, bail};
 use flights::{Flight, FlightSet};
+use labels::labels;
 use replay::Replay;
 use runtime::event::StopToken;
 use runtime::registry::Registry;
@@ -102,27 +108,4 @@ fn require_distinct_folders(set: &FlightSet) -> Result<()> {
         }
     }
     Ok(())
-}
-
-/// Names of the vehicles in reports: those of their files, or the whole paths if the names are the same.
-fn labels(vehicles: &[&Path]) -> Vec<String> {
-    let stem = |path: &&Path| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let stems: Vec<String> = vehicles.iter().map(stem).collect();
-    match &stems[..] {
-        [one, other] if one == other => vehicles.iter().map(|path| path.display().to_string()).collect(),
-        _ => stems,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::labels;
-    use std::path::Path;
-
-    #[test]
-    fn vehicles_of_the_same_name_are_told_apart_by_their_paths() {
-        let label = |paths: [&str; 2]| labels(&paths.map(Path::new));
-        assert_eq!(label(["a/old.toml", "a/new.toml"]), ["old", "new"]);
-        assert_eq!(label(["a/h.toml", "b/h.toml"]), ["a/h.toml", "b/h.toml"]);
-    }
 }

@@ -6,7 +6,8 @@ use anyhow::{Result, bail};
 use clap::Args;
 use flights::FlightSet;
 use hummingbus::COMPONENTS;
-use report::validate::Validation;
+use identify::steps_ahead::Between;
+use report::validate::{StepsAheadErrors, Validation};
 use std::path::{Path, PathBuf};
 
 /// Text of `--help` behind the options.
@@ -26,6 +27,13 @@ pub struct ValidateArguments {
     /// Keep what was flown in this folder: of each flight its data, its manifest and its recording.
     #[arg(long, value_name = "DIR")]
     keep: Option<PathBuf>,
+    /// Instead of flying on the bus, predict N samples ahead of every sample, driven by the measured rotor speeds where they were
+    /// logged: mean errors after 1 to N samples, beside those of persistence (velocity, attitude and rates stay).
+    #[arg(long, value_name = "N", conflicts_with = "keep", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    steps_ahead: Option<u32>,
+    /// With --steps-ahead: rotors keep the speed of the last sample until the next; without it they follow straight lines between samples.
+    #[arg(long, requires = "steps_ahead")]
+    held: bool,
 }
 
 /// Flies all flights and prints the errors; every failure is an error, so that `true` means that every flight was
@@ -37,6 +45,12 @@ pub fn validate(arguments: &ValidateArguments) -> Result<bool> {
     let Some((file, vehicles)) = arguments.files.split_last() else { bail!("give a flights file") };
     let vehicles: Vec<&Path> = vehicles.iter().map(PathBuf::as_path).collect();
     let flights = FlightSet::load(file)?;
+    if let Some(steps) = arguments.steps_ahead {
+        let between = if arguments.held { Between::Held } else { Between::Lines };
+        let errors = StepsAheadErrors::of(&vehicles, &flights, steps as usize, between)?;
+        if arguments.json { print_json(&errors.json()) } else { print_text(&errors.to_string()) }?;
+        return Ok(true);
+    }
     let mut tell = |line: &str| {
         if !arguments.json {
             say(line);

@@ -8,6 +8,7 @@ use crate::prepared::{BOX_STEPS, EachRotor, Equation, Prepared, Tracks};
 use crate::rows::column;
 use crate::track::Track;
 use nalgebra::{UnitQuaternion, Vector3};
+use std::sync::Arc;
 
 /// A flight's channels side by side.
 #[derive(Debug)]
@@ -18,7 +19,7 @@ pub struct Evidence<'p> {
     pub model: &'p Model,
     /// Faulty parts of the flight, which are no evidence.
     pub doubted: Vec<Part>,
-    tracks: Tracks,
+    tracks: Arc<Tracks>,
     /// Speeds that follow from the commands, on the grid.
     commanded: Vec<EachRotor>,
     /// Measured speeds on the grid; zero where there are none.

@@ -76,7 +76,7 @@ impl Speeds {
     fn of(problem: &Problem, flight: &Prepared) -> Option<Self> {
         flight.offset_of(flight.rotor_speed())?;
         let declared = problem.model.parameters.baseline();
-        let rows = problem.model.tracks(flight, &declared).rows;
+        let rows = &problem.model.tracks(flight, &declared).rows;
         let commanded = problem.model.rotors(flight, &declared).commanded;
         let rotors = || 0..flight.flight.rotors;
         let at_knots =
@@ -137,7 +137,7 @@ fn motion_cost(problem: &Problem, at: usize) -> f64 {
     let declared = problem.model.parameters.baseline();
     let Some(flight) = problem.flights().nth(at) else { return 0.0 };
     let residual = problem.model.residual_under(flight, &declared);
-    let measured = problem.model.tracks(flight, &declared).rows;
+    let measured = &problem.model.tracks(flight, &declared).rows;
     let of_motion = |equation: &Equation| !matches!(equation, Equation::RotorSpeed(_) | Equation::Gyroscope);
     let mut sum = 0.0;
     for equation in flight.layout.equations.iter().filter(|equation| of_motion(equation)) {
