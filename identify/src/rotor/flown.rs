@@ -10,7 +10,7 @@
 //! | `forces` | thrust and torque coefficients with their intervals |
 //! | `blocks`, `least_squares` | blocks of time, and least squares over them |
 //! | `figure` | a figure, or why it is not determined |
-//! | `spikes` | speeds that no rotor has |
+//! | `spikes`, `speed_noise` | speeds that no rotor has; the noise of speeds, and what it takes from a coefficient |
 
 mod blocks;
 mod course;
@@ -20,6 +20,7 @@ mod figure;
 mod forces;
 mod least_squares;
 mod motor;
+mod speed_noise;
 mod spikes;
 mod voltage;
 

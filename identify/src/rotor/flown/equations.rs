@@ -69,8 +69,8 @@ impl<'f> Equations<'f> {
         has_position && !flight.attitude.is_empty() && !self.prepared.is_assumed()
     }
 
-    /// Rows of the forces. Parameters: `thrusts` coefficients of rotors, which [`of_rotors`] assigns, the terms of the air
-    /// at speed, and the bias of the accelerometer.
+    /// Rows of the forces: those of the accelerometer along z, or else those of the acceleration. Parameters: coefficients
+    /// of the rotors ([`of_rotors`]), the terms of the air at speed, and the bias of the accelerometer.
     pub fn forces(&self, vehicle: &Vehicle, number: usize, blocks: &Blocks, is_each: bool) -> Vec<Rows> {
         let body = self.forces_B(vehicle, is_each);
         let bias = body.len();
@@ -80,6 +80,7 @@ impl<'f> Equations<'f> {
                 body.iter().map(|column| column.iter().map(|force| force.z).collect()).collect();
             columns.push(vec![1.0; self.speeds.len()]);
             rows.push(self.rows(Equation::SpecificForce, FORCE_Z, offset + 2, &columns, number, blocks));
+            return rows;
         }
         // A level attitude that was assumed says nothing about the acceleration of the vehicle.
         if let Some(offset) = self.offset(Equation::Acceleration).filter(|_| !self.prepared.is_assumed()) {
@@ -109,6 +110,22 @@ impl<'f> Equations<'f> {
         }
         debug_assert!(rows.iter().all(|rows| rows.columns.len() == bias + 1));
         rows
+    }
+
+    /// Specific force along z that the accelerometer reads beyond that of the acceleration and the attitude, as rows of a
+    /// constant: its bias. `None` where one of the two is not logged.
+    pub fn accelerometer_bias(&self, gravity_m_s2: f64, blocks: &Blocks, number: usize) -> Option<Rows> {
+        let force = self.offset(Equation::SpecificForce)?;
+        let acceleration = self.offset(Equation::Acceleration).filter(|_| !self.prepared.is_assumed())?;
+        let ones = vec![vec![1.0; self.speeds.len()]];
+        let mut rows = self.rows(Equation::SpecificForce, 0, force + 2, &ones, number, blocks);
+        let (width, measured) = (self.prepared.width(), &self.tracks.rows);
+        for ((at, knot), value) in self.prepared.layout.knots.iter().enumerate().zip(&mut rows.values) {
+            let of_axis = |axis: usize| measured[at * width + acceleration + axis];
+            let force_W = Vector3::new(of_axis(0), of_axis(1), of_axis(2) + gravity_m_s2);
+            *value -= (self.tracks.attitude[*knot].inverse() * force_W).z;
+        }
+        Some(rows)
     }
 
     /// Forces by the mass at each instant, by parameter.

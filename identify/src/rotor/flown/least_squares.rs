@@ -30,6 +30,15 @@ pub struct Rows {
     pub blocks: Vec<usize>,
 }
 
+/// Weights of rows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Weighting {
+    /// Each row counts as much as any other of its component: what is slow counts, in which a mean is told.
+    Plain,
+    /// Rows are whitened: a slow disturbance that a controller answers does not bias a gain (docs/decisions/022).
+    Whitened,
+}
+
 /// Knowledge about one parameter that the rows do not hold.
 #[derive(Debug, Clone, Copy)]
 pub struct Prior {
@@ -46,7 +55,7 @@ pub struct Solution {
     pub values: Vec<f64>,
     /// The parameters without one block of time after the other.
     pub without_one: Vec<Vec<f64>>,
-    /// Change of the parameters with one standard deviation of each prior.
+    /// Change of the parameters with one standard deviation of each thing that the blocks of time do not show.
     pub by_prior: Vec<Vec<f64>>,
 }
 
@@ -78,8 +87,12 @@ impl Rows {
 }
 
 /// Noise of each component, from the residuals under `values`.
-pub fn noises(rows: &[Rows], values: &[f64]) -> Vec<NoiseModel> {
-    products(rows, values).iter().map(Products::model).collect()
+pub fn noises(rows: &[Rows], values: &[f64], weighting: Weighting) -> Vec<NoiseModel> {
+    let model = |products: &Products| match weighting {
+        Weighting::Plain => products.white(),
+        Weighting::Whitened => products.model(),
+    };
+    products(rows, values).iter().map(model).collect()
 }
 
 fn products(rows: &[Rows], values: &[f64]) -> Vec<Products> {
@@ -109,20 +122,21 @@ pub fn step(total: &Block) -> Vec<f64> {
 }
 
 /// Fits the parameters of linear `rows`; `None` with too few blocks of time.
-pub fn solved(rows: &[Rows], priors: &[Prior]) -> Option<Solution> {
+pub fn solved(rows: &[Rows], priors: &[Prior], weighting: Weighting) -> Option<Solution> {
     let size = rows.first()?.columns.len();
-    let mut values = vec![0.0; size];
-    let mut noises = vec![NoiseModel::white(1.0); products(rows, &values).len()];
-    let mut all = Vec::new();
-    for round in 0..ROUNDS {
-        if round > 0 {
-            noises = self::noises(rows, &values);
-        }
-        all = blocks(rows, &noises);
-        values = step(&with_priors(&normal::sum(&all), priors));
+    let all = blocks(rows, &noises_of_fit(rows, priors, weighting));
+    (all.len() >= BLOCKS_MIN).then(|| Solution::of(vec![0.0; size], &all, priors))
+}
+
+/// Noise of each component about the fit of linear `rows`.
+pub fn noises_of_fit(rows: &[Rows], priors: &[Prior], weighting: Weighting) -> Vec<NoiseModel> {
+    let size = rows.first().map_or(0, |rows| rows.columns.len());
+    let mut noises = noises(rows, &vec![0.0; size], Weighting::Plain);
+    for _ in 0..ROUNDS {
+        let values = step(&with_priors(&normal::sum(&blocks(rows, &noises)), priors));
+        noises = self::noises(rows, &values, weighting);
     }
-    let solution = Solution::of(vec![0.0; size], &all, priors);
-    (all.len() >= BLOCKS_MIN).then_some(solution)
+    noises
 }
 
 fn with_priors(total: &Block, priors: &[Prior]) -> Block {

@@ -5,7 +5,7 @@
 //! Identification, 2nd ed., section 4.3), and what is left is whitened.
 
 use super::course::{Course, Input};
-use super::least_squares::{self, Rows, Solution};
+use super::least_squares::{self, Rows, Solution, Weighting};
 use crate::noise_model::NoiseModel;
 use crate::normal::{self, Block};
 use crate::rotor::dynamics::Order;
@@ -117,7 +117,10 @@ impl Fit {
 /// Noise of the speeds about a motor.
 pub fn noise_of(courses: &[Course], values: &Values) -> NoiseModel {
     let rows: Vec<Rows> = courses.iter().map(|course| rows(course, values, &[])).collect();
-    least_squares::noises(&rows, &[]).into_iter().next().unwrap_or_else(|| NoiseModel::white(1.0))
+    least_squares::noises(&rows, &[], Weighting::Whitened)
+        .into_iter()
+        .next()
+        .unwrap_or_else(|| NoiseModel::white(1.0))
 }
 
 /// Normal equations of each block of time about `values`.
