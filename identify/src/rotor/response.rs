@@ -116,11 +116,12 @@ mod tests {
         for (wn, zeta) in [(15.1, 0.6), (40.0, 1.0), (40.0, 1.0 + 1e-10), (60.0, 1.8)] {
             let lag = Lag { a1_s: 2.0 * zeta / wn, a2_s2: 1.0 / (wn * wn) };
             let ([first, second], both) = ([0.013, 0.04].map(|t| lag.transition(t)), lag.transition(0.053));
-            for row in 0..2 {
-                for column in 0..2 {
-                    let product: f64 = (0..2).map(|k| second[row][k] * first[k][column]).sum();
-                    assert!((product - both[row][column]).abs() < 1e-9 * (1.0 + both[row][column].abs()));
-                }
+            let entry = |row: usize, column: usize| -> f64 {
+                (0..2).map(|k| second[row][k] * first[k][column]).sum()
+            };
+            for (row, column) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                let (product, at_once) = (entry(row, column), both[row][column]);
+                assert!((product - at_once).abs() < 1e-9 * (1.0 + at_once.abs()), "{wn} {zeta}");
             }
             // From rest a step of 1 leaves the distance 1 - y.
             assert!((1.0 - both[0][0] - lag.step(0.053)).abs() < 1e-9, "{wn} {zeta}");

@@ -416,9 +416,7 @@ fn held_out(usable: &[&Flight], test: &[Course], fitted: &Values, vehicle: &Vehi
 }
 
 fn findings(motor: &FlownMotor, usable: &[&Flight]) -> Vec<String> {
-    let mut findings = Vec::new();
-    let map = share_text(motor);
-    findings.push(map);
+    let mut findings = vec![share_text(motor)];
     if motor.reference_voltage_v.is_none() {
         let mean: Vec<f64> =
             usable.iter().flat_map(|flight| &flight.battery_voltage.values).map(|[value]| *value).collect();

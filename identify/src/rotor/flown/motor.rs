@@ -48,7 +48,7 @@ const ROUNDS: usize = 2;
 /// Values of the parameters, in the order of their constants.
 pub type Values = [f64; PARAMETERS];
 
-/// What is fitted to some courses.
+/// Form of a motor that is fitted to courses.
 #[derive(Debug, Clone, Copy)]
 pub struct Form {
     /// Order of the lag.
