@@ -30,7 +30,7 @@
 //! | `envelope` | the ranges of the test flights, in which the verdict was judged |
 //! | [`report`], [`brief`], [`vehicle_file`] | what is written down |
 //! | `digits` | numbers in texts for people |
-//! | [`rotor`] | the rotor from a thrust stand |
+//! | [`rotor`] | rotors and motors from a thrust stand or from flights |
 //!
 //! ```no_run
 //! use flights::FlightSet;

@@ -26,7 +26,8 @@ use vehicles::Vehicle;
 /// Text of `--help` behind the options.
 pub const HELP: &str = "Examples: hummingbus identify flights.toml --out identified\n          \
     HUMMINGBUS_DATA=data hummingbus identify flights/nanobench.toml --out identified\n          \
-    hummingbus identify rotor flights/stands/esc-test-f40.toml --out rotor\n\n\
+    hummingbus identify rotor flights/stands/esc-test-f40.toml --out rotor\n          \
+    hummingbus identify rotor stand.toml flights.toml --out rotor\n\n\
     Writes report.html, report.json and vehicle.toml into the folder. See docs/identify.md.";
 
 /// A report as JSON: its writer comes first.
@@ -40,10 +41,8 @@ const NEXT: Kind = Kind { name: "next flight", mark: Mark::Start(next_flight::MA
 const SET_POINTS: Kind =
     Kind { name: "set points of a next flight", mark: Mark::Start(next_flight::SET_POINTS_START.as_bytes()) };
 /// Tables for a vehicle file.
-const TABLES: Kind = Kind {
-    name: "table of a rotor",
-    mark: Mark::Start(b"# Tables of a vehicle file, identified from a thrust stand: "),
-};
+const TABLES: Kind =
+    Kind { name: "table of a rotor", mark: Mark::Start(b"# Tables of a vehicle file, identified from ") };
 
 /// Arguments of `identify`.
 #[derive(Args)]
@@ -70,10 +69,11 @@ pub struct IdentifyArguments {
 
 #[derive(Subcommand)]
 enum Part {
-    /// Fit thrust, torque and motor to the logs of a thrust stand.
+    /// Fit thrust, torque and motor to the logs of a thrust stand, or to flights that log rotor speeds.
     Rotor {
-        /// The stand file.
-        stand: PathBuf,
+        /// A stand file, a flights file, or one of each, which are then compared.
+        #[arg(required = true, num_args = 1..=2, value_name = "FILE")]
+        files: Vec<PathBuf>,
         /// Folder of rotor.toml and rotor.json; made if it is not there.
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
@@ -89,15 +89,16 @@ enum Part {
 /// A file that cannot be read or written, flights that cannot be used, a run on the bus that fails.
 pub fn run(arguments: &IdentifyArguments) -> Result<bool> {
     match (&arguments.part, &arguments.flights, &arguments.out) {
-        (Some(Part::Rotor { stand, out, json }), ..) => rotor(stand, out, *json),
+        (Some(Part::Rotor { files, out, json }), ..) => rotor(files, out, *json),
         (None, Some(flights), Some(out)) => flights_of(arguments, flights, out),
         _ => bail!("give a flights file, and a folder with --out"),
     }
 }
 
-fn rotor(stand: &Path, out: &Path, is_json: bool) -> Result<bool> {
-    let found = identify::rotor::run(stand)?;
-    let _lock = claim(out, &[("rotor.toml", &TABLES), ("rotor.json", &REPORT)], &[stand])?;
+fn rotor(files: &[PathBuf], out: &Path, is_json: bool) -> Result<bool> {
+    let files: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
+    let found = identify::rotor::run_files(&files)?;
+    let _lock = claim(out, &[("rotor.toml", &TABLES), ("rotor.json", &REPORT)], &files)?;
     write(out, "rotor.toml", &TABLES, &found.tables)?;
     write(out, "rotor.json", &REPORT, &(found.figures + "\n"))?;
     let report = found.report;

@@ -198,6 +198,32 @@ fn a_stand_with_noise_gives_the_constants_within_its_intervals() {
     }
 }
 
+/// The thesis's rotor on a stand and in flight: both give the same figures, and the report says so.
+#[test]
+fn stand_and_flights_of_one_vehicle_agree() {
+    let place = Place::new();
+    let flights = make_flights(&place, &["--fit", "3"]);
+    let (recording, out) = (place.path("stand.mcap"), place.path("rotor"));
+    let manifest = repository("manifests/thesis/propeller-steps-noisy.toml");
+    place.call(&["run", &manifest, "--record", &recording]).with_code(0);
+    let stand = repository("flights/stands/propeller-steps-noisy.toml");
+    let args = ["identify", "rotor", &stand, &flights, "--out", &out, "--json"];
+    let report = place.start_with(&args, &[("HUMMINGBUS_STAND", &recording)]).end().with_code(0).json();
+    let agreement = report["agreement"].as_array().unwrap();
+    let names: Vec<&str> = agreement.iter().map(|value| value["name"].as_str().unwrap()).collect();
+    assert!(["c_T", "natural frequency", "damping ratio"].iter().all(|name| names.contains(name)), "{report:#}");
+    assert!(agreement.iter().all(|value| value["agrees"] == true), "{agreement:#?}");
+    let tables = std::fs::read_to_string(place.path("rotor/rotor.toml")).unwrap();
+    assert!(
+        tables.starts_with("# Tables of a vehicle file, identified from a thrust stand and flights: "),
+        "{tables}"
+    );
+    let of_map = report["flights"]["motor"]["common"]["speed_at_max"]["estimate"]["value"].as_f64().unwrap();
+    assert!((of_map / (8600.0 * PI / 30.0) - 1.0).abs() < 0.01, "{of_map}");
+    let twice = ["identify", "rotor", &flights, &flights, "--out", &out];
+    place.call(&twice).with_code(2).says(&["flights.toml", "both flights files"]);
+}
+
 #[test]
 fn a_stand_file_that_is_not_as_its_recording_is_refused_in_words() {
     let place = Place::new();

@@ -68,8 +68,8 @@ pub struct Fitted {
 /// First against second order.
 #[derive(Debug, Clone, Serialize)]
 pub struct Comparison {
-    /// Mean square error of the first order minus that of the second over the steps held out, each relative to the
-    /// square of the step's height.
+    /// Mean square error of the first order minus that of the second: of a stand over the steps held out, each relative
+    /// to the square of the step's height; of flights over blocks of time that were left out, by the variance of the noise.
     pub first_minus_second: Option<MeanInterval>,
     /// The second only if its error is smaller beyond the interval, since it has a parameter more.
     pub preferred: Order,

@@ -1,6 +1,7 @@
 //! Errors of a stand file, of its logs, or of the folder of the results.
 
 use diagnostics::Diagnostic;
+use flights::FlightsError;
 use recorder::RecordingError;
 use vehicles::table::TableError;
 
@@ -18,6 +19,21 @@ pub enum RotorError {
     /// is taken from.
     #[error(transparent)]
     File(#[from] Diagnostic),
+    /// A flights file or one of its logs cannot be used.
+    #[error(transparent)]
+    Flights(#[from] FlightsError),
+    /// Two files of one kind.
+    #[error(
+        "{first} and {second} are both {kind} files; expected one stand file, one flights file, or one of each"
+    )]
+    TwoOfAKind {
+        /// The first.
+        first: String,
+        /// The second.
+        second: String,
+        /// Their kind.
+        kind: &'static str,
+    },
     /// A log is not a table.
     #[error("{file}: {cause}")]
     Table {

@@ -4,15 +4,18 @@ use std::fmt;
 
 use serde::Serialize;
 
+use super::agreement::Agreement;
 use super::coefficient::Coefficient;
 use super::dynamics::{Dynamics, Fitted, Order};
 use super::error::RotorError;
+use super::flown::Flown;
+use super::flown_report;
 use super::plateau;
 use super::score::Score;
 use super::statics::Statics;
 use crate::statistics::Estimate;
 
-/// Everything that a stand told.
+/// Everything that a stand and flights told.
 #[derive(Debug, Clone, Serialize)]
 pub struct RotorReport {
     /// Name of the measured object.
@@ -21,6 +24,10 @@ pub struct RotorReport {
     pub statics: Option<Statics>,
     /// The motor; absent without dynamic logs.
     pub dynamics: Option<Dynamics>,
+    /// Figures from flights; absent without a flights file.
+    pub flights: Option<Flown>,
+    /// Values that stand and flights both determine; none without both.
+    pub agreement: Vec<Agreement>,
 }
 
 impl RotorReport {
@@ -41,10 +48,17 @@ impl fmt::Display for RotorReport {
         if let Some(dynamics) = &self.dynamics {
             write_dynamics(f, dynamics)?;
         }
+        if let Some(flown) = &self.flights {
+            flown_report::write(f, flown)?;
+        }
+        if self.flights.is_some() && (self.statics.is_some() || self.dynamics.is_some()) {
+            flown_report::write_agreement(f, &self.agreement)?;
+        }
         let statics = self.statics.iter().flat_map(|statics| &statics.findings);
         let dynamics = self.dynamics.iter().flat_map(|dynamics| &dynamics.findings);
+        let flights = self.flights.iter().flat_map(flown_report::findings);
         writeln!(f, "about the data")?;
-        statics.chain(dynamics).try_for_each(|finding| writeln!(f, "  - {finding}"))
+        statics.chain(dynamics).chain(flights).try_for_each(|finding| writeln!(f, "  - {finding}"))
     }
 }
 

@@ -43,10 +43,39 @@ impl Lag {
             let (sin, cos) = libm::sincos(omega * t_s);
             return 1.0 - libm::exp(-decay * t_s) * (cos + decay / omega * sin);
         }
-        // The slow root by its conjugate, which keeps its digits where a2 is small.
-        let root = discriminant.sqrt();
-        let (slow, fast) = (-2.0 / (a1 + root), -0.5 * (a1 + root) / a2);
+        let (slow, fast) = self.real_roots(discriminant.sqrt());
         1.0 + (fast * libm::exp(slow * t_s) - slow * libm::exp(fast * t_s)) / (slow - fast)
+    }
+
+    /// The matrix that takes the distance from a constant command, and the rate of it, over `t_s`.
+    pub fn transition(self, t_s: f64) -> [[f64; 2]; 2] {
+        let Self { a1_s: a1, a2_s2: a2 } = self;
+        if a2 <= 0.0 {
+            return [[libm::exp(-t_s / a1), 0.0], [0.0, 0.0]];
+        }
+        let discriminant = a1 * a1 - 4.0 * a2;
+        let decay = 0.5 * a1 / a2;
+        if discriminant > NEAR_CRITICAL * a1 * a1 {
+            let (slow, fast) = self.real_roots(discriminant.sqrt());
+            let (of_slow, of_fast) = (libm::exp(slow * t_s), libm::exp(fast * t_s));
+            let part = 1.0 / (slow - fast);
+            return [
+                [part * (slow * of_fast - fast * of_slow), part * (of_slow - of_fast)],
+                [part * slow * fast * (of_fast - of_slow), part * (slow * of_slow - fast * of_fast)],
+            ];
+        }
+        // cos(w t) and sin(w t) / w, of which the latter is t where w is 0.
+        let omega = 0.5 * (-discriminant).max(0.0).sqrt() / a2;
+        let (sin, cos) = libm::sincos(omega * t_s);
+        let sine = if omega * t_s > NEAR_CRITICAL { sin / omega } else { t_s };
+        let fall = libm::exp(-decay * t_s);
+        [[fall * (cos + decay * sine), fall * sine], [-fall * sine / a2, fall * (cos - decay * sine)]]
+    }
+
+    /// The slow and the fast root of an overdamped motor; the slow one by its conjugate, which keeps its digits where
+    /// a2 is small.
+    fn real_roots(self, root: f64) -> (f64, f64) {
+        (-2.0 / (self.a1_s + root), -0.5 * (self.a1_s + root) / self.a2_s2)
     }
 }
 
@@ -80,6 +109,25 @@ mod tests {
                 assert!((lag.step(t) - integrated(lag, t)).abs() < 1e-8, "{wn} {zeta} {t}");
             }
         }
+    }
+
+    #[test]
+    fn transitions_follow_the_step_and_each_other() {
+        for (wn, zeta) in [(15.1, 0.6), (40.0, 1.0), (40.0, 1.0 + 1e-10), (60.0, 1.8)] {
+            let lag = Lag { a1_s: 2.0 * zeta / wn, a2_s2: 1.0 / (wn * wn) };
+            let ([first, second], both) = ([0.013, 0.04].map(|t| lag.transition(t)), lag.transition(0.053));
+            let entry = |row: usize, column: usize| -> f64 {
+                (0..2).map(|k| second[row][k] * first[k][column]).sum()
+            };
+            for (row, column) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                let (product, at_once) = (entry(row, column), both[row][column]);
+                assert!((product - at_once).abs() < 1e-9 * (1.0 + at_once.abs()), "{wn} {zeta}");
+            }
+            // From rest a step of 1 leaves the distance 1 - y.
+            assert!((1.0 - both[0][0] - lag.step(0.053)).abs() < 1e-9, "{wn} {zeta}");
+        }
+        let first = Lag { a1_s: 0.04, a2_s2: 0.0 };
+        assert!((1.0 - first.transition(0.03)[0][0] - first.step(0.03)).abs() < 1e-15);
     }
 
     #[test]

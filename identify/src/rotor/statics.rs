@@ -13,8 +13,8 @@ use super::stand::{Column, Stand, StaticLog, held_out, short_name};
 use super::table::LogTable;
 use crate::statistics::mean;
 
-/// Density of air for the check of plausibility, in kg/m^3 (15 degrees C at sea level, ISO 2533).
-const AIR_KG_M3: f64 = 1.225;
+/// Density of air for checks of plausibility, in kg/m^3 (15 degrees C at sea level, ISO 2533).
+pub const AIR_KG_M3: f64 = 1.225;
 
 /// Results of the static logs.
 #[derive(Debug, Clone, Serialize)]

@@ -5,6 +5,7 @@ use vehicles::{MotorModel, Uncertainty};
 use super::coefficient::Coefficient;
 use super::command_map::CommandLine;
 use super::dynamics::{Dynamics, Order};
+use super::flown::{Figure, FlownCoefficient, FlownCoefficients, FlownMotor};
 use super::report::RotorReport;
 use super::stand::VehicleFile;
 use super::statics::Statics;
@@ -12,8 +13,14 @@ use crate::statistics::Estimate;
 
 /// The text of `rotor.toml`. Values that the stand does not give come from `vehicle`, and are left out without one.
 pub fn text(report: &RotorReport, vehicle: Option<&VehicleFile>) -> String {
+    let is_stand = report.statics.is_some() || report.dynamics.is_some();
+    let origin = match (is_stand, report.flights.is_some()) {
+        (true, true) => "a thrust stand and flights",
+        (false, true) => "flights",
+        _ => "a thrust stand",
+    };
     let head = format!(
-        "# Tables of a vehicle file, identified from a thrust stand: {}.\n\
+        "# Tables of a vehicle file, identified from {origin}: {}.\n\
          # An uncertainty is one standard deviation; rotor.json has intervals, scores and findings.\n",
         diagnostics::printable_line(&report.name)
     );
@@ -38,7 +45,7 @@ fn identified(name: &str, estimate: &Estimate, unit: &str, source: &str) -> Stri
 
 /// A line with the value of the vehicle file, or a comment that it has none.
 fn taken(vehicle: Option<&VehicleFile>, table: &str, name: &str, unit: &str, value: f64) -> String {
-    let Some(file) = vehicle else { return format!("# {name}: the stand does not tell\n") };
+    let Some(file) = vehicle else { return format!("# {name}: not identified\n") };
     let key = format!("{table}.{name}");
     let provenance = file.vehicle.provenance.iter().find(|known| known.key == key);
     let source = provenance.map_or("", |known| known.source.as_str());
@@ -52,9 +59,15 @@ fn taken(vehicle: Option<&VehicleFile>, table: &str, name: &str, unit: &str, val
 
 fn rotor(report: &RotorReport, vehicle: Option<&VehicleFile>) -> String {
     let of = |value: fn(&vehicles::Vehicle) -> f64| vehicle.map_or(f64::NAN, |file| value(&file.vehicle));
-    let line = |name: &str, unit: &str, law: &str, found: Option<&Coefficient>, other: f64| match found {
-        Some(found) => identified(name, &found.value, unit, &fitted_on(report, law, found)),
-        None => taken(vehicle, "rotor", name, unit, other),
+    let line = |name: &str, unit: &str, law: &str, found: Option<&Coefficient>, other: f64| {
+        let flown = flown(report, if unit == "N/(rad/s)^2" { |all| &all.thrust } else { |all| &all.torque });
+        match (found, flown) {
+            (Some(found), _) => identified(name, &found.value, unit, &fitted_on(report, law, found)),
+            (None, Some(flown)) => {
+                identified(name, &flown, unit, &format!("{}: {law} in flight", report.name))
+            }
+            (None, None) => taken(vehicle, "rotor", name, unit, other),
+        }
     };
     let found =
         |of: fn(&Statics) -> &Option<Coefficient>| report.statics.as_ref().and_then(|all| of(all).as_ref());
@@ -66,6 +79,11 @@ fn rotor(report: &RotorReport, vehicle: Option<&VehicleFile>) -> String {
         taken(vehicle, "rotor", "inertia", "kg*m^2", of(|vehicle| vehicle.rotor_inertia_kg_m2)),
     ]
     .concat()
+}
+
+/// A coefficient that flights determine.
+fn flown(report: &RotorReport, of: fn(&FlownCoefficients) -> &FlownCoefficient) -> Option<Estimate> {
+    of(report.flights.as_ref()?.coefficients.as_ref()?).coefficient.determined().copied()
 }
 
 fn fitted_on(report: &RotorReport, law: &str, found: &Coefficient) -> String {
@@ -89,7 +107,10 @@ fn motor(report: &RotorReport, vehicle: Option<&VehicleFile>) -> String {
         };
         return format!("[motor]\n# {}\n{order}", comparison.reason);
     }
-    let Some(file) = vehicle else { return "# [motor]: the stand does not tell\n".to_owned() };
+    if let Some(lines) = flown_motor(report) {
+        return lines;
+    }
+    let Some(file) = vehicle else { return "# [motor]: not identified\n".to_owned() };
     let line = |name: &str, unit: &str, value: f64| taken(vehicle, "motor", name, unit, value);
     let order = match file.vehicle.motor {
         MotorModel::FirstOrder { time_constant_s } => {
@@ -103,6 +124,31 @@ fn motor(report: &RotorReport, vehicle: Option<&VehicleFile>) -> String {
     format!("[motor]\n{order}")
 }
 
+/// The motor of flights, if they determine it. A delay is an effect of the vehicle, which a comment gives.
+fn flown_motor(report: &RotorReport) -> Option<String> {
+    let motor = report.flights.as_ref()?.motor.as_ref()?;
+    let lag = &motor.common.lag;
+    let source = format!("{}: speeds under the commands of flights", report.name);
+    let line = |name: &str, figure: &Option<Figure>| {
+        let figure = figure.as_ref()?;
+        Some(identified(name, figure.determined()?, figure.unit, &source))
+    };
+    let order = match motor.comparison.preferred {
+        Order::First => first_order(line("time_constant", &lag.time_constant)?),
+        Order::Second => second_order(
+            line("natural_frequency", &lag.natural_frequency)?,
+            line("damping_ratio", &lag.damping_ratio)?,
+        ),
+    };
+    let delay = lag.delay.determined().map(|delay| {
+        format!(
+            "# from the command to the measured speed: a delay of {:.4} s (95 %: {:.4} to {:.4}); the effect command-delay has it\n",
+            delay.value, delay.low, delay.high
+        )
+    });
+    Some(format!("[motor]\n# {}\n{order}{}", motor.comparison.reason, delay.unwrap_or_default()))
+}
+
 fn first_order(time_constant: String) -> String {
     format!("model = \"first-order\"\n{time_constant}")
 }
@@ -112,6 +158,10 @@ fn second_order(natural_frequency: String, damping_ratio: String) -> String {
 }
 
 fn command(report: &RotorReport, vehicle: Option<&VehicleFile>) -> String {
+    let flown = report.flights.as_ref().and_then(|flown| flown.motor.as_ref());
+    if let Some(lines) = flown.and_then(|motor| flown_command(&report.name, motor, vehicle)) {
+        return lines;
+    }
     let (lines, zero_is_off, source) =
         match (report.dynamics.as_ref().map(|dynamics| &dynamics.command), vehicle) {
             (Some(Some(found)), _) => {
@@ -129,11 +179,35 @@ fn command(report: &RotorReport, vehicle: Option<&VehicleFile>) -> String {
                 ];
                 (lines, Some(map.zero_is_off), format!("taken over from {}", file.name))
             }
-            (_, None) => return "# [command]: the stand does not tell\n".to_owned(),
+            (_, None) => return "# [command]: not identified\n".to_owned(),
         };
     let source = toml::Value::from(source);
     let off = zero_is_off.map(|is_off| format!("zero_is_off = {{ value = {is_off}, source = {source} }}\n"));
     format!("[command]\n{}{}", lines.concat(), off.unwrap_or_default())
+}
+
+/// The command map of flights, over the range of the vehicle file's; `None` if they do not determine it.
+fn flown_command(name: &str, motor: &FlownMotor, vehicle: Option<&VehicleFile>) -> Option<String> {
+    let map = &vehicle?.vehicle.command;
+    let common = &motor.common;
+    let (low, high) = (common.speed_at_min.determined()?, common.speed_at_max.determined()?);
+    // A line can leave the axis below; a vehicle file has no negative speed.
+    let low = Estimate { value: low.value.max(0.0), ..*low };
+    let at = motor.reference_voltage_v.map(|voltage| format!(" at {voltage:.2} V"));
+    let source = format!("{name}: line through speeds and commands of flights{}", at.unwrap_or_default());
+    let line = |name: &str, unit: &str, value: f64| taken(vehicle, "command", name, unit, value);
+    let off = toml::Value::from(format!("taken over from {}", vehicle?.name));
+    Some(
+        [
+            "[command]\n".to_owned(),
+            line("min", "1", map.min),
+            line("max", "1", map.max),
+            identified("speed_at_min", &low, "rad/s", &source),
+            identified("speed_at_max", high, "rad/s", &source),
+            format!("zero_is_off = {{ value = {}, source = {off} }}\n", map.zero_is_off),
+        ]
+        .concat(),
+    )
 }
 
 fn identified_command(name: &str, found: &CommandLine) -> [String; 4] {
