@@ -34,16 +34,18 @@ const NAMES: &[&str] = &[
     "gyroscopic-torque",
     "rig-pendulum",
     "bearing-friction",
+    "gimbal-friction",
 ];
 
 /// Those that know neither where up is nor where the ground is, so that the laboratory may be turned at will.
-const FREE_OF_THE_VERTICAL: [&str; 6] = [
+const FREE_OF_THE_VERTICAL: [&str; 7] = [
     "rotor-drag",
     "parasitic-drag",
     "translational-lift",
     "blade-flapping",
     "weak-rotor",
     "bearing-friction",
+    "gimbal-friction",
 ];
 
 #[test]
@@ -383,7 +385,7 @@ proptest! {
     ) {
         let vehicle = hummingbird();
         let situation = FlightCondition::new(&vehicle, &state, &air_W_m_s);
-        for name in ["rotor-drag", "parasitic-drag", "bearing-friction"] {
+        for name in ["rotor-drag", "parasitic-drag", "bearing-friction", "gimbal-friction"] {
             let wrench = wrench(&between_bounds(find(name).unwrap(), &shares), &situation);
             prop_assert!(power_W(&wrench, &situation) <= 0.0, "{name}");
         }
