@@ -34,6 +34,14 @@ impl Pairs {
     /// The vehicle's leaning, as an acceleration in the horizontal plane under `gravity_m_s2`, against the position's
     /// over windows of `window_s`.
     pub fn leaning(attitude: &Channel<4>, position: &Channel<3>, gravity_m_s2: f64, window_s: f64) -> Self {
+        let leaning = Self::leaning_of(attitude, gravity_m_s2);
+        Self::over_windows(&position.time_s, &leaning, window_s, |from, to| {
+            velocity_change(position, from, to).map(|change| Vector3::new(change.x, change.y, 0.0))
+        })
+    }
+
+    /// The horizontal acceleration of a vehicle that carries its weight as it leans, in the world.
+    pub fn leaning_of(attitude: &Channel<4>, gravity_m_s2: f64) -> Channel<3> {
         let lean = |wxyz: &[f64; 4]| {
             let up = rotation(*wxyz) * Vector3::z();
             // Beyond 60 degrees the vehicle does not hold its height by leaning.
@@ -41,10 +49,7 @@ impl Pairs {
             [part * up.x, part * up.y, 0.0]
         };
         let values = attitude.values.iter().map(lean).collect();
-        let leaning = Channel { time_s: attitude.time_s.clone(), values };
-        Self::over_windows(&position.time_s, &leaning, window_s, |from, to| {
-            velocity_change(position, from, to).map(|change| Vector3::new(change.x, change.y, 0.0))
-        })
+        Channel { time_s: attitude.time_s.clone(), values }
     }
 
     /// An acceleration in the world against the velocity's change over windows of `window_s`, or against the position's
@@ -89,6 +94,33 @@ impl Pairs {
     /// The same pairs, the logged vector turned by `turn`.
     pub fn turned(&self, turn: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> Self {
         Self { logged: self.logged.iter().map(turn).collect(), derived: self.derived.clone() }
+    }
+
+    /// The horizontal parts.
+    pub fn level(self) -> Self {
+        let level =
+            |vectors: Vec<Vector3<f64>>| vectors.into_iter().map(|v| Vector3::new(v.x, v.y, 0.0)).collect();
+        Self { logged: level(self.logged), derived: level(self.derived) }
+    }
+
+    /// The same pairs, without the mean of each of the two vectors.
+    pub fn without_means(self) -> Self {
+        let centred = |vectors: Vec<Vector3<f64>>| {
+            let mean = vectors.iter().sum::<Vector3<f64>>() / vectors.len().max(1) as f64;
+            vectors.into_iter().map(|vector| vector - mean).collect()
+        };
+        Self { logged: centred(self.logged), derived: centred(self.derived) }
+    }
+
+    /// The root mean square of the logged vector.
+    pub fn size_logged(&self) -> f64 {
+        let squares = self.logged.iter().map(Vector3::norm_squared).sum::<f64>();
+        (squares / self.logged.len().max(1) as f64).sqrt()
+    }
+
+    /// True if there are enough pairs to say something.
+    pub fn is_enough(&self) -> bool {
+        self.derived.len() >= PAIRS_MIN
     }
 
     /// The root mean square of the difference between the two.

@@ -65,6 +65,8 @@ pub struct FlightEntry {
     pub delay_s: BTreeMap<Quantity, Spanned<f64>>,
     /// Assumption in place of a measurement that the log does not have.
     pub assume: Option<Spanned<Assumption>>,
+    /// True if a rig holds the vehicle, false if it flies freely; else the channels show it.
+    pub rig: Option<bool>,
     /// True if values that contradict their units are only noted.
     #[serde(default)]
     pub trust_units: bool,

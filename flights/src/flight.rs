@@ -89,6 +89,8 @@ pub struct Flight {
     pub specific_force: Channel<3>,
     /// Voltage of the battery in V.
     pub battery_voltage: Channel<1>,
+    /// True if a rig holds the vehicle at a point, false if it flies freely; `None` if nobody said so.
+    pub on_rig: Option<bool>,
     /// Assumptions of the flights file in place of measurements, such as a level attitude.
     pub assumed: Vec<String>,
     /// Notes of the reader: repeated samples left out, gaps, values that look like another unit.
@@ -161,6 +163,7 @@ impl Flight {
             angular_velocity: Channel::default(),
             specific_force: Channel::default(),
             battery_voltage: Channel::default(),
+            on_rig: None,
             assumed: Vec::new(),
             notes: Vec::new(),
         }

@@ -17,6 +17,7 @@
 //! | `channels`, `clean`, `held`, `jumps`, `spikes`, `reading` | from a log's numbers to a flight |
 //! | `specific_force` | specific force from what logs hold in its place |
 //! | `plausible`, `agreement`, `force_doubt`, `still`, `units`, `finding` | values against physics |
+//! | `rig` | vehicles that a rig holds at a point |
 //! | `span` | times against the number of samples |
 //! | `held_out`, `twin` | whether test flights hold what parameters are fitted on: by file and time, by samples |
 //! | `state` | errors of a simulated state against the measured one |
@@ -65,6 +66,7 @@ mod plausible;
 mod played;
 mod quantity;
 mod reading;
+mod rig;
 mod rows;
 mod scaling;
 mod seams;
@@ -91,6 +93,7 @@ pub use limits::NextFlight;
 pub use log_reader::ReadFile;
 pub use played::Played;
 pub use quantity::Quantity;
+pub use rig::{Hold, hold};
 pub use set::FlightSet;
 pub use span::{Moment, Sparse};
 pub use twin::{Comparison, Twin, twin};

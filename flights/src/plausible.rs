@@ -12,6 +12,7 @@ use crate::flight::{Channel, Flight, median};
 use crate::force_doubt::{ForceDoubt, Kind};
 use crate::frame;
 use crate::quantity::{FRACTION, PERCENT, Quantity};
+use crate::rig::{Hold, hold};
 use crate::spikes::usual_greatest;
 use crate::still;
 use crate::units::{HUNDREDS, Units, finding, is_gross, of_hundreds, of_unit};
@@ -77,7 +78,7 @@ pub fn judge(flight: &Flight, vehicle: &Vehicle, channels: &ChannelMap) -> Vec<F
         judge.rates(),
         judge.still(),
         judge.velocity(),
-        judge.leaning().or_else(|| judge.axes()).or_else(|| judge.speed()),
+        judge.place().or_else(|| judge.speed()),
         judge.commands(),
         judge.rotor_speed(),
         judge.voltage(),
@@ -297,6 +298,12 @@ impl Judge<'_> {
             if fits.is_some() { "" } else { "; it may be in the body, or late" }
         );
         Some(finding(quantity, fits, &what))
+    }
+
+    /// The position accelerates as and to where the vehicle leans, unless a rig holds it.
+    fn place(&self) -> Option<Finding> {
+        let is_held = matches!(hold(self.flight, self.vehicle.gravity_m_s2), Hold::Held(_));
+        if is_held { None } else { self.leaning().or_else(|| self.axes()) }
     }
 
     /// The position accelerates as the vehicle leans.

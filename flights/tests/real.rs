@@ -18,7 +18,7 @@ fn load(name: &str) -> FlightSet {
 }
 
 fn length_s(flight: &Flight) -> f64 {
-    flight.command.span_s().unwrap().1
+    flight.attitude.span_s().or(flight.command.span_s()).unwrap().1
 }
 
 #[test]
@@ -52,7 +52,7 @@ fn every_flights_file_is_read_without_a_doubt_about_units() {
             assert!(!flight.notes.iter().any(doubt), "{:?}", flight.notes);
         }
     }
-    assert_eq!(count, 9);
+    assert_eq!(count, 11);
 }
 
 #[test]

@@ -40,7 +40,11 @@ impl Brief {
             answer: answer(report),
             // Effects of a model that loses are no findings.
             missing: findings.iter().map(|(name, effect)| missing(name, effect)).collect(),
-            certainty: findings.iter().map(|(name, effect)| certainty(name, effect)).collect(),
+            certainty: findings
+                .iter()
+                .map(|(name, effect)| certainty(name, effect))
+                .chain(report.ratios.iter().map(|ratios| format!("Ratios: {ratios}.")))
+                .collect(),
             changes: CHANNELS
                 .iter()
                 .filter_map(|channel| change(report, channel))
@@ -152,6 +156,10 @@ fn next(report: &Report, accepted: &[(&str, &EffectReport)]) -> Vec<String> {
         if let (Some(experiment), Some(rival)) = (&effect.experiment, effect.confused_with.first()) {
             steps.push(format!("To tell {name} from {rival}: {experiment}."));
         }
+    }
+    if let Some(ratios) = &report.ratios {
+        steps
+            .push(format!("To separate thrust, inertia, static moment and friction: {}.", ratios.experiment));
     }
     if let Some(proposal) = &report.next_flight {
         let sentences = proposal.sentences().join(". ");

@@ -84,7 +84,7 @@ fn has(prepared: &Prepared, quantity: Quantity) -> bool {
         Quantity::Height => !flight.position.is_empty(),
         Quantity::Attitude => has_attitude,
         Quantity::Command => !flight.command.is_empty(),
-        Quantity::Rig => !prepared.moves_freely(),
+        Quantity::Rig => !prepared.moves_freely,
         Quantity::TwoClocks => allows(Equation::Gyroscope) || !flight.command.is_empty(),
         Quantity::SpecificForce => allows(Equation::SpecificForce),
         Quantity::TwoRotations => allows(Equation::Gyroscope),

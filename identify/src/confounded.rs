@@ -1,7 +1,8 @@
 //! Confounded effects: rivals that explain the flights as well in the place of an accepted effect.
 
-use crate::candidate::Candidate;
+use crate::candidate::{Candidate, free_parameters};
 use crate::fit::{FitResult, Problem};
+use crate::ratios;
 use crate::select::{Judged, Round, Selection, fitted, is_worse, without};
 use rayon::prelude::*;
 
@@ -17,13 +18,13 @@ pub struct Rival {
     pub fitted: FitResult,
 }
 
-/// The rivals of each accepted candidate.
-pub fn rivals(problem: &Problem, selection: &Selection) -> Vec<Vec<Rival>> {
-    (0..selection.accepted.len()).map(|at| of_candidate(problem, selection, at)).collect()
+/// The rivals of each accepted candidate among `open` ones.
+pub fn rivals(problem: &Problem, selection: &Selection, open: &[Candidate]) -> Vec<Vec<Rival>> {
+    (0..selection.accepted.len()).map(|at| of_candidate(problem, selection, open, at)).collect()
 }
 
 /// The rivals of the accepted candidate number `at`, among those that were near it when it was taken.
-fn of_candidate(problem: &Problem, selection: &Selection, at: usize) -> Vec<Rival> {
+fn of_candidate(problem: &Problem, selection: &Selection, open: &[Candidate], at: usize) -> Vec<Rival> {
     let candidate = &selection.accepted[at];
     let mut others = selection.accepted.clone();
     others.remove(at);
@@ -33,7 +34,42 @@ fn of_candidate(problem: &Problem, selection: &Selection, at: usize) -> Vec<Riva
         let is_alike = !is_worse(&fitted, &selection.after);
         is_alike.then(|| Rival { candidate: (*candidate).clone(), fitted })
     };
-    near(selection, candidate).par_iter().filter_map(rival).collect()
+    let mut rivals: Vec<Rival> = near(selection, candidate).par_iter().filter_map(rival).collect();
+    if ratios::shows_rotation_alone(problem) {
+        rivals.extend(of_ratios(problem, selection, open, candidate));
+    }
+    rivals
+}
+
+/// Rivals of the parameters of `candidate` that scale thrust or inertia: rotation alone shows their ratios only. The rest of the
+/// candidate stays.
+fn of_ratios(
+    problem: &Problem,
+    selection: &Selection,
+    open: &[Candidate],
+    candidate: &Candidate,
+) -> Vec<Rival> {
+    let scaling = ratios::scaling(problem, &candidate.free);
+    if scaling.is_empty() {
+        return Vec::new();
+    }
+    let mut start = selection.after.values.clone();
+    scaling.iter().for_each(|at| start[*at] = problem.model.parameters.all[*at].baseline);
+    let kept: Vec<usize> =
+        free_parameters(&selection.accepted).into_iter().filter(|at| !scaling.contains(at)).collect();
+    let is_other = |other: &&Candidate| {
+        other.kind != candidate.kind && !selection.accepted.iter().any(|one| one.kind == other.kind)
+    };
+    let rival = |other: &Candidate| {
+        let free = ratios::scaling(problem, &other.free);
+        if free.is_empty() {
+            return None;
+        }
+        let fitted = problem.fitted(&start, &[kept.as_slice(), &free].concat());
+        let is_alike = !is_worse(&fitted, &selection.after);
+        is_alike.then(|| Rival { candidate: Candidate { kind: other.kind, free }, fitted })
+    };
+    open.iter().filter(is_other).filter_map(rival).collect()
 }
 
 /// The candidates of other effects with at least [`NEAR`] of the gain of `candidate`, in the round that took it.

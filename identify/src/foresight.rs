@@ -205,7 +205,7 @@ fn ends_under(
     let corrected = errors.taken_off(flight.flight, &flight.late);
     let Some(measured) = Measured::of(&corrected) else { return Vec::new() };
     let measured = span_s.into_iter().fold(measured, Measured::shortened);
-    measured.ends(problem.model.airframe(values), horizon_s, push)
+    measured.ends(problem.model.airframe_of(flight, values), horizon_s, push)
 }
 
 /// Errors of a state at the end of a window: attitude about the axes of the body in deg, velocity in the world in m/s; 0

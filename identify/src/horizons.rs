@@ -52,11 +52,15 @@ pub fn predictions(problem: &Problem, set: &FlightSet, values: &[f64]) -> Vec<Pr
         let (Some(before), Some(after)) = (Measured::of(&aligned), Measured::of(&corrected)) else {
             continue;
         };
+        let airframe = |values: &[f64]| {
+            let model = &problem.model;
+            prepared.map_or_else(|| model.airframe(values), |flight| model.airframe_of(flight, values))
+        };
         let seen = prepared.map_or(OwnTrim::default(), |prepared| OwnTrim::of(problem, prepared, values));
         for horizon_s in HORIZONS_S {
-            let old = before.ends(problem.model.airframe(&declared), horizon_s, |_| [0.0; 6]);
-            let new = after.ends(problem.model.airframe(values), horizon_s, |_| [0.0; 6]);
-            let trimmed = after.ends(problem.model.airframe(values), horizon_s, |from_s| seen.at(from_s));
+            let old = before.ends(airframe(&declared), horizon_s, |_| [0.0; 6]);
+            let new = after.ends(airframe(values), horizon_s, |_| [0.0; 6]);
+            let trimmed = after.ends(airframe(values), horizon_s, |from_s| seen.at(from_s));
             let errors = [
                 errors(&aligned, &old, |end| end.simulated),
                 errors(&corrected, &new, |end| end.simulated),

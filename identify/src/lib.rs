@@ -18,8 +18,10 @@
 //! | `normal`, `fit` | generalised least squares over blocks of time: an estimation problem and its result |
 //! | `logging` | timing errors that slowly logged commands make |
 //! | `select`, `confounded` | the stepwise search for the effects that the flights ask for, and their rivals |
+//! | `ratios` | what flights determine that show rotation alone |
 //! | `questions`, `evidence`, `log_rates` | open questions, and what a simulated flight would say on them |
 //! | [`proposal`] | the next flight, as reports hold it |
+//! | `rig` | flights of vehicles that a rig holds |
 //! | `align`, `faults`, `trim` | clocks, sensors and trims, before anything is fitted |
 //! | `sensing` | the sensors' delays and biases, and a flight without them |
 //! | `whiteness`, `noise`, [`statistics`] | what is left, and what noise alone would leave |
@@ -68,9 +70,11 @@ mod predict;
 mod prepared;
 pub mod proposal;
 mod questions;
+mod ratios;
 mod refine;
 mod regressor;
 pub mod report;
+mod rig;
 pub mod rotor;
 mod rows;
 pub mod run;
@@ -94,6 +98,7 @@ pub use faults::Fault;
 pub use log_rates::LogRates;
 pub use prepared::Equation;
 pub use questions::{OpenQuestions, Question};
+pub use ratios::{Ratio, Ratios};
 pub use regressor::Regressor;
 pub use sensing::SensorErrors;
 pub use unusable::Unusable;

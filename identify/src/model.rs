@@ -7,7 +7,7 @@ use crate::prepared::{BOX_STEPS, EachRotor, Equation, Held, Prepared, Tracks};
 use crate::sensing::SensorErrors;
 use crate::track::Track;
 use nalgebra::Vector3;
-use plant::effects::Stage;
+use plant::effects::{Quantity, Stage};
 use plant::{Actuation, Airframe, NewtonEuler, PerRotor, RigidBody, RotorState, State};
 use std::sync::Arc;
 use vehicles::Vehicle;
@@ -39,6 +39,13 @@ impl Model {
         Airframe::with_effects(self.vehicle.clone(), self.parameters.effects_under(values))
     }
 
+    /// The vehicle of `flight` under these values: effects of a rig do not act where it moves freely.
+    pub fn airframe_of(&self, flight: &Prepared, values: &[f64]) -> Airframe {
+        let mut effects = self.parameters.effects_under(values);
+        effects.retain(|effect| !(flight.moves_freely && effect.kind.needs.contains(&Quantity::Rig)));
+        Airframe::with_effects(self.vehicle.clone(), effects)
+    }
+
     /// The measured channels of `flight` under these values.
     pub fn tracks(&self, flight: &Prepared, values: &[f64]) -> Arc<Tracks> {
         let errors = SensorErrors::of(&self.parameters, values);
@@ -53,7 +60,7 @@ impl Model {
             let flown = flight.recent_rotors.at(pose_s, || measured_rotors(flight, pose_s));
             return Rotors { commanded: flown.iter().map(speeds).collect(), flown: flown.to_vec() };
         }
-        let mut flown = spun(&self.airframe(values), flight, pose_s);
+        let mut flown = spun(&self.airframe_of(flight, values), flight, pose_s);
         let commanded: Vec<EachRotor> = flown.iter().map(speeds).collect();
         if !flight.flight.rotor_speed.is_empty() {
             correct(flight, pose_s, &commanded, &mut flown);
@@ -96,7 +103,7 @@ impl Model {
     }
 
     fn sides(&self, flight: &Prepared, tracks: &Tracks, rotors: &Rotors, values: &[f64]) -> Sides {
-        let airframe = self.airframe(values);
+        let airframe = self.airframe_of(flight, values);
         let actuation = air(&airframe, flight.layout.clock.step_s);
         let model = NewtonEuler::flying(airframe, 1);
         let mounting = SensorErrors::of(&self.parameters, values).mounting();

@@ -3,6 +3,7 @@
 
 use crate::clock::{Clock, Lateness};
 use crate::memo::{Memo, Recent};
+use crate::rig;
 use crate::track::{Track, valid_about};
 use crate::unusable::Unusable;
 use crate::window::{NUMEROV, SIMPSON, Window, central_difference, second_difference};
@@ -136,9 +137,6 @@ const WORTH: f64 = 0.9;
 /// Far below any tick, and above the rounding of times from which seconds since 1970 were subtracted.
 const SLACK_S: f64 = 1e-6;
 
-/// No rig lets a vehicle go further to the side.
-const RIG_M: f64 = 0.3;
-
 /// A flight with its layout.
 #[derive(Debug)]
 pub struct Prepared<'f> {
@@ -158,6 +156,8 @@ pub struct Prepared<'f> {
     recent_tracks: Recent<(f64, f64, Lateness), Tracks>,
     /// Measured rotors, by the delay of the pose.
     pub recent_rotors: Recent<f64, Vec<PerRotor<RotorState>>>,
+    /// True if the vehicle accelerates as it leans, or moves further to the side than any rig allows.
+    pub moves_freely: bool,
 }
 
 impl<'f> Prepared<'f> {
@@ -194,6 +194,7 @@ impl<'f> Prepared<'f> {
             memo: Memo::default(),
             recent_tracks: Recent::default(),
             recent_rotors: Recent::default(),
+            moves_freely: rig::moves_freely(flight, propulsion.gravity_m_s2),
         };
         prepared.layout.knots = prepared.knots(propulsion);
         if prepared.layout.knots.len() >= 3 { Ok(prepared) } else { Err(prepared.unusable(propulsion)) }
@@ -228,15 +229,6 @@ impl<'f> Prepared<'f> {
     /// True if its attitude or its rates were assumed instead of measured.
     pub fn is_assumed(&self) -> bool {
         !self.flight.assumed.is_empty()
-    }
-
-    /// True if the vehicle moves further to the side than any rig allows.
-    pub fn moves_freely(&self) -> bool {
-        let positions = &self.flight.position.values;
-        (0..2).any(|axis| {
-            let of_axis = || positions.iter().map(|position| position[axis]);
-            of_axis().fold(f64::MIN, f64::max) - of_axis().fold(f64::MAX, f64::min) > RIG_M
-        })
     }
 
     /// Length of the compared part, in s.
@@ -420,6 +412,7 @@ pub struct Propulsion {
     command: CommandMap,
     /// Mean speed of the rotors above which the vehicle is in the air.
     least_rad_s: f64,
+    gravity_m_s2: f64,
     /// Time constant of the motors.
     pub motor_s: f64,
 }
@@ -431,7 +424,12 @@ impl Propulsion {
             MotorModel::FirstOrder { time_constant_s } => time_constant_s,
             MotorModel::SecondOrder { natural_frequency_rad_s, .. } => 1.0 / natural_frequency_rad_s,
         };
-        Self { command: vehicle.command, least_rad_s: FLYING * vehicle.hover_speed_rad_s(), motor_s }
+        Self {
+            command: vehicle.command,
+            least_rad_s: FLYING * vehicle.hover_speed_rad_s(),
+            gravity_m_s2: vehicle.gravity_m_s2,
+            motor_s,
+        }
     }
 
     /// Longest period of commands that show how the motors follow: two samples within their time constant.

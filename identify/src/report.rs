@@ -7,6 +7,7 @@ use crate::envelope::Reached;
 use crate::faults::Fault;
 use crate::loss::{Loss, advice};
 use crate::proposal::Proposal;
+use crate::ratios::Ratios;
 use crate::select::Withdrawn;
 use crate::trim::Trim;
 use crate::whiteness::Whiteness;
@@ -58,6 +59,8 @@ pub struct Report {
     pub unexplained: BTreeMap<&'static str, Unexplained>,
     /// Effects, or sensors' parts of them, that these flights cannot show, and the data that would be needed.
     pub not_identifiable: Vec<Unidentifiable>,
+    /// The ratios that are determined, where the flights show rotation alone.
+    pub ratios: Option<Ratios>,
     /// The proposed next flight; `None` if no question is open, or none was searched.
     pub next_flight: Option<Proposal>,
     /// Length of the blocks that count as independent.
@@ -281,6 +284,10 @@ impl Report {
                 writeln!(f, "    to tell them apart: {experiment}")?;
             }
         }
+        if let Some(ratios) = &self.ratios {
+            writeln!(f, "ratios: {ratios}")?;
+            writeln!(f, "  to separate thrust, inertia, static moment and friction: {}", ratios.experiment)?;
+        }
         for Withdrawn { effect, reason } in &self.withdrawn {
             writeln!(f, "withdrawn: {effect}: {reason}")?;
         }
@@ -424,6 +431,7 @@ impl Report {
             envelope: BTreeMap::new(),
             noise_floor: BTreeMap::new(),
             unexplained: BTreeMap::new(),
+            ratios: None,
             not_identifiable: Vec::new(),
             next_flight: None,
             block_s: 1.0,

@@ -15,8 +15,10 @@ use crate::noise;
 use crate::parameter::{Parameter, Parameters};
 use crate::prepared::{BOX_STEPS, Equation, Layout, Prepared, Propulsion, block_s, box_s};
 use crate::questions::OpenQuestions;
+use crate::ratios::Ratios;
 use crate::regressor::{Regressor, regressors};
 use crate::report::{BeforeAfter, Changes, EffectReport, Estimate, FlightReport, Report, Unexplained};
+use crate::rig;
 use crate::rows::column;
 use crate::select::{Selection, select};
 use crate::sensing::SensorErrors;
@@ -81,7 +83,7 @@ pub struct Outcome {
     pub late: BTreeMap<String, Lateness>,
     /// Accepted delays and biases of sensors, for the same.
     pub sensor_errors: SensorErrors,
-    /// The flights without their faulty channels; `None` if no channel has a fault.
+    /// The flights without their faulty channels, and without what a rig makes meaningless; `None` if all is used.
     pub believed: Option<FlightSet>,
     /// Questions that a further flight may answer; `None` if none is open.
     pub questions: Option<OpenQuestions>,
@@ -114,7 +116,7 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
     let vehicle = Vehicle::load_from(&set.files, &set.vehicle)?;
     let declared = entry::resolve(&vehicle.effects)?;
     progress("preparing flights");
-    let (mut faults, believed) = faults::in_channels(&problem(&vehicle, &declared, set)?.0, set);
+    let (mut faults, believed) = believed(&vehicle, &declared, set)?;
     let set = believed.as_ref().unwrap_or(set);
     let (mut problem, mut flight_reports, offsets) = aligned(&vehicle, &declared, set, &mut faults)?;
     let all: Vec<&Prepared> = problem.flights().collect();
@@ -122,7 +124,7 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
     let selection = select(&mut problem, &open, progress);
     progress("confounded effects");
     let mut effects = judged_effects(&problem, &selection);
-    let rivals = rivals(&problem, &selection);
+    let rivals = rivals(&problem, &selection, &open);
     accepted_effects(&problem, &selection, &rivals, &mut effects);
     undetermined_effects(&problem, &selection, &unidentifiable, &mut effects);
     note_logging(&problem, &selection, &mut flight_reports);
@@ -155,6 +157,7 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
         envelope,
         flights: flight_reports,
         noise_floor,
+        ratios: Ratios::of(&problem, &selection.after),
         not_identifiable: unidentifiable,
         next_flight: None,
         block_s: problem.block_s,
@@ -203,6 +206,18 @@ fn aligned<'f>(
     Ok((problem, reports, offsets))
 }
 
+/// Faults of the channels of `set`, and the set without these and without what a rig makes meaningless; `None` if all is used.
+fn believed(
+    vehicle: &Vehicle,
+    declared: &[Effect],
+    set: &FlightSet,
+) -> Result<(Vec<Fault>, Option<FlightSet>), IdentifyError> {
+    let held = rig::without_translation(set, vehicle, declared);
+    let set = held.as_ref().unwrap_or(set);
+    let (faults, cleaned) = faults::in_channels(&problem(vehicle, declared, set)?.0, set);
+    Ok((faults, cleaned.or(held)))
+}
+
 /// Finds the faults of the flights of `set` without fitting anything.
 ///
 /// # Errors
@@ -210,7 +225,7 @@ fn aligned<'f>(
 pub fn faults(set: &FlightSet) -> Result<Vec<Fault>, IdentifyError> {
     let vehicle = Vehicle::load(&set.vehicle)?;
     let declared = entry::resolve(&vehicle.effects)?;
-    let (mut faults, believed) = faults::in_channels(&problem(&vehicle, &declared, set)?.0, set);
+    let (mut faults, believed) = believed(&vehicle, &declared, set)?;
     aligned(&vehicle, &declared, believed.as_ref().unwrap_or(set), &mut faults)?;
     Ok(faults)
 }

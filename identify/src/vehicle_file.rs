@@ -186,6 +186,7 @@ mod tests {
             envelope: BTreeMap::new(),
             noise_floor: BTreeMap::new(),
             unexplained: BTreeMap::new(),
+            ratios: None,
             not_identifiable: Vec::new(),
             next_flight: None,
             block_s: 0.0,

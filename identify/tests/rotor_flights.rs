@@ -219,7 +219,7 @@ fn measured(name: &str) -> Option<Found> {
 /// Rotor speeds without commands: thrust by the mass, with what is left out said in a sentence.
 #[test]
 fn a_brushless_crazyflie_has_its_published_thrust() {
-    let Some(found) = measured("rotors/nanodrone") else { return };
+    let Some(found) = measured("nanodrone") else { return };
     let flown = found.report.flights.as_ref().unwrap();
     assert!(
         flown.motor.is_none() && flown.findings.iter().any(|text| text.contains("`command` is not logged"))
@@ -230,10 +230,12 @@ fn a_brushless_crazyflie_has_its_published_thrust() {
 
 #[test]
 fn an_agile_quadrotor_has_one_thrust_at_any_speed() {
-    let Some(found) = measured("rotors/neurobem") else { return };
+    let Some(found) = measured("neurobem") else { return };
     let flown = found.report.flights.as_ref().unwrap();
     let coefficients = flown.coefficients.as_ref().unwrap();
     let thrust = coefficients.thrust.coefficient.determined().unwrap();
     assert!((1.4e-6..1.7e-6).contains(&thrust.value), "{}", found.report);
-    assert!(coefficients.torque.coefficient.determined().is_some(), "{}", found.report);
+    // Half a minute of flight with little yaw holds no torque that is sure; a value beyond doubt would be a wrong one.
+    let torque = coefficients.torque.coefficient.estimate.unwrap();
+    assert!(torque.low < 1e-8 && torque.high > 0.0, "{}", found.report);
 }

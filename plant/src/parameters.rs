@@ -336,7 +336,7 @@ mod tests {
     #[test]
     fn effects_that_a_rig_has_by_its_joints_are_refused_with_it() {
         let entry = |name| EffectEntry { name, ..effect_entry() };
-        for name in ["rig-pendulum", "bearing-friction"] {
+        for name in ["rig-pendulum", "bearing-friction", "gimbal-friction"] {
             let mut scene = Scene::load(repository("scenes/rig-fixed.toml").as_ref()).unwrap();
             let mut vehicle = Vehicle::load(repository("vehicles/hummingbird.toml").as_ref()).unwrap();
             assert_eq!(refuse_double_rig(&vehicle, &scene), Ok(()));

@@ -251,3 +251,21 @@ fn dry_friction_stops_a_rotation_and_viscous_friction_lets_it_fade() {
     assert!((rate_after(0.0081, 0.0, 1_000) - 1.0).abs() < 2e-3);
     assert!(rate_after(0.0081, 0.0, 2_500).abs() < 1e-3);
 }
+
+/// Of a ball joint the friction about an axis has its share of the rate; about an axis of a gimbal it is whole.
+#[test]
+fn a_gimbal_rubs_about_each_axis_by_itself_and_a_ball_joint_against_the_vector() {
+    let torque = |effect: Effect| {
+        let mut flight = Flight::new(free_body(), vec![effect], 1.0);
+        flight.state.body.angular_velocity_B_rad_s = Vector3::new(3.0, -4.0, 0.0);
+        let turning = flight.accelerations().angular_acceleration_B_rad_s2;
+        free_body().inertia_kg_m2 * turning
+    };
+    let free = torque(effect("bearing-friction", &[0.0, 0.0]));
+    let ball = torque(effect("bearing-friction", &[0.01, 0.0])) - free;
+    assert!((ball - Vector3::new(-0.006, 0.008, 0.0)).norm() < 1e-5, "{ball}");
+    let gimbal = torque(effect("gimbal-friction", &[0.01, 0.02, 0.03])) - free;
+    assert!((gimbal - Vector3::new(-0.01, 0.02, 0.0)).norm() < 1e-5, "{gimbal}");
+    let viscous = torque(effect("gimbal-friction", &[0.0, 0.0, 0.0, 0.001, 0.002, 0.003])) - free;
+    assert!((viscous - Vector3::new(-0.003, 0.008, 0.0)).norm() < 1e-9, "{viscous}");
+}

@@ -36,10 +36,11 @@ const NAMES: &[&str] = &[
     "gyroscopic-torque",
     "rig-pendulum",
     "bearing-friction",
+    "gimbal-friction",
 ];
 
 /// Those that know neither where up is nor where the ground is, so that the laboratory may be turned at will.
-const FREE_OF_THE_VERTICAL: [&str; 8] = [
+const FREE_OF_THE_VERTICAL: [&str; 9] = [
     "rotor-drag",
     "parasitic-drag",
     "translational-lift",
@@ -48,6 +49,7 @@ const FREE_OF_THE_VERTICAL: [&str; 8] = [
     "rate-damping",
     "weak-rotor",
     "bearing-friction",
+    "gimbal-friction",
 ];
 
 #[test]
@@ -387,7 +389,7 @@ proptest! {
     ) {
         let vehicle = hummingbird();
         let situation = FlightCondition::new(&vehicle, &state, &air_W_m_s);
-        for name in ["rotor-drag", "parasitic-drag", "rate-damping", "bearing-friction"] {
+        for name in ["rotor-drag", "parasitic-drag", "rate-damping", "bearing-friction", "gimbal-friction"] {
             let wrench = wrench(&between_bounds(find(name).unwrap(), &shares), &situation);
             prop_assert!(power_W(&wrench, &situation) <= 0.0, "{name}");
         }

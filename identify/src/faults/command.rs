@@ -76,7 +76,7 @@ fn goes_on(evidence: &Evidence, stretch: &Stretch) -> bool {
         };
         turning.iter().map(of_axis).fold(0.0, f64::max)
     };
-    evidence.flight.moves_freely() || (spread(false) > 0.0 && spread(true) > 0.5 * spread(false))
+    evidence.flight.moves_freely || (spread(false) > 0.0 && spread(true) > 0.5 * spread(false))
 }
 
 /// Share of the weight that the commands carry in the mean; `None` without commands.

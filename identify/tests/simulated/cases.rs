@@ -18,7 +18,7 @@ pub const MATTERS: f64 = 0.01;
 pub const FREE_DELAY_S: f64 = 0.02;
 
 /// Names of the effects that are candidates.
-pub const EFFECTS: [&str; 19] = [
+pub const EFFECTS: [&str; 20] = [
     "rotor-drag",
     "parasitic-drag",
     "translational-lift",
@@ -38,7 +38,11 @@ pub const EFFECTS: [&str; 19] = [
     "bearing-friction",
     SENSOR_DELAY,
     SENSOR_BIAS,
+    "gimbal-friction",
 ];
+
+/// Effects of a rig.
+const ON_RIG: [&str; 3] = ["rig-pendulum", "bearing-friction", "gimbal-friction"];
 
 /// Pairs of effects that act together.
 pub const PAIRS: [[&str; 2]; 12] = [
@@ -142,7 +146,7 @@ impl Case {
         if names.contains(&"wind") {
             case.vehicle = "hummingbird-drag.toml";
         }
-        case.plan.is_on_rig = names.iter().any(|name| ["rig-pendulum", "bearing-friction"].contains(name));
+        case.plan.is_on_rig = names.iter().any(|name| ON_RIG.contains(name));
         case
     }
 

@@ -12,8 +12,10 @@ use plant::{Airframe, Backend, FreeFlight, NewtonEuler, PerRotor, RigidBody};
 use std::path::{Path, PathBuf};
 use vehicles::{MotorModel, ROTORS_MAX, Vehicle};
 
+pub mod bearing;
 pub mod cases;
 pub mod feedback;
+pub mod rigs;
 
 const TICK_S: f64 = 0.001;
 /// A vehicle further away than this has got out of control: its flight does not compare with any other.
@@ -220,10 +222,15 @@ struct Sticks(Vec<([f64; 3], f64)>);
 
 impl Sticks {
     fn of(plan: &Plan) -> Self {
-        let mut random = bus::random::stream(plan.seed, "sticks");
+        Self::of_seed(plan.seed, plan.duration_s, 1.0)
+    }
+
+    /// Kicks `size` times as large as usual.
+    fn of_seed(seed: u64, duration_s: f64, size: f64) -> Self {
+        let mut random = bus::random::stream(seed, "sticks");
         let mut normal = move || bus::random::normal(&mut random);
-        let count = (plan.duration_s / STICK_S) as usize + 1;
-        let one = |_| ([0.03 * normal(), 0.03 * normal(), 0.015 * normal()], 0.1 * normal());
+        let count = (duration_s / STICK_S) as usize + 1;
+        let one = |_| ([0.03, 0.03, 0.015].map(|torque| size * torque * normal()), 0.1 * normal());
         Self((0..count).map(one).collect())
     }
 }
@@ -236,10 +243,20 @@ fn stirred(
     state: &plant::State,
     time_s: f64,
 ) -> PerRotor<f64> {
+    let turn = (state.body.attitude_WB, state.body.angular_velocity_B_rad_s);
+    stirred_by(vehicle, allocation, sticks, turn, time_s)
+}
+
+/// The same by attitude and angular velocity in B.
+fn stirred_by(
+    vehicle: &Vehicle,
+    allocation: &Allocation,
+    sticks: &Sticks,
+    (attitude_WB, rates_B_rad_s): (UnitQuaternion<f64>, Vector3<f64>),
+    time_s: f64,
+) -> PerRotor<f64> {
     let (kick_N_m, lift) = sticks.0[(time_s / STICK_S) as usize];
-    let body = &state.body;
-    let levelling =
-        vehicle.inertia_kg_m2 * (-2.0 * body.attitude_WB.scaled_axis() - 2.2 * body.angular_velocity_B_rad_s);
+    let levelling = vehicle.inertia_kg_m2 * (-2.0 * attitude_WB.scaled_axis() - 2.2 * rates_B_rad_s);
     let thrust_N = vehicle.mass_kg * vehicle.gravity_m_s2 * (1.0 + lift.clamp(-0.3, 0.3));
     let wrench = RotorWrench { thrust_N, torque_B_N_m: levelling + Vector3::from(kick_N_m) };
     allocation.allocate(&wrench).speeds_rad_s.map(|speed| vehicle.command.command(speed))

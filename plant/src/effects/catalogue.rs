@@ -7,6 +7,7 @@ mod bearing_friction;
 mod blade_flapping;
 mod com_offset;
 pub(super) mod command_delay;
+mod gimbal_friction;
 mod ground_effect;
 mod ground_turbulence;
 mod gyroscopic_torque;
@@ -47,6 +48,7 @@ pub static CATALOGUE: &[&EffectKind] = &[
     &gyroscopic_torque::EFFECT,
     &rig_pendulum::EFFECT,
     &bearing_friction::EFFECT,
+    &gimbal_friction::EFFECT,
 ];
 
 /// The effect that files call `name`.

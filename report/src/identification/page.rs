@@ -252,6 +252,7 @@ mod tests {
             envelope: BTreeMap::new(),
             noise_floor: BTreeMap::new(),
             unexplained: BTreeMap::new(),
+            ratios: None,
             not_identifiable: Vec::new(),
             next_flight: None,
             block_s: 1.0,

@@ -7,6 +7,7 @@
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use flights::Flight;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -32,7 +33,7 @@ pub struct Equations<'f> {
     /// The flight.
     pub flight: &'f Flight,
     prepared: Prepared<'f>,
-    tracks: Tracks,
+    tracks: Arc<Tracks>,
     speeds: Vec<EachRotor>,
 }
 

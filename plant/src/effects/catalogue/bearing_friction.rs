@@ -30,7 +30,7 @@ effect_parameters! {
 }
 
 /// Below this speed dry friction is taken as viscous, so that it has no jump: tuned, no source.
-const SMOOTHING_RAD_S: f64 = 0.05;
+pub(super) const SMOOTHING_RAD_S: f64 = 0.05;
 
 fn brake(values: &Values, condition: &FlightCondition) -> Wrench {
     let Parameters { coulomb, viscous } = values.into();

@@ -1,6 +1,7 @@
 //! Another inertia than the declared one.
 
-use crate::effects::kind::{Action, EffectKind, Quantity, Values};
+use super::thrust_scale;
+use crate::effects::kind::{Action, Confounder, EffectKind, Quantity, Values};
 use diagnostics::unit::RATIO;
 use nalgebra::{Matrix3, Vector3};
 use vehicles::Vehicle;
@@ -14,6 +15,11 @@ pub static EFFECT: EffectKind = EffectKind {
     parameters: Parameters::SPECS,
     actions: &[Action::Vehicle(stretch)],
     needs: &[Quantity::Torque],
+    confounded_with: &[Confounder {
+        effect: &thrust_scale::EFFECT,
+        experiment: "fly freely with a position or an accelerometer, which show thrust by itself; on a rig hang a known weight \
+                     at a known arm: its torque shows the inertia",
+    }],
     require: Some(require_rigid),
     ..EffectKind::PLAIN
 };

@@ -1,7 +1,8 @@
 //! A body that swings about a bearing beside its centre of mass.
 
+use super::{inertia_error, thrust_scale};
 use crate::effects::condition::FlightCondition;
-use crate::effects::kind::{Action, EffectKind, Quantity, Values};
+use crate::effects::kind::{Action, Confounder, EffectKind, Quantity, Values};
 use crate::rotor::Wrench;
 use diagnostics::unit::{INERTIA, STATIC_MOMENT};
 use nalgebra::Vector3;
@@ -18,6 +19,16 @@ pub static EFFECT: EffectKind = EffectKind {
     parameters: Parameters::SPECS,
     actions: &[Action::Vehicle(slow), Action::Wrench(swing)],
     needs: &[Quantity::Torque, Quantity::Attitude, Quantity::Rig],
+    confounded_with: &[
+        Confounder {
+            effect: &thrust_scale::EFFECT,
+            experiment: "hang a known weight at a known arm on the rig: its torque shows by how much thrust and inertia differ",
+        },
+        Confounder {
+            effect: &inertia_error::EFFECT,
+            experiment: "fly freely, without the rig: the added inertia of the rig is gone, an error of the vehicle's stays",
+        },
+    ],
     ..EffectKind::PLAIN
 };
 
