@@ -211,7 +211,10 @@ fn stand_and_flights_of_one_vehicle_agree() {
     let report = place.start_with(&args, &[("HUMMINGBUS_STAND", &recording)]).end().with_code(0).json();
     let agreement = report["agreement"].as_array().unwrap();
     let names: Vec<&str> = agreement.iter().map(|value| value["name"].as_str().unwrap()).collect();
-    assert!(["c_T", "natural frequency", "damping ratio"].iter().all(|name| names.contains(name)), "{report:#}");
+    assert!(
+        ["c_T", "natural frequency", "damping ratio"].iter().all(|name| names.contains(name)),
+        "{report:#}"
+    );
     assert!(agreement.iter().all(|value| value["agrees"] == true), "{agreement:#?}");
     let tables = std::fs::read_to_string(place.path("rotor/rotor.toml")).unwrap();
     assert!(
