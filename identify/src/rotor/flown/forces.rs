@@ -207,9 +207,10 @@ impl<'f> Set<'f> {
 
     fn force_solution(&self, is_each: bool) -> Option<Solution> {
         let priors = priors(is_each, self.vehicle);
-        let solved = |late: f64| {
-            least_squares::solved(&self.force_rows(Role::Fit, is_each, late), &priors, Weighting::Plain)
-        };
+        // Rotors are told apart by differences of their speeds, whose mean tells little, and which a controller sets.
+        let weighting = if is_each { Weighting::Whitened } else { Kind::Thrust.weighting() };
+        let solved =
+            |late: f64| least_squares::solved(&self.force_rows(Role::Fit, is_each, late), &priors, weighting);
         let (mut solution, shifted) = (solved(0.0)?, solved(1.0)?);
         let change = shifted.values.iter().zip(&solution.values).map(|(shifted, value)| shifted - value);
         let change = change.collect();
