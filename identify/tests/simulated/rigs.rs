@@ -13,6 +13,9 @@ pub type Truth = (&'static str, &'static [&'static str], fn(Bearing) -> Bearing)
 const GIMBAL: Friction = Friction::Gimbal([0.004, 0.006, 0.003], [0.0; 3]);
 const BALL: Friction = Friction::Ball(0.005, 0.0);
 
+/// Friction beside which the pilot's kicks are small: the bearing sticks for much of the flight.
+pub const STICKING: &str = "the same, half the kicks";
+
 /// All truths.
 pub const TRUTHS: [Truth; 12] =
     [
@@ -21,11 +24,7 @@ pub const TRUTHS: [Truth; 12] =
             friction: GIMBAL,
             ..plain
         }),
-        ("the same, half the kicks", &["gimbal-friction"], |plain| Bearing {
-            friction: GIMBAL,
-            kicks: 0.5,
-            ..plain
-        }),
+        (STICKING, &["gimbal-friction"], |plain| Bearing { friction: GIMBAL, kicks: 0.5, ..plain }),
         ("dry friction 1, 0, 0 mN m", &["gimbal-friction"], |plain| Bearing {
             friction: Friction::Gimbal([0.001, 0.0, 0.0], [0.0; 3]),
             ..plain
