@@ -19,14 +19,14 @@ fn motion(size_rad: f64, lean_rad: f64) -> Motion {
     let mut motion = Motion { attitudes: Vec::new(), places: Vec::new(), forces: Vec::new() };
     for step in 0..6000 {
         let time_s = STEP_S * f64::from(step);
-        let roll = size_rad * (2.1 * time_s).sin() + 0.5 * size_rad * (5.3 * time_s).sin();
-        let pitch = size_rad * (1.7 * time_s + 1.0).sin() + 0.4 * size_rad * (6.1 * time_s).cos();
+        let roll = size_rad * libm::sin(2.1 * time_s) + 0.5 * size_rad * libm::sin(5.3 * time_s);
+        let pitch = size_rad * libm::sin(1.7 * time_s + 1.0) + 0.4 * size_rad * libm::cos(6.1 * time_s);
         let yaw = 0.4 * time_s;
         let steady = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), lean_rad);
         let attitude = steady * UnitQuaternion::from_euler_angles(roll, pitch, yaw);
         let thrust = GRAVITY_M_S2 / (attitude * Vector3::z()).z;
         // The wind carries what the steady lean asks for.
-        let wind = Vector3::x() * (GRAVITY_M_S2 * lean_rad.tan());
+        let wind = Vector3::x() * (GRAVITY_M_S2 * libm::tan(lean_rad));
         let acceleration = attitude * Vector3::z() * thrust - GRAVITY_M_S2 * Vector3::z() - wind;
         velocity += acceleration * STEP_S;
         place += velocity * STEP_S;

@@ -321,9 +321,9 @@ impl<'f> Problem<'f> {
         free: &[usize],
     ) -> Vec<Block> {
         let of_flight = |flight: &Prepared| {
-            let (residual, own) = self.linearised(flight, values, free);
+            let (residual, columns) = self.linearised(flight, values, free);
             let (_, accepted) = self.linearised(flight, base.0, base.1);
-            self.blocks_from(flight, residual, [accepted, own].concat())
+            self.blocks_from(flight, residual, [accepted, columns].concat())
         };
         flights.iter().flat_map(of_flight).collect()
     }
@@ -481,7 +481,7 @@ impl Problem<'_> {
             rows[offset..].iter().step_by(width).copied().collect()
         };
         let of_component = |(offset, component)| {
-            let signal = of(&measured, offset).iter().map(|row| row * row).sum();
+            let signal = of(measured, offset).iter().map(|row| row * row).sum();
             (component, Left { column: of(&left, offset), stretches: stretches(flight), signal })
         };
         components(flight).enumerate().map(of_component).collect()

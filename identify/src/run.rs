@@ -532,7 +532,7 @@ fn pictures(problem: &Problem, selection: &Selection) -> Vec<Picture> {
                 role: flight.flight.role,
                 equation: *equation,
                 time_s: flight.layout.knots.iter().map(|knot| flight.layout.clock.at(*knot)).collect(),
-                measured: columns(&measured),
+                measured: columns(measured),
                 before: columns(&before),
                 after: columns(&after),
             });

@@ -40,7 +40,7 @@ pub fn whiteness(problem: &Problem, values: &[f64]) -> BTreeMap<&'static str, Wh
         for equation in &flight.layout.equations {
             for axis in 0..equation.size() {
                 let [residual, measured] =
-                    [&residual, &measured].map(|rows| column(flight, rows, *equation, axis));
+                    [&residual, measured].map(|rows| column(flight, rows, *equation, axis));
                 let column = Column { equation: *equation, residual, spread: deviation(&measured) };
                 columns.entry(equation.name()).or_default().push(column);
             }

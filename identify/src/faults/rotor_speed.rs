@@ -82,7 +82,7 @@ impl Speeds {
         let at_knots =
             |rotor: usize| flight.layout.knots.iter().map(|knot| commanded[*knot][rotor]).collect();
         Some(Self {
-            measured: rotors().map(|rotor| column(flight, &rows, flight.rotor_speed(), rotor)).collect(),
+            measured: rotors().map(|rotor| column(flight, rows, flight.rotor_speed(), rotor)).collect(),
             expected: rotors().map(at_knots).collect(),
         })
     }
@@ -145,7 +145,7 @@ fn motion_cost(problem: &Problem, at: usize) -> f64 {
             let power = |rows: &[f64]| -> f64 {
                 column(flight, rows, *equation, axis).iter().map(|row| row * row).sum()
             };
-            sum += power(&residual) / power(&measured).max(1e-12);
+            sum += power(&residual) / power(measured).max(1e-12);
         }
     }
     sum
