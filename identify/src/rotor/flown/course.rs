@@ -26,7 +26,7 @@ pub struct Input {
     pub share: f64,
     /// 1 if the motor is on; 0 if the command switches it off.
     pub on: f64,
-    /// Logarithm of the battery's voltage by the reference; 0 without a voltage.
+    /// Logarithm of the battery's voltage by the reference when the command was logged; 0 without a voltage.
     pub log_voltage: f64,
 }
 
@@ -39,6 +39,8 @@ pub struct Course {
     pub rotor: usize,
     /// Commands.
     pub inputs: Vec<Input>,
+    /// Voltage of the battery, if it counts.
+    pub voltage: Option<Voltage>,
     /// Times of the speeds that are compared, in s.
     pub time_s: Vec<f64>,
     /// Speeds in rad/s.
@@ -100,7 +102,16 @@ fn course(
     let (time_s, speed_rad_s): (Vec<f64>, Vec<f64>) = kept.iter().map(speed).filter(is_used).unzip();
     let stretches = stretches(&time_s);
     let blocks = time_s.iter().map(|time_s| blocks.of_time(number, *time_s)).collect();
-    Course { flight: number, rotor, inputs, time_s, speed_rad_s, stretches, blocks }
+    Course {
+        flight: number,
+        rotor,
+        inputs,
+        voltage: voltage.cloned(),
+        time_s,
+        speed_rad_s,
+        stretches,
+        blocks,
+    }
 }
 
 /// Part of the range of the map that a command is at, saturated as the map is.

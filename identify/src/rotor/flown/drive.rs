@@ -420,12 +420,8 @@ fn findings(motor: &FlownMotor, usable: &[&Flight]) -> Vec<String> {
     if motor.reference_voltage_v.is_none() {
         let mean: Vec<f64> =
             usable.iter().flat_map(|flight| &flight.battery_voltage.values).map(|[value]| *value).collect();
-        let at = if mean.is_empty() {
-            "that of these flights".to_owned()
-        } else {
-            format!("about {:.2} V", median(&mean))
-        };
-        findings.push(format!("command map: it holds at the battery's voltage of the flights, {at}"));
+        let at = if mean.is_empty() { String::new() } else { format!(", about {:.2} V", median(&mean)) };
+        findings.push(format!("command map: it holds at the battery's voltage of these flights{at}"));
     }
     if let Some(period_s) = motor.command_period_s {
         findings.push(format!(

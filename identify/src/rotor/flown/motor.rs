@@ -136,16 +136,21 @@ pub fn simulated(course: &Course, values: &Values) -> Vec<f64> {
 
 /// The answers of a course's motor to [`units`].
 fn answers(course: &Course, values: &Values) -> Vec<[f64; 2]> {
-    course.filtered(lag(values), values[DELAY], |input| units(input, values[POWER]))
+    // The voltage acts at the time at which the command does.
+    let log_voltage = |input: &Input| match &course.voltage {
+        Some(voltage) if values[POWER] != 0.0 => voltage.log_at(input.time_s + values[DELAY]),
+        _ => 0.0,
+    };
+    course.filtered(lag(values), values[DELAY], |input| units(input, values[POWER] * log_voltage(input)))
 }
 
 fn speed(values: &Values, [least, range]: &[f64; 2]) -> f64 {
     values[LOW] * least + (values[HIGH] - values[LOW]) * range
 }
 
-/// The answer to the least command, and to the range of the map, that an input asks for.
-fn units(input: &Input, power: f64) -> [f64; 2] {
-    let gain = input.on * if power == 0.0 { 1.0 } else { libm::exp(power * input.log_voltage) };
+/// The least command, and the range of the map, that an input asks for, at a gain of this logarithm.
+fn units(input: &Input, log_gain: f64) -> [f64; 2] {
+    let gain = input.on * if log_gain == 0.0 { 1.0 } else { libm::exp(log_gain) };
     [gain, gain * input.share]
 }
 
