@@ -67,7 +67,7 @@ fn of_ratios(
         }
         let fitted = problem.fitted(&start, &[kept.as_slice(), &free].concat());
         let is_alike = !is_worse(&fitted, &selection.after);
-        is_alike.then(|| Rival { candidate: Candidate { kind: other.kind, free }, fitted })
+        is_alike.then_some(Rival { candidate: Candidate { kind: other.kind, free }, fitted })
     };
     open.iter().filter(is_other).filter_map(rival).collect()
 }
