@@ -327,13 +327,11 @@ fn round(
     Round { judged: all, taken }
 }
 
-/// Has those of whom the linearised equations promise most fitted in earnest; a promise alone is not accepted. Those that start at a
+/// Fits those in earnest of whom the linearised equations promise most; a promise alone is not accepted. Those that start at a
 /// guess are far from linear, so that their place among promises says little: all of them are fitted that promise enough.
 fn confirm(problem: &Problem, base: &FitResult, accepted: &[Candidate], all: &mut [Judged], level: f64) {
-    let mut promises: Vec<&mut Judged> = all
-        .iter_mut()
-        .filter(|judged| judged.is_promise && (judged.is_accepted || judged.is_logging))
-        .collect();
+    let mut promises: Vec<&mut Judged> =
+        all.iter_mut().filter(|judged| judged.is_promise && judged.is_accepted).collect();
     let is_guessed = |judged: &Judged| !judged.candidate.kind.guesses.is_empty();
     promises.sort_by(|a, b| is_guessed(b).cmp(&is_guessed(a)).then(b.gain.total_cmp(&a.gain)));
     let guessed = promises.iter().filter(|judged| is_guessed(judged)).count();

@@ -252,7 +252,7 @@ fn dry_friction_stops_a_rotation_and_viscous_friction_lets_it_fade() {
     assert!(rate_after(0.0081, 0.0, 2_500).abs() < 1e-3);
 }
 
-/// Of a ball joint the friction about an axis has its share of the rate; about an axis of a gimbal it is whole.
+/// Friction about one axis: in a ball joint its share of the rate, in a gimbal the whole.
 #[test]
 fn a_gimbal_rubs_about_each_axis_by_itself_and_a_ball_joint_against_the_vector() {
     let torque = |effect: Effect| {

@@ -10,7 +10,7 @@
 //! | `forces` | thrust and torque coefficients with their intervals |
 //! | `blocks`, `least_squares` | blocks of time, and least squares over them |
 //! | `figure` | a figure, or why it is not determined |
-//! | `spikes`, `speed_noise` | speeds that no rotor has; the noise of speeds, and what it takes from a coefficient |
+//! | `speed_noise` | the noise of speeds, and what it takes from a coefficient |
 
 mod blocks;
 mod course;
@@ -21,7 +21,6 @@ mod forces;
 mod least_squares;
 mod motor;
 mod speed_noise;
-mod spikes;
 mod voltage;
 
 use flights::{Channel, Flight, FlightSet};
@@ -47,14 +46,19 @@ pub struct Flown {
     pub findings: Vec<String>,
 }
 
+/// Notes of the reader on rotor speeds and commands.
+fn notes(flight: &Flight) -> impl Iterator<Item = String> {
+    let is_of_rotors = |note: &&String| note.starts_with("rotor_speed") || note.starts_with("command");
+    flight.notes.iter().filter(is_of_rotors).map(|note| format!("flight `{}`: {note}", flight.name))
+}
+
 /// Fits rotors and motors to the flights of `set`, which fly `vehicle`.
 ///
 /// # Errors
 /// If no flight to fit on has rotor speeds with commands or motion.
 pub fn fitted(set: &FlightSet, vehicle: &Vehicle) -> Result<Flown, RotorError> {
-    let mut findings = Vec::new();
-    let flights: Vec<Flight> =
-        set.flights.iter().map(|flight| spikes::left_out(flight, &mut findings)).collect();
+    let flights = &set.flights;
+    let mut findings: Vec<String> = flights.iter().flat_map(notes).collect();
     let all: Vec<&Flight> = flights.iter().collect();
     let motor = drive::fitted(&all, vehicle);
     let without_commands: Vec<Flight> =

@@ -145,7 +145,7 @@ fn stuck(values: &[f64], shortest: usize) -> (usize, usize) {
 }
 
 /// The median of five readings about each; fewer at the ends.
-pub fn running_median(values: &[f64]) -> Vec<f64> {
+fn running_median(values: &[f64]) -> Vec<f64> {
     let window = |row: usize| row.saturating_sub(MEDIAN_REACH)..(row + MEDIAN_REACH + 1).min(values.len());
     (0..values.len()).map(|row| median(&values[window(row)])).collect()
 }

@@ -17,7 +17,7 @@ pub const MATTERS: f64 = 0.01;
 /// Delay that a vehicle in free flight may have and still fly.
 pub const FREE_DELAY_S: f64 = 0.02;
 
-/// Names of the effects that are candidates.
+/// Names of the effects that are candidates without rotor speeds; the others are in `torques_of_the_air`.
 pub const EFFECTS: [&str; 20] = [
     "rotor-drag",
     "parasitic-drag",
