@@ -5,33 +5,24 @@
 //! second derivative and the accelerometer's reading, rotated by the attitude, less gravity. No model is needed
 //! to see by how much one lags. The lateness that the attitudes of all flights share is left to the candidate
 //! `sensor-delay`. A flight's own lateness beyond that is removed, and so is that of position and velocity
-//! beyond it.
+//! beyond it. Rotor speeds that drive the model are the one channel whose lateness takes a model (`rotor_clock`).
 
 use crate::clock::Lateness;
 use crate::fit::Problem;
 use crate::noise_model::NoiseModel;
-use crate::normal::{self, Block};
+use crate::normal::Block;
+use crate::offset::{Found, descended};
 use crate::prepared::{Equation, Prepared, Translation};
+use crate::rotor_clock::of_rotor_speed;
 use crate::sensor_effects::POSE_DELAY;
 use crate::whitening::{ComponentNoise, Noises};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Gauss-Newton steps.
-const STEPS: usize = 40;
-/// No step is longer: a linearisation of the motion holds for a fraction of its fastest oscillation.
-const STEP_MAX_S: f64 = 0.02;
-/// From fewer blocks no deviation can be told.
-const LEAST_BLOCKS: usize = 5;
-/// An offset is real beyond so many standard deviations.
-const SURE: f64 = 4.0;
-
 /// Bias of an offset due to the samples' positions on the grid, as a part of the period of the shifted channel
 /// (docs/validation.md). It comes from the noise that interpolation leaves; blocks of time do not show it.
 const BETWEEN_SAMPLES: f64 = 0.1;
-/// A channel that is later than this is not on the same flight.
-const LATE_MAX_S: f64 = 0.4;
 
 /// Lateness of a channel against the inertial unit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -56,34 +47,6 @@ impl Offset {
 /// Offsets by channel; `None` where the flight lacks the channels that it takes, or has too little of them.
 pub type Offsets = BTreeMap<&'static str, Option<Offset>>;
 
-/// An offset that was found.
-#[derive(Debug, Clone, Copy)]
-struct Found {
-    late_s: f64,
-    deviation_s: f64,
-    /// Greatest bias due to the samples' positions on the grid.
-    between_s: f64,
-}
-
-impl Found {
-    /// True if its difference from `other` exceeds chance, the bias of both due to the grid, and `least_s`.
-    fn is_beyond(&self, other: &Found, least_s: f64) -> bool {
-        let own_s = (self.late_s - other.late_s).abs();
-        let deviation_s = libm::hypot(self.deviation_s, other.deviation_s);
-        own_s > SURE * deviation_s && own_s > least_s.max(self.between_s).max(other.between_s)
-    }
-
-    /// Returns the mean of the offsets; zero without any.
-    fn mean(all: &[Found]) -> Found {
-        let part = 1.0 / (all.len() as f64).max(1.0);
-        Found {
-            late_s: part * all.iter().map(|shift| shift.late_s).sum::<f64>(),
-            deviation_s: part * all.iter().map(|shift| shift.deviation_s.powi(2)).sum::<f64>().sqrt(),
-            between_s: all.iter().map(|shift| shift.between_s).fold(0.0, f64::max),
-        }
-    }
-}
-
 /// The attitude's offset from the gyroscope.
 fn of_attitude(problem: &Problem, flight: &Prepared) -> Option<Found> {
     flight.offset_of(Equation::Gyroscope)?;
@@ -91,7 +54,7 @@ fn of_attitude(problem: &Problem, flight: &Prepared) -> Option<Found> {
         problem.model.parameters.all.iter().position(|parameter| *parameter.kind == POSE_DELAY)?;
     let mut values = problem.model.parameters.baseline();
     let between_s = BETWEEN_SAMPLES * flight.flight.attitude.period_s().unwrap_or(0.0);
-    descended(between_s, |late_s| {
+    descended(0.0, between_s, |late_s| {
         values[parameter] = late_s;
         problem.blocks_of(flight, &values, &[parameter])
     })
@@ -113,7 +76,7 @@ fn of_translation(
     let periods = [flight.flight.attitude.period_s(), flight.flight.specific_force.period_s()];
     let between_s = BETWEEN_SAMPLES * periods.into_iter().flatten().fold(0.0, f64::max);
     let blocks = problem.block_knots(flight);
-    descended(between_s, |late_s| {
+    descended(0.0, between_s, |late_s| {
         let inertial = |aside_s: f64| {
             let moved_s = -late_s - aside_s;
             flight.inertial_rows(translation, attitude_s + moved_s, moved_s, gravity_m_s2)
@@ -134,33 +97,6 @@ fn of_translation(
     })
 }
 
-/// The offset at which the squares are least, by the normal equations at an offset, of which it is the first parameter.
-fn descended(between_s: f64, mut blocks_at: impl FnMut(f64) -> Vec<Block>) -> Option<Found> {
-    let (mut late_s, mut last_s, mut reach_s) = (0.0_f64, 0.0_f64, STEP_MAX_S);
-    for _ in 0..STEPS {
-        let blocks = blocks_at(late_s);
-        let total = normal::sum(&blocks);
-        if blocks.len() < LEAST_BLOCKS || total.gram[(0, 0)] <= 0.0 {
-            return None;
-        }
-        let step_s = -(normal::inverse(&total.gram) * &total.gradient)[0];
-        let deviation_s = normal::covariance(&blocks)[(0, 0)].max(0.0).sqrt();
-        // How samples lie on the grid makes waves in the cost, over whose troughs a whole step can go to and fro.
-        if step_s * last_s < 0.0 {
-            reach_s = last_s.abs() / 2.0;
-        }
-        last_s = step_s.clamp(-reach_s, reach_s);
-        late_s += last_s;
-        if late_s.abs() > LATE_MAX_S {
-            return None;
-        }
-        if last_s.abs() < 1e-5_f64.max(0.02 * deviation_s) {
-            return Some(Found { late_s, deviation_s, between_s });
-        }
-    }
-    None
-}
-
 /// Noises under which only gyroscope and attitude count.
 fn kinematic_noises() -> Noises {
     (0..3)
@@ -173,6 +109,7 @@ struct Clocks {
     attitude: Option<Found>,
     position: Option<Found>,
     velocity: Option<Found>,
+    rotor_speed: Option<Found>,
 }
 
 impl Clocks {
@@ -180,7 +117,8 @@ impl Clocks {
         let attitude = of_attitude(problem, flight);
         // Without a gyroscope nobody knows which of the two is late.
         let of = |translation| of_translation(problem, flight, translation, attitude?.late_s);
-        Self { attitude, position: of(Translation::Position), velocity: of(Translation::Velocity) }
+        let (position, velocity) = (of(Translation::Position), of(Translation::Velocity));
+        Self { attitude, position, velocity, rotor_speed: of_rotor_speed(problem, flight) }
     }
 
     /// Returns the lateness to remove, where `shared` is the attitudes' lateness that all flights share.
@@ -192,7 +130,12 @@ impl Clocks {
                 .filter(|shift| self.attitude.is_some_and(|other| shift.is_beyond(&other, least_s)));
             apart.map_or(attitude_s, |shift| shift.late_s - shared.late_s)
         };
-        Lateness { attitude_s, position_s: of(self.position), velocity_s: of(self.velocity) }
+        let (position_s, velocity_s) = (of(self.position), of(self.velocity));
+        // No effect stands for a lateness of theirs that flights share.
+        let on_time = Found { late_s: 0.0, deviation_s: 0.0, between_s: 0.0 };
+        let rotors = self.rotor_speed.filter(|shift| shift.is_beyond(&on_time, least_s));
+        let rotor_speed_s = rotors.map_or(0.0, |shift| shift.late_s);
+        Lateness { attitude_s, position_s, velocity_s, rotor_speed_s }
     }
 }
 
@@ -219,6 +162,7 @@ pub fn align(problem: &mut Problem) -> Vec<(String, Offsets)> {
             ("attitude", offset(shift.attitude, late.attitude_s)),
             ("position", offset(shift.position, late.position_s)),
             ("velocity", offset(shift.velocity, late.velocity_s)),
+            ("rotor_speed", offset(shift.rotor_speed, late.rotor_speed_s)),
         ];
         offsets.push((flight.flight.name.clone(), Offsets::from(of_flight)));
     }

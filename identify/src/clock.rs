@@ -33,4 +33,6 @@ pub struct Lateness {
     pub position_s: f64,
     /// Lateness of the velocity in s.
     pub velocity_s: f64,
+    /// Lateness of the rotor speeds in s.
+    pub rotor_speed_s: f64,
 }

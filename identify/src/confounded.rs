@@ -3,8 +3,9 @@
 use crate::candidate::{Candidate, free_parameters};
 use crate::fit::{FitResult, Problem};
 use crate::ratios;
-use crate::select::{Judged, Round, Selection, fitted, is_worse, without};
+use crate::select::{Judged, Round, Selection, fitted, is_clearly_worse, is_worse, without};
 use rayon::prelude::*;
+use std::sync::OnceLock;
 
 /// A rival has at least this part of the gain.
 const NEAR: f64 = 0.5;
@@ -28,13 +29,27 @@ fn of_candidate(problem: &Problem, selection: &Selection, open: &[Candidate], at
     let candidate = &selection.accepted[at];
     let mut others = selection.accepted.clone();
     others.remove(at);
-    let base = without(problem, &selection.after, &selection.accepted, at);
-    let rival = |candidate: &&Candidate| {
-        let fitted = fitted(problem, &base, &others, candidate);
+    let near = near(selection, candidate);
+    let linear = near.iter().filter(|rival| rival.kind.guesses.is_empty());
+    let free: Vec<usize> =
+        selection.after.free.iter().copied().chain(linear.flat_map(|rival| rival.free.clone())).collect();
+    let equations = problem.equations(&selection.after.values, &free);
+    let base = OnceLock::new();
+    let rival = |rival: &&Candidate| {
+        if rival.kind.guesses.is_empty() {
+            let is_dropped = |at: &usize| !others.iter().chain([*rival]).any(|kept| kept.free.contains(at));
+            let dropped: Vec<usize> = free.iter().copied().filter(is_dropped).collect();
+            let costs = problem.costs_near(&problem.near(&equations, &selection.after.values, &dropped));
+            if is_clearly_worse(&costs, &selection.after) {
+                return None;
+            }
+        }
+        let base = base.get_or_init(|| without(problem, &selection.after, &selection.accepted, at));
+        let fitted = fitted(problem, base, &others, rival);
         let is_alike = !is_worse(&fitted, &selection.after);
-        is_alike.then(|| Rival { candidate: (*candidate).clone(), fitted })
+        is_alike.then(|| Rival { candidate: (*rival).clone(), fitted })
     };
-    let mut rivals: Vec<Rival> = near(selection, candidate).par_iter().filter_map(rival).collect();
+    let mut rivals: Vec<Rival> = near.par_iter().filter_map(rival).collect();
     if ratios::shows_rotation_alone(problem) {
         rivals.extend(of_ratios(problem, selection, open, candidate));
     }

@@ -19,6 +19,8 @@ use std::collections::BTreeMap;
 
 /// Steps of a fit at most.
 const STEPS_MAX: usize = 12;
+/// Chord steps after each of them at most.
+const CHORD_STEPS_MAX: usize = 5;
 /// Parts that the estimation data are cut into for cross-validation.
 const FOLDS: usize = 10;
 /// A fit is done when a step changes every parameter by less than this part of its standard deviation.
@@ -43,6 +45,47 @@ pub struct Problem<'f> {
     /// Mean lateness of the attitudes of the estimation data against the gyroscopes, in s: a fit of their delay
     /// starts there.
     pub shared_late_s: f64,
+}
+
+/// Equations of the estimation data.
+#[derive(Debug, Clone)]
+pub struct Equations {
+    /// The parameters of the derivatives.
+    free: Vec<usize>,
+    /// The normal equations, by flight and block of time.
+    blocks: Vec<Vec<Block>>,
+    /// Whitened derivatives, by flight.
+    columns: Vec<Vec<Vec<f64>>>,
+}
+
+impl Equations {
+    /// The normal equations of all flights, by block of time.
+    fn all(&self) -> Vec<Block> {
+        self.blocks.concat()
+    }
+
+    /// The part of them for other parameters.
+    fn without(&self, dropped: &[usize]) -> Self {
+        let kept: Vec<usize> = (0..self.free.len()).filter(|at| !dropped.contains(&self.free[*at])).collect();
+        let of = |blocks: &Vec<Block>| blocks.iter().map(|block| block.of(&kept)).collect();
+        let columns_of = |columns: &Vec<Vec<f64>>| kept.iter().map(|at| columns[*at].clone()).collect();
+        Self {
+            free: kept.iter().map(|at| self.free[*at]).collect(),
+            blocks: self.blocks.iter().map(of).collect(),
+            columns: self.columns.iter().map(columns_of).collect(),
+        }
+    }
+}
+
+/// A fit whose derivatives were taken at a point near: exact enough for a comparison, and not for an interval.
+#[derive(Debug, Clone)]
+pub struct Near {
+    /// Values of all parameters.
+    pub values: Vec<f64>,
+    /// The free parameters.
+    free: Vec<usize>,
+    /// The normal equations about the values, by flight and block of time.
+    blocks: Vec<Vec<Block>>,
 }
 
 /// Result of a fit.
@@ -109,23 +152,25 @@ impl<'f> Problem<'f> {
         self.estimation.iter_mut().chain(&mut self.validation).chain(&mut self.test)
     }
 
-    /// Fits the parameters `free`, starting from `start`.
+    /// Fits the parameters `free`, starting from `start`: Gauss-Newton steps, each followed by chord steps, which keep the
+    /// derivatives.
     pub fn fitted(&self, start: &[f64], free: &[usize]) -> FitResult {
         let mut values = start.to_vec();
-        let mut blocks = self.blocks(&self.estimation, &values, free);
-        let mut cost = normal::sum(&blocks).cost;
+        let mut equations = self.equations(&values, free);
+        let mut blocks = equations.all();
         for _ in 0..STEPS_MAX {
+            let cost = normal::sum(&blocks).cost;
             let step = self.step(&blocks, &values, free);
             if free.is_empty() || self.is_small(&step, &blocks) {
                 break;
             }
-            let Some((next, next_blocks, next_cost)) = self.descended(&values, free, &step, cost) else {
+            let Some((next, next_cost)) = self.descended(&values, free, &step, cost) else {
                 break;
             };
-            (values, blocks) = (next, next_blocks);
-            let gain = cost - next_cost;
-            cost = next_cost;
-            if gain < 1e-9 * cost {
+            values = self.chord_steps(&equations, next, next_cost);
+            equations = self.equations(&values, free);
+            blocks = equations.all();
+            if cost - normal::sum(&blocks).cost < 1e-9 * cost {
                 break;
             }
         }
@@ -137,6 +182,83 @@ impl<'f> Problem<'f> {
         };
         let estimation_costs = blocks.iter().map(|block| block.cost).collect();
         FitResult { values, free: free.to_vec(), covariance, validation_costs, estimation_costs }
+    }
+
+    /// The equations of the estimation data about `values`.
+    pub fn equations(&self, values: &[f64], free: &[usize]) -> Equations {
+        let of_flight = |flight| {
+            let (residual, columns) = self.whitened(flight, values, free);
+            (self.summed(flight, &residual, &columns), columns)
+        };
+        let (blocks, columns) = self.estimation.iter().map(of_flight).unzip();
+        Equations { free: free.to_vec(), blocks, columns }
+    }
+
+    /// The normal equations about `values`, by flight and block of time, with the derivatives that are known.
+    fn blocks_with(&self, equations: &Equations, values: &[f64]) -> Vec<Vec<Block>> {
+        let of_flight = |(flight, columns): (&Prepared<'_>, &Vec<Vec<f64>>)| {
+            self.summed(flight, &self.whitened(flight, values, &[]).0, columns)
+        };
+        self.estimation.iter().zip(&equations.columns).map(of_flight).collect()
+    }
+
+    /// Values after steps from `values`, whose cost is known, with the derivatives that are known, while they gain: near a solution
+    /// the residual is what changes, and it costs a small part of the derivatives.
+    fn chord_steps(&self, equations: &Equations, mut values: Vec<f64>, mut cost: f64) -> Vec<f64> {
+        let free = &equations.free;
+        for _ in 0..CHORD_STEPS_MAX {
+            let about = self.blocks_with(equations, &values).concat();
+            let step = self.step(&about, &values, free);
+            if self.is_small(&step, &about) {
+                break;
+            }
+            let next = self.moved(&values, free, &step);
+            let next_cost: f64 = self.costs(&self.estimation, &next).iter().sum();
+            let gain = cost - next_cost;
+            if gain <= 0.0 {
+                break;
+            }
+            (values, cost) = (next, next_cost);
+            if gain < 1e-9 * cost {
+                break;
+            }
+        }
+        values
+    }
+
+    /// The fit with the parameters `dropped` at their baselines and the other ones of `equations`, which are those about `values`.
+    pub fn near(&self, equations: &Equations, values: &[f64], dropped: &[usize]) -> Near {
+        let baseline = |at: &usize| self.model.parameters.all[*at].baseline - values[*at];
+        let held: Vec<Option<f64>> =
+            equations.free.iter().map(|at| dropped.contains(at).then(|| baseline(at))).collect();
+        let step = held_step(&normal::sum(&equations.all()), &held);
+        let start = self.moved(values, &equations.free, &step);
+        let others = equations.without(dropped);
+        let cost = self.costs(&self.estimation, &start).iter().sum();
+        let values = self.chord_steps(&others, start, cost);
+        Near { blocks: self.blocks_with(&others, &values), free: others.free, values }
+    }
+
+    /// The values of `near` without each estimation flight in turn, as those of [`Problem::values_without`].
+    pub fn each_without(&self, near: &Near) -> Vec<Vec<f64>> {
+        let Near { values, free, blocks } = near;
+        if blocks.len() < 2 || free.is_empty() {
+            return vec![values.clone(); blocks.len()];
+        }
+        let without = |flight: usize| {
+            let kept = [&blocks[..flight], &blocks[flight + 1..]].concat().concat();
+            self.moved(values, free, &self.step(&kept, values, free))
+        };
+        (0..blocks.len()).map(without).collect()
+    }
+
+    /// The costs of `near` on the data that effects are chosen on.
+    pub fn costs_near(&self, near: &Near) -> Vec<f64> {
+        if self.validation.is_empty() {
+            self.cross_validated(&near.blocks.concat(), &near.values, &near.free)
+        } else {
+            self.costs(&self.validation, &near.values)
+        }
     }
 
     /// The cost of each block of the estimation data under parameters that were fitted without its fold: the folds are
@@ -201,14 +323,13 @@ impl<'f> Problem<'f> {
         free: &[usize],
         step: &DVector<f64>,
         cost: f64,
-    ) -> Option<(Vec<f64>, Vec<Block>, f64)> {
+    ) -> Option<(Vec<f64>, f64)> {
         let mut share = 1.0;
         for _ in 0..5 {
             let next = self.moved(values, free, &(step * share));
-            let blocks = self.blocks(&self.estimation, &next, free);
-            let sum = normal::sum(&blocks).cost;
+            let sum = self.costs(&self.estimation, &next).iter().sum();
             if sum < cost {
-                return Some((next, blocks, sum));
+                return Some((next, sum));
             }
             share /= 4.0;
         }
@@ -311,6 +432,14 @@ impl<'f> Problem<'f> {
         self.blocks_from(flight, residual, columns)
     }
 
+    /// The whitened residual and its derivatives.
+    fn whitened(&self, flight: &Prepared, values: &[f64], free: &[usize]) -> (Vec<f64>, Vec<Vec<f64>>) {
+        let (mut residual, mut columns) = self.linearised(flight, values, free);
+        let whitening = Whitening::of(flight, &self.noises);
+        std::iter::once(&mut residual).chain(&mut columns).for_each(|rows| whitening.apply(rows));
+        (residual, columns)
+    }
+
     /// The normal equations of all blocks of `flights` about `values`, with the derivatives by `accepted` as they are at `base`: near it
     /// they hardly differ, and are known.
     pub fn blocks_near(
@@ -335,9 +464,14 @@ impl<'f> Problem<'f> {
         mut residual: Vec<f64>,
         mut columns: Vec<Vec<f64>>,
     ) -> Vec<Block> {
-        use rayon::prelude::*;
         let whitening = Whitening::of(flight, &self.noises);
         std::iter::once(&mut residual).chain(&mut columns).for_each(|rows| whitening.apply(rows));
+        self.summed(flight, &residual, &columns)
+    }
+
+    /// The normal equations of the blocks of one flight, from a whitened residual and its derivatives.
+    fn summed(&self, flight: &Prepared, residual: &[f64], columns: &[Vec<f64>]) -> Vec<Block> {
+        use rayon::prelude::*;
         let (width, weights) = (flight.width(), self.row_weights(flight));
         let of_knots = |knots: &(usize, usize)| {
             let mut block = Block::zero(columns.len());
@@ -345,7 +479,7 @@ impl<'f> Problem<'f> {
             for at in knots.0 * width..knots.1 * width {
                 let weight = weights[at % width];
                 if weight > 0.0 {
-                    row.iter_mut().zip(&columns).for_each(|(row, column)| *row = column[at]);
+                    row.iter_mut().zip(columns).for_each(|(row, column)| *row = column[at]);
                     block.add(residual[at], &row, weight);
                 }
             }

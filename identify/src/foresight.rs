@@ -5,7 +5,7 @@
 //! are fitted on, each with parameters that were fitted on the others.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
-use crate::fit::{FitResult, Problem};
+use crate::fit::{Equations, FitResult, Problem};
 use crate::noise;
 use crate::predict::{Measured, WindowEnd};
 use crate::prepared::Prepared;
@@ -61,13 +61,14 @@ pub struct Foresight {
 }
 
 impl Foresight {
-    /// Prediction errors of the judged flights under the fit; empty where no attitude was measured.
-    pub fn of(problem: &Problem, fitted: &FitResult) -> Self {
+    /// Prediction errors of the judged flights under the fit with the parameters `dropped` at their baselines, where `equations` are
+    /// those about it; empty where no attitude was measured.
+    pub fn of(problem: &Problem, equations: &Equations, fitted: &FitResult, dropped: &[usize]) -> Self {
+        let near = problem.near(equations, &fitted.values, dropped);
         let flights: Vec<(&Prepared, Vec<f64>)> = if problem.validation.is_empty() {
-            let without = |at| problem.values_without(fitted, at);
-            problem.estimation.iter().enumerate().map(|(at, flight)| (flight, without(at))).collect()
+            problem.estimation.iter().zip(problem.each_without(&near)).collect()
         } else {
-            problem.validation.iter().map(|flight| (flight, fitted.values.clone())).collect()
+            problem.validation.iter().map(|flight| (flight, near.values.clone())).collect()
         };
         Self::by(problem, &flights, |flight, values, horizon_s| {
             trimmed_ends(problem, flight, values, horizon_s)

@@ -9,8 +9,8 @@ use vehicles::ROTORS_MAX;
 /// Numbers that are kept for one flight at most: 32 MB.
 const NUMBERS_MAX: usize = 4_000_000;
 
-/// Values of a [`Recent`].
-const RECENT: usize = 3;
+/// Values of a [`Recent`]: those at a point, and at a step to both sides of it by each of two delays.
+const RECENT: usize = 5;
 
 /// Rows of one flight, and a derivative by one parameter.
 pub type Rows = Arc<Vec<f64>>;
@@ -26,7 +26,7 @@ pub struct Key {
     pub distrusted: [bool; ROTORS_MAX],
 }
 
-/// Values of a costly function at the arguments that were used last: those of a fit's point and of a step to both sides of it.
+/// Values of a costly function at the arguments that were used last: those of a fit's point and of steps to both sides of it.
 #[derive(Debug)]
 pub struct Recent<K, V> {
     entries: Mutex<Vec<(K, Arc<V>)>>,
@@ -137,11 +137,11 @@ mod tests {
                 x * x
             })
         };
-        assert_eq!([1, 2, 3, 1, 2, 1].map(square), [1, 4, 9, 1, 4, 1]);
-        assert_eq!(made.get(), 3);
-        // The three that were used last are 4, 1 and 2.
-        assert_eq!(([4, 2, 1, 4].map(square), made.get()), ([16, 4, 1, 16], 4));
-        assert_eq!((square(3), made.get()), (9, 5));
+        assert_eq!([1, 2, 3, 4, 5, 1, 2, 1].map(square), [1, 4, 9, 16, 25, 1, 4, 1]);
+        assert_eq!(made.get(), 5);
+        // All but 3 were used later than it.
+        assert_eq!(([6, 4, 5, 2, 1, 6].map(square), made.get()), ([36, 16, 25, 4, 1, 36], 6));
+        assert_eq!((square(3), made.get()), (9, 7));
     }
 
     #[test]

@@ -5,7 +5,6 @@ use crate::memo::{Key, Rows};
 use crate::parameter::Parameters;
 use crate::prepared::{BOX_STEPS, EachRotor, Equation, Held, Prepared, Tracks};
 use crate::sensing::SensorErrors;
-use crate::track::Track;
 use nalgebra::Vector3;
 use plant::effects::{Quantity, Stage};
 use plant::{Actuation, Airframe, NewtonEuler, PerRotor, RigidBody, RotorState, State};
@@ -92,6 +91,26 @@ impl Model {
         }
         self.leave_out_distrusted(flight, &mut residual);
         residual
+    }
+
+    /// One component of the model's side of an equation of forces or torques, through its window about each instant of the grid; 0 where
+    /// that does not fit on it.
+    pub fn side(&self, flight: &Prepared, equation: Equation, axis: usize, values: &[f64]) -> Vec<f64> {
+        let sides = self.sides(flight, &self.tracks(flight, values), &self.rotors(flight, values), values);
+        let of_equation = match equation {
+            Equation::SpecificForce => &sides.force_B,
+            Equation::Acceleration => &sides.acceleration_W,
+            Equation::AngularAcceleration => &sides.angular_B,
+            Equation::Gyroscope | Equation::RotorSpeed(_) => return vec![0.0; flight.layout.clock.count],
+        };
+        let at = flight.layout.equations.iter().position(|known| *known == equation);
+        let window = at.map(|at| &flight.layout.windows[at].1);
+        let reach = flight.reach();
+        let about = |i: usize| {
+            let is_inside = i >= reach && i + reach < of_equation.len();
+            window.filter(|_| is_inside).map_or(0.0, |window| window.over(of_equation, i)[axis])
+        };
+        (0..flight.layout.clock.count).map(about).collect()
     }
 
     /// A rotor's speed that is not believed is compared with nothing.
@@ -269,7 +288,7 @@ fn speeds(rotors: &PerRotor<RotorState>) -> EachRotor {
 /// Adds to rotors that follow from the commands by how much the measured ones turn faster. Their acceleration stays that
 /// of the commands: even of a smoothed measurement it would be noise for the most part.
 fn correct(flight: &Prepared, pose_s: f64, commanded: &[EachRotor], rotors: &mut [PerRotor<RotorState>]) {
-    let mut difference = Track::sampled(&flight.flight.rotor_speed, -pose_s, &flight.layout.clock);
+    let mut difference = flight.rotor_speeds(pose_s);
     for (difference, commanded) in difference.values.iter_mut().zip(commanded) {
         *difference = std::array::from_fn(|i| difference[i] - commanded[i]);
     }
@@ -282,9 +301,8 @@ fn correct(flight: &Prepared, pose_s: f64, commanded: &[EachRotor], rotors: &mut
 }
 
 fn measured_rotors(flight: &Prepared, pose_s: f64) -> Vec<PerRotor<RotorState>> {
-    let clock = &flight.layout.clock;
-    let track = Track::sampled(&flight.flight.rotor_speed, -pose_s, clock);
-    let slopes = track.slope(BOX_STEPS, clock.step_s);
+    let track = flight.rotor_speeds(pose_s);
+    let slopes = track.slope(BOX_STEPS, flight.layout.clock.step_s);
     let rotor = |speed_rad_s, acceleration_rad_s2| RotorState { speed_rad_s, acceleration_rad_s2 };
     let rotors = track.values.iter().zip(&slopes);
     let count = flight.flight.rotors;

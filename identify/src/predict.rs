@@ -10,8 +10,11 @@ use plant::{Airframe, Backend, FreeFlight, NewtonEuler, PerRotor, RigidBody, Rot
 use std::collections::BTreeMap;
 use vehicles::ROTORS_MAX;
 
-/// Length of a tick.
+/// Length of a tick where rotors follow commands: that of the bus.
 const TICK_S: f64 = 0.001;
+/// Length of a tick where rotor speeds are measured, a quarter of the period of logs at 100 Hz: nothing that is simulated is as fast as a
+/// motor then.
+pub(crate) const ROTOR_TICK_S: f64 = 0.0025;
 /// Times are sums of decimal fractions: a nanosecond of slack keeps the last moment.
 const SLACK_S: f64 = 1e-9;
 
@@ -65,10 +68,11 @@ impl Measured {
     /// The ends of the windows of `horizon_s` that count, one window after the other, as `airframe` predicts them
     /// under a constant push over each window: angular acceleration in B and acceleration in W, by the window's begin.
     pub fn ends(&self, airframe: Airframe, horizon_s: f64, push: impl Fn(f64) -> [f64; 6]) -> Vec<WindowEnd> {
-        let window = (horizon_s / TICK_S).round() as usize;
-        let memory = airframe.initial_state(0, "predict", TICK_S);
+        let tick_s = if self.rotor_speed.is_some() { ROTOR_TICK_S } else { TICK_S };
+        let window = (horizon_s / tick_s).round() as usize;
+        let memory = airframe.initial_state(0, "predict", tick_s);
         let (start_s, end_s) = self.played.span_s();
-        let at_s = |tick: usize| start_s + tick as f64 * TICK_S;
+        let at_s = |tick: usize| start_s + tick as f64 * tick_s;
         let mut hint = 0;
         let mut before = self.played.at(start_s, &mut hint);
         let count = airframe.vehicle().rotors.len();
@@ -78,16 +82,16 @@ impl Measured {
         let (mut ends, mut pushing) = (Vec::new(), push(start_s));
         let span_s = (end_s - start_s + SLACK_S).min(self.span_s);
         let mut speed_hint = 0;
-        for tick in 1..=(span_s / TICK_S) as usize {
+        for tick in 1..=(span_s / tick_s) as usize {
             match &self.rotor_speed {
-                None => plant.step(&before.command[..count], TICK_S, &[]),
+                None => plant.step(&before.command[..count], tick_s, &[]),
                 Some(speeds) => {
                     let rotors = rotors_at(speeds, at_s(tick - 1), &mut speed_hint);
-                    plant.step_with_rotors(&PerRotor::from_fn(count, |rotor| rotors[rotor]), TICK_S);
+                    plant.step_with_rotors(&PerRotor::from_fn(count, |rotor| rotors[rotor]), tick_s);
                 }
             }
             if pushing != [0.0; 6] {
-                let pushed = pushed(&plant.state().body, &pushing);
+                let pushed = pushed(&plant.state().body, &pushing, tick_s);
                 plant.set_body(&pushed);
             }
             before = self.played.at(at_s(tick), &mut hint);
@@ -147,8 +151,8 @@ pub fn errors(flight: &Flight, ends: &[WindowEnd], of: impl Fn(&WindowEnd) -> Ri
 }
 
 /// The body after a tick under a push.
-fn pushed(body: &RigidBody, push: &[f64; 6]) -> RigidBody {
-    let [x, y, z, forward, left, up] = push.map(|acceleration| acceleration * TICK_S);
+fn pushed(body: &RigidBody, push: &[f64; 6], tick_s: f64) -> RigidBody {
+    let [x, y, z, forward, left, up] = push.map(|acceleration| acceleration * tick_s);
     RigidBody {
         velocity_W_m_s: body.velocity_W_m_s + Vector3::new(forward, left, up),
         angular_velocity_B_rad_s: body.angular_velocity_B_rad_s + Vector3::new(x, y, z),

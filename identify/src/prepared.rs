@@ -275,7 +275,8 @@ impl<'f> Prepared<'f> {
         let turning = turning(&attitude, clock.step_s);
         let gyroscope = Track::sampled(&flight.angular_velocity, imu_s, clock);
         let force = Track::sampled(&flight.specific_force, imu_s, clock);
-        let speeds = Track::sampled(&flight.rotor_speed, -pose_s, clock);
+        let is_of_rotors = self.offset_of(self.rotor_speed()).is_some();
+        let speeds = is_of_rotors.then(|| self.rotor_speeds(pose_s)).unwrap_or_default();
         let rates = if flight.angular_velocity.is_empty() {
             Track { values: turning.clone(), valid: Vec::new() }.smoothed(BOX_STEPS / 2)
         } else {
@@ -302,6 +303,11 @@ impl<'f> Prepared<'f> {
             }
         }
         Tracks { position, velocity, attitude, rates, rows }
+    }
+
+    /// The measured rotor speeds, with the pose late by `pose_s`.
+    pub fn rotor_speeds(&self, pose_s: f64) -> Track<ROTORS_MAX> {
+        Track::sampled(&self.flight.rotor_speed, self.late.rotor_speed_s - pose_s, &self.layout.clock)
     }
 
     /// The acceleration in W by position or velocity alone, seen through the windows: three components for each knot;
@@ -341,16 +347,18 @@ impl<'f> Prepared<'f> {
             sampled_if_late(&flight.attitude, late.attitude_s, clock),
             sampled_if_late(&flight.position, late.position_s, clock),
             sampled_if_late(&flight.velocity, late.velocity_s, clock),
+            sampled_if_late(&flight.rotor_speed, late.rotor_speed_s, clock),
         ];
         for is_valid in moved.into_iter().flatten() {
             let about = valid_about(&is_valid, reach);
             self.layout.knots.retain(|knot| about[*knot]);
         }
         // Their rows are those of the knots before.
-        (self.memo, self.recent_tracks) = Default::default();
+        (self.memo, self.recent_tracks, self.recent_rotors) = Default::default();
     }
 
-    fn reach(&self) -> usize {
+    /// Instants that a window reaches to both sides.
+    pub fn reach(&self) -> usize {
         self.layout.windows.iter().map(|(a, b)| a.reach().max(b.reach())).max().unwrap_or(0)
     }
 

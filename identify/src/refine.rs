@@ -40,11 +40,11 @@ pub fn refined(problem: &Problem, fitted: &FitResult) -> Option<FitResult> {
     }
     let refinement = Refinement { problem, free: &free, known: known(problem, fitted, &free) };
     let better = refinement.descended(&flights, &fitted.values)?;
-    if !refinement.predicts_better(fitted, &better) {
+    let (blocks, rows) = refinement.blocks(&flights, &better);
+    if !refinement.predicts_better(fitted, &better, &blocks, rows) {
         return None;
     }
-    let (blocks, _) = refinement.blocks(&flights, &better);
-    Some(refinement.result(fitted, better, &blocks))
+    Some(refinement.result(fitted, better, &plain(&blocks)))
 }
 
 struct Refinement<'p, 'f> {
@@ -82,7 +82,8 @@ impl Refinement<'_, '_> {
         // The variance of a residual, in whose units the equations' knowledge counts.
         let mut variance = None;
         for number in 0..STEPS_MAX {
-            let (mut blocks, rows) = self.blocks(flights, &values);
+            let (blocks, rows) = self.blocks(flights, &values);
+            let mut blocks = plain(&blocks);
             let of_errors = normal::sum(&blocks).cost;
             let variance = *variance.get_or_insert(of_errors / rows.max(1) as f64);
             let prior = self.prior(start, &values, variance);
@@ -112,27 +113,46 @@ impl Refinement<'_, '_> {
     }
 
     /// True if flights are predicted better, beyond chance, by values that were moved on the others: each flight in turn, or
-    /// those that effects are chosen on.
-    fn predicts_better(&self, fitted: &FitResult, better: &[f64]) -> bool {
+    /// those that effects are chosen on. `blocks` are the equations about `better`.
+    fn predicts_better(
+        &self,
+        fitted: &FitResult,
+        better: &[f64],
+        blocks: &[(usize, Block)],
+        rows: usize,
+    ) -> bool {
         let problem = self.problem;
-        if problem.validation.is_empty() && problem.estimation.len() > 1 {
-            let of = |at: usize| {
-                let others: Vec<&Prepared> = others(&problem.estimation, at);
-                let start = problem.values_without(fitted, at);
-                let moved = self.descended(&others, &start).unwrap_or_else(|| start.clone());
-                (&problem.estimation[at], start, moved)
-            };
-            let all: Vec<_> = (0..problem.estimation.len()).map(of).collect();
-            let before: Vec<_> = all.iter().map(|(flight, start, _)| (*flight, start.clone())).collect();
-            let after: Vec<_> = all.iter().map(|(flight, _, moved)| (*flight, moved.clone())).collect();
-            return Foresight::under(problem, &after).is_better_than(&Foresight::under(problem, &before));
-        }
+        let is_each_in_turn = problem.validation.is_empty() && problem.estimation.len() > 1;
         let judged = if problem.validation.is_empty() { &problem.estimation } else { &problem.validation };
-        let under = |values: &[f64]| {
-            let flights: Vec<_> = judged.iter().map(|flight| (flight, values.to_vec())).collect();
-            Foresight::under(problem, &flights)
+        let pairs = |(at, flight)| {
+            if !is_each_in_turn {
+                return (flight, fitted.values.clone(), better.to_vec());
+            }
+            let start = problem.values_without(fitted, at);
+            let moved = self.without(at, &start, better, blocks, rows);
+            (flight, start, moved)
         };
-        under(better).is_better_than(&under(&fitted.values))
+        let all: Vec<(&Prepared, Vec<f64>, Vec<f64>)> = judged.iter().enumerate().map(pairs).collect();
+        let before: Vec<_> = all.iter().map(|(flight, start, _)| (*flight, start.clone())).collect();
+        let after: Vec<_> = all.into_iter().map(|(flight, _, moved)| (flight, moved)).collect();
+        Foresight::under(problem, &after).is_better_than(&Foresight::under(problem, &before))
+    }
+
+    /// The values without the flight at `at`, by a step from the equations about those with all: a descent without each would take as
+    /// long as all else together. `start` is what the equations of the other flights alone say.
+    fn without(
+        &self,
+        at: usize,
+        start: &[f64],
+        better: &[f64],
+        blocks: &[(usize, Block)],
+        rows: usize,
+    ) -> Vec<f64> {
+        let variance = blocks.iter().map(|(_, block)| block.cost).sum::<f64>() / rows.max(1) as f64;
+        let others = blocks.iter().filter(|(flight, _)| *flight != at).map(|(_, block)| block.clone());
+        let equations: Vec<Block> = others.chain([self.prior(start, better, variance)]).collect();
+        let step = self.problem.step(&equations, better, self.free);
+        self.problem.moved(better, self.free, &step)
     }
 
     fn cost(&self, flights: &[&Prepared], values: &[f64]) -> f64 {
@@ -163,8 +183,9 @@ impl Refinement<'_, '_> {
         jobs.par_iter().map(of_job).collect()
     }
 
-    /// The normal equations by flight and block of time, and the number of rows; rows that err much count less (soft L1).
-    fn blocks(&self, flights: &[&Prepared], values: &[f64]) -> (Vec<Block>, usize) {
+    /// The normal equations by block of time, each with the place of its flight, and the number of rows; rows that err much count
+    /// less (soft L1).
+    fn blocks(&self, flights: &[&Prepared], values: &[f64]) -> (Vec<(usize, Block)>, usize) {
         let now = self.residuals(flights, values);
         let moved: Vec<(f64, Vec<Residuals>)> = self
             .free
@@ -194,8 +215,11 @@ impl Refinement<'_, '_> {
                 }
             }
         }
-        let mut blocks: Vec<Block> = blocks.into_values().collect();
-        blocks.iter_mut().for_each(Block::complete);
+        let completed = |((flight, _), mut block): ((usize, i64), Block)| {
+            block.complete();
+            (flight, block)
+        };
+        let blocks = blocks.into_iter().map(completed).collect();
         (blocks, 6 * now.iter().map(Vec::len).sum::<usize>())
     }
 
@@ -219,7 +243,7 @@ fn loss(residual: f64) -> f64 {
     2.0 * ((1.0 + residual * residual).sqrt() - 1.0)
 }
 
-fn others<'p, 'f>(flights: &'p [Prepared<'f>], at: usize) -> Vec<&'p Prepared<'f>> {
-    let kept = flights.iter().enumerate().filter(|(other, _)| *other != at);
-    kept.map(|(_, flight)| flight).collect()
+/// The blocks of all flights.
+fn plain(blocks: &[(usize, Block)]) -> Vec<Block> {
+    blocks.iter().map(|(_, block)| block.clone()).collect()
 }

@@ -199,9 +199,12 @@ impl StepwiseSearch {
         if names.is_empty() {
             return None;
         }
-        let with = Foresight::of(problem, &self.base);
+        let equations = problem.equations(&self.base.values, &self.base.free);
+        let with = Foresight::of(problem, &equations, &self.base, &[]);
         let growth = |name: &'static str| {
-            let without = Foresight::of(problem, &self.without_effect(problem, name).1);
+            let of_effect = self.accepted.iter().filter(|candidate| candidate.kind.name == name);
+            let dropped: Vec<usize> = of_effect.flat_map(|candidate| candidate.free.clone()).collect();
+            let without = Foresight::of(problem, &equations, &self.base, &dropped);
             Some((name, with.growth(&without)?))
         };
         let (effect, Growth { component, horizon_s, without, with, unit }) =
@@ -515,6 +518,11 @@ fn best(problem: &Problem, judged: &[Judged]) -> Option<usize> {
     accepted.iter().filter(is_alike).min_by(|a, b| size(**a).cmp(&size(**b)).then(by_gain(b, a))).copied()
 }
 
+/// True if so much is worse on the validation data than `other` that no better fit changes it.
+pub fn is_clearly_worse(costs: &[f64], other: &FitResult) -> bool {
+    p_value(costs, &other.validation_costs) < CLEARLY_WORSE
+}
+
 /// True if `fitted` is worse on the validation data than `other`, beyond chance.
 pub fn is_worse(fitted: &FitResult, other: &FitResult) -> bool {
     p_value(&fitted.validation_costs, &other.validation_costs) < CONFOUNDED_LEVEL
@@ -526,7 +534,7 @@ fn without_idle(problem: &Problem, mut base: FitResult, accepted: &mut Vec<Candi
     // The newest has just passed.
     while at + 1 < accepted.len() {
         let promised = problem.promised_without(&base, &accepted[at].free);
-        if p_value(&promised, &base.validation_costs) < CLEARLY_WORSE {
+        if is_clearly_worse(&promised, &base) {
             at += 1;
             continue;
         }

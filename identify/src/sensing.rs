@@ -60,6 +60,7 @@ impl SensorErrors {
         earlier(&mut flight.position, self.pose_delay_s + late.position_s);
         earlier(&mut flight.velocity, self.pose_delay_s + late.velocity_s);
         earlier(&mut flight.attitude, self.pose_delay_s + late.attitude_s);
+        earlier(&mut flight.rotor_speed, late.rotor_speed_s);
         earlier(&mut flight.angular_velocity, self.inertial_delay_s);
         earlier(&mut flight.specific_force, self.inertial_delay_s);
         less(&mut flight.angular_velocity, self.gyroscope_bias_rad_s);

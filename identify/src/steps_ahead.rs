@@ -4,15 +4,13 @@
 //!
 //! Other than the windows that an identification judges by, these overlap, and their errors are means of norms.
 
-use crate::predict::{body, rotors_at, state};
+use crate::predict::{ROTOR_TICK_S, body, rotors_at, state};
 use flights::state::StateQuantity;
 use flights::{Channel, Flight, Played};
 use plant::{Airframe, Backend, FreeFlight, NewtonEuler, PerRotor, RigidBody, RotorState};
 use rayon::prelude::*;
 use vehicles::ROTORS_MAX;
 
-/// Longest step of the integration between two samples, in s: a quarter of the period of logs at 100 Hz; tuned, no source.
-const STEP_MAX_S: f64 = 0.0025;
 /// Rotors that follow commands are simulated in steps of this length, in s.
 const MOTOR_STEP_S: f64 = 0.001;
 /// Samples whose predictions are one job of a thread.
@@ -86,7 +84,7 @@ pub fn errors(
     }
     let of_job = |starts: &[usize]| {
         let mut sums = Sums::new(steps);
-        let memory = airframe.initial_state(0, "predict", STEP_MAX_S);
+        let memory = airframe.initial_state(0, "predict", ROTOR_TICK_S);
         let mut plant = FreeFlight::new(NewtonEuler::flying(airframe.clone(), 1), bodies[starts[0]], memory);
         starts.iter().for_each(|at| {
             sums.add(&mut plant, &Window { times_s, bodies: &bodies, rotors: &rotors, at: *at, between })
@@ -156,7 +154,7 @@ impl Sums {
             .saturating_sub(1);
         for step in 0..self.model.len() {
             let (from_s, to_s) = (window.times_s[window.at + step], window.times_s[window.at + step + 1]);
-            let parts = ((to_s - from_s) / STEP_MAX_S).ceil().max(1.0);
+            let parts = ((to_s - from_s) / ROTOR_TICK_S).ceil().max(1.0);
             let part_s = (to_s - from_s) / parts;
             for part in 0..parts as usize {
                 let at_s = from_s + part as f64 * part_s;

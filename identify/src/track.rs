@@ -147,26 +147,27 @@ fn interpolated<const N: usize>(
     period_s: f64,
 ) -> Track<N> {
     let times = &channel.time_s;
+    // Several instants lie between two samples.
+    let slopes: Vec<[f64; N]> = (0..times.len()).map(|sample| slope_at(channel, sample)).collect();
     let mut segment = 0;
-    let mut track = Track::default();
+    let mut track = Track { values: Vec::with_capacity(clock.count), valid: Vec::with_capacity(clock.count) };
     for index in 0..clock.count {
         let at_s = clock.at(index) + delay_s;
         while segment + 2 < times.len() && times[segment + 1] <= at_s {
             segment += 1;
         }
-        track.values.push(cubic(channel, segment, at_s));
+        track.values.push(cubic(channel, &slopes, segment, at_s));
         let inside = times[0] - 1e-9 <= at_s && at_s <= times[times.len() - 1] + 1e-9;
         track.valid.push(inside && times[segment + 1] - times[segment] <= GAP_PERIODS * period_s);
     }
     track
 }
 
-fn cubic<const N: usize>(channel: &Channel<N>, segment: usize, at_s: f64) -> [f64; N] {
+fn cubic<const N: usize>(channel: &Channel<N>, slopes: &[[f64; N]], segment: usize, at_s: f64) -> [f64; N] {
     let (times, values) = (&channel.time_s, &channel.values);
     let span_s = times[segment + 1] - times[segment];
     // Beyond the samples nothing is valid; a cubic would run away there.
     let part = ((at_s - times[segment]) / span_s).clamp(0.0, 1.0);
-    let slopes = [slope_at(channel, segment), slope_at(channel, segment + 1)];
     let (part2, part3) = (part * part, part * part * part);
     let shares = [
         2.0 * part3 - 3.0 * part2 + 1.0,
@@ -176,9 +177,9 @@ fn cubic<const N: usize>(channel: &Channel<N>, segment: usize, at_s: f64) -> [f6
     ];
     std::array::from_fn(|i| {
         shares[0] * values[segment][i]
-            + shares[1] * span_s * slopes[0][i]
+            + shares[1] * span_s * slopes[segment][i]
             + shares[2] * values[segment + 1][i]
-            + shares[3] * span_s * slopes[1][i]
+            + shares[3] * span_s * slopes[segment + 1][i]
     })
 }
 

@@ -3,7 +3,7 @@
 use super::files::PAGE;
 use super::interrupts::stop_token;
 use super::next_flight::{self, NextFlight};
-use super::output::{print_json, print_text, readable};
+use super::output::{self, print_json, print_text, readable};
 use super::progress;
 use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand};
@@ -20,7 +20,7 @@ use serde_json::{Value, json};
 use std::fs::File;
 use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use vehicles::Vehicle;
 
 /// Text of `--help` behind the options.
@@ -111,7 +111,13 @@ fn flights_of(arguments: &IdentifyArguments, file: &Path, out: &Path) -> Result<
     if !arguments.json {
         bar.enable_steady_tick(Duration::from_millis(100));
     }
-    let say = |text: &str| bar.set_message(readable(text).into_owned());
+    let started = Instant::now();
+    let say = |text: &str| {
+        bar.set_message(readable(text).into_owned());
+        if bar.is_hidden() && !arguments.json {
+            output::say(&format!("{:6.1} s  {}", started.elapsed().as_secs_f64(), readable(text)));
+        }
+    };
     say("reading flights");
     let set = FlightSet::load(file)?;
     let base = Vehicle::base(&set.files, &set.vehicle);
