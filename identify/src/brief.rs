@@ -197,6 +197,7 @@ mod tests {
             high: 1.465e-6,
             at_bound: false,
             determined: true,
+            by_equations: None,
         };
         EffectReport {
             accepted: true,

@@ -4,21 +4,21 @@
     reason = "not in a component: reports of flights, whose products are summed by hand"
 )]
 
-use crate::candidate::Candidate;
 use crate::model::Model;
-use crate::noise_model::Products;
 use crate::normal::{self, Block};
 use crate::prepared::Prepared;
 use crate::rows::keep_means;
 use crate::statistics::student_quantile;
-use crate::whitening::{
-    Component, ComponentNoise, Noises, Whitening, components, has_trim, mean, spread, stretches,
-};
+use crate::whitening::{Noises, Whitening, components};
 use nalgebra::{DMatrix, DVector};
-use std::collections::BTreeMap;
+use plant::effects::{EffectKind, Requirement};
 
 /// Steps of a fit at most.
 const STEPS_MAX: usize = 12;
+/// Halvings in the search for the longest step to a vehicle that can be.
+const HALVINGS: usize = 12;
+/// Such a vehicle still can be with this many times the deviation.
+const SPARE: f64 = 1.002;
 /// Chord steps after each of them at most.
 const CHORD_STEPS_MAX: usize = 5;
 /// Parts that the estimation data are cut into for cross-validation.
@@ -364,13 +364,51 @@ impl<'f> Problem<'f> {
         step
     }
 
-    /// The values after a step, within their bounds.
+    /// The values after a step, within their bounds, and such that a vehicle can have them.
     pub fn moved(&self, values: &[f64], free: &[usize], step: &DVector<f64>) -> Vec<f64> {
+        let all = &self.model.parameters.all;
         let mut next = values.to_vec();
         for (parameter, step) in free.iter().zip(step.iter()) {
-            next[*parameter] = self.model.parameters.all[*parameter].bounded(next[*parameter] + step);
+            next[*parameter] = all[*parameter].bounded(next[*parameter] + step);
+        }
+        let mut kinds: Vec<&EffectKind> = free.iter().map(|at| all[*at].kind).collect();
+        kinds.dedup();
+        for (kind, requirement) in kinds.iter().filter_map(|kind| Some((kind, kind.require?))) {
+            let of_kind: Vec<usize> = free.iter().copied().filter(|at| all[*at].kind == *kind).collect();
+            if !self.meets(requirement, &next, &of_kind) {
+                self.hold_back(requirement, values, &mut next, &of_kind);
+            }
         }
         next
+    }
+
+    /// True if the vehicle meets what an effect requires, with something to spare of the effect's `parameters`: a file has fewer digits.
+    fn meets(&self, requirement: Requirement, values: &[f64], parameters: &[usize]) -> bool {
+        let mut beyond = values.to_vec();
+        for at in parameters {
+            let baseline = self.model.parameters.all[*at].baseline;
+            beyond[*at] = baseline + SPARE * (values[*at] - baseline);
+        }
+        requirement(self.model.airframe(&beyond).vehicle()).is_ok()
+    }
+
+    /// Takes back as much of the way from `values` to `next` as the requirement asks for: of one parameter where that is enough, such as
+    /// a moment of inertia that is larger than the sum of the others, else of all.
+    fn hold_back(&self, requirement: Requirement, values: &[f64], next: &mut [f64], parameters: &[usize]) {
+        let taken_back = |next: &[f64], taken: &[usize], part: f64| {
+            let mut tried = next.to_vec();
+            taken.iter().for_each(|at| tried[*at] += part * (values[*at] - next[*at]));
+            tried
+        };
+        let is_enough = |at: &&usize| self.meets(requirement, &taken_back(next, &[**at], 1.0), parameters);
+        let moved = parameters.iter().find(is_enough).map_or(parameters.to_vec(), |at| vec![*at]);
+        let (mut enough, mut too_little) = (1.0, 0.0);
+        for _ in 0..HALVINGS {
+            let part = f64::midpoint(enough, too_little);
+            let is_met = self.meets(requirement, &taken_back(next, &moved, part), parameters);
+            *(if is_met { &mut enough } else { &mut too_little }) = part;
+        }
+        next.copy_from_slice(&taken_back(next, &moved, enough));
     }
 
     /// The normal equations of all blocks of `flights`.
@@ -379,7 +417,7 @@ impl<'f> Problem<'f> {
     }
 
     /// The model's residual and its derivatives; where the attitude was assumed, the means of blocks alone.
-    fn linearised(&self, flight: &Prepared, values: &[f64], free: &[usize]) -> (Vec<f64>, Vec<Vec<f64>>) {
+    pub fn linearised(&self, flight: &Prepared, values: &[f64], free: &[usize]) -> (Vec<f64>, Vec<Vec<f64>>) {
         let (mut residual, mut columns) = self.model.linearised(flight, values, free);
         if flight.is_assumed() {
             let blocks = self.block_knots(flight);
@@ -531,96 +569,7 @@ fn held_step(total: &Block, held: &[Option<f64>]) -> DVector<f64> {
     step
 }
 
-/// Residual of one component of a flight.
-struct Left {
-    column: Vec<f64>,
-    stretches: Vec<(usize, usize)>,
-    /// Sum of the squares of the measured values.
-    signal: f64,
-}
-
-/// The noise of one component, and the spread of its trims if they are each flight's own.
-fn noise_of(flights: &[Left], is_own: bool, is_white: bool) -> ComponentNoise {
-    let mut products = Products::default();
-    for Left { column, stretches, signal } in flights {
-        let centre = if is_own { column.iter().sum::<f64>() / column.len().max(1) as f64 } else { 0.0 };
-        for (first, end) in stretches {
-            let rows: Vec<f64> = column[*first..*end].iter().map(|row| row - centre).collect();
-            products.add(&rows);
-        }
-        products.add_white(LEAST_NOISE * LEAST_NOISE * signal);
-    }
-    let model = if is_white { products.white() } else { products.model() };
-    let means = flights.iter().filter_map(|left| mean(&left.column, &left.stretches, &model));
-    let trim_variance = if is_own { spread(&means.collect::<Vec<_>>()) } else { 0.0 };
-    ComponentNoise { model, trim_variance }
-}
-
-/// A component without any noise would count infinitely: no sensor is better than this part of its own signal.
-const LEAST_NOISE: f64 = 1e-4;
-
 impl Problem<'_> {
-    /// Sets the noises by what is left on the estimation data when, from `base` on, all of `candidates` take
-    /// the step that fits best.
-    pub fn weigh(&mut self, base: &FitResult, candidates: &[Candidate]) {
-        let mut all = base.free.clone();
-        // Torques of an assumed attitude are zero, to which any scale of thrust or inertia could shrink the model's.
-        let is_assumed = self.estimation.iter().any(Prepared::is_assumed);
-        let counts =
-            |candidate: &&Candidate| candidate.kind.is_linear && (!is_assumed || candidate.is_trim());
-        for candidate in candidates.iter().filter(counts) {
-            all.extend(candidate.free.iter().filter(|at| !base.free.contains(at)));
-        }
-        for _ in 0..2 {
-            if self.noises.is_empty() {
-                self.noises = self.noises_after(&base.values, &[], &DVector::zeros(0));
-            }
-            let total = normal::sum(&self.blocks(&self.estimation, &base.values, &all));
-            let step = -(normal::inverse(&total.gram) * &total.gradient);
-            self.noises = self.noises_after(&base.values, &all, &step);
-        }
-    }
-
-    /// The noise of each component, and the spread of the flights' trims, after a step.
-    fn noises_after(&self, values: &[f64], free: &[usize], step: &DVector<f64>) -> Noises {
-        let mut left: BTreeMap<Component, Vec<Left>> = BTreeMap::new();
-        for flight in &self.estimation {
-            for (component, of_flight) in self.left_after(flight, values, free, step) {
-                left.entry(component).or_default().push(of_flight);
-            }
-        }
-        let is_assumed = self.estimation.iter().any(Prepared::is_assumed);
-        let noise = |(component, flights): (Component, Vec<Left>)| {
-            let is_own = !is_assumed && flights.len() > 1 && has_trim(component);
-            (component, noise_of(&flights, is_own, is_assumed))
-        };
-        left.into_iter().map(noise).collect()
-    }
-
-    /// Residuals of each component of a flight after a step.
-    fn left_after(
-        &self,
-        flight: &Prepared,
-        values: &[f64],
-        free: &[usize],
-        step: &DVector<f64>,
-    ) -> Vec<(Component, Left)> {
-        let (mut left, columns) = self.linearised(flight, values, free);
-        for (column, step) in columns.iter().zip(step.iter()) {
-            left.iter_mut().zip(column).for_each(|(left, slope)| *left += slope * step);
-        }
-        let measured = &self.model.tracks(flight, values).rows;
-        let width = flight.width();
-        let of = |rows: &[f64], offset: usize| -> Vec<f64> {
-            rows[offset..].iter().step_by(width).copied().collect()
-        };
-        let of_component = |(offset, component)| {
-            let signal = of(measured, offset).iter().map(|row| row * row).sum();
-            (component, Left { column: of(&left, offset), stretches: stretches(flight), signal })
-        };
-        components(flight).enumerate().map(of_component).collect()
-    }
-
     /// The cost that `fitted` leaves on the estimation data, in units of what all candidates together would leave by the
     /// linearised equations: those by which the weights were set. Delays, lags and the battery are far from linear and do
     /// not count.

@@ -276,7 +276,7 @@ impl<'f> Prepared<'f> {
         let gyroscope = Track::sampled(&flight.angular_velocity, imu_s, clock);
         let force = Track::sampled(&flight.specific_force, imu_s, clock);
         let is_of_rotors = self.offset_of(self.rotor_speed()).is_some();
-        let speeds = is_of_rotors.then(|| self.rotor_speeds(pose_s)).unwrap_or_default();
+        let speeds = if is_of_rotors { self.rotor_speeds(pose_s) } else { Track::default() };
         let rates = if flight.angular_velocity.is_empty() {
             Track { values: turning.clone(), valid: Vec::new() }.smoothed(BOX_STEPS / 2)
         } else {

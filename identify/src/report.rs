@@ -132,6 +132,10 @@ pub struct Estimate {
     pub at_bound: bool,
     /// True if these flights determine it: its interval does not cover all values that the effect may have.
     pub determined: bool,
+    /// The value by the equations of each moment, where predictions ask for one far beyond its interval. Neither is then a property of
+    /// the vehicle alone: something acts that no effect has, and a controller answers it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub by_equations: Option<f64>,
 }
 
 /// A residual without an explanation.
@@ -276,6 +280,13 @@ impl Report {
                 };
                 let unit = if estimate.unit == "1" { String::new() } else { format!(" {}", estimate.unit) };
                 writeln!(f, "    {parameter} = {value}{unit}  (95 %: {low} ... {high}){doubt}")?;
+                if let Some(other) = estimate.by_equations.map(rounded) {
+                    writeln!(
+                        f,
+                        "      by the equations of each moment {other}{unit}: do not take it for a property of the vehicle; something \
+                         acts that no effect has, and the controller answers it"
+                    )?;
+                }
             }
             if !effect.confused_with.is_empty() {
                 writeln!(f, "    cannot be told from: {}", effect.confused_with.join(", "))?;

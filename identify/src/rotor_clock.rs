@@ -1,7 +1,7 @@
 //! Lateness of measured rotor speeds against the inertial unit: by the torques and the thrust that the rotors make.
 //!
-//! Where rotor speeds alone drive the model, a clock of their own that is 10 ms off turns the phase of a torque at 10 Hz by 36 deg, and
-//! inertia and damping come out wrong. The model's angular acceleration and specific force under the measured speeds are shifted until they
+//! A clock of their own that is 10 ms off turns the phase of a torque at 10 Hz by 36 deg, and inertia and damping come out wrong where rotor
+//! speeds alone drive the model. The model's angular acceleration and specific force under the measured speeds are shifted until they
 //! fit the measured ones best, each component with a gain of its own, as thrust and inertia may be declared wrong. Compared are changes
 //! from one knot to the next: the slow part of a torque balances what no rotor makes.
 
@@ -28,7 +28,7 @@ struct Component {
     weight: f64,
 }
 
-/// What is compared.
+/// Changes from knot to knot, of all components.
 struct Changes {
     step_s: f64,
     /// Knots from which a change is counted, each with its index.
@@ -95,12 +95,12 @@ impl Changes {
     /// The gain that fits best, and the part of the changes that it explains: none where it is negative.
     fn gain(component: &Component, modelled: &[f64]) -> (f64, f64) {
         let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let (cross, own) = (product(&component.measured, modelled), product(modelled, modelled));
+        let (cross, square) = (product(&component.measured, modelled), product(modelled, modelled));
         let all = product(&component.measured, &component.measured);
-        if cross <= 0.0 || own <= 0.0 || all <= 0.0 {
+        if cross <= 0.0 || square <= 0.0 || all <= 0.0 {
             (0.0, 0.0)
         } else {
-            (cross / own, cross * cross / (own * all))
+            (cross / square, cross * cross / (square * all))
         }
     }
 

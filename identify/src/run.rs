@@ -36,6 +36,10 @@ pub use crate::horizons::HORIZONS_S;
 /// A residual is worth telling where its persistent part is beyond this part of its noise.
 const UNEXPLAINED: f64 = 0.3;
 
+/// Predictions ask for another value than the equations beyond so many standard errors of these: far beyond chance, and beyond what
+/// intervals that are somewhat short make; tuned, no source.
+const FAR: f64 = 8.0;
+
 /// Greatest mean distance of samples of motion: beyond it they show nothing, and the computation of every tick
 /// would cost more time and memory than the comparison is worth.
 const SPACING_MAX_S: f64 = 0.5;
@@ -425,7 +429,14 @@ fn accepted_effects(
         let mut parameters = BTreeMap::new();
         for at in &indices {
             let candidate = &selection.accepted[*at];
-            parameters.extend(estimates(problem, selection.flown(), &candidate.free));
+            let found = estimates(problem, selection.flown(), &candidate.free);
+            let by_equations = |(name, estimate): (&'static str, Estimate)| {
+                let at =
+                    candidate.free.iter().find(|at| problem.model.parameters.all[**at].spec().name == name);
+                let other = at.and_then(|at| far_by_equations(selection, *at));
+                (name, Estimate { by_equations: other, ..estimate })
+            };
+            parameters.extend(found.into_iter().map(by_equations));
             candidate.free.iter().for_each(|at| start[*at] = problem.model.parameters.all[*at].baseline);
         }
         let without = problem.fitted(&start, &free_parameters(&others));
@@ -453,6 +464,13 @@ fn accepted_effects(
     }
 }
 
+/// The value of a parameter by the equations, where the refined one is farther than [`FAR`] of its standard errors.
+fn far_by_equations(selection: &Selection, parameter: usize) -> Option<f64> {
+    let value = selection.after.values[parameter];
+    let away = (selection.flown().values[parameter] - value).abs();
+    (away > FAR * selection.after.standard_error(parameter)?).then_some(value)
+}
+
 /// Effects of slowly logged commands, with intervals that cover all values that they may have.
 fn undetermined_effects(
     problem: &Problem,
@@ -466,7 +484,10 @@ fn undetermined_effects(
         let open = |entry: &Parameter| {
             let (spec, value) = (entry.spec(), entry.baseline);
             let (unit, low, high) = (spec.unit(), spec.min, spec.max);
-            (spec.name, Estimate { value, unit, low, high, at_bound: false, determined: false })
+            (
+                spec.name,
+                Estimate { value, unit, low, high, at_bound: false, determined: false, by_equations: None },
+            )
         };
         let report = EffectReport {
             accepted: false,
@@ -500,7 +521,8 @@ pub fn estimates(problem: &Problem, fitted: &FitResult, free: &[usize]) -> BTree
         // Zero is where many effects begin, and no bound that data pushed against.
         let at_bound = value != entry.baseline && (value <= entry.spec().min || value >= entry.spec().max);
         let determined = low > entry.spec().min || high < entry.spec().max;
-        (entry.spec().name, Estimate { value, unit: entry.spec().unit(), low, high, at_bound, determined })
+        let unit = entry.spec().unit();
+        (entry.spec().name, Estimate { value, unit, low, high, at_bound, determined, by_equations: None })
     };
     free.iter().map(one).collect()
 }

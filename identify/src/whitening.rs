@@ -4,6 +4,11 @@
 //! strapped on differently. It is a random effect, with a spread over flights that these themselves show, so that what all
 //! flights share is told from what each has of its own. Rows are freed of the part of their mean that the spread explains:
 //! quasi-demeaning (Fuller and Battese, J. Econometrics 2, 1974), of which nothing and the whole mean are the ends.
+//!
+//! A force that no effect explains acts somewhere, and turns the vehicle too. Residuals of torques are taken less what those of the forces
+//! predict of them at the same moment: seemingly unrelated regressions (Zellner, J. American Statistical Association 57, 1962), with the
+//! likelihood as that of the forces times that of the torques given the forces. Without it a controller that answers such a torque makes a
+//! fit find too little torque for the rotors.
 
 use crate::noise_model::NoiseModel;
 use crate::prepared::{BOX_STEPS, Equation, Prepared};
@@ -19,12 +24,14 @@ pub struct ComponentNoise {
     pub model: NoiseModel,
     /// Variance of the flights' trims.
     pub trim_variance: f64,
+    /// Components whose residuals at the same moment predict a part of this one's, and by how much.
+    pub given: Vec<(Component, f64)>,
 }
 
 impl ComponentNoise {
     /// Noise without trims.
     pub fn of(model: NoiseModel) -> Self {
-        Self { model, trim_variance: 0.0 }
+        Self { model, trim_variance: 0.0, given: Vec::new() }
     }
 }
 
@@ -59,6 +66,8 @@ pub struct Whitening<'n> {
     width: usize,
     stretches: Vec<(usize, usize)>,
     components: Vec<Option<&'n ComponentNoise>>,
+    /// By component: places in a knot's rows of those that it is given, and the factors.
+    given: Vec<Vec<(usize, f64)>>,
     trims: Vec<TrimColumn>,
 }
 
@@ -78,9 +87,15 @@ struct TrimColumn {
 impl<'n> Whitening<'n> {
     /// The whitening of `flight` by `noises`.
     pub fn of(flight: &Prepared, noises: &'n Noises) -> Self {
-        let components = components(flight).map(|component| noises.get(&component)).collect();
+        let names: Vec<Component> = components(flight).collect();
+        let components: Vec<_> = names.iter().map(|component| noises.get(component)).collect();
+        let place = |of: &(Component, f64)| Some((names.iter().position(|name| *name == of.0)?, of.1));
+        let places = |noise: &Option<&ComponentNoise>| -> Vec<(usize, f64)> {
+            noise.map_or(Vec::new(), |noise| noise.given.iter().filter_map(place).collect())
+        };
+        let given = components.iter().map(places).collect();
         let (width, stretches) = (flight.width(), stretches(flight));
-        let mut whitening = Self { width, stretches, components, trims: Vec::new() };
+        let mut whitening = Self { width, stretches, components, given, trims: Vec::new() };
         let with_trims =
             |noise: &Option<&ComponentNoise>| noise.is_some_and(|noise| noise.trim_variance > 0.0);
         let offsets = (0..width).filter(|offset| with_trims(&whitening.components[*offset]));
@@ -101,6 +116,11 @@ impl<'n> Whitening<'n> {
 
     /// Puts the innovations in place of `rows`, without the part of their means that trims explain.
     pub fn apply(&self, rows: &mut [f64]) {
+        for (offset, given) in self.given.iter().enumerate().filter(|(_, given)| !given.is_empty()) {
+            for knot in rows.chunks_exact_mut(self.width) {
+                knot[offset] -= given.iter().map(|(at, factor)| factor * knot[*at]).sum::<f64>();
+            }
+        }
         for (offset, noise) in self.components.iter().enumerate() {
             let Some(noise) = noise else { continue };
             for (first, end) in &self.stretches {

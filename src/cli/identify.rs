@@ -20,7 +20,7 @@ use serde_json::{Value, json};
 use std::fs::File;
 use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use vehicles::Vehicle;
 
 /// Text of `--help` behind the options.
@@ -111,11 +111,10 @@ fn flights_of(arguments: &IdentifyArguments, file: &Path, out: &Path) -> Result<
     if !arguments.json {
         bar.enable_steady_tick(Duration::from_millis(100));
     }
-    let started = Instant::now();
     let say = |text: &str| {
         bar.set_message(readable(text).into_owned());
         if bar.is_hidden() && !arguments.json {
-            output::say(&format!("{:6.1} s  {}", started.elapsed().as_secs_f64(), readable(text)));
+            output::say(&format!("{:6.1} s  {}", bar.elapsed().as_secs_f64(), readable(text)));
         }
     };
     say("reading flights");

@@ -30,11 +30,11 @@ const PUBLISHED: &str = "tuned, no source: published Hummingbirds differ by 50 %
 effect_parameters! {
     struct Parameters {
         /// e_xx: relative deviation about body x
-        error_xx: RATIO, min: -0.5, max: 1.0, neutral: Some(0.0), nominal: 0.1, source: PUBLISHED;
+        error_xx: RATIO, min: -0.5, max: 9.0, neutral: Some(0.0), nominal: 0.1, source: PUBLISHED;
         /// e_yy: relative deviation about body y
-        error_yy: RATIO, min: -0.5, max: 1.0, neutral: Some(0.0), nominal: 0.1, source: PUBLISHED;
+        error_yy: RATIO, min: -0.5, max: 9.0, neutral: Some(0.0), nominal: 0.1, source: PUBLISHED;
         /// e_zz: relative deviation about body z
-        error_zz: RATIO, min: -0.5, max: 1.0, neutral: Some(0.0), nominal: 0.1, source: PUBLISHED;
+        error_zz: RATIO, min: -0.5, max: 9.0, neutral: Some(0.0), nominal: 0.1, source: PUBLISHED;
     }
 }
 

@@ -1,0 +1,155 @@
+//! The noise of an estimation problem: what is left of each component when all candidates have taken their step.
+#![allow(
+    clippy::disallowed_types,
+    reason = "not in a component: reports of flights, whose products are summed by hand"
+)]
+#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
+
+use crate::candidate::Candidate;
+use crate::fit::{FitResult, Problem};
+use crate::lever::{Moments, factors};
+use crate::noise_model::Products;
+use crate::normal;
+use crate::prepared::{Equation, Prepared};
+use crate::whitening::{Component, ComponentNoise, Noises, components, has_trim, mean, spread, stretches};
+use nalgebra::{DVector, Vector3};
+use std::collections::BTreeMap;
+
+/// Residual of one component of a flight.
+struct Left {
+    column: Vec<f64>,
+    stretches: Vec<(usize, usize)>,
+    /// Sum of the squares of the measured values.
+    signal: f64,
+}
+
+/// The noise of one component, and the spread of its trims if they are each flight's own.
+fn noise_of(flights: &[Left], is_own: bool, is_white: bool) -> ComponentNoise {
+    let mut products = Products::default();
+    for Left { column, stretches, signal } in flights {
+        let centre = if is_own { column.iter().sum::<f64>() / column.len().max(1) as f64 } else { 0.0 };
+        for (first, end) in stretches {
+            let rows: Vec<f64> = column[*first..*end].iter().map(|row| row - centre).collect();
+            products.add(&rows);
+        }
+        products.add_white(LEAST_NOISE * LEAST_NOISE * signal);
+    }
+    let model = if is_white { products.white() } else { products.model() };
+    let means = flights.iter().filter_map(|left| mean(&left.column, &left.stretches, &model));
+    let trim_variance = if is_own { spread(&means.collect::<Vec<_>>()) } else { 0.0 };
+    ComponentNoise { model, trim_variance, given: Vec::new() }
+}
+
+/// A component without any noise would count infinitely: no sensor is better than this part of its own signal.
+const LEAST_NOISE: f64 = 1e-4;
+
+impl Problem<'_> {
+    /// Sets the noises by what is left on the estimation data when, from `base` on, all of `candidates` take
+    /// the step that fits best.
+    pub fn weigh(&mut self, base: &FitResult, candidates: &[Candidate]) {
+        let mut all = base.free.clone();
+        // Torques of an assumed attitude are zero, to which any scale of thrust or inertia could shrink the model's.
+        let is_assumed = self.estimation.iter().any(Prepared::is_assumed);
+        let counts =
+            |candidate: &&Candidate| candidate.kind.is_linear && (!is_assumed || candidate.is_trim());
+        for candidate in candidates.iter().filter(counts) {
+            all.extend(candidate.free.iter().filter(|at| !base.free.contains(at)));
+        }
+        for _ in 0..2 {
+            if self.noises.is_empty() {
+                self.noises = self.noises_after(&base.values, &[], &DVector::zeros(0));
+            }
+            let total = normal::sum(&self.blocks(&self.estimation, &base.values, &all));
+            let step = -(normal::inverse(&total.gram) * &total.gradient);
+            self.noises = self.noises_after(&base.values, &all, &step);
+        }
+    }
+
+    /// The noise of each component, and the spread of the flights' trims, after a step.
+    fn noises_after(&self, values: &[f64], free: &[usize], step: &DVector<f64>) -> Noises {
+        let mut left: BTreeMap<Component, Vec<Left>> = BTreeMap::new();
+        for flight in &self.estimation {
+            for (component, of_flight) in self.left_after(flight, values, free, step) {
+                left.entry(component).or_default().push(of_flight);
+            }
+        }
+        let is_assumed = self.estimation.iter().any(Prepared::is_assumed);
+        let mut given = if is_assumed { BTreeMap::new() } else { self.take_off_forces(values, &mut left) };
+        let noise = |(component, flights): (Component, Vec<Left>)| {
+            let is_own = !is_assumed && flights.len() > 1 && has_trim(component);
+            let given = given.remove(&component).unwrap_or_default();
+            (component, ComponentNoise { given, ..noise_of(&flights, is_own, is_assumed) })
+        };
+        left.into_iter().map(noise).collect()
+    }
+
+    /// Residuals of each component of a flight after a step.
+    fn left_after(
+        &self,
+        flight: &Prepared,
+        values: &[f64],
+        free: &[usize],
+        step: &DVector<f64>,
+    ) -> Vec<(Component, Left)> {
+        let (mut left, columns) = self.linearised(flight, values, free);
+        for (column, step) in columns.iter().zip(step.iter()) {
+            left.iter_mut().zip(column).for_each(|(left, slope)| *left += slope * step);
+        }
+        let measured = &self.model.tracks(flight, values).rows;
+        let width = flight.width();
+        let of = |rows: &[f64], offset: usize| -> Vec<f64> {
+            rows[offset..].iter().step_by(width).copied().collect()
+        };
+        let of_component = |(offset, component)| {
+            let signal = of(measured, offset).iter().map(|row| row * row).sum();
+            (component, Left { column: of(&left, offset), stretches: stretches(flight), signal })
+        };
+        components(flight).enumerate().map(of_component).collect()
+    }
+
+    /// Takes off the residuals of each torque what those of the forces predict of them, and returns the factors by torque.
+    fn take_off_forces(
+        &self,
+        values: &[f64],
+        left: &mut BTreeMap<Component, Vec<Left>>,
+    ) -> BTreeMap<Component, Vec<(Component, f64)>> {
+        let force = [0, 1, 2].map(|axis| (Equation::SpecificForce.name(), axis));
+        let mut factors_of = BTreeMap::new();
+        let [Some(x), Some(y), Some(z)] = force.map(|of| left.get(&of)) else { return factors_of };
+        let torques = (0..3).map(|axis| (Equation::AngularAcceleration.name(), axis));
+        // Every flight has all of these equations, or the forces would be of other moments.
+        let is_whole = |flights: &Vec<Left>| flights.len() == self.estimation.len();
+        if ![x, y, z].into_iter().all(is_whole) {
+            return factors_of;
+        }
+        let forces: Vec<[Vec<f64>; 3]> =
+            (0..x.len()).map(|at| [x, y, z].map(|flights| flights[at].column.clone())).collect();
+        let velocities: Vec<Vec<[f64; 3]>> =
+            self.estimation.iter().map(|flight| self.velocities_B(flight, values)).collect();
+        for component in torques {
+            let Some(flights) = left.get_mut(&component).filter(|flights| is_whole(flights)) else {
+                continue;
+            };
+            let moments = flights.iter().zip(&forces).zip(&velocities);
+            let moments: Vec<Moments> = moments
+                .map(|((left, forces), velocities)| Moments { torque: &left.column, forces, velocities })
+                .collect();
+            let Some(found) = factors(&moments) else { continue };
+            for (left, forces) in flights.iter_mut().zip(&forces) {
+                for (at, row) in left.column.iter_mut().enumerate() {
+                    *row -= (0..3).map(|axis| found[axis] * forces[axis][at]).sum::<f64>();
+                }
+            }
+            factors_of.insert(component, force.into_iter().zip(found).collect());
+        }
+        factors_of
+    }
+
+    /// Velocities in B at the knots of a flight.
+    fn velocities_B(&self, flight: &Prepared, values: &[f64]) -> Vec<[f64; 3]> {
+        let tracks = self.model.tracks(flight, values);
+        let of =
+            |knot: &usize| (tracks.attitude[*knot].inverse() * Vector3::from(tracks.velocity[*knot])).into();
+        flight.layout.knots.iter().map(of).collect()
+    }
+}
