@@ -1,17 +1,17 @@
 //! Offsets between the clocks of a flight: lateness of attitude and position against the inertial unit, by the
-//! sensors alone.
+//! sensors alone, and of rotor speeds that drive the model.
 //!
 //! The attitude's rate of change and the gyroscope's reading are the same quantity. So are the position's
 //! second derivative and the accelerometer's reading, rotated by the attitude, less gravity. No model is needed
 //! to see by how much one lags. The lateness that the attitudes of all flights share is left to the candidate
 //! `sensor-delay`. A flight's own lateness beyond that is removed, and so is that of position and velocity
-//! beyond it. Rotor speeds that drive the model are the one channel whose lateness takes a model (`rotor_clock`).
+//! beyond it. Rotor speeds are the one channel whose lateness takes a model (`rotor_clock`); the clock of the inertial unit stays.
 
 use crate::clock::Lateness;
 use crate::fit::Problem;
 use crate::noise_model::NoiseModel;
 use crate::normal::Block;
-use crate::offset::{Found, descended};
+use crate::offset::{Found, LATE_MAX_S, descended};
 use crate::prepared::{Equation, Prepared, Translation};
 use crate::rotor_clock::of_rotor_speed;
 use crate::sensor_effects::POSE_DELAY;
@@ -44,7 +44,8 @@ impl Offset {
     }
 }
 
-/// Offsets by channel; `None` where the flight lacks the channels that it takes, or has too little of them.
+/// Offsets by channel; `None` where the flight lacks the channels that it takes, or has too little of them. That of rotor speeds is `None`
+/// where commands are logged.
 pub type Offsets = BTreeMap<&'static str, Option<Offset>>;
 
 /// The attitude's offset from the gyroscope.
@@ -54,7 +55,7 @@ fn of_attitude(problem: &Problem, flight: &Prepared) -> Option<Found> {
         problem.model.parameters.all.iter().position(|parameter| *parameter.kind == POSE_DELAY)?;
     let mut values = problem.model.parameters.baseline();
     let between_s = BETWEEN_SAMPLES * flight.flight.attitude.period_s().unwrap_or(0.0);
-    descended(0.0, between_s, |late_s| {
+    descended(0.0, LATE_MAX_S, between_s, |late_s| {
         values[parameter] = late_s;
         problem.blocks_of(flight, &values, &[parameter])
     })
@@ -76,7 +77,7 @@ fn of_translation(
     let periods = [flight.flight.attitude.period_s(), flight.flight.specific_force.period_s()];
     let between_s = BETWEEN_SAMPLES * periods.into_iter().flatten().fold(0.0, f64::max);
     let blocks = problem.block_knots(flight);
-    descended(0.0, between_s, |late_s| {
+    descended(0.0, LATE_MAX_S, between_s, |late_s| {
         let inertial = |aside_s: f64| {
             let moved_s = -late_s - aside_s;
             flight.inertial_rows(translation, attitude_s + moved_s, moved_s, gravity_m_s2)

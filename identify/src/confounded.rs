@@ -5,7 +5,6 @@ use crate::fit::{FitResult, Problem};
 use crate::ratios;
 use crate::select::{Judged, Round, Selection, fitted, is_clearly_worse, is_worse, without};
 use rayon::prelude::*;
-use std::sync::OnceLock;
 
 /// A rival has at least this part of the gain.
 const NEAR: f64 = 0.5;
@@ -29,31 +28,46 @@ fn of_candidate(problem: &Problem, selection: &Selection, open: &[Candidate], at
     let candidate = &selection.accepted[at];
     let mut others = selection.accepted.clone();
     others.remove(at);
-    let near = near(selection, candidate);
-    let linear = near.iter().filter(|rival| rival.kind.guesses.is_empty());
-    let free: Vec<usize> =
-        selection.after.free.iter().copied().chain(linear.flat_map(|rival| rival.free.clone())).collect();
-    let equations = problem.equations(&selection.after.values, &free);
-    let base = OnceLock::new();
-    let rival = |rival: &&Candidate| {
-        if rival.kind.guesses.is_empty() {
-            let is_dropped = |at: &usize| !others.iter().chain([*rival]).any(|kept| kept.free.contains(at));
-            let dropped: Vec<usize> = free.iter().copied().filter(is_dropped).collect();
-            let costs = problem.costs_near(&problem.near(&equations, &selection.after.values, &dropped));
-            if is_clearly_worse(&costs, &selection.after) {
-                return None;
-            }
-        }
-        let base = base.get_or_init(|| without(problem, &selection.after, &selection.accepted, at));
-        let fitted = fitted(problem, base, &others, rival);
-        let is_alike = !is_worse(&fitted, &selection.after);
-        is_alike.then(|| Rival { candidate: (*rival).clone(), fitted })
-    };
-    let mut rivals: Vec<Rival> = near.par_iter().filter_map(rival).collect();
+    let screened = screened(problem, selection, candidate, &others, that_came_near(selection, candidate));
+    let mut rivals: Vec<Rival> = Vec::new();
+    if !screened.is_empty() {
+        let base = without(problem, &selection.after, &selection.accepted, at);
+        let rival = |rival: &&Candidate| {
+            let fitted = fitted(problem, &base, &others, rival);
+            let is_alike = !is_worse(&fitted, &selection.after);
+            is_alike.then(|| Rival { candidate: (*rival).clone(), fitted })
+        };
+        rivals.extend(screened.par_iter().filter_map(rival).collect::<Vec<_>>());
+    }
     if ratios::shows_rotation_alone(problem) {
         rivals.extend(of_ratios(problem, selection, open, candidate));
     }
     rivals
+}
+
+/// Those of `rivals` that are not clearly worse than `candidate` by fits near the solution. What begins at a guess is far from linear, and
+/// is not screened.
+fn screened<'s>(
+    problem: &Problem,
+    selection: &Selection,
+    candidate: &Candidate,
+    others: &[Candidate],
+    rivals: Vec<&'s Candidate>,
+) -> Vec<&'s Candidate> {
+    let is_guessed = |candidate: &Candidate| !candidate.kind.guesses.is_empty();
+    if is_guessed(candidate) || rivals.iter().all(|rival| is_guessed(rival)) {
+        return rivals;
+    }
+    let of_rivals = rivals.iter().filter(|rival| !is_guessed(rival)).flat_map(|rival| rival.free.clone());
+    let free: Vec<usize> = selection.after.free.iter().copied().chain(of_rivals).collect();
+    let equations = problem.equations(&selection.after.values, &free);
+    let is_kept = |rival: &Candidate| {
+        let is_dropped = |at: &usize| !others.iter().chain([rival]).any(|kept| kept.free.contains(at));
+        let dropped: Vec<usize> = free.iter().copied().filter(is_dropped).collect();
+        let near = problem.near(&equations, &selection.after.values, &dropped);
+        is_guessed(rival) || !is_clearly_worse(&problem.costs_near(&near), &selection.after)
+    };
+    rivals.into_par_iter().filter(|rival| is_kept(rival)).collect()
 }
 
 /// Rivals of the parameters of `candidate` that scale thrust or inertia: rotation alone shows their ratios only. The rest of the
@@ -88,7 +102,7 @@ fn of_ratios(
 }
 
 /// The candidates of other effects with at least [`NEAR`] of the gain of `candidate`, in the round that took it.
-fn near<'s>(selection: &'s Selection, candidate: &Candidate) -> Vec<&'s Candidate> {
+fn that_came_near<'s>(selection: &'s Selection, candidate: &Candidate) -> Vec<&'s Candidate> {
     let took = |round: &&Round| round.taken().is_some_and(|taken| taken.candidate == *candidate);
     let Some(round) = selection.rounds.iter().find(took) else { return Vec::new() };
     let gain = round.taken().map_or(0.0, |taken| taken.gain);

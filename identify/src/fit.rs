@@ -15,9 +15,9 @@ use plant::effects::{EffectKind, Requirement};
 
 /// Steps of a fit at most.
 const STEPS_MAX: usize = 12;
-/// Halvings in the search for the longest step to a vehicle that can be.
+/// Halvings in the search for the longest step that meets what an effect requires.
 const HALVINGS: usize = 12;
-/// Such a vehicle still can be with this many times the deviation.
+/// Margin of that check: factor on the deviation from the baseline. A file has fewer digits than a fit.
 const SPARE: f64 = 1.002;
 /// Chord steps after each of them at most.
 const CHORD_STEPS_MAX: usize = 5;
@@ -202,8 +202,8 @@ impl<'f> Problem<'f> {
         self.estimation.iter().zip(&equations.columns).map(of_flight).collect()
     }
 
-    /// Values after steps from `values`, whose cost is known, with the derivatives that are known, while they gain: near a solution
-    /// the residual is what changes, and it costs a small part of the derivatives.
+    /// Values after steps from `values` with the derivatives that are known, while the steps gain. Near a solution the residual is what
+    /// changes, and it takes a small part of the time of the derivatives.
     fn chord_steps(&self, equations: &Equations, mut values: Vec<f64>, mut cost: f64) -> Vec<f64> {
         let free = &equations.free;
         for _ in 0..CHORD_STEPS_MAX {
@@ -228,12 +228,15 @@ impl<'f> Problem<'f> {
 
     /// The fit with the parameters `dropped` at their baselines and the other ones of `equations`, which are those about `values`.
     pub fn near(&self, equations: &Equations, values: &[f64], dropped: &[usize]) -> Near {
-        let baseline = |at: &usize| self.model.parameters.all[*at].baseline - values[*at];
-        let held: Vec<Option<f64>> =
-            equations.free.iter().map(|at| dropped.contains(at).then(|| baseline(at))).collect();
-        let step = held_step(&normal::sum(&equations.all()), &held);
-        let start = self.moved(values, &equations.free, &step);
         let others = equations.without(dropped);
+        let start = if dropped.is_empty() {
+            values.to_vec()
+        } else {
+            let baseline = |at: &usize| self.model.parameters.all[*at].baseline - values[*at];
+            let held = equations.free.iter().map(|at| dropped.contains(at).then(|| baseline(at))).collect();
+            let total = normal::sum(&equations.all());
+            self.moved(values, &equations.free, &self.step_beside(&total, values, &equations.free, held))
+        };
         let cost = self.costs(&self.estimation, &start).iter().sum();
         let values = self.chord_steps(&others, start, cost);
         Near { blocks: self.blocks_with(&others, &values), free: others.free, values }
@@ -343,7 +346,17 @@ impl<'f> Problem<'f> {
     }
 
     fn step_of(&self, total: &Block, values: &[f64], free: &[usize]) -> DVector<f64> {
-        let mut held: Vec<Option<f64>> = vec![None; free.len()];
+        self.step_beside(total, values, free, vec![None; free.len()])
+    }
+
+    /// The same with some parameters held: these go by so much.
+    fn step_beside(
+        &self,
+        total: &Block,
+        values: &[f64],
+        free: &[usize],
+        mut held: Vec<Option<f64>>,
+    ) -> DVector<f64> {
         let mut step = DVector::zeros(free.len());
         for _ in 0..=free.len() {
             step = held_step(total, &held);
@@ -364,7 +377,7 @@ impl<'f> Problem<'f> {
         step
     }
 
-    /// The values after a step, within their bounds, and such that a vehicle can have them.
+    /// The values after a step, within their bounds, and such that they meet what effects require of a vehicle.
     pub fn moved(&self, values: &[f64], free: &[usize], step: &DVector<f64>) -> Vec<f64> {
         let all = &self.model.parameters.all;
         let mut next = values.to_vec();
@@ -382,7 +395,7 @@ impl<'f> Problem<'f> {
         next
     }
 
-    /// True if the vehicle meets what an effect requires, with something to spare of the effect's `parameters`: a file has fewer digits.
+    /// True if the vehicle meets what an effect requires, also with the effect's `parameters` [`SPARE`] times as far from their baselines.
     fn meets(&self, requirement: Requirement, values: &[f64], parameters: &[usize]) -> bool {
         let mut beyond = values.to_vec();
         for at in parameters {
@@ -392,8 +405,8 @@ impl<'f> Problem<'f> {
         requirement(self.model.airframe(&beyond).vehicle()).is_ok()
     }
 
-    /// Takes back as much of the way from `values` to `next` as the requirement asks for: of one parameter where that is enough, such as
-    /// a moment of inertia that is larger than the sum of the others, else of all.
+    /// Takes back as much of the way from `values` to `next` as the requirement asks for. Of one parameter where that is enough, as of a
+    /// moment of inertia that is larger than the sum of the others; else of all.
     fn hold_back(&self, requirement: Requirement, values: &[f64], next: &mut [f64], parameters: &[usize]) {
         let taken_back = |next: &[f64], taken: &[usize], part: f64| {
             let mut tried = next.to_vec();

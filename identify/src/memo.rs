@@ -20,7 +20,7 @@ pub type Rows = Arc<Vec<f64>>;
 pub struct Key {
     /// Values of all parameters.
     pub values: Vec<f64>,
-    /// Lateness of the pose.
+    /// Lateness of pose and rotor speeds.
     pub late: Lateness,
     /// Rotors whose measured speed is not believed.
     pub distrusted: [bool; ROTORS_MAX],

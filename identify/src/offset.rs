@@ -44,9 +44,11 @@ impl Found {
     }
 }
 
-/// The offset at which the squares are least, from `start_s` on, by the normal equations at an offset, of which it is the first parameter.
+/// The offset at which the squares are least, searched from `start_s` on, by the normal equations at an offset, of which it is the first
+/// parameter; `None` beyond `most_s`.
 pub fn descended(
     start_s: f64,
+    most_s: f64,
     between_s: f64,
     mut blocks_at: impl FnMut(f64) -> Vec<Block>,
 ) -> Option<Found> {
@@ -65,7 +67,7 @@ pub fn descended(
         }
         last_s = step_s.clamp(-reach_s, reach_s);
         late_s += last_s;
-        if late_s.abs() > LATE_MAX_S {
+        if late_s.abs() > most_s {
             return None;
         }
         if last_s.abs() < 1e-5_f64.max(0.02 * deviation_s) {

@@ -12,8 +12,8 @@ use vehicles::ROTORS_MAX;
 
 /// Length of a tick where rotors follow commands: that of the bus.
 const TICK_S: f64 = 0.001;
-/// Length of a tick where rotor speeds are measured, a quarter of the period of logs at 100 Hz: nothing that is simulated is as fast as a
-/// motor then.
+/// Length of a tick where rotor speeds are measured, so that no motor is simulated: a quarter of the period of logs at 100 Hz; tuned, no
+/// source.
 pub(crate) const ROTOR_TICK_S: f64 = 0.0025;
 /// Times are sums of decimal fractions: a nanosecond of slack keeps the last moment.
 const SLACK_S: f64 = 1e-9;

@@ -144,7 +144,7 @@ pub struct Prepared<'f> {
     pub flight: &'f Flight,
     /// Its layout.
     pub layout: Layout,
-    /// Lateness of its pose beyond that of `sensor-delay`.
+    /// Lateness of its pose beyond that of `sensor-delay`, and of its rotor speeds.
     pub late: Lateness,
     /// Rotors whose measured speed is not believed.
     pub distrusted: [bool; ROTORS_MAX],
@@ -338,7 +338,7 @@ impl<'f> Prepared<'f> {
         self.rows_over(&translation.windows(clock.step_s).1, &acceleration_W)
     }
 
-    /// Takes its pose as `late`, and leaves out the knots about which it was not sampled then.
+    /// Takes its pose and rotor speeds as `late`, and leaves out the knots about which it was not sampled then.
     pub fn set_late(&mut self, late: Lateness) {
         self.late = late;
         let (flight, clock) = (self.flight, &self.layout.clock);

@@ -138,8 +138,8 @@ impl Refinement<'_, '_> {
         Foresight::under(problem, &after).is_better_than(&Foresight::under(problem, &before))
     }
 
-    /// The values without the flight at `at`, by a step from the equations about those with all: a descent without each would take as
-    /// long as all else together. `start` is what the equations of the other flights alone say.
+    /// The values without the flight at `at`, by a step from the equations about those with all flights. It approximates a descent on the
+    /// others, which would take as long as all else together. `start` is what the equations of the other flights say.
     fn without(
         &self,
         at: usize,
@@ -152,7 +152,11 @@ impl Refinement<'_, '_> {
         let others = blocks.iter().filter(|(flight, _)| *flight != at).map(|(_, block)| block.clone());
         let equations: Vec<Block> = others.chain([self.prior(start, better, variance)]).collect();
         let step = self.problem.step(&equations, better, self.free);
-        self.problem.moved(better, self.free, &step)
+        let moved = self.problem.moved(better, self.free, &step);
+        // What is not refined stays as the other flights alone have it.
+        let mut values = start.to_vec();
+        self.free.iter().for_each(|at| values[*at] = moved[*at]);
+        values
     }
 
     fn cost(&self, flights: &[&Prepared], values: &[f64]) -> f64 {

@@ -132,8 +132,8 @@ pub struct Estimate {
     pub at_bound: bool,
     /// True if these flights determine it: its interval does not cover all values that the effect may have.
     pub determined: bool,
-    /// The value by the equations of each moment, where predictions ask for one far beyond its interval. Neither is then a property of
-    /// the vehicle alone: something acts that no effect has, and a controller answers it.
+    /// The value by the equations of each moment, where predictions ask for one far beyond its interval. Neither is then sure to be a
+    /// property of the vehicle. A possible cause is a force or a torque that no effect has, and that the controller answers.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub by_equations: Option<f64>,
 }
@@ -283,8 +283,8 @@ impl Report {
                 if let Some(other) = estimate.by_equations.map(rounded) {
                     writeln!(
                         f,
-                        "      by the equations of each moment {other}{unit}: do not take it for a property of the vehicle; something \
-                         acts that no effect has, and the controller answers it"
+                        "      by the equations of each moment {other}{unit}: do not take either for a property of the vehicle; possible cause: \
+                         a force or torque that no effect has, and that the controller answers"
                     )?;
                 }
             }

@@ -13,7 +13,7 @@ use crate::prepared::{BOX_STEPS, Equation, Prepared};
 /// Components that are compared. About z the torque is too weak, along x and y rotors make no force.
 const COMPONENTS: [(Equation, usize); 3] =
     [(Equation::AngularAcceleration, 0), (Equation::AngularAcceleration, 1), (Equation::SpecificForce, 2)];
-/// Offsets up to this one are searched; tuned, no source: the clocks of one public log of rotor speeds are 40 ms apart.
+/// Offsets up to this one are searched; tuned, no source: three times the greatest of docs/decisions/033-rotor-clocks-and-levers.md.
 const SEARCHED_S: f64 = 0.1;
 /// A component counts where the shifted model explains this part of its changes.
 const LEAST_PART: f64 = 0.2;
@@ -52,16 +52,15 @@ pub fn of_rotor_speed(problem: &Problem, flight: &Prepared) -> Option<Found> {
     let start_s = changes.weigh()?;
     let between_s = BETWEEN_SAMPLES * measured.rotor_speed.period_s().unwrap_or(0.0);
     let blocks = problem.block_knots(flight);
-    descended(start_s, between_s, |late_s| changes.blocks(&blocks, late_s))
-        .filter(|found| found.late_s.abs() < SEARCHED_S)
+    descended(start_s, SEARCHED_S, between_s, |late_s| changes.blocks(&blocks, late_s))
 }
 
 impl Changes {
     fn of(problem: &Problem, flight: &Prepared) -> Self {
         let layout = &flight.layout;
         let step_s = layout.clock.step_s;
-        // Shifted windows have to stay on the grid.
-        let margin = (SEARCHED_S / step_s).ceil() as usize + 2 + flight.reach();
+        // Shifted windows have to stay on the grid, with a step to both sides for the derivative, and one for the line between two.
+        let margin = (SEARCHED_S / step_s).ceil() as usize + 3 + flight.reach();
         let is_inside = |knot: usize| knot >= margin && knot + BOX_STEPS + margin < layout.clock.count;
         let pairs = layout.knots.windows(2).enumerate();
         let kept = pairs.filter(|(_, pair)| pair[1] - pair[0] == BOX_STEPS && is_inside(pair[0]));

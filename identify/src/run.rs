@@ -468,7 +468,8 @@ fn accepted_effects(
 fn far_by_equations(selection: &Selection, parameter: usize) -> Option<f64> {
     let value = selection.after.values[parameter];
     let away = (selection.flown().values[parameter] - value).abs();
-    (away > FAR * selection.after.standard_error(parameter)?).then_some(value)
+    let error = selection.after.standard_error(parameter).filter(|error| *error > 0.0)?;
+    (away > FAR * error).then_some(value)
 }
 
 /// Effects of slowly logged commands, with intervals that cover all values that they may have.

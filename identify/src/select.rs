@@ -203,8 +203,15 @@ impl StepwiseSearch {
         let with = Foresight::of(problem, &equations, &self.base, &[]);
         let growth = |name: &'static str| {
             let of_effect = self.accepted.iter().filter(|candidate| candidate.kind.name == name);
-            let dropped: Vec<usize> = of_effect.flat_map(|candidate| candidate.free.clone()).collect();
-            let without = Foresight::of(problem, &equations, &self.base, &dropped);
+            let of_effect: Vec<&Candidate> = of_effect.collect();
+            // What begins at a guess is far from linear: the others are fitted in full.
+            let without = if of_effect.iter().any(|candidate| !candidate.kind.guesses.is_empty()) {
+                let (_, fitted) = self.without_effect(problem, name);
+                let equations = problem.equations(&fitted.values, &fitted.free);
+                Foresight::of(problem, &equations, &fitted, &[])
+            } else {
+                Foresight::of(problem, &equations, &self.base, &free_of(&of_effect))
+            };
             Some((name, with.growth(&without)?))
         };
         let (effect, Growth { component, horizon_s, without, with, unit }) =
@@ -291,6 +298,10 @@ impl StepwiseSearch {
         }
         false
     }
+}
+
+fn free_of(candidates: &[&Candidate]) -> Vec<usize> {
+    candidates.iter().flat_map(|candidate| candidate.free.clone()).collect()
 }
 
 /// The fit of `accepted` but that at `at`, from `base` on.
@@ -518,7 +529,7 @@ fn best(problem: &Problem, judged: &[Judged]) -> Option<usize> {
     accepted.iter().filter(is_alike).min_by(|a, b| size(**a).cmp(&size(**b)).then(by_gain(b, a))).copied()
 }
 
-/// True if so much is worse on the validation data than `other` that no better fit changes it.
+/// True if such costs on the validation data are worse than those of `other` so surely that a fit in full is spared.
 pub fn is_clearly_worse(costs: &[f64], other: &FitResult) -> bool {
     p_value(costs, &other.validation_costs) < CLEARLY_WORSE
 }

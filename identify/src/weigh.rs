@@ -126,14 +126,18 @@ impl Problem<'_> {
             (0..x.len()).map(|at| [x, y, z].map(|flights| flights[at].column.clone())).collect();
         let velocities: Vec<Vec<[f64; 3]>> =
             self.estimation.iter().map(|flight| self.velocities_B(flight, values)).collect();
+        let blocks: Vec<_> = self.estimation.iter().map(|flight| self.block_knots(flight)).collect();
         for component in torques {
             let Some(flights) = left.get_mut(&component).filter(|flights| is_whole(flights)) else {
                 continue;
             };
-            let moments = flights.iter().zip(&forces).zip(&velocities);
-            let moments: Vec<Moments> = moments
-                .map(|((left, forces), velocities)| Moments { torque: &left.column, forces, velocities })
-                .collect();
+            let moments = |at: usize| Moments {
+                torque: &flights[at].column,
+                forces: &forces[at],
+                velocities: &velocities[at],
+                blocks: &blocks[at],
+            };
+            let moments: Vec<Moments> = (0..flights.len()).map(moments).collect();
             let Some(found) = factors(&moments) else { continue };
             for (left, forces) in flights.iter_mut().zip(&forces) {
                 for (at, row) in left.column.iter_mut().enumerate() {

@@ -5,10 +5,8 @@
 //! flights share is told from what each has of its own. Rows are freed of the part of their mean that the spread explains:
 //! quasi-demeaning (Fuller and Battese, J. Econometrics 2, 1974), of which nothing and the whole mean are the ends.
 //!
-//! A force that no effect explains acts somewhere, and turns the vehicle too. Residuals of torques are taken less what those of the forces
-//! predict of them at the same moment: seemingly unrelated regressions (Zellner, J. American Statistical Association 57, 1962), with the
-//! likelihood as that of the forces times that of the torques given the forces. Without it a controller that answers such a torque makes a
-//! fit find too little torque for the rotors.
+//! A force that no effect explains acts at a lever and turns the vehicle too. The part of a torque residual that force residuals predict is
+//! subtracted first (`lever`).
 
 use crate::noise_model::NoiseModel;
 use crate::prepared::{BOX_STEPS, Equation, Prepared};

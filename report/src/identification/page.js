@@ -27,7 +27,7 @@ const accepted = report.verdict.map((name) => [name, report.effects[name]]).filt
 const doubt = ({ determined, at_bound }) => (!determined ? ", not determined by these flights" : at_bound ? ", at its bound" : "");
 
 const byEquations = ({ by_equations, unit }) => by_equations === undefined ? "" :
-  `; by the equations of each moment ${withUnit(by_equations, unit)}: no property of the vehicle alone, something acts that no effect has`;
+  `; by the equations of each moment ${withUnit(by_equations, unit)}: neither is sure to be a property of the vehicle`;
 
 const estimateText = ([name, estimate]) => `${spaced(name)} = ${withUnit(estimate.value, estimate.unit)} ` +
   `(95 %: ${number(estimate.low)} to ${number(estimate.high)}${doubt(estimate)})${byEquations(estimate)}`;
