@@ -4,8 +4,13 @@
 //! the force, rotors then seem to have little torque. The part of a torque residual that force residuals predict at the same moment is
 //! subtracted, as in seemingly unrelated regressions (Zellner, J. American Statistical Association 57, 1962).
 //!
-//! What a torque owes to the velocity is left to the effects that have it. The regression has the velocity beside the forces, and only the
-//! part of the forces is used. So this is a working covariance, not the likelihood; intervals are those of the jackknife.
+//! Effects have the torques that follow the velocity. So the regression has the velocity beside the forces, and only the
+//! part of the forces is used. This is a working covariance, not the likelihood; intervals are those of the jackknife.
+
+#![allow(
+    clippy::disallowed_types,
+    reason = "not in a component: reports of flights, whose products are summed by hand"
+)]
 
 use crate::normal::{self, Block};
 use crate::statistics::chance_of_no_gain;
