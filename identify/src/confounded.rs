@@ -62,10 +62,13 @@ fn screened<'s>(
     let free: Vec<usize> = selection.after.free.iter().copied().chain(of_rivals).collect();
     let equations = problem.equations(&selection.after.values, &free);
     let is_kept = |rival: &Candidate| {
+        if is_guessed(rival) {
+            return true;
+        }
         let is_dropped = |at: &usize| !others.iter().chain([rival]).any(|kept| kept.free.contains(at));
         let dropped: Vec<usize> = free.iter().copied().filter(is_dropped).collect();
         let near = problem.near(&equations, &selection.after.values, &dropped);
-        is_guessed(rival) || !is_clearly_worse(&problem.costs_near(&near), &selection.after)
+        !is_clearly_worse(&problem.costs_near(&near), &selection.after)
     };
     rivals.into_par_iter().filter(|rival| is_kept(rival)).collect()
 }

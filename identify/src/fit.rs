@@ -51,7 +51,7 @@ pub struct Problem<'f> {
 #[derive(Debug, Clone)]
 pub struct Equations {
     /// The parameters of the derivatives.
-    free: Vec<usize>,
+    pub free: Vec<usize>,
     /// The normal equations, by flight and block of time.
     blocks: Vec<Vec<Block>>,
     /// Whitened derivatives, by flight.
@@ -60,12 +60,12 @@ pub struct Equations {
 
 impl Equations {
     /// The normal equations of all flights, by block of time.
-    fn all(&self) -> Vec<Block> {
+    pub fn all(&self) -> Vec<Block> {
         self.blocks.concat()
     }
 
     /// The part of them for other parameters.
-    fn without(&self, dropped: &[usize]) -> Self {
+    pub fn without(&self, dropped: &[usize]) -> Self {
         let kept: Vec<usize> = (0..self.free.len()).filter(|at| !dropped.contains(&self.free[*at])).collect();
         let of = |blocks: &Vec<Block>| blocks.iter().map(|block| block.of(&kept)).collect();
         let columns_of = |columns: &Vec<Vec<f64>>| kept.iter().map(|at| columns[*at].clone()).collect();
@@ -75,17 +75,6 @@ impl Equations {
             columns: self.columns.iter().map(columns_of).collect(),
         }
     }
-}
-
-/// A fit whose derivatives were taken at a point near: exact enough for a comparison, and not for an interval.
-#[derive(Debug, Clone)]
-pub struct Near {
-    /// Values of all parameters.
-    pub values: Vec<f64>,
-    /// The free parameters.
-    free: Vec<usize>,
-    /// The normal equations about the values, by flight and block of time.
-    blocks: Vec<Vec<Block>>,
 }
 
 /// Result of a fit.
@@ -195,7 +184,7 @@ impl<'f> Problem<'f> {
     }
 
     /// The normal equations about `values`, by flight and block of time, with the derivatives that are known.
-    fn blocks_with(&self, equations: &Equations, values: &[f64]) -> Vec<Vec<Block>> {
+    pub fn blocks_with(&self, equations: &Equations, values: &[f64]) -> Vec<Vec<Block>> {
         let of_flight = |(flight, columns): (&Prepared<'_>, &Vec<Vec<f64>>)| {
             self.summed(flight, &self.whitened(flight, values, &[]).0, columns)
         };
@@ -204,7 +193,7 @@ impl<'f> Problem<'f> {
 
     /// Values after steps from `values` with the derivatives that are known, while the steps gain. Near a solution the residual is what
     /// changes, and it takes a small part of the time of the derivatives.
-    fn chord_steps(&self, equations: &Equations, mut values: Vec<f64>, mut cost: f64) -> Vec<f64> {
+    pub fn chord_steps(&self, equations: &Equations, mut values: Vec<f64>, mut cost: f64) -> Vec<f64> {
         let free = &equations.free;
         for _ in 0..CHORD_STEPS_MAX {
             let about = self.blocks_with(equations, &values).concat();
@@ -224,44 +213,6 @@ impl<'f> Problem<'f> {
             }
         }
         values
-    }
-
-    /// The fit with the parameters `dropped` at their baselines and the other ones of `equations`, which are those about `values`.
-    pub fn near(&self, equations: &Equations, values: &[f64], dropped: &[usize]) -> Near {
-        let others = equations.without(dropped);
-        let start = if dropped.is_empty() {
-            values.to_vec()
-        } else {
-            let baseline = |at: &usize| self.model.parameters.all[*at].baseline - values[*at];
-            let held = equations.free.iter().map(|at| dropped.contains(at).then(|| baseline(at))).collect();
-            let total = normal::sum(&equations.all());
-            self.moved(values, &equations.free, &self.step_beside(&total, values, &equations.free, held))
-        };
-        let cost = self.costs(&self.estimation, &start).iter().sum();
-        let values = self.chord_steps(&others, start, cost);
-        Near { blocks: self.blocks_with(&others, &values), free: others.free, values }
-    }
-
-    /// The values of `near` without each estimation flight in turn, as those of [`Problem::values_without`].
-    pub fn each_without(&self, near: &Near) -> Vec<Vec<f64>> {
-        let Near { values, free, blocks } = near;
-        if blocks.len() < 2 || free.is_empty() {
-            return vec![values.clone(); blocks.len()];
-        }
-        let without = |flight: usize| {
-            let kept = [&blocks[..flight], &blocks[flight + 1..]].concat().concat();
-            self.moved(values, free, &self.step(&kept, values, free))
-        };
-        (0..blocks.len()).map(without).collect()
-    }
-
-    /// The costs of `near` on the data that effects are chosen on.
-    pub fn costs_near(&self, near: &Near) -> Vec<f64> {
-        if self.validation.is_empty() {
-            self.cross_validated(&near.blocks.concat(), &near.values, &near.free)
-        } else {
-            self.costs(&self.validation, &near.values)
-        }
     }
 
     /// The cost of each block of the estimation data under parameters that were fitted without its fold: the folds are
@@ -350,7 +301,7 @@ impl<'f> Problem<'f> {
     }
 
     /// The same with some parameters held: these go by so much.
-    fn step_beside(
+    pub fn step_beside(
         &self,
         total: &Block,
         values: &[f64],

@@ -63,6 +63,7 @@ mod logging;
 mod loss;
 mod memo;
 mod model;
+mod near;
 mod noise;
 mod noise_model;
 mod normal;

@@ -203,14 +203,14 @@ impl StepwiseSearch {
         let with = Foresight::of(problem, &equations, &self.base, &[]);
         let growth = |name: &'static str| {
             let of_effect = self.accepted.iter().filter(|candidate| candidate.kind.name == name);
-            let of_effect: Vec<&Candidate> = of_effect.collect();
+            let of_effect: Vec<Candidate> = of_effect.cloned().collect();
             // What begins at a guess is far from linear: the others are fitted in full.
             let without = if of_effect.iter().any(|candidate| !candidate.kind.guesses.is_empty()) {
                 let (_, fitted) = self.without_effect(problem, name);
                 let equations = problem.equations(&fitted.values, &fitted.free);
                 Foresight::of(problem, &equations, &fitted, &[])
             } else {
-                Foresight::of(problem, &equations, &self.base, &free_of(&of_effect))
+                Foresight::of(problem, &equations, &self.base, &free_parameters(&of_effect))
             };
             Some((name, with.growth(&without)?))
         };
@@ -298,10 +298,6 @@ impl StepwiseSearch {
         }
         false
     }
-}
-
-fn free_of(candidates: &[&Candidate]) -> Vec<usize> {
-    candidates.iter().flat_map(|candidate| candidate.free.clone()).collect()
 }
 
 /// The fit of `accepted` but that at `at`, from `base` on.
