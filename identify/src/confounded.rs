@@ -2,8 +2,9 @@
 
 use crate::candidate::{Candidate, free_parameters};
 use crate::fit::{FitResult, Problem};
+use crate::judgement::{Judged, fitted, is_clearly_worse, is_worse, without};
 use crate::ratios;
-use crate::select::{Judged, Round, Selection, fitted, is_clearly_worse, is_worse, without};
+use crate::select::{Round, Selection};
 use rayon::prelude::*;
 
 /// A rival has at least this part of the gain.

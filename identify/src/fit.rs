@@ -296,7 +296,8 @@ impl<'f> Problem<'f> {
         self.step_of(&normal::sum(blocks), values, free)
     }
 
-    fn step_of(&self, total: &Block, values: &[f64], free: &[usize]) -> DVector<f64> {
+    /// The same for the sum of the blocks.
+    pub fn step_of(&self, total: &Block, values: &[f64], free: &[usize]) -> DVector<f64> {
         self.step_beside(total, values, free, vec![None; free.len()])
     }
 

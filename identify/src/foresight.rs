@@ -16,24 +16,36 @@ use flights::state::StateQuantity;
 use plant::RigidBody;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// Horizons at which effects are judged.
 pub const HORIZONS_S: [f64; 2] = [0.1, 0.5];
-/// Components of attitude and velocity.
-const COMPONENTS: [&str; 6] =
-    ["attitude x", "attitude y", "attitude z", "velocity x", "velocity y", "velocity z"];
-/// Chance of a false finding that one component grows.
+/// Quantities that are judged, and their units.
+const QUANTITIES: [(StateQuantity, &str); 4] = [
+    (StateQuantity::Attitude, "deg"),
+    (StateQuantity::Velocity, "m/s"),
+    (StateQuantity::Rates, "rad/s"),
+    (StateQuantity::Position, "m"),
+];
+/// Number of their components.
+pub const ERRORS: usize = 3 * QUANTITIES.len();
+/// Errors of attitude about the axes of the body in deg, velocity in the world in m/s, rates in the body in rad/s, and position in the
+/// world in m.
+pub type WindowErrors = [f64; ERRORS];
+/// Chance of a false finding that one channel grows.
 const LEVEL: f64 = 0.01;
 /// A smaller growth of an error does not matter.
 const LEAST_GROWTH: f64 = 1.02;
 /// Nor does one by less than this part of the error that the noise of the sensors makes.
 const OF_NOISE: f64 = 0.5;
+/// Nor one by less than this part of persistence's error: a position after 0.1 s is known to a millimetre by its velocity.
+const OF_PERSISTENCE: f64 = 0.01;
 
 /// A prediction error that an effect makes greater.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Growth {
-    /// Component: attitude about an axis of the body in deg, or velocity along an axis of the world in m/s.
-    pub component: &'static str,
+    /// The channel.
+    pub channel: &'static str,
     /// Horizon in s.
     pub horizon_s: f64,
     /// Root mean square without the effect.
@@ -55,9 +67,11 @@ impl Growth {
 #[derive(Debug)]
 pub struct Foresight {
     /// Squares by flight, horizon and block of time: sums by component, and the number of windows.
-    squares: BTreeMap<(usize, usize, i64), ([f64; 6], f64)>,
-    /// Errors of attitude and velocity about one axis that the noise of the sensors makes, by horizon.
-    noise: [[f64; 2]; 2],
+    squares: BTreeMap<(usize, usize, i64), (WindowErrors, f64)>,
+    /// Mean squares of persistence's errors, by horizon.
+    persistent: [[f64; QUANTITIES.len()]; HORIZONS_S.len()],
+    /// Errors of each quantity that the noise of the sensors makes, by horizon.
+    noise: [[f64; QUANTITIES.len()]; 2],
 }
 
 impl Foresight {
@@ -70,62 +84,59 @@ impl Foresight {
         } else {
             problem.validation.iter().map(|flight| (flight, near.values.clone())).collect()
         };
-        Self::by(problem, &flights, |flight, values, horizon_s| {
-            trimmed_ends(problem, flight, values, horizon_s)
-        })
+        Self::under(problem, &flights)
     }
 
-    /// Prediction errors of flights, each under its values, without trims of their own.
+    /// Prediction errors of flights, each under its values and with its own trim.
     pub fn under(problem: &Problem, flights: &[(&Prepared, Vec<f64>)]) -> Self {
-        Self::by(problem, flights, |flight, values, horizon_s| ends(problem, flight, values, horizon_s, None))
-    }
-
-    fn by(
-        problem: &Problem,
-        flights: &[(&Prepared, Vec<f64>)],
-        ends: impl Fn(&Prepared, &[f64], f64) -> Vec<WindowEnd> + Sync,
-    ) -> Self {
         let jobs: Vec<(usize, usize)> = (0..flights.len())
             .flat_map(|at| (0..HORIZONS_S.len()).map(move |horizon| (at, horizon)))
             .collect();
         let of_job = |(at, horizon): &(usize, usize)| -> Vec<_> {
             let (flight, values) = &flights[*at];
-            let ends = ends(flight, values, HORIZONS_S[*horizon]);
+            let ends = trimmed_ends(problem, flight, values, HORIZONS_S[*horizon]);
             ends.iter()
                 .map(|end| {
-                    (
-                        (*at, *horizon, problem.block_of(end.from_s)),
-                        errors(flight, end, &end.simulated).map(|error| error * error),
-                    )
+                    let squares = |state| errors(flight, end, state).map(|error| error * error);
+                    let key = (*at, *horizon, problem.block_of(end.from_s));
+                    (key, squares(&end.simulated), squares(&end.persistent))
                 })
                 .collect()
         };
-        let mut sums = BTreeMap::new();
-        for (key, squares) in jobs.par_iter().map(of_job).collect::<Vec<_>>().into_iter().flatten() {
-            let sum: &mut ([f64; 6], f64) = sums.entry(key).or_default();
+        let (mut sums, mut persistent) =
+            (BTreeMap::new(), [([0.0; QUANTITIES.len()], 0.0); HORIZONS_S.len()]);
+        for (key, squares, of_persistence) in
+            jobs.par_iter().map(of_job).collect::<Vec<_>>().into_iter().flatten()
+        {
+            let (sum, count) = &mut persistent[key.1];
+            of_persistence.iter().enumerate().for_each(|(at, square)| sum[at / 3] += square);
+            *count += 1.0;
+            let sum: &mut (WindowErrors, f64) = sums.entry(key).or_default();
             sum.0.iter_mut().zip(squares).for_each(|(sum, square)| *sum += square);
             sum.1 += 1.0;
         }
-        Self { squares: sums, noise: noise(problem) }
+        let persistent = persistent.map(|(sum, count)| sum.map(|sum| sum / f64::max(count, 1.0)));
+        Self { squares: sums, persistent, noise: noise(problem) }
     }
 
-    /// The component whose error grows most from `without` the effect to `self`, of those that grow beyond their noise.
+    /// The channel whose error grows most from `without` the effect to `self`, of those that grow beyond their noise.
     pub fn growth(&self, without: &Self) -> Option<Growth> {
         let places =
-            (0..HORIZONS_S.len()).flat_map(|horizon| (0..COMPONENTS.len()).map(move |at| (horizon, at)));
+            (0..HORIZONS_S.len()).flat_map(|horizon| (0..QUANTITIES.len()).map(move |at| (horizon, at)));
         let of_place = |(horizon, at): (usize, usize)| {
-            let pairs: Vec<(f64, f64)> = self.blocks(without, horizon, at);
+            let pairs = self.blocks(without, horizon, 3 * at..3 * at + 3);
             let mean = |of: &dyn Fn(&(f64, f64)) -> f64| {
                 (pairs.iter().map(of).sum::<f64>() / pairs.len().max(1) as f64).sqrt()
             };
             let (with, without) = (mean(&|pair| pair.0), mean(&|pair| pair.1));
             let growths: Vec<f64> = pairs.iter().map(|(with, without)| with - without).collect();
             let by = (with * with - without * without).max(0.0).sqrt();
-            let matters = with > LEAST_GROWTH * without && by > OF_NOISE * self.noise[horizon][at / 3];
+            let matters = with > LEAST_GROWTH * without
+                && by > OF_NOISE * self.noise[horizon][at]
+                && with - without > OF_PERSISTENCE * self.persistent[horizon][at].sqrt();
             let is_beyond = matters && chance_of_no_gain(&growths) < LEVEL;
-            let (component, horizon_s) = (COMPONENTS[at], HORIZONS_S[horizon]);
-            let unit = if at < 3 { "deg" } else { "m/s" };
-            is_beyond.then_some(Growth { component, horizon_s, without, with, unit })
+            let ((quantity, unit), horizon_s) = (QUANTITIES[at], HORIZONS_S[horizon]);
+            is_beyond.then_some(Growth { channel: quantity.name(), horizon_s, without, with, unit })
         };
         places.filter_map(of_place).max_by(|a, b| a.ratio().total_cmp(&b.ratio()))
     }
@@ -133,11 +144,16 @@ impl Foresight {
     /// True if all errors together, each in units of `other`'s, are smaller than `other`'s beyond chance, and by more than
     /// [`LEAST_GROWTH`].
     pub fn is_better_than(&self, other: &Self) -> bool {
+        self.chance_against(other) < LEVEL
+    }
+
+    /// Chance of errors that much smaller than `other`'s, all together; 1 where they are not smaller by more than [`LEAST_GROWTH`].
+    pub fn chance_against(&self, other: &Self) -> f64 {
         let mut gains: Vec<f64> = Vec::new();
         let mut total = (0.0, 0.0);
         for horizon in 0..HORIZONS_S.len() {
-            let of = |at: usize| self.blocks(other, horizon, at);
-            for (at, pairs) in (0..COMPONENTS.len()).map(of).enumerate() {
+            let of = |at: usize| self.blocks(other, horizon, at..at + 1);
+            for (at, pairs) in (0..ERRORS).map(of).enumerate() {
                 let scale = pairs.iter().map(|pair| pair.1).sum::<f64>() / pairs.len().max(1) as f64;
                 if at == 0 && gains.len() < pairs.len() {
                     gains.resize(pairs.len(), 0.0);
@@ -149,93 +165,107 @@ impl Foresight {
                 }
             }
         }
-        total.1 > LEAST_GROWTH * LEAST_GROWTH * total.0 && chance_of_no_gain(&gains) < LEVEL
+        let is_smaller = total.1 > LEAST_GROWTH * LEAST_GROWTH * total.0;
+        if is_smaller { chance_of_no_gain(&gains) } else { 1.0 }
     }
 
-    /// Mean squares of one component by block, with and without, where both have some.
-    fn blocks(&self, without: &Self, horizon: usize, at: usize) -> Vec<(f64, f64)> {
+    /// Mean squares of these components together by block, with and without, where both have some.
+    fn blocks(&self, without: &Self, horizon: usize, of: Range<usize>) -> Vec<(f64, f64)> {
         let of_horizon = self.squares.iter().filter(|(key, _)| key.1 == horizon);
-        let pair = |(key, (with, count)): (&(usize, usize, i64), &([f64; 6], f64))| {
+        let pair = |(key, (with, count)): (&(usize, usize, i64), &(WindowErrors, f64))| {
             let (other, other_count) = without.squares.get(key)?;
-            Some((with[at] / count, other[at] / other_count))
+            let sum = |squares: &WindowErrors| squares[of.clone()].iter().sum::<f64>();
+            Some((sum(with) / count, sum(other) / other_count))
         };
         of_horizon.filter_map(pair).collect()
     }
 }
 
-/// Errors of attitude in deg and velocity in m/s about one axis that the sensors' noise makes in the judged flights.
-fn noise(problem: &Problem) -> [[f64; 2]; 2] {
+/// Errors of each quantity that the sensors' noise makes in the judged flights.
+fn noise(problem: &Problem) -> [[f64; QUANTITIES.len()]; 2] {
     let flights = if problem.validation.is_empty() { &problem.estimation } else { &problem.validation };
     let floor = noise::floor(flights);
     HORIZONS_S.map(|horizon_s| {
         let of_all = noise::prediction_floor(&floor, horizon_s, problem.model.vehicle.gravity_m_s2);
-        ["attitude", "velocity"].map(|name| of_all.get(name).map_or(0.0, |error| error / 3.0_f64.sqrt()))
+        QUANTITIES.map(|(of, _)| of_all.get(of.name()).copied().unwrap_or(0.0))
     })
 }
 
-/// The ends of a flight's windows under `values`; none where its attitude was assumed, or there is nothing to predict with.
-/// Up to `span_s` of the flight.
+/// The ends of a flight's windows under `values` at several horizons, up to `span_s` of the flight; none where its attitude was assumed, or there
+/// is nothing to predict with.
 pub fn ends(
     problem: &Problem,
     flight: &Prepared,
     values: &[f64],
-    horizon_s: f64,
-    span_s: Option<f64>,
-) -> Vec<WindowEnd> {
-    ends_under(problem, flight, values, horizon_s, span_s, |_| [0.0; 6])
+    horizons_s: &[f64],
+    span_s: f64,
+) -> Vec<Vec<WindowEnd>> {
+    ends_under(problem, flight, values, (horizons_s, span_s), |_| [0.0; 6])
 }
 
-/// The same with the flight's own trim.
+/// The same at one horizon and with the flight's own trim.
 fn trimmed_ends(problem: &Problem, flight: &Prepared, values: &[f64], horizon_s: f64) -> Vec<WindowEnd> {
     let seen = OwnTrim::of(problem, flight, values);
-    ends_under(problem, flight, values, horizon_s, None, |from_s| seen.at(from_s))
+    ends_under(problem, flight, values, (&[horizon_s], f64::INFINITY), |from_s| seen.at(from_s)).remove(0)
 }
 
 fn ends_under(
     problem: &Problem,
     flight: &Prepared,
     values: &[f64],
-    horizon_s: f64,
-    span_s: Option<f64>,
+    (horizons_s, span_s): (&[f64], f64),
     push: impl Fn(f64) -> [f64; 6],
-) -> Vec<WindowEnd> {
-    if flight.is_assumed() || flight.flight.attitude.is_empty() {
-        return Vec::new();
-    }
-    let errors = SensorErrors::of(&problem.model.parameters, values);
-    let corrected = errors.taken_off(flight.flight, &flight.late);
-    let Some(measured) = Measured::of(&corrected) else { return Vec::new() };
-    let measured = span_s.into_iter().fold(measured, Measured::shortened);
-    measured.ends(problem.model.airframe_of(flight, values), horizon_s, push)
+) -> Vec<Vec<WindowEnd>> {
+    let Some(measured) = measured(problem, flight, values) else { return vec![Vec::new(); horizons_s.len()] };
+    let airframe = problem.model.airframe_of(flight, values);
+    measured.shortened(span_s).ends_within(airframe, horizons_s, push)
 }
 
-/// Errors of a state at the end of a window: attitude about the axes of the body in deg, velocity in the world in m/s; 0
-/// where `flight` does not show the velocity.
-pub fn errors(flight: &Prepared, end: &WindowEnd, state: &RigidBody) -> [f64; 6] {
+/// A flight's measurements without the errors of the sensors; `None` where its attitude was assumed, or there is nothing to predict with.
+fn measured(problem: &Problem, flight: &Prepared, values: &[f64]) -> Option<Measured> {
+    if flight.is_assumed() || flight.flight.attitude.is_empty() {
+        return None;
+    }
+    let errors = SensorErrors::of(&problem.model.parameters, values);
+    Measured::of(&errors.taken_off(flight.flight, &flight.late))
+}
+
+/// Errors of a state at the end of a window; 0 of a quantity that `flight` does not show.
+pub fn errors(flight: &Prepared, end: &WindowEnd, state: &RigidBody) -> WindowErrors {
     let turn_B = (end.measured.attitude_WB.inverse() * state.attitude_WB).scaled_axis();
-    let part = f64::from(StateQuantity::Velocity.is_measured(flight.flight));
-    let slip_W = part * (state.velocity_W_m_s - end.measured.velocity_W_m_s);
-    [turn_B.x.to_degrees(), turn_B.y.to_degrees(), turn_B.z.to_degrees(), slip_W.x, slip_W.y, slip_W.z]
+    let slip_W = state.velocity_W_m_s - end.measured.velocity_W_m_s;
+    let spin_B = state.angular_velocity_B_rad_s - end.measured.angular_velocity_B_rad_s;
+    let away_W = state.position_W_m - end.measured.position_W_m;
+    let of_quantity = [turn_B.map(f64::to_degrees), slip_W, spin_B, away_W];
+    std::array::from_fn(|at| {
+        let is_shown = QUANTITIES[at / 3].0.is_measured(flight.flight);
+        f64::from(is_shown) * of_quantity[at / 3][at % 3]
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Errors of 40 blocks, of which the velocity along x is so many times as large as the others.
+    /// Errors of 40 blocks, of which the velocity is so many times as large as the others.
     fn errors_with(ratio: f64) -> Foresight {
         let one = |block: i64| {
             let size = 1.0 + 0.1 * ((block * 7919) % 11) as f64;
-            let squares = [1.0, 1.0, 1.0, ratio * ratio, 1.0, 1.0].map(|square| size * square);
-            [((0, 0, block), (squares, 1.0)), ((0, 1, block), ([size; 6], 1.0))]
+            let mut squares = [size; ERRORS];
+            squares[3..6].iter_mut().for_each(|square| *square *= ratio * ratio);
+            [((0, 0, block), (squares, 1.0)), ((0, 1, block), ([size; ERRORS], 1.0))]
         };
-        Foresight { squares: (0..40).flat_map(one).collect(), noise: [[0.1; 2]; 2] }
+        Foresight {
+            squares: (0..40).flat_map(one).collect(),
+            persistent: [[4.0; QUANTITIES.len()]; 2],
+            noise: [[0.1; QUANTITIES.len()]; 2],
+        }
     }
 
     #[test]
-    fn the_component_that_grows_is_told_with_its_size() {
+    fn the_channel_that_grows_is_told_with_its_size() {
         let growth = errors_with(1.5).growth(&errors_with(1.0)).unwrap();
-        assert_eq!((growth.component, growth.horizon_s, growth.unit), ("velocity x", 0.1, "m/s"));
+        assert_eq!((growth.channel, growth.horizon_s, growth.unit), ("velocity", 0.1, "m/s"));
         assert!((growth.ratio() - 1.5).abs() < 1e-9, "{growth:?}");
         assert_eq!(errors_with(1.0).growth(&errors_with(1.5)), None);
         assert_eq!(errors_with(1.01).growth(&errors_with(1.0)), None, "too little to matter");

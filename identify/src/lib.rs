@@ -17,7 +17,7 @@
 //! | `noise_model`, `whitening` | the noise of a residual: autoregressive within a flight, trims between flights |
 //! | `normal`, `fit` | generalised least squares over blocks of time: an estimation problem and its result |
 //! | `logging` | timing errors that slowly logged commands make |
-//! | `select`, `confounded` | the stepwise search for the effects that the flights ask for, and their rivals |
+//! | `select`, `judgement`, `revision`, `confounded` | the stepwise search for the effects that the flights ask for, its revision by predictions, and their rivals |
 //! | `ratios` | what flights determine that show rotation alone |
 //! | `questions`, `evidence`, `log_rates` | open questions, and what a simulated flight would say on them |
 //! | [`proposal`] | the next flight, as reports hold it |
@@ -57,6 +57,7 @@ mod faults;
 mod fit;
 mod foresight;
 mod horizons;
+mod judgement;
 mod lever;
 mod log_rates;
 mod logging;
@@ -77,6 +78,7 @@ mod ratios;
 mod refine;
 mod regressor;
 pub mod report;
+mod revision;
 mod rig;
 pub mod rotor;
 mod rotor_clock;

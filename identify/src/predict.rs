@@ -68,8 +68,19 @@ impl Measured {
     /// The ends of the windows of `horizon_s` that count, one window after the other, as `airframe` predicts them
     /// under a constant push over each window: angular acceleration in B and acceleration in W, by the window's begin.
     pub fn ends(&self, airframe: Airframe, horizon_s: f64, push: impl Fn(f64) -> [f64; 6]) -> Vec<WindowEnd> {
+        self.ends_within(airframe, &[horizon_s], push).remove(0)
+    }
+
+    /// The same for several horizons, in rising order: one window of the longest after the other, of which each shorter horizon is a part.
+    pub fn ends_within(
+        &self,
+        airframe: Airframe,
+        horizons_s: &[f64],
+        push: impl Fn(f64) -> [f64; 6],
+    ) -> Vec<Vec<WindowEnd>> {
         let tick_s = if self.rotor_speed.is_some() { ROTOR_TICK_S } else { TICK_S };
-        let window = (horizon_s / tick_s).round() as usize;
+        let windows: Vec<usize> =
+            horizons_s.iter().map(|horizon_s| (horizon_s / tick_s).round() as usize).collect();
         let memory = airframe.initial_state(0, "predict", tick_s);
         let (start_s, end_s) = self.played.span_s();
         let at_s = |tick: usize| start_s + tick as f64 * tick_s;
@@ -79,7 +90,8 @@ impl Measured {
         let mut begin = body(&before);
         let mut plant = FreeFlight::new(NewtonEuler::flying(airframe, 1), begin, memory);
         plant.settle_rotors(&before.command[..count]);
-        let (mut ends, mut pushing) = (Vec::new(), push(start_s));
+        let (mut ends, mut pushing) = (vec![Vec::new(); windows.len()], push(start_s));
+        let mut begin_tick = 0;
         let span_s = (end_s - start_s + SLACK_S).min(self.span_s);
         let mut speed_hint = 0;
         for tick in 1..=(span_s / tick_s) as usize {
@@ -95,18 +107,19 @@ impl Measured {
                 plant.set_body(&pushed);
             }
             before = self.played.at(at_s(tick), &mut hint);
-            if tick % window == 0 {
-                let (from_s, measured) = (at_s(tick - window), body(&before));
-                if self.played.counts(from_s, at_s(tick)) {
-                    let position_W_m = begin.position_W_m + horizon_s * begin.velocity_W_m_s;
-                    ends.push(WindowEnd {
-                        from_s,
-                        simulated: plant.state().body,
-                        persistent: RigidBody { position_W_m, ..begin },
-                        measured,
-                    });
-                }
-                (begin, pushing) = (measured, push(at_s(tick)));
+            let Some(at) = windows.iter().position(|window| *window == tick - begin_tick) else { continue };
+            let (from_s, measured) = (at_s(begin_tick), body(&before));
+            if self.played.counts(from_s, at_s(tick)) {
+                let position_W_m = begin.position_W_m + horizons_s[at] * begin.velocity_W_m_s;
+                ends[at].push(WindowEnd {
+                    from_s,
+                    simulated: plant.state().body,
+                    persistent: RigidBody { position_W_m, ..begin },
+                    measured,
+                });
+            }
+            if at + 1 == windows.len() {
+                (begin, begin_tick, pushing) = (measured, tick, push(at_s(tick)));
                 plant.set_body(&measured);
             }
         }

@@ -10,8 +10,9 @@
     reason = "not in a component: reports of flights, whose products are summed by hand"
 )]
 
+use crate::candidate::Candidate;
 use crate::fit::{FitResult, Problem};
-use crate::foresight::{Foresight, HORIZONS_S, ends, errors};
+use crate::foresight::{ERRORS, Foresight, WindowErrors, ends, errors};
 use crate::normal::{self, Block};
 use crate::predict::WindowEnd;
 use crate::prepared::Prepared;
@@ -20,6 +21,8 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
+/// Horizons at which prediction errors are made small.
+const REFINED_S: [f64; 5] = [0.05, 0.1, 0.2, 0.35, 0.5];
 /// Steps at most.
 const STEPS_MAX: usize = 8;
 /// A step that gains a smaller part is the last.
@@ -29,29 +32,54 @@ const SHARES: [f64; 5] = [1.0, 0.5, 0.25, 0.1, 0.03];
 /// Flights are refined on up to so much of their time, in s.
 const SPAN_MAX_S: f64 = 120.0;
 
+/// Parameters that were moved on to where predictions are best, and the equations of prediction errors about them.
+pub struct Refined<'p, 'f> {
+    refinement: Refinement<'p, 'f>,
+    /// The fit of the equations of motion.
+    fitted: &'p FitResult,
+    about: Linearised,
+    /// The refined fit.
+    pub result: FitResult,
+}
+
 /// The parameters `fitted` to the equations, moved on to where predictions are best; `None` where that does not predict better
-/// beyond chance, or nothing can be moved.
-pub fn refined(problem: &Problem, fitted: &FitResult) -> Option<FitResult> {
+/// beyond chance, or nothing can be moved. The search begins at the values `near`, which an earlier one may have found.
+pub fn refined<'p, 'f>(
+    problem: &'p Problem<'f>,
+    fitted: &'p FitResult,
+    near: Option<&[f64]>,
+) -> Option<Refined<'p, 'f>> {
     let is_moved = |at: &usize| !SENSOR_EFFECTS.contains(&problem.model.parameters.all[*at].kind);
     let free: Vec<usize> = fitted.free.iter().copied().filter(is_moved).collect();
-    let flights: Vec<&Prepared> = problem.estimation.iter().collect();
     if free.is_empty() {
         return None;
     }
-    let refinement = Refinement { problem, free: &free, known: known(problem, fitted, &free) };
-    let better = refinement.descended(&flights, &fitted.values)?;
-    let (blocks, rows) = refinement.blocks(&flights, &better);
-    if !refinement.predicts_better(fitted, &better, &blocks, rows) {
-        return None;
-    }
-    Some(refinement.result(fitted, better, &plain(&blocks)))
+    let known = known(problem, fitted, &free);
+    let refinement = Refinement { problem, free, known };
+    let (values, about) = refinement.descended(&fitted.values, near)?;
+    let result = refinement.result(fitted, values, &about);
+    let refined = Refined { refinement, fitted, about, result };
+    refined.predicts_better().then_some(refined)
 }
 
 struct Refinement<'p, 'f> {
     problem: &'p Problem<'f>,
-    free: &'p [usize],
+    free: Vec<usize>,
     /// Inverse of the covariance of the parameters by the equations.
     known: DMatrix<f64>,
+}
+
+/// Prediction errors of the estimation data about some values, with their derivatives.
+#[derive(Clone)]
+struct Linearised {
+    /// The values.
+    values: Vec<f64>,
+    /// By flight and horizon.
+    residuals: Vec<Residuals>,
+    /// By parameter, flight and horizon, and window.
+    slopes: Vec<Vec<Vec<WindowErrors>>>,
+    /// The variance of a residual at the start, in whose units the knowledge that the equations have counts.
+    variance: f64,
 }
 
 /// The inverse of the covariance of the parameters `free` that were `fitted`; those that no row determines are known by
@@ -72,148 +100,234 @@ fn known(problem: &Problem, fitted: &FitResult, free: &[usize]) -> DMatrix<f64> 
     normal::inverse(&covariance)
 }
 
-/// The residuals of one flight at one horizon by block of time: six numbers a window.
-type Residuals = Vec<(i64, [f64; 6])>;
+/// The residuals of one flight at one horizon, with their blocks of time.
+type Residuals = Vec<(i64, WindowErrors)>;
+
+impl Refined<'_, '_> {
+    /// True if flights are predicted better, beyond chance, by values that were moved on the others: each flight in turn, or
+    /// those that effects are chosen on.
+    fn predicts_better(&self) -> bool {
+        let problem = self.refinement.problem;
+        let before = |at| {
+            if self.is_each_in_turn() {
+                problem.values_without(self.fitted, at)
+            } else {
+                self.fitted.values.clone()
+            }
+        };
+        let before: Vec<_> =
+            self.judged().iter().enumerate().map(|(at, flight)| (flight, before(at))).collect();
+        let after = self.by_flight(&self.about, &[]);
+        Foresight::under(problem, &after).is_better_than(&Foresight::under(problem, &before))
+    }
+
+    /// Predictions of the flights that effects are chosen on, with the parameters `dropped` at their baselines and the others moved to that.
+    pub fn foresight(&self, dropped: &[usize]) -> Foresight {
+        let about = if dropped.is_empty() {
+            self.about.clone()
+        } else {
+            self.refinement.beside(&self.about, &self.fitted.values, dropped)
+        };
+        Foresight::under(self.refinement.problem, &self.by_flight(&about, dropped))
+    }
+
+    /// The part of the loss of the estimation data that each of `candidates` would take off, as the linearised predictions promise.
+    pub fn promises(&self, candidates: &[&Candidate]) -> Vec<f64> {
+        let Refinement { problem, free, .. } = &self.refinement;
+        let all =
+            [free.clone(), candidates.iter().flat_map(|candidate| candidate.free.clone()).collect()].concat();
+        let wide = Refinement { problem, known: DMatrix::zeros(all.len(), all.len()), free: all };
+        let about = wide.linearised(&self.about.values, self.about.variance);
+        let total = normal::sum(&plain(wide.blocks(&about)));
+        let cost_after = |columns: &[usize]| {
+            let block = total.of(columns);
+            let parameters: Vec<usize> = columns.iter().map(|at| wide.free[*at]).collect();
+            let step = problem.step_of(&block, &about.values, &parameters);
+            block.cost_after(&step)
+        };
+        let refined: Vec<usize> = (0..free.len()).collect();
+        let before = cost_after(&refined);
+        let promise = |candidate: &&Candidate| {
+            let columns = wide
+                .free
+                .iter()
+                .enumerate()
+                .filter(|(at, free)| *at >= refined.len() && candidate.free.contains(free));
+            let columns: Vec<usize> = refined.iter().copied().chain(columns.map(|(at, _)| at)).collect();
+            1.0 - cost_after(&columns) / before
+        };
+        candidates.iter().map(promise).collect()
+    }
+
+    fn is_each_in_turn(&self) -> bool {
+        let problem = self.refinement.problem;
+        problem.validation.is_empty() && problem.estimation.len() > 1
+    }
+
+    fn judged(&self) -> &[Prepared<'_>] {
+        let problem = self.refinement.problem;
+        if problem.validation.is_empty() { &problem.estimation } else { &problem.validation }
+    }
+
+    /// The flights that predictions are judged on, each with its values: where there are no others, those without the flight, by a step
+    /// from the equations about those with all flights. It approximates a descent on the others, which would take as long as all else together.
+    fn by_flight(&self, about: &Linearised, dropped: &[usize]) -> Vec<(&Prepared<'_>, Vec<f64>)> {
+        let blocks = self.refinement.blocks(about);
+        let of_flight = |(at, flight)| {
+            if !self.is_each_in_turn() {
+                return (flight, about.values.clone());
+            }
+            let others = blocks.iter().filter(|(of, _)| *of != at).map(|(_, block)| block.clone());
+            let start = self.refinement.problem.values_without(self.fitted, at);
+            (flight, self.refinement.stepped(about, &start, others.collect(), dropped))
+        };
+        self.judged().iter().enumerate().map(of_flight).collect()
+    }
+}
 
 impl Refinement<'_, '_> {
-    /// The values after some steps; `None` if the first gains nothing.
-    fn descended(&self, flights: &[&Prepared], start: &[f64]) -> Option<Vec<f64>> {
-        let mut values = start.to_vec();
-        // The variance of a residual, in whose units the equations' knowledge counts.
-        let mut variance = None;
+    /// The values after some steps and the equations about them; `None` if nothing gains. `start` is what the equations of motion say.
+    fn descended(&self, start: &[f64], near: Option<&[f64]>) -> Option<(Vec<f64>, Linearised)> {
+        let at_start = self.residuals(start);
+        let rows = ERRORS * at_start.iter().map(Vec::len).sum::<usize>();
+        let variance = cost(&at_start) / rows.max(1) as f64;
+        let near = near.map(|near| self.with_refined(start, near)).filter(|near| {
+            cost(&self.residuals(near)) + self.prior(start, variance, near).cost < cost(&at_start)
+        });
+        let mut about = self.linearised(near.as_deref().unwrap_or(start), variance);
         for number in 0..STEPS_MAX {
-            let (blocks, rows) = self.blocks(flights, &values);
-            let mut blocks = plain(&blocks);
-            let of_errors = normal::sum(&blocks).cost;
-            let variance = *variance.get_or_insert(of_errors / rows.max(1) as f64);
-            let prior = self.prior(start, &values, variance);
-            let cost = of_errors + prior.cost;
-            blocks.push(prior);
-            let step = self.problem.step(&blocks, &values, self.free);
-            let tried = SHARES.iter().find_map(|share| {
-                let next = self.problem.moved(&values, self.free, &(&step * *share));
-                let next_cost = self.cost(flights, &next) + self.prior(start, &next, variance).cost;
-                (next_cost < cost).then_some((next, next_cost))
-            });
-            let Some((next, next_cost)) = tried else { return (number > 0).then_some(values) };
-            values = next;
-            if next_cost > (1.0 - LEAST_STEP_GAIN) * cost {
+            let Some((next, gain)) = self.next(&about, start, &[]) else {
+                return (number > 0 || near.is_some()).then(|| (about.values.clone(), about));
+            };
+            about = self.linearised(&next, about.variance);
+            if gain < LEAST_STEP_GAIN {
                 break;
             }
         }
-        Some(values)
+        Some((about.values.clone(), about))
     }
 
-    /// Normal equations of the knowledge that the equations have, about `values`.
-    fn prior(&self, start: &[f64], values: &[f64], variance: f64) -> Block {
+    /// The values of `start` with the refined ones of `others`.
+    fn with_refined(&self, start: &[f64], others: &[f64]) -> Vec<f64> {
+        let mut values = start.to_vec();
+        self.free.iter().for_each(|at| values[*at] = others[*at]);
+        values
+    }
+
+    /// The equations with the parameters `dropped` at their baselines and the others moved to that. The derivatives stay, so that the errors come
+    /// out somewhat too large.
+    fn beside(&self, about: &Linearised, start: &[f64], dropped: &[usize]) -> Linearised {
+        let mut about = about.clone();
+        let blocks = plain(self.blocks(&about));
+        about = self.moved(&about, self.stepped(&about, start, blocks, dropped));
+        for _ in 0..STEPS_MAX {
+            let Some((next, gain)) = self.next(&about, start, dropped) else { break };
+            about = self.moved(&about, next);
+            if gain < LEAST_STEP_GAIN {
+                break;
+            }
+        }
+        about
+    }
+
+    /// The values after a step that gains, and the part that it gains.
+    fn next(&self, about: &Linearised, start: &[f64], dropped: &[usize]) -> Option<(Vec<f64>, f64)> {
+        let blocks = plain(self.blocks(about));
+        let cost = normal::sum(&blocks).cost + self.prior(start, about.variance, &about.values).cost;
+        let whole = self.stepped(about, start, blocks, dropped);
+        let step = DVector::from_iterator(
+            self.free.len(),
+            self.free.iter().map(|at| whole[*at] - about.values[*at]),
+        );
+        SHARES.iter().find_map(|share| {
+            let next = self.problem.moved(&about.values, &self.free, &(&step * *share));
+            let of_next = self::cost(&self.residuals(&next)) + self.prior(start, about.variance, &next).cost;
+            (of_next < cost).then(|| (next, 1.0 - of_next / cost))
+        })
+    }
+
+    /// The values after the step that the equations `blocks` about some values ask for, beside what the equations of motion say, which are fulfilled
+    /// best at `start`. Those `dropped` go to their baselines; those that are not refined are as in `start`.
+    fn stepped(
+        &self,
+        about: &Linearised,
+        start: &[f64],
+        mut blocks: Vec<Block>,
+        dropped: &[usize],
+    ) -> Vec<f64> {
+        blocks.push(self.prior(start, about.variance, &about.values));
+        let all = &self.problem.model.parameters.all;
+        let held =
+            self.free.iter().map(|at| dropped.contains(at).then(|| all[*at].baseline - about.values[*at]));
+        let step = self.problem.step_beside(&normal::sum(&blocks), &about.values, &self.free, held.collect());
+        let moved = self.problem.moved(&about.values, &self.free, &step);
+        self.with_refined(start, &moved)
+    }
+
+    /// Normal equations of the knowledge that the equations of motion have, about `values`.
+    fn prior(&self, start: &[f64], variance: f64, values: &[f64]) -> Block {
         let away = DVector::from_fn(self.free.len(), |i, _| values[self.free[i]] - start[self.free[i]]);
         let gram = &self.known * variance;
         let gradient = &gram * &away;
         Block { cost: away.dot(&gradient), gram, gradient }
     }
 
-    /// True if flights are predicted better, beyond chance, by values that were moved on the others: each flight in turn, or
-    /// those that effects are chosen on. `blocks` are the equations about `better`.
-    fn predicts_better(
-        &self,
-        fitted: &FitResult,
-        better: &[f64],
-        blocks: &[(usize, Block)],
-        rows: usize,
-    ) -> bool {
-        let problem = self.problem;
-        let is_each_in_turn = problem.validation.is_empty() && problem.estimation.len() > 1;
-        let judged = if problem.validation.is_empty() { &problem.estimation } else { &problem.validation };
-        let pairs = |(at, flight)| {
-            if !is_each_in_turn {
-                return (flight, fitted.values.clone(), better.to_vec());
-            }
-            let start = problem.values_without(fitted, at);
-            let moved = self.without(at, &start, better, blocks, rows);
-            (flight, start, moved)
-        };
-        let all: Vec<(&Prepared, Vec<f64>, Vec<f64>)> = judged.iter().enumerate().map(pairs).collect();
-        let before: Vec<_> = all.iter().map(|(flight, start, _)| (*flight, start.clone())).collect();
-        let after: Vec<_> = all.into_iter().map(|(flight, _, moved)| (flight, moved)).collect();
-        Foresight::under(problem, &after).is_better_than(&Foresight::under(problem, &before))
+    /// Residuals of the estimation data in units of persistence's errors.
+    fn residuals(&self, values: &[f64]) -> Vec<Residuals> {
+        let flights = &self.problem.estimation;
+        flights.par_iter().flat_map_iter(|flight| self.residuals_of(flight, values)).collect()
     }
 
-    /// The values without the flight at `at`, by a step from the equations about those with all flights. It approximates a descent on the
-    /// others, which would take as long as all else together. `start` is what the equations of the other flights say.
-    fn without(
-        &self,
-        at: usize,
-        start: &[f64],
-        better: &[f64],
-        blocks: &[(usize, Block)],
-        rows: usize,
-    ) -> Vec<f64> {
-        let variance = blocks.iter().map(|(_, block)| block.cost).sum::<f64>() / rows.max(1) as f64;
-        let others = blocks.iter().filter(|(flight, _)| *flight != at).map(|(_, block)| block.clone());
-        let equations: Vec<Block> = others.chain([self.prior(start, better, variance)]).collect();
-        let step = self.problem.step(&equations, better, self.free);
-        let moved = self.problem.moved(better, self.free, &step);
-        // What is not refined stays as the other flights alone have it.
-        let mut values = start.to_vec();
-        self.free.iter().for_each(|at| values[*at] = moved[*at]);
-        values
-    }
-
-    fn cost(&self, flights: &[&Prepared], values: &[f64]) -> f64 {
-        self.residuals(flights, values).iter().flatten().flat_map(|(_, row)| row).map(|r| loss(*r)).sum()
-    }
-
-    /// Residuals in units of persistence's errors.
-    fn residuals(&self, flights: &[&Prepared], values: &[f64]) -> Vec<Residuals> {
-        let jobs: Vec<(&Prepared, f64)> =
-            flights.iter().flat_map(|flight| HORIZONS_S.map(|horizon_s| (*flight, horizon_s))).collect();
-        let of_job = |(flight, horizon_s): &(&Prepared, f64)| -> Residuals {
-            let ends = ends(self.problem, flight, values, *horizon_s, Some(SPAN_MAX_S));
-            let mut scales = [0.0; 2];
+    /// Those of a flight, by horizon.
+    fn residuals_of(&self, flight: &Prepared, values: &[f64]) -> Vec<Residuals> {
+        let of_horizon = |ends: Vec<WindowEnd>| -> Residuals {
+            let mut squares = [0.0; ERRORS];
             for end in &ends {
                 let away = errors(flight, end, &end.persistent);
-                for (at, away) in away.iter().enumerate() {
-                    scales[at / 3] += away * away / ends.len() as f64;
-                }
+                squares.iter_mut().zip(away).for_each(|(sum, away)| *sum += away * away);
             }
-            let scaled = |row: [f64; 6]| -> [f64; 6] {
-                std::array::from_fn(|at| row[at] / scales[at / 3].sqrt().max(1e-9))
-            };
+            let scales = squares.map(|sum| (sum / ends.len() as f64).sqrt().max(1e-9));
             let one = |end: &WindowEnd| {
-                (self.problem.block_of(end.from_s), scaled(errors(flight, end, &end.simulated)))
+                let row = errors(flight, end, &end.simulated);
+                (self.problem.block_of(end.from_s), std::array::from_fn(|at| row[at] / scales[at]))
             };
             ends.iter().map(one).collect()
         };
-        jobs.par_iter().map(of_job).collect()
+        ends(self.problem, flight, values, &REFINED_S, SPAN_MAX_S).into_iter().map(of_horizon).collect()
     }
 
-    /// The normal equations by block of time, each with the place of its flight, and the number of rows; rows that err much count
-    /// less (soft L1).
-    fn blocks(&self, flights: &[&Prepared], values: &[f64]) -> (Vec<(usize, Block)>, usize) {
-        let now = self.residuals(flights, values);
-        let moved: Vec<(f64, Vec<Residuals>)> = self
-            .free
-            .par_iter()
-            .map(|at| {
-                let entry = &self.problem.model.parameters.all[*at];
-                let mut changed = values.to_vec();
-                let step =
-                    if values[*at] + entry.step <= entry.spec().max { entry.step } else { -entry.step };
-                changed[*at] += step;
-                (step, self.residuals(flights, &changed))
-            })
-            .collect();
+    /// The residuals about `values` with their derivatives.
+    fn linearised(&self, values: &[f64], variance: f64) -> Linearised {
+        let residuals = self.residuals(values);
+        let slopes_of = |at: &usize| {
+            let entry = &self.problem.model.parameters.all[*at];
+            let step = if values[*at] + entry.step <= entry.spec().max { entry.step } else { -entry.step };
+            let mut changed = values.to_vec();
+            changed[*at] += step;
+            slopes(&residuals, &self.residuals(&changed), step)
+        };
+        let slopes = self.free.par_iter().map(slopes_of).collect();
+        Linearised { values: values.to_vec(), residuals, slopes, variance }
+    }
+
+    /// The same about other `values`, with the derivatives as they were.
+    fn moved(&self, about: &Linearised, values: Vec<f64>) -> Linearised {
+        Linearised { residuals: self.residuals(&values), values, ..about.clone() }
+    }
+
+    /// The normal equations by block of time, each with the place of its flight; rows that err much count less (soft L1).
+    fn blocks(&self, about: &Linearised) -> Vec<(usize, Block)> {
         let mut blocks: BTreeMap<(usize, i64), Block> = BTreeMap::new();
-        for (job, rows) in now.iter().enumerate() {
+        for (job, rows) in about.residuals.iter().enumerate() {
             for (window, (block, row)) in rows.iter().enumerate() {
-                let key = (job / HORIZONS_S.len(), *block);
+                let key = (job / REFINED_S.len(), *block);
                 let sum = blocks.entry(key).or_insert_with(|| Block::zero(self.free.len()));
                 for (axis, residual) in row.iter().enumerate() {
-                    let slope = |(step, residuals): &(f64, Vec<Residuals>)| {
-                        let changed = residuals[job].get(window).map_or(*residual, |changed| changed.1[axis]);
-                        (changed - residual) / step
-                    };
-                    let slopes: Vec<f64> = moved.iter().map(slope).collect();
+                    let slopes: Vec<f64> = about
+                        .slopes
+                        .iter()
+                        .map(|slopes| slopes[job].get(window).map_or(0.0, |row| row[axis]))
+                        .collect();
                     sum.add(*residual, &slopes, 1.0 / (1.0 + residual * residual).sqrt());
                     sum.cost += loss(*residual) - residual * residual / (1.0 + residual * residual).sqrt();
                 }
@@ -223,13 +337,13 @@ impl Refinement<'_, '_> {
             block.complete();
             (flight, block)
         };
-        let blocks = blocks.into_iter().map(completed).collect();
-        (blocks, 6 * now.iter().map(Vec::len).sum::<usize>())
+        blocks.into_iter().map(completed).collect()
     }
 
     /// The result at `values`; parameters that were not moved keep their variance.
-    fn result(&self, fitted: &FitResult, values: Vec<f64>, blocks: &[Block]) -> FitResult {
-        let of_moved = normal::covariance(blocks);
+    fn result(&self, fitted: &FitResult, values: Vec<f64>, about: &Linearised) -> FitResult {
+        let blocks = plain(self.blocks(about));
+        let of_moved = normal::covariance(&blocks);
         let place = |at: &usize| self.free.iter().position(|free| free == at);
         let covariance = DMatrix::from_fn(fitted.free.len(), fitted.free.len(), |i, j| {
             match (place(&fitted.free[i]), place(&fitted.free[j])) {
@@ -242,12 +356,27 @@ impl Refinement<'_, '_> {
     }
 }
 
-/// Twice the soft L1 loss of a residual.
-fn loss(residual: f64) -> f64 {
-    2.0 * ((1.0 + residual * residual).sqrt() - 1.0)
+/// Derivatives by differences: where there is no other window, there is none.
+fn slopes(residuals: &[Residuals], changed: &[Residuals], step: f64) -> Vec<Vec<WindowErrors>> {
+    let of_window = |((_, row), (_, changed)): (&(i64, WindowErrors), &(i64, WindowErrors))| {
+        std::array::from_fn(|at| (changed[at] - row[at]) / step)
+    };
+    let of_job =
+        |(rows, changed): (&Residuals, &Residuals)| rows.iter().zip(changed).map(of_window).collect();
+    residuals.iter().zip(changed).map(of_job).collect()
 }
 
 /// The blocks of all flights.
-fn plain(blocks: &[(usize, Block)]) -> Vec<Block> {
-    blocks.iter().map(|(_, block)| block.clone()).collect()
+fn plain(blocks: Vec<(usize, Block)>) -> Vec<Block> {
+    blocks.into_iter().map(|(_, block)| block).collect()
+}
+
+/// The loss of all residuals.
+fn cost(residuals: &[Residuals]) -> f64 {
+    residuals.iter().flatten().flat_map(|(_, row)| row).map(|residual| loss(*residual)).sum()
+}
+
+/// Twice the soft L1 loss of a residual.
+fn loss(residual: f64) -> f64 {
+    2.0 * ((1.0 + residual * residual).sqrt() - 1.0)
 }

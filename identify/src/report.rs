@@ -8,7 +8,7 @@ use crate::faults::Fault;
 use crate::loss::{Loss, advice};
 use crate::proposal::Proposal;
 use crate::ratios::Ratios;
-use crate::select::Withdrawn;
+use crate::revision::Withdrawn;
 use crate::trim::Trim;
 use crate::whiteness::Whiteness;
 use serde::Serialize;

@@ -22,26 +22,14 @@
 
 use crate::candidate::{Candidate, free_parameters};
 use crate::fit::{FitResult, Problem};
-use crate::foresight::{Foresight, Growth};
+use crate::judgement::{
+    FALSE_RATE, Judged, fitted, fitted_from, is_clearly_worse, is_worse, judged, p_value, start, without,
+};
 use crate::logging;
 use crate::normal::{self, Block};
-use crate::refine;
-use crate::sensor_effects::POSE_DELAY;
-use crate::statistics::{chance_of_no_gain, fisher_tail};
+use crate::revision::{Revision, Revisions, Withdrawn, without_effect};
 use rayon::prelude::*;
-use serde::Serialize;
 
-/// A smaller part of the squared error does not matter, however certain it is: the comparison's own error at its
-/// joints is of the order of a tenth of it.
-const LEAST_GAIN: f64 = 0.002;
-/// A smaller part of a plausible value is not worth naming.
-const LEAST_PART: f64 = 0.01;
-/// Chance of a false acceptance in a round.
-const FALSE_RATE: f64 = 0.01;
-/// Two candidates whose difference is within this one-sided level cannot be told apart.
-const CONFOUNDED_LEVEL: f64 = 0.05;
-/// Level at which an effect is kept without a fit, where the equations promise a loss without it.
-const CLEARLY_WORSE: f64 = 0.001;
 /// Steps of a promise from a guess: nothing but the candidate's own derivatives is computed again.
 const PROMISE_STEPS: usize = 3;
 /// Number of candidates of a round that are fitted fully.
@@ -53,25 +41,6 @@ const ROUNDS_MAX: usize = 12;
 const MUCH_LEFT: f64 = 1.5;
 /// Number of candidates that are tried as the first of two.
 const FIRSTS: usize = 4;
-
-/// A candidate that was fitted and judged.
-#[derive(Debug, Clone)]
-pub struct Judged {
-    /// The candidate.
-    pub candidate: Candidate,
-    /// The fit of it and of what was accepted before.
-    pub fitted: FitResult,
-    /// Gain on the validation data as a part of their squared error.
-    pub gain: f64,
-    /// Chance of as much without the effect.
-    pub p_value: f64,
-    /// True if it was accepted.
-    pub is_accepted: bool,
-    /// True if it would be, but for the logging of the commands, which explains it.
-    pub is_logging: bool,
-    /// True if `fitted` comes from the linearised equations, not from a fit.
-    pub is_promise: bool,
-}
 
 /// One round.
 #[derive(Debug, Clone)]
@@ -87,15 +56,6 @@ impl Round {
     pub fn taken(&self) -> Option<&Judged> {
         self.taken.map(|at| &self.judged[at])
     }
-}
-
-/// An effect that was accepted and taken back.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Withdrawn {
-    /// The effect.
-    pub effect: &'static str,
-    /// The reason.
-    pub reason: String,
 }
 
 /// Result of a selection.
@@ -140,22 +100,25 @@ pub fn select(problem: &mut Problem, candidates: &[Candidate], progress: &mut dy
     let mut search = StepwiseSearch { accepted: Vec::new(), rounds: Vec::new(), base };
     let mut open = candidates.to_vec();
     let mut withdrawn = Vec::new();
+    let mut revisions = Revisions::default();
     let refined = loop {
         search.run(problem, &open, progress);
         problem.weigh(&search.base, candidates);
         search.base = problem.fitted(&search.base.values, &free_parameters(&search.accepted));
-        progress("every effect once more, by its parameters and by predictions");
-        let mut found = search.unsound(problem).or_else(|| search.worst(problem));
-        let mut refined = None;
-        if found.is_none() {
-            progress("refinement by prediction errors");
-            refined = refine::refined(problem, &search.base);
-            found = refined.as_ref().and_then(|refined| search.stopped(problem, refined));
+        let StepwiseSearch { accepted, base, rounds } = &mut search;
+        match revisions.next(problem, accepted, base, &open, progress) {
+            Revision::Without(found) => {
+                (*accepted, *base) = without_effect(problem, accepted, base, found.effect);
+                open.retain(|candidate| candidate.kind.name != found.effect);
+                withdrawn.push(found);
+            }
+            Revision::With(found) => {
+                accepted.push(found.candidate.clone());
+                *base = found.fitted.clone();
+                rounds.push(Round { judged: vec![*found], taken: Some(0) });
+            }
+            Revision::Done(refined) => break refined,
         }
-        let Some(found) = found else { break refined };
-        search.withdraw(problem, found.effect);
-        open.retain(|candidate| candidate.kind.name != found.effect);
-        withdrawn.push(found);
     };
     let StepwiseSearch { accepted, rounds, base: after } = search;
     let before = problem.fitted(&declared, &[]);
@@ -170,75 +133,6 @@ struct StepwiseSearch {
 }
 
 impl StepwiseSearch {
-    /// An accepted effect with a parameter that `fitted` left at a bound.
-    fn stopped(&self, problem: &Problem, fitted: &FitResult) -> Option<Withdrawn> {
-        self.accepted.iter().find_map(|candidate| {
-            let bound = at_bound(problem, candidate, fitted)?;
-            let reason = format!("{bound}: more is asked for than this effect can be");
-            Some(Withdrawn { effect: candidate.kind.name, reason })
-        })
-    }
-
-    /// An accepted effect with a parameter that the last fit left at a bound, or that is no longer beyond chance beside the
-    /// others.
-    fn unsound(&self, problem: &Problem) -> Option<Withdrawn> {
-        let by_chance = |candidate: &Candidate| {
-            let chance = joint_p_value(problem, &self.base, candidate);
-            let reason =
-                format!("its parameters are no longer beyond chance beside those of the others: {chance:.3}");
-            (chance >= FALSE_RATE).then_some(Withdrawn { effect: candidate.kind.name, reason })
-        };
-        self.stopped(problem, &self.base).or_else(|| self.accepted.iter().find_map(by_chance))
-    }
-
-    /// The accepted effect without which predictions are better, of several the one with the greatest growth.
-    fn worst(&self, problem: &Problem) -> Option<Withdrawn> {
-        let mut names: Vec<&'static str> =
-            self.accepted.iter().map(|candidate| candidate.kind.name).collect();
-        names.dedup();
-        if names.is_empty() {
-            return None;
-        }
-        let equations = problem.equations(&self.base.values, &self.base.free);
-        let with = Foresight::of(problem, &equations, &self.base, &[]);
-        let growth = |name: &'static str| {
-            let of_effect = self.accepted.iter().filter(|candidate| candidate.kind.name == name);
-            let of_effect: Vec<Candidate> = of_effect.cloned().collect();
-            // What begins at a guess is far from linear: the others are fitted in full.
-            let without = if of_effect.iter().any(|candidate| !candidate.kind.guesses.is_empty()) {
-                let (_, fitted) = self.without_effect(problem, name);
-                let equations = problem.equations(&fitted.values, &fitted.free);
-                Foresight::of(problem, &equations, &fitted, &[])
-            } else {
-                Foresight::of(problem, &equations, &self.base, &free_parameters(&of_effect))
-            };
-            Some((name, with.growth(&without)?))
-        };
-        let (effect, Growth { component, horizon_s, without, with, unit }) =
-            names.into_iter().filter_map(growth).max_by(|a, b| a.1.ratio().total_cmp(&b.1.ratio()))?;
-        let reason = format!(
-            "the error of {component} after {horizon_s} s is {without:.3} {unit} without it, {with:.3} {unit} with it"
-        );
-        Some(Withdrawn { effect, reason })
-    }
-
-    /// The other accepted candidates, and their fit.
-    fn without_effect(&self, problem: &Problem, effect: &str) -> (Vec<Candidate>, FitResult) {
-        let (dropped, others): (Vec<Candidate>, Vec<Candidate>) =
-            self.accepted.iter().cloned().partition(|candidate| candidate.kind.name == effect);
-        let mut start = self.base.values.clone();
-        free_parameters(&dropped)
-            .into_iter()
-            .for_each(|at| start[at] = problem.model.parameters.all[at].baseline);
-        let fitted = problem.fitted(&start, &free_parameters(&others));
-        (others, fitted)
-    }
-
-    /// Takes an effect back.
-    fn withdraw(&mut self, problem: &Problem, effect: &str) {
-        (self.accepted, self.base) = self.without_effect(problem, effect);
-    }
-
     /// Rounds among `candidates` until none changes anything.
     fn run(&mut self, problem: &mut Problem, candidates: &[Candidate], progress: &mut dyn FnMut(&str)) {
         for _ in 0..ROUNDS_MAX {
@@ -300,15 +194,6 @@ impl StepwiseSearch {
     }
 }
 
-/// The fit of `accepted` but that at `at`, from `base` on.
-pub fn without(problem: &Problem, base: &FitResult, accepted: &[Candidate], at: usize) -> FitResult {
-    let mut others = accepted.to_vec();
-    let dropped = others.remove(at);
-    let mut start = base.values.clone();
-    dropped.free.iter().for_each(|at| start[*at] = problem.model.parameters.all[*at].baseline);
-    problem.fitted(&start, &free_parameters(&others))
-}
-
 /// Judges all of `candidates` that are not in `accepted`; `rate` is the chance of a false acceptance among them.
 fn round(
     problem: &Problem,
@@ -355,112 +240,6 @@ fn confirm(problem: &Problem, base: &FitResult, accepted: &[Candidate], all: &mu
     });
 }
 
-fn judged(
-    problem: &Problem,
-    base: &FitResult,
-    candidate: &Candidate,
-    fitted: FitResult,
-    level: f64,
-) -> Judged {
-    let gain = base.validation_cost() - fitted.validation_cost();
-    let p_value = p_value(&base.validation_costs, &fitted.validation_costs);
-    let joint_p_value = joint_p_value(problem, &fitted, candidate);
-    let is_real = p_value < level
-        && joint_p_value < level
-        && gain > LEAST_GAIN * base.validation_cost()
-        && is_seen(problem, candidate, &fitted)
-        && !is_beyond_bounds(problem, candidate, &fitted);
-    let is_logging =
-        is_real && logging::explained_lag_s(problem, candidate.kind, &candidate.free, &fitted).is_some();
-    let (candidate, gain) = (candidate.clone(), gain / base.validation_cost());
-    Judged {
-        candidate,
-        fitted,
-        gain,
-        p_value,
-        is_accepted: is_real && !is_logging,
-        is_logging,
-        is_promise: false,
-    }
-}
-
-/// True if one of its parameters is too large to be an artefact of the grid: a delay of more than half a step,
-/// or another parameter of more than [`LEAST_PART`] of a plausible change.
-fn is_seen(problem: &Problem, candidate: &Candidate, fitted: &FitResult) -> bool {
-    candidate.free.iter().any(|at| {
-        let entry = &problem.model.parameters.all[*at];
-        let least = if entry.kind.is_delay { problem.least_delay_s() } else { LEAST_PART * entry.scale };
-        (fitted.values[*at] - entry.baseline).abs() > least
-    })
-}
-
-/// True if every parameter that moved stopped at a bound: the flights ask for more than the effect can be, so another
-/// effect is at work.
-#[allow(clippy::float_cmp, reason = "values that stop at a bound are the bound")]
-fn is_beyond_bounds(problem: &Problem, candidate: &Candidate, fitted: &FitResult) -> bool {
-    candidate.free.iter().all(|at| {
-        let (entry, value) = (&problem.model.parameters.all[*at], fitted.values[*at]);
-        value == entry.baseline || value == entry.spec().min || value == entry.spec().max
-    })
-}
-
-/// The first parameter that stopped at a bound other than its baseline, of those that the flights determine.
-#[allow(clippy::float_cmp, reason = "values that stop at a bound are the bound")]
-fn at_bound(problem: &Problem, candidate: &Candidate, fitted: &FitResult) -> Option<String> {
-    candidate.free.iter().find_map(|at| {
-        let (entry, value) = (&problem.model.parameters.all[*at], fitted.values[*at]);
-        let spec = entry.spec();
-        let half = fitted.t_quantile(0.975) * fitted.standard_error(*at).unwrap_or(f64::INFINITY);
-        let is_bound = value != entry.baseline && (value == spec.min || value == spec.max);
-        let is_determined = value - half > spec.min || value + half < spec.max;
-        (is_bound && is_determined)
-            .then(|| format!("{} stopped at its bound {value} {}", spec.name, spec.unit()))
-    })
-}
-
-/// The candidate's parameters fitted together with the accepted ones, from the best of its starts.
-pub fn fitted(
-    problem: &Problem,
-    base: &FitResult,
-    accepted: &[Candidate],
-    candidate: &Candidate,
-) -> FitResult {
-    let all = [free_parameters(accepted), candidate.free.clone()].concat();
-    problem.fitted(&start(problem, base, candidate).0, &all)
-}
-
-/// The same from the values that a promise led to, if they are better than all other starts.
-fn fitted_from(
-    problem: &Problem,
-    base: &FitResult,
-    accepted: &[Candidate],
-    candidate: &Candidate,
-    promised: &[f64],
-) -> FitResult {
-    let all = [free_parameters(accepted), candidate.free.clone()].concat();
-    let (start, least) = start(problem, base, candidate);
-    let cost = problem.costs(&problem.estimation, promised).iter().sum::<f64>();
-    problem.fitted(if cost < least { promised } else { &start }, &all)
-}
-
-/// The best start of a candidate's fit, and its cost: that of `base` for one that starts at the baseline.
-fn start(problem: &Problem, base: &FitResult, candidate: &Candidate) -> (Vec<f64>, f64) {
-    let mut start = base.values.clone();
-    let mut least = base.estimation_cost();
-    let by_clocks: &[f64] = &[problem.shared_late_s];
-    let more = (*candidate.kind == POSE_DELAY).then_some(by_clocks);
-    for values in candidate.kind.guesses.iter().copied().chain(more) {
-        let mut tried = base.values.clone();
-        candidate.free.iter().zip(values).for_each(|(at, value)| tried[*at] = *value);
-        let cost = problem.costs(&problem.estimation, &tried).iter().sum::<f64>();
-        // The parts of a product have no slope at zero, so some other start is taken in any case.
-        if cost < least || (start == base.values && candidate.free.len() > 1) {
-            (start, least) = (tried, cost.min(least));
-        }
-    }
-    (start, least)
-}
-
 /// The fit that a few steps from the best start promise, with the derivatives by the accepted parameters as they are at `base`.
 fn promised_from_guess(
     problem: &Problem,
@@ -487,24 +266,6 @@ fn promised_from_guess(
     promise(problem, &values, all, &estimation, &validation)
 }
 
-/// Chance that the candidate's parameters are as far from their baselines together if they are there in truth: Wald's test
-/// with the jackknife's covariance. Of two that act as a product alone neither is sure by itself.
-fn joint_p_value(problem: &Problem, fitted: &FitResult, candidate: &Candidate) -> f64 {
-    let is_known =
-        |at: &usize| fitted.standard_error(*at).is_some_and(|error| error > 0.0 && error.is_finite());
-    let known: Vec<usize> = candidate.free.iter().copied().filter(is_known).collect();
-    let away: Vec<f64> =
-        known.iter().map(|at| fitted.values[*at] - problem.model.parameters.all[*at].baseline).collect();
-    let blocks = fitted.estimation_costs.len() as f64;
-    fisher_tail(fitted.wald(&known, &away) / known.len() as f64, known.len() as f64, blocks - 1.0)
-}
-
-/// Chance that the mean gain of the blocks from `before` to `after` is not above zero.
-fn p_value(before: &[f64], after: &[f64]) -> f64 {
-    let gains: Vec<f64> = before.iter().zip(after).map(|(before, after)| before - after).collect();
-    chance_of_no_gain(&gains)
-}
-
 /// The accepted one with the greatest gain, or the one with the fewest parameters that is not worse beyond chance.
 fn best(problem: &Problem, judged: &[Judged]) -> Option<usize> {
     // What the logging of the commands explains as well is no effect; sensors that lead for it are named nowhere.
@@ -523,16 +284,6 @@ fn best(problem: &Problem, judged: &[Judged]) -> Option<usize> {
     let is_alike = |at: &&usize| !is_worse(&judged[**at].fitted, &judged[greatest].fitted);
     let size = |at: usize| judged[at].candidate.free.len();
     accepted.iter().filter(is_alike).min_by(|a, b| size(**a).cmp(&size(**b)).then(by_gain(b, a))).copied()
-}
-
-/// True if such costs on the validation data are worse than those of `other` so surely that a fit in full is spared.
-pub fn is_clearly_worse(costs: &[f64], other: &FitResult) -> bool {
-    p_value(costs, &other.validation_costs) < CLEARLY_WORSE
-}
-
-/// True if `fitted` is worse on the validation data than `other`, beyond chance.
-pub fn is_worse(fitted: &FitResult, other: &FitResult) -> bool {
-    p_value(&fitted.validation_costs, &other.validation_costs) < CONFOUNDED_LEVEL
 }
 
 /// Takes back effects that no longer gain anything.

@@ -1,0 +1,182 @@
+//! Judgement of a candidate: its fit beside what was accepted before, and whether that is an effect.
+
+use crate::candidate::{Candidate, free_parameters};
+use crate::fit::{FitResult, Problem};
+use crate::logging;
+use crate::sensor_effects::POSE_DELAY;
+use crate::statistics::{chance_of_no_gain, fisher_tail};
+
+/// A smaller part of the squared error does not matter, however certain it is: the comparison's own error at its
+/// joints is of the order of a tenth of it.
+const LEAST_GAIN: f64 = 0.002;
+/// Chance of a false acceptance in a round.
+pub const FALSE_RATE: f64 = 0.01;
+/// A smaller part of a plausible value is not worth naming.
+const LEAST_PART: f64 = 0.01;
+/// Two candidates whose difference is within this one-sided level cannot be told apart.
+const CONFOUNDED_LEVEL: f64 = 0.05;
+/// Level at which an effect is kept without a fit, where the equations promise a loss without it.
+const CLEARLY_WORSE: f64 = 0.001;
+
+/// A candidate that was fitted and judged.
+#[derive(Debug, Clone)]
+pub struct Judged {
+    /// The candidate.
+    pub candidate: Candidate,
+    /// The fit of it and of what was accepted before.
+    pub fitted: FitResult,
+    /// Gain on the validation data as a part of their squared error.
+    pub gain: f64,
+    /// Chance of as much without the effect.
+    pub p_value: f64,
+    /// True if it was accepted.
+    pub is_accepted: bool,
+    /// True if it would be, but for the logging of the commands, which explains it.
+    pub is_logging: bool,
+    /// True if `fitted` comes from the linearised equations, not from a fit.
+    pub is_promise: bool,
+}
+
+/// The fit of `accepted` but that at `at`, from `base` on.
+pub fn without(problem: &Problem, base: &FitResult, accepted: &[Candidate], at: usize) -> FitResult {
+    let mut others = accepted.to_vec();
+    let dropped = others.remove(at);
+    let mut start = base.values.clone();
+    dropped.free.iter().for_each(|at| start[*at] = problem.model.parameters.all[*at].baseline);
+    problem.fitted(&start, &free_parameters(&others))
+}
+
+/// A candidate with its fit, judged at `level`.
+pub fn judged(
+    problem: &Problem,
+    base: &FitResult,
+    candidate: &Candidate,
+    fitted: FitResult,
+    level: f64,
+) -> Judged {
+    let gain = base.validation_cost() - fitted.validation_cost();
+    let p_value = p_value(&base.validation_costs, &fitted.validation_costs);
+    let joint_p_value = joint_p_value(problem, &fitted, candidate);
+    let is_real = p_value < level
+        && joint_p_value < level
+        && gain > LEAST_GAIN * base.validation_cost()
+        && is_seen(problem, candidate, &fitted)
+        && !is_beyond_bounds(problem, candidate, &fitted);
+    let is_logging =
+        is_real && logging::explained_lag_s(problem, candidate.kind, &candidate.free, &fitted).is_some();
+    let (candidate, gain) = (candidate.clone(), gain / base.validation_cost());
+    Judged {
+        candidate,
+        fitted,
+        gain,
+        p_value,
+        is_accepted: is_real && !is_logging,
+        is_logging,
+        is_promise: false,
+    }
+}
+
+/// True if one of its parameters is too large to be an artefact of the grid: a delay of more than half a step,
+/// or another parameter of more than [`LEAST_PART`] of a plausible change.
+fn is_seen(problem: &Problem, candidate: &Candidate, fitted: &FitResult) -> bool {
+    candidate.free.iter().any(|at| {
+        let entry = &problem.model.parameters.all[*at];
+        let least = if entry.kind.is_delay { problem.least_delay_s() } else { LEAST_PART * entry.scale };
+        (fitted.values[*at] - entry.baseline).abs() > least
+    })
+}
+
+/// True if every parameter that moved stopped at a bound: the flights ask for more than the effect can be, so another
+/// effect is at work.
+#[allow(clippy::float_cmp, reason = "values that stop at a bound are the bound")]
+fn is_beyond_bounds(problem: &Problem, candidate: &Candidate, fitted: &FitResult) -> bool {
+    candidate.free.iter().all(|at| {
+        let (entry, value) = (&problem.model.parameters.all[*at], fitted.values[*at]);
+        value == entry.baseline || value == entry.spec().min || value == entry.spec().max
+    })
+}
+
+/// The first parameter that stopped at a bound other than its baseline, of those that the flights determine.
+#[allow(clippy::float_cmp, reason = "values that stop at a bound are the bound")]
+pub fn at_bound(problem: &Problem, candidate: &Candidate, fitted: &FitResult) -> Option<String> {
+    candidate.free.iter().find_map(|at| {
+        let (entry, value) = (&problem.model.parameters.all[*at], fitted.values[*at]);
+        let spec = entry.spec();
+        let half = fitted.t_quantile(0.975) * fitted.standard_error(*at).unwrap_or(f64::INFINITY);
+        let is_bound = value != entry.baseline && (value == spec.min || value == spec.max);
+        let is_determined = value - half > spec.min || value + half < spec.max;
+        (is_bound && is_determined)
+            .then(|| format!("{} stopped at its bound {value} {}", spec.name, spec.unit()))
+    })
+}
+
+/// The candidate's parameters fitted together with the accepted ones, from the best of its starts.
+pub fn fitted(
+    problem: &Problem,
+    base: &FitResult,
+    accepted: &[Candidate],
+    candidate: &Candidate,
+) -> FitResult {
+    let all = [free_parameters(accepted), candidate.free.clone()].concat();
+    problem.fitted(&start(problem, base, candidate).0, &all)
+}
+
+/// The same from the values that a promise led to, if they are better than all other starts.
+pub fn fitted_from(
+    problem: &Problem,
+    base: &FitResult,
+    accepted: &[Candidate],
+    candidate: &Candidate,
+    promised: &[f64],
+) -> FitResult {
+    let all = [free_parameters(accepted), candidate.free.clone()].concat();
+    let (start, least) = start(problem, base, candidate);
+    let cost = problem.costs(&problem.estimation, promised).iter().sum::<f64>();
+    problem.fitted(if cost < least { promised } else { &start }, &all)
+}
+
+/// The best start of a candidate's fit, and its cost: that of `base` for one that starts at the baseline.
+pub fn start(problem: &Problem, base: &FitResult, candidate: &Candidate) -> (Vec<f64>, f64) {
+    let mut start = base.values.clone();
+    let mut least = base.estimation_cost();
+    let by_clocks: &[f64] = &[problem.shared_late_s];
+    let more = (*candidate.kind == POSE_DELAY).then_some(by_clocks);
+    for values in candidate.kind.guesses.iter().copied().chain(more) {
+        let mut tried = base.values.clone();
+        candidate.free.iter().zip(values).for_each(|(at, value)| tried[*at] = *value);
+        let cost = problem.costs(&problem.estimation, &tried).iter().sum::<f64>();
+        // The parts of a product have no slope at zero, so some other start is taken in any case.
+        if cost < least || (start == base.values && candidate.free.len() > 1) {
+            (start, least) = (tried, cost.min(least));
+        }
+    }
+    (start, least)
+}
+
+/// Chance that the candidate's parameters are as far from their baselines together if they are there in truth: Wald's test
+/// with the jackknife's covariance. Of two that act as a product alone neither is sure by itself.
+pub fn joint_p_value(problem: &Problem, fitted: &FitResult, candidate: &Candidate) -> f64 {
+    let is_known =
+        |at: &usize| fitted.standard_error(*at).is_some_and(|error| error > 0.0 && error.is_finite());
+    let known: Vec<usize> = candidate.free.iter().copied().filter(is_known).collect();
+    let away: Vec<f64> =
+        known.iter().map(|at| fitted.values[*at] - problem.model.parameters.all[*at].baseline).collect();
+    let blocks = fitted.estimation_costs.len() as f64;
+    fisher_tail(fitted.wald(&known, &away) / known.len() as f64, known.len() as f64, blocks - 1.0)
+}
+
+/// Chance that the mean gain of the blocks from `before` to `after` is not above zero.
+pub fn p_value(before: &[f64], after: &[f64]) -> f64 {
+    let gains: Vec<f64> = before.iter().zip(after).map(|(before, after)| before - after).collect();
+    chance_of_no_gain(&gains)
+}
+
+/// True if such costs on the validation data are worse than those of `other` so surely that a fit in full is spared.
+pub fn is_clearly_worse(costs: &[f64], other: &FitResult) -> bool {
+    p_value(costs, &other.validation_costs) < CLEARLY_WORSE
+}
+
+/// True if `fitted` is worse on the validation data than `other`, beyond chance.
+pub fn is_worse(fitted: &FitResult, other: &FitResult) -> bool {
+    p_value(&fitted.validation_costs, &other.validation_costs) < CONFOUNDED_LEVEL
+}
