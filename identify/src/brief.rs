@@ -211,13 +211,23 @@ mod tests {
     }
 
     fn report() -> Report {
-        let change = |before, after| Change { before, after, persistence: 9.0, own_trim: after, unit: "deg" };
+        let change = |before, after| Change {
+            before,
+            after,
+            persistence: 9.0,
+            own_trim: after,
+            disturbance: after,
+            measured_attitude: None,
+            by_axis: [0.0; 3],
+            unit: "deg",
+        };
         let flight = |before, after| {
             BTreeMap::from([("0.5".to_owned(), BTreeMap::from([("attitude", change(before, after))]))])
         };
         Report {
             verdict: vec!["rotor-drag"],
             effects: BTreeMap::from([("rotor-drag", effect())]),
+            limits: BTreeMap::new(),
             held_out: Changes::from([
                 ("one".to_owned(), flight(20.0, 2.0)),
                 ("two".to_owned(), flight(30.0, 5.0)),

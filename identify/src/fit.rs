@@ -561,3 +561,42 @@ impl Problem<'_> {
         0.5 * self.flights().map(|flight| flight.layout.clock.step_s).fold(0.0, f64::max)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::parameter::Parameters;
+    use vehicles::Vehicle;
+
+    /// Of a rigid body no moment of inertia is larger than the sum of the other two.
+    #[test]
+    fn a_step_ends_where_no_rigid_body_has_the_inertia() {
+        let vehicle = Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml").unwrap();
+        let model = Model { parameters: Parameters::of(&vehicle, &[]), vehicle };
+        let problem = Problem {
+            model,
+            estimation: Vec::new(),
+            validation: Vec::new(),
+            test: Vec::new(),
+            noises: Noises::new(),
+            block_s: 1.0,
+            shared_late_s: 0.0,
+        };
+        let is_inertia = |at: &usize| problem.model.parameters.all[*at].kind.name == "inertia-error";
+        let free: Vec<usize> = (0..problem.model.parameters.all.len()).filter(is_inertia).collect();
+        let start = problem.model.parameters.baseline();
+        let inertia = |values: &[f64]| {
+            let airframe = problem.model.airframe(values);
+            let tensor = &airframe.vehicle().inertia_kg_m2;
+            [tensor[(0, 0)], tensor[(1, 1)], tensor[(2, 2)]]
+        };
+        // To three times as much about z alone, of which some is possible, and about all three, of which all is.
+        let about_z = problem.moved(&start, &free, &DVector::from_row_slice(&[0.0, 0.0, 2.0]));
+        let [xx, yy, zz] = inertia(&about_z);
+        let [.., declared] = inertia(&start);
+        assert!(zz <= xx + yy && zz > 0.99 * (xx + yy), "{xx} {yy} {zz}");
+        assert!(zz > declared && (about_z[free[0]], about_z[free[1]]) == (0.0, 0.0));
+        let about_all = problem.moved(&start, &free, &DVector::from_row_slice(&[2.0, 2.0, 2.0]));
+        assert_eq!(free.iter().map(|at| about_all[*at]).collect::<Vec<_>>(), [2.0; 3]);
+    }
+}

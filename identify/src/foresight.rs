@@ -3,15 +3,14 @@
 //! An effect can make the residual of the equations smaller and yet predictions worse: it then absorbs the
 //! influence of another cause. The judged flights are those with role `select`, or else those that parameters
 //! are fitted on, each with parameters that were fitted on the others.
-#![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
+use crate::disturbance::{Colours, Observed};
 use crate::fit::{Equations, FitResult, Problem};
 use crate::noise;
-use crate::predict::{Measured, WindowEnd};
+use crate::predict::{Measured, WindowEnd, components};
 use crate::prepared::Prepared;
 use crate::sensing::SensorErrors;
 use crate::statistics::chance_of_no_gain;
-use crate::trim::OwnTrim;
 use flights::state::StateQuantity;
 use plant::RigidBody;
 use rayon::prelude::*;
@@ -20,17 +19,11 @@ use std::ops::Range;
 
 /// Horizons at which effects are judged.
 pub const HORIZONS_S: [f64; 2] = [0.1, 0.5];
-/// Quantities that are judged, and their units.
-const QUANTITIES: [(StateQuantity, &str); 4] = [
-    (StateQuantity::Attitude, "deg"),
-    (StateQuantity::Velocity, "m/s"),
-    (StateQuantity::Rates, "rad/s"),
-    (StateQuantity::Position, "m"),
-];
+/// Quantities that are judged.
+const QUANTITIES: [StateQuantity; 4] = StateQuantity::ALL;
 /// Number of their components.
 pub const ERRORS: usize = 3 * QUANTITIES.len();
-/// Errors of attitude about the axes of the body in deg, velocity in the world in m/s, rates in the body in rad/s, and position in the
-/// world in m.
+/// Errors of all components.
 pub type WindowErrors = [f64; ERRORS];
 /// Chance of a false finding that one channel grows.
 const LEVEL: f64 = 0.01;
@@ -69,7 +62,7 @@ pub struct Foresight {
     /// Squares by flight, horizon and block of time: sums by component, and the number of windows.
     squares: BTreeMap<(usize, usize, i64), (WindowErrors, f64)>,
     /// Mean squares of persistence's errors, by horizon.
-    persistent: [[f64; QUANTITIES.len()]; HORIZONS_S.len()],
+    persistent: [WindowErrors; HORIZONS_S.len()],
     /// Errors of each quantity that the noise of the sensors makes, by horizon.
     noise: [[f64; QUANTITIES.len()]; 2],
 }
@@ -89,13 +82,16 @@ impl Foresight {
 
     /// Prediction errors of flights, each under its values and with its own trim.
     pub fn under(problem: &Problem, flights: &[(&Prepared, Vec<f64>)]) -> Self {
+        let colours = Colours::of(problem, &flights[0].1);
         let jobs: Vec<(usize, usize)> = (0..flights.len())
             .flat_map(|at| (0..HORIZONS_S.len()).map(move |horizon| (at, horizon)))
             .collect();
         let of_job = |(at, horizon): &(usize, usize)| -> Vec<_> {
             let (flight, values) = &flights[*at];
-            let ends = trimmed_ends(problem, flight, values, HORIZONS_S[*horizon]);
+            let ends =
+                ends(problem, flight, values, &colours, (&HORIZONS_S[*horizon..=*horizon], f64::INFINITY));
             ends.iter()
+                .flatten()
                 .map(|end| {
                     let squares = |state| errors(flight, end, state).map(|error| error * error);
                     let key = (*at, *horizon, problem.block_of(end.from_s));
@@ -103,13 +99,12 @@ impl Foresight {
                 })
                 .collect()
         };
-        let (mut sums, mut persistent) =
-            (BTreeMap::new(), [([0.0; QUANTITIES.len()], 0.0); HORIZONS_S.len()]);
+        let (mut sums, mut persistent) = (BTreeMap::new(), [([0.0; ERRORS], 0.0); HORIZONS_S.len()]);
         for (key, squares, of_persistence) in
             jobs.par_iter().map(of_job).collect::<Vec<_>>().into_iter().flatten()
         {
             let (sum, count) = &mut persistent[key.1];
-            of_persistence.iter().enumerate().for_each(|(at, square)| sum[at / 3] += square);
+            sum.iter_mut().zip(of_persistence).for_each(|(sum, square)| *sum += square);
             *count += 1.0;
             let sum: &mut (WindowErrors, f64) = sums.entry(key).or_default();
             sum.0.iter_mut().zip(squares).for_each(|(sum, square)| *sum += square);
@@ -129,43 +124,49 @@ impl Foresight {
                 (pairs.iter().map(of).sum::<f64>() / pairs.len().max(1) as f64).sqrt()
             };
             let (with, without) = (mean(&|pair| pair.0), mean(&|pair| pair.1));
+            let persistent: f64 = self.persistent[horizon][3 * at..3 * at + 3].iter().sum();
             let growths: Vec<f64> = pairs.iter().map(|(with, without)| with - without).collect();
             let by = (with * with - without * without).max(0.0).sqrt();
             let matters = with > LEAST_GROWTH * without
                 && by > OF_NOISE * self.noise[horizon][at]
-                && with - without > OF_PERSISTENCE * self.persistent[horizon][at].sqrt();
+                && with - without > OF_PERSISTENCE * persistent.sqrt();
             let is_beyond = matters && chance_of_no_gain(&growths) < LEVEL;
-            let ((quantity, unit), horizon_s) = (QUANTITIES[at], HORIZONS_S[horizon]);
-            is_beyond.then_some(Growth { channel: quantity.name(), horizon_s, without, with, unit })
+            let (quantity, horizon_s) = (QUANTITIES[at], HORIZONS_S[horizon]);
+            is_beyond.then_some(Growth {
+                channel: quantity.name(),
+                horizon_s,
+                without,
+                with,
+                unit: quantity.unit(),
+            })
         };
         places.filter_map(of_place).max_by(|a, b| a.ratio().total_cmp(&b.ratio()))
     }
 
-    /// True if all errors together, each in units of `other`'s, are smaller than `other`'s beyond chance, and by more than
-    /// [`LEAST_GROWTH`].
+    /// True if all errors together are smaller than `other`'s beyond chance, and by more than [`LEAST_GROWTH`], in the geometric mean over components,
+    /// horizons and blocks of time: half of an error counts as much where it is small, down to the noise of the sensors, as where it is great.
     pub fn is_better_than(&self, other: &Self) -> bool {
         self.chance_against(other) < LEVEL
     }
 
     /// Chance of errors that much smaller than `other`'s, all together; 1 where they are not smaller by more than [`LEAST_GROWTH`].
     pub fn chance_against(&self, other: &Self) -> f64 {
-        let mut gains: Vec<f64> = Vec::new();
-        let mut total = (0.0, 0.0);
-        for horizon in 0..HORIZONS_S.len() {
-            let of = |at: usize| self.blocks(other, horizon, at..at + 1);
-            for (at, pairs) in (0..ERRORS).map(of).enumerate() {
-                let scale = pairs.iter().map(|pair| pair.1).sum::<f64>() / pairs.len().max(1) as f64;
-                if at == 0 && gains.len() < pairs.len() {
-                    gains.resize(pairs.len(), 0.0);
-                }
-                for (gain, (new, old)) in gains.iter_mut().zip(&pairs) {
-                    let (new, old) = (new / scale.max(1e-18), old / scale.max(1e-18));
-                    *gain += old - new;
-                    total = (total.0 + new, total.1 + old);
-                }
+        let mut gains: BTreeMap<(usize, i64), f64> = BTreeMap::new();
+        let mut count = 0.0;
+        for (key, (new, windows)) in &self.squares {
+            let Some((old, old_windows)) = other.squares.get(key) else { continue };
+            let (flight, horizon, block) = *key;
+            let gain = gains.entry((flight, block)).or_default();
+            for at in (0..ERRORS).filter(|at| old[*at] > 0.0) {
+                let floor = (OF_NOISE * self.noise[horizon][at / 3]).powi(2) / 3.0;
+                *gain += libm::log(
+                    (old[at] / old_windows + floor) / (new[at] / windows + floor).max(f64::MIN_POSITIVE),
+                );
+                count += 1.0;
             }
         }
-        let is_smaller = total.1 > LEAST_GROWTH * LEAST_GROWTH * total.0;
+        let gains: Vec<f64> = gains.into_values().collect();
+        let is_smaller = gains.iter().sum::<f64>() > 2.0 * libm::log(LEAST_GROWTH) * count;
         if is_smaller { chance_of_no_gain(&gains) } else { 1.0 }
     }
 
@@ -187,38 +188,22 @@ fn noise(problem: &Problem) -> [[f64; QUANTITIES.len()]; 2] {
     let floor = noise::floor(flights);
     HORIZONS_S.map(|horizon_s| {
         let of_all = noise::prediction_floor(&floor, horizon_s, problem.model.vehicle.gravity_m_s2);
-        QUANTITIES.map(|(of, _)| of_all.get(of.name()).copied().unwrap_or(0.0))
+        QUANTITIES.map(|of| of_all.get(of.name()).copied().unwrap_or(0.0))
     })
 }
 
-/// The ends of a flight's windows under `values` at several horizons, up to `span_s` of the flight; none where its attitude was assumed, or there
-/// is nothing to predict with.
+/// The ends of a flight's windows under `values` at several horizons, up to `span_s` of the flight, with the disturbance of these `colours` that was
+/// seen before each; none where its attitude was assumed, or there is nothing to predict with.
 pub fn ends(
     problem: &Problem,
     flight: &Prepared,
     values: &[f64],
-    horizons_s: &[f64],
-    span_s: f64,
-) -> Vec<Vec<WindowEnd>> {
-    ends_under(problem, flight, values, (horizons_s, span_s), |_| [0.0; 6])
-}
-
-/// The same at one horizon and with the flight's own trim.
-fn trimmed_ends(problem: &Problem, flight: &Prepared, values: &[f64], horizon_s: f64) -> Vec<WindowEnd> {
-    let seen = OwnTrim::of(problem, flight, values);
-    ends_under(problem, flight, values, (&[horizon_s], f64::INFINITY), |from_s| seen.at(from_s)).remove(0)
-}
-
-fn ends_under(
-    problem: &Problem,
-    flight: &Prepared,
-    values: &[f64],
+    colours: &Colours,
     (horizons_s, span_s): (&[f64], f64),
-    push: impl Fn(f64) -> [f64; 6],
 ) -> Vec<Vec<WindowEnd>> {
     let Some(measured) = measured(problem, flight, values) else { return vec![Vec::new(); horizons_s.len()] };
-    let airframe = problem.model.airframe_of(flight, values);
-    measured.shortened(span_s).ends_within(airframe, horizons_s, push)
+    let (airframe, seen) = (problem.model.airframe_of(flight, values), Observed::of(problem, flight, values));
+    measured.shortened(span_s).ends_within(airframe, horizons_s, |from_s| seen.expected(colours, from_s))
 }
 
 /// A flight's measurements without the errors of the sensors; `None` where its attitude was assumed, or there is nothing to predict with.
@@ -232,14 +217,9 @@ fn measured(problem: &Problem, flight: &Prepared, values: &[f64]) -> Option<Meas
 
 /// Errors of a state at the end of a window; 0 of a quantity that `flight` does not show.
 pub fn errors(flight: &Prepared, end: &WindowEnd, state: &RigidBody) -> WindowErrors {
-    let turn_B = (end.measured.attitude_WB.inverse() * state.attitude_WB).scaled_axis();
-    let slip_W = state.velocity_W_m_s - end.measured.velocity_W_m_s;
-    let spin_B = state.angular_velocity_B_rad_s - end.measured.angular_velocity_B_rad_s;
-    let away_W = state.position_W_m - end.measured.position_W_m;
-    let of_quantity = [turn_B.map(f64::to_degrees), slip_W, spin_B, away_W];
+    let errors = components(end, state);
     std::array::from_fn(|at| {
-        let is_shown = QUANTITIES[at / 3].0.is_measured(flight.flight);
-        f64::from(is_shown) * of_quantity[at / 3][at % 3]
+        f64::from(QUANTITIES[at / 3].is_measured(flight.flight)) * errors[at / 3][at % 3]
     })
 }
 
@@ -257,7 +237,7 @@ mod tests {
         };
         Foresight {
             squares: (0..40).flat_map(one).collect(),
-            persistent: [[4.0; QUANTITIES.len()]; 2],
+            persistent: [[1.0; ERRORS]; 2],
             noise: [[0.1; QUANTITIES.len()]; 2],
         }
     }

@@ -1,10 +1,10 @@
 //! Tables of prediction errors: every flight at every horizon, by the declared vehicle, by the new one and by persistence.
 
 use crate::clock::Lateness;
+use crate::disturbance::{Colours, Course, Observed};
 use crate::fit::Problem;
-use crate::predict::{Errors, Measured, errors};
+use crate::predict::{Errors, Measured, WindowEnd, components, errors};
 use crate::sensing::SensorErrors;
-use crate::trim::OwnTrim;
 use flights::state::StateQuantity;
 use flights::{FlightSet, Role};
 use serde::Serialize;
@@ -27,6 +27,12 @@ pub struct Change {
     pub persistence: f64,
     /// With the accepted effects, and the flight's own trim as it was seen up to the begin of each window.
     pub own_trim: f64,
+    /// With the accepted effects, and the disturbance as it was seen up to the begin of each window, which decays to the trim.
+    pub disturbance: f64,
+    /// With the accepted effects and the measured attitude, so that forces alone make the error; `None` of the channels of rotation.
+    pub measured_attitude: Option<f64>,
+    /// Root mean square of `after` by axis: of position and velocity those of the world, of attitude and rates those of the body.
+    pub by_axis: [f64; 3],
     /// Unit of all.
     pub unit: &'static str,
 }
@@ -43,6 +49,7 @@ pub struct Prediction {
 pub fn predictions(problem: &Problem, set: &FlightSet, values: &[f64]) -> Vec<Prediction> {
     let declared = problem.model.parameters.baseline();
     let sensor_errors = SensorErrors::of(&problem.model.parameters, values);
+    let colours = Colours::of(problem, values);
     let mut predictions = Vec::new();
     for flight in &set.flights {
         let prepared = problem.flights().find(|prepared| prepared.flight.name == flight.name);
@@ -56,18 +63,24 @@ pub fn predictions(problem: &Problem, set: &FlightSet, values: &[f64]) -> Vec<Pr
             let model = &problem.model;
             prepared.map_or_else(|| model.airframe(values), |flight| model.airframe_of(flight, values))
         };
-        let seen = prepared.map_or(OwnTrim::default(), |prepared| OwnTrim::of(problem, prepared, values));
+        let seen = prepared.map_or(Observed::default(), |prepared| Observed::of(problem, prepared, values));
+        let turned = Measured::of(&corrected).map(Measured::turning_as_measured);
         for horizon_s in HORIZONS_S {
-            let old = before.ends(airframe(&declared), horizon_s, |_| [0.0; 6]);
-            let new = after.ends(airframe(values), horizon_s, |_| [0.0; 6]);
-            let trimmed = after.ends(airframe(values), horizon_s, |from_s| seen.at(from_s));
+            let ends = |push: &dyn Fn(f64) -> Course| after.ends(airframe(values), horizon_s, push);
+            let old = before.ends(airframe(&declared), horizon_s, |_| Course::none());
+            let new = ends(&|_| Course::none());
+            let turned =
+                turned.iter().flat_map(|turned| turned.ends(airframe(values), horizon_s, |_| Course::none()));
+            let simulated = |ends: &[WindowEnd]| errors(&corrected, ends, |end| end.simulated);
             let errors = [
                 errors(&aligned, &old, |end| end.simulated),
-                errors(&corrected, &new, |end| end.simulated),
+                simulated(&new),
                 errors(&corrected, &new, |end| end.persistent),
-                errors(&corrected, &trimmed, |end| end.simulated),
+                simulated(&ends(&|from_s| seen.trim(from_s))),
+                simulated(&ends(&|from_s| seen.expected(&colours, from_s))),
+                simulated(&turned.collect::<Vec<_>>()),
             ];
-            let channels = changes(&errors);
+            let channels = changes(&errors, &by_axis(&new));
             predictions.push(Prediction {
                 flight: flight.name.clone(),
                 role: flight.role,
@@ -79,17 +92,37 @@ pub fn predictions(problem: &Problem, set: &FlightSet, values: &[f64]) -> Vec<Pr
     predictions
 }
 
-/// Errors by channel: of the declared vehicle, the new one, persistence, and the new one with the flight's own trim.
-fn changes(errors: &[Errors; 4]) -> BTreeMap<&'static str, Change> {
-    let one = |quantity: StateQuantity| {
+/// Errors by channel: of the declared vehicle, the new one, persistence, and the new one with the flight's own trim, with the disturbance that was
+/// seen, and with the measured attitude.
+fn changes(errors: &[Errors; 6], by_axis: &[[f64; 3]; 4]) -> BTreeMap<&'static str, Change> {
+    let one = |(quantity, by_axis): (StateQuantity, &[f64; 3])| {
         let (channel, unit) = (quantity.name(), quantity.unit());
-        let [before, after, persistence, own_trim] =
+        let [before, after, persistence, own_trim, disturbance, turned] =
             errors.each_ref().map(|errors| errors.get(channel).copied());
-        let (before, after) = (before?, after?);
-        let (persistence, own_trim) = (persistence?, own_trim?);
-        Some((channel, Change { before, after, persistence, own_trim, unit }))
+        let is_turn = matches!(quantity, StateQuantity::Attitude | StateQuantity::Rates);
+        let change = Change {
+            before: before?,
+            after: after?,
+            persistence: persistence?,
+            own_trim: own_trim?,
+            disturbance: disturbance?,
+            measured_attitude: turned.filter(|_| !is_turn),
+            by_axis: *by_axis,
+            unit,
+        };
+        Some((channel, change))
     };
-    StateQuantity::ALL.into_iter().filter_map(one).collect()
+    StateQuantity::ALL.into_iter().zip(by_axis).filter_map(one).collect()
+}
+
+/// Root mean squares of the errors by quantity and axis.
+fn by_axis(ends: &[WindowEnd]) -> [[f64; 3]; 4] {
+    let mut squares = [[0.0; 3]; 4];
+    for error in ends.iter().map(|end| components(end, &end.simulated)) {
+        let add = |(sum, error): (&mut f64, &f64)| *sum += error * error / ends.len() as f64;
+        squares.iter_mut().flatten().zip(error.iter().flatten()).for_each(add);
+    }
+    squares.map(|axes| axes.map(f64::sqrt))
 }
 
 /// The errors of the flights of `role`.

@@ -11,7 +11,7 @@
 //! | `window` | the window, and differences that lose nothing |
 //! | `prepared`, `rows` | a flight, the equations that it allows, and their rows |
 //! | `model`, `memo` | the model's side of the equations, and what was computed of it lately |
-//! | [`steps_ahead`] | errors of multi-step predictions |
+//! | [`steps_ahead`], [`accelerations`] | errors of multi-step predictions; accelerations at every sample, for benchmarks |
 //! | `parameter`, `sensor_effects` | what may be changed of the model; sensors' errors as effects beside the plant's |
 //! | `candidate` | which effects these flights can show |
 //! | `noise_model`, `whitening` | the noise of a residual: autoregressive within a flight, trims between flights |
@@ -26,6 +26,7 @@
 //! | `sensing` | the sensors' delays and biases, and a flight without them |
 //! | `whiteness`, `noise`, [`statistics`] | what is left, and what noise alone would leave |
 //! | `predict`, `horizons` | prediction over horizons, and tables of its errors |
+//! | `disturbance`, `limits` | disturbances as they were seen before a window; what predictions are limited by |
 //! | `foresight`, `loss` | predictions as a judge of effects and of the verdict |
 //! | `refine` | parameters moved to where predictions are best |
 //! | `regressor` | what residuals are looked at against |
@@ -45,12 +46,14 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod accelerations;
 mod align;
 pub mod brief;
 mod candidate;
 mod clock;
 mod confounded;
 mod digits;
+mod disturbance;
 mod envelope;
 mod evidence;
 mod faults;
@@ -59,6 +62,7 @@ mod foresight;
 mod horizons;
 mod judgement;
 mod lever;
+mod limits;
 mod log_rates;
 mod logging;
 mod loss;

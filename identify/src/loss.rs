@@ -42,8 +42,8 @@ pub fn losses(errors: &Changes, noise: &BTreeMap<&'static str, Noise>) -> Vec<Lo
             };
             let floor =
                 noise.get(channel).and_then(|noise| noise.prediction.get(horizon)).copied().unwrap_or(0.0);
-            // A flight's own trim is none of the vehicle's.
-            let trimmed = change.after.min(change.own_trim);
+            // A flight's own trim, and what disturbs it, are none of the vehicle's.
+            let trimmed = change.after.min(change.own_trim).min(change.disturbance);
             let rivals =
                 [("persistence", trimmed, change.persistence), ("declared", change.after, change.before)];
             let loses =
@@ -74,7 +74,16 @@ mod tests {
     use crate::horizons::Change;
 
     fn losses_of(after: f64, own_trim: f64, persistence: f64, floor: f64) -> Vec<Loss> {
-        let change = Change { before: 4.0, after, persistence, own_trim, unit: "deg" };
+        let change = Change {
+            before: 4.0,
+            after,
+            persistence,
+            own_trim,
+            disturbance: own_trim,
+            measured_attitude: None,
+            by_axis: [0.0; 3],
+            unit: "deg",
+        };
         let channels = BTreeMap::from([("attitude", change)]);
         let errors = Changes::from([("leg".to_owned(), BTreeMap::from([("0.5".to_owned(), channels)]))]);
         let prediction = BTreeMap::from([("0.5".to_owned(), floor)]);

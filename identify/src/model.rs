@@ -232,7 +232,7 @@ struct Sides {
 }
 
 /// Returns the motion of the air under the steady effects, which is the same at every instant.
-fn air(airframe: &Airframe, step_s: f64) -> Actuation {
+pub fn air(airframe: &Airframe, step_s: f64) -> Actuation {
     let count = airframe.vehicle().rotors.len();
     let rotors = PerRotor::filled(count, RotorState::default());
     let state = State { body: RigidBody::level_at(Vector3::zeros()), rotors };

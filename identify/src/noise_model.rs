@@ -65,6 +65,18 @@ impl NoiseModel {
         if variance > 0.0 { 1.0 / variance } else { 0.0 }
     }
 
+    /// The best prediction of the `count` samples that follow the samples `past`.
+    pub fn forecast(&self, past: &[f64], count: usize) -> Vec<f64> {
+        let order = (self.predictors.len() - 1).min(past.len());
+        let (coefficients, _) = &self.predictors[order];
+        let mut rows = past[past.len() - order..].to_vec();
+        for _ in 0..count {
+            let next = coefficients.iter().zip(rows.iter().rev()).map(|(a, row)| a * row).sum();
+            rows.push(next);
+        }
+        rows.split_off(order)
+    }
+
     /// Puts the innovations in place of every `width`th of `rows`, which follow each other without a gap. The first of
     /// them have fewer before them: theirs are scaled to the variance of the others.
     pub fn whiten(&self, rows: &mut [f64], width: usize) {

@@ -3,6 +3,7 @@
 //! flown with its measured rotor speeds.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
+use crate::disturbance::{Course, Push};
 use flights::state::{StateQuantity, VehicleState, WindowEndErrors};
 use flights::{Channel, Flight, Played, Row};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -26,6 +27,8 @@ pub struct Measured {
     rotor_speed: Option<Channel<ROTORS_MAX>>,
     /// Longest time from the first sample that is predicted, in s.
     span_s: f64,
+    /// True if the model does not turn by itself: its attitude and rates are the measured ones.
+    turns_as_measured: bool,
 }
 
 /// Root mean squares at the ends of windows, by channel.
@@ -52,7 +55,12 @@ impl Measured {
             return None;
         }
         let rotor_speed = (!is_commanded).then(|| flight.rotor_speed.clone());
-        Some(Self { played: Played::of(flight).ok()?, rotor_speed, span_s: f64::INFINITY })
+        Some(Self {
+            played: Played::of(flight).ok()?,
+            rotor_speed,
+            span_s: f64::INFINITY,
+            turns_as_measured: false,
+        })
     }
 
     /// The first `span_s` of it.
@@ -60,14 +68,19 @@ impl Measured {
         Self { span_s, ..self }
     }
 
+    /// With the measured attitude and rates in place of predicted ones, so that what is left is due to forces alone.
+    pub fn turning_as_measured(self) -> Self {
+        Self { turns_as_measured: true, ..self }
+    }
+
     /// Errors of `airframe` at the ends of windows of `horizon_s`.
     pub fn predicted(&self, flight: &Flight, airframe: Airframe, horizon_s: f64) -> Errors {
-        errors(flight, &self.ends(airframe, horizon_s, |_| [0.0; 6]), |end| end.simulated)
+        errors(flight, &self.ends(airframe, horizon_s, |_| Course::none()), |end| end.simulated)
     }
 
     /// The ends of the windows of `horizon_s` that count, one window after the other, as `airframe` predicts them
-    /// under a constant push over each window: angular acceleration in B and acceleration in W, by the window's begin.
-    pub fn ends(&self, airframe: Airframe, horizon_s: f64, push: impl Fn(f64) -> [f64; 6]) -> Vec<WindowEnd> {
+    /// under a push over each window, by the window's begin.
+    pub fn ends(&self, airframe: Airframe, horizon_s: f64, push: impl Fn(f64) -> Course) -> Vec<WindowEnd> {
         self.ends_within(airframe, &[horizon_s], push).remove(0)
     }
 
@@ -76,7 +89,7 @@ impl Measured {
         &self,
         airframe: Airframe,
         horizons_s: &[f64],
-        push: impl Fn(f64) -> [f64; 6],
+        push: impl Fn(f64) -> Course,
     ) -> Vec<Vec<WindowEnd>> {
         let tick_s = if self.rotor_speed.is_some() { ROTOR_TICK_S } else { TICK_S };
         let windows: Vec<usize> =
@@ -102,11 +115,15 @@ impl Measured {
                     plant.step_with_rotors(&PerRotor::from_fn(count, |rotor| rotors[rotor]), tick_s);
                 }
             }
-            if pushing != [0.0; 6] {
-                let pushed = pushed(&plant.state().body, &pushing, tick_s);
+            if !pushing.is_none() {
+                let pushed = pushed(&plant.state().body, pushing.at(at_s(tick) - 0.5 * tick_s), tick_s);
                 plant.set_body(&pushed);
             }
             before = self.played.at(at_s(tick), &mut hint);
+            if self.turns_as_measured {
+                let RigidBody { attitude_WB, angular_velocity_B_rad_s, .. } = body(&before);
+                plant.set_body(&RigidBody { attitude_WB, angular_velocity_B_rad_s, ..plant.state().body });
+            }
             let Some(at) = windows.iter().position(|window| *window == tick - begin_tick) else { continue };
             let (from_s, measured) = (at_s(begin_tick), body(&before));
             if self.played.counts(from_s, at_s(tick)) {
@@ -163,8 +180,21 @@ pub fn errors(flight: &Flight, ends: &[WindowEnd], of: impl Fn(&WindowEnd) -> Ri
     measured.map(|quantity| (quantity.name(), sums.rms(quantity))).collect()
 }
 
+/// Errors of a state at the end of a window by axis, in the order of [`StateQuantity::ALL`]: position in m and velocity in m/s along the axes of
+/// the world, attitude in deg and rates in rad/s about those of the body.
+pub fn components(end: &WindowEnd, state: &RigidBody) -> [[f64; 3]; 4] {
+    let turn_B = (end.measured.attitude_WB.inverse() * state.attitude_WB).scaled_axis();
+    let away = [
+        state.position_W_m - end.measured.position_W_m,
+        state.velocity_W_m_s - end.measured.velocity_W_m_s,
+        turn_B.map(f64::to_degrees),
+        state.angular_velocity_B_rad_s - end.measured.angular_velocity_B_rad_s,
+    ];
+    away.map(Into::into)
+}
+
 /// The body after a tick under a push.
-fn pushed(body: &RigidBody, push: &[f64; 6], tick_s: f64) -> RigidBody {
+fn pushed(body: &RigidBody, push: Push, tick_s: f64) -> RigidBody {
     let [x, y, z, forward, left, up] = push.map(|acceleration| acceleration * tick_s);
     RigidBody {
         velocity_W_m_s: body.velocity_W_m_s + Vector3::new(forward, left, up),

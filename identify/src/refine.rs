@@ -11,6 +11,7 @@
 )]
 
 use crate::candidate::Candidate;
+use crate::disturbance::Colours;
 use crate::fit::{FitResult, Problem};
 use crate::foresight::{ERRORS, Foresight, WindowErrors, ends, errors};
 use crate::normal::{self, Block};
@@ -55,7 +56,7 @@ pub fn refined<'p, 'f>(
         return None;
     }
     let known = known(problem, fitted, &free);
-    let refinement = Refinement { problem, free, known };
+    let refinement = Refinement { problem, free, known, colours: Colours::of(problem, &fitted.values) };
     let (values, about) = refinement.descended(&fitted.values, near)?;
     let result = refinement.result(fitted, values, &about);
     let refined = Refined { refinement, fitted, about, result };
@@ -67,6 +68,8 @@ struct Refinement<'p, 'f> {
     free: Vec<usize>,
     /// Inverse of the covariance of the parameters by the equations.
     known: DMatrix<f64>,
+    /// The colours of the disturbances.
+    colours: Colours,
 }
 
 /// Prediction errors of the estimation data about some values, with their derivatives.
@@ -136,7 +139,12 @@ impl Refined<'_, '_> {
         let Refinement { problem, free, .. } = &self.refinement;
         let all =
             [free.clone(), candidates.iter().flat_map(|candidate| candidate.free.clone()).collect()].concat();
-        let wide = Refinement { problem, known: DMatrix::zeros(all.len(), all.len()), free: all };
+        let wide = Refinement {
+            problem,
+            known: DMatrix::zeros(all.len(), all.len()),
+            free: all,
+            colours: self.refinement.colours.clone(),
+        };
         let about = wide.linearised(&self.about.values, self.about.variance);
         let total = normal::sum(&plain(wide.blocks(&about)));
         let cost_after = |columns: &[usize]| {
@@ -293,7 +301,10 @@ impl Refinement<'_, '_> {
             };
             ends.iter().map(one).collect()
         };
-        ends(self.problem, flight, values, &REFINED_S, SPAN_MAX_S).into_iter().map(of_horizon).collect()
+        ends(self.problem, flight, values, &self.colours, (&REFINED_S, SPAN_MAX_S))
+            .into_iter()
+            .map(of_horizon)
+            .collect()
     }
 
     /// The residuals about `values` with their derivatives.

@@ -5,6 +5,7 @@ use crate::candidate::Unidentifiable;
 use crate::digits::rounded;
 use crate::envelope::Reached;
 use crate::faults::Fault;
+use crate::limits::Limits;
 use crate::loss::{Loss, advice};
 use crate::proposal::Proposal;
 use crate::ratios::Ratios;
@@ -47,6 +48,8 @@ pub struct Report {
     pub trims: Vec<Trim>,
     /// Prediction errors of the test flights: flight, horizon in s, channel.
     pub held_out: Changes,
+    /// Parts of the squared errors of the test flights after 0.5 s, by what they are due to: channel.
+    pub limits: BTreeMap<&'static str, Limits>,
     /// The same of the flights that effects are chosen on.
     pub selected: Changes,
     /// The same of the flights that parameters are fitted on.
@@ -341,20 +344,33 @@ impl Report {
 
     fn write_errors(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if !self.held_out.is_empty() {
-            let what = "prediction errors on the test flights (RMS, declared -> new; in brackets with the flight's own trim, and persistence)";
+            let what = "prediction errors on the test flights (RMS, declared -> new; in brackets with the flight's own trim, with the disturbance \
+                        seen before, and persistence)";
             writeln!(f, "\n{what}:")?;
         }
         for (flight, horizons) in &self.held_out {
             writeln!(f, "  {flight}")?;
             for (horizon, channels) in horizons {
                 let one = |(name, change): (&&str, &Change)| {
-                    let [before, after, own_trim, persistence] =
-                        [change.before, change.after, change.own_trim, change.persistence].map(rounded);
-                    format!("{name} {before} -> {after} ({own_trim}; {persistence}) {}", change.unit)
+                    let [before, after, own_trim, disturbance, persistence] = [
+                        change.before,
+                        change.after,
+                        change.own_trim,
+                        change.disturbance,
+                        change.persistence,
+                    ]
+                    .map(rounded);
+                    format!(
+                        "{name} {before} -> {after} ({own_trim}; {disturbance}; {persistence}) {}",
+                        change.unit
+                    )
                 };
                 let errors = channels.iter().map(one).collect::<Vec<_>>().join("   ");
                 writeln!(f, "    {horizon:>4} s  {errors}")?;
             }
+        }
+        for (channel, limits) in &self.limits {
+            writeln!(f, "what limits {channel} after 0.5 s, as parts of the squared error: {limits}")?;
         }
         let worse = self.worse();
         if !worse.is_empty() {
@@ -438,6 +454,7 @@ impl Report {
             trims: Vec::new(),
             selected: Changes::new(),
             held_out: Changes::new(),
+            limits: BTreeMap::new(),
             fitted: Changes::new(),
             envelope: BTreeMap::new(),
             noise_floor: BTreeMap::new(),
@@ -457,7 +474,16 @@ mod tests {
 
     #[test]
     fn a_new_vehicle_that_predicts_worse_is_told() {
-        let change = |before, after| Change { before, after, persistence: 1.0, own_trim: after, unit: "m" };
+        let change = |before, after| Change {
+            before,
+            after,
+            persistence: 1.0,
+            own_trim: after,
+            disturbance: after,
+            measured_attitude: None,
+            by_axis: [0.0; 3],
+            unit: "m",
+        };
         let channels = BTreeMap::from([("position", change(0.1, 0.25)), ("velocity", change(0.1, 0.11))]);
         let mut report = Report {
             held_out: Changes::from([("leg 2".to_owned(), BTreeMap::from([("0.5".to_owned(), channels)]))]),

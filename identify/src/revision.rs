@@ -2,7 +2,7 @@
 //!
 //! Effects are found by the equations of each moment. What counts in the end are predictions: so the parameters are refined by
 //! prediction errors (`refine`), and an effect without which these are smaller is taken back. Where predictions ask for other values than the
-//! equations, they may ask for an effect that the equations hardly show. Such a candidate is added if it is beyond chance by both.
+//! equations, they may ask for an effect that the equations hardly show. Such a candidate is added if predictions are better with it beyond chance.
 
 use crate::candidate::{Candidate, free_parameters};
 use crate::fit::{FitResult, Problem};
@@ -15,6 +15,8 @@ use serde::Serialize;
 
 /// Number of candidates that are fitted of those that predictions may ask for.
 const TRIED: usize = 3;
+/// Level at which a refined effect has to be beyond chance: it was so by the equations at [`FALSE_RATE`] already.
+const REFINED_RATE: f64 = 0.05;
 /// A candidate has to promise at least this part of the loss.
 const LEAST_PROMISE: f64 = 0.02;
 
@@ -59,7 +61,7 @@ impl Revisions {
     ) -> Revision {
         progress("every effect once more, by its parameters");
         let search = Found { problem, accepted, base };
-        if let Some(found) = search.unsound(base) {
+        if let Some(found) = search.unsound(base, FALSE_RATE, &self.tried) {
             return Revision::Without(found);
         }
         progress("refinement by prediction errors");
@@ -69,7 +71,9 @@ impl Revisions {
         };
         self.near = Some(moved.result.values.clone());
         progress("every effect once more, by predictions");
-        if let Some(found) = search.unsound(&moved.result).or_else(|| search.worst_refined(&moved)) {
+        if let Some(found) =
+            search.unsound(&moved.result, REFINED_RATE, &[]).or_else(|| search.worst_refined(&moved))
+        {
             return Revision::Without(found);
         }
         progress("further effects, by predictions");
@@ -99,9 +103,6 @@ impl Revisions {
         for (_, candidate) in promises.into_iter().take(TRIED) {
             self.tried.push(candidate.clone());
             let fitted = fitted(problem, base, accepted, candidate);
-            if joint_p_value(problem, &fitted, candidate) >= FALSE_RATE {
-                continue;
-            }
             let Some(moved) = refined(problem, &fitted, Some(&now.result.values)) else { continue };
             let p_value = moved.foresight(&[]).chance_against(&now.foresight(&[]));
             let is_sound = at_bound(problem, candidate, &moved.result).is_none()
@@ -134,20 +135,25 @@ struct Found<'s, 'f> {
 }
 
 impl Found<'_, '_> {
-    /// An accepted effect with a parameter that `fitted` left at a bound, or that is no longer beyond chance beside the others.
-    fn unsound(&self, fitted: &FitResult) -> Option<Withdrawn> {
+    /// An accepted effect with a parameter that `fitted` left at a bound, or the one that is least beyond chance beside the others, if that is not at
+    /// `level`. Those `asked` for by predictions alone need not be.
+    fn unsound(&self, fitted: &FitResult, level: f64, asked: &[Candidate]) -> Option<Withdrawn> {
         let stopped = |candidate: &Candidate| {
             let bound = at_bound(self.problem, candidate, fitted)?;
             let reason = format!("{bound}: more is asked for than this effect can be");
             Some(Withdrawn { effect: candidate.kind.name, reason })
         };
-        let by_chance = |candidate: &Candidate| {
-            let chance = joint_p_value(self.problem, fitted, candidate);
+        let chance =
+            |candidate: &Candidate| (candidate.kind.name, joint_p_value(self.problem, fitted, candidate));
+        let by_chance = || {
+            let all = self.accepted.iter().filter(|candidate| !asked.contains(candidate)).map(chance);
+            let (effect, chance) =
+                all.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, chance)| *chance >= level)?;
             let reason =
                 format!("its parameters are no longer beyond chance beside those of the others: {chance:.3}");
-            (chance >= FALSE_RATE).then_some(Withdrawn { effect: candidate.kind.name, reason })
+            Some(Withdrawn { effect, reason })
         };
-        self.accepted.iter().find_map(stopped).or_else(|| self.accepted.iter().find_map(by_chance))
+        self.accepted.iter().find_map(stopped).or_else(by_chance)
     }
 
     /// The accepted candidates of an effect.
@@ -179,11 +185,16 @@ impl Found<'_, '_> {
         })
     }
 
+    /// One error that grows with an effect does not matter where all of them together become smaller.
     fn worst_by(&self, with: &Foresight, without: impl Fn(&'static str) -> Foresight) -> Option<Withdrawn> {
         let mut names: Vec<&'static str> =
             self.accepted.iter().map(|candidate| candidate.kind.name).collect();
         names.dedup();
-        let growth = |name: &'static str| Some((name, with.growth(&without(name))?));
+        let growth = |name: &'static str| {
+            let without = without(name);
+            let growth = with.growth(&without)?;
+            (!with.is_better_than(&without)).then_some((name, growth))
+        };
         let (effect, Growth { channel, horizon_s, without, with, unit }) =
             names.into_iter().filter_map(growth).max_by(|a, b| a.1.ratio().total_cmp(&b.1.ratio()))?;
         let reason = format!(

@@ -8,6 +8,7 @@ use crate::envelope;
 use crate::faults::{self, Fault};
 use crate::fit::{FitResult, Problem};
 use crate::horizons::{of_role, predictions};
+use crate::limits::limits;
 use crate::logging;
 use crate::loss::losses;
 use crate::model::Model;
@@ -147,6 +148,7 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
         vehicle: set.vehicle.display().to_string(),
         verdict: verdict(&problem, &selection),
         losses: losses(&of_measured_attitude(&problem, &held_out), &noise_floor),
+        limits: limits(&of_measured_attitude(&problem, &held_out), &noise_floor),
         withdrawn: selection.withdrawn.clone(),
         refined: selection.refined.is_some(),
         effects,
@@ -562,4 +564,33 @@ fn pictures(problem: &Problem, selection: &Selection) -> Vec<Picture> {
         }
     }
     pictures
+}
+
+#[cfg(test)]
+#[allow(clippy::disallowed_types, reason = "not in a component: the covariance of a report's fit")]
+mod tests {
+    use super::*;
+    use nalgebra::DMatrix;
+
+    #[test]
+    fn the_value_of_the_equations_is_told_where_predictions_ask_for_another() {
+        let fit = |value: f64| FitResult {
+            values: vec![value],
+            free: vec![0],
+            covariance: DMatrix::from_element(1, 1, 0.01),
+            validation_costs: Vec::new(),
+            estimation_costs: Vec::new(),
+        };
+        let selection = |refined: Option<f64>| Selection {
+            accepted: Vec::new(),
+            before: fit(0.0),
+            after: fit(1.0),
+            refined: refined.map(fit),
+            rounds: Vec::new(),
+            withdrawn: Vec::new(),
+        };
+        assert_eq!(far_by_equations(&selection(Some(1.9)), 0), Some(1.0));
+        assert_eq!(far_by_equations(&selection(Some(0.3)), 0), None, "seven standard errors");
+        assert_eq!(far_by_equations(&selection(None), 0), None);
+    }
 }

@@ -1,6 +1,7 @@
 //! Multi-step prediction: of a flight whose model is true the errors are those of the sampling alone.
 mod simulated;
 
+use identify::accelerations::accelerations;
 use identify::steps_ahead::{Between, StepsAhead, errors};
 use plant::Airframe;
 use simulated::{Plan, effect, fly, vehicle_file};
@@ -76,4 +77,41 @@ fn what_a_flight_lacks_is_said() {
     assert_eq!(error, "it has neither rotor speeds nor commands");
     let error = errors(&flight, &airframe, 5_000, Between::Lines).unwrap_err();
     assert_eq!(error, "it has 800 samples, at least 5001 are needed");
+}
+
+#[test]
+fn accelerations_of_the_true_model_are_those_that_were_measured() {
+    let (vehicle, flight) = flight(true);
+    let predicted = accelerations(&flight, &Airframe::new(vehicle.clone())).unwrap();
+    assert_eq!(predicted.time_s.len(), predicted.specific_force_B_m_s2.len());
+    let force = &flight.specific_force;
+    let measured = |time_s: f64| {
+        let next = force.time_s.partition_point(|other| *other < time_s).min(force.values.len() - 1);
+        force.values[next]
+    };
+    // In the middle of the flight, where the derived velocity has samples on both sides.
+    let middle = || (100..predicted.time_s.len() - 100).step_by(7);
+    for at in middle() {
+        for (axis, found) in predicted.specific_force_B_m_s2[at].iter().enumerate() {
+            let wanted = measured(predicted.time_s[at])[axis];
+            assert!(
+                (found - wanted).abs() < 0.2,
+                "{} s, axis {axis}: {found}, measured {wanted}",
+                predicted.time_s[at]
+            );
+        }
+    }
+    let heavy = Airframe::with_effects(vehicle, vec![effect("mass-error", &[("error", 0.1)])]);
+    let of_heavy = accelerations(&flight, &heavy).unwrap();
+    for at in middle() {
+        let [light, heavy] = [&predicted, &of_heavy].map(|of| of.specific_force_B_m_s2[at][2]);
+        assert!((heavy - light / 1.1).abs() < 1e-9, "{heavy} of {light}");
+    }
+}
+
+#[test]
+fn accelerations_need_rotor_speeds() {
+    let (vehicle, flight) = flight(false);
+    let error = accelerations(&flight, &Airframe::new(vehicle)).unwrap_err();
+    assert_eq!(error, "it has no rotor speeds");
 }

@@ -7,14 +7,17 @@
 //! | `windows` | errors at the ends of the windows, read from the recording |
 //! | `mod@errors` | the results, as a table and as JSON |
 //! | `steps_ahead` | errors of multi-step predictions, made in this process |
+//! | `accelerations` | predicted accelerations at every sample, made in this process |
 //! | `labels` | names of the vehicles in both |
 
+mod accelerations;
 mod errors;
 mod labels;
 mod replay;
 mod steps_ahead;
 mod windows;
 
+pub use accelerations::predicted_accelerations;
 pub use errors::{ChannelErrors, Errors, FlightErrors, HorizonErrors};
 pub use steps_ahead::{FlightSteps, StepsAheadErrors};
 

@@ -7,7 +7,7 @@ use clap::Args;
 use flights::FlightSet;
 use hummingbus::COMPONENTS;
 use identify::steps_ahead::Between;
-use report::validate::{StepsAheadErrors, Validation};
+use report::validate::{StepsAheadErrors, Validation, predicted_accelerations};
 use std::path::{Path, PathBuf};
 
 /// Text of `--help` behind the options.
@@ -34,6 +34,10 @@ pub struct ValidateArguments {
     /// With --steps-ahead: rotors keep the speed of the last sample until the next; without it they follow straight lines between samples.
     #[arg(long, requires = "steps_ahead")]
     held: bool,
+    /// Instead of flying on the bus, print the specific force and the angular acceleration that each vehicle predicts at every sample of the
+    /// attitude, from the measured state and rotor speeds. Needs --json.
+    #[arg(long, requires = "json", conflicts_with_all = ["keep", "steps_ahead"])]
+    accelerations: bool,
 }
 
 /// Flies all flights and prints the errors; every failure is an error, so that `true` means that every flight was
@@ -49,6 +53,10 @@ pub fn validate(arguments: &ValidateArguments) -> Result<bool> {
         let between = if arguments.held { Between::Held } else { Between::Lines };
         let errors = StepsAheadErrors::of(&vehicles, &flights, steps as usize, between)?;
         if arguments.json { print_json(&errors.json()) } else { print_text(&errors.to_string()) }?;
+        return Ok(true);
+    }
+    if arguments.accelerations {
+        print_json(&predicted_accelerations(&vehicles, &flights)?)?;
         return Ok(true);
     }
     let mut tell = |line: &str| {

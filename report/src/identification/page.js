@@ -137,13 +137,15 @@ const floorOf = (channel, horizon) => report.noise_floor[channel]?.prediction[ho
 
 function fillErrors(id, flights) {
   const rows = (flight, errors) => horizons({ errors }).flatMap((horizon) => CHANNELS.filter((name) => errors[horizon][name]).map((channel) => {
-    const { before, after, persistence, own_trim, unit } = errors[horizon][channel];
+    const { before, after, persistence, own_trim, disturbance, measured_attitude, by_axis, unit } = errors[horizon][channel];
     const flown = data.bus?.flights[flight]?.[horizon]?.[channel];
-    return [horizon, left(channel), number(before), number(after), number(own_trim), number(persistence), left(shownUnit(unit)), change(before, after),
+    return [horizon, left(channel), number(before), number(after), ...by_axis.map((error) => number(error)), number(own_trim), number(disturbance), number(measured_attitude),
+      number(persistence), left(shownUnit(unit)), change(before, after),
       number(floorOf(channel, horizon)), ...(data.bus ? [number(flown?.before), number(flown?.after)] : [])];
   }));
   const onBus = data.bus ? ["declared, on the bus", "new, on the bus"] : [];
-  fillTable(id, [left("flight"), "horizon [s]", left("channel"), "declared", "new", "own trim", "persistence", left("unit"), "change", "by noise alone", ...onBus],
+  fillTable(id, [left("flight"), "horizon [s]", left("channel"), "declared", "new", "x", "y", "z", "own trim", "disturbance seen",
+    "attitude as measured", "persistence", left("unit"), "change", "by noise alone", ...onBus],
     Object.entries(flights).flatMap(([flight, errors]) => grouped(flight, rows(flight, errors))));
 }
 
@@ -174,6 +176,15 @@ function drawErrors() {
   }
   fillErrors("held-out", report.held_out);
   fillErrors("fitted", { ...report.selected, ...report.fitted });
+}
+
+function drawLimits() {
+  const part = (value) => `${(100 * value).toFixed(0)} %`;
+  fillTable("limits", [left("channel"), "the flight's own trim", "a disturbance seen before", "noise of the sensors", "unknown"],
+    CHANNELS.filter((channel) => report.limits[channel]).map((channel) => {
+      const { trim, disturbance, noise, unknown } = report.limits[channel];
+      return [left(channel), part(trim), part(disturbance), part(noise), part(unknown)];
+    }));
 }
 
 function drawNoise() {
@@ -314,4 +325,4 @@ function drawResiduals() {
   zoomTogether(["residual", "sides"].map(element));
 }
 
-for (const part of [drawBrief, drawSummary, drawFlights, drawClocks, drawFaults, drawEffects, drawErrors, drawNoise, drawWhiteness, drawResiduals]) part();
+for (const part of [drawBrief, drawSummary, drawFlights, drawClocks, drawFaults, drawEffects, drawErrors, drawLimits, drawNoise, drawWhiteness, drawResiduals]) part();

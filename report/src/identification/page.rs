@@ -247,6 +247,7 @@ mod tests {
             faults: Vec::new(),
             trims: Vec::new(),
             held_out: BTreeMap::new(),
+            limits: BTreeMap::new(),
             selected: BTreeMap::new(),
             fitted: BTreeMap::new(),
             envelope: BTreeMap::new(),

@@ -1,0 +1,42 @@
+//! Predicted accelerations of flights, for programs.
+
+use super::labels::labels;
+use anyhow::{Context, Result};
+use flights::FlightSet;
+use identify::accelerations::accelerations;
+use plant::Airframe;
+use serde_json::{Map, Value, json};
+use std::path::Path;
+use vehicles::Vehicle;
+
+/// Accelerations that each of `vehicles`, with the effects of its file, predicts at the samples of the `flights`: by flight the role, and by vehicle
+/// the times in s, the specific forces in m/s² and the angular accelerations in rad/s², both along and about the axes of the body.
+///
+/// # Errors
+/// A vehicle file that cannot be read, a flight without an attitude or rotor speeds.
+///
+/// ```no_run
+/// let set = flights::FlightSet::load("flights/neurobem.toml".as_ref())?;
+/// let json = report::validate::predicted_accelerations(&[set.vehicle.as_ref()], &set)?;
+/// println!("{}", json["flights"]["up to 6.5 m/s"]["neurobem-quadrotor"]["specific_force"][0]);
+/// # Ok::<(), anyhow::Error>(())
+/// ```
+pub fn predicted_accelerations(vehicles: &[&Path], flights: &FlightSet) -> Result<Value> {
+    let mut of_flights = Map::new();
+    for flight in &flights.flights {
+        let mut of_flight = json!({ "role": flight.role });
+        for (vehicle, name) in vehicles.iter().zip(labels(vehicles)) {
+            let airframe = Airframe::from_files(Vehicle::load_from(&flights.files, vehicle)?, &[])?;
+            let predicted = accelerations(flight, &airframe)
+                .map_err(anyhow::Error::msg)
+                .with_context(|| format!("the flight `{}` cannot be predicted", flight.name))?;
+            of_flight[name] = json!({
+                "time_s": predicted.time_s,
+                "specific_force": predicted.specific_force_B_m_s2,
+                "angular_acceleration": predicted.angular_acceleration_B_rad_s2,
+            });
+        }
+        of_flights.insert(flight.name.clone(), of_flight);
+    }
+    Ok(json!({ "flights": of_flights }))
+}
