@@ -8,31 +8,32 @@ use crate::fit::Problem;
 use crate::noise_model::{NoiseModel, Products};
 use crate::prepared::{BOX_STEPS, Equation, Prepared};
 use crate::rows::column;
+use crate::sensing::SensorErrors;
 use crate::whitening::stretches;
 
 /// A trim counts by the time that it was seen, against this time: about ten times that over which disturbances of flights
 /// remember themselves; tuned, no source.
 const SETTLED_S: f64 = 2.0;
-/// A prediction of a disturbance ends so long after what was seen last, in s: behind the longest horizon it is the trim.
-const AHEAD_S: f64 = 1.2;
+/// Disturbances are expected for so long after the start of a window, in s: to the longest horizon of predictions.
+const AHEAD_S: f64 = 1.0;
 
 /// Angular acceleration in B and acceleration in W beyond a model's.
-pub type Push = [f64; 6];
+pub type AddedAcceleration = [f64; 6];
 
 /// A push over the time of one window.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Course {
+pub struct Forecast {
     /// Time of the first value, in s.
     start_s: f64,
     /// Time from one value to the next, in s.
     step_s: f64,
     /// Values, with straight lines between them; the last one stays.
-    values: Vec<Push>,
+    values: Vec<AddedAcceleration>,
 }
 
-impl Course {
+impl Forecast {
     /// The same push at all times.
-    pub fn constant(push: Push) -> Self {
+    pub fn constant(push: AddedAcceleration) -> Self {
         Self { start_s: 0.0, step_s: 1.0, values: vec![push] }
     }
 
@@ -47,7 +48,7 @@ impl Course {
     }
 
     /// The push at a time.
-    pub fn at(&self, time_s: f64) -> Push {
+    pub fn at(&self, time_s: f64) -> AddedAcceleration {
         let Some(last) = self.values.last() else { return [0.0; 6] };
         let place = ((time_s - self.start_s) / self.step_s).max(0.0);
         let (before, part) = (place as usize, place.fract());
@@ -60,9 +61,9 @@ impl Course {
 
 /// The colour of what a model leaves, by component of a push.
 #[derive(Debug, Clone)]
-pub struct Colours([NoiseModel; 6]);
+pub struct DisturbanceModels([NoiseModel; 6]);
 
-impl Colours {
+impl DisturbanceModels {
     /// Those of the estimation data under `values`.
     pub fn of(problem: &Problem, values: &[f64]) -> Self {
         let mut products: [Products; 6] = Default::default();
@@ -93,6 +94,8 @@ fn columns(problem: &Problem, flight: &Prepared, values: &[f64]) -> [Vec<f64>; 6
 pub struct Observed {
     /// Time from knot to knot, in s.
     knot_s: f64,
+    /// Time from a knot to the last sample that its residual depends on, in s.
+    lag_s: f64,
     /// Knots, in s.
     time_s: Vec<f64>,
     /// The first knot of the stretch without a gap that each knot is in.
@@ -100,7 +103,7 @@ pub struct Observed {
     /// Residuals beyond the trim, by component and knot; empty where the flight does not show it.
     rows: [Vec<f64>; 6],
     /// The trim as it was known at each knot.
-    trims: Vec<Push>,
+    trims: Vec<AddedAcceleration>,
 }
 
 impl Observed {
@@ -114,41 +117,48 @@ impl Observed {
             trims.push(sum.map(|sum| sum / ((at + 1) as f64 + SETTLED_S / knot_s)));
         }
         let first = stretches(flight).into_iter().flat_map(|(first, end)| vec![first; end - first]).collect();
-        let time_s = flight.layout.knots.iter().map(|knot| flight.layout.clock.at(*knot)).collect();
-        Self { knot_s, time_s, first, rows, trims }
+        // Knots stand at the stamps of the poses, windows at the times at which these were taken.
+        let late_s = SensorErrors::of(&problem.model.parameters, values).pose_delay_s;
+        let time_s = flight.layout.knots.iter().map(|knot| flight.layout.clock.at(*knot) - late_s).collect();
+        Self { knot_s, lag_s: lag_s(flight), time_s, first, rows, trims }
     }
 
-    /// The last knot that is known at `at_s`: its window reaches two knots beyond its middle.
+    /// The last knot that is known at `at_s`.
     fn last(&self, at_s: f64) -> Option<usize> {
-        self.time_s.partition_point(|time_s| time_s + 2.0 * self.knot_s <= at_s).checked_sub(1)
+        self.time_s.partition_point(|time_s| time_s + self.lag_s <= at_s).checked_sub(1)
     }
 
     /// The trim that was known at `at_s`.
-    pub fn trim(&self, at_s: f64) -> Course {
-        self.last(at_s).map_or(Course::none(), |last| Course::constant(self.trims[last]))
+    pub fn trim(&self, at_s: f64) -> Forecast {
+        self.last(at_s).map_or(Forecast::none(), |last| Forecast::constant(self.trims[last]))
     }
 
     /// The disturbance as it was expected at `at_s` from then on.
-    pub fn expected(&self, colours: &Colours, at_s: f64) -> Course {
-        let Some(last) = self.last(at_s) else { return Course::none() };
-        let start_s = self.time_s[last];
-        // Behind a gap nothing is left of it but the trim.
-        let is_stale = at_s - start_s > AHEAD_S;
-        let count = if is_stale { 0 } else { (AHEAD_S / self.knot_s).ceil() as usize };
-        let trim = self.trims[last];
+    pub fn expected(&self, models: &DisturbanceModels, at_s: f64) -> Forecast {
+        let Some(last) = self.last(at_s) else { return Forecast::none() };
+        let (start_s, trim) = (self.time_s[last], self.trims[last]);
+        // After a gap nothing is left of it but the trim.
+        if at_s - start_s > self.lag_s + 2.0 * self.knot_s {
+            return Forecast::constant(trim);
+        }
+        let count = ((at_s - start_s + AHEAD_S) / self.knot_s).ceil() as usize;
         let mut values = vec![trim; count + 1];
-        for (at, (rows, Colours(models))) in self.rows.iter().zip(std::iter::repeat(colours)).enumerate() {
+        for (at, (rows, model)) in self.rows.iter().zip(&models.0).enumerate() {
             let Some(past) = rows.get(self.first[last]..=last) else { continue };
             let past: Vec<f64> = past.iter().map(|row| row - trim[at]).collect();
-            let ahead = models[at].forecast(&past, count);
-            let now = past.last().copied().filter(|_| !is_stale).unwrap_or(0.0);
-            values
-                .iter_mut()
-                .zip(std::iter::once(now).chain(ahead))
-                .for_each(|(value, away)| value[at] += away);
+            let away = past.last().copied().into_iter().chain(model.forecast(&past, count));
+            values.iter_mut().zip(away).for_each(|(value, away)| value[at] += away);
         }
-        Course { start_s, step_s: self.knot_s, values }
+        Forecast { start_s, step_s: self.knot_s, values }
     }
+}
+
+/// Time from a knot to the last sample that its residual depends on, in s: the reach of the window, that of slopes of positions and rotor speeds, and two
+/// samples of interpolation.
+fn lag_s(flight: &Prepared) -> f64 {
+    let periods_s = [flight.flight.attitude.period_s(), flight.flight.position.period_s()];
+    let slowest_s = periods_s.into_iter().flatten().fold(0.0, f64::max);
+    (flight.reach() + BOX_STEPS) as f64 * flight.layout.clock.step_s + 2.0 * slowest_s
 }
 
 #[cfg(test)]
@@ -157,10 +167,10 @@ mod tests {
 
     #[test]
     fn a_course_is_straight_between_its_values_and_stays_at_the_last() {
-        let course = Course { start_s: 1.0, step_s: 0.5, values: vec![[0.0; 6], [2.0; 6]] };
-        let at = |time_s: f64| course.at(time_s)[4];
+        let forecast = Forecast { start_s: 1.0, step_s: 0.5, values: vec![[0.0; 6], [2.0; 6]] };
+        let at = |time_s: f64| forecast.at(time_s)[4];
         assert_eq!([at(0.0), at(1.0), at(1.25), at(1.5), at(9.0)], [0.0, 0.0, 1.0, 2.0, 2.0]);
-        assert_eq!((Course::none().at(3.0), Course::constant([1.0; 6]).at(3.0)), ([0.0; 6], [1.0; 6]));
+        assert_eq!((Forecast::none().at(3.0), Forecast::constant([1.0; 6]).at(3.0)), ([0.0; 6], [1.0; 6]));
     }
 
     #[test]
@@ -168,6 +178,7 @@ mod tests {
         let knots = 400;
         let observed = Observed {
             knot_s: 0.05,
+            lag_s: 0.1,
             time_s: (0..knots).map(|at| 0.05 * at as f64).collect(),
             first: vec![0; knots],
             // A step at the end.
@@ -187,10 +198,11 @@ mod tests {
         };
         let column: Vec<f64> = (0..4000).map(|_| next()).collect();
         products.add(&column);
-        let colours = Colours(std::array::from_fn(|_| products.model()));
-        let before = observed.expected(&colours, 19.0);
+        let models = DisturbanceModels(std::array::from_fn(|_| products.model()));
+        // The step is at 19.05 s, and known 0.1 s later.
+        let before = observed.expected(&models, 19.14);
         assert!(before.at(19.5).iter().all(|push| (push - 1.0).abs() < 1e-9), "the step is not known yet");
-        let behind = observed.expected(&colours, 19.95);
+        let behind = observed.expected(&models, 19.951);
         assert!((behind.at(19.8)[1] - 5.0).abs() < 0.3, "{:?}", behind.at(19.85));
         assert!(behind.at(20.0)[1] < behind.at(19.9)[1]);
         assert!((behind.at(21.0)[1] - 1.0).abs() < 0.3, "{:?}", behind.at(21.0));

@@ -4,7 +4,7 @@
 //! influence of another cause. The judged flights are those with role `select`, or else those that parameters
 //! are fitted on, each with parameters that were fitted on the others.
 
-use crate::disturbance::{Colours, Observed};
+use crate::disturbance::{DisturbanceModels, Observed};
 use crate::fit::{Equations, FitResult, Problem};
 use crate::noise;
 use crate::predict::{Measured, WindowEnd, components};
@@ -77,19 +77,18 @@ impl Foresight {
         } else {
             problem.validation.iter().map(|flight| (flight, near.values.clone())).collect()
         };
-        Self::under(problem, &flights)
+        Self::under(problem, &DisturbanceModels::of(problem, &near.values), &flights)
     }
 
-    /// Prediction errors of flights, each under its values and with its own trim.
-    pub fn under(problem: &Problem, flights: &[(&Prepared, Vec<f64>)]) -> Self {
-        let colours = Colours::of(problem, &flights[0].1);
+    /// Prediction errors of flights, each under its values, with disturbances of these models as they were seen before each window.
+    pub fn under(problem: &Problem, models: &DisturbanceModels, flights: &[(&Prepared, Vec<f64>)]) -> Self {
         let jobs: Vec<(usize, usize)> = (0..flights.len())
             .flat_map(|at| (0..HORIZONS_S.len()).map(move |horizon| (at, horizon)))
             .collect();
         let of_job = |(at, horizon): &(usize, usize)| -> Vec<_> {
             let (flight, values) = &flights[*at];
             let ends =
-                ends(problem, flight, values, &colours, (&HORIZONS_S[*horizon..=*horizon], f64::INFINITY));
+                ends(problem, flight, values, models, (&HORIZONS_S[*horizon..=*horizon], f64::INFINITY));
             ends.iter()
                 .flatten()
                 .map(|end| {
@@ -155,6 +154,10 @@ impl Foresight {
         let mut count = 0.0;
         for (key, (new, windows)) in &self.squares {
             let Some((old, old_windows)) = other.squares.get(key) else { continue };
+            // A vehicle whose prediction diverges is no better one.
+            if !new.iter().all(|square| square.is_finite()) {
+                return 1.0;
+            }
             let (flight, horizon, block) = *key;
             let gain = gains.entry((flight, block)).or_default();
             for at in (0..ERRORS).filter(|at| old[*at] > 0.0) {
@@ -192,18 +195,18 @@ fn noise(problem: &Problem) -> [[f64; QUANTITIES.len()]; 2] {
     })
 }
 
-/// The ends of a flight's windows under `values` at several horizons, up to `span_s` of the flight, with the disturbance of these `colours` that was
+/// The ends of a flight's windows under `values` at several horizons, up to `span_s` of the flight, with the disturbance of these `models` that was
 /// seen before each; none where its attitude was assumed, or there is nothing to predict with.
 pub fn ends(
     problem: &Problem,
     flight: &Prepared,
     values: &[f64],
-    colours: &Colours,
+    models: &DisturbanceModels,
     (horizons_s, span_s): (&[f64], f64),
 ) -> Vec<Vec<WindowEnd>> {
     let Some(measured) = measured(problem, flight, values) else { return vec![Vec::new(); horizons_s.len()] };
     let (airframe, seen) = (problem.model.airframe_of(flight, values), Observed::of(problem, flight, values));
-    measured.shortened(span_s).ends_within(airframe, horizons_s, |from_s| seen.expected(colours, from_s))
+    measured.shortened(span_s).ends_within(airframe, horizons_s, |from_s| seen.expected(models, from_s))
 }
 
 /// A flight's measurements without the errors of the sensors; `None` where its attitude was assumed, or there is nothing to predict with.

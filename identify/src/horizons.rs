@@ -1,7 +1,7 @@
 //! Tables of prediction errors: every flight at every horizon, by the declared vehicle, by the new one and by persistence.
 
 use crate::clock::Lateness;
-use crate::disturbance::{Colours, Course, Observed};
+use crate::disturbance::{DisturbanceModels, Forecast, Observed};
 use crate::fit::Problem;
 use crate::predict::{Errors, Measured, WindowEnd, components, errors};
 use crate::sensing::SensorErrors;
@@ -49,7 +49,7 @@ pub struct Prediction {
 pub fn predictions(problem: &Problem, set: &FlightSet, values: &[f64]) -> Vec<Prediction> {
     let declared = problem.model.parameters.baseline();
     let sensor_errors = SensorErrors::of(&problem.model.parameters, values);
-    let colours = Colours::of(problem, values);
+    let models = DisturbanceModels::of(problem, values);
     let mut predictions = Vec::new();
     for flight in &set.flights {
         let prepared = problem.flights().find(|prepared| prepared.flight.name == flight.name);
@@ -66,18 +66,19 @@ pub fn predictions(problem: &Problem, set: &FlightSet, values: &[f64]) -> Vec<Pr
         let seen = prepared.map_or(Observed::default(), |prepared| Observed::of(problem, prepared, values));
         let turned = Measured::of(&corrected).map(Measured::turning_as_measured);
         for horizon_s in HORIZONS_S {
-            let ends = |push: &dyn Fn(f64) -> Course| after.ends(airframe(values), horizon_s, push);
-            let old = before.ends(airframe(&declared), horizon_s, |_| Course::none());
-            let new = ends(&|_| Course::none());
-            let turned =
-                turned.iter().flat_map(|turned| turned.ends(airframe(values), horizon_s, |_| Course::none()));
+            let ends = |push: &dyn Fn(f64) -> Forecast| after.ends(airframe(values), horizon_s, push);
+            let old = before.ends(airframe(&declared), horizon_s, |_| Forecast::none());
+            let new = ends(&|_| Forecast::none());
+            let turned = turned
+                .iter()
+                .flat_map(|turned| turned.ends(airframe(values), horizon_s, |_| Forecast::none()));
             let simulated = |ends: &[WindowEnd]| errors(&corrected, ends, |end| end.simulated);
             let errors = [
                 errors(&aligned, &old, |end| end.simulated),
                 simulated(&new),
                 errors(&corrected, &new, |end| end.persistent),
                 simulated(&ends(&|from_s| seen.trim(from_s))),
-                simulated(&ends(&|from_s| seen.expected(&colours, from_s))),
+                simulated(&ends(&|from_s| seen.expected(&models, from_s))),
                 simulated(&turned.collect::<Vec<_>>()),
             ];
             let channels = changes(&errors, &by_axis(&new));

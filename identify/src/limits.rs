@@ -99,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn a_trim_or_a_disturbance_that_helps_not_takes_nothing_off() {
+    fn a_trim_or_a_disturbance_that_does_not_help_takes_nothing_off() {
         let change = Change {
             before: 9.0,
             after: 2.0,

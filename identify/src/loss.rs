@@ -42,12 +42,14 @@ pub fn losses(errors: &Changes, noise: &BTreeMap<&'static str, Noise>) -> Vec<Lo
             };
             let floor =
                 noise.get(channel).and_then(|noise| noise.prediction.get(horizon)).copied().unwrap_or(0.0);
-            // A flight's own trim, and what disturbs it, are none of the vehicle's.
-            let trimmed = change.after.min(change.own_trim).min(change.disturbance);
+            // A flight's own trim, and what disturbs it, are none of the vehicle's: the best of three.
+            let all = [change.after, change.own_trim, change.disturbance];
+            let trimmed = all.into_iter().min_by(f64::total_cmp).unwrap_or(change.after);
             let rivals =
                 [("persistence", trimmed, change.persistence), ("declared", change.after, change.before)];
-            let loses =
-                |new: f64, other: f64| (new * new - floor * floor).max(0.0).sqrt() > LEAST_RATIO * other;
+            let loses = |new: f64, other: f64| {
+                !new.is_finite() || (new * new - floor * floor).max(0.0).sqrt() > LEAST_RATIO * other
+            };
             let beaten = rivals.into_iter().filter(|(_, new, other)| loses(*new, *other));
             if let Some((rival, new, other)) = beaten.min_by(|a, b| a.2.total_cmp(&b.2)) {
                 let (flight, unit) = (flight.clone(), change.unit);

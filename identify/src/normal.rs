@@ -118,7 +118,16 @@ pub fn inverse(gram: &DMatrix<f64>) -> DMatrix<f64> {
 /// 232(2), 2023). A sandwich of the same blocks is too short where a few violent ones hold most of the
 /// evidence.
 pub fn covariance(blocks: &[Block]) -> DMatrix<f64> {
-    let total = sum(blocks);
+    blocks
+        .first()
+        .map_or(DMatrix::zeros(0, 0), |first| covariance_beside(blocks, &Block::zero(first.gradient.len())))
+}
+
+/// The same where the equations `known` hold beside those of the blocks, whichever block is left out.
+pub fn covariance_beside(blocks: &[Block], known: &Block) -> DMatrix<f64> {
+    let mut total = sum(blocks);
+    total.gram += &known.gram;
+    total.gradient += &known.gradient;
     let size = total.gradient.len();
     let without =
         |block: &Block| -(inverse(&(&total.gram - &block.gram)) * (&total.gradient - &block.gradient));

@@ -3,7 +3,7 @@
 //! flown with its measured rotor speeds.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
-use crate::disturbance::{Course, Push};
+use crate::disturbance::{AddedAcceleration, Forecast};
 use flights::state::{StateQuantity, VehicleState, WindowEndErrors};
 use flights::{Channel, Flight, Played, Row};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -75,12 +75,12 @@ impl Measured {
 
     /// Errors of `airframe` at the ends of windows of `horizon_s`.
     pub fn predicted(&self, flight: &Flight, airframe: Airframe, horizon_s: f64) -> Errors {
-        errors(flight, &self.ends(airframe, horizon_s, |_| Course::none()), |end| end.simulated)
+        errors(flight, &self.ends(airframe, horizon_s, |_| Forecast::none()), |end| end.simulated)
     }
 
     /// The ends of the windows of `horizon_s` that count, one window after the other, as `airframe` predicts them
     /// under a push over each window, by the window's begin.
-    pub fn ends(&self, airframe: Airframe, horizon_s: f64, push: impl Fn(f64) -> Course) -> Vec<WindowEnd> {
+    pub fn ends(&self, airframe: Airframe, horizon_s: f64, push: impl Fn(f64) -> Forecast) -> Vec<WindowEnd> {
         self.ends_within(airframe, &[horizon_s], push).remove(0)
     }
 
@@ -89,7 +89,7 @@ impl Measured {
         &self,
         airframe: Airframe,
         horizons_s: &[f64],
-        push: impl Fn(f64) -> Course,
+        push: impl Fn(f64) -> Forecast,
     ) -> Vec<Vec<WindowEnd>> {
         let tick_s = if self.rotor_speed.is_some() { ROTOR_TICK_S } else { TICK_S };
         let windows: Vec<usize> =
@@ -194,7 +194,7 @@ pub fn components(end: &WindowEnd, state: &RigidBody) -> [[f64; 3]; 4] {
 }
 
 /// The body after a tick under a push.
-fn pushed(body: &RigidBody, push: Push, tick_s: f64) -> RigidBody {
+fn pushed(body: &RigidBody, push: AddedAcceleration, tick_s: f64) -> RigidBody {
     let [x, y, z, forward, left, up] = push.map(|acceleration| acceleration * tick_s);
     RigidBody {
         velocity_W_m_s: body.velocity_W_m_s + Vector3::new(forward, left, up),

@@ -11,7 +11,7 @@
 )]
 
 use crate::candidate::Candidate;
-use crate::disturbance::Colours;
+use crate::disturbance::DisturbanceModels;
 use crate::fit::{FitResult, Problem};
 use crate::foresight::{ERRORS, Foresight, WindowErrors, ends, errors};
 use crate::normal::{self, Block};
@@ -24,6 +24,8 @@ use std::collections::BTreeMap;
 
 /// Horizons at which prediction errors are made small.
 const REFINED_S: [f64; 5] = [0.05, 0.1, 0.2, 0.35, 0.5];
+/// Persistence's error along one axis counts as at least this part of that along all three.
+const LEAST_PART: f64 = 0.1;
 /// Steps at most.
 const STEPS_MAX: usize = 8;
 /// A step that gains a smaller part is the last.
@@ -56,7 +58,8 @@ pub fn refined<'p, 'f>(
         return None;
     }
     let known = known(problem, fitted, &free);
-    let refinement = Refinement { problem, free, known, colours: Colours::of(problem, &fitted.values) };
+    let refinement =
+        Refinement { problem, free, known, models: DisturbanceModels::of(problem, &fitted.values) };
     let (values, about) = refinement.descended(&fitted.values, near)?;
     let result = refinement.result(fitted, values, &about);
     let refined = Refined { refinement, fitted, about, result };
@@ -68,8 +71,8 @@ struct Refinement<'p, 'f> {
     free: Vec<usize>,
     /// Inverse of the covariance of the parameters by the equations.
     known: DMatrix<f64>,
-    /// The colours of the disturbances.
-    colours: Colours,
+    /// The models of the disturbances.
+    models: DisturbanceModels,
 }
 
 /// Prediction errors of the estimation data about some values, with their derivatives.
@@ -121,7 +124,8 @@ impl Refined<'_, '_> {
         let before: Vec<_> =
             self.judged().iter().enumerate().map(|(at, flight)| (flight, before(at))).collect();
         let after = self.by_flight(&self.about, &[]);
-        Foresight::under(problem, &after).is_better_than(&Foresight::under(problem, &before))
+        let under = |flights: &[_]| Foresight::under(problem, &self.refinement.models, flights);
+        under(&after).is_better_than(&under(&before))
     }
 
     /// Predictions of the flights that effects are chosen on, with the parameters `dropped` at their baselines and the others moved to that.
@@ -131,7 +135,7 @@ impl Refined<'_, '_> {
         } else {
             self.refinement.beside(&self.about, &self.fitted.values, dropped)
         };
-        Foresight::under(self.refinement.problem, &self.by_flight(&about, dropped))
+        Foresight::under(self.refinement.problem, &self.refinement.models, &self.by_flight(&about, dropped))
     }
 
     /// The part of the loss of the estimation data that each of `candidates` would take off, as the linearised predictions promise.
@@ -143,7 +147,7 @@ impl Refined<'_, '_> {
             problem,
             known: DMatrix::zeros(all.len(), all.len()),
             free: all,
-            colours: self.refinement.colours.clone(),
+            models: self.refinement.models.clone(),
         };
         let about = wide.linearised(&self.about.values, self.about.variance);
         let total = normal::sum(&plain(wide.blocks(&about)));
@@ -165,6 +169,11 @@ impl Refined<'_, '_> {
             1.0 - cost_after(&columns) / before
         };
         candidates.iter().map(promise).collect()
+    }
+
+    /// True if the flights that predictions are judged on are not those that parameters were moved on.
+    pub fn is_held_out(&self) -> bool {
+        self.is_each_in_turn() || !self.refinement.problem.validation.is_empty()
     }
 
     fn is_each_in_turn(&self) -> bool {
@@ -294,14 +303,14 @@ impl Refinement<'_, '_> {
                 let away = errors(flight, end, &end.persistent);
                 squares.iter_mut().zip(away).for_each(|(sum, away)| *sum += away * away);
             }
-            let scales = squares.map(|sum| (sum / ends.len() as f64).sqrt().max(1e-9));
+            let scales = scales(&squares, ends.len());
             let one = |end: &WindowEnd| {
                 let row = errors(flight, end, &end.simulated);
                 (self.problem.block_of(end.from_s), std::array::from_fn(|at| row[at] / scales[at]))
             };
             ends.iter().map(one).collect()
         };
-        ends(self.problem, flight, values, &self.colours, (&REFINED_S, SPAN_MAX_S))
+        ends(self.problem, flight, values, &self.models, (&REFINED_S, SPAN_MAX_S))
             .into_iter()
             .map(of_horizon)
             .collect()
@@ -354,7 +363,11 @@ impl Refinement<'_, '_> {
     /// The result at `values`; parameters that were not moved keep their variance.
     fn result(&self, fitted: &FitResult, values: Vec<f64>, about: &Linearised) -> FitResult {
         let blocks = plain(self.blocks(about));
-        let of_moved = normal::covariance(&blocks);
+        let prior = self.prior(&fitted.values, about.variance, &about.values);
+        // What the equations know is not sure either.
+        let share = normal::inverse(&(normal::sum(&blocks).gram + &prior.gram)) * &prior.gram;
+        let of_known = &share * normal::inverse(&self.known) * share.transpose();
+        let of_moved = normal::covariance_beside(&blocks, &prior) + of_known;
         let place = |at: &usize| self.free.iter().position(|free| free == at);
         let covariance = DMatrix::from_fn(fitted.free.len(), fitted.free.len(), |i, j| {
             match (place(&fitted.free[i]), place(&fitted.free[j])) {
@@ -365,6 +378,14 @@ impl Refinement<'_, '_> {
         });
         FitResult { values, covariance, ..fitted.clone() }
     }
+}
+
+/// Root mean squares by component; an axis about which hardly anything moves counts as one with a part of the whole movement.
+fn scales(squares: &WindowErrors, count: usize) -> WindowErrors {
+    std::array::from_fn(|at| {
+        let whole: f64 = squares[at / 3 * 3..at / 3 * 3 + 3].iter().sum();
+        (squares[at].max(LEAST_PART * LEAST_PART * whole) / count.max(1) as f64).sqrt().max(1e-9)
+    })
 }
 
 /// Derivatives by differences: where there is no other window, there is none.

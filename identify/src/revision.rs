@@ -47,9 +47,16 @@ pub struct Revisions {
     near: Option<Vec<f64>>,
     /// Candidates that predictions have asked for once.
     tried: Vec<Candidate>,
+    /// Those of them that were added.
+    added: Vec<Candidate>,
 }
 
 impl Revisions {
+    /// Candidates that were added since predictions ask for them. The equations alone may hardly show them.
+    pub fn added(&self) -> &[Candidate] {
+        &self.added
+    }
+
     /// The revision of the `accepted` effects with the fit `base`; `open` are the candidates that may be added.
     pub fn next(
         &mut self,
@@ -61,7 +68,7 @@ impl Revisions {
     ) -> Revision {
         progress("every effect once more, by its parameters");
         let search = Found { problem, accepted, base };
-        if let Some(found) = search.unsound(base, FALSE_RATE, &self.tried) {
+        if let Some(found) = search.unsound(base, FALSE_RATE, &self.added) {
             return Revision::Without(found);
         }
         progress("refinement by prediction errors");
@@ -85,6 +92,10 @@ impl Revisions {
 
     /// The candidate with which predictions are better beyond chance, of those that promise most.
     fn asked_for(&mut self, search: &Found, now: &Refined, open: &[Candidate]) -> Option<Judged> {
+        // A flight on which parameters were moved would ask for any effect.
+        if !now.is_held_out() {
+            return None;
+        }
         let Found { problem, accepted, base } = *search;
         let is_open = |candidate: &&Candidate| {
             let is_linear = candidate.kind.guesses.is_empty() && !candidate.kind.is_delay;
@@ -110,7 +121,7 @@ impl Revisions {
             if p_value < level && is_sound {
                 let gain = (base.validation_cost() - fitted.validation_cost()) / base.validation_cost();
                 let candidate = candidate.clone();
-                drop(moved);
+                self.added.push(candidate.clone());
                 return Some(Judged {
                     candidate,
                     fitted,
@@ -147,8 +158,8 @@ impl Found<'_, '_> {
             |candidate: &Candidate| (candidate.kind.name, joint_p_value(self.problem, fitted, candidate));
         let by_chance = || {
             let all = self.accepted.iter().filter(|candidate| !asked.contains(candidate)).map(chance);
-            let (effect, chance) =
-                all.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, chance)| *chance >= level)?;
+            let unsure = all.filter(|(_, chance)| *chance >= level);
+            let (effect, chance) = unsure.max_by(|a, b| a.1.total_cmp(&b.1))?;
             let reason =
                 format!("its parameters are no longer beyond chance beside those of the others: {chance:.3}");
             Some(Withdrawn { effect, reason })
@@ -164,6 +175,9 @@ impl Found<'_, '_> {
     /// The accepted effect without which predictions are better, of several the one with the greatest growth.
     fn worst(&self) -> Option<Withdrawn> {
         let Self { problem, accepted, base } = self;
+        if accepted.is_empty() {
+            return None;
+        }
         let equations = problem.equations(&base.values, &base.free);
         self.worst_by(&Foresight::of(problem, &equations, base, &[]), |name| {
             let of_effect = self.of_effect(name);
@@ -181,8 +195,24 @@ impl Found<'_, '_> {
     /// The same with the others refined by prediction errors, as the effect is.
     fn worst_refined(&self, refined: &Refined) -> Option<Withdrawn> {
         self.worst_by(&refined.foresight(&[]), |name| {
-            refined.foresight(&free_parameters(&self.of_effect(name)))
+            let of_effect = self.of_effect(name);
+            // Errors of sensors are not refined: without them the others are fitted and refined anew.
+            if of_effect.iter().any(|candidate| SENSOR_EFFECTS.contains(&candidate.kind)) {
+                self.refined_without(name, &refined.result.values)
+            } else {
+                refined.foresight(&free_parameters(&of_effect))
+            }
         })
+    }
+
+    /// Predictions without an effect, with the others fitted and refined from the values `near` on.
+    fn refined_without(&self, effect: &str, near: &[f64]) -> Foresight {
+        let Self { problem, accepted, base } = self;
+        let (_, fitted) = without_effect(problem, accepted, base, effect);
+        refined(problem, &fitted, Some(near)).map_or_else(
+            || Foresight::of(problem, &problem.equations(&fitted.values, &fitted.free), &fitted, &[]),
+            |moved| moved.foresight(&[]),
+        )
     }
 
     /// One error that grows with an effect does not matter where all of them together become smaller.

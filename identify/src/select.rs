@@ -6,15 +6,14 @@
 //! 1. The gain on the validation data is beyond chance: the mean of the blocks' gains is above zero at 1 % over all
 //!    candidates of the round together (Bonferroni; one-sided percentile bootstrap over blocks, Efron 1979).
 //! 2. Its parameters together differ from their baselines beyond chance on the estimation data, at the same level.
-//! 3. The gain matters: it is at least [`LEAST_GAIN`] of the squared error.
+//! 3. The gain matters: it is at least 0.2 % of the squared error.
 //! 4. The effect is not asked for more than it can be: not all parameters that moved stopped at a bound.
 //!
 //! The accepted candidate with the greatest gain is taken, or one with fewer parameters if the difference is not
 //! beyond chance. Then those taken before have to pass the first test again, as a later effect may explain the
 //! residual that an earlier one explained by mistake.
 //!
-//! In the end effects are withdrawn, and the search goes on without them: those of which a parameter stopped at a bound, those
-//! that are no longer beyond chance beside the others, and those without which predictions are better (`foresight`).
+//! In the end effects are withdrawn or added by predictions, and the search goes on (`revision`).
 //!
 //! If a round accepts nothing although all candidates together would reduce the cost much, pairs are tried that
 //! gain only together. They face the same tests; the chance of a false acceptance in that search is
@@ -102,7 +101,7 @@ pub fn select(problem: &mut Problem, candidates: &[Candidate], progress: &mut dy
     let mut withdrawn = Vec::new();
     let mut revisions = Revisions::default();
     let refined = loop {
-        search.run(problem, &open, progress);
+        search.run(problem, &open, revisions.added(), progress);
         problem.weigh(&search.base, candidates);
         search.base = problem.fitted(&search.base.values, &free_parameters(&search.accepted));
         let StepwiseSearch { accepted, base, rounds } = &mut search;
@@ -133,8 +132,14 @@ struct StepwiseSearch {
 }
 
 impl StepwiseSearch {
-    /// Rounds among `candidates` until none changes anything.
-    fn run(&mut self, problem: &mut Problem, candidates: &[Candidate], progress: &mut dyn FnMut(&str)) {
+    /// Rounds among `candidates` until none changes anything; those `kept` are not given up for others.
+    fn run(
+        &mut self,
+        problem: &mut Problem,
+        candidates: &[Candidate],
+        kept: &[Candidate],
+        progress: &mut dyn FnMut(&str),
+    ) {
         for _ in 0..ROUNDS_MAX {
             let open = candidates.iter().filter(|candidate| !self.accepted.contains(candidate)).count();
             if open == 0 {
@@ -144,24 +149,24 @@ impl StepwiseSearch {
             problem.weigh(&self.base, candidates);
             self.base = problem.fitted(&self.base.values, &free_parameters(&self.accepted));
             self.rounds.push(round(problem, &self.base, &self.accepted, candidates, FALSE_RATE));
-            if !(self.take(problem) || self.take_two(problem, candidates)) {
+            if !(self.take(problem, kept) || self.take_two(problem, candidates, kept)) {
                 break;
             }
         }
     }
 
     /// Accepts the candidate that the last round took.
-    fn take(&mut self, problem: &Problem) -> bool {
+    fn take(&mut self, problem: &Problem, kept: &[Candidate]) -> bool {
         let Some(taken) = self.rounds.last().and_then(Round::taken).cloned() else { return false };
         self.accepted.push(taken.candidate);
-        self.base = without_idle(problem, taken.fitted, &mut self.accepted);
+        self.base = without_idle(problem, taken.fitted, &mut self.accepted, kept);
         true
     }
 
     /// Accepts two that only gain together: of two strong effects each can make the blocks worse in which the other
     /// acts. The firsts that are tried are chosen on the estimation data, the second in a round with the first. Then
     /// the first has to pass a round with the second.
-    fn take_two(&mut self, problem: &Problem, candidates: &[Candidate]) -> bool {
+    fn take_two(&mut self, problem: &Problem, candidates: &[Candidate], kept: &[Candidate]) -> bool {
         let Some(last) = self.rounds.last() else { return false };
         if problem.left(&self.base) < MUCH_LEFT {
             return false;
@@ -186,7 +191,7 @@ impl StepwiseSearch {
             if is_gain && first_round.taken.is_some() {
                 self.rounds.extend([first_round, second_round]);
                 self.accepted = both;
-                self.base = without_idle(problem, second.fitted, &mut self.accepted);
+                self.base = without_idle(problem, second.fitted, &mut self.accepted, kept);
                 return true;
             }
         }
@@ -287,10 +292,19 @@ fn best(problem: &Problem, judged: &[Judged]) -> Option<usize> {
 }
 
 /// Takes back effects that no longer gain anything.
-fn without_idle(problem: &Problem, mut base: FitResult, accepted: &mut Vec<Candidate>) -> FitResult {
+fn without_idle(
+    problem: &Problem,
+    mut base: FitResult,
+    accepted: &mut Vec<Candidate>,
+    kept: &[Candidate],
+) -> FitResult {
     let mut at = 0;
     // The newest has just passed.
     while at + 1 < accepted.len() {
+        if kept.contains(&accepted[at]) {
+            at += 1;
+            continue;
+        }
         let promised = problem.promised_without(&base, &accepted[at].free);
         if is_clearly_worse(&promised, &base) {
             at += 1;

@@ -101,6 +101,20 @@ fn accelerations_of_the_true_model_are_those_that_were_measured() {
             );
         }
     }
+    let rates = &flight.angular_velocity;
+    for at in middle() {
+        let next = rates.time_s.partition_point(|other| *other < predicted.time_s[at]);
+        let (before, behind) = (next - 3, next + 3);
+        for (axis, found) in predicted.angular_acceleration_B_rad_s2[at].iter().enumerate() {
+            let slope = (rates.values[behind][axis] - rates.values[before][axis])
+                / (rates.time_s[behind] - rates.time_s[before]);
+            assert!(
+                (found - slope).abs() < 0.5,
+                "{} s, axis {axis}: {found}, measured {slope}",
+                predicted.time_s[at]
+            );
+        }
+    }
     let heavy = Airframe::with_effects(vehicle, vec![effect("mass-error", &[("error", 0.1)])]);
     let of_heavy = accelerations(&flight, &heavy).unwrap();
     for at in middle() {

@@ -34,8 +34,8 @@ pub struct ValidateArguments {
     /// With --steps-ahead: rotors keep the speed of the last sample until the next; without it they follow straight lines between samples.
     #[arg(long, requires = "steps_ahead")]
     held: bool,
-    /// Instead of flying on the bus, print the specific force and the angular acceleration that each vehicle predicts at every sample of the
-    /// attitude, from the measured state and rotor speeds. Needs --json.
+    /// Instead of flying on the bus, print the specific force (m/s²) and the angular acceleration (rad/s²) that each vehicle predicts at every
+    /// sample of the attitude, from the measured state and rotor speeds. Needs --json.
     #[arg(long, requires = "json", conflicts_with_all = ["keep", "steps_ahead"])]
     accelerations: bool,
 }

@@ -9,8 +9,8 @@ use serde_json::{Map, Value, json};
 use std::path::Path;
 use vehicles::Vehicle;
 
-/// Accelerations that each of `vehicles`, with the effects of its file, predicts at the samples of the `flights`: by flight the role, and by vehicle
-/// the times in s, the specific forces in m/s² and the angular accelerations in rad/s², both along and about the axes of the body.
+/// Accelerations that each of `vehicles`, with the effects of its file, predicts at the samples of the `flights`: by flight its role and, under `vehicles`,
+/// the times in s, the specific forces in m/s² and the angular accelerations in rad/s², along and about the axes of the body.
 ///
 /// # Errors
 /// A vehicle file that cannot be read, a flight without an attitude or rotor speeds.
@@ -18,24 +18,26 @@ use vehicles::Vehicle;
 /// ```no_run
 /// let set = flights::FlightSet::load("flights/neurobem.toml".as_ref())?;
 /// let json = report::validate::predicted_accelerations(&[set.vehicle.as_ref()], &set)?;
-/// println!("{}", json["flights"]["up to 6.5 m/s"]["neurobem-quadrotor"]["specific_force"][0]);
+/// println!("{}", json["flights"]["up to 6.5 m/s"]["vehicles"]["neurobem-quadrotor"]["specific_force_m_s2"][0]);
 /// # Ok::<(), anyhow::Error>(())
 /// ```
 pub fn predicted_accelerations(vehicles: &[&Path], flights: &FlightSet) -> Result<Value> {
     let mut of_flights = Map::new();
     for flight in &flights.flights {
-        let mut of_flight = json!({ "role": flight.role });
+        let mut of_vehicles = Map::new();
         for (vehicle, name) in vehicles.iter().zip(labels(vehicles)) {
             let airframe = Airframe::from_files(Vehicle::load_from(&flights.files, vehicle)?, &[])?;
             let predicted = accelerations(flight, &airframe)
                 .map_err(anyhow::Error::msg)
                 .with_context(|| format!("the flight `{}` cannot be predicted", flight.name))?;
-            of_flight[name] = json!({
+            let columns = json!({
                 "time_s": predicted.time_s,
-                "specific_force": predicted.specific_force_B_m_s2,
-                "angular_acceleration": predicted.angular_acceleration_B_rad_s2,
+                "specific_force_m_s2": predicted.specific_force_B_m_s2,
+                "angular_acceleration_rad_s2": predicted.angular_acceleration_B_rad_s2,
             });
+            of_vehicles.insert(name, columns);
         }
+        let of_flight = json!({ "role": flight.role, "vehicles": of_vehicles });
         of_flights.insert(flight.name.clone(), of_flight);
     }
     Ok(json!({ "flights": of_flights }))
