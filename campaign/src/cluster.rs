@@ -284,7 +284,7 @@ impl Array {
         let mut lost = Vec::new();
         let mut cancelled = Vec::new();
         for (&number, chunk) in &mut self.chunks {
-            let state = states.get(&(chunk.array.clone(), number));
+            let state = slurm::state_in(states, &chunk.array, number);
             if state == Some(&TaskState::Alive) {
                 chunk.ends_seen = 0;
                 continue;

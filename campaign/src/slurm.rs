@@ -68,6 +68,15 @@ pub fn submit(submission: &Submission<'_>) -> Result<String> {
     Ok(number.to_owned())
 }
 
+/// Number that stands for the tasks of an array that had not begun when it was cancelled.
+const REST: usize = usize::MAX;
+
+/// The state of a task of an array; `None` if Slurm does not know it.
+pub fn state_in<'s>(states: &'s States, array: &str, task: usize) -> Option<&'s TaskState> {
+    let of = |task: usize| states.get(&(array.to_owned(), task));
+    of(task).or_else(|| of(REST))
+}
+
 /// States of the tasks of `arrays`. Slurm forgets a task some minutes after its end; it has no state then.
 ///
 /// # Errors
@@ -134,12 +143,18 @@ fn ranges(tasks: &[usize]) -> String {
     ranges.iter().map(text).collect::<Vec<_>>().join(",")
 }
 
-/// Lines of `ARRAY TASK STATE`; others, such as jobs without tasks, are left out.
+/// Lines of `ARRAY TASK STATE`; others, such as jobs without tasks, are left out. One that is cancelled may stand for all tasks of an array that had not
+/// begun: [`REST`].
 fn parsed(text: &str) -> States {
     let line = |line: &str| {
         let mut words = line.split_whitespace();
-        let (array, task, state) = (words.next()?, words.next()?.parse().ok()?, words.next()?);
-        Some(((array.to_owned(), task), state_of(state)))
+        let (array, task, state) = (words.next()?, words.next()?, state_of(words.next()?));
+        let task = match task.parse() {
+            Ok(task) => task,
+            Err(_) if state == TaskState::Cancelled => REST,
+            Err(_) => return None,
+        };
+        Some(((array.to_owned(), task), state))
     };
     text.lines().filter_map(line).collect()
 }
@@ -156,7 +171,7 @@ fn state_of(word: &str) -> TaskState {
 
 #[cfg(test)]
 mod tests {
-    use super::{TaskState, parsed, ranges};
+    use super::{TaskState, parsed, ranges, state_in};
 
     #[test]
     fn task_numbers_are_written_as_ranges() {
@@ -177,5 +192,14 @@ mod tests {
         assert_eq!(state("2", 0), Some(TaskState::Ended("NODE_FAIL".to_owned())));
         assert_eq!(state("2", 1), Some(TaskState::Cancelled));
         assert_eq!(state("2", 4), None);
+    }
+
+    #[test]
+    fn tasks_that_had_not_begun_are_cancelled_together() {
+        // As squeue 22.05 prints an array of which four tasks were pending when it was cancelled.
+        let states = parsed("1 N/A CANCELLED\n1 0 COMPLETED\n1 1 COMPLETED\n");
+        assert_eq!(state_in(&states, "1", 0), Some(&TaskState::Ended("COMPLETED".to_owned())));
+        assert_eq!(state_in(&states, "1", 3), Some(&TaskState::Cancelled));
+        assert_eq!(state_in(&states, "2", 3), None);
     }
 }
