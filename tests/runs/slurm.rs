@@ -88,7 +88,7 @@ fn a_cluster_gives_the_rows_of_this_machine_whatever_it_loses() {
     let text = String::from_utf8_lossy(&output.stdout);
     assert!(output.status.success(), "{text}\n{}", String::from_utf8_lossy(&output.stderr));
     // One for each campaign: undisturbed, disturbed, resumed, cancelled.
-    assert_eq!(text.matches("60 rows, the same bytes").count(), 4, "{text}");
+    assert_eq!(text.matches("240 rows, the same bytes").count(), 4, "{text}");
 }
 
 #[test]
