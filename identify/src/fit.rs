@@ -568,7 +568,7 @@ mod tests {
     use crate::parameter::Parameters;
     use vehicles::Vehicle;
 
-    /// Of a rigid body no moment of inertia is larger than the sum of the other two.
+    /// No moment of inertia of a rigid body is larger than the sum of the other two.
     #[test]
     fn a_step_ends_where_no_rigid_body_has_the_inertia() {
         let vehicle = Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml").unwrap();

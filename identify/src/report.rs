@@ -262,7 +262,7 @@ impl Report {
         if self.refined {
             writeln!(
                 f,
-                "  (parameters refined by prediction errors over 0.1 and 0.5 s, which predicts better)"
+                "  (parameters refined by prediction errors over 0.05 to 0.5 s, which predicts better)"
             )?;
         }
         for name in &self.verdict {
