@@ -205,6 +205,7 @@ mod tests {
             parameters: BTreeMap::from([("coefficient", coefficient)]),
             held_out: BeforeAfter { before: 1.35, after: 1.06 },
             chance: 5e-5,
+            worth: Vec::new(),
             confused_with: vec!["blade-flapping"],
             experiment: Some("fly with a load".to_owned()),
         }

@@ -84,6 +84,8 @@ pub struct FitResult {
     pub values: Vec<f64>,
     /// The free parameters, which were fitted.
     pub free: Vec<usize>,
+    /// Values that the equations would have them take if there were no bounds.
+    pub unbounded: Vec<f64>,
     /// Their covariance.
     pub covariance: DMatrix<f64>,
     /// Weighted sums of squares of the blocks of the validation data.
@@ -107,6 +109,11 @@ impl FitResult {
     pub fn standard_error(&self, parameter: usize) -> Option<f64> {
         let at = self.free.iter().position(|free| *free == parameter)?;
         Some(self.covariance[(at, at)].max(0.0).sqrt())
+    }
+
+    /// The value that the equations would have a parameter take if it had no bounds; `None` where it was held.
+    pub fn unbounded(&self, parameter: usize) -> Option<f64> {
+        self.free.iter().position(|free| *free == parameter).map(|at| self.unbounded[at])
     }
 
     /// Wald's statistic of these free parameters: how far they are `away` together, in units of their covariance.
@@ -170,7 +177,8 @@ impl<'f> Problem<'f> {
             self.costs(&self.validation, &values)
         };
         let estimation_costs = blocks.iter().map(|block| block.cost).collect();
-        FitResult { values, free: free.to_vec(), covariance, validation_costs, estimation_costs }
+        let unbounded = unbounded(&normal::sum(&blocks), &values, free);
+        FitResult { values, free: free.to_vec(), unbounded, covariance, validation_costs, estimation_costs }
     }
 
     /// The equations of the estimation data about `values`.
@@ -522,6 +530,12 @@ impl<'f> Problem<'f> {
 /// The folds of a cross-validation: stretches of time.
 fn folds(blocks: &[Block]) -> std::slice::Chunks<'_, Block> {
     blocks.chunks(blocks.len().div_ceil(FOLDS).max(1))
+}
+
+/// The values after the step that the equations `total` about `values` ask for, bounds or not.
+pub fn unbounded(total: &Block, values: &[f64], free: &[usize]) -> Vec<f64> {
+    let step = held_step(total, &vec![None; free.len()]);
+    free.iter().zip(step.iter()).map(|(at, step)| values[*at] + step).collect()
 }
 
 /// The step of the parameters that are not held, while the others go where they are held.

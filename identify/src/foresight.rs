@@ -11,6 +11,7 @@ use crate::predict::{Measured, WindowEnd, components};
 use crate::prepared::Prepared;
 use crate::sensing::SensorErrors;
 use crate::statistics::chance_of_no_gain;
+use crate::worth::Worth;
 use flights::state::StateQuantity;
 use plant::RigidBody;
 use rayon::prelude::*;
@@ -33,31 +34,11 @@ const LEAST_GROWTH: f64 = 1.02;
 const OF_NOISE: f64 = 0.5;
 /// Nor one by less than this part of persistence's error: a position after 0.1 s is known to a millimetre by its velocity.
 const OF_PERSISTENCE: f64 = 0.01;
-
-/// A prediction error that an effect makes greater.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Growth {
-    /// The channel.
-    pub channel: &'static str,
-    /// Horizon in s.
-    pub horizon_s: f64,
-    /// Root mean square without the effect.
-    pub without: f64,
-    /// Root mean square with it.
-    pub with: f64,
-    /// Unit of both.
-    pub unit: &'static str,
-}
-
-impl Growth {
-    /// Error with the effect in units of that without.
-    pub fn ratio(&self) -> f64 {
-        self.with / self.without
-    }
-}
+/// An effect changes something where an error without it has a part of at least this share of persistence's error; tuned, no source.
+const LEAST_CHANGE: f64 = 0.02;
 
 /// Prediction errors of the judged flights.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Foresight {
     /// Squares by flight, horizon and block of time: sums by component, and the number of windows.
     squares: BTreeMap<(usize, usize, i64), (WindowErrors, f64)>,
@@ -65,6 +46,23 @@ pub struct Foresight {
     persistent: [WindowErrors; HORIZONS_S.len()],
     /// Errors of each quantity that the noise of the sensors makes, by horizon.
     noise: [[f64; QUANTITIES.len()]; 2],
+}
+
+/// The growth of one prediction error by an effect.
+struct Growth {
+    worth: Worth,
+    /// True if it is great enough to matter.
+    matters: bool,
+    /// True if the part that grew is great enough to be told, however great the noise beside it.
+    is_change: bool,
+    /// Growths of its mean square, by block of time.
+    of_blocks: Vec<f64>,
+}
+
+impl Growth {
+    fn is_beyond_chance(&self) -> bool {
+        chance_of_no_gain(&self.of_blocks) < LEVEL
+    }
 }
 
 impl Foresight {
@@ -113,8 +111,25 @@ impl Foresight {
         Self { squares: sums, persistent, noise: noise(problem) }
     }
 
+    /// Every error with an effect beside that `without` it.
+    pub fn worths(&self, without: &Self) -> Vec<Worth> {
+        self.compared(without).into_iter().map(|growth| growth.worth).collect()
+    }
+
     /// The channel whose error grows most from `without` the effect to `self`, of those that grow beyond their noise.
-    pub fn growth(&self, without: &Self) -> Option<Growth> {
+    pub fn growth(&self, without: &Self) -> Option<Worth> {
+        let grown =
+            self.compared(without).into_iter().filter(|growth| growth.matters && growth.is_beyond_chance());
+        grown.map(|growth| growth.worth).max_by(|a, b| a.ratio().total_cmp(&b.ratio()))
+    }
+
+    /// True if an effect changes something: an error is greater without it, or all of them together are smaller with it.
+    pub fn is_worth_more_than(&self, without: &Self) -> bool {
+        without.compared(self).iter().any(|growth| growth.is_change) || self.is_better_than(without)
+    }
+
+    /// Every error that was measured, with an effect and `without` it.
+    fn compared(&self, without: &Self) -> Vec<Growth> {
         let places =
             (0..HORIZONS_S.len()).flat_map(|horizon| (0..QUANTITIES.len()).map(move |at| (horizon, at)));
         let of_place = |(horizon, at): (usize, usize)| {
@@ -124,22 +139,17 @@ impl Foresight {
             };
             let (with, without) = (mean(&|pair| pair.0), mean(&|pair| pair.1));
             let persistent: f64 = self.persistent[horizon][3 * at..3 * at + 3].iter().sum();
-            let growths: Vec<f64> = pairs.iter().map(|(with, without)| with - without).collect();
             let by = (with * with - without * without).max(0.0).sqrt();
             let matters = with > LEAST_GROWTH * without
                 && by > OF_NOISE * self.noise[horizon][at]
                 && with - without > OF_PERSISTENCE * persistent.sqrt();
-            let is_beyond = matters && chance_of_no_gain(&growths) < LEVEL;
-            let (quantity, horizon_s) = (QUANTITIES[at], HORIZONS_S[horizon]);
-            is_beyond.then_some(Growth {
-                channel: quantity.name(),
-                horizon_s,
-                without,
-                with,
-                unit: quantity.unit(),
-            })
+            let is_change = with > LEAST_GROWTH * without && by > LEAST_CHANGE * persistent.sqrt();
+            let (channel, unit) = (QUANTITIES[at].name(), QUANTITIES[at].unit());
+            let worth = Worth { channel, horizon_s: HORIZONS_S[horizon], without, with, unit };
+            let of_blocks = pairs.iter().map(|(with, without)| with - without).collect();
+            (without > 0.0).then_some(Growth { worth, matters, is_change, of_blocks })
         };
-        places.filter_map(of_place).max_by(|a, b| a.ratio().total_cmp(&b.ratio()))
+        places.filter_map(of_place).collect()
     }
 
     /// True if all errors together are smaller than `other`'s beyond chance, and by more than [`LEAST_GROWTH`], in the geometric mean over components,
@@ -252,6 +262,14 @@ mod tests {
         assert!((growth.ratio() - 1.5).abs() < 1e-9, "{growth:?}");
         assert_eq!(errors_with(1.0).growth(&errors_with(1.5)), None);
         assert_eq!(errors_with(1.01).growth(&errors_with(1.0)), None, "too little to matter");
+    }
+
+    #[test]
+    fn an_effect_is_worth_something_where_an_error_is_greater_without_it() {
+        assert!(errors_with(1.0).is_worth_more_than(&errors_with(1.5)));
+        assert!(!errors_with(1.0).is_worth_more_than(&errors_with(1.0)));
+        assert!(!errors_with(1.5).is_worth_more_than(&errors_with(1.0)), "without it they are smaller");
+        assert!(!errors_with(1.0).is_worth_more_than(&errors_with(1.01)), "too little");
     }
 
     #[test]

@@ -13,6 +13,8 @@ const LEAST_GAIN: f64 = 0.002;
 pub const FALSE_RATE: f64 = 0.01;
 /// A smaller part of a plausible value is not worth naming.
 const LEAST_PART: f64 = 0.01;
+/// A bound that is passed by a smaller part of a plausible change is not passed: what the model lacks elsewhere moves estimates by as much.
+const BEYOND_PART: f64 = 0.1;
 /// Two candidates whose difference is within this one-sided level cannot be told apart.
 const CONFOUNDED_LEVEL: f64 = 0.05;
 /// Level at which an effect is kept without a fit, where the equations promise a loss without it.
@@ -61,7 +63,8 @@ pub fn judged(
         && joint_p_value < level
         && gain > LEAST_GAIN * base.validation_cost()
         && is_seen(problem, candidate, &fitted)
-        && !is_beyond_bounds(problem, candidate, &fitted);
+        && !is_beyond_bounds(problem, candidate, &fitted)
+        && !drives_to_bound(problem, base, candidate, &fitted);
     let is_logging =
         is_real && logging::explained_lag_s(problem, candidate.kind, &candidate.free, &fitted).is_some();
     let (candidate, gain) = (candidate.clone(), gain / base.validation_cost());
@@ -88,24 +91,38 @@ fn is_seen(problem: &Problem, candidate: &Candidate, fitted: &FitResult) -> bool
 
 /// True if every parameter that moved stopped at a bound: the flights ask for more than the effect can be, so another
 /// effect is at work.
-#[allow(clippy::float_cmp, reason = "values that stop at a bound are the bound")]
+#[allow(clippy::float_cmp, reason = "a value that did not move is the baseline")]
 fn is_beyond_bounds(problem: &Problem, candidate: &Candidate, fitted: &FitResult) -> bool {
     candidate.free.iter().all(|at| {
-        let (entry, value) = (&problem.model.parameters.all[*at], fitted.values[*at]);
-        value == entry.baseline || value == entry.spec().min || value == entry.spec().max
+        let baseline = problem.model.parameters.all[*at].baseline;
+        fitted.values[*at] == baseline || is_stopped(problem, fitted, *at)
     })
 }
 
+/// True if a parameter stopped at a bound other than its baseline, and the equations ask for more by more than chance. One that is in truth what its bound is (rotors
+/// without any angular momentum) is as often beyond it as within.
+pub fn is_stopped(problem: &Problem, fitted: &FitResult, at: usize) -> bool {
+    let (entry, value) = (&problem.model.parameters.all[at], fitted.values[at]);
+    let beyond = fitted.unbounded(at).map_or(f64::INFINITY, |asked| (asked - value).abs());
+    let by_chance = fitted.t_quantile(0.975) * fitted.standard_error(at).unwrap_or(0.0);
+    entry.stops_at(value) && beyond > by_chance.max(BEYOND_PART * entry.scale)
+}
+
+/// True if a parameter of an effect that was accepted before stops at a bound only beside this one: the two are nearly the same together
+/// (mass, thrust and inertia all greater by one part), and what drives them is an effect that neither is.
+fn drives_to_bound(problem: &Problem, base: &FitResult, candidate: &Candidate, fitted: &FitResult) -> bool {
+    let others = fitted.free.iter().filter(|at| !candidate.free.contains(at));
+    others.into_iter().any(|at| is_stopped(problem, fitted, *at) && !is_stopped(problem, base, *at))
+}
+
 /// The first parameter that stopped at a bound other than its baseline, of those that the flights determine.
-#[allow(clippy::float_cmp, reason = "values that stop at a bound are the bound")]
 pub fn at_bound(problem: &Problem, candidate: &Candidate, fitted: &FitResult) -> Option<String> {
     candidate.free.iter().find_map(|at| {
         let (entry, value) = (&problem.model.parameters.all[*at], fitted.values[*at]);
         let spec = entry.spec();
         let half = fitted.t_quantile(0.975) * fitted.standard_error(*at).unwrap_or(f64::INFINITY);
-        let is_bound = value != entry.baseline && (value == spec.min || value == spec.max);
         let is_determined = value - half > spec.min || value + half < spec.max;
-        (is_bound && is_determined)
+        (is_stopped(problem, fitted, *at) && is_determined)
             .then(|| format!("{} stopped at its bound {value} {}", spec.name, spec.unit()))
     })
 }

@@ -31,6 +31,7 @@
 //! | `refine` | parameters moved to where predictions are best |
 //! | `regressor` | what residuals are looked at against |
 //! | `envelope` | the ranges of the test flights, in which the verdict was judged |
+//! | [`effect_reports`], [`worth`] | each effect as it was judged, and what predictions gain by it |
 //! | [`report`], [`brief`], [`vehicle_file`] | what is written down |
 //! | `digits` | numbers in texts for people |
 //! | [`rotor`] | rotors and motors from a thrust stand or from flights |
@@ -54,6 +55,7 @@ mod clock;
 mod confounded;
 mod digits;
 mod disturbance;
+pub mod effect_reports;
 mod envelope;
 mod evidence;
 mod faults;
@@ -101,6 +103,7 @@ mod weigh;
 mod whiteness;
 mod whitening;
 mod window;
+pub mod worth;
 
 pub use clock::Lateness;
 pub use envelope::Reached;

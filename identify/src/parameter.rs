@@ -105,6 +105,12 @@ impl Parameter {
     pub fn bounded(&self, wanted: f64) -> f64 {
         wanted.clamp(self.spec().min, self.spec().max)
     }
+
+    /// True if `value` is a bound other than the baseline: more is asked for than the parameter can be.
+    #[allow(clippy::float_cmp, reason = "values that stop at a bound are the bound")]
+    pub fn stops_at(&self, value: f64) -> bool {
+        value != self.baseline && (value == self.spec().min || value == self.spec().max)
+    }
 }
 
 /// The grid cannot see less.

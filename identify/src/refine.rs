@@ -12,7 +12,7 @@
 
 use crate::candidate::Candidate;
 use crate::disturbance::DisturbanceModels;
-use crate::fit::{FitResult, Problem};
+use crate::fit::{FitResult, Problem, unbounded};
 use crate::foresight::{ERRORS, Foresight, WindowErrors, ends, errors};
 use crate::normal::{self, Block};
 use crate::predict::WindowEnd;
@@ -376,7 +376,20 @@ impl Refinement<'_, '_> {
                 _ => 0.0,
             }
         });
-        FitResult { values, covariance, ..fitted.clone() }
+        let mut total = normal::sum(&blocks);
+        total.gram += &prior.gram;
+        total.gradient += &prior.gradient;
+        let of_free = unbounded(&total, &values, &self.free);
+        let mut result = FitResult { values, covariance, ..fitted.clone() };
+        for (at, asked) in self.free.iter().zip(of_free) {
+            result
+                .free
+                .iter()
+                .position(|free| free == at)
+                .into_iter()
+                .for_each(|place| result.unbounded[place] = asked);
+        }
+        result
     }
 }
 

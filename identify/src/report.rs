@@ -12,6 +12,7 @@ use crate::ratios::Ratios;
 use crate::revision::Withdrawn;
 use crate::trim::Trim;
 use crate::whiteness::Whiteness;
+use crate::worth::{Worth, in_words};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -114,6 +115,8 @@ pub struct EffectReport {
     pub held_out: BeforeAfter<f64>,
     /// Chance of as much gain without it, by resampled blocks.
     pub chance: f64,
+    /// Prediction errors of the flights that effects are chosen on, with and without it; empty where no attitude was measured.
+    pub worth: Vec<Worth>,
     /// Effects that would do as well in its place.
     pub confused_with: Vec<&'static str>,
     /// The experiment that would separate it from them.
@@ -290,6 +293,9 @@ impl Report {
                          a force or torque that no effect has, and that the controller answers"
                     )?;
                 }
+            }
+            if let Some(worth) = in_words(&effect.worth) {
+                writeln!(f, "    prediction errors without it -> with it, {worth}")?;
             }
             if !effect.confused_with.is_empty() {
                 writeln!(f, "    cannot be told from: {}", effect.confused_with.join(", "))?;

@@ -6,12 +6,15 @@
 
 use crate::candidate::{Candidate, free_parameters};
 use crate::fit::{FitResult, Problem};
-use crate::foresight::{Foresight, Growth};
+use crate::foresight::Foresight;
 use crate::judgement::{FALSE_RATE, Judged, at_bound, fitted, joint_p_value};
+use crate::logging;
 use crate::refine::{Refined, refined};
 use crate::sensor_effects::SENSOR_EFFECTS;
+use crate::worth::Worth;
 use plant::effects::Action;
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// Number of candidates that are fitted of those that predictions may ask for.
 const TRIED: usize = 3;
@@ -36,8 +39,17 @@ pub enum Revision {
     Without(Withdrawn),
     /// With this candidate.
     With(Box<Judged>),
-    /// Nothing: it is over. The fit is refined where that predicts better.
-    Done(Option<FitResult>),
+    /// Nothing: it is over.
+    Done(End),
+}
+
+/// The end of a search.
+#[derive(Debug)]
+pub struct End {
+    /// The refined fit, where that predicts better.
+    pub refined: Option<FitResult>,
+    /// Prediction errors of the judged flights with and without each accepted effect.
+    pub worths: BTreeMap<&'static str, Vec<Worth>>,
 }
 
 /// Revisions of one search, which know each other.
@@ -74,24 +86,34 @@ impl Revisions {
         progress("refinement by prediction errors");
         let Some(moved) = refined(problem, base, self.near.as_deref()) else {
             progress("every effect once more, by predictions");
-            return search.worst().map_or(Revision::Done(None), Revision::Without);
+            let predictions = search.predictions();
+            let end = End { refined: None, worths: predictions.worths() };
+            return search.unworthy(&predictions).map_or(Revision::Done(end), Revision::Without);
         };
         self.near = Some(moved.result.values.clone());
         progress("every effect once more, by predictions");
-        if let Some(found) =
-            search.unsound(&moved.result, REFINED_RATE, &[]).or_else(|| search.worst_refined(&moved))
-        {
+        if let Some(found) = search.unsound(&moved.result, REFINED_RATE, &[]) {
+            return Revision::Without(found);
+        }
+        let predictions = search.predictions_refined(&moved);
+        if let Some(found) = search.unworthy(&predictions) {
             return Revision::Without(found);
         }
         progress("further effects, by predictions");
-        match self.asked_for(&search, &moved, open) {
+        match self.asked_for(&search, &moved, &predictions.with, open) {
             Some(found) => Revision::With(Box::new(found)),
-            None => Revision::Done(Some(moved.result)),
+            None => Revision::Done(End { refined: Some(moved.result), worths: predictions.worths() }),
         }
     }
 
     /// The candidate with which predictions are better beyond chance, of those that promise most.
-    fn asked_for(&mut self, search: &Found, now: &Refined, open: &[Candidate]) -> Option<Judged> {
+    fn asked_for(
+        &mut self,
+        search: &Found,
+        now: &Refined,
+        predictions: &Foresight,
+        open: &[Candidate],
+    ) -> Option<Judged> {
         // A flight on which parameters were moved would ask for any effect.
         if !now.is_held_out() {
             return None;
@@ -115,7 +137,7 @@ impl Revisions {
             self.tried.push(candidate.clone());
             let fitted = fitted(problem, base, accepted, candidate);
             let Some(moved) = refined(problem, &fitted, Some(&now.result.values)) else { continue };
-            let p_value = moved.foresight(&[]).chance_against(&now.foresight(&[]));
+            let p_value = moved.foresight(&[]).chance_against(predictions);
             let is_sound = at_bound(problem, candidate, &moved.result).is_none()
                 && joint_p_value(problem, &moved.result, candidate) < FALSE_RATE;
             if p_value < level && is_sound {
@@ -172,14 +194,14 @@ impl Found<'_, '_> {
         self.accepted.iter().filter(|candidate| candidate.kind.name == name).cloned().collect()
     }
 
-    /// The accepted effect without which predictions are better, of several the one with the greatest growth.
-    fn worst(&self) -> Option<Withdrawn> {
+    /// Predictions with all effects, and without each of them.
+    fn predictions(&self) -> Predictions {
         let Self { problem, accepted, base } = self;
         if accepted.is_empty() {
-            return None;
+            return Predictions::default();
         }
         let equations = problem.equations(&base.values, &base.free);
-        self.worst_by(&Foresight::of(problem, &equations, base, &[]), |name| {
+        let without = |name| {
             let of_effect = self.of_effect(name);
             // What begins at a guess is far from linear: the others are fitted in full.
             if of_effect.iter().any(|candidate| !candidate.kind.guesses.is_empty()) {
@@ -189,12 +211,14 @@ impl Found<'_, '_> {
             } else {
                 Foresight::of(problem, &equations, base, &free_parameters(&of_effect))
             }
-        })
+        };
+        let with = Foresight::of(problem, &equations, base, &[]);
+        Predictions { with, without: self.names().into_iter().map(|name| (name, without(name))).collect() }
     }
 
     /// The same with the others refined by prediction errors, as the effect is.
-    fn worst_refined(&self, refined: &Refined) -> Option<Withdrawn> {
-        self.worst_by(&refined.foresight(&[]), |name| {
+    fn predictions_refined(&self, refined: &Refined) -> Predictions {
+        let without = |name| {
             let of_effect = self.of_effect(name);
             // Errors of sensors are not refined: without them the others are fitted and refined anew.
             if of_effect.iter().any(|candidate| SENSOR_EFFECTS.contains(&candidate.kind)) {
@@ -202,7 +226,17 @@ impl Found<'_, '_> {
             } else {
                 refined.foresight(&free_parameters(&of_effect))
             }
-        })
+        };
+        let with = refined.foresight(&[]);
+        Predictions { with, without: self.names().into_iter().map(|name| (name, without(name))).collect() }
+    }
+
+    /// Names of the accepted effects.
+    fn names(&self) -> Vec<&'static str> {
+        let mut names: Vec<&'static str> =
+            self.accepted.iter().map(|candidate| candidate.kind.name).collect();
+        names.dedup();
+        names
     }
 
     /// Predictions without an effect, with the others fitted and refined from the values `near` on.
@@ -215,20 +249,60 @@ impl Found<'_, '_> {
         )
     }
 
+    /// The accepted effect that predictions are better without, of several the one with the greatest growth; or else the one that they gain
+    /// least by, if that is nothing. What such an effect takes is missing in the numbers of the others.
+    fn unworthy(&self, predictions: &Predictions) -> Option<Withdrawn> {
+        predictions.worst().or_else(|| predictions.idle(|name| self.may_be_idle(name)))
+    }
+
+    /// Errors of sensors may be great and yet change no prediction, and what stands for the logging of the commands is no effect.
+    fn may_be_idle(&self, name: &str) -> bool {
+        self.of_effect(name).iter().all(|candidate| {
+            let is_of_sensor = SENSOR_EFFECTS.contains(&candidate.kind);
+            !is_of_sensor && logging::explained_lead_s(self.problem, candidate, self.base).is_none()
+        })
+    }
+}
+
+/// Predictions with all accepted effects, and without each of them.
+#[derive(Debug, Default)]
+struct Predictions {
+    with: Foresight,
+    without: Vec<(&'static str, Foresight)>,
+}
+
+impl Predictions {
+    fn worths(&self) -> BTreeMap<&'static str, Vec<Worth>> {
+        self.without.iter().map(|(name, without)| (*name, self.with.worths(without))).collect()
+    }
+
     /// One error that grows with an effect does not matter where all of them together become smaller.
-    fn worst_by(&self, with: &Foresight, without: impl Fn(&'static str) -> Foresight) -> Option<Withdrawn> {
-        let mut names: Vec<&'static str> =
-            self.accepted.iter().map(|candidate| candidate.kind.name).collect();
-        names.dedup();
-        let growth = |name: &'static str| {
-            let without = without(name);
-            let growth = with.growth(&without)?;
-            (!with.is_better_than(&without)).then_some((name, growth))
+    fn worst(&self) -> Option<Withdrawn> {
+        let growth = |(name, without): &(&'static str, Foresight)| {
+            let growth = self.with.growth(without)?;
+            (!self.with.is_better_than(without)).then_some((*name, growth))
         };
-        let (effect, Growth { channel, horizon_s, without, with, unit }) =
-            names.into_iter().filter_map(growth).max_by(|a, b| a.1.ratio().total_cmp(&b.1.ratio()))?;
+        let (effect, Worth { channel, horizon_s, without, with, unit }) =
+            self.without.iter().filter_map(growth).max_by(|a, b| a.1.ratio().total_cmp(&b.1.ratio()))?;
         let reason = format!(
             "the error of {channel} after {horizon_s} s is {without:.3} {unit} without it, {with:.3} {unit} with it"
+        );
+        Some(Withdrawn { effect, reason })
+    }
+
+    /// The effect, of those that may be, without which no error grows, that gains least.
+    fn idle(&self, may_be: impl Fn(&'static str) -> bool) -> Option<Withdrawn> {
+        let gain = |(name, without): &(&'static str, Foresight)| {
+            let most =
+                self.with.worths(without).into_iter().min_by(|a, b| a.ratio().total_cmp(&b.ratio()))?;
+            let is_idle = may_be(name) && !self.with.is_worth_more_than(without);
+            is_idle.then_some((*name, most))
+        };
+        let (effect, Worth { channel, horizon_s, without, with, unit }) =
+            self.without.iter().filter_map(gain).max_by(|a, b| a.1.ratio().total_cmp(&b.1.ratio()))?;
+        let reason = format!(
+            "no prediction changes by it; most, the error of {channel} after {horizon_s} s, is {without:.3e} {unit} without \
+             it, {with:.3e} {unit} with it"
         );
         Some(Withdrawn { effect, reason })
     }

@@ -1,24 +1,25 @@
 //! The whole way: from flights and the declared vehicle to a report.
 
 use crate::align::{Offsets, align};
-use crate::candidate::{Candidate, FAST_COMMANDS, Unidentifiable, candidates, free_parameters};
+use crate::candidate::{Candidate, candidates};
 use crate::clock::Lateness;
-use crate::confounded::{Rival, rivals};
+use crate::confounded::rivals;
+use crate::effect_reports;
 use crate::envelope;
 use crate::faults::{self, Fault};
-use crate::fit::{FitResult, Problem};
+use crate::fit::Problem;
 use crate::horizons::{of_role, predictions};
 use crate::limits::limits;
 use crate::logging;
 use crate::loss::losses;
 use crate::model::Model;
 use crate::noise;
-use crate::parameter::{Parameter, Parameters};
+use crate::parameter::Parameters;
 use crate::prepared::{BOX_STEPS, Equation, Layout, Prepared, Propulsion, block_s, box_s};
 use crate::questions::OpenQuestions;
 use crate::ratios::Ratios;
 use crate::regressor::{Regressor, regressors};
-use crate::report::{BeforeAfter, Changes, EffectReport, Estimate, FlightReport, Report, Unexplained};
+use crate::report::{BeforeAfter, Changes, FlightReport, Report, Unexplained};
 use crate::rig;
 use crate::rows::column;
 use crate::select::{Selection, select};
@@ -28,7 +29,7 @@ use crate::whiteness::{Whiteness, whiteness};
 use crate::whitening::Noises;
 use diagnostics::Diagnostic;
 use flights::{Flight, FlightSet, Role};
-use plant::effects::{Effect, EffectKind, entry};
+use plant::effects::{Effect, entry};
 use std::collections::BTreeMap;
 use vehicles::Vehicle;
 
@@ -37,17 +38,9 @@ pub use crate::horizons::HORIZONS_S;
 /// A residual is worth telling where its persistent part is beyond this part of its noise.
 const UNEXPLAINED: f64 = 0.3;
 
-/// Predictions ask for another value than the equations beyond so many standard errors of these: far beyond chance, and beyond what
-/// intervals that are somewhat short make; tuned, no source.
-const FAR: f64 = 8.0;
-
 /// Greatest mean distance of samples of motion: beyond it they show nothing, and the computation of every tick
 /// would cost more time and memory than the comparison is worth.
 const SPACING_MAX_S: f64 = 0.5;
-
-/// The experiment for two effects of which no better one is known.
-const OTHER_FLIGHTS: &str =
-    "fly manoeuvres in which the two differ: other speeds, rates, heights or loads than in these flights";
 
 /// Reason why flights cannot be used for identification.
 ///
@@ -128,10 +121,10 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
     let (open, unidentifiable) = candidates(&problem.model.parameters, &all);
     let selection = select(&mut problem, &open, progress);
     progress("confounded effects");
-    let mut effects = judged_effects(&problem, &selection);
+    let mut effects = effect_reports::judged(&problem, &selection);
     let rivals = rivals(&problem, &selection, &open);
-    accepted_effects(&problem, &selection, &rivals, &mut effects);
-    undetermined_effects(&problem, &selection, &unidentifiable, &mut effects);
+    effect_reports::add_accepted(&problem, &selection, &rivals, &mut effects);
+    effect_reports::add_undetermined(&problem, &selection, &unidentifiable, &mut effects);
     note_logging(&problem, &selection, &mut flight_reports);
     progress("predictions");
     let values = &selection.flown().values;
@@ -146,7 +139,7 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
     let envelope = envelope::of(problem.test.iter().map(|flight| (flight.flight, window_s(&flight.layout))));
     let report = Report {
         vehicle: set.vehicle.display().to_string(),
-        verdict: verdict(&problem, &selection),
+        verdict: effect_reports::verdict(&problem, &selection),
         losses: losses(&of_measured_attitude(&problem, &held_out), &noise_floor),
         limits: limits(&of_measured_attitude(&problem, &held_out), &noise_floor),
         withdrawn: selection.withdrawn.clone(),
@@ -355,26 +348,6 @@ fn flight_report(flight: &Flight, prepared: Option<&Prepared>) -> FlightReport {
     }
 }
 
-/// Names of the accepted effects, without those that the logging of the commands explains.
-fn verdict(problem: &Problem, selection: &Selection) -> Vec<&'static str> {
-    let mut names = Vec::new();
-    for candidate in named(problem, selection) {
-        if !names.contains(&candidate.kind.name) {
-            names.push(candidate.kind.name);
-        }
-    }
-    names
-}
-
-/// Accepted candidates that stand for effects.
-fn named<'s>(problem: &Problem, selection: &'s Selection) -> impl Iterator<Item = &'s Candidate> {
-    let is_logging =
-        |candidate: &&Candidate| logging::explained_lead_s(problem, candidate, &selection.after).is_some();
-    let named: Vec<&Candidate> =
-        selection.accepted.iter().filter(|candidate| !is_logging(candidate)).collect();
-    named.into_iter()
-}
-
 /// Notes the lateness of the commands that their logging explains.
 fn note_logging(problem: &Problem, selection: &Selection, reports: &mut [FlightReport]) {
     let leads = selection.accepted.iter();
@@ -386,148 +359,6 @@ fn note_logging(problem: &Problem, selection: &Selection, reports: &mut [FlightR
     });
     let Some(lead_s) = leads.chain(lags).reduce(f64::max) else { return };
     reports.iter_mut().for_each(|report| report.notes.push(logging::note(problem, lead_s)));
-}
-
-/// The candidates as the last round that judged them left them.
-fn judged_effects(problem: &Problem, selection: &Selection) -> BTreeMap<&'static str, EffectReport> {
-    let mut effects: BTreeMap<&'static str, EffectReport> = BTreeMap::new();
-    for round in &selection.rounds {
-        let mut of_round: BTreeMap<&'static str, EffectReport> = BTreeMap::new();
-        for judged in &round.judged {
-            let after = judged.fitted.validation_cost();
-            let before = after / (1.0 - judged.gain).max(1e-12);
-            let report = EffectReport {
-                accepted: false,
-                linearised: judged.is_promise,
-                parameters: estimates(problem, &judged.fitted, &judged.candidate.free),
-                held_out: BeforeAfter { before: size(problem, before), after: size(problem, after) },
-                chance: judged.p_value,
-                confused_with: Vec::new(),
-                experiment: None,
-            };
-            // Of the parts of an effect the one that gains most.
-            let name = judged.candidate.kind.name;
-            if of_round.get(name).is_none_or(|other| report.held_out.after < other.held_out.after) {
-                of_round.insert(name, report);
-            }
-        }
-        effects.extend(of_round);
-    }
-    effects
-}
-
-fn accepted_effects(
-    problem: &Problem,
-    selection: &Selection,
-    rivals: &[Vec<Rival>],
-    effects: &mut BTreeMap<&'static str, EffectReport>,
-) {
-    for name in verdict(problem, selection) {
-        let indices: Vec<usize> =
-            (0..selection.accepted.len()).filter(|at| selection.accepted[*at].kind.name == name).collect();
-        let others: Vec<Candidate> =
-            selection.accepted.iter().filter(|candidate| candidate.kind.name != name).cloned().collect();
-        let mut start = selection.after.values.clone();
-        let mut parameters = BTreeMap::new();
-        for at in &indices {
-            let candidate = &selection.accepted[*at];
-            let found = estimates(problem, selection.flown(), &candidate.free);
-            let by_equations = |(name, estimate): (&'static str, Estimate)| {
-                let at =
-                    candidate.free.iter().find(|at| problem.model.parameters.all[**at].spec().name == name);
-                let other = at.and_then(|at| far_by_equations(selection, *at));
-                (name, Estimate { by_equations: other, ..estimate })
-            };
-            parameters.extend(found.into_iter().map(by_equations));
-            candidate.free.iter().for_each(|at| start[*at] = problem.model.parameters.all[*at].baseline);
-        }
-        let without = problem.fitted(&start, &free_parameters(&others));
-        let mut alike: Vec<&'static EffectKind> =
-            indices.iter().flat_map(|at| &rivals[*at]).map(|rival| rival.candidate.kind).collect();
-        alike.sort_by_key(|kind| kind.name);
-        alike.dedup_by_key(|kind| kind.name);
-        let experiment = alike.first().map(|other| {
-            let kind = selection.accepted[indices[0]].kind;
-            kind.experiment_against(other).unwrap_or(OTHER_FLIGHTS).to_owned()
-        });
-        let report = EffectReport {
-            accepted: true,
-            linearised: false,
-            parameters,
-            held_out: BeforeAfter {
-                before: size(problem, without.validation_cost()),
-                after: size(problem, selection.after.validation_cost()),
-            },
-            chance: selection.p_value(name),
-            confused_with: alike.iter().map(|kind| kind.name).collect(),
-            experiment,
-        };
-        effects.insert(name, report);
-    }
-}
-
-/// The value of a parameter by the equations, where the refined one is farther than [`FAR`] of its standard errors.
-fn far_by_equations(selection: &Selection, parameter: usize) -> Option<f64> {
-    let value = selection.after.values[parameter];
-    let away = (selection.flown().values[parameter] - value).abs();
-    let error = selection.after.standard_error(parameter).filter(|error| *error > 0.0)?;
-    (away > FAR * error).then_some(value)
-}
-
-/// Effects of slowly logged commands, with intervals that cover all values that they may have.
-fn undetermined_effects(
-    problem: &Problem,
-    selection: &Selection,
-    unidentifiable: &[Unidentifiable],
-    effects: &mut BTreeMap<&'static str, EffectReport>,
-) {
-    let residual = size(problem, selection.after.validation_cost());
-    for missing in unidentifiable.iter().filter(|missing| missing.needs == FAST_COMMANDS) {
-        let of_effect = problem.model.parameters.all.iter().filter(|entry| entry.kind.name == missing.effect);
-        let open = |entry: &Parameter| {
-            let (spec, value) = (entry.spec(), entry.baseline);
-            let (unit, low, high) = (spec.unit(), spec.min, spec.max);
-            (
-                spec.name,
-                Estimate { value, unit, low, high, at_bound: false, determined: false, by_equations: None },
-            )
-        };
-        let report = EffectReport {
-            accepted: false,
-            linearised: false,
-            parameters: of_effect.map(open).collect(),
-            held_out: BeforeAfter { before: residual, after: residual },
-            chance: 1.0,
-            confused_with: Vec::new(),
-            experiment: None,
-        };
-        effects.entry(missing.effect).or_insert(report);
-    }
-}
-
-/// The weighted root mean square of a sum of squares of the validation data.
-fn size(problem: &Problem, cost: f64) -> f64 {
-    (cost / problem.validation_rows() as f64).sqrt()
-}
-
-/// The estimates of these parameters, with 95 % intervals.
-#[must_use]
-pub fn estimates(problem: &Problem, fitted: &FitResult, free: &[usize]) -> BTreeMap<&'static str, Estimate> {
-    let quantile = fitted.t_quantile(0.975);
-    let one = |at: &usize| {
-        let entry = &problem.model.parameters.all[*at];
-        let (value, half) =
-            (fitted.values[*at], quantile * fitted.standard_error(*at).unwrap_or(f64::INFINITY));
-        // Commands that were logged slowly make it come out too small, which no block of time shows.
-        let bias = logging::bias(problem, entry);
-        let (low, high) = ((value - half).max(entry.spec().min), (value + half + bias).min(entry.spec().max));
-        // Zero is where many effects begin, and no bound that data pushed against.
-        let at_bound = value != entry.baseline && (value <= entry.spec().min || value >= entry.spec().max);
-        let determined = low > entry.spec().min || high < entry.spec().max;
-        let unit = entry.spec().unit();
-        (entry.spec().name, Estimate { value, unit, low, high, at_bound, determined, by_equations: None })
-    };
-    free.iter().map(one).collect()
 }
 
 fn unexplained(
@@ -564,33 +395,4 @@ fn pictures(problem: &Problem, selection: &Selection) -> Vec<Picture> {
         }
     }
     pictures
-}
-
-#[cfg(test)]
-#[allow(clippy::disallowed_types, reason = "not in a component: the covariance of a report's fit")]
-mod tests {
-    use super::*;
-    use nalgebra::DMatrix;
-
-    #[test]
-    fn the_value_of_the_equations_is_told_where_predictions_ask_for_another() {
-        let fit = |value: f64| FitResult {
-            values: vec![value],
-            free: vec![0],
-            covariance: DMatrix::from_element(1, 1, 0.01),
-            validation_costs: Vec::new(),
-            estimation_costs: Vec::new(),
-        };
-        let selection = |refined: Option<f64>| Selection {
-            accepted: Vec::new(),
-            before: fit(0.0),
-            after: fit(1.0),
-            refined: refined.map(fit),
-            rounds: Vec::new(),
-            withdrawn: Vec::new(),
-        };
-        assert_eq!(far_by_equations(&selection(Some(1.9)), 0), Some(1.0));
-        assert_eq!(far_by_equations(&selection(Some(0.3)), 0), None, "seven standard errors");
-        assert_eq!(far_by_equations(&selection(None), 0), None);
-    }
 }

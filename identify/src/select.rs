@@ -20,14 +20,16 @@
 //! [`FALSE_RATE`] once more. The rounds end when nothing changes any more.
 
 use crate::candidate::{Candidate, free_parameters};
-use crate::fit::{FitResult, Problem};
+use crate::fit::{FitResult, Problem, unbounded};
 use crate::judgement::{
     FALSE_RATE, Judged, fitted, fitted_from, is_clearly_worse, is_worse, judged, p_value, start, without,
 };
 use crate::logging;
 use crate::normal::{self, Block};
-use crate::revision::{Revision, Revisions, Withdrawn, without_effect};
+use crate::revision::{End, Revision, Revisions, Withdrawn, without_effect};
+use crate::worth::Worth;
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 
 /// Steps of a promise from a guess: nothing but the candidate's own derivatives is computed again.
 const PROMISE_STEPS: usize = 3;
@@ -72,6 +74,8 @@ pub struct Selection {
     pub rounds: Vec<Round>,
     /// Effects that were accepted and taken back.
     pub withdrawn: Vec<Withdrawn>,
+    /// Prediction errors of the judged flights with and without each accepted effect.
+    pub worths: BTreeMap<&'static str, Vec<Worth>>,
 }
 
 impl Selection {
@@ -100,7 +104,7 @@ pub fn select(problem: &mut Problem, candidates: &[Candidate], progress: &mut dy
     let mut open = candidates.to_vec();
     let mut withdrawn = Vec::new();
     let mut revisions = Revisions::default();
-    let refined = loop {
+    let End { refined, worths } = loop {
         search.run(problem, &open, revisions.added(), progress);
         problem.weigh(&search.base, candidates);
         search.base = problem.fitted(&search.base.values, &free_parameters(&search.accepted));
@@ -116,12 +120,12 @@ pub fn select(problem: &mut Problem, candidates: &[Candidate], progress: &mut dy
                 *base = found.fitted.clone();
                 rounds.push(Round { judged: vec![*found], taken: Some(0) });
             }
-            Revision::Done(refined) => break refined,
+            Revision::Done(end) => break end,
         }
     };
     let StepwiseSearch { accepted, rounds, base: after } = search;
     let before = problem.fitted(&declared, &[]);
-    Selection { accepted, before, after, refined, rounds, withdrawn }
+    Selection { accepted, before, after, refined, rounds, withdrawn, worths }
 }
 
 /// State of a selection.
@@ -364,6 +368,7 @@ fn promise(
     let moved: Vec<Block> = estimation.iter().map(|block| block.after(&step)).collect();
     FitResult {
         values: problem.moved(values, &free, &step),
+        unbounded: unbounded(&normal::sum(estimation), values, &free),
         covariance: normal::covariance(&moved),
         validation_costs: if problem.validation.is_empty() {
             problem.cross_validated(estimation, values, &free)

@@ -2,8 +2,10 @@
 //! `cargo run --release -p hummingbus-identify --example confusion`, see docs/validation.md.
 mod simulated;
 
+use identify::run::identify;
 use rayon::prelude::*;
 use simulated::cases::{Case, EFFECTS, Judgement};
+use std::collections::BTreeSet;
 
 /// Long enough to tell effects apart, short enough for many of them.
 const DURATION_S: f64 = 8.0;
@@ -72,6 +74,33 @@ fn two_effects_at_once_are_both_named() {
 fn two_effects_that_hide_each_other_are_both_named() {
     let pair = ["thrust-scale", "translational-lift"];
     require_right(&pair.join(" + "), &judged(Case::of(&pair, 1.0, 10_603, 12.0)));
+}
+
+/// Their truth is the bound of the parameter: half of the estimates lie beyond it.
+#[test]
+fn rotors_without_angular_momentum_are_named_and_hide_no_mass() {
+    let truth = [
+        simulated::effect("mass-error", &[("error", 0.08)]),
+        simulated::effect("rotor-drag", &[("coefficient", 7e-5)]),
+        simulated::effect("gyroscopic-torque", &[("scale_error", -1.0)]),
+    ];
+    let wanted = BTreeSet::from(["mass-error", "rotor-drag", "gyroscopic-torque"]);
+    let of_seed = |seed: u64| {
+        let mut case = Case::null(seed, DURATION_S);
+        case.plan.truth = truth.to_vec();
+        let report = identify(&case.flights(), &mut |_| ()).unwrap().report;
+        assert_eq!(report.verdict.iter().copied().collect::<BTreeSet<_>>(), wanted, "seed {seed}\n{report}");
+        let value = |effect: &str, name: &str| report.effects[effect].parameters[name];
+        let (mass, rotors) = (value("mass-error", "error"), value("gyroscopic-torque", "scale_error"));
+        assert!((0.075..0.085).contains(&mass.value), "seed {seed}\n{report}");
+        assert!(
+            (-1.0..-0.9).contains(&rotors.value) && rotors.low <= -0.99 && !rotors.at_bound,
+            "seed {seed}\n{report}"
+        );
+        rotors.value
+    };
+    let values: Vec<f64> = (0..6_u64).into_par_iter().map(|seed| of_seed(4200 + seed)).collect();
+    assert!(values.contains(&-1.0), "no estimate stopped at the bound: the seeds show nothing, {values:?}");
 }
 
 /// At a true rate of 5 % more than three of twenty would be seen once in sixty times; the seeds are fixed.

@@ -1,7 +1,8 @@
 //! 95 % intervals hold the truth as often as they say, of the effects that are true, without a selection.
 mod simulated;
 
-use identify::run::{estimates, problem};
+use identify::effect_reports::estimates;
+use identify::run::problem;
 use rayon::prelude::*;
 use simulated::cases::Case;
 

@@ -2,7 +2,8 @@
 
 use super::cases::Case;
 use super::effect;
-use identify::run::{estimates, identify, problem};
+use identify::effect_reports::estimates;
+use identify::run::{identify, problem};
 
 const DURATION_S: f64 = 20.0;
 
