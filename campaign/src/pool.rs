@@ -18,6 +18,8 @@ use std::time::Duration;
 const LOOK: Duration = Duration::from_millis(50);
 /// Host time in which a worker must have read its inputs.
 const START: Duration = Duration::from_secs(60);
+/// Workers that may die of one flight: the first may have been ended by the host, for want of memory for example.
+const ATTEMPTS: usize = 2;
 /// Workers that are started, one after another, before the campaign is given up.
 const STARTS: usize = 3;
 
@@ -86,23 +88,38 @@ impl Pool<'_> {
     ) -> Result<()> {
         let mut worker = None;
         while let Some(job) = next() {
+            match self.fly_one(&job, &mut worker, stop)? {
+                Some(row) => rows.send(Ok(row))?,
+                None => return Ok(()),
+            }
+        }
+        Ok(())
+    }
+
+    /// Flies a flight on `worker`, or on a new one where that is gone; once more if the worker dies. `None` if the campaign is
+    /// stopped.
+    fn fly_one(&self, job: &Job, worker: &mut Option<Worker>, stop: &StopToken) -> Result<Option<Row>> {
+        let mut deaths = Vec::new();
+        while deaths.len() < ATTEMPTS {
             let mut alive = match worker.take() {
                 Some(worker) => worker,
                 None => match self.start(stop)? {
                     Some(started) => started,
-                    None => return Ok(()),
+                    None => return Ok(None),
                 },
             };
-            match alive.fly(&job, self.timeout, stop)? {
+            match alive.fly(job, self.timeout, stop)? {
                 Flown::Row(row) => {
-                    worker = Some(alive);
-                    rows.send(Ok(row))?;
+                    *worker = Some(alive);
+                    return Ok(Some(row));
                 }
-                Flown::Ended(why) => rows.send(Ok(Row::ended(job.flight, why)))?,
-                Flown::Stopped => return Ok(()),
+                Flown::Died(why) => deaths.push(why),
+                Flown::Late(why) => return Ok(Some(Row::ended(job.flight, why))),
+                Flown::Stopped => return Ok(None),
             }
         }
-        Ok(())
+        let why = format!("{ATTEMPTS} workers died of it: {}", deaths.join("; "));
+        Ok(Some(Row::ended(job.flight, why)))
     }
 
     /// Starts a worker, again if it dies before it is ready; `None` if the campaign is stopped meanwhile.
@@ -130,8 +147,10 @@ enum Greeted {
 /// End of a flight.
 enum Flown {
     Row(Row),
-    /// The worker died or was ended; the reason.
-    Ended(String),
+    /// The worker died; how.
+    Died(String),
+    /// The flight took longer than it may.
+    Late(String),
     /// The campaign was stopped.
     Stopped,
 }
@@ -200,10 +219,10 @@ impl Worker {
             Answer::Line(line) => {
                 Flown::Row(serde_json::from_str(&line).context("a worker's answer is not a row")?)
             }
-            Answer::Dead(why) => Flown::Ended(format!("the worker {why}")),
+            Answer::Dead(why) => Flown::Died(format!("the worker {why}")),
             Answer::Late => {
                 let seconds = timeout.as_secs_f64();
-                Flown::Ended(format!("the flight took more than {seconds} s of host time (timeout_s_host)"))
+                Flown::Late(format!("the flight took more than {seconds} s of host time (timeout_s_host)"))
             }
             Answer::Stopped => Flown::Stopped,
         })
@@ -244,5 +263,59 @@ fn described(status: ExitStatus) -> String {
         (Some(signal), _) => format!("was ended by signal {signal}"),
         (_, Some(code)) => format!("ended with exit code {code}"),
         _ => "ended".to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Pool;
+    use crate::row::Row;
+    use crate::worker::{Job, Order};
+    use runtime::event::StopToken;
+    use std::collections::BTreeMap;
+    use std::path::PathBuf;
+    use std::time::Duration;
+
+    /// A worker that kills itself when it is handed flight 1 for the first time, and whenever it is handed flight 2.
+    const DIES: &str = r#"
+        read -r order; echo '"Ready"'
+        while read -r job; do
+            flight=${job#*:}; flight=${flight%%,*}
+            echo "$flight" >>"$0/flown"
+            case $flight in
+                1) mkdir "$0/once" 2>/dev/null && kill -9 $$ ;;
+                2) kill -9 $$ ;;
+            esac
+            echo "{\"flight\":$flight,\"passed\":true,\"failed\":null,\"failed_at_s\":null,\"error\":null,\"figures\":[],\"wall_s\":0.0}"
+        done
+    "#;
+
+    #[test]
+    fn a_flight_whose_worker_died_is_flown_again_once_and_then_counted_as_lost() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().to_str().unwrap().to_owned();
+        let command = ["sh", "-c", DIES, &path].map(str::to_owned);
+        let order = Order {
+            build: String::new(),
+            path: PathBuf::new(),
+            text: String::new(),
+            fingerprint: String::new(),
+            folder: folder.path().to_owned(),
+        };
+        let pool = Pool { command: &command, workers: 1, order: &order, timeout: Duration::from_secs(60) };
+        let mut rows: BTreeMap<u64, Row> = BTreeMap::new();
+        let jobs = (0..4).map(|flight| Job { flight, sets: Vec::new() });
+        pool.fly(jobs, &StopToken::new(), |row| {
+            rows.insert(row.flight, row);
+            Ok(())
+        })
+        .unwrap();
+        let passed: Vec<u64> = rows.values().filter(|row| row.passed).map(|row| row.flight).collect();
+        assert_eq!(passed, [0, 1, 3]);
+        let died = "the worker was ended by signal 9";
+        let why = format!("2 workers died of it: {died}; {died}");
+        assert!(rows[&2].is_of_host && rows[&2].error.as_deref() == Some(&why), "{:?}", rows[&2]);
+        let flown = std::fs::read_to_string(folder.path().join("flown")).unwrap();
+        assert_eq!(flown, "0\n1\n1\n2\n2\n3\n");
     }
 }
