@@ -165,6 +165,7 @@ impl Campaign {
             })
         }))?;
         require_names(&vary)?;
+        require_keys(&vary)?;
         let flights = flights(&file, &vary).map_err(|error| {
             let span = file.flights.as_ref().map_or(0..0, Spanned::span);
             at(&span, error, "docs/campaigns.md lists the keys of a campaign")
@@ -264,6 +265,19 @@ fn require_names(vary: &[Varied]) -> Result<(), Diagnostic> {
             return Err(
                 varied.problem(ParameterError::conflict("name", message), "give each a `name` of its own")
             );
+        }
+    }
+    Ok(())
+}
+
+/// Refuses a key that two varied values set, or one value twice: the last one would win.
+fn require_keys(vary: &[Varied]) -> Result<(), Diagnostic> {
+    let keys = vary.iter().flat_map(|varied| varied.keys.iter().map(move |key| (varied, key.trim())));
+    let keys: Vec<(&Varied, &str)> = keys.collect();
+    for (index, (varied, key)) in keys.iter().enumerate() {
+        if keys[..index].iter().any(|(_, other)| other == key) {
+            let error = ParameterError::conflict("key", format!("`{key}` is varied twice"));
+            return Err(varied.problem(error, "leave one of them out, or vary another key"));
         }
     }
     Ok(())
@@ -369,6 +383,14 @@ mod tests {
             (
                 "flights = 2\n[[vary]]\nkey = \"a.x\"\nvalues = [1]\n[[vary]]\nkey = \"b.x\"\nvalues = [1]",
                 "c.toml:6:1: two varied values are called `x`",
+            ),
+            (
+                "flights = 2\n[[vary]]\nname = \"one\"\nkey = \"a.x\"\nvalues = [1]\n[[vary]]\nname = \"two\"\nkeys = [\"b.x\", \"a.x\"]\nvalues = [1]",
+                "c.toml:7:1: `a.x` is varied twice",
+            ),
+            (
+                "flights = 2\n[[vary]]\nkeys = [\"a.x\", \"a.x\"]\nvalues = [1]",
+                "c.toml:3:1: `a.x` is varied twice",
             ),
         ] {
             let found = parse(text).unwrap_err();
