@@ -33,7 +33,7 @@ pub const HELP: &str = "Example: hummingbus campaign manifests/campaigns/hover-r
 /// The page of the report.
 const PAGE: &str = "report.html";
 /// Progress of a campaign.
-const BAR: &str = "{bar:30} {pos}/{len} flights  {per_sec}, {eta} left  {msg}";
+const BAR: &str = "{bar:30} {pos}/{len} flights  {rate}, {left} left  {msg}";
 /// Flights that are checked before the first one is flown.
 const CHECKED: usize = 3;
 
@@ -159,9 +159,8 @@ impl Opened {
     fn fly(&mut self, mut rows: BTreeMap<u64, Row>) -> Result<BTreeMap<u64, Row>> {
         let jobs = jobs(&self.campaign, &self.base, &self.plan, &rows)?;
         require_flyable(&self.base, &jobs)?;
-        let bar = progress::bar(BAR, self.flying.json);
-        bar.set_length(self.plan.flights.len() as u64);
-        bar.set_position(rows.len() as u64);
+        let (flown, planned) = (rows.len() as u64, self.plan.flights.len() as u64);
+        let bar = progress::bar_from(BAR, flown, planned, self.flying.json);
         let Self { flying, campaign, base, plan, figures, store } = self;
         let (path, text, fingerprint) = (flying.path.clone(), flying.text.clone(), base.fingerprint.clone());
         let order =

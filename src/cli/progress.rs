@@ -1,8 +1,10 @@
 //! Progress of a command on the terminal.
 
 use super::output::say;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use runtime::event::RunEvent;
+use std::fmt::Write;
+use std::time::Duration;
 
 /// Times a second a bar is drawn at most.
 const DRAW_HZ: u8 = 10;
@@ -15,6 +17,34 @@ pub fn bar(template: &str, is_quiet: bool) -> ProgressBar {
         if is_quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr_with_hz(DRAW_HZ) };
     let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
     ProgressBar::with_draw_target(None, target).with_style(style)
+}
+
+/// A bar like `template` that begins at `start` of `length`: its keys `rate` and `left` tell of the steps from there on, since
+/// earlier ones took time that nobody measured.
+pub fn bar_from(template: &str, start: u64, length: u64, is_quiet: bool) -> ProgressBar {
+    let bar = bar(template, is_quiet);
+    let rate = move |state: &ProgressState, out: &mut dyn Write| {
+        // A bar that cannot be drawn is left out.
+        let _ = write!(out, "{:.1}/s", rate_hz(state, start));
+    };
+    let left = move |state: &ProgressState, out: &mut dyn Write| {
+        let rate_hz = rate_hz(state, start);
+        let steps = state.len().unwrap_or(0).saturating_sub(state.pos());
+        let _ = match Duration::try_from_secs_f64(steps as f64 / rate_hz) {
+            Ok(left) => write!(out, "{:#}", HumanDuration(left)),
+            Err(_) => write!(out, "–"),
+        };
+    };
+    let bar = bar.with_position(start);
+    bar.set_style(bar.style().with_key("rate", rate).with_key("left", left));
+    bar.set_length(length);
+    bar
+}
+
+/// Steps a second since the bar was made, at `start`.
+fn rate_hz(state: &ProgressState, start: u64) -> f64 {
+    let elapsed_s = state.elapsed().as_secs_f64();
+    if elapsed_s > 0.0 { state.pos().saturating_sub(start) as f64 / elapsed_s } else { 0.0 }
 }
 
 /// Shows an event of a run: its ticks, their rate and the real-time factor.
@@ -39,5 +69,21 @@ pub fn finish(bar: &ProgressBar) {
     if !bar.is_hidden() {
         // The next output starts on a line of its own.
         say("");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{bar_from, rate_hz};
+    use std::time::Duration;
+
+    #[test]
+    fn the_rate_of_a_continued_campaign_is_that_of_its_own_flights() {
+        let bar = bar_from("{rate} {left}", 900, 1000, true).with_elapsed(Duration::from_secs(10));
+        bar.inc(5);
+        bar.update(|state| {
+            let found = rate_hz(state, 900);
+            assert!((found - 0.5).abs() < 0.01, "{found}");
+        });
     }
 }
