@@ -38,15 +38,24 @@ impl Base {
         let forced = [format!("run.record={NO_RECORDING}"), "run.pace=free".to_owned()];
         let overrides = [&campaign.set[..], &forced].concat();
         let files = InputFiles::default();
+        let mut lines = 0;
         let (manifest, from) = match &campaign.start {
-            Start::Manifest(path) => (read_manifest(path, campaign, &overrides, &files, registry)?, None),
+            Start::Manifest(path) => {
+                let read = || format!("cannot read the manifest {}", path.display());
+                let text = files.text(path).with_context(read)?;
+                lines = text.matches('\n').count() + 1;
+                let manifest = Manifest::parse(campaign.measures.behind(text), path, &overrides, registry);
+                let placed = |error: Diagnostic| in_place(campaign, path, lines, error.into());
+                (manifest.map_err(placed)?, None)
+            }
             Start::Checkpoint(path) => {
                 let from = Checkpoint::read(path)?;
                 let about = || format!("cannot go on from {}", path.display());
                 (from.load_manifest(&overrides, registry).with_context(about)?, Some(from))
             }
         };
-        let graph = runtime::require_flyable(&manifest, files, from.as_ref())?;
+        let graph = runtime::require_flyable(&manifest, files, from.as_ref())
+            .map_err(|error| in_place(campaign, &manifest.path, lines, error))?;
         require_judgement(&manifest)?;
         require_different(&campaign.vary, &columns(&manifest.content))?;
         let fingerprint = fingerprint(campaign, &manifest, from.as_ref(), &graph);
@@ -107,18 +116,9 @@ impl Base {
     }
 }
 
-/// The manifest at `path`, with the measures of `campaign`.
-fn read_manifest(
-    path: &Path,
-    campaign: &Campaign,
-    overrides: &[String],
-    files: &InputFiles,
-    registry: Registry,
-) -> Result<Manifest> {
-    let text = files.text(path).with_context(|| format!("cannot read the manifest {}", path.display()))?;
-    // Measures are tables: they may stand behind everything else.
-    let text = if campaign.measures.is_empty() { text } else { format!("{text}\n{}", campaign.measures) };
-    Ok(Manifest::parse(text, path, overrides, registry)?)
+/// The error with the place of a measure in the campaign file.
+fn in_place(campaign: &Campaign, manifest: &Path, lines: usize, error: anyhow::Error) -> anyhow::Error {
+    campaign.measures.placed(error, &manifest.display().to_string(), lines)
 }
 
 /// Digest of everything but the drawn numbers that a row depends on.

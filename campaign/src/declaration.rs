@@ -1,6 +1,7 @@
 //! The campaign file.
 
 use crate::distribution::Distribution;
+use crate::measures::Measures;
 use diagnostics::{Diagnostic, ParameterError, Place, read_toml};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
@@ -35,8 +36,8 @@ pub struct Campaign {
     pub sampling: Sampling,
     /// Overrides of all flights, as `--set` takes them.
     pub set: Vec<String>,
-    /// Measures beside those of the manifest, as TOML `[[measure]]` tables.
-    pub measures: String,
+    /// Measures beside those of the manifest.
+    pub measures: Measures,
     /// Varied values.
     pub vary: Vec<Varied>,
     /// Host time after which a flight is given up, in seconds.
@@ -110,7 +111,7 @@ struct File {
     #[serde(default)]
     set: Vec<String>,
     #[serde(default)]
-    measure: Vec<toml::Table>,
+    measure: Vec<Spanned<toml::Table>>,
     #[serde(default)]
     vary: Vec<Spanned<Vary>>,
     timeout_s_host: Option<Spanned<f64>>,
@@ -192,18 +193,14 @@ impl Campaign {
             at(&span, error, "name a manifest, or a checkpoint that all flights go on from")
         })?;
         if let (Start::Checkpoint(_), Some(measure)) = (&start, file.measure.first()) {
-            let name = measure.get("name").map_or(String::new(), |name| format!(" {name}"));
+            let name = measure.get_ref().get("name").map_or(String::new(), |name| format!(" {name}"));
             let message = format!("[[measure]]{name} would see the flight from the checkpoint on only");
             let error = ParameterError::conflict("measure", message);
             return Err(at(&(0..0), error, "write it into the manifest, and write the checkpoint anew"));
         }
-        let mut measures = toml::Table::new();
-        if !file.measure.is_empty() {
-            measures.insert("measure".into(), file.measure.into());
-        }
+        let measures = Measures::of(&name, text, &file.measure);
         let (seed, sampling, set) = (file.seed, file.sampling, file.set);
         let path = path.to_owned();
-        let measures = measures.to_string();
         Ok(Self { path, start, flights, seed, sampling, set, measures, vary, timeout_s_host })
     }
 }

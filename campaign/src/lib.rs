@@ -5,6 +5,7 @@
 //! | [`declaration`] | the campaign file: the manifest, the varied values, the number of flights |
 //! | [`distribution`] | distributions of a varied value |
 //! | [`fork`] | the campaign file of `run --from FILE --fork N --vary …` |
+//! | [`measures`] | measures of the campaign file, read behind the manifest |
 //! | [`draw`] | values of all flights, drawn from the campaign's seed |
 //! | [`plan`] | the plan: the values of every flight, a CSV file that may be edited |
 //! | [`base`] | the manifest that all flights have in common, and the files it reads |
@@ -29,6 +30,7 @@ pub mod draw;
 pub mod flying;
 pub mod fork;
 pub mod gains_file;
+pub mod measures;
 pub mod page;
 pub mod plan;
 pub mod pool;
