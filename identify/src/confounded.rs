@@ -1,7 +1,8 @@
 //! Confounded effects: rivals that explain the flights as well in the place of an accepted effect.
 
 use crate::candidate::{Candidate, free_parameters};
-use crate::fit::{FitResult, Problem};
+use crate::fit::Problem;
+use crate::fit_result::FitResult;
 use crate::judgement::{Judged, fitted, is_clearly_worse, is_worse, without};
 use crate::ratios;
 use crate::select::{Round, Selection};

@@ -2,7 +2,8 @@
 
 use crate::candidate::{Candidate, FAST_COMMANDS, Unidentifiable, free_parameters};
 use crate::confounded::Rival;
-use crate::fit::{FitResult, Problem};
+use crate::fit::Problem;
+use crate::fit_result::FitResult;
 use crate::judgement::is_stopped;
 use crate::logging;
 use crate::parameter::Parameter;

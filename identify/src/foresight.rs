@@ -5,7 +5,8 @@
 //! are fitted on, each with parameters that were fitted on the others.
 
 use crate::disturbance::{DisturbanceModels, Observed};
-use crate::fit::{Equations, FitResult, Problem};
+use crate::fit::{Equations, Problem};
+use crate::fit_result::FitResult;
 use crate::noise;
 use crate::predict::{Measured, WindowEnd, components};
 use crate::prepared::Prepared;

@@ -1,7 +1,8 @@
 //! Judgement of a candidate: its fit beside what was accepted before, and whether that is an effect.
 
 use crate::candidate::{Candidate, free_parameters};
-use crate::fit::{FitResult, Problem};
+use crate::fit::Problem;
+use crate::fit_result::FitResult;
 use crate::logging;
 use crate::sensor_effects::POSE_DELAY;
 use crate::statistics::{chance_of_no_gain, fisher_tail};

@@ -15,7 +15,7 @@
 //! | `parameter`, `sensor_effects` | what may be changed of the model; sensors' errors as effects beside the plant's |
 //! | `candidate` | which effects these flights can show |
 //! | `noise_model`, `whitening` | the noise of a residual: autoregressive within a flight, trims between flights |
-//! | `normal`, `fit` | generalised least squares over blocks of time: an estimation problem and its result |
+//! | `normal`, `fit`, `fit_result` | generalised least squares over blocks of time: an estimation problem and its result |
 //! | `logging` | timing errors that slowly logged commands make |
 //! | `select`, `judgement`, `revision`, `confounded` | the stepwise search for the effects that the flights ask for, its revision by predictions, and their rivals |
 //! | `ratios` | what flights determine that show rotation alone |
@@ -60,6 +60,7 @@ mod envelope;
 mod evidence;
 mod faults;
 mod fit;
+mod fit_result;
 mod foresight;
 mod horizons;
 mod judgement;

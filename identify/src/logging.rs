@@ -5,7 +5,8 @@
 //! delay shorter. Blocks of time do not show this.
 
 use crate::candidate::Candidate;
-use crate::fit::{FitResult, Problem};
+use crate::fit::Problem;
+use crate::fit_result::FitResult;
 use crate::parameter::Parameter;
 use crate::sensor_effects::{IMU_DELAY, POSE_DELAY};
 use plant::effects::EffectKind;

@@ -3,7 +3,8 @@
 use crate::candidate::Candidate;
 use crate::confounded::Rival;
 use crate::digits::rounded;
-use crate::fit::{FitResult, Problem};
+use crate::fit::Problem;
+use crate::fit_result::FitResult;
 use crate::log_rates::LogRates;
 use crate::model::Model;
 use crate::normal::{self, Block};

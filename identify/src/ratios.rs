@@ -4,7 +4,8 @@
 //! as it is. So thrust by inertia is determined, but neither of the two.
 
 use crate::digits::rounded;
-use crate::fit::{FitResult, Problem};
+use crate::fit::Problem;
+use crate::fit_result::FitResult;
 use crate::prepared::{Equation, Prepared};
 use serde::Serialize;
 use std::fmt;

@@ -12,7 +12,8 @@
 
 use crate::candidate::Candidate;
 use crate::disturbance::DisturbanceModels;
-use crate::fit::{FitResult, Problem, unbounded};
+use crate::fit::{Problem, unbounded};
+use crate::fit_result::FitResult;
 use crate::foresight::{ERRORS, Foresight, WindowErrors, ends, errors};
 use crate::normal::{self, Block};
 use crate::predict::WindowEnd;

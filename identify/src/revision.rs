@@ -5,7 +5,8 @@
 //! equations, they may ask for an effect that the equations hardly show. Such a candidate is added if predictions are better with it beyond chance.
 
 use crate::candidate::{Candidate, free_parameters};
-use crate::fit::{FitResult, Problem};
+use crate::fit::Problem;
+use crate::fit_result::FitResult;
 use crate::foresight::Foresight;
 use crate::judgement::{FALSE_RATE, Judged, at_bound, fitted, joint_p_value};
 use crate::logging;

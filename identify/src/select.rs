@@ -20,7 +20,8 @@
 //! [`FALSE_RATE`] once more. The rounds end when nothing changes any more.
 
 use crate::candidate::{Candidate, free_parameters};
-use crate::fit::{FitResult, Problem, unbounded};
+use crate::fit::{Problem, unbounded};
+use crate::fit_result::FitResult;
 use crate::judgement::{
     FALSE_RATE, Judged, fitted, fitted_from, is_clearly_worse, is_worse, judged, p_value, start, without,
 };

@@ -6,7 +6,8 @@
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use crate::candidate::Candidate;
-use crate::fit::{FitResult, Problem};
+use crate::fit::Problem;
+use crate::fit_result::FitResult;
 use crate::lever::{Moments, factors};
 use crate::noise_model::Products;
 use crate::normal;
