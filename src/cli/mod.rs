@@ -41,7 +41,7 @@ mod view;
 
 use anyhow::Result;
 use clap::{CommandFactory as _, Parser, Subcommand};
-use output::{message, readable, say};
+use output::{print_error, print_error_json, readable, say};
 use std::process::ExitCode;
 use table::commands;
 
@@ -156,7 +156,7 @@ pub fn main() -> ExitCode {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::FAILURE,
         Err(error) => {
-            say(&format!("error: {}", message(&error)));
+            print_error(&error);
             ExitCode::from(2)
         }
     }
@@ -173,6 +173,11 @@ fn write_manual(arguments: &completions::ManArguments) -> Result<bool> {
 /// Prints help, the version, or the reason why the arguments are refused. A shell's `*` makes arguments of any names.
 fn refuse(error: &clap::Error) -> ExitCode {
     let text = error.render().to_string();
+    if error.use_stderr() {
+        print_error_json(
+            &serde_json::json!({ "error": text.trim_end().trim_start_matches("error: "), "faults": [] }),
+        );
+    }
     if readable(&text) == text {
         // In colour where the terminal has it.
         error.exit();

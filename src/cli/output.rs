@@ -4,8 +4,13 @@
 use anyhow::{Context, Result};
 use diagnostics::{Diagnostic, printable, printable_json, short_lines};
 use serde::Serialize;
+use serde_json::{Value, json};
 use std::borrow::Cow;
 use std::io::Write as _;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// True once a JSON document was printed: a command prints one.
+static HAS_PRINTED_JSON: AtomicBool = AtomicBool::new(false);
 
 /// Prints a text for people to standard output.
 pub fn print_text(text: &str) -> Result<()> {
@@ -14,6 +19,7 @@ pub fn print_text(text: &str) -> Result<()> {
 
 /// Prints `value` as JSON to standard output.
 pub fn print_json(value: &impl Serialize) -> Result<()> {
+    HAS_PRINTED_JSON.store(true, Ordering::Relaxed);
     print(&printable_json(&serde_json::to_string_pretty(value)?))
 }
 
@@ -69,6 +75,39 @@ pub fn message(error: &anyhow::Error) -> String {
             format!("{text}: {cause:#}")
         }
     })
+}
+
+/// Prints the error of a command on standard error. Where `--json` asks for it, a program finds it on standard output, too: `error` is the text, and
+/// `faults` are the places in files.
+pub fn print_error(error: &anyhow::Error) {
+    say(&format!("error: {}", message(error)));
+    print_error_json(&json!({ "error": message(error), "faults": faults(error) }));
+}
+
+/// Prints `value` as JSON if the arguments ask for JSON, and no document was printed before.
+pub fn print_error_json(value: &Value) {
+    let asks = std::env::args_os().take_while(|word| word != "--").any(|word| word == "--json");
+    if asks && !HAS_PRINTED_JSON.load(Ordering::Relaxed) {
+        // The text is on standard error, whatever becomes of this.
+        let _ = print_json(value);
+    }
+}
+
+/// The faults of files that an error is about.
+fn faults(error: &anyhow::Error) -> Vec<Value> {
+    let diagnostic = error.chain().find_map(|cause| cause.downcast_ref::<Diagnostic>());
+    let one = |fault: Diagnostic| {
+        let (line, column) = fault.place.as_ref().map(|place| (place.line, place.column)).unzip();
+        json!({
+            "file": fault.file,
+            "line": line,
+            "column": column,
+            "key": fault.key(),
+            "message": fault.error.to_string(),
+            "help": fault.help,
+        })
+    };
+    diagnostic.map_or(Vec::new(), |diagnostic| diagnostic.all().map(one).collect())
 }
 
 /// Prints warnings on standard error.

@@ -108,6 +108,26 @@ pub fn refused_setting(manifest: &str, settings: &[&str]) -> Ended {
 }
 
 #[test]
+fn programs_find_a_refusal_as_json() {
+    let place = Place::new();
+    let path = place.write("wrong.toml", good().replace("duration_s = 0.1", "duration_s = 0.1\nrate = 1"));
+    for command in ["run", "check", "profile"] {
+        let ended = place.call(&[command, &path, "--json"]).with_code(2);
+        let found = ended.json();
+        let fault = &found["faults"][0];
+        assert_eq!((&fault["file"], &fault["key"]), (&path.as_str().into(), &"run.rate".into()), "{ended}");
+        assert_eq!((fault["line"].as_u64(), fault["column"].as_u64()), (Some(3), Some(1)), "{ended}");
+        assert!(fault["message"].as_str().unwrap().starts_with("unknown key `run.rate`"), "{ended}");
+        let text = found["error"].as_str().unwrap();
+        assert!(ended.error.contains(text) && text.contains(":3:1: unknown key"), "{ended}");
+        // Nobody who asks for no JSON gets any.
+        assert_eq!(place.call(&[command, &path]).with_code(2).output, "");
+    }
+    let ended = place.call(&["check", "--json"]).with_code(2);
+    assert!(ended.json()["error"].as_str().unwrap().contains("required arguments"), "{ended}");
+}
+
+#[test]
 fn the_good_manifest_flies() {
     let place = Place::new();
     let path = place.write("good.toml", good());
