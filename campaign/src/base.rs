@@ -2,9 +2,9 @@
 
 use crate::declaration::{Campaign, Meaning, Start, Varied};
 use crate::draw::rounded;
-use crate::row::{columns, require_different};
+use crate::row::{columns, require_different, verdict_columns};
 use anyhow::{Context, Result, bail};
-use diagnostics::{Diagnostic, ParameterError};
+use diagnostics::{Diagnostic, ParameterError, did_you_mean};
 use inputs::{InputFiles, sha256};
 use runtime::checkpoint::Checkpoint;
 use runtime::graph::Graph;
@@ -23,6 +23,12 @@ pub struct Base {
     pub from: Option<Checkpoint>,
     /// Files that were read.
     pub files: InputFiles,
+    /// Names of the figures of a row.
+    pub figures: Vec<String>,
+    /// Names of the verdicts of a row.
+    pub verdicts: Vec<String>,
+    /// Indices of the figures that table and report keep.
+    pub kept: Vec<usize>,
     /// Digest of all texts and files, and of the meaning of the varied values.
     pub fingerprint: String,
     /// Declared numbers by key: the manifest is not read again for each flight.
@@ -57,9 +63,12 @@ impl Base {
         let graph = runtime::require_flyable(&manifest, files, from.as_ref())
             .map_err(|error| in_place(campaign, &manifest.path, lines, error))?;
         require_judgement(&manifest)?;
-        require_different(&campaign.vary, &columns(&manifest.content))?;
+        let (figures, verdicts) = (columns(&manifest.content), verdict_columns(&manifest.content));
+        require_different(&campaign.vary, &[&figures[..], &verdicts].concat())?;
+        let kept = kept(campaign, &figures)?;
         let fingerprint = fingerprint(campaign, &manifest, from.as_ref(), &graph);
-        Ok(Self { manifest, from, files: graph.files, fingerprint, declared: Mutex::default() })
+        let declared = Mutex::default();
+        Ok(Self { manifest, from, files: graph.files, figures, verdicts, kept, fingerprint, declared })
     }
 
     /// Values of `varied` for a drawn number: by key.
@@ -119,6 +128,29 @@ impl Base {
 /// The error with the place of a measure in the campaign file.
 fn in_place(campaign: &Campaign, manifest: &Path, lines: usize, error: anyhow::Error) -> anyhow::Error {
     campaign.measures.placed(error, &manifest.display().to_string(), lines)
+}
+
+/// Indices of the figures that the campaign file chooses, in its order.
+fn kept(campaign: &Campaign, figures: &[String]) -> Result<Vec<usize>, Diagnostic> {
+    let Some(chosen) = &campaign.figures else { return Ok((0..figures.len()).collect()) };
+    let mut kept = Vec::new();
+    for (name, place) in chosen {
+        let refused = |message: String, help: String| {
+            Err(Diagnostic::at(place.clone(), ParameterError::conflict("figures", message)).help(help))
+        };
+        match figures.iter().position(|figure| figure == name) {
+            Some(index) if kept.contains(&index) => {
+                return refused(format!("the figure `{name}` stands twice"), "leave it out once".to_owned());
+            }
+            Some(index) => kept.push(index),
+            None => {
+                let known = figures.iter().map(String::as_str);
+                let help = did_you_mean(name, known, "the figures are");
+                return refused(format!("no flight has a figure `{name}`"), help);
+            }
+        }
+    }
+    Ok(kept)
 }
 
 /// Digest of everything but the drawn numbers that a row depends on.

@@ -38,6 +38,8 @@ pub struct Campaign {
     pub set: Vec<String>,
     /// Measures beside those of the manifest.
     pub measures: Measures,
+    /// Names of the figures that table and report keep, with their places; all where absent.
+    pub figures: Option<Vec<(String, Place)>>,
     /// Varied values.
     pub vary: Vec<Varied>,
     /// Host time after which a flight is given up, in seconds.
@@ -112,6 +114,7 @@ struct File {
     set: Vec<String>,
     #[serde(default)]
     measure: Vec<Spanned<toml::Table>>,
+    figures: Option<Vec<Spanned<String>>>,
     #[serde(default)]
     vary: Vec<Spanned<Vary>>,
     timeout_s_host: Option<Spanned<f64>>,
@@ -199,9 +202,13 @@ impl Campaign {
             return Err(at(&(0..0), error, "write it into the manifest, and write the checkpoint anew"));
         }
         let measures = Measures::of(&name, text, &file.measure);
+        let placed = |figure: &Spanned<String>| {
+            (figure.get_ref().clone(), Place::of(name.clone(), text, &figure.span()))
+        };
+        let figures = file.figures.as_ref().map(|figures| figures.iter().map(placed).collect());
         let (seed, sampling, set) = (file.seed, file.sampling, file.set);
         let path = path.to_owned();
-        Ok(Self { path, start, flights, seed, sampling, set, measures, vary, timeout_s_host })
+        Ok(Self { path, start, flights, seed, sampling, set, measures, figures, vary, timeout_s_host })
     }
 }
 
@@ -281,7 +288,7 @@ fn require_keys(vary: &[Varied]) -> Result<(), Diagnostic> {
 }
 
 /// Columns of the results of every campaign.
-pub const COLUMNS: [&str; 6] = ["flight", "passed", "failed", "failed_at_s", "error", "wall_s"];
+pub const COLUMNS: [&str; 7] = ["flight", "run.seed", "passed", "failed", "failed_at_s", "error", "version"];
 
 /// Name of the value at `key`: its last part, with the one before it where that is a column of every campaign, such as the
 /// `error` of the effect `mass-error`.

@@ -1,7 +1,6 @@
 //! The gains file that a tuning writes: the declared one with other numbers, each with its origin.
 
 use crate::search::{Change, Outcome, TunedGain};
-use crate::worker::VERSION;
 use anyhow::{Context, Result};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -10,11 +9,19 @@ use toml_edit::{DocumentMut, Item, Value};
 /// Start of every gains file that a tuning writes.
 pub const START: &str = "# Written by hummingbus tune.";
 
-/// Text of the new gains file: `declared`, the text of the file `name`, with the gains of `outcome`, which `tuning` found.
+/// Text of the new gains file: `declared`, the text of the file `name`, with the gains of `outcome`, which `tuning` found by
+/// hummingbus `build`.
 ///
 /// # Errors
 /// If the declared file is not TOML, or has no place for a gain.
-pub fn text(declared: &str, name: &Path, tuning: &Path, seed: u64, outcome: &Outcome) -> Result<String> {
+pub fn text(
+    declared: &str,
+    name: &Path,
+    tuning: &Path,
+    seed: u64,
+    build: &str,
+    outcome: &Outcome,
+) -> Result<String> {
     let file = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let (name, tuning) = (file(name), file(tuning));
     let mut document: DocumentMut = declared.parse().with_context(|| format!("{name}: not a TOML file"))?;
@@ -23,16 +30,16 @@ pub fn text(declared: &str, name: &Path, tuning: &Path, seed: u64, outcome: &Out
             put(&mut document, key, gain, &tuning).with_context(|| format!("{name}: no place `{key}`"))?;
         }
     }
-    Ok(format!("{}#\n{document}", header(&name, &tuning, seed, outcome)?))
+    Ok(format!("{}#\n{document}", header(&name, &tuning, seed, build, outcome)?))
 }
 
 /// First lines of the file: the tuned file, the flights, and the figures before and after.
-fn header(name: &str, tuning: &str, seed: u64, outcome: &Outcome) -> Result<String> {
+fn header(name: &str, tuning: &str, seed: u64, build: &str, outcome: &Outcome) -> Result<String> {
     let Outcome { generations, candidates, tuned_on, held_out, .. } = outcome;
     let mut text = format!("{START}\n");
     writeln!(
         text,
-        "# {name}, tuned by {tuning}: hummingbus {VERSION}, CMA-ES with seed {seed}, {generations} generations, {candidates}"
+        "# {name}, tuned by {tuning}: hummingbus {build}, CMA-ES with seed {seed}, {generations} generations, {candidates}"
     )?;
     writeln!(text, "# candidates, {} flights each (plan of seed {}).", tuned_on.flights, tuned_on.seed)?;
     let percent = 100.0 * held_out.costs.relative();
@@ -107,14 +114,15 @@ mod tests {
             held_out: comparison.clone(),
         };
         let declared = "# Ours.\n[roll]\np = { value = 16, unit = \"1/s^2\", source = \"tuned\" } # much\nd = 6.0 # plain\n";
-        let write =
-            |gains| text(declared, "a/pid.toml".as_ref(), "b/hover.toml".as_ref(), 1, &outcome(gains));
+        let write = |gains| {
+            text(declared, "a/pid.toml".as_ref(), "b/hover.toml".as_ref(), 1, "0.1.0", &outcome(gains))
+        };
         let found = write(vec![gain("roll.p", 16.0, 12.5), gain("roll.d", 6.0, 7.0)]).unwrap();
         assert!(found.starts_with(START), "{found}");
         let body = "# Ours.\n[roll]\np = { value = 12.5, unit = \"1/s^2\", source = \"hummingbus tune hover.toml; before: 16\" } # much\nd = 7.0 # plain\n";
         assert!(found.ends_with(body), "{found}");
         for line in [
-            "pid.toml, tuned by hover.toml",
+            "pid.toml, tuned by hover.toml: hummingbus 0.1.0, CMA-ES with seed 1",
             "(-50.0 %, standard error 5.0 %)",
             "#   height: 0.500000 0.250000",
         ] {

@@ -1,5 +1,6 @@
 //! The report as one HTML page that needs no network, drawn by `page.js` with plotly.js ([`report::page`]).
 
+use crate::base::Base;
 use crate::plan::Plan;
 use crate::report::Report;
 use crate::row::Row;
@@ -9,15 +10,18 @@ use serde_json::{Value, json};
 /// Flights on the page at most, spread evenly over all: more would make it slow.
 const SHOWN: usize = 5000;
 
-/// The page of `report`, with the `rows` and their `figures` by name.
+/// The page of `report`, with the `rows` and the figures that `base` keeps.
 #[must_use]
-pub fn page(report: &Report, plan: &Plan, figures: &[String], rows: &[Row]) -> Vec<u8> {
+pub fn page(report: &Report, plan: &Plan, base: &Base, rows: &[Row]) -> Vec<u8> {
     let step = rows.len().div_ceil(SHOWN).max(1);
-    let shown: Vec<Value> = rows.iter().step_by(step).map(flight).collect();
+    let shown: Vec<Value> = rows.iter().step_by(step).map(|row| flight(base, row)).collect();
+    let figures: Vec<&String> = base.kept.iter().map(|&index| &base.figures[index]).collect();
     let data = json!({ "report": report, "varied": plan.names, "figures": figures, "flights": shown });
     html(include_str!("page/page.html"), PLOTLY_BASIC, include_str!("page/page.js"), &data)
 }
 
-fn flight(row: &Row) -> Value {
-    json!({ "flight": row.flight, "passed": row.passed, "drawn": row.drawn, "figures": row.figures })
+fn flight(base: &Base, row: &Row) -> Value {
+    let figures: Vec<Option<f64>> =
+        base.kept.iter().map(|&index| row.figures.get(index).copied().flatten()).collect();
+    json!({ "flight": row.flight, "passed": row.passed, "drawn": row.drawn, "figures": figures })
 }

@@ -101,6 +101,16 @@ impl Plan {
         }
         Ok(sets)
     }
+
+    /// Seed of the run of flight `flight`; none where the drawn one is no seed.
+    ///
+    /// # Errors
+    /// As of [`Self::sets`].
+    pub fn seed(&self, campaign: &Campaign, base: &Base, flight: usize) -> Result<Option<i64>> {
+        let sets = self.sets(campaign, base, flight)?;
+        let seed = sets.iter().rev().find_map(|set| set.strip_prefix(SEED)?.strip_prefix('='));
+        Ok(seed.and_then(|seed| seed.parse().ok()))
+    }
 }
 
 /// A number as TOML: whole where its distribution is, since `seed = 3.0` is no seed.

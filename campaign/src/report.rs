@@ -3,9 +3,9 @@
 use crate::base::Base;
 use crate::declaration::{Campaign, Start};
 use crate::plan::Plan;
-use crate::row::{Row, columns, count};
+use crate::row::{Row, count};
 use crate::statistics::{clopper_pearson, quantiles, rank_correlation};
-use anyhow::Result;
+use anyhow::{Context as _, Result};
 use runtime::manifest::PassCondition;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -26,6 +26,8 @@ const CHANCE_MAX: f64 = 1e-3;
 pub struct Report {
     /// The campaign file.
     pub campaign: String,
+    /// Build of hummingbus that flew the flights.
+    pub version: String,
     /// The manifest that was flown.
     pub manifest: String,
     /// The checkpoint that all flights went on from.
@@ -39,6 +41,8 @@ pub struct Report {
     pub passed: u64,
     /// Flights without figures.
     pub broken: u64,
+    /// Those of them that the host ended: the next call flies them again.
+    pub lost: u64,
     /// Part of the flights that passed.
     pub pass_rate: f64,
     /// Its interval at 95 % (Clopper and Pearson).
@@ -51,6 +55,8 @@ pub struct Report {
     pub figures: Vec<Spread>,
     /// Rank correlations that chance does not explain, strongest first.
     pub influences: Vec<Influence>,
+    /// Command that flies a flight again, recorded; `FLIGHT` stands for its number.
+    pub again: String,
     /// Worst flights, worst first.
     pub worst: Vec<Worst>,
 }
@@ -104,16 +110,23 @@ pub struct Worst {
 }
 
 impl Report {
-    /// The report of the `rows` flown so far; `folder` holds the plan.
+    /// The report of the `rows` that hummingbus `build` has flown so far; `folder` holds the plan.
     ///
     /// # Errors
-    /// If the values of a flight cannot be written as overrides.
-    pub fn of(campaign: &Campaign, base: &Base, plan: &Plan, rows: &[Row], folder: &Path) -> Result<Self> {
-        let figures = columns(&base.manifest.content);
+    /// If the values of a flight cannot be written as overrides, or the working directory is gone.
+    pub fn of(
+        campaign: &Campaign,
+        base: &Base,
+        plan: &Plan,
+        rows: &[Row],
+        folder: &Path,
+        build: &str,
+    ) -> Result<Self> {
         let flights = rows.len() as u64;
         let passed = rows.iter().filter(|row| row.passed).count() as u64;
         Ok(Self {
             campaign: campaign.path.display().to_string(),
+            version: build.to_owned(),
             manifest: base.manifest.path.display().to_string(),
             from: match &campaign.start {
                 Start::Manifest(_) => None,
@@ -123,12 +136,14 @@ impl Report {
             flights,
             passed,
             broken: rows.iter().filter(|row| row.error.is_some()).count() as u64,
+            lost: rows.iter().filter(|row| row.is_of_host).count() as u64,
             pass_rate: passed as f64 / flights.max(1) as f64,
             interval: clopper_pearson(passed, flights.max(1), CONFIDENCE),
             failures: failures(rows),
             errors: errors(rows),
-            figures: spreads(&figures, rows),
-            influences: influences(plan, &figures, rows),
+            figures: spreads(base, rows),
+            influences: influences(plan, base, rows),
+            again: again(campaign, folder, "FLIGHT")?,
             worst: worst(campaign, base, plan, rows, folder)?,
         })
     }
@@ -162,19 +177,19 @@ fn errors(rows: &[Row]) -> Vec<(String, u64)> {
     errors
 }
 
-fn spreads(figures: &[String], rows: &[Row]) -> Vec<Spread> {
-    let spread = |(index, figure): (usize, &String)| {
+fn spreads(base: &Base, rows: &[Row]) -> Vec<Spread> {
+    let spread = |&index: &usize| {
         let values: Vec<f64> = rows.iter().filter_map(|row| *row.figures.get(index)?).collect();
         Spread {
-            figure: figure.clone(),
+            figure: base.figures[index].clone(),
             flights: values.len() as u64,
             quantiles: quantiles(&values, &QUANTILES),
         }
     };
-    figures.iter().enumerate().map(spread).collect()
+    base.kept.iter().map(spread).collect()
 }
 
-fn influences(plan: &Plan, figures: &[String], rows: &[Row]) -> Vec<Influence> {
+fn influences(plan: &Plan, base: &Base, rows: &[Row]) -> Vec<Influence> {
     let mut influences = Vec::new();
     for (varied, name) in plan.names.iter().enumerate() {
         let mut add = |figure: &str, value: &dyn Fn(&Row) -> Option<f64>| {
@@ -188,8 +203,8 @@ fn influences(plan: &Plan, figures: &[String], rows: &[Row]) -> Vec<Influence> {
             }
         };
         add("passed", &|row| row.error.is_none().then_some(if row.passed { 1.0 } else { 0.0 }));
-        for (index, figure) in figures.iter().enumerate() {
-            add(figure, &|row| row.figures.get(index).copied().flatten());
+        for &index in &base.kept {
+            add(&base.figures[index], &|row| row.figures.get(index).copied().flatten());
         }
     }
     influences.sort_by(|a, b| b.rank_correlation.abs().total_cmp(&a.rank_correlation.abs()));
@@ -205,7 +220,8 @@ fn worst(campaign: &Campaign, base: &Base, plan: &Plan, rows: &[Row], folder: &P
     ranked.truncate(WORST);
     let listed = |(_, reason, row): (f64, String, &Row)| {
         let sets = plan.sets(campaign, base, row.flight as usize)?;
-        let (command, run) = (again(campaign, folder, row.flight), run(campaign, row.flight, &sets));
+        let command = again(campaign, folder, &row.flight.to_string())?;
+        let run = run(campaign, row.flight, &sets)?;
         Ok(Worst { flight: row.flight, reason, command, run })
     };
     ranked.into_iter().map(listed).collect()
@@ -246,20 +262,26 @@ fn margin(pass: &PassCondition, value: f64) -> f64 {
     below.min(above) / if scale > 0.0 { scale } else { 1.0 }
 }
 
-/// The command that flies a flight again, recorded, to the same figures.
-fn again(campaign: &Campaign, folder: &Path, flight: u64) -> String {
-    let [file, folder] = [&campaign.path, folder].map(|path| word(&path.display().to_string()));
-    format!("hummingbus campaign {file} --out {folder} --fly {flight}")
+/// The command that flies a flight again, recorded, to the same figures; it works from any folder.
+fn again(campaign: &Campaign, folder: &Path, flight: &str) -> Result<String> {
+    let (file, folder) = (absolute(&campaign.path)?, absolute(folder)?);
+    Ok(format!("hummingbus campaign {file} --out {folder} --fly {flight}"))
 }
 
 /// The `run` command of a flight: without the measures of the campaign file, and in no need of the folder.
-fn run(campaign: &Campaign, flight: u64, sets: &[String]) -> String {
+fn run(campaign: &Campaign, flight: u64, sets: &[String]) -> Result<String> {
     let start = match &campaign.start {
-        Start::Manifest(path) => word(&path.display().to_string()),
-        Start::Checkpoint(path) => format!("--from {}", word(&path.display().to_string())),
+        Start::Manifest(path) => absolute(path)?,
+        Start::Checkpoint(path) => format!("--from {}", absolute(path)?),
     };
     let sets = campaign.set.iter().chain(sets).map(|set| format!(" --set {}", word(set)));
-    format!("hummingbus run {start} --record flight-{flight}.mcap{}", sets.collect::<String>())
+    Ok(format!("hummingbus run {start} --record flight-{flight}.mcap{}", sets.collect::<String>()))
+}
+
+/// `path` from the root on, as one word of a shell.
+fn absolute(path: &Path) -> Result<String> {
+    let path = std::path::absolute(path).context("the working directory is gone")?;
+    Ok(word(&inputs::tidy(&path).display().to_string()))
 }
 
 /// `text` as one word of a shell.
@@ -297,7 +319,7 @@ impl fmt::Display for Report {
         if self.influences.is_empty() {
             writeln!(f, "    none that chance does not explain")?;
         }
-        writeln!(f, "  worst flights:")?;
+        writeln!(f, "  worst flights; each is flown again, recorded, by: {}", self.again)?;
         let mut worst = self.worst.iter();
         worst.try_for_each(|Worst { flight, reason, .. }| {
             writeln!(f, "    {flight}: {}", reason.lines().next().unwrap_or_default())

@@ -22,6 +22,9 @@ pub struct Row {
     pub failed_at_s: Option<f64>,
     /// Reason why the flight has no figures: refused values, a failed step, a worker that died.
     pub error: Option<String>,
+    /// Verdicts of the conditions and comparisons of the manifest; empty where the flight was not judged.
+    #[serde(default)]
+    pub verdicts: Vec<bool>,
     /// Figures by column; none where a condition has no value, or it is not a finite number.
     pub figures: Vec<Option<f64>>,
     /// Host time that the flight took, s.
@@ -31,7 +34,7 @@ pub struct Row {
     pub is_of_host: bool,
 }
 
-/// Refuses two columns with one name: `varied` values, `figures`, and the columns of every campaign.
+/// Refuses two columns with one name: `varied` values, `figures` and verdicts, and the columns of every campaign.
 ///
 /// # Errors
 /// The varied value whose name is taken, or the name of two conditions.
@@ -76,6 +79,17 @@ pub fn columns(content: &Content) -> Vec<String> {
     conditions.chain(compare).collect()
 }
 
+/// Names of the verdicts of the conditions and comparisons in `content`: the columns of [`Row::verdicts`].
+#[must_use]
+pub fn verdict_columns(content: &Content) -> Vec<String> {
+    let conditions = content.pass.iter().map(|condition| condition.get_ref().name.clone());
+    let compare = content.compare.iter().map(|compare| {
+        let compare = compare.get_ref();
+        format!("{} after {} s", compare.simulated, compare.window_s)
+    });
+    conditions.chain(compare).map(|name| format!("{name} (passed)")).collect()
+}
+
 impl Row {
     /// The row of flight number `flight`, whose run has this `summary`.
     #[must_use]
@@ -94,8 +108,10 @@ impl Row {
         }
         let (failed, failed_at_s) = first_failure(summary);
         let (passed, wall_s) = (summary.passed, summary.host_s);
+        let conditions = summary.pass.iter().map(|verdict| verdict.passed);
+        let verdicts = conditions.chain(summary.compare.iter().map(|errors| errors.passed)).collect();
         let (drawn, error, is_of_host) = (Vec::new(), None, false);
-        Self { flight, drawn, passed, failed, failed_at_s, error, figures, wall_s, is_of_host }
+        Self { flight, drawn, passed, failed, failed_at_s, error, verdicts, figures, wall_s, is_of_host }
     }
 
     /// The row of a flight that the host ended.

@@ -5,7 +5,6 @@
 use crate::declaration::Campaign;
 use crate::plan::Plan;
 use crate::row::Row;
-use crate::worker::VERSION;
 use anyhow::{Context, Result, bail};
 use inputs::sha256;
 use serde::{Deserialize, Serialize};
@@ -37,10 +36,39 @@ pub struct Store {
 
 /// First line of the rows: what they were flown of.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
-struct Header {
-    version: String,
-    fingerprint: String,
-    figures: Vec<String>,
+pub struct Header {
+    /// Build of hummingbus.
+    pub build: String,
+    /// Digest of the inputs ([`crate::base::Base::fingerprint`]).
+    pub fingerprint: String,
+    /// Names of the figures.
+    pub figures: Vec<String>,
+    /// Names of the verdicts.
+    pub verdicts: Vec<String>,
+}
+
+impl Header {
+    /// Refuses rows whose first line `found` says that they are of other inputs or of another build.
+    fn require_same(&self, found: &str) -> Result<()> {
+        let found: serde_json::Value =
+            serde_json::from_str(found).context("not the rows of a campaign; choose another --out")?;
+        // Rows of version 0.1.0 had a version without its commit.
+        let build = found["build"].as_str().or(found["version"].as_str());
+        let build = build.context("not the rows of a campaign; choose another --out")?;
+        if build != self.build {
+            bail!(
+                "its flights were flown by hummingbus {build}, this is hummingbus {}: rows of two builds are not mixed; go on \
+                 with that build, choose another --out, or remove the file to fly all flights again",
+                self.build
+            );
+        }
+        if serde_json::from_value::<Self>(found).ok().as_ref() != Some(self) {
+            bail!(
+                "its flights were flown of other inputs; choose another --out, or remove the file to fly them again"
+            );
+        }
+        Ok(())
+    }
 }
 
 impl Store {
@@ -51,8 +79,7 @@ impl Store {
     pub fn open(
         folder: &Path,
         campaign: &Campaign,
-        fingerprint: &str,
-        figures: &[String],
+        header: &Header,
     ) -> Result<(Self, Plan, BTreeMap<u64, Row>)> {
         let shown = folder.display();
         std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {shown}"))?;
@@ -64,20 +91,15 @@ impl Store {
             forget(folder, &mut lock)?;
         }
         let plan = plan(folder, campaign, &mut lock)?;
-        let header = Header {
-            version: VERSION.to_owned(),
-            fingerprint: fingerprint.to_owned(),
-            figures: figures.to_owned(),
-        };
         let path = folder.join(ROWS);
-        let (mut flown, whole) = if path.exists() { read(&path, &header)? } else { (BTreeMap::new(), 0) };
+        let (mut flown, whole) = if path.exists() { read(&path, header)? } else { (BTreeMap::new(), 0) };
         // The plan may have been edited since, and what the host ended is flown again.
         flown.retain(|flight, row| !row.is_of_host && plan.flights.get(*flight as usize) == Some(&row.drawn));
         let mut rows = opened(&path, OpenOptions::new().create(true).append(true))?;
         // A line that was cut off is written again.
         rows.set_len(whole)?;
         if whole == 0 {
-            writeln!(rows, "{}", serde_json::to_string(&header)?)?;
+            writeln!(rows, "{}", serde_json::to_string(header)?)?;
         }
         let work = tempfile::Builder::new().prefix(WORK).tempdir_in(folder);
         let work = work.with_context(|| format!("cannot make a folder in {shown}"))?;
@@ -222,14 +244,7 @@ fn read(path: &Path, header: &Header) -> Result<(BTreeMap<u64, Row>, u64)> {
         && line.ends_with('\n')
     {
         if whole == 0 {
-            let found: Header = serde_json::from_str(&line)
-                .with_context(|| format!("{shown}: not the rows of a campaign; choose another --out"))?;
-            if found != *header {
-                bail!(
-                    "{shown}: its flights were flown of other inputs or by another version; choose another --out, or \
-                     remove the file to fly them again"
-                );
-            }
+            header.require_same(&line).with_context(|| format!("cannot go on with {shown}"))?;
         } else {
             let row: Row = serde_json::from_str(&line).with_context(|| {
                 format!("{shown}:{number}: expected a row as JSON; remove the line to fly its flight again")
@@ -245,17 +260,22 @@ fn read(path: &Path, header: &Header) -> Result<(BTreeMap<u64, Row>, u64)> {
 
 #[cfg(test)]
 mod tests {
-    use super::Store;
+    use super::{Header, Store};
     use crate::declaration::Campaign;
     use crate::row::Row;
     use std::io::Write as _;
+
+    fn header(build: &str, fingerprint: &str) -> Header {
+        let (build, fingerprint) = (build.to_owned(), fingerprint.to_owned());
+        Header { build, fingerprint, figures: vec!["f".to_owned()], verdicts: Vec::new() }
+    }
 
     #[test]
     fn a_folder_goes_on_where_it_was_cut_off_and_refuses_others() {
         let text = "manifest = \"a.toml\"\nflights = 3\n[[vary]]\nkey = \"x\"\nvalues = [1]";
         let campaign = Campaign::parse("c.toml".as_ref(), text).unwrap();
         let folder = tempfile::tempdir().unwrap();
-        let open = |fingerprint: &str| Store::open(folder.path(), &campaign, fingerprint, &["f".to_owned()]);
+        let open = |fingerprint: &str| Store::open(folder.path(), &campaign, &header("1", fingerprint));
         let (mut store, plan, flown) = open("a").unwrap();
         assert!(flown.is_empty() && plan.flights.len() == 3);
         let row = |flight: u64, drawn: f64| Row {
@@ -277,11 +297,13 @@ mod tests {
         let (store, _, flown) = open("a").unwrap();
         assert_eq!(flown.into_values().collect::<Vec<_>>(), [row(1, 1.0)]);
         drop(store);
-        let error = open("b").unwrap_err().to_string();
+        let error = format!("{:#}", open("b").unwrap_err());
         assert!(error.contains("flown of other inputs"), "{error}");
+        let error = format!("{:#}", Store::open(folder.path(), &campaign, &header("2", "a")).unwrap_err());
+        assert!(error.contains("flown by hummingbus 1, this is hummingbus 2"), "{error}");
         let more = Campaign { flights: 4, ..campaign.clone() };
         // Rows were flown: the plan of another campaign file is not drawn over them.
-        let error = Store::open(folder.path(), &more, "a", &["f".to_owned()]).unwrap_err().to_string();
+        let error = Store::open(folder.path(), &more, &header("1", "a")).unwrap_err().to_string();
         assert!(error.contains("drawn of a campaign file with other flights"), "{error}");
     }
 
@@ -291,7 +313,7 @@ mod tests {
         let campaign = Campaign::parse("c.toml".as_ref(), text).unwrap();
         let more = Campaign { flights: 4, ..campaign.clone() };
         let folder = tempfile::tempdir().unwrap();
-        let open = |campaign, fingerprint| Store::open(folder.path(), campaign, fingerprint, &[]);
+        let open = |campaign, fingerprint| Store::open(folder.path(), campaign, &header("1", fingerprint));
         open(&campaign, "a").unwrap();
         assert_eq!(open(&more, "b").unwrap().1.flights.len(), 4);
         let path = folder.path().join(super::PLAN);
@@ -308,7 +330,7 @@ mod tests {
         let campaign = Campaign::parse("c.toml".as_ref(), text).unwrap();
         let folder = tempfile::tempdir().unwrap();
         std::fs::create_dir(folder.path().join("workers")).unwrap();
-        let error = Store::open(folder.path(), &campaign, "a", &[]).unwrap_err().to_string();
+        let error = Store::open(folder.path(), &campaign, &header("1", "a")).unwrap_err().to_string();
         assert!(error.contains("is not empty, and holds no campaign"), "{error}");
     }
 }

@@ -1,40 +1,67 @@
 //! Writes all rows as Parquet: one row a flight, in the order of the plan.
 
-use crate::plan::Plan;
 use crate::row::Row;
 use anyhow::Result;
 use report::columns::{Column, write_parquet};
 use std::fs::File;
 
-/// Writes the `rows` of `plan` to `file`. `figures` names the figures of the rows.
-///
-/// Columns: `flight`; the drawn numbers by their names; `passed`; `failed`, `failed_at_s`, `error`; the figures; `wall_s`,
-/// the host time, which alone differs between two runs of a campaign.
-///
-/// # Errors
-/// If the file cannot be written.
-pub fn write(file: &mut File, plan: &Plan, figures: &[String], rows: &[Row]) -> Result<()> {
-    let columns = columns(plan, figures, rows);
-    let columns: Vec<(&str, &Column)> =
-        columns.iter().map(|(name, column)| (name.as_str(), column)).collect();
-    write_parquet(file, "flights", &columns, &[])
+/// Rows with what they have in common.
+#[derive(Debug)]
+pub struct Table<'a> {
+    /// Names of the varied values.
+    pub varied: &'a [String],
+    /// Names of the verdicts of a row.
+    pub verdicts: &'a [String],
+    /// Names of the figures of a row.
+    pub figures: &'a [String],
+    /// Indices of the figures that the table keeps.
+    pub kept: &'a [usize],
+    /// Build of hummingbus that flew the rows.
+    pub build: &'a str,
+    /// Rows in the order of the plan.
+    pub rows: &'a [Row],
+    /// Seed of the run of each row.
+    pub seeds: Vec<Option<i64>>,
 }
 
-fn columns(plan: &Plan, figures: &[String], rows: &[Row]) -> Vec<(String, Column)> {
-    let numbers = |of: &dyn Fn(&Row) -> Option<f64>| Column::Number(rows.iter().map(of).collect());
-    let texts = |of: &dyn Fn(&Row) -> Option<String>| Column::Text(rows.iter().map(of).collect());
-    let mut columns =
-        vec![("flight".to_owned(), Column::Whole(rows.iter().map(|row| row.flight as i64).collect()))];
-    for (index, name) in plan.names.iter().enumerate() {
-        columns.push((name.clone(), numbers(&|row| row.drawn.get(index).copied())));
+impl Table<'_> {
+    /// Writes the table to `file`.
+    ///
+    /// Columns: `flight`; the drawn numbers by their names; `run.seed`; `passed`; `failed`, `failed_at_s`, `error`; a verdict
+    /// for each condition; the figures; `version`. Host times are in no column: the bytes depend on plan and build alone.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn write(&self, file: &mut File) -> Result<()> {
+        let columns = self.columns();
+        let columns: Vec<(&str, &Column)> =
+            columns.iter().map(|(name, column)| (name.as_str(), column)).collect();
+        write_parquet(file, "flights", &columns, &[])
     }
-    columns.push(("passed".to_owned(), Column::Truth(rows.iter().map(|row| row.passed).collect())));
-    columns.push(("failed".to_owned(), texts(&|row| row.failed.clone())));
-    columns.push(("failed_at_s".to_owned(), numbers(&|row| row.failed_at_s)));
-    columns.push(("error".to_owned(), texts(&|row| row.error.clone())));
-    for (index, name) in figures.iter().enumerate() {
-        columns.push((name.clone(), numbers(&|row| row.figures.get(index).copied().flatten())));
+
+    fn columns(&self) -> Vec<(String, Column)> {
+        let rows = self.rows;
+        let numbers = |of: &dyn Fn(&Row) -> Option<f64>| Column::Number(rows.iter().map(of).collect());
+        let texts = |of: &dyn Fn(&Row) -> Option<String>| Column::Text(rows.iter().map(of).collect());
+        let verdicts = |of: &dyn Fn(&Row) -> Option<bool>| Column::Verdict(rows.iter().map(of).collect());
+        let flights = rows.iter().map(|row| row.flight as i64).collect();
+        let mut columns = vec![("flight".to_owned(), Column::Whole(flights))];
+        for (index, name) in self.varied.iter().enumerate() {
+            columns.push((name.clone(), numbers(&|row| row.drawn.get(index).copied())));
+        }
+        columns.push(("run.seed".to_owned(), Column::Integer(self.seeds.clone())));
+        columns.push(("passed".to_owned(), Column::Truth(rows.iter().map(|row| row.passed).collect())));
+        columns.push(("failed".to_owned(), texts(&|row| row.failed.clone())));
+        columns.push(("failed_at_s".to_owned(), numbers(&|row| row.failed_at_s)));
+        columns.push(("error".to_owned(), texts(&|row| row.error.clone())));
+        for (index, name) in self.verdicts.iter().enumerate() {
+            columns.push((name.clone(), verdicts(&|row| row.verdicts.get(index).copied())));
+        }
+        for &index in self.kept {
+            let value = |row: &Row| row.figures.get(index).copied().flatten();
+            columns.push((self.figures[index].clone(), numbers(&value)));
+        }
+        columns.push(("version".to_owned(), texts(&|_| Some(self.build.to_owned()))));
+        columns
     }
-    columns.push(("wall_s".to_owned(), numbers(&|row| Some(row.wall_s))));
-    columns
 }

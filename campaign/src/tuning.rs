@@ -132,6 +132,11 @@ impl Tuning {
             return Err(Diagnostic::in_file(name, message).help(HELP));
         };
         let (span, tune) = (tune.span(), tune.get_ref());
+        if let Some((_, place)) = campaign.figures.iter().flatten().next() {
+            let message = "the figures of a tuning are those of [[tune.minimise]]";
+            let error = ParameterError::conflict("figures", message);
+            return Err(Diagnostic::at(place.clone(), error).help("leave `figures` out"));
+        }
         let process = tune.check(&campaign).map_err(|error| at(&span, error))?;
         let gains = Diagnostic::gather(tune.gain.iter().map(|gain| {
             let place = Place::of(name.clone(), text, &gain.span());
@@ -307,6 +312,7 @@ mod tests {
         let whole = format!("{HEAD}gains = \"process.c.gains\"\nheld_out = 2\n{GAIN}{TERM}");
         for (from, to, expected) in [
             ("[tune]", "[[measure]]\nname = \"a\"\n[tool]", "unknown"),
+            ("flights = 2", "flights = 2\nfigures = [\"f\"]", "the figures of a tuning are those of"),
             ("process.c.gains", "c.gains", "t.toml:3:1: `gains` must be process.NAME.gains"),
             ("held_out = 2", "held_out = 0", "`held_out` must be at least 1 flight"),
             ("generations = 3", "generations = 0", "`generations` must be at least 1"),

@@ -16,14 +16,11 @@ use std::fs::File;
 use std::io::{BufRead, Write};
 use std::path::{Path, PathBuf};
 
-/// Version of this hummingbus.
-pub const VERSION: &str = env!("CARGO_PKG_VERSION");
-
 /// Campaign that a worker flies for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Order {
-    /// Version of hummingbus that the rows are of.
-    pub version: String,
+    /// Build of hummingbus that the rows are of.
+    pub build: String,
     /// Path of the campaign file.
     pub path: PathBuf,
     /// Its text.
@@ -62,11 +59,11 @@ pub fn take_output() -> std::io::Result<File> {
     Ok(output)
 }
 
-/// Flies what `input` hands out, with the components of `registry`, until it ends.
+/// Flies what `input` hands out, with the components of `registry`, until it ends. `build` names this program.
 ///
 /// # Errors
 /// If input or output break, or a line is not what is expected.
-pub fn serve(registry: Registry, input: impl BufRead, mut output: impl Write) -> Result<()> {
+pub fn serve(registry: Registry, build: &str, input: impl BufRead, mut output: impl Write) -> Result<()> {
     // A flight that hangs must not outlive the campaign.
     set_parent_process_death_signal(Some(Signal::KILL)).context("cannot bind the worker to its parent")?;
     let mut lines = input.lines();
@@ -74,7 +71,7 @@ pub fn serve(registry: Registry, input: impl BufRead, mut output: impl Write) ->
     let order: Order = serde_json::from_str(&order)?;
     let folder = tempfile::tempdir_in(&order.folder);
     let folder = folder.with_context(|| format!("cannot make a folder in {}", order.folder.display()))?;
-    let base = match prepare(&order, registry) {
+    let base = match prepare(&order, build, registry) {
         Ok(base) => base,
         Err(error) => return answer(&mut output, &Greeting::Refused(format!("{error:#}"))),
     };
@@ -91,11 +88,12 @@ fn answer(output: &mut impl Write, value: &impl Serialize) -> Result<()> {
     Ok(output.flush()?)
 }
 
-fn prepare(order: &Order, registry: Registry) -> Result<Base> {
-    if order.version != VERSION {
+fn prepare(order: &Order, build: &str, registry: Registry) -> Result<Base> {
+    if order.build != build {
         bail!(
-            "this hummingbus is of version {VERSION}, the campaign's of version {}: install the same",
-            order.version
+            "this is hummingbus {build}, the campaign was started by hummingbus {}: rows of two builds are not mixed; install \
+             the same build here and there",
+            order.build
         );
     }
     let campaign = Campaign::parse(&order.path, &order.text)?;

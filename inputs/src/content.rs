@@ -29,6 +29,28 @@ impl Content {
     }
 }
 
+/// Returns the SHA-256 of all that `from` reads, in hexadecimal; a large file is never whole in memory.
+///
+/// ```
+/// let bytes = b"abc".as_slice();
+/// assert_eq!(inputs::sha256_of(bytes)?, inputs::sha256(bytes));
+/// # Ok::<(), std::io::Error>(())
+/// ```
+///
+/// # Errors
+/// If `from` cannot be read.
+pub fn sha256_of(mut from: impl std::io::Read) -> std::io::Result<String> {
+    let (mut digest, mut part) = (Sha256::new(), vec![0; 1 << 16]);
+    loop {
+        match from.read(&mut part) {
+            Ok(0) => return Ok(hexadecimal(&digest.finalize())),
+            Ok(count) => digest.update(&part[..count]),
+            Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
+    }
+}
+
 /// Returns the SHA-256 of `bytes` in hexadecimal.
 ///
 /// ```
@@ -36,7 +58,11 @@ impl Content {
 /// ```
 #[must_use]
 pub fn sha256(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().fold(String::with_capacity(64), |mut text, byte| {
+    hexadecimal(&Sha256::digest(bytes))
+}
+
+fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::with_capacity(64), |mut text, byte| {
         // Writing to a string cannot fail.
         let _ = write!(text, "{byte:02x}");
         text

@@ -32,7 +32,7 @@ mod read;
 mod store;
 mod tidy;
 
-pub use content::sha256;
+pub use content::{sha256, sha256_of};
 pub use files::{InputFile, InputFiles};
 pub use read::{TEXT_BYTES_MAX, read_bytes};
 pub use tidy::tidy;

@@ -53,7 +53,7 @@ def campaign(
         words += [] if value is None else [option, str(value)]
     # Exit code 1: flown, and the condition does not hold.
     found = report(words, codes=(0, 1))
-    return Campaign(Path(out), found, found["requirement_met"])
+    return Campaign(Path(out), found, found["requirement_met"] is not False)
 
 
 def identify(

@@ -20,6 +20,8 @@ pub enum Column {
     Whole(Vec<i64>),
     /// Truth values, one in each row.
     Truth(Vec<bool>),
+    /// Truth values.
+    Verdict(Vec<Option<bool>>),
     /// Numbers.
     Number(Vec<Option<f64>>),
     /// Integers.
@@ -72,6 +74,7 @@ fn field(name: &str, column: &Column) -> Result<TypePtr> {
     let (physical, repetition) = match column {
         Column::Whole(_) => (Physical::INT64, Repetition::REQUIRED),
         Column::Truth(_) => (Physical::BOOLEAN, Repetition::REQUIRED),
+        Column::Verdict(_) => (Physical::BOOLEAN, Repetition::OPTIONAL),
         Column::Number(_) => (Physical::DOUBLE, Repetition::OPTIONAL),
         Column::Integer(_) => (Physical::INT64, Repetition::OPTIONAL),
         Column::Text(_) => (Physical::BYTE_ARRAY, Repetition::OPTIONAL),
@@ -85,6 +88,10 @@ fn put(writer: &mut SerializedColumnWriter<'_>, column: &Column) -> Result<()> {
     match column {
         Column::Whole(values) => writer.typed::<Int64Type>().write_batch(values, None, None)?,
         Column::Truth(values) => writer.typed::<BoolType>().write_batch(values, None, None)?,
+        Column::Verdict(values) => {
+            let known: Vec<bool> = values.iter().flatten().copied().collect();
+            writer.typed::<BoolType>().write_batch(&known, Some(&levels(values)), None)?
+        }
         Column::Number(values) => {
             let known: Vec<f64> = values.iter().flatten().copied().collect();
             writer.typed::<DoubleType>().write_batch(&known, Some(&levels(values)), None)?

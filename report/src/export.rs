@@ -146,6 +146,7 @@ fn fill(column: &mut Column, rows: usize) {
         Column::Number(values) => values.resize(values.len().max(rows), None),
         Column::Integer(values) => values.resize(values.len().max(rows), None),
         Column::Text(values) => values.resize(values.len().max(rows), None),
+        Column::Verdict(values) => values.resize(values.len().max(rows), None),
         Column::Whole(_) | Column::Truth(_) => {}
     }
 }
@@ -174,6 +175,7 @@ fn length(column: &Column) -> usize {
         Column::Text(values) => values.len(),
         Column::Whole(values) => values.len(),
         Column::Truth(values) => values.len(),
+        Column::Verdict(values) => values.len(),
     }
 }
 
@@ -185,6 +187,7 @@ fn cell(column: &Column, row: usize) -> String {
         Column::Text(values) => values[row].clone(),
         Column::Whole(values) => Some(values[row].to_string()),
         Column::Truth(values) => Some(values[row].to_string()),
+        Column::Verdict(values) => values[row].map(|value| value.to_string()),
     };
     text.unwrap_or_default()
 }

@@ -1,19 +1,20 @@
 //! The command `campaign`: thousands of flights of one manifest, each with other values.
 
-use super::campaign_engine::{EngineArguments, Flight, fly_task};
+use super::campaign_engine::{EngineArguments, Flight, build, fly_task};
 use super::interrupts::stop_token;
 use super::output::{print_json, print_text, say};
 use super::progress;
 use anyhow::{Context, Result, bail};
 use campaign::base::Base;
 use campaign::declaration::Campaign;
+use campaign::page;
 use campaign::plan::Plan;
 use campaign::report::Report;
 use campaign::requirement::Requirement;
-use campaign::row::{Row, columns};
-use campaign::store::{PLAN, Store};
-use campaign::worker::{Job, Order, VERSION, serve, take_output};
-use campaign::{page, table};
+use campaign::row::Row;
+use campaign::store::{Header, PLAN, Store};
+use campaign::table::Table;
+use campaign::worker::{Job, Order, serve, take_output};
 use clap::Args;
 use hummingbus::COMPONENTS;
 use inputs::InputFiles;
@@ -34,8 +35,11 @@ pub const HELP: &str = "Example: hummingbus campaign manifests/campaigns/hover-r
 const PAGE: &str = "report.html";
 /// Progress of a campaign.
 const BAR: &str = "{bar:30} {pos}/{len} flights  {rate}, {left} left  {msg}";
-/// Flights that are checked before the first one is flown.
-const CHECKED: usize = 3;
+/// Flights that are checked at most before the first one is flown, until one is not refused.
+const CHECKED: usize = 100;
+/// Step between two checked flights, as a part of the plan: multiples of the golden ratio fill it evenly, and fall in step with no
+/// grid.
+const STEP: f64 = 0.618_033_988_749_894_9;
 
 /// Arguments of `campaign`.
 #[derive(Args)]
@@ -93,7 +97,7 @@ pub struct Flying {
 pub fn campaign(arguments: &CampaignArguments) -> Result<bool> {
     if arguments.worker {
         let output = take_output().context("cannot keep standard output for answers")?;
-        return serve(COMPONENTS, stdin().lock(), output).map(|()| true);
+        return serve(COMPONENTS, &build()?, stdin().lock(), output).map(|()| true);
     }
     if let Some(folder) = &arguments.task_of {
         return fly_task(folder).map(|()| true);
@@ -127,8 +131,19 @@ pub fn fly(flying: Flying) -> Result<bool> {
 
 fn fly_all((mut opened, flown): (Opened, BTreeMap<u64, Row>)) -> Result<bool> {
     let rows = opened.fly(flown)?;
-    let report = opened.write(&rows)?;
-    judge(&opened, &report)
+    let rows: Vec<Row> = rows.into_values().collect();
+    let Opened { campaign, base, plan, flying, build, .. } = &opened;
+    let report = Report::of(campaign, base, plan, &rows, &flying.folder, build)?;
+    let failures = opened.write(&rows, &report);
+    // A file that cannot be written must not cost the verdict.
+    let is_met = judge(&opened, &report, failures.is_empty());
+    failures.iter().for_each(|failure| say(&format!("error: {failure:#}")));
+    match failures.len() {
+        0 => is_met,
+        count => bail!(
+            "{count} of 3 files were not written; the rows are kept, and the same command writes the files"
+        ),
+    }
 }
 
 /// A campaign with its folder.
@@ -136,7 +151,7 @@ struct Opened {
     flying: Flying,
     campaign: Campaign,
     base: Base,
-    figures: Vec<String>,
+    build: String,
     store: Store,
     plan: Plan,
 }
@@ -147,29 +162,35 @@ impl Opened {
         let Flying { path, text, folder, .. } = &flying;
         let campaign = Campaign::parse(path, text)?;
         let base = Base::read(&campaign, COMPONENTS)?;
-        let figures = columns(&base.manifest.content);
-        let (store, plan, flown) = Store::open(folder, &campaign, &base.fingerprint, &figures)?;
+        let header = Header {
+            build: build()?,
+            fingerprint: base.fingerprint.clone(),
+            figures: base.figures.clone(),
+            verdicts: base.verdicts.clone(),
+        };
+        let (store, plan, flown) = Store::open(folder, &campaign, &header)?;
         if let (true, Some(name)) = (flying.is_made, path.file_name().and_then(|name| name.to_str())) {
             store.write(name, |file| Ok(file.write_all(text.as_bytes())?))?;
         }
-        Ok((Self { flying, campaign, base, figures, store, plan }, flown))
+        Ok((Self { flying, campaign, base, build: header.build, store, plan }, flown))
     }
 
     /// Flies the flights that have no row yet; all rows by flight.
     fn fly(&mut self, mut rows: BTreeMap<u64, Row>) -> Result<BTreeMap<u64, Row>> {
         let jobs = jobs(&self.campaign, &self.base, &self.plan, &rows)?;
-        require_flyable(&self.base, &jobs)?;
+        if rows.is_empty() {
+            require_flyable(&self.base, &jobs)?;
+        }
         let (flown, planned) = (rows.len() as u64, self.plan.flights.len() as u64);
         let bar = progress::bar_from(BAR, flown, planned, self.flying.json);
-        let Self { flying, campaign, base, plan, figures, store } = self;
+        let Self { flying, campaign, base, plan, build, store } = self;
         let (path, text, fingerprint) = (flying.path.clone(), flying.text.clone(), base.fingerprint.clone());
-        let order =
-            Order { version: VERSION.to_owned(), path, text, fingerprint, folder: store.work_folder()? };
+        let order = Order { build: build.clone(), path, text, fingerprint, folder: store.work_folder()? };
         let flight = Flight { folder: &flying.folder, order, timeout_s_host: campaign.timeout_s_host };
         let tell = |text: &str| bar.suspend(|| say(text));
         let end = flying.engine.fly(flight, jobs, &tell, |mut row| {
             row.drawn.clone_from(&plan.flights[row.flight as usize]);
-            row.figures.resize(figures.len(), None);
+            row.figures.resize(base.figures.len(), None);
             store.add(&row)?;
             rows.insert(row.flight, row);
             bar.inc(1);
@@ -180,33 +201,54 @@ impl Opened {
         Ok(rows)
     }
 
-    /// Writes the table and the report.
-    fn write(&self, rows: &BTreeMap<u64, Row>) -> Result<Report> {
-        let rows: Vec<Row> = rows.values().cloned().collect();
-        let report = Report::of(&self.campaign, &self.base, &self.plan, &rows, &self.flying.folder)?;
-        let Self { store, plan, figures, .. } = self;
-        store.write("flights.parquet", |file| table::write(file, plan, figures, &rows))?;
-        store.write("report.json", |file| Ok(serde_json::to_writer_pretty(file, &report)?))?;
-        store.write(PAGE, |file| Ok(file.write_all(&page::page(&report, plan, figures, &rows))?))?;
-        Ok(report)
+    /// Writes the table and the report; the failures of those that cannot be written.
+    fn write(&self, rows: &[Row], report: &Report) -> Vec<anyhow::Error> {
+        let Self { store, plan, base, .. } = self;
+        let written = [
+            store.write("flights.parquet", |file| self.table(rows)?.write(file)),
+            store.write("report.json", |file| Ok(serde_json::to_writer_pretty(file, report)?)),
+            store.write(PAGE, |file| Ok(file.write_all(&page::page(report, plan, base, rows))?)),
+        ];
+        written.into_iter().filter_map(Result::err).collect()
+    }
+
+    fn table<'a>(&'a self, rows: &'a [Row]) -> Result<Table<'a>> {
+        let Self { campaign, base, plan, build, .. } = self;
+        let seeds = rows.iter().map(|row| plan.seed(campaign, base, row.flight as usize));
+        Ok(Table {
+            varied: &plan.names,
+            verdicts: &base.verdicts,
+            figures: &base.figures,
+            kept: &base.kept,
+            build,
+            rows,
+            seeds: seeds.collect::<Result<_>>()?,
+        })
     }
 }
 
 /// Prints the report, and says if the requirement holds.
-fn judge(opened: &Opened, report: &Report) -> Result<bool> {
+fn judge(opened: &Opened, report: &Report, has_page: bool) -> Result<bool> {
     let Flying { folder, require, json, .. } = &opened.flying;
-    let is_met = require.is_none_or(|required| required.is_met(report.passed, report.flights));
+    let verdict = verdict(*require, report);
     if *json {
         let mut value = json!(report);
-        value["requirement_met"] = json!(is_met);
+        let is_whole = report.flights == report.planned;
+        value["requirement_met"] = json!(require.and(verdict).filter(|_| is_whole));
         print_json(&value)?;
     } else {
-        print_text(&format!("{report}{}", next_steps(folder, report)))?;
+        print_text(&format!("{report}{}", next_steps(folder, report, has_page)))?;
     }
     let left = report.planned - report.flights;
     if left > 0 {
         bail!("the campaign was interrupted; the same command flies the other {left} flights");
     }
+    let Some(is_met) = verdict else {
+        bail!(
+            "the host ended {} flights, without which there is no verdict; the same command flies them again",
+            report.lost
+        );
+    };
     if let Some(required) = require.filter(|_| !is_met) {
         let shown = required.shown(report.passed, report.flights);
         say(&format!("not met: {required}; these flights show {shown:.4}"));
@@ -214,11 +256,25 @@ fn judge(opened: &Opened, report: &Report) -> Result<bool> {
     Ok(is_met)
 }
 
-/// Last lines of the summary: the page, and the command that flies the worst flight again.
-fn next_steps(folder: &Path, report: &Report) -> String {
-    let page = format!("report: {}", folder.join(PAGE).display());
-    let Some(worst) = report.worst.first() else { return page };
-    format!("to fly the worst again, recorded: {}\n{page}", worst.command)
+/// True if the requirement holds, or there is none; `None` while flights that were not flown to their end could change that.
+fn verdict(require: Option<Requirement>, report: &Report) -> Option<bool> {
+    let open = report.planned - report.flights + report.lost;
+    let Some(required) = require else { return (open == 0).then_some(true) };
+    // The open flights count as failed first, then as passed.
+    let is_met = |passed| required.is_met(passed, report.planned);
+    match (is_met(report.passed), is_met(report.passed + open)) {
+        (true, _) => Some(true),
+        (_, false) => Some(false),
+        _ => None,
+    }
+}
+
+/// Last lines of the summary: the command that flies the worst flight again, and the page if it was written.
+fn next_steps(folder: &Path, report: &Report, has_page: bool) -> String {
+    let worst = report.worst.first();
+    let worst = worst.map(|worst| format!("to fly the worst again, recorded: {}", worst.command));
+    let page = has_page.then(|| format!("report: {}", folder.join(PAGE).display()));
+    worst.into_iter().chain(page).collect::<Vec<_>>().join("\n")
 }
 
 /// Flies flight number `flight` of the plan on this thread, recorded; false if a condition does not hold.
@@ -265,13 +321,29 @@ fn jobs(campaign: &Campaign, base: &Base, plan: &Plan, flown: &BTreeMap<u64, Row
         .collect()
 }
 
-/// Refuses a campaign whose first flights are all refused, as they are where no manifest has a varied key.
+/// Refuses a campaign of which flights that are spread over the whole plan are all refused, as they are where no manifest has a
+/// varied key.
 fn require_flyable(base: &Base, jobs: &[Job]) -> Result<()> {
-    let mut refusals = jobs.iter().take(CHECKED).map(|job| base.check(&job.sets));
-    match refusals.next() {
-        Some(Err(error)) if refusals.all(|refusal| refusal.is_err()) => {
-            Err(error).context(format!("flight {} and the next ones are refused", jobs[0].flight))
+    let mut first = None;
+    for (flight, job) in spread(jobs.len()).map(|index| &jobs[index]).enumerate() {
+        match base.check(&job.sets) {
+            Ok(()) => return Ok(()),
+            Err(error) if flight == 0 => first = Some((job.flight, error)),
+            Err(_) => {}
         }
-        _ => Ok(()),
     }
+    let Some((flight, error)) = first else { return Ok(()) };
+    let checked = jobs.len().min(CHECKED);
+    Err(error).context(format!(
+        "no flight can be flown: of the plan's {} flights {checked} were checked, which are all refused; flight {flight}",
+        jobs.len()
+    ))
+}
+
+/// Indices below `count`: all of few, in the order of the plan; the first [`CHECKED`] that fill many evenly.
+fn spread(count: usize) -> impl Iterator<Item = usize> {
+    let index = move |number: usize| {
+        if count <= CHECKED { number } else { ((number as f64 * STEP).fract() * count as f64) as usize }
+    };
+    (0..count.min(CHECKED)).map(index)
 }

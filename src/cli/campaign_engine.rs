@@ -9,6 +9,8 @@ use campaign::pool::Pool;
 use campaign::row::Row;
 use campaign::worker::{Job, Order};
 use clap::{Args, ValueEnum};
+use inputs::sha256_of;
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -16,6 +18,8 @@ use std::time::Duration;
 pub const WORKER: &str = "--worker";
 /// The hidden argument of a task.
 const TASK_OF: &str = "--task-of";
+/// Digits of the digest of an executable.
+const DIGITS: usize = 12;
 /// Folder that the tasks share, in the folder of the campaign.
 const SHARED: &str = "slurm";
 /// Least number of flights of a task that is not stated: a task takes seconds to start.
@@ -197,6 +201,18 @@ pub fn fly_task(folder: &Path) -> Result<()> {
 fn quoted(path: &Path) -> Result<String> {
     let path = path.to_str().with_context(|| format!("the path {} is not UTF-8", path.display()))?;
     Ok(format!("'{}'", path.replace('\'', "'\\''")))
+}
+
+/// This build of hummingbus: its version with the commit, as `--version` prints it; a digest of the executable where no commit is
+/// known, as in debug builds and in those of a source archive.
+pub fn build() -> Result<String> {
+    let version = env!("HUMMINGBUS_VERSION");
+    if version.contains('(') {
+        return Ok(version.to_owned());
+    }
+    // The running one, also where a newer one has taken its place.
+    let digest = File::open("/proc/self/exe").and_then(sha256_of).context("cannot read this program")?;
+    Ok(format!("{version} (executable {})", &digest[..DIGITS]))
 }
 
 /// Number of this machine's cores.

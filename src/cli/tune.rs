@@ -1,6 +1,6 @@
 //! The command `tune`: gains that make a figure of many flights smaller.
 
-use super::campaign_engine::{cores, worker_command};
+use super::campaign_engine::{build, cores, worker_command};
 use super::interrupts::stop_token;
 use super::output::{print_json, print_text};
 use super::progress;
@@ -11,7 +11,7 @@ use campaign::gains_file;
 use campaign::pool::Pool;
 use campaign::search::{Change, Comparison, Outcome, search};
 use campaign::tuning::Tuning;
-use campaign::worker::{Order, VERSION};
+use campaign::worker::Order;
 use clap::Args;
 use hummingbus::COMPONENTS;
 use inputs::InputFiles;
@@ -68,7 +68,7 @@ pub fn tune(arguments: &TuneArguments) -> Result<bool> {
     let is_better = outcome.held_out.costs.after < outcome.held_out.costs.before;
     if is_better {
         let declared = base.files.text(&gains)?;
-        let text = gains_file::text(&declared, &gains, path, tuning.seed, &outcome)?;
+        let text = gains_file::text(&declared, &gains, path, tuning.seed, &build()?, &outcome)?;
         output_file::write(&out, &GAINS, |file| file.write_all(text.as_bytes()))?;
     }
     if arguments.json {
@@ -84,7 +84,7 @@ fn fly(arguments: &TuneArguments, tuning: &Tuning, base: &Base, text: String) ->
     let stop = stop_token()?;
     let folder = tempfile::tempdir().context("cannot make a folder for the workers")?;
     let order = Order {
-        version: VERSION.to_owned(),
+        build: build()?,
         path: arguments.tuning.clone(),
         text,
         fingerprint: base.fingerprint.clone(),

@@ -17,9 +17,23 @@ def expected(folder):
     with open(folder / "rows.jsonl", encoding="utf-8") as file:
         header, *rows = map(json.loads, file)
     rows.sort(key=lambda row: row["flight"])
-    columns = ["flight", *varied, "passed", "failed", "failed_at_s", "error", *header["figures"], "wall_s"]
+    verdicts, figures = header["verdicts"], header["figures"]
+    columns = ["flight", *varied, "run.seed", "passed", "failed", "failed_at_s", "error", *verdicts, *figures, "version"]
     named = [
-        [row["flight"], *row["drawn"], row["passed"], row["failed"], row["failed_at_s"], row["error"], *row["figures"], row["wall_s"]]
+        [
+            row["flight"],
+            *row["drawn"],
+            # The seed is varied.
+            int(row["drawn"][varied.index("seed")]),
+            row["passed"],
+            row["failed"],
+            row["failed_at_s"],
+            row["error"],
+            # A flight that was not judged has none.
+            *(row["verdicts"] or [None] * len(verdicts)),
+            *row["figures"],
+            header["build"],
+        ]
         for row in rows
     ]
     return columns, named

@@ -78,7 +78,7 @@ fn a_campaign_that_is_interrupted_loses_and_falsifies_no_flight() {
     let campaign =
         written(&place, "c.toml", &HOVERS.replace("0.4\"", "10.0\"").replace("flights = 12", "flights = 6"));
     let folder = place.path("out");
-    let mut launch = place.start(&["campaign", &campaign, "--out", &folder, "--workers", "2"]);
+    let mut launch = place.start(&["campaign", &campaign, "--out", &folder, "--workers", "2", "--json"]);
     poll("no flight ended", || {
         assert!(!launch.has_ended(), "it ended by itself");
         let text = fs::read_to_string(format!("{folder}/rows.jsonl")).unwrap_or_default();
@@ -87,6 +87,7 @@ fn a_campaign_that_is_interrupted_loses_and_falsifies_no_flight() {
     launch.signal(Signal::INT);
     let ended = launch.end().with_code(2);
     ended.says(&["the campaign was interrupted; the same command flies the other"]);
+    assert!(ended.json()["requirement_met"].is_null());
     let before = rows(&folder);
     assert!((1..6).contains(&before.len()) && before.iter().all(|row| row["error"].is_null()), "{before:?}");
     place.call(&["campaign", &campaign, "--out", &folder]).with_code(0).prints(&["6 of 6 flights passed"]);
@@ -165,10 +166,43 @@ fn flights_that_cannot_be_flown_are_counted_with_their_reasons() {
     let text = HOVERS.replace("flights = 12", "flights = 3\ntimeout_s_host = 0.001").replace("0.4", "400.0");
     let campaign = written(&place, "slow.toml", &text);
     let folder = place.path("slow");
-    place
-        .call(&["campaign", &campaign, "--out", &folder])
-        .with_code(0)
-        .prints(&["0 of 3 flights passed", "timeout_s_host"]);
+    let ended = place.call(&["campaign", &campaign, "--out", &folder]).with_code(2);
+    ended.prints(&["0 of 3 flights passed", "timeout_s_host"]);
+    ended.says(&[
+        "the host ended 3 flights, without which there is no verdict; the same command flies them again",
+    ]);
+    // Whatever they come to, no more than all pass; and half of none is met by none.
+    let gate = |rate: &str| place.call(&["campaign", &campaign, "--out", &folder, "--require", rate]).code;
+    assert_eq!(
+        ["pass_rate >= 0", "pass_rate >= 0.9 at 95 %", "pass_rate >= 0.5"].map(gate),
+        [Some(0), Some(1), Some(2)]
+    );
+}
+
+#[test]
+fn a_plan_is_flown_whose_first_or_last_flights_are_refused() {
+    let place = Place::new();
+    let text = HOVERS.replace("flights = 12", "sampling = \"grid\"").replace("as = \"factor\"\n", "");
+    let seeds = "[[vary]]\nkey = \"run.seed\"\nintegers = [1, 4]\n[[measure]]";
+    let text = text.replace("[[measure]]", seeds);
+    let grid = |values: &str| text.replace("uniform = [0.8, 1.2]", &format!("values = {values}"));
+    let (out, cut) = (place.path("out"), place.path("cut"));
+    let campaign = written(&place, "first.toml", &grid("[-0.1, 0.48]"));
+    place.call(&["campaign", &campaign, "--out", &out]).with_code(0).prints(&["4 of 8 flights passed"]);
+
+    // Interrupted where all others are refused.
+    let campaign = written(&place, "last.toml", &grid("[0.48, -0.1]"));
+    let fly = || place.call(&["campaign", &campaign, "--out", &cut, "--workers", "1"]);
+    fly().with_code(0).prints(&["4 of 8 flights passed"]);
+    let path = format!("{cut}/rows.jsonl");
+    let text = fs::read_to_string(&path).unwrap();
+    fs::write(&path, text.split_inclusive('\n').take(6).collect::<String>()).unwrap();
+    fly().with_code(0).prints(&["4 of 8 flights passed"]);
+    assert_eq!(rows(&cut).len(), 8);
+
+    let campaign = written(&place, "none.toml", &grid("[-0.2, -0.1]"));
+    let ended = place.call(&["campaign", &campaign, "--out", &place.path("none")]).with_code(2);
+    ended.says(&["of the plan's 8 flights 8 were checked, which are all refused; flight 0", "mass"]);
 }
 
 #[test]
@@ -202,6 +236,7 @@ fn what_cannot_be_flown_at_all_is_refused_before_the_first_flight() {
         (HOVERS.replace("uniform = [0.8, 1.2]", "uniform = [1.2, 0.8]"), "a lower limit below the upper one"),
         (HOVERS.replace("position.z", "position.w"), "c.toml:8:1: measure `height`"),
         (HOVERS.replace("statistic = \"last\"", "statistic = \"latest\""), "c.toml:13:13: "),
+        (format!("figures = [\"heigth\"]\n{HOVERS}"), "c.toml:2:12: no flight has a figure `heigth`"),
         (HOVERS.replace("name = \"height\"", "name = \"mass\""), "`mass` is the name of another column"),
         (HOVERS.replace("[\"run.dur", "[\"run.seed=5\", \"run.dur"), "each flight has a seed of its own"),
         (HOVERS.split("[[measure]]").next().unwrap().to_owned(), "neither [[pass]] nor [[measure]]"),

@@ -2,6 +2,7 @@
 //! cluster does seldom.
 
 use crate::campaign::{HOVERS, rows, written};
+use crate::campaign_results::{has_commit, other_build};
 use crate::skipped::skip;
 use crate::support::{Ended, HUMMINGBUS, Launch, Place, repository};
 use rustix::process::Signal;
@@ -152,8 +153,9 @@ fn flights_of_a_chunk_that_is_always_lost_have_the_reason_and_are_flown_by_the_n
     let place = Place::new();
     stand_in(&place, "1\n1\n1\n");
     let out = place.path("out");
-    let ended = on_slurm(&place, &out, &[]).with_code(0);
+    let ended = on_slurm(&place, &out, &[]).with_code(2);
     ended.prints(&["7 of 12 flights passed", "ended 3 times without a flight: NODE_FAIL"]);
+    ended.says(&["the host ended 5 flights, without which there is no verdict"]);
     on_slurm(&place, &out, &[]).with_code(0).prints(&["12 of 12 flights passed"]);
     assert_eq!(fs::read_to_string(place.path("bin/submitted")).unwrap(), "1 0-2\n2 1\n3 1\n4 0\n");
 }
@@ -164,6 +166,19 @@ fn tasks_that_cannot_fly_refuse_the_campaign_with_their_last_words() {
     stand_in(&place, "");
     let ended = on_slurm(&place, &place.path("out"), &["--node-command", "echo no such container && false"]);
     ended.with_code(2).says(&["ended 3 times without a flight", "it said: no such container"]);
+}
+
+#[test]
+fn a_node_with_another_build_flies_nothing() {
+    let place = Place::new();
+    if has_commit(&place) {
+        return skip("a build with a commit is not another one by its bytes");
+    }
+    stand_in(&place, "");
+    let ended = on_slurm(&place, &place.path("out"), &["--node-command", &other_build(&place)]);
+    ended
+        .with_code(2)
+        .says(&["the campaign was started by hummingbus", "install the same build here and there"]);
 }
 
 #[test]

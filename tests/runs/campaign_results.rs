@@ -1,0 +1,147 @@
+//! Results of campaigns: the same bytes, of one build, and a summary even where a file cannot be written.
+
+use crate::campaign::{HOVERS, rows, written};
+use crate::skipped::skip;
+use crate::support::{HUMMINGBUS, Load, Place};
+use std::fs::{self, OpenOptions};
+use std::io::Write as _;
+use std::process::Command;
+
+fn table(folder: &str) -> Vec<u8> {
+    fs::read(format!("{folder}/flights.parquet")).unwrap()
+}
+
+#[test]
+fn the_table_is_the_same_bytes_however_many_workers_fly_it_interrupted_and_on_a_loaded_machine() {
+    let place = Place::new();
+    let campaign = written(&place, "c.toml", HOVERS);
+    let fly = |name: &str, workers: &str| {
+        let folder = place.path(name);
+        place.call(&["campaign", &campaign, "--out", &folder, "--workers", workers]).with_code(0);
+        folder
+    };
+    let one = table(&fly("one", "1"));
+    let two = fly("two", "2");
+    assert!(one == table(&two), "two workers wrote another table than one");
+
+    let path = format!("{two}/rows.jsonl");
+    let text = fs::read_to_string(&path).unwrap();
+    fs::write(&path, text.split_inclusive('\n').take(5).collect::<String>()).unwrap();
+    fs::remove_file(format!("{two}/flights.parquet")).unwrap();
+    assert!(one == table(&fly("two", "2")), "a continued campaign wrote another table");
+
+    let load = Load::of_threads(8);
+    assert!(one == table(&fly("loaded", "2")), "a loaded machine wrote another table");
+    drop(load);
+}
+
+/// A program of another build: the bytes behind an executable change what it is, and not what it does.
+pub fn other_build(place: &Place) -> String {
+    let path = place.path("other");
+    fs::copy(HUMMINGBUS, &path).unwrap();
+    OpenOptions::new().append(true).open(&path).unwrap().write_all(b"another").unwrap();
+    path
+}
+
+/// True if the program knows its commit: a changed executable is no other build then.
+pub fn has_commit(place: &Place) -> bool {
+    place.call(&["--version"]).output.contains('(')
+}
+
+#[test]
+fn rows_of_two_builds_are_not_mixed() {
+    let place = Place::new();
+    if has_commit(&place) {
+        return skip("a build with a commit is not another one by its bytes");
+    }
+    let campaign = written(&place, "c.toml", HOVERS);
+    let out = place.path("out");
+    let report = place.call(&["campaign", &campaign, "--out", &out, "--json"]).with_code(0).json();
+    let version = report["version"].as_str().unwrap();
+    assert!(version.starts_with(env!("CARGO_PKG_VERSION")), "{version}");
+    let mut other = Command::new(other_build(&place));
+    other.args(["campaign", &campaign, "--out", &out]);
+    let ended = place.launch(other).end().with_code(2);
+    ended.says(&[
+        &format!(
+            "its flights were flown by hummingbus {version}, this is hummingbus {}",
+            env!("CARGO_PKG_VERSION")
+        ),
+        "go on with that build, choose another --out, or remove the file",
+    ]);
+    assert_eq!(rows(&out).len(), 12);
+}
+
+#[test]
+fn a_table_that_cannot_be_written_costs_neither_the_summary_nor_the_verdict() {
+    let place = Place::new();
+    let campaign = written(&place, "c.toml", HOVERS);
+    let out = place.path("out");
+    for name in ["report.html/x", "flights.parquet/x"] {
+        place.call(&["campaign", &campaign, "--out", &out, "--plan-only"]).with_code(0);
+        fs::create_dir_all(format!("{out}/{name}")).unwrap();
+    }
+    let gate = ["campaign", &campaign, "--out", &out, "--require", "pass_rate >= 0.9 at 95 %"];
+    let ended = place.call(&gate).with_code(2);
+    ended.prints(&["12 of 12 flights passed"]);
+    assert!(!ended.output.contains("report: "), "{ended}");
+    ended.says(&[
+        "cannot write",
+        "report.html",
+        "flights.parquet",
+        "not met: pass_rate",
+        "2 of 3 files were not written",
+    ]);
+    assert!(fs::exists(format!("{out}/report.json")).unwrap());
+}
+
+#[test]
+fn the_worst_flights_are_flown_again_from_any_folder() {
+    let place = Place::new();
+    written(&place, "c.toml", HOVERS);
+    let from_place = |args: &[&str]| {
+        let mut command = Command::new(HUMMINGBUS);
+        command.args(args).current_dir(place.path(""));
+        place.launch(command).end()
+    };
+    let ended = from_place(&["campaign", "c.toml", "--out", "out"]).with_code(0);
+    ended.prints(&["each is flown again, recorded, by: hummingbus campaign /", " --fly FLIGHT"]);
+    let report = from_place(&["campaign", "c.toml", "--out", "out", "--json"]).with_code(0).json();
+    assert!(report["requirement_met"].is_null());
+    let worst = report["worst"].as_array().unwrap();
+    assert_eq!(worst.len(), 10);
+    for key in ["command", "run"] {
+        let command = worst[9][key].as_str().unwrap();
+        let recording = place.path(&format!("{key}.mcap"));
+        let flight = format!("flight-{}.mcap", worst[9]["flight"]);
+        let command = command.replace(&flight, &recording);
+        // From the folder of the tests, not from that of the campaign.
+        place.call(&command.split(' ').skip(1).collect::<Vec<_>>()).with_code(0);
+    }
+}
+
+#[test]
+fn a_report_keeps_the_figures_that_the_campaign_chooses() {
+    let place = Place::new();
+    let more = "[[measure]]\nname = \"east\"\ntopic = \"/plant/state\"\nfield = \"position.x\"\nunit = \"m\"\nstatistic = \"every\"\n";
+    let text = format!("{HOVERS}{more}");
+    let out = place.path("out");
+    let fly = |figures: &str| {
+        let campaign = written(&place, "c.toml", &format!("{figures}{text}"));
+        place.call(&["campaign", &campaign, "--out", &out, "--json"]).with_code(0).json()
+    };
+    let names = |report: &serde_json::Value| {
+        let figures = report["figures"].as_array().unwrap().clone();
+        figures.into_iter().map(|figure| figure["figure"].as_str().unwrap().to_owned()).collect::<Vec<_>>()
+    };
+    assert_eq!(names(&fly("")), ["height", "east (min)", "east (max)"]);
+    let wide = table(&out).len();
+    let unknown = written(&place, "unknown.toml", &format!("figures = [\"heigth\"]\n{text}"));
+    let ended = place.call(&["campaign", &unknown, "--out", &out]).with_code(2);
+    ended.says(&["unknown.toml:2:12: no flight has a figure `heigth`", "did you mean `height`?"]);
+    // Another choice needs no flight.
+    let before = fs::read_to_string(format!("{out}/rows.jsonl")).unwrap();
+    assert_eq!(names(&fly("figures = [\"east (max)\"]\n")), ["east (max)"]);
+    assert!(table(&out).len() < wide);
+    assert_eq!(before, fs::read_to_string(format!("{out}/rows.jsonl")).unwrap());
+}
