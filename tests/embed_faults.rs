@@ -8,6 +8,10 @@ use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::{MotorCommand, SetPoint};
 use bus::{InputPorts, OutputPorts, ParameterError, Registration};
+use campaign::base::Base;
+use campaign::declaration::Campaign;
+use campaign::row::Row;
+use campaign::worker::{Job, Order, serve};
 use hummingbus::{Answer, Host, Launcher, Manifest, ManifestBuilder, Progress, Request, RunEvent, StopToken};
 use runtime::registry::Registry;
 use std::path::Path;
@@ -145,6 +149,7 @@ const COMPONENTS: Registry = Registry::new(&[
     Registration::of::<Heir>(),
     Registration::of::<Sink>(),
     Registration::of::<recorder::node::Recorder>(),
+    Registration::of::<report::judge::node::Judge>(),
 ]);
 
 /// Names of the threads of a run.
@@ -489,5 +494,34 @@ fn of_two_runs_at_once_one_fails_and_the_other_does_not_notice() {
             }
             assert_eq!(sound.join().unwrap().unwrap(), counted(2000));
         });
+    });
+}
+
+/// A campaign of two flights, whose source panics in the first.
+const CAMPAIGN: &str = "manifest = \"faults.toml\"\nflights = 2\nvary = []\n[[measure]]\nname = \"count\"\n\
+                        topic = \"/source/command\"\nfield = \"command[0]\"\nunit = \"count\"\nstatistic = \"last\"\n";
+
+#[test]
+fn a_flight_of_a_campaign_that_panics_has_the_reason_in_its_row_and_its_worker_flies_on() {
+    alone(|folder| {
+        IS_ARMED.store(true, SeqCst);
+        let manifest = "[run]\nrate_hz = 1000\nduration_s = 0.2\n[process.source]\nkind = \"source\"\n\
+                        parameters = { fault = \"panic\", at_tick = 50 }\n";
+        std::fs::write(folder.join("faults.toml"), manifest).unwrap();
+        let path = folder.join("c.toml");
+        let campaign = Campaign::parse(&path, CAMPAIGN).unwrap();
+        let fingerprint = Base::read(&campaign, COMPONENTS).unwrap().fingerprint;
+        let (build, text, folder) = ("1".to_owned(), CAMPAIGN.to_owned(), folder.to_owned());
+        let order = Order { build, path, text, fingerprint, folder };
+        let jobs = (0..2).map(|flight| serde_json::to_string(&Job { flight, sets: Vec::new() }).unwrap());
+        let lines: Vec<String> =
+            std::iter::once(serde_json::to_string(&order).unwrap()).chain(jobs).collect();
+        let mut answers = Vec::new();
+        serve(COMPONENTS, "1", lines.join("\n").as_bytes(), &mut answers).unwrap();
+        let answers = String::from_utf8(answers).unwrap();
+        let rows: Vec<Row> = answers.lines().skip(1).map(|row| serde_json::from_str(row).unwrap()).collect();
+        let error = rows[0].error.as_deref().unwrap();
+        assert!(error.contains("the propeller came off") && !rows[0].is_of_host, "{error}");
+        assert_eq!((&rows[1].error, &rows[1].figures[..]), (&None, &[Some(200.0)][..]));
     });
 }

@@ -52,6 +52,7 @@ mod autopilots;
 mod backups;
 mod by_hand;
 mod campaign;
+mod campaign_faults;
 mod campaign_results;
 mod checkpoints;
 mod clean;
