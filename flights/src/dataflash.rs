@@ -58,7 +58,7 @@ struct Format {
 impl Dataflash {
     /// Reads a log's bytes. Damaged parts are left out, which its notes say.
     pub fn parse(bytes: Vec<u8>) -> Result<Self, LogError> {
-        if !bytes.starts_with(&HEAD) {
+        if !bytes[zeros(&bytes)..].starts_with(&HEAD) {
             let expected = "the bytes A3 95 at its begin";
             return Err(LogError::unexpected(Spot::Whole, expected, "no dataflash log", "check `format`"));
         }
@@ -69,6 +69,16 @@ impl Dataflash {
         let topics = topics(formats, &bytes);
         Ok(Self { bytes, topics, notes })
     }
+}
+
+/// Number of zeros in front of everything else.
+fn zeros(bytes: &[u8]) -> usize {
+    bytes.iter().take_while(|byte| **byte == 0).count()
+}
+
+/// True for a log that begins with the description of messages, or with zeros in front of it.
+pub fn is_behind_zeros(bytes: &[u8]) -> bool {
+    bytes[zeros(bytes)..].starts_with(&[HEAD[0], HEAD[1], FMT.0])
 }
 
 struct Reader<'a> {

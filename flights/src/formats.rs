@@ -6,7 +6,7 @@ use vehicles::foreign;
 
 use crate::crazyflie::CrazyflieLog;
 use crate::csv_log::CsvLog;
-use crate::dataflash::Dataflash;
+use crate::dataflash::{self, Dataflash};
 use crate::declaration::{Clock, Format};
 use crate::error::{LogError, Spot};
 use crate::form::Form;
@@ -46,7 +46,8 @@ pub fn guess(path: &Path, bytes: &[u8]) -> Format {
     match bytes {
         [0x89, b'M', b'C', b'A', b'P', b'0', b'\r', b'\n', ..] => Format::Mcap,
         [b'U', b'L', b'o', b'g', 1, 0x12, 0x35, _, ..] => Format::Ulog,
-        [0xA3, 0x95, 0x80, ..] => Format::Dataflash,
+        // The card of an autopilot can hold a block of zeros in front of the log.
+        _ if dataflash::is_behind_zeros(bytes) => Format::Dataflash,
         // Of every version: its reader names those that it does not read.
         [0xBC, _, 0, _, _, _, _, _, ..] => Format::Crazyflie,
         [b'P', b'A', b'R', b'1' | b'E', ..] if foreign::of(bytes).is_some() => Format::Parquet,

@@ -55,6 +55,17 @@ fn a_log_is_read_by_its_own_description_with_and_without_units() {
 }
 
 #[test]
+fn zeros_in_front_of_a_log_are_passed_over() {
+    let behind = [vec![0; 64], log(400, true)].concat();
+    let flight = read(&behind);
+    assert_eq!(
+        (flight.attitude.time_s.len(), flight.attitude.values),
+        (400, read(&log(400, true)).attitude.values)
+    );
+    assert!(flight.notes.iter().all(|note| note.contains("64 bytes")), "{:?}", flight.notes);
+}
+
+#[test]
 fn further_sensors_are_topics_of_their_own() {
     let second = CHANNELS.replace("\"IMU\"", "\"IMU:1\"");
     for has_units in [true, false] {

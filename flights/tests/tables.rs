@@ -76,6 +76,13 @@ fn files_are_read_as_programs_write_them() {
     same("by number", load(plain.as_bytes(), &by_number(0), ""));
     same("no header", load(rows.as_bytes(), &by_number(0), ""));
     same("no header, said so", load(rows.as_bytes(), &by_number(0), "csv = { header = false }"));
+    same("bars", load(plain.replace(',', "|").as_bytes(), CHANNELS, ""));
+    let quoted =
+        plain.split_once('\n').unwrap().0.split(',').map(|name| format!("\"{name}\"")).collect::<Vec<_>>();
+    same(
+        "names in marks behind blanks",
+        load(format!("{}\n{rows}", quoted.join(", ")).as_bytes(), CHANNELS, ""),
+    );
     let framed: String =
         plain.lines().enumerate().map(|(row, line)| format!("{row};{}\n", line.replace(',', ";"))).collect();
     same("a number in front", load(framed.as_bytes(), &by_number(1), ""));

@@ -33,12 +33,14 @@ const FROM_PYTHON: &str = "load it with NumPy, and write it as CSV: `numpy.savet
 const FROM_PANDAS: &str = "load it with pandas, and write it as CSV: `frame.to_csv(FILE, index=False)`";
 const FROM_MATLAB: &str = "load it in MATLAB, and write it as CSV: `writetable(struct2table(...), FILE)`";
 const FROM_SPREADSHEET: &str = "save the sheet as CSV";
+const IN_UTF32: &str = "a text in UTF-32";
+const TO_UTF8: &str = "write it as UTF-8: `iconv -f UTF-32 -t UTF-8 FILE > FILE.csv`";
 const IN_FLIGHTS: &str = "a flights file can name it (docs/flights.md); here, write it as CSV";
 
 /// First bytes, name, advice.
 type Magic = (&'static [u8], &'static str, &'static str);
 
-const MAGIC: [Magic; 33] = [
+const MAGIC: [Magic; 35] = [
     (b"\x89MCAP0\r\n", "a recording (MCAP)", IN_FLIGHTS),
     (b"ULog\x01\x12\x35", "a ULog of PX4", IN_FLIGHTS),
     (b"\xbc\x01\x00", "the card log of a Crazyflie, version 1", "log with newer firmware"),
@@ -88,7 +90,9 @@ const MAGIC: [Magic; 33] = [
     (b"\x04\x22\x4d\x18", "compressed (LZ4)", "unpack it: `unlz4 FILE`"),
     (b"7z\xbc\xaf\x27\x1c", "an archive (7z)", "unpack it: `7z x FILE`"),
     (b"Rar!\x1a\x07", "an archive (RAR)", "unpack it: `unrar x FILE`"),
-    (b"%PDF", "a PDF document", EXPORT),
+    (b"%PDF-", "a PDF document", EXPORT),
+    (b"\xff\xfe\0\0", IN_UTF32, TO_UTF8),
+    (b"\0\0\xfe\xff", IN_UTF32, TO_UTF8),
     (b"\x89PNG\r\n\x1a\n", "an image (PNG)", EXPORT),
     (b"\x80\x02", "a pickle of Python", FROM_PANDAS),
     (b"\x80\x03", "a pickle of Python", FROM_PANDAS),
@@ -113,7 +117,8 @@ const ZIPPED: [Magic; 6] = [
 ];
 
 /// Beginnings of texts that are not tables, after blanks, in lower case.
-const TEXTS: [Magic; 8] = [
+const TEXTS: [Magic; 9] = [
+    (b"{\\rtf", "a document (RTF)", EXPORT),
     (b"<!doctype html", "a web page (HTML)", "download the file itself; the page may ask for a login"),
     (b"<html", "a web page (HTML)", "download the file itself; the page may ask for a login"),
     (b"<?xml", "XML", EXPORT),
@@ -143,6 +148,10 @@ const TAR: (usize, &[u8]) = (257, b"ustar");
 pub fn of(bytes: &[u8]) -> Option<Foreign> {
     if bytes.is_empty() {
         return Some(Foreign { name: "empty", advice: "copy the log again, or name another" });
+    }
+    if bytes.iter().all(u8::is_ascii_whitespace) {
+        let name = "empty besides blanks and ends of lines";
+        return Some(Foreign { name, advice: "copy the log again, or name another" });
     }
     let first = &bytes[..bytes.len().min(LOOKED_AT)];
     let named = |magic: &Magic| Foreign { name: magic.1, advice: magic.2 };
@@ -214,10 +223,28 @@ fn binary(bytes: &[u8]) -> Option<Foreign> {
         let advice = "copy it again: it was not written to its end, or the card is damaged";
         return Some(Foreign { name: "a file of zeros", advice });
     }
+    if is_utf32(first) {
+        return Some(Foreign { name: IN_UTF32, advice: TO_UTF8 });
+    }
     let control = first.iter().filter(|byte| is_control(**byte)).count();
     let is_binary = control as f64 > CONTROL_SHARE * first.len() as f64;
     (is_binary && encoding::utf16(bytes).is_none())
         .then_some(Foreign { name: "binary, of an unknown format", advice: EXPORT })
+}
+
+/// True for ASCII characters of four bytes each, in either order.
+fn is_utf32(first: &[u8]) -> bool {
+    const CHARACTERS_MIN: usize = 2;
+    let characters = || first.chunks_exact(4);
+    let all = |at: usize| {
+        let is_ascii = |character: &[u8]| {
+            (0..4).all(
+                |byte| if byte == at { (1..0x80).contains(&character[byte]) } else { character[byte] == 0 },
+            )
+        };
+        characters().len() >= CHARACTERS_MIN && characters().all(is_ascii)
+    };
+    all(0) || all(3)
 }
 
 #[cfg(test)]
@@ -231,7 +258,12 @@ mod tests {
     #[test]
     fn formats_are_named_by_their_first_bytes_with_what_converts_them() {
         let tar = [vec![b'a'; 257], b"ustar\x0000".to_vec()].concat();
-        let cases: [(&[u8], &str, &str); 35] = [
+        let in_utf32 =
+            |text: &str| -> Vec<u8> { text.chars().flat_map(|c| u32::from(c).to_le_bytes()).collect() };
+        let marked = [vec![0xff, 0xfe, 0, 0], in_utf32("t,x\n0,1\n")].concat();
+        assert_eq!(of(&in_utf32("t,x\n0,1\n")).unwrap().name, IN_UTF32);
+        assert!(of(b"\n\r\n \n").unwrap().name.starts_with("empty besides blanks"));
+        let cases: [(&[u8], &str, &str); 38] = [
             (b"#ROSBAG V2.0\n", "a bag of ROS 1", "rosbags-convert"),
             (b"SQLite format 3\0", ".db3", "mcap convert"),
             (b"\xa3\x95\x80\x80YFMT", "ArduPilot", "flights file"),
@@ -264,6 +296,9 @@ mod tests {
             (b"<?xml version=\"1.0\"?><log>", "XML", "CSV"),
             (b"<?xml version=\"1.0\"?>\n<!-- mine -->\n<robot>", "URDF", "CSV"),
             (b"\xef\xbb\xbf{\"t\": [0, 1]}", "JSON", "CSV"),
+            (b"%PDF-1.4\n1 0 obj\n", "PDF", "CSV"),
+            (b"{\\rtf1 hi}", "RTF", "CSV"),
+            (&marked, "UTF-32", "iconv"),
             (b"\x7fELF\x02", "program", "name the log"),
             (b"\x01\x02\x03\x04\x05\x06\x07\x08\x00\x01\x02", "unknown format", "CSV"),
             (&tar, "tar", "tar xf"),

@@ -218,13 +218,15 @@ fn sep_line(text: &str) -> Option<(u64, Delimiter)> {
 fn most_frequent(header: &str) -> Delimiter {
     let count = |delimiter: u8| header.bytes().filter(|byte| *byte == delimiter).count();
     // The last of equals wins, which is the comma.
-    let most = [b'\t', b';', b','].into_iter().max_by_key(|delimiter| count(*delimiter));
+    let most = [b'|', b'\t', b';', b','].into_iter().max_by_key(|delimiter| count(*delimiter));
     Delimiter::Byte(most.unwrap_or(b','))
 }
 
 /// The delimiter of a row of numbers, whose commas can be decimal ones.
 fn of_row(row: &str) -> Delimiter {
-    if let Some(delimiter) = [b'\t', b';'].into_iter().find(|delimiter| row.as_bytes().contains(delimiter)) {
+    if let Some(delimiter) =
+        [b'\t', b';', b'|'].into_iter().find(|delimiter| row.as_bytes().contains(delimiter))
+    {
         return Delimiter::Byte(delimiter);
     }
     let mut words = row.split_whitespace();
@@ -244,7 +246,13 @@ fn cells(line: &str, delimiter: Delimiter) -> Vec<String> {
         .delimiter(byte)
         .from_reader(line.as_bytes());
     let record = reader.records().next().and_then(Result::ok).unwrap_or_default();
-    record.iter().map(str::to_owned).collect()
+    record.iter().map(unquoted).collect()
+}
+
+/// A cell without the quotation marks around it: a blank in front of them, as in Blackbox logs, hides them from the reader of CSV.
+fn unquoted(cell: &str) -> String {
+    let inner = cell.strip_prefix('"').and_then(|rest| rest.strip_suffix('"'));
+    inner.map_or_else(|| cell.to_owned(), |inner| inner.replace("\"\"", "\""))
 }
 
 /// The same text with one byte between cells, and that byte: runs of blanks become tabs, but for those in quotation marks.
