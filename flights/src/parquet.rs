@@ -12,6 +12,7 @@ use parquet::schema::types::SchemaDescriptor;
 use vehicles::table::{TableError, column_of, shown};
 use vehicles::wall_clock;
 
+use crate::arrays;
 use crate::declaration::Entry;
 use crate::error::{LogError, Spot};
 use crate::form::Form;
@@ -82,7 +83,18 @@ impl ParquetLog {
     }
 
     fn column(&self, name: &str) -> Result<usize, LogError> {
+        if let Some((list, _)) = arrays::indexed(name).filter(|(list, _)| self.is_list(list)) {
+            return Err(values::not_numbers(Spot::Named("column", shown(list)), "lists"));
+        }
         Ok(column_of(&self.headers, None, name).map_err(TableError::from)?)
+    }
+
+    /// True if the column `name` holds lists of numbers.
+    fn is_list(&self, name: &str) -> bool {
+        let columns = self.metadata.file_metadata().schema_descr().columns();
+        columns.iter().any(|column| {
+            column.max_rep_level() > 0 && column.path().parts().first().is_some_and(|part| part == name)
+        })
     }
 }
 

@@ -121,6 +121,27 @@ fn columns_of_all_types_of_numbers_are_read() {
     assert!(off.fold(0.0, f64::max) < 1e-9);
 }
 
+/// As pyarrow writes decimal fractions and float16.
+#[test]
+fn fractions_in_blocks_of_bytes_are_read() {
+    let decimal = typed("optional fixed_len_byte_array(8) px (DECIMAL(18,9))", 0.0, 1e9);
+    let long = typed("required fixed_len_byte_array(16) py (DECIMAL(38,9))", 0.0, 1e9);
+    let half = typed("optional fixed_len_byte_array(2) wx (FLOAT16)", 0.0, 1.0);
+    let log = changed(&[("px", &decimal), ("py", &long), ("wx", &half)]);
+    let flight = load(&log, CHANNELS, "").unwrap();
+    let plain = load_as("log.csv", Motion::default().csv().as_bytes(), CHANNELS, "").unwrap();
+    let furthest = |a: &[[f64; 3]], b: &[[f64; 3]]| {
+        let both = a.as_flattened().iter().zip(b.as_flattened());
+        both.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    };
+    assert_eq!(flight.position.values.len(), 1001);
+    assert!(furthest(&flight.position.values, &plain.position.values) < 1e-9);
+    assert_eq!(flight.angular_velocity.values.len(), 1001);
+    assert!(furthest(&flight.angular_velocity.values, &plain.angular_velocity.values) < 4e-3);
+    let blocks = changed(&[("px", &typed("required fixed_len_byte_array(8) px", 0.0, 1.0))]);
+    says("blocks", load(&blocks, CHANNELS, ""), &["column `px`", "found blocks of bytes"]);
+}
+
 #[test]
 fn times_have_the_unit_of_their_type_or_the_declared_one() {
     let since_1970 = 1.9e9;
@@ -171,6 +192,48 @@ fn empty_cells_are_left_out_and_recordings_chosen_as_in_csv() {
         load(&changed(&[("t", &falling)]), CHANNELS, ""),
         &["fall in 1000 of 1000 steps", "10 s in row 1 to 9.99 s in row 2", "column `t`"],
     );
+}
+
+/// A column of lists, as pyarrow writes it, and pages that are packed in a way that is not read.
+#[test]
+fn lists_and_other_compressions_are_named() {
+    let schema = "message log { required double t; optional group gyro (LIST) { repeated group list { optional \
+                  double element; } } }";
+    let schema = std::sync::Arc::new(parquet::schema::parser::parse_message_type(schema).unwrap());
+    let mut writer =
+        parquet::file::writer::SerializedFileWriter::new(Vec::new(), schema, Default::default()).unwrap();
+    let mut group = writer.next_row_group().unwrap();
+    let mut times = group.next_column().unwrap().unwrap();
+    times.typed::<parquet::data_type::DoubleType>().write_batch(&[0.0, 0.1], None, None).unwrap();
+    times.close().unwrap();
+    let mut lists = group.next_column().unwrap().unwrap();
+    let numbers = lists.typed::<parquet::data_type::DoubleType>();
+    numbers.write_batch(&[1.0; 6], Some(&[3; 6]), Some(&[0, 1, 1, 0, 1, 1])).unwrap();
+    lists.close().unwrap();
+    group.close().unwrap();
+    let channels = "time = { columns = [\"t\"], unit = \"s\" }\nangular_velocity = { columns = [\"gyro\"], unit = \"rad/s\" }";
+    let lists = load(&writer.into_inner().unwrap(), channels, "");
+    says("lists", lists, &["column `gyro`", "expected one number in each row, found lists"]);
+    // The codec of a column is the fourth field of its metadata: zstd (6) becomes brotli (4).
+    let properties = WriterProperties::builder().set_compression(Compression::ZSTD(Default::default()));
+    let packed = file::file(&columns(&Motion::default().csv()), 2000, properties.build());
+    let brotli = with_codec(&packed, 6, 4);
+    says(
+        "brotli",
+        load(&brotli, CHANNELS, ""),
+        &["compression by snappy, gzip, zstd or lz4_raw", "by brotli"],
+    );
+}
+
+/// The file with another number in the fields of the footer that name a codec: behind the path of a column, `t` (one name
+/// of one letter).
+fn with_codec(file: &[u8], codec: u8, other: u8) -> Vec<u8> {
+    let mut changed = file.to_vec();
+    // The path (a list of one text of one byte), and a field one further (i32) with the codec, as a zigzag number.
+    let sought = [0x19, 0x18, 0x01, b't', 0x15, 2 * codec];
+    let at = file.windows(sought.len()).position(|window| window == sought).expect("the column's codec");
+    changed[at + sought.len() - 1] = 2 * other;
+    changed
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Meaning of the whole numbers of a column, according to its type.
+//! Meaning of the numbers of a column, according to its type.
 
 use parquet::basic::{ConvertedType, LogicalType, TimeUnit, Type};
 use parquet::schema::types::ColumnDescriptor;
@@ -6,7 +6,7 @@ use parquet::schema::types::ColumnDescriptor;
 /// Seconds of a day.
 const DAY_S: f64 = 86_400.0;
 
-/// Meaning of whole numbers.
+/// Meaning of numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Kind {
     /// Numbers as they stand.
@@ -19,6 +19,8 @@ pub enum Kind {
     Days,
     /// Decimal fractions with this number of digits behind the point.
     Decimal(i32),
+    /// Fractions of two bytes.
+    Half,
 }
 
 impl Kind {
@@ -28,6 +30,7 @@ impl Kind {
             Some(LogicalType::Timestamp(time) | LogicalType::Time(time)) => Self::Times(unit(&time.unit)),
             Some(LogicalType::Date) => Self::Days,
             Some(LogicalType::Decimal(decimal)) => Self::Decimal(decimal.scale),
+            Some(LogicalType::Float16) => Self::Half,
             Some(LogicalType::Integer(integer)) if !integer.is_signed => Self::Unsigned,
             Some(_) => Self::Plain,
             None => Self::of_older(column),
@@ -53,7 +56,7 @@ impl Kind {
     /// Factor of the numbers: of times and days to s.
     pub fn scale(self) -> f64 {
         match self {
-            Self::Plain | Self::Unsigned => 1.0,
+            Self::Plain | Self::Unsigned | Self::Half => 1.0,
             Self::Times("ms") => 1e-3,
             Self::Times("us") => 1e-6,
             Self::Times(_) => 1e-9,

@@ -7,8 +7,10 @@ use parquet::basic::{Compression, Encoding};
 
 use super::thrift::{Cursor, STRUCT};
 
-/// Bytes of a page, unpacked: for each value as many as its levels and the longest number take, and these besides.
-const BYTES_PER_VALUE: usize = 16;
+/// Bytes of a page, unpacked: for each value as many as a number of usual length takes, or those of a longer one, and as
+/// many as its levels take; and these besides.
+const BYTES_PER_NUMBER: usize = 12;
+const BYTES_OF_LEVELS: usize = 4;
 const BYTES_FREE: usize = 4096;
 
 /// Words for the fault of a column.
@@ -41,6 +43,8 @@ pub struct Pages<'a> {
     /// The bytes that were not read yet.
     rest: &'a [u8],
     compression: Compression,
+    /// Most bytes of a page for each value.
+    bytes_per_value: usize,
     /// Rows of the group that no page had yet.
     rows_left: usize,
     rows: usize,
@@ -58,9 +62,10 @@ struct Header {
 }
 
 impl<'a> Pages<'a> {
-    /// The pages in `bytes`, which hold `rows` rows.
-    pub fn new(bytes: &'a [u8], compression: Compression, rows: usize) -> Self {
-        Self { rest: bytes, compression, rows_left: rows, rows }
+    /// The pages in `bytes`, which hold `rows` rows of numbers of `width` bytes.
+    pub fn new(bytes: &'a [u8], compression: Compression, rows: usize, width: usize) -> Self {
+        let bytes_per_value = width.max(BYTES_PER_NUMBER) + BYTES_OF_LEVELS;
+        Self { rest: bytes, compression, bytes_per_value, rows_left: rows, rows }
     }
 
     /// The next page; `None` behind that with the last row.
@@ -140,7 +145,7 @@ impl<'a> Pages<'a> {
         values: usize,
         levels: usize,
     ) -> Result<Cow<'a, [u8]>, Fault> {
-        let (length, most) = (size(header.unpacked)?, BYTES_FREE + BYTES_PER_VALUE * values);
+        let (length, most) = (size(header.unpacked)?, BYTES_FREE + self.bytes_per_value * values);
         let other = |found: usize| Err(format!("a page unpacks to {found} bytes, expected {length}"));
         let Some(wanted) = length.checked_sub(levels).filter(|_| length <= most) else {
             return Err(format!("a page claims {length} bytes for {values} values, expected at most {most}"));
@@ -157,6 +162,18 @@ impl<'a> Pages<'a> {
         }
         if unpacked.len() == length { Ok(unpacked.into()) } else { other(unpacked.len()) }
     }
+}
+
+/// True for a way of packing that is unpacked here.
+pub fn is_unpacked(compression: Compression) -> bool {
+    matches!(
+        compression,
+        Compression::UNCOMPRESSED
+            | Compression::SNAPPY
+            | Compression::GZIP(_)
+            | Compression::ZSTD(_)
+            | Compression::LZ4_RAW
+    )
 }
 
 /// Appends the unpacked bytes of `packed`; no more than a byte beyond `length`.

@@ -10,19 +10,20 @@ use vehicles::table::shown;
 use super::bits::{differences, runs};
 use super::footer::{chunk, damaged};
 use super::kind::Kind;
-use super::pages::{Fault, Page, Pages};
+use super::pages::{Fault, Page, Pages, is_unpacked};
 use crate::error::{LogError, Spot};
 
 /// Days from the origin of Julian days to 1970.
 const JULIAN_1970: i64 = 2_440_588;
+/// Bytes of the longest number: a decimal fraction of 76 digits.
+const WIDTH_MAX: usize = 32;
 
 /// The numbers of the column `index`; NaN in empty cells. Times are in s.
 pub fn read(bytes: &[u8], metadata: &ParquetMetaData, index: usize) -> Result<Vec<f64>, LogError> {
     let descriptor = metadata.file_metadata().schema_descr().column(index);
     let at = || Spot::Named("column", shown(&descriptor.path().string()));
-    let column = Column::of(&descriptor).map_err(|found| {
-        LogError::unexpected(at(), "one number in each row", found, "write a column of numbers for each")
-    })?;
+    let column = Column::of(&descriptor).map_err(|found| not_numbers(at(), found))?;
+    check_packing(metadata, index, at())?;
     let mut numbers = Vec::new();
     for group in metadata.row_groups() {
         column
@@ -32,9 +33,30 @@ pub fn read(bytes: &[u8], metadata: &ParquetMetaData, index: usize) -> Result<Ve
     Ok(numbers)
 }
 
+/// Refusal of a column that holds `found` in place of numbers.
+pub fn not_numbers(at: Spot, found: &str) -> LogError {
+    LogError::unexpected(at, "one number in each row", found, "write a column of numbers for each")
+}
+
+/// Refuses a column that is packed by a program that is not known here, by its name.
+fn check_packing(metadata: &ParquetMetaData, index: usize, at: Spot) -> Result<(), LogError> {
+    let columns = metadata.row_groups().iter().filter_map(|group| group.columns().get(index));
+    let Some(unknown) = columns.map(|column| column.compression()).find(|packing| !is_unpacked(*packing))
+    else {
+        return Ok(());
+    };
+    let name = format!("{unknown:?}").to_lowercase();
+    let found = format!("compression by {}", name.split('(').next().unwrap_or_default());
+    let advice = "write the file with one of these";
+    Err(LogError::unexpected(at, "compression by snappy, gzip, zstd or lz4_raw, or none", found, advice))
+}
+
 /// Everything that reading the numbers of a column takes.
 struct Column {
     physical: Type,
+    /// Bytes of a number.
+    width: usize,
+    is_half: bool,
     is_unsigned: bool,
     /// Factor of whole numbers.
     scale: f64,
@@ -47,23 +69,12 @@ impl Column {
     fn of(descriptor: &ColumnDescriptor) -> Result<Self, &'static str> {
         let kind = Kind::of(descriptor);
         let physical = descriptor.physical_type();
-        match (descriptor.max_rep_level(), physical) {
-            (1.., _) => return Err("lists"),
-            (_, Type::BYTE_ARRAY) => return Err("texts"),
-            (_, Type::FIXED_LEN_BYTE_ARRAY) => return Err("blocks of bytes"),
-            _ => {}
+        if descriptor.max_rep_level() > 0 {
+            return Err("lists");
         }
         let level = u32::try_from(descriptor.max_def_level()).unwrap_or(0);
-        Ok(Self { physical, is_unsigned: kind == Kind::Unsigned, scale: kind.scale(), level })
-    }
-
-    /// Bytes of a number.
-    fn width(&self) -> usize {
-        match self.physical {
-            Type::INT96 => 12,
-            Type::INT64 | Type::DOUBLE => 8,
-            _ => 4,
-        }
+        let (width, is_half) = (width(descriptor, kind)?, kind == Kind::Half);
+        Ok(Self { physical, width, is_half, is_unsigned: kind == Kind::Unsigned, scale: kind.scale(), level })
     }
 
     /// The number in as many bytes.
@@ -79,6 +90,8 @@ impl Column {
                 let day = i64::from(i32::from_le_bytes(*bytes.get(8..)?.first_chunk()?)) - JULIAN_1970;
                 Kind::Days.scale() * day as f64 + self.scale * whole(bytes)? as f64
             }
+            Type::FIXED_LEN_BYTE_ARRAY if self.is_half => half(u16::from_le_bytes(*bytes.first_chunk()?)),
+            Type::FIXED_LEN_BYTE_ARRAY => self.scale * big_endian(bytes.get(..self.width)?),
             _ => return None,
         })
     }
@@ -103,7 +116,7 @@ impl Column {
             usize::try_from(group.num_rows()).map_err(|_| "a group has an impossible number of rows")?;
         let column = group.columns().get(index).ok_or("a group of rows lacks it")?;
         let content = chunk(bytes, column).ok_or("its bytes lie outside of the file")?;
-        let mut pages = Pages::new(content, column.compression(), rows);
+        let mut pages = Pages::new(content, column.compression(), rows, self.width);
         let (mut dictionary, before) = (Vec::new(), to.len());
         while let Some(page) = pages.next()? {
             match page {
@@ -179,12 +192,11 @@ impl Column {
                 )
             }
             Encoding::BYTE_STREAM_SPLIT if !is_boolean => {
-                let width = self.width();
+                let width = self.width;
                 (bytes.len() >= count * width).then_some(())?;
                 let stride = bytes.len() / width;
                 let number = |index: usize| {
-                    // The longest number has twelve bytes.
-                    let parts: [u8; 12] =
+                    let parts: [u8; WIDTH_MAX] =
                         std::array::from_fn(|part| bytes[part.min(width - 1) * stride + index]);
                     self.number(&parts)
                 };
@@ -195,10 +207,45 @@ impl Column {
     }
 
     fn plain(&self, bytes: &[u8], count: usize) -> Option<Vec<f64>> {
-        let numbers = bytes.chunks_exact(self.width()).take(count);
+        let numbers = bytes.chunks_exact(self.width).take(count);
         (numbers.len() == count).then_some(())?;
         numbers.map(|number| self.number(number)).collect()
     }
+}
+
+/// Bytes of a number of the column; else a description of the values that it holds in place of numbers.
+fn width(descriptor: &ColumnDescriptor, kind: Kind) -> Result<usize, &'static str> {
+    let length = usize::try_from(descriptor.type_length()).unwrap_or(0);
+    match (descriptor.physical_type(), kind) {
+        (Type::BYTE_ARRAY, Kind::Decimal(_)) => Err("decimal fractions of changing length"),
+        (Type::BYTE_ARRAY, _) => Err("texts"),
+        (Type::FIXED_LEN_BYTE_ARRAY, Kind::Half) if length == 2 => Ok(length),
+        (Type::FIXED_LEN_BYTE_ARRAY, Kind::Decimal(_)) if (1..=WIDTH_MAX).contains(&length) => Ok(length),
+        (Type::FIXED_LEN_BYTE_ARRAY, _) => Err("blocks of bytes"),
+        (Type::INT96, _) => Ok(12),
+        (Type::INT64 | Type::DOUBLE, _) => Ok(8),
+        _ => Ok(4),
+    }
+}
+
+/// A number of two bytes (IEEE 754 binary16).
+fn half(bits: u16) -> f64 {
+    let (exponent, fraction) = (i32::from(bits >> 10 & 0x1f), f64::from(bits & 0x3ff));
+    let size = match exponent {
+        0 => libm::ldexp(fraction, -24),
+        31 if fraction > 0.0 => f64::NAN,
+        31 => f64::INFINITY,
+        _ => libm::ldexp(1024.0 + fraction, exponent - 25),
+    };
+    if bits >> 15 == 1 { -size } else { size }
+}
+
+/// A whole number with its sign (two's complement), the byte of most weight first.
+fn big_endian(bytes: &[u8]) -> f64 {
+    let is_negative = bytes.first().is_some_and(|first| *first >= 0x80);
+    let of = |byte: &u8| f64::from(if is_negative { !*byte } else { *byte });
+    let size = bytes.iter().fold(0.0, |sum, byte| 256.0 * sum + of(byte));
+    if is_negative { -size - 1.0 } else { size }
 }
 
 /// The levels of a page, whose length stands in front of them or is known, and its values.
@@ -210,5 +257,35 @@ fn split(content: &[u8], known: Option<usize>, has_levels: bool) -> Option<(&[u8
             content[4..].split_at_checked(usize::try_from(length).ok()?)
         }
         None => Some((&[], content)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn halves_are_those_of_ieee_754() {
+        for (bits, number) in [
+            (0x3c00, 1.0),
+            (0xc000, -2.0),
+            (0x7bff, 65504.0),
+            (0x0001, 5.960_464_477_539_063e-8),
+            (0x3555, 0.333_251_953_125),
+            (0x8000, 0.0),
+            (0xfc00, f64::NEG_INFINITY),
+        ] {
+            assert_eq!(half(bits), number, "{bits:x}");
+        }
+        assert!(half(0x7e00).is_nan());
+    }
+
+    #[test]
+    fn decimal_fractions_keep_their_sign_at_any_length() {
+        assert_eq!(big_endian(&[0xff; 16]), -1.0);
+        assert_eq!(big_endian(&[0x01, 0x00]), 256.0);
+        assert_eq!(big_endian(&[0xff, 0x85]), -123.0);
+        assert_eq!(big_endian(&[0x80]), -128.0);
+        assert_eq!(big_endian(&(-123_456_789_012_i128).to_be_bytes()), -123_456_789_012.0);
     }
 }

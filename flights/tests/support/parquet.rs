@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use parquet::basic::Type;
 use parquet::column::writer::ColumnWriter;
-use parquet::data_type::ByteArray;
+use parquet::data_type::{ByteArray, FixedLenByteArray};
 use parquet::file::properties::WriterProperties;
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::parser::parse_message_type;
@@ -74,7 +74,29 @@ fn write(writer: &mut ColumnWriter<'_>, cells: &[Option<f64>]) {
                 numbers.iter().map(|number| number.to_string().into_bytes().into()).collect();
             writer.write_batch(&values, levels, None)
         }
-        _ => panic!("no column of {} is written", Type::FIXED_LEN_BYTE_ARRAY),
+        ColumnWriter::FixedLenByteArrayColumnWriter(writer) => {
+            let length = usize::try_from(writer.get_descriptor().type_length()).unwrap();
+            let bytes = |number: &f64| match length {
+                2 => half(*number).to_le_bytes().to_vec(),
+                _ => (number.round() as i128).to_be_bytes()[16 - length..].to_vec(),
+            };
+            let values: Vec<FixedLenByteArray> =
+                numbers.iter().map(|number| FixedLenByteArray::from(bytes(number))).collect();
+            writer.write_batch(&values, levels, None)
+        }
+        ColumnWriter::Int96ColumnWriter(_) => panic!("no column of {} is written", Type::INT96),
     }
     .unwrap();
+}
+
+/// The bits of a number of two bytes, for numbers of usual size; rounded to zero.
+fn half(number: f64) -> u16 {
+    let size = number.abs();
+    if size < 6.2e-5 {
+        return 0;
+    }
+    let exponent = libm::floor(libm::log2(size));
+    let fraction = ((size / libm::exp2(exponent) - 1.0) * 1024.0) as u16;
+    let sign = if number < 0.0 { 0x8000 } else { 0 };
+    sign | (((exponent as i32 + 15) as u16) << 10) | fraction
 }
