@@ -1,10 +1,12 @@
 //! Cleaning of a channel: faulty samples are left out, counted and noted.
 
+use vehicles::Vehicle;
 use vehicles::gaps::GAP_PERIODS;
 
 use crate::clock::{self, NotForward};
 use crate::error::{LogError, Spot};
 use crate::flight::{Channel, median, period_s};
+use crate::glitches;
 use crate::held;
 use crate::quantity::Quantity;
 use crate::spikes;
@@ -27,6 +29,7 @@ pub fn clean<const N: usize>(
     let channel = growing(quantity, channel, notes);
     let channel = if quantity == Quantity::Command { channel } else { unheld(quantity, channel, notes) };
     let channel = if quantity == Quantity::RotorSpeed { unspiked(channel, notes) } else { channel };
+    let channel = without_glitches(quantity, &glitches::without(quantity, &channel), channel, notes);
     if channel.is_empty() {
         let why = notes.last().map_or("the log has none", String::as_str);
         let (expected, found) = ("samples that can be used", format!("none of {total} ({why})"));
@@ -53,6 +56,33 @@ fn unspiked<const N: usize>(channel: Channel<N>, notes: &mut Vec<String>) -> Cha
     let kept = channel.kept(|index| is_kept[index]);
     say_dropped(Quantity::RotorSpeed, &channel, &kept, "have a spike, which no rotor can follow", notes);
     kept
+}
+
+/// Leaves out the samples that are not kept, as glitches.
+fn without_glitches<const N: usize>(
+    quantity: Quantity,
+    is_kept: &[bool],
+    channel: Channel<N>,
+    notes: &mut Vec<String>,
+) -> Channel<N> {
+    if is_kept.iter().all(|is_kept| *is_kept) {
+        return channel;
+    }
+    let kept = channel.kept(|index| is_kept[index]);
+    let first_s = (0..is_kept.len()).find(|index| !is_kept[*index]).map_or(0.0, |at| channel.time_s[at]);
+    let why = format!("are far from those before and behind them, first at {first_s:.3} s of the log");
+    say_dropped(quantity, &channel, &kept, &why, notes);
+    kept
+}
+
+/// Leaves out commands far outside the range of `vehicle`, where those before and behind are not.
+pub fn without_wild_commands<const N: usize>(
+    channel: Channel<N>,
+    vehicle: &Vehicle,
+    notes: &mut Vec<String>,
+) -> Channel<N> {
+    let is_kept = glitches::without_commands(&channel, vehicle);
+    without_glitches(Quantity::Command, &is_kept, channel, notes)
 }
 
 /// Leaves out samples of messages that do not hold the quantity, which their `fields` say.

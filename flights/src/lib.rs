@@ -14,9 +14,9 @@
 //! | `form`, `rows` | tables, CSV and Parquet: their declared form, and rows on one clock |
 //! | `known_types` | messages whose fields and units need not be said |
 //! | `name`, `scaling`, `matrices`, `clock` | names of numbers, their factors, rotation matrices, clocks that start again |
-//! | `channels`, `clean`, `held`, `jumps`, `spikes`, `reading` | from a log's numbers to a flight |
+//! | `channels`, `clean`, `held`, `held_commands`, `jumps`, `spikes`, `glitches`, `reading` | from a log's numbers to a flight |
 //! | `specific_force` | specific force from what logs hold in its place |
-//! | `plausible`, `agreement`, `force_doubt`, `still`, `units`, `finding` | values against physics |
+//! | `plausible`, `agreement`, `lateness`, `force_doubt`, `still`, `units`, `finding` | values against physics |
 //! | `rig` | vehicles that a rig holds at a point |
 //! | `span` | times against the number of samples |
 //! | `held_out`, `twin` | whether test flights hold what parameters are fitted on: by file and time, by samples |
@@ -46,12 +46,15 @@ mod force_doubt;
 mod form;
 mod formats;
 mod frame;
+mod glitches;
 mod held;
+mod held_commands;
 mod held_out;
 mod joined;
 mod jumps;
 mod known;
 mod known_types;
+mod lateness;
 mod limits;
 mod log;
 mod log_reader;

@@ -11,6 +11,7 @@ use crate::finding::Finding;
 use crate::flight::{Channel, Flight, median};
 use crate::force_doubt::{ForceDoubt, Kind};
 use crate::frame;
+use crate::lateness;
 use crate::quantity::{FRACTION, PERCENT, Quantity};
 use crate::rig::{Hold, hold};
 use crate::spikes::usual_greatest;
@@ -26,12 +27,16 @@ const IN_TIME: f64 = 0.9;
 const RATE_WINDOW_S: f64 = 0.1;
 const VELOCITY_WINDOW_S: f64 = 0.2;
 const LEANING_WINDOW_S: f64 = 0.4;
+/// A gyroscope that is late by less is aligned by its readers.
+const ALIGNED_S: f64 = 0.2;
 /// Below these the vehicle hardly moves, and noise is compared with noise.
 const QUIET_RATE_RAD_S: f64 = 0.05;
 const QUIET_SPEED_M_S: f64 = 0.05;
 const QUIET_ACCELERATION_M_S2: f64 = 0.2;
 /// A vehicle accelerates as it leans, but for the drag, within this factor.
 const LEANING_TOLERANCE: f64 = 3.0;
+/// Beyond this factor a scale is as likely as a unit.
+const LEANING_EXACT: f64 = 1.5;
 /// And a vector is its twin's derivative within this one.
 const DERIVATIVE_TOLERANCE: f64 = 1.3;
 /// No multirotor flies faster, in m/s.
@@ -211,7 +216,13 @@ impl Judge<'_> {
             return self
                 .units
                 .by_unit_or_scale(quantity, agreement.slope, DERIVATIVE_TOLERANCE, &what)
-                .or_else(|| late(quantity, agreement));
+                .or_else(|| {
+                    late(quantity, agreement).map(|vague| self.late_rates(agreement).unwrap_or(vague))
+                })
+                .or_else(|| self.units.off_a_little(quantity, agreement, &what));
+        }
+        if let Some(late) = self.late_rates(agreement) {
+            return Some(late);
         }
         let reordered = self
             .w_first()
@@ -232,7 +243,8 @@ impl Judge<'_> {
             "it has a correlation of {:.2} with the derivative of the attitude (signs of the axes: {signs:?})",
             agreement.correlation
         );
-        let fits = explains.then(|| match signs {
+        let is_turned = signs.iter().any(|sign| *sign < 0.0);
+        let fits = (explains && is_turned).then(|| match signs {
             [x, y, z] if x < 0.0 && y < 0.0 && z < 0.0 => {
                 format!("an attitude that takes the world to the body: {}", self.inverse_advice())
             }
@@ -240,6 +252,25 @@ impl Judge<'_> {
             _ => "the axes, or angles of the attitude, with a `-` before the name".to_owned(),
         });
         Some(finding(quantity, fits, &what))
+    }
+
+    /// The angular velocity is the attitude's derivative, but on another clock.
+    fn late_rates(&self, agreement: Agreement) -> Option<Finding> {
+        let (attitude, rates) = (&self.flight.attitude, &self.flight.angular_velocity);
+        let late = lateness::of_rates(attitude, rates, RATE_WINDOW_S, QUIET_RATE_RAD_S)
+            .filter(|late| late.correlation > agreement.correlation + ALIKE)?;
+        let what = format!(
+            "it has a correlation of {:.2} with the derivative of the attitude, and of {:.2} if it is {:.2} s late: the clocks \
+             of the two differ by about that",
+            agreement.correlation, late.correlation, late.late_s
+        );
+        let fits = format!(
+            "`delay_s = {{ angular_velocity = {:.2} }}` of the flight (and the same for channels of the same sensor or file)",
+            late.late_s
+        );
+        // Less than this `identify` finds and takes off by itself.
+        let is_clear = late.late_s.abs() > ALIGNED_S;
+        Some(finding(Quantity::AngularVelocity, is_clear.then_some(fits), &what))
     }
 
     /// Names under which an attitude that takes the world to the body is read.
@@ -270,7 +301,7 @@ impl Judge<'_> {
         let quantity = Quantity::Velocity;
         let pairs = Pairs::velocities(&self.flight.position, &self.flight.velocity, VELOCITY_WINDOW_S);
         // A position in too large a unit makes everything look quiet: the share of noise decides then.
-        let agreement = pairs.agreement(QUIET_SPEED_M_S * self.position_scale())?;
+        let agreement = pairs.agreement(QUIET_SPEED_M_S * self.least_scale(Quantity::Position))?;
         let what = format!("it is {:.5} times the derivative of the position", agreement.slope);
         if agreement.correlation > SAME {
             let position =
@@ -306,30 +337,46 @@ impl Judge<'_> {
         if is_held { None } else { self.leaning().or_else(|| self.axes()) }
     }
 
-    /// The position accelerates as the vehicle leans.
+    /// The position, or else the velocity, accelerates as the vehicle leans.
     fn leaning(&self) -> Option<Finding> {
         if !self.flight.assumed.is_empty() {
             return None;
         }
-        let (quantity, gravity_m_s2) = (Quantity::Position, self.vehicle.gravity_m_s2);
-        let (attitude, position) = (&self.flight.attitude, &self.flight.position);
-        let pairs = Pairs::leaning(attitude, position, gravity_m_s2, LEANING_WINDOW_S);
-        let agreement = pairs.agreement(QUIET_ACCELERATION_M_S2 * self.position_scale())?;
+        let (quantity, pairs) = self.leaning_pairs();
+        let agreement = pairs.agreement(QUIET_ACCELERATION_M_S2 * self.least_scale(quantity))?;
         let factor = 1.0 / agreement.slope;
         if agreement.correlation <= SAME || libm::log(factor).abs() < libm::log(LEANING_TOLERANCE) {
             return None;
         }
-        let what = format!(
-            "declared in {}, it accelerates {factor:.4} times as much as the vehicle leans",
-            self.units.unit(quantity)
-        );
+        let what = format!("it accelerates {factor:.4} times as much as the vehicle leans");
+        let declared = format!("declared in {}, {what}", self.units.unit(quantity));
         let unit = self.units.unit_that_fits(quantity, factor, LEANING_TOLERANCE);
         if pairs.agreement(QUIET_ACCELERATION_M_S2).is_none() {
             // Also what hangs on a rig leans and hardly moves.
             let hint = unit.map_or(String::new(), |unit| format!("; on a rig, or in another unit ({unit})"));
-            return Some(finding(quantity, None, &(what + &hint)));
+            return Some(finding(quantity, None, &(declared + &hint)));
         }
-        Some(finding(quantity, either(unit, self.angles_that_fit(factor)), &what))
+        let is_alone = self.units.unit_that_fits(quantity, factor, LEANING_EXACT).is_some();
+        let unit =
+            unit.map(|unit| if is_alone { unit } else { self.units.scale_before(quantity, factor, &unit) });
+        let fits = either(unit, self.angles_that_fit(factor));
+        Some(match fits {
+            None => self.units.by_scale(quantity, factor, &what),
+            fits => finding(quantity, fits, &declared),
+        })
+    }
+
+    /// The vehicle's leaning against the acceleration of its position, or else of its velocity.
+    fn leaning_pairs(&self) -> (Quantity, Pairs) {
+        let (flight, gravity_m_s2) = (self.flight, self.vehicle.gravity_m_s2);
+        if flight.position.is_empty() {
+            let leaning = Pairs::leaning_of(&flight.attitude, gravity_m_s2);
+            let pairs =
+                Pairs::accelerations(&leaning, &flight.velocity, &flight.position, LEANING_WINDOW_S).level();
+            return (Quantity::Velocity, pairs);
+        }
+        let pairs = Pairs::leaning(&flight.attitude, &flight.position, gravity_m_s2, LEANING_WINDOW_S);
+        (Quantity::Position, pairs)
     }
 
     /// The position accelerates to where the vehicle leans.
@@ -375,10 +422,10 @@ impl Judge<'_> {
         (off < libm::log(LEANING_TOLERANCE)).then(|| format!("{} of `attitude`", of_unit(name)))
     }
 
-    /// Returns the least ratio that the position as read may have to its true value, if the log has another unit.
-    fn position_scale(&self) -> f64 {
-        let declared = self.units.factor(Quantity::Position);
-        let largest = Quantity::Position.dimension().units.iter().map(|unit| unit.1).fold(declared, f64::max);
+    /// Returns the least ratio that the values as read may have to the true ones, if the log has another unit.
+    fn least_scale(&self, quantity: Quantity) -> f64 {
+        let declared = self.units.factor(quantity);
+        let largest = quantity.dimension().units.iter().map(|unit| unit.1).fold(declared, f64::max);
         declared / largest
     }
 

@@ -16,6 +16,7 @@ use crate::error::{FlightsError, LogError, Spot};
 use crate::finding::Finding;
 use crate::flight::{AnyChannel, Channel, Flight};
 use crate::frame;
+use crate::held_commands;
 use crate::jumps;
 use crate::known::SETTLE_S;
 use crate::known_types;
@@ -121,6 +122,7 @@ impl Reading<'_> {
         self.assume(&mut flight, yaw)?;
         jumps::leave_out_jumps(&mut flight);
         self.turn_force(&mut flight)?;
+        held_commands::leave_out(&mut flight, self.vehicle);
         say_gaps(&mut flight);
         self.check_something_is_left(&flight)?;
         let findings = plausible::judge(&flight, self.vehicle, &self.channels);
@@ -140,7 +142,8 @@ impl Reading<'_> {
             Ok(attitude) => flight.attitude = attitude,
             Err(cause) => said.errors.push(self.channel_error(Quantity::Attitude, cause)),
         }
-        flight.command = self.channel(log, Quantity::Command, said);
+        let commands = self.channel(log, Quantity::Command, said);
+        flight.command = clean::without_wild_commands(commands, self.vehicle, &mut said.notes);
         flight.rotor_speed = self.channel(log, Quantity::RotorSpeed, said);
         flight.position = self.channel(log, Quantity::Position, said);
         flight.velocity = self.channel(log, Quantity::Velocity, said);

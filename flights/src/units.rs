@@ -3,6 +3,7 @@
 use diagnostics::unit::ROTOR_SPEED;
 use toml::Spanned;
 
+use crate::agreement::Agreement;
 use crate::declaration::{ChannelMap, EachNumber, Entry};
 use crate::finding::Finding;
 use crate::quantity::Quantity;
@@ -11,6 +12,8 @@ use crate::quantity::Quantity;
 pub const HUNDREDS: f64 = 100.0;
 /// Counts of sensors are as near to some units as this factor: beyond it, a scale is as likely as a unit.
 const EXACT: f64 = 1.05;
+/// Beyond this correlation noise hardly changes the ratio of two channels.
+const CLOSELY: f64 = 0.98;
 /// Values that no unit explains are refused beyond this factor.
 const GROSS: f64 = 3.0;
 
@@ -40,8 +43,11 @@ impl Units<'_> {
             // The size of a rotor's speed, or of the force in a flight that leans, is not known as well.
             let is_derivative = matches!(quantity, Quantity::AngularVelocity | Quantity::Velocity);
             let is_exact = !is_derivative || self.unit_that_fits(quantity, factor, EXACT).is_some();
-            let is_alone = is_exact && !is_scaled;
-            if is_alone { unit } else { format!("{unit}, or {}", self.scale(quantity, factor)) }
+            match (is_exact, is_scaled) {
+                (true, false) => unit,
+                (true, true) => format!("{unit}, or {}", self.scale(quantity, factor)),
+                (false, _) => self.scale_before(quantity, factor, &unit),
+            }
         });
         Some(finding(quantity, fits, &format!("declared in {}, {what}", self.unit(quantity))))
     }
@@ -63,6 +69,24 @@ impl Units<'_> {
     pub fn by_scale(&self, quantity: Quantity, factor: f64, what: &str) -> Finding {
         let fits = format!("no unit alone, but {}", self.scale(quantity, factor));
         finding(quantity, Some(fits), &format!("declared in {}, {what}", self.unit(quantity)))
+    }
+
+    /// Advice of a scale, where `unit` alone is near and leaves an error, which is said.
+    pub fn scale_before(&self, quantity: Quantity, factor: f64, unit: &str) -> String {
+        let errors =
+            self.other_units(quantity).map(|(_, other)| factor * other / self.factor(quantity) - 1.0);
+        let error = errors.min_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
+        let (percent, way) = (100.0 * error.abs(), if error > 0.0 { "large" } else { "small" });
+        let scale = self.scale(quantity, factor);
+        format!("{scale} ({unit} alone leaves the values about {percent:.0} % too {way})")
+    }
+
+    /// A note on values that follow another channel closely, but are some percent too large or too small.
+    pub fn off_a_little(&self, quantity: Quantity, agreement: Agreement, what: &str) -> Option<Finding> {
+        let is_off = libm::log(agreement.slope.abs()).abs() > libm::log(EXACT);
+        let scale = || self.scale(quantity, agreement.slope);
+        (is_off && agreement.correlation > CLOSELY)
+            .then(|| finding(quantity, None, &format!("{what}, which {} would make 1", scale())))
     }
 
     /// The scale with which values are right that are `factor` times too large.

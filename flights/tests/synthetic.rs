@@ -166,6 +166,110 @@ fn a_position_alone_is_held_against_how_the_vehicle_leans() {
     );
 }
 
+/// A position or a velocity in feet or inches fits no unit.
+#[test]
+fn lengths_in_no_known_unit_are_refused_with_a_scale() {
+    let declared = |name: &str| without(if name == "position" { "velocity" } else { "position" });
+    for (per_m, fits) in
+        [(3.2808, "no unit alone, but a `scale` of about 0.3"), (39.37, "a `scale` of about 0.02")]
+    {
+        let foreign = Motion { length_unit: per_m, ..Motion::default() };
+        let found = findings(&foreign, &declared("position"));
+        assert!(found.len() == 1 && found[0].1.starts_with(fits), "{per_m}: {found:?}");
+        let velocity = changed("vx", 3, |_, v| v.iter_mut().for_each(|v| *v *= per_m));
+        let place = Place::new();
+        place.write("log.csv", velocity.as_bytes());
+        let error = place.load("log.csv", &declared("velocity"), "").unwrap_err().to_string();
+        assert!(error.contains("`velocity`: declared in m/s, it accelerates"), "{error}");
+        assert!(error.contains("a `scale` of about 0.") && error.contains("would fit"), "{error}");
+    }
+}
+
+/// Counts of 16.4 LSB/(deg/s) are near to milliradians per second, but not the same.
+#[test]
+fn a_scale_comes_before_a_unit_that_is_only_near() {
+    let counts = Motion { rate_unit: 16.4 * 57.295_78, ..Motion::default() };
+    let found = findings(&counts, CHANNELS);
+    let [(Quantity::AngularVelocity, fits)] = &found[..] else { panic!("{found:?}") };
+    assert!(
+        fits.starts_with(
+            "a `scale` of about 1.06e-3 (`unit = \"mrad/s\"` alone leaves the values about 6 % too "
+        ),
+        "{fits}"
+    );
+}
+
+/// A gyroscope whose scale is off by 6 % is read, and the note says by how much.
+#[test]
+fn a_scale_that_is_a_little_off_is_noted() {
+    let off = Motion { rate_unit: 0.94, ..Motion::default() };
+    let notes = read(&off, CHANNELS, "").unwrap().notes;
+    assert!(notes.len() == 1 && notes[0].contains("it is 0.94"), "{notes:?}");
+    assert!(notes[0].contains("which a `scale` of about 1.06"), "{notes:?}");
+    let near = Motion { rate_unit: 0.97, ..Motion::default() };
+    assert_eq!(read(&near, CHANNELS, "").unwrap().notes, [""; 0]);
+}
+
+/// One flipped bit in a log of a thousand samples costs that sample.
+#[test]
+fn lone_wild_samples_are_left_out_and_said() {
+    for (first, name, wild) in [
+        ("wx", "angular_velocity", 1e30),
+        ("wy", "angular_velocity", -35.0),
+        ("vx", "velocity", 1e12),
+        ("pz", "position", 1e15),
+        ("fz", "specific_force", -1e20),
+        ("m1", "command", 1e9),
+        ("v", "battery_voltage", 1e6),
+    ] {
+        let text = changed(first, 1, |row, numbers| {
+            if row == 400 {
+                numbers[0] = wild;
+            }
+        });
+        let flight = read_text(&text).unwrap_or_else(|error| panic!("{first}: {error}"));
+        let note =
+            format!("{name}: 1 of 1001 samples are far from those before and behind them, first at 4.000 s");
+        assert!(flight.notes.len() == 1 && flight.notes[0].starts_with(&note), "{first}: {:?}", flight.notes);
+    }
+}
+
+/// The gyroscope of another clock, as in a second file or from another computer.
+#[test]
+fn a_gyroscope_on_another_clock_is_refused_with_its_delay() {
+    let of = |late_s: f64| {
+        let whole = Motion::default().csv();
+        let (header, rows) = whole.split_once('\n').unwrap();
+        let late = |row: &str| {
+            let (time, rest) = row.split_once(',').unwrap();
+            format!("{},{rest}\n", time.parse::<f64>().unwrap() + late_s)
+        };
+        let place = Place::new();
+        place.write("log.csv", whole.as_bytes());
+        let other: String = rows.lines().map(late).collect();
+        place.write("imu.csv", format!("{header}\n{other}").as_bytes());
+        let channels =
+            CHANNELS.replace("[\"wx\", \"wy\", \"wz\"]", "[\"wx\", \"wy\", \"wz\"], file = \"imu.csv\"");
+        place.load("log.csv", &channels, "").map(|flight| flight.notes).map_err(|error| error.to_string())
+    };
+    for late_s in [0.3, 0.6, -1.0] {
+        let error = of(late_s).unwrap_err();
+        let fits =
+            error.split_once("`delay_s = { angular_velocity = ").unwrap_or_else(|| panic!("{error}")).1;
+        let delay_s: f64 = fits.split(' ').next().unwrap().parse().unwrap();
+        assert!((delay_s - late_s).abs() < 0.03 && error.contains("the clocks of the two differ"), "{error}");
+    }
+    assert_eq!(of(0.0).unwrap(), [""; 0]);
+}
+
+/// An axis that does not follow is not one with a wrong sign.
+#[test]
+fn an_axis_without_a_signal_is_not_advised_a_sign() {
+    let text = changed("wx", 1, |row, rate| rate[0] = if row % 2 == 0 { 9.0 } else { -9.0 });
+    let notes = read_text(&text).unwrap_or_else(|error| panic!("{error}")).notes;
+    assert!(notes.iter().any(|note| note.contains("signs of the axes: [0.0, 1.0, 1.0]")), "{notes:?}");
+}
+
 #[test]
 fn times_in_another_unit_are_found_before_a_part_is_cut_out() {
     let in_ms = Motion { time_unit: 1000.0, ..Motion::default() };
@@ -304,7 +408,8 @@ fn a_unit_is_advised_only_where_it_alone_fits() {
         let found = findings(&motion, CHANNELS);
         let fits = found.iter().find(|(found, _)| *found == quantity).map(|(_, fits)| fits.clone()).unwrap();
         let number = fits.split_once("a `scale` of about ").unwrap_or_else(|| panic!("{fits}")).1;
-        assert!((number.parse::<f64>().unwrap() / scale - 1.0).abs() < 0.1, "{fits} for {scale}");
+        let number: f64 = number.split(' ').next().unwrap().parse().unwrap();
+        assert!((number / scale - 1.0).abs() < 0.1, "{fits} for {scale}");
     };
     let force = |force_unit| Motion { force_unit, ..Motion::default() };
     scaled(Quantity::SpecificForce, force(1000.0), 1e-3);

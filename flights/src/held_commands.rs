@@ -1,0 +1,176 @@
+//! Commands that the logger held: they repeat to the last bit while the vehicle goes on turning. Nobody knows them there; the
+//! repeats are left out, so that every reader finds a gap.
+
+use crate::canonical::turning;
+use crate::flight::{Channel, Flight, median};
+use vehicles::Vehicle;
+
+/// Shortest stretch; whole numbers of a coarse range repeat for less.
+const HELD_S: f64 = 1.0;
+/// Least number of equal samples.
+const LEAST_SAMPLES: usize = 20;
+/// Least change in the same time elsewhere, in the smallest steps of the channel: a coarser one shows nothing.
+const STEPS: f64 = 10.0;
+/// Within the stretch the vehicle turns by this part of what it does elsewhere, at least.
+const GOES_ON: f64 = 0.5;
+/// Greatest part of the commands that a logger holds: if more repeat, a motor's column is wrong.
+const PART_MAX: f64 = 0.5;
+
+/// Leaves out the repeats of commands that the logger held, and notes them.
+pub fn leave_out(flight: &mut Flight, vehicle: &Vehicle) {
+    if flight.commands_on_change || !flight.assumed.is_empty() {
+        return;
+    }
+    let rates = rates(flight);
+    let command = &flight.command;
+    let stretches: Vec<(usize, usize)> = (0..vehicle.rotors.len())
+        .flat_map(|rotor| held(command, rotor, vehicle))
+        .filter(|(from, to)| goes_on(&rates, command.time_s[*from], command.time_s[*to]))
+        .collect();
+    let mut is_kept = vec![true; command.time_s.len()];
+    // The first of a stretch was fresh.
+    stretches.iter().for_each(|(from, to)| is_kept[from + 1..=*to].fill(false));
+    let repeats = is_kept.iter().filter(|is_kept| !**is_kept).count();
+    if repeats == 0 || repeats as f64 > PART_MAX * is_kept.len() as f64 {
+        return;
+    }
+    let longest = stretches.iter().max_by(|a, b| {
+        let length_s = |(from, to): &(usize, usize)| command.time_s[*to] - command.time_s[*from];
+        length_s(a).total_cmp(&length_s(b))
+    });
+    if let Some((from, to)) = longest {
+        let [from_s, to_s] = [from, to].map(|at| command.time_s[*at]);
+        flight.notes.push(format!(
+            "command: {repeats} of {} samples are held by the logger: they repeat to the last digit while the vehicle goes on \
+             turning, the longest from {from_s:.2} s to {to_s:.2} s; left out",
+            is_kept.len()
+        ));
+    }
+    flight.command = flight.command.kept(|at| is_kept[at]);
+}
+
+/// Angular velocity, or else the rate of change of the attitude.
+fn rates(flight: &Flight) -> Channel<3> {
+    if flight.angular_velocity.is_empty() && !flight.attitude.is_empty() {
+        return turning(&flight.attitude);
+    }
+    flight.angular_velocity.clone()
+}
+
+/// Stretches in which the command of a rotor repeats, each by its first and last sample. At its limits a command may stay.
+fn held<const N: usize>(command: &Channel<N>, rotor: usize, vehicle: &Vehicle) -> Vec<(usize, usize)> {
+    let number = |at: usize| command.values[at][rotor];
+    let is_at_limit = |number: f64| number <= vehicle.command.min || number >= vehicle.command.max;
+    let (mut found, mut from) = (Vec::new(), 0);
+    for at in 1..=command.values.len() {
+        if command.values.get(at).is_some_and(|values| values[rotor].to_bits() == number(from).to_bits()) {
+            continue;
+        }
+        let to = at - 1;
+        let is_long = to - from >= LEAST_SAMPLES && command.time_s[to] - command.time_s[from] >= HELD_S;
+        if is_long && !is_at_limit(number(from)) && is_fine(command, rotor, to - from) {
+            found.push((from, to));
+        }
+        from = at;
+    }
+    found
+}
+
+/// True if the command changes in `count` samples by many of its smallest steps, in nine of ten places.
+fn is_fine<const N: usize>(command: &Channel<N>, rotor: usize, count: usize) -> bool {
+    let numbers: Vec<f64> = command.values.iter().map(|values| values[rotor]).collect();
+    let size = numbers.iter().fold(0.0_f64, |size, number| size.max(number.abs()));
+    // Smaller steps are rounding errors of a unit conversion.
+    let steps = numbers.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| *step > 1e-9 * size);
+    let Some(least) = steps.reduce(f64::min) else { return false };
+    // Of the stretch itself nothing is taken: there the way is zero.
+    let ways = numbers.iter().zip(numbers.iter().skip(count)).map(|(from, to)| (to - from).abs());
+    let mut ways: Vec<f64> = ways.filter(|way| *way > 0.0).collect();
+    ways.sort_by(f64::total_cmp);
+    ways.get(ways.len() / 10).is_some_and(|way| *way > STEPS * least)
+}
+
+/// True if the vehicle turns between two times about as much as elsewhere.
+fn goes_on(rates: &Channel<3>, from_s: f64, to_s: f64) -> bool {
+    let is_inside = |at: usize| (from_s..=to_s).contains(&rates.time_s[at]);
+    (0..3).any(|axis| {
+        let usual_size = |inside: bool| {
+            let of = (0..rates.values.len()).filter(|at| is_inside(*at) == inside);
+            let numbers: Vec<f64> = of.map(|at| rates.values[at][axis]).collect();
+            let middle = median(numbers.iter().copied())?;
+            median(numbers.iter().map(|number| (number - middle).abs()))
+        };
+        matches!((usual_size(true), usual_size(false)), (Some(inside), Some(outside)) if outside > 0.0 && inside > GOES_ON * outside)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flight::Role;
+
+    /// A flight of 20 s at 100 Hz that turns to and fro, with commands that follow.
+    fn flight() -> (Flight, Vehicle) {
+        let vehicle = Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml").unwrap();
+        let mut flight = Flight::new("f", "log", Role::Fit);
+        let time_s: Vec<f64> = (0..2000).map(|k| 0.01 * f64::from(k)).collect();
+        let rate = |t: &f64| [0.5 * libm::sin(5.0 * t), 0.3 * libm::cos(3.0 * t), 0.0];
+        flight.angular_velocity =
+            Channel { values: time_s.iter().map(rate).collect(), time_s: time_s.clone() };
+        let commands =
+            |t: &f64| {
+                std::array::from_fn(|rotor| {
+                    if rotor < 4 { 76.0 + 5.0 * libm::sin(5.0 * t + rotor as f64) } else { 0.0 }
+                })
+            };
+        flight.command = Channel { values: time_s.iter().map(commands).collect(), time_s };
+        (flight, vehicle)
+    }
+
+    #[test]
+    fn what_the_logger_held_is_a_gap() {
+        for rotors in [0..4, 1..2] {
+            let (mut flight, vehicle) = flight();
+            let first = flight.command.values[500];
+            flight.command.values[500..900].iter_mut().for_each(|values| {
+                values[rotors.clone()].copy_from_slice(&first[rotors.clone()]);
+            });
+            leave_out(&mut flight, &vehicle);
+            assert_eq!(flight.command.time_s.len(), 2000 - 399, "{rotors:?}");
+            assert!(flight.notes[0].starts_with("command: 399 of 2000 samples are held by the logger"));
+            assert!(flight.notes[0].contains("from 5.00 s to 8.99 s"), "{:?}", flight.notes);
+        }
+    }
+
+    #[test]
+    fn commands_that_may_stay_are_left() {
+        let unchanged = |change: &dyn Fn(&mut Flight)| {
+            let (mut flight, vehicle) = flight();
+            change(&mut flight);
+            let before = flight.command.clone();
+            leave_out(&mut flight, &vehicle);
+            assert_eq!((flight.command, flight.notes), (before, vec![]));
+        };
+        unchanged(&|_| {});
+        let hold = |flight: &mut Flight, command: f64| {
+            flight.command.values[500..900].iter_mut().for_each(|values| values[..4].fill(command));
+        };
+        // At a limit, at rest, on change, in whole numbers, and for most of the flight.
+        unchanged(&|flight| hold(flight, 200.0));
+        unchanged(&|flight| {
+            hold(flight, 76.0);
+            flight.angular_velocity.values[500..900].fill([0.0; 3]);
+        });
+        unchanged(&|flight| {
+            hold(flight, 76.0);
+            flight.commands_on_change = true;
+        });
+        unchanged(&|flight| {
+            let whole =
+                |values: &mut [f64; vehicles::ROTORS_MAX]| *values = values.map(|x| (x / 5.0).round());
+            flight.command.values.iter_mut().for_each(whole);
+            hold(flight, 15.0);
+        });
+        unchanged(&|flight| flight.command.values[200..1700].iter_mut().for_each(|values| values[1] = 70.0));
+    }
+}
