@@ -13,7 +13,7 @@ use bus::context::NodeContext;
 use diagnostics::parameter::{ParameterError, all, finite, positive, refuse, require};
 use inputs::InputFiles;
 use nalgebra::{UnitQuaternion, Vector3};
-use scenes::Scene;
+use scenes::{Mesh, Scene};
 use serde::Deserialize;
 use std::path::PathBuf;
 use vehicles::{EffectEntry, Vehicle};
@@ -172,6 +172,7 @@ impl Parameters {
         // Before the backend, which a vehicle that is none might not survive.
         airworthy::tell_unsourced(airframe.vehicle(), run);
         odd::tell(&airframe, run);
+        scene.meshes.iter().filter_map(Mesh::doubt).for_each(|doubt| run.warn("scene", doubt));
         beyond::tell(airframe.vehicle(), airframe.effects(), &self.start(), run);
         airworthy::check_rotor_inertia(airframe.vehicle())?;
         let dt_s = run.tick_s() / f64::from(self.substeps);

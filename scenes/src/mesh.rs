@@ -18,6 +18,9 @@ const FLAT: f64 = 1e-6;
 /// Each triangle of a convex mesh is held against each corner.
 const CONVEX_MAX: usize = 2000;
 
+/// Longest sides of meshes that are usual, in m: a nut to a stadium. Beyond it the unit of the file is in doubt; tuned, no source.
+const USUAL_M: std::ops::RangeInclusive<f64> = 0.01..=200.0;
+
 /// A triangle less high than this, over its longest side, is a line: as far as rounding goes.
 const LINE_MAX: f64 = 1e-9;
 
@@ -135,6 +138,35 @@ impl Mesh {
             [0, 1, 2].map(|axis| used().map(|corner| corner[axis]).fold(from, bound))
         };
         [along(f64::min, f64::INFINITY), along(f64::max, f64::NEG_INFINITY)]
+    }
+
+    /// Reason to doubt the unit of its file, in words: beside vehicles and rooms it is implausibly large or small.
+    #[must_use]
+    pub fn doubt(&self) -> Option<String> {
+        let [low, high] = self.extent_W_m();
+        let size_m: [f64; 3] = std::array::from_fn(|axis| high[axis] - low[axis]);
+        let longest_m = size_m.into_iter().fold(0.0, f64::max);
+        let sides = |factor: f64| {
+            let [x, y, z] = size_m.map(|side_m| factor * side_m);
+            format!("{x:.4} x {y:.4} x {z:.4} m")
+        };
+        let is_large = longest_m > *USUAL_M.end();
+        let (factor, mistake) = if is_large {
+            (1e-3, "millimetres were read as metres")
+        } else {
+            (1e3, "metres were read as millimetres")
+        };
+        (!USUAL_M.contains(&longest_m)).then(|| {
+            format!(
+                "mesh \"{}\" measures {}, expected {} m to {} m in its longest side, as beside vehicles and in rooms; check its \
+                 `scale`: {factor} times as large, as if {mistake}, it would measure {}",
+                self.name,
+                sides(1.0),
+                USUAL_M.start(),
+                USUAL_M.end(),
+                sides(factor)
+            )
+        })
     }
 
     /// True if it has no border: each edge of a triangle is one of another too, the other way round.

@@ -110,6 +110,29 @@ fn triangles(mesh: &Mesh) -> Vec<[[i64; 3]; 3]> {
     all
 }
 
+/// Millimetres that are read as metres, and metres that are read as millimetres.
+#[test]
+fn a_mesh_of_implausible_size_is_doubted_with_its_scale() {
+    let of = |factor: f32| {
+        let corners =
+            (0..8).map(corner).map(|[x, y, z]| format!("v {} {} {}\n", factor * x, factor * y, factor * z));
+        let faces =
+            FACES.map(|face| format!("f {}\n", face.map(|corner| (corner + 1).to_string()).join(" ")));
+        let bytes = corners.chain(faces).collect::<String>().into_bytes();
+        with_mesh("box.obj", TURNED, bytes).unwrap().meshes.remove(0).doubt()
+    };
+    assert_eq!([of(1.0), of(50.0), of(0.01)], [None, None, None]);
+    let large = of(1000.0).unwrap();
+    for part in [
+        "mesh \"box\" measures 2000.0000 x 1000.0000 x 3000.0000 m",
+        "check its `scale`: 0.001 times",
+        "2.0000 x 1.0000 x 3.0000 m",
+    ] {
+        assert!(large.contains(part), "{part} is not in: {large}");
+    }
+    assert!(of(0.001).unwrap().contains("1000 times as large, as if metres were read as millimetres"));
+}
+
 #[test]
 fn one_box_in_each_format_is_the_same_triangles_placed_and_turned() {
     let of = |file: &str, bytes| with_mesh(file, TURNED, bytes).unwrap().meshes.remove(0);
