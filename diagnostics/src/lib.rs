@@ -31,6 +31,6 @@ pub use diagnostic::{Diagnostic, Faults};
 pub use nearest::{did_you_mean, nearest};
 pub use parameter::ParameterError;
 pub use place::Place;
-pub use printable::{printable, printable_json, printable_line, short_lines, shortened};
+pub use printable::{is_printable, printable, printable_json, printable_line, short_lines, shortened};
 pub use read::{Misread, parse_toml, read, read_toml, read_tree};
 pub use unit::{Dimension, convert};

@@ -103,7 +103,8 @@ fn escaped(text: &str, is_kept: impl Fn(char) -> bool, push: impl Fn(&mut String
 /// True if a terminal shows the character and leaves the characters around it where they are. False for control
 /// characters, the controls of the direction of writing (Unicode's `Bidi_Control`), separators of lines, and
 /// characters without width (`Default_Ignorable_Code_Point`, but for the variation selectors of emoji).
-fn is_printable(c: char) -> bool {
+#[must_use]
+pub fn is_printable(c: char) -> bool {
     let is_hidden = matches!(c,
         '\u{ad}' | '\u{34f}' | '\u{61c}' | '\u{115f}'..='\u{1160}' | '\u{17b4}'..='\u{17b5}'
         | '\u{180b}'..='\u{180f}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}'

@@ -4,6 +4,7 @@
 //! 4.1.1, MIT). The crate `plotly` embeds the whole library and two MathJax bundles, which makes a page of 7.5 MB and
 //! brings fifty more packages.
 
+use diagnostics::printable_json;
 use serde_json::Value;
 
 /// Mark near the start of every page.
@@ -23,10 +24,22 @@ pub fn page(body: &str, plotly: &str, script: &str, data: &Value) -> Vec<u8> {
         style = include_str!("page/page.css"),
         body = body,
         plotly = plotly,
-        // No name in the data can end the element that holds it.
-        data = data.to_string().replace('<', "\\u003c"),
+        // No name in the data can turn or hide text, or end the element that holds it.
+        data = printable_json(&data.to_string()).replace('<', "\\u003c"),
         kit = include_str!("page/kit.js"),
         script = script,
     )
     .into_bytes()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_in_the_data_neither_end_their_element_nor_turn_the_text() {
+        let page = page("", "", "", &serde_json::json!({ "name": "</script>\u{202e}x" }));
+        let page = String::from_utf8(page).unwrap();
+        assert!(page.contains("\\u003c/script>\\u202ex") && !page.contains('\u{202e}'));
+    }
 }

@@ -4,6 +4,7 @@
 //! centre of mass, its axes are the body's.
 
 use crate::airframe::{Body, Paint, Part, Shape};
+use diagnostics::is_printable;
 use std::fmt::Write as _;
 
 /// Mark within the first bytes of every such file: a file without it is not replaced.
@@ -93,6 +94,8 @@ fn escaped(name: &str) -> String {
             '"' => text += "&quot;",
             '\t' | '\n' | '\r' => text.push(' '),
             '\u{0}'..='\u{1f}' | '\u{fffe}' | '\u{ffff}' => text.push(char::REPLACEMENT_CHARACTER),
+            // Characters that turn or hide the text beside them stand as their numbers.
+            _ if !is_printable(letter) => text += &format!("&#{};", u32::from(letter)),
             _ => text.push(letter),
         }
         text
@@ -106,6 +109,7 @@ mod tests {
     #[test]
     fn names_are_escaped_and_zeros_have_no_sign() {
         assert_eq!(escaped("a \"<b>\" & \u{7}c\n"), "a &quot;&lt;b&gt;&quot; &amp; \u{fffd}c ");
+        assert_eq!(escaped("a\u{202e}b\u{200b}é"), "a&#8238;b&#8203;é");
         assert_eq!(numbers([-0.0, 1e-7, -2.5]), "0 0.0000001 -2.5");
     }
 }
