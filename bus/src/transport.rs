@@ -285,8 +285,26 @@ pub(crate) fn samples_bytes(size: usize, capacity: Capacity) -> u64 {
     (samples * (8 * sample_words(size) + size_of::<SampleHeader>())) as u64
 }
 
+/// Open files that a process needs at least while it opens a topic: with fewer left, iceoryx2 fails without a reason.
+const FILES_LEFT_MIN: u64 = 16;
+
+/// Hint at the limit on open files, where this process is near it; else empty. The listing itself is one of them.
+fn few_files_left() -> String {
+    let limit = rustix::process::getrlimit(rustix::process::Resource::Nofile).current.unwrap_or(u64::MAX);
+    let open =
+        std::fs::read_dir("/proc/self/fd").map_or(0, |entries| entries.count() as u64).saturating_sub(1);
+    hint_of_files(open, limit)
+}
+
+fn hint_of_files(open: u64, limit: u64) -> String {
+    if open.saturating_add(FILES_LEFT_MIN) < limit {
+        return String::new();
+    }
+    format!("; it has {open} files open, and its limit is {limit}: raise that (`ulimit -n`), 1024 is usual")
+}
+
 fn transport_error(node: &str, action: &str, reason: &IceoryxError) -> BusError {
-    let reason = reason.to_string();
+    let reason = reason.to_string() + &few_files_left();
     BusError::Transport { node: node.to_owned(), action: action.to_owned(), reason }
 }
 
@@ -362,7 +380,7 @@ impl Received {
 
 #[cfg(test)]
 mod tests {
-    use super::{Receiver, SampleHeader, Sender, Transport, run_dir_bytes_max, takes_run_dir};
+    use super::{Receiver, SampleHeader, Sender, Transport, hint_of_files, run_dir_bytes_max, takes_run_dir};
     use crate::announcement::Announcement;
     use crate::host_time::monotonic_ns;
     use crate::message::Message as _;
@@ -371,6 +389,15 @@ mod tests {
     use crate::plan::{Capacity, InputPlan, TopicPlan};
     use crate::port::{Feed, InPort, Source};
     use std::os::unix::fs::{MetadataExt, PermissionsExt};
+
+    #[test]
+    fn a_process_near_its_limit_on_open_files_is_told_so() {
+        assert_eq!(hint_of_files(40, 1024), "");
+        assert!(
+            hint_of_files(18, 30).contains("18 files open, and its limit is 30: raise that (`ulimit -n`)")
+        );
+        assert_eq!(hint_of_files(40, u64::MAX), "");
+    }
 
     const TOPIC: &str = "/plant/state";
     const SIZE: usize = 8;
