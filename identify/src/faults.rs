@@ -78,11 +78,11 @@ fn of_commands(flights: &[Evidence]) -> Found {
 }
 
 fn of_rotor_speeds(flights: &[Evidence]) -> Found {
-    let one = |evidence: &Evidence| {
-        let ordered = || order::swapped(evidence, order::Drive::RotorSpeed);
-        Some((rotor_speed::among_each_other(evidence.flight).or_else(ordered)?, Part::RotorSpeed))
+    let ordered = order::swapped(flights, order::Drive::RotorSpeed).into_iter();
+    let one = |(evidence, ordered): (&Evidence, Option<Fault>)| {
+        Some((rotor_speed::among_each_other(evidence.flight).or(ordered)?, Part::RotorSpeed))
     };
-    flights.iter().map(one).collect()
+    flights.iter().zip(ordered).map(one).collect()
 }
 
 /// Returns the faults of rotors and of trims. Faulty rotor sensors are distrusted in `problem`; flights with an impossible

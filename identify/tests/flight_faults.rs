@@ -366,6 +366,54 @@ fn a_vehicle_file_with_reversed_spins_is_refused() {
     assert!(error.contains("role \"fit\"") && error.contains("with all spins reversed explains"), "{error}");
 }
 
+/// Each choice of wrong spins in the vehicle file is refused, and the right spins are named.
+#[test]
+fn a_vehicle_file_with_some_wrong_spins_is_refused() {
+    let set = flown(false);
+    let text = std::fs::read_to_string(&set.vehicle).expect("the vehicle file");
+    let declared: Vec<&str> = text.match_indices("spin = {").map(|(at, _)| &text[at..]).collect();
+    let declared: Vec<bool> =
+        declared.iter().map(|spin| spin.starts_with("spin = { value = \"counter-clockwise\"")).collect();
+    assert_eq!(declared.len(), 4);
+    let wrong: Vec<String> = (1..15_usize)
+        .into_par_iter()
+        .filter_map(|code| {
+            let is_wrong = |rotor: usize| code >> rotor & 1 == 1;
+            let folder = tempfile::tempdir().expect("a folder");
+            let vehicle = folder.path().join("spins.toml");
+            std::fs::write(&vehicle, with_spins(&text, is_wrong)).expect("a vehicle file");
+            let error = identify(&FlightSet { vehicle, ..set.clone() }, &mut |_| ()).expect_err("a refusal");
+            let numbers: Vec<String> =
+                (0..4).filter(|rotor| is_wrong(*rotor)).map(|rotor| (rotor + 1).to_string()).collect();
+            let right: Vec<&str> = declared
+                .iter()
+                .map(|is_counter| if *is_counter { "counter-clockwise" } else { "clockwise" })
+                .collect();
+            let wanted = format!(
+                "the order 1, 2, 3, 4 of the logged ones with the {} {} reversed (in the order of the file: {})",
+                if numbers.len() == 1 { "spin of rotor" } else { "spins of rotors" },
+                numbers.join(", "),
+                right.join(", ")
+            );
+            let error = error.to_string();
+            (!error.contains(&wanted)).then(|| format!("{numbers:?}: {error}"))
+        })
+        .collect();
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// Vehicle file `text`, with the spins of the rotors that are wrong the other way.
+fn with_spins(text: &str, is_wrong: impl Fn(usize) -> bool) -> String {
+    let mut parts = text.split("spin = { value = \"");
+    let mut changed = parts.next().unwrap_or_default().to_owned();
+    for (rotor, part) in parts.enumerate() {
+        let (spin, rest) = part.split_once('"').expect("a spin in quotes");
+        let other = if spin == "clockwise" { "counter-clockwise" } else { "clockwise" };
+        changed += &format!("spin = {{ value = \"{}\"{rest}", if is_wrong(rotor) { other } else { spin });
+    }
+    changed
+}
+
 /// A vehicle that is held aside by more than its rotors can make, or commands of another vehicle.
 #[test]
 fn a_trim_that_no_rotors_hold() {

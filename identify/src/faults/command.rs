@@ -20,12 +20,11 @@ const UNIT: &str = "check unit and columns of `command` for this flight";
 /// The fault of each flight's commands.
 pub fn find(flights: &[Evidence]) -> Vec<Option<Fault>> {
     let carried: Vec<Option<f64>> = flights.iter().map(carried).collect();
+    let ordered = swapped(flights, Drive::Command);
     let of = |at: usize| {
         let evidence = &flights[at];
         carried[at]?;
-        frozen(evidence)
-            .or_else(|| swapped(evidence, Drive::Command))
-            .or_else(|| scaled(evidence, at, &carried))
+        frozen(evidence).or_else(|| ordered[at].clone()).or_else(|| scaled(evidence, at, &carried))
     };
     (0..flights.len()).map(of).collect()
 }

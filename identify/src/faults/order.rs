@@ -1,8 +1,8 @@
 //! Order of the rotors in commands and in rotor speeds, and their senses of rotation.
 //!
-//! The angular accelerations show both, at any size of thrust and inertia and at any delay: each order, with the spins of the
-//! vehicle file or all of them reversed, is a regression of its own. Of up to four rotors all orders are tried; of more, those
-//! with two exchanged, and those that begin at another rotor.
+//! The angular accelerations show both, at any size of thrust and inertia and at any delay: each order, with each choice of
+//! reversed spins, is a regression of its own. Of up to four rotors all orders and all spins are tried. Of more rotors, these
+//! orders are tried: two rotors exchanged, and those that begin at another rotor; each with one, two or all spins reversed.
 
 use super::evidence::Evidence;
 use super::fault::{Fault, Part};
@@ -14,6 +14,15 @@ use vehicles::{ROTORS_MAX, Rotor};
 const LATE_S: f64 = 0.2;
 /// Least gain of another order of the rotors: share of the squared angular accelerations, summed over the axes.
 const MORE: f64 = 0.5;
+/// Least gain where the other order leaves less than [`LEFT`] of what the declared one leaves.
+const MORE_OF_LITTLE: f64 = 0.2;
+const LEFT: f64 = 1.0 / 3.0;
+/// Least gain of spins that other flights of the same vehicle show.
+const MORE_AS_OTHERS: f64 = 0.05;
+/// Sum of the shares of an arrangement that explains all.
+const AXES: f64 = 3.0;
+/// Arrangements whose gains differ by less cannot be told apart.
+const ALIKE: f64 = 0.02;
 
 /// A channel with a number for each rotor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,76 +54,172 @@ impl Drive {
     }
 }
 
-/// An order of the rotors, with the spins of the vehicle file or all of them reversed.
+/// An order of the rotors, with the spins of some of them reversed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Arrangement {
     /// For each rotor of the vehicle file, the number of the channel that belongs to it.
     order: Vec<usize>,
-    is_reversed: bool,
+    /// For each rotor of the vehicle file, true if it turns the other way than the file says.
+    is_reversed: Vec<bool>,
 }
 
 impl Arrangement {
     /// Returns the arrangements of so many rotors that are tried, the declared one first.
     fn all(rotors: usize) -> Vec<Self> {
-        let both =
-            |order: Vec<usize>| [false, true].map(|is_reversed| Self { order: order.clone(), is_reversed });
-        orders(rotors).into_iter().flat_map(both).collect()
+        let spins = spins(rotors);
+        let of_order = |order: Vec<usize>| {
+            spins.iter().map(move |spins| Self { order: order.clone(), is_reversed: spins.clone() })
+        };
+        orders(rotors).into_iter().flat_map(of_order).collect()
     }
 
-    fn text(&self) -> String {
+    /// Rotors of the vehicle file with another channel than their own, counted from 1.
+    fn moved(&self) -> Vec<String> {
+        let moved = self.order.iter().enumerate().filter(|(rotor, at)| rotor != *at);
+        moved.map(|(rotor, _)| (rotor + 1).to_string()).collect()
+    }
+
+    /// Number of rotors that are elsewhere or turn the other way. Reversing all spins is one change: of the yaw axis.
+    fn changes(&self) -> usize {
+        let reversed = self.is_reversed.iter().filter(|is_reversed| **is_reversed).count();
+        self.moved().len() + if reversed == self.order.len() { 1 } else { reversed }
+    }
+
+    fn text(&self, rotors: &[Rotor]) -> String {
         let names: Vec<String> = self.order.iter().map(|rotor| (rotor + 1).to_string()).collect();
-        let names = names.join(", ");
-        let spins = if self.is_reversed { " with all spins reversed" } else { "" };
-        format!("the order {names} of the logged ones{spins}")
+        format!("the order {} of the logged ones{}", names.join(", "), self.spins_text(rotors))
+    }
+
+    /// The reversed spins, and all spins as they would be right.
+    fn spins_text(&self, rotors: &[Rotor]) -> String {
+        let reversed: Vec<String> = (0..rotors.len())
+            .filter(|rotor| self.is_reversed[*rotor])
+            .map(|rotor| (rotor + 1).to_string())
+            .collect();
+        let name = |(rotor, is_reversed): (&Rotor, &bool)| {
+            if (rotor.spin > 0.0) == *is_reversed { "clockwise" } else { "counter-clockwise" }
+        };
+        let right: Vec<&str> = rotors.iter().zip(&self.is_reversed).map(name).collect();
+        match reversed.len() {
+            0 => String::new(),
+            all if all == rotors.len() => " with all spins reversed".to_owned(),
+            count => format!(
+                " with the {} {} reversed (in the order of the file: {})",
+                if count == 1 { "spin of rotor" } else { "spins of rotors" },
+                reversed.join(", "),
+                right.join(", ")
+            ),
+        }
     }
 }
 
-/// Fault of a flight whose `drive` explains the angular accelerations in another arrangement of the rotors.
-pub fn swapped(evidence: &Evidence, drive: Drive) -> Option<Fault> {
-    let products = products(evidence, drive)?;
-    let effects = [1.0, -1.0].map(|spin| effects_of_squares(evidence, spin));
-    let score = |arrangement: &Arrangement| {
-        let effect = &effects[usize::from(arrangement.is_reversed)];
-        let of = |products: &Products| products.explained(effect, &arrangement.order);
-        products.iter().map(of).fold(0.0, f64::max)
+/// Faults of flights whose `drive` explains the angular accelerations in another arrangement of the rotors. Spins belong to the
+/// vehicle: those that one flight shows are doubted in all that do not speak for the declared ones.
+pub fn swapped(flights: &[Evidence], drive: Drive) -> Vec<Option<Fault>> {
+    let scores: Vec<Option<Scores>> = flights.iter().map(|evidence| Scores::of(evidence, drive)).collect();
+    let found: Vec<Option<usize>> = scores.iter().map(|scores| scores.as_ref()?.clearly_better()).collect();
+    let spins = scores.iter().zip(&found).find_map(|(scores, found)| {
+        let found = (*found)?;
+        scores.as_ref().filter(|scores| scores.all[found].1.moved().is_empty()).map(|_| found)
+    });
+    let of_flight = |((evidence, scores), found): ((&Evidence, &Option<Scores>), Option<usize>)| {
+        let scores = scores.as_ref()?;
+        let as_others = || spins.filter(|at| scores.gain(*at) > MORE_AS_OTHERS);
+        Some(scores.fault(evidence, drive, found.or_else(as_others)?))
     };
-    let rotors = evidence.model.vehicle.rotors.len();
-    let scored: Vec<_> = Arrangement::all(rotors).into_iter().map(|one| (score(&one), one)).collect();
-    let declared = scored.first()?.0;
-    let (best, found) = scored.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
-    if best < declared + MORE {
-        return None;
-    }
-    let moved: Vec<String> = (0..rotors)
-        .filter(|rotor| found.order[*rotor] != *rotor)
-        .map(|rotor| (rotor + 1).to_string())
-        .collect();
-    let (channel, kind) = match &moved[..] {
-        [] => (drive.name().to_owned(), "reversed-spins"),
-        _ => (format!("{}.{}", drive.name(), moved.join("+")), "swapped"),
-    };
-    let percent = |score: f64| 100.0 * score / 3.0;
-    Some(Fault {
-        flight: evidence.flight.flight.name.clone(),
-        channel,
-        kind,
-        expected: format!(
-            "the order and the spins of the vehicle file's rotors, which explain {:.0} % of the angular accelerations",
-            percent(declared)
-        ),
-        found: format!("that {} explains {:.0} %", found.text(), percent(best)),
-        consequence: drive.part().consequence(),
-        advice: drive.advice(),
-    })
+    flights.iter().zip(&scores).zip(found).map(of_flight).collect()
 }
 
-/// Most rotors of which all orders are tried.
-const ALL_ORDERS_MAX: usize = 4;
+/// Shares of the angular accelerations of one flight that each arrangement explains, the declared one first.
+struct Scores {
+    all: Vec<(f64, Arrangement)>,
+}
+
+impl Scores {
+    /// `None` if the flight does not have what it takes.
+    fn of(evidence: &Evidence, drive: Drive) -> Option<Self> {
+        let products = products(evidence, drive)?;
+        let effects = [1.0, -1.0].map(|spin| effects_of_squares(evidence, spin));
+        let score = |arrangement: &Arrangement| {
+            let reversed = arrangement.is_reversed.iter().enumerate();
+            let effect: Vec<_> =
+                reversed.map(|(rotor, is_reversed)| effects[usize::from(*is_reversed)][rotor]).collect();
+            let of = |products: &Products| products.explained(&effect, &arrangement.order);
+            products.iter().map(of).fold(0.0, f64::max)
+        };
+        let arrangements = Arrangement::all(evidence.model.vehicle.rotors.len()).into_iter();
+        Some(Self { all: arrangements.map(|one| (score(&one), one)).collect() })
+    }
+
+    /// Gain of an arrangement over the declared one.
+    fn gain(&self, at: usize) -> f64 {
+        self.all[at].0 - self.all[0].0
+    }
+
+    /// The arrangement that is clearly better than the declared one.
+    fn clearly_better(&self) -> Option<usize> {
+        let best = self.simplest_of_best()?;
+        let left = |at: usize| AXES - self.all[at].0;
+        let is_clear =
+            self.gain(best) > MORE || (self.gain(best) > MORE_OF_LITTLE && left(best) < LEFT * left(0));
+        is_clear.then_some(best)
+    }
+
+    /// The best arrangement; of several that are about as good, the one with the fewest changes.
+    fn simplest_of_best(&self) -> Option<usize> {
+        let best = self.all.iter().map(|(score, _)| *score).max_by(f64::total_cmp)?;
+        let as_good = (0..self.all.len()).filter(|at| self.all[*at].0 > best - ALIKE);
+        as_good.min_by(|a, b| {
+            let [one, other] = [&self.all[*a], &self.all[*b]];
+            one.1.changes().cmp(&other.1.changes()).then(other.0.total_cmp(&one.0))
+        })
+    }
+
+    fn fault(&self, evidence: &Evidence, drive: Drive, at: usize) -> Fault {
+        let (declared, (best, found)) = (self.all[0].0, &self.all[at]);
+        let (channel, kind) = match &found.moved()[..] {
+            [] => (drive.name().to_owned(), "reversed-spins"),
+            moved => (format!("{}.{}", drive.name(), moved.join("+")), "swapped"),
+        };
+        let percent = |score: f64| 100.0 * score / AXES;
+        Fault {
+            flight: evidence.flight.flight.name.clone(),
+            channel,
+            kind,
+            expected: format!(
+                "the order and the spins of the vehicle file's rotors, which explain {:.0} % of the angular accelerations",
+                percent(declared)
+            ),
+            found: format!(
+                "that {} explains {:.0} %",
+                found.text(&evidence.model.vehicle.rotors),
+                percent(*best)
+            ),
+            consequence: drive.part().consequence(),
+            advice: drive.advice(),
+        }
+    }
+}
+
+/// Most rotors of which all orders and all spins are tried.
+const ALL_MAX: usize = 4;
+/// Most spins of more rotors that are reversed together, but for all of them.
+const REVERSED_MAX: u32 = 2;
+
+/// The spins that are tried, true for a reversed one; the declared ones first.
+fn spins(rotors: usize) -> Vec<Vec<bool>> {
+    let is_tried = |code: &u32| {
+        let reversed = code.count_ones();
+        rotors <= ALL_MAX || reversed <= REVERSED_MAX || reversed as usize == rotors
+    };
+    let codes = (0..1_u32 << rotors).filter(is_tried);
+    codes.map(|code| (0..rotors).map(|rotor| code >> rotor & 1 == 1).collect()).collect()
+}
 
 /// The orders that are tried, the declared one first.
 fn orders(rotors: usize) -> Vec<Vec<usize>> {
     let declared: Vec<usize> = (0..rotors).collect();
-    if rotors <= ALL_ORDERS_MAX {
+    if rotors <= ALL_MAX {
         let code =
             |code: usize| (0..rotors).rev().map(move |at| code / rotors.pow(at as u32) % rotors).collect();
         let all = (0..rotors.pow(rotors as u32)).map(code);
@@ -225,16 +330,32 @@ mod tests {
     use super::Arrangement;
 
     #[test]
-    fn orders_are_all_of_four_rotors_and_exchanged_or_begun_later_of_more() {
-        for (rotors, count) in [(1, 2), (3, 12), (4, 48), (6, 2 * (6 + 15)), (12, 2 * (12 + 66))] {
+    fn all_arrangements_of_four_rotors_and_some_of_more() {
+        let of_more = |rotors: usize| {
+            let pairs = rotors * (rotors - 1) / 2;
+            (rotors + pairs) * (1 + rotors + pairs + 1)
+        };
+        for (rotors, count) in [(1, 2), (3, 48), (4, 384), (6, of_more(6)), (12, of_more(12))] {
             let all = Arrangement::all(rotors);
             assert_eq!(all.len(), count);
-            assert_eq!(all[0], Arrangement { order: (0..rotors).collect(), is_reversed: false });
+            assert_eq!(all[0].order, (0..rotors).collect::<Vec<_>>());
+            assert_eq!(all[0].is_reversed, vec![false; rotors]);
             for one in &all {
                 let mut sorted = one.order.clone();
                 sorted.sort_unstable();
                 assert_eq!(sorted, all[0].order);
             }
         }
+    }
+
+    #[test]
+    fn the_fewest_changes_say_what_is_wrong() {
+        let changes = |order: [usize; 4], is_reversed: [bool; 4]| {
+            Arrangement { order: order.to_vec(), is_reversed: is_reversed.to_vec() }.changes()
+        };
+        assert_eq!(changes([0, 1, 2, 3], [false; 4]), 0);
+        assert_eq!(changes([0, 1, 2, 3], [true; 4]), 1);
+        assert_eq!(changes([0, 1, 2, 3], [true, false, true, false]), 2);
+        assert_eq!(changes([1, 0, 2, 3], [true, false, false, false]), 3);
     }
 }
