@@ -6,7 +6,7 @@
 //!
 //! | room | what it holds |
 //! |---|---|
-//! | [`run`] | the whole way, from flights to a report |
+//! | [`run`], `error` | the whole way, from flights to a report; reasons why it is not gone |
 //! | `clock`, `track` | measured channels on a grid of instants |
 //! | `window` | the window, and differences that lose nothing |
 //! | `prepared`, `rows` | a flight, the equations that it allows, and their rows |
@@ -57,6 +57,7 @@ mod digits;
 mod disturbance;
 pub mod effect_reports;
 mod envelope;
+mod error;
 mod evidence;
 mod faults;
 mod fit;

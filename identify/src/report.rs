@@ -174,6 +174,12 @@ pub(crate) const UNCHECKED: &str = "no test flight has both a measured attitude 
 /// Ratio of prediction errors, new by declared, above which the new vehicle predicts worse.
 const WORSE: f64 = 1.2;
 
+/// Advice for a pose without an inertial unit.
+const NOTHING_TO_COMPARE: &str = "nothing to compare the pose with; log gyroscope and accelerometer";
+/// Advice for a pose that follows no inertial unit.
+const APART: &str = "the pose agrees with gyroscope and accelerometer at no delay up to 0.4 s; their clocks differ by more, or one \
+                     of them is wrong: set `delay_s`, or choose one clock";
+
 impl Report {
     /// True if the verdict is empty and the validation data are too short to accept an effect.
     pub(crate) fn is_undecided(&self) -> bool {
@@ -232,7 +238,11 @@ impl Report {
             let has_position =
                 |report: &FlightReport| report.name == *flight && report.equations.contains(&"acceleration");
             if self.flights.iter().any(has_position) && offsets.values().all(Option::is_none) {
-                let advice = "nothing to compare the pose with; log gyroscope and accelerometer";
+                let has_both = |report: &FlightReport| {
+                    report.name == *flight
+                        && ["gyroscope", "specific_force"].iter().all(|of| report.equations.contains(of))
+                };
+                let advice = if self.flights.iter().any(has_both) { APART } else { NOTHING_TO_COMPARE };
                 writeln!(f, "clock: {flight}: {advice}")?;
             }
             for (channel, offset) in offsets {

@@ -6,6 +6,7 @@ use crate::clock::Lateness;
 use crate::confounded::rivals;
 use crate::effect_reports;
 use crate::envelope;
+use crate::error::{faulty, no_flight};
 use crate::faults::{self, Fault};
 use crate::fit::Problem;
 use crate::horizons::{of_role, predictions};
@@ -27,12 +28,12 @@ use crate::sensing::SensorErrors;
 use crate::trim;
 use crate::whiteness::{Whiteness, whiteness};
 use crate::whitening::Noises;
-use diagnostics::Diagnostic;
 use flights::{Flight, FlightSet, Role};
 use plant::effects::{Effect, entry};
 use std::collections::BTreeMap;
 use vehicles::Vehicle;
 
+pub use crate::error::IdentifyError;
 pub use crate::horizons::HORIZONS_S;
 
 /// A residual is worth telling where its persistent part is beyond this part of its noise.
@@ -41,29 +42,6 @@ const UNEXPLAINED: f64 = 0.3;
 /// Greatest mean distance of samples of motion: beyond it they show nothing, and the computation of every tick
 /// would cost more time and memory than the comparison is worth.
 const SPACING_MAX_S: f64 = 0.5;
-
-/// Reason why flights cannot be used for identification.
-///
-/// ```
-/// let vehicle = "../vehicles/hummingbird.toml".into();
-/// let set = flights::FlightSet { vehicle, flights: Vec::new(), next_flight: Default::default(), files: Default::default() };
-/// let error = identify::run::identify(&set, &mut |_| ()).unwrap_err();
-/// assert!(error.to_string().starts_with("no flight with role \"fit\" can be used: there is none."));
-/// ```
-#[derive(Debug, thiserror::Error)]
-pub enum IdentifyError {
-    /// The vehicle file.
-    #[error(transparent)]
-    Vehicle(#[from] Diagnostic),
-    /// A role that no flight has.
-    #[error("no flight with role \"{role}\" can be used: {reason}")]
-    NoFlight {
-        /// The role.
-        role: &'static str,
-        /// Reasons, flight by flight.
-        reason: String,
-    },
-}
 
 /// Results of an identification, with the data that their plots need.
 #[derive(Debug)]
@@ -229,6 +207,18 @@ pub fn faults(set: &FlightSet) -> Result<Vec<Fault>, IdentifyError> {
     Ok(faults)
 }
 
+/// Finds the faults of the channels of `set`, whose flights may have any roles; without an identification.
+///
+/// # Errors
+/// A vehicle file that cannot be read.
+pub fn doubts(set: &FlightSet) -> Result<Vec<Fault>, IdentifyError> {
+    let vehicle = Vehicle::load_from(&set.files, &set.vehicle)?;
+    let declared = entry::resolve(&vehicle.effects)?;
+    let held = rig::without_translation(set, &vehicle, &declared);
+    let set = held.as_ref().unwrap_or(set);
+    Ok(faults::in_channels(&usable(&vehicle, &declared, set).0, set).0)
+}
+
 /// The flights on their grids, with the declared model.
 ///
 /// # Errors
@@ -238,6 +228,21 @@ pub fn problem<'f>(
     declared: &[Effect],
     set: &'f FlightSet,
 ) -> Result<(Problem<'f>, Vec<FlightReport>), IdentifyError> {
+    let (problem, reports, reasons) = usable(vehicle, declared, set);
+    for (role, flights) in [(Role::Fit, &problem.estimation), (Role::Test, &problem.test)] {
+        if flights.is_empty() {
+            return Err(no_flight(role, &reasons));
+        }
+    }
+    Ok((problem, reports))
+}
+
+/// The flights that can be used, all flights as reported, and the reasons of those that cannot.
+fn usable<'f>(
+    vehicle: &Vehicle,
+    declared: &[Effect],
+    set: &'f FlightSet,
+) -> (Problem<'f>, Vec<FlightReport>, Vec<(&'f Flight, String)>) {
     let parameters = Parameters::of(vehicle, declared);
     let propulsion = Propulsion::of(vehicle);
     let (mut estimation, mut validation, mut test) = (Vec::new(), Vec::new(), Vec::new());
@@ -265,40 +270,12 @@ pub fn problem<'f>(
             (None, _) => {}
         }
     }
-    for (role, flights) in [(Role::Fit, &estimation), (Role::Test, &test)] {
-        if flights.is_empty() {
-            return Err(no_flight(role, &reasons));
-        }
-    }
     let total_s: f64 = estimation.iter().map(Prepared::compared_s).sum();
     let model = Model { vehicle: vehicle.clone(), parameters };
     let noises = Noises::new();
     let block_s = block_s(total_s);
     let problem = Problem { model, estimation, validation, test, noises, block_s, shared_late_s: 0.0 };
-    Ok((problem, reports))
-}
-
-/// The error of a role that has no flight besides those with faults; `None` if none has one.
-fn faulty(faults: &[Fault], set: &FlightSet) -> Option<IdentifyError> {
-    let of_role = |role: Role| {
-        let names = set.flights.iter().filter(|flight| flight.role == role).map(|flight| &flight.name);
-        names.map(|name| faults.iter().filter(|fault| fault.flight == *name).collect()).collect()
-    };
-    let without: Vec<(Role, Vec<Vec<&Fault>>)> =
-        [Role::Fit, Role::Test].map(|role| (role, of_role(role))).into();
-    let (role, faults) =
-        without.into_iter().find(|(_, flights)| flights.iter().all(|faults| !faults.is_empty()))?;
-    let one = |fault: &&Fault| {
-        format!(
-            "fault of flight `{}`: {}: {}; {}",
-            fault.flight,
-            fault.channel,
-            fault.finding(),
-            fault.advice
-        )
-    };
-    let reason = faults.iter().flatten().map(one).collect::<Vec<_>>().join("; ");
-    Some(IdentifyError::NoFlight { role: role.name(), reason })
+    (problem, reports, reasons)
 }
 
 fn slow_note(period_s: f64, propulsion: &Propulsion) -> String {
@@ -307,23 +284,6 @@ fn slow_note(period_s: f64, propulsion: &Propulsion) -> String {
         "command: logged every {period_s:.3} s, expected at most {most_s:.3} s, half of the motors' time constant of {motor_s:.3} s; motor lag, \
          command delay, inertia and all torques cannot be determined, and are not compared; log commands or rotor speeds faster"
     )
-}
-
-/// The error of `role`, none of whose flights can be used for these reasons.
-fn no_flight(role: Role, reasons: &[(&Flight, String)]) -> IdentifyError {
-    let one = |(flight, reason): &(&Flight, String)| {
-        let notes = if flight.notes.is_empty() {
-            String::new()
-        } else {
-            format!(" (notes: {})", flight.notes.join("; "))
-        };
-        format!("flight `{}`: {reason}{notes}", flight.name)
-    };
-    let of_role = reasons.iter().filter(|(flight, _)| flight.role == role).map(one);
-    let reason = of_role.collect::<Vec<_>>().join("\n  ");
-    let none = "there is none. Add flights, or give one a part of another's time by `from_s` and `to_s`";
-    let reason = if reason.is_empty() { none.to_owned() } else { reason };
-    IdentifyError::NoFlight { role: role.name(), reason }
 }
 
 /// Width of the windows in which measurement and model are compared, s.

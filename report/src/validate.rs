@@ -9,16 +9,19 @@
 //! | `steps_ahead` | errors of multi-step predictions, made in this process |
 //! | `accelerations` | predicted accelerations at every sample, made in this process |
 //! | `labels` | names of the vehicles in both |
+//! | `notes` | notes on the flights beside their errors |
 
 mod accelerations;
 mod errors;
 mod labels;
+mod notes;
 mod replay;
 mod steps_ahead;
 mod windows;
 
 pub use accelerations::predicted_accelerations;
 pub use errors::{ChannelErrors, Errors, FlightErrors, HorizonErrors};
+pub use notes::Notes;
 pub use steps_ahead::{FlightSteps, StepsAheadErrors};
 
 use anyhow::{Context, Result, bail};

@@ -7,7 +7,8 @@ use clap::Args;
 use flights::FlightSet;
 use hummingbus::COMPONENTS;
 use identify::steps_ahead::Between;
-use report::validate::{StepsAheadErrors, Validation, predicted_accelerations};
+use report::validate::{Notes, StepsAheadErrors, Validation, predicted_accelerations};
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// Text of `--help` behind the options.
@@ -52,11 +53,12 @@ pub fn validate(arguments: &ValidateArguments) -> Result<bool> {
     if let Some(steps) = arguments.steps_ahead {
         let between = if arguments.held { Between::Held } else { Between::Lines };
         let errors = StepsAheadErrors::of(&vehicles, &flights, steps as usize, between)?;
-        if arguments.json { print_json(&errors.json()) } else { print_text(&errors.to_string()) }?;
+        print_with_notes(&flights, arguments.json, errors.json(), &errors.to_string())?;
         return Ok(true);
     }
     if arguments.accelerations {
-        print_json(&predicted_accelerations(&vehicles, &flights)?)?;
+        let predicted = predicted_accelerations(&vehicles, &flights)?;
+        print_with_notes(&flights, true, predicted, "")?;
         return Ok(true);
     }
     let mut tell = |line: &str| {
@@ -68,6 +70,16 @@ pub fn validate(arguments: &ValidateArguments) -> Result<bool> {
     let validation =
         Validation { components: COMPONENTS, stop: &stop_token()?, keep: arguments.keep.as_deref() };
     let errors = validation.errors(&vehicles, &flights, &mut tell)?;
-    if arguments.json { print_json(&errors.json()) } else { print_text(&errors.to_string()) }?;
+    print_with_notes(&flights, arguments.json, errors.json(), &errors.to_string())?;
     Ok(true)
+}
+
+/// Prints errors, as JSON or as a table, with the notes on the flights.
+fn print_with_notes(flights: &FlightSet, is_json: bool, mut json: Value, table: &str) -> Result<()> {
+    let notes = Notes::of(flights);
+    if is_json {
+        notes.add_to(&mut json);
+        return print_json(&json);
+    }
+    print_text(&format!("{table}{notes}"))
 }

@@ -113,6 +113,30 @@ fn windows_with_a_gap_are_not_counted_and_said() {
     assert!(json["flights"]["course"]["horizons"]["0.1"]["left_out"].as_u64().unwrap() > 5, "{json:#}");
 }
 
+/// Motors in another order, commands that the logger held and gaps are told as `identify` tells them.
+#[test]
+fn notes_of_the_reader_and_faults_stand_below_the_table() {
+    let place = Place::new();
+    let flights = flown(&place, "excite", &[], ALL);
+    let vehicle_file = repository("vehicles/hummingbird.toml");
+    let text = std::fs::read_to_string(&flights).unwrap();
+    let topic = "command = { topic = \"/controller/command\"";
+    let fields = ["2", "1", "0", "3"].map(|rotor| format!("\"command[{rotor}]\"")).join(", ");
+    let swapped = text.replace(topic, &format!("{topic}, fields = [{fields}], unit = \"count\""));
+    let swapped = place.write("swapped.toml", swapped);
+    let args = ["validate", &vehicle_file, &swapped, "--steps-ahead", "5"];
+    place.call(&args).with_code(0).prints(&["note: course: command.1+3 (swapped)", "the order 3, 2, 1, 4"]);
+    let json = place.call(&[&args[..], &["--json"]].concat()).with_code(0).json();
+    let notes = json["flights"]["course"]["notes"].as_array().unwrap_or_else(|| panic!("{json:#}"));
+    assert!(notes.iter().any(|note| note.as_str().unwrap().contains("command.1+3 (swapped)")), "{json:#}");
+    let sound = place
+        .call(&["validate", &vehicle_file, &flights, "--steps-ahead", "5", "--json"])
+        .with_code(0)
+        .json();
+    let notes = sound["flights"]["course"]["notes"].as_array().unwrap();
+    assert!(notes.iter().all(|note| !note.as_str().unwrap().contains("swapped")), "{sound:#}");
+}
+
 #[test]
 fn a_file_that_is_missing_is_named() {
     let place = Place::new();
