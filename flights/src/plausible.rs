@@ -218,8 +218,7 @@ impl Judge<'_> {
                 .by_unit_or_scale(quantity, agreement.slope, DERIVATIVE_TOLERANCE, &what)
                 .or_else(|| {
                     late(quantity, agreement).map(|vague| self.late_rates(agreement).unwrap_or(vague))
-                })
-                .or_else(|| self.units.off_a_little(quantity, agreement, &what));
+                });
         }
         if let Some(late) = self.late_rates(agreement) {
             return Some(late);

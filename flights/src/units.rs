@@ -3,7 +3,6 @@
 use diagnostics::unit::ROTOR_SPEED;
 use toml::Spanned;
 
-use crate::agreement::Agreement;
 use crate::declaration::{ChannelMap, EachNumber, Entry};
 use crate::finding::Finding;
 use crate::quantity::Quantity;
@@ -12,10 +11,6 @@ use crate::quantity::Quantity;
 pub const HUNDREDS: f64 = 100.0;
 /// Counts of sensors are as near to some units as this factor: beyond it, a scale is as likely as a unit.
 const EXACT: f64 = 1.05;
-/// A gyroscope and an attitude that is held for some samples differ by as much as 5.5 % in real flights (`flights/`): less is not told.
-const OFF: f64 = 1.06;
-/// Beyond this correlation noise hardly changes the ratio of two channels.
-const CLOSELY: f64 = 0.98;
 /// Values that no unit explains are refused beyond this factor.
 const GROSS: f64 = 3.0;
 
@@ -81,14 +76,6 @@ impl Units<'_> {
         let (percent, way) = (100.0 * error.abs(), if error > 0.0 { "large" } else { "small" });
         let scale = self.scale(quantity, factor);
         format!("{scale} ({unit} alone leaves the values about {percent:.0} % too {way})")
-    }
-
-    /// A note on values that follow another channel closely, but are some percent too large or too small.
-    pub fn off_a_little(&self, quantity: Quantity, agreement: Agreement, what: &str) -> Option<Finding> {
-        let is_off = libm::log(agreement.slope.abs()).abs() > libm::log(OFF);
-        let scale = || self.scale(quantity, agreement.slope);
-        (is_off && agreement.correlation > CLOSELY)
-            .then(|| finding(quantity, None, &format!("{what}, which {} would make 1", scale())))
     }
 
     /// The scale with which values are right that are `factor` times too large.

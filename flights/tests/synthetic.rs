@@ -199,17 +199,6 @@ fn a_scale_comes_before_a_unit_that_is_only_near() {
     );
 }
 
-/// A gyroscope whose scale is off by 6 % is read, and the note says by how much.
-#[test]
-fn a_scale_that_is_a_little_off_is_noted() {
-    let off = Motion { rate_unit: 0.94, ..Motion::default() };
-    let notes = read(&off, CHANNELS, "").unwrap().notes;
-    assert!(notes.len() == 1 && notes[0].contains("it is 0.94"), "{notes:?}");
-    assert!(notes[0].contains("which a `scale` of about 1.06"), "{notes:?}");
-    let near = Motion { rate_unit: 0.97, ..Motion::default() };
-    assert_eq!(read(&near, CHANNELS, "").unwrap().notes, [""; 0]);
-}
-
 /// One flipped bit in a log of a thousand samples costs that sample.
 #[test]
 fn lone_wild_samples_are_left_out_and_said() {
