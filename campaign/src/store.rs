@@ -48,27 +48,37 @@ pub struct Header {
 }
 
 impl Header {
-    /// Refuses rows whose first line `found` says that they are of other inputs or of another build.
-    fn require_same(&self, found: &str) -> Result<()> {
+    /// Refuses rows whose first line `found` says that they are of other inputs, or of a build that is not among `builds`.
+    fn require_same(&self, found: &str, builds: Builds) -> Result<()> {
         let found: serde_json::Value =
             serde_json::from_str(found).context("not the rows of a campaign; choose another --out")?;
         // Rows of version 0.1.0 had a version without its commit.
         let build = found["build"].as_str().or(found["version"].as_str());
         let build = build.context("not the rows of a campaign; choose another --out")?;
-        if build != self.build {
+        if build != self.build && builds == Builds::Same {
             bail!(
                 "its flights were flown by hummingbus {build}, this is hummingbus {}: rows of two builds are not mixed; go on \
                  with that build, choose another --out, or remove the file to fly all flights again",
                 self.build
             );
         }
-        if serde_json::from_value::<Self>(found).ok().as_ref() != Some(self) {
+        let same_build = |found: Self| Self { build: self.build.clone(), ..found };
+        if serde_json::from_value::<Self>(found).ok().map(same_build).as_ref() != Some(self) {
             bail!(
                 "its flights were flown of other inputs; choose another --out, or remove the file to fly them again"
             );
         }
         Ok(())
     }
+}
+
+/// Builds of hummingbus whose rows are taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Builds {
+    /// This one: more rows are added.
+    Same,
+    /// Any: none is added, so that a failure can be flown again by a program that was mended.
+    Any,
 }
 
 impl Store {
@@ -80,6 +90,7 @@ impl Store {
         folder: &Path,
         campaign: &Campaign,
         header: &Header,
+        builds: Builds,
     ) -> Result<(Self, Plan, BTreeMap<u64, Row>)> {
         let shown = folder.display();
         std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {shown}"))?;
@@ -92,7 +103,8 @@ impl Store {
         }
         let plan = plan(folder, campaign, &mut lock)?;
         let path = folder.join(ROWS);
-        let (mut flown, whole) = if path.exists() { read(&path, header)? } else { (BTreeMap::new(), 0) };
+        let (mut flown, whole) =
+            if path.exists() { read(&path, (header, builds))? } else { (BTreeMap::new(), 0) };
         // The plan may have been edited since, and what the host ended is flown again.
         flown.retain(|flight, row| !row.is_of_host && plan.flights.get(*flight as usize) == Some(&row.drawn));
         let mut rows = opened(&path, OpenOptions::new().create(true).append(true))?;
@@ -236,7 +248,7 @@ fn plan(folder: &Path, campaign: &Campaign, lock: &mut File) -> Result<Plan> {
 }
 
 /// The rows in the file at `path`, and the length of its whole lines.
-fn read(path: &Path, header: &Header) -> Result<(BTreeMap<u64, Row>, u64)> {
+fn read(path: &Path, (header, builds): (&Header, Builds)) -> Result<(BTreeMap<u64, Row>, u64)> {
     let shown = path.display();
     let mut reader = BufReader::new(File::open(path).with_context(|| format!("cannot read {shown}"))?);
     let (mut rows, mut whole, mut line, mut number) = (BTreeMap::new(), 0_u64, String::new(), 1);
@@ -244,7 +256,7 @@ fn read(path: &Path, header: &Header) -> Result<(BTreeMap<u64, Row>, u64)> {
         && line.ends_with('\n')
     {
         if whole == 0 {
-            header.require_same(&line).with_context(|| format!("cannot go on with {shown}"))?;
+            header.require_same(&line, builds).with_context(|| format!("cannot go on with {shown}"))?;
         } else {
             let row: Row = serde_json::from_str(&line).with_context(|| {
                 format!("{shown}:{number}: expected a row as JSON; remove the line to fly its flight again")
@@ -260,7 +272,7 @@ fn read(path: &Path, header: &Header) -> Result<(BTreeMap<u64, Row>, u64)> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Header, Store};
+    use super::{Builds, Header, Store};
     use crate::declaration::Campaign;
     use crate::row::Row;
     use std::io::Write as _;
@@ -275,7 +287,9 @@ mod tests {
         let text = "manifest = \"a.toml\"\nflights = 3\n[[vary]]\nkey = \"x\"\nvalues = [1]";
         let campaign = Campaign::parse("c.toml".as_ref(), text).unwrap();
         let folder = tempfile::tempdir().unwrap();
-        let open = |fingerprint: &str| Store::open(folder.path(), &campaign, &header("1", fingerprint));
+        let open = |fingerprint: &str| {
+            Store::open(folder.path(), &campaign, &header("1", fingerprint), Builds::Same)
+        };
         let (mut store, plan, flown) = open("a").unwrap();
         assert!(flown.is_empty() && plan.flights.len() == 3);
         let row = |flight: u64, drawn: f64| Row {
@@ -299,11 +313,16 @@ mod tests {
         drop(store);
         let error = format!("{:#}", open("b").unwrap_err());
         assert!(error.contains("flown of other inputs"), "{error}");
-        let error = format!("{:#}", Store::open(folder.path(), &campaign, &header("2", "a")).unwrap_err());
+        let error = format!(
+            "{:#}",
+            Store::open(folder.path(), &campaign, &header("2", "a"), Builds::Same).unwrap_err()
+        );
         assert!(error.contains("flown by hummingbus 1, this is hummingbus 2"), "{error}");
         let more = Campaign { flights: 4, ..campaign.clone() };
         // Rows were flown: the plan of another campaign file is not drawn over them.
-        let error = Store::open(folder.path(), &more, &header("1", "a")).unwrap_err().to_string();
+        Store::open(folder.path(), &campaign, &header("2", "a"), Builds::Any).unwrap();
+        let error =
+            Store::open(folder.path(), &more, &header("1", "a"), Builds::Same).unwrap_err().to_string();
         assert!(error.contains("drawn of a campaign file with other flights"), "{error}");
     }
 
@@ -313,7 +332,9 @@ mod tests {
         let campaign = Campaign::parse("c.toml".as_ref(), text).unwrap();
         let more = Campaign { flights: 4, ..campaign.clone() };
         let folder = tempfile::tempdir().unwrap();
-        let open = |campaign, fingerprint| Store::open(folder.path(), campaign, &header("1", fingerprint));
+        let open = |campaign, fingerprint| {
+            Store::open(folder.path(), campaign, &header("1", fingerprint), Builds::Same)
+        };
         open(&campaign, "a").unwrap();
         assert_eq!(open(&more, "b").unwrap().1.flights.len(), 4);
         let path = folder.path().join(super::PLAN);
@@ -330,7 +351,8 @@ mod tests {
         let campaign = Campaign::parse("c.toml".as_ref(), text).unwrap();
         let folder = tempfile::tempdir().unwrap();
         std::fs::create_dir(folder.path().join("workers")).unwrap();
-        let error = Store::open(folder.path(), &campaign, &header("1", "a")).unwrap_err().to_string();
+        let error =
+            Store::open(folder.path(), &campaign, &header("1", "a"), Builds::Same).unwrap_err().to_string();
         assert!(error.contains("is not empty, and holds no campaign"), "{error}");
     }
 }

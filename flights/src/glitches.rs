@@ -16,6 +16,9 @@ const SHARE_MAX: f64 = 0.05;
 /// Commands lie outside the vehicle's range by more than this part of it.
 const BEYOND: f64 = 0.5;
 
+/// A voltage that goes and returns by less than this part of it may be a load's.
+const OF_PACK: f64 = 0.3;
+
 /// Distances that no value goes and returns from.
 struct Limits {
     /// Least distance.
@@ -33,7 +36,7 @@ impl Limits {
             Quantity::Velocity => Some(Self { least: 0.5, per_s: 50.0 }),
             // Full scale of most accelerometers, 16 g: an impact may fill it.
             Quantity::SpecificForce => Some(Self { least: 160.0, per_s: 0.0 }),
-            // Half of a cell; a load lowers the voltage of a healthy one by less.
+            // Half of a cell; [`without`] asks for more of a pack.
             Quantity::BatteryVoltage => Some(Self { least: 2.0, per_s: 0.0 }),
             _ => None,
         }
@@ -44,10 +47,18 @@ impl Limits {
 pub fn without<const N: usize>(quantity: Quantity, channel: &Channel<N>) -> Vec<bool> {
     let whole = vec![true; channel.values.len()];
     let Some(limits) = Limits::of(quantity) else { return whole };
+    // A load lowers the voltage of a pack of many cells by volts, and in a slow log it returns in the next sample.
+    let least = match quantity {
+        Quantity::BatteryVoltage => {
+            let voltage = median(channel.values.iter().map(|values| values[0])).unwrap_or(0.0);
+            limits.least.max(OF_PACK * voltage)
+        }
+        _ => limits.least,
+    };
     let usual: [f64; N] = std::array::from_fn(|axis| usual_step(channel, axis));
     let is_far = |sample: usize, other: usize, axis: usize| {
         let span_s = (channel.time_s[sample] - channel.time_s[other]).abs();
-        let limit = limits.least.max(limits.per_s * span_s).max(UNUSUAL * usual[axis]);
+        let limit = least.max(limits.per_s * span_s).max(UNUSUAL * usual[axis]);
         distance(channel, sample, other, axis) > limit
     };
     kept(channel, is_far)

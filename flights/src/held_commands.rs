@@ -23,8 +23,15 @@ pub fn leave_out(flight: &mut Flight, vehicle: &Vehicle) {
     }
     let rates = rates(flight);
     let command = &flight.command;
-    let stretches: Vec<(usize, usize)> = (0..vehicle.rotors.len())
-        .flat_map(|rotor| held(command, rotor, vehicle))
+    let held: Vec<(usize, usize)> =
+        (0..vehicle.rotors.len()).flat_map(|rotor| held(command, rotor, vehicle)).collect();
+    // Of a log that holds most of its commands nothing is left out, and there may be many stretches.
+    let samples: usize = held.iter().map(|(from, to)| to - from).sum();
+    if samples as f64 > PART_MAX * (vehicle.rotors.len() * command.time_s.len()) as f64 {
+        return;
+    }
+    let stretches: Vec<(usize, usize)> = held
+        .into_iter()
         .filter(|(from, to)| goes_on(&rates, command.time_s[*from], command.time_s[*to]))
         .collect();
     let mut is_kept = vec![true; command.time_s.len()];
@@ -60,7 +67,11 @@ fn rates(flight: &Flight) -> Channel<3> {
 /// Stretches in which the command of a rotor repeats, each by its first and last sample. At its limits a command may stay.
 fn held<const N: usize>(command: &Channel<N>, rotor: usize, vehicle: &Vehicle) -> Vec<(usize, usize)> {
     let number = |at: usize| command.values[at][rotor];
-    let is_at_limit = |number: f64| number <= vehicle.command.min || number >= vehicle.command.max;
+    // A controller may clamp within the range of the vehicle file: what is never passed is a limit.
+    let numbers = || command.values.iter().map(|values| values[rotor]);
+    let least = numbers().fold(f64::INFINITY, f64::min).max(vehicle.command.min);
+    let greatest = numbers().fold(f64::NEG_INFINITY, f64::max).min(vehicle.command.max);
+    let is_at_limit = |number: f64| number <= least || number >= greatest;
     let (mut found, mut from) = (Vec::new(), 0);
     for at in 1..=command.values.len() {
         if command.values.get(at).is_some_and(|values| values[rotor].to_bits() == number(from).to_bits()) {
@@ -155,8 +166,9 @@ mod tests {
         let hold = |flight: &mut Flight, command: f64| {
             flight.command.values[500..900].iter_mut().for_each(|values| values[..4].fill(command));
         };
-        // At a limit, at rest, on change, in whole numbers, and for most of the flight.
+        // At a limit of the vehicle or of the controller, at rest, on change, in whole numbers, and for most of the flight.
         unchanged(&|flight| hold(flight, 200.0));
+        unchanged(&|flight| hold(flight, 60.0));
         unchanged(&|flight| {
             hold(flight, 76.0);
             flight.angular_velocity.values[500..900].fill([0.0; 3]);

@@ -220,12 +220,18 @@ impl Judge<'_> {
                     late(quantity, agreement).map(|vague| self.late_rates(agreement).unwrap_or(vague))
                 });
         }
-        if let Some(late) = self.late_rates(agreement) {
-            return Some(late);
-        }
         let reordered = self
             .w_first()
             .and_then(|attitude| Pairs::rates(&attitude, rates, RATE_WINDOW_S).agreement(QUIET_RATE_RAD_S));
+        let signs = pairs.signs();
+        let signed =
+            pairs.turned(|rate| rate.component_mul(&Vector3::from(signs))).agreement(QUIET_RATE_RAD_S);
+        // A sine with the wrong sign is one that is late by half of its period, too.
+        let at_once = [Some(agreement), reordered, signed].into_iter().flatten();
+        let best = at_once.max_by(|a, b| a.correlation.total_cmp(&b.correlation)).unwrap_or(agreement);
+        if let Some(late) = self.late_rates(best) {
+            return Some(late);
+        }
         if let Some(better) = reordered.filter(|better| better.correlation > SAME) {
             let what = format!(
                 "its derivative has a correlation of {:.2} with the angular velocity, {:.2} with w first",
@@ -234,9 +240,6 @@ impl Judge<'_> {
             let fits = "the order w, x, y, z: name the columns in the order x, y, z, w".to_owned();
             return Some(finding(Quantity::Attitude, Some(fits), &what));
         }
-        let signs = pairs.signs();
-        let signed =
-            pairs.turned(|rate| rate.component_mul(&Vector3::from(signs))).agreement(QUIET_RATE_RAD_S);
         let explains = signed.is_some_and(|signed| signed.correlation > SAME);
         let what = format!(
             "it has a correlation of {:.2} with the derivative of the attitude (signs of the axes: {signs:?})",
@@ -264,7 +267,8 @@ impl Judge<'_> {
             agreement.correlation, late.correlation, late.late_s
         );
         let fits = format!(
-            "`delay_s = {{ angular_velocity = {:.2} }}` of the flight (and the same for channels of the same sensor or file)",
+            "`delay_s = {{ angular_velocity = {:.2} }}` of the flight, added to a delay that stands there (and the same for channels of the same \
+             sensor or file)",
             late.late_s
         );
         // Less than this `identify` finds and takes off by itself.

@@ -17,7 +17,7 @@ pub struct FitResult {
     pub free: Vec<usize>,
     /// Values that the equations would have them take if there were no bounds.
     pub unbounded: Vec<f64>,
-    /// Their covariance.
+    /// Covariance of the free parameters.
     pub covariance: DMatrix<f64>,
     /// Weighted sums of squares of the blocks of the validation data.
     pub validation_costs: Vec<f64>,

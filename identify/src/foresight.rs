@@ -1,4 +1,4 @@
-//! Predictions as a judge: no effect is kept with which the vehicle predicts worse than without it.
+//! Predictions as a judge: no effect is kept with which the vehicle predicts worse than without it, or the same.
 //!
 //! An effect can make the residual of the equations smaller and yet predictions worse: it then absorbs the
 //! influence of another cause. The judged flights are those with role `select`, or else those that parameters
@@ -35,8 +35,12 @@ const LEAST_GROWTH: f64 = 1.02;
 const OF_NOISE: f64 = 0.5;
 /// Nor one by less than this part of persistence's error: a position after 0.1 s is known to a millimetre by its velocity.
 const OF_PERSISTENCE: f64 = 0.01;
-/// An effect changes something where an error without it has a part of at least this share of persistence's error; tuned, no source.
+/// An effect changes something where a component's error without it has a part of at least this share of persistence's error; tuned, no source.
 const LEAST_CHANGE: f64 = 0.02;
+/// Persistence's error along one axis counts as at least this part of that along all three.
+const LEAST_AXIS: f64 = 0.1;
+/// Mean square that stands for a prediction that diverged.
+const DIVERGED: f64 = 1e60;
 
 /// Prediction errors of the judged flights.
 #[derive(Debug, Default)]
@@ -47,23 +51,6 @@ pub struct Foresight {
     persistent: [WindowErrors; HORIZONS_S.len()],
     /// Errors of each quantity that the noise of the sensors makes, by horizon.
     noise: [[f64; QUANTITIES.len()]; 2],
-}
-
-/// The growth of one prediction error by an effect.
-struct Growth {
-    worth: Worth,
-    /// True if it is great enough to matter.
-    matters: bool,
-    /// True if the part that grew is great enough to be told, however great the noise beside it.
-    is_change: bool,
-    /// Growths of its mean square, by block of time.
-    of_blocks: Vec<f64>,
-}
-
-impl Growth {
-    fn is_beyond_chance(&self) -> bool {
-        chance_of_no_gain(&self.of_blocks) < LEVEL
-    }
 }
 
 impl Foresight {
@@ -114,41 +101,46 @@ impl Foresight {
 
     /// Every error with an effect beside that `without` it.
     pub fn worths(&self, without: &Self) -> Vec<Worth> {
-        self.compared(without).into_iter().map(|growth| growth.worth).collect()
+        self.compared(without).into_iter().map(|(worth, _)| worth).collect()
     }
 
     /// The channel whose error grows most from `without` the effect to `self`, of those that grow beyond their noise.
     pub fn growth(&self, without: &Self) -> Option<Worth> {
-        let grown =
-            self.compared(without).into_iter().filter(|growth| growth.matters && growth.is_beyond_chance());
-        grown.map(|growth| growth.worth).max_by(|a, b| a.ratio().total_cmp(&b.ratio()))
+        let grown = self.compared(without).into_iter().filter(|(_, is_grown)| *is_grown);
+        grown.map(|(worth, _)| worth).max_by(|a, b| a.ratio().total_cmp(&b.ratio()))
     }
 
     /// True if an effect changes something: an error is greater without it, or all of them together are smaller with it.
     pub fn is_worth_more_than(&self, without: &Self) -> bool {
-        without.compared(self).iter().any(|growth| growth.is_change) || self.is_better_than(without)
+        let mut places = (0..HORIZONS_S.len()).flat_map(|horizon| (0..ERRORS).map(move |at| (horizon, at)));
+        places.any(|(horizon, at)| without.is_grown(self, horizon, at)) || self.is_better_than(without)
     }
 
-    /// Every error that was measured, with an effect and `without` it.
-    fn compared(&self, without: &Self) -> Vec<Growth> {
+    /// True if the error of a component is greater than that `with` an effect by a part that matters, and by more than chance or noticeably.
+    fn is_grown(&self, with: &Self, horizon: usize, at: usize) -> bool {
+        let pairs = self.blocks(with, horizon, at..at + 1);
+        let [without, with] = root_means(&pairs);
+        let axes: f64 = self.persistent[horizon][at / 3 * 3..at / 3 * 3 + 3].iter().sum();
+        let persistent = self.persistent[horizon][at].max(LEAST_AXIS * LEAST_AXIS * axes).sqrt();
+        let part = (without * without - with * with).max(0.0).sqrt();
+        part > LEAST_CHANGE * persistent && (without > LEAST_GROWTH * with || is_beyond_chance(&pairs))
+    }
+
+    /// Every error that was measured, with an effect and `without` it, and whether it grows by the effect beyond its noise.
+    fn compared(&self, without: &Self) -> Vec<(Worth, bool)> {
         let places =
             (0..HORIZONS_S.len()).flat_map(|horizon| (0..QUANTITIES.len()).map(move |at| (horizon, at)));
         let of_place = |(horizon, at): (usize, usize)| {
             let pairs = self.blocks(without, horizon, 3 * at..3 * at + 3);
-            let mean = |of: &dyn Fn(&(f64, f64)) -> f64| {
-                (pairs.iter().map(of).sum::<f64>() / pairs.len().max(1) as f64).sqrt()
-            };
-            let (with, without) = (mean(&|pair| pair.0), mean(&|pair| pair.1));
+            let [with, without] = root_means(&pairs);
             let persistent: f64 = self.persistent[horizon][3 * at..3 * at + 3].iter().sum();
             let by = (with * with - without * without).max(0.0).sqrt();
             let matters = with > LEAST_GROWTH * without
                 && by > OF_NOISE * self.noise[horizon][at]
                 && with - without > OF_PERSISTENCE * persistent.sqrt();
-            let is_change = with > LEAST_GROWTH * without && by > LEAST_CHANGE * persistent.sqrt();
             let (channel, unit) = (QUANTITIES[at].name(), QUANTITIES[at].unit());
             let worth = Worth { channel, horizon_s: HORIZONS_S[horizon], without, with, unit };
-            let of_blocks = pairs.iter().map(|(with, without)| with - without).collect();
-            (without > 0.0).then_some(Growth { worth, matters, is_change, of_blocks })
+            (without > 0.0).then_some((worth, matters && is_beyond_chance(&pairs)))
         };
         places.filter_map(of_place).collect()
     }
@@ -171,11 +163,10 @@ impl Foresight {
             }
             let (flight, horizon, block) = *key;
             let gain = gains.entry((flight, block)).or_default();
-            for at in (0..ERRORS).filter(|at| old[*at] > 0.0) {
+            for at in (0..ERRORS).filter(|at| old[*at] != 0.0) {
                 let floor = (OF_NOISE * self.noise[horizon][at / 3]).powi(2) / 3.0;
-                *gain += libm::log(
-                    (old[at] / old_windows + floor) / (new[at] / windows + floor).max(f64::MIN_POSITIVE),
-                );
+                let (old, new) = (finite(old[at] / old_windows), new[at] / windows);
+                *gain += libm::log((old + floor) / (new + floor).max(f64::MIN_POSITIVE));
                 count += 1.0;
             }
         }
@@ -190,10 +181,27 @@ impl Foresight {
         let pair = |(key, (with, count)): (&(usize, usize, i64), &(WindowErrors, f64))| {
             let (other, other_count) = without.squares.get(key)?;
             let sum = |squares: &WindowErrors| squares[of.clone()].iter().sum::<f64>();
-            Some((sum(with) / count, sum(other) / other_count))
+            Some((finite(sum(with) / count), finite(sum(other) / other_count)))
         };
         of_horizon.filter_map(pair).collect()
     }
+}
+
+/// A mean square; that of a prediction that diverged is very great.
+fn finite(square: f64) -> f64 {
+    if square.is_finite() { square } else { DIVERGED }
+}
+
+/// Root means of the first and of the second of mean squares by block.
+fn root_means(pairs: &[(f64, f64)]) -> [f64; 2] {
+    let mean = |sum: f64| (sum / pairs.len().max(1) as f64).sqrt();
+    [mean(pairs.iter().map(|pair| pair.0).sum()), mean(pairs.iter().map(|pair| pair.1).sum())]
+}
+
+/// True if the first are greater than the second beyond chance.
+fn is_beyond_chance(pairs: &[(f64, f64)]) -> bool {
+    let growths: Vec<f64> = pairs.iter().map(|(first, second)| first - second).collect();
+    chance_of_no_gain(&growths) < LEVEL
 }
 
 /// Errors of each quantity that the sensors' noise makes in the judged flights.
@@ -270,7 +278,16 @@ mod tests {
         assert!(errors_with(1.0).is_worth_more_than(&errors_with(1.5)));
         assert!(!errors_with(1.0).is_worth_more_than(&errors_with(1.0)));
         assert!(!errors_with(1.5).is_worth_more_than(&errors_with(1.0)), "without it they are smaller");
-        assert!(!errors_with(1.0).is_worth_more_than(&errors_with(1.01)), "too little");
+        assert!(errors_with(1.0).is_worth_more_than(&errors_with(1.01)), "little, but in every block");
+        assert!(!errors_with(1.0).is_worth_more_than(&errors_with(1.0001)), "too little");
+        // One axis alone.
+        let mut yaw = errors_with(1.0);
+        yaw.squares.values_mut().for_each(|(squares, _)| squares[11] *= 1.03);
+        assert!(errors_with(1.0).is_worth_more_than(&yaw));
+        let mut diverged = errors_with(1.0);
+        diverged.squares.values_mut().take(2).for_each(|(squares, _)| squares[4] = f64::NAN);
+        assert!(errors_with(1.0).is_worth_more_than(&diverged), "it diverges without the effect");
+        assert!(!diverged.is_worth_more_than(&errors_with(1.0)));
     }
 
     #[test]

@@ -160,6 +160,9 @@ pub struct Prepared<'f> {
     pub moves_freely: bool,
 }
 
+/// Commands farther apart than this many time constants of the motors say nothing on most of the time between them.
+const UNKNOWN_BETWEEN: f64 = 2.0;
+
 impl<'f> Prepared<'f> {
     /// The flight on its grid.
     ///
@@ -168,8 +171,11 @@ impl<'f> Prepared<'f> {
     pub fn new(flight: &'f Flight, box_s: Option<f64>, propulsion: &Propulsion) -> Result<Self, Unusable> {
         let slow_period_s = propulsion.slow_period_s(flight);
         let equations = equations(flight, slow_period_s.is_some());
+        let motor_s = propulsion.motor_s;
+        if let Some(period_s) = slow_period_s.filter(|period_s| *period_s > UNKNOWN_BETWEEN * motor_s) {
+            return Err(Unusable::UnknownBetween { period_s, motor_s });
+        }
         if equations.iter().all(|equation| matches!(equation, Equation::RotorSpeed(_))) {
-            let motor_s = propulsion.motor_s;
             let slow = slow_period_s.map(|period_s| Unusable::SlowCommands { period_s, motor_s });
             return Err(Unusable::of_channels(flight).or(slow).unwrap_or(Unusable::NoMotion));
         }

@@ -302,7 +302,7 @@ impl Predictions {
         let (effect, Worth { channel, horizon_s, without, with, unit }) =
             self.without.iter().filter_map(gain).max_by(|a, b| a.1.ratio().total_cmp(&b.1.ratio()))?;
         let reason = format!(
-            "no prediction changes by it; most, the error of {channel} after {horizon_s} s, is {without:.3e} {unit} without \
+            "no prediction error falls noticeably with it; most, the error of {channel} after {horizon_s} s, is {without:.3e} {unit} without \
              it, {with:.3e} {unit} with it"
         );
         Some(Withdrawn { effect, reason })

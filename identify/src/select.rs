@@ -1,13 +1,15 @@
 //! Attribution: selection of the candidates that the flights support, one after the other.
 //!
 //! In each round every candidate is fitted, together with what was accepted before, on the estimation data, and judged
-//! on the validation data, or without these by cross-validation over blocks of the estimation data. It is accepted only if four things hold:
+//! on the validation data, or without these by cross-validation over blocks of the estimation data. It is accepted only if five things hold:
 //!
 //! 1. The gain on the validation data is beyond chance: the mean of the blocks' gains is above zero at 1 % over all
 //!    candidates of the round together (Bonferroni; one-sided percentile bootstrap over blocks, Efron 1979).
 //! 2. Its parameters together differ from their baselines beyond chance on the estimation data, at the same level.
 //! 3. The gain matters: it is at least 0.2 % of the squared error.
-//! 4. The effect is not asked for more than it can be: not all parameters that moved stopped at a bound.
+//! 4. The effect is not asked for more than it can be: not all parameters that moved stopped at a bound beyond which the equations ask by
+//!    more than chance.
+//! 5. No effect that was taken before stops at its bound only beside this one.
 //!
 //! The accepted candidate with the greatest gain is taken, or one with fewer parameters if the difference is not
 //! beyond chance. Then those taken before have to pass the first test again, as a later effect may explain the

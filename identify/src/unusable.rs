@@ -35,6 +35,18 @@ pub enum Unusable {
         /// Time constant of the motors.
         motor_s: f64,
     },
+    /// Commands so far apart that the rotors followed others between them.
+    #[error(
+        "its commands were logged every {period_s:.3} s, expected at most {most:.3} s, twice the motors' time constant of {motor_s:.3} s: the rotors followed \
+         commands between them that nobody knows; log commands or rotor speeds faster, or set `on_change = true` if each command held until the next",
+        most = 2.0 * motor_s
+    )]
+    UnknownBetween {
+        /// Usual time between two commands.
+        period_s: f64,
+        /// Time constant of the motors.
+        motor_s: f64,
+    },
     /// A channel with too few samples.
     #[error("its `{channel}` has {samples} samples, expected at least 3")]
     FewSamples {

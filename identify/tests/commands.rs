@@ -189,6 +189,20 @@ fn commands_slower_than_the_motors_determine_no_lag_delay_or_inertia() {
     assert!(report.to_string().contains(note), "{report}");
 }
 
+/// At 5 Hz the motors have settled three times between two commands, at speeds that nobody knows.
+#[test]
+fn commands_far_apart_are_refused() {
+    let slow = changed(&heavy(20.0), |flight| keep(&mut flight.command, |at, _| at.is_multiple_of(200)));
+    let error = refused(&slow);
+    for part in [
+        "logged every 0.200 s, expected at most 0.133 s",
+        "commands between them that nobody knows",
+        "on_change = true",
+    ] {
+        assert!(error.contains(part), "no {part:?} in: {error}");
+    }
+}
+
 /// Some of the commands of a controller at 500 Hz: they act late by half of the period, which is not an effect.
 #[test]
 fn what_the_logging_of_commands_makes_is_not_named() {

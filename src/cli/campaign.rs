@@ -12,7 +12,7 @@ use campaign::plan::Plan;
 use campaign::report::Report;
 use campaign::requirement::Requirement;
 use campaign::row::Row;
-use campaign::store::{Header, PLAN, Store};
+use campaign::store::{Builds, Header, PLAN, Store};
 use campaign::table::Table;
 use campaign::worker::{Job, Order, serve, take_output};
 use clap::Args;
@@ -109,7 +109,8 @@ pub fn campaign(arguments: &CampaignArguments) -> Result<bool> {
     let folder = arguments.out.clone().unwrap_or_else(|| path.with_extension(""));
     let CampaignArguments { require, json, .. } = *arguments;
     let engine = arguments.engine.clone();
-    let opened = Opened::new(Flying { path, text, folder, is_made: false, engine, require, json })?;
+    let builds = if arguments.fly.is_some() { Builds::Any } else { Builds::Same };
+    let opened = Opened::new(Flying { path, text, folder, is_made: false, engine, require, json }, builds)?;
     if arguments.plan_only {
         let path = opened.0.flying.folder.join(PLAN);
         return print_text(&format!("{} flights: {}", opened.0.plan.flights.len(), path.display()))
@@ -126,7 +127,7 @@ pub fn campaign(arguments: &CampaignArguments) -> Result<bool> {
 /// # Errors
 /// As [`campaign`].
 pub fn fly(flying: Flying) -> Result<bool> {
-    fly_all(Opened::new(flying)?)
+    fly_all(Opened::new(flying, Builds::Same)?)
 }
 
 fn fly_all((mut opened, flown): (Opened, BTreeMap<u64, Row>)) -> Result<bool> {
@@ -138,6 +139,9 @@ fn fly_all((mut opened, flown): (Opened, BTreeMap<u64, Row>)) -> Result<bool> {
     // A file that cannot be written must not cost the verdict.
     let is_met = judge(&opened, &report, failures.is_empty());
     failures.iter().for_each(|failure| say(&format!("error: {failure:#}")));
+    if let (Err(error), false) = (&is_met, failures.is_empty()) {
+        say(&format!("error: {error:#}"));
+    }
     match failures.len() {
         0 => is_met,
         count => bail!(
@@ -158,7 +162,7 @@ struct Opened {
 
 impl Opened {
     /// The campaign, and the rows that were flown already.
-    fn new(flying: Flying) -> Result<(Self, BTreeMap<u64, Row>)> {
+    fn new(flying: Flying, builds: Builds) -> Result<(Self, BTreeMap<u64, Row>)> {
         let Flying { path, text, folder, .. } = &flying;
         let campaign = Campaign::parse(path, text)?;
         let base = Base::read(&campaign, COMPONENTS)?;
@@ -168,7 +172,7 @@ impl Opened {
             figures: base.figures.clone(),
             verdicts: base.verdicts.clone(),
         };
-        let (store, plan, flown) = Store::open(folder, &campaign, &header)?;
+        let (store, plan, flown) = Store::open(folder, &campaign, &header, builds)?;
         if let (true, Some(name)) = (flying.is_made, path.file_name().and_then(|name| name.to_str())) {
             store.write(name, |file| Ok(file.write_all(text.as_bytes())?))?;
         }

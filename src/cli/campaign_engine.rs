@@ -203,13 +203,10 @@ fn quoted(path: &Path) -> Result<String> {
     Ok(format!("'{}'", path.replace('\'', "'\\''")))
 }
 
-/// This build of hummingbus: its version with the commit, as `--version` prints it; a digest of the executable where no commit is
-/// known, as in debug builds and in those of a source archive.
+/// This build of hummingbus: its version, as `--version` prints it, and a digest of the executable. The version's commit says nothing of what
+/// was changed since.
 pub fn build() -> Result<String> {
     let version = env!("HUMMINGBUS_VERSION");
-    if version.contains('(') {
-        return Ok(version.to_owned());
-    }
     // The running one, also where a newer one has taken its place.
     let digest = File::open("/proc/self/exe").and_then(sha256_of).context("cannot read this program")?;
     Ok(format!("{version} (executable {})", &digest[..DIGITS]))

@@ -19,8 +19,7 @@ pub fn print_text(text: &str) -> Result<()> {
 
 /// Prints `value` as JSON to standard output.
 pub fn print_json(value: &impl Serialize) -> Result<()> {
-    HAS_PRINTED_JSON.store(true, Ordering::Relaxed);
-    print(&printable_json(&serde_json::to_string_pretty(value)?))
+    print_document(&serde_json::to_string_pretty(value)?)
 }
 
 /// Prints a file that another program reads to standard output, whole.
@@ -30,7 +29,12 @@ pub fn print_file(text: &str) -> Result<()> {
 
 /// Prints `value` as one line of JSON to standard output.
 pub fn print_json_line(value: &impl Serialize) -> Result<()> {
-    print(&printable_json(&serde_json::to_string(value)?))
+    print_document(&serde_json::to_string(value)?)
+}
+
+fn print_document(json: &str) -> Result<()> {
+    HAS_PRINTED_JSON.store(true, Ordering::Relaxed);
+    print(&printable_json(json))
 }
 
 /// Writes `value` as one line of JSON to `out`.

@@ -2,7 +2,7 @@
 //! cluster does seldom.
 
 use crate::campaign::{HOVERS, rows, written};
-use crate::campaign_results::{has_commit, other_build};
+use crate::campaign_results::other_build;
 use crate::skipped::skip;
 use crate::support::{Ended, HUMMINGBUS, Launch, Place, repository};
 use rustix::process::Signal;
@@ -171,9 +171,6 @@ fn tasks_that_cannot_fly_refuse_the_campaign_with_their_last_words() {
 #[test]
 fn a_node_with_another_build_flies_nothing() {
     let place = Place::new();
-    if has_commit(&place) {
-        return skip("a build with a commit is not another one by its bytes");
-    }
     stand_in(&place, "");
     let ended = on_slurm(&place, &place.path("out"), &["--node-command", &other_build(&place)]);
     ended

@@ -21,6 +21,9 @@ const LEFT: f64 = 1.0 / 3.0;
 const MORE_AS_OTHERS: f64 = 0.05;
 /// Sum of the shares of an arrangement that explains all.
 const AXES: f64 = 3.0;
+/// Of some reversed spins, torques about the yaw axis are as large as those about the others by the vehicle file, within this factor. Else it is other
+/// torques that come with roll and pitch: reversed spins mix the rotors' large differences for these into yaw.
+const SIZE_TOLERANCE: f64 = 3.0;
 /// Arrangements whose gains differ by less cannot be told apart.
 const ALIKE: f64 = 0.02;
 
@@ -114,14 +117,15 @@ impl Arrangement {
 }
 
 /// Faults of flights whose `drive` explains the angular accelerations in another arrangement of the rotors. Spins belong to the
-/// vehicle: those that one flight shows are doubted in all that do not speak for the declared ones.
+/// vehicle: those that one flight shows most clearly are doubted in all in which they explain more than the declared ones.
 pub fn swapped(flights: &[Evidence], drive: Drive) -> Vec<Option<Fault>> {
     let scores: Vec<Option<Scores>> = flights.iter().map(|evidence| Scores::of(evidence, drive)).collect();
     let found: Vec<Option<usize>> = scores.iter().map(|scores| scores.as_ref()?.clearly_better()).collect();
-    let spins = scores.iter().zip(&found).find_map(|(scores, found)| {
-        let found = (*found)?;
-        scores.as_ref().filter(|scores| scores.all[found].1.moved().is_empty()).map(|_| found)
+    let clear_spins = scores.iter().zip(&found).filter_map(|(scores, found)| {
+        let (scores, found) = (scores.as_ref()?, (*found)?);
+        scores.all[found].1.moved().is_empty().then(|| (scores.gain(found), found))
     });
+    let spins = clear_spins.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, found)| found);
     let of_flight = |((evidence, scores), found): ((&Evidence, &Option<Scores>), Option<usize>)| {
         let scores = scores.as_ref()?;
         let as_others = || spins.filter(|at| scores.gain(*at) > MORE_AS_OTHERS);
@@ -144,7 +148,13 @@ impl Scores {
             let reversed = arrangement.is_reversed.iter().enumerate();
             let effect: Vec<_> =
                 reversed.map(|(rotor, is_reversed)| effects[usize::from(*is_reversed)][rotor]).collect();
-            let of = |products: &Products| products.explained(&effect, &arrangement.order);
+            let is_mixed =
+                arrangement.is_reversed.contains(&true) && arrangement.is_reversed.contains(&false);
+            let order = &arrangement.order;
+            let of = |products: &Delayed| {
+                let is_yaw = !is_mixed || products.parts.iter().all(|part| part.are_torques(&effect, order));
+                products.whole.explained(&effect, order, is_yaw)
+            };
             products.iter().map(of).fold(0.0, f64::max)
         };
         let arrangements = Arrangement::all(evidence.model.vehicle.rotors.len()).into_iter();
@@ -258,29 +268,52 @@ struct Products {
 }
 
 impl Products {
-    /// Share of the angular accelerations that the commands in `order` explain, summed over the axes: 3 at most.
-    fn explained(&self, effect: &[Vector3<f64>], order: &[usize]) -> f64 {
-        let rotors = || 0..order.len();
-        let of_axis = |axis: usize| {
-            let by = |rotor: usize| effect[rotor][axis];
-            let both: f64 = rotors().map(|rotor| by(rotor) * self.both[axis][order[rotor]]).sum();
-            let size: f64 = rotors()
-                .flat_map(|a| rotors().map(move |b| (a, b)))
-                .map(|(a, b)| by(a) * by(b) * self.squares[order[a]][order[b]])
-                .sum();
+    /// Share of the angular accelerations that the commands in `order` explain, summed over the axes: 3 at most, or 2 without yaw.
+    fn explained(&self, effect: &[Vector3<f64>], order: &[usize], with_yaw: bool) -> f64 {
+        let share = |axis: usize| {
+            let (both, size) = self.regression(effect, order, axis);
             let whole = size * self.turning[axis];
             // The opposite direction explains nothing.
             if both > 0.0 && whole > 0.0 { both * both / whole } else { 0.0 }
         };
-        (0..3).map(of_axis).sum()
+        (0..if with_yaw { 3 } else { 2 }).map(share).sum()
+    }
+
+    /// True if the angular accelerations about yaw are as large as the torques by the vehicle file make them, beside those about roll and pitch.
+    fn are_torques(&self, effect: &[Vector3<f64>], order: &[usize]) -> bool {
+        let [(x, of_x), (y, of_y), (yaw, of_yaw)] =
+            [0, 1, 2].map(|axis| self.regression(effect, order, axis));
+        let larger = yaw / of_yaw * (of_x + of_y) / (x + y);
+        (1.0 / SIZE_TOLERANCE..SIZE_TOLERANCE).contains(&larger)
+    }
+
+    /// Products of the angular accelerations about an axis with what the commands in `order` ask for, and of that with itself.
+    fn regression(&self, effect: &[Vector3<f64>], order: &[usize], axis: usize) -> (f64, f64) {
+        let rotors = || 0..order.len();
+        let by = |rotor: usize| effect[rotor][axis];
+        let both: f64 = rotors().map(|rotor| by(rotor) * self.both[axis][order[rotor]]).sum();
+        let size: f64 = rotors()
+            .flat_map(|a| rotors().map(move |b| (a, b)))
+            .map(|(a, b)| by(a) * by(b) * self.squares[order[a]][order[b]])
+            .sum();
+        (both, size)
     }
 }
 
 /// Angular accelerations and squared speeds at a knot.
 type Row = ([f64; 3], EachRotor);
 
+/// Products at one delay of the commands: of the whole flight, and of its parts.
+struct Delayed {
+    whole: Products,
+    parts: [Products; PARTS],
+}
+
+/// Parts of a flight in each of which some reversed spins have to make torques of the right size.
+const PARTS: usize = 3;
+
 /// Products for every delay of the commands.
-fn products(evidence: &Evidence, drive: Drive) -> Option<Vec<Products>> {
+fn products(evidence: &Evidence, drive: Drive) -> Option<Vec<Delayed>> {
     let turning = evidence.measured(Equation::AngularAcceleration)?;
     let flight = evidence.flight.flight;
     let is_absent =
@@ -292,7 +325,7 @@ fn products(evidence: &Evidence, drive: Drive) -> Option<Vec<Products>> {
     Some((0..=late_max).map(|late| products_at(evidence, drive, &turning, late)).collect())
 }
 
-fn products_at(evidence: &Evidence, drive: Drive, turning: &[Vec<f64>], late: usize) -> Products {
+fn products_at(evidence: &Evidence, drive: Drive, turning: &[Vec<f64>], late: usize) -> Delayed {
     let knots = evidence.flight.layout.knots.iter().enumerate();
     let rows: Vec<Row> = knots
         .filter_map(|(at, knot)| {
@@ -304,7 +337,16 @@ fn products_at(evidence: &Evidence, drive: Drive, turning: &[Vec<f64>], late: us
             Some((turned, squares))
         })
         .collect();
-    let (count, rotors) = (rows.len().max(1) as f64, evidence.model.vehicle.rotors.len());
+    let rotors = evidence.model.vehicle.rotors.len();
+    let part = |number: usize| &rows[number * rows.len() / PARTS..(number + 1) * rows.len() / PARTS];
+    Delayed {
+        whole: products_of(&rows, rotors),
+        parts: std::array::from_fn(|number| products_of(part(number), rotors)),
+    }
+}
+
+fn products_of(rows: &[Row], rotors: usize) -> Products {
+    let count = rows.len().max(1) as f64;
     let middle = |of: &dyn Fn(&Row) -> f64| rows.iter().map(of).sum::<f64>() / count;
     let turned: [f64; 3] = std::array::from_fn(|axis| middle(&|row| row.0[axis]));
     let speeds: EachRotor = std::array::from_fn(|rotor| middle(&|row| row.1[rotor]));
@@ -313,7 +355,7 @@ fn products_at(evidence: &Evidence, drive: Drive, turning: &[Vec<f64>], late: us
         both: [[0.0; ROTORS_MAX]; 3],
         squares: [[0.0; ROTORS_MAX]; ROTORS_MAX],
     };
-    for (turning, squares) in &rows {
+    for (turning, squares) in rows {
         let a: [f64; 3] = std::array::from_fn(|axis| turning[axis] - turned[axis]);
         let s: EachRotor = std::array::from_fn(|rotor| squares[rotor] - speeds[rotor]);
         for (axis, turned) in a.iter().enumerate() {
