@@ -35,10 +35,10 @@ const LEAST_GROWTH: f64 = 1.02;
 const OF_NOISE: f64 = 0.5;
 /// Nor one by less than this part of persistence's error: a position after 0.1 s is known to a millimetre by its velocity.
 const OF_PERSISTENCE: f64 = 0.01;
-/// An effect changes something where a component's error without it has a part of at least this share of persistence's error; tuned, no source.
+/// An effect changes something where an error without it has a part of at least this share of persistence's error; tuned, no source.
 const LEAST_CHANGE: f64 = 0.02;
-/// Persistence's error along one axis counts as at least this part of that along all three.
-const LEAST_AXIS: f64 = 0.1;
+/// The same of a part that the noise beside it hides, and that is beyond chance.
+const SURE_CHANGE: f64 = 0.05;
 /// Mean square that stands for a prediction that diverged.
 const DIVERGED: f64 = 1e60;
 
@@ -112,18 +112,19 @@ impl Foresight {
 
     /// True if an effect changes something: an error is greater without it, or all of them together are smaller with it.
     pub fn is_worth_more_than(&self, without: &Self) -> bool {
-        let mut places = (0..HORIZONS_S.len()).flat_map(|horizon| (0..ERRORS).map(move |at| (horizon, at)));
+        let mut places =
+            (0..HORIZONS_S.len()).flat_map(|horizon| (0..QUANTITIES.len()).map(move |at| (horizon, at)));
         places.any(|(horizon, at)| without.is_grown(self, horizon, at)) || self.is_better_than(without)
     }
 
-    /// True if the error of a component is greater than that `with` an effect by a part that matters, and by more than chance or noticeably.
+    /// True if the error of a quantity is greater than that `with` an effect by a part that matters, noticeably, or by a greater part beyond chance.
     fn is_grown(&self, with: &Self, horizon: usize, at: usize) -> bool {
-        let pairs = self.blocks(with, horizon, at..at + 1);
+        let pairs = self.blocks(with, horizon, 3 * at..3 * at + 3);
         let [without, with] = root_means(&pairs);
-        let axes: f64 = self.persistent[horizon][at / 3 * 3..at / 3 * 3 + 3].iter().sum();
-        let persistent = self.persistent[horizon][at].max(LEAST_AXIS * LEAST_AXIS * axes).sqrt();
+        let persistent = self.persistent[horizon][3 * at..3 * at + 3].iter().sum::<f64>().sqrt();
         let part = (without * without - with * with).max(0.0).sqrt();
-        part > LEAST_CHANGE * persistent && (without > LEAST_GROWTH * with || is_beyond_chance(&pairs))
+        let is_noticeable = part > LEAST_CHANGE * persistent && without > LEAST_GROWTH * with;
+        is_noticeable || (part > SURE_CHANGE * persistent && is_beyond_chance(&pairs))
     }
 
     /// Every error that was measured, with an effect and `without` it, and whether it grows by the effect beyond its noise.
@@ -280,10 +281,6 @@ mod tests {
         assert!(!errors_with(1.5).is_worth_more_than(&errors_with(1.0)), "without it they are smaller");
         assert!(errors_with(1.0).is_worth_more_than(&errors_with(1.01)), "little, but in every block");
         assert!(!errors_with(1.0).is_worth_more_than(&errors_with(1.0001)), "too little");
-        // One axis alone.
-        let mut yaw = errors_with(1.0);
-        yaw.squares.values_mut().for_each(|(squares, _)| squares[11] *= 1.03);
-        assert!(errors_with(1.0).is_worth_more_than(&yaw));
         let mut diverged = errors_with(1.0);
         diverged.squares.values_mut().take(2).for_each(|(squares, _)| squares[4] = f64::NAN);
         assert!(errors_with(1.0).is_worth_more_than(&diverged), "it diverges without the effect");
