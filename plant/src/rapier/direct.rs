@@ -50,6 +50,11 @@ const SHIFT_EXACT_M_S: f64 = 1e-9;
 /// Number of rounds from which the next shifts are extrapolated.
 const DEPTH: usize = 3;
 
+/// Factors of the damping where shifts come nearer and where they do not, and its bound. Tuned, no source.
+const DAMPING_GROWS: f64 = 1.5;
+const DAMPING_FALLS: f64 = 0.5;
+const DAMPING_MIN: f64 = 0.05;
+
 /// Part of the greatest change that regularises the extrapolation. Tuned, no source.
 const REGULAR: f64 = 1e-9;
 
@@ -125,6 +130,8 @@ struct Cone {
     /// The rate less the bound, without impulses; along the normal without the shift.
     free: Vector3<f64>,
     shift: f64,
+    /// The shift that came nearest to the slip that it led to.
+    nearest: f64,
     history: History,
     z: Vector3<f64>,
     s: Vector3<f64>,
@@ -190,13 +197,14 @@ impl Cone {
 
 impl Direct {
     /// Finds the impulses of an island, whose bodies are those that `is_in`: they move as `all` without impulses, and have
-    /// the mobilities of `mobile`.
+    /// the mobilities of `mobile`. The search begins with `slips_m_s`, guesses of how fast each constraint slips.
     pub(super) fn solve(
         &mut self,
         all: &mut [Body],
         mobile: &[Body],
         constraints: &mut [Unilateral],
         joints: &[Bilateral],
+        slips_m_s: &[f64],
         is_in: impl Fn(usize) -> bool,
     ) {
         self.places.clear();
@@ -208,7 +216,7 @@ impl Direct {
                 self.roots.push(root(&body.mobility));
             }
         }
-        self.lay(all, constraints, joints);
+        self.lay(all, constraints, joints, slips_m_s);
         self.find();
         self.hand_out(all, constraints);
     }
@@ -222,11 +230,12 @@ impl Direct {
         Line { places, ways: [way(0), way(1)] }
     }
 
-    fn lay(&mut self, all: &[Body], constraints: &[Unilateral], joints: &[Bilateral]) {
+    fn lay(&mut self, all: &[Body], constraints: &[Unilateral], joints: &[Bilateral], slips_m_s: &[f64]) {
         let (mut cones, mut ties) = (std::mem::take(&mut self.cones), std::mem::take(&mut self.ties));
         cones.clear();
-        let asked = constraints.iter().enumerate().filter(|(_, it)| it.bound_m_s > f64::NEG_INFINITY);
-        cones.extend(asked.filter_map(|(number, constraint)| self.cone(all, number, constraint)));
+        let numbered = constraints.iter().zip(slips_m_s).enumerate();
+        let asked = numbered.filter(|(_, (it, _))| it.bound_m_s > f64::NEG_INFINITY);
+        cones.extend(asked.filter_map(|(number, (it, slip_m_s))| self.cone(all, number, it, *slip_m_s)));
         ties.clear();
         let rows = joints.iter().flat_map(|joint| &joint.rows[..joint.count]);
         ties.extend(rows.filter_map(|row| {
@@ -238,7 +247,7 @@ impl Direct {
     }
 
     /// The cone of a constraint; none where it moves no body of the island.
-    fn cone(&self, all: &[Body], number: usize, constraint: &Unilateral) -> Option<Cone> {
+    fn cone(&self, all: &[Body], number: usize, constraint: &Unilateral, slip_m_s: f64) -> Option<Cone> {
         let normal = &constraint.normal;
         let friction = constraint.friction.as_ref().filter(|it| it.coefficient > FRICTIONLESS);
         let rows = friction.map_or([normal; 3], |friction| [normal, &friction.slips[0], &friction.slips[1]]);
@@ -259,7 +268,8 @@ impl Direct {
             lines: [0, 1, 2].map(|at| self.line(rows[at], scale[at])),
             scale,
             free: rates.component_mul(&scale),
-            shift: 0.0,
+            shift: scale.y * slip_m_s,
+            nearest: 0.0,
             history: History::default(),
             z: zeros,
             s: zeros,
@@ -275,30 +285,48 @@ impl Direct {
     }
 
     /// Finds shifts that lead to themselves, by Anderson's acceleration (D. Anderson, Iterative procedures for
-    /// nonlinear integral equations, 1965).
+    /// nonlinear integral equations, 1965), damped where they go to and fro: a contact that comes to stick or to slip
+    /// bends their map. Where none are found, the nearest are taken.
     fn find(&mut self) {
-        let (mut known, mut before_m_s) = (0, 0.0);
+        let (mut known, mut damping) = (0, 1.0_f64);
+        let (mut before_m_s, mut least_m_s) = (f64::INFINITY, f64::INFINITY);
         for round in 0..SHIFTS_MAX {
-            let steps = self.find_shifted();
-            let mut most_m_s = 0.0_f64;
-            for cone in &mut self.cones {
-                let off = cone.slip(&self.change) - cone.shift;
-                most_m_s = most_m_s.max(off.abs() / cone.scale.y.max(f64::MIN_POSITIVE));
-                cone.history.note(cone.shift, off);
-            }
-            if steps >= STEPS_MAX || most_m_s <= SHIFT_EXACT_M_S {
+            self.find_shifted();
+            let most_m_s = self.note_shifts();
+            if most_m_s <= SHIFT_EXACT_M_S {
                 return;
             }
+            if most_m_s < least_m_s {
+                least_m_s = most_m_s;
+                self.cones.iter_mut().for_each(|cone| cone.nearest = cone.shift);
+            }
             // An extrapolation that made it worse is forgotten. Without one, what made it worse tells the next shift.
-            let more = if most_m_s < before_m_s || known == 0 { known + 1 } else { 0 };
-            known = more.min(round).min(DEPTH);
+            (known, damping) = match (most_m_s < before_m_s, known) {
+                (true, _) => ((known + 1).min(round).min(DEPTH), (DAMPING_GROWS * damping).min(1.0)),
+                (false, 0) => (1, (DAMPING_FALLS * damping).max(DAMPING_MIN)),
+                (false, _) => (0, damping),
+            };
             before_m_s = most_m_s;
-            self.change_shifts(known);
+            self.change_shifts(known, damping);
         }
+        self.cones.iter_mut().for_each(|cone| cone.shift = cone.nearest);
+        self.find_shifted();
     }
 
-    /// The next shifts, from the changes of the shifts and of their images in the last `known` rounds.
-    fn change_shifts(&mut self, known: usize) {
+    /// Notes the shifts and the slips that they led to; returns by how much one is off at most.
+    fn note_shifts(&mut self) -> f64 {
+        let Self { cones, change, .. } = self;
+        let off_m_s = cones.iter_mut().map(|cone| {
+            let off = cone.slip(change) - cone.shift;
+            cone.history.note(cone.shift, off);
+            off.abs() / cone.scale.y.max(f64::MIN_POSITIVE)
+        });
+        off_m_s.fold(0.0, f64::max)
+    }
+
+    /// The next shifts, from the changes of the shifts and of their images in the last `known` rounds: the part `damping` of
+    /// the way to these.
+    fn change_shifts(&mut self, known: usize, damping: f64) {
         let (mut products, mut right) = (Matrix3::<f64>::zeros(), Vector3::<f64>::zeros());
         for history in self.cones.iter().map(|cone| &cone.history) {
             for row in 0..known {
@@ -312,8 +340,9 @@ impl Direct {
         let parts = regular.try_inverse().map_or(Vector3::zeros(), |inverse| inverse * (right / size));
         for cone in &mut self.cones {
             let history = &cone.history;
-            let back = (0..known).map(|at| parts[at] * (history.by[at] + history.off_by[at])).sum::<f64>();
-            cone.shift = (cone.shift + history.off - back).max(0.0);
+            let back =
+                (0..known).map(|at| parts[at] * (history.by[at] + damping * history.off_by[at])).sum::<f64>();
+            cone.shift = (cone.shift + damping * history.off - back).max(0.0);
         }
     }
 

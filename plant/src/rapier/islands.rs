@@ -16,10 +16,38 @@ pub(super) struct Islands {
     firsts: Vec<usize>,
     /// Twists without impulses.
     start: Vec<Vector6<f64>>,
-    /// Twists and impulses that the sweeps found.
-    swept: Vec<Vector6<f64>>,
-    swept_N_s: Vec<(f64, Option<Vector2<f64>>)>,
+    /// The nearest twists and impulses so far.
+    nearest: Kept,
+    /// Slips that the sweeps left.
+    slips_m_s: Vec<f64>,
     direct: Direct,
+}
+
+/// Twists of all bodies, and impulses of all constraints.
+#[derive(Default)]
+struct Kept {
+    twists: Vec<Vector6<f64>>,
+    impulses_N_s: Vec<(f64, Option<Vector2<f64>>)>,
+}
+
+impl Kept {
+    fn keep(&mut self, all: &[Body], constraints: &[Unilateral]) {
+        self.twists.clear();
+        self.twists.extend(all.iter().map(|body| body.twist));
+        self.impulses_N_s.clear();
+        let impulses_N_s = |it: &Unilateral| (it.impulse_N_s, it.friction.map(|it| it.impulses_N_s));
+        self.impulses_N_s.extend(constraints.iter().map(impulses_N_s));
+    }
+
+    fn put_back(&self, all: &mut [Body], constraints: &mut [Unilateral]) {
+        all.iter_mut().zip(&self.twists).for_each(|(body, twist)| body.twist = *twist);
+        for (constraint, (normal_N_s, aside_N_s)) in constraints.iter_mut().zip(&self.impulses_N_s) {
+            constraint.impulse_N_s = *normal_N_s;
+            if let Some((friction, aside_N_s)) = constraint.friction.as_mut().zip(*aside_N_s) {
+                friction.impulses_N_s = aside_N_s;
+            }
+        }
+    }
 }
 
 impl Islands {
@@ -62,8 +90,7 @@ impl Islands {
     }
 
     /// Solves the island that begins with the body `first` directly, if it is one and the sweeps left it
-    /// unsettled. A result that is not better than that of the sweeps is not taken. Returns the greatest error
-    /// of one of its rates.
+    /// unsettled. The nearest result is taken. Returns the greatest error of one of its rates.
     fn settle(
         &mut self,
         first: usize,
@@ -72,39 +99,37 @@ impl Islands {
         constraints: &mut [Unilateral],
         joints: &[Bilateral],
     ) -> f64 {
-        let Self { firsts, start, swept, swept_N_s, direct } = self;
+        let Self { firsts, start, nearest, slips_m_s, direct } = self;
         let is_in = |body: usize| firsts[body] == first && moves(&mobile[body]);
         let is_row_in = |bodies: &[usize; 2]| bodies.iter().any(|body| is_in(*body));
-        let swept_off_m_s = off_m_s(all, constraints, joints, is_row_in);
-        if swept_off_m_s <= FOUND_M_S {
-            return swept_off_m_s;
+        let mut least_m_s = off_m_s(all, constraints, joints, is_row_in);
+        if least_m_s <= FOUND_M_S {
+            return least_m_s;
         }
-        swept.clear();
-        swept.extend(all.iter().map(|body| body.twist));
-        swept_N_s.clear();
-        swept_N_s
-            .extend(constraints.iter().map(|it| (it.impulse_N_s, it.friction.map(|it| it.impulses_N_s))));
+        nearest.keep(all, constraints);
+        slips_m_s.clear();
+        slips_m_s.extend(constraints.iter().map(|it| it.slip_m_s(all)));
         let bodies = all.iter_mut().zip(&*start).enumerate().filter(|(number, _)| is_in(*number));
         bodies.for_each(|(_, (body, start))| body.twist = *start);
-        direct.solve(all, mobile, constraints, joints, is_in);
-        let mut direct_off_m_s = off_m_s(all, constraints, joints, is_row_in);
-        if direct_off_m_s > FOUND_M_S {
-            // The loads are found, and almost the directions in which the contacts slip: those the sweeps find.
-            solver::sweep(all, constraints, joints);
-            direct_off_m_s = off_m_s(all, constraints, joints, is_row_in);
-        }
-        let is_finite = all.iter().all(|body| body.twist.iter().all(|it| it.is_finite()));
-        if is_finite && direct_off_m_s < swept_off_m_s {
-            return direct_off_m_s;
-        }
-        all.iter_mut().zip(&*swept).for_each(|(body, swept)| body.twist = *swept);
-        for (constraint, (normal_N_s, aside_N_s)) in constraints.iter_mut().zip(&*swept_N_s) {
-            constraint.impulse_N_s = *normal_N_s;
-            if let Some((friction, aside_N_s)) = constraint.friction.as_mut().zip(*aside_N_s) {
-                friction.impulses_N_s = aside_N_s;
+        direct.solve(all, mobile, constraints, joints, slips_m_s, is_in);
+        for is_found_directly in [true, false] {
+            if !is_found_directly {
+                // The loads are found, and almost the directions in which the contacts slip: those the sweeps may find.
+                solver::sweep(all, constraints, joints);
+            }
+            let off_m_s = off_m_s(all, constraints, joints, is_row_in);
+            let is_finite = all.iter().all(|body| body.twist.iter().all(|it| it.is_finite()));
+            if !is_finite || off_m_s >= least_m_s {
+                break;
+            }
+            nearest.keep(all, constraints);
+            least_m_s = off_m_s;
+            if off_m_s <= FOUND_M_S {
+                break;
             }
         }
-        swept_off_m_s
+        nearest.put_back(all, constraints);
+        least_m_s
     }
 }
 

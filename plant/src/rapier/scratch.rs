@@ -37,6 +37,8 @@ pub(super) struct Scratch {
     pub ropes: Vec<[usize; 2]>,
     pub free_bodies: Work,
     pub islands: Islands,
+    /// Greatest speed at which two that touch came nearer or slipped, before the impulses that were looked for last.
+    pub fastest_m_s: f64,
 }
 
 impl Scratch {
@@ -55,6 +57,9 @@ impl Scratch {
     /// one into a still object, no impulses satisfy both: the other is left out, and flies into it. Returns the
     /// greatest error of a rate.
     pub(super) fn solve(&mut self) -> f64 {
+        let asked = self.constraints.iter().filter(|it| it.bound_m_s > f64::NEG_INFINITY);
+        let speeds_m_s = asked.map(|it| it.slip_m_s(&self.then).max(-it.normal.rate(&self.then)));
+        self.fastest_m_s = speeds_m_s.fold(0.0, f64::max);
         let is_among_others = self.is_among_others();
         if is_among_others {
             self.before.clone_from(&self.then);

@@ -357,6 +357,11 @@ impl Unilateral {
         })
     }
 
+    /// Speed of its slip; 0 without friction.
+    pub(super) fn slip_m_s(&self, all: &[Body]) -> f64 {
+        self.friction.map_or(0.0, |it| Vector2::new(it.slips[0].rate(all), it.slips[1].rate(all)).norm())
+    }
+
     /// Relaxes the normal, and then friction; returns by how much that changed their rates.
     fn relax(&mut self, all: &mut [Body]) -> f64 {
         let slipped = |this: &mut Self, all: &mut [Body]| {

@@ -454,7 +454,7 @@ impl Motion {
     fn judge(&mut self, scratch: &Scratch, off_m_s: f64, start_J: f64) {
         let end_J = self.energy_J(&scratch.then, &scratch.then);
         let gain_J = if scratch.is_among_others() { 0.0 } else { end_J - start_J - scratch.lent_J() };
-        let outcome = Outcome { off_m_s, start_J, gain_J };
+        let outcome = Outcome { off_m_s, fastest_m_s: scratch.fastest_m_s, start_J, gain_J };
         let unsolved = || Unsolved::of(&outcome, scratch, &self.free_bodies.objects);
         self.unsolved = self.unsolved.or_else(unsolved);
     }
@@ -464,7 +464,7 @@ impl Motion {
     /// work on the vehicle, and are left out of this. Where no impulses make the bodies leave as asked, the impact is
     /// inelastic. Returns by how much a rate is off at most.
     fn lose_gain(&self, scratch: &mut Scratch, off_m_s: f64, start_J: f64) -> f64 {
-        let is_met = Outcome::is_met(off_m_s);
+        let is_met = off_m_s <= Outcome::may_be_off_m_s(scratch.fastest_m_s);
         let makes_none = self.energy_J(&scratch.then, &scratch.then) <= start_J;
         if scratch.is_among_others() || (is_met && makes_none) {
             return off_m_s;

@@ -3,17 +3,25 @@
 use super::free_bodies::{FIRST_BODY, VEHICLE};
 use super::scratch::Scratch;
 
-/// A rate that is farther off ends the run, m/s. Tuned, no source.
+/// A rate that is farther off than this, and than a part of the fastest rate, ends the run, m/s. Tuned, no source.
 const OFF_MOST_M_S: f64 = 1e-4;
+
+/// That part. For contacts that only just stick or slip the iteration may find no shifts (`direct`). With shifts that are
+/// nearly right, they push while they part, and by less than the coefficients of friction and restitution are known. Solvers
+/// without shifts leave that error whole (A. Castro and others, An unconstrained convex formulation of compliant
+/// contact, 2022). Tuned, no source.
+const OFF_MOST_OF_FASTEST: f64 = 0.05;
 
 /// Part of the kinetic energy, and of 1 J, that the impulses of a step may make by rounding. Tuned, no source.
 const GAIN_MOST: f64 = 1e-6;
 
 /// The result of a search for impulses.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Outcome {
     /// Greatest error of a rate.
     pub off_m_s: f64,
+    /// Greatest speed at which two that touch come nearer or slip, before the impulses.
+    pub fastest_m_s: f64,
     /// Kinetic energy before the impulses.
     pub start_J: f64,
     /// Kinetic energy that the impulses added, beyond what was asked for; 0 where another vehicle pushes.
@@ -21,13 +29,17 @@ pub(super) struct Outcome {
 }
 
 impl Outcome {
-    /// True if every rate is as near to its bound as it has to be.
-    pub(super) fn is_met(off_m_s: f64) -> bool {
-        off_m_s <= OFF_MOST_M_S
+    /// The error of a rate up to which impulses are taken as found.
+    pub(super) fn may_be_off_m_s(fastest_m_s: f64) -> f64 {
+        OFF_MOST_M_S.max(OFF_MOST_OF_FASTEST * fastest_m_s)
+    }
+
+    fn is_met(&self) -> bool {
+        self.off_m_s <= Self::may_be_off_m_s(self.fastest_m_s)
     }
 
     fn is_sound(&self) -> bool {
-        Self::is_met(self.off_m_s) && self.gain_J <= GAIN_MOST * (1.0 + self.start_J)
+        self.is_met() && self.gain_J <= GAIN_MOST * (1.0 + self.start_J)
     }
 }
 
@@ -36,8 +48,7 @@ impl Outcome {
 pub(super) struct Unsolved {
     /// The two that the worst of them pushes, as `bus::messages::Contact` numbers them, the vehicle as 0; none of a stop.
     objects: Option<[u32; 2]>,
-    off_m_s: f64,
-    gain_J: f64,
+    outcome: Outcome,
 }
 
 impl Unsolved {
@@ -54,7 +65,7 @@ impl Unsolved {
             _ => objects.get(body.wrapping_sub(FIRST_BODY)).copied().unwrap_or_default(),
         };
         let objects = near.map(|near| [near.object, second(near.bodies[1])]);
-        Some(Self { objects, off_m_s: outcome.off_m_s, gain_J: outcome.gain_J })
+        Some(Self { objects, outcome: *outcome })
     }
 
     /// The error message, with the name of each object.
@@ -63,10 +74,12 @@ impl Unsolved {
             let [first, second] = objects.map(name);
             format!("between {first} and {second}")
         });
-        let found = match Outcome::is_met(self.off_m_s) {
-            true => format!("they made {:.1e} J of motion", self.gain_J),
+        let Outcome { off_m_s, fastest_m_s, gain_J, .. } = self.outcome;
+        let found = match self.outcome.is_met() {
+            true => format!("they made {gain_J:.1e} J of motion"),
             false => {
-                format!("a rate is off by {:.1e} m/s, expected {OFF_MOST_M_S:.0e} m/s at most", self.off_m_s)
+                let most_m_s = Outcome::may_be_off_m_s(fastest_m_s);
+                format!("a rate is off by {off_m_s:.1e} m/s, expected {most_m_s:.0e} m/s at most")
             }
         };
         format!(

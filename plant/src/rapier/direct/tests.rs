@@ -29,7 +29,7 @@ fn an_island_of_joints_alone_is_solved_in_few_steps() {
     let (mut all, joints) = chain();
     let mobile = all.clone();
     let mut direct = Direct::default();
-    direct.solve(&mut all, &mobile, &mut [], &joints, |body| body > 0);
+    direct.solve(&mut all, &mobile, &mut [], &joints, &[], |body| body > 0);
     let off_m_s = joints.iter().map(|joint| joint.off_m_s(&all)).fold(0.0, f64::max);
     assert!(off_m_s < 1e-9, "a rate is off by {off_m_s} m/s");
     let steps = direct.find_shifted();
