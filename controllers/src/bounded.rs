@@ -29,7 +29,31 @@ const STEPS_MAX: usize = 4 * ROTORS_MAX;
 /// A part of the squared speed for each rotor, 0 to 1; 0 behind the last one.
 pub(crate) type Parts = SVector<f64, ROTORS_MAX>;
 
-const ROWS: usize = 4 + ROTORS_MAX;
+/// [`BoundedLeastSquares::step`] with matrices for the first `$count` rotors: nalgebra's factorisations are not generic over a
+/// size that is known when compiled.
+macro_rules! step_of {
+    ($count:expr, $this:ident, $missing:ident, $parts:ident, $held:ident) => {{
+        let mut rows = SMatrix::<f64, { 4 + $count }, $count>::zeros();
+        let mut right = SVector::<f64, { 4 + $count }>::zeros();
+        right.fixed_rows_mut::<4>(0).copy_from(&$missing);
+        for rotor in 0..$count {
+            rows[(4 + rotor, rotor)] = SMALL;
+            if !$held[rotor] {
+                rows.fixed_view_mut::<4, 1>(0, rotor).copy_from(&$this.effects.column(rotor));
+                right[4 + rotor] = -SMALL * $parts[rotor];
+            }
+        }
+        let factors = rows.qr();
+        factors.q_tr_mul(&mut right);
+        let mut solution = right.fixed_rows::<$count>(0).into_owned();
+        // Each column has a row of its own: the triangle has no zero on its diagonal.
+        factors.r().solve_upper_triangular_mut(&mut solution);
+        let mut step = Parts::zeros();
+        // What is held stays at its bound to the last bit.
+        (0..$count).filter(|rotor| !$held[*rotor]).for_each(|rotor| step[rotor] = solution[rotor]);
+        step
+    }};
+}
 
 /// The rotors' effects, and their least part.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,13 +64,19 @@ pub(crate) struct BoundedLeastSquares {
     sizes: Vector4<f64>,
     /// The least squared speed as a part of the greatest.
     least: f64,
+    /// Number of the rotors.
+    count: usize,
 }
 
 impl BoundedLeastSquares {
     /// `effects` are the torques about x, y, z (N·m) and the thrust (N) that each rotor makes at its greatest speed.
     pub fn new(effects: impl Iterator<Item = Vector4<f64>>, least: f64) -> Self {
         let mut all = SMatrix::<f64, 4, ROTORS_MAX>::zeros();
-        all.column_iter_mut().zip(effects).for_each(|(mut column, effect)| column.copy_from(&effect));
+        let mut count = 0;
+        for (mut column, effect) in all.column_iter_mut().zip(effects) {
+            column.copy_from(&effect);
+            count += 1;
+        }
         let size = |row: usize| all.row(row).norm();
         // Roll and pitch have one unit, so that the torque that is missed is the shortest vector.
         let tilt = size(0).max(size(1));
@@ -54,7 +84,7 @@ impl BoundedLeastSquares {
         for (row, mut effects) in all.row_iter_mut().enumerate() {
             effects *= WEIGHTS[row] / sizes[row];
         }
-        Self { effects: all, sizes, least }
+        Self { effects: all, sizes, least, count }
     }
 
     /// Sizes of roll, pitch, yaw (N·m) and thrust (N): the root of the sum of squares over the rotors at full speed.
@@ -104,24 +134,14 @@ impl BoundedLeastSquares {
     /// The change of the rotors that are not held that solves the problem without bounds. The rows have falling weights, in
     /// which Householder's factorisation is stable (Björck, Numerical methods for least squares problems, 1996, section 4.4).
     fn step(&self, demand: &Vector4<f64>, parts: &Parts, held: &[bool; ROTORS_MAX]) -> Parts {
-        let mut rows = SMatrix::<f64, ROWS, ROTORS_MAX>::zeros();
-        let mut missing = SVector::<f64, ROWS>::zeros();
-        missing.fixed_rows_mut::<4>(0).copy_from(&(demand - self.effects * parts));
-        for rotor in 0..ROTORS_MAX {
-            rows[(4 + rotor, rotor)] = SMALL;
-            if !held[rotor] {
-                rows.fixed_view_mut::<4, 1>(0, rotor).copy_from(&self.effects.column(rotor));
-                missing[4 + rotor] = -SMALL * parts[rotor];
-            }
+        let missing = demand - self.effects * parts;
+        // The factorisation is most of the cost: four rotors need a tenth of what twelve do.
+        match self.count {
+            0..=4 => step_of!(4, self, missing, parts, held),
+            5 | 6 => step_of!(6, self, missing, parts, held),
+            7 | 8 => step_of!(8, self, missing, parts, held),
+            _ => step_of!(ROTORS_MAX, self, missing, parts, held),
         }
-        let factors = rows.qr();
-        factors.q_tr_mul(&mut missing);
-        let mut step = missing.fixed_rows::<ROTORS_MAX>(0).into_owned();
-        // Each column has a row of its own: the triangle has no zero on its diagonal.
-        factors.r().solve_upper_triangular_mut(&mut step);
-        // What is held stays at its bound to the last bit.
-        step.iter_mut().zip(held).filter(|(_, is_held)| **is_held).for_each(|(step, _)| *step = 0.0);
-        step
     }
 
     /// The part of `step` up to the first bound, and the rotor that meets it.
