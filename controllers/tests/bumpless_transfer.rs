@@ -4,8 +4,7 @@
     reason = "a trailing _W or _B names the frame a vector is written in, _N the newton"
 )]
 
-mod flight;
-
+use crate::flight;
 use bus::messages::Vector3 as Point;
 use controllers::allocation::RotorWrench;
 use controllers::cascade::CascadeLaw;

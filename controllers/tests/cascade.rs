@@ -1,8 +1,7 @@
 //! The thesis's first scenario flown by the cascade, and courses flown by the velocity law, in a closed loop.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
-mod flight;
-
+use crate::flight;
 use controllers::cascade::CascadeLaw;
 use controllers::cascade_gains::CascadeGains;
 use controllers::velocity::{LoopsGains, VelocityLaw, VelocityLoop, VelocitySetPoint};

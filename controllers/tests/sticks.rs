@@ -1,10 +1,8 @@
 //! The stored recordings of sticks: written by the random pilot, like a hand, and flown by the cascade.
 #![allow(dead_code, reason = "the generator's own main is not used here")]
 
-mod flight;
-#[path = "../examples/random_pilot.rs"]
-mod random_pilot;
-
+use crate::flight;
+use crate::random_pilot;
 use controllers::cascade::CascadeLaw;
 use controllers::cascade_gains::CascadeGains;
 use controllers::set_points::SetPoint;

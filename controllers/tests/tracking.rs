@@ -1,8 +1,7 @@
 //! The controllers that follow a trajectory, in closed loops.
 #![allow(non_snake_case, reason = "_N names the newton")]
 
-mod common;
-
+use crate::common;
 use common::{Craft, Loop, PERIOD_S, believed, trajectory, vehicle};
 use controllers::allocation::RotorWrench;
 use controllers::cascade::CascadeLaw;

@@ -1,8 +1,7 @@
 //! Trajectories: derivatives that are derivatives, waypoints that are hit, starts and ends at rest.
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
-mod common;
-
+use crate::common;
 use common::{trajectory, try_trajectory};
 use controllers::trajectory::Trajectory;
 use nalgebra::Vector3;

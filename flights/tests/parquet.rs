@@ -1,10 +1,7 @@
 //! Parquet files, read through a flights file.
 
-#[path = "support/parquet.rs"]
-mod file;
-#[allow(dead_code, reason = "other tests use the rest")]
-mod support;
-
+use crate::parquet_file as file;
+use crate::support;
 use file::{Column, columns};
 use flights::Flight;
 use parquet::basic::{Compression, Encoding};

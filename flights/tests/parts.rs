@@ -1,8 +1,6 @@
 //! Flights whose logs lie in several files, part by part.
 
-#[allow(dead_code, reason = "other tests use the rest")]
-mod support;
-
+use crate::support;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -1,8 +1,6 @@
 //! Patterns of logs: a flight for each log that is found.
 
-#[allow(dead_code, reason = "other tests use the rest")]
-mod support;
-
+use crate::support;
 use std::path::Path;
 
 use flights::{FlightSet, Role};

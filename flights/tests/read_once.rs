@@ -1,8 +1,6 @@
 //! Every file of a flights file is read once, and whoever needs one again gets the same bytes.
 
-#[allow(dead_code, reason = "other tests use the rest")]
-mod support;
-
+use crate::support;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::fs;

@@ -1,8 +1,6 @@
 //! Flights of the repository's flights files, read from real logs in the folder that `HUMMINGBUS_DATA` names.
 
-#[path = "../../tests/runs/skipped.rs"]
-mod skipped;
-
+use crate::skipped;
 use std::path::{Path, PathBuf};
 
 use flights::{Channel, Flight, FlightSet, Role};

@@ -1,7 +1,6 @@
 //! Made-up logs of every format: the flights that are read from them, and the errors for wrong ones.
 
-mod support;
-
+use crate::support;
 use flights::{Flight, FlightSet, FlightsError, Quantity};
 use support::{Motion, Place, crc32};
 

@@ -1,8 +1,6 @@
 //! CSV files as programs write them, read through a flights file.
 
-#[allow(dead_code, reason = "other tests use the rest")]
-mod support;
-
+use crate::support;
 use flights::Flight;
 use support::{Motion, Place, crc32};
 

@@ -1,8 +1,6 @@
 //! ULogs that are damaged, cut or subscribed again: the flights that are read from them, and the notes.
 
-#[allow(dead_code, reason = "other tests use the rest")]
-mod support;
-
+use crate::support;
 use flights::Flight;
 use support::{Place, ulog, ulog_message};
 

@@ -1,7 +1,6 @@
 //! Flights with an effect that nobody declared: it is named, and nothing else is. The whole table is made by
 //! `cargo run --release -p hummingbus-identify --example confusion`, see docs/validation.md.
-mod simulated;
-
+use crate::simulated;
 use identify::run::identify;
 use rayon::prelude::*;
 use simulated::cases::{Case, EFFECTS, Judgement};

@@ -1,6 +1,5 @@
 //! Clocks of attitude and gyroscope against each other, whatever noise the attitude has, and of rotor speeds against the gyroscope.
-mod simulated;
-
+use crate::simulated;
 use flights::Channel;
 use identify::run::identify;
 use rayon::prelude::*;

@@ -1,6 +1,5 @@
 //! Commands that were not logged all the time, and flights whose commands or motion are missing.
-mod simulated;
-
+use crate::simulated;
 use flights::{Channel, Flight, FlightSet};
 use identify::report::{Estimate, Report};
 use identify::run::identify;

@@ -1,6 +1,5 @@
 //! 95 % intervals hold the truth as often as they say, of the effects that are true, without a selection.
-mod simulated;
-
+use crate::simulated;
 use identify::effect_reports::estimates;
 use identify::run::problem;
 use rayon::prelude::*;

@@ -1,7 +1,6 @@
 //! A slow disturbance under feedback is not taken for an inertia, and an inertia beside one is found. The whole
 //! table is made by `cargo run --release -p hummingbus-identify --example feedback`, see docs/validation.md.
-mod simulated;
-
+use crate::simulated;
 use rayon::prelude::*;
 use simulated::feedback::{Gust, fitted, gusts, searched};
 

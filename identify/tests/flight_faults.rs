@@ -1,8 +1,6 @@
 //! Faults of one flight among several: each is named with its flight and its channel, and flights without one have none.
-mod simulated;
-#[path = "../../tests/runs/skipped.rs"]
-mod skipped;
-
+use crate::simulated;
+use crate::skipped;
 use flights::{Channel, Flight, FlightSet, Role};
 use identify::Fault;
 use identify::run::{faults, identify};

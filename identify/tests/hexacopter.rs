@@ -1,6 +1,5 @@
 //! A hexacopter: one of its six rotors is weak, and that one is found.
-mod simulated;
-
+use crate::simulated;
 use identify::run::identify;
 use simulated::cases::Case;
 

@@ -1,6 +1,5 @@
 //! Variations of the logging: channels left out, slow, held, late, broken.
-mod simulated;
-
+use crate::simulated;
 use flights::{Channel, Flight, FlightSet};
 use identify::report::Report;
 use identify::run::identify;

@@ -1,8 +1,6 @@
 //! Real flights, where they are: `HUMMINGBUS_DATA` names their folder. docs/validation.md has all of them.
 
-#[path = "../../tests/runs/skipped.rs"]
-mod skipped;
-
+use crate::skipped;
 use flights::FlightSet;
 use identify::report::Report;
 use identify::run::identify;

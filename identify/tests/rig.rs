@@ -1,7 +1,6 @@
 //! Vehicles that a bearing holds at a point: flights of an integrator of their own, with hidden truths. The whole table is made by
 //! `cargo run --release -p hummingbus-identify --example rigs`, see docs/validation.md.
-mod simulated;
-
+use crate::simulated;
 use flights::{FlightSet, Role};
 use identify::run::identify;
 use rayon::prelude::*;

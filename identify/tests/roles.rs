@@ -1,6 +1,5 @@
 //! Roles of flights: parameters are fitted on some, effects chosen on others, and test flights decide nothing.
-mod simulated;
-
+use crate::simulated;
 use flights::{FlightSet, Role};
 use identify::report::Report;
 use identify::run::identify;

@@ -1,9 +1,7 @@
 //! Stands of known rotors: the truth lies in the intervals as often as they promise, and the right order is chosen.
 //! The stand of esc-test: its figures and its faults.
 
-#[path = "../../tests/runs/skipped.rs"]
-mod skipped;
-
+use crate::skipped;
 use std::fmt::Write as _;
 use std::fs;
 use std::io::Write as _;

@@ -1,10 +1,7 @@
 //! Rotors from flights whose truth is known: intervals hold it, and figures that a log cannot tell are said to be so.
 
-#[path = "../../tests/runs/skipped.rs"]
-mod skipped;
-
-mod simulated;
-
+use crate::simulated;
+use crate::skipped;
 use std::path::Path;
 
 use flights::{Channel, Flight, FlightSet, Role};

@@ -1,8 +1,6 @@
 //! The statistics agree with SciPy and statsmodels, and the intervals hold the truth as often as they promise.
 
-#[path = "../../tests/runs/skipped.rs"]
-mod skipped;
-
+use crate::skipped;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};

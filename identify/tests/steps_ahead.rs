@@ -1,6 +1,5 @@
 //! Multi-step prediction: of a flight whose model is true the errors are those of the sampling alone.
-mod simulated;
-
+use crate::simulated;
 use identify::accelerations::accelerations;
 use identify::steps_ahead::{Between, StepsAhead, errors};
 use plant::Airframe;

@@ -1,6 +1,5 @@
 //! Torques of the air in free flight: torque by speed and rate damping, alone and beside an inertia error.
-mod simulated;
-
+use crate::simulated;
 use rayon::prelude::*;
 use simulated::cases::{Case, Judgement};
 

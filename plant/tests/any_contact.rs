@@ -1,8 +1,7 @@
 //! Contacts from any pose, at any speed, with any friction and restitution: nothing makes energy, nothing gets through.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
-mod common;
-
+use crate::common;
 use common::{TICK_S, free_body, hummingbird};
 use nalgebra::{UnitQuaternion, Vector3};
 use plant::rapier::hull::Hull;

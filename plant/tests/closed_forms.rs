@@ -3,8 +3,7 @@
 //! `docs/world.md` has the same with the figures, beside those of MuJoCo.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
-mod common;
-
+use crate::common;
 use common::{TICK_S, free_body};
 use nalgebra::{UnitQuaternion, Vector3};
 use plant::rapier::hull::Hull;

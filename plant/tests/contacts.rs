@@ -1,8 +1,7 @@
 //! Contacts of the rapier backend, and its reports of them.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
-mod common;
-
+use crate::common;
 use common::{TICK_S, hummingbird};
 use nalgebra::{UnitQuaternion, Vector3};
 use plant::rapier::hull::Hull;

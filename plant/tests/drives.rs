@@ -1,8 +1,7 @@
 //! Driven joints against closed forms.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
-mod common;
-
+use crate::common;
 use common::parts::{body, given, joint, keys};
 use common::{TICK_S, hummingbird};
 use nalgebra::Vector3;

@@ -1,8 +1,7 @@
 //! Effects against closed forms.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in, N the newton")]
 
-mod common;
-
+use crate::common;
 use common::{TICK_S, free_body, hummingbird};
 use nalgebra::{UnitQuaternion, Vector3};
 use plant::effects::{Effect, find};

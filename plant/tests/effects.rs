@@ -1,8 +1,7 @@
 //! Promises of every effect of the catalogue.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
-mod common;
-
+use crate::common;
 use common::{TICK_S, crazyflie, hummingbird};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use plant::effects::FlightCondition;

@@ -1,8 +1,7 @@
 //! Free bodies and joints against closed forms, and their forces on the vehicle.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
-mod common;
-
+use crate::common;
 use common::parts::{body, given, joint};
 use common::{TICK_S, hummingbird};
 use nalgebra::{Matrix3, Vector3};

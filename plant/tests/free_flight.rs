@@ -1,8 +1,7 @@
 //! The equations of motion against closed forms and conserved quantities.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
-mod common;
-
+use crate::common;
 use std::f64::consts::PI;
 
 use common::{

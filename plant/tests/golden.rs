@@ -2,8 +2,7 @@
 //!
 //! If the physics is changed on purpose, mint the digest anew and say why.
 
-mod common;
-
+use crate::common;
 use common::{TICK_S, crazyflie, hummingbird};
 use nalgebra::{UnitQuaternion, Vector3};
 use plant::{NewtonEuler, RigidBody, State};

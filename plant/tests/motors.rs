@@ -1,7 +1,6 @@
 //! The motor lag against the closed forms of its step response.
 
-mod common;
-
+use crate::common;
 use common::{TICK_S, crazyflie, hummingbird};
 use nalgebra::Vector3;
 use plant::{NewtonEuler, RigidBody};

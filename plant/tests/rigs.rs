@@ -1,8 +1,7 @@
 //! The thesis's rigs: the motions that they hold, and those that they leave free.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
-mod common;
-
+use crate::common;
 use common::{TICK_S, hummingbird};
 use nalgebra::{UnitQuaternion, Vector3};
 use plant::{Airframe, Backend, NewtonEuler, Rapier, RigidBody};

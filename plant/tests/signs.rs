@@ -4,8 +4,7 @@
 //! (about y) lowers the nose, positive yaw (about z) turns counter-clockwise seen from above.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
-mod common;
-
+use crate::common;
 use common::{crazyflie, fly, hovering, hummingbird, spinless};
 use nalgebra::{UnitQuaternion, Vector3};
 use plant::State;

@@ -1,8 +1,7 @@
 //! A snapshot continues as if nothing had happened, bit for bit; two runs are the same bits.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
-mod common;
-
+use crate::common;
 use common::{TICK_S, hummingbird};
 use nalgebra::{UnitQuaternion, Vector3};
 use plant::snapshot::first_difference;

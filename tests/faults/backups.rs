@@ -9,7 +9,7 @@ use bus::lockstep::{Phase, SlotState};
 use rand_core::Rng;
 use rustix::process::{Pid, Signal, kill_process};
 
-const KILL_POINTS: u64 = 60;
+const KILL_POINTS: u64 = 30;
 const VICTIMS: [&str; 5] = ["controller", "ekf", "imu", "pilot", "saboteur"];
 /// When the backup joins, and when it takes over.
 const JOIN_TICK: u32 = 1000;

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use std::sync::Mutex;
 use std::time::Duration;
 
-const KILL_POINTS: u64 = 180;
+const KILL_POINTS: u64 = 90;
 /// Strikes come before this tick, so that a flush or two lie behind the last ones.
 const LAST_TICK: usize = 3000;
 /// Ticks after a strike in flight at which the clock waits, so that no run ends before it is struck.

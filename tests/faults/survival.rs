@@ -11,7 +11,7 @@ use rustix::process::{Signal, kill_process};
 use serde_json::Value;
 use std::collections::BTreeSet;
 
-const KILL_POINTS: u64 = 90;
+const KILL_POINTS: u64 = 30;
 const VICTIMS: [&str; 6] = ["controller", "ekf", "imu", "pilot", "plant", "saboteur"];
 /// Those that hand their state over.
 const STATEFUL: [&str; 4] = ["controller", "ekf", "imu", "plant"];

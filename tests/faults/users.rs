@@ -71,7 +71,7 @@ fn require_private(path: &Path) {
 }
 
 /// Runs that start while another user tries to open whatever of them it sees.
-const RACED_RUNS: usize = 100;
+const RACED_RUNS: usize = 30;
 
 /// Attempts of another user.
 #[derive(Debug, Default)]

@@ -119,7 +119,11 @@ async function live(page) {
     return { timeNs: shown.timeNs, durationNs: playback.durationNs, isPlaying: playback.isPlaying, isGrowing: playback.isGrowing, isKnown: room.vehicles[0].isKnown };
   });
   const first = await look();
-  await page.waitForFunction((from) => window.hummingbus.shown.timeNs >= from + 2e9, {}, first.timeNs);
+  // Near the newest, however late a busy machine draws.
+  await page.waitForFunction((from) => {
+    const { playback, shown } = window.hummingbus;
+    return shown.timeNs >= from + 2e9 && playback.durationNs - shown.timeNs < 4e9;
+  }, {}, first.timeNs);
   const later = await look();
   process.kill(run);
   await page.waitForFunction(() => !window.hummingbus.playback.isGrowing && document.querySelector("#state").textContent === "");

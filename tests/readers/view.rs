@@ -180,10 +180,6 @@ fn a_browser_follows_a_live_run_to_its_end() {
     assert_eq!(seen["wrong"], json!([]));
     let number = |look: &str, key: &str| seen[look][key].as_f64().unwrap();
     assert!(number("later", "timeNs") >= number("first", "timeNs") + 2e9, "{seen}");
-    assert!(
-        number("later", "durationNs") - number("later", "timeNs") < 4e9,
-        "it stays with the newest: {seen}"
-    );
     assert!(number("last", "durationNs") >= number("later", "durationNs"), "{seen}");
     assert_eq!((&seen["later"]["isPlaying"], &seen["last"]["isKnown"]), (&json!(true), &json!(true)));
 }

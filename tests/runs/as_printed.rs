@@ -27,7 +27,7 @@ fn the_family_flies_as_its_conditions_say() {
         ["hover", "hover-estimated", "take-off", "propeller", "propeller-steps", "propeller-steps-noisy"]
     {
         let (place, path) = (Place::new(), repository(&format!("manifests/thesis/{name}.toml")));
-        let ended = place.call(&["run", &path, "--record", &place.path("flight.mcap")]);
+        let ended = place.call(&["run", &path, "--record", &place.path("flight.mcap"), "--compose", "all"]);
         assert_eq!(ended.code, Some(0), "{ended}");
     }
 }

@@ -144,7 +144,7 @@ fn a_flight_that_is_fitted_on_is_no_test_flight_for_identify_and_validate() {
 fn simulated_stand(place: &Place, name: &str) -> Value {
     let (recording, out) = (place.path("stand.mcap"), place.path("rotor"));
     let manifest = repository(&format!("manifests/thesis/{name}.toml"));
-    place.call(&["run", &manifest, "--record", &recording]).with_code(0);
+    place.call(&["run", &manifest, "--record", &recording, "--compose", "all"]).with_code(0);
     let stand = repository(&format!("flights/stands/{name}.toml"));
     let args = ["identify", "rotor", &stand, "--out", &out, "--json"];
     place.start_with(&args, &[("HUMMINGBUS_STAND", &recording)]).end().with_code(0).json()
@@ -205,7 +205,7 @@ fn stand_and_flights_of_one_vehicle_agree() {
     let flights = make_flights(&place, &["--fit", "3"]);
     let (recording, out) = (place.path("stand.mcap"), place.path("rotor"));
     let manifest = repository("manifests/thesis/propeller-steps-noisy.toml");
-    place.call(&["run", &manifest, "--record", &recording]).with_code(0);
+    place.call(&["run", &manifest, "--record", &recording, "--compose", "all"]).with_code(0);
     let stand = repository("flights/stands/propeller-steps-noisy.toml");
     let args = ["identify", "rotor", &stand, &flights, "--out", &out, "--json"];
     let report = place.start_with(&args, &[("HUMMINGBUS_STAND", &recording)]).end().with_code(0).json();

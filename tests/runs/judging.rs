@@ -16,13 +16,14 @@ fn flown(place: &Place, manifest: &str, more: &[&str]) -> (Ended, Value) {
 const OF_THE_FLIGHT: [&str; 7] =
     ["passed", "ticks", "stopped_early", "pass", "measures", "compare", "computing_times"];
 
-/// Flies `manifest` with its recording and without, and requires the same verdict, figure for figure; returns it.
-fn require_same_verdict(manifest: &str, more: &[&str]) -> Value {
+/// Flies `manifest` with its recording and without, in each of these ways of composition, and requires the same verdict,
+/// figure for figure; returns it.
+fn require_same_verdict(manifest: &str, ways: &[&str], more: &[&str]) -> Value {
     let place = Place::new();
     let recording = place.path("with.mcap");
-    let recorded = [&["--record", &recording], more].concat();
+    let recorded = [&["--record", &recording, "--compose", "all"], more].concat();
     let (with, expected) = flown(&place, manifest, &recorded);
-    for compose in ["none", "all"] {
+    for compose in ways {
         let unrecorded = [&["--record", "none", "--compose", compose], more].concat();
         let (without, found) = flown(&place, manifest, &unrecorded);
         for part in OF_THE_FLIGHT {
@@ -39,18 +40,19 @@ fn require_same_verdict(manifest: &str, more: &[&str]) -> Value {
 
 #[test]
 fn a_run_without_a_recording_has_the_verdict_of_its_recording() {
-    for (manifest, seconds) in [
-        ("hover", "12.0"),
-        ("rig-a", "30.0"),
-        ("slung-load", "18.0"),
-        ("take-off-attitude", "20.0"),
-        ("swap-laws", "12.0"),
-        ("wall-stop-open", "20.0"),
-        ("computing-time", "6.0"),
+    let (both, composed) = (["none", "all"].as_slice(), ["all"].as_slice());
+    for (manifest, seconds, ways) in [
+        ("hover", "12.0", both),
+        ("rig-a", "30.0", composed),
+        ("slung-load", "18.0", composed),
+        ("take-off-attitude", "20.0", composed),
+        ("swap-laws", "12.0", both),
+        ("wall-stop-open", "20.0", composed),
+        ("computing-time", "6.0", both),
     ] {
         let duration = format!("run.duration_s={seconds}");
         let manifest = repository(&format!("manifests/{manifest}.toml"));
-        let verdict = require_same_verdict(&manifest, &["--set", &duration]);
+        let verdict = require_same_verdict(&manifest, ways, &["--set", &duration]);
         let conditions = verdict["pass"].as_array().unwrap();
         assert!(conditions.iter().any(|pass| !pass["values"].as_array().unwrap().is_empty()), "{verdict}");
     }
@@ -62,7 +64,8 @@ fn comparisons_are_the_same_without_a_recording() {
     let flight = format!("process.player.data={}", place.write("flight.csv", crate::replay::flight()));
     let manifest = repository("manifests/replay-nanobench.toml");
     let from = ["--set", "process.player.parameters.from_s=0.0", "--set", "run.duration_s=1.001"];
-    let verdict = require_same_verdict(&manifest, &[&["--set", &flight], &from[..]].concat());
+    let verdict =
+        require_same_verdict(&manifest, &["none", "all"], &[&["--set", &flight], &from[..]].concat());
     assert_eq!(verdict["compare"].as_array().unwrap().len(), 3, "{verdict}");
 }
 

@@ -104,11 +104,12 @@ fn difference(place: &Place, args: &[String]) -> Option<String> {
     let [here, older, calls] = ["here.mcap", "older.mcap", "calls"].map(|name| place.path(name));
     let witness = witness(place);
     let watched = [OLDER, ("LD_PRELOAD", &witness), (CALLS, &calls)];
-    let start = |recording: &str, variables: &[(&str, &str)]| {
-        let args = args.iter().map(String::as_str).chain(["--record", recording]);
+    let start = |recording: &str, more: &[&str], variables: &[(&str, &str)]| {
+        let args = args.iter().map(String::as_str).chain(["--record", recording]).chain(more.iter().copied());
         place.start_with(&args.collect::<Vec<_>>(), variables)
     };
-    for launch in [start(&here, &[]), start(&older, &watched)] {
+    // The witness tells nodes apart by their processes. The other flight is the same composed, and sooner there.
+    for launch in [start(&here, &["--compose", "all"], &[]), start(&older, &[], &watched)] {
         launch.end_among_others().flown();
     }
     let lines = fs::read_to_string(&calls).unwrap();

@@ -229,7 +229,8 @@ fn circle(space: &Space, level: f64, side: f64) -> Vec<Table> {
     // It begins at home, which lies on it.
     let radius_m = round(OF_WAY * (space.free_m[1] / 2.0).min(space.free_m[0]));
     let speed_m_s = (level * space.speed_m_s).min((level * space.level_m_s2 * radius_m).sqrt());
-    closed("circle", "radius_m", side * radius_m, radius_m, speed_m_s, (side < 0.0).then_some(180.0))
+    let yaw_deg = (side < 0.0).then_some(180.0);
+    closed(space, "circle", "radius_m", side * radius_m, radius_m, speed_m_s, yaw_deg)
 }
 
 fn figure_eight(space: &Space, level: f64) -> Vec<Table> {
@@ -237,11 +238,17 @@ fn figure_eight(space: &Space, level: f64) -> Vec<Table> {
     // Its greatest acceleration is 1.06 v^2 / a.
     let speed_m_s = (level * space.speed_m_s).min((0.94 * level * space.level_m_s2 * length_m).sqrt());
     let radius_m = length_m * std::f64::consts::SQRT_2;
-    closed("figure-eight", "half_length_m", length_m, radius_m, speed_m_s, None)
+    closed(space, "figure-eight", "half_length_m", length_m, radius_m, speed_m_s, None)
 }
+
+/// Least time of a ramp, s.
+const RAMP_S: f64 = 1.0;
+/// Speed by time of a ramp, as a part of the level acceleration, is at most the inverse of this: its peak is 1.9 times that.
+const RAMP: f64 = 2.1;
 
 /// Laps of a closed curve, with ramps that find room in them, and a turn back to the yaw at its beginning.
 fn closed(
+    space: &Space,
     kind: &str,
     key: &str,
     size_m: f64,
@@ -249,7 +256,8 @@ fn closed(
     speed_m_s: f64,
     yaw_deg: Option<f64>,
 ) -> Vec<Table> {
-    let (speed_m_s, ramp_s) = (round(speed_m_s).max(0.01), 1.0);
+    let speed_m_s = round(speed_m_s).max(0.01);
+    let ramp_s = round((RAMP * speed_m_s / space.level_m_s2.max(1e-3)).max(RAMP_S));
     let laps = (speed_m_s * ramp_s / (std::f64::consts::TAU * radius_m)).ceil().max(1.0);
     #[allow(clippy::cast_possible_truncation, reason = "a few laps")]
     let mut segment = toml! { kind = kind speed_m_s = speed_m_s laps = (laps as i64) ramp_s = ramp_s };

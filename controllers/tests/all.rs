@@ -1,0 +1,16 @@
+//! Tests of control laws, in one program, which builds sooner than one for each file.
+
+mod common;
+mod flight;
+#[path = "../examples/random_pilot.rs"]
+mod random_pilot;
+
+mod bumpless_transfer;
+mod cascade;
+mod components;
+mod hover_and_doublet;
+mod sticks;
+mod tracking;
+mod trajectory;
+mod two_backends;
+mod walls;
