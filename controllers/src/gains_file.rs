@@ -84,7 +84,7 @@ pub(crate) fn load<G>(files: &InputFiles, path: &Path, read: Reader<G>) -> Resul
     let text = files.text(path);
     let unreadable = |cause| Diagnostic::unreadable(&file, &cause);
     let gains = text.map_err(unreadable).and_then(|text| parse(&text, &file, read));
-    gains.map_err(|error| ParameterError::conflict("gains", error))
+    gains.map_err(|error| ParameterError::file("gains", &error))
 }
 
 /// The gains in `text`; `file_name` is for messages only.
@@ -166,25 +166,25 @@ impl Table<'_, '_> {
         &self,
         key: &'static str,
         of: Dimension,
-        check: impl FnOnce(Quantity, &Document<'_>) -> Result<Quantity, Diagnostic>,
+        check: impl for<'q, 't> FnOnce(Quantity<'q, 't>) -> Result<Quantity<'q, 't>, Diagnostic>,
     ) -> f64 {
         let (table, name) = match key.rsplit_once('.') {
             Some((path, name)) => (self.table(path), name),
             None => (self.clone(), key),
         };
         let Some(section) = table.section else { return f64::NAN };
-        let read = section.chosen(name, of).and_then(|number| check(number, section.doc));
+        let read = section.chosen(name, of).and_then(check);
         self.opened.keep(read).map_or(f64::NAN, |number| number.si)
     }
 
     /// A gain: zero or more, since a negative one turns a loop against itself.
     pub(crate) fn gain(&self, key: &'static str, of: Dimension) -> f64 {
-        self.number(key, of, |number, doc| number.not_negative(doc)?.within(doc, &GAIN))
+        self.number(key, of, |number| number.not_negative()?.within(&GAIN))
     }
 
     /// A limit or a time: more than zero.
     pub(crate) fn limit(&self, key: &'static str, of: Dimension) -> f64 {
-        self.number(key, of, |number, doc| number.positive(doc)?.within(doc, &LIMIT))
+        self.number(key, of, |number| number.positive()?.within(&LIMIT))
     }
 
     /// A limit that is more than zero and less than `bound`, which `expected` describes.
@@ -200,10 +200,10 @@ impl Table<'_, '_> {
         fits: impl Fn(f64) -> bool,
         expected: &str,
     ) -> f64 {
-        self.number(key, of, |number, doc| {
-            let number = number.positive(doc)?.within(doc, &LIMIT)?;
+        self.number(key, of, |number| {
+            let number = number.positive()?.within(&LIMIT)?;
             let holds = fits(number.si);
-            number.require(doc, holds, expected)
+            number.require(holds, expected)
         })
     }
 

@@ -17,7 +17,7 @@ use std::io;
 /// assert_eq!(error.key(), "body.mass_kg");
 /// assert_eq!(
 ///     error.to_string(),
-///     "a.toml:2:11: `body.mass_kg` must be a number above 0, found -1\n  help: correct this value"
+///     "a.toml:2:11: `body.mass_kg` must be a number above 0, found -1"
 /// );
 ///
 /// // All errors of a file at once.
@@ -32,7 +32,6 @@ use std::io;
 ///   |
 /// 2 | mass_kg = -1
 ///   |           ^^
-///   help: correct this value
 /// a.toml: no rotors
 ///   help: add [[rotors]]"
 /// );
@@ -164,13 +163,12 @@ impl Serialize for Diagnostic {
 /// `file:line:column: message`, which editors jump to, then `help:`; with `{:#}` the line of the file between them.
 impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match &self.place {
-            Some(place) => write!(f, "{place}: {}", self.error)?,
-            None if self.file.is_empty() => write!(f, "{}", self.error)?,
-            None => write!(f, "{}: {}", self.file, self.error)?,
-        }
-        if let (Some(place), true) = (&self.place, f.alternate()) {
-            write!(f, "\n{place:#}")?;
+        match (&self.error, &self.place) {
+            (ParameterError::File { shown, who, .. }, Some(place)) if f.alternate() => {
+                let by = if who.is_empty() { String::new() } else { format!(" by {who}") };
+                write!(f, "{shown}\n  named in {place}{by}")?;
+            }
+            _ => self.write_head(f)?,
         }
         if !self.help.is_empty() {
             write!(f, "\n  help: {}", self.help)?;
@@ -180,6 +178,21 @@ impl fmt::Display for Diagnostic {
             other.fmt(f)?;
         }
         Ok(())
+    }
+}
+
+impl Diagnostic {
+    /// Place and message, for terminals with the line.
+    fn write_head(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.place {
+            Some(place) => write!(f, "{place}: {}", self.error)?,
+            None if self.file.is_empty() => write!(f, "{}", self.error)?,
+            None => write!(f, "{}: {}", self.file, self.error)?,
+        }
+        match (&self.place, f.alternate()) {
+            (Some(place), true) => write!(f, "\n{place:#}"),
+            _ => Ok(()),
+        }
     }
 }
 

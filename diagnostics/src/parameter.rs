@@ -48,6 +48,18 @@ pub enum ParameterError {
         /// Contradiction, and advice.
         message: String,
     },
+    /// A file that the parameter names, with the faults in it.
+    #[error("{message}")]
+    File {
+        /// The dotted key.
+        key: String,
+        /// The faults, with their places in that file.
+        message: String,
+        /// The same for terminals, with the lines of that file.
+        shown: String,
+        /// The component that has the parameter; empty where that is not known.
+        who: String,
+    },
 }
 
 impl ParameterError {
@@ -75,27 +87,61 @@ impl ParameterError {
         Self::Conflict { key: key.into(), message: message.to_string() }
     }
 
+    /// Creates the error for a file that `key` names; `fault` is written with the lines of the file where it is asked for
+    /// its alternate form.
+    ///
+    /// ```
+    /// use diagnostics::{Diagnostic, ParameterError, Place};
+    ///
+    /// let fault = Diagnostic::at(Place::of("bird.toml", "mass = -1\n", &(7..9)), "it is negative");
+    /// let named = ParameterError::file("vehicle", &fault).of("process `plant`");
+    /// let place = Place::of("hover.toml", "vehicle = 'bird.toml'\n", &(10..21));
+    /// let error = Diagnostic::at(place, named);
+    /// assert_eq!(error.to_string(), "hover.toml:1:11: process `plant`: bird.toml:1:8: it is negative");
+    /// // For terminals: the line that is wrong, once.
+    /// let shown = format!("{error:#}");
+    /// assert!(shown.starts_with("bird.toml:1:8: it is negative\n  |\n1 | mass = -1\n"));
+    /// assert!(shown.ends_with("\n  named in hover.toml:1:11 by process `plant`"));
+    /// ```
+    #[must_use]
+    pub fn file(key: impl Into<String>, fault: &impl Display) -> Self {
+        let (message, shown) = (fault.to_string(), format!("{fault:#}"));
+        Self::File { key: key.into(), message, shown, who: String::new() }
+    }
+
+    /// The same of the component `who`.
+    #[must_use]
+    pub fn of(self, who: impl Into<String>) -> Self {
+        let who = who.into();
+        match self {
+            Self::File { key, message, shown, .. } => {
+                Self::File { message: format!("{who}: {message}"), key, shown, who }
+            }
+            error => Self::conflict(error.key(), format!("{who}: {error}")),
+        }
+    }
+
     /// The dotted key that is to blame; empty where none is in particular.
     #[must_use]
     pub fn key(&self) -> &str {
         let (Self::Value { key, .. }
         | Self::Missing { key, .. }
         | Self::Unknown { key, .. }
+        | Self::File { key, .. }
         | Self::Conflict { key, .. }) = self;
         key
     }
 
-    /// Returns advice; empty for a conflict, which has it in its message.
+    /// Returns advice; empty where the message says what to do.
     #[must_use]
     pub fn help(&self) -> String {
         match self {
-            Self::Value { .. } => "correct this value".to_owned(),
             Self::Missing { .. } => "add it to this table".to_owned(),
             Self::Unknown { .. } => match self.meant() {
                 Some(known) => format!("did you mean `{known}`?"),
                 None => "remove it, or correct its spelling".to_owned(),
             },
-            Self::Conflict { .. } => String::new(),
+            Self::Value { .. } | Self::File { .. } | Self::Conflict { .. } => String::new(),
         }
     }
 
@@ -127,6 +173,7 @@ impl ParameterError {
         let (Self::Value { key, .. }
         | Self::Missing { key, .. }
         | Self::Unknown { key, .. }
+        | Self::File { key, .. }
         | Self::Conflict { key, .. }) = &mut self;
         let told = format!("`{key}`: ");
         *key = if key.is_empty() { table.to_owned() } else { format!("{table}.{key}") };

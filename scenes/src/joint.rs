@@ -219,9 +219,9 @@ fn refuse_pair(section: &Section, parent: End, child: End) -> Result<(), Diagnos
     Ok(())
 }
 
-fn axis<'t>(
-    section: &Section<'_, 't>,
-    limit: impl Fn(&'static str) -> Result<Quantity, Diagnostic>,
+fn axis<'d, 't>(
+    section: &Section<'d, 't>,
+    limit: impl Fn(&'static str) -> Result<Quantity<'d, 't>, Diagnostic>,
     bounds: &Bounds,
 ) -> Result<Axis, Diagnostic> {
     let unit = Bounds { min: -1e6, max: 1e6, unit: "1", why: "a direction: its length does not matter" };
@@ -229,7 +229,7 @@ fn axis<'t>(
     let along_W =
         along_W.try_normalize(1e-6).ok_or_else(|| refused(section, "axis", "a direction", "three zeros"))?;
     let stop = |name, otherwise: f64| match section.has(name) {
-        true => Ok(limit(name)?.within(section.doc, bounds)?.si),
+        true => Ok(limit(name)?.within(bounds)?.si),
         false => Ok(otherwise),
     };
     let limits = [stop("lower", f64::NEG_INFINITY)?, stop("upper", f64::INFINITY)?];

@@ -76,7 +76,7 @@ pub(crate) fn parse(section: &Section) -> Result<Rig, Diagnostic> {
     let tilt_max = || {
         let tilt = section.quantity("tilt_max", ANGLE)?;
         let holds = tilt.si > 0.0 && tilt.si < std::f64::consts::PI;
-        tilt.require(section.doc, holds, "an angle above 0 and below 180 deg")
+        tilt.require(holds, "an angle above 0 and below 180 deg")
     };
     let rig = Rig {
         bearing_W_m: section.vector("bearing", LENGTH, &PLACE)?.into(),

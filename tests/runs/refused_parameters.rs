@@ -153,11 +153,9 @@ fn a_vehicle_with_a_number_that_none_has_is_refused_with_its_file_line_and_key()
         let place = Place::new();
         let (manifest, vehicle) = with_vehicle(&place, from, to);
         let number = if found == "1e308" { "1.047" } else { found };
-        refused_args(&["run", &manifest], &manifest).says(&[
-            &format!("{vehicle}:"),
-            &format!("`{key}"),
-            number,
-        ]);
+        // The line of the vehicle file, and the manifest that names it.
+        let ended = refused_args(&["run", &manifest], &vehicle);
+        ended.says(&[&format!("`{key}"), number, &format!("named in {manifest}:"), "by process `"]);
     }
 }
 

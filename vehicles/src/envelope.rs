@@ -63,11 +63,10 @@ pub(crate) fn read(root: &Section) -> Result<Option<Envelope>, Diagnostic> {
         if section.has(key) {
             let quantity = section.quantity(key, dimension)?;
             // Heights may lie below the origin of the world.
-            let quantity =
-                if key.starts_with("height") { quantity } else { quantity.positive(section.doc)? };
+            let quantity = if key.starts_with("height") { quantity } else { quantity.positive()? };
             let is_above = envelope.height_min_m.is_none_or(|low| key != "height_max" || quantity.si > low);
             *number(&mut envelope) =
-                Some(quantity.require(section.doc, is_above, "a height above `envelope.height_min`")?.si);
+                Some(quantity.require(is_above, "a height above `envelope.height_min`")?.si);
         }
     }
     section.finish()?;

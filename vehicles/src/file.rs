@@ -9,7 +9,7 @@ use crate::command::CommandMap;
 use crate::effects;
 use crate::envelope;
 use crate::foreign;
-use crate::provenance::{Provenance, Uncertainty};
+use crate::provenance::Uncertainty;
 use crate::reader::{Document, Quantity, Section};
 use crate::vehicle::{MotorModel, ROTORS_MAX, Rotor, Vehicle};
 use diagnostics::unit::{
@@ -17,6 +17,7 @@ use diagnostics::unit::{
 };
 use diagnostics::{Diagnostic, Faults};
 use inputs::InputFiles;
+use toml::de::DeTable;
 
 /// Part of its size by which a published tensor may miss the triangle inequality through rounding.
 const TRIANGLE_SLACK: f64 = 1e-9;
@@ -42,8 +43,8 @@ impl Vehicle {
 
     /// Reads and checks the text of a vehicle file, whose layout `vehicles/hummingbird.toml` shows; `file_name` is for
     /// messages, and the path of its `base` is relative to it. A file with a `base` has that file's vehicle, and its effects
-    /// before its own; a table `[body]`, `[rotor]`, `[motor]`, `[command]` or the `[[rotors]]` of the file replace those of
-    /// its base whole.
+    /// before its own; keys of its tables `[body]`, `[rotor]`, `[motor]` and `[command]` replace those of its base, and its
+    /// `[[rotors]]` all those of its base.
     pub fn parse(text: &str, file_name: &str) -> Result<Self, Diagnostic> {
         Self::parse_with(text, file_name, &|path| InputFiles::default().text(path))
     }
@@ -71,9 +72,9 @@ impl Vehicle {
         let tree = doc.tree()?;
         let root = Section::new(&doc, String::new(), 0..0, tree.get_ref());
         if root.has("base") {
-            return on_base(&root, &beside(Path::new(file_name), root.text("base")?), read);
+            return on_base(&doc, tree.get_ref(), &beside(Path::new(file_name), root.text("base")?), read);
         }
-        complete(&doc, &root)
+        complete(&root, None)
     }
 
     /// The file that the vehicle file at `path` adds effects to, or replaces tables of, if it names one.
@@ -109,19 +110,16 @@ fn beside(path: &Path, other: &str) -> PathBuf {
 }
 
 fn on_base(
-    root: &Section,
+    upper: &Document,
+    table: &DeTable,
     path: &Path,
     read: &dyn Fn(&Path) -> io::Result<String>,
 ) -> Result<Vehicle, Diagnostic> {
-    let (name, file) = (title(root)?, path.display().to_string());
-    let more = effects::read(root)?;
-    let tables = Tables::read(root)?;
-    // That of the base is of another model.
-    let envelope = envelope::read(root)?;
-    root.finish()?;
+    let file = path.display().to_string();
+    let root = Section::new(upper, String::new(), 0..0, table);
     let text = read(path).map_err(|cause| {
         let expected = "the path of a vehicle file, relative to this one";
-        root.doc.bad(&root.at_of("base"), "base", expected, format!("{file}: {cause}"))
+        upper.bad(&root.at_of("base"), "base", expected, format!("{file}: {cause}"))
     })?;
     let doc = Document::new(&file, &text);
     let tree = doc.tree()?;
@@ -131,56 +129,25 @@ fn on_base(
         let expected = "a complete vehicle file as a base";
         return Err(doc.bad(&lower.at_of("base"), "base", expected, "one that has a base itself"));
     }
-    let base = complete(&doc, &lower)?;
-    let effects = [base.effects.clone(), more].concat();
-    Ok(tables.replacing(Vehicle { name, effects, envelope, ..base }, root.doc.provenance.take()))
+    root.text("base")?;
+    // Alone first: what is wrong in it is not that of this file.
+    let base = complete(&lower, None)?;
+    let vehicle = complete(&root, Some(&lower))?;
+    let effects = [base.effects, vehicle.effects].concat();
+    let provenance = [doc.provenance.take(), vehicle.provenance].concat();
+    Ok(Vehicle { effects, provenance, ..vehicle })
 }
 
-/// The tables that a file on a base has of its own.
-struct Tables {
-    body: Option<(f64, Matrix3<f64>, f64)>,
-    rotor: Option<[f64; 3]>,
-    rotors: Option<Vec<Rotor>>,
-    motor: Option<MotorModel>,
-    command: Option<CommandMap>,
-}
-
-impl Tables {
-    fn read(root: &Section) -> Result<Self, Diagnostic> {
-        let table = |name: &'static str| root.has(name).then(|| root.section(name)).transpose();
-        Ok(Self {
-            body: table("body")?.map(|of| body(&of)).transpose()?,
-            rotor: table("rotor")?.map(|of| rotor(&of)).transpose()?,
-            rotors: root.has("rotors").then(|| layout(root)).transpose()?,
-            motor: table("motor")?.map(|of| motor(&of)).transpose()?,
-            command: table("command")?.map(|of| command(&of)).transpose()?,
-        })
-    }
-
-    /// The vehicle `base` with these tables, whose numbers come from `sources`.
-    fn replacing(self, mut base: Vehicle, sources: Vec<Provenance>) -> Vehicle {
-        let table = |number: &Provenance| number.key.split('.').next().map(str::to_owned);
-        base.provenance.retain(|lower| sources.iter().all(|upper| table(upper) != table(lower)));
-        base.provenance.extend(sources);
-        let (mass_kg, inertia_kg_m2, gravity_m_s2) =
-            self.body.unwrap_or((base.mass_kg, base.inertia_kg_m2, base.gravity_m_s2));
-        let [thrust_coefficient, torque_coefficient, rotor_inertia_kg_m2] = self.rotor.unwrap_or([
-            base.thrust_coefficient,
-            base.torque_coefficient,
-            base.rotor_inertia_kg_m2,
-        ]);
-        Vehicle {
-            mass_kg,
-            inertia_kg_m2,
-            gravity_m_s2,
-            thrust_coefficient,
-            torque_coefficient,
-            rotor_inertia_kg_m2,
-            rotors: self.rotors.unwrap_or(base.rotors),
-            motor: self.motor.unwrap_or(base.motor),
-            command: self.command.unwrap_or(base.command),
-            ..base
-        }
+/// The table `name` of the file, on top of that of its base.
+fn table<'d, 't>(
+    root: &Section<'d, 't>,
+    lower: Option<&Section<'d, 't>>,
+    name: &'static str,
+) -> Result<Section<'d, 't>, Diagnostic> {
+    match (lower, root.has(name)) {
+        (Some(lower), true) => Ok(root.section(name)?.above(lower.section(name)?)),
+        (Some(lower), false) => lower.section(name),
+        (None, _) => root.section(name),
     }
 }
 
@@ -191,14 +158,15 @@ fn title(root: &Section) -> Result<String, Diagnostic> {
     Ok(root.text("name")?.to_owned())
 }
 
-fn complete(doc: &Document, root: &Section) -> Result<Vehicle, Diagnostic> {
+/// The vehicle of a file; what its tables have not is that of its base.
+fn complete<'d, 't>(root: &Section<'d, 't>, lower: Option<&Section<'d, 't>>) -> Result<Vehicle, Diagnostic> {
     let mut faults = Faults::default();
     let name = faults.keep(title(root));
-    let body = faults.keep(root.section("body").and_then(|section| body(&section)));
-    let rotor = faults.keep(root.section("rotor").and_then(|section| rotor(&section)));
-    let rotors = faults.keep(layout(root));
-    let motor = faults.keep(root.section("motor").and_then(|section| motor(&section)));
-    let command = faults.keep(root.section("command").and_then(|section| command(&section)));
+    let body = faults.keep(table(root, lower, "body").and_then(|section| body(&section)));
+    let rotor = faults.keep(table(root, lower, "rotor").and_then(|section| rotor(&section)));
+    let rotors = faults.keep(layout(if root.has("rotors") { root } else { lower.unwrap_or(root) }));
+    let motor = faults.keep(table(root, lower, "motor").and_then(|section| motor(&section)));
+    let command = faults.keep(table(root, lower, "command").and_then(|section| command(&section)));
     let effects = faults.keep(effects::read(root));
     let envelope = faults.keep(envelope::read(root));
     faults.keep(root.finish());
@@ -218,28 +186,29 @@ fn complete(doc: &Document, root: &Section) -> Result<Vehicle, Diagnostic> {
             command: command?,
             effects: effects?,
             envelope: envelope?,
-            provenance: doc.provenance.take(),
+            provenance: root.doc.provenance.take(),
         })
     })();
     faults.finish(vehicle)
 }
 
 fn body(section: &Section) -> Result<(f64, Matrix3<f64>, f64), Diagnostic> {
-    let mass = section.quantity("mass", MASS)?.positive(section.doc)?.within(section.doc, &bounds::MASS)?;
-    let gravity_m_s2 = section.bounded("gravity", ACCELERATION, &bounds::GRAVITY)?;
-    let inertia = inertia(section)?;
-    section.finish()?;
-    Ok((mass.si, inertia, gravity_m_s2))
+    // All keys are asked for before the first fault is told: a misspelt one is told beside the one that it should be.
+    let mut faults = Faults::default();
+    let mass = section.quantity("mass", MASS).and_then(|mass| mass.positive()?.within(&bounds::MASS));
+    let mass = faults.keep(mass);
+    let gravity_m_s2 = faults.keep(section.bounded("gravity", ACCELERATION, &bounds::GRAVITY));
+    let inertia = faults.keep(inertia(section));
+    faults.keep(section.finish());
+    faults.finish((|| Some((mass?.si, inertia?, gravity_m_s2?)))())
 }
 
 /// The symmetric tensor J; `inertia_xy` and so on are the entries J_xy themselves, not their negatives.
 fn inertia(section: &Section) -> Result<Matrix3<f64>, Diagnostic> {
-    let xx = moment(section, "inertia_xx")?;
-    let yy = moment(section, "inertia_yy")?;
-    let zz = moment(section, "inertia_zz")?;
-    let xy = product(section, "inertia_xy")?;
-    let xz = product(section, "inertia_xz")?;
-    let yz = product(section, "inertia_yz")?;
+    let moments = ["inertia_xx", "inertia_yy", "inertia_zz"].map(|name| moment(section, name));
+    let products = ["inertia_xy", "inertia_xz", "inertia_yz"].map(|name| product(section, name));
+    let ([xx, yy, zz], [xy, xz, yz]) = (moments, products);
+    let (xx, yy, zz, xy, xz, yz) = (xx?, yy?, zz?, xy?, xz?, yz?);
     let tensor = Matrix3::new(xx.si, xy, xz, xy, yy.si, yz, xz, yz, zz.si);
     let moments = principal_moments(&tensor);
     if is_physical(&moments) {
@@ -247,11 +216,11 @@ fn inertia(section: &Section) -> Result<Matrix3<f64>, Diagnostic> {
     }
     let found = format!("{:.4e}, {:.4e}, {:.4e} kg*m^2", moments[0], moments[1], moments[2]);
     let expected = "a tensor whose principal moments are above 0, none larger than the sum of the other two";
-    Err(section.doc.bad(&xx.at, &section.key("inertia_xx, inertia_yy, inertia_zz"), expected, found))
+    Err(xx.doc.bad(&xx.at, &section.key("inertia_xx, inertia_yy, inertia_zz"), expected, found))
 }
 
-fn moment(section: &Section, name: &'static str) -> Result<Quantity, Diagnostic> {
-    section.quantity(name, INERTIA)?.positive(section.doc)?.within(section.doc, &bounds::INERTIA)
+fn moment<'d, 't>(section: &Section<'d, 't>, name: &'static str) -> Result<Quantity<'d, 't>, Diagnostic> {
+    section.quantity(name, INERTIA)?.positive()?.within(&bounds::INERTIA)
 }
 
 fn product(section: &Section, name: &'static str) -> Result<f64, Diagnostic> {
@@ -276,13 +245,15 @@ fn principal_moments(tensor: &Matrix3<f64>) -> Vector3<f64> {
 }
 
 fn rotor(section: &Section) -> Result<[f64; 3], Diagnostic> {
-    let numbers = [
-        section.bounded("thrust_coefficient", THRUST_COEFFICIENT, &bounds::THRUST_COEFFICIENT)?,
-        section.bounded("torque_coefficient", TORQUE_COEFFICIENT, &bounds::TORQUE_COEFFICIENT)?,
-        section.bounded("inertia", INERTIA, &bounds::ROTOR_INERTIA)?,
-    ];
-    section.finish()?;
-    Ok(numbers)
+    let mut faults = Faults::default();
+    let [thrust, torque, inertia] = [
+        section.bounded("thrust_coefficient", THRUST_COEFFICIENT, &bounds::THRUST_COEFFICIENT),
+        section.bounded("torque_coefficient", TORQUE_COEFFICIENT, &bounds::TORQUE_COEFFICIENT),
+        section.bounded("inertia", INERTIA, &bounds::ROTOR_INERTIA),
+    ]
+    .map(|number| faults.keep(number));
+    faults.keep(section.finish());
+    faults.finish((|| Some([thrust?, torque?, inertia?]))())
 }
 
 fn layout(root: &Section) -> Result<Vec<Rotor>, Diagnostic> {
@@ -348,16 +319,23 @@ fn motor(section: &Section) -> Result<MotorModel, Diagnostic> {
 }
 
 fn command(section: &Section) -> Result<CommandMap, Diagnostic> {
-    let doc = section.doc;
-    let min = section.quantity("min", PURE_NUMBER)?.within(doc, &bounds::COMMAND)?;
-    let max = section.quantity("max", PURE_NUMBER)?.within(doc, &bounds::COMMAND)?;
-    let low = section.quantity("speed_at_min", SPEED)?.within(doc, &bounds::ROTOR_SPEED)?;
-    let high = section.quantity("speed_at_max", SPEED)?.within(doc, &bounds::ROTOR_SPEED)?;
+    let mut faults = Faults::default();
+    let [min, max, low, high] = [
+        ("min", PURE_NUMBER, &bounds::COMMAND),
+        ("max", PURE_NUMBER, &bounds::COMMAND),
+        ("speed_at_min", SPEED, &bounds::ROTOR_SPEED),
+        ("speed_at_max", SPEED, &bounds::ROTOR_SPEED),
+    ]
+    .map(|(name, dimension, bounds)| {
+        faults.keep(section.quantity(name, dimension).and_then(|number| number.within(bounds)))
+    });
+    let zero_is_off = section.has("zero_is_off");
+    faults.keep(section.finish());
+    let (min, max, low, high) = faults.finish((|| Some((min?, max?, low?, high?)))())?;
     let (above_min, above_low) = (max.si > min.si, high.si > low.si);
-    let max = max.require(doc, above_min, "a command above `command.min`")?;
-    let high = high.require(doc, above_low, "a speed above `command.speed_at_min`")?;
-    let zero_is_off = section.has("zero_is_off") && told(&section.section("zero_is_off")?)?;
-    section.finish()?;
+    let max = max.require(above_min, "a command above `command.min`")?;
+    let high = high.require(above_low, "a speed above `command.speed_at_min`")?;
+    let zero_is_off = zero_is_off && told(&section.section("zero_is_off")?)?;
     Ok(CommandMap {
         min: min.si,
         max: max.si,

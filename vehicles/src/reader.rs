@@ -48,9 +48,11 @@ impl<'t> Document<'t> {
     }
 }
 
-/// A number in SI, and where it stands in the file.
-#[derive(Debug, Clone)]
-pub struct Quantity {
+/// A number in SI, and where it stands in its file.
+#[derive(Clone)]
+pub struct Quantity<'d, 't> {
+    /// The file.
+    pub doc: &'d Document<'t>,
     /// The number, in SI.
     pub si: f64,
     /// The whole dotted key.
@@ -60,39 +62,35 @@ pub struct Quantity {
     unit: &'static str,
 }
 
-impl Quantity {
+impl Quantity<'_, '_> {
     /// Refuses the number unless `holds`.
-    pub fn require(self, doc: &Document, holds: bool, expected: &str) -> Result<Self, Diagnostic> {
+    pub fn require(self, holds: bool, expected: &str) -> Result<Self, Diagnostic> {
         if holds {
             Ok(self)
         } else {
-            Err(doc.bad(&self.at, &self.key, expected, format!("{} {}", self.si, self.unit)))
+            Err(self.doc.bad(&self.at, &self.key, expected, format!("{} {}", self.si, self.unit)))
         }
     }
 
     /// Refuses zero and less.
-    pub fn positive(self, doc: &Document) -> Result<Self, Diagnostic> {
-        self.pass(doc, positive)
+    pub fn positive(self) -> Result<Self, Diagnostic> {
+        self.pass(positive)
     }
 
     /// Refuses a number outside of `bounds`.
-    pub fn within(self, doc: &Document, bounds: &Bounds) -> Result<Self, Diagnostic> {
-        self.pass(doc, |key, si| bounds.check(key, si))
+    pub fn within(self, bounds: &Bounds) -> Result<Self, Diagnostic> {
+        self.pass(|key, si| bounds.check(key, si))
     }
 
     /// Refuses less than zero.
-    pub fn not_negative(self, doc: &Document) -> Result<Self, Diagnostic> {
-        self.pass(doc, not_negative)
+    pub fn not_negative(self) -> Result<Self, Diagnostic> {
+        self.pass(not_negative)
     }
 
-    fn pass(
-        self,
-        doc: &Document,
-        check: impl Fn(&str, f64) -> Result<(), ParameterError>,
-    ) -> Result<Self, Diagnostic> {
+    fn pass(self, check: impl Fn(&str, f64) -> Result<(), ParameterError>) -> Result<Self, Diagnostic> {
         match check(&self.key, self.si) {
             Ok(()) => Ok(self),
-            Err(error) => Err(Diagnostic::at(doc.place(&self.at), error.in_unit(self.unit))),
+            Err(error) => Err(Diagnostic::at(self.doc.place(&self.at), error.in_unit(self.unit))),
         }
     }
 }
@@ -125,12 +123,26 @@ pub struct Section<'d, 't> {
     pub at: Range<usize>,
     table: &'d DeTable<'t>,
     asked: RefCell<BTreeSet<&'d str>>,
+    /// The table of the base, which has what this one has not.
+    lower: Option<Box<Self>>,
 }
 
 impl<'d, 't> Section<'d, 't> {
     /// The `table` at `path`.
     pub fn new(doc: &'d Document<'t>, path: String, at: Range<usize>, table: &'d DeTable<'t>) -> Self {
-        Section { doc, path, at, table, asked: RefCell::default() }
+        Section { doc, path, at, table, asked: RefCell::default(), lower: None }
+    }
+
+    /// This table on top of that of the base.
+    #[must_use]
+    pub(crate) fn above(self, lower: Self) -> Self {
+        Section { lower: Some(Box::new(lower)), ..self }
+    }
+
+    /// The table that has `name`, if that is the base's.
+    fn inherited(&self, name: &'d str) -> Option<&Self> {
+        let lower = self.lower.as_deref()?;
+        (self.find(name).is_none() && lower.has(name)).then_some(lower)
     }
 
     /// The whole dotted key of `name` in this table.
@@ -151,11 +163,14 @@ impl<'d, 't> Section<'d, 't> {
 
     /// True if the file has `name`.
     pub fn has(&self, name: &'d str) -> bool {
-        self.find(name).is_some()
+        self.find(name).is_some() || self.inherited(name).is_some()
     }
 
     /// A sub-table.
     pub fn section(&self, name: &'d str) -> Result<Section<'d, 't>, Diagnostic> {
+        if let Some(lower) = self.inherited(name) {
+            return lower.section(name);
+        }
         self.as_section(self.key(name), self.need(name, "a table")?, "a table")
     }
 
@@ -193,6 +208,9 @@ impl<'d, 't> Section<'d, 't> {
 
     /// A text, not empty.
     pub fn text(&self, name: &'d str) -> Result<&'d str, Diagnostic> {
+        if let Some(lower) = self.inherited(name) {
+            return lower.text(name);
+        }
         let value = self.need(name, "a text")?;
         match value.get_ref().as_str() {
             Some(text) if !text.trim().is_empty() => Ok(text),
@@ -203,6 +221,9 @@ impl<'d, 't> Section<'d, 't> {
 
     /// A text that has to be one of `choices`; returns the value beside it.
     pub fn choice<T: Copy>(&self, name: &'d str, choices: &[(&str, T)]) -> Result<T, Diagnostic> {
+        if let Some(lower) = self.inherited(name) {
+            return lower.choice(name, choices);
+        }
         let text = self.text(name)?;
         if let Some((_, chosen)) = choices.iter().find(|(name, _)| *name == text) {
             return Ok(*chosen);
@@ -219,27 +240,33 @@ impl<'d, 't> Section<'d, 't> {
     }
 
     /// A parameter: a table with `value`, `unit`, `source` and `uncertainty`; the value in SI.
-    pub fn quantity(&self, name: &'d str, dimension: Dimension) -> Result<Quantity, Diagnostic> {
+    pub fn quantity(&self, name: &'d str, dimension: Dimension) -> Result<Quantity<'d, 't>, Diagnostic> {
         self.number_of(name, dimension, Origin::Known)
     }
 
     /// A parameter within `bounds`, in SI.
     pub fn bounded(&self, name: &'d str, dimension: Dimension, bounds: &Bounds) -> Result<f64, Diagnostic> {
-        Ok(self.quantity(name, dimension)?.within(self.doc, bounds)?.si)
+        Ok(self.quantity(name, dimension)?.within(bounds)?.si)
     }
 
     /// A number that was chosen, such as a gain: as [`Self::quantity`], but it has an `uncertainty` only
     /// if the file has one.
-    pub fn chosen(&self, name: &'d str, dimension: Dimension) -> Result<Quantity, Diagnostic> {
+    pub fn chosen(&self, name: &'d str, dimension: Dimension) -> Result<Quantity<'d, 't>, Diagnostic> {
         self.number_of(name, dimension, Origin::Chosen)
     }
 
-    fn number_of(&self, name: &'d str, dimension: Dimension, origin: Origin) -> Result<Quantity, Diagnostic> {
+    fn number_of(
+        &self,
+        name: &'d str,
+        dimension: Dimension,
+        origin: Origin,
+    ) -> Result<Quantity<'d, 't>, Diagnostic> {
         let parameter = self.parameter(name)?;
         let value = parameter.need("value", "a number")?;
         let si = parameter.number("value", value)? * parameter.meta(dimension, origin)?;
-        let quantity = Quantity { si, key: parameter.path, at: value.span(), unit: dimension.si() };
-        quantity.require(self.doc, si.is_finite(), "a number that is finite in SI")
+        let (doc, at, unit) = (parameter.doc, value.span(), dimension.si());
+        let quantity = Quantity { doc, si, key: parameter.path, at, unit };
+        quantity.require(si.is_finite(), "a number that is finite in SI")
     }
 
     /// A parameter whose value is an array of three numbers, each within `bounds`.
@@ -255,7 +282,7 @@ impl<'d, 't> Section<'d, 't> {
         let factor = parameter.meta(dimension, Origin::Known)?;
         let numbers = numbers.map(|number| number * factor);
         all(|key, si| bounds.check(key, si), &parameter.path, &numbers)
-            .map_err(|error| Diagnostic::at(self.doc.place(&value.span()), error))?;
+            .map_err(|error| Diagnostic::at(parameter.doc.place(&value.span()), error))?;
         Ok(numbers)
     }
 
@@ -269,14 +296,17 @@ impl<'d, 't> Section<'d, 't> {
             unit: parameter.text("unit")?.to_owned(),
             source: parameter.source()?.to_owned(),
             uncertainty: parameter.uncertainty(1.0)?,
-            place: self.doc.place(&value.span()),
-            unit_place: self.doc.place(&parameter.at_of("unit")),
+            place: parameter.doc.place(&value.span()),
+            unit_place: parameter.doc.place(&parameter.at_of("unit")),
         };
         parameter.finish()?;
         Ok(stated)
     }
 
     pub(crate) fn parameter(&self, name: &'d str) -> Result<Section<'d, 't>, Diagnostic> {
+        if let Some(lower) = self.inherited(name) {
+            return lower.parameter(name);
+        }
         let expected = "a table with value, unit, source and uncertainty";
         self.as_section(self.key(name), self.need(name, expected)?, expected)
     }

@@ -248,6 +248,64 @@ fn a_rotors_axis_is_a_direction_upwards_of_any_length() {
     assert!(axis("[nan, 0, 1]").is_err() && axis("[0, 1]").is_err());
 }
 
+/// A vehicle file on the Hummingbird's.
+fn on_hummingbird(tables: &str) -> Result<Vehicle, Diagnostic> {
+    let text = format!("name = \"mine\"\nbase = \"hummingbird.toml\"\n{tables}");
+    Vehicle::parse_with(&text, "mine.toml", &|_| Ok(HUMMINGBIRD.to_owned()))
+}
+
+#[test]
+fn a_file_on_a_base_replaces_single_numbers() {
+    let base = Vehicle::parse(HUMMINGBIRD, "hummingbird.toml").unwrap();
+    let number = |value: &str, unit: &str| {
+        format!("{{ value = {value}, unit = \"{unit}\", source = \"scales\", uncertainty = 0.001 }}")
+    };
+    let tables = format!(
+        "[body]\nmass = {}\n[command]\nspeed_at_max = {}",
+        number("0.6", "kg"),
+        number("9000", "rpm")
+    );
+    let vehicle = on_hummingbird(&tables).unwrap();
+    assert_eq!((vehicle.mass_kg, &*vehicle.name), (0.6, "mine"));
+    assert!((rpm(vehicle.command.speed_at_max_rad_s) - 9000.0).abs() < 1e-9);
+    let command =
+        vehicles::CommandMap { speed_at_max_rad_s: base.command.speed_at_max_rad_s, ..vehicle.command };
+    let (mass_kg, name) = (base.mass_kg, base.name.clone());
+    let provenance = base.provenance.clone();
+    let rest = Vehicle { mass_kg, name, command, provenance, ..vehicle.clone() };
+    assert_eq!(rest, base);
+    // Each number once, with the file that it is from.
+    let file = |key: &str| {
+        let of: Vec<_> = vehicle.provenance.iter().filter(|number| number.key == key).collect();
+        assert_eq!(of.len(), 1, "{key}");
+        of[0].file.clone()
+    };
+    assert_eq!(vehicle.provenance.len(), base.provenance.len());
+    assert_eq!([file("body.mass"), file("command.speed_at_max")], ["mine.toml", "mine.toml"]);
+    assert_eq!([file("body.gravity"), file("command.min")], ["hummingbird.toml", "hummingbird.toml"]);
+}
+
+#[test]
+fn what_a_file_on_a_base_replaces_wrongly_is_told_at_its_place() {
+    let told = |tables: &str| on_hummingbird(tables).unwrap_err().to_string();
+    let number = "{ value = 300, unit = \"1\", source = \"test\", uncertainty = \"exact\" }";
+    let message = told(&format!("[command]\nmin = {number}"));
+    assert!(message.contains("`command.max` must be a command above `command.min`"), "{message}");
+    let message = told("[body]\nmas = 3");
+    assert!(message.starts_with("mine.toml:4:1: unknown key `body.mas`"), "{message}");
+    assert!(message.ends_with("did you mean `mass`?"), "{message}");
+}
+
+#[test]
+fn a_misspelt_key_is_told_beside_the_one_that_is_missing() {
+    let message = refused("mass = {", "mas = {").to_string();
+    assert!(message.contains("missing key `body.mass`"), "{message}");
+    assert!(
+        message.contains("unknown key `body.mas`") && message.ends_with("did you mean `mass`?"),
+        "{message}"
+    );
+}
+
 #[test]
 fn a_rotor_that_has_failed_stands_still_and_carries_nothing() {
     let line = "failed = { value = true, source = \"test\" }";

@@ -186,7 +186,8 @@ fn refused(declared: &DeclaredNode<'_>, error: &ParameterError) -> Diagnostic {
         ParameterError::Missing { .. } => format!("add {key} = … to [process.{name}.parameters]"),
         _ => error.meant().map_or(String::new(), |near| format!("did you mean `{near}`?")),
     };
-    problem(declared, &place(declared, key), &error.to_string(), help)
+    let error = error.clone().of(format!("process `{name}`"));
+    declared.manifest.problem(&place(declared, key), error, help)
 }
 
 fn problem(declared: &DeclaredNode<'_>, at: &Range<usize>, message: &str, help: String) -> Diagnostic {
