@@ -2,6 +2,7 @@
 
 mod common;
 mod flight;
+#[allow(dead_code, reason = "the generator's own main is not used here")]
 #[path = "../examples/random_pilot.rs"]
 mod random_pilot;
 

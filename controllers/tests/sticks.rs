@@ -1,5 +1,4 @@
 //! The stored recordings of sticks: written by the random pilot, like a hand, and flown by the cascade.
-#![allow(dead_code, reason = "the generator's own main is not used here")]
 
 use crate::flight;
 use crate::random_pilot;

@@ -164,9 +164,9 @@ impl Serialize for Diagnostic {
 impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (&self.error, &self.place) {
-            (ParameterError::File { shown, who, .. }, Some(place)) if f.alternate() => {
-                let by = if who.is_empty() { String::new() } else { format!(" by {who}") };
-                write!(f, "{shown}\n  named in {place}{by}")?;
+            (ParameterError::File { faults, .. }, Some(place)) if f.alternate() => {
+                let by = if faults.who.is_empty() { String::new() } else { format!(" by {}", faults.who) };
+                write!(f, "{}\n  named in {place}{by}", faults.shown)?;
             }
             _ => self.write_head(f)?,
         }

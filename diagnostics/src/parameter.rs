@@ -49,17 +49,24 @@ pub enum ParameterError {
         message: String,
     },
     /// A file that the parameter names, with the faults in it.
-    #[error("{message}")]
+    #[error("{}", .faults.message)]
     File {
         /// The dotted key.
         key: String,
-        /// The faults, with their places in that file.
-        message: String,
-        /// The same for terminals, with the lines of that file.
-        shown: String,
-        /// The component that has the parameter; empty where that is not known.
-        who: String,
+        /// The faults.
+        faults: Box<FileFaults>,
     },
+}
+
+/// Faults of a file that a parameter names.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FileFaults {
+    /// The faults with their places in that file, behind the component that has the parameter, if that is known.
+    pub message: String,
+    /// The faults for terminals, with the lines of that file.
+    pub shown: String,
+    /// The component; empty where it is not known.
+    pub who: String,
 }
 
 impl ParameterError {
@@ -106,7 +113,7 @@ impl ParameterError {
     #[must_use]
     pub fn file(key: impl Into<String>, fault: &impl Display) -> Self {
         let (message, shown) = (fault.to_string(), format!("{fault:#}"));
-        Self::File { key: key.into(), message, shown, who: String::new() }
+        Self::File { key: key.into(), faults: Box::new(FileFaults { message, shown, who: String::new() }) }
     }
 
     /// The same of the component `who`.
@@ -114,8 +121,10 @@ impl ParameterError {
     pub fn of(self, who: impl Into<String>) -> Self {
         let who = who.into();
         match self {
-            Self::File { key, message, shown, .. } => {
-                Self::File { message: format!("{who}: {message}"), key, shown, who }
+            Self::File { key, mut faults } => {
+                faults.message = format!("{who}: {}", faults.message);
+                faults.who = who;
+                Self::File { key, faults }
             }
             error => Self::conflict(error.key(), format!("{who}: {error}")),
         }

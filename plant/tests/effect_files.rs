@@ -168,6 +168,12 @@ fn a_base_that_is_not_there_or_has_a_base_itself_is_refused() {
 }
 
 #[test]
+fn a_misspelt_effect_is_told_with_the_one_that_was_meant() {
+    let error = airframe("\n[[effects]]\nname = \"parasitc-drag\"\n", "").unwrap_err();
+    assert!(error.ends_with("did you mean \"parasitic-drag\"?"), "{error}");
+}
+
+#[test]
 fn a_motor_of_another_model_replaces_that_of_its_base() {
     let declared = Vehicle::load(Path::new("../vehicles/hummingbird.toml")).unwrap();
     let head = "name = \"x\"\nbase = \"hummingbird.toml\"\n";

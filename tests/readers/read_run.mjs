@@ -38,7 +38,12 @@ const seen = await withPage(address, async (page, wrong) => {
   // The schedule, which asks the server while it is open.
   await page.click("#schedule > summary");
   await page.waitForFunction(() => document.querySelectorAll("#schedule-rows tr").length > 3 && document.getElementById("schedule-facts").textContent.includes("takes"));
-  await page.waitForFunction(() => [...document.querySelectorAll("#schedule-rows tr")].some((row) => row.cells[7].textContent !== "–"));
+  // On a busy machine some are measured before the others, whose bars lie at the beginning until then.
+  await page.waitForFunction(() => {
+    const rows = [...document.querySelectorAll("#schedule-rows tr")];
+    const isMeasured = (name) => rows.some((row) => row.cells[0].textContent === name && row.cells[7].textContent !== "–");
+    return ["plant", "imu", "ekf", "controller"].every(isMeasured);
+  });
   found.schedule = await page.evaluate(() => ({
     rows: [...document.querySelectorAll("#schedule-rows tr")].map((row) => [...row.cells].map((cell) => cell.textContent)),
     left: Object.fromEntries([...document.querySelectorAll("#schedule-rows tr")].map((row) => [row.cells[0].textContent, row.querySelector(".bar").getBoundingClientRect().left])),

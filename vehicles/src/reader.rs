@@ -10,7 +10,7 @@ use toml::de::{DeTable, DeValue};
 use crate::provenance::{NO_SOURCE, Provenance, Stated, Uncertainty};
 use diagnostics::parameter::{Bounds, all, not_negative, positive};
 use diagnostics::unit::Dimension;
-use diagnostics::{Diagnostic, ParameterError, Place, parse_toml};
+use diagnostics::{Diagnostic, ParameterError, Place, nearest, parse_toml};
 
 /// The file being read: for positions, and to gather provenance on the way.
 pub struct Document<'t> {
@@ -230,7 +230,9 @@ impl<'d, 't> Section<'d, 't> {
         }
         let names: Vec<_> = choices.iter().map(|(name, _)| format!("\"{name}\"")).collect();
         let expected = format!("one of {}", names.join(", "));
-        Err(self.doc.bad(&self.at_of(name), &self.key(name), expected, format!("\"{text}\"")))
+        let near = nearest(text, choices.iter().map(|(name, _)| *name));
+        let help = near.map_or(String::new(), |near| format!("did you mean \"{near}\"?"));
+        Err(self.doc.bad(&self.at_of(name), &self.key(name), expected, format!("\"{text}\"")).help(help))
     }
 
     /// True or false.

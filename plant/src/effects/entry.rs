@@ -2,7 +2,7 @@
 
 use super::catalogue::{CATALOGUE, find};
 use super::kind::{Effect, EffectKind, ParameterSpec, Values};
-use diagnostics::{Diagnostic, ParameterError};
+use diagnostics::{Diagnostic, ParameterError, nearest};
 use vehicles::{EffectEntry, Stated, Vehicle};
 
 /// The effects of `entries`, in their order.
@@ -25,8 +25,11 @@ pub fn resolve<'e>(entries: impl IntoIterator<Item = &'e EffectEntry>) -> Result
 
 fn kind(entry: &EffectEntry) -> Result<&'static EffectKind, Diagnostic> {
     find(&entry.name).ok_or_else(|| {
-        let names = CATALOGUE.iter().map(|kind| kind.name).collect::<Vec<_>>().join(", ");
-        bad_name(entry, &format!("one of {names}"), "no such effect")
+        let names = || CATALOGUE.iter().map(|kind| kind.name);
+        let all = names().collect::<Vec<_>>().join(", ");
+        let near = nearest(&entry.name, names());
+        let help = near.map_or(String::new(), |near| format!("did you mean \"{near}\"?"));
+        bad_name(entry, &format!("one of {all}"), "no such effect").help(help)
     })
 }
 
