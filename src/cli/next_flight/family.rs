@@ -243,8 +243,9 @@ fn figure_eight(space: &Space, level: f64) -> Vec<Table> {
 
 /// Least time of a ramp, s.
 const RAMP_S: f64 = 1.0;
-/// Speed by time of a ramp, as a part of the level acceleration, is at most the inverse of this: its peak is 1.9 times that.
-const RAMP: f64 = 2.1;
+/// Time of a ramp in units of its speed by the level acceleration: at its peak it takes half of that, and the curve the
+/// rest.
+const RAMP: f64 = 4.0;
 
 /// Laps of a closed curve, with ramps that find room in them, and a turn back to the yaw at its beginning.
 fn closed(
