@@ -135,7 +135,7 @@ impl BoundedLeastSquares {
     /// which Householder's factorisation is stable (Björck, Numerical methods for least squares problems, 1996, section 4.4).
     fn step(&self, demand: &Vector4<f64>, parts: &Parts, held: &[bool; ROTORS_MAX]) -> Parts {
         let missing = demand - self.effects * parts;
-        // The factorisation is most of the cost: four rotors need a tenth of what twelve do.
+        // The factorisation is most of the cost: that of four rotors has a sixteenth of the operations of that of twelve.
         match self.count {
             0..=4 => step_of!(4, self, missing, parts, held),
             5 | 6 => step_of!(6, self, missing, parts, held),

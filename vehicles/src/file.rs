@@ -216,7 +216,8 @@ fn inertia(section: &Section) -> Result<Matrix3<f64>, Diagnostic> {
     }
     let found = format!("{:.4e}, {:.4e}, {:.4e} kg*m^2", moments[0], moments[1], moments[2]);
     let expected = "a tensor whose principal moments are above 0, none larger than the sum of the other two";
-    Err(xx.doc.bad(&xx.at, &section.key("inertia_xx, inertia_yy, inertia_zz"), expected, found))
+    let wrong = [&xx, &yy, &zz].into_iter().find(|moment| section.is_own(moment)).unwrap_or(&xx);
+    Err(wrong.doc.bad(&wrong.at, &section.key("inertia_xx, inertia_yy, inertia_zz"), expected, found))
 }
 
 fn moment<'d, 't>(section: &Section<'d, 't>, name: &'static str) -> Result<Quantity<'d, 't>, Diagnostic> {
@@ -305,17 +306,22 @@ fn spin(section: &Section) -> Result<f64, Diagnostic> {
 
 fn motor(section: &Section) -> Result<MotorModel, Diagnostic> {
     let is_first = section.choice("model", &[("first-order", true), ("second-order", false)])?;
-    let number = |name, dimension, bounds: &_| section.bounded(name, dimension, bounds);
+    let mut faults = Faults::default();
+    let mut number = |name, dimension, bounds: &_| faults.keep(section.bounded(name, dimension, bounds));
     let model = if is_first {
-        MotorModel::FirstOrder { time_constant_s: number("time_constant", TIME, &bounds::TIME_CONSTANT)? }
+        let time_constant_s = number("time_constant", TIME, &bounds::TIME_CONSTANT);
+        time_constant_s.map(|time_constant_s| MotorModel::FirstOrder { time_constant_s })
     } else {
-        MotorModel::SecondOrder {
-            natural_frequency_rad_s: number("natural_frequency", SPEED, &bounds::NATURAL_FREQUENCY)?,
-            damping_ratio: number("damping_ratio", PURE_NUMBER, &bounds::DAMPING_RATIO)?,
-        }
+        let natural_frequency_rad_s = number("natural_frequency", SPEED, &bounds::NATURAL_FREQUENCY);
+        let damping_ratio = number("damping_ratio", PURE_NUMBER, &bounds::DAMPING_RATIO);
+        let both = natural_frequency_rad_s.zip(damping_ratio);
+        both.map(|(natural_frequency_rad_s, damping_ratio)| MotorModel::SecondOrder {
+            natural_frequency_rad_s,
+            damping_ratio,
+        })
     };
-    section.finish()?;
-    Ok(model)
+    faults.keep(section.finish());
+    faults.finish(model)
 }
 
 fn command(section: &Section) -> Result<CommandMap, Diagnostic> {
@@ -333,8 +339,15 @@ fn command(section: &Section) -> Result<CommandMap, Diagnostic> {
     faults.keep(section.finish());
     let (min, max, low, high) = faults.finish((|| Some((min?, max?, low?, high?)))())?;
     let (above_min, above_low) = (max.si > min.si, high.si > low.si);
-    let max = max.require(above_min, "a command above `command.min`")?;
-    let high = high.require(above_low, "a speed above `command.speed_at_min`")?;
+    // Of two numbers that do not go together, that of this file is wrong, not that of its base.
+    let (min, max) = match section.is_own(&max) {
+        true => (min, max.require(above_min, "a command above `command.min`")?),
+        false => (min.require(above_min, "a command below `command.max`")?, max),
+    };
+    let (low, high) = match section.is_own(&high) {
+        true => (low, high.require(above_low, "a speed above `command.speed_at_min`")?),
+        false => (low.require(above_low, "a speed below `command.speed_at_max`")?, high),
+    };
     let zero_is_off = zero_is_off && told(&section.section("zero_is_off")?)?;
     Ok(CommandMap {
         min: min.si,

@@ -145,6 +145,11 @@ impl<'d, 't> Section<'d, 't> {
         (self.find(name).is_none() && lower.has(name)).then_some(lower)
     }
 
+    /// True if the number is of this table's file, not of its base.
+    pub(crate) fn is_own(&self, number: &Quantity<'d, 't>) -> bool {
+        std::ptr::eq(self.doc, number.doc)
+    }
+
     /// The whole dotted key of `name` in this table.
     pub fn key(&self, name: &str) -> String {
         if self.path.is_empty() { name.to_owned() } else { format!("{}.{name}", self.path) }

@@ -292,7 +292,13 @@ fn what_a_file_on_a_base_replaces_wrongly_is_told_at_its_place() {
     let told = |tables: &str| on_hummingbird(tables).unwrap_err().to_string();
     let number = "{ value = 300, unit = \"1\", source = \"test\", uncertainty = \"exact\" }";
     let message = told(&format!("[command]\nmin = {number}"));
-    assert!(message.contains("`command.max` must be a command above `command.min`"), "{message}");
+    assert!(
+        message.starts_with("mine.toml:4:17: `command.min` must be a command below `command.max`"),
+        "{message}"
+    );
+    let moment = "{ value = 1, unit = \"kg*m^2\", source = \"test\", uncertainty = \"exact\" }";
+    let message = told(&format!("[body]\ninertia_zz = {moment}"));
+    assert!(message.starts_with("mine.toml:4:24: `body.inertia_xx, inertia_yy, inertia_zz`"), "{message}");
     let message = told("[body]\nmas = 3");
     assert!(message.starts_with("mine.toml:4:1: unknown key `body.mas`"), "{message}");
     assert!(message.ends_with("did you mean `mass`?"), "{message}");
@@ -300,6 +306,9 @@ fn what_a_file_on_a_base_replaces_wrongly_is_told_at_its_place() {
 
 #[test]
 fn a_misspelt_key_is_told_beside_the_one_that_is_missing() {
+    let message = refused("damping_ratio = {", "daming_ratio = {").to_string();
+    assert!(message.contains("missing key `motor.damping_ratio`"), "{message}");
+    assert!(message.ends_with("did you mean `damping_ratio`?"), "{message}");
     let message = refused("mass = {", "mas = {").to_string();
     assert!(message.contains("missing key `body.mass`"), "{message}");
     assert!(

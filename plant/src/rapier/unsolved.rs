@@ -6,7 +6,7 @@ use super::scratch::Scratch;
 /// A rate that is farther off than this, and than a part of the fastest rate, ends the run, m/s. Tuned, no source.
 const OFF_MOST_M_S: f64 = 1e-4;
 
-/// That part. For contacts that only just stick or slip the iteration may find no shifts (`direct`). With shifts that are
+/// Part of the fastest rate by which a rate may be off, too. For contacts that only just stick or slip the iteration may find no shifts (`direct`). With shifts that are
 /// nearly right, they push while they part, and by less than the coefficients of friction and restitution are known. Solvers
 /// without shifts leave that error whole (A. Castro and others, An unconstrained convex formulation of compliant
 /// contact, 2022). Tuned, no source.
