@@ -64,7 +64,7 @@ fn the_catalogue_has_the_names_that_files_use() {
 #[test]
 fn the_page_of_effects_is_the_catalogues() {
     let page = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/effects.md")).unwrap();
-    let hint = "write it anew: cargo run -p hummingbus-plant --example effects_page >docs/effects.md";
+    let hint = "write it anew: hummingbus effects --markdown >docs/effects.md";
     assert!(page == plant::effects::page::markdown(), "{hint}");
 }
 

@@ -8,6 +8,7 @@ mod clean;
 mod completions;
 mod components;
 mod diff;
+mod effects;
 mod export;
 mod export_fmu;
 mod files;
@@ -112,6 +113,9 @@ commands! {
     /// Print every component: its ports, its parameters, the state that it hands over.
     #[command(after_help = "Example: hummingbus components --json")]
     Components(components::ComponentsArguments) => components::components;
+    /// Print the effects that vehicle and scene files may list: equations, sources, parameters with units and bounds.
+    #[command(after_help = "Example: hummingbus effects rotor-drag")]
+    Effects(effects::EffectsArguments) => effects::effects;
     /// Find what measured flights show that the declared vehicle lacks; or fit a rotor to a thrust stand.
     #[command(after_help = identify::HELP)]
     Identify(identify::IdentifyArguments) => identify::run;

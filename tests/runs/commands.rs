@@ -174,7 +174,7 @@ fn cat_prints_one_json_object_a_line() {
 }
 
 #[test]
-fn schema_and_components_print_one() {
+fn schema_components_and_effects_print_one() {
     let place = Place::new();
     let ended = place.call(&["schema", "PlantState"]).with_code(0);
     assert_eq!(ended.output.matches("layout ").count(), 1, "{}", ended.output);
@@ -184,6 +184,14 @@ fn schema_and_components_print_one() {
     let ended = place.call(&["components", "pid"]).with_code(0);
     assert!(ended.output.lines().count() == 3 && ended.output.contains("**`pid`**"), "{}", ended.output);
     place.call(&["components", "pit"]).with_code(2).says(&["no component pit", "pid"]);
+    let ended = place.call(&["effects", "rotor-drag"]).with_code(0);
+    ended.prints(&["## rotor-drag", "**Equation:**", "| `coefficient` |"]);
+    let one = place.call(&["effects", "rotor-drag", "--json"]).with_code(0).json();
+    assert_eq!(one[0]["parameters"][0]["units"][0], "N*s^2/(m*rad)");
+    let names = place.call(&["effects"]).with_code(0).output;
+    let all = place.call(&["effects", "--json"]).with_code(0).json();
+    assert_eq!(names.lines().count(), all.as_array().unwrap().len() + 1, "{names}");
+    place.call(&["effects", "rotor-dreg"]).with_code(2).says(&["did you mean `rotor-drag`?"]);
 }
 
 #[test]

@@ -5,11 +5,11 @@ use super::kind::{EffectKind, FitAs, ParameterSpec, Randomness};
 use std::fmt::Write;
 
 const HEAD: &str = "# Effects
-<!-- Written by `cargo run -p hummingbus-plant --example effects_page >docs/effects.md` from plant/src/effects. -->
+<!-- Written by `hummingbus effects --markdown >docs/effects.md` from plant/src/effects. -->
 
 An effect is a named piece of physics beyond the declared vehicle. A vehicle file lists those of the vehicle, a scene
 file those of the surroundings; the plant flies both, the vehicle's first, each in the order of its file, and each
-effect once. Forces, torques and changes of thrust add up.
+effect once. Forces, torques and changes of thrust add up. `hummingbus effects NAME` prints what stands here of one.
 
 ```toml
 [[effects]]
@@ -45,12 +45,19 @@ pub fn markdown() -> String {
     for kind in CATALOGUE {
         let _ = writeln!(page, "| [`{0}`](#{0}) | {1} |", kind.name, kind.summary);
     }
-    CATALOGUE.iter().for_each(|kind| section(&mut page, kind));
+    for kind in CATALOGUE {
+        page.push('\n');
+        page.push_str(&of(kind));
+    }
     page
 }
 
-fn section(page: &mut String, kind: &EffectKind) {
-    let _ = writeln!(page, "\n## {}", kind.name);
+/// The section of one effect, in Markdown.
+#[must_use]
+pub fn of(kind: &EffectKind) -> String {
+    let mut section = String::new();
+    let page = &mut section;
+    let _ = writeln!(page, "## {}", kind.name);
     let _ = writeln!(page, "{}.\n", capitalised(kind.summary));
     let _ = writeln!(page, "- **Equation:** `{}`", kind.equation);
     let _ = writeln!(page, "- **Source:** {}.", kind.source);
@@ -67,6 +74,7 @@ fn section(page: &mut String, kind: &EffectKind) {
     );
     page.push_str("|---|---|---|---|---|---|---|---|\n");
     kind.parameters.iter().for_each(|spec| row(page, spec));
+    section
 }
 
 /// Describes how an identification fits it.

@@ -1,5 +1,0 @@
-//! Prints docs/effects.md.
-
-fn main() {
-    print!("{}", plant::effects::page::markdown());
-}
