@@ -166,7 +166,7 @@ impl fmt::Display for Diagnostic {
         match (&self.error, &self.place) {
             (ParameterError::File { faults, .. }, Some(place)) if f.alternate() => {
                 let by = if faults.who.is_empty() { String::new() } else { format!(" by {}", faults.who) };
-                write!(f, "{}\n  named in {place}{by}", faults.shown)?;
+                write!(f, "{:#}\n  named in {place}{by}", faults.fault)?;
             }
             _ => self.write_head(f)?,
         }

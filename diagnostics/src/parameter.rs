@@ -1,7 +1,8 @@
 //! Parameters of components: the error for one that is refused, and the checks that raise it.
 
+use crate::diagnostic::Diagnostic;
 use crate::nearest::nearest;
-use std::fmt::Display;
+use std::fmt::{self, Display};
 
 /// A parameter that a component refuses.
 ///
@@ -49,7 +50,7 @@ pub enum ParameterError {
         message: String,
     },
     /// A file that the parameter names, with the faults in it.
-    #[error("{}", .faults.message)]
+    #[error("{faults}")]
     File {
         /// The dotted key.
         key: String,
@@ -61,12 +62,20 @@ pub enum ParameterError {
 /// Faults of a file that a parameter names.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FileFaults {
-    /// The faults with their places in that file, behind the component that has the parameter, if that is known.
-    pub message: String,
-    /// The faults for terminals, with the lines of that file.
-    pub shown: String,
-    /// The component; empty where it is not known.
+    /// The faults, with their places in that file.
+    pub fault: Diagnostic,
+    /// The component that has the parameter; empty where it is not known.
     pub who: String,
+}
+
+/// The faults behind the component.
+impl Display for FileFaults {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if !self.who.is_empty() {
+            write!(f, "{}: ", self.who)?;
+        }
+        self.fault.fmt(f)
+    }
 }
 
 impl ParameterError {
@@ -94,14 +103,13 @@ impl ParameterError {
         Self::Conflict { key: key.into(), message: message.to_string() }
     }
 
-    /// Creates the error for a file that `key` names; `fault` is written with the lines of the file where it is asked for
-    /// its alternate form.
+    /// Creates the error for a file that `key` names, and the `fault` in it.
     ///
     /// ```
     /// use diagnostics::{Diagnostic, ParameterError, Place};
     ///
     /// let fault = Diagnostic::at(Place::of("bird.toml", "mass = -1\n", &(7..9)), "it is negative");
-    /// let named = ParameterError::file("vehicle", &fault).of("process `plant`");
+    /// let named = ParameterError::file("vehicle", fault).of("process `plant`");
     /// let place = Place::of("hover.toml", "vehicle = 'bird.toml'\n", &(10..21));
     /// let error = Diagnostic::at(place, named);
     /// assert_eq!(error.to_string(), "hover.toml:1:11: process `plant`: bird.toml:1:8: it is negative");
@@ -111,9 +119,8 @@ impl ParameterError {
     /// assert!(shown.ends_with("\n  named in hover.toml:1:11 by process `plant`"));
     /// ```
     #[must_use]
-    pub fn file(key: impl Into<String>, fault: &impl Display) -> Self {
-        let (message, shown) = (fault.to_string(), format!("{fault:#}"));
-        Self::File { key: key.into(), faults: Box::new(FileFaults { message, shown, who: String::new() }) }
+    pub fn file(key: impl Into<String>, fault: Diagnostic) -> Self {
+        Self::File { key: key.into(), faults: Box::new(FileFaults { fault, who: String::new() }) }
     }
 
     /// The same of the component `who`.
@@ -122,8 +129,7 @@ impl ParameterError {
         let who = who.into();
         match self {
             Self::File { key, mut faults } => {
-                faults.message = format!("{who}: {}", faults.message);
-                faults.who = who;
+                faults.who = if faults.who.is_empty() { who } else { format!("{who}: {}", faults.who) };
                 Self::File { key, faults }
             }
             error => Self::conflict(error.key(), format!("{who}: {error}")),

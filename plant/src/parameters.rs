@@ -222,11 +222,11 @@ impl Parameters {
 
     /// The vehicle as it flies, and the scene around it.
     fn airframe(&self, files: &InputFiles) -> Result<(Airframe, Scene), ParameterError> {
-        let refused = |error| ParameterError::file("vehicle", &error);
+        let refused = |error| ParameterError::file("vehicle", error);
         let vehicle = Vehicle::load_from(files, &self.vehicle).map_err(refused)?;
         let scene =
             self.scene.as_deref().map_or_else(|| Ok(Scene::default()), |path| Scene::load_from(files, path));
-        let scene = scene.map_err(|error| ParameterError::file("scene", &error))?;
+        let scene = scene.map_err(|error| ParameterError::file("scene", error))?;
         refuse_double_rig(&vehicle, &scene)?;
         Ok((Airframe::from_files(vehicle, &scene.effects).map_err(refused)?, scene))
     }

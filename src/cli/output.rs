@@ -2,7 +2,7 @@
 //! escaped here.
 
 use anyhow::{Context, Result};
-use diagnostics::{Diagnostic, printable, printable_json, short_lines};
+use diagnostics::{Diagnostic, ParameterError, printable, printable_json, short_lines};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::borrow::Cow;
@@ -100,18 +100,32 @@ pub fn print_error_json(value: &Value) {
 /// The faults of files that an error is about.
 fn faults(error: &anyhow::Error) -> Vec<Value> {
     let diagnostic = error.chain().find_map(|cause| cause.downcast_ref::<Diagnostic>());
-    let one = |fault: Diagnostic| {
-        let (line, column) = fault.place.as_ref().map(|place| (place.line, place.column)).unzip();
-        json!({
-            "file": fault.file,
-            "line": line,
-            "column": column,
-            "key": fault.key(),
-            "message": fault.error.to_string(),
-            "help": fault.help,
-        })
-    };
-    diagnostic.map_or(Vec::new(), |diagnostic| diagnostic.all().map(one).collect())
+    diagnostic.into_iter().flat_map(Diagnostic::all).flat_map(|fault| of_named_file(&fault)).collect()
+}
+
+/// The fault, or those of the file that is named there.
+fn of_named_file(fault: &Diagnostic) -> Vec<Value> {
+    let ParameterError::File { faults, .. } = &fault.error else { return vec![fault_json(fault, None)] };
+    faults.fault.all().map(|inner| fault_json(&inner, Some(fault))).collect()
+}
+
+/// A fault; `by` is the place that names its file, where another one does.
+fn fault_json(fault: &Diagnostic, by: Option<&Diagnostic>) -> Value {
+    let place = |fault: &Diagnostic| fault.place.as_ref().map(|place| (place.line, place.column)).unzip();
+    let (line, column) = place(fault);
+    let named_in = by.map(|by| {
+        let (line, column) = place(by);
+        json!({ "file": by.file, "line": line, "column": column, "key": by.key() })
+    });
+    json!({
+        "file": fault.file,
+        "line": line,
+        "column": column,
+        "key": fault.key(),
+        "message": fault.error.to_string(),
+        "help": fault.help,
+        "named_in": named_in,
+    })
 }
 
 /// Prints warnings on standard error.

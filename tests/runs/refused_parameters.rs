@@ -156,6 +156,15 @@ fn a_vehicle_with_a_number_that_none_has_is_refused_with_its_file_line_and_key()
         // The line of the vehicle file, and the manifest that names it.
         let ended = refused_args(&["run", &manifest], &vehicle);
         ended.says(&[&format!("`{key}"), number, &format!("named in {manifest}:"), "by process `"]);
+        let found = place.call(&["run", &manifest, "--json"]).with_code(2).json();
+        let fault = &found["faults"][0];
+        assert!(
+            fault["file"] == vehicle.as_str() && fault["key"].as_str().unwrap().starts_with(key),
+            "{fault}"
+        );
+        let told = format!("named in {manifest}:{}:", fault["named_in"]["line"]);
+        assert!(ended.error.contains(&format!("error: {vehicle}:{}:", fault["line"])), "{fault}");
+        assert!(ended.error.contains(&told), "{fault}");
     }
 }
 
