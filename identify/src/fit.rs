@@ -12,6 +12,7 @@ use crate::rows::keep_means;
 use crate::whitening::{Noises, Whitening, components};
 use nalgebra::{DMatrix, DVector};
 use plant::effects::{EffectKind, Requirement};
+use rayon::prelude::*;
 
 /// Steps of a fit at most.
 const STEPS_MAX: usize = 12;
@@ -127,7 +128,7 @@ impl<'f> Problem<'f> {
             let (residual, columns) = self.whitened(flight, values, free);
             (self.summed(flight, &residual, &columns), columns)
         };
-        let (blocks, columns) = self.estimation.iter().map(of_flight).unzip();
+        let (blocks, columns) = self.estimation.par_iter().map(of_flight).unzip();
         Equations { free: free.to_vec(), blocks, columns }
     }
 
@@ -136,7 +137,7 @@ impl<'f> Problem<'f> {
         let of_flight = |(flight, columns): (&Prepared<'_>, &Vec<Vec<f64>>)| {
             self.summed(flight, &self.whitened(flight, values, &[]).0, columns)
         };
-        self.estimation.iter().zip(&equations.columns).map(of_flight).collect()
+        self.estimation.par_iter().zip(&equations.columns).map(of_flight).collect()
     }
 
     /// Values after steps from `values` with the derivatives that are known, while the steps gain. Near a solution the residual is what
@@ -326,7 +327,7 @@ impl<'f> Problem<'f> {
 
     /// The normal equations of all blocks of `flights`.
     pub fn blocks(&self, flights: &[Prepared], values: &[f64], free: &[usize]) -> Vec<Block> {
-        flights.iter().flat_map(|flight| self.blocks_of(flight, values, free)).collect()
+        flights.par_iter().flat_map_iter(|flight| self.blocks_of(flight, values, free)).collect()
     }
 
     /// The model's residual and its derivatives; where the attitude was assumed, the means of blocks alone.
@@ -405,7 +406,7 @@ impl<'f> Problem<'f> {
             let (_, accepted) = self.linearised(flight, base.0, base.1);
             self.blocks_from(flight, residual, [accepted, columns].concat())
         };
-        flights.iter().flat_map(of_flight).collect()
+        flights.par_iter().flat_map_iter(of_flight).collect()
     }
 
     /// The normal equations of the blocks of one flight, from a residual and its derivatives.
@@ -422,7 +423,6 @@ impl<'f> Problem<'f> {
 
     /// The normal equations of the blocks of one flight, from a whitened residual and its derivatives.
     fn summed(&self, flight: &Prepared, residual: &[f64], columns: &[Vec<f64>]) -> Vec<Block> {
-        use rayon::prelude::*;
         let (width, weights) = (flight.width(), self.row_weights(flight));
         let of_knots = |knots: &(usize, usize)| {
             let mut block = Block::zero(columns.len());

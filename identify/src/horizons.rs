@@ -6,7 +6,8 @@ use crate::fit::Problem;
 use crate::predict::{Errors, Measured, WindowEnd, components, errors};
 use crate::sensing::SensorErrors;
 use flights::state::StateQuantity;
-use flights::{FlightSet, Role};
+use flights::{Flight, FlightSet, Role};
+use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -50,14 +51,14 @@ pub fn predictions(problem: &Problem, set: &FlightSet, values: &[f64]) -> Vec<Pr
     let declared = problem.model.parameters.baseline();
     let sensor_errors = SensorErrors::of(&problem.model.parameters, values);
     let models = DisturbanceModels::of(problem, values);
-    let mut predictions = Vec::new();
-    for flight in &set.flights {
+    let of_flight = |flight: &Flight| {
+        let mut predictions = Vec::new();
         let prepared = problem.flights().find(|prepared| prepared.flight.name == flight.name);
         let late = prepared.map_or(Lateness::default(), |prepared| prepared.late);
         let aligned = SensorErrors::default().taken_off(flight, &late);
         let corrected = sensor_errors.taken_off(flight, &late);
         let (Some(before), Some(after)) = (Measured::of(&aligned), Measured::of(&corrected)) else {
-            continue;
+            return predictions;
         };
         let airframe = |values: &[f64]| {
             let model = &problem.model;
@@ -89,8 +90,9 @@ pub fn predictions(problem: &Problem, set: &FlightSet, values: &[f64]) -> Vec<Pr
                 channels,
             });
         }
-    }
-    predictions
+        predictions
+    };
+    set.flights.par_iter().flat_map_iter(of_flight).collect()
 }
 
 /// Errors by channel: of the declared vehicle, the new one, persistence, and the new one with the flight's own trim, with the disturbance that was

@@ -8,6 +8,7 @@
 //! |---|---|
 //! | [`run`], `error` | the whole way, from flights to a report; reasons why it is not gone |
 //! | `clock`, `track` | measured channels on a grid of instants |
+//! | `rotor_track` | the rotors on that grid |
 //! | `window` | the window, and differences that lose nothing |
 //! | `prepared`, `rows` | a flight, the equations that it allows, and their rows |
 //! | `model`, `memo` | the model's side of the equations, and what was computed of it lately |
@@ -90,6 +91,7 @@ mod revision;
 mod rig;
 pub mod rotor;
 mod rotor_clock;
+mod rotor_track;
 mod rows;
 pub mod run;
 mod select;

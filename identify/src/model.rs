@@ -3,25 +3,17 @@
 
 use crate::memo::{Key, Rows};
 use crate::parameter::Parameters;
-use crate::prepared::{BOX_STEPS, EachRotor, Equation, Held, Prepared, Tracks};
+use crate::prepared::{BOX_STEPS, Equation, Held, Prepared, Tracks};
+use crate::rotor_track::{EachRotor, Rotors};
 use crate::sensing::SensorErrors;
-use nalgebra::Vector3;
-use plant::effects::{Quantity, Stage};
+use nalgebra::{UnitQuaternion, Vector3};
+use plant::effects::{EffectKind, FlightCondition, Quantity, Stage};
 use plant::{Actuation, Airframe, NewtonEuler, PerRotor, RigidBody, RotorState, State};
 use std::sync::Arc;
 use vehicles::Vehicle;
 
 /// The motors are simulated in steps of at most this length.
 const MOTOR_STEP_S: f64 = 0.001;
-
-/// The rotors over a flight, on its grid.
-#[derive(Debug, Clone)]
-pub struct Rotors {
-    /// Rotors that act on the vehicle: measured where speeds were logged, else computed from the commands.
-    pub flown: Vec<PerRotor<RotorState>>,
-    /// Rotor speeds that follow from the commands; zeros behind the last rotor.
-    pub commanded: Vec<EachRotor>,
-}
 
 /// The declared vehicle, with the parameters that a fit may change.
 #[derive(Debug)]
@@ -41,7 +33,7 @@ impl Model {
     /// The vehicle of `flight` under these values: effects of a rig do not act where it moves freely.
     pub fn airframe_of(&self, flight: &Prepared, values: &[f64]) -> Airframe {
         let mut effects = self.parameters.effects_under(values);
-        effects.retain(|effect| !(flight.moves_freely && effect.kind.needs.contains(&Quantity::Rig)));
+        effects.retain(|effect| acts_on(effect.kind, flight));
         Airframe::with_effects(self.vehicle.clone(), effects)
     }
 
@@ -56,15 +48,19 @@ impl Model {
     pub fn rotors(&self, flight: &Prepared, values: &[f64]) -> Rotors {
         let pose_s = SensorErrors::of(&self.parameters, values).pose_delay_s;
         if flight.flight.command.is_empty() {
-            let flown = flight.recent_rotors.at(pose_s, || measured_rotors(flight, pose_s));
-            return Rotors { commanded: flown.iter().map(speeds).collect(), flown: flown.to_vec() };
+            let measured = || {
+                let flown = measured_rotors(flight, pose_s);
+                let commanded = flown.iter().map(speeds).collect();
+                Rotors::new(flown, commanded)
+            };
+            return Rotors::clone(&flight.recent_rotors.at(pose_s, measured));
         }
         let mut flown = spun(&self.airframe_of(flight, values), flight, pose_s);
         let commanded: Vec<EachRotor> = flown.iter().map(speeds).collect();
         if !flight.flight.rotor_speed.is_empty() {
             correct(flight, pose_s, &commanded, &mut flown);
         }
-        Rotors { flown, commanded }
+        Rotors::new(flown, commanded)
     }
 
     /// Measurement less model, for each knot each equation's components.
@@ -125,28 +121,40 @@ impl Model {
         let airframe = self.airframe_of(flight, values);
         let actuation = air(&airframe, flight.layout.clock.step_s);
         let model = NewtonEuler::flying(airframe, 1);
-        let mounting = SensorErrors::of(&self.parameters, values).mounting();
         let gravity_m_s2 = model.vehicle().gravity_m_s2;
         let has_world = flight.offset_of(Equation::Acceleration).is_some();
-        let mut sides = Sides::default();
-        for i in 0..flight.layout.clock.count {
-            let attitude_WB = tracks.attitude[i] * mounting;
-            let body = RigidBody {
-                position_W_m: tracks.position.values[i].into(),
-                velocity_W_m_s: tracks.velocity[i].into(),
-                attitude_WB,
-                angular_velocity_B_rad_s: tracks.rates[i].into(),
-            };
-            let motion = model.accelerations_under(&actuation, &State { body, rotors: rotors.flown[i] });
+        let mut sides = Sides::with_capacity(flight.layout.clock.count);
+        for state in self.states(flight, tracks, rotors, values) {
+            let motion = model.accelerations_under(&actuation, &state);
             sides.force_B.push(motion.specific_force_B_m_s2.into());
             sides.angular_B.push(motion.angular_acceleration_B_rad_s2.into());
             if has_world {
-                let mut acceleration_W = attitude_WB * motion.specific_force_B_m_s2;
+                let mut acceleration_W = state.body.attitude_WB * motion.specific_force_B_m_s2;
                 acceleration_W.z -= gravity_m_s2;
                 sides.acceleration_W.push(acceleration_W.into());
             }
         }
         sides
+    }
+
+    /// The measured states on the grid under `values`, with rotors as the model has them.
+    fn states<'t>(
+        &self,
+        flight: &Prepared,
+        tracks: &'t Tracks,
+        rotors: &'t Rotors,
+        values: &[f64],
+    ) -> impl Iterator<Item = State> + use<'t> {
+        let mounting = SensorErrors::of(&self.parameters, values).mounting();
+        (0..flight.layout.clock.count).map(move |i| {
+            let body = RigidBody {
+                position_W_m: tracks.position.values[i].into(),
+                velocity_W_m_s: tracks.velocity[i].into(),
+                attitude_WB: tracks.attitude[i] * mounting,
+                angular_velocity_B_rad_s: tracks.rates[i].into(),
+            };
+            State { body, rotors: rotors.flown[i] }
+        })
     }
 
     /// The residual under `values`, and its derivative by each parameter of `free`: one column each.
@@ -161,8 +169,14 @@ impl Model {
                 let (residual, columns) = known.unzip();
                 let about = About::of(self, flight, values, residual);
                 let known = columns.unwrap_or_else(|| vec![None; free.len()]);
+                let is_open = |(at, known): (&usize, &Option<Rows>)| {
+                    known.is_none() && self.parameters.all[*at].kind.only_adds()
+                };
+                let flown = about.flown();
+                let open = free.iter().zip(&known).any(is_open);
+                let conditions = if open { about.conditions(&flown) } else { Vec::new() };
                 let column = |(&parameter, known): (&usize, Option<Rows>)| {
-                    known.unwrap_or_else(|| Arc::new(about.column(parameter)))
+                    known.unwrap_or_else(|| Arc::new(about.column(parameter, &flown, &conditions)))
                 };
                 let columns: Vec<Rows> = free.par_iter().zip(known).map(column).collect();
                 (about.residual, columns)
@@ -196,8 +210,28 @@ impl<'m, 'p, 'f> About<'m, 'p, 'f> {
         Self { model, flight, values, tracks, rotors, residual }
     }
 
-    /// The derivative of the residual by one parameter.
-    fn column(&self, parameter: usize) -> Vec<f64> {
+    /// The model under the values.
+    fn flown(&self) -> NewtonEuler {
+        NewtonEuler::flying(self.model.airframe_of(self.flight, self.values), 1)
+    }
+
+    /// The conditions on the grid of the vehicle of `flown`, each with its attitude.
+    fn conditions<'v>(&self, flown: &'v NewtonEuler) -> Vec<(FlightCondition<'v>, UnitQuaternion<f64>)> {
+        let air_velocity_W_m_s = air(flown.airframe(), self.flight.layout.clock.step_s).air_velocity_W_m_s;
+        let of_state = |state: State| {
+            (FlightCondition::new(flown.vehicle(), &state, &air_velocity_W_m_s), state.body.attitude_WB)
+        };
+        self.model.states(self.flight, &self.tracks, &self.rotors, self.values).map(of_state).collect()
+    }
+
+    /// The derivative of the residual by one parameter. Effects that only add forces and torques are looked at under the `conditions` of the vehicle of
+    /// `flown`.
+    fn column(
+        &self,
+        parameter: usize,
+        flown: &NewtonEuler,
+        conditions: &[(FlightCondition<'_>, UnitQuaternion<f64>)],
+    ) -> Vec<f64> {
         let (model, flight) = (self.model, self.flight);
         let entry = &model.parameters.all[parameter];
         let up = self.values[parameter] + entry.step <= entry.spec().max;
@@ -217,18 +251,77 @@ impl<'m, 'p, 'f> About<'m, 'p, 'f> {
                 return ahead.iter().zip(&behind).map(|(a, b)| (a - b) / (2.0 * step)).collect();
             }
             Stage::Rotors => model.residual(flight, &self.tracks, &model.rotors(flight, &ahead), &ahead),
+            Stage::Body if entry.kind.only_adds() => {
+                return self.column_of_added((entry.kind, &ahead, step), flown, conditions);
+            }
             Stage::Body => model.residual(flight, &self.tracks, &self.rotors, &ahead),
         };
         moved.iter().zip(self.residual.iter()).map(|(moved, before)| (moved - before) / step).collect()
     }
+
+    /// The same by a parameter of an effect that only adds forces and torques, which goes to the values `ahead` by `step`: all others stay.
+    fn column_of_added(
+        &self,
+        (kind, ahead, step): (&'static EffectKind, &[f64], f64),
+        flown: &NewtonEuler,
+        conditions: &[(FlightCondition<'_>, UnitQuaternion<f64>)],
+    ) -> Vec<f64> {
+        let flight = self.flight;
+        if !acts_on(kind, flight) {
+            return vec![0.0; self.residual.len()];
+        }
+        let [after, now] =
+            [ahead, self.values].map(|values| self.model.parameters.effect_under(kind, values));
+        let is_neutral = now.values == kind.neutral().values;
+        let has_world = flight.offset_of(Equation::Acceleration).is_some();
+        let mut sides = Sides::with_capacity(conditions.len());
+        for (condition, attitude_WB) in conditions {
+            let mut added = flown.accelerations_added(&after, condition);
+            if !is_neutral {
+                added = added.less(&flown.accelerations_added(&now, condition));
+            }
+            // The residual has the model's side taken off.
+            let force_B = added.specific_force_B_m_s2 / -step;
+            sides.force_B.push(force_B.into());
+            sides.angular_B.push((added.angular_acceleration_B_rad_s2 / -step).into());
+            if has_world {
+                sides.acceleration_W.push((attitude_WB * force_B).into());
+            }
+        }
+        let mut column = Vec::with_capacity(self.residual.len());
+        for &knot in &flight.layout.knots {
+            for (equation, (_, window)) in flight.layout.equations.iter().zip(&flight.layout.windows) {
+                match equation {
+                    Equation::SpecificForce => column.extend(window.over(&sides.force_B, knot)),
+                    Equation::Acceleration => column.extend(window.over(&sides.acceleration_W, knot)),
+                    Equation::AngularAcceleration => column.extend(window.over(&sides.angular_B, knot)),
+                    Equation::Gyroscope | Equation::RotorSpeed(_) => {
+                        column.extend(std::iter::repeat_n(0.0, equation.size()));
+                    }
+                }
+            }
+        }
+        column
+    }
+}
+
+/// True if effects of `kind` act on `flight`: those of a rig do not where it moves freely.
+fn acts_on(kind: &EffectKind, flight: &Prepared) -> bool {
+    !(flight.moves_freely && kind.needs.contains(&Quantity::Rig))
 }
 
 /// The model's sides on the grid.
-#[derive(Default)]
 struct Sides {
     force_B: Vec<[f64; 3]>,
     acceleration_W: Vec<[f64; 3]>,
     angular_B: Vec<[f64; 3]>,
+}
+
+impl Sides {
+    fn with_capacity(count: usize) -> Self {
+        let [force_B, acceleration_W, angular_B] = std::array::from_fn(|_| Vec::with_capacity(count));
+        Self { force_B, acceleration_W, angular_B }
+    }
 }
 
 /// Returns the motion of the air under the steady effects, which is the same at every instant.

@@ -95,6 +95,22 @@ impl Parameters {
     }
 }
 
+impl Parameters {
+    /// The plant's effect `kind` under `values`.
+    ///
+    /// # Panics
+    /// If it is none of the plant's.
+    pub fn effect_under(&self, kind: &EffectKind, values: &[f64]) -> Effect {
+        let baseline = self.baseline.iter().find(|effect| effect.kind == kind);
+        let mut effect = *baseline.expect("an effect of the catalogue");
+        for (parameter, value) in self.all.iter().zip(values).filter(|(parameter, _)| parameter.kind == kind)
+        {
+            effect.values[parameter.index] = *value;
+        }
+        effect
+    }
+}
+
 impl Parameter {
     /// Returns its specification, with unit and bounds.
     pub fn spec(&self) -> &'static ParameterSpec {

@@ -13,9 +13,14 @@ use vehicles::ROTORS_MAX;
 
 /// Length of a tick where rotors follow commands: that of the bus.
 const TICK_S: f64 = 0.001;
-/// Length of a tick where rotor speeds are measured, so that no motor is simulated: a quarter of the period of logs at 100 Hz; tuned, no
+/// Length of a tick where rotor speeds are measured often, so that no motor is simulated: a quarter of the period of logs at 100 Hz; tuned, no
 /// source.
 pub(crate) const ROTOR_TICK_S: f64 = 0.0025;
+/// Longer ticks, for logs of that period: between two samples the speeds are a straight line, and a vehicle turns by 0.1 rad, which a step of fourth
+/// order follows to 1e-8. All horizons are whole numbers of each.
+const LONG_ROTOR_TICKS_S: [f64; 2] = [0.01, 0.005];
+/// Part by which the period of a log may be below such a tick.
+const PERIOD_SLACK: f64 = 0.02;
 /// Times are sums of decimal fractions: a nanosecond of slack keeps the last moment.
 const SLACK_S: f64 = 1e-9;
 
@@ -91,7 +96,7 @@ impl Measured {
         horizons_s: &[f64],
         push: impl Fn(f64) -> Forecast,
     ) -> Vec<Vec<WindowEnd>> {
-        let tick_s = if self.rotor_speed.is_some() { ROTOR_TICK_S } else { TICK_S };
+        let tick_s = self.rotor_speed.as_ref().map_or(TICK_S, rotor_tick_s);
         let windows: Vec<usize> =
             horizons_s.iter().map(|horizon_s| (horizon_s / tick_s).round() as usize).collect();
         let memory = airframe.initial_state(0, "predict", tick_s);
@@ -111,7 +116,7 @@ impl Measured {
             match &self.rotor_speed {
                 None => plant.step(&before.command[..count], tick_s, &[]),
                 Some(speeds) => {
-                    let rotors = rotors_at(speeds, at_s(tick - 1), &mut speed_hint);
+                    let rotors = rotors_between(speeds, at_s(tick - 1), at_s(tick), &mut speed_hint);
                     plant.step_with_rotors(&PerRotor::from_fn(count, |rotor| rotors[rotor]), tick_s);
                 }
             }
@@ -144,6 +149,12 @@ impl Measured {
     }
 }
 
+/// Length of a tick in which rotors turn at measured `speeds`.
+fn rotor_tick_s(speeds: &Channel<ROTORS_MAX>) -> f64 {
+    let longest_s = (1.0 + PERIOD_SLACK) * speeds.period_s().unwrap_or_default();
+    LONG_ROTOR_TICKS_S.into_iter().find(|tick_s| *tick_s <= longest_s).unwrap_or(ROTOR_TICK_S)
+}
+
 /// The rotors at `time_s`, on straight lines between the samples of their speeds. `hint` is an index near, kept between calls
 /// at growing times.
 pub(crate) fn rotors_at(
@@ -166,6 +177,20 @@ pub(crate) fn rotors_at(
             speed_rad_s: if is_between { from + slope * since_s } else { from },
             acceleration_rad_s2: slope,
         }
+    })
+}
+
+/// The rotors at `from_s`, accelerating to their speeds at `to_s`, between which there may be several samples.
+pub(crate) fn rotors_between(
+    speeds: &Channel<ROTORS_MAX>,
+    from_s: f64,
+    to_s: f64,
+    hint: &mut usize,
+) -> [RotorState; ROTORS_MAX] {
+    let (from, to) = (rotors_at(speeds, from_s, hint), rotors_at(speeds, to_s, &mut hint.clone()));
+    std::array::from_fn(|rotor| {
+        let grown_rad_s = to[rotor].speed_rad_s - from[rotor].speed_rad_s;
+        RotorState { acceleration_rad_s2: grown_rad_s / (to_s - from_s), ..from[rotor] }
     })
 }
 

@@ -4,12 +4,12 @@
 use crate::clock::{Clock, Lateness};
 use crate::memo::{Memo, Recent};
 use crate::rig;
+use crate::rotor_track::{EachRotor, Rotors};
 use crate::track::{Track, valid_about};
 use crate::unusable::Unusable;
 use crate::window::{NUMEROV, SIMPSON, Window, central_difference, second_difference};
 use flights::{Channel, Flight, KnownRotors, SETTLE_S};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use plant::{PerRotor, RotorState};
 use std::sync::Arc;
 use vehicles::gaps::held_period_s;
 use vehicles::{CommandMap, MotorModel, ROTORS_MAX, Vehicle};
@@ -36,9 +36,6 @@ pub enum Equation {
     /// It has so many rotors.
     RotorSpeed(usize),
 }
-
-/// A number for each rotor; zeros behind the last.
-pub type EachRotor = [f64; ROTORS_MAX];
 
 impl Equation {
     /// Returns the number of its components.
@@ -155,7 +152,7 @@ pub struct Prepared<'f> {
     /// Tracks, by the delays of pose and inertial unit, and the lateness of the pose.
     recent_tracks: Recent<(f64, f64, Lateness), Tracks>,
     /// Measured rotors, by the delay of the pose.
-    pub recent_rotors: Recent<f64, Vec<PerRotor<RotorState>>>,
+    pub recent_rotors: Recent<f64, Rotors>,
     /// True if the vehicle accelerates as it leans, or moves further to the side than any rig allows.
     pub moves_freely: bool,
 }

@@ -28,7 +28,8 @@ pub fn regressors(model: &Model, flight: &Prepared, values: &[f64]) -> Vec<Regre
     let body = |at: usize, axis: usize| {
         tracks.attitude[at].inverse_transform_vector(&Vector3::from(tracks.velocity[at]))[axis]
     };
-    let mean_speed = |at: usize| rotors[at].iter().map(|rotor| rotor.speed_rad_s).sum::<f64>() / 4.0;
+    let count = flight.flight.rotors as f64;
+    let mean_speed = |at: usize| rotors[at].iter().map(|rotor| rotor.speed_rad_s).sum::<f64>() / count;
     let all: [Named<'_>; 10] = [
         ("speed", "m/s", &|at| Vector3::from(tracks.velocity[at]).norm()),
         ("velocity x (body)", "m/s", &|at| body(at, 0)),

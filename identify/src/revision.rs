@@ -14,6 +14,7 @@ use crate::refine::{Refined, refined};
 use crate::sensor_effects::SENSOR_EFFECTS;
 use crate::worth::Worth;
 use plant::effects::Action;
+use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -36,8 +37,8 @@ pub struct Withdrawn {
 /// The next turn of a search.
 #[derive(Debug)]
 pub enum Revision {
-    /// Without this effect.
-    Without(Withdrawn),
+    /// Without these effects.
+    Without(Vec<Withdrawn>),
     /// With this candidate.
     With(Box<Judged>),
     /// Nothing: it is over.
@@ -82,22 +83,27 @@ impl Revisions {
         progress("every effect once more, by its parameters");
         let search = Found { problem, accepted, base };
         if let Some(found) = search.unsound(base, FALSE_RATE, &self.added) {
-            return Revision::Without(found);
+            return Revision::Without(vec![found]);
         }
         progress("refinement by prediction errors");
         let Some(moved) = refined(problem, base, self.near.as_deref()) else {
             progress("every effect once more, by predictions");
             let predictions = search.predictions();
             let end = End { refined: None, worths: predictions.worths() };
-            return search.unworthy(&predictions).map_or(Revision::Done(end), Revision::Without);
+            let together = |dropped: &[usize]| search.foresight(dropped);
+            return match search.unworthy(&predictions, together) {
+                found if found.is_empty() => Revision::Done(end),
+                found => Revision::Without(found),
+            };
         };
         self.near = Some(moved.result.values.clone());
         progress("every effect once more, by predictions");
         if let Some(found) = search.unsound(&moved.result, REFINED_RATE, &[]) {
-            return Revision::Without(found);
+            return Revision::Without(vec![found]);
         }
         let predictions = search.predictions_refined(&moved);
-        if let Some(found) = search.unworthy(&predictions) {
+        let found = search.unworthy(&predictions, |dropped| moved.foresight(dropped));
+        if !found.is_empty() {
             return Revision::Without(found);
         }
         progress("further effects, by predictions");
@@ -214,7 +220,10 @@ impl Found<'_, '_> {
             }
         };
         let with = Foresight::of(problem, &equations, base, &[]);
-        Predictions { with, without: self.names().into_iter().map(|name| (name, without(name))).collect() }
+        Predictions {
+            with,
+            without: self.names().into_par_iter().map(|name| (name, without(name))).collect(),
+        }
     }
 
     /// The same with the others refined by prediction errors, as the effect is.
@@ -229,7 +238,10 @@ impl Found<'_, '_> {
             }
         };
         let with = refined.foresight(&[]);
-        Predictions { with, without: self.names().into_iter().map(|name| (name, without(name))).collect() }
+        Predictions {
+            with,
+            without: self.names().into_par_iter().map(|name| (name, without(name))).collect(),
+        }
     }
 
     /// Names of the accepted effects.
@@ -250,10 +262,32 @@ impl Found<'_, '_> {
         )
     }
 
-    /// The accepted effect that predictions are better without, of several the one with the greatest growth; or else the one that they gain
-    /// least by, if that is nothing. What such an effect takes is missing in the numbers of the others.
-    fn unworthy(&self, predictions: &Predictions) -> Option<Withdrawn> {
-        predictions.worst().or_else(|| predictions.idle(|name| self.may_be_idle(name)))
+    /// The accepted effect that predictions are better without, of several the one with the greatest growth; or else those that they gain
+    /// nothing by: all, if they gain nothing by all of them `together` (predictions with these parameters at their baselines), and the one that they
+    /// gain least by if not. What such an effect takes is missing in the numbers of the others.
+    fn unworthy(
+        &self,
+        predictions: &Predictions,
+        together: impl Fn(&[usize]) -> Foresight,
+    ) -> Vec<Withdrawn> {
+        if let Some(worst) = predictions.worst() {
+            return vec![worst];
+        }
+        let mut idle = predictions.idle(|name| self.may_be_idle(name));
+        if idle.len() > 1 {
+            let candidates: Vec<Candidate> =
+                idle.iter().flat_map(|withdrawn| self.of_effect(withdrawn.effect)).collect();
+            if predictions.with.is_worth_more_than(&together(&free_parameters(&candidates))) {
+                idle.truncate(1);
+            }
+        }
+        idle
+    }
+
+    /// Predictions of the fit, with the parameters `dropped` at their baselines.
+    fn foresight(&self, dropped: &[usize]) -> Foresight {
+        let Self { problem, base, .. } = self;
+        Foresight::of(problem, &problem.equations(&base.values, &base.free), base, dropped)
     }
 
     /// Errors of sensors may be great and yet change no prediction, and what stands for the logging of the commands is no effect.
@@ -291,21 +325,24 @@ impl Predictions {
         Some(Withdrawn { effect, reason })
     }
 
-    /// The effect, of those that may be, without which no error grows, that gains least.
-    fn idle(&self, may_be: impl Fn(&'static str) -> bool) -> Option<Withdrawn> {
+    /// The effects, of those that may be, without which no error grows; the one that gains least first.
+    fn idle(&self, may_be: impl Fn(&'static str) -> bool) -> Vec<Withdrawn> {
         let gain = |(name, without): &(&'static str, Foresight)| {
             let most =
                 self.with.worths(without).into_iter().min_by(|a, b| a.ratio().total_cmp(&b.ratio()))?;
             let is_idle = may_be(name) && !self.with.is_worth_more_than(without);
             is_idle.then_some((*name, most))
         };
-        let (effect, Worth { channel, horizon_s, without, with, unit }) =
-            self.without.iter().filter_map(gain).max_by(|a, b| a.1.ratio().total_cmp(&b.1.ratio()))?;
-        let reason = format!(
-            "no prediction error falls noticeably with it; most, the error of {channel} after {horizon_s} s, is {without:.3e} {unit} without \
-             it, {with:.3e} {unit} with it"
-        );
-        Some(Withdrawn { effect, reason })
+        let mut idle: Vec<(&'static str, Worth)> = self.without.iter().filter_map(gain).collect();
+        idle.sort_by(|a, b| b.1.ratio().total_cmp(&a.1.ratio()));
+        let withdrawn = |(effect, Worth { channel, horizon_s, without, with, unit })| {
+            let reason = format!(
+                "no prediction error falls noticeably with it; most, the error of {channel} after {horizon_s} s, is {without:.3e} {unit} \
+                 without it, {with:.3e} {unit} with it"
+            );
+            Withdrawn { effect, reason }
+        };
+        idle.into_iter().map(withdrawn).collect()
     }
 }
 

@@ -114,9 +114,11 @@ pub fn select(problem: &mut Problem, candidates: &[Candidate], progress: &mut dy
         let StepwiseSearch { accepted, base, rounds } = &mut search;
         match revisions.next(problem, accepted, base, &open, progress) {
             Revision::Without(found) => {
-                (*accepted, *base) = without_effect(problem, accepted, base, found.effect);
-                open.retain(|candidate| candidate.kind.name != found.effect);
-                withdrawn.push(found);
+                for Withdrawn { effect, .. } in &found {
+                    (*accepted, *base) = without_effect(problem, accepted, base, effect);
+                    open.retain(|candidate| candidate.kind.name != *effect);
+                }
+                withdrawn.extend(found);
             }
             Revision::With(found) => {
                 accepted.push(found.candidate.clone());
@@ -224,7 +226,10 @@ fn round(
         let found = match (is_guessed, is_timing) {
             (false, _) => screen.promised(problem, base, candidate),
             (true, false) => promised_from_guess(problem, base, accepted, candidate),
-            (true, true) => fitted(problem, base, accepted, candidate),
+            (true, true) => {
+                let promised = promised_from_guess(problem, base, accepted, candidate).values;
+                fitted_from(problem, base, accepted, candidate, &promised)
+            }
         };
         Judged { is_promise: !(is_guessed && is_timing), ..judged(problem, base, candidate, found, level) }
     };

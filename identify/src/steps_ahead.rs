@@ -4,7 +4,7 @@
 //!
 //! Other than the windows that an identification judges by, these overlap, and their errors are means of norms.
 
-use crate::predict::{ROTOR_TICK_S, body, rotors_at, state};
+use crate::predict::{ROTOR_TICK_S, body, rotors_at, rotors_between, state};
 use flights::state::StateQuantity;
 use flights::{Channel, Flight, Played};
 use plant::{Airframe, Backend, FreeFlight, NewtonEuler, PerRotor, RigidBody, RotorState};
@@ -181,20 +181,6 @@ impl Sums {
             sum(&mut self.persistence[step], &persistent);
         }
     }
-}
-
-/// The rotors at `from_s`, accelerating to their speeds at `to_s`, between which there may be several samples.
-fn rotors_between(
-    speeds: &Channel<ROTORS_MAX>,
-    from_s: f64,
-    to_s: f64,
-    hint: &mut usize,
-) -> [RotorState; ROTORS_MAX] {
-    let (from, to) = (rotors_at(speeds, from_s, hint), rotors_at(speeds, to_s, &mut hint.clone()));
-    std::array::from_fn(|rotor| {
-        let grown_rad_s = to[rotor].speed_rad_s - from[rotor].speed_rad_s;
-        RotorState { acceleration_rad_s2: grown_rad_s / (to_s - from_s), ..from[rotor] }
-    })
 }
 
 /// The measured rotor speeds, or those that follow from the commands.

@@ -10,6 +10,7 @@ use vehicles::Vehicle;
 
 use crate::actuation::Actuation;
 use crate::airframe::Airframe;
+use crate::effects::{Effect, FlightCondition};
 use crate::rotation::rotated;
 use crate::state::{BodyRates, PerRotor, Rates, RigidBody, RotorRates, RotorState, State};
 
@@ -40,6 +41,18 @@ pub struct Accelerations {
     pub specific_force_B_m_s2: Vector3<f64>,
     /// Rate of change of the angular velocity, in the body frame.
     pub angular_acceleration_B_rad_s2: Vector3<f64>,
+}
+
+impl Accelerations {
+    /// The difference to others.
+    #[must_use]
+    pub fn less(&self, others: &Self) -> Self {
+        Self {
+            specific_force_B_m_s2: self.specific_force_B_m_s2 - others.specific_force_B_m_s2,
+            angular_acceleration_B_rad_s2: self.angular_acceleration_B_rad_s2
+                - others.angular_acceleration_B_rad_s2,
+        }
+    }
 }
 
 impl NewtonEuler {
@@ -131,6 +144,16 @@ impl NewtonEuler {
         Accelerations {
             specific_force_B_m_s2: wrench.force_B_N / self.vehicle().mass_kg,
             angular_acceleration_B_rad_s2: self.angular_acceleration(state, &wrench.torque_B_N_m),
+        }
+    }
+
+    /// Specific force and angular acceleration that `effect` adds to those of this model under `condition`. The effect has to be one that only adds:
+    /// [`EffectKind::only_adds`](crate::effects::EffectKind::only_adds).
+    pub fn accelerations_added(&self, effect: &Effect, condition: &FlightCondition<'_>) -> Accelerations {
+        let wrench = effect.added_wrench(condition);
+        Accelerations {
+            specific_force_B_m_s2: wrench.force_B_N / self.vehicle().mass_kg,
+            angular_acceleration_B_rad_s2: self.inverse_inertia * wrench.torque_B_N_m,
         }
     }
 

@@ -83,6 +83,37 @@ fn every_specification_is_whole() {
     }
 }
 
+/// What an effect adds is what the model with it has more than the model without it.
+#[test]
+fn an_effect_that_only_adds_adds_the_difference_of_the_models() {
+    let vehicle = hummingbird();
+    let body = RigidBody {
+        velocity_W_m_s: Vector3::new(3.0, -2.0, 1.0),
+        attitude_WB: UnitQuaternion::from_euler_angles(0.3, -0.2, 1.0),
+        angular_velocity_B_rad_s: Vector3::new(0.5, -0.7, 0.9),
+        // So near the ground that its effect acts.
+        ..RigidBody::level_at(Vector3::z() * 0.2)
+    };
+    let rotors = plant::PerRotor::from([400.0, 450.0, 420.0, 380.0]).map(RotorState::steady);
+    let state = State { body, rotors };
+    let plain = NewtonEuler::new(vehicle.clone(), 1);
+    let adding: Vec<Effect> =
+        CATALOGUE.iter().filter(|kind| kind.only_adds()).map(|kind| kind.nominal()).collect();
+    assert!(adding.len() > 6, "{adding:?}");
+    for effect in adding {
+        let with = NewtonEuler::flying(Airframe::with_effects(vehicle.clone(), vec![effect]), 1);
+        let expected = with.accelerations(&state).less(&plain.accelerations(&state));
+        let condition = FlightCondition::new(&vehicle, &state, &Vector3::zeros());
+        let apart = plain.accelerations_added(&effect, &condition).less(&expected);
+        let name = effect.kind.name;
+        assert!(apart.specific_force_B_m_s2.norm() < 1e-12, "{name}: {apart:?}");
+        assert!(apart.angular_acceleration_B_rad_s2.norm() < 1e-11, "{name}: {apart:?}");
+        // Those of a rig have nothing to act on in this flight.
+        let acts = expected.specific_force_B_m_s2.norm() + expected.angular_acceleration_B_rad_s2.norm();
+        assert!(acts > 1e-4, "{name} does nothing here");
+    }
+}
+
 /// A flight with the effects it is given, tick by tick.
 struct Flight {
     model: NewtonEuler,

@@ -4,7 +4,8 @@
 use super::fault::Part;
 use super::twin::Twin;
 use crate::model::Model;
-use crate::prepared::{BOX_STEPS, EachRotor, Equation, Prepared, Tracks};
+use crate::prepared::{BOX_STEPS, Equation, Prepared, Tracks};
+use crate::rotor_track::EachRotor;
 use crate::rows::column;
 use crate::track::Track;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -21,7 +22,7 @@ pub struct Evidence<'p> {
     pub doubted: Vec<Part>,
     tracks: Arc<Tracks>,
     /// Speeds that follow from the commands, on the grid.
-    commanded: Vec<EachRotor>,
+    commanded: Arc<Vec<EachRotor>>,
     /// Measured speeds on the grid; zero where there are none.
     measured: Vec<EachRotor>,
 }

@@ -6,7 +6,8 @@
 
 use super::evidence::Evidence;
 use super::fault::{Fault, Part};
-use crate::prepared::{EachRotor, Equation};
+use crate::prepared::Equation;
+use crate::rotor_track::EachRotor;
 use nalgebra::Vector3;
 use vehicles::{ROTORS_MAX, Rotor};
 

@@ -208,6 +208,26 @@ pub struct Effect {
     pub values: Values,
 }
 
+impl Effect {
+    /// The force and the torque that it adds under `condition`; nothing of what else it may change.
+    pub(crate) fn added_wrench(&self, condition: &FlightCondition<'_>) -> Wrench {
+        let mut sum = Wrench::default();
+        for action in self.kind.actions {
+            match action {
+                Action::Wrench(wrench) => sum += wrench(&self.values, condition),
+                Action::Thrust(added_N) => {
+                    for (at, rotor) in condition.vehicle.rotors.iter().enumerate() {
+                        let force_B_N = rotor.axis * added_N(&self.values, condition, at);
+                        sum += Wrench::at(&rotor.position_m, force_B_N);
+                    }
+                }
+                Action::Vehicle(_) | Action::Delay(_) | Action::Tick(_) | Action::Battery(_) => {}
+            }
+        }
+        sum
+    }
+}
+
 impl Quantity {
     /// Describes the channels that it is measured by, and their purpose.
     #[must_use]
@@ -271,6 +291,21 @@ impl EffectKind {
     #[must_use]
     pub fn neutral(&'static self) -> Effect {
         self.with(|spec| spec.neutral.unwrap_or(spec.nominal))
+    }
+
+    /// True if it adds forces and torques, which are functions of the flight condition alone, and changes nothing else.
+    ///
+    /// ```
+    /// use plant::effects::find;
+    ///
+    /// assert!(find("rotor-drag").unwrap().only_adds());
+    /// assert!(!find("mass-error").unwrap().only_adds(), "it changes the vehicle");
+    /// assert!(!find("wind").unwrap().only_adds(), "it moves the air");
+    /// ```
+    #[must_use]
+    pub fn only_adds(&self) -> bool {
+        let adds = |action: &Action| matches!(action, Action::Thrust(_) | Action::Wrench(_));
+        !self.actions.is_empty() && self.actions.iter().all(adds)
     }
 
     /// The parameters that mean something for `vehicle`: of those that are one for each rotor, as many as it has.

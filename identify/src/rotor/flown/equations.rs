@@ -15,7 +15,8 @@ use vehicles::Vehicle;
 
 use super::blocks::Blocks;
 use super::least_squares::Rows;
-use crate::prepared::{BOX_STEPS, EachRotor, Equation, Prepared, Propulsion, Tracks, box_s};
+use crate::prepared::{BOX_STEPS, Equation, Prepared, Propulsion, Tracks, box_s};
+use crate::rotor_track::EachRotor;
 use crate::track::Track;
 use crate::unusable::Unusable;
 use crate::window::{SIMPSON, Window, central_difference};
