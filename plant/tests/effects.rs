@@ -83,7 +83,7 @@ fn every_specification_is_whole() {
     }
 }
 
-/// What an effect adds is what the model with it has more than the model without it.
+/// Sum of the model without an effect and of what it adds: the model with it.
 #[test]
 fn an_effect_that_only_adds_adds_the_difference_of_the_models() {
     let vehicle = hummingbird();
