@@ -96,7 +96,7 @@ pub fn configuration(context: &NodeContext<'_>, path: Option<&Path>) -> Result<S
 /// # Errors
 /// It is refused.
 pub fn vehicle(context: &NodeContext<'_>, path: &Path) -> Result<Vehicle, ParameterError> {
-    Vehicle::load_from(&context.files, path).map_err(|error| ParameterError::file("vehicle", error))
+    Vehicle::load_from(&context.files, path).map_err(|error| error.named_by("vehicle"))
 }
 
 /// The refusal of a vehicle.

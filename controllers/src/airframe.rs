@@ -32,7 +32,7 @@ impl ControlledVehicle {
     /// The file is refused, or its rotors cannot be allocated to.
     pub fn load(files: &InputFiles, path: &Path) -> Result<Self, ParameterError> {
         let vehicle = Vehicle::load_from(files, path);
-        let vehicle = vehicle.map_err(|error| ParameterError::file("vehicle", error))?;
+        let vehicle = vehicle.map_err(|error| error.named_by("vehicle"))?;
         Self::new(vehicle).map_err(|error| ParameterError::conflict("vehicle", error))
     }
 

@@ -84,7 +84,7 @@ pub(crate) fn load<G>(files: &InputFiles, path: &Path, read: Reader<G>) -> Resul
     let text = files.text(path);
     let unreadable = |cause| Diagnostic::unreadable(&file, &cause);
     let gains = text.map_err(unreadable).and_then(|text| parse(&text, &file, read));
-    gains.map_err(|error| ParameterError::file("gains", error))
+    gains.map_err(|error| error.named_by("gains"))
 }
 
 /// The gains in `text`; `file_name` is for messages only.

@@ -1,6 +1,6 @@
 //! Fault of a file that somebody wrote: the place, what was expected, what was found, what to do.
 
-use crate::parameter::ParameterError;
+use crate::parameter::{FileFault, FileFaults, ParameterError};
 use crate::place::Place;
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 use std::fmt;
@@ -76,6 +76,39 @@ impl Diagnostic {
     #[must_use]
     pub fn help(self, help: impl Into<String>) -> Self {
         Self { help: help.into(), ..self }
+    }
+
+    /// Creates the error of the parameter `key`, which names the file of these faults.
+    ///
+    /// ```
+    /// use diagnostics::{Diagnostic, Place};
+    ///
+    /// let fault = Diagnostic::at(Place::of("bird.toml", "mass = -1\n", &(7..9)), "it is negative");
+    /// let named = fault.named_by("vehicle").of("process `plant`");
+    /// let place = Place::of("hover.toml", "vehicle = 'bird.toml'\n", &(10..21));
+    /// let error = Diagnostic::at(place, named);
+    /// assert_eq!(error.to_string(), "hover.toml:1:11: process `plant`: bird.toml:1:8: it is negative");
+    /// // For terminals: the line that is wrong, once.
+    /// let shown = format!("{error:#}");
+    /// assert!(shown.starts_with("bird.toml:1:8: it is negative\n  |\n1 | mass = -1\n"));
+    /// assert!(shown.ends_with("\n  named in hover.toml:1:11 by process `plant`"));
+    /// ```
+    #[must_use]
+    pub fn named_by(&self, key: impl Into<String>) -> ParameterError {
+        let one = |fault: Self| FileFault {
+            key: fault.key().to_owned(),
+            message: fault.error.to_string(),
+            file: fault.file,
+            place: fault.place,
+            help: fault.help,
+        };
+        let faults = FileFaults {
+            each: self.all().map(one).collect(),
+            message: self.to_string(),
+            shown: format!("{self:#}"),
+            who: String::new(),
+        };
+        ParameterError::File { key: key.into(), faults: Box::new(faults) }
     }
 
     /// The dotted key that is to blame; empty where none is in particular.
@@ -166,7 +199,7 @@ impl fmt::Display for Diagnostic {
         match (&self.error, &self.place) {
             (ParameterError::File { faults, .. }, Some(place)) if f.alternate() => {
                 let by = if faults.who.is_empty() { String::new() } else { format!(" by {}", faults.who) };
-                write!(f, "{:#}\n  named in {place}{by}", faults.fault)?;
+                write!(f, "{}\n  named in {place}{by}", faults.shown)?;
             }
             _ => self.write_head(f)?,
         }

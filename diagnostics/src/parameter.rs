@@ -1,7 +1,7 @@
 //! Parameters of components: the error for one that is refused, and the checks that raise it.
 
-use crate::diagnostic::Diagnostic;
 use crate::nearest::nearest;
+use crate::place::Place;
 use std::fmt::{self, Display};
 
 /// A parameter that a component refuses.
@@ -62,10 +62,29 @@ pub enum ParameterError {
 /// Faults of a file that a parameter names.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FileFaults {
-    /// The faults, with their places in that file.
-    pub fault: Diagnostic,
+    /// The faults.
+    pub each: Vec<FileFault>,
+    /// The faults in text.
+    pub message: String,
+    /// The faults for terminals, with the lines of that file.
+    pub shown: String,
     /// The component that has the parameter; empty where it is not known.
     pub who: String,
+}
+
+/// A fault of a file that a parameter names.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FileFault {
+    /// The file.
+    pub file: String,
+    /// Place in the file; none where the fault is of the whole.
+    pub place: Option<Place>,
+    /// The dotted key that is to blame; empty where none is in particular.
+    pub key: String,
+    /// Expected and found values.
+    pub message: String,
+    /// Advice; empty where the message says it.
+    pub help: String,
 }
 
 /// The faults behind the component.
@@ -74,7 +93,7 @@ impl Display for FileFaults {
         if !self.who.is_empty() {
             write!(f, "{}: ", self.who)?;
         }
-        self.fault.fmt(f)
+        f.write_str(&self.message)
     }
 }
 
@@ -101,26 +120,6 @@ impl ParameterError {
     #[must_use]
     pub fn conflict(key: impl Into<String>, message: impl Display) -> Self {
         Self::Conflict { key: key.into(), message: message.to_string() }
-    }
-
-    /// Creates the error for a file that `key` names, and the `fault` in it.
-    ///
-    /// ```
-    /// use diagnostics::{Diagnostic, ParameterError, Place};
-    ///
-    /// let fault = Diagnostic::at(Place::of("bird.toml", "mass = -1\n", &(7..9)), "it is negative");
-    /// let named = ParameterError::file("vehicle", fault).of("process `plant`");
-    /// let place = Place::of("hover.toml", "vehicle = 'bird.toml'\n", &(10..21));
-    /// let error = Diagnostic::at(place, named);
-    /// assert_eq!(error.to_string(), "hover.toml:1:11: process `plant`: bird.toml:1:8: it is negative");
-    /// // For terminals: the line that is wrong, once.
-    /// let shown = format!("{error:#}");
-    /// assert!(shown.starts_with("bird.toml:1:8: it is negative\n  |\n1 | mass = -1\n"));
-    /// assert!(shown.ends_with("\n  named in hover.toml:1:11 by process `plant`"));
-    /// ```
-    #[must_use]
-    pub fn file(key: impl Into<String>, fault: Diagnostic) -> Self {
-        Self::File { key: key.into(), faults: Box::new(FileFaults { fault, who: String::new() }) }
     }
 
     /// The same of the component `who`.

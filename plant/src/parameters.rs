@@ -10,6 +10,7 @@ use crate::origin::{Origin, Physics};
 use crate::rapier::{Misfit, Rapier};
 use crate::state::RigidBody;
 use bus::context::NodeContext;
+use diagnostics::Diagnostic;
 use diagnostics::parameter::{ParameterError, all, finite, positive, refuse, require};
 use inputs::InputFiles;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -222,11 +223,11 @@ impl Parameters {
 
     /// The vehicle as it flies, and the scene around it.
     fn airframe(&self, files: &InputFiles) -> Result<(Airframe, Scene), ParameterError> {
-        let refused = |error| ParameterError::file("vehicle", error);
+        let refused = |error: Diagnostic| error.named_by("vehicle");
         let vehicle = Vehicle::load_from(files, &self.vehicle).map_err(refused)?;
         let scene =
             self.scene.as_deref().map_or_else(|| Ok(Scene::default()), |path| Scene::load_from(files, path));
-        let scene = scene.map_err(|error| ParameterError::file("scene", error))?;
+        let scene = scene.map_err(|error| error.named_by("scene"))?;
         refuse_double_rig(&vehicle, &scene)?;
         Ok((Airframe::from_files(vehicle, &scene.effects).map_err(refused)?, scene))
     }

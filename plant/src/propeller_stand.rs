@@ -172,7 +172,7 @@ impl Component for PropellerStand {
         let sigmas = [force_noise_N, torque_noise_N_m, speed_noise_rad_s];
         let noise = Noise { sigmas, random: stream(run.seed, run.name) };
         let vehicle = Vehicle::load_from(&run.files, &vehicle);
-        let vehicle = vehicle.map_err(|error| ParameterError::file("vehicle", error))?;
+        let vehicle = vehicle.map_err(|error| error.named_by("vehicle"))?;
         let is_there = (1..=vehicle.rotors.len()).contains(&rotor);
         require("rotor", rotor, is_there, "1 to 4, in the order of the vehicle file")?;
         let ticks = run.period_ticks;

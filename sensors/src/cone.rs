@@ -25,7 +25,7 @@ const RAYS: usize = 17;
 /// There is none, or it is refused.
 pub fn caster(files: &InputFiles, path: Option<&Path>) -> Result<RayCaster, ParameterError> {
     let path = path.ok_or_else(|| ParameterError::missing("scene", ""))?;
-    let scene = Scene::load_from(files, path).map_err(|error| ParameterError::file("scene", error))?;
+    let scene = Scene::load_from(files, path).map_err(|error| error.named_by("scene"))?;
     Ok(RayCaster::new(&scene))
 }
 

@@ -2,7 +2,8 @@
 //! escaped here.
 
 use anyhow::{Context, Result};
-use diagnostics::{Diagnostic, ParameterError, printable, printable_json, short_lines};
+use diagnostics::parameter::FileFault;
+use diagnostics::{Diagnostic, ParameterError, Place, printable, printable_json, short_lines};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::borrow::Cow;
@@ -105,27 +106,33 @@ fn faults(error: &anyhow::Error) -> Vec<Value> {
 
 /// The fault, or those of the file that is named there.
 fn of_named_file(fault: &Diagnostic) -> Vec<Value> {
-    let ParameterError::File { faults, .. } = &fault.error else { return vec![fault_json(fault, None)] };
-    faults.fault.all().map(|inner| fault_json(&inner, Some(fault))).collect()
+    let Diagnostic { file, place, error, help, .. } = fault;
+    let ParameterError::File { faults, .. } = error else {
+        return vec![fault_json((file, place.as_ref(), fault.key()), (&error.to_string(), help), None)];
+    };
+    let one = |FileFault { file, place, key, message, help }: &FileFault| {
+        fault_json((file, place.as_ref(), key), (message, help), Some(fault))
+    };
+    faults.each.iter().map(one).collect()
 }
 
-/// A fault; `by` is the place that names its file, where another one does.
-fn fault_json(fault: &Diagnostic, by: Option<&Diagnostic>) -> Value {
-    let place = |fault: &Diagnostic| fault.place.as_ref().map(|place| (place.line, place.column)).unzip();
-    let (line, column) = place(fault);
-    let named_in = by.map(|by| {
-        let (line, column) = place(by);
-        json!({ "file": by.file, "line": line, "column": column, "key": by.key() })
-    });
-    json!({
-        "file": fault.file,
-        "line": line,
-        "column": column,
-        "key": fault.key(),
-        "message": fault.error.to_string(),
-        "help": fault.help,
-        "named_in": named_in,
-    })
+/// A fault at a place; `by` is the place that names its file, where another one does.
+fn fault_json(
+    at: (&str, Option<&Place>, &str),
+    (message, help): (&str, &str),
+    by: Option<&Diagnostic>,
+) -> Value {
+    let named_in = by.map(|by| place_json((&by.file, by.place.as_ref(), by.key())));
+    let mut fault = place_json(at);
+    fault["message"] = message.into();
+    fault["help"] = help.into();
+    fault["named_in"] = named_in.into();
+    fault
+}
+
+fn place_json((file, place, key): (&str, Option<&Place>, &str)) -> Value {
+    let (line, column) = place.map(|place| (place.line, place.column)).unzip();
+    json!({ "file": file, "line": line, "column": column, "key": key })
 }
 
 /// Prints warnings on standard error.
