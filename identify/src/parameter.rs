@@ -99,7 +99,7 @@ impl Parameters {
     /// The plant's effect `kind` under `values`.
     ///
     /// # Panics
-    /// If it is none of the plant's.
+    /// If it is not in the catalogue.
     pub fn effect_under(&self, kind: &EffectKind, values: &[f64]) -> Effect {
         let baseline = self.baseline.iter().find(|effect| effect.kind == kind);
         let mut effect = *baseline.expect("an effect of the catalogue");

@@ -13,13 +13,12 @@ use vehicles::ROTORS_MAX;
 
 /// Length of a tick where rotors follow commands: that of the bus.
 const TICK_S: f64 = 0.001;
-/// Length of a tick where rotor speeds are measured often, so that no motor is simulated: a quarter of the period of logs at 100 Hz; tuned, no
-/// source.
+/// Length of a tick where rotor speeds are measured, so that no motor is simulated; tuned, no source.
 pub(crate) const ROTOR_TICK_S: f64 = 0.0025;
-/// Longer ticks, for logs of that period: between two samples the speeds are a straight line, and a vehicle turns by 0.1 rad, which a step of fourth
-/// order follows to 1e-8. All horizons are whole numbers of each.
-const LONG_ROTOR_TICKS_S: [f64; 2] = [0.01, 0.005];
-/// Part by which the period of a log may be below such a tick.
+/// The same for logs with a period of at least this: a step of fourth order is stable up to a damping of 550 1/s, and a vehicle that turns by 10 rad/s
+/// is followed to 1e-9.
+const LONG_ROTOR_TICK_S: f64 = 0.005;
+/// Part by which the period of such a log may be shorter.
 const PERIOD_SLACK: f64 = 0.02;
 /// Times are sums of decimal fractions: a nanosecond of slack keeps the last moment.
 const SLACK_S: f64 = 1e-9;
@@ -99,6 +98,12 @@ impl Measured {
         let tick_s = self.rotor_speed.as_ref().map_or(TICK_S, rotor_tick_s);
         let windows: Vec<usize> =
             horizons_s.iter().map(|horizon_s| (horizon_s / tick_s).round() as usize).collect();
+        debug_assert!(
+            horizons_s.iter().zip(&windows).all(|(horizon_s, ticks)| {
+                *ticks > 0 && (*ticks as f64 * tick_s - horizon_s).abs() < SLACK_S
+            }),
+            "horizons are whole numbers of ticks of {tick_s} s: {horizons_s:?}"
+        );
         let memory = airframe.initial_state(0, "predict", tick_s);
         let (start_s, end_s) = self.played.span_s();
         let at_s = |tick: usize| start_s + tick as f64 * tick_s;
@@ -113,6 +118,15 @@ impl Measured {
         let span_s = (end_s - start_s + SLACK_S).min(self.span_s);
         let mut speed_hint = 0;
         for tick in 1..=(span_s / tick_s) as usize {
+            // A push acts over the tick: half of it before, half behind.
+            let over_tick = (!pushing.is_none()).then(|| pushing.at(at_s(tick) - 0.5 * tick_s));
+            let kick = |plant: &mut FreeFlight| {
+                if let Some(push) = over_tick {
+                    let body = pushed(&plant.state().body, push, 0.5 * tick_s);
+                    plant.set_body(&body);
+                }
+            };
+            kick(&mut plant);
             match &self.rotor_speed {
                 None => plant.step(&before.command[..count], tick_s, &[]),
                 Some(speeds) => {
@@ -120,10 +134,7 @@ impl Measured {
                     plant.step_with_rotors(&PerRotor::from_fn(count, |rotor| rotors[rotor]), tick_s);
                 }
             }
-            if !pushing.is_none() {
-                let pushed = pushed(&plant.state().body, pushing.at(at_s(tick) - 0.5 * tick_s), tick_s);
-                plant.set_body(&pushed);
-            }
+            kick(&mut plant);
             before = self.played.at(at_s(tick), &mut hint);
             if self.turns_as_measured {
                 let RigidBody { attitude_WB, angular_velocity_B_rad_s, .. } = body(&before);
@@ -151,8 +162,8 @@ impl Measured {
 
 /// Length of a tick in which rotors turn at measured `speeds`.
 fn rotor_tick_s(speeds: &Channel<ROTORS_MAX>) -> f64 {
-    let longest_s = (1.0 + PERIOD_SLACK) * speeds.period_s().unwrap_or_default();
-    LONG_ROTOR_TICKS_S.into_iter().find(|tick_s| *tick_s <= longest_s).unwrap_or(ROTOR_TICK_S)
+    let period_s = (1.0 + PERIOD_SLACK) * speeds.period_s().unwrap_or_default();
+    if period_s >= LONG_ROTOR_TICK_S { LONG_ROTOR_TICK_S } else { ROTOR_TICK_S }
 }
 
 /// The rotors at `time_s`, on straight lines between the samples of their speeds. `hint` is an index near, kept between calls
@@ -218,9 +229,9 @@ pub fn components(end: &WindowEnd, state: &RigidBody) -> [[f64; 3]; 4] {
     away.map(Into::into)
 }
 
-/// The body after a tick under a push.
-fn pushed(body: &RigidBody, push: AddedAcceleration, tick_s: f64) -> RigidBody {
-    let [x, y, z, forward, left, up] = push.map(|acceleration| acceleration * tick_s);
+/// The body after a push over `span_s`.
+fn pushed(body: &RigidBody, push: AddedAcceleration, span_s: f64) -> RigidBody {
+    let [x, y, z, forward, left, up] = push.map(|acceleration| acceleration * span_s);
     RigidBody {
         velocity_W_m_s: body.velocity_W_m_s + Vector3::new(forward, left, up),
         angular_velocity_B_rad_s: body.angular_velocity_B_rad_s + Vector3::new(x, y, z),

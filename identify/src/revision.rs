@@ -16,7 +16,7 @@ use crate::worth::Worth;
 use plant::effects::Action;
 use rayon::prelude::*;
 use serde::Serialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Number of candidates that are fitted of those that predictions may ask for.
 const TRIED: usize = 3;
@@ -212,7 +212,7 @@ impl Found<'_, '_> {
             let of_effect = self.of_effect(name);
             // What begins at a guess is far from linear: the others are fitted in full.
             if of_effect.iter().any(|candidate| !candidate.kind.guesses.is_empty()) {
-                let (_, fitted) = without_effect(problem, accepted, base, name);
+                let (_, fitted) = without_effects(problem, accepted, base, &[name]);
                 let equations = problem.equations(&fitted.values, &fitted.free);
                 Foresight::of(problem, &equations, &fitted, &[])
             } else {
@@ -248,14 +248,16 @@ impl Found<'_, '_> {
     fn names(&self) -> Vec<&'static str> {
         let mut names: Vec<&'static str> =
             self.accepted.iter().map(|candidate| candidate.kind.name).collect();
-        names.dedup();
+        // Of an effect whose parameters are candidates by themselves others may have been accepted in between.
+        let mut known = BTreeSet::new();
+        names.retain(|name| known.insert(*name));
         names
     }
 
     /// Predictions without an effect, with the others fitted and refined from the values `near` on.
     fn refined_without(&self, effect: &str, near: &[f64]) -> Foresight {
         let Self { problem, accepted, base } = self;
-        let (_, fitted) = without_effect(problem, accepted, base, effect);
+        let (_, fitted) = without_effects(problem, accepted, base, &[effect]);
         refined(problem, &fitted, Some(near)).map_or_else(
             || Foresight::of(problem, &problem.equations(&fitted.values, &fitted.free), &fitted, &[]),
             |moved| moved.foresight(&[]),
@@ -277,7 +279,9 @@ impl Found<'_, '_> {
         if idle.len() > 1 {
             let candidates: Vec<Candidate> =
                 idle.iter().flat_map(|withdrawn| self.of_effect(withdrawn.effect)).collect();
-            if predictions.with.is_worth_more_than(&together(&free_parameters(&candidates))) {
+            // What begins at a guess is far from linear, as above.
+            let is_linear = candidates.iter().all(|candidate| candidate.kind.guesses.is_empty());
+            if !is_linear || predictions.with.is_worth_more_than(&together(&free_parameters(&candidates))) {
                 idle.truncate(1);
             }
         }
@@ -346,15 +350,15 @@ impl Predictions {
     }
 }
 
-/// The accepted candidates but those of an effect, and their fit.
-pub fn without_effect(
+/// The accepted candidates but those of these effects, and their fit.
+pub fn without_effects(
     problem: &Problem,
     accepted: &[Candidate],
     base: &FitResult,
-    effect: &str,
+    effects: &[&str],
 ) -> (Vec<Candidate>, FitResult) {
     let (dropped, others): (Vec<Candidate>, Vec<Candidate>) =
-        accepted.iter().cloned().partition(|candidate| candidate.kind.name == effect);
+        accepted.iter().cloned().partition(|candidate| effects.contains(&candidate.kind.name));
     let mut start = base.values.clone();
     free_parameters(&dropped)
         .into_iter()

@@ -29,7 +29,7 @@ use crate::judgement::{
 };
 use crate::logging;
 use crate::normal::{self, Block};
-use crate::revision::{End, Revision, Revisions, Withdrawn, without_effect};
+use crate::revision::{End, Revision, Revisions, Withdrawn, without_effects};
 use crate::worth::Worth;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -114,10 +114,9 @@ pub fn select(problem: &mut Problem, candidates: &[Candidate], progress: &mut dy
         let StepwiseSearch { accepted, base, rounds } = &mut search;
         match revisions.next(problem, accepted, base, &open, progress) {
             Revision::Without(found) => {
-                for Withdrawn { effect, .. } in &found {
-                    (*accepted, *base) = without_effect(problem, accepted, base, effect);
-                    open.retain(|candidate| candidate.kind.name != *effect);
-                }
+                let effects: Vec<&str> = found.iter().map(|withdrawn| withdrawn.effect).collect();
+                (*accepted, *base) = without_effects(problem, accepted, base, &effects);
+                open.retain(|candidate| !effects.contains(&candidate.kind.name));
                 withdrawn.extend(found);
             }
             Revision::With(found) => {

@@ -54,7 +54,7 @@ impl FreeFlight {
         let mut actuation = airframe.begin_tick(&mut self.effects, &self.state, &unasked, dt_s);
         actuation.targets_rad_s = rotors.map(|rotor| motor::target_of(&airframe.vehicle().motor, &rotor));
         self.effects.actuation = actuation;
-        self.model.advance(&mut self.state, &actuation, dt_s);
+        self.model.advance_with_rotors(&mut self.state, &actuation, dt_s);
     }
 }
 

@@ -128,6 +128,19 @@ impl NewtonEuler {
         state.rotors = self.airframe.settled(actuation, &state.rotors);
     }
 
+    /// The same with rotors whose speeds grow by their accelerations, whatever their motors would do.
+    pub(crate) fn advance_with_rotors(&self, state: &mut State, actuation: &Actuation, dt_s: f64) {
+        let held = state.rotors.map(|RotorState { acceleration_rad_s2, .. }| RotorRates {
+            acceleration_rad_s2,
+            jerk_rad_s3: 0.0,
+        });
+        let span_s = dt_s / f64::from(self.substeps);
+        for _ in 0..self.substeps {
+            *state = Self::stepped(state, span_s, |state| self.rates_with(state, actuation, held));
+        }
+        state.body.attitude_WB = UnitQuaternion::new_normalize(state.body.attitude_WB.into_inner());
+    }
+
     /// Specific force and angular acceleration at `state`, in still air.
     pub fn accelerations(&self, state: &State) -> Accelerations {
         self.accelerations_under(&Actuation::none(state.rotors.len()), state)
@@ -171,7 +184,11 @@ impl NewtonEuler {
         span_s: f64,
         hold: impl Fn(&State, Rates) -> Rates,
     ) -> State {
-        let rates = |state: &State| hold(state, self.rates(state, actuation));
+        Self::stepped(state, span_s, |state| hold(state, self.rates(state, actuation)))
+    }
+
+    /// One classic Runge-Kutta step of fourth order.
+    fn stepped(state: &State, span_s: f64, rates: impl Fn(&State) -> Rates) -> State {
         let mut sum = rates(state);
         let mut stage = state.moved(&sum, span_s / 2.0);
         for (weight, share) in [(2.0, 0.5), (2.0, 1.0)] {
@@ -186,8 +203,12 @@ impl NewtonEuler {
 
     /// Rates of free flight.
     pub(crate) fn rates(&self, state: &State, actuation: &Actuation) -> Rates {
-        let mut rates =
-            Rates { body: BodyRates::default(), rotors: self.airframe.rotor_rates(actuation, state) };
+        self.rates_with(state, actuation, self.airframe.rotor_rates(actuation, state))
+    }
+
+    /// The same with rotors that change by these rates.
+    fn rates_with(&self, state: &State, actuation: &Actuation, rotors: PerRotor<RotorRates>) -> Rates {
+        let mut rates = Rates { body: BodyRates::default(), rotors };
         let wrench = self.airframe.wrench(actuation, state, &rates.rotors);
         let attitude_WB = state.body.attitude_WB.as_ref();
         let force_W_N = rotated(attitude_WB, &wrench.force_B_N);

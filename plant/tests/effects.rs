@@ -108,7 +108,6 @@ fn an_effect_that_only_adds_adds_the_difference_of_the_models() {
         let name = effect.kind.name;
         assert!(apart.specific_force_B_m_s2.norm() < 1e-12, "{name}: {apart:?}");
         assert!(apart.angular_acceleration_B_rad_s2.norm() < 1e-11, "{name}: {apart:?}");
-        // Those of a rig have nothing to act on in this flight.
         let acts = expected.specific_force_B_m_s2.norm() + expected.angular_acceleration_B_rad_s2.norm();
         assert!(acts > 1e-4, "{name} does nothing here");
     }

@@ -9,7 +9,7 @@ use common::{
     momentum_W,
 };
 use nalgebra::{UnitQuaternion, Vector3};
-use plant::{Airframe, Backend, FreeFlight, NewtonEuler, RigidBody, State};
+use plant::{Airframe, Backend, FreeFlight, NewtonEuler, PerRotor, RigidBody, RotorState, State};
 use vehicles::Vehicle;
 
 #[test]
@@ -164,6 +164,21 @@ fn commands_that_are_not_numbers_leave_the_state_finite() {
     fly(&model, &mut state, &[f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -1e300], 100);
     assert!(state.body.position_W_m.iter().all(|x| x.is_finite()));
     assert!(state.rotors.iter().all(|rotor| rotor.speed_rad_s.is_finite()));
+}
+
+#[test]
+fn turned_rotors_go_on_with_their_accelerations_whatever_their_motors_are() {
+    for vehicle in [hummingbird(), crazyflie()] {
+        let airframe = Airframe::new(vehicle);
+        let memory = airframe.initial_state(0, "plant", 0.01);
+        let model = NewtonEuler::flying(airframe, 1);
+        let mut flight = FreeFlight::new(model, RigidBody::level_at(Vector3::z()), memory);
+        let rotor = |acceleration_rad_s2| RotorState { speed_rad_s: 400.0, acceleration_rad_s2 };
+        flight.step_with_rotors(&PerRotor::from([900.0, -900.0, 0.0, 50.0].map(rotor)), 0.01);
+        for (rotor, expected) in flight.state().rotors.iter().zip([409.0, 391.0, 400.0, 400.5]) {
+            assert!((rotor.speed_rad_s - expected).abs() < 1e-9, "{rotor:?} for {expected}");
+        }
+    }
 }
 
 /// A vehicle whose rotors are turned as those of a commanded one moves as that one: thrust, torque and the reaction of rotors

@@ -38,16 +38,15 @@ pub fn effects(arguments: &EffectsArguments) -> Result<bool> {
 
 fn named(name: &str) -> Result<&'static EffectKind> {
     let names = CATALOGUE.iter().map(|kind| kind.name);
-    find(name).ok_or_else(|| {
-        anyhow!("there is no effect `{name}`; {}", did_you_mean(name, names, "the effects are"))
-    })
+    find(name)
+        .ok_or_else(|| anyhow!("unknown effect `{name}`; {}", did_you_mean(name, names, "the effects are")))
 }
 
 /// A line for each effect.
 fn list() -> String {
     let width = CATALOGUE.iter().map(|kind| kind.name.len()).max().unwrap_or_default();
     let lines = CATALOGUE.iter().map(|kind| format!("{:width$}  {}\n", kind.name, kind.summary));
-    lines.chain(["`hummingbus effects NAME` tells all about one.".to_owned()]).collect()
+    lines.chain(["`hummingbus effects NAME` prints one effect in full.".to_owned()]).collect()
 }
 
 fn json(kind: &EffectKind) -> Value {
@@ -57,6 +56,7 @@ fn json(kind: &EffectKind) -> Value {
         "equation": kind.equation,
         "source": kind.source,
         "validity": kind.validity,
+        "needs": kind.needs.iter().map(|need| need.describe()).collect::<Vec<_>>(),
         "parameters": kind.parameters.iter().map(parameter_json).collect::<Vec<_>>(),
     })
 }

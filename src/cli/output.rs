@@ -111,18 +111,22 @@ fn of_named_file(fault: &Diagnostic) -> Vec<Value> {
         return vec![fault_json((file, place.as_ref(), fault.key()), (&error.to_string(), help), None)];
     };
     let one = |FileFault { file, place, key, message, help }: &FileFault| {
-        fault_json((file, place.as_ref(), key), (message, help), Some(fault))
+        fault_json((file, place.as_ref(), key), (message, help), Some((fault, &faults.who)))
     };
     faults.each.iter().map(one).collect()
 }
 
-/// A fault at a place; `by` is the place that names its file, where another one does.
+/// A fault at a place; `by` is the place that names its file, where another one does, and the component that reads it.
 fn fault_json(
     at: (&str, Option<&Place>, &str),
     (message, help): (&str, &str),
-    by: Option<&Diagnostic>,
+    by: Option<(&Diagnostic, &str)>,
 ) -> Value {
-    let named_in = by.map(|by| place_json((&by.file, by.place.as_ref(), by.key())));
+    let named_in = by.map(|(by, component)| {
+        let mut place = place_json((&by.file, by.place.as_ref(), by.key()));
+        place["component"] = component.into();
+        place
+    });
     let mut fault = place_json(at);
     fault["message"] = message.into();
     fault["help"] = help.into();

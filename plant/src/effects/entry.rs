@@ -28,7 +28,7 @@ fn kind(entry: &EffectEntry) -> Result<&'static EffectKind, Diagnostic> {
         let names = || CATALOGUE.iter().map(|kind| kind.name);
         let all = names().collect::<Vec<_>>().join(", ");
         let near = nearest(&entry.name, names());
-        let help = near.map_or("`hummingbus effects` lists what they do".to_owned(), |near| {
+        let help = near.map_or("`hummingbus effects` lists all effects".to_owned(), |near| {
             format!("did you mean \"{near}\"?")
         });
         bad_name(entry, &format!("one of {all}"), "no such effect").help(help)

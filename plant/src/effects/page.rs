@@ -9,7 +9,7 @@ const HEAD: &str = "# Effects
 
 An effect is a named piece of physics beyond the declared vehicle. A vehicle file lists those of the vehicle, a scene
 file those of the surroundings; the plant flies both, the vehicle's first, each in the order of its file, and each
-effect once. Forces, torques and changes of thrust add up. `hummingbus effects NAME` prints what stands here of one.
+effect once. Forces, torques and changes of thrust add up. `hummingbus effects NAME` prints the section of one effect.
 
 ```toml
 [[effects]]
