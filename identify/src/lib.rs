@@ -99,6 +99,8 @@ mod sensing;
 mod sensor_effects;
 pub mod statistics;
 pub mod steps_ahead;
+#[cfg(test)]
+mod test_flights;
 mod track;
 mod trim;
 mod unusable;

@@ -401,3 +401,60 @@ fn measured_rotors(flight: &Prepared, pose_s: f64) -> Vec<PerRotor<RotorState>> 
     let count = flight.flight.rotors;
     rotors.map(|(speed, slope)| PerRotor::from_fn(count, |i| rotor(speed[i], slope[i]))).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::prepared::Propulsion;
+    use crate::test_flights::{flown, hummingbird};
+
+    /// Derivatives by parameters of effects that only add forces and torques are those of the whole model: beside others that act, in wind, for a
+    /// heavier vehicle, and where a step has to go down.
+    #[test]
+    fn derivatives_by_added_forces_are_those_of_the_whole_model() {
+        let vehicle = hummingbird();
+        let model = Model { parameters: Parameters::of(&vehicle, &[]), vehicle };
+        let flight = flown(
+            [4.0, 0.01],
+            |t| [2.0 * libm::sin(1.3 * t), 1.5 * libm::cos(0.9 * t), 0.6 + 0.3 * libm::sin(2.0 * t)],
+            |t| [0.3 * libm::sin(2.1 * t), 0.2 * libm::cos(1.7 * t), 0.5 * t],
+        );
+        let prepared = Prepared::new(&flight, None, &Propulsion::of(&model.vehicle)).unwrap();
+        let mut values = model.parameters.baseline();
+        let acting = ["rotor-drag", "translational-lift", "wind", "mass-error", "com-offset", "sensor-bias"];
+        for (value, entry) in values.iter_mut().zip(&model.parameters.all) {
+            if acting.contains(&entry.kind.name) {
+                *value = entry.bounded(entry.baseline + 0.5 * entry.scale);
+            }
+            if entry.kind.name == "parasitic-drag" {
+                *value = entry.spec().max;
+            }
+        }
+        let all = &model.parameters.all;
+        let free: Vec<usize> = (0..all.len()).filter(|at| all[*at].kind.only_adds()).collect();
+        assert!(free.len() > 10, "{free:?}");
+        let (residual, columns) = model.linearised(&prepared, &values, &free);
+        let norm = |rows: &[f64]| rows.iter().map(|row| row * row).sum::<f64>().sqrt();
+        for (at, column) in free.iter().zip(&columns) {
+            let entry = &all[*at];
+            let up = values[*at] + entry.step <= entry.spec().max;
+            let step = if up { entry.step } else { -entry.step };
+            let mut moved = values.clone();
+            moved[*at] += step;
+            let moved = model.residual_under(&prepared, &moved);
+            let expected: Vec<f64> = moved.iter().zip(&residual).map(|(a, b)| (a - b) / step).collect();
+            let apart: Vec<f64> = column.iter().zip(&expected).map(|(a, b)| a - b).collect();
+            let (kind, name) = (entry.kind.name, entry.spec().name);
+            // Differences of sums have the rounding of the sums.
+            let rounding = 1e-11 * norm(&residual) / step.abs();
+            assert!(
+                norm(&apart) <= 1e-9 * norm(&expected) + rounding,
+                "{kind}.{name}: {} of {}",
+                norm(&apart),
+                norm(&expected)
+            );
+        }
+        let shown = columns.iter().filter(|column| norm(column) > 0.0).count();
+        assert!(shown > 8, "{shown} of {} act in this flight", columns.len());
+    }
+}

@@ -257,3 +257,30 @@ pub(crate) fn body(row: &Row) -> RigidBody {
         angular_velocity_B_rad_s: row.angular_velocity_rad_s.into(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_flights::{flown, hummingbird};
+
+    /// A constant push along x moves a vehicle that hovers by a t^2 / 2, whatever the length of a tick is.
+    #[test]
+    fn a_push_acts_over_the_whole_of_each_tick() {
+        for (period_s, tick_s) in
+            [(0.01, LONG_ROTOR_TICK_S), (0.00495, LONG_ROTOR_TICK_S), (0.002, ROTOR_TICK_S)]
+        {
+            let flight = flown([2.0, period_s], |_| [0.0, 0.0, 2.0], |_| [0.0; 3]);
+            assert_eq!(rotor_tick_s(&flight.rotor_speed), tick_s);
+            let push = |_| Forecast::constant([0.0, 0.0, 0.0, 0.4, 0.0, 0.0]);
+            let horizons_s = [0.05, 0.1, 0.5];
+            let measured = Measured::of(&flight).unwrap();
+            let ends = measured.ends_within(Airframe::new(hummingbird()), &horizons_s, push);
+            for (ends, horizon_s) in ends.iter().zip(horizons_s) {
+                assert!(!ends.is_empty(), "no window of {horizon_s} s at {period_s} s");
+                let expected = Vector3::new(0.2 * horizon_s * horizon_s, 0.0, 2.0);
+                let found = ends[0].simulated.position_W_m;
+                assert!((found - expected).norm() < 1e-9, "{period_s} s, after {horizon_s} s: {found}");
+            }
+        }
+    }
+}
