@@ -224,7 +224,7 @@ impl<'m, 'p, 'f> About<'m, 'p, 'f> {
         self.model.states(self.flight, &self.tracks, &self.rotors, self.values).map(of_state).collect()
     }
 
-    /// The derivative of the residual by one parameter. Effects that only add forces and torques are looked at under the `conditions` of the vehicle of
+    /// The derivative of the residual by one parameter. Effects that only add forces and torques are evaluated under the `conditions` of the vehicle of
     /// `flown`.
     fn column(
         &self,

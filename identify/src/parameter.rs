@@ -93,9 +93,7 @@ impl Parameters {
         }
         effects.into_iter().zip(is_in).filter(|(_, is_in)| *is_in).map(|(effect, _)| effect).collect()
     }
-}
 
-impl Parameters {
     /// The plant's effect `kind` under `values`.
     ///
     /// # Panics
