@@ -10,11 +10,12 @@ pub(crate) mod summary;
 
 use crate::source::Source;
 use mcap::read::ChannelAccumulator;
-use mcap::records::{self, ChunkHeader, Record, SchemaHeader, op};
+use mcap::records::{self, ChunkHeader, MessageHeader, Record, SchemaHeader, op};
 use mcap::{Channel, MAGIC, Message, parse_record};
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Larger chunks are refused: writers close theirs at some megabytes.
@@ -234,11 +235,36 @@ pub struct Messages<'a> {
     /// The byte in front of which reading stops; `None` if it goes on to the footer.
     end: Option<usize>,
     chunk: Option<Chunk>,
+    /// The memory of the chunk before, which the next one is unpacked into.
+    spare: Vec<u8>,
+    /// The last message that stood outside of chunks.
+    loose: Vec<u8>,
     /// Bytes that further chunks may unpack to.
     unpacked_left: u64,
     channels: Declared,
     is_behind_data: bool,
     is_done: bool,
+}
+
+/// A message, and the place of its data: in the chunk that is being read, or else in the last message outside of chunks.
+struct Placed {
+    channel: Arc<Channel<'static>>,
+    header: MessageHeader,
+    data: Range<usize>,
+}
+
+impl Placed {
+    /// The same, where the record's body begins at `body`.
+    fn behind(self, body: usize) -> Self {
+        Self { data: body + self.data.start..body + self.data.end, ..self }
+    }
+}
+
+/// A message, whose data stand where they were unpacked.
+pub(crate) struct InPlace<'a> {
+    pub(crate) channel: Arc<Channel<'static>>,
+    pub(crate) header: MessageHeader,
+    pub(crate) data: &'a [u8],
 }
 
 /// A chunk that is being read.
@@ -262,6 +288,8 @@ impl<'a> Messages<'a> {
             at: 0,
             end: None,
             chunk: None,
+            spare: Vec::new(),
+            loose: Vec::new(),
             unpacked_left: limit(&source, UNPACKED_BYTES, UNPACKED_RATIO),
             channels: Declared::of(&source),
             is_behind_data: false,
@@ -270,15 +298,17 @@ impl<'a> Messages<'a> {
     }
 
     /// The next message, if the next record is one.
-    fn step(&mut self) -> Result<Option<Message<'static>>, Damage> {
+    fn step(&mut self) -> Result<Option<Placed>, Damage> {
         if let Some(chunk) = &mut self.chunk {
             if chunk.at < chunk.content.len() {
                 let bytes = Bytes { source: Source::Memory(&chunk.content), of: &chunk.of };
                 let (at, raw) = (chunk.at, bytes.record(chunk.at)?);
                 chunk.at = raw.end;
-                return linked(&mut self.channels, &bytes, at, &raw);
+                let body = raw.end - raw.body.len();
+                let placed = linked(&mut self.channels, &bytes, at, &raw)?;
+                return Ok(placed.map(|placed| placed.behind(body)));
             }
-            self.chunk = None;
+            self.spare = self.chunk.take().map_or_else(Vec::new, |chunk| chunk.content);
         }
         let (file, at) = (Bytes { source: self.source, of: "" }, self.at);
         if self.end.is_some_and(|end| at >= end) {
@@ -306,11 +336,19 @@ impl<'a> Messages<'a> {
                             _ => Fault::Large(stated),
                         })
                     })?;
-                    let content = unpacked(&header, &data).map_err(refused)?.into_owned();
+                    let mut content = std::mem::take(&mut self.spare);
+                    unpack(&header, &data, &mut content).map_err(refused)?;
                     self.chunk = Some(Chunk { content, at: 0, of: format!(" of the chunk at byte {at}") });
                 }
             }
-            _ if !self.is_behind_data => return linked(&mut self.channels, &file, at, &raw),
+            _ if !self.is_behind_data => {
+                let placed = linked(&mut self.channels, &file, at, &raw)?;
+                if placed.is_some() {
+                    self.loose.clear();
+                    self.loose.extend_from_slice(&raw.body);
+                }
+                return Ok(placed);
+            }
             // The summary repeats schemas and channels, and need not be held against them.
             _ => file.parsed(at, &raw).map(|_| ())?,
         }
@@ -318,28 +356,47 @@ impl<'a> Messages<'a> {
     }
 }
 
-impl Iterator for Messages<'_> {
-    type Item = Result<Message<'static>, Damage>;
-
-    fn next(&mut self) -> Option<Self::Item> {
+impl Messages<'_> {
+    /// The next message, without a copy.
+    pub(crate) fn next_in_place(&mut self) -> Option<Result<InPlace<'_>, Damage>> {
         while !self.is_done {
             let step = self.step();
             self.is_done |= step.is_err();
             if let Some(next) = step.transpose() {
-                return Some(next);
+                let all = self.chunk.as_ref().map_or(&self.loose, |chunk| &chunk.content);
+                return Some(next.map(|Placed { channel, header, data }| InPlace {
+                    channel,
+                    header,
+                    data: &all[data],
+                }));
             }
         }
         None
     }
 }
 
-/// A message with its channel; schemas and channels are kept for those that follow.
+impl Iterator for Messages<'_> {
+    type Item = Result<Message<'static>, Damage>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let next = self.next_in_place()?;
+        Some(next.map(|InPlace { channel, header, data }| Message {
+            channel,
+            sequence: header.sequence,
+            log_time: header.log_time,
+            publish_time: header.publish_time,
+            data: Cow::Owned(data.to_owned()),
+        }))
+    }
+}
+
+/// A message with its channel, its data placed in the record's body; schemas and channels are kept for those that follow.
 fn linked(
     channels: &mut Declared,
     bytes: &Bytes<'_>,
     at: usize,
     raw: &Raw<'_>,
-) -> Result<Option<Message<'static>>, Damage> {
+) -> Result<Option<Placed>, Damage> {
     match bytes.parsed(at, raw)? {
         Record::Schema { header, data } => channels.add_schema(header, data.into_owned()),
         Record::Channel(channel) => channels.add_channel(channel, raw.body.len()),
@@ -348,9 +405,8 @@ fn linked(
             let unknown =
                 || bytes.damage(at, format!("a message of the channel {id}, which no record declares"));
             let channel = channels.all.get(id).ok_or_else(unknown)?;
-            let data = Cow::Owned(data.into_owned());
-            let (log_time, publish_time) = (header.log_time, header.publish_time);
-            return Ok(Some(Message { channel, sequence: header.sequence, log_time, publish_time, data }));
+            let end = raw.body.len();
+            return Ok(Some(Placed { channel, header, data: end - data.len()..end }));
         }
         _ => Ok(()),
     }
@@ -418,20 +474,21 @@ fn magic(file: &Bytes<'_>, at: usize) -> Result<usize, Damage> {
     Err(file.damage(at, format!("{what} the magic bytes of MCAP, 89 4d 43 41 50 30 0d 0a")))
 }
 
-/// The records of a chunk.
-fn unpacked<'a>(header: &ChunkHeader, data: &'a [u8]) -> Result<Cow<'a, [u8]>, Fault> {
+/// Puts the records of a chunk into `content`, instead of what is in it.
+fn unpack(header: &ChunkHeader, data: &[u8], content: &mut Vec<u8>) -> Result<(), Fault> {
     let size = header.uncompressed_size;
-    let content = match header.compression.as_str() {
-        "" => Cow::Borrowed(data),
-        "zstd" => Cow::Owned(read_all(zstd_decoder(data, size)?, size)?),
-        "lz4" => Cow::Owned(read_all(lz4_flex::frame::FrameDecoder::new(data), size)?),
+    content.clear();
+    match header.compression.as_str() {
+        "" => content.extend_from_slice(data),
+        "zstd" => read_all(zstd_decoder(data, size)?, size, content)?,
+        "lz4" => read_all(lz4_flex::frame::FrameDecoder::new(data), size, content)?,
         other => return Err(Fault::Compression(other.to_owned())),
-    };
-    let (stored, found) = (header.uncompressed_crc, crc32fast::hash(&content));
+    }
+    let (stored, found) = (header.uncompressed_crc, crc32fast::hash(content));
     if stored != 0 && stored != found {
         return Err(Fault::Checksum { stored, found });
     }
-    Ok(content)
+    Ok(())
 }
 
 /// The decoder of a chunk of `size` bytes.
@@ -442,13 +499,12 @@ fn zstd_decoder(data: &[u8], size: u64) -> Result<impl Read, Fault> {
     Ok(decoder)
 }
 
-/// The content of a chunk, which is `size` bytes; the memory grows with the bytes found.
-fn read_all(decoder: impl Read, size: u64) -> Result<Vec<u8>, Fault> {
-    let mut content = Vec::new();
+/// Puts the content of a chunk, which is `size` bytes, into `content`; the memory grows with the bytes found.
+fn read_all(decoder: impl Read, size: u64, content: &mut Vec<u8>) -> Result<(), Fault> {
     // One byte more shows that there is more.
-    let read = decoder.take(size.saturating_add(1)).read_to_end(&mut content)?;
+    let read = decoder.take(size.saturating_add(1)).read_to_end(content)?;
     if read as u64 == size {
-        return Ok(content);
+        return Ok(());
     }
     Err(Fault::Size { stated: size, found: read })
 }

@@ -26,6 +26,19 @@ pub struct Record {
     pub cdr: Vec<u8>,
 }
 
+/// A message of a recording, as [`Recording::visit`] passes it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Passing<'a> {
+    /// Tick at which it was sent.
+    pub tick: u32,
+    /// Simulation time in nanoseconds.
+    pub time_ns: u64,
+    /// Topic.
+    pub topic: &'a str,
+    /// Encapsulation header and body.
+    pub cdr: &'a [u8],
+}
+
 /// A topic of a recording.
 #[derive(Clone, Debug)]
 pub struct Topic {
@@ -266,16 +279,52 @@ impl Recording {
         self.whole(Messages::of(self.source()))
     }
 
+    /// Calls `take` with each message in the order of [`Recording::messages`], where it stands: nothing is copied.
+    ///
+    /// ```no_run
+    /// use recorder::{RecordingError, reader::Recording};
+    ///
+    /// let (recording, mut bytes) = (Recording::open("hover.mcap".as_ref())?, 0);
+    /// recording.visit::<RecordingError>(|message| {
+    ///     bytes += message.cdr.len();
+    ///     Ok(())
+    /// })?;
+    /// println!("{bytes} bytes of messages");
+    /// # Ok::<(), RecordingError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// If the file is damaged, or that of `take`, which then gets no further message.
+    pub fn visit<E: From<RecordingError>>(
+        &self,
+        mut take: impl FnMut(Passing<'_>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let mut messages = Messages::of(self.source());
+        while let Some(message) = messages.next_in_place() {
+            if !self.has_whole(&message) {
+                break;
+            }
+            let message = message.map_err(|damage| RecordingError::content(&self.path, damage))?;
+            let (header, topic) = (message.header, message.channel.topic.as_str());
+            take(Passing { tick: header.sequence, time_ns: header.log_time, topic, cdr: message.data })?;
+        }
+        Ok(())
+    }
+
+    /// False from where the recording was cut on.
+    fn has_whole<T>(&self, message: &Result<T, Damage>) -> bool {
+        match message {
+            Ok(_) => true,
+            Err(damage) => self.cut.is_none() || damage.is_refused,
+        }
+    }
+
     /// The messages, as far as the recording is whole.
     pub(crate) fn whole<'a>(
         &'a self,
         messages: Messages<'a>,
     ) -> impl Iterator<Item = Result<Record, RecordingError>> + use<'a> {
-        let is_whole = |message: &Result<_, Damage>| match message {
-            Ok(_) => true,
-            Err(damage) => self.cut.is_none() || damage.is_refused,
-        };
-        messages.take_while(is_whole).map(|message| {
+        messages.take_while(|message| self.has_whole(message)).map(|message| {
             let message = message.map_err(|damage| RecordingError::content(&self.path, damage))?;
             Ok(Record {
                 tick: message.sequence,
@@ -291,10 +340,18 @@ impl Recording {
     /// # Errors
     /// If it does not fit its definition.
     pub fn decode(&self, record: &Record) -> Result<Vec<Leaf>, RecordingError> {
-        let topic = self.topic(&record.topic)?;
-        topic.definition.decode(&record.cdr).map_err(|reason| RecordingError::Decode {
-            topic: record.topic.clone(),
-            type_name: topic.type_name.clone(),
+        self.decode_on(&record.topic, &record.cdr)
+    }
+
+    /// The fields of a message on `topic` with these bytes.
+    ///
+    /// # Errors
+    /// As [`Recording::decode`].
+    pub fn decode_on(&self, topic: &str, cdr: &[u8]) -> Result<Vec<Leaf>, RecordingError> {
+        let Topic { type_name, definition, .. } = self.topic(topic)?;
+        definition.decode(cdr).map_err(|reason| RecordingError::Decode {
+            topic: topic.to_owned(),
+            type_name: type_name.clone(),
             reason,
         })
     }

@@ -39,21 +39,21 @@ impl Recording {
     pub fn series(&self, fields: &[(&str, &str)]) -> Result<Vec<Series>, RecordingError> {
         fields.iter().try_for_each(|(topic, _)| self.topic(topic).map(|_| ()))?;
         let mut series = vec![Series::default(); fields.len()];
-        for record in self.messages() {
-            let record = record?;
-            let wanted = |(topic, _): &(&str, &str)| record.topic == *topic;
+        self.visit::<RecordingError>(|message| {
+            let wanted = |(topic, _): &(&str, &str)| message.topic == *topic;
             if !fields.iter().any(wanted) {
-                continue;
+                return Ok(());
             }
-            let leaves = self.decode(&record)?;
+            let leaves = self.decode_on(message.topic, message.cdr)?;
             for (series, field) in series.iter_mut().zip(fields).filter(|(_, field)| wanted(field)) {
-                let unknown = || RecordingError::unknown_field(&record.topic, field.1, &leaves);
+                let unknown = || RecordingError::unknown_field(message.topic, field.1, &leaves);
                 let (value, unit) = value(&leaves, field.1).ok_or_else(unknown)?;
-                series.time_ns.push(record.time_ns);
+                series.time_ns.push(message.time_ns);
                 series.value.push(value);
                 unit.clone_into(&mut series.unit);
             }
-        }
+            Ok(())
+        })?;
         Ok(series)
     }
 

@@ -2,6 +2,7 @@
 
 use crate::columns::{Column, write_parquet};
 use anyhow::Result;
+use recorder::RecordingError;
 use recorder::definition::{Leaf, Value, is_padding};
 use recorder::reader::Recording;
 use std::io::Write;
@@ -53,12 +54,12 @@ struct Field {
 pub fn table(recording: &Recording, topic: &str) -> Result<Table> {
     recording.topic(topic)?;
     let mut table = Table::default();
-    for record in recording.messages() {
-        let record = record?;
-        if record.topic == topic {
-            table.add(record.tick, record.time_ns, &recording.decode(&record)?);
+    recording.visit::<RecordingError>(|message| {
+        if message.topic == topic {
+            table.add(message.tick, message.time_ns, &recording.decode_on(topic, message.cdr)?);
         }
-    }
+        Ok(())
+    })?;
     Ok(table)
 }
 

@@ -34,17 +34,17 @@ pub(crate) fn figures(conditions: &Conditions, recording: &Recording) -> Result<
         return Ok(evaluator.finish());
     }
     let mut under_way = None;
-    for record in recording.messages() {
-        let record = record?;
-        let time_ns = *under_way.get_or_insert(record.time_ns);
-        if record.time_ns != time_ns {
+    recording.visit::<anyhow::Error>(|message| {
+        let time_ns = *under_way.get_or_insert(message.time_ns);
+        if message.time_ns != time_ns {
             evaluator.end_tick(time_ns)?;
-            under_way = Some(record.time_ns);
+            under_way = Some(message.time_ns);
         }
-        if let Some(topic) = evaluator.topic(&record.topic) {
-            evaluator.take(topic, &record.cdr)?;
+        match evaluator.topic(message.topic) {
+            Some(topic) => Ok(evaluator.take(topic, message.cdr)?),
+            None => Ok(()),
         }
-    }
+    })?;
     under_way.map_or(Ok(()), |time_ns| evaluator.end_tick(time_ns))?;
     Ok(evaluator.finish())
 }

@@ -3,6 +3,7 @@
 
 use anyhow::{Result, bail};
 use bus::plan::Plan;
+use recorder::RecordingError;
 use recorder::node::SHADOW_PREFIX;
 use recorder::reader::Recording;
 use runtime::launcher::{Purpose, Report};
@@ -256,22 +257,25 @@ fn step_at(values: &Values, topic: &str, tick: u32) -> Option<Step> {
 /// The numbers of `topics` and of their shadows.
 fn values(recording: &Recording, topics: &[&str]) -> Result<Values> {
     let mut values = Values::new();
-    for record in recording.messages() {
-        let record = record?;
-        let primary = record.topic.strip_prefix(SHADOW_PREFIX).unwrap_or(&record.topic);
+    if topics.is_empty() {
+        return Ok(values);
+    }
+    recording.visit::<RecordingError>(|message| {
+        let primary = message.topic.strip_prefix(SHADOW_PREFIX).unwrap_or(message.topic);
         if !topics.contains(&primary) {
-            continue;
+            return Ok(());
         }
-        for leaf in recording.decode(&record)? {
+        for leaf in recording.decode_on(message.topic, message.cdr)? {
             // Time stamps differ only if ticks do.
             let is_stamp = leaf.path.rsplit('.').nth(1) == Some("stamp");
             if let Some(number) = leaf.value.as_f64().filter(|_| !is_stamp) {
-                let entry = values.entry((record.topic.clone(), leaf.path)).or_default();
+                let entry = values.entry((message.topic.to_owned(), leaf.path)).or_default();
                 entry.0 = leaf.unit;
-                entry.1.insert(record.tick, number);
+                entry.1.insert(message.tick, number);
             }
         }
-    }
+        Ok(())
+    })?;
     Ok(values)
 }
 

@@ -125,6 +125,8 @@ impl<'a> Messages<'a> {
             at: block.at,
             end: Some(block.end),
             chunk: None,
+            spare: Vec::new(),
+            loose: Vec::new(),
             unpacked_left: limit(&source, UNPACKED_BYTES, UNPACKED_RATIO),
             channels: Declared { all, ..Declared::of(&source) },
             is_behind_data: false,

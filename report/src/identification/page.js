@@ -32,8 +32,10 @@ const byEquations = ({ by_equations, unit }) => by_equations === undefined ? "" 
 const estimateText = ([name, estimate]) => `${spaced(name)} = ${withUnit(estimate.value, estimate.unit)} ` +
   `(95 %: ${number(estimate.low)} to ${number(estimate.high)}${doubt(estimate)})${byEquations(estimate)}`;
 
+const knowing = { "own trim": " with the flight's own trim", disturbance: " with the disturbance seen before" };
+
 const lossText = ({ flight, horizon, channel, rival, other, unit, ...loss }) =>
-  `${channel} after ${horizon} s of ${flight}: new ${withUnit(loss.new, unit)}, ${rival} ${withUnit(other, unit)}`;
+  `${channel} after ${horizon} s of ${flight}: new ${withUnit(loss.new, unit)}${knowing[loss.knowing] ?? ""}, ${rival} ${withUnit(other, unit)}`;
 
 function verdictText() {
   const isUndecided = !report.verdict.length && report.validation_blocks < 12;

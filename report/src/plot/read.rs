@@ -58,18 +58,20 @@ pub fn read(
     let mut drawn = Drawn { bins, request, is_named: choice.is_named, against: f64::NAN };
     let mut uses = uses(choice);
     let [mut read_s, mut whole_s] = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
-    for (number, record) in (0_u64..).zip(recording.messages()) {
-        let record = record?;
+    let mut number = 0_u64;
+    recording.visit::<anyhow::Error>(|message| {
         if number.is_multiple_of(PROGRESS_EVERY) {
             progress(number);
         }
-        let time_s = record.time_ns as f64 * 1e-9;
+        number += 1;
+        let time_s = message.time_ns as f64 * 1e-9;
         widen(&mut whole_s, time_s);
-        let Some(uses) = uses.get_mut(&record.topic).filter(|_| request.span.holds(time_s)) else { continue };
-        let leaves = recording.decode(&record)?;
+        let wanted = uses.get_mut(message.topic).filter(|_| request.span.holds(time_s));
+        let Some(uses) = wanted else { return Ok(()) };
+        let leaves = recording.decode_on(message.topic, message.cdr)?;
         widen(&mut read_s, time_s);
-        drawn.push(uses, time_s, &leaves)?;
-    }
+        drawn.push(uses, time_s, &leaves)
+    })?;
     require_samples(choice, request.span, read_s, whole_s)?;
     Ok(read_s)
 }

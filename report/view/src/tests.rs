@@ -350,7 +350,8 @@ fn a_taken_port_is_refused_with_what_to_do() {
 #[test]
 fn damage_within_a_recording_is_the_answer_to_a_long_window() {
     let flight = Flight::of(10, true);
-    overwrite(&flight.path, 2, 5);
+    // So densely that a chunk is hit, and not only the indexes between two.
+    (100..120).for_each(|part| overwrite(&flight.path, part, 200));
     let server = Running::start(&flight);
     let height = json!([{ "topic": "/plant/state", "field": "position.z" }]);
     let request = json!({ "recording": 0, "from_ns": 0, "to_ns": 5000 * MS, "bins": 10, "fields": height });
