@@ -57,6 +57,16 @@ impl<T: Copy + Default, const N: usize> Bounded<T, N> {
         (values.len() <= N).then(|| Self::from_fn(values.len(), |index| values[index]))
     }
 
+    /// Becomes the sequence of the first `N` of `values`, in place.
+    #[inline]
+    pub fn assign(&mut self, values: impl IntoIterator<Item = T>) {
+        let before = self.len();
+        let pairs = self.values.iter_mut().zip(values);
+        let count = pairs.map(|(place, value)| *place = value).count();
+        self.values[count.min(before)..before].fill(T::default());
+        self.count = count as u32;
+    }
+
     /// The sequence of the values that `value` makes of these.
     #[must_use]
     #[inline]
@@ -97,8 +107,7 @@ impl<T: Copy + Default, const N: usize> FromIterator<T> for Bounded<T, N> {
     #[inline]
     fn from_iter<I: IntoIterator<Item = T>>(values: I) -> Self {
         let mut all = Self::default();
-        let pairs = all.values.iter_mut().zip(values);
-        all.count = pairs.map(|(place, value)| *place = value).count() as u32;
+        all.assign(values);
         all
     }
 }
@@ -171,6 +180,15 @@ mod tests {
         let mut words = [u64::MAX; 5];
         *bytemuck::from_bytes_mut(bytemuck::bytes_of_mut(&mut words)) = Bounded::<u64, 4>::from([7, 8]);
         assert_eq!(words, [2, 7, 8, 0, 0]);
+    }
+
+    #[test]
+    fn values_that_no_longer_count_are_zero() {
+        let mut some = Bounded::<u64, 4>::from([7, 8, 9]);
+        some.assign([1]);
+        assert_eq!((bytemuck::cast_ref::<_, [u64; 5]>(&some), some.len()), (&[1, 1, 0, 0, 0], 1));
+        some.assign(2..9);
+        assert_eq!(some, [2, 3, 4, 5]);
     }
 
     #[test]

@@ -99,7 +99,7 @@ pub trait OutputPorts: Sized {
     ///
     /// # Errors
     /// If shared memory cannot be had.
-    fn write(self, samples: &mut OutputSamples<'_>) -> Result<(), BusError>;
+    fn write(&self, samples: &mut OutputSamples<'_>) -> Result<(), BusError>;
 
     /// Outputs that were sent last; `None` if a required one was never sent.
     fn read(samples: InputSamples<'_>) -> Option<Self>;
@@ -210,7 +210,7 @@ pub trait OutputPort: Sized {
     ///
     /// # Errors
     /// If shared memory cannot be had.
-    fn write(self, samples: &mut OutputSamples<'_>, port: usize) -> Result<(), BusError>;
+    fn write(&self, samples: &mut OutputSamples<'_>, port: usize) -> Result<(), BusError>;
     /// Output that was sent last on port `port`; `None` if a required output was never sent.
     fn read(samples: InputSamples<'_>, port: usize) -> Option<Self>;
 }
@@ -219,9 +219,9 @@ impl<T: Message> OutputPort for T {
     const SCHEMA: &'static Schema = T::SCHEMA;
     const REQUIRED: bool = true;
 
-    fn write(self, samples: &mut OutputSamples<'_>, port: usize) -> Result<(), BusError> {
+    fn write(&self, samples: &mut OutputSamples<'_>, port: usize) -> Result<(), BusError> {
         if let Some(words) = samples.0.words(port)? {
-            *view_mut(words) = self;
+            *view_mut(words) = *self;
         }
         Ok(())
     }
@@ -235,8 +235,8 @@ impl<T: Message> OutputPort for Option<T> {
     const SCHEMA: &'static Schema = T::SCHEMA;
     const REQUIRED: bool = false;
 
-    fn write(self, samples: &mut OutputSamples<'_>, port: usize) -> Result<(), BusError> {
-        self.map_or(Ok(()), |message| message.write(samples, port))
+    fn write(&self, samples: &mut OutputSamples<'_>, port: usize) -> Result<(), BusError> {
+        self.as_ref().map_or(Ok(()), |message| message.write(samples, port))
     }
 
     fn read(samples: InputSamples<'_>, port: usize) -> Option<Self> {
@@ -253,7 +253,7 @@ impl<'a> InputPorts<'a> for () {
 impl OutputPorts for () {
     const DECLARED: &'static [PortSpec] = &[];
 
-    fn write(self, _: &mut OutputSamples<'_>) -> Result<(), BusError> {
+    fn write(&self, _: &mut OutputSamples<'_>) -> Result<(), BusError> {
         Ok(())
     }
 

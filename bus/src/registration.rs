@@ -162,8 +162,11 @@ impl<C: Component> Instance for Made<C> {
         inputs: InputSamples<'_>,
         outputs: &mut OutputSamples<'_>,
     ) -> Result<(), StepError> {
-        let sent = self.component.step(context, C::Inputs::read(inputs), &mut self.state)?;
-        Ok(sent.write(outputs)?)
+        // By reference: the outputs of a plant are two kilobytes, which each move would copy.
+        match self.component.step(context, C::Inputs::read(inputs), &mut self.state) {
+            Ok(ref sent) => Ok(sent.write(outputs)?),
+            Err(error) => Err(error),
+        }
     }
 
     fn finish(&mut self) -> Result<(), StepError> {

@@ -330,7 +330,7 @@ pub fn air(airframe: &Airframe, step_s: f64) -> Actuation {
     let rotors = PerRotor::filled(count, RotorState::default());
     let state = State { body: RigidBody::level_at(Vector3::zeros()), rotors };
     let commands = PerRotor::filled(count, 0.0);
-    airframe.begin_tick(&mut airframe.initial_state(0, "identify", step_s), &state, &commands, step_s)
+    *airframe.begin_tick(&mut airframe.initial_state(0, "identify", step_s), &state, &commands, step_s)
 }
 
 /// The rotors that follow from the commands: simulated in fine steps, averaged over one step about each instant.
@@ -360,7 +360,7 @@ fn spun(airframe: &Airframe, flight: &Prepared, pose_s: f64) -> Vec<PerRotor<Rot
                 None => commands.mean(from_s, to_s),
             };
             let actuation = airframe.begin_tick(&mut memory, &state, &command[..count], step_s);
-            let after = airframe.spun(&actuation, &state.rotors, step_s);
+            let after = airframe.spun(actuation, &state.rotors, step_s);
             let half = 0.5 / parts as f64;
             for (sum, (before, after)) in sum.iter_mut().zip(state.rotors.iter().zip(&after)) {
                 sum.speed_rad_s += half * (before.speed_rad_s + after.speed_rad_s);

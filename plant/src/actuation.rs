@@ -27,6 +27,13 @@ impl Actuation {
         let thrust_deviation = targets_rad_s.map(|_| 0.0);
         Self { targets_rad_s, air_velocity_W_m_s: Vector3::zeros(), thrust_deviation }
     }
+
+    /// Becomes that of motors that are asked for these speeds, in still air.
+    pub(crate) fn ask(&mut self, targets_rad_s: impl IntoIterator<Item = f64>) {
+        self.targets_rad_s.assign(targets_rad_s);
+        self.thrust_deviation.assign(std::iter::repeat_n(0.0, self.targets_rad_s.len()));
+        self.air_velocity_W_m_s = Vector3::zeros();
+    }
 }
 
 saved_fields!(Actuation { targets_rad_s, air_velocity_W_m_s, thrust_deviation });

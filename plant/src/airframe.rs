@@ -18,7 +18,7 @@
 //! # let body = RigidBody::level_at(nalgebra::Vector3::z());
 //! # let state = State { body, rotors: PerRotor::filled(4, RotorState::steady(400.0)) };
 //! let actuation = airframe.begin_tick(&mut effects, &state, &[76.5; 4], dt_s);
-//! assert_eq!(actuation, effects.actuation);
+//! assert_eq!(actuation.targets_rad_s.len(), 4, "rad/s, one for each rotor");
 //! # Ok::<(), diagnostics::Diagnostic>(())
 //! ```
 
@@ -121,28 +121,27 @@ impl Airframe {
         }
     }
 
-    /// Wrench over the tick of `dt_s` that begins at `state`, under raw motor `commands` held over it: one for each
-    /// rotor.
-    #[must_use]
-    pub fn begin_tick(
+    /// Actuation over the tick of `dt_s` that begins at `state`, under raw motor `commands` held over it: one for each
+    /// rotor. It is kept in `memory`.
+    pub fn begin_tick<'m>(
         &self,
-        effects: &mut AirframeState,
+        memory: &'m mut AirframeState,
         state: &State,
         commands: &[f64],
         dt_s: f64,
-    ) -> Actuation {
-        let delayed = effects.commands.pass(commands, self.delay_s() / dt_s);
-        let mut actuation = self.commanded(&delayed);
-        for (effect, effect_state) in self.effects.iter().zip(&mut effects.effects) {
+    ) -> &'m Actuation {
+        let AirframeState { actuation, commands: line, effects } = memory;
+        let delayed = line.pass(commands, self.delay_s() / dt_s);
+        actuation.ask(self.targets_rad_s(&delayed));
+        for (effect, effect_state) in self.effects.iter().zip(effects) {
             for action in effect.kind.actions {
                 if let Action::Tick(tick) = action {
                     let condition = FlightCondition::new(&self.vehicle, state, &actuation.air_velocity_W_m_s);
-                    let (actuation, state) = (&mut actuation, &mut *effect_state);
+                    let (actuation, state) = (&mut *actuation, &mut *effect_state);
                     tick(&effect.values, &mut Advance { condition, actuation, state, dt_s });
                 }
             }
         }
-        effects.actuation = actuation;
         actuation
     }
 
@@ -162,14 +161,25 @@ impl Airframe {
 
     /// Returns the actuation under `commands` in still air, without the state of effects.
     pub(crate) fn commanded(&self, commands: &[f64]) -> Actuation {
-        let speed = |(rotor, command): (usize, &f64)| self.vehicle.commanded_speed_rad_s(rotor, *command);
-        Actuation::of(commands.iter().enumerate().map(speed).collect())
+        Actuation::of(self.targets_rad_s(commands).collect())
     }
 
-    /// Rates of change of the rotors.
-    pub(crate) fn rotor_rates(&self, actuation: &Actuation, state: &State) -> PerRotor<RotorRates> {
+    /// Speeds that these commands ask the rotors for.
+    fn targets_rad_s(&self, commands: &[f64]) -> impl Iterator<Item = f64> {
+        let speed = |(rotor, command): (usize, &f64)| self.vehicle.commanded_speed_rad_s(rotor, *command);
+        commands.iter().enumerate().map(speed)
+    }
+
+    /// Rates of change of the rotors, into `rates`.
+    pub(crate) fn set_rotor_rates(
+        &self,
+        actuation: &Actuation,
+        state: &State,
+        rates: &mut PerRotor<RotorRates>,
+    ) {
         let motor = &self.vehicle.motor;
-        paired(&state.rotors, &actuation.targets_rad_s, |rotor, target| motor::rates(motor, rotor, *target))
+        let pairs = state.rotors.iter().zip(&actuation.targets_rad_s);
+        rates.assign(pairs.map(|(rotor, target)| motor::rates(motor, rotor, *target)));
     }
 
     /// Returns all forces but gravity and contacts, and their torques about the centre of mass. The effects are added
@@ -204,17 +214,17 @@ impl Airframe {
     ) -> PerRotor<RotorState> {
         let motor = &self.vehicle.motor;
         let moved = |rotor: &RotorState, target: &f64| motor::moved(motor, rotor, *target, dt_s);
-        self.settled(actuation, &paired(rotors, &actuation.targets_rad_s, moved))
+        let mut spun = paired(rotors, &actuation.targets_rad_s, moved);
+        self.settle(actuation, &mut spun);
+        spun
     }
 
-    /// The rotors with accelerations that fit their speeds and targets, as shown at the end of a tick.
-    pub(crate) fn settled(
-        &self,
-        actuation: &Actuation,
-        rotors: &PerRotor<RotorState>,
-    ) -> PerRotor<RotorState> {
+    /// Gives the rotors accelerations that fit their speeds and targets, as shown at the end of a tick.
+    pub(crate) fn settle(&self, actuation: &Actuation, rotors: &mut PerRotor<RotorState>) {
         let motor = &self.vehicle.motor;
-        paired(rotors, &actuation.targets_rad_s, |rotor, target| motor::settled(motor, rotor, *target))
+        for (rotor, target) in rotors.iter_mut().zip(&actuation.targets_rad_s) {
+            *rotor = motor::settled(motor, rotor, *target);
+        }
     }
 
     fn thrust_N(&self, actuation: &Actuation, condition: &FlightCondition, rotor: usize) -> f64 {

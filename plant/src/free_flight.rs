@@ -51,10 +51,10 @@ impl FreeFlight {
         let airframe = self.model.airframe();
         let unasked = PerRotor::filled(rotors.len(), 0.0);
         self.state.rotors = *rotors;
-        let mut actuation = airframe.begin_tick(&mut self.effects, &self.state, &unasked, dt_s);
+        airframe.begin_tick(&mut self.effects, &self.state, &unasked, dt_s);
+        let actuation = &mut self.effects.actuation;
         actuation.targets_rad_s = rotors.map(|rotor| motor::target_of(&airframe.vehicle().motor, &rotor));
-        self.effects.actuation = actuation;
-        self.model.advance_with_rotors(&mut self.state, &actuation, dt_s);
+        self.model.advance_with_rotors(&mut self.state, actuation, dt_s);
     }
 }
 
@@ -73,7 +73,7 @@ impl Backend for FreeFlight {
 
     fn step(&mut self, commands: &[f64], dt_s: f64, _traffic: &[Neighbour]) {
         let actuation = self.model.airframe().begin_tick(&mut self.effects, &self.state, commands, dt_s);
-        self.model.advance(&mut self.state, &actuation, dt_s);
+        self.model.advance(&mut self.state, actuation, dt_s);
     }
 
     fn settle_rotors(&mut self, commands: &[f64]) {

@@ -122,21 +122,21 @@ impl NewtonEuler {
     pub fn advance(&self, state: &mut State, actuation: &Actuation, dt_s: f64) {
         let span_s = dt_s / f64::from(self.substeps);
         for _ in 0..self.substeps {
-            *state = self.runge_kutta(state, actuation, span_s);
+            Self::step_by(state, span_s, |state, rates| self.set_rates(state, actuation, rates));
         }
         state.body.attitude_WB = UnitQuaternion::new_normalize(state.body.attitude_WB.into_inner());
-        state.rotors = self.airframe.settled(actuation, &state.rotors);
+        self.airframe.settle(actuation, &mut state.rotors);
     }
 
     /// The same with rotors whose speeds grow by their accelerations, whatever their motors would do.
     pub(crate) fn advance_with_rotors(&self, state: &mut State, actuation: &Actuation, dt_s: f64) {
-        let held = state.rotors.map(|RotorState { acceleration_rad_s2, .. }| RotorRates {
-            acceleration_rad_s2,
-            jerk_rad_s3: 0.0,
-        });
+        let held = shown_rates(state);
         let span_s = dt_s / f64::from(self.substeps);
         for _ in 0..self.substeps {
-            *state = Self::stepped(state, span_s, |state| self.rates_with(state, actuation, held));
+            Self::step_by(state, span_s, |state, rates| {
+                rates.rotors = held;
+                self.set_body_rates(state, actuation, rates);
+            });
         }
         state.body.attitude_WB = UnitQuaternion::new_normalize(state.body.attitude_WB.into_inner());
     }
@@ -148,12 +148,7 @@ impl NewtonEuler {
 
     /// Specific force and angular acceleration at `state`, with the actuation over the tick that ends there.
     pub fn accelerations_under(&self, actuation: &Actuation, state: &State) -> Accelerations {
-        // Those that a rotor state itself shows, where no target is at hand.
-        let shown_rates = state.rotors.map(|RotorState { acceleration_rad_s2, .. }| RotorRates {
-            acceleration_rad_s2,
-            jerk_rad_s3: 0.0,
-        });
-        let wrench = self.airframe.wrench(actuation, state, &shown_rates);
+        let wrench = self.airframe.wrench(actuation, state, &shown_rates(state));
         Accelerations {
             specific_force_B_m_s2: wrench.force_B_N / self.vehicle().mass_kg,
             angular_acceleration_B_rad_s2: self.angular_acceleration(state, &wrench.torque_B_N_m),
@@ -184,31 +179,44 @@ impl NewtonEuler {
         span_s: f64,
         hold: impl Fn(&State, Rates) -> Rates,
     ) -> State {
-        Self::stepped(state, span_s, |state| hold(state, self.rates(state, actuation)))
+        let mut moved = *state;
+        Self::step_by(&mut moved, span_s, |state, rates| *rates = hold(state, self.rates(state, actuation)));
+        moved
     }
 
-    /// One classic Runge-Kutta step of fourth order.
-    fn stepped(state: &State, span_s: f64, rates: impl Fn(&State) -> Rates) -> State {
-        let mut sum = rates(state);
-        let mut stage = state.moved(&sum, span_s / 2.0);
+    /// One classic Runge-Kutta step of fourth order. `set_rates` gets the rates of an earlier stage, and sets them.
+    fn step_by(state: &mut State, span_s: f64, set_rates: impl Fn(&State, &mut Rates)) {
+        // States and rates have room for twelve rotors: each copy of one costs as much as its arithmetic.
+        let start = *state;
+        let mut sum = Rates::default();
+        set_rates(&start, &mut sum);
+        state.move_from(&start, &sum, span_s / 2.0);
+        let mut rates = sum;
         for (weight, share) in [(2.0, 0.5), (2.0, 1.0)] {
-            let middle = rates(&stage);
-            sum.add(&middle, weight);
-            stage.move_from(state, &middle, share * span_s);
+            set_rates(state, &mut rates);
+            sum.add(&rates, weight);
+            state.move_from(&start, &rates, share * span_s);
         }
-        sum.add(&rates(&stage), 1.0);
-        stage.move_from(state, &sum, span_s / 6.0);
-        stage
+        set_rates(state, &mut rates);
+        sum.add(&rates, 1.0);
+        state.move_from(&start, &sum, span_s / 6.0);
     }
 
     /// Rates of free flight.
     pub(crate) fn rates(&self, state: &State, actuation: &Actuation) -> Rates {
-        self.rates_with(state, actuation, self.airframe.rotor_rates(actuation, state))
+        let mut rates = Rates::default();
+        self.set_rates(state, actuation, &mut rates);
+        rates
     }
 
-    /// The same with rotors that change by these rates.
-    fn rates_with(&self, state: &State, actuation: &Actuation, rotors: PerRotor<RotorRates>) -> Rates {
-        let mut rates = Rates { body: BodyRates::default(), rotors };
+    /// The same, into `rates`.
+    fn set_rates(&self, state: &State, actuation: &Actuation, rates: &mut Rates) {
+        self.airframe.set_rotor_rates(actuation, state, &mut rates.rotors);
+        self.set_body_rates(state, actuation, rates);
+    }
+
+    /// Those of the body, with the rotors' that `rates` has.
+    fn set_body_rates(&self, state: &State, actuation: &Actuation, rates: &mut Rates) {
         let wrench = self.airframe.wrench(actuation, state, &rates.rotors);
         let attitude_WB = state.body.attitude_WB.as_ref();
         let force_W_N = rotated(attitude_WB, &wrench.force_B_N);
@@ -219,7 +227,6 @@ impl NewtonEuler {
             attitude_WB_per_s: attitude_WB * Quaternion::from_imag(state.body.angular_velocity_B_rad_s * 0.5),
             angular_acceleration_B_rad_s2: self.angular_acceleration(state, &wrench.torque_B_N_m),
         };
-        rates
     }
 
     /// J^-1 (tau - w x J w).
@@ -227,4 +234,10 @@ impl NewtonEuler {
         let w = &state.body.angular_velocity_B_rad_s;
         self.inverse_inertia * (torque_B_N_m - w.cross(&(self.vehicle().inertia_kg_m2 * w)))
     }
+}
+
+/// Rates of the rotors that their state itself shows, where no target is at hand.
+fn shown_rates(state: &State) -> PerRotor<RotorRates> {
+    let shown = |RotorState { acceleration_rad_s2, .. }| RotorRates { acceleration_rad_s2, jerk_rad_s3: 0.0 };
+    state.rotors.map(shown)
 }

@@ -35,7 +35,8 @@ impl Outputs {
             pose: Some(PoseStamped { pose: Pose { position, orientation }, ..Default::default() }),
             tf: Some(BodyTransform::new(frame, position, orientation)),
             contact: Some(contact(backend)),
-            bodies: Some(bodies(backend)),
+            // Without free bodies the port cannot be wired.
+            bodies: (!backend.bodies().is_empty()).then(|| bodies(backend)),
             battery: Some(battery_message(backend, time_ns)),
         }
     }

@@ -248,8 +248,8 @@ impl Backend for Rapier {
     }
 
     fn step(&mut self, commands: &[f64], dt_s: f64, traffic: &[Neighbour]) {
-        let actuation =
-            self.motion.model.airframe().begin_tick(&mut self.effects, &self.motion.state, commands, dt_s);
+        let airframe = self.motion.model.airframe();
+        let actuation = *airframe.begin_tick(&mut self.effects, &self.motion.state, commands, dt_s);
         let span_s = dt_s / f64::from(self.motion.model.substeps());
         self.motion.contacts.begin_tick();
         self.motion.changed = Changed::default();
@@ -265,8 +265,7 @@ impl Backend for Rapier {
         self.others = others;
         let body = &mut self.motion.state.body;
         body.attitude_WB = UnitQuaternion::new_normalize(body.attitude_WB.into_inner());
-        self.motion.state.rotors =
-            self.motion.model.airframe().settled(&actuation, &self.motion.state.rotors);
+        self.motion.model.airframe().settle(&actuation, &mut self.motion.state.rotors);
         self.reaction = Reaction {
             acceleration_W_m_s2: self.motion.changed.velocity_W_m_s / dt_s,
             angular_acceleration_W_rad_s2: self.motion.changed.spin_W_rad_s / dt_s,

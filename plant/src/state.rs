@@ -93,7 +93,7 @@ impl RotorState {
 }
 
 /// Rates of change of every component of a [`State`].
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Rates {
     pub body: BodyRates,
     pub rotors: PerRotor<RotorRates>,

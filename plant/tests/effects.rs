@@ -454,7 +454,7 @@ fn lags(name: &str, values: Values, height_m: f64, dt_s: f64, ticks: usize) -> V
     let mut carried = airframe.initial_state(3, "plant", dt_s);
     let body = RigidBody::level_at(Vector3::z() * height_m);
     let state = State { body, rotors: [RotorState::steady(400.0); 4].into() };
-    (0..ticks).map(|_| airframe.begin_tick(&mut carried, &state, &[76.5; 4], dt_s)).collect()
+    (0..ticks).map(|_| *airframe.begin_tick(&mut carried, &state, &[76.5; 4], dt_s)).collect()
 }
 
 /// Standard deviation, and the autocorrelation after `lag` samples.

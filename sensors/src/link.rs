@@ -200,7 +200,7 @@ impl OutputPorts for Outputs {
         required: true,
     }];
 
-    fn write(self, samples: &mut OutputSamples<'_>) -> Result<(), BusError> {
+    fn write(&self, samples: &mut OutputSamples<'_>) -> Result<(), BusError> {
         self.statistics.write(samples, 0)?;
         let messages = self.newest.iter().zip(self.sizes).take(self.streams).enumerate();
         for (stream, (message, size)) in messages {

@@ -142,10 +142,10 @@ fn expand_outputs(input: &DeriveInput) -> Result<Tokens> {
             const DECLARED: &'static [::bus::ports::PortSpec] = &[#(#specs),*];
 
             fn write(
-                self,
+                &self,
                 samples: &mut ::bus::ports::OutputSamples<'_>,
             ) -> ::core::result::Result<(), ::bus::BusError> {
-                #(::bus::ports::OutputPort::write(self.#names, samples, #ports)?;)*
+                #(::bus::ports::OutputPort::write(&self.#names, samples, #ports)?;)*
                 ::core::result::Result::Ok(())
             }
 

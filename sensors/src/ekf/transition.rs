@@ -109,7 +109,8 @@ impl Transition {
         let (shift, push) = (vector(self.shift).cross_matrix(), vector(self.push).cross_matrix());
         let [turn, turn_twice, tilt, tilt_twice] =
             [&self.turn, &self.turn_twice, &self.tilt, &self.tilt_twice].map(matrix);
-        let tilts = covariance.fixed_view::<TILTS, TILTS>(ATTITUDE, ATTITUDE);
+        // Columns that follow each other are multiplied twice as fast as those of the whole.
+        let tilts = covariance.fixed_view::<TILTS, TILTS>(ATTITUDE, ATTITUDE).into_owned();
         // The variance of a first error, which varies by `first`, plus the weighted ones, with which it varies by `with_first`.
         let sum = |first: f64, with_first: &Tilts, weights: &Tilts| {
             first + 2.0 * weights.dot(with_first) + weights.dot(&(tilts * weights))
