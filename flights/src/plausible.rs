@@ -13,7 +13,7 @@ use crate::force_doubt::{ForceDoubt, Kind};
 use crate::frame;
 use crate::lateness;
 use crate::quantity::{FRACTION, PERCENT, Quantity};
-use crate::rig::{Hold, hold};
+use crate::rig::{Hold, hold, turns_about};
 use crate::spikes::usual_greatest;
 use crate::still;
 use crate::units::{HUNDREDS, Units, finding, is_gross, of_hundreds, of_unit};
@@ -241,6 +241,9 @@ impl Judge<'_> {
             return Some(finding(Quantity::Attitude, Some(fits), &what));
         }
         let explains = signed.is_some_and(|signed| signed.correlation > SAME);
+        if explains && matches!(signs, [x, y, z] if x > 0.0 && y < 0.0 && z < 0.0) {
+            return Some(self.one_frame_is_wrong(agreement.correlation));
+        }
         let what = format!(
             "it has a correlation of {:.2} with the derivative of the attitude (signs of the axes: {signs:?})",
             agreement.correlation
@@ -250,10 +253,41 @@ impl Judge<'_> {
             [x, y, z] if x < 0.0 && y < 0.0 && z < 0.0 => {
                 format!("an attitude that takes the world to the body: {}", self.inverse_advice())
             }
-            [x, y, z] if x > 0.0 && y < 0.0 && z < 0.0 => self.other_frame(quantity),
             _ => "the axes, or angles of the attitude, with a `-` before the name".to_owned(),
         });
         Some(finding(quantity, fits, &what))
+    }
+
+    /// The attitude's derivative has y and z of the angular velocity with the other sign: one of the two is in another frame.
+    /// The attitude is, if in the other one the vehicle accelerates as it leans.
+    fn one_frame_is_wrong(&self, correlation: f64) -> Finding {
+        let attitude = &self.flight.attitude;
+        let turned = Channel {
+            time_s: attitude.time_s.clone(),
+            // The same change leads back.
+            values: attitude.values.iter().map(|wxyz| frame::attitude(Frame::FrdNed, *wxyz)).collect(),
+        };
+        let leans = |attitude: &Channel<4>| {
+            let agreement = self.leaning_pairs_of(attitude).1.agreement(QUIET_ACCELERATION_M_S2);
+            agreement.filter(|_| self.flight.assumed.is_empty()).map(|agreement| agreement.correlation)
+        };
+        let [here, there] = [Quantity::AngularVelocity, Quantity::Attitude].map(|one| self.other_frame(one));
+        let what = format!("it has a correlation of {correlation:.2} with the derivative of the attitude");
+        match (leans(attitude), leans(&turned)) {
+            (Some(declared), Some(other)) if other > declared + CLEARLY => {
+                let what = format!(
+                    "its derivative has a correlation of {correlation:.2} with the angular velocity, and its lean of {declared:.2}                      with the acceleration; in the other frame that is {other:.2}"
+                );
+                finding(Quantity::Attitude, Some(there), &what)
+            }
+            (Some(declared), Some(other)) if declared > other + CLEARLY => {
+                finding(Quantity::AngularVelocity, Some(here), &what)
+            }
+            _ => {
+                let either = format!("{here} here or {there} of `attitude`");
+                finding(Quantity::AngularVelocity, Some(either), &what)
+            }
+        }
     }
 
     /// The angular velocity is the attitude's derivative, but on another clock.
@@ -354,12 +388,12 @@ impl Judge<'_> {
         let what = format!("it accelerates {factor:.4} times as much as the vehicle leans");
         let declared = format!("declared in {}, {what}", self.units.unit(quantity));
         let unit = self.units.unit_that_fits(quantity, factor, LEANING_TOLERANCE);
-        if pairs.agreement(QUIET_ACCELERATION_M_S2).is_none() {
+        let is_alone = self.units.unit_that_fits(quantity, factor, LEANING_EXACT).is_some();
+        if pairs.agreement(QUIET_ACCELERATION_M_S2).is_none() && !(is_alone && self.is_free(quantity)) {
             // Also what hangs on a rig leans and hardly moves.
             let hint = unit.map_or(String::new(), |unit| format!("; on a rig, or in another unit ({unit})"));
             return Some(finding(quantity, None, &(declared + &hint)));
         }
-        let is_alone = self.units.unit_that_fits(quantity, factor, LEANING_EXACT).is_some();
         let unit =
             unit.map(|unit| if is_alone { unit } else { self.units.scale_before(quantity, factor, &unit) });
         let fits = either(unit, self.angles_that_fit(factor));
@@ -369,16 +403,27 @@ impl Judge<'_> {
         })
     }
 
+    /// True if what follows the lean, and by far too little, is on no rig: so it is declared, or the position is not that of a
+    /// point that turns with the vehicle.
+    fn is_free(&self, quantity: Quantity) -> bool {
+        self.flight.on_rig == Some(false) || (quantity == Quantity::Position && !turns_about(self.flight))
+    }
+
     /// The vehicle's leaning against the acceleration of its position, or else of its velocity.
     fn leaning_pairs(&self) -> (Quantity, Pairs) {
+        self.leaning_pairs_of(&self.flight.attitude)
+    }
+
+    /// The same with this attitude.
+    fn leaning_pairs_of(&self, attitude: &Channel<4>) -> (Quantity, Pairs) {
         let (flight, gravity_m_s2) = (self.flight, self.vehicle.gravity_m_s2);
         if flight.position.is_empty() {
-            let leaning = Pairs::leaning_of(&flight.attitude, gravity_m_s2);
+            let leaning = Pairs::leaning_of(attitude, gravity_m_s2);
             let pairs =
                 Pairs::accelerations(&leaning, &flight.velocity, &flight.position, LEANING_WINDOW_S).level();
             return (Quantity::Velocity, pairs);
         }
-        let pairs = Pairs::leaning(&flight.attitude, &flight.position, gravity_m_s2, LEANING_WINDOW_S);
+        let pairs = Pairs::leaning(attitude, &flight.position, gravity_m_s2, LEANING_WINDOW_S);
         (Quantity::Position, pairs)
     }
 

@@ -141,7 +141,7 @@ fn felt_velocity(attitude: &Channel<4>, force: &Channel<3>) -> Channel<3> {
 }
 
 /// True if the position is that of a point that turns with the vehicle about another: position = place + R lever.
-fn turns_about(flight: &Flight) -> bool {
+pub(crate) fn turns_about(flight: &Flight) -> bool {
     let (attitude, position) = (&flight.attitude, &flight.position);
     let mut at = 0;
     let mut samples = Vec::new();

@@ -2,6 +2,7 @@
 
 use crate::support;
 use flights::{Flight, FlightSet, FlightsError, Quantity};
+use nalgebra::{UnitQuaternion, Vector3};
 use support::{Motion, Place, crc32};
 
 const CHANNELS: &str = r#"
@@ -156,13 +157,51 @@ fn a_position_alone_is_held_against_how_the_vehicle_leans() {
     let channels = without("velocity");
     let cm = Motion { length_unit: 100.0, ..Motion::default() };
     assert_eq!(findings(&cm, &channels), [(Quantity::Position, "`unit = \"cm\"`".to_owned())]);
-    // As little as that also moves on a rig.
+    // As little as that also moves a point beside the bearing of a rig, which turns with the vehicle: in swings of one
+    // frequency along each axis it follows the lean.
     let declared = channels.replace("unit = \"m\"", "unit = \"mm\"");
     let notes = read(&Motion::default(), &declared, "").unwrap().notes;
     assert!(
         notes.len() == 1 && notes[0].contains("on a rig, or in another unit (`unit = \"m\"`)"),
         "{notes:?}"
     );
+    let refused = read(&Motion::default(), &declared, "rig = false").unwrap_err().to_string();
+    assert!(
+        refused.contains("`position`: declared in mm") && refused.contains("`unit = \"m\"` would fit"),
+        "{refused}"
+    );
+    // No point of a rig follows the lean in swings of two frequencies.
+    let place = Place::new();
+    place.write("log.csv", two_swings().as_bytes());
+    let lines = declared
+        .lines()
+        .filter(|line| ["time", "command", "attitude", "position"].iter().any(|it| line.starts_with(it)));
+    let declared: String = lines.map(|line| format!("{line}\n")).collect();
+    let refused = place.load("log.csv", &declared, "").unwrap_err().to_string();
+    assert!(
+        refused.contains("`position`: declared in mm") && refused.contains("`unit = \"m\"` would fit"),
+        "{refused}"
+    );
+    place.load("log.csv", &declared.replace("\"mm\"", "\"m\""), "").unwrap();
+}
+
+/// A flight in which the vehicle leans to and fro, slowly and fast at once: times, commands, positions in m and attitudes.
+fn two_swings() -> String {
+    let mut text = "t,m1,m2,m3,m4,px,py,pz,qx,qy,qz,qw\n".to_owned();
+    for row in 0..=1000 {
+        let t = 0.01 * f64::from(row);
+        let (x, y) = (
+            1.4 * libm::sin(1.4 * t) + 0.1 * libm::sin(5.0 * t),
+            libm::cos(2.0 * t) + 0.1 * libm::cos(4.4 * t),
+        );
+        let along_x = -2.744 * libm::sin(1.4 * t) - 2.5 * libm::sin(5.0 * t);
+        let along_y = -4.0 * libm::cos(2.0 * t) - 1.936 * libm::cos(4.4 * t);
+        let force = Vector3::new(along_x, along_y, 9.81);
+        let q = UnitQuaternion::rotation_between(&Vector3::z(), &force).unwrap();
+        let row = format!("{t:.2},100,101,102,103,{x},{y},1,{},{},{},{}\n", q.i, q.j, q.k, q.w);
+        text.push_str(&row);
+    }
+    text
 }
 
 /// A position or a velocity in feet or inches fits no unit.
@@ -442,6 +481,41 @@ fn frames_are_converted_and_a_wrong_one_is_found() {
     let body = "specific_force = { columns = [\"fx\", \"fy\", \"fz\"], unit = \"m/s^2\" }";
     let wrong = framed.replace(&body.replace(" }", ", frame = \"frd-ned\" }"), body);
     assert!(findings(&frd, &wrong).iter().any(|(_, fits)| fits.contains("frd-ned")));
+}
+
+/// The gyroscope contradicts an attitude in the wrong frame, but it is not the gyroscope that is wrong.
+#[test]
+fn a_wrong_frame_is_looked_for_where_it_is() {
+    let other = "`frame = \"frd-ned\"`";
+    let in_other_frame = |channels: &str, channel: &str| {
+        let line = |line: &str| match line.starts_with(channel) {
+            true => format!("{}\n", line.replace(" }", ", frame = \"frd-ned\" }")),
+            false => format!("{line}\n"),
+        };
+        channels.lines().map(line).collect::<String>()
+    };
+    let wrong =
+        |channels: &str, channel: &str| findings(&Motion::default(), &in_other_frame(channels, channel));
+    let flu = other.replace("frd-ned", "flu-enu");
+    let attitude = wrong(CHANNELS, "attitude");
+    assert!(attitude.contains(&(Quantity::Attitude, flu.clone())), "{attitude:?}");
+    assert!(attitude.iter().all(|(channel, _)| *channel != Quantity::AngularVelocity), "{attitude:?}");
+    let rates = wrong(CHANNELS, "angular_velocity");
+    assert_eq!(rates, [(Quantity::AngularVelocity, flu.clone())]);
+    // Nothing else tells which of the two is wrong.
+    let alone: String = CHANNELS
+        .lines()
+        .filter(|line| {
+            !["position", "velocity", "specific_force"].iter().any(|channel| line.starts_with(channel))
+        })
+        .map(|line| format!("{line}\n"))
+        .collect();
+    for (channel, fits) in [
+        ("attitude", format!("{other} here or {flu} of `attitude`")),
+        ("angular_velocity", format!("{flu} here or {other} of `attitude`")),
+    ] {
+        assert_eq!(wrong(&alone, channel), [(Quantity::AngularVelocity, fits)]);
+    }
 }
 
 /// The channels with a specific force from other columns.
