@@ -126,7 +126,7 @@ fn change(report: &Report, channel: &str) -> Option<String> {
 
 /// The envelope of the test flights; `None` where nothing of it is known.
 fn judged_in(report: &Report) -> Option<String> {
-    let words = (!report.envelope.is_empty()).then(|| report.envelope_in_words())?;
+    let words = report.has_validated().then(|| report.envelope_in_words())?;
     Some(format!("Validated in flights with {words}. The model was not validated beyond these limits."))
 }
 
@@ -285,6 +285,7 @@ mod tests {
             channel: "attitude",
             rival: "persistence",
             new: 40.0,
+            knowing: "nothing",
             other: 9.0,
             unit: "deg",
         };

@@ -1,5 +1,6 @@
 //! Predictions that lose: to the declared vehicle, or to persistence, which knows no vehicle at all.
 
+use crate::digits::rounded;
 use crate::horizons::Changes;
 use crate::noise::Noise;
 use serde::Serialize;
@@ -24,6 +25,9 @@ pub struct Loss {
     pub rival: &'static str,
     /// Root mean square of the new vehicle.
     pub new: f64,
+    /// Knowledge of the prediction besides the new vehicle: `nothing`, `own trim` or `disturbance`. Against persistence the best
+    /// of the three counts.
+    pub knowing: &'static str,
     /// Root mean square of the rival.
     pub other: f64,
     /// Unit of both.
@@ -43,21 +47,44 @@ pub fn losses(errors: &Changes, noise: &BTreeMap<&'static str, Noise>) -> Vec<Lo
             let floor =
                 noise.get(channel).and_then(|noise| noise.prediction.get(horizon)).copied().unwrap_or(0.0);
             // A flight's own trim, and what disturbs it, are none of the vehicle's: the best of three.
-            let all = [change.after, change.own_trim, change.disturbance];
-            let trimmed = all.into_iter().min_by(f64::total_cmp).unwrap_or(change.after);
-            let rivals =
-                [("persistence", trimmed, change.persistence), ("declared", change.after, change.before)];
+            let plain = (change.after, "nothing");
+            let all = [plain, (change.own_trim, "own trim"), (change.disturbance, "disturbance")];
+            let best = all.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or(plain);
+            let rivals = [("persistence", best, change.persistence), ("declared", plain, change.before)];
             let loses = |new: f64, other: f64| {
                 !new.is_finite() || (new * new - floor * floor).max(0.0).sqrt() > LEAST_RATIO * other
             };
-            let beaten = rivals.into_iter().filter(|(_, new, other)| loses(*new, *other));
-            if let Some((rival, new, other)) = beaten.min_by(|a, b| a.2.total_cmp(&b.2)) {
+            let beaten = rivals.into_iter().filter(|(_, new, other)| loses(new.0, *other));
+            if let Some((rival, (new, knowing), other)) = beaten.min_by(|a, b| a.2.total_cmp(&b.2)) {
                 let (flight, unit) = (flight.clone(), change.unit);
-                losses.push(Loss { flight, horizon, channel, rival, new, other, unit });
+                losses.push(Loss { flight, horizon, channel, rival, new, knowing, other, unit });
             }
         }
     }
     losses
+}
+
+impl Loss {
+    /// Text of [`Loss::knowing`] behind an error; empty for nothing.
+    #[must_use]
+    pub fn knowing_text(&self) -> &'static str {
+        match self.knowing {
+            "own trim" => " with the flight's own trim",
+            "disturbance" => " with the disturbance seen before",
+            _ => "",
+        }
+    }
+}
+
+impl std::fmt::Display for Loss {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { flight, horizon, channel, rival, new, other, unit, .. } = self;
+        let (new, other, knowing) = (rounded(*new), rounded(*other), self.knowing_text());
+        write!(
+            f,
+            "{channel} after {horizon} s of {flight}: new {new} {unit}{knowing}, {rival} {other} {unit}"
+        )
+    }
 }
 
 /// Measurements that would help where `channel` loses.
@@ -97,6 +124,12 @@ mod tests {
         let rival = |losses: &[Loss]| losses.iter().map(|loss| loss.rival).collect::<Vec<_>>();
         assert_eq!(rival(&losses_of(2.0, 2.0, 1.0, 0.1)), ["persistence"]);
         assert_eq!(rival(&losses_of(5.0, 5.0, 9.0, 0.1)), ["declared"]);
+        let knowing = |own_trim| losses_of(3.0, own_trim, 1.0, 0.1)[0].clone();
+        assert_eq!((knowing(3.0).new, knowing(3.0).knowing), (3.0, "nothing"));
+        assert_eq!((knowing(2.0).new, knowing(2.0).knowing), (2.0, "own trim"));
+        let text =
+            "attitude after 0.5 s of leg: new 2.000 deg with the flight's own trim, persistence 1.000 deg";
+        assert_eq!(knowing(2.0).to_string(), text);
         assert!(losses_of(0.9, 0.9, 1.0, 0.1).is_empty());
         // The sensors make nearly all of the error; or the flight's own trim does.
         assert!(losses_of(2.0, 2.0, 1.0, 1.8).is_empty());

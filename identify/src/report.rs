@@ -194,6 +194,11 @@ impl Report {
         self.held_out.keys().all(is_assumed)
     }
 
+    /// True if the test flights tell where the model holds. A model that loses was not validated anywhere.
+    pub(crate) fn has_validated(&self) -> bool {
+        self.losses.is_empty() && !self.envelope.is_empty()
+    }
+
     /// The envelope as the end of a sentence.
     pub(crate) fn envelope_in_words(&self) -> String {
         let limits = self.envelope.iter();
@@ -330,10 +335,7 @@ impl Report {
     /// The answer where predictions lose: no verdict, but advice what to measure.
     fn write_losses(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "\nverdict: this vehicle file does not describe these flights. Its predictions lose:")?;
-        for Loss { flight, horizon, channel, rival, new, other, unit } in &self.losses {
-            let (new, other) = (rounded(*new), rounded(*other));
-            writeln!(f, "  {channel} after {horizon} s of {flight}: {new} {unit}, {rival} {other} {unit}")?;
-        }
+        self.losses.iter().try_for_each(|loss| writeln!(f, "  {loss}"))?;
         let mut channels: Vec<&str> = self.losses.iter().map(|loss| loss.channel).collect();
         channels.sort_unstable();
         channels.dedup();
@@ -443,7 +445,7 @@ impl Report {
                 "unexplained: {name}: {rms} {unit} are explained neither by noise nor by any effect (before: {before})"
             )?;
         }
-        if !self.envelope.is_empty() {
+        if self.has_validated() {
             writeln!(f, "validated in flights with {}", self.envelope_in_words())?;
         }
         self.not_identifiable.iter().try_for_each(|Unidentifiable { effect, needs }| {

@@ -36,8 +36,7 @@ pub fn text(
     let mut tables = ArrayOfTables::new();
     effects.iter().for_each(|effect| tables.push(table(effect, &vehicle, report)));
     let mut added = DocumentMut::new();
-    // A model that loses was not validated anywhere.
-    if report.losses.is_empty() && !report.envelope.is_empty() {
+    if report.has_validated() {
         added["envelope"] = Item::Table(envelope(report));
     }
     added["effects"] = Item::ArrayOfTables(tables);

@@ -111,9 +111,10 @@ fn flights_of(arguments: &IdentifyArguments, file: &Path, out: &Path) -> Result<
     if !arguments.json {
         bar.enable_steady_tick(Duration::from_millis(100));
     }
+    let lines = progress::Lines::default();
     let say = |text: &str| {
         bar.set_message(readable(text).into_owned());
-        if bar.is_hidden() && !arguments.json {
+        if bar.is_hidden() && !arguments.json && lines.is_due(text, bar.elapsed()) {
             output::say(&format!("{:6.1} s  {}", bar.elapsed().as_secs_f64(), readable(text)));
         }
     };

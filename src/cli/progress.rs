@@ -4,10 +4,13 @@ use super::output::say;
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use runtime::event::RunEvent;
 use std::fmt::Write;
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 /// Times a second a bar is drawn at most.
 const DRAW_HZ: u8 = 10;
+/// Time between two lines about one stage.
+const LINE_PERIOD: Duration = Duration::from_secs(10);
 /// Template of the bar of a run.
 pub const RUN: &str = "{bar:30} {pos}/{len} ticks  {msg}";
 
@@ -47,6 +50,24 @@ fn rate_hz(state: &ProgressState, start: u64) -> f64 {
     if elapsed_s > 0.0 { state.pos().saturating_sub(start) as f64 / elapsed_s } else { 0.0 }
 }
 
+/// Progress as lines, where no terminal draws a bar: each stage is told once, and its count now and then.
+#[derive(Default)]
+pub struct Lines(Mutex<Option<(String, Duration)>>);
+
+impl Lines {
+    /// True if `text` is to be told, `elapsed` after the beginning: it is of another stage than the last line, or that is old. The stage is
+    /// what stands in front of the last colon.
+    pub fn is_due(&self, text: &str, elapsed: Duration) -> bool {
+        let stage = text.rsplit_once(": ").map_or(text, |(stage, _)| stage);
+        let mut last = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_due = last.as_ref().is_none_or(|(of, at)| of != stage || elapsed >= *at + LINE_PERIOD);
+        if is_due {
+            *last = Some((stage.to_owned(), elapsed));
+        }
+        is_due
+    }
+}
+
 /// Shows an event of a run: its ticks, their rate and the real-time factor.
 pub fn show(bar: &ProgressBar, event: RunEvent<'_>) {
     match event {
@@ -74,8 +95,19 @@ pub fn finish(bar: &ProgressBar) {
 
 #[cfg(test)]
 mod tests {
-    use super::{bar_from, rate_hz};
+    use super::{Lines, bar_from, rate_hz};
     use std::time::Duration;
+
+    #[test]
+    fn a_stage_is_told_once_and_its_count_now_and_then() {
+        let lines = Lines::default();
+        let told = |text: &str, s: u64| lines.is_due(text, Duration::from_secs(s));
+        assert!(told("round 1: 23 candidates", 0) && told("round 2: 22 candidates", 1));
+        assert!(told("next flight: 1 of 39 manoeuvres", 2) && !told("next flight: 2 of 39 manoeuvres", 3));
+        assert!(!told("next flight: 9 of 39 manoeuvres", 11) && told("next flight: 10 of 39 manoeuvres", 12));
+        assert!(told("next flight, limits raised: 1 of 39 manoeuvres", 13));
+        assert!(told("refinement", 14) && !told("refinement", 15));
+    }
 
     #[test]
     fn the_rate_of_a_continued_campaign_is_that_of_its_own_flights() {

@@ -41,6 +41,9 @@ pub const MANIFEST: &str = "next-flight.toml";
 /// Name of the set points in the folder.
 pub const SET_POINTS: &str = "next-flight.csv";
 
+/// A separation below this, in standard errors, is none: no raising of a single limit makes an answer of it.
+const NO_SEPARATION: f64 = 0.3;
+
 /// Advice where no limit helps.
 const NOT_SHOWN: &str = "no manoeuvre shows what stays open, with raised limits either: another sensor, load or declared \
     effect is needed";
@@ -178,7 +181,10 @@ fn raised<T: Fn(usize, usize) + Sync>(
     let questions = simulator.questions;
     let open: Vec<usize> = (0..now.len()).filter(|at| now[*at] < SEPARATED).collect();
     let mut best: Option<(usize, f64, String)> = None;
-    for raised in Raised::ALL {
+    // Where no manoeuvre shows anything, the limits are first raised together: one family of flights tells that none helps.
+    let is_dark = open.iter().all(|at| now[*at] < NO_SEPARATION);
+    let order = if is_dark { Raised::TOGETHER_FIRST } else { Raised::ALL };
+    for raised in order {
         let (raised_bounds, text) = raised.on(bounds);
         if raised_bounds == *bounds {
             continue;
@@ -194,6 +200,9 @@ fn raised<T: Fn(usize, usize) + Sync>(
         // It only says whether a limit helps.
         let chosen = search::combined(questions, flown, bounds.duration_s, 0);
         let found = search::separations(questions, flown, &chosen);
+        if is_dark && raised == Raised::All && open.iter().all(|at| found[*at] < NO_SEPARATION) {
+            break;
+        }
         let answered = open.iter().filter(|at| found[**at] >= SEPARATED).count();
         let worst = open.iter().map(|at| found[*at]).fold(f64::INFINITY, f64::min);
         if best.as_ref().is_none_or(|(count, least, _)| (answered, worst) > (*count, *least)) {
