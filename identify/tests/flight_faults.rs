@@ -339,6 +339,21 @@ fn every_order_of_the_motors_is_found() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
+/// The order belongs to the channels of all flights: together they show it where noise hides it in each.
+#[test]
+fn exchanged_motors_of_all_flights_are_found_in_noise() {
+    let noisy =
+        |noise: f64| several(&Case::of(&["mass-error", "rotor-drag"], 1.0, 61, DURATION_S).with_noise(noise));
+    for noise in [1.0, 10.0, 30.0] {
+        let mut set = noisy(noise);
+        assert_eq!(found(&set), [], "{noise}");
+        set.flights.iter_mut().for_each(|flight| each(&mut flight.command, |commands| commands.swap(0, 1)));
+        let told = faults(&set).expect_err("no flight is left").to_string();
+        let swapped = told.matches("the order 2, 1, 3, 4 of the logged ones explains").count();
+        assert_eq!(swapped, set.flights.len() - 1, "{noise}: each flight of role fit\n{told}");
+    }
+}
+
 /// Speeds that were measured in another order than commanded, and logged without commands.
 #[test]
 fn rotor_speeds_in_another_order() {

@@ -1,9 +1,10 @@
 //! Real flights, where they are: `HUMMINGBUS_DATA` names their folder. docs/validation.md has all of them.
 
 use crate::skipped;
-use flights::FlightSet;
+use flights::{Flight, FlightSet, Role};
+use identify::Fault;
 use identify::report::Report;
-use identify::run::identify;
+use identify::run::{faults, identify};
 use std::path::Path;
 
 /// The flights of a flights file; `None`, with a word about it, where there is no data.
@@ -49,4 +50,52 @@ fn weights_are_seen_where_they_were_put() {
     }
     let Some(set) = flights("crazypad-normal-e8") else { return };
     assert!(!report(&set).verdict.contains(&"com-offset"));
+}
+
+/// Every other order of a Crazyflie's motors is found, though the commands explain a tenth of the angular accelerations.
+#[test]
+fn every_other_order_of_real_motors_is_found() {
+    let Some(set) = flights("nanobench") else { return };
+    assert_eq!(faults(&set).unwrap_or_else(|error| panic!("{error}")), []);
+    let fits = set.flights.iter().filter(|flight| flight.role == Role::Fit).count();
+    let codes = (0..256_usize).map(|code| [code / 64, code / 16 % 4, code / 4 % 4, code % 4]);
+    let others = codes.filter(|order| (0..4).all(|rotor| order.contains(&rotor))).skip(1);
+    let wrong: Vec<String> = others
+        .filter_map(|order| {
+            let mut set = set.clone();
+            for commands in set.flights.iter_mut().flat_map(|flight| &mut flight.command.values) {
+                let logged = *commands;
+                order.iter().enumerate().for_each(|(rotor, at)| commands[rotor] = logged[*at]);
+            }
+            let put_right: [usize; 4] =
+                std::array::from_fn(|rotor| order.iter().position(|at| *at == rotor).expect("an order"));
+            let put_right = put_right.map(|at| (at + 1).to_string()).join(", ");
+            let wanted = format!("the order {put_right} of the logged ones explains");
+            let told = match faults(&set) {
+                Ok(found) => format!("not refused: {found:#?}"),
+                Err(error) => error.to_string(),
+            };
+            (told.matches(&wanted).count() != fits).then(|| format!("{order:?}: {told}"))
+        })
+        .collect();
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn real_flights_have_their_motors_in_order() {
+    for name in ["nanobench", "arpl-crazyflie", "nanodrone", "neurobem"] {
+        let Some(set) = flights(name) else { return };
+        // All together, and each flight by itself.
+        let of_role = |flight: &Flight, role| Flight { role, ..flight.clone() };
+        let alone = set
+            .flights
+            .iter()
+            .map(|flight| [Role::Fit, Role::Test].map(|role| of_role(flight, role)).to_vec());
+        for flights in std::iter::once(set.flights.clone()).chain(alone) {
+            let found = faults(&FlightSet { flights, ..set.clone() });
+            let found = found.unwrap_or_else(|error| panic!("{name}: {error}"));
+            let is_of_order = |fault: &Fault| ["swapped", "reversed-spins"].contains(&fault.kind);
+            assert!(!found.iter().any(is_of_order), "{name}: {found:#?}");
+        }
+    }
 }
