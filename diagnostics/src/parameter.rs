@@ -64,12 +64,10 @@ pub enum ParameterError {
 pub struct FileFaults {
     /// The faults.
     pub each: Vec<FileFault>,
-    /// The faults in text.
-    pub message: String,
-    /// The faults for terminals, with the lines of that file.
-    pub shown: String,
     /// The component that has the parameter; empty where it is not known.
     pub who: String,
+    /// Other components that read the file, and the places that name it for them.
+    pub also: Vec<(String, Place)>,
 }
 
 /// A fault of a file that a parameter names.
@@ -85,15 +83,24 @@ pub struct FileFault {
     pub message: String,
     /// Advice; empty where the message says it.
     pub help: String,
+    /// The fault in text, with its place and the advice.
+    pub text: String,
+    /// The fault for terminals, with the line of that file.
+    pub shown: String,
 }
 
-/// The faults behind the component.
+/// The faults behind the components that read the file; with `{:#}` the faults alone, with the lines of that file.
 impl Display for FileFaults {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if !self.who.is_empty() {
-            write!(f, "{}: ", self.who)?;
+        let who: Vec<&str> = std::iter::once(self.who.as_str())
+            .chain(self.also.iter().map(|(who, _)| who.as_str()))
+            .filter(|who| !who.is_empty())
+            .collect();
+        if !f.alternate() && !who.is_empty() {
+            write!(f, "{}: ", who.join(", "))?;
         }
-        f.write_str(&self.message)
+        let text = |fault: &FileFault| if f.alternate() { fault.shown.clone() } else { fault.text.clone() };
+        f.write_str(&self.each.iter().map(text).collect::<Vec<_>>().join("\n"))
     }
 }
 

@@ -169,6 +169,26 @@ fn a_vehicle_with_a_number_that_none_has_is_refused_with_its_file_line_and_key()
 }
 
 #[test]
+fn a_fault_of_a_file_that_two_processes_read_is_told_once_with_both() {
+    let place = Place::new();
+    let (manifest, vehicle) = with_vehicle(&place, "[motor]", "[moter]");
+    let ended = refused_args(&["run", &manifest], &vehicle);
+    ended.says(&[
+        "unknown key `moter`",
+        "did you mean `motor`?",
+        "by process `controller`, and in",
+        "by process `plant`",
+    ]);
+    assert_eq!(ended.error.matches("moter`").count(), 1, "{ended}");
+    assert!(!ended.error.contains("missing key"), "{ended}");
+    let found = place.call(&["run", &manifest, "--json"]).with_code(2).json();
+    assert_eq!(found["faults"].as_array().unwrap().len(), 1, "{found}");
+    let fault = &found["faults"][0];
+    assert_eq!(fault["named_in"]["component"], "process `controller`", "{fault}");
+    assert_eq!(fault["also_named_in"][0]["component"], "process `plant`", "{fault}");
+}
+
+#[test]
 fn a_vehicle_that_its_rotors_do_not_carry_is_refused_and_one_they_hardly_carry_is_told() {
     let place = Place::new();
     let (manifest, vehicle) = with_vehicle(&place, "{ value = 0.480,", "{ value = 480,");
