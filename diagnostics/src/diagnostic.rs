@@ -96,16 +96,7 @@ impl Diagnostic {
     /// ```
     #[must_use]
     pub fn named_by(&self, key: impl Into<String>) -> ParameterError {
-        let one = |fault: Self| FileFault {
-            key: fault.key().to_owned(),
-            message: fault.error.to_string(),
-            text: fault.to_string(),
-            shown: format!("{fault:#}"),
-            file: fault.file,
-            place: fault.place,
-            help: fault.help,
-        };
-        let each = self.all().map(one).collect();
+        let each = self.all().map(FileFault::from).collect();
         let faults = FileFaults { each, who: String::new(), also: Vec::new() };
         ParameterError::File { key: key.into(), faults: Box::new(faults) }
     }
@@ -207,6 +198,21 @@ impl Faults {
         match faults.next() {
             Some(first) => Err(first.and(faults).each_once()),
             None => Ok(value.expect("what is not faulty was read")),
+        }
+    }
+}
+
+/// The fault alone, without the others of the file.
+impl From<Diagnostic> for FileFault {
+    fn from(fault: Diagnostic) -> Self {
+        Self {
+            key: fault.key().to_owned(),
+            message: fault.error.to_string(),
+            text: fault.to_string(),
+            shown: format!("{fault:#}"),
+            file: fault.file,
+            place: fault.place,
+            help: fault.help,
         }
     }
 }

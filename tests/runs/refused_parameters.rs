@@ -125,6 +125,27 @@ fn an_override_that_is_none() {
     set("include=[]").says(&["unknown key `include`"]);
 }
 
+#[test]
+fn an_override_in_a_file_is_told_with_its_text_and_the_file_that_exists() {
+    let place = Place::new();
+    let (manifest, vehicle) = with_vehicle(&place, "[motor]", "[motor]");
+    for (set, says) in [
+        ("body.mas=0.5", "unknown key `body.mas`"),
+        ("body.mass=-1", "`body.mass` must be a finite number above 0, found -1"),
+        ("body.mass.unit=lb", "`body.mass.unit` must be a unit of mass"),
+    ] {
+        let set = format!("process.plant.vehicle.{set}");
+        let ended = refused_setting(&manifest, &[&set]);
+        ended.says(&[says, "by process `plant`"]);
+        assert!(!ended.error.contains("@plant"), "{ended}");
+    }
+    // A fault at another key of the file, which has a line.
+    let set = "process.plant.vehicle.command.min=300";
+    let ended = place.call(&["check", &manifest, "--set", set]).with_code(2);
+    ended.says(&[&format!("error: {vehicle}:"), "`command.max` must be", &format!("--set {set}")]);
+    assert!(!ended.error.contains("@plant"), "{ended}");
+}
+
 /// Writes the good manifest with another vehicle into `place`: the Hummingbird with `from` replaced by `to`.
 fn with_vehicle(place: &Place, from: &str, to: &str) -> (String, String) {
     let text = fs::read_to_string(repository("vehicles/hummingbird.toml")).unwrap();

@@ -46,6 +46,8 @@ pub struct Sources {
     pub order: Vec<usize>,
     /// The components that they may name.
     pub registry: Registry,
+    /// Keys that a file sets in place of `--set`, such as a campaign file, and their places.
+    pub set_places: Vec<(String, Place)>,
 }
 
 impl Sources {
@@ -123,12 +125,31 @@ impl Sources {
             Origin::Argument(name) => (*name).to_owned(),
             Origin::Override => {
                 let error: ParameterError = error.into();
+                if let Some(place) = self.set_place(&source.text) {
+                    let error = ParameterError::conflict(error.key(), format!("{}: {error}", source.text));
+                    return Diagnostic::at(place.clone(), error).help(help);
+                }
                 let message = format!("--set {}: {error}", source.text);
                 let error = ParameterError::conflict(error.key(), message);
                 return Diagnostic::in_file(self.file().display().to_string(), error).help(help);
             }
         };
         Diagnostic::at(Place::of(file, &source.text, &span), error).help(help)
+    }
+
+    /// The value of `--set` at `span`, as the user knows it.
+    pub fn value(&self, span: &Range<usize>) -> String {
+        let text = &self.at(span.start).text;
+        match self.set_place(text) {
+            Some(place) => format!("{text} of {place}"),
+            None => format!("--set {text}"),
+        }
+    }
+
+    /// Place of the value `text` in the file that sets it in place of `--set`.
+    pub fn set_place(&self, text: &str) -> Option<&Place> {
+        let key = text.split('=').next().unwrap_or_default().trim();
+        self.set_places.iter().find(|(known, _)| known.trim() == key).map(|(_, place)| place)
     }
 
     /// Diagnostic for a value that could not be read, at its place.
