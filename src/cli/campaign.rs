@@ -1,6 +1,7 @@
 //! The command `campaign`: thousands of flights of one manifest, each with other values.
 
 use super::campaign_engine::{EngineArguments, Flight, build, fly_task};
+use super::files::require_kind;
 use super::interrupts::stop_token;
 use super::output::{print_json, print_text, say};
 use super::progress;
@@ -26,6 +27,7 @@ use serde_json::json;
 use std::collections::BTreeMap;
 use std::io::{Write as _, stdin};
 use std::path::{Path, PathBuf};
+use vehicles::kind::Kind;
 
 pub const HELP: &str = "Example: hummingbus campaign manifests/campaigns/hover-robustness.toml --out robustness\n\n\
                         Writes plan.csv, flights.parquet, report.json and report.html into the folder. The same command goes \
@@ -104,6 +106,7 @@ pub fn campaign(arguments: &CampaignArguments) -> Result<bool> {
     }
     arguments.engine.check()?;
     let path = arguments.campaign.clone().context("expected a campaign file")?;
+    require_kind(&path, &[Kind::Campaign], "")?;
     let text =
         InputFiles::default().text(&path).with_context(|| format!("cannot read {}", path.display()))?;
     let folder = arguments.out.clone().unwrap_or_else(|| path.with_extension(""));

@@ -225,7 +225,41 @@ fn cat_leaves_padding_out() {
 #[test]
 fn a_manifest_is_not_read_as_a_recording() {
     let ended = Place::new().call(&["cat", &hover()]).with_code(2);
-    ended.says(&["hover.toml is a TOML file, not a recording", "hummingbus run"]);
+    ended.says(&["hover.toml is a manifest, not a recording", "hummingbus run"]);
+}
+
+#[test]
+fn a_file_of_another_kind_is_told_with_the_command_that_reads_it() {
+    let place = Place::new();
+    let flights =
+        place.write("flights.toml", "vehicle = \"v.toml\"\n[[flight]]\nfile = \"a.csv\"\nrole = \"fit\"\n");
+    let (csv, packed) = (place.write("log.csv", "t,x\n0,1\n"), place.write("log.csv.gz", "\u{1f}"));
+    fs::write(&packed, b"\x1f\x8b\x08\0\0").unwrap();
+    let recording = recording(&place);
+    let vehicle = repository("vehicles/hummingbird.toml");
+    let (gains, scene) = (repository("controllers/gains/pid.toml"), repository("scenes/office.toml"));
+    let out = place.path("out");
+    let says = |args: &[&str], says: &[&str]| place.call(args).with_code(2).says(says);
+    says(
+        &["validate", &flights, &vehicle],
+        &["is a flights file, not a vehicle file", "identify", "stand first"],
+    );
+    says(
+        &["identify", &hover(), "--out", &out],
+        &["hover.toml is a manifest, not a flights file", "hummingbus run"],
+    );
+    says(&["campaign", &hover()], &["hover.toml is a manifest, not a campaign file"]);
+    for command in ["run", "check"] {
+        says(&[command, &recording], &["is a recording, not a manifest", "hummingbus cat"]);
+        says(&[command, &vehicle], &["is a vehicle file, not a manifest", "as `vehicle`"]);
+        says(&[command, &scene], &["is a scene file, not a manifest"]);
+        says(&[command, &gains], &["is a gains file, not a manifest"]);
+    }
+    for command in ["cat", "plot"] {
+        says(&[command, &csv], &["is a CSV file, not a recording", "a flights file names it"]);
+        says(&[command, &packed], &["is compressed (gzip), not a recording", "gunzip"]);
+    }
+    assert!(!std::path::Path::new(&out).exists());
 }
 
 #[test]
