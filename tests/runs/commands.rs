@@ -182,10 +182,23 @@ fn schema_components_and_effects_print_one() {
     assert_eq!(one.as_array().map(Vec::len), Some(1));
     place.call(&["schema", "PlantStat"]).with_code(2).says(&["no component", "PlantStat", "PlantState"]);
     let ended = place.call(&["components", "pid"]).with_code(0);
-    assert!(ended.output.lines().count() == 3 && ended.output.contains("**`pid`**"), "{}", ended.output);
+    ended.prints(&[
+        "pid: altitude, roll",
+        "reads\n  set_point: SetPoint",
+        "parameters\n  vehicle",
+        "hands over",
+    ]);
+    let gps = place.call(&["components", "gps"]).with_code(0);
+    gps.prints(&[
+        "position_drift_time_s  [s] default 300.0\n",
+        "rate_hz  [Hz] default the part's\n      measurements a second",
+    ]);
+    for text in [&ended.output, &gps.output, &place.call(&["effects", "rotor-drag"]).with_code(0).output] {
+        assert!(!["<br>", "](", "**", "|---", "`"].iter().any(|mark| text.contains(mark)), "{text}");
+    }
     place.call(&["components", "pit"]).with_code(2).says(&["no component pit", "pid"]);
     let ended = place.call(&["effects", "rotor-drag"]).with_code(0);
-    ended.prints(&["## rotor-drag", "**Equation:**", "| `coefficient` |"]);
+    ended.prints(&["rotor-drag: ", "\nequation", "\nholds for", "parameters\n  coefficient  "]);
     let one = place.call(&["effects", "rotor-drag", "--json"]).with_code(0).json();
     assert_eq!(one[0]["parameters"][0]["units"][0], "N*s^2/(m*rad)");
     let names = place.call(&["effects"]).with_code(0).output;
@@ -378,8 +391,8 @@ fn an_export_replaces_no_file_of_another_kind_and_names_an_unknown_topic() {
 fn what_is_no_recording_is_refused() {
     let place = Place::new();
     let (empty, text) = (place.write("empty.mcap", ""), place.write("text.mcap", "hello\n".repeat(100)));
-    for file in [empty, text] {
-        place.call(&["diff", &file, &file]).with_code(2).says(&[&file, "not a complete MCAP file"]);
+    for (file, told) in [(empty, "is empty, not a recording"), (text, "not a complete MCAP file")] {
+        place.call(&["diff", &file, &file]).with_code(2).says(&[&file, told]);
     }
     let none = place.path("none.mcap");
     place.call(&["diff", &none, &none]).with_code(2).says(&["cannot open the recording", &none]);
