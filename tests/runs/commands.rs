@@ -276,6 +276,21 @@ fn a_file_of_another_kind_is_told_with_the_command_that_reads_it() {
 }
 
 #[test]
+fn cat_refuses_a_span_without_messages() {
+    let place = Place::new();
+    let recording = recording(&place);
+    place
+        .call(&["cat", &recording, "--from", "100"])
+        .with_code(2)
+        .says(&["--from 100", "the recording ends at 0."]);
+    place
+        .call(&["cat", &recording, "--from", "5", "--to", "3"])
+        .with_code(2)
+        .says(&["--from 5 --to 3", "the end"]);
+    place.call(&["cat", &recording, "--from", "0.1", "--to", "0.1"]).with_code(0);
+}
+
+#[test]
 fn a_quiet_run_prints_only_its_failure() {
     let place = Place::new();
     let record = place.path("quiet.mcap");
