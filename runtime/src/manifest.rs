@@ -208,6 +208,13 @@ impl Manifest {
         self.sources.problem(span, error, help)
     }
 
+    /// Places of the key and the value at `path` within the key or the value at `span`. Where a value of `--set` may be meant, whose
+    /// key begins with `set`, it is `span` twice.
+    pub(crate) fn inside(&self, span: &Range<usize>, path: &[&str], set: &str) -> [Range<usize>; 2] {
+        let is_set = self.overrides().any(|text| text.trim_start().starts_with(set));
+        if is_set { [span.clone(), span.clone()] } else { self.sources.inside(span, path) }
+    }
+
     /// Refuses `value` where it is stated and does not fit.
     pub(crate) fn require<T>(
         &self,

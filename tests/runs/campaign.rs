@@ -235,7 +235,7 @@ fn what_cannot_be_flown_at_all_is_refused_before_the_first_flight() {
         ),
         (vary("run.sed").replace("as = \"factor\"\n", ""), "sed"),
         (HOVERS.replace("uniform = [0.8, 1.2]", "uniform = [1.2, 0.8]"), "a lower limit below the upper one"),
-        (HOVERS.replace("position.z", "position.w"), "c.toml:8:1: measure `height`"),
+        (HOVERS.replace("position.z", "position.w"), "c.toml:11:9: measure `height`"),
         (HOVERS.replace("statistic = \"last\"", "statistic = \"latest\""), "c.toml:13:13: "),
         (format!("figures = [\"heigth\"]\n{HOVERS}"), "c.toml:2:12: no flight has a figure `heigth`"),
         (HOVERS.replace("name = \"height\"", "name = \"mass\""), "`mass` is the name of another column"),

@@ -1,20 +1,23 @@
 //! Refused: parameters, vehicles, rates and other numbers of a manifest, and settings.
 
-use crate::refusals::{good, refused, refused_args, refused_setting, refused_text, refused_with};
+use crate::refusals::{good, refused, refused_args, refused_setting, refused_with};
 use crate::support::{Place, repository};
 use std::fs;
 
 #[test]
 fn set_points_that_cannot_be_flown() {
-    let marked = good().replace("\nset_points =", "\n§set_points =");
-    let with = |from: &str, to: &str| {
-        assert_eq!(marked.matches(from).count(), 1);
-        refused_text(&marked.replace(from, to))
-    };
-    let ended = with("unit = \"m\"", "unit = \"ft\"");
+    let with = |from: &str, to: &str| refused(from, to);
+    let ended = with("unit = \"m\"", "unit = §\"ft\"");
     ended.says(&["process `pilot`: `set_points.0.unit` must be \"m\"", "found \"ft\""]);
-    with("\"altitude\"", "\"height\"").says(&["`set_points.0.channel` must be", "found \"height\""]);
-    with("to = 1.5, ", "").says(&["`set_points.0.to` must be a finite number in a step, found nothing"]);
+    with("\"altitude\"", "§\"height\"").says(&["`set_points.0.channel` must be", "found \"height\""]);
+    with("kind = \"step\"", "kind = §\"ste\"").says(&["`set_points.0.kind`"]);
+    with("at_s = 0.1, to", "at_s = 0.1, §too")
+        .says(&["unknown key `set_points.0.too`", "did you mean `to`?"]);
+    with(
+        "[{ kind = \"step\", channel = \"altitude\", at_s = 0.1, to = 1.5, ",
+        "[§{ kind = \"step\", channel = \"altitude\", at_s = 0.1, ",
+    )
+    .says(&["`set_points.0.to` must be a finite number in a step, found nothing"]);
 }
 
 #[test]

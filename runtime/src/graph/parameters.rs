@@ -184,12 +184,28 @@ fn refused(declared: &DeclaredNode<'_>, error: &ParameterError) -> Diagnostic {
         ParameterError::Missing { .. } => format!("add {key} = … to [process.{name}.parameters]"),
         _ => error.meant().map_or(String::new(), |near| format!("did you mean `{near}`?")),
     };
+    let is_unknown = matches!(error, ParameterError::Unknown { .. });
+    let at = place_within(declared, key, is_unknown);
     let error = error.clone().of(format!("process `{name}`"));
-    declared.manifest.problem(&place(declared, key), error, help)
+    declared.manifest.problem(&at, error, help)
 }
 
 fn problem(declared: &DeclaredNode<'_>, at: &Range<usize>, message: &str, help: String) -> Diagnostic {
     declared.manifest.problem(at, format!("process `{}`: {message}", declared.name.get_ref()), help)
+}
+
+/// Place of the value of the dotted `key`, or of the key itself if it `is_unknown`: that of a single entry where a parameter is a
+/// list or a table.
+fn place_within(declared: &DeclaredNode<'_>, key: &str, is_unknown: bool) -> Range<usize> {
+    let at = place(declared, key);
+    let path: Vec<&str> = key.split('.').skip(1).collect();
+    let is_parameter = declared.process.parameters.keys().any(|parameter| parameter.span() == at);
+    if path.is_empty() || !is_parameter {
+        return at;
+    }
+    let set = format!("process.{}.parameters", declared.name.get_ref());
+    let [of_key, of_value] = declared.manifest.inside(&at, &path, &set);
+    if is_unknown { of_key } else { of_value }
 }
 
 /// Place of the dotted `key`: an input as `inputs.PORT`, or by its first name a parameter or a file; else the place of
