@@ -162,13 +162,20 @@ impl ParameterError {
                 Some(known) => format!("did you mean `{known}`?"),
                 None => "remove it, or correct its spelling".to_owned(),
             },
-            Self::Value { .. } | Self::File { .. } | Self::Conflict { .. } => String::new(),
+            Self::Value { .. } => {
+                self.meant().map_or(String::new(), |meant| format!("did you mean `{meant}`?"))
+            }
+            Self::File { .. } | Self::Conflict { .. } => String::new(),
         }
     }
 
-    /// The known key that an unknown one was probably meant to be.
+    /// The known key that an unknown one was probably meant to be; or the name, of a value that is one of several.
     #[must_use]
     pub fn meant(&self) -> Option<&str> {
+        if let Self::Value { expected, found, .. } = self {
+            let names = expected.strip_prefix("one of `")?.strip_suffix('`')?;
+            return nearest(found.strip_prefix('`')?.strip_suffix('`')?, names.split("`, `"));
+        }
         let Self::Unknown { key, known } = self else { return None };
         // The tables on the way are no part of what was misspelt.
         let written = key.rsplit('.').next().unwrap_or(key);
@@ -394,6 +401,14 @@ mod tests {
         assert!(told(bounds("counts").check("command", 2.0), "1").ends_with("found 2.0 counts"));
         let error = bounds("").check("gain", 2.0);
         assert_eq!(told(error, "rad/s"), "`gain` must be 0.0 to 1.0 (it is so), found 2.0 rad/s");
+    }
+
+    #[test]
+    fn a_misspelt_name_among_several_is_told_with_the_one_that_is_meant() {
+        let value =
+            |found: &str| ParameterError::value("channels", "one of `position`, `attitude`", found).help();
+        assert_eq!(value("`positoin`"), "did you mean `position`?");
+        assert_eq!(value("3"), "");
     }
 
     #[test]

@@ -380,7 +380,13 @@ impl<'d, 't> Section<'d, 't> {
     fn three(&self, value: &Spanned<DeValue<'t>>) -> Result<[f64; 3], Diagnostic> {
         let found: Vec<_> = value.get_ref().as_array().into_iter().flat_map(|array| array.iter()).collect();
         let [x, y, z] = found[..] else {
-            return Err(self.wrong_type(&self.key("value"), value, "an array of three numbers"));
+            let (key, expected) = (self.key("value"), "an array of three numbers");
+            return Err(match value.get_ref().as_array() {
+                Some(array) => {
+                    self.doc.bad(&value.span(), &key, expected, format!("an array of {}", array.len()))
+                }
+                None => self.wrong_type(&key, value, expected),
+            });
         };
         Ok([self.number("value", x)?, self.number("value", y)?, self.number("value", z)?])
     }

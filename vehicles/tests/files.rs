@@ -221,7 +221,12 @@ fn a_wrong_type_is_named() {
     let mass = line_of("mass = ");
     assert_refused("value = 0.480", "value = \"0.480\"", mass, &["finite number", "a TOML string"]);
     assert_refused(MASS_LINE, "mass = 0.48", mass, &["a table with value, unit, source and uncertainty"]);
-    assert_refused("[0.17, 0, 0]", "[0.17, 0]", line_of("[0.17, 0, 0]"), &["an array of three numbers"]);
+    assert_refused(
+        "[0.17, 0, 0]",
+        "[0.17, 0]",
+        line_of("[0.17, 0, 0]"),
+        &["an array of three numbers, found an array of 2"],
+    );
     assert_refused("\"second-order\"", "\"third-order\"", line_of("second-order"), &["\"first-order\""]);
     let near = refused("\"second-order\"", "\"secondorder\"");
     assert_eq!(near.help, "did you mean \"second-order\"?");
