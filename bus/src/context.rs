@@ -73,6 +73,13 @@ impl InputMessage<'_> {
         let initial = self.initial?;
         Some(initial.get(field).and_then(|values| values.as_array()).map_or(0, Vec::len))
     }
+
+    /// Numbers that the initial message has in its array `field`; empty without an initial message.
+    #[must_use]
+    pub fn initial_numbers(&self, field: &str) -> Vec<f64> {
+        let values = self.initial.and_then(|initial| initial.get(field)?.as_array());
+        values.into_iter().flatten().filter_map(serde_json::Value::as_f64).collect()
+    }
 }
 
 /// Legal but unusual value of a node in its run.

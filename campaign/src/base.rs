@@ -50,14 +50,17 @@ impl Base {
                 let read = || format!("cannot read the manifest {}", path.display());
                 let text = files.text(path).with_context(read)?;
                 lines = text.matches('\n').count() + 1;
-                let manifest = Manifest::parse(campaign.measures.behind(text), path, &overrides, registry);
+                let places = campaign.set_places.clone();
+                let text = campaign.measures.behind(text);
+                let manifest = Manifest::parse_placed(text, path, &overrides, places, registry);
                 let placed = |error: Diagnostic| in_place(campaign, path, lines, error.into());
                 (manifest.map_err(placed)?, None)
             }
             Start::Checkpoint(path) => {
                 let from = Checkpoint::read(path)?;
                 let about = || format!("cannot go on from {}", path.display());
-                (from.load_manifest(&overrides, registry).with_context(about)?, Some(from))
+                let manifest = from.load_manifest(&overrides, registry).with_context(about)?;
+                (manifest.placing(campaign.set_places.clone()), Some(from))
             }
         };
         let graph = runtime::require_flyable(&manifest, files, from.as_ref())

@@ -36,6 +36,8 @@ pub struct Campaign {
     pub sampling: Sampling,
     /// Overrides of all flights, as `--set` takes them.
     pub set: Vec<String>,
+    /// Keys that the file sets or varies, and the places of their values.
+    pub set_places: Vec<(String, Place)>,
     /// Measures beside those of the manifest.
     pub measures: Measures,
     /// Names of the figures that table and report keep, with their places; all where absent.
@@ -111,7 +113,7 @@ struct File {
     #[serde(default)]
     sampling: Sampling,
     #[serde(default)]
-    set: Vec<String>,
+    set: Vec<Spanned<String>>,
     #[serde(default)]
     measure: Vec<Spanned<toml::Table>>,
     figures: Option<Vec<Spanned<String>>>,
@@ -127,9 +129,9 @@ struct File {
 #[serde(deny_unknown_fields)]
 struct Vary {
     name: Option<String>,
-    key: Option<String>,
+    key: Option<Spanned<String>>,
     #[serde(default)]
-    keys: Vec<String>,
+    keys: Vec<Spanned<String>>,
     #[serde(default, rename = "as")]
     meaning: Meaning,
     values: Option<Vec<f64>>,
@@ -185,12 +187,11 @@ impl Campaign {
                 ParameterError::value("timeout_s_host", "seconds above 0, at most a million", timeout_s_host);
             return Err(at(&span, error, "leave it out for 60 s"));
         }
-        if let Some(set) =
-            file.set.iter().find(|set| set.split('=').next().is_some_and(|key| key.trim() == "run.seed"))
-        {
-            let message = format!("`{set}` in `set`: each flight has a seed of its own");
+        let key_of = |set: &str| set.split('=').next().unwrap_or_default().trim().to_owned();
+        if let Some(set) = file.set.iter().find(|set| key_of(set.get_ref()) == "run.seed") {
+            let message = format!("`{}` in `set`: each flight has a seed of its own", set.get_ref());
             let error = ParameterError::conflict("set", message);
-            return Err(at(&(0..0), error, "change `seed` of the campaign, or vary run.seed"));
+            return Err(at(&set.span(), error, "change `seed` of the campaign, or vary run.seed"));
         }
         let start = start(&file, path).map_err(|(span, error)| {
             at(&span, error, "name a manifest, or a checkpoint that all flights go on from")
@@ -206,9 +207,28 @@ impl Campaign {
             (figure.get_ref().clone(), Place::of(name.clone(), text, &figure.span()))
         };
         let figures = file.figures.as_ref().map(|figures| figures.iter().map(placed).collect());
-        let (seed, sampling, set) = (file.seed, file.sampling, file.set);
+        let place = |span| Place::of(name.clone(), text, &span);
+        let varied =
+            file.vary.iter().map(Spanned::get_ref).flat_map(|vary| vary.key.iter().chain(&vary.keys));
+        let varied = varied.map(|key| (key.get_ref().clone(), place(key.span())));
+        let set_places =
+            file.set.iter().map(|set| (key_of(set.get_ref()), place(set.span()))).chain(varied).collect();
+        let set = file.set.into_iter().map(Spanned::into_inner).collect();
+        let (seed, sampling) = (file.seed, file.sampling);
         let path = path.to_owned();
-        Ok(Self { path, start, flights, seed, sampling, set, measures, figures, vary, timeout_s_host })
+        Ok(Self {
+            path,
+            start,
+            flights,
+            seed,
+            sampling,
+            set,
+            set_places,
+            measures,
+            figures,
+            vary,
+            timeout_s_host,
+        })
     }
 }
 
@@ -302,7 +322,7 @@ fn default_name(key: &str) -> String {
 
 impl Varied {
     fn of(vary: &Vary, place: &Place) -> Result<Self, ParameterError> {
-        let keys: Vec<String> = vary.key.iter().chain(&vary.keys).cloned().collect();
+        let keys: Vec<String> = vary.key.iter().chain(&vary.keys).map(|key| key.get_ref().clone()).collect();
         let first =
             keys.first().ok_or_else(|| ParameterError::missing("key", "a key, as `--set` takes it"))?;
         let name = vary.name.clone().unwrap_or_else(|| default_name(first));

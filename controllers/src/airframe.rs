@@ -1,11 +1,11 @@
 //! The vehicle as its controllers know it: its file, the allocation to its rotors, and the models for the loops.
 
-use crate::allocation::{Allocation, AllocationError, THRUST_RESERVE};
-use diagnostics::ParameterError;
+use crate::allocation::{Allocation, AllocationError, Part, THRUST_RESERVE};
+use diagnostics::{Diagnostic, ParameterError, Place};
 use inputs::InputFiles;
 use nalgebra::Vector3;
 use std::path::Path;
-use vehicles::Vehicle;
+use vehicles::{Provenance, Vehicle};
 
 /// A vehicle, and how its rotors are reached.
 ///
@@ -33,7 +33,8 @@ impl ControlledVehicle {
     pub fn load(files: &InputFiles, path: &Path) -> Result<Self, ParameterError> {
         let vehicle = Vehicle::load_from(files, path);
         let vehicle = vehicle.map_err(|error| error.named_by("vehicle"))?;
-        Self::new(vehicle).map_err(|error| ParameterError::conflict("vehicle", error))
+        let places = vehicle.provenance.clone();
+        Self::new(vehicle).map_err(|error| at_its_line(files, path, &places, &error).named_by("vehicle"))
     }
 
     /// `vehicle` with its allocation.
@@ -72,4 +73,29 @@ pub struct HoverModel {
     pub thrust_min_N: f64,
     /// The greatest thrust to demand, N.
     pub thrust_max_N: f64,
+}
+/// The fault at the number of the vehicle file at `path`, or of its base, that it is about.
+fn at_its_line(
+    files: &InputFiles,
+    path: &Path,
+    numbers: &[Provenance],
+    error: &AllocationError,
+) -> Diagnostic {
+    let key = match error {
+        AllocationError::Singular { part: Part::Thrust, .. } => "rotor.thrust_coefficient",
+        AllocationError::Singular { part: Part::Yaw, .. } => "rotors.0.spin",
+        AllocationError::Singular { .. } | AllocationError::Unheld { .. } => "rotors.0.position",
+        AllocationError::SpeedRange { .. } => "command.speed_at_min",
+    };
+    let message = ParameterError::conflict(key, error);
+    let place = numbers.iter().rev().find(|number| number.key == key).and_then(|number| {
+        let text = files.text(Path::new(&number.file)).ok()?;
+        let line = text.lines().nth(number.line.checked_sub(1)?)?;
+        let start = line.as_ptr() as usize - text.as_ptr() as usize;
+        Some(Place::of(&number.file, &text, &(start..start + line.len())))
+    });
+    match place {
+        Some(place) => Diagnostic::at(place, message),
+        None => Diagnostic::in_file(path.display().to_string(), message),
+    }
 }

@@ -75,7 +75,7 @@ pub enum AllocationError {
         "its {working} working rotors of {rotors} cannot make thrust and three torques independently: {part} is not \
          controllable{}; expected four or more rotors that push and turn each in a way of its own; correct `rotors` and \
          `rotor` of the vehicle file",
-        why(*part, *working)
+        why(*part, *working, *is_one_way)
     )]
     Singular {
         /// Number of rotors.
@@ -84,6 +84,8 @@ pub enum AllocationError {
         working: usize,
         /// The part that follows from those before it.
         part: Part,
+        /// True if all working rotors turn one way.
+        is_one_way: bool,
     },
     /// Within their limits, the rotors do not make a torque both ways while they carry the weight.
     #[error(
@@ -110,12 +112,13 @@ pub enum AllocationError {
 }
 
 /// The likely reason for a part that is not controllable.
-fn why(part: Part, working: usize) -> &'static str {
+fn why(part: Part, working: usize, is_one_way: bool) -> &'static str {
     match part {
         Part::Yaw if working == 3 => {
             " (a tricopter needs a servo that tilts a rotor, which no vehicle file describes)"
         }
-        Part::Yaw => " (do all rotors turn one way?)",
+        Part::Yaw if is_one_way => " (all rotors turn one way, so that yaw follows from thrust)",
+        Part::Yaw => "",
         Part::Roll | Part::Pitch => " (are the rotors in a line?)",
         Part::Thrust => " (`rotor.thrust_coefficient` is 0)",
     }
@@ -184,7 +187,9 @@ impl Allocation {
         }
         let (rotors, working) = (vehicle.rotors.len(), vehicle.working_rotors().count());
         let effectiveness = effectiveness(vehicle);
-        let singular = |part| AllocationError::Singular { rotors, working, part };
+        let mut spins = vehicle.working_rotors().map(|rotor| rotor.spin);
+        let is_one_way = spins.next().is_none_or(|first| spins.all(|spin| spin == first));
+        let singular = |part| AllocationError::Singular { rotors, working, part, is_one_way };
         dependent(&effectiveness).map_or(Ok(()), |part| Err(singular(part)))?;
         let inverse = inverse(&effectiveness).ok_or_else(|| singular(Part::Yaw))?;
         let (square_min_rad2_s2, square_max_rad2_s2) = (min_rad_s * min_rad_s, max_rad_s * max_rad_s);

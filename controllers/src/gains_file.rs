@@ -242,9 +242,10 @@ mod tests {
         let text = text.replace("damping_ratio", "damping").replace("rate_feed_forward", "feed_forward");
         let error = parse(&text, "my.toml", CascadeGains::read).unwrap_err();
         let (count, error) = (error.all().count(), error.to_string());
-        let missing = ["missing key `command_filter`", "missing key `attitude.rate_feed_forward`"];
-        let unknown = ["unknown key `filter`", "unknown key `attitude.feed_forward`"];
-        assert!(missing.iter().chain(&unknown).all(|fault| error.contains(fault)), "{error}");
-        assert_eq!(count, 4, "one for each: {error}");
+        let told =
+            ["missing key `command_filter`", "unknown key `filter`", "unknown key `attitude.feed_forward`"];
+        assert!(told.iter().all(|fault| error.contains(fault)), "{error}");
+        assert!(error.ends_with("did you mean `rate_feed_forward`?"), "a misspelt key is one fault: {error}");
+        assert_eq!(count, 3, "one for each: {error}");
     }
 }

@@ -1,5 +1,6 @@
 //! Fault of a file that somebody wrote: the place, what was expected, what was found, what to do.
 
+use crate::nearest::nearest;
 use crate::parameter::{FileFault, FileFaults, ParameterError};
 use crate::place::Place;
 use serde::ser::{Serialize, SerializeStruct, Serializer};
@@ -95,19 +96,8 @@ impl Diagnostic {
     /// ```
     #[must_use]
     pub fn named_by(&self, key: impl Into<String>) -> ParameterError {
-        let one = |fault: Self| FileFault {
-            key: fault.key().to_owned(),
-            message: fault.error.to_string(),
-            file: fault.file,
-            place: fault.place,
-            help: fault.help,
-        };
-        let faults = FileFaults {
-            each: self.all().map(one).collect(),
-            message: self.to_string(),
-            shown: format!("{self:#}"),
-            who: String::new(),
-        };
+        let each = self.all().map(FileFault::from).collect();
+        let faults = FileFaults { each, who: String::new(), also: Vec::new() };
         ParameterError::File { key: key.into(), faults: Box::new(faults) }
     }
 
@@ -132,6 +122,38 @@ impl Diagnostic {
             self.others.extend(more);
         }
         self
+    }
+
+    /// The same faults, each told once: a misspelt key is not missing as well, and the faults of a file that several
+    /// components read are those of all.
+    fn each_once(self) -> Self {
+        let mut faults: Vec<Self> = self.all().collect();
+        join_misspelt(&mut faults);
+        let mut once: Vec<Self> = Vec::with_capacity(faults.len());
+        for mut fault in faults {
+            let is_told = once.iter_mut().any(|told| told.takes_over(&mut fault));
+            if !is_told {
+                once.push(fault);
+            }
+        }
+        let mut once = once.into_iter();
+        once.next().map_or(self, |first| first.and(once))
+    }
+
+    /// Takes the faults of the same file from `other`, and adds its component; true if `other` has no more faults.
+    fn takes_over(&mut self, other: &mut Self) -> bool {
+        let (ParameterError::File { faults: told, .. }, ParameterError::File { faults: new, .. }) =
+            (&mut self.error, &mut other.error)
+        else {
+            return false;
+        };
+        let count = new.each.len();
+        new.each.retain(|fault| !told.each.contains(fault));
+        if let (true, Some(place)) = (new.each.len() < count, &other.place) {
+            told.also.push((new.who.clone(), place.clone()));
+            told.also.append(&mut new.also);
+        }
+        new.each.is_empty()
     }
 
     /// Gathers the results of all `checks`.
@@ -174,9 +196,57 @@ impl Faults {
     pub fn finish<T>(self, value: Option<T>) -> Result<T, Diagnostic> {
         let mut faults = self.0.into_iter();
         match faults.next() {
-            Some(first) => Err(first.and(faults)),
+            Some(first) => Err(first.and(faults).each_once()),
             None => Ok(value.expect("what is not faulty was read")),
         }
+    }
+}
+
+/// The fault alone, without the others of the file.
+impl From<Diagnostic> for FileFault {
+    fn from(fault: Diagnostic) -> Self {
+        Self {
+            key: fault.key().to_owned(),
+            message: fault.error.to_string(),
+            text: fault.to_string(),
+            shown: format!("{fault:#}"),
+            file: fault.file,
+            place: fault.place,
+            help: fault.help,
+        }
+    }
+}
+
+/// Drops each missing key for which an unknown one of the same table stands: it is misspelt.
+fn join_misspelt(faults: &mut Vec<Diagnostic>) {
+    for index in 0..faults.len() {
+        let Some(unknown) = faults.get(index).filter(|fault| fault.is_unknown()) else { continue };
+        let (table, written) = split(unknown.key());
+        let twins = faults.iter().filter(|fault| {
+            fault.is_missing() && fault.file == unknown.file && split(fault.key()).0 == table
+        });
+        let missing: Vec<&str> = twins.map(|fault| split(fault.key()).1).collect();
+        let Some(meant) = nearest(written, missing).map(str::to_owned) else { continue };
+        let (file, table) = (unknown.file.clone(), table.to_owned());
+        faults[index].help = format!("did you mean `{meant}`?");
+        faults.retain(|fault| {
+            !(fault.is_missing() && fault.file == file && split(fault.key()) == (&table, &meant))
+        });
+    }
+}
+
+/// The table of a dotted key, and its last name.
+fn split(key: &str) -> (&str, &str) {
+    key.rsplit_once('.').unwrap_or(("", key))
+}
+
+impl Diagnostic {
+    fn is_missing(&self) -> bool {
+        matches!(self.error, ParameterError::Missing { .. })
+    }
+
+    fn is_unknown(&self) -> bool {
+        matches!(self.error, ParameterError::Unknown { .. })
     }
 }
 
@@ -198,8 +268,11 @@ impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (&self.error, &self.place) {
             (ParameterError::File { faults, .. }, Some(place)) if f.alternate() => {
-                let by = if faults.who.is_empty() { String::new() } else { format!(" by {}", faults.who) };
-                write!(f, "{}\n  named in {place}{by}", faults.shown)?;
+                let by = |who: &str| if who.is_empty() { String::new() } else { format!(" by {who}") };
+                write!(f, "{faults:#}\n  named in {place}{}", by(&faults.who))?;
+                for (who, place) in &faults.also {
+                    write!(f, ", and in {place}{}", by(who))?;
+                }
             }
             _ => self.write_head(f)?,
         }
@@ -233,7 +306,7 @@ impl std::error::Error for Diagnostic {}
 
 #[cfg(test)]
 mod tests {
-    use super::{Diagnostic, Place};
+    use super::{Diagnostic, ParameterError, Place};
 
     fn at(offset: usize) -> Diagnostic {
         Diagnostic::at(Place::of("a.toml", "x = 1\ny = 2\n", &(offset..offset + 1)), "bad value")
@@ -243,6 +316,44 @@ mod tests {
     fn a_diagnostic_names_file_line_and_column() {
         let error = at(10).help("give another");
         assert_eq!(error.to_string(), "a.toml:2:5: bad value\n  help: give another");
+    }
+
+    #[test]
+    fn a_misspelt_key_is_one_fault() {
+        let at = |error| Diagnostic::at(Place::of("a.toml", "mas = 1", &(0..3)), error);
+        let missing = |key: &str| Err::<(), _>(at(ParameterError::missing(key, "")));
+        let unknown = |key: &str| Err(at(ParameterError::unknown(key, ["gravity", "mass", "max"])));
+        let faults =
+            [missing("body.mass"), missing("body.gravity"), missing("motor.mass"), unknown("body.mas")];
+        let gathered = Diagnostic::gather(faults).unwrap_err();
+        let keys: Vec<String> = gathered.all().map(|fault| fault.key().to_owned()).collect();
+        assert_eq!(keys, ["body.gravity", "motor.mass", "body.mas"]);
+        assert!(gathered.to_string().ends_with("did you mean `mass`?"), "{gathered}");
+        let shuffled = Diagnostic::gather([unknown("mas"), missing("mass")]).unwrap_err();
+        assert_eq!(shuffled.all().count(), 1);
+    }
+
+    #[test]
+    fn a_fault_of_a_file_of_several_components_is_told_once() {
+        let named = |line: usize, who: &str, faults: usize| {
+            let all: Vec<_> =
+                [4, 10].into_iter().take(faults).map(|offset| Err::<(), _>(at(offset))).collect();
+            let error = Diagnostic::gather(all).unwrap_err().named_by("vehicle").of(who);
+            Err::<(), _>(Diagnostic::at(Place::of("m.toml", "\n\n\n", &(line..line)), error))
+        };
+        let both = Diagnostic::gather([named(0, "plant", 1), named(1, "controller", 1)]).unwrap_err();
+        assert_eq!(both.to_string(), "m.toml:1:1: plant, controller: a.toml:1:5: bad value");
+        let shown = format!("{both:#}");
+        assert_eq!(shown.matches("bad value").count(), 1, "{shown}");
+        assert!(shown.ends_with("named in m.toml:1:1 by plant, and in m.toml:2:1 by controller"), "{shown}");
+        // The fault of one of them alone stays beside it.
+        let more = Diagnostic::gather([named(0, "plant", 1), named(1, "controller", 2)]).unwrap_err();
+        let shown = format!("{more:#}");
+        assert_eq!(
+            (shown.matches("a.toml:1:5").count(), shown.matches("a.toml:2:5").count()),
+            (1, 1),
+            "{shown}"
+        );
     }
 
     #[test]

@@ -6,11 +6,22 @@
 /// use diagnostics::nearest;
 ///
 /// assert_eq!(nearest("comand", ["command", "state"]), Some("command"));
+/// assert_eq!(nearest("PID", ["pid", "lqr"]), Some("pid"));
+/// assert_eq!(nearest("baro", ["barometer", "battery"]), Some("barometer"));
 /// assert_eq!(nearest("xyz", ["command", "state"]), None);
 /// ```
 pub fn nearest<'a>(found: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    let scored = known.into_iter().map(|name| (strsim::levenshtein(found, name), name));
-    scored.filter(|(distance, name)| *distance <= name.len().div_ceil(3)).min().map(|(_, name)| name)
+    let (found, known) = (found.to_lowercase(), known.into_iter().collect::<Vec<_>>());
+    let scored = known.iter().map(|name| (strsim::levenshtein(&found, &name.to_lowercase()), *name));
+    let near = scored.filter(|(distance, name)| *distance <= name.len().div_ceil(3)).min();
+    near.map(|(_, name)| name).or_else(|| begun(&found, &known))
+}
+
+/// The only name that begins with `found`, if that has three letters or more.
+fn begun<'a>(found: &str, known: &[&'a str]) -> Option<&'a str> {
+    let mut begun = known.iter().filter(|name| name.to_lowercase().starts_with(found));
+    let first = begun.next().filter(|_| found.len() >= 3)?;
+    begun.next().is_none().then_some(*first)
 }
 
 /// Returns advice on the name `found` that is none of `known`: the one that was probably meant, else `all` and

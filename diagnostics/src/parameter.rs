@@ -64,12 +64,10 @@ pub enum ParameterError {
 pub struct FileFaults {
     /// The faults.
     pub each: Vec<FileFault>,
-    /// The faults in text.
-    pub message: String,
-    /// The faults for terminals, with the lines of that file.
-    pub shown: String,
     /// The component that has the parameter; empty where it is not known.
     pub who: String,
+    /// Other components that read the file, and the places that name it for them.
+    pub also: Vec<(String, Place)>,
 }
 
 /// A fault of a file that a parameter names.
@@ -85,15 +83,24 @@ pub struct FileFault {
     pub message: String,
     /// Advice; empty where the message says it.
     pub help: String,
+    /// The fault in text, with its place and the advice.
+    pub text: String,
+    /// The fault for terminals, with the line of that file.
+    pub shown: String,
 }
 
-/// The faults behind the component.
+/// The faults behind the components that read the file; with `{:#}` the faults alone, with the lines of that file.
 impl Display for FileFaults {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if !self.who.is_empty() {
-            write!(f, "{}: ", self.who)?;
+        let who: Vec<&str> = std::iter::once(self.who.as_str())
+            .chain(self.also.iter().map(|(who, _)| who.as_str()))
+            .filter(|who| !who.is_empty())
+            .collect();
+        if !f.alternate() && !who.is_empty() {
+            write!(f, "{}: ", who.join(", "))?;
         }
-        f.write_str(&self.message)
+        let text = |fault: &FileFault| if f.alternate() { fault.shown.clone() } else { fault.text.clone() };
+        f.write_str(&self.each.iter().map(text).collect::<Vec<_>>().join("\n"))
     }
 }
 
@@ -155,13 +162,20 @@ impl ParameterError {
                 Some(known) => format!("did you mean `{known}`?"),
                 None => "remove it, or correct its spelling".to_owned(),
             },
-            Self::Value { .. } | Self::File { .. } | Self::Conflict { .. } => String::new(),
+            Self::Value { .. } => {
+                self.meant().map_or(String::new(), |meant| format!("did you mean `{meant}`?"))
+            }
+            Self::File { .. } | Self::Conflict { .. } => String::new(),
         }
     }
 
-    /// The known key that an unknown one was probably meant to be.
+    /// The known key that an unknown one was probably meant to be; or the name, of a value that is one of several.
     #[must_use]
     pub fn meant(&self) -> Option<&str> {
+        if let Self::Value { expected, found, .. } = self {
+            let names = expected.strip_prefix("one of `")?.strip_suffix('`')?;
+            return nearest(found.strip_prefix('`')?.strip_suffix('`')?, names.split("`, `"));
+        }
         let Self::Unknown { key, known } = self else { return None };
         // The tables on the way are no part of what was misspelt.
         let written = key.rsplit('.').next().unwrap_or(key);
@@ -387,6 +401,14 @@ mod tests {
         assert!(told(bounds("counts").check("command", 2.0), "1").ends_with("found 2.0 counts"));
         let error = bounds("").check("gain", 2.0);
         assert_eq!(told(error, "rad/s"), "`gain` must be 0.0 to 1.0 (it is so), found 2.0 rad/s");
+    }
+
+    #[test]
+    fn a_misspelt_name_among_several_is_told_with_the_one_that_is_meant() {
+        let value =
+            |found: &str| ParameterError::value("channels", "one of `position`, `attitude`", found).help();
+        assert_eq!(value("`positoin`"), "did you mean `position`?");
+        assert_eq!(value("3"), "");
     }
 
     #[test]

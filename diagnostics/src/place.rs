@@ -42,6 +42,22 @@ impl Place {
             source: source.to_owned(),
         }
     }
+
+    /// The same place in the `text` of another `file`: the nearest line that is the same; `None` if there is none.
+    ///
+    /// ```
+    /// use diagnostics::Place;
+    ///
+    /// let place = Place::of("copy.toml", "new = 0\nx = 1\n", &(8..9));
+    /// assert_eq!(place.in_file("a.toml", "x = 1\n").unwrap().to_string(), "a.toml:1:1");
+    /// assert_eq!(place.in_file("a.toml", "x = 2\n"), None);
+    /// ```
+    #[must_use]
+    pub fn in_file(&self, file: impl Into<String>, text: &str) -> Option<Self> {
+        let same = text.lines().enumerate().filter(|(_, line)| *line == self.source);
+        let (index, _) = same.min_by_key(|(index, _)| (index + 1).abs_diff(self.line))?;
+        Some(Self { file: file.into(), line: index + 1, ..self.clone() })
+    }
 }
 
 impl fmt::Display for Place {

@@ -214,6 +214,53 @@ mod tests {
     }
 
     #[test]
+    fn a_start_below_the_ground_is_refused_where_there_is_one() {
+        let below = json!({ "initial_position_m": [0.0, 0.0, -1.0] });
+        let error = checked("scenes/room.toml", below.clone(), &[]).unwrap_err();
+        assert_eq!(error.key(), "initial_position_m");
+        assert!(error.to_string().contains("-1.0], which is below the ground"), "{error}");
+        let measured = json!({ "initial_position_m": [0.0, 0.0, -1.0], "window_s": 0.1 });
+        assert_eq!(checked("scenes/room.toml", measured, &["measured"]), Ok(()));
+        let mut free = json!({ "vehicle": repository("vehicles/hummingbird.toml") });
+        free.as_object_mut().unwrap().extend(below.as_object().unwrap().clone());
+        let check = |parameters: &Value| {
+            Registration::of::<Plant>().check(parameters, &NodeContext::new("plant", &[]))
+        };
+        assert_eq!(check(&free), Ok(()), "there is no ground");
+        free["scene"] = repository("scenes/room.toml").into();
+        assert!(check(&free).unwrap_err().to_string().contains("below the ground"));
+    }
+
+    #[test]
+    fn an_initial_command_beyond_the_range_of_the_motors_is_told() {
+        let warned = |vehicle: &str, command: f64| {
+            let initial = json!({ "command": [command, command, command, command] });
+            let message =
+                InputMessage { port: "command", bytes: 112, period_ticks: 1, initial: Some(&initial) };
+            let messages = [message];
+            let context = NodeContext::new("plant", &["command"]).reading(&messages);
+            let parameters = json!({ "vehicle": repository(vehicle) });
+            Registration::of::<Plant>().check(&parameters, &context).unwrap();
+            let warnings = context.into_warnings();
+            warnings
+                .into_iter()
+                .filter(|warning| warning.key == "inputs.command")
+                .map(|warning| warning.message)
+                .collect::<Vec<_>>()
+        };
+        for (command, end) in [(765.0, 200.0), (-5.0, 1.0), (0.0, 1.0)] {
+            let told = warned("vehicles/hummingbird.toml", command).concat();
+            assert!(told.contains(&format!("has {command} for rotor 0")), "{told}");
+            assert!(
+                told.contains("expected 1 to 200") && told.contains(&format!("takes it as {end}")),
+                "{told}"
+            );
+        }
+        assert!(warned("vehicles/hummingbird.toml", 1.0).is_empty());
+        assert!(warned("vehicles/hummingbird.toml", 200.0).is_empty());
+    }
+
+    #[test]
     fn each_vehicle_has_a_frame_of_its_own() {
         let frame = |name: &str| frame_of(name).map(|frame| frame.as_str().to_owned());
         for (name, expected) in [

@@ -74,7 +74,26 @@ fn refuse_initial(vehicle: &Vehicle, run: &NodeContext<'_>) -> Result<(), Parame
     let wrong = command.and_then(|input| input.initial_count("command")).filter(|found| *found != count);
     wrong.map_or(Ok(()), |found| {
         refuse(true, "inputs.command", || unequal(vehicle, "the initial value of its input", found))
-    })
+    })?;
+    tell_initial(vehicle, &command.map_or(Vec::new(), |input| input.initial_numbers("command")), run);
+    Ok(())
+}
+
+/// Warns of an initial command beyond the range of the vehicle's motors, which hold it at the end of the range.
+fn tell_initial(vehicle: &Vehicle, commands: &[f64], run: &NodeContext<'_>) {
+    let map = &vehicle.command;
+    let is_within =
+        |command: f64| (map.min..=map.max).contains(&command) || (map.zero_is_off && command == 0.0);
+    let Some(rotor) = commands.iter().position(|command| !is_within(*command)) else { return };
+    let (command, end) = (commands[rotor], if commands[rotor] < map.min { map.min } else { map.max });
+    run.warn(
+        "inputs.command",
+        format!(
+            "the initial value of its input `command` has {command} for rotor {rotor}, counted from 0, expected {} to {}, the \
+             range of `vehicle` \"{}\" (`command.min`, `command.max`); the motor takes it as {end}: correct `initial`",
+            map.min, map.max, vehicle.name
+        ),
+    );
 }
 
 /// The words on a command of `holder` that has `found` numbers.
@@ -202,8 +221,12 @@ impl Parameters {
         let scene = &origin.scene;
         if let Physics::Rapier { crash_speed_m_s } = origin.physics {
             let mut rapier = origin.begin_in_scene(crash_speed_m_s);
+            self.refuse_below_ground(scene)?;
             self.refuse_inside(&rapier, scene)?;
             return self.refuse_bodies(&mut rapier, scene, dt_s);
+        }
+        if self.scene.is_some() {
+            self.refuse_below_ground(scene)?;
         }
         let has_bodies = scene.bodies().next().is_some() || !scene.joints.is_empty();
         refuse(has_bodies, "scene", || {
@@ -230,6 +253,18 @@ impl Parameters {
         let scene = scene.map_err(|error| error.named_by("scene"))?;
         refuse_double_rig(&vehicle, &scene)?;
         Ok((Airframe::from_files(vehicle, &scene.effects).map_err(refused)?, scene))
+    }
+
+    /// Refuses a start below the ground, unless a measured flight gives the start or a rig holds the vehicle.
+    fn refuse_below_ground(&self, scene: &Scene) -> Result<(), ParameterError> {
+        let is_below = self.initial_position_m[2] < 0.0;
+        let is_free = self.window_s.is_none() && scene.rig.is_none();
+        refuse(is_below && is_free, "initial_position_m", || {
+            format!(
+                "`initial_position_m` is {:?}, which is below the ground at z = 0; start at z = 0 or above",
+                self.initial_position_m
+            )
+        })
     }
 
     /// Refuses a start inside a box or a mesh, unless a measured flight gives the start.

@@ -85,7 +85,33 @@ impl RecordingError {
     /// There is no `field` among the `leaves` of `topic`.
     #[must_use]
     pub fn unknown_field(topic: &str, field: &str, leaves: &[Leaf]) -> Self {
-        let known = leaves.iter().map(|leaf| leaf.path.as_str()).collect::<Vec<_>>().join(", ");
+        let known = names(leaves.iter().map(|leaf| leaf.path.as_str()));
         Self::UnknownField { topic: topic.to_owned(), field: field.to_owned(), known }
+    }
+}
+
+/// The names of fields in a list; of an array the first two elements, since how many there are depends on the vehicle.
+fn names<'p>(paths: impl Iterator<Item = &'p str>) -> String {
+    let mut names: Vec<&str> = Vec::new();
+    for path in paths {
+        let index = path.strip_suffix(']').and_then(|path| path.rsplit_once('[')?.1.parse::<usize>().ok());
+        match index {
+            Some(2) => names.push("…"),
+            Some(3..) => {}
+            _ => names.push(path),
+        }
+    }
+    names.join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::names;
+
+    #[test]
+    fn an_array_is_listed_by_its_first_elements() {
+        let speeds: Vec<String> = (0..12).map(|rotor| format!("rotor_speed[{rotor}]")).collect();
+        let paths = ["tick"].into_iter().chain(speeds.iter().map(String::as_str)).chain(["position.z"]);
+        assert_eq!(names(paths), "tick, rotor_speed[0], rotor_speed[1], …, position.z");
     }
 }

@@ -39,7 +39,8 @@ pub(crate) use content::{ComputingTimeSetting, InputSetting, OutputSetting, Proc
 pub(crate) use sets::is_name;
 
 use crate::registry::Registry;
-use diagnostics::{Diagnostic, ParameterError, read_tree};
+use diagnostics::parameter::FileFault;
+use diagnostics::{Diagnostic, ParameterError, Place, read_tree};
 use file_edits::FileEdit;
 use inputs::InputFiles;
 use sources::{Origin, Sources};
@@ -93,9 +94,31 @@ impl Manifest {
         overrides: &[String],
         registry: Registry,
     ) -> Result<Self, Diagnostic> {
+        Self::parse_placed(text, path, overrides, Vec::new(), registry)
+    }
+
+    /// As [`Manifest::parse`]; errors of overrides of the keys of `set_places` are shown there instead of as `--set`.
+    ///
+    /// # Errors
+    /// As [`Manifest::parse`].
+    pub fn parse_placed(
+        text: String,
+        path: &Path,
+        overrides: &[String],
+        set_places: Vec<(String, Place)>,
+        registry: Registry,
+    ) -> Result<Self, Diagnostic> {
         let mut sources = include::read(path, text, registry)?;
+        sources.set_places = set_places;
         overrides.iter().for_each(|text| sources.add(Origin::Override, text.clone()));
         Self::of(path.to_owned(), sources)
+    }
+
+    /// This manifest; errors of further overrides of the keys of `set_places` are shown there instead of as `--set`.
+    #[must_use]
+    pub fn placing(mut self, set_places: Vec<(String, Place)>) -> Self {
+        self.sources.set_places = set_places;
+        self
     }
 
     /// This manifest with another value at `key`, such as `process.controller.parameters.gains.altitude_p`.
@@ -185,6 +208,13 @@ impl Manifest {
         self.sources.problem(span, error, help)
     }
 
+    /// Places of the key and the value at `path` within the key or the value at `span`. Where a value of `--set` may be meant, whose
+    /// key begins with `set`, it is `span` twice.
+    pub(crate) fn inside(&self, span: &Range<usize>, path: &[&str], set: &str) -> [Range<usize>; 2] {
+        let is_set = self.overrides().any(|text| text.trim_start().starts_with(set));
+        if is_set { [span.clone(), span.clone()] } else { self.sources.inside(span, path) }
+    }
+
     /// Refuses `value` where it is stated and does not fit.
     pub(crate) fn require<T>(
         &self,
@@ -255,6 +285,40 @@ impl Manifest {
         let edited = file_edits::edited_path(&path, name);
         files.keep(&edited, text.into_bytes());
         Ok(edited)
+    }
+
+    /// The faults `error` of the file `key` of the process `name`, whose edited copy lies at `copy`: the user knows the file at
+    /// `original` and the values of `--set`, not the copy.
+    pub(crate) fn without_copy(
+        &self,
+        files: &InputFiles,
+        (name, key): (&str, &str),
+        (original, copy): (&Path, &Path),
+        error: ParameterError,
+    ) -> ParameterError {
+        let ParameterError::File { key: parameter, mut faults } = error else { return error };
+        let edits: Vec<&FileEdit> = self.file_edits.iter().filter(|edit| edit.is_of(name, key)).collect();
+        let text = files.text(original).unwrap_or_default();
+        let (shown, copy) = (original.display().to_string(), copy.display().to_string());
+        for fault in faults.each.iter_mut().filter(|fault| fault.file == copy) {
+            let error = ParameterError::conflict(fault.key.clone(), &fault.message);
+            let found = match edits.iter().find(|edit| edit.is_about(&fault.key, &text)) {
+                Some(edit) => self.problem(edit.span(), error, fault.help.clone()),
+                None => {
+                    let values: Vec<String> =
+                        edits.iter().map(|edit| self.sources.value(edit.span())).collect();
+                    let help = format!("{} (read with {})", fault.help, values.join(", "));
+                    let place = fault.place.as_ref().and_then(|place| place.in_file(&shown, &text));
+                    match place {
+                        Some(place) => Diagnostic::at(place, error),
+                        None => Diagnostic::in_file(&shown, error),
+                    }
+                    .help(help.trim_start())
+                }
+            };
+            *fault = FileFault::from(found);
+        }
+        ParameterError::File { key: parameter, faults }
     }
 
     /// This manifest with one more `[[swap]]`-like backup of `process`, whose differences are the TOML

@@ -1,6 +1,6 @@
 //! The components that a manifest may name.
 
-use bus::component::Transfer;
+use bus::component::{Role, Transfer};
 use bus::schema::Schema;
 use bus::{BusError, Registration};
 use std::collections::BTreeMap;
@@ -88,16 +88,17 @@ impl Registry {
         self.iter().find(|component| component.name == name)
     }
 
-    /// The names of all kinds, for messages.
+    /// The names of all kinds that a manifest can use, for messages.
     #[must_use]
     pub fn names(&self) -> String {
         self.kinds().collect::<Vec<_>>().join(", ")
     }
 
-    /// The names of all kinds.
+    /// The names of all kinds that a manifest can use.
     pub fn kinds(&self) -> impl Iterator<Item = &'static str> {
         let programs = self.programs.iter().map(|program| program.name);
-        self.iter().map(|component| component.name).chain(programs)
+        let usable = self.iter().filter(|component| component.role != Role::Judge);
+        usable.map(|component| component.name).chain(programs)
     }
 
     /// Every message that a port of a component carries, in the order of their type names.

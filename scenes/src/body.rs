@@ -65,6 +65,9 @@ const BODY_SPEED: Bounds =
 const BODY_SPIN: Bounds =
     Bounds { min: -1e3, max: 1e3, unit: "rad/s", why: "a radian a tick at 1 kHz cannot be integrated" };
 
+/// Keys of a free body.
+pub(crate) const KEYS: [&str; 3] = ["mass", "velocity", "angular_velocity"];
+
 /// The keys of a thing that say that it moves; none of them where it stands still.
 pub(crate) struct Keys {
     mass_kg: f64,

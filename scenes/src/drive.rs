@@ -169,6 +169,7 @@ pub(crate) const LINEAR: Dimensions = Dimensions {
 
 /// Reads the table `drive` of a joint, whose numbers have these `dimensions`.
 pub(crate) fn parse(section: &Section, dimensions: &Dimensions) -> Result<Drive, Diagnostic> {
+    section.require_known(&["mode", "limit", "stiffness", "damping", "schedule"])?;
     let mode = section.choice("mode", &MODES)?;
     let limit = match section.has("limit") {
         true => section.bounded("limit", dimensions.force, &LIMIT)?,

@@ -230,6 +230,9 @@ fn one_mesh(
     folder: &Path,
     read: &dyn Fn(&Path) -> IoResult<Vec<u8>>,
 ) -> Result<Mesh, Diagnostic> {
+    section.require_known(
+        &[&["name", "file", "position", "yaw", "scale", "solid"], &SURFACE[..], &body::KEYS].concat(),
+    )?;
     let name = section.text("name")?.to_owned();
     let file = folder.join(section.text("file")?);
     let refused = |found: String| {
@@ -289,6 +292,9 @@ fn check_size(mesh: &Mesh, scale_m: f64) -> Result<(), String> {
     ))
 }
 
+/// Keys of a surface.
+const SURFACE: [&str; 2] = ["friction", "restitution"];
+
 /// Reads the surface of `section`; keys that it does not have are those of `otherwise`.
 fn surface(section: &Section, otherwise: &Surface) -> Result<Surface, Diagnostic> {
     let number = |name, bounds, otherwise| {
@@ -301,6 +307,7 @@ fn surface(section: &Section, otherwise: &Surface) -> Result<Surface, Diagnostic
 }
 
 fn one_box(section: &Section, surface_around: &Surface) -> Result<Cuboid, Diagnostic> {
+    section.require_known(&[&["name", "centre", "size", "yaw"], &SURFACE[..], &body::KEYS].concat())?;
     let name = section.text("name")?.to_owned();
     let centre = section.vector("centre", LENGTH, &PLACE)?;
     let size = section.vector("size", LENGTH, &SIZE)?;
@@ -314,6 +321,7 @@ fn one_box(section: &Section, surface_around: &Surface) -> Result<Cuboid, Diagno
 }
 
 fn one_ball(section: &Section, surface_around: &Surface) -> Result<Ball, Diagnostic> {
+    section.require_known(&[&["name", "centre", "radius"], &SURFACE[..], &body::KEYS].concat())?;
     let name = section.text("name")?.to_owned();
     let centre_W_m = Vector3::from(section.vector("centre", LENGTH, &PLACE)?);
     let radius_m = section.bounded("radius", LENGTH, &RADIUS)?;

@@ -132,6 +132,9 @@ const KINDS: [(&str, Kind); 5] = [
 
 /// Reads a table of `[[joints]]` in a scene with these `bodies`; see `scenes/slung-load.toml`.
 pub(crate) fn parse(section: &Section, bodies: &[&str]) -> Result<Joint, Diagnostic> {
+    let ends = ["name", "kind", "parent", "child", "anchor"];
+    let of_kinds = ["axis", "lower", "upper", "length", "end", "damping", "drive"];
+    section.require_known(&[&ends[..], &of_kinds].concat())?;
     let name = section.text("name")?.to_owned();
     let kind = section.choice("kind", &KINDS)?;
     let parent = end(section, "parent", bodies)?;

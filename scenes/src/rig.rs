@@ -72,6 +72,18 @@ const AMOUNT: Bounds = Bounds {
 
 /// Reads the table `[rig]`; see `scenes/rig-sliding.toml`.
 pub(crate) fn parse(section: &Section) -> Result<Rig, Diagnostic> {
+    section.require_known(&[
+        "bearing",
+        "mount",
+        "tilt_max",
+        "heave",
+        "sway",
+        "moving_mass",
+        "bearing_friction",
+        "bearing_damping",
+        "slide_friction",
+        "slide_damping",
+    ])?;
     let amount = |name, dimension| section.bounded(name, dimension, &AMOUNT);
     let tilt_max = || {
         let tilt = section.quantity("tilt_max", ANGLE)?;

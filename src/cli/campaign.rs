@@ -1,6 +1,7 @@
 //! The command `campaign`: thousands of flights of one manifest, each with other values.
 
 use super::campaign_engine::{EngineArguments, Flight, build, fly_task};
+use super::files::require_kind;
 use super::interrupts::stop_token;
 use super::output::{print_json, print_text, say};
 use super::progress;
@@ -26,6 +27,7 @@ use serde_json::json;
 use std::collections::BTreeMap;
 use std::io::{Write as _, stdin};
 use std::path::{Path, PathBuf};
+use vehicles::kind::Kind;
 
 pub const HELP: &str = "Example: hummingbus campaign manifests/campaigns/hover-robustness.toml --out robustness\n\n\
                         Writes plan.csv, flights.parquet, report.json and report.html into the folder. The same command goes \
@@ -104,6 +106,7 @@ pub fn campaign(arguments: &CampaignArguments) -> Result<bool> {
     }
     arguments.engine.check()?;
     let path = arguments.campaign.clone().context("expected a campaign file")?;
+    require_kind(&path, &[Kind::Campaign], "")?;
     let text =
         InputFiles::default().text(&path).with_context(|| format!("cannot read {}", path.display()))?;
     let folder = arguments.out.clone().unwrap_or_else(|| path.with_extension(""));
@@ -172,6 +175,10 @@ impl Opened {
             figures: base.figures.clone(),
             verdicts: base.verdicts.clone(),
         };
+        if !folder.exists() {
+            // Refused before a folder is made for it.
+            require_flyable(&campaign, &base, &Plan::of(&campaign))?;
+        }
         let (store, plan, flown) = Store::open(folder, &campaign, &header, builds)?;
         if let (true, Some(name)) = (flying.is_made, path.file_name().and_then(|name| name.to_str())) {
             store.write(name, |file| Ok(file.write_all(text.as_bytes())?))?;
@@ -183,7 +190,7 @@ impl Opened {
     fn fly(&mut self, mut rows: BTreeMap<u64, Row>) -> Result<BTreeMap<u64, Row>> {
         let jobs = jobs(&self.campaign, &self.base, &self.plan, &rows)?;
         if rows.is_empty() {
-            require_flyable(&self.base, &jobs)?;
+            require_flyable(&self.campaign, &self.base, &self.plan)?;
         }
         let (flown, planned) = (rows.len() as u64, self.plan.flights.len() as u64);
         let bar = progress::bar_from(BAR, flown, planned, self.flying.json);
@@ -327,20 +334,19 @@ fn jobs(campaign: &Campaign, base: &Base, plan: &Plan, flown: &BTreeMap<u64, Row
 
 /// Refuses a campaign of which flights that are spread over the whole plan are all refused, as they are where no manifest has a
 /// varied key.
-fn require_flyable(base: &Base, jobs: &[Job]) -> Result<()> {
+fn require_flyable(campaign: &Campaign, base: &Base, plan: &Plan) -> Result<()> {
     let mut first = None;
-    for (flight, job) in spread(jobs.len()).map(|index| &jobs[index]).enumerate() {
-        match base.check(&job.sets) {
+    for flight in spread(plan.flights.len()) {
+        match base.check(&plan.sets(campaign, base, flight)?) {
             Ok(()) => return Ok(()),
-            Err(error) if flight == 0 => first = Some((job.flight, error)),
-            Err(_) => {}
+            Err(error) => first = first.or(Some((flight, error))),
         }
     }
     let Some((flight, error)) = first else { return Ok(()) };
-    let checked = jobs.len().min(CHECKED);
+    let checked = plan.flights.len().min(CHECKED);
     Err(error).context(format!(
         "no flight can be flown: of the plan's {} flights {checked} were checked, which are all refused; flight {flight}",
-        jobs.len()
+        plan.flights.len()
     ))
 }
 

@@ -37,7 +37,12 @@ pub struct CatArguments {
 /// # Errors
 /// If the recording cannot be read, or has no such topic or field.
 pub fn cat(arguments: &CatArguments) -> Result<bool> {
+    let (from_s, to_s) = (arguments.from, arguments.to);
+    if to_s < from_s {
+        bail!("--from {from_s} --to {to_s}: the end must not be before the start");
+    }
     let recording = open_recording(&arguments.recording)?;
+    arguments.require_any(&recording)?;
     if let Some(topic) = &arguments.topic {
         recording.topic(topic)?;
     }
@@ -112,6 +117,26 @@ fn cell_of(text: &str) -> String {
 }
 
 impl CatArguments {
+    /// Refuses a span that begins behind the last message.
+    fn require_any(&self, recording: &Recording) -> Result<()> {
+        if self.from == 0.0 {
+            return Ok(());
+        }
+        let mut last_s: Option<f64> = None;
+        for record in recording.messages() {
+            let time_s =
+                std::time::Duration::from_nanos(record.context("cannot read on")?.time_ns).as_secs_f64();
+            if time_s >= self.from {
+                return Ok(());
+            }
+            last_s = Some(last_s.map_or(time_s, |last_s| last_s.max(time_s)));
+        }
+        match last_s {
+            Some(last_s) => bail!("--from {}: the recording ends at {last_s} s; begin earlier", self.from),
+            None => Ok(()),
+        }
+    }
+
     /// The messages of the topic within the span; of all topics where none is named.
     fn records<'a>(&'a self, recording: &'a Recording) -> impl Iterator<Item = Result<Record>> + 'a {
         let is_wanted = |record: &Record| {

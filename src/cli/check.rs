@@ -1,9 +1,11 @@
 //! The command `check`.
 
+use super::files::require_kind;
 use super::output::{print_json, print_text, print_warnings};
 use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
+use vehicles::kind::Kind;
 
 /// Arguments of `check`.
 #[derive(Args)]
@@ -27,6 +29,7 @@ pub struct CheckArguments {
 /// The faults of the manifest.
 pub fn check(arguments: &CheckArguments) -> Result<bool> {
     let CheckArguments { manifest, set, .. } = arguments;
+    require_kind(manifest, &[Kind::Manifest], "")?;
     let checked = if arguments.no_programs {
         hummingbus::check(manifest, set)?
     } else {

@@ -1,6 +1,7 @@
 //! The command `components`.
 
-use super::output::{print_file, print_json};
+use super::output::{print_file, print_json, print_text};
+use super::parameter_text::parameter_lines;
 use anyhow::{Result, anyhow};
 use bus::Registration;
 use bus::component::{Role, Transfer};
@@ -38,7 +39,7 @@ pub fn components(arguments: &ComponentsArguments) -> Result<bool> {
         if arguments.json {
             print_json(&[program_json(program)])
         } else {
-            print_file(&(table([].into_iter()) + &program_row(program)))
+            print_text(&plain_program(program))
         }?;
         return Ok(true);
     }
@@ -47,7 +48,7 @@ pub fn components(arguments: &ComponentsArguments) -> Result<bool> {
         (None, true) => print_json(&all_json())?,
         (Some(component), true) => print_json(&[json(component)])?,
         (None, false) => print_file(&format!("{HEAD}\n{}{}", table(COMPONENTS.iter()), programs()))?,
-        (Some(component), false) => print_file(&table(std::iter::once(component)))?,
+        (Some(component), false) => print_text(&plain(component))?,
     }
     Ok(true)
 }
@@ -64,6 +65,37 @@ fn program_row(program: &NodeProgram) -> String {
     format!(
         "| **`{name}`**: {summary}; a process of its own | {ports} | {ports} | {parameters} | what it can save |\n"
     )
+}
+
+/// All about a component, as plain text for a terminal.
+fn plain(component: &Registration) -> String {
+    let (reads, sends) = (inputs(component), outputs(component));
+    let parts = [("reads", reads), ("sends", sends)];
+    let parts = parts.map(|(title, ports)| format!("{title}\n{}", indented(&ports)));
+    let parameters = indented(&parameter_lines(component.name, parameters(component)));
+    let Registration { name, summary, .. } = component;
+    let state = state(component);
+    format!(
+        "{name}: {summary}\n\n{}\n\nparameters\n{parameters}\n\nhands over\n  {state}",
+        parts.join("\n\n")
+    )
+    .replace('`', "")
+}
+
+fn plain_program(program: &NodeProgram) -> String {
+    let NodeProgram { name, summary, parameters, .. } = program;
+    let parameters = indented(&parameter_lines(name, parameters));
+    format!(
+        "{name}: {summary}; a process of its own\n\nreads and sends\n  the ports that the manifest names\n\nparameters\n{parameters}"
+    )
+}
+
+/// Lines beneath a title; a dash for none.
+fn indented(lines: &[String]) -> String {
+    match lines {
+        [] => "  –".to_owned(),
+        lines => lines.iter().map(|line| format!("  {line}")).collect::<Vec<_>>().join("\n"),
+    }
 }
 
 /// Every kind, as JSON.
@@ -95,24 +127,38 @@ fn table(components: impl Iterator<Item = &'static Registration>) -> String {
 
 fn row(component: &Registration) -> String {
     let Registration { name, summary, .. } = component;
-    let inputs = match component.inputs {
-        Inputs::Ports(ports) => listed(ports.iter().map(port)),
-        Inputs::Many(schema) => format!("any number of {}", type_name(schema)),
-        Inputs::Any => "any topics".to_owned(),
-        Inputs::Forwarded { bytes_max } => format!("any topics of at most {bytes_max} bytes"),
-    };
+    let (inputs, outputs) = (listed(inputs(component).into_iter()), listed(outputs(component).into_iter()));
+    let parameters = listed(parameters(component).iter().map(|name| format!("`{name}`")));
+    let state = state(component);
+    format!("| **`{name}`**: {summary} | {inputs} | {outputs} | {parameters} | {state} |\n")
+}
+
+/// The inputs, each in words.
+fn inputs(component: &Registration) -> Vec<String> {
+    match component.inputs {
+        Inputs::Ports(ports) => ports.iter().map(port).collect(),
+        Inputs::Many(schema) => vec![format!("any number of {}", type_name(schema))],
+        Inputs::Any => vec!["any topics".to_owned()],
+        Inputs::Forwarded { bytes_max } => vec![format!("any topics of at most {bytes_max} bytes")],
+    }
+}
+
+/// The outputs, each in words.
+fn outputs(component: &Registration) -> Vec<String> {
     let forwarded = matches!(component.inputs, Inputs::Forwarded { .. });
     let forwarded = forwarded.then(|| "each input's topic".to_owned());
-    let outputs = listed(component.outputs.iter().map(port).chain(forwarded));
-    let parameters = listed(parameters(component).iter().map(|name| format!("`{name}`")));
-    let state = match component.transfer {
+    component.outputs.iter().map(port).chain(forwarded).collect()
+}
+
+/// The state that it hands over, in words.
+fn state(component: &Registration) -> &'static str {
+    match component.transfer {
         Transfer::Message(schema) => type_name(schema),
         Transfer::Bytes(type_name) => type_name,
         Transfer::Nothing => "–",
         Transfer::File | Transfer::Growing(_) => "cannot be replaced",
         Transfer::External(_) => "cannot be saved",
-    };
-    format!("| **`{name}`**: {summary} | {inputs} | {outputs} | {parameters} | {state} |\n")
+    }
 }
 
 fn json(component: &Registration) -> Value {

@@ -29,7 +29,7 @@ pub fn effects(arguments: &EffectsArguments) -> Result<bool> {
     match chosen {
         _ if arguments.markdown => print_file(&page::markdown())?,
         Some(kind) if arguments.json => print_json(&[json(kind)])?,
-        Some(kind) => print_text(page::of(kind).trim())?,
+        Some(kind) => print_text(page::plain(kind).trim_end())?,
         None if arguments.json => print_json(&CATALOGUE.iter().map(|kind| json(kind)).collect::<Vec<_>>())?,
         None => print_text(&list())?,
     }

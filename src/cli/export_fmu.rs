@@ -1,5 +1,6 @@
 //! The command `export-fmu`.
 
+use super::files::require_kind;
 use super::output::{print_json, print_text};
 use anyhow::{Context, Result, bail};
 use clap::Args;
@@ -8,6 +9,7 @@ use runtime::output_file::{self, Kind, Mark, is_same};
 use serde_json::json;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
+use vehicles::kind;
 
 /// Examples that `--help` shows.
 pub const HELP: &str = "Examples:
@@ -57,6 +59,7 @@ pub fn export_fmu(arguments: &ExportFmuArguments) -> Result<bool> {
     if is_same(&out, &arguments.file) {
         bail!("{} is what is read: name another file", out.display());
     }
+    require_kind(&arguments.file, &[kind::Kind::Manifest, kind::Kind::Vehicle], "")?;
     output_file::check(&out, &FMU)?;
     let wishes = Wishes {
         without: &arguments.without,

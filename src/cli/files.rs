@@ -3,22 +3,22 @@
 use anyhow::{Result, anyhow};
 use recorder::reader::Recording;
 use runtime::checkpoint::Checkpoint;
-use runtime::output_file::{Kind, Mark};
+use runtime::output_file::{self, Mark};
 use runtime::rewind::MARK;
+use std::fs::File;
+use std::io::Read as _;
 use std::path::Path;
+use vehicles::kind::Kind;
 
 /// A page of any kind.
-pub const PAGE: Kind = Kind { name: "page", mark: Mark::Within(report::page::MARK.as_bytes()) };
+pub const PAGE: output_file::Kind =
+    output_file::Kind { name: "page", mark: Mark::Within(report::page::MARK.as_bytes()) };
 
 /// Opens a recording, or the whole part of one that was cut off, and then reports that.
 pub fn open_recording(path: &Path) -> Result<Recording> {
-    let recording = Recording::salvage(path).map_err(|error| {
-        let is_toml = path.is_file() && path.extension().is_some_and(|extension| extension == "toml");
-        match Checkpoint::read(path) {
-            Ok(checkpoint) => not_recorded_but(path, &checkpoint),
-            Err(_) if is_toml => not_recorded(path),
-            Err(_) => error.into(),
-        }
+    let recording = Recording::salvage(path).map_err(|error| match Checkpoint::read(path) {
+        Ok(checkpoint) => not_recorded_but(path, &checkpoint),
+        Err(_) => require_kind(path, &[Kind::Recording], "").err().unwrap_or_else(|| error.into()),
     })?;
     if let Some(cut) = recording.cut() {
         let end = cut.last_tick.map_or("nothing of it is whole".to_owned(), |tick| {
@@ -57,10 +57,26 @@ fn not_recorded_but(path: &Path, checkpoint: &Checkpoint) -> anyhow::Error {
     )
 }
 
-/// The reason why a TOML file is not read as a recording.
-fn not_recorded(path: &Path) -> anyhow::Error {
-    let path = path.display();
-    anyhow!(
-        "{path} is a TOML file, not a recording: if it is a manifest, `hummingbus run {path}` records its flight (.mcap)"
-    )
+/// Refuses the file at `path` if its content shows a kind that is none of `expected`, with the command that reads it and with
+/// `advice`. The reader of the file reports a file that cannot be read, or whose kind is not known.
+///
+/// # Errors
+/// The kind that was found, and those that were expected.
+pub fn require_kind(path: &Path, expected: &[Kind], advice: &str) -> Result<()> {
+    let Some(found) = start(path).and_then(|start| Kind::of(&start)).filter(|kind| !expected.contains(kind))
+    else {
+        return Ok(());
+    };
+    let shown = path.display().to_string();
+    let names: Vec<&str> = expected.iter().map(Kind::name).collect();
+    let advice = if advice.is_empty() { String::new() } else { format!("; {advice}") };
+    Err(anyhow!("{shown} is {}, not {}: {}{advice}", found.name(), names.join(" or "), found.reader(&shown)))
+}
+
+/// The first bytes of a file, enough for its kind; the whole of a text.
+fn start(path: &Path) -> Option<Vec<u8>> {
+    let file = path.is_file().then(|| File::open(path).ok()).flatten()?;
+    let mut bytes = Vec::new();
+    file.take(inputs::TEXT_BYTES_MAX).read_to_end(&mut bytes).ok()?;
+    Some(bytes)
 }

@@ -1,6 +1,6 @@
 //! The command `identify`: effects that flights show and the declared model lacks, and the model with them.
 
-use super::files::PAGE;
+use super::files::{PAGE, require_kind};
 use super::interrupts::stop_token;
 use super::next_flight::{self, NextFlight};
 use super::output::{self, print_json, print_text, readable};
@@ -21,7 +21,7 @@ use std::fs::File;
 use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
-use vehicles::Vehicle;
+use vehicles::{Vehicle, kind};
 
 /// Text of `--help` behind the options.
 pub const HELP: &str = "Examples: hummingbus identify flights.toml --out identified\n          \
@@ -97,6 +97,9 @@ pub fn run(arguments: &IdentifyArguments) -> Result<bool> {
 
 fn rotor(files: &[PathBuf], out: &Path, is_json: bool) -> Result<bool> {
     let files: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
+    for file in &files {
+        require_kind(file, &[kind::Kind::Stand, kind::Kind::Flights], "")?;
+    }
     let found = identify::rotor::run_files(&files)?;
     let _lock = claim(out, &[("rotor.toml", &TABLES), ("rotor.json", &REPORT)], &files)?;
     write(out, "rotor.toml", &TABLES, &found.tables)?;
@@ -119,6 +122,7 @@ fn flights_of(arguments: &IdentifyArguments, file: &Path, out: &Path) -> Result<
         }
     };
     say("reading flights");
+    require_kind(file, &[kind::Kind::Flights], "")?;
     let set = FlightSet::load(file)?;
     let base = Vehicle::base(&set.files, &set.vehicle);
     let inputs: Vec<&Path> =

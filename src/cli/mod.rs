@@ -23,6 +23,7 @@ mod new;
 mod next_flight;
 mod node;
 mod output;
+mod parameter_text;
 mod plot;
 mod profile;
 mod progress;

@@ -110,8 +110,15 @@ fn of_named_file(fault: &Diagnostic) -> Vec<Value> {
     let ParameterError::File { faults, .. } = error else {
         return vec![fault_json((file, place.as_ref(), fault.key()), (&error.to_string(), help), None)];
     };
-    let one = |FileFault { file, place, key, message, help }: &FileFault| {
-        fault_json((file, place.as_ref(), key), (message, help), Some((fault, &faults.who)))
+    let others =
+        faults.also.iter().map(|(who, place)| named_in((&place.file, Some(place), fault.key()), who));
+    let others: Vec<Value> = others.collect();
+    let one = |FileFault { file, place, key, message, help, .. }: &FileFault| {
+        let mut told = fault_json((file, place.as_ref(), key), (message, help), Some((fault, &faults.who)));
+        if !others.is_empty() {
+            told["also_named_in"] = others.clone().into();
+        }
+        told
     };
     faults.each.iter().map(one).collect()
 }
@@ -122,16 +129,19 @@ fn fault_json(
     (message, help): (&str, &str),
     by: Option<(&Diagnostic, &str)>,
 ) -> Value {
-    let named_in = by.map(|(by, component)| {
-        let mut place = place_json((&by.file, by.place.as_ref(), by.key()));
-        place["component"] = component.into();
-        place
-    });
+    let named_in = by.map(|(by, component)| named_in((&by.file, by.place.as_ref(), by.key()), component));
     let mut fault = place_json(at);
     fault["message"] = message.into();
     fault["help"] = help.into();
     fault["named_in"] = named_in.into();
     fault
+}
+
+/// The place that names a file, and the component that reads it.
+fn named_in(at: (&str, Option<&Place>, &str), component: &str) -> Value {
+    let mut place = place_json(at);
+    place["component"] = component.into();
+    place
 }
 
 fn place_json((file, place, key): (&str, Option<&Place>, &str)) -> Value {

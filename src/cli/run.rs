@@ -1,5 +1,6 @@
 //! The command `run` and related ones: check a manifest, fly it, judge its recording, print the results.
 
+use super::files::require_kind;
 use super::foxglove::{self, LiveFoxglove};
 use super::interrupts::stop_token;
 use super::live_page::LivePage;
@@ -24,6 +25,7 @@ use runtime::run_dir::run_of_launcher;
 use serde_json::{Value, json};
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
+use vehicles::kind::Kind;
 
 /// Arguments of `run`, and common arguments of the commands that fly a manifest.
 #[derive(Args)]
@@ -291,7 +293,10 @@ fn loaded(arguments: &RunArguments, from: Option<&Checkpoint>) -> Result<Manifes
     }
     match (from, &arguments.manifest) {
         (Some(from), _) => from.load_manifest(&set, COMPONENTS),
-        (None, Some(path)) => Ok(Manifest::load(path, &set, COMPONENTS)?),
+        (None, Some(path)) => {
+            require_kind(path, &[Kind::Manifest], "")?;
+            Ok(Manifest::load(path, &set, COMPONENTS)?)
+        }
         (None, None) => bail!("name a manifest, or a checkpoint with --from"),
     }
 }

@@ -1,11 +1,11 @@
 //! The command `shadow`.
 
+use super::files::open_recording;
 use super::output::print_text;
 use super::run::{RunArguments, run};
 use super::steer;
 use anyhow::{Result, bail};
 use clap::Args;
-use recorder::reader::Recording;
 use std::path::PathBuf;
 
 /// Arguments of `shadow`.
@@ -33,7 +33,7 @@ pub fn shadow(arguments: &ShadowArguments) -> Result<bool> {
             let with = steer::description(&arguments.with)?;
             run(&arguments.run, None, Some((process, &with)))
         }
-        (None, Some(path)) => print_text(&report::shadow::report(&Recording::open(path)?)?).map(|()| true),
+        (None, Some(path)) => print_text(&report::shadow::report(&open_recording(path)?)?).map(|()| true),
         (None, None) => bail!("name the process to shadow: --process NAME; or give a recording (.mcap)"),
         (Some(_), Some(path)) => {
             bail!("{} is a recording: leave --process out, or give a manifest", path.display())

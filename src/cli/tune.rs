@@ -1,6 +1,7 @@
 //! The command `tune`: gains that make a figure of many flights smaller.
 
 use super::campaign_engine::{build, cores, worker_command};
+use super::files::require_kind;
 use super::interrupts::stop_token;
 use super::output::{print_json, print_text};
 use super::progress;
@@ -20,6 +21,7 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+use vehicles::kind;
 
 pub const HELP: &str = "Example: hummingbus tune manifests/tune/hover.toml --out hover-gains.toml\n\n\
                         Writes a gains file if the tuned gains cost less on flights that they were not tuned on; exit code 1 if \
@@ -52,6 +54,7 @@ pub struct TuneArguments {
 /// A problem in the tuning file, its manifest or the gains file, or an interrupted tuning.
 pub fn tune(arguments: &TuneArguments) -> Result<bool> {
     let path = &arguments.tuning;
+    require_kind(path, &[kind::Kind::Campaign], "")?;
     let text = InputFiles::default().text(path).with_context(|| format!("cannot read {}", path.display()))?;
     let tuning = Tuning::parse(path, &text)?;
     let base = Base::read(&tuning.campaign, COMPONENTS)?;

@@ -1,5 +1,6 @@
 //! The command `validate`.
 
+use super::files::require_kind;
 use super::interrupts::stop_token;
 use super::output::{print_json, print_text, say};
 use anyhow::{Result, bail};
@@ -10,6 +11,7 @@ use identify::steps_ahead::Between;
 use report::validate::{Notes, StepsAheadErrors, Validation, predicted_accelerations};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
+use vehicles::kind::Kind;
 
 /// Text of `--help` behind the options.
 pub const HELP: &str = "Example: hummingbus validate vehicles/hummingbird.toml fitted.toml flights.toml\n\n\
@@ -49,6 +51,9 @@ pub struct ValidateArguments {
 pub fn validate(arguments: &ValidateArguments) -> Result<bool> {
     let Some((file, vehicles)) = arguments.files.split_last() else { bail!("give a flights file") };
     let vehicles: Vec<&Path> = vehicles.iter().map(PathBuf::as_path).collect();
+    let order = "the vehicle files stand first, the flights file last";
+    vehicles.iter().try_for_each(|vehicle| require_kind(vehicle, &[Kind::Vehicle], order))?;
+    require_kind(file, &[Kind::Flights], order)?;
     let flights = FlightSet::load(file)?;
     if let Some(steps) = arguments.steps_ahead {
         let between = if arguments.held { Between::Held } else { Between::Lines };

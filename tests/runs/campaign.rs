@@ -5,6 +5,7 @@ use recorder::reader::Recording;
 use rustix::process::Signal;
 use serde_json::Value;
 use std::fs;
+use std::path::Path;
 
 /// A campaign of short hovers of varied mass.
 pub const HOVERS: &str = "flights = 12\nset = [\"run.duration_s=0.4\"]\n\
@@ -234,7 +235,7 @@ fn what_cannot_be_flown_at_all_is_refused_before_the_first_flight() {
         ),
         (vary("run.sed").replace("as = \"factor\"\n", ""), "sed"),
         (HOVERS.replace("uniform = [0.8, 1.2]", "uniform = [1.2, 0.8]"), "a lower limit below the upper one"),
-        (HOVERS.replace("position.z", "position.w"), "c.toml:8:1: measure `height`"),
+        (HOVERS.replace("position.z", "position.w"), "c.toml:11:9: measure `height`"),
         (HOVERS.replace("statistic = \"last\"", "statistic = \"latest\""), "c.toml:13:13: "),
         (format!("figures = [\"heigth\"]\n{HOVERS}"), "c.toml:2:12: no flight has a figure `heigth`"),
         (HOVERS.replace("name = \"height\"", "name = \"mass\""), "`mass` is the name of another column"),
@@ -246,6 +247,16 @@ fn what_cannot_be_flown_at_all_is_refused_before_the_first_flight() {
         ended.says(&[says]);
         assert!(!ended.to_string().contains("panicked"), "{ended}");
     }
+    // A key of a file: the place in the campaign file, and no folder.
+    let text = vary("process.plant.vehicle.body.mas").replace("as = \"factor\"\n", "");
+    let (campaign, folder) = (written(&place, "key.toml", &text), place.path("no-folder"));
+    let ended = place.call(&["campaign", &campaign, "--out", &folder]).with_code(2);
+    let line =
+        fs::read_to_string(&campaign).unwrap().lines().position(|line| line.starts_with("key = ")).unwrap()
+            + 1;
+    ended.says(&["unknown key `body.mas`", &format!("{campaign}:{line}:7: process.plant.vehicle.body.mas=")]);
+    assert!(!ended.error.contains("--set") && !ended.error.contains("@plant"), "{ended}");
+    assert!(!Path::new(&folder).exists());
     // A controller in a process of its own, and a swap.
     let swap = HOVERS.replace("set = [\"run.duration_s=0.4\"]\n", "");
     place.write("swap.toml", format!("include = [{:?}]", repository("manifests/swap-gains.toml")));

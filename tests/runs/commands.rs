@@ -182,10 +182,23 @@ fn schema_components_and_effects_print_one() {
     assert_eq!(one.as_array().map(Vec::len), Some(1));
     place.call(&["schema", "PlantStat"]).with_code(2).says(&["no component", "PlantStat", "PlantState"]);
     let ended = place.call(&["components", "pid"]).with_code(0);
-    assert!(ended.output.lines().count() == 3 && ended.output.contains("**`pid`**"), "{}", ended.output);
+    ended.prints(&[
+        "pid: altitude, roll",
+        "reads\n  set_point: SetPoint",
+        "parameters\n  vehicle",
+        "hands over",
+    ]);
+    let gps = place.call(&["components", "gps"]).with_code(0);
+    gps.prints(&[
+        "position_drift_time_s  [s] default 300.0\n",
+        "rate_hz  [Hz] default the part's\n      measurements a second",
+    ]);
+    for text in [&ended.output, &gps.output, &place.call(&["effects", "rotor-drag"]).with_code(0).output] {
+        assert!(!["<br>", "](", "**", "|---", "`"].iter().any(|mark| text.contains(mark)), "{text}");
+    }
     place.call(&["components", "pit"]).with_code(2).says(&["no component pit", "pid"]);
     let ended = place.call(&["effects", "rotor-drag"]).with_code(0);
-    ended.prints(&["## rotor-drag", "**Equation:**", "| `coefficient` |"]);
+    ended.prints(&["rotor-drag: ", "\nequation", "\nholds for", "parameters\n  coefficient  "]);
     let one = place.call(&["effects", "rotor-drag", "--json"]).with_code(0).json();
     assert_eq!(one[0]["parameters"][0]["units"][0], "N*s^2/(m*rad)");
     let names = place.call(&["effects"]).with_code(0).output;
@@ -225,7 +238,56 @@ fn cat_leaves_padding_out() {
 #[test]
 fn a_manifest_is_not_read_as_a_recording() {
     let ended = Place::new().call(&["cat", &hover()]).with_code(2);
-    ended.says(&["hover.toml is a TOML file, not a recording", "hummingbus run"]);
+    ended.says(&["hover.toml is a manifest, not a recording", "hummingbus run"]);
+}
+
+#[test]
+fn a_file_of_another_kind_is_told_with_the_command_that_reads_it() {
+    let place = Place::new();
+    let flights =
+        place.write("flights.toml", "vehicle = \"v.toml\"\n[[flight]]\nfile = \"a.csv\"\nrole = \"fit\"\n");
+    let (csv, packed) = (place.write("log.csv", "t,x\n0,1\n"), place.write("log.csv.gz", "\u{1f}"));
+    fs::write(&packed, b"\x1f\x8b\x08\0\0").unwrap();
+    let recording = recording(&place);
+    let vehicle = repository("vehicles/hummingbird.toml");
+    let (gains, scene) = (repository("controllers/gains/pid.toml"), repository("scenes/office.toml"));
+    let out = place.path("out");
+    let says = |args: &[&str], says: &[&str]| place.call(args).with_code(2).says(says);
+    says(
+        &["validate", &flights, &vehicle],
+        &["is a flights file, not a vehicle file", "identify", "stand first"],
+    );
+    says(
+        &["identify", &hover(), "--out", &out],
+        &["hover.toml is a manifest, not a flights file", "hummingbus run"],
+    );
+    says(&["campaign", &hover()], &["hover.toml is a manifest, not a campaign file"]);
+    for command in ["run", "check"] {
+        says(&[command, &recording], &["is a recording, not a manifest", "hummingbus cat"]);
+        says(&[command, &vehicle], &["is a vehicle file, not a manifest", "as `vehicle`"]);
+        says(&[command, &scene], &["is a scene file, not a manifest"]);
+        says(&[command, &gains], &["is a gains file, not a manifest"]);
+    }
+    for command in ["cat", "plot"] {
+        says(&[command, &csv], &["is a CSV file, not a recording", "a flights file names it"]);
+        says(&[command, &packed], &["is compressed (gzip), not a recording", "gunzip"]);
+    }
+    assert!(!std::path::Path::new(&out).exists());
+}
+
+#[test]
+fn cat_refuses_a_span_without_messages() {
+    let place = Place::new();
+    let recording = recording(&place);
+    place
+        .call(&["cat", &recording, "--from", "100"])
+        .with_code(2)
+        .says(&["--from 100", "the recording ends at 0."]);
+    place
+        .call(&["cat", &recording, "--from", "5", "--to", "3"])
+        .with_code(2)
+        .says(&["--from 5 --to 3", "the end"]);
+    place.call(&["cat", &recording, "--from", "0.1", "--to", "0.1"]).with_code(0);
 }
 
 #[test]
@@ -344,8 +406,8 @@ fn an_export_replaces_no_file_of_another_kind_and_names_an_unknown_topic() {
 fn what_is_no_recording_is_refused() {
     let place = Place::new();
     let (empty, text) = (place.write("empty.mcap", ""), place.write("text.mcap", "hello\n".repeat(100)));
-    for file in [empty, text] {
-        place.call(&["diff", &file, &file]).with_code(2).says(&[&file, "not a complete MCAP file"]);
+    for (file, told) in [(empty, "is empty, not a recording"), (text, "not a complete MCAP file")] {
+        place.call(&["diff", &file, &file]).with_code(2).says(&[&file, told]);
     }
     let none = place.path("none.mcap");
     place.call(&["diff", &none, &none]).with_code(2).says(&["cannot open the recording", &none]);

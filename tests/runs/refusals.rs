@@ -157,6 +157,9 @@ fn an_unknown_key() {
 fn an_unknown_kind() {
     let ended = refused("kind = \"imu\"", "kind = §\"imus\"");
     ended.says(&["there is no kind `imus`", "did you mean `imu`?", "recorder"]);
+    assert!(!ended.error.contains("judge"), "a manifest cannot use it: {ended}");
+    refused("kind = \"imu\"", "kind = §\"IMU\"").says(&["did you mean `imu`?"]);
+    refused("kind = \"imu\"", "kind = §\"baro\"").says(&["did you mean `barometer`?"]);
     refused("kind = \"imu\"", "kind = §\"lidar\"").says(&["the kinds are", "attitude, barometer"]);
 }
 

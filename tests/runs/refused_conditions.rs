@@ -9,16 +9,17 @@ const PASS: &str = "[[pass]]\nname = \"low\"\ntopic = \"/plant/state\"\nfield = 
 #[test]
 fn a_condition_on_a_topic_that_nobody_publishes() {
     let pass = "name = \"high\"\ntopic = \"/plant/stat\"\nfield = \"position.z\"\nunit = \"m\"\nstatistic = \"max\"\nmin = 1\n";
-    let ended = refused_with(&format!("\n§[[pass]]\n{pass}"));
+    let ended = refused_with(&format!("\n[[pass]]\n{}", pass.replace("\"/plant", "§\"/plant")));
     ended.says(&["nobody publishes /plant/stat", "did you mean `/plant/state`?"]);
-    let compare = "simulated = \"/plant/state\"\nmeasured = \"/player/measured\"\nwindow_s = 0.1\n";
-    refused_with(&format!("\n§[[compare]]\n{compare}")).says(&["nobody publishes /player/measured"]);
+    let compare = "simulated = \"/plant/state\"\nmeasured = §\"/player/measured\"\nwindow_s = 0.1\n";
+    refused_with(&format!("\n[[compare]]\n{compare}")).says(&["nobody publishes /player/measured"]);
 }
 
 #[test]
 fn a_condition_on_a_field_or_in_a_unit_that_is_none() {
     let with = |from: &str, to: &str| refused_with(&format!("\n§{}", PASS.replace(from, to)));
-    with("position.z", "position.q").says(&["pass condition `low`", "`position.q`", "position.z"]);
+    let wrong = PASS.replace("\"position.z", "§\"position.q");
+    refused_with(&format!("\n{wrong}")).says(&["pass condition `low`", "`position.q`", "position.z"]);
     with("\"m\"", "\"deg\"").says(&["pass condition `low`", "`deg` is not a unit of length", "cm"]);
     with("max = 1\n", "").says(&["pass condition `low`", "no limit", "add `min`, `max`"]);
 }
@@ -27,29 +28,32 @@ fn a_condition_on_a_field_or_in_a_unit_that_is_none() {
 fn a_measure_that_has_a_limit_or_measures_nothing() {
     let with = |from: &str, to: &str| {
         let measure = PASS.replace("[[pass]]", "[[measure]]").replace("max = 1\n", "");
-        refused_with(&format!("\n§{}", measure.replace(from, to)))
+        let mark = if to.contains('§') { "" } else { "§" };
+        refused_with(&format!("\n{mark}{}", measure.replace(from, to)))
     };
     with("name", "max = 1\nname").says(&["measure `low`: it has a limit", "write [[pass]]"]);
-    with("position.z", "position.q").says(&["measure `low`", "`position.q`", "position.z"]);
-    with("/plant/state", "/plant/stat").says(&["nobody publishes /plant/stat"]);
+    with("\"position.z", "§\"position.q").says(&["measure `low`", "`position.q`", "position.z"]);
+    with("\"/plant/state", "§\"/plant/stat").says(&["nobody publishes /plant/stat"]);
 }
 
 #[test]
 fn a_lag_or_gain_without_a_reference_that_it_can_have() {
     let with = |keys: &str| {
         let lag = PASS.replace("\"max\"", "\"lag\"").replace("unit = \"m\"", "unit = \"ms\"");
-        refused_with(&format!("\n§{lag}{keys}"))
+        let mark = if keys.contains('§') { "" } else { "§" };
+        refused_with(&format!("\n{mark}{lag}{keys}"))
     };
     let reference = |rest: &str| format!("reference = {{ topic = \"/plant/state\", {rest} }}\n");
     let height = reference("field = \"position.z\"");
     with("").says(&["pass condition `low`", "`lag` has no `reference`", "add what it is measured against"]);
-    with(&reference("field = \"position.q\"")).says(&["`position.q`", "position.z"]);
+    with(&reference("field = §\"position.q\"")).says(&["`position.q`", "position.z"]);
     with(&reference("field = \"attitude.roll\"")).says(&["the field is in `m`, its `reference` in `rad`"]);
     for (within_s, said) in [("0.0", "0 s"), ("1e300", "1000000")] {
         let said = format!("`within_s` of `reference` is {said}");
         with(&reference(&format!("field = \"position.z\", within_s = {within_s}"))).says(&[&said]);
     }
-    with(&height.replace("state", "stat")).says(&["nobody publishes /plant/stat", "did you mean"]);
+    with(&height.replace("\"/plant/state", "§\"/plant/stat"))
+        .says(&["nobody publishes /plant/stat", "did you mean"]);
     let minus = height.replace("reference", "minus");
     with(&format!("{height}{minus}")).says(&["the statistic `lag` cannot have `minus`", "from_s and to_s"]);
     refused_with(&format!("\n§{PASS}{height}")).says(&["`reference` is there", "`lag` and `gain`"]);
@@ -60,7 +64,10 @@ fn a_lag_or_gain_without_a_reference_that_it_can_have() {
 #[test]
 fn a_condition_on_a_topic_that_the_recorder_leaves_out() {
     let recorder = "[process.recorder]\nkind = \"recorder\"\n";
-    let ended = refused(recorder, &format!("{recorder}inputs.imu = \"/imu/imu\"\n§{PASS}"));
+    let ended = refused(
+        recorder,
+        &format!("{recorder}inputs.imu = \"/imu/imu\"\n{}", PASS.replace("\"/plant", "§\"/plant")),
+    );
     ended.says(&["/plant/state is judged but not recorded", "kind = \"recorder\""]);
 }
 
@@ -68,9 +75,12 @@ fn a_condition_on_a_topic_that_the_recorder_leaves_out() {
 #[test]
 fn a_condition_without_a_recorder_on_a_topic_or_field_that_is_none() {
     let recorder = "[process.recorder]\nkind = \"recorder\"\n";
-    let with = |from: &str, to: &str| refused(recorder, &format!("§{}", PASS.replace(from, to)));
-    with("/plant/state", "/plant/stat").says(&["nobody publishes /plant/stat", "did you mean"]);
-    with("position.z", "position.q").says(&["pass condition `low`", "`position.q`", "position.z"]);
+    let with = |from: &str, to: &str| {
+        let mark = if to.contains('§') { "" } else { "§" };
+        refused(recorder, &format!("{mark}{}", PASS.replace(from, to)))
+    };
+    with("\"/plant/state", "§\"/plant/stat").says(&["nobody publishes /plant/stat", "did you mean"]);
+    with("\"position.z", "§\"position.q").says(&["pass condition `low`", "`position.q`", "position.z"]);
     with("\"m\"", "\"deg\"").says(&["pass condition `low`", "`deg` is not a unit of length"]);
 }
 

@@ -1,20 +1,23 @@
 //! Refused: parameters, vehicles, rates and other numbers of a manifest, and settings.
 
-use crate::refusals::{good, refused, refused_args, refused_setting, refused_text, refused_with};
+use crate::refusals::{good, refused, refused_args, refused_setting, refused_with};
 use crate::support::{Place, repository};
 use std::fs;
 
 #[test]
 fn set_points_that_cannot_be_flown() {
-    let marked = good().replace("\nset_points =", "\n§set_points =");
-    let with = |from: &str, to: &str| {
-        assert_eq!(marked.matches(from).count(), 1);
-        refused_text(&marked.replace(from, to))
-    };
-    let ended = with("unit = \"m\"", "unit = \"ft\"");
+    let with = |from: &str, to: &str| refused(from, to);
+    let ended = with("unit = \"m\"", "unit = §\"ft\"");
     ended.says(&["process `pilot`: `set_points.0.unit` must be \"m\"", "found \"ft\""]);
-    with("\"altitude\"", "\"height\"").says(&["`set_points.0.channel` must be", "found \"height\""]);
-    with("to = 1.5, ", "").says(&["`set_points.0.to` must be a finite number in a step, found nothing"]);
+    with("\"altitude\"", "§\"height\"").says(&["`set_points.0.channel` must be", "found \"height\""]);
+    with("kind = \"step\"", "kind = §\"ste\"").says(&["`set_points.0.kind`"]);
+    with("at_s = 0.1, to", "at_s = 0.1, §too")
+        .says(&["unknown key `set_points.0.too`", "did you mean `to`?"]);
+    with(
+        "[{ kind = \"step\", channel = \"altitude\", at_s = 0.1, to = 1.5, ",
+        "[§{ kind = \"step\", channel = \"altitude\", at_s = 0.1, ",
+    )
+    .says(&["`set_points.0.to` must be a finite number in a step, found nothing"]);
 }
 
 #[test]
@@ -125,6 +128,27 @@ fn an_override_that_is_none() {
     set("include=[]").says(&["unknown key `include`"]);
 }
 
+#[test]
+fn an_override_in_a_file_is_told_with_its_text_and_the_file_that_exists() {
+    let place = Place::new();
+    let (manifest, vehicle) = with_vehicle(&place, "[motor]", "[motor]");
+    for (set, says) in [
+        ("body.mas=0.5", "unknown key `body.mas`"),
+        ("body.mass=-1", "`body.mass` must be a finite number above 0, found -1"),
+        ("body.mass.unit=lb", "`body.mass.unit` must be a unit of mass"),
+    ] {
+        let set = format!("process.plant.vehicle.{set}");
+        let ended = refused_setting(&manifest, &[&set]);
+        ended.says(&[says, "by process `plant`"]);
+        assert!(!ended.error.contains("@plant"), "{ended}");
+    }
+    // A fault at another key of the file, which has a line.
+    let set = "process.plant.vehicle.command.min=300";
+    let ended = place.call(&["check", &manifest, "--set", set]).with_code(2);
+    ended.says(&[&format!("error: {vehicle}:"), "`command.max` must be", &format!("--set {set}")]);
+    assert!(!ended.error.contains("@plant"), "{ended}");
+}
+
 /// Writes the good manifest with another vehicle into `place`: the Hummingbird with `from` replaced by `to`.
 fn with_vehicle(place: &Place, from: &str, to: &str) -> (String, String) {
     let text = fs::read_to_string(repository("vehicles/hummingbird.toml")).unwrap();
@@ -166,6 +190,26 @@ fn a_vehicle_with_a_number_that_none_has_is_refused_with_its_file_line_and_key()
         assert!(ended.error.contains(&format!("error: {vehicle}:{}:", fault["line"])), "{fault}");
         assert!(ended.error.contains(&told), "{fault}");
     }
+}
+
+#[test]
+fn a_fault_of_a_file_that_two_processes_read_is_told_once_with_both() {
+    let place = Place::new();
+    let (manifest, vehicle) = with_vehicle(&place, "[motor]", "[moter]");
+    let ended = refused_args(&["run", &manifest], &vehicle);
+    ended.says(&[
+        "unknown key `moter`",
+        "did you mean `motor`?",
+        "by process `controller`, and in",
+        "by process `plant`",
+    ]);
+    assert_eq!(ended.error.matches("moter`").count(), 1, "{ended}");
+    assert!(!ended.error.contains("missing key"), "{ended}");
+    let found = place.call(&["run", &manifest, "--json"]).with_code(2).json();
+    assert_eq!(found["faults"].as_array().unwrap().len(), 1, "{found}");
+    let fault = &found["faults"][0];
+    assert_eq!(fault["named_in"]["component"], "process `controller`", "{fault}");
+    assert_eq!(fault["also_named_in"][0]["component"], "process `plant`", "{fault}");
 }
 
 #[test]

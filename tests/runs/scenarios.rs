@@ -171,9 +171,11 @@ fn a_tricopter_and_a_hexacopter_that_cannot_lose_a_rotor_are_refused_with_the_re
     let text = std::fs::read_to_string(repository("vehicles/hummingbird.toml")).unwrap();
     let tricopter = place.write("tri.toml", &text[..text.rfind("[[rotors]]").unwrap()]);
     let failed = hexacopter_with(&place, "failed = { value = true, source = \"test\" }");
+    let one_way = place.write("one-way.toml", text.replace("\"counter-clockwise\"", "\"clockwise\""));
     for (vehicle, told) in [
         (tricopter, ["yaw is not controllable", "a tricopter needs a servo"]),
         (failed, ["its 5 working rotors of 6 cannot hover", "yaw is not controllable both ways"]),
+        (one_way, ["one-way.toml:", "all rotors turn one way, so that yaw follows from thrust"]),
     ] {
         let set = format!("process.controller.vehicle={vehicle}");
         let check = ["check", &repository("manifests/hexa-hover.toml"), "--set", &set];

@@ -41,6 +41,7 @@ pub fn read(root: &Section) -> Result<Vec<EffectEntry>, Diagnostic> {
 }
 
 fn one_effect(section: &Section) -> Result<EffectEntry, Diagnostic> {
+    section.require_spelt("name")?;
     let name = section.text("name")?.to_owned();
     let parameters = section.keys().filter(|key| *key != "name");
     Ok(EffectEntry {

@@ -269,6 +269,7 @@ fn layout(root: &Section) -> Result<Vec<Rotor>, Diagnostic> {
 }
 
 fn one_rotor(section: &Section) -> Result<Rotor, Diagnostic> {
+    section.require_known(&["name", "position", "axis", "spin", "failed", "torque_scale"])?;
     let name = section.text("name")?.to_owned();
     let position_m = Vector3::from(section.vector("position", LENGTH, &bounds::HUB)?);
     let axis = if section.has("axis") { axis(section)? } else { Vector3::z() };
@@ -298,6 +299,7 @@ fn axis(section: &Section) -> Result<Vector3<f64>, Diagnostic> {
 
 /// A sense of rotation has a value and a source, but neither unit nor uncertainty.
 fn spin(section: &Section) -> Result<f64, Diagnostic> {
+    section.require_known(&["value", "source"])?;
     let spin = section.choice("value", &[("counter-clockwise", 1.0), ("clockwise", -1.0)])?;
     section.note("seen from above", section.source()?, Uncertainty::OneSigma(0.0));
     section.finish()?;
@@ -360,6 +362,7 @@ fn command(section: &Section) -> Result<CommandMap, Diagnostic> {
 
 /// True or false, with a source.
 fn told(section: &Section) -> Result<bool, Diagnostic> {
+    section.require_known(&["value", "source"])?;
     let value = section.flag("value")?;
     section.note("true or false", section.source()?, Uncertainty::OneSigma(0.0));
     section.finish()?;

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 
 use toml::Spanned;
-use toml::de::{DeTable, DeValue};
+use toml::de::{DeString, DeTable, DeValue};
 
 use crate::provenance::{NO_SOURCE, Provenance, Stated, Uncertainty};
 use diagnostics::parameter::{Bounds, all, not_negative, positive};
@@ -162,8 +162,15 @@ impl<'d, 't> Section<'d, 't> {
     }
 
     pub(crate) fn need(&self, name: &'d str, expected: &str) -> Result<&'d Spanned<DeValue<'t>>, Diagnostic> {
-        let missing = || ParameterError::missing(self.key(name), expected);
-        self.find(name).ok_or_else(|| Diagnostic::at(self.doc.place(&self.at), missing()))
+        self.find(name).ok_or_else(|| {
+            let missing = ParameterError::missing(self.key(name), expected);
+            if self.path.is_empty() {
+                let start = self.doc.place(&first_content(self.doc.text));
+                Diagnostic::at(start, missing).help(format!("add {} to this file", shape(name, expected)))
+            } else {
+                Diagnostic::at(self.doc.place(&self.at), missing)
+            }
+        })
     }
 
     /// True if the file has `name`.
@@ -315,7 +322,9 @@ impl<'d, 't> Section<'d, 't> {
             return lower.parameter(name);
         }
         let expected = "a table with value, unit, source and uncertainty";
-        self.as_section(self.key(name), self.need(name, expected)?, expected)
+        let parameter = self.as_section(self.key(name), self.need(name, expected)?, expected)?;
+        parameter.require_known(&["value", "unit", "source", "uncertainty"])?;
+        Ok(parameter)
     }
 
     /// Checks unit, source and uncertainty of a parameter's table; notes them; gives the factor to SI.
@@ -371,7 +380,13 @@ impl<'d, 't> Section<'d, 't> {
     fn three(&self, value: &Spanned<DeValue<'t>>) -> Result<[f64; 3], Diagnostic> {
         let found: Vec<_> = value.get_ref().as_array().into_iter().flat_map(|array| array.iter()).collect();
         let [x, y, z] = found[..] else {
-            return Err(self.wrong_type(&self.key("value"), value, "an array of three numbers"));
+            let (key, expected) = (self.key("value"), "an array of three numbers");
+            return Err(match value.get_ref().as_array() {
+                Some(array) => {
+                    self.doc.bad(&value.span(), &key, expected, format!("an array of {}", array.len()))
+                }
+                None => self.wrong_type(&key, value, expected),
+            });
         };
         Ok([self.number("value", x)?, self.number("value", y)?, self.number("value", z)?])
     }
@@ -402,14 +417,51 @@ impl<'d, 't> Section<'d, 't> {
 
     /// Refuses every key that was not read, in the file's order.
     pub fn finish(&self) -> Result<(), Diagnostic> {
-        let asked = self.asked.borrow();
-        let unknown = self.table.keys().filter(|key| !asked.contains(key.get_ref().as_ref()));
+        let asked: Vec<&str> = self.asked.borrow().iter().copied().collect();
+        self.require_known(&asked)
+    }
+
+    /// Refuses every key that is not `known`, in the file's order: first in a reader that stops at the first missing key, so
+    /// that a misspelt key is not told as a missing one.
+    pub fn require_known(&self, known: &[&str]) -> Result<(), Diagnostic> {
+        let mut known = known.to_vec();
+        known.sort_unstable();
+        let unknown = self.table.keys().filter(|key| !known.contains(&key.get_ref().as_ref()));
         let mut unknown: Vec<_> = unknown.collect();
         unknown.sort_by_key(|key| key.span().start);
         Diagnostic::gather(unknown.into_iter().map(|key| {
-            let error = ParameterError::unknown(self.key(key.get_ref()), asked.iter().copied());
+            let error = ParameterError::unknown(self.key(key.get_ref()), known.iter().copied());
             Err::<(), _>(Diagnostic::at(self.doc.place(&key.span()), error))
         }))
         .map(drop)
+    }
+
+    /// Refuses a key that is probably `name`, where the table does not have that.
+    pub(crate) fn require_spelt(&self, name: &'d str) -> Result<(), Diagnostic> {
+        let near = |key: &&Spanned<DeString<'t>>| nearest(key.get_ref(), [name]).is_some();
+        match self.table.keys().find(near).filter(|_| !self.has(name)) {
+            Some(key) => {
+                let error = ParameterError::unknown(self.key(key.get_ref()), [name]);
+                Err(Diagnostic::at(self.doc.place(&key.span()), error))
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+/// The start of the first line that is neither blank nor a comment: no line of the file is to blame for what is missing in it.
+fn first_content(text: &str) -> Range<usize> {
+    let is_content = |line: &&str| !line.trim().is_empty() && !line.trim_start().starts_with('#');
+    let before: usize = text.split_inclusive('\n').take_while(|line| !is_content(line)).map(str::len).sum();
+    let start = if before < text.len() { before } else { 0 };
+    start..start
+}
+
+/// A missing key of a file as it is written: a table with its brackets.
+fn shape(name: &str, expected: &str) -> String {
+    match expected {
+        "a table" => format!("[{name}]"),
+        "an array of tables" => format!("[[{name}]]"),
+        _ => format!("`{name}`"),
     }
 }

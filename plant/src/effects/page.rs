@@ -77,6 +77,45 @@ pub fn of(kind: &EffectKind) -> String {
     section
 }
 
+/// All about one effect, as plain text for a terminal.
+#[must_use]
+pub fn plain(kind: &EffectKind) -> String {
+    let mut text = format!("{}: {}\n\n", kind.name, kind.summary);
+    let mut facts = vec![
+        ("equation".to_owned(), kind.equation.to_owned()),
+        ("source".to_owned(), kind.source.to_owned()),
+        ("holds for".to_owned(), kind.validity.to_owned()),
+        ("fitted".to_owned(), fitted(kind)),
+    ];
+    for other in CATALOGUE {
+        if let Some(experiment) = kind.experiment_against(other) {
+            facts.push((format!("told from {}", other.name), experiment.to_owned()));
+        }
+    }
+    let width = facts.iter().map(|(title, _)| title.len()).max().unwrap_or_default();
+    for (title, fact) in &facts {
+        let _ = writeln!(text, "{title:width$}  {}", fact.replace('`', ""));
+    }
+    text.push_str("\nparameters\n");
+    let width = kind.parameters.iter().map(|spec| spec.name.len()).max().unwrap_or_default();
+    for spec in kind.parameters {
+        let units: Vec<_> = spec.dimension.units.iter().map(|(unit, _)| *unit).collect();
+        let neutral = spec.neutral.map_or("must be given".to_owned(), |value| format!("neutral {value}"));
+        let _ = writeln!(text, "  {:width$}  {}", spec.name, spec.meaning.replace('`', ""));
+        let _ = writeln!(
+            text,
+            "  {:width$}  {} to {}, {neutral}, nominal {} ({}); units: {}",
+            "",
+            spec.min,
+            spec.max,
+            spec.nominal,
+            spec.nominal_source,
+            units.join(", ")
+        );
+    }
+    text
+}
+
 /// Describes how an identification fits it.
 fn fitted(kind: &EffectKind) -> String {
     if kind.randomness == Randomness::Stochastic {

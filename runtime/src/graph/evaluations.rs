@@ -6,6 +6,7 @@ use crate::program::Program;
 use bus::plan::{NodePlan, Plan};
 use diagnostics::{Diagnostic, did_you_mean};
 use recorder::RecordingError;
+use std::ops::Range;
 use toml::Spanned;
 
 /// Checks that all topics of the conditions reach the recorder or the judge, and that fields and units exist.
@@ -203,28 +204,34 @@ fn check_units(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) 
     let at = |message: String, help: &str| {
         manifest.problem(&pass.span(), format!("{} `{}`: {message}", kind(condition), condition.name), help)
     };
-    let unit = |topic: &str, field: &str| {
-        unit_of(manifest, plan, topic, field)
-            .map_err(|error| at(error.to_string(), "name one of these fields"))
+    let unit = |table: &str, topic: &str, field: &str| {
+        unit_of(manifest, plan, topic, field).map_err(|error| {
+            let message = format!("{} `{}`: {error}", kind(condition), condition.name);
+            manifest.problem(
+                &key_of(manifest, &pass.span(), table, "field"),
+                message,
+                "name one of these fields",
+            )
+        })
     };
-    let Some(unit_here) = unit(&condition.topic, &condition.field)? else { return Ok(()) };
+    let Some(unit_here) = unit("", &condition.topic, &condition.field)? else { return Ok(()) };
     diagnostics::convert(condition.statistic.unit(&unit_here), &condition.unit)
         .map_err(|error| at(error.to_string(), "state the limits in a unit of the field's quantity"))?;
     if let Some(minus) = &condition.minus
-        && let Some(other) = unit(&minus.topic, &minus.field)?
+        && let Some(other) = unit("minus", &minus.topic, &minus.field)?
         && other != unit_here
     {
         return Err(at(format!("`minus` takes `{other}` off `{unit_here}`"), "compare fields of one unit"));
     }
     if let Some(reference) = &condition.reference
-        && let Some(other) = unit(&reference.topic, &reference.field)?
+        && let Some(other) = unit("reference", &reference.topic, &reference.field)?
         && other != unit_here
     {
         let message = format!("the field is in `{unit_here}`, its `reference` in `{other}`");
         return Err(at(message, "compare fields of one unit, as an angle with the one asked for"));
     }
     if let Some(gate) = &condition.gate {
-        unit(&gate.topic, &gate.field)?;
+        unit("while", &gate.topic, &gate.field)?;
     }
     Ok(())
 }
@@ -280,26 +287,38 @@ fn unit_of(
 fn check_taken(manifest: &Manifest, plan: &Plan, programs: &[Program]) -> Result<(), Diagnostic> {
     let content = &manifest.content;
     let passes = content.pass.iter().chain(&content.measure);
-    let passes = passes.map(|pass| (pass.span(), pass.get_ref().topics().collect()));
-    let compares = content.compare.iter().map(|compare| {
+    let passes = passes.flat_map(|pass| {
+        let topics = pass.get_ref().placed_topics();
+        topics.map(|(table, topic)| (pass.span(), [table, "topic"], topic))
+    });
+    let compares = content.compare.iter().flat_map(|compare| {
         let Comparison { simulated, measured, .. } = compare.get_ref();
-        (compare.span(), vec![simulated.as_str(), measured.as_str()])
+        [("simulated", simulated), ("measured", measured)]
+            .map(|(key, topic)| (compare.span(), ["", key], topic.as_str()))
     });
     let takes_samples = |(_, program): &(_, &Program)| program.is_recorder() || program.is_judge();
     let takers = plan.nodes.iter().zip(programs).filter(takes_samples);
     let taken: Vec<usize> = takers.flat_map(|(node, _)| &node.inputs).map(|input| input.topic).collect();
-    for (span, topics) in passes.chain(compares) {
-        for topic in topics {
-            let Some(index) = plan.topics.iter().position(|known| known.name == topic) else {
-                let known = plan.topics.iter().map(|topic| topic.name.as_str());
-                let help = did_you_mean(topic, known, "the topics are");
-                return Err(manifest.problem(&span, format!("nobody publishes {topic}"), help));
-            };
-            if !taken.contains(&index) {
-                let help = "add a process with kind = \"recorder\" that takes it";
-                return Err(manifest.problem(&span, format!("{topic} is judged but not recorded"), help));
-            }
+    for (span, [table, key], topic) in passes.chain(compares) {
+        let at = || key_of(manifest, &span, table, key);
+        let Some(index) = plan.topics.iter().position(|known| known.name == topic) else {
+            let known = plan.topics.iter().map(|topic| topic.name.as_str());
+            let help = did_you_mean(topic, known, "the topics are");
+            return Err(manifest.problem(&at(), format!("nobody publishes {topic}"), help));
+        };
+        if !taken.contains(&index) {
+            let help = "add a process with kind = \"recorder\" that takes it";
+            return Err(manifest.problem(&at(), format!("{topic} is judged but not recorded"), help));
         }
     }
     Ok(())
+}
+
+/// Place of the value of `key` in the condition or comparison at `span`, or in its `table` of that name.
+fn key_of(manifest: &Manifest, span: &Range<usize>, table: &str, key: &str) -> Range<usize> {
+    let path: Vec<&str> = [table, key].into_iter().filter(|name| !name.is_empty()).collect();
+    let is_set = ["pass.", "measure.", "compare."].map(|list| manifest.inside(span, &path, list));
+    let [_, at] = &is_set[0];
+    // A value of --set may be meant.
+    if is_set.iter().all(|places| places == &is_set[0]) { at.clone() } else { span.clone() }
 }

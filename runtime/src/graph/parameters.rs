@@ -69,8 +69,8 @@ pub fn of(
     let read = declared.files.listing_anew();
     let mut parameters: BTreeMap<&str, serde_json::Value> =
         process.parameters.iter().map(|(key, value)| (key.get_ref().as_str(), value.clone())).collect();
-    // Copies of files with the values of `--set`, and their originals.
-    let mut edited: Vec<(String, String)> = Vec::new();
+    // Copies of files with the values of `--set`: keys, originals, copies.
+    let mut edited: Vec<(&str, PathBuf, PathBuf)> = Vec::new();
     let mut has_firmware = false;
     for (key, file) in files(process) {
         let Some(file) = file else { continue };
@@ -79,7 +79,7 @@ pub fn of(
         let original = manifest.resolve(file)?;
         let path = manifest.with_edits(declared.files, name.get_ref(), key, original.clone())?;
         if path != original {
-            edited.push((path.display().to_string(), original.display().to_string()));
+            edited.push((key, original, path.clone()));
         }
         let path = path.to_string_lossy().into_owned();
         if parameters.insert(key, path.as_str().into()).is_some() {
@@ -115,14 +115,12 @@ pub fn of(
             .timed(plan.tick_ns, period_ticks, plan.duration_ticks)
             .seeded(plan.seed)
             .given(&read);
-        let copies = |refused: Diagnostic| match edited.as_slice() {
-            [] => refused,
-            [(copy, original), ..] => {
-                let help = format!("{copy} is {original} with the values of --set. {}", refused.help);
-                refused.help(help.trim_end())
-            }
-        };
-        kind.check(&parameters, &context).map_err(|error| copies(refused(declared, &error)))?;
+        kind.check(&parameters, &context).map_err(|error| {
+            let error = edited.iter().fold(error, |error, (key, original, copy)| {
+                manifest.without_copy(declared.files, (name.get_ref(), key), (original, copy), error)
+            });
+            refused(declared, &error)
+        })?;
         // A firmware has files beside its program.
         if has_firmware {
             notes.models.extend(read.used().into_iter().map(|file| file.path));
@@ -186,12 +184,28 @@ fn refused(declared: &DeclaredNode<'_>, error: &ParameterError) -> Diagnostic {
         ParameterError::Missing { .. } => format!("add {key} = … to [process.{name}.parameters]"),
         _ => error.meant().map_or(String::new(), |near| format!("did you mean `{near}`?")),
     };
+    let is_unknown = matches!(error, ParameterError::Unknown { .. });
+    let at = place_within(declared, key, is_unknown);
     let error = error.clone().of(format!("process `{name}`"));
-    declared.manifest.problem(&place(declared, key), error, help)
+    declared.manifest.problem(&at, error, help)
 }
 
 fn problem(declared: &DeclaredNode<'_>, at: &Range<usize>, message: &str, help: String) -> Diagnostic {
     declared.manifest.problem(at, format!("process `{}`: {message}", declared.name.get_ref()), help)
+}
+
+/// Place of the value of the dotted `key`, or of the key itself if it `is_unknown`: that of a single entry where a parameter is a
+/// list or a table.
+fn place_within(declared: &DeclaredNode<'_>, key: &str, is_unknown: bool) -> Range<usize> {
+    let at = place(declared, key);
+    let path: Vec<&str> = key.split('.').skip(1).collect();
+    let is_parameter = declared.process.parameters.keys().any(|parameter| parameter.span() == at);
+    if path.is_empty() || !is_parameter {
+        return at;
+    }
+    let set = format!("process.{}.parameters", declared.name.get_ref());
+    let [of_key, of_value] = declared.manifest.inside(&at, &path, &set);
+    if is_unknown { of_key } else { of_value }
 }
 
 /// Place of the dotted `key`: an input as `inputs.PORT`, or by its first name a parameter or a file; else the place of

@@ -437,12 +437,18 @@ pub struct PassCondition {
 impl PassCondition {
     /// The topics that it needs.
     pub fn topics(&self) -> impl Iterator<Item = &str> {
+        self.placed_topics().map(|(_, topic)| topic)
+    }
+
+    /// The topics that it needs, with the keys of the tables that name them; empty for its own.
+    pub fn placed_topics(&self) -> impl Iterator<Item = (&'static str, &str)> {
         let others = [
-            self.minus.as_ref().map(|minus| &minus.topic),
-            self.reference.as_ref().map(|reference| &reference.topic),
-            self.gate.as_ref().map(|gate| &gate.topic),
+            self.minus.as_ref().map(|minus| ("minus", &minus.topic)),
+            self.reference.as_ref().map(|reference| ("reference", &reference.topic)),
+            self.gate.as_ref().map(|gate| ("while", &gate.topic)),
         ];
-        std::iter::once(&self.topic).chain(others.into_iter().flatten()).map(String::as_str)
+        let all = std::iter::once(("", &self.topic)).chain(others.into_iter().flatten());
+        all.map(|(table, topic)| (table, topic.as_str()))
     }
 }
 

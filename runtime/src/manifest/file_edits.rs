@@ -116,6 +116,26 @@ impl FileEdit {
         self.process == name && self.file == key
     }
 
+    /// Place of the `--set`.
+    pub fn span(&self) -> &Range<usize> {
+        &self.span
+    }
+
+    /// True if a fault of the dotted `key` is one of the value of this edit of the file with this `text`.
+    pub fn is_about(&self, key: &str, text: &str) -> bool {
+        let mut keys = match text.parse::<DocumentMut>() {
+            Ok(document) => self.keys_in(document.as_item()),
+            Err(_) => self.keys.clone(),
+        };
+        // A quantity's faults are those of its own key.
+        if keys.last().is_some_and(|last| last == VALUE) && self.keys.last().is_some_and(|last| last != VALUE)
+        {
+            keys.pop();
+        }
+        let fault: Vec<&str> = key.split('.').collect();
+        !key.is_empty() && keys.iter().zip(&fault).all(|(a, b)| a == b) && fault.len() >= keys.len().min(2)
+    }
+
     fn require_file(&self, sources: &Sources, content: &Content) -> Result<(), Diagnostic> {
         let name = &self.process;
         let Some((_, process)) = content.process.iter().find(|(other, _)| other.get_ref() == name) else {

@@ -6,7 +6,7 @@ use diagnostics::{Diagnostic, Misread, ParameterError, Place};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
-use toml::de::DeTable;
+use toml::de::{DeTable, DeValue};
 
 /// Origin of a text.
 #[derive(Clone, Debug)]
@@ -46,6 +46,8 @@ pub struct Sources {
     pub order: Vec<usize>,
     /// The components that they may name.
     pub registry: Registry,
+    /// Keys that a file sets in place of `--set`, such as a campaign file, and their places.
+    pub set_places: Vec<(String, Place)>,
 }
 
 impl Sources {
@@ -123,12 +125,41 @@ impl Sources {
             Origin::Argument(name) => (*name).to_owned(),
             Origin::Override => {
                 let error: ParameterError = error.into();
+                if let Some(place) = self.set_place(&source.text) {
+                    let error = ParameterError::conflict(error.key(), format!("{}: {error}", source.text));
+                    return Diagnostic::at(place.clone(), error).help(help);
+                }
                 let message = format!("--set {}: {error}", source.text);
                 let error = ParameterError::conflict(error.key(), message);
                 return Diagnostic::in_file(self.file().display().to_string(), error).help(help);
             }
         };
         Diagnostic::at(Place::of(file, &source.text, &span), error).help(help)
+    }
+
+    /// The value of `--set` at `span`, as the user knows it.
+    pub fn value(&self, span: &Range<usize>) -> String {
+        let text = &self.at(span.start).text;
+        match self.set_place(text) {
+            Some(place) => format!("{text} of {place}"),
+            None => format!("--set {text}"),
+        }
+    }
+
+    /// Place of the value `text` in the file that sets it in place of `--set`.
+    pub fn set_place(&self, text: &str) -> Option<&Place> {
+        let key = text.split('=').next().unwrap_or_default().trim();
+        self.set_places.iter().find(|(known, _)| known.trim() == key).map(|(_, place)| place)
+    }
+
+    /// Places of the key and the value at `path` within the key or the value at `span`: of the deepest part of the path that the text
+    /// has; `span` twice if it has none.
+    pub fn inside(&self, span: &Range<usize>, path: &[&str]) -> [Range<usize>; 2] {
+        let source = self.at(span.start);
+        let table = tree::parse(&source.text, source.base).ok();
+        let root = table.map(|table| Spanned::new(span.clone(), DeValue::Table(table)));
+        let found = root.as_ref().and_then(|root| tree::find(root.get_ref(), span));
+        found.map_or([span.clone(), span.clone()], |value| tree::deepest(span, value, path))
     }
 
     /// Diagnostic for a value that could not be read, at its place.
@@ -181,6 +212,25 @@ impl Sources {
 #[cfg(test)]
 mod tests {
     use super::{Origin, Sources};
+
+    #[test]
+    fn a_key_within_a_value_has_a_place_of_its_own() {
+        let mut sources = Sources::default();
+        sources.add(Origin::File("b.toml".into()), "q = 1".into());
+        let text = "list = [\n { a = 1 },\n { b = 2 },\n]\n[[t]]\nc = 3\n";
+        sources.add(Origin::File("a.toml".into()), text.into());
+        let (base, list) = (sources.last().base, text.find("list").unwrap());
+        let key = base + list..base + list + 4;
+        let told = |path: &[&str], part: usize| {
+            sources.problem(&sources.inside(&key, path)[part], "no", "").to_string()
+        };
+        assert_eq!(
+            (told(&["1", "b"], 0), told(&["1", "b"], 1)),
+            ("a.toml:3:4: no".into(), "a.toml:3:8: no".into())
+        );
+        assert_eq!(told(&["1", "x"], 1), "a.toml:3:2: no", "the deepest that there is");
+        assert_eq!(told(&["x"], 0), "a.toml:1:1: no");
+    }
 
     #[test]
     fn an_offset_names_a_place_in_any_text() {

@@ -25,6 +25,43 @@ pub fn parse_value(text: &str, base: usize) -> Option<Spanned<DeValue<'_>>> {
     DeValue::parse(text).ok().map(|value| shifted(value, base))
 }
 
+/// The value at `span`, or of the key at `span`, within `value`.
+pub fn find<'v, 't>(value: &'v DeValue<'t>, span: &Range<usize>) -> Option<&'v Spanned<DeValue<'t>>> {
+    let is_it = |value: &Spanned<DeValue<'_>>| value.span() == *span;
+    match value {
+        DeValue::Table(table) => table.iter().find_map(|(key, value)| {
+            if key.span() == *span {
+                return Some(value);
+            }
+            // A list of tables has the place of its first table.
+            find(value.get_ref(), span).or_else(|| is_it(value).then_some(value))
+        }),
+        DeValue::Array(array) => array
+            .iter()
+            .find_map(|value| if is_it(value) { Some(value) } else { find(value.get_ref(), span) }),
+        _ => None,
+    }
+}
+
+/// Places of the key and of the value at `path` within `value`, whose own key or value lies at `span`; of the deepest part of
+/// the path that there is.
+pub fn deepest(span: &Range<usize>, value: &Spanned<DeValue<'_>>, path: &[&str]) -> [Range<usize>; 2] {
+    let (mut places, mut value) = ([span.clone(), span.clone()], value);
+    for name in path {
+        let next = match value.get_ref() {
+            DeValue::Table(table) => table.get_key_value(*name).map(|(key, value)| (key.span(), value)),
+            DeValue::Array(array) => {
+                let item = name.parse().ok().and_then(|index: usize| array.get(index));
+                item.map(|item| (item.span(), item))
+            }
+            _ => None,
+        };
+        let Some((key, inner)) = next else { break };
+        (places, value) = ([key, inner.span()], inner);
+    }
+    places
+}
+
 fn shifted(value: Spanned<DeValue<'_>>, base: usize) -> Spanned<DeValue<'_>> {
     let span = value.span().start + base..value.span().end + base;
     let value = match value.into_inner() {
