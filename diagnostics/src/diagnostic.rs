@@ -4,6 +4,7 @@ use crate::nearest::nearest;
 use crate::parameter::{FileFault, FileFaults, ParameterError};
 use crate::place::Place;
 use serde::ser::{Serialize, SerializeStruct, Serializer};
+use std::collections::BTreeSet;
 use std::fmt;
 use std::io;
 
@@ -219,20 +220,27 @@ impl From<Diagnostic> for FileFault {
 
 /// Drops each missing key for which an unknown one of the same table stands: it is misspelt.
 fn join_misspelt(faults: &mut Vec<Diagnostic>) {
+    let mut joined = BTreeSet::new();
     for index in 0..faults.len() {
-        let Some(unknown) = faults.get(index).filter(|fault| fault.is_unknown()) else { continue };
+        let unknown = &faults[index];
+        if !unknown.is_unknown() {
+            continue;
+        }
         let (table, written) = split(unknown.key());
-        let twins = faults.iter().filter(|fault| {
+        let is_twin = |at: &usize| {
+            let fault = &faults[*at];
             fault.is_missing() && fault.file == unknown.file && split(fault.key()).0 == table
-        });
-        let missing: Vec<&str> = twins.map(|fault| split(fault.key()).1).collect();
-        let Some(meant) = nearest(written, missing).map(str::to_owned) else { continue };
-        let (file, table) = (unknown.file.clone(), table.to_owned());
-        faults[index].help = format!("did you mean `{meant}`?");
-        faults.retain(|fault| {
-            !(fault.is_missing() && fault.file == file && split(fault.key()) == (&table, &meant))
-        });
+        };
+        let twins: Vec<usize> = (0..faults.len()).filter(|at| is_twin(at) && !joined.contains(at)).collect();
+        let name = |at: &usize| split(faults[*at].key()).1;
+        let Some(meant) = nearest(written, twins.iter().map(name)) else { continue };
+        let twin = twins.iter().find(|at| name(at) == meant).copied();
+        let help = format!("did you mean `{meant}`?");
+        joined.extend(twin);
+        faults[index].help = help;
     }
+    let mut at = 0..;
+    faults.retain(|_| at.next().is_some_and(|at| !joined.contains(&at)));
 }
 
 /// The table of a dotted key, and its last name.

@@ -274,13 +274,14 @@ impl Judge<'_> {
         let [here, there] = [Quantity::AngularVelocity, Quantity::Attitude].map(|one| self.other_frame(one));
         let what = format!("it has a correlation of {correlation:.2} with the derivative of the attitude");
         match (leans(attitude), leans(&turned)) {
-            (Some(declared), Some(other)) if other > declared + CLEARLY => {
+            (Some(declared), Some(other)) if other > SAME && other > declared + CLEARLY => {
                 let what = format!(
-                    "its derivative has a correlation of {correlation:.2} with the angular velocity, and its lean of {declared:.2}                      with the acceleration; in the other frame that is {other:.2}"
+                    "its derivative has a correlation of {correlation:.2} with the angular velocity, and its lean of {declared:.2} \
+                     with the acceleration; in the other frame that is {other:.2}"
                 );
                 finding(Quantity::Attitude, Some(there), &what)
             }
-            (Some(declared), Some(other)) if declared > other + CLEARLY => {
+            (Some(declared), Some(other)) if declared > SAME && declared > other + CLEARLY => {
                 finding(Quantity::AngularVelocity, Some(here), &what)
             }
             _ => {

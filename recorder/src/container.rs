@@ -221,7 +221,7 @@ fn long32<'a>(rest: &mut &'a [u8]) -> Result<&'a [u8], Fault> {
 }
 
 /// The messages of an MCAP file of any writer. A damaged chunk is an error in front of any of its messages; no
-/// message follows an error. The memory taken is that of one chunk, as far as it was written.
+/// message follows an error. The memory taken is that of the largest chunk, or message outside of chunks, as far as it was written.
 ///
 /// ```
 /// let mut messages = recorder::reader::Messages::new(b"PK\x03\x04, as archives begin");

@@ -3,6 +3,7 @@
 use super::campaign_engine::{EngineArguments, Flight, build, fly_task};
 use super::files::require_kind;
 use super::interrupts::stop_token;
+use super::kind::Kind;
 use super::output::{print_json, print_text, say};
 use super::progress;
 use anyhow::{Context, Result, bail};
@@ -27,7 +28,6 @@ use serde_json::json;
 use std::collections::BTreeMap;
 use std::io::{Write as _, stdin};
 use std::path::{Path, PathBuf};
-use vehicles::kind::Kind;
 
 pub const HELP: &str = "Example: hummingbus campaign manifests/campaigns/hover-robustness.toml --out robustness\n\n\
                         Writes plan.csv, flights.parquet, report.json and report.html into the folder. The same command goes \

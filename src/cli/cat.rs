@@ -4,6 +4,7 @@ use super::files::open_recording;
 use super::output::{gone_or_failed, write_json_line};
 use anyhow::{Context, Result, bail};
 use clap::Args;
+use recorder::RecordingError;
 use recorder::definition::{Leaf, Value, is_padding};
 use recorder::reader::{Record, Recording};
 use std::io::Write as _;
@@ -42,7 +43,6 @@ pub fn cat(arguments: &CatArguments) -> Result<bool> {
         bail!("--from {from_s} --to {to_s}: the end must not be before the start");
     }
     let recording = open_recording(&arguments.recording)?;
-    arguments.require_any(&recording)?;
     if let Some(topic) = &arguments.topic {
         recording.topic(topic)?;
     }
@@ -57,7 +57,9 @@ fn seconds(text: &str) -> Result<f64, String> {
 
 fn json_lines(recording: &Recording, arguments: &CatArguments) -> Result<bool> {
     let mut out = std::io::BufWriter::new(std::io::stdout().lock());
+    let mut is_empty = true;
     for record in arguments.records(recording) {
+        is_empty = false;
         let record = record?;
         let leaves = arguments.leaves(recording, &record)?;
         let fields: serde_json::Map<_, _> =
@@ -68,6 +70,9 @@ fn json_lines(recording: &Recording, arguments: &CatArguments) -> Result<bool> {
         if let Err(error) = write_json_line(&mut out, &line) {
             return gone_or_failed(error);
         }
+    }
+    if is_empty {
+        arguments.require_whole(recording)?;
     }
     out.flush().map_or_else(gone_or_failed, |()| Ok(recording.cut().is_none()))
 }
@@ -98,6 +103,9 @@ fn csv(recording: &Recording, arguments: &CatArguments) -> Result<bool> {
             return gone_or_failed(error);
         }
     }
+    if header.is_none() {
+        arguments.require_whole(recording)?;
+    }
     out.flush().map_or_else(gone_or_failed, |()| Ok(recording.cut().is_none()))
 }
 
@@ -117,24 +125,22 @@ fn cell_of(text: &str) -> String {
 }
 
 impl CatArguments {
-    /// Refuses a span that begins behind the last message.
-    fn require_any(&self, recording: &Recording) -> Result<()> {
-        if self.from == 0.0 {
-            return Ok(());
-        }
-        let mut last_s: Option<f64> = None;
-        for record in recording.messages() {
-            let time_s =
-                std::time::Duration::from_nanos(record.context("cannot read on")?.time_ns).as_secs_f64();
-            if time_s >= self.from {
-                return Ok(());
+    /// Refuses a span without a message, where the recording or the topic has some.
+    fn require_whole(&self, recording: &Recording) -> Result<()> {
+        let mut span_s: Option<[f64; 2]> = None;
+        recording.visit::<RecordingError>(|message| {
+            if self.topic.as_ref().is_none_or(|topic| topic == message.topic) {
+                let time_s = std::time::Duration::from_nanos(message.time_ns).as_secs_f64();
+                let [first_s, last_s] = span_s.unwrap_or([time_s; 2]);
+                span_s = Some([first_s.min(time_s), last_s.max(time_s)]);
             }
-            last_s = Some(last_s.map_or(time_s, |last_s| last_s.max(time_s)));
-        }
-        match last_s {
-            Some(last_s) => bail!("--from {}: the recording ends at {last_s} s; begin earlier", self.from),
-            None => Ok(()),
-        }
+            Ok(())
+        })?;
+        let Some([first_s, last_s]) = span_s else { return Ok(()) };
+        let what =
+            self.topic.as_ref().map_or_else(|| "the recording".to_owned(), |topic| format!("`{topic}`"));
+        let to = if self.to.is_finite() { format!(" --to {}", self.to) } else { String::new() };
+        bail!("--from {}{to}: no message; those of {what} go from {first_s} s to {last_s} s", self.from)
     }
 
     /// The messages of the topic within the span; of all topics where none is named.

@@ -1,11 +1,11 @@
 //! The command `check`.
 
 use super::files::require_kind;
+use super::kind::Kind;
 use super::output::{print_json, print_text, print_warnings};
 use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
-use vehicles::kind::Kind;
 
 /// Arguments of `check`.
 #[derive(Args)]

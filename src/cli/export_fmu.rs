@@ -1,6 +1,7 @@
 //! The command `export-fmu`.
 
 use super::files::require_kind;
+use super::kind;
 use super::output::{print_json, print_text};
 use anyhow::{Context, Result, bail};
 use clap::Args;
@@ -9,7 +10,6 @@ use runtime::output_file::{self, Kind, Mark, is_same};
 use serde_json::json;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
-use vehicles::kind;
 
 /// Examples that `--help` shows.
 pub const HELP: &str = "Examples:

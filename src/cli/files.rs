@@ -1,5 +1,6 @@
 //! Files that commands read and write.
 
+use super::kind::Kind;
 use anyhow::{Result, anyhow};
 use recorder::reader::Recording;
 use runtime::checkpoint::Checkpoint;
@@ -8,7 +9,6 @@ use runtime::rewind::MARK;
 use std::fs::File;
 use std::io::Read as _;
 use std::path::Path;
-use vehicles::kind::Kind;
 
 /// A page of any kind.
 pub const PAGE: output_file::Kind =

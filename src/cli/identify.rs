@@ -2,6 +2,7 @@
 
 use super::files::{PAGE, require_kind};
 use super::interrupts::stop_token;
+use super::kind;
 use super::next_flight::{self, NextFlight};
 use super::output::{self, print_json, print_text, readable};
 use super::progress;
@@ -21,7 +22,7 @@ use std::fs::File;
 use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
-use vehicles::{Vehicle, kind};
+use vehicles::Vehicle;
 
 /// Text of `--help` behind the options.
 pub const HELP: &str = "Examples: hummingbus identify flights.toml --out identified\n          \

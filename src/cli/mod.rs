@@ -18,6 +18,7 @@ mod identify;
 mod included_models;
 mod inherited;
 mod interrupts;
+mod kind;
 mod live_page;
 mod new;
 mod next_flight;

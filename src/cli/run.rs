@@ -3,6 +3,7 @@
 use super::files::require_kind;
 use super::foxglove::{self, LiveFoxglove};
 use super::interrupts::stop_token;
+use super::kind::Kind;
 use super::live_page::LivePage;
 use super::output::{message, print_json, print_text, print_warnings, say};
 use super::profile::Files;
@@ -25,7 +26,6 @@ use runtime::run_dir::run_of_launcher;
 use serde_json::{Value, json};
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
-use vehicles::kind::Kind;
 
 /// Arguments of `run`, and common arguments of the commands that fly a manifest.
 #[derive(Args)]

@@ -33,7 +33,11 @@ pub fn shadow(arguments: &ShadowArguments) -> Result<bool> {
             let with = steer::description(&arguments.with)?;
             run(&arguments.run, None, Some((process, &with)))
         }
-        (None, Some(path)) => print_text(&report::shadow::report(&open_recording(path)?)?).map(|()| true),
+        (None, Some(path)) => {
+            let recording = open_recording(path)?;
+            print_text(&report::shadow::report(&recording)?)?;
+            Ok(recording.cut().is_none())
+        }
         (None, None) => bail!("name the process to shadow: --process NAME; or give a recording (.mcap)"),
         (Some(_), Some(path)) => {
             bail!("{} is a recording: leave --process out, or give a manifest", path.display())

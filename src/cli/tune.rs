@@ -3,6 +3,7 @@
 use super::campaign_engine::{build, cores, worker_command};
 use super::files::require_kind;
 use super::interrupts::stop_token;
+use super::kind;
 use super::output::{print_json, print_text};
 use super::progress;
 use anyhow::{Context, Result, bail};
@@ -21,7 +22,6 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
-use vehicles::kind;
 
 pub const HELP: &str = "Example: hummingbus tune manifests/tune/hover.toml --out hover-gains.toml\n\n\
                         Writes a gains file if the tuned gains cost less on flights that they were not tuned on; exit code 1 if \

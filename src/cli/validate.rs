@@ -2,6 +2,7 @@
 
 use super::files::require_kind;
 use super::interrupts::stop_token;
+use super::kind::Kind;
 use super::output::{print_json, print_text, say};
 use anyhow::{Result, bail};
 use clap::Args;
@@ -11,7 +12,6 @@ use identify::steps_ahead::Between;
 use report::validate::{Notes, StepsAheadErrors, Validation, predicted_accelerations};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use vehicles::kind::Kind;
 
 /// Text of `--help` behind the options.
 pub const HELP: &str = "Example: hummingbus validate vehicles/hummingbird.toml fitted.toml flights.toml\n\n\

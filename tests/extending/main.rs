@@ -37,6 +37,9 @@ mod cli {
     #[path = "../../../src/cli/files.rs"]
     #[allow(dead_code, reason = "a command uses some of it")]
     pub mod files;
+    #[path = "../../../src/cli/kind.rs"]
+    #[allow(dead_code, reason = "a command uses some of it")]
+    pub mod kind;
     #[path = "../../../src/cli/output.rs"]
     #[allow(dead_code, reason = "a command uses some of it")]
     pub mod output;

@@ -282,7 +282,11 @@ fn cat_refuses_a_span_without_messages() {
     place
         .call(&["cat", &recording, "--from", "100"])
         .with_code(2)
-        .says(&["--from 100", "the recording ends at 0."]);
+        .says(&["--from 100", "no message; those of the recording go from 0."]);
+    place
+        .call(&["cat", &recording, "--from", "0.1001", "--to", "0.1002"])
+        .with_code(2)
+        .says(&["--from 0.1001 --to 0.1002: no message"]);
     place
         .call(&["cat", &recording, "--from", "5", "--to", "3"])
         .with_code(2)

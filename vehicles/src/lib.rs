@@ -41,7 +41,6 @@ mod file;
 pub mod foreign;
 pub mod from_model;
 pub mod gaps;
-pub mod kind;
 mod layout;
 pub mod lines;
 pub mod provenance;

@@ -147,6 +147,10 @@ fn a_misspelt_key_is_told_once_at_its_own_line() {
         assert_eq!((error.key(), &*error.help), (key, &*format!("did you mean `{meant}`?")), "{error}");
         assert_eq!(error.place.unwrap().line, line_of(from), "{key}");
     }
+    let both = HUMMINGBIRD.replacen("[body]", "[boddy]", 1).replacen("[motor]", "[moter]", 1);
+    let error = Vehicle::parse(&both, "bird.toml").unwrap_err();
+    let keys: Vec<&str> = error.all().map(|fault| fault.key()).collect();
+    assert_eq!(keys, ["boddy", "moter"], "{error}");
     let start = HUMMINGBIRD.find("[motor]").unwrap();
     let end = HUMMINGBIRD.find("[command]").unwrap();
     let without = [&HUMMINGBIRD[..start], &HUMMINGBIRD[end..]].concat();

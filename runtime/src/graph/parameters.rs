@@ -203,7 +203,11 @@ fn place_within(declared: &DeclaredNode<'_>, key: &str, is_unknown: bool) -> Ran
     if path.is_empty() || !is_parameter {
         return at;
     }
-    let set = format!("process.{}.parameters", declared.name.get_ref());
+    // A vehicle of a set is given as SET/PROCESS.
+    let set = match declared.name.get_ref().split_once('/') {
+        Some((set, process)) => format!("set.{set}.process.{process}.parameters"),
+        None => format!("process.{}.parameters", declared.name.get_ref()),
+    };
     let [of_key, of_value] = declared.manifest.inside(&at, &path, &set);
     if is_unknown { of_key } else { of_value }
 }

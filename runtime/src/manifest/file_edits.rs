@@ -127,10 +127,13 @@ impl FileEdit {
             Ok(document) => self.keys_in(document.as_item()),
             Err(_) => self.keys.clone(),
         };
-        // A quantity's faults are those of its own key.
+        // A quantity's faults are those of its own key; the unit and the source stay those of the file.
         if keys.last().is_some_and(|last| last == VALUE) && self.keys.last().is_some_and(|last| last != VALUE)
         {
             keys.pop();
+            if key.split('.').count() > keys.len() {
+                return false;
+            }
         }
         let fault: Vec<&str> = key.split('.').collect();
         !key.is_empty() && keys.iter().zip(&fault).all(|(a, b)| a == b) && fault.len() >= keys.len().min(2)

@@ -42,9 +42,6 @@ impl Raised {
     /// All of them, cheap ones first.
     pub const ALL: [Self; 5] = [Self::Duration, Self::Speed, Self::Tilt, Self::Room, Self::All];
 
-    /// The same, but for speed, tilt and room together in front of each of them.
-    pub const TOGETHER_FIRST: [Self; 5] = [Self::Duration, Self::All, Self::Speed, Self::Tilt, Self::Room];
-
     /// `bounds` with this one raised, and how a report says so.
     pub fn on(self, bounds: &Bounds) -> (Bounds, String) {
         let mut raised = *bounds;

@@ -182,27 +182,38 @@ fn raised<T: Fn(usize, usize) + Sync>(
     let open: Vec<usize> = (0..now.len()).filter(|at| now[*at] < SEPARATED).collect();
     let mut best: Option<(usize, f64, String)> = None;
     // Where no manoeuvre shows anything, the limits are first raised together: one family of flights tells that none helps.
-    let is_dark = open.iter().all(|at| now[*at] < NO_SEPARATION);
-    let order = if is_dark { Raised::TOGETHER_FIRST } else { Raised::ALL };
-    for raised in order {
+    let mut together = None;
+    if open.iter().all(|at| now[*at] < NO_SEPARATION) {
+        let (bounds, text) = Raised::All.on(bounds);
+        let flown = simulator.family(&bounds, &tell(&format!(", limits raised ({text})")))?;
+        let chosen = search::combined(questions, &flown, bounds.duration_s, 0);
+        let found = search::separations(questions, &flown, &chosen);
+        if open.iter().all(|at| found[*at] < NO_SEPARATION) {
+            return Ok((simulator.stop.count() == 0).then(|| NOT_SHOWN.to_owned()));
+        }
+        together = Some(flown);
+    }
+    for raised in Raised::ALL {
         let (raised_bounds, text) = raised.on(bounds);
         if raised_bounds == *bounds {
             continue;
         }
         let bounds = raised_bounds;
         let again;
-        let flown = if raised == Raised::Duration {
-            flown
-        } else {
-            again = simulator.family(&bounds, &tell(&format!(", limits raised ({text})")))?;
-            &again[..]
+        let flown = match raised {
+            Raised::Duration => flown,
+            _ => {
+                let known = if raised == Raised::All { together.take() } else { None };
+                again = match known {
+                    Some(flown) => flown,
+                    None => simulator.family(&bounds, &tell(&format!(", limits raised ({text})")))?,
+                };
+                &again[..]
+            }
         };
         // It only says whether a limit helps.
         let chosen = search::combined(questions, flown, bounds.duration_s, 0);
         let found = search::separations(questions, flown, &chosen);
-        if is_dark && raised == Raised::All && open.iter().all(|at| found[*at] < NO_SEPARATION) {
-            break;
-        }
         let answered = open.iter().filter(|at| found[**at] >= SEPARATED).count();
         let worst = open.iter().map(|at| found[*at]).fold(f64::INFINITY, f64::min);
         if best.as_ref().is_none_or(|(count, least, _)| (answered, worst) > (*count, *least)) {

@@ -1,19 +1,10 @@
 //! Kinds of files that commands read, by content: a file that is given to the wrong command is told with its kind.
 
-use crate::foreign::{self, Foreign};
 use diagnostics::parse_toml;
 use toml::de::{DeTable, DeValue};
+use vehicles::foreign::{self, Foreign};
 
 /// Kind of a file that this program reads, or the foreign format that it is.
-///
-/// ```
-/// use vehicles::kind::Kind;
-///
-/// assert_eq!(Kind::of(vehicles::reference::HUMMINGBIRD.as_bytes()), Some(Kind::Vehicle));
-/// assert_eq!(Kind::of(b"vehicle = 'v.toml'\n[[flight]]\nfile = 'a.csv'"), Some(Kind::Flights));
-/// assert_eq!(Kind::of(b"t,x\n0,1\n"), Some(Kind::Csv));
-/// assert_eq!(Kind::of(b"name = 'something'"), None);
-/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// Manifest of a run.
@@ -113,11 +104,14 @@ fn of_toml(table: &DeTable<'_>) -> Option<Kind> {
     let has = |key: &str| table.get(key).is_some();
     let is_text = |key: &str| table.get(key).is_some_and(|value| value.get_ref().is_str());
     let count = |keys: &[&str]| keys.iter().filter(|key| has(key)).count();
+    // A campaign has a list of that name.
+    let has_sets = table.get("set").is_some_and(|value| value.get_ref().as_table().is_some());
+    let is_of_manifest = count(&["process", "run", "include"]) > 0 || has_sets;
     let kinds = [
         (Kind::Campaign, (is_text("manifest") || is_text("from")) && count(&["vary", "tune", "flights"]) > 0),
         (Kind::Flights, is_text("vehicle") && has("flight")),
         (Kind::Stand, is_text("name") && count(&["static", "dynamic"]) > 0),
-        (Kind::Manifest, count(&["process", "run", "include", "set"]) > 0 && !is_text("manifest")),
+        (Kind::Manifest, is_of_manifest && !is_text("manifest") && count(&["vary", "tune"]) == 0),
         (Kind::Vehicle, count(&["body", "rotor", "motor", "command", "rotors"]) > 1 || is_text("base")),
         (Kind::Scene, is_text("name") && count(&["boxes", "meshes", "balls", "joints", "rig"]) > 0),
     ];
@@ -139,11 +133,12 @@ fn is_of_gains(table: &DeTable<'_>) -> bool {
     !table.is_empty() && table.iter().all(|(_, value)| is_gain(value.get_ref()))
 }
 
-/// True for a text whose first line with content has several cells.
+/// True for a text whose first line with content has several cells, and is none of TOML.
 fn is_table(text: &str) -> bool {
     let is_content = |line: &&str| !line.trim().is_empty() && !line.starts_with('#');
     let cells = |line: &str| line.split([',', ';', '\t']).filter(|cell| !cell.trim().is_empty()).count();
-    text.lines().find(is_content).is_some_and(|line| cells(line) > 1)
+    let is_toml = |line: &str| line.contains('=') || line.trim_start().starts_with('[');
+    text.lines().find(is_content).is_some_and(|line| cells(line) > 1 && !is_toml(line))
 }
 
 #[cfg(test)]
@@ -171,7 +166,14 @@ mod tests {
         assert_eq!(Kind::of(b"\x89MCAP0\r\n\x01"), Some(Kind::Recording));
         assert_eq!(Kind::of(b"hummingbus checkpoint 2\n\0"), Some(Kind::Checkpoint));
         assert_eq!(Kind::of(b"\x1f\x8b\x08\0").unwrap().name(), "compressed (gzip)");
-        for text in ["x = 1", "not a table", "[run", "a = 1\nbase = 3"] {
+        for text in [
+            "include = ['a.toml', 'b.toml']\n[run",
+            "manifst = 'm.toml'\nset = ['run.seed=1']\n[[vary]]",
+            "x = 1",
+            "not a table",
+            "[run",
+            "a = 1\nbase = 3",
+        ] {
             assert_eq!(Kind::of(text.as_bytes()), None, "{text}");
         }
     }
