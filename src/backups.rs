@@ -6,8 +6,14 @@ use runtime::manifest::Manifest;
 use std::path::Path;
 
 fn hover() -> (Manifest, Graph) {
+    hover_with(&[])
+}
+
+fn hover_with(overrides: &[&str]) -> (Manifest, Graph) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("manifests/hover.toml");
-    let manifest = Manifest::load(&path, &["run.duration_s=1".to_owned()], COMPONENTS).unwrap();
+    let overrides: Vec<String> =
+        ["run.duration_s=1"].iter().chain(overrides).map(|text| (*text).to_owned()).collect();
+    let manifest = Manifest::load(&path, &overrides, COMPONENTS).unwrap();
     let graph = Graph::build(&manifest).unwrap();
     (manifest, graph)
 }
@@ -32,11 +38,47 @@ fn a_backup_in_a_live_run_that_cannot_be_is_refused_with_its_place() {
     let refused = |process: &str, with: &str| {
         backup_of(&manifest, &graph.plan, &graph.files, process, with).map(|_| ()).unwrap_err().to_string()
     };
-    let message = refused("contorller", "");
-    assert!(message.starts_with("--with:1:1: there is no process `contorller`"), "{message}");
+    // An argument that was not given has no fault.
+    for (process, reason) in [("contorller", "there is no process"), ("recorder", "its file would be torn")] {
+        let message = refused(process, "");
+        assert!(message.contains(reason) && message.contains("manifests/hover.toml: "), "{message}");
+        assert!(!message.contains("--with"), "{message}");
+    }
     let message = refused("controller", "wait = \"spin\"\nknid = 3");
     assert!(message.starts_with("--with:2:1: unknown key `knid`"), "{message}");
     assert!(refused("controller", "parameters.gain = 3").contains("--with:1:12: process `controller`"));
     assert!(refused("controller", "x = ").starts_with("--with:1:"));
-    assert!(refused("recorder", "").contains("its file would be torn"));
+}
+
+#[test]
+fn a_backup_changes_values_of_the_gains_file_that_its_process_names() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("controllers/gains/pid-thesis.toml");
+    let (manifest, graph) = hover_with(&[&format!("process.controller.gains={}", file.display())]);
+    let backup = |with: &str| {
+        backup_of(&manifest, &graph.plan, &graph.files, "controller", &format!("parameters.{with}"))
+    };
+    let plan = backup("gains.roll = { proportional_1_s2 = 20.0, integral_1_s3 = 0.0, derivative_1_s = 7.0 }");
+    let gains = plan.unwrap().plan.parameters["gains"].clone();
+    assert_eq!((gains["file"].as_str(), &gains["roll"]["derivative_1_s"]), (file.to_str(), &7.0.into()));
+    assert!(backup("gains.roll.proportional_1_s2 = 20.0").is_ok(), "the file has the others");
+    for (with, place, reason) in [
+        ("gains.rol = 3", "--with:1:18: ", "unknown key `gains.rol`"),
+        ("gains.roll.proportional = 20", "--with:1:23: ", "unknown key `gains.roll.proportional`"),
+        ("gains.roll.proportional_1_s2 = -1", "--with:1:43: ", "`gains.roll.proportional_1_s2`"),
+        ("gains.roll.proportional_1_s2 = \"a\"", "--with:1:43: ", "`gains.roll.proportional_1_s2`"),
+        ("gains = 3", "--with:1:12: ", "`gains` twice"),
+    ] {
+        let message = backup(with).map(drop).unwrap_err().to_string();
+        assert!(message.starts_with(place) && message.contains(reason), "{with}: {message}");
+    }
+}
+
+#[test]
+fn a_backup_of_another_kind_keeps_the_vehicle() {
+    let (manifest, graph) = hover();
+    let backup = |with: &str| backup_of(&manifest, &graph.plan, &graph.files, "controller", with);
+    let plan = backup("kind = \"cascade\"").unwrap().plan;
+    assert_eq!(plan.parameters["vehicle"], graph.plan.nodes[0].parameters["vehicle"]);
+    let message = backup("kind = \"cascade\"\nvehicle = \"none.toml\"").map(drop).unwrap_err().to_string();
+    assert!(message.starts_with("--with:2:"), "{message}");
 }

@@ -38,6 +38,36 @@ impl Requirement {
     }
 }
 
+impl Requirement {
+    /// Text of the pass rate that `passed` of `flights` show.
+    ///
+    /// ```
+    /// # let required: campaign::requirement::Requirement = "pass_rate >= 0.99 at 95 %".parse()?;
+    /// let words = "50 of 50 flights passed, which shows a pass rate of at least 0.9418 (one-sided lower limit at 95 %; the interval of \
+    ///              the summary has two sides, each at 97.5 %)";
+    /// assert_eq!(required.shown_in_words(50, 50), words);
+    /// # Ok::<(), String>(())
+    /// ```
+    #[must_use]
+    pub fn shown_in_words(&self, passed: u64, flights: u64) -> String {
+        let shown = self.shown(passed, flights);
+        let flown = format!("{passed} of {flights} flights passed");
+        match self.confidence {
+            None => format!("{flown}, a pass rate of {shown:.4}"),
+            Some(confidence) => format!(
+                "{flown}, which shows a pass rate of at least {shown:.4} (one-sided lower limit at {} %; the interval of \
+                 the summary has two sides, each at 97.5 %)",
+                percent(confidence)
+            ),
+        }
+    }
+}
+
+/// A part of one in percent, without the digits that the product adds.
+fn percent(part: f64) -> f64 {
+    (part * 1e8).round() / 1e6
+}
+
 impl FromStr for Requirement {
     type Err = String;
 
@@ -64,7 +94,7 @@ impl FromStr for Requirement {
 impl fmt::Display for Requirement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "pass_rate >= {}", self.pass_rate)?;
-        self.confidence.map_or(Ok(()), |confidence| write!(f, " at {} %", confidence * 100.0))
+        self.confidence.map_or(Ok(()), |confidence| write!(f, " at {} %", percent(confidence)))
     }
 }
 

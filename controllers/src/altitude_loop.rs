@@ -4,7 +4,7 @@ use crate::airframe::HoverModel;
 use crate::control::{HoverMotion, Integrals, within};
 use crate::law::Predecessor;
 use diagnostics::unit::{ACCELERATION, PER_SECOND, PER_SECOND_2, PER_SECOND_3, VELOCITY};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// The least cosine of the tilt that is compensated: beyond 60° more thrust would push sideways rather
 /// than up. Tuned, no source.
@@ -12,7 +12,7 @@ const TILT_COSINE_MIN: f64 = 0.5;
 
 gains! {
     /// The gains of one loop, from an error to an acceleration (linear: m/s², angular: rad/s²).
-    #[derive(Deserialize)]
+    #[derive(Deserialize, Serialize)]
     #[serde(deny_unknown_fields)]
     pub struct LoopGains of file {
         /// Acceleration for each unit of error, 1/s².

@@ -31,8 +31,9 @@ use crate::gains_file::{self, GAIN};
 use diagnostics::parameter::{ParameterError, require};
 use diagnostics::unit::{ACCELERATION, ANGULAR_ACCELERATION, VELOCITY};
 use inputs::InputFiles;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use std::path::Path;
 
 /// The gains of the thesis.
 const THESIS: &str = include_str!("../gains/pid-thesis.toml");
@@ -46,7 +47,7 @@ gains! {
     /// let (ours, thesis) = (PidGains::default(), PidGains::thesis());
     /// assert_eq!((ours.roll.proportional_1_s2, thesis.roll.proportional_1_s2), (16.0, 25.0));
     /// ```
-    #[derive(Deserialize)]
+    #[derive(Deserialize, Serialize)]
     #[serde(default, deny_unknown_fields, expecting = "a table of gains or the path of a gains file")]
     pub struct PidGains of file, built in "pid.toml" {
         /// Altitude error (m) and rate of climb (m/s) to vertical acceleration (m/s²).
@@ -76,7 +77,8 @@ impl PidGains {
             .expect("a test reads the built-in gains")
     }
 
-    /// The gains that a manifest gives: the table `parameters.gains`, the path of a gains file, or those built in.
+    /// The gains that a manifest gives: the table `parameters.gains`, the path of a gains file, or those built in. A table with the
+    /// absolute path of a gains file at `file` replaces values of that file.
     ///
     /// # Errors
     /// The file or a number is refused; the text names the key.
@@ -85,10 +87,25 @@ impl PidGains {
             None => Ok(Self::default()),
             Some(Value::String(path)) => Self::load(files, Some(path.as_ref())),
             Some(table) => {
-                let gains = diagnostics::read(table).and_then(|gains: Self| gains.check().map(|()| gains));
+                let whole = Self::over_file(files, table)?;
+                let gains = diagnostics::read(whole.as_ref().unwrap_or(table))
+                    .and_then(|gains: Self| gains.check().map(|()| gains));
                 gains.map_err(|error| error.within("gains"))
             }
         }
+    }
+
+    /// The gains of the file that `table` names, with the values of `table` in place of the file's; `None` if it names no file.
+    fn over_file(files: &InputFiles, table: &Value) -> Result<Option<Value>, ParameterError> {
+        let file = table.get("file").and_then(Value::as_str).map(Path::new);
+        let Some(file) = file.filter(|file| file.is_absolute()) else { return Ok(None) };
+        let gains = Self::load(files, Some(file))?;
+        let mut whole = serde_json::to_value(gains).unwrap_or_default();
+        let values = table.as_object().into_iter().flatten().filter(|(key, _)| *key != "file");
+        for (key, value) in values {
+            put_over(&mut whole[key], value);
+        }
+        Ok(Some(whole))
     }
 
     /// Returns the gains of the altitude loop.
@@ -115,6 +132,16 @@ impl PidGains {
         let tilt_rad = self.tilt_command_max_rad;
         let is_good = tilt_rad > 0.0 && tilt_rad < std::f64::consts::FRAC_PI_3;
         require("tilt_command_max_rad", tilt_rad, is_good, "above 0 and below 1.0472 (60 deg)")
+    }
+}
+
+/// Puts `over` in place of `base`; of two tables, each value of `over` in place of the one of `base`.
+fn put_over(base: &mut Value, over: &Value) {
+    match (base, over) {
+        (Value::Object(base), Value::Object(over)) => {
+            over.iter().for_each(|(key, value)| put_over(base.entry(key).or_insert(Value::Null), value));
+        }
+        (base, over) => *base = over.clone(),
     }
 }
 
@@ -191,5 +218,24 @@ mod tests {
         assert!(error.contains("rol"), "{error}");
         let error = toml::from_str::<PidGains>("[roll]\nproportional_1_s2 = 20").unwrap_err().to_string();
         assert!(error.contains("integral_1_s3"), "{error}");
+    }
+
+    #[test]
+    fn values_of_a_table_replace_those_of_the_file_that_it_names() {
+        let (files, path) = (InputFiles::default(), Path::new("/gains.toml"));
+        files.keep(path, THESIS.into());
+        let given = |table: &str| {
+            let table = format!("{{\"file\": \"/gains.toml\", {table}}}");
+            PidGains::given(&files, Some(&serde_json::from_str(&table).unwrap()))
+        };
+        let mut expected = PidGains::thesis();
+        expected.roll.derivative_1_s = 7.0;
+        assert_eq!(given("\"roll\": {\"derivative_1_s\": 7}"), Ok(expected));
+        let refused = |table: &str| given(table).unwrap_err().to_string();
+        assert!(refused("\"rol\": 1").contains("unknown key `gains.rol`"), "{}", refused("\"rol\": 1"));
+        assert!(refused("\"yaw\": 1").contains("`gains.yaw`"), "{}", refused("\"yaw\": 1"));
+        let relative = serde_json::json!({ "file": "gains.toml" });
+        let error = PidGains::given(&files, Some(&relative)).unwrap_err().to_string();
+        assert!(error.contains("unknown key `gains.file`"), "{error}");
     }
 }

@@ -10,6 +10,17 @@ const RPM: f64 = PI / 30.0;
 /// Standard gravity (CGPM 1901), by which data sheets convert g to m/s^2, and scales a gram-force to newtons.
 pub const STANDARD_GRAVITY_M_S2: f64 = 9.806_65;
 
+/// The text of `unit` behind a number: a space and the unit; empty for the unit 1.
+///
+/// ```
+/// use diagnostics::unit::behind_number;
+/// assert_eq!(format!("2{}, 3{}", behind_number("m"), behind_number("1")), "2 m, 3");
+/// ```
+#[must_use]
+pub fn behind_number(unit: &str) -> String {
+    if unit == "1" { String::new() } else { format!(" {unit}") }
+}
+
 /// A physical dimension and the units accepted for it.
 ///
 /// ```

@@ -16,7 +16,7 @@ use crate::quantity::{FRACTION, PERCENT, Quantity};
 use crate::rig::{Hold, hold, turns_about};
 use crate::spikes::usual_greatest;
 use crate::still;
-use crate::units::{HUNDREDS, Units, finding, is_gross, of_hundreds, of_unit};
+use crate::units::{HUNDREDS, Units, finding, is_gross, of_hundreds, of_unit, short};
 use diagnostics::unit::{ANGLE, ROTOR_SPEED};
 
 /// Above this correlation a logged and a derived vector are the same but for a factor.
@@ -502,8 +502,17 @@ impl Judge<'_> {
         let tolerance = 0.05 * (map.max - map.min);
         let constant =
             if low.total_cmp(&high).is_eq() { " and never change (motors that are not armed?)" } else { "" };
+        let log = self.units.commands_in_log([low, high], map);
+        let [log_low, log_high] = log.map(short);
+        let read = match self.units.unit(quantity) {
+            unit @ (FRACTION | PERCENT) => {
+                format!(" in the log ({}), read as {} to {} counts", of_unit(unit), short(low), short(high))
+            }
+            _ if log != [low, high] => format!(" in the log, read as {} to {}", short(low), short(high)),
+            _ => String::new(),
+        };
         let what = format!(
-            "its commands go from {low} to {high}{constant}, the vehicle's from {} to {} (hover {:.1})",
+            "its commands go from {log_low} to {log_high}{read}{constant}, the vehicle's from {} to {} (hover {:.1})",
             map.min,
             map.max,
             self.vehicle.hover_command()

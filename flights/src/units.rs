@@ -2,10 +2,11 @@
 
 use diagnostics::unit::ROTOR_SPEED;
 use toml::Spanned;
+use vehicles::CommandMap;
 
 use crate::declaration::{ChannelMap, EachNumber, Entry};
 use crate::finding::Finding;
-use crate::quantity::Quantity;
+use crate::quantity::{FRACTION, PERCENT, Quantity};
 
 /// ESCs of Betaflight and others log their electrical speeds in hundreds of revolutions a minute.
 pub const HUNDREDS: f64 = 100.0;
@@ -116,6 +117,25 @@ impl Units<'_> {
         declared.unwrap_or(quantity.dimension().units[0].0)
     }
 
+    /// Commands as the log has them: before scale, offset and unit. With a scale or an offset for each number, as they are in the
+    /// unit.
+    pub fn commands_in_log(&self, commands: [f64; 2], map: CommandMap) -> [f64; 2] {
+        let entry = self.declared(Quantity::Command);
+        let all = |numbers: Option<&EachNumber>, otherwise: f64| match numbers {
+            Some(EachNumber::All(number)) => *number,
+            _ => otherwise,
+        };
+        let scale = all(entry.and_then(|entry| entry.scale.as_ref()), 1.0);
+        let offset = all(entry.and_then(|entry| entry.offset.as_ref()), 0.0);
+        let is_share = [FRACTION, PERCENT].contains(&self.unit(Quantity::Command));
+        let (factor, min) = if is_share {
+            (self.factor(Quantity::Command) * (map.max - map.min), map.min)
+        } else {
+            (1.0, 0.0)
+        };
+        commands.map(|command| ((command - min) / factor - offset) / scale)
+    }
+
     /// The factor from the declared unit to SI.
     pub fn factor(&self, quantity: Quantity) -> f64 {
         quantity.dimension().factor(self.unit(quantity)).unwrap_or(1.0)
@@ -132,6 +152,20 @@ fn rounded(number: f64) -> String {
     if (0.01..1000.0).contains(&number) { format!("{number:.3}") } else { format!("{number:.2e}") }
 }
 
+/// Four digits of a number, without zeros at the end; a whole number below ten million is whole.
+pub fn short(number: f64) -> String {
+    let size = number.abs();
+    if number.fract() == 0.0 && size < 1e7 {
+        return format!("{number:.0}");
+    }
+    if !(1e-4..1e7).contains(&size) {
+        return format!("{number:.3e}");
+    }
+    let digits = usize::try_from(3 - libm::log10(size).floor() as i32).unwrap_or(0);
+    let text = format!("{number:.digits$}");
+    if digits > 0 { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
 /// The keys for hundreds of revolutions a minute.
 pub fn of_hundreds() -> String {
     format!("{} with `scale = {HUNDREDS}` (hundreds)", of_unit("rpm"))
@@ -146,4 +180,16 @@ pub fn of_unit(name: &str) -> String {
 pub fn finding(channel: Quantity, fits: Option<String>, what: &str) -> Finding {
     let advice = fits.as_ref().map_or(String::new(), |fits| format!("; {fits} would fit"));
     Finding { channel, message: format!("`{channel}`: {what}{advice}"), fits }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::short;
+
+    #[test]
+    fn numbers_have_four_digits() {
+        let texts = [28_837_366.05, 42_226_166.550_000_004, 43_988.0, 43_988.4, 76.5, 0.123_456, 1.0, 0.0];
+        let expected = ["2.884e7", "4.223e7", "43988", "43988", "76.5", "0.1235", "1", "0"];
+        assert_eq!(texts.map(short), expected);
+    }
 }

@@ -6,6 +6,7 @@ use crate::horizons::Change;
 use crate::loss::advice;
 use crate::report::{EffectReport, Estimate, Report, UNCHECKED};
 use crate::sensor_effects::SENSOR_EFFECTS;
+use diagnostics::unit::behind_number;
 use serde::Serialize;
 use std::collections::BTreeSet;
 
@@ -86,7 +87,7 @@ fn missing(name: &str, effect: &EffectReport) -> String {
 }
 
 fn value(name: &str, estimate: &Estimate) -> String {
-    let unit = if estimate.unit == "1" { String::new() } else { format!(" {}", estimate.unit) };
+    let unit = behind_number(estimate.unit);
     let [value, low, high] = [estimate.value, estimate.low, estimate.high].map(rounded);
     format!("{} {value}{unit} ({low} to {high})", name.replace('_', " "))
 }
@@ -96,8 +97,12 @@ fn certainty(name: &str, effect: &EffectReport) -> String {
         [] => String::new(),
         rivals => format!("; these flights cannot tell it from {}", rivals.join(", ")),
     };
-    let is_loose = effect.parameters.values().any(|estimate| !estimate.determined);
-    let loose = if is_loose { "; a value of it is not determined" } else { "" };
+    let loose = effect.parameters.iter().filter(|(_, estimate)| !estimate.determined);
+    let loose: Vec<String> = loose.map(|(parameter, _)| parameter.replace('_', " ")).collect();
+    let loose = match loose.as_slice() {
+        [] => String::new(),
+        loose => format!("; these flights do not determine: {}", loose.join(", ")),
+    };
     // The search draws 20,000 resamplings: none of them says less.
     let chance =
         if effect.chance < 1e-4 { "below 0.0001".to_owned() } else { format!("{:.4}", effect.chance) };
@@ -311,5 +316,14 @@ mod tests {
         let short = Brief::of(&Report { validation_blocks: 3, ..Report::of_nothing() });
         assert_eq!(short.answer, "These flights are too short to tell.");
         assert!(short.next[0].starts_with("Fly longer: "), "{:?}", short.next);
+    }
+
+    #[test]
+    fn a_value_that_is_not_determined_is_named() {
+        let mut effect = effect();
+        assert!(!super::certainty("rotor-drag", &effect).contains("determine"));
+        effect.parameters.get_mut("coefficient").unwrap().determined = false;
+        let text = super::certainty("rotor-drag", &effect);
+        assert!(text.ends_with("; these flights do not determine: coefficient."), "{text}");
     }
 }

@@ -1,5 +1,12 @@
 //! Numbers in texts for people.
 
+use diagnostics::unit::behind_number;
+
+/// Four digits and the unit.
+pub fn quantity(value: f64, unit: &str) -> String {
+    format!("{}{}", rounded(value), behind_number(unit))
+}
+
 /// Four digits.
 pub fn rounded(value: f64) -> String {
     if value == 0.0 {
@@ -12,5 +19,18 @@ pub fn rounded(value: f64) -> String {
         format!("{value:.0}")
     } else {
         format!("{value:.3e}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::quantity;
+
+    #[test]
+    fn numbers_of_ordinary_size_are_plain_and_the_unit_1_is_left_out() {
+        let texts =
+            [(2.339, "m/s"), (-0.7993, "1"), (9.0, "1"), (0.0, "m"), (43_988.4, "rpm"), (5.7e-8, "N")];
+        let texts = texts.map(|(value, unit)| quantity(value, unit));
+        assert_eq!(texts, ["2.339 m/s", "-0.7993", "9.000", "0 m", "43988 rpm", "5.700e-8 N"]);
     }
 }

@@ -1,6 +1,7 @@
 //! Judgement of a candidate: its fit beside what was accepted before, and whether that is an effect.
 
 use crate::candidate::{Candidate, free_parameters};
+use crate::digits::quantity;
 use crate::fit::Problem;
 use crate::fit_result::FitResult;
 use crate::logging;
@@ -124,7 +125,7 @@ pub fn at_bound(problem: &Problem, candidate: &Candidate, fitted: &FitResult) ->
         let half = fitted.t_quantile(0.975) * fitted.standard_error(*at).unwrap_or(f64::INFINITY);
         let is_determined = value - half > spec.min || value + half < spec.max;
         (is_stopped(problem, fitted, *at) && is_determined)
-            .then(|| format!("{} stopped at its bound {value} {}", spec.name, spec.unit()))
+            .then(|| format!("{} stopped at its bound {}", spec.name, quantity(value, spec.unit())))
     })
 }
 

@@ -2,7 +2,7 @@
 
 use crate::candidate::Candidate;
 use crate::confounded::Rival;
-use crate::digits::rounded;
+use crate::digits::quantity;
 use crate::fit::Problem;
 use crate::fit_result::FitResult;
 use crate::log_rates::LogRates;
@@ -50,8 +50,7 @@ impl std::fmt::Display for Question {
         match self {
             Self::Names { effect, rival } => write!(f, "{effect} or {rival}"),
             Self::Parameter { effect, parameter, plausible, unit } => {
-                let unit = if *unit == "1" { "" } else { unit };
-                write!(f, "{parameter} of {effect} to {} {unit}", rounded(*plausible))
+                write!(f, "{parameter} of {effect} to {}", quantity(*plausible, unit))
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::align::Offsets;
 use crate::candidate::Unidentifiable;
-use crate::digits::rounded;
+use crate::digits::{quantity, rounded};
 use crate::envelope::Reached;
 use crate::faults::Fault;
 use crate::limits::Limits;
@@ -13,6 +13,7 @@ use crate::revision::Withdrawn;
 use crate::trim::Trim;
 use crate::whiteness::Whiteness;
 use crate::worth::{Worth, in_words};
+use diagnostics::unit::behind_number;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -208,7 +209,7 @@ impl Report {
                 Some((name, _)) => (name, "at most"),
                 None => (*key, ""),
             };
-            format!("{} {word} {} {unit}", name.replace('_', " "), rounded(*value))
+            format!("{} {word} {}", name.replace('_', " "), quantity(*value, unit))
         };
         limits.map(one).collect::<Vec<_>>().join(", ")
     }
@@ -299,7 +300,7 @@ impl Report {
                     }
                     _ => "",
                 };
-                let unit = if estimate.unit == "1" { String::new() } else { format!(" {}", estimate.unit) };
+                let unit = behind_number(estimate.unit);
                 writeln!(f, "    {parameter} = {value}{unit}  (95 %: {low} ... {high}){doubt}")?;
                 if let Some(other) = estimate.by_equations.map(rounded) {
                     writeln!(
@@ -432,7 +433,7 @@ impl Report {
         for (name, after) in &self.whiteness.after {
             let before = self.whiteness.before.get(name).map_or(f64::NAN, |before| before.rms);
             let [before, new, no_model] = [before, after.rms, after.no_model].map(rounded);
-            writeln!(f, "  {name:20} {before} -> {new} ({no_model}) {}", after.unit)?;
+            writeln!(f, "  {name:20} {before} -> {new} ({no_model}){}", behind_number(after.unit))?;
         }
         Ok(())
     }

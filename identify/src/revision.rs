@@ -5,6 +5,7 @@
 //! equations, they may ask for an effect that the equations hardly show. Such a candidate is added if predictions are better with it beyond chance.
 
 use crate::candidate::{Candidate, free_parameters};
+use crate::digits::quantity;
 use crate::fit::Problem;
 use crate::fit_result::FitResult;
 use crate::foresight::Foresight;
@@ -323,9 +324,9 @@ impl Predictions {
         };
         let (effect, Worth { channel, horizon_s, without, with, unit }) =
             self.without.iter().filter_map(growth).max_by(|a, b| a.1.ratio().total_cmp(&b.1.ratio()))?;
-        let reason = format!(
-            "the error of {channel} after {horizon_s} s is {without:.3} {unit} without it, {with:.3} {unit} with it"
-        );
+        let [without, with] = [without, with].map(|error| quantity(error, unit));
+        let reason =
+            format!("the error of {channel} after {horizon_s} s is {without} without it, {with} with it");
         Some(Withdrawn { effect, reason })
     }
 
@@ -340,9 +341,10 @@ impl Predictions {
         let mut idle: Vec<(&'static str, Worth)> = self.without.iter().filter_map(gain).collect();
         idle.sort_by(|a, b| b.1.ratio().total_cmp(&a.1.ratio()));
         let withdrawn = |(effect, Worth { channel, horizon_s, without, with, unit })| {
+            let [without, with] = [without, with].map(|error| quantity(error, unit));
             let reason = format!(
-                "no prediction error falls noticeably with it; most, the error of {channel} after {horizon_s} s, is {without:.3e} {unit} \
-                 without it, {with:.3e} {unit} with it"
+                "no prediction error falls noticeably with it; most, the error of {channel} after {horizon_s} s, is {without} \
+                 without it, {with} with it"
             );
             Withdrawn { effect, reason }
         };

@@ -1,6 +1,6 @@
 //! The new vehicle file: the declared one with the effects that were accepted.
 
-use crate::digits::rounded;
+use crate::digits::{quantity, rounded};
 use crate::envelope::Reached;
 use crate::report::{Estimate, Report};
 use diagnostics::Diagnostic;
@@ -133,8 +133,8 @@ fn of_estimate(estimate: &Estimate, source: &str) -> Item {
         Estimate { at_bound: true, .. } => "at its bound: ",
         _ => "",
     };
-    let interval =
-        format!("{doubt}95 % interval {:.3e} to {:.3e} {}", estimate.low, estimate.high, estimate.unit);
+    let (low, high) = (rounded(estimate.low), quantity(estimate.high, estimate.unit));
+    let interval = format!("{doubt}95 % interval {low} to {high}");
     parameter(estimate.value, estimate.unit, source, interval.into())
 }
 

@@ -50,7 +50,7 @@ fn a_tick_with_all_effects_allocates_nothing() {
     let before = ALLOCATIONS.get();
     for _ in 0..1000 {
         let actuation = model.airframe().begin_tick(&mut effects, &state, &[hover; 4], TICK_S);
-        model.advance(&mut state, &actuation, TICK_S);
+        model.advance(&mut state, actuation, TICK_S);
     }
     assert_eq!(ALLOCATIONS.get() - before, 0);
 }

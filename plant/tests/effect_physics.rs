@@ -40,7 +40,7 @@ impl Flight {
         for _ in 0..ticks {
             let actuation =
                 self.model.airframe().begin_tick(&mut self.effects, &self.state, &[command; 4], TICK_S);
-            self.model.advance(&mut self.state, &actuation, TICK_S);
+            self.model.advance(&mut self.state, actuation, TICK_S);
         }
     }
 
@@ -48,7 +48,7 @@ impl Flight {
     fn accelerations(&mut self) -> Accelerations {
         let hover = hummingbird().hover_command();
         let actuation = self.model.airframe().begin_tick(&mut self.effects, &self.state, &[hover; 4], TICK_S);
-        self.model.accelerations_under(&actuation, &self.state)
+        self.model.accelerations_under(actuation, &self.state)
     }
 }
 

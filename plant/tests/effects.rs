@@ -129,7 +129,7 @@ impl Flight {
 
     fn tick(&mut self, commands: &[f64]) {
         let actuation = self.model.airframe().begin_tick(&mut self.effects, &self.state, commands, TICK_S);
-        self.model.advance(&mut self.state, &actuation, TICK_S);
+        self.model.advance(&mut self.state, actuation, TICK_S);
     }
 
     /// Commands that swing about hover, each with a rhythm of its own.

@@ -3,6 +3,7 @@
 
 use anyhow::{Result, bail};
 use bus::plan::Plan;
+use diagnostics::unit::behind_number;
 use recorder::RecordingError;
 use recorder::node::SHADOW_PREFIX;
 use recorder::reader::Recording;
@@ -21,7 +22,7 @@ use std::fmt;
 /// let (from_tick, samples) = (0, 100);
 /// let difference =
 ///     Difference { topic, field, unit, from_tick, samples, mean, rms, max, max_tick, primary_deviation };
-/// assert!(difference.to_string().contains("rms 1.0000 1, mean -0.5000, max 3.0000 at tick 17"));
+/// assert!(difference.to_string().contains("rms 1.0000, mean -0.5000, max 3.0000 at tick 17"));
 /// ```
 #[derive(Clone, Debug, Serialize)]
 pub struct Difference {
@@ -92,7 +93,7 @@ impl Replacement {
 /// use report::shadow::Step;
 /// let [topic, field, unit] = ["/pid/command", "command[0]", "1"].map(str::to_owned);
 /// let step = Step { topic, field, unit, step: 0.25, step_before: 0.125, law_difference: None };
-/// let text = "    /pid/command command[0]: step 0.2500 1 at the take-over, 0.1250 one sample earlier";
+/// let text = "    /pid/command command[0]: step 0.2500 at the take-over, 0.1250 one sample earlier";
 /// assert_eq!(step.to_string(), text);
 /// ```
 #[derive(Clone, Debug, Serialize)]
@@ -190,7 +191,22 @@ pub fn report(recording: &Recording) -> Result<String> {
             "{path} has no shadow: its run had no [[shadow]], [[swap]] or standby, or did not record their topics"
         );
     }
-    Ok(differences.iter().map(|difference| format!("{difference}\n")).collect())
+    Ok(lines(&differences))
+}
+
+/// A line for each difference, and one line for all fields that are equal.
+pub(crate) fn lines(differences: &[Difference]) -> String {
+    let (equal, unequal): (Vec<_>, Vec<_>) = differences.iter().partition(|difference| difference.max == 0.0);
+    let mut text: String = unequal.iter().map(|difference| format!("{difference}\n")).collect();
+    if !equal.is_empty() {
+        let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+        equal.iter().for_each(|difference| *counts.entry(&difference.topic).or_default() += 1);
+        let topics: Vec<String> = counts.iter().map(|(topic, count)| format!("{topic} {count}")).collect();
+        let fields =
+            if equal.len() == 1 { "1 field is".to_owned() } else { format!("{} fields are", equal.len()) };
+        text += &format!("  shadow − primary: {fields} equal in every sample: {}\n", topics.join(", "));
+    }
+    text
 }
 
 /// The difference of two series of the same topic, field and unit, given by their ticks.
@@ -282,10 +298,10 @@ fn values(recording: &Recording, topics: &[&str]) -> Result<Values> {
 impl fmt::Display for Difference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { topic, field, unit, mean, rms, max, max_tick, primary_deviation, .. } = self;
-        let (samples, from_tick) = (self.samples, self.from_tick);
+        let (samples, from_tick, unit) = (self.samples, self.from_tick, behind_number(unit));
         write!(
             f,
-            "  {topic} {field}: shadow − primary: rms {rms:.4} {unit}, mean {mean:+.4}, max {max:.4} at tick {max_tick} \
+            "  {topic} {field}: shadow − primary: rms {rms:.4}{unit}, mean {mean:+.4}, max {max:.4} at tick {max_tick} \
              ({samples} samples from tick {from_tick} on; standard deviation of the primary {primary_deviation:.4})"
         )
     }
@@ -294,16 +310,11 @@ impl fmt::Display for Difference {
 impl fmt::Display for Step {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { topic, field, unit, step, step_before, .. } = self;
+        let unit = behind_number(unit);
         write!(
             f,
-            "    {topic} {field}: step {step:.4} {unit} at the take-over, {step_before:.4} one sample earlier"
-        )?;
-        match self.law_difference {
-            Some(difference) => {
-                write!(f, "; the output of the new controller differs by {difference:.4} at that tick")
-            }
-            None => Ok(()),
-        }
+            "    {topic} {field}: step {step:.4}{unit} at the take-over, {step_before:.4} one sample earlier"
+        )
     }
 }
 
@@ -335,13 +346,44 @@ impl fmt::Display for Replacement {
             let lines: Vec<&str> = reason.lines().map(str::trim).take(3).collect();
             write!(f, ": REFUSED: {}", lines.join("; "))?;
         }
-        self.steps.iter().try_for_each(|step| write!(f, "\n{step}"))
+        self.steps.iter().try_for_each(|step| {
+            write!(f, "\n{step}")?;
+            step.law_difference.map_or(Ok(()), |difference| {
+                let name = &report.process;
+                write!(f, "; the output of the new `{name}` differs by {difference:.4} in that sample")
+            })
+        })
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Series, by_shadow, difference};
+    use super::{Replacement, Series, Step, by_shadow, difference, lines};
+    use runtime::launcher::{Purpose, Report};
+
+    #[test]
+    fn the_summary_of_a_swap_names_the_process() {
+        let report = Report {
+            process: "plant".to_owned(),
+            generation: 1,
+            purpose: Purpose::Swap,
+            is_planned: true,
+            request: None,
+            join_tick: Some(41),
+            take_over_tick: Some(50),
+            hand_over: Some("state"),
+            start_ms: 12.0,
+            hold_ms: 0.4,
+            refused: None,
+            inputs: Vec::new(),
+        };
+        let [topic, field, unit] = ["/plant/state", "position.z", "m"].map(str::to_owned);
+        let step = Step { topic, field, unit, step: 0.25, step_before: 0.125, law_difference: Some(0.5) };
+        let text = Replacement { report, steps: vec![step] }.to_string();
+        let end = "step 0.2500 m at the take-over, 0.1250 one sample earlier; \
+                   the output of the new `plant` differs by 0.5000 in that sample";
+        assert!(text.ends_with(end), "{text}");
+    }
 
     #[test]
     fn each_shadow_is_held_against_the_primary_of_its_own_time() {
@@ -358,5 +400,22 @@ mod tests {
             .collect();
         assert_eq!(told, [(0, 5, 100.0), (7, 3, 1.0)]);
         assert_eq!(by_shadow(&shadow, &[]), [shadow]);
+    }
+
+    #[test]
+    fn fields_that_are_equal_share_a_line() {
+        let primary: Series = (0..4).map(|tick| (tick, f64::from(tick))).collect();
+        let other: Series = (0..4).map(|tick| (tick, f64::from(tick) + 0.5)).collect();
+        let of = |topic, field, shadow| difference([topic, field, "m"], shadow, &primary).unwrap();
+        let mut all =
+            vec![of("/plant/state", "position.z", &other), of("/plant/state", "position.x", &primary)];
+        let text = lines(&all);
+        assert!(text.starts_with("  /plant/state position.z: shadow − primary: rms 0.5000 m, "), "{text}");
+        let end = "\n  shadow − primary: 1 field is equal in every sample: /plant/state 1\n";
+        assert!(text.ends_with(end) && text.lines().count() == 2, "{text}");
+        all.push(of("/plant/pose", "position.x", &primary));
+        let text = lines(&all);
+        let end = "2 fields are equal in every sample: /plant/pose 1, /plant/state 1\n";
+        assert!(text.ends_with(end) && text.lines().count() == 2, "{text}");
     }
 }

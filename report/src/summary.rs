@@ -264,7 +264,7 @@ impl fmt::Display for Summary {
         }
         self.computing_times.iter().try_for_each(|overruns| writeln!(f, "{overruns}"))?;
         self.write_replacements(f)?;
-        self.shadows.iter().try_for_each(|difference| writeln!(f, "{difference}"))?;
+        f.write_str(&shadow::lines(&self.shadows))?;
         self.compare.iter().try_for_each(|errors| writeln!(f, "{errors}"))?;
         self.pass.iter().chain(&self.measures).try_for_each(|verdict| writeln!(f, "{verdict}"))?;
         self.beyond.iter().try_for_each(|beyond| writeln!(f, "{beyond}"))?;

@@ -215,6 +215,11 @@ impl Manifest {
         if is_set { [span.clone(), span.clone()] } else { self.sources.inside(span, path) }
     }
 
+    /// Places of the key and the value at the dotted `key` of the differences of a live swap; `None` if they do not state it.
+    pub(crate) fn in_argument(&self, key: &str) -> Option<[Range<usize>; 2]> {
+        self.sources.in_argument(key)
+    }
+
     /// Refuses `value` where it is stated and does not fit.
     pub(crate) fn require<T>(
         &self,
@@ -322,7 +327,8 @@ impl Manifest {
     }
 
     /// This manifest with one more `[[swap]]`-like backup of `process`, whose differences are the TOML
-    /// `with_text`: the manifest that its places refer to, and the whole process.
+    /// `with_text`: the manifest that its places refer to, the process's name, and the whole
+    /// backup.
     ///
     /// # Errors
     /// A [`Diagnostic`] that names the place in the manifest or in `with_text`.
@@ -330,20 +336,22 @@ impl Manifest {
         &self,
         process: &str,
         with_text: &str,
-    ) -> Result<(Self, Spanned<Process>), Diagnostic> {
+    ) -> Result<(Self, Spanned<String>, Spanned<Process>), Diagnostic> {
         let mut sources = self.sources.clone();
+        sources.add(Origin::Process, process.to_owned());
+        let name = Spanned::new(sources.last_span(), process.to_owned());
         sources.add(Origin::Argument("--with"), with_text.to_owned());
         let tree = whole_tree(&sources)?;
         let with = sources.last_table()?;
         let span = sources.last_span();
         finite::require(&with, "", &sources)?;
-        let whole = replacement::whole(&sources, &tree, &Spanned::new(span.clone(), process.into()), with)?;
+        let whole = replacement::whole(&sources, &tree, &name, with)?;
         let whole = Spanned::new(span.clone(), DeValue::Table(whole));
         let whole = read_tree::<Process>(&whole).map_err(|misread| sources.refused(misread))?;
         let content = content(&sources, tree)?;
         let (path, recorded_text) = (self.path.clone(), self.recorded_text.clone());
         let file_edits = self.file_edits.clone();
-        Ok((Self { path, recorded_text, content, sources, file_edits }, Spanned::new(span, whole)))
+        Ok((Self { path, recorded_text, content, sources, file_edits }, name, Spanned::new(span, whole)))
     }
 }
 

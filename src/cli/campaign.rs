@@ -261,8 +261,7 @@ fn judge(opened: &Opened, report: &Report, has_page: bool) -> Result<bool> {
         );
     };
     if let Some(required) = require.filter(|_| !is_met) {
-        let shown = required.shown(report.passed, report.flights);
-        say(&format!("not met: {required}; these flights show {shown:.4}"));
+        say(&format!("not met: {required}; {}", required.shown_in_words(report.passed, report.flights)));
     }
     Ok(is_met)
 }

@@ -18,7 +18,7 @@ pub struct CatArguments {
     /// Only this topic.
     #[arg(long)]
     topic: Option<String>,
-    /// Only this field, such as position.z, or all fields below it, such as position; repeatable.
+    /// Only this field, such as position.z, or all fields below it, such as position; repeatable. Needs --topic.
     #[arg(long, value_name = "FIELD", requires = "topic")]
     field: Vec<String>,
     /// Start of the span, in seconds of simulated time.
@@ -27,7 +27,7 @@ pub struct CatArguments {
     /// End of the span, which belongs to it.
     #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value_t = f64::INFINITY, hide_default_value = true)]
     to: f64,
-    /// Print CSV with a column for each field.
+    /// Print CSV with a column for each field. Needs --topic.
     #[arg(long, requires = "topic")]
     csv: bool,
 }

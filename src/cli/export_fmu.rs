@@ -97,10 +97,37 @@ fn library() -> Result<Vec<u8>> {
     let Some(path) = places.iter().find(|path| path.is_file()) else {
         let places: Vec<_> = places.iter().map(|path| path.display().to_string()).collect();
         bail!(
-            "the library that goes into an FMU is not there: neither {}; `cargo build --release -p hummingbus-fmu-export` \
-             in the sources of hummingbus builds it beside the program",
-            places.join(" nor ")
+            "the library that goes into an FMU is not there: neither {}; build it{}",
+            places.join(" nor "),
+            how_to_build(folder)
         );
     };
     std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))
+}
+
+/// The command that builds the library beside the program in `folder`: a folder of cargo in the sources, or another one.
+fn how_to_build(folder: &Path) -> String {
+    let profile = if folder.ends_with("debug") { "" } else { " --release" };
+    let command = format!("cargo build{profile} --locked -p hummingbus -p hummingbus-fmu-export");
+    match folder.ancestors().nth(2).filter(|sources| sources.join("bindings/fmu-export").is_dir()) {
+        Some(sources) => format!(": cd {} && {command}", sources.display()),
+        None => format!(" in the sources of hummingbus, and copy it there: {command}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::how_to_build;
+    use std::path::Path;
+
+    #[test]
+    fn the_command_that_builds_the_library_is_whole() {
+        let sources = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let command = "cargo build --release --locked -p hummingbus -p hummingbus-fmu-export";
+        let of_release = format!(": cd {} && {command}", sources.display());
+        assert_eq!(how_to_build(&sources.join("target/release")), of_release);
+        let of_debug = of_release.replace(" --release", "");
+        assert_eq!(how_to_build(&sources.join("target/debug")), of_debug);
+        assert!(how_to_build(Path::new("/usr/bin")).ends_with(command));
+    }
 }

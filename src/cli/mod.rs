@@ -89,7 +89,7 @@ commands! {
     #[command(after_help = diff::HELP)]
     Diff(diff::DiffArguments) => diff::diff;
     /// Print a recording's messages, one JSON object a line.
-    #[command(after_help = "Example: hummingbus cat hover.mcap --topic /plant/state | head")]
+    #[command(after_help = "Examples: hummingbus cat hover.mcap --topic /plant/state | head\n          hummingbus cat hover.mcap --topic /plant/state --field position.z --csv")]
     Cat(cat::CatArguments) => cat::cat;
     /// Write a recording's messages as tables, a file for each topic: Parquet or CSV.
     #[command(after_help = export::HELP)]

@@ -195,9 +195,9 @@ fn as_json(drawing: &Drawing, files: &[(Format, PathBuf)]) -> Value {
 }
 
 fn as_text(drawing: &Drawing, files: &[(Format, PathBuf)]) -> String {
-    let files = files.iter().map(|(format, path)| match format {
-        Format::Html => format!("page: {}", path.display()),
-        Format::Png | Format::Svg => format!("picture: {}", path.display()),
+    let files = files.iter().map(|(format, path)| {
+        let name = if *format == Format::Html { "page" } else { "picture" };
+        format!("{}\n{name}: {}", drawing.amounts(*format), path.display())
     });
-    std::iter::once(drawing.to_string()).chain(files).collect::<Vec<_>>().join("\n")
+    files.collect::<Vec<_>>().join("\n")
 }

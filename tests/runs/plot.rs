@@ -277,3 +277,23 @@ fn a_recording_that_was_cut_off_is_plotted_as_far_as_it_goes() {
     place.call(&["plot", &cut, "--json"]).with_code(1).says(&["was cut off"]);
     assert!(Path::new(&place.path("cut.html")).exists());
 }
+
+#[test]
+fn the_amounts_are_those_of_each_file() {
+    let place = Place::new();
+    let recording = laps(&place, &["h1", "h2"]);
+    let plotted = |more: &[&str]| place.call(&[&["plot", &recording], more].concat()).with_code(0).output;
+    let page = plotted(&[]);
+    assert!(
+        page.starts_with("axes: 10 with ") && page.contains("paths: 4; objects in the scene: 4"),
+        "{page}"
+    );
+    // A picture shows the first vehicle over time.
+    let picture = plotted(&["--svg", &place.path("a.svg")]);
+    assert!(picture.starts_with("axes: 5 with ") && !picture.contains("paths"), "{picture}");
+    let paths = plotted(&["--figure", "top", "--svg", &place.path("b.svg")]);
+    assert!(
+        paths.starts_with("paths: 4; objects in the scene: 4; from ") && !paths.contains("axes"),
+        "{paths}"
+    );
+}

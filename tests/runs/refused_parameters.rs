@@ -23,11 +23,14 @@ fn set_points_that_cannot_be_flown() {
 #[test]
 fn a_file_and_a_parameter_that_say_the_same() {
     let gains = repository("controllers/gains/pid.toml");
-    let ended = refused(
-        "kind = \"pid\"",
-        &format!("kind = \"pid\"\ngains = §\"{gains}\"\nparameters.gains.roll = 1"),
-    );
+    let with = |parameter: &str| {
+        refused("kind = \"pid\"", &format!("kind = \"pid\"\ngains = \"{gains}\"\n{parameter}"))
+    };
+    let ended = with("parameters.§gains = \"pid.toml\"");
     ended.says(&["`controller` has `gains` twice", "leave one of them out"]);
+    // A table replaces values of the file, and is read as such.
+    with("parameters.gains.§rol = 1").says(&["unknown key `gains.rol`", "did you mean `roll`?"]);
+    with("parameters.gains.roll = §1").says(&["`gains.roll`"]);
 }
 
 #[test]

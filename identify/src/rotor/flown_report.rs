@@ -7,6 +7,7 @@ use super::dynamics::Order;
 use super::flown::{Figure, Flown, FlownCoefficient, FlownCoefficients, FlownMotor, HeldOut, LagFigures};
 use crate::digits::rounded;
 use crate::statistics::Estimate;
+use diagnostics::unit::behind_number;
 
 /// Writes what flights show.
 pub fn write(f: &mut fmt::Formatter<'_>, flown: &Flown) -> fmt::Result {
@@ -100,9 +101,10 @@ fn write_figure(f: &mut fmt::Formatter<'_>, name: &str, figure: &Figure) -> fmt:
 
 fn text(figure: &Figure) -> String {
     match (&figure.not_determined, &figure.estimate) {
-        (None, Some(estimate)) => format!("{} {}", interval(estimate), figure.unit),
+        (None, Some(estimate)) => format!("{}{}", interval(estimate), behind_number(figure.unit)),
         (reason, estimate) => {
-            let at = estimate.map(|estimate| format!(" ({} {})", interval(&estimate), figure.unit));
+            let at =
+                estimate.map(|estimate| format!(" ({}{})", interval(&estimate), behind_number(figure.unit)));
             format!("not determined: {}{}", reason.as_deref().unwrap_or("no data"), at.unwrap_or_default())
         }
     }
@@ -120,7 +122,13 @@ pub fn write_agreement(f: &mut fmt::Formatter<'_>, all: &[Agreement]) -> fmt::Re
     writeln!(f, "stand and flights")?;
     for Agreement { name, unit, stand, flights, agrees } in all {
         let verdict = if *agrees { "agree" } else { "differ beyond their intervals" };
-        writeln!(f, "  {name}: {} and {} {unit}: they {verdict}", interval(stand), interval(flights))?;
+        writeln!(
+            f,
+            "  {name}: {} and {}{}: they {verdict}",
+            interval(stand),
+            interval(flights),
+            behind_number(unit)
+        )?;
     }
     Ok(())
 }

@@ -2,13 +2,12 @@
 
 use super::figure::{Across, Panel, Trail};
 use super::outline::Outline;
-use super::request::View;
+use super::request::{Format, View};
 use super::scene::Solid;
 use serde::Serialize;
 use serde_json::{Value, json};
-use std::fmt;
 
-/// Content of a file with a drawing; its text states the amounts.
+/// Content of a file with a drawing.
 #[derive(Debug, Serialize)]
 pub struct Drawing {
     #[serde(skip)]
@@ -31,6 +30,47 @@ impl Drawing {
         json!(self)
     }
 
+    /// The amounts of what a file of this `format` shows, and the span of time.
+    ///
+    /// ```
+    /// use report::plot::{Drawing, Format, Request};
+    /// # use bus::{Message, announcement::Announcement, messages::PlantState};
+    /// # let folder = tempfile::tempdir()?;
+    /// # let path = folder.path().join("fall.mcap");
+    /// # let mut writer = recorder::writer::RecordingWriter::create(&path)?;
+    /// # let channel = writer.add_channel("/plant/state", &Announcement::of(PlantState::SCHEMA))?;
+    /// # for tick in 0..100_u32 {
+    /// #     let cdr = [&[0, 1, 0, 0], bytemuck::bytes_of(&PlantState::default())].concat();
+    /// #     writer.write(channel, tick, u64::from(tick) * 10_000_000, &cdr)?;
+    /// #     writer.end_tick()?;
+    /// # }
+    /// # writer.finish()?;
+    /// let recording = recorder::reader::Recording::open(&path)?;
+    /// let plots = vec!["/plant/state:position.z".to_owned()];
+    /// let drawing = Drawing::of(&recording, &Request { plots, ..Request::default() }, &mut |_| ())?;
+    /// assert_eq!(drawing.amounts(Format::Png), "axes: 1 with 1 curves; from 0.000 s to 0.990 s");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn amounts(&self, format: Format) -> String {
+        let views = self.views_or(format.usual_views());
+        let mut parts = Vec::new();
+        if views.contains(&View::Time) {
+            // A picture has room for the first vehicle.
+            let room = if format == Format::Html { self.panels.len() } else { 1 };
+            let axes = self.panels.iter().take(room).flat_map(|panel| &panel.axes);
+            let curves: usize = axes.clone().map(|axes| axes.curves.len()).sum();
+            parts.push(format!("axes: {} with {curves} curves", axes.count()));
+        }
+        if views.iter().any(|view| *view != View::Time) {
+            let (paths, things) = (self.trails.len(), self.solids.len());
+            parts.push(format!("paths: {paths}; objects in the scene: {things}"));
+        }
+        let [from_s, to_s] = self.span_s;
+        parts.push(format!("from {from_s:.3} s to {to_s:.3} s"));
+        parts.join("; ")
+    }
+
     /// The requested views, or else those of `usual` that have content.
     pub(super) fn views_or(&self, usual: &[View]) -> Vec<View> {
         let has_some =
@@ -40,16 +80,5 @@ impl Drawing {
         } else {
             self.views.clone()
         }
-    }
-}
-
-impl fmt::Display for Drawing {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let axes = self.panels.iter().flat_map(|panel| &panel.axes);
-        let curves: usize = axes.clone().map(|axes| axes.curves.len()).sum();
-        let (axes, paths, things, [from_s, to_s]) =
-            (axes.count(), self.trails.len(), self.solids.len(), self.span_s);
-        write!(f, "axes: {axes} with {curves} curves; paths: {paths}; objects in the scene: {things}; ")?;
-        write!(f, "from {from_s:.3} s to {to_s:.3} s")
     }
 }

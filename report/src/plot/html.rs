@@ -6,7 +6,7 @@ use crate::page::PLOTLY_3D;
 use crate::plot::drawing::Drawing;
 use crate::plot::figure::{Axes, Curve, Trail};
 use crate::plot::outline::Outline;
-use crate::plot::request::View;
+use crate::plot::request::{Format, View};
 use crate::plot::scene::Solid;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -18,7 +18,7 @@ pub fn page(drawing: &Drawing) -> Vec<u8> {
 
 /// Data for the page's script: the drawing with its points.
 fn data(drawing: &Drawing) -> Value {
-    let views = drawing.views_or(&[View::Time, View::Path, View::Top, View::Side]);
+    let views = drawing.views_or(Format::Html.usual_views());
     let panels = drawing.panels.iter().filter(|_| views.contains(&View::Time));
     json!({
         "title": drawing.title,

@@ -31,24 +31,11 @@ use crate::attached::Attached;
 use anyhow::{Result, bail};
 use choice::Choice;
 use recorder::reader::Recording;
-use serde::Serialize;
 
 pub use drawing::Drawing;
 pub use picture::{PNG_MARK, SVG_MARK};
-pub use request::{Request, Span, View};
+pub use request::{Format, Request, Span, View};
 pub use scene::{Solid, bodies_of, scene_of};
-
-/// A kind of file that shows a drawing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Format {
-    /// A page that needs no network.
-    Html,
-    /// A picture of dots.
-    Png,
-    /// A picture of lines.
-    Svg,
-}
 
 impl Drawing {
     /// Reads from `recording` what `request` asks for; `read` hears how many messages are read, now and then.

@@ -7,7 +7,7 @@
 use crate::plot::drawing::Drawing;
 use crate::plot::figure::{Across, Axes, Panel, in_layers};
 use crate::plot::ink::{Area, Flat, LEGEND_ROW, Look, WIDTH, at, draw_legend, draw_line, letters, px};
-use crate::plot::request::View;
+use crate::plot::request::{Format, View};
 use crate::plot::{space, thin};
 use anyhow::{Context, Result, bail};
 use plotters::prelude::*;
@@ -39,7 +39,7 @@ const PNG_HEAD_BYTES: usize = 8 + 25;
 /// # Errors
 /// If there is nothing to draw.
 pub fn svg(drawing: &Drawing) -> Result<String> {
-    let views = drawing.views_or(&[View::Time]);
+    let views = drawing.views_or(Format::Svg.usual_views());
     // Of several vehicles only the first has room.
     let panel = drawing.panels.first().filter(|_| views.contains(&View::Time));
     let axes = panel.map_or(&[][..], |panel| &panel.axes);

@@ -58,3 +58,25 @@ impl Span {
         time_s >= self.from_s - 5e-10 && self.to_s.is_none_or(|to_s| time_s <= to_s + 5e-10)
     }
 }
+
+/// A kind of file that shows a drawing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Format {
+    /// A page that needs no network.
+    Html,
+    /// A picture of dots.
+    Png,
+    /// A picture of lines.
+    Svg,
+}
+
+impl Format {
+    /// The views that a file shows if none is requested.
+    pub(super) fn usual_views(self) -> &'static [View] {
+        match self {
+            Self::Html => &[View::Time, View::Path, View::Top, View::Side],
+            Self::Png | Self::Svg => &[View::Time],
+        }
+    }
+}

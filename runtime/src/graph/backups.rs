@@ -78,10 +78,10 @@ pub fn backup_of(
     process: &str,
     with_text: &str,
 ) -> Result<BackupSpec, Diagnostic> {
-    let (manifest, whole) = manifest.succeed(process, with_text)?;
+    let (manifest, name, whole) = manifest.succeed(process, with_text)?;
     let declared_nodes = declared_nodes(&manifest, files)?;
     let run = Run { manifest: &manifest, plan, declared_nodes: &declared_nodes };
-    let node = run.node(&Spanned::new(whole.span(), process.to_owned()))?;
+    let node = run.node(&name)?;
     run.resolve(node, whole.get_ref(), &whole.span(), &mut Notes::default())
 }
 

@@ -15,6 +15,9 @@ use std::path::PathBuf;
 use toml::Spanned;
 use vehicles::Vehicle;
 
+/// Key of the gains file's path in the parameter `gains`, whose other values replace those of the file.
+const FILE: &str = "file";
+
 /// Notes taken while a manifest becomes a plan.
 #[derive(Debug, Default)]
 pub struct Notes {
@@ -82,11 +85,9 @@ pub fn of(
             edited.push((key, original, path.clone()));
         }
         let path = path.to_string_lossy().into_owned();
-        if parameters.insert(key, path.as_str().into()).is_some() {
-            let message = format!("`{}` has `{key}` twice: as a file, and in its parameters", name.get_ref());
-            let help =
-                "leave one of them out; a swap that changes gains names another gains file: gains = \"PATH\"";
-            return Err(manifest.problem(&file.span(), message, help));
+        if let Some(stated) = parameters.insert(key, path.as_str().into()) {
+            let over_file = over_file(declared, key, &path, stated).ok_or_else(|| has_two(declared, key))?;
+            parameters.insert(key, over_file);
         }
         let named = named_files(&read, key, path.into());
         if program.component().is_none() {
@@ -135,6 +136,31 @@ pub fn of(
     Ok((parameters, read.used()))
 }
 
+/// The parameter `gains` of a built-in controller that names the gains file at `path` and has the table `stated` in its parameters:
+/// the values of the table replace those of the file. `None` if the two exclude each other.
+fn over_file(
+    declared: &DeclaredNode<'_>,
+    key: &str,
+    path: &str,
+    stated: serde_json::Value,
+) -> Option<serde_json::Value> {
+    declared.program.component()?;
+    let serde_json::Value::Object(mut table) = stated else { return None };
+    if key != "gains" || table.contains_key(FILE) {
+        return None;
+    }
+    table.insert(FILE.to_owned(), path.into());
+    Some(table.into())
+}
+
+/// A file and a parameter at the same `key` of `declared`, of which only one can be used.
+fn has_two(declared: &DeclaredNode<'_>, key: &str) -> Diagnostic {
+    let name = declared.name.get_ref();
+    let message = format!("`{name}` has `{key}` twice: as a file, and in its parameters");
+    let help = format!("leave one of them out; to change values, name another file: {key} = \"PATH\"");
+    declared.manifest.problem(&place(declared, key), message, help)
+}
+
 /// The file at `path`, the value of `key`, with the files that it names itself.
 fn named_files(files: &InputFiles, key: &str, path: PathBuf) -> Vec<PathBuf> {
     let others = match key {
@@ -177,17 +203,37 @@ fn require_none(manifest: &Manifest, process: &Process) -> Result<(), Diagnostic
 /// A refused parameter, at its place.
 fn refused(declared: &DeclaredNode<'_>, error: &ParameterError) -> Diagnostic {
     let (name, key) = (declared.name.get_ref(), error.key());
+    let file = files(declared.process).into_iter().find(|(file, _)| *file == key);
+    let has_two = file.is_some_and(|(_, file)| file.is_some())
+        && declared.process.parameters.keys().any(|parameter| parameter.get_ref() == key);
     let help = match error {
-        ParameterError::Missing { .. } if files(declared.process).iter().any(|(file, _)| *file == key) => {
+        ParameterError::Missing { .. } if is_backup(declared) => {
+            let value =
+                if file.is_some() { format!("{key} = \"PATH\"") } else { format!("parameters.{key} = …") };
+            format!(
+                "add {value} to the keys of the backup: one of another kind keeps no parameters, and of the files `vehicle` and `scene`"
+            )
+        }
+        ParameterError::Missing { .. } if file.is_some() => {
             format!("add {key} = \"PATH\" to [process.{name}]")
         }
         ParameterError::Missing { .. } => format!("add {key} = … to [process.{name}.parameters]"),
+        ParameterError::Value { .. } if has_two => {
+            format!(
+                "change the values in a copy of the {key} file, and write {key} = \"COPY\" in place of parameters.{key}"
+            )
+        }
         _ => error.meant().map_or(String::new(), |near| format!("did you mean `{near}`?")),
     };
     let is_unknown = matches!(error, ParameterError::Unknown { .. });
     let at = place_within(declared, key, is_unknown);
     let error = error.clone().of(format!("process `{name}`"));
     declared.manifest.problem(&at, error, help)
+}
+
+/// True for a backup: its keys are those of a process with those of its `with` or `standby`.
+fn is_backup(declared: &DeclaredNode<'_>) -> bool {
+    declared.manifest.content.process.keys().all(|process| process.span() != declared.name.span())
 }
 
 fn problem(declared: &DeclaredNode<'_>, at: &Range<usize>, message: &str, help: String) -> Diagnostic {
@@ -198,6 +244,11 @@ fn problem(declared: &DeclaredNode<'_>, at: &Range<usize>, message: &str, help: 
 /// list or a table.
 fn place_within(declared: &DeclaredNode<'_>, key: &str, is_unknown: bool) -> Range<usize> {
     let at = place(declared, key);
+    // A table of the manifest may have been merged with one of a live swap: the value is told where it is written.
+    let [of_key, of_value] = declared.manifest.in_argument(&format!("parameters.{key}")).unwrap_or_default();
+    if of_key != of_value {
+        return if is_unknown { of_key } else { of_value };
+    }
     let path: Vec<&str> = key.split('.').skip(1).collect();
     let is_parameter = declared.process.parameters.keys().any(|parameter| parameter.span() == at);
     if path.is_empty() || !is_parameter {

@@ -10,6 +10,9 @@ use toml::de::{DeTable, DeValue};
 /// Keys that a backup has in common with the process it succeeds.
 const FIXED: [&str; 5] = ["lockstep", "on_exit", "outputs", "period_ticks", "standby"];
 
+/// Files that describe what is flown and where, not how a kind works: a backup of another kind keeps those that it reads.
+const MODELS: [&str; 2] = ["vehicle", "scene"];
+
 /// Makes every `with` of `[[swap]]` and `[[shadow]]`, and every `standby`, a whole process.
 ///
 /// # Errors
@@ -104,5 +107,13 @@ fn differing<'s>(
     whole.remove("on_exit");
     whole.remove("standby");
     tree::replace_keys(&mut whole, with);
+    let kind = tree::string(&whole, "kind").and_then(|kind| sources.registry.find(kind));
+    for model in MODELS {
+        // A change of the kind has removed it: the new kind reads the same model, if it reads one.
+        let is_read = kind.is_some_and(|kind| kind.parameters().contains(&model));
+        if let Some((key, value)) = process.get_key_value(model).filter(|_| is_read) {
+            whole.entry(key.clone()).or_insert_with(|| value.clone());
+        }
+    }
     Ok(whole)
 }

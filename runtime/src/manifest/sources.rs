@@ -17,6 +17,8 @@ pub enum Origin {
     Override,
     /// The value of another argument.
     Argument(&'static str),
+    /// The name of a process of a live run, as a command gives it.
+    Process,
 }
 
 /// A text and where it begins among all.
@@ -32,7 +34,7 @@ impl Source {
     fn path(&self) -> Option<&Path> {
         match &self.origin {
             Origin::File(path) => Some(path),
-            Origin::Override | Origin::Argument(_) => None,
+            Origin::Override | Origin::Argument(_) | Origin::Process => None,
         }
     }
 }
@@ -122,7 +124,11 @@ impl Sources {
         let span = span.start - source.base..span.end.max(span.start) - source.base;
         let file = match &source.origin {
             Origin::File(path) => path.display().to_string(),
-            Origin::Argument(name) => (*name).to_owned(),
+            Origin::Argument(name) if !source.text.is_empty() => (*name).to_owned(),
+            // The manifest has the process; no text has the fault.
+            Origin::Argument(_) | Origin::Process => {
+                return Diagnostic::in_file(self.file().display().to_string(), error).help(help);
+            }
             Origin::Override => {
                 let error: ParameterError = error.into();
                 if let Some(place) = self.set_place(&source.text) {
@@ -160,6 +166,20 @@ impl Sources {
         let root = table.map(|table| Spanned::new(span.clone(), DeValue::Table(table)));
         let found = root.as_ref().and_then(|root| tree::find(root.get_ref(), span));
         found.map_or([span.clone(), span.clone()], |value| tree::deepest(span, value, path))
+    }
+
+    /// Places of the key and the value at the dotted `key` in the argument that was added last; `None` if it does not state them.
+    pub fn in_argument(&self, key: &str) -> Option<[Range<usize>; 2]> {
+        let source = self.all.iter().rfind(|source| matches!(source.origin, Origin::Argument(_)))?;
+        let mut inside = DeValue::Table(tree::parse(&source.text, source.base).ok()?);
+        let mut places = None;
+        for name in key.split('.') {
+            let DeValue::Table(mut table) = inside else { return None };
+            let (key, value) = table.remove_entry(name)?;
+            places = Some([key.span(), value.span()]);
+            inside = value.into_inner();
+        }
+        places
     }
 
     /// Diagnostic for a value that could not be read, at its place.

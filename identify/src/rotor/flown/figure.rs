@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::digits::rounded;
+use crate::digits::{quantity, rounded};
 use crate::statistics::Estimate;
 
 /// A figure.
@@ -21,9 +21,9 @@ impl Figure {
     pub fn within(unit: &'static str, estimate: Estimate, range: (f64, f64)) -> Self {
         let is_known = estimate.sigma.is_finite() && estimate.value.is_finite();
         let is_whole = estimate.low <= range.0 && estimate.high >= range.1;
-        let (least, most) = (rounded(range.0), rounded(range.1));
+        let (least, most) = (rounded(range.0), quantity(range.1, unit));
         let reason = (!is_known || is_whole)
-            .then(|| format!("the interval is the whole range from {least} to {most} {unit}"));
+            .then(|| format!("the interval is the whole range from {least} to {most}"));
         Self { unit, estimate: is_known.then_some(estimate), not_determined: reason }
     }
 
