@@ -149,7 +149,7 @@ fn a_misspelt_key_is_told_once_at_its_own_line() {
     }
     let both = HUMMINGBIRD.replacen("[body]", "[boddy]", 1).replacen("[motor]", "[moter]", 1);
     let error = Vehicle::parse(&both, "bird.toml").unwrap_err();
-    let keys: Vec<&str> = error.all().map(|fault| fault.key()).collect();
+    let keys: Vec<String> = error.all().map(|fault| fault.key().to_owned()).collect();
     assert_eq!(keys, ["boddy", "moter"], "{error}");
     let start = HUMMINGBIRD.find("[motor]").unwrap();
     let end = HUMMINGBIRD.find("[command]").unwrap();
