@@ -77,6 +77,14 @@ fn wrong_units_are_found_with_those_that_fit() {
     is("\"m/s\"", "\"mm/s\"", Quantity::Velocity, "m/s");
     is("\"V\"", "\"mV\"", Quantity::BatteryVoltage, "\"V\"");
     is("\"count\"", "\"fraction\"", Quantity::Command, "count");
+    // The numbers are those of the log.
+    let text = refused(&CHANNELS.replace("\"count\"", "\"fraction\""), "");
+    let told = [
+        "its commands go from 1",
+        " in the log (`unit = \"fraction\"`), read as 19901 to 20498",
+        " counts, the vehicle's from",
+    ];
+    assert!(told.iter().all(|part| text.contains(part)), "{text}");
 }
 
 #[test]
