@@ -39,7 +39,7 @@ use std::path::Path;
 const THESIS: &str = include_str!("../gains/pid-thesis.toml");
 
 gains! {
-    /// Gains and limits of the four loops. A loop's table is given whole or left out.
+    /// Gains and limits of the four loops. A loop's table is given whole or left out, except over a gains file.
     ///
     /// ```
     /// use controllers::pid_gains::PidGains;

@@ -9,7 +9,7 @@ use recorder::node::SHADOW_PREFIX;
 use recorder::reader::Recording;
 use runtime::launcher::{Purpose, Report};
 use serde::Serialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 /// The difference between a field of a shadow topic and the same field of the topic itself, over the ticks of one
@@ -196,11 +196,17 @@ pub fn report(recording: &Recording) -> Result<String> {
 
 /// A line for each difference, and one line for all fields that are equal.
 pub(crate) fn lines(differences: &[Difference]) -> String {
-    let (equal, unequal): (Vec<_>, Vec<_>) = differences.iter().partition(|difference| difference.max == 0.0);
+    let unequal: Vec<_> = differences.iter().filter(|difference| difference.max != 0.0).collect();
     let mut text: String = unequal.iter().map(|difference| format!("{difference}\n")).collect();
+    // A field may have had several shadows, one after the other.
+    let field = |difference: &Difference| (difference.topic.clone(), difference.field.clone());
+    let mut equal: BTreeSet<(String, String)> = differences.iter().map(field).collect();
+    unequal.iter().for_each(|difference| {
+        equal.remove(&field(difference));
+    });
     if !equal.is_empty() {
         let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
-        equal.iter().for_each(|difference| *counts.entry(&difference.topic).or_default() += 1);
+        equal.iter().for_each(|(topic, _)| *counts.entry(topic).or_default() += 1);
         let topics: Vec<String> = counts.iter().map(|(topic, count)| format!("{topic} {count}")).collect();
         let fields =
             if equal.len() == 1 { "1 field is".to_owned() } else { format!("{} fields are", equal.len()) };

@@ -139,8 +139,10 @@ impl CatArguments {
         let Some([first_s, last_s]) = span_s else { return Ok(()) };
         let what =
             self.topic.as_ref().map_or_else(|| "the recording".to_owned(), |topic| format!("`{topic}`"));
-        let to = if self.to.is_finite() { format!(" --to {}", self.to) } else { String::new() };
-        bail!("--from {}{to}: no message; those of {what} go from {first_s} s to {last_s} s", self.from)
+        let from = (self.from > 0.0).then(|| format!("--from {}", self.from));
+        let to = self.to.is_finite().then(|| format!("--to {}", self.to));
+        let span = [from, to].into_iter().flatten().collect::<Vec<_>>().join(" ");
+        bail!("{span}: no message; those of {what} go from {first_s} s to {last_s} s")
     }
 
     /// The messages of the topic within the span; of all topics where none is named.

@@ -12,7 +12,6 @@
 //! | [`gaps`] | gaps of logs whose samples hold until the next |
 //! | `file` | which keys a vehicle file has, and what is physical |
 //! | [`foreign`] | formats that are taken for another one, by their first bytes |
-//! | [`kind`] | kinds of files that commands read, by content |
 //! | [`reader`] | walks the TOML tree with positions, refuses what it does not know; scene files and gains files use it too |
 //! | `schedule` | parameters that are lines of times and values |
 //! | [`quotes`] | quotation marks in CSV files of measurements, whose rows are lines |

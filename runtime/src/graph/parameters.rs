@@ -211,7 +211,7 @@ fn refused(declared: &DeclaredNode<'_>, error: &ParameterError) -> Diagnostic {
             let value =
                 if file.is_some() { format!("{key} = \"PATH\"") } else { format!("parameters.{key} = …") };
             format!(
-                "add {value} to the keys of the backup: one of another kind keeps no parameters, and of the files `vehicle` and `scene`"
+                "add {value} to the keys of the backup; where its kind is another one, it keeps nothing but `vehicle` and `scene`"
             )
         }
         ParameterError::Missing { .. } if file.is_some() => {

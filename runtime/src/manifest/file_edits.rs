@@ -131,7 +131,7 @@ impl FileEdit {
         if keys.last().is_some_and(|last| last == VALUE) && self.keys.last().is_some_and(|last| last != VALUE)
         {
             keys.pop();
-            if key.split('.').count() > keys.len() {
+            if key.split('.').nth(keys.len()).is_some_and(|below| below != VALUE) {
                 return false;
             }
         }
@@ -146,6 +146,15 @@ impl FileEdit {
             let help = did_you_mean(name, known, "the processes are");
             return Err(sources.problem(&self.span, format!("there is no process `{name}`"), help));
         };
+        let is_over_file = process.parameters.keys().any(|parameter| parameter.get_ref() == self.file);
+        if is_over_file {
+            let message = format!(
+                "process `{name}` has values of its own for `{}`, which come before the file's",
+                self.file
+            );
+            let help = format!("change them: process.{name}.parameters.{}.…", self.file);
+            return Err(sources.problem(&self.span, message, help));
+        }
         if file_of(process, self.file).is_some() {
             return Ok(());
         }

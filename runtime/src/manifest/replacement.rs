@@ -106,6 +106,12 @@ fn differing<'s>(
     let mut whole = process.clone();
     whole.remove("on_exit");
     whole.remove("standby");
+    // Values over a gains file are of that file: another one is taken as it is.
+    if with.get("gains").is_some()
+        && let Some(parameters) = tree::table_mut(&mut whole, "parameters")
+    {
+        parameters.remove("gains");
+    }
     tree::replace_keys(&mut whole, with);
     let kind = tree::string(&whole, "kind").and_then(|kind| sources.registry.find(kind));
     for model in MODELS {

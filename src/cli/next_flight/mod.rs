@@ -183,12 +183,16 @@ fn raised<T: Fn(usize, usize) + Sync>(
     let mut best: Option<(usize, f64, String)> = None;
     // Where no manoeuvre shows anything, the limits are first raised together: one family of flights tells that none helps.
     let mut together = None;
-    if open.iter().all(|at| now[*at] < NO_SEPARATION) {
+    let shows_nothing = |flown: &[Flown], bounds: &Bounds| {
+        let chosen = search::combined(questions, flown, bounds.duration_s, 0);
+        let found = search::separations(questions, flown, &chosen);
+        open.iter().all(|at| found[*at] < NO_SEPARATION)
+    };
+    let is_dark = open.iter().all(|at| now[*at] < NO_SEPARATION);
+    if is_dark && shows_nothing(flown, &Raised::Duration.on(bounds).0) {
         let (bounds, text) = Raised::All.on(bounds);
         let flown = simulator.family(&bounds, &tell(&format!(", limits raised ({text})")))?;
-        let chosen = search::combined(questions, &flown, bounds.duration_s, 0);
-        let found = search::separations(questions, &flown, &chosen);
-        if open.iter().all(|at| found[*at] < NO_SEPARATION) {
+        if shows_nothing(&flown, &bounds) {
             return Ok((simulator.stop.count() == 0).then(|| NOT_SHOWN.to_owned()));
         }
         together = Some(flown);
