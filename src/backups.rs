@@ -74,6 +74,22 @@ fn a_backup_changes_values_of_the_gains_file_that_its_process_names() {
 }
 
 #[test]
+fn another_gains_file_takes_the_place_of_values_too() {
+    let (manifest, graph) =
+        hover_with(&["process.controller.parameters.gains.altitude_integral_max_m_s2=1.5"]);
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("controllers/gains/pid-thesis.toml");
+    let backup = |with: &str| {
+        let backup = backup_of(&manifest, &graph.plan, &graph.files, "controller", with).unwrap();
+        backup.plan.parameters["gains"].clone()
+    };
+    let of_file = format!("gains = {:?}", file.display().to_string());
+    assert_eq!(backup(&of_file).as_str(), file.to_str());
+    let with_value = backup(&format!("{of_file}\nparameters.gains.altitude_integral_max_m_s2 = 2.0"));
+    assert_eq!(with_value["altitude_integral_max_m_s2"], 2.0);
+    assert_eq!(backup("wait = \"spin\"")["altitude_integral_max_m_s2"], 1.5);
+}
+
+#[test]
 fn a_backup_of_another_kind_keeps_the_vehicle() {
     let (manifest, graph) = hover();
     let backup = |with: &str| backup_of(&manifest, &graph.plan, &graph.files, "controller", with);

@@ -420,6 +420,9 @@ mod tests {
         let end = "\n  shadow − primary: 1 field is equal in every sample: /plant/state 1\n";
         assert!(text.ends_with(end) && text.lines().count() == 2, "{text}");
         all.push(of("/plant/pose", "position.x", &primary));
+        // Later shadows: fields are counted once, and one that differed before is not equal.
+        all.push(of("/plant/pose", "position.x", &primary));
+        all.push(of("/plant/state", "position.z", &primary));
         let text = lines(&all);
         let end = "2 fields are equal in every sample: /plant/pose 1, /plant/state 1\n";
         assert!(text.ends_with(end) && text.lines().count() == 2, "{text}");

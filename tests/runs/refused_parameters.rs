@@ -138,6 +138,7 @@ fn an_override_in_a_file_is_told_with_its_text_and_the_file_that_exists() {
     for (set, says) in [
         ("body.mas=0.5", "unknown key `body.mas`"),
         ("body.mass=-1", "`body.mass` must be a finite number above 0, found -1"),
+        ("body.mass=heavy", "`body.mass.value` must be"),
         ("body.mass.unit=lb", "`body.mass.unit` must be a unit of mass"),
     ] {
         let set = format!("process.plant.vehicle.{set}");

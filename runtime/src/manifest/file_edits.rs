@@ -298,6 +298,16 @@ mod tests {
     }
 
     #[test]
+    fn a_fault_of_a_value_is_about_its_edit_and_one_of_its_unit_is_not() {
+        let edit = FileEdit::parse("process.plant.vehicle.body.mass=heavy", 0).unwrap();
+        let is_about = |key: &str| edit.is_about(key, VEHICLE);
+        assert!(is_about("body.mass") && is_about("body.mass.value"));
+        assert!(!is_about("body.mass.unit") && !is_about("body.length") && !is_about(""));
+        let unit = FileEdit::parse("process.plant.vehicle.body.mass.unit=lb", 0).unwrap();
+        assert!(unit.is_about("body.mass.unit", VEHICLE) && !unit.is_about("body.mass.value", VEHICLE));
+    }
+
+    #[test]
     fn a_quantity_keeps_its_unit_and_its_comment() {
         let found = changed("process.plant.vehicle.body.mass=0.5").unwrap();
         assert_eq!(found, VEHICLE.replace("0.48", "0.5"));
