@@ -28,7 +28,7 @@ pub struct Record {
 
 /// A message of a recording, as [`Recording::visit`] passes it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Passing<'a> {
+pub struct RecordRef<'a> {
     /// Tick at which it was sent.
     pub tick: u32,
     /// Simulation time in nanoseconds.
@@ -297,7 +297,7 @@ impl Recording {
     /// If the file is damaged, or that of `take`, which then gets no further message.
     pub fn visit<E: From<RecordingError>>(
         &self,
-        mut take: impl FnMut(Passing<'_>) -> Result<(), E>,
+        mut take: impl FnMut(RecordRef<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
         let mut messages = Messages::of(self.source());
         while let Some(message) = messages.next_in_place() {
@@ -306,7 +306,7 @@ impl Recording {
             }
             let message = message.map_err(|damage| RecordingError::content(&self.path, damage))?;
             let (header, topic) = (message.header, message.channel.topic.as_str());
-            take(Passing { tick: header.sequence, time_ns: header.log_time, topic, cdr: message.data })?;
+            take(RecordRef { tick: header.sequence, time_ns: header.log_time, topic, cdr: message.data })?;
         }
         Ok(())
     }
