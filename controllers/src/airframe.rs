@@ -74,6 +74,7 @@ pub struct HoverModel {
     /// The greatest thrust to demand, N.
     pub thrust_max_N: f64,
 }
+
 /// The fault at the number of the vehicle file at `path`, or of its base, that it is about.
 fn at_its_line(
     files: &InputFiles,

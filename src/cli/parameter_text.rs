@@ -35,10 +35,16 @@ fn keys(kind: &str, name: &str) -> Vec<&'static str> {
 
 fn lines(name: &str, cells: Option<Cells<'_>>) -> Vec<String> {
     let Some(cells) = cells else { return vec![name.to_owned()] };
-    let head = match cells[..] {
-        [_, unit, default, ..] => {
-            let unit = Some(plain(unit)).filter(|unit| !unit.is_empty());
-            let default = Some(plain(default)).filter(|default| !default.is_empty());
+    // Some tables have no column of units.
+    let facts = match cells[..] {
+        [_, unit, default, ..] => Some((unit, default)),
+        [_, default] => Some(("", default)),
+        _ => None,
+    };
+    let head = match facts {
+        Some((unit, default)) => {
+            let stated = |text: &str| Some(plain(text)).filter(|text| !["", "–"].contains(&&**text));
+            let (unit, default) = (stated(unit), stated(default));
             let default = default.map(|default| match default.as_str() {
                 "required" => default,
                 _ => format!("default {default}"),
@@ -47,7 +53,7 @@ fn lines(name: &str, cells: Option<Cells<'_>>) -> Vec<String> {
                 [unit.map(|unit| format!("[{unit}]")), default].into_iter().flatten().collect();
             format!("{name}  {}", facts.join(" "))
         }
-        _ => name.to_owned(),
+        None => name.to_owned(),
     };
     let meaning = cells.first().map(|meaning| format!("    {}", plain(meaning)));
     std::iter::once(head.trim_end().to_owned()).chain(meaning).collect()
@@ -55,8 +61,7 @@ fn lines(name: &str, cells: Option<Cells<'_>>) -> Vec<String> {
 
 /// The row of `name` in the section of `kind`, else in that which sensors share, else in any other.
 fn described<'p>(kind: &str, name: &str) -> Option<Cells<'p>> {
-    let section = format!("`{kind}`");
-    let is_own = |title: &str| title == section;
+    let is_own = |title: &str| title.trim_matches('`').eq_ignore_ascii_case(kind);
     let pages = || PAGES.iter().copied();
     let find = |is_meant: &dyn Fn(&str) -> bool| pages().find_map(|page| row(page, name, is_meant));
     find(&is_own).or_else(|| find(&|title| title == "Sensors")).or_else(|| find(&|_| true))
@@ -64,6 +69,7 @@ fn described<'p>(kind: &str, name: &str) -> Option<Cells<'p>> {
 
 /// The cells behind `name` in the first table that has it, below a title that is meant.
 fn row<'p>(page: &'p str, name: &str, is_meant: &dyn Fn(&str) -> bool) -> Option<Cells<'p>> {
+    let names = [format!("`{name}`"), format!("`parameters.{name}`")];
     let mut title = "";
     for line in page.lines() {
         if let Some(found) = line.strip_prefix("## ").or(line.strip_prefix("### ")) {
@@ -71,8 +77,9 @@ fn row<'p>(page: &'p str, name: &str, is_meant: &dyn Fn(&str) -> bool) -> Option
         }
         let Some(cells) = line.strip_prefix("| ").filter(|_| is_meant(title)) else { continue };
         let mut cells = cells.trim_end().trim_end_matches('|').split(" | ").map(str::trim);
-        let is_named =
-            cells.next().is_some_and(|first| first.split(", ").any(|part| part == format!("`{name}`")));
+        let is_named = cells
+            .next()
+            .is_some_and(|first| first.split(", ").any(|part| names.iter().any(|name| part == name)));
         if is_named {
             return Some(cells.collect());
         }
@@ -115,6 +122,11 @@ mod tests {
         assert_eq!(lines[0], "position_drift_time_s  [s] default 300.0");
         assert_eq!(lines[1], "    its time constant");
         assert_eq!(lines[3], "    measurements a second");
+        // The section of the kind comes first, also of an autopilot; a table without units has defaults.
+        let of_px4 = parameter_lines("px4", &["armed_by_channel", "rest_s"]);
+        assert!(of_px4[1].contains("RC_MAP_ARM_SW"), "{of_px4:?}");
+        assert!(of_px4[2].starts_with("rest_s  default "), "{of_px4:?}");
+        assert!(parameter_lines("fmu", &["start"]).len() > 1);
     }
 
     #[test]

@@ -182,20 +182,18 @@ fn raised<T: Fn(usize, usize) + Sync>(
     let open: Vec<usize> = (0..now.len()).filter(|at| now[*at] < SEPARATED).collect();
     let mut best: Option<(usize, f64, String)> = None;
     // Where no manoeuvre shows anything, the limits are first raised together: one family of flights tells that none helps.
-    let mut together = None;
     let shows_nothing = |flown: &[Flown], bounds: &Bounds| {
         let chosen = search::combined(questions, flown, bounds.duration_s, 0);
         let found = search::separations(questions, flown, &chosen);
         open.iter().all(|at| found[*at] < NO_SEPARATION)
     };
-    let is_dark = open.iter().all(|at| now[*at] < NO_SEPARATION);
-    if is_dark && shows_nothing(flown, &Raised::Duration.on(bounds).0) {
+    let nothing_shown = open.iter().all(|at| now[*at] < NO_SEPARATION);
+    if nothing_shown && shows_nothing(flown, &Raised::Duration.on(bounds).0) {
         let (bounds, text) = Raised::All.on(bounds);
         let flown = simulator.family(&bounds, &tell(&format!(", limits raised ({text})")))?;
         if shows_nothing(&flown, &bounds) {
             return Ok((simulator.stop.count() == 0).then(|| NOT_SHOWN.to_owned()));
         }
-        together = Some(flown);
     }
     for raised in Raised::ALL {
         let (raised_bounds, text) = raised.on(bounds);
@@ -204,16 +202,11 @@ fn raised<T: Fn(usize, usize) + Sync>(
         }
         let bounds = raised_bounds;
         let again;
-        let flown = match raised {
-            Raised::Duration => flown,
-            _ => {
-                let known = if raised == Raised::All { together.take() } else { None };
-                again = match known {
-                    Some(flown) => flown,
-                    None => simulator.family(&bounds, &tell(&format!(", limits raised ({text})")))?,
-                };
-                &again[..]
-            }
+        let flown = if raised == Raised::Duration {
+            flown
+        } else {
+            again = simulator.family(&bounds, &tell(&format!(", limits raised ({text})")))?;
+            &again[..]
         };
         // It only says whether a limit helps.
         let chosen = search::combined(questions, flown, bounds.duration_s, 0);
