@@ -29,9 +29,36 @@ const WORK: &str = ".workers-";
 pub struct Store {
     folder: PathBuf,
     rows: File,
-    /// Held open: the lock goes with the process.
-    _lock: File,
+    _lock: Lock,
     work: TempDir,
+}
+
+/// The lock of a folder, held by this process alone. The kernel gives it back when the process dies.
+#[derive(Debug)]
+struct Lock(File);
+
+impl Lock {
+    fn of(folder: &Path) -> Result<Self> {
+        let path = folder.join(LOCK);
+        let file = opened(&path, OpenOptions::new().create(true).truncate(false).read(true).write(true))?;
+        match file.try_lock() {
+            Ok(()) => Ok(Self(file)),
+            Err(TryLockError::WouldBlock) => {
+                bail!(
+                    "another campaign is writing to {}; wait for it, or choose another --out",
+                    folder.display()
+                )
+            }
+            Err(TryLockError::Error(error)) => Err(error).context(format!("cannot lock {}", path.display())),
+        }
+    }
+}
+
+impl Drop for Lock {
+    fn drop(&mut self) {
+        // Closing is not enough: a process that another thread is starting holds a copy until it executes its program.
+        let _ = self.0.unlock();
+    }
 }
 
 /// First line of the rows: what they were flown of.
@@ -95,13 +122,13 @@ impl Store {
         let shown = folder.display();
         std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {shown}"))?;
         require_own(folder)?;
-        let mut lock = locked(folder)?;
+        let mut lock = Lock::of(folder)?;
         remove_left_work(folder)?;
         if !has_rows(&folder.join(ROWS))? {
             // Nothing was flown: a refused campaign file that is corrected begins anew.
-            forget(folder, &mut lock)?;
+            forget(folder, &mut lock.0)?;
         }
-        let plan = plan(folder, campaign, &mut lock)?;
+        let plan = plan(folder, campaign, &mut lock.0)?;
         let path = folder.join(ROWS);
         let (mut flown, whole) =
             if path.exists() { read(&path, (header, builds))? } else { (BTreeMap::new(), 0) };
@@ -208,18 +235,6 @@ fn put(folder: &Path, name: &str, write: impl FnOnce(&mut File) -> Result<()>) -
     let mut draft = draft.with_context(failed)?;
     write(draft.as_file_mut()).with_context(failed)?;
     draft.persist(&path).map(drop).with_context(failed)
-}
-
-fn locked(folder: &Path) -> Result<File> {
-    let path = folder.join(LOCK);
-    let file = opened(&path, OpenOptions::new().create(true).truncate(false).read(true).write(true))?;
-    match file.try_lock() {
-        Ok(()) => Ok(file),
-        Err(TryLockError::WouldBlock) => {
-            bail!("another campaign is writing to {}; wait for it, or choose another --out", folder.display())
-        }
-        Err(TryLockError::Error(error)) => Err(error).context(format!("cannot lock {}", path.display())),
-    }
 }
 
 /// The plan in the folder, drawn and written where there is none.
