@@ -116,6 +116,15 @@ impl<const N: usize> Channel<N> {
         period_s(&self.time_s)
     }
 
+    /// The samples that were taken in `pieces_s`: times from first to last, in rising order.
+    fn within(&self, pieces_s: &[(f64, f64)]) -> Self {
+        self.kept(|index| {
+            let at_s = self.time_s[index];
+            let next = pieces_s.partition_point(|piece| piece.1 < at_s);
+            pieces_s.get(next).is_some_and(|piece| piece.0 <= at_s)
+        })
+    }
+
     /// The samples for which `is_kept` holds of their index.
     pub(crate) fn kept(&self, is_kept: impl Fn(usize) -> bool) -> Self {
         let kept = || (0..self.time_s.len()).filter(|index| is_kept(*index));
@@ -178,6 +187,42 @@ impl Flight {
         };
         let all: Vec<String> = self.times().into_iter().filter_map(of).collect();
         if all.is_empty() { "no channel".to_owned() } else { all.join(", ") }
+    }
+
+    /// The flight with the samples alone that were taken in `pieces_s`: times from first to last, in s. Commands that were logged on change are kept, since
+    /// each holds until the next.
+    ///
+    /// ```
+    /// use flights::{Channel, Flight, Role};
+    ///
+    /// let mut flight = Flight::new("f", "log.csv", Role::Fit);
+    /// flight.battery_voltage = Channel { time_s: vec![0.0, 1.0, 2.0, 3.0], values: vec![[11.9]; 4] };
+    /// assert_eq!(flight.within(&[(0.0, 0.5), (2.0, 3.0)]).battery_voltage.time_s, [0.0, 2.0, 3.0]);
+    /// ```
+    #[must_use]
+    pub fn within(&self, pieces_s: &[(f64, f64)]) -> Self {
+        let command =
+            if self.commands_on_change { self.command.clone() } else { self.command.within(pieces_s) };
+        Self {
+            command,
+            rotor_speed: self.rotor_speed.within(pieces_s),
+            position: self.position.within(pieces_s),
+            velocity: self.velocity.within(pieces_s),
+            attitude: self.attitude.within(pieces_s),
+            angular_velocity: self.angular_velocity.within(pieces_s),
+            specific_force: self.specific_force.within(pieces_s),
+            battery_voltage: self.battery_voltage.within(pieces_s),
+            name: self.name.clone(),
+            file: self.file.clone(),
+            other_files: self.other_files.clone(),
+            role: self.role,
+            rotors: self.rotors,
+            commands_on_change: self.commands_on_change,
+            command_breaks_s: self.command_breaks_s.clone(),
+            on_rig: self.on_rig,
+            assumed: self.assumed.clone(),
+            notes: self.notes.clone(),
+        }
     }
 
     /// Iterates over the files that it was read from.

@@ -8,6 +8,7 @@
 //! beyond it. Rotor speeds are the one channel whose lateness takes a model (`rotor_clock`); the clock of the inertial unit stays.
 
 use crate::clock::Lateness;
+use crate::excerpt;
 use crate::fit::Problem;
 use crate::noise_model::NoiseModel;
 use crate::normal::Block;
@@ -147,7 +148,11 @@ impl Clocks {
 pub fn align(problem: &mut Problem) -> Vec<(String, Offsets)> {
     let noises = std::mem::replace(&mut problem.noises, kinematic_noises());
     let flights: Vec<&Prepared> = problem.flights().collect();
-    let clocks: Vec<Clocks> = flights.par_iter().map(|flight| Clocks::of(problem, flight)).collect();
+    let of_flight = |flight: &&Prepared| {
+        let part = excerpt::of_flight(flight);
+        Clocks::of(problem, part.as_ref().unwrap_or(flight))
+    };
+    let clocks: Vec<Clocks> = flights.par_iter().map(of_flight).collect();
     problem.noises = noises;
     let of_fit: Vec<Found> =
         clocks[..problem.estimation.len()].iter().filter_map(|shift| shift.attitude).collect();

@@ -4,7 +4,7 @@ use crate::candidate::{Candidate, FAST_COMMANDS, Unidentifiable, free_parameters
 use crate::confounded::Rival;
 use crate::fit::Problem;
 use crate::fit_result::FitResult;
-use crate::judgement::is_stopped;
+use crate::judgement::{Way, is_stopped};
 use crate::logging;
 use crate::parameter::Parameter;
 use crate::report::{BeforeAfter, EffectReport, Estimate};
@@ -50,7 +50,7 @@ pub fn judged(problem: &Problem, selection: &Selection) -> BTreeMap<&'static str
             let before = after / (1.0 - judged.gain).max(1e-12);
             let report = EffectReport {
                 accepted: false,
-                linearised: judged.is_promise,
+                linearised: judged.way != Way::Full,
                 parameters: estimates(problem, &judged.fitted, &judged.candidate.free),
                 held_out: BeforeAfter { before: size(problem, before), after: size(problem, after) },
                 chance: judged.p_value,

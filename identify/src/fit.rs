@@ -67,7 +67,14 @@ impl Equations {
 
     /// The part of them for other parameters.
     pub fn without(&self, dropped: &[usize]) -> Self {
-        let kept: Vec<usize> = (0..self.free.len()).filter(|at| !dropped.contains(&self.free[*at])).collect();
+        let kept: Vec<usize> = self.free.iter().copied().filter(|at| !dropped.contains(at)).collect();
+        self.of(&kept)
+    }
+
+    /// The part of them for the parameters `free`, in their order.
+    pub fn of(&self, free: &[usize]) -> Self {
+        let kept: Vec<usize> =
+            free.iter().filter_map(|at| self.free.iter().position(|known| known == at)).collect();
         let of = |blocks: &Vec<Block>| blocks.iter().map(|block| block.of(&kept)).collect();
         let columns_of = |columns: &Vec<Vec<f64>>| kept.iter().map(|at| columns[*at].clone()).collect();
         Self {
@@ -111,7 +118,7 @@ impl<'f> Problem<'f> {
                 break;
             }
         }
-        let covariance = normal::covariance(&blocks) + self.trim_covariance(&blocks, &values, free);
+        let covariance = self.covariance(&blocks, &equations);
         let validation_costs = if self.validation.is_empty() {
             self.cross_validated(&blocks, &values, free)
         } else {
@@ -130,6 +137,22 @@ impl<'f> Problem<'f> {
         };
         let (blocks, columns) = self.estimation.par_iter().map(of_flight).unzip();
         Equations { free: free.to_vec(), blocks, columns }
+    }
+
+    /// The equations of the estimation data about `values`, with the derivatives by `accepted` as they are at `base`.
+    pub fn equations_near(
+        &self,
+        (base, accepted): (&[f64], &[usize]),
+        values: &[f64],
+        free: &[usize],
+    ) -> Equations {
+        let of_flight = |flight| {
+            let (residual, of_free) = self.whitened(flight, values, free);
+            let columns = [self.whitened(flight, base, accepted).1, of_free].concat();
+            (self.summed(flight, &residual, &columns), columns)
+        };
+        let (blocks, columns) = self.estimation.par_iter().map(of_flight).unzip();
+        Equations { free: [accepted, free].concat(), blocks, columns }
     }
 
     /// The normal equations about `values`, by flight and block of time, with the derivatives that are known.
@@ -342,18 +365,15 @@ impl<'f> Problem<'f> {
         (residual, columns)
     }
 
-    /// Part of a fit's covariance that the flights' trims add; `blocks` are given at its solution.
-    fn trim_covariance(&self, blocks: &[Block], values: &[f64], free: &[usize]) -> DMatrix<f64> {
-        let mut covariance = DMatrix::zeros(free.len(), free.len());
-        if free.is_empty() || self.noises.values().all(|noise| noise.trim_variance == 0.0) {
+    /// Covariance of a fit at whose solution the normal equations are `blocks`, with the derivatives of `equations`: of the noise, and of the flights' trims.
+    pub fn covariance(&self, blocks: &[Block], equations: &Equations) -> DMatrix<f64> {
+        let mut covariance = normal::covariance(blocks);
+        if equations.free.is_empty() || self.noises.values().all(|noise| noise.trim_variance == 0.0) {
             return covariance;
         }
         let inverse = normal::inverse(&normal::sum(blocks).gram);
-        for flight in &self.estimation {
-            let whitening = Whitening::of(flight, &self.noises);
-            let (_, mut columns) = self.linearised(flight, values, free);
-            columns.iter_mut().for_each(|column| whitening.apply(column));
-            for gradient in whitening.trim_gradients(&columns) {
+        for (flight, columns) in self.estimation.iter().zip(&equations.columns) {
+            for gradient in Whitening::of(flight, &self.noises).trim_gradients(columns) {
                 let away = &inverse * DVector::from_vec(gradient);
                 covariance += &away * away.transpose();
             }

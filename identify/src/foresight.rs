@@ -73,8 +73,7 @@ impl Foresight {
             .collect();
         let of_job = |(at, horizon): &(usize, usize)| -> Vec<_> {
             let (flight, values) = &flights[*at];
-            let ends =
-                ends(problem, flight, values, models, (&HORIZONS_S[*horizon..=*horizon], f64::INFINITY));
+            let ends = ends(problem, flight, values, models, &HORIZONS_S[*horizon..=*horizon]);
             ends.iter()
                 .flatten()
                 .map(|end| {
@@ -215,34 +214,39 @@ fn noise(problem: &Problem) -> [[f64; QUANTITIES.len()]; 2] {
     })
 }
 
-/// The ends of a flight's windows under `values` at several horizons, up to `span_s` of the flight, with the disturbance of these `models` that was
-/// seen before each; none where its attitude was assumed, or there is nothing to predict with.
+/// The ends of a flight's windows under `values` at several horizons, with the disturbance of these `models` that was seen before each; none where its
+/// attitude was assumed, or there is nothing to predict with.
 pub fn ends(
     problem: &Problem,
     flight: &Prepared,
     values: &[f64],
     models: &DisturbanceModels,
-    (horizons_s, span_s): (&[f64], f64),
+    horizons_s: &[f64],
 ) -> Vec<Vec<WindowEnd>> {
-    let Some(measured) = measured(problem, flight, values) else { return vec![Vec::new(); horizons_s.len()] };
+    let errors = SensorErrors::of(&problem.model.parameters, values);
+    let measured = flight.recent_measured.at(errors, || measured(flight, &errors));
+    let Some(measured) = measured.as_ref() else { return vec![Vec::new(); horizons_s.len()] };
     let (airframe, seen) = (problem.model.airframe_of(flight, values), Observed::of(problem, flight, values));
-    measured.shortened(span_s).ends_within(airframe, horizons_s, |from_s| seen.expected(models, from_s))
+    measured.ends_within(airframe, horizons_s, |from_s| seen.expected(models, from_s))
 }
 
-/// A flight's measurements without the errors of the sensors; `None` where its attitude was assumed, or there is nothing to predict with.
-fn measured(problem: &Problem, flight: &Prepared, values: &[f64]) -> Option<Measured> {
+/// A flight's measurements without the errors of the sensors, in the pieces of its grid; `None` where its attitude was assumed, or there is nothing to
+/// predict with.
+fn measured(flight: &Prepared, errors: &SensorErrors) -> Option<Measured> {
     if flight.is_assumed() || flight.flight.attitude.is_empty() {
         return None;
     }
-    let errors = SensorErrors::of(&problem.model.parameters, values);
-    Measured::of(&errors.taken_off(flight.flight, &flight.late))
+    let pieces_s = flight.layout.clock.pieces_s();
+    let cut = (!pieces_s.is_empty()).then(|| flight.flight.within(&pieces_s));
+    let measured = Measured::of(&errors.taken_off(cut.as_ref().unwrap_or(&flight.flight), &flight.late))?;
+    Some(measured.within(pieces_s, flight.settling_s()))
 }
 
 /// Errors of a state at the end of a window; 0 of a quantity that `flight` does not show.
 pub fn errors(flight: &Prepared, end: &WindowEnd, state: &RigidBody) -> WindowErrors {
     let errors = components(end, state);
     std::array::from_fn(|at| {
-        f64::from(QUANTITIES[at / 3].is_measured(flight.flight)) * errors[at / 3][at % 3]
+        f64::from(QUANTITIES[at / 3].is_measured(&flight.flight)) * errors[at / 3][at % 3]
     })
 }
 

@@ -1,9 +1,12 @@
 //! Tables of prediction errors: every flight at every horizon, by the declared vehicle, by the new one and by persistence.
 
 use crate::clock::Lateness;
-use crate::disturbance::{DisturbanceModels, Forecast, Observed};
+use crate::disturbance::{DisturbanceModels, Observed};
+use crate::excerpt;
 use crate::fit::Problem;
+use crate::forecast::Forecast;
 use crate::predict::{Errors, Measured, WindowEnd, components, errors};
+use crate::prepared::Prepared;
 use crate::sensing::SensorErrors;
 use flights::state::StateQuantity;
 use flights::{Flight, FlightSet, Role};
@@ -55,9 +58,15 @@ pub fn predictions(problem: &Problem, set: &FlightSet, values: &[f64]) -> Vec<Pr
         let mut predictions = Vec::new();
         let prepared = problem.flights().find(|prepared| prepared.flight.name == flight.name);
         let late = prepared.map_or(Lateness::default(), |prepared| prepared.late);
+        let part = prepared.and_then(excerpt::of_flight);
+        let pieces_s = part.as_ref().map_or(Vec::new(), |part| part.layout.clock.pieces_s());
+        let settling_s = part.as_ref().map_or(0.0, Prepared::settling_s);
+        let cut = part.is_some().then(|| flight.within(&pieces_s));
+        let flight = cut.as_ref().unwrap_or(flight);
+        let measured = |flight: &Flight| Some(Measured::of(flight)?.within(pieces_s.clone(), settling_s));
         let aligned = SensorErrors::default().taken_off(flight, &late);
         let corrected = sensor_errors.taken_off(flight, &late);
-        let (Some(before), Some(after)) = (Measured::of(&aligned), Measured::of(&corrected)) else {
+        let (Some(before), Some(after)) = (measured(&aligned), measured(&corrected)) else {
             return predictions;
         };
         let airframe = |values: &[f64]| {
@@ -65,7 +74,7 @@ pub fn predictions(problem: &Problem, set: &FlightSet, values: &[f64]) -> Vec<Pr
             prepared.map_or_else(|| model.airframe(values), |flight| model.airframe_of(flight, values))
         };
         let seen = prepared.map_or(Observed::default(), |prepared| Observed::of(problem, prepared, values));
-        let turned = Measured::of(&corrected).map(Measured::turning_as_measured);
+        let turned = measured(&corrected).map(Measured::turning_as_measured);
         for horizon_s in HORIZONS_S {
             let ends = |push: &dyn Fn(f64) -> Forecast| after.ends(airframe(values), horizon_s, push);
             let old = before.ends(airframe(&declared), horizon_s, |_| Forecast::none());

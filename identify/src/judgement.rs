@@ -22,6 +22,17 @@ const CONFOUNDED_LEVEL: f64 = 0.05;
 /// Level at which an effect is kept without a fit, where the equations promise a loss without it.
 const CLEARLY_WORSE: f64 = 0.001;
 
+/// The way to a candidate's fit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Way {
+    /// A step by the linearised equations.
+    Promise,
+    /// Steps with the derivatives of another point.
+    Near,
+    /// A fit in full.
+    Full,
+}
+
 /// A candidate that was fitted and judged.
 #[derive(Debug, Clone)]
 pub struct Judged {
@@ -37,8 +48,8 @@ pub struct Judged {
     pub is_accepted: bool,
     /// True if it would be, but for the logging of the commands, which explains it.
     pub is_logging: bool,
-    /// True if `fitted` comes from the linearised equations, not from a fit.
-    pub is_promise: bool,
+    /// The way to `fitted`.
+    pub way: Way,
 }
 
 /// The fit of `accepted` but that at `at`, from `base` on.
@@ -77,7 +88,7 @@ pub fn judged(
         p_value,
         is_accepted: is_real && !is_logging,
         is_logging,
-        is_promise: false,
+        way: Way::Full,
     }
 }
 
@@ -149,9 +160,14 @@ pub fn fitted_from(
     promised: &[f64],
 ) -> FitResult {
     let all = [free_parameters(accepted), candidate.free.clone()].concat();
+    problem.fitted(&start_from(problem, base, candidate, promised), &all)
+}
+
+/// The values that a promise led to, if they are better than all other starts.
+pub fn start_from(problem: &Problem, base: &FitResult, candidate: &Candidate, promised: &[f64]) -> Vec<f64> {
     let (start, least) = start(problem, base, candidate);
     let cost = problem.costs(&problem.estimation, promised).iter().sum::<f64>();
-    problem.fitted(if cost < least { promised } else { &start }, &all)
+    if cost < least { promised.to_vec() } else { start }
 }
 
 /// The best start of a candidate's fit, and its cost: that of `base` for one that starts at the baseline.

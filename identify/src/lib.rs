@@ -8,7 +8,8 @@
 //! |---|---|
 //! | [`run`], `error` | the whole way, from flights to a report; reasons why it is not gone |
 //! | `clock`, `track` | measured channels on a grid of instants |
-//! | `rotor_track` | the rotors on that grid |
+//! | `rotor_track`, `spinning` | the rotors on that grid, and those that follow from commands |
+//! | `excerpt` | the parts of long flights in which effects are looked for |
 //! | `window` | the window, and differences that lose nothing |
 //! | `prepared`, `rows` | a flight, the equations that it allows, and their rows |
 //! | `model`, `memo` | the model's side of the equations, and what was computed of it lately |
@@ -26,7 +27,7 @@
 //! | `align`, `faults`, `trim` | clocks, sensors and trims, before anything is fitted |
 //! | `sensing` | the sensors' delays and biases, and a flight without them |
 //! | `whiteness`, `noise`, [`statistics`] | what is left, and what noise alone would leave |
-//! | `predict`, `horizons` | prediction over horizons, and tables of its errors |
+//! | `predict`, `forecast`, `horizons` | prediction over horizons, and tables of its errors |
 //! | `disturbance`, `limits` | disturbances as they were seen before a window; what predictions are limited by |
 //! | `foresight`, `loss` | predictions as a judge of effects and of the verdict |
 //! | `refine` | parameters moved to where predictions are best |
@@ -60,9 +61,11 @@ pub mod effect_reports;
 mod envelope;
 mod error;
 mod evidence;
+mod excerpt;
 mod faults;
 mod fit;
 mod fit_result;
+mod forecast;
 mod foresight;
 mod horizons;
 mod judgement;
@@ -97,6 +100,7 @@ pub mod run;
 mod select;
 mod sensing;
 mod sensor_effects;
+mod spinning;
 pub mod statistics;
 pub mod steps_ahead;
 #[cfg(test)]

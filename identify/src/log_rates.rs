@@ -29,7 +29,7 @@ pub struct LogRates {
 impl LogRates {
     /// The rates of the first of `flights`.
     pub(crate) fn of(flights: &[Prepared]) -> Self {
-        flights.first().map_or_else(Self::default, |prepared| Self::of_flight(prepared.flight))
+        flights.first().map_or_else(Self::default, |prepared| Self::of_flight(&prepared.flight))
     }
 
     fn of_flight(flight: &Flight) -> Self {

@@ -15,7 +15,7 @@ use vehicles::gaps::held_period_s;
 
 /// Usual longest time between two commands of each flight with commands.
 fn periods_s(problem: &Problem) -> impl Iterator<Item = f64> {
-    let flights = problem.flights().map(|flight| flight.flight).filter(|flight| !flight.commands_on_change);
+    let flights = problem.flights().map(|flight| &*flight.flight).filter(|flight| !flight.commands_on_change);
     flights.filter_map(|flight| held_period_s(&flight.command.time_s))
 }
 

@@ -3,20 +3,18 @@
 
 use crate::memo::{Key, Rows};
 use crate::parameter::Parameters;
-use crate::prepared::{BOX_STEPS, Equation, Held, Prepared, Tracks};
+use crate::prepared::{BOX_STEPS, Equation, Prepared, Tracks};
 use crate::rotor_track::{EachRotor, Rotors};
 use crate::sensing::SensorErrors;
+use crate::spinning::spun;
 use nalgebra::{UnitQuaternion, Vector3};
 use plant::effects::{EffectKind, FlightCondition, Quantity, Stage};
 use plant::{Actuation, Airframe, NewtonEuler, PerRotor, RigidBody, RotorState, State};
 use std::sync::Arc;
 use vehicles::Vehicle;
 
-/// The motors are simulated in steps of at most this length.
-const MOTOR_STEP_S: f64 = 0.001;
-
 /// The declared vehicle, with the parameters that a fit may change.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Model {
     /// The vehicle as it is declared.
     pub vehicle: Vehicle,
@@ -331,46 +329,6 @@ pub fn air(airframe: &Airframe, step_s: f64) -> Actuation {
     let state = State { body: RigidBody::level_at(Vector3::zeros()), rotors };
     let commands = PerRotor::filled(count, 0.0);
     *airframe.begin_tick(&mut airframe.initial_state(0, "identify", step_s), &state, &commands, step_s)
-}
-
-/// The rotors that follow from the commands: simulated in fine steps, averaged over one step about each instant.
-fn spun(airframe: &Airframe, flight: &Prepared, pose_s: f64) -> Vec<PerRotor<RotorState>> {
-    let (clock, vehicle) = (&flight.layout.clock, airframe.vehicle());
-    let count = vehicle.rotors.len();
-    let parts = (clock.step_s / MOTOR_STEP_S - 1e-9).ceil().max(1.0) as usize;
-    let step_s = clock.step_s / parts as f64;
-    let mut commands = Held::new(&flight.flight.command);
-    // Counted, not summed up: over half an hour a sum drifts past a sample, and the command would be a tick late.
-    let start_s = clock.at(0) - clock.step_s / 2.0 - pose_s;
-    let at_s = |step: usize| start_s + step as f64 * step_s;
-    let first = commands.at(start_s);
-    let mut memory = airframe.initial_state(0, "identify", step_s);
-    let steady = |rotor| RotorState::steady(vehicle.commanded_speed_rad_s(rotor, first[rotor]));
-    let mut state =
-        State { body: RigidBody::level_at(Vector3::zeros()), rotors: PerRotor::from_fn(count, steady) };
-    let mut out = Vec::with_capacity(clock.count);
-    for index in 0..clock.count {
-        let mut sum = PerRotor::filled(count, RotorState::default());
-        for part in 0..parts {
-            let (from_s, to_s) = (at_s(index * parts + part), at_s(index * parts + part + 1));
-            let command = match flight.slow_period_s {
-                // Between two slow samples of the commands there were others; held, each would act half a period late.
-                Some(_) => commands.between(f64::midpoint(from_s, to_s)),
-                // Where the grid does not lie on the commands' own, a step sees two of them.
-                None => commands.mean(from_s, to_s),
-            };
-            let actuation = airframe.begin_tick(&mut memory, &state, &command[..count], step_s);
-            let after = airframe.spun(actuation, &state.rotors, step_s);
-            let half = 0.5 / parts as f64;
-            for (sum, (before, after)) in sum.iter_mut().zip(state.rotors.iter().zip(&after)) {
-                sum.speed_rad_s += half * (before.speed_rad_s + after.speed_rad_s);
-                sum.acceleration_rad_s2 += half * (before.acceleration_rad_s2 + after.acceleration_rad_s2);
-            }
-            state.rotors = after;
-        }
-        out.push(sum);
-    }
-    out
 }
 
 /// The speeds; zeros behind the last rotor.

@@ -2,7 +2,8 @@
 //!
 //! They compare a fit with and without an effect in a small part of the time of a fit in full.
 
-use crate::fit::{Equations, Problem};
+use crate::fit::{Equations, Problem, unbounded};
+use crate::fit_result::FitResult;
 use crate::normal::{self, Block};
 
 /// A fit whose derivatives were taken at a point near: exact enough for a comparison, and not for an interval.
@@ -31,6 +32,20 @@ impl Problem<'_> {
         let cost = self.costs(&self.estimation, &start).iter().sum();
         let values = self.chord_steps(&others, start, cost);
         Near { blocks: self.blocks_with(&others, &values), free: others.free, values }
+    }
+
+    /// The fit near, as a result, of the parameters of `equations`, which are those about `values`.
+    pub fn fitted_near(&self, equations: &Equations, values: &[f64]) -> FitResult {
+        let near = self.near(equations, values, &[]);
+        let blocks = near.blocks.concat();
+        FitResult {
+            covariance: self.covariance(&blocks, equations),
+            validation_costs: self.costs_near(&near),
+            estimation_costs: blocks.iter().map(|block| block.cost).collect(),
+            unbounded: unbounded(&normal::sum(&blocks), &near.values, &near.free),
+            values: near.values,
+            free: near.free,
+        }
     }
 
     /// The values of `near` without each estimation flight in turn, as those of [`Problem::values_without`].

@@ -22,7 +22,7 @@ pub type Floor = BTreeMap<&'static str, (f64, &'static str)>;
 pub fn floor(flights: &[Prepared]) -> Floor {
     let mut floor = Floor::new();
     let mut add = |name: &'static str, unit: &'static str, of_flight: &dyn Fn(&Flight) -> Option<f64>| {
-        let found: Vec<f64> = flights.iter().filter_map(|flight| of_flight(flight.flight)).collect();
+        let found: Vec<f64> = flights.iter().filter_map(|flight| of_flight(&flight.flight)).collect();
         if !found.is_empty() {
             let mean_square = found.iter().map(|x| x * x).sum::<f64>() / found.len() as f64;
             floor.insert(name, (mean_square.sqrt(), unit));

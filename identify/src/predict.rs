@@ -3,7 +3,7 @@
 //! flown with its measured rotor speeds.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
-use crate::disturbance::{AddedAcceleration, Forecast};
+use crate::forecast::{AddedAcceleration, Forecast};
 use flights::state::{StateQuantity, VehicleState, WindowEndErrors};
 use flights::{Channel, Flight, Played, Row};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -29,8 +29,10 @@ pub struct Measured {
     played: Played,
     /// Rotor speeds in place of commands.
     rotor_speed: Option<Channel<ROTORS_MAX>>,
-    /// Longest time from the first sample that is predicted, in s.
-    span_s: f64,
+    /// Pieces of the flight in which windows lie, from first to last moment in s; empty where they lie anywhere.
+    pieces_s: Vec<(f64, f64)>,
+    /// Time from a piece's begin to its first window, in s.
+    settling_s: f64,
     /// True if the model does not turn by itself: its attitude and rates are the measured ones.
     turns_as_measured: bool,
 }
@@ -62,14 +64,15 @@ impl Measured {
         Some(Self {
             played: Played::of(flight).ok()?,
             rotor_speed,
-            span_s: f64::INFINITY,
+            pieces_s: Vec::new(),
+            settling_s: 0.0,
             turns_as_measured: false,
         })
     }
 
-    /// The first `span_s` of it.
-    pub fn shortened(self, span_s: f64) -> Self {
-        Self { span_s, ..self }
+    /// With windows in these pieces of the flight alone, each behind the time in which rotors settle that are simulated from its begin on.
+    pub fn within(self, pieces_s: Vec<(f64, f64)>, settling_s: f64) -> Self {
+        Self { pieces_s, settling_s, ..self }
     }
 
     /// With the measured attitude and rates in place of predicted ones, so that what is left is due to forces alone.
@@ -114,10 +117,10 @@ impl Measured {
         let mut plant = FreeFlight::new(NewtonEuler::flying(airframe, 1), begin, memory);
         plant.settle_rotors(&before.command[..count]);
         let (mut ends, mut pushing) = (vec![Vec::new(); windows.len()], push(start_s));
-        let mut begin_tick = 0;
-        let span_s = (end_s - start_s + SLACK_S).min(self.span_s);
-        let mut speed_hint = 0;
-        for tick in 1..=(span_s / tick_s) as usize {
+        let (mut begin_tick, mut tick, mut speed_hint) = (0, 0, 0);
+        let last_tick = ((end_s - start_s + SLACK_S) / tick_s) as usize;
+        while tick < last_tick {
+            tick += 1;
             // A push acts over the tick: half of it before, half behind.
             let over_tick = (!pushing.is_none()).then(|| pushing.at(at_s(tick) - 0.5 * tick_s));
             let kick = |plant: &mut FreeFlight| {
@@ -142,7 +145,7 @@ impl Measured {
             }
             let Some(at) = windows.iter().position(|window| *window == tick - begin_tick) else { continue };
             let (from_s, measured) = (at_s(begin_tick), body(&before));
-            if self.played.counts(from_s, at_s(tick)) {
+            if self.is_chosen(from_s, at_s(tick)) && self.played.counts(from_s, at_s(tick)) {
                 let position_W_m = begin.position_W_m + horizons_s[at] * begin.velocity_W_m_s;
                 ends[at].push(WindowEnd {
                     from_s,
@@ -152,11 +155,40 @@ impl Measured {
                 });
             }
             if at + 1 == windows.len() {
-                (begin, begin_tick, pushing) = (measured, tick, push(at_s(tick)));
-                plant.set_body(&measured);
+                // A battery's charge depends on all that was flown before.
+                if plant.battery().is_none() {
+                    let next_s = self.next_window_s(at_s(tick), at_s(tick) - from_s);
+                    let next = ((next_s - start_s - SLACK_S) / tick_s).ceil() as usize;
+                    if next > last_tick {
+                        break;
+                    }
+                    if next > tick {
+                        tick = next;
+                        before = self.played.at(at_s(tick), &mut hint);
+                        plant.settle_rotors(&before.command[..count]);
+                    }
+                }
+                (begin, begin_tick, pushing) = (body(&before), tick, push(at_s(tick)));
+                plant.set_body(&begin);
             }
         }
         ends
+    }
+
+    /// The first moment from `from_s` on with a whole window in a piece.
+    fn next_window_s(&self, from_s: f64, window_s: f64) -> f64 {
+        if self.pieces_s.is_empty() {
+            return from_s;
+        }
+        let next = self.pieces_s.iter().find(|piece| from_s.max(piece.0) + window_s <= piece.1);
+        next.map_or(f64::INFINITY, |piece| from_s.max(piece.0))
+    }
+
+    /// True if the window lies in a piece, with rotors that have settled.
+    fn is_chosen(&self, from_s: f64, to_s: f64) -> bool {
+        let holds =
+            |piece: &(f64, f64)| piece.0 + self.settling_s <= from_s + SLACK_S && to_s <= piece.1 + SLACK_S;
+        self.pieces_s.is_empty() || self.pieces_s.iter().any(holds)
     }
 }
 
@@ -280,6 +312,34 @@ mod tests {
                 let expected = Vector3::new(0.2 * horizon_s * horizon_s, 0.0, 2.0);
                 let found = ends[0].simulated.position_W_m;
                 assert!((found - expected).norm() < 1e-9, "{period_s} s, after {horizon_s} s: {found}");
+            }
+        }
+    }
+
+    /// Windows in pieces of a flight are those of the whole flight that lie in them.
+    #[test]
+    fn windows_in_pieces_are_those_of_the_whole_flight() {
+        let moves = |t: f64| [2.0 * libm::sin(1.3 * t), libm::cos(0.9 * t), 2.0];
+        let flight = flown([30.0, 0.01], moves, |t| [0.2 * libm::sin(t), 0.0, 0.1 * t]);
+        let ends = |measured: Measured| {
+            measured.ends_within(Airframe::new(hummingbird()), &[0.1, 0.5], |_| Forecast::none())
+        };
+        let whole = ends(Measured::of(&flight).unwrap());
+        let pieces_s = vec![(3.0, 8.0), (20.0, 26.25)];
+        let within = ends(Measured::of(&flight).unwrap().within(pieces_s.clone(), 0.5));
+        for (whole, within) in whole.iter().zip(&within) {
+            let chosen: Vec<&WindowEnd> = whole
+                .iter()
+                .filter(|end| {
+                    pieces_s.iter().any(|piece| (piece.0 + 0.5..=piece.1 - 0.5).contains(&end.from_s))
+                })
+                .collect();
+            assert_eq!(within.len(), chosen.len());
+            assert!(within.len() > 15, "{}", within.len());
+            for (found, expected) in within.iter().zip(chosen) {
+                assert!((found.from_s - expected.from_s).abs() < 1e-9);
+                let apart = (found.simulated.velocity_W_m_s - expected.simulated.velocity_W_m_s).norm();
+                assert!(apart < 1e-9, "{} s: {apart}", found.from_s);
             }
         }
     }

@@ -3,13 +3,17 @@
 
 use crate::clock::{Clock, Lateness};
 use crate::memo::{Memo, Recent};
+use crate::predict::Measured;
 use crate::rig;
 use crate::rotor_track::{EachRotor, Rotors};
+use crate::sensing::SensorErrors;
 use crate::track::{Track, valid_about};
 use crate::unusable::Unusable;
 use crate::window::{NUMEROV, SIMPSON, Window, central_difference, second_difference};
 use flights::{Channel, Flight, KnownRotors, SETTLE_S};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use std::borrow::Cow;
+use std::ops::Range;
 use std::sync::Arc;
 use vehicles::gaps::held_period_s;
 use vehicles::{CommandMap, MotorModel, ROTORS_MAX, Vehicle};
@@ -125,6 +129,8 @@ pub struct Tracks {
 /// Grid steps in a box of the window, which is also the way from knot to knot.
 pub const BOX_STEPS: usize = 5;
 
+/// Samples are kept so far before and behind a piece of a flight, in s: beyond all delays that are tried.
+const BESIDE_S: f64 = 1.0;
 /// Delays of sensors that are tried take samples from beside an instant: so much is left out at the ends of a flight.
 const END_MARGIN_S: f64 = 0.2;
 /// And so much about its gaps, where that leaves at least [`WORTH`] of the windows.
@@ -138,7 +144,7 @@ const SLACK_S: f64 = 1e-6;
 #[derive(Debug)]
 pub struct Prepared<'f> {
     /// The flight.
-    pub flight: &'f Flight,
+    pub flight: Cow<'f, Flight>,
     /// Its layout.
     pub layout: Layout,
     /// Lateness of its pose beyond that of `sensor-delay`, and of its rotor speeds.
@@ -153,6 +159,8 @@ pub struct Prepared<'f> {
     recent_tracks: Recent<(f64, f64, Lateness), Tracks>,
     /// Measured rotors, by the delay of the pose.
     pub recent_rotors: Recent<f64, Rotors>,
+    /// Measured states for predictions, by the errors of the sensors; `None` where there is nothing to predict with.
+    pub recent_measured: Recent<SensorErrors, Option<Measured>>,
     /// True if the vehicle accelerates as it leans, or moves further to the side than any rig allows.
     pub moves_freely: bool,
 }
@@ -189,7 +197,7 @@ impl<'f> Prepared<'f> {
         let layout = Layout { clock, knots: Vec::new(), equations, windows };
         let (late, distrusted) = (Lateness::default(), [false; ROTORS_MAX]);
         let mut prepared = Self {
-            flight,
+            flight: Cow::Borrowed(flight),
             layout,
             late,
             distrusted,
@@ -197,15 +205,60 @@ impl<'f> Prepared<'f> {
             memo: Memo::default(),
             recent_tracks: Recent::default(),
             recent_rotors: Recent::default(),
+            recent_measured: Recent::default(),
             moves_freely: rig::moves_freely(flight, propulsion.gravity_m_s2),
         };
         prepared.layout.knots = prepared.knots(propulsion);
         if prepared.layout.knots.len() >= 3 { Ok(prepared) } else { Err(prepared.unusable(propulsion)) }
     }
 
+    /// The flight with these `pieces` of its grid alone, ranges of instants in rising order. A piece's knots are those whose windows lie in it, with
+    /// rotors that have settled.
+    pub fn within(&self, pieces: &[Range<usize>]) -> Self {
+        let clock = self.layout.clock.within(pieces);
+        let (before, behind) = self.margins();
+        let (mut knots, mut first) = (Vec::new(), 0);
+        for piece in pieces {
+            let inside = piece.start + before..piece.end.saturating_sub(behind);
+            let of_piece = self.layout.knots.iter().filter(|knot| inside.contains(knot));
+            knots.extend(of_piece.map(|knot| knot - piece.start + first));
+            first += piece.len();
+        }
+        // Delays take samples from beside an instant.
+        let sampled_s: Vec<(f64, f64)> =
+            clock.pieces_s().iter().map(|(from_s, to_s)| (from_s - BESIDE_S, to_s + BESIDE_S)).collect();
+        Self {
+            flight: Cow::Owned(Flight {
+                command: self.flight.command.clone(),
+                ..self.flight.within(&sampled_s)
+            }),
+            layout: Layout { clock, knots, ..self.layout.clone() },
+            late: self.late,
+            distrusted: self.distrusted,
+            slow_period_s: self.slow_period_s,
+            memo: Memo::default(),
+            recent_tracks: Recent::default(),
+            recent_rotors: Recent::default(),
+            recent_measured: Recent::default(),
+            moves_freely: self.moves_freely,
+        }
+    }
+
+    /// Instants from the begin of a piece of the flight to its first knot, and from its last knot to its end.
+    pub fn margins(&self) -> (usize, usize) {
+        // Slopes on the grid take a box to both sides.
+        let reach = self.reach() + BOX_STEPS;
+        ((self.settling_s() / self.layout.clock.step_s).ceil() as usize + reach, reach)
+    }
+
+    /// Time after which rotors are known that are simulated from any state on.
+    pub fn settling_s(&self) -> f64 {
+        if self.flight.command.is_empty() { 0.0 } else { SETTLE_S }
+    }
+
     /// The reason why less than three windows are left.
     fn unusable(&self, propulsion: &Propulsion) -> Unusable {
-        let (flight, clock) = (self.flight, &self.layout.clock);
+        let (flight, clock) = (&*self.flight, &self.layout.clock);
         let (from_s, to_s) = (clock.at(0), clock.at(clock.count - 1));
         let known = KnownRotors::of(flight);
         if !known.stretches_s().iter().any(|stretch| stretch.0 < to_s && from_s < stretch.1) {
@@ -265,7 +318,7 @@ impl<'f> Prepared<'f> {
     }
 
     fn sampled(&self, pose_s: f64, imu_s: f64) -> Tracks {
-        let (flight, clock) = (self.flight, &self.layout.clock);
+        let (flight, clock) = (&*self.flight, &self.layout.clock);
         let imu_s = imu_s - pose_s;
         let position = Track::sampled(&flight.position, self.late.position_s, clock);
         let velocity_track = Track::sampled(&flight.velocity, self.late.velocity_s, clock);
@@ -317,7 +370,7 @@ impl<'f> Prepared<'f> {
     /// `None` where that is not logged, or not compared.
     pub fn translation_rows(&self, translation: Translation) -> Option<Vec<f64>> {
         self.offset_of(Equation::Acceleration).filter(|_| !self.is_assumed())?;
-        let channel = translation.channel(self.flight);
+        let channel = translation.channel(&self.flight);
         let (measured, _) = translation.windows(self.layout.clock.step_s);
         let values = || Track::sampled(channel, 0.0, &self.layout.clock).values;
         (!channel.is_empty()).then(|| self.rows_over(&measured, &values()))
@@ -344,7 +397,7 @@ impl<'f> Prepared<'f> {
     /// Takes its pose and rotor speeds as `late`, and leaves out the knots about which it was not sampled then.
     pub fn set_late(&mut self, late: Lateness) {
         self.late = late;
-        let (flight, clock) = (self.flight, &self.layout.clock);
+        let (flight, clock) = (&*self.flight, &self.layout.clock);
         let reach = self.reach();
         let moved = [
             sampled_if_late(&flight.attitude, late.attitude_s, clock),
@@ -357,7 +410,7 @@ impl<'f> Prepared<'f> {
             self.layout.knots.retain(|knot| about[*knot]);
         }
         // Their rows are those of the knots before.
-        (self.memo, self.recent_tracks, self.recent_rotors) = Default::default();
+        (self.memo, self.recent_tracks, self.recent_rotors, self.recent_measured) = Default::default();
     }
 
     /// Instants that a window reaches to both sides.
@@ -383,7 +436,7 @@ impl<'f> Prepared<'f> {
     }
 
     fn valid(&self, propulsion: &Propulsion, gap_margin_s: f64) -> Vec<bool> {
-        let (flight, clock) = (self.flight, &self.layout.clock);
+        let (flight, clock) = (&*self.flight, &self.layout.clock);
         let mut valid = vec![true; clock.count];
         let mut require = |other: Vec<bool>| valid.iter_mut().zip(other).for_each(|(all, one)| *all &= one);
         let about = [

@@ -33,8 +33,6 @@ const STEPS_MAX: usize = 8;
 const LEAST_STEP_GAIN: f64 = 1e-3;
 /// Shares of a step that are tried.
 const SHARES: [f64; 5] = [1.0, 0.5, 0.25, 0.1, 0.03];
-/// Flights are refined on up to so much of their time, in s.
-const SPAN_MAX_S: f64 = 120.0;
 
 /// Parameters that were moved on to where predictions are best, and the equations of prediction errors about them.
 pub struct Refined<'p, 'f> {
@@ -85,7 +83,7 @@ struct Linearised {
     residuals: Vec<Residuals>,
     /// By parameter, flight and horizon, and window.
     slopes: Vec<Vec<Vec<WindowErrors>>>,
-    /// The variance of a residual at the start, in whose units the knowledge that the equations have counts.
+    /// The variance of a residual, in whose units the knowledge that the equations have counts.
     variance: f64,
 }
 
@@ -150,7 +148,7 @@ impl Refined<'_, '_> {
             free: all,
             models: self.refinement.models.clone(),
         };
-        let about = wide.linearised(&self.about.values, self.about.variance);
+        let about = wide.linearised(&self.about.values);
         let total = normal::sum(&plain(wide.blocks(&about)));
         let cost_after = |columns: &[usize]| {
             let block = total.of(columns);
@@ -207,22 +205,41 @@ impl Refinement<'_, '_> {
     /// The values after some steps and the equations about them; `None` if nothing gains. `start` is what the equations of motion say.
     fn descended(&self, start: &[f64], near: Option<&[f64]>) -> Option<(Vec<f64>, Linearised)> {
         let at_start = self.residuals(start);
-        let rows = ERRORS * at_start.iter().map(Vec::len).sum::<usize>();
-        let variance = cost(&at_start) / rows.max(1) as f64;
+        let variance = variance(&at_start);
         let near = near.map(|near| self.with_refined(start, near)).filter(|near| {
             cost(&self.residuals(near)) + self.prior(start, variance, near).cost < cost(&at_start)
         });
-        let mut about = self.linearised(near.as_deref().unwrap_or(start), variance);
+        let mut about = self.linearised(near.as_deref().unwrap_or(start));
         for number in 0..STEPS_MAX {
-            let Some((next, gain)) = self.next(&about, start, &[]) else {
+            let Some((moved, gain)) = self.next(&about, start, &[], &SHARES) else {
                 return (number > 0 || near.is_some()).then(|| (about.values.clone(), about));
             };
-            about = self.linearised(&next, about.variance);
+            // Residuals change more than their derivatives, and take a small part of the time.
+            let moved = self.chord_steps(moved, start, &[], &[1.0]);
+            about = self.linearised(&moved.values);
             if gain < LEAST_STEP_GAIN {
                 break;
             }
         }
         Some((about.values.clone(), about))
+    }
+
+    /// The equations after steps with the derivatives as they were, while these gain.
+    fn chord_steps(
+        &self,
+        mut about: Linearised,
+        start: &[f64],
+        dropped: &[usize],
+        shares: &[f64],
+    ) -> Linearised {
+        for _ in 0..STEPS_MAX {
+            let Some((next, gain)) = self.next(&about, start, dropped, shares) else { break };
+            about = next;
+            if gain < LEAST_STEP_GAIN {
+                break;
+            }
+        }
+        about
     }
 
     /// The values of `start` with the refined ones of `others`.
@@ -235,21 +252,19 @@ impl Refinement<'_, '_> {
     /// The equations with the parameters `dropped` at their baselines and the others moved to that. The derivatives stay, so that the errors come
     /// out somewhat too large.
     fn beside(&self, about: &Linearised, start: &[f64], dropped: &[usize]) -> Linearised {
-        let mut about = about.clone();
-        let blocks = plain(self.blocks(&about));
-        about = self.moved(&about, self.stepped(&about, start, blocks, dropped));
-        for _ in 0..STEPS_MAX {
-            let Some((next, gain)) = self.next(&about, start, dropped) else { break };
-            about = self.moved(&about, next);
-            if gain < LEAST_STEP_GAIN {
-                break;
-            }
-        }
-        about
+        let blocks = plain(self.blocks(about));
+        let moved = self.moved(about, self.stepped(about, start, blocks, dropped));
+        self.chord_steps(moved, start, dropped, &SHARES)
     }
 
-    /// The values after a step that gains, and the part that it gains.
-    fn next(&self, about: &Linearised, start: &[f64], dropped: &[usize]) -> Option<(Vec<f64>, f64)> {
+    /// The equations after the greatest of these shares of a step that gains, with the derivatives as they were, and the part that it gains.
+    fn next(
+        &self,
+        about: &Linearised,
+        start: &[f64],
+        dropped: &[usize],
+        shares: &[f64],
+    ) -> Option<(Linearised, f64)> {
         let blocks = plain(self.blocks(about));
         let cost = normal::sum(&blocks).cost + self.prior(start, about.variance, &about.values).cost;
         let whole = self.stepped(about, start, blocks, dropped);
@@ -257,9 +272,9 @@ impl Refinement<'_, '_> {
             self.free.len(),
             self.free.iter().map(|at| whole[*at] - about.values[*at]),
         );
-        SHARES.iter().find_map(|share| {
-            let next = self.problem.moved(&about.values, &self.free, &(&step * *share));
-            let of_next = self::cost(&self.residuals(&next)) + self.prior(start, about.variance, &next).cost;
+        shares.iter().find_map(|share| {
+            let next = self.moved(about, self.problem.moved(&about.values, &self.free, &(&step * *share)));
+            let of_next = self::cost(&next.residuals) + self.prior(start, about.variance, &next.values).cost;
             (of_next < cost).then(|| (next, 1.0 - of_next / cost))
         })
     }
@@ -311,14 +326,11 @@ impl Refinement<'_, '_> {
             };
             ends.iter().map(one).collect()
         };
-        ends(self.problem, flight, values, &self.models, (&REFINED_S, SPAN_MAX_S))
-            .into_iter()
-            .map(of_horizon)
-            .collect()
+        ends(self.problem, flight, values, &self.models, &REFINED_S).into_iter().map(of_horizon).collect()
     }
 
     /// The residuals about `values` with their derivatives.
-    fn linearised(&self, values: &[f64], variance: f64) -> Linearised {
+    fn linearised(&self, values: &[f64]) -> Linearised {
         let residuals = self.residuals(values);
         let slopes_of = |at: &usize| {
             let entry = &self.problem.model.parameters.all[*at];
@@ -328,7 +340,7 @@ impl Refinement<'_, '_> {
             slopes(&residuals, &self.residuals(&changed), step)
         };
         let slopes = self.free.par_iter().map(slopes_of).collect();
-        Linearised { values: values.to_vec(), residuals, slopes, variance }
+        Linearised { values: values.to_vec(), variance: variance(&residuals), residuals, slopes }
     }
 
     /// The same about other `values`, with the derivatives as they were.
@@ -420,6 +432,11 @@ fn plain(blocks: Vec<(usize, Block)>) -> Vec<Block> {
 /// The loss of all residuals.
 fn cost(residuals: &[Residuals]) -> f64 {
     residuals.iter().flatten().flat_map(|(_, row)| row).map(|residual| loss(*residual)).sum()
+}
+
+/// The mean loss of a residual.
+fn variance(residuals: &[Residuals]) -> f64 {
+    cost(residuals) / (ERRORS * residuals.iter().map(Vec::len).sum::<usize>()).max(1) as f64
 }
 
 /// Twice the soft L1 loss of a residual.

@@ -9,7 +9,7 @@ use crate::digits::quantity;
 use crate::fit::Problem;
 use crate::fit_result::FitResult;
 use crate::foresight::Foresight;
-use crate::judgement::{FALSE_RATE, Judged, at_bound, fitted, joint_p_value};
+use crate::judgement::{FALSE_RATE, Judged, Way, at_bound, fitted, joint_p_value};
 use crate::logging;
 use crate::refine::{Refined, refined};
 use crate::sensor_effects::SENSOR_EFFECTS;
@@ -159,7 +159,7 @@ impl Revisions {
                     p_value,
                     is_accepted: true,
                     is_logging: false,
-                    is_promise: false,
+                    way: Way::Full,
                 });
             }
         }

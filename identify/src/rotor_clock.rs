@@ -39,7 +39,7 @@ struct Changes {
 /// The lateness of the rotor speeds of `flight`; `None` where commands drive it, or the channels that show it are not logged or
 /// show too little.
 pub fn of_rotor_speed(problem: &Problem, flight: &Prepared) -> Option<Found> {
-    let measured = flight.flight;
+    let measured = &*flight.flight;
     let has_inertial_unit = !measured.angular_velocity.is_empty();
     if !measured.command.is_empty()
         || measured.rotor_speed.is_empty()
@@ -59,9 +59,13 @@ impl Changes {
     fn of(problem: &Problem, flight: &Prepared) -> Self {
         let layout = &flight.layout;
         let step_s = layout.clock.step_s;
-        // Shifted windows have to stay on the grid, with a step to both sides for the derivative, and one for the line between two.
+        // Shifted windows have to stay on a piece of the grid, with a step to both sides for the derivative, and one for the line between two.
         let margin = (SEARCHED_S / step_s).ceil() as usize + 3 + flight.reach();
-        let is_inside = |knot: usize| knot >= margin && knot + BOX_STEPS + margin < layout.clock.count;
+        let clock = &layout.clock;
+        let is_inside = |knot: usize| {
+            let end = knot + BOX_STEPS + margin;
+            knot >= margin && end < clock.count && clock.piece(knot - margin) == clock.piece(end)
+        };
         let pairs = layout.knots.windows(2).enumerate();
         let kept = pairs.filter(|(_, pair)| pair[1] - pair[0] == BOX_STEPS && is_inside(pair[0]));
         let knots: Vec<(usize, usize)> = kept.map(|(at, pair)| (at, pair[0])).collect();

@@ -7,6 +7,7 @@ use crate::confounded::rivals;
 use crate::effect_reports;
 use crate::envelope;
 use crate::error::{faulty, no_flight};
+use crate::excerpt::{self, excerpt, on_all};
 use crate::faults::{self, Fault};
 use crate::fit::Problem;
 use crate::horizons::{of_role, predictions};
@@ -97,10 +98,17 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
     let (mut problem, mut flight_reports, offsets) = aligned(&vehicle, &declared, set, &mut faults)?;
     let all: Vec<&Prepared> = problem.flights().collect();
     let (open, unidentifiable) = candidates(&problem.model.parameters, &all);
-    let selection = select(&mut problem, &open, progress);
+    let mut excerpt = excerpt(&problem);
+    let searched = excerpt.as_mut().unwrap_or(&mut problem);
+    let mut selection = select(searched, &open, progress);
     progress("confounded effects");
-    let mut effects = effect_reports::judged(&problem, &selection);
-    let rivals = rivals(&problem, &selection, &open);
+    let mut effects = effect_reports::judged(searched, &selection);
+    let rivals = rivals(searched, &selection, &open);
+    if let Some(excerpt) = &excerpt {
+        progress("parameters on all flights");
+        selection = on_all(&mut problem, excerpt, selection);
+        note_excerpt(excerpt, &mut flight_reports);
+    }
     effect_reports::add_accepted(&problem, &selection, &rivals, &mut effects);
     effect_reports::add_undetermined(&problem, &selection, &unidentifiable, &mut effects);
     note_logging(&problem, &selection, &mut flight_reports);
@@ -114,7 +122,8 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
         before: whiteness(&problem, &selection.before.values),
         after: whiteness(&problem, values),
     };
-    let envelope = envelope::of(problem.test.iter().map(|flight| (flight.flight, window_s(&flight.layout))));
+    let envelope =
+        envelope::of(problem.test.iter().map(|flight| (&*flight.flight, window_s(&flight.layout))));
     let report = Report {
         vehicle: set.vehicle.display().to_string(),
         verdict: effect_reports::verdict(&problem, &selection),
@@ -305,6 +314,14 @@ fn flight_report(flight: &Flight, prepared: Option<&Prepared>) -> FlightReport {
             .collect(),
         assumed: flight.assumed.clone(),
         notes: flight.notes.clone(),
+    }
+}
+
+/// Notes how much of each flight effects were looked for in.
+fn note_excerpt(excerpt: &Problem, reports: &mut [FlightReport]) {
+    for flight in excerpt.flights() {
+        let of_flight = reports.iter_mut().filter(|report| report.name == flight.flight.name);
+        of_flight.for_each(|report| report.notes.push(excerpt::note(flight)));
     }
 }
 

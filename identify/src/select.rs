@@ -22,10 +22,11 @@
 //! [`FALSE_RATE`] once more. The rounds end when nothing changes any more.
 
 use crate::candidate::{Candidate, free_parameters};
-use crate::fit::{Problem, unbounded};
+use crate::fit::{Equations, Problem, unbounded};
 use crate::fit_result::FitResult;
 use crate::judgement::{
-    FALSE_RATE, Judged, fitted, fitted_from, is_clearly_worse, is_worse, judged, p_value, start, without,
+    FALSE_RATE, Judged, Way, fitted, fitted_from, is_clearly_worse, is_worse, judged, p_value, start,
+    start_from, without,
 };
 use crate::logging;
 use crate::normal::{self, Block};
@@ -36,8 +37,10 @@ use std::collections::BTreeMap;
 
 /// Steps of a promise from a guess: nothing but the candidate's own derivatives is computed again.
 const PROMISE_STEPS: usize = 3;
-/// Number of candidates of a round that are fitted fully.
+/// Number of candidates of a round that are fitted.
 const CONFIRMED: usize = 4;
+/// Derivatives of another point serve where steps with them take off at least this part of what was promised.
+const AS_PROMISED: f64 = 0.5;
 /// More rounds than there are effects worth naming.
 const ROUNDS_MAX: usize = 12;
 /// Two that mask each other are looked for where this many times the cost is left that all candidates together
@@ -219,41 +222,82 @@ fn round(
     let level = rate / open.len().max(1) as f64;
     let screen = Screen::of(problem, base, accepted, &open);
     let judge = |candidate: &&Candidate| {
-        // What acts on time is far from linear, and each such candidate is a rival of all others: no promise will do.
+        if candidate.kind.guesses.is_empty() {
+            let promised = screen.promised(problem, base, candidate);
+            return Judged { way: Way::Promise, ..judged(problem, base, candidate, promised, level) };
+        }
+        let promised = promised_from_guess(problem, base, accepted, candidate);
+        let promise = Judged { way: Way::Promise, ..judged(problem, base, candidate, promised, level) };
+        // Each candidate that acts on time is a rival of all others: a promise will not do.
         let is_timing = candidate.kind.is_delay || candidate.kind.changes_drive;
-        let is_guessed = !candidate.kind.guesses.is_empty();
-        let found = match (is_guessed, is_timing) {
-            (false, _) => screen.promised(problem, base, candidate),
-            (true, false) => promised_from_guess(problem, base, accepted, candidate),
-            (true, true) => {
-                let promised = promised_from_guess(problem, base, accepted, candidate).values;
-                fitted_from(problem, base, accepted, candidate, &promised)
-            }
-        };
-        Judged { is_promise: !(is_guessed && is_timing), ..judged(problem, base, candidate, found, level) }
+        if is_timing {
+            fitted_as_promised(problem, &screen, (base, accepted), &promise, level)
+        } else {
+            promise
+        }
     };
     let mut all: Vec<Judged> = open.par_iter().map(judge).collect();
-    confirm(problem, base, accepted, &mut all, level);
-    let taken = best(problem, &all);
-    Round { judged: all, taken }
+    confirm(problem, &screen, (base, accepted), &mut all, level);
+    // What is taken is fitted in full, and may be another candidate then.
+    loop {
+        let taken = best(problem, &all);
+        match taken {
+            Some(at) if all[at].way != Way::Full => {
+                let Judged { candidate, fitted, .. } = &all[at];
+                let fitted = problem.fitted(&fitted.values, &fitted.free);
+                all[at] = judged(problem, base, candidate, fitted, level);
+            }
+            _ => return Round { judged: all, taken },
+        }
+    }
 }
 
-/// Fits those in earnest of whom the linearised equations promise most; a promise alone is not accepted. Those that start at a
+/// Fits those of whom the linearised equations promise most; a promise alone is not accepted. Those that start at a
 /// guess are far from linear, so that their place among promises says little: all of them are fitted that promise enough.
-fn confirm(problem: &Problem, base: &FitResult, accepted: &[Candidate], all: &mut [Judged], level: f64) {
+fn confirm(
+    problem: &Problem,
+    screen: &Screen,
+    (base, accepted): (&FitResult, &[Candidate]),
+    all: &mut [Judged],
+    level: f64,
+) {
     let mut promises: Vec<&mut Judged> =
-        all.iter_mut().filter(|judged| judged.is_promise && judged.is_accepted).collect();
+        all.iter_mut().filter(|judged| judged.way == Way::Promise && judged.is_accepted).collect();
     let is_guessed = |judged: &Judged| !judged.candidate.kind.guesses.is_empty();
     promises.sort_by(|a, b| is_guessed(b).cmp(&is_guessed(a)).then(b.gain.total_cmp(&a.gain)));
     let guessed = promises.iter().filter(|judged| is_guessed(judged)).count();
     promises.into_par_iter().enumerate().for_each(|(place, promise)| {
         if place < guessed + CONFIRMED {
-            let fitted = fitted_from(problem, base, accepted, &promise.candidate, &promise.fitted.values);
-            *promise = judged(problem, base, &promise.candidate, fitted, level);
+            *promise = fitted_as_promised(problem, screen, (base, accepted), promise, level);
         } else {
             promise.is_accepted = false;
         }
     });
+}
+
+/// The candidate of a promise, fitted with the derivatives at hand; in full where they do not lead as far as promised.
+fn fitted_as_promised(
+    problem: &Problem,
+    screen: &Screen,
+    (base, accepted): (&FitResult, &[Candidate]),
+    promise: &Judged,
+    level: f64,
+) -> Judged {
+    let candidate = &promise.candidate;
+    let near = if candidate.kind.guesses.is_empty() {
+        let all = [screen.accepted.as_slice(), &candidate.free].concat();
+        problem.fitted_near(&screen.equations.of(&all), &base.values)
+    } else {
+        let start = start_from(problem, base, candidate, &promise.fitted.values);
+        let known = (base.values.as_slice(), screen.accepted.as_slice());
+        problem.fitted_near(&problem.equations_near(known, &start, &candidate.free), &start)
+    };
+    let promised = base.estimation_cost() - promise.fitted.estimation_cost();
+    if base.estimation_cost() - near.estimation_cost() > AS_PROMISED * promised {
+        return Judged { way: Way::Near, ..judged(problem, base, candidate, near, level) };
+    }
+    let fitted = fitted_from(problem, base, accepted, candidate, &promise.fitted.values);
+    judged(problem, base, candidate, fitted, level)
 }
 
 /// The fit that a few steps from the best start promise, with the derivatives by the accepted parameters as they are at `base`.
@@ -334,7 +378,7 @@ fn without_idle(
 
 /// Linearised equations from which the fit of each candidate is predicted.
 struct Screen {
-    columns: Vec<usize>,
+    equations: Equations,
     estimation: Vec<normal::Block>,
     validation: Vec<normal::Block>,
     accepted: Vec<usize>,
@@ -345,16 +389,17 @@ impl Screen {
         let linear = open.iter().filter(|candidate| candidate.kind.guesses.is_empty());
         let mut columns = free_parameters(accepted);
         columns.extend(linear.flat_map(|candidate| candidate.free.clone()));
-        let blocks = |flights| problem.blocks(flights, &base.values, &columns);
-        let (estimation, validation) = (blocks(&problem.estimation), blocks(&problem.validation));
-        Self { columns, estimation, validation, accepted: free_parameters(accepted) }
+        let equations = problem.equations(&base.values, &columns);
+        let validation = problem.blocks(&problem.validation, &base.values, &columns);
+        Self { estimation: equations.all(), equations, validation, accepted: free_parameters(accepted) }
     }
 
     /// The fit that the linearised equations promise.
     fn promised(&self, problem: &Problem, base: &FitResult, candidate: &Candidate) -> FitResult {
         let wanted: Vec<usize> = self.accepted.iter().chain(&candidate.free).copied().collect();
+        let columns = &self.equations.free;
         let at: Vec<usize> =
-            wanted.iter().filter_map(|p| self.columns.iter().position(|column| column == p)).collect();
+            wanted.iter().filter_map(|p| columns.iter().position(|column| column == p)).collect();
         let of = |blocks: &[Block]| -> Vec<Block> { blocks.iter().map(|block| block.of(&at)).collect() };
         let (fit, test) = (of(&self.estimation), of(&self.validation));
         promise(problem, &base.values, wanted, &fit, &test)

@@ -364,7 +364,7 @@ const PARTS: usize = 3;
 /// Products for every delay of the commands.
 fn products(evidence: &Evidence, drive: Drive) -> Option<Vec<Delayed>> {
     let turning = evidence.measured(Equation::AngularAcceleration)?;
-    let flight = evidence.flight.flight;
+    let flight = &*evidence.flight.flight;
     let is_absent =
         if drive == Drive::Command { flight.command.is_empty() } else { flight.rotor_speed.is_empty() };
     if is_absent || evidence.flight.is_assumed() {

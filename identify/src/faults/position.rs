@@ -35,7 +35,7 @@ fn fault(evidence: &Evidence, channel: String, kind: &'static str, expected: &st
 
 /// Jumps in the channel, and those that its reader removed.
 fn jumps(evidence: &Evidence) -> Option<Fault> {
-    let flight = evidence.flight.flight;
+    let flight = &*evidence.flight.flight;
     let mut alone = Flight::new("", "", Role::Fit);
     alone.position.clone_from(&flight.position);
     flights::leave_out_jumps(&mut alone);
@@ -45,7 +45,7 @@ fn jumps(evidence: &Evidence) -> Option<Fault> {
 }
 
 fn frozen(evidence: &Evidence, axis: usize) -> Option<Fault> {
-    let flight = evidence.flight.flight;
+    let flight = &*evidence.flight.flight;
     let stretch = longest(evidence.flight, &flight.position, axis, FROZEN_S, |_| false)?;
     let expected = "a number that changes in flight";
     let channel = format!("position.{}", axis_name(axis));

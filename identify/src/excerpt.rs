@@ -1,0 +1,179 @@
+//! Excerpts: effects are looked for in parts of long flights, and their parameters are fitted on all of them.
+//!
+//! A search tries some twenty effects in each of several rounds. What is worth naming shows in minutes, so that more than [`SEARCH_S`] of estimation data
+//! would take longer and name the same.
+
+use crate::candidate::free_parameters;
+use crate::fit::Problem;
+use crate::prepared::Prepared;
+use crate::refine::refined;
+use crate::select::Selection;
+use std::ops::Range;
+
+/// Effects are looked for in about so much of the estimation data, in s; tuned, no source.
+const SEARCH_S: f64 = 160.0;
+/// Their parameters are refined by predictions of about so much of it, in s.
+const REFINED_S: f64 = 600.0;
+/// The report's predictions are made in about so much of a flight, in s, and its clocks are aligned by as much.
+const FLIGHT_S: f64 = 300.0;
+/// Length of a piece of a flight, in s: many times as long as manoeuvres and disturbances remember themselves.
+const PIECE_S: f64 = 10.0;
+/// Nothing is left out where this part of the data or more would stay.
+const MOST: f64 = 0.7;
+
+/// The problem with pieces of its flights, spread evenly over each; `None` where there is not much more than the search needs.
+pub fn excerpt<'f>(problem: &Problem<'f>) -> Option<Problem<'f>> {
+    shortened(problem, SEARCH_S)
+}
+
+/// The problem with about `time_s` of its estimation data and as much of its validation data, where it has much more.
+fn shortened<'f>(problem: &Problem<'f>, time_s: f64) -> Option<Problem<'f>> {
+    let share = |flights: &[Prepared]| time_s / flights.iter().map(Prepared::compared_s).sum::<f64>();
+    let of = |flights: &[Prepared<'f>]| {
+        let share = share(flights);
+        let of_flight = |flight| within(flight, if share < MOST { share } else { 1.0 });
+        flights.iter().map(of_flight).collect()
+    };
+    (share(&problem.estimation) < MOST).then(|| Problem {
+        model: problem.model.clone(),
+        estimation: of(&problem.estimation),
+        validation: of(&problem.validation),
+        test: Vec::new(),
+        noises: problem.noises.clone(),
+        block_s: problem.block_s,
+        shared_late_s: problem.shared_late_s,
+    })
+}
+
+/// Pieces of a flight that is long by itself; `None` of one that is not.
+pub fn of_flight<'f>(flight: &Prepared<'f>) -> Option<Prepared<'f>> {
+    let share = FLIGHT_S / flight.compared_s();
+    (share < MOST).then(|| within(flight, share))
+}
+
+/// The flight with a `share` of its time.
+fn within<'f>(flight: &Prepared<'f>, share: f64) -> Prepared<'f> {
+    flight.within(&pieces(flight, share))
+}
+
+/// A `share` of a flight: pieces in the middle of equal parts of what is compared of it.
+fn pieces(flight: &Prepared, share: f64) -> Vec<Range<usize>> {
+    let knots = &flight.layout.knots;
+    let count = (share * flight.compared_s() / PIECE_S).round().max(1.0) as usize;
+    let (before, behind) = flight.margins();
+    let bounds = |part: usize| (part * knots.len() / count, (part + 1) * knots.len() / count);
+    let piece = |part: usize| {
+        let (first, end) = bounds(part);
+        let left_out = ((1.0 - share) * (end - first) as f64) as usize;
+        let (first, end) = (first + left_out / 2, end - left_out.div_ceil(2));
+        let last = end.max(first + 1).min(knots.len()) - 1;
+        knots[first].saturating_sub(before)..(knots[last] + behind + 1).min(flight.layout.clock.count)
+    };
+    let mut pieces: Vec<Range<usize>> = (0..count).map(piece).collect();
+    pieces.dedup_by(|next, last| {
+        let is_joined = next.start <= last.end;
+        last.end = if is_joined { next.end } else { last.end };
+        is_joined
+    });
+    pieces
+}
+
+/// What was `found` in an excerpt of `problem`, with the parameters fitted on all of it, and refined by prediction errors again.
+pub fn on_all(problem: &mut Problem, excerpt: &Problem, found: Selection) -> Selection {
+    problem.noises = excerpt.noises.clone();
+    let before = problem.fitted(&problem.model.parameters.baseline(), &[]);
+    let after = problem.fitted(&found.after.values, &free_parameters(&found.accepted));
+    let shorter = shortened(problem, REFINED_S);
+    let predicted = shorter.as_ref().unwrap_or(problem);
+    let refined = found.refined.as_ref().and_then(|near| refined(predicted, &after, Some(&near.values)));
+    let refined = refined.map(|moved| moved.result);
+    Selection { before, after, refined, ..found }
+}
+
+/// The time of a flight that is compared in an excerpt, as a note for the report.
+pub fn note(flight: &Prepared) -> String {
+    let pieces = flight.layout.clock.pieces_s().len();
+    let parts = if pieces == 1 { "one piece".to_owned() } else { format!("{pieces} pieces") };
+    format!(
+        "effects are looked for in {:.0} s of it, in {parts}; their parameters are fitted on all of it",
+        flight.compared_s()
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::Problem;
+    use crate::model::Model;
+    use crate::parameter::Parameters;
+    use crate::prepared::Propulsion;
+    use crate::test_flights::{flown, hummingbird};
+    use crate::whitening::Noises;
+    use flights::{Channel, Flight};
+
+    fn problem(flights: &[Flight]) -> Problem<'_> {
+        let vehicle = hummingbird();
+        let propulsion = Propulsion::of(&vehicle);
+        let of_flight = |flight| Prepared::new(flight, None, &propulsion).unwrap();
+        Problem {
+            model: Model { parameters: Parameters::of(&vehicle, &[]), vehicle },
+            estimation: flights.iter().map(of_flight).collect(),
+            validation: Vec::new(),
+            test: Vec::new(),
+            noises: Noises::new(),
+            block_s: 2.0,
+            shared_late_s: 0.0,
+        }
+    }
+
+    fn flight(duration_s: f64) -> Flight {
+        flown(
+            [duration_s, 0.01],
+            |t| [2.0 * libm::sin(1.3 * t), 1.5 * libm::cos(0.9 * t), 0.6 + 0.3 * libm::sin(2.0 * t)],
+            |t| [0.3 * libm::sin(2.1 * t), 0.2 * libm::cos(1.7 * t), 0.1 * t],
+        )
+    }
+
+    /// The same flight with commands in place of rotor speeds.
+    fn commanded(flight: Flight) -> Flight {
+        let time_s = flight.rotor_speed.time_s.clone();
+        let hover = hummingbird().hover_command();
+        let command = |t: &f64| std::array::from_fn(|rotor| hover + 3.0 * libm::sin(5.0 * t + rotor as f64));
+        let command = Channel { values: time_s.iter().map(command).collect(), time_s };
+        Flight { command, rotor_speed: Channel::default(), ..flight }
+    }
+
+    /// The rows of an excerpt are those that the whole flight has at the same moments, with rotors measured or simulated.
+    #[test]
+    fn rows_of_an_excerpt_are_those_of_the_whole_flight() {
+        let flights = [flight(200.0), commanded(flight(250.0))];
+        let whole = problem(&flights);
+        let part = excerpt(&whole).expect("450 s are more than a search needs");
+        let values = whole.model.parameters.baseline();
+        for (whole_flight, part_flight) in whole.estimation.iter().zip(&part.estimation) {
+            let ratio = part_flight.compared_s() / whole_flight.compared_s();
+            assert!((ratio - SEARCH_S / 450.0).abs() < 0.02, "{ratio}");
+            let pieces_s = part_flight.layout.clock.pieces_s();
+            assert!(pieces_s.len() > 5 && pieces_s.windows(2).all(|pair| pair[0].1 < pair[1].0));
+            let rows = |flight: &Prepared| {
+                let residual = whole.model.residual_under(flight, &values);
+                let times = flight.layout.knots.iter().map(|knot| flight.layout.clock.at(*knot));
+                times.zip(residual.chunks(flight.width()).map(<[f64]>::to_vec)).collect::<Vec<_>>()
+            };
+            let of_whole = rows(whole_flight);
+            for (at_s, row) in rows(part_flight) {
+                let same = of_whole.iter().find(|(whole_s, _)| (whole_s - at_s).abs() < 1e-6);
+                let (_, expected) = same.expect("a knot of the whole flight");
+                let apart = row.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                // Motors that began anew differ by what is left of their lag after half a second.
+                let most = if part_flight.flight.command.is_empty() { 1e-9 } else { 0.01 };
+                assert!(apart < most, "{at_s} s: {apart}, expected at most {most}");
+            }
+        }
+    }
+
+    #[test]
+    fn flights_of_the_length_of_a_search_stay_whole() {
+        assert!(excerpt(&problem(&[flight(60.0), flight(60.0), flight(60.0)])).is_none());
+    }
+}
