@@ -2,7 +2,7 @@
 
 use crate::declaration::{Campaign, Meaning, Start, Varied};
 use crate::draw::rounded;
-use crate::row::{columns, require_different, verdict_columns};
+use crate::row::{columns, require_different, units, verdict_columns};
 use anyhow::{Context, Result, bail};
 use diagnostics::{Diagnostic, ParameterError, did_you_mean};
 use inputs::{InputFiles, sha256};
@@ -25,6 +25,8 @@ pub struct Base {
     pub files: InputFiles,
     /// Names of the figures of a row.
     pub figures: Vec<String>,
+    /// Units of the figures.
+    pub units: Vec<String>,
     /// Names of the verdicts of a row.
     pub verdicts: Vec<String>,
     /// Indices of the figures that table and report keep.
@@ -70,8 +72,8 @@ impl Base {
         require_different(&campaign.vary, &[&figures[..], &verdicts].concat())?;
         let kept = kept(campaign, &figures)?;
         let fingerprint = fingerprint(campaign, &manifest, from.as_ref(), &graph);
-        let declared = Mutex::default();
-        Ok(Self { manifest, from, files: graph.files, figures, verdicts, kept, fingerprint, declared })
+        let (units, declared) = (units(&manifest.content), Mutex::default());
+        Ok(Self { manifest, from, files: graph.files, figures, units, verdicts, kept, fingerprint, declared })
     }
 
     /// Values of `varied` for a drawn number: by key.

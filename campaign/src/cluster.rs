@@ -310,8 +310,9 @@ impl Array {
                 // Said once, however often Slurm refuses them.
                 if chunk.ends_seen == ENDS_SEEN {
                     (cluster.tell)(&format!(
-                        "task {}_{number} ended before {left} flights: {word}",
-                        chunk.array
+                        "task {}_{number} ended before {}: {word}",
+                        chunk.array,
+                        crate::report::flights(left as u64)
                     ));
                 }
                 again.push(number);
@@ -371,8 +372,9 @@ impl Array {
         let Some(chunk) = self.cancelled.values().next() else { return Ok(()) };
         let left: usize = self.cancelled.values().map(|chunk| chunk.missing.len()).sum();
         bail!(
-            "Slurm's job {} was cancelled before {left} flights were flown; the same command flies them",
-            chunk.array
+            "Slurm's job {} was cancelled before the end of {}; the same command flies the rest",
+            chunk.array,
+            crate::report::flights(left as u64)
         )
     }
 

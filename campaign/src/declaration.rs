@@ -134,11 +134,11 @@ struct Vary {
     keys: Vec<Spanned<String>>,
     #[serde(default, rename = "as")]
     meaning: Meaning,
-    values: Option<Vec<f64>>,
-    uniform: Option<[f64; 2]>,
-    log_uniform: Option<[f64; 2]>,
-    normal: Option<[f64; 2]>,
-    integers: Option<[i64; 2]>,
+    values: Option<Spanned<Vec<f64>>>,
+    uniform: Option<Spanned<[f64; 2]>>,
+    log_uniform: Option<Spanned<[f64; 2]>>,
+    normal: Option<Spanned<[f64; 2]>>,
+    integers: Option<Spanned<[i64; 2]>>,
 }
 
 fn first() -> u64 {
@@ -167,7 +167,9 @@ impl Campaign {
             let place = Place::of(name.clone(), text, &vary.span());
             Varied::of(vary.get_ref(), &place).map_err(|error| {
                 let help = "docs/campaigns.md lists the keys of [[vary]]";
-                Diagnostic::at(place.clone(), error).help(help)
+                let value = vary.get_ref().span_of(error.key());
+                let place = value.map_or(place, |span| Place::of(name.clone(), text, &span));
+                Diagnostic::at(place, error).help(help)
             })
         }))?;
         require_names(&vary)?;
@@ -338,13 +340,26 @@ impl Varied {
 }
 
 impl Vary {
+    /// Place of the value of the distribution's `key`, if it is stated.
+    fn span_of(&self, key: &str) -> Option<std::ops::Range<usize>> {
+        match key {
+            "values" => self.values.as_ref().map(Spanned::span),
+            "uniform" => self.uniform.as_ref().map(Spanned::span),
+            "log_uniform" => self.log_uniform.as_ref().map(Spanned::span),
+            "normal" => self.normal.as_ref().map(Spanned::span),
+            "integers" => self.integers.as_ref().map(Spanned::span),
+            _ => None,
+        }
+    }
+
     fn distribution(&self) -> Result<Distribution, ParameterError> {
+        let two = |numbers: &Option<Spanned<[f64; 2]>>| numbers.as_ref().map(|numbers| *numbers.get_ref());
         let stated: Vec<Distribution> = [
-            self.values.clone().map(Distribution::Values),
-            self.uniform.map(Distribution::Uniform),
-            self.log_uniform.map(Distribution::LogUniform),
-            self.normal.map(Distribution::Normal),
-            self.integers.map(Distribution::Integers),
+            self.values.as_ref().map(|values| Distribution::Values(values.get_ref().clone())),
+            two(&self.uniform).map(Distribution::Uniform),
+            two(&self.log_uniform).map(Distribution::LogUniform),
+            two(&self.normal).map(Distribution::Normal),
+            self.integers.as_ref().map(|limits| Distribution::Integers(*limits.get_ref())),
         ]
         .into_iter()
         .flatten()
@@ -397,8 +412,13 @@ mod tests {
             ("flights = 2\n[[vary]]\nvalues = [1]", "c.toml:3:1: missing key `key`"),
             (
                 "flights = 2\n[[vary]]\nkey = \"a\"\nuniform = [2, 1]",
-                "c.toml:3:1: `uniform` must be a lower limit",
+                "c.toml:5:11: `uniform` must be a lower limit",
             ),
+            (
+                "flights = 2\n[[vary]]\nkey = \"a\"\nvalues = []",
+                "c.toml:5:10: `values` must be at least one value",
+            ),
+            ("flights = 2\n[[vary]]\nkey = \"a\"\nintegers = [3, 1]", "c.toml:5:12: `integers` must be"),
             ("flights = 2\nvary = []\nflight = 3", "c.toml:4:1: unknown"),
             (
                 "sampling = \"grid\"\n[[vary]]\nkey = \"a\"\nuniform = [1, 2]",

@@ -1,6 +1,7 @@
 //! The gains file that a tuning writes: the declared one with other numbers, each with its origin.
 
-use crate::search::{Change, Outcome, TunedGain};
+use crate::report::with_unit;
+use crate::search::{Change, FigureChange, Outcome, TunedGain};
 use anyhow::{Context, Result};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -53,11 +54,26 @@ fn header(name: &str, tuning: &str, seed: u64, build: &str, outcome: &Outcome) -
     writeln!(text, "#   costs: {} ({percent:+.1} %, standard error {error:.1} %)", line(held_out.costs))?;
     let Change { before, after } = held_out.failed;
     writeln!(text, "#   flights with a condition that does not hold: {before} {after}")?;
-    for (figure, change) in &held_out.figures {
+    for (figure, FigureChange { change, unit }) in &held_out.figures {
         // A name is one line of a comment.
-        writeln!(text, "#   {}: {}", figure.escape_debug(), line(*change))?;
+        let unit = with_unit(unit);
+        writeln!(text, "#   {}: {}{}", figure.escape_debug(), line(*change), unit.escape_debug())?;
     }
     Ok(text)
+}
+
+/// Unit of the quantity at the dotted `key` of the gains file with this `text`; 1 for a number without a unit.
+///
+/// ```
+/// let text = "[roll]\np = { value = 16, unit = \"1/s^2\" }\nd = 6.0\n";
+/// assert_eq!(["roll.p", "roll.d"].map(|key| campaign::gains_file::unit(text, key)), ["1/s^2", "1"]);
+/// ```
+#[must_use]
+pub fn unit(text: &str, key: &str) -> String {
+    let document = text.parse::<DocumentMut>().unwrap_or_default();
+    let quantity = key.split('.').try_fold(document.as_item(), |item, key| item.get(key));
+    let unit = quantity.and_then(|quantity| quantity.get("unit")?.as_str());
+    unit.unwrap_or("1").to_owned()
 }
 
 /// Puts a gain at the dotted `key`, a quantity or a number; `None` if there is no such place.
@@ -88,7 +104,7 @@ fn replace(item: &mut Item, new: Value) -> Option<()> {
 #[cfg(test)]
 mod tests {
     use super::{START, text};
-    use crate::search::{Change, Comparison, Outcome, TunedGain};
+    use crate::search::{Change, Comparison, FigureChange, Outcome, TunedGain};
 
     #[test]
     fn a_gain_keeps_its_unit_and_gets_its_origin() {
@@ -97,6 +113,7 @@ mod tests {
             keys: vec![key.to_owned()],
             before,
             after,
+            unit: "1".to_owned(),
         };
         let comparison = Comparison {
             flights: 8,
@@ -104,7 +121,10 @@ mod tests {
             costs: Change { before: 2.0, after: 1.0 },
             standard_error: 0.1,
             failed: Change { before: 1.0, after: 0.0 },
-            figures: vec![("height".to_owned(), Change { before: 0.5, after: 0.25 })],
+            figures: vec![(
+                "height".to_owned(),
+                FigureChange { change: Change { before: 0.5, after: 0.25 }, unit: "m".to_owned() },
+            )],
         };
         let outcome = |gains| Outcome {
             gains,
@@ -124,7 +144,7 @@ mod tests {
         for line in [
             "pid.toml, tuned by hover.toml: hummingbus 0.1.0, CMA-ES with seed 1",
             "(-50.0 %, standard error 5.0 %)",
-            "#   height: 0.500000 0.250000",
+            "#   height: 0.500000 0.250000 m\n",
         ] {
             assert!(found.contains(line), "{found}");
         }

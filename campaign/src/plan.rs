@@ -66,11 +66,13 @@ impl Plan {
             let record = record.with_context(|| format!("{}: not a CSV file", path.display()))?;
             let line = record.position().map_or(0, csv::Position::line);
             let at = || format!("{}:{line}", path.display());
-            let numbers =
-                record.iter().map(|cell| cell.trim().parse::<f64>().ok().filter(|it| it.is_finite()));
-            let numbers = numbers.collect::<Option<Vec<f64>>>();
-            let numbers =
-                numbers.with_context(|| format!("{}: expected finite numbers, found {record:?}", at()))?;
+            let number = |(column, cell): (&String, &str)| {
+                let number = cell.trim().parse::<f64>().ok().filter(|number| number.is_finite());
+                let problem =
+                    || format!("{}: column `{column}`: expected a finite number, found `{cell}`", at());
+                number.with_context(problem)
+            };
+            let numbers = found.iter().zip(&record).map(number).collect::<Result<Vec<f64>>>()?;
             #[allow(clippy::float_cmp, reason = "whole numbers")]
             if numbers[0] != flights.len() as f64 {
                 bail!("{}: expected flight {}, found {}", at(), flights.len(), numbers[0]);
@@ -138,7 +140,8 @@ mod tests {
         for (text, expected) in [
             ("flight,y\n0,7\n", "expected the columns flight,x, found flight,y"),
             ("flight,x\n0,7\n0,8\n", "plan.csv:3: expected flight 1, found 0"),
-            ("flight,x\n0,inf\n", "plan.csv:2: expected finite numbers"),
+            ("flight,x\n0,inf\n", "plan.csv:2: column `x`: expected a finite number, found `inf`"),
+            ("flight,x\n0,7\nb,7\n", "plan.csv:3: column `flight`: expected a finite number, found `b`"),
             ("flight,x\n0\n", "not a CSV file"),
             ("flight,x\n", "there is no flight in it"),
         ] {

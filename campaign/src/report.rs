@@ -16,6 +16,8 @@ use std::path::Path;
 const CONFIDENCE: f64 = 0.95;
 /// Flights that are listed with their commands.
 const WORST: usize = 10;
+/// Reasons of flights without figures that the text lists.
+const REASONS: usize = 5;
 /// Quantiles of a figure.
 const QUANTILES: [f64; 5] = [0.0, 0.05, 0.5, 0.95, 1.0];
 /// Chance below which a rank correlation is shown: one in a thousand, since many pairs are looked at.
@@ -50,7 +52,7 @@ pub struct Report {
     /// Conditions that failed first, most frequent first.
     pub failures: Vec<Failure>,
     /// Reasons of flights without figures, most frequent first.
-    pub errors: Vec<(String, u64)>,
+    pub errors: Vec<Reason>,
     /// Distribution of each figure.
     pub figures: Vec<Spread>,
     /// Rank correlations that chance does not explain, strongest first.
@@ -72,11 +74,24 @@ pub struct Failure {
     pub median_s: Option<f64>,
 }
 
+/// Reason of flights without figures: their errors differ in numbers alone.
+#[derive(Debug, PartialEq, Serialize)]
+pub struct Reason {
+    /// Number of flights.
+    pub flights: u64,
+    /// Number of the first one.
+    pub flight: u64,
+    /// Error of the first one.
+    pub error: String,
+}
+
 /// Distribution of a figure over the flights.
 #[derive(Debug, Serialize)]
 pub struct Spread {
     /// Name of the figure.
     pub figure: String,
+    /// Unit of the values.
+    pub unit: String,
     /// Flights with a value.
     pub flights: u64,
     /// Least value, 5 %, median, 95 %, greatest value.
@@ -166,15 +181,49 @@ fn failures(rows: &[Row]) -> Vec<Failure> {
     failures
 }
 
-fn errors(rows: &[Row]) -> Vec<(String, u64)> {
-    let mut counts: BTreeMap<&str, u64> = BTreeMap::new();
-    rows.iter()
-        .filter_map(|row| row.error.as_deref())
-        .for_each(|error| *counts.entry(error).or_default() += 1);
-    let mut errors: Vec<(String, u64)> =
-        counts.into_iter().map(|(error, count)| (error.to_owned(), count)).collect();
-    errors.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
-    errors
+fn errors(rows: &[Row]) -> Vec<Reason> {
+    let mut reasons: BTreeMap<String, Reason> = BTreeMap::new();
+    for row in rows {
+        let Some(error) = &row.error else { continue };
+        let first = || Reason { flights: 0, flight: row.flight, error: error.clone() };
+        reasons.entry(masked(error)).or_insert_with(first).flights += 1;
+    }
+    let mut reasons: Vec<Reason> = reasons.into_values().collect();
+    reasons.sort_by_key(|reason| (std::cmp::Reverse(reason.flights), reason.flight));
+    reasons
+}
+
+/// `text` with `…` in place of each number: the errors of two flights have the values that were drawn.
+fn masked(text: &str) -> String {
+    let (mut masked, mut rest, mut is_in_word) = (String::new(), text, false);
+    while let Some(first) = rest.chars().next() {
+        let number = if is_in_word { 0 } else { number_length(rest) };
+        let (shown, length) = if number > 0 { ('…', number) } else { (first, first.len_utf8()) };
+        masked.push(shown);
+        is_in_word = number > 0 || first.is_alphanumeric() || first == '_';
+        rest = &rest[length..];
+    }
+    masked
+}
+
+/// Length of the number at the start of `text` in bytes; 0 if there is none.
+fn number_length(text: &str) -> usize {
+    let digits = |from: usize| text[from..].bytes().take_while(u8::is_ascii_digit).count();
+    let sign = |from: usize| usize::from(text[from..].starts_with(['-', '+']));
+    let mut end = sign(0) + digits(sign(0));
+    if end == sign(0) {
+        return 0;
+    }
+    if text[end..].starts_with('.') && digits(end + 1) > 0 {
+        end += 1 + digits(end + 1);
+    }
+    if text[end..].starts_with(['e', 'E']) {
+        let exponent = end + 1 + sign(end + 1);
+        if digits(exponent) > 0 {
+            end = exponent + digits(exponent);
+        }
+    }
+    end
 }
 
 fn spreads(base: &Base, rows: &[Row]) -> Vec<Spread> {
@@ -182,6 +231,7 @@ fn spreads(base: &Base, rows: &[Row]) -> Vec<Spread> {
         let values: Vec<f64> = rows.iter().filter_map(|row| *row.figures.get(index)?).collect();
         Spread {
             figure: base.figures[index].clone(),
+            unit: base.units[index].clone(),
             flights: values.len() as u64,
             quantiles: quantiles(&values, &QUANTILES),
         }
@@ -290,6 +340,50 @@ fn word(text: &str) -> String {
     if text.chars().all(is_plain) { text.to_owned() } else { format!("'{}'", text.replace('\'', "'\\''")) }
 }
 
+/// Text of a number of flights.
+///
+/// ```
+/// use campaign::report::flights;
+/// assert_eq!([flights(1), flights(2)], ["1 flight", "2 flights"]);
+/// ```
+#[must_use]
+pub fn flights(count: u64) -> String {
+    if count == 1 { "1 flight".to_owned() } else { format!("{count} flights") }
+}
+
+/// Text of a unit behind a number; empty for a pure number.
+///
+/// ```
+/// use campaign::report::with_unit;
+/// assert_eq!(["m", "1"].map(with_unit), [" m", ""]);
+/// ```
+#[must_use]
+pub fn with_unit(unit: &str) -> String {
+    if unit == "1" { String::new() } else { format!(" {unit}") }
+}
+
+impl Report {
+    /// Flights without figures: their number, then the most frequent reasons, each with the error of a flight.
+    fn write_errors(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.broken > 0 {
+            writeln!(f, "  {} without figures:", flights(self.broken))?;
+        }
+        let (shown, others) = self.errors.split_at(self.errors.len().min(REASONS));
+        for Reason { flights: count, flight, error } in shown {
+            let such_as = if *count > 1 {
+                format!("{count} such as flight {flight}")
+            } else {
+                format!("flight {flight}")
+            };
+            writeln!(f, "    {such_as}: {}", error.lines().next().unwrap_or_default())?;
+        }
+        match others.iter().map(|reason| reason.flights).sum() {
+            0 => Ok(()),
+            more => writeln!(f, "    and {} more; report.json has all reasons", flights(more)),
+        }
+    }
+}
+
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [low, high] = self.interval.map(|limit| 100.0 * limit);
@@ -303,13 +397,7 @@ impl fmt::Display for Report {
             writeln!(f, "  {} of {} planned flights were not flown", self.planned - flights, self.planned)?;
         }
         self.failures.iter().try_for_each(|failure| writeln!(f, "  {failure}"))?;
-        for (error, flights) in self.errors.iter().take(WORST) {
-            writeln!(
-                f,
-                "  without figures, {flights} flights: {}",
-                error.lines().next().unwrap_or_default()
-            )?;
-        }
+        self.write_errors(f)?;
         writeln!(f, "  minimum, 5th percentile, median, 95th percentile, maximum:")?;
         self.figures.iter().try_for_each(|spread| writeln!(f, "    {spread}"))?;
         writeln!(f, "  rank correlations (Spearman), strongest first:")?;
@@ -330,14 +418,55 @@ impl fmt::Display for Report {
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let at = self.median_s.map_or(String::new(), |at_s| format!(", at {at_s:.2} s in the median"));
-        write!(f, "failed first in {} flights{at}: {}", self.flights, self.condition)
+        write!(f, "failed first in {}{at}: {}", flights(self.flights), self.condition)
     }
 }
 
 impl fmt::Display for Spread {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let values: Vec<String> = self.quantiles.iter().map(|value| format!("{value:.4}")).collect();
-        let values = if values.is_empty() { "no value".to_owned() } else { values.join(", ") };
+        let values = if values.is_empty() {
+            "no value".to_owned()
+        } else {
+            values.join(", ") + &with_unit(&self.unit)
+        };
         write!(f, "{}: {values}", self.figure)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Reason, Spread, errors, masked};
+    use crate::row::Row;
+
+    #[test]
+    fn errors_that_differ_in_drawn_values_are_one_reason() {
+        let broken = |flight, error: &str| Row::broken(flight, error.to_owned());
+        let rows = [
+            broken(0, "h1/plant: mass=-1e-5: found -0.5 kg"),
+            broken(1, "h1/plant: mass=2: found -3.25E+2 kg"),
+            broken(2, "h2/plant: mass=-7.5: found 3 kg"),
+            Row { flight: 3, ..Row::default() },
+            broken(4, "h1/plant: mass=9.: found 10 kg"),
+        ];
+        let reason = |flights, flight, error: &str| Reason { flights, flight, error: error.to_owned() };
+        let expected = [
+            reason(2, 0, "h1/plant: mass=-1e-5: found -0.5 kg"),
+            reason(1, 2, "h2/plant: mass=-7.5: found 3 kg"),
+            reason(1, 4, "h1/plant: mass=9.: found 10 kg"),
+        ];
+        assert_eq!(errors(&rows), expected);
+        assert_eq!(masked("c.toml:6:7: m^2 x_1 -5"), "c.toml:…:…: m^… x_1 …");
+    }
+
+    #[test]
+    fn a_distribution_has_its_unit() {
+        let spread = |unit: &str, quantiles: &[f64]| {
+            let (figure, unit) = ("height".to_owned(), unit.to_owned());
+            Spread { figure, unit, flights: 1, quantiles: quantiles.to_vec() }.to_string()
+        };
+        assert_eq!(spread("m", &[1.0, 2.5]), "height: 1.0000, 2.5000 m");
+        assert_eq!(spread("1", &[1.0]), "height: 1.0000");
+        assert_eq!(spread("m", &[]), "height: no value");
     }
 }

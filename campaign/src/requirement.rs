@@ -74,6 +74,7 @@ impl FromStr for Requirement {
     fn from_str(text: &str) -> Result<Self, String> {
         let refused =
             || format!("expected `pass_rate >= 0.99 at 95 %` or `pass_rate >= 0.99`, found `{text}`");
+        let beyond = |what: &str, range: &str| format!("the {what} must be {range}, found `{text}`");
         let rate =
             text.trim().strip_prefix("pass_rate").and_then(|rest| rest.trim_start().strip_prefix(">="));
         let rate = rate.ok_or_else(refused)?;
@@ -82,10 +83,15 @@ impl FromStr for Requirement {
             None => (rate, None),
         };
         let part = |text: &str, percent: f64| text.trim().parse::<f64>().ok().map(|number| number / percent);
-        let pass_rate = part(rate, 1.0).filter(|rate| (0.0..=1.0).contains(rate)).ok_or_else(refused)?;
+        let pass_rate = part(rate, 1.0).ok_or_else(refused)?;
+        if !(0.0..=1.0).contains(&pass_rate) {
+            return Err(beyond("pass rate", "0 to 1"));
+        }
         let confidence = confidence.map(|text| {
             let percent = text.trim().strip_suffix('%').ok_or_else(refused)?;
-            part(percent, 100.0).filter(|it| (0.5..1.0).contains(it)).ok_or_else(refused)
+            let confidence = part(percent, 100.0).ok_or_else(refused)?;
+            let is_known = (0.5..1.0).contains(&confidence);
+            if is_known { Ok(confidence) } else { Err(beyond("confidence", "at least 50 % and below 100 %")) }
         });
         Ok(Self { pass_rate, confidence: confidence.transpose()? })
     }
@@ -113,6 +119,16 @@ mod tests {
         ] {
             let error = text.parse::<Requirement>().unwrap_err();
             assert!(error.contains(&format!("found `{text}`")), "{error}");
+        }
+        for (text, range) in [
+            ("pass_rate >= 1.2", "the pass rate must be 0 to 1,"),
+            ("pass_rate >= -0.1", "the pass rate must be 0 to 1,"),
+            ("pass_rate >= nan", "the pass rate must be 0 to 1,"),
+            ("pass_rate >= 0.9 at 0 %", "the confidence must be at least 50 % and below 100 %,"),
+            ("pass_rate >= 0.9 at 100 %", "the confidence must be at least 50 % and below 100 %,"),
+        ] {
+            let error = text.parse::<Requirement>().unwrap_err();
+            assert!(error.starts_with(range), "{error}");
         }
         assert_eq!("pass_rate>=0.5".parse::<Requirement>().unwrap().to_string(), "pass_rate >= 0.5");
     }

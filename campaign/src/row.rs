@@ -2,6 +2,7 @@
 
 use crate::declaration::{COLUMNS, Varied};
 use diagnostics::{Diagnostic, ParameterError};
+use report::judge::{Verdict, WindowErrors};
 use report::summary::Summary;
 use runtime::manifest::{Content, Statistic};
 use serde::{Deserialize, Serialize};
@@ -18,7 +19,7 @@ pub struct Row {
     pub passed: bool,
     /// Name of the condition that failed first, or the first in the manifest where none has a time.
     pub failed: Option<String>,
-    /// Simulation time of its first sample by which it failed, s; none for a mean, an RMS and the like.
+    /// Simulation time of its first sample by which it failed, s; of the last sample of its span for a mean, an RMS and the like.
     pub failed_at_s: Option<f64>,
     /// Reason why the flight has no figures: refused values, a failed step, a worker that died.
     pub error: Option<String>,
@@ -65,16 +66,31 @@ pub fn count(statistic: Statistic) -> usize {
 /// Names of the figures of the conditions in `content`: the columns of [`Row::figures`].
 #[must_use]
 pub fn columns(content: &Content) -> Vec<String> {
+    figures(content).into_iter().map(|(name, _)| name).collect()
+}
+
+/// Units of the figures of the conditions in `content`, by column.
+#[must_use]
+pub fn units(content: &Content) -> Vec<String> {
+    figures(content).into_iter().map(|(_, unit)| unit).collect()
+}
+
+/// Names and units of the figures.
+fn figures(content: &Content) -> Vec<(String, String)> {
     let conditions = content.pass.iter().chain(&content.measure).flat_map(|condition| {
         let condition = condition.get_ref();
         let names: &[&str] =
             if condition.statistic == Statistic::Every { &[" (min)", " (max)"] } else { &[""] };
-        names.iter().map(|ending| format!("{}{ending}", condition.name)).collect::<Vec<_>>()
+        let figure = |ending: &&str| (format!("{}{ending}", condition.name), condition.unit.clone());
+        names.iter().map(figure).collect::<Vec<_>>()
     });
     let compare = content.compare.iter().flat_map(|compare| {
         let compare = compare.get_ref();
-        ["position_rms_m", "velocity_rms_m_s", "attitude_rms_deg"]
-            .map(|name| format!("{} after {} s: {name}", compare.simulated, compare.window_s))
+        [("position_rms_m", "m"), ("velocity_rms_m_s", "m/s"), ("attitude_rms_deg", "deg")].map(
+            |(name, unit)| {
+                (format!("{} after {} s: {name}", compare.simulated, compare.window_s), unit.to_owned())
+            },
+        )
     });
     conditions.chain(compare).collect()
 }
@@ -106,7 +122,7 @@ impl Row {
             let errors = [errors.position_rms_m, errors.velocity_rms_m_s, errors.attitude_rms_deg];
             figures.extend(errors.map(|error| Some(error).filter(|error| error.is_finite())));
         }
-        let (failed, failed_at_s) = first_failure(summary);
+        let (failed, failed_at_s) = first_failure(&summary.pass, &summary.compare);
         let (passed, wall_s) = (summary.passed, summary.host_s);
         let conditions = summary.pass.iter().map(|verdict| verdict.passed);
         let verdicts = conditions.chain(summary.compare.iter().map(|errors| errors.passed)).collect();
@@ -127,13 +143,30 @@ impl Row {
     }
 }
 
-/// The condition that failed first, and when.
-fn first_failure(summary: &Summary) -> (Option<String>, Option<f64>) {
-    let failed = summary.pass.iter().filter(|verdict| !verdict.passed);
-    let at = |verdict: &&report::judge::Verdict| verdict.failed_at_s.unwrap_or(f64::INFINITY);
+/// The condition that failed first, and when. A condition without samples has no time, and a comparison neither: they come last.
+fn first_failure(pass: &[Verdict], compare: &[WindowErrors]) -> (Option<String>, Option<f64>) {
+    let failed = pass.iter().filter(|verdict| !verdict.passed);
+    let at = |verdict: &&Verdict| verdict.failed_at_s.unwrap_or(f64::INFINITY);
     let Some(first) = failed.min_by(|a, b| at(a).total_cmp(&at(b))) else {
-        let compared = summary.compare.iter().find(|errors| !errors.passed);
+        let compared = compare.iter().find(|errors| !errors.passed);
         return (compared.map(|errors| format!("{} after {} s", errors.simulated, errors.window_s)), None);
     };
     (Some(first.name.clone()), first.failed_at_s)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::first_failure;
+    use report::judge::Verdict;
+
+    #[test]
+    fn a_mean_fails_at_the_end_of_its_span_and_may_be_the_first() {
+        let failed =
+            |name: &str, failed_at_s| Verdict { name: name.to_owned(), failed_at_s, ..Verdict::default() };
+        // The mean of the climb, to 5 s, and an altitude that is left later.
+        let found = first_failure(&[failed("altitude", Some(9.0)), failed("mean", Some(5.0))], &[]);
+        assert_eq!(found, (Some("mean".to_owned()), Some(5.0)));
+        let found = first_failure(&[failed("without samples", None), failed("mean", Some(5.0))], &[]);
+        assert_eq!(found, (Some("mean".to_owned()), Some(5.0)));
+    }
 }

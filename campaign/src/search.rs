@@ -8,9 +8,10 @@
 use crate::base::Base;
 use crate::declaration::Campaign;
 use crate::flying::Flying;
+use crate::gains_file;
 use crate::plan::Plan;
-use crate::row::{Row, columns};
-use crate::tuning::Tuning;
+use crate::row::Row;
+use crate::tuning::{Term, Tuning};
 use anyhow::{Context, Result, bail};
 use cmaes::{CMAESOptions, DVector};
 use serde::Serialize;
@@ -47,6 +48,8 @@ pub struct TunedGain {
     pub before: f64,
     /// Tuned value.
     pub after: f64,
+    /// Unit of both.
+    pub unit: String,
 }
 
 /// Flights with the declared and the tuned gains, side by side.
@@ -62,8 +65,31 @@ pub struct Comparison {
     pub standard_error: f64,
     /// Flights in which a condition of the manifest does not hold.
     pub failed: Change,
-    /// Terms of the costs: mean of each figure.
-    pub figures: Vec<(String, Change)>,
+    /// Terms of the costs: mean of each figure, by its name.
+    pub figures: Vec<(String, FigureChange)>,
+}
+
+/// Mean of a figure before and after.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FigureChange {
+    /// Both means.
+    #[serde(flatten)]
+    pub change: Change,
+    /// Their unit.
+    pub unit: String,
+}
+
+/// State of a search after a generation.
+#[derive(Clone, Debug, Serialize)]
+pub struct Progress {
+    /// Generations so far.
+    pub generation: usize,
+    /// Candidates that were flown.
+    pub candidates: usize,
+    /// Costs of the declared gains and of the best candidate, on the flights that it was tuned by.
+    pub costs: Change,
+    /// Gains of the best candidate.
+    pub gains: Vec<TunedGain>,
 }
 
 /// A number before and after.
@@ -91,6 +117,8 @@ struct Course<'a> {
     sets: Vec<Vec<String>>,
     /// Column of each term's figure.
     columns: Vec<usize>,
+    /// Unit of each term's figure.
+    units: Vec<String>,
     seed: u64,
 }
 
@@ -106,7 +134,7 @@ struct Flown {
     error: Option<String>,
 }
 
-/// Tunes the gains of `tuning`; `tell` hears of each generation: its number and the lowest costs so far, relative to today's.
+/// Tunes the gains of `tuning`; `tell` hears of each generation.
 ///
 /// # Errors
 /// If a gain or a figure does not exist, today's gains do not fly, or the flights are stopped.
@@ -114,7 +142,7 @@ pub fn search(
     tuning: &Tuning,
     base: &Base,
     flying: &Flying<'_>,
-    tell: &(dyn Fn(usize, f64) + Sync),
+    tell: &(dyn Fn(Progress) + Sync),
 ) -> Result<Outcome> {
     let declared = declared(tuning, base)?;
     let start = tuning.gains.iter().zip(&declared).map(|(gain, declared)| gain.start(*declared));
@@ -128,6 +156,19 @@ pub fn search(
     let values = |point: &DVector<f64>| -> Vec<f64> {
         let gains = tuning.gains.iter().zip(&declared).zip(point.iter());
         gains.map(|((gain, declared), x)| gain.value(*declared, *x)).collect()
+    };
+    let gains_file = base.manifest.file_path(&tuning.process, "gains");
+    let gains_file = gains_file.and_then(|path| base.files.text(&path).ok()).unwrap_or_default();
+    let tuned = |after: &[f64]| -> Vec<TunedGain> {
+        let gains = tuning.gains.iter().zip(declared.iter().zip(after));
+        let tuned = gains.map(|(gain, (before, after))| TunedGain {
+            unit: gains_file::unit(&gains_file, &gain.keys[0]),
+            name: gain.name.clone(),
+            keys: gain.keys.clone(),
+            before: *before,
+            after: *after,
+        });
+        tuned.collect()
     };
     let failure = Mutex::new(None);
     let costs = |point: &DVector<f64>| match course.fly(&values(point)) {
@@ -151,8 +192,14 @@ pub fn search(
         if let Some(error) = failure.lock().unwrap_or_else(std::sync::PoisonError::into_inner).take() {
             return Err(error);
         }
-        let best = search.overall_best_individual().map_or(f64::INFINITY, |best| best.value);
-        tell(search.generation(), best);
+        if let Some(best) = search.overall_best_individual() {
+            tell(Progress {
+                generation: search.generation(),
+                candidates: search.function_evals(),
+                costs: Change { before: costs_today, after: best.value * costs_today },
+                gains: tuned(&values(&best.point)),
+            });
+        }
         if end.is_some() {
             break;
         }
@@ -161,24 +208,16 @@ pub fn search(
     // The mean of the last generation may be better than each candidate.
     let mean = values(search.mean());
     let mean_costs = course.fly(&mean)?.relative_costs(costs_today) + beyond(search.mean());
-    let (least, tuned) =
+    let (least, after) =
         if mean_costs < best.value { (mean_costs, mean) } else { (best.value, values(&best.point)) };
-    let tuned = if least < 1.0 { tuned } else { declared.clone() };
+    let after = if least < 1.0 { after } else { declared.clone() };
     let held_out = Course::new(tuning, &tuning.held_out, base, flying)?;
-    let gains = tuning.gains.iter().zip(declared.iter().zip(&tuned));
     Ok(Outcome {
-        gains: gains
-            .map(|(gain, (before, after))| TunedGain {
-                name: gain.name.clone(),
-                keys: gain.keys.clone(),
-                before: *before,
-                after: *after,
-            })
-            .collect(),
+        gains: tuned(&after),
         generations: search.generation(),
         candidates: search.function_evals(),
-        tuned_on: course.compare(&declared, &tuned)?,
-        held_out: held_out.compare(&declared, &tuned)?,
+        tuned_on: course.compare(&declared, &after)?,
+        held_out: held_out.compare(&declared, &after)?,
     })
 }
 
@@ -213,15 +252,15 @@ impl<'a> Course<'a> {
         let plan = Plan::of(campaign);
         let sets = (0..plan.flights.len()).map(|flight| plan.sets(campaign, base, flight));
         let sets = sets.collect::<Result<Vec<_>>>()?;
-        let known = columns(&base.manifest.content);
-        let column = |name: &String| {
-            let found = known.iter().position(|column| column == name);
-            found.with_context(|| {
-                format!("there is no figure `{name}` to minimise; the figures are: {}", known.join("; "))
-            })
+        let known = &base.figures;
+        let column = |term: &Term| {
+            let found = known.iter().position(|column| *column == term.figure);
+            found.ok_or_else(|| term.unknown(known))
         };
-        let columns = tuning.terms.iter().map(|term| column(&term.figure)).collect::<Result<_>>()?;
-        Ok(Self { tuning, flying, sets, columns, seed: campaign.seed })
+        let columns: Vec<usize> =
+            tuning.terms.iter().map(column).collect::<Result<_, diagnostics::Diagnostic>>()?;
+        let units = columns.iter().map(|&column| base.units[column].clone()).collect();
+        Ok(Self { tuning, flying, sets, columns, units, seed: campaign.seed })
     }
 
     /// Flies all flights with these values of the gains.
@@ -270,9 +309,12 @@ impl<'a> Course<'a> {
         let costs = Change { before: mean(&before)?, after: mean(&after)? };
         let pairs = before.costs.iter().flatten().zip(after.costs.iter().flatten());
         let differences: Vec<f64> = pairs.map(|(before, after)| after - before).collect();
-        let figures = self.tuning.terms.iter().zip(before.figures.iter().zip(&after.figures));
-        let figures = figures
-            .map(|(term, (before, after))| (term.figure.clone(), Change { before: *before, after: *after }));
+        let terms = self.tuning.terms.iter().zip(&self.units);
+        let figures = terms.zip(before.figures.iter().zip(&after.figures));
+        let figures = figures.map(|((term, unit), (before, after))| {
+            let change = Change { before: *before, after: *after };
+            (term.figure.clone(), FigureChange { change, unit: unit.clone() })
+        });
         Ok(Comparison {
             flights: differences.len(),
             seed: self.seed,

@@ -167,8 +167,14 @@ impl Store {
     /// If the folder cannot be written to, for example because the disk is full.
     pub fn add(&mut self, row: &Row) -> Result<()> {
         let line = format!("{}\n", serde_json::to_string(row)?);
+        let failed = || format!("cannot write {}", self.folder.join(ROWS).display());
+        let whole = self.rows.metadata().with_context(failed)?.len();
         let written = self.rows.write_all(line.as_bytes());
-        written.with_context(|| format!("cannot write {}", self.folder.join(ROWS).display()))
+        if written.is_err() {
+            // The next row must not stand behind a part of this one.
+            let _ = self.rows.set_len(whole);
+        }
+        written.with_context(failed)
     }
 }
 

@@ -14,6 +14,8 @@ pub struct Table<'a> {
     pub verdicts: &'a [String],
     /// Names of the figures of a row.
     pub figures: &'a [String],
+    /// Units of the figures.
+    pub units: &'a [String],
     /// Indices of the figures that the table keeps.
     pub kept: &'a [usize],
     /// Build of hummingbus that flew the rows.
@@ -28,7 +30,8 @@ impl Table<'_> {
     /// Writes the table to `file`.
     ///
     /// Columns: `flight`; the drawn numbers by their names; `run.seed`; `passed`; `failed`, `failed_at_s`, `error`; a verdict
-    /// for each condition; the figures; `version`. Host times are in no column: the bytes depend on plan and build alone.
+    /// for each condition; the figures; `version`. The metadata has the unit of each figure. Host times are in no column: the
+    /// bytes depend on plan and build alone.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -36,7 +39,11 @@ impl Table<'_> {
         let columns = self.columns();
         let columns: Vec<(&str, &Column)> =
             columns.iter().map(|(name, column)| (name.as_str(), column)).collect();
-        write_parquet(file, "flights", &columns, &[])
+        let unit = |&index: &usize| (format!("unit of {}", self.figures[index]), self.units[index].clone());
+        let units: Vec<(String, String)> = self.kept.iter().map(unit).collect();
+        let units: Vec<(&str, String)> =
+            units.iter().map(|(key, unit)| (key.as_str(), unit.clone())).collect();
+        write_parquet(file, "flights", &columns, &units)
     }
 
     fn columns(&self) -> Vec<(String, Column)> {

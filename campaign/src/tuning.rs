@@ -2,7 +2,7 @@
 
 use crate::declaration::{Campaign, Sampling};
 use crate::draw::rounded_to;
-use diagnostics::{Diagnostic, ParameterError, Place, read_toml};
+use diagnostics::{Diagnostic, ParameterError, Place, nearest, read_toml};
 use serde::Deserialize;
 use std::ops::Range;
 use std::path::Path;
@@ -75,13 +75,14 @@ pub enum Limits {
 }
 
 /// A term of the cost of a flight: weight times figure.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug)]
 pub struct Term {
     /// Name of the figure.
     pub figure: String,
     /// Weight, in costs for each unit of the figure.
     pub weight: f64,
+    /// Place of the name in the file.
+    place: Place,
 }
 
 #[derive(Deserialize)]
@@ -101,7 +102,14 @@ struct Tune {
     #[serde(default)]
     failed_costs: f64,
     gain: Vec<Spanned<Gain>>,
-    minimise: Vec<Term>,
+    minimise: Vec<Minimised>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Minimised {
+    figure: Spanned<String>,
+    weight: f64,
 }
 
 #[derive(Deserialize)]
@@ -142,6 +150,12 @@ impl Tuning {
             let place = Place::of(name.clone(), text, &gain.span());
             Tuned::of(gain.get_ref(), &place).map_err(|error| Diagnostic::at(place.clone(), error).help(HELP))
         }))?;
+        let terms = tune.minimise.iter().map(|term| Term {
+            figure: term.figure.get_ref().clone(),
+            weight: term.weight,
+            place: Place::of(name.clone(), text, &term.figure.span()),
+        });
+        let terms = terms.collect();
         let held_out =
             Campaign { flights: tune.held_out, seed: campaign.seed.wrapping_add(1), ..campaign.clone() };
         Ok(Self {
@@ -149,7 +163,7 @@ impl Tuning {
             held_out,
             process,
             gains,
-            terms: tune.minimise.clone(),
+            terms,
             failed_costs: tune.failed_costs,
             generations: tune.generations,
             population: tune.population,
@@ -268,6 +282,22 @@ impl Tuned {
     pub(crate) fn problem(&self, message: impl Into<String>) -> Diagnostic {
         let (key, _) = self.limits.key();
         Diagnostic::at(self.place.clone(), ParameterError::conflict(key, message.into())).help(HELP)
+    }
+}
+
+impl Term {
+    /// A problem with the figure, which is not among the `known` ones.
+    pub(crate) fn unknown(&self, known: &[String]) -> Diagnostic {
+        let message = format!(
+            "there is no figure `{}` to minimise; the figures are: {}",
+            self.figure,
+            known.join("; ")
+        );
+        let help = match nearest(&self.figure, known.iter().map(String::as_str)) {
+            Some(near) => format!("did you mean `{near}`?"),
+            None => HELP.to_owned(),
+        };
+        Diagnostic::at(self.place.clone(), ParameterError::conflict("figure", message)).help(help)
     }
 }
 

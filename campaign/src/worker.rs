@@ -71,14 +71,14 @@ pub fn serve(registry: Registry, build: &str, input: impl BufRead, mut output: i
     let order: Order = serde_json::from_str(&order)?;
     let folder = tempfile::tempdir_in(&order.folder);
     let folder = folder.with_context(|| format!("cannot make a folder in {}", order.folder.display()))?;
-    let base = match prepare(&order, build, registry) {
-        Ok(base) => base,
+    let (campaign, base) = match prepare(&order, build, registry) {
+        Ok(read) => read,
         Err(error) => return answer(&mut output, &Greeting::Refused(format!("{error:#}"))),
     };
     answer(&mut output, &Greeting::Ready)?;
     for line in lines {
         let job: Job = serde_json::from_str(&line?)?;
-        answer(&mut output, &fly(&base, &job, folder.path()))?;
+        answer(&mut output, &fly(&campaign, &base, &job, folder.path()))?;
     }
     Ok(())
 }
@@ -88,7 +88,8 @@ fn answer(output: &mut impl Write, value: &impl Serialize) -> Result<()> {
     Ok(output.flush()?)
 }
 
-fn prepare(order: &Order, build: &str, registry: Registry) -> Result<Base> {
+/// The campaign and its manifest. All paths begin at the root, so that those of a row's error do not depend on the working directory.
+fn prepare(order: &Order, build: &str, registry: Registry) -> Result<(Campaign, Base)> {
     if order.build != build {
         bail!(
             "this is hummingbus {build}, the campaign was started by hummingbus {}: rows of two builds are not mixed; install \
@@ -96,18 +97,44 @@ fn prepare(order: &Order, build: &str, registry: Registry) -> Result<Base> {
             order.build
         );
     }
-    let campaign = Campaign::parse(&order.path, &order.text)?;
+    let path = std::path::absolute(&order.path).context("the working directory is gone")?;
+    let campaign = Campaign::parse(&inputs::tidy(&path), &order.text)?;
     let base = Base::read(&campaign, registry)?;
     if base.fingerprint != order.fingerprint {
         bail!("the manifest or a file that it names changed while the campaign flew; start it again");
     }
-    Ok(base)
+    Ok((campaign, base))
 }
 
-/// The row of one flight; what goes wrong is in it.
-fn fly(base: &Base, job: &Job, folder: &Path) -> Row {
-    let flown = fly_once(base, job, folder);
-    flown.unwrap_or_else(|error| Row::broken(job.flight, format!("{error:#}")))
+/// The row of one flight; an error is in the row, with paths that begin at the folder of the campaign file.
+fn fly(campaign: &Campaign, base: &Base, job: &Job, folder: &Path) -> Row {
+    let home = campaign.path.parent().unwrap_or(Path::new(""));
+    let broken = |error| Row::broken(job.flight, from_folder(&format!("{error:#}"), home));
+    fly_once(base, job, folder).unwrap_or_else(broken)
+}
+
+/// `text` with paths that begin at `folder` in place of those that begin at the root. Paths outside of the folders around it stay.
+fn from_folder(text: &str, folder: &Path) -> String {
+    let mut text = text.to_owned();
+    for (up, around) in folder.ancestors().enumerate() {
+        let depth = around.components().count() - 1;
+        // A folder right below the root may be called like the process of a topic.
+        if depth == 0 || (depth == 1 && up > 0) {
+            break;
+        }
+        text = replaced(&text, &format!("{}/", around.display()), &"../".repeat(up));
+    }
+    text
+}
+
+/// `text` with `new` in place of each `old` at the beginning of a path.
+fn replaced(text: &str, old: &str, new: &str) -> String {
+    let mut parts = text.split(old);
+    let first = parts.next().unwrap_or_default().to_owned();
+    parts.fold(first, |all, part| {
+        let is_within = all.ends_with(|c: char| c.is_alphanumeric() || "._-~/".contains(c));
+        all + if is_within { old } else { new } + part
+    })
 }
 
 fn fly_once(base: &Base, job: &Job, folder: &Path) -> Result<Row> {
@@ -118,4 +145,91 @@ fn fly_once(base: &Base, job: &Job, folder: &Path) -> Result<Row> {
     let mut summary = Summary::new(manifest.name(), outcome, tick_s);
     summary.judge_by(&figures, &manifest.content)?;
     Ok(Row::of(job.flight, &summary, &manifest.content))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Job, fly, from_folder};
+    use crate::base::Base;
+    use crate::declaration::Campaign;
+    use crate::plan::Plan;
+    use crate::report::Report;
+    use bus::component::{Component, Info, StepError};
+    use bus::context::{NodeContext, StepContext};
+    use bus::messages::MotorCommand;
+    use bus::{ParameterError, Registration};
+    use runtime::registry::Registry;
+    use std::collections::BTreeMap;
+
+    #[derive(bus::OutputPorts)]
+    struct Outputs {
+        command: MotorCommand,
+    }
+
+    /// Commands of a spring, which breaks at a load above 1.
+    struct Spring {
+        load: f64,
+    }
+
+    impl Component for Spring {
+        const INFO: Info = Info::new("spring", "sends its load");
+        type Parameters = BTreeMap<String, f64>;
+        type Inputs<'a> = ();
+        type Outputs = Outputs;
+        type State = ();
+        fn new(parameters: Self::Parameters, _: &NodeContext<'_>) -> Result<Self, ParameterError> {
+            Ok(Self { load: parameters["load"] })
+        }
+        fn initial(&self) {}
+        fn step(&self, context: &StepContext<'_>, (): (), (): &mut ()) -> Result<Outputs, StepError> {
+            assert!(context.tick() < 5 || self.load <= 1.0, "the spring broke under {}", self.load);
+            Ok(Outputs { command: MotorCommand { command: [self.load; 4].into(), ..Default::default() } })
+        }
+    }
+
+    const COMPONENTS: Registry =
+        Registry::new(&[Registration::of::<Spring>(), Registration::of::<report::judge::node::Judge>()]);
+
+    #[test]
+    fn a_flight_whose_component_panics_is_named_and_counted_and_the_rest_flies() {
+        let folder = tempfile::tempdir().unwrap();
+        let manifest = "[run]\nduration_s = 0.1\n[process.spring]\nkind = \"spring\"\nparameters.load = 0.0\n\
+                        [[measure]]\nname = \"command\"\ntopic = \"/spring/command\"\nfield = \"command[0]\"\nunit = \"count\"\nstatistic = \"last\"\n";
+        std::fs::write(folder.path().join("m.toml"), manifest).unwrap();
+        let text = "manifest = \"m.toml\"\nsampling = \"grid\"\n[[vary]]\nkey = \"process.spring.parameters.load\"\nvalues = [0.5, 2.5, 1.0]";
+        let campaign = Campaign::parse(&folder.path().join("c.toml"), text).unwrap();
+        let base = Base::read(&campaign, COMPONENTS).unwrap();
+        let plan = Plan::of(&campaign);
+        let row = |flight: usize| {
+            let sets = plan.sets(&campaign, &base, flight).unwrap();
+            fly(&campaign, &base, &Job { flight: flight as u64, sets }, folder.path())
+        };
+        let rows: Vec<_> = (0..3).map(row).collect();
+        let loads: Vec<_> = rows.iter().map(|row| row.figures.first().copied().flatten()).collect();
+        assert_eq!(loads, [Some(0.5), None, Some(1.0)]);
+        let error = rows[1].error.as_deref().unwrap();
+        assert_eq!(error, "a component panicked: the spring broke under 2.5");
+        assert!(!rows[1].is_of_host);
+        let report = Report::of(&campaign, &base, &plan, &rows, folder.path(), "1").unwrap();
+        assert_eq!((report.passed, report.broken, report.lost), (2, 1, 0));
+        assert!(
+            report.to_string().contains("1 flight without figures:\n    flight 1: a component panicked"),
+            "{report}"
+        );
+    }
+
+    #[test]
+    fn paths_begin_at_the_folder_of_the_campaign_file() {
+        let shown = |text: &str| from_folder(text, "/home/me/drone/campaigns".as_ref());
+        assert_eq!(shown("/home/me/drone/campaigns/c.toml:6:7: no"), "c.toml:6:7: no");
+        assert_eq!(
+            shown("process `a`: /home/me/drone/hover.toml:1:2: look at `/home/me/other/v.toml:3`"),
+            "process `a`: ../hover.toml:1:2: look at `../../other/v.toml:3`"
+        );
+        // Others are no folders around it.
+        for text in ["/opt/v.toml:1:2", "../home/me/v.toml", "/home/you/v.toml", "topic /home/state"] {
+            assert_eq!(shown(text), text);
+        }
+        assert_eq!(from_folder("/sim/c.toml:1:1, /sim/a/b.toml", "/sim".as_ref()), "c.toml:1:1, a/b.toml");
+    }
 }

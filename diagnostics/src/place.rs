@@ -43,6 +43,20 @@ impl Place {
         }
     }
 
+    /// The place of line number `line` of `text`, from 1; a number past the end means the end.
+    ///
+    /// ```
+    /// use diagnostics::Place;
+    ///
+    /// assert_eq!(Place::of_line("a.toml", "x = 1\ny = 2\n", 2).to_string(), "a.toml:2:1");
+    /// ```
+    #[must_use]
+    pub fn of_line(file: impl Into<String>, text: &str, line: usize) -> Self {
+        let before = text.split_inclusive('\n').take(line.saturating_sub(1));
+        let start = before.map(str::len).sum();
+        Self::of(file, text, &(start..start))
+    }
+
     /// The same place in the `text` of another `file`: the nearest line that is the same; `None` if there is none.
     ///
     /// ```

@@ -220,7 +220,8 @@ impl Summary {
     /// The checkpoint to go back to: the newest before a condition failed first, or the newest. `tick_s` is the time of a tick.
     #[must_use]
     pub fn checkpoint_to_go_back_to(&self, tick_s: f64) -> Option<&Written> {
-        let failed = self.pass.iter().filter(|verdict| !verdict.passed);
+        // A condition that only its whole span decides has no sample to go back to.
+        let failed = self.pass.iter().filter(|verdict| !verdict.passed && !verdict.failed_at_end);
         let failed_s = failed.filter_map(|verdict| verdict.failed_at_s).min_by(f64::total_cmp);
         let is_before =
             |written: &&Written| failed_s.is_none_or(|failed_s| f64::from(written.tick) * tick_s <= failed_s);

@@ -301,12 +301,19 @@ impl Manifest {
         (original, copy): (&Path, &Path),
         error: ParameterError,
     ) -> ParameterError {
-        let ParameterError::File { key: parameter, mut faults } = error else { return error };
+        let in_words = |text: &str| self.without_copy_in(files, (name, key), (original, copy), text);
+        let (parameter, mut faults) = match error {
+            ParameterError::File { key, faults } => (key, faults),
+            ParameterError::Conflict { key, message } => {
+                return ParameterError::Conflict { key, message: in_words(&message) };
+            }
+            error => return error,
+        };
         let edits: Vec<&FileEdit> = self.file_edits.iter().filter(|edit| edit.is_of(name, key)).collect();
         let text = files.text(original).unwrap_or_default();
-        let (shown, copy) = (original.display().to_string(), copy.display().to_string());
-        for fault in faults.each.iter_mut().filter(|fault| fault.file == copy) {
-            let error = ParameterError::conflict(fault.key.clone(), &fault.message);
+        let (shown, copied) = (original.display().to_string(), copy.display().to_string());
+        for fault in faults.each.iter_mut().filter(|fault| fault.file == copied) {
+            let error = ParameterError::conflict(fault.key.clone(), in_words(&fault.message));
             let found = match edits.iter().find(|edit| edit.is_about(&fault.key, &text)) {
                 Some(edit) => self.problem(edit.span(), error, fault.help.clone()),
                 None => {
@@ -324,6 +331,31 @@ impl Manifest {
             *fault = FileFault::from(found);
         }
         ParameterError::File { key: parameter, faults }
+    }
+
+    /// The message `text` with names that the user knows in place of lines of an edited copy, as of [`Manifest::without_copy`]: the
+    /// place of a value of `--set`, or the same line of the file at `original`.
+    pub(crate) fn without_copy_in(
+        &self,
+        files: &InputFiles,
+        (name, key): (&str, &str),
+        (original, copy): (&Path, &Path),
+        text: &str,
+    ) -> String {
+        let (before, after) =
+            (files.text(original).unwrap_or_default(), files.text(copy).unwrap_or_default());
+        let (shown, copy) = (original.display().to_string(), copy.display().to_string());
+        let edits = self.file_edits.iter().filter(|edit| edit.is_of(name, key));
+        file_edits::renamed(text, &copy, |line, key| {
+            if let Some(edit) = edits.clone().find(|edit| edit.is_about(key, &before)) {
+                return self.sources.value_place(edit.span());
+            }
+            let place = line.map(|line| Place::of_line(&*copy, &after, line));
+            match place.and_then(|place| place.in_file(&*shown, &before)) {
+                Some(place) => format!("{shown}:{}", place.line),
+                None => shown.clone(),
+            }
+        })
     }
 
     /// This manifest with one more `[[swap]]`-like backup of `process`, whose differences are the TOML

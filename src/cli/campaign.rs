@@ -11,7 +11,7 @@ use campaign::base::Base;
 use campaign::declaration::Campaign;
 use campaign::page;
 use campaign::plan::Plan;
-use campaign::report::Report;
+use campaign::report::{Report, flights};
 use campaign::requirement::Requirement;
 use campaign::row::Row;
 use campaign::store::{Builds, Header, PLAN, Store};
@@ -116,8 +116,8 @@ pub fn campaign(arguments: &CampaignArguments) -> Result<bool> {
     let opened = Opened::new(Flying { path, text, folder, is_made: false, engine, require, json }, builds)?;
     if arguments.plan_only {
         let path = opened.0.flying.folder.join(PLAN);
-        return print_text(&format!("{} flights: {}", opened.0.plan.flights.len(), path.display()))
-            .map(|()| true);
+        let planned = flights(opened.0.plan.flights.len() as u64);
+        return print_text(&format!("{planned}: {}", path.display())).map(|()| true);
     }
     match arguments.fly {
         Some(flight) => fly_one(&opened.0, flight),
@@ -133,8 +133,11 @@ pub fn fly(flying: Flying) -> Result<bool> {
     fly_all(Opened::new(flying, Builds::Same)?)
 }
 
-fn fly_all((mut opened, flown): (Opened, BTreeMap<u64, Row>)) -> Result<bool> {
-    let rows = opened.fly(flown)?;
+fn fly_all((mut opened, mut rows): (Opened, BTreeMap<u64, Row>)) -> Result<bool> {
+    let flown = match opened.fly(&mut rows) {
+        Err(error) if rows.is_empty() => return Err(error),
+        flown => flown,
+    };
     let rows: Vec<Row> = rows.into_values().collect();
     let Opened { campaign, base, plan, flying, build, .. } = &opened;
     let report = Report::of(campaign, base, plan, &rows, &flying.folder, build)?;
@@ -142,6 +145,8 @@ fn fly_all((mut opened, flown): (Opened, BTreeMap<u64, Row>)) -> Result<bool> {
     // A file that cannot be written must not cost the verdict.
     let is_met = judge(&opened, &report, failures.is_empty());
     failures.iter().for_each(|failure| say(&format!("error: {failure:#}")));
+    // The reason for the flights that are missing.
+    flown?;
     if let (Err(error), false) = (&is_met, failures.is_empty()) {
         say(&format!("error: {error:#}"));
     }
@@ -186,9 +191,9 @@ impl Opened {
         Ok((Self { flying, campaign, base, build: header.build, store, plan }, flown))
     }
 
-    /// Flies the flights that have no row yet; all rows by flight.
-    fn fly(&mut self, mut rows: BTreeMap<u64, Row>) -> Result<BTreeMap<u64, Row>> {
-        let jobs = jobs(&self.campaign, &self.base, &self.plan, &rows)?;
+    /// Flies the flights that have no row in `rows` yet, and adds each row that is kept.
+    fn fly(&mut self, rows: &mut BTreeMap<u64, Row>) -> Result<()> {
+        let jobs = jobs(&self.campaign, &self.base, &self.plan, rows)?;
         if rows.is_empty() {
             require_flyable(&self.campaign, &self.base, &self.plan)?;
         }
@@ -199,17 +204,20 @@ impl Opened {
         let order = Order { build: build.clone(), path, text, fingerprint, folder: store.work_folder()? };
         let flight = Flight { folder: &flying.folder, order, timeout_s_host: campaign.timeout_s_host };
         let tell = |text: &str| bar.suspend(|| say(text));
+        let mut is_written = true;
         let end = flying.engine.fly(flight, jobs, &tell, |mut row| {
             row.drawn.clone_from(&plan.flights[row.flight as usize]);
             row.figures.resize(base.figures.len(), None);
-            store.add(&row)?;
+            store.add(&row).inspect_err(|_| is_written = false)?;
             rows.insert(row.flight, row);
             bar.inc(1);
             Ok(())
         });
         progress::finish(&bar);
-        end.with_context(|| format!("{} flights are kept in {}", rows.len(), self.flying.folder.display()))?;
-        Ok(rows)
+        end.with_context(|| {
+            let kept = format!("{} kept in {}", flights(rows.len() as u64), self.flying.folder.display());
+            if is_written { kept } else { format!("{kept}; the same command flies the rest") }
+        })
     }
 
     /// Writes the table and the report; the failures of those that cannot be written.
@@ -230,6 +238,7 @@ impl Opened {
             varied: &plan.names,
             verdicts: &base.verdicts,
             figures: &base.figures,
+            units: &base.units,
             kept: &base.kept,
             build,
             rows,
@@ -252,12 +261,12 @@ fn judge(opened: &Opened, report: &Report, has_page: bool) -> Result<bool> {
     }
     let left = report.planned - report.flights;
     if left > 0 {
-        bail!("the campaign was interrupted; the same command flies the other {left} flights");
+        bail!("the campaign was interrupted; the same command flies the other {}", flights(left));
     }
     let Some(is_met) = verdict else {
         bail!(
-            "the host ended {} flights, without which there is no verdict; the same command flies them again",
-            report.lost
+            "the host ended {}, without which there is no verdict; the same command flies them again",
+            flights(report.lost)
         );
     };
     if let Some(required) = require.filter(|_| !is_met) {
@@ -344,8 +353,8 @@ fn require_flyable(campaign: &Campaign, base: &Base, plan: &Plan) -> Result<()> 
     let Some((flight, error)) = first else { return Ok(()) };
     let checked = plan.flights.len().min(CHECKED);
     Err(error).context(format!(
-        "no flight can be flown: of the plan's {} flights {checked} were checked, which are all refused; flight {flight}",
-        plan.flights.len()
+        "no flight can be flown: of the plan's {} {checked} were checked, which are all refused; flight {flight}",
+        flights(plan.flights.len() as u64)
     ))
 }
 

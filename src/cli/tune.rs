@@ -4,23 +4,26 @@ use super::campaign_engine::{build, cores, worker_command};
 use super::files::require_kind;
 use super::interrupts::stop_token;
 use super::kind;
-use super::output::{print_json, print_text};
+use super::output::{print_json, print_text, say};
 use super::progress;
 use anyhow::{Context, Result, bail};
 use campaign::base::Base;
 use campaign::flying::with_flights;
 use campaign::gains_file;
 use campaign::pool::Pool;
-use campaign::search::{Change, Comparison, Outcome, search};
+use campaign::report::{flights as count_of, with_unit};
+use campaign::search::{Change, Comparison, FigureChange, Outcome, Progress, search};
 use campaign::tuning::Tuning;
 use campaign::worker::Order;
 use clap::Args;
 use hummingbus::COMPONENTS;
 use inputs::InputFiles;
 use runtime::output_file::{self, Kind, Mark};
+use serde_json::json;
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 pub const HELP: &str = "Example: hummingbus tune manifests/tune/hover.toml --out hover-gains.toml\n\n\
@@ -67,7 +70,12 @@ pub fn tune(arguments: &TuneArguments) -> Result<bool> {
         bail!("{} is an input of the tuning; name another file with --out", out.display());
     }
     output_file::check(&out, &GAINS)?;
-    let outcome = fly(arguments, &tuning, &base, text)?;
+    let mut last = None;
+    let outcome = match fly(arguments, &tuning, &base, text, &mut last) {
+        // A first generation takes as long as a campaign: what it found is not to be lost.
+        Err(_) if stop_token()?.count() > 0 => return interrupted(arguments, &tuning, last.as_ref()),
+        outcome => outcome?,
+    };
     let is_better = outcome.held_out.costs.after < outcome.held_out.costs.before;
     if is_better {
         let declared = base.files.text(&gains)?;
@@ -82,8 +90,47 @@ pub fn tune(arguments: &TuneArguments) -> Result<bool> {
     Ok(is_better)
 }
 
-/// Flies the search.
-fn fly(arguments: &TuneArguments, tuning: &Tuning, base: &Base, text: String) -> Result<Outcome> {
+/// Prints what an interrupted search has found, and ends with the reason why no file was written.
+fn interrupted(arguments: &TuneArguments, tuning: &Tuning, last: Option<&Progress>) -> Result<bool> {
+    let after = last.map_or_else(
+        || "before the end of its first generation".to_owned(),
+        |last| format!("after generation {} of {}", last.generation, tuning.generations),
+    );
+    let message = format!(
+        "the tuning was interrupted {after}; no file was written, since other flights have not judged its gains"
+    );
+    if arguments.json {
+        print_json(&json!({ "error": message, "faults": [], "interrupted": last }))?;
+    } else if let Some(last) = last {
+        print_text(&found_so_far(last)?)?;
+    }
+    bail!(message)
+}
+
+/// The best gains of an interrupted search.
+fn found_so_far(last: &Progress) -> Result<String> {
+    let Progress { generation, candidates, costs, gains } = last;
+    let mut text = format!("generation {generation}, {candidates} candidates; the best one so far:\n\n");
+    for gain in gains {
+        writeln!(text, "  {}: {} → {}{}", gain.name, gain.before, gain.after, with_unit(&gain.unit))?;
+    }
+    let percent = 100.0 * costs.relative();
+    write!(
+        text,
+        "\n  costs on the flights that it was tuned on: {:.5} → {:.5}, {percent:+.1} %",
+        costs.before, costs.after
+    )?;
+    Ok(text)
+}
+
+/// Flies the search; `last` gets its state after each generation.
+fn fly(
+    arguments: &TuneArguments,
+    tuning: &Tuning,
+    base: &Base,
+    text: String,
+    last: &mut Option<Progress>,
+) -> Result<Outcome> {
     let stop = stop_token()?;
     let folder = tempfile::tempdir().context("cannot make a folder for the workers")?;
     let order = Order {
@@ -101,9 +148,19 @@ fn fly(arguments: &TuneArguments, tuning: &Tuning, base: &Base, text: String) ->
     };
     let bar = progress::bar(BAR, arguments.json);
     bar.set_length(tuning.generations as u64);
-    let tell = |generation: usize, costs: f64| {
-        bar.set_position(generation as u64);
-        bar.set_message(format!("lowest costs: {:.1} % of today's", 100.0 * costs));
+    let (lines, last) = (progress::Lines::default(), Mutex::new(last));
+    let tell = |progress: Progress| {
+        let costs = 100.0 * progress.costs.after / progress.costs.before;
+        bar.set_position(progress.generation as u64);
+        bar.set_message(format!("lowest costs: {costs:.1} % of today's"));
+        let line = format!(
+            "tuning: generation {} of {}, lowest costs {costs:.1} % of today's",
+            progress.generation, tuning.generations
+        );
+        if bar.is_hidden() && !arguments.json && lines.is_due(&line, bar.elapsed()) {
+            say(&line);
+        }
+        **last.lock().unwrap_or_else(PoisonError::into_inner) = Some(progress);
     };
     let outcome = with_flights(&pool, &stop, |flying| search(tuning, base, flying, &tell));
     progress::finish(&bar);
@@ -118,7 +175,7 @@ fn default_out(path: &Path) -> PathBuf {
 fn summary(outcome: &Outcome, out: Option<&Path>) -> Result<String> {
     let mut text = format!("{} generations, {} candidates\n\n", outcome.generations, outcome.candidates);
     for gain in &outcome.gains {
-        writeln!(text, "  {}: {} → {}", gain.name, gain.before, gain.after)?;
+        writeln!(text, "  {}: {} → {}{}", gain.name, gain.before, gain.after, with_unit(&gain.unit))?;
     }
     writeln!(text, "\n{}", compared("tuned on", &outcome.tuned_on)?)?;
     writeln!(text, "{}", compared("judged by other flights:", &outcome.held_out)?)?;
@@ -133,14 +190,14 @@ fn compared(title: &str, comparison: &Comparison) -> Result<String> {
     let Comparison { flights, costs, standard_error, failed, figures, .. } = comparison;
     let percent = 100.0 * costs.relative();
     let error = 100.0 * standard_error / costs.before;
-    let mut text = format!("{title} {flights} flights\n");
+    let mut text = format!("{title} {}\n", count_of(*flights as u64));
     writeln!(
         text,
         "  costs: {:.5} → {:.5}, {percent:+.1} % (standard error {error:.1} %)",
         costs.before, costs.after
     )?;
-    for (figure, Change { before, after }) in figures {
-        writeln!(text, "  {figure}: {before:.5} → {after:.5}")?;
+    for (figure, FigureChange { change: Change { before, after }, unit }) in figures {
+        writeln!(text, "  {figure}: {before:.5} → {after:.5}{}", with_unit(unit))?;
     }
     writeln!(text, "  flights with a condition that does not hold: {} → {}", failed.before, failed.after)?;
     Ok(text)

@@ -1,6 +1,7 @@
-//! pandas, polars and DuckDB read the flights of a campaign.
+//! pandas, polars and DuckDB read the flights of a campaign, and a browser draws its page.
 
-use crate::{ROOT, hummingbus, readers};
+use crate::{ROOT, hummingbus, look, readers};
+use serde_json::json;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -46,6 +47,35 @@ fn pandas_polars_and_duckdb_find_the_rows_of_a_campaign() {
         output.status.code() == Some(1) && message.starts_with("read_campaign.py: pandas has"),
         "{message}"
     );
+}
+
+#[test]
+fn a_browser_draws_the_page_with_units_and_counts_within_its_window() {
+    let Some(readers) = readers() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    // The commands of the worst flights are as long as the path.
+    let inner = folder.path().join("a-folder-with-a-name-that-takes-a-line-by-itself/".repeat(3));
+    fs::create_dir_all(&inner).unwrap();
+    let (campaign, out) = (inner.join("c.toml"), inner.join("out"));
+    let manifest = Path::new(ROOT).join("manifests/hover.toml");
+    fs::write(&campaign, format!("manifest = {:?}\n{CAMPAIGN}", manifest.to_str().unwrap())).unwrap();
+    hummingbus(&["campaign".as_ref(), campaign.as_os_str(), "--out".as_ref(), out.as_os_str()]);
+
+    let seen = look(&readers, "read_campaign.mjs", &[out.join("report.html").as_os_str()]);
+    assert_eq!((&seen["wrong"], &seen["overflow"]), (&json!([]), &json!(0)), "{seen}");
+    let cell = |table: &str, row: usize, column: usize| {
+        seen["tables"][table][row][column]
+            .as_str()
+            .unwrap_or_else(|| panic!("{table} {row} {column}: {seen}"))
+    };
+    assert_eq!((cell("figures", 0, 7), cell("figures", 1, 7)), ("unit", "m"));
+    let failures = seen["tables"]["failures"].as_array().unwrap();
+    let total = failures.iter().position(|row| row[1] == "without figures, for these reasons:").unwrap();
+    assert_eq!((cell("failures", total, 0), cell("failures", total + 1, 0)), ("2", "2"));
+    assert!(cell("failures", total + 1, 1).starts_with("such as flight "), "{seen}");
+    for axis in ["histogram", "scatter"] {
+        assert!(seen["axes"][axis].as_str().unwrap().ends_with(" in m"), "{seen}");
+    }
 }
 
 fn read(readers: &Path, folder: &Path) -> Output {

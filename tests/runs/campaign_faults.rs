@@ -77,9 +77,20 @@ fn a_full_disk_is_named_and_costs_no_row_that_was_written() {
     let mut command = Command::new("sh");
     command.args(["-c", limited, "sh", HUMMINGBUS, "campaign", &campaign, "--out", &out, "--workers", "1"]);
     let ended = place.launch(command).end().with_code(2);
-    ended.says(&["flights are kept in", "cannot write", "rows.jsonl", "File too large"]);
+    ended.says(&[
+        &format!("flights kept in {out}; the same command flies the rest"),
+        "cannot write",
+        "rows.jsonl",
+        "File too large",
+    ]);
     let path = format!("{out}/rows.jsonl");
     let text = fs::read_to_string(&path).unwrap();
+    assert!(text.ends_with('\n'), "a part of a row is left: {text}");
+    let kept = text.lines().count() as u64 - 1;
+    ended.prints(&[
+        &format!("{kept} of {kept} flights passed"),
+        &format!("{} of 60 planned flights were not flown", 60 - kept),
+    ]);
     let whole: String = text.split_inclusive('\n').filter(|line| line.ends_with('\n')).collect();
     let kept = whole.lines().count() - 1;
     assert!((1..60).contains(&kept), "{kept}");

@@ -1,7 +1,7 @@
 //! Results of campaigns: the same bytes, of one build, and a summary even where a file cannot be written.
 
 use crate::campaign::{HOVERS, rows, written};
-use crate::support::{HUMMINGBUS, Load, Place};
+use crate::support::{HUMMINGBUS, Load, Place, repository};
 use std::fs::{self, OpenOptions};
 use std::io::Write as _;
 use std::process::Command;
@@ -32,6 +32,33 @@ fn the_table_is_the_same_bytes_however_many_workers_fly_it_interrupted_and_on_a_
     let load = Load::of_threads(8);
     assert!(one == table(&fly("loaded", "2")), "a loaded machine wrote another table");
     drop(load);
+}
+
+#[test]
+fn the_table_of_refused_flights_is_the_same_bytes_from_any_folder_and_names_files_that_exist() {
+    let place = Place::new();
+    // Masses below 0, and masses that the rotors cannot let down.
+    let text = HOVERS
+        .replace("flights = 12", "flights = 40")
+        .replace("as = \"factor\"\nuniform = [0.8, 1.2]", "uniform = [-0.6, 0.6]");
+    let campaign = written(&place, "c.toml", &text);
+    let fly = |folder: &str, file: &str, out: &str| {
+        let mut command = Command::new(HUMMINGBUS);
+        command.args(["campaign", file, "--out", out]).current_dir(folder);
+        place.launch(command).end().with_code(0);
+    };
+    let (here, there) = (place.path("here"), place.path("there"));
+    fly(&place.path(""), "c.toml", "here");
+    fly(&repository(""), &campaign, &there);
+    assert!(table(&here) == table(&there), "another folder gave another table");
+    let errors: Vec<String> =
+        rows(&here).iter().filter_map(|row| Some(row["error"].as_str()?.to_owned())).collect();
+    for says in ["c.toml:5:7: process.plant.vehicle.body.mass=-", "cannot come down"] {
+        assert!(errors.iter().any(|error| error.contains(says)), "no {says} in {errors:#?}");
+    }
+    for error in errors {
+        assert!(error.starts_with("hover.toml:") && !error.contains("@plant"), "{error}");
+    }
 }
 
 /// A program of another build: the bytes behind an executable change what it is, and not what it does.
@@ -130,7 +157,13 @@ fn a_report_keeps_the_figures_that_the_campaign_chooses() {
         let figures = report["figures"].as_array().unwrap().clone();
         figures.into_iter().map(|figure| figure["figure"].as_str().unwrap().to_owned()).collect::<Vec<_>>()
     };
-    assert_eq!(names(&fly("")), ["height", "east (min)", "east (max)"]);
+    let report = fly("");
+    assert_eq!(names(&report), ["height", "east (min)", "east (max)"]);
+    let units: Vec<_> = report["figures"].as_array().unwrap().iter().map(|figure| &figure["unit"]).collect();
+    assert_eq!(units, ["m", "m", "m"]);
+    // Metadata of the table.
+    let parquet = String::from_utf8_lossy(&table(&out)).into_owned();
+    assert!(["unit of height", "unit of east (min)"].iter().all(|key| parquet.contains(key)));
     let wide = table(&out).len();
     let unknown = written(&place, "unknown.toml", &format!("figures = [\"heigth\"]\n{text}"));
     let ended = place.call(&["campaign", &unknown, "--out", &out]).with_code(2);

@@ -128,6 +128,13 @@ fn an_override_that_is_none() {
     set("process.h1/plant.cpu=1").says(&["there is no process `h1/plant`"]);
     set("=1").says(&["expected keys with dots between them"]);
     set("pass.9.max=1").says(&["`pass` is a list of 6, and `9` is none of them", "numbered from 0"]);
+    for (key, help) in [
+        ("process.plant.vehicle.body.centre[0]", "write `centre.0`"),
+        ("process.plant.parameters.initial_position_m[2]", "write `initial_position_m.2`"),
+        ("pass[0].max", "write `pass.0`"),
+    ] {
+        set(&format!("{key}=1")).says(&["an element of a list is a key of its own", help]);
+    }
     set("include=[]").says(&["unknown key `include`"]);
 }
 
@@ -151,6 +158,23 @@ fn an_override_in_a_file_is_told_with_its_text_and_the_file_that_exists() {
     let ended = place.call(&["check", &manifest, "--set", set]).with_code(2);
     ended.says(&[&format!("error: {vehicle}:"), "`command.max` must be", &format!("--set {set}")]);
     assert!(!ended.error.contains("@plant"), "{ended}");
+}
+
+#[test]
+fn a_vehicle_that_contradicts_itself_by_an_override_is_told_with_the_override_and_lines_of_the_file_that_exists()
+ {
+    let place = Place::new();
+    let (manifest, vehicle) = with_vehicle(&place, "[motor]", "[motor]");
+    let text = fs::read_to_string(&vehicle).unwrap();
+    let gravity = text.lines().position(|line| line.starts_with("gravity")).unwrap() + 1;
+    // Refused, and with a warning.
+    for (mass, says) in [("0.0075", "cannot come down"), ("2.0", "can hardly climb or tilt")] {
+        let set = format!("process.plant.vehicle.body.mass={mass}");
+        let ended = place.call(&["check", &manifest, "--set", &set]);
+        ended
+            .says(&[says, &format!("look at --set {set}: `body.mass`, {vehicle}:{gravity}: `body.gravity`")]);
+        assert!(!ended.error.contains("@plant"), "{ended}");
+    }
 }
 
 /// Writes the good manifest with another vehicle into `place`: the Hummingbird with `from` replaced by `to`.

@@ -1,7 +1,8 @@
 //! Tuning gains: the same gains however many workers fly, judged by other flights, and refusals in words.
 
 use crate::campaign::{rows, written};
-use crate::support::{Place, repository};
+use crate::support::{Place, poll, repository};
+use rustix::process::Signal;
 use std::fs;
 
 /// A tuning of the height of short hovers, whose damping is far too weak at first.
@@ -100,6 +101,47 @@ fn gains_that_are_not_better_on_other_flights_are_not_written() {
 }
 
 #[test]
+fn an_interrupted_tuning_prints_the_best_gains_so_far() {
+    let place = Place::new();
+    let file = tuning(&place, "t.toml", &TUNING.replace("generations = 4", "generations = 1000"));
+    let out = place.path("gains.toml");
+    for signal in [Signal::INT, Signal::TERM] {
+        let mut launch = place.start(&["tune", &file, "--out", &out]);
+        poll("no generation ended", || {
+            assert!(!launch.has_ended(), "it ended by itself: {}", launch.errors());
+            launch.errors().contains("tuning: generation 1 of 1000, lowest costs").then_some(())
+        });
+        launch.signal(signal);
+        let ended = launch.end().with_code(2);
+        ended.says(&[
+            "the tuning was interrupted after generation",
+            "of 1000; no file was written, since other flights have not judged its gains",
+        ]);
+        ended.prints(&[
+            "the best one so far:",
+            "damping: 1.5 → ",
+            "costs on the flights that it was tuned on: ",
+        ]);
+    }
+    assert!(!fs::exists(&out).unwrap());
+}
+
+#[test]
+fn the_result_has_units() {
+    let place = Place::new();
+    let file = tuning(&place, "t.toml", &TUNING.replace("generations = 4", "generations = 2"));
+    let out = place.path("gains.toml");
+    let ended = place.call(&["tune", &file, "--out", &out]).with_code(0);
+    for (name, unit) in [("damping: ", " 1/s"), ("height error: ", " m")] {
+        let line = ended.output.lines().find(|line| line.contains(name)).unwrap();
+        assert!(line.ends_with(unit), "{ended}");
+    }
+    let text = fs::read_to_string(&out).unwrap();
+    let line = text.lines().find(|line| line.contains("height error: ")).unwrap();
+    assert!(line.starts_with('#') && line.ends_with(" m"), "{text}");
+}
+
+#[test]
 fn what_cannot_be_tuned_is_refused_in_words() {
     let place = Place::new();
     let out = place.path("gains.toml");
@@ -135,6 +177,16 @@ fn what_cannot_be_tuned_is_refused_in_words() {
         ended.says(&[says]);
         assert!(!ended.to_string().contains("panicked"), "{ended}");
     }
+    // A figure that does not exist: its place, and the one that is meant.
+    let text = TUNING.replace("figure = \"height error\"", "figure = \"hight error\"");
+    let file = tuning(&place, "t.toml", &text);
+    let written = fs::read_to_string(&file).unwrap();
+    let line = written.lines().position(|line| line.starts_with("figure = ")).unwrap() + 1;
+    let ended = place.call(&["tune", &file, "--out", &out]).with_code(2);
+    ended.says(&[
+        &format!("{file}:{line}:10: there is no figure `hight error`"),
+        "did you mean `height error`?",
+    ]);
     let file = tuning(&place, "t.toml", TUNING);
     let weak = place.path("weak.toml");
     place.call(&["tune", &file, "--out", &weak]).with_code(2).says(&["is an input of the tuning"]);

@@ -13,18 +13,27 @@ if (flights.length < report.flights) {
   element("summary").textContent += ` The plots show every ${Math.round(report.flights / flights.length)}th flight.`;
 }
 
+// Reasons that the table lists.
+const REASONS = 10;
+const others = report.errors.slice(REASONS).reduce((sum, it) => sum + it.flights, 0);
+
 fillTable(
   "failures",
   ["flights", left("first failure"), "median time in s"],
   [
     ...report.failures.map((failure) => [failure.flights, left(failure.condition), number(failure.median_s)]),
-    ...report.errors.map(([error, count]) => [count, long(error), "–"]),
+    ...(report.broken ? [[report.broken, left("without figures, for these reasons:"), "–"]] : []),
+    ...report.errors.slice(0, REASONS).map((it) => [it.flights, wrapped(`${it.flights > 1 ? "such as " : ""}flight ${it.flight}: ${it.error}`), "–"]),
+    ...(others ? [[others, left("more; report.json has all reasons"), "–"]] : []),
   ],
 );
 fillTable(
   "figures",
-  [left("figure"), "flights", "least", "5 %", "median", "95 %", "greatest"],
-  report.figures.map((figure) => [left(figure.figure), figure.flights, ...figure.quantiles.map((value) => number(value))]),
+  [left("figure"), "flights", "least", "5 %", "median", "95 %", "greatest", left("unit")],
+  report.figures.map((it) => {
+    const quantiles = it.quantiles.length ? it.quantiles.map((value) => number(value)) : Array(5).fill("–");
+    return [left(it.figure), it.flights, ...quantiles, left(shownUnit(it.unit))];
+  }),
 );
 fillTable(
   "influences",
@@ -34,11 +43,17 @@ fillTable(
 fillTable(
   "worst",
   ["flight", left("reason"), left("command")],
-  report.worst.map((worst) => [worst.flight, left(worst.reason), left(worst.command)]),
+  report.worst.map((worst) => [worst.flight, wrapped(worst.reason), wrapped(worst.command)]),
 );
 
 // A name that fits beside an axis.
 const short = (name) => (name.length > 36 ? `${name.slice(0, 35)}…` : name);
+
+// The name of a figure with its unit, for an axis.
+function inUnit(name, index) {
+  const unit = shownUnit(report.figures[index].unit);
+  return unit ? `${name} in ${unit}` : name;
+}
 
 // Flights that passed and flights that failed, as two traces.
 function traces(make) {
@@ -58,13 +73,13 @@ function drawHistogram() {
     return { type: "bar", x: counts.map((_, bin) => low + (bin + 0.5) * size), y: counts };
   });
   const more = { barmode: "stack", bargap: 0.05, showlegend: true };
-  Plotly.react("histogram", bars, layout("", figures[index], "flights", more), CONFIG);
+  Plotly.react("histogram", bars, layout("", inUnit(figures[index], index), "flights", more), CONFIG);
 }
 
 function drawScatter() {
   const [from, to] = [Number(element("varied").value), Number(element("against").value)];
   const points = traces((group) => ({ type: "scatter", mode: "markers", x: group.map((it) => it.drawn[from]), y: group.map((it) => it.figures[to]), text: group.map((it) => `flight ${it.flight}`) }));
-  Plotly.react("scatter", points, layout("", varied[from], short(figures[to]), { showlegend: true }), CONFIG);
+  Plotly.react("scatter", points, layout("", varied[from], inUnit(short(figures[to]), to), { showlegend: true }), CONFIG);
 }
 
 for (const [id, names, draw] of [["figure", figures, drawHistogram], ["varied", varied, drawScatter], ["against", figures, drawScatter]]) {

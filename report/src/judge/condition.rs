@@ -25,6 +25,8 @@ pub struct Condition {
     pairs: Pairs,
     /// Time of the first sample after which the condition cannot hold any more.
     lost_ns: Option<u64>,
+    /// Time of the newest sample that counts.
+    last_ns: Option<u64>,
 }
 
 /// Samples of a field and of its reference within the span, of which the lag and the gain are computed at the end.
@@ -45,6 +47,7 @@ pub struct KeptSamples {
     samples: Samples,
     pairs: Pairs,
     lost_ns: Option<u64>,
+    last_ns: Option<u64>,
 }
 
 impl Condition {
@@ -63,9 +66,18 @@ impl Condition {
         let reference =
             pass.reference.as_ref().map(|other| signal(&other.topic, &other.field)).transpose()?;
         let gate = pass.gate.as_ref().map(|gate| signal(&gate.topic, &gate.field)).transpose()?;
-        let (samples, pairs) = (Samples::default(), Pairs::default());
-        let pass = pass.clone();
-        Ok(Self { pass, judged, minus, reference, gate, factor: None, samples, pairs, lost_ns: None })
+        Ok(Self {
+            pass: pass.clone(),
+            judged,
+            minus,
+            reference,
+            gate,
+            factor: None,
+            samples: Samples::default(),
+            pairs: Pairs::default(),
+            lost_ns: None,
+            last_ns: None,
+        })
     }
 
     /// Reserves memory for a run of `duration_ns` in ticks of `tick_ns`, so that no sample allocates.
@@ -82,9 +94,10 @@ impl Condition {
 
     /// The samples and figures kept so far.
     pub fn kept(&self) -> KeptSamples {
-        let Self { pass, factor, samples, pairs, lost_ns, .. } = self;
+        let Self { pass, factor, samples, pairs, lost_ns, last_ns, .. } = self;
         let (name, pairs) = (pass.name.clone(), pairs.clone());
-        KeptSamples { name, factor: *factor, samples: *samples, pairs, lost_ns: *lost_ns }
+        let (factor, samples) = (*factor, *samples);
+        KeptSamples { name, factor, samples, pairs, lost_ns: *lost_ns, last_ns: *last_ns }
     }
 
     /// Goes on from the samples that another evaluation of the condition has `kept`.
@@ -100,7 +113,8 @@ impl Condition {
         self.pairs.field.extend(kept.pairs.field);
         self.pairs.reference.extend(kept.pairs.reference);
         (self.pairs.first_ns, self.pairs.second_ns) = (kept.pairs.first_ns, kept.pairs.second_ns);
-        (self.factor, self.samples, self.lost_ns) = (kept.factor, kept.samples, kept.lost_ns);
+        (self.factor, self.samples) = (kept.factor, kept.samples);
+        (self.lost_ns, self.last_ns) = (kept.lost_ns, kept.last_ns);
         Ok(())
     }
 
@@ -121,6 +135,7 @@ impl Condition {
         }
         if let Some(reference) = self.reference {
             if let Some(reference) = signals.held(reference) {
+                self.last_ns = Some(time_ns);
                 self.pairs.field.push(judged[0]);
                 self.pairs.reference.push(reference[0]);
             }
@@ -129,6 +144,7 @@ impl Condition {
         {
             let value = value * factor;
             self.samples.add(value);
+            self.last_ns = Some(time_ns);
             if self.lost_ns.is_none() && self.is_lost_by(value) {
                 self.lost_ns = Some(time_ns);
             }
@@ -138,9 +154,10 @@ impl Condition {
 
     /// The values of the condition.
     pub fn finish(&self) -> Found {
+        let [lost_s, last_s] = [self.lost_ns, self.last_ns].map(|ns| Some(ns? as f64 * 1e-9));
+        let found = Found { lost_s, last_s, ..Found::default() };
         let Some(reference) = &self.pass.reference else {
-            let values = self.samples.values(self.pass.statistic);
-            return Found { values, why: None, lost_s: self.lost_ns.map(|ns| ns as f64 * 1e-9) };
+            return Found { values: self.samples.values(self.pass.statistic), ..found };
         };
         match self.pairs.response(reference) {
             Ok((response, step_s)) => {
@@ -148,9 +165,9 @@ impl Condition {
                     Statistic::Lag => response.lag_samples as f64 * step_s,
                     _ => response.gain,
                 };
-                Found { values: vec![value * self.factor.unwrap_or(1.0)], ..Found::default() }
+                Found { values: vec![value * self.factor.unwrap_or(1.0)], ..found }
             }
-            Err(why) => Found { why: Some(why.to_string()), ..Found::default() },
+            Err(why) => Found { why: Some(why.to_string()), ..found },
         }
     }
 
@@ -421,6 +438,43 @@ mod tests {
         assert!(
             error.contains("`c`") && error.contains("`m`") && error.contains("`p` of /b, in `rad`"),
             "{error}"
+        );
+    }
+
+    #[test]
+    fn a_condition_that_no_sample_breaks_fails_at_the_last_sample_of_its_span() {
+        let of = |statistic: &str, limits: &str| {
+            let text = format!("from_s = 1.0\nto_s = 3.0\n{limits}");
+            let text = format!(
+                "name = \"c\"\ntopic = \"/a\"\nfield = \"p\"\nunit = \"m\"\nstatistic = \"{statistic}\"\n{text}"
+            );
+            verdict(&toml::from_str(&text).unwrap(), &[samples("/a", "m", &[9.0, 5.0, 7.0, 6.0, 0.0])])
+                .unwrap()
+        };
+        for (statistic, limits) in [
+            ("mean", "max = 1.0"),
+            ("rms", "max = 1.0"),
+            ("last", "max = 1.0"),
+            ("span", "max = 1.0"),
+            // The greatest sample is too small, the least one too great.
+            ("max", "min = 8.0"),
+            ("min", "max = 1.0"),
+        ] {
+            let failed = of(statistic, limits);
+            assert_eq!((failed.failed_at_s, failed.failed_at_end), (Some(3.0), true), "{statistic}");
+            assert!(failed.to_string().ends_with(", at the end of its span, 3.000 s"), "{failed}");
+            assert_eq!(of(statistic, "max = 10.0").failed_at_s, None, "{statistic}");
+        }
+        let failed = of("max", "max = 6.5");
+        assert_eq!((failed.failed_at_s, failed.failed_at_end), (Some(2.0), false));
+        assert!(failed.to_string().ends_with(", first at 2.000 s"), "{failed}");
+        let both = [samples("/a", "m", &pulse(7)), samples("/b", "m", &pulse(5))];
+        let lag = verdict(&response("lag", "s", "max = 1.0\nto_s = 18.0"), &both).unwrap();
+        assert_eq!((lag.passed, lag.failed_at_s), (false, Some(18.0)));
+        // A span without a sample has no time.
+        assert_eq!(
+            verdict(&condition("from_s = 5.0"), &[samples("/a", "m", &[1.0])]).unwrap().failed_at_s,
+            None
         );
     }
 

@@ -32,6 +32,8 @@ pub struct Found {
     /// Time of the first sample by which the condition fails for any later samples; `None` for a mean, an RMS and the
     /// like.
     pub lost_s: Option<f64>,
+    /// Time of the last sample of the span.
+    pub last_s: Option<f64>,
 }
 
 /// RMS errors of one comparison, NaN without a window.

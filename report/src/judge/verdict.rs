@@ -13,10 +13,10 @@ use std::fmt;
 /// let (name, unit) = ("altitude".to_owned(), "m".to_owned());
 /// let values = vec![1.49, 1.51];
 /// let (min, max) = (Some(1.4), Some(1.6));
-/// let verdict = Verdict { name, values, unit, min, max, passed: true, why: None, failed_at_s: None };
+/// let verdict = Verdict { name, values, unit, min, max, passed: true, ..Verdict::default() };
 /// assert_eq!(verdict.to_string(), "  ok     altitude: 1.4900 … 1.5100 m (1.4 … 1.6)");
 /// ```
-#[derive(Debug, Serialize)]
+#[derive(Debug, Default, Serialize)]
 pub struct Verdict {
     /// Meaning of the condition.
     pub name: String,
@@ -33,9 +33,13 @@ pub struct Verdict {
     /// Reason why there are no values, if it is more than a lack of samples.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub why: Option<String>,
-    /// Simulation time of the first sample by which it failed; `None` for a mean, an RMS and the like.
+    /// Simulation time of the first sample by which it failed; of the last sample of its span for a mean, an RMS and the like.
+    /// `None` if there is no sample.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub failed_at_s: Option<f64>,
+    /// True if no sample alone made it fail, so that `failed_at_s` is the time of the last one.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub failed_at_end: bool,
 }
 
 /// RMS errors of a simulated state at the ends of windows; its text is a line of the summary.
@@ -75,10 +79,11 @@ impl Verdict {
     /// The verdict on `pass`, of whose samples this was found.
     pub(crate) fn of(pass: &PassCondition, found: &Found) -> Self {
         let PassCondition { name, unit, min, max, .. } = pass;
-        let Found { values, why, lost_s } = found.clone();
+        let Found { values, why, lost_s, last_s } = found.clone();
         // A span without samples fails: samples that were never there did not pass.
         let passed = !values.is_empty() && values.iter().all(|value| within(*value, *min, *max));
-        let failed_at_s = lost_s.filter(|_| !passed);
+        let failed_at_s = lost_s.or(last_s).filter(|_| !passed);
+        let failed_at_end = failed_at_s.is_some() && lost_s.is_none();
         Self {
             name: name.clone(),
             values,
@@ -88,6 +93,7 @@ impl Verdict {
             passed,
             why,
             failed_at_s,
+            failed_at_end,
         }
     }
 }
@@ -137,8 +143,9 @@ impl fmt::Display for Verdict {
             (None, None) => return write!(f, "  value  {}: {values}{unit}", self.name),
         };
         let mark = if self.passed { "ok    " } else { "FAILED" };
-        let from = self.failed_at_s.map_or(String::new(), |at_s| format!(", first at {at_s:.3} s"));
-        write!(f, "  {mark} {}: {values}{unit} ({limit}){from}", self.name)
+        let at = if self.failed_at_end { "at the end of its span," } else { "first at" };
+        let at = self.failed_at_s.map_or(String::new(), |at_s| format!(", {at} {at_s:.3} s"));
+        write!(f, "  {mark} {}: {values}{unit} ({limit}){at}", self.name)
     }
 }
 

@@ -37,9 +37,10 @@ function number(value, digits = 4) {
   return `${mantissa.replace("-", "−")}·10${raised(Number(exponent))}`;
 }
 
-// A cell is text, or made by `left` or `long`.
+// A cell is text, or made by `left`, `long` or, for words longer than a line, `wrapped`.
 const left = (text) => ({ text, className: "left" });
 const long = (text, colSpan = 1) => ({ text, className: "long", colSpan });
+const wrapped = (text) => ({ text, className: "long wrapped" });
 
 // Fills the table with headings and rows, each its cells or {cells, className}.
 function fillTable(id, headings, rows) {

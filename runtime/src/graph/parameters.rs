@@ -129,7 +129,15 @@ pub fn of(
         for warning in context.into_warnings() {
             let at = place(declared, &warning.key);
             if !(warning.is_behind_end && notes.is_cut(manifest, &at)) {
-                notes.warnings.push(problem(declared, &at, &warning.message, String::new()));
+                let message = edited.iter().fold(warning.message, |message, (key, original, copy)| {
+                    manifest.without_copy_in(
+                        declared.files,
+                        (name.get_ref(), key),
+                        (original, copy),
+                        &message,
+                    )
+                });
+                notes.warnings.push(problem(declared, &at, &message, String::new()));
             }
         }
     }

@@ -47,6 +47,22 @@ pub fn edited_path(path: &Path, process: &str) -> PathBuf {
     path.with_file_name(format!("{stem}@{}{ending}", process.replace('/', "@")))
 }
 
+/// The message `text` with other names of the file called `copy`: `name` returns one by the line behind the name, if there is one, and the key
+/// behind that, which is empty if there is none.
+pub fn renamed(text: &str, copy: &str, mut name: impl FnMut(Option<usize>, &str) -> String) -> String {
+    let mut parts = text.split(copy);
+    let first = parts.next().unwrap_or_default().to_owned();
+    parts.fold(first, |all, part| {
+        let line = part
+            .strip_prefix(':')
+            .map(|rest| &rest[..rest.len() - rest.trim_start_matches(|c: char| c.is_ascii_digit()).len()]);
+        let number = line.and_then(|line| line.parse().ok());
+        let rest = if number.is_some() { &part[1 + line.map_or(0, str::len)..] } else { part };
+        let key = rest.strip_prefix(": `").and_then(|rest| rest.split('`').next()).unwrap_or_default();
+        all + &name(number, key) + rest
+    })
+}
+
 /// The processes and keys of files that `overrides` edit, each once.
 pub fn edited_files<'s>(overrides: impl Iterator<Item = &'s str>) -> Vec<(&'s str, &'static str)> {
     let mut found = Vec::new();
@@ -305,6 +321,21 @@ mod tests {
         assert!(!is_about("body.mass.unit") && !is_about("body.length") && !is_about(""));
         let unit = FileEdit::parse("process.plant.vehicle.body.mass.unit=lb", 0).unwrap();
         assert!(unit.is_about("body.mass.unit", VEHICLE) && !unit.is_about("body.mass.value", VEHICLE));
+    }
+
+    #[test]
+    fn a_line_of_the_copy_in_a_message_is_named_otherwise() {
+        let text = "too heavy; look at /v@p.toml:21: `body.mass`, /v@p.toml:3: `body.gravity`, and /v@p.toml";
+        let found = super::renamed(text, "/v@p.toml", |line, key| match (line, key) {
+            (Some(21), "body.mass") => "--set a=1".to_owned(),
+            (Some(3), "body.gravity") => "/v.toml:2".to_owned(),
+            (None, "") => "/v.toml".to_owned(),
+            other => panic!("{other:?}"),
+        });
+        assert_eq!(
+            found,
+            "too heavy; look at --set a=1: `body.mass`, /v.toml:2: `body.gravity`, and /v.toml"
+        );
     }
 
     #[test]

@@ -38,6 +38,10 @@ impl<'s> Override<'s> {
         if keys.iter().any(|key| key.get_ref().is_empty()) || keys.len() > DEPTH_MAX {
             return Err(refused("expected keys with dots between them before the `=`"));
         }
+        if let Some((key, other)) = keys.iter().find_map(|key| Some((key, with_dot(key.get_ref())?))) {
+            let message = format!("`{}`: an element of a list is a key of its own", key.get_ref());
+            return Err(sources.problem(&key.span(), message, format!("write `{other}`")));
+        }
         Ok(Self { keys, value: value_of(value, source.base + path.len() + 1) })
     }
 
@@ -80,6 +84,12 @@ fn keys(path: &str, base: usize) -> Vec<Spanned<&str>> {
         Spanned::new(begin..begin + text.trim().len(), text.trim())
     };
     path.split('.').map(key).collect()
+}
+
+/// The keys that are meant by a `key` such as `centre[0]`: `centre.0`.
+fn with_dot(key: &str) -> Option<String> {
+    let (list, index) = key.strip_suffix(']')?.split_once('[')?;
+    index.parse::<usize>().is_ok().then(|| format!("{list}.{index}"))
 }
 
 /// A value as TOML; any other text is a string: a path needs no quotes on the command line.

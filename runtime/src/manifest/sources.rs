@@ -152,6 +152,12 @@ impl Sources {
         }
     }
 
+    /// Place of the value of `--set` at `span`, as the user knows it.
+    pub fn value_place(&self, span: &Range<usize>) -> String {
+        let text = &self.at(span.start).text;
+        self.set_place(text).map_or_else(|| format!("--set {text}"), Place::to_string)
+    }
+
     /// Place of the value `text` in the file that sets it in place of `--set`.
     pub fn set_place(&self, text: &str) -> Option<&Place> {
         let key = text.split('=').next().unwrap_or_default().trim();

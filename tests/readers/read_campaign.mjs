@@ -1,0 +1,26 @@
+// Prints as JSON what a browser draws of a campaign's page, 1200 pixels wide. Usage: read_campaign.mjs PAGE
+
+import { pathToFileURL } from "node:url";
+import { withPage } from "./browser.mjs";
+
+const [file] = process.argv.slice(2);
+const WIDTH = 1200;
+
+/** Returns the cells of the tables, the titles of the axes, and the pixels by which the page or a table is too wide. */
+function look() {
+  const rows = (id) => [...document.querySelectorAll(`#${id} tr`)].map((row) => [...row.cells].map((cell) => cell.textContent));
+  const text = (name) => document.querySelector(name)?.textContent ?? "";
+  const boxes = [document.documentElement, ...document.querySelectorAll(".scroll")];
+  return {
+    tables: Object.fromEntries(["failures", "figures", "worst"].map((id) => [id, rows(id)])),
+    axes: { histogram: text("#histogram .xtitle"), scatter: text("#scatter .ytitle") },
+    overflow: Math.max(...boxes.map((box) => box.scrollWidth - box.clientWidth)),
+  };
+}
+
+const seen = await withPage(pathToFileURL(file).href, async (page, wrong) => {
+  await page.setViewport({ width: WIDTH, height: 1000 });
+  await page.waitForSelector("#scatter .cartesianlayer path");
+  return { ...(await page.evaluate(look)), wrong };
+});
+console.log(JSON.stringify(seen));
