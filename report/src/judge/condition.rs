@@ -44,7 +44,8 @@ pub struct KeptSamples {
     factor: Option<f64>,
     samples: Samples,
     pairs: Pairs,
-    lost_ns: Option<u64>,
+    /// Time of the first sample after which the condition cannot hold any more.
+    pub lost_ns: Option<u64>,
 }
 
 impl Condition {

@@ -13,10 +13,10 @@ use std::fmt;
 /// let (name, unit) = ("altitude".to_owned(), "m".to_owned());
 /// let values = vec![1.49, 1.51];
 /// let (min, max) = (Some(1.4), Some(1.6));
-/// let verdict = Verdict { name, values, unit, min, max, passed: true, why: None, failed_at_s: None };
+/// let verdict = Verdict { name, values, unit, min, max, passed: true, ..Default::default() };
 /// assert_eq!(verdict.to_string(), "  ok     altitude: 1.4900 … 1.5100 m (1.4 … 1.6)");
 /// ```
-#[derive(Debug, Serialize)]
+#[derive(Debug, Default, Serialize)]
 pub struct Verdict {
     /// Meaning of the condition.
     pub name: String,
@@ -36,6 +36,9 @@ pub struct Verdict {
     /// Simulation time of the first sample by which it failed; `None` for a mean, an RMS and the like.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub failed_at_s: Option<f64>,
+    /// The tick at that time.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub failed_at_tick: Option<u32>,
 }
 
 /// RMS errors of a simulated state at the ends of windows; its text is a line of the summary.
@@ -88,7 +91,15 @@ impl Verdict {
             passed,
             why,
             failed_at_s,
+            failed_at_tick: None,
         }
+    }
+
+    /// The same verdict, with the tick of its failure in a run with ticks of `tick_s`.
+    pub(crate) fn in_ticks_of(self, tick_s: f64) -> Self {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a tick of the run")]
+        let failed_at_tick = self.failed_at_s.map(|at_s| (at_s / tick_s).round() as u32);
+        Self { failed_at_tick, ..self }
     }
 }
 
@@ -137,7 +148,8 @@ impl fmt::Display for Verdict {
             (None, None) => return write!(f, "  value  {}: {values}{unit}", self.name),
         };
         let mark = if self.passed { "ok    " } else { "FAILED" };
-        let from = self.failed_at_s.map_or(String::new(), |at_s| format!(", first at {at_s:.3} s"));
+        let tick = self.failed_at_tick.map_or(String::new(), |tick| format!(", tick {tick}"));
+        let from = self.failed_at_s.map_or(String::new(), |at_s| format!(", first at {at_s:.3} s{tick}"));
         write!(f, "  {mark} {}: {values}{unit} ({limit}){from}", self.name)
     }
 }
