@@ -11,6 +11,9 @@ use inputs::InputFile;
 use serde::{Deserialize, Serialize};
 use std::cell::RefCell;
 
+/// Processes of a node after which a planned one is long gone, with its parts of checkpoints.
+const GONE_AFTER: u32 = 4;
+
 /// Origin of the process that flies a node.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) enum Origin {
@@ -71,9 +74,13 @@ impl Instances {
         self.0.borrow_mut().push(Started { generation, spec, ticks, has_state: false, is_refused: false });
     }
 
-    /// Notes the ticks of the backups in `membership`.
+    /// Notes the ticks of the backups in `membership`, and forgets planned processes of which no part is still to be written.
     pub fn note_membership(&self, membership: &Membership) {
-        for started in &mut *self.0.borrow_mut() {
+        let mut all = self.0.borrow_mut();
+        all.retain(|Started { generation, spec, .. }| {
+            spec.with.is_some() || generation + GONE_AFTER > membership.nodes[spec.node].primary.generation
+        });
+        for started in &mut *all {
             let node = &membership.nodes[started.spec.node];
             let backup = node.backup.as_ref().filter(|backup| backup.generation == started.generation);
             match backup {
