@@ -141,11 +141,20 @@ fn what_a_link_cannot_carry_is_told_by_the_check() {
     refused("[process.up]\nparameters.streams.setpoint = {}\n", &["streams.setpoint", "set_point"]);
     refused("[process.up]\nperiod_ticks = 2\n", &["every 2 ticks", "would miss messages"]);
     refused(
-        "[process.down]\nparameters.latency_ms = 400.0\n",
-        &["180 messages are sent each second, so 72 would be under way, and a link holds 64"],
+        "[process.down]\nparameters.latency_ms = 40000.0\n",
+        &["are 40000 ms together, expected at most 22756 ms: 180 messages are sent each second"],
     );
     let long = "[process.down]\nparameters.queue_bytes = 50\n";
     refused(long, &["a message of `estimate` takes 55 bytes", "never be sent"]);
+}
+
+/// The queue is as long as the latency needs.
+#[test]
+fn more_messages_than_a_short_line_has_places_for_are_under_way() {
+    let (topics, _) = fly("ground-station.toml", "[process.down]\nparameters.latency_ms = 400.0\n");
+    let (_, last) = topics["/down/statistics"].last().unwrap();
+    let under_way = u32::from_le_bytes(last[36..40].try_into().unwrap());
+    assert!((70..80).contains(&under_way), "{under_way} of 180 a second are under way for 0.4 s");
 }
 
 #[test]

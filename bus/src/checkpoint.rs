@@ -8,11 +8,10 @@
 use crate::component::Transfer;
 use crate::computation::Computation;
 use crate::error::BusError;
-use crate::plan::{NodePlan, Plan};
+use crate::plan::Plan;
 use crate::saved_sample::SavedSample;
 use crate::state_transfer::StateLayout;
 use crate::user_file;
-use inputs::sha256;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::io::Read as _;
@@ -35,8 +34,6 @@ pub struct NodePart {
     /// True if another component goes on in its place, as a successor in flight does: from the state if it can load it, from
     /// the samples that were sent last otherwise.
     pub(crate) is_succeeded: bool,
-    /// SHA-256 of that process's part of the plan.
-    plan_sum: String,
     layout: Option<StateLayout>,
     state: Vec<u8>,
     /// Words of a step under way that takes simulated time.
@@ -91,16 +88,7 @@ impl NodePart {
             computation.save(&mut state);
         }
         let (name, timing) = (name.to_owned(), timing.to_vec());
-        Self {
-            name,
-            generation: 0,
-            is_succeeded: false,
-            plan_sum: String::new(),
-            layout,
-            state,
-            timing,
-            samples,
-        }
+        Self { name, generation: 0, is_succeeded: false, layout, state, timing, samples }
     }
 
     /// Gives `computation`, the node's, the state of this part, and `timing` the words of its computing time.
@@ -164,16 +152,7 @@ impl NodePart {
     pub fn stateless(name: &str) -> Self {
         let (layout, state) = (None, Vec::new());
         let (name, timing, samples) = (name.to_owned(), Vec::new(), Vec::new());
-        Self {
-            name,
-            generation: 0,
-            is_succeeded: false,
-            plan_sum: String::new(),
-            layout,
-            state,
-            timing,
-            samples,
-        }
+        Self { name, generation: 0, is_succeeded: false, layout, state, timing, samples }
     }
 
     /// The same part for another component, which goes on as a successor in flight does.
@@ -182,21 +161,21 @@ impl NodePart {
         Self { is_succeeded: true, ..self }
     }
 
-    /// The same part, of generation `generation` of the node, which flies by `plan`.
-    pub(crate) fn of_process(self, generation: u32, plan: &NodePlan) -> Self {
-        Self { generation, plan_sum: plan_sum(plan), ..self }
-    }
-
-    /// True if the process that has written it flew by `plan`.
-    #[must_use]
-    pub fn is_of(&self, plan: &NodePlan) -> bool {
-        self.plan_sum == plan_sum(plan)
+    /// The same part, of generation `generation` of the node.
+    pub(crate) fn of_process(self, generation: u32) -> Self {
+        Self { generation, ..self }
     }
 
     /// Bytes of its state.
     #[must_use]
     pub fn state_bytes(&self) -> usize {
         self.state.len()
+    }
+
+    /// Its state.
+    #[must_use]
+    pub fn state(&self) -> &[u8] {
+        &self.state
     }
 }
 
@@ -254,12 +233,18 @@ impl Parts {
     /// # Errors
     /// If one of them cannot be read.
     pub fn written(run_dir: &Path, cause: Cause, tick: u32, nodes: usize) -> Result<Option<Self>, BusError> {
-        let paths: Vec<PathBuf> = (0..nodes).map(|index| part_path(run_dir, cause, tick, index)).collect();
-        if !paths.iter().all(|path| path.exists()) {
+        if !Self::are_written(run_dir, cause, tick, nodes) {
             return Ok(None);
         }
-        let nodes = paths.iter().map(|path| load(path)).collect::<Result<_, _>>()?;
+        let part = |index| load(&part_path(run_dir, cause, tick, index));
+        let nodes = (0..nodes).map(part).collect::<Result<_, _>>()?;
         Ok(Some(Self { tick, nodes }))
+    }
+
+    /// True if the `nodes` nodes of the run in `run_dir` have written their parts for `tick`.
+    #[must_use]
+    pub fn are_written(run_dir: &Path, cause: Cause, tick: u32, nodes: usize) -> bool {
+        (0..nodes).all(|index| part_path(run_dir, cause, tick, index).exists())
     }
 
     /// Removes the parts that the nodes have written for `tick`.
@@ -267,13 +252,6 @@ impl Parts {
         // It goes with the run directory otherwise.
         let _ = std::fs::remove_dir_all(run_dir.join(cause.folder()).join(tick.to_string()));
     }
-}
-
-/// SHA-256 of the entries of `plan` that decide what a process computes.
-fn plan_sum(plan: &NodePlan) -> String {
-    let NodePlan { period_ticks, inputs, parameters, computing_time, .. } = plan;
-    let text = serde_json::to_string(&(period_ticks, inputs, parameters, computing_time));
-    sha256(text.unwrap_or_else(|error| unreachable!("a plan serialises: {error}")).as_bytes())
 }
 
 /// Writes the part of node `index` of the checkpoint at `tick` into `run_dir`.

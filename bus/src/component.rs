@@ -157,6 +157,10 @@ pub struct Info {
     pub role: Role,
     /// Parameters that count at the start alone, since its state begins with them.
     pub initial: &'static [&'static str],
+    /// Reason why it cannot take the place of a component from whose state it does not go on, if it cannot.
+    pub needs_state: Option<&'static str>,
+    /// Of a judge: simulation time in ns from which on a condition cannot hold any more, from the bytes of its state.
+    pub failed_ns: Option<fn(&[u8]) -> Option<u64>>,
 }
 
 /// Role of a component in a run.
@@ -174,7 +178,7 @@ impl Info {
     /// A component that computes outputs.
     #[must_use]
     pub const fn new(name: &'static str, summary: &'static str) -> Self {
-        Self { name, summary, role: Role::Compute, initial: &[] }
+        Self { name, summary, role: Role::Compute, initial: &[], needs_state: None, failed_ns: None }
     }
 
     /// The same component, whose `parameters` count at the start alone. A run that goes on from a checkpoint refuses other
@@ -191,15 +195,29 @@ impl Info {
         Self { initial: parameters, ..self }
     }
 
+    /// The same component, which takes the place of another one only if it goes on from its state; `reason` says why.
+    ///
+    /// ```
+    /// use bus::component::Info;
+    ///
+    /// const WORLD: Info = Info::new("world", "moves bodies").needing_state("the bodies would be lost");
+    /// assert!(WORLD.needs_state.is_some());
+    /// ```
+    #[must_use]
+    pub const fn needing_state(self, reason: &'static str) -> Self {
+        Self { needs_state: Some(reason), ..self }
+    }
+
     /// The same component as the one that writes the run's recording.
     #[must_use]
     pub const fn recorder(self) -> Self {
         Self { role: Role::Record, ..self }
     }
 
-    /// The same component as the one that judges a run that is not recorded.
+    /// The same component as the one that judges a run that is not recorded. `failed_ns` returns the simulation time from which
+    /// on a condition cannot hold any more, from the bytes of its state.
     #[must_use]
-    pub const fn judge(self) -> Self {
-        Self { role: Role::Judge, ..self }
+    pub const fn judge(self, failed_ns: fn(&[u8]) -> Option<u64>) -> Self {
+        Self { role: Role::Judge, failed_ns: Some(failed_ns), ..self }
     }
 }

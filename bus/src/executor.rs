@@ -164,7 +164,7 @@ impl<'c> Executor<'c> {
                 // While the run is held, this member may be the only one that waits.
                 Turn::Save => {
                     for Member { node, computation } in &mut self.members {
-                        node.write_at_hold(&self.locals, &**computation)?;
+                        node.write_at_hold(&self.locals, &mut **computation)?;
                     }
                 }
                 turn => return Ok(turn),

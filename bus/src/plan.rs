@@ -130,6 +130,16 @@ impl NodePlan {
         json_file::store(&backup_path(run_dir, node, generation), self)
     }
 
+    /// True if a process that flies by `other` computes the same: its period, inputs, parameters and computing time are equal.
+    #[must_use]
+    pub fn computes_as(&self, other: &Self) -> bool {
+        let text = |Self { period_ticks, inputs, parameters, computing_time, .. }: &Self| {
+            let text = serde_json::to_string(&(period_ticks, inputs, parameters, computing_time));
+            text.unwrap_or_else(|error| unreachable!("a plan serialises: {error}"))
+        };
+        text(self) == text(other)
+    }
+
     /// Inputs that a process of this node may have.
     #[must_use]
     pub fn inputs_max(&self) -> usize {

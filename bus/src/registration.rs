@@ -7,6 +7,7 @@ use crate::parameter_names;
 use crate::plan::{NodePlan, Plan};
 use crate::ports::{InputPorts, InputSamples, Inputs, OutputPorts, OutputSamples, PortSpec};
 use crate::schema::Schema;
+use crate::state_transfer::StateLayout;
 use diagnostics::ParameterError;
 use inputs::InputFiles;
 use serde_json::Value;
@@ -22,6 +23,10 @@ pub struct Registration {
     pub role: Role,
     /// Parameters that count at the start alone.
     pub initial: &'static [&'static str],
+    /// As [`Info::needs_state`].
+    pub needs_state: Option<&'static str>,
+    /// As [`Info::failed_ns`].
+    pub failed_ns: Option<fn(&[u8]) -> Option<u64>>,
     /// Inputs.
     pub inputs: Inputs,
     /// Outputs.
@@ -39,12 +44,14 @@ impl Registration {
     /// The component `C`.
     #[must_use]
     pub const fn of<C: Component + 'static>() -> Self {
-        let Info { name, summary, role, initial } = C::INFO;
+        let Info { name, summary, role, initial, needs_state, failed_ns } = C::INFO;
         Self {
             name,
             summary,
             role,
             initial,
+            needs_state,
+            failed_ns,
             inputs: <C::Inputs<'static> as InputPorts<'static>>::DECLARED,
             outputs: C::Outputs::DECLARED,
             transfer: C::State::TRANSFER,
@@ -69,6 +76,26 @@ impl Registration {
     /// The parameter or file that is not valid.
     pub fn check(&self, parameters: &Value, context: &NodeContext<'_>) -> Result<(), ParameterError> {
         (self.check)(parameters, context)
+    }
+
+    /// True if the component, as `node` of `plan`, goes on in flight from the state of `before` as `node_before`; the run has read
+    /// `files`.
+    ///
+    /// # Errors
+    /// If one of the two cannot be made.
+    pub fn goes_on_from(
+        &self,
+        node: &NodePlan,
+        (before, node_before): (&Self, &NodePlan),
+        plan: &Plan,
+        files: &InputFiles,
+    ) -> Result<bool, ParameterError> {
+        let layout = |component: &Self, node| -> Result<Option<StateLayout>, ParameterError> {
+            let made = component.make_for(plan, node, files)?;
+            Ok(StateLayout::of(component.transfer, made.state_size(), made.configuration()))
+        };
+        let (own, other) = (layout(self, node)?, layout(before, node_before)?);
+        Ok(own.is_some() && own == other)
     }
 
     /// The component, made for `node` of `plan` from the run's `files`.

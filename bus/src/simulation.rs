@@ -190,12 +190,9 @@ impl Simulation {
     #[must_use]
     pub fn save(&mut self) -> Parts {
         assert_eq!(self.begun, 0, "a tick that has begun is not saved");
-        let (tick, samples, plan) = (self.tick, &self.samples, &self.plan);
-        let mut nodes: Vec<_> = self
-            .members
-            .iter_mut()
-            .map(|member| (member.node, member.save(tick, samples).of_process(0, &plan.nodes[member.node])))
-            .collect();
+        let (tick, samples) = (self.tick, &self.samples);
+        let mut nodes: Vec<_> =
+            self.members.iter_mut().map(|member| (member.node, member.save(tick, samples))).collect();
         nodes.sort_by_key(|(node, _)| *node);
         Parts { tick, nodes: nodes.into_iter().map(|(_, part)| part).collect() }
     }

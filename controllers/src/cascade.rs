@@ -7,6 +7,7 @@
 //!   it, comes round at 360°, and is set to the measured yaw as long as no thrust is asked for.
 //! - Attitude loop: error of roll, pitch and yaw, times a gain, and a part of the filtered commands' own rates,
 //!   to their rates of change, and by the kinematics of the z-y-x sequence to body rates (the inverse of thesis eq. 3.18).
+//!   Command filter and attitude loop may compute on every n-th step only, `attitude_every_steps`: the rates stay between.
 //! - Rate loop: α = Kp·e + ∫Ki·e dt − Kd·dω/dt with e the error of a body rate; torque = inertia · α. The
 //!   cross product of rate and angular momentum is left to the loops.
 
@@ -16,14 +17,36 @@ use crate::altitude_loop::AltitudeLoop;
 use crate::angle::wrap_rad;
 use crate::cascade_gains::{CascadeGains, CommandFilter};
 use crate::control::{ControlInput, ControlOutput, HoverMotion, Integrals};
-use crate::law::{FileParameters, Law, LawContext, Predecessor};
+use crate::law::{Law, LawContext, Predecessor};
 use crate::law_inputs::SetPointInputs;
 use crate::set_points::SetPoint;
 use bus::component::Info;
 use diagnostics::ParameterError;
+use diagnostics::parameter::require;
 use nalgebra::Vector3;
+use serde::Deserialize;
 use std::f64::consts::PI;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+/// The most steps between two of the attitude loop.
+const ATTITUDE_EVERY_MAX: u32 = 1000;
+
+/// Parameters.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Parameters {
+    /// Vehicle file.
+    vehicle: PathBuf,
+    /// Gains file; the built-in gains where there is none.
+    gains: Option<PathBuf>,
+    /// Steps between two of the command filter and the attitude loop.
+    #[serde(default = "every_step")]
+    attitude_every_steps: u32,
+}
+
+fn every_step() -> u32 {
+    1
+}
 
 /// The law at one period, with everything that does not change during a run.
 ///
@@ -47,6 +70,8 @@ pub struct CascadeLaw {
     pub vehicle: HoverModel,
     /// Time between two steps, s.
     pub period_s: f64,
+    /// Steps between two of the command filter and the attitude loop.
+    pub attitude_every_steps: u32,
 }
 
 /// State of the law.
@@ -65,6 +90,15 @@ pub struct CascadeState {
     /// Body rates behind the filter of the rate loop's derivative.
     #[field(unit = "rad/s", frame = "body")]
     pub rate_filtered: [f64; 3],
+    /// Body rates that the attitude loop asked for last.
+    #[field(unit = "rad/s", frame = "body")]
+    pub rate_command: [f64; 3],
+    /// Steps before the attitude loop computes again.
+    #[field(unit = "1")]
+    pub attitude_in_steps: u32,
+    /// Zero.
+    #[field(unit = "")]
+    pad0: u32,
 }
 
 impl Law for CascadeLaw {
@@ -72,7 +106,7 @@ impl Law for CascadeLaw {
         "cascade",
         "command filter, attitude loop around rate loop, altitude PID, control allocation",
     );
-    type Parameters = FileParameters;
+    type Parameters = Parameters;
     type Inputs<'a> = SetPointInputs<'a>;
     type State = CascadeState;
 
@@ -82,7 +116,11 @@ impl Law for CascadeLaw {
 
     fn new(parameters: &Self::Parameters, context: &LawContext<'_>) -> Result<Self, ParameterError> {
         let gains = CascadeGains::load(&context.node.files, parameters.gains.as_deref())?;
-        Ok(Self { gains, vehicle: context.craft.hover_model(), period_s: context.node.period_s() })
+        let (key, attitude_every_steps) = ("attitude_every_steps", parameters.attitude_every_steps);
+        let is_good = (1..=ATTITUDE_EVERY_MAX).contains(&attitude_every_steps);
+        require(key, attitude_every_steps, is_good, "1 to 1000 steps")?;
+        let (vehicle, period_s) = (context.craft.hover_model(), context.node.period_s());
+        Ok(Self { gains, vehicle, period_s, attitude_every_steps })
     }
 
     fn rate_gain_1_s(&self) -> f64 {
@@ -111,10 +149,14 @@ impl CascadeLaw {
         if last.thrust_N <= self.vehicle.thrust_min_N {
             state.attitude_command[2] = measured.yaw_rad;
         }
-        self.filter_commands(state, set_point);
+        if state.attitude_in_steps == 0 {
+            state.attitude_in_steps = self.attitude_every_steps;
+            self.filter_commands(state, set_point);
+            state.rate_command = self.rate_command_B_rad_s(state, measured).into();
+        }
+        state.attitude_in_steps -= 1;
         let [roll_rad, pitch_rad, yaw_rad] = state.attitude_command;
-        let rates_B_rad_s = self.rate_command_B_rad_s(state, measured);
-        let torque_B_N_m = self.torque_B_N_m(state, &rates_B_rad_s, measured);
+        let torque_B_N_m = self.torque_B_N_m(state, measured);
         let altitude_m = set_point.altitude_m;
         let thrust_N = self.altitude_loop().thrust_N(&mut state.integrals.lift, altitude_m, measured);
         ControlOutput {
@@ -153,13 +195,13 @@ impl CascadeLaw {
     }
 
     fn filter_commands(&self, state: &mut CascadeState, set_point: &SetPoint) {
-        let filter = &self.gains.filter;
+        let (filter, period_s) = (&self.gains.filter, self.period_s * f64::from(self.attitude_every_steps));
         for (axis, asked_rad) in [set_point.roll_rad, set_point.pitch_rad].into_iter().enumerate() {
             let (angle, rate) = (state.attitude_command[axis], state.attitude_command_rate[axis]);
-            let (angle, rate) = filter.moved(angle, rate, asked_rad, self.period_s);
+            let (angle, rate) = filter.moved(angle, rate, asked_rad, period_s);
             (state.attitude_command[axis], state.attitude_command_rate[axis]) = (angle, rate);
         }
-        let turn_max_rad = filter.yaw_rate_max_rad_s * self.period_s;
+        let turn_max_rad = filter.yaw_rate_max_rad_s * period_s;
         let yaw_rad = state.attitude_command[2];
         let turn_rad = wrap_rad(set_point.yaw_rad - yaw_rad).clamp(-turn_max_rad, turn_max_rad);
         state.attitude_command[2] = wrap_rad(yaw_rad + turn_rad);
@@ -188,16 +230,11 @@ impl CascadeLaw {
         )
     }
 
-    fn torque_B_N_m(
-        &self,
-        state: &mut CascadeState,
-        rates_B_rad_s: &Vector3<f64>,
-        measured: &HoverMotion,
-    ) -> Vector3<f64> {
+    fn torque_B_N_m(&self, state: &mut CascadeState, measured: &HoverMotion) -> Vector3<f64> {
         let mut acceleration_B_rad_s2 = Vector3::zeros();
         for (axis, integral) in state.integrals.turn.iter_mut().enumerate() {
             let rate_rad_s = measured.angular_velocity_B_rad_s[axis];
-            let error_rad_s = rates_B_rad_s[axis] - rate_rad_s;
+            let error_rad_s = state.rate_command[axis] - rate_rad_s;
             let change_rad_s2 = self.rate_change_rad_s2(&mut state.rate_filtered[axis], rate_rad_s);
             let (gains, max) = (&self.gains.rate[axis], self.gains.integral_max_rad_s2);
             *integral = (*integral + gains.integral_1_s2 * error_rad_s * self.period_s).clamp(-max, max);
@@ -243,7 +280,7 @@ mod tests {
             thrust_min_N: 1.0,
             thrust_max_N: 10.0,
         };
-        CascadeLaw { gains: CascadeGains::default(), vehicle, period_s: 1e-3 }
+        CascadeLaw { gains: CascadeGains::default(), vehicle, period_s: 1e-3, attitude_every_steps: 1 }
     }
 
     fn level() -> HoverMotion {
@@ -299,6 +336,30 @@ mod tests {
         let upside_down = HoverMotion { roll_rad: PI, ..level() };
         let wrench = law.demand(&mut state, &IN_FLIGHT, &hold(), &upside_down).wrench;
         assert_eq!(wrench.thrust_N, law.vehicle.thrust_min_N);
+    }
+
+    #[test]
+    fn the_attitude_loop_computes_on_every_nth_step_and_the_rate_loop_on_all() {
+        let law = CascadeLaw { attitude_every_steps: 4, ..law() };
+        let asked = SetPoint { roll_rad: 0.2, yaw_rad: 1.0, ..hold() };
+        let (mut state, mut slow) = (flying(&level()), flying(&level()));
+        let slower = CascadeLaw { period_s: 4e-3, attitude_every_steps: 1, ..law };
+        for step in 0..40 {
+            let turning = HoverMotion {
+                angular_velocity_B_rad_s: Vector3::new(f64::from(step) * 1e-3, 0.0, 0.0),
+                ..level()
+            };
+            let before = state;
+            law.demand(&mut state, &IN_FLIGHT, &asked, &turning);
+            let is_due = step % 4 == 0;
+            assert_eq!(state.attitude_command != before.attitude_command, is_due, "step {step}");
+            assert_eq!(state.rate_command != before.rate_command, is_due, "step {step}");
+            assert_ne!(state.integrals.turn, before.integrals.turn, "step {step}");
+            if is_due {
+                slower.filter_commands(&mut slow, &asked);
+                assert_eq!(state.attitude_command, slow.attitude_command, "as one of four times the period");
+            }
+        }
     }
 
     #[test]

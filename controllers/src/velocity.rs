@@ -105,7 +105,7 @@ impl VelocityLoop {
     /// The loops with `gains` for `vehicle`.
     #[must_use]
     pub fn new(gains: &LoopsGains, vehicle: HoverModel, period_s: f64) -> Self {
-        let cascade = CascadeLaw { gains: gains.cascade, vehicle, period_s };
+        let cascade = CascadeLaw { gains: gains.cascade, vehicle, period_s, attitude_every_steps: 1 };
         Self { gains: gains.velocity, cascade }
     }
 

@@ -98,7 +98,15 @@ fn laws() -> [(&'static str, Law); 7] {
     };
     [
         ("pid", Law::Pid(PidLaw { gains: PidGains::default(), vehicle, period_s: PERIOD_S })),
-        ("cascade", Law::Cascade(CascadeLaw { gains: CascadeGains::default(), vehicle, period_s: PERIOD_S })),
+        (
+            "cascade",
+            Law::Cascade(CascadeLaw {
+                gains: CascadeGains::default(),
+                vehicle,
+                period_s: PERIOD_S,
+                attitude_every_steps: 1,
+            }),
+        ),
         ("velocity", Law::Velocity(VelocityLaw { velocity, constant: Some(held) })),
         ("wall-stop", Law::WallStop(stop)),
         ("wall-follow", Law::WallFollow(follow)),

@@ -12,7 +12,12 @@ use vehicles::{MotorModel, Vehicle};
 const NO_WALLS: flight::Walls = [f64::INFINITY; 4];
 
 fn cascade() -> CascadeLaw {
-    CascadeLaw { gains: CascadeGains::default(), vehicle: believed().hover_model(), period_s: PERIOD_S }
+    CascadeLaw {
+        gains: CascadeGains::default(),
+        vehicle: believed().hover_model(),
+        period_s: PERIOD_S,
+        attitude_every_steps: 1,
+    }
 }
 
 fn velocity(constant: Option<VelocitySetPoint>) -> VelocityLaw {

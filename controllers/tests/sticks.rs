@@ -54,8 +54,12 @@ fn a_recording_moves_like_a_hand_within_the_sticks_range_and_rests_at_its_ends()
 /// Free flight: the angle follows the stick with the loop's lag.
 #[test]
 fn the_cascade_follows_the_recordings() {
-    let law =
-        CascadeLaw { gains: CascadeGains::default(), vehicle: believed().hover_model(), period_s: PERIOD_S };
+    let law = CascadeLaw {
+        gains: CascadeGains::default(),
+        vehicle: believed().hover_model(),
+        period_s: PERIOD_S,
+        attitude_every_steps: 1,
+    };
     for (channel, _) in STORED {
         let sticks = stored(channel);
         let no_walls = [f64::INFINITY; 4];

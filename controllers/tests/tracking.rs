@@ -272,8 +272,12 @@ fn assert_smooth<A: Law, B: Law>(name: &str, before: &A, after: &B, off_max_m: f
 fn a_swap_to_or_from_the_tracking_laws_goes_on_from_the_wrench_that_was_asked_for() {
     let (lqr, geometric) = (lqr(), geometric());
     let pid = PidLaw { gains: PidGains::default(), vehicle: believed().hover_model(), period_s: PERIOD_S };
-    let cascade =
-        CascadeLaw { gains: CascadeGains::default(), vehicle: believed().hover_model(), period_s: PERIOD_S };
+    let cascade = CascadeLaw {
+        gains: CascadeGains::default(),
+        vehicle: believed().hover_model(),
+        period_s: PERIOD_S,
+        attitude_every_steps: 1,
+    };
     assert_smooth("lqr to geometric", &lqr, &geometric, 0.01);
     assert_smooth("geometric to lqr", &geometric, &lqr, 0.01);
     assert_smooth("pid to lqr", &pid, &lqr, 0.01);

@@ -28,6 +28,9 @@ pub struct Summary {
     pub passed: bool,
     /// The first tick of the run: that of the checkpoint from which it went on, or 0.
     pub first_tick: u32,
+    /// Simulated time of a tick.
+    #[serde(skip)]
+    tick_s: f64,
     /// Ticks completed, from that one on.
     pub ticks: u32,
     /// Simulated time.
@@ -50,6 +53,8 @@ pub struct Summary {
     pub recording: Option<PathBuf>,
     /// Checkpoints that were written and kept.
     pub checkpoints: Vec<Written>,
+    /// Checkpoints that could not be written, in words.
+    pub missed_checkpoints: Vec<String>,
     /// Times at which the run went back in flight.
     pub rewinds: Vec<Rewound>,
     /// True if the conditions are not judged: the run went on from a checkpoint without figures of the flight before.
@@ -131,6 +136,7 @@ impl Summary {
     ///     flight: None,
     ///     figures: None,
     ///     checkpoints: Vec::new(),
+    ///     missed_checkpoints: Vec::new(),
     ///     rewinds: Vec::new(),
     /// };
     /// let summary = Summary::new("hover".to_owned(), outcome, 1e-3);
@@ -148,6 +154,7 @@ impl Summary {
             manifest,
             passed: !outcome.was_stopped && !replacements.iter().any(Replacement::has_failed),
             first_tick: outcome.first_tick,
+            tick_s,
             ticks,
             simulated_s: f64::from(ticks) * tick_s,
             host_s: outcome.host_s,
@@ -159,6 +166,7 @@ impl Summary {
             computing_times: outcome.overruns.into_iter().map(overruns).collect(),
             recording: None,
             checkpoints: outcome.checkpoints,
+            missed_checkpoints: outcome.missed_checkpoints,
             rewinds: outcome.rewinds,
             is_unjudged: false,
             pass: Vec::new(),
@@ -206,7 +214,10 @@ impl Summary {
 
     /// Adds the verdicts on the conditions in `content`, of which these are the figures.
     fn add(&mut self, figures: &Figures, content: &Content) -> Result<()> {
-        let of = |(pass, found): (&Spanned<PassCondition>, &Found)| Verdict::of(pass.get_ref(), found);
+        let tick_s = self.tick_s;
+        let of = |(pass, found): (&Spanned<PassCondition>, &Found)| {
+            Verdict::of(pass.get_ref(), found).in_ticks_of(tick_s)
+        };
         self.pass = content.pass.iter().zip(&figures.pass).map(of).collect();
         self.measures = content.measure.iter().zip(&figures.measures).map(of).collect();
         let compared = content.compare.iter().zip(&figures.compare);
@@ -217,15 +228,22 @@ impl Summary {
         Ok(())
     }
 
-    /// The checkpoint to go back to: the newest before a condition failed first, or the newest. `tick_s` is the time of a tick.
+    /// The first tick by which a condition failed.
     #[must_use]
-    pub fn checkpoint_to_go_back_to(&self, tick_s: f64) -> Option<&Written> {
+    pub fn failed_at_tick(&self) -> Option<u32> {
         // A condition that only its whole span decides has no sample to go back to.
         let failed = self.pass.iter().filter(|verdict| !verdict.passed && !verdict.failed_at_end);
-        let failed_s = failed.filter_map(|verdict| verdict.failed_at_s).min_by(f64::total_cmp);
-        let is_before =
-            |written: &&Written| failed_s.is_none_or(|failed_s| f64::from(written.tick) * tick_s <= failed_s);
-        self.checkpoints.iter().rev().find(is_before)
+        failed.filter_map(|verdict| verdict.failed_at_tick).min()
+    }
+
+    /// The checkpoint to go back to: the newest before a condition failed first, or the newest.
+    #[must_use]
+    pub fn checkpoint_to_go_back_to(&self) -> Option<&Written> {
+        let failed_at = self.failed_at_tick();
+        self.checkpoints
+            .iter()
+            .rev()
+            .find(|written| failed_at.is_none_or(|failed_at| written.tick <= failed_at))
     }
 
     /// The replacements as text; those that were refused are never left out.
@@ -279,6 +297,7 @@ impl fmt::Display for Summary {
         if let Some(last) = self.checkpoints.last() {
             writeln!(f, "  checkpoints: {}, the last {}", self.checkpoints.len(), last.path.display())?;
         }
+        self.missed_checkpoints.iter().try_for_each(|missed| writeln!(f, "  warning: {missed}"))?;
         let refused = self.replacements.iter().filter(|replacement| replacement.has_failed()).count();
         match (self.passed, refused) {
             (true, _) => write!(f, "passed"),

@@ -5,21 +5,24 @@
 //! manifest again and refuses texts and files that have changed since.
 
 use crate::fork;
-use crate::graph::Graph;
+use crate::graph::{Graph, backup_of};
+use crate::instances::{Flown, Origin, Requested};
 use crate::manifest::Manifest;
 use crate::output_file::{self, Kind, Mark};
-use crate::program::{BackupSpec, Executable, Program, flying};
+use crate::program::{BackupSpec, Executable, Program};
 use crate::registry::Registry;
 use anyhow::{Context as _, Result, anyhow, bail};
 use bus::checkpoint::{NodePart, Parts};
+use bus::plan::NodePlan;
 use diagnostics::Diagnostic;
 use inputs::{InputFile, sha256};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::io::{Read as _, Write as _};
 use std::path::{Path, PathBuf};
 
 /// The first bytes of a checkpoint; the digit counts the changes of the format.
-const START: &[u8] = b"hummingbus checkpoint 2\n";
+const START: &[u8] = b"hummingbus checkpoint 3\n";
 /// Characters of a SHA-256 in hexadecimal, which the file ends with.
 const SUM_BYTES: usize = 64;
 /// The largest file that is read.
@@ -40,8 +43,12 @@ pub struct Checkpoint {
     texts: Vec<(PathBuf, String)>,
     /// The values of `--set`.
     overrides: Vec<String>,
-    /// Kind or command of each node at its tick, by name.
-    kinds: Vec<(String, String)>,
+    /// Processes that fly at its tick.
+    processes: Vec<Process>,
+    /// Swaps under way at its tick that were requested in flight.
+    requested: Vec<Requested>,
+    /// Files that backups requested in flight have read, with their SHA-256.
+    requested_files: Vec<(PathBuf, String)>,
     /// Files that the run has read, with their SHA-256.
     files: Vec<(PathBuf, String)>,
     /// Simulated time of a tick, ns.
@@ -49,9 +56,25 @@ pub struct Checkpoint {
     parts: Parts,
 }
 
+/// Process that flies a node.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Process {
+    node: String,
+    /// Kind or command.
+    kind: String,
+    origin: Origin,
+}
+
 impl Checkpoint {
-    /// The checkpoint with `parts` of the run of `manifest`, checked as `graph`.
-    pub(crate) fn new(manifest: &Manifest, graph: &Graph, parts: Parts) -> Self {
+    /// The checkpoint with `parts` of the run of `manifest`, checked as `graph`, of whose processes `flown` are in the
+    /// places of others at its tick.
+    pub(crate) fn new(manifest: &Manifest, graph: &Graph, parts: Parts, flown: Flown) -> Self {
+        let Flown { processes, requested, files: requested_files } = flown;
+        let process = |(node, (origin, program)): (&NodePlan, (Origin, Program))| Process {
+            node: node.name.clone(),
+            kind: kind_of(&program),
+            origin,
+        };
         let file = |file: InputFile| (file.path, file.sha256);
         Self {
             version: VERSION.to_owned(),
@@ -62,7 +85,9 @@ impl Checkpoint {
                 .filter(|text| !is_of_recording(text))
                 .map(str::to_owned)
                 .collect(),
-            kinds: kinds(graph, parts.tick),
+            processes: graph.plan.nodes.iter().zip(processes).map(process).collect(),
+            requested,
+            requested_files: requested_files.into_iter().map(file).collect(),
             files: files(graph).cloned().map(file).collect(),
             tick_ns: graph.plan.tick_ns,
             parts,
@@ -202,14 +227,16 @@ impl Checkpoint {
         sha256(&bytes.unwrap_or_else(|error| unreachable!("its types serialise: {error}")))
     }
 
-    /// Makes the run of `graph` go on from here; `is_changed` says that it has other values than the run that has written the
-    /// checkpoint.
+    /// Makes the run of `manifest`, checked as `graph`, go on from here; `is_changed` says that it has other values than the run
+    /// that has written the checkpoint.
     ///
     /// # Errors
     /// If it is another run: a file has changed, a node is not in it, or its ticks are others.
-    pub fn resume(&self, graph: &mut Graph, is_changed: bool) -> Result<()> {
+    pub fn resume(&self, manifest: &Manifest, graph: &mut Graph, is_changed: bool) -> Result<()> {
+        let replaced = self.take_over(manifest, graph)?;
         for InputFile { path, sha256, .. } in files(graph) {
-            match self.files.iter().find(|(known, _)| known == path) {
+            let mut known = self.files.iter().chain(&self.requested_files);
+            match known.find(|(known, _)| known == path) {
                 // A copy with values of `--set` lies nowhere, and is another one by right.
                 Some(_) if is_changed && !path.exists() => {}
                 Some((_, expected)) => require_same(path, expected, sha256)?,
@@ -227,7 +254,7 @@ impl Checkpoint {
                 plan.duration_ticks
             );
         }
-        take_over(graph, tick)?;
+        graph.begun = replaced;
         let plan = &graph.plan;
         let nodes =
             plan.nodes.iter().zip(&graph.programs).map(|(node, program)| self.part(&node.name, program));
@@ -244,11 +271,65 @@ impl Checkpoint {
         Ok(())
     }
 
+    /// Puts the processes that fly at its tick into the places of those before them, and returns their origins, by node. Backups
+    /// that have joined before its tick join again at it.
+    fn take_over(&self, manifest: &Manifest, graph: &mut Graph) -> Result<BTreeMap<usize, Origin>> {
+        let tick = self.tick();
+        let requested = |node: &str, with: &str| {
+            let backup = backup_of(manifest, &graph.plan, &graph.files, node, with);
+            backup.with_context(|| format!("the swap of `{node}` that was requested in flight"))
+        };
+        let mut flying = BTreeMap::new();
+        for Process { node, origin, .. } in &self.processes {
+            if let Ok(index) = graph.plan.node_index(node) {
+                let backup = match origin {
+                    Origin::Request(with) => Some(requested(node, with)?),
+                    _ => None,
+                };
+                flying.insert(index, (origin.clone(), backup));
+            }
+        }
+        let under_way = self.requested.iter().map(|Requested { node, with, take_over_tick }| {
+            let backup = requested(node, with);
+            backup.map(|backup| BackupSpec { take_over_tick: Some(*take_over_tick), ..backup })
+        });
+        let under_way = under_way.collect::<Result<Vec<_>>>()?;
+        let (mut replaced, planned) = (BTreeMap::new(), Origin::Plan);
+        let due = |backup: &BackupSpec| tick.next_multiple_of(backup.plan.period_ticks.max(1));
+        for backup in std::mem::take(&mut graph.backups) {
+            let (node, due) = (backup.node, due(&backup));
+            let origin = flying.get(&node).map_or(&planned, |(origin, _)| origin);
+            let is_origin = !backup.is_shadow() && *origin == Origin::of(&backup);
+            let is_done =
+                backup.take_over_tick.is_some_and(|at| at <= due) || is_origin && !backup.is_standby;
+            if is_origin || is_done && *origin == Origin::Plan {
+                replaced.insert(node, Origin::of(&backup));
+                put(graph, backup.clone());
+            }
+            if !is_done {
+                // It has no part of its own: it goes on from the state of the process before.
+                graph.backups.push(BackupSpec { join_tick: backup.join_tick.max(due), ..backup });
+            }
+        }
+        let join = |backup: BackupSpec| BackupSpec { join_tick: due(&backup), ..backup };
+        graph.backups.extend(under_way.into_iter().map(join));
+        graph.backups.sort_by_key(|backup| (backup.join_tick, backup.node));
+        for (node, (origin, backup)) in flying {
+            if let Some(backup) = backup {
+                replaced.insert(node, origin);
+                put(graph, backup);
+            }
+        }
+        Ok(replaced)
+    }
+
     /// Refuses a graph in which a node reads a topic without a sample before the checkpoint and without one at its
     /// tick.
     fn require_samples(&self, graph: &Graph) -> Result<()> {
         let (tick, plan) = (self.tick(), &graph.plan);
-        for (node, program) in plan.nodes.iter().zip(&graph.programs) {
+        let is_due = |backup: &&BackupSpec| backup.join_tick < tick + backup.plan.period_ticks.max(1);
+        let joining = graph.backups.iter().filter(is_due).map(|backup| (&backup.plan, &backup.program));
+        for (node, program) in plan.nodes.iter().zip(&graph.programs).chain(joining) {
             for input in node.inputs.iter().filter(|_| !program.is_recorder() && !program.is_judge()) {
                 let topic = &plan.topics[input.topic];
                 let due = tick.next_multiple_of(node.period_ticks.max(1));
@@ -274,8 +355,8 @@ impl Checkpoint {
             return Ok(NodePart::stateless(name));
         }
         let part = self.parts.nodes.iter().find(|part| part.name == name).cloned();
-        let is_other = |(_, kind): &&(String, String)| *kind != kind_of(program);
-        if self.kinds.iter().filter(|(node, _)| node == name).any(|kind| is_other(&kind)) {
+        let kind = kind_of(program);
+        if self.processes.iter().any(|process| process.node == name && process.kind != kind) {
             return part.map(NodePart::succeeded).context("it has a kind and no part");
         }
         part.ok_or_else(|| {
@@ -291,15 +372,6 @@ impl Checkpoint {
     }
 }
 
-/// Kind or command of each node of `graph` at `tick`, by name.
-fn kinds(graph: &Graph, tick: u32) -> Vec<(String, String)> {
-    let kind = |(node, program): (usize, &Program)| {
-        let program = flying(node, program, &graph.backups, tick);
-        (graph.plan.nodes[node].name.clone(), kind_of(program))
-    };
-    graph.programs.iter().enumerate().map(kind).collect()
-}
-
 /// Kind or command of `program`.
 fn kind_of(program: &Program) -> String {
     match (&program.executable, program.kind()) {
@@ -308,36 +380,21 @@ fn kind_of(program: &Program) -> String {
     }
 }
 
-/// Puts the processes that have taken over before `tick` into the place of those before them.
-///
-/// # Errors
-/// If one is on the way in at `tick`.
-fn take_over(graph: &mut Graph, tick: u32) -> Result<()> {
-    let (done, ahead): (Vec<_>, Vec<_>) =
-        std::mem::take(&mut graph.backups).into_iter().partition(|backup| backup.has_taken_over(tick));
-    for BackupSpec { node, plan, program, .. } in done {
-        for group in &mut graph.plan.groups {
-            let place = group.members.iter().position(|member| member.node == node);
-            match (place, program.component()) {
-                (Some(place), Some(component)) => component.name.clone_into(&mut group.members[place].kind),
-                (Some(place), None) => drop(group.members.remove(place)),
-                (None, _) => {}
-            }
+/// Puts `backup` into the place of the process of its node.
+fn put(graph: &mut Graph, backup: BackupSpec) {
+    let BackupSpec { node, plan, program, .. } = backup;
+    for group in &mut graph.plan.groups {
+        let place = group.members.iter().position(|member| member.node == node);
+        match (place, program.component()) {
+            (Some(place), Some(component)) => component.name.clone_into(&mut group.members[place].kind),
+            (Some(place), None) => drop(group.members.remove(place)),
+            (None, _) => {}
         }
-        (graph.plan.nodes[node], graph.programs[node]) = (plan, program);
     }
-    graph.backups = ahead;
-    for backup in &mut graph.backups {
-        if backup.take_over_tick.is_some() && backup.join_tick < tick {
-            bail!(
-                "another process joins `{}` before tick {tick}, at which the run goes on",
-                backup.plan.name
-            );
-        }
-        // A standby and a shadow have no part of their own: they go on from the state of the process before.
-        backup.join_tick = backup.join_tick.max(tick.next_multiple_of(backup.plan.period_ticks.max(1)));
-    }
-    Ok(())
+    // As after a take-over in flight, the node's answer to the end of its process stays.
+    let (on_exit, restarts) = (graph.programs[node].on_exit, graph.plan.nodes[node].restarts);
+    graph.programs[node] = Program { on_exit, ..program };
+    graph.plan.nodes[node] = NodePlan { restarts, ..plan };
 }
 
 /// The files that the nodes of `graph` read: those of a recorder are the manifest's.
@@ -410,7 +467,9 @@ mod tests {
             manifest: "/a/hover.toml".into(),
             texts: vec![("/a/hover.toml".into(), sha256(b"[run]"))],
             overrides: vec!["run.seed=3".to_owned()],
-            kinds: Vec::new(),
+            processes: Vec::new(),
+            requested: Vec::new(),
+            requested_files: Vec::new(),
             files: Vec::new(),
             tick_ns: 1_000_000,
             parts: Parts { tick: 6500, nodes },

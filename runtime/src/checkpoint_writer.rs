@@ -2,10 +2,11 @@
 
 use crate::checkpoint::{Checkpoint, Written, path};
 use crate::graph::Graph;
+use crate::instances::{Flown, Instances};
 use crate::manifest::Manifest;
-use crate::program::{BackupSpec, OnExit, unsaved};
 use anyhow::{Context as _, Result, anyhow, bail};
-use bus::checkpoint::{Cause, NodePart, Parts};
+use bus::checkpoint::{Cause, Parts};
+use bus::component::Transfer;
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
@@ -41,16 +42,25 @@ impl WrittenFiles {
         self.asked.borrow_mut().push(written);
     }
 
-    /// Adds a checkpoint of the plan, and returns the oldest if there are more than `keep`. One that was also asked for stays
-    /// in the other list, so that it is not removed.
-    fn add_planned(&self, written: Written, keep: usize) -> Option<Written> {
+    /// Adds a checkpoint of the plan, and returns the oldest if there are more than `keep` beside that of tick `pinned`. One that
+    /// was also asked for stays in the other list, so that it is not removed.
+    fn add_planned(&self, written: Written, keep: usize, pinned: Option<u32>) -> Option<Written> {
         if self.asked.borrow().contains(&written) {
             return None;
         }
         self.asked.borrow_mut().retain(|other| other.path != written.path);
         let mut planned = self.planned.borrow_mut();
         planned.push(written);
-        (planned.len() > keep).then(|| planned.remove(0))
+        let is_free = |written: &Written| pinned != Some(written.tick);
+        let free = planned.iter().filter(|written| is_free(written)).count();
+        let oldest = planned.iter().position(is_free).filter(|_| free > keep)?;
+        Some(planned.remove(oldest))
+    }
+
+    /// The tick of the newest checkpoint of the plan up to tick `until`.
+    fn newest_planned(&self, until: u32) -> Option<u32> {
+        let planned = self.planned.borrow();
+        planned.iter().map(|written| written.tick).filter(|&tick| tick <= until).max()
     }
 
     /// The newest before tick `now`: that of `tick`, if it is given.
@@ -97,6 +107,7 @@ pub(crate) struct Writer<'a> {
     /// Path of the files without `.TICK.ckpt`.
     pub(crate) stem: &'a Path,
     pub(crate) files: &'a WrittenFiles,
+    pub(crate) instances: &'a Instances,
 }
 
 impl Writer<'_> {
@@ -104,21 +115,17 @@ impl Writer<'_> {
     /// their parts; `None` before.
     pub(crate) fn write_asked(&self, tick: u32, path: Option<&Path>) -> Result<Option<PathBuf>> {
         let path = path.map_or_else(|| self::path(self.stem, tick), Path::to_owned);
-        let is_written = self.write(Cause::Request, tick, &path)?;
-        if is_written {
-            self.files.add_asked(Written { tick, path: path.clone() });
-        }
-        Ok(is_written.then_some(path))
+        let Some(parts) = self.parts(Cause::Request, tick)? else { return Ok(None) };
+        let written = self.put(parts, &path);
+        Parts::remove_written(self.run_dir, Cause::Request, tick);
+        written.with_context(|| format!("no checkpoint of tick {tick}"))?;
+        self.files.add_asked(Written { tick, path: path.clone() });
+        Ok(Some(path))
     }
 
-    /// Writes the checkpoint of `tick` to `path`, once its nodes have written their parts; false before.
-    fn write(&self, cause: Cause, tick: u32, path: &Path) -> Result<bool> {
-        let Some(parts) = Parts::written(self.run_dir, cause, tick, self.graph.plan.nodes.len())? else {
-            return Ok(false);
-        };
-        self.put(parts, path)?;
-        Parts::remove_written(self.run_dir, cause, tick);
-        Ok(true)
+    /// The parts of the checkpoint of `tick`, once its nodes have written them.
+    fn parts(&self, cause: Cause, tick: u32) -> Result<Option<Parts>> {
+        Ok(Parts::written(self.run_dir, cause, tick, self.graph.plan.nodes.len())?)
     }
 
     /// The checkpoint in `file`, or that of `tick` which this run has written, or the newest of it before tick `now`, to which
@@ -141,7 +148,8 @@ impl Writer<'_> {
                 "{path} was replaced since this run has written it: it is of tick {found}, and was of tick {expected}"
             );
         }
-        let of_now = Checkpoint::new(self.manifest, self.graph, Parts { tick: now, nodes: Vec::new() });
+        let parts = Parts { tick: now, nodes: Vec::new() };
+        let of_now = Checkpoint::new(self.manifest, self.graph, parts, Flown::default());
         if !found.is_of_run_of(&of_now) {
             bail!(
                 "{} is a checkpoint of another run: its manifest, one of its files or a value of --set is another one; \
@@ -168,38 +176,41 @@ impl Writer<'_> {
                 again.backups.push(backup.clone());
             }
         }
-        checkpoint.resume(&mut again, true)?;
+        checkpoint.resume(self.manifest, &mut again, true)?;
         Ok(again)
     }
 
-    /// True if the process that has written `part` is the one that the manifest states for node `index` at `tick`.
-    fn is_planned(&self, index: usize, part: &NodePart, tick: u32) -> bool {
-        let Graph { plan, backups, programs, .. } = self.graph;
-        let is_swap = |backup: &&BackupSpec| backup.node == index && backup.has_taken_over(tick);
-        let swaps: Vec<&BackupSpec> = backups.iter().filter(is_swap).collect();
-        let plan = swaps.last().map_or(&plan.nodes[index], |backup| &backup.plan);
-        // A restarted process is the same as its predecessor.
-        let is_restarted = programs[index].on_exit == OnExit::Restart;
-        part.is_of(plan) && (is_restarted || part.generation as usize == swaps.len())
-    }
-
     fn put(&self, parts: Parts, path: &Path) -> Result<()> {
-        let (graph, tick) = (self.graph, parts.tick);
-        for (index, part) in parts.nodes.iter().enumerate() {
-            if !self.is_planned(index, part, tick) {
-                bail!(
-                    "no checkpoint of tick {tick}: another process has taken the place of `{}`, and the manifest, by which a run \
-                     goes on, does not say which",
-                    part.name
-                );
+        let flown = self.instances.flown(self.graph, &parts)?;
+        let nodes = self.graph.plan.nodes.iter();
+        for (node, (_, program)) in nodes.zip(&flown.processes) {
+            if let Some(Transfer::External(what)) = program.component().map(|component| component.transfer) {
+                bail!("the state of `{}` is in {what}, which does not tell it", node.name);
             }
         }
-        if let Some((node, program)) = unsaved(&graph.plan, &graph.programs, &graph.backups, tick) {
-            bail!(
-                "no checkpoint of tick {tick}: the state of `{node}` is in {program}, which does not tell it"
-            );
+        Checkpoint::new(self.manifest, self.graph, parts, flown).write(path)
+    }
+}
+
+/// Checkpoints that could not be written for one reason.
+struct Missed {
+    first: u32,
+    last: u32,
+    count: u32,
+    /// Error of the first.
+    error: anyhow::Error,
+}
+
+impl std::fmt::Display for Missed {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { first, last, count, error } = self;
+        match count {
+            1 => write!(f, "no checkpoint of tick {first}: {error:#}"),
+            _ => write!(
+                f,
+                "{count} checkpoints from tick {first} to tick {last} are missing; the first: {error:#}"
+            ),
         }
-        Checkpoint::new(self.manifest, graph, parts).write(path)
     }
 }
 
@@ -208,63 +219,89 @@ pub(crate) struct Collector<'a> {
     pub(crate) writer: Writer<'a>,
     /// The checkpoint that comes next.
     next: Option<u32>,
-    /// Error of the checkpoint that could not be written.
-    failed: Option<anyhow::Error>,
+    /// Checkpoints that could not be written.
+    missed: Vec<Missed>,
+    /// True if a condition is known to fail.
+    has_failed: bool,
+    /// The newest checkpoint before the failure, which is kept.
+    pinned: Option<u32>,
 }
 
 impl<'a> Collector<'a> {
     /// The collector of the checkpoints that `writer` writes.
     pub(crate) fn new(writer: Writer<'a>) -> Self {
         let plan = &writer.graph.plan;
-        Self { writer, next: plan.checkpoint_after(plan.first_tick), failed: None }
+        Self {
+            writer,
+            next: plan.checkpoint_after(plan.first_tick),
+            missed: Vec::new(),
+            has_failed: false,
+            pinned: None,
+        }
     }
 
     /// Writes the files of the checkpoints that are complete.
     pub(crate) fn collect(&mut self) {
-        while self.failed.is_none()
-            && let Some(tick) = self.next
-        {
-            let path = path(self.writer.stem, tick);
-            match self.writer.write(Cause::Plan, tick, &path) {
-                Ok(true) => self.note(tick, path),
-                Ok(false) => return,
-                Err(error) => self.failed = Some(error),
+        while let Some(tick) = self.next {
+            match self.writer.parts(Cause::Plan, tick) {
+                Ok(Some(parts)) => self.add(parts),
+                Ok(None) if !self.is_passed(tick) => return,
+                Ok(None) => self.miss(tick, anyhow!("a process that was replaced has left its part out")),
+                Err(error) => self.miss(tick, error),
             }
+            Parts::remove_written(self.writer.run_dir, Cause::Plan, tick);
+            self.next = self.writer.graph.plan.checkpoint_after(tick);
         }
     }
 
-    /// Writes the file of `parts`.
+    /// True if the checkpoint after that of `tick` is complete: the processes write their parts in the order of the ticks.
+    fn is_passed(&self, tick: u32) -> bool {
+        let Writer { graph, run_dir, .. } = self.writer;
+        let next = graph.plan.checkpoint_after(tick);
+        next.is_some_and(|next| Parts::are_written(run_dir, Cause::Plan, next, graph.plan.nodes.len()))
+    }
+
+    /// Writes the file of `parts`, and removes the oldest where fewer are kept.
     pub(crate) fn add(&mut self, parts: Parts) {
         let (tick, path) = (parts.tick, path(self.writer.stem, parts.tick));
-        match self.writer.put(parts, &path) {
-            Ok(()) => self.note(tick, path),
-            Err(error) => self.failed = self.failed.take().or(Some(error)),
+        let failed_at = self.failed_at(&parts);
+        if let Err(error) = self.writer.put(parts, &path) {
+            return self.miss(tick, error);
         }
-    }
-
-    /// Notes that the checkpoint of `tick` is written to `path`, and removes the oldest where fewer are kept.
-    fn note(&mut self, tick: u32, path: PathBuf) {
-        let Writer { manifest, graph, files, .. } = self.writer;
-        self.next = graph.plan.checkpoint_after(tick);
+        let Writer { manifest, files, .. } = self.writer;
+        if let (false, Some(failed_at)) = (self.has_failed, failed_at) {
+            (self.has_failed, self.pinned) = (true, files.newest_planned(failed_at));
+        }
         let keep = manifest.content.run.checkpoint_keep.as_ref().map_or(usize::MAX, |keep| *keep.get_ref());
-        if let Some(oldest) = files.add_planned(Written { tick, path }, keep) {
+        if let Some(oldest) = files.add_planned(Written { tick, path }, keep, self.pinned) {
             // A user who has removed or replaced it meanwhile has done so on purpose.
             let _ = std::fs::remove_file(oldest.path);
         }
     }
 
-    /// The files of the plan that the run has left.
-    ///
-    /// # Errors
-    /// If one could not be written.
-    pub(crate) fn finish(mut self) -> Result<Vec<Written>> {
-        self.collect();
-        match self.failed.take() {
-            Some(error) => {
-                Err(error.context("the run was flown, but not every checkpoint of it was written"))
-            }
-            None => Ok(self.writer.files.planned.borrow().clone()),
+    /// The first tick by which a condition cannot hold any more, if the judge has seen one before `parts`.
+    fn failed_at(&self, parts: &Parts) -> Option<u32> {
+        let Graph { plan, programs, .. } = self.writer.graph;
+        let judges = programs.iter().zip(&parts.nodes);
+        let failed_ns = judges.filter_map(|(program, part)| program.component()?.failed_ns?(part.state()));
+        failed_ns.min().and_then(|failed_ns| u32::try_from(failed_ns / plan.tick_ns).ok())
+    }
+
+    /// Notes that the checkpoint of `tick` cannot be written.
+    fn miss(&mut self, tick: u32, error: anyhow::Error) {
+        let cause = error.root_cause().to_string();
+        let is_alike = |missed: &&mut Missed| missed.error.root_cause().to_string() == cause;
+        match self.missed.last_mut().filter(is_alike) {
+            Some(missed) => (missed.last, missed.count) = (tick, missed.count + 1),
+            None => self.missed.push(Missed { first: tick, last: tick, count: 1, error }),
         }
+    }
+
+    /// The files of the plan that the run has left, and in words those that could not be written.
+    pub(crate) fn finish(mut self) -> (Vec<Written>, Vec<String>) {
+        self.collect();
+        let missed = self.missed.iter().map(ToString::to_string).collect();
+        (self.writer.files.planned.borrow().clone(), missed)
     }
 }
 
@@ -283,7 +320,7 @@ mod tests {
         let error = files.newest(None, 500).unwrap_err().to_string();
         assert!(error.contains("before tick 500: it has written none"), "{error}");
         for tick in [100, 300, 500] {
-            assert_eq!(files.add_planned(written(tick), 9), None);
+            assert_eq!(files.add_planned(written(tick), 9, None), None);
         }
         files.add_asked(written(200));
         let newest = |tick, now| files.newest(tick, now).unwrap();
@@ -309,9 +346,20 @@ mod tests {
         assert!(files.newest(Some(100), 400).is_err(), "its file has that of tick 250");
         assert_eq!(files.newest(Some(250), 400).unwrap(), in_one_file(250));
         files.add_asked(written(300));
-        assert_eq!(files.add_planned(written(300), 1), None);
-        assert_eq!(files.add_planned(written(400), 1), None);
-        assert_eq!(files.add_planned(written(500), 1), Some(written(400)));
+        assert_eq!(files.add_planned(written(300), 1, None), None);
+        assert_eq!(files.add_planned(written(400), 1, None), None);
+        assert_eq!(files.add_planned(written(500), 1, None), Some(written(400)));
         assert_eq!(files.newest(Some(300), 900).unwrap(), written(300));
+    }
+
+    #[test]
+    fn the_checkpoint_before_a_failure_is_kept_beside_the_newest() {
+        let files = WrittenFiles::default();
+        for tick in [100, 200, 300] {
+            assert_eq!(files.add_planned(written(tick), 3, None), None);
+        }
+        assert_eq!((files.newest_planned(250), files.newest_planned(99)), (Some(200), None));
+        let removed = [400, 500, 600].map(|tick| files.add_planned(written(tick), 3, Some(200)));
+        assert_eq!(removed, [None, Some(written(100)), Some(written(300))]);
     }
 }

@@ -27,8 +27,9 @@ mod wiring;
 
 pub use crate::program::BackupSpec;
 use crate::program::Program;
-pub use backups::backup_of;
+pub use backups::{backup_of, successor_of};
 
+use crate::instances::Origin;
 use crate::manifest::Manifest;
 use crate::placement;
 use bus::checkpoint::Parts;
@@ -36,6 +37,7 @@ use bus::plan::Plan;
 use bus::{InputFiles, Registration};
 use diagnostics::Diagnostic;
 use parameters::Notes;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use wiring::{Wiring, wire};
 
@@ -77,6 +79,8 @@ pub struct Graph {
     pub files: InputFiles,
     /// Parts of the checkpoint from which the run goes on.
     pub(crate) from: Option<Parts>,
+    /// Origins of first processes that are not those of the manifest, by node: a run that goes on begins with them.
+    pub(crate) begun: BTreeMap<usize, Origin>,
     /// Legal but unusual values; `check` and `run` print them.
     pub warnings: Vec<Diagnostic>,
 }
@@ -127,9 +131,10 @@ impl Graph {
         let programs: Vec<Program> = declared_nodes.into_iter().map(|declared| declared.program).collect();
         evaluations::check(manifest, &plan, &programs, &mut notes)?;
         plan.groups = groups;
-        let (models, warnings) = notes.into_parts(manifest);
-        checkpoints::add(manifest, &mut plan, &programs, &backups)?;
-        Ok(Self { plan, programs, backups, sidecars, models, files, from: None, warnings })
+        let (models, mut warnings) = notes.into_parts(manifest);
+        checkpoints::add(manifest, &mut plan, &programs, &backups, &mut warnings)?;
+        let begun = BTreeMap::new();
+        Ok(Self { plan, programs, backups, sidecars, models, files, from: None, begun, warnings })
     }
 }
 

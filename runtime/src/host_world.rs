@@ -5,8 +5,9 @@ use crate::ctl::Reply;
 use crate::ctl::control::ControlServer;
 use crate::ctl::protocol::{Answer, Request};
 use crate::descendants::Descendants;
-use crate::graph::backup_of;
+use crate::graph::successor_of;
 use crate::host::{End, Host, Thread, ThreadPart};
+use crate::instances::Instances;
 use crate::manifest::Manifest;
 use crate::process_log;
 use crate::program::{BackupSpec, Program, Readiness};
@@ -16,7 +17,7 @@ use crate::view::{SegmentWrite, View};
 use crate::world::{Body, Spent, World};
 use anyhow::{Context, Result};
 use bus::host_time::monotonic_ns;
-use bus::lockstep::SupervisorView;
+use bus::lockstep::{SlotState, SupervisorView};
 use bus::membership::Membership;
 use bus::plan::{GroupPlan, InputPlan, NodePlan, Plan};
 use bus::{BusError, Join};
@@ -59,6 +60,8 @@ pub struct HostWorld<'a> {
     pub descendants: Option<&'a Descendants>,
     /// Sockets on which sidecars report that they are ready, by their number.
     pub sockets: BTreeMap<usize, UnixDatagram>,
+    /// Processes that it has started in the places of others.
+    pub instances: &'a Instances,
     /// The processes of groups that were started, by the groups' names.
     pub groups: BTreeMap<String, Rc<RefCell<SharedBody>>>,
 }
@@ -152,7 +155,12 @@ impl World for HostWorld<'_> {
         let control = &self.control;
         match write {
             SegmentWrite::Clear(slot) => control.clear_slot(slot),
-            SegmentWrite::SetSlot(slot, state) => control.set_slot_state(slot, state),
+            SegmentWrite::SetSlot(slot, state) => {
+                if state == SlotState::Taken {
+                    self.instances.note_transfer(self.plan, slot, control.transfer(slot));
+                }
+                control.set_slot_state(slot, state);
+            }
             SegmentWrite::FirstTick(slot, tick) => control.set_first_tick(slot, tick),
             SegmentWrite::StartShadow(topic, tick) => control.start_shadow(topic, tick),
             SegmentWrite::Publish(epoch) => control.set_epoch(epoch),
@@ -215,12 +223,14 @@ impl World for HostWorld<'_> {
         }
     }
 
-    fn store_backup(&mut self, plan: &NodePlan, node: usize, generation: u32) -> Result<(), BusError> {
-        store_files(self.files, self.run_dir, plan)?;
-        plan.store_backup(self.run_dir, node, generation)
+    fn store_backup(&mut self, backup: &BackupSpec, generation: u32) -> Result<(), BusError> {
+        self.instances.note_start(generation, backup);
+        store_files(self.files, self.run_dir, &backup.plan)?;
+        backup.plan.store_backup(self.run_dir, backup.node, generation)
     }
 
     fn store_membership(&mut self, membership: &Membership) -> Result<(), BusError> {
+        self.instances.note_membership(membership);
         membership.store(self.run_dir)
     }
 
@@ -243,7 +253,7 @@ impl World for HostWorld<'_> {
     }
 
     fn backup_of(&self, process: &str, with: &str) -> Result<BackupSpec, Diagnostic> {
-        backup_of(self.manifest, self.plan, self.files, process, with)
+        successor_of(self.manifest, self.plan, self.files, process, with)
     }
 }
 

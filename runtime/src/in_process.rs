@@ -141,6 +141,7 @@ pub(crate) fn fly(
         flight: None,
         figures: None,
         checkpoints: Vec::new(),
+        missed_checkpoints: Vec::new(),
         rewinds: Vec::new(),
     })
 }
@@ -196,7 +197,7 @@ pub fn fly_unrecorded(
 fn graph_of(manifest: &Manifest, files: InputFiles, path: &Path, from: Option<&Checkpoint>) -> Result<Graph> {
     let mut graph = Graph::build_from(manifest, files)?;
     if let Some(from) = from {
-        from.resume(&mut graph, true)?;
+        from.resume(manifest, &mut graph, true)?;
     }
     require_host(&Host::InProcess, manifest, &graph)?;
     graph.plan.checkpoint_ticks.clear();

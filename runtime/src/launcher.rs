@@ -12,6 +12,7 @@ use crate::host::Host;
 use crate::host_limits::require_host;
 use crate::host_world::{HostWorld, store_files};
 use crate::in_process::{self, FIGURES};
+use crate::instances::Instances;
 use crate::manifest::Manifest;
 pub use crate::outcome::Outcome;
 use crate::outputs::Outputs;
@@ -165,7 +166,7 @@ impl<'a> Launcher<'a> {
     pub fn fly(mut self, manifest: &Manifest, recording: &Path) -> Result<(Outcome, Option<Recording>)> {
         let mut graph = Graph::build_from(manifest, self.files.clone())?;
         if let Some(from) = self.from.take() {
-            from.resume(&mut graph, true)?;
+            from.resume(manifest, &mut graph, true)?;
         }
         let mut outputs = Outputs::of(manifest, &graph, recording, Vec::new())?;
         let outcome = self.launch(manifest, &mut graph, &mut outputs)?;
@@ -240,20 +241,21 @@ impl<'a> Launcher<'a> {
         }
         let graph = &*graph;
         let (run_path, stem) = (run_dir.path(), &outputs.stem);
-        let mut checkpoints = Collector::new(Writer { manifest, graph, run_dir: run_path, stem, files });
+        let instances = &Instances::default();
+        let writer = Writer { manifest, graph, run_dir: run_path, stem, files, instances };
+        let mut checkpoints = Collector::new(writer);
         let flown = self.fly_in(run_dir, place, manifest, graph, &mut checkpoints, rewinds, on);
         // A user goes back to those of a run that broke.
-        let mut written = checkpoints.finish();
-        if let (Err(error), true) = (&written, rewinds.is_asked()) {
-            // The run goes back to a checkpoint that is there.
-            on(RunEvent::Note(&format!("{error:#}")));
-            written = Ok(Vec::new());
+        let (written, missed) = checkpoints.finish();
+        if flown.is_err() || rewinds.is_asked() {
+            // No summary says so.
+            missed.iter().for_each(|missed| on(RunEvent::Note(missed)));
         }
-        if let (Err(_), Some(Written { tick, path })) = (&flown, written.iter().flatten().last()) {
+        if let (Err(_), Some(Written { tick, path })) = (&flown, written.last()) {
             on(RunEvent::Note(&format!("the last checkpoint is {}, of tick {tick}", path.display())));
         }
         let mut outcome = flown?;
-        outcome.checkpoints = written?;
+        (outcome.checkpoints, outcome.missed_checkpoints) = (written, missed);
         Ok(outcome)
     }
 
@@ -298,6 +300,7 @@ impl<'a> Launcher<'a> {
             control: control.clone(),
             run_dir: dir,
             descendants: descendants.as_ref(),
+            instances: checkpoints.writer.instances,
             sockets: BTreeMap::new(),
             groups: BTreeMap::new(),
         };
@@ -407,6 +410,7 @@ fn outcome(plan: &Plan, control: &SupervisorView, supervisor: &Supervisor<'_, Ho
         flight: None,
         figures: None,
         checkpoints: Vec::new(),
+        missed_checkpoints: Vec::new(),
         rewinds: Vec::new(),
     }
 }

@@ -18,6 +18,7 @@ pub mod host;
 mod host_limits;
 mod host_world;
 mod in_process;
+mod instances;
 pub mod launcher;
 mod location;
 pub mod manifest;

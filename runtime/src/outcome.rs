@@ -31,6 +31,8 @@ pub struct Outcome {
     pub figures: Option<Vec<u8>>,
     /// Files of the checkpoints that were written and kept, in their order.
     pub checkpoints: Vec<Written>,
+    /// Checkpoints of the plan that could not be written, in words.
+    pub missed_checkpoints: Vec<String>,
     /// Times at which the run went back in flight.
     pub rewinds: Vec<Rewound>,
 }

@@ -102,6 +102,17 @@ impl Program {
         self.has(Role::Judge)
     }
 
+    /// True if `other` starts the same: executable, environment and working directory are equal.
+    pub fn is_same(&self, other: &Self) -> bool {
+        let command = |program: &Self| match &program.executable {
+            Executable::Command(command) => Some(command.clone()),
+            Executable::Component(_) | Executable::Program(_) => None,
+        };
+        (self.kind(), command(self)) == (other.kind(), command(other))
+            && self.environment == other.environment
+            && self.working_directory == other.working_directory
+    }
+
     fn has(&self, role: Role) -> bool {
         self.component().is_some_and(|component| component.role == role)
     }
@@ -118,6 +129,8 @@ pub struct BackupSpec {
     pub take_over_tick: Option<u32>,
     /// True if it is promoted when the primary dies.
     pub is_standby: bool,
+    /// Keys in which it differs from its process, as TOML, if a request in flight gave them.
+    pub(crate) with: Option<String>,
     /// Program to start.
     pub(crate) program: Program,
     /// Plan that the backup reads about itself: the node's own, with the backup's parameters and inputs.
@@ -125,13 +138,18 @@ pub struct BackupSpec {
 }
 
 impl BackupSpec {
+    /// True if it never flies.
+    pub(crate) fn is_shadow(&self) -> bool {
+        self.take_over_tick.is_none() && !self.is_standby
+    }
+
     /// True if it flies at `tick`.
     pub(crate) fn has_taken_over(&self, tick: u32) -> bool {
         self.take_over_tick.is_some_and(|at| at < tick)
     }
 }
 
-/// Program that flies at `tick` if node `node` begins as `program` and `backups` take over.
+/// Program that the manifest has fly at `tick` if node `node` begins as `program` and `backups` take over.
 pub(crate) fn flying<'a>(
     node: usize,
     program: &'a Program,

@@ -250,7 +250,7 @@ impl<'a, W: World> Supervisor<'a, W> {
     fn execute(&mut self, command: Command) -> Result<()> {
         match command {
             Command::Spawn { node, generation, backup } => {
-                let stored = self.world.store_backup(&backup.plan, node, generation);
+                let stored = self.world.store_backup(&backup, generation);
                 let role = Role::Node { node, generation };
                 let name = &self.plan.nodes[node].name;
                 let started = stored

@@ -9,7 +9,7 @@ use crate::view::{SegmentWrite, View};
 use anyhow::Result;
 use bus::BusError;
 use bus::membership::Membership;
-use bus::plan::{InputPlan, NodePlan};
+use bus::plan::InputPlan;
 use diagnostics::Diagnostic;
 use std::time::Duration;
 
@@ -71,11 +71,11 @@ pub trait World {
     /// Takes note of orphans that have ended, except for the processes `known`, which are waited for elsewhere.
     fn reap(&self, known: &[u32]);
 
-    /// Writes the plan that a backup of `node` reads about itself.
+    /// Writes the plan that the `backup`, as process `generation` of its node, reads about itself.
     ///
     /// # Errors
     /// If the file cannot be written.
-    fn store_backup(&mut self, plan: &NodePlan, node: usize, generation: u32) -> Result<(), BusError>;
+    fn store_backup(&mut self, backup: &BackupSpec, generation: u32) -> Result<(), BusError>;
     /// Writes a membership.
     ///
     /// # Errors

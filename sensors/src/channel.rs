@@ -2,7 +2,8 @@
 //!
 //! A sensor's node computes at each of its periods. It *measures* at the first of them at or after each multiple
 //! of 1 / `rate_hz`; a measurement *arrives* at the first at or after `delay_ms` later. In between it waits in a
-//! queue that is part of the node's hand-over state, so that a backup goes on with the measurements under way. Rate
+//! queue that is part of the node's hand-over state, so that a backup goes on with the measurements under way. The queue is
+//! as long as delay and rate need. Rate
 //! and delay are therefore exact where they are multiples of the node's period, and rounded up to it elsewhere;
 //! a measurement always holds the truth of its stated time.
 //!
@@ -12,6 +13,7 @@
 
 use crate::noise::LazyStream;
 use bus::Message;
+use bus::component::{State, StateError, Transfer};
 use bus::context::NodeContext;
 use bus::random::{Stream, stream, uniform};
 use diagnostics::parameter::{ParameterError, not_negative, positive, refuse, require};
@@ -20,12 +22,13 @@ use diagnostics::parameter::{ParameterError, not_negative, positive, refuse, req
 /// the interval. Tuned, no source.
 const UNEVEN_SHARE: f64 = 5.0;
 
-/// Capacity of a queue of measurements: those under way, and the one that arrived last.
-pub const QUEUE: usize = 32;
+/// Places of a queue beside those of the measurements under way: one for the measurement that arrived last, and one for a
+/// delay that is rounded up to the node's period.
+const MORE_PLACES: usize = 2;
 
-/// Number of measurements that may be under way: one place of the queue is for the one that arrived last, and one for
-/// a delay that is rounded up to the node's period.
-const UNDER_WAY_MAX: f64 = (QUEUE - 2) as f64;
+/// Number of measurements that may be under way: 1 s at 10 kHz. The state of a sensor is stated after every tick where another
+/// process may take its place.
+const UNDER_WAY_MAX: f64 = 10_000.0;
 
 /// Times at which a sensor measures, and the delays and losses of its measurements.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,13 +52,20 @@ impl Timing {
         let dropout_is_good = (0.0..1.0).contains(&self.dropout);
         require("dropout", self.dropout, dropout_is_good, "a fraction from 0 to below 1")?;
         not_negative("dropout_mean_s", self.dropout_mean_s)?;
-        let under_way = self.delay_ms * 1e-3 * self.rate_hz;
-        let expected = "at most 30 measurements long";
-        require("delay_ms", self.delay_ms, under_way <= UNDER_WAY_MAX, expected)?;
+        let (longest_ms, rate_hz) = (UNDER_WAY_MAX / self.rate_hz * 1e3, self.rate_hz);
+        let expected = format!(
+            "at most {longest_ms} ms: at {rate_hz} Hz {UNDER_WAY_MAX} measurements are under way then"
+        );
+        require("delay_ms", self.delay_ms, self.under_way() <= UNDER_WAY_MAX, &expected)?;
         let losses = Losses::new(self);
         let mean_is_good = losses.begin <= 1.0 && losses.stay >= 0.0;
         let expected = "zero, or long enough for one measurement and for the fraction `dropout` of them";
         require("dropout_mean_s", self.dropout_mean_s, mean_is_good, expected)
+    }
+
+    /// Number of measurements under way, without the rounding to a node's period.
+    fn under_way(&self) -> f64 {
+        self.delay_ms * 1e-3 * self.rate_hz
     }
 
     /// Refuses a rate at which a node of `run` cannot measure; warns if measurements would be uneven or never arrive.
@@ -127,9 +137,6 @@ pub struct ChannelState {
     /// Number of measurements that have arrived.
     #[field(unit = "1")]
     arrived: u64,
-    /// When those in the queue arrive.
-    #[field(unit = "ns")]
-    arrival_ns: [u64; QUEUE],
     /// Words of 32 bits drawn from the noise stream: the low and the high half of the count.
     #[field(unit = "1")]
     noise_words: [u64; 2],
@@ -147,6 +154,8 @@ pub struct ChannelState {
 /// The channel of a node, and its random streams at their start.
 #[derive(Debug, Clone)]
 pub struct Channel {
+    /// Places of the queue of measurements.
+    places: usize,
     interval_ns: u64,
     delay_ns: u64,
     losses: Losses,
@@ -154,13 +163,66 @@ pub struct Channel {
     loss: Stream,
 }
 
-/// State of a sensor, the measurements under way among it.
+/// State of a sensor beside its measurements.
 pub trait Remembered {
     /// Message that it sends.
     type Measurement: Copy;
 
-    /// Returns the measurements under way, and the last ones, which start as what is sent until the first arrives.
-    fn under_way(&mut self) -> (&mut ChannelState, &mut [Self::Measurement; QUEUE]);
+    /// Returns the state of the channel.
+    fn channel(&mut self) -> &mut ChannelState;
+}
+
+/// State of a sensor with the measurements under way.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Queued<S: Remembered> {
+    /// State of the sensor beside its measurements.
+    pub sensor: S,
+    /// Arrival times of the measurements in the queue.
+    arrival_ns: Vec<u64>,
+    /// The last measurements, which start as the one that is sent until the first arrives.
+    queue: Vec<S::Measurement>,
+}
+
+impl<S: Remembered> Queued<S> {
+    const SENSOR_BYTES: usize = size_of::<S>();
+    const PLACE_BYTES: usize = size_of::<u64>() + size_of::<S::Measurement>();
+}
+
+/// The bytes of the sensor's state, then arrival time and measurement of each place of the queue.
+impl<S: Message + Remembered<Measurement: Message>> State for Queued<S> {
+    const TRANSFER: Transfer = Transfer::Bytes(S::SCHEMA.type_name);
+
+    fn configuration(&self) -> u64 {
+        S::SCHEMA.layout_hash() ^ <S::Measurement as Message>::SCHEMA.layout_hash().rotate_left(1)
+    }
+
+    fn size(&self) -> usize {
+        Self::SENSOR_BYTES + self.queue.len() * Self::PLACE_BYTES
+    }
+
+    fn save(&self, bytes: &mut [u8]) {
+        let (sensor, places) = bytes.split_at_mut(Self::SENSOR_BYTES);
+        sensor.copy_from_slice(bytemuck::bytes_of(&self.sensor));
+        let queued = self.arrival_ns.iter().zip(&self.queue);
+        for (place, (arrival_ns, measurement)) in places.chunks_exact_mut(Self::PLACE_BYTES).zip(queued) {
+            let (time, message) = place.split_at_mut(size_of::<u64>());
+            time.copy_from_slice(bytemuck::bytes_of(arrival_ns));
+            message.copy_from_slice(bytemuck::bytes_of(measurement));
+        }
+    }
+
+    fn load(&mut self, bytes: &[u8]) -> Result<(), StateError> {
+        StateError::check_size(S::SCHEMA.type_name, self.size(), bytes)?;
+        let (sensor, places) = bytes.split_at(Self::SENSOR_BYTES);
+        self.sensor = bytemuck::pod_read_unaligned(sensor);
+        let queued = self.arrival_ns.iter_mut().zip(&mut self.queue);
+        for (place, (arrival_ns, measurement)) in places.chunks_exact(Self::PLACE_BYTES).zip(queued) {
+            let (time, message) = place.split_at(size_of::<u64>());
+            *arrival_ns = bytemuck::pod_read_unaligned(time);
+            *measurement = bytemuck::pod_read_unaligned(message);
+        }
+        Ok(())
+    }
 }
 
 /// The chance in one measurement.
@@ -203,7 +265,14 @@ impl Channel {
         loss.set_stream(1);
         let (interval_ns, delay_ns) =
             (nanoseconds(timing.rate_hz.recip()), nanoseconds(timing.delay_ms * 1e-3));
-        Ok(Self { interval_ns, delay_ns, losses: Losses::new(timing), noise, loss })
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most `UNDER_WAY_MAX`")]
+        let places = timing.under_way().ceil() as usize + MORE_PLACES;
+        Ok(Self { places, interval_ns, delay_ns, losses: Losses::new(timing), noise, loss })
+    }
+
+    /// The state before the first measurement: that of the `sensor`, which sends `first` until the first arrives.
+    pub(crate) fn state<S: Remembered>(&self, sensor: S, first: S::Measurement) -> Queued<S> {
+        Queued { sensor, arrival_ns: vec![0; self.places], queue: vec![first; self.places] }
     }
 
     /// Returns the measurement that has arrived by `now_ns`, a tick of its node. If one is due, `measure` makes
@@ -211,44 +280,43 @@ impl Channel {
     pub(crate) fn measure<S: Remembered>(
         &self,
         now_ns: u64,
-        state: &mut S,
+        state: &mut Queued<S>,
         measure: impl FnOnce(&mut S, &S::Measurement, &mut Chance<'_>) -> S::Measurement,
     ) -> S::Measurement {
-        let (under_way, queue) = state.under_way();
+        let Queued { sensor, arrival_ns, queue } = state;
+        let under_way = sensor.channel();
         if now_ns >= under_way.next_ns {
-            let last = queue[before(under_way.measured)];
+            let last = queue[self.before(under_way.measured)];
             let noise = LazyStream::new(&self.noise, under_way.noise_words);
             let loss = LazyStream::new(&self.loss, under_way.loss_words);
             let mut chance = Chance { now_ns, noise, loss, losses: self.losses, lost: under_way.lost };
-            let measurement = measure(state, &last, &mut chance);
-            let (under_way, queue) = state.under_way();
-            let number = place(under_way.measured);
+            let measurement = measure(sensor, &last, &mut chance);
+            let under_way = sensor.channel();
+            let number = self.place(under_way.measured);
             queue[number] = measurement;
             under_way.lost = chance.lost;
             under_way.noise_words = chance.noise.words();
             under_way.loss_words = chance.loss.words();
-            under_way.arrival_ns[number] = now_ns.saturating_add(self.delay_ns);
+            arrival_ns[number] = now_ns.saturating_add(self.delay_ns);
             under_way.measured += 1;
             under_way.next_ns = (now_ns / self.interval_ns + 1).saturating_mul(self.interval_ns);
         }
-        let (under_way, queue) = state.under_way();
-        while under_way.arrived < under_way.measured
-            && under_way.arrival_ns[place(under_way.arrived)] <= now_ns
-        {
+        let under_way = sensor.channel();
+        while under_way.arrived < under_way.measured && arrival_ns[self.place(under_way.arrived)] <= now_ns {
             under_way.arrived += 1;
         }
-        queue[before(under_way.arrived)]
+        queue[self.before(under_way.arrived)]
     }
-}
 
-/// The place of measurement `number` in the queue.
-fn place(number: u64) -> usize {
-    (number % QUEUE as u64) as usize
-}
+    /// The place of measurement `number` in the queue.
+    fn place(&self, number: u64) -> usize {
+        (number % self.places as u64) as usize
+    }
 
-/// The place of the measurement before `number`; before the first it is the last place, not yet written.
-fn before(number: u64) -> usize {
-    place(number.wrapping_sub(1))
+    /// The place of the measurement before `number`; before the first it is the last place, not yet written.
+    fn before(&self, number: u64) -> usize {
+        self.place(number.checked_sub(1).unwrap_or(self.places as u64 - 1))
+    }
 }
 
 fn nanoseconds(seconds: f64) -> u64 {
@@ -259,19 +327,24 @@ fn nanoseconds(seconds: f64) -> u64 {
 mod tests {
     use super::*;
     use rand_core::Rng;
+    use std::marker::PhantomData;
 
     const TICK_NS: u64 = 1_000_000;
 
-    impl<M: Copy> Remembered for (ChannelState, [M; QUEUE]) {
+    /// State of a sensor that remembers nothing beside its measurements.
+    #[derive(Clone, Debug, PartialEq)]
+    struct Plain<M>(ChannelState, PhantomData<M>);
+
+    impl<M: Copy> Remembered for Plain<M> {
         type Measurement = M;
 
-        fn under_way(&mut self) -> (&mut ChannelState, &mut [M; QUEUE]) {
-            (&mut self.0, &mut self.1)
+        fn channel(&mut self) -> &mut ChannelState {
+            &mut self.0
         }
     }
 
-    fn nothing_measured<M: Copy>(sent: M) -> (ChannelState, [M; QUEUE]) {
-        (ChannelState::default(), [sent; QUEUE])
+    fn nothing_measured<M: Copy>(channel: &Channel, sent: M) -> Queued<Plain<M>> {
+        channel.state(Plain(ChannelState::default(), PhantomData), sent)
     }
 
     fn timing() -> Timing {
@@ -286,7 +359,7 @@ mod tests {
     /// The times at which measurements were made, tick by tick as they arrive; 0 is sent until the first.
     fn arrivals(timing: &Timing, period_ticks: u64, ticks: u64) -> Vec<(u64, u64)> {
         let channel = channel(timing, period_ticks, 1, "gps").unwrap();
-        let mut state = nothing_measured(u64::MAX);
+        let mut state = nothing_measured(&channel, u64::MAX);
         (0..ticks)
             .step_by(usize::try_from(period_ticks).unwrap())
             .map(|tick| {
@@ -324,9 +397,9 @@ mod tests {
 
     #[test]
     fn a_delay_shorter_than_the_interval_and_one_longer_are_exact() {
-        for delay_ticks in [1_u64, 80, 99, 100, 250, 3000] {
+        for delay_ticks in [1_u64, 80, 99, 100, 250, 3000, 8250] {
             let timing = Timing { delay_ms: delay_ticks as f64, ..timing() };
-            for (tick, measured) in arrivals(&timing, 1, 4000) {
+            for (tick, measured) in arrivals(&timing, 1, 9900) {
                 let expected = tick.checked_sub(delay_ticks).map_or(NOTHING, |tick| tick / 100 * 100);
                 assert_eq!(measured, expected, "at tick {tick} with a delay of {delay_ticks}");
             }
@@ -347,7 +420,7 @@ mod tests {
     #[test]
     fn a_channel_that_starts_late_measures_once_and_then_at_its_rate() {
         let channel = channel(&timing(), 1, 1, "gps").unwrap();
-        let mut state = nothing_measured(());
+        let mut state = nothing_measured(&channel, ());
         let mut count = 0;
         for tick in 5031..5331 {
             channel.measure(tick * TICK_NS, &mut state, |_, _, _| count += 1);
@@ -357,7 +430,7 @@ mod tests {
 
     fn lost(timing: &Timing, count: usize) -> Vec<bool> {
         let channel = channel(timing, 1, 3, "mocap").unwrap();
-        let mut state = nothing_measured(false);
+        let mut state = nothing_measured(&channel, false);
         let interval_ns = channel.interval_ns;
         (0..count as u64)
             .map(|n| channel.measure(n * interval_ns, &mut state, |_, _, chance| chance.is_lost(0)))
@@ -386,7 +459,7 @@ mod tests {
     fn losses_do_not_reshuffle_the_noise() {
         let noise = |dropout: f64| {
             let channel = channel(&Timing { dropout, ..timing() }, 1, 3, "gps").unwrap();
-            let mut state = nothing_measured(0);
+            let mut state = nothing_measured(&channel, 0);
             let measure = |_: &mut _, _: &u64, chance: &mut Chance<'_>| {
                 chance.is_lost(0);
                 chance.noise().next_u64()
@@ -403,12 +476,12 @@ mod tests {
             if chance.is_lost(0) { 0 } else { chance.noise().next_u64() }
         };
         let first = channel(&timing, 1, 3, "gps").unwrap();
-        let mut state = nothing_measured(1);
+        let mut state = nothing_measured(&first, 1);
         for tick in 0..333 {
             first.measure(tick * TICK_NS, &mut state, measure);
         }
         let second = channel(&timing, 1, 3, "gps").unwrap();
-        let mut handed = state;
+        let mut handed = state.clone();
         for tick in 333..1000 {
             let expected = first.measure(tick * TICK_NS, &mut state, measure);
             let found = second.measure(tick * TICK_NS, &mut handed, measure);
@@ -424,7 +497,7 @@ mod tests {
             ("rate_hz", Timing { rate_hz: 0.0, ..timing() }),
             ("rate_hz", Timing { rate_hz: f64::NAN, ..timing() }),
             ("delay_ms", Timing { delay_ms: -1.0, ..timing() }),
-            ("delay_ms", Timing { delay_ms: 3001.0, ..timing() }),
+            ("delay_ms", Timing { delay_ms: 1_000_001.0, ..timing() }),
             ("delay_ms", Timing { delay_ms: f64::NAN, ..timing() }),
             ("dropout", Timing { dropout: 1.0, ..timing() }),
             ("dropout", Timing { dropout: -0.1, ..timing() }),
@@ -436,6 +509,8 @@ mod tests {
             let error = refused(timing);
             assert!(error.starts_with(&format!("`{key}` must be ")), "{error}");
         }
+        let fast = Timing { rate_hz: 8000.0, delay_ms: 2000.0, ..timing() };
+        assert!(refused(fast).contains("at most 1250 ms: at 8000 Hz"), "{}", refused(fast));
         let error = channel(&timing(), 200, 1, "gps").unwrap_err().to_string();
         assert!(error.contains("`rate_hz`") && error.contains("`period_ticks`"), "{error}");
     }

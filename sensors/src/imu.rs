@@ -3,7 +3,7 @@
 //! It reads at each of its periods. `crate::channel` gives the delays and losses of readings; a lost one repeats the
 //! one before.
 
-use crate::channel::{Channel, ChannelState, QUEUE, Remembered};
+use crate::channel::{Channel, ChannelState, Queued, Remembered};
 use crate::imu_model::{ImuModel, ImuModelState, ImuParams, ImuReading};
 use crate::imu_part::{ImuMotion, ImuPart, ImuPartState};
 use crate::noise::{drawn, drawn_words};
@@ -48,15 +48,12 @@ pub struct ImuState {
     filtered_angular_velocity: Vector3,
     /// Measurements that are under way.
     channel: ChannelState,
-    /// The last readings.
-    queue: [Imu; QUEUE],
 }
 
 impl ImuState {
-    /// Before the first reading: until it arrives, the IMU reads rest and level.
+    /// Before the first reading.
     fn new(model: &ImuModelState) -> Self {
-        let at_rest = Imu { specific_force: [0.0, 0.0, STANDARD_GRAVITY_M_S2].into(), ..Default::default() };
-        let mut state = Self { queue: [at_rest; QUEUE], ..Self::default() };
+        let mut state = Self::default();
         state.store(model);
         state
     }
@@ -100,8 +97,8 @@ impl ImuState {
 impl Remembered for ImuState {
     type Measurement = Imu;
 
-    fn under_way(&mut self) -> (&mut ChannelState, &mut [Imu; QUEUE]) {
-        (&mut self.channel, &mut self.queue)
+    fn channel(&mut self) -> &mut ChannelState {
+        &mut self.channel
     }
 }
 
@@ -141,7 +138,7 @@ impl Component for ImuSensor {
     type Parameters = ImuParams;
     type Inputs<'a> = TruthInputs<'a>;
     type Outputs = Outputs;
-    type State = ImuState;
+    type State = Queued<ImuState>;
 
     fn new(params: ImuParams, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         let rate_hz = context.period_s().recip();
@@ -152,23 +149,26 @@ impl Component for ImuSensor {
         Ok(Self { part, model, channel, initial })
     }
 
-    fn initial(&self) -> ImuState {
-        ImuState::new(&self.initial)
+    /// Until the first reading arrives, the IMU reads rest and level.
+    fn initial(&self) -> Queued<ImuState> {
+        let at_rest = Imu { specific_force: [0.0, 0.0, STANDARD_GRAVITY_M_S2].into(), ..Default::default() };
+        self.channel.state(ImuState::new(&self.initial), at_rest)
     }
 
     fn step(
         &self,
         context: &StepContext<'_>,
         inputs: TruthInputs<'_>,
-        state: &mut ImuState,
+        state: &mut Queued<ImuState>,
     ) -> Result<Outputs, StepError> {
-        let mut model = state.model(&self.initial.random);
-        let mut part = state.part();
+        let sensor = &mut state.sensor;
+        let mut model = sensor.model(&self.initial.random);
+        let mut part = sensor.part();
         let felt = self.part.feel(&mut part, &motion(inputs.state, context.time_ns()));
         let reading = self.part.in_steps(&self.model.read(&mut model, &felt));
         let reading = message(&reading);
-        state.store_part(&part);
-        state.store(&model);
+        sensor.store_part(&part);
+        sensor.store(&model);
         let imu =
             self.channel.measure(
                 context.time_ns(),

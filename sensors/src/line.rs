@@ -7,13 +7,14 @@
 //! that is sent depends on the seed, the node's name and n alone.
 
 use bus::Message;
+use bus::component::StateError;
 use bus::ports::FORWARDED_BYTES_MAX;
 use bus::random::{self, Stream, uniform};
 
 /// Streams that share a line at most.
 pub const STREAMS: usize = 16;
-/// Packets that wait or are under way at most.
-pub const PACKETS: usize = 64;
+/// Packets that a line has places for at least.
+pub const PLACES_MIN: usize = 64;
 
 /// States of a [`Packet`].
 const FREE: u32 = 0;
@@ -54,12 +55,18 @@ pub struct Packet {
 }
 
 /// State of a line.
+#[derive(Clone, Debug)]
+pub struct LineState {
+    /// The messages that wait or are under way, in any order.
+    packets: Vec<Packet>,
+    line: LineFields,
+}
+
+/// State of a line beside its packets.
 #[derive(Clone, Copy, Debug, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/LineState")]
-pub struct LineState {
-    /// The messages that wait or are under way, in any order.
-    packets: [Packet; PACKETS],
+pub struct LineFields {
     /// The newest message of each stream that has arrived.
     #[field(unit = "1")]
     pub(crate) newest: [[u8; FORWARDED_BYTES_MAX]; STREAMS],
@@ -107,20 +114,27 @@ pub struct LineCounts {
     pub delay_ns: u64,
 }
 
-impl Default for LineState {
-    /// Nothing waits, nothing was sent.
-    fn default() -> Self {
-        bytemuck::Zeroable::zeroed()
+impl std::ops::Deref for LineState {
+    type Target = LineFields;
+
+    fn deref(&self) -> &LineFields {
+        &self.line
     }
 }
 
-/// More packets than a line has places for.
+impl std::ops::DerefMut for LineState {
+    fn deref_mut(&mut self) -> &mut LineFields {
+        &mut self.line
+    }
+}
+
+/// More packets than a line has places for; the number of these.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "{PACKETS} messages wait or are under way, and a link holds no more: shorten its `latency_ms`, `jitter_ms` or \
+    "{0} messages wait or are under way, and this link holds no more: shorten its `latency_ms`, `jitter_ms` or \
      `queue_bytes`, or send less often (`rate_hz`)"
 )]
-pub struct NoPlace;
+pub struct NoPlace(pub usize);
 
 /// Settings of a line.
 #[derive(Debug)]
@@ -161,8 +175,8 @@ impl Line {
             state.counts.dropped[stream] += 1;
             return Ok(());
         }
-        let number = state.queued;
-        let place = state.packets.iter_mut().find(|packet| packet.stage == FREE).ok_or(NoPlace)?;
+        let (number, places) = (state.queued, state.packets.len());
+        let place = state.packets.iter_mut().find(|packet| packet.stage == FREE).ok_or(NoPlace(places))?;
         #[allow(clippy::cast_possible_truncation, reason = "at most STREAMS")]
         let stream = stream as u32;
         *place = Packet {
@@ -181,18 +195,19 @@ impl Line {
     /// Sends the messages that wait, up to `until_ns`.
     pub fn send(&self, state: &mut LineState, until_ns: u64) {
         while let Some((index, start_ns)) = self.next(state).filter(|(_, start_ns)| *start_ns < until_ns) {
-            if start_ns > state.free_ns {
-                (state.busy_since_ns, state.busy_bits) = (start_ns, 0);
+            let LineState { packets, line } = &mut *state;
+            if start_ns > line.free_ns {
+                (line.busy_since_ns, line.busy_bits) = (start_ns, 0);
             }
-            let (delay_ns, is_lost) = self.fate(state.counts.begun);
-            let packet = &mut state.packets[index];
-            state.busy_bits += u64::from(packet.wire_bytes) * self.bits_per_byte;
-            state.free_ns = state.busy_since_ns + self.duration_ns(state.busy_bits);
-            state.last_arrival_ns = state.last_arrival_ns.max(state.free_ns + delay_ns);
-            packet.arrival_ns = state.last_arrival_ns;
+            let (delay_ns, is_lost) = self.fate(line.counts.begun);
+            let packet = &mut packets[index];
+            line.busy_bits += u64::from(packet.wire_bytes) * self.bits_per_byte;
+            line.free_ns = line.busy_since_ns + self.duration_ns(line.busy_bits);
+            line.last_arrival_ns = line.last_arrival_ns.max(line.free_ns + delay_ns);
+            packet.arrival_ns = line.last_arrival_ns;
             (packet.stage, packet.is_lost) = (UNDER_WAY, u32::from(is_lost));
-            state.counts.begun += 1;
-            state.counts.begun_bytes += u64::from(packet.wire_bytes);
+            line.counts.begun += 1;
+            line.counts.begun_bytes += u64::from(packet.wire_bytes);
         }
     }
 
@@ -227,19 +242,20 @@ impl Line {
     /// Takes out the messages that have arrived by `now_ns`.
     pub fn arrive(state: &mut LineState, now_ns: u64) {
         let arrived = |packet: &&mut Packet| packet.stage == UNDER_WAY && packet.arrival_ns <= now_ns;
+        let LineState { packets, line } = state;
         // In the order of arrival, of a stream the newest stays.
         while let Some(packet) =
-            state.packets.iter_mut().filter(arrived).min_by_key(|packet| (packet.arrival_ns, packet.number))
+            packets.iter_mut().filter(arrived).min_by_key(|packet| (packet.arrival_ns, packet.number))
         {
             packet.stage = FREE;
             let stream = packet.stream as usize;
             if packet.is_lost == 1 {
-                state.counts.lost[stream] += 1;
+                line.counts.lost[stream] += 1;
                 continue;
             }
-            state.newest[stream] = packet.message;
-            state.counts.arrived[stream] += 1;
-            state.counts.delay_ns = packet.arrival_ns - packet.queued_ns;
+            line.newest[stream] = packet.message;
+            line.counts.arrived[stream] += 1;
+            line.counts.delay_ns = packet.arrival_ns - packet.queued_ns;
         }
     }
 
@@ -256,6 +272,40 @@ impl Line {
 }
 
 impl LineState {
+    /// A line with so many `places` for packets: nothing waits, nothing was sent.
+    pub fn new(places: usize) -> Self {
+        Self { packets: vec![bytemuck::Zeroable::zeroed(); places], line: bytemuck::Zeroable::zeroed() }
+    }
+
+    /// Bytes that [`LineState::save`] writes.
+    pub fn size(&self) -> usize {
+        size_of::<LineFields>() + self.packets.len() * size_of::<Packet>()
+    }
+
+    /// Writes the state into `bytes`.
+    pub fn save(&self, bytes: &mut [u8]) {
+        let (line, packets) = bytes.split_at_mut(size_of::<LineFields>());
+        line.copy_from_slice(bytemuck::bytes_of(&self.line));
+        packets.copy_from_slice(bytemuck::cast_slice(&self.packets));
+    }
+
+    /// Goes on from `bytes` that [`LineState::save`] wrote for a line with as many places.
+    ///
+    /// # Errors
+    /// If their number is another one.
+    pub fn load(&mut self, bytes: &[u8]) -> Result<(), StateError> {
+        StateError::check_size(LineFields::SCHEMA.type_name, self.size(), bytes)?;
+        let (line, packets) = bytes.split_at(size_of::<LineFields>());
+        self.line = bytemuck::pod_read_unaligned(line);
+        bytemuck::cast_slice_mut(&mut self.packets).copy_from_slice(packets);
+        Ok(())
+    }
+
+    /// Number that changes with the layout of the state.
+    pub fn configuration() -> u64 {
+        LineFields::SCHEMA.layout_hash() ^ Packet::SCHEMA.layout_hash().rotate_left(1)
+    }
+
     /// Bytes and messages that wait.
     pub fn waiting(&self) -> (u32, u32) {
         let queued = self.packets.iter().filter(|packet| packet.stage == QUEUED);
@@ -270,7 +320,7 @@ impl LineState {
 
 #[cfg(test)]
 mod tests {
-    use super::{Line, LineState, NoPlace, PACKETS};
+    use super::{Line, LineState, NoPlace, PLACES_MIN};
     use bus::random::stream;
 
     const MS: u64 = 1_000_000;
@@ -290,7 +340,7 @@ mod tests {
 
     /// Offers a message of 35 bytes each `every_ms` for `length_ms`, and lets all arrive.
     fn carry(line: &mut Line, every_ms: u64, length_ms: u64) -> LineState {
-        let mut state = LineState::default();
+        let mut state = LineState::new(PLACES_MIN);
         for ms in 0..length_ms {
             if ms % every_ms == 0 {
                 line.queue(&mut state, 0, &[1; 24], 35, ms * MS).unwrap();
@@ -340,7 +390,7 @@ mod tests {
 
     #[test]
     fn what_finds_no_room_is_dropped_and_counted() {
-        let (line, mut state) = (line(1), LineState::default());
+        let (line, mut state) = (line(1), LineState::new(PLACES_MIN));
         for _ in 0..7 {
             line.queue(&mut state, 1, &[1; 24], 35, 0).unwrap();
         }
@@ -355,20 +405,20 @@ mod tests {
     #[test]
     fn more_packets_than_there_are_places_for_are_an_error_and_not_a_full_queue() {
         let line = Line { latency_ns: 10_000 * MS, bits_s: 1_000_000, ..line(1) };
-        let mut state = LineState::default();
-        for number in 0..PACKETS as u64 {
+        let mut state = LineState::new(PLACES_MIN);
+        for number in 0..PLACES_MIN as u64 {
             line.queue(&mut state, 0, &[1], 12, number * MS).unwrap();
             line.send(&mut state, (number + 1) * MS);
         }
-        assert_eq!((state.under_way(), state.waiting()), (PACKETS as u32, (0, 0)));
-        assert_eq!(line.queue(&mut state, 0, &[1], 12, 100 * MS), Err(NoPlace));
+        assert_eq!((state.under_way(), state.waiting()), (PLACES_MIN as u32, (0, 0)));
+        assert_eq!(line.queue(&mut state, 0, &[1], 12, 100 * MS), Err(NoPlace(PLACES_MIN)));
         assert_eq!(state.counts.dropped[0], 0);
     }
 
     #[test]
     fn the_higher_priority_goes_first_and_interrupts_nothing() {
         let line = Line { priorities: vec![0, 9, 0], ..line(1) };
-        let mut state = LineState::default();
+        let mut state = LineState::new(PLACES_MIN);
         for (stream, at_ns) in [(0, 0), (0, 0), (1, MS), (2, MS)] {
             line.queue(&mut state, stream, &[7], 12, at_ns).unwrap();
         }
@@ -385,7 +435,7 @@ mod tests {
     #[test]
     fn messages_keep_their_order_whatever_the_jitter() {
         let line = Line { bits_s: 1_000_000, jitter_ns: 50 * MS, ..line(3) };
-        let (mut state, mut newest, mut delays) = (LineState::default(), 0, Vec::new());
+        let (mut state, mut newest, mut delays) = (LineState::new(PLACES_MIN), 0, Vec::new());
         for ms in 0..250_u64 {
             let message = u8::try_from(ms).unwrap();
             line.queue(&mut state, 0, &[message], 12, ms * MS).unwrap();
@@ -404,7 +454,7 @@ mod tests {
     fn a_line_goes_on_from_its_state_byte_for_byte() {
         let make = || Line { jitter_ns: 20 * MS, loss: 0.3, ..line(5) };
         let (mut first, mut second) = (make(), make());
-        let mut states = [LineState::default(), LineState::default()];
+        let mut states = [LineState::new(PLACES_MIN), LineState::new(PLACES_MIN)];
         for ms in 0..2000_u64 {
             for (line, state) in [&mut first, &mut second].into_iter().zip(&mut states) {
                 line.queue(state, (ms % 3) as usize, &ms.to_le_bytes(), 13 + (ms % 7) as u32, ms * MS)
@@ -414,9 +464,18 @@ mod tests {
             }
             if ms == 777 {
                 second = make();
-                states[1] = states[0];
+                let mut bytes = vec![1; states[0].size()];
+                states[0].save(&mut bytes);
+                states[1] = LineState::new(PLACES_MIN);
+                states[1].load(&bytes).unwrap();
+                assert!(LineState::new(PLACES_MIN + 1).load(&bytes).is_err());
             }
         }
-        assert!(bytemuck::bytes_of(&states[0]) == bytemuck::bytes_of(&states[1]));
+        let [first, second] = states.map(|state| {
+            let mut bytes = vec![1; state.size()];
+            state.save(&mut bytes);
+            bytes
+        });
+        assert!(first == second);
     }
 }

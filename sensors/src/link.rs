@@ -10,7 +10,7 @@
 //! it has arrived. The link itself adds nothing to that: its inputs are a tick late because no message arrives in the tick
 //! in which it is sent.
 
-use crate::line::{Line, LineState, NoPlace, PACKETS, STREAMS};
+use crate::line::{Line, LineState, NoPlace, PLACES_MIN, STREAMS};
 use bus::announcement::Announcement;
 use bus::component::{Component, Info, State, StateError, StepError, Transfer};
 use bus::context::{NodeContext, StepContext};
@@ -39,6 +39,9 @@ const OVERHEAD_BYTES: u32 = 11;
 const QUEUE_BYTES: u32 = 202;
 /// Greatest rate of a serial line; the bits of a run also have to stay countable.
 const BAUD_MAX: f64 = 1e9;
+
+/// The most messages that may be under way: 1 s of four streams at 1 kHz.
+const UNDER_WAY_MAX: f64 = 4096.0;
 
 /// The stamp of an initial value: nothing was sent yet. Before the run, so that another link does not take it for a
 /// message.
@@ -157,24 +160,17 @@ pub struct LinkStatistics {
     pub stream_dropped: [u32; STREAMS],
 }
 
-/// State of a link: marks of the messages that it took last from its inputs, and its line.
-///
-/// ```
-/// use bus::Message;
-/// // It is handed over to whoever takes the link's place, and so is a message.
-/// assert_eq!(sensors::link::LinkState::SCHEMA.type_name, "hummingbus_msgs/msg/LinkState");
-/// ```
+/// Marks of the messages that a link took last from its inputs.
 #[derive(Clone, Copy, Debug, Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/LinkState")]
-pub struct LinkState {
-    line: LineState,
+struct Marks {
     /// The mark of the message that was taken last from each input; all bits set before the first.
     #[field(unit = "1")]
-    taken_mark: [u64; STREAMS],
+    mark: [u64; STREAMS],
     /// The period of its rate in which it was taken; all bits set before the first.
     #[field(unit = "1")]
-    taken_period: [u64; STREAMS],
+    period: [u64; STREAMS],
 }
 
 /// Outputs of a link: its statistics, and the newest message of each stream.
@@ -232,26 +228,37 @@ struct Forwarded {
     extent: Option<Extent>,
 }
 
-/// State of a link. The layouts are not transferred: a successor learns them when it connects.
+/// State of a link: its line, and marks of the messages that it took last. The layouts are not transferred: a successor learns
+/// them when it connects.
 #[derive(Debug)]
 pub struct LinkMemory {
-    state: LinkState,
+    line: LineState,
+    taken: Marks,
     forwarded: [Forwarded; STREAMS],
 }
 
 impl State for LinkMemory {
-    const TRANSFER: Transfer = LinkState::TRANSFER;
+    const TRANSFER: Transfer = Transfer::Bytes(<Marks as Message>::SCHEMA.type_name);
+
+    fn configuration(&self) -> u64 {
+        LineState::configuration()
+    }
 
     fn size(&self) -> usize {
-        self.state.size()
+        size_of::<Marks>() + self.line.size()
     }
 
     fn save(&self, bytes: &mut [u8]) {
-        self.state.save(bytes);
+        let (taken, line) = bytes.split_at_mut(size_of::<Marks>());
+        taken.copy_from_slice(bytemuck::bytes_of(&self.taken));
+        self.line.save(line);
     }
 
     fn load(&mut self, bytes: &[u8]) -> Result<(), StateError> {
-        self.state.load(bytes)
+        StateError::check_size(<Marks as Message>::SCHEMA.type_name, self.size(), bytes)?;
+        let (taken, line) = bytes.split_at(size_of::<Marks>());
+        self.taken = bytemuck::pod_read_unaligned(taken);
+        self.line.load(line)
     }
 }
 
@@ -277,6 +284,8 @@ pub struct Link {
     line: Line,
     overhead_bytes: u32,
     tick_ns: u64,
+    /// Places for packets.
+    places: usize,
     /// By the names of the inputs.
     streams: Vec<LinkStream>,
 }
@@ -306,16 +315,16 @@ impl Component for Link {
         }
         let streams = names.iter().map(|name| LinkStream::new(name, &parameters, context));
         let streams = streams.collect::<Result<Vec<_>, _>>()?;
-        parameters.check_load(context)?;
+        let places = parameters.places(context)?;
         let line =
             parameters.line(context, streams.iter().map(|stream| stream.parameters.priority).collect());
-        Ok(Self { line, overhead_bytes: parameters.overhead_bytes, tick_ns: context.tick_ns, streams })
+        let (overhead_bytes, tick_ns) = (parameters.overhead_bytes, context.tick_ns);
+        Ok(Self { line, overhead_bytes, tick_ns, places, streams })
     }
 
     fn initial(&self) -> LinkMemory {
-        let (taken_mark, taken_period) = ([u64::MAX; STREAMS], [u64::MAX; STREAMS]);
-        let state = LinkState { line: LineState::default(), taken_mark, taken_period };
-        LinkMemory { state, forwarded: [Forwarded::default(); STREAMS] }
+        let taken = Marks { mark: [u64::MAX; STREAMS], period: [u64::MAX; STREAMS] };
+        LinkMemory { line: LineState::new(self.places), taken, forwarded: [Forwarded::default(); STREAMS] }
     }
 
     fn connected(&self, topics: &[(&str, &Announcement)], memory: &mut LinkMemory) -> Result<(), StepError> {
@@ -330,24 +339,24 @@ impl Component for Link {
         &self,
         context: &StepContext<'_>,
         inputs: ForwardedInputs<'_>,
-        LinkMemory { state, forwarded }: &mut LinkMemory,
+        LinkMemory { line, taken, forwarded }: &mut LinkMemory,
     ) -> Result<Outputs, StepError> {
         let now_ns = context.time_ns();
         let forwarded = &forwarded[..self.streams.len()];
         if context.tick() == 0 {
             // What the inputs hold is no message yet.
-            for (index, (layout, newest)) in forwarded.iter().zip(&mut state.line.newest).enumerate() {
+            for (index, (layout, newest)) in forwarded.iter().zip(&mut line.newest).enumerate() {
                 newest[..layout.size].copy_from_slice(&inputs.newest(index)[..layout.size]);
                 layout.mark_as_none(newest);
             }
         } else {
             let sent_ns = now_ns - self.tick_ns;
-            self.line.send(&mut state.line, sent_ns);
-            self.take(inputs, state, forwarded, sent_ns)?;
+            self.line.send(line, sent_ns);
+            self.take(inputs, line, taken, forwarded, sent_ns)?;
         }
-        self.line.send(&mut state.line, now_ns);
-        Line::arrive(&mut state.line, now_ns);
-        Ok(self.outputs(&state.line, forwarded, now_ns))
+        self.line.send(line, now_ns);
+        Line::arrive(line, now_ns);
+        Ok(self.outputs(line, forwarded, now_ns))
     }
 }
 
@@ -356,7 +365,8 @@ impl Link {
     fn take(
         &self,
         inputs: ForwardedInputs<'_>,
-        state: &mut LinkState,
+        line: &mut LineState,
+        taken: &mut Marks,
         forwarded: &[Forwarded],
         sent_ns: u64,
     ) -> Result<(), NoPlace> {
@@ -364,13 +374,13 @@ impl Link {
             let message = &inputs.newest(index)[..layout.size];
             let mark = layout.stamp(message).or_else(|| inputs.sent_tick(index));
             let period = stream.period(sent_ns);
-            let is_new = !layout.is_none(message) && mark.is_none_or(|mark| mark != state.taken_mark[index]);
-            let is_due = period.is_none_or(|period| period != state.taken_period[index]);
+            let is_new = !layout.is_none(message) && mark.is_none_or(|mark| mark != taken.mark[index]);
+            let is_due = period.is_none_or(|period| period != taken.period[index]);
             if is_new && is_due {
-                state.taken_mark[index] = mark.unwrap_or(u64::MAX);
-                state.taken_period[index] = period.unwrap_or(u64::MAX);
+                taken.mark[index] = mark.unwrap_or(u64::MAX);
+                taken.period[index] = period.unwrap_or(u64::MAX);
                 let wire_bytes = stream.wire_bytes(layout.used_bytes(message), self.overhead_bytes);
-                self.line.queue(&mut state.line, index, message, wire_bytes, sent_ns)?;
+                self.line.queue(line, index, message, wire_bytes, sent_ns)?;
             }
         }
         Ok(())
@@ -472,10 +482,10 @@ impl Parameters {
         require("loss", self.loss, (0.0..=1.0).contains(&self.loss), "a fraction from 0 to 1")
     }
 
-    /// Refuses a stream whose messages never fit into the queue, and more messages under way than a link holds;
-    /// warns of streams that together exceed the line.
-    fn check_load(&self, context: &NodeContext<'_>) -> Result<(), ParameterError> {
-        let (mut offered_bytes_s, mut offered_hz) = (0.0, 0.0);
+    /// Places for the packets that wait or are under way. Refuses a stream whose messages never fit into the queue, and more
+    /// messages under way than a link may hold; warns of streams that together exceed the line.
+    fn places(&self, context: &NodeContext<'_>) -> Result<usize, ParameterError> {
+        let (mut offered_bytes_s, mut offered_hz, mut shortest_bytes) = (0.0, 0.0, u32::MAX as usize);
         for message in context.messages {
             let stream = self.streams.get(message.port);
             let message_bytes =
@@ -493,15 +503,18 @@ impl Parameters {
                 stream.and_then(|stream| stream.rate_hz).map_or(sent_hz, |rate_hz| rate_hz.min(sent_hz));
             offered_bytes_s += rate_hz * bytes as f64;
             offered_hz += rate_hz;
+            shortest_bytes = shortest_bytes.min(bytes);
         }
         let carried_bytes_s = self.baud / f64::from(self.bits_per_byte);
         // Messages keep their order: where they are dense, each waits for the latest before it.
         let sent_hz = offered_hz * (carried_bytes_s / offered_bytes_s).min(1.0);
         let under_way = sent_hz * (self.latency_ms + self.jitter_ms) * 1e-3;
-        refuse(under_way > PACKETS as f64, "latency_ms", || {
+        refuse(under_way > UNDER_WAY_MAX, "latency_ms", || {
             format!(
-                "{sent_hz:.0} messages are sent each second, so {under_way:.0} would be under way, and a link holds {PACKETS}: \
-                 shorten the latency, or send less often (`rate_hz`)"
+                "`latency_ms` and `jitter_ms` are {} ms together, expected at most {:.0} ms: {sent_hz:.0} messages are sent each \
+                 second, and {UNDER_WAY_MAX} may be under way; shorten the latency, or send less often (`rate_hz`)",
+                self.latency_ms + self.jitter_ms,
+                UNDER_WAY_MAX / sent_hz * 1e3
             )
         })?;
         if offered_bytes_s > carried_bytes_s * (1.0 + 1e-9) {
@@ -511,7 +524,11 @@ impl Parameters {
                 self.baud
             ));
         }
-        Ok(())
+        let waiting = self.queue_bytes as usize / shortest_bytes;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most `UNDER_WAY_MAX`")]
+        let under_way = under_way.ceil() as usize;
+        // As many again, since messages of all streams may be sent in one tick, and shorter ones than a topic's greatest.
+        Ok(PLACES_MIN.max(2 * (under_way + context.messages.len()) + waiting))
     }
 
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "validated before")]

@@ -8,7 +8,7 @@
 //! The beams fire together and do not hear each other. An echo comes back from every surface in the cone at any
 //! angle of incidence; a real beam that grazes a smooth floor or wall hears none.
 
-use crate::channel::{Chance, QUEUE};
+use crate::channel::Chance;
 use crate::cone::{Cone, caster, check_bodies, check_told};
 use crate::parameters::within;
 use crate::sensing::Sensor;
@@ -178,9 +178,8 @@ impl Sensor for RangeFinders {
     }
 
     /// Until the first measurement arrives, nothing is met.
-    fn initial(&self) -> RangeState {
-        let nothing = Ranges { distance: [self.params.reach_m; BEAMS], ..Default::default() };
-        RangeState { queue: [nothing; QUEUE], ..RangeState::default() }
+    fn first(&self) -> Ranges {
+        Ranges { distance: [self.params.reach_m; BEAMS], ..Default::default() }
     }
 
     /// The noise is drawn whether or not a beam meets anything, so that the reading of one of them does not

@@ -1,6 +1,6 @@
 //! A sensor as a component: it measures its inputs, and a channel has the times, delays and losses of measurements.
 
-use crate::channel::{Chance, Channel, Remembered};
+use crate::channel::{Chance, Channel, Queued, Remembered};
 use crate::parameters::Parameters;
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
@@ -24,18 +24,14 @@ macro_rules! sensor {
         pub struct $State {
             /// Measurements that are under way.
             channel: $crate::channel::ChannelState,
-            /// The last measurements.
-            queue: [$Message; $crate::channel::QUEUE],
             $($(#[$field_meta])* $field: $type,)*
         }
 
         impl $crate::channel::Remembered for $State {
             type Measurement = $Message;
 
-            fn under_way(
-                &mut self,
-            ) -> (&mut $crate::channel::ChannelState, &mut [$Message; $crate::channel::QUEUE]) {
-                (&mut self.channel, &mut self.queue)
+            fn channel(&mut self) -> &mut $crate::channel::ChannelState {
+                &mut self.channel
             }
         }
 
@@ -97,7 +93,7 @@ pub trait Sensor: Sized + Send {
     /// Outputs.
     type Outputs: OutputPorts + From<Sent<Self>>;
     /// State from tick to tick.
-    type State: Message + Default + Remembered<Measurement: Measurement>;
+    type State: Message + Default + Remembered<Measurement: Measurement + Message + Default>;
 
     /// Makes the sensor of parameters that are within their ranges, and of the files that they name.
     ///
@@ -108,6 +104,11 @@ pub trait Sensor: Sized + Send {
     /// The state before the first tick.
     fn initial(&self) -> Self::State {
         Self::State::default()
+    }
+
+    /// The measurement that is sent until the first arrives.
+    fn first(&self) -> Sent<Self> {
+        Sent::<Self>::default()
     }
 
     /// Refuses ports that do not go with its parameters.
@@ -170,7 +171,7 @@ impl<S: Sensor> Component for Sensing<S> {
     type Parameters = S::Parameters;
     type Inputs<'a> = S::Inputs<'a>;
     type Outputs = S::Outputs;
-    type State = S::State;
+    type State = Queued<S::State>;
 
     fn new(parameters: S::Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         parameters.validate()?;
@@ -180,15 +181,15 @@ impl<S: Sensor> Component for Sensing<S> {
         Ok(Self { sensor, channel })
     }
 
-    fn initial(&self) -> S::State {
-        self.sensor.initial()
+    fn initial(&self) -> Queued<S::State> {
+        self.channel.state(self.sensor.initial(), self.sensor.first())
     }
 
     fn step(
         &self,
         context: &StepContext<'_>,
         inputs: S::Inputs<'_>,
-        state: &mut S::State,
+        state: &mut Queued<S::State>,
     ) -> Result<S::Outputs, StepError> {
         self.sensor.check_inputs(&inputs)?;
         let arrived = self.channel.measure(context.time_ns(), state, |state, last, chance| {

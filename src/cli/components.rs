@@ -154,7 +154,7 @@ fn outputs(component: &Registration) -> Vec<String> {
 fn state(component: &Registration) -> &'static str {
     match component.transfer {
         Transfer::Message(schema) => type_name(schema),
-        Transfer::Bytes(type_name) => type_name,
+        Transfer::Bytes(type_name) => short(type_name),
         Transfer::Nothing => "–",
         Transfer::File | Transfer::Growing(_) => "cannot be replaced",
         Transfer::External(_) => "cannot be saved",
@@ -206,7 +206,12 @@ fn port(port: &PortSpec) -> String {
 
 /// A message's name without its package.
 fn type_name(schema: &Schema) -> &'static str {
-    schema.type_name.rsplit('/').next().unwrap_or(schema.type_name)
+    short(schema.type_name)
+}
+
+/// The name of a type without its package.
+fn short(type_name: &'static str) -> &'static str {
+    type_name.rsplit('/').next().unwrap_or(type_name)
 }
 
 fn listed(items: impl Iterator<Item = String>) -> String {

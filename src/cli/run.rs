@@ -144,7 +144,7 @@ pub fn run(
     let going_on = from.as_ref().map(Checkpoint::tick);
     if let (Some(from), Some(path)) = (from, &arguments.from) {
         let about = || format!("cannot go on from {}", path.display());
-        from.resume(&mut graph, !arguments.set.is_empty()).with_context(about)?;
+        from.resume(&manifest, &mut graph, !arguments.set.is_empty()).with_context(about)?;
     }
     let mut path = recording_path(&manifest, record)?;
     if extra_shadow.is_some() && arguments.record.is_none() {
@@ -203,13 +203,24 @@ pub fn run(
     if let Some(path) = &summary.recording {
         text += &format!("\nto plot it: {}\nto see it fly: {}", command("plot", path), command("view", path));
     }
-    if let Some(Written { tick, path }) = summary.checkpoint_to_go_back_to(graph.plan.tick_s()) {
-        text += &format!("\nto go on from tick {tick}: {}", command("run --from", path));
+    match (summary.checkpoint_to_go_back_to(), summary.failed_at_tick()) {
+        (Some(Written { tick, path }), _) => {
+            text += &format!("\nto go on from tick {tick}: {}", command("run --from", path));
+        }
+        (None, Some(failed_at)) if !summary.checkpoints.is_empty() => {
+            text += &format!(
+                "\nno checkpoint before tick {failed_at}, at which a condition failed first, was kept: --checkpoint-every with a \
+                 shorter time writes one"
+            );
+        }
+        (None, _) => {}
     }
     if arguments.json {
         print_json(&as_json(&summary, profile.as_ref(), &files)?)?;
     } else if !(arguments.quiet && summary.passed) {
         print_text(&text)?;
+    } else {
+        summary.missed_checkpoints.iter().for_each(|missed| say(&format!("warning: {missed}")));
     }
     if let Some(page) = page {
         stay(page, summary.recording.as_deref(), &stop)?;

@@ -10,7 +10,7 @@ use std::path::Path;
 /// Simulated length of the flights of all manifests, s.
 const DURATION_S: f64 = 0.5;
 /// Hosts of the nodes: the arguments that ask for them.
-const HOSTS: [&[&str]; 3] = [&["--in-process"], &["--compose", "all"], &["--compose", "none"]];
+pub const HOSTS: [&[&str]; 3] = [&["--in-process"], &["--compose", "all"], &["--compose", "none"]];
 
 /// A shipped manifest, flown for half a second.
 struct Flight<'a> {
@@ -45,7 +45,7 @@ fn needs_processes(manifest: &str) -> bool {
 }
 
 /// Checkpoints beside the recording `stem`: their ticks and paths, by tick.
-fn checkpoints(place: &Place, stem: &str) -> Vec<(u32, String)> {
+pub fn checkpoints(place: &Place, stem: &str) -> Vec<(u32, String)> {
     let folder = place.path("");
     let names = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
     let tick = |name: &String| -> Option<u32> {
@@ -59,7 +59,7 @@ fn checkpoints(place: &Place, stem: &str) -> Vec<(u32, String)> {
 
 /// Requires that `later` begins at `tick` and goes on as `whole` does.
 #[track_caller]
-fn require_goes_on(place: &Place, whole: &str, later: &str, tick: u32) {
+pub fn require_goes_on(place: &Place, whole: &str, later: &str, tick: u32) {
     let expected = format!("begins at tick {tick}, and from there on all messages are those of");
     place.call(&["diff", whole, later]).with_code(1).prints(&[&expected]);
 }
@@ -150,6 +150,32 @@ fn what_is_under_way_goes_on() {
             place.call(&[&["run", "--from", &file, "--record", &later][..], host].concat()).flown();
             require_goes_on(&place, &whole, &later, tick);
         }
+    }
+}
+
+/// In the air, at the touch, and on the ground.
+#[test]
+fn a_landing_goes_on() {
+    let place = Place::new();
+    let take_off = repository("manifests/take-off.toml");
+    let landing = "[run]\nduration_s = 3.2\n[process.pilot.parameters]\ninitial_altitude_m = -1.0\nset_points = [\n\
+                   { kind = \"ramp\", channel = \"altitude\", at_s = 0.3, over_s = 0.7, to = 0.6, unit = \"m\" },\n\
+                   { kind = \"ramp\", channel = \"altitude\", at_s = 1.6, over_s = 0.6, to = -1.0, unit = \"m\" },\n]\n\
+                   [[pass]]\nname = \"lands\"\ntopic = \"/plant/contact\"\nfield = \"began\"\nunit = \"1\"\nfrom_s = 1.8\n\
+                   statistic = \"max\"\nmin = 1\n";
+    let ticks: Vec<u32> = (0..14).map(|number| 1801 + number * 97).collect();
+    let checkpoints: String =
+        ticks.iter().map(|tick| format!("[[checkpoint]]\nat_tick = {tick}\n")).collect();
+    let manifest = place.write("m.toml", format!("include = [{take_off:?}]\n{landing}{checkpoints}"));
+    let (whole, later) = (place.path("a.mcap"), place.path("b.mcap"));
+    let flown = place.call(&["run", &manifest, "--record", &whole, "--in-process", "--json"]).json();
+    let verdicts = flown["pass"].as_array().unwrap();
+    let lands = verdicts.iter().find(|verdict| verdict["name"] == "lands").unwrap();
+    assert_eq!(lands["passed"], true, "{lands}");
+    for (tick, host) in ticks.into_iter().zip(HOSTS.iter().cycle()) {
+        let file = place.path(&format!("a.{tick}.ckpt"));
+        place.call(&[&["run", "--from", &file, "--record", &later][..], host].concat()).flown();
+        require_goes_on(&place, &whole, &later, tick);
     }
 }
 
@@ -252,6 +278,9 @@ fn another_law_goes_on_as_a_swap_has_it() {
         place.call(&[&args[..], host].concat()).with_code(0);
         require_goes_on(&place, &whole, &fork, 3000);
     }
+    // It keeps no gains of the law before.
+    let args = ["run", "--from", &file, "--record", &fork, "--in-process", "--set"];
+    place.call(&[&args[..], &["process.controller.kind=cascade"]].concat()).with_code(0);
     // One that reads something else.
     let gains = repository("controllers/gains/geometric.toml");
     let set = [
@@ -329,7 +358,18 @@ fn a_failed_condition_leads_to_the_checkpoint_before() {
     let manifest = place.write("m.toml", format!("include = [{hover:?}]\n{rises}"));
     let args = ["run", &manifest, "--record", &place.path("a.mcap"), "--checkpoint-every", "1s"];
     // The climb from 1.0 m to 1.5 m begins at 2 s.
-    place.call(&args).with_code(1).prints(&["FAILED stays down", "to go on from tick 2000:", "a.2000.ckpt"]);
+    let ended = place.call(&args).with_code(1);
+    ended.prints(&["FAILED stays down", ", tick 2", "to go on from tick 2000:", "a.2000.ckpt"]);
+    // It is kept beside the newest.
+    let args = [&args[..], &["--keep", "3"]].concat();
+    place.call(&args).with_code(1).prints(&["to go on from tick 2000:", "a.2000.ckpt"]);
+    place.call(&[&args[..], &["--in-process"]].concat()).with_code(1).prints(&["to go on from tick 2000:"]);
+    let kept: Vec<u32> = checkpoints(&place, "a").iter().map(|(tick, _)| *tick).collect();
+    assert_eq!(kept, [2000, 9000, 10_000, 11_000]);
+    // Where there is none before it, the summary says so.
+    let args =
+        ["run", &manifest, "--record", &place.path("b.mcap"), "--checkpoint-every", "3s", "--in-process"];
+    place.call(&args).with_code(1).prints(&["no checkpoint before tick 2", "was kept"]);
 }
 
 #[test]
@@ -458,11 +498,27 @@ fn what_does_not_fit_is_refused_in_words() {
         let manifest = place.write("bad.toml", format!("include = [{hover:?}]\n{more}"));
         place.call(&["check", &manifest]).with_code(2).says(&[part]);
     }
-    let swap = repository("manifests/swap-gains.toml");
-    let args = ["run", &swap, "--record", "none", "--checkpoint-every", "2900ms"];
-    place.call(&args).with_code(2).says(&[
-        "tick 2900",
-        "joins `controller` at tick 2800",
-        "takes over at tick 3000",
-    ]);
+    let hover = repository("manifests/hover.toml");
+    let args = ["run", &hover, "--record", "none", "--in-process", "--set", "run.duration_s=0.1"];
+    let every = |time: &str| place.call(&[&args[..], &["--checkpoint-every", time]].concat());
+    let neighbours = ["which is 1.5 ticks", "such as 0.001 s or 0.002 s"];
+    every("1.5ms").with_code(2).says(&neighbours);
+    every("0.5ms").with_code(2).says(&["which is 0.5 ticks", "such as 0.001 s"]);
+    every("3ms").flown();
+    every("200ms")
+        .says(&["warning: ", "`checkpoint_every_s` is 0.2 s: the run ends before its first checkpoint"]);
+}
+
+#[test]
+fn a_run_on_one_thread_takes_no_requests_and_says_so() {
+    let place = Place::new();
+    let hover = repository("manifests/hover.toml");
+    let launch = place.start_endless(&["run", &hover, "--record", "none", "--in-process"]);
+    poll("a run", || (!place.run_dirs().is_empty()).then_some(()));
+    let run = place.run_id();
+    let ended = place.start(&["ctl", "pause", "--run", &run]).end_among_others().with_code(2);
+    ended.says(&["takes no requests: it flies on one thread (--in-process)"]);
+    assert!(!ended.to_string().contains("os error"), "{ended}");
+    launch.signal(Signal::INT);
+    launch.end().with_code(1);
 }

@@ -55,6 +55,7 @@ mod campaign;
 mod campaign_faults;
 mod campaign_results;
 mod checkpoints;
+mod checkpoints_of_swaps;
 mod clean;
 mod cleanup;
 mod commands;

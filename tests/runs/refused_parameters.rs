@@ -304,3 +304,13 @@ fn a_period_that_overflows_the_count_of_ticks() {
     let ended = refused("period_ticks = 5", "period_ticks = §4294967295");
     ended.says(&["`period_ticks` of `mocap` is 4294967295, and the run has 100 ticks", "32 bits"]);
 }
+
+/// In the unit of the file, as the number that was found.
+#[test]
+fn the_bounds_of_an_effect_are_told_in_the_unit_of_the_file() {
+    let place = Place::new();
+    let vehicle = format!("process.plant.vehicle={}", repository("vehicles/hummingbird-uncertain.toml"));
+    let delay = "process.plant.vehicle.effects.command-delay.delay=1000";
+    let args = ["check", &repository("manifests/hover.toml"), "--set", &vehicle, "--set", delay];
+    place.call(&args).with_code(2).says(&["must be 0 to 500 ms, found 1000 ms"]);
+}

@@ -173,12 +173,19 @@ fn a_plant_hands_its_state_to_one_with_other_numbers() {
 }
 
 #[test]
-fn a_plant_of_another_backend_is_refused_and_the_run_flies_on() {
+fn a_plant_of_another_backend_is_refused_before_it_takes_over() {
     let place = Place::new();
-    let (ended, recording) = swap_plant(&place, "parameters.backend = \"rapier\"");
-    let ended = ended.with_code(1);
-    let refused = ended.json()["successions"][0]["refused"].to_string();
-    assert!(refused.contains("another backend"), "{ended}");
+    let parts = ["the backup of `plant` does not go on from its state", "another backend"];
+    let (ended, _) = swap_plant(&place, "parameters.backend = \"rapier\"");
+    ended.with_code(2).says(&parts);
+    place.call(&["check", &place.path("swap.toml")]).with_code(2).says(&parts);
+    let (manifest, recording) = (hover_with(&place, "plain.toml", ""), place.path("live.mcap"));
+    let mut launch = place.start(&["run", &manifest, "--record", &recording]);
+    launch.hold_at(300);
+    let swap = ["swap", "plant", "--with", "parameters.backend = \"rapier\"", "--run", &place.run_id()];
+    place.start(&swap).end_among_others().with_code(2).says(&parts);
+    launch.release();
+    launch.end().flown();
     assert!(messages(&recording) == messages(&undisturbed(&place)), "the flights differ");
 }
 

@@ -75,7 +75,7 @@ impl ConnectedNode {
     pub(crate) fn write_at_hold(
         &mut self,
         locals: &Locals,
-        computation: &dyn Computation,
+        computation: &mut dyn Computation,
     ) -> Result<(), BusError> {
         if !self.is_asked_at_hold() {
             return Ok(());
@@ -85,6 +85,15 @@ impl ConnectedNode {
         self.asks_answered = asks;
         let taken = self.stepper.gather_before(of);
         taken.inspect_err(|&(topic, _)| lockstep.count_gap(topic)).map_err(|(_, error)| error)?;
+        if self.tick >= self.retirement_tick {
+            // Its backup computes the next due tick, and writes the part.
+            return Ok(());
+        }
+        if self.links.generation > 0 && self.tick == self.take_over_tick {
+            // Every tick before is computed: the predecessor has stated the state with which this process takes over.
+            let failed = |reason| BusError::Parameters { node: self.links.node.name.clone(), reason };
+            self.state.load(self.tick, computation).map_err(failed)?;
+        }
         self.write_checkpoint(Cause::Request, of, self.tick, locals, computation)
     }
 
@@ -103,7 +112,7 @@ impl ConnectedNode {
         }
         let samples = self.stepper.samples_before(of, locals);
         let part = self.state.part(&links.node.name, samples, computation);
-        let part = part.of_process(links.generation, &links.node);
+        let part = part.of_process(links.generation);
         store_part(&links.run_dir, cause, of, links.index, &part)
     }
 }

@@ -54,7 +54,10 @@ impl SupervisorView {
         for (cell, topic) in self.segment.topics().iter().zip(&plan.topics) {
             cell.sent.store(plan.first_tick.next_multiple_of(topic.period_ticks.max(1)), Relaxed);
         }
-        (0..plan.nodes.len()).for_each(|slot| self.set_first_tick(slot, plan.first_tick));
+        // A node counts as far as its first due tick: the clock holds no boundary for a slower one.
+        for (slot, node) in plan.nodes.iter().enumerate() {
+            self.set_first_tick(slot, plan.first_tick.next_multiple_of(node.period_ticks.max(1)));
+        }
     }
 
     /// Opens the control segment of `plan`, to steer a run that another process supervises.

@@ -77,14 +77,21 @@ fn within_bounds(spec: &ParameterSpec, stated: &Stated, entry: &EffectEntry) -> 
         return Err(Diagnostic::at(stated.unit_place.clone(), error));
     };
     let si = stated.value * factor;
-    // A pure number's unit would read as another number.
-    let unit = if spec.unit() == "1" { String::new() } else { format!(" {}", spec.unit()) };
     if (spec.min..=spec.max).contains(&si) {
         return Ok(si);
     }
-    let expected = format!("{} to {}{unit}", spec.min, spec.max);
+    // A pure number's unit would read as another number.
+    let unit = if stated.unit == "1" { String::new() } else { format!(" {}", stated.unit) };
+    // In the unit of the file, without the noise of the division.
+    let [min, max] = [spec.min, spec.max].map(|si| format!("{:.9e}", si / factor));
+    let expected = format!("{} to {}{unit}", plain(&min), plain(&max));
     let error = ParameterError::value(key, expected, format!("{} {}", stated.value, stated.unit));
     Err(Diagnostic::at(stated.place.clone(), error))
+}
+
+/// The number that `text` is, as short as it can be written.
+fn plain(text: &str) -> String {
+    text.parse::<f64>().map_or_else(|_| text.to_owned(), |number| number.to_string())
 }
 
 /// Refuses `vehicle`, which has these effects, if it does not meet the requirements of one of them.

@@ -46,7 +46,8 @@ pub struct KeptSamples {
     factor: Option<f64>,
     samples: Samples,
     pairs: Pairs,
-    lost_ns: Option<u64>,
+    /// Time of the first sample after which the condition cannot hold any more.
+    pub lost_ns: Option<u64>,
     last_ns: Option<u64>,
 }
 

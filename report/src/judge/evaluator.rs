@@ -19,6 +19,13 @@ struct Kept {
     windows: Vec<WindowEndErrors>,
 }
 
+/// The simulation time in ns of the first sample after which a condition cannot hold any more, from the bytes of
+/// [`Evaluator::save`].
+pub fn failed_ns(bytes: &[u8]) -> Option<u64> {
+    let kept: Kept = postcard::from_bytes(bytes).ok()?;
+    kept.conditions.iter().filter_map(|condition| condition.lost_ns).min()
+}
+
 /// Conditions, measures and comparisons of a run, evaluated as samples pass.
 ///
 /// It keeps the sums and extremes of the samples so far. Lag and gain need whole signals: their samples are kept.

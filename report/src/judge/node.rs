@@ -1,6 +1,6 @@
 //! The judge: a component that passes the samples of a run without a recording through the evaluator.
 
-use super::evaluator::Evaluator;
+use super::evaluator::{self, Evaluator};
 use bus::announcement::Announcement;
 use bus::component::{Component, Info, State, StateError, StepError, Transfer};
 use bus::context::{NodeContext, StepContext};
@@ -79,7 +79,7 @@ impl Component for Judge {
         "judge",
         "evaluates the conditions of a run without a recording; the launcher adds it, a manifest cannot",
     )
-    .judge();
+    .judge(evaluator::failed_ns);
     type Parameters = Parameters;
     type Inputs<'a> = AnyInputs<'a>;
     type Outputs = ();

@@ -40,6 +40,9 @@ pub struct Verdict {
     /// True if no sample alone made it fail, so that `failed_at_s` is the time of the last one.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub failed_at_end: bool,
+    /// The tick at that time.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub failed_at_tick: Option<u32>,
 }
 
 /// RMS errors of a simulated state at the ends of windows; its text is a line of the summary.
@@ -94,7 +97,15 @@ impl Verdict {
             why,
             failed_at_s,
             failed_at_end,
+            failed_at_tick: None,
         }
+    }
+
+    /// The same verdict, with the tick of its failure in a run with ticks of `tick_s`.
+    pub(crate) fn in_ticks_of(self, tick_s: f64) -> Self {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a tick of the run")]
+        let failed_at_tick = self.failed_at_s.map(|at_s| (at_s / tick_s).round() as u32);
+        Self { failed_at_tick, ..self }
     }
 }
 
@@ -143,8 +154,9 @@ impl fmt::Display for Verdict {
             (None, None) => return write!(f, "  value  {}: {values}{unit}", self.name),
         };
         let mark = if self.passed { "ok    " } else { "FAILED" };
+        let tick = self.failed_at_tick.map_or(String::new(), |tick| format!(", tick {tick}"));
         let at = if self.failed_at_end { "at the end of its span," } else { "first at" };
-        let at = self.failed_at_s.map_or(String::new(), |at_s| format!(", {at} {at_s:.3} s"));
+        let at = self.failed_at_s.map_or(String::new(), |at_s| format!(", {at} {at_s:.3} s{tick}"));
         write!(f, "  {mark} {}: {values}{unit} ({limit}){at}", self.name)
     }
 }

@@ -4,9 +4,9 @@
 use crate::ctl::protocol::{Answer, Request};
 use crate::ctl::server::{is_own_user, socket_path};
 use crate::run_dir::LiveRun;
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Error, Result, anyhow, bail};
 use bus::user_file;
-use std::io::{BufRead, BufReader, Write};
+use std::io::{BufRead, BufReader, ErrorKind, Write};
 use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant};
 
@@ -20,9 +20,7 @@ const POLL: Duration = Duration::from_millis(5);
 /// If the run has ended.
 pub fn ask(run: &LiveRun, request: &Request) -> Result<Answer> {
     let run_id = &run.entry.run_id;
-    let mut stream = connect(run).with_context(|| {
-        format!("run {run_id} has ended, or flies on one thread (--in-process), which takes no requests")
-    })?;
+    let mut stream = connect(run).map_err(|error| refused(run, error))?;
     let mut line = serde_json::to_string(request)?;
     line.push('\n');
     stream.write_all(line.as_bytes()).with_context(|| format!("run {run_id} has ended"))?;
@@ -33,6 +31,20 @@ pub fn ask(run: &LiveRun, request: &Request) -> Result<Answer> {
     }
     serde_json::from_str(&answer)
         .with_context(|| format!("run {run_id} gave an answer of another version of hummingbus: {answer}"))
+}
+
+/// Reason why `run` takes no request.
+fn refused(run: &LiveRun, error: std::io::Error) -> Error {
+    let run_id = &run.entry.run_id;
+    if !run.is_live() {
+        return anyhow!("run {run_id} has ended");
+    }
+    if error.kind() == ErrorKind::NotFound {
+        return anyhow!(
+            "run {run_id} takes no requests: it flies on one thread (--in-process); Ctrl-C in its terminal ends it"
+        );
+    }
+    Error::new(error).context(format!("cannot ask run {run_id}"))
 }
 
 /// Connects to `run`, which may just be starting.

@@ -46,6 +46,7 @@ pub fn all(
     for (node, declared) in declared_nodes.iter().enumerate() {
         if let Some(standby) = &declared.process.standby {
             let backup = run.resolve(node, standby.get_ref(), &standby.span(), notes)?;
+            run.require_state(&backup, &standby.span())?;
             placed.push((BackupSpec { is_standby: true, ..backup }, standby.span()));
         }
     }
@@ -56,6 +57,7 @@ pub fn all(
     for swap in &manifest.content.swap {
         let node = run.node(&swap.get_ref().process)?;
         let backup = run.resolve(node, &swap.get_ref().with, &swap.span(), notes)?;
+        run.require_state(&backup, &swap.span())?;
         placed.extend(run.times(node, swap)?.into_iter().map(|(join_tick, at_tick)| {
             (BackupSpec { join_tick, take_over_tick: Some(at_tick), ..backup.clone() }, swap.span())
         }));
@@ -63,6 +65,24 @@ pub fn all(
     placed.sort_by_key(|(backup, _)| (backup.join_tick, backup.node));
     run.require_one_at_a_time(&placed)?;
     Ok(placed.into_iter().map(|(backup, _)| backup).collect())
+}
+
+/// As [`backup_of`], for a backup that takes over.
+///
+/// # Errors
+/// As [`backup_of`], or if the backup does not go on from the state of its process, and has to.
+pub fn successor_of(
+    manifest: &Manifest,
+    plan: &Plan,
+    files: &InputFiles,
+    process: &str,
+    with_text: &str,
+) -> Result<BackupSpec, Diagnostic> {
+    let backup = backup_of(manifest, plan, files, process, with_text)?;
+    let (manifest, _, whole) = manifest.succeed(process, with_text)?;
+    let declared_nodes = declared_nodes(&manifest, files)?;
+    let run = Run { manifest: &manifest, plan, declared_nodes: &declared_nodes };
+    run.require_state(&backup, &whole.span()).map(|()| backup)
 }
 
 /// The backup of `process` in a run of `manifest` by `plan` that is under way; `with_text` is TOML with its
@@ -82,7 +102,8 @@ pub fn backup_of(
     let declared_nodes = declared_nodes(&manifest, files)?;
     let run = Run { manifest: &manifest, plan, declared_nodes: &declared_nodes };
     let node = run.node(&name)?;
-    run.resolve(node, whole.get_ref(), &whole.span(), &mut Notes::default())
+    let backup = run.resolve(node, whole.get_ref(), &whole.span(), &mut Notes::default())?;
+    Ok(BackupSpec { with: Some(with_text.to_owned()), ..backup })
 }
 
 impl Run<'_> {
@@ -132,7 +153,8 @@ impl Run<'_> {
         plan.outputs.clone_from(&present.outputs);
         plan.cpu = plan.cpu.or(present.cpu);
         let program = declared_nodes.swap_remove(node).program;
-        Ok(BackupSpec { node, join_tick: 0, take_over_tick: None, is_standby: false, program, plan })
+        let (take_over_tick, with) = (None, None);
+        Ok(BackupSpec { node, join_tick: 0, take_over_tick, is_standby: false, with, program, plan })
     }
 
     /// The outputs of `node` as they are, written out.
@@ -186,6 +208,22 @@ impl Run<'_> {
             list(present),
         );
         Err(self.manifest.problem(span, message, "a backup publishes the same messages on the same ports"))
+    }
+
+    /// Refuses a `backup` that takes over, declared at `span`, if it has to go on from the state of its process and does not.
+    fn require_state(&self, backup: &BackupSpec, span: &Range<usize>) -> Result<(), Diagnostic> {
+        let declared = &self.declared_nodes[backup.node];
+        let Some(component) = backup.program.component() else { return Ok(()) };
+        let (Some(reason), Some(before)) = (component.needs_state, declared.program.component()) else {
+            return Ok(());
+        };
+        let (before, files) = ((before, &self.plan.nodes[backup.node]), declared.files.listing_anew());
+        // A component that cannot be made is refused elsewhere, with its place.
+        if component.goes_on_from(&backup.plan, before, self.plan, &files).unwrap_or(true) {
+            return Ok(());
+        }
+        let message = format!("the backup of `{}` does not go on from its state", backup.plan.name);
+        Err(self.manifest.problem(span, message, reason))
     }
 
     fn require_room(&self, node: usize, plan: &NodePlan, span: &Range<usize>) -> Result<(), Diagnostic> {

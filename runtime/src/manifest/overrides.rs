@@ -1,6 +1,7 @@
 //! `--set key.path=value`.
 
 use super::file_edits;
+use super::replacement;
 use super::sources::{Source, Sources};
 use super::tree;
 use diagnostics::{Diagnostic, did_you_mean};
@@ -21,9 +22,12 @@ pub struct Override<'s> {
 /// Reason why a value has no place in the manifest, and advice.
 type Misplaced = (String, &'static str);
 
-/// Values given with `--set`, in their order.
+/// Values given with `--set`: kinds of processes first, then the others, each in their order.
 pub fn all(sources: &Sources) -> Result<Vec<Override<'_>>, Diagnostic> {
-    sources.overrides().map(|source| Override::parse(source, sources)).collect()
+    let parsed = sources.overrides().map(|source| Override::parse(source, sources));
+    let mut all = parsed.collect::<Result<Vec<_>, _>>()?;
+    all.sort_by_key(|change| !change.is_of_kind());
+    Ok(all)
 }
 
 impl<'s> Override<'s> {
@@ -50,6 +54,11 @@ impl<'s> Override<'s> {
         matches!(self.names().as_slice(), ["process", name, ..] if name.contains('/'))
     }
 
+    /// True if it states the kind of a process: other values are of that one.
+    pub fn is_of_kind(&self) -> bool {
+        matches!(self.names().as_slice(), ["process", _, "kind"])
+    }
+
     /// True if it changes a value in a file of a process: `file_edits`.
     pub fn is_of_a_file(&self) -> bool {
         file_edits::split(&self.names()).is_some()
@@ -64,6 +73,17 @@ impl<'s> Override<'s> {
     pub fn apply(self, root: &mut DeTable<'s>, sources: &Sources) -> Result<(), Diagnostic> {
         if self.is_of_an_expanded_process() {
             require_process(root, &self.keys[1], sources)?;
+        }
+        if self.is_of_kind()
+            && let Some(process) = tree::table_mut(root, "process")
+            && let Some(process) = tree::table_mut(process, self.keys[1].get_ref())
+        {
+            // As the successor in a swap.
+            let key = Spanned::new(self.keys[2].span(), Cow::Borrowed(*self.keys[2].get_ref()));
+            let mut with = DeTable::new();
+            with.insert(key, self.value);
+            replacement::succeed(process, with, sources);
+            return Ok(());
         }
         let Some((last, parents)) = self.keys.split_last() else { return Ok(()) };
         let mut whole = DeValue::Table(std::mem::take(root));
@@ -187,6 +207,30 @@ mod tests {
         let error = changed(text, "swap.2.at_tick=5").unwrap_err().to_string();
         assert!(error.contains("`swap` is a list of 2, and `2` is none of them"), "{error}");
         assert_eq!(changed("a = [1, 2]", "a.0=7").unwrap()["a"], serde_json::json!([7, 2]));
+    }
+
+    #[test]
+    fn another_kind_forgets_the_keys_of_the_former_one_and_keeps_its_own() {
+        let text =
+            "[process.a]\nkind = 'old'\ngains = 'g.toml'\nparameters = { b = 1 }\ninputs = { c = '/d' }";
+        let found = changed(text, "process.a.kind=new").unwrap();
+        assert_eq!(found["process"]["a"], serde_json::json!({ "kind": "new", "inputs": { "c": "/d" } }));
+        let found = changed(text, "process.a.kind=old").unwrap();
+        assert_eq!(found["process"]["a"]["gains"], "g.toml");
+        // In whichever order they are given.
+        let mut sources = Sources::default();
+        sources.add(Origin::File("a.toml".into()), text.to_owned());
+        for change in ["process.a.parameters.e=2", "process.a.kind=new"] {
+            sources.add(Origin::Override, change.to_owned());
+        }
+        let mut table = sources.table(&sources.all[0]).unwrap();
+        super::all(&sources)
+            .unwrap()
+            .into_iter()
+            .for_each(|change| change.apply(&mut table, &sources).unwrap());
+        let found =
+            serde_json::Value::deserialize(toml::Deserializer::from(Spanned::new(0..0, table))).unwrap();
+        assert_eq!(found["process"]["a"]["parameters"], serde_json::json!({ "e": 2 }));
     }
 
     #[test]

@@ -112,14 +112,21 @@ fn differing<'s>(
     {
         parameters.remove("gains");
     }
-    tree::replace_keys(&mut whole, with);
-    let kind = tree::string(&whole, "kind").and_then(|kind| sources.registry.find(kind));
-    for model in MODELS {
+    succeed(&mut whole, with, sources);
+    Ok(whole)
+}
+
+/// Puts the keys of `with` in place of those of `process`. Another kind keeps none of the keys of a kind but the models that it
+/// reads.
+pub fn succeed<'s>(process: &mut DeTable<'s>, with: DeTable<'s>, sources: &Sources) {
+    let before =
+        MODELS.map(|model| process.get_key_value(model).map(|(key, value)| (key.clone(), value.clone())));
+    tree::replace_keys(process, with);
+    let kind = tree::string(process, "kind").and_then(|kind| sources.registry.find(kind));
+    for (key, value) in before.into_iter().flatten() {
         // A change of the kind has removed it: the new kind reads the same model, if it reads one.
-        let is_read = kind.is_some_and(|kind| kind.parameters().contains(&model));
-        if let Some((key, value)) = process.get_key_value(model).filter(|_| is_read) {
-            whole.entry(key.clone()).or_insert_with(|| value.clone());
+        if kind.is_some_and(|kind| kind.parameters().contains(&key.get_ref().as_ref())) {
+            process.entry(key).or_insert(value);
         }
     }
-    Ok(whole)
 }

@@ -159,6 +159,7 @@ impl Replacements<'_> {
             join_tick: 0,
             take_over_tick: None,
             is_standby: false,
+            with: None,
             program: self.nodes[node].program.clone(),
             plan: self.membership.nodes[node].primary.plan.clone(),
         };

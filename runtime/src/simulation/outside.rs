@@ -13,7 +13,7 @@ use anyhow::{Result, bail};
 use bus::BusError;
 use bus::lockstep::SlotState;
 use bus::membership::Membership;
-use bus::plan::{InputPlan, NodePlan};
+use bus::plan::InputPlan;
 use diagnostics::Diagnostic;
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -120,11 +120,11 @@ impl World for SimWorld {
 
     fn reap(&self, _: &[u32]) {}
 
-    fn store_backup(&mut self, _: &NodePlan, node: usize, generation: u32) -> Result<(), BusError> {
+    fn store_backup(&mut self, backup: &BackupSpec, generation: u32) -> Result<(), BusError> {
         let sim = &mut *self.0.borrow_mut();
         sim.preempt();
         if sim.strikes(Fault::StoreBackup, 4) {
-            return Err(file_error(&format!("backup-{node}.{generation}.json")));
+            return Err(file_error(&format!("backup-{}.{generation}.json", backup.node)));
         }
         Ok(())
     }
@@ -178,7 +178,8 @@ impl World for SimWorld {
         let node = node.ok_or_else(|| Diagnostic::in_file("m.toml", "no such process"))?;
         let program = settings::program(OnExit::Stop);
         let plan = sim.plan.nodes[node].clone();
-        Ok(BackupSpec { node, join_tick: 0, take_over_tick: None, is_standby: false, program, plan })
+        let (take_over_tick, with) = (None, None);
+        Ok(BackupSpec { node, join_tick: 0, take_over_tick, is_standby: false, with, program, plan })
     }
 }
 

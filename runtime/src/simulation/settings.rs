@@ -4,6 +4,7 @@ use super::sim::{Draw, NODES, WINDOW};
 use crate::graph::Graph;
 use crate::program::{BackupSpec, Executable, OnExit, Program, Readiness};
 use bus::plan::{InputPlan, NodePlan, OutputPlan, Pace, Plan, TopicPlan, Wait};
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 const TICKS: u32 = 60;
@@ -88,6 +89,7 @@ pub(super) fn graph(draw: &mut Draw) -> Graph {
             join_tick,
             take_over_tick,
             is_standby,
+            with: None,
             program: program(on_exit),
             plan: plan.nodes[node].clone(),
         };
@@ -107,5 +109,6 @@ pub(super) fn graph(draw: &mut Draw) -> Graph {
     });
     let sidecars = sidecars.collect();
     let files = bus::InputFiles::default();
-    Graph { plan, programs, backups, sidecars, models: Vec::new(), files, from: None, warnings: Vec::new() }
+    let (models, begun, warnings) = (Vec::new(), BTreeMap::new(), Vec::new());
+    Graph { plan, programs, backups, sidecars, models, files, from: None, begun, warnings }
 }
