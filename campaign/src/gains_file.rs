@@ -62,20 +62,6 @@ fn header(name: &str, tuning: &str, seed: u64, build: &str, outcome: &Outcome) -
     Ok(text)
 }
 
-/// Unit of the quantity at the dotted `key` of the gains file with this `text`; 1 for a number without a unit.
-///
-/// ```
-/// let text = "[roll]\np = { value = 16, unit = \"1/s^2\" }\nd = 6.0\n";
-/// assert_eq!(["roll.p", "roll.d"].map(|key| campaign::gains_file::unit(text, key)), ["1/s^2", "1"]);
-/// ```
-#[must_use]
-pub fn unit(text: &str, key: &str) -> String {
-    let document = text.parse::<DocumentMut>().unwrap_or_default();
-    let quantity = key.split('.').try_fold(document.as_item(), |item, key| item.get(key));
-    let unit = quantity.and_then(|quantity| quantity.get("unit")?.as_str());
-    unit.unwrap_or("1").to_owned()
-}
-
 /// Puts a gain at the dotted `key`, a quantity or a number; `None` if there is no such place.
 fn put(document: &mut DocumentMut, key: &str, gain: &TunedGain, tuning: &str) -> Option<()> {
     let item = key.split('.').try_fold(document.as_item_mut(), |item, key| item.get_mut(key))?;

@@ -8,7 +8,6 @@
 use crate::base::Base;
 use crate::declaration::Campaign;
 use crate::flying::Flying;
-use crate::gains_file;
 use crate::plan::Plan;
 use crate::row::Row;
 use crate::tuning::{Term, Tuning};
@@ -162,7 +161,7 @@ pub fn search(
     let tuned = |after: &[f64]| -> Vec<TunedGain> {
         let gains = tuning.gains.iter().zip(declared.iter().zip(after));
         let tuned = gains.map(|(gain, (before, after))| TunedGain {
-            unit: gains_file::unit(&gains_file, &gain.keys[0]),
+            unit: gain.unit(&gains_file),
             name: gain.name.clone(),
             keys: gain.keys.clone(),
             before: *before,

@@ -7,6 +7,7 @@ use serde::Deserialize;
 use std::ops::Range;
 use std::path::Path;
 use toml::Spanned;
+use toml_edit::DocumentMut;
 
 /// Significant digits of a tuned gain: what is flown is what the gains file says.
 const DIGITS: usize = 4;
@@ -252,6 +253,15 @@ impl Tuned {
         rounded_to(value, DIGITS)
     }
 
+    /// Unit of the value in the gains file with this `text`; 1 for a number without a unit.
+    #[must_use]
+    pub fn unit(&self, text: &str) -> String {
+        let document = text.parse::<DocumentMut>().unwrap_or_default();
+        let quantity = self.keys[0].split('.').try_fold(document.as_item(), |item, key| item.get(key));
+        let unit = quantity.and_then(|quantity| quantity.get("unit")?.as_str());
+        unit.unwrap_or("1").to_owned()
+    }
+
     /// Coordinate of the `declared` value in the range.
     ///
     /// # Errors
@@ -329,6 +339,8 @@ mod tests {
         let gain = &tuning.gains[0];
         assert_eq!(gain.start(16.0).unwrap(), 0.5);
         assert_eq!([0.0, 0.5, 1.0, 7.0].map(|x| gain.value(16.0, x)), [8.0, 16.0, 32.0, 32.0]);
+        let file = "[roll]\nproportional = { value = 16, unit = \"1/s^2\" }\n";
+        assert_eq!([file, "[roll]\nproportional = 16\n"].map(|file| gain.unit(file)), ["1/s^2", "1"]);
         assert!(gain.start(0.0).unwrap_err().to_string().contains("which no factor changes"));
         // Flights that judge share no seed with those that tune.
         assert_ne!(tuning.held_out.seed, tuning.campaign.seed);
