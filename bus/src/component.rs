@@ -160,8 +160,11 @@ pub struct Info {
     /// Reason why it cannot take the place of a component from whose state it does not go on, if it cannot.
     pub needs_state: Option<&'static str>,
     /// Of a judge: simulation time in ns from which on a condition cannot hold any more, from the bytes of its state.
-    pub failed_ns: Option<fn(&[u8]) -> Option<u64>>,
+    pub failed_ns: Option<FailedNs>,
 }
+
+/// Simulation time in ns from which on a condition cannot hold any more, from the bytes of a judge's state; `None` if all may hold.
+pub type FailedNs = fn(&[u8]) -> Option<u64>;
 
 /// Role of a component in a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -217,7 +220,7 @@ impl Info {
     /// The same component as the one that judges a run that is not recorded. `failed_ns` returns the simulation time from which
     /// on a condition cannot hold any more, from the bytes of its state.
     #[must_use]
-    pub const fn judge(self, failed_ns: fn(&[u8]) -> Option<u64>) -> Self {
+    pub const fn judge(self, failed_ns: FailedNs) -> Self {
         Self { role: Role::Judge, failed_ns: Some(failed_ns), ..self }
     }
 }
