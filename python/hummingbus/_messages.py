@@ -125,7 +125,7 @@ _parts: dict[int, tuple[tuple[int], np.dtype, np.dtype]] = {}
 
 
 def _parts_of(dtype: np.dtype) -> tuple[tuple[int], np.dtype, np.dtype]:
-    kinds = [dtype[part] for part in range(len(dtype))]
+    kinds = [dtype[part] for part in range(len(dtype.names or ()))]
     if kinds[0].names or any(kind != kinds[0] for kind in kinds):
         raise TypeError(f"its parts are of several types: {dtype}")
     return _parts.setdefault(id(dtype), ((len(kinds),), kinds[0], dtype))

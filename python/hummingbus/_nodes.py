@@ -148,7 +148,7 @@ def _run(component: Any, inputs: Any, outputs: Any, state: Any) -> None:
     is_class = isinstance(component, type)
     declared = (component.inputs, component.outputs, component.state) if is_class else (inputs or {}, outputs or {}, state)
     _require_own_names(*declared)
-    absent = {}
+    absent: dict[str, Any] = {}
     for ports, wired, declare in zip(declared, node.wired(), (node.input, node.output)):
         names = [name for name, _ in wired]
         for port, of_port in ports.items():

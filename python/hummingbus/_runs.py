@@ -101,8 +101,10 @@ class Run:
         while self.status()["state"] == "starting":
             time.sleep(0.005)
         # Each key on a line of its own: a file may not be one inline table.
-        tables = isinstance(backup, Mapping)
-        text = "".join(f"{json.dumps(key)} = {toml(value)}\n" for key, value in backup.items()) if tables else os.fspath(backup)
+        if isinstance(backup, Mapping):
+            text = "".join(f"{json.dumps(key)} = {toml(value)}\n" for key, value in backup.items())
+        else:
+            text = os.fspath(backup)
         words = [process, "--with", text]
         for option, value in (("--shadow-ticks", shadow_ticks), ("--at-tick", at_tick)):
             words += [] if value is None else [option, str(value)]

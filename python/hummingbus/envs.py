@@ -55,7 +55,7 @@ class HoverEnv(gymnasium.Env):
             vehicle = Path(self._folder.name) / "hummingbird.toml"
             vehicle.write_text(_native.REFERENCE_VEHICLE)
         text = _HOVER.format(vehicle=_quoted(os.path.abspath(vehicle)), hover=[hover] * rotors)
-        self._text, self._hover, self._span = text, hover, span
+        self._text, self._rotors, self._hover, self._span = text, rotors, hover, span
         self._action_ticks, self._duration_s = action_ticks, duration_s
         self._target, self._start_within = np.array(target_m), start_within_m
         self._command = message("MotorCommand").zeros()
@@ -69,17 +69,17 @@ class HoverEnv(gymnasium.Env):
         drawn = self._target + self.np_random.uniform(-self._start_within, self._start_within, 3)
         position = np.array((options or {}).get("position_m", drawn), float)
         self._simulation = Simulation(text=self._text, set={"process.plant.parameters.initial_position_m": position})
-        self._act(np.zeros(self.action_space.shape))
+        self._act(self._simulation, np.zeros(self._rotors))
         self._simulation.step(1)
-        return self._observed(), {"time_s": self._simulation.time_s}
+        return self._observed(self._simulation), {"time_s": self._simulation.time_s}
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Flies `action_ticks` with the commands of `action`."""
         if self._simulation is None:
             raise _native.Error("the environment was not reset")
-        self._act(np.clip(action, -1.0, 1.0))
+        self._act(self._simulation, np.clip(action, -1.0, 1.0))
         self._simulation.step(self._action_ticks)
-        observation, time_s = self._observed(), self._simulation.time_s
+        observation, time_s = self._observed(self._simulation), self._simulation.time_s
         away, speed, spin = (float(np.linalg.norm(observation[part])) for part in (slice(3), slice(3, 6), slice(10, 13)))
         x, y = observation[6], observation[7]
         upright = 1.0 - 2.0 * (x * x + y * y)
@@ -91,12 +91,14 @@ class HoverEnv(gymnasium.Env):
         """Removes the folder of the environment."""
         self._folder.cleanup()
 
-    def _act(self, action: np.ndarray) -> None:
+    def _act(self, simulation: Simulation, action: np.ndarray) -> None:
         set_values(self._command["command"], self._hover + self._span * action)
-        self._simulation.act("agent", command=self._command)
+        simulation.act("agent", command=self._command)
 
-    def _observed(self) -> np.ndarray:
-        state = self._simulation.read("/plant/state")
+    def _observed(self, simulation: Simulation) -> np.ndarray:
+        state = simulation.read("/plant/state")
+        if state is None:
+            raise _native.Error("the plant has sent no state")
         parts = (self._target - vector(state["position"]), *(vector(state[name]) for name in ("velocity", "attitude", "angular_velocity")))
         return np.concatenate(parts)
 

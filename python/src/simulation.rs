@@ -9,6 +9,9 @@ use pyo3::prelude::*;
 use pyo3::types::PyByteArray;
 use std::path::Path;
 
+/// Ticks after which Python may end a step by a signal: some milliseconds.
+const TICKS_BETWEEN_SIGNALS: u32 = 1000;
+
 /// A simulation; `hummingbus/_simulations.py` has what people use.
 #[pyclass(unsendable)]
 pub struct Simulation {
@@ -45,10 +48,17 @@ impl Simulation {
         self.simulation.time_s()
     }
 
-    /// Computes so many ticks.
-    fn step(&mut self, ticks: u32) -> PyResult<()> {
+    /// Computes so many ticks. Ctrl-C ends it with the exception that Python has for it.
+    fn step(&mut self, py: Python<'_>, ticks: u32) -> PyResult<()> {
         let Self { simulation, actions } = self;
-        acting(actions, || (0..ticks).try_for_each(|_| simulation.step())).map_err(raised)
+        let mut left = ticks;
+        while left > 0 {
+            let some = left.min(TICKS_BETWEEN_SIGNALS);
+            acting(actions, || (0..some).try_for_each(|_| simulation.step())).map_err(raised)?;
+            py.check_signals()?;
+            left -= some;
+        }
+        Ok(())
     }
 
     /// Sets the message that the agent `node` sends on `output` from now on.

@@ -70,8 +70,12 @@ fn described<'p>(kind: &str, name: &str) -> Option<Cells<'p>> {
 /// The cells behind `name` in the first table that has it, below a title that is meant.
 fn row<'p>(page: &'p str, name: &str, is_meant: &dyn Fn(&str) -> bool) -> Option<Cells<'p>> {
     let names = [format!("`{name}`"), format!("`parameters.{name}`")];
-    let mut title = "";
+    let (mut title, mut header, mut before) = ("", "", "");
     for line in page.lines() {
+        if line.starts_with("|--") {
+            header = before;
+        }
+        before = line;
         if let Some(found) = line.strip_prefix("## ").or(line.strip_prefix("### ")) {
             title = found.trim();
         }
@@ -81,7 +85,10 @@ fn row<'p>(page: &'p str, name: &str, is_meant: &dyn Fn(&str) -> bool) -> Option
             .next()
             .is_some_and(|first| first.split(", ").any(|part| names.iter().any(|name| part == name)));
         if is_named {
-            return Some(cells.collect());
+            // An example is no default.
+            let has_example = header.trim_end_matches([' ', '|']).ends_with("example");
+            let cells = cells.collect::<Vec<_>>();
+            return Some(cells[..cells.len() - usize::from(has_example)].to_vec());
         }
     }
     None
@@ -127,6 +134,8 @@ mod tests {
         assert!(of_px4[1].contains("RC_MAP_ARM_SW"), "{of_px4:?}");
         assert!(of_px4[2].starts_with("rest_s  default "), "{of_px4:?}");
         assert!(parameter_lines("fmu", &["start"]).len() > 1);
+        // A table that has examples has no defaults.
+        assert_eq!(parameter_lines("pid", &["gains"])[0], "gains");
     }
 
     #[test]
