@@ -139,6 +139,10 @@ pub trait Component: Sized + Send {
     }
 }
 
+/// Function that returns from the bytes of a judge's state the simulation time in ns from which on a condition cannot hold any
+/// more, if there is one.
+pub type FailedNs = fn(&[u8]) -> Option<u64>;
+
 /// Description of a component.
 ///
 /// ```
@@ -160,7 +164,7 @@ pub struct Info {
     /// Reason why it cannot take the place of a component from whose state it does not go on, if it cannot.
     pub needs_state: Option<&'static str>,
     /// Of a judge: simulation time in ns from which on a condition cannot hold any more, from the bytes of its state.
-    pub failed_ns: Option<fn(&[u8]) -> Option<u64>>,
+    pub failed_ns: Option<FailedNs>,
 }
 
 /// Role of a component in a run.
@@ -217,7 +221,7 @@ impl Info {
     /// The same component as the one that judges a run that is not recorded. `failed_ns` returns the simulation time from which
     /// on a condition cannot hold any more, from the bytes of its state.
     #[must_use]
-    pub const fn judge(self, failed_ns: fn(&[u8]) -> Option<u64>) -> Self {
+    pub const fn judge(self, failed_ns: FailedNs) -> Self {
         Self { role: Role::Judge, failed_ns: Some(failed_ns), ..self }
     }
 }

@@ -1,7 +1,7 @@
 //! A component in a table of components: its declaration, and how one is made, without its type.
 
 use crate::announcement::Announcement;
-use crate::component::{Component, Info, Role, State, StateError, StepError, Transfer};
+use crate::component::{Component, FailedNs, Info, Role, State, StateError, StepError, Transfer};
 use crate::context::{NodeContext, StepContext};
 use crate::parameter_names;
 use crate::plan::{NodePlan, Plan};
@@ -26,7 +26,7 @@ pub struct Registration {
     /// As [`Info::needs_state`].
     pub needs_state: Option<&'static str>,
     /// As [`Info::failed_ns`].
-    pub failed_ns: Option<fn(&[u8]) -> Option<u64>>,
+    pub failed_ns: Option<FailedNs>,
     /// Inputs.
     pub inputs: Inputs,
     /// Outputs.
@@ -94,8 +94,8 @@ impl Registration {
             let made = component.make_for(plan, node, files)?;
             Ok(StateLayout::of(component.transfer, made.state_size(), made.configuration()))
         };
-        let (own, other) = (layout(self, node)?, layout(before, node_before)?);
-        Ok(own.is_some() && own == other)
+        let (before, after) = (layout(before, node_before)?, layout(self, node)?);
+        Ok(after.is_some() && after == before)
     }
 
     /// The component, made for `node` of `plan` from the run's `files`.

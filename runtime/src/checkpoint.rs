@@ -6,10 +6,10 @@
 
 use crate::fork;
 use crate::graph::{Graph, backup_of};
-use crate::instances::{Flown, Origin, Requested};
+use crate::instances::{Flown, Requested};
 use crate::manifest::Manifest;
 use crate::output_file::{self, Kind, Mark};
-use crate::program::{BackupSpec, Executable, Program};
+use crate::program::{BackupSpec, Executable, Origin, Program};
 use crate::registry::Registry;
 use anyhow::{Context as _, Result, anyhow, bail};
 use bus::checkpoint::{NodePart, Parts};

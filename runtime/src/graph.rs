@@ -26,10 +26,9 @@ mod recorders;
 mod wiring;
 
 pub use crate::program::BackupSpec;
-use crate::program::Program;
+use crate::program::{Origin, Program};
 pub use backups::{backup_of, successor_of};
 
-use crate::instances::Origin;
 use crate::manifest::Manifest;
 use crate::placement;
 use bus::checkpoint::Parts;

@@ -1,7 +1,7 @@
 //! Processes that a run has started in the places of others. A checkpoint names by them the process that flies each node.
 
 use crate::graph::Graph;
-use crate::program::{BackupSpec, Program};
+use crate::program::{BackupSpec, Origin, Program};
 use anyhow::{Context as _, Result, bail};
 use bus::checkpoint::Parts;
 use bus::lockstep::TransferOutcome;
@@ -13,21 +13,6 @@ use std::cell::RefCell;
 
 /// Processes of a node after which a planned one is long gone, with its parts of checkpoints.
 const GONE_AFTER: u32 = 4;
-
-/// Origin of the process that flies a node.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) enum Origin {
-    /// The process that the manifest names for the checkpoint's tick.
-    Plan,
-    /// The first process of the node.
-    First,
-    /// The backup of the manifest's swap at this tick.
-    Swap(u32),
-    /// The node's standby.
-    Standby,
-    /// The backup of a swap that was requested in flight, with these keys, as TOML.
-    Request(String),
-}
 
 /// Swap under way that was requested in flight.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -180,16 +165,5 @@ impl Instances {
             }
         }
         Ok(requested)
-    }
-}
-
-impl Origin {
-    /// Origin of `backup`.
-    pub fn of(backup: &BackupSpec) -> Self {
-        match (&backup.with, backup.take_over_tick) {
-            (Some(with), _) => Self::Request(with.clone()),
-            (None, Some(tick)) => Self::Swap(tick),
-            (None, None) => Self::Standby,
-        }
     }
 }

@@ -5,7 +5,7 @@ use crate::registry::NodeProgram;
 use bus::Registration;
 use bus::component::{Role, Transfer};
 use bus::plan::{NodePlan, Plan};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -146,6 +146,32 @@ impl BackupSpec {
     /// True if it flies at `tick`.
     pub(crate) fn has_taken_over(&self, tick: u32) -> bool {
         self.take_over_tick.is_some_and(|at| at < tick)
+    }
+}
+
+/// Origin of the process that flies a node.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) enum Origin {
+    /// The process that the manifest names for the checkpoint's tick.
+    Plan,
+    /// The first process of the node.
+    First,
+    /// The backup of the manifest's swap at this tick.
+    Swap(u32),
+    /// The node's standby.
+    Standby,
+    /// The backup of a swap that was requested in flight, with these keys, as TOML.
+    Request(String),
+}
+
+impl Origin {
+    /// Origin of `backup`.
+    pub fn of(backup: &BackupSpec) -> Self {
+        match (&backup.with, backup.take_over_tick) {
+            (Some(with), _) => Self::Request(with.clone()),
+            (None, Some(tick)) => Self::Swap(tick),
+            (None, None) => Self::Standby,
+        }
     }
 }
 

@@ -43,6 +43,9 @@ const BAUD_MAX: f64 = 1e9;
 /// The most messages that may be under way: 1 s of four streams at 1 kHz.
 const UNDER_WAY_MAX: f64 = 4096.0;
 
+/// The most places of a link: those under way, and as many that wait.
+const PLACES_MAX: f64 = 2.0 * UNDER_WAY_MAX;
+
 /// The stamp of an initial value: nothing was sent yet. Before the run, so that another link does not take it for a
 /// message.
 const NEVER: Time = Time { sec: -1, nanosec: 0 };
@@ -315,7 +318,8 @@ impl Component for Link {
         }
         let streams = names.iter().map(|name| LinkStream::new(name, &parameters, context));
         let streams = streams.collect::<Result<Vec<_>, _>>()?;
-        let places = parameters.places(context)?;
+        parameters.check_load(context)?;
+        let places = parameters.places(context);
         let line =
             parameters.line(context, streams.iter().map(|stream| stream.parameters.priority).collect());
         let (overhead_bytes, tick_ns) = (parameters.overhead_bytes, context.tick_ns);
@@ -482,10 +486,10 @@ impl Parameters {
         require("loss", self.loss, (0.0..=1.0).contains(&self.loss), "a fraction from 0 to 1")
     }
 
-    /// Places for the packets that wait or are under way. Refuses a stream whose messages never fit into the queue, and more
-    /// messages under way than a link may hold; warns of streams that together exceed the line.
-    fn places(&self, context: &NodeContext<'_>) -> Result<usize, ParameterError> {
-        let (mut offered_bytes_s, mut offered_hz, mut shortest_bytes) = (0.0, 0.0, u32::MAX as usize);
+    /// Refuses a stream whose messages never fit into the queue, and more messages under way than a link may hold; warns of streams
+    /// that together exceed the line.
+    fn check_load(&self, context: &NodeContext<'_>) -> Result<(), ParameterError> {
+        let (mut offered_bytes_s, mut offered_hz) = (0.0, 0.0);
         for message in context.messages {
             let stream = self.streams.get(message.port);
             let message_bytes =
@@ -503,7 +507,6 @@ impl Parameters {
                 stream.and_then(|stream| stream.rate_hz).map_or(sent_hz, |rate_hz| rate_hz.min(sent_hz));
             offered_bytes_s += rate_hz * bytes as f64;
             offered_hz += rate_hz;
-            shortest_bytes = shortest_bytes.min(bytes);
         }
         let carried_bytes_s = self.baud / f64::from(self.bits_per_byte);
         // Messages keep their order: where they are dense, each waits for the latest before it.
@@ -524,11 +527,26 @@ impl Parameters {
                 self.baud
             ));
         }
-        let waiting = self.queue_bytes as usize / shortest_bytes;
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most `UNDER_WAY_MAX`")]
-        let under_way = under_way.ceil() as usize;
-        // As many again, since messages of all streams may be sent in one tick, and shorter ones than a topic's greatest.
-        Ok(PLACES_MIN.max(2 * (under_way + context.messages.len()) + waiting))
+        Ok(())
+    }
+
+    /// Places for the packets that wait or are under way, whatever the messages of the topics are: a stream without a rate sends at
+    /// each tick, and a message without a stated length has one byte beside the overhead.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most `PLACES_MAX`")]
+    fn places(&self, context: &NodeContext<'_>) -> usize {
+        let stream = |port: &&str| self.streams.get(*port);
+        let rate_hz =
+            |port| stream(port).and_then(|stream| stream.rate_hz).unwrap_or(context.period_s().recip());
+        let bytes =
+            |port: &&str| stream(port).and_then(|stream| stream.bytes).unwrap_or(1) + self.overhead_bytes;
+        let shortest = context.inputs.iter().map(bytes).min().unwrap_or(1);
+        let carried_hz = self.baud / f64::from(self.bits_per_byte) / f64::from(shortest);
+        let sent_hz = context.inputs.iter().map(rate_hz).sum::<f64>().min(carried_hz);
+        let under_way = sent_hz * (self.latency_ms + self.jitter_ms) * 1e-3;
+        let waiting = f64::from(self.queue_bytes / shortest);
+        // Messages of all streams may be sent in one tick.
+        let places = under_way.ceil() + waiting + 2.0 * context.inputs.len() as f64;
+        places.clamp(PLACES_MIN as f64, PLACES_MAX) as usize
     }
 
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "validated before")]
