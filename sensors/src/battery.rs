@@ -190,7 +190,7 @@ mod tests {
             let sent = sensor.step(BatteryInputs { battery: &Battery::default() }).unwrap().measured;
             assert_eq!((sent.valid, sent.voltage, sent.current), (0, 0.0, 0.0));
         }
-        assert_eq!(sensor.state.charge, params.initial_charge, "nothing is drawn from it");
+        assert_eq!(sensor.state.sensor.charge, params.initial_charge, "nothing is drawn from it");
     }
 
     #[test]
