@@ -139,6 +139,10 @@ pub trait Component: Sized + Send {
     }
 }
 
+/// Function that returns from the bytes of a judge's state the simulation time in ns from which on a condition cannot hold any
+/// more, if there is one.
+pub type FailedNs = fn(&[u8]) -> Option<u64>;
+
 /// Description of a component.
 ///
 /// ```

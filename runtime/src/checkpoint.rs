@@ -21,6 +21,8 @@ use std::collections::BTreeMap;
 use std::io::{Read as _, Write as _};
 use std::path::{Path, PathBuf};
 
+/// The first bytes of a checkpoint of any format: one of an earlier format may be replaced.
+const MARK: &[u8] = b"hummingbus checkpoint ";
 /// The first bytes of a checkpoint; the digit counts the changes of the format.
 const START: &[u8] = b"hummingbus checkpoint 3\n";
 /// Characters of a SHA-256 in hexadecimal, which the file ends with.
@@ -30,7 +32,7 @@ const BYTES_MAX: u64 = 4 << 30;
 /// The version of the program that goes on from a checkpoint must be that which has written it.
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// The kind of the file.
-pub(crate) const CHECKPOINT: Kind = Kind { name: "checkpoint", mark: Mark::Start(START) };
+pub(crate) const CHECKPOINT: Kind = Kind { name: "checkpoint", mark: Mark::Start(MARK) };
 
 /// A checkpoint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -111,8 +113,7 @@ impl Checkpoint {
     }
 
     fn from_bytes(bytes: &[u8]) -> Result<Self> {
-        let kind = START.len() - 2;
-        if !bytes.starts_with(&START[..kind]) {
+        if !bytes.starts_with(MARK) {
             bail!(
                 "it is no checkpoint of hummingbus; `run` writes them with --checkpoint-every or [[checkpoint]]"
             );
