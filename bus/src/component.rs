@@ -167,9 +167,6 @@ pub struct Info {
     pub failed_ns: Option<FailedNs>,
 }
 
-/// Simulation time in ns from which on a condition cannot hold any more, from the bytes of a judge's state; `None` if all may hold.
-pub type FailedNs = fn(&[u8]) -> Option<u64>;
-
 /// Role of a component in a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
