@@ -78,7 +78,7 @@ fn pieces(flight: &Prepared, share: f64) -> Vec<Range<usize>> {
     pieces
 }
 
-/// What was `found` in an excerpt of `problem`, with the parameters fitted on all of it, and refined by prediction errors again.
+/// The selection that was `found` in an excerpt of `problem`, with the parameters fitted on all of it, and refined by prediction errors again.
 pub fn on_all(problem: &mut Problem, excerpt: &Problem, found: Selection) -> Selection {
     problem.noises = excerpt.noises.clone();
     let before = problem.fitted(&problem.model.parameters.baseline(), &[]);

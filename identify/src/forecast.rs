@@ -1,4 +1,4 @@
-//! What acts on a vehicle beyond a model, as it is expected over a window.
+//! Pushes that act on a vehicle beyond a model, as they are expected over a window.
 
 /// Angular acceleration in B and acceleration in W beyond a model's.
 pub type AddedAcceleration = [f64; 6];
