@@ -163,7 +163,7 @@ pub struct Info {
     pub initial: &'static [&'static str],
     /// Reason why it cannot take the place of a component from whose state it does not go on, if it cannot.
     pub needs_state: Option<&'static str>,
-    /// Of a judge: simulation time in ns from which on a condition cannot hold any more, from the bytes of its state.
+    /// Failure that a judge has seen, if it is one.
     pub failed_ns: Option<FailedNs>,
 }
 

@@ -8,13 +8,14 @@ use crate::fit::Problem;
 use crate::prepared::Prepared;
 use crate::refine::refined;
 use crate::select::Selection;
+use flights::Role;
 use std::ops::Range;
 
 /// Effects are looked for in about so much of the estimation data, in s; tuned, no source.
 const SEARCH_S: f64 = 160.0;
 /// Their parameters are refined by predictions of about so much of it, in s.
 const REFINED_S: f64 = 600.0;
-/// The report's predictions are made in about so much of a flight, in s, and its clocks are aligned by as much.
+/// The clocks of a flight are aligned by about so much of it, in s, and predictions of a flight that is not for test are made in as much.
 const FLIGHT_S: f64 = 300.0;
 /// Length of a piece of a flight, in s: many times as long as manoeuvres and disturbances remember themselves.
 const PIECE_S: f64 = 10.0;
@@ -98,6 +99,16 @@ pub fn note(flight: &Prepared) -> String {
         "effects are looked for in {:.0} s of it, in {parts}; their parameters are fitted on all of it",
         flight.compared_s()
     )
+}
+
+/// Uses of a part of a long flight, as a note for the report; `None` of a flight that stays whole.
+pub fn part_note(flight: &Prepared) -> Option<String> {
+    let is_long = FLIGHT_S / flight.compared_s() < MOST;
+    let uses = match flight.flight.role {
+        Role::Test => "its clocks are aligned",
+        Role::Fit | Role::Select => "its clocks are aligned and its prediction errors computed",
+    };
+    is_long.then(|| format!("{uses} by {FLIGHT_S} s of it, spread evenly"))
 }
 
 #[cfg(test)]

@@ -58,7 +58,8 @@ pub fn predictions(problem: &Problem, set: &FlightSet, values: &[f64]) -> Vec<Pr
         let mut predictions = Vec::new();
         let prepared = problem.flights().find(|prepared| prepared.flight.name == flight.name);
         let late = prepared.map_or(Lateness::default(), |prepared| prepared.late);
-        let part = prepared.and_then(excerpt::of_flight);
+        // A test flight is judged whole, as on the bus.
+        let part = prepared.filter(|_| flight.role != Role::Test).and_then(excerpt::of_flight);
         let pieces_s = part.as_ref().map_or(Vec::new(), |part| part.layout.clock.pieces_s());
         let settling_s = part.as_ref().map_or(0.0, Prepared::settling_s);
         let cut = part.is_some().then(|| flight.within(&pieces_s));

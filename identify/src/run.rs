@@ -104,6 +104,7 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
     progress("confounded effects");
     let mut effects = effect_reports::judged(searched, &selection);
     let rivals = rivals(searched, &selection, &open);
+    note_parts(&problem, &mut flight_reports);
     if let Some(excerpt) = &excerpt {
         progress("parameters on all flights");
         selection = on_all(&mut problem, excerpt, selection);
@@ -314,6 +315,14 @@ fn flight_report(flight: &Flight, prepared: Option<&Prepared>) -> FlightReport {
             .collect(),
         assumed: flight.assumed.clone(),
         notes: flight.notes.clone(),
+    }
+}
+
+/// Notes how much of each long flight serves for what.
+fn note_parts(problem: &Problem, reports: &mut [FlightReport]) {
+    for flight in problem.flights() {
+        let of_flight = reports.iter_mut().filter(|report| report.name == flight.flight.name);
+        of_flight.for_each(|report| report.notes.extend(excerpt::part_note(flight)));
     }
 }
 
