@@ -22,6 +22,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Child, ExitStatus};
 use std::time::Duration;
+use toml::Spanned;
 
 /// Time that a program has to describe itself.
 const PATIENCE: Duration = Duration::from_secs(20);
@@ -65,7 +66,9 @@ pub fn check_programs(manifest: &Manifest, graph: &Graph, exe: &Path) -> Result<
         match ask(manifest, exe, run_dir, program)? {
             Answer::Described(description) => {
                 for (output, message) in program.plan.outputs.iter().zip(&description.outputs) {
-                    messages.entry(output.topic).or_insert_with(|| message.clone());
+                    let side =
+                        || Side::of_port(&program.plan.name, "sends", &output.port, message.clone(), false);
+                    messages.entry(output.topic).or_insert_with(side);
                 }
                 described.push((program, description));
             }
@@ -100,20 +103,36 @@ fn asked(graph: &Graph) -> Vec<Asked<'_>> {
     first.chain(backups).filter(|asked| asked.program.component().is_none()).collect()
 }
 
+/// A message as one side of a topic has it.
+struct Side {
+    /// The process and its port, for people.
+    who: String,
+    message: Announcement,
+    /// True if the message is part of the program that holds the components.
+    is_built_in: bool,
+}
+
+impl Side {
+    fn of_port(process: &str, verb: &str, port: &str, message: Announcement, is_built_in: bool) -> Self {
+        Self { who: format!("process `{process}` {verb} its port `{port}`"), message, is_built_in }
+    }
+}
+
 /// Messages of the topics that components send or read by their types, by the numbers of the topics.
-fn known_messages(manifest: &Manifest, graph: &Graph) -> BTreeMap<usize, Announcement> {
+fn known_messages(manifest: &Manifest, graph: &Graph) -> BTreeMap<usize, Side> {
     let of_components = graph.plan.nodes.iter().zip(&graph.programs);
     let of_components = of_components.filter_map(|(node, program)| Some((node, program.component()?)));
-    let topics = of_components.flat_map(|(node, component)| {
+    let ports = of_components.flat_map(|(node, component)| {
         let is_typed = matches!(component.inputs, Inputs::Ports(_) | Inputs::Many(_));
-        let read = node.inputs.iter().filter(move |_| is_typed).map(|input| input.topic);
-        read.chain(node.outputs.iter().map(|output| output.topic))
+        let read = node.inputs.iter().filter(move |_| is_typed);
+        let read = read.map(move |input| (node, input.topic, "reads", &input.port));
+        read.chain(node.outputs.iter().map(move |output| (node, output.topic, "sends", &output.port)))
     });
-    let announced = topics.filter_map(|topic| {
+    let sides = ports.filter_map(|(node, topic, verb, port)| {
         let schema = manifest.registry().message(&graph.plan.topics[topic].type_name)?;
-        Some((topic, Announcement::of(schema)))
+        Some((topic, Side::of_port(&node.name, verb, port, Announcement::of(schema), true)))
     });
-    announced.collect()
+    sides.collect()
 }
 
 /// Answer of a program.
@@ -139,21 +158,22 @@ fn ask(manifest: &Manifest, exe: &Path, run_dir: &Path, asked: Asked<'_>) -> Res
     let who = format!("process `{}`", plan.name);
     let said = process_log::last_words(&log).join("\n  ");
     match ended {
-        Some(status) if !status.success() => {
-            let message = format!("{who} would not take part in a run: it ended with {status}\n  {said}");
-            Err(problem(
-                manifest,
-                &plan.name,
-                message,
-                "correct the manifest or the program as its output says",
-            )
-            .into())
+        Some(status) => {
+            let (said, help) = match said.is_empty() {
+                false => (format!("\n  {said}"), "correct the manifest or the program as its output says"),
+                true => (
+                    String::new(),
+                    "a program takes part in a run by the library of hummingbus; one that does not is `lockstep = false`",
+                ),
+            };
+            let message = format!("{who} would not take part in a run: it ended with {status}{said}");
+            let at = named_parameter(&message).unwrap_or_default().to_owned();
+            Err(problem(manifest, &plan.name, &at, message, help).into())
         }
-        ended => {
-            let why = if ended.is_some() { "it exited with code 0" } else { "it was stopped after 20 s" };
-            let message = format!("{who} did not report its ports: {why}");
+        None => {
+            let message = format!("{who} did not report its ports within {} s", PATIENCE.as_secs());
             let help = "a program that joins by this version of hummingbus answers; its ports are compared when a run begins";
-            Ok(Answer::Silent(Box::new(problem(manifest, &plan.name, message, help))))
+            Ok(Answer::Silent(Box::new(problem(manifest, &plan.name, "", message, help))))
         }
     }
 }
@@ -178,7 +198,7 @@ fn compare(
     graph: &Graph,
     asked: Asked<'_>,
     description: &Description,
-    messages: &BTreeMap<usize, Announcement>,
+    messages: &BTreeMap<usize, Side>,
 ) -> Result<()> {
     let inputs = asked.plan.inputs.iter().zip(&description.inputs);
     let inputs =
@@ -186,26 +206,60 @@ fn compare(
     let outputs = asked.plan.outputs.iter().zip(&description.outputs);
     let outputs = outputs.map(|(output, message)| (output.topic, &output.port, message, "sends"));
     for (topic, port, declared, verb) in inputs.chain(outputs) {
-        let Some(sent) = messages.get(&topic).filter(|sent| sent.layout_hash != declared.layout_hash) else {
+        let other = messages.get(&topic);
+        let Some(other) = other.filter(|other| other.message.layout_hash != declared.layout_hash) else {
             continue;
         };
         let topic = &graph.plan.topics[topic].name;
         let message = format!(
-            "layout mismatch on topic {topic}: process `{}` {verb} its port `{port}` as\n{}\nand the other side has\n{}",
-            asked.plan.name, declared.layout, sent.layout
+            "layout mismatch on topic {topic}: process `{}` {verb} its port `{port}` as\n{}\nand {} as\n{}",
+            asked.plan.name, declared.layout, other.who, other.message.layout
         );
-        let help = "build the program anew with the message of the other side, or the other side with that of the program";
-        return Err(problem(manifest, &asked.plan.name, message, help).into());
+        let help = if other.is_built_in {
+            "rebuild the program against this version of hummingbus, whose message `hummingbus schema` prints"
+        } else {
+            "rebuild the program that has the older message"
+        };
+        return Err(problem(manifest, &asked.plan.name, "", message, help).into());
     }
     Ok(())
 }
 
-/// A problem of the `command` of process `name`; of the manifest as a whole where a set or a swap names it.
-fn problem(manifest: &Manifest, name: &str, message: String, help: &str) -> Diagnostic {
+/// The first parameter that a text of a program names, as in "`parameters.inputs.z` is in `m`".
+fn named_parameter(text: &str) -> Option<&str> {
+    let mut words = text.split(|c: char| c.is_whitespace() || "`\"',;:()".contains(c));
+    let parameter = words.find_map(|word| word.strip_prefix("parameters."))?;
+    Some(parameter.trim_end_matches('.'))
+}
+
+/// A problem of process `name` at its `parameter`; without one, at its program; of the manifest as a whole where a set or a swap
+/// names the process.
+fn problem(manifest: &Manifest, name: &str, parameter: &str, message: String, help: &str) -> Diagnostic {
     let mut processes = manifest.content.process.iter();
-    let process = processes.find(|(process, _)| process.get_ref() == name).map(|(_, process)| process);
-    match process.and_then(|process| process.command.as_ref()) {
-        Some(command) => manifest.problem(&command.span(), message, help),
-        None => Diagnostic::in_file(manifest.path.display().to_string(), message).help(help),
+    let Some((process, settings)) = processes.find(|(process, _)| process.get_ref() == name) else {
+        return Diagnostic::in_file(manifest.path.display().to_string(), message).help(help);
+    };
+    let path: Vec<&str> = parameter.split('.').collect();
+    let of_parameter = settings.parameters.keys().find(|key| key.get_ref() == path[0]).map(Spanned::span);
+    let of_parameter = of_parameter.map(|at| {
+        let [key, _] = manifest.inside(&at, &path[1..], &format!("process.{name}.parameters"));
+        key
+    });
+    let of_program =
+        settings.command.as_ref().map(Spanned::span).or(settings.kind.as_ref().map(Spanned::span));
+    manifest.problem(&of_parameter.or(of_program).unwrap_or_else(|| process.span()), message, help)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::named_parameter;
+
+    #[test]
+    fn a_parameter_is_found_in_the_words_of_a_program() {
+        let found = named_parameter("error: `parameters.inputs.positio`: the FMU has no variable `positio`");
+        assert_eq!(found, Some("inputs.positio"));
+        assert_eq!(named_parameter("parameters.extra is not read; it has no others."), Some("extra"));
+        assert_eq!(named_parameter("give parameters.state_bytes, at least 48."), Some("state_bytes"));
+        assert_eq!(named_parameter("it ended with exit code 1"), None);
     }
 }

@@ -81,8 +81,11 @@ fn a_check_finds_what_a_run_would() {
         (controller.clone(), faulty("port"), "declares the output `nothing`"),
         (controller.clone(), faulty("type"), "the manifest states"),
         (controller.clone(), faulty("layout"), "process `controller` reads its port `set_point` as"),
+        (controller.clone(), faulty("layout"), "and process `pilot` sends its port `set_point` as"),
         // What the program sends is read by a component.
         (pid(), faulty("layout"), "process `pilot` sends its port `set_point` as"),
+        (pid(), faulty("layout"), "and process `controller` reads its port `set_point` as"),
+        (pid(), faulty("layout"), "rebuild the program against this version"),
         (controller.clone(), faulty("padding"), "at byte 8, and the fields before it end at 4"),
     ];
     for (controller, pilot, words) in cases {
@@ -93,15 +96,27 @@ fn a_check_finds_what_a_run_would() {
 }
 
 #[test]
-fn a_program_that_tells_nothing_is_a_warning_and_none_is_started_where_that_is_asked_for() {
+fn a_program_that_takes_no_part_is_refused_and_none_is_started_where_that_is_asked_for() {
     let silent = "command = [\"true\"]\noutputs.set_point = { type = \"hummingbus_msgs/msg/SetPoint\" }\n";
     let place = Place::new();
     let manifest = hover(&place, &custom(INPUTS, TILT), silent);
-    place.call(&["check", &manifest]).with_code(0).says(&["did not report its ports: it exited with code 0"]);
+    let words =
+        ["hover.toml:", "process `pilot` would not take part in a run: it ended with", "lockstep = false"];
+    place.call(&["check", &manifest]).with_code(2).says(&words);
     let ended = place.call(&["check", &manifest, "--no-programs"]).with_code(0);
     assert!(ended.error.is_empty(), "{ended}");
     let failing = hover(&place, &custom(INPUTS, TILT), &silent.replace("true", "false"));
     place.call(&["check", &failing]).with_code(2).says(&["process `pilot` would not take part in a run"]);
+}
+
+/// The place of a parameter that a program refuses.
+#[test]
+fn a_parameter_that_a_program_refuses_is_told_with_its_line() {
+    let place = Place::new();
+    let manifest = hover(&place, &custom(INPUTS, TILT), &faulty("unread"));
+    let text = std::fs::read_to_string(&manifest).unwrap();
+    let line = 1 + text.lines().position(|line| line.contains("extra = 1")).unwrap();
+    place.call(&["check", &manifest]).with_code(2).says(&[&format!("hover.toml:{line}:"), "extra = 1"]);
 }
 
 /// As one that is linked with an older library, which knows nothing of a check.

@@ -161,6 +161,83 @@ fn what_goes_wrong_in_a_program_is_said_with_node_and_reason() {
     }
 }
 
+/// The content of each block of docs/cpp.md in `language`.
+fn blocks(language: &str) -> Vec<String> {
+    let page = fs::read_to_string(repository("docs/cpp.md")).unwrap();
+    let opening = format!("\n```{language}\n");
+    let blocks = page.split(&opening).skip(1);
+    blocks.map(|rest| rest.split("\n```").next().unwrap().to_owned()).collect()
+}
+
+/// The page's node, message, step in C and CMake file, as a project that finds the installed library.
+#[test]
+fn the_code_of_the_page_builds_and_flies() {
+    let place = Place::new();
+    let (cpp, c, cmake) = (blocks("cpp"), blocks("c"), blocks("cmake"));
+    let ([node, message], [step], [cmake]) = (&cpp[..], &c[..], &cmake[..]) else { panic!("docs/cpp.md") };
+    let (source, build) = (place.path("project"), place.path("project/build"));
+    fs::create_dir_all(&source).unwrap();
+    let file = |name: &str, text: String| fs::write(format!("{source}/{name}"), text).unwrap();
+    file("controller.cpp", node.clone());
+    file(
+        "battery.cpp",
+        format!(
+            "#include <hummingbus/hummingbus.hpp>\n#include <hummingbus/messages.hpp>\n{message}\n\
+             int main() {{\n  return hummingbus::program([] {{\n    hummingbus::Node node;\n\
+             const auto battery = node.output<Battery>(\"battery\");\n\
+             node.run([&](hummingbus::Tick& tick) {{ tick.output(battery)->voltage = 11.5; }});\n  }});\n}}\n"
+        ),
+    );
+    file(
+        "asking.c",
+        format!(
+            "#include <hummingbus/hummingbus.h>\n#include <hummingbus/messages.h>\n{step}\n\
+             int main(void) {{\n  HbNode *node = NULL;\n  uint32_t set_point = 0;\n\
+             int32_t status = hb_node_join(&node);\n\
+             if (status == HB_OK) status = hb_node_output(node, \"set_point\", &HB_SET_POINT, &set_point);\n\
+             if (status == HB_OK) status = hb_node_run(node, step, &set_point);\n\
+             hb_node_free(node);\n  return status == HB_ABORTED ? HB_OK : status;\n}}\n"
+        ),
+    );
+    let project = "cmake_minimum_required(VERSION 3.16)\nproject(page LANGUAGES C CXX)\n";
+    let more = ["battery.cpp", "asking.c"].map(|file| {
+        let name = file.split('.').next().unwrap();
+        format!("add_executable({name} {file})\ntarget_link_libraries({name} PRIVATE hummingbus::static)\n")
+    });
+    file("CMakeLists.txt", format!("{project}{cmake}\n{}", more.concat()));
+    let mut configure = Command::new("cmake");
+    configure.args(["-S", &source, "-B", &build]);
+    configure.arg(format!("-DCMAKE_PREFIX_PATH={}", built().prefix.display()));
+    succeed(configure);
+    let mut make = Command::new("cmake");
+    make.args(["--build", &build]);
+    succeed(make);
+
+    let set_point = "outputs.set_point = { type = \"hummingbus_msgs/msg/SetPoint\" }";
+    let state = "inputs.state = { topic = \"/plant/state\", delay_ticks = 1, initial = {} }";
+    let manifest = hover(
+        &place,
+        &format!(
+            "[process.pilot]\ncommand = [\"{build}/controller\"]\n{set_point}\n{state}\n\
+             [process.asking]\ncommand = [\"{build}/asking\"]\n{set_point}\n\
+             [process.battery]\ncommand = [\"{build}/battery\"]\n\
+             outputs.battery = {{ type = \"my_msgs/msg/Battery\" }}\n"
+        ),
+    );
+    fly(&place, &manifest).flown();
+    let column = |topic: &str, field: &str| -> Vec<f64> {
+        let cat = ["cat", &place.path("flight.mcap"), "--topic", topic, "--field", field, "--csv"];
+        let printed = place.call(&cat).with_code(0).output;
+        let value = |line: &str| line.rsplit(',').next().unwrap().parse().unwrap();
+        printed.lines().skip(1).map(value).collect()
+    };
+    let (height, asked) = (column("/plant/state", "position.z"), column("/pilot/set_point", "altitude"));
+    assert_eq!((height.len(), asked.len()), (300, 300));
+    assert!(height.iter().zip(&asked[1..]).all(|(height, asked)| *asked == height + 0.5));
+    assert_eq!(column("/asking/set_point", "altitude"), [1.5; 300]);
+    assert_eq!(column("/battery/battery", "voltage"), [11.5; 300]);
+}
+
 #[test]
 fn pkg_config_and_a_compiler_are_enough() {
     let built = built();

@@ -232,9 +232,14 @@ fn description() -> String {
 
 /// The FMU of `native.c`.
 pub(crate) fn native(place: &Place) -> String {
+    native_of(place, &description())
+}
+
+/// The FMU of `native.c` with another description.
+fn native_of(place: &Place, xml: &str) -> String {
     let folder = if cfg!(target_arch = "aarch64") { "aarch64-linux" } else { "x86_64-linux" };
     let path = format!("binaries/{folder}/native.so");
-    archive(place, "native.fmu", &[("modelDescription.xml", description().as_bytes()), (&path, library())])
+    archive(place, "native.fmu", &[("modelDescription.xml", xml.as_bytes()), (&path, library())])
 }
 
 /// Mappings of a process that holds the FMU `native`, as the manifest below has them.
@@ -276,6 +281,24 @@ fn arrays_and_integers_pass_through_one_in_c() {
         );
     }
     assert_eq!(passed[4 * 1199 + 3], 1.0, "the seconds of the last stamp");
+}
+
+/// The page's manifest, with the FMU in C under the page's names.
+#[test]
+fn the_manifest_of_the_page_passes_its_check() {
+    let place = Place::new();
+    let page = fs::read_to_string(repository("docs/fmu.md")).unwrap();
+    let block = page.split("\n```toml\n").nth(1).unwrap().split("\n```").next().unwrap();
+    let xml = description()
+        .replace("\"passed\"", "\"counts\"")
+        .replace("name=\"weight\"", "name=\"altitude_gain\"");
+    let fmu = native_of(&place, &xml);
+    let path = "\"../target/fmu/Controller.fmu\"";
+    assert!(block.contains(path), "{block}");
+    let flight = repository("manifests/sets/flight.toml");
+    let run = "[run]\nduration_s = 1.0\n";
+    let text = format!("include = [{flight:?}]\n{run}{}\n", block.replace(path, &format!("{fmu:?}")));
+    place.call(&["check", &place.write("page.toml", text)]).with_code(0);
 }
 
 #[test]
@@ -391,6 +414,15 @@ fn what_does_not_fit_is_said_by_check_with_its_key() {
         }
     }
     assert!(wrong.is_empty(), "{wrong}");
+}
+
+#[test]
+fn a_check_points_at_the_variable_that_does_not_fit() {
+    let place = Place::new();
+    let manifest = beside(&place, &native(&place), "", &MAPPED.replace("position =", "positio ="));
+    let text = fs::read_to_string(&manifest).unwrap();
+    let line = 1 + text.lines().position(|line| line.contains("positio =")).unwrap();
+    place.call(&["check", &manifest]).with_code(2).says(&[&format!("beside.toml:{line}:12"), "did you mean"]);
 }
 
 #[test]

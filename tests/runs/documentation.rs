@@ -1,10 +1,11 @@
 //! The documentation names only what is there, and every key of manifests.
 
 use crate::refusals::good;
-use crate::support::{Place, repository};
+use crate::support::{HUMMINGBUS, Place, repository};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
+use std::process::Command;
 
 /// The words of a Markdown file that stand in backticks.
 fn quoted(file: &str) -> Vec<String> {
@@ -151,6 +152,54 @@ fn code_blocks(page: &str, fence: &str) -> Vec<String> {
     let opening = format!("\n```{fence}\n");
     let blocks = text.split(&opening).skip(1);
     blocks.map(|block| block.split("\n```\n").next().unwrap().to_owned()).collect()
+}
+
+/// The commands of a page's shell blocks, each on one line.
+fn commands(page: &str) -> Vec<String> {
+    let joined = code_blocks(page, "sh").join("\n").replace("\\\n", " ");
+    joined.lines().map(|line| line.trim().trim_end_matches('&').to_owned()).collect()
+}
+
+/// Bash takes a line apart as it does for a user, and clap reads its arguments: `--help` is the last of them.
+#[test]
+fn every_call_of_the_program_on_a_page_has_options_that_exist() {
+    let mut count = 0;
+    let program = |word: &str| word.trim_start_matches("target/release/") == "hummingbus";
+    for page in pages() {
+        let lines = commands(&page).into_iter();
+        // A line may begin with variables of its environment.
+        for line in lines.filter(|line| line.split(' ').find(|word| !word.contains('=')).is_some_and(program))
+        {
+            let line = line.replace("target/release/hummingbus", "hummingbus");
+            let script = format!("set -o pipefail; hummingbus() {{ \"$PROGRAM\" \"$@\" --help; }}; {line}");
+            let mut bash = Command::new("bash");
+            let ended = bash.args(["-c", &script]).env("PROGRAM", HUMMINGBUS).output().unwrap();
+            let said = String::from_utf8_lossy(&ended.stderr);
+            assert!(ended.status.success(), "{page}: {line}\n{said}");
+            count += 1;
+        }
+    }
+    assert!(count > 60, "found only {count}");
+}
+
+#[test]
+fn every_path_in_a_shell_block_exists() {
+    let folders =
+        ["manifests/", "vehicles/", "flights/", "examples/", "scripts/", "bindings/", "containers/"];
+    let mut count = 0;
+    for page in pages() {
+        for line in commands(&page) {
+            let line = line.split(" #").next().unwrap().to_owned();
+            let is_made = |word: &&str| [".mcap", ".ckpt"].iter().any(|end| word.ends_with(end));
+            let is_ours = |word: &&str| folders.iter().any(|folder| word.starts_with(folder));
+            for path in line.split_whitespace().filter(|word| is_ours(word) && !is_made(word)) {
+                let path = path.trim_end_matches(';');
+                count += 1;
+                assert!(path.contains('$') || Path::new(&repository(path)).exists(), "{page} names {path}");
+            }
+        }
+    }
+    assert!(count > 40, "found only {count}");
 }
 
 /// The README's controller is that of the example, which `manifests/custom-controller.toml` flies.

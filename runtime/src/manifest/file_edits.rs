@@ -11,7 +11,7 @@ use inputs::InputFiles;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
-use toml_edit::{DocumentMut, Item, Table, Value};
+use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, Value};
 
 /// Keys of a process whose value is a TOML file.
 const FILES: [&str; 3] = ["vehicle", "scene", "gains"];
@@ -195,15 +195,16 @@ impl FileEdit {
     }
 
     fn apply(&self, document: &mut DocumentMut) -> Result<(), String> {
-        self.require_effect(document)?;
+        self.list_effect(document)?;
         let keys = self.keys_in(document.as_item());
-        put(document.as_item_mut(), &keys, self.value.clone())
+        let value = self.with_source(&keys);
+        put(document.as_item_mut(), &keys, value)
             .ok_or_else(|| format!("the {} file has no place `{}`", self.file, self.keys.join(".")))
     }
 
-    /// Refuses an effect that the file does not list: its other parameters, their units and its place among the effects would
-    /// be unknown.
-    fn require_effect(&self, document: &DocumentMut) -> Result<(), String> {
+    /// Adds an effect that the file does not list behind those that it lists, with the neutral values of its parameters.
+    /// Refuses one whose value has no unit: only a quantity of the file would give it.
+    fn list_effect(&self, document: &mut DocumentMut) -> Result<(), String> {
         let [list, name, ..] = self.keys.as_slice() else { return Ok(()) };
         if list != EFFECTS || name.parse::<usize>().is_ok() {
             return Ok(());
@@ -214,12 +215,33 @@ impl FileEdit {
         if names.contains(&name.as_str()) {
             return Ok(());
         }
-        let known = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
-        Err(format!(
-            "the {} file lists no effect `{name}` (it lists {known}); add [[effects]] with name = \"{name}\" and its parameters to \
-             that file, and set one of them",
-            self.file
-        ))
+        if !is_quantity(&self.value) {
+            let known = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+            return Err(format!(
+                "the {} file lists no effect `{name}` (it lists {known}); to add it, give the value as {{ value = NUMBER, unit = \"UNIT\" }}; \
+                 `hummingbus effects {name}` prints its parameters and units",
+                self.file
+            ));
+        }
+        let mut effect = Table::new();
+        effect.insert("name", toml_edit::value(name.as_str()));
+        let effects = document.entry(EFFECTS).or_insert_with(|| Item::ArrayOfTables(ArrayOfTables::new()));
+        effects.as_array_of_tables_mut().map(|effects| effects.push(effect)).ok_or_else(|| {
+            format!("`{EFFECTS}` of the {} file is no list of tables, [[{EFFECTS}]]", self.file)
+        })
+    }
+
+    /// The value; where it is a parameter of an effect with its unit, with the source and uncertainty that files state.
+    fn with_source(&self, keys: &[String]) -> Value {
+        let mut value = self.value.clone();
+        if let Some(table) =
+            value.as_inline_table_mut().filter(|_| is_quantity(&self.value) && keys[0] == EFFECTS)
+        {
+            for (key, text) in [("source", "--set"), ("uncertainty", "not stated")] {
+                table.entry(key).or_insert_with(|| text.into());
+            }
+        }
+        value
     }
 
     /// The keys to the number itself: a quantity keeps its unit and source.
@@ -281,6 +303,11 @@ fn at<'i>(inside: &'i Item, key: &str) -> Option<&'i Item> {
         Ok(index) if !inside.is_table_like() => inside.get(index),
         _ => inside.get(key),
     }
+}
+
+/// True for a number with its unit, as files state it.
+fn is_quantity(value: &Value) -> bool {
+    value.as_inline_table().is_some_and(|table| [VALUE, "unit"].iter().all(|key| table.contains_key(key)))
 }
 
 /// Index of the table called `name` in a list of tables, as the effects of a vehicle are named.
@@ -388,6 +415,19 @@ mod tests {
         let gust = edit("process.plant.vehicle.effects.gust.x=3");
         let (_, message) = edited(&text, &[&gust], &|_| None).unwrap_err();
         assert!(message.contains("`gust` (it lists wind)"), "{message}");
+    }
+
+    #[test]
+    fn an_effect_with_a_unit_is_added_and_its_next_parameter_joins_it() {
+        let set = |key: &str| {
+            let text = format!("process.plant.vehicle.effects.{key}={{ value = 3, unit = \"m/s\" }}");
+            FileEdit::parse(&text, 0).unwrap()
+        };
+        let found = edited(VEHICLE, &[&set("wind.x"), &set("wind.y")], &|_| None).unwrap();
+        let effects = found.strip_prefix(VEHICLE).unwrap().trim_start();
+        let quantity = "{ value = 3, unit = \"m/s\" , source = \"--set\", uncertainty = \"not stated\" }";
+        let table = format!("[[effects]]\nname = \"wind\"\nx = {quantity}\ny = {quantity}\n");
+        assert_eq!(effects.replace(" ,", ",").replace("\"}", "\" }"), table.replace(" ,", ","));
     }
 
     #[test]
