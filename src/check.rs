@@ -1,7 +1,7 @@
 //! Checks manifests without running them, for the command line and for other programs: editors, tests, fuzzers.
 
 use crate::COMPONENTS;
-use diagnostics::Diagnostic;
+use diagnostics::{Diagnostic, Faults};
 use runtime::graph::Graph;
 use runtime::manifest::Manifest;
 use scenes::Scene;
@@ -25,7 +25,18 @@ use std::path::Path;
 /// # Ok::<(), hummingbus::Diagnostic>(())
 /// ```
 pub fn check(path: &Path, overrides: &[String]) -> Result<Graph, Diagnostic> {
-    Graph::build(&Manifest::load(path, overrides, COMPONENTS)?)
+    let (manifest, unknown) = Manifest::load_readable(path, overrides, COMPONENTS)?;
+    with_unknown(unknown, Graph::build(&manifest))
+}
+
+/// The graph of a manifest with keys whose faults are `unknown`.
+fn with_unknown(unknown: Option<Diagnostic>, graph: Result<Graph, Diagnostic>) -> Result<Graph, Diagnostic> {
+    let mut faults = Faults::default();
+    if let Some(unknown) = unknown {
+        faults.keep::<()>(Err(unknown));
+    }
+    let graph = faults.keep(graph);
+    faults.finish(graph)
 }
 
 /// As [`check()`], and asks the programs that the manifest names as a `command` for their ports: each is started once, and ends
@@ -44,8 +55,8 @@ pub fn check(path: &Path, overrides: &[String]) -> Result<Graph, Diagnostic> {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn check_with_programs(path: &Path, overrides: &[String]) -> anyhow::Result<Graph> {
-    let manifest = Manifest::load(path, overrides, COMPONENTS)?;
-    let mut graph = Graph::build(&manifest)?;
+    let (manifest, unknown) = Manifest::load_readable(path, overrides, COMPONENTS)?;
+    let mut graph = with_unknown(unknown, Graph::build(&manifest))?;
     graph.warnings.extend(runtime::check_programs(&manifest, &graph, Path::new("/proc/self/exe"))?);
     Ok(graph)
 }

@@ -95,6 +95,12 @@ pub trait Component: Sized + Send {
     /// A parameter or a file that cannot be meant.
     fn new(parameters: Self::Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError>;
 
+    /// Ticks of `tick_ns` between two steps of a node whose manifest states no `period_ticks`: one, except for a component that has
+    /// something new to send more seldom.
+    fn period_ticks(_parameters: &Self::Parameters, _tick_ns: u64) -> u32 {
+        1
+    }
+
     /// Tries the component before a run, in a check: finds errors and oddities although each parameter is valid.
     ///
     /// # Errors

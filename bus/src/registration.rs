@@ -34,6 +34,7 @@ pub struct Registration {
     /// Transfer of its state to the process that takes its place.
     pub transfer: Transfer,
     parameters: fn() -> &'static [&'static str],
+    period: fn(&Value, u64) -> Option<u32>,
     check: fn(&Value, &NodeContext<'_>) -> Result<(), ParameterError>,
     make: Make,
 }
@@ -56,6 +57,10 @@ impl Registration {
             outputs: C::Outputs::DECLARED,
             transfer: C::State::TRANSFER,
             parameters: parameter_names::of::<C::Parameters>,
+            period: |parameters, tick_ns| {
+                let parameters = diagnostics::read::<C::Parameters>(parameters).ok()?;
+                Some(C::period_ticks(&parameters, tick_ns))
+            },
             check: |parameters, context| make::<C>(parameters, context)?.rehearse(context),
             make: |parameters, context| {
                 let component = make::<C>(parameters, context)?;
@@ -68,6 +73,12 @@ impl Registration {
     #[must_use]
     pub fn parameters(&self) -> &'static [&'static str] {
         (self.parameters)()
+    }
+
+    /// As [`Component::period_ticks`]: at least one, and one of parameters that [`check`](Self::check) refuses.
+    #[must_use]
+    pub fn period_ticks(&self, parameters: &Value, tick_ns: u64) -> u32 {
+        (self.period)(parameters, tick_ns).unwrap_or(1).max(1)
     }
 
     /// Checks `parameters` and the files that they name for a node, without running it.

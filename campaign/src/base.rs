@@ -164,8 +164,11 @@ fn fingerprint(campaign: &Campaign, manifest: &Manifest, from: Option<&Checkpoin
     // Each node lists the files that it reads.
     let files: Vec<&str> =
         graph.plan.nodes.iter().flat_map(|node| &node.files).map(|file| file.sha256.as_str()).collect();
-    let varied: Vec<_> =
-        campaign.vary.iter().map(|varied| (&varied.name, &varied.keys, varied.meaning)).collect();
+    let varied: Vec<_> = campaign
+        .vary
+        .iter()
+        .map(|varied| (&varied.name, &varied.keys, varied.meaning, varied.distribution.choices()))
+        .collect();
     let from = from.map_or(String::new(), Checkpoint::sha256);
     sha256(format!("{texts:?}{files:?}{varied:?}{from}").as_bytes())
 }

@@ -1,6 +1,7 @@
 //! The campaign file.
 
 use crate::distribution::Distribution;
+use crate::list::List;
 use crate::measures::Measures;
 use diagnostics::{Diagnostic, ParameterError, Place, read_toml};
 use serde::Deserialize;
@@ -134,7 +135,7 @@ struct Vary {
     keys: Vec<Spanned<String>>,
     #[serde(default, rename = "as")]
     meaning: Meaning,
-    values: Option<Spanned<Vec<f64>>>,
+    values: Option<Spanned<List>>,
     uniform: Option<Spanned<[f64; 2]>>,
     log_uniform: Option<Spanned<[f64; 2]>>,
     normal: Option<Spanned<[f64; 2]>>,
@@ -330,6 +331,10 @@ impl Varied {
         let name = vary.name.clone().unwrap_or_else(|| default_name(first));
         let distribution = vary.distribution()?;
         distribution.check()?;
+        if distribution.choices().is_some() && vary.meaning != Meaning::Value {
+            let message = "a factor and an offset act on numbers, and `values` lists others";
+            return Err(ParameterError::conflict("values", message));
+        }
         Ok(Self { name, keys, meaning: vary.meaning, distribution, place: place.clone() })
     }
 
@@ -392,6 +397,26 @@ mod tests {
                 parse(&format!("flights = 2\n[[vary]]\nkey = \"{key}\"\nuniform = [0, 1]")).unwrap();
             assert_eq!(campaign.vary[0].name, name);
         }
+    }
+
+    #[test]
+    fn texts_and_truth_values_are_chosen_from_and_numbers_stand_alone() {
+        let text = |values: &str| format!("sampling = \"grid\"\n[[vary]]\nkey = \"a\"\nvalues = {values}");
+        let campaign = parse(&text("[\"pid\", \"lqr\"]")).unwrap();
+        let distribution = &campaign.vary[0].distribution;
+        assert_eq!((campaign.flights, distribution.choice(1.0)), (2, Some(&"lqr".into())));
+        assert_eq!(
+            parse(&text("[true, false]")).unwrap().vary[0].distribution.choice(0.0),
+            Some(&true.into())
+        );
+        assert_eq!(parse(&text("[1, 2.5]")).unwrap().vary[0].distribution.choice(0.0), None);
+        let refused = parse(&text("[\"pid\", 2]")).unwrap_err();
+        assert!(
+            refused.contains("c.toml:5:10") && refused.contains("a list of numbers, or one of"),
+            "{refused}"
+        );
+        let refused = parse(&text("[\"pid\"]\nas = \"factor\"")).unwrap_err();
+        assert!(refused.contains("c.toml:5:10") && refused.contains("act on numbers"), "{refused}");
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Distributions of a varied value.
 
+use crate::list::List;
 use diagnostics::ParameterError;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, Normal};
@@ -17,8 +18,9 @@ use statrs::distribution::{ContinuousCDF, Normal};
 #[derive(Clone, Debug, Deserialize, Serialize, PartialEq)]
 #[serde(rename_all = "snake_case")]
 pub enum Distribution {
-    /// One of these values, each with the same chance; in a grid, all of them.
-    Values(Vec<f64>),
+    /// One of these values, each with the same chance; in a grid, all of them. The drawn number of one that is no number is its
+    /// place in the list.
+    Values(List),
     /// Uniform between two limits.
     Uniform([f64; 2]),
     /// Uniform in the logarithm between two positive limits.
@@ -35,7 +37,7 @@ impl Distribution {
     pub fn at(&self, quantile: f64) -> f64 {
         let between = |low: f64, high: f64| low + quantile * (high - low);
         match self {
-            Self::Values(values) => values[index(quantile, values.len() as u64) as usize],
+            Self::Values(list) => list.nth(index(quantile, list.len() as u64) as usize),
             Self::Uniform([low, high]) => between(*low, *high),
             Self::LogUniform([low, high]) => libm::exp(between(libm::log(*low), libm::log(*high))),
             Self::Normal([mean, deviation]) => {
@@ -54,7 +56,7 @@ impl Distribution {
     /// If the distribution has no finite number of values.
     pub fn count(&self) -> Result<u64, ParameterError> {
         match self {
-            Self::Values(values) => Ok(values.len() as u64),
+            Self::Values(list) => Ok(list.len() as u64),
             Self::Integers([first, last]) => Ok(count(*first, *last)),
             _ => Err(ParameterError::conflict(
                 "sampling",
@@ -68,7 +70,7 @@ impl Distribution {
     pub fn nth(&self, index: u64) -> f64 {
         match self {
             Self::Integers([first, _]) => (first + index as i64) as f64,
-            Self::Values(values) => values[index as usize],
+            Self::Values(list) => list.nth(index as usize),
             other => other.at(0.5),
         }
     }
@@ -78,9 +80,25 @@ impl Distribution {
     pub fn is_whole(&self) -> bool {
         match self {
             Self::Integers(_) => true,
-            Self::Values(values) => values.iter().all(|value| value.fract() == 0.0),
+            Self::Values(list) => list.is_whole(),
             _ => false,
         }
+    }
+
+    /// The texts and truth values that are chosen from; `None` where numbers are drawn.
+    #[must_use]
+    pub fn choices(&self) -> Option<&[toml::Value]> {
+        match self {
+            Self::Values(List::Choices(choices)) => Some(choices),
+            _ => None,
+        }
+    }
+
+    /// The text or truth value that the number `drawn` stands for, if it stands for one.
+    #[must_use]
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a place in the list")]
+    pub fn choice(&self, drawn: f64) -> Option<&toml::Value> {
+        self.choices()?.get(drawn as usize)
     }
 
     /// Refuses limits that hold no value.
@@ -89,7 +107,7 @@ impl Distribution {
     /// The key, with what was expected and found.
     pub fn check(&self) -> Result<(), ParameterError> {
         let numbers: &[f64] = match self {
-            Self::Values(values) => values,
+            Self::Values(list) => list.numbers(),
             Self::Uniform(limits) | Self::LogUniform(limits) | Self::Normal(limits) => limits,
             Self::Integers(_) => &[],
         };
@@ -97,7 +115,7 @@ impl Distribution {
             return Err(ParameterError::value(self.key(), "finite numbers", value));
         }
         match self {
-            Self::Values(values) if values.is_empty() => {
+            Self::Values(list) if list.len() == 0 => {
                 Err(ParameterError::value("values", "at least one value", "an empty list"))
             }
             Self::Uniform([low, high]) | Self::LogUniform([low, high]) if low >= high => {
@@ -160,14 +178,14 @@ mod tests {
         assert!(
             (Distribution::Normal([1.0, 2.0]).at(0.975) - (1.0 + 2.0 * 1.959_963_984_540_054)).abs() < 1e-8
         );
-        close(Distribution::Values(vec![3.0, 5.0]).at(0.5), 5.0);
+        close(Distribution::Values(vec![3.0, 5.0].into()).at(0.5), 5.0);
         close(Distribution::Integers([-1, 1]).at(0.34), 0.0);
     }
 
     #[test]
     fn limits_without_a_value_are_refused() {
         for (distribution, key) in [
-            (Distribution::Values(vec![]), "values"),
+            (Distribution::Values(vec![].into()), "values"),
             (Distribution::Uniform([1.0, 1.0]), "uniform"),
             (Distribution::Uniform([f64::NAN, 1.0]), "uniform"),
             (Distribution::LogUniform([0.0, 1.0]), "log_uniform"),

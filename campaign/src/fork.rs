@@ -7,9 +7,9 @@ use std::path::Path;
 use std::str::FromStr;
 
 /// Expected text of an argument.
-const EXPECTED: &str = "KEY=DISTRIBUTION:NUMBERS, such as process.plant.vehicle.body.mass=uniform:0.4,0.6";
+const EXPECTED: &str = "KEY=DISTRIBUTION:VALUES, such as process.plant.vehicle.body.mass=uniform:0.4,0.6";
 
-/// A varied value as an argument: `KEY=DISTRIBUTION:NUMBERS`, with `factor:` or `offset:` in front of the distribution where
+/// A varied value as an argument: `KEY=DISTRIBUTION:VALUES`, with `factor:` or `offset:` in front of the distribution where
 /// the numbers act on the declared one.
 ///
 /// ```
@@ -17,6 +17,8 @@ const EXPECTED: &str = "KEY=DISTRIBUTION:NUMBERS, such as process.plant.vehicle.
 /// let vary: Vary = "process.plant.vehicle.body.mass=factor:uniform:0.9,1.1".parse()?;
 /// assert_eq!(vary.key, "process.plant.vehicle.body.mass");
 /// assert_eq!(vary.distribution.at(0.5), 1.0);
+/// let kinds: Vary = "process.controller.kind=values:pid,lqr".parse()?;
+/// assert_eq!(kinds.distribution.choice(1.0), Some(&"lqr".into()));
 /// let refused = "run.seed=uniform:2,1".parse::<Vary>().unwrap_err();
 /// assert!(refused.to_string().contains("a lower limit below the upper one"), "{refused}");
 /// # Ok::<(), diagnostics::ParameterError>(())
@@ -44,12 +46,19 @@ impl FromStr for Vary {
         };
         let (name, numbers) = drawn.split_once(':').ok_or_else(refused)?;
         // As in a campaign file, so that both take the same distributions.
-        let list = format!("{name} = [{numbers}]");
+        let values: Vec<String> = numbers.split(',').map(|value| literal(value.trim())).collect();
+        let list = format!("{name} = [{}]", values.join(", "));
         let distribution: Distribution = toml::from_str(&list).map_err(|_| refused())?;
         distribution.check()?;
         let key = key.trim().to_owned();
         if key.is_empty() { Err(refused()) } else { Ok(Self { key, meaning, distribution }) }
     }
+}
+
+/// A value as TOML: what is none is a text without quotes.
+fn literal(value: &str) -> String {
+    let is_toml = value.parse::<toml::Value>().is_ok();
+    if is_toml || value.is_empty() { value.to_owned() } else { toml::Value::from(value).to_string() }
 }
 
 /// Text of the campaign file whose `flights` go on from the checkpoint `from`, with the overrides `set` of all flights.
@@ -117,7 +126,7 @@ mod tests {
         ];
         assert_eq!(found, expected);
         assert_eq!(campaign.vary[0].distribution, Distribution::LogUniform([0.5, 2.0]));
-        assert_eq!(campaign.vary[2].distribution, Distribution::Values(vec![3.0, 4.0, 5.0]));
+        assert_eq!(campaign.vary[2].distribution, Distribution::Values(vec![3.0, 4.0, 5.0].into()));
     }
 
     #[test]
@@ -129,10 +138,10 @@ mod tests {
             "mass=even:1,2",
             "mass=uniform:1",
             "=uniform:1,2",
-            "a=values:x",
+            "a=uniform:x",
         ] {
             let error = wrong.parse::<Vary>().unwrap_err().to_string();
-            assert!(error.contains("KEY=DISTRIBUTION:NUMBERS"), "{wrong}: {error}");
+            assert!(error.contains("KEY=DISTRIBUTION:VALUES"), "{wrong}: {error}");
         }
     }
 }

@@ -3,7 +3,7 @@
 //! | module | contents |
 //! |---|---|
 //! | [`declaration`] | the campaign file: the manifest, the varied values, the number of flights |
-//! | [`distribution`] | distributions of a varied value |
+//! | [`distribution`], [`list`] | distributions of a varied value; values that are listed one by one |
 //! | [`fork`] | the campaign file of `run --from FILE --fork N --vary …` |
 //! | [`measures`] | measures of the campaign file, read behind the manifest |
 //! | [`draw`] | values of all flights, drawn from the campaign's seed |
@@ -30,6 +30,7 @@ pub mod draw;
 pub mod flying;
 pub mod fork;
 pub mod gains_file;
+pub mod list;
 pub mod measures;
 pub mod page;
 pub mod plan;

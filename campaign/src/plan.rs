@@ -3,6 +3,7 @@
 use crate::base::Base;
 use crate::declaration::{Campaign, FLIGHTS_MAX, Varied};
 use crate::draw::draw;
+use crate::list::shown;
 use anyhow::{Context, Result, bail};
 use std::path::Path;
 
@@ -34,11 +35,11 @@ impl Plan {
     ///
     /// # Errors
     /// If there is no memory for it.
-    pub fn to_csv(&self) -> Result<Vec<u8>> {
+    pub fn to_csv(&self, campaign: &Campaign) -> Result<Vec<u8>> {
         let mut writer = csv::Writer::from_writer(Vec::new());
         writer.write_record(std::iter::once(FLIGHT).chain(self.names.iter().map(String::as_str)))?;
         for (number, values) in self.flights.iter().enumerate() {
-            let values = values.iter().map(f64::to_string);
+            let values = campaign.vary.iter().zip(values).map(|(varied, drawn)| cell(varied, *drawn));
             writer.write_record(std::iter::once(number.to_string()).chain(values))?;
         }
         Ok(writer.into_inner()?)
@@ -47,7 +48,7 @@ impl Plan {
     /// The plan in the CSV `text` of the file `path`, for the varied values of `campaign`.
     ///
     /// # Errors
-    /// If the columns are not those of the campaign, or a cell is not a number.
+    /// If the columns are not those of the campaign, a cell is not a number, or not one of the texts that are chosen from.
     pub fn parse(path: &Path, text: &str, campaign: &Campaign) -> Result<Self> {
         let names: Vec<String> = campaign.vary.iter().map(|varied| varied.name.clone()).collect();
         let expected: Vec<&str> = std::iter::once(FLIGHT).chain(names.iter().map(String::as_str)).collect();
@@ -66,13 +67,23 @@ impl Plan {
             let record = record.with_context(|| format!("{}: not a CSV file", path.display()))?;
             let line = record.position().map_or(0, csv::Position::line);
             let at = || format!("{}:{line}", path.display());
-            let number = |(column, cell): (&String, &str)| {
+            let number = |(index, (column, cell)): (usize, (&String, &str))| {
+                if let Some(choices) =
+                    index.checked_sub(1).and_then(|index| campaign.vary[index].distribution.choices())
+                {
+                    let place = choices.iter().position(|choice| shown(choice) == cell);
+                    let known = || choices.iter().map(shown).collect::<Vec<_>>().join(", ");
+                    let problem = || {
+                        format!("{}: column `{column}`: expected one of {}, found `{cell}`", at(), known())
+                    };
+                    return place.map(|place| place as f64).with_context(problem);
+                }
                 let number = cell.trim().parse::<f64>().ok().filter(|number| number.is_finite());
                 let problem =
                     || format!("{}: column `{column}`: expected a finite number, found `{cell}`", at());
                 number.with_context(problem)
             };
-            let numbers = found.iter().zip(&record).map(number).collect::<Result<Vec<f64>>>()?;
+            let numbers = found.iter().zip(&record).enumerate().map(number).collect::<Result<Vec<f64>>>()?;
             #[allow(clippy::float_cmp, reason = "whole numbers")]
             if numbers[0] != flights.len() as f64 {
                 bail!("{}: expected flight {}, found {}", at(), flights.len(), numbers[0]);
@@ -115,8 +126,16 @@ impl Plan {
     }
 }
 
-/// A number as TOML: whole where its distribution is, since `seed = 3.0` is no seed.
+/// The value of a flight in the plan: the number, or the text that it stands for.
+fn cell(varied: &Varied, drawn: f64) -> String {
+    varied.distribution.choice(drawn).map_or_else(|| drawn.to_string(), shown)
+}
+
+/// The drawn value as TOML: a number is whole where its distribution is, since `seed = 3.0` is no seed.
 fn written(varied: &Varied, value: f64) -> String {
+    if let Some(choice) = varied.distribution.choice(value) {
+        return choice.to_string();
+    }
     let is_whole = varied.distribution.is_whole() && value.fract() == 0.0;
     if is_whole { format!("{value:.0}") } else { format!("{value:?}") }
 }
@@ -127,11 +146,23 @@ mod tests {
     use crate::declaration::Campaign;
 
     #[test]
+    fn a_plan_has_the_texts_that_are_chosen_from() {
+        let text = "manifest = \"a.toml\"\nsampling = \"grid\"\n[[vary]]\nkey = \"x.kind\"\nvalues = [\"pid\", \"lqr\"]";
+        let campaign = Campaign::parse("c.toml".as_ref(), text).unwrap();
+        let plan = Plan::of(&campaign);
+        let csv = String::from_utf8(plan.to_csv(&campaign).unwrap()).unwrap();
+        assert_eq!(csv, "flight,kind\n0,pid\n1,lqr\n");
+        assert_eq!(Plan::parse("plan.csv".as_ref(), &csv, &campaign).unwrap(), plan);
+        let edited = Plan::parse("plan.csv".as_ref(), "flight,kind\n0,lqg\n", &campaign).unwrap_err();
+        assert_eq!(edited.to_string(), "plan.csv:2: column `kind`: expected one of pid, lqr, found `lqg`");
+    }
+
+    #[test]
     fn a_plan_is_read_as_it_was_written_and_an_edited_one_checked() {
         let text = "manifest = \"a.toml\"\nflights = 3\n[[vary]]\nkey = \"x\"\nnormal = [1e-9, 1e-3]";
         let campaign = Campaign::parse("c.toml".as_ref(), text).unwrap();
         let plan = Plan::of(&campaign);
-        let csv = String::from_utf8(plan.to_csv().unwrap()).unwrap();
+        let csv = String::from_utf8(plan.to_csv(&campaign).unwrap()).unwrap();
         let read = |text: &str| {
             Plan::parse("plan.csv".as_ref(), text, &campaign).map_err(|error| format!("{error:#}"))
         };

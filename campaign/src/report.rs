@@ -1,7 +1,8 @@
 //! The report of a campaign: pass rate, failures, distributions, influences, worst flights; as text and as JSON.
 
 use crate::base::Base;
-use crate::declaration::{Campaign, Start};
+use crate::declaration::{Campaign, Start, Varied};
+use crate::list::shown;
 use crate::plan::Plan;
 use crate::row::{Row, count};
 use crate::statistics::{clopper_pearson, quantiles, rank_correlation};
@@ -55,6 +56,8 @@ pub struct Report {
     pub errors: Vec<Reason>,
     /// Distribution of each figure.
     pub figures: Vec<Spread>,
+    /// Flights by each text or truth value that a varied value is chosen from.
+    pub choices: Vec<Choice>,
     /// Rank correlations that chance does not explain, strongest first.
     pub influences: Vec<Influence>,
     /// Command that flies a flight again, recorded; `FLIGHT` stands for its number.
@@ -96,6 +99,25 @@ pub struct Spread {
     pub flights: u64,
     /// Least value, 5 %, median, 95 %, greatest value.
     pub quantiles: Vec<f64>,
+}
+
+/// Flights with one of the texts or truth values of a varied value.
+#[derive(Debug, Serialize)]
+pub struct Choice {
+    /// Name of the varied value.
+    pub varied: String,
+    /// Its text.
+    pub choice: String,
+    /// Flights with it.
+    pub flights: u64,
+    /// Those whose conditions all held.
+    pub passed: u64,
+    /// Part of them that passed.
+    pub pass_rate: f64,
+    /// Its interval at 95 % (Clopper and Pearson).
+    pub interval: [f64; 2],
+    /// Median of each figure of the report.
+    pub medians: Vec<Option<f64>>,
 }
 
 /// Rank correlation of a varied value with the outcome or a figure.
@@ -157,7 +179,8 @@ impl Report {
             failures: failures(rows),
             errors: errors(rows),
             figures: spreads(base, rows),
-            influences: influences(plan, base, rows),
+            choices: choices(campaign, base, rows),
+            influences: influences(campaign, base, rows),
             again: again(campaign, folder, "FLIGHT")?,
             worst: worst(campaign, base, plan, rows, folder)?,
         })
@@ -239,9 +262,41 @@ fn spreads(base: &Base, rows: &[Row]) -> Vec<Spread> {
     base.kept.iter().map(spread).collect()
 }
 
-fn influences(plan: &Plan, base: &Base, rows: &[Row]) -> Vec<Influence> {
+fn choices(campaign: &Campaign, base: &Base, rows: &[Row]) -> Vec<Choice> {
+    let mut choices = Vec::new();
+    for (index, varied) in campaign.vary.iter().enumerate() {
+        for choice in varied.distribution.choices().unwrap_or_default() {
+            let is_it = |row: &&Row| {
+                row.drawn.get(index).and_then(|drawn| varied.distribution.choice(*drawn)) == Some(choice)
+            };
+            let of_choice: Vec<&Row> = rows.iter().filter(is_it).collect();
+            let flights = of_choice.len() as u64;
+            let passed = of_choice.iter().filter(|row| row.passed).count() as u64;
+            let median = |&figure: &usize| {
+                let values: Vec<f64> = of_choice.iter().filter_map(|row| *row.figures.get(figure)?).collect();
+                quantiles(&values, &[0.5]).first().copied()
+            };
+            choices.push(Choice {
+                varied: varied.name.clone(),
+                choice: shown(choice),
+                flights,
+                passed,
+                pass_rate: passed as f64 / flights.max(1) as f64,
+                interval: clopper_pearson(passed, flights.max(1), CONFIDENCE),
+                medians: base.kept.iter().map(median).collect(),
+            });
+        }
+    }
+    choices
+}
+
+/// Rank correlations of the varied numbers: texts have no order.
+fn influences(campaign: &Campaign, base: &Base, rows: &[Row]) -> Vec<Influence> {
     let mut influences = Vec::new();
-    for (varied, name) in plan.names.iter().enumerate() {
+    for (varied, Varied { name, distribution, .. }) in campaign.vary.iter().enumerate() {
+        if distribution.choices().is_some() {
+            continue;
+        }
         let mut add = |figure: &str, value: &dyn Fn(&Row) -> Option<f64>| {
             let pairs: Vec<(f64, f64)> =
                 rows.iter().filter_map(|row| Some((*row.drawn.get(varied)?, value(row)?))).collect();
@@ -400,6 +455,7 @@ impl fmt::Display for Report {
         self.write_errors(f)?;
         writeln!(f, "  minimum, 5th percentile, median, 95th percentile, maximum:")?;
         self.figures.iter().try_for_each(|spread| writeln!(f, "    {spread}"))?;
+        self.choices.iter().try_for_each(|choice| writeln!(f, "  {choice}"))?;
         writeln!(f, "  rank correlations (Spearman), strongest first:")?;
         for Influence { varied, figure, rank_correlation, .. } in self.influences.iter().take(WORST) {
             writeln!(f, "    {rank_correlation:+.2} of `{varied}` with: {figure}")?;
@@ -419,6 +475,18 @@ impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let at = self.median_s.map_or(String::new(), |at_s| format!(", at {at_s:.2} s in the median"));
         write!(f, "failed first in {}{at}: {}", flights(self.flights), self.condition)
+    }
+}
+
+impl fmt::Display for Choice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { varied, choice, passed, flights, pass_rate, interval, .. } = self;
+        let [low, high] = interval.map(|limit| 100.0 * limit);
+        let rate = 100.0 * pass_rate;
+        write!(
+            f,
+            "`{varied}` = {choice}: {passed} of {flights} passed: {rate:.2} % ({low:.2} … {high:.2} % at 95 %)"
+        )
     }
 }
 

@@ -246,7 +246,7 @@ fn put(folder: &Path, name: &str, write: impl FnOnce(&mut File) -> Result<()>) -
 /// The plan in the folder, drawn and written where there is none.
 fn plan(folder: &Path, campaign: &Campaign, lock: &mut File) -> Result<Plan> {
     let (path, drawn) = (folder.join(PLAN), Plan::of(campaign));
-    let text = drawn.to_csv()?;
+    let text = drawn.to_csv(campaign)?;
     let digest = sha256(&text);
     if !path.exists() {
         put(folder, PLAN, |file| Ok(file.write_all(&text)?))?;

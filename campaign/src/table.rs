@@ -1,5 +1,7 @@
 //! Writes all rows as Parquet: one row a flight, in the order of the plan.
 
+use crate::declaration::Varied;
+use crate::list::shown;
 use crate::row::Row;
 use anyhow::Result;
 use report::columns::{Column, write_parquet};
@@ -8,8 +10,8 @@ use std::fs::File;
 /// Rows with what they have in common.
 #[derive(Debug)]
 pub struct Table<'a> {
-    /// Names of the varied values.
-    pub varied: &'a [String],
+    /// Varied values.
+    pub varied: &'a [Varied],
     /// Names of the verdicts of a row.
     pub verdicts: &'a [String],
     /// Names of the figures of a row.
@@ -29,7 +31,7 @@ pub struct Table<'a> {
 impl Table<'_> {
     /// Writes the table to `file`.
     ///
-    /// Columns: `flight`; the drawn numbers by their names; `run.seed`; `passed`; `failed`, `failed_at_s`, `error`; a verdict
+    /// Columns: `flight`; the drawn values by their names; `run.seed`; `passed`; `failed`, `failed_at_s`, `error`; a verdict
     /// for each condition; the figures; `version`. The metadata has the unit of each figure. Host times are in no column: the
     /// bytes depend on plan and build alone.
     ///
@@ -53,8 +55,13 @@ impl Table<'_> {
         let verdicts = |of: &dyn Fn(&Row) -> Option<bool>| Column::Verdict(rows.iter().map(of).collect());
         let flights = rows.iter().map(|row| row.flight as i64).collect();
         let mut columns = vec![("flight".to_owned(), Column::Whole(flights))];
-        for (index, name) in self.varied.iter().enumerate() {
-            columns.push((name.clone(), numbers(&|row| row.drawn.get(index).copied())));
+        for (index, Varied { name, distribution, .. }) in self.varied.iter().enumerate() {
+            let drawn = |row: &Row| row.drawn.get(index).copied();
+            let column = match distribution.choices() {
+                None => numbers(&drawn),
+                Some(_) => texts(&|row| distribution.choice(drawn(row)?).map(shown)),
+            };
+            columns.push((name.clone(), column));
         }
         columns.push(("run.seed".to_owned(), Column::Integer(self.seeds.clone())));
         columns.push(("passed".to_owned(), Column::Truth(rows.iter().map(|row| row.passed).collect())));

@@ -137,6 +137,7 @@ impl Diagnostic {
                 once.push(fault);
             }
         }
+        in_order_of_lines(&mut once);
         let mut once = once.into_iter();
         once.next().map_or(self, |first| first.and(once))
     }
@@ -168,6 +169,21 @@ impl Diagnostic {
     }
 }
 
+/// Sorts `faults` by their lines; their files stay in the order of their first faults, and those without a place are last.
+fn in_order_of_lines(faults: &mut [Diagnostic]) {
+    let mut files: Vec<String> = Vec::new();
+    for place in faults.iter().filter_map(|fault| fault.place.as_ref()) {
+        if !files.contains(&place.file) {
+            files.push(place.file.clone());
+        }
+    }
+    let number = |file: &String| files.iter().position(|other| other == file);
+    faults.sort_by_key(|fault| match &fault.place {
+        Some(place) => (number(&place.file).unwrap_or(files.len()), place.line, place.column),
+        None => (files.len(), 0, 0),
+    });
+}
+
 /// The faults of a file, gathered on the way so that one look shows all of them.
 ///
 /// ```
@@ -185,6 +201,12 @@ impl Faults {
     /// Returns the value that was read; keeps the fault and returns `None`, if it is faulty.
     pub fn keep<T>(&mut self, read: Result<T, Diagnostic>) -> Option<T> {
         read.map_err(|fault| self.0.push(fault)).ok()
+    }
+
+    /// True if there were none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
     }
 
     /// `value`, which is there unless there were faults.
@@ -288,7 +310,8 @@ impl fmt::Display for Diagnostic {
             write!(f, "\n  help: {}", self.help)?;
         }
         for other in &self.others {
-            f.write_str("\n")?;
+            // Whoever prints it has written the word before the first.
+            f.write_str(if f.alternate() { "\nerror: " } else { "\n" })?;
             other.fmt(f)?;
         }
         Ok(())

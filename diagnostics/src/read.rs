@@ -105,6 +105,12 @@ impl Misread {
         self.span.clone().unwrap_or(0..0)
     }
 
+    /// True for a key that the table does not have: without it the rest can be read.
+    #[must_use]
+    pub fn is_unknown_key(&self) -> bool {
+        matches!(self.error, ParameterError::Unknown { .. })
+    }
+
     /// The same in a text that begins at byte `base` of a longer one.
     #[must_use]
     pub fn shifted(self, base: usize) -> Self {

@@ -34,11 +34,12 @@ use crate::placement;
 use bus::checkpoint::Parts;
 use bus::plan::Plan;
 use bus::{InputFiles, Registration};
-use diagnostics::Diagnostic;
+use diagnostics::{Diagnostic, Faults};
 use parameters::Notes;
+use processes::DeclaredNode;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use wiring::{Wiring, wire};
+use wiring::{Wiring, wire_apart};
 
 /// Ticks that a fast node may be ahead of the slowest where the manifest does not say.
 const DEFAULT_WINDOW_TICKS: u32 = 64;
@@ -104,36 +105,80 @@ impl Graph {
     /// As [`Graph::build`].
     pub fn build_from(manifest: &Manifest, files: InputFiles) -> Result<Self, Diagnostic> {
         manifest.included().for_each(|(path, text)| files.keep(path, text.as_bytes().to_vec()));
-        let declared_nodes = processes::declared_nodes(manifest, &files)?;
-        let sidecars = processes::sidecars(manifest)?;
-        processes::require_own_logs(manifest)?;
-        let wiring = wire(&declared_nodes, None)?;
-        let mut plan = plan(manifest, wiring)?;
+        // A fault does not hide those of other keys, so that one look shows all of them.
+        let mut faults = Faults::default();
+        let declared_nodes = faults.keep(processes::declared_nodes(manifest, &files));
+        let sidecars = faults.keep(processes::sidecars(manifest));
+        faults.keep(processes::require_own_logs(manifest));
+        let wired = declared_nodes.as_deref().and_then(|nodes| faults.keep(wire_apart(nodes, None)));
+        let planned =
+            wired.and_then(|(wiring, faulty)| faults.keep(plan(manifest, wiring)).zip(Some(faulty)));
+        let (Some(declared_nodes), Some((mut plan, faulty))) = (declared_nodes, planned) else {
+            return faults.finish(None);
+        };
         let clock_cpu = &manifest.content.run.clock_cpu;
-        processes::require_core(manifest, clock_cpu, "clock_cpu")?;
+        faults.keep(processes::require_core(manifest, clock_cpu, "clock_cpu"));
         placement::place(&mut plan, clock_cpu.as_ref().map(|cpu| *cpu.get_ref()));
-        let groups = groups::of(manifest, &declared_nodes, &plan.nodes)?;
-        if manifest.content.run.window_ticks.is_none() && !groups.is_empty() {
+        let groups = faults.keep(groups::of(manifest, &declared_nodes, &plan.nodes));
+        if manifest.content.run.window_ticks.is_none() && groups.as_ref().is_some_and(|it| !it.is_empty()) {
             plan.window_ticks = GROUPS_WINDOW_TICKS;
         }
         let mut notes = Notes::default();
-        periods::check(manifest, &declared_nodes, &plan, &mut notes)?;
-        let parameters =
-            Diagnostic::gather(declared_nodes.iter().zip(&plan.nodes).map(|(declared, node)| {
-                let parameters = parameters::of(declared, &plan, node.period_ticks, &mut notes)?;
-                processes::require_replaceable(declared, node).map(|()| parameters)
-            }))?;
-        let of_nodes = plan.nodes.iter_mut().zip(parameters);
-        of_nodes.for_each(|(node, of_node)| (node.parameters, node.files) = of_node);
-        recorders::check(&declared_nodes, &plan.nodes)?;
-        let backups = backups::all(manifest, &plan, &declared_nodes, &mut notes)?;
-        let programs: Vec<Program> = declared_nodes.into_iter().map(|declared| declared.program).collect();
-        evaluations::check(manifest, &plan, &programs, &mut notes)?;
-        plan.groups = groups;
+        let periods = faults.keep(periods::check(manifest, &declared_nodes, &plan, &mut notes));
+        if periods.is_some() {
+            set_parameters(&declared_nodes, &mut plan, &faulty, &mut notes, &mut faults);
+        }
+        faults.keep(recorders::check(&declared_nodes, &plan.nodes));
+        let programs: Vec<Program> = declared_nodes.iter().map(|declared| declared.program.clone()).collect();
+        faults.keep(evaluations::check(manifest, &plan, &programs, &mut notes));
+        // A backup is wired as its node is: those of faulty nodes would repeat their faults.
+        let backups = match faults.is_empty() {
+            true => faults.keep(backups::all(manifest, &plan, &declared_nodes, &mut notes)),
+            false => None,
+        };
         let (models, mut warnings) = notes.into_parts(manifest);
-        checkpoints::add(manifest, &mut plan, &programs, &backups, &mut warnings)?;
+        let (Some(groups), Some(backups), Some(sidecars)) = (groups, backups, sidecars) else {
+            return faults.finish(None);
+        };
+        plan.groups = groups;
+        faults.keep(checkpoints::add(manifest, &mut plan, &programs, &backups, &mut warnings));
         let begun = BTreeMap::new();
-        Ok(Self { plan, programs, backups, sidecars, models, files, from: None, begun, warnings })
+        faults.finish(Some(Self {
+            plan,
+            programs,
+            backups,
+            sidecars,
+            models,
+            files,
+            from: None,
+            begun,
+            warnings,
+        }))
+    }
+}
+
+/// Puts the checked parameters of all nodes into `plan`. The nodes with a `faulty` input have none: parameters are checked with the
+/// inputs.
+fn set_parameters(
+    declared_nodes: &[DeclaredNode<'_>],
+    plan: &mut Plan,
+    faulty: &BTreeMap<usize, Diagnostic>,
+    notes: &mut Notes,
+    faults: &mut Faults,
+) {
+    for (index, declared) in declared_nodes.iter().enumerate() {
+        let node = &plan.nodes[index];
+        let of_node = match faulty.get(&index) {
+            Some(fault) => Err(fault.clone()),
+            None => parameters::of(declared, plan, node.period_ticks, notes).and_then(|of_node| {
+                processes::require_replaceable(declared, node)?;
+                Ok(of_node)
+            }),
+        };
+        if let Some((parameters, files)) = faults.keep(of_node) {
+            let node = &mut plan.nodes[index];
+            (node.parameters, node.files) = (parameters, files);
+        }
     }
 }
 

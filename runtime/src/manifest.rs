@@ -40,7 +40,7 @@ pub(crate) use sets::is_name;
 
 use crate::registry::Registry;
 use diagnostics::parameter::FileFault;
-use diagnostics::{Diagnostic, ParameterError, Place, read_tree};
+use diagnostics::{Diagnostic, Misread, ParameterError, Place, read_tree};
 use file_edits::FileEdit;
 use inputs::InputFiles;
 use sources::{Origin, Sources};
@@ -82,6 +82,20 @@ impl Manifest {
     /// A [`Diagnostic`] that names the place.
     pub fn load(path: &Path, overrides: &[String], registry: Registry) -> Result<Self, Diagnostic> {
         Self::parse(include::text(path)?, path, overrides, registry)
+    }
+
+    /// As [`Manifest::load`] for a check that tells every fault: the manifest, its unknown keys repaired, and the faults of these.
+    ///
+    /// # Errors
+    /// A [`Diagnostic`] that names the place, where the rest cannot be read.
+    pub fn load_readable(
+        path: &Path,
+        overrides: &[String],
+        registry: Registry,
+    ) -> Result<(Self, Option<Diagnostic>), Diagnostic> {
+        let mut sources = include::read(path, include::text(path)?, registry)?;
+        overrides.iter().for_each(|text| sources.add(Origin::Override, text.clone()));
+        Self::readable(path.to_owned(), sources)
     }
 
     /// Reads `text` as the manifest at `path`, which need not exist, as [`Manifest::load`] does.
@@ -161,11 +175,19 @@ impl Manifest {
     }
 
     fn of(path: PathBuf, sources: Sources) -> Result<Self, Diagnostic> {
+        let (manifest, unknown) = Self::readable(path, sources)?;
+        unknown.map_or(Ok(manifest), Err)
+    }
+
+    /// The manifest, its unknown keys repaired, and the faults of these.
+    fn readable(path: PathBuf, sources: Sources) -> Result<(Self, Option<Diagnostic>), Diagnostic> {
         let tree = whole_tree(&sources)?;
-        let content = content(&sources, tree)?;
-        let file_edits = file_edits::all(&sources, &content)?;
-        let recorded_text = recorded::text(&sources, &content.process)?;
-        Ok(Self { path, recorded_text, content, sources, file_edits })
+        let (content, unknown) = readable_content(&sources, tree)?;
+        let unknown = joined(unknown);
+        let edits = file_edits::all(&sources, &content);
+        let texts = edits.and_then(|edits| Ok((edits, recorded::text(&sources, &content.process)?)));
+        let (file_edits, recorded_text) = texts.map_err(|fault| fault.and(unknown.clone()))?;
+        Ok((Self { path, recorded_text, content, sources, file_edits }, unknown))
     }
 
     /// The manifest's name: its file name without `.toml`.
@@ -387,24 +409,60 @@ impl Manifest {
     }
 }
 
-/// Content of the whole `tree`.
+/// Content of the whole `tree`, its unknown keys repaired, and the faults of these.
 ///
 /// # Errors
 /// The faults of the tree and of each process, if it cannot be read.
+fn readable_content(sources: &Sources, tree: DeTable<'_>) -> Result<(Content, Vec<Diagnostic>), Diagnostic> {
+    let mut whole = Spanned::new(0..0, DeValue::Table(tree));
+    let mut unknown = Vec::new();
+    let mut content = loop {
+        match read_tree(&whole) {
+            Ok(content) => break content,
+            Err(first) if !misread_key(&mut whole, &first) => {
+                return Err(faults_of(sources, &whole, first).and(unknown));
+            }
+            // What is left may have faults of its own.
+            Err(misread) => unknown.push(sources.refused(misread)),
+        }
+    };
+    match judging::complete(&mut content, sources) {
+        Ok(()) => Ok((content, unknown)),
+        Err(fault) => Err(fault.and(unknown)),
+    }
+}
+
+/// True if `misread` is an unknown key: then the tree is repaired, by the key that is meant or without it.
+fn misread_key(whole: &mut Spanned<DeValue<'_>>, misread: &Misread) -> bool {
+    let meant = misread.error.meant();
+    misread.is_unknown_key() && tree::repair(whole.get_mut(), &misread.span(), meant)
+}
+
+/// The fault `first` of the whole tree, with those of each process.
+fn faults_of(sources: &Sources, whole: &Spanned<DeValue<'_>>, first: Misread) -> Diagnostic {
+    let processes = whole.get_ref().get("process").and_then(|processes| processes.get_ref().as_table());
+    let others = processes.into_iter().flatten().filter_map(|(name, process)| {
+        let misread = read_tree::<Process>(process).err()?;
+        let misread = misread.within(&format!("process.{}", name.get_ref()));
+        (misread.span() != first.span()).then(|| sources.refused(misread))
+    });
+    let others: Vec<Diagnostic> = others.collect();
+    sources.refused(first).and(others)
+}
+
+/// Content of the whole `tree`.
+///
+/// # Errors
+/// As [`readable_content`], and the faults of unknown keys.
 fn content(sources: &Sources, tree: DeTable<'_>) -> Result<Content, Diagnostic> {
-    let whole = Spanned::new(0..0, DeValue::Table(tree));
-    let mut content = read_tree(&whole).map_err(|first| {
-        let processes = whole.get_ref().get("process").and_then(|processes| processes.get_ref().as_table());
-        let others = processes.into_iter().flatten().filter_map(|(name, process)| {
-            let misread = read_tree::<Process>(process).err()?;
-            let misread = misread.within(&format!("process.{}", name.get_ref()));
-            (misread.span() != first.span()).then(|| sources.refused(misread))
-        });
-        let others: Vec<Diagnostic> = others.collect();
-        sources.refused(first).and(others)
-    })?;
-    judging::complete(&mut content, sources)?;
-    Ok(content)
+    let (content, unknown) = readable_content(sources, tree)?;
+    joined(unknown).map_or(Ok(content), Err)
+}
+
+/// The faults as one, if there are any.
+fn joined(faults: Vec<Diagnostic>) -> Option<Diagnostic> {
+    let mut faults = faults.into_iter();
+    faults.next().map(|first| first.and(faults))
 }
 
 /// Everything that the sources say, with sets expanded and backups made whole.

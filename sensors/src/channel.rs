@@ -63,6 +63,20 @@ impl Timing {
         require("dropout_mean_s", self.dropout_mean_s, mean_is_good, expected)
     }
 
+    /// The longest period of a node, in ticks of `tick_ns`, at which measurements are made and arrive at the very ticks at which they
+    /// would with a period of one tick; that is one tick where interval or delay are no whole number of ticks.
+    #[must_use]
+    pub(crate) fn period_ticks(&self, tick_ns: u64) -> u32 {
+        let whole = |ticks: f64| {
+            let is_whole = (ticks - ticks.round()).abs() <= 1e-9 * ticks && ticks <= f64::from(u32::MAX);
+            is_whole.then_some(ticks.round() as u32)
+        };
+        let tick_s = tick_ns as f64 * 1e-9;
+        let interval = whole((self.rate_hz * tick_s).recip()).filter(|ticks| *ticks > 0);
+        let delay = whole(self.delay_ms * 1e-3 / tick_s);
+        interval.zip(delay).map_or(1, |(interval, delay)| greatest_common_divisor(interval, delay))
+    }
+
     /// Number of measurements under way, without the rounding to a node's period.
     fn under_way(&self) -> f64 {
         self.delay_ms * 1e-3 * self.rate_hz
@@ -97,6 +111,10 @@ impl Timing {
         }
         Ok(())
     }
+}
+
+fn greatest_common_divisor(a: u32, b: u32) -> u32 {
+    if b == 0 { a } else { greatest_common_divisor(b, a % b) }
 }
 
 /// The chances with which losses begin and last.
@@ -349,6 +367,18 @@ mod tests {
 
     fn timing() -> Timing {
         Timing { rate_hz: 10.0, delay_ms: 0.0, dropout: 0.0, dropout_mean_s: 0.0 }
+    }
+
+    #[test]
+    fn a_node_computes_as_seldom_as_its_measurements_are_made_and_arrive() {
+        let period = |rate_hz, delay_ms| Timing { rate_hz, delay_ms, ..timing() }.period_ticks(TICK_NS);
+        assert_eq!(
+            [period(50.0, 0.0), period(50.0, 40.0), period(50.0, 10.0), period(10.0, 80.0)],
+            [20, 20, 10, 20]
+        );
+        // Between two ticks, or at 60 Hz: each of them has to be looked at.
+        assert_eq!([period(50.0, 2.5), period(60.0, 0.0), period(1000.0, 0.0), period(2000.0, 0.0)], [1; 4]);
+        assert_eq!([period(0.0, 1.0), period(-1.0, 0.0), period(f64::NAN, 0.0), period(1e-300, 0.0)], [1; 4]);
     }
 
     fn channel(timing: &Timing, period_ticks: u64, seed: u64, node: &str) -> Result<Channel, ParameterError> {

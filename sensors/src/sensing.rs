@@ -181,6 +181,10 @@ impl<S: Sensor> Component for Sensing<S> {
         Ok(Self { sensor, channel })
     }
 
+    fn period_ticks(parameters: &S::Parameters, tick_ns: u64) -> u32 {
+        parameters.timing().period_ticks(tick_ns)
+    }
+
     fn initial(&self) -> Queued<S::State> {
         self.channel.state(self.sensor.initial(), self.sensor.first())
     }

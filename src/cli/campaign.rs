@@ -39,6 +39,8 @@ const PAGE: &str = "report.html";
 const BAR: &str = "{bar:30} {pos}/{len} flights  {rate}, {left} left  {msg}";
 /// Flights that are checked at most before the first one is flown, until one is not refused.
 const CHECKED: usize = 100;
+/// Flights that are checked at most with each text or truth value, until one is not refused.
+const CHECKED_OF_CHOICE: usize = 5;
 /// Step between two checked flights, as a part of the plan: multiples of the golden ratio fill it evenly, and fall in step with no
 /// grid.
 const STEP: f64 = 0.618_033_988_749_894_9;
@@ -222,11 +224,11 @@ impl Opened {
 
     /// Writes the table and the report; the failures of those that cannot be written.
     fn write(&self, rows: &[Row], report: &Report) -> Vec<anyhow::Error> {
-        let Self { store, plan, base, .. } = self;
+        let Self { store, campaign, base, .. } = self;
         let written = [
             store.write("flights.parquet", |file| self.table(rows)?.write(file)),
             store.write("report.json", |file| Ok(serde_json::to_writer_pretty(file, report)?)),
-            store.write(PAGE, |file| Ok(file.write_all(&page::page(report, plan, base, rows))?)),
+            store.write(PAGE, |file| Ok(file.write_all(&page::page(report, campaign, base, rows))?)),
         ];
         written.into_iter().filter_map(Result::err).collect()
     }
@@ -235,7 +237,7 @@ impl Opened {
         let Self { campaign, base, plan, build, .. } = self;
         let seeds = rows.iter().map(|row| plan.seed(campaign, base, row.flight as usize));
         Ok(Table {
-            varied: &plan.names,
+            varied: &campaign.vary,
             verdicts: &base.verdicts,
             figures: &base.figures,
             units: &base.units,
@@ -341,21 +343,46 @@ fn jobs(campaign: &Campaign, base: &Base, plan: &Plan, flown: &BTreeMap<u64, Row
 }
 
 /// Refuses a campaign of which flights that are spread over the whole plan are all refused, as they are where no manifest has a
-/// varied key.
+/// varied key, and one with a text or truth value that is refused in each flight, as a misspelt one is.
 fn require_flyable(campaign: &Campaign, base: &Base, plan: &Plan) -> Result<()> {
+    let all = plan.flights.len();
+    if let Some((flight, error)) = refusal(campaign, base, plan, spread(all))? {
+        return Err(error).context(format!(
+            "no flight can be flown: of the plan's {} {} were checked, which are all refused; flight {flight}",
+            flights(all as u64),
+            all.min(CHECKED)
+        ));
+    }
+    for (index, varied) in campaign.vary.iter().enumerate() {
+        for choice in varied.distribution.choices().unwrap_or_default() {
+            let is_chosen =
+                |flight: &usize| varied.distribution.choice(plan.flights[*flight][index]) == Some(choice);
+            let chosen = (0..all).filter(is_chosen).take(CHECKED_OF_CHOICE);
+            if let Some((flight, error)) = refusal(campaign, base, plan, chosen)? {
+                let name = &varied.name;
+                return Err(error)
+                    .context(format!("no flight with {choice} as `{name}` can be flown; flight {flight}"));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The first of these flights with its error, if all of them are refused.
+fn refusal(
+    campaign: &Campaign,
+    base: &Base,
+    plan: &Plan,
+    flights: impl Iterator<Item = usize>,
+) -> Result<Option<(usize, anyhow::Error)>> {
     let mut first = None;
-    for flight in spread(plan.flights.len()) {
+    for flight in flights {
         match base.check(&plan.sets(campaign, base, flight)?) {
-            Ok(()) => return Ok(()),
+            Ok(()) => return Ok(None),
             Err(error) => first = first.or(Some((flight, error))),
         }
     }
-    let Some((flight, error)) = first else { return Ok(()) };
-    let checked = plan.flights.len().min(CHECKED);
-    Err(error).context(format!(
-        "no flight can be flown: of the plan's {} {checked} were checked, which are all refused; flight {flight}",
-        flights(plan.flights.len() as u64)
-    ))
+    Ok(first)
 }
 
 /// Indices below `count`: all of few, in the order of the plan; the first [`CHECKED`] that fill many evenly.

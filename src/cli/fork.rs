@@ -37,7 +37,7 @@ struct ForkArguments {
     fork: Option<u64>,
     /// Vary a value of the flights, such as process.plant.vehicle.body.mass=uniform:0.4,0.6 or run.seed=integers:1,9; with
     /// factor: or offset: before the distribution the numbers act on the declared value.
-    #[arg(long, value_name = "KEY=DISTRIBUTION:NUMBERS", requires = "fork")]
+    #[arg(long, value_name = "KEY=DISTRIBUTION:VALUES", requires = "fork")]
     vary: Vec<Vary>,
     /// Folder for the plan, the flights and the report of --fork; beside the checkpoint where absent.
     #[arg(long, value_name = "FOLDER", requires = "fork")]

@@ -174,3 +174,41 @@ fn a_report_keeps_the_figures_that_the_campaign_chooses() {
     assert!(table(&out).len() < wide);
     assert_eq!(before, fs::read_to_string(format!("{out}/rows.jsonl")).unwrap());
 }
+
+/// Vehicles side by side: each flight of one is a flight of the other, and all results have their names.
+#[test]
+fn texts_are_varied_and_told_apart_in_every_result() {
+    let place = Place::new();
+    let (light, heavy) = ("light.toml", "heavy.toml");
+    let vehicle = fs::read_to_string(repository("vehicles/hummingbird.toml")).unwrap();
+    place.write(light, &vehicle);
+    place.write(heavy, vehicle.replace("value = 0.480", "value = 0.500"));
+    let text = "sampling = \"grid\"\nset = [\"run.duration_s=0.4\"]\n\
+                [[vary]]\nkey = \"process.plant.vehicle\"\nvalues = [\"light.toml\", \"heavy.toml\"]\n\
+                [[vary]]\nkey = \"run.seed\"\nintegers = [1, 3]\n\
+                [[measure]]\nname = \"height\"\ntopic = \"/plant/state\"\nfield = \"position.z\"\nunit = \"m\"\nstatistic = \"last\"\n";
+    let (campaign, folder) = (written(&place, "c.toml", text), place.path("out"));
+    let report = place.call(&["campaign", &campaign, "--out", &folder, "--json"]).with_code(0).json();
+    let plan = fs::read_to_string(format!("{folder}/plan.csv")).unwrap();
+    let lines: Vec<String> =
+        [light, heavy].iter().flat_map(|name| (1..=3).map(move |seed| format!("{name},{seed}"))).collect();
+    let numbered = lines.iter().enumerate().map(|(flight, line)| format!("{flight},{line}\n"));
+    assert_eq!(plan, format!("flight,vehicle,seed\n{}", numbered.collect::<String>()));
+    let heights: Vec<f64> = rows(&folder).iter().map(|row| row["figures"][0].as_f64().unwrap()).collect();
+    // The same noise, a heavier vehicle.
+    assert!((0..3).all(|flight| heights[flight] > heights[flight + 3]), "{heights:?}");
+    let choices = report["choices"].as_array().unwrap();
+    let told: Vec<_> =
+        choices.iter().map(|it| (it["choice"].as_str().unwrap(), it["flights"].as_u64().unwrap())).collect();
+    assert_eq!(told, [(light, 3), (heavy, 3)]);
+    let mut of_light = heights[..3].to_vec();
+    of_light.sort_by(f64::total_cmp);
+    assert_eq!(choices[0]["medians"][0].as_f64(), Some(of_light[1]));
+    assert!(report["influences"].as_array().unwrap().iter().all(|it| it["varied"] != "vehicle"), "{report}");
+    let worst = report["worst"].as_array().unwrap().iter().find(|worst| worst["flight"] == 4).unwrap();
+    assert!(worst["run"].as_str().unwrap().contains("'process.plant.vehicle=\"heavy.toml\"'"), "{worst}");
+    // A text that is none of the key's is refused before anything is flown.
+    let wrong = written(&place, "wrong.toml", &text.replace("\"heavy.toml\"", "\"heavi.toml\""));
+    let ended = place.call(&["campaign", &wrong, "--out", &place.path("none")]).with_code(2);
+    ended.says(&["no flight with \"heavi.toml\" as `vehicle` can be flown"]);
+}

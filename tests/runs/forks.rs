@@ -134,7 +134,7 @@ fn what_cannot_vary_behind_a_checkpoint_is_refused_in_words() {
     refused(&["--vary", "run.rate_hz=values:500"], "a tick of the checkpoint is 1000000 ns");
     refused(&["--set", "run.duration_s=1.0"], "raise run.duration_s");
     refused(&["--vary", "process.plnt.period_ticks=values:2"], "there is no process `plnt`");
-    refused(&["--vary", "run.seed=even:1,2"], "KEY=DISTRIBUTION:NUMBERS");
+    refused(&["--vary", "run.seed=even:1,2"], "KEY=DISTRIBUTION:VALUES");
     refused(&["--set", "run.seed=2"], "each flight has a seed of its own");
     refused(&["--record", "b.mcap"], "cannot be used with");
     place.call(&["run", &place.path("m.toml"), "--fork", "2"]).with_code(2).says(&["--from"]);

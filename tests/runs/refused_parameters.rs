@@ -314,3 +314,25 @@ fn the_bounds_of_an_effect_are_told_in_the_unit_of_the_file() {
     let args = ["check", &repository("manifests/hover.toml"), "--set", &vehicle, "--set", delay];
     place.call(&args).with_code(2).says(&["must be 0 to 500 ms, found 1000 ms"]);
 }
+
+/// Faults of every stage, from the file's keys to its conditions, in the order of their lines.
+#[test]
+fn a_check_tells_the_faults_of_all_stages_at_once() {
+    let place = Place::new();
+    let pass = "\n[[pass]]\nname = \"a\"\ntopic = \"/plant/stat\"\nfield = \"position.z\"\nunit = \"m\"\nstatistic = \"max\"\nmax = 2.0\n";
+    let text = good()
+        .replace("window_ticks = 64", "windo_ticks = 64")
+        .replace("inputs.imu = \"/imu/imu\"", "inputs.imu = \"/imu/im\"")
+        .replace("initial_altitude_m = 1.0", "initial_altitude_m = \"high\"");
+    let manifest = place.write("faulty.toml", format!("{text}{pass}"));
+    let found = place.call(&["check", &manifest, "--json"]).with_code(2).json();
+    let faults = found["faults"].as_array().unwrap();
+    let lines: Vec<u64> = faults.iter().map(|fault| fault["line"].as_u64().unwrap()).collect();
+    assert!(lines.len() == 4 && lines.is_sorted(), "{found}");
+    let keys = ["windo_ticks", "/imu/im", "initial_altitude_m", "/plant/stat"];
+    for (fault, key) in faults.iter().zip(keys) {
+        assert!(fault["message"].as_str().unwrap().contains(key), "{fault}");
+    }
+    let ended = place.call(&["check", &manifest]).with_code(2);
+    assert_eq!(ended.error.matches("error: ").count(), 4, "{ended}");
+}

@@ -50,3 +50,28 @@ fn a_sensor_that_should_measure_more_often_than_it_computes_is_refused() {
     let manifest = short(&place, "slow.toml", "[process.mocap]\nperiod_ticks = 20\n");
     place.call(&["run", &manifest]).with_code(2).says(&["`rate_hz`", "`period_ticks`", "mocap"]);
 }
+
+/// A period that nobody states changes the number of samples alone: whoever reads them sees the same.
+#[test]
+fn a_sensor_sends_at_its_rate_and_readers_see_no_difference() {
+    let place = Place::new();
+    let text = std::fs::read_to_string(repository("manifests/hover.toml")).unwrap();
+    let text = text.replace("\"../vehicles/", &format!("\"{}/", repository("vehicles")));
+    let stated = "kind = \"mocap\"\nperiod_ticks = 5\n";
+    assert!(text.contains(stated));
+    let flown = |name: &str, mocap: &str| {
+        let text = text.replace(stated, &format!("kind = \"mocap\"\n{mocap}"));
+        let (manifest, recording) =
+            (place.write(&format!("{name}.toml"), text), place.path(&format!("{name}.mcap")));
+        place.call(&["run", &manifest, "--record", &recording, "--set", "run.duration_s=4.0"]).flown();
+        topics(&recording)
+    };
+    let parameters = "parameters = { rate_hz = 50.0, delay_ms = 10.0, dropout = 0.1 }\n";
+    let [mut each_tick, mut at_its_rate] =
+        [("each", format!("period_ticks = 1\n{parameters}")), ("rate", parameters.to_owned())]
+            .map(|(name, mocap)| flown(name, &mocap));
+    let [each, rate] =
+        [&mut each_tick, &mut at_its_rate].map(|topics| topics.remove("/mocap/mocap").unwrap());
+    assert_eq!((each.len(), rate.len()), (4000, 400));
+    require_same_messages(&each_tick, &at_its_rate);
+}

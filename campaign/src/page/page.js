@@ -35,6 +35,14 @@ fillTable(
     return [left(it.figure), it.flights, ...quantiles, left(shownUnit(it.unit))];
   }),
 );
+element("chosen").hidden = !report.choices.length;
+fillTable(
+  "choices",
+  [left("varied value"), left("choice"), "flights", "passed", "pass rate", "from", "to", ...report.figures.map((it) => wrapped(`median ${it.figure}`))],
+  report.choices.map((it) => [
+    left(it.varied), left(it.choice), it.flights, it.passed, percent(it.pass_rate), ...it.interval.map(percent), ...it.medians.map(number),
+  ]),
+);
 fillTable(
   "influences",
   [left("varied value"), left("outcome or figure"), "rank correlation", "chance"],

@@ -110,7 +110,7 @@ fn require_forwardable(
 
 fn published_by(node: usize, declared: &DeclaredNode<'_>) -> Result<Vec<Published>, Diagnostic> {
     let DeclaredNode { manifest, name, process, program, .. } = declared;
-    let period = period_ticks(manifest, process)?;
+    let period = period_ticks(manifest, process, program.component())?;
     let outputs: Vec<(&str, Carries)> = match &program.executable {
         Executable::Component(kind) => {
             let forwarded = forwarded_ports(declared, kind)?;

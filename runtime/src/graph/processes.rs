@@ -6,7 +6,7 @@ use crate::program::{Executable, OnExit, Program, Readiness};
 use bus::component::Transfer;
 use bus::plan::NodePlan;
 use bus::process::{LAUNCHER_VARIABLE, RUN_VARIABLE};
-use bus::{GENERATION_VARIABLE, NODE_VARIABLE};
+use bus::{GENERATION_VARIABLE, NODE_VARIABLE, Registration};
 use diagnostics::{Diagnostic, did_you_mean, nearest};
 use inputs::InputFiles;
 use std::collections::BTreeMap;
@@ -265,14 +265,26 @@ fn require_name(manifest: &Manifest, name: &Spanned<String>) -> Result<(), Diagn
     Err(manifest.problem(&name.span(), format!("`{text}` cannot name a process"), help))
 }
 
-/// Ticks between two computations of `process`.
+/// Ticks between two computations of `process`, which is of `kind` if it is a component: as stated, or those that the component
+/// chooses by its parameters.
 ///
 /// # Errors
 /// If it is 0.
-pub fn period_ticks(manifest: &Manifest, process: &Process) -> Result<u32, Diagnostic> {
+pub fn period_ticks(
+    manifest: &Manifest,
+    process: &Process,
+    kind: Option<&Registration>,
+) -> Result<u32, Diagnostic> {
     let help = "a node runs every 1 or more ticks";
-    let period = manifest.within("period_ticks", &process.period_ticks, 1..=u32::MAX, help)?;
-    Ok(period.unwrap_or(1))
+    if let Some(period) = manifest.within("period_ticks", &process.period_ticks, 1..=u32::MAX, help)? {
+        return Ok(period);
+    }
+    // Outputs whose period is stated are multiples of the node's.
+    let has_stated_output = process.outputs.values().any(|output| output.every_ticks.is_some());
+    let Some(kind) = kind.filter(|_| !has_stated_output) else { return Ok(1) };
+    let parameters = process.parameters.iter().map(|(key, value)| (key.get_ref().clone(), value.clone()));
+    let tick_ns = 1_000_000_000 / u64::from((*manifest.content.run.rate_hz.get_ref()).max(1));
+    Ok(kind.period_ticks(&parameters.collect::<serde_json::Map<_, _>>().into(), tick_ns))
 }
 
 fn require_environment(manifest: &Manifest, process: &Process) -> Result<(), Diagnostic> {

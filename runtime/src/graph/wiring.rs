@@ -5,6 +5,7 @@ use super::{computing_time, inputs, outputs};
 use crate::program::OnExit;
 use bus::plan::{NodePlan, TopicPlan};
 use diagnostics::Diagnostic;
+use std::collections::BTreeMap;
 
 /// Topics and nodes, wired to each other.
 pub struct Wiring {
@@ -20,16 +21,31 @@ pub struct Wiring {
 /// # Errors
 /// A faulty port, or a cycle without a delay.
 pub fn wire(declared_nodes: &[DeclaredNode<'_>], changed: Option<usize>) -> Result<Wiring, Diagnostic> {
+    let (wiring, faulty) = wire_apart(declared_nodes, changed)?;
+    Diagnostic::gather(faulty.into_values().map(Err::<(), _>))?;
+    Ok(wiring)
+}
+
+/// As [`wire`], for a check that goes on: a node with a faulty port has no inputs, and its faults are returned by its index.
+///
+/// # Errors
+/// A faulty output, which hides what others read, or a cycle without a delay.
+pub fn wire_apart(
+    declared_nodes: &[DeclaredNode<'_>],
+    changed: Option<usize>,
+) -> Result<(Wiring, BTreeMap<usize, Diagnostic>), Diagnostic> {
     let published = outputs::publish_all(declared_nodes)?;
     let topics: Vec<TopicPlan> = published.iter().map(|output| output.topic.clone()).collect();
+    let mut faulty = BTreeMap::new();
     let mut nodes = Diagnostic::gather(declared_nodes.iter().enumerate().map(|(index, declared)| {
         let process = declared.process;
+        let inputs = inputs::inputs(declared, &topics);
         Ok(NodePlan {
             name: declared.name.get_ref().clone(),
-            period_ticks: processes::period_ticks(declared.manifest, process)?,
+            period_ticks: processes::period_ticks(declared.manifest, process, declared.program.component())?,
             wait: process.wait.unwrap_or_default(),
             cpu: process.cpu.as_ref().map(|cpu| *cpu.get_ref()),
-            inputs: inputs::inputs(declared, &topics)?,
+            inputs: inputs.map_err(|fault| faulty.insert(index, fault)).unwrap_or_default(),
             outputs: outputs::outputs(&published, index),
             parameters: serde_json::Value::Null,
             files: Vec::new(),
@@ -38,7 +54,9 @@ pub fn wire(declared_nodes: &[DeclaredNode<'_>], changed: Option<usize>) -> Resu
             is_recorder: declared.program.is_recorder(),
         })
     }))?;
-    inputs::require_no_cycle(declared_nodes, &nodes, &published, changed)?;
-    inputs::order_inputs(&mut nodes, &published);
-    Ok(Wiring { topics, nodes })
+    if faulty.is_empty() {
+        inputs::require_no_cycle(declared_nodes, &nodes, &published, changed)?;
+        inputs::order_inputs(&mut nodes, &published);
+    }
+    Ok((Wiring { topics, nodes }, faulty))
 }

@@ -62,6 +62,27 @@ pub fn deepest(span: &Range<usize>, value: &Spanned<DeValue<'_>>, path: &[&str])
     places
 }
 
+/// Gives the value of the unknown key at `span` to the key that is `meant`, if that is absent, and removes it otherwise; false if
+/// there is no key at `span`.
+pub fn repair(value: &mut DeValue<'_>, span: &Range<usize>, meant: Option<&str>) -> bool {
+    match value {
+        DeValue::Table(table) => {
+            let Some(key) = table.keys().find(|key| key.span() == *span).map(|key| key.get_ref().to_string())
+            else {
+                return table.iter_mut().any(|(_, value)| repair(value.get_mut(), span, meant));
+            };
+            let value = table.remove(key.as_str());
+            let meant = meant.filter(|meant| !table.contains_key(*meant));
+            if let (Some(value), Some(meant)) = (value, meant) {
+                table.insert(Spanned::new(span.clone(), meant.to_owned().into()), value);
+            }
+            true
+        }
+        DeValue::Array(array) => array.iter_mut().any(|value| repair(value.get_mut(), span, meant)),
+        _ => false,
+    }
+}
+
 fn shifted(value: Spanned<DeValue<'_>>, base: usize) -> Spanned<DeValue<'_>> {
     let span = value.span().start + base..value.span().end + base;
     let value = match value.into_inner() {
