@@ -1,6 +1,7 @@
 //! From a manifest to the plan of a run, checked before anything starts.
 //!
 //! - `processes`: the executable of each process, and its settings on the host
+//! - `sidecars`: processes beside the ticks, and the order in which they start
 //! - `outputs`, `inputs`, `wiring`: topics and edges
 //! - `computing_time`: computing time of the steps
 //! - `parameters`, `recorders`: parameters and files of each node
@@ -23,6 +24,7 @@ mod periods;
 mod processes;
 mod ranges;
 mod recorders;
+mod sidecars;
 mod wiring;
 
 pub use crate::program::BackupSpec;
@@ -105,7 +107,7 @@ impl Graph {
     pub fn build_from(manifest: &Manifest, files: InputFiles) -> Result<Self, Diagnostic> {
         manifest.included().for_each(|(path, text)| files.keep(path, text.as_bytes().to_vec()));
         let declared_nodes = processes::declared_nodes(manifest, &files)?;
-        let sidecars = processes::sidecars(manifest)?;
+        let sidecars = sidecars::sidecars(manifest)?;
         processes::require_own_logs(manifest)?;
         let wiring = wire(&declared_nodes, None)?;
         let mut plan = plan(manifest, wiring)?;
@@ -122,7 +124,8 @@ impl Graph {
             Diagnostic::gather(declared_nodes.iter().zip(&plan.nodes).map(|(declared, node)| {
                 let parameters = parameters::of(declared, &plan, node.period_ticks, &mut notes)?;
                 processes::require_replaceable(declared, node).map(|()| parameters)
-            }))?;
+            }));
+        let parameters = parameters.map_err(|fault| notes.explain(fault))?;
         let of_nodes = plan.nodes.iter_mut().zip(parameters);
         of_nodes.for_each(|(node, of_node)| (node.parameters, node.files) = of_node);
         recorders::check(&declared_nodes, &plan.nodes)?;
