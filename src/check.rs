@@ -31,10 +31,9 @@ pub fn check(path: &Path, overrides: &[String]) -> Result<Graph, Diagnostic> {
 
 /// The graph of a manifest with keys whose faults are `unknown`.
 fn with_unknown(unknown: Option<Diagnostic>, graph: Result<Graph, Diagnostic>) -> Result<Graph, Diagnostic> {
+    let Some(unknown) = unknown else { return graph };
     let mut faults = Faults::default();
-    if let Some(unknown) = unknown {
-        faults.keep::<()>(Err(unknown));
-    }
+    faults.keep::<()>(Err(unknown));
     let graph = faults.keep(graph);
     faults.finish(graph)
 }

@@ -39,6 +39,8 @@ use vehicles::Vehicle;
 const ARMED_S: f64 = 4.0;
 /// Longest step of the firmware's clock, s; a longer one is not taken (`SIM_JSON.cpp`).
 const PERIOD_MAX_S: f64 = 0.1;
+/// Text that occurs in each of its programs.
+const NAME: &str = "ArduCopter";
 /// Heading of the vehicle that rests, degrees from north: its x points east.
 const HEADING_DEG: f64 = 90.0;
 /// Date of the firmware's start, by which its GPS tells the time: 2025-01-01T00:00:00Z, in seconds since 1970. Without it, it is the host's.
@@ -131,7 +133,9 @@ impl Autopilot for ArduPilot {
         let refused = |reason: String| settings::refused_vehicle(&vehicle, &reason);
         let layout = Layout::of(&vehicle.rotors, &FRAMES).map_err(refused)?;
         let numbers = FrameNumbers::of(&layout).map_err(refused)?;
+        layout.warn_of_oddities(&vehicle, context);
         let program = settings::program(context, &firmware, "ArduCopter's SITL, build/sitl/bin/arducopter")?;
+        settings::require_text(&program, &firmware, NAME, "it is not ArduCopter's SITL")?;
         settings::check_arming(armed_by_channel, remote_control::CHANNELS)?;
         settings::check_rest(rest_s, ARMED_S, armed_by_channel)?;
         parameters.origin.check()?;
@@ -190,7 +194,10 @@ impl Autopilot for ArduPilot {
 
     fn exchange(&self, link: &mut Link, sensed: &Sensed<'_>) -> Result<Throttles, String> {
         link.steps += 1;
-        link.remote_control.send(sensed.rc)?;
+        // Without datagrams, the firmware takes its remote control for lost.
+        if sensed.is_rc_new {
+            link.remote_control.send(sensed.rc)?;
+        }
         let time_s = answer::timestamp_s(link.steps, self.rest.period_s);
         link.datagrams.send(answer::text(time_s, sensed).as_bytes())?;
         let last = link.frame;

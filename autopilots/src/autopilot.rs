@@ -19,6 +19,8 @@ pub struct Sensed<'a> {
     pub estimate: &'a StateEstimate,
     /// Its remote control.
     pub rc: &'a RcChannels,
+    /// True if the channels have arrived since the exchange before. Older ones are not sent, so that the firmware sees a lost radio.
+    pub is_rc_new: bool,
 }
 
 /// Outputs of the motors, 0 (off) to 1 (all), in the order of the vehicle file's rotors.

@@ -44,10 +44,19 @@ const ARMED_S: f64 = 1.0;
 const STALE_S: f64 = 0.1;
 /// Channels of a packet of the remote control, and motors of a packet of the outputs.
 const CHANNELS: usize = 16;
-/// Host time that loading the configuration may take.
-const CONFIGURATION_LIMIT: Duration = Duration::from_secs(20);
+/// Host time that loading the configuration may take; it takes less than 1 s. Half of the default watchdog, so that the run ends
+/// with this reason.
+const CONFIGURATION_LIMIT: Duration = Duration::from_secs(10);
+/// Text that occurs in each of its programs.
+const NAME: &str = "Betaflight";
+/// Its argument that loads a configuration, since 2026-02-21 (pull request 14935).
+const CONFIGURE: &str = "--config";
+const WITHOUT_CONFIGURE: &str = "this version of Betaflight cannot load a configuration, expected one from 2026-02-21 on (docs/firmware.md; \
+                                 releases up to 2025.12 are older)";
 /// Mark of a line of its command line about a command that it refuses.
 const REFUSED: &str = "###ERROR";
+/// Start of a line behind that, about the values that it takes.
+const ALLOWED: &str = "Allowed";
 
 /// Parameters of the firmware.
 #[derive(Debug, Deserialize)]
@@ -119,7 +128,11 @@ pub struct Betaflight {
     vehicle: Vehicle,
     layout: Layout,
     firmware: Vec<u8>,
+    /// File of the program.
+    firmware_path: PathBuf,
     configuration: String,
+    /// File of the configuration.
+    configuration_path: PathBuf,
     armed_by_channel: Option<usize>,
     period_ns: u64,
     /// Ticks between two packets of the remote control.
@@ -136,6 +149,8 @@ pub struct Link {
     steps: u64,
     /// Steps since the last motor outputs came.
     stale_steps: u64,
+    /// True if channels have come since the last packet of the remote control.
+    is_rc_new: bool,
 }
 
 impl Autopilot for Betaflight {
@@ -151,8 +166,11 @@ impl Autopilot for Betaflight {
         let vehicle = settings::vehicle(context, &vehicle)?;
         let layout = Layout::of(&vehicle.rotors, &MIXERS)
             .map_err(|reason| settings::refused_vehicle(&vehicle, &reason))?;
+        layout.warn_of_oddities(&vehicle, context);
         let program =
             settings::preloadable(context, &firmware, "Betaflight's SITL, obj/main/betaflight_SITL.elf")?;
+        settings::require_text(&program, &firmware, NAME, "it is not Betaflight's SITL")?;
+        settings::require_text(&program, &firmware, CONFIGURE, WITHOUT_CONFIGURE)?;
         positive("rc_rate_hz", parameters.rc_rate_hz)?;
         parameters.origin.check()?;
         settings::check_arming(armed_by_channel, CHANNELS)?;
@@ -160,6 +178,8 @@ impl Autopilot for Betaflight {
             vehicle,
             layout,
             firmware: program,
+            firmware_path: firmware,
+            configuration_path: configuration.clone().unwrap_or_default(),
             configuration: settings::configuration(context, configuration.as_deref())?,
             armed_by_channel,
             period_ns: context.tick_ns * u64::from(context.period_ticks),
@@ -174,32 +194,15 @@ impl Autopilot for Betaflight {
     }
 
     fn boot(&self) -> Result<Link, String> {
-        let scratch = Scratch::new("betaflight")?;
-        let program = scratch.write("betaflight", &self.firmware)?;
-        scratch.write("lockstep.so", LOCKSTEP)?;
-        let configuration = scratch.write("configuration", self.commands().as_bytes())?;
-        let mut configure = scratch.command(&program)?;
-        configure.env("LD_PRELOAD", PRELOADED).arg("--config").arg(configuration);
-        let printed = scratch
-            .run(configure, CONFIGURATION_LIMIT)
-            .map_err(|error| format!("the configuration: {error}"))?;
-        if let Some(line) = printed.lines().find(|line| line.contains(REFUSED)) {
-            return Err(format!("the configuration has a command that Betaflight refuses: {line}"));
-        }
-        let mut command = scratch.command(&program)?;
-        command.env("LD_PRELOAD", PRELOADED).env(BOOT_VARIABLE, nanoseconds(BOOT_S).to_string());
-        let stream = Stream::start(scratch, command, self.reply_timeout)?;
-        let mut link = Link { stream, steps: 0, stale_steps: 0 };
-        link.receive()?;
-        if self.rest().of(self, &mut link)? {
-            return Ok(link);
-        }
-        let words = "it is not armed at tick 0: its motors stand still under `armed_by_channel` and the configuration";
-        Err(link.stream.firmware().complaint(words))
+        self.start().map_err(|error| format!("{}: {error}", self.firmware_path.display()))
     }
 
     fn exchange(&self, link: &mut Link, sensed: &Sensed<'_>) -> Result<Throttles, String> {
-        let packets = self.packets(link.steps, sensed);
+        link.is_rc_new |= sensed.is_rc_new;
+        let mut packets = self.packets(link.steps, sensed);
+        if link.is_rc_new && link.steps.is_multiple_of(self.rc_ticks) {
+            (packets.has_sticks, link.is_rc_new) = (1, false);
+        }
         link.steps += 1;
         link.stream.send(bytemuck::bytes_of(&packets))?;
         let answer = link.receive()?;
@@ -214,6 +217,45 @@ impl Autopilot for Betaflight {
 }
 
 impl Betaflight {
+    /// Loads the configuration, and starts the firmware.
+    fn start(&self) -> Result<Link, String> {
+        let scratch = Scratch::new("betaflight")?;
+        let program = scratch.write("betaflight", &self.firmware)?;
+        scratch.write("lockstep.so", LOCKSTEP)?;
+        let configuration = scratch.write("configuration", self.commands().as_bytes())?;
+        let mut configure = scratch.command(&program)?;
+        configure.env("LD_PRELOAD", PRELOADED).arg(CONFIGURE).arg(configuration);
+        let printed = scratch
+            .run(configure, CONFIGURATION_LIMIT)
+            .map_err(|error| format!("it does not load its configuration: {error}"))?;
+        if let Some(refusal) = refusal(&printed) {
+            return Err(self.refused(&refusal));
+        }
+        let mut command = scratch.command(&program)?;
+        command.env("LD_PRELOAD", PRELOADED).env(BOOT_VARIABLE, nanoseconds(BOOT_S).to_string());
+        let stream = Stream::start(scratch, command, self.reply_timeout)?;
+        let mut link = Link { stream, steps: 0, stale_steps: 0, is_rc_new: false };
+        link.receive()?;
+        if self.rest().of(self, &mut link)? {
+            return Ok(link);
+        }
+        let words = "it is not armed at tick 0: its motors stand still under `armed_by_channel` and the configuration";
+        Err(link.stream.firmware().complaint(words))
+    }
+
+    /// The refusal of a command, at its line of the configuration.
+    fn refused(&self, refusal: &Refusal<'_>) -> String {
+        let Refusal { command, reason, allowed } = refusal;
+        let mut lines = self.configuration.lines();
+        let line = lines.position(|line| !command.is_empty() && line.trim() == *command);
+        let place =
+            line.map_or(String::new(), |at| format!("{}:{}: ", self.configuration_path.display(), at + 1));
+        let allowed = if allowed.is_empty() { String::new() } else { format!(" ({allowed})") };
+        format!(
+            "{place}the configuration has a command that Betaflight refuses: `{command}`: {reason}{allowed}"
+        )
+    }
+
     /// Input of its command line: the commands of the configuration, then the mixer of the vehicle, which they may not undo,
     /// and `save`.
     fn commands(&self) -> String {
@@ -234,7 +276,7 @@ impl Betaflight {
         }
     }
 
-    /// The packets of a tick, the `step`th of the firmware.
+    /// The packets of a tick, the `step`th of the firmware, without that of the remote control.
     fn packets(&self, step: u64, sensed: &Sensed<'_>) -> TickPackets {
         let time_s = BOOT_S + (step + 1) as f64 * self.period_ns as f64 * 1e-9;
         let Sensed { imu, estimate, rc, .. } = sensed;
@@ -254,7 +296,7 @@ impl Betaflight {
         };
         TickPackets {
             length_ns: self.period_ns,
-            has_sticks: u64::from(step.is_multiple_of(self.rc_ticks)),
+            has_sticks: 0,
             state,
             sticks_time_s: time_s,
             channels_us: std::array::from_fn(|at| pulse_us(rc, at)),
@@ -275,6 +317,27 @@ impl Betaflight {
         }
         Ok(throttles)
     }
+}
+
+/// A command that the firmware refuses: the command, its reason, and the values that it takes, where it prints them.
+#[derive(Debug, PartialEq)]
+struct Refusal<'a> {
+    command: &'a str,
+    reason: &'a str,
+    allowed: &'a str,
+}
+
+/// The first command that the firmware refuses, by the text that it has printed: it prints each command behind a prompt before its answer.
+fn refusal(printed: &str) -> Option<Refusal<'_>> {
+    let lines: Vec<&str> = printed.lines().collect();
+    let at = lines.iter().position(|line| line.contains(REFUSED))?;
+    let before = at.checked_sub(1).map_or("", |at| lines[at]);
+    let behind = lines.get(at + 1).filter(|line| line.starts_with(ALLOWED));
+    Some(Refusal {
+        command: before.trim_start_matches(['#', ' ']).trim_end(),
+        reason: lines[at],
+        allowed: behind.map_or("", |line| line.trim_end()),
+    })
 }
 
 impl Link {
@@ -301,6 +364,8 @@ mod tests {
             layout: Layout::of(&vehicle.rotors, &MIXERS).unwrap(),
             vehicle,
             firmware: Vec::new(),
+            firmware_path: PathBuf::from("betaflight_SITL.elf"),
+            configuration_path: PathBuf::from("bird.cli"),
             configuration: "aux 0 0 0 1700 2100 0 0\nsave\n".to_owned(),
             armed_by_channel: None,
             period_ns: 1_000_000,
@@ -327,7 +392,7 @@ mod tests {
         };
         let rc =
             RcChannels { pulse: [1500.4, 1500.6, 900.0, 9000.0, 2000.0].into(), ..RcChannels::default() };
-        let sensed = Sensed { time_s: 0.0, imu: &imu, estimate: &estimate, rc: &rc };
+        let sensed = Sensed { time_s: 0.0, imu: &imu, estimate: &estimate, rc: &rc, is_rc_new: true };
         let betaflight = hummingbird();
         let packets = betaflight.packets(20, &sensed);
         let state = packets.state;
@@ -345,8 +410,6 @@ mod tests {
         // ISO 2533: 95.46 kPa at 500 m.
         assert!((state.pressure_Pa - 95_461.0).abs() < 5.0, "{}", state.pressure_Pa);
         assert_eq!(packets.channels_us[..6], [1500, 1501, 900, 2200, 2000, 1000], "what is not sent is off");
-        let has_sticks = |step| betaflight.packets(step, &sensed).has_sticks;
-        assert_eq!([has_sticks(20), has_sticks(21), has_sticks(40)], [1, 0, 1], "50 packets a second");
     }
 
     #[test]
@@ -360,5 +423,21 @@ mod tests {
         assert!(betaflight.throttles(&answer).unwrap_err().contains("NaN"), "no output is taken for a stop");
         let commands = "aux 0 0 0 1700 2100 0 0\nmixer QUADP\nset yaw_motors_reversed = OFF\nsave\n";
         assert_eq!(betaflight.commands(), commands);
+    }
+
+    /// Text of the real firmware.
+    #[test]
+    fn a_refused_command_is_found_in_the_printed_text_and_in_its_file() {
+        let mut betaflight = hummingbird();
+        betaflight.configuration = "aux 0 0 0 1700 2100 0 0\nset p_roll = 99999\n".to_owned();
+        let printed = "# aux 0 0 0 1700 2100 0 0\n# set p_roll = 99999\n###ERROR IN set: INVALID VALUE###\nAllowed range: 0 - 250\n";
+        assert_eq!(
+            betaflight.refused(&refusal(printed).unwrap()),
+            "bird.cli:2: the configuration has a command that Betaflight refuses: `set p_roll = 99999`: ###ERROR IN set: INVALID \
+             VALUE### (Allowed range: 0 - 250)"
+        );
+        assert_eq!(refusal("# aux 0 0 0 1700 2100 0 0\nsaved\n"), None);
+        let other = refusal("###ERROR IN set: INVALID VALUE###").unwrap();
+        assert_eq!((other.command, other.allowed), ("", ""));
     }
 }

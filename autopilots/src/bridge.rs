@@ -4,7 +4,7 @@ use crate::autopilot::{Autopilot, Sensed};
 use bus::announcement::Announcement;
 use bus::component::{Component, Info, State, StateError, StepError, Transfer};
 use bus::context::{NodeContext, StepContext};
-use bus::messages::{Imu, MotorCommand, RcChannels, StateEstimate};
+use bus::messages::{Imu, MotorCommand, RcChannels, StateEstimate, Time};
 use bus::{InputPorts, OutputPorts, ParameterError};
 
 /// Inputs of a firmware.
@@ -36,7 +36,20 @@ pub struct Outputs {
 pub struct Bridge<A>(A);
 
 /// The firmware's process, once it runs: what a firmware remembers is its own.
-pub struct BridgeState<L>(Option<L>);
+pub struct BridgeState<L> {
+    link: Option<L>,
+    /// Stamp of the channels of the step before.
+    rc_stamp: Option<Time>,
+}
+
+impl<L> BridgeState<L> {
+    /// True if the channels with `stamp` are others than those of the step before; notes them. A link gives those that were never sent a
+    /// stamp before tick 0.
+    fn is_rc_new(&mut self, stamp: Time) -> bool {
+        let before = self.rc_stamp.replace(stamp);
+        stamp.sec >= 0 && before != Some(stamp)
+    }
+}
 
 impl<L: Send + 'static> State for BridgeState<L> {
     const TRANSFER: Transfer = Transfer::External("a firmware");
@@ -65,15 +78,11 @@ impl<A: Autopilot> Component for Bridge<A> {
     }
 
     fn initial(&self) -> Self::State {
-        BridgeState(None)
+        BridgeState { link: None, rc_stamp: None }
     }
 
-    fn connected(
-        &self,
-        _: &[(&str, &Announcement)],
-        BridgeState(link): &mut Self::State,
-    ) -> Result<(), StepError> {
-        *link = Some(self.0.boot()?);
+    fn connected(&self, _: &[(&str, &Announcement)], state: &mut Self::State) -> Result<(), StepError> {
+        state.link = Some(self.0.boot()?);
         Ok(())
     }
 
@@ -81,19 +90,33 @@ impl<A: Autopilot> Component for Bridge<A> {
         &self,
         context: &StepContext<'_>,
         inputs: Inputs<'_>,
-        BridgeState(link): &mut Self::State,
+        state: &mut Self::State,
     ) -> Result<Outputs, StepError> {
-        let Some(link) = link else { return Err("the firmware was not started".into()) };
         let Inputs { imu, estimate, rc } = inputs;
-        let sensed = Sensed { time_s: context.time_s(), imu, estimate, rc };
+        let is_rc_new = state.is_rc_new(rc.stamp);
+        let Some(link) = &mut state.link else { return Err("the firmware was not started".into()) };
+        let sensed = Sensed { time_s: context.time_s(), imu, estimate, rc, is_rc_new };
         let throttles = self.0.exchange(link, &sensed)?;
         let range = &self.0.vehicle().command;
         let counts = throttles.map(|throttle| range.min + throttle.clamp(0.0, 1.0) * (range.max - range.min));
         Ok(Outputs { command: MotorCommand { command: counts, ..Default::default() } })
     }
 
-    fn finish(&self, BridgeState(link): &mut Self::State) -> Result<(), StepError> {
-        drop(link.take());
+    fn finish(&self, state: &mut Self::State) -> Result<(), StepError> {
+        drop(state.link.take());
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn channels_are_new_once_and_never_before_they_were_sent() {
+        let mut state = BridgeState::<()> { link: None, rc_stamp: None };
+        let stamps = [(-1, 0), (-1, 0), (0, 0), (0, 0), (0, 20), (1, 20), (1, 20)];
+        let are_new = stamps.map(|(sec, nanosec)| state.is_rc_new(Time { sec, nanosec }));
+        assert_eq!(are_new, [false, false, true, false, true, true, false]);
     }
 }

@@ -1,6 +1,8 @@
 //! Finds the motor output of each rotor from the rotors' places and spins, and the firmware's numbering.
 
-use vehicles::Rotor;
+use crate::settings;
+use bus::context::NodeContext;
+use vehicles::{Rotor, Vehicle};
 
 /// A motor of a frame: its angle from the front, clockwise seen from above, in degrees, and whether it turns clockwise.
 pub type Motor = (f64, bool);
@@ -10,6 +12,11 @@ pub type Frame = (&'static str, &'static [Motor]);
 
 /// A rotor stands in a motor's place up to this part of the angle between two neighbours.
 const PLACE: f64 = 25.0 / 90.0;
+
+/// Mixers count on equal arms and upright rotors: warned of is a longest arm of more than this multiple of the shortest, and an axis
+/// that leans by more than this, degrees. Tuned, no source: the integrators of a firmware balance less.
+const ARMS_MAX: f64 = 1.5;
+const LEAN_MAX_DEG: f64 = 20.0;
 
 /// A frame, and the rotor of each of its motors.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,6 +50,30 @@ impl Layout {
             ));
         }
         Ok(Self { frame, is_reversed: reversed[0], motors: order })
+    }
+
+    /// Warns of rotors of `vehicle` for which the frame's mixer was not made.
+    pub fn warn_of_oddities(&self, vehicle: &Vehicle, context: &NodeContext<'_>) {
+        let (rotors, frame) = (&vehicle.rotors, self.frame);
+        let arm_m = |at: usize| rotors[at].position_m.xy().norm();
+        let by_arm = |a: &usize, b: &usize| arm_m(*a).total_cmp(&arm_m(*b));
+        let extremes = (0..rotors.len()).min_by(by_arm).zip((0..rotors.len()).max_by(by_arm));
+        if let Some((least, most)) = extremes.filter(|(least, most)| arm_m(*most) > ARMS_MAX * arm_m(*least))
+        {
+            let (least_m, most_m) = (arm_m(least), arm_m(most));
+            let odd = format!(
+                "has arms of {least_m:.4} m and {most_m:.4} m, and the mixer {frame} counts on equal ones"
+            );
+            settings::warn_of_vehicle(context, vehicle, &odd, &format!("rotors.{least}.position"));
+        }
+        let lean_deg = |rotor: &Rotor| libm::acos(rotor.axis.z.clamp(-1.0, 1.0)).to_degrees();
+        if let Some(at) = rotors.iter().position(|rotor| lean_deg(rotor) > LEAN_MAX_DEG) {
+            let (name, lean_deg) = (&rotors[at].name, lean_deg(&rotors[at]));
+            let odd = format!(
+                "has a rotor \"{name}\" that leans by {lean_deg:.1} degrees, and the mixer {frame} counts on upright ones"
+            );
+            settings::warn_of_vehicle(context, vehicle, &odd, &format!("rotors.{at}.axis"));
+        }
     }
 }
 

@@ -149,6 +149,8 @@ pub struct Link {
     exchanges: u64,
     /// Messages of the sensors sent.
     sent: u64,
+    /// True if channels have come since the last message of the remote control.
+    is_rc_new: bool,
     /// Sequence number of the next message.
     sequence: u8,
     /// Messages to send, and what came.
@@ -229,6 +231,7 @@ impl Autopilot for Px4 {
             stream: self.start()?,
             exchanges: 0,
             sent: 0,
+            is_rc_new: false,
             sequence: 0,
             messages: Vec::new(),
             received: Vec::new(),
@@ -254,6 +257,7 @@ impl Autopilot for Px4 {
     }
 
     fn exchange(&self, link: &mut Link, sensed: &Sensed<'_>) -> Result<Throttles, String> {
+        link.is_rc_new |= sensed.is_rc_new;
         let is_due = link.exchanges.is_multiple_of(self.every);
         link.exchanges += 1;
         if is_due {
@@ -284,9 +288,10 @@ impl Px4 {
     fn await_start(&self, link: &mut Link) -> Result<(), String> {
         let (imu, estimate, rc) =
             (imu_at_rest(&self.vehicle), StateEstimate::default(), RcChannels::default());
-        let sensed = Sensed { time_s: 0.0, imu: &imu, estimate: &estimate, rc: &rc };
+        let sensed = Sensed { time_s: 0.0, imu: &imu, estimate: &estimate, rc: &rc, is_rc_new: true };
         self.receive(link)?;
         while link.sent < START_UP_MAX {
+            link.is_rc_new = true;
             self.sense(link, &sensed)?;
             if link.is_started && link.stale == 0 {
                 return Ok(());
@@ -313,7 +318,7 @@ impl Px4 {
 
     /// Messages of a step. That of the sensors is the last one: it sets the clock.
     fn write_messages(&self, link: &mut Link, time_us: u64, sensed: &Sensed<'_>) {
-        let Link { sent, sequence, messages: bytes, is_at_rest, .. } = link;
+        let Link { sent, sequence, messages: bytes, is_at_rest, is_rc_new, .. } = link;
         let estimate = sensed.estimate;
         let field_B_T = self.magnetic_field.vector_B_T(estimate.attitude);
         // At rest, a position is one from the place of the rest.
@@ -330,7 +335,9 @@ impl Px4 {
         if sent.is_multiple_of(GPS_EVERY) {
             add(HIL_GPS, &|payload| sample.gps(payload));
         }
-        if sent.is_multiple_of(CHANNELS_EVERY) {
+        // Without this message, the firmware takes its remote control for lost.
+        if *is_rc_new && sent.is_multiple_of(CHANNELS_EVERY) {
+            *is_rc_new = false;
             add(RC_CHANNELS, &|payload| sample.channels(payload));
         }
         add(HIL_STATE_QUATERNION, &|payload| sample.state(payload));

@@ -37,8 +37,10 @@ impl Rest {
         for step in 0..all {
             let rc = self.rc(step + armed >= all);
             let time_s = (step as f64 - all as f64) * self.period_s;
-            throttles =
-                autopilot.exchange(link, &Sensed { time_s, imu: &imu, estimate: &estimate, rc: &rc })?;
+            throttles = autopilot.exchange(
+                link,
+                &Sensed { time_s, imu: &imu, estimate: &estimate, rc: &rc, is_rc_new: true },
+            )?;
         }
         Ok(self.armed_by_channel.is_none() || throttles.iter().any(|throttle| *throttle > 0.0))
     }

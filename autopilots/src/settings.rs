@@ -1,11 +1,12 @@
 //! Parameters and files that firmwares have in common.
 
 use bus::context::NodeContext;
+use controllers::airframe::ControlledVehicle;
 use diagnostics::ParameterError;
 use diagnostics::parameter::{positive_up_to, refuse};
 use std::path::Path;
 use std::time::Duration;
-use vehicles::Vehicle;
+use vehicles::{Rotor, Vehicle};
 
 /// First channel of a switch; those before are the sticks.
 const FIRST_SWITCH: usize = 5;
@@ -66,6 +67,17 @@ pub fn preloadable(
     Ok(program)
 }
 
+/// Refuses a program in which the text `mark` does not occur; `reason` says why it is needed.
+///
+/// # Errors
+/// The text does not occur.
+pub fn require_text(program: &[u8], path: &Path, mark: &str, reason: &str) -> Result<(), ParameterError> {
+    let has_text = program.windows(mark.len()).any(|window| window == mark.as_bytes());
+    refuse(!has_text, "firmware", || {
+        format!("{}: {reason}: the text `{mark}` does not occur in it", path.display())
+    })
+}
+
 /// True for an ELF program with a program header that names the dynamic linker.
 fn has_interpreter(program: &[u8]) -> bool {
     /// Type of that header (`PT_INTERP`).
@@ -91,12 +103,25 @@ pub fn configuration(context: &NodeContext<'_>, path: Option<&Path>) -> Result<S
     Ok(bytes.map_or(String::new(), |bytes| String::from_utf8_lossy(&bytes).into_owned()))
 }
 
-/// The vehicle at `path`.
+/// The vehicle at `path`, by the same checks as those of controllers. Warns of rotors that have failed: no firmware is told.
 ///
 /// # Errors
-/// It is refused.
+/// It is refused, or its rotors cannot hover.
 pub fn vehicle(context: &NodeContext<'_>, path: &Path) -> Result<Vehicle, ParameterError> {
-    Vehicle::load_from(&context.files, path).map_err(|error| error.named_by("vehicle"))
+    let vehicle = ControlledVehicle::load(&context.files, path)?.vehicle;
+    for (at, _) in vehicle.rotors.iter().enumerate().filter(|(_, rotor)| rotor.has_failed) {
+        let Rotor { name, .. } = &vehicle.rotors[at];
+        let odd = format!("has a rotor \"{name}\" that has failed, and the firmware counts on each");
+        warn_of_vehicle(context, &vehicle, &odd, &format!("rotors.{at}."));
+    }
+    Ok(vehicle)
+}
+
+/// Warns of something odd about `vehicle`, with the first number in its file whose key begins with `key`.
+pub fn warn_of_vehicle(context: &NodeContext<'_>, vehicle: &Vehicle, odd: &str, key: &str) {
+    let number = vehicle.provenance.iter().find(|number| number.key.starts_with(key));
+    let place = number.map_or(String::new(), |it| format!("; look at {}:{}: `{}`", it.file, it.line, it.key));
+    context.warn("vehicle", format!("`vehicle` \"{}\" {odd}{place}", vehicle.name));
 }
 
 /// The refusal of a vehicle.

@@ -85,7 +85,9 @@ fn at_its_line(
     let key = match error {
         AllocationError::Singular { part: Part::Thrust, .. } => "rotor.thrust_coefficient",
         AllocationError::Singular { part: Part::Yaw, .. } => "rotors.0.spin",
-        AllocationError::Singular { .. } | AllocationError::Unheld { .. } => "rotors.0.position",
+        AllocationError::Singular { .. }
+        | AllocationError::Unheld { .. }
+        | AllocationError::Unbalanced { .. } => "rotors.0.position",
         AllocationError::SpeedRange { .. } => "command.speed_at_min",
     };
     let message = ParameterError::conflict(key, error);

@@ -75,7 +75,7 @@ pub enum AllocationError {
         "its {working} working rotors of {rotors} cannot make thrust and three torques independently: {part} is not \
          controllable{}; expected four or more rotors that push and turn each in a way of its own; correct `rotors` and \
          `rotor` of the vehicle file",
-        why(*part, *working, *is_one_way)
+        why(*part, (*rotors, *working), *is_one_way)
     )]
     Singular {
         /// Number of rotors.
@@ -86,6 +86,19 @@ pub enum AllocationError {
         part: Part,
         /// True if all working rotors turn one way.
         is_one_way: bool,
+    },
+    /// Within their limits, no speeds of the rotors carry the weight without a torque.
+    #[error(
+        "its {working} working rotors of {rotors} cannot hover: wherever they carry the weight, a {part} torque remains unbalanced; \
+         expected rotors on both sides of the centre of mass; correct `rotors` of the vehicle file"
+    )]
+    Unbalanced {
+        /// Number of rotors.
+        rotors: usize,
+        /// Number of those that have not failed.
+        working: usize,
+        /// The torque that remains.
+        part: Part,
     },
     /// Within their limits, the rotors do not make a torque both ways while they carry the weight.
     #[error(
@@ -112,13 +125,16 @@ pub enum AllocationError {
 }
 
 /// The likely reason for a part that is not controllable.
-fn why(part: Part, working: usize, is_one_way: bool) -> &'static str {
+fn why(part: Part, (rotors, working): (usize, usize), is_one_way: bool) -> &'static str {
     match part {
+        Part::Yaw if working == 3 && rotors > 3 => " (with three rotors it turns about z)",
         Part::Yaw if working == 3 => {
             " (a tricopter needs a servo that tilts a rotor, which no vehicle file describes)"
         }
         Part::Yaw if is_one_way => " (all rotors turn one way, so that yaw follows from thrust)",
         Part::Yaw => "",
+        Part::Roll | Part::Pitch if working == 1 => " (a single rotor makes no torque without thrust)",
+        Part::Roll | Part::Pitch if working == 2 => " (two rotors are always in a line)",
         Part::Roll | Part::Pitch => " (are the rotors in a line?)",
         Part::Thrust => " (`rotor.thrust_coefficient` is 0)",
     }
@@ -201,6 +217,8 @@ impl Allocation {
         let (min_N, max_N) = made.thrust_range_N(THRUST_RESERVE);
         let thrust_N = (vehicle.mass_kg * vehicle.gravity_m_s2).clamp(min_N, max_N);
         made.hover = made.within_limits(&RotorWrench { thrust_N, ..RotorWrench::default() });
+        let unbalanced = |part| AllocationError::Unbalanced { rotors, working, part };
+        made.unbalanced(thrust_N).map_or(Ok(()), |part| Err(unbalanced(part)))?;
         made.unheld().map_or(Ok(made), |part| Err(AllocationError::Unheld { rotors, working, part }))
     }
 
@@ -313,6 +331,18 @@ impl Allocation {
         start.iter_mut().zip(&squares).for_each(|(part, square)| *part = square / self.square_max_rad2_s2);
         let parts = self.bounded.solve(&torques_then_thrust(demand), &start);
         PerRotor::from_fn(squares.len(), |rotor| parts[rotor] * self.square_max_rad2_s2)
+    }
+
+    /// The torque that the rotors make at equal speeds, if no speeds make the thrust `hover_N` without a torque: torques come first, so that
+    /// the speeds of hover then make less.
+    fn unbalanced(&self, hover_N: f64) -> Option<Part> {
+        let missed_N = hover_N - self.wrench(&self.hover.map(f64::sqrt)).thrust_N;
+        if missed_N.abs() < HELD_MIN * hover_N {
+            return None;
+        }
+        let at_equal_speeds: Vector4<f64> = self.effectiveness.iter().map(torques_first).sum();
+        let torques = at_equal_speeds.component_div(self.bounded.sizes());
+        Some([Part::Roll, Part::Pitch, Part::Yaw][torques.xyz().iamax()])
     }
 
     /// The first torque that the rotors cannot make both ways in hover. Yaw is tried first: rotors have least of it.
@@ -622,7 +652,9 @@ mod tests {
     fn refused(vehicle: &Vehicle) -> (Option<Part>, String) {
         let error = Allocation::new(vehicle).unwrap_err();
         let part = match error {
-            AllocationError::Singular { part, .. } | AllocationError::Unheld { part, .. } => Some(part),
+            AllocationError::Singular { part, .. }
+            | AllocationError::Unheld { part, .. }
+            | AllocationError::Unbalanced { part, .. } => Some(part),
             AllocationError::SpeedRange { .. } => None,
         };
         (part, error.to_string())
@@ -636,10 +668,33 @@ mod tests {
             assert!(message.contains(&format!("its {count} working rotors of {count} cannot")), "{message}");
         }
         assert!(refused(&ring(3)).1.contains("a tricopter needs a servo"));
+        assert!(refused(&ring(1)).1.contains("a single rotor makes no torque"));
+        let mut failed = hummingbird();
+        failed.rotors[1].has_failed = true;
+        assert!(
+            refused(&failed).1.contains("3 working rotors of 4")
+                && refused(&failed).1.contains("it turns about z")
+        );
         let mut one_way = ring(6);
         one_way.rotors.iter_mut().for_each(|rotor| rotor.spin = 1.0);
         let (part, message) = refused(&one_way);
         assert!(part == Some(Part::Yaw) && message.contains("all rotors turn one way"), "{message}");
+    }
+
+    #[test]
+    fn rotors_on_one_side_leave_a_torque() {
+        let moved = |by_m: Vector3<f64>| {
+            let mut vehicle = hummingbird();
+            vehicle.rotors.iter_mut().for_each(|rotor| rotor.position_m += by_m);
+            Allocation::new(&vehicle)
+        };
+        let refused = |by_m: Vector3<f64>| moved(by_m).unwrap_err();
+        let unbalanced = |part| AllocationError::Unbalanced { rotors: 4, working: 4, part };
+        assert_eq!(refused(Vector3::x() * 0.4), unbalanced(Part::Pitch));
+        assert_eq!(refused(Vector3::y() * -0.4), unbalanced(Part::Roll));
+        let message = refused(Vector3::x() * 0.4).to_string();
+        assert!(message.contains("cannot hover") && message.contains("a pitch torque remains"), "{message}");
+        assert!(moved(Vector3::x() * 0.02).is_ok(), "the rotors in front and behind balance");
     }
 
     #[test]

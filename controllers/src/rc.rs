@@ -12,7 +12,7 @@ use inputs::InputFiles;
 use serde::Deserialize;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
-use vehicles::table::{Dialect, Table, names, shown};
+use vehicles::table::{Dialect, Table, TableError, names, shown};
 
 /// Number of the throttle's channel, from 1.
 const THROTTLE: usize = 3;
@@ -118,6 +118,12 @@ impl Component for Rc {
             )
         })?;
         script.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
+        if let Some(Move { channel, at_s, pulse_us, .. }) = never_acting(&script) {
+            let message = format!(
+                "`script` moves channel {channel} twice at {at_s} s: the move to {pulse_us} µs never acts; leave it out"
+            );
+            context.warn("script", message);
+        }
         let end_s = context.duration_s();
         for Move { channel, at_s, .. } in script.iter().filter(|it| it.at_s >= end_s) {
             let message = format!(
@@ -179,6 +185,17 @@ fn segments(script: &[Move]) -> Vec<Segment> {
     segments
 }
 
+/// Returns the first move of `script`, which is sorted by start, that another of its channel replaces when it starts. A step before a ramp
+/// is where the ramp starts.
+fn never_acting(script: &[Move]) -> Option<&Move> {
+    script.iter().enumerate().find_map(|(at, first)| {
+        let is_twin =
+            |other: &&Move| other.channel == first.channel && other.at_s.total_cmp(&first.at_s).is_eq();
+        let next = script[at + 1..].iter().find(is_twin)?;
+        (first.over_s > 0.0 || next.over_s == 0.0).then_some(first)
+    })
+}
+
 fn neutral_us(channel: usize) -> f64 {
     if channel <= STICKS && channel != THROTTLE { MIDDLE_US } else { LOW_US }
 }
@@ -222,18 +239,19 @@ impl Recording {
     fn read(bytes: &[u8]) -> Result<Self, String> {
         let known: Vec<String> = (1..=RC_CHANNELS_MAX).map(|channel| format!("ch{channel}")).collect();
         let wanted: Vec<&str> = std::iter::once("time_s").chain(known.iter().map(String::as_str)).collect();
-        let table =
-            Table::parse(bytes, &wanted, &Dialect::default()).map_err(|cause| format!(": {cause}"))?;
-        let time = table.column("time_s").map_err(|cause| format!(": {cause}"))?;
+        let table = Table::parse(bytes, &wanted, &Dialect::default())
+            .map_err(|cause| format!(": {}", without_keys(&cause)))?;
         let place = |(index, name): (usize, &String)| Some((index + 1, table.column(name).ok()?));
         let places: Vec<(usize, usize)> = known.iter().enumerate().filter_map(place).collect();
         let line = table.header_line.unwrap_or(1);
-        if places.is_empty() || places.len() + 1 != table.headers.len() {
+        let time = table.column("time_s").ok();
+        let is_whole = !places.is_empty() && places.len() + 1 == table.headers.len();
+        let Some(time) = time.filter(|_| is_whole) else {
             let found = names(&table.headers);
             return Err(format!(
                 ":{line}: expected the columns time_s and ch1 to ch{RC_CHANNELS_MAX}, each once, found {found}"
             ));
-        }
+        };
         let mut read = Self {
             channels: places.iter().map(|(channel, _)| *channel).collect(),
             times_s: Vec::new(),
@@ -279,6 +297,13 @@ impl Recording {
         refuse(from_s > last_s, "from_s", || {
             format!("`from_s` is {from_s} s, expected at most {last_s} s, the time of the last row of `data`")
         })?;
+        let begin_s = self.times_s.first().copied().unwrap_or_default() - from_s;
+        if begin_s > 0.0 {
+            context.warn(
+                "data",
+                format!("`data` begins at {begin_s} s of the run: its first pulses are sent from 0 s on; set `from_s` to begin with its first row"),
+            );
+        }
         let end_s = last_s - from_s;
         if end_s < context.duration_s() {
             context.warn(
@@ -304,9 +329,58 @@ impl Recording {
     }
 }
 
+/// Text of a fault of the file, without the advice to set a key `csv`, which `rc` does not have.
+fn without_keys(cause: &TableError) -> String {
+    let text = cause.to_string();
+    if !text.contains("`csv.") {
+        return text;
+    }
+    let fault = text.split(';').next().unwrap_or_default();
+    let is_of_keys = fault.contains("`csv.");
+    let fault = if is_of_keys { String::new() } else { format!("{fault}; ") };
+    format!(
+        "{fault}expected a line with the names time_s, ch1, ch2, …, then rows of numbers with decimal points"
+    )
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Warnings of `text`, with `files`.
+    fn warnings(text: &str) -> Vec<String> {
+        let context = NodeContext::new("rc", &[]).timed(1_000_000, 1, 1000);
+        Rc::new(toml::from_str(text).unwrap(), &context).unwrap();
+        context.into_warnings().into_iter().map(|warning| warning.message).collect()
+    }
+
+    #[test]
+    fn a_move_that_never_acts_is_warned_of() {
+        let twice = |first: &str, second: &str| {
+            let of = |more: &str| format!("{{ channel = 3, at_s = 0.5, {more} }}");
+            warnings(&format!("script = [{}, {}]", of(first), of(second)))
+        };
+        let told = twice("pulse_us = 1200", "pulse_us = 1400");
+        assert!(told[0].contains("channel 3 twice at 0.5 s: the move to 1200 µs never acts"), "{told:?}");
+        assert_eq!(twice("pulse_us = 1200, over_s = 1.0", "pulse_us = 1400, over_s = 1.0").len(), 1);
+        assert_eq!(
+            twice("pulse_us = 1200", "pulse_us = 1400, over_s = 1.0"),
+            [""; 0],
+            "the ramp starts at 1200"
+        );
+    }
+
+    #[test]
+    fn data_that_begins_late_is_warned_of() {
+        let told = |text: &str, from_s: f64| {
+            let context = NodeContext::new("rc", &[]).timed(1_000_000, 1, 1000);
+            Recording::read(text.as_bytes()).unwrap().check_times(from_s, &context).unwrap();
+            context.into_warnings().into_iter().map(|warning| warning.message).collect::<Vec<_>>()
+        };
+        let text = "time_s,ch1\n3,1500\n9,1600\n";
+        assert!(told(text, 0.0)[0].contains("begins at 3 s of the run"));
+        assert_eq!(told(text, 3.0), [""; 0]);
+    }
 
     fn rc(text: &str) -> Result<Rc, ParameterError> {
         Rc::new(toml::from_str(text).unwrap(), &NodeContext::new("rc", &[]))
@@ -348,6 +422,10 @@ mod tests {
         assert!(refused("time_s,ch1\n0,15\n").contains("column `ch1`: expected pulses of 800 to 2200 µs"));
         assert!(refused("time_s,ch1,roll\n0,1500,1\n").contains("ch1 to ch16"));
         assert!(refused("time_s,ch1\n").contains("at least one row"));
+        for text in ["ch1,ch2\n1500,1500\n", "1500,1500\n1500,1500\n", "time,ch1\n0,1500\n"] {
+            let fault = refused(text);
+            assert!(fault.contains("time_s") && !fault.contains("csv."), "{fault}");
+        }
         for text in [
             "script = [{ channel = 17, at_s = 0.0, pulse_us = 1500 }]",
             "script = [{ channel = 1, at_s = 0.0, pulse_us = 500 }]",

@@ -168,6 +168,12 @@ impl Component for RemoteControl {
                 )
             })?;
         }
+        if let Some(Switch { channel, at_s, pulse_us }) = never_acting(&parameters.switches) {
+            let message = format!(
+                "`switches` moves channel {channel} twice at {at_s} s: the move to {pulse_us} µs never acts; leave it out"
+            );
+            context.warn("switches", message);
+        }
         Ok(Self { parameters, period_s: context.period_s() })
     }
 
@@ -194,6 +200,13 @@ impl Component for RemoteControl {
         let pulse = Bounded::from_fn(last, channel);
         Ok(Outputs { rc: RcChannels { pulse, ..Default::default() } })
     }
+}
+
+/// Returns the first of `switches` that a later one of the same channel and time replaces.
+fn never_acting(switches: &[Switch]) -> Option<&Switch> {
+    let is_twin = |a: &Switch, b: &Switch| a.channel == b.channel && a.at_s.total_cmp(&b.at_s).is_eq();
+    let mut all = switches.iter().enumerate();
+    all.find_map(|(at, first)| switches[at + 1..].iter().any(|other| is_twin(first, other)).then_some(first))
 }
 
 impl RemoteControl {
@@ -242,6 +255,20 @@ mod tests {
             serde_json::json!({ "tilt_max_deg": 30, "yaw_rate_max_deg_s": 90, "hover_throttle": 0.4 });
         parameters.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
         bus::Harness::from_json(&parameters).unwrap()
+    }
+
+    #[test]
+    fn a_switch_that_moves_twice_at_one_time_is_warned_of() {
+        let told = |second_s: f64| {
+            let context = NodeContext::new("sticks", &[]);
+            let parameters = serde_json::json!({ "tilt_max_deg": 30, "yaw_rate_max_deg_s": 90, "hover_throttle": 0.4, "switches": [
+                { "channel": 5, "at_s": 1.0, "pulse_us": 2000 }, { "channel": 5, "at_s": second_s, "pulse_us": 1000 },
+            ] });
+            RemoteControl::new(serde_json::from_value(parameters).unwrap(), &context).unwrap();
+            context.into_warnings().into_iter().map(|warning| warning.message).collect::<Vec<_>>()
+        };
+        assert!(told(1.0)[0].contains("channel 5 twice at 1 s: the move to 2000 µs never acts"));
+        assert_eq!(told(2.0), [""; 0]);
     }
 
     /// An integral beyond full throttle comes back when the vehicle is too high, also where nothing else answers.

@@ -50,6 +50,8 @@ pub struct Diagnostic {
     pub help: String,
     /// Other faults of the file.
     others: Vec<Diagnostic>,
+    /// Legal but unusual values, which may explain the faults.
+    warnings: Vec<Diagnostic>,
 }
 
 impl Diagnostic {
@@ -58,7 +60,7 @@ impl Diagnostic {
     pub fn in_file(file: impl Into<String>, error: impl Into<ParameterError>) -> Self {
         let error = error.into();
         let help = error.help();
-        Self { file: file.into(), place: None, error, help, others: Vec::new() }
+        Self { file: file.into(), place: None, error, help, others: Vec::new(), warnings: Vec::new() }
     }
 
     /// Creates a fault at `place`.
@@ -110,7 +112,7 @@ impl Diagnostic {
 
     /// Iterates over this fault and the others of the file, each on its own.
     pub fn all(&self) -> impl Iterator<Item = Self> + '_ {
-        let alone = Self { others: Vec::new(), ..self.clone() };
+        let alone = Self { others: Vec::new(), warnings: Vec::new(), ..self.clone() };
         std::iter::once(alone).chain(self.others.iter().cloned())
     }
 
@@ -123,6 +125,18 @@ impl Diagnostic {
             self.others.extend(more);
         }
         self
+    }
+
+    /// The same faults, with `warnings` that may explain them.
+    #[must_use]
+    pub fn with_warnings(self, warnings: Vec<Self>) -> Self {
+        Self { warnings, ..self }
+    }
+
+    /// Legal but unusual values beside the faults; its text is without them.
+    #[must_use]
+    pub fn warnings(&self) -> &[Self] {
+        &self.warnings
     }
 
     /// The same faults, each told once: a misspelt key is not missing as well, and the faults of a file that several

@@ -17,7 +17,7 @@ const GYRATION_MAX: f64 = 1.5;
 /// One below this multiple is odd: motors are at the ends of the arms. Tuned, no source.
 const GYRATION_MIN: f64 = 0.03;
 /// Motors with a slower pole are odd: those of multirotors take 0.01 to 0.3 s. Tuned, no source.
-const SLOW_MAX_S: f64 = 1.0;
+const SLOW_MAX_S: f64 = 0.3;
 
 /// Warns of everything odd about the vehicle of `airframe` and its effects.
 pub(crate) fn tell(airframe: &Airframe, run: &NodeContext<'_>) {

@@ -64,7 +64,12 @@ impl fmt::Display for Graph {
                 OnExit::Ignore => "; if it ends with an error, the run goes on",
                 OnExit::Stop | OnExit::Standby => "; if it ends with an error, so does the run",
             };
-            writeln!(f, "\n{name} ({}), takes no part in the ticks{ready}{end}", what(program))
+            let after = if program.after.is_empty() {
+                String::new()
+            } else {
+                format!("; starts when {} is ready", program.after.join(", "))
+            };
+            writeln!(f, "\n{name} ({}), takes no part in the ticks{after}{ready}{end}", what(program))
         })
     }
 }

@@ -1,6 +1,7 @@
 //! From a manifest to the plan of a run, checked before anything starts.
 //!
 //! - `processes`: the executable of each process, and its settings on the host
+//! - `sidecars`: processes beside the ticks, and the order in which they start
 //! - `outputs`, `inputs`, `wiring`: topics and edges
 //! - `computing_time`: computing time of the steps
 //! - `parameters`, `recorders`: parameters and files of each node
@@ -23,6 +24,7 @@ mod periods;
 mod processes;
 mod ranges;
 mod recorders;
+mod sidecars;
 mod wiring;
 
 pub use crate::program::BackupSpec;
@@ -104,11 +106,16 @@ impl Graph {
     /// # Errors
     /// As [`Graph::build`].
     pub fn build_from(manifest: &Manifest, files: InputFiles) -> Result<Self, Diagnostic> {
+        let mut notes = Notes::default();
+        Self::noting(manifest, files, &mut notes).map_err(|fault| notes.explain(fault))
+    }
+
+    fn noting(manifest: &Manifest, files: InputFiles, notes: &mut Notes) -> Result<Self, Diagnostic> {
         manifest.included().for_each(|(path, text)| files.keep(path, text.as_bytes().to_vec()));
         // A fault does not hide those of other keys, so that one look shows all of them.
         let mut faults = Faults::default();
         let declared_nodes = faults.keep(processes::declared_nodes(manifest, &files));
-        let sidecars = faults.keep(processes::sidecars(manifest));
+        let sidecars = faults.keep(sidecars::sidecars(manifest));
         faults.keep(processes::require_own_logs(manifest));
         let wired = declared_nodes.as_deref().and_then(|nodes| faults.keep(wire_apart(nodes, None)));
         let planned =
@@ -123,23 +130,22 @@ impl Graph {
         if manifest.content.run.window_ticks.is_none() && groups.as_ref().is_some_and(|it| !it.is_empty()) {
             plan.window_ticks = GROUPS_WINDOW_TICKS;
         }
-        let mut notes = Notes::default();
-        let periods = faults.keep(periods::check(manifest, &declared_nodes, &plan, &mut notes));
+        let periods = faults.keep(periods::check(manifest, &declared_nodes, &plan, notes));
         if periods.is_some() {
-            set_parameters(&declared_nodes, &mut plan, &faulty, &mut notes, &mut faults);
+            set_parameters(&declared_nodes, &mut plan, &faulty, notes, &mut faults);
         }
         faults.keep(recorders::check(&declared_nodes, &plan.nodes));
         let programs: Vec<Program> = declared_nodes.iter().map(|declared| declared.program.clone()).collect();
-        faults.keep(evaluations::check(manifest, &plan, &programs, &mut notes));
+        faults.keep(evaluations::check(manifest, &plan, &programs, notes));
         // A backup is wired as its node is: those of faulty nodes would repeat their faults.
         let backups = match faults.is_empty() {
-            true => faults.keep(backups::all(manifest, &plan, &declared_nodes, &mut notes)),
+            true => faults.keep(backups::all(manifest, &plan, &declared_nodes, notes)),
             false => None,
         };
-        let (models, mut warnings) = notes.into_parts(manifest);
         let (Some(groups), Some(backups), Some(sidecars)) = (groups, backups, sidecars) else {
             return faults.finish(None);
         };
+        let (models, mut warnings) = std::mem::take(notes).into_parts(manifest);
         plan.groups = groups;
         faults.keep(checkpoints::add(manifest, &mut plan, &programs, &backups, &mut warnings));
         let begun = BTreeMap::new();

@@ -276,6 +276,12 @@ impl Manifest {
         self.sources.resolve(written)
     }
 
+    /// The text `written` with the variables of the environment in place of `${NAME}` and `${NAME:-default}`; `what` begins the fault of
+    /// one that is not set.
+    pub(crate) fn expand(&self, written: &Spanned<String>, what: &str) -> Result<String, Diagnostic> {
+        self.sources.expand(written, what)
+    }
+
     /// Path of the file `key`, which is `vehicle`, `scene` or `gains`, of the process `name`; `None` if it names none.
     #[must_use]
     pub fn file_path(&self, name: &str, key: &str) -> Option<PathBuf> {

@@ -70,6 +70,8 @@ pub struct Program {
     pub watchdog: Duration,
     /// Condition for a sidecar to count as ready.
     pub ready: Readiness,
+    /// Sidecars that have to become ready before it starts.
+    pub after: Vec<String>,
     /// File for its standard output and error; in the run directory where absent.
     pub log: Option<PathBuf>,
 }

@@ -17,8 +17,10 @@ pub struct Sidecars<'a, B: Body> {
 }
 
 struct Sidecar<'a, B: Body> {
+    name: &'a str,
     program: &'a Program,
-    process: Process<B>,
+    /// None until those have become ready after which it starts.
+    process: Option<Process<B>>,
     is_ready: bool,
     /// True if the first tick need not wait for it any more.
     was_ready: bool,
@@ -47,54 +49,64 @@ impl<'a, B: Body> Sidecars<'a, B> {
         Self { all: Vec::new() }
     }
 
-    /// Starts a sidecar; `now` is the watchdogs' time, here and below.
+    /// Adds a sidecar.
+    pub fn add(&mut self, name: &'a str, program: &'a Program) {
+        let started = Duration::ZERO;
+        self.all.push(Sidecar { name, program, process: None, is_ready: false, was_ready: false, started });
+    }
+
+    /// Starts those that wait for no other; `now` is the watchdogs' time, here and below.
     ///
     /// # Errors
-    /// If it cannot be started.
-    pub fn start(
-        &mut self,
-        world: &mut impl World<Body = B>,
-        now: Duration,
-        name: &str,
-        program: &'a Program,
-    ) -> Result<()> {
-        let role = Role::Sidecar { index: self.all.len(), generation: 0 };
-        let process = Process::new(name, role, world.start(name, role, Some(program))?);
-        let is_ready = program.ready == Readiness::Started;
-        self.all.push(Sidecar { program, process, is_ready, was_ready: is_ready, started: now });
+    /// If one cannot be started.
+    pub fn start(&mut self, world: &mut impl World<Body = B>, now: Duration) -> Result<()> {
+        while let Some(index) = (0..self.all.len()).find(|index| self.is_due(*index)) {
+            let sidecar = &mut self.all[index];
+            let role = Role::Sidecar { index, generation: 0 };
+            let body = world.start(sidecar.name, role, Some(sidecar.program))?;
+            sidecar.process = Some(Process::new(sidecar.name, role, body));
+            sidecar.is_ready = sidecar.program.ready == Readiness::Started;
+            (sidecar.was_ready, sidecar.started) = (sidecar.is_ready, now);
+        }
         Ok(())
     }
 
-    /// Hears which are ready and looks which have ended; kills those that do not get ready in their time.
+    /// True if sidecar `index` has not been started and those have become ready after which it starts.
+    fn is_due(&self, index: usize) -> bool {
+        let Sidecar { program, process, .. } = &self.all[index];
+        let was_ready = |name: &String| self.all.iter().any(|other| other.name == name && other.was_ready);
+        process.is_none() && program.after.iter().all(was_ready)
+    }
+
+    /// Hears which are ready and looks which have ended; kills those that do not get ready in their time, and starts those that have waited
+    /// for others.
     ///
     /// # Errors
-    /// If a process cannot be watched.
+    /// If a process cannot be watched or started.
     pub fn look(&mut self, world: &mut impl World<Body = B>, now: Duration) -> Result<()> {
         for (index, sidecar) in self.all.iter_mut().enumerate() {
+            let Some(process) = &mut sidecar.process else { continue };
             sidecar.is_ready |= world.hears_ready(index);
             sidecar.was_ready |= sidecar.is_ready;
-            sidecar.process.look()?;
-            sidecar.note_early_end();
+            process.look()?;
+            note_early_end(process, sidecar.is_ready);
             let patience = sidecar.program.watchdog;
-            if !sidecar.is_ready
-                && sidecar.process.end.is_none()
-                && now.saturating_sub(sidecar.started) > patience
-            {
+            if !sidecar.is_ready && process.end.is_none() && now.saturating_sub(sidecar.started) > patience {
                 let milliseconds = patience.as_millis();
-                sidecar.process.kill();
-                sidecar.process.verdict = Some(format!(
+                process.kill();
+                process.verdict = Some(format!(
                     "was killed by the watchdog: it did not say within {milliseconds} ms that it is ready; \
                      `ready = \"notify\"` waits for READY=1 on the socket NOTIFY_SOCKET, as `systemd-notify \
                      --ready` sends it"
                 ));
             }
         }
-        Ok(())
+        self.start(world, now)
     }
 
-    /// The processes of all.
+    /// The processes of all that were started.
     pub fn bodies(&self) -> impl Iterator<Item = &B> {
-        self.all.iter().map(|sidecar| &sidecar.process.body)
+        self.all.iter().filter_map(|sidecar| sidecar.process.as_ref()).map(|process| &process.body)
     }
 
     /// True if every sidecar that the first tick waits for is ready.
@@ -104,17 +116,20 @@ impl<'a, B: Body> Sidecars<'a, B> {
 
     /// The next one that has failed and is not settled; it counts as settled then.
     pub fn next_failure(&mut self, now: Duration) -> Option<Failure> {
-        let has_failed = |sidecar: &Sidecar<'_, B>| !sidecar.process.is_settled && sidecar.has_failed();
-        let index = self.all.iter().position(has_failed)?;
-        let sidecar = &mut self.all[index];
-        sidecar.process.is_settled = true;
-        let lived = now.saturating_sub(sidecar.started);
-        Some(Failure {
-            index,
-            name: sidecar.process.name.clone(),
-            policy: sidecar.program.on_exit,
-            is_possible: sidecar.process.role.generation() == 0 || lived >= LIFE_MIN,
-            message: sidecar.process.post_mortem(),
+        self.all.iter_mut().enumerate().find_map(|(index, sidecar)| {
+            let process = sidecar.process.as_mut()?;
+            if process.is_settled || !has_failed(process, sidecar.is_ready) {
+                return None;
+            }
+            process.is_settled = true;
+            let lived = now.saturating_sub(sidecar.started);
+            Some(Failure {
+                index,
+                name: process.name.clone(),
+                policy: sidecar.program.on_exit,
+                is_possible: process.role.generation() == 0 || lived >= LIFE_MIN,
+                message: process.post_mortem(),
+            })
         })
     }
 
@@ -129,40 +144,33 @@ impl<'a, B: Body> Sidecars<'a, B> {
     /// If it cannot be started.
     pub fn restart(&mut self, world: &mut impl World<Body = B>, now: Duration, index: usize) -> Result<()> {
         let sidecar = &mut self.all[index];
+        let Some(before) = &mut sidecar.process else { return Ok(()) };
         sidecar.started = now;
         sidecar.is_ready = sidecar.program.ready == Readiness::Started;
-        sidecar.process.body.remove_log();
-        let role = Role::Sidecar { index, generation: sidecar.process.role.generation() + 1 };
-        let name = sidecar.process.name.clone();
-        let body = world.start(&name, role, Some(sidecar.program))?;
-        sidecar.process = Process::new(&name, role, body);
+        before.body.remove_log();
+        let role = Role::Sidecar { index, generation: before.role.generation() + 1 };
+        let body = world.start(sidecar.name, role, Some(sidecar.program))?;
+        *before = Process::new(sidecar.name, role, body);
         Ok(())
     }
 }
 
 impl<B: Body> Drop for Sidecars<'_, B> {
     fn drop(&mut self) {
-        self.all.iter_mut().for_each(|sidecar| sidecar.process.kill());
+        self.all.iter_mut().filter_map(|sidecar| sidecar.process.as_mut()).for_each(Process::kill);
     }
 }
 
-impl<B: Body> Sidecar<'_, B> {
-    /// Notes an end with code 0 of a sidecar that had to report that it is ready, and did not. Any other end with
-    /// code 0 is in order.
-    fn note_early_end(&mut self) {
-        if !self.is_ready
-            && self.process.verdict.is_none()
-            && self.process.end.as_ref().is_some_and(|end| end.success())
-        {
-            let text =
-                "ended with exit code 0 before it said that it is ready: READY=1 on the socket NOTIFY_SOCKET";
-            self.process.verdict = Some(text.to_owned());
-        }
+/// Notes an end with code 0 of a sidecar that had to report that it is ready, and did not. Any other end with code 0 is in order.
+fn note_early_end<B: Body>(process: &mut Process<B>, is_ready: bool) {
+    if !is_ready && process.verdict.is_none() && process.end.as_ref().is_some_and(|end| end.success()) {
+        let text =
+            "ended with exit code 0 before it said that it is ready: READY=1 on the socket NOTIFY_SOCKET";
+        process.verdict = Some(text.to_owned());
     }
+}
 
-    /// True if it was killed, failed, or ended before it was ready.
-    fn has_failed(&self) -> bool {
-        self.process.end.as_ref().is_some_and(|end| !end.success() || !self.is_ready)
-            || self.process.verdict.is_some()
-    }
+/// True if the sidecar of `process` was killed, failed, or ended before it was ready.
+fn has_failed<B: Body>(process: &Process<B>, is_ready: bool) -> bool {
+    process.end.as_ref().is_some_and(|end| !end.success() || !is_ready) || process.verdict.is_some()
 }

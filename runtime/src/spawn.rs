@@ -17,6 +17,9 @@ use std::process::{Child, Command, Stdio};
 /// The environment variable with the socket on which a sidecar says that it is ready (sd_notify(3)).
 const NOTIFY_VARIABLE: &str = "NOTIFY_SOCKET";
 
+/// The environment variable with the folder of a command for files of its own, which goes with the run.
+pub const SCRATCH_VARIABLE: &str = "HUMMINGBUS_SCRATCH";
+
 /// Process to start.
 #[derive(Clone, Copy)]
 pub enum Started<'a> {
@@ -65,6 +68,9 @@ pub fn start(
             command.envs(notify.map(|socket| (NOTIFY_VARIABLE, socket)));
             bus::process::die_with_this_one(&mut command);
         }
+    }
+    if let Some(Executable::Command(_)) = program.map(|program| &program.executable) {
+        command.env(SCRATCH_VARIABLE, scratch(name, role, run_dir)?);
     }
     let log = program.and_then(|program| program.log.as_deref());
     let log_name = if matches!(started, Started::Group) { format!("group.{name}") } else { name.to_owned() };
@@ -123,16 +129,29 @@ fn command(exe: &Path, started: Started<'_>) -> Command {
     command
 }
 
+/// A folder for the files of a process, which is removed with the run directory. A backup and a restarted process have their own.
+fn scratch(name: &str, role: Role, run_dir: &Path) -> Result<PathBuf> {
+    let path = run_dir.join(format!("{}.scratch", file_name(name, role)));
+    std::fs::create_dir_all(&path)
+        .with_context(|| format!("process `{name}`: cannot make the folder {}", path.display()))?;
+    Ok(path)
+}
+
+/// Name of the files of a process in the run directory: a backup and a restarted process have their number in it.
+fn file_name(name: &str, role: Role) -> String {
+    let generation = role.generation();
+    let number = if generation == 0 { String::new() } else { format!("#{generation}") };
+    format!("{}{number}", name.replace('/', "."))
+}
+
 /// Log file of a process: the file that the manifest names, to which a backup appends, or one in the run directory.
 /// There a backup has its own.
 fn open_log(name: &str, role: Role, run_dir: &Path, log: Option<&Path>) -> Result<(File, PathBuf)> {
-    let generation = role.generation();
-    let number = if generation == 0 { String::new() } else { format!("#{generation}") };
     if let Some(path) = log {
         let file = append_to_log(path).with_context(|| format!("process `{name}`"))?;
         return Ok((file, path.to_owned()));
     }
-    let path = run_dir.join(format!("{}{number}.log", name.replace('/', ".")));
+    let path = run_dir.join(format!("{}.log", file_name(name, role)));
     let file = OpenOptions::new().create(true).append(true).open(&path);
     Ok((file.with_context(|| format!("process `{name}`: cannot open {}", path.display()))?, path))
 }

@@ -148,9 +148,8 @@ impl<'a, W: World> Supervisor<'a, W> {
         for (name, role, program) in all {
             self.start_process(name, role, program)?;
         }
-        for (name, program) in &graph.sidecars {
-            self.sidecars.start(&mut self.world, self.clock.now(), name, program)?;
-        }
+        graph.sidecars.iter().for_each(|(name, program)| self.sidecars.add(name, program));
+        self.sidecars.start(&mut self.world, self.clock.now())?;
         self.tell(Event::Started).map(|_| ())
     }
 

@@ -86,6 +86,7 @@ pub fn message(error: &anyhow::Error) -> String {
 /// `faults` are the places in files.
 pub fn print_error(error: &anyhow::Error) {
     say(&format!("error: {}", message(error)));
+    print_warnings(diagnostic(error).map_or(&[], Diagnostic::warnings));
     print_error_json(&json!({ "error": message(error), "faults": faults(error) }));
 }
 
@@ -98,10 +99,14 @@ pub fn print_error_json(value: &Value) {
     }
 }
 
+/// The faults of files in an error.
+fn diagnostic(error: &anyhow::Error) -> Option<&Diagnostic> {
+    error.chain().find_map(|cause| cause.downcast_ref::<Diagnostic>())
+}
+
 /// The faults of files that an error is about.
 fn faults(error: &anyhow::Error) -> Vec<Value> {
-    let diagnostic = error.chain().find_map(|cause| cause.downcast_ref::<Diagnostic>());
-    diagnostic.into_iter().flat_map(Diagnostic::all).flat_map(|fault| of_named_file(&fault)).collect()
+    diagnostic(error).into_iter().flat_map(Diagnostic::all).flat_map(|fault| of_named_file(&fault)).collect()
 }
 
 /// The fault, or those of the file that is named there.

@@ -88,6 +88,40 @@ fn the_first_tick_waits_for_a_sidecar_that_says_when_it_is_ready() {
 }
 
 #[test]
+fn a_sidecar_starts_when_those_before_it_are_ready() {
+    let place = Place::new();
+    let folder = place.path("");
+    let script = format!("touch server; until [ -e go ]; do sleep 0.02; done; {NOTIFY}; sleep 600");
+    // By their names, the client would be first.
+    let client = format!(
+        "ready = \"notify\"\n[process.client]\nlockstep = false\nafter = [\"viewer\"]\nworking_directory = {folder:?}\n\
+         command = [\"touch\", \"client\"]\n"
+    );
+    let mut launch = start(&place, &script, &client, &[]);
+    let exists = |name: &str| std::fs::metadata(place.path(name)).is_ok();
+    poll("it was not started", || exists("server").then_some(()));
+    launch.hold_at(0);
+    launch.release();
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    assert!(!exists("client"), "it waits");
+    place.write("go", "");
+    launch.end().with_code(0);
+    assert!(exists("client"), "it was started");
+}
+
+#[test]
+fn a_sidecar_behind_one_that_may_be_missing_starts_without_it() {
+    let place = Place::new();
+    let folder = place.path("");
+    let client = format!(
+        "ready = \"notify\"\non_exit = \"ignore\"\n[process.client]\nlockstep = false\nafter = [\"viewer\"]\n\
+         working_directory = {folder:?}\ncommand = [\"touch\", \"client\"]\n"
+    );
+    start(&place, "exit 4", &client, &[]).end().with_code(0).says(&["The run goes on without it"]);
+    assert!(std::fs::metadata(place.path("client")).is_ok());
+}
+
+#[test]
 fn the_first_tick_waits_for_a_sidecar_that_is_restarted_before_it_is_ready() {
     let place = Place::new();
     let script = format!(

@@ -125,6 +125,40 @@ fn each_flies_its_own(place: &Place, manifest: &str, settings: &[String]) {
     assert!((first - 1.4).abs() < 0.2 && (second - 1.4).abs() < 0.2 && first != second, "{first} {second}");
 }
 
+/// Runs `manifest` with `settings` for 4 s, its sticks behind a radio link that loses the part `loss`; returns the last commands.
+fn last_commands_behind_a_radio(place: &Place, manifest: &str, settings: &[String], loss: f64) -> Vec<f64> {
+    let link = format!(
+        "[process.radio]\nkind = \"link\"\nparameters = {{ baud = 1000000, latency_ms = 10.0, loss = {loss:?}, streams.rc.rate_hz = 50.0 }}\n\
+         inputs.rc = {{ topic = \"/sticks/rc\", delay_ticks = 1, initial = {{}} }}\n"
+    );
+    let text = fs::read_to_string(manifest).unwrap().replace("../../", &repository(""));
+    let (flown, _) = text.split_once("[[pass]]").unwrap();
+    let flown = flown.replace("inputs.rc = \"/sticks/rc\"", "inputs.rc = \"/radio/rc\"");
+    let path = place.write("radio.toml", flown + &link);
+    let recording = place.path("radio.mcap");
+    let settings = [settings, &["run.duration_s=4".to_owned()]].concat();
+    call(place, "run", &path, &settings, &["--record", &recording]).with_code(0);
+    let args = ["cat", &recording, "--topic", "/controller/command", "--csv"];
+    let rows = place.call(&args).with_code(0).output;
+    let cells: Vec<&str> = rows.lines().last().unwrap().split(',').collect();
+    cells[cells.len() - 4..].iter().map(|cell| cell.parse().unwrap()).collect()
+}
+
+/// Flies `manifest` behind a radio: a lost one has the firmware act, which stops its motors.
+fn a_lost_radio_reaches_the_firmware(manifest: &str, settings: &[String]) {
+    let place = Place::new();
+    let flying = last_commands_behind_a_radio(&place, manifest, settings, 0.0);
+    assert!(flying.iter().all(|counts| (50.0..120.0).contains(counts)), "it hovers: {flying:?}");
+    let lost = last_commands_behind_a_radio(&place, manifest, settings, 1.0);
+    assert!(lost.iter().all(|counts| *counts <= 1.0), "its failsafe stops the motors: {lost:?}");
+}
+
+#[test]
+fn a_lost_radio_is_lost_for_the_firmware() {
+    let place = Place::new();
+    a_lost_radio_reaches_the_firmware(&manifest(), &stand_in(&place, ""));
+}
+
 /// As the log of a receiver: the channels of one flight fly it again.
 #[test]
 fn recorded_channels_fly_the_flight_again() {
@@ -192,8 +226,11 @@ fn a_firmware_that_is_not_armed_is_told_before_tick_0() {
 #[test]
 fn a_command_that_the_firmware_refuses_is_told_before_tick_0() {
     let place = Place::new();
-    let ended = call(&place, "run", &manifest(), &stand_in(&place, "nonsense\n"), &["--record", "none"]);
-    ended.with_code(2).says(&["a command that Betaflight refuses: ###ERROR", "nonsense"]);
+    let ended =
+        call(&place, "run", &manifest(), &stand_in(&place, "# one\nnonsense 7\n"), &["--record", "none"]);
+    ended
+        .with_code(2)
+        .says(&["/configuration:2: ", "a command that Betaflight refuses: `nonsense 7`: ###ERROR"]);
 }
 
 #[test]
@@ -204,7 +241,13 @@ fn what_cannot_be_a_firmware_is_refused_by_check() {
     let text = place.write("text", "no program");
     let in_static = place.write("static", compiled("sitl.c", &["-static"]));
     let settings = stand_in(&place, "");
-    let cases: [(&str, &[&str]); 6] = [
+    let old = place.write("old", compiled("sitl.c", &["-DOLD"]));
+    let cases: [(&str, &[&str]); 8] = [
+        (
+            &format!("process.controller.firmware={old}"),
+            &["/old: this version of Betaflight cannot load", "`--config`"],
+        ),
+        ("process.controller.firmware=/bin/ls", &["/bin/ls: it is not Betaflight's SITL", "`Betaflight`"]),
         (&format!("process.controller.firmware={text}"), &["firmware", "expected a 64-bit Linux program"]),
         (&format!("process.controller.firmware={in_static}"), &["linked statically", "would stall"]),
         ("process.controller.firmware=/nowhere/sitl", &["/nowhere/sitl", "No such file"]),
@@ -219,6 +262,37 @@ fn what_cannot_be_a_firmware_is_refused_by_check() {
         let settings = [&settings[..], &[setting.to_owned()]].concat();
         call(&place, "check", &manifest(), &settings, &[]).with_code(2).says(told);
     }
+}
+
+/// The Hummingbird with the text `from` of its file replaced by `to`, as a setting of the manifest.
+fn vehicle_with(place: &Place, from: &str, to: &str) -> String {
+    let text = fs::read_to_string(repository("vehicles/hummingbird.toml")).unwrap();
+    assert!(text.contains(from), "{from}");
+    format!("process.controller.vehicle={}", place.write("bird.toml", text.replacen(from, to, 1)))
+}
+
+#[test]
+fn a_firmware_has_vehicles_checked_as_controllers_do() {
+    let place = Place::new();
+    let settings = stand_in(&place, "");
+    let check = |from: &str, to: &str| {
+        let settings = [&settings[..], &[vehicle_with(&place, from, to)]].concat();
+        call(&place, "check", &manifest(), &settings, &[])
+    };
+    let (front, name) = ("value = [0.17, 0, 0]", "name = \"front\"");
+    let failed = check(name, &format!("{name}\nfailed = {{ value = true, source = \"test\" }}"));
+    failed.with_code(2).says(&["its 3 working rotors of 4 cannot", "bird.toml:"]);
+    check(front, "value = [0.05, 0, 0]").with_code(0).says(&[
+        "has arms of 0.0500 m and 0.1700 m, and the mixer QUADP counts on equal ones",
+        "bird.toml:",
+        "`rotors.0.position`",
+    ]);
+    let leaning =
+        "axis = { value = [0, 0.6, 0.8], unit = \"1\", source = \"test\", uncertainty = \"not stated\" }";
+    check(name, &format!("{name}\n{leaning}")).with_code(0).says(&[
+        "\"front\" that leans by 36.9 degrees, and the mixer QUADP counts on upright ones",
+        "`rotors.0.axis`",
+    ]);
 }
 
 #[test]

@@ -3,17 +3,18 @@
 use crate::refusals::{good, refused, refused_setting, refused_text, refused_with};
 use crate::support::{Launch, Place, repository};
 use std::fs;
+use std::path::Path;
 
 /// Flies a script as a command beside the good manifest's nodes; it writes what it finds to a file.
 #[test]
 fn a_sidecar_runs_beside_the_ticks_and_ends_with_the_run() {
     let place = Place::new();
-    let script =
-        "echo \"$COLOUR $PWD ${HUMMINGBUS_NODE-none} $(basename \"$HUMMINGBUS_RUN\")\" > \"$OUT\"; sleep 600";
+    let script = "touch \"$HUMMINGBUS_SCRATCH/a file\"; \
+        echo \"$COLOUR $PWD ${HUMMINGBUS_NODE-none} $(basename \"$HUMMINGBUS_RUN\") $HUMMINGBUS_SCRATCH\" > \"$OUT\"; sleep 600";
     let (out, folder) = (place.path("out"), repository("docs"));
     let sidecar = format!(
-        "\n[process.viewer]\nlockstep = false\ncommand = [\"sh\", \"-c\", {script:?}]\n\
-         environment = {{ COLOUR = \"blue\", OUT = {out:?} }}\nworking_directory = {folder:?}\n"
+        "\n[process.viewer]\nlockstep = false\ncommand = [\"${{HUMMINGBUS_UNSET:-sh}}\", \"-c\", {script:?}]\n\
+         environment = {{ COLOUR = \"${{HUMMINGBUS_UNSET:-blue}}\", OUT = {out:?} }}\nworking_directory = {folder:?}\n"
     );
     let text = good().replace("duration_s = 0.1", "duration_s = 100\npace = \"realtime\"") + &sidecar;
     let path = place.write("beside.toml", text);
@@ -23,8 +24,11 @@ fn a_sidecar_runs_beside_the_ticks_and_ends_with_the_run() {
         await_it(&mut launch, || fs::read_to_string(&out).ok().filter(|written| written.ends_with('\n')));
     assert!(written.starts_with(&format!("blue {folder} none hummingbus-")), "{written}");
     // It leaves nothing behind, although the script would sleep on.
+    let scratch = written.trim_end().rsplit(' ').next().unwrap().to_owned();
+    assert!(scratch.ends_with("/viewer.scratch") && Path::new(&scratch).join("a file").exists(), "{written}");
     launch.signal(rustix::process::Signal::INT);
     launch.end().with_code(1);
+    assert!(!Path::new(&scratch).exists(), "it goes with the run");
 }
 
 /// Looks again and again, while a long run goes on.
@@ -59,6 +63,25 @@ fn a_sidecar_that_would_be_a_node() {
     refused("kind = \"imu\"", "kind = \"imu\"\nready = §\"notify\"").says(&["`ready` of `imu`"]);
     with("period_ticks = §2").says(&["`period_ticks` of `viewer`", "takes no part in the ticks"]);
     refused("kind = \"imu\"", "lockstep = false\nkind = §\"imu\"").says(&["`kind` of `imu`"]);
+    refused("kind = \"imu\"", "kind = \"imu\"\nafter = [§\"viewer\"]")
+        .says(&["`after` of `imu`", "leave it out"]);
+}
+
+#[test]
+fn an_order_of_sidecars_that_cannot_be() {
+    let with = |more: &str| {
+        let sidecar =
+            |name: &str| format!("\n[process.{name}]\nlockstep = false\ncommand = [\"sleep\", \"9\"]\n");
+        let [viewer, server, store] = ["viewer", "server", "store"].map(sidecar);
+        refused_with(&format!("{store}after = [\"viewer\"]\n{viewer}after = [\"server\"]\n{server}{more}\n"))
+    };
+    with("after = [§\"sorver\"]")
+        .says(&["`after` of `server`: there is no process `sorver`", "did you mean `server`?"]);
+    with("after = [§\"imu\"]")
+        .says(&["`after` of `server`: `imu` takes part in the ticks", "lockstep = false"]);
+    with("after = [§\"store\"]")
+        .says(&["`after` of `server` is a circle: server after store after viewer after server"]);
+    with("after = [§\"server\"]").says(&["`after` of `server` is a circle: server after server"]);
 }
 
 #[test]
@@ -70,6 +93,8 @@ fn a_command_that_is_not_there_or_not_executable() {
     with(&text).says(&["it is not executable", "chmod +x"]);
     with("no-such-program").says(&["cannot start `no-such-program`: no folder of PATH"]);
     with("").says(&["no folder of PATH"]);
+    with("${HUMMINGBUS_UNSET}")
+        .says(&["the program is `${HUMMINGBUS_UNSET}`", "HUMMINGBUS_UNSET is not set"]);
 }
 
 #[test]
@@ -95,6 +120,9 @@ fn host_settings_that_no_system_has() {
     let marked = good().replace("kind = \"ekf\"", twice);
     let ended = refused_text(&marked.replace("kind = \"imu\"", "kind = \"imu\"\nlog = §\"./a.log\""));
     ended.says(&["`log`: `imu` writes to the file of `ekf`"]);
+    with("environment.§HUMMINGBUS_SCRATCH = \"x\"").says(&["HUMMINGBUS_SCRATCH is set by the launcher"]);
+    with("environment.§A = \"${HUMMINGBUS_UNSET}\"")
+        .says(&["`environment.A` is", "HUMMINGBUS_UNSET is not set"]);
     with("environment.§HUMMINGBUS_RUN = \"x\"").says(&["HUMMINGBUS_RUN is set by the launcher"]);
     with("environment.§\"A=B\" = \"x\"").says(&["cannot be an environment variable"]);
     with("environment.A = §3").says(&["environment.A` must be a string, found 3"]);

@@ -183,6 +183,32 @@ fn a_tricopter_and_a_hexacopter_that_cannot_lose_a_rotor_are_refused_with_the_re
     }
 }
 
+/// Rotors that are all in front, two of them in one place.
+#[test]
+fn rotors_that_leave_a_torque_in_hover_are_refused_with_all_that_is_odd() {
+    let place = Place::new();
+    let text = std::fs::read_to_string(repository("vehicles/hummingbird.toml")).unwrap();
+    let text = ["[0.17, 0, 0]", "[0, -0.17, 0]", "[-0.17, 0, 0]", "[0, 0.17, 0]"]
+        .into_iter()
+        .zip(["[0.4, 0, 0]", "[0.2, -0.17, 0]", "[0.4, 0, 0]", "[0.2, 0.17, 0]"])
+        .fold(text, |text, (from, to)| {
+            text.replacen(&format!("value = {from}"), &format!("value = {to}"), 1)
+        });
+    let (head, rotors) = text.split_once("[[rotors]]").unwrap();
+    let (front, others) = rotors.split_at(rotors.find("[[rotors]]").unwrap());
+    let vehicle = format!("{head}[[rotors]]{}{others}", front.replace("\"clockwise", "\"counter-clockwise"));
+    let vehicle = place.write("ahead.toml", vehicle);
+    let sets = ["plant", "controller"].map(|process| format!("process.{process}.vehicle={vehicle}"));
+    let check = ["check", &repository("manifests/hover.toml"), "--set", &sets[0], "--set", &sets[1]];
+    let ended = place.call(&check).with_code(2);
+    ended.says(&[
+        "its 4 working rotors of 4 cannot hover",
+        "a pitch torque remains unbalanced",
+        "ahead.toml:",
+    ]);
+    ended.says(&["warning: ", "its rotors \"front\" and \"rear\" in one place"]);
+}
+
 /// With neighbours that turn alike the others take over, and it flies on.
 #[test]
 fn a_hexacopter_whose_spins_allow_it_flies_on_without_a_rotor() {

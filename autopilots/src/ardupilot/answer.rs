@@ -62,7 +62,16 @@ mod tests {
 
     fn line(attitude: UnitQuaternion<f64>) -> String {
         let (imu, estimate) = sample(attitude);
-        text(1.5, &Sensed { time_s: 0.0, imu: &imu, estimate: &estimate, rc: &RcChannels::default() })
+        text(
+            1.5,
+            &Sensed {
+                time_s: 0.0,
+                imu: &imu,
+                estimate: &estimate,
+                rc: &RcChannels::default(),
+                is_rc_new: true,
+            },
+        )
     }
 
     /// Roll, pitch and yaw that the firmware reads: to the right, nose up, clockwise from north, degrees.

@@ -219,7 +219,7 @@ mod tests {
             ..StateEstimate::default()
         };
         let rc = RcChannels { pulse: [1500.4, 1100.0, 900.0].into(), ..RcChannels::default() };
-        let sensed = Sensed { time_s: 0.0, imu: &imu, estimate: &estimate, rc: &rc };
+        let sensed = Sensed { time_s: 0.0, imu: &imu, estimate: &estimate, rc: &rc, is_rc_new: true };
         let place = [8.545_594, 47.397_742, 488.0];
         let sample =
             Sample { time_us: 1000, count: 0, sensed: &sensed, place, field_B_T: [0.0, -0.25e-4, -0.375e-4] };

@@ -18,6 +18,9 @@ use vehicles::Vehicle;
 /// Key of the gains file's path in the parameter `gains`, whose other values replace those of the file.
 const FILE: &str = "file";
 
+/// Key of a vehicle file.
+const VEHICLE: &str = "vehicle";
+
 /// Notes taken while a manifest becomes a plan.
 #[derive(Debug, Default)]
 pub struct Notes {
@@ -25,6 +28,8 @@ pub struct Notes {
     pub models: Vec<PathBuf>,
     /// Legal but unusual values.
     pub warnings: Vec<Diagnostic>,
+    /// Those about vehicles, which may explain why one is refused.
+    of_vehicles: Vec<Diagnostic>,
     /// True if warnings were left out because the run was cut short.
     has_cut: bool,
 }
@@ -37,6 +42,12 @@ impl Notes {
         let is_cut = !manifest.sources.is_one_text(span.start, manifest.content.run.duration_s.span().start);
         self.has_cut |= is_cut;
         is_cut
+    }
+
+    /// A fault of processes; if a vehicle is refused, with the warnings about vehicles.
+    pub fn explain(&mut self, fault: Diagnostic) -> Diagnostic {
+        let is_of_vehicle = fault.all().any(|fault| fault.key() == VEHICLE);
+        if is_of_vehicle { fault.with_warnings(std::mem::take(&mut self.of_vehicles)) } else { fault }
     }
 
     /// The warnings, with one about everything that a run that was cut short leaves out.
@@ -116,12 +127,12 @@ pub fn of(
             .timed(plan.tick_ns, period_ticks, plan.duration_ticks)
             .seeded(plan.seed)
             .given(&read);
-        kind.check(&parameters, &context).map_err(|error| {
+        let checked = kind.check(&parameters, &context).map_err(|error| {
             let error = edited.iter().fold(error, |error, (key, original, copy)| {
                 manifest.without_copy(declared.files, (name.get_ref(), key), (original, copy), error)
             });
             refused(declared, &error)
-        })?;
+        });
         // A firmware has files beside its program.
         if has_firmware {
             notes.models.extend(read.used().into_iter().map(|file| file.path));
@@ -137,9 +148,14 @@ pub fn of(
                         &message,
                     )
                 });
-                notes.warnings.push(problem(declared, &at, &message, String::new()));
+                let warning_at = problem(declared, &at, &message, String::new());
+                if warning.key == VEHICLE {
+                    notes.of_vehicles.push(warning_at.clone());
+                }
+                notes.warnings.push(warning_at);
             }
         }
+        checked?;
     }
     Ok((parameters, read.used()))
 }

@@ -3,6 +3,7 @@
 use crate::manifest::{Manifest, Process, is_name};
 use crate::output_file;
 use crate::program::{Executable, OnExit, Program, Readiness};
+use crate::spawn::SCRATCH_VARIABLE;
 use bus::component::Transfer;
 use bus::plan::NodePlan;
 use bus::process::{LAUNCHER_VARIABLE, RUN_VARIABLE};
@@ -54,42 +55,9 @@ pub fn declared_nodes<'m>(
     Ok(declared_nodes)
 }
 
-/// The processes that do not, by name.
-///
-/// # Errors
-/// If one has a key that only a node may have, or cannot be started.
-pub fn sidecars(manifest: &Manifest) -> Result<Vec<(String, Program)>, Diagnostic> {
-    let sidecars = manifest.content.process.iter().filter(|(_, process)| !takes_part(process));
-    Diagnostic::gather(sidecars.map(|(name, process)| {
-        require_no_node(manifest, name, process)?;
-        Ok((name.get_ref().clone(), program(manifest, name, process)?))
-    }))
-}
-
-fn takes_part(process: &Process) -> bool {
+/// True for a process that takes part in the ticks, and is no sidecar.
+pub fn takes_part(process: &Process) -> bool {
     process.lockstep.as_ref().is_none_or(|lockstep| *lockstep.get_ref())
-}
-
-/// A sidecar has no ports, no place in the ticks, and no state of the run that a standby could go on from.
-fn require_no_node(manifest: &Manifest, name: &Spanned<String>, process: &Process) -> Result<(), Diagnostic> {
-    let who = format!("of `{}`, which has lockstep = false", name.get_ref());
-    let files = [("kind", &process.kind)].into_iter().chain(files(process));
-    let mut stated = files.map(|(key, file)| (key, file.as_ref().map(Spanned::span))).chain([
-        ("period_ticks", process.period_ticks.as_ref().map(Spanned::span)),
-        ("cpu", process.cpu.as_ref().map(Spanned::span)),
-        ("wait", process.wait.map(|_| name.span())),
-        ("parameters", process.parameters.keys().next().map(Spanned::span)),
-        ("inputs", process.inputs.keys().next().map(Spanned::span)),
-        ("outputs", process.outputs.keys().next().map(Spanned::span)),
-    ]);
-    if let Some((key, span)) = stated.find_map(|(key, span)| Some((key, span?))) {
-        let help =
-            "a sidecar is a `command` that takes no part in the ticks; leave the key or `lockstep` out";
-        return Err(manifest.problem(&span, format!("`{key}` {who}"), help));
-    }
-    let message = |_: &OnExit| format!("`on_exit` {who}: nothing can stand by for it");
-    let help = "stop (the default), restart or ignore";
-    manifest.require(&process.on_exit, |on_exit| *on_exit != OnExit::Standby, message, help)
 }
 
 /// Refuses keys that only a sidecar may have.
@@ -102,6 +70,11 @@ fn require_no_sidecar(
     let message = |_: &Readiness| format!("`ready` of `{name}`, which takes part in the ticks");
     let help = "leave it out: a node is ready when it has joined; sidecars (lockstep = false) may say so";
     manifest.require(&process.ready, |_| false, message, help)?;
+    if let Some(first) = process.after.first() {
+        let message = format!("`after` of `{name}`, which takes part in the ticks");
+        let help = "leave it out: nodes wait for each other's samples; sidecars (lockstep = false) start in an order";
+        return Err(manifest.problem(&first.span(), message, help));
+    }
     let message = |_: &OnExit| format!("`on_exit` of `{name}`: no tick can be computed without a node");
     let help = "stop (the default), restart or standby; only sidecars (lockstep = false) can be ignored";
     manifest.require(&process.on_exit, |on_exit| *on_exit != OnExit::Ignore, message, help)
@@ -130,20 +103,21 @@ pub fn program(
     process: &Process,
 ) -> Result<Program, Diagnostic> {
     require_name(manifest, name)?;
-    require_environment(manifest, process)?;
+    let environment = environment(manifest, process)?;
     require_core(manifest, &process.cpu, "cpu")?;
     let help = "no process computes in no time: give milliseconds of host time, such as 20000";
     let watchdog = manifest.within("watchdog_ms_host", &process.watchdog_ms_host, 1..=u64::MAX, help)?;
     let (nice, priority) = (&process.nice, &process.realtime_priority);
     Ok(Program {
-        executable: executable(manifest, name, process)?,
-        environment: process.environment.iter().map(|(k, v)| (k.get_ref().clone(), v.clone())).collect(),
+        executable: executable(manifest, name, process, &environment)?,
+        environment,
         working_directory: working_directory(manifest, process)?,
         nice: manifest.within("nice", nice, -20..=19, "it goes from -20 to 19")?,
         realtime_priority: manifest.within("realtime_priority", priority, 1..=99, "it goes from 1 to 99")?,
         on_exit: process.on_exit.as_ref().map_or(OnExit::Stop, |on_exit| *on_exit.get_ref()),
         watchdog: watchdog.map_or(crate::program::WATCHDOG, Duration::from_millis),
         ready: process.ready.as_ref().map_or(Readiness::Started, |ready| *ready.get_ref()),
+        after: Vec::new(),
         log: log(manifest, process)?,
     })
 }
@@ -152,6 +126,7 @@ fn executable(
     manifest: &Manifest,
     name: &Spanned<String>,
     process: &Process,
+    environment: &BTreeMap<String, String>,
 ) -> Result<Executable, Diagnostic> {
     match (&process.kind, &process.command) {
         (Some(kind), None) => {
@@ -165,7 +140,7 @@ fn executable(
                 manifest.problem(&kind.span(), message, format!("{near} kinds are {}", registry.names()))
             })
         }
-        (None, Some(command)) => self::command(manifest, name, process, command).map(Executable::Command),
+        (None, Some(command)) => self::command(manifest, name, environment, command).map(Executable::Command),
         (Some(_), Some(command)) => {
             let message = format!("process `{}` has both `kind` and `command`", name.get_ref());
             Err(manifest.problem(&command.span(), message, "leave one of them out"))
@@ -187,11 +162,12 @@ fn nameless(manifest: &Manifest, name: &Spanned<String>) -> Diagnostic {
     manifest.problem(&name.span(), format!("there is no process `{found}`"), help)
 }
 
-/// The arguments of a command; the first becomes the path of a file that can be executed.
+/// The arguments of a command; the first becomes the path of a file that can be executed, with its variables replaced. A shell may have
+/// variables of its own in the others.
 fn command(
     manifest: &Manifest,
     name: &Spanned<String>,
-    process: &Process,
+    environment: &BTreeMap<String, String>,
     command: &Spanned<Vec<String>>,
 ) -> Result<Vec<String>, Diagnostic> {
     let refused = |message: &str, help: &str| manifest.problem(&command.span(), message, help);
@@ -202,14 +178,16 @@ fn command(
         return Err(refused("a word of `command` holds a NUL", "no program can be given one"));
     }
     let who = format!("process `{}`: cannot start", name.get_ref());
+    let written = Spanned::new(command.span(), word.clone());
+    let word = &manifest.expand(&written, "the program is")?;
     let path = if word.contains('/') {
-        let path = manifest.resolve(&Spanned::new(command.span(), word.clone()))?;
+        let path = manifest.resolve(&written)?;
         if let Some((why, help)) = objection(&path) {
             return Err(refused(&format!("{who} {}: {why}", path.display()), help));
         }
         path.to_string_lossy().into_owned()
     } else {
-        in_path(process, word).ok_or_else(|| {
+        in_path(environment, word).ok_or_else(|| {
             let message = format!("{who} `{word}`: no folder of PATH holds such an executable");
             refused(&message, "install it, or give a path with a `/`, relative to the manifest")
         })?
@@ -243,9 +221,8 @@ fn is_text_without_interpreter(path: &Path) -> bool {
 }
 
 /// The file behind a bare name, in the folders of the PATH that the process will have.
-fn in_path(process: &Process, word: &str) -> Option<String> {
-    let stated = process.environment.iter().find(|(name, _)| name.get_ref() == "PATH");
-    let path = stated.map(|(_, path)| path.into()).or_else(|| std::env::var_os("PATH"))?;
+fn in_path(environment: &BTreeMap<String, String>, word: &str) -> Option<String> {
+    let path = environment.get("PATH").map(Into::into).or_else(|| std::env::var_os("PATH"))?;
     let mut files = std::env::split_paths(&path).map(|folder| folder.join(word));
     let found = files.find(|file| !word.is_empty() && is_executable(file))?;
     Some(std::path::absolute(&found).unwrap_or(found).to_string_lossy().into_owned())
@@ -287,10 +264,14 @@ pub fn period_ticks(
     Ok(kind.period_ticks(&parameters.collect::<serde_json::Map<_, _>>().into(), tick_ns))
 }
 
-fn require_environment(manifest: &Manifest, process: &Process) -> Result<(), Diagnostic> {
-    for (name, value) in &process.environment {
+/// The environment variables of `process`, their values with those of the launcher replaced.
+fn environment(manifest: &Manifest, process: &Process) -> Result<BTreeMap<String, String>, Diagnostic> {
+    /// Variables that the launcher sets.
+    const SET: [&str; 5] =
+        [GENERATION_VARIABLE, LAUNCHER_VARIABLE, NODE_VARIABLE, RUN_VARIABLE, SCRATCH_VARIABLE];
+    let expanded = |(name, value): (&Spanned<String>, &String)| {
         let text = name.get_ref();
-        if [GENERATION_VARIABLE, LAUNCHER_VARIABLE, NODE_VARIABLE, RUN_VARIABLE].contains(&text.as_str()) {
+        if SET.contains(&text.as_str()) {
             let help = "leave it out: by it a process finds its run";
             return Err(manifest.problem(&name.span(), format!("{text} is set by the launcher"), help));
         }
@@ -298,8 +279,11 @@ fn require_environment(manifest: &Manifest, process: &Process) -> Result<(), Dia
             let message = format!("{text:?} = {value:?} cannot be an environment variable");
             return Err(manifest.problem(&name.span(), message, "a name has no `=`, and neither has a NUL"));
         }
-    }
-    Ok(())
+        let written = Spanned::new(name.span(), value.clone());
+        Ok((text.clone(), manifest.expand(&written, &format!("`environment.{text}` is"))?))
+    };
+    let all = Diagnostic::gather(process.environment.iter().map(expanded))?;
+    Ok(all.into_iter().collect())
 }
 
 /// Refuses a core that this machine does not have, or does not allow.

@@ -177,6 +177,9 @@ pub struct Process {
     pub standby: Option<Spanned<Box<Process>>>,
     /// Condition for a sidecar to count as ready.
     pub ready: Option<Spanned<Readiness>>,
+    /// Names of sidecars that have to become ready before this one starts.
+    #[serde(default)]
+    pub after: Vec<Spanned<String>>,
     /// Longest time that the run may stand still because of it, in milliseconds of host time.
     pub watchdog_ms_host: Option<Spanned<u64>>,
     /// File for its standard output and error, relative to the manifest.

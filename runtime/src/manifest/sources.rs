@@ -200,12 +200,17 @@ impl Sources {
     /// A path as written: `${NAME:-default}` is the environment's NAME. A relative path starts at the folder of the
     /// file it is written in, or of the manifest if it was given as an argument.
     pub fn path(&self, written: &Spanned<String>) -> Result<PathBuf, Diagnostic> {
-        let expanded = vehicles::variables::expand(written.get_ref(), |name| std::env::var(name).ok())
-            .map_err(|message| {
-                let message = format!("the path is {message}");
-                self.problem(&written.span(), message, "set the variable, or give a default: ${NAME:-path}")
-            })?;
+        let expanded = self.expand(written, "the path is")?;
         Ok(self.folder(written.span().start).join(expanded))
+    }
+
+    /// The text `written` with its variables replaced by those of the environment; `what` begins the fault of one that is not set.
+    pub fn expand(&self, written: &Spanned<String>, what: &str) -> Result<String, Diagnostic> {
+        let expanded = vehicles::variables::expand(written.get_ref(), |name| std::env::var(name).ok());
+        expanded.map_err(|message| {
+            let message = format!("{what} {message}");
+            self.problem(&written.span(), message, "set the variable, or give a default: ${NAME:-path}")
+        })
     }
 
     /// The path from the root on; the processes of a run get it as text.

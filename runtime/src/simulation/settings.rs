@@ -22,6 +22,7 @@ pub(super) fn program(on_exit: OnExit) -> Program {
         on_exit,
         watchdog: WATCHDOG,
         ready: Readiness::Started,
+        after: Vec::new(),
         log: None,
     }
 }

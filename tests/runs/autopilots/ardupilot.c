@@ -14,6 +14,8 @@ static struct { uint16_t magic, rate; uint32_t frame; uint16_t pulse[16]; } pack
 static double now, gyro[3], force[3], position[3], velocity[3], attitude[4];
 /* As the firmware has them until the first packet comes. */
 static double rc[16] = { 1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800 };
+/* Time of the last packet; after 1 s without one it stops its motors, as a failsafe. */
+static double rc_time;
 static int rc_port;
 static char parameters[100][2][40];
 static int count;
@@ -119,6 +121,7 @@ static void take_rc(void)
     for (ssize_t length; (length = recv(fd, taken, sizeof taken, MSG_DONTWAIT | MSG_TRUNC)) >= 0;) {
         if (length != sizeof taken)
             fail("another length", "remote control");
+        rc_time = now;
         for (int channel = 0; channel < 16; channel++)
             if (taken[channel])
                 rc[channel] = taken[channel];
@@ -200,7 +203,7 @@ int main(int words_count, char **words)
         int is_on = arming && rc[arming - 1] > 1700 && !parameter("UNARMED", 0);
         armed = !is_on ? -1 : armed < 0 ? now : armed;
         /* Motors stand still for 2 s after arming. */
-        if (armed >= 0 && now - armed > 2)
+        if (armed >= 0 && now - armed > 2 && now - rc_time < 1)
             fly();
         else
             for (int motor = 0; motor < 4; motor++)

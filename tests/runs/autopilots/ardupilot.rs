@@ -1,7 +1,7 @@
 //! ArduPilot: a stand-in for ArduCopter's SITL (`ardupilot.c`) flies, and fails in every way; the real one where
 //! `HUMMINGBUS_ARDUPILOT` names it.
 
-use super::{call, compiled, each_flies_its_own};
+use super::{a_lost_radio_reaches_the_firmware, call, compiled, each_flies_its_own};
 use crate::recordings::{require_same, topics};
 use crate::skipped::variable_or_skip;
 use crate::support::{Place, poll, repository};
@@ -60,6 +60,12 @@ fn packets_that_come_twice_or_late_or_from_others_change_nothing() {
         let disturbed = topics(&flight(&place, more, "disturbed.mcap"));
         assert!(disturbed == undisturbed, "{more}");
     }
+}
+
+#[test]
+fn a_lost_radio_is_lost_for_ardupilot() {
+    let place = Place::new();
+    a_lost_radio_reaches_the_firmware(&manifest(), &stand_in(&place, ""));
 }
 
 #[test]
@@ -126,7 +132,8 @@ fn what_cannot_be_an_ardupilot_is_refused_by_check() {
     let [text, wrong] =
         [place.write("text", "no program"), place.write("wrong.parm", "# one\nFRAME_CLASS\n")];
     let octa = repository("vehicles/tarot-t18.toml");
-    let cases: [(&str, &[&str]); 8] = [
+    let cases: [(&str, &[&str]); 9] = [
+        ("process.controller.firmware=/bin/ls", &["/bin/ls: it is not ArduCopter's SITL", "`ArduCopter`"]),
         ("process.controller.firmware=${HUMMINGBUS_UNSET}", &["HUMMINGBUS_UNSET is not set"]),
         (&format!("process.controller.firmware={text}"), &["firmware", "build/sitl/bin/arducopter"]),
         (&format!("process.controller.configuration={wrong}"), &["line 2: expected a name", "FRAME_CLASS"]),

@@ -1,7 +1,7 @@
 /* Stands in for PX4's SITL with its simulator's MAVLink interface: the same messages, arguments, files, start-up script and commands, and a
  * law of a few lines, mixed by the rotors' parameters. Parameters say how it misbehaves, at a time of its clock in seconds: `ENDS`,
  * `CRASHES`, `HANGS`, `MUTE`, `WRONG_CRC`, `NOT_A_NUMBER`; or all the time: `NEVER_CONNECTS 1`, `NEVER_BOOTS 1`, `NO_LOCKSTEP 1`,
- * `UNARMED 1`, `TWICE 1`. */
+ * `UNARMED 1`, `TWICE 1`. With `LOST 1` the remote control may be lost and the vehicle fall. */
 #include <arpa/inet.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -24,6 +24,8 @@ static int count, instance, fd, sensors, gps, sticks, sequence_in = -1, sequence
 static uint64_t now;
 static float force[3], rate[3], attitude[4];
 static uint16_t rc[18];
+/* Time of the last remote control; after 1 s without it stops its motors, as a failsafe. */
+static uint64_t rc_time;
 static pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
 static pthread_cond_t stepped = PTHREAD_COND_INITIALIZER;
 
@@ -142,7 +144,7 @@ static void answer(void)
     controls.time = now;
     controls.flags = !parameter("NO_LOCKSTEP", 0);
     controls.mode = is_on ? 129 : 1;
-    if (armed >= 0 && now - armed > 1e6)
+    if (armed >= 0 && now - armed > 1e6 && now - rc_time < 1000000)
         fly(controls.outputs);
     if (is_due("NOT_A_NUMBER"))
         controls.outputs[1] = NAN;
@@ -207,7 +209,7 @@ static void sense(const uint8_t *payload)
         within("weight", force[2], -9.82, -9.8), within("still", rate[0], -0.002, 0.002);
         within("north", floats[7], -0.25, -0.15), within("down", floats[8], 0.4, 0.5);
     }
-    within("GPS", gps, sensors / 25, sensors / 25 + 1), within("sticks", sticks, sensors / 5, sensors / 5 + 1);
+    within("GPS", gps, sensors / 25, sensors / 25 + 1), within("sticks", sticks, parameter("LOST", 0) ? 0 : sensors / 5, sensors / 5 + 1);
     misbehave();
     if (sensors % 250 == 0)
         heartbeat();
@@ -226,7 +228,7 @@ static void take_gps(const uint8_t *payload)
     int32_t place[3];
     memcpy(place, payload + 8, sizeof place);
     within("latitude", place[0] * 1e-7, 47.39, 47.41), within("longitude", place[1] * 1e-7, 8.54, 8.55);
-    within("altitude", place[2] * 1e-3, 487.5, 491), within("fix", payload[34], 3, 3);
+    within("altitude", place[2] * 1e-3, parameter("LOST", 0) ? 400 : 487.5, 491), within("fix", payload[34], 3, 3);
     gps++;
 }
 
@@ -240,7 +242,7 @@ static void take(const uint8_t *head)
     switch (head[7]) {
     case SENSOR: sense(payload); break;
     case GPS: take_gps(payload); break;
-    case RC: memcpy(rc, payload + 4, sizeof rc), within("channels", payload[40], 18, 18), sticks++; break;
+    case RC: memcpy(rc, payload + 4, sizeof rc), within("channels", payload[40], 18, 18), sticks++, rc_time = now; break;
     case STATE: memcpy(attitude, payload + 8, sizeof attitude); break;
     default: fail("another message", head[7]);
     }

@@ -1,6 +1,6 @@
 //! PX4: a stand-in for its SITL (`px4.c`) flies, and fails in every way; the real one where `HUMMINGBUS_PX4` names it.
 
-use super::{call, compiled, each_flies_its_own};
+use super::{a_lost_radio_reaches_the_firmware, call, compiled, each_flies_its_own};
 use crate::recordings::{require_same, topics};
 use crate::skipped::variable_or_skip;
 use crate::support::{Place, poll, repository};
@@ -90,6 +90,12 @@ fn the_last_outputs_of_a_step_count() {
     let place = Place::new();
     let once = topics(&flight(&place, "", "once.mcap"));
     assert!(topics(&flight(&place, "TWICE 1\n", "twice.mcap")) == once);
+}
+
+#[test]
+fn a_lost_radio_is_lost_for_px4() {
+    let place = Place::new();
+    a_lost_radio_reaches_the_firmware(&manifest(), &stand_in(&place, "LOST 1\n"));
 }
 
 #[test]

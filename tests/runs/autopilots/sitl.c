@@ -29,6 +29,16 @@ static int udp(int port, int is_server)
     return fd;
 }
 
+/* Time of the last packet of the sticks; after 1 s without one it stops its motors, as a failsafe. */
+static double sticks_time;
+
+static double seconds(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return now.tv_sec + 1e-9 * now.tv_nsec;
+}
+
 static void take(int fd, void *packet, size_t size)
 {
     for (;;) {
@@ -36,8 +46,11 @@ static void take(int fd, void *packet, size_t size)
         struct timeval limit = { .tv_usec = 100000 };
         FD_ZERO(&fds);
         FD_SET(fd, &fds);
-        if (select(fd + 1, &fds, NULL, NULL, &limit) == 1)
-            recvfrom(fd, packet, size, 0, NULL, NULL);
+        if (select(fd + 1, &fds, NULL, NULL, &limit) != 1)
+            continue;
+        recvfrom(fd, packet, size, 0, NULL, NULL);
+        if (packet == &sticks)
+            sticks_time = seconds();
     }
 }
 
@@ -51,13 +64,6 @@ static void *take_sticks(void *fd)
 {
     take(*(int *)fd, &sticks, sizeof sticks);
     return NULL;
-}
-
-static double seconds(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return now.tv_sec + 1e-9 * now.tv_nsec;
 }
 
 static float clamped(double pulse)
@@ -92,13 +98,23 @@ static void misbehave(const char *words, double now)
             pause();
 }
 
+/* Texts of the real program, by which it is known; built with OLD, those of a release without `--config`. */
+#ifdef OLD
+static const char *volatile known_texts[] = { "Betaflight" };
+#define CONFIGURE "--load"
+#else
+static const char *volatile known_texts[] = { "Betaflight", "--config" };
+#define CONFIGURE "--config"
+#endif
+
 int main(int count, char **words)
 {
     char text[4096] = "", *kept = "eeprom.bin";
-    if (count == 3 && !strcmp(words[1], "--config")) {
+    if (count == 3 && known_texts[0] && !strcmp(words[1], CONFIGURE)) {
         FILE *in = fopen(words[2], "r"), *out = fopen(kept, "w");
         while (fgets(text, sizeof text, in)) {
             fputs(text, out);
+            printf("# %s", text);
             if (!strncmp(text, "nonsense", 8))
                 printf("###ERROR IN input: UNKNOWN COMMAND: nonsense###\n");
         }
@@ -130,7 +146,7 @@ int main(int count, char **words)
             ;
         next += 1e-3;
         misbehave(text, next);
-        if (sticks.channels[4] > 1700 && !is_unarmed)
+        if (sticks.channels[4] > 1700 && next - sticks_time < 1 && !is_unarmed)
             fly();
         else
             for (int motor = 0; motor < 4; motor++)
