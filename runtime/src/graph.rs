@@ -5,6 +5,7 @@
 //! - `computing_time`: computing time of the steps
 //! - `parameters`, `recorders`: parameters and files of each node
 //! - `periods`: nodes and outputs that compute only once, or whose ticks would overflow
+//! - `samples`: samples that no reader takes, and measurements that come too late
 //! - `ranges`: ranges of numbers by their units
 //! - `groups`: nodes that share a process
 //! - `evaluations`: conditions and measures after the run
@@ -23,6 +24,7 @@ mod periods;
 mod processes;
 mod ranges;
 mod recorders;
+mod samples;
 mod wiring;
 
 pub use crate::program::BackupSpec;
@@ -126,6 +128,7 @@ impl Graph {
         let of_nodes = plan.nodes.iter_mut().zip(parameters);
         of_nodes.for_each(|(node, of_node)| (node.parameters, node.files) = of_node);
         recorders::check(&declared_nodes, &plan.nodes)?;
+        samples::check(&declared_nodes, &plan, &mut notes);
         let backups = backups::all(manifest, &plan, &declared_nodes, &mut notes)?;
         let programs: Vec<Program> = declared_nodes.into_iter().map(|declared| declared.program).collect();
         evaluations::check(manifest, &plan, &programs, &mut notes)?;
