@@ -1,5 +1,6 @@
 //! The nodes of a run, wired to each other.
 
+use super::inputs::Senders;
 use super::processes::{self, DeclaredNode};
 use super::{computing_time, inputs, outputs};
 use crate::program::OnExit;
@@ -22,6 +23,7 @@ pub struct Wiring {
 pub fn wire(declared_nodes: &[DeclaredNode<'_>], changed: Option<usize>) -> Result<Wiring, Diagnostic> {
     let published = outputs::publish_all(declared_nodes)?;
     let topics: Vec<TopicPlan> = published.iter().map(|output| output.topic.clone()).collect();
+    let senders = Senders { declared_nodes, published: &published };
     let mut nodes = Diagnostic::gather(declared_nodes.iter().enumerate().map(|(index, declared)| {
         let process = declared.process;
         Ok(NodePlan {
@@ -29,7 +31,7 @@ pub fn wire(declared_nodes: &[DeclaredNode<'_>], changed: Option<usize>) -> Resu
             period_ticks: processes::period_ticks(declared.manifest, process)?,
             wait: process.wait.unwrap_or_default(),
             cpu: process.cpu.as_ref().map(|cpu| *cpu.get_ref()),
-            inputs: inputs::inputs(declared, &topics)?,
+            inputs: inputs::inputs(declared, &topics, &senders)?,
             outputs: outputs::outputs(&published, index),
             parameters: serde_json::Value::Null,
             files: Vec::new(),
