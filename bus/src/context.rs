@@ -2,7 +2,7 @@
 
 use crate::ports::{InputSamples, OutputPorts, SampleSource};
 use inputs::InputFiles;
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 
 /// Information about a component's node and run, and the list of its warnings.
 ///
@@ -36,6 +36,7 @@ pub struct NodeContext<'a> {
     /// Files of the run: a component reads the files that its parameters name with these, and with nothing else.
     pub files: InputFiles,
     warnings: RefCell<Vec<Warning>>,
+    times: Cell<SampleTimes>,
 }
 
 /// Message type of an input.
@@ -82,6 +83,18 @@ impl InputMessage<'_> {
     }
 }
 
+/// Times of a node's samples, as far as its component states them: a check of the manifest compares them with the nodes
+/// around it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SampleTimes {
+    /// Time between two measurements; `None` for components that do not measure.
+    pub measured_every_s: Option<f64>,
+    /// Least time from a measurement, or from the arrival of a message, to its sending.
+    pub delay_s: f64,
+    /// Greatest age of a measurement that the component uses; `None` if it uses any.
+    pub remembered_s: Option<f64>,
+}
+
 /// Legal but unusual value of a node in its run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Warning {
@@ -101,7 +114,20 @@ impl<'a> NodeContext<'a> {
         let (seed, tick_ns, period_ticks, duration_ticks) = (1, 1_000_000, 1, 3_600_000);
         let (outputs, warnings) = (&[] as &[_], RefCell::default());
         let (messages, files) = (&[] as &[_], InputFiles::default());
-        Self { name, seed, inputs, outputs, messages, tick_ns, period_ticks, duration_ticks, files, warnings }
+        let times = Cell::default();
+        Self {
+            name,
+            seed,
+            inputs,
+            outputs,
+            messages,
+            tick_ns,
+            period_ticks,
+            duration_ticks,
+            files,
+            warnings,
+            times,
+        }
     }
 
     /// The same node where the manifest names these `outputs`.
@@ -177,6 +203,24 @@ impl<'a> NodeContext<'a> {
 
     fn push(&self, key: &str, message: String, is_behind_end: bool) {
         self.warnings.borrow_mut().push(Warning { key: key.to_owned(), message, is_behind_end });
+    }
+
+    /// States the times of the node's samples.
+    ///
+    /// ```
+    /// # use bus::context::{NodeContext, SampleTimes};
+    /// let context = NodeContext::new("gps", &["state"]);
+    /// context.state_times(SampleTimes { measured_every_s: Some(0.1), delay_s: 0.08, ..Default::default() });
+    /// assert_eq!(context.times().measured_every_s, Some(0.1));
+    /// ```
+    pub fn state_times(&self, times: SampleTimes) {
+        self.times.set(times);
+    }
+
+    /// The times that were stated last.
+    #[must_use]
+    pub fn times(&self) -> SampleTimes {
+        self.times.get()
     }
 
     /// The warnings left so far.

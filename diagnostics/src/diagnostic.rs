@@ -3,6 +3,7 @@
 use crate::nearest::nearest;
 use crate::parameter::{FileFault, FileFaults, ParameterError};
 use crate::place::Place;
+use crate::plain::plain;
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 use std::collections::BTreeSet;
 use std::fmt;
@@ -72,7 +73,7 @@ impl Diagnostic {
     /// A file that cannot be read at all.
     #[must_use]
     pub fn unreadable(file: impl Into<String>, cause: &io::Error) -> Self {
-        Self::in_file(file, format!("cannot read this file: {cause}"))
+        Self::in_file(file, format!("cannot read this file: {}", plain(&cause.to_string())))
             .help("check the path and that it is UTF-8 text")
     }
 

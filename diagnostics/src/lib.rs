@@ -5,6 +5,7 @@
 //! | [`Diagnostic`] | fault of a file: the place, what was expected, what was found, what to do |
 //! | `nearest` | the known name that was probably meant |
 //! | `place` | position in a file |
+//! | `plain` | messages of the system and of libraries, in words |
 //! | `printable` | untrusted text as a terminal shows it |
 //! | [`mod@parameter`] | parameters of components: the error, and the checks that raise it |
 //! | `read` | types from JSON and TOML, whose errors carry their keys and places |
@@ -23,6 +24,7 @@ mod diagnostic;
 mod nearest;
 pub mod parameter;
 mod place;
+mod plain;
 mod printable;
 mod read;
 pub mod unit;
@@ -31,6 +33,7 @@ pub use diagnostic::{Diagnostic, Faults};
 pub use nearest::{did_you_mean, nearest};
 pub use parameter::ParameterError;
 pub use place::Place;
+pub use plain::plain;
 pub use printable::{is_printable, printable, printable_json, printable_line, short_lines, shortened};
 pub use read::{Misread, parse_toml, read, read_toml, read_tree};
 pub use unit::{Dimension, convert};

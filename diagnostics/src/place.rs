@@ -24,6 +24,18 @@ pub struct Place {
     source: String,
     /// The bytes of `source` that are meant.
     marked: Range<usize>,
+    /// An earlier place in the same file that belongs to the fault.
+    before: Option<Before>,
+}
+
+/// An earlier place, and the lines from there on.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Before {
+    line: usize,
+    /// The text from its line to the line that is meant, without that.
+    source: String,
+    /// The bytes of `source` that are meant.
+    marked: Range<usize>,
 }
 
 impl Place {
@@ -40,7 +52,25 @@ impl Place {
             column: before[line_start..].chars().count() + 1,
             marked: in_line(span.start)..in_line(span.end.max(span.start)),
             source: source.to_owned(),
+            before: None,
         }
+    }
+
+    /// The same place, drawn together with the earlier bytes `first` of the same `text`.
+    ///
+    /// ```
+    /// let text = "x = 1\ny = 2\nx = 3\n";
+    /// let place = diagnostics::Place::of("a.toml", text, &(12..13)).after(text, &(0..1));
+    /// let drawn = format!("{place:#}");
+    /// assert!(drawn.contains("1 | x = 1") && drawn.contains("3 | x = 3"), "{drawn}");
+    /// ```
+    #[must_use]
+    pub fn after(self, text: &str, first: &Range<usize>) -> Self {
+        let of_first = Self::of("", text, first);
+        let lines: Vec<&str> = text.lines().skip(of_first.line - 1).take(self.line - of_first.line).collect();
+        let source: String = lines.iter().flat_map(|line| [*line, "\n"]).collect();
+        let before = Before { line: of_first.line, source, marked: of_first.marked };
+        Self { before: Some(before), ..self }
     }
 
     /// The place of line number `line` of `text`, from 1; a number past the end means the end.
@@ -78,6 +108,15 @@ impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if !f.alternate() {
             return write!(f, "{}:{}:{}", self.file, self.line, self.column);
+        }
+        if let Some(before) = &self.before {
+            let source = format!("{}{}", before.source, self.source);
+            let shifted = self.marked.start + before.source.len()..self.marked.end + before.source.len();
+            let first = AnnotationKind::Context.span(before.marked.clone()).label("the first one");
+            let marks = [AnnotationKind::Primary.span(shifted), first];
+            let snippet = Snippet::source(&source).line_start(before.line).annotations(marks);
+            let drawn = Renderer::plain().render(&[Group::with_level(Level::ERROR).element(snippet)]);
+            return f.write_str(&drawn);
         }
         let mark = AnnotationKind::Primary.span(self.marked.clone());
         let snippet = Snippet::source(&self.source).line_start(self.line).annotation(mark);

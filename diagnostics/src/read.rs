@@ -57,7 +57,7 @@ pub fn read<P: DeserializeOwned>(parameters: &Value) -> Result<P, ParameterError
 /// assert_eq!(error.to_string().lines().next(), Some("a.toml:1:8: `seed` must be a whole number, at least 0, found the text \"x\""));
 /// ```
 pub fn read_toml<T: DeserializeOwned>(file: &str, text: &str) -> Result<T, Diagnostic> {
-    let misread = |misread: Misread| Diagnostic::at(Place::of(file, text, &misread.span()), misread.error);
+    let misread = |misread: Misread| Diagnostic::at(misread.place(file, text), misread.error);
     let table = parse_toml(text).map_err(misread)?;
     let span = table.span();
     read_tree(&Spanned::new(span, DeValue::Table(table.into_inner()))).map_err(misread)
@@ -69,9 +69,64 @@ pub fn read_toml<T: DeserializeOwned>(file: &str, text: &str) -> Result<T, Diagn
 /// The place at which it is not TOML, and the reason.
 pub fn parse_toml(text: &str) -> Result<Spanned<DeTable<'_>>, Misread> {
     DeTable::parse(text).map_err(|error| {
-        let message = format!("not valid TOML: {}", error.message().trim());
-        Misread { error: message.into(), span: error.span() }
+        let span = error.span();
+        if error.message() == DUPLICATE_KEY
+            && let Some(second) = &span
+        {
+            return duplicate(text, second);
+        }
+        let why = match error.message().trim() {
+            // TOML takes anything that it cannot read for text without quotes.
+            why if why.starts_with("string values must be quoted") => {
+                "this is neither a number, a text in quotes, true, false, a list nor a table"
+            }
+            why => why,
+        };
+        Misread { error: format!("not valid TOML: {why}").into(), span, first: None }
     })
+}
+
+/// Message of the parser for a key that its table has already.
+const DUPLICATE_KEY: &str = "duplicate key";
+
+/// The error of the key at `second`, which its table has already.
+fn duplicate(text: &str, second: &Range<usize>) -> Misread {
+    let key = text.get(second.clone()).unwrap_or_default();
+    let first = first_of(text, second, key.trim_matches(['"', '\'']));
+    let message = match &first {
+        Some(first) => {
+            let line = Place::of("", text, first).line;
+            format!("not valid TOML: the key `{key}` is there twice, first in line {line}")
+        }
+        None => format!("not valid TOML: the key `{key}` is there twice"),
+    };
+    Misread { error: message.into(), span: Some(second.clone()), first }
+}
+
+/// Place of the first key `name` in the table that has it again at `second`.
+fn first_of(text: &str, second: &Range<usize>, name: &str) -> Option<Range<usize>> {
+    // Under another name of the same length the second one finds its place in the tree, beside the first.
+    let other = "z".repeat(second.len());
+    let renamed = format!("{}{other}{}", text.get(..second.start)?, text.get(second.end..)?);
+    let (tree, _) = DeTable::parse_recoverable(&renamed);
+    let first = beside(tree.get_ref(), second, name)?;
+    (first.start < second.start).then_some(first)
+}
+
+/// Place of the key `name` in the table that has a key at `span`.
+fn beside(table: &DeTable<'_>, span: &Range<usize>, name: &str) -> Option<Range<usize>> {
+    if table.keys().any(|key| key.span() == *span) {
+        return table.get_key_value(name).map(|(key, _)| key.span());
+    }
+    table.values().find_map(|value| beside_in(value, span, name))
+}
+
+fn beside_in(value: &Spanned<DeValue<'_>>, span: &Range<usize>, name: &str) -> Option<Range<usize>> {
+    match value.get_ref() {
+        DeValue::Table(table) => beside(table, span, name),
+        DeValue::Array(items) => items.iter().find_map(|item| beside_in(item, span, name)),
+        _ => None,
+    }
 }
 
 /// Reads a part of a TOML file as a `T`.
@@ -96,6 +151,8 @@ pub struct Misread {
     /// The key, the expected value and the value that was found.
     pub error: ParameterError,
     span: Option<Range<usize>>,
+    /// Bytes of an earlier place that belongs to the error, such as the first of two equal keys.
+    first: Option<Range<usize>>,
 }
 
 impl Misread {
@@ -111,11 +168,27 @@ impl Misread {
         matches!(self.error, ParameterError::Unknown { .. })
     }
 
+    /// Returns the bytes of an earlier place that belongs to the error, such as the first of two equal keys.
+    #[must_use]
+    pub fn first(&self) -> Option<Range<usize>> {
+        self.first.clone()
+    }
+
+    /// Returns the place in the `text` of `file`.
+    #[must_use]
+    pub fn place(&self, file: &str, text: &str) -> Place {
+        let place = Place::of(file, text, &self.span());
+        match &self.first {
+            Some(first) => place.after(text, first),
+            None => place,
+        }
+    }
+
     /// The same in a text that begins at byte `base` of a longer one.
     #[must_use]
     pub fn shifted(self, base: usize) -> Self {
-        let span = self.span();
-        Self { span: Some(base + span.start..base + span.end), ..self }
+        let shifted = |span: Range<usize>| base + span.start..base + span.end;
+        Self { span: Some(shifted(self.span())), first: self.first.map(shifted), ..self }
     }
 
     /// The same error, in the table `table`.
@@ -197,6 +270,21 @@ impl<'v> Tree<'v> {
 }
 
 impl<'v> Shape<'v> {
+    /// The value as it stands in a file.
+    fn seen(&self) -> String {
+        seen(match self {
+            Self::Null => Unexpected::Unit,
+            Self::Bool(flag) => Unexpected::Bool(*flag),
+            Self::Unsigned(number) => Unexpected::Unsigned(*number),
+            Self::Signed(number) => Unexpected::Signed(*number),
+            Self::Float(number) => Unexpected::Float(*number),
+            Self::Text(text) => Unexpected::Str(text),
+            Self::Other(what) => Unexpected::Other(what),
+            Self::List(_) => Unexpected::Seq,
+            Self::Table(_) => Unexpected::Map,
+        })
+    }
+
     fn visit<V: Visitor<'v>>(self, visitor: V) -> Result<V::Value, Misread> {
         match self {
             Self::Null => visitor.visit_unit(),
@@ -272,7 +360,10 @@ impl<'de> Deserializer<'de> for Tree<'de> {
                 MapAccessDeserializer::new(Entries::of(entries)).deserialize_enum(name, variants, visitor)
             }
             Shape::Table(_) => Err(de::Error::custom("expected a table with one key, the variant's name")),
-            shape => shape.visit(visitor),
+            shape => {
+                let expected = format!("one of `{}`", variants.join("`, `"));
+                Err(ParameterError::value("", expected, shape.seen()).into())
+            }
         }
         .map_err(|misread: Misread| misread.at(self.span))
     }
@@ -336,7 +427,7 @@ impl<'v> de::SeqAccess<'v> for Items<'v> {
 
 impl From<ParameterError> for Misread {
     fn from(error: ParameterError) -> Self {
-        Self { error, span: None }
+        Self { error, span: None, first: None }
     }
 }
 
@@ -443,6 +534,39 @@ mod tests {
     }
 
     #[test]
+    fn a_key_that_is_there_twice_is_shown_at_both_places() {
+        for (text, places) in [
+            ("a = 1\nb = 2\na = 3", "3:1 1"),
+            ("[p.q]\nx = 1\n\n[p.r]\nx = 1\n[p.q]\ny = 1", "6:4 1"),
+            ("a = { b = 1, c = 2, b = 3 }", "1:21 1"),
+            ("[[l]]\nx = 1\n[[l]]\ny = 1\n'y' = 2\n", "5:1 4"),
+            ("[t]\na.b = 1\na.b = 2\n", "3:3 2"),
+        ] {
+            let error = read_toml::<Wheels>("a.toml", text).unwrap_err();
+            let place = error.place.as_ref().unwrap();
+            let (shown, told) = (format!("{error:#}"), error.error.to_string());
+            let first = told.rsplit(' ').next().unwrap();
+            assert_eq!(format!("{}:{} {first}", place.line, place.column), places, "{told}");
+            assert!(told.contains("is there twice") && shown.contains("the first one"), "{shown}");
+        }
+    }
+
+    #[test]
+    fn a_choice_of_another_type_is_told_with_the_choices() {
+        #[derive(Debug, serde::Deserialize)]
+        #[serde(rename_all = "lowercase")]
+        enum Side {
+            Left,
+            Right,
+        }
+        let read = |text| read_toml::<BTreeMap<String, Side>>("a.toml", text);
+        assert!(matches!(read("a = 'left'").unwrap()["a"], Side::Left));
+        assert!(matches!(read("a = 'right'").unwrap()["a"], Side::Right));
+        let error = read("a = 3").unwrap_err();
+        assert_eq!(error.error.to_string(), "`a` must be one of `left`, `right`, found 3");
+    }
+
+    #[test]
     fn an_unknown_key_may_contain_a_dot() {
         let (place, error) = refused("[[a]]\n'b.c' = 1");
         assert_eq!((place.as_str(), error.as_str()), ("2:1", "unknown key `a.0.b.c`, expected `radius_m`"));
@@ -466,5 +590,7 @@ mod tests {
     fn what_is_no_toml_is_told_with_its_place() {
         let error = read_toml::<Wheels>("a.toml", "a = 1\nb = ").unwrap_err().to_string();
         assert!(error.starts_with("a.toml:2:5: not valid TOML: "), "{error}");
+        let error = read_toml::<Wheels>("a.toml", "a = 1 2").unwrap_err().to_string();
+        assert!(error.contains("this is neither a number"), "{error}");
     }
 }

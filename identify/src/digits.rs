@@ -22,9 +22,22 @@ pub fn rounded(value: f64) -> String {
     }
 }
 
+/// Value with six significant digits: no estimate is known better.
+///
+/// Files have these; intervals in texts have four.
+pub fn to_six_digits(value: f64) -> f64 {
+    format!("{value:.5e}").parse().unwrap_or(value)
+}
+
 #[cfg(test)]
 mod tests {
-    use super::quantity;
+    use super::{quantity, to_six_digits};
+
+    #[test]
+    fn a_number_of_a_file_has_six_digits() {
+        let values = [0.005_995_057_451_690_751_5, -1.0, 7.618_4e-8, 43_988.456, 0.0];
+        assert_eq!(values.map(to_six_digits), [0.005_995_06, -1.0, 7.618_4e-8, 43_988.5, 0.0]);
+    }
 
     #[test]
     fn numbers_of_ordinary_size_are_plain_and_the_unit_1_is_left_out() {

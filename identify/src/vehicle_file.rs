@@ -1,6 +1,6 @@
 //! The new vehicle file: the declared one with the effects that were accepted.
 
-use crate::digits::{quantity, rounded};
+use crate::digits::{quantity, rounded, to_six_digits};
 use crate::envelope::Reached;
 use crate::report::{Estimate, Report};
 use diagnostics::Diagnostic;
@@ -135,7 +135,9 @@ fn of_estimate(estimate: &Estimate, source: &str) -> Item {
     };
     let (low, high) = (rounded(estimate.low), quantity(estimate.high, estimate.unit));
     let interval = format!("{doubt}95 % interval {low} to {high}");
-    parameter(estimate.value, estimate.unit, source, interval.into())
+    // At a bound the digits that are left out could lead beyond it.
+    let value = if estimate.at_bound { estimate.value } else { to_six_digits(estimate.value) };
+    parameter(value, estimate.unit, source, interval.into())
 }
 
 fn parameter(value: f64, unit: &str, source: &str, uncertainty: Value) -> Item {

@@ -52,11 +52,11 @@ pub enum RecordingError {
         reason: DecodeError,
     },
     /// There is no such topic.
-    #[error("the recording has no topic {topic}; it has {known}")]
+    #[error("the recording has no topic {topic}; it has {}", if .known.is_empty() { "none" } else { .known })]
     UnknownTopic {
         /// The topic requested.
         topic: String,
-        /// The topics there are.
+        /// The topics there are; empty if there is none.
         known: String,
     },
     /// There is no such field.

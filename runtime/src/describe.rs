@@ -37,7 +37,7 @@ impl fmt::Display for Graph {
         }
         for (index, (node, program)) in plan.nodes.iter().zip(&self.programs).enumerate() {
             let cpu = node.cpu.map_or(String::new(), |cpu| format!(", cpu {cpu}"));
-            let (what, hz) = (what(program), rate_hz / f64::from(node.period_ticks));
+            let (what, hz) = (what(program), rounded(rate_hz / f64::from(node.period_ticks)));
             let wait = serde_json::json!(node.wait);
             writeln!(f, "\n{} ({what}), {hz} Hz{cpu}, {}", node.name, wait.as_str().unwrap_or_default())?;
             for input in &node.inputs {
@@ -49,7 +49,7 @@ impl fmt::Display for Graph {
             }
             for output in &node.outputs {
                 let topic = &plan.topics[output.topic];
-                let hz = rate_hz / f64::from(topic.period_ticks);
+                let hz = rounded(rate_hz / f64::from(topic.period_ticks));
                 writeln!(f, "  -> {:<12} {} [{}] {hz} Hz", output.port, topic.name, topic.type_name)?;
             }
             f.write_str(&replacements(self, index))?;
@@ -72,6 +72,11 @@ impl fmt::Display for Graph {
             writeln!(f, "\n{name} ({}), takes no part in the ticks{after}{ready}{end}", what(program))
         })
     }
+}
+
+/// A rate with three digits behind the point at most.
+fn rounded(hz: f64) -> f64 {
+    (hz * 1e3).round() / 1e3
 }
 
 fn what(program: &Program) -> String {

@@ -6,6 +6,7 @@
 //! - `computing_time`: computing time of the steps
 //! - `parameters`, `recorders`: parameters and files of each node
 //! - `periods`: nodes and outputs that compute only once, or whose ticks would overflow
+//! - `samples`: samples that no reader takes, and measurements that come too late
 //! - `ranges`: ranges of numbers by their units
 //! - `groups`: nodes that share a process
 //! - `evaluations`: conditions and measures after the run
@@ -24,6 +25,7 @@ mod periods;
 mod processes;
 mod ranges;
 mod recorders;
+mod samples;
 mod sidecars;
 mod wiring;
 
@@ -137,6 +139,9 @@ impl Graph {
         faults.keep(recorders::check(&declared_nodes, &plan.nodes));
         let programs: Vec<Program> = declared_nodes.iter().map(|declared| declared.program.clone()).collect();
         faults.keep(evaluations::check(manifest, &plan, &programs, notes));
+        if faults.is_empty() {
+            samples::check(&declared_nodes, &plan, notes);
+        }
         // A backup is wired as its node is: those of faulty nodes would repeat their faults.
         let backups = match faults.is_empty() {
             true => faults.keep(backups::all(manifest, &plan, &declared_nodes, notes)),

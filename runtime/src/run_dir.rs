@@ -39,6 +39,12 @@ pub struct Entry {
     pub manifest: PathBuf,
     /// The process number of its launcher.
     pub launcher: u32,
+    /// The folder in which it was started.
+    #[serde(default)]
+    pub folder: PathBuf,
+    /// The number of the terminal on which it was started; `None` if it has none.
+    #[serde(default)]
+    pub terminal: Option<u32>,
 }
 
 impl Entry {
@@ -50,7 +56,9 @@ impl Entry {
     /// Entry of a new run of `manifest` that is called `run_id`.
     fn named(manifest: &Path, run_id: String) -> Result<Self> {
         let run_dir = new_run_dir(&run_id)?;
-        Ok(Self { run_id, run_dir, manifest: manifest.to_owned(), launcher: std::process::id() })
+        let (manifest, launcher) = (manifest.to_owned(), std::process::id());
+        let folder = std::env::current_dir().unwrap_or_default();
+        Ok(Self { run_id, run_dir, manifest, launcher, folder, terminal: terminal() })
     }
 
     /// Entry of run `run_id` in `file`; `None` for any other content.
@@ -60,6 +68,15 @@ impl Entry {
         let entry: Self = serde_json::from_str(&text).ok()?;
         (entry.run_id == run_id && is_run_dir_of(&entry.run_dir, run_id)).then_some(entry)
     }
+}
+
+/// Number of the terminal of this process; `None` if it has none.
+fn terminal() -> Option<u32> {
+    let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
+    // The name of the program, in brackets, may hold spaces. Behind it: state, parent, group, session, terminal.
+    let (_, fields) = stat.rsplit_once(')')?;
+    let number: i32 = fields.split_whitespace().nth(4)?.parse().ok()?;
+    (number != 0).then_some(number.cast_unsigned())
 }
 
 /// The monotonic time, in ns; later than any that this process has given out, though a clock may stand still between
@@ -433,6 +450,34 @@ pub fn find_live(run_id: Option<&str>) -> Result<LiveRun> {
     choose(live_runs(), run_id)
 }
 
+/// The live run that a command is to change: the one named `run_id`, or the only one, if it was started in this folder and on this
+/// terminal.
+///
+/// # Errors
+/// As [`find_live`], or if the only run was started elsewhere: it may be somebody's long flight.
+pub fn find_own(run_id: Option<&str>) -> Result<LiveRun> {
+    let run = find_live(run_id)?;
+    if run_id.is_none() {
+        require_here(&run.entry, &std::env::current_dir().unwrap_or_default(), terminal())?;
+    }
+    Ok(run)
+}
+
+fn require_here(entry: &Entry, folder: &Path, terminal: Option<u32>) -> Result<()> {
+    let elsewhere = if entry.folder != folder {
+        format!("in another folder, {}", entry.folder.display())
+    } else if entry.terminal != terminal {
+        "on another terminal".to_owned()
+    } else {
+        return Ok(());
+    };
+    let Entry { run_id, manifest, .. } = entry;
+    bail!(
+        "the run that is alive, of {}, was started {elsewhere}; if it is meant, say so with --run {run_id}",
+        manifest.display()
+    )
+}
+
 /// The run that the process `launcher` flies; the first one, if it flies several.
 ///
 /// ```
@@ -464,8 +509,8 @@ fn listed(runs: &[LiveRun]) -> String {
 #[cfg(test)]
 mod tests {
     use super::{
-        Entry, LiveRun, choose, dir_name, entry_path, is_run_id, register, run_of_dir, run_of_shared_memory,
-        try_claim,
+        Entry, LiveRun, choose, dir_name, entry_path, is_run_id, register, require_here, run_of_dir,
+        run_of_shared_memory, try_claim,
     };
     use std::collections::BTreeSet;
     use std::path::Path;
@@ -475,7 +520,8 @@ mod tests {
     fn runs(names: &[&str]) -> Vec<LiveRun> {
         let run = |name: &&str| {
             let run_id = (*name).to_owned();
-            let entry = Entry { run_id, run_dir: "/t".into(), manifest: "/m.toml".into(), launcher: 1 };
+            let (run_dir, manifest, folder) = ("/t".into(), "/m.toml".into(), "/f".into());
+            let entry = Entry { run_id, run_dir, manifest, launcher: 1, folder, terminal: Some(7) };
             LiveRun { entry, file: tempfile::tempfile().unwrap() }
         };
         names.iter().map(run).collect()
@@ -490,6 +536,19 @@ mod tests {
         });
         numbers.sort_unstable();
         assert!(numbers.windows(2).all(|pair| pair[0] < pair[1]));
+    }
+
+    #[test]
+    fn a_run_of_another_folder_or_terminal_is_changed_by_its_name_alone() {
+        let run = runs(&["1-a"]).remove(0);
+        let here = |folder: &str, terminal| {
+            require_here(&run.entry, Path::new(folder), terminal).map_err(|error| error.to_string())
+        };
+        assert_eq!(here("/f", Some(7)), Ok(()));
+        let error = here("/g", Some(7)).unwrap_err();
+        assert!(error.contains("another folder, /f") && error.contains("--run 1-a"), "{error}");
+        let error = here("/f", None).unwrap_err();
+        assert!(error.contains("another terminal") && error.contains("/m.toml"), "{error}");
     }
 
     #[test]

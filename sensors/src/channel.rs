@@ -14,7 +14,7 @@
 use crate::noise::LazyStream;
 use bus::Message;
 use bus::component::{State, StateError, Transfer};
-use bus::context::NodeContext;
+use bus::context::{NodeContext, SampleTimes};
 use bus::random::{Stream, stream, uniform};
 use diagnostics::parameter::{ParameterError, not_negative, positive, refuse, require};
 
@@ -278,6 +278,9 @@ impl Channel {
     /// As [`Timing::check`].
     pub fn new(timing: &Timing, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         timing.check(context)?;
+        let measured_every_s = Some(timing.rate_hz.recip());
+        let delay_s = timing.delay_ms * 1e-3;
+        context.state_times(SampleTimes { measured_every_s, delay_s, remembered_s: None });
         let random = || stream(context.seed, context.name);
         let (noise, mut loss) = (random(), random());
         loss.set_stream(1);

@@ -10,7 +10,7 @@ mod transition;
 
 use crate::wire::{attitude, vector, vector_message};
 use bus::component::{Component, Info, StepError};
-use bus::context::{NodeContext, StepContext};
+use bus::context::{NodeContext, SampleTimes, StepContext};
 use bus::messages::{
     AttitudeEstimate, Barometer, Gps, Imu, Innovation, Magnetometer, Mocap, StateEstimate, Vector3,
 };
@@ -75,6 +75,8 @@ impl Component for Ekf {
 
     fn new(params: EkfParams, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         let filter = Self::with_period(params, context.period_s())?;
+        let remembered_s = Some(params.delay_max_ms * 1e-3);
+        context.state_times(SampleTimes { remembered_s, ..SampleTimes::default() });
         let has_position = context.has("gps") || context.has("mocap");
         let unwired = "nothing tells the position: wire `inputs.gps`, `inputs.mocap` or both";
         if has_position { Ok(filter) } else { Err(ParameterError::conflict("", unwired)) }

@@ -13,7 +13,7 @@
 use crate::line::{Line, LineState, NoPlace, PLACES_MIN, STREAMS};
 use bus::announcement::Announcement;
 use bus::component::{Component, Info, State, StateError, StepError, Transfer};
-use bus::context::{NodeContext, StepContext};
+use bus::context::{NodeContext, SampleTimes, StepContext};
 use bus::messages::Time;
 use bus::ports::{
     FORWARDED_BYTES_MAX, ForwardedInputs, InputSamples, OutputPort, OutputPorts, OutputSamples, PortSpec,
@@ -319,6 +319,8 @@ impl Component for Link {
         let streams = names.iter().map(|name| LinkStream::new(name, &parameters, context));
         let streams = streams.collect::<Result<Vec<_>, _>>()?;
         parameters.check_load(context)?;
+        let delay_s = parameters.latency_ms * 1e-3;
+        context.state_times(SampleTimes { delay_s, ..SampleTimes::default() });
         let places = parameters.places(context);
         let line =
             parameters.line(context, streams.iter().map(|stream| stream.parameters.priority).collect());

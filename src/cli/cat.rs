@@ -84,7 +84,7 @@ fn csv(recording: &Recording, arguments: &CatArguments) -> Result<bool> {
         let record = record?;
         let leaves = arguments.leaves(recording, &record)?;
         let (paths, values): (Vec<_>, Vec<_>) =
-            leaves.into_iter().map(|leaf| (leaf.path, leaf.value.to_string())).unzip();
+            leaves.into_iter().map(|leaf| (leaf.path, text_of(leaf.value))).unzip();
         let mut lines = String::new();
         if let Some(columns) = &header {
             if *columns != paths {
@@ -107,6 +107,14 @@ fn csv(recording: &Recording, arguments: &CatArguments) -> Result<bool> {
         arguments.require_whole(recording)?;
     }
     out.flush().map_or_else(gone_or_failed, |()| Ok(recording.cut().is_none()))
+}
+
+/// A value as a cell of CSV holds it.
+fn text_of(value: Value) -> String {
+    match value {
+        Value::Text(text) => text,
+        number => number.to_string(),
+    }
 }
 
 /// A row of CSV, safe to be shown on a terminal.
@@ -160,6 +168,14 @@ impl CatArguments {
     fn leaves(&self, recording: &Recording, record: &Record) -> Result<Vec<Leaf>> {
         let mut leaves = recording.decode(record)?;
         leaves.retain(|leaf| !is_padding(&leaf.path));
+        // Angles of a quaternion and velocities along the axes of the body, as conditions and plots have them.
+        let is_made = |field: &&String| !leaves.iter().any(|leaf| is_part(&leaf.path, field));
+        let made = self.field.iter().filter(is_made).filter_map(|field| {
+            let (value, unit) = recorder::series::value(&leaves, field)?;
+            Some(Leaf { path: field.clone(), unit: unit.to_owned(), value: Value::Float(value) })
+        });
+        let made: Vec<Leaf> = made.collect();
+        leaves.extend(made);
         for field in &self.field {
             if !leaves.iter().any(|leaf| is_part(&leaf.path, field)) {
                 let known: Vec<_> = leaves.iter().map(|leaf| leaf.path.as_str()).collect();

@@ -8,6 +8,7 @@ use bus::component::{Role, Transfer};
 use bus::ports::{Inputs, PortSpec};
 use bus::schema::Schema;
 use clap::Args;
+use diagnostics::did_you_mean;
 use hummingbus::COMPONENTS;
 use runtime::registry::NodeProgram;
 use serde_json::{Value, json};
@@ -115,9 +116,9 @@ fn program_json(program: &NodeProgram) -> Value {
 }
 
 fn find(name: &str) -> Result<&'static Registration> {
-    COMPONENTS
-        .find(name)
-        .ok_or_else(|| anyhow!("there is no component {name}; there are: {}", COMPONENTS.names()))
+    COMPONENTS.find(name).ok_or_else(|| {
+        anyhow!("there is no component {name}; {}", did_you_mean(name, COMPONENTS.kinds(), "there are:"))
+    })
 }
 
 fn table(components: impl Iterator<Item = &'static Registration>) -> String {

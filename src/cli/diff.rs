@@ -25,7 +25,7 @@ pub struct DiffArguments {
     /// The second recording.
     b: PathBuf,
     /// Largest difference that counts as none, in the unit of each field.
-    #[arg(long, value_name = "NUMBER", value_parser = tolerance)]
+    #[arg(long, value_name = "NUMBER", value_parser = tolerance, allow_negative_numbers = true)]
     tolerance: Option<f64>,
     /// Print JSON.
     #[arg(long)]

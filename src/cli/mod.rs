@@ -44,6 +44,7 @@ mod view;
 
 use anyhow::Result;
 use clap::{CommandFactory as _, Parser, Subcommand};
+use diagnostics::plain;
 use output::{print_error, print_error_json, readable, say};
 use std::process::ExitCode;
 use table::commands;
@@ -178,13 +179,14 @@ fn write_manual(arguments: &completions::ManArguments) -> Result<bool> {
 
 /// Prints help, the version, or the reason why the arguments are refused. A shell's `*` makes arguments of any names.
 fn refuse(error: &clap::Error) -> ExitCode {
-    let text = error.render().to_string();
+    let rendered = error.render();
+    let text = plain(&rendered.to_string()).into_owned();
     if error.use_stderr() {
         print_error_json(
             &serde_json::json!({ "error": text.trim_end().trim_start_matches("error: "), "faults": [] }),
         );
     }
-    if readable(&text) == text {
+    if !error.use_stderr() || (readable(&text) == text && rendered.to_string() == text) {
         // In colour where the terminal has it.
         error.exit();
     }

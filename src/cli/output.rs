@@ -3,11 +3,11 @@
 
 use anyhow::{Context, Result};
 use diagnostics::parameter::FileFault;
-use diagnostics::{Diagnostic, ParameterError, Place, printable, printable_json, short_lines};
+use diagnostics::{Diagnostic, ParameterError, Place, plain, printable, printable_json, short_lines};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::borrow::Cow;
-use std::io::Write as _;
+use std::io::{IsTerminal as _, Write as _};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// True once a JSON document was printed: a command prints one.
@@ -66,12 +66,32 @@ pub fn gone_or_failed(error: std::io::Error) -> Result<bool> {
 
 /// Prints a line on standard error. If that is closed or full, the line is lost.
 pub fn say(text: &str) {
-    let _ = writeln!(std::io::stderr(), "{}", readable(text));
+    let text = readable(text);
+    let marked = MARKS.iter().find_map(|(mark, style)| Some((mark, style, text.strip_prefix(mark)?)));
+    let _ = match marked.filter(|_| has_colour()) {
+        Some((mark, style, rest)) => writeln!(std::io::stderr(), "{style}{mark}{RESET}{rest}"),
+        None => writeln!(std::io::stderr(), "{text}"),
+    };
+}
+
+/// Begins of lines that are coloured on a terminal, and their colours: those of the errors of arguments.
+const MARKS: [(&str, &str); 2] = [("error:", "\x1b[1m\x1b[31m"), ("warning:", "\x1b[1m\x1b[33m")];
+const RESET: &str = "\x1b[0m";
+
+/// True if standard error is a terminal that may be coloured (<https://no-color.org>).
+fn has_colour() -> bool {
+    let is_set = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
+    let is_dumb = std::env::var_os("TERM").is_none_or(|term| term == "dumb");
+    std::io::stderr().is_terminal() && !is_set("NO_COLOR") && !is_dumb
 }
 
 /// Message of an error with its causes and the lines of the files concerned; a cause that the text already contains
 /// is not repeated.
 pub fn message(error: &anyhow::Error) -> String {
+    plain(&whole_message(error)).into_owned()
+}
+
+fn whole_message(error: &anyhow::Error) -> String {
     let first = error.chain().next().map_or(String::new(), |first| format!("{first:#}"));
     error.chain().skip(1).fold(first, |text, cause| {
         if text.contains(&cause.to_string()) || text.contains(&format!("{cause:#}")) {

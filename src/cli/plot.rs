@@ -158,9 +158,23 @@ fn outputs(arguments: &PlotArguments) -> Result<Vec<(Format, PathBuf)>> {
         if files[..index].iter().any(|(_, other)| is_same(path, other)) {
             bail!("{} is named twice: name another file", path.display());
         }
+        require_name(*format, path)?;
         output_file::check(path, kind(*format))?;
     }
     Ok(files)
+}
+
+/// Refuses a picture whose name says that it is another kind of file.
+fn require_name(format: Format, path: &Path) -> Result<()> {
+    let (option, ending) = match format {
+        Format::Html => return Ok(()),
+        Format::Png => ("--png", "png"),
+        Format::Svg => ("--svg", "svg"),
+    };
+    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(ending)) {
+        return Ok(());
+    }
+    bail!("{option} {}: its name must end in .{ending}; --out takes pages and pictures", path.display())
 }
 
 fn format_of(path: &Path) -> Result<Format> {

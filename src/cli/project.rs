@@ -1,7 +1,7 @@
 //! A project folder for a vehicle of one's own: templates, and the folder that is made from them.
 
 use super::shell::quoted;
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use clap::ValueEnum;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -124,9 +124,13 @@ pub fn make(folder: &Path, language: Language, sources: Option<&Path>) -> Result
     }
     let sources = sources.map_or_else(built_from, |sources| required(sources).map(Some))?;
     let parent = folder.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    // Written beside its place, and renamed once it is whole. The draft is removed in any case.
+    if !parent.is_dir() {
+        bail!("there is no folder {}: make it first", parent.display());
+    }
+    // Written beside its place, and renamed once it is whole. The draft is removed in any case. Its own name says nothing to
+    // anybody.
     let draft = tempfile::tempdir_in(parent)
-        .with_context(|| format!("cannot make a folder in {}", parent.display()))?;
+        .map_err(|error| anyhow!("cannot make a folder in {}: {}", parent.display(), error.kind()))?;
     // A folder within: the temporary folder is closed to other users, the project has the rights of the umask.
     let whole = draft.path().join(name);
     let templates = language.templates();

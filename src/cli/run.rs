@@ -13,6 +13,7 @@ use anyhow::{Context, Error, Result, anyhow, bail};
 use clap::Args;
 use diagnostics::Diagnostic;
 use hummingbus::COMPONENTS;
+use recorder::reader::Recording;
 use report::profile::Profile;
 use report::summary::Summary;
 use runtime::checkpoint::{Checkpoint, Written};
@@ -178,7 +179,8 @@ pub fn run(
     let (mut outcome, recording) =
         flown.or_else(|error| Err(broken(&manifest, &error, outputs.left().as_deref(), arguments.json)?))?;
     let (flight, figures) = (outcome.flight.take(), outcome.figures.take());
-    let profile = flight.as_ref().map(|flight| Profile::of(flight, outcome.missed_deadlines));
+    let recorded = recording.as_ref().map(Recording::path);
+    let profile = flight.as_ref().map(|flight| Profile::of(flight, outcome.missed_deadlines, recorded));
     let mut summary = Summary::new(manifest.name(), outcome, graph.plan.tick_s());
     match (&recording, figures) {
         // A recording holds the flight from the checkpoint on; its judge has seen the ticks before, too.

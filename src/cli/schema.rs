@@ -6,6 +6,7 @@ use anyhow::{Result, bail};
 use bus::announcement::Announcement;
 use bus::schema::Schema;
 use clap::Args;
+use diagnostics::did_you_mean;
 use hummingbus::COMPONENTS;
 use serde_json::Value;
 use std::fmt::Write as _;
@@ -60,10 +61,11 @@ fn chosen(name: Option<&str>, with_states: bool) -> Result<Vec<&'static Schema>>
     }
     let Some(name) = name else { return Ok(schemas) };
     let names: Vec<_> = schemas.iter().map(|schema| short(schema)).collect();
-    let known = names.join(", ");
     schemas.retain(|schema| schema.type_name == name || short(schema) == name);
     if schemas.is_empty() {
-        bail!("no component has a port for a message {name}; there are: {known}");
+        let written = name.rsplit('/').next().unwrap_or(name);
+        let help = did_you_mean(written, names, "there are:");
+        bail!("no component has a port for a message {name}; {help}");
     }
     Ok(schemas)
 }

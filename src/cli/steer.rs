@@ -7,13 +7,14 @@ use inputs::InputFiles;
 use runtime::ctl::client;
 use runtime::ctl::protocol::{Answer, Request};
 use runtime::manifest::PaceSetting;
-use runtime::run_dir::find_live;
+use runtime::run_dir::find_own;
 use std::path::{Path, PathBuf};
 
 /// The arguments of `hummingbus ctl`.
 #[derive(Args)]
 pub struct CtlArguments {
-    /// The run, as `hummingbus top` names it; needed only if several are alive.
+    /// The run, as `hummingbus top` names it; needed if several are alive, or the only one was started in another folder or on
+    /// another terminal.
     #[arg(long, global = true, value_name = "ID")]
     run: Option<String>,
     /// Print the run's answer as JSON.
@@ -107,7 +108,8 @@ pub struct SwapArguments {
     /// The tick from which on the backup's outputs count; as soon as possible where absent.
     #[arg(long, value_name = "TICK")]
     at_tick: Option<u32>,
-    /// The run, as `hummingbus top` names it; needed only if several are alive.
+    /// The run, as `hummingbus top` names it; needed if several are alive, or the only one was started in another folder or on
+    /// another terminal.
     #[arg(long, value_name = "ID")]
     run: Option<String>,
     /// Print the run's answer as JSON.
@@ -145,7 +147,7 @@ pub fn description(given: &str) -> Result<String> {
 }
 
 fn ask(run_id: Option<&str>, request: &Request, json: bool) -> Result<()> {
-    let run = find_live(run_id)?;
+    let run = find_own(run_id)?;
     let answer = client::ask(&run, request)?;
     if json {
         output::print_json_line(&answer)?;

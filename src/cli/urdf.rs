@@ -1,6 +1,7 @@
 //! The command `urdf`.
 
-use super::files::open_recording;
+use super::files::{open_recording, require_kind};
+use super::kind::Kind as FileKind;
 use super::output::print_file;
 use anyhow::{Context, Result, bail};
 use clap::Args;
@@ -68,6 +69,7 @@ pub fn urdf(arguments: &UrdfArguments) -> Result<bool> {
 }
 
 fn of_file(path: &Path) -> Result<Body> {
+    require_kind(path, &[FileKind::Vehicle], "urdf takes a vehicle file or a recording")?;
     let airframe = Airframe::from_files(Vehicle::load(path)?, &[])?;
     let nothing = || format!("{}: its rotors are all in one place, so that it has no size", path.display());
     Body::of(&airframe).with_context(nothing)

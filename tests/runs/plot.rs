@@ -193,7 +193,7 @@ fn a_velocity_is_drawn_along_the_body_and_against_another_number() {
 fn what_is_not_there_is_refused_with_what_is() {
     let place = Place::new();
     let recording = laps(&place, &[""]);
-    let cases: [(&[&str], &str); 11] = [
+    let cases: [(&[&str], &str); 14] = [
         (
             &["--plot", "/plant/stat:position.z"],
             "the recording has no topic /plant/stat; it has /pilot/set_point, /planner/reference, /plant/state",
@@ -210,7 +210,10 @@ fn what_is_not_there_is_refused_with_what_is() {
         (&["--out", "laps.pdf"], "--out laps.pdf: its name must end in .html, .png or .svg"),
         (&["--png", "/no/where.png"], "cannot create /no/where.png: there is no folder /no"),
         (&["--svg", &recording], "laps.mcap is the recording itself: name another file"),
-        (&["--png", &place.path("tmp")], "cannot create"),
+        (&["--png", &place.path("tmp")], "its name must end in .png"),
+        (&["--png", &place.path("a.jpg")], "its name must end in .png"),
+        (&["--png", &place.path("a.svg")], "its name must end in .png"),
+        (&["--svg", &place.path("a.png")], "its name must end in .svg"),
     ];
     for (args, reason) in cases {
         refused(place.call(&[&["plot", &recording][..], args].concat()), reason);

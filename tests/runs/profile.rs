@@ -79,10 +79,25 @@ fn the_critical_path_and_the_ages_are_those_of_the_loop() {
     assert_eq!(sources, ["/ekf/estimate", "/imu/imu", "/mocap/mocap", "/pilot/set_point", "/plant/state"]);
     for age in profile["age"].as_array().unwrap() {
         assert_eq!((&age["command"], &age["host"]["count"]), (&"/controller/command".into(), &TICKS.into()));
-        // Every edge of the loop but one is of the same tick; a pose of motion capture is used for five.
-        let is_held = ["/mocap/mocap", "/plant/state"].iter().any(|topic| age["source"] == *topic);
-        assert_eq!(age["simulated"]["max_us"], if is_held { 4000.0 } else { 0.0 }, "{age}");
+        // Every edge of the loop but one is of the same tick; a pose of motion capture is sent for five, and measured 10 ms before it
+        // arrives, 100 times a second.
+        let max_us = match age["source"].as_str().unwrap() {
+            "/mocap/mocap" => 19_000.0,
+            "/plant/state" => 4000.0,
+            _ => 0.0,
+        };
+        assert_eq!(age["simulated"]["max_us"], max_us, "{age}");
     }
+}
+
+#[test]
+fn the_age_of_a_pose_counts_from_its_measurement() {
+    let profile =
+        &hover(&Place::new(), &["--json", "--set=process.mocap.parameters.delay_ms=40"]).json()["profile"];
+    let age = find(&profile["age"], "source", "/mocap/mocap")["simulated"].clone();
+    // 40 ms late, and used for 10 ms.
+    assert_eq!(age["max_us"], 49_000.0, "{age}");
+    assert!((40_000.0..=49_000.0).contains(&age["p50_us"].as_f64().unwrap()), "{age}");
 }
 
 #[test]

@@ -211,6 +211,74 @@ fn a_topic_of_another_type() {
 }
 
 #[test]
+fn a_type_that_a_command_states_wrongly_is_blamed_on_the_command() {
+    let law = "command = [\"/bin/true\"]\ninputs.set_point = \"/pilot/set_point\"\ninputs.estimate = \"/ekf/estimate\"\n";
+    let vehicle = repository("vehicles/hummingbird.toml");
+    let pid = format!(
+        "kind = \"pid\"\nvehicle = \"{vehicle}\"\ninputs.set_point = \"/pilot/set_point\"\ninputs.estimate = \"/ekf/estimate\"\n"
+    );
+    let stated = |outputs: &str| refused(&pid, &format!("{law}{outputs}"));
+    stated("outputs.command = { type = §\"hummingbus_msgs/msg/StateEstimate\" }").says(&[
+        "output `command` of `controller` is stated as hummingbus_msgs/msg/StateEstimate",
+        "input `command` of `plant` reads hummingbus_msgs/msg/MotorCommand",
+    ]);
+    for name in ["hummingbus_msgs/msg/MotorComand", "MotorComand"] {
+        stated(&format!("outputs.command = {{ type = §\"{name}\" }}"))
+            .says(&["did you mean `hummingbus_msgs/msg/MotorCommand`?"]);
+    }
+}
+
+#[test]
+fn a_key_that_is_there_twice_is_shown_at_both_places() {
+    let ended = refused("window_ticks = 64", "window_ticks = 64\nseed = 1\n§window_ticks = 32");
+    ended.says(&[
+        "the key `window_ticks` is there twice, first in line 3",
+        "3 | window_ticks = 64",
+        "5 | window_ticks = 32",
+    ]);
+}
+
+#[test]
+fn samples_that_are_never_read_are_warned_of() {
+    let place = Place::new();
+    let path = place.write("good.toml", good());
+    let told = |settings: &[&str]| {
+        let settings = settings.iter().flat_map(|setting| ["--set", setting]);
+        let args: Vec<&str> =
+            ["check", &path, "--set", "run.duration_s=1"].into_iter().chain(settings).collect();
+        place.call(&args).with_code(0).error
+    };
+    for (settings, said) in [
+        (
+            &["process.imu.period_ticks=2", "process.ekf.period_ticks=3"][..],
+            "33 % of the measurements are never read",
+        ),
+        (&["process.ekf.period_ticks=4"], "75 % of the measurements are never read"),
+        (
+            &["process.imu.period_ticks=2", "process.ekf.period_ticks=10"],
+            "80 % of the measurements are never read",
+        ),
+        (&["process.ekf.period_ticks=20", "process.imu.period_ticks=20"], "input `mocap` of `ekf`"),
+        (
+            &["process.mocap.parameters.delay_ms=300"],
+            "at least 300 ms old when they arrive, and `ekf` remembers 200 ms",
+        ),
+    ] {
+        let error = told(settings);
+        assert!(error.starts_with("warning: ") && error.contains(said), "{settings:?}: {error}");
+    }
+    for harmless in [
+        &["process.imu.period_ticks=4", "process.ekf.period_ticks=4"][..],
+        &["process.imu.period_ticks=4", "process.ekf.period_ticks=2"],
+        &["process.controller.period_ticks=4"],
+        &["process.mocap.parameters.delay_ms=200"],
+        &["run.rate_hz=4000", "process.ekf.period_ticks=4", "process.mocap.period_ticks=20"],
+    ] {
+        assert_eq!(told(harmless), "", "{harmless:?}");
+    }
+}
+
+#[test]
 fn two_publishers_on_one_topic() {
     let second = "[process.imu2]\nkind = \"imu\"\ninputs.state = \"/plant/state\"\n";
     let ended = refused_with(&format!("\n{second}outputs.§imu = {{ topic = \"/imu/imu\" }}\n"));
@@ -226,8 +294,15 @@ fn a_topic_without_a_slash() {
 #[test]
 fn an_output_between_two_ticks_of_its_process() {
     let ended =
-        refused("kind = \"imu\"", "kind = \"imu\"\nperiod_ticks = 2\noutputs.§imu = { every_ticks = 3 }");
-    ended.says(&["output `imu` is due every 3 ticks", "runs every 2", "multiple"]);
+        refused("kind = \"imu\"", "kind = \"imu\"\nperiod_ticks = 2\noutputs.imu = { every_ticks = §3 }");
+    ended.says(&[
+        "output `imu` is due every 3 ticks (333.333 Hz), its process runs every 2 (500 Hz)",
+        "a multiple of the process's `period_ticks`: 2 (500 Hz) or 4 (250 Hz)",
+    ]);
+    let place = Place::new();
+    let path = place.write("good.toml", good());
+    refused_setting(&path, &["process.imu.period_ticks=2", "process.imu.outputs.imu.every_ticks=3"])
+        .says(&["every 3 ticks (333.333 Hz)"]);
     refused("kind = \"imu\"", "kind = \"imu\"\nperiod_ticks = §0").says(&["`period_ticks` is 0"]);
 }
 

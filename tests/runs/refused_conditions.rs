@@ -1,6 +1,6 @@
 //! Refused: pass conditions and comparisons.
 
-use crate::refusals::{good, refused, refused_with};
+use crate::refusals::{good, refused, refused_setting, refused_with};
 use crate::support::{Place, repository};
 
 /// A condition that holds at the start of the good manifest's flight.
@@ -17,10 +17,15 @@ fn a_condition_on_a_topic_that_nobody_publishes() {
 
 #[test]
 fn a_condition_on_a_field_or_in_a_unit_that_is_none() {
-    let with = |from: &str, to: &str| refused_with(&format!("\n§{}", PASS.replace(from, to)));
+    let with = |from: &str, to: &str| {
+        let mark = if to.contains('§') { "" } else { "§" };
+        refused_with(&format!("\n{mark}{}", PASS.replace(from, to)))
+    };
     let wrong = PASS.replace("\"position.z", "§\"position.q");
     refused_with(&format!("\n{wrong}")).says(&["pass condition `low`", "`position.q`", "position.z"]);
-    with("\"m\"", "\"deg\"").says(&["pass condition `low`", "`deg` is not a unit of length", "cm"]);
+    let misspelt = PASS.replace("\"position.z", "§\"postion.z");
+    refused_with(&format!("\n{misspelt}")).says(&["`postion.z`", "did you mean `position.z`?"]);
+    with("\"m\"", "§\"deg\"").says(&["pass condition `low`", "`deg` is not a unit of length", "cm"]);
     with("max = 1\n", "").says(&["pass condition `low`", "no limit", "add `min`, `max`"]);
 }
 
@@ -31,7 +36,7 @@ fn a_measure_that_has_a_limit_or_measures_nothing() {
         let mark = if to.contains('§') { "" } else { "§" };
         refused_with(&format!("\n{mark}{}", measure.replace(from, to)))
     };
-    with("name", "max = 1\nname").says(&["measure `low`: it has a limit", "write [[pass]]"]);
+    with("name", "max = §1\nname").says(&["measure `low`: it has a limit", "write [[pass]]"]);
     with("\"position.z", "§\"position.q").says(&["measure `low`", "`position.q`", "position.z"]);
     with("\"/plant/state", "§\"/plant/stat").says(&["nobody publishes /plant/stat"]);
 }
@@ -39,26 +44,27 @@ fn a_measure_that_has_a_limit_or_measures_nothing() {
 #[test]
 fn a_lag_or_gain_without_a_reference_that_it_can_have() {
     let with = |keys: &str| {
-        let lag = PASS.replace("\"max\"", "\"lag\"").replace("unit = \"m\"", "unit = \"ms\"");
         let mark = if keys.contains('§') { "" } else { "§" };
-        refused_with(&format!("\n{mark}{lag}{keys}"))
+        let lag = PASS.replace("\"max\"", &format!("{mark}\"lag\"")).replace("unit = \"m\"", "unit = \"ms\"");
+        refused_with(&format!("\n{lag}{keys}"))
     };
     let reference = |rest: &str| format!("reference = {{ topic = \"/plant/state\", {rest} }}\n");
     let height = reference("field = \"position.z\"");
     with("").says(&["pass condition `low`", "`lag` has no `reference`", "add what it is measured against"]);
     with(&reference("field = §\"position.q\"")).says(&["`position.q`", "position.z"]);
-    with(&reference("field = \"attitude.roll\"")).says(&["the field is in `m`, its `reference` in `rad`"]);
+    with(&reference("field = §\"attitude.roll\"")).says(&["the field is in `m`, its `reference` in `rad`"]);
     for (within_s, said) in [("0.0", "0 s"), ("1e300", "1000000")] {
         let said = format!("`within_s` of `reference` is {said}");
-        with(&reference(&format!("field = \"position.z\", within_s = {within_s}"))).says(&[&said]);
+        with(&reference(&format!("field = \"position.z\", within_s = §{within_s}"))).says(&[&said]);
     }
     with(&height.replace("\"/plant/state", "§\"/plant/stat"))
         .says(&["nobody publishes /plant/stat", "did you mean"]);
-    let minus = height.replace("reference", "minus");
+    let minus = height.replace("reference = ", "minus = §");
     with(&format!("{height}{minus}")).says(&["the statistic `lag` cannot have `minus`", "from_s and to_s"]);
-    refused_with(&format!("\n§{PASS}{height}")).says(&["`reference` is there", "`lag` and `gain`"]);
-    let metres = PASS.replace("\"max\"", "\"lag\"");
-    refused_with(&format!("\n§{metres}{height}")).says(&["`m` is not a unit of time"]);
+    let marked = height.replace("reference = ", "reference = §");
+    refused_with(&format!("\n{PASS}{marked}")).says(&["`reference` is there", "`lag` and `gain`"]);
+    let metres = PASS.replace("\"max\"", "\"lag\"").replace("\"m\"", "§\"m\"");
+    refused_with(&format!("\n{metres}{height}")).says(&["`m` is not a unit of time"]);
 }
 
 #[test]
@@ -81,7 +87,7 @@ fn a_condition_without_a_recorder_on_a_topic_or_field_that_is_none() {
     };
     with("\"/plant/state", "§\"/plant/stat").says(&["nobody publishes /plant/stat", "did you mean"]);
     with("\"position.z", "§\"position.q").says(&["pass condition `low`", "`position.q`", "position.z"]);
-    with("\"m\"", "\"deg\"").says(&["pass condition `low`", "`deg` is not a unit of length"]);
+    with("\"m\"", "§\"deg\"").says(&["pass condition `low`", "`deg` is not a unit of length"]);
 }
 
 #[test]
@@ -110,26 +116,39 @@ fn a_comparison_without_a_limit_or_with_another_window_than_the_plant_has() {
 
 #[test]
 fn a_condition_that_nothing_can_hold() {
-    let with = |limits: &str| refused_with(&format!("§{}", PASS.replace("max = 1\n", limits)));
-    with("min = 2\nmax = 1\n").says(&[
+    let with = |limits: &str| refused_with(&PASS.replace("max = 1\n", limits));
+    with("min = §2\nmax = 1\n").says(&[
         "pass condition `low`",
         "`min` is 2 and `max` is 1",
-        "nothing lies between",
+        "nothing lies between: lower `min`, or raise `max`",
     ]);
-    with("max = 1\nfrom_s = 0.1\n")
+    with("max = 1\nfrom_s = §0.1\n")
         .says(&["`from_s` is 0.1 s, and the run ends at 0.1 s", "raise run.duration_s"]);
-    with("max = 1\nfrom_s = 5\nto_s = 4\n").says(&["`from_s` is 5 s and `to_s` is 4 s"]);
-    with("max = 1\nfrom_s = 0.0501\nto_s = 0.0504\n")
+    with("max = 1\nfrom_s = 5\nto_s = §4\n").says(&["`from_s` is 5 s and `to_s` is 4 s"]);
+    with("max = 1\nfrom_s = §0.0501\nto_s = 0.0504\n")
         .says(&["no sample of /plant/state", "it comes every 0.001 s"]);
-    with("max = 1\nfrom_s = -1\n").says(&["`from_s` is -1 s"]);
-    let gate = "max = 1\nwhile = { topic = \"/plant/state\", field = \"position.z\", min = 1, max = 0 }\n";
+    with("max = 1\nfrom_s = §-1\n").says(&["`from_s` is -1 s"]);
+    let gate = "max = 1\nwhile = { topic = \"/plant/state\", field = \"position.z\", min = §1, max = 0 }\n";
     with(gate).says(&["`while`: `min` is 1 and `max` is 0"]);
-    let rms = PASS.replace("statistic = \"max\"", "statistic = \"rms\"").replace("max = 1\n", "max = -1\n");
-    refused_with(&format!("§{rms}")).says(&["`max` is -1", "the root of a mean square is never below 0"]);
+    let rms = PASS.replace("statistic = \"max\"", "statistic = \"rms\"").replace("max = 1\n", "max = §-1\n");
+    refused_with(&rms).says(&["`max` is -1", "the root of a mean square is never below 0"]);
     for number in ["nan", "inf", "-inf", "1e999"] {
         let ended = refused_with(&PASS.replace("max = 1\n", &format!("max = §{number}\n")));
         ended.says(&[&format!("`pass.0.max` is {number}, expected a finite number")]);
     }
+}
+
+#[test]
+fn a_limit_that_a_setting_states_is_blamed_on_the_setting() {
+    let place = Place::new();
+    let path = place.write("good.toml", good() + PASS);
+    refused_setting(&path, &["pass.0.min=2"]).says(&["`min` is 2 and `max` is 1"]);
+    refused_setting(&path, &["pass.0.unit=deg"]).says(&["`deg` is not a unit of length"]);
+    // A setting of another key blames nothing but the line.
+    let wrong = place.write("wrong.toml", good() + &PASS.replace("max = 1\n", "min = 2\nmax = 1\n"));
+    let ended = place.call(&["check", &wrong, "--set", "pass.0.from_s=0.01"]).with_code(2);
+    let line = good().lines().count() + 7;
+    assert!(ended.error.starts_with(&format!("error: {wrong}:{line}:7: ")), "{ended}");
 }
 
 #[test]

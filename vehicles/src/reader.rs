@@ -3,6 +3,7 @@
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::ops::Range;
+use std::sync::LazyLock;
 
 use toml::Spanned;
 use toml::de::{DeString, DeTable, DeValue};
@@ -28,7 +29,8 @@ impl<'t> Document<'t> {
 
     /// Parses the text into its tree.
     pub fn tree(&self) -> Result<Spanned<DeTable<'t>>, Diagnostic> {
-        parse_toml(self.text).map_err(|misread| Diagnostic::at(self.place(&misread.span()), misread.error))
+        parse_toml(self.text)
+            .map_err(|misread| Diagnostic::at(misread.place(self.file, self.text), misread.error))
     }
 
     /// The place of the bytes `span`, for messages.
@@ -125,12 +127,19 @@ pub struct Section<'d, 't> {
     asked: RefCell<BTreeSet<&'d str>>,
     /// The table of the base, which has what this one has not.
     lower: Option<Box<Self>>,
+    /// The value, where the file has it in place of a table: the rest is the base's.
+    alone: Option<&'d Spanned<DeValue<'t>>>,
 }
+
+/// Key of the number in a parameter's table.
+const VALUE: &str = "value";
+/// The table of a parameter of which the file has the value alone.
+static EMPTY: LazyLock<DeTable<'static>> = LazyLock::new(DeTable::new);
 
 impl<'d, 't> Section<'d, 't> {
     /// The `table` at `path`.
     pub fn new(doc: &'d Document<'t>, path: String, at: Range<usize>, table: &'d DeTable<'t>) -> Self {
-        Section { doc, path, at, table, asked: RefCell::default(), lower: None }
+        Section { doc, path, at, table, asked: RefCell::default(), lower: None, alone: None }
     }
 
     /// This table on top of that of the base.
@@ -158,7 +167,7 @@ impl<'d, 't> Section<'d, 't> {
     /// The value of `name`, if the file has it.
     fn find(&self, name: &'d str) -> Option<&'d Spanned<DeValue<'t>>> {
         self.asked.borrow_mut().insert(name);
-        self.table.get(name)
+        self.alone.filter(|_| name == VALUE).or_else(|| self.table.get(name))
     }
 
     pub(crate) fn need(&self, name: &'d str, expected: &str) -> Result<&'d Spanned<DeValue<'t>>, Diagnostic> {
@@ -322,9 +331,26 @@ impl<'d, 't> Section<'d, 't> {
             return lower.parameter(name);
         }
         let expected = "a table with value, unit, source and uncertainty";
-        let parameter = self.as_section(self.key(name), self.need(name, expected)?, expected)?;
-        parameter.require_known(&["value", "unit", "source", "uncertainty"])?;
+        let value = self.need(name, expected)?;
+        if let Some(parameter) = self.replacing(name, value)? {
+            return Ok(parameter);
+        }
+        let parameter = self.as_section(self.key(name), value, expected)?;
+        parameter.require_known(&[VALUE, "unit", "source", "uncertainty"])?;
         Ok(parameter)
+    }
+
+    /// The parameter of the base with another value, where the file has nothing but that; `None` where it has more.
+    fn replacing(&self, name: &'d str, value: &'d Spanned<DeValue<'t>>) -> Result<Option<Self>, Diagnostic> {
+        let Some(lower) = self.lower.as_deref().filter(|lower| lower.has(name)) else { return Ok(None) };
+        let alone = match value.get_ref() {
+            DeValue::Integer(_) | DeValue::Float(_) | DeValue::Array(_) => value,
+            DeValue::Table(table) if table.len() == 1 && table.contains_key(VALUE) => &table[VALUE],
+            _ => return Ok(None),
+        };
+        let parameter = Section::new(self.doc, self.key(name), value.span(), &EMPTY);
+        let parameter = Section { alone: Some(alone), ..parameter };
+        Ok(Some(parameter.above(lower.parameter(name)?)))
     }
 
     /// Checks unit, source and uncertainty of a parameter's table; notes them; gives the factor to SI.
@@ -356,6 +382,9 @@ impl<'d, 't> Section<'d, 't> {
 
     /// Returns the source of a number.
     pub(crate) fn source(&self) -> Result<&'d str, Diagnostic> {
+        if let Some(lower) = self.inherited("source") {
+            return lower.source();
+        }
         self.need("source", "a text, or \"none\" for a number without a source")?;
         self.text("source")
     }
@@ -364,6 +393,9 @@ impl<'d, 't> Section<'d, 't> {
     fn uncertainty(&self, factor: f64) -> Result<Uncertainty, Diagnostic> {
         if self.source()? == NO_SOURCE && !self.has("uncertainty") {
             return Ok(Uncertainty::Said("not stated".to_owned()));
+        }
+        if let Some(lower) = self.inherited("uncertainty") {
+            return lower.uncertainty(factor);
         }
         let expected = "a number (one standard deviation, in the same unit) or a text such as \"not stated\"";
         let value = self.need("uncertainty", expected)?;
@@ -407,7 +439,7 @@ impl<'d, 't> Section<'d, 't> {
     }
 
     fn wrong_type(&self, key: &str, value: &Spanned<DeValue<'t>>, expected: &str) -> Diagnostic {
-        self.doc.bad(&value.span(), key, expected, format!("a TOML {}", value.get_ref().type_str()))
+        self.doc.bad(&value.span(), key, expected, seen(value))
     }
 
     /// Returns the place of the value of `name`, in bytes; that of the table itself where it has none.
@@ -455,6 +487,19 @@ fn first_content(text: &str) -> Range<usize> {
     let before: usize = text.split_inclusive('\n').take_while(|line| !is_content(line)).map(str::len).sum();
     let start = if before < text.len() { before } else { 0 };
     start..start
+}
+
+/// A value of another type than is expected, as people call it.
+pub(crate) fn seen(value: &Spanned<DeValue<'_>>) -> String {
+    match value.get_ref() {
+        DeValue::String(text) => format!("the text {text:?}"),
+        DeValue::Integer(number) => number.as_str().to_owned(),
+        DeValue::Float(number) => number.as_str().to_owned(),
+        DeValue::Boolean(flag) => flag.to_string(),
+        DeValue::Datetime(time) => format!("the time {time}"),
+        DeValue::Array(_) => "a list".to_owned(),
+        DeValue::Table(_) => "a table".to_owned(),
+    }
 }
 
 /// A missing key of a file as it is written: a table with its brackets.

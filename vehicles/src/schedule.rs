@@ -1,6 +1,6 @@
 //! Schedules: parameters that are lines of times and values.
 
-use crate::reader::{Origin, Section};
+use crate::reader::{Origin, Section, seen};
 use diagnostics::Diagnostic;
 use diagnostics::parameter::Bounds;
 use diagnostics::unit::Dimension;
@@ -68,7 +68,7 @@ impl<'d, 't> Section<'d, 't> {
         let found = match value.get_ref().as_array() {
             Some(array) if array.is_empty() => "an empty array".to_owned(),
             Some(array) => format!("an array of {}", array.len()),
-            None => format!("a TOML {}", value.get_ref().type_str()),
+            None => seen(value),
         };
         let expected =
             if key == "value" { POINTS } else { "a point: an array of two numbers, time in s and value" };

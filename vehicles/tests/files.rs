@@ -223,7 +223,7 @@ fn a_number_that_is_not_physical_is_refused() {
 #[test]
 fn a_wrong_type_is_named() {
     let mass = line_of("mass = ");
-    assert_refused("value = 0.480", "value = \"0.480\"", mass, &["finite number", "a TOML string"]);
+    assert_refused("value = 0.480", "value = \"0.480\"", mass, &["finite number", "the text \"0.480\""]);
     assert_refused(MASS_LINE, "mass = 0.48", mass, &["a table with value, unit, source and uncertainty"]);
     assert_refused(
         "[0.17, 0, 0]",
@@ -320,6 +320,35 @@ fn a_file_on_a_base_replaces_single_numbers() {
     assert_eq!(vehicle.provenance.len(), base.provenance.len());
     assert_eq!([file("body.mass"), file("command.speed_at_max")], ["mine.toml", "mine.toml"]);
     assert_eq!([file("body.gravity"), file("command.min")], ["hummingbird.toml", "hummingbird.toml"]);
+}
+
+#[test]
+fn a_value_alone_keeps_unit_source_and_uncertainty_of_the_base() {
+    let base = Vehicle::parse(HUMMINGBIRD, "hummingbird.toml").unwrap();
+    let of =
+        |vehicle: &Vehicle, key: &str| vehicle.provenance.iter().find(|it| it.key == key).unwrap().clone();
+    for mass in ["0.6", "{ value = 0.6 }"] {
+        let vehicle =
+            on_hummingbird(&format!("[body]\nmass = {mass}\n[command]\nspeed_at_max = 9000\n")).unwrap();
+        assert_eq!(vehicle.mass_kg, 0.6);
+        assert_eq!(vehicle.provenance.len(), base.provenance.len());
+        let (own, of_base) = (of(&vehicle, "body.mass"), of(&base, "body.mass"));
+        assert_eq!((&*own.file, own.line), ("mine.toml", 4));
+        assert_eq!(
+            (own.unit, own.source, own.uncertainty),
+            (of_base.unit, of_base.source, of_base.uncertainty)
+        );
+    }
+    let told = |tables: &str| on_hummingbird(tables).unwrap_err().to_string();
+    let message = told("[body]\nmass = -1");
+    assert!(message.starts_with("mine.toml:4:8: `body.mass` must be"), "{message}");
+    let message = told("[body]\nmass = { value = 0.6, unit = \"kg\" }");
+    assert!(message.contains("missing key `body.mass.source`"), "{message}");
+    // Without a base there is nothing to keep.
+    let line = HUMMINGBIRD.lines().find(|line| line.starts_with("mass = ")).unwrap();
+    let message =
+        Vehicle::parse(&HUMMINGBIRD.replacen(line, "mass = 0.6", 1), "a.toml").unwrap_err().to_string();
+    assert!(message.contains("a table with value, unit, source and uncertainty, found 0.6"), "{message}");
 }
 
 #[test]

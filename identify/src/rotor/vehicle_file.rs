@@ -9,7 +9,7 @@ use super::flown::{Figure, FlownCoefficient, FlownCoefficients, FlownMotor};
 use super::report::RotorReport;
 use super::stand::VehicleFile;
 use super::statics::Statics;
-use crate::digits::{quantity, rounded};
+use crate::digits::{quantity, rounded, to_six_digits};
 use crate::statistics::Estimate;
 
 /// The text of `rotor.toml`. Values that the stand does not give come from `vehicle`, and are left out without one.
@@ -39,9 +39,11 @@ fn parameter(name: &str, value: f64, unit: &str, source: &str, uncertainty: &str
 /// An estimate's line.
 fn identified(name: &str, estimate: &Estimate, unit: &str, source: &str) -> String {
     let known = estimate.sigma.is_finite();
-    let uncertainty = if known { format!("{:e}", estimate.sigma) } else { "\"too few blocks\"".to_owned() };
+    let uncertainty =
+        if known { format!("{:e}", to_six_digits(estimate.sigma)) } else { "\"too few blocks\"".to_owned() };
     let interval = format!("95 % interval {} to {}", rounded(estimate.low), quantity(estimate.high, unit));
-    parameter(name, estimate.value, unit, &format!("{source}; {interval}"), &uncertainty)
+    let value = to_six_digits(estimate.value);
+    parameter(name, value, unit, &format!("{source}; {interval}"), &uncertainty)
 }
 
 /// A line with the value of the vehicle file, or a comment that it has none.

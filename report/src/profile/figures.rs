@@ -1,11 +1,12 @@
 //! The figures of a profiled run.
 
-use super::age::{Age, ages};
+use super::age::{Age, Measured, ages};
 use super::latency::{NodeLatency, Transport, latencies};
 use super::pacing::Pacing;
 use super::path::CriticalPath;
 use runtime::flight::Flight;
 use serde::Serialize;
+use std::path::Path;
 
 /// Host time of a run, part by part; its text is a table for each part.
 ///
@@ -16,7 +17,7 @@ use serde::Serialize;
 /// /// What there is to say about a run that was profiled.
 /// fn text(outcome: &Outcome) -> Option<String> {
 ///     let flight = outcome.flight.as_ref()?;
-///     Some(Profile::of(flight, outcome.missed_deadlines).to_string())
+///     Some(Profile::of(flight, outcome.missed_deadlines, None).to_string())
 /// }
 /// ```
 #[derive(Debug, Serialize)]
@@ -35,16 +36,18 @@ pub struct Profile {
 }
 
 impl Profile {
-    /// The profile of `flight`, in which the clock counted `missed_deadlines`.
-    pub fn of(flight: &Flight, missed_deadlines: u32) -> Self {
+    /// The profile of `flight`, in which the clock counted `missed_deadlines`. Its `recording` has the times of the measurements.
+    pub fn of(flight: &Flight, missed_deadlines: u32, recording: Option<&Path>) -> Self {
         let (nodes, transport) = latencies(flight);
+        // Without a whole recording the ages count from the stamps.
+        let measured = recording.and_then(|path| Measured::read(flight, path).ok()).unwrap_or_default();
         Self {
             ticks: flight.ticks,
             noted: flight.noted(),
             left_out: flight.left_out(),
             nodes,
             transport,
-            age: ages(flight),
+            age: ages(flight, &measured),
             critical_path: CriticalPath::of(flight),
             pacing: Pacing::of(flight, missed_deadlines),
         }

@@ -3,7 +3,7 @@
 //! A plant, an IMU at half the rate and a controller in a loop, four ticks. The pictures in the tests' numbers:
 //! each node has its inputs, has computed, has sent, and has ended.
 
-use super::age::{Age, ages};
+use super::age::{Age, Measured, ages};
 use super::latency::latencies;
 use super::pacing::Pacing;
 use super::path::{CriticalPath, Path, Place, Stretch};
@@ -144,7 +144,7 @@ fn transport_counts_the_sample_that_was_waited_for() {
 
 #[test]
 fn a_command_is_as_old_as_the_oldest_sample_that_went_into_it() {
-    let ages = ages(&free_flight());
+    let ages = ages(&free_flight(), &Measured::default());
     let age = |topic: &str| -> &Age { ages.iter().find(|age| age.source == topic).unwrap() };
     assert!(ages.iter().all(|age| age.command == "/controller/command"));
     assert_eq!(ages.len(), 2);
@@ -153,6 +153,17 @@ fn a_command_is_as_old_as_the_oldest_sample_that_went_into_it() {
     require(&age("/plant/state").host, &[1450 - 1200, 1900 - 1200, 2150 - 2000, 2255 - 2000]);
     require(&age("/imu/imu").simulated, &[0, 1000, 0, 1000]);
     require(&age("/imu/imu").host, &[1450 - 1310, 1900 - 1310, 2150 - 2060, 2255 - 2060]);
+}
+
+#[test]
+fn a_sample_that_states_its_measurement_is_as_old_as_that() {
+    // Both readings arrive a tick of 1 µs late.
+    let measured = Measured::of(READING, &[(0, 0), (2, 1000)]);
+    let ages = ages(&free_flight(), &measured);
+    let reading = ages.iter().find(|age| age.source == "/imu/imu").unwrap();
+    require(&reading.simulated, &[0, 1000, 1000, 2000]);
+    let state = ages.iter().find(|age| age.source == "/plant/state").unwrap();
+    require(&state.simulated, &[0, 1000, 0, 1000]);
 }
 
 fn stretch(place: Place, start_ns: u64, end_ns: u64) -> Stretch {
@@ -311,7 +322,7 @@ fn a_tick_that_was_sent_before_its_process_died_is_that_one_s() {
 fn names_cannot_break_the_page() {
     let mut flight = free_flight();
     flight.plan.nodes[PLANT].name = "</script><b>".to_owned();
-    let profile = super::Profile::of(&flight, 0);
+    let profile = super::Profile::of(&flight, 0, None);
     let page = String::from_utf8(profile.page("a \"run\"", &flight)).unwrap();
     assert!(!page.contains("</script><b>"));
     let (_, data) = page.split_once("id=\"data\">").unwrap();

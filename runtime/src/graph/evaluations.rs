@@ -4,7 +4,7 @@ use super::parameters::Notes;
 use crate::manifest::{Comparison, Manifest, PassCondition, Statistic};
 use crate::program::Program;
 use bus::plan::{NodePlan, Plan};
-use diagnostics::{Diagnostic, did_you_mean};
+use diagnostics::{Diagnostic, did_you_mean, nearest};
 use recorder::RecordingError;
 use std::ops::Range;
 use toml::Spanned;
@@ -39,22 +39,25 @@ fn kind(condition: &PassCondition) -> &'static str {
 
 fn check_no_limits(manifest: &Manifest, measure: &Spanned<PassCondition>) -> Result<(), Diagnostic> {
     let PassCondition { name, min, max, .. } = measure.get_ref();
-    if min.is_none() && max.is_none() {
-        return Ok(());
-    }
+    let key = match (min, max) {
+        (None, None) => return Ok(()),
+        (Some(_), _) => "min",
+        (None, Some(_)) => "max",
+    };
     let message = format!("measure `{name}`: it has a limit, and a measure is reported, not judged");
-    Err(manifest.problem(&measure.span(), message, "leave `min` and `max` out, or write [[pass]]"))
+    let at = key_of(manifest, &measure.span(), "", key);
+    Err(manifest.problem(&at, message, "leave `min` and `max` out, or write [[pass]]"))
 }
 
 /// Refuses a condition that cannot fail, or cannot hold.
 fn check_limits(manifest: &Manifest, pass: &Spanned<PassCondition>) -> Result<(), Diagnostic> {
     let condition = pass.get_ref();
-    let at = |message: String, help: &str| {
-        manifest.problem(&pass.span(), format!("pass condition `{}`: {message}", condition.name), help)
+    let at = |span: &Range<usize>, message: String, help: &str| {
+        manifest.problem(span, format!("pass condition `{}`: {message}", condition.name), help)
     };
     if condition.min.is_none() && condition.max.is_none() {
         let help = "add `min`, `max`, or both; what is only to be reported is a [[measure]]";
-        return Err(at("it has no limit, so it cannot fail".into(), help));
+        return Err(at(&pass.span(), "it has no limit, so it cannot fail".into(), help));
     }
     let least = match condition.statistic {
         Statistic::Rms => Some((0.0, "the root of a mean square")),
@@ -62,7 +65,7 @@ fn check_limits(manifest: &Manifest, pass: &Spanned<PassCondition>) -> Result<()
         _ => None,
     };
     match impossible(condition.min, condition.max, least) {
-        Some((message, help)) => Err(at(message, &help)),
+        Some((keys, message, help)) => Err(at(&blamed(manifest, &pass.span(), "", keys), message, &help)),
         None => Ok(()),
     }
 }
@@ -76,15 +79,16 @@ fn check_span(
     notes: &mut Notes,
 ) -> Result<(), Diagnostic> {
     let PassCondition { name, topic, from_s, to_s, .. } = pass.get_ref();
-    let at = |message: String, help: &str| {
-        manifest.problem(&pass.span(), format!("{} `{name}`: {message}", kind(pass.get_ref())), help)
+    let at = |keys: &[&str], message: String, help: &str| {
+        let span = blamed(manifest, &pass.span(), "", keys);
+        manifest.problem(&span, format!("{} `{name}`: {message}", kind(pass.get_ref())), help)
     };
     if *from_s < 0.0 {
-        return Err(at(format!("`from_s` is {from_s} s"), "a run begins at 0 s"));
+        return Err(at(&["from_s"], format!("`from_s` is {from_s} s"), "a run begins at 0 s"));
     }
     if let Some(to_s) = to_s.filter(|to_s| to_s < from_s) {
         let message = format!("`from_s` is {from_s} s and `to_s` is {to_s} s");
-        return Err(at(message, "a span ends where it begins, or later"));
+        return Err(at(&["to_s", "from_s"], message, "a span ends where it begins, or later"));
     }
     let period = plan.topics.iter().find(|known| known.name == *topic).map_or(1, |known| known.period_ticks);
     let (first_s, period_s) = first_sample_s(*from_s, period, plan.tick_ns);
@@ -93,7 +97,8 @@ fn check_span(
         let message = format!(
             "no sample of {topic} lies from {from_s} s to {to_s} s: it comes every {period_s} s, the next at {first_s} s"
         );
-        return Err(at(message, "widen the span: a span without samples does not pass"));
+        let help = "widen the span: a span without samples does not pass";
+        return Err(at(&["from_s", "to_s"], message, help));
     }
     if first_s >= end_s - HALF_NS_S {
         if notes.is_cut(manifest, &pass.span()) {
@@ -102,14 +107,14 @@ fn check_span(
         let message =
             format!("`from_s` is {from_s} s, and the run ends at {end_s} s: no sample of {topic} is judged");
         let help = "begin earlier, or raise run.duration_s: a span without samples does not pass";
-        return Err(at(message, help));
+        return Err(at(&["from_s"], message, help));
     }
     if let Some(to_s) = to_s.filter(|to_s| *to_s > end_s + HALF_NS_S)
         && !notes.is_cut(manifest, &pass.span())
     {
         let message = format!("`to_s` is {to_s} s, and the run ends at {end_s} s");
         let help = "only what is flown is judged; leave `to_s` out for the whole rest of the run";
-        notes.warnings.push(at(message, help));
+        notes.warnings.push(at(&["to_s"], message, help));
     }
     Ok(())
 }
@@ -126,15 +131,18 @@ fn first_sample_s(from_s: f64, period_ticks: u32, tick_ns: u64) -> (f64, f64) {
     (number * period_s, period_s)
 }
 
-/// Reason why no value of at least `least` can hold the limits, and advice.
-fn impossible(min: Option<f64>, max: Option<f64>, least: Option<(f64, &str)>) -> Option<(String, String)> {
+/// Keys, message and advice of a fault.
+type Fault = (&'static [&'static str], String, String);
+
+/// Reason why no value of at least `least` can hold the limits, with their keys, and advice.
+fn impossible(min: Option<f64>, max: Option<f64>, least: Option<(f64, &str)>) -> Option<Fault> {
     match (min, max, least) {
         (Some(min), Some(max), _) if min > max => {
-            let help = "nothing lies between: exchange them".to_owned();
-            Some((format!("`min` is {min} and `max` is {max}"), help))
+            let help = "nothing lies between: lower `min`, or raise `max`".to_owned();
+            Some((&["min", "max"], format!("`min` is {min} and `max` is {max}"), help))
         }
         (_, Some(max), Some((least, what))) if max < least => {
-            Some((format!("`max` is {max}"), format!("{what} is never below {least}")))
+            Some((&["max"], format!("`max` is {max}"), format!("{what} is never below {least}")))
         }
         _ => None,
     }
@@ -148,7 +156,11 @@ fn reset_window_s(plan: &Plan, topic: &str) -> Option<f64> {
 }
 
 fn check_window(manifest: &Manifest, plan: &Plan, compare: &Spanned<Comparison>) -> Result<(), Diagnostic> {
-    let at = |message: String, help: &str| Err(manifest.problem(&compare.span(), message, help));
+    let span = compare.span();
+    let at = |key: &str, message: String, help: &str| {
+        let at = if key.is_empty() { span.clone() } else { key_of(manifest, &span, "", key) };
+        Err(manifest.problem(&at, message, help))
+    };
     let compare = compare.get_ref();
     let (window_s, simulated) = (compare.window_s, &compare.simulated);
     let limits = [
@@ -159,15 +171,15 @@ fn check_window(manifest: &Manifest, plan: &Plan, compare: &Spanned<Comparison>)
     let mut stated = limits.into_iter().filter_map(|(key, limit)| Some((key, limit?))).peekable();
     if stated.peek().is_none() {
         let help = "add max_position_m, max_velocity_m_s or max_attitude_deg";
-        return at("the comparison has no limit, so it cannot fail".to_owned(), help);
+        return at("", "the comparison has no limit, so it cannot fail".to_owned(), help);
     }
     if let Some(set_s) = reset_window_s(plan, simulated).filter(|set_s| *set_s != window_s) {
         let message =
             format!("`window_s` is {window_s} s, but the plant behind {simulated} is set every {set_s} s");
-        return at(message, "give both the same length");
+        return at("window_s", message, "give both the same length");
     }
     if let Some((key, limit)) = stated.find(|(_, limit)| *limit < 0.0) {
-        return at(format!("`{key}` is {limit}"), "an RMS error is never below 0");
+        return at(key, format!("`{key}` is {limit}"), "an RMS error is never below 0");
     }
     let duration_s = f64::from(plan.duration_ticks) * plan.tick_s();
     // The last tick lies one tick before the end.
@@ -176,24 +188,25 @@ fn check_window(manifest: &Manifest, plan: &Plan, compare: &Spanned<Comparison>)
     }
     let message =
         format!("`window_s` is {window_s} s: no window of that length ends within the run of {duration_s} s");
-    at(message, "choose a window shorter than run.duration_s")
+    at("window_s", message, "choose a window shorter than run.duration_s")
 }
 
 fn check_field(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) -> Result<(), Diagnostic> {
     let condition = pass.get_ref();
-    let at = |message: String, help: &str| {
-        manifest.problem(&pass.span(), format!("{} `{}`: {message}", kind(condition), condition.name), help)
+    let at = |table: &str, keys: &[&str], message: String, help: &str| {
+        let span = blamed(manifest, &pass.span(), table, keys);
+        manifest.problem(&span, format!("{} `{}`: {message}", kind(condition), condition.name), help)
     };
-    if let Some((message, help)) =
+    if let Some((keys, message, help)) =
         condition.gate.as_ref().and_then(|gate| impossible(gate.min, gate.max, None))
     {
-        return Err(at(format!("`while`: {message}"), &help));
+        return Err(at("while", keys, format!("`while`: {message}"), &help));
     }
-    if let Some((message, help)) = unfit_reference(condition) {
-        return Err(at(message, help));
+    if let Some(([table, key], message, help)) = unfit_reference(condition) {
+        return Err(at(table, &[key], message, help));
     }
     if condition.gate.as_ref().is_some_and(|gate| gate.min.is_none() && gate.max.is_none()) {
-        return Err(at("`while` has no limit".into(), "add `min`, `max`, or both to it"));
+        return Err(at("", &["while"], "`while` has no limit".into(), "add `min`, `max`, or both to it"));
     }
     check_units(manifest, plan, pass)
 }
@@ -201,34 +214,40 @@ fn check_field(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) 
 /// Refuses fields that are not there, and units that do not fit each other.
 fn check_units(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) -> Result<(), Diagnostic> {
     let condition = pass.get_ref();
-    let at = |message: String, help: &str| {
-        manifest.problem(&pass.span(), format!("{} `{}`: {message}", kind(condition), condition.name), help)
+    let at = |table: &str, key: &str, message: String, help: &str| {
+        let span = key_of(manifest, &pass.span(), table, key);
+        manifest.problem(&span, format!("{} `{}`: {message}", kind(condition), condition.name), help)
     };
     let unit = |table: &str, topic: &str, field: &str| {
         unit_of(manifest, plan, topic, field).map_err(|error| {
             let message = format!("{} `{}`: {error}", kind(condition), condition.name);
-            manifest.problem(
-                &key_of(manifest, &pass.span(), table, "field"),
-                message,
-                "name one of these fields",
-            )
+            let meant = match &error {
+                RecordingError::UnknownField { field, known, .. } => nearest(field, known.split(", ")),
+                _ => None,
+            };
+            let help = meant.map(|meant| format!("did you mean `{meant}`?"));
+            let at = key_of(manifest, &pass.span(), table, "field");
+            manifest.problem(&at, message, help.unwrap_or_else(|| "name one of these fields".to_owned()))
         })
     };
     let Some(unit_here) = unit("", &condition.topic, &condition.field)? else { return Ok(()) };
-    diagnostics::convert(condition.statistic.unit(&unit_here), &condition.unit)
-        .map_err(|error| at(error.to_string(), "state the limits in a unit of the field's quantity"))?;
+    diagnostics::convert(condition.statistic.unit(&unit_here), &condition.unit).map_err(|error| {
+        at("", "unit", error.to_string(), "state the limits in a unit of the field's quantity")
+    })?;
     if let Some(minus) = &condition.minus
         && let Some(other) = unit("minus", &minus.topic, &minus.field)?
         && other != unit_here
     {
-        return Err(at(format!("`minus` takes `{other}` off `{unit_here}`"), "compare fields of one unit"));
+        let message = format!("`minus` takes `{other}` off `{unit_here}`");
+        return Err(at("minus", "field", message, "compare fields of one unit"));
     }
     if let Some(reference) = &condition.reference
         && let Some(other) = unit("reference", &reference.topic, &reference.field)?
         && other != unit_here
     {
         let message = format!("the field is in `{unit_here}`, its `reference` in `{other}`");
-        return Err(at(message, "compare fields of one unit, as an angle with the one asked for"));
+        let help = "compare fields of one unit, as an angle with the one asked for";
+        return Err(at("reference", "field", message, help));
     }
     if let Some(gate) = &condition.gate {
         unit("while", &gate.topic, &gate.field)?;
@@ -236,8 +255,8 @@ fn check_units(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) 
     Ok(())
 }
 
-/// Reason why a condition's `reference` does not fit its statistic, and advice.
-fn unfit_reference(condition: &PassCondition) -> Option<(String, &'static str)> {
+/// Reason why a condition's `reference` does not fit its statistic, with its table and key, and advice.
+fn unfit_reference(condition: &PassCondition) -> Option<([&'static str; 2], String, &'static str)> {
     let name = match condition.statistic {
         Statistic::Gain => "gain",
         _ => "lag",
@@ -246,23 +265,26 @@ fn unfit_reference(condition: &PassCondition) -> Option<(String, &'static str)> 
         let help =
             "add what it is measured against: reference = { topic = \"/pilot/set_point\", field = \"roll\" }";
         let is_of_response = condition.statistic.is_of_response();
-        return is_of_response.then(|| (format!("the statistic `{name}` has no `reference`"), help));
+        let message = || format!("the statistic `{name}` has no `reference`");
+        return is_of_response.then(|| (["", "statistic"], message(), help));
     };
     let beside = [("minus", condition.minus.is_some()), ("while", condition.gate.is_some())];
     if !condition.statistic.is_of_response() {
         return Some((
+            ["", "reference"],
             "`reference` is there".to_owned(),
             "only the statistics `lag` and `gain` have one: leave it out",
         ));
     }
     if let Some((key, _)) = beside.into_iter().find(|(_, is_there)| *is_there) {
         let help = "a lag is looked for in two whole signals: leave the key out, and narrow the span with from_s and to_s";
-        return Some((format!("the statistic `{name}` cannot have `{key}`"), help));
+        return Some((["", key], format!("the statistic `{name}` cannot have `{key}`"), help));
     }
     let within_s = reference.within_s;
     let is_possible = within_s > 0.0 && within_s <= LAG_MAX_S;
     (!is_possible).then(|| {
         (
+            ["reference", "within_s"],
             format!("`within_s` of `reference` is {within_s} s"),
             "it is the largest lag that is looked for: some time above 0, at most 60 s",
         )
@@ -314,11 +336,29 @@ fn check_taken(manifest: &Manifest, plan: &Plan, programs: &[Program]) -> Result
     Ok(())
 }
 
-/// Place of the value of `key` in the condition or comparison at `span`, or in its `table` of that name.
+/// Place of the value of `key` in the condition or comparison at `span`, or in its `table` of that name; the `--set` that
+/// states it, if one does.
 fn key_of(manifest: &Manifest, span: &Range<usize>, table: &str, key: &str) -> Range<usize> {
     let path: Vec<&str> = [table, key].into_iter().filter(|name| !name.is_empty()).collect();
-    let is_set = ["pass.", "measure.", "compare."].map(|list| manifest.inside(span, &path, list));
-    let [_, at] = &is_set[0];
-    // A value of --set may be meant.
-    if is_set.iter().all(|places| places == &is_set[0]) { at.clone() } else { span.clone() }
+    set_of(manifest, span, &path).unwrap_or_else(|| {
+        let [_, at] = manifest.sources.inside(span, &path);
+        at
+    })
+}
+
+/// Place of one of several keys that do not go together: the one that a `--set` states, or the first.
+fn blamed(manifest: &Manifest, span: &Range<usize>, table: &str, keys: &[&str]) -> Range<usize> {
+    let path = |key| [table, key].into_iter().filter(|name| !name.is_empty()).collect::<Vec<_>>();
+    let set = keys.iter().find_map(|key| set_of(manifest, span, &path(key)));
+    set.or_else(|| keys.first().map(|key| key_of(manifest, span, table, key))).unwrap_or_else(|| span.clone())
+}
+
+/// Place of the `--set` that states the value at `path` in the condition or comparison at `span`.
+fn set_of(manifest: &Manifest, span: &Range<usize>, path: &[&str]) -> Option<Range<usize>> {
+    let content = &manifest.content;
+    let index = |list: &[Spanned<PassCondition>]| list.iter().position(|one| one.span() == *span);
+    let compared = content.compare.iter().position(|one| one.span() == *span);
+    let lists = [("pass", index(&content.pass)), ("measure", index(&content.measure)), ("compare", compared)];
+    let (list, index) = lists.into_iter().find_map(|(list, index)| Some((list, index?)))?;
+    manifest.sources.set_at(&format!("{list}.{index}.{}", path.join(".")))
 }

@@ -2,19 +2,68 @@
 
 use super::outputs::{Published, require_known_ports};
 use super::processes::DeclaredNode;
-use crate::manifest::{Conditions, InputSetting};
+use crate::manifest::{Conditions, InputSetting, Manifest};
 use crate::placement;
 use crate::program::Program;
 use bus::plan::{InputPlan, NodePlan, TopicPlan};
 use bus::ports::{Inputs, PortSpec};
-use diagnostics::{Diagnostic, did_you_mean};
+use diagnostics::{Diagnostic, did_you_mean, nearest};
 use toml::Spanned;
+
+/// The nodes of a run with what they publish, in the order of the topics.
+pub struct Senders<'a, 'm> {
+    /// The nodes.
+    pub declared_nodes: &'a [DeclaredNode<'m>],
+    /// Their outputs.
+    pub published: &'a [Published],
+}
+
+impl Senders<'_, '_> {
+    /// Error at the output behind `topic`, if the manifest states its type: the input `reader` of a built-in kind reads `expected`.
+    /// `None` if the type is known to be right, or the sender has another output of the expected type, which is meant then.
+    fn misstated(&self, topic: usize, expected: &str, reader: &str) -> Option<Diagnostic> {
+        let output = &self.published[topic];
+        let DeclaredNode { manifest, name, program, .. } = &self.declared_nodes[output.node];
+        let is_meant = |other: &&Published| other.node == output.node && other.topic.type_name == expected;
+        if program.component().is_some() || self.published.iter().any(|other| is_meant(&other)) {
+            return None;
+        }
+        let (port, found) = (&output.port, &output.topic.type_name);
+        let message = format!(
+            "output `{port}` of `{}` is stated as {found}, {reader} reads {expected}",
+            name.get_ref()
+        );
+        let help = match manifest.registry().message(found) {
+            Some(_) => format!("state type = \"{expected}\", or wire another topic to the input"),
+            None => misspelt_type(manifest, found),
+        };
+        let [_, at] = manifest.sources.inside(&output.span, &["type"]);
+        Some(manifest.problem(&at, message, help))
+    }
+}
+
+/// Advice for a message type that no built-in kind has.
+fn misspelt_type(manifest: &Manifest, found: &str) -> String {
+    let short = |name: &'static str| name.rsplit('/').next().unwrap_or(name);
+    let known: Vec<&'static str> =
+        manifest.registry().messages().iter().map(|schema| schema.type_name).collect();
+    let written = found.rsplit('/').next().unwrap_or(found);
+    let meant = nearest(written, known.iter().map(|name| short(name)));
+    match meant.and_then(|meant| known.iter().find(|name| short(name) == meant)) {
+        Some(meant) => format!("did you mean `{meant}`?"),
+        None => "`hummingbus schema` lists the types".to_owned(),
+    }
+}
 
 /// The inputs of `declared`, wired to `topics`.
 ///
 /// # Errors
 /// A port or topic that is not there, or does not fit.
-pub fn inputs(declared: &DeclaredNode<'_>, topics: &[TopicPlan]) -> Result<Vec<InputPlan>, Diagnostic> {
+pub fn inputs(
+    declared: &DeclaredNode<'_>,
+    topics: &[TopicPlan],
+    senders: &Senders<'_, '_>,
+) -> Result<Vec<InputPlan>, Diagnostic> {
     let DeclaredNode { manifest, name, process, program, .. } = declared;
     match program.component().map(|kind| &kind.inputs) {
         Some(Inputs::Any) if process.inputs.is_empty() => {
@@ -40,7 +89,7 @@ pub fn inputs(declared: &DeclaredNode<'_>, topics: &[TopicPlan]) -> Result<Vec<I
         Some(Inputs::Ports(ports)) => require_ports(declared, ports)?,
         _ => {}
     }
-    process.inputs.iter().map(|(port, setting)| input(declared, port, setting, topics)).collect()
+    process.inputs.iter().map(|(port, setting)| input(declared, port, setting, topics, senders)).collect()
 }
 
 /// Refuses inputs that are none of `ports`, and the lack of one that is required.
@@ -60,6 +109,7 @@ fn input(
     port: &Spanned<String>,
     setting: &InputSetting,
     topics: &[TopicPlan],
+    senders: &Senders<'_, '_>,
 ) -> Result<InputPlan, Diagnostic> {
     let DeclaredNode { manifest, name, program, .. } = declared;
     let who = format!("input `{}` of `{}`", port.get_ref(), name.get_ref());
@@ -71,6 +121,9 @@ fn input(
     };
     let found = &topics[topic].type_name;
     if let Some(expected) = expected_type(program, port.get_ref()).filter(|expected| expected != found) {
+        if let Some(error) = senders.misstated(topic, expected, &who) {
+            return Err(error);
+        }
         let help = format!("wire a topic of {expected}");
         return Err(at(format!(" reads {expected}, {} carries {found}", setting.topic), help));
     }

@@ -20,8 +20,10 @@ pub struct Published {
     pub topic: TopicPlan,
     /// The topic whose messages it forwards, if it does; its type is that of the forwarded messages.
     forwards: Option<String>,
-    port: String,
-    span: Range<usize>,
+    /// The port's name in the node.
+    pub port: String,
+    /// Place of the port in the manifest; that of the node if the manifest does not name the port.
+    pub span: Range<usize>,
 }
 
 /// Returns all outputs of `declared_nodes`, each with its topic; refuses two on one topic.
@@ -205,9 +207,7 @@ fn topic(
     };
     let period_ticks = every_ticks.unwrap_or(period);
     if period_ticks == 0 || !period_ticks.is_multiple_of(period) {
-        let message =
-            format!("output `{port}` is due every {period_ticks} ticks, its process runs every {period}");
-        return at(message, "`every_ticks` must be a multiple of the process's `period_ticks`");
+        return Err(unequal_periods(manifest, (node, period), (port, period_ticks), &span));
     }
     let name = topic.unwrap_or_else(|| format!("/{}/{port}", node.get_ref()));
     let fits = |c: char| c.is_ascii_alphanumeric() || "/_-".contains(c);
@@ -216,6 +216,45 @@ fn topic(
         return at(format!("`{name}` cannot name a topic"), help);
     }
     Ok((TopicPlan { name, type_name, period_ticks }, span))
+}
+
+/// Error of an output that is due at other ticks than its process computes; where a `--set` states one of the periods, it is to
+/// blame, else the output at `span`.
+fn unequal_periods(
+    manifest: &Manifest,
+    (node, period): (&Spanned<String>, u32),
+    (port, every): (&str, u32),
+    span: &Range<usize>,
+) -> Diagnostic {
+    let node = node.get_ref();
+    let rate = |ticks: u32| rate_text(*manifest.content.run.rate_hz.get_ref(), ticks);
+    let message = format!(
+        "output `{port}` is due every {every} ticks ({}), its process runs every {period} ({})",
+        rate(every),
+        rate(period)
+    );
+    let below = (every / period).max(1) * period;
+    let help = format!(
+        "`every_ticks` must be a multiple of the process's `period_ticks`: {below} ({}) or {} ({}), for example",
+        rate(below),
+        below + period,
+        rate(below + period)
+    );
+    let keys = [format!("process.{node}.outputs.{port}.every_ticks"), format!("process.{node}.period_ticks")];
+    let set = keys.iter().find_map(|key| manifest.sources.set_at(key));
+    let in_file = || {
+        let [_, at] = manifest.sources.inside(span, &["every_ticks"]);
+        at
+    };
+    manifest.problem(&set.unwrap_or_else(in_file), message, help)
+}
+
+/// Rate of a period of `ticks`, with three digits behind the point at most.
+pub fn rate_text(rate_hz: u32, ticks: u32) -> String {
+    if ticks == 0 {
+        return "never".to_owned();
+    }
+    format!("{} Hz", (f64::from(rate_hz) * 1e3 / f64::from(ticks)).round() / 1e3)
 }
 
 /// Refuses ports in use that are none of `ports`.

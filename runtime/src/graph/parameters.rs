@@ -4,7 +4,7 @@ use super::processes::{DeclaredNode, files};
 use super::ranges;
 use crate::manifest::{InputSetting, Manifest, Process};
 use crate::program::Executable;
-use bus::context::{InputMessage, NodeContext};
+use bus::context::{InputMessage, NodeContext, SampleTimes};
 use bus::plan::Plan;
 use diagnostics::{Diagnostic, ParameterError};
 use inputs::{InputFile, InputFiles};
@@ -30,6 +30,8 @@ pub struct Notes {
     pub warnings: Vec<Diagnostic>,
     /// Those about vehicles, which may explain why one is refused.
     of_vehicles: Vec<Diagnostic>,
+    /// Times of the samples of each node's first process, by its name.
+    pub times: BTreeMap<String, SampleTimes>,
     /// True if warnings were left out because the run was cut short.
     has_cut: bool,
 }
@@ -133,6 +135,7 @@ pub fn of(
             });
             refused(declared, &error)
         });
+        notes.times.entry(name.get_ref().clone()).or_insert_with(|| context.times());
         // A firmware has files beside its program.
         if has_firmware {
             notes.models.extend(read.used().into_iter().map(|file| file.path));

@@ -1,5 +1,6 @@
 //! The nodes of a run, wired to each other.
 
+use super::inputs::Senders;
 use super::processes::{self, DeclaredNode};
 use super::{computing_time, inputs, outputs};
 use crate::program::OnExit;
@@ -37,9 +38,10 @@ pub fn wire_apart(
     let published = outputs::publish_all(declared_nodes)?;
     let topics: Vec<TopicPlan> = published.iter().map(|output| output.topic.clone()).collect();
     let mut faulty = BTreeMap::new();
+    let senders = Senders { declared_nodes, published: &published };
     let mut nodes = Diagnostic::gather(declared_nodes.iter().enumerate().map(|(index, declared)| {
         let process = declared.process;
-        let inputs = inputs::inputs(declared, &topics);
+        let inputs = inputs::inputs(declared, &topics, &senders);
         Ok(NodePlan {
             name: declared.name.get_ref().clone(),
             period_ticks: processes::period_ticks(declared.manifest, process, declared.program.component())?,

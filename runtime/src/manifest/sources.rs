@@ -84,7 +84,14 @@ impl Sources {
     /// Table of one of the texts, with places among all texts.
     pub fn table<'s>(&self, source: &'s Source) -> Result<DeTable<'s>, Diagnostic> {
         tree::parse(&source.text, source.base).map_err(|misread| {
-            self.problem(&misread.span(), misread.error, "docs/manifest.md shows how a manifest is written")
+            let (span, first) = (misread.span(), misread.first());
+            let mut problem =
+                self.problem(&span, misread.error, "docs/manifest.md shows how a manifest is written");
+            if let Some(first) = first {
+                let first = first.start - source.base..first.end - source.base;
+                problem.place = problem.place.map(|place| place.after(&source.text, &first));
+            }
+            problem
         })
     }
 
@@ -101,6 +108,18 @@ impl Sources {
     /// The values given with `--set`.
     pub fn overrides(&self) -> impl Iterator<Item = &Source> {
         self.all.iter().filter(|source| matches!(source.origin, Origin::Override))
+    }
+
+    /// Place of the last `--set` that states the value at the dotted `key`.
+    pub fn set_at(&self, key: &str) -> Option<Range<usize>> {
+        let is_of = |source: &&Source| {
+            source
+                .text
+                .split_once('=')
+                .is_some_and(|(path, _)| path.split('.').map(str::trim).eq(key.split('.')))
+        };
+        let found = self.overrides().filter(is_of).last()?;
+        Some(found.base..found.base + found.text.len())
     }
 
     /// True if the place `offset` lies in a `--set`.
