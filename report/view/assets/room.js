@@ -7,6 +7,8 @@ import { FlatRenderer } from "./flat.js";
 import { curveColour, onTheme, pageColour } from "./palette.js";
 
 const PATH_POINTS = 3000;
+// Not the colour of the path, which hides it in a vehicle that follows well.
+const PLAN = 0xcc79a7;
 // A path that spreads over more blocks of the file is drawn around the time that is shown.
 const PATH_BLOCKS = 200;
 // It is read again and again of a recording that grows.
@@ -148,7 +150,7 @@ export class Room {
       return made;
     };
     const path = new THREE.Group();
-    const plan = new THREE.Line(new THREE.BufferGeometry(), new THREE.LineDashedMaterial({ color: colour, dashSize: 0.1, gapSize: 0.08 }));
+    const plan = new THREE.Line(new THREE.BufferGeometry(), new THREE.LineDashedMaterial({ color: PLAN, dashSize: 0.15, gapSize: 0.1 }));
     plan.frustumCulled = false;
     path.add(line(0.3), line(0.9), line(0.9), plan);
     path.children[2].geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(3 * TAIL_POINTS), 3));
