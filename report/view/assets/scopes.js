@@ -90,22 +90,26 @@ class Plot {
     const units = [...new Set(this.curves.map(({ unit }) => unit))];
     const topics = new Set(this.curves.map(({ topic }) => topic));
     const { recordings } = this.scopes;
-    const isCompared = new Set(this.curves.map(({ recording }) => recording)).size > 1;
+    // Names of recordings are long: the key has them once.
+    const others = [...new Set(this.curves.map(({ recording }) => recording))].filter((recording) => recording > 0);
+    const keys = others.map((recording) => Object.assign(document.createElement("span"), {
+      className: "unit", textContent: `(${recording + 1}): ${clipped(recordings[recording].name, 40)}`,
+    }));
     this.values = this.curves.map((curve) => {
       const dash = document.createElement("span");
       dash.className = curve.isDashed ? "dash ghost" : "dash";
       dash.style.borderColor = curveColour(curve.colour);
       const value = Object.assign(document.createElement("span"), { className: "value" });
-      const name = Object.assign(document.createElement("span"), { className: "name", title: `${curve.topic} ${curve.field}` });
+      const name = Object.assign(document.createElement("span"), { className: "name", title: `${curve.topic} ${curve.field} of ${recordings[curve.recording].name}` });
       const unit = units.length > 1 && curve.unit ? ` [${clipped(curve.unit, 16)}]` : "";
-      const of = isCompared ? ` of ${clipped(recordings[curve.recording].name, 40)}` : "";
+      const of = curve.recording > 0 ? ` (${curve.recording + 1})` : "";
       name.append(dash, `${clipped(topics.size > 1 ? `${curve.topic} ${curve.field}` : curve.field, 60)}${of}${unit}`, value);
       return { name, value };
     });
     const topic = Object.assign(document.createElement("span"), { className: "unit" });
     const unit = units.length === 1 && units[0] ? ` [${clipped(units[0], 16)}]` : "";
     topic.textContent = topics.size === 1 ? `${clipped([...topics][0], 60)}${unit}` : unit.trim();
-    this.head.replaceChildren(topic, ...this.values.map(({ name }) => name));
+    this.head.replaceChildren(topic, ...this.values.map(({ name }) => name), ...keys);
     this.edit.setAttribute("aria-label", `Edit the plot of ${this.curves.map(({ field }) => field).join(", ")}`);
   }
 
