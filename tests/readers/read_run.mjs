@@ -58,6 +58,8 @@ const seen = await withPage(address, async (page, wrong) => {
   await awaitAnswer("paused at tick");
   await awaitState("paused");
   found.paused = await look();
+  // The room shows the last sample before the pause, not the last that is recorded.
+  await page.waitForFunction((tick) => Math.round(window.hummingbus.shown.timeNs / 1e6) === tick - 1, { polling: 50 }, found.paused.tick);
   await page.click("#run-step");
   await awaitTick(found.paused.tick + 1);
 
@@ -118,6 +120,7 @@ const seen = await withPage(address, async (page, wrong) => {
   await page.focus("#swap-yes");
   await page.keyboard.press("Enter");
   await page.waitForFunction(() => !document.getElementById("swap").open);
+  found.marks = await page.evaluate(() => window.hummingbus.scopes.marks.filter(({ kind }) => kind === "swap"));
   found.swapped = await look();
 
   // A second page sees what the first one asked for.

@@ -101,6 +101,10 @@ fn require_controls(seen: &Value) {
         swapped["answer"].as_str().unwrap().contains("controller") && swapped["isWrong"] == false,
         "{swapped}"
     );
+    assert_eq!(
+        (&seen["marks"][0]["text"], seen["marks"].as_array().unwrap().len()),
+        (&json!("swap of controller"), 1)
+    );
     assert_eq!(seen["other"]["shown"], "paused");
     assert_eq!((&seen["kept"]["shown"], &seen["ended"]["shown"]), (&json!("paused"), &json!("ended")));
     assert!(seen["ended"]["answer"].as_str().unwrap().contains("has ended at tick"), "{}", seen["ended"]);

@@ -298,3 +298,102 @@ fn the_page_of_a_run_that_goes_back_shows_it_from_the_checkpoint_on() {
     drop(page);
     run.end().with_code(1);
 }
+
+/// Numbers of the answer to `request`.
+fn numbers(page: &Page, name: &str, request: &Value) -> Vec<f64> {
+    let Page { host, path, .. } = page;
+    let (body, mut stream) = (request.to_string(), TcpStream::connect(host).unwrap());
+    write!(
+        stream,
+        "POST {path}api/{name} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\nContent-Type: application/json\r\n\
+         Content-Length: {}\r\n\r\n{body}",
+        body.len()
+    )
+    .unwrap();
+    let mut answer = Vec::new();
+    stream.read_to_end(&mut answer).unwrap();
+    let head = answer.windows(4).position(|bytes| bytes == b"\r\n\r\n").unwrap();
+    if answer.starts_with(b"HTTP/1.1 204") {
+        return Vec::new();
+    }
+    assert!(answer.starts_with(b"HTTP/1.1 200"), "{}", String::from_utf8_lossy(&answer));
+    answer[head + 4..].as_chunks().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect()
+}
+
+/// The newest values of a live run are ahead of its recording, and those that the recording then holds.
+#[test]
+fn the_page_of_a_live_run_gets_its_newest_samples_ahead_of_the_recording() {
+    let place = Place::new();
+    let (manifest, recording) = (repository("manifests/hover.toml"), place.path("newest.mcap"));
+    let run = place.start(&watched(&manifest, &recording, "run.duration_s=4000"));
+    let mut page = Page::of(&run);
+    page.await_event(|event| event["recordings"] == 1);
+    let fields = json!([
+        { "topic": "/plant/state", "field": "position.z" },
+        { "topic": "/plant/state", "field": "rotor_speed[0]" },
+    ]);
+    let newest = json!({ "fields": fields });
+    // The recorder finds the ring at the first ticks after the first request.
+    poll("nothing is newer", || numbers(&page, "newest", &newest).first().copied());
+    let held = page.done(&json!({ "request": "pause" }));
+    let found = poll("the newest sample is not that of the pause", || {
+        let found = numbers(&page, "newest", &newest);
+        (found[0] == (held - 1) as f64 * 1e6).then_some(found)
+    });
+    let refused = json!({ "fields": [{ "topic": "/nobody", "field": "x" }] });
+    let (head, body) = page.post("newest", &refused);
+    assert!(head.starts_with("HTTP/1.1 400") && body.contains("/nobody"), "{head} {body}");
+    page.done(&json!({ "request": "stop" }));
+    page.await_event(|event| event["run"]["state"] == "ended");
+    let at =
+        json!({ "recording": 0, "from_ns": found[0] as u64, "step_ns": 0, "count": 1, "fields": fields });
+    poll("the recording has other values", || (numbers(&page, "frames", &at) == found[1..]).then_some(()));
+    assert!(numbers(&page, "newest", &newest).is_empty(), "the recording is whole by now");
+    drop(page);
+    run.end().with_code(1);
+}
+
+/// Layouts of plots outlive the command, and every page has them.
+#[test]
+fn layouts_are_kept_in_the_folder_of_the_user_s_state() {
+    let place = Place::new();
+    let (recording, state) = (recording(&place), place.path("state"));
+    let plots = json!([[[0, "/plant/state", "position.z"]]]);
+    for round in 0..2 {
+        let launch = place.start_with(&["view", &recording, "--no-open"], &[("XDG_STATE_HOME", &state)]);
+        let address = address(&launch);
+        let (host, path) = address.split_at(address.find('/').unwrap());
+        if round == 0 {
+            let body = json!({ "name": "height", "plots": plots }).to_string();
+            let mut stream = TcpStream::connect(host).unwrap();
+            write!(
+                stream,
+                "POST {path}api/layouts HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\
+                 Content-Type: application/json\r\nContent-Length: {}\r\n\r\n{body}",
+                body.len()
+            )
+            .unwrap();
+            let mut answer = String::new();
+            stream.read_to_string(&mut answer).unwrap();
+            assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
+        }
+        let (_, body) = answer(host, &format!("{path}api/layouts"));
+        assert_eq!(
+            serde_json::from_str::<Value>(&body).unwrap(),
+            json!({ "height": plots }),
+            "round {round}"
+        );
+        launch.signal(Signal::TERM);
+        launch.end().with_code(0);
+    }
+}
+
+#[test]
+fn a_browser_that_fails_is_not_said_to_show_the_page() {
+    let place = Place::new();
+    let recording = recording(&place);
+    let launch = place.start_with(&["view", &recording], &[("BROWSER", "/bin/false")]);
+    launch.await_said("Open this address in a browser");
+    launch.signal(Signal::TERM);
+    launch.end().with_code(0);
+}

@@ -22,6 +22,8 @@ pub struct Line<P> {
     pub role: Role,
     /// Colour, as HTML writes it.
     pub colour: &'static str,
+    /// True if it is drawn darker: its colour is that of the flown line beside it.
+    pub is_darker: bool,
     /// Samples in the recording.
     pub samples: u64,
     /// The points; JSON has their number.
@@ -105,6 +107,7 @@ fn axes(wanted: &Wanted) -> Result<Axes> {
         field: channel.path.clone(),
         role: ask.role,
         colour: "",
+        is_darker: ask.role != Role::Flown,
         samples: curve.samples(),
         points: curve.points(),
     });
@@ -228,7 +231,8 @@ fn colour(curves: &mut [Curve]) {
     }
 }
 
-/// The paths in space: those of one vehicle have one colour, and each free body has one.
+/// The paths in space: those of one vehicle have one colour, and each free body has one. Where there is one vehicle alone,
+/// its flown, estimated, measured and requested paths differ in colour.
 pub fn trails(read: &[(Ask, thin::Poses)]) -> Vec<Trail> {
     let drawn = || read.iter().filter(|(_, trail)| trail.samples > 0);
     // A body may be called as a vehicle is.
@@ -238,13 +242,17 @@ pub fn trails(read: &[(Ask, thin::Poses)]) -> Vec<Trail> {
     let movers = distinct(drawn().map(mover));
     let drawn = drawn().map(|read| {
         let (ask, trail) = read;
-        let index = movers.iter().position(|known| *known == mover(read)).unwrap_or_default();
+        let index = match movers.len() {
+            1 => role_colour(ask.role),
+            _ => movers.iter().position(|known| *known == mover(read)).unwrap_or_default(),
+        };
         Trail {
             name: trail.body().map_or_else(|| trail_name(ask.vehicle(), ask.role), str::to_owned),
             topic: ask.topic.clone(),
             field: String::new(),
             role: ask.role,
             colour: COLOURS[index % COLOURS.len()],
+            is_darker: movers.len() > 1 && ask.role != Role::Flown,
             samples: trail.samples,
             points: trail.points().into_iter().map(|[x, y, z, ..]| [x, y, z]).collect(),
         }
@@ -252,6 +260,16 @@ pub fn trails(read: &[(Ask, thin::Poses)]) -> Vec<Trail> {
     let mut trails: Vec<Trail> = drawn.collect();
     trails.sort_by_key(|trail| trail.role);
     trails
+}
+
+/// Number of the colour of an only vehicle's path.
+fn role_colour(role: Role) -> usize {
+    match role {
+        Role::Flown => 0,
+        Role::Estimated => 1,
+        Role::Measured => 3,
+        Role::Asked => 2,
+    }
 }
 
 fn trail_name(vehicle: &str, role: Role) -> String {
@@ -268,7 +286,16 @@ mod tests {
 
     fn curve(topic: &str, field: &str, role: Role) -> Curve {
         let (topic, field) = (topic.to_owned(), field.to_owned());
-        Curve { name: String::new(), topic, field, role, colour: "", samples: 0, points: Vec::new() }
+        Curve {
+            name: String::new(),
+            topic,
+            field,
+            role,
+            colour: "",
+            is_darker: false,
+            samples: 0,
+            points: Vec::new(),
+        }
     }
 
     #[test]

@@ -56,13 +56,18 @@ pub struct Look {
 }
 
 impl Look {
-    /// Look of `line`; lines other than the flown one are darker, to be distinguished from it.
+    /// Look of `line`: lines other than the flown one are thin, and darker where they share its colour.
     pub fn of<P>(line: &Line<P>) -> Self {
-        let colour = rgb(line.colour);
-        let darker = RGBColor(colour.0 / 2, colour.1 / 2, colour.2 / 2);
-        let is_flown = line.role == Role::Flown;
-        let (colour, width) = if is_flown { (colour, FLOWN_WIDTH) } else { (darker, THIN_WIDTH) };
-        Self { colour, width, is_dashed: line.role == Role::Asked }
+        let RGBColor(red, green, blue) = rgb(line.colour);
+        let darker = RGBColor(red / 2, green / 2, blue / 2);
+        let colour = if line.is_darker { darker } else { RGBColor(red, green, blue) };
+        Self { colour, ..Self::of_role(line.role) }
+    }
+
+    /// Look of the lines of a role, whatever their colours.
+    fn of_role(role: Role) -> Self {
+        let width = if role == Role::Flown { FLOWN_WIDTH } else { THIN_WIDTH };
+        Self { colour: INK, width, is_dashed: role == Role::Asked }
     }
 
     /// The style of the line for plotters.
@@ -102,16 +107,34 @@ where
 pub fn draw_legend<'a, P>(area: &Area<'a>, width: u32, lines: &[Line<P>]) -> Result<Area<'a>> {
     let (plots, legend) = area.split_horizontally(px(WIDTH - width));
     let anchor = Pos::new(HPos::Left, VPos::Center);
-    for (row, line) in (0..).zip(lines) {
-        let (look, y) = (Look::of(line), at(36 + row * LEGEND_ROW));
+    for (row, (look, name)) in (0..).zip(legend_rows(lines)) {
+        let y = at(36 + row * LEGEND_ROW);
         let dashes: &[(u32, u32)] =
             if look.is_dashed { &[(10, 18), (22, 30), (34, 36)] } else { &[(10, 36)] };
         for (from, to) in dashes {
             legend.draw(&PathElement::new([(at(*from), y), (at(*to), y)], look.style()))?;
         }
-        legend.draw(&Text::new(line.name.as_str(), (at(44), y), letters(LABEL_SIZE).pos(anchor)))?;
+        legend.draw(&Text::new(name, (at(44), y), letters(LABEL_SIZE).pos(anchor)))?;
     }
     Ok(plots)
+}
+
+/// Rows of a legend. Lines of a role that all have the colours of flown lines share a row: nine rows hide the three that matter.
+pub fn legend_rows<P>(lines: &[Line<P>]) -> Vec<(Look, String)> {
+    let has_fellow = |line: &Line<P>| {
+        line.is_darker && lines.iter().any(|other| other.role == Role::Flown && other.colour == line.colour)
+    };
+    let is_shared = |role: Role| {
+        let mut of_role = lines.iter().filter(|line| line.role == role).peekable();
+        role != Role::Flown && of_role.peek().is_some() && of_role.all(has_fellow)
+    };
+    let count = |role: Role| lines.iter().filter(|line| line.role == role).count();
+    let is_short = |role: Role| is_shared(role) && count(role) > 1;
+    let alone = lines.iter().filter(|line| !is_short(line.role));
+    let mut rows: Vec<_> = alone.map(|line| (Look::of(line), line.name.clone())).collect();
+    let roles = [Role::Estimated, Role::Measured, Role::Asked].into_iter().filter(|role| is_short(*role));
+    rows.extend(roles.map(|role| (Look::of_role(role), role.suffix().trim_start().to_owned())));
+    rows
 }
 
 /// Look of flat axes.

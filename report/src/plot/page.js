@@ -4,7 +4,12 @@ const SPACE = config(["toImage", "zoom3d", "pan3d", "orbitRotation", "tableRotat
 const SOLID = "#787878";
 // Layers of the lines: an estimator's noise must not hide the flown line, nor that the line that was asked for.
 const LAYERS = { estimated: 1, measured: 1, flown: 2, asked: 3 };
-const LEGEND = { x: 1.01, y: 1, font: { size: 12 }, itemwidth: 30 };
+// Beside the curves a legend would leave a narrow page nothing to draw on: there it is below them.
+const NARROW = matchMedia("(max-width: 700px)");
+const LEGEND_ROW = 22;
+const WIDE_PX = 320;
+const LEGEND_BELOW = { orientation: "h", x: 0, xanchor: "left", y: 0, yref: "container", yanchor: "bottom", font: { size: 12 }, itemwidth: 30 };
+const LEGEND_BESIDE = { x: 1.01, y: 1, font: { size: 12 }, itemwidth: 30 };
 // So wide that the longest name has room, and the same for all plots: their axes of time are then as long.
 const LEGEND_WIDTH = 7 * Math.max(12, ...data.panels.flatMap((panel) => panel.axes).flatMap((axes) => axes.curves)
   .map((curve) => curve.name.length)) + 60;
@@ -18,9 +23,21 @@ function darker(colour) {
   return `rgb(${parts.join(",")})`;
 }
 
-function look({ role, colour }) {
+function look({ role, colour, is_darker: isDarker }) {
   if (role === "flown") return { color: colour, width: 2 };
-  return { color: darker(colour), width: 1.2, dash: role === "asked" ? "dash" : "solid" };
+  return { color: isDarker ? darker(colour) : colour, width: 1.2, dash: role === "asked" ? "dash" : "solid" };
+}
+
+// Height that names need in a legend below the curves, at the present width.
+function heightBelow(id, names) {
+  const width = Math.max(element(id).clientWidth - 20, 200);
+  let [rows, used] = [1, 0];
+  for (const name of names) {
+    const needed = 7 * name.length + 50;
+    if (used > 0 && used + needed > width) [rows, used] = [rows + 1, 0];
+    used += needed;
+  }
+  return rows * LEGEND_ROW;
 }
 
 function drawAxes(axes) {
@@ -28,10 +45,13 @@ function drawAxes(axes) {
     mode: "lines", name: curve.name, x: curve.x, y: curve.y, line: look(curve), zorder: LAYERS[curve.role],
     hovertemplate: `%{x:.3f} ${data.across.unit}: %{y:.5~g} ${axes.unit}<br>${curve.topic} ${curve.field}<extra>${curve.name}</extra>`,
   }));
-  return addPlot("time", "wide", traces, layout(axes.title, data.across.label, `${axes.label} [${axes.unit}]`, {
+  const below = NARROW.matches ? heightBelow("time", traces.map(({ name }) => name)) : 0;
+  const room = below ? { l: 56, r: 8, t: 36, b: 58 + below } : { l: 76, r: LEGEND_WIDTH, t: 36, b: 44 };
+  return addPlot("time", below ? "" : "wide", traces, layout(axes.title, data.across.label, `${axes.label} [${axes.unit}]`, {
     // A copy: plotly.js changes the one that it is given.
-    xaxis: { range: [...data.across.range], zeroline: false }, yaxis: { zeroline: false, automargin: false },
-    margin: { l: 76, r: LEGEND_WIDTH, t: 36, b: 44, autoexpand: false }, legend: LEGEND, showlegend: true,
+    xaxis: { range: [...data.across.range], zeroline: false, title: { text: data.across.label, standoff: below ? 12 : undefined } }, yaxis: { zeroline: false, automargin: false },
+    margin: { ...room, autoexpand: false }, legend: below ? LEGEND_BELOW : LEGEND_BESIDE, showlegend: true,
+    ...(below ? { height: WIDE_PX + below } : {}),
   }), CONFIG);
 }
 
@@ -100,7 +120,7 @@ function drawPath() {
   const camera = { eye: { x: 1.0, y: -1.8, z: 1.0 }, center: { x: 0, y: 0, z: -0.2 } };
   return Plotly.newPlot("path", [ground(), ...data.solids.flatMap(solidTraces), ...airframes, ...paths], {
     scene: { xaxis: axis("x"), yaxis: axis("y"), zaxis: axis("z"), aspectmode: "data", camera },
-    margin: { l: 0, r: 0, t: 40, b: 0 }, legend: LEGEND, showlegend: true,
+    margin: { l: 0, r: 0, t: 40, b: 0 }, legend: NARROW.matches ? LEGEND_BELOW : LEGEND_BESIDE, showlegend: true,
   }, SPACE);
 }
 
@@ -137,8 +157,10 @@ async function draw() {
   element("summary").textContent = `${data.recording}, ${from} s to ${to} s of simulated time. ` +
     "Dashed: asked for. Thin: estimated or measured. Drag to zoom, double-click to see all; a click on a name hides its curve.";
   offerVehicles();
-  if (data.panels.length) await drawPanel(data.panels[0]);
+  const drawShown = () => data.panels.length && drawPanel(data.panels[element("vehicle").value || 0]);
+  await drawShown();
   await drawSpace();
+  NARROW.addEventListener("change", () => Promise.resolve(drawShown()).then(drawSpace));
   // For whoever waits until everything is there.
   document.body.dataset.drawn = "true";
 }

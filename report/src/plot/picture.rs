@@ -6,7 +6,9 @@
 
 use crate::plot::drawing::Drawing;
 use crate::plot::figure::{Across, Axes, Panel, in_layers};
-use crate::plot::ink::{Area, Flat, LEGEND_ROW, Look, WIDTH, at, draw_legend, draw_line, letters, px};
+use crate::plot::ink::{
+    Area, Flat, LEGEND_ROW, Look, WIDTH, at, draw_legend, draw_line, legend_rows, letters, px,
+};
 use crate::plot::request::{Format, View};
 use crate::plot::{space, thin};
 use anyhow::{Context, Result, bail};
@@ -95,7 +97,7 @@ fn heading(drawing: &Drawing, panel: Option<&Panel>) -> String {
 /// The height of axes over time without the numbers below the last ones, in pixels.
 #[allow(clippy::cast_possible_truncation, reason = "a legend is short")]
 fn axes_height(axes: &Axes) -> u32 {
-    AXES_HEIGHT.max((axes.curves.len() as u32 + 2) * LEGEND_ROW)
+    AXES_HEIGHT.max((legend_rows(&axes.curves).len() as u32 + 2) * LEGEND_ROW)
 }
 
 /// The picture as PNG.
@@ -142,11 +144,11 @@ fn draw_axes(area: &Area<'_>, axes: &Axes, across: &Across, legend: u32, room: u
 
 /// The width of the legends, in pixels: one for all, so that the axes are as wide as each other.
 fn legend_width(drawing: &Drawing, axes: &[Axes], views: &[View]) -> u32 {
-    let curves = axes.iter().flat_map(|axes| &axes.curves).map(|curve| &curve.name);
+    let curves = axes.iter().flat_map(|axes| legend_rows(&axes.curves));
     let has_paths = views.iter().any(|view| *view != View::Time);
-    let paths = drawing.trails.iter().filter(|_| has_paths).map(|trail| &trail.name);
+    let paths = has_paths.then(|| legend_rows(&drawing.trails)).into_iter().flatten();
     #[allow(clippy::cast_possible_truncation, reason = "a name is short")]
-    let longest = curves.chain(paths).map(|name| name.chars().count() as u32).max().unwrap_or(0);
+    let longest = curves.chain(paths).map(|(_, name)| name.chars().count() as u32).max().unwrap_or(0);
     (longest * LETTER_WIDTH + 52).clamp(130, WIDTH / 2)
 }
 

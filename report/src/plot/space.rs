@@ -14,6 +14,8 @@ use std::ops::Range;
 
 /// Room beside the axes of a flat view, in pixels: left, right, above, below.
 const MARGINS: [u32; 4] = [80, 12, 34, 50];
+/// Room in pixels between the name of the axis across and the title of the next view.
+const GAP: u32 = 18;
 const FLAT_HEIGHT: Range<u32> = 260..760;
 const PATH_HEIGHT: u32 = 640;
 /// Direction of view of the paths in three dimensions, in rad: from the right of -y, and from above.
@@ -66,13 +68,13 @@ fn flat_axes(view: View) -> [usize; 2] {
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a height of some hundred pixels")]
 pub fn height(drawing: &Drawing, view: View, width: u32) -> u32 {
     if view == View::Path {
-        return PATH_HEIGHT;
+        return PATH_HEIGHT + GAP;
     }
     let extent = extent(drawing);
     let [across, up] = flat_axes(view).map(|axis| length(&extent[axis]));
     let [left, right, above, below] = MARGINS;
     let height = f64::from(width - left - right) * up / across + f64::from(above + below);
-    (height as u32).clamp(FLAT_HEIGHT.start, FLAT_HEIGHT.end)
+    (height as u32).clamp(FLAT_HEIGHT.start, FLAT_HEIGHT.end) + GAP
 }
 
 /// Draws a view of the paths.
@@ -80,7 +82,7 @@ pub fn height(drawing: &Drawing, view: View, width: u32) -> u32 {
 /// # Errors
 /// If plotters cannot.
 pub fn draw(area: &Area<'_>, drawing: &Drawing, legend: u32, view: View) -> Result<()> {
-    let plots = draw_legend(area, legend, &drawing.trails)?;
+    let plots = draw_legend(area, legend, &drawing.trails)?.margin(0, px(GAP), 0, 0);
     if view == View::Path { draw_path(&plots, drawing) } else { draw_flat(&plots, drawing, view) }
 }
 

@@ -34,9 +34,29 @@ export async function frames(request, signal) {
   return (await numbers("api/frames", request, signal)).values;
 }
 
+/** Time and values of the newest samples of the live run; null where nothing newer than the recording can be had. */
+export async function newest(request) {
+  const headers = { "content-type": "application/json" };
+  const response = await answered("api/newest", { method: "POST", headers, body: JSON.stringify(request) });
+  if (response.status === 204) return null;
+  const [timeNs, ...values] = new Float64Array(await response.arrayBuffer());
+  return { timeNs, values };
+}
+
 /** Two values for each of `bins` intervals between two times, field after field; and the part of the recording read for it. */
 export function curves(request, signal) {
   return numbers("api/curves", request, signal);
+}
+
+/** The user's layouts of scopes by their names. */
+export async function layouts() {
+  return (await answered("api/layouts")).json();
+}
+
+/** Keeps a layout, or forgets it for null; the layouts then. */
+export async function keepLayout(name, plots) {
+  const headers = { "content-type": "application/json" };
+  return (await answered("api/layouts", { method: "POST", headers, body: JSON.stringify({ name, plots }) })).json();
 }
 
 /** Lasting facts about the live run. */

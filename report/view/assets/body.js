@@ -74,9 +74,12 @@ export class VehicleBody {
       new THREE.MeshLambertMaterial({ color: paint, transparent: ghost !== null, opacity: ghost === null ? 1 : 0.4 }),
     );
     const thrust = arrow(0xe69f00);
-    hub.add(blade, thrust);
+    // Beside the arrow of thrust, so that both are seen where they are equal.
+    const command = arrow(0x56b4e9);
+    command.position.x = 0.25 * radius;
+    hub.add(blade, thrust, command);
     this.group.add(hub);
-    this.propellers.push({ blade, thrust, spin: rotor.spin });
+    this.propellers.push({ blade, thrust, command, spin: rotor.spin });
   }
 
   /** Finds the places of the values that it needs, among the topics of `vehicle`. */
@@ -89,6 +92,7 @@ export class VehicleBody {
     this.attitude = columns.all(state, ["x", "y", "z", "w"].map((part) => `attitude.${part}`));
     this.velocity = vector(state, "velocity");
     this.speeds = count > 0 ? row(state, "rotor_speed", count) : null;
+    this.commands = row(topics.command, "command", this.propellers.length);
     this.estimate = vector(topics.estimate, "position");
     this.reference = vector(topics.reference, "position");
     this.altitude = columns.all(topics.status, ["altitude_set_point"]) ?? columns.all(topics.set_point, ["altitude"]);
@@ -149,6 +153,7 @@ export class VehicleBody {
     if (attitude?.every(Number.isFinite)) this.group.quaternion.set(...attitude).normalize();
     this.axes.visible = layers.axes ?? false;
     this.#turn(at(this.speeds), turnS, layers.thrust);
+    this.#command(at(this.commands), layers.command);
     this.#measure(at(this.distances), at(this.hits), layers.beams);
     this.#ask(at(this.reference), at(this.altitude)?.[0], position, layers.asked);
     this.#sense(at(this.wallDistances), at(this.inSight), position, layers.walls);
@@ -158,22 +163,39 @@ export class VehicleBody {
   }
 
   #turn(speeds, turnS, hasThrust) {
-    const { body } = this.vehicle;
     this.propellers.forEach(({ blade, thrust, spin }, index) => {
       const speed = speeds?.[index];
       const isKnown = Number.isFinite(speed);
       if (isKnown) blade.rotation.z = (blade.rotation.z + spin * speed * turnS) % (2 * Math.PI);
-      // Carrying its part of the weight, a rotor has an arrow as long as the vehicle's reach.
-      const share = isKnown ? (body.thrust_coefficient * speed * speed * this.propellers.length) / body.weight_N : 0;
-      const length = share * this.reach;
-      thrust.visible = Boolean(hasThrust && share > 0.05);
-      if (thrust.visible) thrust.setLength(length, Math.min(0.25 * this.reach, length), 0.12 * this.reach);
+      this.#lift(thrust, isKnown ? speed : 0, hasThrust);
     });
   }
 
+  /** Shows the thrust that the motors are asked for, once they turn as fast as their commands ask. */
+  #command(commands, isShown) {
+    const map = this.vehicle.body?.command;
+    this.propellers.forEach(({ command }, index) => {
+      const asked = commands?.[index];
+      const isKnown = Boolean(map) && Number.isFinite(asked);
+      const share = isKnown ? (Math.min(Math.max(asked, map.min), map.max) - map.min) / (map.max - map.min) : 0;
+      const isOff = !isKnown || (map.zero_is_off && asked <= 0);
+      const speed = isOff ? 0 : map.speed_at_min_rad_s + share * (map.speed_at_max_rad_s - map.speed_at_min_rad_s);
+      this.#lift(command, speed, isShown);
+    });
+  }
+
+  /** An arrow for the thrust at a speed: of a rotor that carries its part of the weight, as long as the vehicle's reach. */
+  #lift(arrowOfRotor, speed, isShown) {
+    const { body } = this.vehicle;
+    const share = speed > 0 ? (body.thrust_coefficient * speed * speed * this.propellers.length) / body.weight_N : 0;
+    const length = share * this.reach;
+    arrowOfRotor.visible = Boolean(isShown && share > 0.05);
+    if (arrowOfRotor.visible) arrowOfRotor.setLength(length, Math.min(0.25 * this.reach, length), 0.12 * this.reach);
+  }
+
   #measure(distances, hits, isShown) {
-    const isSeen = isShown && distances !== undefined;
-    this.beams.visible = isSeen && distances.every(Number.isFinite);
+    // Not `undefined`, which three.js takes for true.
+    this.beams.visible = Boolean(isShown && distances?.every(Number.isFinite));
     const places = this.beams.geometry.attributes.position;
     BEAMS.forEach((beam, index) => {
       const isHit = this.beams.visible && hits?.[index] === 1;

@@ -11,10 +11,11 @@ function option(value, text) {
 
 /** A time as people read it: seconds, from a minute on with minutes, from an hour on with hours. */
 export function timeText(seconds, decimals) {
-  const [hours, minutes] = [Math.floor(seconds / 3600), Math.floor(seconds / 60) % 60];
-  const rest = seconds.toFixed(decimals);
-  if (seconds < 60) return `${rest} s`;
-  const part = (seconds % 60).toFixed(decimals).padStart(decimals ? decimals + 3 : 2, "0");
+  // Rounded before it is split: 59.96 s are 1:00.0, not 0:60.0.
+  const rounded = Number(seconds.toFixed(decimals));
+  const [hours, minutes] = [Math.floor(rounded / 3600), Math.floor(rounded / 60) % 60];
+  if (rounded < 60) return `${rounded.toFixed(decimals)} s`;
+  const part = (rounded - 60 * Math.floor(rounded / 60)).toFixed(decimals).padStart(decimals ? decimals + 3 : 2, "0");
   return hours ? `${hours}:${String(minutes).padStart(2, "0")}:${part}` : `${minutes}:${part}`;
 }
 

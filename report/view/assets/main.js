@@ -3,6 +3,8 @@
 import { catalogue, growth } from "./api.js";
 import { cameraControls, TimeControls } from "./controls.js";
 import { Columns, Feed } from "./feed.js";
+import { Layouts } from "./layouts.js";
+import { Newest } from "./newest.js";
 import { Picker } from "./picker.js";
 import { PACES, Playback } from "./playback.js";
 import { Room } from "./room.js";
@@ -12,6 +14,8 @@ import { defaultPlots, Scopes } from "./scopes.js";
 // Pause between two questions for the growth of a recording that is being written.
 const GROWTH_MS = 500;
 const GROWING = "The recording is not finished: End goes to its newest second.";
+const UNFINISHED = "The run has ended without finishing its recording: the page shows what was written.";
+const FINISHED_MS = 3000;
 const HELD = "The run is paused: the room shows its last recorded second.";
 const AWAITED = "Nothing is recorded yet: the recorder writes each second of simulated time.";
 const state = document.getElementById("state");
@@ -79,9 +83,16 @@ function head(recordings, isLive) {
 }
 
 /** Follows recordings that grow, until their writers have finished them; `grown` hears of each growth, and of new topics. */
-async function follow(recordings, report, grown) {
+async function follow(recordings, run, report, grown) {
   const goesOn = () => recordings.some((recording) => recording.is_growing);
-  if (goesOn()) report(GROWING);
+  let overMs = null;
+  const reportGrowing = () => {
+    if (run.status === null || !run.isOver) return report(GROWING);
+    // A recorder that ended with its run has finished the file soon.
+    overMs ??= performance.now();
+    return report(performance.now() - overMs < FINISHED_MS ? "" : UNFINISHED);
+  };
+  if (goesOn()) reportGrowing();
   while (goesOn()) {
     await new Promise((resolve) => setTimeout(resolve, GROWTH_MS));
     try {
@@ -89,7 +100,7 @@ async function follow(recordings, report, grown) {
       const hasGrown = isNew || news.some((one, number) => one.duration_ns !== recordings[number].duration_ns || !one.is_growing);
       news.forEach((one, number) => Object.assign(recordings[number], one));
       if (hasGrown) grown(isNew);
-      report(GROWING);
+      reportGrowing();
     } catch (error) {
       report(error.message);
     }
@@ -120,13 +131,15 @@ async function awaited(report) {
 function hearOf(run) {
   const [reportServer, reportHeld] = [reporter("server"), reporter("held")];
   let starts = null;
+  // The newest sample of a paused run is shown, unless nobody has watched it before.
+  const isBehind = () => run.status?.state === "paused" && !window.hummingbus.playback?.isReached;
   return new Promise((isHeard) => {
     hear((told) => {
       // A run that has gone back begins another recording; the plots are in the address.
       if (starts !== null && told.starts > starts && starts > 0) location.reload();
       starts = told.starts;
       run.take(told.run);
-      reportHeld(run.status?.state === "paused" ? HELD : "");
+      reportHeld(isBehind() ? HELD : "");
       isHeard();
     }, reportServer);
   });
@@ -155,18 +168,22 @@ async function start() {
   new TimeControls(playback, recordings[0].start_s);
   const picker = new Picker(recordings);
   const keep = (plots) => history.replaceState(null, "", `#${encodeURIComponent(JSON.stringify({ plots }))}`);
-  const scopes = new Scopes(recordings, playback, picker, plotsOf(recordings), { report: reporter("scopes"), changed: keep });
+  const scopes = new Scopes(recordings, playback, picker, plotsOf(recordings), { report: reporter("scopes"), changed: keep, liveMarks: run.marks });
+  new Layouts(scopes);
   playback.onChange(() => (isStale = true));
   Object.assign(window.hummingbus, { playback, room, scopes });
   shown.isFlat = room.isFlat;
 
+  const newest = new Newest(columns[0].fields, () => scopes.feeds[0].fields, reporter("newest"));
+  const isAhead = () => playback.isFollowing && newest.rows !== null;
   const show = () => {
-    const rows = feeds.map((feed) => feed.row(playback));
+    const rows = isAhead() ? [newest.rows.room] : feeds.map((feed) => feed.row(playback));
     if (rows.every(Boolean)) {
       isStale = playback.isPlaying;
       shown.timeNs = rows[0].timeNs;
     }
-    room.update(rows, feeds.map((feed) => Math.min(playback.timeNs, feed.durationNs)));
+    room.update(rows, isAhead() ? [playback.timeNs] : feeds.map((feed) => Math.min(playback.timeNs, feed.durationNs)));
+    scopes.newest = isAhead() ? newest.rows.scopes : null;
     places();
     shown.vehicles = room.vehicles.map(({ name, recording, group, isKnown }) => (
       { name, recording, isKnown, position: group.position.toArray(), attitude: group.quaternion.toArray() }));
@@ -189,7 +206,7 @@ async function start() {
     head(recordings, run.status !== null);
     isStale = true;
   };
-  follow(recordings, reporter("growth"), (isNew) => {
+  follow(recordings, run, reporter("growth"), (isNew) => {
     if (isNew) learn();
     const isGrowing = recordings.some((recording) => recording.is_growing);
     playback.grow(Math.max(...recordings.map((recording) => recording.duration_ns)), isGrowing);
@@ -205,7 +222,11 @@ async function start() {
   const frame = (now) => {
     playback.pass(now - last);
     last = now;
+    // The live run has one recording.
+    if (run.status && !run.isOver && playback.isFollowing && recordings.length === 1) newest.ask(({ timeNs }) => playback.reach(timeNs));
+    else newest.rows = null;
     if (isStale) show();
+    else scopes.showLate();
     if (room.draw()) shown.frames += 1;
     shown.scopesDrawn = scopes.isDrawn ?? false;
     requestAnimationFrame(frame);

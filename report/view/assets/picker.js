@@ -48,8 +48,8 @@ export class Picker {
       }
     });
     this.list.replaceChildren(...parts);
-    this.more.hidden = left === 0;
-    this.more.textContent = `${left} more fields: search for them.`;
+    this.more.hidden = left === 0 && shown > 0;
+    this.more.textContent = shown > 0 ? `${left} more fields: search for them.` : "No field has all of these words in its name or topic.";
   }
 
   #choice(recording, topic, { path, unit }) {

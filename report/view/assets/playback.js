@@ -6,12 +6,14 @@ export const PACES = [0.1, 0.25, 0.5, 1, 2, 5, 10];
 // A recorder writes what it has each second. Where time is to be the newest and falls farther behind, it goes on from there.
 const BEHIND_NS = 2.5e9;
 const AT_ONCE_NS = 1e9;
+// A run that tells its newest time moves time by itself; after such a silence, time goes on as in a recording.
+const REACHED_MS = 500;
 
 export class Playback {
   #heard = [];
 
   constructor(durationNs, tickNs) {
-    Object.assign(this, { durationNs, tickNs, timeNs: 0, pace: 1, isPlaying: false, isGrowing: false, isNewest: false });
+    Object.assign(this, { durationNs, tickNs, timeNs: 0, pace: 1, isPlaying: false, isGrowing: false, isNewest: false, reachedMs: -Infinity });
   }
 
   /** Calls `hear` after each change. */
@@ -46,7 +48,29 @@ export class Playback {
 
   /** The recording has come so far, and may go on. */
   grow(durationNs, isGrowing) {
-    Object.assign(this, { durationNs, isGrowing });
+    // The run may be ahead of its recording.
+    this.durationNs = isGrowing ? Math.max(durationNs, this.durationNs) : durationNs;
+    this.isGrowing = isGrowing;
+    this.timeNs = Math.min(this.timeNs, this.durationNs);
+    this.#notify();
+  }
+
+  /** True while time is to be the newest of a run. */
+  get isFollowing() {
+    return this.isNewest && this.isPlaying && this.isGrowing;
+  }
+
+  /** True if the newest time of a run is shown, ahead of its recording. */
+  get isReached() {
+    return this.isFollowing && performance.now() - this.reachedMs < REACHED_MS;
+  }
+
+  /** The run has come to this time, which is shown while time is to be the newest. */
+  reach(timeNs) {
+    if (!this.isFollowing || timeNs < this.durationNs) return;
+    this.reachedMs = performance.now();
+    if (timeNs === this.timeNs) return;
+    Object.assign(this, { timeNs, durationNs: timeNs });
     this.#notify();
   }
 
@@ -57,7 +81,7 @@ export class Playback {
 
   /** Lets `ms` of the viewer's time pass. */
   pass(ms) {
-    if (!this.isPlaying) return;
+    if (!this.isPlaying || this.isReached) return;
     // After a pause of the browser, time goes on where it was.
     this.timeNs += Math.min(ms, 100) * 1e6 * this.pace;
     if (this.isNewest && this.timeNs < this.durationNs - BEHIND_NS) this.timeNs = this.durationNs - AT_ONCE_NS;

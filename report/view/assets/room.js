@@ -7,10 +7,16 @@ import { FlatRenderer } from "./flat.js";
 import { curveColour, onTheme, pageColour } from "./palette.js";
 
 const PATH_POINTS = 3000;
+// Not the colour of the path, which hides it in a vehicle that follows well.
+const PLAN = 0xcc79a7;
 // A path that spreads over more blocks of the file is drawn around the time that is shown.
 const PATH_BLOCKS = 200;
 // It is read again and again of a recording that grows.
 const PATH_BLOCKS_GROWING = 60;
+// Pause in front of the reading of a path: times that a slider passes are not read.
+const PATH_CALM_MS = 120;
+// Places of a live run behind the end of its recording.
+const TAIL_POINTS = 1200;
 const ABOARD = new THREE.Vector3(0.02, 0, 0.09);
 const AHEAD = new THREE.Vector3(1, 0, 0);
 // The first place of the camera, seen from a vehicle, in multiples of its reach.
@@ -19,7 +25,9 @@ const FIRST_LOOK = new THREE.Vector3(-7, -7, 7);
 /** Names of the layers beside the bodies, and if they are shown from the start. */
 export const LAYERS = {
   path: ["path", true],
+  plan: ["planned path", true],
   thrust: ["thrust", true],
+  command: ["motor commands", true],
   asked: ["set point", true],
   estimate: ["estimate", true],
   beams: ["range beams", true],
@@ -129,12 +137,12 @@ export class Room {
     }
     const colour = curveColour(this.vehicles.length);
     const body = new VehicleBody(vehicle, columns, colour, isGhost ? colour : null);
-    Object.assign(body, { recording, fields: columns.fields, path: this.#path(colour), pathSpan: null });
+    Object.assign(body, { recording, fields: columns.fields, path: this.#path(colour), pathSpan: null, pathRead: null, tail: [] });
     this.scene.add(body.group, body.world, body.path);
     this.vehicles.push(body);
   }
 
-  /** The path of a vehicle: all that was read of it, and above that what is flown by now. */
+  /** The path of a vehicle: all that was read of it, what is flown by now, what is not recorded yet, and what was planned. */
   #path(colour) {
     const line = (opacity) => {
       const made = new THREE.Line(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ color: colour, transparent: true, opacity }));
@@ -142,7 +150,11 @@ export class Room {
       return made;
     };
     const path = new THREE.Group();
-    path.add(line(0.3), line(0.9));
+    const plan = new THREE.Line(new THREE.BufferGeometry(), new THREE.LineDashedMaterial({ color: PLAN, dashSize: 0.15, gapSize: 0.1 }));
+    plan.frustumCulled = false;
+    path.add(line(0.3), line(0.9), line(0.9), plan);
+    path.children[2].geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(3 * TAIL_POINTS), 3));
+    path.children[2].geometry.setDrawRange(0, 0);
     path.visible = false;
     return path;
   }
@@ -196,7 +208,8 @@ export class Room {
 
   /** Recordings have grown: their paths are read anew. */
   grow() {
-    for (const body of this.vehicles) body.pathSpan = null;
+    // One that is being read is drawn first: of a slow reader there would be none.
+    for (const body of this.vehicles) if (!body.pathRead) body.pathSpan = null;
   }
 
   setMode(mode, followed = this.followed) {
@@ -220,7 +233,7 @@ export class Room {
       const wasKnown = body.isKnown;
       body.update(row.values, turnS, this.layers);
       if (this.vehicles[this.followed] === body && body.isKnown) this.#follow(body, before, wasKnown);
-      this.#trail(body, timesNs);
+      this.#trail(body, timesNs[body.recording], row.isNewest ?? false);
     }
     if (rows[0]) this.#moveBodies(rows[0].values);
     this.grid.visible = this.layers.grid;
@@ -248,42 +261,90 @@ export class Room {
     this.controls.target.copy(position);
   }
 
-  async #trail(body, timesNs) {
-    body.path.visible = this.layers.path && body.pathTimes !== undefined;
+  /** Shows the path of a vehicle up to this time, once that is read. */
+  #trail(body, timeNs, isNewest) {
+    body.pathNowNs = timeNs;
     if (!body.position) return;
-    const recording = this.recordings[body.recording];
-    const timeNs = timesNs[body.recording];
-    if (!body.pathSpan || timeNs < body.pathSpan[0] || timeNs > body.pathSpan[1]) await this.#readPath(body, recording, timeNs);
-    if (!body.pathTimes) return;
-    const { fromNs, stepNs } = body.pathTimes;
-    const flown = Math.floor((timeNs - fromNs) / stepNs) + 1;
-    body.path.children[1].geometry.setDrawRange(0, Math.min(Math.max(flown, 0), body.pathTimes.count));
+    const span = body.pathRead?.span ?? body.pathSpan;
+    if (!span || timeNs < span[0] || timeNs > span[1]) this.#readPath(body, timeNs);
+    this.#extend(body, isNewest);
+    this.#flown(body);
+  }
+
+  /** Draws the part of the path that is flown by now. A path around another time is hidden. */
+  #flown(body) {
+    const { pathTimes, pathNowNs, path } = body;
+    const isThere = pathTimes !== undefined && pathNowNs >= pathTimes.fromNs && (pathNowNs <= pathTimes.toNs || body.tail.length > 0);
+    path.visible = isThere;
+    if (!isThere) return;
+    const flown = Math.floor((pathNowNs - pathTimes.fromNs) / pathTimes.stepNs) + 1;
+    path.children[1].geometry.setDrawRange(0, Math.min(Math.max(flown, 0), pathTimes.count));
+    path.children.forEach((line, index) => (line.visible = this.layers[index < 3 ? "path" : "plan"]));
     this.isStale = true;
   }
 
-  /** Reads the path of a vehicle: all of a short recording, and around the time of a long one. */
-  async #readPath(body, recording, timeNs) {
+  /** Goes on with the path of a live run from the end of its recording to the place that is shown. */
+  #extend(body, isNewest) {
+    const endNs = body.pathTimes?.endNs ?? 0;
+    const timeNs = body.pathNowNs;
+    // Its first place is that at the end of the path, so that there is no gap.
+    const kept = body.tail.filter((place, index, all) => place.timeNs < timeNs && (place.timeNs > endNs || all[index + 1]?.timeNs > endNs));
+    body.tail = isNewest ? [...kept, { timeNs, at: body.group.position.clone() }].slice(-TAIL_POINTS) : [];
+    const { geometry } = body.path.children[2];
+    body.tail.forEach(({ at }, index) => geometry.attributes.position.setXYZ(index, at.x, at.y, at.z));
+    geometry.attributes.position.needsUpdate = true;
+    geometry.setDrawRange(0, body.tail.length);
+  }
+
+  /** Reads the path of a vehicle: all of a short recording, and around the time of a long one. A later reading ends this one. */
+  async #readPath(body, timeNs) {
+    const recording = this.recordings[body.recording];
     const most = recording.is_growing ? PATH_BLOCKS_GROWING : PATH_BLOCKS;
     const part = Math.min(most / Math.max(recording.blocks, 1), 1);
-    const spanNs = Math.max(recording.duration_ns * part, 1e9);
+    const [endNs, spanNs] = [recording.duration_ns, Math.max(recording.duration_ns * part, 1e9)];
     const fromNs = part === 1 ? 0 : Math.max(Math.round(timeNs - 0.7 * spanNs), 0);
-    // Before the answer: one question is enough.
-    body.pathSpan = part === 1 ? [0, Infinity] : [fromNs === 0 ? 0 : timeNs - 0.3 * spanNs, fromNs + spanNs];
+    const span = part === 1 ? [0, Infinity] : [fromNs === 0 ? 0 : timeNs - 0.3 * spanNs, fromNs + spanNs];
     const stepNs = Math.max(Math.ceil(spanNs / PATH_POINTS), 1);
-    const fields = body.position.map((place) => body.fields[place]);
+    body.pathRead?.abort.abort();
+    const read = { span, abort: new AbortController() };
+    body.pathRead = read;
+    await new Promise((resolve) => setTimeout(resolve, PATH_CALM_MS));
+    if (body.pathRead !== read) return;
+    const fields = [...body.position, ...(body.reference ?? [])].map((place) => body.fields[place]);
     try {
-      const values = await frames({ recording: body.recording, from_ns: fromNs, step_ns: stepNs, count: PATH_POINTS, fields });
-      const last = values.length / 3;
-      const points = new Float32Array(values.length);
-      // A sample that is not there yet is drawn where the first one is.
-      const first = values.findIndex((value, index) => index % 3 === 0 && !Number.isNaN(value));
-      for (let index = 0; index < values.length; index += 1) points[index] = values[index < first ? first + (index % 3) : index];
-      for (const line of body.path.children) line.geometry.setAttribute("position", new THREE.BufferAttribute(points, 3));
-      body.pathTimes = { fromNs, stepNs, count: last };
-      body.path.visible = this.layers.path;
+      const request = { recording: body.recording, from_ns: fromNs, step_ns: stepNs, count: PATH_POINTS, fields };
+      const values = await frames(request, read.abort.signal);
+      if (body.pathRead !== read) return;
+      this.#drawPath(body, values, fields.length);
+      body.pathTimes = { fromNs, stepNs, count: PATH_POINTS, toNs: part === 1 ? Infinity : fromNs + spanNs, endNs };
     } catch {
+      if (body.pathRead !== read) return;
       body.pathTimes = undefined;
     }
+    Object.assign(body, { pathRead: null, pathSpan: span });
+    this.#flown(body);
+    this.isStale = true;
+  }
+
+  #drawPath(body, values, width) {
+    const points = (from) => {
+      const found = new Float32Array(3 * PATH_POINTS);
+      const at = (place, axis) => values[place * width + from + axis];
+      // A sample that is not there yet is drawn where the first one is.
+      let first = 0;
+      while (first < PATH_POINTS - 1 && Number.isNaN(at(first, 0))) first += 1;
+      for (let index = 0; index < found.length; index += 1) found[index] = at(Math.max(Math.floor(index / 3), first), index % 3);
+      return new THREE.BufferAttribute(found, 3);
+    };
+    const flown = points(0);
+    for (const line of body.path.children.slice(0, 2)) line.geometry.setAttribute("position", flown);
+    const plan = body.path.children[3];
+    // A reference that stands still is its cross alone.
+    const planned = width > 3 && !body.isGhost ? points(3) : null;
+    plan.geometry.setDrawRange(0, planned && !Number.isNaN(planned.getX(PATH_POINTS - 1)) ? PATH_POINTS : 0);
+    if (!planned) return;
+    plan.geometry.setAttribute("position", planned);
+    plan.computeLineDistances();
   }
 
   /** Draws, if anything changed. */

@@ -7,6 +7,8 @@ import { Schedule } from "./schedule.js";
 /** Paces that are offered beside the present one: the words of `hummingbus ctl pace`. */
 const PACES = ["0.1", "0.25", "0.5", "realtime", "2", "5", "10", "free"];
 const STEP_MANY = 100;
+// Simulated time between two missed deadlines of one stretch.
+const STRETCH_S = 1;
 // States in which a run takes no more requests.
 const OVER = ["ended", "stopping"];
 
@@ -30,6 +32,8 @@ export class RunControls {
   #heardPace = [];
 
   constructor() {
+    /** Marks on the axis of time that no recording has: swaps by this page, and missed deadlines. */
+    this.marks = [];
     this.status = null;
     this.facts = null;
     this.hand = new Hand();
@@ -53,6 +57,7 @@ export class RunControls {
     get("run").hidden = status === null;
     if (status === null) return;
     if (before && before.state !== "ended") this.#sayEnd();
+    this.#markLate(before);
     if (before?.pace !== status.pace) {
       this.#choosePace(status.pace);
       for (const hear of this.#heardPace) hear(status.pace);
@@ -69,6 +74,18 @@ export class RunControls {
     }
   }
 
+  /** Marks the time since the state `before`, if a deadline was missed in it; misses that follow each other have one mark. */
+  #markLate(before) {
+    const { missed_deadlines: missed, time_s: timeS } = this.status;
+    if (!before || !(missed > before.missed_deadlines) || timeS <= before.time_s) return;
+    const last = this.marks.findLast(({ kind }) => kind === "late");
+    const isSame = last && before.time_s - last.to_s < STRETCH_S;
+    const mark = isSame ? last : { kind: "late", from_s: before.time_s, count: 0 };
+    mark.count += missed - before.missed_deadlines;
+    Object.assign(mark, { to_s: timeS, text: `${mark.count} ${mark.count === 1 ? "deadline" : "deadlines"} missed` });
+    if (!isSame) this.marks.push(mark);
+  }
+
   get isOver() {
     return this.status === null || OVER.includes(this.status.state);
   }
@@ -80,7 +97,7 @@ export class RunControls {
   /** Says that the run has ended, if it has: that is the last word on whatever it was asked for. */
   #sayEnd() {
     if (this.status?.state !== "ended") return;
-    Object.assign(get("run-answer"), { textContent: `The run has ended at tick ${this.status.tick}. Its recording stays.`, className: "" });
+    Object.assign(get("run-answer"), { textContent: `The run has ended at tick ${this.status.tick}.`, className: "" });
   }
 
   #choosePace(pace) {
@@ -117,12 +134,19 @@ export class RunControls {
       // A later request has the place by now.
       if (number === this.asking || !isDone) say(isDone ? answer.text : `Refused: ${answer.reason}`, !isDone);
       // The news of the end may have come before.
+      if (isDone && request.request === "swap") this.#markSwap(request, answer);
       if (isDone) this.#sayEnd();
       return isDone;
     } catch (error) {
       say(error.message, true);
       return false;
     }
+  }
+
+  /** Marks a swap, which is answered when the backup has taken over. */
+  #markSwap({ process, at_tick: atTick }, { tick }) {
+    const atS = (atTick ?? tick) * (this.facts?.tick_s ?? 0);
+    this.marks.push({ kind: "swap", from_s: atS, text: `swap of ${process}` });
   }
 
   toggle() {

@@ -12,6 +12,11 @@ const AGAIN_MS = 700;
 const VALUES_MS = 150;
 const DEGREES = 180 / Math.PI;
 const SYNC = "hummingbus";
+// A limit within so many spans of the curves is shown with them.
+const LIMIT_REACH = 1.5;
+// Distance at which a mark is under the pointer, and marks that are told of at once.
+const NEAR_PX = 5;
+const HINTS_MAX = 4;
 
 /** Unit and factor of a field as people read it: angles in degrees, rotor speeds in revolutions a minute. */
 function readable({ path, unit }) {
@@ -84,20 +89,27 @@ class Plot {
   #heading() {
     const units = [...new Set(this.curves.map(({ unit }) => unit))];
     const topics = new Set(this.curves.map(({ topic }) => topic));
+    const { recordings } = this.scopes;
+    // Names of recordings are long: the key has them once.
+    const others = [...new Set(this.curves.map(({ recording }) => recording))].filter((recording) => recording > 0);
+    const keys = others.map((recording) => Object.assign(document.createElement("span"), {
+      className: "unit", textContent: `(${recording + 1}): ${clipped(recordings[recording].name, 40)}`,
+    }));
     this.values = this.curves.map((curve) => {
       const dash = document.createElement("span");
       dash.className = curve.isDashed ? "dash ghost" : "dash";
       dash.style.borderColor = curveColour(curve.colour);
       const value = Object.assign(document.createElement("span"), { className: "value" });
-      const name = Object.assign(document.createElement("span"), { className: "name", title: `${curve.topic} ${curve.field}` });
+      const name = Object.assign(document.createElement("span"), { className: "name", title: `${curve.topic} ${curve.field} of ${recordings[curve.recording].name}` });
       const unit = units.length > 1 && curve.unit ? ` [${clipped(curve.unit, 16)}]` : "";
-      name.append(dash, `${clipped(topics.size > 1 ? `${curve.topic} ${curve.field}` : curve.field, 60)}${unit}`, value);
+      const of = curve.recording > 0 ? ` (${curve.recording + 1})` : "";
+      name.append(dash, `${clipped(topics.size > 1 ? `${curve.topic} ${curve.field}` : curve.field, 60)}${of}${unit}`, value);
       return { name, value };
     });
     const topic = Object.assign(document.createElement("span"), { className: "unit" });
     const unit = units.length === 1 && units[0] ? ` [${clipped(units[0], 16)}]` : "";
     topic.textContent = topics.size === 1 ? `${clipped([...topics][0], 60)}${unit}` : unit.trim();
-    this.head.replaceChildren(topic, ...this.values.map(({ name }) => name));
+    this.head.replaceChildren(topic, ...this.values.map(({ name }) => name), ...keys);
     this.edit.setAttribute("aria-label", `Edit the plot of ${this.curves.map(({ field }) => field).join(", ")}`);
   }
 
@@ -118,14 +130,16 @@ class Plot {
       scales: { x: { time: false, range: () => scopes.windowS() }, y: { range: (plot, low, high) => this.#range(low, high) } },
       axes: [{ ...axis, size: 26 }, { ...axis, size: 54 }],
       series: [{}, ...series],
-      hooks: { draw: [(plot) => this.#marks(plot)], setSelect: [(plot) => this.#selected(plot)] },
+      hooks: { draw: [(plot) => this.#marks(plot)], setSelect: [(plot) => this.#selected(plot)], setCursor: [(plot) => this.#point(plot)] },
     };
+    this.hint = Object.assign(document.createElement("div"), { className: "mark-hint", hidden: true });
     this.drawing = new uPlot(options, [[], ...this.curves.map(() => [])], this.area);
     this.now = document.createElement("div");
     this.now.style.cssText = `position:absolute;top:0;bottom:0;width:1px;pointer-events:none;background:${pageColour("accent")}`;
-    this.drawing.over.append(this.now);
+    this.drawing.over.append(this.now, this.hint);
     this.drawing.over.addEventListener("dblclick", () => scopes.zoom(null));
     this.#clicks();
+    this.#touches();
     this.bins = Math.max(Math.round((width - 66) / 1.5), 20);
   }
 
@@ -140,6 +154,26 @@ class Plot {
     });
   }
 
+  /** A finger that goes along the plot zooms, as the mouse does; one that goes up or down scrolls the page. */
+  #touches() {
+    const { over } = this.drawing;
+    let downX = null;
+    const place = ({ clientX }) => clientX - over.getBoundingClientRect().left;
+    const select = (left, width) => this.drawing.setSelect({ left, width, top: 0, height: over.clientHeight }, false);
+    over.addEventListener("pointerdown", (event) => (downX = event.pointerType === "touch" && event.isPrimary ? place(event) : null));
+    over.addEventListener("pointermove", (event) => {
+      if (downX !== null) select(Math.min(downX, place(event)), Math.abs(place(event) - downX));
+    });
+    over.addEventListener("pointerup", () => {
+      if (downX !== null) this.#selected(this.drawing);
+      downX = null;
+    });
+    over.addEventListener("pointercancel", () => {
+      downX = null;
+      select(0, 0);
+    });
+  }
+
   #selected(plot) {
     const { left, width } = plot.select;
     if (width < 4) return;
@@ -147,32 +181,78 @@ class Plot {
     plot.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
   }
 
+  /** The range of the values, with the limits that are not far from them. */
   #range(low, high) {
     if (!Number.isFinite(low) || !Number.isFinite(high)) return [-1, 1];
-    const room = 0.06 * (high - low) || 0.05 * Math.abs(high) || 1;
-    return [low - room, high + room];
+    const reach = LIMIT_REACH * Math.max(high - low, 0.02 * Math.max(Math.abs(low), Math.abs(high)));
+    const near = this.#limits().map(({ value }) => value).filter((value) => value > low - reach && value < high + reach);
+    const [least, most] = [Math.min(low, ...near), Math.max(high, ...near)];
+    const room = 0.06 * (most - least) || 0.05 * Math.abs(most) || 1;
+    return [least - room, most + room];
   }
 
-  /** Draws limits of pass conditions on these fields, and swaps. */
+  /** Limits of pass conditions on these curves within the window, in the curves' units. */
+  #limits() {
+    const [start, end] = this.scopes.windowS();
+    return this.scopes.marks.flatMap((mark) => {
+      const factor = mark.kind === "pass" ? this.#factorOf(mark) : null;
+      const [fromS, toS] = [mark.from_s, mark.to_s ?? this.scopes.endS];
+      if (factor === null || fromS > end || toS < start) return [];
+      const limit = (bound, sign) => ({ mark, fromS, toS, value: mark[bound] * factor, text: `${mark.text || mark.statistic}: ${sign} ${mark[bound]} ${mark.unit}`.trim() });
+      return [mark.min !== null && limit("min", "≥"), mark.max !== null && limit("max", "≤")].filter(Boolean);
+    });
+  }
+
+  /** Draws limits of pass conditions on these fields, swaps and missed deadlines. */
   #marks(plot) {
     const { ctx: context, bbox } = plot;
     const [x, y] = [(seconds) => plot.valToPos(seconds, "x", true), (value) => plot.valToPos(value, "y", true)];
+    const [top, bottom] = [bbox.top, bbox.top + bbox.height];
     context.save();
     context.beginPath();
     context.rect(bbox.left, bbox.top, bbox.width, bbox.height);
     context.clip();
     context.lineWidth = devicePixelRatio;
     context.setLineDash([4 * devicePixelRatio, 3 * devicePixelRatio]);
-    for (const mark of this.scopes.marks) {
-      if (mark.kind === "swap") this.#line(context, pageColour("ink"), [x(mark.from_s), bbox.top], [x(mark.from_s), bbox.top + bbox.height]);
-      const factor = mark.kind === "pass" ? this.#factorOf(mark) : null;
-      if (factor === null) continue;
-      const [from, to] = [x(mark.from_s), x(mark.to_s ?? this.scopes.endS)];
-      for (const limit of [mark.min, mark.max].filter((limit) => limit !== null)) {
-        this.#line(context, pageColour("warn"), [from, y(limit * factor)], [to, y(limit * factor)]);
-      }
+    for (const { kind, from_s: from, to_s: to } of this.scopes.marks) {
+      if (kind === "late") this.#stretch(context, [x(from), x(to)], [top, bottom]);
+      if (kind === "swap") this.#line(context, pageColour("ink"), [x(from), top], [x(from), bottom]);
+    }
+    for (const { fromS, toS, value, text } of this.#limits()) {
+      const place = y(value);
+      this.#line(context, pageColour("warn"), [x(fromS), place], [x(toS), place]);
+      // One that is far from the curves is told of at the edge.
+      if (place < top || place > bottom) this.#edge(context, Math.max(x(fromS), bbox.left), place < top ? top : bottom, place < top, text);
     }
     context.restore();
+  }
+
+  /** A stretch of time, at least so wide that it is seen. */
+  #stretch(context, [from, to], [top, bottom]) {
+    context.fillStyle = pageColour("late");
+    context.fillRect(from, top, Math.max(to - from, 2 * devicePixelRatio), bottom - top);
+  }
+
+  #edge(context, left, place, isTop, text) {
+    context.fillStyle = pageColour("warn");
+    context.font = `${11 * devicePixelRatio}px system-ui`;
+    context.textBaseline = isTop ? "top" : "bottom";
+    context.fillText(`${isTop ? "▲" : "▼"} ${text}`, left + 4 * devicePixelRatio, place);
+  }
+
+  /** Says which mark is under the pointer. */
+  #point(plot) {
+    const { left, top } = plot.cursor;
+    const isNear = (value, axis, place) => Math.abs(plot.valToPos(value, axis) - place) < NEAR_PX;
+    const isIn = (from, to) => left >= plot.valToPos(from, "x") - NEAR_PX && left <= plot.valToPos(to, "x") + NEAR_PX;
+    const timed = this.scopes.marks.filter(({ kind, from_s: from, to_s: to }) => kind !== "pass" && isIn(from, to ?? from));
+    const limits = this.#limits().filter(({ value, fromS, toS }) => isIn(fromS, toS) && isNear(value, "y", top));
+    const texts = left < 0 ? [] : [...new Set([...timed.map(({ text }) => text), ...limits.map(({ text }) => text)])];
+    this.hint.hidden = texts.length === 0;
+    if (texts.length === 0) return;
+    this.hint.textContent = texts.slice(0, HINTS_MAX).join("\n");
+    const isLeft = left < plot.over.clientWidth / 2;
+    Object.assign(this.hint.style, { left: isLeft ? `${left + 10}px` : "", right: isLeft ? "" : `${plot.over.clientWidth - left + 10}px` });
   }
 
   #line(context, colour, from, to) {
@@ -184,8 +264,8 @@ class Plot {
   }
 
   /** From the unit of a condition to that of the curve it limits; null where no curve is of its field. */
-  #factorOf({ topic, field, unit }) {
-    const curve = this.curves.find((other) => other.recording === 0 && other.topic === topic && other.field === field);
+  #factorOf({ recording, topic, field, unit }) {
+    const curve = this.curves.find((other) => other.recording === recording && other.topic === topic && other.field === field);
     if (!curve) return null;
     if (unit === curve.unit) return 1;
     if (unit === "rad" && curve.unit === "deg") return DEGREES;
@@ -218,14 +298,19 @@ class Plot {
 
   showTime(seconds) {
     if (!this.drawing) return;
-    const place = this.drawing.valToPos(seconds, "x");
+    // A live run is ahead of the curves, which end with its recording.
+    const end = this.scopes.newest ? this.scopes.windowS()[1] : Infinity;
+    const place = this.drawing.valToPos(Math.min(seconds, end), "x");
     this.now.style.left = `${place}px`;
     this.now.hidden = !(place >= 0 && place <= this.drawing.over.clientWidth);
   }
 
   showValues(rows, places) {
     this.curves.forEach((curve, index) => {
-      const value = rows[curve.recording]?.[places(curve)];
+      const row = rows[curve.recording];
+      // Those on their way follow.
+      if (!row) return;
+      const value = row[places(curve)];
       const text = Number.isFinite(value) ? Number((value * curve.factor).toPrecision(5)).toString() : "–";
       if (this.values[index].value.textContent !== text) this.values[index].value.textContent = text;
     });
@@ -236,12 +321,15 @@ export class Scopes {
   #timer = null;
   #running = null;
   #valuesAt = 0;
+  // Some values are on their way.
+  #isLate = false;
+  /** Values of the live run ahead of its recording. */
+  newest = null;
 
-  constructor(recordings, playback, picker, plots, { report, changed }) {
-    Object.assign(this, { recordings, playback, picker, report, changed, window: null, list: document.getElementById("plots") });
+  constructor(recordings, playback, picker, plots, { report, changed, liveMarks = [] }) {
+    Object.assign(this, { recordings, playback, picker, report, changed, liveMarks, window: null, list: document.getElementById("plots") });
     this.startS = recordings[0].start_s;
     this.endS = this.startS + playback.durationNs * 1e-9;
-    this.marks = recordings[0].marks;
     this.plots = [];
     for (const fields of plots) this.#add(fields);
     this.#feeds();
@@ -255,6 +343,16 @@ export class Scopes {
       this.#rebuild();
     }).observe(this.list);
     this.refresh();
+  }
+
+  /** Marks of the recordings and of the live run; one that two recordings share is drawn once. */
+  get marks() {
+    const [first, ...others] = this.recordings;
+    const texts = new Set(first.marks.map((mark) => JSON.stringify(mark)));
+    const own = others.flatMap((recording, index) => recording.marks
+      .filter((mark) => !texts.has(JSON.stringify(mark)))
+      .map((mark) => ({ ...mark, recording: index + 1, text: `${mark.text} of ${recording.name}` })));
+    return [...first.marks.map((mark) => ({ ...mark, recording: 0 })), ...own, ...this.liveMarks];
   }
 
   #add(fields) {
@@ -276,6 +374,17 @@ export class Scopes {
       this.refresh();
       this.changed(this.layout());
     });
+  }
+
+  /** Shows the plots of a layout; fields that the recordings lack are left out. */
+  take(layout) {
+    for (const plot of [...this.plots]) this.#remove(plot);
+    for (const plot of layout) this.#add(plot.map(([recording, topic, field]) => ({ recording, topic, field })));
+    for (const plot of this.plots.filter(({ curves: shown }) => shown.length === 0)) this.#remove(plot);
+    this.report(this.plots.length ? "" : "The recording has no field of this layout.");
+    this.#feeds();
+    this.refresh();
+    this.changed(this.layout());
   }
 
   #remove(plot) {
@@ -367,12 +476,18 @@ export class Scopes {
     this.#showValues();
   }
 
+  /** Shows values that have come since the last call of `showTime`. */
+  showLate() {
+    if (this.#isLate) this.#showValues();
+  }
+
   #showValues() {
     const now = performance.now();
     if (this.playback.isPlaying && now - this.#valuesAt < VALUES_MS) return;
     const still = { timeNs: this.playback.timeNs, isPlaying: false };
-    const rows = this.feeds.map((feed) => (feed.fields.length > 0 ? feed.row(still)?.values : undefined));
-    if (rows.every((row, number) => !row && this.feeds[number].fields.length > 0)) return;
+    const rowOf = (feed) => (feed.fields.length > 0 ? feed.row(still)?.values : undefined);
+    const rows = this.newest ? [this.newest.values] : this.feeds.map(rowOf);
+    this.#isLate = rows.some((row, number) => !row && this.feeds[number].fields.length > 0);
     this.#valuesAt = now;
     for (const plot of this.plots) {
       plot.showValues(rows, ({ recording, topic, field }) =>

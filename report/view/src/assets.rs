@@ -28,6 +28,8 @@ assets! {
     "api.js": SCRIPT,
     "playback.js": SCRIPT,
     "feed.js": SCRIPT,
+    "newest.js": SCRIPT,
+    "layouts.js": SCRIPT,
     "room.js": SCRIPT,
     "body.js": SCRIPT,
     "flat.js": SCRIPT,

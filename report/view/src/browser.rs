@@ -8,10 +8,15 @@ use std::io::Write as _;
 use std::os::unix::ffi::OsStrExt as _;
 use std::os::unix::fs::{OpenOptionsExt as _, PermissionsExt as _};
 use std::process::{Command, Stdio};
+use std::time::Duration;
 use tempfile::TempDir;
 
 /// Bytes of a path that stand as they are in an address.
 const PATH: AsciiSet = NON_ALPHANUMERIC.remove(b'/').remove(b'.').remove(b'-').remove(b'_').remove(b'~');
+
+/// Looks for the failure of a browser that was started, and the pause between two.
+const FAILURE_LOOKS: u32 = 20;
+const FAILURE_LOOK: Duration = Duration::from_millis(20);
 
 /// A file that leads a browser to an address. Only this user can read it, and dropping it removes it.
 ///
@@ -56,7 +61,7 @@ fn page(address: &str) -> String {
     )
 }
 
-/// Opens `address` in the browser that `BROWSER` names, or in the desktop's; `None` if there is neither. The browser gets
+/// Opens `address` in the browser that `BROWSER` names, or in the desktop's; `None` if there is neither, or it fails at once. The browser gets
 /// the path of a file that leads there, which has to stay until it has read it.
 ///
 /// `BROWSER` holds commands between colons, of which the first that starts is taken; `%s` in one stands for the address.
@@ -93,17 +98,22 @@ fn words(command: &str, address: &str) -> Vec<String> {
     words.chain((!has_place).then(|| address.to_owned())).collect()
 }
 
+/// Starts a program; false if there is none, or it fails at once.
 fn start(program: &str, arguments: &[impl AsRef<OsStr>]) -> bool {
     let mut command = Command::new(program);
     command.args(arguments).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
-    match command.spawn() {
-        Ok(mut child) => {
-            // A child that is not waited for stays in the table of processes.
-            std::thread::spawn(move || child.wait());
-            true
+    let Ok(mut child) = command.spawn() else { return false };
+    for _ in 0..FAILURE_LOOKS {
+        match child.try_wait() {
+            // One that has handed the address to a browser at work ends at once, too.
+            Ok(Some(status)) => return status.success(),
+            Ok(None) => std::thread::sleep(FAILURE_LOOK),
+            Err(_) => return false,
         }
-        Err(_) => false,
     }
+    // A child that is not waited for stays in the table of processes.
+    std::thread::spawn(move || child.wait());
+    true
 }
 
 #[cfg(test)]
@@ -124,6 +134,11 @@ mod tests {
         assert_eq!(commands("", true, address), [["xdg-open", address]]);
         assert!(commands("", false, address).is_empty());
         assert!(open_by("", false, address).unwrap().is_none());
+        assert!(
+            open_by("/bin/false", false, address).unwrap().is_none(),
+            "a browser that fails shows nothing"
+        );
+        assert!(open_by("/bin/false:/bin/true", false, address).unwrap().is_some());
     }
 
     /// Every user sees the arguments of a process, and no other user may learn the token.

@@ -13,7 +13,9 @@
 //! | `readers` | threads that read recordings, a few at the same time |
 //! | `assets` | the files of the page, part of this program |
 //! | [`live`] | the live run behind a page: its state, and the requests of the page |
+//! | `newest` | the newest values of that run, ahead of its recording |
 //! | `schedule` | the tick of that run as planned, and as it goes |
+//! | `layouts` | the layouts of scopes that a user keeps |
 //! | `pages` | the pages that are open, and their events |
 //! | `gate` | requests that are let in |
 //! | [`server`] | the server: addresses and their answers |
@@ -33,8 +35,10 @@ pub mod fields;
 pub mod foxglove_server;
 pub mod frames;
 mod gate;
+mod layouts;
 pub mod live;
 mod marks;
+mod newest;
 pub mod overview;
 mod pages;
 mod priority;

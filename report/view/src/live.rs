@@ -1,6 +1,9 @@
 //! The live run behind a page: its state, and the requests of the page.
 
+use crate::fields::Asked as Field;
+use crate::newest::Newest;
 use crate::schedule::Schedule;
+use crate::shown::Shown;
 use anyhow::{Context as _, Result, ensure};
 use bus::asked::{Asked, AskedFile};
 use bus::lockstep::LiveView;
@@ -10,7 +13,7 @@ use runtime::ctl::protocol::{Answer, Request, State, Status};
 use runtime::run_dir::LiveRun;
 use serde::Deserialize;
 use serde_json::{Value, json};
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// Set points that a page requests.
 #[derive(Debug, Deserialize)]
@@ -30,6 +33,7 @@ pub struct Live {
     run: Arc<LiveRun>,
     plan: Plan,
     schedule: Schedule,
+    newest: Mutex<Newest>,
     /// Opened at the first look that finds it.
     control: OnceLock<LiveView>,
 }
@@ -37,7 +41,8 @@ pub struct Live {
 impl Live {
     /// The run that flies `plan`.
     pub fn of(run: LiveRun, plan: Plan) -> Self {
-        Self { run: Arc::new(run), plan, schedule: Schedule::default(), control: OnceLock::new() }
+        let newest = Mutex::new(Newest::of(&run, &plan));
+        Self { run: Arc::new(run), plan, schedule: Schedule::default(), newest, control: OnceLock::new() }
     }
 
     /// True while the launcher of the run lives.
@@ -57,6 +62,18 @@ impl Live {
     /// The tick as planned and as it goes; null until the run has a control segment.
     pub fn schedule(&self) -> Value {
         if self.control().is_none() { Value::Null } else { self.schedule.look(&self.run, &self.plan) }
+    }
+
+    /// Time of the newest sample and the newest values of `fields`, which may be newer than the recording `shown`; `None` if
+    /// nothing newer can be had.
+    ///
+    /// # Errors
+    /// As [`Newest::values`].
+    pub(crate) fn newest(&self, shown: &Shown, fields: &[Field]) -> Result<Option<Vec<f64>>> {
+        if !self.run.is_live() {
+            return Ok(None);
+        }
+        self.newest.lock().unwrap_or_else(PoisonError::into_inner).values(&self.run, shown, fields)
     }
 
     fn control(&self) -> Option<&LiveView> {

@@ -15,11 +15,15 @@ pub fn marks(attached: &Attached, tick_s: Option<f64>) -> Vec<Value> {
 
 fn swaps(swap: &Table, tick_s: Option<f64>) -> Vec<Value> {
     let number = |key: &str| swap.get(key).and_then(toml::Value::as_integer);
-    let (Some(at_tick), Some(tick_s)) = (number("at_tick"), tick_s) else { return Vec::new() };
+    let stated_s = swap.get("at_s").and_then(|at| at.as_float().or_else(|| Some(at.as_integer()? as f64)));
+    let Some(tick_s) = tick_s else { return Vec::new() };
+    let Some(first_s) = stated_s.or_else(|| Some(number("at_tick")? as f64 * tick_s)) else {
+        return Vec::new();
+    };
     let process = swap.get("process").and_then(toml::Value::as_str).unwrap_or_default();
     let times = number("repeat").unwrap_or(1).clamp(1, REPEATS_MAX);
     let every = number("every_ticks").unwrap_or(0);
-    let at = |repeat: i64| (at_tick as f64 + every as f64 * repeat as f64) * tick_s;
+    let at = |repeat: i64| first_s + every as f64 * repeat as f64 * tick_s;
     let mark =
         |repeat: i64| json!({ "kind": "swap", "from_s": at(repeat), "text": format!("swap of {process}") });
     (0..times).map(mark).collect()

@@ -8,6 +8,9 @@
 //! | `GET  /token=…/api/growth` | JSON: of each recording its duration, blocks and number of topics, if it still grows, and the error that ended reading |
 //! | `POST /token=…/api/frames` | numbers: [`crate::frames`] |
 //! | `POST /token=…/api/curves` | numbers: [`crate::curves`]; the header `x-read` holds the part that was read for them |
+//! | `POST /token=…/api/newest` | numbers: time of the newest sample of the live run, and the newest values; 204 where nothing newer than the recording can be had |
+//! | `GET  /token=…/api/layouts` | JSON: the user's layouts of scopes by their names |
+//! | `POST /token=…/api/layouts` | the same, once it has kept or forgotten one |
 //! | `GET  /token=…/api/events` | events: state of the live run, how often it has started, number of recordings; open for as long as the page of a live run is |
 //! | `GET  /token=…/api/run` | JSON: manifest and processes of the live run; null without one |
 //! | `GET  /token=…/api/schedule` | JSON: the tick of the live run as planned, and as it goes; null without one |
@@ -22,7 +25,9 @@ use crate::curves::{CurvesRequest, curves};
 use crate::entry::Entry;
 use crate::frames::{FramesRequest, frames};
 use crate::gate::Gate;
+use crate::layouts::{Keeping, Layout, Layouts};
 use crate::live::{Asking, Live};
+use crate::newest::NewestRequest;
 use crate::pages::{News, Pages, events};
 use crate::priority::step_back;
 use crate::readers::Readers;
@@ -38,6 +43,7 @@ use bus::plan::Plan;
 use runtime::ctl::protocol::{Answer, Request as Asked};
 use runtime::run_dir::LiveRun;
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::net::{Ipv4Addr, TcpListener};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock, PoisonError, RwLock};
@@ -91,6 +97,7 @@ struct Content {
     starts: AtomicUsize,
     /// Reason why there is no recording, and none will come.
     refusal: OnceLock<String>,
+    layouts: Layouts,
     pages: Pages,
     readers: Readers,
     askers: Readers,
@@ -204,6 +211,7 @@ impl Server {
             live: RwLock::default(),
             starts: AtomicUsize::new(0),
             refusal: OnceLock::new(),
+            layouts: Layouts::of_user(),
             pages: Pages::default(),
             readers: Readers::new(READERS),
             askers: Readers::new(ASKERS),
@@ -276,6 +284,8 @@ fn routes(content: Arc<Content>) -> Router {
         .route("/{token}/api/growth", get(growth))
         .route("/{token}/api/frames", post(answer_frames))
         .route("/{token}/api/curves", post(answer_curves))
+        .route("/{token}/api/newest", post(newest))
+        .route("/{token}/api/layouts", get(layouts).post(keep_layout))
         .route("/{token}/api/events", get(hear))
         .route("/{token}/api/run", get(described))
         .route("/{token}/api/schedule", get(scheduled))
@@ -375,6 +385,43 @@ async fn answer_curves(State(content): State<Arc<Content>>, Json(request): Json<
     .await
 }
 
+async fn layouts(State(content): State<Arc<Content>>) -> Response {
+    listed(content.layouts.all())
+}
+
+async fn keep_layout(State(content): State<Arc<Content>>, Json(keeping): Json<Keeping>) -> Response {
+    listed(content.layouts.keep(keeping))
+}
+
+fn listed(found: Result<BTreeMap<String, Layout>>) -> Response {
+    match found {
+        Ok(layouts) => Json(layouts).into_response(),
+        Err(error) => (StatusCode::CONFLICT, format!("{error:#}\n")).into_response(),
+    }
+}
+
+async fn newest(State(content): State<Arc<Content>>, Json(request): Json<NewestRequest>) -> Response {
+    let asking = content.clone();
+    let work = move || {
+        let (Some(live), recordings) = (asking.live(), asking.recordings()) else { return Ok(None) };
+        let Some(entry) = recordings.first() else { return Ok(None) };
+        live.newest(&entry.known().shown, &request.fields)
+    };
+    match content.readers.run(work).await {
+        Ok(Ok(Some(values))) => octets(&values).into_response(),
+        Ok(Ok(None)) => StatusCode::NO_CONTENT.into_response(),
+        Ok(Err(error)) => (StatusCode::BAD_REQUEST, format!("{error:#}\n")).into_response(),
+        Err(_) => {
+            (StatusCode::INTERNAL_SERVER_ERROR, "reading ended by an error of the program\n").into_response()
+        }
+    }
+}
+
+fn octets(values: &[f64]) -> ([(HeaderName, &'static str); 1], Vec<u8>) {
+    let bytes = values.iter().flat_map(|value| value.to_le_bytes()).collect();
+    ([(header::CONTENT_TYPE, "application/octet-stream")], bytes)
+}
+
 /// The answer to a request that reads a recording: on a thread of its own, since files are read there.
 async fn reading(
     content: Arc<Content>,
@@ -392,9 +439,8 @@ async fn reading(
     };
     match content.readers.run(work).await {
         Ok(Ok((values, part))) => {
-            let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
-            let kind = (header::CONTENT_TYPE, "application/octet-stream".to_owned());
-            ([kind, (HeaderName::from_static("x-read"), part.to_string())], bytes).into_response()
+            let read = [(HeaderName::from_static("x-read"), part.to_string())];
+            (read, octets(&values)).into_response()
         }
         Ok(Err(error)) => (StatusCode::BAD_REQUEST, format!("{error:#}\n")).into_response(),
         Err(_) => {

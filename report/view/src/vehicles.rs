@@ -81,8 +81,16 @@ fn body(attached: &Attached, name: &str) -> Value {
             "spin": rotor.spin,
         })
     });
+    let map = &vehicle.command;
     json!({
         "name": body.name,
+        "command": {
+            "min": map.min,
+            "max": map.max,
+            "speed_at_min_rad_s": map.speed_at_min_rad_s,
+            "speed_at_max_rad_s": map.speed_at_max_rad_s,
+            "zero_is_off": map.zero_is_off,
+        },
         "weight_N": vehicle.mass_kg * vehicle.gravity_m_s2,
         "thrust_coefficient": vehicle.thrust_coefficient,
         "reach_m": body.reach_m(),
