@@ -49,6 +49,13 @@ pub struct Diagnostic {
     pub error: ParameterError,
     /// Advice; empty where the message says it.
     pub help: String,
+    /// Everything beside this fault; in a box, since faults are passed on in results.
+    beside: Box<Beside>,
+}
+
+/// Everything beside a fault.
+#[derive(Debug, Clone, Default, PartialEq)]
+struct Beside {
     /// Other faults of the file.
     others: Vec<Diagnostic>,
     /// Legal but unusual values, which may explain the faults.
@@ -61,7 +68,7 @@ impl Diagnostic {
     pub fn in_file(file: impl Into<String>, error: impl Into<ParameterError>) -> Self {
         let error = error.into();
         let help = error.help();
-        Self { file: file.into(), place: None, error, help, others: Vec::new(), warnings: Vec::new() }
+        Self { file: file.into(), place: None, error, help, beside: Box::default() }
     }
 
     /// Creates a fault at `place`.
@@ -113,31 +120,32 @@ impl Diagnostic {
 
     /// Iterates over this fault and the others of the file, each on its own.
     pub fn all(&self) -> impl Iterator<Item = Self> + '_ {
-        let alone = Self { others: Vec::new(), warnings: Vec::new(), ..self.clone() };
-        std::iter::once(alone).chain(self.others.iter().cloned())
+        let alone = Self { beside: Box::default(), ..self.clone() };
+        std::iter::once(alone).chain(self.beside.others.iter().cloned())
     }
 
     /// This, and `others` beside it.
     #[must_use]
     pub fn and(mut self, others: impl IntoIterator<Item = Self>) -> Self {
         for mut other in others {
-            let more = std::mem::take(&mut other.others);
-            self.others.push(other);
-            self.others.extend(more);
+            let more = std::mem::take(&mut other.beside.others);
+            self.beside.others.push(other);
+            self.beside.others.extend(more);
         }
         self
     }
 
     /// The same faults, with `warnings` that may explain them.
     #[must_use]
-    pub fn with_warnings(self, warnings: Vec<Self>) -> Self {
-        Self { warnings, ..self }
+    pub fn with_warnings(mut self, warnings: Vec<Self>) -> Self {
+        self.beside.warnings = warnings;
+        self
     }
 
     /// Legal but unusual values beside the faults; its text is without them.
     #[must_use]
     pub fn warnings(&self) -> &[Self] {
-        &self.warnings
+        &self.beside.warnings
     }
 
     /// The same faults, each told once: a misspelt key is not missing as well, and the faults of a file that several
@@ -324,7 +332,7 @@ impl fmt::Display for Diagnostic {
         if !self.help.is_empty() {
             write!(f, "\n  help: {}", self.help)?;
         }
-        for other in &self.others {
+        for other in &self.beside.others {
             // Whoever prints it has written the word before the first.
             f.write_str(if f.alternate() { "\nerror: " } else { "\n" })?;
             other.fmt(f)?;

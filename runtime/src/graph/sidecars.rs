@@ -47,10 +47,10 @@ fn after(manifest: &Manifest, name: &Spanned<String>, process: &Process) -> Resu
     let processes = &manifest.content.process;
     let vehicle = name.get_ref().rsplit_once('/').map(|(vehicle, _)| vehicle);
     let found = |written: &Spanned<String>| {
-        let own = vehicle.map(|vehicle| format!("{vehicle}/{}", written.get_ref()));
-        let names = own.into_iter().chain([written.get_ref().clone()]);
+        let local = vehicle.map(|vehicle| format!("{vehicle}/{}", written.get_ref()));
+        let names = local.into_iter().chain([written.get_ref().clone()]);
         let known = |name: &String| processes.iter().find(|(known, _)| known.get_ref() == name);
-        let Some((found, other)) = names.filter_map(|name| known(&name)).next() else {
+        let Some((found, other)) = names.into_iter().find_map(|name| known(&name)) else {
             let sidecars = processes.iter().filter(|(_, process)| !takes_part(process));
             let help = did_you_mean(
                 written.get_ref(),
