@@ -260,12 +260,14 @@ fn pictures_have_their_size_their_letters_and_their_dashes_and_are_the_same_twic
         "Attitude",
         "angle [deg]",
         "simulated time [s]",
-        "z set point",
+        "set point",
         "Path from above",
         "x [m]",
     ] {
         assert!(svg.contains(text), "{text} is missing");
     }
+    // Three set points have the colours of three flown lines, and one row of the legend.
+    assert!(!svg.contains("z set point"));
     // Three angles of one lap that was asked for are one dash after the other; each is a line of its own.
     assert!(svg.matches("<polyline").count() > 200);
     assert!(!Path::new(&place.path("laps.html")).exists());
