@@ -125,7 +125,7 @@ pub fn make(folder: &Path, language: Language, sources: Option<&Path>) -> Result
     let sources = sources.map_or_else(built_from, |sources| required(sources).map(Some))?;
     let parent = folder.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     if !parent.is_dir() {
-        bail!("there is no folder {}: make it first", parent.display());
+        bail!("cannot make a folder in {}: there is no such folder; make it first", parent.display());
     }
     // Written beside its place, and renamed once it is whole. The draft is removed in any case. Its own name says nothing to
     // anybody.

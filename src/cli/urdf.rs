@@ -69,7 +69,10 @@ pub fn urdf(arguments: &UrdfArguments) -> Result<bool> {
 }
 
 fn of_file(path: &Path) -> Result<Body> {
-    require_kind(path, &[FileKind::Vehicle], "urdf takes a vehicle file or a recording")?;
+    // A model of another program has an error of its own.
+    if path.extension().is_some_and(|extension| extension == "toml") {
+        require_kind(path, &[FileKind::Vehicle], "urdf takes a vehicle file or a recording")?;
+    }
     let airframe = Airframe::from_files(Vehicle::load(path)?, &[])?;
     let nothing = || format!("{}: its rotors are all in one place, so that it has no size", path.display());
     Body::of(&airframe).with_context(nothing)
