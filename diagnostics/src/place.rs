@@ -24,8 +24,8 @@ pub struct Place {
     source: String,
     /// The bytes of `source` that are meant.
     marked: Range<usize>,
-    /// An earlier place in the same file that belongs to the fault.
-    before: Option<Before>,
+    /// An earlier place in the same file that belongs to the fault; in a box, since few places have one.
+    before: Option<Box<Before>>,
 }
 
 /// An earlier place, and the lines from there on.
@@ -70,7 +70,7 @@ impl Place {
         let lines: Vec<&str> = text.lines().skip(of_first.line - 1).take(self.line - of_first.line).collect();
         let source: String = lines.iter().flat_map(|line| [*line, "\n"]).collect();
         let before = Before { line: of_first.line, source, marked: of_first.marked };
-        Self { before: Some(before), ..self }
+        Self { before: Some(Box::new(before)), ..self }
     }
 
     /// The place of line number `line` of `text`, from 1; a number past the end means the end.
