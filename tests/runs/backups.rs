@@ -97,7 +97,8 @@ fn a_swap_whose_times_say_too_little_or_too_much() {
     marked("at_tick = 50\nshadow_ticks = 9\nrepeat = §2").says(&["`repeat` without `every_ticks`"]);
     marked("at_tick = 50\nshadow_ticks = 9\nevery_ticks = §2").says(&["`every_ticks` without `repeat`"]);
     marked("at_tick = 50\nshadow_ticks = 9\nevery_ticks = 2\nrepeat = §0").says(&["`repeat` is 0"]);
-    marked("§at_tik = 50").says(&["unknown key `swap.0.at_tik`", "did you mean `at_tick`?"]);
+    marked("§at_tik = 50\nshadow_ticks = 9")
+        .says(&["unknown key `swap.0.at_tik`", "did you mean `at_tick`?"]);
 }
 
 #[test]

@@ -221,7 +221,8 @@ fn a_model_of_a_command_has_to_be_there_and_its_data_may_be_a_device() {
     let place = Place::new();
     let check = |keys: &str| {
         let command = format!("[process.other]\ncommand = [\"/bin/true\"]\n{keys}\n");
-        place.call(&["check", &manifest(&place, 0.3, &command)])
+        // The program takes no part in a run.
+        place.call(&["check", "--no-programs", &manifest(&place, 0.3, &command)])
     };
     let ended = check("vehicle = \"missing.toml\"").with_code(2);
     ended.says(&["process `other`: `vehicle`: cannot read", "missing.toml", "relative to the manifest"]);
