@@ -154,8 +154,8 @@ fn what_no_schedule_can_be_is_refused_with_its_point() {
     let schedule = "joints.0.drive.schedule";
     assert!(scene(&with("[[0, 1], [2, 3], [2, 4]]")).is_ok(), "two of one time are a jump");
     refused(&with("[]"), &["test.toml:17:22:", schedule, "one or more points", "empty"]);
-    refused(&with("1"), &[schedule, "one or more points", "integer"]);
-    refused(&with("[1, 2]"), &["schedule.value.0", "two numbers", "integer"]);
+    refused(&with("1"), &[schedule, "one or more points", "found 1"]);
+    refused(&with("[1, 2]"), &["schedule.value.0", "two numbers", "found 1"]);
     refused(&with("[[0, 1], [1, 2, 3]]"), &["schedule.value.1", "two numbers", "an array of 3"]);
     refused(&with("[[0, 1], [2, 2], [1.5, 3]]"), &["schedule.value.2", "2 s or later", "1.5 s"]);
     refused(&with("[[-1, 1]]"), &["schedule.value.0", "since the start", "-1"]);

@@ -456,7 +456,7 @@ fn several_faults_are_told_at_once_each_with_its_place() {
     let error = Vehicle::parse(&text, "bird.toml").unwrap_err();
     let faults: Vec<Diagnostic> = error.all().collect();
     assert_eq!(faults.len(), 3, "{error}");
-    for (fault, key) in faults.iter().zip(["`body.mass", "spin", "`motor.model`"]) {
+    for (fault, key) in faults.iter().zip(["`body.mass", "`motor.model`", "spin"]) {
         let message = fault.to_string();
         assert!(message.starts_with("bird.toml:") && message.contains(key), "{message}");
         assert!(error.to_string().contains(&message));
