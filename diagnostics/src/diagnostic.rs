@@ -35,7 +35,7 @@ use std::io;
 ///   |
 /// 2 | mass_kg = -1
 ///   |           ^^
-/// a.toml: no rotors
+/// error: a.toml: no rotors
 ///   help: add [[rotors]]"
 /// );
 /// ```
