@@ -5,12 +5,10 @@
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::{MotorCommand, Quaternion, SetPoint, StateEstimate};
-use bus::{BusError, InputPorts, OutputPorts, ParameterError};
-use serde::Deserialize;
+use bus::{BusError, InputPorts, OutputPorts, ParameterError, Parameters};
 
 /// The manifest's `parameters` table: gains from an error to motor counts.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Parameters)]
 struct Gains {
     /// Command at which the vehicle hovers, in counts.
     hover_count: f64,

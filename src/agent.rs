@@ -89,8 +89,7 @@ pub struct Agent {
 }
 
 /// Parameters: none.
-#[derive(Debug, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, bus::Parameters)]
 pub struct Parameters {}
 
 /// Outputs, of which the manifest names some.

@@ -28,20 +28,24 @@ const FIELDS: [&str; 4] = ["altitude", "roll", "pitch", "yaw"];
 const SET_POINT: &str = "hummingbus_msgs/msg/SetPoint";
 
 /// Parameters of `operator`.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, bus::Parameters)]
 pub struct Parameters {
     /// Altitude until another one is requested; the angles are zero.
+    #[parameter(example = "1.0")]
     initial_altitude_m: f64,
     /// Lowest and highest altitude that can be requested.
+    #[parameter(example = "[0.3, 3.0]")]
     altitudes_m: [f64; 2],
     /// Largest roll and pitch that can be requested.
+    #[parameter(range = "at most 30", example = "20.0")]
     tilt_max_deg: f64,
-    /// Answer to a source that has fallen silent.
+    /// Answer to a source that was silent for 250 ms.
+    #[parameter(range = "`hold`, `level`, `land`", example = "\"level\"")]
     fallback: Fallback,
-    /// A recording whose set points are sent instead.
+    /// Recording of such a run, relative to the manifest, whose set points are sent instead.
     data: Option<PathBuf>,
-    /// Topic of these set points; that of this process where left out, or the only one.
+    /// Topic of these set points in the recording.
+    #[parameter(shown = "`/NAME/set_point` of this process, or the only one")]
     topic: Option<String>,
 }
 

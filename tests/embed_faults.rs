@@ -22,11 +22,10 @@ use std::time::{Duration, Instant};
 /// Counts its ticks, and does at one of them what it is told.
 struct Source(Parameters);
 
-#[derive(Clone, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, bus::Parameters)]
 struct Parameters {
     fault: String,
-    #[serde(default)]
+    #[parameter(default = 0)]
     at_tick: u32,
 }
 

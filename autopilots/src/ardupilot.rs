@@ -27,7 +27,6 @@ use diagnostics::parameter::refuse;
 use frames::{FRAMES, FrameNumbers};
 use outputs::Outputs;
 use remote_control::RemoteControl;
-use serde::Deserialize;
 use std::io;
 use std::path::PathBuf;
 use std::process::Command;
@@ -52,35 +51,31 @@ const PARAMETER_FILE: &str = "hummingbus.parm";
 const CLOSED_PORTS: [u8; 7] = [0, 1, 2, 5, 6, 7, 8];
 
 /// Parameters of the firmware.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, bus::Parameters)]
 pub struct Parameters {
-    /// The vehicle that it flies.
+    /// Vehicle file, relative to the manifest.
     vehicle: PathBuf,
-    /// ArduCopter's program for SITL.
+    /// ArduCopter's program for SITL, relative to the manifest.
     firmware: PathBuf,
-    /// File of its parameters.
+    /// File of its parameters, relative to the manifest.
     configuration: Option<PathBuf>,
     /// Further arguments of the program; they count more than those of this component.
-    #[serde(default)]
+    #[parameter(default = Vec::new())]
     arguments: Vec<String>,
     /// Channel whose switch arms, counted from 1, where the firmware is to be armed at tick 0; none where the pilot arms.
     armed_by_channel: Option<usize>,
-    /// Simulated time before tick 0 in which its estimator settles, s.
-    #[serde(default = "rest_s")]
+    /// Simulated time before tick 0 in which its estimator settles.
+    ///
+    /// The estimator (EKF3) aligns its attitude within 6 s, and uses its GPS from 41 s on (measured, ArduCopter 4.6.0-dev); the last 4 s
+    /// are for arming.
+    #[parameter(default = 45.0)]
     rest_s: f64,
-    /// Host time that an answer may take, in s.
-    #[serde(default = "settings::reply_timeout_s")]
+    /// Host time that an answer may take.
+    #[parameter(default = settings::reply_timeout_s())]
     reply_timeout_s: f64,
     /// Place on the earth of the world's origin.
-    #[serde(default)]
+    #[parameter(default = Origin::default(), shown = "the home of PX4's simulations, in Zurich", table = Origin)]
     origin: Origin,
-}
-
-/// The estimator (EKF3) aligns its attitude within 6 s, and uses its GPS from 41 s on (measured, ArduCopter 4.6.0-dev); the last 4 s are
-/// for arming.
-fn rest_s() -> f64 {
-    45.0
 }
 
 /// ArduCopter as the manifest has it.

@@ -5,7 +5,6 @@ use bus::component::Info;
 use bus::context::NodeContext;
 use bus::messages::{Imu, ROTORS_MAX, RcChannels, StateEstimate};
 use diagnostics::ParameterError;
-use serde::de::DeserializeOwned;
 use vehicles::Vehicle;
 
 /// Inputs of a firmware at a tick: body x forward, y left, z up; the world's z up; SI units.
@@ -31,7 +30,7 @@ pub trait Autopilot: Sized + Send {
     /// Its name in manifests, and what it is.
     const INFO: Info;
     /// Its parameters, with those of the files that it needs.
-    type Parameters: DeserializeOwned;
+    type Parameters: bus::Parameters;
     /// The firmware's process, and what is known of it.
     type Link: Send + 'static;
 

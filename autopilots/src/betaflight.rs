@@ -22,7 +22,6 @@ use bus::context::NodeContext;
 use diagnostics::ParameterError;
 use diagnostics::parameter::positive;
 use mixers::MIXERS;
-use serde::Deserialize;
 use std::path::PathBuf;
 use std::time::Duration;
 use vehicles::Vehicle;
@@ -59,31 +58,25 @@ const REFUSED: &str = "###ERROR";
 const ALLOWED: &str = "Allowed";
 
 /// Parameters of the firmware.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, bus::Parameters)]
 pub struct Parameters {
-    /// The vehicle that it flies.
+    /// Vehicle file, relative to the manifest.
     vehicle: PathBuf,
-    /// Betaflight's program for SITL.
+    /// Betaflight's program for SITL, relative to the manifest.
     firmware: PathBuf,
-    /// Commands of its command line, before it flies.
+    /// File of commands of its command line, which it runs before it flies, relative to the manifest.
     configuration: Option<PathBuf>,
     /// Channel whose switch arms, counted from 1, where the firmware is to be armed at tick 0; none where the pilot arms.
     armed_by_channel: Option<usize>,
-    /// Packets of the remote control a second.
-    #[serde(default = "rc_rate_hz")]
+    /// Packets of the remote control a second, as receivers of serial protocols send at least.
+    #[parameter(default = 50.0)]
     rc_rate_hz: f64,
-    /// Host time that an answer may take, in s.
-    #[serde(default = "settings::reply_timeout_s")]
+    /// Host time that an answer may take.
+    #[parameter(default = settings::reply_timeout_s())]
     reply_timeout_s: f64,
     /// Place on the earth of the world's origin.
-    #[serde(default)]
+    #[parameter(default = Origin::default(), shown = "the home of PX4's simulations, in Zurich", table = Origin)]
     origin: Origin,
-}
-
-/// As receivers of serial protocols send at least.
-fn rc_rate_hz() -> f64 {
-    50.0
 }
 
 /// A tick's packets, as `lockstep.c` reads them.

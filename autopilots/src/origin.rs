@@ -1,12 +1,11 @@
 //! The place on the earth at which the world's origin lies: its x points east, its y north.
 
 use diagnostics::parameter::{ParameterError, refuse};
-use serde::Deserialize;
 
 /// Metres of a degree of latitude on a sphere of the earth's mean radius, 6 371 008.8 m (IUGG).
 const M_PER_DEGREE: f64 = 6_371_008.8 * std::f64::consts::PI / 180.0;
 
-/// Latitude, longitude and altitude of the world's origin.
+/// Latitude, longitude and altitude of the world's origin; by default the home position of PX4's simulations, in Zurich.
 ///
 /// ```
 /// let origin = autopilots::origin::Origin::default();
@@ -14,22 +13,18 @@ const M_PER_DEGREE: f64 = 6_371_008.8 * std::f64::consts::PI / 180.0;
 /// assert!((latitude_deg - origin.latitude_deg - 1e-3).abs() < 1e-8, "north is along y");
 /// assert_eq!((longitude_deg, altitude_m), (origin.longitude_deg, origin.altitude_m + 2.0));
 /// ```
-#[derive(Clone, Copy, Debug, Deserialize, PartialEq)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Copy, Debug, PartialEq, bus::Parameters)]
+#[parameters(default)]
 pub struct Origin {
-    /// Degrees north.
+    /// Latitude, north.
+    #[parameter(default = 47.397_742, range = "-89 to 89")]
     pub latitude_deg: f64,
-    /// Degrees east.
+    /// Longitude, east.
+    #[parameter(default = 8.545_594, range = "-180 to 180")]
     pub longitude_deg: f64,
-    /// Metres above the sea.
+    /// Altitude above the sea.
+    #[parameter(default = 488.0, range = "-10 000 to 10 000")]
     pub altitude_m: f64,
-}
-
-impl Default for Origin {
-    /// The default home position of PX4's simulations, in Zurich.
-    fn default() -> Self {
-        Self { latitude_deg: 47.397_742, longitude_deg: 8.545_594, altitude_m: 488.0 }
-    }
 }
 
 impl Origin {

@@ -33,7 +33,6 @@ use messages::{
     HIL_ACTUATOR_CONTROLS, HIL_GPS, HIL_SENSOR, HIL_STATE_QUATERNION, INERTIAL_FIELDS, MAGNETIC_FIELDS,
     Outputs, PRESSURE_FIELDS, RC_CHANNELS, Sample,
 };
-use serde::Deserialize;
 use std::net::{Ipv4Addr, UdpSocket};
 use std::path::PathBuf;
 use std::time::Duration;
@@ -71,55 +70,44 @@ const MODEL: &str = "none_iris";
 const ANSWER_MAX: usize = 1 << 16;
 
 /// Parameters of the firmware.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, bus::Parameters)]
 pub struct Parameters {
-    /// The vehicle that it flies.
+    /// Vehicle file, relative to the manifest.
     vehicle: PathBuf,
-    /// PX4's program for SITL.
+    /// PX4's program for SITL, relative to the manifest.
     firmware: PathBuf,
-    /// File of its parameters.
+    /// File of its parameters, relative to the manifest.
     configuration: Option<PathBuf>,
     /// Channel whose switch arms, counted from 1, where the firmware is to be armed at tick 0; none where the pilot arms.
     armed_by_channel: Option<usize>,
-    /// Simulated time before tick 0 in which its estimator settles, s.
-    #[serde(default = "rest_s")]
+    /// Simulated time before tick 0 in which its estimator settles.
+    ///
+    /// The estimator aligns its attitude within seconds, and its start-up script lets it use a GPS soon after that.
+    #[parameter(default = 20.0)]
     rest_s: f64,
-    /// Host time that an answer may take, in s.
-    #[serde(default = "settings::reply_timeout_s")]
+    /// Host time that an answer may take.
+    #[parameter(default = settings::reply_timeout_s())]
     reply_timeout_s: f64,
-    /// Host time that an answer may take while its start-up script runs, in s.
-    #[serde(default = "boot_timeout_s")]
+    /// Host time that an answer may take while its start-up script runs.
+    ///
+    /// The start-up script runs a few hundred commands, each a process.
+    #[parameter(default = 60.0)]
     boot_timeout_s: f64,
     /// Airframe of its start-up script.
-    #[serde(default = "model")]
+    #[parameter(default = MODEL.to_owned())]
     model: String,
     /// True if it sends to ground stations.
-    #[serde(default)]
+    #[parameter(default = false)]
     ground_station: bool,
-    /// Place of the rest before tick 0, m.
-    #[serde(default)]
+    /// Place of the rest before tick 0.
+    #[parameter(default = [0.0; 3])]
     start_position_m: [f64; 3],
     /// Place on the earth of the world's origin.
-    #[serde(default)]
+    #[parameter(default = Origin::default(), shown = "the home of PX4's simulations, in Zurich", table = Origin)]
     origin: Origin,
     /// Magnetic field of the earth at the origin.
-    #[serde(default)]
+    #[parameter(default = MagneticField::default(), shown = "that of the default origin in 2025", table = MagneticField)]
     magnetic_field: MagneticField,
-}
-
-/// The estimator aligns its attitude within seconds, and its start-up script lets it use a GPS soon after that.
-fn rest_s() -> f64 {
-    20.0
-}
-
-/// The start-up script runs a few hundred commands, each a process.
-fn boot_timeout_s() -> f64 {
-    60.0
-}
-
-fn model() -> String {
-    MODEL.to_owned()
 }
 
 /// PX4 as the manifest has it.

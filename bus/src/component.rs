@@ -2,9 +2,9 @@
 
 use crate::announcement::Announcement;
 use crate::context::{NodeContext, StepContext};
+use crate::parameters::Parameters;
 use crate::ports::{InputPorts, OutputPorts};
 use diagnostics::ParameterError;
-use serde::de::DeserializeOwned;
 
 pub use crate::state::{State, StateError, Transfer};
 
@@ -32,9 +32,9 @@ pub type StepError = Box<dyn std::error::Error + Send + Sync>;
 /// /// Asks for a hover at the height at which the vehicle is, and some more.
 /// struct Climb(Parameters);
 ///
-/// #[derive(serde::Deserialize)]
-/// #[serde(deny_unknown_fields)]
+/// #[derive(bus::Parameters)]
 /// struct Parameters {
+///     /// Height above the vehicle.
 ///     more_m: f64,
 /// }
 ///
@@ -79,8 +79,8 @@ pub type StepError = Box<dyn std::error::Error + Send + Sync>;
 pub trait Component: Sized + Send {
     /// Its name in manifests, and its summary.
     const INFO: Info;
-    /// Content of the manifest's `parameters` table: a struct that refuses unknown fields.
-    type Parameters: DeserializeOwned;
+    /// Content of the manifest's `parameters` table.
+    type Parameters: Parameters;
     /// Inputs.
     type Inputs<'a>: InputPorts<'a>;
     /// Outputs.
@@ -89,7 +89,7 @@ pub trait Component: Sized + Send {
     /// writes its own bytes.
     type State: State;
 
-    /// Makes the component, for a check of the manifest as for a run.
+    /// Makes the component of parameters within their ranges, for a check of the manifest as for a run.
     ///
     /// # Errors
     /// A parameter or a file that cannot be meant.

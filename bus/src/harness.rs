@@ -3,6 +3,7 @@
 use crate::component::{Component, State, StepError};
 use crate::context::{NodeContext, StepContext};
 use crate::ports::SampleSource;
+use crate::registration::make_of;
 use crate::sample_memory::SampleMemory;
 use diagnostics::ParameterError;
 
@@ -44,7 +45,7 @@ impl<C: Component> Harness<C> {
     /// # Errors
     /// As [`Component::new`].
     pub fn in_context(parameters: C::Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
-        let component = C::new(parameters, context)?;
+        let component: C = make_of(parameters, context)?;
         let state = component.initial();
         let (tick_ns, period_ticks) = (context.tick_ns, context.period_ticks);
         Ok(Self { component, state, tick: 0, tick_ns, period_ticks, predecessor: None })

@@ -52,7 +52,7 @@ pub mod messages;
 pub mod names;
 mod node;
 mod node_harness;
-mod parameter_names;
+pub mod parameters;
 pub mod plan;
 mod port;
 pub mod ports;
@@ -89,7 +89,7 @@ pub mod user_file;
 pub mod watch;
 
 pub use bounded::Bounded;
-pub use bus_derive::{InputPorts, Message, OutputPorts};
+pub use bus_derive::{InputPorts, Message, OutputPorts, Parameters};
 pub use component::Component;
 pub use diagnostics::ParameterError;
 pub use error::BusError;
@@ -100,6 +100,7 @@ pub use join::{GENERATION_VARIABLE, Join, NODE_VARIABLE};
 pub use message::Message;
 pub use node::Node;
 pub use node_harness::{NodeHarness, Sample};
+pub use parameters::Parameters;
 pub use registration::{Registration, message_of};
 pub use run_process::run_process;
 pub use simulation::{Simulation, Topic};
@@ -109,4 +110,5 @@ pub use transport::{IceoryxError, limit_transport_log, reap_dead, takes_run_dir}
 #[doc(hidden)]
 pub mod __private {
     pub use bytemuck;
+    pub use serde;
 }

@@ -3,7 +3,7 @@
 use crate::announcement::Announcement;
 use crate::component::{Component, FailedNs, Info, Role, State, StateError, StepError, Transfer};
 use crate::context::{NodeContext, StepContext};
-use crate::parameter_names;
+use crate::parameters::{Parameter, Parameters};
 use crate::plan::{NodePlan, Plan};
 use crate::ports::{InputPorts, InputSamples, Inputs, OutputPorts, OutputSamples, PortSpec};
 use crate::schema::Schema;
@@ -33,7 +33,8 @@ pub struct Registration {
     pub outputs: &'static [PortSpec],
     /// Transfer of its state to the process that takes its place.
     pub transfer: Transfer,
-    parameters: fn() -> &'static [&'static str],
+    /// Parameters in a manifest.
+    pub parameters: &'static [Parameter],
     period: fn(&Value, u64) -> Option<u32>,
     check: fn(&Value, &NodeContext<'_>) -> Result<(), ParameterError>,
     make: Make,
@@ -56,7 +57,7 @@ impl Registration {
             inputs: <C::Inputs<'static> as InputPorts<'static>>::DECLARED,
             outputs: C::Outputs::DECLARED,
             transfer: C::State::TRANSFER,
-            parameters: parameter_names::of::<C::Parameters>,
+            parameters: C::Parameters::DECLARED,
             period: |parameters, tick_ns| {
                 let parameters = diagnostics::read::<C::Parameters>(parameters).ok()?;
                 Some(C::period_ticks(&parameters, tick_ns))
@@ -69,10 +70,10 @@ impl Registration {
         }
     }
 
-    /// The names of its parameters.
+    /// True if it has a parameter called `name`.
     #[must_use]
-    pub fn parameters(&self) -> &'static [&'static str] {
-        (self.parameters)()
+    pub fn has_parameter(&self, name: &str) -> bool {
+        self.parameters.iter().any(|parameter| parameter.name == name)
     }
 
     /// As [`Component::period_ticks`]: at least one, and one of parameters that [`check`](Self::check) refuses.
@@ -144,7 +145,16 @@ pub fn message_of(components: &'static [Registration], type_name: &str) -> Optio
 }
 
 fn make<C: Component>(parameters: &Value, context: &NodeContext<'_>) -> Result<C, ParameterError> {
-    C::new(diagnostics::read(parameters)?, context)
+    make_of(diagnostics::read(parameters)?, context)
+}
+
+/// Makes a component of parameters that are within their ranges.
+pub(crate) fn make_of<C: Component>(
+    parameters: C::Parameters,
+    context: &NodeContext<'_>,
+) -> Result<C, ParameterError> {
+    parameters.validate()?;
+    C::new(parameters, context)
 }
 
 /// A component with its state, without their types. Its steps do not allocate.

@@ -22,30 +22,25 @@ use crate::law_inputs::SetPointInputs;
 use crate::set_points::SetPoint;
 use bus::component::Info;
 use diagnostics::ParameterError;
-use diagnostics::parameter::require;
+use diagnostics::parameter::within;
 use nalgebra::Vector3;
-use serde::Deserialize;
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
 /// The most steps between two of the attitude loop.
-const ATTITUDE_EVERY_MAX: u32 = 1000;
+const ATTITUDE_EVERY_MAX: f64 = 1000.0;
 
 /// Parameters.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, bus::Parameters)]
 pub struct Parameters {
-    /// Vehicle file.
+    /// Vehicle file, relative to the manifest.
     vehicle: PathBuf,
-    /// Gains file; the built-in gains where there is none.
+    /// Gains file, relative to the manifest.
+    #[parameter(shown = "the gains of controllers/gains/cascade.toml")]
     gains: Option<PathBuf>,
-    /// Steps between two of the command filter and the attitude loop.
-    #[serde(default = "every_step")]
+    /// The command filter and the attitude loop compute on every n-th step, the rate loop and the altitude loop on each.
+    #[parameter(default = 1, check = within(1.0..=ATTITUDE_EVERY_MAX, "1 to 1000 steps"))]
     attitude_every_steps: u32,
-}
-
-fn every_step() -> u32 {
-    1
 }
 
 /// The law at one period, with everything that does not change during a run.
@@ -116,9 +111,7 @@ impl Law for CascadeLaw {
 
     fn new(parameters: &Self::Parameters, context: &LawContext<'_>) -> Result<Self, ParameterError> {
         let gains = CascadeGains::load(&context.node.files, parameters.gains.as_deref())?;
-        let (key, attitude_every_steps) = ("attitude_every_steps", parameters.attitude_every_steps);
-        let is_good = (1..=ATTITUDE_EVERY_MAX).contains(&attitude_every_steps);
-        require(key, attitude_every_steps, is_good, "1 to 1000 steps")?;
+        let attitude_every_steps = parameters.attitude_every_steps;
         let (vehicle, period_s) = (context.craft.hover_model(), context.node.period_s());
         Ok(Self { gains, vehicle, period_s, attitude_every_steps })
     }

@@ -55,23 +55,28 @@ mod array {
 }
 
 /// The column map of a flight.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, bus::Parameters)]
 pub struct ColumnMap {
     /// Form of a file that does not show it.
-    #[serde(default)]
+    #[parameter(default = Dialect::default(), shown = "what the file shows")]
     pub csv: Dialect,
     /// Time, any origin.
+    #[parameter(unit = "`s`, `ms`, `us`")]
     pub time: Columns<1>,
-    /// Motor commands in the order of the vehicle file.
+    /// Motor commands, one column for each rotor in the order of the vehicle file.
+    #[parameter(unit = "`count`")]
     pub command: CommandColumns,
-    /// Position in the world.
+    /// Position in the world, 3 columns.
+    #[parameter(unit = "`m`, `mm`")]
     pub position: Columns<3>,
-    /// Velocity in the world.
+    /// Velocity in the world, 3 columns.
+    #[parameter(unit = "`m/s`, `mm/s`")]
     pub velocity: Columns<3>,
-    /// Attitude quaternion, body to world, in the order x, y, z, w.
+    /// Attitude quaternion, body to world, 4 columns in the order x, y, z, w.
+    #[parameter(unit = "`1`")]
     pub attitude: Columns<4>,
-    /// Angular velocity in the body.
+    /// Angular velocity in the body, 3 columns.
+    #[parameter(unit = "`rad/s`, `deg/s`")]
     pub angular_velocity: Columns<3>,
 }
 

@@ -8,8 +8,6 @@ use bus::component::Info;
 use bus::context::NodeContext;
 use bus::ports::InputPorts;
 use diagnostics::ParameterError;
-use serde::Deserialize;
-use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 
 /// A control law at one period, with everything that does not change during a run.
@@ -19,7 +17,7 @@ pub trait Law: Sized + Send {
     /// Its name in manifests, and its description.
     const INFO: Info;
     /// Parameters, as the manifest's `parameters` table holds them.
-    type Parameters: DeserializeOwned;
+    type Parameters: bus::Parameters;
     /// Inputs.
     type Inputs<'a>: InputPorts<'a> + Into<ControlInput>;
     /// State between ticks.
@@ -76,11 +74,11 @@ pub struct LawContext<'a> {
 }
 
 /// Parameters of a law that has no others.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, bus::Parameters)]
 pub struct FileParameters {
-    /// Vehicle file.
+    /// Vehicle file, relative to the manifest.
     pub vehicle: PathBuf,
-    /// Gains file; the built-in gains where there is none.
+    /// Gains file, relative to the manifest.
+    #[parameter(shown = "the built-in gains")]
     pub gains: Option<PathBuf>,
 }

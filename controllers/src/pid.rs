@@ -14,7 +14,6 @@ use crate::set_points::SetPoint;
 use bus::component::Info;
 use diagnostics::ParameterError;
 use nalgebra::Vector3;
-use serde::Deserialize;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -52,12 +51,12 @@ pub struct PidState {
 }
 
 /// Parameters of the PID controller.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, bus::Parameters)]
 pub struct Parameters {
-    /// Vehicle file.
+    /// Vehicle file, relative to the manifest.
     vehicle: PathBuf,
-    /// Gains and limits: a table, or the path of a gains file.
+    /// Gains and limits: a table, or the path of a gains file, relative to the manifest.
+    #[parameter(shown = "the gains of controllers/gains/pid.toml")]
     gains: Option<Value>,
 }
 

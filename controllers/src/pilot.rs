@@ -7,22 +7,21 @@ use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::SetPoint;
 use diagnostics::parameter::{ParameterError, refuse};
-use serde::Deserialize;
 use std::path::PathBuf;
 
 /// Parameters of the pilot.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, bus::Parameters)]
 pub struct Parameters {
-    /// Altitude until the first entry changes it; the angles start at zero.
+    /// Altitude until the first set point; the angles start at zero.
+    #[parameter(example = "1.0")]
     initial_altitude_m: f64,
-    /// The schedule.
-    #[serde(default)]
+    /// List of steps, ramps and doublets.
+    #[parameter(default = Vec::new())]
     set_points: Vec<SetPointEntry>,
-    /// A recording of sticks, whose channels the schedule leaves alone.
+    /// Recording of sticks, relative to the manifest; `set_points` then has other channels only.
     data: Option<PathBuf>,
-    /// Time in the recording at which tick 0 lies; below 0 its sticks act that much later than it says.
-    #[serde(default)]
+    /// Time in the recording at which tick 0 lies; below 0 the sticks act that much later than recorded.
+    #[parameter(default = 0.0)]
     from_s: f64,
 }
 

@@ -11,18 +11,18 @@ use serde::Deserialize;
 use std::path::PathBuf;
 
 /// Parameters of the player.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, bus::Parameters)]
 pub struct Parameters {
-    /// The flight.
+    /// CSV file of the flight, relative to the manifest.
     data: PathBuf,
     /// Time in the flight, from its first row, at which tick 0 lies.
-    #[serde(default)]
+    #[parameter(default = 0.0, range = "within the flight")]
     from_s: f64,
-    /// Columns of the quantities.
+    /// Table of the columns of the quantities and their units.
+    #[parameter(table = ColumnMap, example = "{ time = { columns = [\"t\"], unit = \"s\" }, command = { columns = [\"m1\", \"m2\", \"m3\", \"m4\"], unit = \"count\" }, position = { columns = [\"x\", \"y\", \"z\"], unit = \"m\" }, velocity = { columns = [\"vx\", \"vy\", \"vz\"], unit = \"m/s\" }, attitude = { columns = [\"qx\", \"qy\", \"qz\", \"qw\"], unit = \"1\" }, angular_velocity = { columns = [\"p\", \"q\", \"r\"], unit = \"rad/s\" } }")]
     columns: ColumnMap,
-    /// Treatment of gaps.
-    #[serde(default)]
+    /// Treatment of gaps, times without rows: the run is refused, or the last command holds.
+    #[parameter(default = Gaps::Refuse, shown = "refuse", range = "`refuse`, `hold`")]
     gaps: Gaps,
 }
 

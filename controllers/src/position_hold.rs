@@ -17,44 +17,37 @@ use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::{SetPoint, StateEstimate};
 use bus::{InputPorts, OutputPorts};
-use diagnostics::parameter::{ParameterError, not_negative, positive, positive_up_to};
+use diagnostics::parameter::{ParameterError, not_negative, positive, up_to};
 use diagnostics::unit::STANDARD_GRAVITY_M_S2;
 use nalgebra::{Quaternion, UnitQuaternion};
-use serde::Deserialize;
 
 /// Parameters of the hold.
 ///
 /// The gains are tuned, no source, around `pid` with its built-in gains, whose attitude follows within 0.4 s: the velocity
 /// loop is to be slower than that, and the position loop slower than the velocity loop.
-#[derive(Debug, Clone, Copy, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Debug, Clone, Copy, bus::Parameters)]
+#[parameters(default)]
 pub struct Parameters {
-    /// Kx: from the error of the place (m) to a velocity (m/s), 1/s. Default 0.45.
+    /// Error of the place to a velocity, Kx.
+    #[parameter(default = 0.45, check = positive)]
     position_1_s: f64,
-    /// Kv: from the error of that velocity (m/s) to an acceleration (m/s²), 1/s. Default 1.5.
+    /// Error of that velocity to an acceleration, Kv.
+    #[parameter(default = 1.5, check = positive)]
     velocity_1_s: f64,
-    /// Greatest speed of the return to its place, m/s. Default 1.0.
+    /// Greatest speed of the return to its place.
+    #[parameter(default = 1.0, check = positive)]
     speed_max_m_s: f64,
-    /// Greatest tilt, degrees. Default 10.
+    /// Greatest tilt.
+    #[parameter(default = 10.0, check = up_to(TILT_MAX_DEG, "deg"))]
     tilt_max_deg: f64,
-    /// Below this speed along an axis it locks the place, m/s. Default 0.1.
+    /// Below this speed along an axis it locks the place.
+    #[parameter(default = 0.1, check = positive)]
     lock_speed_m_s: f64,
-    /// Up to this tilt the pilot asks for none, degrees. Default 3: a tenth of the sticks' range (thesis §5.3), as PX4's
-    /// parameter `MPC_HOLD_DZ` has it.
+    /// Up to this tilt the pilot asks for none.
+    ///
+    /// A tenth of the sticks' range (thesis §5.3), as PX4's parameter `MPC_HOLD_DZ` has it.
+    #[parameter(default = 3.0, check = not_negative)]
     stick_dead_band_deg: f64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            position_1_s: 0.45,
-            velocity_1_s: 1.5,
-            speed_max_m_s: 1.0,
-            tilt_max_deg: 10.0,
-            lock_speed_m_s: 0.1,
-            stick_dead_band_deg: 3.0,
-        }
-    }
 }
 
 /// Inputs of the hold.
@@ -128,12 +121,6 @@ impl Component for PositionHold {
         let Parameters { position_1_s, velocity_1_s, speed_max_m_s, tilt_max_deg, lock_speed_m_s, .. } =
             parameters;
         let stick_dead_band_deg = parameters.stick_dead_band_deg;
-        positive("position_1_s", position_1_s)?;
-        positive("velocity_1_s", velocity_1_s)?;
-        positive("speed_max_m_s", speed_max_m_s)?;
-        positive_up_to("tilt_max_deg", tilt_max_deg, TILT_MAX_DEG, "deg")?;
-        positive("lock_speed_m_s", lock_speed_m_s)?;
-        not_negative("stick_dead_band_deg", stick_dead_band_deg)?;
         let acceleration_max_m_s2 = STANDARD_GRAVITY_M_S2 * libm::tan(tilt_max_deg.to_radians());
         Ok(Self {
             position_1_s,

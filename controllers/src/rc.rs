@@ -9,7 +9,6 @@ use bus::messages::{RC_CHANNELS_MAX, RcChannels};
 use bus::{Bounded, OutputPorts};
 use diagnostics::parameter::{ParameterError, refuse};
 use inputs::InputFiles;
-use serde::Deserialize;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use vehicles::table::{Dialect, Table, TableError, names, shown};
@@ -25,33 +24,34 @@ const STICKS: usize = 4;
 const PULSES_US: RangeInclusive<f64> = 800.0..=2200.0;
 
 /// Parameters of `rc`.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, bus::Parameters)]
 pub struct Parameters {
-    /// Number of channels; the highest one of script and recording, at least 4, if left out.
+    /// Number of channels.
+    #[parameter(shown = "the highest that is used, at least 4", range = "4 to 18")]
     channels: Option<usize>,
-    /// Moves of channels.
-    #[serde(default)]
+    /// List of moves. A move begins at the pulses that the one before it on the channel has reached. Before its first move a stick sends
+    /// 1500 µs, throttle and switches 1000 µs.
+    #[parameter(default = Vec::new(), table = Move, entry = "N")]
     script: Vec<Move>,
-    /// Recording of a receiver, whose channels the script leaves alone.
+    /// Recording of a receiver, relative to the manifest; `script` then has other channels only.
     data: Option<PathBuf>,
-    /// Time in the recording at which tick 0 lies, s.
-    #[serde(default)]
+    /// Time in the recording at which tick 0 lies.
+    #[parameter(default = 0.0)]
     from_s: f64,
 }
 
 /// Move of a channel.
-#[derive(Clone, Copy, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, bus::Parameters)]
 struct Move {
-    /// Number of the channel, from 1.
+    /// Number of the channel, from 1: roll, pitch, throttle, yaw, switches.
     channel: usize,
-    /// Start, s.
+    /// Start.
     at_s: f64,
-    /// Pulses at its end, µs.
+    /// Pulses at its end.
+    #[parameter(unit = "µs", range = "800 to 2200")]
     pulse_us: f64,
-    /// Duration, s; 0 for a step.
-    #[serde(default)]
+    /// Duration; 0 for a step.
+    #[parameter(default = 0.0)]
     over_s: f64,
 }
 

@@ -12,7 +12,6 @@ use bus::messages::{RC_CHANNELS_MAX, RcChannels, SetPoint, StateEstimate};
 use bus::{Bounded, InputPorts, OutputPorts};
 use diagnostics::parameter::{ParameterError, not_negative, positive, refuse};
 use nalgebra::{Quaternion, UnitQuaternion};
-use serde::Deserialize;
 
 /// Channels before the first switch: roll, pitch, throttle, yaw.
 const STICKS: usize = 4;
@@ -24,64 +23,47 @@ const LOW_US: f64 = 1000.0;
 const WHOLE_US: f64 = 1000.0;
 
 /// Parameters of the remote control.
-#[derive(Debug, Clone, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Clone, bus::Parameters)]
 pub struct Parameters {
-    /// Roll or pitch at full stick, degrees: the firmware's limit of its angle mode.
+    /// Angle of the firmware's angle mode at full stick.
+    #[parameter(check = positive, example = "30.0")]
     tilt_max_deg: f64,
-    /// Yaw rate at full stick, degrees/s: the firmware's.
+    /// Yaw rate of the firmware at full stick.
+    #[parameter(check = positive, example = "100.0")]
     yaw_rate_max_deg_s: f64,
-    /// Throttle at hover, 0 to 1.
+    /// Throttle at hover.
+    #[parameter(range = "0 to 1", example = "0.4")]
     hover_throttle: f64,
-    /// Kx, 1/s.
-    #[serde(default = "altitude_1_s")]
+    /// Error of the altitude to a climb, Kx.
+    #[parameter(default = 1.5, check = not_negative)]
     altitude_1_s: f64,
-    /// Greatest speed of climbing and sinking, m/s.
-    #[serde(default = "climb_max_m_s")]
+    /// Greatest speed of climbing and sinking.
+    #[parameter(default = 1.0, check = positive)]
     climb_max_m_s: f64,
-    /// Kv, throttle for 1 m/s, s/m.
-    #[serde(default = "climb_s_m")]
+    /// Error of the climb to throttle, Kv.
+    #[parameter(default = 0.12, check = not_negative)]
     climb_s_m: f64,
-    /// Ki, throttle for 1 m, 1/m.
-    #[serde(default = "climb_integral_1_m")]
+    /// The same, integrated, Ki.
+    #[parameter(default = 0.06, check = not_negative)]
     climb_integral_1_m: f64,
-    /// Yaw rate for an error of the yaw, 1/s.
-    #[serde(default = "yaw_1_s")]
+    /// Error of the yaw to a yaw rate.
+    #[parameter(default = 2.0, check = not_negative)]
     yaw_1_s: f64,
-    /// Switches.
-    #[serde(default)]
+    /// List of moves of switches; a switch that has not moved sends 1000 µs.
+    #[parameter(default = Vec::new(), table = Switch, entry = "N")]
     switches: Vec<Switch>,
 }
 
-fn altitude_1_s() -> f64 {
-    1.5
-}
-
-fn climb_max_m_s() -> f64 {
-    1.0
-}
-
-fn climb_s_m() -> f64 {
-    0.12
-}
-
-fn climb_integral_1_m() -> f64 {
-    0.06
-}
-
-fn yaw_1_s() -> f64 {
-    2.0
-}
-
 /// A switch that moves.
-#[derive(Debug, Clone, Copy, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Clone, Copy, bus::Parameters)]
 struct Switch {
-    /// Its channel, counted from 1.
+    /// Its channel, counted from 1; the first four are the sticks.
+    #[parameter(range = "5 to 18")]
     channel: usize,
-    /// From this time on, s.
+    /// Time of the move.
     at_s: f64,
-    /// It sends these pulses, µs.
+    /// Pulses from then on.
+    #[parameter(unit = "µs", range = "800 to 2200")]
     pulse_us: f64,
 }
 
@@ -141,17 +123,6 @@ impl Component for RemoteControl {
     type State = RemoteControlState;
 
     fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
-        positive("tilt_max_deg", parameters.tilt_max_deg)?;
-        positive("yaw_rate_max_deg_s", parameters.yaw_rate_max_deg_s)?;
-        positive("climb_max_m_s", parameters.climb_max_m_s)?;
-        for (key, value) in [
-            ("altitude_1_s", parameters.altitude_1_s),
-            ("climb_s_m", parameters.climb_s_m),
-            ("climb_integral_1_m", parameters.climb_integral_1_m),
-            ("yaw_1_s", parameters.yaw_1_s),
-        ] {
-            not_negative(key, value)?;
-        }
         let hover = parameters.hover_throttle;
         refuse(!(0.0..=1.0).contains(&hover), "hover_throttle", || {
             format!("`hover_throttle` is {hover}, expected 0 to 1")

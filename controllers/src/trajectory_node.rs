@@ -6,19 +6,18 @@ use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::Reference;
 use diagnostics::ParameterError;
-use serde::Deserialize;
 
 /// Parameters of the trajectory.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, bus::Parameters)]
 pub struct Parameters {
     /// Position at its start, in the world.
+    #[parameter(example = "[0.0, 0.0, 1.0]")]
     initial_position_m: [f64; 3],
     /// Yaw at its start.
-    #[serde(default)]
+    #[parameter(default = 0.0)]
     initial_yaw_deg: f64,
-    /// The segments; it hovers where the last ends.
-    #[serde(default)]
+    /// List of segments, flown one after another; it hovers where the last ends.
+    #[parameter(default = Vec::new())]
     segments: Vec<serde_json::Value>,
 }
 

@@ -16,9 +16,8 @@ use crate::law::{Law, LawContext, Predecessor};
 use crate::law_inputs::VelocityInputs;
 use crate::set_points::SetPoint;
 use bus::component::Info;
-use diagnostics::parameter::{ParameterError, all, finite, refuse};
+use diagnostics::parameter::{ParameterError, finite, refuse};
 use diagnostics::unit::{ACCELERATION, PER_SECOND, PURE_NUMBER, TIME, VELOCITY};
-use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
 gains! {
@@ -237,18 +236,21 @@ impl VelocityLaw {
 }
 
 /// Parameters of the velocity controller.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, bus::Parameters)]
 pub struct Parameters {
-    /// Vehicle file.
+    /// Vehicle file, relative to the manifest.
     vehicle: PathBuf,
-    /// Gains file; the built-in `controllers/gains/velocity.toml` where there is none.
+    /// Gains file, relative to the manifest.
+    #[parameter(shown = "the gains of controllers/gains/velocity.toml")]
     gains: Option<PathBuf>,
-    /// Velocity along the heading's level axes, without a reference.
+    /// Velocity along the heading's x and y, without the input `reference`.
+    #[parameter(shown = "[0.0, 0.0]", check = finite)]
     velocity_m_s: Option<[f64; 2]>,
-    /// Height, without a reference.
+    /// Height in the world, without `reference`.
+    #[parameter(shown = "required without `reference`", check = finite)]
     altitude_m: Option<f64>,
-    /// Yaw, without a reference.
+    /// Yaw, without `reference`.
+    #[parameter(shown = "0.0", check = finite)]
     yaw_rad: Option<f64>,
 }
 
@@ -270,18 +272,15 @@ impl Parameters {
         })
     }
 
-    fn constant(&self) -> Result<Option<VelocitySetPoint>, ParameterError> {
-        let Some(altitude_m) = self.altitude_m else { return Ok(None) };
+    fn constant(&self) -> Option<VelocitySetPoint> {
+        let altitude_m = self.altitude_m?;
         let constant = VelocitySetPoint {
             velocity_m_s: self.velocity_m_s.unwrap_or_default(),
             altitude_m,
             yaw_rad: self.yaw_rad.unwrap_or_default(),
             ..VelocitySetPoint::default()
         };
-        finite("altitude_m", altitude_m)?;
-        finite("yaw_rad", constant.yaw_rad)?;
-        all(finite, "velocity_m_s", &constant.velocity_m_s)?;
-        Ok(Some(constant))
+        Some(constant)
     }
 }
 
@@ -299,7 +298,7 @@ impl Law for VelocityLaw {
         parameters.check(context.node.has("reference"))?;
         let gains = LoopsGains::load(&context.node.files, parameters.gains.as_deref())?;
         let velocity = VelocityLoop::new(&gains, context.craft.hover_model(), context.node.period_s());
-        Ok(Self { velocity, constant: parameters.constant()? })
+        Ok(Self { velocity, constant: parameters.constant() })
     }
 
     fn rate_gain_1_s(&self) -> f64 {

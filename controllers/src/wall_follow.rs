@@ -24,7 +24,7 @@ use crate::room::Room;
 use crate::velocity::{LoopsGains, VelocityLoop, VelocitySetPoint, VelocityState};
 use bus::component::Info;
 use bus::messages::WallEstimate;
-use diagnostics::parameter::{ParameterError, finite, positive, positive_up_to, refuse, require};
+use diagnostics::parameter::{ParameterError, finite, positive, refuse, require, up_to, within};
 use diagnostics::unit::{ACCELERATION, PER_SECOND, PER_SECOND_3, VELOCITY};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
@@ -130,43 +130,42 @@ pub struct WallFollowState {
 }
 
 /// Parameters of the wall-follow controller.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, bus::Parameters)]
 pub struct Parameters {
-    /// Vehicle file.
+    /// Vehicle file, relative to the manifest.
     vehicle: PathBuf,
-    /// Gains file; the built-in `controllers/gains/wall-follow.toml` where there is none.
+    /// Gains file, relative to the manifest.
+    #[parameter(shown = "the gains of controllers/gains/wall-follow.toml")]
     gains: Option<PathBuf>,
-    /// "varying" or "constant".
+    /// The speed shrinks with the distance to the wall ahead, or speed and distance are constant.
+    #[parameter(range = "`varying`, `constant`", example = "\"varying\"")]
     mode: Mode,
-    /// Height above the ground below.
+    /// Height above what is below.
+    #[parameter(check = positive, example = "1.0")]
     altitude_m: f64,
     /// The constant speed, or the most of the varying one.
+    #[parameter(shown = "0.7, varying 1.5", check = up_to(SPEED_MAX_M_S, "m/s"))]
     speed_m_s: Option<f64>,
-    /// Distance from the walls.
-    #[serde(default = "default_distance_m")]
+    /// Level distance from the walls.
+    ///
+    /// Thesis §5.5.
+    #[parameter(default = 3.0, check = up_to(DISTANCE_MAX_M, "m"))]
     distance_m: f64,
     /// Yaw.
-    #[serde(default)]
+    #[parameter(default = 0.0, check = finite)]
     heading_rad: f64,
     /// The state in which it begins.
-    #[serde(default = "default_start_state")]
+    #[parameter(default = 1, check = within(1.0..=5.0, "1 to 5"))]
     start_state: u32,
-    /// Size of the room, where it is shared with other vehicles.
+    /// Mode constant, in a room shared with other vehicles: its size along the heading's x and y.
+    #[parameter(range = "two lengths above 2 `distance_m`")]
     room_m: Option<[f64; 2]>,
-    /// Place at the start, from the walls at -x and -y.
+    /// Place at the start, from the walls at −x and −y, with `room_m`.
+    #[parameter(shown = "what the beams tell", range = "within `room_m`")]
     start_in_room_m: Option<[f64; 2]>,
-    /// Least distance to a vehicle ahead.
+    /// It stops where a vehicle ahead is this near, and slows down from twice this on, with `room_m`.
+    #[parameter(shown = "0.6", check = up_to(DISTANCE_MAX_M, "m"))]
     ahead_min_m: Option<f64>,
-}
-
-/// Thesis §5.5.
-fn default_distance_m() -> f64 {
-    3.0
-}
-
-fn default_start_state() -> u32 {
-    1
 }
 
 /// Tuned, no source: the thesis does not say how fast it flies.
@@ -182,15 +181,6 @@ const SPEED_MAX_M_S: f64 = 2.0;
 const DISTANCE_MAX_M: f64 = 5.0;
 
 impl Parameters {
-    fn check(&self) -> Result<(), ParameterError> {
-        positive("altitude_m", self.altitude_m)?;
-        finite("heading_rad", self.heading_rad)?;
-        positive_up_to("distance_m", self.distance_m, DISTANCE_MAX_M, "m")?;
-        let speed_m_s = self.speed_m_s.unwrap_or(CONSTANT_SPEED_M_S);
-        positive_up_to("speed_m_s", speed_m_s, SPEED_MAX_M_S, "m/s")?;
-        require("start_state", self.start_state, (1..=5).contains(&self.start_state), "1 to 5")
-    }
-
     fn shared(&self) -> Result<Option<Shared>, ParameterError> {
         let of_a_room = [
             ("start_in_room_m", self.start_in_room_m.is_some()),
@@ -211,7 +201,6 @@ impl Parameters {
         let expected = format!("two lengths above 2 distance_m = {least_m} m");
         require("room_m", format_args!("{size_m:?}"), has_room, expected)?;
         let ahead_min_m = self.ahead_min_m.unwrap_or(AHEAD_MIN_M);
-        positive_up_to("ahead_min_m", ahead_min_m, DISTANCE_MAX_M, "m")?;
         let start_m = self.start_in_room_m.unwrap_or(size_m);
         let is_within = start_m.iter().zip(size_m).all(|(at_m, side_m)| (0.0..=side_m).contains(at_m));
         let expected = format!("within room_m = {size_m:?} m");
@@ -234,7 +223,6 @@ impl Law for WallFollowLaw {
     }
 
     fn new(parameters: &Self::Parameters, context: &LawContext<'_>) -> Result<Self, ParameterError> {
-        parameters.check()?;
         let gains = WallFollowGains::load(&context.node.files, parameters.gains.as_deref())?;
         let nominal_m_s =
             if parameters.mode == Mode::Varying { VARYING_SPEED_M_S } else { CONSTANT_SPEED_M_S };

@@ -18,7 +18,7 @@ use crate::law_inputs::WallInputs;
 use crate::legs::{self, Beam, Leg};
 use crate::velocity::{LoopsGains, VelocityLoop, VelocitySetPoint, VelocityState};
 use bus::component::Info;
-use diagnostics::parameter::{ParameterError, finite, positive, positive_up_to, refuse, require};
+use diagnostics::parameter::{ParameterError, finite, positive, refuse, up_to, within};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
@@ -100,39 +100,37 @@ enum Mode {
 }
 
 /// Parameters of the thesis's wall-follow controller.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, bus::Parameters)]
 pub struct Parameters {
-    /// Vehicle file.
+    /// Vehicle file, relative to the manifest.
     vehicle: PathBuf,
-    /// Gains file; the built-in `controllers/gains/wall-follow-thesis.toml` where there is none.
+    /// Gains file, relative to the manifest.
+    #[parameter(shown = "the gains of controllers/gains/wall-follow-thesis.toml")]
     gains: Option<PathBuf>,
-    /// "varying" or "constant".
+    /// A tilt towards the wall ahead that falls with the distance to it, and no velocity across (Figs 5.36–5.45), or velocity commands
+    /// that switch in steps with the states (Figs 5.46–5.54).
+    #[parameter(range = "`varying`, `constant`", example = "\"varying\"")]
     mode: Mode,
-    /// Height above the ground below.
+    /// Height above what is below.
+    #[parameter(check = positive, example = "1.0")]
     altitude_m: f64,
     /// Mode varying: tilt far from the wall ahead.
+    #[parameter(shown = "2.0", check = up_to(TILT_MAX_DEG, "deg"))]
     tilt_deg: Option<f64>,
     /// Mode constant: the speed.
+    #[parameter(shown = "0.5", check = up_to(SPEED_MAX_M_S, "m/s"))]
     speed_m_s: Option<f64>,
-    /// Distance from a wall ahead at which the next state begins.
-    #[serde(default = "default_distance_m")]
+    /// Level distance from the wall ahead at which the next state begins.
+    ///
+    /// Thesis §5.5.
+    #[parameter(default = 3.0, check = up_to(DISTANCE_MAX_M, "m"))]
     distance_m: f64,
     /// Yaw.
-    #[serde(default)]
+    #[parameter(default = 0.0, check = finite)]
     heading_rad: f64,
     /// The state in which it begins.
-    #[serde(default = "default_start_state")]
+    #[parameter(default = 1, check = within(1.0..=5.0, "1 to 5"))]
     start_state: u32,
-}
-
-/// Thesis §5.5.
-fn default_distance_m() -> f64 {
-    3.0
-}
-
-fn default_start_state() -> u32 {
-    1
 }
 
 /// Tuned, no source: the thesis gives neither.
@@ -155,13 +153,11 @@ impl Parameters {
             Mode::Varying => {
                 of_the_other("speed_m_s", self.speed_m_s.is_some(), "constant")?;
                 let tilt_deg = self.tilt_deg.unwrap_or(TILT_DEG);
-                positive_up_to("tilt_deg", tilt_deg, TILT_MAX_DEG, "deg")?;
                 Ok(Ahead::Tilt(tilt_deg.to_radians()))
             }
             Mode::Constant => {
                 of_the_other("tilt_deg", self.tilt_deg.is_some(), "varying")?;
                 let speed_m_s = self.speed_m_s.unwrap_or(SPEED_M_S);
-                positive_up_to("speed_m_s", speed_m_s, SPEED_MAX_M_S, "m/s")?;
                 Ok(Ahead::Velocity(speed_m_s))
             }
         }
@@ -182,11 +178,6 @@ impl Law for WallFollowThesisLaw {
     }
 
     fn new(parameters: &Self::Parameters, context: &LawContext<'_>) -> Result<Self, ParameterError> {
-        positive("altitude_m", parameters.altitude_m)?;
-        finite("heading_rad", parameters.heading_rad)?;
-        positive_up_to("distance_m", parameters.distance_m, DISTANCE_MAX_M, "m")?;
-        let start_state = parameters.start_state;
-        require("start_state", start_state, (1..=5).contains(&start_state), "1 to 5")?;
         let gains = WallFollowThesisGains::load(&context.node.files, parameters.gains.as_deref())?;
         Ok(Self {
             velocity: VelocityLoop::new(&gains.loops, context.craft.hover_model(), context.node.period_s()),
@@ -195,7 +186,7 @@ impl Law for WallFollowThesisLaw {
             distance_m: parameters.distance_m,
             altitude_m: parameters.altitude_m,
             heading_rad: parameters.heading_rad,
-            start_state,
+            start_state: parameters.start_state,
         })
     }
 

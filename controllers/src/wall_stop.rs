@@ -18,9 +18,8 @@ use crate::law::{Law, LawContext, Predecessor};
 use crate::law_inputs::WallInputs;
 use crate::velocity::{LoopsGains, VelocityLoop, VelocitySetPoint, VelocityState};
 use bus::component::Info;
-use diagnostics::parameter::{ParameterError, finite, positive, positive_up_to};
+use diagnostics::parameter::{ParameterError, finite, positive, up_to};
 use diagnostics::unit::{ACCELERATION, LENGTH, PER_SECOND, PER_SECOND_3, TIME, VELOCITY};
-use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
 /// Flying at the cruising speed.
@@ -111,34 +110,29 @@ pub struct WallStopState {
 }
 
 /// Parameters of the wall-stop controller.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, bus::Parameters)]
 pub struct Parameters {
-    /// Vehicle file.
+    /// Vehicle file, relative to the manifest.
     vehicle: PathBuf,
-    /// Gains file; the built-in `controllers/gains/wall-stop.toml` where there is none.
+    /// Gains file, relative to the manifest.
+    #[parameter(shown = "the gains of controllers/gains/wall-stop.toml")]
     gains: Option<PathBuf>,
-    /// Height above the ground below.
+    /// Height above what is below.
+    #[parameter(check = positive, example = "1.0")]
     altitude_m: f64,
-    /// Speed towards the wall.
-    #[serde(default = "default_cruise_speed_m_s")]
+    /// Speed towards the wall. It never flies faster than it could stop before a wall just out of sight.
+    ///
+    /// Tuned, no source: the thesis does not say how fast it flies.
+    #[parameter(default = 1.0, check = up_to(SPEED_MAX_M_S, "m/s"))]
     cruise_speed_m_s: f64,
-    /// Distance from the wall at which it stops.
-    #[serde(default = "default_distance_m")]
+    /// Level distance from the wall at which it stops.
+    ///
+    /// Thesis §5.5.
+    #[parameter(default = 3.0, check = up_to(DISTANCE_MAX_M, "m"))]
     distance_m: f64,
     /// Yaw.
-    #[serde(default)]
+    #[parameter(default = 0.0, check = finite)]
     heading_rad: f64,
-}
-
-/// Tuned, no source: the thesis does not say how fast it flies.
-fn default_cruise_speed_m_s() -> f64 {
-    1.0
-}
-
-/// Thesis §5.5.
-fn default_distance_m() -> f64 {
-    3.0
 }
 
 /// Beyond this the sensors' reach of 7.65 m (thesis §5.5) leaves too little to brake in.
@@ -158,10 +152,6 @@ impl Law for WallStopLaw {
     }
 
     fn new(parameters: &Self::Parameters, context: &LawContext<'_>) -> Result<Self, ParameterError> {
-        positive("altitude_m", parameters.altitude_m)?;
-        finite("heading_rad", parameters.heading_rad)?;
-        positive_up_to("cruise_speed_m_s", parameters.cruise_speed_m_s, SPEED_MAX_M_S, "m/s")?;
-        positive_up_to("distance_m", parameters.distance_m, DISTANCE_MAX_M, "m")?;
         let gains = WallStopGains::load(&context.node.files, parameters.gains.as_deref())?;
         Ok(Self {
             velocity: VelocityLoop::new(&gains.loops, context.craft.hover_model(), context.node.period_s()),

@@ -16,9 +16,8 @@ use crate::law::{Law, LawContext, Predecessor};
 use crate::law_inputs::WallInputs;
 use crate::velocity::{LoopsGains, VelocityLoop, VelocitySetPoint, VelocityState};
 use bus::component::Info;
-use diagnostics::parameter::{ParameterError, finite, positive, positive_up_to};
+use diagnostics::parameter::{ParameterError, finite, positive, up_to};
 use diagnostics::unit::PER_SECOND_2;
-use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
 /// Flying by the pitch that the distance makes.
@@ -89,34 +88,29 @@ pub struct WallStopThesisState {
 }
 
 /// Parameters of the thesis's wall-stop controller.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, bus::Parameters)]
 pub struct Parameters {
-    /// Vehicle file.
+    /// Vehicle file, relative to the manifest.
     vehicle: PathBuf,
-    /// Gains file; the built-in `controllers/gains/wall-stop-thesis.toml` where there is none.
+    /// Gains file, relative to the manifest.
+    #[parameter(shown = "the gains of controllers/gains/wall-stop-thesis.toml")]
     gains: Option<PathBuf>,
-    /// Height above the ground below.
+    /// Height above what is below.
+    #[parameter(check = positive, example = "1.0")]
     altitude_m: f64,
-    /// Pitch of free flight, far from the wall.
-    #[serde(default = "default_pitch_deg")]
+    /// Pitch of free flight far from the wall.
+    ///
+    /// Tuned, no source: the thesis's text has no number. From 5 m to go and in still air the law alone makes 0.96 m/s.
+    #[parameter(default = 1.0, check = up_to(PITCH_MAX_DEG, "deg"))]
     pitch_deg: f64,
-    /// Distance from the wall at which it stops.
-    #[serde(default = "default_distance_m")]
+    /// Level distance from the wall at which it stops.
+    ///
+    /// Thesis §5.5.
+    #[parameter(default = 3.0, check = up_to(DISTANCE_MAX_M, "m"))]
     distance_m: f64,
     /// Yaw.
-    #[serde(default)]
+    #[parameter(default = 0.0, check = finite)]
     heading_rad: f64,
-}
-
-/// Tuned, no source: the thesis's text has no number. From 5 m to go and in still air the law alone makes 0.96 m/s.
-fn default_pitch_deg() -> f64 {
-    1.0
-}
-
-/// Thesis §5.5.
-fn default_distance_m() -> f64 {
-    3.0
 }
 
 /// Beyond this it comes too fast to stop within the 3 m. Tuned, no source.
@@ -138,10 +132,6 @@ impl Law for WallStopThesisLaw {
     }
 
     fn new(parameters: &Self::Parameters, context: &LawContext<'_>) -> Result<Self, ParameterError> {
-        positive("altitude_m", parameters.altitude_m)?;
-        finite("heading_rad", parameters.heading_rad)?;
-        positive_up_to("pitch_deg", parameters.pitch_deg, PITCH_MAX_DEG, "deg")?;
-        positive_up_to("distance_m", parameters.distance_m, DISTANCE_MAX_M, "m")?;
         let gains = WallStopThesisGains::load(&context.node.files, parameters.gains.as_deref())?;
         Ok(Self {
             velocity: VelocityLoop::new(&gains.loops, context.craft.hover_model(), context.node.period_s()),

@@ -199,7 +199,8 @@ fn what_is_wrong_with_a_segment_is_named_with_its_place() {
 
 #[test]
 fn the_example_of_the_documentation_can_be_flown() {
-    let text = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/manifest.md")).unwrap();
+    let text =
+        std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/set-points.md")).unwrap();
     let examples = text.split("```toml\n").skip(1).map(|rest| rest.split("```").next().unwrap());
     let of_segments: Vec<_> = examples.filter(|example| example.contains("segments = [")).collect();
     assert_eq!(of_segments.len(), 1);

@@ -3,6 +3,7 @@
 use crate::nearest::nearest;
 use crate::place::Place;
 use std::fmt::{self, Display};
+use std::ops::RangeBounds;
 
 /// A parameter that a component refuses.
 ///
@@ -317,6 +318,25 @@ pub fn not_negative(key: &str, value: f64) -> Result<(), ParameterError> {
 pub fn positive_up_to(key: &str, value: f64, max: f64, unit: &str) -> Result<(), ParameterError> {
     let is_good = value > 0.0 && value <= max;
     require(key, value, is_good, format!("above 0 and at most {max} {unit}").trim_end())
+}
+
+/// Passes a number above zero and up to `max`, in `unit`, as [`positive_up_to`] does.
+pub fn up_to(max: f64, unit: &'static str) -> impl Fn(&str, f64) -> Result<(), ParameterError> {
+    move |key, value| positive_up_to(key, value, max, unit)
+}
+
+/// Passes a number in `range`, which `expected` describes.
+///
+/// ```
+/// use diagnostics::parameter::within;
+///
+/// assert!(within(0.0..=1.0, "0 to 1")("loss", 1.5).is_err());
+/// ```
+pub fn within(
+    range: impl RangeBounds<f64>,
+    expected: &'static str,
+) -> impl Fn(&str, f64) -> Result<(), ParameterError> {
+    move |key, value| require(key, value, range.contains(&value), expected)
 }
 
 /// Passes numbers that `check` passes, each.

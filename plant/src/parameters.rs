@@ -11,7 +11,7 @@ use crate::rapier::{Misfit, Rapier};
 use crate::state::RigidBody;
 use bus::context::NodeContext;
 use diagnostics::Diagnostic;
-use diagnostics::parameter::{ParameterError, all, finite, positive, refuse, require};
+use diagnostics::parameter::{ParameterError, finite, positive, refuse, within};
 use inputs::InputFiles;
 use nalgebra::{UnitQuaternion, Vector3};
 use scenes::{Mesh, Scene};
@@ -20,31 +20,35 @@ use std::path::PathBuf;
 use vehicles::{EffectEntry, Vehicle};
 
 /// Parameters of the plant.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, bus::Parameters)]
 pub struct Parameters {
-    /// Vehicle file.
+    /// Vehicle file, relative to the manifest.
     vehicle: PathBuf,
-    /// Scene file; nothing but the ground where it is left out.
+    /// Scene file, relative to the manifest.
+    #[parameter(shown = "nothing but the ground")]
     scene: Option<PathBuf>,
-    /// Physics that moves the vehicle.
-    #[serde(default)]
+    /// Physics that moves the vehicle: free flight, or the same forces in a scene.
+    #[parameter(default = BackendName::default(), shown = "newton-euler", range = "`newton-euler`, `rapier`")]
     backend: BackendName,
-    /// Position of the centre of mass at tick 0, in the world.
-    #[serde(default)]
+    /// Centre of mass at tick 0, in the world.
+    #[parameter(default = [0.0; 3], check = finite)]
     initial_position_m: [f64; 3],
-    /// Velocity of the centre of mass at tick 0, in the world.
-    #[serde(default)]
+    /// Its velocity, in the world.
+    #[parameter(default = [0.0; 3], check = finite)]
     initial_velocity_m_s: [f64; 3],
     /// Heading at tick 0, counter-clockwise from the world's x.
-    #[serde(default)]
+    #[parameter(default = 0.0, check = finite)]
     initial_yaw_deg: f64,
-    /// Integration steps per tick; 2 keep chirps of 100 degrees of tilt within 1e-6 m over 10 s at 1 kHz.
-    #[serde(default = "two")]
+    /// Integration steps per tick.
+    ///
+    /// 2 keep chirps of 100 degrees of tilt within 1e-6 m over 10 s at 1 kHz.
+    #[parameter(default = 2, check = within(1.0..=SUBSTEPS_MAX, "1 to 1000"))]
     pub(crate) substeps: u32,
-    /// With a `measured` input: time between two settings to the measured state.
+    /// With the input `measured`: time between two settings to the measured state.
+    #[parameter(shown = "required with `measured`", check = positive)]
     window_s: Option<f64>,
     /// With `rapier`: an impact that is faster is a crash.
+    #[parameter(shown = "1.0", check = positive)]
     crash_speed_m_s: Option<f64>,
 }
 
@@ -61,11 +65,7 @@ enum BackendName {
 const CRASH_SPEED_M_S: f64 = 1.0;
 
 /// More steps than these gain nothing at 1 kHz, and would look like a run that hangs: tuned, no source.
-const SUBSTEPS_MAX: u32 = 1000;
-
-fn two() -> u32 {
-    2
-}
+const SUBSTEPS_MAX: f64 = 1000.0;
 
 /// Refuses an initial command that does not have one number for each rotor.
 fn refuse_initial(vehicle: &Vehicle, run: &NodeContext<'_>) -> Result<(), ParameterError> {
@@ -128,13 +128,6 @@ impl Parameters {
 
     /// Refuses invalid parameters.
     fn check(&self, run: &NodeContext<'_>) -> Result<(), ParameterError> {
-        all(finite, "initial_position_m", &self.initial_position_m)?;
-        all(finite, "initial_velocity_m_s", &self.initial_velocity_m_s)?;
-        finite("initial_yaw_deg", self.initial_yaw_deg)?;
-        let substeps_are_good = (1..=SUBSTEPS_MAX).contains(&self.substeps);
-        require("substeps", self.substeps, substeps_are_good, format!("1 to {SUBSTEPS_MAX}"))?;
-        self.window_s.map_or(Ok(()), |window_s| positive("window_s", window_s))?;
-        self.crash_speed_m_s.map_or(Ok(()), |speed_m_s| positive("crash_speed_m_s", speed_m_s))?;
         let flies_freely = self.backend == BackendName::NewtonEuler;
         let (is_measured, has_window) = (run.has("measured"), self.window_s.is_some());
         let conflicts = [

@@ -15,7 +15,6 @@ use bus::messages::Time;
 use bus::random::{self, Stream, normal, stream};
 use bus::{Message, OutputPorts};
 use diagnostics::parameter::{ParameterError, not_negative, refuse, require};
-use serde::Deserialize;
 use std::f64::consts::PI;
 use std::path::PathBuf;
 use vehicles::{CommandMap, Vehicle};
@@ -25,41 +24,37 @@ use vehicles::{CommandMap, Vehicle};
 const WORDS_PER_TICK: u128 = 1 << 10;
 
 /// Parameters of the stand.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, bus::Parameters)]
 pub struct Parameters {
-    /// Vehicle file.
+    /// Vehicle file, relative to the manifest.
     vehicle: PathBuf,
     /// Number of the vehicle's rotor on the stand, from 1.
-    #[serde(default = "first")]
+    #[parameter(default = 1, range = "1 to the number of rotors")]
     rotor: usize,
-    /// The commanded speed over time; 0 before the first.
+    /// List of changes of the commanded speed; it is 0 before the first.
+    #[parameter(table = SpeedEntry, entry = "N", example = "[{ at_s = 0.0, to_rpm = 3900.0 }, { at_s = 5.0, over_s = 20.0, to_rpm = 8600.0 }]")]
     speeds: Vec<SpeedEntry>,
-    /// Standard deviation of a reading of the force, N.
-    #[serde(default)]
+    /// Standard deviation of a reading of the force.
+    #[parameter(default = 0.0, check = not_negative)]
     force_noise_N: f64,
-    /// Standard deviation of a reading of the torque, N·m; the drag torque is computed from that reading.
-    #[serde(default)]
+    /// Standard deviation of a reading of the torque on the mount, from which the drag torque is computed.
+    #[parameter(default = 0.0, check = not_negative)]
     torque_noise_N_m: f64,
-    /// Standard deviation of a reading of the speed, rad/s.
-    #[serde(default)]
+    /// Standard deviation of a reading of the speed.
+    #[parameter(default = 0.0, check = not_negative)]
     speed_noise_rad_s: f64,
 }
 
-fn first() -> usize {
-    1
-}
-
 /// Change of the commanded speed.
-#[derive(Debug, Clone, Copy, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Clone, Copy, bus::Parameters)]
 pub struct SpeedEntry {
-    /// Start of the change, s; not before the change ahead of it is over.
+    /// Start of the change; not before the change ahead of it is over.
     at_s: f64,
-    /// Duration of the change, s; 0 for a step.
-    #[serde(default)]
+    /// Duration of the change; 0 for a step.
+    #[parameter(default = 0.0)]
     over_s: f64,
     /// Speed after the change: 0, or one that the vehicle's motors can be asked for.
+    #[parameter(unit = "rpm")]
     to_rpm: f64,
 }
 
@@ -166,9 +161,6 @@ impl Component for PropellerStand {
     fn new(parameters: Parameters, run: &NodeContext<'_>) -> Result<Self, ParameterError> {
         let Parameters { vehicle, rotor, speeds, force_noise_N, torque_noise_N_m, speed_noise_rad_s } =
             parameters;
-        not_negative("force_noise_N", force_noise_N)?;
-        not_negative("torque_noise_N_m", torque_noise_N_m)?;
-        not_negative("speed_noise_rad_s", speed_noise_rad_s)?;
         let sigmas = [force_noise_N, torque_noise_N_m, speed_noise_rad_s];
         let noise = Noise { sigmas, random: stream(run.seed, run.name) };
         let vehicle = Vehicle::load_from(&run.files, &vehicle);

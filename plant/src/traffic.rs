@@ -7,7 +7,6 @@ use bus::context::{NodeContext, StepContext};
 use bus::messages::{PlantState, Traffic as Gathered};
 use bus::ports::Many;
 use diagnostics::parameter::{ParameterError, refuse};
-use serde::Deserialize;
 
 /// Gathers the states of the plants of a run.
 ///
@@ -23,8 +22,7 @@ use serde::Deserialize;
 pub struct Traffic;
 
 /// Parameters of the traffic: none.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, bus::Parameters)]
 pub struct Parameters {}
 
 /// Outputs of the traffic.

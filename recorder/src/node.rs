@@ -24,16 +24,14 @@ const FLUSH_PERIOD_S: f64 = 1.0;
 /// assert!(parameters.attachments.is_empty());
 /// # Ok::<(), diagnostics::ParameterError>(())
 /// ```
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, bus::Parameters)]
 pub struct Parameters {
     /// The file to write.
     pub path: PathBuf,
     /// Files to attach.
-    #[serde(default)]
+    #[parameter(default = Vec::new())]
     pub attachments: Vec<AttachedFile>,
     /// Files by which others watch the run; absent where nobody can.
-    #[serde(default)]
     pub watch: Option<WatchFiles>,
 }
 

@@ -68,8 +68,8 @@ pub struct Summary {
     /// Backups that joined the run, took over, or were refused.
     #[serde(rename = "successions")]
     pub replacements: Vec<Replacement>,
-    /// Quantities beyond the envelope in which the vehicle's model was validated; of recorded flights only.
-    pub beyond: Vec<Beyond>,
+    /// Quantities beyond the envelope in which the vehicle's model was validated; `None` of a flight that was not recorded.
+    pub beyond: Option<Vec<Beyond>>,
     /// Differences between shadows and the processes that they shadowed.
     pub shadows: Vec<Difference>,
     /// Warnings of `check`; printed before the flight.
@@ -173,7 +173,7 @@ impl Summary {
             measures: Vec::new(),
             compare: Vec::new(),
             replacements,
-            beyond: Vec::new(),
+            beyond: None,
             shadows: Vec::new(),
             warnings: Vec::new(),
         }
@@ -198,7 +198,7 @@ impl Summary {
     pub fn describe(&mut self, recording: &Recording, plan: &Plan) -> Result<()> {
         shadow::add_steps(recording, plan, &mut self.replacements)?;
         self.shadows = shadow::differences(recording, &shadow::joins(plan, &self.replacements))?;
-        self.beyond = beyond::of(recording)?;
+        self.beyond = Some(beyond::of(recording)?);
         self.recording = Some(recording.path().to_owned());
         Ok(())
     }
@@ -286,7 +286,7 @@ impl fmt::Display for Summary {
         f.write_str(&shadow::lines(&self.shadows))?;
         self.compare.iter().try_for_each(|errors| writeln!(f, "{errors}"))?;
         self.pass.iter().chain(&self.measures).try_for_each(|verdict| writeln!(f, "{verdict}"))?;
-        self.beyond.iter().try_for_each(|beyond| writeln!(f, "{beyond}"))?;
+        self.beyond.iter().flatten().try_for_each(|beyond| writeln!(f, "{beyond}"))?;
         if self.is_unjudged {
             let why = "the run before had no judge in flight; one that writes checkpoints by itself has";
             writeln!(f, "  conditions: not judged, {why}")?;

@@ -4,14 +4,16 @@
 //! - `sample`: the state of a run at a moment, and the rates between two moments
 //! - `screen`: the drawing of a view
 //! - `keys`: actions of the keys
+//! - `vehicles`: heights and attitudes of the vehicles
 #![allow(clippy::disallowed_methods, reason = "rates are per host time")]
 
 mod keys;
 mod sample;
 mod screen;
+mod vehicles;
 mod view;
 
-pub use view::{ProcessRow, View};
+pub use view::{ProcessRow, VehicleRow, View};
 
 use anyhow::Result;
 use keys::Keys;
@@ -39,10 +41,11 @@ const ONCE: Duration = Duration::from_millis(500);
 /// # Errors
 /// If it has ended.
 pub fn look(run: &Arc<LiveRun>) -> Result<View> {
-    let source = Source::open(run)?;
+    let mut source = Source::open(run)?;
     let before = source.sample();
     std::thread::sleep(ONCE);
-    Ok(source.between(&before, &source.sample()))
+    let after = source.sample();
+    Ok(source.between(&before, &after))
 }
 
 /// Looks at a run again and again, at any times.
@@ -84,9 +87,9 @@ impl Watcher {
 /// # Errors
 /// If the run has ended, or the terminal cannot be drawn on.
 pub fn watch(run: &Arc<LiveRun>, is_terminated: &AtomicBool) -> Result<()> {
-    let source = Source::open(run)?;
+    let mut source = Source::open(run)?;
     let mut terminal = ratatui::try_init()?;
-    let result = draw_until_left(&mut terminal, Keys::new(run), &source, is_terminated);
+    let result = draw_until_left(&mut terminal, Keys::new(run), &mut source, is_terminated);
     ratatui::try_restore()?;
     result
 }
@@ -99,7 +102,7 @@ pub fn restore_terminal() {
 fn draw_until_left(
     terminal: &mut DefaultTerminal,
     mut keys: Keys,
-    source: &Source,
+    source: &mut Source,
     is_terminated: &AtomicBool,
 ) -> Result<()> {
     let mut looks: VecDeque<Sample> = VecDeque::from([source.sample()]);

@@ -129,6 +129,7 @@ impl Graph {
         faults.keep(processes::require_core(manifest, clock_cpu, "clock_cpu"));
         placement::place(&mut plan, clock_cpu.as_ref().map(|cpu| *cpu.get_ref()));
         let groups = faults.keep(groups::of(manifest, &declared_nodes, &plan.nodes));
+        let groups = groups.map(|groups| placement::place_groups(&plan, groups));
         if manifest.content.run.window_ticks.is_none() && groups.as_ref().is_some_and(|it| !it.is_empty()) {
             plan.window_ticks = GROUPS_WINDOW_TICKS;
         }

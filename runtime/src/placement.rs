@@ -1,6 +1,6 @@
 //! Graph questions about a run: cycles, depths, and which nodes share a core.
 
-use bus::plan::{NodePlan, Plan};
+use bus::plan::{GroupPlan, NodePlan, Plan};
 
 /// A cycle of edges without delay, as node indices in the direction of the data.
 pub fn zero_delay_cycle(nodes: &[NodePlan], publisher: impl Fn(usize) -> usize) -> Option<Vec<usize>> {
@@ -66,6 +66,18 @@ pub fn place(plan: &mut Plan, clock_cpu: Option<usize>) {
         let default = in_loop.or(spread).map_or(last, |number| loop_cores[number % loop_cores.len()]);
         node.cpu = node.cpu.or(Some(default));
     }
+}
+
+/// Gives each of `groups` without a core that of its first member in a feedback loop, or else of its first member.
+pub fn place_groups(plan: &Plan, groups: Vec<GroupPlan>) -> Vec<GroupPlan> {
+    let loops = feedback_loops(plan);
+    let placed = |group: GroupPlan| {
+        let nodes = || group.members.iter().map(|member| member.node);
+        let node = nodes().find(|&node| loops[node].is_some()).or_else(|| nodes().next());
+        let cpu = group.cpu.or_else(|| plan.nodes[node?].cpu);
+        GroupPlan { cpu, ..group }
+    };
+    groups.into_iter().map(placed).collect()
 }
 
 /// Number of the feedback loop of each node, if it is in one: nodes that reach each other, delays included.

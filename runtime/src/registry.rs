@@ -1,6 +1,7 @@
 //! The components that a manifest may name.
 
 use bus::component::{Role, Transfer};
+use bus::parameters::Parameter;
 use bus::schema::Schema;
 use bus::{BusError, Registration};
 use std::collections::BTreeMap;
@@ -40,8 +41,8 @@ pub struct NodeProgram {
     pub name: &'static str,
     /// Purpose, in one line.
     pub summary: &'static str,
-    /// The names of its parameters.
-    pub parameters: &'static [&'static str],
+    /// Its parameters.
+    pub parameters: &'static [Parameter],
     /// Joins the run that started this process and takes part in it; is given the components, whose messages it may exchange.
     pub run: fn(&'static [Registration]) -> Result<(), BusError>,
 }

@@ -21,7 +21,7 @@ const PRESSURE_MIN_PA: f64 = 1.0e3;
 /// The most, Pa (the same: 1200 mbar).
 const PRESSURE_MAX_PA: f64 = 1.2e5;
 
-parameters! {
+timed_parameters! {
     /// Parameters of a barometer; the defaults are a MEAS Switzerland (TE Connectivity) MS5611-01BA03.
     ///
     /// Its data sheet (DA5611-01BA03): resolution 0.012 mbar RMS at an oversampling ratio of 4096, which is its noise;
@@ -42,18 +42,24 @@ parameters! {
     /// ```
     #[derive(Copy)]
     pub struct BarometerParams timed { rate_hz: 50.0, delay_ms: 16.0 } {
-        /// True pressure at the world's origin, Pa.
-        ground_pressure_Pa: f64 = SEA_LEVEL_PRESSURE_PA => positive,
-        /// Pressure at which the altitude is zero, Pa.
-        reference_pressure_Pa: f64 = SEA_LEVEL_PRESSURE_PA => positive,
-        /// Standard deviation of a reading, Pa.
-        noise_Pa: f64 = 1.2 => not_negative,
-        /// The bias at the first reading, Pa.
-        initial_bias_Pa: f64 = 0.0 => finite,
-        /// Random walk of the bias, Pa/√s.
-        bias_walk_Pa_sqrt_s: f64 = 0.2 => not_negative,
-        /// Readings are multiples of this, Pa; 0 for any reading.
-        resolution_Pa: f64 = 1.0 => not_negative,
+        /// True pressure at the world's origin.
+        #[parameter(default = SEA_LEVEL_PRESSURE_PA, check = positive)]
+        pub ground_pressure_Pa: f64,
+        /// Pressure at which the altitude is zero.
+        #[parameter(default = SEA_LEVEL_PRESSURE_PA, check = positive)]
+        pub reference_pressure_Pa: f64,
+        /// Standard deviation of a reading.
+        #[parameter(default = 1.2, check = not_negative)]
+        pub noise_Pa: f64,
+        /// The bias at the first reading.
+        #[parameter(default = 0.0, check = finite)]
+        pub initial_bias_Pa: f64,
+        /// Random walk of the bias.
+        #[parameter(default = 0.2, check = not_negative)]
+        pub bias_walk_Pa_sqrt_s: f64,
+        /// Readings are multiples of this; 0 for any reading.
+        #[parameter(default = 1.0, check = not_negative)]
+        pub resolution_Pa: f64,
     }
 }
 

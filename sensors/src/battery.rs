@@ -6,17 +6,16 @@
 //! battery, nothing is measured and `valid` is 0.
 
 use crate::channel::Chance;
-use crate::parameters::within;
 use crate::sensing::Sensor;
 use crate::steps::in_steps;
 use bus::InputPorts;
 use bus::component::Info;
 use bus::messages::Battery;
 use bus::random::normal;
-use diagnostics::parameter::{ParameterError, finite, not_negative, positive};
+use diagnostics::parameter::{ParameterError, finite, not_negative, positive, within};
 use inputs::InputFiles;
 
-parameters! {
+timed_parameters! {
     /// Parameters of a battery monitor; the defaults are a Texas Instruments INA226 with a shunt of 2 mΩ.
     ///
     /// Its data sheet (SBOS547): 1.25 mV a count of voltage, 2.5 µV a count of shunt voltage, which is 1.25 mA; 1.1 ms
@@ -36,22 +35,30 @@ parameters! {
     /// ```
     #[derive(Copy)]
     pub struct BatteryParams timed { rate_hz: 10.0, delay_ms: 2.2 } {
-        /// Standard deviation of a voltage, V.
-        voltage_noise_V: f64 = 1.25e-3 => not_negative,
-        /// Constant error of the voltage, V.
-        voltage_bias_V: f64 = 0.0 => finite,
-        /// Voltages are multiples of this, V; 0 for any.
-        voltage_resolution_V: f64 = 1.25e-3 => not_negative,
-        /// Standard deviation of a current, A.
-        current_noise_A: f64 = 1.25e-3 => not_negative,
-        /// Constant error of the current, A.
-        current_bias_A: f64 = 0.0 => finite,
-        /// Currents are multiples of this, A; 0 for any.
-        current_resolution_A: f64 = 1.25e-3 => not_negative,
-        /// Capacity of the battery, A·h.
-        capacity_Ah: f64 = 2.1 => positive,
-        /// The charge that is taken for granted at the first measurement, 0 to 1.
-        initial_charge: f64 = 1.0 => within(0.0..=1.0, "from 0 to 1"),
+        /// Standard deviation of a voltage.
+        #[parameter(default = 1.25e-3, check = not_negative)]
+        pub voltage_noise_V: f64,
+        /// Constant error of the voltage.
+        #[parameter(default = 0.0, check = finite)]
+        pub voltage_bias_V: f64,
+        /// Voltages are multiples of this; 0 for any.
+        #[parameter(default = 1.25e-3, check = not_negative)]
+        pub voltage_resolution_V: f64,
+        /// Standard deviation of a current.
+        #[parameter(default = 1.25e-3, check = not_negative)]
+        pub current_noise_A: f64,
+        /// Constant error of the current.
+        #[parameter(default = 0.0, check = finite)]
+        pub current_bias_A: f64,
+        /// Currents are multiples of this; 0 for any.
+        #[parameter(default = 1.25e-3, check = not_negative)]
+        pub current_resolution_A: f64,
+        /// Capacity of the battery.
+        #[parameter(default = 2.1, check = positive)]
+        pub capacity_Ah: f64,
+        /// The charge that is taken for granted at the first measurement.
+        #[parameter(default = 1.0, check = within(0.0..=1.0, "from 0 to 1"))]
+        pub initial_charge: f64,
     }
 }
 

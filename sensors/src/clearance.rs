@@ -19,16 +19,19 @@ const REACH_M: f64 = 1000.0;
 /// Nearer to the world's origin than this no laps are counted, m.
 const MIDDLE_M: f64 = 0.5;
 
-parameters! {
-    /// Parameters of the clearance node.
-    pub struct Parameters {
-        /// Scene file; there is no default.
-        scene: Option<PathBuf> = None,
-        /// The distance to keep from the wall, m.
-        keep_m: f64 = 3.0 => not_negative,
-        /// Along a side, the wall ahead and the wall behind are at least this much farther than `keep_m`, m.
-        corner_m: f64 = 0.75 => not_negative,
-    }
+/// Parameters of the clearance node.
+#[derive(Debug, Clone, PartialEq, bus::Parameters)]
+#[parameters(default)]
+pub struct Parameters {
+    /// Scene file, relative to the manifest.
+    #[parameter(shown = "required")]
+    pub scene: Option<PathBuf>,
+    /// Distance from the wall that is to be kept.
+    #[parameter(default = 3.0, check = not_negative)]
+    pub keep_m: f64,
+    /// Along a side, the wall ahead and the wall behind are at least this much farther than `keep_m`.
+    #[parameter(default = 0.75, check = not_negative)]
+    pub corner_m: f64,
 }
 
 /// State of the component.
@@ -88,7 +91,6 @@ impl Component for ClearanceJudge {
     type State = ClearanceState;
 
     fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
-        parameters.validate()?;
         let Parameters { scene, keep_m, corner_m } = parameters;
         let caster = caster(&context.files, scene.as_deref())?;
         check_bodies(&caster, context)?;

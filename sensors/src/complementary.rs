@@ -21,35 +21,41 @@
 //! in dt and has no singularity; the blend happens in roll and pitch and leaves yaw to the gyroscope.
 
 use crate::imu_model::ImuReading;
-use crate::parameters::within;
 use crate::wire::{attitude, attitude_message, vector, vector_message};
+use bus::Parameters as _;
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::{AttitudeEstimate, Imu, Quaternion, Vector3 as VectorMessage};
 use bus::{InputPorts, Message, OutputPorts};
-use diagnostics::parameter::{ParameterError, not_negative, positive};
+use diagnostics::parameter::{ParameterError, not_negative, positive, within};
 use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::{PI, TAU};
 
 /// Beyond this pitch (rad) roll and yaw are hard to tell apart, and the accelerometer is left out.
 const PITCH_BLEND_MAX_RAD: f64 = 1.4;
 
-parameters! {
-    /// Parameters of the filter: its trust in the accelerometer.
-    #[derive(Copy)]
-    pub struct ComplementaryParams {
-        /// Time constant with which roll and pitch follow the accelerometer, s. Default 30 (tuned, no
-        /// source, see the head of this file); the thesis's 0.98 at 1 kHz is 0.049 s.
-        time_constant_s: f64 = 30.0 => positive,
-        /// In place of the time constant: the gyroscope's weight once a sample, as the thesis's 0.98 (§4.3) is
-        /// printed. The filter then depends on its period: see the head of this file. Default: none.
-        gyroscope_weight: Option<f64> = None => within(f64::EPSILON..1.0, "above 0 and below 1"),
-        /// The accelerometer is left out while the size of its reading differs from gravity by more than
-        /// this fraction: then it surely measures more than gravity. Default 0.2 (tuned, no source).
-        gravity_tolerance: f64 = 0.2 => not_negative,
-        /// Gravity, m/s². Default 9.81 (thesis §3.1).
-        gravity_m_s2: f64 = 9.81 => positive,
-    }
+/// Parameters of the filter: its trust in the accelerometer.
+#[derive(Debug, Clone, Copy, PartialEq, bus::Parameters)]
+#[parameters(default)]
+pub struct ComplementaryParams {
+    /// Time constant with which roll and pitch follow the accelerometer.
+    ///
+    /// Tuned, no source, see the head of this file; the thesis's 0.98 at 1 kHz is 0.049 s.
+    #[parameter(default = 30.0, check = positive)]
+    pub time_constant_s: f64,
+    /// In place of the time constant: the gyroscope's weight once every period; the thesis's is 0.98 (§4.3).
+    ///
+    /// The filter then depends on its period: see the head of this file.
+    #[parameter(check = within(f64::EPSILON..1.0, "above 0 and below 1"))]
+    pub gyroscope_weight: Option<f64>,
+    /// The accelerometer is left out where its reading differs from gravity by more than this fraction.
+    ///
+    /// Tuned, no source: then it surely measures more than gravity.
+    #[parameter(default = 0.2, check = not_negative)]
+    pub gravity_tolerance: f64,
+    /// Gravity (thesis §3.1).
+    #[parameter(default = 9.81, check = positive)]
+    pub gravity_m_s2: f64,
 }
 
 /// The gyroscope's weight once every `period_s` in a filter of `time_constant_s`.

@@ -16,7 +16,7 @@ use diagnostics::parameter::{ParameterError, finite, not_negative, positive};
 use inputs::InputFiles;
 use nalgebra::Vector3;
 
-parameters! {
+timed_parameters! {
     /// Parameters of a satellite receiver; the defaults are a u-blox NEO-M8N.
     ///
     /// Its data sheet (UBX-15031086): 10 Hz; horizontal position within 2.5 m half of the time, which for equal axes
@@ -38,16 +38,21 @@ parameters! {
     /// ```
     #[derive(Copy)]
     pub struct GpsParams timed { rate_hz: 10.0, delay_ms: 80.0 } {
-        /// Standard deviation of the position's white noise along each axis, m.
-        position_noise_m: [f64; 3] = [0.3, 0.3, 0.45] => not_negative,
-        /// Standard deviation of the position's drift along each axis, m.
-        position_drift_m: [f64; 3] = [2.1, 2.1, 3.15] => not_negative,
-        /// Time constant of the drift, s.
-        position_drift_time_s: f64 = 300.0 => positive,
-        /// Constant error of the position, m.
-        position_bias_m: [f64; 3] = [0.0; 3] => finite,
-        /// Standard deviation of the velocity's white noise along each axis, m/s.
-        velocity_noise_m_s: [f64; 3] = [0.074, 0.074, 0.111] => not_negative,
+        /// Standard deviation of the position's white noise along each axis.
+        #[parameter(default = [0.3, 0.3, 0.45], check = not_negative)]
+        pub position_noise_m: [f64; 3],
+        /// Standard deviation of the position's drift along each axis.
+        #[parameter(default = [2.1, 2.1, 3.15], check = not_negative)]
+        pub position_drift_m: [f64; 3],
+        /// Time constant of the drift.
+        #[parameter(default = 300.0, check = positive)]
+        pub position_drift_time_s: f64,
+        /// Constant error of the position.
+        #[parameter(default = [0.0; 3], check = finite)]
+        pub position_bias_m: [f64; 3],
+        /// Standard deviation of the velocity's white noise along each axis.
+        #[parameter(default = [0.074, 0.074, 0.111], check = not_negative)]
+        pub velocity_noise_m_s: [f64; 3],
     }
 }
 

@@ -11,11 +11,9 @@ use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::StateEstimate;
 use diagnostics::ParameterError;
-use serde::Deserialize;
 
 /// Parameters of the estimator: none.
-#[derive(Debug, Clone, Copy, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Clone, Copy, bus::Parameters)]
 pub struct Parameters {}
 
 /// Outputs of the component.

@@ -6,81 +6,109 @@
 
 use crate::channel::Timing;
 use crate::noise::{BiasWalk, WhiteNoise};
-use crate::parameters::within;
 use crate::wire::vector;
+use bus::Parameters as _;
 use bus::messages::Imu;
 use bus::random::{Stream, stream};
-use diagnostics::parameter::{ParameterError, finite, not_negative, positive};
+use diagnostics::parameter::{ParameterError, finite, not_negative, positive, within};
 use nalgebra::Vector3;
 
-parameters! {
-    /// Parameters of an IMU; the defaults are an Analog Devices ADIS16448.
-    ///
-    /// The noise densities and bias walks are those that the EuRoC micro aerial vehicle data set gives for
-    /// its ADIS16448 (Burri et al., "The EuRoC micro aerial vehicle datasets", IJRR 2016, file
-    /// `imu0/sensor.yaml`); no data sheet of a part of this class gives a bias walk. The ranges are the
-    /// data sheet's (±18 g, ±1000 °/s). The thesis does not name the part on the Hummingbird, so none of
-    /// these is its own. The initial biases are zero: an autopilot nulls them at rest before take-off. Readings are neither
-    /// delayed nor lost: the autopilot reads the part over a wire of a few centimetres.
-    #[derive(Copy)]
-    pub struct ImuParams {
-        /// White noise of the accelerometer, m/s²/√Hz.
-        accelerometer_noise_density_m_s2_sqrt_hz: f64 = 2.0e-3 => not_negative,
-        /// Random walk of the accelerometer's bias, m/s³/√Hz.
-        accelerometer_bias_walk_m_s3_sqrt_hz: f64 = 3.0e-3 => not_negative,
-        /// The accelerometer's bias at the first reading, body axes, m/s².
-        accelerometer_initial_bias_m_s2: [f64; 3] = [0.0; 3] => finite,
-        /// The accelerometer reads no more than this on any axis, m/s².
-        accelerometer_range_m_s2: f64 = 18.0 * diagnostics::unit::STANDARD_GRAVITY_M_S2 => positive,
-        /// White noise of the gyroscope, rad/s/√Hz.
-        gyroscope_noise_density_rad_s_sqrt_hz: f64 = 1.6968e-4 => not_negative,
-        /// Random walk of the gyroscope's bias, rad/s²/√Hz.
-        gyroscope_bias_walk_rad_s2_sqrt_hz: f64 = 1.9393e-5 => not_negative,
-        /// The gyroscope's bias at the first reading, body axes, rad/s.
-        gyroscope_initial_bias_rad_s: [f64; 3] = [0.0; 3] => finite,
-        /// The gyroscope reads no more than this on any axis, rad/s.
-        gyroscope_range_rad_s: f64 = 1000.0_f64.to_radians() => positive,
-        /// Position of the part, seen from the centre of mass, body axes, m.
-        position_m: [f64; 3] = [0.0; 3] => within(-10.0..=10.0, "-10 to 10 m"),
-        /// Rotation of the part against the body, as a rotation vector, degrees.
-        misalignment_deg: [f64; 3] = [0.0; 3] => within(-180.0..=180.0, "-180 to 180 deg"),
-        /// Errors of the accelerometer's scale, of each axis.
-        accelerometer_scale_error: [f64; 3] = [0.0; 3] => within(-0.5..=0.5, "-0.5 to 0.5"),
-        /// Cross-axis sensitivities of the accelerometer: x of y, x of z, y of x, y of z, z of x, z of y.
-        accelerometer_cross_axis: [f64; 6] = [0.0; 6] => within(-0.5..=0.5, "-0.5 to 0.5"),
-        /// Corner frequency of the accelerometer's low pass of first order, Hz; 0 where there is none.
-        accelerometer_bandwidth_hz: f64 = 0.0 => not_negative,
-        /// The accelerometer reads whole multiples of this, m/s²; 0 where it resolves all.
-        accelerometer_resolution_m_s2: f64 = 0.0 => not_negative,
-        /// Drift of the accelerometer's bias with temperature, of each axis, m/s²/K.
-        accelerometer_bias_drift_m_s2_k: [f64; 3] = [0.0; 3] => within(-1.0..=1.0, "-1 to 1 m/s^2/K"),
-        /// Amplitude with which the unbalance of a rotor shakes the part, m.
-        accelerometer_vibration_m: f64 = 0.0 => within(0.0..=1e-3, "0 to 1e-3 m"),
-        /// Errors of the gyroscope's scale, of each axis.
-        gyroscope_scale_error: [f64; 3] = [0.0; 3] => within(-0.5..=0.5, "-0.5 to 0.5"),
-        /// Cross-axis sensitivities of the gyroscope, in the order of the accelerometer's.
-        gyroscope_cross_axis: [f64; 6] = [0.0; 6] => within(-0.5..=0.5, "-0.5 to 0.5"),
-        /// Corner frequency of the gyroscope's low pass of first order, Hz; 0 where there is none.
-        gyroscope_bandwidth_hz: f64 = 0.0 => not_negative,
-        /// The gyroscope reads whole multiples of this, rad/s; 0 where it resolves all.
-        gyroscope_resolution_rad_s: f64 = 0.0 => not_negative,
-        /// Drift of the gyroscope's bias with temperature, of each axis, rad/s/K.
-        gyroscope_bias_drift_rad_s_k: [f64; 3] = [0.0; 3] => within(-0.1..=0.1, "-0.1 to 0.1 rad/s/K"),
-        /// Sensitivity of the gyroscope's axes to the specific force along themselves, rad/s per m/s².
-        gyroscope_g_sensitivity: [f64; 3] = [0.0; 3] => within(-0.1..=0.1, "-0.1 to 0.1 rad/s per m/s^2"),
-        /// Angle by which the unbalance of a rotor shakes the part, rad.
-        gyroscope_vibration_rad: f64 = 0.0 => within(0.0..=0.01, "0 to 0.01 rad"),
-        /// Rise of the part's temperature after it is switched on, at tick 0, K.
-        warming_k: f64 = 0.0 => within(-100.0..=100.0, "-100 to 100 K"),
-        /// The time constant of its warming up, s.
-        warming_time_s: f64 = 300.0 => positive,
-        /// Time from a reading to its arrival, ms.
-        delay_ms: f64 = 0.0,
-        /// Fraction of readings that are lost.
-        dropout: f64 = 0.0,
-        /// Mean duration of losses, s; 0 where each is independent of the one before.
-        dropout_mean_s: f64 = 0.0,
-    }
+/// Parameters of an IMU; the defaults are an Analog Devices ADIS16448.
+///
+/// The noise densities and bias walks are those that the EuRoC micro aerial vehicle data set gives for
+/// its ADIS16448 (Burri et al., "The EuRoC micro aerial vehicle datasets", IJRR 2016, file
+/// `imu0/sensor.yaml`); no data sheet of a part of this class gives a bias walk. The ranges are the
+/// data sheet's (±18 g, ±1000 °/s). The thesis does not name the part on the Hummingbird, so none of
+/// these is its own. The initial biases are zero: an autopilot nulls them at rest before take-off. Readings are neither
+/// delayed nor lost: the autopilot reads the part over a wire of a few centimetres.
+#[derive(Debug, Clone, Copy, PartialEq, bus::Parameters)]
+#[parameters(default)]
+pub struct ImuParams {
+    /// White noise of the accelerometer.
+    #[parameter(default = 2.0e-3, check = not_negative)]
+    pub accelerometer_noise_density_m_s2_sqrt_hz: f64,
+    /// Random walk of the accelerometer's bias.
+    #[parameter(default = 3.0e-3, check = not_negative)]
+    pub accelerometer_bias_walk_m_s3_sqrt_hz: f64,
+    /// The accelerometer's bias at the first reading, body axes.
+    #[parameter(default = [0.0; 3], check = finite)]
+    pub accelerometer_initial_bias_m_s2: [f64; 3],
+    /// The accelerometer reads no more than this on any axis.
+    #[parameter(default = 18.0 * diagnostics::unit::STANDARD_GRAVITY_M_S2, shown = "176.52 (18 g)", check = positive)]
+    pub accelerometer_range_m_s2: f64,
+    /// White noise of the gyroscope.
+    #[parameter(default = 1.6968e-4, check = not_negative)]
+    pub gyroscope_noise_density_rad_s_sqrt_hz: f64,
+    /// Random walk of the gyroscope's bias.
+    #[parameter(default = 1.9393e-5, check = not_negative)]
+    pub gyroscope_bias_walk_rad_s2_sqrt_hz: f64,
+    /// The gyroscope's bias at the first reading, body axes.
+    #[parameter(default = [0.0; 3], check = finite)]
+    pub gyroscope_initial_bias_rad_s: [f64; 3],
+    /// The gyroscope reads no more than this on any axis.
+    #[parameter(default = 1000.0_f64.to_radians(), shown = "17.453 (1000 °/s)", check = positive)]
+    pub gyroscope_range_rad_s: f64,
+    /// Position of the part, seen from the centre of mass, body axes: it feels a turn as α × r + ω × (ω × r).
+    #[parameter(default = [0.0; 3], check = within(-10.0..=10.0, "-10 to 10 m"))]
+    pub position_m: [f64; 3],
+    /// Rotation of the part against the body, as a rotation vector.
+    #[parameter(default = [0.0; 3], check = within(-180.0..=180.0, "-180 to 180 deg"))]
+    pub misalignment_deg: [f64; 3],
+    /// Errors of the accelerometer's scale, of each axis.
+    #[parameter(default = [0.0; 3], check = within(-0.5..=0.5, "-0.5 to 0.5"))]
+    pub accelerometer_scale_error: [f64; 3],
+    /// Cross-axis sensitivities of the accelerometer: x of y, x of z, y of x, y of z, z of x, z of y.
+    #[parameter(default = [0.0; 6], check = within(-0.5..=0.5, "-0.5 to 0.5"))]
+    pub accelerometer_cross_axis: [f64; 6],
+    /// Corner frequency of the accelerometer's low pass of first order; 0 where there is none.
+    #[parameter(default = 0.0, check = not_negative)]
+    pub accelerometer_bandwidth_hz: f64,
+    /// The accelerometer reads whole multiples of this; 0 where it resolves all.
+    #[parameter(default = 0.0, check = not_negative)]
+    pub accelerometer_resolution_m_s2: f64,
+    /// Drift of the accelerometer's bias with temperature, of each axis.
+    #[parameter(default = [0.0; 3], check = within(-1.0..=1.0, "-1 to 1 m/s^2/K"))]
+    pub accelerometer_bias_drift_m_s2_k: [f64; 3],
+    /// Amplitude d with which the unbalance of each rotor shakes the part: d Ω² of acceleration, once a turn in the rotors' plane, twice a
+    /// turn across it.
+    #[parameter(default = 0.0, check = within(0.0..=1e-3, "0 to 1e-3 m"))]
+    pub accelerometer_vibration_m: f64,
+    /// Errors of the gyroscope's scale, of each axis.
+    #[parameter(default = [0.0; 3], check = within(-0.5..=0.5, "-0.5 to 0.5"))]
+    pub gyroscope_scale_error: [f64; 3],
+    /// Cross-axis sensitivities of the gyroscope, in the order of the accelerometer's.
+    #[parameter(default = [0.0; 6], check = within(-0.5..=0.5, "-0.5 to 0.5"))]
+    pub gyroscope_cross_axis: [f64; 6],
+    /// Corner frequency of the gyroscope's low pass of first order; 0 where there is none.
+    #[parameter(default = 0.0, check = not_negative)]
+    pub gyroscope_bandwidth_hz: f64,
+    /// The gyroscope reads whole multiples of this; 0 where it resolves all.
+    #[parameter(default = 0.0, check = not_negative)]
+    pub gyroscope_resolution_rad_s: f64,
+    /// Drift of the gyroscope's bias with temperature, of each axis.
+    #[parameter(default = [0.0; 3], check = within(-0.1..=0.1, "-0.1 to 0.1 rad/s/K"))]
+    pub gyroscope_bias_drift_rad_s_k: [f64; 3],
+    /// Sensitivity of the gyroscope's axes to the specific force along themselves.
+    #[parameter(unit = "rad/s per m/s²", default = [0.0; 3], check = within(-0.1..=0.1, "-0.1 to 0.1 rad/s per m/s^2"))]
+    pub gyroscope_g_sensitivity: [f64; 3],
+    /// Angle φ by which the unbalance of each rotor shakes the part: a rate of φ Ω, in the same rhythm.
+    #[parameter(default = 0.0, check = within(0.0..=0.01, "0 to 0.01 rad"))]
+    pub gyroscope_vibration_rad: f64,
+    /// Rise of the part's temperature after it is switched on, at tick 0.
+    #[parameter(default = 0.0, check = within(-100.0..=100.0, "-100 to 100 K"))]
+    pub warming_k: f64,
+    /// The time constant of its warming up.
+    #[parameter(default = 300.0, check = positive)]
+    pub warming_time_s: f64,
+    /// Time from a reading to its arrival; at most 30 periods.
+    #[parameter(default = 0.0, check = not_negative)]
+    pub delay_ms: f64,
+    /// Fraction of the readings that are lost: the one before is sent again.
+    #[parameter(default = 0.0, range = "0 to below 1")]
+    pub dropout: f64,
+    /// Mean duration of losses; 0: each is independent of the one before.
+    #[parameter(default = 0.0, check = not_negative)]
+    pub dropout_mean_s: f64,
 }
 
 impl ImuParams {

@@ -22,8 +22,7 @@ use bus::random::stream;
 use bus::schema::Extent;
 use bus::{BusError, Message};
 use diagnostics::ParameterError;
-use diagnostics::parameter::{not_negative, positive_up_to, refuse, require};
-use serde::Deserialize;
+use diagnostics::parameter::{positive_up_to, refuse, require, within};
 use std::collections::BTreeMap;
 
 /// 57 600 baud, as the thesis sets the XBee modules of its Hummingbird (§2.2).
@@ -58,61 +57,45 @@ const NEVER: Time = Time { sec: -1, nanosec: 0 };
 /// assert_eq!(parameters.baud, 57_600.0);
 /// # Ok::<(), diagnostics::ParameterError>(())
 /// ```
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, bus::Parameters)]
 pub struct Parameters {
-    /// Bits a second on the wire.
-    #[serde(default = "baud")]
+    /// Bits a second on the wire (thesis §2.2).
+    #[parameter(default = BAUD, unit = "bit/s", check = whole_baud)]
     pub baud: f64,
-    /// Bits that a byte takes, with start and stop bits.
-    #[serde(default = "bits_per_byte")]
+    /// Bits that a byte takes: 8, start, stop (thesis §2.2).
+    #[parameter(default = BITS_PER_BYTE, check = within(8.0..=16.0, "from 8 to 16: 8 data bits, start, parity, stop"))]
     pub bits_per_byte: u32,
-    /// Bytes that each message takes beside its own.
-    #[serde(default = "overhead_bytes")]
+    /// Bytes that each message takes beside its own; by default AscTec's framing.
+    #[parameter(default = OVERHEAD_BYTES, check = within(0.0..=1024.0, "at most 1024"))]
     pub overhead_bytes: u32,
-    /// Bytes that may wait for the wire, the overhead included.
-    #[serde(default = "queue_bytes")]
+    /// Bytes that may wait for the wire, the overhead included; by default an XBee's input buffer.
+    #[parameter(default = QUEUE_BYTES, check = within(0.0..=1_048_576.0, "at most 1048576"))]
     pub queue_bytes: u32,
-    /// Time from a message's last bit to its arrival, ms.
-    #[serde(default)]
+    /// Time from a message's last bit to its arrival.
+    #[parameter(default = 0.0, check = within(0.0..=60_000.0, "0 to 60 000 ms"))]
     pub latency_ms: f64,
-    /// Greatest addition to that, evenly drawn for each message, ms.
-    #[serde(default)]
+    /// Greatest addition to that, evenly drawn for each message.
+    #[parameter(default = 0.0, check = within(0.0..=60_000.0, "0 to 60 000 ms"))]
     pub jitter_ms: f64,
-    /// Fraction of the messages that are lost on the way.
-    #[serde(default)]
+    /// Fraction of the messages that are lost on the way, each independent of the others.
+    #[parameter(default = 0.0, check = within(0.0..=1.0, "a fraction from 0 to 1"))]
     pub loss: f64,
     /// Parameters of single streams, by the name of their input.
-    #[serde(default)]
+    #[parameter(default = BTreeMap::new(), table = StreamParameters, entry = "INPUT")]
     pub streams: BTreeMap<String, StreamParameters>,
 }
 
-fn baud() -> f64 {
-    BAUD
-}
-
-fn bits_per_byte() -> u32 {
-    BITS_PER_BYTE
-}
-
-fn overhead_bytes() -> u32 {
-    OVERHEAD_BYTES
-}
-
-fn queue_bytes() -> u32 {
-    QUEUE_BYTES
-}
-
 /// Parameters of a stream.
-#[derive(Clone, Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, Default, bus::Parameters)]
 pub struct StreamParameters {
-    /// Bytes of a message on the wire, without the overhead: as many as a recording holds where absent.
+    /// Bytes of a message on the wire, without the overhead.
+    #[parameter(shown = "as many as a recording holds")]
     bytes: Option<u32>,
-    /// Messages a second that are sent at most; each that is new where absent.
+    /// Messages a second that are queued at most.
+    #[parameter(shown = "every new one")]
     rate_hz: Option<f64>,
     /// Priority of the stream: of several that wait, the highest goes first.
-    #[serde(default)]
+    #[parameter(default = 0)]
     priority: u32,
 }
 
@@ -308,7 +291,6 @@ impl Component for Link {
                 "it computes every {ticks} ticks, and would miss messages between: leave `period_ticks` out"
             )
         })?;
-        parameters.validate()?;
         let mut names = context.inputs.to_vec();
         names.sort_unstable();
         let (count, most) = (names.len(), STREAMS);
@@ -468,26 +450,13 @@ impl Forwarded {
     }
 }
 
-impl Parameters {
-    fn validate(&self) -> Result<(), ParameterError> {
-        let is_good = self.baud.fract() == 0.0 && (1.0..=BAUD_MAX).contains(&self.baud);
-        require("baud", self.baud, is_good, format!("a whole number from 1 to {BAUD_MAX}"))?;
-        let bits = self.bits_per_byte;
-        require(
-            "bits_per_byte",
-            bits,
-            (8..=16).contains(&bits),
-            "from 8 to 16: 8 data bits, start, parity, stop",
-        )?;
-        require("overhead_bytes", self.overhead_bytes, self.overhead_bytes <= 1024, "at most 1024")?;
-        require("queue_bytes", self.queue_bytes, self.queue_bytes <= 1 << 20, "at most 1048576")?;
-        for (key, ms) in [("latency_ms", self.latency_ms), ("jitter_ms", self.jitter_ms)] {
-            not_negative(key, ms)?;
-            require(key, ms, ms <= 60_000.0, "at most 60 000 ms")?;
-        }
-        require("loss", self.loss, (0.0..=1.0).contains(&self.loss), "a fraction from 0 to 1")
-    }
+/// Passes a whole number of bits a second.
+fn whole_baud(key: &str, baud: f64) -> Result<(), ParameterError> {
+    let is_good = baud.fract() == 0.0 && (1.0..=BAUD_MAX).contains(&baud);
+    require(key, baud, is_good, format!("a whole number from 1 to {BAUD_MAX}"))
+}
 
+impl Parameters {
     /// Refuses a stream whose messages never fit into the queue, and more messages under way than a link may hold; warns of streams
     /// that together exceed the line.
     fn check_load(&self, context: &NodeContext<'_>) -> Result<(), ParameterError> {

@@ -6,17 +6,16 @@
 use crate::channel::Chance;
 use crate::earth_field;
 use crate::noise::standard_normal;
-use crate::parameters::within;
 use crate::sensing::{Sensor, TruthInputs};
 use crate::steps::in_steps;
 use crate::wire::{attitude, vector_message};
 use bus::component::Info;
 use bus::messages::Magnetometer;
-use diagnostics::parameter::{ParameterError, finite, not_negative, positive};
+use diagnostics::parameter::{ParameterError, finite, not_negative, positive, within};
 use inputs::InputFiles;
 use nalgebra::Vector3;
 
-parameters! {
+timed_parameters! {
     /// Parameters of a magnetometer; the defaults are a Honeywell HMC5883L.
     ///
     /// Its data sheet (900405): noise floor 2 mG, 1090 counts per gauss in its default range of ±1.3 gauss, up to
@@ -35,22 +34,30 @@ parameters! {
     /// ```
     #[derive(Copy)]
     pub struct MagnetometerParams timed { rate_hz: 100.0, delay_ms: 6.0 } {
-        /// Magnetic flux density of the earth's field, T.
-        field_T: f64 = earth_field::FIELD_T => not_negative,
-        /// Inclination of the earth's field, below the horizon, degrees.
-        inclination_deg: f64 = earth_field::INCLINATION_DEG => within(-90.0..=90.0, "from -90 to 90"),
-        /// Declination: angle of magnetic north east of the world's x axis, degrees.
-        declination_deg: f64 = earth_field::DECLINATION_DEG => finite,
-        /// Field of the vehicle's magnetised parts, body axes, T.
-        hard_iron_T: [f64; 3] = [0.0; 3] => finite,
+        /// Magnetic flux density of the earth's field.
+        #[parameter(default = earth_field::FIELD_T, check = not_negative)]
+        pub field_T: f64,
+        /// Inclination of the earth's field, below the horizon.
+        #[parameter(default = earth_field::INCLINATION_DEG, check = within(-90.0..=90.0, "from -90 to 90"))]
+        pub inclination_deg: f64,
+        /// Declination: angle of magnetic north east of the world's x axis.
+        #[parameter(default = earth_field::DECLINATION_DEG, check = finite)]
+        pub declination_deg: f64,
+        /// Field of the vehicle's magnetised parts, body axes.
+        #[parameter(default = [0.0; 3], check = finite)]
+        pub hard_iron_T: [f64; 3],
         /// Share of the field that is left along each body axis.
-        soft_iron_scale: [f64; 3] = [1.0; 3] => finite,
-        /// Standard deviation of each axis, T.
-        noise_T: f64 = 2.0e-7 => not_negative,
-        /// Readings are multiples of this, T; 0 for any reading.
-        resolution_T: f64 = 1e-4 / 1090.0 => not_negative,
-        /// The most that an axis reads, T.
-        range_T: f64 = 1.3e-4 => positive,
+        #[parameter(default = [1.0; 3], check = finite)]
+        pub soft_iron_scale: [f64; 3],
+        /// Standard deviation of each axis.
+        #[parameter(default = 2.0e-7, check = not_negative)]
+        pub noise_T: f64,
+        /// Readings are multiples of this; 0 for any reading.
+        #[parameter(default = 1e-4 / 1090.0, check = not_negative)]
+        pub resolution_T: f64,
+        /// The most that an axis reads.
+        #[parameter(default = 1.3e-4, check = positive)]
+        pub range_T: f64,
     }
 }
 

@@ -13,7 +13,7 @@ use diagnostics::parameter::{ParameterError, finite, not_negative};
 use inputs::InputFiles;
 use nalgebra::{UnitQuaternion, Vector3};
 
-parameters! {
+timed_parameters! {
     /// Parameters of motion capture; the defaults are a Vicon system of MX cameras.
     ///
     /// *Position*: Merriaux et al., "A study of Vicon system positioning performance" (Sensors 17(7), 2017), find a
@@ -35,14 +35,18 @@ parameters! {
     /// ```
     #[derive(Copy)]
     pub struct MocapParams timed { rate_hz: 100.0, delay_ms: 10.0 } {
-        /// Standard deviation of each axis of a position, m.
-        position_noise_m: f64 = 0.5e-3 => not_negative,
-        /// Standard deviation of the rotation about each body axis, degrees.
-        attitude_noise_deg: f64 = 0.1 => not_negative,
-        /// Constant error of the position, world axes, m.
-        position_bias_m: [f64; 3] = [0.0; 3] => finite,
-        /// Constant error of the attitude: a rotation about the body's axes, degrees.
-        attitude_bias_deg: [f64; 3] = [0.0; 3] => finite,
+        /// Standard deviation of each axis of a position.
+        #[parameter(default = 0.5e-3, check = not_negative)]
+        pub position_noise_m: f64,
+        /// Standard deviation of the rotation about each body axis.
+        #[parameter(default = 0.1, check = not_negative)]
+        pub attitude_noise_deg: f64,
+        /// Constant error of the position, world axes.
+        #[parameter(default = [0.0; 3], check = finite)]
+        pub position_bias_m: [f64; 3],
+        /// Constant error of the attitude: a rotation about the body's axes.
+        #[parameter(default = [0.0; 3], check = finite)]
+        pub attitude_bias_deg: [f64; 3],
     }
 }
 

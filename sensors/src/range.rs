@@ -10,7 +10,6 @@
 
 use crate::channel::Chance;
 use crate::cone::{Cone, caster, check_bodies, check_told};
-use crate::parameters::within;
 use crate::sensing::Sensor;
 use crate::steps::in_steps;
 use crate::wire::{attitude, body_poses, vector};
@@ -19,7 +18,7 @@ use bus::component::{Info, StepError};
 use bus::context::NodeContext;
 use bus::messages::{BodyStates, PlantState, Ranges, Traffic};
 use bus::random::normal;
-use diagnostics::parameter::{ParameterError, finite, not_negative, positive, require};
+use diagnostics::parameter::{ParameterError, finite, not_negative, positive, require, within};
 use inputs::InputFiles;
 use nalgebra::{UnitQuaternion, Vector3};
 use scenes::RayCaster;
@@ -30,7 +29,7 @@ const BEAMS: usize = 5;
 /// A vehicle of the traffic that is nearer than this is the sensors' own: positions of one tick differ by less.
 const SELF_MAX_M: f64 = 0.01;
 
-parameters! {
+timed_parameters! {
     /// Parameters of the range finders; the defaults are five MaxBotix XL-MaxSonar-AE0 (MB1300).
     ///
     /// *Reach, resolution, nearest reading and rate* are the data sheet's (PD11840): 7.65 m, 1 cm, 20 cm, which it
@@ -53,26 +52,33 @@ parameters! {
     /// assert!((ranges.distance[4] - 1.5).abs() < 0.1, "the last beam looks down: {ranges:?}");
     /// ```
     pub struct RangeParams timed { rate_hz: 10.0, delay_ms: 50.0 } {
-        /// Scene file; there is no default.
-        scene: Option<PathBuf> = None,
-        /// Standard deviation of a reading, m.
-        noise_m: f64 = 0.01 => not_negative,
-        /// Constant error of each beam, m.
-        bias_m: [f64; BEAMS] = [0.0; BEAMS] => finite,
-        /// Readings are multiples of this, m; 0 for any reading.
-        resolution_m: f64 = 0.01 => not_negative,
-        /// Nothing beyond this is met, m.
-        reach_m: f64 = 7.65 => positive,
-        /// Reading of anything nearer than this, m.
-        nearest_m: f64 = 0.20,
-        /// Half angle of the beams' cones, degrees, below 90.
-        half_angle_deg: f64 = 5.0 => within(0.0..90.0, "zero or more and below 90"),
-        /// Radius of the spheres that other vehicles are, m.
-        vehicle_radius_m: f64 = 0.27 => positive,
-        /// Index of this vehicle in the traffic, numbered from 0; where absent, that of the vehicle that is
-        /// nearer than 1 cm.
-        #[serde(rename = "self")]
-        self_index: Option<u32> = None,
+        /// Scene file, relative to the manifest.
+        #[parameter(shown = "required")]
+        pub scene: Option<PathBuf>,
+        /// Standard deviation of a reading.
+        #[parameter(default = 0.01, check = not_negative)]
+        pub noise_m: f64,
+        /// Constant error of each beam.
+        #[parameter(default = [0.0; BEAMS], check = finite)]
+        pub bias_m: [f64; BEAMS],
+        /// Readings are multiples of this; 0 for any reading.
+        #[parameter(default = 0.01, check = not_negative)]
+        pub resolution_m: f64,
+        /// Nothing beyond this is met.
+        #[parameter(default = 7.65, check = positive)]
+        pub reach_m: f64,
+        /// Reading of anything nearer than this.
+        #[parameter(default = 0.20)]
+        pub nearest_m: f64,
+        /// Half angle of the beams' cones.
+        #[parameter(default = 5.0, check = within(0.0..90.0, "zero or more and below 90"))]
+        pub half_angle_deg: f64,
+        /// Radius of the spheres that other vehicles are.
+        #[parameter(default = 0.27, check = positive)]
+        pub vehicle_radius_m: f64,
+        /// Index of this vehicle in the traffic, from 0.
+        #[parameter(rename = "self", shown = "that of the vehicle nearer than 1 cm")]
+        pub self_index: Option<u32>,
     }
 }
 

@@ -13,7 +13,7 @@ use bus::random::normal;
 use diagnostics::parameter::{ParameterError, not_negative, require};
 use inputs::InputFiles;
 
-parameters! {
+timed_parameters! {
     /// Parameters of the rotor speeds that the motors' controllers measure.
     ///
     /// *Resolution*: telemetry of electronic speed controllers (KISS, BLHeli_32) counts hundreds of electrical revolutions
@@ -34,14 +34,18 @@ parameters! {
     /// ```
     #[derive(Copy)]
     pub struct RpmParams timed { rate_hz: 200.0, delay_ms: 0.0 } {
-        /// Standard deviation of a speed, rad/s.
-        noise_rad_s: f64 = 1.5 => not_negative,
-        /// Speeds are multiples of this, rad/s; 0 for any.
-        resolution_rad_s: f64 = 1.5 => not_negative,
-        /// The rotor, from 1, whose reading is stuck at the first one; 0 for none.
-        stuck_rotor: usize = 0 => rotor,
-        /// The rotor, from 1, of whose speed half is read; 0 for none.
-        half_reading_rotor: usize = 0 => rotor,
+        /// Standard deviation of a speed.
+        #[parameter(default = 1.5, check = not_negative)]
+        pub noise_rad_s: f64,
+        /// Speeds are multiples of this; 0 for any.
+        #[parameter(default = 1.5, check = not_negative)]
+        pub resolution_rad_s: f64,
+        /// A fault: this rotor, 1 to 4, reads for ever its first reading; 0: none.
+        #[parameter(default = 0, check = rotor)]
+        pub stuck_rotor: usize,
+        /// A fault: half of the speed of this rotor is read; 0: none.
+        #[parameter(default = 0, check = rotor)]
+        pub half_reading_rotor: usize,
     }
 }
 

@@ -1,7 +1,7 @@
 //! A sensor as a component: it measures its inputs, and a channel has the times, delays and losses of measurements.
 
 use crate::channel::{Chance, Channel, Queued, Remembered};
-use crate::parameters::Parameters;
+use crate::parameters::Timed;
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::{Barometer, Battery, Gps, Magnetometer, Mocap, PlantState, Ranges, RotorSpeeds};
@@ -87,7 +87,7 @@ pub trait Sensor: Sized + Send {
     /// Its name in manifests, and its description.
     const INFO: Info;
     /// Parameters in the manifest.
-    type Parameters: Parameters;
+    type Parameters: Timed;
     /// Inputs.
     type Inputs<'a>: InputPorts<'a>;
     /// Outputs.
@@ -174,7 +174,6 @@ impl<S: Sensor> Component for Sensing<S> {
     type State = Queued<S::State>;
 
     fn new(parameters: S::Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
-        parameters.validate()?;
         let channel = Channel::new(&parameters.timing(), context)?;
         let sensor = S::made_of(parameters, &context.files)?;
         sensor.check(context)?;

@@ -15,6 +15,9 @@ pub struct CheckArguments {
     /// Override a key of the manifest.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// Nodes that share a process: none, all, vehicles, or groups such as plant+imu,ekf+controller.
+    #[arg(long, value_name = "GROUPS")]
+    compose: Option<String>,
     /// Start no program that the manifest names as a `command`: their ports are not compared.
     #[arg(long)]
     no_programs: bool,
@@ -28,12 +31,14 @@ pub struct CheckArguments {
 /// # Errors
 /// The faults of the manifest.
 pub fn check(arguments: &CheckArguments) -> Result<bool> {
-    let CheckArguments { manifest, set, .. } = arguments;
+    let CheckArguments { manifest, compose, .. } = arguments;
+    let compose = compose.iter().map(|groups| format!("run.compose={groups}"));
+    let set: Vec<String> = arguments.set.iter().cloned().chain(compose).collect();
     require_kind(manifest, &[Kind::Manifest], "")?;
     let checked = if arguments.no_programs {
-        hummingbus::check(manifest, set)?
+        hummingbus::check(manifest, &set)?
     } else {
-        hummingbus::check_with_programs(manifest, set)?
+        hummingbus::check_with_programs(manifest, &set)?
     };
     print_warnings(&checked.warnings);
     if arguments.json {

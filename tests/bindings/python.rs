@@ -136,6 +136,21 @@ fn a_controller_in_python_takes_over_from_pid_with_its_state_and_pid_from_it() {
 }
 
 #[test]
+fn a_run_with_a_controller_in_python_goes_on_from_a_checkpoint_with_the_same_bytes() {
+    let Some(python) = python() else { return };
+    let place = Place::new();
+    let manifest = shipped(&place, "python-controller.toml");
+    let [whole, rest] = ["whole.mcap", "rest.mcap"].map(|name| place.path(name));
+    let text = fs::read_to_string(manifest).unwrap();
+    let manifest = place.write("python.toml", format!("{text}\n[[checkpoint]]\nat_tick = 2500\n"));
+    python.call(&place, &["run", &manifest, "--record", &whole]).flown();
+    let from = place.path("whole.2500.ckpt");
+    python.call(&place, &["run", "--from", &from, "--record", &rest]).flown();
+    let expected = "begins at tick 2500, and from there on all messages are those of";
+    place.call(&["diff", &whole, &rest]).with_code(1).prints(&[expected]);
+}
+
+#[test]
 fn a_new_project_in_python_passes_its_own_test() {
     let Some(python) = python() else { return };
     let place = Place::new();
@@ -373,6 +388,15 @@ fn an_environment_is_what_gymnasium_expects_and_a_seed_gives_the_same_episode() 
          with warnings.catch_warnings():\n\
          \x20   warnings.filterwarnings('ignore', message='.*Box observation space (min|max)imum value is -?inf.*')\n\
          \x20   check_env(HoverEnv(), skip_render_check=True)\n\
+         # In processes of their own as in this one: the same observations.\n\
+         import gymnasium\n\
+         def first(kind):\n\
+         \x20   many = kind([HoverEnv] * 2)\n\
+         \x20   seen = [many.reset(seed=1)[0]] + [many.step(np.full((2, 4), 0.1))[0] for _ in range(20)]\n\
+         \x20   many.close()\n\
+         \x20   return np.array(seen)\n\
+         same = [first(kind) for kind in (gymnasium.vector.SyncVectorEnv, gymnasium.vector.AsyncVectorEnv)]\n\
+         assert same[0].shape == (21, 2, 13) and (same[0] == same[1]).all()\n\
          def episode(seed):\n\
          \x20   env, found = HoverEnv(), []\n\
          \x20   observation, _ = env.reset(seed=seed)\n\

@@ -10,16 +10,15 @@ use bus::messages::Time;
 use diagnostics::ParameterError;
 use diagnostics::parameter::positive;
 use nalgebra::Vector3;
-use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
 /// Parameters of the law.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, bus::Parameters)]
 pub struct Parameters {
-    /// Vehicle file.
+    /// Vehicle file, relative to the manifest.
     vehicle: PathBuf,
-    /// Bandwidth of the loops of height and attitude, rad/s.
+    /// Bandwidth of the loops of height and attitude.
+    #[parameter(check = positive)]
     bandwidth_rad_s: f64,
 }
 
@@ -50,7 +49,6 @@ impl Law for LevelLaw {
     }
 
     fn new(parameters: &Self::Parameters, context: &LawContext<'_>) -> Result<Self, ParameterError> {
-        positive("bandwidth_rad_s", parameters.bandwidth_rad_s)?;
         Ok(Self { model: context.craft.hover_model(), bandwidth_rad_s: parameters.bandwidth_rad_s })
     }
 

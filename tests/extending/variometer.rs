@@ -7,16 +7,15 @@ use bus::random::{self, Stream, normal, stream};
 use bus::{InputPorts, Message, OutputPorts};
 use diagnostics::ParameterError;
 use diagnostics::parameter::{not_negative, positive};
-use serde::Deserialize;
 
 /// Parameters of the variometer. Tuned, no source.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, bus::Parameters)]
 pub struct Parameters {
-    /// Time constant of the lag, s.
+    /// Time constant of the lag.
+    #[parameter(check = positive)]
     lag_s: f64,
-    /// Standard deviation of the noise, m/s.
-    #[serde(default)]
+    /// Standard deviation of the noise.
+    #[parameter(default = 0.0, check = not_negative)]
     noise_m_s: f64,
 }
 
@@ -61,8 +60,6 @@ impl Component for Variometer {
     type State = State;
 
     fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
-        positive("lag_s", parameters.lag_s)?;
-        not_negative("noise_m_s", parameters.noise_m_s)?;
         let followed = 1.0 - libm::exp(-context.period_s() / parameters.lag_s);
         let random = stream(context.seed, context.name);
         Ok(Self { followed, noise_m_s: parameters.noise_m_s, random })

@@ -190,8 +190,8 @@ fn schema_components_and_effects_print_one() {
     ]);
     let gps = place.call(&["components", "gps"]).with_code(0);
     gps.prints(&[
-        "position_drift_time_s  [s] default 300.0\n",
-        "rate_hz  [Hz] default the part's\n      measurements a second",
+        "position_drift_time_s  [s] default 300.0; above 0\n",
+        "rate_hz  [Hz] default 10.0; above 0\n      Measurements a second.",
     ]);
     for text in [&ended.output, &gps.output, &place.call(&["effects", "rotor-drag"]).with_code(0).output] {
         assert!(!["<br>", "](", "**", "|---", "`"].iter().any(|mark| text.contains(mark)), "{text}");

@@ -106,7 +106,7 @@ fn a_group_that_cannot_be_is_refused_with_the_reason() {
         ("plant+recorder", "it is the recorder"),
         ("plant+imu,imu+ekf", "`imu` is a member of group `plant+imu` and of group `imu+ekf`"),
         ("plant+gyro", "a group names `gyro`, which is not there"),
-        ("plant", "there is no group `plant`"),
+        ("plnat", "there is no group `plnat`"),
         ("plant+plant", "names `plant` twice"),
         ("vehicles", "there is no vehicle to compose"),
     ] {
@@ -133,6 +133,8 @@ fn top_names_the_group_of_each_member() {
     let grouped = processes.iter().filter(|process| process["group"] == "imu+ekf");
     let names: Vec<_> = grouped.map(|process| process["name"].clone()).collect();
     assert_eq!(names, ["ekf", "imu"]);
+    let height_m = view["vehicles"][0]["height_m"].as_f64().unwrap();
+    assert!((0.9..1.6).contains(&height_m), "{view}");
     launch.signal(Signal::INT);
     launch.end().with_code(1);
 }

@@ -216,9 +216,9 @@ fn the_component_of_the_readme_is_the_one_that_is_flown() {
     assert_eq!(bus["path"].as_str(), Some("../hummingbus/bus"));
     let named = fs::read_to_string(repository("bus/Cargo.toml")).unwrap().parse::<toml::Table>().unwrap();
     assert_eq!(bus["package"], named["package"]["name"]);
-    // Whatever else the program uses is a dependency that the block names.
-    let used = |name: &str| blocks[0].contains(&format!("use {name}::"));
-    assert!(["bus", "serde"].iter().all(|name| used(name) && package["dependencies"].get(*name).is_some()));
+    // The program uses no other library than the block names.
+    let used = blocks[0].lines().filter_map(|line| line.strip_prefix("use ")?.split("::").next());
+    assert!(used.into_iter().all(|name| package["dependencies"].get(name).is_some()), "{package}");
 }
 
 /// The keys that the refusal of `unknown_key` in the good manifest, with `from` replaced by `to`, names as known.
@@ -234,7 +234,8 @@ fn known_keys(from: &str, to: &str) -> Vec<String> {
 
 #[test]
 fn the_documentation_has_every_key() {
-    let text = fs::read_to_string(repository("docs/manifest.md")).unwrap();
+    let pages = ["docs/manifest-reference.md", "docs/conditions.md", "docs/components.md", "docs/laws.md"];
+    let text = pages.map(|page| fs::read_to_string(repository(page)).unwrap()).concat();
     let end = "[process.recorder]\nkind = \"recorder\"\n";
     let list = |name: &str| format!("{end}\n[[{name}]]\nunknown_key = 1\n");
     let within = |process: &str, key: &str| format!("kind = \"{process}\"\n{key}.unknown_key = 1");
@@ -266,26 +267,30 @@ fn the_documentation_has_every_key() {
         let is_named = [format!("`{key}`"), format!("`{key}."), format!(".{key}`")];
         let is_shown = [format!("{key} = "), format!("{key}.")];
         let is_there = is_named.iter().chain(&is_shown).any(|form| text.contains(form));
-        assert!(is_there, "docs/manifest.md has no `{key}`");
+        assert!(is_there, "none of {pages:?} has `{key}`");
     }
 }
 
 #[test]
 fn the_examples_of_the_documentation_are_toml() {
-    let text = fs::read_to_string(repository("docs/manifest.md")).unwrap();
-    let examples: Vec<&str> =
-        text.split("```toml\n").skip(1).map(|rest| rest.split("```").next().unwrap()).collect();
-    assert!(examples.len() >= 10, "{}", examples.len());
-    for example in examples {
-        toml::from_str::<toml::Table>(example).unwrap_or_else(|error| panic!("{error}\n{example}"));
+    let mut count = 0;
+    for page in pages() {
+        for example in code_blocks(&page, "toml") {
+            toml::from_str::<toml::Table>(&example)
+                .unwrap_or_else(|error| panic!("{page}: {error}\n{example}"));
+            count += 1;
+        }
     }
+    assert!(count >= 60, "{count}");
 }
 
+/// A reader saves the blocks of the tutorial, one below the other, in the folder of the manifests.
 #[test]
-fn every_kind_has_one_section_in_the_page_of_manifests() {
-    let page = fs::read_to_string(repository("docs/manifest.md")).unwrap();
-    for kind in hummingbus::COMPONENTS.iter().map(|component| component.name) {
-        let count = page.lines().filter(|line| *line == format!("### `{kind}`")).count();
-        assert_eq!(count, 1, "docs/manifest.md has {count} sections of `{kind}`");
-    }
+fn the_manifest_of_the_tutorial_passes() {
+    let place = Place::new();
+    let [vehicles, from] = ["vehicles", "../vehicles"].map(|path| format!("\"{path}/hummingbird.toml\""));
+    let here = vehicles.replace("vehicles/", &repository("vehicles/"));
+    let text = code_blocks("docs/manifest.md", "toml").join("\n").replace(&from, &here);
+    let ended = place.call(&["run", &place.write("first.toml", text), "--record", "none"]).with_code(0);
+    ended.prints(&["passed"]);
 }

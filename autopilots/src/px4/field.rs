@@ -3,28 +3,24 @@
 use bus::messages::Quaternion;
 use diagnostics::parameter::{ParameterError, refuse};
 use nalgebra::{UnitQuaternion, Vector3};
-use serde::Deserialize;
 
 /// Strongest field that is meant, T: three times that of the earth.
 const FIELD_MAX_T: f64 = 2e-4;
 
-/// Magnetic field of the earth.
-#[derive(Clone, Copy, Debug, Deserialize, PartialEq)]
-#[serde(deny_unknown_fields, default)]
+/// Magnetic field of the earth; by default that of the default origin at the beginning of 2025, from the World Magnetic Model 2025
+/// (NOAA NCEI and BGS).
+#[derive(Clone, Copy, Debug, PartialEq, bus::Parameters)]
+#[parameters(default)]
 pub struct MagneticField {
-    /// Magnetic flux density, T.
+    /// Magnetic flux density.
+    #[parameter(default = 48.318e-6, range = "0 to 2e-4")]
     pub field_T: f64,
-    /// Inclination below the horizon, degrees.
+    /// Inclination below the horizon.
+    #[parameter(default = 63.50, range = "-90 to 90")]
     pub inclination_deg: f64,
-    /// Declination: angle of magnetic north east of geographic north, degrees.
+    /// Declination: angle of magnetic north east of geographic north.
+    #[parameter(default = 3.42, range = "-180 to 180")]
     pub declination_deg: f64,
-}
-
-impl Default for MagneticField {
-    /// At the default origin at the beginning of 2025, from the World Magnetic Model 2025 (NOAA NCEI and BGS).
-    fn default() -> Self {
-        Self { field_T: 48.318e-6, inclination_deg: 63.50, declination_deg: 3.42 }
-    }
 }
 
 impl MagneticField {

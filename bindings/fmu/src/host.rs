@@ -13,7 +13,6 @@ use bus::process::RUN_VARIABLE;
 use bus::schema::Schema;
 use bus::{BusError, Registration};
 use inputs::sha256;
-use serde::Deserialize;
 use serde_json::Value;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -29,27 +28,28 @@ const HEAD_BYTES: usize = 16;
 /// Number of bytes of a state that the FMU did not save.
 const UNSAVED: u64 = u64::MAX;
 
-/// Names of the parameters of `kind = "fmu"`.
-pub const PARAMETERS: [&str; 6] = ["fmu", "inputs", "outputs", "start", "state", "state_bytes"];
+/// Parameters of `kind = "fmu"`, for documentation.
+pub const PARAMETERS: &[bus::parameters::Parameter] = <Parameters as bus::Parameters>::DECLARED;
 
 /// Parameters of `kind = "fmu"`.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, bus::Parameters)]
 struct Parameters {
-    /// The FMU's file.
+    /// File of the FMU, relative to the manifest.
     fmu: PathBuf,
-    /// Fields of input ports, by input variable.
-    #[serde(default)]
+    /// Table of the fields of input ports, by input variable.
+    #[parameter(default = Mapping::new())]
     inputs: Mapping,
-    /// Fields of output ports, by variable.
-    #[serde(default)]
+    /// Table of the fields of output ports, by variable.
+    #[parameter(default = Mapping::new())]
     outputs: Mapping,
-    /// Values of variables before the FMU is initialized, in its own units.
-    #[serde(default)]
+    /// Table of values of variables before the FMU is initialized, in its own units.
+    #[parameter(default = BTreeMap::new())]
     start: BTreeMap<String, Value>,
-    /// True to save the FMU's state, false not to; where absent, the FMU decides.
+    /// True to save the FMU's state, false not to.
+    #[parameter(shown = "what the FMU declares")]
     state: Option<bool>,
     /// Room for a saved state, in bytes.
+    #[parameter(shown = "65536")]
     state_bytes: Option<usize>,
 }
 
@@ -381,21 +381,4 @@ fn prove(
              is not the same at every run. With parameters.state = false it flies without: whoever takes its place begins anew, and a checkpoint does not hold it"
         )
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::{PARAMETERS, Parameters};
-    use serde_json::json;
-
-    #[test]
-    fn the_named_parameters_are_those_that_are_read() {
-        let unknown =
-            diagnostics::read::<Parameters>(&json!({ "fmu": "a.fmu", "colour": 1 })).unwrap_err().to_string();
-        assert!(PARAMETERS.iter().all(|name| unknown.contains(name)), "{unknown}");
-        let all = json!({ "fmu": "a.fmu", "inputs": { "u": "x.y", "v": ["x.z"] }, "outputs": {}, "start": {}, "state": true,
-                          "state_bytes": 8 });
-        assert_eq!(all.as_object().unwrap().len(), PARAMETERS.len());
-        assert!(diagnostics::read::<Parameters>(&all).is_ok());
-    }
 }

@@ -1,16 +1,17 @@
 //! `#[derive(Message)]`: a fixed-layout message with its schema, checked when it is compiled; `#[derive(InputPorts)]` and
-//! `#[derive(OutputPorts)]`, the ports of a component.
+//! `#[derive(OutputPorts)]`, the ports of a component; `#[derive(Parameters)]`, its parameters.
 //!
 //! The derive refuses a struct that is not `repr(C)`, has implicit padding, has a field name that
 //! ROS 2 tools reject, or has a floating-point field that does not state its unit.
 
+mod fields;
+mod parameters;
+
+use fields::{doc_text, named_fields, require_no_generics};
 use proc_macro::TokenStream;
 use proc_macro2::TokenStream as Tokens;
 use quote::quote;
-use syn::{
-    Attribute, Data, DataStruct, DeriveInput, Error, Expr, ExprLit, Field, Fields, Lit, LitStr, Result, Type,
-    parse_macro_input,
-};
+use syn::{Attribute, DeriveInput, Error, Field, LitStr, Result, Type, parse_macro_input};
 
 /// Derives `bus::Message` for a `repr(C)` struct without padding.
 ///
@@ -109,6 +110,25 @@ pub fn derive_output_ports(input: TokenStream) -> TokenStream {
     expanded(&parse_macro_input!(input), expand_outputs)
 }
 
+/// Derives `bus::Parameters` and `serde::Deserialize` for a struct: the content of a `parameters` table of a manifest, which refuses
+/// unknown keys. The doc comment of a field is its meaning in the documentation.
+///
+/// `#[parameter(…)]` on a field takes
+/// - `default = EXPRESSION`: the value where the manifest has none; without it a parameter is required, unless it is an `Option`.
+/// - `shown = "…"`: the default in words, where the value says less.
+/// - `unit = "…"`: the unit, where the end of the name does not say it.
+/// - `check = FUNCTION`: a check of each of its numbers, `Fn(&str, f64) -> Result<(), ParameterError>`, as `diagnostics::parameter` has.
+/// - `range = "…"`: the accepted values in words, where another function checks them.
+/// - `table = TYPE`: the type that declares the keys of the table; with `entry = "NAME"` those of each table in it, or in the list (`"N"`).
+/// - `example = "…"`: a value for examples, as TOML.
+/// - `rename = "…"`: its name in the manifest.
+///
+/// `#[parameters(default)]` on the struct derives `Default` too.
+#[proc_macro_derive(Parameters, attributes(parameter, parameters))]
+pub fn derive_parameters(input: TokenStream) -> TokenStream {
+    expanded(&parse_macro_input!(input), parameters::expand)
+}
+
 fn expand_inputs(input: &DeriveInput) -> Result<Tokens> {
     let lifetime = input.generics.lifetimes().next().filter(|_| input.generics.params.len() == 1);
     let wrong =
@@ -172,10 +192,6 @@ fn port_spec(field: &Field, port: &Tokens) -> Tokens {
     }
 }
 
-fn require_no_generics(input: &DeriveInput, why: &str) -> Result<()> {
-    if input.generics.params.is_empty() { Ok(()) } else { Err(Error::new_spanned(&input.generics, why)) }
-}
-
 /// The texts that the attributes `#[attribute(…)]` give for `keys`.
 fn options<const N: usize>(
     attributes: &[Attribute],
@@ -217,15 +233,6 @@ fn require_repr_c(input: &DeriveInput) -> Result<()> {
         })?;
     }
     if is_c { Ok(()) } else { Err(Error::new_spanned(&input.ident, "a message needs #[repr(C)]")) }
-}
-
-fn named_fields(input: &DeriveInput) -> Result<&syn::punctuated::Punctuated<Field, syn::Token![,]>> {
-    match &input.data {
-        Data::Struct(DataStruct { fields: Fields::Named(fields), .. }) if !fields.named.is_empty() => {
-            Ok(&fields.named)
-        }
-        _ => Err(Error::new_spanned(&input.ident, "expected a struct with named fields")),
-    }
 }
 
 fn field_schema(input: &DeriveInput, field: &Field) -> Result<Tokens> {
@@ -271,14 +278,4 @@ fn is_field_name(name: &str) -> bool {
         && name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_')
         && !name.contains("__")
         && !name.ends_with('_')
-}
-
-/// The doc comment of an item as one line.
-fn doc_text(attributes: &[Attribute]) -> String {
-    let text = |attribute: &Attribute| match &attribute.meta.require_name_value().ok()?.value {
-        Expr::Lit(ExprLit { lit: Lit::Str(text), .. }) => Some(text.value().trim().to_owned()),
-        _ => None,
-    };
-    let lines = attributes.iter().filter(|attribute| attribute.path().is_ident("doc")).filter_map(text);
-    lines.take_while(|line| !line.is_empty()).collect::<Vec<_>>().join(" ")
 }

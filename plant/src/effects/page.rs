@@ -20,7 +20,7 @@ coefficient = { value = 8.06428e-5, unit = \"N*s^2/(m*rad)\", source = \"RotorS\
 A parameter that is left out has its neutral value, with which it does nothing; one without a neutral value has to be
 given. Controllers read the same vehicle file and know nothing of its effects. A vehicle file that only adds effects to
 another names it with `base = \"hummingbird.toml\"`, a path relative to itself, and holds `name`, `notes`
-and `[[effects]]`. It may replace numbers of its base as well ([manifest.md](manifest.md#plant)).
+and `[[effects]]`. It may replace numbers of its base as well ([manifest.md](plant.md#plant)).
 
 Drag, inflow and whatever else depends on the motion are evaluated at every stage of the integration; how the air moves,
 delays and the battery are settled when a tick begins and hold over it. Random effects draw from a stream of their own,

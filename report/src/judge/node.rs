@@ -8,7 +8,6 @@ use bus::ports::AnyInputs;
 use diagnostics::ParameterError;
 use recorder::fields::TopicFields;
 use runtime::manifest::Conditions;
-use serde::Deserialize;
 use std::path::PathBuf;
 
 /// Parameters of the judge, which the launcher gives.
@@ -20,8 +19,7 @@ use std::path::PathBuf;
 /// assert!(parameters.conditions.topics().is_empty());
 /// # Ok::<(), diagnostics::ParameterError>(())
 /// ```
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, bus::Parameters)]
 pub struct Parameters {
     /// The file to which the figures are written.
     pub path: PathBuf,

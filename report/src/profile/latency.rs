@@ -11,6 +11,9 @@ use std::collections::BTreeMap;
 pub struct NodeLatency {
     /// The node.
     pub name: String,
+    /// Group with whose other members it shares a process.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub group: Option<String>,
     /// Time from the end of the computation before until the last need was met; 0 if it was met already.
     pub wait: Times,
     /// Time from then until it had its inputs; only ticks at which it waited.
@@ -46,6 +49,7 @@ pub fn latencies(flight: &Flight) -> (Vec<NodeLatency>, Vec<Transport>) {
 
 fn latency(flight: &Flight, node: usize, transport: &mut BTreeMap<(usize, usize), Times>) -> NodeLatency {
     let name = flight.node_name(node).to_owned();
+    let group = flight.plan.group_of(node).map(|group| group.name.clone());
     let [mut wait, mut wake_up, mut compute, mut publish] = std::array::from_fn(|_| Times::default());
     for times in flight.ticks_of(node) {
         compute.add(times.done_ns.saturating_sub(times.received_ns));
@@ -61,7 +65,7 @@ fn latency(flight: &Flight, node: usize, transport: &mut BTreeMap<(usize, usize)
             transport.entry((topic, node)).or_default().add(woken_ns);
         }
     }
-    NodeLatency { name, wait, wake_up, compute, publish }
+    NodeLatency { name, group, wait, wake_up, compute, publish }
 }
 
 /// The parts of a tick.

@@ -1,5 +1,6 @@
 //! State of a run at a moment: read from its control segment and from the kernel, without disturbing it.
 
+use crate::top::vehicles::Vehicles;
 use crate::top::view::{ProcessRow, TopicRow, View};
 use anyhow::{Context, Result};
 use bus::BusError;
@@ -23,6 +24,7 @@ pub struct Source {
     plan: Plan,
     run: Arc<LiveRun>,
     control: LiveView,
+    vehicles: Vehicles,
 }
 
 /// State of a run at a moment.
@@ -43,7 +45,8 @@ impl Source {
     pub fn open(run: &Arc<LiveRun>) -> Result<Self> {
         let open = || {
             let plan = Plan::load(&run.entry.run_dir)?;
-            Ok::<_, BusError>(Self { control: LiveView::open(&plan)?, plan, run: run.clone() })
+            let (control, vehicles) = (LiveView::open(&plan)?, Vehicles::of(run, &plan));
+            Ok::<_, BusError>(Self { control, vehicles, plan, run: run.clone() })
         };
         let start = Instant::now();
         let mut source = open();
@@ -57,7 +60,8 @@ impl Source {
     }
 
     /// State of the run now.
-    pub fn sample(&self) -> Sample {
+    pub fn sample(&mut self) -> Sample {
+        let vehicles = self.vehicles.look();
         let mut status = Status::of(&self.plan, &self.control);
         if !self.run.is_live() {
             status.state = State::Ended;
@@ -71,7 +75,7 @@ impl Source {
         let (processes, used) = std::iter::once(clock).chain(nodes).unzip();
         let topics = (0..self.plan.topics.len()).map(|index| self.topic(index)).collect();
         let manifest = self.run.entry.manifest.display().to_string();
-        let view = View { manifest, status, span_s: 0.0, real_time_factor: 0.0, processes, topics };
+        let view = View { manifest, status, span_s: 0.0, real_time_factor: 0.0, vehicles, processes, topics };
         Sample { at_ns: monotonic_ns(), view, used }
     }
 

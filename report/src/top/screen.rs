@@ -1,7 +1,7 @@
-//! Drawing of a view: title, processes, topics, and the keys. 80 × 24 characters are enough for hover.toml.
+//! Drawing of a view: title, vehicles, processes, topics, and the keys. 80 × 24 characters are enough for hover.toml.
 
 use crate::cells::Cells;
-use crate::top::view::{View, processes, title, topics};
+use crate::top::view::{View, only_vehicle, processes, title, topics, vehicles};
 use diagnostics::printable_line;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Constraint, Layout, Rect};
@@ -12,6 +12,7 @@ use runtime::ctl::protocol::State;
 
 const KEYS: &str = "space pause  s step  S 100  + - speed  f free  r realtime  x stop  q leave";
 /// Widths of the columns: of numbers in characters, of text as shares of the remaining width.
+const VEHICLE_WIDTHS: [u16; 6] = [1, 9, 9, 7, 7, 7];
 const PROCESS_WIDTHS: [u16; 7] = [3, 7, 9, 5, 7, 7, 5];
 const TOPIC_WIDTHS: [u16; 5] = [2, 1, 9, 10, 5];
 
@@ -28,9 +29,13 @@ pub struct Screen<'a> {
 impl Widget for Screen<'_> {
     fn render(self, area: Rect, buffer: &mut Buffer) {
         let (processes, topics) = (processes(self.view), topics(self.view));
-        let process_lines = share_of(area.height.saturating_sub(6), processes.rows.len(), topics.rows.len());
-        let [head, first, _, second, notice, keys] = Layout::vertical([
+        let vehicles = vehicles(self.view);
+        let flown_lines = vehicle_lines(area.height, vehicles.rows.len());
+        let height = area.height.saturating_sub(6 + flown_lines);
+        let process_lines = share_of(height, processes.rows.len(), topics.rows.len());
+        let [head, flown, first, _, second, notice, keys] = Layout::vertical([
             Constraint::Length(3),
+            Constraint::Length(flown_lines),
             Constraint::Length(process_lines),
             Constraint::Length(1),
             Constraint::Fill(1),
@@ -40,13 +45,21 @@ impl Widget for Screen<'_> {
         .areas(area);
         let [run, progress] = title(self.view);
         let run = printable_line(&run);
-        let lines = [Line::styled(run, title_style(self.view.status.state)), Line::raw(progress)];
+        let state = Line::raw(only_vehicle(self.view));
+        let lines = [Line::styled(run, title_style(self.view.status.state)), Line::raw(progress), state];
         Text::from_iter(lines).render(head, buffer);
+        table(&vehicles, &VEHICLE_WIDTHS, self.scroll, flown.height.saturating_sub(1)).render(flown, buffer);
         table(&processes, &PROCESS_WIDTHS, self.scroll, first.height).render(first, buffer);
         table(&topics, &TOPIC_WIDTHS, self.scroll, second.height).render(second, buffer);
         Line::raw(printable_line(self.notice)).bold().render(notice, buffer);
         Line::raw(KEYS).dim().render(keys, buffer);
     }
+}
+
+/// Lines for `vehicles` of a screen of `height` lines, with the heading and an empty line behind them: a quarter of the screen at most.
+fn vehicle_lines(height: u16, vehicles: usize) -> u16 {
+    let lines = |rows: usize| u16::try_from(rows + 2).unwrap_or(u16::MAX);
+    if vehicles == 0 { 0 } else { lines(vehicles).min(height / 4) }
 }
 
 /// Lines for the processes of `height` lines for both tables, each with its heading: the lines that both need if
@@ -86,7 +99,7 @@ fn table(cells: &Cells, widths: &[u16], scroll: usize, height: u16) -> Table<'st
 #[cfg(test)]
 mod tests {
     use super::{KEYS, Screen};
-    use crate::top::view::{ProcessRow, TopicRow, View};
+    use crate::top::view::{ProcessRow, TopicRow, VehicleRow, View};
     use bus::plan::Pace;
     use ratatui::Terminal;
     use ratatui::backend::TestBackend;
@@ -125,6 +138,7 @@ mod tests {
             },
             span_s: 1.0,
             real_time_factor: 0.4999,
+            vehicles: vec![],
             processes: (0..rows).map(process).collect(),
             topics: (0..rows).map(topic).collect(),
         }
@@ -154,6 +168,27 @@ mod tests {
         assert_eq!(words(&lines[13]), ["topic", "publisher", "rate", "Hz", "samples", "lost"]);
         assert_eq!(words(&lines[21]), ["/process-7/estimate", "process-7", "1000", "12345", "0"]);
         assert_eq!(lines[22..], ["paused at tick 12345", KEYS]);
+    }
+
+    #[test]
+    fn one_vehicle_has_a_line_and_several_have_a_table() {
+        let row = |name: &str| VehicleRow {
+            name: name.to_owned(),
+            height_m: Some(1.4985),
+            speed_m_s: Some(0.02),
+            roll_deg: Some(-9.96),
+            pitch_deg: Some(0.0),
+            ..VehicleRow::default()
+        };
+        let mut view = view(8);
+        view.vehicles = vec![row("plant")];
+        let lines = drawn(&view, (80, 24), 0);
+        assert_eq!(lines[2], "height 1.498 m  speed 0.02 m/s  roll -10.0°  pitch 0.0°  yaw -°");
+        view.vehicles = vec![row("h1"), row("h2")];
+        let lines = drawn(&view, (80, 24), 0);
+        assert!(lines[3].starts_with("vehicle") && lines[3].ends_with("yaw °"), "{lines:#?}");
+        assert!(lines[5].starts_with("h2") && lines[5].ends_with("-10.0     0.0       -"), "{lines:#?}");
+        assert!(lines[7].starts_with("process  "), "{lines:#?}");
     }
 
     #[test]

@@ -6,7 +6,7 @@ use serde::Serialize;
 use std::fmt;
 use std::path::Path;
 
-/// A run as shown; its text is a table of its processes and one of its topics.
+/// A run as shown; its text is a table of its vehicles, one of its processes and one of its topics.
 ///
 /// ```
 /// use bus::plan::Pace;
@@ -15,8 +15,9 @@ use std::path::Path;
 /// use runtime::manifest::PaceSetting;
 /// let (run_id, state, pace) = ("1f-2e".to_owned(), State::Paused, PaceSetting(Pace::Free));
 /// let status = Status { run_id, state, tick: 5, end_tick: 10, time_s: 0.005, pace, missed_deadlines: 0 };
-/// let (manifest, processes, topics) = ("hover.toml".to_owned(), Vec::new(), Vec::new());
-/// let view = View { manifest, status, span_s: 0.5, real_time_factor: 0.0, processes, topics };
+/// let (vehicles, processes, topics) = (Vec::new(), Vec::new(), Vec::new());
+/// let manifest = "hover.toml".to_owned();
+/// let view = View { manifest, status, span_s: 0.5, real_time_factor: 0.0, vehicles, processes, topics };
 /// assert!(view.to_string().starts_with("hover.toml  run 1f-2e  paused\ntick 5 / 10  0.005 s"));
 /// ```
 #[derive(Clone, Debug, Serialize)]
@@ -30,10 +31,31 @@ pub struct View {
     pub span_s: f64,
     /// Simulated time per host time.
     pub real_time_factor: f64,
+    /// The vehicles, of a run that is recorded.
+    pub vehicles: Vec<VehicleRow>,
     /// The clock, then the nodes.
     pub processes: Vec<ProcessRow>,
     /// The topics.
     pub topics: Vec<TopicRow>,
+}
+
+/// A vehicle as shown; values are missing before its first sample.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct VehicleRow {
+    /// Name; that of the plant's process for a vehicle without a set.
+    pub name: String,
+    /// Simulation time of the state, s.
+    pub time_s: Option<f64>,
+    /// Height of the centre of mass in the world, m.
+    pub height_m: Option<f64>,
+    /// Speed, m/s.
+    pub speed_m_s: Option<f64>,
+    /// Roll, degrees.
+    pub roll_deg: Option<f64>,
+    /// Pitch, degrees, positive nose down.
+    pub pitch_deg: Option<f64>,
+    /// Yaw, degrees, positive counter-clockwise from above.
+    pub yaw_deg: Option<f64>,
 }
 
 /// A process as shown.
@@ -75,6 +97,31 @@ pub struct TopicRow {
     pub lost: u32,
 }
 
+/// The table of several vehicles; one alone has a line of its own.
+pub fn vehicles(view: &View) -> Cells {
+    let headings = ["vehicle", "height m", "speed m/s", "roll °", "pitch °", "yaw °"];
+    let several = Some(&view.vehicles).filter(|vehicles| vehicles.len() > 1);
+    Cells::new(&headings, 1, several.into_iter().flatten().map(vehicle).collect())
+}
+
+/// The state of the only vehicle in one line; empty if there is none or several.
+pub fn only_vehicle(view: &View) -> String {
+    let [only] = &view.vehicles[..] else { return String::new() };
+    let [height, speed, roll, pitch, yaw] = &vehicle(only)[1..] else { return String::new() };
+    format!("height {height} m  speed {speed} m/s  roll {roll}°  pitch {pitch}°  yaw {yaw}°")
+}
+
+fn vehicle(row: &VehicleRow) -> Vec<String> {
+    let VehicleRow { name, height_m, speed_m_s, roll_deg, pitch_deg, yaw_deg, .. } = row;
+    let angles = [roll_deg, pitch_deg, yaw_deg].map(|angle_deg| or_dash(*angle_deg, 1));
+    [name.clone(), or_dash(*height_m, 3), or_dash(*speed_m_s, 2)].into_iter().chain(angles).collect()
+}
+
+/// A number with `digits` decimals, or a dash for none.
+fn or_dash(value: Option<f64>, digits: usize) -> String {
+    value.map_or("-".to_owned(), |value| format!("{value:.digits$}"))
+}
+
 /// The table of the processes.
 pub fn processes(view: &View) -> Cells {
     let headings = ["process", "state", "tick", "CPU %", "p50 µs", "p99 µs", "late"];
@@ -82,8 +129,6 @@ pub fn processes(view: &View) -> Cells {
 }
 
 fn process(row: &ProcessRow) -> Vec<String> {
-    let or_dash =
-        |value: Option<f64>, digits| value.map_or("-".to_owned(), |value| format!("{value:.digits$}"));
     vec![
         row.group.as_ref().map_or(row.name.clone(), |group| format!("{} [{group}]", row.name)),
         row.state.clone(),
@@ -124,6 +169,15 @@ impl fmt::Display for View {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [run, progress] = title(self);
         let (processes, topics) = (processes(self), topics(self));
-        write!(f, "{run}\n{progress}\n\n{processes}\n{topics}")
+        let (only, several) = (only_vehicle(self), vehicles(self));
+        writeln!(f, "{run}\n{progress}")?;
+        if !only.is_empty() {
+            writeln!(f, "{only}")?;
+        }
+        writeln!(f)?;
+        if !several.rows.is_empty() {
+            writeln!(f, "{several}")?;
+        }
+        write!(f, "{processes}\n{topics}")
     }
 }

@@ -86,8 +86,13 @@ impl Composer<'_> {
     ) -> Result<Vec<GroupPlan>, Diagnostic> {
         let group = |names: &Vec<String>| {
             if let [name] = names.as_slice() {
-                let found = stated.iter().find(|group| group.name == *name).cloned();
-                return found.ok_or_else(|| self.no_group(name, stated, span));
+                if let Some(group) = stated.iter().find(|group| group.name == *name) {
+                    return Ok(group.clone());
+                }
+                // A process alone is a group of one, so that a list may name each process once.
+                if !self.nodes.iter().any(|node| node.name == *name) {
+                    return Err(self.no_group(name, stated, span));
+                }
             }
             let members = Diagnostic::gather(names.iter().map(|name| self.member(name, span)))?;
             self.group(&names.join("+"), members, None, span)
@@ -133,8 +138,6 @@ impl Composer<'_> {
             let kind = self.declared_nodes[node].program.component()?.name.to_owned();
             Some(MemberPlan { node, kind })
         };
-        // The core of a member in a feedback loop, where the launcher has chosen one.
-        let cpu = cpu.or_else(|| self.nodes[*nodes.first()?].cpu);
         GroupPlan { name: name.to_owned(), members: nodes.iter().filter_map(member).collect(), cpu }
     }
 

@@ -125,7 +125,7 @@ pub fn succeed<'s>(process: &mut DeTable<'s>, with: DeTable<'s>, sources: &Sourc
     let kind = tree::string(process, "kind").and_then(|kind| sources.registry.find(kind));
     for (key, value) in before.into_iter().flatten() {
         // A change of the kind has removed it: the new kind reads the same model, if it reads one.
-        if kind.is_some_and(|kind| kind.parameters().contains(&key.get_ref().as_ref())) {
+        if kind.is_some_and(|kind| kind.has_parameter(key.get_ref())) {
             process.entry(key).or_insert(value);
         }
     }

@@ -23,6 +23,7 @@ use super::start::{lost_covariance, start};
 use super::transition::{Covariance, CovarianceView, STATES, Transition};
 use crate::wire::attitude;
 use bus::Message;
+use bus::Parameters as _;
 use bus::component::{State, StateError, Transfer};
 use diagnostics::parameter::{ParameterError, positive, require};
 use nalgebra::{SMatrix, Vector3};

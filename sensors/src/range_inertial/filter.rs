@@ -23,6 +23,7 @@ use super::axis::{AHEAD, Axis, Echo, PATH, Side, VELOCITY};
 use super::gains::{Gains, TooLongAgo};
 use super::params::RangeInertialParams;
 use crate::wire::{attitude, vector, vector_message};
+use bus::Parameters as _;
 use bus::messages::{
     AttitudeEstimate, Gps, Imu, Quaternion, Ranges, StateEstimate, Vector3 as Vector3Message, WallEstimate,
 };

@@ -3,31 +3,27 @@
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::{MotorCommand, Quaternion, SetPoint, StateEstimate};
-use bus::{BusError, InputPorts, OutputPorts, ParameterError};
-use serde::Deserialize;
+use bus::{BusError, InputPorts, OutputPorts, ParameterError, Parameters};
 
 #[cfg(test)]
 mod hover_test;
 
-/// The table `parameters` of the manifest.
-#[derive(Debug, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+/// The table `parameters` of the manifest. The defaults are tuned for the vehicle file of this project.
+#[derive(Debug, Parameters)]
+#[parameters(default)]
 struct Gains {
     /// Command at which the vehicle hovers, in counts.
+    #[parameter(default = 76.5)]
     hover: f64,
     /// Counts per metre of height error, and per metre a second of climb.
+    #[parameter(default = [63.6, 31.8])]
     altitude: [f64; 2],
     /// Counts per radian of roll or pitch error, and per radian a second of rate.
+    #[parameter(default = [11.6, 4.4])]
     tilt: [f64; 2],
     /// Counts per radian a second of yaw rate.
+    #[parameter(default = 5.0)]
     yaw_rate: f64,
-}
-
-/// Tuned for the vehicle file of this project.
-impl Default for Gains {
-    fn default() -> Self {
-        Self { hover: 76.5, altitude: [63.6, 31.8], tilt: [11.6, 4.4], yaw_rate: 5.0 }
-    }
 }
 
 /// Inputs, by the names in the manifest.

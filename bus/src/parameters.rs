@@ -1,0 +1,226 @@
+//! Parameters of a component: declared once, with unit, default, range and documentation.
+//!
+//! ```
+//! use bus::Parameters;
+//! use diagnostics::parameter::positive;
+//!
+//! /// Gains of a controller of the altitude.
+//! #[derive(Parameters)]
+//! struct Gains {
+//!     /// Error of the altitude to a climb.
+//!     #[parameter(default = 1.5, check = positive)]
+//!     altitude_1_s: f64,
+//!     /// Thrust at hover.
+//!     #[parameter(unit = "N")]
+//!     hover: f64,
+//! }
+//!
+//! let [altitude, hover] = Gains::DECLARED else { panic!() };
+//! assert_eq!((altitude.unit, altitude.default.text().as_str(), (altitude.range)().as_str()), ("1/s", "1.5", "above 0"));
+//! assert_eq!((hover.doc, hover.default.text().as_str()), ("Thrust at hover.", "required"));
+//! let gains: Gains = diagnostics::read(&serde_json::json!({ "hover": 4.9, "altitude_1_s": -1.0 }))?;
+//! assert!(gains.validate().is_err());
+//! # Ok::<(), bus::ParameterError>(())
+//! ```
+
+use diagnostics::ParameterError;
+use serde::de::{DeserializeOwned, IgnoredAny};
+use serde_json::Value;
+use std::collections::BTreeMap;
+
+/// The content of a `parameters` table; `#[derive(bus::Parameters)]` implements it.
+pub trait Parameters: DeserializeOwned {
+    /// The parameters, in the order in which they are documented.
+    const DECLARED: &'static [Parameter];
+
+    /// Refuses a parameter that is outside its range.
+    ///
+    /// # Errors
+    /// The first that is.
+    fn validate(&self) -> Result<(), ParameterError> {
+        Ok(())
+    }
+}
+
+/// Declaration of a parameter.
+#[derive(Clone, Copy, Debug)]
+pub struct Parameter {
+    /// Key in the manifest.
+    pub name: &'static str,
+    /// Meaning, in one or more sentences.
+    pub doc: &'static str,
+    /// Unit; empty for texts, files and tables.
+    pub unit: &'static str,
+    /// Value where the manifest has none.
+    pub default: DefaultValue,
+    /// Accepted values in words; empty where any that the unit allows is accepted.
+    pub range: fn() -> String,
+    /// Keys of the table that it is, or of each table in it.
+    pub table: &'static [Parameter],
+    /// Stand-in for the name of such a table in it, or for its number in a list; empty where it is itself the table.
+    pub entry: &'static str,
+    /// Value in examples, as TOML; empty where there is none.
+    pub example: &'static str,
+}
+
+/// Value of a parameter that a manifest leaves out.
+#[derive(Clone, Copy, Debug)]
+pub enum DefaultValue {
+    /// None: the parameter is required.
+    Required,
+    /// Description of it.
+    Text(&'static str),
+    /// Function that writes it.
+    Value(fn() -> String),
+}
+
+impl DefaultValue {
+    /// The value in words.
+    #[must_use]
+    pub fn text(&self) -> String {
+        match self {
+            Self::Required => "required".to_owned(),
+            Self::Text(text) => (*text).to_owned(),
+            Self::Value(text) => text(),
+        }
+    }
+}
+
+/// The parameters in `declared` with the keys of their tables, by dotted key, each table before its keys.
+///
+/// ```
+/// let keys: Vec<String> = bus::parameters::dotted(&[]).into_iter().map(|(key, _)| key).collect();
+/// assert!(keys.is_empty());
+/// ```
+#[must_use]
+pub fn dotted(declared: &'static [Parameter]) -> Vec<(String, &'static Parameter)> {
+    let of_parameter = |parameter: &'static Parameter| {
+        let Parameter { name, entry, table, .. } = *parameter;
+        let path = if entry.is_empty() { name.to_owned() } else { format!("{name}.{entry}") };
+        let within = dotted(table).into_iter().map(move |(key, inner)| (format!("{path}.{key}"), inner));
+        std::iter::once((name.to_owned(), parameter)).chain(within)
+    };
+    declared.iter().flat_map(of_parameter).collect()
+}
+
+/// A component without declared parameters.
+macro_rules! undeclared {
+    ($($type:ty),*) => {$(
+        impl Parameters for $type {
+            const DECLARED: &'static [Parameter] = &[];
+        }
+    )*};
+}
+
+undeclared!((), IgnoredAny, Value);
+
+impl<T: DeserializeOwned> Parameters for BTreeMap<String, T> {
+    const DECLARED: &'static [Parameter] = &[];
+}
+
+/// Numbers of a parameter, each of which has to be within its range.
+pub trait Numbers {
+    /// Requires `check` to accept each number.
+    ///
+    /// # Errors
+    /// The first that it refuses.
+    fn all(&self, check: &dyn Fn(f64) -> Result<(), ParameterError>) -> Result<(), ParameterError>;
+}
+
+impl Numbers for f64 {
+    fn all(&self, check: &dyn Fn(f64) -> Result<(), ParameterError>) -> Result<(), ParameterError> {
+        check(*self)
+    }
+}
+
+impl Numbers for u32 {
+    fn all(&self, check: &dyn Fn(f64) -> Result<(), ParameterError>) -> Result<(), ParameterError> {
+        check(f64::from(*self))
+    }
+}
+
+impl Numbers for usize {
+    fn all(&self, check: &dyn Fn(f64) -> Result<(), ParameterError>) -> Result<(), ParameterError> {
+        check(*self as f64)
+    }
+}
+
+impl<const N: usize> Numbers for [f64; N] {
+    fn all(&self, check: &dyn Fn(f64) -> Result<(), ParameterError>) -> Result<(), ParameterError> {
+        self.iter().try_for_each(|number| check(*number))
+    }
+}
+
+impl<T: Numbers> Numbers for Option<T> {
+    fn all(&self, check: &dyn Fn(f64) -> Result<(), ParameterError>) -> Result<(), ParameterError> {
+        self.iter().try_for_each(|numbers| numbers.all(check))
+    }
+}
+
+/// The range that `check` requires, in words: as it refuses what is no number.
+#[doc(hidden)]
+pub fn range_of(check: &dyn Fn(&str, f64) -> Result<(), ParameterError>) -> String {
+    match check("", f64::NAN) {
+        Err(ParameterError::Value { expected, .. }) => {
+            let range = expected.strip_prefix("a finite number").unwrap_or(&expected);
+            range.trim_start_matches([',', ' ']).to_owned()
+        }
+        _ => String::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Parameters, range_of};
+    use diagnostics::parameter::{finite, not_negative};
+    use serde_json::json;
+
+    /// A table with all kinds of fields.
+    #[derive(Debug, PartialEq, bus::Parameters)]
+    #[parameters(default)]
+    struct Gains {
+        /// Offset of each axis.
+        #[parameter(default = [0.0; 3], check = finite)]
+        offset_m: [f64; 3],
+        /// Index of the axis.
+        #[parameter(rename = "self", unit = "1")]
+        own: Option<u32>,
+        /// Streams.
+        #[parameter(default = Vec::new(), shown = "none", table = Stream)]
+        streams: Vec<Stream>,
+    }
+
+    /// A table within.
+    #[derive(Debug, PartialEq, bus::Parameters)]
+    struct Stream {
+        /// Rate.
+        rate_hz: f64,
+    }
+
+    #[test]
+    fn a_table_is_read_with_its_defaults_and_refuses_other_keys() {
+        let read = |value| diagnostics::read::<Gains>(&value);
+        assert_eq!(read(json!({})).unwrap(), Gains::default());
+        let given = read(json!({ "self": 2, "streams": [{ "rate_hz": 5.0 }] })).unwrap();
+        assert_eq!((given.own, given.streams[0].rate_hz), (Some(2), 5.0));
+        let error = read(json!({ "own": 2 })).unwrap_err().to_string();
+        assert_eq!(error, "unknown key `own`, expected one of `offset_m`, `self`, `streams`");
+        assert!(read(json!({ "streams": [{}] })).unwrap_err().to_string().contains("`streams.0.rate_hz`"));
+    }
+
+    #[test]
+    fn declarations_have_unit_default_and_range() {
+        let [offset, own, streams] = Gains::DECLARED else { panic!("{:?}", Gains::DECLARED) };
+        assert_eq!((offset.unit, offset.default.text().as_str()), ("m", "[0.0, 0.0, 0.0]"));
+        assert_eq!((own.name, own.unit, own.default.text().as_str()), ("self", "1", "none"));
+        assert_eq!((streams.default.text().as_str(), streams.table[0].name), ("none", "rate_hz"));
+        assert_eq!((range_of(&finite).as_str(), range_of(&not_negative).as_str()), ("", "0 or more"));
+    }
+
+    #[test]
+    fn a_number_out_of_its_range_is_refused_by_its_key() {
+        let gains = Gains { offset_m: [0.0, f64::NAN, 0.0], ..Gains::default() };
+        assert_eq!(gains.validate().unwrap_err().key(), "offset_m");
+        assert!(Gains::default().validate().is_ok());
+    }
+}
