@@ -66,6 +66,12 @@ fn answer(report: &Report) -> String {
             .to_owned()
     } else if !report.losses.is_empty() {
         "Do not use the new vehicle file: simpler predictions of these flights are better.".to_owned()
+    } else if count == 0 && !report.withdrawn.is_empty() {
+        let withdrawn: Vec<&str> = report.withdrawn.iter().map(|withdrawn| withdrawn.effect).collect();
+        format!(
+            "The declared vehicle file predicts these flights as well as any. They show {}, too small to change a prediction.",
+            withdrawn.join(" and ")
+        )
     } else if count == 0 {
         "The declared vehicle file says all that these flights can show.".to_owned()
     } else if report.is_unchecked() {
@@ -192,6 +198,7 @@ mod tests {
     use crate::horizons::{Change, Changes};
     use crate::loss::Loss;
     use crate::report::{BeforeAfter, EffectReport, Estimate, Report};
+    use crate::revision::Withdrawn;
     use std::collections::BTreeMap;
 
     fn effect() -> EffectReport {
@@ -313,6 +320,15 @@ mod tests {
         let nothing = Brief::of(&Report::of_nothing());
         assert_eq!(nothing.answer, "The declared vehicle file says all that these flights can show.");
         assert!(nothing.missing.is_empty() && nothing.changes.is_empty(), "{nothing:?}");
+        let found =
+            Withdrawn { effect: "ground-effect", reason: "no prediction error falls noticeably".to_owned() };
+        let small = Report { withdrawn: vec![found], ..Report::of_nothing() };
+        assert!(Brief::of(&small).answer.contains("They show ground-effect, too small"));
+        assert!(
+            small
+                .to_string()
+                .contains("verdict: nothing. The equations fit better with ground-effect, but no prediction")
+        );
         let short = Brief::of(&Report { validation_blocks: 3, ..Report::of_nothing() });
         assert_eq!(short.answer, "These flights are too short to tell.");
         assert!(short.next[0].starts_with("Fly longer: "), "{:?}", short.next);

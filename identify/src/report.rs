@@ -260,6 +260,16 @@ impl Report {
         Ok(())
     }
 
+    /// The reason why no effect is named.
+    fn no_effect(&self) -> String {
+        if self.withdrawn.is_empty() {
+            return "No candidate makes the equations fit better beyond chance.".to_owned();
+        }
+        let effects: Vec<&str> = self.withdrawn.iter().map(|withdrawn| withdrawn.effect).collect();
+        let effects = effects.join(", ");
+        format!("The equations fit better with {effects}, but no prediction error falls noticeably.")
+    }
+
     fn write_verdict(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.is_undecided() {
             let (blocks, block_s) = (self.validation_blocks, self.block_s);
@@ -271,7 +281,7 @@ impl Report {
         } else if !self.losses.is_empty() {
             self.write_losses(f)?;
         } else if self.verdict.is_empty() {
-            writeln!(f, "\nverdict: nothing. No candidate makes the equations fit better beyond chance.")?;
+            writeln!(f, "\nverdict: nothing. {}", self.no_effect())?;
         } else {
             writeln!(f, "\nverdict: {}", self.verdict.join(", "))?;
             if self.is_unchecked() {
