@@ -77,21 +77,26 @@ impl Layout {
     }
 }
 
-/// The rotor of each motor, if each rotor stands in the place of one motor alone.
+/// The rotor of each motor, if each rotor stands in the place of one motor alone. Of a coaxial pair, which stands in one place, each motor gets
+/// the rotor that turns as it does.
 fn assigned(rotors: &[Rotor], motors: &[Motor]) -> Option<Vec<usize>> {
     if rotors.len() != motors.len() {
         return None;
     }
     let angle_max_deg = PLACE * 360.0 / motors.len() as f64;
-    let near = |angle_deg: f64| {
+    let is_near = |rotor: &Rotor, angle_deg: f64| {
         let (right, forward) = libm::sincos(angle_deg.to_radians());
-        rotors.iter().position(|rotor| {
-            let at = rotor.position_m;
-            let angle_rad = libm::atan2(at.y * forward + at.x * right, at.x * forward - at.y * right);
-            at.xy().norm() > 0.0 && angle_rad.to_degrees().abs() <= angle_max_deg
-        })
+        let at = rotor.position_m;
+        let angle_rad = libm::atan2(at.y * forward + at.x * right, at.x * forward - at.y * right);
+        at.xy().norm() > 0.0 && angle_rad.to_degrees().abs() <= angle_max_deg
     };
-    let order: Vec<usize> = motors.iter().map(|(angle_deg, _)| near(*angle_deg)).collect::<Option<_>>()?;
+    let rotor_of = |(angle_deg, is_clockwise): &Motor| {
+        let mut near = (0..rotors.len()).filter(|&rotor| is_near(&rotors[rotor], *angle_deg));
+        let (first, second) = (near.next()?, near.next());
+        let turns_alike = |rotor: &usize| (rotors[*rotor].spin < 0.0) == *is_clockwise;
+        second.map_or(Some(first), |second| [first, second].into_iter().find(turns_alike))
+    };
+    let order: Vec<usize> = motors.iter().map(rotor_of).collect::<Option<_>>()?;
     (0..rotors.len()).all(|rotor| order.contains(&rotor)).then_some(order)
 }
 
@@ -119,6 +124,36 @@ mod tests {
             layout.motors.iter().map(|rotor| &*rotors[*rotor].name).collect::<Vec<_>>(),
             ["rear", "right", "left", "front"]
         );
+    }
+
+    /// Rotors at angles from the front, clockwise seen from above, each of which turns clockwise or not.
+    fn rotors_at(motors: &[Motor]) -> Vec<Rotor> {
+        let rotor = |(angle_deg, is_clockwise): &Motor| {
+            let mut rotor = hummingbird().rotors[0].clone();
+            let (right, forward) = libm::sincos(angle_deg.to_radians());
+            rotor.position_m = nalgebra::Vector3::new(forward, -right, 0.0);
+            rotor.spin = if *is_clockwise { -1.0 } else { 1.0 };
+            rotor
+        };
+        motors.iter().map(rotor).collect()
+    }
+
+    #[test]
+    fn every_mixer_is_found_for_its_own_rotors_in_any_order_and_balances_them() {
+        for (mixer, motors) in MIXERS {
+            let mut rotors = rotors_at(motors);
+            assert_eq!(Layout::of(&rotors, &MIXERS).unwrap().frame, mixer);
+            rotors.rotate_left(1);
+            let layout = Layout::of(&rotors, &MIXERS).unwrap();
+            let count = motors.len();
+            let expected: Vec<usize> = (0..count).map(|motor| (motor + count - 1) % count).collect();
+            assert_eq!((layout.frame, layout.motors), (mixer, expected));
+            let sum = rotors.iter().map(|rotor| rotor.position_m).sum::<nalgebra::Vector3<f64>>();
+            assert!(
+                sum.norm() < 1e-12 && rotors.iter().map(|rotor| rotor.spin).sum::<f64>() == 0.0,
+                "{mixer}"
+            );
+        }
     }
 
     #[test]

@@ -68,6 +68,9 @@ pub struct CampaignArguments {
     /// Print the report as JSON, and no progress.
     #[arg(long)]
     json: bool,
+    /// Print no progress.
+    #[arg(short, long)]
+    quiet: bool,
     /// Fly for a campaign that started this process.
     #[arg(long, hide = true)]
     worker: bool,
@@ -92,6 +95,8 @@ pub struct Flying {
     pub require: Option<Requirement>,
     /// True for a report as JSON.
     pub json: bool,
+    /// True for no progress.
+    pub quiet: bool,
 }
 
 /// The command `campaign`; false if the requirement is not met.
@@ -112,10 +117,11 @@ pub fn campaign(arguments: &CampaignArguments) -> Result<bool> {
     let text =
         InputFiles::default().text(&path).with_context(|| format!("cannot read {}", path.display()))?;
     let folder = arguments.out.clone().unwrap_or_else(|| path.with_extension(""));
-    let CampaignArguments { require, json, .. } = *arguments;
+    let CampaignArguments { require, json, quiet, .. } = *arguments;
     let engine = arguments.engine.clone();
     let builds = if arguments.fly.is_some() { Builds::Any } else { Builds::Same };
-    let opened = Opened::new(Flying { path, text, folder, is_made: false, engine, require, json }, builds)?;
+    let opened =
+        Opened::new(Flying { path, text, folder, is_made: false, engine, require, json, quiet }, builds)?;
     if arguments.plan_only {
         let path = opened.0.flying.folder.join(PLAN);
         let planned = flights(opened.0.plan.flights.len() as u64);
@@ -200,7 +206,7 @@ impl Opened {
             require_flyable(&self.campaign, &self.base, &self.plan)?;
         }
         let (flown, planned) = (rows.len() as u64, self.plan.flights.len() as u64);
-        let bar = progress::bar_from(BAR, flown, planned, self.flying.json);
+        let bar = progress::bar_from(BAR, flown, planned, self.flying.json || self.flying.quiet);
         let Self { flying, campaign, base, plan, build, store } = self;
         let (path, text, fingerprint) = (flying.path.clone(), flying.text.clone(), base.fingerprint.clone());
         let order = Order { build: build.clone(), path, text, fingerprint, folder: store.work_folder()? };

@@ -68,5 +68,6 @@ pub fn run(arguments: &RunOrForkArguments) -> Result<bool> {
         engine: EngineArguments::local(fork.workers),
         require: fork.require,
         json: run.json,
+        quiet: run.quiet,
     })
 }

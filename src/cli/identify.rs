@@ -60,6 +60,9 @@ pub struct IdentifyArguments {
     /// Print the report as JSON, and no progress.
     #[arg(long)]
     json: bool,
+    /// Print no progress.
+    #[arg(short, long)]
+    quiet: bool,
     /// Do not fly the declared and the new vehicle on the bus.
     #[arg(long)]
     no_bus: bool,
@@ -111,14 +114,15 @@ fn rotor(files: &[PathBuf], out: &Path, is_json: bool) -> Result<bool> {
 }
 
 fn flights_of(arguments: &IdentifyArguments, file: &Path, out: &Path) -> Result<bool> {
-    let bar = progress::bar("{spinner} {elapsed:>4}  {msg}", arguments.json);
-    if !arguments.json {
+    let is_quiet = arguments.json || arguments.quiet;
+    let bar = progress::bar("{spinner} {elapsed:>4}  {msg}", is_quiet);
+    if !is_quiet {
         bar.enable_steady_tick(Duration::from_millis(100));
     }
     let lines = progress::Lines::default();
     let say = |text: &str| {
         bar.set_message(readable(text).into_owned());
-        if bar.is_hidden() && !arguments.json && lines.is_due(text, bar.elapsed()) {
+        if bar.is_hidden() && !is_quiet && lines.is_due(text, bar.elapsed()) {
             output::say(&format!("{:6.1} s  {}", bar.elapsed().as_secs_f64(), readable(text)));
         }
     };

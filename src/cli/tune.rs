@@ -49,6 +49,9 @@ pub struct TuneArguments {
     /// Print the result as JSON, and no progress.
     #[arg(long)]
     json: bool,
+    /// Print no progress.
+    #[arg(short, long)]
+    quiet: bool,
 }
 
 /// The command `tune`; false if the tuned gains are not better.
@@ -146,7 +149,8 @@ fn fly(
         order: &order,
         timeout: Duration::from_secs_f64(tuning.campaign.timeout_s_host),
     };
-    let bar = progress::bar(BAR, arguments.json);
+    let is_quiet = arguments.json || arguments.quiet;
+    let bar = progress::bar(BAR, is_quiet);
     bar.set_length(tuning.generations as u64);
     let (lines, last) = (progress::Lines::default(), Mutex::new(last));
     let tell = |progress: Progress| {
@@ -157,7 +161,7 @@ fn fly(
             "tuning: generation {} of {}, lowest costs {costs:.1} % of today's",
             progress.generation, tuning.generations
         );
-        if bar.is_hidden() && !arguments.json && lines.is_due(&line, bar.elapsed()) {
+        if bar.is_hidden() && !is_quiet && lines.is_due(&line, bar.elapsed()) {
             say(&line);
         }
         **last.lock().unwrap_or_else(PoisonError::into_inner) = Some(progress);

@@ -27,6 +27,9 @@ pub struct ValidateArguments {
     /// Print JSON, and no progress.
     #[arg(long)]
     json: bool,
+    /// Print no progress.
+    #[arg(short, long)]
+    quiet: bool,
     /// Keep what was flown in this folder: of each flight its data, its manifest and its recording.
     #[arg(long, value_name = "DIR")]
     keep: Option<PathBuf>,
@@ -67,7 +70,7 @@ pub fn validate(arguments: &ValidateArguments) -> Result<bool> {
         return Ok(true);
     }
     let mut tell = |line: &str| {
-        if !arguments.json {
+        if !arguments.json && !arguments.quiet {
             say(line);
         }
     };

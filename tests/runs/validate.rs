@@ -82,6 +82,8 @@ fn the_table_sets_vehicles_side_by_side_and_progress_goes_to_standard_error() {
     let ended = place.call(&["validate", &vehicle_file, &heavy, &flights, "--keep", &kept]).with_code(0);
     ended.prints(&["own", "heavy", "ratio", "position, m", "rates, rad/s", "0.5 s"]);
     ended.says(&["course: 4.0 s flown in"]);
+    let quiet = place.call(&["validate", &vehicle_file, &flights, "--quiet"]).with_code(0);
+    assert!(quiet.error.is_empty(), "{quiet}");
     // What was kept can be flown again.
     place.call(&["run", &format!("{kept}/course/manifest.toml"), "--json"]).with_code(0);
 }
