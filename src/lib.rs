@@ -1,19 +1,18 @@
 //! hummingbus: a vehicle simulation as independent components in deterministic lockstep, on a zero-copy bus.
 //!
-//! A manifest says which components fly together, and how they are wired. [`load`] reads one. [`Launcher`] flies it,
-//! in processes, on threads or in one thread, and returns the outcome of the run and its recording:
+//! A manifest says which components fly together, and how they are wired. [`load`] reads one. [`fly`] flies it by a [`Launcher`],
+//! in processes, on threads or in one thread, and returns the verdicts and the recording:
 //!
 //! ```
 //! use hummingbus::{Host, Launcher};
 //! let folder = tempfile::tempdir()?;
 //! let hover = concat!(env!("CARGO_MANIFEST_DIR"), "/manifests/hover.toml");
-//! let manifest = hummingbus::load(hover)?.set("run.duration_s", 0.1)?;
+//! let manifest = hummingbus::load(hover)?;
 //!
-//! let (outcome, recording) =
-//!     Launcher::new(Host::InProcess).fly(&manifest, &folder.path().join("hover.mcap"))?;
+//! let flown = hummingbus::fly(Launcher::new(Host::InProcess), &manifest, folder.path().join("hover.mcap"))?;
 //!
-//! assert_eq!(outcome.ticks, 100);
-//! let altitude = &recording.unwrap().series(&[("/plant/state", "position.z")])?[0];
+//! assert!(flown.summary.passed, "{}", flown.summary);
+//! let altitude = &flown.recording.unwrap().series(&[("/plant/state", "position.z")])?[0];
 //! assert!((altitude.value[99] - 1.0).abs() < 0.01);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -79,6 +78,7 @@ mod check;
 mod components;
 #[cfg(test)]
 mod extremes;
+mod flown;
 pub mod fmu_export;
 pub mod operator;
 #[cfg(test)]
@@ -88,6 +88,7 @@ pub use bus::Simulation;
 pub use check::{check, check_text, check_with_programs, drives, meshes};
 pub use components::COMPONENTS;
 pub use diagnostics::Diagnostic;
+pub use flown::{Flown, fly};
 pub use runtime::checkpoint::Checkpoint;
 pub use runtime::ctl::Remote;
 pub use runtime::ctl::protocol::{Answer, Request};

@@ -179,6 +179,33 @@ impl Summary {
         }
     }
 
+    /// Judges the run of `plan` by its `recording`, or by the `figures` of its judge ([`Outcome::figures`]): with both, figures decide, since
+    /// they also hold the ticks before the checkpoint from which the run went on.
+    ///
+    /// # Errors
+    /// As [`Summary::judge`] and [`Summary::judge_by`].
+    pub fn judge_flight(
+        &mut self,
+        recording: Option<&Recording>,
+        figures: Option<&[u8]>,
+        plan: &Plan,
+        content: &Content,
+    ) -> Result<()> {
+        match (recording, figures) {
+            (Some(recording), Some(figures)) => {
+                self.judge_by(figures, content)?;
+                self.describe(recording, plan)
+            }
+            (Some(recording), None) if self.first_tick > 0 => {
+                self.is_unjudged = !content.conditions().topics().is_empty();
+                self.describe(recording, plan)
+            }
+            (Some(recording), None) => self.judge(recording, plan, content),
+            (None, Some(figures)) => self.judge_by(figures, content),
+            (None, None) => Ok(()),
+        }
+    }
+
     /// Judges the `recording` of the run: its shadows, its replacements, and the conditions in `content`. A run that
     /// was stopped has not flown the spans of its conditions, so these are left out.
     ///

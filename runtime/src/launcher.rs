@@ -163,14 +163,26 @@ impl<'a> Launcher<'a> {
     ///
     /// # Errors
     /// A problem in the manifest, or as [`Launcher::launch`].
-    pub fn fly(mut self, manifest: &Manifest, recording: &Path) -> Result<(Outcome, Option<Recording>)> {
+    pub fn fly(self, manifest: &Manifest, recording: &Path) -> Result<(Outcome, Option<Recording>)> {
+        self.fly_planned(manifest, recording).map(|(_, outcome, recording)| (outcome, recording))
+    }
+
+    /// As [`Launcher::fly`]; returns the plan of the run too.
+    ///
+    /// # Errors
+    /// As [`Launcher::fly`].
+    pub fn fly_planned(
+        mut self,
+        manifest: &Manifest,
+        recording: &Path,
+    ) -> Result<(Plan, Outcome, Option<Recording>)> {
         let mut graph = Graph::build_from(manifest, self.files.clone())?;
         if let Some(from) = self.from.take() {
             from.resume(manifest, &mut graph, true)?;
         }
         let mut outputs = Outputs::of(manifest, &graph, recording, Vec::new())?;
         let outcome = self.launch(manifest, &mut graph, &mut outputs)?;
-        Ok((outcome, outputs.finish()?))
+        Ok((graph.plan, outcome, outputs.finish()?))
     }
 
     /// Flies `graph`, the checked `manifest`, and claims `outputs` for it; returns when everything that was started has

@@ -182,20 +182,7 @@ pub fn run(
     let recorded = recording.as_ref().map(Recording::path);
     let profile = flight.as_ref().map(|flight| Profile::of(flight, outcome.missed_deadlines, recorded));
     let mut summary = Summary::new(manifest.name(), outcome, graph.plan.tick_s());
-    match (&recording, figures) {
-        // A recording holds the flight from the checkpoint on; its judge has seen the ticks before, too.
-        (Some(recording), Some(figures)) => {
-            summary.judge_by(&figures, &manifest.content)?;
-            summary.describe(recording, &graph.plan)?;
-        }
-        (Some(recording), None) if summary.first_tick > 0 => {
-            summary.is_unjudged = !manifest.content.conditions().topics().is_empty();
-            summary.describe(recording, &graph.plan)?;
-        }
-        (Some(recording), None) => summary.judge(recording, &graph.plan, &manifest.content)?,
-        (None, Some(figures)) => summary.judge_by(&figures, &manifest.content)?,
-        (None, None) => {}
-    }
+    summary.judge_flight(recording.as_ref(), figures.as_deref(), &graph.plan, &manifest.content)?;
     summary.warnings = graph.warnings;
     let mut text = summary.to_string();
     if let (Some(flight), Some(profile)) = (&flight, &profile) {

@@ -1,0 +1,39 @@
+//! A flight with its verdict.
+
+use anyhow::Result;
+use recorder::reader::Recording;
+use report::summary::Summary;
+use runtime::launcher::Launcher;
+use runtime::manifest::Manifest;
+use std::path::Path;
+
+/// A flight that was flown and judged.
+#[derive(Debug)]
+pub struct Flown {
+    /// Verdicts, measures and comparisons; `passed` if all conditions hold. Its text is the summary of `hummingbus run`.
+    pub summary: Summary,
+    /// The recording; `None` if the manifest has no recorder.
+    pub recording: Option<Recording>,
+}
+
+/// Flies `manifest`, records it to `recording` if it has a recorder, and judges its conditions as `hummingbus run` does.
+///
+/// # Errors
+/// A problem in the manifest, or as [`Launcher::launch`]. A condition that does not hold is a verdict and no error.
+///
+/// ```
+/// use hummingbus::{Host, Launcher};
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("hover.mcap");
+/// let manifest = hummingbus::load(concat!(env!("CARGO_MANIFEST_DIR"), "/manifests/hover.toml"))?;
+/// let flown = hummingbus::fly(Launcher::new(Host::InProcess), &manifest, &path)?;
+/// assert!(flown.summary.passed, "{}", flown.summary);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn fly(launcher: Launcher<'_>, manifest: &Manifest, recording: impl AsRef<Path>) -> Result<Flown> {
+    let (plan, mut outcome, recording) = launcher.fly_planned(manifest, recording.as_ref())?;
+    let figures = outcome.figures.take();
+    let mut summary = Summary::new(manifest.name(), outcome, plan.tick_s());
+    summary.judge_flight(recording.as_ref(), figures.as_deref(), &plan, &manifest.content)?;
+    Ok(Flown { summary, recording })
+}
