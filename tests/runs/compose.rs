@@ -116,6 +116,21 @@ fn a_group_that_cannot_be_is_refused_with_the_reason() {
     place.call(&["run", &hover, "--compose", "plant+"]).with_code(2).says(&["such as plant+imu"]);
 }
 
+/// A companion outside of the loop, which comes first by its name, does not pull a sensor away from the core of its loop.
+#[test]
+fn a_group_has_the_core_of_its_member_in_a_feedback_loop() {
+    let place = Place::new();
+    let sensors = repository("manifests/sensors.toml");
+    let plan =
+        place.call(&["check", &sensors, "--compose", "imu+battery,plant", "--json"]).with_code(0).json();
+    let cpu = |list: &str, name: &str| {
+        let found = plan[list].as_array().unwrap().iter().find(|entry| entry["name"] == name);
+        found.unwrap_or_else(|| panic!("{plan}"))["cpu"].clone()
+    };
+    assert_eq!(cpu("groups", "imu+battery"), cpu("nodes", "imu"));
+    assert_eq!(cpu("groups", "plant"), cpu("nodes", "plant"));
+}
+
 #[test]
 fn top_names_the_group_of_each_member() {
     let place = Place::new();
