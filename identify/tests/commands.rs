@@ -116,6 +116,19 @@ fn commands_that_are_written_on_change_hold_until_the_next() {
     assert!(without_key.as_ref().map_or(true, |compared_s| *compared_s < 25.0), "{without_key:?}");
 }
 
+/// The trim that a flight shows passes for no verdict where it is most of the weight.
+#[test]
+fn commands_of_another_range_are_not_described() {
+    let scaled = changed(&heavy(20.0), |flight| {
+        flight.command.values.iter_mut().flatten().for_each(|command| *command *= 0.35);
+    });
+    let report = found(&scaled);
+    assert!(report.losses.iter().any(|loss| loss.rival == "trim"), "{report}");
+    let text = report.to_string();
+    assert!(text.contains("verdict: this vehicle file does not describe these flights"), "{text}");
+    assert!(text.contains("is missing, more than 1.962 m/s^2 is no trim"), "{text}");
+}
+
 /// A change that makes a flight unusable.
 type Change = fn(&mut Flight);
 
