@@ -39,6 +39,13 @@ pub fn is_held<const N: usize>(values: &[[f64; N]]) -> bool {
     is_regular(&runs) || of_chance() < COARSE_SHARE * long / runs.len() as f64
 }
 
+/// The first index of each run of equal values, where the runs are those of a finer grid.
+pub fn regular_starts<const N: usize>(values: &[[f64; N]]) -> Option<Vec<usize>> {
+    let starts: Vec<usize> = starts(values).collect();
+    let runs: Vec<usize> = starts.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    (runs.len() >= 2 && is_regular(&runs)).then_some(starts)
+}
+
 /// The first index of each run of equal values.
 pub fn starts<const N: usize>(values: &[[f64; N]]) -> impl Iterator<Item = usize> {
     (0..values.len()).filter(|&index| index == 0 || values[index] != values[index - 1])

@@ -3,10 +3,15 @@
 
 use crate::canonical::turning;
 use crate::flight::{Channel, Flight, median};
+use crate::held;
 use vehicles::Vehicle;
 
 /// Shortest stretch; whole numbers of a coarse range repeat for less.
 const HELD_S: f64 = 1.0;
+/// Shortest stretch in which all rotors repeat at once; motors reach another speed in a longer one.
+const TOGETHER_S: f64 = 0.1;
+/// And it is so many times as long as commands usually stay.
+const USUAL_STAYS: usize = 5;
 /// Least number of equal samples.
 const LEAST_SAMPLES: usize = 20;
 /// Least change in the same time elsewhere, in the smallest steps of the channel: a coarser one shows nothing.
@@ -23,17 +28,21 @@ pub fn leave_out(flight: &mut Flight, vehicle: &Vehicle) {
     }
     let rates = rates(flight);
     let command = &flight.command;
-    let held: Vec<(usize, usize)> =
-        (0..vehicle.rotors.len()).flat_map(|rotor| held(command, rotor, vehicle)).collect();
+    let rotors = vehicle.rotors.len();
+    let held: Vec<(usize, usize)> = (0..rotors).flat_map(|rotor| held(command, rotor, vehicle)).collect();
+    let together = held_together(command, vehicle);
     // Of a log that holds most of its commands nothing is left out, and there may be many stretches.
-    let samples: usize = held.iter().map(|(from, to)| to - from).sum();
-    if samples as f64 > PART_MAX * (vehicle.rotors.len() * command.time_s.len()) as f64 {
+    let count = |stretches: &[(usize, usize)]| stretches.iter().map(|(from, to)| to - from).sum::<usize>();
+    let samples = count(&held).max(rotors * count(&together));
+    if samples as f64 > PART_MAX * (rotors * command.time_s.len()) as f64 {
         return;
     }
-    let stretches: Vec<(usize, usize)> = held
-        .into_iter()
-        .filter(|(from, to)| goes_on(&rates, command.time_s[*from], command.time_s[*to]))
-        .collect();
+    let times_s = |(from, to): &(usize, usize)| (command.time_s[*from], command.time_s[*to]);
+    // In a short one the vehicle turns little, in all of them as much as elsewhere.
+    let all_s: Vec<(f64, f64)> = together.iter().map(times_s).collect();
+    let together = if goes_on(&rates, &all_s) { together } else { Vec::new() };
+    let long = held.into_iter().filter(|stretch| goes_on(&rates, &[times_s(stretch)]));
+    let stretches: Vec<(usize, usize)> = long.chain(together).collect();
     let mut is_kept = vec![true; command.time_s.len()];
     // The first of a stretch was fresh.
     stretches.iter().for_each(|(from, to)| is_kept[from + 1..=*to].fill(false));
@@ -67,10 +76,7 @@ fn rates(flight: &Flight) -> Channel<3> {
 /// Stretches in which the command of a rotor repeats, each by its first and last sample. At its limits a command may stay.
 fn held<const N: usize>(command: &Channel<N>, rotor: usize, vehicle: &Vehicle) -> Vec<(usize, usize)> {
     let number = |at: usize| command.values[at][rotor];
-    // A controller may clamp within the range of the vehicle file: what is never passed is a limit.
-    let numbers = || command.values.iter().map(|values| values[rotor]);
-    let least = numbers().fold(f64::INFINITY, f64::min).max(vehicle.command.min);
-    let greatest = numbers().fold(f64::NEG_INFINITY, f64::max).min(vehicle.command.max);
+    let (least, greatest) = limits(command, rotor, vehicle);
     let is_at_limit = |number: f64| number <= least || number >= greatest;
     let (mut found, mut from) = (Vec::new(), 0);
     for at in 1..=command.values.len() {
@@ -87,6 +93,37 @@ fn held<const N: usize>(command: &Channel<N>, rotor: usize, vehicle: &Vehicle) -
     found
 }
 
+/// Shorter stretches in which the commands of all rotors repeat at once, which fine commands do not do by chance.
+fn held_together<const N: usize>(command: &Channel<N>, vehicle: &Vehicle) -> Vec<(usize, usize)> {
+    let starts: Vec<usize> = held::starts(&command.values).chain([command.values.len()]).collect();
+    let mut stays: Vec<usize> = starts.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    stays.sort_unstable();
+    let Some(usual) = stays.get(stays.len() / 2) else { return Vec::new() };
+    let limits: Vec<(f64, f64)> =
+        (0..vehicle.rotors.len()).map(|rotor| limits(command, rotor, vehicle)).collect();
+    let is_held = |(from, to): &(usize, usize)| {
+        let duration_s = command.time_s[*to] - command.time_s[*from];
+        let inside = |(rotor, (least, greatest)): (usize, &(f64, f64))| {
+            let number = command.values[*from][rotor];
+            number > *least && number < *greatest
+        };
+        to - from >= USUAL_STAYS * usual
+            && (TOGETHER_S..HELD_S).contains(&duration_s)
+            && limits.iter().enumerate().any(inside)
+            && (0..limits.len()).all(|rotor| is_fine(command, rotor, to - from))
+    };
+    starts.windows(2).map(|pair| (pair[0], pair[1] - 1)).filter(is_held).collect()
+}
+
+/// Numbers at which the command of a rotor may stay.
+fn limits<const N: usize>(command: &Channel<N>, rotor: usize, vehicle: &Vehicle) -> (f64, f64) {
+    // A controller may clamp within the range of the vehicle file: what is never passed is a limit.
+    let numbers = || command.values.iter().map(|values| values[rotor]);
+    let least = numbers().fold(f64::INFINITY, f64::min).max(vehicle.command.min);
+    let greatest = numbers().fold(f64::NEG_INFINITY, f64::max).min(vehicle.command.max);
+    (least, greatest)
+}
+
 /// True if the command changes in `count` samples by many of its smallest steps, in nine of ten places.
 fn is_fine<const N: usize>(command: &Channel<N>, rotor: usize, count: usize) -> bool {
     let numbers: Vec<f64> = command.values.iter().map(|values| values[rotor]).collect();
@@ -101,9 +138,11 @@ fn is_fine<const N: usize>(command: &Channel<N>, rotor: usize, count: usize) -> 
     ways.get(ways.len() / 10).is_some_and(|way| *way > STEPS * least)
 }
 
-/// True if the vehicle turns between two times about as much as elsewhere.
-fn goes_on(rates: &Channel<3>, from_s: f64, to_s: f64) -> bool {
-    let is_inside = |at: usize| (from_s..=to_s).contains(&rates.time_s[at]);
+/// True if the vehicle turns in `stretches_s` about as much as elsewhere.
+fn goes_on(rates: &Channel<3>, stretches_s: &[(f64, f64)]) -> bool {
+    let within = |time_s: f64| stretches_s.iter().any(|(from_s, to_s)| (*from_s..=*to_s).contains(&time_s));
+    let inside: Vec<bool> = rates.time_s.iter().map(|time_s| within(*time_s)).collect();
+    let is_inside = |at: usize| inside[at];
     (0..3).any(|axis| {
         let usual_size = |inside: bool| {
             let of = (0..rates.values.len()).filter(|at| is_inside(*at) == inside);
@@ -150,6 +189,34 @@ mod tests {
             assert_eq!(flight.command.time_s.len(), 2000 - 399, "{rotors:?}");
             assert!(flight.notes[0].starts_with("command: 399 of 2000 samples are held by the logger"));
             assert!(flight.notes[0].contains("from 5.00 s to 8.99 s"), "{:?}", flight.notes);
+        }
+    }
+
+    #[test]
+    fn short_holds_of_all_rotors_are_gaps() {
+        let (mut flight, vehicle) = flight();
+        let holds = || (0..12).map(|number| 100 + 150 * number);
+        for from in holds() {
+            let first = flight.command.values[from];
+            flight.command.values[from..from + 40].fill(first);
+        }
+        leave_out(&mut flight, &vehicle);
+        assert!(flight.notes[0].starts_with("command: 468 of 2000 samples are held by the logger"));
+        // While one rotor goes on, the others may stay; and so may commands in steps that are coarse beside their changes.
+        for is_coarse in [false, true] {
+            let (mut flight, _) = self::flight();
+            if is_coarse {
+                flight.command.values.iter_mut().flatten().for_each(|number| *number = number.round());
+            }
+            for from in holds() {
+                let first = flight.command.values[from];
+                let rotors = if is_coarse { 0..4 } else { 0..3 };
+                flight.command.values[from..from + 40]
+                    .iter_mut()
+                    .for_each(|values| values[rotors.clone()].copy_from_slice(&first[rotors.clone()]));
+            }
+            leave_out(&mut flight, &vehicle);
+            assert_eq!((flight.command.time_s.len(), flight.notes), (2000, vec![]), "{is_coarse}");
         }
     }
 

@@ -69,6 +69,11 @@ const POSITION_MISTAKES: [Mistake<[f64; 3]>; 4] = [
 ];
 /// Speeds are those that hover needs within this factor: it is the root of the one within which thrust and mass are known.
 const ROTOR_SPEED_TOLERANCE: f64 = 1.25;
+/// Thrust of the commands in flight over the weight. A battery that is nearly empty asks for twice the commands of a full one (real
+/// logs of a Crazyflie: 2.03), and nothing makes motors stronger.
+const LIFT_RANGE: std::ops::RangeInclusive<f64> = 0.5..=3.0;
+/// Part of the usual greatest thrust below which motors idle.
+const AIRBORNE: f64 = 0.3;
 /// Numbers of pole pairs that motors of vehicles have.
 const POLE_PAIRS: std::ops::RangeInclusive<f64> = 2.0..=24.0;
 /// Voltages that a battery of a vehicle can have, from one cell to fourteen.
@@ -530,7 +535,33 @@ impl Judge<'_> {
         let outside = high > map.max + tolerance || low < (map.min - tolerance).min(0.0);
         let far = high > 1.5 * map.max + tolerance;
         let fits = far.then(|| "a vehicle file with their range in its `[command]`".to_owned());
-        (outside || high < map.min).then(|| finding(quantity, fits, &what))
+        if outside || high < map.min {
+            return Some(finding(quantity, fits, &what));
+        }
+        self.lift(&what)
+    }
+
+    /// The thrust of the commands bears the vehicle, if it moves freely.
+    fn lift(&self, range: &str) -> Option<Finding> {
+        let vehicle = self.vehicle;
+        let weight = vehicle.mass_kg * vehicle.gravity_m_s2;
+        let thrust = |commands: &[f64; ROTORS_MAX]| -> f64 {
+            let rotors = vehicle.rotors.iter().zip(commands).filter(|(rotor, _)| !rotor.has_failed);
+            let squares =
+                rotors.map(|(rotor, command)| rotor.axis.z * vehicle.command.speed(*command).powi(2));
+            vehicle.thrust_coefficient * squares.sum::<f64>()
+        };
+        let thrusts = || self.flight.command.values.iter().map(thrust);
+        // On the ground motors idle.
+        let high = usual_greatest(thrusts())?;
+        let factor = median(thrusts().filter(|thrust| *thrust > AIRBORNE * high))? / weight;
+        let is_judged = factor.is_finite() && !LIFT_RANGE.contains(&factor);
+        if !is_judged || hold(self.flight, vehicle.gravity_m_s2) != Hold::Free {
+            return None;
+        }
+        let what = format!("{range}; in flight their thrust is {factor:.2} times the weight");
+        let fits = "a vehicle file with the `[command]`, thrust and mass of this vehicle, or another `scale` of the commands,";
+        Some(finding(Quantity::Command, Some(fits.to_owned()), &what))
     }
 
     /// The rotors turn about as fast as hover needs.
@@ -556,11 +587,17 @@ impl Judge<'_> {
         if let Some(hundreds) = self.hundreds_of_electrical(factor) {
             return Some(finding(quantity, Some(hundreds), &what));
         }
-        let hint = self.hint_of_poles(factor);
-        if is_gross(factor) && hint.is_empty() {
-            return Some(self.units.by_scale(quantity, factor, &what));
+        let poles = self.poles(factor);
+        if !is_gross(factor) {
+            let hint = poles.map_or(String::new(), |poles| format!("; electrical speeds need {poles}"));
+            return Some(finding(quantity, None, &format!("{what}{hint}")));
         }
-        Some(finding(quantity, None, &format!("{what}{hint}")))
+        Some(match poles {
+            None => self.units.by_scale(quantity, factor, &what),
+            Some(poles) => {
+                finding(quantity, Some(format!("if these speeds are electrical, {poles},")), &what)
+            }
+        })
     }
 
     /// Note that the log has hundreds of electrical revolutions a minute, where they are not divided by pole pairs.
@@ -579,17 +616,15 @@ impl Judge<'_> {
         is_near.then(|| "mechanical speeds, without `pole_pairs`,".to_owned())
     }
 
-    /// Returns a hint at `pole_pairs`. Their number is known from the motor; a hover shows it only roughly.
-    fn hint_of_poles(&self, factor: f64) -> String {
+    /// Returns advice of `pole_pairs`, where so many are possible. Their number is known from the motor; a hover shows it only
+    /// roughly.
+    fn poles(&self, factor: f64) -> Option<String> {
         let declared =
             self.units.declared(Quantity::RotorSpeed).and_then(|entry| entry.pole_pairs).unwrap_or(1);
         let pairs = factor * f64::from(declared);
-        if !POLE_PAIRS.contains(&pairs) {
-            return String::new();
-        }
-        format!(
-            "; electrical speeds need `pole_pairs`, half the number of a motor's magnets, here about {pairs:.0}"
-        )
+        POLE_PAIRS
+            .contains(&pairs)
+            .then(|| format!("`pole_pairs`, half the number of a motor's magnets, here about {pairs:.0}"))
     }
 
     /// The voltage is one that batteries have.

@@ -389,6 +389,19 @@ fn rotor_speeds_are_compared_with_hover() {
 }
 
 #[test]
+fn commands_that_do_not_bear_the_vehicle_are_refused() {
+    let weak = Motion { command_unit: 0.35, ..Motion::default() };
+    let found = findings(&weak, CHANNELS);
+    let [(Quantity::Command, fits)] = &found[..] else { panic!("{found:?}") };
+    assert!(fits.contains("`[command]`") && fits.contains("`scale`"), "{fits}");
+    let text = read(&weak, CHANNELS, "").unwrap_err().to_string();
+    assert!(text.contains("in flight their thrust is 0.") && text.contains("times the weight"), "{text}");
+    assert!(read(&weak, CHANNELS, "trust_units = true").is_ok());
+    let scaled = CHANNELS.replace("unit = \"count\"", "unit = \"count\", scale = 2.857");
+    assert_eq!(read(&weak, &scaled, "").unwrap().notes, [""; 0]);
+}
+
+#[test]
 fn electrical_rotor_speeds_are_divided_by_the_pole_pairs() {
     let vehicle = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../vehicles/hummingbird.toml");
     let hover = vehicles::Vehicle::load(&vehicle).unwrap().hover_speed_rad_s();
@@ -399,9 +412,14 @@ fn electrical_rotor_speeds_are_divided_by_the_pole_pairs() {
     let flight = read(&electrical, &declared(", pole_pairs = 7"), "").unwrap();
     assert!((flight.rotor_speed.values[0][0] / (hover * 100.0 / 101.5) - 1.0).abs() < 1e-9);
     assert_eq!(flight.notes, [""; 0]);
-    let notes = read(&electrical, &channels, "").unwrap().notes;
+    // Without them the speeds are far from those of hover; those of a motor with two pairs are not.
+    let found = findings(&electrical, &channels);
+    let [(Quantity::RotorSpeed, fits)] = &found[..] else { panic!("{found:?}") };
+    assert!(fits.contains("`pole_pairs`") && fits.contains("about 7"), "{fits}");
+    let two = Motion { command_unit: 2.0 * hover / 101.5 * rpm, ..Motion::default() };
+    let notes = read(&two, &channels, "").unwrap().notes;
     assert!(
-        notes.len() == 1 && notes[0].contains("`pole_pairs`") && notes[0].contains("about 7"),
+        notes.len() == 1 && notes[0].contains("need `pole_pairs`") && notes[0].contains("about 2"),
         "{notes:?}"
     );
     let mechanical = Motion { command_unit: hover / 101.5 * rpm, ..Motion::default() };

@@ -29,7 +29,7 @@
 //! | `whiteness`, `noise`, [`statistics`] | what is left, and what noise alone would leave |
 //! | `predict`, `forecast`, `horizons` | prediction over horizons, and tables of its errors |
 //! | `disturbance`, `limits` | disturbances as they were seen before a window; what predictions are limited by |
-//! | `foresight`, `loss` | predictions as a judge of effects and of the verdict |
+//! | `foresight`, `loss`, `misfit` | predictions, and residuals of each moment, as a judge of effects and of the verdict |
 //! | `refine` | parameters moved to where predictions are best |
 //! | `regressor` | what residuals are looked at against |
 //! | `envelope` | the ranges of the test flights, in which the verdict was judged |
@@ -75,6 +75,7 @@ mod log_rates;
 mod logging;
 mod loss;
 mod memo;
+mod misfit;
 mod model;
 mod near;
 mod noise;

@@ -9,14 +9,14 @@ use crate::fit::Problem;
 use crate::fit_result::FitResult;
 use crate::parameter::Parameter;
 use crate::sensor_effects::{IMU_DELAY, POSE_DELAY};
+use flights::Flight;
 use plant::effects::EffectKind;
 use vehicles::MotorModel;
-use vehicles::gaps::held_period_s;
 
 /// Usual longest time between two commands of each flight with commands.
 fn periods_s(problem: &Problem) -> impl Iterator<Item = f64> {
     let flights = problem.flights().map(|flight| &*flight.flight).filter(|flight| !flight.commands_on_change);
-    flights.filter_map(|flight| held_period_s(&flight.command.time_s))
+    flights.filter_map(Flight::command_period_s)
 }
 
 /// The shortest of these periods, which explains a shift in time that all flights share; 0 without commands.

@@ -12,23 +12,26 @@ const CHANNELS: [&str; 2] = ["attitude", "velocity"];
 /// A smaller ratio of errors is no loss.
 const LEAST_RATIO: f64 = 1.05;
 
-/// A prediction error of the new vehicle that is greater than a rival's.
+/// The horizon of the equations of each moment.
+pub const MOMENT: &str = "0";
+
+/// An error of the new vehicle that is greater than a rival's: of a prediction, or of the equations of each moment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Loss {
     /// The flight.
     pub flight: String,
-    /// Horizon in s.
+    /// Horizon in s; `0` of the equations of each moment.
     pub horizon: &'static str,
-    /// The channel.
+    /// The channel, or the equation of each moment.
     pub channel: &'static str,
-    /// `persistence` or `declared`.
+    /// `persistence` or `declared`; of each moment `no model`, or `trim`: the greatest constant force that passes for one.
     pub rival: &'static str,
-    /// Root mean square of the new vehicle.
+    /// Root mean square of the new vehicle; beside `trim` the constant force that it lacks.
     pub new: f64,
     /// Knowledge of the prediction besides the new vehicle: `nothing`, `own trim` or `disturbance`. Against persistence the best
     /// of the three counts.
     pub knowing: &'static str,
-    /// Root mean square of the rival.
+    /// Root mean square of the rival; the limit of a trim.
     pub other: f64,
     /// Unit of both.
     pub unit: &'static str,
@@ -80,6 +83,21 @@ impl std::fmt::Display for Loss {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { flight, horizon, channel, rival, new, other, unit, .. } = self;
         let (new, other, knowing) = (rounded(*new), rounded(*other), self.knowing_text());
+        match *rival {
+            "trim" => {
+                return write!(
+                    f,
+                    "{channel} of {flight}: a constant {new} {unit} is missing, more than {other} {unit} is no trim"
+                );
+            }
+            "no model" => {
+                return write!(
+                    f,
+                    "{channel} at each moment of {flight}: new {new} {unit}, without any model {other} {unit}"
+                );
+            }
+            _ => (),
+        }
         write!(
             f,
             "{channel} after {horizon} s of {flight}: new {new} {unit}{knowing}, {rival} {other} {unit}"
@@ -89,7 +107,7 @@ impl std::fmt::Display for Loss {
 
 /// Measurements that would help where `channel` loses.
 pub fn advice(channel: &str) -> &'static str {
-    if channel == "attitude" {
+    if ["attitude", "angular_acceleration"].contains(&channel) {
         "torques: log rotor speeds and every command the motors get, weigh and balance the vehicle before each flight, and measure \
          its inertia and the rotors' thrust over command on a stand"
     } else {

@@ -15,7 +15,6 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
-use vehicles::gaps::held_period_s;
 use vehicles::{CommandMap, MotorModel, ROTORS_MAX, Vehicle};
 
 /// An equation that measurement and model are both put into.
@@ -175,6 +174,11 @@ impl<'f> Prepared<'f> {
     /// If the flight has less than three windows to compare: no drive, no motion, too little of both in flight.
     pub fn new(flight: &'f Flight, box_s: Option<f64>, propulsion: &Propulsion) -> Result<Self, Unusable> {
         let slow_period_s = propulsion.slow_period_s(flight);
+        // Between slow commands nobody knows the others that were not logged: their repeats are none.
+        let each_once = slow_period_s.and_then(|_| flight.without_held_commands());
+        let used = each_once.map_or(Cow::Borrowed(flight), Cow::Owned);
+        let flight = &*used;
+        let moves_freely = rig::moves_freely(flight, propulsion.gravity_m_s2);
         let equations = equations(flight, slow_period_s.is_some());
         let motor_s = propulsion.motor_s;
         if let Some(period_s) = slow_period_s.filter(|period_s| *period_s > UNKNOWN_BETWEEN * motor_s) {
@@ -197,7 +201,7 @@ impl<'f> Prepared<'f> {
         let layout = Layout { clock, knots: Vec::new(), equations, windows };
         let (late, distrusted) = (Lateness::default(), [false; ROTORS_MAX]);
         let mut prepared = Self {
-            flight: Cow::Borrowed(flight),
+            flight: used,
             layout,
             late,
             distrusted,
@@ -206,7 +210,7 @@ impl<'f> Prepared<'f> {
             recent_tracks: Recent::default(),
             recent_rotors: Recent::default(),
             recent_measured: Recent::default(),
-            moves_freely: rig::moves_freely(flight, propulsion.gravity_m_s2),
+            moves_freely,
         };
         prepared.layout.knots = prepared.knots(propulsion);
         if prepared.layout.knots.len() >= 3 { Ok(prepared) } else { Err(prepared.unusable(propulsion)) }
@@ -505,8 +509,7 @@ impl Propulsion {
     fn slow_period_s(&self, flight: &Flight) -> Option<f64> {
         let is_known =
             flight.commands_on_change || !flight.rotor_speed.is_empty() || !flight.assumed.is_empty();
-        held_period_s(&flight.command.time_s)
-            .filter(|period_s| !is_known && *period_s > self.longest_period_s())
+        flight.command_period_s().filter(|period_s| !is_known && *period_s > self.longest_period_s())
     }
 
     /// Mean speeds of the rotors at the instants of `clock`, by commands or else as measured.

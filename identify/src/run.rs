@@ -14,6 +14,7 @@ use crate::horizons::{of_role, predictions};
 use crate::limits::limits;
 use crate::logging;
 use crate::loss::losses;
+use crate::misfit::misfits;
 use crate::model::Model;
 use crate::noise;
 use crate::parameter::Parameters;
@@ -125,10 +126,12 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
     };
     let envelope =
         envelope::of(problem.test.iter().map(|flight| (&*flight.flight, window_s(&flight.layout))));
+    let mut losses = losses(&of_measured_attitude(&problem, &held_out), &noise_floor);
+    losses.extend(misfits(&problem, values));
     let report = Report {
         vehicle: set.vehicle.display().to_string(),
         verdict: effect_reports::verdict(&problem, &selection),
-        losses: losses(&of_measured_attitude(&problem, &held_out), &noise_floor),
+        losses,
         limits: limits(&of_measured_attitude(&problem, &held_out), &noise_floor),
         withdrawn: selection.withdrawn.clone(),
         refined: selection.refined.is_some(),

@@ -116,6 +116,44 @@ fn commands_that_are_written_on_change_hold_until_the_next() {
     assert!(without_key.as_ref().map_or(true, |compared_s| *compared_s < 25.0), "{without_key:?}");
 }
 
+/// Commands at 20 Hz that a table at the rate of the sensors repeats are as slow as those that were written once.
+#[test]
+fn commands_that_a_finer_table_holds_are_slow() {
+    let held = |is_on_change: bool| {
+        changed(&heavy(20.0), |flight| {
+            let mut last = (f64::NEG_INFINITY, [0.0; ROTORS_MAX]);
+            for (time_s, value) in flight.command.time_s.iter().zip(&mut flight.command.values) {
+                if time_s - last.0 > 0.05 - 1e-6 {
+                    last = (*time_s, *value);
+                }
+                *value = last.1;
+            }
+            flight.commands_on_change = is_on_change;
+        })
+    };
+    let slow = |report: &Report| {
+        let mut notes = report.flights.iter().flat_map(|flight| &flight.notes);
+        notes.any(|note| note.contains("command: logged every 0.050 s"))
+    };
+    let report = found(&held(false));
+    assert!(slow(&report), "{report}");
+    require_mass(&report);
+    assert!(!slow(&found(&held(true))));
+}
+
+/// The trim that a flight shows passes for no verdict where it is most of the weight.
+#[test]
+fn commands_of_another_range_are_not_described() {
+    let scaled = changed(&heavy(20.0), |flight| {
+        flight.command.values.iter_mut().flatten().for_each(|command| *command *= 0.35);
+    });
+    let report = found(&scaled);
+    assert!(report.losses.iter().any(|loss| loss.rival == "trim"), "{report}");
+    let text = report.to_string();
+    assert!(text.contains("verdict: this vehicle file does not describe these flights"), "{text}");
+    assert!(text.contains("is missing, more than 1.962 m/s^2 is no trim"), "{text}");
+}
+
 /// A change that makes a flight unusable.
 type Change = fn(&mut Flight);
 

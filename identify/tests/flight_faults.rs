@@ -14,6 +14,19 @@ const COUNT: u64 = 6;
 /// The flight that gets a fault; the last is the one that is tested on.
 const FAULTY: usize = 2;
 
+/// Commands on another clock pass for no other order of the rotors.
+#[test]
+fn commands_on_another_clock_are_told_with_the_time() {
+    for late_s in [0.3, 0.45] {
+        let mut set = flown(false);
+        set.flights[FAULTY].command.time_s.iter_mut().for_each(|time_s| *time_s += late_s);
+        let fault = require(&set, "command", "other-clock");
+        let (_, told) = fault.found.split_once("`delay_s` of about ").expect("a time");
+        let told: f64 = told.parse().expect("a number");
+        assert!((told - late_s).abs() < 0.05, "{late_s}: {}", fault.found);
+    }
+}
+
 /// Flights of a heavier vehicle with undeclared drag.
 fn flown(has_rotor_speeds: bool) -> FlightSet {
     static WITH: OnceLock<FlightSet> = OnceLock::new();

@@ -107,12 +107,12 @@ impl<'p> Evidence<'p> {
     }
 
     /// Squared speeds that follow from the commands, about `knot` less `late` instants; `None` outside the grid.
-    pub fn commanded_squares(&self, knot: usize, late: usize) -> Option<EachRotor> {
+    pub fn commanded_squares(&self, knot: usize, late: isize) -> Option<EachRotor> {
         squares_about(&self.commanded, knot, late)
     }
 
     /// Squared speeds as measured, like [`Self::commanded_squares`].
-    pub fn measured_squares(&self, knot: usize, late: usize) -> Option<EachRotor> {
+    pub fn measured_squares(&self, knot: usize, late: isize) -> Option<EachRotor> {
         squares_about(&self.measured, knot, late)
     }
 
@@ -134,8 +134,8 @@ impl<'p> Evidence<'p> {
 }
 
 /// Mean squares about `knot` less `late` instants; `None` outside the grid.
-fn squares_about(speeds: &[EachRotor], knot: usize, late: usize) -> Option<EachRotor> {
-    let middle = knot.checked_sub(late).filter(|middle| *middle >= BOX_STEPS)?;
+fn squares_about(speeds: &[EachRotor], knot: usize, late: isize) -> Option<EachRotor> {
+    let middle = knot.checked_add_signed(-late).filter(|middle| *middle >= BOX_STEPS)?;
     let about = speeds.get(middle - BOX_STEPS..=middle + BOX_STEPS)?;
     let sum = |rotor: usize| about.iter().map(|speeds| speeds[rotor] * speeds[rotor]).sum::<f64>();
     Some(std::array::from_fn(|rotor| sum(rotor) / about.len() as f64))

@@ -11,7 +11,7 @@ pub struct Fault {
     /// The channel, with the rotor counted from 1 or the axis.
     pub channel: String,
     /// Kind: `stuck-sensor`, `scaled-sensor`, `rotor-off-command`, `frozen`, `scaled`, `mirrored`, `swapped`, `reversed-spins`,
-    /// `jumping` or `impossible-trim`.
+    /// `other-clock`, `jumping` or `impossible-trim`.
     pub kind: &'static str,
     /// Expectation, with numbers.
     pub expected: String,

@@ -3,6 +3,7 @@
 //! The angular accelerations show both, at any size of thrust and inertia and at any delay: each order, with each choice of
 //! reversed spins, is a regression of its own. Of up to four rotors all orders and all spins are tried. Of more rotors, these
 //! orders are tried: two rotors exchanged, and those that begin at another rotor; each with one, two or all spins reversed.
+//! Commands on another clock pass for none of them: the declared order is tried at times far from the motion's, too.
 
 use super::evidence::Evidence;
 use super::fault::{Fault, Part};
@@ -13,6 +14,13 @@ use vehicles::{ROTORS_MAX, Rotor};
 
 /// Longest delay that is tried.
 const LATE_S: f64 = 0.2;
+/// An order of more than [`ALL_MAX`] rotors is named only if it leaves less than this part.
+const LEFT_UNTRIED: f64 = 0.25;
+/// Greatest difference of two clocks that is looked for.
+const APART_S: f64 = 1.0;
+/// Least part of the angular accelerations that the declared order explains on the right clock. It explains more by [`MORE`] than any does
+/// within [`LATE_S`].
+const APART_SHARE: f64 = 1.0 / 3.0;
 /// Least gain of another order of the rotors: share of the squared angular accelerations, summed over the axes.
 const MORE: f64 = 0.5;
 /// Least gain where the other order leaves less than [`LEFT`] of what the declared one leaves.
@@ -50,6 +58,18 @@ impl Drive {
 
     fn part(self) -> Part {
         if self == Drive::Command { Part::Command } else { Part::RotorSpeed }
+    }
+
+    /// Advice for a channel on another clock.
+    fn clock_advice(self) -> &'static str {
+        match self {
+            Drive::Command => {
+                "give that time as `delay_s = { command = … }` of the flight, or log all channels on one clock"
+            }
+            Drive::RotorSpeed => {
+                "give that time as `delay_s = { rotor_speed = … }` of the flight, or log all channels on one clock"
+            }
+        }
     }
 
     fn advice(self) -> &'static str {
@@ -126,7 +146,11 @@ impl Arrangement {
 /// Faults of flights whose `drive` explains the angular accelerations in another arrangement of the rotors. Spins belong to the
 /// vehicle: those that one flight shows most clearly are doubted in all in which they explain more than the declared ones.
 pub fn swapped(flights: &[Evidence], drive: Drive) -> Vec<Option<Fault>> {
-    let scores: Vec<Option<Scores>> = flights.iter().map(|evidence| Scores::of(evidence, drive)).collect();
+    let all: Vec<Option<Scores>> = flights.iter().map(|evidence| Scores::of(evidence, drive)).collect();
+    let apart: Vec<Option<Fault>> =
+        flights.iter().zip(&all).map(|(evidence, scores)| scores.as_ref()?.apart(evidence, drive)).collect();
+    let is_judged = |(scores, apart): (Option<Scores>, &Option<Fault>)| scores.filter(|_| apart.is_none());
+    let scores: Vec<Option<Scores>> = all.into_iter().zip(&apart).map(is_judged).collect();
     let found: Vec<Option<usize>> = scores.iter().map(|scores| scores.as_ref()?.clearly_better()).collect();
     let clear_spins = scores.iter().zip(&found).filter_map(|(scores, found)| {
         let (scores, found) = (scores.as_ref()?, (*found)?);
@@ -140,7 +164,8 @@ pub fn swapped(flights: &[Evidence], drive: Drive) -> Vec<Option<Fault>> {
         let as_others = || spins.filter(|at| scores.gain(*at) > MORE_AS_OTHERS);
         Some(scores.fault(evidence, drive, found.or_else(as_others).or(in_all)?))
     };
-    flights.iter().zip(&scores).zip(found).map(of_flight).collect()
+    let swapped = flights.iter().zip(&scores).zip(found).map(of_flight);
+    swapped.zip(apart).map(|(swapped, apart)| apart.or(swapped)).collect()
 }
 
 /// The order that explains more than the declared one over these flights, [`TIMES`] as much, and no less in any part of any.
@@ -220,6 +245,49 @@ impl Scores {
         Some(Self { all, directed })
     }
 
+    /// The fault of a channel that stands on another clock than the motion, by more than [`LATE_S`].
+    fn apart(&self, evidence: &Evidence, drive: Drive) -> Option<Fault> {
+        let within = self.all.iter().map(|(score, _)| *score).fold(0.0, f64::max);
+        let least = (APART_SHARE * AXES).max(within + MORE);
+        // No time could explain so much more.
+        if least > AXES {
+            return None;
+        }
+        let turning = evidence.measured(Equation::AngularAcceleration)?;
+        let effect = effects_of_squares(evidence, 1.0);
+        let order: Vec<usize> = (0..effect.len()).collect();
+        let step_s = evidence.flight.layout.clock.step_s;
+        let far = (APART_S / step_s) as isize;
+        let score = |late: isize| -> f64 {
+            let products = products_of(&rows_at(evidence, drive, &turning, late), effect.len());
+            products.shares(&effect, &order, true).iter().map(|share| share.max(0.0)).sum()
+        };
+        let (late, best) = (-far..=far).map(|late| (late, score(late))).max_by(|a, b| a.1.total_cmp(&b.1))?;
+        if best < least {
+            return None;
+        }
+        let (late_s, percent) = (late as f64 * step_s, |score: f64| 100.0 * score / AXES);
+        Some(Fault {
+            flight: evidence.flight.flight.name.clone(),
+            channel: drive.name().to_owned(),
+            kind: "other-clock",
+            expected: format!(
+                "the motion to follow within {LATE_S} s, where no order of the rotors explains more than {:.0} % of the angular \
+                 accelerations",
+                percent(within)
+            ),
+            found: format!(
+                "that the declared one explains {:.0} % if its times are {:.2} s {}: `delay_s` of about {:.2}",
+                percent(best),
+                late_s.abs(),
+                if late_s < 0.0 { "earlier" } else { "later" },
+                -late_s
+            ),
+            consequence: drive.part().consequence(),
+            advice: drive.clock_advice(),
+        })
+    }
+
     /// Gain of an arrangement over the declared one.
     fn gain(&self, at: usize) -> f64 {
         self.all[at].0 - self.all[0].0
@@ -237,11 +305,23 @@ impl Scores {
 
     fn fault(&self, evidence: &Evidence, drive: Drive, at: usize) -> Fault {
         let (declared, (best, found)) = (self.all[0].0, &self.all[at]);
+        // Of more rotors the right order may be none of those that were tried.
+        let is_named = found.order.len() <= ALL_MAX || AXES - best < LEFT_UNTRIED * AXES;
         let (channel, kind) = match &found.moved()[..] {
             [] => (drive.name().to_owned(), "reversed-spins"),
+            _ if !is_named => (drive.name().to_owned(), "swapped"),
             moved => (format!("{}.{}", drive.name(), moved.join("+")), "swapped"),
         };
         let percent = |score: f64| 100.0 * score / AXES;
+        let rotors = &evidence.model.vehicle.rotors;
+        let found = if is_named {
+            format!("that {} explains {:.0} %", found.text(rotors), percent(*best))
+        } else {
+            format!(
+                "that none of those that were tried (two exchanged, or begun at another rotor) explains more than {:.0} %",
+                percent(*best)
+            )
+        };
         Fault {
             flight: evidence.flight.flight.name.clone(),
             channel,
@@ -250,11 +330,7 @@ impl Scores {
                 "the order and the spins of the vehicle file's rotors, which explain {:.0} % of the angular accelerations",
                 percent(declared)
             ),
-            found: format!(
-                "that {} explains {:.0} %",
-                found.text(&evidence.model.vehicle.rotors),
-                percent(*best)
-            ),
+            found,
             consequence: drive.part().consequence(),
             advice: drive.advice(),
         }
@@ -370,13 +446,14 @@ fn products(evidence: &Evidence, drive: Drive) -> Option<Vec<Delayed>> {
     if is_absent || evidence.flight.is_assumed() {
         return None;
     }
-    let late_max = (LATE_S / evidence.flight.layout.clock.step_s).round() as usize;
+    let late_max = (LATE_S / evidence.flight.layout.clock.step_s).round() as isize;
     Some((0..=late_max).map(|late| products_at(evidence, drive, &turning, late)).collect())
 }
 
-fn products_at(evidence: &Evidence, drive: Drive, turning: &[Vec<f64>], late: usize) -> Delayed {
+/// Angular accelerations and the squared speeds `late` instants before them.
+fn rows_at(evidence: &Evidence, drive: Drive, turning: &[Vec<f64>], late: isize) -> Vec<Row> {
     let knots = evidence.flight.layout.knots.iter().enumerate();
-    let rows: Vec<Row> = knots
+    knots
         .filter_map(|(at, knot)| {
             let turned = std::array::from_fn(|axis| turning[axis][at]);
             let squares = match drive {
@@ -385,7 +462,11 @@ fn products_at(evidence: &Evidence, drive: Drive, turning: &[Vec<f64>], late: us
             };
             Some((turned, squares))
         })
-        .collect();
+        .collect()
+}
+
+fn products_at(evidence: &Evidence, drive: Drive, turning: &[Vec<f64>], late: isize) -> Delayed {
+    let rows = rows_at(evidence, drive, turning, late);
     let rotors = evidence.model.vehicle.rotors.len();
     let part = |number: usize| &rows[number * rows.len() / PARTS..(number + 1) * rows.len() / PARTS];
     Delayed {

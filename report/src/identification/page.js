@@ -35,6 +35,8 @@ const estimateText = ([name, estimate]) => `${spaced(name)} = ${withUnit(estimat
 const knowing = { "own trim": " with the flight's own trim", disturbance: " with the disturbance seen before" };
 
 const lossText = ({ flight, horizon, channel, rival, other, unit, ...loss }) =>
+  rival === "trim" ? `${spaced(channel)} of ${flight}: a constant ${withUnit(loss.new, unit)} is missing, more than ${withUnit(other, unit)} is no trim` :
+  rival === "no model" ? `${spaced(channel)} at each moment of ${flight}: new ${withUnit(loss.new, unit)}, without any model ${withUnit(other, unit)}` :
   `${channel} after ${horizon} s of ${flight}: new ${withUnit(loss.new, unit)}${knowing[loss.knowing] ?? ""}, ${rival} ${withUnit(other, unit)}`;
 
 function verdictText() {
