@@ -196,6 +196,9 @@ pub fn run(
         (None, Some(figures)) => summary.judge_by(&figures, &manifest.content)?,
         (None, None) => {}
     }
+    if recording.is_none() {
+        summary.unevaluated = report::beyond::with_envelope(&graph.plan, &|path| graph.files.text(path).ok());
+    }
     summary.warnings = graph.warnings;
     let mut text = summary.to_string();
     if let (Some(flight), Some(profile)) = (&flight, &profile) {
