@@ -285,6 +285,18 @@ fn require_dimensions(file: &File) -> Result<(), ParameterError> {
     Ok(())
 }
 
+/// Refuses a name that would be more than a part of one line of a report.
+///
+/// # Errors
+/// If it has control characters.
+pub fn require_line(name: &str) -> Result<(), ParameterError> {
+    if name.contains(char::is_control) {
+        let expected = "a text without control characters such as ends of lines";
+        return Err(ParameterError::value("name", expected, diagnostics::printable_line(name)));
+    }
+    Ok(())
+}
+
 fn require_names(vary: &[Varied]) -> Result<(), Diagnostic> {
     for (index, varied) in vary.iter().enumerate() {
         if vary[..index].iter().any(|other| other.name == varied.name) {
@@ -329,6 +341,7 @@ impl Varied {
         let first =
             keys.first().ok_or_else(|| ParameterError::missing("key", "a key, as `--set` takes it"))?;
         let name = vary.name.clone().unwrap_or_else(|| default_name(first));
+        require_line(&name)?;
         let distribution = vary.distribution()?;
         distribution.check()?;
         if distribution.choices().is_some() && vary.meaning != Meaning::Value {

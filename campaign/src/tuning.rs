@@ -1,6 +1,6 @@
 //! The `[tune]` table of a campaign file: the gains that are tuned, and the cost that is minimised.
 
-use crate::declaration::{Campaign, Sampling};
+use crate::declaration::{Campaign, Sampling, require_line};
 use crate::draw::rounded_to;
 use diagnostics::{Diagnostic, ParameterError, Place, nearest, read_toml};
 use serde::Deserialize;
@@ -239,7 +239,9 @@ impl Tuned {
             let expected = "a lower limit below the upper one, factors above 0";
             return Err(ParameterError::value(key, expected, format!("[{low}, {high}]")));
         }
-        Ok(Self { name: gain.name.clone().unwrap_or(first), keys, limits, place: place.clone() })
+        let name = gain.name.clone().unwrap_or(first);
+        require_line(&name)?;
+        Ok(Self { name, keys, limits, place: place.clone() })
     }
 
     /// Value at the coordinate `x` of the range, 0 to 1, of a gain that is `declared`; four significant digits.

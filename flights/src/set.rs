@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use diagnostics::Diagnostic;
+use diagnostics::{Diagnostic, printable_line};
 use inputs::InputFiles;
 use toml::Spanned;
 use vehicles::Vehicle;
@@ -177,15 +177,23 @@ fn check_limits(document: &Document, declaration: &Declaration) -> Option<Flight
     Some(document.bad(&limits.span(), format!("next_flight.{key}"), expected, found, "correct it"))
 }
 
-/// Names that several flights have.
+/// Names that several flights have, or that are more than a part of a line.
 fn check_names(document: &Document, logs: &[Log<'_>]) -> Vec<FlightsError> {
+    let refused = |log: &Log<'_>, expected: &str, found: String, advice: &str| {
+        document.bad(&log.name_span(), format!("flight.{}.name", log.index), expected, found, advice)
+    };
+    let with_control = logs.iter().filter(|log| log.name.contains(char::is_control)).map(|log| {
+        let expected = "a name without control characters such as ends of lines";
+        let found = format!("\"{}\"", printable_line(&log.name));
+        refused(log, expected, found, "correct the name; where it is the log's, rename the log")
+    });
     let mut names = BTreeSet::new();
     let again = logs.iter().filter(|log| !names.insert(log.name.as_str()));
-    let refused = |log: &Log<'_>| {
-        let (key, found) = (format!("flight.{}.name", log.index), format!("\"{}\" a second time", log.name));
-        document.bad(&log.name_span(), key, "the name of one flight", found, "give another")
-    };
-    again.map(refused).collect()
+    let again = again.map(|log| {
+        let found = format!("\"{}\" a second time", printable_line(&log.name));
+        refused(log, "the name of one flight", found, "give another")
+    });
+    with_control.chain(again).collect()
 }
 
 /// The invalid bound of a flight's part, its place, and its value.

@@ -116,6 +116,10 @@ fn files_that_need_a_key_are_refused_with_it() {
         load(rows.as_bytes(), CHANNELS, ""),
         &["line 1", "header", "`0.00`", "\"#1\"", "csv.header_line"],
     );
+    for (what, delimiter) in [("no header, blanks", " "), ("no header, tabs", "\t")] {
+        let loaded = load(rows.replace(',', delimiter).as_bytes(), CHANNELS, "");
+        says(what, loaded, &["line 1", "expected a header", "found numbers (`0.00`, ", "\"#1\""]);
+    }
     says(
         "dates",
         load(dated.as_bytes(), CHANNELS, ""),

@@ -2,6 +2,7 @@
 
 use crate::error::RecordingError;
 use crate::reader::{Record, Recording};
+use diagnostics::printable_line;
 use serde::Serialize;
 use std::fmt;
 use std::path::PathBuf;
@@ -65,7 +66,8 @@ impl fmt::Display for Difference {
         match self {
             Self::Message { tick, topic, field, a, b } => {
                 let field = field.as_ref().map_or(String::new(), |field| format!(", field {field}"));
-                write!(f, "tick {tick}, topic {topic}{field}: {a} against {b}")
+                let text = format!("tick {tick}, topic {topic}{field}: {a} against {b}");
+                f.write_str(&printable_line(&text))
             }
             Self::Prefix { shorter, last_tick, longer } => {
                 write!(f, "{} is a prefix of {}: ", shorter.display(), longer.display())?;

@@ -1,6 +1,7 @@
 //! Errors about a recording.
 
 use crate::definition::{DecodeError, Leaf};
+use diagnostics::printable_line;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -33,6 +34,25 @@ pub enum RecordingError {
         /// Fault of the content.
         reason: String,
     },
+    /// Messages in another encoding than those of ROS 2.
+    #[error(
+        "{path}: expected messages of ROS 2, encoded as `cdr` with a `ros2msg` schema; topic {} has messages encoded as \
+         `{}` with a `{}` schema. Leave such topics out with `mcap filter {path} -o NEW.mcap --exclude-topic-regex TOPIC`, \
+         or read the file with `mcap cat --json`",
+        printable_line(topic),
+        printable_line(message),
+        printable_line(schema)
+    )]
+    Encoding {
+        /// The file.
+        path: PathBuf,
+        /// The topic.
+        topic: String,
+        /// Encoding of its messages.
+        message: String,
+        /// Encoding of their schema.
+        schema: String,
+    },
     /// The MCAP writer failed.
     #[error("writing {path}: {reason}. Is the disk full?")]
     Write {
@@ -42,7 +62,11 @@ pub enum RecordingError {
         reason: String,
     },
     /// A message does not fit its definition.
-    #[error("topic {topic}: a message does not fit its definition {type_name}: {reason}")]
+    #[error(
+        "topic {}: a message does not fit its definition {}: {reason}",
+        printable_line(topic),
+        printable_line(type_name)
+    )]
     Decode {
         /// The topic.
         topic: String,
@@ -52,7 +76,10 @@ pub enum RecordingError {
         reason: DecodeError,
     },
     /// There is no such topic.
-    #[error("the recording has no topic {topic}; it has {}", if .known.is_empty() { "none" } else { .known })]
+    #[error(
+        "the recording has no topic {}; it has {}",
+        printable_line(topic), if known.is_empty() { "none".into() } else { printable_line(known) }
+    )]
     UnknownTopic {
         /// The topic requested.
         topic: String,
@@ -60,7 +87,12 @@ pub enum RecordingError {
         known: String,
     },
     /// There is no such field.
-    #[error("topic {topic} has no field `{field}`; it has {known}")]
+    #[error(
+        "topic {} has no field `{}`; it has {}",
+        printable_line(topic),
+        printable_line(field),
+        printable_line(known)
+    )]
     UnknownField {
         /// The topic.
         topic: String,

@@ -163,9 +163,15 @@ impl Recording {
     }
 
     fn complete(content: Content, path: &Path) -> Result<Self, RecordingError> {
-        let summary = summary(content.source()).map_err(|damage| RecordingError::content(path, damage))?;
-        let missing = || RecordingError::content(path, "it has no summary section");
-        let channels = summary.ok_or_else(missing)?.channels;
+        let broken = |damage| RecordingError::content(path, damage);
+        let channels = match summary(content.source()).map_err(broken)? {
+            Some(summary) => summary.channels,
+            // Writers may leave the summary out.
+            None => match Scan::of(content.source()) {
+                Scan { damage: Some(damage), .. } => return Err(broken(damage)),
+                Scan { channels, .. } => channels,
+            },
+        };
         let topics = topics(&channels, path)?;
         Ok(Self { path: path.to_owned(), content, channels, topics, cut: None })
     }
@@ -187,16 +193,9 @@ impl Recording {
         if !is_magic(0)? || (source.len() > magic && is_magic(source.len() - magic)?) {
             return Self::of_file(&file, path);
         }
-        let mut channels = Channels::new();
-        let mut last_tick = None;
-        for message in Messages::of(source) {
-            let message = match message {
-                Ok(message) => message,
-                Err(damage) if damage.is_refused => return Err(RecordingError::content(path, damage)),
-                Err(_) => break,
-            };
-            last_tick = Some(message.sequence);
-            channels.entry(message.channel.id).or_insert((message.channel, 0)).1 += 1;
+        let Scan { channels, last_tick, damage } = Scan::of(source);
+        if let Some(damage) = damage.filter(|damage| damage.is_refused) {
+            return Err(RecordingError::content(path, damage));
         }
         let topics = topics(&channels, path)?;
         Ok(Self { path: path.to_owned(), content, channels, topics, cut: Some(Cut { last_tick }) })
@@ -356,27 +355,60 @@ impl Recording {
         })
     }
 
-    /// The attachments: name and content. Of a recording that was cut, which has no index of them, those in front of its
+    /// The attachments: name and content. If the file has no index of them, as one that was cut, those in front of its
     /// first message: where ours are.
     ///
     /// # Errors
     /// If the file is damaged.
     pub fn attachments(&self) -> Result<Vec<(String, Vec<u8>)>, RecordingError> {
         let broken = |damage| RecordingError::content(&self.path, damage);
-        if self.cut.is_some() {
-            return leading_attachments(self.source()).map_err(broken);
-        }
-        let summary = summary(self.source()).map_err(broken)?;
-        let attachments = summary.iter().flat_map(|summary| &summary.attachments);
-        attachments.map(|index| attachment(self.source(), index).map_err(broken)).collect()
+        let summary = if self.cut.is_some() { None } else { summary(self.source()).map_err(broken)? };
+        let Some(summary) = summary else { return leading_attachments(self.source()).map_err(broken) };
+        summary.attachments.iter().map(|index| attachment(self.source(), index).map_err(broken)).collect()
     }
 }
+
+/// Channels of a file without a summary, found by reading its messages.
+struct Scan {
+    channels: Channels,
+    /// Tick of the last message that is whole.
+    last_tick: Option<u32>,
+    /// Damage behind that message.
+    damage: Option<Damage>,
+}
+
+impl Scan {
+    fn of(source: Source<'_>) -> Self {
+        let mut scan = Self { channels: Channels::new(), last_tick: None, damage: None };
+        for message in Messages::of(source) {
+            match message {
+                Ok(message) => {
+                    scan.last_tick = Some(message.sequence);
+                    scan.channels.entry(message.channel.id).or_insert((message.channel, 0)).1 += 1;
+                }
+                Err(damage) => scan.damage = Some(damage),
+            }
+        }
+        scan
+    }
+}
+
+/// Encodings of messages and schemas that are read: those of ROS 2.
+const ENCODINGS: [&str; 2] = ["cdr", "ros2msg"];
 
 /// The topics of `channels`, each given with the number of its messages.
 fn topics(channels: &Channels, path: &Path) -> Result<BTreeMap<String, Topic>, RecordingError> {
     let mut topics = BTreeMap::new();
     for (channel, message_count) in channels.values() {
         let Some(schema) = &channel.schema else { continue };
+        if [channel.message_encoding.as_str(), schema.encoding.as_str()] != ENCODINGS {
+            return Err(RecordingError::Encoding {
+                path: path.to_owned(),
+                topic: channel.topic.clone(),
+                message: channel.message_encoding.clone(),
+                schema: schema.encoding.clone(),
+            });
+        }
         let definition = Definition::parse(&schema.name, &String::from_utf8_lossy(&schema.data))
             .map_err(|reason| RecordingError::content(path, format!("schema {}: {reason}", schema.name)))?;
         let (type_name, message_count) = (schema.name.clone(), *message_count);

@@ -197,6 +197,33 @@ fn blocks_have_all_messages_and_a_cut_file_has_the_attachments_in_front_of_them(
     assert_eq!(counts(&PLAIN[..PLAIN.len() - 8]), (20, 20, vec![]));
 }
 
+/// A finished file whose footer names no summary, as writers may leave it.
+#[test]
+fn a_finished_file_without_a_summary_is_read_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("plain.mcap");
+    let mut bytes = WHOLE.clone();
+    let footer = bytes.len() - 8 - 20;
+    bytes[footer..footer + 20].fill(0);
+    std::fs::write(&path, &bytes).unwrap();
+    std::fs::write(folder.path().join("whole.mcap"), &*WHOLE).unwrap();
+    let whole = Recording::open(&folder.path().join("whole.mcap")).unwrap();
+    for recording in [Recording::open(&path).unwrap(), Recording::salvage(&path).unwrap()] {
+        assert_eq!((recording.cut(), recording.messages().count()), (None, 90));
+        let counts = |of: &Recording| -> Vec<_> {
+            of.topics().iter().map(|(name, topic)| (name.clone(), topic.message_count)).collect()
+        };
+        assert_eq!(counts(&recording), counts(&whole));
+        assert_eq!(recording.attachments().unwrap(), whole.attachments().unwrap());
+        assert_eq!(by_blocks(&recording), Some(90));
+    }
+    // A damaged chunk is an error, as in a file with a summary.
+    let frame = bytes.windows(4).position(|window| window == [0x28, 0xb5, 0x2f, 0xfd]).unwrap();
+    bytes[frame] ^= 0xff;
+    std::fs::write(&path, &bytes).unwrap();
+    assert!(Recording::open(&path).is_err());
+}
+
 /// Text that looks like a definition.
 fn definition() -> impl Strategy<Value = String> {
     let line = prop_oneof![

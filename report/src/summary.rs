@@ -5,7 +5,7 @@ use crate::judge::{self, Figures, Found, Verdict, WindowErrors};
 use crate::shadow::{self, Difference, Replacement};
 use anyhow::Result;
 use bus::plan::Plan;
-use diagnostics::Diagnostic;
+use diagnostics::{Diagnostic, printable_line};
 use recorder::reader::Recording;
 use runtime::checkpoint::Written;
 use runtime::launcher::Outcome;
@@ -70,6 +70,9 @@ pub struct Summary {
     pub replacements: Vec<Replacement>,
     /// Quantities beyond the envelope in which the vehicle's model was validated; `None` of a flight that was not recorded.
     pub beyond: Option<Vec<Beyond>>,
+    /// Names of vehicles with an envelope that was not evaluated, because the flight was not recorded.
+    #[serde(skip)]
+    pub unevaluated: Vec<String>,
     /// Differences between shadows and the processes that they shadowed.
     pub shadows: Vec<Difference>,
     /// Warnings of `check`; printed before the flight.
@@ -174,6 +177,7 @@ impl Summary {
             compare: Vec::new(),
             replacements,
             beyond: None,
+            unevaluated: Vec::new(),
             shadows: Vec::new(),
             warnings: Vec::new(),
         }
@@ -292,7 +296,12 @@ impl fmt::Display for Summary {
         writeln!(
             f,
             "{}: {} ticks ({:.3} s) in {:.3} s: {:.0} ticks/s, {:.2} × real time",
-            self.manifest, self.ticks, self.simulated_s, self.host_s, self.ticks_per_s, self.real_time_factor
+            printable_line(&self.manifest),
+            self.ticks,
+            self.simulated_s,
+            self.host_s,
+            self.ticks_per_s,
+            self.real_time_factor
         )?;
         if self.first_tick > 0 {
             writeln!(f, "  from the checkpoint of tick {} on", self.first_tick)?;
@@ -314,6 +323,10 @@ impl fmt::Display for Summary {
         self.compare.iter().try_for_each(|errors| writeln!(f, "{errors}"))?;
         self.pass.iter().chain(&self.measures).try_for_each(|verdict| writeln!(f, "{verdict}"))?;
         self.beyond.iter().flatten().try_for_each(|beyond| writeln!(f, "{beyond}"))?;
+        self.unevaluated.iter().try_for_each(|name| {
+            let name = printable_line(name);
+            writeln!(f, "  the flight envelope of {name} was not evaluated: it needs a recording")
+        })?;
         if self.is_unjudged {
             let why = "the run before had no judge in flight; one that writes checkpoints by itself has";
             writeln!(f, "  conditions: not judged, {why}")?;

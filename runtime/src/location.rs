@@ -1,8 +1,9 @@
 //! The location that a path names: an opened folder and a name in it. Once it is found, no change of the path can
 //! redirect it.
 //!
-//! Any folder that everybody may write to is treated as by a kernel with `fs.protected_symlinks`, sticky or not. A
-//! link in it is followed only if it belongs to this user or to the owner of the folder.
+//! A link of another user than root is followed only in a folder into which nobody but this user and root may write.
+//! This is stricter than a kernel with `fs.protected_symlinks`: that follows links of a folder's owner, who may have
+//! planted them as well.
 
 use rustix::fs::{AtFlags, CWD, FileType, Mode, OFlags, Stat};
 use rustix::io::Errno;
@@ -16,6 +17,8 @@ use std::sync::Arc;
 
 /// Symbolic links that are followed, as many as the kernel follows.
 const LINKS_MAX: usize = 40;
+/// Number of the user root.
+const ROOT: u32 = 0;
 /// A folder that is opened to name files in it, not to list it.
 const FOLDER: OFlags = OFlags::PATH.union(OFlags::DIRECTORY).union(OFlags::NOFOLLOW).union(OFlags::CLOEXEC);
 
@@ -30,7 +33,7 @@ pub enum Unlocated {
     NoFolder(PathBuf),
     /// A link that another user may have planted.
     #[error(
-        "{} is a link of user {owner} in a folder that everybody may write to, and is not followed; remove it, or name \
+        "{} is a link of user {owner} in a folder that other users may write to, and is not followed; remove it, or name \
          another file", .link.display()
     )]
     Planted {
@@ -222,11 +225,13 @@ impl Walk {
     }
 }
 
-/// True if this user follows a link in a folder.
+/// True if this user follows a link in a folder: neither its owner nor one who may write to the folder can have
+/// planted it.
 fn may_follow(link: &Stat, folder: &Stat) -> bool {
-    let is_open_to_all = Mode::from_raw_mode(folder.st_mode).contains(Mode::WOTH);
     let follower = rustix::process::geteuid().as_raw();
-    !is_open_to_all || [follower, folder.st_uid].contains(&link.st_uid)
+    let is_trusted = |owner: u32| owner == follower || owner == ROOT;
+    let writers = Mode::from_raw_mode(folder.st_mode).intersection(Mode::WGRP | Mode::WOTH);
+    is_trusted(link.st_uid) || (is_trusted(folder.st_uid) && writers.is_empty())
 }
 
 #[cfg(test)]
@@ -239,7 +244,7 @@ mod tests {
 
     const STRANGER: u32 = 1234;
 
-    fn open_to_all(folder: &Path, mode: u32) {
+    fn set_mode(folder: &Path, mode: u32) {
         std::fs::set_permissions(folder, std::fs::Permissions::from_mode(mode)).unwrap();
     }
 
@@ -292,7 +297,7 @@ mod tests {
 
     /// Only root can give a link to another user.
     #[test]
-    fn a_link_of_another_user_in_a_folder_of_all_is_not_followed() {
+    fn a_link_of_another_user_is_not_followed_where_others_may_write() {
         let folder = tempfile::tempdir().unwrap();
         let [shared, mine] = ["shared", "mine"].map(|name| folder.path().join(name));
         std::fs::create_dir(&shared).unwrap();
@@ -301,25 +306,31 @@ mod tests {
         symlink(mine.join("file"), shared.join("file")).unwrap();
         let found = |name: &str| Location::find(&shared.join(name));
         let to_stranger = |link: &str| lchown(shared.join(link), Some(STRANGER), Some(STRANGER));
-        open_to_all(&shared, 0o1777);
+        set_mode(&shared, 0o1777);
         assert!(found("folder/file").is_ok() && found("file").is_ok(), "one's own are followed");
         if to_stranger("folder").and_then(|()| to_stranger("file")).is_err() {
             crate::skipped::skip("only root can give a link to another user");
             return;
         }
         for (name, link) in [("folder/file", "folder"), ("file", "file")] {
-            for mode in [0o1777, 0o777] {
-                open_to_all(&shared, mode);
+            for mode in [0o1777, 0o777, 0o775] {
+                set_mode(&shared, mode);
                 let error = found(name).unwrap_err().to_string();
                 let expected = format!("{} is a link of user {STRANGER} in", shared.join(link).display());
                 assert!(error.starts_with(&expected), "{error}");
             }
-            open_to_all(&shared, 0o755);
+            set_mode(&shared, 0o755);
             assert!(found(name).is_ok(), "nobody else can have planted it");
-            // The folder's owner could put anything there.
-            open_to_all(&shared, 0o1777);
+            // The folder's owner can plant links whatever the mode is.
             lchown(&shared, Some(STRANGER), Some(STRANGER)).unwrap();
+            for mode in [0o1777, 0o755, 0o700] {
+                set_mode(&shared, mode);
+                assert!(matches!(found(name), Err(Unlocated::Planted { owner: STRANGER, .. })), "{mode:o}");
+            }
+            // A link of one's own is followed there, too.
+            lchown(shared.join(link), Some(0), Some(0)).unwrap();
             assert!(found(name).is_ok());
+            to_stranger(link).unwrap();
             lchown(&shared, Some(0), Some(0)).unwrap();
         }
     }

@@ -4,6 +4,7 @@ use super::files::open_recording;
 use super::output::{print_json, print_text};
 use anyhow::Result;
 use clap::Args;
+use diagnostics::printable_line;
 use recorder::comparison::{Comparison, FieldDifference, compare};
 use recorder::diff::{Difference, first_difference};
 use recorder::reader::Recording;
@@ -106,6 +107,7 @@ fn line(field: &FieldDifference) -> String {
         "" | "1" => format!("{largest:?}"),
         unit => format!("{largest:?} {unit}"),
     };
+    let (topic, path, largest) = (printable_line(topic), printable_line(path), printable_line(&largest));
     format!(
         "  {topic} {path}: at most {largest} (tick {largest_tick}), in {messages} messages from tick {first_tick} on"
     )

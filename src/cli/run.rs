@@ -183,6 +183,9 @@ pub fn run(
     let profile = flight.as_ref().map(|flight| Profile::of(flight, outcome.missed_deadlines, recorded));
     let mut summary = Summary::new(manifest.name(), outcome, graph.plan.tick_s());
     summary.judge_flight(recording.as_ref(), figures.as_deref(), &graph.plan, &manifest.content)?;
+    if recording.is_none() {
+        summary.unevaluated = report::beyond::with_envelope(&graph.plan, &|path| graph.files.text(path).ok());
+    }
     summary.warnings = graph.warnings;
     let mut text = summary.to_string();
     if let (Some(flight), Some(profile)) = (&flight, &profile) {

@@ -17,8 +17,12 @@ fn limit(key: &str, value: f64, unit: &str) -> String {
 #[test]
 fn a_flight_beyond_it_is_told_before_and_after() {
     let place = Place::new();
-    let narrow =
-        [limit("height_max", 1.2, "m"), limit("height_min", 1.1, "m"), limit("tilt_max", 45.0, "deg")];
+    let narrow = [
+        limit("height_max", 1.2, "m"),
+        limit("height_min", 1.1, "m"),
+        limit("tilt_max", 45.0, "deg"),
+        limit("specific_force_max", 10.0, "m/s^2"),
+    ];
     let changes = hover(&place, &narrow.concat());
     let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
     let manifest = repository("manifests/hover.toml");
@@ -31,6 +35,8 @@ fn a_flight_beyond_it_is_told_before_and_after() {
         "beyond the validated envelope: height on /plant/state for",
         "(limit 1.100 m)",
         "(limit 1.200 m)",
+        "specific force on /plant/state for",
+        "(limit 10.000 m/s^2)",
     ]);
     assert!(!flown.output.contains("tilt on"), "{}", flown.output);
 }
@@ -44,5 +50,18 @@ fn a_flight_within_it_says_nothing() {
     let manifest = repository("manifests/hover.toml");
     let recording = place.path("hover.mcap");
     let flown = place.call(&[&["run", &manifest, "--record", &recording], &changes[..]].concat());
+    assert!(!flown.output.contains("envelope"), "{}", flown.output);
+}
+
+#[test]
+fn a_flight_without_a_recording_says_that_its_envelope_was_not_evaluated() {
+    let place = Place::new();
+    let changes = hover(&place, &limit("height_max", 3.0, "m"));
+    let manifest = repository("manifests/hover.toml");
+    let unrecorded = ["run", &manifest, "--record", "none", "--set", "run.duration_s=4"];
+    let flown = place.call(&[&unrecorded[..], &["--set", &changes[3]]].concat());
+    flown.prints(&["the flight envelope of validated was not evaluated: it needs a recording"]);
+    // Without an envelope nothing is missing.
+    let flown = place.call(&unrecorded);
     assert!(!flown.output.contains("envelope"), "{}", flown.output);
 }

@@ -1,4 +1,4 @@
-//! Links that another user has planted in a folder that everybody may write to are not followed, whoever writes.
+//! Links that another user has planted in a folder that others may write to are not followed, whoever writes.
 
 use crate::nodes::{manifest, sender};
 use crate::skipped::skip;
@@ -63,6 +63,16 @@ fn what_a_planted_link_names_is_never_written_to() {
     let after: Vec<_> = names.iter().map(|name| fs::read(mine(name)).ok()).collect();
     assert!(before == after, "a file behind a link was written to");
     assert_eq!(fs::read_dir(mine("folder")).unwrap().count(), 0, "a file was made behind a link");
+    // A folder of the link's owner, closed to all others.
+    fs::create_dir(place.path("theirs")).unwrap();
+    let theirs = place.path("theirs/a.mcap");
+    symlink(mine("a.mcap"), &theirs).unwrap();
+    for path in [&theirs, &place.path("theirs")] {
+        lchown(path, Some(NOBODY), Some(NOBODY)).unwrap();
+    }
+    let said = format!("{theirs} is a link of user 65534 in a folder that other users may write to");
+    place.call(&["run", &short, "--record", &theirs]).with_code(2).says(&[&said]);
+    assert_eq!(fs::read(mine("a.mcap")).ok(), before[0], "a file behind a link was written to");
     // One's own link leads where it leads.
     fs::remove_file(shared("a.html")).unwrap();
     symlink(mine("a.html"), shared("a.html")).unwrap();

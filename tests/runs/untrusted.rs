@@ -138,6 +138,84 @@ fn contents_of_recordings_are_escaped() {
     assert!(values.any(|value| value == HOSTILE), "escaped JSON is the same data: {line}");
 }
 
+/// A name with ends of lines, which would look like the end of a summary.
+const FORGED: &str = "height\n\npassed\nto plot it: true\n";
+
+/// Requires that no line of the command's output is one that only the forged name has.
+#[track_caller]
+fn require_one_line(ended: &Ended) {
+    let said = format!("{}{}", ended.output, ended.error);
+    assert!(!said.lines().any(|line| line == "passed" || line.starts_with("to plot it: true")), "{said}");
+    assert!(said.contains("height\\n\\npassed"), "not told of: {said}");
+}
+
+#[test]
+fn names_with_ends_of_lines_forge_no_line() {
+    let place = Place::new();
+    // As TOML writes it.
+    let literal = format!("{FORGED:?}");
+    let condition = |list: &str, limits: &str| {
+        format!(
+            "\n[[{list}]]\nname = {literal}\ntopic = \"/plant/state\"\nfield = \"position.z\"\nunit = \"m\"\n\
+             statistic = \"max\"\n{limits}\n"
+        )
+    };
+    for (list, limits) in [("pass", "max = 0.0"), ("measure", "")] {
+        let path = place.write("forged.toml", good() + &condition(list, limits));
+        for command in ["check", "run"] {
+            let ended = place.call(&[command, &path]).with_code(2);
+            require_one_line(&ended);
+            ended.says(&["forged.toml:", "`name`: expected a text without control characters"]);
+        }
+    }
+    let flights = format!(
+        "vehicle = {}\n[channels]\n[[flight]]\nname = {literal}\nfile = \"log.csv\"\nrole = \"fit\"\n",
+        toml::Value::from(repository("vehicles/hummingbird.toml"))
+    );
+    let flights = place.write("flights.toml", flights);
+    let out = place.path("out");
+    let ended = place.call(&["identify", &flights, "--out", &out]).with_code(2);
+    require_one_line(&ended);
+    ended.says(&["flights.toml:4", "a name without control characters"]);
+    // Names in recordings of others are escaped.
+    let topic = format!("/{FORGED}");
+    let a = place.write("a.mcap", recording(&topic, "one"));
+    let b = place.write("b.mcap", recording(&topic, "another"));
+    let page = place.path("page.html");
+    let calls: &[&[&str]] = &[
+        &["cat", &a, "--topic", "/none"],
+        &["diff", &a, &b],
+        &["diff", &a, &b, "--tolerance", "1"],
+        &["plot", &a, "--out", &page, "--plot", "/none:x"],
+    ];
+    calls.iter().for_each(|args| require_one_line(&place.call(args)));
+}
+
+/// A recording with another encoding of messages and schemas is told with both, and not with a damage.
+#[test]
+fn a_recording_in_another_encoding_is_told_with_it() {
+    let place = Place::new();
+    let bytes = recording("/odometry", "x");
+    let swapped = |bytes: &[u8], from: &[u8], to: &[u8]| {
+        let at = bytes.windows(from.len()).position(|window| window == from).unwrap();
+        [&bytes[..at], to, &bytes[at + from.len()..]].concat()
+    };
+    // Of the same lengths as `cdr` and `ros2msg`.
+    for (message, schema) in [("jsn", "jsonsch"), ("pbf", "protobf")] {
+        let other = swapped(&bytes, b"cdr", message.as_bytes());
+        let path = place.write("other.mcap", swapped(&other, b"ros2msg", schema.as_bytes()));
+        for args in [&["cat", &path][..], &["plot", &path], &["diff", &path, &path]] {
+            let ended = place.call(args).with_code(2);
+            ended.says(&[
+                &format!("topic /odometry has messages encoded as `{message}` with a `{schema}` schema"),
+                "expected messages of ROS 2, encoded as `cdr` with a `ros2msg` schema",
+                "mcap filter",
+            ]);
+            assert!(!ended.error.contains("not a complete MCAP file"), "{}", ended.error);
+        }
+    }
+}
+
 #[test]
 fn a_live_run_of_a_hostile_name_is_shown_escaped() {
     let place = Place::new();

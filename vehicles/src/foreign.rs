@@ -35,12 +35,15 @@ const FROM_MATLAB: &str = "load it in MATLAB, and write it as CSV: `writetable(s
 const FROM_SPREADSHEET: &str = "save the sheet as CSV";
 const IN_UTF32: &str = "a text in UTF-32";
 const TO_UTF8: &str = "write it as UTF-8: `iconv -f UTF-32 -t UTF-8 FILE > FILE.csv`";
+const DATAFLASH_TEXT: &str = "a dataflash log as text (ArduPilot's .log)";
+const FROM_DATAFLASH_TEXT: &str = "name the .BIN of the same flight in a flights file, or write a message as CSV: \
+                                   `mavlogdump.py --format csv --types IMU FILE.log > FILE.csv` (Python package pymavlink)";
 const IN_FLIGHTS: &str = "a flights file can name it (docs/flights.md); here, write it as CSV";
 
 /// First bytes, name, advice.
 type Magic = (&'static [u8], &'static str, &'static str);
 
-const MAGIC: [Magic; 35] = [
+const MAGIC: [Magic; 36] = [
     (b"\x89MCAP0\r\n", "a recording (MCAP)", IN_FLIGHTS),
     (b"ULog\x01\x12\x35", "a ULog of PX4", IN_FLIGHTS),
     (b"\xbc\x01\x00", "the card log of a Crazyflie, version 1", "log with newer firmware"),
@@ -62,6 +65,7 @@ const MAGIC: [Magic; 35] = [
         "write it as CSV: `blackbox_decode FILE`, or export it from Blackbox Explorer",
     ),
     (b"PAR1", "a Parquet file", IN_FLIGHTS),
+    (b"ORC", "an ORC file", FROM_PANDAS),
     (b"ARROW1\0\0", "an Arrow (Feather) file", FROM_PANDAS),
     (b"FEA1", "a Feather file", FROM_PANDAS),
     (b"\x93NUMPY", "a NumPy array (.npy)", FROM_PYTHON),
@@ -117,7 +121,9 @@ const ZIPPED: [Magic; 6] = [
 ];
 
 /// Beginnings of texts that are not tables, after blanks, in lower case.
-const TEXTS: [Magic; 9] = [
+const TEXTS: [Magic; 11] = [
+    (b"fmt, 128,", DATAFLASH_TEXT, FROM_DATAFLASH_TEXT),
+    (b"fmt,128,", DATAFLASH_TEXT, FROM_DATAFLASH_TEXT),
     (b"{\\rtf", "a document (RTF)", EXPORT),
     (b"<!doctype html", "a web page (HTML)", "download the file itself; the page may ask for a login"),
     (b"<html", "a web page (HTML)", "download the file itself; the page may ask for a login"),
@@ -263,7 +269,7 @@ mod tests {
         let marked = [vec![0xff, 0xfe, 0, 0], in_utf32("t,x\n0,1\n")].concat();
         assert_eq!(of(&in_utf32("t,x\n0,1\n")).unwrap().name, IN_UTF32);
         assert!(of(b"\n\r\n \n").unwrap().name.starts_with("empty besides blanks"));
-        let cases: [(&[u8], &str, &str); 38] = [
+        let cases: [(&[u8], &str, &str); 40] = [
             (b"#ROSBAG V2.0\n", "a bag of ROS 1", "rosbags-convert"),
             (b"SQLite format 3\0", ".db3", "mcap convert"),
             (b"\xa3\x95\x80\x80YFMT", "ArduPilot", "flights file"),
@@ -282,6 +288,12 @@ mod tests {
             (b"PK\x03\x04\x14\0log.csv", "ZIP", "unzip"),
             (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", ".xls", "as CSV"),
             (b"PAR1\x15\x04", "Parquet", "flights file"),
+            (b"ORC\x08\x03", "ORC", "pandas"),
+            (
+                b"FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n",
+                "ArduPilot's .log",
+                "mavlogdump.py",
+            ),
             (b"ARROW1\0\0", "Arrow", "pandas"),
             (b"\x93NUMPY\x01\0v\0", ".npy", "NumPy"),
             (b"\x80\x04\x95", "pickle", "pandas"),
@@ -320,9 +332,10 @@ mod tests {
                 .flat_map(|unit| if big { unit.to_be_bytes() } else { unit.to_le_bytes() })
                 .collect()
         };
-        let texts: [&[u8]; 10] = [
+        let texts: [&[u8]; 11] = [
             b"t,x\n0,1\n",
             b"PAR1,PAR2\n0,1\n",
+            b"ORC,FMT\n0,1\n",
             b"\xef\xbb\xbft;x\r\n0;1\r\n",
             b"# made by a logger\nt,x\n0,1\n",
             b"\"t\",\"x\"\n0,1\n",

@@ -99,13 +99,18 @@ impl Search<'_> {
                 break;
             }
         }
-        match best {
-            Some(best) if best.found == 0 && is_numeric(&best.cells) => {
-                Err(TableError::NoHeader { line: best.line.number, found: best.cells })
-            }
-            Some(best) => self.below(best),
-            None => Ok(self.without_header()),
+        let Some(best) = best else { return Ok(self.without_header()) };
+        match self.numbers(&best).filter(|_| best.found == 0) {
+            Some(found) => Err(TableError::NoHeader { line: best.line.number, found }),
+            None => self.below(best),
         }
+    }
+
+    /// The cells of the line, if all of them are numbers with one of the delimiters.
+    fn numbers(&self, candidate: &Candidate) -> Option<Vec<String>> {
+        let text = &self.text[candidate.line.content.clone()];
+        let by_delimiter = self.delimiters(text).into_iter().map(|delimiter| cells(text, delimiter));
+        std::iter::once(candidate.cells.clone()).chain(by_delimiter).find(|cells| is_numeric(cells))
     }
 
     /// The line as a header: with or without a comment's mark, and with the delimiter that gives more of the names.

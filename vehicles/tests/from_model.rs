@@ -501,6 +501,37 @@ fn joints_whose_limits_are_both_0_are_fixed() {
     assert!(urdf("upper=\"0\"").notes[0].contains("battery_mount is movable"));
 }
 
+#[test]
+fn a_body_without_mass_is_noted() {
+    let note = "the links of the rotors have ";
+    assert!(!of(URDF, "plus.urdf").notes.iter().any(|found| found.starts_with(note)));
+    let link = |name: &str, mass_kg: f64| {
+        format!(
+            "<link name=\"{name}\"><inertial><mass value=\"{mass_kg}\"/><inertia ixx=\"1e-6\" iyy=\"1e-6\" izz=\"2e-6\" \
+             ixy=\"0\" ixz=\"0\" iyz=\"0\"/></inertial></link>"
+        )
+    };
+    let rotors: String = [(0.1, 0.1), (0.1, -0.1), (-0.1, -0.1), (-0.1, 0.1)]
+        .iter()
+        .enumerate()
+        .map(|(index, (x, y))| {
+            let joint = format!(
+                "<joint name=\"rotor_{index}\" type=\"continuous\"><parent link=\"base\"/><child link=\"prop_{index}\"/>\
+                 <origin xyz=\"{x} {y} 0\"/><axis xyz=\"0 0 1\"/></joint>"
+            );
+            link(&format!("prop_{index}"), 0.005) + &joint
+        })
+        .collect();
+    let model = |base: &str| of(&format!("<robot name=\"q\">{base}{rotors}</robot>"), "q.urdf");
+    let notes = model("<link name=\"base\"/>").notes;
+    let found = notes.iter().find(|found| found.starts_with(note)).unwrap();
+    assert!(
+        found.contains("0.0200 kg of the vehicle's 0.0200 kg: the body probably lacks its mass"),
+        "{found}"
+    );
+    assert!(!model(&link("base", 0.1)).notes.iter().any(|found| found.starts_with(note)));
+}
+
 /// Texts that replace a part of a model.
 const PARTS: [&str; 16] = [
     "",

@@ -4,7 +4,7 @@ use super::parameters::Notes;
 use crate::manifest::{Comparison, Manifest, PassCondition, Statistic};
 use crate::program::Program;
 use bus::plan::{NodePlan, Plan};
-use diagnostics::{Diagnostic, did_you_mean, nearest};
+use diagnostics::{Diagnostic, did_you_mean, nearest, printable_line};
 use recorder::RecordingError;
 use std::ops::Range;
 use toml::Spanned;
@@ -16,8 +16,10 @@ pub fn check(
     programs: &[Program],
     notes: &mut Notes,
 ) -> Result<(), Diagnostic> {
-    check_taken(manifest, plan, programs)?;
     let content = &manifest.content;
+    let named = content.pass.iter().chain(&content.measure);
+    Diagnostic::gather(named.map(|condition| check_name(manifest, condition)))?;
+    check_taken(manifest, plan, programs)?;
     Diagnostic::gather(content.compare.iter().map(|compare| check_window(manifest, plan, compare)))?;
     let conditions = content.pass.iter().map(|pass| {
         check_limits(manifest, pass)?;
@@ -35,6 +37,21 @@ pub fn check(
 
 fn kind(condition: &PassCondition) -> &'static str {
     if condition.min.is_none() && condition.max.is_none() { "measure" } else { "pass condition" }
+}
+
+/// Refuses a name that would be more than a part of one line of the summary.
+fn check_name(manifest: &Manifest, condition: &Spanned<PassCondition>) -> Result<(), Diagnostic> {
+    let PassCondition { name, .. } = condition.get_ref();
+    if !name.contains(char::is_control) {
+        return Ok(());
+    }
+    let found = printable_line(name);
+    let message = format!(
+        "{}: `name`: expected a text without control characters such as ends of lines, found `{found}`",
+        kind(condition.get_ref())
+    );
+    let at = key_of(manifest, &condition.span(), "", "name");
+    Err(manifest.problem(&at, message, "write the name in one line, without tabs"))
 }
 
 fn check_no_limits(manifest: &Manifest, measure: &Spanned<PassCondition>) -> Result<(), Diagnostic> {
@@ -326,7 +343,7 @@ fn check_taken(manifest: &Manifest, plan: &Plan, programs: &[Program]) -> Result
         let Some(index) = plan.topics.iter().position(|known| known.name == topic) else {
             let known = plan.topics.iter().map(|topic| topic.name.as_str());
             let help = did_you_mean(topic, known, "the topics are");
-            return Err(manifest.problem(&at(), format!("nobody publishes {topic}"), help));
+            return Err(manifest.problem(&at(), format!("nobody publishes {}", printable_line(topic)), help));
         };
         if !taken.contains(&index) {
             let help = "add a process with kind = \"recorder\" that takes it";

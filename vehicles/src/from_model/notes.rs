@@ -4,11 +4,13 @@ use super::model::{Freedom, Motor};
 use super::parts::{GRAVITY_M_S2, Parts};
 use super::rotors::Rotor;
 use super::text::{digits, plain};
+use std::collections::BTreeSet;
 
 /// Notes on a model whose rotors have the coefficient `thrust` in N/(rad/s)^2 and turn at most at `speed_max` in rad/s.
 pub fn of(parts: &Parts, thrust: f64, speed_max: f64) -> Vec<String> {
     let mut notes = parts.model.notes.clone();
     notes.extend(movable(parts));
+    notes.extend(bodiless(parts));
     notes.extend(lags(&parts.rotors));
     notes.extend(directions(&parts.rotors));
     let weight = parts.body.mass_kg * GRAVITY_M_S2;
@@ -25,6 +27,27 @@ pub fn of(parts: &Parts, thrust: f64, speed_max: f64) -> Vec<String> {
         ));
     }
     notes
+}
+
+/// Share of the mass in the links of rotors above which the model probably lacks the mass of its body. Own choice:
+/// propellers and the bells of motors are a tenth to a third of a multicopter.
+const ROTOR_SHARE_MAX: f64 = 0.5;
+
+/// A body that has next to no mass beside its rotors.
+fn bodiless(parts: &Parts) -> Option<String> {
+    let mass_of = |name: &str| {
+        let link = parts.model.links.iter().find(|link| link.name == name)?;
+        Some(link.inertial.as_ref()?.mass_kg)
+    };
+    let links: BTreeSet<&str> = parts.rotors.iter().map(|rotor| rotor.link.name.as_str()).collect();
+    let rotors_kg: f64 = links.into_iter().filter_map(mass_of).sum();
+    let all_kg = parts.body.mass_kg;
+    (rotors_kg > ROTOR_SHARE_MAX * all_kg).then(|| {
+        format!(
+            "the links of the rotors have {rotors_kg:.4} kg of the vehicle's {all_kg:.4} kg: the body probably lacks its mass; \
+             add <inertial> to its link"
+        )
+    })
 }
 
 /// Joints that move and carry no rotor.
