@@ -6,9 +6,8 @@
 use std::path::{Path, PathBuf};
 
 use vehicles::ROTORS_MAX;
-use vehicles::gaps::{held_period_s, of_held};
+use vehicles::gaps::of_held;
 
-use crate::held;
 use crate::quantity::Quantity;
 
 /// Role of a flight.
@@ -241,36 +240,6 @@ impl Flight {
         let next_s = |to_s: f64| time_s.get(time_s.partition_point(|time_s| *time_s < to_s)).copied();
         let breaks = self.command_breaks_s.iter();
         breaks.map(|(from_s, to_s)| (*from_s, next_s(*to_s).unwrap_or(f64::INFINITY))).collect()
-    }
-
-    /// Usual longest time between two commands: between those that differ, where the log holds them on a finer grid. `None`
-    /// with fewer than two.
-    ///
-    /// ```
-    /// use flights::{Channel, Flight, Role};
-    ///
-    /// let mut flight = Flight::new("merged", "log.csv", Role::Fit);
-    /// let held = |k: i32| [f64::from(k / 10); vehicles::ROTORS_MAX];
-    /// flight.command.time_s = (0..100).map(|k| 0.005 * f64::from(k)).collect();
-    /// flight.command.values = (0..100).map(held).collect();
-    /// assert!((flight.command_period_s().unwrap() - 0.05).abs() < 1e-9);
-    /// ```
-    #[must_use]
-    pub fn command_period_s(&self) -> Option<f64> {
-        let Channel { time_s, values } = &self.command;
-        match held::regular_starts(values).filter(|_| !self.commands_on_change) {
-            Some(starts) => held_period_s(&starts.iter().map(|at| time_s[*at]).collect::<Vec<_>>()),
-            None => held_period_s(time_s),
-        }
-    }
-
-    /// The flight with each command once, where its log holds them on a finer grid; `None` where it does not.
-    #[must_use]
-    pub fn without_held_commands(&self) -> Option<Self> {
-        let starts = held::regular_starts(&self.command.values).filter(|_| !self.commands_on_change)?;
-        let mut is_start = vec![false; self.command.values.len()];
-        starts.iter().for_each(|at| is_start[*at] = true);
-        Some(Self { command: self.command.kept(|at| is_start[at]), ..self.clone() })
     }
 
     /// The times of the samples of all channels, in the order of [`Quantity::CHANNELS`].

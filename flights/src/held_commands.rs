@@ -5,6 +5,7 @@ use crate::canonical::turning;
 use crate::flight::{Channel, Flight, median};
 use crate::held;
 use vehicles::Vehicle;
+use vehicles::gaps::held_period_s;
 
 /// Shortest stretch; whole numbers of a coarse range repeat for less.
 const HELD_S: f64 = 1.0;
@@ -20,6 +21,38 @@ const STEPS: f64 = 10.0;
 const GOES_ON: f64 = 0.5;
 /// Greatest part of the commands that a logger holds: if more repeat, a motor's column is wrong.
 const PART_MAX: f64 = 0.5;
+
+impl Flight {
+    /// Usual longest time between two commands: between those that differ, where the log holds them on a finer grid. `None`
+    /// with fewer than two.
+    ///
+    /// ```
+    /// use flights::{Channel, Flight, Role};
+    ///
+    /// let mut flight = Flight::new("merged", "log.csv", Role::Fit);
+    /// let held = |k: i32| [f64::from(k / 10); vehicles::ROTORS_MAX];
+    /// flight.command.time_s = (0..100).map(|k| 0.005 * f64::from(k)).collect();
+    /// flight.command.values = (0..100).map(held).collect();
+    /// assert!((flight.command_period_s().unwrap() - 0.05).abs() < 1e-9);
+    /// ```
+    #[must_use]
+    pub fn command_period_s(&self) -> Option<f64> {
+        let Channel { time_s, values } = &self.command;
+        match held::regular_starts(values).filter(|_| !self.commands_on_change) {
+            Some(starts) => held_period_s(&starts.iter().map(|at| time_s[*at]).collect::<Vec<_>>()),
+            None => held_period_s(time_s),
+        }
+    }
+
+    /// The flight with each command once, where its log holds them on a finer grid; `None` where it does not.
+    #[must_use]
+    pub fn without_held_commands(&self) -> Option<Self> {
+        let starts = held::regular_starts(&self.command.values).filter(|_| !self.commands_on_change)?;
+        let mut is_start = vec![false; self.command.values.len()];
+        starts.iter().for_each(|at| is_start[*at] = true);
+        Some(Self { command: self.command.kept(|at| is_start[at]), ..self.clone() })
+    }
+}
 
 /// Leaves out the repeats of commands that the logger held, and notes them.
 pub fn leave_out(flight: &mut Flight, vehicle: &Vehicle) {

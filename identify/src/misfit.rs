@@ -1,5 +1,5 @@
-//! Forces and torques at each moment that the new vehicle gets worse than no vehicle at all, and a constant force that no
-//! trim is. Predictions with the flight's own trim may hide both.
+//! Losses at each moment: forces and torques that the new vehicle file predicts worse than no model, and a constant force that is too large for
+//! a trim. Predictions with the own trim of the flight may hide both.
 
 use crate::fit::Problem;
 use crate::loss::{Loss, MOMENT};
@@ -15,7 +15,7 @@ const WORSE: f64 = 1.5;
 /// Windows of neighbouring knots overlap; those of every fourth do not.
 const APART: usize = 4;
 
-/// What `values` get worse than no model in the test flights whose attitude was measured.
+/// Losses of `values` against no model, in the test flights whose attitude was measured.
 pub fn misfits(problem: &Problem, values: &[f64]) -> Vec<Loss> {
     let judged = problem.test.iter().filter(|flight| !flight.is_assumed());
     judged.flat_map(|flight| of_flight(problem, flight, values)).collect()
