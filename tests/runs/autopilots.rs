@@ -242,6 +242,11 @@ fn what_cannot_be_a_firmware_is_refused_by_check() {
     let in_static = place.write("static", compiled("sitl.c", &["-static"]));
     let settings = stand_in(&place, "");
     let old = place.write("old", compiled("sitl.c", &["-DOLD"]));
+    // The front left rotor of eight stands 15° beside its place.
+    let octocopter = fs::read_to_string(repository("vehicles/tarot-t18.toml")).unwrap();
+    let place_of_rotor = "[0.586664, 0.243004, 0]";
+    assert!(octocopter.contains(place_of_rotor));
+    let askew = place.write("askew.toml", octocopter.replacen(place_of_rotor, "[0.5038, 0.3866, 0]", 1));
     let cases: [(&str, &[&str]); 8] = [
         (
             &format!("process.controller.firmware={old}"),
@@ -253,10 +258,7 @@ fn what_cannot_be_a_firmware_is_refused_by_check() {
         ("process.controller.firmware=/nowhere/sitl", &["/nowhere/sitl", "No such file"]),
         ("process.controller.parameters.armed_by_channel=4", &["expected 5 to 16"]),
         ("process.controller.parameters.rc_rate_hz=0", &["rc_rate_hz"]),
-        (
-            &format!("process.controller.vehicle={}", repository("vehicles/tarot-t18.toml")),
-            &["rotors match none of the frames QUADX, QUADP"],
-        ),
+        (&format!("process.controller.vehicle={askew}"), &["rotors match none of the frames QUADX, QUADP"]),
     ];
     for (setting, told) in cases {
         let settings = [&settings[..], &[setting.to_owned()]].concat();
