@@ -2,6 +2,7 @@
 
 use flights::{Flight, Role};
 use serde::Serialize;
+use vehicles::gaps::held_period_s;
 use vehicles::{MotorModel, Vehicle};
 
 use super::blocks::Blocks;
@@ -217,7 +218,7 @@ fn span_s_of(flight: &&Flight) -> f64 {
 /// Usual longest time between two commands, of the flight in which it is longest; `None` where each change was logged.
 fn period_s(flights: &[&Flight]) -> Option<f64> {
     let logged = flights.iter().filter(|flight| !flight.commands_on_change);
-    logged.filter_map(|flight| flight.command_period_s()).reduce(f64::max)
+    logged.filter_map(|flight| held_period_s(&flight.command.time_s)).reduce(f64::max)
 }
 
 /// Least, median and greatest command that was flown, of all rotors; the rarest at both ends left out.
