@@ -108,8 +108,12 @@ async function pick(page, words) {
 async function lose(page) {
   process.kill(server);
   await page.evaluate(() => window.hummingbus.playback.step(7));
-  await page.waitForFunction(() => document.querySelector("#state").textContent.includes("does not answer"));
-  return page.$eval("#state", (state) => state.textContent);
+  // The text of that moment: an answer from before the end may come after it.
+  const told = await page.waitForFunction(() => {
+    const { textContent } = document.querySelector("#state");
+    return textContent.includes("does not answer") && textContent;
+  });
+  return told.jsonValue();
 }
 
 /** Follows a live run for two of its seconds, and to its end. */
