@@ -9,7 +9,7 @@ use bus::asked::{Asked, AskedFile, run_dir};
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::SetPoint;
-use diagnostics::parameter::{ParameterError, positive_up_to, refuse};
+use diagnostics::parameter::{ParameterError, refuse, up_to};
 use recorder::reader::Recording;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
@@ -37,7 +37,7 @@ pub struct Parameters {
     #[parameter(example = "[0.3, 3.0]")]
     altitudes_m: [f64; 2],
     /// Largest roll and pitch that can be requested.
-    #[parameter(range = "at most 30", example = "20.0")]
+    #[parameter(check = up_to(TILT_MAX_DEG, "deg"), example = "20.0")]
     tilt_max_deg: f64,
     /// Answer to a source that was silent for 250 ms.
     #[parameter(range = "`hold`, `level`, `land`", example = "\"level\"")]
@@ -164,7 +164,6 @@ impl Component for Operator {
                 "`initial_altitude_m` is {initial_altitude_m} m, expected one within `altitudes_m`, {lowest_m} m to {highest_m} m"
             )
         })?;
-        positive_up_to("tilt_max_deg", tilt_max_deg, TILT_MAX_DEG, "deg")?;
         refuse(topic.is_some() && data.is_none(), "topic", || {
             "`topic` names set points in no recording: add `data`, the recording".to_owned()
         })?;
@@ -376,8 +375,7 @@ mod tests {
         let refused = |key: &str, value: Value| {
             let mut parameters = parameters("hold");
             parameters[key] = value;
-            let context = NodeContext::new("pilot", &[]);
-            Operator::new(serde_json::from_value(parameters).unwrap(), &context).unwrap_err().to_string()
+            bus::Harness::<Operator>::from_json(&parameters).unwrap_err().to_string()
         };
         assert!(refused("altitudes_m", json!([3.0, 0.5])).contains("the lowest and the highest altitude"));
         assert!(refused("initial_altitude_m", json!(4.0)).contains("0.5 m to 3 m"));

@@ -133,7 +133,6 @@ impl Autopilot for ArduPilot {
         settings::require_text(&program, &firmware, NAME, "it is not ArduCopter's SITL")?;
         settings::check_arming(armed_by_channel, remote_control::CHANNELS)?;
         settings::check_rest(rest_s, ARMED_S, armed_by_channel)?;
-        parameters.origin.check()?;
         let period_s = context.period_s();
         refuse(period_s >= PERIOD_MAX_S, "period_ticks", || {
             format!(

@@ -165,7 +165,6 @@ impl Autopilot for Betaflight {
         settings::require_text(&program, &firmware, NAME, "it is not Betaflight's SITL")?;
         settings::require_text(&program, &firmware, CONFIGURE, WITHOUT_CONFIGURE)?;
         positive("rc_rate_hz", parameters.rc_rate_hz)?;
-        parameters.origin.check()?;
         settings::check_arming(armed_by_channel, CHANNELS)?;
         Ok(Self {
             vehicle,

@@ -1,6 +1,6 @@
 //! The place on the earth at which the world's origin lies: its x points east, its y north.
 
-use diagnostics::parameter::{ParameterError, refuse};
+use diagnostics::parameter::within;
 
 /// Metres of a degree of latitude on a sphere of the earth's mean radius, 6 371 008.8 m (IUGG).
 const M_PER_DEGREE: f64 = 6_371_008.8 * std::f64::consts::PI / 180.0;
@@ -17,34 +17,17 @@ const M_PER_DEGREE: f64 = 6_371_008.8 * std::f64::consts::PI / 180.0;
 #[parameters(default)]
 pub struct Origin {
     /// Latitude, north.
-    #[parameter(default = 47.397_742, range = "-89 to 89")]
+    #[parameter(default = 47.397_742, check = within(-89.0..=89.0, "-89 to 89: at the poles there is no east"))]
     pub latitude_deg: f64,
     /// Longitude, east.
-    #[parameter(default = 8.545_594, range = "-180 to 180")]
+    #[parameter(default = 8.545_594, check = within(-180.0..=180.0, "-180 to 180"))]
     pub longitude_deg: f64,
     /// Altitude above the sea.
-    #[parameter(default = 488.0, range = "-10 000 to 10 000")]
+    #[parameter(default = 488.0, check = within(-10_000.0..=10_000.0, "-10 000 to 10 000"))]
     pub altitude_m: f64,
 }
 
 impl Origin {
-    /// Refuses what is no place on the earth, and the poles, where there is no east.
-    ///
-    /// # Errors
-    /// The number that is not meant.
-    pub fn check(&self) -> Result<(), ParameterError> {
-        for (key, value, limit) in [
-            ("latitude_deg", self.latitude_deg, 89.0),
-            ("longitude_deg", self.longitude_deg, 180.0),
-            ("altitude_m", self.altitude_m, 10_000.0),
-        ] {
-            refuse(!(-limit..=limit).contains(&value), "origin", || {
-                format!("`origin.{key}` is {value}, expected {} to {limit}", -limit)
-            })?;
-        }
-        Ok(())
-    }
-
     /// Longitude and latitude in degrees and altitude in metres of a position in the world, in metres: on a sphere, about the
     /// origin.
     #[must_use]

@@ -179,11 +179,9 @@ impl Autopilot for Px4 {
         settings::check_arming(armed_by_channel, messages::CHANNELS.min(RC_CHANNELS_MAX))?;
         settings::check_rest(rest_s, ARMED_S, armed_by_channel)?;
         positive_up_to("boot_timeout_s", parameters.boot_timeout_s, BOOT_TIMEOUT_MAX_S, "s")?;
-        parameters.origin.check()?;
         refuse(!parameters.start_position_m.iter().all(|part| part.is_finite()), "start_position_m", || {
             format!("`start_position_m` is {:?}, expected numbers", parameters.start_position_m)
         })?;
-        parameters.magnetic_field.check()?;
         let period_ns = context.tick_ns * u64::from(context.period_ticks);
         refuse(!SENSOR_PERIOD_NS.is_multiple_of(period_ns), "period_ticks", || {
             let period_s = context.period_s();

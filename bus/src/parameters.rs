@@ -33,7 +33,7 @@ pub trait Parameters: DeserializeOwned {
     /// The parameters, in the order in which they are documented.
     const DECLARED: &'static [Parameter];
 
-    /// Refuses a parameter that is outside its range.
+    /// Refuses a parameter that is outside its range, also in its tables.
     ///
     /// # Errors
     /// The first that is.
@@ -172,8 +172,9 @@ pub fn range_of(check: &dyn Fn(&str, f64) -> Result<(), ParameterError>) -> Stri
 #[cfg(test)]
 mod tests {
     use super::{Parameters, range_of};
-    use diagnostics::parameter::{finite, not_negative};
+    use diagnostics::parameter::{finite, not_negative, positive};
     use serde_json::json;
+    use std::collections::BTreeMap;
 
     /// A table with all kinds of fields.
     #[derive(Debug, PartialEq, bus::Parameters)]
@@ -186,14 +187,21 @@ mod tests {
         #[parameter(rename = "self", unit = "1")]
         own: Option<u32>,
         /// Streams.
-        #[parameter(default = Vec::new(), shown = "none", table = Stream)]
+        #[parameter(default = Vec::new(), shown = "none", table = Stream, entry = "N")]
         streams: Vec<Stream>,
+        /// One more.
+        #[parameter(default = Stream { rate_hz: 1.0 }, shown = "1 Hz", table = Stream)]
+        main: Stream,
+        /// Streams by name.
+        #[parameter(default = BTreeMap::new(), table = Stream, entry = "NAME")]
+        named: BTreeMap<String, Stream>,
     }
 
     /// A table within.
     #[derive(Debug, PartialEq, bus::Parameters)]
     struct Stream {
         /// Rate.
+        #[parameter(check = positive)]
         rate_hz: f64,
     }
 
@@ -204,13 +212,16 @@ mod tests {
         let given = read(json!({ "self": 2, "streams": [{ "rate_hz": 5.0 }] })).unwrap();
         assert_eq!((given.own, given.streams[0].rate_hz), (Some(2), 5.0));
         let error = read(json!({ "own": 2 })).unwrap_err().to_string();
-        assert_eq!(error, "unknown key `own`, expected one of `offset_m`, `self`, `streams`");
+        assert_eq!(
+            error,
+            "unknown key `own`, expected one of `offset_m`, `self`, `streams`, `main`, `named`"
+        );
         assert!(read(json!({ "streams": [{}] })).unwrap_err().to_string().contains("`streams.0.rate_hz`"));
     }
 
     #[test]
     fn declarations_have_unit_default_and_range() {
-        let [offset, own, streams] = Gains::DECLARED else { panic!("{:?}", Gains::DECLARED) };
+        let [offset, own, streams, ..] = Gains::DECLARED else { panic!("{:?}", Gains::DECLARED) };
         assert_eq!((offset.unit, offset.default.text().as_str()), ("m", "[0.0, 0.0, 0.0]"));
         assert_eq!((own.name, own.unit, own.default.text().as_str()), ("self", "1", "none"));
         assert_eq!((streams.default.text().as_str(), streams.table[0].name), ("none", "rate_hz"));
@@ -222,5 +233,13 @@ mod tests {
         let gains = Gains { offset_m: [0.0, f64::NAN, 0.0], ..Gains::default() };
         assert_eq!(gains.validate().unwrap_err().key(), "offset_m");
         assert!(Gains::default().validate().is_ok());
+        for (key, value) in [
+            ("streams.1.rate_hz", json!({ "streams": [{ "rate_hz": 1.0 }, { "rate_hz": 0.0 }] })),
+            ("main.rate_hz", json!({ "main": { "rate_hz": -1.0 } })),
+            ("named.up.rate_hz", json!({ "named": { "up": { "rate_hz": 0.0 } } })),
+        ] {
+            let gains: Gains = diagnostics::read(&value).unwrap();
+            assert_eq!(gains.validate().unwrap_err().key(), key);
+        }
     }
 }

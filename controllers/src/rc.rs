@@ -7,7 +7,7 @@ use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::{RC_CHANNELS_MAX, RcChannels};
 use bus::{Bounded, OutputPorts};
-use diagnostics::parameter::{ParameterError, refuse};
+use diagnostics::parameter::{ParameterError, finite, not_negative, refuse, require};
 use inputs::InputFiles;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
@@ -27,7 +27,7 @@ const PULSES_US: RangeInclusive<f64> = 800.0..=2200.0;
 #[derive(Debug, bus::Parameters)]
 pub struct Parameters {
     /// Number of channels.
-    #[parameter(shown = "the highest that is used, at least 4", range = "4 to 18")]
+    #[parameter(shown = "the highest that is used, at least 4", range = format!("from the highest that is used to {RC_CHANNELS_MAX}"))]
     channels: Option<usize>,
     /// List of moves. A move begins at the pulses that the one before it on the channel has reached. Before its first move a stick sends
     /// 1500 µs, throttle and switches 1000 µs.
@@ -44,15 +44,29 @@ pub struct Parameters {
 #[derive(Clone, Copy, Debug, bus::Parameters)]
 struct Move {
     /// Number of the channel, from 1: roll, pitch, throttle, yaw, switches.
+    #[parameter(check = check_channel)]
     channel: usize,
     /// Start.
+    #[parameter(check = finite)]
     at_s: f64,
     /// Pulses at its end.
-    #[parameter(unit = "µs", range = "800 to 2200")]
+    #[parameter(unit = "µs", check = check_pulse)]
     pulse_us: f64,
     /// Duration; 0 for a step.
-    #[parameter(default = 0.0)]
+    #[parameter(default = 0.0, check = not_negative)]
     over_s: f64,
+}
+
+/// Requires a channel of the message.
+fn check_channel(key: &str, channel: f64) -> Result<(), ParameterError> {
+    let is_there = (1.0..=RC_CHANNELS_MAX as f64).contains(&channel);
+    require(key, channel, is_there, format!("1 to {RC_CHANNELS_MAX}"))
+}
+
+/// Requires pulses that receivers send.
+pub(crate) fn check_pulse(key: &str, pulse_us: f64) -> Result<(), ParameterError> {
+    let (least, most) = (PULSES_US.start(), PULSES_US.end());
+    require(key, pulse_us, PULSES_US.contains(&pulse_us), format!("{least} to {most} µs"))
 }
 
 /// Outputs of `rc`.
@@ -95,7 +109,6 @@ impl Component for Rc {
 
     fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         let Parameters { channels, mut script, data, from_s } = parameters;
-        script.iter().try_for_each(Move::check)?;
         refuse(!from_s.is_finite() || from_s != 0.0 && data.is_none(), "from_s", || {
             format!("`from_s` is {from_s} s, expected a time of the recording in `data`")
         })?;
@@ -198,22 +211,6 @@ fn never_acting(script: &[Move]) -> Option<&Move> {
 
 fn neutral_us(channel: usize) -> f64 {
     if channel <= STICKS && channel != THROTTLE { MIDDLE_US } else { LOW_US }
-}
-
-impl Move {
-    fn check(&self) -> Result<(), ParameterError> {
-        let Self { channel, at_s, pulse_us, over_s } = *self;
-        let is_valid = (1..=RC_CHANNELS_MAX).contains(&channel)
-            && PULSES_US.contains(&pulse_us)
-            && at_s.is_finite()
-            && (0.0..=1e9).contains(&over_s);
-        refuse(!is_valid, "script", || {
-            format!(
-                "`script`: channel {channel} at {at_s} s to {pulse_us} µs over {over_s} s; expected a channel from 1 to \
-                 {RC_CHANNELS_MAX}, pulses of 800 to 2200 µs, and a duration from 0 on"
-            )
-        })
-    }
 }
 
 /// Recording of a receiver, at least one row.
@@ -346,6 +343,7 @@ fn without_keys(cause: &TableError) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bus::Parameters as _;
 
     /// Warnings of `text`, with `files`.
     fn warnings(text: &str) -> Vec<String> {
@@ -383,7 +381,9 @@ mod tests {
     }
 
     fn rc(text: &str) -> Result<Rc, ParameterError> {
-        Rc::new(toml::from_str(text).unwrap(), &NodeContext::new("rc", &[]))
+        let parameters: Parameters = toml::from_str(text).unwrap();
+        parameters.validate()?;
+        Rc::new(parameters, &NodeContext::new("rc", &[]))
     }
 
     #[test]
@@ -426,14 +426,14 @@ mod tests {
             let fault = refused(text);
             assert!(fault.contains("time_s") && !fault.contains("csv."), "{fault}");
         }
-        for text in [
-            "script = [{ channel = 17, at_s = 0.0, pulse_us = 1500 }]",
-            "script = [{ channel = 1, at_s = 0.0, pulse_us = 500 }]",
-            "script = [{ channel = 1, at_s = 0.0, pulse_us = 1500, over_s = -1.0 }]",
-            "channels = 3",
-            "from_s = 1.0",
+        for (key, text) in [
+            ("script.0.channel", "script = [{ channel = 17, at_s = 0.0, pulse_us = 1500 }]"),
+            ("script.0.pulse_us", "script = [{ channel = 1, at_s = 0.0, pulse_us = 500 }]"),
+            ("script.0.over_s", "script = [{ channel = 1, at_s = 0.0, pulse_us = 1500, over_s = -1.0 }]"),
+            ("channels", "channels = 3"),
+            ("from_s", "from_s = 1.0"),
         ] {
-            assert!(rc(text).is_err(), "{text}");
+            assert_eq!(rc(text).unwrap_err().key(), key, "{text}");
         }
         assert_eq!(rc("").unwrap().channels, 4);
     }

@@ -6,11 +6,12 @@
 //! pilot corrects what the battery takes. Switches move at their times.
 
 use crate::angle::wrap_rad;
+use crate::rc::check_pulse;
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::{RC_CHANNELS_MAX, RcChannels, SetPoint, StateEstimate};
 use bus::{Bounded, InputPorts, OutputPorts};
-use diagnostics::parameter::{ParameterError, not_negative, positive, refuse};
+use diagnostics::parameter::{ParameterError, finite, not_negative, positive, require, within};
 use nalgebra::{Quaternion, UnitQuaternion};
 
 /// Channels before the first switch: roll, pitch, throttle, yaw.
@@ -32,7 +33,7 @@ pub struct Parameters {
     #[parameter(check = positive, example = "100.0")]
     yaw_rate_max_deg_s: f64,
     /// Throttle at hover.
-    #[parameter(range = "0 to 1", example = "0.4")]
+    #[parameter(check = within(0.0..=1.0, "0 to 1"), example = "0.4")]
     hover_throttle: f64,
     /// Error of the altitude to a climb, Kx.
     #[parameter(default = 1.5, check = not_negative)]
@@ -58,13 +59,21 @@ pub struct Parameters {
 #[derive(Debug, Clone, Copy, bus::Parameters)]
 struct Switch {
     /// Its channel, counted from 1; the first four are the sticks.
-    #[parameter(range = "5 to 18")]
+    #[parameter(check = check_switch)]
     channel: usize,
     /// Time of the move.
+    #[parameter(check = finite)]
     at_s: f64,
     /// Pulses from then on.
-    #[parameter(unit = "µs", range = "800 to 2200")]
+    #[parameter(unit = "µs", check = check_pulse)]
     pulse_us: f64,
+}
+
+/// Requires a channel behind the sticks.
+fn check_switch(key: &str, channel: f64) -> Result<(), ParameterError> {
+    let first = STICKS + 1;
+    let is_there = (first as f64..=RC_CHANNELS_MAX as f64).contains(&channel);
+    require(key, channel, is_there, format!("{first} to {RC_CHANNELS_MAX}"))
 }
 
 /// Inputs of the remote control.
@@ -123,22 +132,6 @@ impl Component for RemoteControl {
     type State = RemoteControlState;
 
     fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
-        let hover = parameters.hover_throttle;
-        refuse(!(0.0..=1.0).contains(&hover), "hover_throttle", || {
-            format!("`hover_throttle` is {hover}, expected 0 to 1")
-        })?;
-        for Switch { channel, at_s, pulse_us } in &parameters.switches {
-            let is_meant = (STICKS + 1..=RC_CHANNELS_MAX).contains(channel)
-                && (800.0..=2200.0).contains(pulse_us)
-                && at_s.is_finite();
-            refuse(!is_meant, "switches", || {
-                format!(
-                    "`switches`: channel {channel} at {at_s} s to {pulse_us} µs; expected a channel from {} to \
-                     {RC_CHANNELS_MAX} and pulses of 800 to 2200 µs",
-                    STICKS + 1
-                )
-            })?;
-        }
         if let Some(Switch { channel, at_s, pulse_us }) = never_acting(&parameters.switches) {
             let message = format!(
                 "`switches` moves channel {channel} twice at {at_s} s: the move to {pulse_us} µs never acts; leave it out"

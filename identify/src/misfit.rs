@@ -55,10 +55,10 @@ fn of_flight(problem: &Problem, flight: &Prepared, values: &[f64]) -> Vec<Loss> 
     losses
 }
 
-/// Sizes of an equation's residual over one flight: lengths of vectors.
+/// Sizes of the residual of an equation over one flight, as lengths of vectors.
 #[derive(Default)]
 struct Fit {
-    /// Of its mean.
+    /// Length of its mean.
     trim: f64,
     /// Root mean square of the part beyond the mean that neighbouring windows have in common, so that it is no noise.
     left: f64,

@@ -166,7 +166,12 @@ impl Component for PropellerStand {
         let vehicle = Vehicle::load_from(&run.files, &vehicle);
         let vehicle = vehicle.map_err(|error| error.named_by("vehicle"))?;
         let is_there = (1..=vehicle.rotors.len()).contains(&rotor);
-        require("rotor", rotor, is_there, "1 to 4, in the order of the vehicle file")?;
+        require(
+            "rotor",
+            rotor,
+            is_there,
+            format!("1 to {}, in the order of the vehicle file", vehicle.rotors.len()),
+        )?;
         let ticks = run.period_ticks;
         refuse(ticks != 1, "period_ticks", || {
             format!("`period_ticks` is {ticks}, expected 1: a stand runs at every tick; leave it out")

@@ -1,7 +1,7 @@
 //! The earth's magnetic field at the world's origin, for the simulated compass.
 
 use bus::messages::Quaternion;
-use diagnostics::parameter::{ParameterError, refuse};
+use diagnostics::parameter::within;
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// Strongest field that is meant, T: three times that of the earth.
@@ -13,34 +13,17 @@ const FIELD_MAX_T: f64 = 2e-4;
 #[parameters(default)]
 pub struct MagneticField {
     /// Magnetic flux density.
-    #[parameter(default = 48.318e-6, range = "0 to 2e-4")]
+    #[parameter(default = 48.318e-6, check = within(0.0..=FIELD_MAX_T, "0 to 2e-4"))]
     pub field_T: f64,
     /// Inclination below the horizon.
-    #[parameter(default = 63.50, range = "-90 to 90")]
+    #[parameter(default = 63.50, check = within(-90.0..=90.0, "-90 to 90"))]
     pub inclination_deg: f64,
     /// Declination: angle of magnetic north east of geographic north.
-    #[parameter(default = 3.42, range = "-180 to 180")]
+    #[parameter(default = 3.42, check = within(-180.0..=180.0, "-180 to 180"))]
     pub declination_deg: f64,
 }
 
 impl MagneticField {
-    /// Refuses a field that the earth does not have.
-    ///
-    /// # Errors
-    /// The number that is not meant.
-    pub fn check(&self) -> Result<(), ParameterError> {
-        for (key, value, limit) in [
-            ("field_T", self.field_T, FIELD_MAX_T),
-            ("inclination_deg", self.inclination_deg, 90.0),
-            ("declination_deg", self.declination_deg, 180.0),
-        ] {
-            refuse(!(-limit..=limit).contains(&value), "magnetic_field", || {
-                format!("`magnetic_field.{key}` is {value}, expected {} to {limit}", -limit)
-            })?;
-        }
-        Ok(())
-    }
-
     /// The field in the body at `attitude`: x forward, y left, z up, T.
     #[must_use]
     pub fn vector_B_T(&self, attitude: Quaternion) -> [f64; 3] {

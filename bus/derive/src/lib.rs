@@ -118,8 +118,9 @@ pub fn derive_output_ports(input: TokenStream) -> TokenStream {
 /// - `shown = "…"`: the default in words, where the value says less.
 /// - `unit = "…"`: the unit, where the end of the name does not say it.
 /// - `check = FUNCTION`: a check of each of its numbers, `Fn(&str, f64) -> Result<(), ParameterError>`, as `diagnostics::parameter` has.
-/// - `range = "…"`: the accepted values in words, where another function checks them.
-/// - `table = TYPE`: the type that declares the keys of the table; with `entry = "NAME"` those of each table in it, or in the list (`"N"`).
+/// - `range = EXPRESSION`: the accepted values in words, where the constructor checks them.
+/// - `table = TYPE`: the type that declares and checks the keys of the table; with `entry = "NAME"` those of each table in it, or in the list
+///   (`"N"`).
 /// - `example = "…"`: a value for examples, as TOML.
 /// - `rename = "…"`: its name in the manifest.
 ///

@@ -48,6 +48,9 @@ const UNITS: [(&str, &str); 32] = [
 const EXPECTED: &str =
     "expected `rename`, `unit`, `default`, `shown`, `range`, `check`, `table`, `entry` or `example`";
 
+/// Stand-in for the number of a table in a list.
+const NUMBER: &str = "N";
+
 /// A field with its attributes.
 struct Declared<'f> {
     field: &'f Field,
@@ -64,7 +67,7 @@ struct Options {
     unit: Option<LitStr>,
     default: Option<Expr>,
     shown: Option<LitStr>,
-    range: Option<LitStr>,
+    range: Option<Expr>,
     check: Option<Expr>,
     table: Option<Path>,
     entry: Option<LitStr>,
@@ -234,11 +237,26 @@ impl<'f> Declared<'f> {
         }
     }
 
+    /// Checks of its numbers, or of the tables in it.
     fn validation(&self) -> Option<Tokens> {
         let Self { ident, name, options, .. } = self;
-        let check = options.check.as_ref()?;
-        Some(quote! {
-            ::bus::parameters::Numbers::all(&self.#ident, &|number| (#check)(#name, number))?;
+        if let Some(check) = &options.check {
+            return Some(quote! {
+                ::bus::parameters::Numbers::all(&self.#ident, &|number| (#check)(#name, number))?;
+            });
+        }
+        options.table.as_ref()?;
+        let validated = |table: Tokens, key: Tokens| quote!(::bus::Parameters::validate(#table).map_err(|error| error.within(#key))?;);
+        Some(match options.entry.as_ref().map(LitStr::value).as_deref() {
+            None => validated(quote!(&self.#ident), quote!(#name)),
+            Some(NUMBER) => {
+                let each = validated(quote!(table), quote!(&::std::format!("{}.{number}", #name)));
+                quote!(for (number, table) in self.#ident.iter().enumerate() { #each })
+            }
+            Some(_) => {
+                let each = validated(quote!(table), quote!(&::std::format!("{}.{entry}", #name)));
+                quote!(for (entry, table) in &self.#ident { #each })
+            }
         })
     }
 }
@@ -254,7 +272,6 @@ impl Options {
                     ("rename", rename),
                     ("unit", unit),
                     ("shown", shown),
-                    ("range", range),
                     ("entry", entry),
                     ("example", example),
                 ];
@@ -263,6 +280,8 @@ impl Options {
                     *text = Some(meta.value()?.parse()?);
                 } else if is_named("default") {
                     *default = Some(meta.value()?.parse()?);
+                } else if is_named("range") {
+                    *range = Some(meta.value()?.parse()?);
                 } else if is_named("check") {
                     *check = Some(meta.value()?.parse()?);
                 } else if is_named("table") {

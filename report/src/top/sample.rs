@@ -1,4 +1,4 @@
-//! State of a run at a moment: read from its control segment and from the kernel, without disturbing it.
+//! State of a run at a moment: read from its control segment, from the kernel, and from the samples that its recorder copies for watchers.
 
 use crate::top::vehicles::Vehicles;
 use crate::top::view::{ProcessRow, TopicRow, View};
