@@ -6,7 +6,7 @@
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use nalgebra::{UnitQuaternion, Vector3};
-use plant::rapier::hull::Hull;
+use plant::contact_dynamics::hull::Hull;
 use plant::{Airframe, Backend, FreeFlight, NewtonEuler, Rapier, RigidBody, State};
 use scenes::{Scene, Surface};
 use serde_json::{Value, json};

@@ -5,7 +5,7 @@
 //! manifest with `data`, that recording, sends the same samples again, at the same ticks.
 
 use bus::OutputPorts;
-use bus::asked::{Asked, AskedFile, run_dir};
+use bus::asked::{Asked, AskedFile};
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::SetPoint;
@@ -202,8 +202,8 @@ impl Component for Operator {
 
 /// The file through which this node is asked, in a run that has a directory.
 fn file(context: &NodeContext<'_>) -> Result<Option<AskedFile>, ParameterError> {
-    let Some(run_dir) = run_dir() else { return Ok(None) };
-    AskedFile::create(&run_dir, context.name).map(Some).map_err(|error| {
+    let Some(run_dir) = context.run_dir else { return Ok(None) };
+    AskedFile::create(run_dir, context.name).map(Some).map_err(|error| {
         ParameterError::conflict(
             "",
             format!("cannot make the file for set points in the run directory: {error}"),

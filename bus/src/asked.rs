@@ -4,8 +4,6 @@
 //! entry; a sum over the entry lets a reader detect that it has read half of one and half of the next.
 
 use crate::host_time::monotonic_ns;
-use crate::hosted;
-use crate::process::RUN_VARIABLE;
 use crate::user_file;
 use std::fs::{File, OpenOptions};
 use std::io;
@@ -108,16 +106,6 @@ impl AskedFile {
 /// A sum over all words but the last, in which their places count.
 fn sum(words: &[u64; WORDS]) -> u64 {
     words[..WORDS - 1].iter().fold(1, |sum: u64, word| sum.rotate_left(7) ^ word)
-}
-
-/// The directory of the run that this thread or this process computes in. `None` outside of runs, and in runs on one thread.
-///
-/// ```
-/// assert_eq!(bus::asked::run_dir(), None, "this program is no node");
-/// ```
-#[must_use]
-pub fn run_dir() -> Option<PathBuf> {
-    hosted::join().map(|join| join.run_dir).or_else(|| std::env::var_os(RUN_VARIABLE).map(PathBuf::from))
 }
 
 /// Names of nodes have no dots, so that no two have one file.

@@ -1,7 +1,8 @@
 //! The clock service: leads the processes of a run through the ready barrier and grants their ticks.
 
 use crate::error::BusError;
-use crate::host_time::{monotonic_ns, process_cpu_ns};
+use crate::host_time::monotonic_ns;
+use crate::join::Join;
 use crate::lockstep::{ClockView, Phase, SlotState, Waited};
 use crate::plan::{Pace, Plan};
 use crate::profile::GrantWriter;
@@ -11,19 +12,19 @@ use std::cell::RefCell;
 /// Longest sleep of the clock before it checks for a request to stop.
 const NAP_NS_MAX: u64 = 100_000_000;
 
-/// Runs the clock of this process's run until the run is over.
+/// Runs the clock of the run that `join` names until the run is over.
 ///
 /// # Errors
-/// If the process was not started by a launcher; [`BusError::Aborted`] if the launcher ended the run early.
-pub fn run() -> Result<(), BusError> {
-    let run_dir = crate::process::join()?;
+/// If there is no such run; [`BusError::Aborted`] if the launcher ended the run early.
+pub fn run(join: Join) -> Result<(), BusError> {
+    let Join { run_dir, place, .. } = join;
     let plan = Plan::load(&run_dir)?;
     let _claim = crate::claim::claim(&run_dir, "clock")?;
-    crate::process::stay_on(plan.clock_cpu);
+    place.stay_on(plan.clock_cpu);
     let grants = plan.profile.then(|| GrantWriter::create(&run_dir, &plan)).transpose()?;
-    let lockstep = ClockView::open(&plan)?;
+    let lockstep = ClockView::open(&plan, place.clone())?;
     if plan.lock_memory {
-        crate::process::lock_memory()?;
+        place.lock_memory()?;
     }
     serve(&plan, &lockstep, grants)
 }
@@ -34,13 +35,13 @@ pub(crate) fn serve(plan: &Plan, lockstep: &ClockView, grants: Option<GrantWrite
     for phase in [Phase::Connecting, Phase::Running] {
         clock.gather(phase)?;
     }
-    let cpu_start_ns = process_cpu_ns();
+    let cpu_start_ns = lockstep.place().cpu_ns();
     lockstep.note_start();
     // By default the kernel may be 50 µs late to save power, a twentieth of a tick at 1 kHz.
     let _ = rustix::thread::set_current_timer_slack(std::num::NonZeroU64::new(1));
     let end = clock.run()?;
     clock.await_all(end)?;
-    lockstep.note_end(process_cpu_ns() - cpu_start_ns);
+    lockstep.note_end(lockstep.place().cpu_ns() - cpu_start_ns);
     Ok(())
 }
 
@@ -168,7 +169,7 @@ impl Clock<'_> {
     }
 
     fn is_stop_asked_for(&self) -> bool {
-        if crate::process::is_terminated() {
+        if self.lockstep.place().is_terminated() {
             self.lockstep.request_stop();
         }
         self.lockstep.is_stop_requested() || self.lockstep.is_aborted()

@@ -160,6 +160,7 @@ impl ConnectedNode {
                 port.restore(sample, &links.node.name)?;
             }
             port.reads_shadow = matches!(declared, Declared::Raw);
+            port.left_behind = links.left_behind(input.topic, announcement.size);
             self.stepper.inputs.push(port);
             self.announcements.push(announcement);
         }
@@ -225,7 +226,9 @@ impl ConnectedNode {
             let input =
                 InputPlan { port: output.port.clone(), topic: output.topic, delay_ticks: 1, initial: None };
             let announced = Announcement::load(&announcement::topic_path(&links.run_dir, output.topic))?;
-            self.stepper.predecessor.push(InPort::new(&input, topic, &announced, None, Feed::Shared(source)));
+            let mut port = InPort::new(&input, topic, &announced, None, Feed::Shared(source));
+            port.left_behind = links.left_behind(output.topic, announced.size);
+            self.stepper.predecessor.push(port);
         }
         links.transport.reserve()
     }
@@ -237,7 +240,7 @@ impl ConnectedNode {
     pub(crate) fn begin(&mut self, computation: &dyn Computation) -> Result<(), BusError> {
         // Last, when everything that the ticks use is mapped: a mapping that exceeds the limit later fails silently.
         if self.links.plan.lock_memory {
-            crate::process::lock_memory()?;
+            self.links.lockstep.place().lock_memory()?;
         }
         if self.links.generation == 0 {
             // A backup may have to begin with the first tick.
@@ -592,7 +595,7 @@ impl ConnectedNode {
         self.write_checkpoints(tick, locals, computation)?;
         let received_ns = before_ns.unwrap_or_else(monotonic_ns);
         self.step(tick, locals, computation)?;
-        if crate::hosted::is_cancelled() {
+        if self.links.lockstep.place().is_cancelled() {
             // Another instance may have been asked to go on in its place by now.
             return Err(BusError::Aborted);
         }

@@ -3,6 +3,7 @@
 use crate::ports::{InputSamples, OutputPorts, SampleSource};
 use inputs::InputFiles;
 use std::cell::{Cell, RefCell};
+use std::path::Path;
 
 /// Information about a component's node and run, and the list of its warnings.
 ///
@@ -35,6 +36,8 @@ pub struct NodeContext<'a> {
     pub duration_ticks: u32,
     /// Files of the run: a component reads the files that its parameters name with these, and with nothing else.
     pub files: InputFiles,
+    /// Directory of the run; `None` in a check, and in a run on one thread.
+    pub run_dir: Option<&'a Path>,
     warnings: RefCell<Vec<Warning>>,
     times: Cell<SampleTimes>,
 }
@@ -125,6 +128,7 @@ impl<'a> NodeContext<'a> {
             period_ticks,
             duration_ticks,
             files,
+            run_dir: None,
             warnings,
             times,
         }
@@ -158,6 +162,12 @@ impl<'a> NodeContext<'a> {
     #[must_use]
     pub fn given(self, files: &InputFiles) -> Self {
         Self { files: files.clone(), ..self }
+    }
+
+    /// The same node in a run whose directory is `run_dir`.
+    #[must_use]
+    pub fn in_run(self, run_dir: Option<&'a Path>) -> Self {
+        Self { run_dir, ..self }
     }
 
     /// True if `port` is a wired input or a named output.

@@ -9,7 +9,6 @@ use crate::computation::Computation;
 use crate::connected::{ConnectedNode, Turn};
 use crate::depths::depths;
 use crate::error::BusError;
-use crate::host_time::process_cpu_ns;
 use crate::local::LocalTopic;
 use crate::membership::Membership;
 use std::time::Duration;
@@ -93,7 +92,7 @@ impl<'c> Executor<'c> {
             member.node.begin(&*member.computation)?;
         }
         self.members.iter().try_for_each(|member| member.node.await_ticks())?;
-        let cpu_start_ns = process_cpu_ns();
+        let cpu_start_ns = self.cpu_ns();
         while let Some(tick) = self.members.iter().map(|member| member.node.tick).min() {
             self.compute_tick(tick, cpu_start_ns)?;
             if tick.is_multiple_of(self.tell_ticks) {
@@ -108,6 +107,11 @@ impl<'c> Executor<'c> {
             }
         }
         Ok(())
+    }
+
+    /// Processor time of this process or thread so far; 0 without members.
+    fn cpu_ns(&self) -> u64 {
+        self.members.first().map_or(0, |member| member.node.links().lockstep.place().cpu_ns())
     }
 
     /// Computes `tick` of every member for which it is the next.
@@ -132,8 +136,11 @@ impl<'c> Executor<'c> {
                     let is_alone = self.locals.is_empty();
                     // The members of a group share the processor time of their process: each counts the time of its
                     // steps.
-                    let cpu_ns =
-                        if is_alone { process_cpu_ns() - cpu_start_ns } else { member.node.step_ns() };
+                    let cpu_ns = if is_alone {
+                        member.node.links().lockstep.place().cpu_ns() - cpu_start_ns
+                    } else {
+                        member.node.step_ns()
+                    };
                     member.node.complete(cpu_ns);
                     self.leaving.push(member);
                 }

@@ -7,7 +7,6 @@ use crate::plan::{MemberPlan, Pace, Plan};
 use crate::registration::Registration;
 use crate::run_process::{Part, finish};
 use crate::transport::Transport;
-use std::path::Path;
 use std::rc::Rc;
 
 /// The environment variable that names the group that a process is.
@@ -19,34 +18,34 @@ pub const GROUP_VARIABLE: &str = "HUMMINGBUS_GROUP";
 /// # Errors
 /// If the process was not started by a launcher as a group, or as [`run`].
 pub fn run_process(components: &'static [Registration]) -> Result<(), BusError> {
-    let run_dir = crate::process::join()?;
-    let name = std::env::var(GROUP_VARIABLE).map_err(|_| BusError::NotInARun { variable: GROUP_VARIABLE })?;
-    run(&run_dir, &name, components)
+    run(&Join::named_by(GROUP_VARIABLE)?, components)
 }
 
-/// Runs the group `name` of the run in `run_dir`.
+/// Runs the group that `join` names.
 ///
 /// # Errors
 /// If there is no such group, the manifest and a component do not fit, a step fails, or the run is aborted.
-pub fn run(run_dir: &Path, name: &str, components: &'static [Registration]) -> Result<(), BusError> {
+pub fn run(join: &Join, components: &'static [Registration]) -> Result<(), BusError> {
+    let Join { run_dir, node: name, place, .. } = join;
     let plan = Plan::load(run_dir)?;
-    let group = plan.groups.iter().find(|group| group.name == name).ok_or_else(|| BusError::UnknownNode {
-        node: name.to_owned(),
-        known: plan.groups.iter().map(|group| group.name.as_str()).collect::<Vec<_>>().join(", "),
-    })?;
-    crate::process::stay_on(group.cpu);
+    let group =
+        plan.groups.iter().find(|group| group.name == *name).ok_or_else(|| BusError::UnknownNode {
+            node: name.clone(),
+            known: plan.groups.iter().map(|group| group.name.as_str()).collect::<Vec<_>>().join(", "),
+        })?;
+    place.stay_on(group.cpu);
     if plan.pace == Pace::Free {
-        crate::process::wait_for_turn();
+        place.wait_for_turn();
     }
-    let transport = Rc::new(Transport::new(run_dir, &plan.run_id, name)?);
-    let parts = group.members.iter().map(|member| part(run_dir, &plan, member, components));
+    let transport = Rc::new(Transport::new(run_dir, &plan.run_id, name, place)?);
+    let parts = group.members.iter().map(|member| part(join, &plan, member, components));
     let mut parts = parts.collect::<Result<Vec<Part>, BusError>>()?;
     let end = fly(&mut parts, &transport);
     finish(parts, end)
 }
 
 fn part(
-    run_dir: &Path,
+    group: &Join,
     plan: &Plan,
     member: &MemberPlan,
     components: &'static [Registration],
@@ -57,7 +56,7 @@ fn part(
         node: node.clone(),
         reason: format!("this program brings no component `{}`", member.kind),
     })?;
-    Part::make(Join { run_dir: run_dir.to_owned(), node, generation: 0 }, registration, components)
+    Part::make(Join { node, generation: 0, ..group.clone() }, registration, components)
 }
 
 fn fly(parts: &mut [Part], transport: &Rc<Transport>) -> Result<(), BusError> {

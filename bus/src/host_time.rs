@@ -1,6 +1,5 @@
 //! The host's clocks. Numbers that a node computes from them are not reproducible.
 
-use crate::hosted::is_hosted;
 use rustix::time::{ClockId, Timespec};
 use std::time::Duration;
 
@@ -10,13 +9,13 @@ pub fn monotonic_ns() -> u64 {
     clock_ns(ClockId::Monotonic)
 }
 
-/// Processor time of this process in nanoseconds, or of this thread where it is an instance by itself.
+/// Processor time of this process in nanoseconds.
 pub(crate) fn process_cpu_ns() -> u64 {
-    clock_ns(if is_hosted() { ClockId::ThreadCPUTime } else { ClockId::ProcessCPUTime })
+    clock_ns(ClockId::ProcessCPUTime)
 }
 
 #[allow(clippy::cast_sign_loss, reason = "these clocks start at zero and only grow")]
-fn clock_ns(clock: ClockId) -> u64 {
+pub(crate) fn clock_ns(clock: ClockId) -> u64 {
     let time = rustix::time::clock_gettime(clock);
     time.tv_sec as u64 * 1_000_000_000 + time.tv_nsec as u64
 }

@@ -3,6 +3,21 @@
 //! To write a component, use [`Component`], its [contexts](context), [messages] or a [message of its own](Message),
 //! and [`run_process`]; to test one, [`Harness`]. Modules without documentation serve launchers: they change without
 //! notice.
+//!
+//! | subject | modules |
+//! |---|---|
+//! | a component and its declarations | [`component`], [`parameters`], [`ports`], [`context`], [`random`], `state`, `registration` |
+//! | messages | [`message`], [`messages`], [`schema`], `bounded`, `finite` |
+//! | the plan of a run, written by the launcher | [`plan`], `membership`, `depths`, `names` |
+//! | one tick of a node, under every host | `stepper`, `timing`, [`computing_time`], `computation` |
+//! | a node in a process or on a thread | `join`, `place`, `node`, `links`, `connected`, `executor`, `group`, `run_process` |
+//! | all nodes on one thread, without shared memory | `simulation`, `sample_memory` |
+//! | pacing: the control segment and the clock service | `lockstep`, `clock` |
+//! | transport of samples | `transport` (iceoryx2), `local` (within a process), `sample_ring` (to the recorder), [`watch`] (to watchers) |
+//! | states: hand-over, checkpoints | `state_transfer`, `hand_over`, [`checkpoint`], `saved_sample` |
+//! | host times | `profile`, `step_times`, `host_time` |
+//! | files and memory of a run | `announcement`, `description`, `shared_file`, `json_file`, `user_file`, `reserve`, `room`, `claim`, `process` |
+//! | nodes of other languages, tests, people | [`dynamic`], `harness`, `node_harness`, [`asked`] |
 
 // The derive names this crate `bus` also when it is used inside it.
 extern crate self as bus;
@@ -35,8 +50,6 @@ mod harness;
 #[doc(hidden)]
 pub mod host_time;
 #[doc(hidden)]
-pub mod hosted;
-#[doc(hidden)]
 pub mod initial;
 mod join;
 mod json_file;
@@ -53,6 +66,8 @@ pub mod names;
 mod node;
 mod node_harness;
 pub mod parameters;
+#[doc(hidden)]
+pub mod place;
 pub mod plan;
 mod port;
 pub mod ports;

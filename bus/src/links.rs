@@ -7,6 +7,7 @@ use crate::membership::{Membership, NodeInstances};
 use crate::plan::{GroupPlan, NodePlan, Plan};
 use crate::port::{InPort, OutPort, Source};
 use crate::profile::TickWriter;
+use crate::sample_ring::SampleRing;
 use crate::transport::{Receiver, Sender, Transport};
 use std::path::PathBuf;
 use std::rc::Rc;
@@ -68,6 +69,25 @@ impl Links {
     pub(crate) fn is_recorded(&self, topic: usize) -> bool {
         let reads = |node: &NodePlan| node.inputs.iter().any(|input| input.topic == topic);
         self.group().is_some() && self.plan.nodes.iter().any(|node| node.is_recorder && reads(node))
+    }
+
+    /// True if samples of `topic`, which a member of the group that this process is sends, must outlive the process: when
+    /// it dies, other processes go on in the places of members, and read them.
+    pub(crate) fn must_outlive(&self, topic: usize) -> bool {
+        let touches = |node: &NodePlan| {
+            let reads = node.inputs.iter().any(|input| input.topic == topic);
+            node.restarts && (reads || node.outputs.iter().any(|output| output.topic == topic))
+        };
+        self.group()
+            .is_some_and(|group| group.members.iter().any(|member| touches(&self.plan.nodes[member.node])))
+    }
+
+    /// Ring with the samples of `topic` that a group has left behind, for a process that goes on in the place of a member;
+    /// `None` if there is none.
+    pub(crate) fn left_behind(&self, topic: usize, size: usize) -> Option<SampleRing> {
+        let is_of_group = self.plan.group_of(self.plan.publisher(topic)).is_some();
+        // A topic that only processes outside the group read has no ring.
+        (self.generation > 0 && is_of_group).then(|| SampleRing::open(&self.plan, topic, size).ok()).flatten()
     }
 
     /// True if this process records instance `generation` of the publisher of `topic`, which is a member of a group.

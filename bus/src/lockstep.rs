@@ -27,6 +27,7 @@ pub use supervisor_view::SupervisorView;
 mod tests {
     use super::{ClockView, Need, NodeView, SupervisorView, Waited};
     use crate::names::shm_path;
+    use crate::place::Place;
     use crate::plan::{InputPlan, NodePlan, OutputPlan, Plan, TopicPlan, Wait};
 
     /// The views of a run in which `reader` reads the topic of `sender`.
@@ -48,8 +49,9 @@ mod tests {
         let plan = Plan::for_test(100, vec![topic], vec![sender, reader]);
         let supervisor = SupervisorView::create(&plan).unwrap();
         assert!(SupervisorView::create(&plan).is_err(), "two runs never share a segment");
-        let [sender, reader] = [0, 1].map(|node| NodeView::open(&plan, node, 0).unwrap());
-        let views = Views { supervisor, clock: ClockView::open(&plan).unwrap(), sender, reader };
+        let [sender, reader] = [0, 1].map(|node| NodeView::open(&plan, node, 0, Place::Process).unwrap());
+        let views =
+            Views { supervisor, clock: ClockView::open(&plan, Place::Process).unwrap(), sender, reader };
         test(&views, &[plan.first_input(plan.slot(1, 0))]);
         std::fs::remove_file(shm_path(&plan.run_id, "control")).unwrap();
     }

@@ -15,6 +15,7 @@ use crate::lockstep::{NodeView, Phase, SlotState};
 use crate::membership::Membership;
 use crate::message::Message;
 use crate::names::process_name;
+use crate::place::Place;
 use crate::plan::{NodePlan, Pace, Plan};
 use crate::port::OutPort;
 use crate::ports::{Inputs, PortSpec};
@@ -26,7 +27,7 @@ use crate::transport::Transport;
 use inputs::InputFiles;
 use serde::de::DeserializeOwned;
 use std::fmt::Display;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 /// A node that declares its ports by name and runs a closure, where no [`Component`](crate::Component) will do: the whole
@@ -51,6 +52,7 @@ pub struct Node {
     plan: Plan,
     index: usize,
     generation: u32,
+    place: Place,
     node: NodePlan,
     /// The message type of each input, in the plan's order; `None` until declared.
     inputs: Vec<Option<Declared>>,
@@ -85,24 +87,30 @@ impl Node {
 
     /// Opens the part of a run that `join` names.
     pub(crate) fn open(join: Join) -> Result<Self, BusError> {
-        let Join { run_dir, node, generation } = join;
+        let Join { run_dir, node, generation, place } = join;
         let plan = Plan::load(&run_dir)?;
         let index = plan.node_index(&node)?;
         let node = match generation {
             0 => plan.nodes[index].clone(),
             _ => NodePlan::load_backup(&run_dir, index, generation)?,
         };
-        Ok(Self::undeclared(run_dir, plan, index, generation, node))
+        Ok(Self { generation, place, ..Self::undeclared(run_dir, plan, index, node) })
     }
 
     /// Node `index` of `plan` without a run directory: the files that it reads are its host's.
     pub(crate) fn in_memory(plan: &Plan, index: usize) -> Self {
-        Self::undeclared(PathBuf::new(), plan.clone(), index, 0, plan.nodes[index].clone())
+        Self::undeclared(PathBuf::new(), plan.clone(), index, plan.nodes[index].clone())
     }
 
-    fn undeclared(run_dir: PathBuf, plan: Plan, index: usize, generation: u32, node: NodePlan) -> Self {
+    fn undeclared(run_dir: PathBuf, plan: Plan, index: usize, node: NodePlan) -> Self {
         let (inputs, outputs) = (vec![None; node.inputs.len()], vec![None; node.outputs.len()]);
-        Self { run_dir, plan, index, generation, node, inputs, outputs, fault: None }
+        let (generation, place) = (0, Place::Process);
+        Self { run_dir, plan, index, generation, place, node, inputs, outputs, fault: None }
+    }
+
+    /// Directory of the run; `None` in memory.
+    pub(crate) fn run_dir(&self) -> Option<&Path> {
+        Some(&*self.run_dir).filter(|run_dir| !run_dir.as_os_str().is_empty())
     }
 
     /// The node's name in the run.
@@ -357,14 +365,14 @@ impl Node {
     /// # Errors
     /// If a port of the manifest was not declared or declared twice, two sides disagree on a layout, or the run is aborted.
     pub(crate) fn connect(self) -> Result<ConnectedNode, BusError> {
-        if description::is_asked_for() {
+        if self.place.is_process() && description::is_asked_for() {
             return Err(self.describe().err().unwrap_or(BusError::Aborted));
         }
-        crate::process::stay_on(self.node.cpu);
+        self.place.stay_on(self.node.cpu);
         if self.plan.pace == Pace::Free {
-            crate::process::wait_for_turn();
+            self.place.wait_for_turn();
         }
-        let transport = Rc::new(Transport::new(&self.run_dir, &self.plan.run_id, self.name())?);
+        let transport = Rc::new(Transport::new(&self.run_dir, &self.plan.run_id, self.name(), &self.place)?);
         self.announce(transport)?.connect()
     }
 
@@ -390,7 +398,7 @@ impl Node {
     pub(crate) fn announce(mut self, transport: Rc<Transport>) -> Result<AnnouncedNode, BusError> {
         let (inputs, declared_outputs) = self.declared()?;
         let claim = claim::claim(&self.run_dir, &process_name(self.name(), self.generation))?;
-        let lockstep = NodeView::open(&self.plan, self.index, self.generation)?;
+        let lockstep = NodeView::open(&self.plan, self.index, self.generation, self.place.clone())?;
         if self.generation > 0 {
             // Every topic is announced by then.
             lockstep.wait_phase(Phase::Connecting).or_aborted()?;
@@ -529,7 +537,7 @@ fn connect_outputs(links: &Links, declared: &[DeclaredOutput]) -> Result<Vec<Out
             let is_shared = !(is_local || is_recorded) || links.is_read_outside(&membership, output.topic);
             let sender = if is_shared { Some(links.sender(output.topic, schema.size)?) } else { None };
             let mut port = OutPort::new(output, topic, schema, sender, is_local || is_recorded);
-            if is_recorded {
+            if is_recorded || links.must_outlive(output.topic) {
                 port.record(SampleRing::create(&links.plan, output.topic, schema.size)?);
             }
             Ok(declared.with_stamps(port))
@@ -548,6 +556,7 @@ mod tests {
     use crate::join::Join;
     use crate::lockstep::{ClockView, SupervisorView};
     use crate::messages::{MotorCommand, PlantState};
+    use crate::place::Place;
     use crate::plan::{InputPlan, NodePlan, OutputPlan, Plan, TopicPlan};
     use crate::tick::Tick;
     use crate::{BusError, Message};
@@ -613,7 +622,7 @@ mod tests {
     }
 
     fn first(run_dir: &Path, node: &str) -> Join {
-        Join { run_dir: run_dir.to_owned(), node: node.to_owned(), generation: 0 }
+        Join { run_dir: run_dir.to_owned(), node: node.to_owned(), generation: 0, place: Place::Process }
     }
 
     fn fly_source(run_dir: &Path) -> Result<u64, BusError> {
@@ -685,7 +694,7 @@ mod tests {
         let _shared_memory = SharedMemory(&plan);
         plan.store(folder.path()).unwrap();
         let _segment = SupervisorView::create(&plan).unwrap();
-        let clock = ClockView::open(&plan).unwrap();
+        let clock = ClockView::open(&plan, Place::Process).unwrap();
         let (source, sink) = std::thread::scope(|scope| {
             let source = scope.spawn(|| fly_source(folder.path()));
             let sink = scope.spawn(|| fly_sink(folder.path()));

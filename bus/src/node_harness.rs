@@ -58,7 +58,7 @@ impl NodeHarness {
         node: usize,
     ) -> Result<Self, ParameterError> {
         let node = &plan.nodes[node];
-        let mut made = component.make_for(plan, node, &InputFiles::default())?;
+        let mut made = component.make_for(plan, node, &InputFiles::default(), None)?;
         let wire = |name: &str, schema: &'static Schema, is_forwarded: bool| {
             let output = node.outputs.iter().find(|output| output.port == name);
             let topic = output.map(|output| (output.topic, plan.topics[output.topic].period_ticks));

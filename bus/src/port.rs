@@ -107,6 +107,12 @@ impl Feed {
         }
     }
 
+    /// The next sample, which another process has sent.
+    fn next(&mut self, period_ticks: u32) -> Result<Received, Found> {
+        let Self::Shared(source) = self else { return Err(Found::Nothing) };
+        source.next(period_ticks)?.ok_or(Found::Nothing)
+    }
+
     /// True if the samples before number `first` were taken: those of a member are always there.
     fn has_taken(&self, first: u64) -> bool {
         match self {
@@ -128,8 +134,10 @@ pub(crate) struct InPort {
     /// Publishers that succeed it, in order: more than one if a backup died before this node turned to it.
     backups: VecDeque<Backup>,
     initial: Option<Box<[u64]>>,
-    /// The newest sample from before the run went on from a checkpoint.
+    /// The newest sample from before the run went on from a checkpoint, or one that a group has left behind.
     restored: Option<(SampleHeader, Box<[u64]>)>,
+    /// Samples that a group has left behind: its members have sent none by themselves when their process dies.
+    pub(crate) left_behind: Option<SampleRing>,
     topic_name: String,
     size: usize,
     layout_hash: u64,
@@ -156,6 +164,7 @@ impl InPort {
             backups: VecDeque::new(),
             initial,
             restored: None,
+            left_behind: None,
             topic_name: topic.name.clone(),
             size: announcement.size,
             layout_hash: announcement.layout_hash,
@@ -237,13 +246,14 @@ impl InPort {
         // The samples between the current one and the newest are received too, so that gaps show.
         let newest_sequence = u64::from(limit / self.topic_period_ticks);
         self.pass_take_over(newest_sequence);
-        while let Feed::Shared(source) = &mut self.active
-            && source.next_sequence <= newest_sequence
+        while let Feed::Shared(Source { next_sequence: expected, has_history, .. }) = self.active
+            && expected <= newest_sequence
         {
-            let expected = source.next_sequence;
-            let next = source.next(self.topic_period_ticks).transpose();
-            let next = next.unwrap_or_else(|| Err(Found::Nothing));
-            self.current = Some(next.map_err(|found| self.gap(node, tick, expected, found))?);
+            // A group that has died sent its newest samples to nobody outside; who succeeds a member sends newer ones.
+            if !(has_history && self.take_left_behind(expected)) {
+                let next = self.active.next(self.topic_period_ticks);
+                self.current = Some(next.map_err(|found| self.gap(node, tick, expected, found))?);
+            }
             self.pass_take_over(newest_sequence);
         }
         if let Feed::Ring(ring) = &self.active
@@ -253,6 +263,18 @@ impl InPort {
             return Err(self.gap(node, tick, newest_sequence, Found::Nothing));
         }
         self.take_shadow(newest_sequence).map_err(|(expected, found)| self.gap(node, tick, expected, found))
+    }
+
+    /// Makes sample number `sequence` the current one, if a group has left it behind; false if none has.
+    fn take_left_behind(&mut self, sequence: u64) -> bool {
+        let tick = sequence * u64::from(self.topic_period_ticks);
+        let left =
+            self.left_behind.as_ref().zip(u32::try_from(tick).ok()).and_then(|(ring, tick)| ring.at(tick));
+        let (Some(words), Feed::Shared(source)) = (left, &mut self.active) else { return false };
+        source.next_sequence = sequence + 1;
+        self.current = None;
+        self.restored = Some((SampleHeader { tick, sequence, ..SampleHeader::default() }, words.into()));
+        true
     }
 
     /// As [`InPort::take`], without insisting on the newest sample: it may not have been sent yet.

@@ -2,6 +2,7 @@
 
 use crate::error::BusError;
 use crate::join::{GENERATION_VARIABLE, Join, NODE_VARIABLE};
+use crate::place::Place;
 use rustix::process::{Signal, getppid, set_parent_process_death_signal};
 use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 use std::io;
@@ -18,19 +19,28 @@ pub const LAUNCHER_VARIABLE: &str = "HUMMINGBUS_LAUNCHER_PID";
 pub const RUN_VARIABLE: &str = "HUMMINGBUS_RUN";
 
 impl Join {
-    /// The part that the launcher gave this process, which from now on dies with its launcher; or this thread.
+    /// The part that the launcher gave this process, which from now on dies with its launcher.
     ///
     /// # Errors
     /// If the process was not started by a launcher.
     pub fn from_environment() -> Result<Self, BusError> {
-        if let Some(join) = crate::hosted::join() {
-            return Ok(join);
-        }
-        let run_dir = join()?;
-        let node =
-            std::env::var(NODE_VARIABLE).map_err(|_| BusError::NotInARun { variable: NODE_VARIABLE })?;
+        Self::named_by(NODE_VARIABLE)
+    }
+
+    /// As [`Join::from_environment`], where `variable` has the name.
+    pub(crate) fn named_by(variable: &'static str) -> Result<Self, BusError> {
+        let run_dir = run_dir()?;
+        let node = std::env::var(variable).map_err(|_| BusError::NotInARun { variable })?;
         let generation = std::env::var(GENERATION_VARIABLE).ok().and_then(|text| text.parse().ok());
-        Ok(Self { run_dir, node, generation: generation.unwrap_or(0) })
+        Ok(Self { run_dir, node, generation: generation.unwrap_or(0), place: Place::Process })
+    }
+
+    /// The part of the clock service, which the launcher gave this process.
+    ///
+    /// # Errors
+    /// If the process was not started by a launcher.
+    pub fn clock_from_environment() -> Result<Self, BusError> {
+        Ok(Self { run_dir: run_dir()?, node: "clock".to_owned(), generation: 0, place: Place::Process })
     }
 }
 
@@ -38,10 +48,7 @@ impl Join {
 ///
 /// # Errors
 /// If it was not started by a launcher.
-pub(crate) fn join() -> Result<PathBuf, BusError> {
-    if let Some(join) = crate::hosted::join() {
-        return Ok(join.run_dir);
-    }
+fn run_dir() -> Result<PathBuf, BusError> {
     let run_dir = std::env::var_os(RUN_VARIABLE).ok_or(BusError::NotInARun { variable: RUN_VARIABLE })?;
     die_with_parent();
     note_signals();
@@ -93,8 +100,7 @@ fn mask_stop_signals(how: libc::c_int) {
 
 /// True if this process was asked to end.
 pub(crate) fn is_terminated() -> bool {
-    // A signal is then its host's.
-    !crate::hosted::is_hosted() && IS_TERMINATED.get().is_some_and(|flag| flag.load(Ordering::Relaxed))
+    IS_TERMINATED.get().is_some_and(|flag| flag.load(Ordering::Relaxed))
 }
 
 /// Makes the kernel kill this process when its launcher dies, even by `kill -9`.
@@ -139,7 +145,7 @@ fn is_ignored(signal: libc::c_int) -> bool {
 /// Keeps this process on one core. Where the machine has no such core, it stays where it is: placement
 /// is a matter of speed, never of results.
 pub fn stay_on(cpu: Option<usize>) {
-    if let Some(cpu) = cpu.filter(|&cpu| cpu < CpuSet::MAX_CPU && !crate::hosted::is_hosted()) {
+    if let Some(cpu) = cpu.filter(|&cpu| cpu < CpuSet::MAX_CPU) {
         let mut set = CpuSet::new();
         set.set(cpu);
         let _ = sched_setaffinity(None, &set);
@@ -151,9 +157,6 @@ pub fn stay_on(cpu: Option<usize>) {
 /// On a core that the nodes of a loop share, an interrupted waker needs the core once more before it can
 /// sleep; measured, a tick of the hover run takes 4.0 context switches this way and 5.7 without.
 pub(crate) fn wait_for_turn() {
-    if crate::hosted::is_hosted() {
-        return;
-    }
     // SAFETY: the call takes and returns numbers. A process that was given a real-time priority keeps it.
     if unsafe { libc::sched_getscheduler(0) } != libc::SCHED_OTHER {
         return;
@@ -205,9 +208,6 @@ pub fn die_with_this_one(command: &mut Command) {
 /// # Errors
 /// If the system does not allow this much; the error names the right.
 pub(crate) fn lock_memory() -> Result<(), BusError> {
-    if crate::hosted::is_hosted() {
-        return Ok(());
-    }
     let all = rustix::mm::MlockAllFlags::CURRENT | rustix::mm::MlockAllFlags::FUTURE;
     rustix::mm::mlockall(all).map_err(|error| BusError::Denied {
         action: "lock the memory of this process (run.lock_memory)",

@@ -11,6 +11,7 @@ use crate::state_transfer::StateLayout;
 use diagnostics::ParameterError;
 use inputs::InputFiles;
 use serde_json::Value;
+use std::path::Path;
 
 /// A component in a table of components, with everything that a launcher must know about it.
 #[derive(Clone, Copy, Debug)]
@@ -103,19 +104,20 @@ impl Registration {
         files: &InputFiles,
     ) -> Result<bool, ParameterError> {
         let layout = |component: &Self, node| -> Result<Option<StateLayout>, ParameterError> {
-            let made = component.make_for(plan, node, files)?;
+            let made = component.make_for(plan, node, files, None)?;
             Ok(StateLayout::of(component.transfer, made.state_size(), made.configuration()))
         };
         let (after, before) = (layout(self, node)?, layout(before, node_before)?);
         Ok(after.is_some() && after == before)
     }
 
-    /// The component, made for `node` of `plan` from the run's `files`.
+    /// The component, made for `node` of `plan` from the run's `files`; `run_dir` is the directory of the run, if it has one.
     pub(crate) fn make_for(
         &self,
         plan: &Plan,
         node: &NodePlan,
         files: &InputFiles,
+        run_dir: Option<&Path>,
     ) -> Result<Box<dyn Instance>, ParameterError> {
         let inputs: Vec<&str> = node.inputs.iter().map(|input| input.port.as_str()).collect();
         let outputs: Vec<&str> = node.outputs.iter().map(|output| output.port.as_str()).collect();
@@ -123,7 +125,8 @@ impl Registration {
             .naming(&outputs)
             .timed(plan.tick_ns, node.period_ticks, plan.duration_ticks)
             .seeded(plan.seed)
-            .given(files);
+            .given(files)
+            .in_run(run_dir);
         (self.make)(&node.parameters, &context)
     }
 

@@ -73,7 +73,7 @@ impl Part {
     ) -> Result<Self, BusError> {
         let wiring = node.declare(registration, components)?;
         let (plan, node_plan) = node.plan();
-        let made = registration.make_for(plan, node_plan, files);
+        let made = registration.make_for(plan, node_plan, files, node.run_dir());
         let instance = made.map_err(|reason| node.error(reason))?;
         let (name, transfer) = (node.name().to_owned(), registration.transfer);
         Ok(Self { name, node: Some(node), wiring, instance, transfer })

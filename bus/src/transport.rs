@@ -6,6 +6,7 @@
 use crate::error::BusError;
 use crate::message::{ENCAPSULATION_WORD, sample_words};
 use crate::names::{SHARED_MEMORY, shm_path, shm_prefix};
+use crate::place::Place;
 use crate::plan::Capacity;
 use crate::reserve;
 use iceoryx2::node::NodeState;
@@ -122,11 +123,16 @@ pub fn reap_dead(run_dir: &Path, run_id: &str) -> Result<(), IceoryxError> {
 
 impl Transport {
     /// Connects node `node_name` to the run `run_id`, whose directory is `run_dir`.
-    pub(crate) fn new(run_dir: &Path, run_id: &str, node_name: &str) -> Result<Self, BusError> {
+    pub(crate) fn new(
+        run_dir: &Path,
+        run_id: &str,
+        node_name: &str,
+        place: &Place,
+    ) -> Result<Self, BusError> {
         let fail = |reason: IceoryxError| {
             transport_error(node_name, "joining the shared memory of the run", &reason)
         };
-        if !crate::hosted::is_hosted() {
+        if place.is_process() {
             limit_transport_log();
         }
         let config = config(run_dir, run_id).map_err(fail)?;
@@ -386,6 +392,7 @@ mod tests {
     use crate::message::Message as _;
     use crate::messages::SetPoint;
     use crate::names::shm_prefix;
+    use crate::place::Place;
     use crate::plan::{Capacity, InputPlan, TopicPlan};
     use crate::port::{Feed, InPort, Source};
     use std::os::unix::fs::{MetadataExt, PermissionsExt};
@@ -416,7 +423,7 @@ mod tests {
         }
 
         fn join(&self, node: &str) -> Transport {
-            Transport::new(self.folder.path(), &self.id, node).unwrap()
+            Transport::new(self.folder.path(), &self.id, node, &Place::Process).unwrap()
         }
     }
 
@@ -545,7 +552,8 @@ mod tests {
         assert!(
             takes_run_dir(&longest, &run.id) && !takes_run_dir(&folder.join("x".repeat(rest + 1)), &run.id)
         );
-        let [plant, imu] = ["plant", "imu"].map(|name| Transport::new(&longest, &run.id, name).unwrap());
+        let [plant, imu] =
+            ["plant", "imu"].map(|name| Transport::new(&longest, &run.id, name, &Place::Process).unwrap());
         let sender = plant.publisher(TOPIC, 0, SIZE, CAPACITY).unwrap();
         let mut port = port(imu.subscriber(TOPIC, 0, CAPACITY).unwrap());
         send(&sender, 0);

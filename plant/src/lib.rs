@@ -12,7 +12,7 @@
 //! | `newton_euler` | equations of motion and their integration |
 //! | `backend` | what a plant can do, whichever physics moves it |
 //! | `free_flight` | the backend `newton-euler` |
-//! | [`rapier`] | the backend `rapier`: ground, walls, other vehicles, rigs |
+//! | [`contact_dynamics`] | the backend `rapier`: ground, walls, other vehicles, rigs |
 //! | [`saved`] | parts of a state as bytes of a fixed number |
 //! | [`snapshot`] | a backend's state as bytes with names |
 //! | [`node`], `memory` | the plant as a process of a run, and its state |
@@ -47,6 +47,7 @@ mod airframe_state;
 mod airworthy;
 mod backend;
 mod beyond;
+pub mod contact_dynamics;
 pub mod effects;
 mod free_flight;
 mod memory;
@@ -59,7 +60,6 @@ mod others;
 mod output;
 mod parameters;
 pub mod propeller_stand;
-pub mod rapier;
 mod rotation;
 pub mod rotor;
 pub mod saved;
@@ -71,9 +71,9 @@ pub use actuation::{Actuation, Battery};
 pub use airframe::Airframe;
 pub use airframe_state::{AirframeState, EffectState};
 pub use backend::{Backend, ContactReport, Neighbour, NotePart};
+pub use contact_dynamics::Rapier;
 pub use free_flight::FreeFlight;
 pub use memory::PlantMemory;
 pub use newton_euler::{Accelerations, NewtonEuler};
-pub use rapier::Rapier;
 pub use rotor::Wrench;
 pub use state::{PerRotor, RigidBody, RotorState, State};

@@ -2,9 +2,9 @@
 
 use crate::airframe_state::AirframeState;
 use crate::backend::Backend;
+use crate::contact_dynamics::Rapier;
 use crate::free_flight::FreeFlight;
 use crate::newton_euler::NewtonEuler;
-use crate::rapier::Rapier;
 use crate::state::RigidBody;
 use scenes::Scene;
 

@@ -3,11 +3,11 @@
 use crate::airframe::Airframe;
 use crate::airworthy;
 use crate::beyond;
+use crate::contact_dynamics::{Misfit, Rapier};
 use crate::effects::{self, Quantity};
 use crate::newton_euler::NewtonEuler;
 use crate::odd;
 use crate::origin::{Origin, Physics};
-use crate::rapier::{Misfit, Rapier};
 use crate::state::RigidBody;
 use bus::context::NodeContext;
 use diagnostics::Diagnostic;

@@ -4,7 +4,7 @@
 use crate::common;
 use common::{TICK_S, free_body, hummingbird};
 use nalgebra::{UnitQuaternion, Vector3};
-use plant::rapier::hull::Hull;
+use plant::contact_dynamics::hull::Hull;
 use plant::{Airframe, Backend, Neighbour, NewtonEuler, Rapier, RigidBody};
 use proptest::prelude::*;
 use scenes::{Scene, Surface};

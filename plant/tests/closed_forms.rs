@@ -6,7 +6,7 @@
 use crate::common;
 use common::{TICK_S, free_body};
 use nalgebra::{UnitQuaternion, Vector3};
-use plant::rapier::hull::Hull;
+use plant::contact_dynamics::hull::Hull;
 use plant::{Airframe, Backend, NewtonEuler, Rapier, RigidBody};
 use scenes::{Rig, Scene, Surface};
 use std::f64::consts::TAU;

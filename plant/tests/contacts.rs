@@ -4,7 +4,7 @@
 use crate::common;
 use common::{TICK_S, hummingbird};
 use nalgebra::{UnitQuaternion, Vector3};
-use plant::rapier::hull::Hull;
+use plant::contact_dynamics::hull::Hull;
 use plant::{Airframe, Backend, ContactReport, Neighbour, NewtonEuler, Rapier, RigidBody};
 use scenes::Scene;
 

@@ -6,7 +6,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 use plant::Airframe;
-use plant::rapier::hull::Hull;
+use plant::contact_dynamics::hull::Hull;
 
 /// Height of the hub: as thick as the disc that touches. The following are parts of the longest arm: tuned, no source.
 const ARM_RADIUS: f64 = 0.03;

@@ -19,6 +19,9 @@
 //! | [`identification`] | the page of an identification |
 //! | [`page`] | the common part of all pages |
 //!
+//! Without the features `plots`, `tables` and `terminal`, [`plot`], [`columns`] with [`export`], and [`top`] are absent, and
+//! with them what they need.
+//!
 //! Texts, JSON and bytes are returned: but for [`top::watch`], nothing here prints.
 #![forbid(unsafe_code)]
 #![allow(non_snake_case, reason = "a trailing _B or _W names the frame that a vector is written in")]
@@ -27,17 +30,21 @@ pub mod airframe;
 pub mod attached;
 pub mod beyond;
 mod cells;
+#[cfg(feature = "tables")]
 pub mod columns;
+#[cfg(feature = "tables")]
 pub mod export;
 pub mod identification;
 pub mod judge;
 pub mod page;
+#[cfg(feature = "plots")]
 pub mod plot;
 pub mod profile;
 mod response;
 pub mod shadow;
 mod states;
 pub mod summary;
+#[cfg(feature = "terminal")]
 pub mod top;
 pub mod topics;
 pub mod urdf;

@@ -13,6 +13,7 @@ pub const MARK: &str = r#"<meta name="generator" content="hummingbus">"#;
 /// plotly.js with lines, bars and pies.
 pub const PLOTLY_BASIC: &str = include_str!("page/plotly-basic.min.js");
 /// plotly.js with lines, and lines and bodies in space.
+#[cfg(feature = "plots")]
 pub(crate) const PLOTLY_3D: &str = include_str!("page/plotly-gl3d.min.js");
 
 /// The page with this `body` of headings, texts and the places of tables and plots. `script` draws `data` on it with

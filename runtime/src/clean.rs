@@ -16,7 +16,6 @@ use crate::run_dir::{
 use anyhow::{Result, anyhow, bail};
 use bus::process::user_id;
 use bus::user_file;
-use indicatif::HumanBytes;
 use rustix::process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -218,7 +217,9 @@ fn bytes_below(path: &Path) -> u64 {
 }
 
 impl Remains {
-    fn has_something_to_remove(&self) -> bool {
+    /// True if a process or a file of it is there to be removed.
+    #[must_use]
+    pub fn has_something_to_remove(&self) -> bool {
         !(self.processes.is_empty() && self.paths.is_empty())
     }
 
@@ -268,42 +269,4 @@ impl Report {
     pub fn is_done(&self) -> bool {
         self.dead.iter().all(|remains| remains.failures.is_empty())
     }
-}
-
-impl std::fmt::Display for Report {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let verb = if self.dry_run { "would remove" } else { "removed" };
-        for remains in &self.dead {
-            let bytes = HumanBytes(remains.bytes);
-            if remains.has_something_to_remove() {
-                writeln!(f, "{verb} run {}: {bytes}", remains.run_id)?;
-            }
-            let (shared, folders): (Vec<&PathBuf>, Vec<&PathBuf>) =
-                remains.paths.iter().partition(|path| path.starts_with(SHARED_MEMORY));
-            folders.iter().try_for_each(|path| writeln!(f, "  {}", path.display()))?;
-            if !shared.is_empty() {
-                writeln!(f, "  {} in {SHARED_MEMORY}", count(shared.len(), "file"))?;
-            }
-            remains.processes.iter().try_for_each(|process| writeln!(f, "  process {process}"))?;
-            remains.spared.iter().try_for_each(|process| {
-                writeln!(
-                    f,
-                    "  not killed: process {process}, which run {} started and which holds none of its files; if \
-                     nobody needs it: kill {process}",
-                    remains.run_id
-                )
-            })?;
-            remains.failures.iter().try_for_each(|failure| writeln!(f, "  LEFT {failure}"))?;
-        }
-        let bytes = HumanBytes(self.dead.iter().map(|remains| remains.bytes).sum());
-        let live = count(self.live.len(), "live run");
-        match self.dead.iter().filter(|remains| remains.has_something_to_remove()).count() {
-            0 => write!(f, "nothing to remove; {live} kept"),
-            dead => write!(f, "{verb} {} ({bytes}); {live} kept", count(dead, "dead run")),
-        }
-    }
-}
-
-fn count(number: usize, noun: &str) -> String {
-    format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
 }

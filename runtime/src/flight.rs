@@ -1,6 +1,6 @@
 //! Host times noted by the processes of a run, and conclusions drawn from them and the plan.
 
-use crate::replacement::Report;
+use crate::supervisor::replacement::Report;
 use bus::BusError;
 use bus::plan::{InputPlan, Plan};
 use bus::profile::{Grant, GrantReader, TickReader, TickTimes};

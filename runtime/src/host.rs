@@ -2,8 +2,8 @@
 
 use crate::program::{Executable, Program};
 use anyhow::{Context, Result, anyhow, bail};
-use bus::hosted::Hosted;
 use bus::lockstep::SupervisorView;
+use bus::place::Place;
 use bus::{BusError, Join, Registration};
 use std::any::Any;
 use std::os::unix::process::ExitStatusExt;
@@ -168,15 +168,13 @@ impl Thread {
         control: Arc<SupervisorView>,
     ) -> Result<Self> {
         let is_cancelled = Arc::new(AtomicBool::new(false));
-        let (name, hosted) =
-            (join.node.clone(), Hosted { join: join.clone(), is_cancelled: is_cancelled.clone() });
+        let name = join.node.clone();
+        let join = Join { place: Place::Thread(is_cancelled.clone()), ..join };
         let thread = std::thread::Builder::new().name(name.clone()).stack_size(STACK_BYTES);
-        let handle = thread.spawn(move || {
-            hosted.run(|| match part {
-                ThreadPart::Clock => bus::clock::run(),
-                ThreadPart::Node(component) => component.run(join, components),
-                ThreadPart::Group => bus::group::run(&join.run_dir, &join.node, components),
-            })
+        let handle = thread.spawn(move || match part {
+            ThreadPart::Clock => bus::clock::run(join),
+            ThreadPart::Node(component) => component.run(join, components),
+            ThreadPart::Group => bus::group::run(&join, components),
         });
         let handle = handle.with_context(|| format!("process `{name}`: cannot start a thread"))?;
         Ok(Self { handle: Some(handle), is_cancelled, control })

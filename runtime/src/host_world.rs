@@ -19,6 +19,7 @@ use anyhow::{Context, Result};
 use bus::host_time::monotonic_ns;
 use bus::lockstep::{SlotState, SupervisorView};
 use bus::membership::Membership;
+use bus::place::Place;
 use bus::plan::{GroupPlan, InputPlan, NodePlan, Plan};
 use bus::{BusError, Join};
 use diagnostics::Diagnostic;
@@ -120,7 +121,8 @@ impl HostWorld<'_> {
                 };
                 let components = self.manifest.registry().components();
                 let (run_dir, node) = (self.run_dir.to_owned(), name.to_owned());
-                let join = Join { run_dir, node, generation: role.generation() };
+                let (generation, place) = (role.generation(), Place::default());
+                let join = Join { run_dir, node, generation, place };
                 let thread = Thread::start(part, components, join, self.control.clone())?;
                 (Running::Thread(thread), PathBuf::new())
             }

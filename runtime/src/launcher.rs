@@ -17,10 +17,10 @@ use crate::manifest::Manifest;
 pub use crate::outcome::Outcome;
 use crate::outputs::Outputs;
 use crate::program::Program;
-pub use crate::replacement::{Purpose, Report};
 use crate::rewind::{self, Rewinds};
 use crate::run_dir::RunDir;
-use crate::supervision::Supervisor;
+use crate::supervisor::Supervisor;
+pub use crate::supervisor::replacement::{Purpose, Report};
 use crate::world::Spent;
 use anyhow::{Context, Result};
 use bus::lockstep::SupervisorView;
@@ -325,7 +325,7 @@ impl<'a> Launcher<'a> {
         let mut supervisor = Supervisor::new(graph, world, &self.stop, &mut on);
         supervisor.fly(manifest.content.run.start_order_seed)?;
         let mut outcome = outcome(plan, &control, &supervisor);
-        outcome.replacements = supervisor.overseer.replacements.into_reports();
+        outcome.replacements = supervisor.decisions.replacements.into_reports();
         if plan.profile {
             outcome.flight = Some(Flight::open(plan, dir, outcome.ticks, &outcome.replacements)?);
         }

@@ -1,5 +1,19 @@
 //! Checks manifests, and launches the runs that they describe: starts the processes, watches over them, and takes
 //! everything down again.
+//!
+//! | subject | modules |
+//! |---|---|
+//! | the manifest, with the place of every value | [`manifest`] |
+//! | the checked plan of a run | [`graph`], `placement`, [`registry`], `program`, `describe`, `describe_programs` |
+//! | a flight of processes or threads | [`launcher`], [`event`], `outcome`, [`flight`] |
+//! | its supervisor, which decides | `supervisor`, `processes`, `sidecars`, `watch_clock` |
+//! | what the supervisor sees and touches | `world`, `view`, `host_world`, [`host`], `spawn`, `role`, `instances` |
+//! | the same supervisor in simulated worlds | `simulation` |
+//! | a flight on one thread | `in_process` |
+//! | requests to a live run | [`ctl`], [`rewind`] |
+//! | checkpoints and forks | [`checkpoint`], `checkpoint_writer`, `fork` |
+//! | files at the user's paths | [`outputs`], [`output_file`], `claimed_file`, `location`, `file_lock`, `process_log` |
+//! | the run directory, and remains of dead runs | [`run_dir`], [`clean`], `descendants`, `process_table`, `host_limits` |
 
 pub mod checkpoint;
 mod checkpoint_writer;
@@ -25,14 +39,12 @@ pub mod manifest;
 mod outcome;
 pub mod output_file;
 pub mod outputs;
-mod overseer;
 mod placement;
 mod process_log;
 mod process_table;
 mod processes;
 mod program;
 pub mod registry;
-mod replacement;
 pub mod rewind;
 mod role;
 pub mod run_dir;
@@ -43,7 +55,6 @@ mod simulation;
 #[path = "../../tests/runs/skipped.rs"]
 mod skipped;
 mod spawn;
-mod supervision;
 mod supervisor;
 mod view;
 mod watch_clock;
@@ -67,7 +78,7 @@ use registry::Registry;
 /// If there is no such component, or it fails.
 pub fn node(name: &str, registry: Registry) -> anyhow::Result<()> {
     let ended = match (name, registry.find(name)) {
-        ("clock", _) => bus::clock::run(),
+        ("clock", _) => Join::clock_from_environment().and_then(bus::clock::run),
         ("group", None) => bus::group::run_process(registry.components()),
         (_, Some(component)) => {
             Join::from_environment().and_then(|join| component.run(join, registry.components()))

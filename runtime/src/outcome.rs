@@ -2,8 +2,8 @@
 
 use crate::checkpoint::Written;
 use crate::flight::Flight;
-use crate::replacement::Report;
 use crate::rewind::Rewound;
+use crate::supervisor::replacement::Report;
 
 /// The outcome of a run, as [`Launcher::fly`](crate::launcher::Launcher::fly) returns it.
 #[derive(Debug)]

@@ -27,8 +27,8 @@ mod settings;
 mod sim;
 
 use crate::event::RunEvent;
-use crate::supervision::Supervisor;
-use crate::supervisor::State;
+use crate::supervisor::Supervisor;
+use crate::supervisor::state_machine::State;
 use fault::{Fault, HARMFUL, HARMLESS};
 use outside::SimWorld;
 use sim::{Bug, Draw, Log, Sim};
@@ -77,8 +77,8 @@ fn live(seed: u64, faults: Option<&[Fault]>, bug: Option<Bug>, log: &Log) -> Lif
     };
     let mut supervisor = Supervisor::new(&graph, SimWorld(sim.clone()), &stop, &mut listener);
     let flown = supervisor.fly(None);
-    let state = if flown.is_err() { State::Failed } else { supervisor.overseer.state };
-    let reports = &supervisor.overseer.replacements.reports;
+    let state = if flown.is_err() { State::Failed } else { supervisor.decisions.state };
+    let reports = &supervisor.decisions.replacements.reports;
     let refused = reports.iter().filter_map(|report| report.refused.clone()).collect();
     drop(supervisor);
     let sim = sim.borrow();

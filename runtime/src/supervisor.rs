@@ -1,245 +1,350 @@
-//! State machine of the launcher: the states of a run, the events in each, and the actions that follow.
+//! Supervision of a run: starts its processes, reacts to events, and ends everything again.
 //!
-//! Nothing here touches a process: the whole table can be tested.
+//! - `state_machine`: states of a run, events, actions
+//! - `decisions`: consequences of the end of a process
+//! - `replacement`: backups and their take-overs
+//! - `requests`: swaps requested in flight
+//! - `ends`: reactions to the end of processes and sidecars
+//! - `standstill`: runs that stand still, and backups that do not join
+//! - `straggler`: the instance on which a run waits
 
-use crate::program::OnExit;
+pub mod decisions;
+mod ends;
+pub mod replacement;
+mod requests;
+mod standstill;
+pub mod state_machine;
+mod straggler;
 
-/// State of a run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum State {
-    /// Processes are being started.
-    Starting,
-    /// Processes connect; tick 0 waits for the last of them.
-    Gathering,
-    /// Ticks are granted.
-    Running,
-    /// No more ticks are granted; processes finish those that were, and the recorder its file.
-    Draining,
-    /// Every process has left.
-    Stopped,
-    /// The run was aborted.
-    Failed,
+use crate::event::{Progress, RunEvent, StopToken};
+use crate::graph::Graph;
+use crate::processes::{Process, Processes};
+use crate::program::{Program, Readiness};
+use crate::role::Role;
+use crate::sidecars::Sidecars;
+use crate::supervisor::decisions::{Abort, Decisions};
+use crate::supervisor::replacement::Replacements;
+use crate::supervisor::state_machine::{Action, Event, State};
+use crate::view::{Command, SegmentWrite};
+use crate::watch_clock::WatchClock;
+use crate::world::{Body, Spent, World};
+use anyhow::{Result, anyhow};
+use bus::lockstep::Phase;
+use bus::plan::{Plan, SLOTS_PER_NODE};
+use std::time::Duration;
+
+/// Longest sleep of the supervisor between two looks at its processes.
+const POLL: Duration = Duration::from_millis(2);
+/// Time between two checks of the lengths of the processes' logs.
+const LOG_PERIOD: Duration = Duration::from_millis(100);
+/// Time between two searches for orphans that have ended.
+const REAP_PERIOD: Duration = Duration::from_secs(5);
+
+/// Fisher-Yates with the bus's own generator: the same seed gives the same order.
+fn shuffle<T>(items: &mut [T], seed: Option<u64>) {
+    use rand_core::Rng;
+    let Some(seed) = seed else { return };
+    let mut random = bus::random::stream(seed, "start-order");
+    for last in (1..items.len()).rev() {
+        let pick = random.next_u64() % (last as u64 + 1);
+        items.swap(last, usize::try_from(pick).unwrap_or(last));
+    }
 }
 
-/// Event of a run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Event {
-    /// Every process was started.
-    Started,
-    /// Every process has connected.
-    Gathered,
-    /// The last tick was granted.
-    EndReached,
-    /// A stop was requested: Ctrl-C, SIGTERM, `ctl stop`.
-    StopRequested,
-    /// A stop was requested a second time.
-    Interrupted,
-    /// A process died, or hung and was killed, before it had done its part.
-    Died {
-        /// Policy of its manifest.
-        policy: OnExit,
-        /// True if the policy can be carried out: a standby is there, or a restart makes progress.
-        is_possible: bool,
-    },
-    /// A backup failed before it took over.
-    BackupFailed,
-    /// A sidecar ended with an error, was killed, or did not get ready.
-    SidecarFailed {
-        /// Policy of its manifest.
-        policy: OnExit,
-        /// True if a restart makes progress.
-        is_possible: bool,
-    },
-    /// Every process has ended.
-    AllEnded,
+/// Supervisor of a run: passes events to the state machine, and carries out its actions.
+pub struct Supervisor<'a, W: World> {
+    graph: &'a Graph,
+    plan: &'a Plan,
+    /// Decides the consequences of every end.
+    pub decisions: Decisions<'a>,
+    processes: Processes<W::Body>,
+    sidecars: Sidecars<'a, W::Body>,
+    // After the processes, which end first.
+    world: W,
+    clock: WatchClock,
+    /// Processor time in nanoseconds, and deadlines missed, of each node's instances that have left.
+    spent: Vec<Spent>,
+    /// Swaps that were requested and have not ended: the request, and the place of its answer.
+    swaps: Vec<(u32, W::Reply)>,
+    requests: u32,
+    stop: &'a StopToken,
+    stops_seen: usize,
+    listener: &'a mut dyn FnMut(RunEvent<'_>),
+    timing: Timing,
 }
 
-/// Action of the launcher after an event.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Action {
-    /// Nothing.
-    Nothing,
-    /// Have the clock end the run at the next tick boundary.
-    RequestStop,
-    /// End the run at once: every wait of every process returns.
-    Abort,
-    /// Start another process in the place of the one that died.
-    Restart,
-    /// Have the standby take the place of the one that died.
-    Promote,
-    /// Take the backup out of the run; the primary flies on.
-    Refuse,
+/// Times of the supervisor's periodic actions, on the watchdogs' clock.
+#[derive(Debug, Default)]
+struct Timing {
+    /// Progress of the run at its last change, and the time of that change.
+    last_change: (Advance, Duration),
+    logs_bounded: Duration,
+    reaped: Duration,
 }
 
-impl State {
-    /// True if the run is over.
-    pub fn is_over(self) -> bool {
-        matches!(self, Self::Stopped | Self::Failed)
+/// Progress of a run. After any change of it another process has its turn, and its watchdog begins anew.
+#[derive(Debug, Default, PartialEq)]
+struct Advance {
+    /// Progress of the first instances' joining; none before the first look.
+    phase: Option<Phase>,
+    /// True if every node has joined as far as the next phase asks: then it is the clock's turn.
+    awaits_phase: bool,
+    /// Ticks that may be computed.
+    granted: u32,
+    /// Ticks that the instance in each slot has completed.
+    done: Vec<u32>,
+}
+
+impl<'a, W: World> Supervisor<'a, W> {
+    /// The supervisor of a run of `graph` in `world`, which ends when `stop` is used and is followed by `listener`.
+    pub fn new(
+        graph: &'a Graph,
+        world: W,
+        stop: &'a StopToken,
+        listener: &'a mut dyn FnMut(RunEvent<'_>),
+    ) -> Self {
+        let plan = &graph.plan;
+        let replacements = Replacements::new(plan, world.see(), &graph.programs, &graph.backups);
+        Self {
+            graph,
+            plan,
+            decisions: Decisions::new(plan, replacements),
+            processes: Processes { running: Vec::new() },
+            sidecars: Sidecars::new(),
+            clock: WatchClock::new(world.now()),
+            world,
+            spent: vec![Spent::default(); plan.nodes.len()],
+            swaps: Vec::new(),
+            requests: 0,
+            stop,
+            stops_seen: 0,
+            listener,
+            timing: Timing::default(),
+        }
     }
 
-    /// The state after `event`, and the action.
-    pub fn after(self, event: Event) -> (Self, Action) {
-        use Action::{Abort, Nothing, Promote, Refuse, RequestStop, Restart};
-        use State::{Draining, Failed, Gathering, Running, Starting, Stopped};
-        match (self, event) {
-            (Stopped | Failed, _) => (self, Nothing),
-            (_, Event::Interrupted) => (Failed, Abort),
-            (_, Event::StopRequested) => (self.at_least_draining(), RequestStop),
-            (Starting, Event::Started) => (Gathering, Nothing),
-            (Gathering, Event::Gathered) => (Running, Nothing),
-            (Running, Event::EndReached) => (Draining, Nothing),
-            (Running | Draining, Event::Died { policy: OnExit::Restart, is_possible: true }) => {
-                (self, Restart)
+    /// Starts all processes, in the order of `start_order_seed`, and watches until they have ended. After any error
+    /// the live processes may still leave in order: the recorder finishes its file.
+    ///
+    /// # Errors
+    /// The error that ended the run before its time.
+    pub fn fly(&mut self, start_order_seed: Option<u64>) -> Result<()> {
+        let flown = self.start(start_order_seed).and_then(|()| self.watch());
+        self.see();
+        if flown.is_err() && !self.decisions.replacements.view.is_aborted {
+            self.take_down();
+        }
+        if flown.is_ok() {
+            self.tell_progress();
+        }
+        flown
+    }
+
+    fn start(&mut self, start_order_seed: Option<u64>) -> Result<()> {
+        let graph = self.graph;
+        let waits = graph.sidecars.iter().any(|(_, program)| program.ready == Readiness::Notify);
+        let join_tick = if waits { 0 } else { self.join_tick() };
+        self.world.write(SegmentWrite::JoinTick(join_tick));
+        let nodes = graph.programs.iter().zip(&graph.plan.nodes).enumerate();
+        let nodes = nodes.map(|(node, (program, plan))| {
+            (plan.name.as_str(), Role::Node { node, generation: 0 }, Some(program))
+        });
+        let mut all: Vec<_> = std::iter::once(("clock", Role::Clock, None)).chain(nodes).collect();
+        shuffle(&mut all, start_order_seed);
+        for (name, role, program) in all {
+            self.start_process(name, role, program)?;
+        }
+        graph.sidecars.iter().for_each(|(name, program)| self.sidecars.add(name, program));
+        self.sidecars.start(&mut self.world, self.clock.now())?;
+        self.tell(Event::Started).map(|_| ())
+    }
+
+    fn start_process(&mut self, name: &str, role: Role, program: Option<&Program>) -> Result<()> {
+        let body = self.world.start(name, role, program)?;
+        let group = match role {
+            Role::Node { node, generation: 0 } => self.plan.group_of(node).map(|group| group.name.clone()),
+            _ => None,
+        };
+        self.processes.running.push(Process { group, ..Process::new(name, role, body) });
+        Ok(())
+    }
+
+    /// The tick at which the clock must wait for joining instances, and for sidecars that are not ready.
+    fn join_tick(&self) -> u32 {
+        if self.sidecars.all_ready() { self.decisions.replacements.hold_tick() } else { 0 }
+    }
+
+    /// Watches until all processes have ended.
+    fn watch(&mut self) -> Result<()> {
+        while !self.decisions.state.is_over() {
+            let notices = self.world.notices();
+            self.look()?;
+            self.world.wait(notices, POLL);
+        }
+        Ok(())
+    }
+
+    /// Looks once at everything, and carries out the consequences.
+    fn look(&mut self) -> Result<()> {
+        self.clock.look(self.world.now());
+        self.processes.look()?;
+        self.sidecars.look(&mut self.world, self.clock.now())?;
+        self.tidy();
+        self.see();
+        self.settle_ends()?;
+        self.settle_sidecars()?;
+        self.note_interrupts()?;
+        self.note_progress()?;
+        self.serve_requests();
+        if self.decisions.state == State::Draining {
+            self.decisions.replacements.end();
+            self.carry_out()?;
+        }
+        let ended = self.decisions.note_too_late();
+        self.follow(ended)?;
+        // Before `advance` too: a held run must stay held while a backup joins.
+        self.see();
+        self.world.write(SegmentWrite::JoinTick(self.join_tick()));
+        self.see();
+        self.decisions.replacements.advance();
+        self.carry_out()?;
+        self.world.write(SegmentWrite::JoinTick(self.join_tick()));
+        self.decisions.note_laggards();
+        self.carry_out()?;
+        self.see();
+        self.note_stall()?;
+        self.tell_progress();
+        Ok(())
+    }
+
+    fn say(&mut self, text: &str) {
+        (self.listener)(RunEvent::Note(text));
+    }
+
+    /// Reports the progress of the run.
+    fn tell_progress(&mut self) {
+        let view = &self.decisions.replacements.view;
+        let has_begun = !view.first_grant.is_zero();
+        let flown = if has_begun { view.host.saturating_sub(view.first_grant) } else { Duration::ZERO };
+        (self.listener)(RunEvent::Progress(Progress {
+            ticks: view.completed_ticks(),
+            duration_ticks: self.plan.duration_ticks,
+            tick_s: self.plan.tick_s(),
+            host_s: flown.as_secs_f64(),
+        }));
+    }
+
+    /// Looks at the control segment.
+    fn see(&mut self) {
+        let mut view = self.world.see();
+        view.living = self.processes.living().collect();
+        (view.now, view.host) = (self.clock.now(), self.world.now());
+        self.decisions.replacements.view = view;
+    }
+
+    /// Carries out the commands of the replacements.
+    fn carry_out(&mut self) -> Result<()> {
+        while !self.decisions.replacements.view.commands.is_empty() {
+            for command in std::mem::take(&mut self.decisions.replacements.view.commands) {
+                self.execute(command)?;
             }
-            (Running | Draining, Event::Died { policy: OnExit::Standby, is_possible: true }) => {
-                (self, Promote)
+        }
+        Ok(())
+    }
+
+    fn execute(&mut self, command: Command) -> Result<()> {
+        match command {
+            Command::Spawn { node, generation, backup } => {
+                let stored = self.world.store_backup(&backup, generation);
+                let role = Role::Node { node, generation };
+                let name = &self.plan.nodes[node].name;
+                let started = stored
+                    .map_err(anyhow::Error::from)
+                    .and_then(|()| self.start_process(name, role, Some(&backup.program)));
+                if let Err(error) = started {
+                    self.decisions.replacements.note_not_started(node, generation, &error)?;
+                }
             }
-            (_, Event::Died { .. }) => (Failed, Abort),
-            (_, Event::BackupFailed) => (self, Refuse),
-            // The sidecar is not needed any more; it may have ended because the nodes have.
-            (Draining, Event::SidecarFailed { .. }) => (self, Nothing),
-            (_, Event::SidecarFailed { policy: OnExit::Restart, is_possible: true }) => (self, Restart),
-            (_, Event::SidecarFailed { policy: OnExit::Ignore, .. }) => (self, Nothing),
-            (_, Event::SidecarFailed { .. }) => (Failed, Abort),
-            (Starting | Gathering | Running | Draining, Event::AllEnded) => (Stopped, Nothing),
-            (Gathering | Running | Draining, Event::Started)
-            | (Starting | Running | Draining, Event::Gathered)
-            | (Starting | Gathering | Draining, Event::EndReached) => (self, Nothing),
+            Command::Kill { node, generation, message } => {
+                self.processes.kill(Role::Node { node, generation }, message);
+            }
+            Command::Settle { node, generation } => {
+                if let Some(process) = self.processes.of(node, generation) {
+                    process.is_settled = true;
+                }
+            }
+            Command::Free { node, generation, slot } => self.free(node, generation, slot),
+            Command::Store(membership) => self.world.store_membership(&membership)?,
+            Command::Write(write) => self.world.write(write),
+        }
+        Ok(())
+    }
+
+    /// Removes the remains of a process that has ended, and frees its slot.
+    fn free(&mut self, node: usize, generation: u32, slot: usize) {
+        self.spent[node] = self.spent[node].plus(self.world.spent(slot));
+        self.world.write(SegmentWrite::Clear(slot));
+        let process = self.processes.of(node, generation);
+        let end = process.and_then(|process| process.end.as_ref());
+        self.world.remove_traces(node, generation, end.is_some_and(|end| !end.success()));
+        self.processes.forget(node, generation);
+    }
+
+    /// Processor time, deadlines missed and steps missed of all instances of `node` together.
+    pub fn spent_by(&self, node: usize) -> Spent {
+        let slots = (0..SLOTS_PER_NODE).map(|slot| slot * self.plan.nodes.len() + node);
+        slots.map(|slot| self.world.spent(slot)).fold(self.spent[node], Spent::plus)
+    }
+
+    /// Bounds the lengths of logs, and reaps orphans that have ended: they would stay in the table of processes for the
+    /// whole run.
+    fn tidy(&mut self) {
+        let now = self.clock.now();
+        let bodies = || {
+            let processes = self.processes.running.iter().map(|process| &process.body);
+            processes.chain(self.sidecars.bodies())
+        };
+        if now.saturating_sub(self.timing.logs_bounded) >= LOG_PERIOD {
+            self.timing.logs_bounded = now;
+            bodies().for_each(Body::bound_log);
+        }
+        if now.saturating_sub(self.timing.reaped) >= REAP_PERIOD {
+            self.timing.reaped = now;
+            self.world.reap(&bodies().filter_map(Body::id).collect::<Vec<u32>>());
         }
     }
 
-    /// A stop before the first tick still waits for the processes to connect: they end in good order then.
-    fn at_least_draining(self) -> Self {
-        if self == Self::Running { Self::Draining } else { self }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::{Action, Event, State};
-    use crate::program::OnExit;
-
-    const STATES: [State; 6] =
-        [State::Starting, State::Gathering, State::Running, State::Draining, State::Stopped, State::Failed];
-
-    fn events() -> Vec<Event> {
-        let ends = [OnExit::Stop, OnExit::Restart, OnExit::Standby, OnExit::Ignore]
-            .into_iter()
-            .flat_map(|policy| [false, true].map(|is_possible| (policy, is_possible)));
-        let died = ends.clone().map(|(policy, is_possible)| Event::Died { policy, is_possible });
-        let sidecars = ends.map(|(policy, is_possible)| Event::SidecarFailed { policy, is_possible });
-        let others = [
-            Event::Started,
-            Event::Gathered,
-            Event::EndReached,
-            Event::StopRequested,
-            Event::Interrupted,
-            Event::BackupFailed,
-            Event::AllEnded,
-        ];
-        died.chain(sidecars).chain(others).collect()
+    /// Passes an event to the state machine, and carries out the consequences.
+    fn tell(&mut self, event: Event) -> Result<Action> {
+        let action = self.decisions.tell(event);
+        self.carry_out()?;
+        Ok(action)
     }
 
-    fn all() -> impl Iterator<Item = (State, Event, State, Action)> {
-        STATES.into_iter().flat_map(|state| {
-            events().into_iter().map(move |event| {
-                let (next, action) = state.after(event);
-                (state, event, next, action)
-            })
-        })
-    }
-
-    /// A run only goes forward, and every abort is a failure.
-    #[test]
-    fn no_event_leads_back() {
-        let rank = |state: State| STATES.iter().position(|&other| other == state);
-        for (state, event, next, action) in all() {
-            assert!(rank(next) >= rank(state), "{state:?} {event:?} leads back to {next:?}");
-            assert_eq!(
-                next == State::Failed && !state.is_over(),
-                action == Action::Abort,
-                "{state:?} {event:?}"
-            );
+    /// Carries out a decision, and ends the run if that was it.
+    fn follow<T>(&mut self, decided: Result<T, Abort>) -> Result<T> {
+        for note in std::mem::take(&mut self.decisions.notes) {
+            self.say(&note);
         }
-    }
-
-    #[test]
-    fn what_is_over_stays_as_it_is() {
-        for (state, event, next, action) in all().filter(|(state, ..)| state.is_over()) {
-            assert_eq!((next, action), (state, Action::Nothing), "{event:?}");
+        self.carry_out()?;
+        if std::mem::take(&mut self.decisions.has_answered) {
+            self.timing.last_change.1 = self.clock.now();
         }
+        decided.or_else(|Abort(message)| self.abort(message))
     }
 
-    #[test]
-    fn a_death_is_answered_by_its_policy_or_ends_the_run() {
-        for (state, event, next, action) in all() {
-            let Event::Died { policy, is_possible } = event else { continue };
-            let flies = matches!(state, State::Running | State::Draining);
-            let expected = match policy {
-                _ if state.is_over() => Action::Nothing,
-                OnExit::Restart if flies && is_possible => Action::Restart,
-                OnExit::Standby if flies && is_possible => Action::Promote,
-                _ => Action::Abort,
-            };
-            assert_eq!(action, expected, "{state:?} {event:?}");
-            assert_eq!(next == state, action != Action::Abort, "{state:?} {event:?}");
-        }
+    fn abort<T>(&mut self, message: String) -> Result<T> {
+        self.take_down();
+        Err(anyhow!(message))
     }
 
-    #[test]
-    fn a_sidecar_that_fails_ends_the_run_unless_its_manifest_says_otherwise() {
-        for (state, event, next, action) in all() {
-            let Event::SidecarFailed { policy, is_possible } = event else { continue };
-            let expected = match policy {
-                _ if state.is_over() || state == State::Draining => Action::Nothing,
-                OnExit::Ignore => Action::Nothing,
-                OnExit::Restart if is_possible => Action::Restart,
-                _ => Action::Abort,
-            };
-            assert_eq!(action, expected, "{state:?} {event:?}");
-            assert_eq!(next == state, action != Action::Abort, "{state:?} {event:?}");
-        }
-    }
-
-    #[test]
-    fn every_state_can_reach_an_end_and_only_two_are_ends() {
-        for state in STATES {
-            let ends = events().into_iter().any(|event| state.after(event).0.is_over());
-            assert!(ends, "{state:?}");
-            let stays = events().into_iter().all(|event| state.after(event).0 == state);
-            assert_eq!(stays, state.is_over(), "{state:?}");
-        }
-    }
-
-    #[test]
-    fn a_run_goes_through_its_states_in_order() {
-        let path = [Event::Started, Event::Gathered, Event::EndReached, Event::AllEnded];
-        let mut state = State::Starting;
-        let states: Vec<State> = path
-            .into_iter()
-            .map(|event| {
-                state = state.after(event).0;
-                state
-            })
-            .collect();
-        assert_eq!(states, [State::Gathering, State::Running, State::Draining, State::Stopped]);
-    }
-
-    #[test]
-    fn a_stop_is_asked_of_the_clock_and_drains_what_flies() {
-        for (state, event, next, action) in all().filter(|(_, event, ..)| *event == Event::StopRequested) {
-            let expected = if state.is_over() { Action::Nothing } else { Action::RequestStop };
-            assert_eq!(action, expected, "{state:?} {event:?}");
-            let drains = matches!(state, State::Running | State::Draining);
-            assert_eq!(next == State::Draining, drains, "{state:?}");
-        }
-    }
-
-    #[test]
-    fn a_failed_backup_never_ends_the_run() {
-        for (state, _, next, action) in all().filter(|(_, event, ..)| *event == Event::BackupFailed) {
-            assert_eq!(next, state);
-            assert_eq!(action == Action::Refuse, !state.is_over());
+    /// Ends all processes. A failure is only noted: the error of the run stays the one that ended it.
+    fn take_down(&mut self) {
+        let nodes = self.plan.nodes.iter().enumerate();
+        let readers: Vec<_> =
+            nodes.filter(|(_, node)| node.outputs.is_empty()).map(|(node, _)| node).collect();
+        if let Err(error) = self.processes.take_down(&mut self.world, &readers) {
+            self.say(&format!("cannot end all processes: {error:#}"));
         }
     }
 }

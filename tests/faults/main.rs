@@ -6,6 +6,7 @@
 //! - [`campaign`]: many seeded cases, each of which can be repeated
 //! - [`kill_points`]: seeded strikes over processes, ticks and signals, where the run is to stop
 //! - [`survival`]: the same where the process is restarted or has a standby
+//! - [`groups`]: the process of a group dies, and others go on in the places of its members
 //! - [`backups`]: backups that fail before they fly, and strikes at whoever else is there meanwhile
 //! - [`last_tick`]: processes that die behind their last tick
 //! - [`silence`]: processes that neither end nor go on
@@ -32,6 +33,7 @@ mod early;
 mod flight;
 mod floods;
 mod folders;
+mod groups;
 mod intruders;
 mod kill_points;
 mod last_tick;

@@ -1,7 +1,7 @@
 //! A reader of URDF files finds in them the vehicle of the vehicle file, and what it touches with.
 
 use crate::{HUMMINGBUS, ROOT, hummingbus, readers};
-use hummingbus::plant::{Airframe, rapier::hull::Hull};
+use hummingbus::plant::{Airframe, contact_dynamics::hull::Hull};
 use hummingbus::vehicles::Vehicle;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use serde_json::Value;

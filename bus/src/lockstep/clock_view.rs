@@ -5,6 +5,7 @@ use super::states::{Phase, Waited};
 use super::{wait, wake};
 use crate::error::BusError;
 use crate::host_time::monotonic_ns;
+use crate::place::Place;
 use crate::plan::{Plan, Wait};
 use std::ops::Deref;
 use std::sync::atomic::Ordering::{Relaxed, Release};
@@ -24,9 +25,9 @@ impl Deref for ClockView {
 }
 
 impl ClockView {
-    /// Opens the control segment of `plan` as this process, which is its clock service.
-    pub(crate) fn open(plan: &Plan) -> Result<Self, BusError> {
-        let live = LiveView::open(plan)?;
+    /// Opens the control segment of `plan` as its clock service, which runs at `place`.
+    pub(crate) fn open(plan: &Plan, place: Place) -> Result<Self, BusError> {
+        let live = LiveView::at(plan, place)?;
         live.segment.head().clock.process.store(std::process::id(), Relaxed);
         Ok(Self { live })
     }

@@ -4,6 +4,7 @@ use super::segment::Segment;
 use super::states::{Phase, SlotState, TransferOutcome};
 use super::wake::{AWAKE, NEVER};
 use crate::error::BusError;
+use crate::place::Place;
 use crate::plan::{InputPlan, Pace, Plan};
 use crate::step_times::StepTimes;
 use std::sync::atomic::AtomicU32;
@@ -21,7 +22,17 @@ impl LiveView {
     /// # Errors
     /// If it does not exist or belongs to another plan.
     pub fn open(plan: &Plan) -> Result<Self, BusError> {
-        Ok(Self { segment: Segment::open(plan)? })
+        Self::at(plan, Place::Process)
+    }
+
+    /// Opens the control segment of `plan` for an instance at `place`.
+    pub(super) fn at(plan: &Plan, place: Place) -> Result<Self, BusError> {
+        Ok(Self { segment: Segment::open(plan, place)? })
+    }
+
+    /// Place of the instance that has this view.
+    pub(crate) fn place(&self) -> &Place {
+        self.segment.place()
     }
 
     /// The phase of the run.

@@ -5,6 +5,7 @@ use super::states::{Phase, SlotState, TransferOutcome, Waited};
 use super::wait::{set_state, wait_for_count, wait_for_state};
 use super::wake;
 use crate::error::BusError;
+use crate::place::Place;
 use crate::plan::{Plan, Wait};
 use crate::step_times::bucket_of;
 use std::ops::Deref;
@@ -46,12 +47,12 @@ impl Deref for NodeView {
 }
 
 impl NodeView {
-    /// Opens the control segment of `plan` as generation `generation` of node `node`.
-    pub(crate) fn open(plan: &Plan, node: usize, generation: u32) -> Result<Self, BusError> {
+    /// Opens the control segment of `plan` as generation `generation` of node `node`, which runs at `place`.
+    pub(crate) fn open(plan: &Plan, node: usize, generation: u32, place: Place) -> Result<Self, BusError> {
         let (slot, other_slot) = (plan.slot(node, generation), plan.slot(node, generation + 1));
         let has_outputs = !plan.nodes[node].outputs.is_empty();
         Ok(Self {
-            live: LiveView::open(plan)?,
+            live: LiveView::at(plan, place)?,
             slot,
             other_slot,
             first_input: plan.first_input(slot),

@@ -4,8 +4,8 @@ use super::cells::{Head, InputCell, MAGIC, SlotCell, TopicCell};
 use super::states::Abort;
 use super::wake;
 use crate::error::BusError;
-use crate::hosted;
 use crate::names::shm_path;
+use crate::place::Place;
 use crate::plan::{Plan, SLOTS_PER_NODE};
 use crate::shared_file;
 use memmap2::MmapRaw;
@@ -18,6 +18,8 @@ use std::sync::atomic::Ordering::{Acquire, Relaxed, Release};
 pub(super) struct Segment {
     map: MmapRaw,
     counts: Counts,
+    /// Place of the instance that waits here.
+    place: Place,
 }
 
 /// Numbers of cells of each kind behind the head.
@@ -65,7 +67,8 @@ impl Segment {
     /// is [published](Segment::publish).
     pub(super) fn create(plan: &Plan) -> Result<Self, BusError> {
         let counts = Counts::of(plan);
-        Ok(Self { map: shared_file::create(&path(plan), counts.bytes())?, counts })
+        let map = shared_file::create(&path(plan), counts.bytes())?;
+        Ok(Self { map, counts, place: Place::Process })
     }
 
     /// Lets others find the segment: a process that opens it earlier finds no segment rather than half of one.
@@ -73,16 +76,21 @@ impl Segment {
         self.head().run.magic.store(MAGIC, Release);
     }
 
-    /// Opens the control segment of `plan`.
-    pub(super) fn open(plan: &Plan) -> Result<Self, BusError> {
+    /// Opens the control segment of `plan` for an instance at `place`.
+    pub(super) fn open(plan: &Plan, place: Place) -> Result<Self, BusError> {
         let (path, counts) = (path(plan), Counts::of(plan));
         let map = shared_file::open(&path, counts.bytes(), "the control segment of this run")?;
-        let segment = Self { map, counts };
+        let segment = Self { map, counts, place };
         if segment.head().run.magic.load(Acquire) == MAGIC {
             return Ok(segment);
         }
         let (expected, found) = ("a control segment", "other data".to_owned());
         Err(BusError::Content { path, expected, found })
+    }
+
+    /// Place of the instance that waits here.
+    pub(super) fn place(&self) -> &Place {
+        &self.place
     }
 
     pub(super) fn head(&self) -> &Head {
@@ -133,13 +141,13 @@ impl Segment {
 
     /// True if the run was aborted, or this instance is to end: a sample that is not there yet may never come.
     pub(super) fn is_aborted(&self) -> bool {
-        self.head().run.abort.load(Acquire) >= Abort::Told as u32 || hosted::is_cancelled()
+        self.head().run.abort.load(Acquire) >= Abort::Told as u32 || self.place.is_cancelled()
     }
 
     /// True if the run was aborted and the senders have left, or this instance is to end: a sample that is not there
     /// yet never comes.
     pub(super) fn is_drained(&self) -> bool {
-        self.head().run.abort.load(Acquire) >= Abort::Drained as u32 || hosted::is_cancelled()
+        self.head().run.abort.load(Acquire) >= Abort::Drained as u32 || self.place.is_cancelled()
     }
 
     /// Asks the clock to end the run at the next tick boundary.

@@ -33,7 +33,7 @@ pub(super) fn wait_for_count(
         if is_over() {
             return Waited::Over;
         }
-        if crate::process::is_terminated() {
+        if segment.place().is_terminated() {
             segment.request_stop();
         }
         let polls = match wait {

@@ -5,7 +5,7 @@ use super::processes::{DeclaredNode, declared_nodes, irreplaceable, program};
 use super::wiring::wire;
 use crate::manifest::{Manifest, OutputSetting, Process, SwapSetting};
 use crate::program::{BackupSpec, Executable};
-use crate::replacement::take_over_stride;
+use crate::supervisor::replacement::take_over_stride;
 use bus::Registration;
 use bus::plan::{INPUTS_RESERVED, NodePlan, Plan};
 use bus::ports::{Inputs, PortSpec};

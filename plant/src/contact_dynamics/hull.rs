@@ -24,7 +24,7 @@ const HUMMINGBIRD_FOOT_RADIUS_M: f64 = 0.01;
 /// The shape of a vehicle, from its centre of mass, in the body frame.
 ///
 /// ```
-/// use plant::{Airframe, rapier::hull::Hull};
+/// use plant::{Airframe, contact_dynamics::hull::Hull};
 ///
 /// let vehicle = vehicles::Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml").unwrap();
 /// let hull = Hull::of(&Airframe::new(vehicle));

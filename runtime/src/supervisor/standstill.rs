@@ -2,9 +2,9 @@
 
 use super::{Advance, Supervisor};
 use crate::program::OnExit;
-use crate::replacement::Stage;
 use crate::role::Role;
-use crate::supervisor::Event;
+use crate::supervisor::replacement::Stage;
+use crate::supervisor::state_machine::Event;
 use crate::world::World;
 use anyhow::Result;
 use bus::lockstep::Phase;
@@ -13,18 +13,18 @@ use std::time::Duration;
 impl<W: World> Supervisor<'_, W> {
     /// Looks whether the run stands still, and because of whom.
     pub(super) fn note_stall(&mut self) -> Result<()> {
-        let view = &self.overseer.replacements.view;
+        let view = &self.decisions.replacements.view;
         // A paused run stands still on request.
         let is_paused = view.held_at.is_some_and(|held| view.hold_tick <= held);
         // A sidecar that does not get ready has a watchdog of its own.
         let is_waiting = view.held_at.is_some() && !self.sidecars.all_ready();
         let straggler = self.straggler();
         let advance = self.advance(straggler);
-        if advance != self.timing.last_change.0 || self.overseer.state.is_over() || is_paused || is_waiting {
+        if advance != self.timing.last_change.0 || self.decisions.state.is_over() || is_paused || is_waiting {
             self.timing.last_change = (advance, self.clock.now());
             return Ok(());
         }
-        if let Some((node, generation, stage, since)) = self.overseer.replacements.joining() {
+        if let Some((node, generation, stage, since)) = self.decisions.replacements.joining() {
             self.note_late_joiner(node, generation, stage, since.max(self.timing.last_change.1));
             return Ok(());
         }
@@ -44,7 +44,7 @@ impl<W: World> Supervisor<'_, W> {
 
     /// Progress of the run.
     fn advance(&self, straggler: Option<Role>) -> Advance {
-        let view = &self.overseer.replacements.view;
+        let view = &self.decisions.replacements.view;
         Advance {
             phase: Some(view.phase),
             awaits_phase: view.phase < Phase::Running && straggler == Some(Role::Clock),
@@ -58,7 +58,7 @@ impl<W: World> Supervisor<'_, W> {
     fn patience(&self, straggler: Option<Role>) -> Duration {
         match straggler {
             Some(Role::Node { node, generation }) => {
-                self.overseer.replacements.program_of(node, generation).watchdog
+                self.decisions.replacements.program_of(node, generation).watchdog
             }
             Some(Role::Clock | Role::Sidecar { .. }) | None => {
                 self.graph.programs.iter().map(|program| program.watchdog).max().unwrap_or_default()
@@ -68,9 +68,9 @@ impl<W: World> Supervisor<'_, W> {
 
     /// Kills a process that does not join, or an instance that does not connect to it.
     fn note_late_joiner(&mut self, node: usize, generation: u32, stage: Stage, since: Duration) {
-        let disagreeing = self.overseer.replacements.disagreeing();
+        let disagreeing = self.decisions.replacements.disagreeing();
         let late = disagreeing.filter(|_| stage != Stage::Joining).unwrap_or((node, generation));
-        let patience = self.overseer.replacements.program_of(late.0, late.1).watchdog;
+        let patience = self.decisions.replacements.program_of(late.0, late.1).watchdog;
         if self.clock.since(since) > patience {
             let what = if late == (node, generation) {
                 "did not join".to_owned()

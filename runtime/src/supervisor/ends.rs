@@ -1,9 +1,9 @@
 //! Reactions to the end of processes and sidecars, and to an interrupt.
 
 use super::Supervisor;
-use crate::overseer::Death;
 use crate::program::OnExit;
-use crate::supervisor::{Action, Event, State};
+use crate::supervisor::decisions::Death;
+use crate::supervisor::state_machine::{Action, Event, State};
 use crate::world::World;
 use anyhow::Result;
 
@@ -15,12 +15,12 @@ impl<W: World> Supervisor<'_, W> {
             let (Some(end), false) = (&process.end, process.is_settled) else { continue };
             let succeeded = end.success() && process.verdict.is_none();
             let (name, role) = (process.name.clone(), process.role);
-            if succeeded && self.overseer.has_done_its_part(role) {
+            if succeeded && self.decisions.has_done_its_part(role) {
                 self.processes.running[index].is_settled = true;
                 continue;
             }
             let message = self.processes.running[index].post_mortem();
-            let settled = self.overseer.settle(&Death { name, role, message });
+            let settled = self.decisions.settle(&Death { name, role, message });
             if self.follow(settled)?
                 && let Some(process) = self.processes.running.get_mut(index)
                 && process.role == role
@@ -41,7 +41,7 @@ impl<W: World> Supervisor<'_, W> {
                         OnExit::Restart => ": it was restarted and ended again within a second",
                         _ => "; with `on_exit = \"ignore\"` the run would go on without it",
                     };
-                    let ticks = self.overseer.replacements.view.completed_ticks();
+                    let ticks = self.decisions.replacements.view.completed_ticks();
                     return self
                         .abort(format!("{}\nThe run was aborted at tick {ticks}{why}", failure.message));
                 }
@@ -64,7 +64,7 @@ impl<W: World> Supervisor<'_, W> {
         for number in seen..count {
             let event = if number == 0 { Event::StopRequested } else { Event::Interrupted };
             if self.tell(event)? == Action::Abort {
-                let ticks = self.overseer.replacements.view.completed_ticks();
+                let ticks = self.decisions.replacements.view.completed_ticks();
                 return self.abort(format!("interrupted twice: the run was aborted at tick {ticks}"));
             }
         }
@@ -72,11 +72,11 @@ impl<W: World> Supervisor<'_, W> {
     }
 
     pub(super) fn note_progress(&mut self) -> Result<()> {
-        self.overseer.note_gathered();
+        self.decisions.note_gathered();
         self.carry_out()?;
         self.see();
-        let view = &self.overseer.replacements.view;
-        if self.overseer.state == State::Running && view.granted >= view.end_tick {
+        let view = &self.decisions.replacements.view;
+        if self.decisions.state == State::Running && view.granted >= view.end_tick {
             self.tell(Event::EndReached)?;
         }
         if self.processes.all_ended() && self.processes.running.iter().all(|process| process.is_settled) {

@@ -3,8 +3,8 @@
 use super::Supervisor;
 use crate::ctl::protocol::{Answer, Request};
 use crate::program::BackupSpec;
-use crate::replacement::{Report, take_over_stride};
-use crate::supervisor::State;
+use crate::supervisor::replacement::{Report, take_over_stride};
+use crate::supervisor::state_machine::State;
 use crate::view::View;
 use crate::world::World;
 use anyhow::{Result, bail};
@@ -43,7 +43,7 @@ impl<W: World> Supervisor<'_, W> {
             }
         }
         for (request, reply) in std::mem::take(&mut self.swaps) {
-            let mut reports = self.overseer.replacements.reports.iter();
+            let mut reports = self.decisions.replacements.reports.iter();
             match reports.find(|report| report.request == Some(request)) {
                 Some(report) => self.world.answer(reply, &answer(report)),
                 None => self.swaps.push((request, reply)),
@@ -61,14 +61,14 @@ impl<W: World> Supervisor<'_, W> {
     ) -> Result<u32> {
         let backup = self.world.backup_of(process, with)?;
         self.require_claimed_log(&backup)?;
-        if self.overseer.state != State::Running {
+        if self.decisions.state != State::Running {
             bail!("the run does not fly: `{process}` cannot be swapped now");
         }
-        if self.overseer.replacements.is_busy(backup.node) {
+        if self.decisions.replacements.is_busy(backup.node) {
             bail!("`{process}` has a backup, a standby or a shadow already; one at a time");
         }
         self.see();
-        let end = self.overseer.replacements.view.end_tick;
+        let end = self.decisions.replacements.view.end_tick;
         let shadow_ticks = shadow_ticks.unwrap_or(SHADOW_TICKS);
         if shadow_ticks == 0 || shadow_ticks >= end {
             bail!("shadowing for {shadow_ticks} ticks is not within the run's {end} ticks");
@@ -77,7 +77,7 @@ impl<W: World> Supervisor<'_, W> {
             self.require_joinable(process, &backup, shadow_ticks, tick)?;
         }
         self.requests += 1;
-        self.overseer.replacements.request_swap(backup, shadow_ticks, at_tick, self.requests);
+        self.decisions.replacements.request_swap(backup, shadow_ticks, at_tick, self.requests);
         Ok(self.requests)
     }
 
@@ -89,7 +89,7 @@ impl<W: World> Supervisor<'_, W> {
         shadow_ticks: u32,
         tick: u32,
     ) -> Result<()> {
-        let View { granted, end_tick: end, .. } = self.overseer.replacements.view;
+        let View { granted, end_tick: end, .. } = self.decisions.replacements.view;
         let join = tick.saturating_sub(shadow_ticks);
         if join <= granted || tick >= end {
             bail!(

@@ -10,7 +10,7 @@ use std::time::Duration;
 impl<W: World> Supervisor<'_, W> {
     /// The living process that has all it needs and does not come on.
     pub(super) fn straggler(&self) -> Option<Role> {
-        let view = &self.overseer.replacements.view;
+        let view = &self.decisions.replacements.view;
         match view.phase {
             Phase::Announcing => Some(self.not_ready(Phase::Connecting)),
             Phase::Connecting => Some(self.not_ready(Phase::Running)),
@@ -23,22 +23,22 @@ impl<W: World> Supervisor<'_, W> {
 
     /// The first whose time is over of those that have not joined; the clock where all have.
     fn not_ready(&self, phase: Phase) -> Role {
-        let view = &self.overseer.replacements.view;
+        let view = &self.decisions.replacements.view;
         let late = (0..self.plan.nodes.len()).filter(|&node| !view.is_ready(node, phase));
-        late.min_by_key(|&node| self.overseer.replacements.program_of(node, 0).watchdog)
+        late.min_by_key(|&node| self.decisions.replacements.program_of(node, 0).watchdog)
             .map_or(Role::Clock, |node| Role::Node { node, generation: 0 })
     }
 
     /// The node that is furthest behind of those that have all they need.
     fn not_computing(&self) -> Option<Role> {
-        let view = &self.overseer.replacements.view;
+        let view = &self.decisions.replacements.view;
         let stuck = |&(node, generation): &(usize, u32)| {
             let slot = self.plan.slot(node, generation);
             view.slots[slot].state == SlotState::Taken
                 && view.lives(node, generation)
                 && self.can_compute(node, generation)
         };
-        let instances = self.overseer.replacements.instances().filter(stuck);
+        let instances = self.decisions.replacements.instances().filter(stuck);
         let slowest =
             instances.min_by_key(|&(node, generation)| view.slots[self.plan.slot(node, generation)].done);
         slowest.map(|(node, generation)| Role::Node { node, generation })
@@ -50,7 +50,7 @@ impl<W: World> Supervisor<'_, W> {
     fn can_compute(&self, node: usize, generation: u32) -> bool {
         let slot = self.plan.slot(node, generation);
         let (view, inputs) =
-            (&self.overseer.replacements.view, self.overseer.replacements.inputs(node, generation));
+            (&self.decisions.replacements.view, self.decisions.replacements.inputs(node, generation));
         view.has_needs(slot, inputs) && self.is_awake(node, generation)
     }
 
@@ -59,11 +59,11 @@ impl<W: World> Supervisor<'_, W> {
     fn is_awake(&self, node: usize, generation: u32) -> bool {
         let sleeps = |node: usize| {
             let slot = self.plan.slot(node, generation);
-            let inputs = self.overseer.replacements.inputs(node, generation);
+            let inputs = self.decisions.replacements.inputs(node, generation);
             self.world.awaited_topic(slot, inputs).is_some()
-                || self.overseer.replacements.view.slots[slot].awaits_other
+                || self.decisions.replacements.view.slots[slot].awaits_other
         };
-        let lives = |node: usize| self.overseer.replacements.view.lives(node, generation);
+        let lives = |node: usize| self.decisions.replacements.view.lives(node, generation);
         match self.plan.group_of(node).filter(|_| generation == 0) {
             Some(group) => !group.members.iter().any(|member| lives(member.node) && sleeps(member.node)),
             None => !sleeps(node),
@@ -81,7 +81,7 @@ impl<W: World> Supervisor<'_, W> {
     /// Host time in which a paced run must come forward: that of the slowest node's period.
     pub(super) fn deadline(&self) -> Duration {
         let period_ticks = self.plan.nodes.iter().map(|node| node.period_ticks).max().unwrap_or(1);
-        match self.overseer.replacements.view.pace {
+        match self.decisions.replacements.view.pace {
             Pace::Free => Duration::ZERO,
             Pace::Factor(factor) => {
                 Duration::from_secs_f64((f64::from(period_ticks) * self.plan.tick_s() / factor).min(1e6))
@@ -91,7 +91,7 @@ impl<W: World> Supervisor<'_, W> {
 
     /// Message: the processes that are behind the others, and the conditions that they wait for.
     pub(super) fn describe_standstill(&self, straggler: Option<Role>, stood: Duration) -> String {
-        let view = &self.overseer.replacements.view;
+        let view = &self.decisions.replacements.view;
         let names = |phase| {
             let late = self.plan.nodes.iter().enumerate().filter(|(index, _)| !view.is_ready(*index, phase));
             late.map(|(_, node)| format!("`{}`", node.name)).collect::<Vec<_>>().join(", ")
@@ -115,13 +115,13 @@ impl<W: World> Supervisor<'_, W> {
 
     /// Message: the instances that are awake and do not advance, and the topics that the others sleep for.
     fn describe_stuck(&self) -> String {
-        let (plan, view) = (self.plan, &self.overseer.replacements.view);
+        let (plan, view) = (self.plan, &self.decisions.replacements.view);
         let slot = |&(node, generation): &(usize, u32)| plan.slot(node, generation);
         let done = |instance: &(usize, u32)| view.slots[slot(instance)].done;
         let computes = |instance: &(usize, u32)| {
             view.slots[slot(instance)].state == SlotState::Taken && !view.has_completed(slot(instance))
         };
-        let instances: Vec<(usize, u32)> = self.overseer.replacements.instances().filter(computes).collect();
+        let instances: Vec<(usize, u32)> = self.decisions.replacements.instances().filter(computes).collect();
         let name = |&(node, generation): &(usize, u32)| {
             format!("`{}`", bus::names::process_name(&plan.nodes[node].name, generation))
         };
@@ -133,7 +133,7 @@ impl<W: World> Supervisor<'_, W> {
         }
         let tick = stuck.iter().map(|instance| view.completed_by(slot(instance))).min().unwrap_or(0);
         let waiting = instances.iter().filter_map(|instance| {
-            let inputs = self.overseer.replacements.inputs(instance.0, instance.1);
+            let inputs = self.decisions.replacements.inputs(instance.0, instance.1);
             let topic = self.world.awaited_topic(slot(instance), inputs)?;
             Some(format!("; {} waits for {}", name(instance), plan.topics[topic].name))
         });

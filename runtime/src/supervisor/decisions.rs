@@ -1,9 +1,9 @@
 //! Decisions about the end of a process: they follow from observations, and touch no process.
 
 use crate::program::OnExit;
-use crate::replacement::{InstanceRole, Replacements, Stage};
 use crate::role::Role;
-use crate::supervisor::{Action, Event, State};
+use crate::supervisor::replacement::{InstanceRole, Replacements, Stage};
+use crate::supervisor::state_machine::{Action, Event, State};
 use bus::lockstep::Phase;
 use bus::plan::{NodePlan, Plan};
 
@@ -24,7 +24,7 @@ pub struct Abort(pub String);
 
 /// Decides the consequences of events: the states of the run, and those of its replacements.
 #[derive(Debug)]
-pub struct Overseer<'a> {
+pub struct Decisions<'a> {
     plan: &'a Plan,
     /// State of the run.
     pub state: State,
@@ -36,7 +36,7 @@ pub struct Overseer<'a> {
     pub has_answered: bool,
 }
 
-impl<'a> Overseer<'a> {
+impl<'a> Decisions<'a> {
     /// Decides for the run of `plan`, which begins.
     pub fn new(plan: &'a Plan, replacements: Replacements<'a>) -> Self {
         Self { plan, state: State::Starting, replacements, notes: Vec::new(), has_answered: false }
