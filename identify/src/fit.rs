@@ -461,7 +461,7 @@ impl<'f> Problem<'f> {
     }
 
     /// The weights of the rows of one knot.
-    fn row_weights(&self, flight: &Prepared) -> Vec<f64> {
+    pub fn row_weights(&self, flight: &Prepared) -> Vec<f64> {
         let weight = |component| self.noises.get(&component).map_or(0.0, |noise| noise.model.weight());
         components(flight).map(weight).collect()
     }

@@ -20,7 +20,7 @@
 //! | `normal`, `fit`, `fit_result` | generalised least squares over blocks of time: an estimation problem and its result |
 //! | `logging` | timing errors that slowly logged commands make |
 //! | `select`, `judgement`, `revision`, `confounded` | the stepwise search for the effects that the flights ask for, its revision by predictions, and their rivals |
-//! | `ratios` | what flights determine that show rotation alone |
+//! | `ratios`, `instruments` | what flights determine that show rotation alone, and its fit by instrumental variables |
 //! | `questions`, `evidence`, `log_rates` | open questions, and what a simulated flight would say on them |
 //! | [`proposal`] | the next flight, as reports hold it |
 //! | `rig` | flights of vehicles that a rig holds |
@@ -68,6 +68,7 @@ mod fit_result;
 mod forecast;
 mod foresight;
 mod horizons;
+mod instruments;
 mod judgement;
 mod lever;
 mod limits;

@@ -184,6 +184,27 @@ impl Model {
         (residual.to_vec(), columns.iter().map(|column| column.to_vec()).collect())
     }
 
+    /// The derivatives with the rotors that follow from the commands alone, where these are logged.
+    pub fn instruments(&self, flight: &Prepared, values: &[f64], free: &[usize]) -> Vec<Vec<f64>> {
+        let (tracks, rotors) = (self.tracks(flight, values), self.commanded_rotors(flight, values));
+        let residual = Arc::new(self.residual(flight, &tracks, &rotors, values));
+        let about = About { model: self, flight, values, tracks, rotors, residual, is_commanded: true };
+        let flown = about.flown();
+        let conditions = about.conditions(&flown);
+        free.iter().map(|parameter| about.column(*parameter, &flown, &conditions)).collect()
+    }
+
+    /// The rotors that follow from the commands; the measured ones where none are logged.
+    fn commanded_rotors(&self, flight: &Prepared, values: &[f64]) -> Rotors {
+        if flight.flight.command.is_empty() {
+            return self.rotors(flight, values);
+        }
+        let pose_s = SensorErrors::of(&self.parameters, values).pose_delay_s;
+        let flown = spun(&self.airframe_of(flight, values), flight, pose_s);
+        let commanded = flown.iter().map(speeds).collect();
+        Rotors::new(flown, commanded)
+    }
+
     /// The residual under `values`.
     pub fn residual_under(&self, flight: &Prepared, values: &[f64]) -> Vec<f64> {
         self.residual(flight, &self.tracks(flight, values), &self.rotors(flight, values), values)
@@ -198,6 +219,8 @@ struct About<'m, 'p, 'f> {
     tracks: Arc<Tracks>,
     rotors: Rotors,
     residual: Rows,
+    /// True if measured rotor speeds are left aside.
+    is_commanded: bool,
 }
 
 impl<'m, 'p, 'f> About<'m, 'p, 'f> {
@@ -205,7 +228,16 @@ impl<'m, 'p, 'f> About<'m, 'p, 'f> {
     fn of(model: &'m Model, flight: &'p Prepared<'f>, values: &'m [f64], residual: Option<Rows>) -> Self {
         let (tracks, rotors) = (model.tracks(flight, values), model.rotors(flight, values));
         let residual = residual.unwrap_or_else(|| Arc::new(model.residual(flight, &tracks, &rotors, values)));
-        Self { model, flight, values, tracks, rotors, residual }
+        Self { model, flight, values, tracks, rotors, residual, is_commanded: false }
+    }
+
+    /// The rotors under other values.
+    fn rotors_under(&self, values: &[f64]) -> Rotors {
+        if self.is_commanded {
+            self.model.commanded_rotors(self.flight, values)
+        } else {
+            self.model.rotors(self.flight, values)
+        }
     }
 
     /// The model under the values.
@@ -248,7 +280,7 @@ impl<'m, 'p, 'f> About<'m, 'p, 'f> {
                 let behind = model.residual_under(flight, &moved_by(-step));
                 return ahead.iter().zip(&behind).map(|(a, b)| (a - b) / (2.0 * step)).collect();
             }
-            Stage::Rotors => model.residual(flight, &self.tracks, &model.rotors(flight, &ahead), &ahead),
+            Stage::Rotors => model.residual(flight, &self.tracks, &self.rotors_under(&ahead), &ahead),
             Stage::Body if entry.kind.only_adds() => {
                 return self.column_of_added((entry.kind, &ahead, step), flown, conditions);
             }

@@ -51,7 +51,8 @@ impl Ratios {
                 free.extend(alone_about(problem, axis));
             }
         }
-        let all = problem.fitted(&fitted.values, &free);
+        // Measured rotors are noisy regressors, by which least squares finds too small ratios.
+        let all = problem.fitted_by_instruments(&problem.fitted(&fitted.values, &free));
         let of_axes = std::array::from_fn(|axis| ratio(problem, &all, axis));
         Some(Self { of_axes, experiment: EXPERIMENT })
     }

@@ -1,8 +1,11 @@
 //! Hidden truths of vehicles on a rig, and their judgement.
 
 use super::bearing::{Bearing, Friction};
+use flights::Channel;
+use identify::Ratios;
 use identify::report::Report;
-use identify::run::identify;
+use identify::run::{identify, problem};
+use vehicles::Vehicle;
 
 /// Length of each flight.
 pub const DURATION_S: f64 = 20.0;
@@ -53,6 +56,56 @@ pub const TRUTHS: [Truth; 12] =
             Bearing { thrust: 0.95, friction: GIMBAL, ..plain }
         }),
     ];
+
+/// Channels of a log, and the vehicle with them.
+pub type Logged = (&'static str, fn(Rig) -> Rig);
+
+/// A vehicle on its bearing, and the channels that are not logged.
+#[derive(Debug, Clone, Copy)]
+pub struct Rig {
+    pub bearing: Bearing,
+    /// True if only the attitude shows the rotation.
+    pub is_without_gyroscope: bool,
+}
+
+/// Logs in which ratios are looked for.
+pub const LOGS: [Logged; 3] = [
+    ("gyroscope", |rig| rig),
+    ("gyroscope, rotor speeds", |mut rig| {
+        rig.bearing.sensors.has_rotor_speeds = true;
+        rig
+    }),
+    ("attitude alone", |rig| Rig { is_without_gyroscope: true, ..rig }),
+];
+
+/// The true ratios of a vehicle on its bearing, as multiples of the declared: thrust by inertia about x and y, drag torque by inertia about z.
+pub fn true_ratios(bearing: &Bearing) -> [f64; 3] {
+    let [x, y, z] = bearing.inertia;
+    [bearing.thrust / x, bearing.thrust / y, 1.0 / z]
+}
+
+/// Errors of the ratios by axis, as a part of the truth, with half of their intervals, where these effects are known to act.
+pub fn errors_of_ratios(rig: &Rig, effects: &[&str]) -> [(f64, f64); 3] {
+    let mut set = rig.bearing.flights("hummingbird.toml");
+    if rig.is_without_gyroscope {
+        set.flights.iter_mut().for_each(|flight| flight.angular_velocity = Channel::default());
+    }
+    let vehicle = Vehicle::load(&set.vehicle).expect("a vehicle file");
+    let (mut problem, _) = problem(&vehicle, &[], &set).expect("flights to identify on");
+    let of_effect = |name: &&str| problem.model.parameters.of_name(name);
+    let free: Vec<usize> = effects.iter().flat_map(of_effect).collect();
+    let mut fitted = problem.fitted(&problem.model.parameters.baseline(), &[]);
+    for _ in 0..3 {
+        problem.weigh(&fitted, &[]);
+        fitted = problem.fitted(&fitted.values, &free);
+    }
+    let found = Ratios::of(&problem, &fitted).expect("rotation alone");
+    let truth = true_ratios(&rig.bearing);
+    std::array::from_fn(|axis| {
+        let ratio = found.of_axes[axis];
+        (ratio.value / truth[axis] - 1.0, 0.5 * (ratio.high - ratio.low) / truth[axis])
+    })
+}
 
 /// Judgement of a report on a hidden truth.
 #[derive(Debug, PartialEq, Eq)]
