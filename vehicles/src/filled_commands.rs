@@ -297,7 +297,7 @@ mod tests {
         };
         let steady = amid(&|_, at| (500..700).contains(&at).then_some(76.0));
         let ramped = amid(&|_, at| (500..900).contains(&at).then(|| ramp(time_s[at])));
-        let single = amid(&|rotor, at| (rotor < 3 && (500..700).contains(&at)).then(|| 0.01 * at as f64));
+        let single = amid(&|rotor, at| (rotor < 3 && (500..700).contains(&at)).then_some(0.01 * at as f64));
         let coarse = amid(&|_, at| Some(70.0 + (at / 40 % 4) as f64 + (at % 40 / 10) as f64));
         for rotors in [steady, ramped, single, coarse] {
             assert_eq!(found(&time_s, &rotors, false), Filled::default());
