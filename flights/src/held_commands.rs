@@ -1,26 +1,20 @@
-//! Commands that the logger held: they repeat to the last bit while the vehicle goes on turning. Nobody knows them there; the
-//! repeats are left out, so that every reader finds a gap.
+//! Commands that a logger held, or that an exporter filled in: nobody knows them there. They are left out, so that every reader
+//! finds a gap.
 
 use crate::canonical::turning;
 use crate::flight::{Channel, Flight, median};
 use crate::held;
+use std::ops::RangeInclusive;
 use vehicles::Vehicle;
+use vehicles::command_log::{CommandLog, Stretch};
+use vehicles::filled_commands::Filled;
 use vehicles::gaps::held_period_s;
+use vehicles::held_commands;
 
-/// Shortest stretch; whole numbers of a coarse range repeat for less.
-const HELD_S: f64 = 1.0;
-/// Shortest stretch in which all rotors repeat at once; motors reach another speed in a longer one.
-const TOGETHER_S: f64 = 0.1;
-/// And it is so many times as long as commands usually stay.
-const USUAL_STAYS: usize = 5;
-/// Least number of equal samples.
-const LEAST_SAMPLES: usize = 20;
-/// Least change in the same time elsewhere, in the smallest steps of the channel: a coarser one shows nothing.
-const STEPS: f64 = 10.0;
-/// Within the stretch the vehicle turns by this part of what it does elsewhere, at least.
-const GOES_ON: f64 = 0.5;
-/// Greatest part of the commands that a logger holds: if more repeat, a motor's column is wrong.
-const PART_MAX: f64 = 0.5;
+/// Stretches that a note names.
+const NAMED: usize = 5;
+/// A vehicle that nothing carries is pushed by less than this part of gravity, and falls by more than the rest of it.
+const CARRIED: f64 = 0.5;
 
 impl Flight {
     /// Usual longest time between two commands: between those that differ, where the log holds them on a finer grid. `None`
@@ -54,48 +48,79 @@ impl Flight {
     }
 }
 
-/// Leaves out the repeats of commands that the logger held, and notes them.
+/// Leaves out commands that an exporter filled in and repeats of commands that the logger held, and notes them.
 pub fn leave_out(flight: &mut Flight, vehicle: &Vehicle) {
     if flight.commands_on_change || !flight.assumed.is_empty() {
         return;
     }
     let rates = rates(flight);
-    let command = &flight.command;
-    let rotors = vehicle.rotors.len();
-    let held: Vec<(usize, usize)> = (0..rotors).flat_map(|rotor| held(command, rotor, vehicle)).collect();
-    let together = held_together(command, vehicle);
-    // Of a log that holds most of its commands nothing is left out, and there may be many stretches.
-    let count = |stretches: &[(usize, usize)]| stretches.iter().map(|(from, to)| to - from).sum::<usize>();
-    let samples = count(&held).max(rotors * count(&together));
-    if samples as f64 > PART_MAX * (rotors * command.time_s.len()) as f64 {
-        return;
-    }
-    let times_s = |(from, to): &(usize, usize)| (command.time_s[*from], command.time_s[*to]);
-    // In a short one the vehicle turns little, in all of them as much as elsewhere.
-    let all_s: Vec<(f64, f64)> = together.iter().map(times_s).collect();
-    let together = if goes_on(&rates, &all_s) { together } else { Vec::new() };
-    let long = held.into_iter().filter(|stretch| goes_on(&rates, &[times_s(stretch)]));
-    let stretches: Vec<(usize, usize)> = long.chain(together).collect();
-    let mut is_kept = vec![true; command.time_s.len()];
+    let filled =
+        Filled::of(&log(flight, vehicle, &rates), &|from_s, to_s| falls(flight, vehicle, from_s, to_s));
+    note_filled(flight, &filled);
+    let stretches: Vec<RangeInclusive<usize>> = filled.stretches().map(|(from, to)| *from..=*to).collect();
+    remove(flight, &stretches);
+    let held = held_commands::of(&log(flight, vehicle, &rates));
+    note_held(flight, &held);
     // The first of a stretch was fresh.
-    stretches.iter().for_each(|(from, to)| is_kept[from + 1..=*to].fill(false));
-    let repeats = is_kept.iter().filter(|is_kept| !**is_kept).count();
-    if repeats == 0 || repeats as f64 > PART_MAX * is_kept.len() as f64 {
-        return;
+    let repeats: Vec<RangeInclusive<usize>> = held.iter().map(|(from, to)| from + 1..=*to).collect();
+    remove(flight, &repeats);
+}
+
+/// The commands of `flight`, a column for each rotor of `vehicle`, beside its `rates`.
+fn log<'a>(flight: &'a Flight, vehicle: &Vehicle, rates: &'a Channel<3>) -> CommandLog<'a> {
+    let Channel { time_s, values } = &flight.command;
+    let column = |rotor: usize| values.iter().map(|values| values[rotor]).collect();
+    CommandLog {
+        time_s,
+        rotors: (0..vehicle.rotors.len()).map(column).collect(),
+        range: (vehicle.command.min, vehicle.command.max),
+        rate_time_s: &rates.time_s,
+        rates: &rates.values,
     }
-    let longest = stretches.iter().max_by(|a, b| {
-        let length_s = |(from, to): &(usize, usize)| command.time_s[*to] - command.time_s[*from];
-        length_s(a).total_cmp(&length_s(b))
-    });
-    if let Some((from, to)) = longest {
-        let [from_s, to_s] = [from, to].map(|at| command.time_s[*at]);
+}
+
+fn remove(flight: &mut Flight, stretches: &[RangeInclusive<usize>]) {
+    let mut is_kept = vec![true; flight.command.time_s.len()];
+    stretches.iter().for_each(|stretch| is_kept[stretch.clone()].fill(false));
+    flight.command = flight.command.kept(|at| is_kept[at]);
+}
+
+fn note_filled(flight: &mut Flight, filled: &Filled) {
+    let time_s = &flight.command.time_s;
+    let kinds = [
+        (&filled.zeros, "zeros, before and behind which the vehicle flies"),
+        (&filled.lines, "straight lines of all rotors from one command to the next, between noisy ones"),
+    ];
+    for (stretches, kind) in kinds.into_iter().filter(|(stretches, _)| !stretches.is_empty()) {
+        let count: usize = stretches.iter().map(|(from, to)| to + 1 - from).sum();
+        let one = |(from, to): &Stretch| format!("{:.2} s to {:.2} s", time_s[*from], time_s[*to]);
+        let named: Vec<String> = stretches.iter().take(NAMED).map(one).collect();
+        let more = match stretches.len().saturating_sub(NAMED) {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
         flight.notes.push(format!(
-            "command: {repeats} of {} samples are held by the logger: they repeat to the last digit while the vehicle goes on \
-             turning, the longest from {from_s:.2} s to {to_s:.2} s; left out",
-            is_kept.len()
+            "command: {count} of {} samples in {} stretches were filled in by an exporter: {kind}; from {}{more}; left out",
+            time_s.len(),
+            stretches.len(),
+            named.join(", from ")
         ));
     }
-    flight.command = flight.command.kept(|at| is_kept[at]);
+}
+
+fn note_held(flight: &mut Flight, held: &[Stretch]) {
+    let time_s = &flight.command.time_s;
+    let times_s = |(from, to): &Stretch| (time_s[*from], time_s[*to]);
+    let longest = held.iter().map(times_s).max_by(|a, b| (a.1 - a.0).total_cmp(&(b.1 - b.0)));
+    let Some((from_s, to_s)) = longest else { return };
+    let mut is_repeat = vec![false; time_s.len()];
+    held.iter().for_each(|(from, to)| is_repeat[from + 1..=*to].fill(true));
+    let repeats = is_repeat.iter().filter(|is_repeat| **is_repeat).count();
+    flight.notes.push(format!(
+        "command: {repeats} of {} samples are held by the logger: they repeat to the last digit while the vehicle goes on \
+         turning, the longest from {from_s:.2} s to {to_s:.2} s; left out",
+        time_s.len()
+    ));
 }
 
 /// Angular velocity, or else the rate of change of the attitude.
@@ -106,85 +131,42 @@ fn rates(flight: &Flight) -> Channel<3> {
     flight.angular_velocity.clone()
 }
 
-/// Stretches in which the command of a rotor repeats, each by its first and last sample. At its limits a command may stay.
-fn held<const N: usize>(command: &Channel<N>, rotor: usize, vehicle: &Vehicle) -> Vec<(usize, usize)> {
-    let number = |at: usize| command.values[at][rotor];
-    let (least, greatest) = limits(command, rotor, vehicle);
-    let is_at_limit = |number: f64| number <= least || number >= greatest;
-    let (mut found, mut from) = (Vec::new(), 0);
-    for at in 1..=command.values.len() {
-        if command.values.get(at).is_some_and(|values| values[rotor].to_bits() == number(from).to_bits()) {
-            continue;
-        }
-        let to = at - 1;
-        let is_long = to - from >= LEAST_SAMPLES && command.time_s[to] - command.time_s[from] >= HELD_S;
-        if is_long && !is_at_limit(number(from)) && is_fine(command, rotor, to - from) {
-            found.push((from, to));
-        }
-        from = at;
+/// True if the motion shows that nothing carries the vehicle in the second half of the time: rotors go on turning for a moment.
+fn falls(flight: &Flight, vehicle: &Vehicle, from_s: f64, to_s: f64) -> bool {
+    let gravity_m_s2 = vehicle.gravity_m_s2;
+    let within = |time_s: &f64| (f64::midpoint(from_s, to_s)..=to_s).contains(time_s);
+    let forces = flight.specific_force.time_s.iter().zip(&flight.specific_force.values);
+    let sizes = forces
+        .filter(|(time_s, _)| within(time_s))
+        .map(|(_, f)| f.iter().map(|part| part * part).sum::<f64>().sqrt());
+    if let Some(size) = median(sizes) {
+        return size < CARRIED * gravity_m_s2;
     }
-    found
+    let velocity =
+        flight.velocity.time_s.iter().zip(&flight.velocity.values).filter(|(time_s, _)| within(time_s));
+    let speeds: Vec<(f64, f64)> = velocity.map(|(time_s, v)| (*time_s, v[2])).collect();
+    if let Some(rise_m_s2) = slope(&speeds) {
+        return rise_m_s2 < -CARRIED * gravity_m_s2;
+    }
+    let position = flight.position.time_s.iter().zip(&flight.position.values);
+    let heights: Vec<(f64, f64)> = position
+        .filter(|(time_s, _)| (from_s..=to_s).contains(*time_s))
+        .map(|(time_s, p)| (*time_s, p[2]))
+        .collect();
+    let (before, behind) = heights.split_at(heights.len() / 2);
+    let change_m_s = slope(behind).zip(slope(before)).map(|(behind, before)| behind - before);
+    change_m_s.is_some_and(|change_m_s| change_m_s < -CARRIED * gravity_m_s2 * (to_s - from_s) / 2.0)
 }
 
-/// Shorter stretches in which the commands of all rotors repeat at once, which fine commands do not do by chance.
-fn held_together<const N: usize>(command: &Channel<N>, vehicle: &Vehicle) -> Vec<(usize, usize)> {
-    let starts: Vec<usize> = held::starts(&command.values).chain([command.values.len()]).collect();
-    let mut stays: Vec<usize> = starts.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    stays.sort_unstable();
-    let Some(usual) = stays.get(stays.len() / 2) else { return Vec::new() };
-    let limits: Vec<(f64, f64)> =
-        (0..vehicle.rotors.len()).map(|rotor| limits(command, rotor, vehicle)).collect();
-    let is_held = |(from, to): &(usize, usize)| {
-        let duration_s = command.time_s[*to] - command.time_s[*from];
-        let inside = |(rotor, (least, greatest)): (usize, &(f64, f64))| {
-            let number = command.values[*from][rotor];
-            number > *least && number < *greatest
-        };
-        to - from >= USUAL_STAYS * usual
-            && (TOGETHER_S..HELD_S).contains(&duration_s)
-            && limits.iter().enumerate().any(inside)
-            && (0..limits.len()).all(|rotor| is_fine(command, rotor, to - from))
-    };
-    starts.windows(2).map(|pair| (pair[0], pair[1] - 1)).filter(is_held).collect()
-}
-
-/// Numbers at which the command of a rotor may stay.
-fn limits<const N: usize>(command: &Channel<N>, rotor: usize, vehicle: &Vehicle) -> (f64, f64) {
-    // A controller may clamp within the range of the vehicle file: what is never passed is a limit.
-    let numbers = || command.values.iter().map(|values| values[rotor]);
-    let least = numbers().fold(f64::INFINITY, f64::min).max(vehicle.command.min);
-    let greatest = numbers().fold(f64::NEG_INFINITY, f64::max).min(vehicle.command.max);
-    (least, greatest)
-}
-
-/// True if the command changes in `count` samples by many of its smallest steps, in nine of ten places.
-fn is_fine<const N: usize>(command: &Channel<N>, rotor: usize, count: usize) -> bool {
-    let numbers: Vec<f64> = command.values.iter().map(|values| values[rotor]).collect();
-    let size = numbers.iter().fold(0.0_f64, |size, number| size.max(number.abs()));
-    // Smaller steps are rounding errors of a unit conversion.
-    let steps = numbers.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| *step > 1e-9 * size);
-    let Some(least) = steps.reduce(f64::min) else { return false };
-    // Of the stretch itself nothing is taken: there the way is zero.
-    let ways = numbers.iter().zip(numbers.iter().skip(count)).map(|(from, to)| (to - from).abs());
-    let mut ways: Vec<f64> = ways.filter(|way| *way > 0.0).collect();
-    ways.sort_by(f64::total_cmp);
-    ways.get(ways.len() / 10).is_some_and(|way| *way > STEPS * least)
-}
-
-/// True if the vehicle turns in `stretches_s` about as much as elsewhere.
-fn goes_on(rates: &Channel<3>, stretches_s: &[(f64, f64)]) -> bool {
-    let within = |time_s: f64| stretches_s.iter().any(|(from_s, to_s)| (*from_s..=*to_s).contains(&time_s));
-    let inside: Vec<bool> = rates.time_s.iter().map(|time_s| within(*time_s)).collect();
-    let is_inside = |at: usize| inside[at];
-    (0..3).any(|axis| {
-        let usual_size = |inside: bool| {
-            let of = (0..rates.values.len()).filter(|at| is_inside(*at) == inside);
-            let numbers: Vec<f64> = of.map(|at| rates.values[at][axis]).collect();
-            let middle = median(numbers.iter().copied())?;
-            median(numbers.iter().map(|number| (number - middle).abs()))
-        };
-        matches!((usual_size(true), usual_size(false)), (Some(inside), Some(outside)) if outside > 0.0 && inside > GOES_ON * outside)
-    })
+/// Slope of the straight line through points that leaves the least squares; `None` with fewer than three.
+fn slope(points: &[(f64, f64)]) -> Option<f64> {
+    let count = points.len() as f64;
+    let (time_s, value) =
+        points.iter().fold((0.0, 0.0), |sum, point| (sum.0 + point.0 / count, sum.1 + point.1 / count));
+    let of = |product: &dyn Fn(&(f64, f64)) -> f64| points.iter().map(product).sum::<f64>();
+    let squares = of(&|point| (point.0 - time_s).powi(2));
+    (points.len() >= 3 && squares > 0.0)
+        .then(|| of(&|point| (point.0 - time_s) * (point.1 - value)) / squares)
 }
 
 #[cfg(test)]
@@ -250,6 +232,36 @@ mod tests {
             }
             leave_out(&mut flight, &vehicle);
             assert_eq!((flight.command.time_s.len(), flight.notes), (2000, vec![]), "{is_coarse}");
+        }
+    }
+
+    /// Zeros of a vehicle that falls are commands; the accelerometer, the velocity or the position shows it.
+    #[test]
+    fn zeros_of_a_fall_are_commands() {
+        let vertical = |t: f64, is_falling: bool| {
+            let fallen_s = if is_falling { (t - 5.0).clamp(0.0, 0.4) } else { 0.0 };
+            (
+                5.0 - 4.9 * fallen_s * fallen_s,
+                -9.8 * fallen_s,
+                if is_falling && (5.0..5.4).contains(&t) { 0.0 } else { 9.8 },
+            )
+        };
+        for (sensor, is_falling) in (0..3).flat_map(|sensor| [(sensor, false), (sensor, true)]) {
+            let (mut flight, vehicle) = flight();
+            flight.command.values[500..540].iter_mut().for_each(|values| values.fill(0.0));
+            let time_s = flight.command.time_s.clone();
+            let of = |value: &dyn Fn((f64, f64, f64)) -> f64| {
+                let values = time_s.iter().map(|t| [0.0, 0.0, value(vertical(*t, is_falling))]).collect();
+                Channel { time_s: time_s.clone(), values }
+            };
+            match sensor {
+                0 => flight.position = of(&|(height_m, _, _)| height_m),
+                1 => flight.velocity = of(&|(_, rise_m_s, _)| rise_m_s),
+                _ => flight.specific_force = of(&|(_, _, force_m_s2)| force_m_s2),
+            }
+            leave_out(&mut flight, &vehicle);
+            let left = if is_falling { 2000 } else { 1960 };
+            assert_eq!(flight.command.time_s.len(), left, "{sensor} {is_falling}: {:?}", flight.notes);
         }
     }
 

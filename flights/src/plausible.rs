@@ -3,6 +3,7 @@
 //! A mismatch is clear where a known factor, frame or order explains it; otherwise it is only worth a note.
 
 use nalgebra::Vector3;
+use vehicles::bearing::Bearing;
 use vehicles::{ROTORS_MAX, Vehicle};
 
 use crate::agreement::{Agreement, Pairs};
@@ -544,24 +545,25 @@ impl Judge<'_> {
     /// The thrust of the commands bears the vehicle, if it moves freely.
     fn lift(&self, range: &str) -> Option<Finding> {
         let vehicle = self.vehicle;
-        let weight = vehicle.mass_kg * vehicle.gravity_m_s2;
-        let thrust = |commands: &[f64; ROTORS_MAX]| -> f64 {
-            let rotors = vehicle.rotors.iter().zip(commands).filter(|(rotor, _)| !rotor.has_failed);
-            let squares =
-                rotors.map(|(rotor, command)| rotor.axis.z * vehicle.command.speed(*command).powi(2));
-            vehicle.thrust_coefficient * squares.sum::<f64>()
-        };
+        let thrust = |commands: &[f64; ROTORS_MAX]| vehicle.static_thrust_by(&vehicle.command, commands);
         let thrusts = || self.flight.command.values.iter().map(thrust);
         // On the ground motors idle.
         let high = usual_greatest(thrusts())?;
-        let factor = median(thrusts().filter(|thrust| *thrust > AIRBORNE * high))? / weight;
+        let is_airborne = |commands: &&[f64; ROTORS_MAX]| thrust(commands) > AIRBORNE * high;
+        let airborne: Vec<[f64; ROTORS_MAX]> =
+            self.flight.command.values.iter().filter(is_airborne).copied().collect();
+        let bearing = Bearing::of(vehicle, &airborne)?;
+        let factor = bearing.share;
         let is_judged = factor.is_finite() && !LIFT_RANGE.contains(&factor);
         if !is_judged || hold(self.flight, vehicle.gravity_m_s2) != Hold::Free {
             return None;
         }
         let what = format!("{range}; in flight their thrust is {factor:.2} times the weight");
-        let fits = "a vehicle file with the `[command]`, thrust and mass of this vehicle, or another `scale` of the commands,";
-        Some(finding(Quantity::Command, Some(fits.to_owned()), &what))
+        let fits = format!(
+            "a vehicle file with the `[command]`, thrust and mass of this vehicle, or another `scale` of the commands{},",
+            bearing.fitting().map_or(String::new(), |fitting| format!(" ({fitting})"))
+        );
+        Some(finding(Quantity::Command, Some(fits), &what))
     }
 
     /// The rotors turn about as fast as hover needs.

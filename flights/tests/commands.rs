@@ -90,3 +90,48 @@ fn a_table_needs_commands_and_motion_at_one_time() {
         assert!(error.contains(part), "no {part:?} in {error}");
     }
 }
+
+/// The made-up flight of 10 s with noisy commands, which `change` replaces in some rows.
+fn merged(change: impl Fn(usize, usize, &[f64]) -> Option<f64>) -> Flight {
+    let text = Motion::default().csv();
+    let (header, rows) = text.split_once('\n').expect("a header");
+    let noise = |at: usize, rotor: usize| 76.0 + ((at * 7919 + rotor * 131) % 97) as f64 / 20.0;
+    let columns: Vec<Vec<f64>> =
+        (0..4).map(|rotor| (0..=1000).map(|at| noise(at, rotor)).collect()).collect();
+    let row = |(at, line): (usize, &str)| {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        for (rotor, column) in columns.iter().enumerate() {
+            cells[rotor + 1] = change(at, rotor, column).unwrap_or(column[at]).to_string();
+        }
+        cells.join(",") + "\n"
+    };
+    let rows: String = rows.lines().enumerate().map(row).collect();
+    let place = Place::new();
+    place.write("log.csv", format!("{header}\n{rows}").as_bytes());
+    place.load("log.csv", CHANNELS, "").unwrap()
+}
+
+#[test]
+fn commands_that_an_exporter_filled_in_are_a_gap_and_noted() {
+    let is_in_gap = |at: usize| (300..400).contains(&at);
+    let zeros = merged(|at, _, _| is_in_gap(at).then_some(0.0));
+    let line = |at: usize, _: usize, column: &[f64]| {
+        let (first, last) = (column[299], column[400]);
+        is_in_gap(at).then(|| first + (last - first) * (at - 299) as f64 / 101.0)
+    };
+    for (flight, kind) in [(zeros, "zeros, before"), (merged(line), "straight lines of all rotors")] {
+        let note =
+            flight.notes.iter().find(|note| note.contains("filled in by an exporter")).expect("a note");
+        for part in ["100 of 1001 samples in 1 stretches", kind, "from 3.00 s to 3.99 s"] {
+            assert!(note.contains(part), "no {part:?} in {note}");
+        }
+        assert_eq!(flight.command.time_s.len(), 901);
+        let known = KnownRotors::of(&flight);
+        assert!(
+            known.hold(0.5, 2.99) && !known.hold(3.1, 3.2) && !known.hold(4.1, 4.4) && known.hold(4.51, 10.0)
+        );
+    }
+    let plain = merged(|_, _, _| None);
+    let steady = merged(|_, _, _| Some(76.0));
+    assert!([&plain, &steady].iter().all(|flight| flight.command.time_s.len() == 1001), "{:?}", steady.notes);
+}

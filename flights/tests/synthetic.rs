@@ -394,6 +394,8 @@ fn commands_that_do_not_bear_the_vehicle_are_refused() {
     let found = findings(&weak, CHANNELS);
     let [(Quantity::Command, fits)] = &found[..] else { panic!("{found:?}") };
     assert!(fits.contains("`[command]`") && fits.contains("`scale`"), "{fits}");
+    // Hover takes 76.4 counts; these are 0.35 times 101.5.
+    assert!(fits.contains("commands 2.15 times as large") && fits.contains("in place of 200"), "{fits}");
     let text = read(&weak, CHANNELS, "").unwrap_err().to_string();
     assert!(text.contains("in flight their thrust is 0.") && text.contains("times the weight"), "{text}");
     assert!(read(&weak, CHANNELS, "trust_units = true").is_ok());

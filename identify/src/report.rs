@@ -17,6 +17,7 @@ use diagnostics::unit::behind_number;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt;
+use vehicles::bearing::Bearing;
 
 pub use crate::horizons::{Change, Changes};
 pub use crate::noise::Noise;
@@ -33,6 +34,9 @@ pub struct Report {
     /// Predictions of the test flights that lose to persistence or to the declared vehicle: then the vehicle file does not
     /// describe these flights, with these effects or without.
     pub losses: Vec<Loss>,
+    /// Part of the weight that the commands bear in the mean of all flights; `None` where it is about the weight, or nothing shows it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bearing: Option<Bearing>,
     /// Effects that were accepted and taken back.
     pub withdrawn: Vec<Withdrawn>,
     /// True if the parameters were refined by prediction errors, because that predicts better.
@@ -288,6 +292,10 @@ impl Report {
                 writeln!(f, "  (not checked by predictions: {UNCHECKED})")?;
             }
         }
+        if let Some(bearing) = self.bearing {
+            let is_lost = self.is_undecided() || !self.losses.is_empty();
+            writeln!(f, "{}: {bearing}", if is_lost { "likely reason" } else { "warning" })?;
+        }
         if self.refined {
             writeln!(
                 f,
@@ -474,6 +482,7 @@ impl Report {
             flights: Vec::new(),
             verdict: Vec::new(),
             losses: Vec::new(),
+            bearing: None,
             withdrawn: Vec::new(),
             refined: false,
             effects: BTreeMap::new(),

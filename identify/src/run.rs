@@ -34,12 +34,16 @@ use flights::{Flight, FlightSet, Role};
 use plant::effects::{Effect, entry};
 use std::collections::BTreeMap;
 use vehicles::Vehicle;
+use vehicles::bearing::Bearing;
 
 pub use crate::error::IdentifyError;
 pub use crate::horizons::HORIZONS_S;
 
 /// A residual is worth telling where its persistent part is beyond this part of its noise.
 const UNEXPLAINED: f64 = 0.3;
+
+/// Parts of the weight that commands bear by a vehicle file that is right about them: batteries drain, and weights differ.
+const BORNE: std::ops::RangeInclusive<f64> = 0.7..=1.4;
 
 /// Greatest mean distance of samples of motion: beyond it they show nothing, and the computation of every tick
 /// would cost more time and memory than the comparison is worth.
@@ -132,6 +136,7 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
         vehicle: set.vehicle.display().to_string(),
         verdict: effect_reports::verdict(&problem, &selection),
         losses,
+        bearing: bearing(&problem),
         limits: limits(&of_measured_attitude(&problem, &held_out), &noise_floor),
         withdrawn: selection.withdrawn.clone(),
         refined: selection.refined.is_some(),
@@ -164,6 +169,23 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
     let questions = OpenQuestions::of(&problem, &selection, &rivals).filter(|_| is_found);
     drop(problem);
     Ok(Outcome { pictures, regressors, effects, late, sensor_errors, report, believed, questions })
+}
+
+/// Part of the weight that the commands of all flights together bear while they are compared, where that is not about the weight.
+fn bearing(problem: &Problem) -> Option<Bearing> {
+    let of_commands = |flight: &&Prepared| {
+        flight.moves_freely && flight.flight.rotor_speed.is_empty() && !flight.flight.command.is_empty()
+    };
+    let compared = |flight: &Prepared| {
+        let Prepared { flight, layout, .. } = flight;
+        let [first_s, last_s] = [layout.knots.first(), layout.knots.last()]
+            .map(|knot| knot.map_or(f64::NAN, |knot| layout.clock.at(*knot)));
+        let commands = flight.command.time_s.iter().zip(&flight.command.values);
+        let within = commands.filter(|(time_s, _)| (first_s..=last_s).contains(*time_s));
+        within.map(|(_, command)| *command).collect::<Vec<_>>()
+    };
+    let commands: Vec<_> = problem.flights().filter(of_commands).flat_map(compared).collect();
+    Bearing::of(&problem.model.vehicle, &commands).filter(|bearing| !BORNE.contains(&bearing.share))
 }
 
 /// The errors of flights whose attitude was measured: under an assumed one a prediction does not judge the vehicle.

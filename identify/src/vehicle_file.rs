@@ -174,6 +174,7 @@ mod tests {
             flights: Vec::new(),
             verdict: Vec::new(),
             losses: Vec::new(),
+            bearing: None,
             withdrawn: Vec::new(),
             refined: false,
             effects: BTreeMap::new(),

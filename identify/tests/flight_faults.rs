@@ -14,16 +14,33 @@ const COUNT: u64 = 6;
 /// The flight that gets a fault; the last is the one that is tested on.
 const FAULTY: usize = 2;
 
-/// Commands on another clock pass for no other order of the rotors.
+/// Greatest error of a time that is told, for a reason that is not known: 0.021 s over these flights and times, in most about 0.011 s.
+const TOLD_S: f64 = 0.025;
+
+/// Commands on another clock pass for no other order of the rotors, whether they are late or early.
 #[test]
 fn commands_on_another_clock_are_told_with_the_time() {
-    for late_s in [0.3, 0.45] {
-        let mut set = flown(false);
-        set.flights[FAULTY].command.time_s.iter_mut().for_each(|time_s| *time_s += late_s);
-        let fault = require(&set, "command", "other-clock");
-        let (_, told) = fault.found.split_once("`delay_s` of about ").expect("a time");
-        let told: f64 = told.parse().expect("a number");
-        assert!((told - late_s).abs() < 0.05, "{late_s}: {}", fault.found);
+    for seed in [60, 160, 260] {
+        let whole = several(&Case::of(&["mass-error", "rotor-drag"], 1.0, seed, DURATION_S));
+        let shifts_s = [-0.8, -0.45, -0.3, 0.25, 0.3, 0.45, 0.8];
+        let wrong: Vec<String> = shifts_s
+            .par_iter()
+            .filter_map(|late_s| {
+                let mut set = whole.clone();
+                set.flights[FAULTY].command.time_s.iter_mut().for_each(|time_s| *time_s += late_s);
+                let found = found(&set);
+                let told = |fault: &Fault| -> Option<f64> {
+                    fault.found.split_once("`delay_s` of about ")?.1.parse().ok()
+                };
+                let is_told = |fault: &Fault| {
+                    fault.flight == set.flights[FAULTY].name
+                        && (&fault.channel[..], fault.kind) == ("command", "other-clock")
+                        && told(fault).is_some_and(|told_s| (told_s - late_s).abs() < TOLD_S)
+                };
+                (found.len() != 1 || !is_told(&found[0])).then(|| format!("{late_s}: {found:?}"))
+            })
+            .collect();
+        assert!(wrong.is_empty(), "seed {seed}: {wrong:#?}");
     }
 }
 

@@ -4,10 +4,12 @@
 //! |---|---|
 //! | [`vehicle`] | the immutable [`Vehicle`] that the physics uses |
 //! | [`command`] | the map between a raw motor command and a rotor speed |
+//! | [`bearing`] | the part of the weight that commands bear, and the scale that would bear it |
 //! | `envelope` | the flight envelope in which a model was validated |
 //! | [`provenance`] | where each number came from, kept for reports |
 //! | [`effects`] | the effects that a vehicle or scene file lists, as they are written |
 //! | `bounds` | what the numbers of a vehicle can be, and why |
+//! | [`command_log`], [`filled_commands`], [`held_commands`] | commands of a log beside the motion; those that an exporter filled in, or a logger held |
 //! | [`from_model`] | first vehicle files from URDF and SDF |
 //! | [`gaps`] | gaps of logs whose samples hold until the next |
 //! | `file` | which keys a vehicle file has, and what is physical |
@@ -30,16 +32,20 @@
 //! ```
 #![forbid(unsafe_code)]
 
+pub mod bearing;
 mod bounds;
 pub mod command;
+pub mod command_log;
 mod dialect;
 pub mod effects;
 pub mod encoding;
 mod envelope;
 mod file;
+pub mod filled_commands;
 pub mod foreign;
 pub mod from_model;
 pub mod gaps;
+pub mod held_commands;
 mod layout;
 pub mod lines;
 pub mod provenance;

@@ -111,6 +111,14 @@ impl Vehicle {
         if has_failed { 0.0 } else { self.command.speed(command) }
     }
 
+    /// Thrust along z of the body, in N, of rotors that have settled at `commands` by `map`, a map of commands in place of the
+    /// vehicle's own.
+    pub fn static_thrust_by(&self, map: &CommandMap, commands: &[f64; ROTORS_MAX]) -> f64 {
+        let working = self.rotors.iter().zip(commands).filter(|(rotor, _)| !rotor.has_failed);
+        let squares = working.map(|(rotor, command)| rotor.axis.z * map.speed(*command).powi(2));
+        self.thrust_coefficient * squares.sum::<f64>()
+    }
+
     /// The raw motor command for hover, saturated to the motors' range.
     pub fn hover_command(&self) -> f64 {
         self.command.command(self.hover_speed_rad_s())

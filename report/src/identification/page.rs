@@ -239,6 +239,7 @@ mod tests {
             flights: FLIGHTS.map(flight).to_vec(),
             verdict: Vec::new(),
             losses: Vec::new(),
+            bearing: None,
             withdrawn: Vec::new(),
             refined: false,
             effects: BTreeMap::new(),
