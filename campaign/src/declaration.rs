@@ -290,11 +290,8 @@ fn require_dimensions(file: &File) -> Result<(), ParameterError> {
 /// # Errors
 /// If it has control characters.
 pub fn require_line(name: &str) -> Result<(), ParameterError> {
-    if name.contains(char::is_control) {
-        let expected = "a text without control characters such as ends of lines";
-        return Err(ParameterError::value("name", expected, diagnostics::printable_line(name)));
-    }
-    Ok(())
+    diagnostics::require_line(name)
+        .map_err(|refused| ParameterError::value("name", refused.expected, refused.found))
 }
 
 fn require_names(vary: &[Varied]) -> Result<(), Diagnostic> {

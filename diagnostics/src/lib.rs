@@ -34,6 +34,8 @@ pub use nearest::{did_you_mean, nearest};
 pub use parameter::ParameterError;
 pub use place::Place;
 pub use plain::plain;
-pub use printable::{is_printable, printable, printable_json, printable_line, short_lines, shortened};
+pub use printable::{
+    NotOneLine, is_printable, printable, printable_json, printable_line, require_line, short_lines, shortened,
+};
 pub use read::{Misread, parse_toml, read, read_toml, read_tree};
 pub use unit::{Dimension, convert};

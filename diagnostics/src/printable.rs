@@ -28,6 +28,34 @@ pub fn printable_line(text: &str) -> Cow<'_, str> {
     escaped(text, is_printable, push_rust)
 }
 
+/// Text that is more than a part of one line of a report.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NotOneLine {
+    /// Text as expected.
+    pub expected: &'static str,
+    /// Text as found, its control characters escaped.
+    pub found: String,
+}
+
+/// Refuses a text that would be more than a part of one line of a report.
+///
+/// ```
+/// assert!(diagnostics::require_line("höver 1").is_ok());
+/// let refused = diagnostics::require_line("hover\nverdict: held").unwrap_err();
+/// assert_eq!(refused.found, "hover\\nverdict: held");
+/// assert_eq!(refused.expected, "a text without control characters such as ends of lines");
+/// ```
+///
+/// # Errors
+/// If it has control characters.
+pub fn require_line(text: &str) -> Result<(), NotOneLine> {
+    if text.contains(char::is_control) {
+        let expected = "a text without control characters such as ends of lines";
+        return Err(NotOneLine { expected, found: printable_line(text).into_owned() });
+    }
+    Ok(())
+}
+
 /// The JSON text with the same characters as JSON escapes: it holds the same data.
 ///
 /// ```

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use diagnostics::{Diagnostic, printable_line};
+use diagnostics::{Diagnostic, NotOneLine, printable_line, require_line};
 use inputs::InputFiles;
 use toml::Spanned;
 use vehicles::Vehicle;
@@ -182,10 +182,14 @@ fn check_names(document: &Document, logs: &[Log<'_>]) -> Vec<FlightsError> {
     let refused = |log: &Log<'_>, expected: &str, found: String, advice: &str| {
         document.bad(&log.name_span(), format!("flight.{}.name", log.index), expected, found, advice)
     };
-    let with_control = logs.iter().filter(|log| log.name.contains(char::is_control)).map(|log| {
-        let expected = "a name without control characters such as ends of lines";
-        let found = format!("\"{}\"", printable_line(&log.name));
-        refused(log, expected, found, "correct the name; where it is the log's, rename the log")
+    let with_control = logs.iter().filter_map(|log| {
+        let NotOneLine { expected, found } = require_line(&log.name).err()?;
+        Some(refused(
+            log,
+            expected,
+            format!("\"{found}\""),
+            "correct the name; where it is the log's, rename the log",
+        ))
     });
     let mut names = BTreeSet::new();
     let again = logs.iter().filter(|log| !names.insert(log.name.as_str()));

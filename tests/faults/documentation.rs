@@ -4,7 +4,7 @@ use crate::support::repository;
 use std::path::Path;
 
 /// The sources that hold tests.
-const SOURCES: [&str; 11] = [
+const SOURCES: [&str; 12] = [
     "tests/faults",
     "tests/runs",
     "bus/src",
@@ -15,6 +15,7 @@ const SOURCES: [&str; 11] = [
     "vehicles/tests",
     "vehicles/src",
     "runtime/src",
+    "runtime/src/supervisor",
     "src",
 ];
 

@@ -176,7 +176,7 @@ fn names_with_ends_of_lines_forge_no_line() {
     let out = place.path("out");
     let ended = place.call(&["identify", &flights, "--out", &out]).with_code(2);
     require_one_line(&ended);
-    ended.says(&["flights.toml:4", "a name without control characters"]);
+    ended.says(&["flights.toml:4", "a text without control characters"]);
     // Names in recordings of others are escaped.
     let topic = format!("/{FORGED}");
     let a = place.write("a.mcap", recording(&topic, "one"));
@@ -189,6 +189,16 @@ fn names_with_ends_of_lines_forge_no_line() {
         &["plot", &a, "--out", &page, "--plot", "/none:x"],
     ];
     calls.iter().for_each(|args| require_one_line(&place.call(args)));
+    // And so are what the arguments of `plot` name, and their parts.
+    let calls: &[&[&str]] = &[
+        &["plot", &a, "--out", &page, "--plot", &format!("/none:{FORGED}")],
+        &["plot", &a, "--out", &page, "--plot", &format!("{topic}:number,{FORGED}:x")],
+        &["plot", &a, "--out", &page, "--plot", FORGED],
+        &["plot", &a, "--out", &page, "--against", FORGED],
+        &["plot", &a, "--out", &page, &format!("--against={FORGED}:x")],
+        &["plot", &a, "--out", &page, "--vehicle", FORGED],
+    ];
+    calls.iter().for_each(|args| require_one_line(&place.call(args).with_code(2)));
 }
 
 /// A recording with another encoding of messages and schemas is told with both, and not with a damage.

@@ -6,6 +6,7 @@ use crate::plot::scene;
 use crate::plot::thin::{Line, Poses};
 use crate::topics::{self, is_of_shadow, short_name};
 use anyhow::{Context, Result, bail};
+use diagnostics::printable_line;
 use recorder::reader::{Recording, Topic};
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -158,7 +159,13 @@ impl Choice {
             None => &vehicles[..],
             Some(name) => match vehicles.iter().position(|known| known == name) {
                 Some(index) => &vehicles[index..=index],
-                None => bail!("the recording has no vehicle `{name}`; it has {}", listed(&vehicles)),
+                None => {
+                    bail!(
+                        "the recording has no vehicle `{}`; it has {}",
+                        printable_line(name),
+                        listed(&vehicles)
+                    )
+                }
             },
         };
         let axes = if plots.is_empty() {
@@ -185,7 +192,7 @@ fn listed(names: &[String]) -> String {
     match names {
         [] => "none".to_owned(),
         [only] if only.is_empty() => "one without a name".to_owned(),
-        names => names.join(", "),
+        names => printable_line(&names.join(", ")).into_owned(),
     }
 }
 
@@ -246,26 +253,31 @@ fn trails(recording: &Recording, is_shown: impl Fn(&str) -> bool) -> Vec<(Ask, P
 
 /// Topic and number that `--against` names.
 fn number_of(recording: &Recording, against: &str) -> Result<Ask> {
+    let said = printable_line(against);
     let Some((topic, field)) = against.split_once(':') else {
-        bail!("--against {against}: it is not TOPIC:FIELD, such as /plant/state:rotor_speed[0]");
+        bail!("--against {said}: it is not TOPIC:FIELD, such as /plant/state:rotor_speed[0]");
     };
-    let found = recording.topic(topic).with_context(|| format!("--against {against}"))?;
+    let found = recording.topic(topic).with_context(|| format!("--against {said}"))?;
     Ok(Ask::new(topic, field, &found.type_name))
 }
 
 /// The axes that `TOPIC:FIELD,TOPIC:FIELD…` names; a field without a topic is of the topic before.
 fn named(recording: &Recording, plot: &str) -> Result<Wanted> {
+    let said = printable_line(plot);
     let mut last_topic = None;
     let mut asks = Vec::new();
     for part in plot.split(',').map(str::trim) {
         let named = part.split_once(':').or_else(|| last_topic.map(|topic| (topic, part)));
         let Some((topic, field)) = named else {
-            bail!("--plot {plot}: `{part}` is not TOPIC:FIELD, such as /plant/state:position.z");
+            bail!(
+                "--plot {said}: `{}` is not TOPIC:FIELD, such as /plant/state:position.z",
+                printable_line(part)
+            );
         };
         if field.is_empty() {
-            bail!("--plot {plot}: `{part}` names no field");
+            bail!("--plot {said}: `{}` names no field", printable_line(part));
         }
-        let found = recording.topic(topic).with_context(|| format!("--plot {plot}"))?;
+        let found = recording.topic(topic).with_context(|| format!("--plot {said}"))?;
         asks.push(Ask::new(topic, field, &found.type_name));
         last_topic = Some(topic);
     }

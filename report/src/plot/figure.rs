@@ -3,6 +3,7 @@
 use crate::plot::choice::{Ask, Choice, Role, Wanted};
 use crate::plot::thin;
 use anyhow::{Result, bail};
+use diagnostics::printable_line;
 use serde::{Serialize, Serializer};
 
 /// Distinguishable also without colour vision (Okabe and Ito).
@@ -128,7 +129,8 @@ fn unit(asks: &[Ask]) -> Result<String> {
         let told = |ask: &Ask| format!("{}:{} in {}", ask.topic, ask.field, units_of(ask).join(", "));
         let asks = asks.iter().map(told).collect::<Vec<_>>().join(", ");
         bail!(
-            "one set of axes has one unit, but it was asked for {asks}: give each unit a --plot of its own"
+            "one set of axes has one unit, but it was asked for {}: give each unit a --plot of its own",
+            printable_line(&asks)
         );
     }
     Ok(units.into_iter().next().unwrap_or_default())
@@ -156,7 +158,12 @@ pub fn across(choice: &Choice, span_s: [f64; 2]) -> Result<Across> {
     let [(channel, line)] = &ask.curves[..] else {
         let parts =
             ask.curves.iter().map(|(channel, _)| channel.path.as_str()).collect::<Vec<_>>().join(", ");
-        bail!("--against {}:{} is several numbers: name one of {parts}", ask.topic, ask.field);
+        let asked = format!("{}:{}", ask.topic, ask.field);
+        bail!(
+            "--against {} is several numbers: name one of {}",
+            printable_line(&asked),
+            printable_line(&parts)
+        );
     };
     let values = line.points().into_iter().map(|(_, value)| value).filter(|value| value.is_finite());
     let range = values

@@ -5,6 +5,7 @@ use crate::plot::field;
 use crate::plot::request::{Request, Span};
 use crate::plot::thin::{Curve, Line, Poses, Trail};
 use anyhow::{Result, bail};
+use diagnostics::printable_line;
 use recorder::RecordingError;
 use recorder::definition::{Leaf, number};
 use recorder::reader::Recording;
@@ -152,7 +153,7 @@ fn widen(span_s: &mut [f64; 2], time_s: f64) {
 fn require_samples(choice: &Choice, span: Span, read_s: [f64; 2], whole_s: [f64; 2]) -> Result<()> {
     let named = choice.axes.iter().flat_map(|axes| &axes.asks).filter(|_| choice.is_named);
     let what = match choice.against.iter().chain(named).find(|ask| is_empty(ask)) {
-        Some(ask) => format!("{} has no sample", ask.topic),
+        Some(ask) => format!("{} has no sample", printable_line(&ask.topic)),
         None if read_s[0] > read_s[1] => "there is nothing to plot".to_owned(),
         None => return Ok(()),
     };

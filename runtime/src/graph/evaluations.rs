@@ -4,7 +4,7 @@ use super::parameters::Notes;
 use crate::manifest::{Comparison, Manifest, PassCondition, Statistic};
 use crate::program::Program;
 use bus::plan::{NodePlan, Plan};
-use diagnostics::{Diagnostic, did_you_mean, nearest, printable_line};
+use diagnostics::{Diagnostic, NotOneLine, did_you_mean, nearest, printable_line, require_line};
 use recorder::RecordingError;
 use std::ops::Range;
 use toml::Spanned;
@@ -41,15 +41,8 @@ fn kind(condition: &PassCondition) -> &'static str {
 
 /// Refuses a name that would be more than a part of one line of the summary.
 fn check_name(manifest: &Manifest, condition: &Spanned<PassCondition>) -> Result<(), Diagnostic> {
-    let PassCondition { name, .. } = condition.get_ref();
-    if !name.contains(char::is_control) {
-        return Ok(());
-    }
-    let found = printable_line(name);
-    let message = format!(
-        "{}: `name`: expected a text without control characters such as ends of lines, found `{found}`",
-        kind(condition.get_ref())
-    );
+    let Err(NotOneLine { expected, found }) = require_line(&condition.get_ref().name) else { return Ok(()) };
+    let message = format!("{}: `name`: expected {expected}, found `{found}`", kind(condition.get_ref()));
     let at = key_of(manifest, &condition.span(), "", "name");
     Err(manifest.problem(&at, message, "write the name in one line, without tabs"))
 }
