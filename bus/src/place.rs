@@ -1,4 +1,4 @@
-//! Where an instance of a run computes: in a process of its own, or on a thread beside others.
+//! Place of an instance of a run: a process of its own, or a thread beside others.
 //!
 //! Signals, memory, cores and priorities of a process belong to its owner. An instance on a thread leaves them as they are.
 
@@ -8,7 +8,7 @@ use rustix::time::ClockId;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Where an instance of a run computes.
+/// Place of an instance of a run.
 #[derive(Clone, Debug, Default)]
 pub enum Place {
     /// In a process of its own.

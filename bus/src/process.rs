@@ -1,13 +1,10 @@
 //! Settings that a process of a run makes for itself: to die with its launcher, to stay on its core.
 
 use crate::error::BusError;
-use crate::join::{GENERATION_VARIABLE, Join, NODE_VARIABLE};
-use crate::place::Place;
 use rustix::process::{Signal, getppid, set_parent_process_death_signal};
 use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 use std::io;
 use std::os::unix::process::CommandExt;
-use std::path::PathBuf;
 use std::process::Command;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
@@ -18,41 +15,10 @@ pub const LAUNCHER_VARIABLE: &str = "HUMMINGBUS_LAUNCHER_PID";
 /// The environment variable that names the run directory.
 pub const RUN_VARIABLE: &str = "HUMMINGBUS_RUN";
 
-impl Join {
-    /// The part that the launcher gave this process, which from now on dies with its launcher.
-    ///
-    /// # Errors
-    /// If the process was not started by a launcher.
-    pub fn from_environment() -> Result<Self, BusError> {
-        Self::named_by(NODE_VARIABLE)
-    }
-
-    /// As [`Join::from_environment`], where `variable` has the name.
-    pub(crate) fn named_by(variable: &'static str) -> Result<Self, BusError> {
-        let run_dir = run_dir()?;
-        let node = std::env::var(variable).map_err(|_| BusError::NotInARun { variable })?;
-        let generation = std::env::var(GENERATION_VARIABLE).ok().and_then(|text| text.parse().ok());
-        Ok(Self { run_dir, node, generation: generation.unwrap_or(0), place: Place::Process })
-    }
-
-    /// The part of the clock service, which the launcher gave this process.
-    ///
-    /// # Errors
-    /// If the process was not started by a launcher.
-    pub fn clock_from_environment() -> Result<Self, BusError> {
-        Ok(Self { run_dir: run_dir()?, node: "clock".to_owned(), generation: 0, place: Place::Process })
-    }
-}
-
-/// The directory of the run that started this process, with which the process from now on dies.
-///
-/// # Errors
-/// If it was not started by a launcher.
-fn run_dir() -> Result<PathBuf, BusError> {
-    let run_dir = std::env::var_os(RUN_VARIABLE).ok_or(BusError::NotInARun { variable: RUN_VARIABLE })?;
+/// Makes this process one of a run: it dies with its launcher, and a request to end ends the run at a tick boundary.
+pub(crate) fn join_run() {
     die_with_parent();
     note_signals();
-    Ok(PathBuf::from(run_dir))
 }
 
 static IS_TERMINATED: OnceLock<Arc<AtomicBool>> = OnceLock::new();

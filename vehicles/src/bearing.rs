@@ -22,7 +22,7 @@ pub struct Bearing {
 }
 
 impl Bearing {
-    /// What `commands` bear of the weight of `vehicle`; `None` without commands or weight.
+    /// The part of the weight of `vehicle` that `commands` bear; `None` without commands or weight.
     ///
     /// ```
     /// use vehicles::{ROTORS_MAX, Vehicle, bearing::Bearing, reference::HUMMINGBIRD};
