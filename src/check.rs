@@ -1,7 +1,7 @@
 //! Checks manifests without running them, for the command line and for other programs: editors, tests, fuzzers.
 
 use crate::COMPONENTS;
-use diagnostics::{Diagnostic, Faults};
+use diagnostics::{Diagnostic, Error, Faults};
 use runtime::graph::Graph;
 use runtime::manifest::Manifest;
 use scenes::Scene;
@@ -53,7 +53,7 @@ fn with_unknown(unknown: Option<Diagnostic>, graph: Result<Graph, Diagnostic>) -
 /// assert!(hummingbus::check_with_programs(hover, &[])?.warnings.is_empty(), "all of its processes are components");
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn check_with_programs(path: &Path, overrides: &[String]) -> anyhow::Result<Graph> {
+pub fn check_with_programs(path: &Path, overrides: &[String]) -> Result<Graph, Error> {
     let (manifest, unknown) = Manifest::load_readable(path, overrides, COMPONENTS)?;
     let mut graph = with_unknown(unknown, Graph::build(&manifest))?;
     graph.warnings.extend(runtime::check_programs(&manifest, &graph, Path::new("/proc/self/exe"))?);

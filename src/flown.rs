@@ -1,6 +1,6 @@
 //! A flight with its verdict.
 
-use anyhow::Result;
+use diagnostics::Error;
 use recorder::reader::Recording;
 use report::summary::Summary;
 use runtime::launcher::Launcher;
@@ -30,7 +30,7 @@ pub struct Flown {
 /// assert!(flown.summary.passed, "{}", flown.summary);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn fly(launcher: Launcher<'_>, manifest: &Manifest, recording: impl AsRef<Path>) -> Result<Flown> {
+pub fn fly(launcher: Launcher<'_>, manifest: &Manifest, recording: impl AsRef<Path>) -> Result<Flown, Error> {
     let (plan, mut outcome, recording) = launcher.fly_planned(manifest, recording.as_ref())?;
     let figures = outcome.figures.take();
     let mut summary = Summary::new(manifest.name(), outcome, plan.tick_s());

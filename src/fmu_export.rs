@@ -1,10 +1,11 @@
 //! A manifest as an FMU: everything but one process, in whose place the importer of the FMU stands.
 
 use crate::agent::{Actions, acting, registry};
-use anyhow::{Context, Result, anyhow, bail};
+use anyhow::{Context, anyhow, bail};
 use bus::component::Role;
 use bus::plan::{NodePlan, Plan};
 use bus::{Registration, initial};
+use diagnostics::Error;
 use fmu::Version;
 use fmu::export::{Contents, Model, ModelVariable, Source};
 use inputs::sha256;
@@ -45,7 +46,7 @@ pub struct Exported {
 /// # Errors
 /// The manifest has a problem, the process is not in it, a node needs a process of its own, or a topic is not there.
 /// It also fails if the process sends messages that no importer can send.
-pub fn export(path: &Path, wishes: &Wishes<'_>, library: &[u8]) -> Result<Exported> {
+pub fn export(path: &Path, wishes: &Wishes<'_>, library: &[u8]) -> Result<Exported, Error> {
     let load = |overrides: &[String]| load(path, overrides);
     let declared = Graph::build(&load(wishes.overrides)?)?;
     let replaced = node(&declared.plan, wishes.without)?;
@@ -55,11 +56,11 @@ pub fn export(path: &Path, wishes: &Wishes<'_>, library: &[u8]) -> Result<Export
     let graph = Graph::build(&manifest)?;
     let simulation = runtime::simulate(&manifest)?;
     let variables = variables(&graph.plan, simulation, wishes.without, &outputs)?;
-    write(&graph, path, wishes, variables, library)
+    Ok(write(&graph, path, wishes, variables, library)?)
 }
 
 /// The manifest at `path`, or that of the vehicle file there.
-fn load(path: &Path, overrides: &[String]) -> Result<Manifest> {
+fn load(path: &Path, overrides: &[String]) -> anyhow::Result<Manifest> {
     let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
     let is_vehicle = text
         .parse::<toml::Table>()
@@ -74,7 +75,7 @@ fn load(path: &Path, overrides: &[String]) -> Result<Manifest> {
     Ok(Manifest::parse(text, &path.with_file_name("vehicle-as-fmu.toml"), overrides, registry())?)
 }
 
-fn node<'p>(plan: &'p Plan, name: &str) -> Result<&'p NodePlan> {
+fn node<'p>(plan: &'p Plan, name: &str) -> anyhow::Result<&'p NodePlan> {
     let found = plan.nodes.iter().find(|node| node.name == name);
     found.ok_or_else(|| {
         let names: Vec<&str> = plan.nodes.iter().map(|node| node.name.as_str()).collect();
@@ -87,7 +88,7 @@ fn node<'p>(plan: &'p Plan, name: &str) -> Result<&'p NodePlan> {
 
 /// The topics that become outputs: the requested ones, else those that the process reads with the states of plants,
 /// else all.
-fn outputs(plan: &Plan, replaced: &NodePlan, asked: &[String]) -> Result<Vec<String>> {
+fn outputs(plan: &Plan, replaced: &NodePlan, asked: &[String]) -> anyhow::Result<Vec<String>> {
     let name = |topic: usize| plan.topics[topic].name.clone();
     for asked in asked {
         if !plan.topics.iter().any(|topic| topic.name == *asked) {
@@ -111,7 +112,7 @@ fn outputs(plan: &Plan, replaced: &NodePlan, asked: &[String]) -> Result<Vec<Str
 }
 
 /// The setting that puts an agent into the place of `replaced`, with the same topics.
-fn agent(plan: &Plan, replaced: &NodePlan) -> Result<String> {
+fn agent(plan: &Plan, replaced: &NodePlan) -> anyhow::Result<String> {
     let name = &replaced.name;
     if replaced.computing_time.is_some() {
         bail!(
@@ -145,7 +146,7 @@ fn variables(
     mut simulation: bus::Simulation,
     agent: &str,
     outputs: &[String],
-) -> Result<Vec<ModelVariable>> {
+) -> anyhow::Result<Vec<ModelVariable>> {
     let mut all = Vec::new();
     let mut actions = Actions::new();
     for output in &node(plan, agent)?.outputs {
@@ -197,7 +198,7 @@ fn write(
     wishes: &Wishes<'_>,
     variables: Vec<ModelVariable>,
     library: &[u8],
-) -> Result<Exported> {
+) -> anyhow::Result<Exported> {
     let is_stepped = |component: &&'static Registration| component.role == Role::Compute;
     let members = graph.components().enumerate();
     let members =

@@ -59,6 +59,9 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! These functions return [`Error`]: [`Error::is_input`], [`Error::is_component`] and [`Error::is_system`] say which side
+//! is at fault, [`Error::diagnostic`] has the place in a file, and [`Error::process`] names the process that failed.
+//!
 //! | crate | content |
 //! |---|---|
 //! | [`bus`] | components, messages, the lockstep |
@@ -87,7 +90,7 @@ mod properties;
 pub use bus::Simulation;
 pub use check::{check, check_text, check_with_programs, drives, meshes};
 pub use components::COMPONENTS;
-pub use diagnostics::Diagnostic;
+pub use diagnostics::{Diagnostic, Error, Result};
 pub use flown::{Flown, fly};
 pub use runtime::checkpoint::Checkpoint;
 pub use runtime::ctl::Remote;

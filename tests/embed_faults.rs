@@ -12,8 +12,11 @@ use campaign::base::Base;
 use campaign::declaration::Campaign;
 use campaign::row::Row;
 use campaign::worker::{Job, Order, serve};
-use hummingbus::{Answer, Host, Launcher, Manifest, ManifestBuilder, Progress, Request, RunEvent, StopToken};
+use hummingbus::{
+    Answer, Error, Host, Launcher, Manifest, ManifestBuilder, Progress, Request, RunEvent, StopToken,
+};
 use runtime::registry::Registry;
+use rustix::process::{Pid, Signal, kill_process};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering::SeqCst};
 use std::sync::{Mutex, PoisonError};
@@ -185,7 +188,7 @@ fn flown_by(
 ) -> Result<Vec<f64>, String> {
     IS_ARMED.store(true, SeqCst);
     let (_, recording) =
-        launcher.fly(&build(plan, folder), &folder.join(name)).map_err(|error| format!("{error:#}"))?;
+        launcher.fly(&build(plan, folder), &folder.join(name)).map_err(|error| error.with_causes())?;
     let series = recording.unwrap().series(&[("/source/command", "command[0]")]).unwrap();
     Ok(series[0].value.clone())
 }
@@ -522,5 +525,100 @@ fn a_flight_of_a_campaign_that_panics_has_the_reason_in_its_row_and_its_worker_f
         let error = rows[0].error.as_deref().unwrap();
         assert!(error.contains("the propeller came off") && !rows[0].is_of_host, "{error}");
         assert_eq!((&rows[1].error, &rows[1].figures[..]), (&None, &[Some(200.0)][..]));
+    });
+}
+
+/// [`Error::is_component`], [`Error::is_input`] and [`Error::is_system`].
+fn sides(error: &Error) -> [bool; 3] {
+    [error.is_component(), error.is_input(), error.is_system()]
+}
+
+#[test]
+fn an_error_about_a_manifest_is_one_of_the_input_and_has_the_place() {
+    alone(|folder| {
+        let path = folder.join("wrong.toml");
+        std::fs::write(&path, "[run]\nduration_s = \"long\"\n").unwrap();
+        let error = hummingbus::check_with_programs(&path, &[]).unwrap_err();
+        assert_eq!(sides(&error), [false, true, false], "{error}");
+        let fault = error.diagnostic().unwrap();
+        assert_eq!((fault.file.as_str(), fault.place.as_ref().unwrap().line), (path.to_str().unwrap(), 2));
+        assert_eq!(error.process(), None);
+    });
+}
+
+#[test]
+fn an_error_of_a_component_names_its_process_on_one_thread_and_on_several() {
+    for host in [Host::InProcess, Host::Threads] {
+        for fault in ["error", "panic"] {
+            alone(|folder| {
+                IS_ARMED.store(true, SeqCst);
+                let manifest = build(&plan(1000, fault), folder);
+                let flown = Launcher::new(host.clone()).fly(&manifest, &folder.join("a.mcap"));
+                let error = flown.unwrap_err();
+                assert_eq!(sides(&error), [true, false, false], "{host:?}, {fault}: {error}");
+                assert_eq!(error.process(), Some("source"), "{host:?}, {fault}: {error}");
+            });
+        }
+    }
+}
+
+/// Kills the child of this process that is a component of the kind `kind`.
+fn kill_child(kind: &str) {
+    let of_this = format!("PPid:\t{}\n", std::process::id());
+    let children = std::fs::read_dir("/proc").unwrap().flatten().filter_map(|entry| {
+        let status = std::fs::read_to_string(entry.path().join("status")).ok()?;
+        let arguments = std::fs::read_to_string(entry.path().join("cmdline")).ok()?;
+        let is_meant = status.contains(&of_this) && arguments.split('\0').any(|word| word == kind);
+        Pid::from_raw(entry.file_name().to_str()?.parse().ok()?).filter(|_| is_meant)
+    });
+    children.for_each(|child| kill_process(child, Signal::KILL).unwrap());
+}
+
+#[test]
+fn an_error_of_a_process_names_it() {
+    alone(|folder| {
+        let hover = concat!(env!("CARGO_MANIFEST_DIR"), "/manifests/hover.toml");
+        let manifest = hummingbus::load(hover).unwrap().set("run.duration_s", 1000.0).unwrap();
+        let mut is_struck = false;
+        let strike = |event: RunEvent<'_>| match event {
+            RunEvent::Progress(Progress { ticks, .. }) if ticks > 100 && !is_struck => {
+                is_struck = true;
+                kill_child("imu");
+            }
+            _ => {}
+        };
+        let launcher = Launcher::new(Host::Exe(env!("CARGO_BIN_EXE_hummingbus").into())).followed_by(strike);
+        let error = hummingbus::fly(launcher, &manifest, folder.join("a.mcap")).unwrap_err();
+        assert_eq!(sides(&error), [true, false, false], "{error}");
+        assert_eq!(error.process(), Some("imu"), "{error}");
+        assert!(error.to_string().contains("process `imu`"), "{error}");
+    });
+}
+
+#[test]
+fn an_error_about_the_place_of_a_recording_is_one_of_the_system() {
+    // Nobody may make files in /proc.
+    for place in ["missing/a.mcap", "/proc/self/a.mcap"] {
+        alone(|folder| {
+            let manifest = build(&plan(100, "none"), folder);
+            let flown = Launcher::new(Host::Threads).fly(&manifest, &folder.join(place));
+            let error = flown.unwrap_err();
+            assert_eq!(sides(&error), [false, false, true], "{place}: {error}");
+            assert!(error.diagnostic().is_none() && error.process().is_none(), "{place}: {error}");
+        });
+    }
+}
+
+#[test]
+fn an_error_about_a_request_is_on_no_side() {
+    alone(|folder| {
+        let stop = StopToken::new();
+        stop.stop();
+        stop.stop();
+        let manifest = build(&plan(1_000_000, "none"), folder);
+        let flown = Launcher::new(Host::Threads).stopped_by(&stop).fly(&manifest, &folder.join("a.mcap"));
+        let error = flown.unwrap_err();
+        assert!(error.to_string().contains("interrupted twice"), "{error}");
+        assert_eq!(sides(&error), [false; 3], "{error}");
     });
 }

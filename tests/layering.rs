@@ -1,4 +1,5 @@
-//! No two files of a crate need each other: what a file names lies in files below it, all the way down.
+//! No two files of a crate need each other: what a file names lies in files below it, all the way down. And no public
+//! function of the library has an error of another project in its signature.
 //!
 //! A file needs another where it names something that the other defines, whatever path or re-export it takes; a
 //! module that is declared or re-exported is not yet needed. Tests may look at everything, and are left out.
@@ -19,12 +20,27 @@ struct Module {
     /// Names that it defines, but for modules.
     defined: BTreeSet<String>,
     children: BTreeSet<String>,
+    public_children: Vec<String>,
     /// Imported names with their paths.
     imports: BTreeMap<String, Names>,
     /// Names that are imported for others, and so are not yet needed here.
     reexported: BTreeSet<String>,
     globs: Vec<Names>,
     code: Vec<Token>,
+    /// True if other crates can name it.
+    is_public: bool,
+    /// Names that it defines and declares `pub`.
+    public_names: BTreeSet<String>,
+    signatures: Vec<Signature>,
+}
+
+/// A function that is public within its module, or a method of a type.
+struct Signature {
+    name: String,
+    /// The type or trait of a method, or the function itself: the name that leads there.
+    owner: String,
+    /// All names in it.
+    names: BTreeSet<String>,
 }
 
 /// A token without what groups them.
@@ -50,6 +66,7 @@ impl Crate {
     fn read(root: &Path) -> Self {
         let mut read = Self::default();
         read.add_file(Vec::new(), root, root.parent().unwrap());
+        read.note_public(Vec::new());
         read
     }
 
@@ -73,6 +90,9 @@ impl Crate {
                         Some((_, items)) => self.add(inner, file, &below, items),
                         None => self.add_file(inner, &file_of(folder, &name), &below),
                     }
+                    if matches!(child.vis, Visibility::Public(_)) {
+                        module.public_children.push(name.clone());
+                    }
                     module.children.insert(name);
                 }
                 Item::Use(item) => {
@@ -81,11 +101,56 @@ impl Crate {
                 }
                 item => {
                     module.defined.extend(defined(&item));
+                    module.signatures.extend(signatures(&item));
+                    module.public_names.extend(defined(&item).filter(|_| is_public(&item)));
                     flatten(item.to_token_stream(), &mut module.code);
                 }
             }
         }
         self.modules.insert(path, module);
+    }
+
+    /// Notes that the module `path` is public, and so are its public children.
+    fn note_public(&mut self, path: Names) {
+        let Some(module) = self.modules.get_mut(&path) else { return };
+        module.is_public = true;
+        for child in module.public_children.clone() {
+            self.note_public([&path[..], &[child]].concat());
+        }
+    }
+
+    /// The names that other crates can use, each with the file that defines it.
+    fn public(&self) -> BTreeSet<(&Path, &String)> {
+        let modules = || self.modules.iter().filter(|(_, module)| module.is_public);
+        let declared = modules()
+            .flat_map(|(_, module)| module.public_names.iter().map(|name| (module.file.as_path(), name)));
+        let passed_on = modules().flat_map(|(path, module)| {
+            module.reexported.iter().filter_map(|name| {
+                let names = module.imports.get(name)?;
+                Some((self.file(path, names, 0)?, names.last()?))
+            })
+        });
+        declared.chain(passed_on).collect()
+    }
+
+    /// The functions that other crates can call and that have a name of the crate `other` in their signatures.
+    fn public_with(&self, other: &str) -> Vec<String> {
+        let public = self.public();
+        let mut found = Vec::new();
+        for (path, module) in &self.modules {
+            let is_of_other = |name: &String| {
+                name == other || module.imports.get(name).is_some_and(|path| path.first().unwrap() == other)
+            };
+            for Signature { name, owner, names } in &module.signatures {
+                let defined_in = self.file(path, std::slice::from_ref(owner), 0).unwrap_or(&module.file);
+                if public.contains(&(defined_in, owner)) && names.iter().any(is_of_other) {
+                    let owner = if owner == name { String::new() } else { format!("{owner}::") };
+                    let path: String = path.iter().map(|part| format!("{part}::")).collect();
+                    found.push(format!("{path}{owner}{name}"));
+                }
+            }
+        }
+        found
     }
 
     /// The file that defines what `names` lead to from the module `at`; `None` where that is outside of the crate.
@@ -271,6 +336,56 @@ fn defined(item: &Item) -> Option<String> {
     Some(name.to_string())
 }
 
+/// The public functions that an item declares; those of another crate's trait have the signatures of that trait.
+fn signatures(item: &Item) -> Vec<Signature> {
+    let public = |visibility: &Visibility| matches!(visibility, Visibility::Public(_));
+    let signature = |owner: &str, signature: &syn::Signature| Signature {
+        name: signature.ident.to_string(),
+        owner: owner.to_owned(),
+        names: names(signature.to_token_stream()),
+    };
+    match item {
+        Item::Fn(item) if public(&item.vis) => vec![signature(&item.sig.ident.to_string(), &item.sig)],
+        Item::Impl(item) if item.trait_.is_none() => {
+            let syn::Type::Path(of) = &*item.self_ty else { return Vec::new() };
+            let owner = of.path.segments.last().unwrap().ident.to_string();
+            let methods = item.items.iter().filter_map(|inner| match inner {
+                syn::ImplItem::Fn(method) if public(&method.vis) => Some(&method.sig),
+                _ => None,
+            });
+            methods.map(|method| signature(&owner, method)).collect()
+        }
+        Item::Trait(item) if public(&item.vis) => {
+            let methods = item.items.iter().filter_map(|inner| match inner {
+                syn::TraitItem::Fn(method) => Some(&method.sig),
+                _ => None,
+            });
+            methods.map(|method| signature(&item.ident.to_string(), method)).collect()
+        }
+        _ => Vec::new(),
+    }
+}
+
+fn is_public(item: &Item) -> bool {
+    let (Item::Enum(syn::ItemEnum { vis, .. })
+    | Item::Fn(syn::ItemFn { vis, .. })
+    | Item::Struct(syn::ItemStruct { vis, .. })
+    | Item::Trait(syn::ItemTrait { vis, .. })
+    | Item::Type(syn::ItemType { vis, .. })
+    | Item::Union(syn::ItemUnion { vis, .. })) = item
+    else {
+        return false;
+    };
+    matches!(vis, Visibility::Public(_))
+}
+
+fn names(stream: TokenStream) -> BTreeSet<String> {
+    let mut tokens = Vec::new();
+    flatten(stream, &mut tokens);
+    let name = |token| if let Token::Name(name) = token { Some(name) } else { None };
+    tokens.into_iter().filter_map(name).collect()
+}
+
 /// The groups of files of which each needs, over others, all of its group.
 fn circles<'a>(needs: &BTreeMap<&'a Path, BTreeSet<&'a Path>>) -> BTreeSet<Vec<&'a Path>> {
     let reached = |from: &'a Path| {
@@ -322,14 +437,59 @@ fn no_files_need_each_other() {
     assert!(found.is_empty(), "move types down, to where all who need them look:\n{found}");
 }
 
-/// The circles of a crate with these files.
-fn circles_of(files: &[(&str, &str)]) -> Vec<Vec<String>> {
+/// Crates whose public functions may return `anyhow::Error`: they are compiled only for the program and its tools.
+const OF_THE_PROGRAM: [&str; 3] = ["campaign/", "report/view/", "bindings/fmu/"];
+
+#[test]
+fn functions_of_the_library_return_its_own_errors() {
+    let mut found = Vec::new();
+    for root in roots() {
+        let of = root.strip_prefix(env!("CARGO_MANIFEST_DIR")).unwrap().display().to_string();
+        if !OF_THE_PROGRAM.iter().any(|crate_| of.starts_with(crate_)) {
+            found.extend(Crate::read(&root).public_with("anyhow").iter().map(|name| format!("{of}: {name}")));
+        }
+    }
+    assert!(found.is_empty(), "return diagnostics::Error:\n{}", found.join("\n"));
+}
+
+#[test]
+fn a_foreign_error_in_a_public_signature_is_found_by_any_name() {
+    let files = [
+        ("lib.rs", "pub mod a; mod b; mod c; pub use b::{T, f as renamed};"),
+        (
+            "a.rs",
+            "use anyhow::Result; use std::result::Result as R; pub fn named() -> Result<()> {} fn own() -> Result<()> {}
+             pub(crate) fn inner() -> Result<()> {} pub fn fine() -> R<(), ()> {}
+             pub fn whole(_: anyhow::Error) {} pub trait U { fn declared() -> Result<()>; }
+             impl std::str::FromStr for T { fn from_str(_: &str) -> Result<()> {} }
+             pub(crate) struct Inner; impl Inner { pub fn method() -> Result<()> {} }",
+        ),
+        ("b.rs", "use anyhow as x; pub struct T; impl T { pub fn method() -> x::Error {} } pub fn f() -> x::Error {}"),
+        (
+            "c.rs",
+            "pub fn hidden() -> anyhow::Error {}
+             pub struct T; impl T { pub fn namesake() -> anyhow::Error {} }",
+        ),
+    ];
+    let folder = folder_of(&files);
+    let found = Crate::read(&folder.path().join("lib.rs")).public_with("anyhow");
+    assert_eq!(found, ["a::named", "a::whole", "a::U::declared", "b::T::method", "b::f"]);
+}
+
+/// A folder with these files.
+fn folder_of(files: &[(&str, &str)]) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     for (name, text) in files {
         let path = folder.path().join(name);
         fs::create_dir_all(path.parent().unwrap()).unwrap();
         fs::write(path, text).unwrap();
     }
+    folder
+}
+
+/// The circles of a crate with these files.
+fn circles_of(files: &[(&str, &str)]) -> Vec<Vec<String>> {
+    let folder = folder_of(files);
     let read = Crate::read(&folder.path().join("lib.rs"));
     let short = |file: &&Path| file.strip_prefix(folder.path()).unwrap().to_string_lossy().into_owned();
     circles(&read.needs()).iter().map(|circle| circle.iter().map(short).collect()).collect()

@@ -1,5 +1,6 @@
 //! Errors of the bus, in words for the person who launched the run.
 
+use diagnostics::ComponentFailure;
 use std::path::PathBuf;
 use thiserror::Error;
 
@@ -317,6 +318,53 @@ pub enum BusError {
     /// The launcher ended the run early.
     #[error("the run was aborted")]
     Aborted,
+}
+
+impl BusError {
+    /// Name of the node that the error is about, if it is about one.
+    #[must_use]
+    pub fn node(&self) -> Option<&str> {
+        match self {
+            Self::Checkpoint { node, .. }
+            | Self::UnwiredPort { node, .. }
+            | Self::UndeclaredPort { node, .. }
+            | Self::DeclaredTwice { node, .. }
+            | Self::LayoutMismatch { node, .. }
+            | Self::BackupLayout { node, .. }
+            | Self::TypeMismatch { node, .. }
+            | Self::InitialValue { node, .. }
+            | Self::Parameters { node, .. }
+            | Self::Transport { node, .. }
+            | Self::Gap { node, .. }
+            | Self::UnwrittenOutput { node, .. }
+            | Self::NotFinite { node, .. }
+            | Self::Count { node, .. }
+            | Self::Step { node, .. } => Some(node),
+            _ => None,
+        }
+    }
+}
+
+/// A failed step is the failure of its component.
+///
+/// ```
+/// let reason = "the gyroscope is stuck".to_owned();
+/// let error = bus::BusError::Step { node: "imu".to_owned(), tick: 7, time_s: 0.07, reason };
+/// let error = diagnostics::Error::from(error);
+/// assert!(error.is_component() && error.process() == Some("imu"));
+/// ```
+impl From<BusError> for diagnostics::Error {
+    fn from(error: BusError) -> Self {
+        let (BusError::UnwrittenOutput { node, .. }
+        | BusError::NotFinite { node, .. }
+        | BusError::Count { node, .. }
+        | BusError::Step { node, .. }) = &error
+        else {
+            return Self::new(error);
+        };
+        let node = node.clone();
+        ComponentFailure::new(Some(&node), error).into()
+    }
 }
 
 /// As `Display`: a node's `fn main() -> Result<(), BusError>` prints this, and people read it.

@@ -113,6 +113,12 @@ impl Simulation {
         self.tick
     }
 
+    /// Name of the node that steps next; after a step that failed or panicked, the name of its node.
+    #[must_use]
+    pub fn next_node(&self) -> Option<&str> {
+        self.members.get(self.begun).map(|member| member.part.name())
+    }
+
     /// Simulation time at the start of the next tick, s.
     #[must_use]
     pub fn time_s(&self) -> f64 {

@@ -66,7 +66,7 @@ impl Base {
             }
         };
         let graph = runtime::require_flyable(&manifest, files, from.as_ref())
-            .map_err(|error| in_place(campaign, &manifest.path, lines, error))?;
+            .map_err(|error| in_place(campaign, &manifest.path, lines, error.into()))?;
         require_judgement(&manifest)?;
         let (figures, verdicts) = (columns(&manifest.content), verdict_columns(&manifest.content));
         require_different(&campaign.vary, &[&figures[..], &verdicts].concat())?;
@@ -115,7 +115,8 @@ impl Base {
     /// # Errors
     /// The override or the file that does not fit, or the state in the checkpoint that does not fit the flight.
     pub fn check(&self, sets: &[String]) -> Result<()> {
-        runtime::require_flyable(&self.of_flight(sets)?, self.files.branch(), self.from.as_ref()).map(drop)
+        runtime::require_flyable(&self.of_flight(sets)?, self.files.branch(), self.from.as_ref())?;
+        Ok(())
     }
 
     /// The manifest of one flight.

@@ -55,14 +55,11 @@ impl Measures {
             }
             fault
         };
-        match error.downcast::<Diagnostic>() {
-            Ok(error) => {
-                let mut all: Vec<Diagnostic> = error.all().map(placed).collect();
-                let others = all.split_off(1);
-                all.remove(0).and(others).into()
-            }
-            Err(error) => error,
-        }
+        let error = diagnostics::Error::from(error);
+        let Some(fault) = error.diagnostic() else { return error.into() };
+        let mut all: Vec<Diagnostic> = fault.all().map(placed).collect();
+        let others = all.split_off(1);
+        all.remove(0).and(others).into()
     }
 
     /// Place in the campaign file of what stands in line number `line` of the text, from 0.

@@ -45,7 +45,7 @@ impl Table<'_> {
         let units: Vec<(String, String)> = self.kept.iter().map(unit).collect();
         let units: Vec<(&str, String)> =
             units.iter().map(|(key, unit)| (key.as_str(), unit.clone())).collect();
-        write_parquet(file, "flights", &columns, &units)
+        Ok(write_parquet(file, "flights", &columns, &units)?)
     }
 
     fn columns(&self) -> Vec<(String, Column)> {

@@ -3,6 +3,7 @@
 //! | room | what it holds |
 //! |---|---|
 //! | [`Diagnostic`] | fault of a file: the place, what was expected, what was found, what to do |
+//! | [`Error`] | error of the library's functions; `ComponentFailure` marks failures in flight |
 //! | `nearest` | the known name that was probably meant |
 //! | `place` | position in a file |
 //! | `plain` | messages of the system and of libraries, in words |
@@ -20,7 +21,9 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod component_failure;
 mod diagnostic;
+mod error;
 mod nearest;
 pub mod parameter;
 mod place;
@@ -29,7 +32,9 @@ mod printable;
 mod read;
 pub mod unit;
 
+pub use component_failure::ComponentFailure;
 pub use diagnostic::{Diagnostic, Faults};
+pub use error::{Error, Result};
 pub use nearest::{did_you_mean, nearest};
 pub use parameter::ParameterError;
 pub use place::Place;

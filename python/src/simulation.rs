@@ -32,7 +32,7 @@ impl Simulation {
     #[new]
     fn new(text: String, path: &str, overrides: Vec<String>) -> PyResult<Self> {
         let manifest = Manifest::parse(text, Path::new(path), &overrides, registry()).map_err(raised)?;
-        let simulation = simulate(&manifest).map_err(|error| raised(format!("{error:#}")))?;
+        let simulation = simulate(&manifest).map_err(|error| raised(error.with_causes()))?;
         Ok(Self { simulation, actions: Actions::new() })
     }
 

@@ -103,6 +103,12 @@ pub enum RecordingError {
     },
 }
 
+impl From<RecordingError> for diagnostics::Error {
+    fn from(error: RecordingError) -> Self {
+        Self::new(error)
+    }
+}
+
 impl RecordingError {
     /// Error of the system, for `action` on the file at `path`.
     pub(crate) fn file(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Self {

@@ -1,6 +1,7 @@
 //! Tables of typed columns, written as Parquet.
 
-use anyhow::{Context as _, Result};
+use anyhow::Context as _;
+use diagnostics::Error;
 use parquet::basic::{LogicalType, Repetition, Type as Physical};
 use parquet::data_type::{BoolType, ByteArray, ByteArrayType, DoubleType, Int64Type};
 use parquet::file::metadata::KeyValue;
@@ -41,7 +42,7 @@ pub enum Column {
 /// let mut bytes = Vec::new();
 /// write_parquet(&mut bytes, "flight", &columns, &[("unit of position.z", "m".to_owned())])?;
 /// assert!(bytes.starts_with(PARQUET_START));
-/// # Ok::<(), anyhow::Error>(())
+/// # Ok::<(), diagnostics::Error>(())
 /// ```
 ///
 /// # Errors
@@ -51,8 +52,17 @@ pub fn write_parquet(
     name: &str,
     columns: &[(&str, &Column)],
     facts: &[(&str, String)],
-) -> Result<()> {
-    let fields = columns.iter().map(|(name, column)| field(name, column)).collect::<Result<_>>()?;
+) -> Result<(), Error> {
+    Ok(write(out, name, columns, facts)?)
+}
+
+fn write(
+    out: impl Write + Send,
+    name: &str,
+    columns: &[(&str, &Column)],
+    facts: &[(&str, String)],
+) -> anyhow::Result<()> {
+    let fields = columns.iter().map(|(name, column)| field(name, column)).collect::<anyhow::Result<_>>()?;
     let schema = Arc::new(Type::group_type_builder(name).with_fields(fields).build()?);
     let version = ("hummingbus", env!("CARGO_PKG_VERSION").to_owned());
     let facts = std::iter::once(&version).chain(facts);
@@ -70,7 +80,7 @@ pub fn write_parquet(
     Ok(())
 }
 
-fn field(name: &str, column: &Column) -> Result<TypePtr> {
+fn field(name: &str, column: &Column) -> anyhow::Result<TypePtr> {
     let (physical, repetition) = match column {
         Column::Whole(_) => (Physical::INT64, Repetition::REQUIRED),
         Column::Truth(_) => (Physical::BOOLEAN, Repetition::REQUIRED),
@@ -84,7 +94,7 @@ fn field(name: &str, column: &Column) -> Result<TypePtr> {
     Ok(Arc::new(builder.with_logical_type(text).build()?))
 }
 
-fn put(writer: &mut SerializedColumnWriter<'_>, column: &Column) -> Result<()> {
+fn put(writer: &mut SerializedColumnWriter<'_>, column: &Column) -> anyhow::Result<()> {
     match column {
         Column::Whole(values) => writer.typed::<Int64Type>().write_batch(values, None, None)?,
         Column::Truth(values) => writer.typed::<BoolType>().write_batch(values, None, None)?,

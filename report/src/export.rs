@@ -1,7 +1,7 @@
 //! Recordings as tables, a table for each topic, for programs that read Parquet or CSV.
 
 use crate::columns::{Column, write_parquet};
-use anyhow::Result;
+use diagnostics::Error;
 use recorder::RecordingError;
 use recorder::definition::{Leaf, Value, is_padding};
 use recorder::reader::Recording;
@@ -51,7 +51,7 @@ struct Field {
 ///
 /// # Errors
 /// If the recording is damaged, or has no such topic.
-pub fn table(recording: &Recording, topic: &str) -> Result<Table> {
+pub fn table(recording: &Recording, topic: &str) -> Result<Table, Error> {
     recording.topic(topic)?;
     let mut table = Table::default();
     recording.visit::<RecordingError>(|message| {
@@ -110,7 +110,7 @@ impl Table {
     ///
     /// # Errors
     /// If `out` cannot be written to.
-    pub fn write_parquet(&self, out: impl Write + Send) -> Result<()> {
+    pub fn write_parquet(&self, out: impl Write + Send) -> Result<(), Error> {
         let stamps = [("tick", &self.tick), ("time_ns", &self.time_ns)]
             .map(|(name, values)| (name, Column::Whole(values.clone())));
         let stamps = stamps.iter().map(|(name, column)| (*name, column));
@@ -128,14 +128,14 @@ impl Table {
     ///
     /// # Errors
     /// If `out` cannot be written to.
-    pub fn write_csv(&self, out: impl Write) -> Result<()> {
+    pub fn write_csv(&self, out: impl Write) -> Result<(), Error> {
         let mut out = csv::Writer::from_writer(out);
         let paths = self.fields.iter().map(|field| field.path.as_str());
-        out.write_record(CSV_START.split(',').chain(paths))?;
+        out.write_record(CSV_START.split(',').chain(paths)).map_err(Error::new)?;
         for row in 0..self.rows() {
             let stamps = [self.tick[row].to_string(), self.time_ns[row].to_string()];
             let cells = self.fields.iter().map(|field| cell(&field.column, row));
-            out.write_record(stamps.into_iter().chain(cells))?;
+            out.write_record(stamps.into_iter().chain(cells)).map_err(Error::new)?;
         }
         Ok(out.flush()?)
     }

@@ -1,8 +1,9 @@
 //! Effects of backups: the steps of outputs at a take-over, and the differences between the samples of a shadow and
 //! those of the process that it shadows.
 
-use anyhow::{Result, bail};
+use anyhow::anyhow;
 use bus::plan::Plan;
+use diagnostics::Error;
 use diagnostics::unit::behind_number;
 use recorder::RecordingError;
 use recorder::node::SHADOW_PREFIX;
@@ -144,7 +145,7 @@ fn outputs<'a>(plan: &'a Plan, report: &Report) -> impl Iterator<Item = &'a str>
 ///
 /// # Errors
 /// If the recording is damaged.
-pub(crate) fn differences(recording: &Recording, joins: &Joins<'_>) -> Result<Vec<Difference>> {
+pub(crate) fn differences(recording: &Recording, joins: &Joins<'_>) -> anyhow::Result<Vec<Difference>> {
     let shadowed = recording.topics().keys().filter_map(|topic| topic.strip_prefix(SHADOW_PREFIX));
     let values = values(recording, &shadowed.collect::<Vec<_>>())?;
     let mut all = Vec::new();
@@ -183,13 +184,13 @@ fn by_shadow(samples: &Series, joined: &[u32]) -> Vec<Series> {
 ///
 /// # Errors
 /// If the recording is damaged, or has no shadow.
-pub fn report(recording: &Recording) -> Result<String> {
+pub fn report(recording: &Recording) -> Result<String, Error> {
     let differences = differences(recording, &Joins::new())?;
     if differences.is_empty() {
         let path = recording.path().display();
-        bail!(
-            "{path} has no shadow: its run had no [[shadow]], [[swap]] or standby, or did not record their topics"
-        );
+        let none =
+            "has no shadow: its run had no [[shadow]], [[swap]] or standby, or did not record their topics";
+        return Err(anyhow!("{path} {none}").into());
     }
     Ok(lines(&differences))
 }
@@ -246,7 +247,11 @@ fn difference(names: [&str; 3], shadow: &Series, primary: &Series) -> Option<Dif
 ///
 /// # Errors
 /// If the recording is damaged.
-pub(crate) fn add_steps(recording: &Recording, plan: &Plan, replacements: &mut [Replacement]) -> Result<()> {
+pub(crate) fn add_steps(
+    recording: &Recording,
+    plan: &Plan,
+    replacements: &mut [Replacement],
+) -> anyhow::Result<()> {
     let flown = replacements.iter().map(|replacement| &replacement.report);
     let topics =
         flown.filter(|report| report.take_over_tick.is_some()).flat_map(|report| outputs(plan, report));
@@ -277,7 +282,7 @@ fn step_at(values: &Values, topic: &str, tick: u32) -> Option<Step> {
 }
 
 /// The numbers of `topics` and of their shadows.
-fn values(recording: &Recording, topics: &[&str]) -> Result<Values> {
+fn values(recording: &Recording, topics: &[&str]) -> anyhow::Result<Values> {
     let mut values = Values::new();
     if topics.is_empty() {
         return Ok(values);

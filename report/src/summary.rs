@@ -3,9 +3,8 @@
 use crate::beyond::{self, Beyond};
 use crate::judge::{self, Figures, Found, Verdict, WindowErrors};
 use crate::shadow::{self, Difference, Replacement};
-use anyhow::Result;
 use bus::plan::Plan;
-use diagnostics::{Diagnostic, printable_line};
+use diagnostics::{Diagnostic, Error, printable_line};
 use recorder::reader::Recording;
 use runtime::checkpoint::Written;
 use runtime::launcher::Outcome;
@@ -194,7 +193,7 @@ impl Summary {
         figures: Option<&[u8]>,
         plan: &Plan,
         content: &Content,
-    ) -> Result<()> {
+    ) -> Result<(), Error> {
         match (recording, figures) {
             (Some(recording), Some(figures)) => {
                 self.judge_by(figures, content)?;
@@ -215,7 +214,7 @@ impl Summary {
     ///
     /// # Errors
     /// If the recording is damaged, or lacks data that a condition judges.
-    pub fn judge(&mut self, recording: &Recording, plan: &Plan, content: &Content) -> Result<()> {
+    pub fn judge(&mut self, recording: &Recording, plan: &Plan, content: &Content) -> Result<(), Error> {
         if !self.stopped_early {
             self.add(&judge::figures(&content.conditions(), recording)?, content)?;
         }
@@ -226,7 +225,7 @@ impl Summary {
     ///
     /// # Errors
     /// If the recording is damaged.
-    pub fn describe(&mut self, recording: &Recording, plan: &Plan) -> Result<()> {
+    pub fn describe(&mut self, recording: &Recording, plan: &Plan) -> Result<(), Error> {
         shadow::add_steps(recording, plan, &mut self.replacements)?;
         self.shadows = shadow::differences(recording, &shadow::joins(plan, &self.replacements))?;
         self.beyond = Some(beyond::of(recording)?);
@@ -239,12 +238,12 @@ impl Summary {
     ///
     /// # Errors
     /// If the figures are not those of `content`, or there is nothing to compare.
-    pub fn judge_by(&mut self, figures: &[u8], content: &Content) -> Result<()> {
+    pub fn judge_by(&mut self, figures: &[u8], content: &Content) -> Result<(), Error> {
         if self.stopped_early { Ok(()) } else { self.add(&Figures::of_bytes(figures)?, content) }
     }
 
     /// Adds the verdicts on the conditions in `content`, of which these are the figures.
-    fn add(&mut self, figures: &Figures, content: &Content) -> Result<()> {
+    fn add(&mut self, figures: &Figures, content: &Content) -> Result<(), Error> {
         let tick_s = self.tick_s;
         let of = |(pass, found): (&Spanned<PassCondition>, &Found)| {
             Verdict::of(pass.get_ref(), found).in_ticks_of(tick_s)
@@ -253,7 +252,7 @@ impl Summary {
         self.measures = content.measure.iter().zip(&figures.measures).map(of).collect();
         let compared = content.compare.iter().zip(&figures.compare);
         let compared = compared.map(|(compare, found)| WindowErrors::of(compare.get_ref(), found));
-        self.compare = compared.collect::<Result<_>>()?;
+        self.compare = compared.collect::<anyhow::Result<_>>()?;
         let held = self.pass.iter().all(|verdict| verdict.passed);
         self.passed &= held && self.compare.iter().all(|errors| errors.passed);
         Ok(())

@@ -15,7 +15,7 @@ mod view;
 
 pub use view::{ProcessRow, VehicleRow, View};
 
-use anyhow::Result;
+use diagnostics::Error;
 use keys::Keys;
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event;
@@ -40,7 +40,7 @@ const ONCE: Duration = Duration::from_millis(500);
 ///
 /// # Errors
 /// If it has ended.
-pub fn look(run: &Arc<LiveRun>) -> Result<View> {
+pub fn look(run: &Arc<LiveRun>) -> Result<View, Error> {
     let mut source = Source::open(run)?;
     let before = source.sample();
     std::thread::sleep(ONCE);
@@ -59,7 +59,7 @@ impl Watcher {
     ///
     /// # Errors
     /// If it has ended.
-    pub fn open(run: &Arc<LiveRun>) -> Result<Self> {
+    pub fn open(run: &Arc<LiveRun>) -> Result<Self, Error> {
         Ok(Self { source: Source::open(run)?, looks: VecDeque::new() })
     }
 
@@ -86,12 +86,12 @@ impl Watcher {
 ///
 /// # Errors
 /// If the run has ended, or the terminal cannot be drawn on.
-pub fn watch(run: &Arc<LiveRun>, is_terminated: &AtomicBool) -> Result<()> {
+pub fn watch(run: &Arc<LiveRun>, is_terminated: &AtomicBool) -> Result<(), Error> {
     let mut source = Source::open(run)?;
     let mut terminal = ratatui::try_init()?;
     let result = draw_until_left(&mut terminal, Keys::new(run), &mut source, is_terminated);
     ratatui::try_restore()?;
-    result
+    Ok(result?)
 }
 
 /// Restores the terminal as it was before [`watch`], for code that ends the process meanwhile.
@@ -104,7 +104,7 @@ fn draw_until_left(
     mut keys: Keys,
     source: &mut Source,
     is_terminated: &AtomicBool,
-) -> Result<()> {
+) -> anyhow::Result<()> {
     let mut looks: VecDeque<Sample> = VecDeque::from([source.sample()]);
     let mut last_look = Instant::now();
     while !keys.has_left && !is_terminated.load(Ordering::SeqCst) {

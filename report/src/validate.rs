@@ -24,7 +24,8 @@ pub use errors::{ChannelErrors, Errors, FlightErrors, HorizonErrors};
 pub use notes::Notes;
 pub use steps_ahead::{FlightSteps, StepsAheadErrors};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, bail};
+use diagnostics::Error;
 use flights::{Flight, FlightSet};
 use labels::labels;
 use replay::Replay;
@@ -43,11 +44,11 @@ use vehicles::Vehicle;
 /// use std::path::Path;
 ///
 /// /// How well two vehicle files meet the flights, with the components that a program offers.
-/// fn compare(components: runtime::registry::Registry) -> anyhow::Result<Errors> {
+/// fn compare(components: runtime::registry::Registry) -> Result<Errors, Box<dyn std::error::Error>> {
 ///     let flights = flights::FlightSet::load(Path::new("flights.toml"))?;
 ///     let validation = Validation { components, stop: &StopToken::default(), keep: None };
 ///     let vehicles = [Path::new("declared.toml"), Path::new("fitted.toml")];
-///     validation.errors(&vehicles, &flights, &mut |line| println!("{line}"))
+///     Ok(validation.errors(&vehicles, &flights, &mut |line| println!("{line}"))?)
 /// }
 ///
 /// assert!(compare(runtime::registry::Registry::new(&[])).is_err(), "there are no such files");
@@ -74,7 +75,7 @@ impl Validation<'_> {
         vehicles: &[&Path],
         flights: &FlightSet,
         tell: &mut dyn FnMut(&str),
-    ) -> Result<Errors> {
+    ) -> Result<Errors, Error> {
         for vehicle in vehicles {
             Vehicle::load_from(&flights.files, vehicle)?;
         }
@@ -105,7 +106,7 @@ fn not_flown(flight: &Flight, kept: Option<&Path>) -> String {
 }
 
 /// Refuses two flights whose files would lie in one folder.
-fn require_distinct_folders(set: &FlightSet) -> Result<()> {
+fn require_distinct_folders(set: &FlightSet) -> anyhow::Result<()> {
     let mut folders = BTreeMap::new();
     for Flight { name, .. } in &set.flights {
         let folder = replay::file_name(name);

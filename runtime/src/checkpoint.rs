@@ -11,10 +11,10 @@ use crate::manifest::Manifest;
 use crate::output_file::{self, Kind, Mark};
 use crate::program::{BackupSpec, Executable, Origin, Program};
 use crate::registry::Registry;
-use anyhow::{Context as _, Result, anyhow, bail};
+use anyhow::{Context as _, anyhow, bail};
 use bus::checkpoint::{NodePart, Parts};
 use bus::plan::NodePlan;
-use diagnostics::Diagnostic;
+use diagnostics::{Diagnostic, Error};
 use inputs::{InputFile, sha256};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -100,7 +100,7 @@ impl Checkpoint {
     ///
     /// # Errors
     /// If it cannot be read, is not a checkpoint of this version of the program, or is damaged.
-    pub fn read(path: &Path) -> Result<Self> {
+    pub fn read(path: &Path) -> Result<Self, Error> {
         let about = || format!("cannot go on from {}", path.display());
         let mut bytes = Vec::new();
         let mut file = std::fs::File::open(path).with_context(about)?;
@@ -109,10 +109,10 @@ impl Checkpoint {
         if bytes == START {
             file.take(BYTES_MAX).read_to_end(&mut bytes).with_context(about)?;
         }
-        Self::from_bytes(&bytes).with_context(about)
+        Ok(Self::from_bytes(&bytes).with_context(about)?)
     }
 
-    fn from_bytes(bytes: &[u8]) -> Result<Self> {
+    fn from_bytes(bytes: &[u8]) -> anyhow::Result<Self> {
         if !bytes.starts_with(MARK) {
             bail!(
                 "it is no checkpoint of hummingbus; `run` writes them with --checkpoint-every or [[checkpoint]]"
@@ -143,7 +143,7 @@ impl Checkpoint {
     ///
     /// # Errors
     /// If it cannot be written, or something else would be lost.
-    pub(crate) fn write(&self, path: &Path) -> Result<()> {
+    pub(crate) fn write(&self, path: &Path) -> Result<(), Error> {
         let mut bytes = START.to_vec();
         bytes.extend(postcard::to_stdvec(self).context("cannot put the checkpoint into bytes")?);
         let sum = sha256(&bytes);
@@ -189,7 +189,7 @@ impl Checkpoint {
     ///
     /// # Errors
     /// If one of its files has changed, or a value does not fit.
-    pub fn load_manifest(&self, overrides: &[String], registry: Registry) -> Result<Manifest> {
+    pub fn load_manifest(&self, overrides: &[String], registry: Registry) -> Result<Manifest, Error> {
         let all: Vec<String> = self.overrides.iter().chain(overrides).cloned().collect();
         let manifest = Manifest::load(&self.manifest, &all, registry)?;
         if !overrides.is_empty() {
@@ -233,8 +233,18 @@ impl Checkpoint {
     ///
     /// # Errors
     /// If it is another run: a file has changed, a node is not in it, or its ticks are others.
-    pub fn resume(&self, manifest: &Manifest, graph: &mut Graph, is_changed: bool) -> Result<()> {
+    pub fn resume(&self, manifest: &Manifest, graph: &mut Graph, is_changed: bool) -> Result<(), Error> {
         let replaced = self.take_over(manifest, graph)?;
+        self.require_same_run(graph, is_changed)?;
+        graph.begun = replaced;
+        let nodes = self.parts_for(graph)?;
+        graph.plan.first_tick = self.tick();
+        graph.from = Some(Parts { tick: self.tick(), nodes });
+        Ok(())
+    }
+
+    /// Refuses the run of `graph` if it reads other files, or its ticks are others.
+    fn require_same_run(&self, graph: &Graph, is_changed: bool) -> anyhow::Result<()> {
         for InputFile { path, sha256, .. } in files(graph) {
             let mut known = self.files.iter().chain(&self.requested_files);
             match known.find(|(known, _)| known == path) {
@@ -255,11 +265,15 @@ impl Checkpoint {
                 plan.duration_ticks
             );
         }
-        graph.begun = replaced;
+        Ok(())
+    }
+
+    /// The parts of the nodes of `graph`, in their order.
+    fn parts_for(&self, graph: &Graph) -> anyhow::Result<Vec<NodePart>> {
         let plan = &graph.plan;
         let nodes =
             plan.nodes.iter().zip(&graph.programs).map(|(node, program)| self.part(&node.name, program));
-        let nodes = nodes.collect::<Result<Vec<_>>>()?;
+        let nodes = nodes.collect::<anyhow::Result<Vec<_>>>()?;
         self.require_samples(graph)?;
         let is_flown = |name: &str| plan.nodes.iter().any(|node| node.name == name);
         if let Some(part) =
@@ -267,14 +281,12 @@ impl Checkpoint {
         {
             bail!("the checkpoint holds the state of `{}`, which is no process of the run", part.name);
         }
-        graph.plan.first_tick = tick;
-        graph.from = Some(Parts { tick, nodes });
-        Ok(())
+        Ok(nodes)
     }
 
     /// Puts the processes that fly at its tick into the places of those before them, and returns their origins, by node. Backups
     /// that have joined before its tick join again at it.
-    fn take_over(&self, manifest: &Manifest, graph: &mut Graph) -> Result<BTreeMap<usize, Origin>> {
+    fn take_over(&self, manifest: &Manifest, graph: &mut Graph) -> anyhow::Result<BTreeMap<usize, Origin>> {
         let tick = self.tick();
         let requested = |node: &str, with: &str| {
             let backup = backup_of(manifest, &graph.plan, &graph.files, node, with);
@@ -294,7 +306,7 @@ impl Checkpoint {
             let backup = requested(node, with);
             backup.map(|backup| BackupSpec { take_over_tick: Some(*take_over_tick), ..backup })
         });
-        let under_way = under_way.collect::<Result<Vec<_>>>()?;
+        let under_way = under_way.collect::<anyhow::Result<Vec<_>>>()?;
         let (mut replaced, planned) = (BTreeMap::new(), Origin::Plan);
         let due = |backup: &BackupSpec| tick.next_multiple_of(backup.plan.period_ticks.max(1));
         for backup in std::mem::take(&mut graph.backups) {
@@ -326,7 +338,7 @@ impl Checkpoint {
 
     /// Refuses a graph in which a node reads a topic without a sample before the checkpoint and without one at its
     /// tick.
-    fn require_samples(&self, graph: &Graph) -> Result<()> {
+    fn require_samples(&self, graph: &Graph) -> anyhow::Result<()> {
         let (tick, plan) = (self.tick(), &graph.plan);
         let is_due = |backup: &&BackupSpec| backup.join_tick < tick + backup.plan.period_ticks.max(1);
         let joining = graph.backups.iter().filter(is_due).map(|backup| (&backup.plan, &backup.program));
@@ -351,7 +363,7 @@ impl Checkpoint {
     }
 
     /// The part of the node `name`, which is `program`; an empty one for a recorder, which begins a file of its own.
-    fn part(&self, name: &str, program: &Program) -> Result<NodePart> {
+    fn part(&self, name: &str, program: &Program) -> anyhow::Result<NodePart> {
         if program.is_recorder() {
             return Ok(NodePart::stateless(name));
         }
@@ -414,7 +426,7 @@ fn texts(manifest: &Manifest) -> impl Iterator<Item = (PathBuf, String)> {
     })
 }
 
-fn require_same(path: &Path, expected: &str, found: &str) -> Result<()> {
+fn require_same(path: &Path, expected: &str, found: &str) -> anyhow::Result<()> {
     if expected == found {
         return Ok(());
     }
@@ -501,7 +513,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("a.ckpt");
         old.write(&file).unwrap();
-        let error = format!("{:#}", Checkpoint::read(&file).unwrap_err());
+        let error = Checkpoint::read(&file).unwrap_err().with_causes();
         assert!(error.contains("a.ckpt") && error.contains("hummingbus 0.0.1 has written it"), "{error}");
         let error = Checkpoint::from_bytes(b"a letter").unwrap_err().to_string();
         assert!(error.contains("no checkpoint"), "{error}");

@@ -188,7 +188,7 @@ impl Writer<'_> {
                 bail!("the state of `{}` is in {what}, which does not tell it", node.name);
             }
         }
-        Checkpoint::new(self.manifest, self.graph, parts, flown).write(path)
+        Ok(Checkpoint::new(self.manifest, self.graph, parts, flown).write(path)?)
     }
 }
 

@@ -13,9 +13,10 @@ use crate::run_dir::{
     Entry, SHARED_MEMORY, entry_path, folders, is_own_name, is_own_run_dir, is_run_dir_of, live_runs,
     run_of_dir, run_of_shared_memory, shared_memory_of, try_claim,
 };
-use anyhow::{Result, anyhow, bail};
+use anyhow::{anyhow, bail};
 use bus::process::user_id;
 use bus::user_file;
+use diagnostics::Error;
 use rustix::process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -35,7 +36,7 @@ const POLL: Duration = Duration::from_millis(2);
 /// ```no_run
 /// let report = runtime::clean::clean(true)?;
 /// assert!(report.dry_run, "nothing was removed");
-/// # Ok::<(), anyhow::Error>(())
+/// # Ok::<(), runtime::Error>(())
 /// ```
 #[derive(Debug, Serialize)]
 pub struct Report {
@@ -69,7 +70,7 @@ pub struct Remains {
 ///
 /// # Errors
 /// If the machine's processes cannot be listed.
-pub fn clean(dry_run: bool) -> Result<Report> {
+pub fn clean(dry_run: bool) -> Result<Report, Error> {
     let mut report = Report { dry_run, live: Vec::new(), dead: Vec::new() };
     for (run_id, traces) in find_traces()? {
         // Held until everything is removed: a launcher that is just registering this run waits for it.
@@ -115,7 +116,7 @@ struct Traces {
     spared: Vec<i32>,
 }
 
-fn find_traces() -> Result<BTreeMap<String, Traces>> {
+fn find_traces() -> anyhow::Result<BTreeMap<String, Traces>> {
     let mut found: BTreeMap<String, Traces> = BTreeMap::new();
     for path in own_files(Path::new(SHARED_MEMORY)) {
         let Some(run_id) = name_of(&path).and_then(run_of_shared_memory) else { continue };
@@ -153,7 +154,7 @@ fn own_files(folder: &Path) -> Vec<PathBuf> {
 
 /// This user's processes that carry a run directory, each with a flag: true if it holds a file of that directory.
 /// This process and those that see another /dev/shm are left out.
-fn processes_of_runs() -> Result<Vec<(Pid, PathBuf, bool)>> {
+fn processes_of_runs() -> anyhow::Result<Vec<(Pid, PathBuf, bool)>> {
     let (own_mounts, is_kin) = (mounts_of(Path::new("/proc/self")), kin_of_live_launchers());
     let entries = std::fs::read_dir("/proc")?.flatten();
     let process = |entry: std::fs::DirEntry| {
@@ -244,7 +245,7 @@ impl Remains {
 }
 
 /// Kills a process that carries a run directory, and waits until it is gone.
-fn end_process(process: i32, run_id: &str) -> Result<()> {
+fn end_process(process: i32, run_id: &str) -> anyhow::Result<()> {
     let Some(process) = Pid::from_raw(process) else { return Ok(()) };
     // The handle stays with the process, even if another process gets its number: the signal goes to the process that
     // carries the run directory now.

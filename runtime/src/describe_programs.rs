@@ -11,13 +11,13 @@ use crate::program::Program;
 use crate::role::Role;
 use crate::run_dir::shared_memory_of;
 use crate::spawn::{Started, start};
-use anyhow::{Context, Result};
+use anyhow::Context;
 use bus::announcement::Announcement;
 use bus::description::{DESCRIBE_VARIABLE, Description};
 use bus::host_time::monotonic_ns;
 use bus::plan::{NodePlan, Plan};
 use bus::ports::Inputs;
-use diagnostics::Diagnostic;
+use diagnostics::{Diagnostic, Error};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Child, ExitStatus};
@@ -43,7 +43,7 @@ struct Asked<'g> {
 ///
 /// # Errors
 /// The problem of the first program that would not fly, or the reason why none can be started.
-pub fn check_programs(manifest: &Manifest, graph: &Graph, exe: &Path) -> Result<Vec<Diagnostic>> {
+pub fn check_programs(manifest: &Manifest, graph: &Graph, exe: &Path) -> Result<Vec<Diagnostic>, Error> {
     let asked = asked(graph);
     if asked.is_empty() {
         return Ok(Vec::new());
@@ -142,7 +142,7 @@ enum Answer {
     Silent(Box<Diagnostic>),
 }
 
-fn ask(manifest: &Manifest, exe: &Path, run_dir: &Path, asked: Asked<'_>) -> Result<Answer> {
+fn ask(manifest: &Manifest, exe: &Path, run_dir: &Path, asked: Asked<'_>) -> anyhow::Result<Answer> {
     let Asked { node, generation, plan, program } = asked;
     // The place where the manifest has the output of its runs is not for that of a check.
     let mut program = Program { log: None, ..program.clone() };
@@ -199,7 +199,7 @@ fn compare(
     asked: Asked<'_>,
     description: &Description,
     messages: &BTreeMap<usize, Side>,
-) -> Result<()> {
+) -> anyhow::Result<()> {
     let inputs = asked.plan.inputs.iter().zip(&description.inputs);
     let inputs =
         inputs.filter_map(|(input, message)| Some((input.topic, &input.port, message.as_ref()?, "reads")));

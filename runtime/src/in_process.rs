@@ -8,14 +8,16 @@ use crate::host_limits::require_host;
 use crate::manifest::Manifest;
 use crate::outcome::Outcome;
 use crate::program::Program;
-use anyhow::{Context, Result, anyhow, bail};
+use anyhow::{Context, anyhow};
 use bus::checkpoint::Parts;
 use bus::clock::deadline_ns;
 use bus::component::Role;
 use bus::host_time::monotonic_ns;
 use bus::plan::Pace;
-use bus::{Registration, Simulation};
+use bus::{BusError, Registration, Simulation};
+use diagnostics::{ComponentFailure, Error};
 use inputs::InputFiles;
+use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::time::Duration;
@@ -73,7 +75,7 @@ const NAP_NS: u64 = 20_000_000;
 ///
 /// # Errors
 /// A problem in the manifest, or a node that needs a process of its own: an executable, a swap, a standby.
-pub fn simulate(manifest: &Manifest) -> Result<Simulation> {
+pub fn simulate(manifest: &Manifest) -> Result<Simulation, Error> {
     simulate_reading(manifest, InputFiles::default())
 }
 
@@ -81,10 +83,11 @@ pub fn simulate(manifest: &Manifest) -> Result<Simulation> {
 ///
 /// # Errors
 /// As [`simulate`].
-pub fn simulate_reading(manifest: &Manifest, files: InputFiles) -> Result<Simulation> {
+pub fn simulate_reading(manifest: &Manifest, files: InputFiles) -> Result<Simulation, Error> {
     let graph = Graph::build_from(manifest, files)?;
     require_host(&Host::InProcess, manifest, &graph)?;
-    simulation(&graph, |component| component.role == Role::Compute, manifest.registry().components())
+    let components = manifest.registry().components();
+    Ok(simulation(&graph, |component| component.role == Role::Compute, components)?)
 }
 
 /// The nodes of `graph` of which `is_member` is true, in one simulation.
@@ -95,7 +98,7 @@ fn simulation(
     graph: &Graph,
     is_member: impl Fn(&Registration) -> bool,
     components: &'static [Registration],
-) -> Result<Simulation> {
+) -> anyhow::Result<Simulation> {
     let mut members = Vec::new();
     for (index, (program, node)) in graph.programs.iter().zip(&graph.plan.nodes).enumerate() {
         let component = program.component();
@@ -117,18 +120,33 @@ pub(crate) fn fly(
     stop: &StopToken,
     on: &mut dyn FnMut(RunEvent<'_>),
     save: &mut dyn FnMut(Parts),
-) -> Result<Outcome> {
+) -> anyhow::Result<Outcome> {
     let mut simulation = simulation(graph, |_| true, components)?;
     if let Some(parts) = &graph.from {
         simulation.restore(parts)?;
     }
     let start_ns = monotonic_ns();
-    let mut run = Run { graph, stop, on, save, start_ns, reported_ns: start_ns, missed_deadlines: 0 };
-    let flown = catch_unwind(AssertUnwindSafe(|| run.fly(simulation)));
-    let (ticks, overruns) = match flown {
-        Ok(flown) => flown?,
-        Err(panic) => bail!("a component panicked: {}", panic_message(&*panic)),
+    let mut run = Run {
+        graph,
+        stop,
+        on,
+        save,
+        start_ns,
+        reported_ns: start_ns,
+        missed_deadlines: 0,
+        is_stepping: false,
     };
+    let end = catch_unwind(AssertUnwindSafe(|| run.fly(&mut simulation)));
+    let end = end.map_err(|panic| match (run.is_stepping, panicked(&*panic)) {
+        (true, error) => ComponentFailure::new(simulation.next_node(), error).into(),
+        // The listener or the writer of checkpoints.
+        (false, error) => error,
+    })?;
+    let (ticks, overruns) = (simulation.tick(), simulation.overruns());
+    match catch_unwind(AssertUnwindSafe(|| simulation.finish(end))) {
+        Ok(finished) => finished.map_err(failed)?,
+        Err(panic) => return Err(ComponentFailure::new(None, panicked(&*panic)).into()),
+    }
     Ok(Outcome {
         first_tick: graph.plan.first_tick,
         ticks,
@@ -146,6 +164,16 @@ pub(crate) fn fly(
     })
 }
 
+/// The failure of the component that `error` names.
+fn failed(error: BusError) -> ComponentFailure {
+    let node = error.node().map(str::to_owned);
+    ComponentFailure::new(node.as_deref(), error)
+}
+
+fn panicked(panic: &(dyn Any + Send)) -> anyhow::Error {
+    anyhow!("a component panicked: {}", panic_message(panic))
+}
+
 /// A run under way.
 struct Run<'a> {
     graph: &'a Graph,
@@ -157,13 +185,19 @@ struct Run<'a> {
     /// Host time of the last report.
     reported_ns: u64,
     missed_deadlines: u32,
+    /// True while a component computes.
+    is_stepping: bool,
 }
 
 /// Checks that [`fly_unrecorded`] can fly `manifest`, and go on `from` a checkpoint; flies nothing. Returns the graph.
 ///
 /// # Errors
 /// As [`fly_unrecorded`], except for errors in flight.
-pub fn require_flyable(manifest: &Manifest, files: InputFiles, from: Option<&Checkpoint>) -> Result<Graph> {
+pub fn require_flyable(
+    manifest: &Manifest,
+    files: InputFiles,
+    from: Option<&Checkpoint>,
+) -> Result<Graph, Error> {
     let graph = graph_of(manifest, files, Path::new(FIGURES), from)?;
     if let Some(parts) = &graph.from {
         simulation(&graph, |_| true, manifest.registry().components())?.restore(parts)?;
@@ -182,7 +216,7 @@ pub fn fly_unrecorded(
     files: InputFiles,
     folder: &Path,
     from: Option<&Checkpoint>,
-) -> Result<Outcome> {
+) -> Result<Outcome, Error> {
     let path = folder.join(FIGURES);
     let graph = graph_of(manifest, files, &path, from)?;
     let stop = StopToken::new();
@@ -194,7 +228,12 @@ pub fn fly_unrecorded(
 }
 
 /// The graph of `manifest` for one thread, without checkpoints, whose judge writes its figures to `path`.
-fn graph_of(manifest: &Manifest, files: InputFiles, path: &Path, from: Option<&Checkpoint>) -> Result<Graph> {
+fn graph_of(
+    manifest: &Manifest,
+    files: InputFiles,
+    path: &Path,
+    from: Option<&Checkpoint>,
+) -> anyhow::Result<Graph> {
     let mut graph = Graph::build_from(manifest, files)?;
     if let Some(from) = from {
         from.resume(manifest, &mut graph, true)?;
@@ -208,19 +247,16 @@ fn graph_of(manifest: &Manifest, files: InputFiles, path: &Path, from: Option<&C
     Ok(graph)
 }
 
-/// Ticks that were computed, and for each node with a simulated computing time its overruns and skipped steps.
-type Flown = (u32, Vec<(String, u32, u32)>);
-
 impl Run<'_> {
-    fn fly(&mut self, mut simulation: Simulation) -> Result<Flown> {
-        let end = self.step_all(&mut simulation);
+    /// Steps to the end, or to a stop; a failed step ends it too.
+    fn fly(&mut self, simulation: &mut Simulation) -> Result<(), BusError> {
+        let end = self.step_all(simulation);
+        self.is_stepping = false;
         self.tell(simulation.tick());
-        let (ticks, overruns) = (simulation.tick(), simulation.overruns());
-        simulation.finish(end)?;
-        Ok((ticks, overruns))
+        end
     }
 
-    fn step_all(&mut self, simulation: &mut Simulation) -> Result<(), bus::BusError> {
+    fn step_all(&mut self, simulation: &mut Simulation) -> Result<(), BusError> {
         let plan = &self.graph.plan;
         let mut next_checkpoint = plan.checkpoint_after(plan.first_tick);
         while simulation.tick() < plan.duration_ticks && self.stop.count() == 0 {
@@ -235,7 +271,9 @@ impl Run<'_> {
                 (self.save)(simulation.save());
                 next_checkpoint = plan.checkpoint_after(tick);
             }
+            self.is_stepping = true;
             simulation.step()?;
+            self.is_stepping = false;
         }
         Ok(())
     }

@@ -22,10 +22,11 @@ use crate::run_dir::RunDir;
 use crate::supervisor::Supervisor;
 pub use crate::supervisor::replacement::{Purpose, Report};
 use crate::world::Spent;
-use anyhow::{Context, Result};
+use anyhow::Context;
 use bus::lockstep::SupervisorView;
 use bus::plan::Plan;
 use bus::watch::WatchFiles;
+use diagnostics::Error;
 use inputs::InputFiles;
 use recorder::reader::Recording;
 use std::collections::BTreeMap;
@@ -163,7 +164,7 @@ impl<'a> Launcher<'a> {
     ///
     /// # Errors
     /// A problem in the manifest, or as [`Launcher::launch`].
-    pub fn fly(self, manifest: &Manifest, recording: &Path) -> Result<(Outcome, Option<Recording>)> {
+    pub fn fly(self, manifest: &Manifest, recording: &Path) -> Result<(Outcome, Option<Recording>), Error> {
         self.fly_planned(manifest, recording).map(|(_, outcome, recording)| (outcome, recording))
     }
 
@@ -175,7 +176,7 @@ impl<'a> Launcher<'a> {
         mut self,
         manifest: &Manifest,
         recording: &Path,
-    ) -> Result<(Plan, Outcome, Option<Recording>)> {
+    ) -> Result<(Plan, Outcome, Option<Recording>), Error> {
         let mut graph = Graph::build_from(manifest, self.files.clone())?;
         if let Some(from) = self.from.take() {
             from.resume(manifest, &mut graph, true)?;
@@ -196,7 +197,7 @@ impl<'a> Launcher<'a> {
         manifest: &Manifest,
         graph: &mut Graph,
         outputs: &mut Outputs,
-    ) -> Result<Outcome> {
+    ) -> Result<Outcome, Error> {
         require_host(&self.host, manifest, graph)?;
         if self.host != Host::InProcess {
             Host::require_proc()?;
@@ -236,7 +237,7 @@ impl<'a> Launcher<'a> {
         rewinds: &Rewinds,
         files: &WrittenFiles,
         on: &mut dyn FnMut(RunEvent<'_>),
-    ) -> Result<Outcome> {
+    ) -> anyhow::Result<Outcome> {
         // Before anything is touched that an earlier run left.
         if self.host != Host::InProcess {
             bus::room::require(&graph.plan, &manifest.registry().messages())?;
@@ -281,7 +282,7 @@ impl<'a> Launcher<'a> {
         checkpoints: &mut Collector<'_>,
         rewinds: &Rewinds,
         on: &mut dyn FnMut(RunEvent<'_>),
-    ) -> Result<Outcome> {
+    ) -> anyhow::Result<Outcome> {
         if self.host == Host::InProcess {
             let components = manifest.registry().components();
             let mut outcome =
@@ -344,7 +345,7 @@ fn prepare(
     recording: Option<&Path>,
     run_dir: &RunDir,
     mark: Option<String>,
-) -> Result<()> {
+) -> anyhow::Result<()> {
     let (files, recorded) = (graph.files.listing_anew(), run_dir.path().join("manifest.toml"));
     let whole = (manifest.path.as_path(), manifest.recorded_text.as_str(), recorded.as_path());
     let texts = manifest.included().map(|(path, text)| (path, text, path));
@@ -382,7 +383,7 @@ fn prepare(
 }
 
 /// Figures that the judge of a run without a recording has written, if there is one.
-fn figures(graph: &Graph, run_dir: &Path) -> Result<Option<Vec<u8>>> {
+fn figures(graph: &Graph, run_dir: &Path) -> anyhow::Result<Option<Vec<u8>>> {
     let has_judge = graph.programs.iter().any(Program::is_judge);
     let read = || std::fs::read(run_dir.join(FIGURES)).context("cannot read the figures of the judge");
     has_judge.then(read).transpose()

@@ -61,8 +61,10 @@ mod watch_clock;
 mod world;
 
 pub use describe_programs::check_programs;
+pub use diagnostics::{Error, Result};
 pub use in_process::{fly_unrecorded, require_flyable, simulate, simulate_reading};
 
+use anyhow::anyhow;
 use bus::{BusError, Join};
 use registry::Registry;
 
@@ -76,7 +78,7 @@ use registry::Registry;
 ///
 /// # Errors
 /// If there is no such component, or it fails.
-pub fn node(name: &str, registry: Registry) -> anyhow::Result<()> {
+pub fn node(name: &str, registry: Registry) -> Result<()> {
     let ended = match (name, registry.find(name)) {
         ("clock", _) => Join::clock_from_environment().and_then(bus::clock::run),
         ("group", None) => bus::group::run_process(registry.components()),
@@ -84,11 +86,11 @@ pub fn node(name: &str, registry: Registry) -> anyhow::Result<()> {
             Join::from_environment().and_then(|join| component.run(join, registry.components()))
         }
         (_, None) if let Some(program) = registry.program(name) => (program.run)(registry.components()),
-        (_, None) => anyhow::bail!("no kind `{name}`; there are {}", registry.names()),
+        (_, None) => return Err(anyhow!("no kind `{name}`; there are {}", registry.names()).into()),
     };
     match ended {
         // The launcher ended the run and knows why.
         Ok(()) | Err(BusError::Aborted) => Ok(()),
-        Err(error) => anyhow::bail!(error),
+        Err(error) => Err(error.into()),
     }
 }

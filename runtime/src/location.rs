@@ -5,6 +5,7 @@
 //! This is stricter than a kernel with `fs.protected_symlinks`: that follows links of a folder's owner, who may have
 //! planted them as well.
 
+use anyhow::anyhow;
 use rustix::fs::{AtFlags, CWD, FileType, Mode, OFlags, Stat};
 use rustix::io::Errno;
 use std::ffi::{OsStr, OsString};
@@ -53,6 +54,18 @@ pub enum Unlocated {
         /// Cause.
         cause: io::Error,
     },
+}
+
+impl Unlocated {
+    /// This reason behind `text` in one message. A refusal of the system stays one.
+    pub fn told(self, text: String) -> anyhow::Error {
+        let kind = match &self {
+            Self::NoFolder(_) => io::ErrorKind::NotFound,
+            Self::System { cause, .. } => cause.kind(),
+            Self::Folder | Self::Planted { .. } | Self::Links => return anyhow!("{text}: {self}"),
+        };
+        io::Error::new(kind, format!("{text}: {self}")).into()
+    }
 }
 
 /// A name in an opened folder; there need not be a file of that name.

@@ -3,8 +3,9 @@
 
 use crate::file_lock;
 use crate::location::{Location, Unlocated};
-use anyhow::{Context, Result, anyhow, bail};
+use anyhow::{Context, anyhow, bail};
 use bus::host_time::monotonic_ns;
+use diagnostics::Error;
 use rustix::fs::OFlags;
 use std::fs::{File, Metadata};
 use std::io::{self, BufWriter, ErrorKind, Read as _, Write as _};
@@ -88,12 +89,12 @@ const NOT_REGULAR: &str = "it exists and is not a regular file; name another fil
 ///
 /// # Errors
 /// If its folder is not there, or a link on the way is not to be trusted.
-pub(crate) fn real_path(path: &Path) -> Result<PathBuf> {
+pub(crate) fn real_path(path: &Path) -> anyhow::Result<PathBuf> {
     Ok(located(path)?.path)
 }
 
-fn located(path: &Path) -> Result<Location> {
-    Location::find(path).map_err(|reason| anyhow!("cannot create {}: {reason}", path.display()))
+fn located(path: &Path) -> anyhow::Result<Location> {
+    Location::find(path).map_err(|reason| reason.told(format!("cannot create {}", path.display())))
 }
 
 /// Refuses a file of `kind` at `path` if it would replace another kind of file.
@@ -101,15 +102,16 @@ fn located(path: &Path) -> Result<Location> {
 /// # Errors
 /// If its folder is missing, a link on the way cannot be trusted, or the file in its place is neither empty nor of
 /// this kind.
-pub fn check(path: &Path, kind: &Kind) -> Result<()> {
-    locate(path, kind).map(drop)
+pub fn check(path: &Path, kind: &Kind) -> Result<(), Error> {
+    locate(path, kind)?;
+    Ok(())
 }
 
 /// The location of the file of `kind` at `path`.
 ///
 /// # Errors
 /// As [`check`].
-pub(crate) fn locate(path: &Path, kind: &Kind) -> Result<Location> {
+pub(crate) fn locate(path: &Path, kind: &Kind) -> anyhow::Result<Location> {
     let cannot = || format!("cannot create the {} {}", kind.name, path.display());
     let found = Location::find(path);
     if let Err(planted @ Unlocated::Planted { .. }) = &found {
@@ -130,11 +132,17 @@ pub(crate) fn locate(path: &Path, kind: &Kind) -> Result<Location> {
         Err(error) if error.kind() == ErrorKind::NotFound => {}
         // An empty one may be one that this user may only write to.
         Err(_) if location.stat().is_ok_and(|old| old.is_some_and(|old| old.st_size == 0)) => {}
-        opened => {
-            opened.and_then(|file| kind.require(&file)).map_err(|error| anyhow!("{}: {error}", cannot()))?
-        }
+        opened => opened.and_then(|file| kind.require(&file)).map_err(|error| told(&error, cannot()))?,
     }
     Ok(location)
+}
+
+/// `error` behind `text` in one message. A refusal of the system stays one; a file of another kind is none.
+fn told(error: &io::Error, text: String) -> anyhow::Error {
+    match error.raw_os_error() {
+        Some(_) => io::Error::new(error.kind(), format!("{text}: {error}")).into(),
+        None => anyhow!("{text}: {error}"),
+    }
 }
 
 /// True if standard output or standard error goes to this file.
@@ -159,7 +167,7 @@ pub fn write<T>(
     path: &Path,
     kind: &Kind,
     write: impl FnOnce(&mut BufWriter<&mut File>) -> io::Result<T>,
-) -> Result<T> {
+) -> Result<T, Error> {
     let location = locate(path, kind)?;
     let mut draft = Draft::beside(&location).with_context(|| format!("cannot create {}", path.display()))?;
     let cannot = || format!("cannot write {}", path.display());
@@ -210,22 +218,23 @@ impl Drop for Draft {
 ///
 /// # Errors
 /// If that is not possible, or a link on the way is not to be trusted.
-pub fn make_folder(folder: &Path) -> Result<()> {
+pub fn make_folder(folder: &Path) -> Result<(), Error> {
     let inside = folder.join("file");
-    Location::make(&inside)
-        .map(drop)
-        .map_err(|reason| anyhow!("cannot make the folder {}: {reason}", folder.display()))
+    let cannot = || format!("cannot make the folder {}", folder.display());
+    Location::make(&inside).map_err(|reason| reason.told(cannot()))?;
+    Ok(())
 }
 
 /// Holds the folder `folder` for one command that fills it.
 ///
 /// # Errors
 /// If another command does.
-pub fn lock_folder(folder: &Path) -> Result<File> {
+pub fn lock_folder(folder: &Path) -> Result<File, Error> {
     let cannot = || format!("cannot write to the folder {}", folder.display());
     let file = File::open(folder).with_context(cannot)?;
     if !file_lock::try_exclusive(&file).with_context(cannot)? {
-        bail!("{}: another hummingbus writes to it now; name another folder, or wait", cannot());
+        let other = "another hummingbus writes to it now; name another folder, or wait";
+        return Err(anyhow!("{}: {other}", cannot()).into());
     }
     Ok(file)
 }
@@ -260,7 +269,7 @@ mod tests {
             out.write_all(&[b'x'; 100_000])?;
             Err::<(), _>(std::io::Error::from(std::io::ErrorKind::StorageFull))
         };
-        let error = format!("{:#}", write(&path, &LOG, full).unwrap_err());
+        let error = write(&path, &LOG, full).unwrap_err().with_causes();
         assert!(error.contains("cannot write") && error.contains("a.log"), "{error}");
         assert_eq!(std::fs::read_to_string(&path).unwrap(), LOG_START);
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);

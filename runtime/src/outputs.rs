@@ -9,7 +9,8 @@ use crate::manifest::Manifest;
 use crate::output_file::{self, Kind, LOG, RECORDING, is_same};
 use crate::program::Program;
 use crate::run_dir::{self, RunDir};
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, bail};
+use diagnostics::Error;
 use recorder::reader::Recording;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -69,7 +70,12 @@ impl Outputs {
     ///
     /// # Errors
     /// If one of them would replace a file of another kind, an input of the run, or another of them.
-    pub fn of(manifest: &Manifest, graph: &Graph, recording: &Path, pages: Vec<Output>) -> Result<Self> {
+    pub fn of(
+        manifest: &Manifest,
+        graph: &Graph,
+        recording: &Path,
+        pages: Vec<Output>,
+    ) -> Result<Self, Error> {
         let stem = recording.with_extension("");
         let has_recorder = graph.programs.iter().any(Program::is_recorder);
         let recording = has_recorder.then(|| Output {
@@ -89,20 +95,7 @@ impl Outputs {
         let checkpoints: Vec<Output> = checkpoints.collect();
         let all: Vec<&Output> =
             recording.iter().chain(&partial).chain(&logs).chain(&pages).chain(&checkpoints).collect();
-        for (index, output) in all.iter().enumerate() {
-            output_file::check(&output.path, output.kind)?;
-            let path = output.path.display();
-            if let Some(other) = all[..index].iter().find(|other| is_same(&other.path, &output.path)) {
-                bail!("{path} is to be {} and {}: give each a file of its own", other.what, output.what);
-            }
-            if let Some(input) = inputs.iter().find(|input| is_same(input, &output.path)) {
-                bail!(
-                    "{path} cannot be {}: the run reads it, as {}; name another file",
-                    output.what,
-                    input.display()
-                );
-            }
-        }
+        require_separate(&all, &inputs)?;
         Ok(Self { recording, stem, logs, partial: None, claimed_logs: Vec::new() })
     }
 
@@ -110,7 +103,7 @@ impl Outputs {
     ///
     /// # Errors
     /// If another run writes to one of them; the error names it.
-    pub(crate) fn claim(&mut self, run_dir: &RunDir) -> Result<()> {
+    pub(crate) fn claim(&mut self, run_dir: &RunDir) -> anyhow::Result<()> {
         if let Some(recording) = &self.recording {
             let partial = recording.claimed(Partial::claim)?;
             if partial.path.to_str().is_none() {
@@ -139,17 +132,17 @@ impl Outputs {
     ///
     /// # Errors
     /// If something lies there that must not be replaced.
-    pub(crate) fn set_aside(&mut self, number: usize) -> Result<Option<PathBuf>> {
+    pub(crate) fn set_aside(&mut self, number: usize) -> anyhow::Result<Option<PathBuf>> {
         let Some(partial) = self.partial.take() else { return Ok(None) };
         partial.set_aside(&aside(number)).map(Some)
     }
 
     /// Lists the files that the run has claimed, for runs that find them claimed.
-    fn publish(&self, run_dir: &RunDir) -> Result<()> {
+    fn publish(&self, run_dir: &RunDir) -> anyhow::Result<()> {
         let all = self.recording.iter().chain(&self.logs);
         let paths = all.map(|output| output_file::real_path(&output.path));
         let paths = paths.map(|path| Ok(path?.to_string_lossy().into_owned()));
-        let text = serde_json::to_vec(&paths.collect::<Result<Vec<String>>>()?)?;
+        let text = serde_json::to_vec(&paths.collect::<anyhow::Result<Vec<String>>>()?)?;
         std::fs::write(run_dir.path().join(LIST), text).context("cannot write to the run directory")
     }
 
@@ -168,7 +161,7 @@ impl Outputs {
     ///
     /// # Errors
     /// If it is not complete, or something must not be replaced: then it stays where it was written.
-    pub fn finish(&mut self) -> Result<Option<Recording>> {
+    pub fn finish(&mut self) -> Result<Option<Recording>, Error> {
         let (Some(partial), Some(recording)) = (&self.partial, &self.recording) else { return Ok(None) };
         let flown = Recording::of_file(&partial.file, &recording.path)?;
         partial.finish()?;
@@ -192,16 +185,35 @@ impl Outputs {
     }
 }
 
+/// Refuses files of which one would replace a file of another kind, one of `inputs`, or another of them.
+fn require_separate(all: &[&Output], inputs: &[PathBuf]) -> anyhow::Result<()> {
+    for (index, output) in all.iter().enumerate() {
+        output_file::check(&output.path, output.kind)?;
+        let path = output.path.display();
+        if let Some(other) = all[..index].iter().find(|other| is_same(&other.path, &output.path)) {
+            bail!("{path} is to be {} and {}: give each a file of its own", other.what, output.what);
+        }
+        if let Some(input) = inputs.iter().find(|input| is_same(input, &output.path)) {
+            bail!(
+                "{path} cannot be {}: the run reads it, as {}; name another file",
+                output.what,
+                input.display()
+            );
+        }
+    }
+    Ok(())
+}
+
 impl Output {
     /// The file that this recording is while the run flies.
-    fn until_complete(&self) -> Result<Self> {
+    fn until_complete(&self) -> anyhow::Result<Self> {
         let path = partial_path(&output_file::real_path(&self.path)?)?;
         let what = "the recording until it is complete".to_owned();
         Ok(Self { what, path, kind: self.kind, advice: self.advice.clone() })
     }
 
     /// Claims its path with `claim`, and returns the result.
-    fn claimed<T>(&self, claim: impl Fn(&Path) -> Result<Option<T>>) -> Result<T> {
+    fn claimed<T>(&self, claim: impl Fn(&Path) -> anyhow::Result<Option<T>>) -> anyhow::Result<T> {
         for _ in 0..ATTEMPTS {
             if let Some(claimed) = claim(&self.path)? {
                 return Ok(claimed);

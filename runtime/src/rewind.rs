@@ -4,6 +4,7 @@ use crate::ctl::Reply;
 use crate::graph::Graph;
 use crate::output_file::{RECORDING, check};
 use bus::plan::Pace;
+use diagnostics::Error;
 use serde::Serialize;
 use std::cell::{Ref, RefCell};
 use std::path::PathBuf;
@@ -87,7 +88,7 @@ impl Rewinds {
     ///
     /// # Errors
     /// If something else lies there.
-    pub fn require_place(&self) -> anyhow::Result<()> {
+    pub fn require_place(&self) -> Result<(), Error> {
         self.place.borrow().as_ref().map_or(Ok(()), |place| check(place, &RECORDING))
     }
 

@@ -5,11 +5,12 @@
 //! launcher dies, in any way: so a process that can get the lock knows that the run is dead.
 
 use crate::file_lock;
-use anyhow::{Context, Result, anyhow, bail};
+use anyhow::{Context, bail};
 pub(crate) use bus::names::SHARED_MEMORY;
 use bus::names::shm_prefix;
 use bus::process::user_id;
 use bus::user_file;
+use diagnostics::{ComponentFailure, Error};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
@@ -49,12 +50,12 @@ pub struct Entry {
 
 impl Entry {
     /// Entry of a new run of `manifest`.
-    fn new(manifest: &Path) -> Result<Self> {
+    fn new(manifest: &Path) -> anyhow::Result<Self> {
         Self::named(manifest, format!("{:x}-{:x}", std::process::id(), new_run_number()))
     }
 
     /// Entry of a new run of `manifest` that is called `run_id`.
-    fn named(manifest: &Path, run_id: String) -> Result<Self> {
+    fn named(manifest: &Path, run_id: String) -> anyhow::Result<Self> {
         let run_dir = new_run_dir(&run_id)?;
         let (manifest, launcher) = (manifest.to_owned(), std::process::id());
         let folder = std::env::current_dir().unwrap_or_default();
@@ -99,7 +100,7 @@ pub(crate) fn folders() -> Vec<PathBuf> {
 
 /// Path for the directory of run `run_id`. It is one level below the folder: a level shared by runs could vanish with
 /// another run that ends.
-fn new_run_dir(run_id: &str) -> Result<PathBuf> {
+fn new_run_dir(run_id: &str) -> anyhow::Result<PathBuf> {
     let folders = folders();
     let mut paths = folders.iter().map(|folder| folder.join(dir_name(run_id))).enumerate();
     // The first folder is taken even if it cannot be written to: creating the directory then reports the fault.
@@ -135,8 +136,8 @@ impl RunDir {
     ///
     /// # Errors
     /// If shared memory or the folder for temporary files cannot be written to.
-    pub fn create(manifest: &Path) -> Result<Self> {
-        Self::create_by(manifest, Entry::new)
+    pub fn create(manifest: &Path) -> Result<Self, Error> {
+        Ok(Self::create_by(manifest, Entry::new)?)
     }
 
     /// Registers a run that goes on under its old name, `run_id`, after its files were removed; creates its
@@ -144,11 +145,11 @@ impl RunDir {
     ///
     /// # Errors
     /// As [`RunDir::create`].
-    pub fn create_again(manifest: &Path, run_id: &str) -> Result<Self> {
-        Self::create_by(manifest, |manifest| Entry::named(manifest, run_id.to_owned()))
+    pub fn create_again(manifest: &Path, run_id: &str) -> Result<Self, Error> {
+        Ok(Self::create_by(manifest, |manifest| Entry::named(manifest, run_id.to_owned()))?)
     }
 
-    fn create_by(manifest: &Path, new: impl Fn(&Path) -> Result<Entry>) -> Result<Self> {
+    fn create_by(manifest: &Path, new: impl Fn(&Path) -> anyhow::Result<Entry>) -> anyhow::Result<Self> {
         let manifest = std::path::absolute(manifest)?;
         let (entry, registered) = loop {
             let entry = new(&manifest)?;
@@ -189,17 +190,23 @@ impl RunDir {
 
 impl RunDir {
     /// Adds to an error of the run that its directory has no room left, where that is so.
-    pub fn blame_room(&self, error: anyhow::Error) -> anyhow::Error {
+    pub(crate) fn blame_room(&self, error: anyhow::Error) -> anyhow::Error {
         let Ok(found) = rustix::fs::statvfs(self.path()) else { return error };
         let free = found.f_bavail.saturating_mul(found.f_frsize);
         if free >= FULL_BYTES {
             return error;
         }
         let folder = self.path().parent().unwrap_or(self.path()).display();
-        anyhow!(
+        let text = format!(
             "{error:#}\nThe folder for temporary files, {folder}, has {free} bytes free; make room there, or set \
              TMPDIR to another folder"
-        )
+        );
+        let full = std::io::Error::new(std::io::ErrorKind::StorageFull, text);
+        let error = Error::from(error);
+        if error.is_component() {
+            return ComponentFailure::new(error.process(), full).into();
+        }
+        full.into()
     }
 
     /// Removes everything; returns the failures, each as a sentence.
@@ -244,7 +251,7 @@ impl Drop for RunDir {
 /// assert!(path.is_dir());
 /// drop(scratch);
 /// assert!(!path.exists());
-/// # Ok::<(), anyhow::Error>(())
+/// # Ok::<(), runtime::Error>(())
 /// ```
 #[derive(Debug)]
 pub struct Scratch {
@@ -257,7 +264,7 @@ impl Scratch {
     ///
     /// # Errors
     /// If the folder for temporary files cannot be written to.
-    pub fn create() -> Result<Self> {
+    pub fn create() -> Result<Self, Error> {
         let path = Entry::new(Path::new(""))?.run_dir;
         let lock = create_locked(&path).with_context(|| format!("cannot create {}", path.display()))?;
         Ok(Self { path, _lock: lock })
@@ -332,7 +339,7 @@ pub(crate) fn shared_memory_of(run_id: &str) -> Vec<PathBuf> {
 
 /// Writes `entry` and locks it. `None` if `clean` met the file before it was locked, and has removed it: then the
 /// run needs another name, so that a name that was once dead is so for ever.
-fn register(entry: &Entry) -> Result<Option<File>> {
+fn register(entry: &Entry) -> anyhow::Result<Option<File>> {
     let mut options = std::fs::OpenOptions::new();
     options.read(true).write(true).create_new(true).mode(0o600);
     let path = entry_path(&entry.run_id);
@@ -446,8 +453,8 @@ fn live_run(path: &Path) -> Option<LiveRun> {
 ///
 /// # Errors
 /// If there is no such run, or several to choose from; the error lists the live runs.
-pub fn find_live(run_id: Option<&str>) -> Result<LiveRun> {
-    choose(live_runs(), run_id)
+pub fn find_live(run_id: Option<&str>) -> Result<LiveRun, Error> {
+    Ok(choose(live_runs(), run_id)?)
 }
 
 /// The live run that a command is to change: the one named `run_id`, or the only one, if it was started in this folder and on this
@@ -455,7 +462,7 @@ pub fn find_live(run_id: Option<&str>) -> Result<LiveRun> {
 ///
 /// # Errors
 /// As [`find_live`], or if the only run was started elsewhere: it may be somebody's long flight.
-pub fn find_own(run_id: Option<&str>) -> Result<LiveRun> {
+pub fn find_own(run_id: Option<&str>) -> Result<LiveRun, Error> {
     let run = find_live(run_id)?;
     if run_id.is_none() {
         require_here(&run.entry, &std::env::current_dir().unwrap_or_default(), terminal())?;
@@ -463,7 +470,7 @@ pub fn find_own(run_id: Option<&str>) -> Result<LiveRun> {
     Ok(run)
 }
 
-fn require_here(entry: &Entry, folder: &Path, terminal: Option<u32>) -> Result<()> {
+fn require_here(entry: &Entry, folder: &Path, terminal: Option<u32>) -> anyhow::Result<()> {
     let elsewhere = if entry.folder != folder {
         format!("in another folder, {}", entry.folder.display())
     } else if entry.terminal != terminal {
@@ -488,7 +495,7 @@ pub fn run_of_launcher(launcher: u32) -> Option<LiveRun> {
     live_runs().into_iter().find(|run| run.entry.launcher == launcher)
 }
 
-fn choose(mut runs: Vec<LiveRun>, run_id: Option<&str>) -> Result<LiveRun> {
+fn choose(mut runs: Vec<LiveRun>, run_id: Option<&str>) -> anyhow::Result<LiveRun> {
     let is_chosen = |run: &LiveRun| run_id.is_none_or(|run_id| run.entry.run_id == run_id);
     let index = runs.iter().position(is_chosen);
     match (index, run_id, runs.len()) {

@@ -28,9 +28,10 @@ use crate::supervisor::state_machine::{Action, Event, State};
 use crate::view::{Command, SegmentWrite};
 use crate::watch_clock::WatchClock;
 use crate::world::{Body, Spent, World};
-use anyhow::{Result, anyhow};
+use anyhow::Result;
 use bus::lockstep::Phase;
 use bus::plan::{Plan, SLOTS_PER_NODE};
+use diagnostics::ComponentFailure;
 use std::time::Duration;
 
 /// Longest sleep of the supervisor between two looks at its processes.
@@ -330,12 +331,17 @@ impl<'a, W: World> Supervisor<'a, W> {
         if std::mem::take(&mut self.decisions.has_answered) {
             self.timing.last_change.1 = self.clock.now();
         }
-        decided.or_else(|Abort(message)| self.abort(message))
+        decided.or_else(|Abort { process, message }| self.fail(&process, message))
     }
 
-    fn abort<T>(&mut self, message: String) -> Result<T> {
+    /// Ends the run because `process` has failed.
+    fn fail<T>(&mut self, process: &str, message: String) -> Result<T> {
+        self.abort(ComponentFailure::new(Some(process), message))
+    }
+
+    fn abort<T>(&mut self, error: impl Into<anyhow::Error>) -> Result<T> {
         self.take_down();
-        Err(anyhow!(message))
+        Err(error.into())
     }
 
     /// Ends all processes. A failure is only noted: the error of the run stays the one that ended it.

@@ -71,10 +71,10 @@ pub fn export(arguments: &ExportArguments) -> Result<bool> {
 }
 
 fn write(path: &Path, kind: &Kind, table: &Table, is_csv: bool) -> Result<()> {
-    output_file::write(path, kind, |out| {
+    Ok(output_file::write(path, kind, |out| {
         let written = if is_csv { table.write_csv(out) } else { table.write_parquet(out) };
-        written.map_err(|error| std::io::Error::other(format!("{error:#}")))
-    })
+        written.map_err(|error| std::io::Error::other(error.with_causes()))
+    })?)
 }
 
 /// Name of the file of `topic`: `plant.state.parquet` of `/plant/state`.

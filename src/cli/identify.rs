@@ -219,7 +219,7 @@ fn claim(out: &Path, files: &[(&str, &Kind)], inputs: &[&Path]) -> Result<File> 
             );
         }
     }
-    output_file::lock_folder(out)
+    Ok(output_file::lock_folder(out)?)
 }
 
 fn write_json(out: &Path, report: &Value) -> Result<()> {
@@ -229,7 +229,7 @@ fn write_json(out: &Path, report: &Value) -> Result<()> {
 }
 
 fn write(out: &Path, name: &str, kind: &Kind, content: impl AsRef<[u8]>) -> Result<()> {
-    output_file::write(&out.join(name), kind, |file| file.write_all(content.as_ref()))
+    Ok(output_file::write(&out.join(name), kind, |file| file.write_all(content.as_ref()))?)
 }
 
 fn summary(report: &Report, flown: Option<&Value>, out: &Path) -> String {

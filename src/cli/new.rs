@@ -98,7 +98,7 @@ fn require_free(out: &Path) -> Result<()> {
             out.display()
         );
     }
-    output_file::check(out, &VEHICLE)
+    Ok(output_file::check(out, &VEHICLE)?)
 }
 
 fn summary(made: &Converted, file: &str, out: &Path) -> String {

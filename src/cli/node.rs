@@ -16,5 +16,6 @@ pub struct NodeArguments {
 /// # Errors
 /// If there is no such component, or the component's own error.
 pub fn node(NodeArguments { kind }: &NodeArguments) -> Result<bool> {
-    runtime::node(kind, COMPONENTS).map(|()| true)
+    runtime::node(kind, COMPONENTS)?;
+    Ok(true)
 }

@@ -121,7 +121,10 @@ pub fn print_error_json(value: &Value) {
 
 /// The faults of files in an error.
 fn diagnostic(error: &anyhow::Error) -> Option<&Diagnostic> {
-    error.chain().find_map(|cause| cause.downcast_ref::<Diagnostic>())
+    error.chain().find_map(|cause| match cause.downcast_ref::<diagnostics::Error>() {
+        Some(error) => error.diagnostic(),
+        None => cause.downcast_ref(),
+    })
 }
 
 /// The faults of files that an error is about.

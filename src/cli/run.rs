@@ -167,7 +167,8 @@ pub fn run(
         .stopped_by(&stop)
         .adopting_orphans()
         .followed_by(|event| progress::show(&bar, event));
-    let flown = launcher.launch(&manifest, &mut graph, &mut outputs).and_then(|outcome| {
+    let flown = launcher.launch(&manifest, &mut graph, &mut outputs);
+    let flown = flown.map_err(Error::from).and_then(|outcome| {
         progress::finish(&bar);
         Ok((outcome, outputs.finish()?))
     });
@@ -295,7 +296,7 @@ fn loaded(arguments: &RunArguments, from: Option<&Checkpoint>) -> Result<Manifes
         set.push(format!("run.checkpoint_keep={keep}"));
     }
     match (from, &arguments.manifest) {
-        (Some(from), _) => from.load_manifest(&set, COMPONENTS),
+        (Some(from), _) => Ok(from.load_manifest(&set, COMPONENTS)?),
         (None, Some(path)) => {
             require_kind(path, &[Kind::Manifest], "")?;
             Ok(Manifest::load(path, &set, COMPONENTS)?)

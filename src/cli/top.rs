@@ -58,5 +58,6 @@ pub fn top(arguments: &TopArguments) -> Result<bool> {
         top::restore_terminal();
         std::process::exit(1);
     })?;
-    top::watch(&run, &is_terminated).map(|()| true)
+    top::watch(&run, &is_terminated)?;
+    Ok(true)
 }

@@ -1,7 +1,7 @@
 //! Flights on the bus with the declared and the new vehicle of an identification.
 
 use crate::validate::Validation;
-use anyhow::Result;
+use diagnostics::Error;
 use flights::{Flight, FlightSet};
 use identify::SensorErrors;
 use identify::report::{FlightReport, Report};
@@ -23,7 +23,7 @@ pub fn fly_again(
     outcome: &Outcome,
     how: &Validation<'_>,
     tell: &mut dyn FnMut(&str),
-) -> Result<Option<Value>> {
+) -> Result<Option<Value>, Error> {
     let set = outcome.believed.as_ref().unwrap_or(set);
     let aligned = corrected(set, outcome, &SensorErrors::default());
     let corrected = corrected(set, outcome, &outcome.sensor_errors);

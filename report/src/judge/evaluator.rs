@@ -4,7 +4,8 @@ use super::condition::{Condition, KeptSamples};
 use super::figures::Figures;
 use super::signals::Signals;
 use super::windows::Windows;
-use anyhow::{Result, bail};
+use anyhow::anyhow;
+use diagnostics::Error;
 use flights::state::WindowEndErrors;
 use recorder::RecordingError;
 use recorder::fields::TopicFields;
@@ -51,7 +52,7 @@ pub fn failed_ns(bytes: &[u8]) -> Option<u64> {
 ///     evaluator.end_tick(tick as u64 * 1_000_000)?;
 /// }
 /// assert_eq!(evaluator.finish().pass[0].values, [125.0]);
-/// # Ok::<(), anyhow::Error>(())
+/// # Ok::<(), diagnostics::Error>(())
 /// ```
 #[derive(Debug, Default)]
 pub struct Evaluator {
@@ -69,9 +70,9 @@ impl Evaluator {
     pub fn new(
         conditions: &Conditions,
         mut open: impl FnMut(&str) -> Result<TopicFields, RecordingError>,
-    ) -> Result<Self> {
+    ) -> Result<Self, Error> {
         let mut signals = Signals::default();
-        let mut all = |stated: &[_]| -> Result<Vec<Condition>> {
+        let mut all = |stated: &[_]| -> anyhow::Result<Vec<Condition>> {
             stated.iter().map(|pass| Condition::new(pass, &mut signals, &mut open)).collect()
         };
         let (pass, measures) = (all(&conditions.pass)?, all(&conditions.measure)?);
@@ -121,15 +122,16 @@ impl Evaluator {
     ///
     /// # Errors
     /// If it is of other conditions.
-    pub fn load(&mut self, bytes: &[u8]) -> Result<()> {
-        let kept: Kept = postcard::from_bytes(bytes)?;
+    pub fn load(&mut self, bytes: &[u8]) -> Result<(), Error> {
+        let kept: Kept = postcard::from_bytes(bytes).map_err(Error::new)?;
         let (conditions, windows) = (self.pass.len() + self.measures.len(), self.compare.len());
         if (kept.conditions.len(), kept.windows.len()) != (conditions, windows) {
-            bail!(
+            let other = anyhow!(
                 "it holds {} conditions and measures and {} comparisons, and the manifest has {conditions} and {windows}",
                 kept.conditions.len(),
                 kept.windows.len()
             );
+            return Err(other.into());
         }
         for (condition, kept) in self.pass.iter_mut().chain(&mut self.measures).zip(kept.conditions) {
             condition.go_on(kept)?;
@@ -142,7 +144,7 @@ impl Evaluator {
     ///
     /// # Errors
     /// If the fields or units of a condition do not fit each other.
-    pub fn end_tick(&mut self, time_ns: u64) -> Result<()> {
+    pub fn end_tick(&mut self, time_ns: u64) -> Result<(), Error> {
         let Self { signals, pass, measures, compare } = self;
         pass.iter_mut().chain(measures).try_for_each(|one| one.end_tick(signals, time_ns))?;
         compare.iter_mut().for_each(|one| one.end_tick(signals, time_ns));

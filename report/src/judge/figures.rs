@@ -1,5 +1,6 @@
 //! Figures of conditions: values without limits, as the judge of a run hands them to the launcher.
 
+use diagnostics::Error;
 use serde::{Deserialize, Serialize};
 
 /// Figures of all conditions of a run, in the order of the manifest.
@@ -10,7 +11,7 @@ use serde::{Deserialize, Serialize};
 /// let figures = Figures { pass: vec![found], ..Figures::default() };
 /// let read = Figures::of_bytes(&figures.to_bytes()?)?;
 /// assert!(read.pass[0].values[1].is_nan());
-/// # Ok::<(), anyhow::Error>(())
+/// # Ok::<(), diagnostics::Error>(())
 /// ```
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Figures {
@@ -54,15 +55,15 @@ impl Figures {
     ///
     /// # Errors
     /// If there is not enough memory.
-    pub fn to_bytes(&self) -> anyhow::Result<Vec<u8>> {
-        Ok(postcard::to_stdvec(self)?)
+    pub fn to_bytes(&self) -> Result<Vec<u8>, Error> {
+        postcard::to_stdvec(self).map_err(Error::new)
     }
 
     /// The figures that [`Figures::to_bytes`] made these `bytes` of.
     ///
     /// # Errors
     /// If the bytes are not such figures.
-    pub fn of_bytes(bytes: &[u8]) -> anyhow::Result<Self> {
-        Ok(postcard::from_bytes(bytes)?)
+    pub fn of_bytes(bytes: &[u8]) -> Result<Self, Error> {
+        postcard::from_bytes(bytes).map_err(Error::new)
     }
 }

@@ -28,8 +28,9 @@ mod space;
 mod thin;
 
 use crate::attached::Attached;
-use anyhow::{Result, bail};
+use anyhow::anyhow;
 use choice::Choice;
+use diagnostics::Error;
 use recorder::reader::Recording;
 
 pub use drawing::Drawing;
@@ -69,7 +70,7 @@ impl Drawing {
     ///
     /// # Errors
     /// If something that was asked for is not in the recording.
-    pub fn of(recording: &Recording, request: &Request, read: &mut dyn FnMut(u64)) -> Result<Self> {
+    pub fn of(recording: &Recording, request: &Request, read: &mut dyn FnMut(u64)) -> Result<Self, Error> {
         let mut choice = Choice::of(recording, request)?;
         let span_s = read::read(recording, &mut choice, request, read)?;
         let name = recording.path().file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -86,7 +87,8 @@ impl Drawing {
             solids: scene::scene_of(recording)?,
         };
         if drawing.trails.is_empty() && request.views.iter().any(|view| *view != View::Time) {
-            bail!("the recording has no path to draw: no topic holds the position of a vehicle");
+            let none = "the recording has no path to draw: no topic holds the position of a vehicle";
+            return Err(anyhow!(none).into());
         }
         Ok(drawing)
     }
@@ -95,11 +97,11 @@ impl Drawing {
     ///
     /// # Errors
     /// If there is nothing to draw, or the picture would be too large.
-    pub fn file(&self, format: Format) -> Result<Vec<u8>> {
+    pub fn file(&self, format: Format) -> Result<Vec<u8>, Error> {
         match format {
             Format::Html => Ok(html::page(self)),
-            Format::Svg => picture::svg(self).map(String::into_bytes),
-            Format::Png => picture::svg(self).and_then(|svg| picture::png(&svg)),
+            Format::Svg => Ok(picture::svg(self)?.into_bytes()),
+            Format::Png => Ok(picture::png(&picture::svg(self)?)?),
         }
     }
 }

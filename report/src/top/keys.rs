@@ -98,7 +98,7 @@ impl Keys {
                 Ok(Answer::Done { text, .. }) => text,
                 Ok(Answer::Refused { reason }) => reason,
                 Ok(Answer::Status(status)) => status.to_string(),
-                Err(error) => format!("{error:#}"),
+                Err(error) => error.with_causes(),
             };
             let _ = sender.send(text);
         });

@@ -1,7 +1,8 @@
 //! Predicted accelerations of flights, for programs.
 
 use super::labels::labels;
-use anyhow::{Context, Result};
+use anyhow::Context;
+use diagnostics::Error;
 use flights::FlightSet;
 use identify::accelerations::accelerations;
 use plant::Airframe;
@@ -19,9 +20,9 @@ use vehicles::Vehicle;
 /// let set = flights::FlightSet::load("flights/neurobem.toml".as_ref())?;
 /// let json = report::validate::predicted_accelerations(&[set.vehicle.as_ref()], &set)?;
 /// println!("{}", json["flights"]["up to 6.5 m/s"]["vehicles"]["neurobem-quadrotor"]["specific_force_m_s2"][0]);
-/// # Ok::<(), anyhow::Error>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn predicted_accelerations(vehicles: &[&Path], flights: &FlightSet) -> Result<Value> {
+pub fn predicted_accelerations(vehicles: &[&Path], flights: &FlightSet) -> Result<Value, Error> {
     let mut of_flights = Map::new();
     for flight in &flights.flights {
         let mut of_vehicles = Map::new();

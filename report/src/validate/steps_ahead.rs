@@ -2,7 +2,8 @@
 
 use super::labels::labels;
 use crate::cells::Cells;
-use anyhow::{Context, Result};
+use anyhow::Context;
+use diagnostics::Error;
 use flights::state::StateQuantity;
 use flights::{Flight, FlightSet, Role};
 use identify::steps_ahead::{self, Between, StepsAhead};
@@ -70,11 +71,16 @@ impl StepsAheadErrors {
     ///
     /// # Errors
     /// A vehicle file that cannot be read, a flight without the data that a prediction needs.
-    pub fn of(vehicles: &[&Path], flights: &FlightSet, steps: usize, between: Between) -> Result<Self> {
+    pub fn of(
+        vehicles: &[&Path],
+        flights: &FlightSet,
+        steps: usize,
+        between: Between,
+    ) -> Result<Self, Error> {
         let airframes = vehicles
             .iter()
             .map(|vehicle| Ok(Airframe::from_files(Vehicle::load_from(&flights.files, vehicle)?, &[])?))
-            .collect::<Result<Vec<_>>>()?;
+            .collect::<anyhow::Result<Vec<_>>>()?;
         let of_flight = |flight: &Flight| {
             let errors =
                 airframes.iter().map(|airframe| steps_ahead::errors(flight, airframe, steps, between));
@@ -84,7 +90,7 @@ impl StepsAheadErrors {
                 .with_context(|| format!("the flight `{}` cannot be predicted", flight.name))?;
             Ok(FlightSteps::of(flight, errors))
         };
-        let flights = flights.flights.iter().map(of_flight).collect::<Result<Vec<_>>>()?;
+        let flights = flights.flights.iter().map(of_flight).collect::<anyhow::Result<Vec<_>>>()?;
         Ok(Self { vehicles: labels(vehicles), flights })
     }
 

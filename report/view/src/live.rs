@@ -91,7 +91,7 @@ impl Live {
         if let Request::Checkpoint { .. } = request {
             return Answer::refused("the page writes no files; `hummingbus ctl checkpoint` does");
         }
-        client::ask(&self.run, request).unwrap_or_else(|error| Answer::refused(format!("{error:#}")))
+        client::ask(&self.run, request).unwrap_or_else(|error| Answer::refused(error.with_causes()))
     }
 
     /// Hands set points to the node that sends them.

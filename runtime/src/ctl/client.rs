@@ -4,8 +4,9 @@
 use crate::ctl::protocol::{Answer, Request};
 use crate::ctl::server::{is_own_user, socket_path};
 use crate::run_dir::LiveRun;
-use anyhow::{Context, Error, Result, anyhow, bail};
+use anyhow::{Context, anyhow, bail};
 use bus::user_file;
+use diagnostics::Error;
 use std::io::{BufRead, BufReader, ErrorKind, Write};
 use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant};
@@ -18,7 +19,11 @@ const POLL: Duration = Duration::from_millis(5);
 ///
 /// # Errors
 /// If the run has ended.
-pub fn ask(run: &LiveRun, request: &Request) -> Result<Answer> {
+pub fn ask(run: &LiveRun, request: &Request) -> Result<Answer, Error> {
+    Ok(answer(run, request)?)
+}
+
+fn answer(run: &LiveRun, request: &Request) -> anyhow::Result<Answer> {
     let run_id = &run.entry.run_id;
     let mut stream = connect(run).map_err(|error| refused(run, error))?;
     let mut line = serde_json::to_string(request)?;
@@ -34,7 +39,7 @@ pub fn ask(run: &LiveRun, request: &Request) -> Result<Answer> {
 }
 
 /// Reason why `run` takes no request.
-fn refused(run: &LiveRun, error: std::io::Error) -> Error {
+fn refused(run: &LiveRun, error: std::io::Error) -> anyhow::Error {
     let run_id = &run.entry.run_id;
     if !run.is_live() {
         return anyhow!("run {run_id} has ended");
@@ -44,7 +49,7 @@ fn refused(run: &LiveRun, error: std::io::Error) -> Error {
             "run {run_id} takes no requests: it flies on one thread (--in-process); Ctrl-C in its terminal ends it"
         );
     }
-    Error::new(error).context(format!("cannot ask run {run_id}"))
+    anyhow::Error::new(error).context(format!("cannot ask run {run_id}"))
 }
 
 /// Connects to `run`, which may just be starting.

@@ -320,7 +320,7 @@ fn log(manifest: &Manifest, process: &Process) -> Result<Option<PathBuf>, Diagno
     }
     match output_file::check(&path, &output_file::LOG) {
         Ok(()) => Ok(Some(path)),
-        Err(error) => at(format!("`log`: {error:#}"), ""),
+        Err(error) => at(format!("`log`: {}", error.with_causes()), ""),
     }
 }
 

@@ -18,9 +18,14 @@ pub struct Death {
     pub message: String,
 }
 
-/// Reason why the run ends at once.
+/// A failure that ends the run at once.
 #[derive(Clone, Debug)]
-pub struct Abort(pub String);
+pub struct Abort {
+    /// Name of the process in its manifest.
+    pub process: String,
+    /// Message with its end.
+    pub message: String,
+}
 
 /// Decides the consequences of events: the states of the run, and those of its replacements.
 #[derive(Debug)]
@@ -80,10 +85,10 @@ impl<'a> Decisions<'a> {
         action
     }
 
-    /// The run ends: no action can answer the event.
-    fn fail(&mut self, message: String) -> Abort {
+    /// The run ends: no action can answer the failure of `process`.
+    fn fail(&mut self, process: &str, message: String) -> Abort {
         self.tell(Event::Died { policy: OnExit::Stop, is_possible: false });
-        Abort(message)
+        Abort { process: process.to_owned(), message }
     }
 
     /// Draws the consequences of a death; false if that must wait.
@@ -93,7 +98,8 @@ impl<'a> Decisions<'a> {
     pub fn settle(&mut self, death: &Death) -> Result<bool, Abort> {
         let Role::Node { node, generation } = death.role else {
             let ticks = self.replacements.view.completed_ticks();
-            return Err(self.fail(format!("{}\nThe run was aborted at tick {ticks}", death.message)));
+            let message = format!("{}\nThe run was aborted at tick {ticks}", death.message);
+            return Err(self.fail(&death.name, message));
         };
         if self.replacements.has_taken_over(node) {
             if !self.replacements.all_agree() {
@@ -152,10 +158,11 @@ impl<'a> Decisions<'a> {
         self.replacements.refuse(node, reason.clone());
         if vacant {
             let ticks = self.replacements.completed_by_primary(node);
-            return Err(self.fail(format!(
+            let message = format!(
                 "{reason}\nThe run was aborted at tick {ticks}: it came in the place of a process that had died, \
                  and completed no tick"
-            )));
+            );
+            return Err(self.fail(&self.plan.nodes[node].name, message));
         }
         Ok(())
     }
@@ -213,10 +220,8 @@ impl<'a> Decisions<'a> {
                     OnExit::Standby => ": no standby was ready to take over",
                 };
                 let silent = silent_topics(&self.plan.nodes[node], self.plan);
-                return Err(Abort(format!(
-                    "{}\nThe run was aborted at tick {tick}{silent}{why}",
-                    death.message
-                )));
+                let message = format!("{}\nThe run was aborted at tick {tick}{silent}{why}", death.message);
+                return Err(Abort { process: self.plan.nodes[node].name.clone(), message });
             }
         }
         self.has_answered = true;

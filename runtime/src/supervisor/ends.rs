@@ -5,7 +5,7 @@ use crate::program::OnExit;
 use crate::supervisor::decisions::Death;
 use crate::supervisor::state_machine::{Action, Event, State};
 use crate::world::World;
-use anyhow::Result;
+use anyhow::{Result, anyhow};
 
 impl<W: World> Supervisor<'_, W> {
     /// Draws the consequences of every end that was seen.
@@ -42,8 +42,8 @@ impl<W: World> Supervisor<'_, W> {
                         _ => "; with `on_exit = \"ignore\"` the run would go on without it",
                     };
                     let ticks = self.decisions.replacements.view.completed_ticks();
-                    return self
-                        .abort(format!("{}\nThe run was aborted at tick {ticks}{why}", failure.message));
+                    let message = format!("{}\nThe run was aborted at tick {ticks}{why}", failure.message);
+                    return self.fail(&failure.name, message);
                 }
                 Action::Restart => {
                     self.say(&format!("{}\n`{}` is restarted", failure.message, failure.name));
@@ -65,7 +65,7 @@ impl<W: World> Supervisor<'_, W> {
             let event = if number == 0 { Event::StopRequested } else { Event::Interrupted };
             if self.tell(event)? == Action::Abort {
                 let ticks = self.decisions.replacements.view.completed_ticks();
-                return self.abort(format!("interrupted twice: the run was aborted at tick {ticks}"));
+                return self.abort(anyhow!("interrupted twice: the run was aborted at tick {ticks}"));
             }
         }
         Ok(())

@@ -6,7 +6,7 @@ use crate::role::Role;
 use crate::supervisor::replacement::Stage;
 use crate::supervisor::state_machine::Event;
 use crate::world::World;
-use anyhow::Result;
+use anyhow::{Result, anyhow};
 use bus::lockstep::Phase;
 use std::time::Duration;
 
@@ -35,7 +35,7 @@ impl<W: World> Supervisor<'_, W> {
         let text = self.describe_standstill(straggler, stood);
         let Some(straggler) = straggler else {
             self.tell(Event::Died { policy: OnExit::Stop, is_possible: false })?;
-            return self.abort(format!("{text}; it was aborted"));
+            return self.abort(anyhow!("{text}; it was aborted"));
         };
         self.timing.last_change.1 = self.clock.now();
         self.processes.kill(straggler, Some(format!("was killed by the watchdog: {text}")));
