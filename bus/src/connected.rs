@@ -160,7 +160,7 @@ impl ConnectedNode {
                 port.restore(sample, &links.node.name)?;
             }
             port.reads_shadow = matches!(declared, Declared::Raw);
-            port.left_behind = links.left_behind(input.topic, announcement.size);
+            port.left_behind = links.left_behind(input.topic, announcement.size)?;
             self.stepper.inputs.push(port);
             self.announcements.push(announcement);
         }
@@ -227,7 +227,7 @@ impl ConnectedNode {
                 InputPlan { port: output.port.clone(), topic: output.topic, delay_ticks: 1, initial: None };
             let announced = Announcement::load(&announcement::topic_path(&links.run_dir, output.topic))?;
             let mut port = InPort::new(&input, topic, &announced, None, Feed::Shared(source));
-            port.left_behind = links.left_behind(output.topic, announced.size);
+            port.left_behind = links.left_behind(output.topic, announced.size)?;
             self.stepper.predecessor.push(port);
         }
         links.transport.reserve()

@@ -9,6 +9,7 @@ use crate::port::{InPort, OutPort, Source};
 use crate::profile::TickWriter;
 use crate::sample_ring::SampleRing;
 use crate::transport::{Receiver, Sender, Transport};
+use std::io::ErrorKind;
 use std::path::PathBuf;
 use std::rc::Rc;
 
@@ -84,10 +85,19 @@ impl Links {
 
     /// Ring with the samples of `topic` that a group has left behind, for a process that goes on in the place of a member;
     /// `None` if there is none.
-    pub(crate) fn left_behind(&self, topic: usize, size: usize) -> Option<SampleRing> {
+    ///
+    /// # Errors
+    /// If there is one, and it cannot be read.
+    pub(crate) fn left_behind(&self, topic: usize, size: usize) -> Result<Option<SampleRing>, BusError> {
         let is_of_group = self.plan.group_of(self.plan.publisher(topic)).is_some();
-        // A topic that only processes outside the group read has no ring.
-        (self.generation > 0 && is_of_group).then(|| SampleRing::open(&self.plan, topic, size).ok()).flatten()
+        if self.generation == 0 || !is_of_group {
+            return Ok(None);
+        }
+        match SampleRing::open(&self.plan, topic, size) {
+            // A topic that only processes outside the group read has no ring.
+            Err(BusError::File { source, .. }) if source.kind() == ErrorKind::NotFound => Ok(None),
+            opened => opened.map(Some),
+        }
     }
 
     /// True if this process records instance `generation` of the publisher of `topic`, which is a member of a group.
