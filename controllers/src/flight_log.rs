@@ -8,8 +8,10 @@ use inputs::InputFiles;
 use serde::Deserialize;
 use std::fmt::Display;
 use std::path::Path;
+use vehicles::command_log::{CommandLog, Stretch};
+use vehicles::filled_commands::Filled;
 use vehicles::table::{self, Dialect, Table};
-use vehicles::{ROTORS_MAX, gaps};
+use vehicles::{ROTORS_MAX, gaps, held_commands};
 
 /// Columns of a file that hold a quantity, and their unit.
 #[derive(Clone, Debug, Deserialize)]
@@ -111,6 +113,24 @@ pub struct Row {
     pub angular_velocity_rad_s: [f64; 3],
 }
 
+/// Downward acceleration of a vehicle that nothing carries, at least: half of gravity.
+const FALLING_M_S2: f64 = 4.9;
+
+/// Causes of gaps besides missing rows.
+const HELD: &str = "commands that repeat to the last digit while the vehicle goes on turning";
+const FILLED: &str = "commands that were filled in when the log was exported";
+
+/// Time in which the commands of a flight are unknown.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gap {
+    /// Time of the last command before it.
+    pub from_s: f64,
+    /// Time of the first command behind it.
+    pub to_s: f64,
+    /// Content of the file there.
+    pub cause: &'static str,
+}
+
 /// A flight.
 #[derive(Clone, Debug)]
 pub struct FlightLog {
@@ -159,11 +179,54 @@ impl FlightLog {
         self.rows.last().map_or(0.0, |row| row.time_s)
     }
 
-    /// The first gap of the rows that overlaps the time from `from_s` to `to_s`.
+    /// The gaps of the commands, in order: times without rows, and times in which a logger held the commands or an exporter filled them
+    /// in. Each is given by the last command before and the first behind it.
     #[must_use]
-    pub fn gap_within(&self, from_s: f64, to_s: f64) -> Option<(f64, f64)> {
+    pub fn gaps(&self) -> Vec<Gap> {
         let times: Vec<f64> = self.rows.iter().map(|row| row.time_s).collect();
-        gaps::of_held(&times).into_iter().find(|gap| gap.0 < to_s && from_s < gap.1)
+        let of = |(from_s, to_s), cause| Gap { from_s, to_s, cause };
+        let mut all: Vec<Gap> = gaps::of_held(&times).into_iter().map(|gap| of(gap, "no rows")).collect();
+        let (held, filled) = self.unmeasured(&times);
+        let behind = |at: usize| times[(at + 1).min(times.len() - 1)];
+        all.extend(held.iter().map(|(from, to)| of((times[*from], behind(*to)), HELD)));
+        let before = |from: usize| times[from.saturating_sub(1)];
+        all.extend(filled.stretches().map(|(from, to)| of((before(*from), behind(*to)), FILLED)));
+        all.sort_by(|a, b| a.from_s.total_cmp(&b.from_s));
+        all
+    }
+
+    /// The flight with the last command before each gap in the place of commands that an exporter filled in.
+    #[must_use]
+    pub fn with_last_commands(mut self) -> Self {
+        let times: Vec<f64> = self.rows.iter().map(|row| row.time_s).collect();
+        for (from, to) in self.unmeasured(&times).1.stretches() {
+            let last = self.rows[from.saturating_sub(1)].command;
+            self.rows[*from..=*to].iter_mut().for_each(|row| row.command = last);
+        }
+        self
+    }
+
+    /// Commands that a logger held, and those that an exporter filled in.
+    fn unmeasured(&self, times: &[f64]) -> (Vec<Stretch>, Filled) {
+        let rates: Vec<[f64; 3]> = self.rows.iter().map(|row| row.angular_velocity_rad_s).collect();
+        let rotors = self.rows.first().map_or(0, |row| row.command.len());
+        let column = |rotor: usize| self.rows.iter().map(|row| row.command[rotor]).collect();
+        let log = CommandLog {
+            time_s: times,
+            rotors: (0..rotors).map(column).collect(),
+            range: (f64::NEG_INFINITY, f64::INFINITY),
+            rate_time_s: times,
+            rates: &rates,
+        };
+        let filled = Filled::of(&log, &|from_s, to_s| self.falls(from_s, to_s));
+        (held_commands::of(&log), filled)
+    }
+
+    /// True if the vehicle gains downward speed in the second half of the time as without thrust.
+    fn falls(&self, from_s: f64, to_s: f64) -> bool {
+        let middle_s = f64::midpoint(from_s, to_s);
+        let rise = |time_s: f64| self.at(time_s).velocity_m_s[2];
+        rise(to_s) - rise(middle_s) < -FALLING_M_S2 * (to_s - middle_s)
     }
 
     /// The flight at `time_s` after its first row: commands as last set, measurements interpolated.
@@ -302,5 +365,67 @@ fn number(cell: Option<f64>, factor: f64) -> Result<f64, &'static str> {
         Some(number) if (number * factor).abs() <= CELL_MAX => Ok(number * factor),
         Some(_) => Err("at most 1e12 in SI, which no flight exceeds"),
         None => Err("a finite number"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 10 s at 100 Hz of a vehicle that turns to and fro under `command`, by time and rotor.
+    fn flight(command: impl Fn(f64, usize) -> f64) -> FlightLog {
+        let row = |k: i32| {
+            let time_s = 0.01 * f64::from(k);
+            let rate = 0.5 * libm::sin(5.0 * time_s);
+            Row {
+                time_s,
+                command: PerRotor::from_fn(4, |rotor| command(time_s, rotor)),
+                position_m: [0.0; 3],
+                velocity_m_s: [0.0; 3],
+                attitude: [0.0, 0.0, 0.0, 1.0],
+                angular_velocity_rad_s: [rate, 0.6 * rate, 0.0],
+            }
+        };
+        FlightLog { rows: (0..1000).map(row).collect() }
+    }
+
+    /// A command that a controller makes of a noisy measurement.
+    fn noisy(time_s: f64, rotor: usize) -> f64 {
+        let at = (100.0 * time_s).round() as usize;
+        76.0 + ((at * at * 613 + at * 7919 + rotor * 131) % 9973) as f64 / 2000.0
+    }
+
+    #[test]
+    fn commands_that_nobody_measured_are_gaps() {
+        let is_within = |t: f64| (2.995..3.495).contains(&t);
+        let gaps = |flight: &FlightLog| {
+            let gaps = flight.gaps().into_iter();
+            gaps.map(|Gap { from_s, to_s, cause }| ([from_s, to_s].map(|t| (100.0 * t).round()), cause))
+                .collect::<Vec<_>>()
+        };
+        let held = flight(|t, rotor| noisy(if is_within(t) { 3.0 } else { t }, rotor));
+        assert_eq!(gaps(&held), [([300.0, 350.0], HELD)]);
+        let straight = |t: f64, rotor| {
+            let [first, last] = [2.99, 3.5].map(|t| noisy(t, rotor));
+            first + (last - first) * (t - 2.99) / 0.51
+        };
+        for filled in [
+            flight(|t, rotor| if is_within(t) { straight(t, rotor) } else { noisy(t, rotor) }),
+            flight(|t, rotor| if is_within(t) { 0.0 } else { noisy(t, rotor) }),
+        ] {
+            assert_eq!(gaps(&filled), [([299.0, 350.0], FILLED)]);
+            let played = filled.with_last_commands();
+            assert_eq!(played.at(3.2).command, played.at(2.99).command);
+            assert_eq!(played.at(3.5).command[0], noisy(3.5, 0));
+        }
+    }
+
+    #[test]
+    fn commands_of_simple_pilots_are_no_gaps() {
+        for pilot in
+            [noisy, |_, _| 76.0, |t, _| if t < 5.0 { 70.0 } else { 80.0 }, |t: f64, _| 60.0 + t.min(4.0)]
+        {
+            assert_eq!(flight(pilot).gaps(), []);
+        }
     }
 }

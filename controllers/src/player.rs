@@ -1,6 +1,6 @@
 //! The player node: publishes the motor commands and the measured states of a real flight.
 
-use crate::flight_log::{ColumnMap, FlightLog, Row};
+use crate::flight_log::{ColumnMap, FlightLog, Gap, Row};
 use bus::OutputPorts;
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
@@ -21,12 +21,12 @@ pub struct Parameters {
     /// Table of the columns of the quantities and their units.
     #[parameter(table = ColumnMap, example = "{ time = { columns = [\"t\"], unit = \"s\" }, command = { columns = [\"m1\", \"m2\", \"m3\", \"m4\"], unit = \"count\" }, position = { columns = [\"x\", \"y\", \"z\"], unit = \"m\" }, velocity = { columns = [\"vx\", \"vy\", \"vz\"], unit = \"m/s\" }, attitude = { columns = [\"qx\", \"qy\", \"qz\", \"qw\"], unit = \"1\" }, angular_velocity = { columns = [\"p\", \"q\", \"r\"], unit = \"rad/s\" } }")]
     columns: ColumnMap,
-    /// Treatment of gaps, times without rows: the run is refused, or the last command holds.
+    /// Treatment of gaps, times without rows or without measured commands: the run is refused, or the last command holds.
     #[parameter(default = Gaps::Refuse, shown = "refuse", range = "`refuse`, `hold`")]
     gaps: Gaps,
 }
 
-/// Treatment of gaps: times without rows, in which the commands are unknown.
+/// Treatment of gaps: times without rows, or with commands that a logger held or an exporter filled in. The commands are unknown there.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum Gaps {
@@ -64,10 +64,11 @@ fn require_length(log: &FlightLog, from_s: f64, run: &NodeContext<'_>) -> Result
 /// Refuses a run that plays a gap.
 fn require_no_gap(log: &FlightLog, from_s: f64, run: &NodeContext<'_>) -> Result<(), ParameterError> {
     let last_s = from_s + f64::from(run.duration_ticks) * run.tick_s();
-    let Some((begin_s, end_s)) = log.gap_within(from_s, last_s) else { return Ok(()) };
+    let played = log.gaps().into_iter().find(|gap| gap.from_s < last_s && from_s < gap.to_s);
+    let Some(Gap { from_s: begin_s, to_s: end_s, cause }) = played else { return Ok(()) };
     refuse(true, "gaps", || {
         format!(
-            "the flight has no rows from {begin_s:.3} s to {end_s:.3} s after its first: nobody knows the commands there. Play \
+            "the flight has {cause} from {begin_s:.3} s to {end_s:.3} s after its first: nobody knows the commands there. Play \
              a part without gaps by `from_s` and run.duration_s, or set `gaps = \"hold\"` to hold the last command"
         )
     })
@@ -107,6 +108,7 @@ impl Component for Player {
 
     fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         let log = load(&parameters, &context.files)?;
+        let log = if parameters.gaps == Gaps::Hold { log.with_last_commands() } else { log };
         Ok(Self { log, from_s: parameters.from_s, gaps: parameters.gaps })
     }
 
