@@ -24,8 +24,11 @@ struct Left {
     signal: f64,
 }
 
-/// The noise of one component, and the spread of its trims if they are each flight's own.
-fn noise_of(flights: &[Left], is_own: bool, is_white: bool) -> ComponentNoise {
+/// Means of a component in each flight, with their variances.
+type Means = Vec<(f64, f64)>;
+
+/// The noise of one component without the spread of its trims, and its means if they are each flight's own.
+fn noise_of(flights: &[Left], is_own: bool, is_white: bool) -> (ComponentNoise, Means) {
     let mut products = Products::default();
     for Left { column, stretches, signal } in flights {
         let centre = if is_own { column.iter().sum::<f64>() / column.len().max(1) as f64 } else { 0.0 };
@@ -36,9 +39,20 @@ fn noise_of(flights: &[Left], is_own: bool, is_white: bool) -> ComponentNoise {
         products.add_white(LEAST_NOISE * LEAST_NOISE * signal);
     }
     let model = if is_white { products.white() } else { products.model() };
-    let means = flights.iter().filter_map(|left| mean(&left.column, &left.stretches, &model));
-    let trim_variance = if is_own { spread(&means.collect::<Vec<_>>()) } else { 0.0 };
-    ComponentNoise { model, trim_variance, given: Vec::new() }
+    let means = flights.iter().filter(|_| is_own);
+    let means = means.filter_map(|left| mean(&left.column, &left.stretches, &model)).collect();
+    (ComponentNoise::of(model), means)
+}
+
+/// Sets the spread of the trims of each component. Torques about x and y come from the same propellers and batteries: they
+/// share theirs, since two flights often agree about one axis by chance.
+fn set_spreads(noises: &mut Noises, means: &BTreeMap<Component, Means>) {
+    let tilting = [0, 1].map(|axis| (Equation::AngularAcceleration.name(), axis));
+    for (component, noise) in noises {
+        let alike = if tilting.contains(component) { &tilting[..] } else { std::slice::from_ref(component) };
+        noise.trim_variance =
+            spread(&alike.iter().filter_map(|of| means.get(of).cloned()).collect::<Vec<_>>());
+    }
 }
 
 /// A component without any noise would count infinitely: no sensor is better than this part of its own signal.
@@ -76,12 +90,17 @@ impl Problem<'_> {
         }
         let is_assumed = self.estimation.iter().any(Prepared::is_assumed);
         let mut given = if is_assumed { BTreeMap::new() } else { self.take_off_forces(values, &mut left) };
+        let mut means = BTreeMap::new();
         let noise = |(component, flights): (Component, Vec<Left>)| {
             let is_own = !is_assumed && flights.len() > 1 && has_trim(component);
             let given = given.remove(&component).unwrap_or_default();
-            (component, ComponentNoise { given, ..noise_of(&flights, is_own, is_assumed) })
+            let (noise, of_flights) = noise_of(&flights, is_own, is_assumed);
+            means.insert(component, of_flights);
+            (component, ComponentNoise { given, ..noise })
         };
-        left.into_iter().map(noise).collect()
+        let mut noises = left.into_iter().map(noise).collect();
+        set_spreads(&mut noises, &means);
+        noises
     }
 
     /// Residuals of each component of a flight after a step.

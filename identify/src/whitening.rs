@@ -162,18 +162,22 @@ pub fn mean(column: &[f64], stretches: &[(usize, usize)], model: &NoiseModel) ->
 }
 
 /// Variance of the trims of which these are the means with their variances, by their moments (DerSimonian and Laird,
-/// Controlled Clinical Trials 7, 1986); 0 of one flight.
-pub fn spread(means: &[(f64, f64)]) -> f64 {
-    if means.len() < 2 {
-        return 0.0;
-    }
+/// Controlled Clinical Trials 7, 1986): one for several `components` whose trims are alike. 0 of one flight.
+pub fn spread(components: &[Vec<(f64, f64)>]) -> f64 {
+    let moments = components.iter().filter(|means| means.len() > 1).map(|means| moments(means));
+    let (excess, scale) = moments.fold((0.0, 0.0), |sum, of| (sum.0 + of.0, sum.1 + of.1));
+    if scale > 0.0 { (excess / scale).max(0.0) } else { 0.0 }
+}
+
+/// Scatter of means about their own mean, beyond what their variances make, and what a variance of one would add to it.
+fn moments(means: &[(f64, f64)]) -> (f64, f64) {
     let weights: Vec<f64> = means.iter().map(|(_, variance)| 1.0 / variance).collect();
     let total: f64 = weights.iter().sum();
     let centre = means.iter().zip(&weights).map(|((mean, _), weight)| mean * weight).sum::<f64>() / total;
     let scatter: f64 =
         means.iter().zip(&weights).map(|((mean, _), weight)| weight * (mean - centre).powi(2)).sum();
     let scale = total - weights.iter().map(|weight| weight * weight).sum::<f64>() / total;
-    ((scatter - (means.len() - 1) as f64) / scale).max(0.0)
+    (scatter - (means.len() - 1) as f64, scale)
 }
 
 #[cfg(test)]
@@ -185,8 +189,19 @@ mod tests {
         let means: Vec<(f64, f64)> =
             [1.0, -1.0, 3.0, -3.0, 0.0].into_iter().map(|mean| (mean, 0.5)).collect();
         // Their own variance is 5, of which the means' is 0.5.
-        assert!((spread(&means) - 4.5).abs() < 1e-12, "{}", spread(&means));
-        assert_eq!(spread(&means[..1]), 0.0);
-        assert_eq!(spread(&[(1.0, 4.0), (1.5, 4.0)]), 0.0);
+        let own = spread(std::slice::from_ref(&means));
+        assert!((own - 4.5).abs() < 1e-12, "{own}");
+        assert_eq!(spread(&[means[..1].to_vec()]), 0.0);
+        assert_eq!(spread(&[vec![(1.0, 4.0), (1.5, 4.0)]]), 0.0);
+    }
+
+    /// Two flights that agree in one of two alike components by chance do not show that there are no trims.
+    #[test]
+    fn components_that_are_alike_share_their_spread() {
+        let (agree, differ) = (vec![(0.4, 1e-4); 2], vec![(0.1, 1e-4), (0.6, 1e-4)]);
+        let own = spread(std::slice::from_ref(&differ));
+        let shared = spread(&[agree.clone(), differ]);
+        assert_eq!(spread(&[agree]), 0.0);
+        assert!((2.0 * shared - (own - 1e-4)).abs() < 1e-9, "{shared} {own}");
     }
 }
