@@ -34,8 +34,8 @@ impl Brief {
     /// The first page of `report`.
     #[must_use]
     pub fn of(report: &Report) -> Self {
-        let accepted: Vec<_> =
-            report.verdict.iter().filter_map(|name| Some((*name, report.effects.get(name)?))).collect();
+        let named = |name: &&'static str| Some((*name, report.effects.get(name)?));
+        let accepted: Vec<_> = report.verdict.iter().filter_map(named).collect();
         let findings = if report.losses.is_empty() { accepted.as_slice() } else { &[] };
         Self {
             answer: answer(report),
@@ -66,6 +66,12 @@ fn answer(report: &Report) -> String {
             .to_owned()
     } else if !report.losses.is_empty() {
         "Do not use the new vehicle file: simpler predictions of these flights are better.".to_owned()
+    } else if count == 0 && !report.prediction_only.is_empty() {
+        format!(
+            "The declared vehicle file lacks nothing that these flights can name. The new one predicts better with {}, which is no \
+             property of the vehicle.",
+            report.prediction_only.join(" and ")
+        )
     } else if count == 0 && !report.withdrawn.is_empty() {
         let withdrawn: Vec<&str> = report.withdrawn.iter().map(|withdrawn| withdrawn.effect).collect();
         format!(
@@ -184,7 +190,14 @@ fn next(report: &Report, accepted: &[(&str, &EffectReport)]) -> Vec<String> {
             format!("No flight within the limits would decide. {sentences}.")
         });
     }
-    if report.losses.is_empty() && !accepted.is_empty() {
+    if report.losses.is_empty() && !report.prediction_only.is_empty() {
+        steps.push(format!(
+            "Use {} of the new file for predictions alone: its values by the equations and by predictions contradict each other. \
+             A controller that answers a disturbance does that. Log rotor speeds, and fly in still air.",
+            report.prediction_only.join(" and ")
+        ));
+    }
+    if report.losses.is_empty() && !(accepted.is_empty() && report.prediction_only.is_empty()) {
         steps.push(
             "Fly once more, and let `hummingbus validate` judge the new file on that flight.".to_owned(),
         );
@@ -341,5 +354,29 @@ mod tests {
         effect.parameters.get_mut("coefficient").unwrap().determined = false;
         let text = super::certainty("rotor-drag", &effect);
         assert!(text.ends_with("; these flights do not determine: coefficient."), "{text}");
+    }
+
+    /// The inertia of a vehicle whose controller answers a disturbance: predictions ask for another one than the equations.
+    #[test]
+    fn an_effect_that_is_no_property_is_not_named() {
+        let estimate = Estimate { by_equations: Some(0.4), ..*effect().parameters.values().next().unwrap() };
+        let contradictory = EffectReport { parameters: BTreeMap::from([("error_xx", estimate)]), ..effect() };
+        assert!(contradictory.is_contradictory() && !effect().is_contradictory());
+        let report = Report {
+            verdict: Vec::new(),
+            prediction_only: vec!["inertia-error"],
+            effects: BTreeMap::from([("inertia-error", contradictory)]),
+            ..report()
+        };
+        let brief = Brief::of(&report);
+        assert!(brief.answer.contains("lacks nothing that these flights can name"), "{brief:?}");
+        assert!(brief.missing.is_empty() && brief.certainty.is_empty(), "{brief:?}");
+        assert!(brief.next.iter().any(|step| step.starts_with("Use inertia-error")), "{brief:?}");
+        let text = report.to_string();
+        for part in
+            ["verdict: nothing that is a property", "no property of the vehicle: inertia-error", "0.4"]
+        {
+            assert!(text.contains(part), "no {part:?} in: {text}");
+        }
     }
 }

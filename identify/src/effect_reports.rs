@@ -21,7 +21,7 @@ const OTHER_FLIGHTS: &str =
     "fly manoeuvres in which the two differ: other speeds, rates, heights or loads than in these flights";
 
 /// Names of the accepted effects, without those that the logging of the commands explains.
-pub fn verdict(problem: &Problem, selection: &Selection) -> Vec<&'static str> {
+pub fn accepted(problem: &Problem, selection: &Selection) -> Vec<&'static str> {
     let mut names = Vec::new();
     for candidate in named(problem, selection) {
         if !names.contains(&candidate.kind.name) {
@@ -76,7 +76,7 @@ pub fn add_accepted(
     rivals: &[Vec<Rival>],
     effects: &mut BTreeMap<&'static str, EffectReport>,
 ) {
-    for name in verdict(problem, selection) {
+    for name in accepted(problem, selection) {
         let indices: Vec<usize> =
             (0..selection.accepted.len()).filter(|at| selection.accepted[*at].kind.name == name).collect();
         let others: Vec<Candidate> =

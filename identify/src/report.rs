@@ -31,6 +31,9 @@ pub struct Report {
     pub flights: Vec<FlightReport>,
     /// The effects accepted, in order; empty where the declared model holds. Not to be acted on where `losses` has some.
     pub verdict: Vec<&'static str>,
+    /// Accepted effects without which predictions are worse, and whose values by the equations and by predictions contradict each other. They are in
+    /// the vehicle file, and no property of the vehicle.
+    pub prediction_only: Vec<&'static str>,
     /// Predictions of the test flights that lose to persistence or to the declared vehicle: then the vehicle file does not
     /// describe these flights, with these effects or without.
     pub losses: Vec<Loss>,
@@ -128,6 +131,14 @@ pub struct EffectReport {
     pub experiment: Option<String>,
 }
 
+impl EffectReport {
+    /// True if the equations ask for quite another value of a parameter than predictions: neither is a property of the vehicle.
+    #[must_use]
+    pub fn is_contradictory(&self) -> bool {
+        self.parameters.values().any(|estimate| estimate.by_equations.is_some())
+    }
+}
+
 /// A parameter with its 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Estimate {
@@ -186,9 +197,14 @@ const APART: &str = "the pose agrees with gyroscope and accelerometer at no dela
                      of them is wrong: set `delay_s`, or choose one clock";
 
 impl Report {
-    /// True if the verdict is empty and the validation data are too short to accept an effect.
+    /// The effects of the verdict, and those that are kept for predictions.
+    fn accepted(&self) -> impl Iterator<Item = &&'static str> {
+        self.verdict.iter().chain(&self.prediction_only)
+    }
+
+    /// True if no effect was accepted and the validation data are too short for one.
     pub(crate) fn is_undecided(&self) -> bool {
-        self.verdict.is_empty() && self.validation_blocks < ENOUGH_BLOCKS
+        self.accepted().next().is_none() && self.validation_blocks < ENOUGH_BLOCKS
     }
 
     /// True if no prediction judges the verdict: no test flight was predicted from a measured attitude.
@@ -284,13 +300,19 @@ impl Report {
             )?;
         } else if !self.losses.is_empty() {
             self.write_losses(f)?;
-        } else if self.verdict.is_empty() {
+        } else if self.verdict.is_empty() && self.prediction_only.is_empty() {
             writeln!(f, "\nverdict: nothing. {}", self.no_effect())?;
+        } else if self.verdict.is_empty() {
+            writeln!(f, "\nverdict: nothing that is a property of the vehicle")?;
         } else {
             writeln!(f, "\nverdict: {}", self.verdict.join(", "))?;
             if self.is_unchecked() {
                 writeln!(f, "  (not checked by predictions: {UNCHECKED})")?;
             }
+        }
+        if self.losses.is_empty() && !self.prediction_only.is_empty() {
+            let names = self.prediction_only.join(", ");
+            writeln!(f, "kept for predictions, and no property of the vehicle: {names}")?;
         }
         if let Some(bearing) = self.bearing {
             let is_lost = self.is_undecided() || !self.losses.is_empty();
@@ -302,7 +324,7 @@ impl Report {
                 "  (parameters refined by prediction errors over 0.05 to 0.5 s, which predicts better)"
             )?;
         }
-        for name in &self.verdict {
+        for name in self.accepted() {
             let Some(effect) = self.effects.get(name) else { continue };
             let [without, with] = [effect.held_out.before, effect.held_out.after].map(rounded);
             writeln!(
@@ -361,8 +383,9 @@ impl Report {
         for channel in channels {
             writeln!(f, "to measure, for {}", advice(channel))?;
         }
-        if !self.verdict.is_empty() {
-            let names = self.verdict.join(", ");
+        let names: Vec<&str> = self.accepted().copied().collect();
+        if !names.is_empty() {
+            let names = names.join(", ");
             writeln!(f, "The equations ask for these effects, which are not to be acted on: {names}")?;
         }
         Ok(())
@@ -481,6 +504,7 @@ impl Report {
             vehicle: String::new(),
             flights: Vec::new(),
             verdict: Vec::new(),
+            prediction_only: Vec::new(),
             losses: Vec::new(),
             bearing: None,
             withdrawn: Vec::new(),

@@ -22,7 +22,7 @@ use crate::prepared::{BOX_STEPS, Equation, Layout, Prepared, Propulsion, block_s
 use crate::questions::OpenQuestions;
 use crate::ratios::Ratios;
 use crate::regressor::{Regressor, regressors};
-use crate::report::{BeforeAfter, Changes, FlightReport, Report, Unexplained};
+use crate::report::{BeforeAfter, Changes, EffectReport, FlightReport, Report, Unexplained};
 use crate::rig;
 use crate::rows::column;
 use crate::select::{Selection, select};
@@ -132,9 +132,14 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
         envelope::of(problem.test.iter().map(|flight| (&*flight.flight, window_s(&flight.layout))));
     let mut losses = losses(&of_measured_attitude(&problem, &held_out), &noise_floor);
     losses.extend(misfits(&problem, values));
+    let is_contradictory =
+        |name: &&'static str| effects.get(name).is_some_and(EffectReport::is_contradictory);
+    let accepted = effect_reports::accepted(&problem, &selection);
+    let (prediction_only, verdict) = accepted.into_iter().partition(is_contradictory);
     let report = Report {
         vehicle: set.vehicle.display().to_string(),
-        verdict: effect_reports::verdict(&problem, &selection),
+        verdict,
+        prediction_only,
         losses,
         bearing: bearing(&problem),
         limits: limits(&of_measured_attitude(&problem, &held_out), &noise_floor),

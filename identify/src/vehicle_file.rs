@@ -173,6 +173,7 @@ mod tests {
             vehicle: String::new(),
             flights: Vec::new(),
             verdict: Vec::new(),
+            prediction_only: Vec::new(),
             losses: Vec::new(),
             bearing: None,
             withdrawn: Vec::new(),

@@ -238,6 +238,7 @@ mod tests {
             vehicle: "one.toml".to_owned(),
             flights: FLIGHTS.map(flight).to_vec(),
             verdict: Vec::new(),
+            prediction_only: Vec::new(),
             losses: Vec::new(),
             bearing: None,
             withdrawn: Vec::new(),
