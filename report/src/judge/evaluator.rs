@@ -52,7 +52,7 @@ pub fn failed_ns(bytes: &[u8]) -> Option<u64> {
 ///     evaluator.end_tick(tick as u64 * 1_000_000)?;
 /// }
 /// assert_eq!(evaluator.finish().pass[0].values, [125.0]);
-/// # Ok::<(), diagnostics::Error>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Default)]
 pub struct Evaluator {
