@@ -113,12 +113,12 @@ pub struct Row {
     pub angular_velocity_rad_s: [f64; 3],
 }
 
-/// Downward acceleration of a vehicle that nothing carries, at least: half of gravity.
-const FALLING_M_S2: f64 = 4.9;
-
 /// Causes of gaps besides missing rows.
 const HELD: &str = "commands that repeat to the last digit while the vehicle goes on turning";
-const FILLED: &str = "commands that were filled in when the log was exported";
+const FILLED: &str = "commands on straight lines that were filled in when the log was exported";
+
+/// Rows so far beside the played ones are judged, too: commands beside a stretch show that it was filled in.
+const BESIDE_S: f64 = 2.0;
 
 /// Time in which the commands of a flight are unknown.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -127,7 +127,7 @@ pub struct Gap {
     pub from_s: f64,
     /// Time of the first command behind it.
     pub to_s: f64,
-    /// Content of the file there.
+    /// Reason why the commands are unknown.
     pub cause: &'static str,
 }
 
@@ -179,54 +179,44 @@ impl FlightLog {
         self.rows.last().map_or(0.0, |row| row.time_s)
     }
 
-    /// The gaps of the commands, in order: times without rows, and times in which a logger held the commands or an exporter filled them
-    /// in. Each is given by the last command before and the first behind it.
+    /// The gaps of the commands between two times, in order. A gap has no rows, or its commands were held by a logger or filled in with straight
+    /// lines by an exporter. Each gap begins at the last command before it and ends at the first command behind it.
     #[must_use]
-    pub fn gaps(&self) -> Vec<Gap> {
-        let times: Vec<f64> = self.rows.iter().map(|row| row.time_s).collect();
+    pub fn gaps_within(&self, from_s: f64, to_s: f64) -> Vec<Gap> {
+        let before = |time_s: f64| self.rows.partition_point(|row| row.time_s < time_s);
+        let rows = &self.rows[before(from_s - BESIDE_S)..before(to_s + BESIDE_S)];
+        // A stretch may end the rows.
+        let time_s = |at: usize| rows[at.min(rows.len() - 1)].time_s;
         let of = |(from_s, to_s), cause| Gap { from_s, to_s, cause };
+        // The usual period is that of the whole log.
+        let times: Vec<f64> = self.rows.iter().map(|row| row.time_s).collect();
         let mut all: Vec<Gap> = gaps::of_held(&times).into_iter().map(|gap| of(gap, "no rows")).collect();
-        let (held, filled) = self.unmeasured(&times);
-        let behind = |at: usize| times[(at + 1).min(times.len() - 1)];
-        all.extend(held.iter().map(|(from, to)| of((times[*from], behind(*to)), HELD)));
-        let before = |from: usize| times[from.saturating_sub(1)];
-        all.extend(filled.stretches().map(|(from, to)| of((before(*from), behind(*to)), FILLED)));
+        let (held, filled) = Self::held_or_filled(rows);
+        all.extend(held.iter().map(|(from, to)| of((time_s(*from), time_s(to + 1)), HELD)));
+        all.extend(
+            filled.iter().map(|(from, to)| of((time_s(from.saturating_sub(1)), time_s(to + 1)), FILLED)),
+        );
+        all.retain(|gap| gap.from_s < to_s && from_s < gap.to_s);
         all.sort_by(|a, b| a.from_s.total_cmp(&b.from_s));
         all
     }
 
-    /// The flight with the last command before each gap in the place of commands that an exporter filled in.
-    #[must_use]
-    pub fn with_last_commands(mut self) -> Self {
-        let times: Vec<f64> = self.rows.iter().map(|row| row.time_s).collect();
-        for (from, to) in self.unmeasured(&times).1.stretches() {
-            let last = self.rows[from.saturating_sub(1)].command;
-            self.rows[*from..=*to].iter_mut().for_each(|row| row.command = last);
-        }
-        self
-    }
-
-    /// Commands that a logger held, and those that an exporter filled in.
-    fn unmeasured(&self, times: &[f64]) -> (Vec<Stretch>, Filled) {
-        let rates: Vec<[f64; 3]> = self.rows.iter().map(|row| row.angular_velocity_rad_s).collect();
-        let rotors = self.rows.first().map_or(0, |row| row.command.len());
-        let column = |rotor: usize| self.rows.iter().map(|row| row.command[rotor]).collect();
+    /// Stretches of these rows whose commands a logger held, and those on straight lines. The limits of the commands are not known here.
+    fn held_or_filled(rows: &[Row]) -> (Vec<Stretch>, Vec<Stretch>) {
+        let times: Vec<f64> = rows.iter().map(|row| row.time_s).collect();
+        let rates: Vec<[f64; 3]> = rows.iter().map(|row| row.angular_velocity_rad_s).collect();
+        let rotors = rows.first().map_or(0, |row| row.command.len());
+        let column = |rotor: usize| rows.iter().map(|row| row.command[rotor]).collect();
         let log = CommandLog {
-            time_s: times,
+            time_s: &times,
             rotors: (0..rotors).map(column).collect(),
             range: (f64::NEG_INFINITY, f64::INFINITY),
-            rate_time_s: times,
+            rate_time_s: &times,
             rates: &rates,
         };
-        let filled = Filled::of(&log, &|from_s, to_s| self.falls(from_s, to_s));
-        (held_commands::of(&log), filled)
-    }
-
-    /// True if the vehicle gains downward speed in the second half of the time as without thrust.
-    fn falls(&self, from_s: f64, to_s: f64) -> bool {
-        let middle_s = f64::midpoint(from_s, to_s);
-        let rise = |time_s: f64| self.at(time_s).velocity_m_s[2];
-        rise(to_s) - rise(middle_s) < -FALLING_M_S2 * (to_s - middle_s)
+        // True for all times: no stretch of zeros is taken for filled. A throttle may be cut, and the vehicle's weight is not known here.
+        let filled = Filled::of(&log, &|_, _| true);
+        (held_commands::of(&log), filled.lines)
     }
 
     /// The flight at `time_s` after its first row: commands as last set, measurements interpolated.
@@ -399,7 +389,7 @@ mod tests {
     fn commands_that_nobody_measured_are_gaps() {
         let is_within = |t: f64| (2.995..3.495).contains(&t);
         let gaps = |flight: &FlightLog| {
-            let gaps = flight.gaps().into_iter();
+            let gaps = flight.gaps_within(0.0, 9.0).into_iter();
             gaps.map(|Gap { from_s, to_s, cause }| ([from_s, to_s].map(|t| (100.0 * t).round()), cause))
                 .collect::<Vec<_>>()
         };
@@ -409,15 +399,20 @@ mod tests {
             let [first, last] = [2.99, 3.5].map(|t| noisy(t, rotor));
             first + (last - first) * (t - 2.99) / 0.51
         };
-        for filled in [
-            flight(|t, rotor| if is_within(t) { straight(t, rotor) } else { noisy(t, rotor) }),
-            flight(|t, rotor| if is_within(t) { 0.0 } else { noisy(t, rotor) }),
-        ] {
-            assert_eq!(gaps(&filled), [([299.0, 350.0], FILLED)]);
-            let played = filled.with_last_commands();
-            assert_eq!(played.at(3.2).command, played.at(2.99).command);
-            assert_eq!(played.at(3.5).command[0], noisy(3.5, 0));
-        }
+        let filled = flight(|t, rotor| if is_within(t) { straight(t, rotor) } else { noisy(t, rotor) });
+        assert_eq!(gaps(&filled), [([299.0, 350.0], FILLED)]);
+        assert_eq!(filled.gaps_within(3.6, 9.0), [], "the gap is not played");
+        assert_eq!(filled.gaps_within(3.3, 9.0).len(), 1, "a part of the gap is played");
+        let mut without_rows = flight(noisy);
+        without_rows.rows.retain(|row| !is_within(row.time_s));
+        assert_eq!(gaps(&without_rows), [([299.0, 350.0], "no rows")]);
+    }
+
+    /// The throttle is cut for 0.4 s: a true command.
+    #[test]
+    fn zeros_are_played() {
+        let cut = flight(|t, rotor| if (3.0..3.4).contains(&t) { 0.0 } else { noisy(t, rotor) });
+        assert_eq!(cut.gaps_within(0.0, 9.0), []);
     }
 
     #[test]
@@ -425,7 +420,7 @@ mod tests {
         for pilot in
             [noisy, |_, _| 76.0, |t, _| if t < 5.0 { 70.0 } else { 80.0 }, |t: f64, _| 60.0 + t.min(4.0)]
         {
-            assert_eq!(flight(pilot).gaps(), []);
+            assert_eq!(flight(pilot).gaps_within(0.0, 9.0), []);
         }
     }
 }

@@ -21,19 +21,19 @@ pub struct Parameters {
     /// Table of the columns of the quantities and their units.
     #[parameter(table = ColumnMap, example = "{ time = { columns = [\"t\"], unit = \"s\" }, command = { columns = [\"m1\", \"m2\", \"m3\", \"m4\"], unit = \"count\" }, position = { columns = [\"x\", \"y\", \"z\"], unit = \"m\" }, velocity = { columns = [\"vx\", \"vy\", \"vz\"], unit = \"m/s\" }, attitude = { columns = [\"qx\", \"qy\", \"qz\", \"qw\"], unit = \"1\" }, angular_velocity = { columns = [\"p\", \"q\", \"r\"], unit = \"rad/s\" } }")]
     columns: ColumnMap,
-    /// Treatment of gaps, times without rows or without measured commands: the run is refused, or the last command holds.
+    /// Treatment of gaps, times without rows or without measured commands: the run is refused, or the rows are played as they stand.
     #[parameter(default = Gaps::Refuse, shown = "refuse", range = "`refuse`, `hold`")]
     gaps: Gaps,
 }
 
-/// Treatment of gaps: times without rows, or with commands that a logger held or an exporter filled in. The commands are unknown there.
+/// Treatment of gaps: times without rows, or with commands that a logger held or an exporter filled in.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum Gaps {
     /// A run that plays one is refused.
     #[default]
     Refuse,
-    /// The last command holds.
+    /// Rows are played as they stand, and the last command holds where there are none.
     Hold,
 }
 
@@ -64,12 +64,15 @@ fn require_length(log: &FlightLog, from_s: f64, run: &NodeContext<'_>) -> Result
 /// Refuses a run that plays a gap.
 fn require_no_gap(log: &FlightLog, from_s: f64, run: &NodeContext<'_>) -> Result<(), ParameterError> {
     let last_s = from_s + f64::from(run.duration_ticks) * run.tick_s();
-    let played = log.gaps().into_iter().find(|gap| gap.from_s < last_s && from_s < gap.to_s);
-    let Some(Gap { from_s: begin_s, to_s: end_s, cause }) = played else { return Ok(()) };
+    let Some(Gap { from_s: begin_s, to_s: end_s, cause }) =
+        log.gaps_within(from_s, last_s).into_iter().next()
+    else {
+        return Ok(());
+    };
     refuse(true, "gaps", || {
         format!(
-            "the flight has {cause} from {begin_s:.3} s to {end_s:.3} s after its first: nobody knows the commands there. Play \
-             a part without gaps by `from_s` and run.duration_s, or set `gaps = \"hold\"` to hold the last command"
+            "the flight has {cause} from {begin_s:.3} s to {end_s:.3} s after its first row, so that the commands there are \
+             unknown. Play a part without gaps by `from_s` and run.duration_s, or set `gaps = \"hold\"` to play the rows as they stand"
         )
     })
 }
@@ -108,7 +111,6 @@ impl Component for Player {
 
     fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         let log = load(&parameters, &context.files)?;
-        let log = if parameters.gaps == Gaps::Hold { log.with_last_commands() } else { log };
         Ok(Self { log, from_s: parameters.from_s, gaps: parameters.gaps })
     }
 
