@@ -61,14 +61,14 @@ fn answer(report: &Report) -> String {
     let effects = if count == 1 { "one effect".to_owned() } else { format!("{count} effects") };
     if report.is_undecided() {
         "These flights are too short to tell.".to_owned()
-    } else if !report.losses.is_empty() && count == 0 {
+    } else if !report.losses.is_empty() && count == 0 && report.prediction_only.is_empty() {
         "The declared vehicle file does not describe these flights: simpler predictions are better."
             .to_owned()
     } else if !report.losses.is_empty() {
         "Do not use the new vehicle file: simpler predictions of these flights are better.".to_owned()
     } else if count == 0 && !report.prediction_only.is_empty() {
         format!(
-            "The declared vehicle file lacks nothing that these flights can name. The new one predicts better with {}, which is no \
+            "The declared vehicle file lacks nothing that these flights can name. The new one has {} for predictions only: not a \
              property of the vehicle.",
             report.prediction_only.join(" and ")
         )
@@ -192,8 +192,8 @@ fn next(report: &Report, accepted: &[(&str, &EffectReport)]) -> Vec<String> {
     }
     if report.losses.is_empty() && !report.prediction_only.is_empty() {
         steps.push(format!(
-            "Use {} of the new file for predictions alone: its values by the equations and by predictions contradict each other. \
-             A controller that answers a disturbance does that. Log rotor speeds, and fly in still air.",
+            "Use the values of {} in the new file for predictions only: the equations and the predictions contradict each other. \
+             A controller that reacts to a disturbance can cause this. Log rotor speeds, and fly in still air.",
             report.prediction_only.join(" and ")
         ));
     }
@@ -233,6 +233,19 @@ mod tests {
             worth: Vec::new(),
             confused_with: vec!["blade-flapping"],
             experiment: Some("fly with a load".to_owned()),
+        }
+    }
+
+    fn loss(flight: &str) -> Loss {
+        Loss {
+            flight: flight.to_owned(),
+            horizon: "0.5",
+            channel: "attitude",
+            rival: "persistence",
+            new: 40.0,
+            knowing: "nothing",
+            other: 9.0,
+            unit: "deg",
         }
     }
 
@@ -304,16 +317,6 @@ mod tests {
 
     #[test]
     fn a_model_that_loses_is_not_to_be_used_and_what_to_measure_is_said_once() {
-        let loss = |flight: &str| Loss {
-            flight: flight.to_owned(),
-            horizon: "0.5",
-            channel: "attitude",
-            rival: "persistence",
-            new: 40.0,
-            knowing: "nothing",
-            other: 9.0,
-            unit: "deg",
-        };
         let brief = Brief::of(&Report { losses: vec![loss("one"), loss("two")], ..report() });
         assert!(brief.answer.starts_with("Do not use the new vehicle file"), "{}", brief.answer);
         let measure: Vec<_> =
@@ -371,10 +374,15 @@ mod tests {
         let brief = Brief::of(&report);
         assert!(brief.answer.contains("lacks nothing that these flights can name"), "{brief:?}");
         assert!(brief.missing.is_empty() && brief.certainty.is_empty(), "{brief:?}");
-        assert!(brief.next.iter().any(|step| step.starts_with("Use inertia-error")), "{brief:?}");
+        assert!(
+            brief.next.iter().any(|step| step.contains("inertia-error in the new file for predictions only")),
+            "{brief:?}"
+        );
+        let lost = Report { losses: vec![loss("one")], ..report.clone() };
+        assert!(Brief::of(&lost).answer.starts_with("Do not use the new vehicle file"), "{lost}");
         let text = report.to_string();
         for part in
-            ["verdict: nothing that is a property", "no property of the vehicle: inertia-error", "0.4"]
+            ["verdict: nothing that is a property", "not a property of the vehicle: inertia-error", "0.4"]
         {
             assert!(text.contains(part), "no {part:?} in: {text}");
         }

@@ -15,6 +15,8 @@ use std::collections::BTreeMap;
 /// Predictions ask for another value than the equations beyond so many standard errors of these: far beyond chance, and beyond what
 /// intervals that are somewhat short make; tuned, no source.
 const FAR: f64 = 8.0;
+/// And by more than this part of the greater one: a value that is known to a tenth of a percent may move by a whole one; tuned, no source.
+const FAR_PART: f64 = 0.25;
 
 /// The experiment for two effects of which no better one is known.
 const OTHER_FLIGHTS: &str =
@@ -121,12 +123,13 @@ pub fn add_accepted(
     }
 }
 
-/// The value of a parameter by the equations, where the refined one is farther than [`FAR`] of its standard errors.
+/// The value of a parameter by the equations, where the refined one is farther than [`FAR`] of its standard errors and [`FAR_PART`] of its size.
 fn far_by_equations(selection: &Selection, parameter: usize) -> Option<f64> {
     let value = selection.after.values[parameter];
     let away = (selection.flown().values[parameter] - value).abs();
     let error = selection.after.standard_error(parameter).filter(|error| *error > 0.0)?;
-    (away > FAR * error).then_some(value)
+    let size = selection.flown().values[parameter].abs().max(value.abs());
+    (away > FAR * error && away > FAR_PART * size).then_some(value)
 }
 
 /// Effects of slowly logged commands, with intervals that cover all values that they may have.
@@ -214,5 +217,8 @@ mod tests {
         assert_eq!(far_by_equations(&selection(Some(1.9)), 0), Some(1.0));
         assert_eq!(far_by_equations(&selection(Some(0.3)), 0), None, "seven standard errors");
         assert_eq!(far_by_equations(&selection(None), 0), None);
+        let mut sure = selection(Some(1.1));
+        sure.after.covariance[(0, 0)] = 1e-6;
+        assert_eq!(far_by_equations(&sure, 0), None, "a hundred standard errors, and a tenth of the value");
     }
 }

@@ -29,10 +29,10 @@ pub struct Report {
     pub vehicle: String,
     /// The flights.
     pub flights: Vec<FlightReport>,
-    /// The effects accepted, in order; empty where the declared model holds. Not to be acted on where `losses` has some.
+    /// The effects that are named, in order of acceptance. Not to be acted on where `losses` has some.
     pub verdict: Vec<&'static str>,
-    /// Accepted effects without which predictions are worse, and whose values by the equations and by predictions contradict each other. They are in
-    /// the vehicle file, and no property of the vehicle.
+    /// Accepted effects that predictions need, with values by the equations and by predictions that contradict each other. The vehicle file has
+    /// them. They are not properties of the vehicle.
     pub prediction_only: Vec<&'static str>,
     /// Predictions of the test flights that lose to persistence or to the declared vehicle: then the vehicle file does not
     /// describe these flights, with these effects or without.
@@ -132,7 +132,7 @@ pub struct EffectReport {
 }
 
 impl EffectReport {
-    /// True if the equations ask for quite another value of a parameter than predictions: neither is a property of the vehicle.
+    /// True if the equations ask for quite another value of a parameter than predictions: neither is sure to be a property of the vehicle.
     #[must_use]
     pub fn is_contradictory(&self) -> bool {
         self.parameters.values().any(|estimate| estimate.by_equations.is_some())
@@ -312,7 +312,7 @@ impl Report {
         }
         if self.losses.is_empty() && !self.prediction_only.is_empty() {
             let names = self.prediction_only.join(", ");
-            writeln!(f, "kept for predictions, and no property of the vehicle: {names}")?;
+            writeln!(f, "kept for predictions only, not a property of the vehicle: {names}")?;
         }
         if let Some(bearing) = self.bearing {
             let is_lost = self.is_undecided() || !self.losses.is_empty();

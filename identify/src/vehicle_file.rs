@@ -47,9 +47,17 @@ pub fn text(
     } else {
         "# It does not describe these flights: its predictions lose to persistence or to the declared file (`losses` in report.json).\n"
     };
+    let kept: String = if report.prediction_only.is_empty() {
+        String::new()
+    } else {
+        format!(
+            "# For predictions only, not properties of the vehicle: {}.\n",
+            report.prediction_only.join(", ")
+        )
+    };
     Ok(format!(
         "# Written by hummingbus identify. Up to the effects at its end this is the declared file {file}, with its \
-         comments.\n{doubt}{document}\n{added}"
+         comments.\n{doubt}{kept}{document}\n{added}"
     ))
 }
 

@@ -22,7 +22,9 @@ function change(before, after) {
 
 const addItem = (id, textContent) => add(element(id), "li", { textContent });
 
-const accepted = report.verdict.map((name) => [name, report.effects[name]]).filter(([, effect]) => effect);
+// Those of the verdict, and those that are kept for predictions only.
+const acceptedNames = [...report.verdict, ...report.prediction_only];
+const accepted = acceptedNames.map((name) => [name, report.effects[name]]).filter(([, effect]) => effect);
 
 const doubt = ({ determined, at_bound }) => (!determined ? ", not determined by these flights" : at_bound ? ", at its bound" : "");
 
@@ -40,12 +42,14 @@ const lossText = ({ flight, horizon, channel, rival, other, unit, ...loss }) =>
   `${channel} after ${horizon} s of ${flight}: new ${withUnit(loss.new, unit)}${knowing[loss.knowing] ?? ""}, ${rival} ${withUnit(other, unit)}`;
 
 function verdictText() {
-  const isUndecided = !report.verdict.length && report.validation_blocks < 12;
+  const isUndecided = !acceptedNames.length && report.validation_blocks < 12;
   if (report.losses.length && !isUndecided) {
-    const asked = report.verdict.length ? ` The equations ask for ${report.verdict.join(", ")}: not to be acted on.` : "";
+    const asked = acceptedNames.length ? ` The equations ask for ${acceptedNames.join(", ")}: not to be acted on.` : "";
     return `This vehicle file does not describe these flights: its predictions lose.${asked}`;
   }
-  if (report.verdict.length) return `The flights ask for ${report.verdict.join(", ")}.`;
+  const kept = report.prediction_only.length ? ` Kept for predictions only, not a property of the vehicle: ${report.prediction_only.join(", ")}.` : "";
+  if (report.verdict.length) return `The flights ask for ${report.verdict.join(", ")}.${kept}`;
+  if (kept) return `The flights ask for nothing that is a property of the vehicle.${kept}`;
   if (isUndecided) {
     return `Undecided: the flights that effects are chosen on have ${report.validation_blocks} blocks of ${report.block_s} s, and with less than a dozen nothing is beyond chance.`;
   }
