@@ -91,7 +91,7 @@ fn a_run_that_plays_a_gap() {
         lines.lines().enumerate().filter(without).map(|(_, line)| line.to_owned() + "\n").collect();
     refused_replay(&holed, &FROM_THE_START).says(&[
         "the flight has no rows from 0.380 s to 0.590 s",
-        "nobody knows the commands there",
+        "the commands there are unknown",
         "`from_s`",
     ]);
     let held = ["--set", "process.player.parameters.gaps=hold", "--set", "run.duration_s=1.001"];
