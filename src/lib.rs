@@ -59,8 +59,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! These functions return [`Error`]: [`Error::is_input`], [`Error::is_component`] and [`Error::is_system`] say which side
-//! is at fault, [`Error::diagnostic`] has the place in a file, and [`Error::process`] names the process that failed.
+//! [`fly`] and [`simulate`] return [`Error`]: [`Error::is_input`], [`Error::is_component`] and [`Error::is_system`] say which
+//! side is at fault, [`Error::diagnostic`] has the place in a file, and [`Error::process`] names the process that failed.
 //!
 //! | crate | content |
 //! |---|---|

@@ -40,7 +40,7 @@ impl Error {
         anyhow::Error::new(error).into()
     }
 
-    /// True if something that people wrote is at fault: a file, a manifest, a parameter or an argument.
+    /// True if something that people wrote is at fault: a file, a manifest or a parameter.
     #[must_use]
     pub fn is_input(&self) -> bool {
         !self.is_component() && (self.diagnostic().is_some() || self.find_cause::<ParameterError>().is_some())
@@ -52,7 +52,7 @@ impl Error {
         self.find_cause::<ComponentFailure>().is_some()
     }
 
-    /// True if the operating system refused a request: a file, memory, a process or a right.
+    /// True if the operating system refused a request: a file, a process or a right.
     #[must_use]
     pub fn is_system(&self) -> bool {
         !self.is_component() && !self.is_input() && self.find_cause::<io::Error>().is_some()

@@ -169,7 +169,7 @@ pub fn spread(components: &[Vec<(f64, f64)>]) -> f64 {
     if scale > 0.0 { (excess / scale).max(0.0) } else { 0.0 }
 }
 
-/// Scatter of means about their own mean, beyond what their variances make, and what a variance of one would add to it.
+/// Excess of the weighted scatter of means over its expectation, and the derivative of that expectation by the variance of the trims.
 fn moments(means: &[(f64, f64)]) -> (f64, f64) {
     let weights: Vec<f64> = means.iter().map(|(_, variance)| 1.0 / variance).collect();
     let total: f64 = weights.iter().sum();
