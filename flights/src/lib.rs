@@ -16,7 +16,7 @@
 //! | `name`, `scaling`, `matrices`, `clock` | names of numbers, their factors, rotation matrices, clocks that start again |
 //! | `channels`, `clean`, `held`, `held_commands`, `jumps`, `spikes`, `glitches`, `reading` | from a log's numbers to a flight |
 //! | `specific_force` | specific force from what logs hold in its place |
-//! | `plausible`, `agreement`, `lateness`, `force_doubt`, `still`, `units`, `finding` | values against physics |
+//! | `plausible`, `agreement`, `axes`, `lateness`, `force_doubt`, `still`, `units`, `finding` | values against physics |
 //! | `rig` | vehicles that a rig holds at a point |
 //! | `span` | times against the number of samples |
 //! | `held_out`, `twin` | whether test flights hold what parameters are fitted on: by file and time, by samples |
@@ -28,6 +28,7 @@
 
 mod agreement;
 mod arrays;
+mod axes;
 mod bytes;
 mod canonical;
 mod channels;

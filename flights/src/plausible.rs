@@ -7,6 +7,7 @@ use vehicles::bearing::Bearing;
 use vehicles::{ROTORS_MAX, Vehicle};
 
 use crate::agreement::{Agreement, Pairs};
+use crate::axes::{Axes, axis_by_axis};
 use crate::declaration::{ChannelMap, Frame};
 use crate::finding::Finding;
 use crate::flight::{Channel, Flight, median};
@@ -234,8 +235,11 @@ impl Judge<'_> {
             pairs.turned(|rate| rate.component_mul(&Vector3::from(signs))).agreement(QUIET_RATE_RAD_S);
         // A sine with the wrong sign is one that is late by half of its period, too.
         let at_once = [Some(agreement), reordered, signed].into_iter().flatten();
-        let best = at_once.max_by(|a, b| a.correlation.total_cmp(&b.correlation)).unwrap_or(agreement);
-        if let Some(late) = self.late_rates(best) {
+        let in_order = at_once.max_by(|a, b| a.correlation.total_cmp(&b.correlation)).unwrap_or(agreement);
+        let placed = Axes::that_fit(&pairs, QUIET_RATE_RAD_S).filter(|(_, placed)| {
+            placed.correlation > SAME && placed.correlation > in_order.correlation + CLEARLY
+        });
+        if let Some(late) = self.late_rates(placed.map_or(in_order, |(_, placed)| placed)) {
             return Some(late);
         }
         if let Some(better) = reordered.filter(|better| better.correlation > SAME) {
@@ -246,13 +250,21 @@ impl Judge<'_> {
             let fits = "the order w, x, y, z: name the columns in the order x, y, z, w".to_owned();
             return Some(finding(Quantity::Attitude, Some(fits), &what));
         }
+        if let Some((axes, placed)) = placed {
+            let what = format!(
+                "it has a correlation of {:.2} with the derivative of the attitude, and of {:.2} with its axes in another order",
+                agreement.correlation, placed.correlation
+            );
+            return Some(finding(quantity, Some(axes.advice(self.units.declared(quantity))), &what));
+        }
         let explains = signed.is_some_and(|signed| signed.correlation > SAME);
         if explains && matches!(signs, [x, y, z] if x > 0.0 && y < 0.0 && z < 0.0) {
             return Some(self.one_frame_is_wrong(agreement.correlation));
         }
         let what = format!(
-            "it has a correlation of {:.2} with the derivative of the attitude (signs of the axes: {signs:?})",
-            agreement.correlation
+            "it has a correlation of {:.2} with the derivative of the attitude ({})",
+            agreement.correlation,
+            axis_by_axis(signs)
         );
         let is_turned = signs.iter().any(|sign| *sign < 0.0);
         let fits = (explains && is_turned).then(|| match signs {

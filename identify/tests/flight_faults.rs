@@ -284,6 +284,18 @@ fn a_gyroscope_that_is_frozen_mirrored_or_scaled() {
     }
 }
 
+/// Numbers that have nothing to do with the turn of the vehicle are no gyroscope's.
+#[test]
+fn a_gyroscope_without_any_relation_to_the_attitude() {
+    let fault = require_broken(false, "angular_velocity", "unrelated", |flight| {
+        let Channel { time_s, values } = &mut flight.angular_velocity;
+        for (t, value) in time_s.iter().zip(values) {
+            *value = [libm::sin(9.1 * t), libm::cos(7.7 * t), libm::sin(5.9 * t)];
+        }
+    });
+    assert!(fault.found.contains("correlations of at most 0."), "{fault:?}");
+}
+
 #[test]
 fn an_accelerometer_that_is_frozen_mirrored_or_scaled() {
     require_broken(false, "specific_force.x", "frozen", |flight| {

@@ -10,7 +10,7 @@ pub struct Fault {
     pub flight: String,
     /// The channel, with the rotor counted from 1 or the axis.
     pub channel: String,
-    /// Kind: `stuck-sensor`, `scaled-sensor`, `rotor-off-command`, `frozen`, `scaled`, `mirrored`, `swapped`, `reversed-spins`,
+    /// Kind: `stuck-sensor`, `scaled-sensor`, `rotor-off-command`, `frozen`, `scaled`, `mirrored`, `unrelated`, `swapped`, `reversed-spins`,
     /// `other-clock`, `jumping` or `impossible-trim`.
     pub kind: &'static str,
     /// Expectation, with numbers.

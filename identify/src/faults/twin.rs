@@ -10,6 +10,8 @@ const LATE_S: f64 = 0.2;
 const ALIKE: f64 = 0.7;
 /// Least excess of the correlation with the opposite over that with the expected signal, at any delay, of a mirrored axis.
 const SURELY: f64 = 0.05;
+/// Correlation, at any delay, below which signals have nothing to do with each other.
+const UNRELATED: f64 = 0.4;
 /// Least number of values.
 const LEAST: usize = 40;
 
@@ -65,11 +67,27 @@ impl Twin {
         high > ALIKE && high > SURELY - low
     }
 
+    /// True if both signals are larger than `least` (root mean square).
+    pub fn moves(&self, least: f64) -> bool {
+        let is_larger = |values: &[f64]| power(values) > least * least * values.len() as f64;
+        self.measured.len() >= LEAST + self.late_max && is_larger(&self.measured) && is_larger(&self.expected)
+    }
+
+    /// Largest correlation, of either sign and at any delay, if the two signals have nothing to do with each other.
+    pub fn unrelated(&self) -> Option<f64> {
+        let (low, high) = self.extremes();
+        let largest = high.max(-low);
+        (largest < UNRELATED).then_some(largest)
+    }
+
     /// Ratio of the sizes of measured and expected signal, if one follows the other.
     pub fn scale(&self) -> Option<f64> {
-        let power = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>();
         self.follows().then(|| (power(&self.measured) / power(&self.expected)).sqrt())
     }
+}
+
+fn power(values: &[f64]) -> f64 {
+    values.iter().map(|value| value * value).sum()
 }
 
 fn smoothed(values: &[f64], reach: usize) -> Vec<f64> {
@@ -103,6 +121,15 @@ mod tests {
         // Late by half of a period: the opposite at first sight.
         let late = Twin::of(&course(0.18), &course(0.0), STEP_S);
         assert!(late.mirrored().is_none() && late.follows());
+    }
+
+    #[test]
+    fn a_signal_of_other_frequencies_is_unrelated_and_a_late_one_is_not() {
+        let other: Vec<f64> = (0..400).map(|k| libm::cos(11.0 * f64::from(k) * STEP_S)).collect();
+        let twin = Twin::of(&other, &course(0.0), STEP_S);
+        assert!(twin.moves(0.1) && !twin.moves(2.0) && twin.unrelated().is_some());
+        assert!(Twin::of(&course(0.1), &course(0.0), STEP_S).unrelated().is_none());
+        assert!(!Twin::of(&other[..20], &course(0.0)[..20], STEP_S).moves(0.1), "a few values say nothing");
     }
 
     #[test]

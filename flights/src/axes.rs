@@ -1,0 +1,96 @@
+//! Axes of a logged vector in another order, with any signs.
+
+use nalgebra::Vector3;
+
+use crate::agreement::{Agreement, Pairs};
+use crate::declaration::{Entry, Frame};
+
+/// Orders of the axes other than the declared one.
+const OTHER_ORDERS: [[usize; 3]; 5] = [[1, 0, 2], [2, 1, 0], [0, 2, 1], [1, 2, 0], [2, 0, 1]];
+/// Names of the axes.
+const NAMES: [&str; 3] = ["x", "y", "z"];
+
+/// An order of the axes of a logged vector, with signs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Axes {
+    /// Places of x, y and z in the logged vector.
+    places: [usize; 3],
+    /// Their signs.
+    signs: [f64; 3],
+}
+
+impl Axes {
+    /// The order, other than the declared one, under which `pairs` agree best, and their agreement under it; `None` if there are few pairs, or
+    /// the derived vector is mostly below `quiet`.
+    pub fn that_fit(pairs: &Pairs, quiet: f64) -> Option<(Self, Agreement)> {
+        let signed =
+            (0..8u8).map(|bits| [0, 1, 2].map(|axis| if bits >> axis & 1 == 1 { -1.0 } else { 1.0 }));
+        let all = signed.flat_map(|signs| OTHER_ORDERS.map(|places| Self { places, signs }));
+        let agreed = all.filter_map(|axes| Some((axes, axes.agreement(pairs, quiet)?)));
+        agreed.max_by(|(_, a), (_, b)| a.correlation.total_cmp(&b.correlation))
+    }
+
+    fn agreement(&self, pairs: &Pairs, quiet: f64) -> Option<Agreement> {
+        let Self { places: [x, y, z], signs } = *self;
+        pairs.turned(|v| Vector3::new(v[x], v[y], v[z]).component_mul(&Vector3::from(signs))).agreement(quiet)
+    }
+
+    /// The columns of `entry` in this order, as its `columns` would state them, or else the axes.
+    pub fn advice(&self, entry: Option<&Entry>) -> String {
+        // Where the log has y and z the other way, so have the vector's signs.
+        let frame = entry.and_then(|entry| entry.frame).unwrap_or_default();
+        let of_frame = if frame == Frame::FrdNed { [1.0, -1.0, -1.0] } else { [1.0; 3] };
+        let sign = |axis: usize| of_frame[axis] * self.signs[axis] * of_frame[self.places[axis]];
+        let minus = |is_negated: bool| if is_negated { "-" } else { "" };
+        match entry.and_then(|entry| entry.columns.as_deref()) {
+            Some(names) if names.len() == NAMES.len() => {
+                let name = |axis: usize| {
+                    let name = &names[self.places[axis]];
+                    format!("\"{}{}\"", minus(name.sign() * sign(axis) < 0.0), name.plain)
+                };
+                format!("`columns = [{}, {}, {}]`", name(0), name(1), name(2))
+            }
+            _ => {
+                let name = |axis: usize| format!("{}{}", minus(sign(axis) < 0.0), NAMES[self.places[axis]]);
+                format!("the axes in the order {}, {}, {}", name(0), name(1), name(2))
+            }
+        }
+    }
+}
+
+/// Axes that follow their twins, those that follow them with the other sign, and those that do not.
+pub fn axis_by_axis(signs: [f64; 3]) -> String {
+    let named = |sign: f64| {
+        let names = NAMES.into_iter().zip(signs).filter(|(_, of_axis)| (of_axis - sign).abs() < 0.5);
+        names.map(|(name, _)| name).collect::<Vec<_>>().join(", ")
+    };
+    let parts = [(1.0, "alike"), (-1.0, "of the other sign"), (0.0, "without a relation")];
+    let told =
+        parts.map(|(sign, what)| (named(sign), what)).into_iter().filter(|(names, _)| !names.is_empty());
+    told.map(|(names, what)| format!("{names}: {what}")).collect::<Vec<_>>().join("; ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_order_and_the_signs_under_which_vectors_agree_are_found() {
+        let derived: Vec<_> = (0..60)
+            .map(|k| 0.1 * f64::from(k))
+            .map(|t| Vector3::new(libm::sin(t), 0.4 * libm::cos(1.7 * t), 0.6 * libm::sin(2.9 * t)))
+            .collect();
+        // x of the motion is logged with the other sign as z, y as x, z as y.
+        let logged = derived.iter().map(|v| Vector3::new(v.y, v.z, -v.x)).collect();
+        let (axes, agreement) = Axes::that_fit(&Pairs { logged, derived }, 0.05).unwrap();
+        assert_eq!(axes, Axes { places: [2, 0, 1], signs: [-1.0, 1.0, 1.0] });
+        assert!((agreement.correlation - 1.0).abs() < 1e-12);
+        assert_eq!(axes.advice(None), "the axes in the order -z, x, y");
+    }
+
+    #[test]
+    fn nothing_is_found_in_few_vectors() {
+        let few = vec![Vector3::x(); 3];
+        assert!(Axes::that_fit(&Pairs { logged: few.clone(), derived: few }, 0.05).is_none());
+    }
+}
