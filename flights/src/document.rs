@@ -4,10 +4,36 @@ use std::fmt::Display;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use diagnostics::{Diagnostic, ParameterError, Place};
+use diagnostics::{Diagnostic, ParameterError, Place, nearest};
 use serde::de::DeserializeOwned;
 
 use crate::error::FlightsError;
+use crate::quantity::Quantity;
+
+/// Other names of channels, as logs and other programs have them.
+const OTHER_NAMES: [(Quantity, &[&str]); 9] = [
+    (Quantity::Time, &["t", "timestamp", "stamp"]),
+    (Quantity::Command, &["actuator", "motor", "motors", "pwm", "throttle", "thrust"]),
+    (Quantity::RotorSpeed, &["erpm", "motor_speed", "rpm"]),
+    (Quantity::Position, &["pose", "xyz"]),
+    (Quantity::Velocity, &["speed", "twist"]),
+    (Quantity::Attitude, &["euler", "orientation", "quaternion", "rotation"]),
+    (
+        Quantity::AngularVelocity,
+        &["angular_rate", "angular_rates", "body_rates", "gyro", "gyroscope", "rates"],
+    ),
+    (Quantity::SpecificForce, &["acc", "accel", "acceleration", "accelerometer", "linear_acceleration"]),
+    (Quantity::BatteryVoltage, &["battery", "vbat", "voltage"]),
+];
+
+/// The channel that was meant, where the error `told` of a list of names ends in a name that is not in it.
+fn meant(told: &str) -> Option<&'static str> {
+    let (all, found) = told.lines().next()?.rsplit_once(", found `")?;
+    let found = found.strip_suffix('`').filter(|_| all.contains("`angular_velocity`"))?;
+    let is_it = |names: &[&str]| names.iter().any(|name| name.eq_ignore_ascii_case(found));
+    let other = OTHER_NAMES.iter().find(|(_, names)| is_it(names)).map(|(quantity, _)| quantity.name());
+    other.or_else(|| nearest(found, OTHER_NAMES.iter().map(|(quantity, _)| quantity.name())))
+}
 
 /// A flights file that was read.
 pub struct Document {
@@ -25,8 +51,12 @@ impl Document {
     pub fn parse<T: DeserializeOwned>(&self) -> Result<T, FlightsError> {
         let read = diagnostics::read_toml(&self.path.display().to_string(), &self.text);
         read.map_err(|error| {
-            let help = if error.help.is_empty() { "docs/flights.md has the format" } else { &error.help };
-            FlightsError::File(error.clone().help(help))
+            let help = match meant(&error.to_string()) {
+                Some(name) => format!("did you mean `{name}`? docs/flights.md has the format"),
+                None if error.help.is_empty() => "docs/flights.md has the format".to_owned(),
+                None => error.help.clone(),
+            };
+            FlightsError::File(error.help(help))
         })
     }
 
@@ -70,5 +100,26 @@ impl Document {
                 self.bad(place, key, "a path", found.to_string(), advice)
             })?;
         Ok(inputs::tidy(&self.path.parent().unwrap_or(Path::new("")).join(expanded)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_channel_that_was_meant_is_named() {
+        let told = |found: &str| {
+            let text = format!("{found} = 1.0\n");
+            let document = Document::new(Path::new("flights.toml"), text);
+            document.parse::<std::collections::BTreeMap<Quantity, f64>>().unwrap_err().to_string()
+        };
+        for (found, meant) in
+            [("Accel", "specific_force"), ("gyro", "angular_velocity"), ("atitude", "attitude")]
+        {
+            let told = told(found);
+            assert!(told.contains(&format!("did you mean `{meant}`?")), "{told}");
+        }
+        assert!(!told("colour").contains("did you mean"));
     }
 }
