@@ -19,7 +19,7 @@ pub fn page(report: &Report, campaign: &Campaign, base: &Base, rows: &[Row]) -> 
     let figures: Vec<&String> = base.kept.iter().map(|&index| &base.figures[index]).collect();
     let varied: Vec<&String> = campaign.vary.iter().map(|varied| &varied.name).collect();
     let data = json!({ "report": report, "varied": varied, "figures": figures, "flights": shown });
-    html(include_str!("page/page.html"), PLOTLY_BASIC, include_str!("page/page.js"), &data)
+    html(include_str!("page/page.html"), &PLOTLY_BASIC, include_str!("page/page.js"), &data)
 }
 
 fn flight(campaign: &Campaign, base: &Base, row: &Row) -> Value {

@@ -5,26 +5,47 @@
 //! brings fifty more packages.
 
 use diagnostics::printable_json;
+use flate2::read::ZlibDecoder;
 use serde_json::Value;
+use std::io::Read;
 
 /// Mark near the start of every page.
 pub const MARK: &str = r#"<meta name="generator" content="hummingbus">"#;
 
 /// plotly.js with lines, bars and pies.
-pub const PLOTLY_BASIC: &str = include_str!("page/plotly-basic.min.js");
+pub const PLOTLY_BASIC: Bundle = Bundle(include_bytes!(concat!(env!("OUT_DIR"), "/plotly-basic.min.zlib")));
 /// plotly.js with lines, and lines and bodies in space.
 #[cfg(feature = "plots")]
-pub(crate) const PLOTLY_3D: &str = include_str!("page/plotly-gl3d.min.js");
+pub(crate) const PLOTLY_3D: Bundle =
+    Bundle(include_bytes!(concat!(env!("OUT_DIR"), "/plotly-gl3d.min.zlib")));
+
+/// A script that the program holds compressed.
+#[derive(Debug, Clone, Copy)]
+pub struct Bundle(&'static [u8]);
+
+impl Bundle {
+    /// The text of the script.
+    ///
+    /// # Panics
+    /// Never: the build compressed this text.
+    #[must_use]
+    pub fn script(&self) -> String {
+        let mut script = String::new();
+        let read = ZlibDecoder::new(self.0).read_to_string(&mut script);
+        read.expect("the build compressed this text");
+        script
+    }
+}
 
 /// The page with this `body` of headings, texts and the places of tables and plots. `script` draws `data` on it with
 /// a bundle of plotly.js and the functions of `kit.js`.
 #[must_use]
-pub fn page(body: &str, plotly: &str, script: &str, data: &Value) -> Vec<u8> {
+pub fn page(body: &str, plotly: &Bundle, script: &str, data: &Value) -> Vec<u8> {
     format!(
         include_str!("page/page.html"),
         style = include_str!("page/page.css"),
         body = body,
-        plotly = plotly,
+        plotly = plotly.script(),
         // No name in the data can turn or hide text, or end the element that holds it.
         data = printable_json(&data.to_string()).replace('<', "\\u003c"),
         kit = include_str!("page/kit.js"),
@@ -38,8 +59,15 @@ mod tests {
     use super::*;
 
     #[test]
+    fn the_bundles_are_scripts() {
+        assert!(PLOTLY_BASIC.script().starts_with("/**\n* plotly.js"), "{:.40}", PLOTLY_BASIC.script());
+        #[cfg(feature = "plots")]
+        assert!(PLOTLY_3D.script().starts_with("/**\n* plotly.js"), "{:.40}", PLOTLY_3D.script());
+    }
+
+    #[test]
     fn names_in_the_data_neither_end_their_element_nor_turn_the_text() {
-        let page = page("", "", "", &serde_json::json!({ "name": "</script>\u{202e}x" }));
+        let page = page("", &PLOTLY_BASIC, "", &serde_json::json!({ "name": "</script>\u{202e}x" }));
         let page = String::from_utf8(page).unwrap();
         assert!(page.contains("\\u003c/script>\\u202ex") && !page.contains('\u{202e}'));
     }

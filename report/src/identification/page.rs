@@ -24,7 +24,12 @@ const POINTS_MIN: usize = 300;
 /// The page of `outcome`; `flown` are the results on the bus, as in the report's `bus`, if it was flown.
 #[must_use]
 pub fn page(outcome: &Outcome, flown: Option<&Value>) -> Vec<u8> {
-    crate::page::page(include_str!("page.html"), PLOTLY_BASIC, include_str!("page.js"), &data(outcome, flown))
+    crate::page::page(
+        include_str!("page.html"),
+        &PLOTLY_BASIC,
+        include_str!("page.js"),
+        &data(outcome, flown),
+    )
 }
 
 fn data(outcome: &Outcome, flown: Option<&Value>) -> Value {

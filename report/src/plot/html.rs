@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 
 /// The page.
 pub fn page(drawing: &Drawing) -> Vec<u8> {
-    crate::page::page(include_str!("page.html"), PLOTLY_3D, include_str!("page.js"), &data(drawing))
+    crate::page::page(include_str!("page.html"), &PLOTLY_3D, include_str!("page.js"), &data(drawing))
 }
 
 /// Data for the page's script: the drawing with its points.

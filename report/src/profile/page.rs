@@ -26,7 +26,7 @@ impl Profile {
     #[must_use]
     pub fn page(&self, run: &str, flight: &Flight) -> Vec<u8> {
         let data = data(run, flight, self);
-        page::page(include_str!("page.html"), PLOTLY_BASIC, include_str!("page.js"), &data)
+        page::page(include_str!("page.html"), &PLOTLY_BASIC, include_str!("page.js"), &data)
     }
 }
 
