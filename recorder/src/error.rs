@@ -1,7 +1,7 @@
 //! Errors about a recording.
 
 use crate::definition::{DecodeError, Leaf};
-use diagnostics::printable_line;
+use diagnostics::{nearest, printable_line};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -77,8 +77,8 @@ pub enum RecordingError {
     },
     /// There is no such topic.
     #[error(
-        "the recording has no topic {}; it has {}",
-        printable_line(topic), if known.is_empty() { "none".into() } else { printable_line(known) }
+        "the recording has no topic {}{}; it has {}",
+        printable_line(topic), meant(topic, known), if known.is_empty() { "none".into() } else { printable_line(known) }
     )]
     UnknownTopic {
         /// The topic requested.
@@ -88,9 +88,10 @@ pub enum RecordingError {
     },
     /// There is no such field.
     #[error(
-        "topic {} has no field `{}`; it has {}",
+        "topic {} has no field `{}`{}; it has {}",
         printable_line(topic),
         printable_line(field),
+        meant(field, known),
         printable_line(known)
     )]
     UnknownField {
@@ -101,6 +102,12 @@ pub enum RecordingError {
         /// The fields there are.
         known: String,
     },
+}
+
+/// Question for the name among those in `known` that `found` was probably meant to be; empty if none is near.
+fn meant(found: &str, known: &str) -> String {
+    let near = nearest(found, known.split(", "));
+    near.map_or(String::new(), |near| format!(" (did you mean `{}`?)", printable_line(near)))
 }
 
 impl From<RecordingError> for diagnostics::Error {

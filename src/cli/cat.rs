@@ -4,6 +4,7 @@ use super::files::open_recording;
 use super::output::{gone_or_failed, write_json_line};
 use anyhow::{Context, Result, bail};
 use clap::Args;
+use diagnostics::nearest;
 use recorder::RecordingError;
 use recorder::definition::{Leaf, Value, is_padding};
 use recorder::reader::{Record, Recording};
@@ -18,7 +19,8 @@ pub struct CatArguments {
     /// Only this topic.
     #[arg(long)]
     topic: Option<String>,
-    /// Only this field, such as position.z, or all fields below it, such as position; repeatable. Needs --topic.
+    /// Only this field, such as position.z, or all fields below it, such as position; repeatable, and printed in the order
+    /// given. Needs --topic.
     #[arg(long, value_name = "FIELD", requires = "topic")]
     field: Vec<String>,
     /// Start of the span, in seconds of simulated time.
@@ -32,8 +34,7 @@ pub struct CatArguments {
     csv: bool,
 }
 
-/// Prints the messages of a recording: topic, tick, time and fields in the order of the definition, without padding; false if
-/// the recording was cut off.
+/// Prints the messages of a recording: topic, tick, time and fields, without padding; false if the recording was cut off.
 ///
 /// # Errors
 /// If the recording cannot be read, or has no such topic or field.
@@ -164,29 +165,44 @@ impl CatArguments {
         records.map(|record| record.context("cannot read on"))
     }
 
-    /// The requested fields, in the order of the definition.
+    /// The requested fields, each once, in the order of the arguments; without any, all fields in the order of the definition.
     fn leaves(&self, recording: &Recording, record: &Record) -> Result<Vec<Leaf>> {
         let mut leaves = recording.decode(record)?;
         leaves.retain(|leaf| !is_padding(&leaf.path));
-        // Angles of a quaternion and velocities along the axes of the body, as conditions and plots have them.
-        let is_made = |field: &&String| !leaves.iter().any(|leaf| is_part(&leaf.path, field));
-        let made = self.field.iter().filter(is_made).filter_map(|field| {
-            let (value, unit) = recorder::series::value(&leaves, field)?;
-            Some(Leaf { path: field.clone(), unit: unit.to_owned(), value: Value::Float(value) })
-        });
-        let made: Vec<Leaf> = made.collect();
-        leaves.extend(made);
-        for field in &self.field {
-            if !leaves.iter().any(|leaf| is_part(&leaf.path, field)) {
-                let known: Vec<_> = leaves.iter().map(|leaf| leaf.path.as_str()).collect();
-                bail!("no field {field} in {}; there are: {}", record.topic, known.join(", "));
-            }
+        if self.field.is_empty() {
+            return Ok(leaves);
         }
-        let is_wanted =
-            |leaf: &Leaf| self.field.is_empty() || self.field.iter().any(|f| is_part(&leaf.path, f));
-        leaves.retain(is_wanted);
-        Ok(leaves)
+        let mut requested: Vec<Leaf> = Vec::new();
+        for field in &self.field {
+            let found = leaves_of(&leaves, field);
+            if found.is_empty() {
+                let known: Vec<_> = leaves.iter().map(|leaf| leaf.path.as_str()).collect();
+                let meant = nearest(field, known.iter().copied());
+                let meant = meant.map_or(String::new(), |meant| format!(" (did you mean `{meant}`?)"));
+                bail!("no field {field} in {}{meant}; there are: {}", record.topic, known.join(", "));
+            }
+            let is_new = |leaf: &Leaf| requested.iter().all(|other| other.path != leaf.path);
+            let new: Vec<Leaf> = found.into_iter().filter(is_new).collect();
+            requested.extend(new);
+        }
+        Ok(requested)
     }
+}
+
+/// The leaves of a `field`: itself and all below it, or the number that is made of others, as conditions and plots have them: an
+/// angle of a quaternion, or a velocity along an axis of the body.
+fn leaves_of(leaves: &[Leaf], field: &str) -> Vec<Leaf> {
+    let parts: Vec<Leaf> = leaves.iter().filter(|leaf| is_part(&leaf.path, field)).cloned().collect();
+    if !parts.is_empty() {
+        return parts;
+    }
+    let made = recorder::series::value(leaves, field);
+    let leaf = |(value, unit): (f64, &str)| Leaf {
+        path: field.to_owned(),
+        unit: unit.to_owned(),
+        value: Value::Float(value),
+    };
+    made.map(leaf).into_iter().collect()
 }
 
 /// True for the field `of` itself and the fields and elements below it.
@@ -209,7 +225,25 @@ fn json_value(value: &Value) -> serde_json::Value {
 
 #[cfg(test)]
 mod tests {
-    use super::{cell_of, is_part};
+    use super::{cell_of, is_part, leaves_of};
+    use recorder::definition::{Leaf, Value};
+
+    #[test]
+    fn a_field_is_found_with_all_below_it_or_made_of_others() {
+        let leaf = |path: &str, value| Leaf {
+            path: path.to_owned(),
+            unit: "1".to_owned(),
+            value: Value::Float(value),
+        };
+        let leaves =
+            [("q.x", 0.0), ("q.y", 0.0), ("q.z", 0.0), ("q.w", 1.0)].map(|(path, value)| leaf(path, value));
+        let paths =
+            |field: &str| leaves_of(&leaves, field).into_iter().map(|leaf| leaf.path).collect::<Vec<_>>();
+        assert_eq!(paths("q"), ["q.x", "q.y", "q.z", "q.w"]);
+        assert_eq!(paths("q.z"), ["q.z"]);
+        assert_eq!(paths("q.yaw"), ["q.yaw"]);
+        assert!(paths("q.v").is_empty());
+    }
 
     #[test]
     fn a_field_has_the_fields_below_it() {

@@ -220,10 +220,16 @@ fn cat_prints_a_span_of_fields_as_csv() {
     assert!(lines[1].starts_with("100,100000000,") && lines[101].starts_with("200,200000000,"));
     let height: f64 = lines[1].split(',').nth(2).unwrap().parse().unwrap();
     assert!((height - 1.0).abs() < 0.05, "{height} m");
-    place
-        .call(&[&topic[..], &["--field", "position.w"]].concat())
-        .with_code(2)
-        .says(&["no field", "position.z"]);
+    // Columns stand in the order of the arguments, each once.
+    let fields = ["--field", "velocity.z", "--field", "position", "--field", "position.z", "--csv"];
+    let ended = place.call(&[&topic[..], &fields].concat()).with_code(0);
+    let head = ended.output.lines().next();
+    assert_eq!(head, Some("tick,time_ns,velocity.z,position.x,position.y,position.z"));
+    place.call(&[&topic[..], &["--field", "position.w"]].concat()).with_code(2).says(&[
+        "no field position.w",
+        "did you mean `position.x`?",
+        "position.z",
+    ]);
     place.call(&["cat", &recording, "--csv"]).with_code(2).says(&["--topic"]);
     place.call(&[&topic[..], &["--from", "-1"]].concat()).with_code(2);
 }
@@ -309,7 +315,7 @@ fn a_quiet_run_prints_only_its_failure() {
 fn cat_names_the_topics_there_are() {
     let place = Place::new();
     let ended = place.call(&["cat", &recording(&place), "--topic", "/plant/stat"]).with_code(2);
-    ended.says(&["no topic /plant/stat", "/plant/state"]);
+    ended.says(&["no topic /plant/stat (did you mean `/plant/state`?); it has ", "/imu/imu"]);
 }
 
 #[test]

@@ -196,7 +196,7 @@ fn what_is_not_there_is_refused_with_what_is() {
     let cases: [(&[&str], &str); 14] = [
         (
             &["--plot", "/plant/stat:position.z"],
-            "the recording has no topic /plant/stat; it has /pilot/set_point, /planner/reference, /plant/state",
+            "the recording has no topic /plant/stat (did you mean `/plant/state`?); it has /pilot/set_point, /planner/reference",
         ),
         (
             &["--plot", "/pilot/set_point:heigh"],
@@ -205,7 +205,10 @@ fn what_is_not_there_is_refused_with_what_is() {
         (&["--plot", "position.z"], "`position.z` is not TOPIC:FIELD"),
         (&["--plot", "/plant/state:"], "`/plant/state:` names no field"),
         (&["--against", "position.x"], "--against position.x: it is not TOPIC:FIELD"),
-        (&["--against", "/plant/state:positio"], "topic /plant/state has no field `positio`; it has"),
+        (
+            &["--against", "/plant/state:positio"],
+            "topic /plant/state has no field `positio` (did you mean `position.x`?); it has",
+        ),
         (&["--full-throttle", "0"], "--full-throttle 0: expected a number of counts above 0"),
         (&["--out", "laps.pdf"], "--out laps.pdf: its name must end in .html, .png or .svg"),
         (&["--png", "/no/where.png"], "cannot create /no/where.png: there is no folder /no"),

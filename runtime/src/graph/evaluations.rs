@@ -4,7 +4,7 @@ use super::parameters::Notes;
 use crate::manifest::{Comparison, Manifest, PassCondition, Statistic};
 use crate::program::Program;
 use bus::plan::{NodePlan, Plan};
-use diagnostics::{Diagnostic, NotOneLine, did_you_mean, nearest, printable_line, require_line};
+use diagnostics::{Diagnostic, NotOneLine, did_you_mean, printable_line, require_line};
 use recorder::RecordingError;
 use std::ops::Range;
 use toml::Spanned;
@@ -231,13 +231,8 @@ fn check_units(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) 
     let unit = |table: &str, topic: &str, field: &str| {
         unit_of(manifest, plan, topic, field).map_err(|error| {
             let message = format!("{} `{}`: {error}", kind(condition), condition.name);
-            let meant = match &error {
-                RecordingError::UnknownField { field, known, .. } => nearest(field, known.split(", ")),
-                _ => None,
-            };
-            let help = meant.map(|meant| format!("did you mean `{meant}`?"));
             let at = key_of(manifest, &pass.span(), table, "field");
-            manifest.problem(&at, message, help.unwrap_or_else(|| "name one of these fields".to_owned()))
+            manifest.problem(&at, message, "name one of these fields")
         })
     };
     let Some(unit_here) = unit("", &condition.topic, &condition.field)? else { return Ok(()) };
