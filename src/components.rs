@@ -2,6 +2,7 @@
 
 use bus::Registration;
 use controllers::controller::Controller;
+use plant::effects::CATALOGUE;
 use runtime::registry::{NodeProgram, Registry};
 use sensors::sensing::Sensing;
 
@@ -57,7 +58,13 @@ pub const COMPONENTS: Registry = Registry::new(&[
     summary: "an FMU for co-simulation, of FMI 2.0 or 3.0",
     parameters: fmu::PARAMETERS,
     run: fmu::run,
-}]);
+}])
+.with_effects(effects);
+
+/// Names of the effects that the plant knows.
+fn effects() -> Vec<&'static str> {
+    CATALOGUE.iter().map(|kind| kind.name).collect()
+}
 
 #[cfg(test)]
 mod tests {

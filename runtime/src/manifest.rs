@@ -313,7 +313,7 @@ impl Manifest {
         // A file that cannot be read is refused by its reader.
         let Some(text) = is_edited.then(|| files.text(&path).ok()).flatten() else { return Ok(path) };
         let base = |base: &str| file_edits::base_text(files, &path, base);
-        let text = file_edits::edited(&text, &edits, &base)
+        let text = file_edits::edited(&text, &edits, &self.registry().effects(), &base)
             .map_err(|(edit, message)| edit.problem(&self.sources, &message, &path))?;
         let edited = file_edits::edited_path(&path, name);
         files.keep(&edited, text.into_bytes());

@@ -19,6 +19,7 @@ use std::collections::BTreeMap;
 pub struct Registry {
     components: &'static [Registration],
     programs: &'static [NodeProgram],
+    effects: Option<fn() -> Vec<&'static str>>,
 }
 
 /// A kind that is a program of its own instead of a component: its ports are those that the manifest gives it, and its process
@@ -51,13 +52,25 @@ impl Registry {
     /// A registry of `components`, in the order in which messages list them.
     #[must_use]
     pub const fn new(components: &'static [Registration]) -> Self {
-        Self { components, programs: &[] }
+        Self { components, programs: &[], effects: None }
     }
 
     /// This registry with `programs`.
     #[must_use]
     pub const fn with_programs(self, programs: &'static [NodeProgram]) -> Self {
         Self { programs, ..self }
+    }
+
+    /// This registry with the names of the effects that vehicle and scene files may list, for messages.
+    #[must_use]
+    pub const fn with_effects(self, effects: fn() -> Vec<&'static str>) -> Self {
+        Self { effects: Some(effects), ..self }
+    }
+
+    /// Names of the effects that vehicle and scene files may list; empty if the caller stated none.
+    #[must_use]
+    pub fn effects(&self) -> Vec<&'static str> {
+        self.effects.map(|names| names()).unwrap_or_default()
     }
 
     /// The programs.

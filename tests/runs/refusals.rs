@@ -184,9 +184,25 @@ fn a_name_that_is_taken_or_has_capitals() {
 #[test]
 fn an_unknown_port() {
     let ended = refused("inputs.imu =", "inputs.§imuu =");
-    ended.says(&["process `ekf` has no input `imuu`", "did you mean `imu`?"]);
+    ended.says(&["process `ekf`: kind `ekf` has no input `imuu`", "did you mean `imu`?"]);
     let ended = refused("kind = \"imu\"", "kind = \"imu\"\noutputs.§image = {}");
-    ended.says(&["process `imu` has no output `image`", "imu"]);
+    ended.says(&["process `imu`: kind `imu` has no output `image`", "imu"]);
+    // The ports stay where an argument or a backup changes the kind alone.
+    let place = Place::new();
+    let hover = repository("manifests/hover.toml");
+    let set = ["check", &hover, "--set", "process.controller.kind=lqr"];
+    place.call(&set).with_code(2).says(&[
+        "hover.toml:37:8: process `controller`: kind `lqr` has no input `set_point`",
+        "it has reference, estimate, attitude",
+        "--set process.controller.kind=lqr keeps the inputs: write those of `lqr` as inputs = {",
+    ]);
+    let swap =
+        "\n[[swap]]\nprocess = \"controller\"\nat_tick = 50\nshadow_ticks = 9\nwith = { kind = \"lqr\" }\n";
+    let manifest = place.write("swap.toml", good() + swap);
+    place.call(&["check", &manifest]).with_code(2).says(&[
+        "process `controller`: kind `lqr` has no input `set_point`",
+        "the backup of `controller` keeps the inputs",
+    ]);
 }
 
 #[test]
@@ -344,7 +360,13 @@ fn a_delay_without_an_initial_value_or_the_other_way_round() {
     let ended = refused(edge, "inputs.§imu = { topic = \"/imu/imu\", delay_ticks = 1 }");
     ended.says(&["input `imu` of `ekf` is delayed and has no initial value", "initial ="]);
     let ended = refused(edge, "inputs.§imu = { topic = \"/imu/imu\", initial = {} }");
-    ended.says(&["has an initial value but no delay", "add delay_ticks = 1"]);
+    ended.says(&["has an initial value but no delay", "add delay_ticks = 1", "leave the initial value out"]);
+    // The argument is named, not the line of the file that it changes.
+    let hover = repository("manifests/hover.toml");
+    let ended = refused_setting(&hover, &["process.plant.inputs.command.delay_ticks=0"]);
+    ended.says(&["has an initial value but no delay", "process.plant.inputs.command=/controller/command"]);
+    let ended = refused_setting(&hover, &["process.plant.inputs.command.topic=/controller/comand"]);
+    ended.says(&["nobody publishes /controller/comand", "did you mean `/controller/command`?"]);
     let ended = refused(edge, "inputs.§imu = { topic = \"/imu/imu\", delay_ticks = 2, initial = {} }");
     ended.says(&["has delay_ticks = 2", "0 or 1"]);
 }

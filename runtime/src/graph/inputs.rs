@@ -8,6 +8,7 @@ use crate::program::Program;
 use bus::plan::{InputPlan, NodePlan, TopicPlan};
 use bus::ports::{Inputs, PortSpec};
 use diagnostics::{Diagnostic, did_you_mean, nearest};
+use std::ops::Range;
 use toml::Spanned;
 
 /// The nodes of a run with what they publish, in the order of the topics.
@@ -113,11 +114,13 @@ fn input(
 ) -> Result<InputPlan, Diagnostic> {
     let DeclaredNode { manifest, name, program, .. } = declared;
     let who = format!("input `{}` of `{}`", port.get_ref(), name.get_ref());
-    let at = |what: String, help: String| manifest.problem(&port.span(), format!("{who}{what}"), help);
+    let at = |parts: &[&str], what: String, help: String| {
+        manifest.problem(&place(declared, port, parts), format!("{who}{what}"), help)
+    };
     let Some(topic) = topics.iter().position(|topic| topic.name == setting.topic) else {
         let known = topics.iter().map(|topic| topic.name.as_str());
         let help = did_you_mean(&setting.topic, known, "the topics are");
-        return Err(at(format!(": nobody publishes {}", setting.topic), help));
+        return Err(at(&["topic"], format!(": nobody publishes {}", setting.topic), help));
     };
     let found = &topics[topic].type_name;
     if let Some(expected) = expected_type(program, port.get_ref()).filter(|expected| expected != found) {
@@ -125,17 +128,47 @@ fn input(
             return Err(error);
         }
         let help = format!("wire a topic of {expected}");
-        return Err(at(format!(" reads {expected}, {} carries {found}", setting.topic), help));
+        return Err(at(&["topic"], format!(" reads {expected}, {} carries {found}", setting.topic), help));
     }
     if let Some((what, help)) = bad_delay(program, setting) {
-        return Err(at(format!(" {what}"), help.to_owned()));
+        let parts = ["delay_ticks", "initial"];
+        let is_set = manifest.sources.is_override(place(declared, port, &parts).start);
+        let help = match (setting.delay_ticks, &setting.initial) {
+            // The file has the other value: one more of `--set` cannot remove it.
+            (0, Some(_)) if is_set => {
+                let key = set_key(declared, port);
+                format!(
+                    "an input without delay has no initial value: set the whole input, {key}={}",
+                    setting.topic
+                )
+            }
+            _ => help.to_owned(),
+        };
+        return Err(at(&parts, format!(" {what}"), help));
     }
     if let (Some(schema), Some(initial)) = (manifest.registry().message(found), &setting.initial) {
         let told = bus::initial::sample(schema, initial);
-        told.map_err(|reason| at(format!(": initial value: {reason}"), format!("give fields of {found}")))?;
+        told.map_err(|reason| {
+            at(&["initial"], format!(": initial value: {reason}"), format!("give fields of {found}"))
+        })?;
     }
     let (port, delay_ticks) = (port.get_ref().clone(), setting.delay_ticks);
     Ok(InputPlan { port, topic, delay_ticks, initial: setting.initial.clone() })
+}
+
+/// Key of the input `port` of `declared`, as `--set` takes it.
+fn set_key(declared: &DeclaredNode<'_>, port: &Spanned<String>) -> String {
+    format!("process.{}.inputs.{}", declared.name.get_ref(), port.get_ref())
+}
+
+/// Place of the input `port` of `declared`: that of a value of `--set` which changes one of these `parts` of it, else its own.
+fn place(declared: &DeclaredNode<'_>, port: &Spanned<String>, parts: &[&str]) -> Range<usize> {
+    if declared.is_backup() {
+        return port.span();
+    }
+    let key = set_key(declared, port);
+    let set = parts.iter().find_map(|part| declared.manifest.sources.set_at(&format!("{key}.{part}")));
+    set.unwrap_or_else(|| port.span())
 }
 
 /// Fault in the delay and the initial value of an input, and advice.
@@ -149,7 +182,9 @@ fn bad_delay(program: &Program, setting: &InputSetting) -> Option<(String, &'sta
              message has come the output is the initial value",
         ),
         (0, None) | (1, Some(_)) => return None,
-        (0, Some(_)) => ("has an initial value but no delay", "add delay_ticks = 1"),
+        (0, Some(_)) => {
+            ("has an initial value but no delay", "add delay_ticks = 1, or leave the initial value out")
+        }
         (1, None) => (
             "is delayed and has no initial value",
             "state what it reads at tick 0, such as initial = { command = [1, 1, 1, 1] }",

@@ -266,9 +266,31 @@ pub fn require_known_ports<'n, T>(
 ) -> Result<(), Diagnostic> {
     let is_unknown = |name: &&Spanned<String>| ports.clone().all(|port| port != name.get_ref());
     let Some(unknown) = used.keys().find(is_unknown) else { return Ok(()) };
-    let help = did_you_mean(unknown.get_ref(), ports, "it has");
-    let message = format!("process `{}` has no {direction} `{}`", declared.name.get_ref(), unknown.get_ref());
-    Err(declared.manifest.problem(&unknown.span(), message, help))
+    let DeclaredNode { manifest, name, program, .. } = declared;
+    let (kind, port) = (program.kind().unwrap_or_default(), unknown.get_ref());
+    let message = format!("process `{}`: kind `{kind}` has no {direction} `{port}`", name.get_ref());
+    let mut help = did_you_mean(port, ports, "it has");
+    if let Some(changed) = change_of_kind(declared, unknown) {
+        help +=
+            &format!("; {changed} keeps the {direction}s: write those of `{kind}` as {direction}s = {{ … }}");
+    }
+    Err(manifest.problem(&unknown.span(), message, help))
+}
+
+/// Name of the text that changes the kind of `declared` alone, where the `port` stays that of the kind before; `None` if the same
+/// table states both.
+fn change_of_kind(declared: &DeclaredNode<'_>, port: &Spanned<String>) -> Option<String> {
+    let DeclaredNode { manifest, name, process, .. } = declared;
+    if manifest.sources.argument(&port.span()).is_some() {
+        return None;
+    }
+    let kind = process.kind.as_ref()?;
+    if let Some(argument) = manifest.sources.argument(&kind.span()) {
+        return Some(argument);
+    }
+    let is_kept = |before: &Process| before.inputs.keys().any(|input| input.span() == port.span());
+    let is_of_before = declared.is_backup() && manifest.content.process.values().any(is_kept);
+    is_of_before.then(|| format!("the backup of `{}`", name.get_ref()))
 }
 
 /// The outputs of node `node`.

@@ -234,7 +234,7 @@ fn refused(declared: &DeclaredNode<'_>, error: &ParameterError) -> Diagnostic {
     let has_two = file.is_some_and(|(_, file)| file.is_some())
         && declared.process.parameters.keys().any(|parameter| parameter.get_ref() == key);
     let help = match error {
-        ParameterError::Missing { .. } if is_backup(declared) => {
+        ParameterError::Missing { .. } if declared.is_backup() => {
             let value =
                 if file.is_some() { format!("{key} = \"PATH\"") } else { format!("parameters.{key} = …") };
             format!(
@@ -256,11 +256,6 @@ fn refused(declared: &DeclaredNode<'_>, error: &ParameterError) -> Diagnostic {
     let at = place_within(declared, key, is_unknown);
     let error = error.clone().of(format!("process `{name}`"));
     declared.manifest.problem(&at, error, help)
-}
-
-/// True for a backup: its keys are those of a process with those of its `with` or `standby`.
-fn is_backup(declared: &DeclaredNode<'_>) -> bool {
-    declared.manifest.content.process.keys().all(|process| process.span() != declared.name.span())
 }
 
 fn problem(declared: &DeclaredNode<'_>, at: &Range<usize>, message: &str, help: String) -> Diagnostic {

@@ -33,6 +33,13 @@ pub struct DeclaredNode<'m> {
     pub program: Program,
 }
 
+impl DeclaredNode<'_> {
+    /// True for a backup: its keys are those of a process with those of its `with` or `standby`.
+    pub fn is_backup(&self) -> bool {
+        self.manifest.content.process.keys().all(|process| process.span() != self.name.span())
+    }
+}
+
 /// The processes that take part in the ticks, by name; they read from `files`.
 ///
 /// # Errors

@@ -6,7 +6,7 @@
 use super::content::{Content, Process};
 use super::put::put;
 use super::sources::Sources;
-use diagnostics::{Diagnostic, did_you_mean};
+use diagnostics::{Diagnostic, did_you_mean, nearest};
 use inputs::InputFiles;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -93,20 +93,22 @@ pub fn all(sources: &Sources, content: &Content) -> Result<Vec<FileEdit>, Diagno
     edits.map(require).collect()
 }
 
-/// `text` with `edits`; `base` returns the text of the file that it is based on, by the path written in it.
+/// `text` with `edits`, which may name these `effects`; `base` returns the text of the file that it is based on, by the path
+/// written in it.
 ///
 /// # Errors
 /// The edit that has no place, and the reason.
 pub fn edited<'e>(
     text: &str,
     edits: &[&'e FileEdit],
+    effects: &[&str],
     base: &dyn Fn(&str) -> Option<String>,
 ) -> Result<String, (&'e FileEdit, String)> {
     // The reader of the file reports the place at which it is not TOML.
     let Ok(mut document) = text.parse::<DocumentMut>() else { return Ok(text.to_owned()) };
     for edit in edits {
         edit.inherit(&mut document, base);
-        edit.apply(&mut document).map_err(|message| (*edit, message))?;
+        edit.apply(&mut document, effects).map_err(|message| (*edit, message))?;
     }
     Ok(document.to_string())
 }
@@ -194,8 +196,8 @@ impl FileEdit {
         }
     }
 
-    fn apply(&self, document: &mut DocumentMut) -> Result<(), String> {
-        self.list_effect(document)?;
+    fn apply(&self, document: &mut DocumentMut, effects: &[&str]) -> Result<(), String> {
+        self.list_effect(document, effects)?;
         let keys = self.keys_in(document.as_item());
         let value = self.with_source(&keys);
         put(document.as_item_mut(), &keys, value)
@@ -203,8 +205,9 @@ impl FileEdit {
     }
 
     /// Adds an effect that the file does not list behind those that it lists, with the neutral values of its parameters.
-    /// Refuses one whose value has no unit: only a quantity of the file would give it.
-    fn list_effect(&self, document: &mut DocumentMut) -> Result<(), String> {
+    /// Refuses one whose value has no unit: only a quantity of the file would give it. The effects that there are have the names
+    /// `effects`.
+    fn list_effect(&self, document: &mut DocumentMut, effects: &[&str]) -> Result<(), String> {
         let [list, name, ..] = self.keys.as_slice() else { return Ok(()) };
         if list != EFFECTS || name.parse::<usize>().is_ok() {
             return Ok(());
@@ -218,9 +221,9 @@ impl FileEdit {
         if !is_quantity(&self.value) {
             let known = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
             return Err(format!(
-                "the {} file lists no effect `{name}` (it lists {known}); to add it, give the value as {{ value = NUMBER, unit = \"UNIT\" }}; \
-                 `hummingbus effects {name}` prints its parameters and units",
-                self.file
+                "the {} file lists no effect `{name}` (it lists {known}); {}",
+                self.file,
+                way_out(name, effects)
             ));
         }
         let mut effect = Table::new();
@@ -305,6 +308,19 @@ fn at<'i>(inside: &'i Item, key: &str) -> Option<&'i Item> {
     }
 }
 
+/// Advice on the effect `name` that a file does not list; the effects that there are have the names `effects`.
+fn way_out(name: &str, effects: &[&str]) -> String {
+    let near = nearest(name, effects.iter().copied());
+    match near.filter(|near| *near != name) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None if effects.is_empty() || effects.contains(&name) => format!(
+            "to add it, give the value as {{ value = NUMBER, unit = \"UNIT\" }}; `hummingbus effects {name}` prints its \
+             parameters and units"
+        ),
+        None => "`hummingbus effects` lists all effects".to_owned(),
+    }
+}
+
 /// True for a number with its unit, as files state it.
 fn is_quantity(value: &Value) -> bool {
     value.as_inline_table().is_some_and(|table| [VALUE, "unit"].iter().all(|key| table.contains_key(key)))
@@ -327,7 +343,7 @@ mod tests {
 
     fn changed(set: &str) -> Result<String, String> {
         let edit = FileEdit::parse(set, 0).unwrap();
-        edited(VEHICLE, &[&edit], &|_| None).map_err(|(_, message)| message)
+        edited(VEHICLE, &[&edit], &["wind", "gusts"], &|_| None).map_err(|(_, message)| message)
     }
 
     #[test]
@@ -408,12 +424,17 @@ mod tests {
     fn an_effect_that_the_file_does_not_list_is_refused_by_name() {
         let message = changed("process.plant.vehicle.effects.wind.x=3").unwrap_err();
         assert!(message.starts_with("the vehicle file lists no effect `wind` (it lists none)"), "{message}");
+        assert!(message.contains("`hummingbus effects wind` prints its parameters"), "{message}");
+        let message = changed("process.plant.vehicle.effects.winds.x=3").unwrap_err();
+        assert!(message.ends_with("did you mean `wind`?"), "{message}");
+        let message = changed("process.plant.vehicle.effects.lightning.x=3").unwrap_err();
+        assert!(message.ends_with("`hummingbus effects` lists all effects"), "{message}");
         let text = format!("{VEHICLE}[[effects]]\nname = \"wind\"\nx = {{ value = 0, unit = \"m/s\" }}\n");
         let edit = |set| FileEdit::parse(set, 0).unwrap();
         let set = edit("process.plant.vehicle.effects.wind.x=3");
-        assert_eq!(edited(&text, &[&set], &|_| None).unwrap(), text.replace("value = 0,", "value = 3,"));
+        assert_eq!(edited(&text, &[&set], &[], &|_| None).unwrap(), text.replace("value = 0,", "value = 3,"));
         let gust = edit("process.plant.vehicle.effects.gust.x=3");
-        let (_, message) = edited(&text, &[&gust], &|_| None).unwrap_err();
+        let (_, message) = edited(&text, &[&gust], &[], &|_| None).unwrap_err();
         assert!(message.contains("`gust` (it lists wind)"), "{message}");
     }
 
@@ -423,7 +444,7 @@ mod tests {
             let text = format!("process.plant.vehicle.effects.{key}={{ value = 3, unit = \"m/s\" }}");
             FileEdit::parse(&text, 0).unwrap()
         };
-        let found = edited(VEHICLE, &[&set("wind.x"), &set("wind.y")], &|_| None).unwrap();
+        let found = edited(VEHICLE, &[&set("wind.x"), &set("wind.y")], &[], &|_| None).unwrap();
         let effects = found.strip_prefix(VEHICLE).unwrap().trim_start();
         let quantity = "{ value = 3, unit = \"m/s\" , source = \"--set\", uncertainty = \"not stated\" }";
         let table = format!("[[effects]]\nname = \"wind\"\nx = {quantity}\ny = {quantity}\n");

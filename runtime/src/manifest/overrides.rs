@@ -168,7 +168,7 @@ fn slot<'v, 's>(
                 Err((message, "its elements are numbered from 0"))
             }
         },
-        _ => Err((format!("`{name}` is not a table"), "docs/manifest.md lists every key")),
+        _ => Err((format!("`{name}` is not a table"), "docs/manifest-reference.md lists every key")),
     }
 }
 

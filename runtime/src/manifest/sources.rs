@@ -171,6 +171,15 @@ impl Sources {
         }
     }
 
+    /// Argument that states the value at `span`, as the user knows it; `None` if a file of the manifest states it.
+    pub fn argument(&self, span: &Range<usize>) -> Option<String> {
+        match &self.at(span.start).origin {
+            Origin::Override => Some(self.value(span)),
+            Origin::Argument(name) => Some((*name).to_owned()),
+            Origin::File(_) | Origin::Process => None,
+        }
+    }
+
     /// Place of the value of `--set` at `span`, as the user knows it.
     pub fn value_place(&self, span: &Range<usize>) -> String {
         let text = &self.at(span.start).text;
@@ -211,7 +220,7 @@ impl Sources {
     pub fn refused(&self, misread: Misread) -> Diagnostic {
         let help = match misread.error.meant() {
             Some(known) => format!("did you mean `{known}`?"),
-            None => "docs/manifest.md lists every key".to_owned(),
+            None => "docs/manifest-reference.md lists every key".to_owned(),
         };
         self.problem(&misread.span(), misread.error, help)
     }
@@ -295,6 +304,9 @@ mod tests {
         assert_eq!(message(6), "a.toml:2:1: no");
         assert_eq!(message(base), "b.toml:1:1: no");
         assert_eq!(message(base + 10), "b.toml:2:5: no");
-        assert_eq!(message(sources.last().base + 2), "a.toml: --set x=4: no");
+        let set = sources.last().base + 2;
+        assert_eq!(message(set), "a.toml: --set x=4: no");
+        assert_eq!(sources.argument(&(set..set)).as_deref(), Some("--set x=4"));
+        assert_eq!(sources.argument(&(base..base)), None, "a file states it");
     }
 }
