@@ -78,8 +78,9 @@ impl WrittenFiles {
         let wanted = tick.map_or_else(|| format!("before tick {now}"), |tick| format!("of tick {tick}"));
         let ticks: Vec<String> = all.iter().map(|written| written.tick.to_string()).collect();
         let known = match &ticks[..] {
-            [] => "it has written none".to_owned(),
-            ticks => format!("it has those of {}", ticks.join(", ")),
+            [] => "the run has written none".to_owned(),
+            [tick] => format!("the run has one of tick {tick}"),
+            ticks => format!("the run has those of the ticks {}", ticks.join(", ")),
         };
         Err(anyhow!(
             "there is no checkpoint of this run {wanted}: {known}; `run --checkpoint-every` and `ctl checkpoint` write them; \
@@ -318,7 +319,7 @@ mod tests {
     fn a_rewind_finds_what_this_run_has_written_and_not_left() {
         let files = WrittenFiles::default();
         let error = files.newest(None, 500).unwrap_err().to_string();
-        assert!(error.contains("before tick 500: it has written none"), "{error}");
+        assert!(error.contains("before tick 500: the run has written none"), "{error}");
         for tick in [100, 300, 500] {
             assert_eq!(files.add_planned(written(tick), 9, None), None);
         }
@@ -330,7 +331,7 @@ mod tests {
         files.go_back(200, &written(200).path);
         assert_eq!(newest(None, 900), written(200));
         let error = files.newest(Some(300), 900).unwrap_err().to_string();
-        assert!(error.contains("of tick 300: it has those of 100, 200;"), "{error}");
+        assert!(error.contains("of tick 300: the run has those of the ticks 100, 200;"), "{error}");
         // To a checkpoint that it has not written: the flight before it is another one.
         files.go_back(150, Path::new("other.ckpt"));
         assert_eq!(newest(None, 900).path, Path::new("other.ckpt"));

@@ -7,7 +7,7 @@ use crate::graph::Graph;
 use crate::host_world::store_files;
 use crate::manifest::Manifest;
 use crate::process_log;
-use crate::program::Program;
+use crate::program::{HOW_TO_JOIN, Program};
 use crate::role::Role;
 use crate::run_dir::shared_memory_of;
 use crate::spawn::{Started, start};
@@ -159,12 +159,10 @@ fn ask(manifest: &Manifest, exe: &Path, run_dir: &Path, asked: Asked<'_>) -> any
     let said = process_log::last_words(&log).join("\n  ");
     match ended {
         Some(status) => {
+            let no_part = format!("{HOW_TO_JOIN}; a program that takes no part is `lockstep = false`");
             let (said, help) = match said.is_empty() {
                 false => (format!("\n  {said}"), "correct the manifest or the program as its output says"),
-                true => (
-                    String::new(),
-                    "a program takes part in a run by the library of hummingbus; one that does not is `lockstep = false`",
-                ),
+                true => (String::new(), &*no_part),
             };
             let message = format!("{who} would not take part in a run: it ended with {status}{said}");
             let at = named_parameter(&message).unwrap_or_default().to_owned();

@@ -14,6 +14,10 @@ use std::time::Duration;
 /// takes microseconds.
 pub const WATCHDOG: Duration = Duration::from_secs(20);
 
+/// Advice on a program that does not join a run.
+pub(crate) const HOW_TO_JOIN: &str = "to join, a program calls `bus::run_process` or `bus::Node::join` in Rust, `hummingbus::Node` in C++ \
+                                      or `hummingbus.run_node` in Python";
+
 /// An executable behind a node.
 #[derive(Clone, Debug)]
 pub enum Executable {

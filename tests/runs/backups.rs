@@ -123,7 +123,7 @@ fn a_process_that_cannot_be_succeeded() {
         refused_with(&text.replace("\"controller\"", &format!("§\"{process}\"")))
     };
     of("contorller").says(&["there is no process `contorller`", "did you mean `controller`?"]);
-    of("recorder").says(&["`recorder` cannot be succeeded: it is the recorder, and its file would be torn"]);
+    of("recorder").says(&["`recorder` cannot be replaced: it is the recorder, and its file would be torn"]);
     let kept = |text: &str| refused_with(&format!("\n{text}"));
     let sink = table("sink", "inputs.input = \"/imu/imu\"\non_exit = §\"restart\"");
     kept(&sink).says(&["`on_exit` of `sink`: it has no outputs"]);
@@ -158,7 +158,7 @@ fn a_backup_that_would_not_fit_the_graph() {
     let ended = at_swap("kind = \"imu\"\ninputs = { state = \"/plant/state\" }");
     ended.says(&["the kind `imu` publishes `imu` [hummingbus_msgs/msg/Imu]"]);
     ended.says(&[
-        "`controller`, which it would succeed, publishes `command` [hummingbus_msgs/msg/MotorCommand]",
+        "`controller`, which it would replace, publishes `command` [hummingbus_msgs/msg/MotorCommand]",
     ]);
 }
 

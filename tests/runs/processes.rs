@@ -90,6 +90,7 @@ fn a_command_that_is_not_there_or_not_executable() {
     let text = place.write("text", "no program");
     let with = |word: &str| refused("kind = \"imu\"", &format!("command = §[{word:?}]"));
     with("./none").says(&["process `imu`: cannot start ", "/none: there is no such file", "relative"]);
+    with("./venv/bin/python").says(&["/venv/bin/python: there is no such file", "pip install", "README.md"]);
     with(&text).says(&["it is not executable", "chmod +x"]);
     with("no-such-program").says(&["cannot start `no-such-program`: no folder of PATH"]);
     with("").says(&["no folder of PATH"]);

@@ -30,7 +30,10 @@ fn a_run_that_went_back_flies_as_one_from_the_checkpoint_and_its_recording_says_
         let paused = ctl(&place, &run, &["status"])["tick"].as_u64().unwrap();
         let end = (paused / 100 + 2) * 100 + 37;
         ctl(&place, &run, &["step", &(end - paused).to_string()]);
-        refused(&["123"], "there is no checkpoint of this run of tick 123: it has those of 100, 200");
+        refused(
+            &["123"],
+            "there is no checkpoint of this run of tick 123: the run has those of the ticks 100, 200",
+        );
         let aside = place.path("a.rewind-1.mcap");
         if compose == "none" {
             fs::write(&aside, "a letter").unwrap();
@@ -46,7 +49,7 @@ fn a_run_that_went_back_flies_as_one_from_the_checkpoint_and_its_recording_says_
         let file = place.path("a.300.ckpt");
         let text = ctl(&place, &run, &["rewind", &file])["text"].as_str().unwrap().to_owned();
         assert_eq!(text, format!("rewound from tick {} to tick 300, where it is paused", end - 27));
-        refused(&["400"], "of tick 400: it has those of 100, 200, 300");
+        refused(&["400"], "of tick 400: the run has those of the ticks 100, 200, 300");
         refused(&[&place.path("a.400.ckpt")], "a rewind goes back");
         ctl(&place, &run, &["step", &(end - 300).to_string()]);
         ctl(&place, &run, &["stop"]);
@@ -116,8 +119,8 @@ fn a_checkpoint_of_another_run_is_refused() {
         place.start(&all).end_among_others().with_code(2).says(&[says]);
     };
     refused(&[&place.path("other.100.ckpt")], "other.100.ckpt is a checkpoint of another run");
-    refused(&[], "it has written none");
-    refused(&["100"], "it has written none");
+    refused(&[], "the run has written none");
+    refused(&["100"], "the run has written none");
     fs::write(place.path("letter.ckpt"), "a letter").unwrap();
     refused(&[&place.path("letter.ckpt")], "no checkpoint of hummingbus");
     // It flies on, and writes one itself.

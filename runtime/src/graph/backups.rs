@@ -113,10 +113,13 @@ impl Run<'_> {
         let at = |message: String, help: &str| Err(self.manifest.problem(&process.span(), message, help));
         let Some(node) = self.declared_nodes.iter().position(|declared| declared.name.get_ref() == name)
         else {
-            return at(format!("`{name}` takes no part in the ticks"), "only a node can be succeeded");
+            return at(
+                format!("`{name}` takes no part in the ticks"),
+                "only a process that takes part in the ticks can be replaced",
+            );
         };
         match irreplaceable(&self.declared_nodes[node], &self.plan.nodes[node]) {
-            Some(reason) => at(format!("`{name}` cannot be succeeded: {reason}"), "name another process"),
+            Some(reason) => at(format!("`{name}` cannot be replaced: {reason}"), "name another process"),
             None => Ok(node),
         }
     }
@@ -201,7 +204,7 @@ impl Run<'_> {
             if ports.is_empty() { "nothing".to_owned() } else { ports.join(", ") }
         };
         let message = format!(
-            "the kind `{}` publishes {}, but `{}`, which it would succeed, publishes {}",
+            "the kind `{}` publishes {}, but `{}`, which it would replace, publishes {}",
             kind.name,
             list(kind.outputs.iter().map(offered).collect()),
             self.plan.nodes[node].name,
@@ -232,7 +235,8 @@ impl Run<'_> {
             return Ok(());
         }
         let message = format!("the backup of `{}` has {found} inputs", plan.name);
-        let help = format!("it may have {most}: as many as the process it succeeds, or {INPUTS_RESERVED}");
+        let help =
+            format!("it may have {most}: as many as the process that it replaces, or {INPUTS_RESERVED}");
         Err(self.manifest.problem(span, message, help))
     }
 
@@ -279,7 +283,7 @@ impl Run<'_> {
     fn at_tick(&self, swap: &Spanned<SwapSetting>) -> Result<(u32, Range<usize>), Diagnostic> {
         let at = |span: Range<usize>, message: &str, help: &str| self.manifest.problem(&span, message, help);
         if swap.get_ref().shadow_ticks == 0 {
-            let help = "a backup computes at least one tick beside the process it succeeds";
+            let help = "a backup computes at least one tick beside the process that it replaces";
             return Err(at(swap.span(), "`shadow_ticks` is 0", help));
         }
         match (&swap.get_ref().at_tick, &swap.get_ref().at_s) {

@@ -130,20 +130,10 @@ fn input(
         let help = format!("wire a topic of {expected}");
         return Err(at(&["topic"], format!(" reads {expected}, {} carries {found}", setting.topic), help));
     }
-    if let Some((what, help)) = bad_delay(program, setting) {
-        let parts = ["delay_ticks", "initial"];
-        let is_set = manifest.sources.is_override(place(declared, port, &parts).start);
-        let help = match (setting.delay_ticks, &setting.initial) {
-            // The file has the other value: one more of `--set` cannot remove it.
-            (0, Some(_)) if is_set => {
-                let key = set_key(declared, port);
-                format!(
-                    "an input without delay has no initial value: set the whole input, {key}={}",
-                    setting.topic
-                )
-            }
-            _ => help.to_owned(),
-        };
+    let parts = ["delay_ticks", "initial"];
+    let is_set = manifest.sources.is_override(place(declared, port, &parts).start);
+    let set = is_set.then(|| format!("{}={}", set_key(declared, port), setting.topic));
+    if let Some((what, help)) = bad_delay(program, setting, set.as_deref()) {
         return Err(at(&parts, format!(" {what}"), help));
     }
     if let (Some(schema), Some(initial)) = (manifest.registry().message(found), &setting.initial) {
@@ -171,8 +161,9 @@ fn place(declared: &DeclaredNode<'_>, port: &Spanned<String>, parts: &[&str]) ->
     set.unwrap_or_else(|| port.span())
 }
 
-/// Fault in the delay and the initial value of an input, and advice.
-fn bad_delay(program: &Program, setting: &InputSetting) -> Option<(String, &'static str)> {
+/// Fault in the delay and the initial value of an input, and advice; `set` is the value of `--set` that states the whole input, if
+/// one changes a part of it.
+fn bad_delay(program: &Program, setting: &InputSetting, set: Option<&str>) -> Option<(String, String)> {
     let is_forwarded =
         program.component().is_some_and(|kind| matches!(kind.inputs, Inputs::Forwarded { .. }));
     let (what, help) = match (setting.delay_ticks, &setting.initial) {
@@ -183,15 +174,25 @@ fn bad_delay(program: &Program, setting: &InputSetting) -> Option<(String, &'sta
         ),
         (0, None) | (1, Some(_)) => return None,
         (0, Some(_)) => {
-            ("has an initial value but no delay", "add delay_ticks = 1, or leave the initial value out")
+            let what = "has an initial value but no delay".to_owned();
+            // The file may state the other part, which `--set` alone cannot remove.
+            let help = match set {
+                Some(set) => {
+                    format!("an input without delay has no initial value: set the whole input, {set}")
+                }
+                None => "add delay_ticks = 1, or leave the initial value out".to_owned(),
+            };
+            return Some((what, help));
         }
         (1, None) => (
             "is delayed and has no initial value",
             "state what it reads at tick 0, such as initial = { command = [1, 1, 1, 1] }",
         ),
-        (delay, _) => return Some((format!("has delay_ticks = {delay}"), "a delay is 0 or 1 tick")),
+        (delay, _) => {
+            return Some((format!("has delay_ticks = {delay}"), "a delay is 0 or 1 tick".to_owned()));
+        }
     };
-    Some((what.to_owned(), help))
+    Some((what.to_owned(), help.to_owned()))
 }
 
 /// The type that a built-in node reads on `port`; `None` if it reads any.

@@ -205,7 +205,12 @@ fn command(
 /// Reason why a file cannot be executed, and advice.
 fn objection(path: &Path) -> Option<(&'static str, &'static str)> {
     if !path.is_file() {
-        let help = "build it, or correct the path, which is relative to the manifest";
+        let help = if is_python_of_environment(path) {
+            "make this Python environment and install hummingbus into it: README.md of the project has the lines with \
+             `python3 -m venv` and `pip install`, and so has docs/python.md"
+        } else {
+            "build it, or correct the path, which is relative to the manifest"
+        };
         Some(("there is no such file", help))
     } else if !is_executable(path) {
         Some(("it is not executable", "make it so with chmod +x"))
@@ -216,6 +221,12 @@ fn objection(path: &Path) -> Option<(&'static str, &'static str)> {
     } else {
         None
     }
+}
+
+/// True for the interpreter of a Python environment, such as `venv/bin/python`.
+fn is_python_of_environment(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    name.starts_with("python") && path.parent().is_some_and(|folder| folder.ends_with("bin"))
 }
 
 /// True if no kernel can execute the file: it is text that does not begin with `#!`. The C library would pass any

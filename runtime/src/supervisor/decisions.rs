@@ -1,6 +1,6 @@
 //! Decisions about the end of a process: they follow from observations, and touch no process.
 
-use crate::program::OnExit;
+use crate::program::{HOW_TO_JOIN, OnExit};
 use crate::role::Role;
 use crate::supervisor::replacement::{InstanceRole, Replacements, Stage};
 use crate::supervisor::state_machine::{Action, Event, State};
@@ -16,6 +16,8 @@ pub struct Death {
     pub role: Role,
     /// Description of its end, with the last lines that it wrote.
     pub message: String,
+    /// True if it ended with exit code 0.
+    pub is_success: bool,
 }
 
 /// A failure that ends the run at once.
@@ -125,7 +127,10 @@ impl<'a> Decisions<'a> {
                 if self.tell(Event::BackupFailed) == Action::Refuse {
                     let tick = self.replacements.view.slots[self.plan.slot(node, generation)].done;
                     let reason = match self.replacements.stage(node) {
-                        Some(Stage::Starting) => format!("{} (it had not joined yet)", death.message),
+                        Some(Stage::Starting) => {
+                            let how = self.how_to_join(node, generation, death);
+                            format!("{} (it had not joined yet{how})", death.message)
+                        }
                         _ => format!("{} (it had come to tick {tick})", death.message),
                     };
                     self.refuse(node, reason)?;
@@ -134,6 +139,12 @@ impl<'a> Decisions<'a> {
             }
             InstanceRole::Primary => self.settle_primary(node, generation, death),
         }
+    }
+
+    /// Advice on a program that ended with exit code 0 before it joined; empty for any other end.
+    fn how_to_join(&self, node: usize, generation: u32, death: &Death) -> String {
+        let is_command = self.replacements.program_of(node, generation).kind().is_none();
+        if death.is_success && is_command { format!("; {HOW_TO_JOIN}") } else { String::new() }
     }
 
     /// True if a process had completed its last tick when it died, and its node's policy allows the run to go on.
@@ -220,7 +231,9 @@ impl<'a> Decisions<'a> {
                     OnExit::Standby => ": no standby was ready to take over",
                 };
                 let silent = silent_topics(&self.plan.nodes[node], self.plan);
-                let message = format!("{}\nThe run was aborted at tick {tick}{silent}{why}", death.message);
+                let how = if flies { String::new() } else { self.how_to_join(node, generation, death) };
+                let message =
+                    format!("{}\nThe run was aborted at tick {tick}{silent}{why}{how}", death.message);
                 return Err(Abort { process: self.plan.nodes[node].name.clone(), message });
             }
         }
@@ -232,9 +245,8 @@ impl<'a> Decisions<'a> {
     pub fn note_laggards(&mut self) {
         if let Some((node, generation)) = self.replacements.unprepared() {
             let patience = self.replacements.program_of(node, generation).watchdog.as_millis();
-            let message = format!(
-                "was killed by the watchdog: it did not join within {patience} ms; does it link `bus` and connect?"
-            );
+            let message =
+                format!("was killed by the watchdog: it did not join within {patience} ms; {HOW_TO_JOIN}");
             self.replacements.view.kill_for(node, generation, message);
         }
         if let Some((node, generation)) = self.replacements.lingering() {

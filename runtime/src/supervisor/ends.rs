@@ -20,7 +20,7 @@ impl<W: World> Supervisor<'_, W> {
                 continue;
             }
             let message = self.processes.running[index].post_mortem();
-            let settled = self.decisions.settle(&Death { name, role, message });
+            let settled = self.decisions.settle(&Death { name, role, message, is_success: succeeded });
             if self.follow(settled)?
                 && let Some(process) = self.processes.running.get_mut(index)
                 && process.role == role

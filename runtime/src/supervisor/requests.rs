@@ -14,6 +14,12 @@ const SHADOW_TICKS: u32 = 100;
 /// Swaps that are taken a look at most, for the supervisor has more to look after.
 const MAX_SWAPS_A_LOOK: usize = 16;
 
+/// Least tick of a take-over by a backup that joins behind tick `granted` and shadows for `shadow_ticks`: a multiple of `stride`.
+fn least_tick(granted: u32, shadow_ticks: u32, stride: u32) -> u64 {
+    let first = u64::from(granted) + u64::from(shadow_ticks) + 1;
+    first.next_multiple_of(u64::from(stride.max(1)))
+}
+
 /// The answer to a swap that has ended.
 fn answer(report: &Report) -> Answer {
     match (&report.refused, report.take_over_tick) {
@@ -91,17 +97,27 @@ impl<W: World> Supervisor<'_, W> {
     ) -> Result<()> {
         let View { granted, end_tick: end, .. } = self.decisions.replacements.view;
         let join = tick.saturating_sub(shadow_ticks);
-        if join <= granted || tick >= end {
+        let (period, stride) = (backup.plan.period_ticks, take_over_stride(self.plan, backup.node));
+        let advice = match least_tick(granted, shadow_ticks, stride) {
+            least if least >= u64::from(end) => "no tick is left: lower --shadow-ticks".to_owned(),
+            _ if !shadow_ticks.is_multiple_of(period) => {
+                format!("choose --shadow-ticks as a multiple of {period}")
+            }
+            least => format!("the least tick that works now is {least}"),
+        };
+        if tick >= end {
+            bail!("tick {tick} is not within the run, which has {end} ticks; {advice}");
+        }
+        if join <= granted {
             bail!(
                 "tick {tick} less {shadow_ticks} ticks of shadowing is not ahead of the run, which has granted \
-                 {granted} of {end} ticks"
+                 {granted} of {end} ticks; {advice}"
             );
         }
-        let (period, stride) = (backup.plan.period_ticks, take_over_stride(self.plan, backup.node));
         if !tick.is_multiple_of(stride) || !join.is_multiple_of(period) {
             bail!(
                 "`{process}` sends every {stride} and computes every {period} ticks: let it take over at a multiple \
-                 of the first and join at one of the second"
+                 of the first and join at one of the second; {advice}"
             );
         }
         Ok(())
@@ -121,5 +137,18 @@ impl<W: World> Supervisor<'_, W> {
             }
             _ => Ok(()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::least_tick;
+
+    #[test]
+    fn the_least_tick_is_the_first_multiple_whose_backup_can_join() {
+        assert_eq!(least_tick(300, 100, 1), 401);
+        assert_eq!(least_tick(300, 100, 5), 405);
+        assert_eq!(least_tick(299, 100, 5), 400);
+        assert_eq!(least_tick(u32::MAX, 1, 1), u64::from(u32::MAX) + 2);
     }
 }
