@@ -31,7 +31,7 @@ pub struct Base {
     pub verdicts: Vec<String>,
     /// Indices of the figures that table and report keep.
     pub kept: Vec<usize>,
-    /// Digest of all texts and files, and of the meaning of the varied values.
+    /// Digest of all texts and files that a flight depends on, and of the meaning of the varied values.
     pub fingerprint: String,
     /// Declared numbers by key: the manifest is not read again for each flight.
     declared: Mutex<BTreeMap<String, Option<f64>>>,
@@ -161,7 +161,7 @@ fn kept(campaign: &Campaign, figures: &[String]) -> Result<Vec<usize>, Diagnosti
 
 /// Digest of everything but the drawn numbers that a row depends on.
 fn fingerprint(campaign: &Campaign, manifest: &Manifest, from: Option<&Checkpoint>, graph: &Graph) -> String {
-    let texts: Vec<&str> = manifest.texts().collect();
+    let texts: Vec<&str> = manifest.simulated_texts().collect();
     // Each node lists the files that it reads.
     let files: Vec<&str> =
         graph.plan.nodes.iter().flat_map(|node| &node.files).map(|file| file.sha256.as_str()).collect();

@@ -3,7 +3,7 @@
 use crate::declaration::Meaning;
 use crate::distribution::Distribution;
 use diagnostics::ParameterError;
-use std::path::Path;
+use std::path::{Component, Path, PathBuf};
 use std::str::FromStr;
 
 /// Expected text of an argument.
@@ -101,9 +101,37 @@ pub fn text(from: &Path, flights: u64, set: &[String], vary: &[Vary]) -> Result<
     Ok(text)
 }
 
+/// Path of the checkpoint `from` as a campaign file in `folder` names it, so that both can be moved together. It is absolute if the
+/// two have no folder in common but the root.
+#[must_use]
+pub fn from_folder(from: &Path, folder: &Path) -> PathBuf {
+    let (Some(from_real), Some(folder)) = (real_place(from), real(folder)) else { return from.to_owned() };
+    let common = from_real.components().zip(folder.components()).take_while(|(a, b)| a == b).count();
+    if common <= 1 {
+        return from.to_owned();
+    }
+    let up = folder.components().skip(common).map(|_| Component::ParentDir);
+    up.chain(from_real.components().skip(common)).collect()
+}
+
+/// The file at `path` in the folder that links lead to: the file itself may be a link.
+fn real_place(path: &Path) -> Option<PathBuf> {
+    Some(real(path.parent()?)?.join(path.file_name()?))
+}
+
+/// The folder at `path` without links, as far as it exists; `None` if it has steps up where it does not.
+fn real(path: &Path) -> Option<PathBuf> {
+    let path = std::path::absolute(path).ok()?;
+    let (known, rest) = path
+        .ancestors()
+        .find_map(|folder| Some((folder.canonicalize().ok()?, path.strip_prefix(folder).ok()?)))?;
+    let has_steps_up = rest.components().any(|part| part == Component::ParentDir);
+    (!has_steps_up).then(|| known.join(rest))
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{Vary, text};
+    use super::{Vary, from_folder, text};
     use crate::declaration::{Campaign, Meaning};
     use crate::distribution::Distribution;
 
@@ -127,6 +155,25 @@ mod tests {
         assert_eq!(found, expected);
         assert_eq!(campaign.vary[0].distribution, Distribution::LogUniform([0.5, 2.0]));
         assert_eq!(campaign.vary[2].distribution, Distribution::Values(vec![3.0, 4.0, 5.0].into()));
+    }
+
+    #[test]
+    fn a_checkpoint_is_named_from_the_folder_of_the_campaign() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |path: &str| folder.path().join(path);
+        std::fs::create_dir(at("runs")).unwrap();
+        std::os::unix::fs::symlink(at("runs"), at("link")).unwrap();
+        // Folders that are there, that are not, and behind a link.
+        for (from, out, expected) in [
+            ("a.ckpt", "", "a.ckpt"),
+            ("a.ckpt", "a.fork", "../a.ckpt"),
+            ("runs/a.ckpt", "out/x", "../../runs/a.ckpt"),
+            ("link/a.ckpt", "runs/a.fork", "../a.ckpt"),
+        ] {
+            assert_eq!(from_folder(&at(from), &at(out)).to_str(), Some(expected), "{from} of {out}");
+        }
+        let elsewhere = from_folder("/none/a.ckpt".as_ref(), &at("out"));
+        assert_eq!(elsewhere.to_str(), Some("/none/a.ckpt"));
     }
 
     #[test]

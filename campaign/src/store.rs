@@ -92,7 +92,8 @@ impl Header {
         let same_build = |found: Self| Self { build: self.build.clone(), ..found };
         if serde_json::from_value::<Self>(found).ok().map(same_build).as_ref() != Some(self) {
             bail!(
-                "its flights were flown of other inputs; choose another --out, or remove the file to fly them again"
+                "its flights were flown with other inputs: the manifest, a file that it reads, a value of `set` or the checkpoint has \
+                 changed since; choose another --out, or remove the file to fly all flights again"
             );
         }
         Ok(())
@@ -112,7 +113,7 @@ impl Store {
     /// Opens or makes `folder` for `campaign`: its plan, which is written if it is not there, and the rows flown so far.
     ///
     /// # Errors
-    /// If another campaign uses the folder, it holds something else, or its flights were flown of other inputs.
+    /// If another campaign uses the folder, it holds something else, or its flights were flown with other inputs.
     pub fn open(
         folder: &Path,
         campaign: &Campaign,
@@ -333,7 +334,7 @@ mod tests {
         assert_eq!(flown.into_values().collect::<Vec<_>>(), [row(1, 1.0)]);
         drop(store);
         let error = format!("{:#}", open("b").unwrap_err());
-        assert!(error.contains("flown of other inputs"), "{error}");
+        assert!(error.contains("flown with other inputs"), "{error}");
         let error = format!(
             "{:#}",
             Store::open(folder.path(), &campaign, &header("2", "a"), Builds::Same).unwrap_err()

@@ -27,6 +27,8 @@ const MARK: &[u8] = b"hummingbus checkpoint ";
 const START: &[u8] = b"hummingbus checkpoint 3\n";
 /// Characters of a SHA-256 in hexadecimal, which the file ends with.
 const SUM_BYTES: usize = 64;
+/// Ending of the name of a file.
+const ENDING: &str = "ckpt";
 /// The largest file that is read.
 const BYTES_MAX: u64 = 4 << 30;
 /// The version of the program that goes on from a checkpoint must be that which has written it.
@@ -103,7 +105,7 @@ impl Checkpoint {
     pub fn read(path: &Path) -> Result<Self, Error> {
         let about = || format!("cannot go on from {}", path.display());
         let mut bytes = Vec::new();
-        let mut file = std::fs::File::open(path).with_context(about)?;
+        let mut file = std::fs::File::open(path).map_err(|error| missing(path, error)).with_context(about)?;
         // Of a file that is not a checkpoint only the beginning is read.
         (&mut file).take(START.len() as u64).read_to_end(&mut bytes).with_context(about)?;
         if bytes == START {
@@ -218,13 +220,14 @@ impl Checkpoint {
         fork::require_effective(before, &manifest, self.tick()).map(|()| manifest)
     }
 
-    /// SHA-256 of its content.
+    /// SHA-256 of its content, without the values of `--set` that change no byte of a recording.
     ///
     /// # Panics
     /// Never: its types serialise.
     #[must_use]
     pub fn sha256(&self) -> String {
-        let bytes = postcard::to_stdvec(self);
+        let overrides = self.overrides.iter().filter(|text| Manifest::is_of_simulation(text));
+        let bytes = postcard::to_stdvec(&Self { overrides: overrides.cloned().collect(), ..self.clone() });
         sha256(&bytes.unwrap_or_else(|error| unreachable!("its types serialise: {error}")))
     }
 
@@ -467,6 +470,40 @@ pub(crate) fn path(stem: &Path, tick: u32) -> PathBuf {
     stem.with_file_name(name)
 }
 
+/// Folder of manifests in a project, beside which their runs write.
+const MANIFESTS: &str = "manifests";
+/// Checkpoints that a message names at most.
+const NAMED_MAX: usize = 5;
+
+/// The error of a checkpoint at `path` that cannot be opened; if there is no such file, with the checkpoints near it.
+fn missing(path: &Path, error: std::io::Error) -> std::io::Error {
+    if error.kind() != std::io::ErrorKind::NotFound {
+        return error;
+    }
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut known = [checkpoints_in(folder), checkpoints_in(&folder.join(MANIFESTS))].concat();
+    known.sort();
+    let mut named: Vec<String> =
+        known.iter().take(NAMED_MAX).map(|path| path.display().to_string()).collect();
+    if known.len() > NAMED_MAX {
+        named.push(format!("{} more", known.len() - NAMED_MAX));
+    }
+    let advice = match &named[..] {
+        [] => "`run --checkpoint-every 1s` and `ctl checkpoint` write checkpoints".to_owned(),
+        [one] => format!("the checkpoint near it is {one}"),
+        [most @ .., last] => format!("the checkpoints near it are {} and {last}", most.join(", ")),
+    };
+    std::io::Error::new(error.kind(), format!("there is no such file; {advice}"))
+}
+
+/// The files in `folder` that are called like checkpoints.
+fn checkpoints_in(folder: &Path) -> Vec<PathBuf> {
+    let read = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let entries = std::fs::read_dir(read).into_iter().flatten().flatten();
+    let paths = entries.map(|entry| folder.join(entry.file_name()));
+    paths.filter(|path| path.extension().is_some_and(|ending| ending == ENDING)).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::{Checkpoint, START, VERSION, path, sha256};
@@ -487,6 +524,37 @@ mod tests {
             tick_ns: 1_000_000,
             parts: Parts { tick: 6500, nodes },
         }
+    }
+
+    #[test]
+    fn a_checkpoint_that_is_not_there_is_refused_with_those_that_are() {
+        let folder = tempfile::tempdir().unwrap();
+        let error = |path: &str| Checkpoint::read(&folder.path().join(path)).unwrap_err().with_causes();
+        let found = error("b.ckpt");
+        assert!(found.contains("there is no such file; `run --checkpoint-every 1s`"), "{found}");
+        std::fs::create_dir(folder.path().join("manifests")).unwrap();
+        for name in ["a.100.ckpt", "a.mcap", "manifests/c.9.ckpt"] {
+            std::fs::write(folder.path().join(name), "").unwrap();
+        }
+        let found = error("b.ckpt");
+        let listed = ["a.100.ckpt", "manifests/c.9.ckpt"].map(|name| folder.path().join(name));
+        let listed = format!("near it are {} and {}", listed[0].display(), listed[1].display());
+        assert!(found.ends_with(&listed), "{found}");
+        for tick in 10..20 {
+            std::fs::write(folder.path().join(format!("a.{tick}.ckpt")), "").unwrap();
+        }
+        assert!(error("b.ckpt").ends_with(" and 7 more"), "{}", error("b.ckpt"));
+    }
+
+    #[test]
+    fn the_digest_leaves_out_values_that_change_no_recording() {
+        let set = |text: &str| {
+            let mut changed = checkpoint();
+            changed.overrides.push(text.to_owned());
+            changed.sha256()
+        };
+        assert_eq!(set("run.checkpoint_keep=5"), checkpoint().sha256());
+        assert_ne!(set("run.duration_s=5"), checkpoint().sha256());
     }
 
     #[test]

@@ -43,7 +43,7 @@ use diagnostics::parameter::FileFault;
 use diagnostics::{Diagnostic, Misread, ParameterError, Place, read_tree};
 use file_edits::FileEdit;
 use inputs::InputFiles;
-use sources::{Origin, Sources};
+use sources::{Origin, Source, Sources};
 use std::fmt::Display;
 use std::ops::{Range, RangeInclusive};
 use std::path::{Path, PathBuf};
@@ -169,9 +169,14 @@ impl Manifest {
         Ok(file_edits::number(files, key, find).or_else(|| tree::number(tree, key)))
     }
 
-    /// The texts that this manifest is made of: its own file, those that it includes, and the values of `--set`.
-    pub fn texts(&self) -> impl Iterator<Item = &str> {
-        self.sources.all.iter().map(|source| source.text.as_str())
+    /// The texts that a recording depends on: the manifest's own file, those that it includes, and the values of `--set` without those
+    /// that change no byte of a recording.
+    pub fn simulated_texts(&self) -> impl Iterator<Item = &str> {
+        let is_of_host = |source: &Source| {
+            matches!(source.origin, Origin::Override) && !Self::is_of_simulation(&source.text)
+        };
+        let simulated = self.sources.all.iter().filter(move |source| !is_of_host(source));
+        simulated.map(|source| source.text.as_str())
     }
 
     fn of(path: PathBuf, sources: Sources) -> Result<Self, Diagnostic> {

@@ -87,8 +87,8 @@ pub struct Flying {
     pub text: String,
     /// Folder for the plan, the flights and the report.
     pub folder: PathBuf,
-    /// True if the text is to be written to the path, which lies in the folder.
-    pub is_made: bool,
+    /// Text that is to be written to the path, which lies in the folder; `None` if the user wrote the file.
+    pub made: Option<String>,
     /// Engine that flies.
     pub engine: EngineArguments,
     /// Condition for exit code 0.
@@ -121,7 +121,7 @@ pub fn campaign(arguments: &CampaignArguments) -> Result<bool> {
     let engine = arguments.engine.clone();
     let builds = if arguments.fly.is_some() { Builds::Any } else { Builds::Same };
     let opened =
-        Opened::new(Flying { path, text, folder, is_made: false, engine, require, json, quiet }, builds)?;
+        Opened::new(Flying { path, text, folder, made: None, engine, require, json, quiet }, builds)?;
     if arguments.plan_only {
         let path = opened.0.flying.folder.join(PLAN);
         let planned = flights(opened.0.plan.flights.len() as u64);
@@ -193,8 +193,8 @@ impl Opened {
             require_flyable(&campaign, &base, &Plan::of(&campaign))?;
         }
         let (store, plan, flown) = Store::open(folder, &campaign, &header, builds)?;
-        if let (true, Some(name)) = (flying.is_made, path.file_name().and_then(|name| name.to_str())) {
-            store.write(name, |file| Ok(file.write_all(text.as_bytes())?))?;
+        if let (Some(made), Some(name)) = (&flying.made, path.file_name().and_then(|name| name.to_str())) {
+            store.write(name, |file| Ok(file.write_all(made.as_bytes())?))?;
         }
         Ok((Self { flying, campaign, base, build: header.build, store, plan }, flown))
     }

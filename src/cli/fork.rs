@@ -3,11 +3,11 @@
 use super::campaign::{self, Flying};
 use super::campaign_engine::EngineArguments;
 use super::run::{RunArguments, fly};
-use ::campaign::fork::{Vary, text};
+use ::campaign::fork::{Vary, from_folder, text};
 use ::campaign::requirement::Requirement;
 use anyhow::{Context, Result};
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// The campaign file in the folder.
 const FILE: &str = "campaign.toml";
@@ -31,7 +31,7 @@ struct ForkArguments {
         requires = "from",
         value_parser = clap::value_parser!(u64).range(1..=::campaign::declaration::FLIGHTS_MAX),
         conflicts_with_all = [
-            "record", "pace", "window", "compose", "in_process", "checkpoint_every", "view", "foxglove", "quiet",
+            "record", "pace", "window", "compose", "in_process", "checkpoint_every", "view", "foxglove",
         ]
     )]
     fork: Option<u64>,
@@ -60,11 +60,13 @@ pub fn run(arguments: &RunOrForkArguments) -> Result<bool> {
     let from = run.from.as_ref().context("--fork flies from a checkpoint on: name it with --from")?;
     let folder = fork.out.clone().unwrap_or_else(|| from.with_extension("fork"));
     let from = std::path::absolute(from).with_context(|| format!("{} is not a path", from.display()))?;
+    let text = |from: &Path| text(from, flights, &run.set, &fork.vary);
     campaign::fly(Flying {
         path: folder.join(FILE),
-        text: text(&from, flights, &run.set, &fork.vary)?,
+        // The folder need not be there yet, and a path through it would lead nowhere.
+        text: text(&from)?,
+        made: Some(text(&from_folder(&from, &folder))?),
         folder,
-        is_made: true,
         engine: EngineArguments::local(fork.workers),
         require: fork.require,
         json: run.json,

@@ -43,7 +43,8 @@ pub struct RunArguments {
     /// Newest checkpoints that are kept.
     #[arg(long, value_name = "NUMBER", requires = "checkpoint_every")]
     pub keep: Option<u32>,
-    /// File to record to, or none; beside the manifest, named like it, where absent.
+    /// File to record to, or none; beside the manifest, named like it, where absent. With --from that name ends in
+    /// .from-TICK.mcap, and a later run from the same tick replaces the file.
     #[arg(long, value_name = "PATH")]
     pub record: Option<PathBuf>,
     /// free, realtime, or simulated seconds per second.
@@ -81,7 +82,7 @@ pub struct RunArguments {
     /// Print the summary as JSON, and no progress.
     #[arg(long)]
     pub json: bool,
-    /// Print no progress, and a summary only if the run did not pass.
+    /// Print no progress, and a summary only if the run did not pass; with --fork, print no progress.
     #[arg(short, long, conflicts_with = "json")]
     pub quiet: bool,
 }

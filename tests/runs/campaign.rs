@@ -108,7 +108,7 @@ fn an_edited_vehicle_file_is_refused_in_a_folder_of_the_old_one() {
     let folder = place.path("out");
     place.call(&["campaign", &campaign, "--out", &folder]).with_code(0);
     place.write("v.toml", vehicle.replace("value = 0.480", "value = 0.500"));
-    place.call(&["campaign", &campaign, "--out", &folder]).with_code(2).says(&["flown of other inputs"]);
+    place.call(&["campaign", &campaign, "--out", &folder]).with_code(2).says(&["flown with other inputs"]);
 }
 
 #[test]
@@ -280,5 +280,5 @@ fn what_cannot_be_flown_at_all_is_refused_before_the_first_flight() {
     let folder = place.path("other");
     place.call(&["campaign", &campaign, "--out", &folder]).with_code(0);
     let campaign = written(&place, "c.toml", &HOVERS.replace("0.4\"", "0.5\""));
-    place.call(&["campaign", &campaign, "--out", &folder]).with_code(2).says(&["flown of other inputs"]);
+    place.call(&["campaign", &campaign, "--out", &folder]).with_code(2).says(&["flown with other inputs"]);
 }

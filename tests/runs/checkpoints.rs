@@ -469,6 +469,12 @@ fn what_does_not_fit_is_refused_in_words() {
     refused(&["--set", "run.rate_hz=500"], &["a tick of the checkpoint is 1000000 ns"]);
     refused(&[&manifest], &["cannot be used with"]);
     place.call(&["run", &file]).with_code(2).says(&["a.500.ckpt", "with --from"]);
+    let absent = ["run", "--from", &place.path("a.600.ckpt")];
+    place.call(&absent).with_code(2).says(&[
+        "a.600.ckpt",
+        "no such file; the checkpoint near it is ",
+        "a.500.ckpt",
+    ]);
     let named = ["m.toml", "at tick 500 (0.500 s), not a recording", "run --from"];
     place.call(&["cat", &file]).with_code(2).says(&named);
 

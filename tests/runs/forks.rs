@@ -102,13 +102,30 @@ fn a_fork_is_a_campaign_that_goes_on_where_it_was_cut_off() {
     let again =
         place.call(&["campaign", &file, "--out", &folder, "--fly", "2", "--json"]).with_code(0).json();
     assert_eq!(figures(&again), row_figures(&flown[2]));
-    fork(&["--require", "pass_rate >= 0.9 at 95 %"]).with_code(1).says(&["not met"]);
-    // Another checkpoint is another campaign.
+    let quiet = fork(&["--quiet", "--require", "pass_rate >= 0.9 at 95 %"]).with_code(1);
+    quiet.says(&["not met"]);
+    // The folder and the checkpoint may be moved together.
+    let text = fs::read_to_string(&file).unwrap();
+    assert!(text.starts_with("from = \"../a.1200.ckpt\"\n"), "{text}");
+    let moved = place.path("moved");
+    fs::create_dir(&moved).unwrap();
+    let names = ["a.1200.ckpt", "a.1200.fork"];
+    names.iter().for_each(|name| fs::rename(place.path(name), format!("{moved}/{name}")).unwrap());
+    let file = format!("{moved}/a.1200.fork/campaign.toml");
+    let folder = format!("{moved}/a.1200.fork");
+    place.call(&["campaign", &file, "--out", &folder]).with_code(0).prints(&["4 of 4"]);
+    names.iter().for_each(|name| fs::rename(format!("{moved}/{name}"), place.path(name)).unwrap());
+    // The number of checkpoints that are kept changes no flight.
     let manifest = place.path("m.toml");
+    let args = ["run", &manifest, "--record", &place.path("a.mcap"), "--in-process"];
+    let set = ["--set", "run.duration_s=1.4", "--checkpoint-every", "1200ms", "--keep", "2"];
+    place.call(&[&args[..], &set].concat()).flown();
+    fork(&[]).with_code(0).prints(&["4 of 4"]);
+    // Another checkpoint is another campaign.
     let args = ["run", &manifest, "--record", &place.path("a.mcap"), "--in-process", "--set", "run.seed=5"];
     let set = ["--set", "run.duration_s=1.4", "--checkpoint-every", "1200ms"];
     place.call(&[&args[..], &set].concat()).flown();
-    fork(&[]).with_code(2).says(&["flown of other inputs"]);
+    fork(&[]).with_code(2).says(&["flown with other inputs"]);
 }
 
 #[test]
