@@ -93,6 +93,11 @@ fn note_filled(flight: &mut Flight, filled: &Filled) {
     ];
     for (stretches, kind) in kinds.into_iter().filter(|(stretches, _)| !stretches.is_empty()) {
         let count: usize = stretches.iter().map(|(from, to)| to + 1 - from).sum();
+        let verb = if count == 1 { "was" } else { "were" };
+        let all = match stretches.len() {
+            1 => "1 stretch".to_owned(),
+            several => format!("{several} stretches"),
+        };
         let one = |(from, to): &Stretch| format!("{:.2} s to {:.2} s", time_s[*from], time_s[*to]);
         let named: Vec<String> = stretches.iter().take(NAMED).map(one).collect();
         let more = match stretches.len().saturating_sub(NAMED) {
@@ -100,9 +105,8 @@ fn note_filled(flight: &mut Flight, filled: &Filled) {
             more => format!(" and {more} more"),
         };
         flight.notes.push(format!(
-            "command: {count} of {} samples in {} stretches were filled in by an exporter: {kind}; from {}{more}; left out",
+            "command: {count} of {} samples in {all} {verb} filled in by an exporter: {kind}; from {}{more}; left out",
             time_s.len(),
-            stretches.len(),
             named.join(", from ")
         ));
     }

@@ -122,7 +122,7 @@ fn commands_that_an_exporter_filled_in_are_a_gap_and_noted() {
     for (flight, kind) in [(zeros, "zeros, before"), (merged(line), "straight lines of all rotors")] {
         let note =
             flight.notes.iter().find(|note| note.contains("filled in by an exporter")).expect("a note");
-        for part in ["100 of 1001 samples in 1 stretches", kind, "from 3.00 s to 3.99 s"] {
+        for part in ["100 of 1001 samples in 1 stretch were filled in", kind, "from 3.00 s to 3.99 s"] {
             assert!(note.contains(part), "no {part:?} in {note}");
         }
         assert_eq!(flight.command.time_s.len(), 901);

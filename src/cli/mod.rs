@@ -44,8 +44,9 @@ mod validate;
 mod view;
 
 use anyhow::Result;
+use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory as _, Parser, Subcommand};
-use diagnostics::plain;
+use diagnostics::{nearest, plain};
 use output::{print_error, print_error_json, readable, say};
 use std::process::ExitCode;
 use table::commands;
@@ -153,7 +154,10 @@ commands! {
 pub fn main() -> ExitCode {
     let command = match Cli::try_parse() {
         Ok(cli) => cli.command,
-        Err(error) => return refuse(&error),
+        Err(mut error) => {
+            suggest_command(&mut error);
+            return refuse(&error);
+        }
     };
     if !matches!(command, Command::Node(_)) {
         inherited::forget();
@@ -176,6 +180,23 @@ fn print_completions(arguments: &completions::CompletionsArguments) -> Result<bo
 
 fn write_manual(arguments: &completions::ManArguments) -> Result<bool> {
     completions::write_manual(arguments, Cli::command())
+}
+
+/// Adds the command that was probably meant, if clap has no suggestion: it knows none that is near to a word of two letters.
+fn suggest_command(error: &mut clap::Error) {
+    let Some(ContextValue::String(found)) = error.get(ContextKind::InvalidSubcommand) else { return };
+    // The commands within another one are not among those here.
+    let is_first =
+        std::env::args_os().nth(1).is_some_and(|argument| argument.to_str() == Some(found.as_str()));
+    if !is_first || error.get(ContextKind::SuggestedSubcommand).is_some() {
+        return;
+    }
+    let command = Cli::command();
+    let shown = command.get_subcommands().filter(|command| !command.is_hide_set());
+    let near = nearest(found, shown.map(clap::Command::get_name)).map(str::to_owned);
+    if let Some(near) = near {
+        error.insert(ContextKind::SuggestedSubcommand, ContextValue::Strings(vec![near]));
+    }
 }
 
 /// Prints help, the version, or the reason why the arguments are refused. A shell's `*` makes arguments of any names.

@@ -424,6 +424,19 @@ fn what_is_no_recording_is_refused() {
 }
 
 #[test]
+fn a_misspelt_command_is_answered_with_the_near_one() {
+    let place = Place::new();
+    for (found, meant) in [("rn", "run"), ("vaildate", "validate")] {
+        let unknown = format!("unrecognized subcommand '{found}'");
+        let tip = format!("a similar subcommand exists: '{meant}'");
+        place.call(&[found]).with_code(2).says(&[&unknown, &tip]);
+    }
+    // Those of another command are not confused with these.
+    let ended = place.call(&["ctl", "rn"]).with_code(2);
+    assert!(!ended.error.contains("'run'"), "{ended}");
+}
+
+#[test]
 fn every_subcommand_shows_an_example() {
     let place = Place::new();
     for command in ["run", "check", "diff", "cat", "schema"] {

@@ -198,11 +198,12 @@ fn a_live_swap_that_cannot_be_is_refused_and_the_run_flies_on() {
     let run = place.run_id();
     let not_a_program = place.write("not-a-program", "");
     fs::set_permissions(&not_a_program, std::os::unix::fs::PermissionsExt::from_mode(0o755)).unwrap();
-    let cases: [(&[&str], &str); 6] = [
+    let cases: [(&[&str], &str); 7] = [
         (
             &["--with", "command = [\"/bin/true\"]"],
             "exit code 0 before the run did (it had not joined yet; to join, a program calls",
         ),
+        (&["--with", "kind = \"lqr\""], "--with keeps the inputs: write those of `lqr` as inputs = {"),
         (&["--at-tick", "5"], "is not ahead of the run, which has granted"),
         (&["--at-tick", "5"], "the least tick that works now is"),
         (&["--with", &format!("command = [{not_a_program:?}]")], "cannot start"),
