@@ -177,6 +177,13 @@ fn files_that_a_new_project_names_exist_and_no_placeholder_is_left() {
         let rows: Vec<_> =
             readme.lines().filter_map(|line| line.strip_prefix("| `")?.split('`').next()).collect();
         assert!(rows.len() > 5, "{rows:?}");
+        if language == "python" {
+            let controller = fs::read_to_string(format!("{folder}/controller/controller.py")).unwrap();
+            assert!(controller.contains("controller/venv/bin/pip install "), "{controller}");
+            // Its environment is not there yet.
+            let ended = place.call(&["check", &format!("{folder}/hover-python.toml")]).with_code(2);
+            ended.says(&["venv/bin/python: there is no such file", "README.md", "pip install"]);
+        }
         rows.iter().for_each(|row| assert!(Path::new(&format!("{folder}/{row}")).exists(), "{row}"));
         for path in files(Path::new(&folder)) {
             let text = fs::read_to_string(&path).unwrap();

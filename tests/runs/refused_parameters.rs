@@ -121,7 +121,11 @@ fn an_override_that_is_none() {
     let manifest = repository("manifests/hover.toml");
     let set = |text: &str| refused_setting(&manifest, &[text]);
     set("run.seed").says(&["--set run.seed: expected KEY=VALUE", "run.seed=3"]);
-    set("run.seed.low=1").says(&["--set run.seed.low=1", "`seed` is not a table"]);
+    set("run.seed.low=1").says(&[
+        "--set run.seed.low=1",
+        "`seed` is not a table",
+        "docs/manifest-reference.md",
+    ]);
     set("run.seeed=1").says(&["unknown key `run.seeed`", "did you mean `seed`?"]);
     set("run.seed=one").says(&["\"one\""]);
     set("process.plnat.cpu=1").says(&["there is no process `plnat`", "did you mean `plant`?"]);
@@ -136,6 +140,8 @@ fn an_override_that_is_none() {
         set(&format!("{key}=1")).says(&["an element of a list is a key of its own", help]);
     }
     set("include=[]").says(&["unknown key `include`"]);
+    set("process.plant.vehicle.effects.winds.x=3")
+        .says(&["the vehicle file lists no effect `winds`", "did you mean `wind`?"]);
 }
 
 #[test]
