@@ -1,7 +1,7 @@
 //! Comparison of two recordings within a tolerance: the largest difference of each field.
 
 use crate::definition::{Leaf, Value};
-use crate::diff::{Difference, first_of, message_difference, same_message, skip_to};
+use crate::diff::{Difference, Messages, first_of, lacks_topic, message_difference, same_message, skip_to};
 use crate::error::RecordingError;
 use crate::reader::{Record, Recording};
 use serde::{Serialize, Serializer};
@@ -40,20 +40,27 @@ pub struct Comparison {
     pub messages: u64,
     /// Fields that differ, by topic and path.
     pub fields: Vec<FieldDifference>,
+    /// Topics of the first recording that the second lacks; their messages are not compared.
+    pub only_a: Vec<String>,
+    /// Topics of the second recording that the first lacks; their messages are not compared.
+    pub only_b: Vec<String>,
     /// Difference that no tolerance allows, such as a missing message; the comparison ends there.
     pub refused: Option<Difference>,
 }
 
 impl Comparison {
-    /// True if all differences are at most `tolerance`, each in its field's unit.
+    /// True if both recordings have the same topics, and all differences are at most `tolerance`, each in its field's unit.
     #[must_use]
     pub fn is_within(&self, tolerance: f64) -> bool {
-        self.refused.is_none() && self.fields.iter().all(|field| field.largest <= tolerance)
+        self.refused.is_none()
+            && self.only_a.is_empty()
+            && self.only_b.is_empty()
+            && self.fields.iter().all(|field| field.largest <= tolerance)
     }
 }
 
-/// Compares `a` and `b` message by message. If one of them begins later, as the recording of a run from a checkpoint does,
-/// the comparison begins there.
+/// Compares the topics that `a` and `b` share, message by message. If one of them begins later, as the recording of a run
+/// from a checkpoint does, the comparison begins there.
 ///
 /// ```
 /// use bus::announcement::Announcement;
@@ -80,13 +87,66 @@ impl Comparison {
 /// # Errors
 /// If one of them is damaged.
 pub fn compare(a: &Recording, b: &Recording) -> Result<Comparison, RecordingError> {
-    let (mut left, mut right) = (a.messages().peekable(), b.messages().peekable());
+    let (mut only_a, mut only_b) = (LastTicks::new(), LastTicks::new());
+    let found = compare_shared(a, b, shared(a, b, &mut only_a), shared(b, a, &mut only_b))?;
+    let Shared { messages, fields, begin, refused } = found;
+    // A run from a checkpoint lacks topics that the whole run used before the checkpoint alone.
+    let from = |only: LastTicks| -> Vec<String> {
+        only.into_iter().filter(|(_, last_tick)| *last_tick >= begin).map(|(topic, _)| topic).collect()
+    };
+    let fields = fields.0.into_values().collect();
+    Ok(Comparison { messages, fields, only_a: from(only_a), only_b: from(only_b), refused })
+}
+
+/// Last tick of each topic.
+type LastTicks = BTreeMap<String, u32>;
+
+/// Comparison of the topics that two recordings share.
+struct Shared {
+    messages: u64,
+    fields: Fields,
+    /// First tick of the recording that begins later; 0 if both begin together.
+    begin: u32,
+    refused: Option<Difference>,
+}
+
+/// Messages of `of` on the topics that `other` has, too. The last ticks of the others go to `only`.
+fn shared<'a>(
+    of: &'a Recording,
+    other: &'a Recording,
+    only: &'a mut LastTicks,
+) -> Messages<impl Iterator<Item = Result<Record, RecordingError>> + use<'a>> {
+    let is_shared = move |message: &Result<Record, RecordingError>| match message {
+        Ok(record) if lacks_topic(other, of, &record.topic) => {
+            if let Some(last_tick) = only.get_mut(&record.topic) {
+                *last_tick = record.tick;
+            } else {
+                only.insert(record.topic.clone(), record.tick);
+            }
+            false
+        }
+        _ => true,
+    };
+    of.messages().filter(is_shared).peekable()
+}
+
+/// Compares the messages `left` of `a` with the messages `right` of `b`.
+fn compare_shared(
+    a: &Recording,
+    b: &Recording,
+    mut left: Messages<impl Iterator<Item = Result<Record, RecordingError>>>,
+    mut right: Messages<impl Iterator<Item = Result<Record, RecordingError>>>,
+) -> Result<Shared, RecordingError> {
+    let mut begin = 0;
     if let (Some(x), Some(y)) = (first_of(&mut left), first_of(&mut right))
-        && !(skip_to(&mut left, y.tick) && skip_to(&mut right, x.tick))
+        && x.tick != y.tick
     {
-        // One ends before the other begins.
-        let refused = Some(message_difference(&x, &y));
-        return Ok(Comparison { messages: 0, fields: Vec::new(), refused });
+        begin = x.tick.max(y.tick);
+        if !(skip_to(&mut left, begin) && skip_to(&mut right, begin)) {
+            // One ends before the other begins.
+            let refused = Some(message_difference(&x, &y));
+            return Ok(Shared { messages: 0, fields: Fields::default(), begin, refused });
+        }
     }
     let mut fields = Fields::default();
     let (mut messages, mut last_tick) = (0, None);
@@ -111,7 +171,10 @@ pub fn compare(a: &Recording, b: &Recording) -> Result<Comparison, RecordingErro
             }
         }
     };
-    Ok(Comparison { messages, fields: fields.0.into_values().collect(), refused })
+    // The rest names the topics that only one recording has.
+    left.take_while(Result::is_ok).for_each(drop);
+    right.take_while(Result::is_ok).for_each(drop);
+    Ok(Shared { messages, fields, begin, refused })
 }
 
 /// Differences by topic and path.
@@ -203,14 +266,26 @@ mod tests {
 
     /// A climb of 1 m a tick, `above_m` higher at tick 7.
     fn climb(folder: &Path, name: &str, ticks: Range<u32>, above_m: f64) -> Recording {
+        climb_on(folder, name, &[("/plant/state", ticks)], above_m)
+    }
+
+    /// The climb on several topics, each during its ticks.
+    fn climb_on(folder: &Path, name: &str, topics: &[(&str, Range<u32>)], above_m: f64) -> Recording {
         let path = folder.join(name);
         let mut writer = RecordingWriter::create(&path).unwrap();
-        let channel = writer.add_channel("/plant/state", &Announcement::of(PlantState::SCHEMA)).unwrap();
-        for tick in ticks {
+        let announcement = Announcement::of(PlantState::SCHEMA);
+        let channels: Vec<_> =
+            topics.iter().map(|(topic, _)| writer.add_channel(topic, &announcement).unwrap()).collect();
+        let end = topics.iter().map(|(_, ticks)| ticks.end).max().unwrap();
+        for tick in 0..end {
             let z = f64::from(tick) + if tick == 7 { above_m } else { 0.0 };
             let state = PlantState { position: [0.0, 0.0, z].into(), ..PlantState::default() };
             let cdr = [&[0, 1, 0, 0], bytemuck::bytes_of(&state)].concat();
-            writer.write(channel, tick, u64::from(tick) * 1_000_000, &cdr).unwrap();
+            for (channel, (_, ticks)) in channels.iter().zip(topics) {
+                if ticks.contains(&tick) {
+                    writer.write(*channel, tick, u64::from(tick) * 1_000_000, &cdr).unwrap();
+                }
+            }
         }
         writer.finish().unwrap();
         Recording::open(&path).unwrap()
@@ -243,6 +318,41 @@ mod tests {
         let later = climb(folder.path(), "c.mcap", 5..20, 0.5);
         let found = compare(&later, &whole).unwrap();
         assert_eq!((found.messages, found.is_within(0.5)), (15, true));
+    }
+
+    #[test]
+    fn topics_that_only_one_has_are_named_and_the_others_are_compared_to_their_ends() {
+        let folder = tempfile::tempdir().unwrap();
+        let posed = [("/plant/pose", 0..20), ("/plant/state", 0..20)];
+        let shadowed = [("/plant/state", 0..20), ("/shadow/plant/state", 3..5)];
+        let first = climb_on(folder.path(), "a.mcap", &posed, 0.0);
+        let second = climb_on(folder.path(), "b.mcap", &shadowed, 0.25);
+        let found = compare(&first, &second).unwrap();
+        assert_eq!((found.messages, &found.refused), (20, &None));
+        assert_eq!((&found.only_a, &found.only_b), (&only("/plant/pose"), &only("/shadow/plant/state")));
+        assert_eq!((found.fields.len(), found.fields[0].first_tick), (1, 7));
+        assert!(!found.is_within(1.0), "the topics differ");
+        // A comparison that ends early names them, too.
+        let short = climb(folder.path(), "c.mcap", 0..2, 0.0);
+        let found = compare(&short, &second).unwrap();
+        assert!(matches!(found.refused, Some(Difference::Ends { .. })), "{found:?}");
+        assert_eq!((found.only_a.len(), &found.only_b), (0, &only("/shadow/plant/state")));
+    }
+
+    fn only(topic: &str) -> Vec<String> {
+        vec![topic.to_owned()]
+    }
+
+    #[test]
+    fn a_run_from_a_checkpoint_needs_no_topic_that_ended_before_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let whole = climb_on(folder.path(), "a.mcap", &[("/start", 0..2), ("/plant/state", 0..20)], 0.0);
+        let later = climb(folder.path(), "b.mcap", 5..20, 0.0);
+        let found = compare(&whole, &later).unwrap();
+        assert_eq!((found.messages, found.is_within(0.0)), (15, true), "{found:?}");
+        let apart = climb_on(folder.path(), "c.mcap", &[("/start", 0..2)], 0.0);
+        let found = compare(&apart, &later).unwrap();
+        assert_eq!((found.messages, found.only_a.len(), found.only_b.len()), (0, 1, 1));
     }
 
     #[test]

@@ -24,6 +24,17 @@ pub enum Difference {
         /// Value in the second recording.
         b: String,
     },
+    /// A message on a topic that only one recording has.
+    Topic {
+        /// Tick.
+        tick: u32,
+        /// Topic.
+        topic: String,
+        /// The recording that has it.
+        has: PathBuf,
+        /// The recording that lacks it.
+        lacks: PathBuf,
+    },
     /// One recording is the beginning of the other, which goes on.
     Prefix {
         /// The recording that ends first.
@@ -68,6 +79,10 @@ impl fmt::Display for Difference {
                 let field = field.as_ref().map_or(String::new(), |field| format!(", field {field}"));
                 let text = format!("tick {tick}, topic {topic}{field}: {a} against {b}");
                 f.write_str(&printable_line(&text))
+            }
+            Self::Topic { tick, topic, has, lacks } => {
+                let (has, lacks, topic) = (has.display(), lacks.display(), printable_line(topic));
+                write!(f, "tick {tick}, topic {topic}: {lacks} has no such topic, and {has} has it")
             }
             Self::Prefix { shorter, last_tick, longer } => {
                 write!(f, "{} is a prefix of {}: ", shorter.display(), longer.display())?;
@@ -145,7 +160,9 @@ pub fn first_difference(a: &Recording, b: &Recording) -> Result<Option<Differenc
             (None, Some(_)) => prefix(a, last_tick, b),
             (Some(_), None) => prefix(b, last_tick, a),
             (Some(x), Some(y)) if (x.tick, &x.topic) == (y.tick, &y.topic) => field_difference(a, b, &x, &y),
-            (Some(x), Some(y)) => Ok(message_difference(&x, &y)),
+            (Some(x), Some(y)) => {
+                Ok(topic_difference(a, b, &x, &y).unwrap_or_else(|| message_difference(&x, &y)))
+            }
         }
         .map(Some);
     }
@@ -205,6 +222,22 @@ pub(crate) fn message_difference(x: &Record, y: &Record) -> Difference {
     let earlier = if (x.tick, &x.topic) <= (y.tick, &y.topic) { x } else { y };
     let (tick, topic) = (earlier.tick, earlier.topic.clone());
     Difference::Message { tick, topic, field: None, a: describe(x), b: describe(y) }
+}
+
+/// The difference that the next messages `x` of `a` and `y` of `b` make if one of them is on a topic that the other recording
+/// lacks.
+fn topic_difference(a: &Recording, b: &Recording, x: &Record, y: &Record) -> Option<Difference> {
+    let (of_a, of_b) = ((x, a, b), (y, b, a));
+    let by_time = if (x.tick, &x.topic) <= (y.tick, &y.topic) { [of_a, of_b] } else { [of_b, of_a] };
+    let (record, has, lacks) =
+        by_time.into_iter().find(|(record, has, lacks)| lacks_topic(lacks, has, &record.topic))?;
+    let (has, lacks) = (has.path().to_owned(), lacks.path().to_owned());
+    Some(Difference::Topic { tick: record.tick, topic: record.topic.clone(), has, lacks })
+}
+
+/// True if `recording` lacks `topic`, which `other` has.
+pub(crate) fn lacks_topic(recording: &Recording, other: &Recording, topic: &str) -> bool {
+    other.topics().contains_key(topic) && !recording.topics().contains_key(topic)
 }
 
 fn container_difference(a: &Recording, b: &Recording) -> Result<Difference, RecordingError> {

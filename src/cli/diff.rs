@@ -9,6 +9,7 @@ use recorder::comparison::{Comparison, FieldDifference, compare};
 use recorder::diff::{Difference, first_difference};
 use recorder::reader::Recording;
 use serde_json::{Value, json};
+use std::fmt::Display;
 use std::path::PathBuf;
 
 /// Examples that `--help` shows.
@@ -71,10 +72,12 @@ fn within(a: &Recording, b: &Recording, tolerance: f64, is_json: bool) -> Result
             "tolerance": tolerance,
             "messages": found.messages,
             "fields": found.fields,
+            "only_a": found.only_a,
+            "only_b": found.only_b,
             "refused": found.refused.as_ref().map(told),
         }))?;
     } else {
-        print_text(&text(&found, tolerance))?;
+        print_text(&text(&found, a, b, tolerance))?;
     }
     Ok(is_within)
 }
@@ -83,22 +86,49 @@ fn told(difference: &Difference) -> Value {
     json!({ "difference": difference, "text": difference.to_string() })
 }
 
-fn text(found: &Comparison, tolerance: f64) -> String {
-    let Comparison { messages, fields, refused } = found;
+fn text(found: &Comparison, a: &Recording, b: &Recording, tolerance: f64) -> String {
+    let Comparison { fields, only_a, only_b, refused, .. } = found;
     let beyond: Vec<&FieldDifference> = fields.iter().filter(|field| field.largest > tolerance).collect();
-    let mut lines = vec![match (fields.len(), beyond.len()) {
-        (0, _) => format!("{messages} messages are the same"),
-        (all, 0) => format!("{messages} messages are within {tolerance:?}; {all} fields differ:"),
-        (all, count) => format!("{count} of {all} fields that differ are beyond {tolerance:?}:"),
-    }];
+    let mut lines = vec![headline(found, beyond.len(), tolerance)];
     // Within the tolerance those that differ are of interest.
     let listed: Vec<&FieldDifference> = if beyond.is_empty() { fields.iter().collect() } else { beyond };
     lines.extend(listed.iter().take(FIELDS_PRINTED).map(|field| line(field)));
     if listed.len() > FIELDS_PRINTED {
         lines.push(format!("  and {} more; --json lists all", listed.len() - FIELDS_PRINTED));
     }
+    let lacking = [(b, only_a), (a, only_b)].into_iter().filter(|(_, topics)| !topics.is_empty());
+    lines.extend(lacking.map(|(recording, topics)| {
+        format!("{} has no topic {}", recording.path().display(), printable_line(&topics.join(", ")))
+    }));
     lines.extend(refused.iter().map(|difference| format!("no tolerance allows this: {difference}")));
     lines.join("\n")
+}
+
+/// The first line: number of messages, and of the fields that differ.
+fn headline(found: &Comparison, beyond: usize, tolerance: f64) -> String {
+    let has_own = !(found.only_a.is_empty() && found.only_b.is_empty());
+    let messages = || counted(found.messages, "message is", "messages are");
+    match (found.fields.len(), beyond) {
+        (0, _) if found.messages == 0 && has_own => "no topic is in both recordings".to_owned(),
+        (0, _) => format!("{} the same", messages()),
+        (all, 0) => {
+            format!(
+                "{} within {tolerance:?}; {}:",
+                messages(),
+                counted(all, "field differs", "fields differ")
+            )
+        }
+        (all, beyond) => {
+            let all = counted(all, "field that differs", "fields that differ");
+            format!("{beyond} of {all} {} beyond {tolerance:?}:", if beyond == 1 { "is" } else { "are" })
+        }
+    }
+}
+
+/// The count with its words: those of one, or those of many.
+fn counted<T: PartialEq + From<u8> + Display>(count: T, one: &str, many: &str) -> String {
+    let words = if count == T::from(1) { one } else { many };
+    format!("{count} {words}")
 }
 
 fn line(field: &FieldDifference) -> String {
@@ -108,7 +138,19 @@ fn line(field: &FieldDifference) -> String {
         unit => format!("{largest:?} {unit}"),
     };
     let (topic, path, largest) = (printable_line(topic), printable_line(path), printable_line(&largest));
+    let messages = counted(*messages, "message", "messages");
     format!(
-        "  {topic} {path}: at most {largest} (tick {largest_tick}), in {messages} messages from tick {first_tick} on"
+        "  {topic} {path}: at most {largest} (tick {largest_tick}), in {messages} from tick {first_tick} on"
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::counted;
+
+    #[test]
+    fn one_is_singular() {
+        let of = |count: u64| counted(count, "message is", "messages are");
+        assert_eq!([of(0), of(1), of(2)], ["0 messages are", "1 message is", "2 messages are"]);
+    }
 }

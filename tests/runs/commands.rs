@@ -1,7 +1,7 @@
 //! The other subcommands, exit codes and JSON.
 
 use crate::support::{Place, repository};
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::fs;
 
 fn hover() -> String {
@@ -392,6 +392,30 @@ fn a_tolerance_is_in_the_unit_of_each_field_and_json_has_every_field() {
             .with_code(2)
             .says(&["from 0 on"]);
     }
+}
+
+#[test]
+fn a_topic_that_only_one_recording_has_is_named_and_the_others_are_compared() {
+    let place = Place::new();
+    let hover = repository("manifests/hover.toml");
+    let flown = |name: &str, more: &[&str]| {
+        let path = place.path(name);
+        let args = ["run", &hover, "--in-process", "--record", &path, "--set", "run.duration_s=0.5"];
+        place.call(&[&args[..], more].concat()).flown();
+        path
+    };
+    let first = flown("a.mcap", &[]);
+    let other = flown("b.mcap", &["--set", "process.plant.outputs.tf.topic=/poses"]);
+    let ended = place.call(&["diff", &first, &other]).with_code(1);
+    ended.prints(&["tick 0, topic /poses: ", "a.mcap has no such topic, and ", "b.mcap has it"]);
+    let ended = place.call(&["diff", &first, &other, "--tolerance", "0"]).with_code(1);
+    ended.prints(&["messages are the same", "b.mcap has no topic /tf", "a.mcap has no topic /poses"]);
+    assert!(!ended.output.contains("no tolerance allows this"), "{ended}");
+    let told = place.call(&["diff", &first, &other, "--tolerance", "0", "--json"]).with_code(1).json();
+    assert_eq!((&told["only_a"], &told["only_b"]), (&json!(["/tf"]), &json!(["/poses"])));
+    assert_eq!((&told["within"], &told["refused"]), (&false.into(), &Value::Null));
+    // All ticks of the others, not only the first.
+    assert!(told["messages"].as_u64().unwrap() > 500, "{told}");
 }
 
 #[test]
