@@ -63,7 +63,7 @@ fn without_jumps<const N: usize>(
         return channel;
     };
     notes.push(format!(
-        "{quantity}: {NOTE}, first at {:.3} s, most at {:.3} s; the samples about are left out",
+        "{quantity}: {NOTE}, first at {:.3} s, most at {:.3} s; the samples around them are left out",
         channel.time_s[first.from], channel.time_s[greatest.from],
     ));
     let mut is_kept = vec![true; channel.time_s.len()];

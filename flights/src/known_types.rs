@@ -205,7 +205,7 @@ pub fn defaults(log: &dyn Log, format: Format, rotors: usize) -> (ChannelMap, Ve
                 [] => continue,
                 [topic] if holds_nothing(log, quantity, &known.entry(topic, rotors)) => {
                     notes.push(format!(
-                        "{quantity}: not taken from {topic}, whose messages say that they have none"
+                        "{quantity}: not taken from {topic}, whose messages say that they hold no value"
                     ));
                     continue;
                 }

@@ -1,12 +1,11 @@
 //! The first page of a report, for people who fly: the answer, what is missing, how sure that is, what it changes, and what
 //! to do next.
 
-use crate::digits::rounded;
+use crate::digits::{printed, printed_quantity};
 use crate::horizons::Change;
 use crate::loss::advice;
 use crate::report::{EffectReport, Estimate, Report, UNCHECKED};
 use crate::sensor_effects::SENSOR_EFFECTS;
-use diagnostics::unit::behind_number;
 use serde::Serialize;
 use std::collections::BTreeSet;
 
@@ -99,8 +98,7 @@ fn missing(name: &str, effect: &EffectReport) -> String {
 }
 
 fn value(name: &str, estimate: &Estimate) -> String {
-    let unit = behind_number(estimate.unit);
-    let [value, low, high] = [estimate.value, estimate.low, estimate.high].map(rounded);
+    let ([value, low, high], unit) = printed([estimate.value, estimate.low, estimate.high], estimate.unit);
     format!("{} {value}{unit} ({low} to {high})", name.replace('_', " "))
 }
 
@@ -128,22 +126,27 @@ fn change(report: &Report, channel: &str) -> Option<String> {
     let unit = found.first()?.unit;
     let range = |of: fn(&Change) -> f64| {
         let values = found.iter().map(|change| of(change));
-        let (low, high) =
-            values.fold((f64::INFINITY, 0.0_f64), |(low, high), value| (low.min(value), high.max(value)));
-        let (low, high) = (rounded(low), rounded(high));
-        if low == high { format!("{low} {unit}") } else { format!("{low} to {high} {unit}") }
+        values.fold([f64::INFINITY, 0.0_f64], |[low, high], value| [low.min(value), high.max(value)])
+    };
+    let [new_low, new_high] = range(|change| change.after);
+    let [old_low, old_high] = range(|change| change.before);
+    let [still_low, still_high] = range(|change| change.persistence);
+    let (texts, unit) = printed([new_low, new_high, old_low, old_high, still_low, still_high], unit);
+    let [new_low, new_high, old_low, old_high, still_low, still_high] = &texts;
+    let text = |low: &str, high: &str| {
+        if low == high { format!("{low}{unit}") } else { format!("{low} to {high}{unit}") }
     };
     Some(format!(
         "{channel}: {} with the new file, {} with the declared one; {} without any model.",
-        range(|change| change.after),
-        range(|change| change.before),
-        range(|change| change.persistence)
+        text(new_low, new_high),
+        text(old_low, old_high),
+        text(still_low, still_high)
     ))
 }
 
 /// The envelope of the test flights; `None` where nothing of it is known.
 fn judged_in(report: &Report) -> Option<String> {
-    let words = report.has_validated().then(|| report.envelope_in_words())?;
+    let words = report.has_validated().then(|| report.envelope_in_words(printed_quantity))?;
     Some(format!("Validated in flights with {words}. The model was not validated beyond these limits."))
 }
 
@@ -179,15 +182,15 @@ fn next(report: &Report, accepted: &[(&str, &EffectReport)]) -> Vec<String> {
             .push(format!("To separate thrust, inertia, static moment and friction: {}.", ratios.experiment));
     }
     if let Some(proposal) = &report.next_flight {
-        let sentences = proposal.sentences().join(". ");
+        let sentences = proposal.sentences().join(" ");
         steps.push(if proposal.is_worth_flying() {
             format!(
                 "Fly next-flight.toml ({:.0} s; set points in next-flight.csv), and identify again with it among the flights to \
-                 fit. {sentences}.",
+                 fit. {sentences}",
                 proposal.duration_s
             )
         } else {
-            format!("No flight within the limits would decide. {sentences}.")
+            format!("No flight within the limits answers the open questions. {sentences}")
         });
     }
     if report.losses.is_empty() && !report.prediction_only.is_empty() {
@@ -210,12 +213,14 @@ mod tests {
     use super::Brief;
     use crate::horizons::{Change, Changes};
     use crate::loss::Loss;
+    use crate::proposal::{Answer, Limits, Proposal};
+    use crate::questions::Question;
     use crate::report::{BeforeAfter, EffectReport, Estimate, Report};
     use crate::revision::Withdrawn;
     use std::collections::BTreeMap;
 
-    fn effect() -> EffectReport {
-        let coefficient = Estimate {
+    fn coefficient() -> Estimate {
+        Estimate {
             value: 1.4137e-6,
             unit: "N*s^2/(m*rad)",
             low: 1.362e-6,
@@ -223,11 +228,14 @@ mod tests {
             at_bound: false,
             determined: true,
             by_equations: None,
-        };
+        }
+    }
+
+    fn effect() -> EffectReport {
         EffectReport {
             accepted: true,
             linearised: false,
-            parameters: BTreeMap::from([("coefficient", coefficient)]),
+            parameters: BTreeMap::from([("coefficient", coefficient())]),
             held_out: BeforeAfter { before: 1.35, after: 1.06 },
             chance: 5e-5,
             worth: Vec::new(),
@@ -295,8 +303,8 @@ mod tests {
         assert_eq!(
             missing,
             [
-                "rotor-drag: the air that crosses a spinning rotor drags at its hub, linear in both speeds; coefficient 1.414e-6 \
-              N*s^2/(m*rad) (1.362e-6 to 1.465e-6)."
+                "rotor-drag: the air that crosses a spinning rotor drags at its hub, linear in both speeds; coefficient 1.414·10⁻⁶ \
+              N·s²/(m·rad) (1.362·10⁻⁶ to 1.465·10⁻⁶)."
             ]
         );
         assert_eq!(
@@ -313,6 +321,33 @@ mod tests {
         );
         assert_eq!(next[0], "To tell rotor-drag from blade-flapping: fly with a load.");
         assert!(next[1].contains("hummingbus validate"), "{next:?}");
+    }
+
+    #[test]
+    fn a_pilot_reads_whole_sentences_and_short_lengths_in_millimetres() {
+        let offset =
+            Estimate { value: 0.005_995, unit: "m", low: 0.005_985, high: 0.006_005, ..coefficient() };
+        assert_eq!(super::value("x", &offset), "x 5.995 mm (5.985 to 6.005)");
+        let question =
+            Question::Parameter { effect: "com-offset", parameter: "z", plausible: 0.005, unit: "m" };
+        let limits = Limits { room_m: [[0.0, 1.0]; 3], speed_max_m_s: 1.0, tilt_max_deg: 5.0 };
+        let proposal = Proposal {
+            answers: vec![Answer { question, separation: 0.0, manoeuvre: None }],
+            course: Vec::new(),
+            duration_s: 0.0,
+            limits,
+            reached: limits,
+            advice: Some("Raise speed_max_m_s".to_owned()),
+            was_stopped: false,
+        };
+        let brief = Brief::of(&Report { next_flight: Some(proposal), ..Report::of_nothing() });
+        assert_eq!(
+            brief.next,
+            [
+                "No flight within the limits answers the open questions. Open question: z of com-offset to within 5.000 mm. The best \
+              flight separates its answers by 0.0 standard errors, and 3 are needed. Raise speed_max_m_s."
+            ]
+        );
     }
 
     #[test]
@@ -378,7 +413,13 @@ mod tests {
             brief.next.iter().any(|step| step.contains("inertia-error in the new file for predictions only")),
             "{brief:?}"
         );
+        assert_eq!(
+            report.limited_use().unwrap(),
+            "inertia-error for predictions only: not a property of the vehicle"
+        );
         let lost = Report { losses: vec![loss("one")], ..report.clone() };
+        assert!(lost.limited_use().unwrap().ends_with("it does not describe these flights"));
+        assert_eq!(Report::of_nothing().limited_use(), None);
         assert!(Brief::of(&lost).answer.starts_with("Do not use the new vehicle file"), "{lost}");
         let text = report.to_string();
         for part in

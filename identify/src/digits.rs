@@ -22,6 +22,58 @@ pub fn rounded(value: f64) -> String {
     }
 }
 
+/// Lengths up to this are printed in mm, m.
+const MM_TO_M: f64 = 0.1;
+/// No length beside a longer one than this is printed in mm, m.
+const MM_BESIDE_M: f64 = 10.0;
+
+/// Values for people who fly, and their unit: short lengths in mm, powers of ten and of units with raised digits.
+///
+/// All values have one unit, so that they can be compared.
+pub fn printed<const N: usize>(values: [f64; N], unit: &str) -> ([String; N], String) {
+    let is_short = values.iter().any(|value| *value != 0.0 && value.abs() <= MM_TO_M);
+    let is_in_mm = unit == "m" && is_short && values.iter().all(|value| value.abs() < MM_BESIDE_M);
+    let (factor, unit) = if is_in_mm { (1e3, "mm") } else { (1.0, unit) };
+    (values.map(|value| with_signs(factor * value)), unit_with_signs(&behind_number(unit)))
+}
+
+/// One value with its unit, as [`printed`].
+pub fn printed_quantity(value: f64, unit: &str) -> String {
+    let ([value], unit) = printed([value], unit);
+    value + &unit
+}
+
+/// Four digits, with a minus sign and raised digits: `−1.414·10⁻⁶`.
+fn with_signs(value: f64) -> String {
+    let is_small = value != 0.0 && value.abs() < 1e-4;
+    let text = if is_small { format!("{value:.3e}") } else { rounded(value) };
+    let text = match text.split_once('e') {
+        Some((digits, power)) => format!("{digits}·10{}", power.chars().map(raised).collect::<String>()),
+        None => text,
+    };
+    text.replace('-', "−")
+}
+
+/// A unit with raised digits: `N·s²/m`.
+fn unit_with_signs(unit: &str) -> String {
+    let mut is_raised = false;
+    let signs = unit.chars().filter_map(|sign| {
+        is_raised = sign == '^' || is_raised && (sign == '-' || sign.is_ascii_digit());
+        match sign {
+            '^' => None,
+            '*' => Some('·'),
+            _ if is_raised => Some(raised(sign)),
+            _ => Some(sign),
+        }
+    });
+    signs.collect()
+}
+
+fn raised(sign: char) -> char {
+    let digit = sign.to_digit(10).and_then(|digit| "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(digit as usize));
+    digit.unwrap_or(if sign == '-' { '⁻' } else { sign })
+}
+
 /// Value with six significant digits: no estimate is known better.
 ///
 /// Files have these; intervals in texts have four.
@@ -31,7 +83,23 @@ pub fn to_six_digits(value: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{quantity, to_six_digits};
+    use super::{printed, printed_quantity, quantity, to_six_digits};
+
+    #[test]
+    fn people_read_short_lengths_in_millimetres_and_powers_with_raised_digits() {
+        let joined = |values: [f64; 3], unit: &str| {
+            let (values, unit) = printed(values, unit);
+            values.join(" ") + &unit
+        };
+        assert_eq!(joined([0.005_995, 0.005_985, 0.006_005], "m"), "5.995 5.985 6.005 mm");
+        assert_eq!(joined([0.0, -0.1, 0.1], "m"), "0 −100.0 100.0 mm");
+        assert_eq!(joined([0.016_58, 0.1465, 2.039], "m"), "16.58 146.5 2039 mm");
+        assert_eq!(joined([0.016_58, 0.1465, 20.0], "m"), "0.01658 0.1465 20.00 m");
+        assert_eq!(joined([0.0, 0.2, 0.3], "m"), "0 0.2000 0.3000 m");
+        let texts = [(-1.4137e-6, "N*s^2/(m*rad)"), (13.7, "m/s^2"), (0.25, "1"), (3.1e-5, "s^-1")];
+        let texts = texts.map(|(value, unit)| printed_quantity(value, unit));
+        assert_eq!(texts, ["−1.414·10⁻⁶ N·s²/(m·rad)", "13.70 m/s²", "0.2500", "3.100·10⁻⁵ s⁻¹"]);
+    }
 
     #[test]
     fn a_number_of_a_file_has_six_digits() {

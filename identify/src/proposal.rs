@@ -77,21 +77,36 @@ impl Proposal {
         self.answers.iter().any(Answer::is_separated)
     }
 
-    /// One sentence for each question.
+    /// Sentences for each question, and the limit to raise.
     #[must_use]
     pub fn sentences(&self) -> Vec<String> {
-        let mut sentences: Vec<String> = self.answers.iter().map(Answer::sentence).collect();
-        sentences.extend(self.advice.clone());
+        let mut sentences: Vec<String> = self.answers.iter().map(Answer::sentences).collect();
+        sentences.extend(self.advice.iter().map(|advice| format!("{advice}.")));
         sentences
     }
 }
 
 impl Answer {
-    fn sentence(&self) -> String {
-        let Self { question, separation, manoeuvre } = self;
-        let by = manoeuvre.as_ref().map_or(String::new(), |name| format!(", most of it from {name}"));
-        let doubt = if self.is_separated() { "" } else { "; too little to decide (3 are needed)" };
-        format!("{question}: expected separation {separation:.1} standard errors{by}{doubt}")
+    fn sentences(&self) -> String {
+        let Self { question, separation, .. } = self;
+        let (by, needed) = (self.by(), if self.is_separated() { "" } else { ", and 3 are needed" });
+        format!(
+            "Open question: {question}. The best flight separates its answers by {separation:.1} standard errors{by}{needed}."
+        )
+    }
+
+    /// The manoeuvre that says most, for a sentence.
+    fn by(&self) -> String {
+        self.manoeuvre.as_ref().map_or(String::new(), |name| format!(", most of it from {name}"))
+    }
+}
+
+/// A line of the report.
+impl fmt::Display for Answer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { question, separation, .. } = self;
+        let (by, doubt) = (self.by(), if self.is_separated() { "" } else { "; 3 are needed" });
+        write!(f, "{question}: expected separation {separation:.1} standard errors{by}{doubt}")
     }
 }
 
@@ -122,7 +137,8 @@ impl fmt::Display for Proposal {
         if !self.course.is_empty() {
             writeln!(f, "  reaches: {}", self.reached)?;
         }
-        self.sentences().iter().try_for_each(|sentence| writeln!(f, "  {sentence}"))?;
+        self.answers.iter().try_for_each(|answer| writeln!(f, "  {answer}"))?;
+        self.advice.iter().try_for_each(|advice| writeln!(f, "  {advice}"))?;
         self.course.iter().try_for_each(|Part { from_s, to_s, manoeuvre, description }| {
             writeln!(f, "  {from_s:5.1} to {to_s:5.1} s  {manoeuvre}: {description}")
         })
@@ -144,14 +160,14 @@ mod tests {
             duration_s: 0.0,
             limits,
             reached: limits,
-            advice: Some("raise speed_max_m_s".to_owned()),
+            advice: Some("Raise speed_max_m_s".to_owned()),
             was_stopped: false,
         };
         assert!(!proposal.is_worth_flying());
         let text = proposal.to_string();
-        assert!(text.contains("none within the limits") && text.contains("raise speed_max_m_s"), "{text}");
-        assert!(text.contains("1.2 standard errors; too little to decide"), "{text}");
+        assert!(text.contains("none within the limits") && text.contains("Raise speed_max_m_s"), "{text}");
+        assert!(text.contains("1.2 standard errors; 3 are needed"), "{text}");
         proposal.answers[0].separation = 4.0;
-        assert!(proposal.is_worth_flying() && !proposal.to_string().contains("too little"), "{proposal}");
+        assert!(proposal.is_worth_flying() && !proposal.to_string().contains("3 are needed"), "{proposal}");
     }
 }

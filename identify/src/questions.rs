@@ -2,7 +2,7 @@
 
 use crate::candidate::Candidate;
 use crate::confounded::Rival;
-use crate::digits::quantity;
+use crate::digits::printed_quantity;
 use crate::fit::Problem;
 use crate::fit_result::FitResult;
 use crate::log_rates::LogRates;
@@ -50,7 +50,7 @@ impl std::fmt::Display for Question {
         match self {
             Self::Names { effect, rival } => write!(f, "{effect} or {rival}"),
             Self::Parameter { effect, parameter, plausible, unit } => {
-                write!(f, "{parameter} of {effect} to {}", quantity(*plausible, unit))
+                write!(f, "{parameter} of {effect} to within {}", printed_quantity(*plausible, unit))
             }
         }
     }

@@ -220,8 +220,25 @@ impl Report {
         self.losses.is_empty() && !self.envelope.is_empty()
     }
 
+    /// Limit on the use of the new vehicle file, in words; `None` if there is none.
+    #[must_use]
+    pub fn limited_use(&self) -> Option<String> {
+        if self.is_undecided() {
+            None
+        } else if !self.losses.is_empty() {
+            Some("not to be used: it does not describe these flights".to_owned())
+        } else if !self.prediction_only.is_empty() {
+            Some(format!(
+                "{} for predictions only: not a property of the vehicle",
+                self.prediction_only.join(", ")
+            ))
+        } else {
+            None
+        }
+    }
+
     /// The envelope as the end of a sentence.
-    pub(crate) fn envelope_in_words(&self) -> String {
+    pub(crate) fn envelope_in_words(&self, text: fn(f64, &str) -> String) -> String {
         let limits = self.envelope.iter();
         let one = |(key, Reached { value, unit }): (&&str, &Reached)| {
             let (name, word) = match key.rsplit_once('_') {
@@ -229,7 +246,7 @@ impl Report {
                 Some((name, _)) => (name, "at most"),
                 None => (*key, ""),
             };
-            format!("{} {word} {}", name.replace('_', " "), quantity(*value, unit))
+            format!("{} {word} {}", name.replace('_', " "), text(*value, unit))
         };
         limits.map(one).collect::<Vec<_>>().join(", ")
     }
@@ -488,7 +505,7 @@ impl Report {
             )?;
         }
         if self.has_validated() {
-            writeln!(f, "validated in flights with {}", self.envelope_in_words())?;
+            writeln!(f, "validated in flights with {}", self.envelope_in_words(quantity))?;
         }
         self.not_identifiable.iter().try_for_each(|Unidentifiable { effect, needs }| {
             writeln!(f, "not identifiable here: {effect} needs {needs}")

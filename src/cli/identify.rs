@@ -243,10 +243,13 @@ fn summary(report: &Report, flown: Option<&Value>, out: &Path) -> String {
             away * 100.0
         );
     }
-    let mut names = vec!["report.html", "report.json", "vehicle.toml"];
+    let mut names = vec!["report.html", "report.json"];
     if report.next_flight.as_ref().is_some_and(Proposal::is_worth_flying) {
         names.extend([next_flight::MANIFEST, next_flight::SET_POINTS]);
     }
+    // The line ends with the vehicle file, and what it is not for.
+    names.push("vehicle.toml");
     let files: Vec<String> = names.iter().map(|name| out.join(name).display().to_string()).collect();
-    text + &format!("\nwritten: {}", files.join(", "))
+    let limit = report.limited_use().map_or(String::new(), |limit| format!(" ({limit})"));
+    text + &format!("\nwritten: {}{limit}", files.join(", "))
 }

@@ -88,10 +88,10 @@ impl fmt::Display for Bearing {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "the commands bear {:.2} of the weight: the `scale` of the channel `command` or the range in the vehicle file's `[command]` is \
-             probably wrong",
+            "by the vehicle file, the thrust of the commands is {:.2} times the weight: the `scale` of the channel `command` or the range in \
+             the file's `[command]` is probably wrong",
             self.share
         )?;
-        self.fitting().map_or(Ok(()), |fitting| write!(f, "; {fitting} would bear it"))
+        self.fitting().map_or(Ok(()), |fitting| write!(f, "; the thrust equals the weight with {fitting}"))
     }
 }

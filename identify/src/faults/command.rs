@@ -100,7 +100,8 @@ fn scaled(evidence: &Evidence, at: usize, carried: &[Option<f64>]) -> Option<Fau
     let is_further = libm::log(here).abs() > libm::log(usual).abs();
     let is_off = !(1.0 / CARRIED..=CARRIED).contains(&ratio) && is_further;
     is_off.then(|| {
-        let expected = format!("commands that carry {usual:.2} of the weight, as in the other flights");
-        fault(evidence, "command".to_owned(), "scaled", expected, format!("{here:.2} of it"), UNIT)
+        let expected =
+            format!("commands with a thrust of {usual:.2} times the weight, as in the other flights");
+        fault(evidence, "command".to_owned(), "scaled", expected, format!("{here:.2} times the weight"), UNIT)
     })
 }

@@ -45,8 +45,8 @@ pub const SET_POINTS: &str = "next-flight.csv";
 const NO_SEPARATION: f64 = 0.3;
 
 /// Advice where no limit helps.
-const NOT_SHOWN: &str = "no manoeuvre shows what stays open, with raised limits either: another sensor, load or declared \
-    effect is needed";
+const NOT_SHOWN: &str = "No manoeuvre answers what stays open, even if the limits are raised. Log another sensor, fly with \
+    another load, or declare another effect";
 
 /// A proposal and its files.
 pub struct NextFlight {
@@ -216,7 +216,8 @@ fn raised<T: Fn(usize, usize) + Sync>(
         if best.as_ref().is_none_or(|(count, least, _)| (answered, worst) > (*count, *least)) {
             let list = open.iter().map(|at| format!("{:.1}", found[*at])).collect::<Vec<_>>().join(", ");
             let text = format!(
-                "raise {text} in [next_flight] of the flights file: expected separation of what stays open then {list}"
+                "Raise {text} in [next_flight] of the flights file: the expected separation of what stays open is then {list} standard \
+                 errors"
             );
             best = Some((answered, worst, text));
         }
