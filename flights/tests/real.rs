@@ -128,7 +128,7 @@ fn a_ulog_is_read_by_the_types_of_its_messages() {
     assert!((9.3..10.3).contains(&mean_z), "{mean_z}");
     // Its estimator had no horizontal position: `xy_valid` is 0 in all messages.
     assert!(flight.position.is_empty() && flight.velocity.is_empty());
-    let said = "not taken from vehicle_local_position, whose messages say that they have none";
+    let said = "not taken from vehicle_local_position, whose messages say that they hold no value";
     assert!(flight.notes.iter().any(|note| note.contains(said)), "{:?}", flight.notes);
 }
 

@@ -38,6 +38,7 @@ fn a_browser_draws_residuals_and_errors_without_a_network() {
     let buttons = json!(["Download plot as a PNG", "Zoom", "Pan", "Zoom in", "Zoom out", "Reset axes"]);
     assert_eq!(first["buttons"], buttons);
     assert_eq!((&first["overflow"], &last["overflow"]), (&json!(0), &json!(0)), "wider than the window");
+    assert_eq!(seen["attribution"], json!(0), "the table of effects is wider than its place");
 
     // The same check must notice a page whose script fails.
     let text = fs::read_to_string(&found.page).unwrap();

@@ -5,6 +5,8 @@ import { withPage } from "./browser.mjs";
 
 const [file, screenshot] = process.argv.slice(2);
 const PLOTS = ["residual", "sides", "against", "agreement", "auto", "cross"];
+// Pixels in which the table of effects has to fit.
+const WIDTH = 1200;
 const CHOICES = ["flight", "equation", "component", "input"];
 
 /** Returns the drawn parts: each plot's title, axes and number of marks that have an extent; each table's rows. */
@@ -33,6 +35,12 @@ function look([plots, choices]) {
   };
 }
 
+/** Returns the pixels by which the table of effects is wider than its place. */
+function attributionOverflow() {
+  const place = document.getElementById("effects").parentElement;
+  return place.scrollWidth - place.clientWidth;
+}
+
 /** Chooses the last of each selector, from the first selector on, since each offers what the one before leaves. */
 async function chooseLast(page) {
   for (const id of CHOICES) {
@@ -47,6 +55,8 @@ const seen = await withPage(pathToFileURL(file).href, async (page, wrong) => {
   if (screenshot) await page.screenshot({ path: screenshot, fullPage: true });
   await chooseLast(page);
   const last = await page.evaluate(look, [PLOTS, CHOICES]);
-  return { first, last, wrong };
+  await page.setViewport({ width: WIDTH, height: 1000 });
+  const attribution = await page.evaluate(attributionOverflow);
+  return { first, last, attribution, wrong };
 });
 console.log(JSON.stringify(seen));

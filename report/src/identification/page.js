@@ -126,7 +126,7 @@ function effectRows([name, effect]) {
   const figures = [number(before), number(after), change(before, after), chance(effect.chance), long(list(effect.confused_with))];
   const judged = effect.accepted ? "yes" : effect.linearised ? "no, linearised" : "no";
   const rows = Object.entries(effect.parameters).map(([parameter, { value, unit, low, high }], index) => {
-    const label = left([spaced(parameter), shownUnit(unit) && `[${shownUnit(unit)}]`].join(" "));
+    const label = long([spaced(parameter), shownUnit(unit) && `[${shownUnit(unit)}]`].join(" "));
     return [left(index ? "" : judged), label, number(value), `${number(low)} to ${number(high)}`, ...(index ? [] : figures)];
   });
   const longest = Math.max(...effect.worth.map(({ horizon_s }) => horizon_s));
