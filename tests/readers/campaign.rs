@@ -76,6 +76,9 @@ fn a_browser_draws_the_page_with_units_and_counts_within_its_window() {
     for axis in ["histogram", "scatter"] {
         assert!(seen["axes"][axis].as_str().unwrap().ends_with(" in m"), "{seen}");
     }
+    // The whole name of the figure, in lines that fit.
+    let title = seen["axes"]["scatter"].as_str().unwrap();
+    assert!(!title.contains('…') && seen["tooHigh"] == json!(0), "{seen}");
 }
 
 fn read(readers: &Path, folder: &Path) -> Output {

@@ -6,14 +6,22 @@ import { withPage } from "./browser.mjs";
 const [file] = process.argv.slice(2);
 const WIDTH = 1200;
 
-/** Returns the cells of the tables, the titles of the axes, and the pixels by which the page or a table is too wide. */
+/** Returns the cells of the tables, the titles of the axes, the pixels by which the page or a table is too wide, and those by which a
+ * title is higher than its plot. */
 function look() {
   const rows = (id) => [...document.querySelectorAll(`#${id} tr`)].map((row) => [...row.cells].map((cell) => cell.textContent));
   const text = (name) => document.querySelector(name)?.textContent ?? "";
+  // The lines of a title have no spaces between them.
+  const title = (name) => {
+    const lines = [...(document.querySelector(name)?.querySelectorAll("tspan") ?? [])].map((line) => line.textContent);
+    return lines.length ? lines.join(" ") : text(name);
+  };
+  const height = (name) => document.querySelector(name)?.getBoundingClientRect().height ?? Infinity;
   const boxes = [document.documentElement, ...document.querySelectorAll(".scroll")];
   return {
     tables: Object.fromEntries(["failures", "figures", "worst"].map((id) => [id, rows(id)])),
-    axes: { histogram: text("#histogram .xtitle"), scatter: text("#scatter .ytitle") },
+    axes: { histogram: text("#histogram .xtitle"), scatter: title("#scatter .ytitle") },
+    tooHigh: Math.max(0, height("#scatter .ytitle") - height("#scatter .main-svg")),
     overflow: Math.max(...boxes.map((box) => box.scrollWidth - box.clientWidth)),
   };
 }

@@ -2,6 +2,8 @@ const { report, varied, figures, flights } = data;
 const percent = (part) => `${(100 * part).toFixed(2)} %`;
 const PASSED = "#2c7fb8";
 const FAILED = "#d95f0e";
+// A smaller chance has no meaning.
+const chance = (value) => (value < 1e-3 ? "< 0.001" : number(value, 2));
 
 title(`Campaign ${report.campaign}`);
 element("summary").textContent =
@@ -46,7 +48,7 @@ fillTable(
 fillTable(
   "influences",
   [left("varied value"), left("outcome or figure"), "rank correlation", "chance"],
-  report.influences.map((it) => [left(it.varied), left(it.figure), it.rank_correlation.toFixed(2), number(it.chance)]),
+  report.influences.map((it) => [left(it.varied), left(it.figure), it.rank_correlation.toFixed(2).replace("-", "−"), chance(it.chance)]),
 );
 fillTable(
   "worst",
@@ -54,8 +56,19 @@ fillTable(
   report.worst.map((worst) => [worst.flight, wrapped(worst.reason), wrapped(worst.command)]),
 );
 
-// A name that fits beside an axis.
-const short = (name) => (name.length > 36 ? `${name.slice(0, 35)}…` : name);
+// Letters of a line beside an axis, and lines.
+const [LETTERS, LINES] = [34, 3];
+
+// The text in lines that fit beside an axis. Of a longer one the middle is left out: the names of figures differ at their ends.
+function inLines(text) {
+  const lines = [];
+  for (const word of text.split(" ")) {
+    const joined = lines.length ? `${lines.at(-1)} ${word}` : word;
+    if (lines.length && joined.length <= LETTERS) lines[lines.length - 1] = joined;
+    else lines.push(word);
+  }
+  return lines.length > LINES ? [...lines.slice(0, LINES - 1), `… ${lines.at(-1)}`] : lines;
+}
 
 // The name of a figure with its unit, for an axis.
 function inUnit(name, index) {
@@ -66,7 +79,7 @@ function inUnit(name, index) {
 // Flights that passed and flights that failed, as two traces.
 function traces(make) {
   const groups = [["passed", PASSED, true], ["failed", FAILED, false]];
-  return groups.map(([name, color, passed]) => ({ name, marker: { color, size: 4 }, ...make(flights.filter((it) => it.passed === passed)) }));
+  return groups.map(([name, color, passed]) => make(flights.filter((it) => it.passed === passed), { name, marker: { color } }));
 }
 
 function drawHistogram() {
@@ -75,10 +88,10 @@ function drawHistogram() {
   // Both traces share their bins.
   const [low, high] = ends(values);
   const size = (high - low) / 40 || 1;
-  const bars = traces((group) => {
+  const bars = traces((group, trace) => {
     const counts = Array(41).fill(0);
     for (const flight of group) if (flight.figures[index] !== null) counts[Math.floor((flight.figures[index] - low) / size)] += 1;
-    return { type: "bar", x: counts.map((_, bin) => low + (bin + 0.5) * size), y: counts };
+    return { ...trace, type: "bar", x: counts.map((_, bin) => low + (bin + 0.5) * size), y: counts };
   });
   const more = { barmode: "stack", bargap: 0.05, showlegend: true };
   Plotly.react("histogram", bars, layout("", inUnit(figures[index], index), "flights", more), CONFIG);
@@ -86,8 +99,14 @@ function drawHistogram() {
 
 function drawScatter() {
   const [from, to] = [Number(element("varied").value), Number(element("against").value)];
-  const points = traces((group) => ({ type: "scatter", mode: "markers", x: group.map((it) => it.drawn[from]), y: group.map((it) => it.figures[to]), text: group.map((it) => `flight ${it.flight}`) }));
-  Plotly.react("scatter", points, layout("", varied[from], inUnit(short(figures[to]), to), { showlegend: true }), CONFIG);
+  const points = traces((group, { name, marker }) => ({
+    name, type: "scatter", mode: "markers", marker: { ...marker, size: 5, opacity: 0.75 },
+    // The few are drawn over the many.
+    zorder: 2 * group.length < flights.length ? 2 : 1,
+    x: group.map((it) => it.drawn[from]), y: group.map((it) => it.figures[to]), text: group.map((it) => `flight ${it.flight}`),
+  }));
+  const label = inLines(inUnit(figures[to], to)).join("<br>");
+  Plotly.react("scatter", points, layout("", varied[from], label, { showlegend: true }), CONFIG);
 }
 
 for (const [id, names, draw] of [["figure", figures, drawHistogram], ["varied", varied, drawScatter], ["against", figures, drawScatter]]) {
