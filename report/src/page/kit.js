@@ -76,13 +76,16 @@ function offer(id, names) {
   element(id).value = Math.max(names.indexOf(before), 0);
 }
 
+// Labels below the ticks, so that the first one lies lower than the lowest label of the other axis.
+const BELOW = { ticks: "outside", ticklen: 6, tickcolor: "#999" };
+
 const heading = (text) => ({ text, x: 0, xanchor: "left", font: { size: 14 } });
 
 // Axes with these names; `more` of a layout goes before what is usual, axis by axis.
 function layout(text, x, y, { xaxis, yaxis, ...more } = {}) {
   return {
     title: heading(text), showlegend: false, hovermode: "closest", margin: { l: 64, r: 12, t: 36, b: 48 },
-    xaxis: { ...AXIS, title: { text: x }, ...xaxis }, yaxis: { ...AXIS, title: { text: y }, ...yaxis }, ...more,
+    xaxis: { ...AXIS, ...BELOW, title: { text: x }, ...xaxis }, yaxis: { ...AXIS, title: { text: y }, ...yaxis }, ...more,
   };
 }
 

@@ -46,7 +46,7 @@ function drawAxes(axes) {
     hovertemplate: `%{x:.3f} ${data.across.unit}: %{y:.5~g} ${axes.unit}<br>${curve.topic} ${curve.field}<extra>${curve.name}</extra>`,
   }));
   const below = NARROW.matches ? heightBelow("time", traces.map(({ name }) => name)) : 0;
-  const room = below ? { l: 56, r: 8, t: 36, b: 58 + below } : { l: 76, r: LEGEND_WIDTH, t: 36, b: 44 };
+  const room = below ? { l: 56, r: 8, t: 36, b: 64 + below } : { l: 76, r: LEGEND_WIDTH, t: 36, b: 50 };
   return addPlot("time", below ? "" : "wide", traces, layout(axes.title, data.across.label, `${axes.label} [${axes.unit}]`, {
     // A copy: plotly.js changes the one that it is given.
     xaxis: { range: [...data.across.range], zeroline: false, title: { text: data.across.label, standoff: below ? 12 : undefined } }, yaxis: { zeroline: false, automargin: false },
