@@ -188,6 +188,8 @@ const seen = await withPage(address, async (page, wrong) => {
     poses: shown,
     colours: await colours(page),
     plots: await page.evaluate(curvesShown),
+    heads: await page.evaluate(() => [...document.querySelectorAll(".plot-head")].map((head) => head.textContent)),
+    values: await page.evaluate(() => [...document.querySelectorAll(".plot-head .value")].map((value) => value.textContent)),
   };
   if (screenshot) await page.screenshot({ path: screenshot });
   Object.assign(found, { keys: await keys(page), zoomed: await zoom(page), picked: await pick(page, "plant/state position.z") });

@@ -141,6 +141,19 @@ fn a_browser_shows_two_vehicles_in_their_room_and_another_recording_as_a_ghost()
     let heights = seen["plots"][0].as_array().unwrap().iter().filter(|curve| curve["field"] == "position.z");
     let highest: Vec<f64> = heights.map(|curve| curve["spread"][1].as_f64().unwrap()).collect();
     assert_eq!(highest, [laps::SPIKE_M, laps::SPIKE_M]);
+    require_short_heads(&seen);
+}
+
+/// The head of a plot has each topic once, and values of up to four digits, or whole numbers.
+fn require_short_heads(seen: &Value) {
+    let head = seen["heads"][0].as_str().unwrap();
+    assert_eq!(head.matches("/h1/plant/state").count(), 1, "{head}");
+    let values = seen["values"].as_array().unwrap();
+    let digits = |value: &Value| {
+        let text = value.as_str().unwrap().split('e').next().unwrap_or_default();
+        text.trim_start_matches(['-', '0', '.']).chars().filter(char::is_ascii_digit).count()
+    };
+    assert!(!values.is_empty() && values.iter().all(|value| digits(value) <= 5), "{values:?}");
 }
 
 /// Names are those of whoever wrote the recording: they are text, whatever they look like.

@@ -25,6 +25,19 @@ function readable({ path, unit }) {
   return path.startsWith("rotor_speed") ? { unit: "rpm", factor: 30 / Math.PI } : { unit: "deg/s", factor: DEGREES };
 }
 
+/** A value with three digits if it is small, and with four otherwise: more are noise at rest. */
+function shortened(value) {
+  if (!Number.isFinite(value)) return "–";
+  const size = Math.abs(value);
+  return size >= 1e4 ? String(Math.round(value)) : Number(value.toPrecision(size < 0.1 ? 3 : 4)).toString();
+}
+
+/** The part of their paths that several fields share, such as `position` of its three coordinates; empty for none. */
+function sharedPath(fields) {
+  const [first, ...others] = new Set(fields.map((field) => field.replace(/(\.[^.]+|\[\d+\])$/, "")));
+  return others.length || new Set(fields).size < 2 || fields.includes(first) ? "" : first;
+}
+
 const clipped = (text, length) => (text.length > length ? `${text.slice(0, length - 1)}…` : text);
 
 /** The plots that a recording starts with. */
@@ -88,28 +101,39 @@ class Plot {
 
   #heading() {
     const units = [...new Set(this.curves.map(({ unit }) => unit))];
-    const topics = new Set(this.curves.map(({ topic }) => topic));
+    const topics = [...new Set(this.curves.map(({ topic }) => topic))];
     const { recordings } = this.scopes;
     // Names of recordings are long: the key has them once.
     const others = [...new Set(this.curves.map(({ recording }) => recording))].filter((recording) => recording > 0);
     const keys = others.map((recording) => Object.assign(document.createElement("span"), {
       className: "unit", textContent: `(${recording + 1}): ${clipped(recordings[recording].name, 40)}`,
     }));
+    const paths = new Map(topics.map((topic) => [topic, sharedPath(this.curves.filter((curve) => curve.topic === topic).map(({ field }) => field))]));
+    const names = new Map();
     this.values = this.curves.map((curve) => {
       const dash = document.createElement("span");
       dash.className = curve.isDashed ? "dash ghost" : "dash";
       dash.style.borderColor = curveColour(curve.colour);
       const value = Object.assign(document.createElement("span"), { className: "value" });
-      const name = Object.assign(document.createElement("span"), { className: "name", title: `${curve.topic} ${curve.field} of ${recordings[curve.recording].name}` });
       const unit = units.length > 1 && curve.unit ? ` [${clipped(curve.unit, 16)}]` : "";
-      const of = curve.recording > 0 ? ` (${curve.recording + 1})` : "";
-      name.append(dash, `${clipped(topics.size > 1 ? `${curve.topic} ${curve.field}` : curve.field, 60)}${of}${unit}`, value);
-      return { name, value };
+      const of = curve.recording > 0 ? `(${curve.recording + 1})` : "";
+      // The values of one field of several recordings stand beside each other, under one name.
+      const key = JSON.stringify([curve.topic, curve.field]);
+      const known = names.get(key);
+      const name = known ?? Object.assign(document.createElement("span"), { className: "name" });
+      names.set(key, name);
+      name.title = `${known ? `${name.title}, ` : `${curve.topic} ${curve.field} of `}${recordings[curve.recording].name}`;
+      const field = curve.field.slice(paths.get(curve.topic).length).replace(/^\./, "");
+      name.append(dash, ...[known ? "" : `${clipped(field, 60)}${unit}`, of].filter(Boolean), value);
+      return { name, value, topic: curve.topic };
     });
-    const topic = Object.assign(document.createElement("span"), { className: "unit" });
+    // A topic and the path that its fields share stand once, before them.
     const unit = units.length === 1 && units[0] ? ` [${clipped(units[0], 16)}]` : "";
-    topic.textContent = topics.size === 1 ? `${clipped([...topics][0], 60)}${unit}` : unit.trim();
-    this.head.replaceChildren(topic, ...this.values.map(({ name }) => name), ...keys);
+    const groups = topics.flatMap((topic) => [
+      Object.assign(document.createElement("span"), { className: "unit", textContent: `${[clipped(topic, 60), paths.get(topic)].join(" ").trim()}${unit}` }),
+      ...new Set(this.values.filter((shown) => shown.topic === topic).map(({ name }) => name)),
+    ]);
+    this.head.replaceChildren(...groups, ...keys);
     this.edit.setAttribute("aria-label", `Edit the plot of ${this.curves.map(({ field }) => field).join(", ")}`);
   }
 
@@ -311,7 +335,7 @@ class Plot {
       // Those on their way follow.
       if (!row) return;
       const value = row[places(curve)];
-      const text = Number.isFinite(value) ? Number((value * curve.factor).toPrecision(5)).toString() : "–";
+      const text = shortened(value * curve.factor);
       if (this.values[index].value.textContent !== text) this.values[index].value.textContent = text;
     });
   }
