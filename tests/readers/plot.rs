@@ -31,6 +31,7 @@ fn a_browser_draws_every_curve_of_a_flight() {
         require_axes(axes, title, label, lines);
     }
     require_zoom(&seen);
+    assert_eq!(seen["corners"], json!([]), "labels of both axes lie over each other");
 }
 
 fn require_axes(axes: &Value, title: &str, label: &str, [flown, estimated, asked]: [usize; 3]) {

@@ -76,6 +76,17 @@ async function zoom(page) {
   return page.evaluate(() => [...document.querySelectorAll("#time > .js-plotly-plot")].map((plot) => plot._fullLayout.xaxis.range));
 }
 
+/** Titles of the plots in which the lowest label of one axis lies over the first one of the other, with a label at either end. */
+async function corners() {
+  const titles = [];
+  for (const plot of document.querySelectorAll("#time > .js-plotly-plot")) {
+    await Plotly.relayout(plot, { "yaxis.range": [-30, 30], "yaxis.dtick": 10, "xaxis.range": [0, 1] });
+    const [low, first] = [".ytick text", ".xtick text"].map((name) => plot.querySelector(name).getBoundingClientRect());
+    if (low.bottom > first.top && low.right > first.left) titles.push(plot.layout.title.text);
+  }
+  return titles;
+}
+
 async function change(page) {
   await page.select("#vehicle", "1");
   await page.waitForFunction(() =>
@@ -96,6 +107,7 @@ const seen = await withPage(pathToFileURL(file).href, async (page, wrong) => {
   if (screenshot) await page.screenshot({ path: screenshot, fullPage: true });
   const zoomed = first.axes.length ? await zoom(page) : null;
   if (first.vehicles.length > 1) await change(page);
-  return { ...first, colours: space, zoomed, second: first.vehicles.length > 1 ? await page.evaluate(look) : null, wrong };
+  const second = first.vehicles.length > 1 ? await page.evaluate(look) : null;
+  return { ...first, colours: space, zoomed, second, corners: await page.evaluate(corners), wrong };
 }, { before: withoutWebGl ? refuseWebGl : undefined, needsWebGl: rest.includes("needs-webgl") });
 console.log(JSON.stringify(seen));
