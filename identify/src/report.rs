@@ -37,7 +37,7 @@ pub struct Report {
     /// Predictions of the test flights that lose to persistence or to the declared vehicle: then the vehicle file does not
     /// describe these flights, with these effects or without.
     pub losses: Vec<Loss>,
-    /// Part of the weight that the commands bear in the mean of all flights; `None` where it is about the weight, or nothing shows it.
+    /// Thrust of the commands over the weight, for all flights; `None` if they are about equal, or if nothing shows the ratio.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bearing: Option<Bearing>,
     /// Effects that were accepted and taken back.

@@ -42,7 +42,7 @@ pub use crate::horizons::HORIZONS_S;
 /// A residual is worth telling where its persistent part is beyond this part of its noise.
 const UNEXPLAINED: f64 = 0.3;
 
-/// Parts of the weight that commands bear by a vehicle file that is right about them: batteries drain, and weights differ.
+/// Thrust of the commands over the weight by a correct vehicle file: batteries drain, and weights differ.
 const BORNE: std::ops::RangeInclusive<f64> = 0.7..=1.4;
 
 /// Greatest mean distance of samples of motion: beyond it they show nothing, and the computation of every tick
@@ -176,7 +176,7 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
     Ok(Outcome { pictures, regressors, effects, late, sensor_errors, report, believed, questions })
 }
 
-/// Part of the weight that the commands of all flights together bear while they are compared, where that is not about the weight.
+/// Thrust of the commands over the weight while the flights are compared; `None` if both are about equal.
 fn bearing(problem: &Problem) -> Option<Bearing> {
     let of_commands = |flight: &&Prepared| {
         flight.moves_freely && flight.flight.rotor_speed.is_empty() && !flight.flight.command.is_empty()

@@ -1,4 +1,4 @@
-//! Part of the weight that commands bear by a vehicle file, and the scale or the range of the commands that would bear it.
+//! Thrust of commands over the weight by a vehicle file, and the scale or the range of the commands with which both are equal.
 
 use crate::vehicle::{ROTORS_MAX, Vehicle};
 use std::fmt;
@@ -10,19 +10,19 @@ const FACTOR_MAX: f64 = 8.0;
 /// Halvings of the search for a factor.
 const HALVINGS: usize = 50;
 
-/// Part of the weight that commands bear.
+/// Thrust of commands over the weight.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Bearing {
     /// Median thrust over the weight.
     pub share: f64,
-    /// Factor on the commands with which they bear the weight; `None` if none does.
+    /// Factor on the commands with which the thrust equals the weight; `None` if no factor does.
     pub scale: Option<f64>,
-    /// Greatest command of the vehicle file as it is, and the one with which they bear the weight.
+    /// Greatest command of the vehicle file as it is, and the one with which the thrust equals the weight.
     pub max: Option<[f64; 2]>,
 }
 
 impl Bearing {
-    /// The part of the weight of `vehicle` that `commands` bear; `None` without commands or weight.
+    /// Thrust of `commands` over the weight of `vehicle`; `None` without commands or weight.
     ///
     /// ```
     /// use vehicles::{ROTORS_MAX, Vehicle, bearing::Bearing, reference::HUMMINGBIRD};
@@ -74,7 +74,7 @@ fn solved(share: impl Fn(f64) -> f64) -> Option<f64> {
 }
 
 impl Bearing {
-    /// Scale and range with which the commands bear the weight, as text; `None` if none does.
+    /// Scale and range with which the thrust equals the weight, as text; `None` if there is no such scale or range.
     #[must_use]
     pub fn fitting(&self) -> Option<String> {
         let scale = self.scale.map(|scale| format!("commands {scale:.2} times as large"));

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | [`vehicle`] | the immutable [`Vehicle`] that the physics uses |
 //! | [`command`] | the map between a raw motor command and a rotor speed |
-//! | [`bearing`] | the part of the weight that commands bear, and the scale that would bear it |
+//! | [`bearing`] | the thrust of commands over the weight, and the scale with which both are equal |
 //! | `envelope` | the flight envelope in which a model was validated |
 //! | [`provenance`] | where each number came from, kept for reports |
 //! | [`effects`] | the effects that a vehicle or scene file lists, as they are written |

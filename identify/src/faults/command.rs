@@ -78,7 +78,7 @@ fn goes_on(evidence: &Evidence, stretch: &Stretch) -> bool {
     evidence.flight.moves_freely || (spread(false) > 0.0 && spread(true) > 0.5 * spread(false))
 }
 
-/// Share of the weight that the commands carry in the mean; `None` without commands.
+/// Mean thrust of the commands over the weight; `None` without commands.
 fn carried(evidence: &Evidence) -> Option<f64> {
     if evidence.flight.flight.command.is_empty() {
         return None;
