@@ -18,6 +18,7 @@
 //! ```
 
 use crate::COMPONENTS;
+use crate::components::effects;
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::{MotorCommand, Reference, SetPoint};
@@ -33,7 +34,7 @@ pub fn registry() -> Registry {
     static REGISTRY: OnceLock<Registry> = OnceLock::new();
     *REGISTRY.get_or_init(|| {
         let all = [COMPONENTS.components(), &[Registration::of::<Agent>()]].concat();
-        Registry::new(all.leak()).with_programs(COMPONENTS.programs())
+        Registry::new(all.leak()).with_programs(COMPONENTS.programs()).with_effects(effects)
     })
 }
 

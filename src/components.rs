@@ -62,7 +62,7 @@ pub const COMPONENTS: Registry = Registry::new(&[
 .with_effects(effects);
 
 /// Names of the effects that the plant knows.
-fn effects() -> Vec<&'static str> {
+pub(crate) fn effects() -> Vec<&'static str> {
     CATALOGUE.iter().map(|kind| kind.name).collect()
 }
 

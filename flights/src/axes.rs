@@ -3,10 +3,12 @@
 use nalgebra::Vector3;
 
 use crate::agreement::{Agreement, Pairs};
-use crate::declaration::{Entry, Frame};
+use crate::declaration::{EachNumber, Entry, Frame};
 
 /// Orders of the axes other than the declared one.
 const OTHER_ORDERS: [[usize; 3]; 5] = [[1, 0, 2], [2, 1, 0], [0, 2, 1], [1, 2, 0], [2, 0, 1]];
+/// Orders under which correlations differ by less cannot be told apart.
+const ALIKE: f64 = 0.02;
 /// Names of the axes.
 const NAMES: [&str; 3] = ["x", "y", "z"];
 
@@ -20,14 +22,18 @@ pub struct Axes {
 }
 
 impl Axes {
-    /// The order, other than the declared one, under which `pairs` agree best, and their agreement under it; `None` if there are few pairs, or
-    /// the derived vector is mostly below `quiet`.
+    /// The order, other than the declared one, under which `pairs` agree best, and their agreement under it; `None` if there are few pairs, if the
+    /// derived vector is mostly below `quiet`, or if another order fits as well. An axis that hardly moves keeps its sign.
     pub fn that_fit(pairs: &Pairs, quiet: f64) -> Option<(Self, Agreement)> {
-        let signed =
-            (0..8u8).map(|bits| [0, 1, 2].map(|axis| if bits >> axis & 1 == 1 { -1.0 } else { 1.0 }));
+        let sign = |bits: u8, axis: u8| if (bits >> axis) & 1 == 1 { -1.0 } else { 1.0 };
+        let signed = (0..8).map(|bits| [0, 1, 2].map(|axis| sign(bits, axis)));
         let all = signed.flat_map(|signs| OTHER_ORDERS.map(|places| Self { places, signs }));
-        let agreed = all.filter_map(|axes| Some((axes, axes.agreement(pairs, quiet)?)));
-        agreed.max_by(|(_, a), (_, b)| a.correlation.total_cmp(&b.correlation))
+        let agreed: Vec<_> = all.filter_map(|axes| Some((axes, axes.agreement(pairs, quiet)?))).collect();
+        let best = agreed.iter().map(|(_, agreement)| agreement.correlation).fold(-1.0, f64::max);
+        let fitting = || agreed.iter().filter(|(_, agreement)| agreement.correlation > best - ALIKE);
+        let minuses = |axes: &Self| axes.signs.iter().filter(|sign| **sign < 0.0).count();
+        let (axes, agreement) = fitting().min_by_key(|(axes, _)| minuses(axes))?;
+        fitting().all(|(other, _)| other.places == axes.places).then_some((*axes, *agreement))
     }
 
     fn agreement(&self, pairs: &Pairs, quiet: f64) -> Option<Agreement> {
@@ -35,20 +41,23 @@ impl Axes {
         pairs.turned(|v| Vector3::new(v[x], v[y], v[z]).component_mul(&Vector3::from(signs))).agreement(quiet)
     }
 
-    /// The columns of `entry` in this order, as its `columns` would state them, or else the axes.
+    /// The names of `entry` in this order, or else the axes.
     pub fn advice(&self, entry: Option<&Entry>) -> String {
         // Where the log has y and z the other way, so have the vector's signs.
         let frame = entry.and_then(|entry| entry.frame).unwrap_or_default();
         let of_frame = if frame == Frame::FrdNed { [1.0, -1.0, -1.0] } else { [1.0; 3] };
         let sign = |axis: usize| of_frame[axis] * self.signs[axis] * of_frame[self.places[axis]];
         let minus = |is_negated: bool| if is_negated { "-" } else { "" };
-        match entry.and_then(|entry| entry.columns.as_deref()) {
-            Some(names) if names.len() == NAMES.len() => {
+        match entry.and_then(|entry| Some((entry, entry.columns.as_deref()?))) {
+            Some((entry, names)) if names.len() == NAMES.len() => {
                 let name = |axis: usize| {
                     let name = &names[self.places[axis]];
                     format!("\"{}{}\"", minus(name.sign() * sign(axis) < 0.0), name.plain)
                 };
-                format!("`columns = [{}, {}, {}]`", name(0), name(1), name(2))
+                let mut each = [&entry.scale, &entry.offset].into_iter().flatten();
+                let has_each = each.any(|each| matches!(each, EachNumber::Each(_)));
+                let also = if has_each { ", and `scale` and `offset` in the same order" } else { "" };
+                format!("the names in the order [{}, {}, {}]{also}", name(0), name(1), name(2))
             }
             _ => {
                 let name = |axis: usize| format!("{}{}", minus(sign(axis) < 0.0), NAMES[self.places[axis]]);
@@ -86,6 +95,19 @@ mod tests {
         assert_eq!(axes, Axes { places: [2, 0, 1], signs: [-1.0, 1.0, 1.0] });
         assert!((agreement.correlation - 1.0).abs() < 1e-12);
         assert_eq!(axes.advice(None), "the axes in the order -z, x, y");
+    }
+
+    #[test]
+    fn an_axis_that_does_not_move_keeps_its_sign_and_one_that_moves_alone_shows_no_order() {
+        let course =
+            |of: fn(f64) -> Vector3<f64>| (0..60).map(|k| of(0.1 * f64::from(k))).collect::<Vec<_>>();
+        let level = course(|t| Vector3::new(libm::sin(t), libm::cos(1.7 * t), 0.0));
+        let logged = level.iter().map(|v| Vector3::new(v.y, v.x, 0.0)).collect();
+        let (axes, _) = Axes::that_fit(&Pairs { logged, derived: level }, 0.05).unwrap();
+        assert_eq!(axes, Axes { places: [1, 0, 2], signs: [1.0; 3] });
+        let rolling = course(|t| Vector3::new(libm::sin(t), 0.0, 0.0));
+        let logged = rolling.iter().map(|v| Vector3::new(0.0, v.x, 0.0)).collect();
+        assert!(Axes::that_fit(&Pairs { logged, derived: rolling }, 0.05).is_none());
     }
 
     #[test]

@@ -26,7 +26,7 @@ const OTHER_NAMES: [(Quantity, &[&str]); 9] = [
     (Quantity::BatteryVoltage, &["battery", "vbat", "voltage"]),
 ];
 
-/// The channel that was meant, where the error `told` of a list of names ends in a name that is not in it.
+/// Name of the channel that was probably meant, if `told` refuses the name of a channel.
 fn meant(told: &str) -> Option<&'static str> {
     let (all, found) = told.lines().next()?.rsplit_once(", found `")?;
     let found = found.strip_suffix('`').filter(|_| all.contains("`angular_velocity`"))?;

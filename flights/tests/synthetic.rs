@@ -496,9 +496,9 @@ fn a_quaternion_with_w_first_or_the_wrong_way_is_found() {
 fn a_gyroscope_with_its_axes_in_another_order_is_found() {
     let declared = "[\"wx\", \"wy\", \"wz\"]";
     for (columns, frd_ned, fits) in [
-        ("[\"wy\", \"wx\", \"wz\"]", false, "`columns = [\"wx\", \"wy\", \"wz\"]`"),
-        ("[\"wz\", \"-wx\", \"wy\"]", false, "`columns = [\"wx\", \"wy\", \"wz\"]`"),
-        ("[\"wy\", \"-wx\", \"wz\"]", true, "`columns = [\"wx\", \"wy\", \"wz\"]`"),
+        ("[\"wy\", \"wx\", \"wz\"]", false, "the names in the order [\"wx\", \"wy\", \"wz\"]"),
+        ("[\"wz\", \"-wx\", \"wy\"]", false, "the names in the order [\"wx\", \"wy\", \"wz\"]"),
+        ("[\"wy\", \"-wx\", \"wz\"]", true, "the names in the order [\"wx\", \"wy\", \"wz\"]"),
     ] {
         let channels = CHANNELS.replace(declared, columns);
         let channels = if frd_ned { channels.replace(" }", ", frame = \"frd-ned\" }") } else { channels };

@@ -22,9 +22,9 @@ pub fn rounded(value: f64) -> String {
     }
 }
 
-/// Lengths up to this are printed in mm, m.
+/// Length, in m, up to which lengths are printed in mm.
 const MM_TO_M: f64 = 0.1;
-/// No length beside a longer one than this is printed in mm, m.
+/// Length, in m, from which on a row of lengths is printed in m.
 const MM_BESIDE_M: f64 = 10.0;
 
 /// Values for people who fly, and their unit: short lengths in mm, powers of ten and of units with raised digits.

@@ -284,7 +284,7 @@ fn a_gyroscope_that_is_frozen_mirrored_or_scaled() {
     }
 }
 
-/// Numbers that have nothing to do with the turn of the vehicle are no gyroscope's.
+/// A gyroscope whose numbers do not follow the attitude is a fault.
 #[test]
 fn a_gyroscope_without_any_relation_to_the_attitude() {
     let fault = require_broken(false, "angular_velocity", "unrelated", |flight| {
@@ -293,7 +293,7 @@ fn a_gyroscope_without_any_relation_to_the_attitude() {
             *value = [libm::sin(9.1 * t), libm::cos(7.7 * t), libm::sin(5.9 * t)];
         }
     });
-    assert!(fault.found.contains("correlations of at most 0."), "{fault:?}");
+    assert!(fault.found.contains("correlation of at most 0."), "{fault:?}");
 }
 
 #[test]

@@ -88,9 +88,11 @@ impl Comparison {
 /// If one of them is damaged.
 pub fn compare(a: &Recording, b: &Recording) -> Result<Comparison, RecordingError> {
     let (mut only_a, mut only_b) = (LastTicks::new(), LastTicks::new());
-    let found = compare_shared(a, b, shared(a, b, &mut only_a), shared(b, a, &mut only_b))?;
-    let Shared { messages, fields, begin, refused } = found;
+    let begin = begin(a, b)?;
+    let found = compare_shared((a, b), shared(a, b, &mut only_a), shared(b, a, &mut only_b), begin)?;
+    let Shared { messages, fields, refused } = found;
     // A run from a checkpoint lacks topics that the whole run used before the checkpoint alone.
+    let begin = begin.filter(|_| messages > 0).unwrap_or_default();
     let from = |only: LastTicks| -> Vec<String> {
         only.into_iter().filter(|(_, last_tick)| *last_tick >= begin).map(|(topic, _)| topic).collect()
     };
@@ -105,9 +107,14 @@ type LastTicks = BTreeMap<String, u32>;
 struct Shared {
     messages: u64,
     fields: Fields,
-    /// First tick of the recording that begins later; 0 if both begin together.
-    begin: u32,
     refused: Option<Difference>,
+}
+
+/// First tick of the recording that begins later; `None` if both begin together.
+fn begin(a: &Recording, b: &Recording) -> Result<Option<u32>, RecordingError> {
+    let first = |recording: &Recording| recording.messages().next().transpose();
+    let ticks = first(a)?.zip(first(b)?).map(|(x, y)| (x.tick, y.tick));
+    Ok(ticks.filter(|(x, y)| x != y).map(|(x, y)| x.max(y)))
 }
 
 /// Messages of `of` on the topics that `other` has, too. The last ticks of the others go to `only`.
@@ -130,23 +137,21 @@ fn shared<'a>(
     of.messages().filter(is_shared).peekable()
 }
 
-/// Compares the messages `left` of `a` with the messages `right` of `b`.
+/// Compares the messages `left` of `a` with the messages `right` of `b`, from the tick `begin` on.
 fn compare_shared(
-    a: &Recording,
-    b: &Recording,
+    (a, b): (&Recording, &Recording),
     mut left: Messages<impl Iterator<Item = Result<Record, RecordingError>>>,
     mut right: Messages<impl Iterator<Item = Result<Record, RecordingError>>>,
+    begin: Option<u32>,
 ) -> Result<Shared, RecordingError> {
-    let mut begin = 0;
-    if let (Some(x), Some(y)) = (first_of(&mut left), first_of(&mut right))
-        && x.tick != y.tick
+    if let (Some(begin), Some(x), Some(y)) = (begin, first_of(&mut left), first_of(&mut right))
+        && !(skip_to(&mut left, begin) && skip_to(&mut right, begin))
     {
-        begin = x.tick.max(y.tick);
-        if !(skip_to(&mut left, begin) && skip_to(&mut right, begin)) {
-            // One ends before the other begins.
-            let refused = Some(message_difference(&x, &y));
-            return Ok(Shared { messages: 0, fields: Fields::default(), begin, refused });
-        }
+        // One ends before the other begins.
+        let refused = Some(message_difference(&x, &y));
+        drain(left);
+        drain(right);
+        return Ok(Shared { messages: 0, fields: Fields::default(), refused });
     }
     let mut fields = Fields::default();
     let (mut messages, mut last_tick) = (0, None);
@@ -171,10 +176,14 @@ fn compare_shared(
             }
         }
     };
-    // The rest names the topics that only one recording has.
-    left.take_while(Result::is_ok).for_each(drop);
-    right.take_while(Result::is_ok).for_each(drop);
-    Ok(Shared { messages, fields, begin, refused })
+    drain(left);
+    drain(right);
+    Ok(Shared { messages, fields, refused })
+}
+
+/// Reads `messages` to their end: reading names the topics that only one recording has.
+fn drain(messages: impl Iterator<Item = Result<Record, RecordingError>>) {
+    messages.take_while(Result::is_ok).for_each(drop);
 }
 
 /// Differences by topic and path.
@@ -353,6 +362,10 @@ mod tests {
         let apart = climb_on(folder.path(), "c.mcap", &[("/start", 0..2)], 0.0);
         let found = compare(&apart, &later).unwrap();
         assert_eq!((found.messages, found.only_a.len(), found.only_b.len()), (0, 1, 1));
+        // A shared topic that begins later is not a recording that begins later.
+        let late = climb_on(folder.path(), "d.mcap", &[("/start", 0..2), ("/plant/state", 5..20)], 0.0);
+        let found = compare(&late, &climb(folder.path(), "e.mcap", 0..20, 0.0)).unwrap();
+        assert!(found.refused.is_some() && found.only_a == only("/start"), "{found:?}");
     }
 
     #[test]

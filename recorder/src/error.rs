@@ -106,7 +106,8 @@ pub enum RecordingError {
 
 /// Question for the name among those in `known` that `found` was probably meant to be; empty if none is near.
 fn meant(found: &str, known: &str) -> String {
-    let near = nearest(found, known.split(", "));
+    // An ellipsis stands for the further elements of an array.
+    let near = nearest(found, known.split(", ").filter(|name| *name != "…"));
     near.map_or(String::new(), |near| format!(" (did you mean `{}`?)", printable_line(near)))
 }
 

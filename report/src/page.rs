@@ -13,10 +13,10 @@ use std::io::Read;
 pub const MARK: &str = r#"<meta name="generator" content="hummingbus">"#;
 
 /// plotly.js with lines, bars and pies.
-pub const PLOTLY_BASIC: Bundle = Bundle(include_bytes!(concat!(env!("OUT_DIR"), "/plotly-basic.min.zlib")));
+pub static PLOTLY_BASIC: Bundle = Bundle(include_bytes!(concat!(env!("OUT_DIR"), "/plotly-basic.min.zlib")));
 /// plotly.js with lines, and lines and bodies in space.
 #[cfg(feature = "plots")]
-pub(crate) const PLOTLY_3D: Bundle =
+pub(crate) static PLOTLY_3D: Bundle =
     Bundle(include_bytes!(concat!(env!("OUT_DIR"), "/plotly-gl3d.min.zlib")));
 
 /// A script that the program holds compressed.

@@ -63,7 +63,7 @@ pub fn run(arguments: &RunOrForkArguments) -> Result<bool> {
     let text = |from: &Path| text(from, flights, &run.set, &fork.vary);
     campaign::fly(Flying {
         path: folder.join(FILE),
-        // The folder need not be there yet, and a path through it would lead nowhere.
+        // The folder need not be there yet, and a relative path through a missing folder cannot be opened.
         text: text(&from)?,
         made: Some(text(&from_folder(&from, &folder))?),
         folder,

@@ -159,7 +159,7 @@ fn a_backup_that_would_not_fit_the_graph() {
         "\n§[[swap]]\nprocess = \"pilot\"\nat_tick = 50\nshadow_ticks = 9\nwith = { kind = \"operator\" }\n";
     refused_with(pilot).says(&[
         "add parameters.initial_altitude_m = … to the keys of the backup",
-        "a backup of another kind keeps `inputs`, `vehicle` and `scene`, but neither `parameters` nor `gains`",
+        "a backup of another kind keeps `inputs`, and `vehicle` and `scene` if that kind reads them, but neither `parameters` nor `gains`",
     ]);
     let ended = at_swap("kind = \"imu\"\ninputs = { state = \"/plant/state\" }");
     ended.says(&["the kind `imu` publishes `imu` [hummingbus_msgs/msg/Imu]"]);

@@ -45,7 +45,7 @@ pub fn find(evidence: &Evidence) -> Option<Fault> {
     };
     (0..3).find_map(compared).or_else(|| {
         let found = format!(
-            "nothing of it (correlations of at most {:.2}, at any delay up to 0.2 s)",
+            "numbers that do not follow it (correlation of at most {:.2} at any delay up to 0.2 s)",
             unrelated(&twins)?
         );
         let expected = "the rate at which the attitude turns".into();

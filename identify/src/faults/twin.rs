@@ -77,7 +77,8 @@ impl Twin {
     pub fn unrelated(&self) -> Option<f64> {
         let (low, high) = self.extremes();
         let largest = high.max(-low);
-        (largest < UNRELATED).then_some(largest)
+        // Too few values have a correlation of zero.
+        (largest > 0.0 && largest < UNRELATED).then_some(largest)
     }
 
     /// Ratio of the sizes of measured and expected signal, if one follows the other.

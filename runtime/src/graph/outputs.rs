@@ -288,7 +288,10 @@ fn change_of_kind(declared: &DeclaredNode<'_>, port: &Spanned<String>) -> Option
     if let Some(argument) = manifest.sources.argument(&kind.span()) {
         return Some(argument);
     }
-    let is_kept = |before: &Process| before.inputs.keys().any(|input| input.span() == port.span());
+    let is_other =
+        |before: &Process| before.kind.as_ref().is_none_or(|before| before.get_ref() != kind.get_ref());
+    let is_kept =
+        |before: &Process| is_other(before) && before.inputs.keys().any(|input| input.span() == port.span());
     let is_of_before = declared.is_backup() && manifest.content.process.values().any(is_kept);
     is_of_before.then(|| format!("the backup of `{}`", name.get_ref()))
 }

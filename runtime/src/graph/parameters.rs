@@ -238,8 +238,8 @@ fn refused(declared: &DeclaredNode<'_>, error: &ParameterError) -> Diagnostic {
             let value =
                 if file.is_some() { format!("{key} = \"PATH\"") } else { format!("parameters.{key} = …") };
             format!(
-                "add {value} to the keys of the backup; a backup of another kind keeps `inputs`, `vehicle` and `scene`, but neither `parameters` nor \
-                 `gains`"
+                "add {value} to the keys of the backup; a backup of another kind keeps `inputs`, and `vehicle` and `scene` if that kind reads them, but \
+                 neither `parameters` nor `gains`"
             )
         }
         ParameterError::Missing { .. } if file.is_some() => {

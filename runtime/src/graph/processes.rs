@@ -226,7 +226,9 @@ fn objection(path: &Path) -> Option<(&'static str, &'static str)> {
 /// True for the interpreter of a Python environment, such as `venv/bin/python`.
 fn is_python_of_environment(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    name.starts_with("python") && path.parent().is_some_and(|folder| folder.ends_with("bin"))
+    name.starts_with("python")
+        && !path.starts_with("/usr")
+        && path.parent().is_some_and(|folder| folder.ends_with("bin"))
 }
 
 /// True if no kernel can execute the file: it is text that does not begin with `#!`. The C library would pass any

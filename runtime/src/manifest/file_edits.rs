@@ -205,8 +205,8 @@ impl FileEdit {
     }
 
     /// Adds an effect that the file does not list behind those that it lists, with the neutral values of its parameters.
-    /// Refuses one whose value has no unit: only a quantity of the file would give it. The effects that there are have the names
-    /// `effects`.
+    /// Refuses one whose value has no unit: only a quantity of the file would give it. `effects` are the names of
+    /// all effects.
     fn list_effect(&self, document: &mut DocumentMut, effects: &[&str]) -> Result<(), String> {
         let [list, name, ..] = self.keys.as_slice() else { return Ok(()) };
         if list != EFFECTS || name.parse::<usize>().is_ok() {
@@ -308,7 +308,7 @@ fn at<'i>(inside: &'i Item, key: &str) -> Option<&'i Item> {
     }
 }
 
-/// Advice on the effect `name` that a file does not list; the effects that there are have the names `effects`.
+/// Advice on the effect `name` that a file does not list; `effects` are the names of all effects.
 fn way_out(name: &str, effects: &[&str]) -> String {
     let near = nearest(name, effects.iter().copied());
     match near.filter(|near| *near != name) {
@@ -352,7 +352,7 @@ mod tests {
         let base = |path: &str| {
             (path == "b.toml").then(|| "[body]\nmass = { value = 1, unit = \"kg\" }\nlength = 2\n".into())
         };
-        let found = edited("base = \"b.toml\"\n", &[&edit], &base).unwrap();
+        let found = edited("base = \"b.toml\"\n", &[&edit], &[], &base).unwrap();
         assert_eq!(found, "base = \"b.toml\"\n[body]\nmass = { value = 0.5, unit = \"kg\" }\nlength = 2\n");
     }
 

@@ -244,9 +244,10 @@ impl<'a> Decisions<'a> {
     /// Ends those that do not come up or do not leave in their time; their ends are settled like any other.
     pub fn note_laggards(&mut self) {
         if let Some((node, generation)) = self.replacements.unprepared() {
-            let patience = self.replacements.program_of(node, generation).watchdog.as_millis();
-            let message =
-                format!("was killed by the watchdog: it did not join within {patience} ms; {HOW_TO_JOIN}");
+            let program = self.replacements.program_of(node, generation);
+            let patience = program.watchdog.as_millis();
+            let how = if program.kind().is_none() { format!("; {HOW_TO_JOIN}") } else { String::new() };
+            let message = format!("was killed by the watchdog: it did not join within {patience} ms{how}");
             self.replacements.view.kill_for(node, generation, message);
         }
         if let Some((node, generation)) = self.replacements.lingering() {
