@@ -3,6 +3,7 @@
 use crate::component_failure::ComponentFailure;
 use crate::diagnostic::Diagnostic;
 use crate::parameter::ParameterError;
+use anyhow::Chain;
 use std::{fmt, io};
 
 /// Result of a function of the library.
@@ -70,19 +71,76 @@ impl Error {
         self.find_cause::<ComponentFailure>()?.process()
     }
 
-    /// Text of the error and of its causes, in one line where theirs are.
+    /// Text of the error and of its causes, in one line where theirs are. A cause whose text is already in it is left out.
+    ///
+    /// ```
+    /// use diagnostics::Error;
+    ///
+    /// #[derive(Debug, thiserror::Error)]
+    /// #[error("cannot read a.toml: {source}")]
+    /// struct Unreadable {
+    ///     source: std::io::Error,
+    /// }
+    ///
+    /// let error = Error::new(Unreadable { source: std::io::Error::other("the disk is gone") });
+    /// assert_eq!(error.with_causes(), "cannot read a.toml: the disk is gone");
+    /// ```
     #[must_use]
     pub fn with_causes(&self) -> String {
-        format!("{:#}", self.0)
+        self.0.chain().skip(1).fold(self.to_string(), |text, cause| {
+            if has_text_of(&text, cause) { text } else { format!("{text}: {cause}") }
+        })
     }
 
     /// The first error of type `T` among this one and its causes.
     fn find_cause<T: std::error::Error + 'static>(&self) -> Option<&T> {
-        self.0.chain().find_map(|cause| match cause.downcast_ref::<Self>() {
-            Some(error) => error.find_cause(),
-            None => cause.downcast_ref(),
-        })
+        find(self.0.chain())
     }
+}
+
+/// The first error of type `T` in a chain of causes.
+fn find<T: std::error::Error + 'static>(mut chain: Chain<'_>) -> Option<&T> {
+    chain.find_map(|cause| match cause.downcast_ref::<Error>() {
+        Some(error) => error.find_cause(),
+        // A box is an error of its own, which has the causes of its content.
+        None => cause.downcast_ref::<T>().or_else(|| cause.downcast_ref::<Box<T>>().map(|boxed| &**boxed)),
+    })
+}
+
+/// The first fault of a file among `error` and its causes.
+///
+/// ```
+/// use diagnostics::{Diagnostic, Error, find_diagnostic};
+///
+/// let error = Error::from(Diagnostic::in_file("a.toml", "no rotors"));
+/// assert_eq!(find_diagnostic(&error).unwrap().file, "a.toml");
+/// assert_eq!(find_diagnostic(&std::io::Error::other("the disk is gone")), None);
+/// ```
+#[must_use]
+pub fn find_diagnostic<'e>(error: &'e (dyn std::error::Error + 'static)) -> Option<&'e Diagnostic> {
+    find(Chain::new(error))
+}
+
+/// True if `text` contains the text of `cause`, with or without the lines of files. Of several faults, it may contain each
+/// at another place.
+///
+/// ```
+/// use diagnostics::{Diagnostic, has_text_of};
+///
+/// let fault = Diagnostic::in_file("a.toml", "no rotors").and([Diagnostic::in_file("a.toml", "no mass")]);
+/// assert!(has_text_of("a.toml: no rotors; b.toml: empty; a.toml: no mass", &fault));
+/// assert!(!has_text_of("a.toml: no rotors", &fault));
+/// ```
+#[must_use]
+pub fn has_text_of(text: &str, cause: &(dyn std::error::Error + 'static)) -> bool {
+    let has =
+        |part: &dyn fmt::Display| text.contains(&part.to_string()) || text.contains(&format!("{part:#}"));
+    has(&cause) || find_here(cause).is_some_and(|fault| fault.all().all(|one| has(&one)))
+}
+
+/// `cause` as faults of a file, if it is that itself.
+fn find_here<'e>(cause: &'e (dyn std::error::Error + 'static)) -> Option<&'e Diagnostic> {
+    cause.downcast_ref().or_else(|| cause.downcast_ref::<Box<Diagnostic>>().map(|boxed| &**boxed))
 }
 
 impl fmt::Display for Error {
@@ -194,5 +252,43 @@ mod tests {
         let text = format!("{error:?}");
         assert!(text.starts_with("cannot write") && text.contains("permission denied"), "{text}");
         assert_eq!(error.with_causes(), "cannot write: permission denied");
+    }
+
+    /// An error whose text contains that of its cause.
+    #[derive(Debug, thiserror::Error)]
+    #[error("cannot write {path}: {source}")]
+    struct Unwritable {
+        path: &'static str,
+        source: io::Error,
+    }
+
+    #[test]
+    fn each_text_is_told_once() {
+        let unwritable = |path| Unwritable { path, source: refused() };
+        assert_eq!(Error::new(unwritable("a")).with_causes(), "cannot write a: permission denied");
+        let within = anyhow::Error::from(unwritable("a")).context("the run ended");
+        assert_eq!(Error::from(within).with_causes(), "the run ended: cannot write a: permission denied");
+        // A context that does not contain its cause is followed by it.
+        let within = anyhow::Error::from(unwritable("a")).context("cannot write b");
+        assert_eq!(Error::from(within).with_causes(), "cannot write b: cannot write a: permission denied");
+    }
+
+    /// Faults of a file behind a text that contains them.
+    #[derive(Debug, thiserror::Error)]
+    #[error("the vehicle: {cause}")]
+    struct Boxed {
+        #[source]
+        cause: Box<Diagnostic>,
+    }
+
+    #[test]
+    fn a_diagnostic_in_a_box_is_found_and_told_once() {
+        let fault = Diagnostic::in_file("a.toml", "no rotors");
+        let error = Error::new(Boxed { cause: Box::new(fault.clone()) });
+        assert_eq!(error.diagnostic(), Some(&fault));
+        assert!(error.is_input() && !error.is_system());
+        assert_eq!(error.with_causes(), "the vehicle: a.toml: no rotors");
+        let within = Error::from(anyhow::Error::from(error).context("cannot fly"));
+        assert_eq!(find_diagnostic(&within), Some(&fault));
     }
 }

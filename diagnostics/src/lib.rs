@@ -34,7 +34,7 @@ pub mod unit;
 
 pub use component_failure::ComponentFailure;
 pub use diagnostic::{Diagnostic, Faults};
-pub use error::{Error, Result};
+pub use error::{Error, Result, find_diagnostic, has_text_of};
 pub use nearest::{did_you_mean, nearest};
 pub use parameter::ParameterError;
 pub use place::Place;

@@ -24,7 +24,7 @@ use crate::span::Sparse;
 #[derive(Debug, thiserror::Error)]
 pub enum FlightsError {
     /// The flights file cannot be read, is not TOML, or has an invalid key or value.
-    #[error(transparent)]
+    #[error(fmt = std::fmt::Display::fmt)]
     File(#[from] Diagnostic),
     /// The vehicle file is not usable.
     #[error(fmt = vehicle)]
@@ -108,6 +108,9 @@ pub enum FlightsError {
     Several {
         /// All, in the order of the file.
         all: Vec<FlightsError>,
+        /// Faults of files among them.
+        #[source]
+        faults: Option<Box<Diagnostic>>,
     },
 }
 
@@ -118,7 +121,7 @@ fn vehicle(place: &Place, cause: &Diagnostic, f: &mut fmt::Formatter<'_>) -> fmt
 }
 
 /// As [`vehicle`].
-fn several(all: &[FlightsError], f: &mut fmt::Formatter<'_>) -> fmt::Result {
+fn several(all: &[FlightsError], _: &Option<Box<Diagnostic>>, f: &mut fmt::Formatter<'_>) -> fmt::Result {
     all.iter().enumerate().try_for_each(|(index, error)| {
         if index > 0 {
             writeln!(f)?;
@@ -127,7 +130,33 @@ fn several(all: &[FlightsError], f: &mut fmt::Formatter<'_>) -> fmt::Result {
     })
 }
 
+impl From<FlightsError> for diagnostics::Error {
+    fn from(error: FlightsError) -> Self {
+        Self::new(error)
+    }
+}
+
 impl FlightsError {
+    /// The fault of a file, with its place and advice; of several errors, those that are faults of files.
+    ///
+    /// ```
+    /// let error = flights::FlightSet::load("nowhere.toml".as_ref()).unwrap_err();
+    /// assert_eq!(error.diagnostic().unwrap().file, "nowhere.toml");
+    /// ```
+    #[must_use]
+    pub fn diagnostic(&self) -> Option<&Diagnostic> {
+        match self {
+            Self::File(fault) => Some(fault),
+            Self::Vehicle { cause, .. } => Some(cause),
+            Self::Several { faults, .. } => faults.as_deref(),
+            Self::Log { .. }
+            | Self::Implausible { .. }
+            | Self::NotHeldOut { .. }
+            | Self::Write { .. }
+            | Self::NoRows { .. } => None,
+        }
+    }
+
     /// Nothing, or all `errors` as one.
     pub(crate) fn gather(errors: Vec<Self>) -> Result<(), Self> {
         Self::gather_with(Ok(()), errors)
@@ -141,9 +170,15 @@ impl FlightsError {
             Err(error) if errors.is_empty() => Err(error),
             result => {
                 errors.extend(result.err());
-                Err(if errors.len() == 1 { errors.remove(0) } else { Self::Several { all: errors } })
+                Err(if errors.len() == 1 { errors.remove(0) } else { Self::several(errors) })
             }
         }
+    }
+
+    fn several(all: Vec<Self>) -> Self {
+        let mut faults = all.iter().filter_map(Self::diagnostic).cloned();
+        let faults = faults.next().map(|first| Box::new(first.and(faults)));
+        Self::Several { all, faults }
     }
 }
 
@@ -274,4 +309,48 @@ fn named(channel: Option<Quantity>) -> String {
 
 fn list(findings: &[Finding]) -> String {
     findings.iter().map(|finding| format!("\n  - {}", finding.message)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use diagnostics::Error;
+
+    fn fault(file: &str) -> Diagnostic {
+        Diagnostic::at(Place::of(file, "x = 1\ny = 2\n", &(10..11)), "too small").help("give another")
+    }
+
+    fn vehicle(file: &str) -> FlightsError {
+        let place = Place::of("flights.toml", "vehicle = \"v.toml\"\n", &(10..18));
+        FlightsError::Vehicle { place, cause: Box::new(fault(file)) }
+    }
+
+    fn no_rows() -> FlightsError {
+        FlightsError::NoRows { flight: "a".to_owned(), found: "none".to_owned() }
+    }
+
+    #[test]
+    fn the_fault_of_a_file_is_handed_on_with_its_place() {
+        for error in [FlightsError::from(fault("v.toml")), vehicle("v.toml")] {
+            assert_eq!(error.diagnostic(), Some(&fault("v.toml")));
+            let (text, text_with_lines) = (error.to_string(), format!("{error:#}"));
+            let error = Error::from(error);
+            assert!(error.is_input() && error.diagnostic() == Some(&fault("v.toml")), "{error}");
+            assert_eq!((error.with_causes(), format!("{error:#}")), (text, text_with_lines));
+        }
+        assert_eq!(no_rows().diagnostic(), None);
+    }
+
+    #[test]
+    fn of_several_errors_all_faults_of_files_are_handed_on() {
+        let all = vec![vehicle("v.toml"), no_rows(), FlightsError::from(fault("flights.toml"))];
+        let error = FlightsError::gather(all).unwrap_err();
+        let text = error.to_string();
+        let error = Error::from(error);
+        let files: Vec<String> = error.diagnostic().unwrap().all().map(|fault| fault.file).collect();
+        assert_eq!(files, ["v.toml", "flights.toml"]);
+        assert_eq!(error.with_causes(), text);
+        let error = FlightsError::gather(vec![no_rows(), no_rows()]).unwrap_err();
+        assert!(error.diagnostic().is_none() && !Error::from(error).is_input());
+    }
 }

@@ -15,7 +15,7 @@ use flights::{Flight, FlightSet, Role};
 #[derive(Debug, thiserror::Error)]
 pub enum IdentifyError {
     /// The vehicle file.
-    #[error(transparent)]
+    #[error(fmt = std::fmt::Display::fmt)]
     Vehicle(#[from] Diagnostic),
     /// A role that no flight has.
     #[error("no flight with role \"{role}\" can be used: {reason}")]
@@ -25,6 +25,31 @@ pub enum IdentifyError {
         /// Reasons, flight by flight.
         reason: String,
     },
+}
+
+impl IdentifyError {
+    /// The fault of the vehicle file, with its place and advice.
+    ///
+    /// ```
+    /// use diagnostics::Diagnostic;
+    /// use identify::run::IdentifyError;
+    ///
+    /// let error = IdentifyError::from(Diagnostic::in_file("bird.toml", "no rotors"));
+    /// assert_eq!(error.diagnostic().unwrap().file, "bird.toml");
+    /// ```
+    #[must_use]
+    pub fn diagnostic(&self) -> Option<&Diagnostic> {
+        match self {
+            Self::Vehicle(fault) => Some(fault),
+            Self::NoFlight { .. } => None,
+        }
+    }
+}
+
+impl From<IdentifyError> for diagnostics::Error {
+    fn from(error: IdentifyError) -> Self {
+        Self::new(error)
+    }
 }
 
 /// The error of a role that has no flight besides those with faults; `None` if none has one.

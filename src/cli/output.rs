@@ -3,7 +3,10 @@
 
 use anyhow::{Context, Result};
 use diagnostics::parameter::FileFault;
-use diagnostics::{Diagnostic, ParameterError, Place, plain, printable, printable_json, short_lines};
+use diagnostics::{
+    Diagnostic, ParameterError, Place, find_diagnostic, has_text_of, plain, printable, printable_json,
+    short_lines,
+};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::borrow::Cow;
@@ -94,11 +97,7 @@ pub fn message(error: &anyhow::Error) -> String {
 fn whole_message(error: &anyhow::Error) -> String {
     let first = error.chain().next().map_or(String::new(), |first| format!("{first:#}"));
     error.chain().skip(1).fold(first, |text, cause| {
-        if text.contains(&cause.to_string()) || text.contains(&format!("{cause:#}")) {
-            text
-        } else {
-            format!("{text}: {cause:#}")
-        }
+        if has_text_of(&text, cause) { text } else { format!("{text}: {cause:#}") }
     })
 }
 
@@ -121,10 +120,7 @@ pub fn print_error_json(value: &Value) {
 
 /// The faults of files in an error.
 fn diagnostic(error: &anyhow::Error) -> Option<&Diagnostic> {
-    error.chain().find_map(|cause| match cause.downcast_ref::<diagnostics::Error>() {
-        Some(error) => error.diagnostic(),
-        None => cause.downcast_ref(),
-    })
+    find_diagnostic(&**error)
 }
 
 /// The faults of files that an error is about.

@@ -17,7 +17,7 @@ use vehicles::table::TableError;
 pub enum RotorError {
     /// A file cannot be read, is not TOML, or has an invalid key or value; also the vehicle file that the rest
     /// is taken from.
-    #[error(transparent)]
+    #[error(fmt = std::fmt::Display::fmt)]
     File(#[from] Diagnostic),
     /// A flights file or one of its logs cannot be used.
     #[error(transparent)]
@@ -123,7 +123,37 @@ pub enum RotorError {
     Json(#[from] serde_json::Error),
 }
 
+impl From<RotorError> for diagnostics::Error {
+    fn from(error: RotorError) -> Self {
+        Self::new(error)
+    }
+}
+
 impl RotorError {
+    /// The fault of a file, with its place and advice.
+    ///
+    /// ```
+    /// let error = identify::rotor::run("nowhere.toml".as_ref()).unwrap_err();
+    /// assert_eq!(error.diagnostic().unwrap().file, "nowhere.toml");
+    /// ```
+    #[must_use]
+    pub fn diagnostic(&self) -> Option<&Diagnostic> {
+        match self {
+            Self::File(fault) => Some(fault),
+            Self::Flights(error) => error.diagnostic(),
+            Self::TwoOfAKind { .. }
+            | Self::Table { .. }
+            | Self::Recording(_)
+            | Self::NoField { .. }
+            | Self::Unit { .. }
+            | Self::NoColumn { .. }
+            | Self::Time { .. }
+            | Self::NotHeldOut { .. }
+            | Self::TooLittle { .. }
+            | Self::Json(_) => None,
+        }
+    }
+
     pub(super) fn too_little(
         what: impl Into<String>,
         expected: impl Into<String>,
@@ -131,5 +161,23 @@ impl RotorError {
         advice: &'static str,
     ) -> Self {
         Self::TooLittle { what: what.into(), expected: expected.into(), found: found.to_string(), advice }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use diagnostics::Error;
+
+    #[test]
+    fn the_fault_of_a_file_is_handed_on_with_its_place() {
+        let fault = Diagnostic::in_file("bird.toml", "no rotors").help("add [[rotors]]");
+        for error in [RotorError::from(fault.clone()), FlightsError::from(fault.clone()).into()] {
+            assert_eq!(error.diagnostic(), Some(&fault));
+            let text = error.to_string();
+            let error = Error::from(error);
+            assert!(error.is_input() && error.diagnostic() == Some(&fault), "{error}");
+            assert_eq!(error.with_causes(), text);
+        }
     }
 }
