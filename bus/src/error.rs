@@ -1,6 +1,7 @@
 //! Errors of the bus, in words for the person who launched the run.
 
-use diagnostics::ComponentFailure;
+use diagnostics::{ComponentFailure, ParameterError};
+use std::io::{self, ErrorKind};
 use std::path::PathBuf;
 use thiserror::Error;
 
@@ -320,7 +321,86 @@ pub enum BusError {
     Aborted,
 }
 
+/// Side that is at fault.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Side {
+    /// A manifest, a parameter or a file.
+    Input,
+    /// A component, or the program that has it.
+    Component,
+    /// The operating system.
+    System,
+    /// None of them: a request cannot be met, or the cause is not known.
+    Other,
+}
+
+/// At most one of [`BusError::is_input`], [`BusError::is_component`] and [`BusError::is_system`] is true. The conversion to
+/// [`diagnostics::Error`] keeps them.
 impl BusError {
+    /// True if something that people wrote is at fault: a manifest, a parameter or a file.
+    #[must_use]
+    pub fn is_input(&self) -> bool {
+        self.side() == Side::Input
+    }
+
+    /// True if a component is at fault: its step failed, or its program does not fit those of the others.
+    #[must_use]
+    pub fn is_component(&self) -> bool {
+        self.side() == Side::Component
+    }
+
+    /// True if the operating system or the transport refused a request: a file, memory or a right.
+    ///
+    /// ```
+    /// let error = bus::BusError::FileLimit { needed: 1 << 20, limit: 1 << 10 };
+    /// assert!(error.is_system() && !error.is_input() && !error.is_component());
+    /// ```
+    #[must_use]
+    pub fn is_system(&self) -> bool {
+        self.side() == Side::System
+    }
+
+    // Without a wildcard: whoever adds a variant states its side.
+    fn side(&self) -> Side {
+        match self {
+            Self::Content { .. }
+            | Self::Checkpoint { .. }
+            | Self::UnwiredPort { .. }
+            | Self::UndeclaredPort { .. }
+            | Self::TypeMismatch { .. }
+            | Self::InitialValue { .. }
+            | Self::Parameters { .. } => Side::Input,
+            Self::DeclaredTwice { .. }
+            | Self::LayoutMismatch { .. }
+            | Self::BackupLayout { .. }
+            | Self::UnwrittenOutput { .. }
+            | Self::NotFinite { .. }
+            | Self::Count { .. }
+            | Self::Step { .. } => Side::Component,
+            Self::File { .. }
+            | Self::NoRoom { .. }
+            | Self::FileLimit { .. }
+            | Self::Transport { .. }
+            | Self::Denied { .. } => Side::System,
+            Self::NotInARun { .. }
+            | Self::Claimed { .. }
+            | Self::UnknownNode { .. }
+            | Self::UnknownTopic { .. }
+            | Self::Gap { .. }
+            | Self::Aborted => Side::Other,
+        }
+    }
+
+    /// Kind of a refusal that has no `io::Error` as its source.
+    fn refusal(&self) -> Option<ErrorKind> {
+        match self {
+            Self::NoRoom { .. } => Some(ErrorKind::StorageFull),
+            Self::FileLimit { .. } => Some(ErrorKind::FileTooLarge),
+            Self::Transport { .. } => Some(ErrorKind::Other),
+            _ => None,
+        }
+    }
+
     /// Name of the node that the error is about, if it is about one.
     #[must_use]
     pub fn node(&self) -> Option<&str> {
@@ -340,12 +420,21 @@ impl BusError {
             | Self::NotFinite { node, .. }
             | Self::Count { node, .. }
             | Self::Step { node, .. } => Some(node),
-            _ => None,
+            Self::NotInARun { .. }
+            | Self::Claimed { .. }
+            | Self::File { .. }
+            | Self::NoRoom { .. }
+            | Self::FileLimit { .. }
+            | Self::Content { .. }
+            | Self::UnknownNode { .. }
+            | Self::UnknownTopic { .. }
+            | Self::Denied { .. }
+            | Self::Aborted => None,
         }
     }
 }
 
-/// A failed step is the failure of its component.
+/// A failed step is the failure of its component; a refusal of the system is one of the system.
 ///
 /// ```
 /// let reason = "the gyroscope is stuck".to_owned();
@@ -355,15 +444,15 @@ impl BusError {
 /// ```
 impl From<BusError> for diagnostics::Error {
     fn from(error: BusError) -> Self {
-        let (BusError::UnwrittenOutput { node, .. }
-        | BusError::NotFinite { node, .. }
-        | BusError::Count { node, .. }
-        | BusError::Step { node, .. }) = &error
-        else {
-            return Self::new(error);
-        };
-        let node = node.clone();
-        ComponentFailure::new(Some(&node), error).into()
+        let node = error.node().map(str::to_owned);
+        match error.side() {
+            Side::Input => ParameterError::conflict("", error).into(),
+            Side::Component => ComponentFailure::new(node.as_deref(), error).into(),
+            Side::System | Side::Other => match error.refusal() {
+                Some(kind) => io::Error::new(kind, error).into(),
+                None => Self::new(error),
+            },
+        }
     }
 }
 
@@ -371,5 +460,124 @@ impl From<BusError> for diagnostics::Error {
 impl std::fmt::Debug for BusError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{self}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Errors with a manifest, a parameter or a file at fault.
+    fn of_input() -> Vec<BusError> {
+        let (node, port, reason) = ("imu".to_owned(), "rates".to_owned(), "it is too short".to_owned());
+        let known = String::new();
+        vec![
+            BusError::Content { path: "plan.json".into(), expected: "a plan", found: reason.clone() },
+            BusError::Checkpoint { node: node.clone(), reason: reason.clone() },
+            BusError::UnwiredPort {
+                node: node.clone(),
+                direction: "input",
+                port: port.clone(),
+                verb: "wire",
+                known,
+            },
+            BusError::UndeclaredPort { node: node.clone(), direction: "input", port: port.clone() },
+            BusError::TypeMismatch {
+                node: node.clone(),
+                port: port.clone(),
+                expected: "a".to_owned(),
+                found: "b".to_owned(),
+            },
+            BusError::InitialValue { node: node.clone(), port, type_name: "a", reason: reason.clone() },
+            BusError::Parameters { node, reason },
+        ]
+    }
+
+    /// Errors with a component at fault.
+    fn of_component() -> Vec<BusError> {
+        let (node, port, topic) = ("imu".to_owned(), "rates".to_owned(), "/imu/rates".to_owned());
+        let (expected, found) = ("float64 x".to_owned(), "float32 x".to_owned());
+        let (output, field, tick, time_s) = (topic.clone(), "x".to_owned(), 7, 0.07);
+        vec![
+            BusError::DeclaredTwice {
+                node: node.clone(),
+                direction: "input",
+                port: port.clone(),
+                first: "a",
+                second: "b",
+            },
+            BusError::LayoutMismatch {
+                topic: topic.clone(),
+                node: node.clone(),
+                port: port.clone(),
+                expected: expected.clone(),
+                found: found.clone(),
+            },
+            BusError::BackupLayout { node: node.clone(), topic, expected, found },
+            BusError::UnwrittenOutput { node: node.clone(), port, tick },
+            BusError::NotFinite {
+                node: node.clone(),
+                output: output.clone(),
+                field: field.clone(),
+                value: f64::NAN,
+                tick,
+                time_s,
+            },
+            BusError::Count { node: node.clone(), output, field, found: 3, most: 2, tick, time_s },
+            BusError::Step { node, tick, time_s, reason: "the gyroscope is stuck".to_owned() },
+        ]
+    }
+
+    /// Errors of the operating system or the transport.
+    fn of_system() -> Vec<BusError> {
+        let source = || io::Error::from(ErrorKind::PermissionDenied);
+        let (node, reason) = ("imu".to_owned(), "ServiceCouldNotBeCreated".to_owned());
+        vec![
+            BusError::File { action: "open", path: "plan.json".into(), source: source() },
+            BusError::NoRoom { what: "samples".to_owned(), needed: 2, folder: "/dev/shm".into(), free: 1 },
+            BusError::FileLimit { needed: 2, limit: 1 },
+            BusError::Transport { node, action: "opening topic /imu/rates".to_owned(), reason },
+            BusError::Denied { action: "pin to core 7", source: source(), advice: "allow it" },
+        ]
+    }
+
+    /// Errors that blame no side.
+    fn of_none() -> Vec<BusError> {
+        let (name, known) = ("imu".to_owned(), "plant".to_owned());
+        vec![
+            BusError::NotInARun { variable: "HUMMINGBUS_RUN" },
+            BusError::Claimed { name: name.clone() },
+            BusError::UnknownNode { node: name.clone(), known: known.clone() },
+            BusError::UnknownTopic { topic: "/imu/rates".to_owned(), known },
+            BusError::Gap {
+                node: name,
+                topic: "/imu/rates".to_owned(),
+                tick: 7,
+                expected: 6,
+                found: "8".to_owned(),
+            },
+            BusError::Aborted,
+        ]
+    }
+
+    #[test]
+    fn every_error_has_its_side_and_keeps_it_when_it_is_converted() {
+        let all = [
+            (of_input(), [true, false, false]),
+            (of_component(), [false, true, false]),
+            (of_system(), [false, false, true]),
+            (of_none(), [false; 3]),
+        ];
+        assert_eq!(all.iter().map(|(errors, _)| errors.len()).sum::<usize>(), 25, "each variant once");
+        for (errors, sides) in all {
+            for error in errors {
+                let (text, node) = (error.to_string(), error.node().map(str::to_owned));
+                assert_eq!([error.is_input(), error.is_component(), error.is_system()], sides, "{text}");
+                let error = diagnostics::Error::from(error);
+                assert_eq!([error.is_input(), error.is_component(), error.is_system()], sides, "{text}");
+                assert_eq!(error.with_causes(), text);
+                assert_eq!(error.process().map(str::to_owned), node.filter(|_| error.is_component()));
+            }
+        }
     }
 }

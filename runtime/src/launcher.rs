@@ -240,7 +240,7 @@ impl<'a> Launcher<'a> {
     ) -> anyhow::Result<Outcome> {
         // Before anything is touched that an earlier run left.
         if self.host != Host::InProcess {
-            bus::room::require(&graph.plan, &manifest.registry().messages())?;
+            bus::room::require(&graph.plan, &manifest.registry().messages()).map_err(Error::from)?;
         }
         outputs.claim(run_dir)?;
         if let Some(kept) = outputs.kept() {
@@ -292,7 +292,7 @@ impl<'a> Launcher<'a> {
             }
             return Ok(outcome);
         }
-        let control = Arc::new(SupervisorView::create(&graph.plan)?);
+        let control = Arc::new(SupervisorView::create(&graph.plan).map_err(Error::from)?);
         let (plan, dir) = (&graph.plan, run_dir.path());
         // Dropped behind the supervisor, which ends the processes.
         let descendants = self.adopts_orphans.then(|| Descendants::of_run(place));
