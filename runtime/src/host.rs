@@ -111,6 +111,9 @@ pub(crate) enum End {
     Cancelled,
 }
 
+/// Words about an instance that ended with an exit code, which follows them.
+pub(crate) const EXITED: &str = "ended with exit code";
+
 impl End {
     /// True if the instance ended without an error.
     pub fn success(&self) -> bool {
@@ -121,7 +124,7 @@ impl End {
     pub fn message(&self) -> String {
         match self {
             Self::Exited(0) => "ended with exit code 0 before the run did".to_owned(),
-            Self::Exited(code) => format!("ended with exit code {code}"),
+            Self::Exited(code) => format!("{EXITED} {code}"),
             Self::Signalled(signal) => format!(
                 "was killed by {}{}",
                 bus::process::signal_name(*signal),

@@ -5,6 +5,7 @@
 //! launcher dies, in any way: so a process that can get the lock knows that the run is dead.
 
 use crate::file_lock;
+use crate::host::EXITED;
 use anyhow::{Context, bail};
 pub(crate) use bus::names::SHARED_MEMORY;
 use bus::names::shm_prefix;
@@ -28,6 +29,10 @@ const SPARE_FILES: usize = 8;
 /// With less than this free, errors mention the folder for temporary files: a file that did not fit may have been
 /// removed by then.
 const FULL_BYTES: u64 = 256 << 10;
+/// Words of the system for a lack of room: `ENOSPC` and `EDQUOT`.
+const NO_ROOM: [&str; 2] = ["No space left on device", "Disk quota exceeded"];
+/// Words of a process that ended for another reason than a lack of room.
+const OTHER_REASONS: [&str; 3] = [" failed at tick ", " computed tick ", "panicked at"];
 
 /// Entry of a run: its description of itself.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -189,24 +194,11 @@ impl RunDir {
 }
 
 impl RunDir {
-    /// Adds to an error of the run that its directory has no room left, where that is so.
+    /// Adds to an error that may come from lack of room that the folder of the run directory has no room left, if so.
     pub(crate) fn blame_room(&self, error: anyhow::Error) -> anyhow::Error {
         let Ok(found) = rustix::fs::statvfs(self.path()) else { return error };
         let free = found.f_bavail.saturating_mul(found.f_frsize);
-        if free >= FULL_BYTES {
-            return error;
-        }
-        let folder = self.path().parent().unwrap_or(self.path()).display();
-        let text = format!(
-            "{error:#}\nThe folder for temporary files, {folder}, has {free} bytes free; make room there, or set \
-             TMPDIR to another folder"
-        );
-        let full = std::io::Error::new(std::io::ErrorKind::StorageFull, text);
-        let error = Error::from(error);
-        if error.is_component() {
-            return ComponentFailure::new(error.process(), full).into();
-        }
-        full.into()
+        with_room(error.into(), self.path().parent().unwrap_or(self.path()), free).into()
     }
 
     /// Removes everything; returns the failures, each as a sentence.
@@ -232,6 +224,31 @@ impl RunDir {
             .chain(files.filter_map(|path| told(&path, std::fs::remove_file(&path))))
             .collect()
     }
+}
+
+/// Returns `error` with the room in `folder`, if that has few bytes `free` and the error may come from it.
+fn with_room(error: Error, folder: &Path, free: u64) -> Error {
+    if free >= FULL_BYTES || !may_lack_room(&error) {
+        return error;
+    }
+    let text = format!(
+        "{}\nThe folder for temporary files, {}, has {free} bytes free; make room there, or set TMPDIR to another folder",
+        error.with_causes(),
+        folder.display()
+    );
+    let full = std::io::Error::new(std::io::ErrorKind::StorageFull, text);
+    if error.is_component() { ComponentFailure::new(error.process(), full).into() } else { full.into() }
+}
+
+/// True if the system says so, or if a process has ended by itself without another reason: its own words go to the same
+/// folder, and iceoryx2 has no word for a lack of room.
+fn may_lack_room(error: &Error) -> bool {
+    let text = error.with_causes();
+    let is_unexplained = || {
+        let is_explained = OTHER_REASONS.iter().any(|&reason| text.contains(reason));
+        error.is_component() && text.contains(EXITED) && !is_explained
+    };
+    NO_ROOM.iter().any(|&words| text.contains(words)) || is_unexplained()
 }
 
 impl Drop for RunDir {
@@ -517,8 +534,9 @@ fn listed(runs: &[LiveRun]) -> String {
 mod tests {
     use super::{
         Entry, LiveRun, choose, dir_name, entry_path, is_run_id, register, require_here, run_of_dir,
-        run_of_shared_memory, try_claim,
+        run_of_shared_memory, try_claim, with_room,
     };
+    use diagnostics::{ComponentFailure, Diagnostic, Error};
     use std::collections::BTreeSet;
     use std::path::Path;
     use std::sync::Mutex;
@@ -532,6 +550,49 @@ mod tests {
             LiveRun { entry, file: tempfile::tempfile().unwrap() }
         };
         names.iter().map(run).collect()
+    }
+
+    #[test]
+    fn lack_of_room_is_blamed_where_it_can_be_the_reason() {
+        let of_process = |text: &str| Error::from(ComponentFailure::new(Some("imu"), text));
+        let with_free = |error: Error, free| with_room(error, Path::new("/tmp"), free);
+        let full = || Error::from(std::io::Error::from(rustix::io::Errno::NOSPC));
+        let silent = || of_process("process `imu` ended with exit code 2");
+        for (error, is_component) in [(full(), false), (silent(), true)] {
+            let text = error.with_causes();
+            let blamed = with_free(error, 4096);
+            assert_eq!((blamed.is_component(), blamed.is_system()), (is_component, !is_component));
+            assert_eq!(blamed.process(), is_component.then_some("imu"));
+            let expected = format!(
+                "{text}\nThe folder for temporary files, /tmp, has 4096 bytes free; make room there, or set TMPDIR to another folder"
+            );
+            assert_eq!(blamed.with_causes(), expected);
+        }
+        for (error, free) in [
+            (full(), 1 << 30),
+            (silent(), 1 << 30),
+            (
+                of_process(
+                    "process `imu` ended with exit code 2\n  error: node `imu` failed at tick 7 (t = 0.07 s): stuck",
+                ),
+                0,
+            ),
+            (of_process("process `imu` failed: it panicked: the propeller came off"), 0),
+            (of_process("process `imu` was killed by signal 9 (SIGKILL)"), 0),
+            (Diagnostic::in_file("a.toml", "no rotors").into(), 0),
+        ] {
+            let (text, is_input) = (error.with_causes(), error.is_input());
+            let same = with_free(error, free);
+            assert_eq!((same.with_causes(), same.is_input()), (text, is_input));
+        }
+    }
+
+    #[test]
+    fn a_cause_that_the_message_contains_is_told_once_beside_the_room() {
+        let source = std::io::Error::from(rustix::io::Errno::NOSPC);
+        let error = bus::BusError::File { action: "write", path: "/tmp/inputs".into(), source };
+        let blamed = with_room(error.into(), Path::new("/tmp"), 0).with_causes();
+        assert_eq!(blamed.matches("No space left on device").count(), 1, "{blamed}");
     }
 
     #[test]
