@@ -317,6 +317,22 @@ fn a_run_whose_listener_panics_is_taken_down() {
 }
 
 #[test]
+fn on_one_thread_a_panic_of_the_listener_is_not_told_as_that_of_a_component() {
+    alone(|folder| {
+        let give_up = |event: RunEvent<'_>| {
+            if let RunEvent::Progress(_) = event {
+                panic!("the listener gave up");
+            }
+        };
+        let launcher = Launcher::new(Host::InProcess).followed_by(give_up);
+        let error = launcher.fly(&build(&plan(1000, "none"), folder), &folder.join("a.mcap")).unwrap_err();
+        let text = error.with_causes();
+        assert!(text.contains("the listener of the run's events panicked: the listener gave up"), "{text}");
+        assert_eq!(sides(&error), [false; 3], "{text}");
+    });
+}
+
+#[test]
 fn a_run_that_is_interrupted_twice_is_aborted() {
     alone(|folder| {
         let stop = StopToken::new();

@@ -107,7 +107,7 @@ fn simulation(
             members.push((index, component));
         }
     }
-    Ok(Simulation::new(&graph.plan, members, components, &graph.files)?)
+    Ok(Simulation::new(&graph.plan, members, components, &graph.files).map_err(Error::from)?)
 }
 
 /// Flies `graph` to its end, or to a stop.
@@ -123,7 +123,7 @@ pub(crate) fn fly(
 ) -> anyhow::Result<Outcome> {
     let mut simulation = simulation(graph, |_| true, components)?;
     if let Some(parts) = &graph.from {
-        simulation.restore(parts)?;
+        simulation.restore(parts).map_err(Error::from)?;
     }
     let start_ns = monotonic_ns();
     let mut run = Run {
@@ -134,18 +134,19 @@ pub(crate) fn fly(
         start_ns,
         reported_ns: start_ns,
         missed_deadlines: 0,
-        is_stepping: false,
+        active: Active::Run,
     };
     let end = catch_unwind(AssertUnwindSafe(|| run.fly(&mut simulation)));
-    let end = end.map_err(|panic| match (run.is_stepping, panicked(&*panic)) {
-        (true, error) => ComponentFailure::new(simulation.next_node(), error).into(),
-        // The listener or the writer of checkpoints.
-        (false, error) => error,
+    let end = end.map_err(|panic| match (run.active, panicked(run.active, &*panic)) {
+        (Active::Component, error) => ComponentFailure::new(simulation.next_node(), error).into(),
+        (_, error) => error,
     })?;
     let (ticks, overruns) = (simulation.tick(), simulation.overruns());
     match catch_unwind(AssertUnwindSafe(|| simulation.finish(end))) {
         Ok(finished) => finished.map_err(failed)?,
-        Err(panic) => return Err(ComponentFailure::new(None, panicked(&*panic)).into()),
+        Err(panic) => {
+            return Err(ComponentFailure::new(None, panicked(Active::Component, &*panic)).into());
+        }
     }
     Ok(Outcome {
         first_tick: graph.plan.first_tick,
@@ -164,14 +165,37 @@ pub(crate) fn fly(
     })
 }
 
-/// The failure of the component that `error` names.
-fn failed(error: BusError) -> ComponentFailure {
+/// The failure of the component that `error` names, unless the system is at fault.
+fn failed(error: BusError) -> Error {
+    if error.is_system() {
+        return error.into();
+    }
     let node = error.node().map(str::to_owned);
-    ComponentFailure::new(node.as_deref(), error)
+    ComponentFailure::new(node.as_deref(), error).into()
 }
 
-fn panicked(panic: &(dyn Any + Send)) -> anyhow::Error {
-    anyhow!("a component panicked: {}", panic_message(panic))
+fn panicked(active: Active, panic: &(dyn Any + Send)) -> anyhow::Error {
+    anyhow!("{} panicked: {}", active.name(), panic_message(panic))
+}
+
+/// Code that is active on the thread of a run, to be named if it panics.
+#[derive(Clone, Copy)]
+enum Active {
+    Run,
+    Component,
+    Listener,
+    CheckpointWriter,
+}
+
+impl Active {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Run => "the run",
+            Self::Component => "a component",
+            Self::Listener => "the listener of the run's events",
+            Self::CheckpointWriter => "the writer of checkpoints",
+        }
+    }
 }
 
 /// A run under way.
@@ -185,8 +209,7 @@ struct Run<'a> {
     /// Host time of the last report.
     reported_ns: u64,
     missed_deadlines: u32,
-    /// True while a component computes.
-    is_stepping: bool,
+    active: Active,
 }
 
 /// Checks that [`fly_unrecorded`] can fly `manifest`, and go on `from` a checkpoint; flies nothing. Returns the graph.
@@ -251,7 +274,7 @@ impl Run<'_> {
     /// Steps to the end, or to a stop; a failed step ends it too.
     fn fly(&mut self, simulation: &mut Simulation) -> Result<(), BusError> {
         let end = self.step_all(simulation);
-        self.is_stepping = false;
+        self.active = Active::Run;
         self.tell(simulation.tick());
         end
     }
@@ -268,12 +291,15 @@ impl Run<'_> {
                 Pace::Free => self.report(tick),
             }
             if next_checkpoint == Some(tick) {
-                (self.save)(simulation.save());
+                let parts = simulation.save();
+                self.active = Active::CheckpointWriter;
+                (self.save)(parts);
+                self.active = Active::Run;
                 next_checkpoint = plan.checkpoint_after(tick);
             }
-            self.is_stepping = true;
+            self.active = Active::Component;
             simulation.step()?;
-            self.is_stepping = false;
+            self.active = Active::Run;
         }
         Ok(())
     }
@@ -308,7 +334,9 @@ impl Run<'_> {
     fn tell(&mut self, ticks: u32) {
         let (plan, host_s) = (&self.graph.plan, seconds(monotonic_ns() - self.start_ns));
         let (duration_ticks, tick_s) = (plan.duration_ticks, plan.tick_s());
+        self.active = Active::Listener;
         (self.on)(RunEvent::Progress(Progress { ticks, duration_ticks, tick_s, host_s }));
+        self.active = Active::Run;
     }
 }
 

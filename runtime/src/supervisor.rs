@@ -263,7 +263,7 @@ impl<'a, W: World> Supervisor<'a, W> {
                     .map_err(anyhow::Error::from)
                     .and_then(|()| self.start_process(name, role, Some(&backup.program)));
                 if let Err(error) = started {
-                    self.decisions.replacements.note_not_started(node, generation, &error)?;
+                    self.decisions.replacements.note_not_started(node, generation, error)?;
                 }
             }
             Command::Kill { node, generation, message } => {

@@ -1,7 +1,7 @@
 //! The page of a live run, served by a thread of this process.
 
 use super::output::say;
-use anyhow::Result;
+use anyhow::{Result, anyhow};
 use bus::plan::Plan;
 use recorder::reader::Recording;
 use runtime::event::StopToken;
@@ -97,7 +97,9 @@ impl LivePage {
 
     fn end(&mut self) -> Result<()> {
         self.is_over.store(true, Ordering::Relaxed);
-        let ends = self.threads.drain(..).map(|thread| thread.join().unwrap_or(Ok(())));
+        let panicked =
+            |_| Err(anyhow!("the server of the page failed in a way that is a defect of hummingbus"));
+        let ends = self.threads.drain(..).map(|thread| thread.join().unwrap_or_else(panicked));
         ends.collect()
     }
 }

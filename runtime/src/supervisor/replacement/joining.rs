@@ -3,6 +3,7 @@
 use super::{Backup, Join, Pending, Purpose, Replacements, Report, Stage, take_over_stride};
 use bus::lockstep::{Phase, SlotState, TransferOutcome};
 use bus::membership::Instance;
+use diagnostics::Error;
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -131,15 +132,17 @@ impl Replacements<'_> {
         &mut self,
         node: usize,
         generation: u32,
-        error: &anyhow::Error,
+        error: anyhow::Error,
     ) -> anyhow::Result<()> {
         let is_it = |backup: &mut Backup| backup.generation == generation;
         let Some(backup) = self.nodes[node].backup.take_if(is_it) else { return Ok(()) };
         if backup.pending.purpose == Purpose::Restart {
-            anyhow::bail!("{error:#}");
+            let name = &self.plan.nodes[node].name;
+            return Err(error.context(format!("process `{name}` has ended, and cannot be started again")));
         }
         self.free(node, generation);
-        self.reports.push(Report { refused: Some(format!("{error:#}")), ..backup.report });
+        let refused = Some(Error::from(error).with_causes());
+        self.reports.push(Report { refused, ..backup.report });
         Ok(())
     }
 
