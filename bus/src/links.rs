@@ -166,3 +166,101 @@ impl Links {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Links;
+    use crate::lockstep::{NodeView, SupervisorView};
+    use crate::names::{process_name, shm_prefix};
+    use crate::place::Place;
+    use crate::plan::{GroupPlan, MemberPlan, NodePlan, OutputPlan, Plan, TopicPlan};
+    use crate::sample_ring::SampleRing;
+    use crate::transport::Transport;
+    use std::rc::Rc;
+
+    const SIZE: usize = 12;
+    /// Topic of the member of the group.
+    const MEMBERS: usize = 0;
+    /// Topic of the node outside.
+    const OUTSIDERS: usize = 1;
+
+    /// A run with a group of one sender and a sender outside; its files in shared memory are removed with it.
+    struct Run {
+        folder: tempfile::TempDir,
+        plan: Plan,
+        _segment: SupervisorView,
+    }
+
+    impl Run {
+        fn new() -> Self {
+            let topic = |name: &str| TopicPlan {
+                name: name.to_owned(),
+                type_name: "test_msgs/msg/State".to_owned(),
+                period_ticks: 1,
+            };
+            let sender = |name, topic| {
+                NodePlan::for_test(name, vec![], vec![OutputPlan { port: "state".to_owned(), topic }])
+            };
+            let topics = vec![topic("/member/state"), topic("/outsider/state")];
+            let nodes = vec![sender("member", MEMBERS), sender("outsider", OUTSIDERS)];
+            let mut plan = Plan::for_test(100, topics, nodes);
+            let members = vec![MemberPlan { node: 0, kind: "sender".to_owned() }];
+            plan.groups = vec![GroupPlan { name: "group".to_owned(), members, cpu: None }];
+            let segment = SupervisorView::create(&plan).unwrap();
+            Self { folder: tempfile::tempdir().unwrap(), plan, _segment: segment }
+        }
+
+        /// Connections of the instance `generation` of the member.
+        fn links(&self, generation: u32) -> Links {
+            let (run_dir, name) = (self.folder.path(), process_name("member", generation));
+            let transport = Transport::new(run_dir, &self.plan.run_id, &name, &Place::Process).unwrap();
+            Links {
+                run_dir: run_dir.to_owned(),
+                plan: self.plan.clone(),
+                index: 0,
+                generation,
+                node: self.plan.nodes[0].clone(),
+                lockstep: NodeView::open(&self.plan, 0, generation, Place::Process).unwrap(),
+                transport: Rc::new(transport),
+                _claim: crate::claim::claim(run_dir, &name).unwrap(),
+            }
+        }
+    }
+
+    impl Drop for Run {
+        fn drop(&mut self) {
+            let prefix = shm_prefix(&self.plan.run_id);
+            let files = std::fs::read_dir("/dev/shm").into_iter().flatten().flatten();
+            let ours = files.filter(|file| file.file_name().to_string_lossy().starts_with(&prefix));
+            ours.for_each(|file| drop(std::fs::remove_file(file.path())));
+        }
+    }
+
+    #[test]
+    fn a_successor_of_a_member_finds_the_samples_that_the_group_left_behind() {
+        let run = Run::new();
+        let successor = run.links(1);
+        let mut ring = SampleRing::create(&run.plan, MEMBERS, SIZE).unwrap();
+        ring.store(3, &[7, 8, 9]);
+        drop(ring);
+        let left = successor.left_behind(MEMBERS, SIZE).unwrap().unwrap();
+        assert_eq!((left.at(3), left.at(4)), (Some(&[7, 8, 9][..]), None));
+        // A ring for messages of another size is refused.
+        let error = successor.left_behind(MEMBERS, 10 * SIZE).unwrap_err().to_string();
+        assert!(error.contains("samples_0"), "{error}");
+    }
+
+    #[test]
+    fn nothing_is_left_behind_without_a_ring_a_group_or_a_predecessor() {
+        let run = Run::new();
+        let (first, successor) = (run.links(0), run.links(1));
+        let finds = |links: &Links, topic| links.left_behind(topic, SIZE).unwrap().is_some();
+        assert!(!finds(&successor, MEMBERS), "the group has made no ring");
+        for topic in [MEMBERS, OUTSIDERS] {
+            SampleRing::create(&run.plan, topic, SIZE).unwrap();
+        }
+        assert!(finds(&successor, MEMBERS));
+        assert!(!finds(&first, MEMBERS), "the first instance has no predecessor");
+        assert!(!finds(&successor, OUTSIDERS), "its publisher is in no group");
+    }
+}

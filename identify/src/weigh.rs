@@ -177,3 +177,38 @@ impl Problem<'_> {
         flight.layout.knots.iter().map(of).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::set_spreads;
+    use crate::noise_model::NoiseModel;
+    use crate::prepared::Equation;
+    use crate::whitening::{Component, ComponentNoise, Noises};
+    use std::collections::BTreeMap;
+
+    const VARIANCE: f64 = 1e-4;
+
+    #[test]
+    fn torques_about_x_and_y_share_their_spread_and_every_other_component_has_its_own() {
+        let torque = |axis| -> Component { (Equation::AngularAcceleration.name(), axis) };
+        let force: Component = (Equation::SpecificForce.name(), 0);
+        let means = |of: [f64; 2]| of.map(|mean| (mean, VARIANCE)).to_vec();
+        let means = BTreeMap::from([
+            (torque(0), means([0.4, 0.4])),
+            (torque(1), means([0.1, 0.6])),
+            (torque(2), means([1.0, 3.0])),
+        ]);
+        let before = ComponentNoise { trim_variance: 9.0, ..ComponentNoise::of(NoiseModel::white(1.0)) };
+        let components = [torque(0), torque(1), torque(2), force];
+        let mut noises: Noises = components.map(|component| (component, before.clone())).into();
+        set_spreads(&mut noises, &means);
+        // Two means vary by half the square of their difference; their own variance is a part of that.
+        let own = |difference: f64| difference * difference / 2.0 - VARIANCE;
+        let shared = f64::midpoint(own(0.0), own(0.5));
+        for (component, expected) in components.into_iter().zip([shared, shared, own(2.0), 0.0]) {
+            let found = noises[&component].trim_variance;
+            assert!((found - expected).abs() < 1e-9, "{component:?}: {found}, expected {expected}");
+            assert_eq!(noises[&component].model, before.model);
+        }
+    }
+}
