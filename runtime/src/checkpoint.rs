@@ -435,11 +435,11 @@ fn require_same(path: &Path, expected: &str, found: &str) -> anyhow::Result<()> 
     }
     let short = |sum: &str| sum.chars().take(12).collect::<String>();
     bail!(
-        "{} has changed since the checkpoint was written (SHA-256 {}…, then {}…): put the file of then in its place, or \
-         fly from the start; what is to be another value in the run that goes on is given by --set",
+        "{} has changed since the checkpoint was written: expected SHA-256 {}… as in the checkpoint, found {}…; put the \
+         former file in its place, or fly from the start; change values of the run that goes on by --set",
         path.display(),
-        short(found),
-        short(expected)
+        short(expected),
+        short(found)
     )
 }
 
@@ -506,7 +506,7 @@ fn checkpoints_in(folder: &Path) -> Vec<PathBuf> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Checkpoint, START, VERSION, path, sha256};
+    use super::{Checkpoint, START, VERSION, path, require_same, sha256};
     use bus::checkpoint::{NodePart, Parts};
     use std::path::Path;
 
@@ -589,6 +589,17 @@ mod tests {
         future[START.len() - 2] = b'9';
         let error = Checkpoint::from_bytes(&future).unwrap_err().to_string();
         assert!(error.contains("another format"), "{error}");
+    }
+
+    #[test]
+    fn a_file_that_has_changed_is_refused_with_its_digest_and_that_of_the_checkpoint() {
+        let require = |found| require_same(Path::new("m.toml"), "0123456789abcdef", found);
+        require("0123456789abcdef").unwrap();
+        let error = require("fedcba9876543210").unwrap_err().to_string();
+        assert!(
+            error.contains("expected SHA-256 0123456789ab… as in the checkpoint, found fedcba987654…"),
+            "{error}"
+        );
     }
 
     #[test]

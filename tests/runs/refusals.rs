@@ -128,6 +128,31 @@ fn programs_find_a_refusal_as_json() {
 }
 
 #[test]
+fn programs_find_the_faults_of_a_flights_file_and_of_its_vehicle_as_json() {
+    let place = Place::new();
+    let vehicle = std::fs::read_to_string(repository("vehicles/hummingbird.toml")).unwrap();
+    let line = vehicle.lines().position(|line| line.starts_with("mass = {")).unwrap() as u64 + 1;
+    place.write("v.toml", vehicle.replacen("\nmass = {", "\nmass = -1 # {", 1));
+    let flights =
+        "vehicle = \"v.toml\"\n[[flight]]\nname = \"a\"\nfile = \"a.csv\"\nrole = \"fit\"\nto_s = -1.0\n";
+    let flights = place.write("flights.toml", flights);
+    let ended = place.call(&["identify", &flights, "--out", &place.path("out"), "--json"]).with_code(2);
+    let found = ended.json();
+    let of_fault = |fault: &serde_json::Value| {
+        let file = fault["file"].as_str().unwrap();
+        let file = file.rsplit('/').next().unwrap_or(file).to_owned();
+        (file, fault["key"].as_str().unwrap().to_owned(), fault["line"].as_u64())
+    };
+    let faults: Vec<_> = found["faults"].as_array().unwrap().iter().map(of_fault).collect();
+    let expected = [("flights.toml", "flight.0.to_s", 6), ("v.toml", "body.mass", line)];
+    let expected = expected.map(|(file, key, line)| (file.to_owned(), key.to_owned(), Some(line)));
+    assert_eq!(faults, expected, "{ended}");
+    for words in ["`flight.0.to_s` must be", "`body.mass` must be"] {
+        assert_eq!(ended.error.matches(words).count(), 1, "{ended}");
+    }
+}
+
+#[test]
 fn the_good_manifest_flies() {
     let place = Place::new();
     let path = place.write("good.toml", good());
