@@ -67,8 +67,9 @@ impl Floats {
     /// The first number in the message `bytes` that is not finite: its place in bytes, and its value.
     pub(crate) fn first_not_finite(&self, bytes: &[u8]) -> Option<(usize, f64)> {
         let named = || {
-            let place = self.named?.tail_of(bytes);
-            let (index, number) = first_in(bytes.get(place.clone())?, size_of::<f64>())?;
+            let named = self.named?;
+            let place = named.tail_of(bytes);
+            let (index, number) = first_in(bytes.get(place.clone())?, named.tail_number_bytes)?;
             Some((place.start + index, number))
         };
         let in_span = |span: &Span| {
@@ -155,7 +156,7 @@ mod tests {
 
     #[test]
     fn the_numbers_behind_a_name_are_looked_at_wherever_they_begin() {
-        use crate::messages::{BodyTransform, FrameName, Orientation, Point};
+        use crate::messages::{BodyTransform, FrameName, Orientation, Point, StandardRange};
         let level = Orientation { w: 1.0, ..Orientation::default() };
         for name in ["b", "seven77", "eight888", "h1/body"] {
             let at = |z: f64| {
@@ -164,6 +165,11 @@ mod tests {
             };
             assert_eq!(at(1.0), None);
             assert_eq!(at(f64::INFINITY), Some(("child".to_owned(), f64::INFINITY)), "{name}");
+            let singles = |range: f32| {
+                found(&StandardRange::new(&FrameName::new(name).unwrap(), 1, [0.1, 0.2, 7.0, range, 0.0]))
+            };
+            assert_eq!(singles(1.0), None);
+            assert_eq!(singles(f32::INFINITY), Some(("beam".to_owned(), f64::INFINITY)), "{name}");
         }
     }
 

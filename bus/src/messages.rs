@@ -14,6 +14,7 @@ use crate::{Bounded, Message};
 
 mod control;
 mod sensing;
+mod standard;
 mod transform;
 
 pub use control::{ControlStatus, RC_CHANNELS_MAX, RcChannels, Reference};
@@ -21,6 +22,7 @@ pub use sensing::{
     Barometer, Battery, BodyStates, Clearance, Contact, Gps, Innovation, Magnetometer, Mocap, Ranges,
     RotorSpeeds, StateEstimate, Traffic, WallEstimate,
 };
+pub use standard::{Odometry, StandardImu, StandardRange};
 pub use transform::{BodyTransform, FRAME_BYTES_MAX, FrameName, body_frame};
 
 /// The most rotors that a vehicle has.

@@ -73,9 +73,46 @@ pub enum Kind {
     Sequence(&'static Kind, usize),
     /// A string of constant length, stored as ROS 2 stores it (length with its NUL, then the bytes).
     Text,
-    /// A string of at most so many bytes, its NUL included, and so many doubles: the last field of a message. The
-    /// doubles begin behind the string at a multiple of 8 bytes.
-    NamedNumbers(usize, usize),
+    /// A string of at most so many bytes, its NUL included, and the numbers behind it: the last field of a message.
+    NamedNumbers(usize, Numbers),
+}
+
+/// Numbers behind a string, placed as CDR places them.
+///
+/// ```
+/// use bus::schema::{Numbers, Primitive};
+///
+/// assert_eq!(Numbers::doubles(7).room(), 56);
+/// let with_a_byte = Numbers { leading_bytes: 1, primitive: Primitive::F32, count: 5 };
+/// assert_eq!(with_a_byte.room(), 24, "the byte stands in front of the next multiple of 4");
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Numbers {
+    /// Bytes right behind the string, each a `uint8`.
+    pub leading_bytes: usize,
+    /// Type of the numbers, which begin at a multiple of their size.
+    pub primitive: Primitive,
+    /// Count of the numbers.
+    pub count: usize,
+}
+
+impl Numbers {
+    /// So many doubles, without bytes in front of them.
+    #[must_use]
+    pub const fn doubles(count: usize) -> Self {
+        Self { leading_bytes: 0, primitive: Primitive::F64, count }
+    }
+
+    /// Bytes of the numbers.
+    const fn bytes(self) -> usize {
+        self.count * self.primitive.size()
+    }
+
+    /// Bytes that bytes and numbers need behind a multiple of the numbers' size.
+    #[must_use]
+    pub const fn room(self) -> usize {
+        self.leading_bytes.next_multiple_of(self.primitive.size()) + self.bytes()
+    }
 }
 
 impl Kind {
@@ -88,9 +125,7 @@ impl Kind {
             Self::Array(element, length) => *length * element.size(),
             Self::Sequence(element, most) => VALUES_START + *most * element.size(),
             Self::Text => 0,
-            Self::NamedNumbers(name_bytes_max, numbers) => {
-                NAME_START + *name_bytes_max + *numbers * Primitive::F64.size()
-            }
+            Self::NamedNumbers(name_bytes_max, numbers) => NAME_START + *name_bytes_max + numbers.room(),
         }
     }
 
@@ -154,15 +189,26 @@ pub struct Extent {
     pub value_bytes: usize,
     /// Values for which there is room.
     pub values_max: usize,
-    /// Bytes of the doubles that begin behind the values, at a multiple of 8 bytes; 0 where the message ends with the values.
+    /// Bytes of the numbers that begin behind the values; 0 where the message ends with the values.
     #[serde(default)]
     pub tail_bytes: usize,
+    /// Bytes between the values and these numbers, beside those that align the numbers.
+    #[serde(default)]
+    pub tail_leading_bytes: usize,
+    /// Bytes of each of these numbers, to whose multiples they are aligned.
+    #[serde(default = "double_bytes")]
+    pub tail_number_bytes: usize,
+}
+
+/// Bytes of a double.
+const fn double_bytes() -> usize {
+    Primitive::F64.size()
 }
 
 /// Bytes from the start of a [`Bounded`](crate::Bounded) to its first value.
 pub(crate) const VALUES_START: usize = 8;
 /// Bytes from the start of a string to its first character.
-const NAME_START: usize = 4;
+pub(crate) const NAME_START: usize = 4;
 /// Bytes of CDR's encapsulation header.
 const CDR_HEADER_BYTES: usize = 4;
 
@@ -183,15 +229,19 @@ impl Extent {
         &message[..end.min(message.len())]
     }
 
-    /// The place of the doubles behind the values of `message`.
+    /// The place of the numbers behind the values of `message`.
     pub(crate) fn tail_of(&self, message: &[u8]) -> Range<usize> {
         self.tail(self.count(message))
     }
 
-    /// The place of the bytes behind `count` values.
+    /// The place of the numbers behind `count` values.
     fn tail(&self, count: usize) -> Range<usize> {
         let end = self.values_offset + count.min(self.values_max) * self.value_bytes;
-        let start = if self.tail_bytes == 0 { end } else { end.next_multiple_of(8) };
+        let start = match self.tail_bytes {
+            0 => end,
+            // Another process may have announced 0.
+            _ => (end + self.tail_leading_bytes).next_multiple_of(self.tail_number_bytes.max(1)),
+        };
         start..start + self.tail_bytes
     }
 
@@ -298,14 +348,22 @@ impl Schema {
     #[must_use]
     pub fn extent(&self) -> Option<Extent> {
         let last = self.fields.last()?;
-        let (start, value_bytes, values_max, numbers) = match last.kind {
-            Kind::Sequence(element, values_max) => (VALUES_START, element.size(), values_max, 0),
+        let (start, value_bytes, values_max, tail) = match last.kind {
+            Kind::Sequence(element, values_max) => {
+                (VALUES_START, element.size(), values_max, Numbers::doubles(0))
+            }
             Kind::NamedNumbers(name_bytes_max, numbers) => (NAME_START, 1, name_bytes_max, numbers),
             _ => return None,
         };
-        let (count_offset, values_offset) = (last.offset, last.offset + start);
-        let tail_bytes = numbers * Primitive::F64.size();
-        Some(Extent { count_offset, values_offset, value_bytes, values_max, tail_bytes })
+        Some(Extent {
+            count_offset: last.offset,
+            values_offset: last.offset + start,
+            value_bytes,
+            values_max,
+            tail_bytes: tail.bytes(),
+            tail_leading_bytes: tail.leading_bytes,
+            tail_number_bytes: tail.primitive.size(),
+        })
     }
 
     /// A message of zeros, with as many values in its sequence as there is room for.
@@ -414,8 +472,10 @@ fn ros_type(kind: &Kind) -> String {
         Kind::Array(element, length) => format!("{}[{length}]", ros_type(element)),
         Kind::Sequence(element, most) => format!("{}[<={most}]", ros_type(element)),
         Kind::Text => "string".to_owned(),
-        Kind::NamedNumbers(name_bytes_max, numbers) => {
-            format!("string[<={name_bytes_max}] float64[{numbers}]")
+        Kind::NamedNumbers(name_bytes_max, Numbers { leading_bytes, primitive, count }) => {
+            let leading =
+                if *leading_bytes == 0 { String::new() } else { format!("uint8[{leading_bytes}] ") };
+            format!("string[<={name_bytes_max}] {leading}{}[{count}]", primitive.ros_name())
         }
     }
 }

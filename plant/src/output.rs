@@ -1,9 +1,10 @@
 //! Outputs of a plant.
 
 use crate::backend::Backend;
+use crate::state::RigidBody;
 use bus::OutputPorts;
 use bus::messages::{
-    Battery, BodyStates, BodyTransform, Contact, FrameName, Orientation, PlantState, Point, Pose,
+    Battery, BodyStates, BodyTransform, Contact, FrameName, Odometry, Orientation, PlantState, Point, Pose,
     PoseStamped, Quaternion,
 };
 use nalgebra::{UnitQuaternion, Vector3};
@@ -17,6 +18,8 @@ pub struct Outputs {
     pub pose: Option<PoseStamped>,
     /// The transform of the body, for 3-D views.
     pub tf: Option<BodyTransform>,
+    /// Pose in the world and velocity in the frame of the body, as `nav_msgs/Odometry`.
+    pub odometry: Option<Odometry>,
     /// Contacts of the vehicle; with the backend `rapier`.
     pub contact: Option<Contact>,
     /// The scene's free bodies; with the backend `rapier`.
@@ -34,12 +37,25 @@ impl Outputs {
             state: state(backend),
             pose: Some(PoseStamped { pose: Pose { position, orientation }, ..Default::default() }),
             tf: Some(BodyTransform::new(frame, position, orientation)),
+            odometry: Some(odometry(body, frame)),
             contact: Some(contact(backend)),
             // Without free bodies the port cannot be wired.
             bodies: (!backend.bodies().is_empty()).then(|| bodies(backend)),
             battery: Some(battery_message(backend, time_ns)),
         }
     }
+}
+
+/// The twist of `nav_msgs/Odometry` is in the axes of the child frame.
+fn odometry(body: &RigidBody, frame: &FrameName) -> Odometry {
+    let velocity_B_m_s = body.attitude_WB.inverse_transform_vector(&body.velocity_W_m_s);
+    Odometry::new(
+        frame,
+        point(&body.position_W_m),
+        orientation(&body.attitude_WB),
+        vector(&velocity_B_m_s),
+        vector(&body.angular_velocity_B_rad_s),
+    )
 }
 
 fn state(backend: &dyn Backend) -> PlantState {
@@ -112,7 +128,7 @@ fn orientation(attitude: &UnitQuaternion<f64>) -> Orientation {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Airframe, FreeFlight, NewtonEuler, RigidBody};
+    use crate::{Airframe, FreeFlight, NewtonEuler};
 
     fn published(effects: &[&str]) -> Battery {
         let text = vehicles::reference::HUMMINGBIRD;
@@ -124,6 +140,28 @@ mod tests {
         let mut plant = FreeFlight::new(NewtonEuler::flying(airframe, 1), body, effects);
         plant.settle_rotors(&[76.5; 4]);
         battery_message(&plant, 7)
+    }
+
+    #[test]
+    fn odometry_has_the_velocity_in_the_frame_of_the_body() {
+        // Heading along the world's y, it flies along the world's x: to its right.
+        let body = RigidBody {
+            position_W_m: Vector3::new(1.0, 2.0, 3.0),
+            velocity_W_m_s: Vector3::new(4.0, 0.0, 0.5),
+            attitude_WB: UnitQuaternion::from_euler_angles(0.0, 0.0, std::f64::consts::FRAC_PI_2),
+            angular_velocity_B_rad_s: Vector3::new(0.1, 0.2, 0.3),
+        };
+        let numbers = odometry(&body, &FrameName::new("h1/body").unwrap()).numbers();
+        assert_eq!(numbers[..3], [1.0, 2.0, 3.0]);
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        for (found, expected) in numbers[3..7].iter().zip([0.0, 0.0, half, half]) {
+            assert!((found - expected).abs() < 1e-12, "{numbers:?}");
+        }
+        for (found, expected) in numbers[43..49].iter().zip([0.0, -4.0, 0.5, 0.1, 0.2, 0.3]) {
+            assert!((found - expected).abs() < 1e-12, "{numbers:?}");
+        }
+        let mut covariances = numbers[7..43].iter().chain(&numbers[49..]);
+        assert!(covariances.all(|number| *number == 0.0), "unknown: {numbers:?}");
     }
 
     #[test]

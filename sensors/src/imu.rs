@@ -4,6 +4,7 @@
 //! one before.
 
 use crate::channel::{Channel, ChannelState, Queued, Remembered};
+use crate::frame::{body_frame_of, frame};
 use crate::imu_model::{ImuModel, ImuModelState, ImuParams, ImuReading};
 use crate::imu_part::{ImuMotion, ImuPart, ImuPartState};
 use crate::noise::{drawn, drawn_words};
@@ -11,7 +12,7 @@ use crate::sensing::TruthInputs;
 use crate::wire::{vector, vector_message};
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
-use bus::messages::{Imu, PlantState, ROTORS_MAX, Vector3};
+use bus::messages::{FrameName, Imu, PlantState, ROTORS_MAX, StandardImu, Vector3};
 use bus::random::Stream;
 use bus::{Message, OutputPorts};
 use diagnostics::ParameterError;
@@ -107,6 +108,8 @@ impl Remembered for ImuState {
 pub struct Outputs {
     /// The reading that arrived last.
     pub imu: Imu,
+    /// The same reading as `sensor_msgs/Imu`, in the frame of the body.
+    pub data_raw: Option<StandardImu>,
 }
 
 /// An inertial measurement unit.
@@ -129,6 +132,8 @@ pub struct ImuSensor {
     channel: Channel,
     /// The model's state before the first reading. It holds the node's random stream.
     initial: ImuModelState,
+    /// Frame of the body, if its name is not too long.
+    frame: Option<FrameName>,
 }
 
 impl Component for ImuSensor {
@@ -146,7 +151,8 @@ impl Component for ImuSensor {
         let part = ImuPart::new(params, rate_hz);
         let channel = Channel::new(&params.timing(rate_hz), context)?;
         let initial = model.initial_state(context.seed, context.name);
-        Ok(Self { part, model, channel, initial })
+        let frame = frame(context, "data_raw", &body_frame_of(context.name))?;
+        Ok(Self { part, model, channel, initial, frame })
     }
 
     /// Until the first reading arrives, the IMU reads rest and level.
@@ -177,8 +183,15 @@ impl Component for ImuSensor {
                     if chance.is_lost(0) { *last } else { reading }
                 },
             );
-        Ok(Outputs { imu })
+        let data_raw = self.frame.map(|frame| standard(&imu, &frame, &self.model));
+        Ok(Outputs { imu, data_raw })
     }
+}
+
+/// The covariances are those of the white noise; that of a part without noise is unknown.
+fn standard(imu: &Imu, frame: &FrameName, model: &ImuModel) -> StandardImu {
+    let (gyroscope, accelerometer) = model.variances();
+    StandardImu::new(frame, imu.angular_velocity, gyroscope, imu.specific_force, accelerometer)
 }
 
 fn truth(state: &PlantState) -> ImuReading {
@@ -239,6 +252,30 @@ mod tests {
     fn by_default_the_readings_of_the_model_are_sent_as_they_are_made() {
         for (sent, read) in flown(ImuParams::default(), 1000) {
             assert_eq!(bytes(&sent), bytes(&read));
+        }
+    }
+
+    #[test]
+    fn the_standard_message_has_the_same_reading_and_the_variance_of_the_noise() {
+        let params = ImuParams {
+            gyroscope_noise_density_rad_s_sqrt_hz: 1e-3,
+            accelerometer_noise_density_m_s2_sqrt_hz: 2e-2,
+            ..ImuParams::default()
+        };
+        let context = NodeContext::new("h1/imu", &[]).timed(4_000_000, 1, 1000);
+        let mut imu = Harness::<ImuSensor>::in_context(params, &context).unwrap();
+        let Outputs { imu, data_raw } = imu.step(TruthInputs { state: &truth_at(1) }).unwrap();
+        let data_raw = data_raw.unwrap();
+        let name = bytemuck::bytes_of(&data_raw).windows(8).any(|bytes| bytes == b"h1/body\0");
+        let numbers = data_raw.numbers();
+        assert!(name && numbers[4] == -1.0, "the frame, and no orientation: {data_raw:?}");
+        assert_eq!(numbers[13..16], <[f64; 3]>::from(imu.angular_velocity));
+        assert_eq!(numbers[25..28], <[f64; 3]>::from(imu.specific_force));
+        for (first, variance) in [(16, 1e-6 * 250.0), (28, 4e-4 * 250.0)] {
+            for (index, found) in numbers[first..][..9].iter().enumerate() {
+                let expected = if index % 4 == 0 { variance } else { 0.0 };
+                assert!((found - expected).abs() < 1e-12, "{numbers:?}");
+            }
         }
     }
 

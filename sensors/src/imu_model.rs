@@ -213,6 +213,11 @@ impl ImuModel {
         }
     }
 
+    /// Variances of the white noise on each axis: of the gyroscope, rad²/s², and of the accelerometer, m²/s⁴.
+    pub(crate) fn variances(&self) -> (f64, f64) {
+        (self.gyroscope_noise.variance(), self.accelerometer_noise.variance())
+    }
+
     /// The reading of `truth`; the biases then walk one step on.
     ///
     /// The stream is drawn in a fixed order under any parameters, so that changing one of them does

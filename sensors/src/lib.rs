@@ -17,6 +17,7 @@
 //! - [`range_inertial`]: velocity, height and walls from range finders, an IMU and an attitude.
 //! - [`link`], `line`: a data link, and the line that its streams share.
 //! - `steps`: what is left of a value at a resolution; `wire`: the vectors of messages as those of nalgebra.
+//! - `frame`: frames of standard messages.
 //! - `testing`: what the tests of sensors share.
 #![forbid(unsafe_code)]
 #![allow(
@@ -39,6 +40,7 @@ pub mod complementary;
 mod cone;
 mod earth_field;
 pub mod ekf;
+mod frame;
 pub mod gps;
 pub mod ideal;
 pub mod imu;

@@ -31,6 +31,11 @@ impl WhiteNoise {
         Self { sigma: density * rate_hz.sqrt() }
     }
 
+    /// Variance of a sample on each axis.
+    pub(crate) fn variance(&self) -> f64 {
+        self.sigma * self.sigma
+    }
+
     /// The next sample of the three axes, drawn in the order x, y, z.
     pub fn sample(&self, random: &mut Stream) -> Vector3<f64> {
         self.sigma * standard_normal(random)

@@ -8,16 +8,17 @@
 //! The beams fire together and do not hear each other. An echo comes back from every surface in the cone at any
 //! angle of incidence; a real beam that grazes a smooth floor or wall hears none.
 
-use crate::channel::Chance;
+use crate::channel::{Chance, ChannelState, Remembered};
 use crate::cone::{Cone, caster, check_bodies, check_told};
+use crate::frame::frame;
 use crate::sensing::Sensor;
 use crate::steps::in_steps;
 use crate::wire::{attitude, body_poses, vector};
-use bus::InputPorts;
 use bus::component::{Info, StepError};
 use bus::context::NodeContext;
-use bus::messages::{BodyStates, PlantState, Ranges, Traffic};
+use bus::messages::{BodyStates, FrameName, PlantState, Ranges, StandardRange, Traffic};
 use bus::random::normal;
+use bus::{InputPorts, OutputPorts};
 use diagnostics::parameter::{ParameterError, finite, not_negative, positive, require, within};
 use inputs::InputFiles;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -25,6 +26,13 @@ use scenes::RayCaster;
 use std::path::PathBuf;
 
 const BEAMS: usize = 5;
+
+/// Outputs of the beams, in the order of `Ranges`.
+const BEAM_OUTPUTS: [&str; BEAMS] = ["front", "back", "left", "right", "down"];
+
+/// Reading of a beam without a measurement in `sensor_msgs/Range`, in reaches: readers discard what is beyond the reach. The
+/// infinity of REP 117 would end the run. Tuned, no source.
+const NOTHING_REACHES: f64 = 2.0;
 
 /// A vehicle of the traffic that is nearer than this is the sensors' own: positions of one tick differ by less.
 const SELF_MAX_M: f64 = 0.01;
@@ -88,9 +96,24 @@ pub struct RangeFinders {
     params: RangeParams,
     cones: [Cone; BEAMS],
     scene: RayCaster,
+    /// Frames of the beams, of those whose names are not too long.
+    frames: [Option<FrameName>; BEAMS],
 }
 
 impl RangeFinders {
+    /// The reading of a beam in `ranges` as a standard message.
+    fn standard(&self, beam: usize, ranges: &Ranges) -> Option<StandardRange> {
+        let frame = self.frames[beam]?;
+        let RangeParams { noise_m, reach_m, nearest_m, half_angle_deg, .. } = self.params;
+        let range_m = match ranges.valid[beam] {
+            0 => NOTHING_REACHES * reach_m,
+            _ => ranges.distance[beam],
+        };
+        let field_of_view_rad = 2.0 * half_angle_deg.to_radians();
+        let numbers = [field_of_view_rad, nearest_m, reach_m, range_m, noise_m * noise_m];
+        Some(StandardRange::new(&frame, StandardRange::ULTRASOUND, numbers.map(|number| number as f32)))
+    }
+
     /// Returns the distance to the first object that each beam meets within its reach, m.
     fn distances_m(&self, inputs: &RangeInputs<'_>) -> [Option<f64>; BEAMS] {
         let (truth, traffic) = (inputs.state, inputs.traffic);
@@ -143,8 +166,44 @@ impl RangeFinders {
     }
 }
 
-sensor! {
-    pub struct RangeState as "hummingbus_msgs/msg/RangeState" sends ranges: Ranges {}
+/// State of the sensor.
+#[derive(Debug, Clone, Copy, Default, bus::Message)]
+#[repr(C)]
+#[message(type_name = "hummingbus_msgs/msg/RangeState", role = "state")]
+pub struct RangeState {
+    /// Measurements that are under way.
+    channel: ChannelState,
+}
+
+impl Remembered for RangeState {
+    type Measurement = Ranges;
+
+    fn channel(&mut self) -> &mut ChannelState {
+        &mut self.channel
+    }
+}
+
+/// Outputs of the sensor. The standard messages have a frame for each beam, `NODE/OUTPUT`, whose x axis is the beam.
+#[derive(Debug, OutputPorts)]
+pub struct Outputs {
+    /// The measurement that arrived last.
+    pub ranges: Ranges,
+    /// The beam along +x as `sensor_msgs/Range`.
+    pub front: Option<StandardRange>,
+    /// The beam along −x as `sensor_msgs/Range`.
+    pub back: Option<StandardRange>,
+    /// The beam along +y as `sensor_msgs/Range`.
+    pub left: Option<StandardRange>,
+    /// The beam along −y as `sensor_msgs/Range`.
+    pub right: Option<StandardRange>,
+    /// The beam along −z as `sensor_msgs/Range`.
+    pub down: Option<StandardRange>,
+}
+
+impl From<Ranges> for Outputs {
+    fn from(ranges: Ranges) -> Self {
+        Self { ranges, front: None, back: None, left: None, right: None, down: None }
+    }
 }
 
 /// Inputs of the range finders.
@@ -172,11 +231,20 @@ impl Sensor for RangeFinders {
         let (x, y, z) = (Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis());
         let half_angle_rad = params.half_angle_deg.to_radians();
         let cones = [x, -x, y, -y, -z].map(|axis_B| Cone::new(axis_B, half_angle_rad));
-        Ok(Self { params, cones, scene })
+        Ok(Self { params, cones, scene, frames: [None; BEAMS] })
     }
 
-    fn check(&self, run: &NodeContext<'_>) -> Result<(), ParameterError> {
-        check_bodies(&self.scene, run)
+    fn in_run(mut self, run: &NodeContext<'_>) -> Result<Self, ParameterError> {
+        check_bodies(&self.scene, run)?;
+        for (place, output) in self.frames.iter_mut().zip(BEAM_OUTPUTS) {
+            *place = frame(run, output, &format!("{}/{output}", run.name))?;
+        }
+        Ok(self)
+    }
+
+    fn outputs(&self, ranges: Ranges) -> Outputs {
+        let [front, back, left, right, down] = std::array::from_fn(|beam| self.standard(beam, &ranges));
+        Outputs { front, back, left, right, down, ..ranges.into() }
     }
 
     fn check_inputs(&self, inputs: &RangeInputs<'_>) -> Result<(), StepError> {
@@ -305,6 +373,26 @@ mod tests {
         let ranges = read(perfect(), &at([1.0, 2.0, 1.5], 0.0, 0.0, 0.0), None);
         assert_near(ranges.distance, [4.0, 6.0, 3.0, 7.0, 1.5]);
         assert_eq!(ranges.valid, [1; BEAMS]);
+    }
+
+    #[test]
+    fn each_beam_has_a_standard_message_in_its_own_frame() {
+        let params = RangeParams { noise_m: 0.5, half_angle_deg: 4.0, bias_m: [0.0; BEAMS], ..perfect() };
+        // Ahead, nothing is within reach.
+        let truth = at([-4.0, 2.0, 1.5], 0.0, 0.0, 0.0);
+        let mut finders = harness::<RangeFinders>(in_room(params), 100);
+        let inputs = RangeInputs { state: &truth, traffic: None, bodies: None };
+        let Outputs { ranges, front, back, left, right, down } = finders.step(inputs).unwrap();
+        let beams = [front, back, left, right, down].map(Option::unwrap);
+        for (beam, message) in beams.iter().enumerate() {
+            let frame = format!("range/{}\0", BEAM_OUTPUTS[beam]);
+            let bytes = bytemuck::bytes_of(message);
+            assert!(bytes.windows(frame.len()).any(|bytes| bytes == frame.as_bytes()), "{message:?}");
+            let range_m = if beam == 0 { 15.3 } else { ranges.distance[beam] };
+            let expected = [8.0_f64.to_radians(), 0.2, 7.65, range_m, 0.25];
+            assert_eq!(message.numbers(), expected.map(|number| number as f32));
+        }
+        assert_eq!(ranges.valid, [0, 1, 1, 1, 1]);
     }
 
     #[test]

@@ -111,12 +111,17 @@ pub trait Sensor: Sized + Send {
         Sent::<Self>::default()
     }
 
-    /// Refuses ports that do not go with its parameters.
+    /// The sensor as the node of `run`; refuses ports that do not go with its parameters.
     ///
     /// # Errors
     /// The ports, and advice.
-    fn check(&self, _run: &NodeContext<'_>) -> Result<(), ParameterError> {
-        Ok(())
+    fn in_run(self, _run: &NodeContext<'_>) -> Result<Self, ParameterError> {
+        Ok(self)
+    }
+
+    /// The outputs that have the measurement `sent`.
+    fn outputs(&self, sent: Sent<Self>) -> Self::Outputs {
+        sent.into()
     }
 
     /// Refuses inputs that do not go with its parameters.
@@ -175,8 +180,7 @@ impl<S: Sensor> Component for Sensing<S> {
 
     fn new(parameters: S::Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         let channel = Channel::new(&parameters.timing(), context)?;
-        let sensor = S::made_of(parameters, &context.files)?;
-        sensor.check(context)?;
+        let sensor = S::made_of(parameters, &context.files)?.in_run(context)?;
         Ok(Self { sensor, channel })
     }
 
@@ -199,6 +203,6 @@ impl<S: Sensor> Component for Sensing<S> {
             let measured = self.sensor.measure(state, last, chance, inputs);
             Measurement::sent(measured, last, chance)
         });
-        Ok(arrived.into())
+        Ok(self.sensor.outputs(arrived))
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{MapFrame, Orientation, Point, Time};
 use crate::Message;
-use crate::schema::{FieldType, Kind};
+use crate::schema::{FieldType, Kind, Numbers};
 
 /// The most bytes of a frame's name, the NUL behind it included.
 pub const FRAME_BYTES_MAX: usize = 64;
@@ -124,7 +124,7 @@ struct NamedPose {
 }
 
 impl FieldType for NamedPose {
-    const KIND: Kind = Kind::NamedNumbers(FRAME_BYTES_MAX, POSE_NUMBERS);
+    const KIND: Kind = Kind::NamedNumbers(FRAME_BYTES_MAX, Numbers::doubles(POSE_NUMBERS));
 }
 
 /// Offset in a message at which `NamedPose::bytes` begin: a multiple of 8, as CDR aligns numbers from the message's start.
