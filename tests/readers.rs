@@ -41,6 +41,16 @@ use tempfile::TempDir;
 
 const HUMMINGBUS: &str = env!("CARGO_BIN_EXE_hummingbus");
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
+/// Optional outputs of standard messages.
+const STANDARD: [&str; 7] = [
+    "plant.odometry",
+    "imu.data_raw",
+    "range.front",
+    "range.back",
+    "range.left",
+    "range.right",
+    "range.down",
+];
 const VEHICLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/vehicles/hummingbird.toml");
 
 #[test]
@@ -60,18 +70,29 @@ fn rosbags_decodes_the_same_values() {
 
 /// Their frames have names of other lengths, which moves what stands behind them.
 #[test]
-fn others_decode_the_frames_of_ten_vehicles() {
+fn others_decode_the_frames_and_standard_messages_of_ten_vehicles() {
     let Some(readers) = readers() else { return };
     let folder = tempfile::tempdir().unwrap();
     let (recording, lines) = (folder.path().join("ten.mcap"), folder.path().join("ten.jsonl"));
     let manifest = Path::new(ROOT).join("manifests/ten-vehicles.toml");
     let tf = r#"set.wall-follower.process.plant.outputs.tf={ topic = "/tf", every_ticks = 10 }"#;
     let mut run = Command::new(HUMMINGBUS);
-    run.arg("run").arg(&manifest).args(["--set", "run.duration_s=0.1", "--set", tf, "--record"]);
+    run.arg("run").arg(&manifest).args(["--set", "run.duration_s=0.1", "--set", tf]);
+    for output in STANDARD {
+        let (process, port) = output.split_once('.').unwrap();
+        run.args(["--set", &format!("set.wall-follower.process.{process}.outputs.{port}={{}}")]);
+    }
+    run.arg("--record");
     // Whether it passes does not matter: it is cut short.
     assert!(matches!(run.arg(&recording).output().unwrap().status.code(), Some(0 | 1)));
     fs::write(&lines, hummingbus(&["cat".as_ref(), recording.as_ref()]).stdout).unwrap();
-    assert!(fs::read_to_string(&lines).unwrap().contains("\"transforms[0].child_frame_id\":\"v9/body\""));
+    let text = fs::read_to_string(&lines).unwrap();
+    let frames = ["transforms[0].child_frame_id\":\"v9/body", "\"child_frame_id\":\"v9/body"];
+    let headers = ["body", "range/front", "range/back", "range/down"];
+    let headers = headers.map(|frame| format!("\"header.frame_id\":\"v9/{frame}\""));
+    for frame in frames.into_iter().chain(headers.iter().map(String::as_str)) {
+        assert!(text.contains(frame), "no {frame}");
+    }
     for script in ["read_mcap_ros2.py", "read_rosbags.py", "read_foxglove.mjs"] {
         let output = read(&readers, script, &recording, &lines).output().unwrap();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

@@ -1,4 +1,4 @@
-//! The messages of the built-in nodes, and the standard ROS 2 messages that 3-D views draw.
+//! The messages of the built-in nodes, and the standard ROS 2 messages that other tools know.
 //!
 //! Frames: `world` is z up; `body` is x forward, y left, z up, its origin in the centre of mass.
 //!

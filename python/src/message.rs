@@ -41,7 +41,9 @@ fn known(name: &str) -> Result<&'static Schema, String> {
         format!("there is no message {name}; hummingbus.messages() lists those of hummingbus, hummingbus.message makes others")
     })?;
     if found.has_text() {
-        return Err(format!("the message {name} holds a text: only plants send it, for 3-D views"));
+        return Err(format!(
+            "the message {name} holds a text: only plants and sensors send it, for tools of ROS 2"
+        ));
     }
     Ok(found)
 }

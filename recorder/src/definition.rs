@@ -473,7 +473,11 @@ impl Cursor<'_> {
 mod tests {
     use super::{Definition, Value, is_padding};
     use bus::Message;
-    use bus::messages::{BodyTransform, FrameName, MotorCommand, Orientation, Point, PoseStamped, Time};
+    use bus::messages::{
+        BodyTransform, FrameName, MotorCommand, Odometry, Orientation, Point, PoseStamped, StandardImu,
+        StandardRange, Time, Vector3,
+    };
+    use std::collections::BTreeMap;
 
     fn cdr<T: Message>(message: &T) -> Vec<u8> {
         [&[0, 1, 0, 0], bytemuck::bytes_of(message)].concat()
@@ -516,6 +520,36 @@ mod tests {
             assert_eq!((&leaves[3].value, leaves.len()), (&Value::Text(name.to_owned()), 11));
             assert_eq!(leaves[6].value, Value::Float(3.0));
         }
+    }
+
+    #[test]
+    fn standard_messages_of_frames_with_names_of_any_length_decode() {
+        let (ahead, level) = (Vector3 { x: 5.0, ..Vector3::default() }, Orientation::default());
+        for name in ["h", "hb_body", "h1/range/down", "a-vehicle-with-a-long-name/body"] {
+            let frame = FrameName::new(name).unwrap();
+            let imu = decoded(&StandardImu::new(&frame, Vector3::default(), 1e-6, ahead, 4e-6));
+            assert_eq!(imu["header.frame_id"], Value::Text(name.to_owned()));
+            assert_eq!(imu["orientation_covariance[0]"], Value::Float(-1.0));
+            assert_eq!(imu["linear_acceleration.x"], Value::Float(5.0));
+            assert_eq!(imu["linear_acceleration_covariance[8]"], Value::Float(4e-6));
+            let odometry = decoded(&Odometry::new(&frame, Point::default(), level, ahead, ahead));
+            assert_eq!(odometry["header.frame_id"], Value::Text("map".to_owned()));
+            assert_eq!(odometry["child_frame_id"], Value::Text(name.to_owned()));
+            assert_eq!(odometry["twist.twist.linear.x"], Value::Float(5.0));
+            assert_eq!(odometry["twist.covariance[35]"], Value::Float(0.0));
+            let range = decoded(&StandardRange::new(&frame, 1, [0.25, 0.5, 7.5, 1.5, 0.125]));
+            assert_eq!(range["header.frame_id"], Value::Text(name.to_owned()));
+            assert_eq!(range["radiation_type"], Value::Integer(1));
+            assert_eq!(range["range"], Value::Float(1.5));
+            assert_eq!((&range["variance"], range.len()), (&Value::Float(0.125), 9));
+        }
+    }
+
+    /// The fields of a message, read by its own definition from the bytes that are recorded.
+    fn decoded<T: Message>(message: &T) -> BTreeMap<String, Value> {
+        let definition = Definition::parse(T::SCHEMA.type_name, &T::SCHEMA.ros2_definition()).unwrap();
+        let leaves = definition.decode(T::SCHEMA.extent().unwrap().of_cdr(&cdr(message))).unwrap();
+        leaves.into_iter().map(|leaf| (leaf.path, leaf.value)).collect()
     }
 
     #[test]

@@ -13,7 +13,7 @@ pub enum Language {
 }
 
 /// A header with `schemas`, and with the messages within them before them. Messages with a text in them are left out: only
-/// plants send these, for 3-D views.
+/// plants and sensors send these, for tools of ROS 2.
 pub fn header(schemas: &[&'static Schema], language: Language) -> String {
     let mut ordered = Vec::new();
     for schema in schemas.iter().filter(|schema| !schema.has_text()) {

@@ -103,6 +103,7 @@ def named_fields(value):
         return value.items()
     for names in ("__dataclass_fields__", "__slots__"):
         if hasattr(value, names):
-            # `__msgtype__` is no field of the message.
-            return [(name, getattr(value, name)) for name in getattr(value, names) if not name.startswith("__")]
+            # Neither `__msgtype__` nor a constant, in capitals, is a field of the message.
+            fields = [name for name in getattr(value, names) if not name.startswith("__") and not name.isupper()]
+            return [(name, getattr(value, name)) for name in fields]
     return None

@@ -31,8 +31,10 @@ fn manifest(place: &Place) -> String {
     let walls = "walls = \"/odometry/walls\", attitude = \"/attitude/estimate\"";
     let mut text = format!(
         "include = [{include:?}]\n[run]\nduration_s = {}\n\
-         [process.plant]\noutputs.pose = {{}}\noutputs.tf = {{}}\n\
+         [process.plant]\noutputs.pose = {{}}\noutputs.tf = {{}}\noutputs.odometry = {{}}\n\
+         [process.imu]\noutputs.data_raw = {{}}\n\
          [process.range]\ninputs.traffic = \"/traffic/traffic\"\n\
+         outputs = {{ front = {{}}, back = {{}}, left = {{}}, right = {{}}, down = {{}} }}\n\
          [process.link]\nkind = \"link\"\n\
          inputs.gps = {{ topic = \"/gps/gps\", delay_ticks = 1, initial = {{}} }}\n\
          inputs.state = {{ topic = \"/plant/state\", delay_ticks = 1, initial = {{}} }}\n\

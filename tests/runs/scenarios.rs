@@ -26,8 +26,16 @@ const MAY_KNOW: [&str; 12] = [
 ];
 
 /// The messages that hold it.
-pub const TRUTHS: [&str; 7] =
-    ["Clearance", "Contact", "MeasuredState", "PlantState", "PoseStamped", "TFMessage", "Traffic"];
+pub const TRUTHS: [&str; 8] = [
+    "Clearance",
+    "Contact",
+    "MeasuredState",
+    "Odometry",
+    "PlantState",
+    "PoseStamped",
+    "TFMessage",
+    "Traffic",
+];
 
 /// Flies the manifest at `path` composed: the bytes are those of single processes (`compose`, `in_process`), and are there
 /// sooner on a machine that has other things to do.

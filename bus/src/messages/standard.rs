@@ -122,7 +122,7 @@ float64 z
 pub struct StandardImu {
     /// Simulation time.
     pub stamp: Time,
-    /// Frame of the body, then orientation, angular velocity and specific force, each with its covariance.
+    /// Frame of the body, then orientation, angular velocity and specific force, with covariances.
     #[field(unit = "1", frame = "body")]
     reading: NamedReading,
 }
@@ -235,7 +235,7 @@ pub struct Odometry {
     pub stamp: Time,
     /// Frame of the pose, `map`.
     frame_id: MapFrame,
-    /// Frame of the body, its pose in the world, and its twist in its own axes, each with its covariance.
+    /// Frame of the body, its pose in the world and its twist in its own axes, with covariances.
     #[field(unit = "1")]
     motion: NamedMotion,
 }
@@ -272,7 +272,7 @@ impl Odometry {
     }
 }
 
-/// Reading of one range finder, byte-identical to a ROS 2 `sensor_msgs/msg/Range`. Releases before Jazzy have no `variance`; their
+/// Reading of one range finder, byte-identical to a ROS 2 `sensor_msgs/msg/Range`. Releases before Iron have no `variance`; their
 /// readers ignore it.
 ///
 /// ```
@@ -309,7 +309,7 @@ uint32 nanosec
 pub struct StandardRange {
     /// Simulation time.
     pub stamp: Time,
-    /// Frame of the beam, which looks along its x axis; type of radiation; field of view, nearest and farthest range, range and variance.
+    /// Frame of the beam, type of radiation, field of view, nearest and farthest range, range, variance.
     #[field(unit = "1")]
     beam: NamedBeam,
 }
