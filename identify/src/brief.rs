@@ -213,7 +213,7 @@ mod tests {
     use super::Brief;
     use crate::horizons::{Change, Changes};
     use crate::loss::Loss;
-    use crate::proposal::{Answer, Limits, Proposal};
+    use crate::proposal::Proposal;
     use crate::questions::Question;
     use crate::report::{BeforeAfter, EffectReport, Estimate, Report};
     use crate::revision::Withdrawn;
@@ -330,16 +330,7 @@ mod tests {
         assert_eq!(super::value("x", &offset), "x 5.995 mm (5.985 to 6.005)");
         let question =
             Question::Parameter { effect: "com-offset", parameter: "z", plausible: 0.005, unit: "m" };
-        let limits = Limits { room_m: [[0.0, 1.0]; 3], speed_max_m_s: 1.0, tilt_max_deg: 5.0 };
-        let proposal = Proposal {
-            answers: vec![Answer { question, separation: 0.0, manoeuvre: None }],
-            course: Vec::new(),
-            duration_s: 0.0,
-            limits,
-            reached: limits,
-            advice: Some("Raise speed_max_m_s".to_owned()),
-            was_stopped: false,
-        };
+        let proposal = Proposal::of_one_question(question, 0.0);
         let brief = Brief::of(&Report { next_flight: Some(proposal), ..Report::of_nothing() });
         assert_eq!(
             brief.next,

@@ -146,23 +146,31 @@ impl fmt::Display for Proposal {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_flight_that_decides_nothing_is_told_with_the_limit_to_raise() {
-        let question = Question::Names { effect: "rotor-drag", rival: "parasitic-drag" };
+impl Proposal {
+    /// A proposal without a course: one question, its separation, and a limit to raise.
+    pub(crate) fn of_one_question(question: Question, separation: f64) -> Self {
         let limits =
             Limits { room_m: [[-1.0, 1.0], [-1.0, 1.0], [1.0, 2.0]], speed_max_m_s: 0.5, tilt_max_deg: 5.0 };
-        let mut proposal = Proposal {
-            answers: vec![Answer { question, separation: 1.2, manoeuvre: None }],
+        Self {
+            answers: vec![Answer { question, separation, manoeuvre: None }],
             course: Vec::new(),
             duration_s: 0.0,
             limits,
             reached: limits,
             advice: Some("Raise speed_max_m_s".to_owned()),
             was_stopped: false,
-        };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_flight_that_decides_nothing_is_told_with_the_limit_to_raise() {
+        let question = Question::Names { effect: "rotor-drag", rival: "parasitic-drag" };
+        let mut proposal = Proposal::of_one_question(question, 1.2);
         assert!(!proposal.is_worth_flying());
         let text = proposal.to_string();
         assert!(text.contains("none within the limits") && text.contains("Raise speed_max_m_s"), "{text}");
