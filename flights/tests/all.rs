@@ -10,9 +10,11 @@ mod parquet_file;
 mod skipped;
 mod support;
 
+mod axes;
 mod bags;
 mod commands;
 mod dataflash;
+mod force;
 mod held_out;
 mod parquet;
 mod parts;
@@ -23,3 +25,4 @@ mod rig;
 mod synthetic;
 mod tables;
 mod ulog;
+mod units;

@@ -1,5 +1,7 @@
 //! Made-up motions and logs.
 
+pub mod made;
+
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
