@@ -1,4 +1,4 @@
-//! Real flights, where they are: `HUMMINGBUS_DATA` names their folder. docs/validation.md has all of them.
+//! Real flights, where they are: `HUMMINGBUS_DATA` names their folder. docs/validation-real.md has all of them.
 
 use crate::skipped;
 use flights::{Flight, FlightSet, Role};
