@@ -29,19 +29,38 @@ fn commands_on_another_clock_are_told_with_the_time() {
                 let mut set = whole.clone();
                 set.flights[FAULTY].command.time_s.iter_mut().for_each(|time_s| *time_s += late_s);
                 let found = found(&set);
-                let told = |fault: &Fault| -> Option<f64> {
-                    fault.found.split_once("`delay_s` of about ")?.1.parse().ok()
-                };
                 let is_told = |fault: &Fault| {
                     fault.flight == set.flights[FAULTY].name
                         && (&fault.channel[..], fault.kind) == ("command", "other-clock")
-                        && told(fault).is_some_and(|told_s| (told_s - late_s).abs() < TOLD_S)
+                        && told_s(fault).is_some_and(|told_s| (told_s - late_s).abs() < TOLD_S)
                 };
                 (found.len() != 1 || !is_told(&found[0])).then(|| format!("{late_s}: {found:?}"))
             })
             .collect();
         assert!(wrong.is_empty(), "seed {seed}: {wrong:#?}");
     }
+}
+
+/// Commands that are early by little more than the longest delay that is tried are told with the right time, or not at all: they pass for no
+/// other order and for no other fault.
+#[test]
+fn commands_that_are_early_by_a_quarter_of_a_second_pass_for_no_other_fault() {
+    const LATE_S: f64 = -0.25;
+    for seed in [60, 160, 260] {
+        let mut set = several(&Case::of(&["mass-error", "rotor-drag"], 1.0, seed, DURATION_S));
+        set.flights[FAULTY].command.time_s.iter_mut().for_each(|time_s| *time_s += LATE_S);
+        let found = found(&set);
+        let is_right = |fault: &Fault| {
+            (&fault.flight, &fault.channel[..]) == (&set.flights[FAULTY].name, "command")
+                && told_s(fault).is_some_and(|told_s| (told_s - LATE_S).abs() < TOLD_S)
+        };
+        assert!(found.len() <= 1 && found.iter().all(is_right), "seed {seed}: {found:#?}");
+    }
+}
+
+/// The `delay_s` that a fault of the clock advises.
+fn told_s(fault: &Fault) -> Option<f64> {
+    fault.found.split_once("`delay_s` of about ")?.1.parse().ok()
 }
 
 /// Flights of a heavier vehicle with undeclared drag.
