@@ -70,7 +70,7 @@ fn without_glitches<const N: usize>(
     }
     let kept = channel.kept(|index| is_kept[index]);
     let first_s = (0..is_kept.len()).find(|index| !is_kept[*index]).map_or(0.0, |at| channel.time_s[at]);
-    let why = format!("are far from those before and behind them, first at {first_s:.3} s of the log");
+    let why = format!("are far from the samples before and after them, first at {first_s:.3} s of the log");
     say_dropped(quantity, &channel, &kept, &why, notes);
     kept
 }
@@ -98,8 +98,10 @@ pub fn without_absent<const N: usize>(
 ) -> Result<Channel<N>, LogError> {
     let kept = channel.kept(|index| is_absent.get(index) != Some(&true));
     if kept.is_empty() && !channel.is_empty() {
-        let (expected, found) =
-            (format!("messages that hold it, by `{fields}`"), format!("none of {}", channel.time_s.len()));
+        let (expected, found) = (
+            format!("messages with a valid value, by `{fields}`"),
+            format!("none of {}", channel.time_s.len()),
+        );
         return Err(LogError::unexpected(
             Spot::Whole,
             expected,
@@ -107,7 +109,7 @@ pub fn without_absent<const N: usize>(
             "name another topic, or remove the channel",
         ));
     }
-    say_dropped(quantity, &channel, &kept, &format!("do not hold it, by `{fields}`"), notes);
+    say_dropped(quantity, &channel, &kept, &format!("have no valid value, by `{fields}`"), notes);
     Ok(kept)
 }
 
@@ -129,11 +131,11 @@ pub fn say_dropped<const N: usize>(
 fn check_clock(time_s: &[f64]) -> Result<(), LogError> {
     if let Some(fault) = clock::not_forward(time_s) {
         let (expected, advice) =
-            ("times that grow", "choose another clock or message, or sort the log by time");
+            ("times that increase", "choose another clock or message, or sort the log by time");
         let found = match fault {
             NotForward::Stands => format!("the same time, {} s, in all {} samples", time_s[0], time_s.len()),
             NotForward::Falls { falling, steps, first: [from, to] } => format!(
-                "times that fall in {falling} of {steps} steps, first from {} s to {} s behind {} samples",
+                "times that fall in {falling} of {steps} steps, first from {} s to {} s after {} samples",
                 time_s[from],
                 time_s[to],
                 from + 1
@@ -143,7 +145,7 @@ fn check_clock(time_s: &[f64]) -> Result<(), LogError> {
     }
     let Some(at) = clock::restarts(time_s).first().copied() else { return Ok(()) };
     let found = format!(
-        "a clock that starts again: behind {at} samples the time goes back from {} s to {} s",
+        "a clock that starts again: after {at} samples the time goes back from {} s to {} s",
         time_s[at - 1],
         time_s[at]
     );
@@ -158,7 +160,7 @@ fn growing<const N: usize>(quantity: Quantity, channel: Channel<N>, notes: &mut 
     }
     let is_kept = longest_growing(&channel.time_s);
     let kept = channel.kept(|index| is_kept[index]);
-    say_dropped(quantity, &channel, &kept, "have a time that does not grow", notes);
+    say_dropped(quantity, &channel, &kept, "have a time that does not increase", notes);
     kept
 }
 
@@ -232,7 +234,7 @@ pub fn unit_quaternions(channel: Channel<4>, notes: &mut Vec<String>) -> Result<
         let advice = "name the columns of x, y, z and w, or use `euler` for angles";
         return Err(LogError::unexpected(Spot::Whole, expected, found, advice));
     }
-    say_dropped(Quantity::Attitude, &channel, &kept, "are no quaternion of length one", notes);
+    say_dropped(Quantity::Attitude, &channel, &kept, "are not unit quaternions", notes);
     let mut before = [1.0, 0.0, 0.0, 0.0];
     for (index, q) in kept.values.iter_mut().enumerate() {
         let along: f64 = q.iter().zip(before).map(|(a, b)| a * b).sum();
@@ -261,7 +263,7 @@ mod tests {
         let read = channel(&[(0.0, 1.0), (1.0, 2.0), (1e9, 3.0), (2.0, 4.0), (2.0, 5.0), (3.0, 6.0)]);
         let cleaned = clean(Quantity::BatteryVoltage, read, &mut notes).unwrap();
         assert_eq!(cleaned.time_s, [0.0, 1.0, 2.0, 3.0]);
-        assert_eq!(notes, ["battery_voltage: 2 of 6 samples have a time that does not grow; left out"]);
+        assert_eq!(notes, ["battery_voltage: 2 of 6 samples have a time that does not increase; left out"]);
     }
 
     #[test]

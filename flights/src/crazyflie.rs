@@ -89,10 +89,10 @@ impl CrazyflieLog {
         if !is_whole {
             self.notes.push(format!(
                 "the checksum at its end is missing or wrong: the log is cut or damaged; {count} records were read, \
-                 {others} bytes that are no record left out"
+                 {others} bytes outside of records were left out"
             ));
         } else if left_out > 0 {
-            self.notes.push(format!("{left_out} bytes of the log are no record; left out"));
+            self.notes.push(format!("{left_out} bytes of the log belong to no record; left out"));
         }
     }
 
@@ -165,7 +165,7 @@ fn header(cursor: &mut Cursor<'_>) -> Result<BTreeMap<u16, Event>, LogError> {
             Spot::Whole,
             expected,
             found,
-            "log with newer firmware, or convert it to CSV by the `cfusdlog.py` of its own",
+            "log with newer firmware, or convert it to CSV with the `cfusdlog.py` of its firmware",
         ));
     }
     let count = cursor.u16().ok_or_else(cut)?;

@@ -157,11 +157,11 @@ fn said(places: usize, first: usize, lost: usize, left: usize) -> Vec<String> {
     let mut notes = Vec::new();
     if places > 0 {
         notes.push(format!(
-            "the log is damaged in {places} places, the first at byte {first}: {lost} bytes are no messages; left out"
+            "the log is damaged in {places} places, the first at byte {first}: {lost} bytes belong to no message; left out"
         ));
     }
     if left > 0 {
-        notes.push(format!("the log is cut: its last {left} bytes are no whole message; left out"));
+        notes.push(format!("the log is cut: its last {left} bytes are an incomplete message; left out"));
     }
     notes
 }

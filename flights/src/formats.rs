@@ -23,7 +23,7 @@ pub fn parse(
     clock: Option<Clock>,
 ) -> Result<Box<dyn Log>, LogError> {
     if form.recording.is_some() && !format.is_table() {
-        let expected = "a CSV file or a Parquet file, of which alone one of several recordings is chosen";
+        let expected = "a CSV file or a Parquet file: only in these can one of several recordings be chosen";
         return Err(LogError::unexpected(Spot::Key("recording"), expected, "another format", "remove it"));
     }
     if clock.is_some() && format != Format::Mcap {

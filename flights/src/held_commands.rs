@@ -88,7 +88,7 @@ fn remove(flight: &mut Flight, stretches: &[RangeInclusive<usize>]) {
 fn note_filled(flight: &mut Flight, filled: &Filled) {
     let time_s = &flight.command.time_s;
     let kinds = [
-        (&filled.zeros, "zeros, before and behind which the vehicle flies"),
+        (&filled.zeros, "zeros, although the vehicle flies before and after them"),
         (&filled.lines, "straight lines of all rotors from one command to the next, between noisy ones"),
     ];
     for (stretches, kind) in kinds.into_iter().filter(|(stretches, _)| !stretches.is_empty()) {

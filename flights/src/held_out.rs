@@ -66,7 +66,7 @@ fn same_part([(_, fit_part), (_, test_part)]: [(&Flight, &Part); 2], shared: &Sh
     let (from_s, to_s) = (a.0.max(b.0), a.1.min(b.1));
     (to_s - from_s > EDGE_S).then(|| {
         format!(
-            "{} and {} are {}, and of its time from {:.3} s to {:.3} s and from {:.3} s to {:.3} s both have {:.3} s to \
+            "{} and {} are {}; of its time, one has {:.3} s to {:.3} s, the other {:.3} s to {:.3} s, and both have {:.3} s to \
              {:.3} s",
             shared.files[0].display(),
             shared.files[1].display(),

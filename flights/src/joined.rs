@@ -111,7 +111,7 @@ fn check_order(before: (&Path, Span), after: (&LogPart, Span)) -> Result<(), Log
     }
     let found = format!("times from {:.3} s to {:.3} s", b.from_s, b.to_s);
     let expected = format!(
-        "times behind those of {}, which has {:.3} s to {:.3} s, as a list has the parts of one log in the order of time",
+        "times after those of {}, which has {:.3} s to {:.3} s: a list names the parts of one log in the order of time",
         first.display(),
         a.from_s,
         a.to_s

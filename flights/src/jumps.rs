@@ -24,7 +24,7 @@ const POSITION: Limits = Limits { least: 0.05, acceleration: 50.0 };
 const ATTITUDE: Limits = Limits { least: 0.0873, acceleration: 250.0 };
 
 /// Note on jumps, after the channel's name.
-const NOTE: &str = "jumps as no vehicle moves";
+const NOTE: &str = "jumps faster than a vehicle can move";
 
 /// Leaves out the samples about jumps of position and attitude, and notes them in the flight's notes.
 pub fn leave_out_jumps(flight: &mut Flight) {

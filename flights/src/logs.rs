@@ -146,8 +146,7 @@ fn find(pattern: &Path) -> Result<Vec<PathBuf>, String> {
     if text.contains("**") {
         return Err("`**`, which would look through all folders".to_owned());
     }
-    let paths =
-        glob::glob_with(&text, MATCHING).map_err(|error| format!("a pattern that is none: {error}"))?;
+    let paths = glob::glob_with(&text, MATCHING).map_err(|error| format!("an invalid pattern: {error}"))?;
     let mut found = paths.collect::<Result<Vec<_>, _>>().map_err(|error| error.to_string())?;
     found.retain(|path| path.is_file());
     found.sort();

@@ -240,7 +240,7 @@ fn decoded(
             at,
             expected,
             found.to_string(),
-            "the log is damaged, or its schema is another's",
+            "the log is damaged, or its schema is that of another type",
         )
     })
 }

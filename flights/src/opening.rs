@@ -189,7 +189,7 @@ impl Opening<'_> {
         let format = asked.format.unwrap_or_else(|| formats::guess(file, &bytes));
         check_format(*first.get_or_insert(format), format, &asked.files[0])?;
         if !asked.is_beside && asked.entry.csv.is_some() && format != Format::Csv {
-            let expected = "a CSV file, whose form it says";
+            let expected = "a CSV file: `csv` describes the form of one";
             return Err(LogError::unexpected(Spot::Key("csv"), expected, "another format", "remove it"));
         }
         let clock = asked.entry.time.or(self.declaration.time);

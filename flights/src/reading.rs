@@ -446,7 +446,7 @@ fn say_command_gaps(time_s: &[f64], notes: &mut Vec<String>) {
     let Some((from_s, to_s)) = longest else { return };
     notes.push(format!(
         "{}: gaps of more than {GAP_PERIODS} periods: {}, the longest from {from_s:.3} s to {to_s:.3} s; the rotor speeds \
-         are unknown there and {SETTLE_S} s behind, so nothing is compared; if the log writes commands only on change, set \
+         are unknown there and for {SETTLE_S} s after each, so nothing is compared; if the log writes commands only on change, set \
          `on_change = true` in the channel `command`",
         Quantity::Command,
         gaps.len(),

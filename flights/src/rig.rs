@@ -55,7 +55,7 @@ pub enum Hold {
 #[must_use]
 pub fn hold(flight: &Flight, gravity_m_s2: f64) -> Hold {
     match flight.on_rig {
-        Some(true) => return Hold::Held("so it is declared".to_owned()),
+        Some(true) => return Hold::Held("the flights file declares it".to_owned()),
         Some(false) => return Hold::Free,
         None => {}
     }

@@ -66,7 +66,7 @@ pub fn check_forward(time_s: &[f64], time: Option<&Entry>, places: &Places<'_>) 
         }
     };
     let found = format!("{found}, column `{}`", shown(name));
-    Err(LogError::unexpected(Spot::Key("time"), "times that grow", found, advice))
+    Err(LogError::unexpected(Spot::Key("time"), "times that increase", found, advice))
 }
 
 /// The rows of the recording with this number; those of the only one where none is asked for.

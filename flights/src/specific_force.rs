@@ -70,7 +70,7 @@ pub fn in_body(
         "{quantity}: computed with the attitude from what is declared as {}",
         meaning.holds.name()
     ));
-    say_dropped(quantity, logged, &turned, "have no attitude about them", notes);
+    say_dropped(quantity, logged, &turned, "have no attitude at their times", notes);
     Ok(turned)
 }
 

@@ -72,14 +72,14 @@ fn notes(content: &Content) -> Vec<String> {
     let (mut notes, damage) = (Vec::new(), content.damage);
     if damage.count > 0 {
         notes.push(format!(
-            "the log is damaged in {} places, the first at byte {}: {} bytes are no messages, {:.3} s by the stamps before \
-             and behind them; left out",
+            "the log is damaged in {} places, the first at byte {}: {} bytes belong to no message, {:.3} s by the stamps before \
+             and after them; left out",
             damage.count, damage.first, damage.bytes, damage.seconds
         ));
     }
     if content.bytes_left > 0 {
         let left = content.bytes_left;
-        notes.push(format!("the log is cut: its last {left} bytes are no whole message; left out"));
+        notes.push(format!("the log is cut: its last {left} bytes are an incomplete message; left out"));
     }
     if !content.dropouts_ms.is_empty() {
         let sum_s = content.dropouts_ms.iter().map(|ms| f64::from(*ms)).sum::<f64>() * 1e-3;

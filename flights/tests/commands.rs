@@ -38,9 +38,11 @@ fn gap(t: f64) -> bool {
 fn a_gap_of_the_commands_is_noted_with_its_consequence() {
     let flight = read(gap, CHANNELS, "").unwrap();
     let note = flight.notes.iter().find(|note| note.starts_with("command: gaps")).expect("a note");
-    for part in
-        ["the longest from 1.990 s to 5.000 s", "unknown there and 0.5 s behind", "`on_change = true`"]
-    {
+    for part in [
+        "the longest from 1.990 s to 5.000 s",
+        "unknown there and for 0.5 s after each",
+        "`on_change = true`",
+    ] {
         assert!(note.contains(part), "no {part:?} in {note}");
     }
     let known = KnownRotors::of(&flight);
@@ -119,7 +121,9 @@ fn commands_that_an_exporter_filled_in_are_a_gap_and_noted() {
         let (first, last) = (column[299], column[400]);
         is_in_gap(at).then(|| first + (last - first) * (at - 299) as f64 / 101.0)
     };
-    for (flight, kind) in [(zeros, "zeros, before"), (merged(line), "straight lines of all rotors")] {
+    for (flight, kind) in
+        [(zeros, "zeros, although the vehicle flies"), (merged(line), "straight lines of all rotors")]
+    {
         let note =
             flight.notes.iter().find(|note| note.contains("filled in by an exporter")).expect("a note");
         for part in ["100 of 1001 samples in 1 stretch were filled in", kind, "from 3.00 s to 3.99 s"] {

@@ -128,7 +128,7 @@ fn parts_that_are_no_parts_of_one_log_are_refused() {
         &[
             "part ",
             "b.csv",
-            "behind those of ",
+            "after those of ",
             "a.csv",
             "4.990 s",
             "from 4.000 s",

@@ -78,8 +78,9 @@ fn lone_wild_samples_are_left_out_and_said() {
             }
         });
         let flight = read_text(&text).unwrap_or_else(|error| panic!("{first}: {error}"));
-        let note =
-            format!("{name}: 1 of 1001 samples are far from those before and behind them, first at 4.000 s");
+        let note = format!(
+            "{name}: 1 of 1001 samples are far from the samples before and after them, first at 4.000 s"
+        );
         assert!(flight.notes.len() == 1 && flight.notes[0].starts_with(&note), "{first}: {:?}", flight.notes);
     }
 }
@@ -232,7 +233,7 @@ fn bad_cells_and_times_are_counted() {
     has("command: 2 of 1001 samples have no finite number");
     let others = "attitude, position, velocity, angular_velocity, specific_force, battery_voltage";
     has(&format!("{others}: 1 of 1001 samples have no finite number"));
-    has(&format!("{others}: 1 of 1000 samples have a time that does not grow"));
+    has(&format!("{others}: 1 of 1000 samples have a time that does not increase"));
 }
 
 #[test]
@@ -335,13 +336,13 @@ fn a_crazyflie_log_is_read_as_far_as_it_goes() {
     // Cut, with a checksum that fits.
     let mut cut = log[..log.len() - 10].to_vec();
     cut.extend(crc32(&cut).to_le_bytes());
-    said(&crazyflie(&cut).unwrap(), "33 bytes of the log are no record");
+    said(&crazyflie(&cut).unwrap(), "33 bytes of the log belong to no record");
     // A wrong event, a wrong byte in a value, and bytes that are missing, all in the middle.
     let mut broken = log.clone();
     broken[start + 100 * record] = 7;
     let flight = crazyflie(&broken).unwrap();
     assert_eq!(flight.command.time_s.len(), 199);
-    said(&flight, "199 records were read, 43 bytes that are no record left out");
+    said(&flight, "199 records were read, 43 bytes outside of records were left out");
     let mut broken = log.clone();
     broken[start + 100 * record + 10] ^= 1;
     said(&crazyflie(&broken).unwrap(), "200 records were read, 0 bytes");

@@ -235,7 +235,7 @@ fn times_that_do_not_run_forward_are_refused_by_what_they_do() {
         load(&falling, CHANNELS),
         &[
             "`time`",
-            "times that grow",
+            "times that increase",
             "fall in 1000 of 1000 steps",
             "10 s in line 2 to 9.99 s in line 3",
             "column `t`",

@@ -140,7 +140,7 @@ impl Column {
             }
         }
         let read = to.len() - before;
-        if read == rows { Ok(()) } else { Err(format!("it ends behind {read} of {rows} rows")) }
+        if read == rows { Ok(()) } else { Err(format!("it ends after {read} of {rows} rows")) }
     }
 
     /// True for each row with a number.
