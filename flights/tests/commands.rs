@@ -2,6 +2,7 @@
 
 use crate::support;
 use flights::{Flight, FlightsError, KnownRotors, csv};
+use std::ops::Range;
 use support::{Motion, Place};
 
 const CHANNELS: &str = r#"
@@ -93,8 +94,8 @@ fn a_table_needs_commands_and_motion_at_one_time() {
     }
 }
 
-/// The made-up flight of 10 s with noisy commands, which `change` replaces in some rows.
-fn merged(change: impl Fn(usize, usize, &[f64]) -> Option<f64>) -> Flight {
+/// The made-up flight of 10 s with noisy commands, which `change` replaces in some rows; `extra` is in the flight's table.
+fn merged(change: impl Fn(usize, usize, &[f64]) -> Option<f64>, extra: &str) -> Flight {
     let text = Motion::default().csv();
     let (header, rows) = text.split_once('\n').expect("a header");
     let noise = |at: usize, rotor: usize| 76.0 + ((at * 7919 + rotor * 131) % 97) as f64 / 20.0;
@@ -110,19 +111,24 @@ fn merged(change: impl Fn(usize, usize, &[f64]) -> Option<f64>) -> Flight {
     let rows: String = rows.lines().enumerate().map(row).collect();
     let place = Place::new();
     place.write("log.csv", format!("{header}\n{rows}").as_bytes());
-    place.load("log.csv", CHANNELS, "").unwrap()
+    place.load("log.csv", CHANNELS, extra).unwrap()
+}
+
+/// Row `at` of the straight line over the rows `gap`, as `interpolate` of pandas fills them.
+fn interpolated(column: &[f64], gap: &Range<usize>, at: usize) -> f64 {
+    let (before, behind) = (gap.start - 1, gap.end);
+    let part = (at - before) as f64 / (behind - before) as f64;
+    column[before] + (column[behind] - column[before]) * part
 }
 
 #[test]
 fn commands_that_an_exporter_filled_in_are_a_gap_and_noted() {
-    let is_in_gap = |at: usize| (300..400).contains(&at);
-    let zeros = merged(|at, _, _| is_in_gap(at).then_some(0.0));
-    let line = |at: usize, _: usize, column: &[f64]| {
-        let (first, last) = (column[299], column[400]);
-        is_in_gap(at).then(|| first + (last - first) * (at - 299) as f64 / 101.0)
-    };
+    let gap = 300..400;
+    let zeros = merged(|at, _, _| gap.contains(&at).then_some(0.0), "");
+    let line =
+        |at: usize, _: usize, column: &[f64]| gap.contains(&at).then(|| interpolated(column, &gap, at));
     for (flight, kind) in
-        [(zeros, "zeros, although the vehicle flies"), (merged(line), "straight lines of all rotors")]
+        [(zeros, "zeros, although the vehicle flies"), (merged(line, ""), "straight lines of all rotors")]
     {
         let note =
             flight.notes.iter().find(|note| note.contains("filled in by an exporter")).expect("a note");
@@ -135,7 +141,46 @@ fn commands_that_an_exporter_filled_in_are_a_gap_and_noted() {
             known.hold(0.5, 2.99) && !known.hold(3.1, 3.2) && !known.hold(4.1, 4.4) && known.hold(4.51, 10.0)
         );
     }
-    let plain = merged(|_, _, _| None);
-    let steady = merged(|_, _, _| Some(76.0));
+    let plain = merged(|_, _, _| None, "");
+    let steady = merged(|_, _, _| Some(76.0), "");
     assert!([&plain, &steady].iter().all(|flight| flight.command.time_s.len() == 1001), "{:?}", steady.notes);
+}
+
+/// From the log to the rows that are compared: both fillers in one log, of which the flight is a part.
+#[test]
+fn rows_that_an_exporter_filled_in_are_not_compared() {
+    let (zeros, line) = (300..400, 600..700);
+    let filler = |at: usize, _: usize, column: &[f64]| {
+        if zeros.contains(&at) {
+            return Some(0.0);
+        }
+        line.contains(&at).then(|| interpolated(column, &line, at))
+    };
+    let flight = merged(filler, "from_s = 1.0");
+    let notes: Vec<&String> =
+        flight.notes.iter().filter(|note| note.contains("filled in by an exporter")).collect();
+    // Times are those of the flight, which begins 1 s after the log.
+    let [of_zeros, of_line] = notes[..] else { panic!("{:?}", flight.notes) };
+    assert!(of_zeros.contains("zeros") && of_zeros.contains("from 2.00 s to 2.99 s"), "{of_zeros}");
+    assert!(of_line.contains("straight lines") && of_line.contains("from 5.00 s to 5.99 s"), "{of_line}");
+    // A window counts if the rotors are known throughout.
+    let known = KnownRotors::of(&flight);
+    for (from_s, to_s, is_known) in [
+        (0.5, 1.9, true),
+        (1.9, 2.1, false),
+        (2.4, 2.6, false),
+        (3.1, 3.4, false),
+        (3.51, 4.9, true),
+        (5.4, 5.6, false),
+        (6.1, 6.4, false),
+        (6.51, 9.0, true),
+    ] {
+        assert_eq!(known.hold(from_s, to_s), is_known, "{from_s} s to {to_s} s: {:?}", known.stretches_s());
+    }
+    // The table that a replay flies has no row of them.
+    let (written, text) = csv(&flight).unwrap();
+    let times = text.lines().skip(1).map(|row| row.split(',').next().unwrap().parse::<f64>().unwrap());
+    let is_filled = |time_s: &f64| (1.995..2.995).contains(time_s) || (4.995..5.995).contains(time_s);
+    assert_eq!((times.filter(is_filled).count(), written.rows), (0, 701), "{:?}", written.notes);
+    assert!(written.notes.iter().any(|note| note.contains("200 of 901 rows")), "{:?}", written.notes);
 }
