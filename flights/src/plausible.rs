@@ -315,12 +315,15 @@ impl Judge<'_> {
         let late = lateness::of_rates(attitude, rates, RATE_WINDOW_S, QUIET_RATE_RAD_S)
             .filter(|late| late.correlation > agreement.correlation + ALIKE)?;
         let what = format!(
-            "it has a correlation of {:.2} with the derivative of the attitude, and of {:.2} if it is {:.2} s late: the clocks \
+            "it has a correlation of {:.2} with the derivative of the attitude, and of {:.2} if it is {:.2} s {}: the clocks \
              of the two differ by about that",
-            agreement.correlation, late.correlation, late.late_s
+            agreement.correlation,
+            late.correlation,
+            late.late_s.abs(),
+            if late.late_s < 0.0 { "early" } else { "late" }
         );
         let fits = format!(
-            "`delay_s = {{ angular_velocity = {:.2} }}` of the flight, added to a delay that stands there (and the same for channels of the same \
+            "`delay_s = {{ angular_velocity = {:.2} }}` of the flight, added to a delay that is there already (and the same for channels of the same \
              sensor or file)",
             late.late_s
         );

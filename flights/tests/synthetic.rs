@@ -103,12 +103,13 @@ fn a_gyroscope_on_another_clock_is_refused_with_its_delay() {
             CHANNELS.replace("[\"wx\", \"wy\", \"wz\"]", "[\"wx\", \"wy\", \"wz\"], file = \"imu.csv\"");
         place.load("log.csv", &channels, "").map(|flight| flight.notes).map_err(|error| error.to_string())
     };
-    for late_s in [0.3, 0.6, -1.0] {
+    for late_s in [0.3, 0.6, -0.25, -1.0] {
         let error = of(late_s).unwrap_err();
         let fits =
             error.split_once("`delay_s = { angular_velocity = ").unwrap_or_else(|| panic!("{error}")).1;
         let delay_s: f64 = fits.split(' ').next().unwrap().parse().unwrap();
-        assert!((delay_s - late_s).abs() < 0.03 && error.contains("the clocks of the two differ"), "{error}");
+        let side = if late_s < 0.0 { "s early: the clocks of the two differ" } else { "s late: the clocks" };
+        assert!((delay_s - late_s).abs() < 0.03 && error.contains(side), "{error}");
     }
     assert_eq!(of(0.0).unwrap(), [""; 0]);
 }
