@@ -73,7 +73,7 @@ pub fn axis_by_axis(signs: [f64; 3]) -> String {
         let names = NAMES.into_iter().zip(signs).filter(|(_, of_axis)| (of_axis - sign).abs() < 0.5);
         names.map(|(name, _)| name).collect::<Vec<_>>().join(", ")
     };
-    let parts = [(1.0, "alike"), (-1.0, "of the other sign"), (0.0, "without a relation")];
+    let parts = [(1.0, "agree"), (-1.0, "opposite sign"), (0.0, "unrelated")];
     let told =
         parts.map(|(sign, what)| (named(sign), what)).into_iter().filter(|(names, _)| !names.is_empty());
     told.map(|(names, what)| format!("{names}: {what}")).collect::<Vec<_>>().join("; ")

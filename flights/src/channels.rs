@@ -177,7 +177,7 @@ fn named(quantity: Quantity, entry: &Entry, rotors: usize) -> Result<(Cow<'_, [N
     if let Some((key, _)) =
         of_attitude.into_iter().find(|(_, is_given)| *is_given && quantity != Quantity::Attitude)
     {
-        return refused(key, "`attitude` alone to have it", "it", "remove it");
+        return refused(key, "this key in `attitude` alone", "it here", "remove it");
     }
     let (key, names, size, shape) = match (&entry.columns, &entry.euler, &entry.matrix) {
         (Some(columns), None, None) => ("columns", columns, quantity.size().unwrap_or(rotors), Shape::Plain),
@@ -208,8 +208,8 @@ fn named(quantity: Quantity, entry: &Entry, rotors: usize) -> Result<(Cow<'_, [N
 /// Returns the kind of a specific force as declared; refuses one for another quantity.
 fn holds(quantity: Quantity, entry: &Entry) -> Result<Holds, LogError> {
     if entry.holds.is_some() && quantity != Quantity::SpecificForce {
-        let (expected, advice) = ("`specific_force` alone to have it", "remove it");
-        return Err(LogError::unexpected(Spot::Key("holds"), expected, "it", advice));
+        let (expected, advice) = ("this key in `specific_force` alone", "remove it");
+        return Err(LogError::unexpected(Spot::Key("holds"), expected, "it here", advice));
     }
     Ok(entry.holds.unwrap_or_default())
 }
@@ -219,7 +219,7 @@ fn require_command_on_change(quantity: Quantity, entry: &Entry) -> Result<(), Lo
     if entry.on_change.is_none() || quantity == Quantity::Command {
         return Ok(());
     }
-    Err(LogError::unexpected(Spot::Key("on_change"), "`command` alone to have it", "it", "remove it"))
+    Err(LogError::unexpected(Spot::Key("on_change"), "this key in `command` alone", "it here", "remove it"))
 }
 
 /// Returns the ratio of the electrical to the mechanical speed; 1 where the log has mechanical speeds.
@@ -227,7 +227,7 @@ fn pole_pairs(quantity: Quantity, entry: &Entry) -> Result<f64, LogError> {
     let at = Spot::Key("pole_pairs");
     match entry.pole_pairs {
         Some(_) if quantity != Quantity::RotorSpeed => {
-            Err(LogError::unexpected(at, "`rotor_speed` alone to have it", "it", "remove it"))
+            Err(LogError::unexpected(at, "this key in `rotor_speed` alone", "it here", "remove it"))
         }
         Some(0) => Err(LogError::unexpected(at, "half the number of a motor's magnets", "0", "correct it")),
         pairs => Ok(f64::from(pairs.unwrap_or(1))),

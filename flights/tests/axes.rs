@@ -9,7 +9,7 @@ use flights::Quantity;
 fn an_axis_without_a_signal_is_not_advised_a_sign() {
     let text = changed("wx", 1, |row, rate| rate[0] = if row % 2 == 0 { 9.0 } else { -9.0 });
     let notes = read_text(&text).unwrap_or_else(|error| panic!("{error}")).notes;
-    assert!(notes.iter().any(|note| note.contains("(y, z: alike; x: without a relation)")), "{notes:?}");
+    assert!(notes.iter().any(|note| note.contains("(y, z: agree; x: unrelated)")), "{notes:?}");
 }
 
 #[test]

@@ -235,7 +235,7 @@ fn electrical_rotor_speeds_are_divided_by_the_pole_pairs() {
         "{zero}"
     );
     let of_rates = CHANNELS.replace("\"rad/s\"", "\"rad/s\", pole_pairs = 7");
-    assert!(refused(&of_rates, "").contains("expected `rotor_speed` alone"));
+    assert!(refused(&of_rates, "").contains("expected this key in `rotor_speed` alone"));
 }
 
 #[test]
