@@ -68,6 +68,17 @@ impl Pairs {
         Self::over_windows(&velocity.time_s, acceleration, window_s, |from, to| Some(v(to) - v(from)))
     }
 
+    /// A logged quantity against the size of the mean of `vector` over windows of `window_s`.
+    pub fn sizes(logged: &Channel<3>, vector: &Channel<3>, window_s: f64) -> Self {
+        let time_s = &vector.time_s;
+        let size = |from: usize, to: usize| {
+            let sum: Vector3<f64> = vector.values[from..to].iter().map(|value| Vector3::from(*value)).sum();
+            // Windows divide by their length.
+            Some(Vector3::x() * (sum.norm() / (to - from) as f64 * (time_s[to] - time_s[from])))
+        };
+        Self::over_windows(time_s, logged, window_s, size)
+    }
+
     fn over_windows(
         time_s: &[f64],
         logged: &Channel<3>,
@@ -94,6 +105,15 @@ impl Pairs {
     /// The same pairs, the logged vector turned by `turn`.
     pub fn turned(&self, turn: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> Self {
         Self { logged: self.logged.iter().map(turn).collect(), derived: self.derived.clone() }
+    }
+
+    /// Keeps the pairs whose logged vector `is_kept`.
+    pub fn retain_logged(&mut self, is_kept: impl Fn(&Vector3<f64>) -> bool) {
+        let kept: Vec<bool> = self.logged.iter().map(is_kept).collect();
+        for vectors in [&mut self.logged, &mut self.derived] {
+            let mut kept = kept.iter();
+            vectors.retain(|_| kept.next().is_some_and(|is_kept| *is_kept));
+        }
     }
 
     /// The horizontal parts.

@@ -123,3 +123,27 @@ fn a_declaration_counts_before_the_channels_and_an_assumed_attitude_shows_nothin
     assert_eq!(found(&flight), Hold::Unknown);
     assert_eq!(found(&Flight::new("", "", Role::Fit)), Hold::Unknown);
 }
+
+/// Without an attitude the accelerometer shows free flight: it feels what the commands make. A bearing bears the weight.
+#[test]
+fn a_vehicle_whose_specific_force_follows_its_commands_flies() {
+    let motion = motion(0.1, 0.0);
+    let mut flight = Flight::new("", "", Role::Fit);
+    let thrust =
+        |step: usize| 1.0 + 0.15 * libm::sin(0.01 * step as f64) + 0.1 * libm::cos(0.023 * step as f64);
+    let steps: Vec<usize> = (0..motion.forces.len()).collect();
+    flight.command = channel(&steps, |step| {
+        std::array::from_fn(|rotor| if rotor < 4 { 100.0 * thrust(*step) } else { 0.0 })
+    });
+    assert_eq!(found(&flight), Hold::Unknown);
+    // Rotors follow their commands late.
+    flight.specific_force =
+        channel(&steps, |step| [0.3, -0.2, GRAVITY_M_S2 * thrust(step.saturating_sub(12))]);
+    assert_eq!(found(&flight), Hold::Free);
+    flight.specific_force = channel(&steps, |step| [0.3, 0.2 * libm::sin(0.3 * *step as f64), GRAVITY_M_S2]);
+    assert_eq!(found(&flight), Hold::Unknown);
+    // On a rig that turns about a point, what is felt follows the rates, not the total of the rotors.
+    let turning = |step: usize| libm::sin(0.037 * step as f64).powi(2);
+    flight.specific_force = channel(&steps, |step| [0.0, 0.0, GRAVITY_M_S2 + 2.0 * turning(*step)]);
+    assert_eq!(found(&flight), Hold::Unknown);
+}

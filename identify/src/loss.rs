@@ -1,7 +1,7 @@
 //! Predictions that lose: to the declared vehicle, or to persistence, which knows no vehicle at all.
 
 use crate::digits::rounded;
-use crate::horizons::Changes;
+use crate::horizons::{Change, Changes};
 use crate::noise::Noise;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -9,6 +9,8 @@ use std::collections::BTreeMap;
 /// Horizons and channels that are judged.
 const HORIZONS: [&str; 2] = ["0.1", "0.5"];
 const CHANNELS: [&str; 2] = ["attitude", "velocity"];
+/// Judged in the place of an attitude that was not logged.
+const RATES: &str = "rates";
 /// A smaller ratio of errors is no loss.
 const LEAST_RATIO: f64 = 1.05;
 
@@ -42,11 +44,7 @@ pub struct Loss {
 pub fn losses(errors: &Changes, noise: &BTreeMap<&'static str, Noise>) -> Vec<Loss> {
     let mut losses = Vec::new();
     for (flight, horizons) in errors {
-        let places = HORIZONS.into_iter().flat_map(|horizon| CHANNELS.map(|channel| (horizon, channel)));
-        for (horizon, channel) in places {
-            let Some(change) = horizons.get(horizon).and_then(|channels| channels.get(channel)) else {
-                continue;
-            };
+        for (horizon, channel, change) in HORIZONS.into_iter().flat_map(|horizon| judged(horizons, horizon)) {
             let floor =
                 noise.get(channel).and_then(|noise| noise.prediction.get(horizon)).copied().unwrap_or(0.0);
             // A flight's own trim, and what disturbs it, are none of the vehicle's: the best of three.
@@ -65,6 +63,17 @@ pub fn losses(errors: &Changes, noise: &BTreeMap<&'static str, Noise>) -> Vec<Lo
         }
     }
     losses
+}
+
+/// The errors that are judged at one horizon.
+fn judged<'c>(
+    horizons: &'c BTreeMap<String, BTreeMap<&'static str, Change>>,
+    horizon: &'static str,
+) -> Vec<(&'static str, &'static str, &'c Change)> {
+    let Some(channels) = horizons.get(horizon) else { return Vec::new() };
+    let turning = (!channels.contains_key("attitude")).then_some(RATES);
+    let names = CHANNELS.into_iter().chain(turning);
+    names.filter_map(|channel| Some((horizon, channel, channels.get(channel)?))).collect()
 }
 
 impl Loss {
@@ -107,7 +116,7 @@ impl std::fmt::Display for Loss {
 
 /// Measurements that would help where `channel` loses.
 pub fn advice(channel: &str) -> &'static str {
-    if ["attitude", "angular_acceleration"].contains(&channel) {
+    if ["attitude", RATES, "angular_acceleration"].contains(&channel) {
         "torques: log rotor speeds and every command the motors get, weigh and balance the vehicle before each flight, and measure \
          its inertia and the rotors' thrust over command on a stand"
     } else {
@@ -118,9 +127,13 @@ pub fn advice(channel: &str) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::horizons::Change;
 
     fn losses_of(after: f64, own_trim: f64, persistence: f64, floor: f64) -> Vec<Loss> {
+        losses_in(&["attitude"], [after, own_trim, persistence, floor])
+    }
+
+    /// Losses of a flight with the same errors in each of these channels.
+    fn losses_in(logged: &[&'static str], [after, own_trim, persistence, floor]: [f64; 4]) -> Vec<Loss> {
         let change = Change {
             before: 4.0,
             after,
@@ -131,10 +144,20 @@ mod tests {
             by_axis: [0.0; 3],
             unit: "deg",
         };
-        let channels = BTreeMap::from([("attitude", change)]);
+        let channels: BTreeMap<_, _> = logged.iter().map(|channel| (*channel, change)).collect();
         let errors = Changes::from([("leg".to_owned(), BTreeMap::from([("0.5".to_owned(), channels)]))]);
         let prediction = BTreeMap::from([("0.5".to_owned(), floor)]);
         losses(&errors, &BTreeMap::from([("attitude", Noise { value: 0.1, unit: "rad", prediction })]))
+    }
+
+    #[test]
+    fn rates_are_judged_where_no_attitude_is_logged() {
+        let lost = |logged: &[&'static str]| {
+            losses_in(logged, [3.0, 3.0, 1.0, 0.1]).iter().map(|loss| loss.channel).collect::<Vec<_>>()
+        };
+        assert_eq!(lost(&["rates"]), ["rates"]);
+        assert_eq!(lost(&["attitude", "rates"]), ["attitude"]);
+        assert!(advice("rates").starts_with("torques"));
     }
 
     #[test]
