@@ -5,6 +5,7 @@
 
 use crate::model::air;
 use crate::predict::{body, rotors_at};
+use crate::steps_ahead::rotor_speeds;
 use flights::{Flight, Played};
 use plant::{Airframe, NewtonEuler, PerRotor, State};
 
@@ -20,6 +21,8 @@ pub struct Accelerations {
 }
 
 /// Accelerations of `airframe` at the measured states and rotor speeds of `flight`, with the effects that it has.
+///
+/// A flight without rotor speeds has those that follow from its commands by the airframe, as in [`crate::steps_ahead::errors`].
 ///
 /// # Errors
 /// A sentence that says what the flight lacks.
@@ -38,9 +41,7 @@ pub struct Accelerations {
 /// ```
 pub fn accelerations(flight: &Flight, airframe: &Airframe) -> Result<Accelerations, String> {
     let played = Played::of(flight).map_err(|cause| cause.to_string())?;
-    if flight.rotor_speed.is_empty() {
-        return Err("it has no rotor speeds".to_owned());
-    }
+    let speeds = rotor_speeds(flight, airframe, &played)?;
     let period_s = flight.attitude.period_s().ok_or("it has less than two samples of the attitude")?;
     let actuation = air(airframe, period_s);
     let (model, count) = (NewtonEuler::flying(airframe.clone(), 1), airframe.vehicle().rotors.len());
@@ -49,7 +50,7 @@ pub fn accelerations(flight: &Flight, airframe: &Airframe) -> Result<Acceleratio
     let samples = flight.attitude.time_s.iter().filter(|time_s| (start_s..=end_s).contains(*time_s));
     for time_s in samples {
         let body = body(&played.at(*time_s, &mut hint));
-        let rotors = rotors_at(&flight.rotor_speed, *time_s, &mut speed_hint);
+        let rotors = rotors_at(&speeds, *time_s, &mut speed_hint);
         let rotors = PerRotor::from_fn(count, |rotor| rotors[rotor]);
         let motion = model.accelerations_under(&actuation, &State { body, rotors });
         predicted.time_s.push(*time_s);

@@ -68,7 +68,7 @@ pub fn errors(
     between: Between,
 ) -> Result<StepsAhead, String> {
     let played = Played::of(flight).map_err(|cause| cause.to_string())?;
-    let rotors = rotors(flight, airframe, &played)?;
+    let rotors = rotor_speeds(flight, airframe, &played)?;
     let times_s = &even_times_s(flight, &played)?;
     if times_s.len() <= steps {
         return Err(format!("it has {} samples, at least {} are needed", times_s.len(), steps + 1));
@@ -183,8 +183,13 @@ impl Sums {
     }
 }
 
-/// The measured rotor speeds, or those that follow from the commands.
-fn rotors(flight: &Flight, airframe: &Airframe, played: &Played) -> Result<Channel<ROTORS_MAX>, String> {
+/// The measured rotor speeds of `flight`, or those that follow from its commands: by the command map, the motors, the delays and the battery of
+/// `airframe`. The rotors have settled at the first command.
+pub(crate) fn rotor_speeds(
+    flight: &Flight,
+    airframe: &Airframe,
+    played: &Played,
+) -> Result<Channel<ROTORS_MAX>, String> {
     if !flight.rotor_speed.is_empty() {
         return Ok(flight.rotor_speed.clone());
     }

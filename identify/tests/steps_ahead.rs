@@ -1,6 +1,6 @@
 //! Multi-step prediction: of a flight whose model is true the errors are those of the sampling alone.
 use crate::simulated;
-use identify::accelerations::accelerations;
+use identify::accelerations::{Accelerations, accelerations};
 use identify::steps_ahead::{Between, StepsAhead, errors};
 use plant::Airframe;
 use simulated::{Plan, effect, fly, vehicle_file};
@@ -122,9 +122,33 @@ fn accelerations_of_the_true_model_are_those_that_were_measured() {
     }
 }
 
+/// Mean difference of the thrust over the mass in the middle of a flight, in m/s²; that of `late` is taken `by` samples later.
+fn mean_apart(early: &Accelerations, late: &Accelerations, by: usize) -> f64 {
+    let middle = || (100..early.time_s.len() - 100).step_by(7);
+    let apart =
+        |at: usize| (early.specific_force_B_m_s2[at][2] - late.specific_force_B_m_s2[at + by][2]).abs();
+    middle().map(apart).sum::<f64>() / middle().count() as f64
+}
+
 #[test]
-fn accelerations_need_rotor_speeds() {
+fn accelerations_without_rotor_speeds_follow_from_the_commands() {
+    let (vehicle, flight) = flight(true);
+    let commanded = flights::Flight { rotor_speed: flights::Channel::default(), ..flight.clone() };
+    let airframe = Airframe::new(vehicle.clone());
+    let [measured, followed] = [&flight, &commanded].map(|flight| accelerations(flight, &airframe).unwrap());
+    assert_eq!(measured.time_s, followed.time_s);
+    let apart = mean_apart(&measured, &followed, 0);
+    assert!(apart < 0.01, "{apart} m/s^2");
+    let delay = vec![effect("command-delay", &[("delay", 0.05)])];
+    let delayed = accelerations(&commanded, &Airframe::with_effects(vehicle, delay)).unwrap();
+    let (at_once, shifted) = (mean_apart(&followed, &delayed, 0), mean_apart(&followed, &delayed, 5));
+    assert!(shifted < 0.1 * at_once, "{shifted} m/s^2 at 0.05 s later, {at_once} m/s^2 at the same time");
+}
+
+#[test]
+fn accelerations_need_rotor_speeds_or_commands() {
     let (vehicle, flight) = flight(false);
-    let error = accelerations(&flight, &Airframe::new(vehicle)).unwrap_err();
-    assert_eq!(error, "it has no rotor speeds");
+    let silent = flights::Flight { command: flights::Channel::default(), ..flight };
+    let error = accelerations(&silent, &Airframe::new(vehicle)).unwrap_err();
+    assert_eq!(error, "it has neither rotor speeds nor commands");
 }

@@ -14,7 +14,7 @@ use vehicles::Vehicle;
 /// the times in s, the specific forces in m/s² and the angular accelerations in rad/s², along and about the axes of the body.
 ///
 /// # Errors
-/// A vehicle file that cannot be read, a flight without an attitude or rotor speeds.
+/// A vehicle file that cannot be read, a flight without an attitude, a flight with neither rotor speeds nor commands.
 ///
 /// ```no_run
 /// let set = flights::FlightSet::load("flights/neurobem.toml".as_ref())?;
