@@ -2,6 +2,7 @@
 
 use crate::parameter::Parameters;
 use crate::prepared::{Equation, Prepared};
+use flights::Flight;
 use plant::effects::{EffectKind, FitAs, Quantity};
 
 /// Need of effects that show in torques, or in the time at which commands act.
@@ -91,8 +92,25 @@ fn has(prepared: &Prepared, quantity: Quantity) -> bool {
         Quantity::TwoDirections => has_attitude && has(prepared, Quantity::Force),
         Quantity::InertialUnit => !flight.angular_velocity.is_empty() || !flight.specific_force.is_empty(),
         Quantity::RotorSpeed => !flight.rotor_speed.is_empty(),
+        Quantity::KnownRig => {
+            flight.on_rig == Some(true) || !flight.rotor_speed.is_empty() || may_show_rig(flight)
+        }
         Quantity::Pose => has_attitude || !flight.position.is_empty(),
     }
+}
+
+/// True if a flight has another clock than that of its commands to hold an inertial unit against: that of the attitude, or of rotor speeds beside
+/// the commands.
+pub fn has_third_clock(prepared: &Prepared) -> bool {
+    !prepared.flight.attitude.is_empty() || prepared.offset_of(prepared.rotor_speed()).is_some()
+}
+
+/// True if the attitude of a flight does not contradict a rig. The translation of a held vehicle was left out before (`rig`); where there is one,
+/// it did not show a rig.
+fn may_show_rig(flight: &Flight) -> bool {
+    let has_translation =
+        !flight.position.is_empty() || !flight.velocity.is_empty() || !flight.specific_force.is_empty();
+    !flight.attitude.is_empty() && !has_translation
 }
 
 /// The whole effect, or its parts where a part makes sense alone.
@@ -101,5 +119,71 @@ fn parts(parameters: &Parameters, kind: &'static EffectKind) -> Vec<Candidate> {
     match kind.fit_as {
         FitAs::Whole => vec![Candidate { kind, free }],
         FitAs::EachParameter => free.into_iter().map(|one| Candidate { kind, free: vec![one] }).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::prepared::{Propulsion, box_s};
+    use crate::test_flights::{flown, hummingbird};
+    use flights::Channel;
+    use vehicles::ROTORS_MAX;
+
+    /// A vehicle that stays in place, leans too little to show a rig, and logs all channels but the accelerometer.
+    fn all_channels() -> Flight {
+        let flight = flown([5.0, 0.01], |_| [0.0, 0.0, 2.0], |t| [0.01 * libm::sin(3.0 * t), 0.0, 0.0]);
+        let mut commands = [0.0; ROTORS_MAX];
+        commands[..4].fill(hummingbird().hover_command());
+        let time_s = flight.rotor_speed.time_s.clone();
+        Flight { command: Channel { values: vec![commands; time_s.len()], time_s }, ..flight }
+    }
+
+    /// The same with gyroscope and commands alone.
+    fn gyroscope_and_commands() -> Flight {
+        let mut flight = all_channels();
+        (flight.position, flight.velocity) = (Channel::default(), Channel::default());
+        (flight.attitude, flight.rotor_speed) = (Channel::default(), Channel::default());
+        flight
+    }
+
+    fn prepared(flight: &Flight) -> Prepared<'_> {
+        let propulsion = Propulsion::of(&hummingbird());
+        Prepared::new(flight, box_s(flight), &propulsion).expect("a usable flight")
+    }
+
+    /// Requirements of the parts of an effect that a flight does not meet.
+    fn needs(effect: &str, flight: &Flight) -> Vec<&'static str> {
+        let parameters = Parameters::of(&hummingbird(), &[]);
+        let (_, unidentifiable) = candidates(&parameters, &[&prepared(flight)]);
+        unidentifiable.into_iter().filter(|one| one.effect == effect).map(|one| one.needs).collect()
+    }
+
+    /// Of commands and an inertial unit alone only the sum of both delays shows.
+    #[test]
+    fn attitude_and_rotor_speeds_are_a_third_clock() {
+        let (all, alone) = (all_channels(), gyroscope_and_commands());
+        let turned = Flight { attitude: all.attitude.clone(), ..alone.clone() };
+        let spinning = Flight { rotor_speed: all.rotor_speed.clone(), ..alone.clone() };
+        let has_clock = |flight: &Flight| has_third_clock(&prepared(flight));
+        assert_eq!([&alone, &turned, &spinning].map(has_clock), [false, true, true]);
+    }
+
+    /// A friction that follows from commands alone is a candidate only on a rig that is declared or shows.
+    #[test]
+    fn frictions_of_a_rig_take_a_rig_or_rotor_speeds() {
+        let (all, alone) = (all_channels(), gyroscope_and_commands());
+        let turned = Flight { attitude: all.attitude.clone(), ..alone.clone() };
+        let placed = Flight { position: all.position.clone(), ..turned.clone() };
+        let spinning = Flight { rotor_speed: all.rotor_speed.clone(), ..placed.clone() };
+        let held = Flight { on_rig: Some(true), ..alone.clone() };
+        for effect in ["gimbal-friction", "bearing-friction"] {
+            for unknown in [&alone, &placed] {
+                assert_eq!(needs(effect, unknown), [Quantity::KnownRig.describe()], "{effect}");
+            }
+            for known in [&turned, &spinning, &held] {
+                assert!(needs(effect, known).is_empty(), "{effect}");
+            }
+        }
     }
 }

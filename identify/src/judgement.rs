@@ -1,11 +1,11 @@
 //! Judgement of a candidate: its fit beside what was accepted before, and whether that is an effect.
 
-use crate::candidate::{Candidate, free_parameters};
+use crate::candidate::{Candidate, free_parameters, has_third_clock};
 use crate::digits::quantity;
 use crate::fit::Problem;
 use crate::fit_result::FitResult;
 use crate::logging;
-use crate::sensor_effects::POSE_DELAY;
+use crate::sensor_effects::{IMU_DELAY, POSE_DELAY};
 use crate::statistics::{chance_of_no_gain, fisher_tail};
 
 /// A smaller part of the squared error does not matter, however certain it is: the comparison's own error at its
@@ -76,6 +76,7 @@ pub fn judged(
         && joint_p_value < level
         && gain > LEAST_GAIN * base.validation_cost()
         && is_seen(problem, candidate, &fitted)
+        && !is_delay_of_commands(problem, candidate, &fitted)
         && !is_beyond_bounds(problem, candidate, &fitted)
         && !drives_to_bound(problem, base, candidate, &fitted);
     let is_logging =
@@ -100,6 +101,13 @@ fn is_seen(problem: &Problem, candidate: &Candidate, fitted: &FitResult) -> bool
         let least = if entry.kind.is_delay { problem.least_delay_s() } else { LEAST_PART * entry.scale };
         (fitted.values[*at] - entry.baseline).abs() > least
     })
+}
+
+/// True if an inertial unit is later than the commands, and no third clock shows which of the two is right: only the sum of both delays shows, and
+/// `command-delay` is its name. No delay of the commands is negative, so that an early inertial unit keeps its own name.
+fn is_delay_of_commands(problem: &Problem, candidate: &Candidate, fitted: &FitResult) -> bool {
+    let is_late = || candidate.free.iter().any(|at| fitted.values[*at] > 0.0);
+    *candidate.kind == IMU_DELAY && is_late() && !problem.flights().any(has_third_clock)
 }
 
 /// True if every parameter that moved stopped at a bound: the flights ask for more than the effect can be, so another

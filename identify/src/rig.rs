@@ -22,8 +22,8 @@ pub fn moves_freely(flight: &Flight, gravity_m_s2: f64) -> bool {
     }
 }
 
-/// The flights of `set` without the translation of those that a rig holds; `None` if none has any. Where a flight itself does not
-/// show if it is held, `declared` effects of a rig do.
+/// The flights of `set` without the translation of those that a rig holds, which are marked as held; `None` if nothing changes. Where a flight
+/// itself does not show if it is held, `declared` effects of a rig do.
 pub fn without_translation(set: &FlightSet, vehicle: &Vehicle, declared: &[Effect]) -> Option<FlightSet> {
     let is_declared = declared.iter().any(|effect| effect.kind.needs.contains(&Quantity::Rig));
     let reason = |flight: &Flight| match hold(flight, vehicle.gravity_m_s2) {
@@ -31,7 +31,8 @@ pub fn without_translation(set: &FlightSet, vehicle: &Vehicle, declared: &[Effec
         Hold::Unknown if is_declared => Some("the vehicle file declares effects of a rig".to_owned()),
         Hold::Free | Hold::Unknown => None,
     };
-    let held = |flight: &Flight| reason(flight).filter(|_| !translation(flight).is_empty());
+    let is_open = |flight: &Flight| flight.on_rig.is_none() || !translation(flight).is_empty();
+    let held = |flight: &Flight| reason(flight).filter(|_| is_open(flight));
     let reasons: Vec<Option<String>> = set.flights.iter().map(held).collect();
     if reasons.iter().all(Option::is_none) {
         return None;
@@ -55,9 +56,41 @@ fn translation(flight: &Flight) -> Vec<&'static str> {
 
 fn leave_out_translation(flight: &mut Flight, reason: &str) {
     let names = translation(flight).join(", ");
-    flight.notes.push(format!("{names}: left out, as a rig holds the vehicle: {reason}"));
+    if !names.is_empty() {
+        flight.notes.push(format!("{names}: left out, as a rig holds the vehicle: {reason}"));
+    }
     flight.on_rig = Some(true);
     flight.position = Channel::default();
     flight.velocity = Channel::default();
     flight.specific_force = Channel::default();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_flights::{flown, hummingbird};
+    use plant::effects::find;
+
+    /// A gyroscope alone does not show a rig, and there is nothing to leave out.
+    #[test]
+    fn a_declared_effect_of_a_rig_declares_the_rig() {
+        let flight = flown([2.0, 0.01], |_| [0.0, 0.0, 2.0], |_| [0.0; 3]);
+        let flight = Flight {
+            position: Channel::default(),
+            velocity: Channel::default(),
+            attitude: Channel::default(),
+            ..flight
+        };
+        let set = FlightSet {
+            vehicle: "hummingbird.toml".into(),
+            flights: vec![flight],
+            next_flight: Default::default(),
+            files: Default::default(),
+        };
+        assert!(without_translation(&set, &hummingbird(), &[]).is_none());
+        let declared = [find("bearing-friction").expect("a known effect").neutral()];
+        let marked = without_translation(&set, &hummingbird(), &declared).expect("a rig that is declared");
+        assert_eq!(marked.flights[0].on_rig, Some(true));
+        assert!(marked.flights[0].notes.is_empty(), "{:?}", marked.flights[0].notes);
+    }
 }

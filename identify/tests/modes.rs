@@ -35,6 +35,11 @@ fn without_imu(flight: &mut Flight) {
     flight.specific_force = Channel::default();
 }
 
+fn with_imu_alone(flight: &mut Flight) {
+    flight.position = Channel::default();
+    flight.attitude = Channel::default();
+}
+
 fn thinned<const N: usize>(channel: &mut Channel<N>, every: usize) {
     let kept = |at: &usize| at.is_multiple_of(every);
     channel.time_s = (0..channel.time_s.len()).filter(kept).map(|at| channel.time_s[at]).collect();
@@ -92,15 +97,32 @@ fn rotor_speeds_alone_do_in_place_of_commands() {
 
 #[test]
 fn an_inertial_unit_alone_shows_mass_and_says_what_it_cannot_show() {
-    let found = changed(&Case::of(&["mass-error"], 1.0, 16, DURATION_S), |flight| {
-        flight.position = Channel::default();
-        flight.attitude = Channel::default();
-    });
+    let found = changed(&Case::of(&["mass-error"], 1.0, 16, DURATION_S), with_imu_alone);
     require_named(&found, &["mass-error"]);
     let unseen: Vec<&str> = found.not_identifiable.iter().map(|missing| missing.effect).collect();
     for effect in ["rotor-drag", "wind", "ground-effect"] {
         assert!(unseen.contains(&effect), "{unseen:?}");
     }
+}
+
+/// Of commands and an inertial unit alone only the sum of both delays shows.
+#[test]
+fn an_inertial_unit_alone_is_not_told_from_late_commands() {
+    let found = changed(&Case::of(&["command-delay"], 1.0, 26, 2.0 * DURATION_S), with_imu_alone);
+    require_named(&found, &["command-delay"]);
+    assert!(found.effects["command-delay"].confused_with.contains(&"sensor-delay"), "{found}");
+}
+
+/// Commands that act before their stamps: no delay of the commands is negative.
+#[test]
+fn an_inertial_unit_alone_may_be_early() {
+    let found = changed(&Case::null(27, 2.0 * DURATION_S), |flight| {
+        with_imu_alone(flight);
+        shift(&mut flight.command, 0.015);
+    });
+    require_named(&found, &["sensor-delay"]);
+    let delay = found.effects["sensor-delay"].parameters["imu"];
+    assert!((delay.value + 0.015).abs() < 0.002, "{delay:?}");
 }
 
 #[test]

@@ -151,6 +151,8 @@ pub enum Quantity {
     Pose,
     /// The speeds of the rotors.
     RotorSpeed,
+    /// A rig that is declared or that the attitude shows, or else the speeds of the rotors.
+    KnownRig,
 }
 
 /// Stage that has to be computed anew when a parameter changes; the later stages follow from the earlier ones.
@@ -248,6 +250,10 @@ impl Quantity {
             Self::Pose => "attitude or position, for the pose's",
             Self::RotorSpeed => {
                 "rotor speeds: torques that follow from commands alone are late by unknown times, which passes for a damping"
+            }
+            Self::KnownRig => {
+                "`rig = true` or rotor speeds, where no attitude shows the rig: torques that follow from commands alone are late by \
+                 unknown times, which passes for a friction"
             }
         }
     }

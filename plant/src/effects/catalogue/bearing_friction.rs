@@ -16,7 +16,7 @@ pub static EFFECT: EffectKind = EffectKind {
     validity: "the same about every axis, as in a ball joint; no stiction: below w_0 the bearing creeps",
     parameters: Parameters::SPECS,
     actions: &[Action::Wrench(brake)],
-    needs: &[Quantity::Torque, Quantity::Rig],
+    needs: &[Quantity::Torque, Quantity::Rig, Quantity::KnownRig],
     ..EffectKind::PLAIN
 };
 

@@ -17,7 +17,7 @@ pub static EFFECT: EffectKind = EffectKind {
     validity: "axes of the gimbal that lie along those of the body: a small tilt; no stiction: below w_0 the bearings creep",
     parameters: Parameters::SPECS,
     actions: &[Action::Wrench(brake)],
-    needs: &[Quantity::Torque, Quantity::Rig],
+    needs: &[Quantity::Torque, Quantity::Rig, Quantity::KnownRig],
     confounded_with: &[Confounder {
         effect: &bearing_friction::EFFECT,
         experiment: "turn about two axes at once: a ball joint then brakes each of them less than alone, a gimbal does not",
