@@ -144,8 +144,9 @@ impl<'a> Layout<'a> {
             (Quantity::Position | Quantity::Velocity, &[x, y, z]) => {
                 frame::world(self.frame, [x, y, z]).into()
             }
-            (Quantity::AngularVelocity, &[x, y, z]) => frame::body(self.frame, [x, y, z]).into(),
-            (Quantity::SpecificForce, &[x, y, z]) => frame::force(self.frame, self.holds, [x, y, z]).into(),
+            (Quantity::AngularVelocity | Quantity::SpecificForce, &[x, y, z]) => {
+                frame::axes(self.frame, self.holds, [x, y, z]).into()
+            }
             (Quantity::Attitude, &[roll, pitch, yaw]) if self.shape == Shape::Euler => {
                 frame::attitude(self.frame, frame::euler([roll, pitch, yaw])).into()
             }
@@ -205,13 +206,23 @@ fn named(quantity: Quantity, entry: &Entry, rotors: usize) -> Result<(Cow<'_, [N
     Ok((names, shape))
 }
 
-/// Returns the kind of a specific force as declared; refuses one for another quantity.
+/// Returns the kind of a specific force, or the axes of an angular velocity, as declared; refuses those of another quantity.
 fn holds(quantity: Quantity, entry: &Entry) -> Result<Holds, LogError> {
-    if entry.holds.is_some() && quantity != Quantity::SpecificForce {
-        let (expected, advice) = ("this key in `specific_force` alone", "remove it");
-        return Err(LogError::unexpected(Spot::Key("holds"), expected, "it here", advice));
+    let Some(holds) = entry.holds else { return Ok(Holds::default()) };
+    let known: &[Holds] = match quantity {
+        Quantity::SpecificForce => &Holds::FORCES,
+        Quantity::AngularVelocity => &Holds::RATES,
+        _ => {
+            let expected = "this key in `specific_force` or `angular_velocity` alone";
+            return Err(LogError::unexpected(Spot::Key("holds"), expected, "it here", "remove it"));
+        }
+    };
+    if known.contains(&holds) {
+        return Ok(holds);
     }
-    Ok(entry.holds.unwrap_or_default())
+    let quoted = |holds: &Holds| format!("\"{}\"", holds.name());
+    let expected = known.iter().map(quoted).collect::<Vec<_>>().join(" or ");
+    Err(LogError::unexpected(Spot::Key("holds"), expected, quoted(&holds), "correct it"))
 }
 
 /// Refuses `on_change` of all but commands: other channels have a value between their samples.

@@ -159,7 +159,7 @@ pub struct Entry {
     pub unit: Option<String>,
     /// Frames of the numbers in the log.
     pub frame: Option<Frame>,
-    /// Kind of a `specific_force`.
+    /// Kind of a `specific_force`, or axes of an `angular_velocity`.
     pub holds: Option<Holds>,
     /// True if a log writes a `command` only when it changes.
     pub on_change: Option<bool>,
@@ -196,7 +196,7 @@ pub enum Frame {
     FrdNed,
 }
 
-/// Kind of the numbers of a specific force in the log.
+/// Kind of the numbers of a specific force in the log, or axes of those of an angular velocity.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Holds {
@@ -209,12 +209,18 @@ pub enum Holds {
     WorldAcceleration,
     /// The specific force along the axes of the world: +g up at rest.
     WorldSpecificForce,
+    /// An angular velocity along the axes of the body: a gyroscope's reading.
+    Body,
+    /// An angular velocity along the axes of the world.
+    World,
 }
 
 impl Holds {
-    /// All.
-    pub const ALL: [Self; 4] =
+    /// Those of a specific force.
+    pub const FORCES: [Self; 4] =
         [Self::SpecificForce, Self::BodyAcceleration, Self::WorldAcceleration, Self::WorldSpecificForce];
+    /// Those of an angular velocity.
+    pub const RATES: [Self; 2] = [Self::Body, Self::World];
 
     /// The name in a flights file.
     pub fn name(self) -> &'static str {
@@ -223,12 +229,14 @@ impl Holds {
             Self::BodyAcceleration => "body-acceleration",
             Self::WorldAcceleration => "world-acceleration",
             Self::WorldSpecificForce => "world-specific-force",
+            Self::Body => "body",
+            Self::World => "world",
         }
     }
 
     /// True if the axes are those of the world.
     pub fn is_in_world(self) -> bool {
-        matches!(self, Self::WorldAcceleration | Self::WorldSpecificForce)
+        matches!(self, Self::WorldAcceleration | Self::WorldSpecificForce | Self::World)
     }
 
     /// True if gravity was taken off.

@@ -71,7 +71,7 @@ impl<'a> ForceDoubt<'a> {
     pub fn doubt(&self) -> Option<Doubt> {
         let declared_m_s2 = self.pairs(self.declared).residual();
         let frames = [Frame::FluEnu, Frame::FrdNed];
-        let kinds = Holds::ALL.into_iter().flat_map(|holds| frames.map(|frame| Kind { holds, frame }));
+        let kinds = Holds::FORCES.into_iter().flat_map(|holds| frames.map(|frame| Kind { holds, frame }));
         let tried = kinds.filter(|kind| kind.holds != self.declared.holds).filter_map(|kind| {
             let pairs = self.pairs(kind);
             let agreement = pairs.agreement(QUIET_M_S2).filter(|agreement| agreement.correlation > SAME)?;
@@ -101,8 +101,8 @@ impl<'a> ForceDoubt<'a> {
         let acceleration = with_attitude(&flight.specific_force, &flight.attitude, |force, q| {
             let logged = now.logged(force, q);
             // Each change of frames undoes itself.
-            let raw = frame::force(self.declared.frame, self.declared.holds, logged.into());
-            then.acceleration(frame::force(kind.frame, kind.holds, raw).into(), q)
+            let raw = frame::axes(self.declared.frame, self.declared.holds, logged.into());
+            then.acceleration(frame::axes(kind.frame, kind.holds, raw).into(), q)
         });
         Pairs::accelerations(&acceleration, &flight.velocity, &flight.position, WINDOW_S)
     }

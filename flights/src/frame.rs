@@ -23,8 +23,8 @@ pub fn body(frame: Frame, [x, y, z]: [f64; 3]) -> [f64; 3] {
     }
 }
 
-/// A specific force as the log holds it, in the world or in the body.
-pub fn force(frame: Frame, holds: Holds, vector: [f64; 3]) -> [f64; 3] {
+/// A specific force or an angular velocity as the log holds it, in the world or in the body.
+pub fn axes(frame: Frame, holds: Holds, vector: [f64; 3]) -> [f64; 3] {
     if holds.is_in_world() { world(frame, vector) } else { body(frame, vector) }
 }
 

@@ -15,8 +15,8 @@
 //! | `known_types` | messages whose fields and units need not be said |
 //! | `name`, `scaling`, `matrices`, `clock` | names of numbers, their factors, rotation matrices, clocks that start again |
 //! | `channels`, `clean`, `held`, `held_commands`, `jumps`, `spikes`, `glitches`, `reading` | from a log's numbers to a flight |
-//! | `specific_force` | specific force from what logs hold in its place |
-//! | `plausible`, `agreement`, `axes`, `lateness`, `force_doubt`, `still`, `units`, `finding` | values against physics |
+//! | `specific_force` | specific force and angular velocity from what logs hold in their place |
+//! | `plausible`, `agreement`, `axes`, `lateness`, `force_doubt`, `rates_doubt`, `still`, `units`, `finding` | values against physics |
 //! | `rig` | vehicles that a rig holds at a point |
 //! | `span` | times against the number of samples |
 //! | `held_out`, `twin` | whether test flights hold what parameters are fitted on: by file and time, by samples |
@@ -69,6 +69,7 @@ mod parquet;
 mod plausible;
 mod played;
 mod quantity;
+mod rates_doubt;
 mod reading;
 mod rig;
 mod rows;

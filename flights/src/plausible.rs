@@ -7,13 +7,11 @@ use vehicles::bearing::Bearing;
 use vehicles::{ROTORS_MAX, Vehicle};
 
 use crate::agreement::{Agreement, Pairs};
-use crate::axes::{Axes, axis_by_axis};
 use crate::declaration::{ChannelMap, Frame};
 use crate::finding::Finding;
 use crate::flight::{Channel, Flight, median};
 use crate::force_doubt::{ForceDoubt, Kind};
 use crate::frame;
-use crate::lateness;
 use crate::quantity::{FRACTION, PERCENT, Quantity};
 use crate::rig::{Hold, hold, turns_about};
 use crate::spikes::usual_greatest;
@@ -22,25 +20,23 @@ use crate::units::{HUNDREDS, Units, finding, is_gross, of_hundreds, of_unit, sho
 use diagnostics::unit::{ANGLE, ROTOR_SPEED};
 
 /// Above this correlation a logged and a derived vector are the same but for a factor.
-const SAME: f64 = 0.7;
+pub const SAME: f64 = 0.7;
+/// A vehicle in gusts accelerates as it leans with this correlation at least (real flights in a wind of 12 m/s: 0.65 to 0.72).
+pub const GUSTY: f64 = 0.6;
 /// Below this one of them is late or noisy.
 const IN_TIME: f64 = 0.9;
-/// Windows over which rates are derived, in s: long against the jitter between channels.
-const RATE_WINDOW_S: f64 = 0.1;
+/// Windows over which vectors are derived, in s: long against the jitter between channels.
 const VELOCITY_WINDOW_S: f64 = 0.2;
 const LEANING_WINDOW_S: f64 = 0.4;
-/// A gyroscope that is late by less is aligned by its readers.
-const ALIGNED_S: f64 = 0.2;
 /// Below these the vehicle hardly moves, and noise is compared with noise.
-const QUIET_RATE_RAD_S: f64 = 0.05;
 const QUIET_SPEED_M_S: f64 = 0.05;
-const QUIET_ACCELERATION_M_S2: f64 = 0.2;
+pub const QUIET_ACCELERATION_M_S2: f64 = 0.2;
 /// A vehicle accelerates as it leans, but for the drag, within this factor.
 const LEANING_TOLERANCE: f64 = 3.0;
 /// Beyond this factor a scale is as likely as a unit.
 const LEANING_EXACT: f64 = 1.5;
 /// And a vector is its twin's derivative within this one.
-const DERIVATIVE_TOLERANCE: f64 = 1.3;
+pub const DERIVATIVE_TOLERANCE: f64 = 1.3;
 /// No multirotor flies faster, in m/s.
 const SPEED_MAX_M_S: f64 = 100.0;
 /// Loggers sample at 4 Hz to 5 kHz, and vehicles fly for a second to an hour.
@@ -49,9 +45,9 @@ const SPAN_RANGE_S: (f64, f64) = (1.0, 3600.0);
 /// Below this correlation a vector does not follow its twin at all.
 const AGAINST: f64 = 0.3;
 /// It follows another kind clearly better if the correlation grows by this much.
-const CLEARLY: f64 = 0.3;
+pub const CLEARLY: f64 = 0.3;
 /// And two that are nearer than this cannot be told apart.
-const ALIKE: f64 = 0.1;
+pub const ALIKE: f64 = 0.1;
 /// Correction that would make it good, as text and in numbers.
 type Mistake<T> = (&'static str, fn(T) -> T);
 /// Possible mistakes about the Euler angles roll and pitch.
@@ -109,10 +105,14 @@ pub fn judge_time(flight: &Flight, vehicle: &Vehicle, channels: &ChannelMap) -> 
     judge.time(times).or_else(|| judge.time(&times[1..]))
 }
 
-struct Judge<'a> {
-    flight: &'a Flight,
-    vehicle: &'a Vehicle,
-    units: Units<'a>,
+/// A flight, with what its channels are compared with.
+pub struct Judge<'a> {
+    /// The flight.
+    pub flight: &'a Flight,
+    /// The vehicle.
+    pub vehicle: &'a Vehicle,
+    /// The declared units.
+    pub units: Units<'a>,
 }
 
 impl Judge<'_> {
@@ -196,152 +196,6 @@ impl Judge<'_> {
         (up < 0.3).then(|| finding(Quantity::Attitude, fits, &what))
     }
 
-    /// The attitude as it would be if the columns named x, y, z, w held w, x, y, z; `None` in other frames.
-    fn w_first(&self) -> Option<Channel<4>> {
-        let entry = self.units.declared(Quantity::Attitude)?;
-        let plain = entry.frame.unwrap_or_default() == Frame::FluEnu && entry.columns.is_some();
-        plain.then(|| Channel {
-            time_s: self.flight.attitude.time_s.clone(),
-            values: self.flight.attitude.values.iter().map(|[w, x, y, z]| [*x, *y, *z, *w]).collect(),
-        })
-    }
-
-    /// The angular velocity is the attitude's derivative.
-    fn rates(&self) -> Option<Finding> {
-        if !self.flight.assumed.is_empty() {
-            return None;
-        }
-        let (quantity, rates) = (Quantity::AngularVelocity, &self.flight.angular_velocity);
-        let pairs = Pairs::rates(&self.flight.attitude, rates, RATE_WINDOW_S);
-        let agreement = pairs.agreement(QUIET_RATE_RAD_S)?;
-        if agreement.correlation > SAME {
-            let what = format!("it is {:.4} times the derivative of the attitude", agreement.slope);
-            if let Some(angles) = self.angles_that_fit(agreement.slope) {
-                let unit = self.units.unit_that_fits(quantity, agreement.slope, DERIVATIVE_TOLERANCE);
-                return Some(finding(quantity, either(unit, Some(angles)), &what));
-            }
-            return self
-                .units
-                .by_unit_or_scale(quantity, agreement.slope, DERIVATIVE_TOLERANCE, &what)
-                .or_else(|| {
-                    late(quantity, agreement).map(|vague| self.late_rates(agreement).unwrap_or(vague))
-                });
-        }
-        let reordered = self
-            .w_first()
-            .and_then(|attitude| Pairs::rates(&attitude, rates, RATE_WINDOW_S).agreement(QUIET_RATE_RAD_S));
-        let signs = pairs.signs();
-        let signed =
-            pairs.turned(|rate| rate.component_mul(&Vector3::from(signs))).agreement(QUIET_RATE_RAD_S);
-        // A sine with the wrong sign is one that is late by half of its period, too.
-        let at_once = [Some(agreement), reordered, signed].into_iter().flatten();
-        let in_order = at_once.max_by(|a, b| a.correlation.total_cmp(&b.correlation)).unwrap_or(agreement);
-        let placed = Axes::that_fit(&pairs, QUIET_RATE_RAD_S).filter(|(_, placed)| {
-            placed.correlation > SAME && placed.correlation > in_order.correlation + CLEARLY
-        });
-        if let Some(late) = self.late_rates(placed.map_or(in_order, |(_, placed)| placed)) {
-            return Some(late);
-        }
-        if let Some(better) = reordered.filter(|better| better.correlation > SAME) {
-            let what = format!(
-                "its derivative has a correlation of {:.2} with the angular velocity, {:.2} with w first",
-                agreement.correlation, better.correlation
-            );
-            let fits = "the order w, x, y, z: name the columns in the order x, y, z, w".to_owned();
-            return Some(finding(Quantity::Attitude, Some(fits), &what));
-        }
-        if let Some((axes, placed)) = placed {
-            let what = format!(
-                "it has a correlation of {:.2} with the derivative of the attitude, and of {:.2} with its axes in another order",
-                agreement.correlation, placed.correlation
-            );
-            return Some(finding(quantity, Some(axes.advice(self.units.declared(quantity))), &what));
-        }
-        let explains = signed.is_some_and(|signed| signed.correlation > SAME);
-        if explains && matches!(signs, [x, y, z] if x > 0.0 && y < 0.0 && z < 0.0) {
-            return Some(self.one_frame_is_wrong(agreement.correlation));
-        }
-        let what = format!(
-            "it has a correlation of {:.2} with the derivative of the attitude ({})",
-            agreement.correlation,
-            axis_by_axis(signs)
-        );
-        let is_turned = signs.iter().any(|sign| *sign < 0.0);
-        let fits = (explains && is_turned).then(|| match signs {
-            [x, y, z] if x < 0.0 && y < 0.0 && z < 0.0 => {
-                format!("an attitude that takes the world to the body: {}", self.inverse_advice())
-            }
-            _ => "the axes, or angles of the attitude, with a `-` before the name".to_owned(),
-        });
-        Some(finding(quantity, fits, &what))
-    }
-
-    /// The attitude's derivative has y and z of the angular velocity with the other sign: one of the two is in another frame.
-    /// The attitude is, if in the other one the vehicle accelerates as it leans.
-    fn one_frame_is_wrong(&self, correlation: f64) -> Finding {
-        let attitude = &self.flight.attitude;
-        let turned = Channel {
-            time_s: attitude.time_s.clone(),
-            // The same change leads back.
-            values: attitude.values.iter().map(|wxyz| frame::attitude(Frame::FrdNed, *wxyz)).collect(),
-        };
-        let leans = |attitude: &Channel<4>| {
-            let agreement = self.leaning_pairs_of(attitude).1.agreement(QUIET_ACCELERATION_M_S2);
-            agreement.filter(|_| self.flight.assumed.is_empty()).map(|agreement| agreement.correlation)
-        };
-        let [here, there] = [Quantity::AngularVelocity, Quantity::Attitude].map(|one| self.other_frame(one));
-        let what = format!("it has a correlation of {correlation:.2} with the derivative of the attitude");
-        match (leans(attitude), leans(&turned)) {
-            (Some(declared), Some(other)) if other > SAME && other > declared + CLEARLY => {
-                let what = format!(
-                    "its derivative has a correlation of {correlation:.2} with the angular velocity, and its lean of {declared:.2} \
-                     with the acceleration; in the other frame that is {other:.2}"
-                );
-                finding(Quantity::Attitude, Some(there), &what)
-            }
-            (Some(declared), Some(other)) if declared > SAME && declared > other + CLEARLY => {
-                finding(Quantity::AngularVelocity, Some(here), &what)
-            }
-            _ => {
-                let either = format!("{here} here or {there} of `attitude`");
-                finding(Quantity::AngularVelocity, Some(either), &what)
-            }
-        }
-    }
-
-    /// The angular velocity is the attitude's derivative, but on another clock.
-    fn late_rates(&self, agreement: Agreement) -> Option<Finding> {
-        let (attitude, rates) = (&self.flight.attitude, &self.flight.angular_velocity);
-        let late = lateness::of_rates(attitude, rates, RATE_WINDOW_S, QUIET_RATE_RAD_S)
-            .filter(|late| late.correlation > agreement.correlation + ALIKE)?;
-        let what = format!(
-            "it has a correlation of {:.2} with the derivative of the attitude, and of {:.2} if it is {:.2} s {}: the clocks \
-             of the two differ by about that",
-            agreement.correlation,
-            late.correlation,
-            late.late_s.abs(),
-            if late.late_s < 0.0 { "early" } else { "late" }
-        );
-        let fits = format!(
-            "`delay_s = {{ angular_velocity = {:.2} }}` of the flight, added to a delay that is there already (and the same for channels of the same \
-             sensor or file)",
-            late.late_s
-        );
-        // Less than this `identify` finds and takes off by itself.
-        let is_clear = late.late_s.abs() > ALIGNED_S;
-        Some(finding(Quantity::AngularVelocity, is_clear.then_some(fits), &what))
-    }
-
-    /// Names under which an attitude that takes the world to the body is read.
-    fn inverse_advice(&self) -> &'static str {
-        let is_matrix = self.units.declared(Quantity::Attitude).is_some_and(|entry| entry.matrix.is_some());
-        if is_matrix {
-            "name the columns of its `matrix` column by column"
-        } else {
-            "negate x, y and z of its columns"
-        }
-    }
-
     /// An attitude turns where the gyroscope does.
     fn still(&self) -> Option<Finding> {
         let still = still::turning(&self.flight.attitude, &self.flight.angular_velocity)?;
@@ -404,13 +258,16 @@ impl Judge<'_> {
         let (quantity, pairs) = self.leaning_pairs();
         let agreement = pairs.agreement(QUIET_ACCELERATION_M_S2 * self.least_scale(quantity))?;
         let factor = 1.0 / agreement.slope;
-        if agreement.correlation <= SAME || libm::log(factor).abs() < libm::log(LEANING_TOLERANCE) {
+        if agreement.correlation <= GUSTY || libm::log(factor).abs() < tolerance_of_lean(agreement) {
             return None;
         }
         let what = format!("it accelerates {factor:.4} times as much as the vehicle leans");
         let declared = format!("declared in {}, {what}", self.units.unit(quantity));
         let unit = self.units.unit_that_fits(quantity, factor, LEANING_TOLERANCE);
-        let is_alone = self.units.unit_that_fits(quantity, factor, LEANING_EXACT).is_some();
+        // Leaning against gusts is in the size of the lean, but not in its regression on the acceleration.
+        let mut factors = [factor, factor / agreement.correlation].into_iter();
+        let is_alone =
+            factors.any(|factor| self.units.unit_that_fits(quantity, factor, LEANING_EXACT).is_some());
         if pairs.agreement(QUIET_ACCELERATION_M_S2).is_none() && !(is_alone && self.is_free(quantity)) {
             // Also what hangs on a rig leans and hardly moves.
             let hint = unit.map_or(String::new(), |unit| format!("; on a rig, or in another unit ({unit})"));
@@ -431,30 +288,34 @@ impl Judge<'_> {
         self.flight.on_rig == Some(false) || (quantity == Quantity::Position && !turns_about(self.flight))
     }
 
-    /// The vehicle's leaning against the acceleration of its position, or else of its velocity.
+    /// The vehicle's leaning against the acceleration of its position, or else of its velocity. Without their means: a vehicle leans
+    /// into a steady wind and stays where it is.
     fn leaning_pairs(&self) -> (Quantity, Pairs) {
         self.leaning_pairs_of(&self.flight.attitude)
     }
 
     /// The same with this attitude.
-    fn leaning_pairs_of(&self, attitude: &Channel<4>) -> (Quantity, Pairs) {
+    pub fn leaning_pairs_of(&self, attitude: &Channel<4>) -> (Quantity, Pairs) {
         let (flight, gravity_m_s2) = (self.flight, self.vehicle.gravity_m_s2);
         if flight.position.is_empty() {
             let leaning = Pairs::leaning_of(attitude, gravity_m_s2);
             let pairs =
                 Pairs::accelerations(&leaning, &flight.velocity, &flight.position, LEANING_WINDOW_S).level();
-            return (Quantity::Velocity, pairs);
+            return (Quantity::Velocity, pairs.without_means());
         }
-        let pairs = Pairs::leaning(attitude, &flight.position, gravity_m_s2, LEANING_WINDOW_S);
-        (Quantity::Position, pairs)
+        (Quantity::Position, self.leaning_pairs_with(attitude, &flight.position))
+    }
+
+    /// The lean of this attitude against the acceleration of this position.
+    fn leaning_pairs_with(&self, attitude: &Channel<4>, position: &Channel<3>) -> Pairs {
+        Pairs::leaning(attitude, position, self.vehicle.gravity_m_s2, LEANING_WINDOW_S).without_means()
     }
 
     /// The position accelerates to where the vehicle leans.
     fn axes(&self) -> Option<Finding> {
         let (attitude, position) = (&self.flight.attitude, &self.flight.position);
         let agreement = |attitude: &Channel<4>, position: &Channel<3>| {
-            let pairs = Pairs::leaning(attitude, position, self.vehicle.gravity_m_s2, LEANING_WINDOW_S);
-            let agreement = pairs.agreement(QUIET_ACCELERATION_M_S2);
+            let agreement = self.leaning_pairs_with(attitude, position).agreement(QUIET_ACCELERATION_M_S2);
             agreement.filter(|_| self.flight.assumed.is_empty()).map(|agreement| agreement.correlation)
         };
         let declared = agreement(attitude, position).filter(|correlation| *correlation < SAME)?;
@@ -469,21 +330,24 @@ impl Judge<'_> {
         });
         let tried: Vec<(&str, f64)> = of_angles.chain(of_position).collect();
         let best = tried.iter().map(|(_, correlation)| *correlation).fold(-1.0, f64::max);
+        let is_clear = is_clearly_better(best, declared);
         // With little yaw a pose tells not which of its halves is turned round.
-        let alike =
-            tried.iter().filter(|(_, correlation)| *correlation > SAME && *correlation > best - ALIKE);
+        let alike = tried.iter().filter(|(_, correlation)| *correlation > GUSTY.max(best - ALIKE));
         let advice = alike.map(|(advice, _)| *advice).collect::<Vec<_>>().join(", or ");
+        let others = if best > declared + ALIKE {
+            format!("; with axes named otherwise it is at best {best:.2}")
+        } else {
+            ", and no higher one with its axes in another order or with other signs".to_owned()
+        };
         let what = format!(
-            "the position's acceleration has a correlation of {declared:.2} with how the vehicle leans; at best {best:.2}, \
-             with axes named otherwise"
+            "the position's acceleration has a correlation of {declared:.2} with how the vehicle leans{others}"
         );
         let quantity = if is_euler { Quantity::Attitude } else { Quantity::Position };
-        let is_clear = best > SAME && best > declared + CLEARLY;
         (is_clear || declared < AGAINST).then(|| finding(quantity, is_clear.then_some(advice), &what))
     }
 
     /// The unit of Euler angles in which a vehicle that leans or turns `factor` times too little would not.
-    fn angles_that_fit(&self, factor: f64) -> Option<String> {
+    pub fn angles_that_fit(&self, factor: f64) -> Option<String> {
         let entry = self.units.declared(Quantity::Attitude)?;
         entry.euler.as_ref()?;
         let declared = entry.unit.as_deref()?;
@@ -654,7 +518,8 @@ impl Judge<'_> {
         (!(low..high).contains(&volts)).then(|| finding(quantity, fits, &what))
     }
 
-    fn other_frame(&self, quantity: Quantity) -> String {
+    /// The key of the frame that the channel is not declared in.
+    pub fn other_frame(&self, quantity: Quantity) -> String {
         let frame = self.units.declared(quantity).and_then(|entry| entry.frame);
         let other = if frame == Some(Frame::FrdNed) { "flu-enu" } else { "frd-ned" };
         format!("`frame = \"{other}\"`")
@@ -671,8 +536,22 @@ fn with_angles(attitude: &Channel<4>, change: fn((f64, f64)) -> (f64, f64)) -> C
     Channel { time_s: attitude.time_s.clone(), values: attitude.values.iter().map(changed).collect() }
 }
 
+/// Logarithm of the factor beyond which an acceleration is not that of the lean. Gusts make the lean larger, and noise the
+/// acceleration: each by no more than the correlation falls.
+fn tolerance_of_lean(agreement: Agreement) -> f64 {
+    let loose = if agreement.correlation > SAME { 1.0 } else { agreement.correlation };
+    libm::log(LEANING_TOLERANCE / loose)
+}
+
+/// True if axes named otherwise follow the lean, and those as declared do not. In gusts nothing follows it well, so that more has to be
+/// gained.
+pub fn is_clearly_better(best: f64, declared: f64) -> bool {
+    let least = if best > SAME { CLEARLY } else { 2.0 * CLEARLY };
+    best > GUSTY && best > declared + least
+}
+
 /// Joins the fits of two as text; if only one has a fit, returns that.
-fn either(here: Option<String>, there: Option<String>) -> Option<String> {
+pub fn either(here: Option<String>, there: Option<String>) -> Option<String> {
     match (here, there) {
         (Some(here), Some(there)) => Some(format!("{here} here or {there}")),
         (here, there) => here.or(there),
@@ -687,7 +566,7 @@ fn of_kind(kind: Kind, declared: Kind) -> String {
 }
 
 /// A note where a vector follows its derived twin but loosely.
-fn late(channel: Quantity, agreement: Agreement) -> Option<Finding> {
+pub fn late(channel: Quantity, agreement: Agreement) -> Option<Finding> {
     let what = format!(
         "it follows the derivative with a correlation of {:.2} only: noisy, or one is late (`delay_s`)",
         agreement.correlation

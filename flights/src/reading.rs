@@ -121,7 +121,7 @@ impl Reading<'_> {
         yaw.iter_mut().for_each(|yaw| self.shift(Quantity::Attitude, &mut yaw.time_s, origin_s));
         self.assume(&mut flight, yaw)?;
         jumps::leave_out_jumps(&mut flight);
-        self.turn_force(&mut flight)?;
+        self.turn_into_body(&mut flight)?;
         held_commands::leave_out(&mut flight, self.vehicle);
         say_gaps(&mut flight);
         self.check_something_is_left(&flight)?;
@@ -357,8 +357,17 @@ impl Reading<'_> {
         Ok(())
     }
 
-    /// Converts the logged vectors to a specific force.
-    fn turn_force(&self, flight: &mut Flight) -> Result<(), FlightsError> {
+    /// Converts the logged vectors to a specific force and an angular velocity in the body.
+    fn turn_into_body(&self, flight: &mut Flight) -> Result<(), FlightsError> {
+        let axes = self.declared(Quantity::AngularVelocity).and_then(|entry| entry.holds).unwrap_or_default();
+        let turned = specific_force::rates_in_body(
+            &flight.angular_velocity,
+            &flight.attitude,
+            axes,
+            &mut flight.notes,
+        );
+        flight.angular_velocity =
+            turned.map_err(|cause| self.channel_error(Quantity::AngularVelocity, cause))?;
         let Some(entry) = self.declared(Quantity::SpecificForce) else { return Ok(()) };
         let meaning =
             Meaning { holds: entry.holds.unwrap_or_default(), gravity_m_s2: self.vehicle.gravity_m_s2 };

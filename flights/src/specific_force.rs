@@ -1,4 +1,4 @@
-//! Specific force and its substitutes in logs: accelerations, with or without gravity, along other axes.
+//! Specific force and its substitutes in logs: accelerations, with or without gravity, along other axes. Angular velocities along other axes.
 //!
 //! With R the attitude, body to world, and g up the gravity in the world, the specific force in the body is
 //! f = R^T (a + g), where a is the acceleration in the world: R b where the log holds b along the axes of the body.
@@ -59,17 +59,42 @@ pub fn in_body(
         return Ok(logged.clone());
     }
     let turned = with_attitude(logged, attitude, |sample, q| meaning.specific_force(sample, q));
+    checked(Quantity::SpecificForce, meaning.holds, logged, attitude, turned, notes)
+}
+
+/// Turns logged angular velocities into the body; samples without an attitude about are left out.
+///
+/// # Errors
+/// If there is none for any.
+pub fn rates_in_body(
+    logged: &Channel<3>,
+    attitude: &Channel<4>,
+    holds: Holds,
+    notes: &mut Vec<String>,
+) -> Result<Channel<3>, LogError> {
+    if !holds.is_in_world() || logged.is_empty() {
+        return Ok(logged.clone());
+    }
+    let turned = with_attitude(logged, attitude, |rate, q| q.inverse() * rate);
+    checked(Quantity::AngularVelocity, holds, logged, attitude, turned, notes)
+}
+
+/// Notes what was turned into the body; refuses a channel of which nothing is left.
+fn checked(
+    quantity: Quantity,
+    holds: Holds,
+    logged: &Channel<3>,
+    attitude: &Channel<4>,
+    turned: Channel<3>,
+    notes: &mut Vec<String>,
+) -> Result<Channel<3>, LogError> {
     if turned.is_empty() {
         let expected = "an attitude at its times, which turns it into the body";
         let found = if attitude.is_empty() { "no channel `attitude`" } else { "none" };
         let advice = "map `attitude`, or remove this channel";
         return Err(LogError::unexpected(Spot::Key("holds"), expected, found, advice));
     }
-    let quantity = Quantity::SpecificForce;
-    notes.push(format!(
-        "{quantity}: computed with the attitude from what is declared as {}",
-        meaning.holds.name()
-    ));
+    notes.push(format!("{quantity}: computed with the attitude from what is declared as {}", holds.name()));
     say_dropped(quantity, logged, &turned, "have no attitude at their times", notes);
     Ok(turned)
 }
@@ -118,13 +143,28 @@ mod tests {
         let (acceleration, up) = (Vector3::new(1.0, -2.0, 0.5), Vector3::new(0.0, 0.0, 9.8));
         let force = q.inverse() * (acceleration + up);
         let expected = [force, q.inverse() * acceleration, acceleration, acceleration + up];
-        for (holds, expected) in Holds::ALL.into_iter().zip(expected) {
+        for (holds, expected) in Holds::FORCES.into_iter().zip(expected) {
             let meaning = Meaning { holds, gravity_m_s2: 9.8 };
             let logged = meaning.logged(force, &q);
             assert!((logged - expected).norm() < 1e-12, "{holds:?}");
             assert!((meaning.acceleration(logged, &q) - acceleration).norm() < 1e-12, "{holds:?}");
             assert!((meaning.specific_force(logged, &q) - force).norm() < 1e-12, "{holds:?}");
         }
+    }
+
+    #[test]
+    fn rates_in_the_world_are_turned_into_the_body() {
+        let q = UnitQuaternion::from_euler_angles(0.3, -0.2, 1.1);
+        let time_s = vec![0.0, 1.0];
+        let attitude = Channel { time_s: time_s.clone(), values: vec![[q.w, q.i, q.j, q.k]; 2] };
+        let body = Vector3::new(0.3, -0.1, 0.5);
+        let logged = Channel { time_s, values: vec![(q * body).into(); 2] };
+        let mut notes = Vec::new();
+        let turned = rates_in_body(&logged, &attitude, Holds::World, &mut notes).unwrap();
+        assert!(turned.values.iter().all(|rate| (Vector3::from(*rate) - body).norm() < 1e-12), "{turned:?}");
+        assert_eq!(notes, ["angular_velocity: computed with the attitude from what is declared as world"]);
+        assert_eq!(rates_in_body(&logged, &attitude, Holds::Body, &mut notes).unwrap(), logged);
+        assert!(rates_in_body(&logged, &Channel::default(), Holds::World, &mut notes).is_err());
     }
 
     #[test]
