@@ -114,21 +114,44 @@ fn numbers(table: &Table, name: &str) -> Result<Vec<f64>, LogError> {
         Err(missing @ ColumnError::Missing { .. }) => missing,
         Err(error) => return Err(TableError::from(error).into()),
     };
-    let array = arrays::indexed(name).and_then(|(array, index)| Some((table.column(array).ok()?, index)));
-    let (column, index) = array.ok_or_else(|| TableError::from(missing))?;
+    let (column, indices) = array_of(table, name).ok_or_else(|| TableError::from(missing))?;
     table
         .rows
         .iter()
         .map(|row| {
-            array_part(row.cell(column), index).ok_or_else(|| {
+            array_part(row.cell(column), &indices).ok_or_else(|| {
                 let at = Spot::Cell { line: row.line, column: shown(&table.headers[column]) };
-                let expected = format!("an array of more than {index} numbers, such as \"[0.1, 0.2, 0.3]\"");
+                let expected = expected_array(&indices);
                 let found = format!("`{}`", shown(row.cell(column)));
                 let advice = "correct the line, or name a column for each number";
                 LogError::unexpected(at, expected, found, advice)
             })
         })
         .collect()
+}
+
+/// The column of arrays of which `name` is a part, and its indices in the arrays, the outermost first.
+fn array_of(table: &Table, name: &str) -> Option<(usize, Vec<usize>)> {
+    let (mut part, mut indices) = (name, Vec::new());
+    while let Some((array, index)) = arrays::indexed(part) {
+        indices.insert(0, index);
+        if let Ok(column) = table.column(array) {
+            return Some((column, indices));
+        }
+        part = array;
+    }
+    None
+}
+
+/// Returns the words for an array that has a number at `indices`.
+fn expected_array(indices: &[usize]) -> String {
+    match indices {
+        [index] => format!("an array of more than {index} numbers, such as \"[0.1, 0.2, 0.3]\""),
+        _ => {
+            let part: String = indices.iter().map(|index| format!("[{index}]")).collect();
+            format!("arrays in an array, such as \"[[0.1, 0.2], [0.3, 0.4]]\", with a number {part}")
+        }
+    }
 }
 
 /// Refuses a column in which no cell holds a number, with its first cell that holds something.
@@ -146,8 +169,8 @@ fn check_numbers(table: &Table, name: &str, numbers: &[f64]) -> Result<(), LogEr
 }
 
 /// A number of the array in a cell; NaN of a cell that is empty, `None` where there is none.
-fn array_part(cell: &str, index: usize) -> Option<f64> {
-    if cell.is_empty() { Some(f64::NAN) } else { arrays::numbers(cell)?.get(index).copied() }
+fn array_part(cell: &str, indices: &[usize]) -> Option<f64> {
+    if cell.is_empty() { Some(f64::NAN) } else { arrays::part(cell, indices) }
 }
 
 /// Refuses arrays that their own delimiters take apart: all columns behind them would hold other numbers.

@@ -46,6 +46,8 @@ const SPAN_RANGE_S: (f64, f64) = (1.0, 3600.0);
 const AGAINST: f64 = 0.3;
 /// It follows another kind clearly better if the correlation grows by this much.
 pub const CLEARLY: f64 = 0.3;
+/// In gusts it has to grow by this much.
+const CLEARLY_IN_GUSTS: f64 = 0.5;
 /// And two that are nearer than this cannot be told apart.
 pub const ALIKE: f64 = 0.1;
 /// Correction that would make it good, as text and in numbers.
@@ -334,14 +336,7 @@ impl Judge<'_> {
         // With little yaw a pose tells not which of its halves is turned round.
         let alike = tried.iter().filter(|(_, correlation)| *correlation > GUSTY.max(best - ALIKE));
         let advice = alike.map(|(advice, _)| *advice).collect::<Vec<_>>().join(", or ");
-        let others = if best > declared + ALIKE {
-            format!("; with axes named otherwise it is at best {best:.2}")
-        } else {
-            ", and no higher one with its axes in another order or with other signs".to_owned()
-        };
-        let what = format!(
-            "the position's acceleration has a correlation of {declared:.2} with how the vehicle leans{others}"
-        );
+        let what = of_lean(declared, best);
         let quantity = if is_euler { Quantity::Attitude } else { Quantity::Position };
         (is_clear || declared < AGAINST).then(|| finding(quantity, is_clear.then_some(advice), &what))
     }
@@ -543,10 +538,22 @@ fn tolerance_of_lean(agreement: Agreement) -> f64 {
     libm::log(LEANING_TOLERANCE / loose)
 }
 
-/// True if axes named otherwise follow the lean, and those as declared do not. In gusts nothing follows it well, so that more has to be
+/// Returns the words for the correlation with the lean as declared, and for the best with axes named otherwise.
+fn of_lean(declared: f64, best: f64) -> String {
+    let others = if best > declared + ALIKE {
+        format!("; with axes named otherwise it is at best {best:.2}")
+    } else {
+        ", and no higher one with axes named otherwise".to_owned()
+    };
+    format!(
+        "the position's acceleration has a correlation of {declared:.2} with how the vehicle leans{others}"
+    )
+}
+
+/// True if axes named otherwise follow the lean, and those as declared do not. In gusts none follow it well, so that more has to be
 /// gained.
 pub fn is_clearly_better(best: f64, declared: f64) -> bool {
-    let least = if best > SAME { CLEARLY } else { 2.0 * CLEARLY };
+    let least = if best > SAME { CLEARLY } else { CLEARLY_IN_GUSTS };
     best > GUSTY && best > declared + least
 }
 
@@ -581,4 +588,32 @@ fn z_up(attitude: &Channel<4>) -> Option<f64> {
 
 fn range(numbers: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     numbers.map(|number| (number, number)).reduce(|a, b| (b.0.min(a.0), b.1.max(a.1)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_better_order_of_axes_is_told_only_if_it_is_better() {
+        assert!(
+            of_lean(-0.16, 0.16).ends_with(
+                "of -0.16 with how the vehicle leans; with axes named otherwise it is at best 0.16"
+            )
+        );
+        assert!(
+            of_lean(0.22, 0.21)
+                .ends_with("of 0.22 with how the vehicle leans, and no higher one with axes named otherwise")
+        );
+    }
+
+    #[test]
+    fn in_gusts_the_lean_shows_axes_and_units_by_more() {
+        assert!(
+            is_clearly_better(0.75, 0.4) && !is_clearly_better(0.65, 0.3) && is_clearly_better(0.65, 0.1)
+        );
+        assert!(!is_clearly_better(0.55, -0.55));
+        let tolerance = |correlation| libm::exp(tolerance_of_lean(Agreement { slope: 1.0, correlation }));
+        assert!((tolerance(0.9) - 3.0).abs() < 1e-12 && (tolerance(0.65) - 3.0 / 0.65).abs() < 1e-12);
+    }
 }

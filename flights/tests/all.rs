@@ -26,3 +26,4 @@ mod synthetic;
 mod tables;
 mod ulog;
 mod units;
+mod wind;

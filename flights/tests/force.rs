@@ -80,5 +80,10 @@ fn what_a_force_holds_needs_an_attitude_and_a_force() {
         "{text}"
     );
     let other = refused(&CHANNELS.replace("\"m/s\"", "\"m/s\", holds = \"world-acceleration\""), "");
-    assert!(other.contains("`velocity`: `holds`: expected this key in `specific_force` or `angular_velocity` alone"), "{other}");
+    assert!(
+        other.contains(
+            "`velocity`: `holds`: expected this key in `specific_force` or `angular_velocity` alone"
+        ),
+        "{other}"
+    );
 }

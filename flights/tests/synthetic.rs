@@ -3,6 +3,7 @@
 use crate::support::made::{CHANNELS, changed, read, read_text, refused};
 use crate::support::{self, Motion, Place, crc32};
 use flights::{Flight, FlightSet, FlightsError};
+use nalgebra::{Quaternion, UnitQuaternion};
 
 #[test]
 fn a_plain_flight_is_read_without_notes() {
@@ -179,6 +180,54 @@ fn cells_may_hold_arrays() {
             assert_eq!(flight.notes, [""; 0]);
         }
     }
+}
+
+/// The made-up flight with the rotation matrix of its attitude in a cell, its rows in arrays.
+fn with_matrices() -> String {
+    let row = |line: &str| {
+        let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
+        let q = Quaternion::new(cells[14], cells[11], cells[12], cells[13]);
+        let matrix = UnitQuaternion::from_quaternion(q).to_rotation_matrix();
+        let of_row = |row: usize| {
+            let [x, y, z] = [0, 1, 2].map(|column| matrix[(row, column)]);
+            format!("[{x}, {y}, {z}]")
+        };
+        let command = cells[..5].iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+        format!("{command},\"[{}, {}, {}]\"\n", of_row(0), of_row(1), of_row(2))
+    };
+    "t,m1,m2,m3,m4,R\n".to_owned() + &Motion::default().csv().lines().skip(1).map(row).collect::<String>()
+}
+
+#[test]
+fn a_cell_may_hold_a_matrix_as_arrays_in_an_array() {
+    let plain = read(&Motion::default(), CHANNELS, "").unwrap().attitude;
+    let place = Place::new();
+    place.write("log.csv", with_matrices().as_bytes());
+    let channels = |names: &str| {
+        let kept = ARRAYS.lines().filter(|line| line.starts_with("time") || line.starts_with("command"));
+        let kept: String = kept.map(|line| format!("{line}\n")).collect();
+        format!("{kept}attitude = {{ matrix = [{names}] }}\n")
+    };
+    let part = |index: usize| format!("\"R[{}][{}]\"", index / 3, index % 3);
+    let parts: Vec<String> = (0..9).map(part).collect();
+    for names in ["\"R\"".to_owned(), parts.join(", ")] {
+        let attitude = place.load("log.csv", &channels(&names), "").unwrap().attitude;
+        assert_eq!(attitude.values.len(), plain.values.len(), "{names}");
+        for (a, b) in attitude.values.iter().zip(&plain.values) {
+            assert!(a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>().abs() > 1.0 - 1e-9, "{a:?} {b:?}");
+        }
+    }
+    let refused =
+        |names: &[String]| place.load("log.csv", &channels(&names.join(", ")), "").unwrap_err().to_string();
+    let beyond = [&parts[..8], &["\"R[2][3]\"".to_owned()]].concat();
+    let error = refused(&beyond);
+    assert!(
+        error.contains("line 2, column `R`: expected arrays in an array")
+            && error.contains("a number [2][3], found `[["),
+        "{error}"
+    );
+    let flat = [&parts[..8], &["\"R[9]\"".to_owned()]].concat();
+    assert!(refused(&flat).contains("expected an array of more than 9 numbers"));
 }
 
 #[test]

@@ -72,8 +72,7 @@ struct Candidate {
 impl Search<'_> {
     /// The names that a header has to have.
     fn wanted(&self) -> impl Iterator<Item = &str> {
-        let numbered = |name: &&&str| by_number(name).or_else(|| by_number(array(name)?)).is_none();
-        self.names.iter().filter(numbered).copied()
+        self.names.iter().filter(|name| number_of(name).is_none()).copied()
     }
 
     /// The lines that are not blank.
@@ -164,8 +163,7 @@ impl Search<'_> {
 
     /// The rows begin with the first line that has a cell for each column that is asked for, and numbers in most.
     fn without_header(&self) -> Layout {
-        let numbers =
-            self.names.iter().filter_map(|name| by_number(name).or_else(|| by_number(array(name)?)));
+        let numbers = self.names.iter().filter_map(|name| number_of(name));
         let least = numbers.max().unwrap_or(1);
         let row = self.lines().take(SEARCHED).find_map(|line| {
             let text = &self.text[line.content.clone()];
@@ -188,7 +186,17 @@ impl Search<'_> {
 
 /// True if a header has the column `name`, or the array of which `name` is a part.
 fn has(header: &[String], name: &str) -> bool {
-    header.iter().any(|cell| cell == name || array(name) == Some(cell.as_str()))
+    arrays(name).any(|name| header.iter().any(|cell| cell == name))
+}
+
+/// Returns the number of the column `name`, or of the array of which `name` is a part.
+fn number_of(name: &str) -> Option<usize> {
+    arrays(name).find_map(by_number)
+}
+
+/// The name, and those of the arrays of which it is a part: `a[0][1]`, `a[0]` and `a`.
+fn arrays(name: &str) -> impl Iterator<Item = &str> {
+    std::iter::successors(Some(name), |name| array(name))
 }
 
 /// The name of the array in `name[index]`.
