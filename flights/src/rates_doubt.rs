@@ -76,7 +76,7 @@ impl Judge<'_> {
         }
         self.units
             .by_unit_or_scale(quantity, agreement.slope, DERIVATIVE_TOLERANCE, &what)
-            .or_else(|| self.clearly_along_other_axes())
+            .or_else(|| self.rates_along_other_axes())
             .or_else(|| late(quantity, agreement).map(|vague| self.late_rates(agreement).unwrap_or(vague)))
     }
 
@@ -88,7 +88,7 @@ impl Judge<'_> {
             .and_then(|attitude| Pairs::rates(&attitude, rates, WINDOW_S).agreement(QUIET_RAD_S));
         let signs = pairs.signs();
         let signed = pairs.turned(|rate| rate.component_mul(&Vector3::from(signs))).agreement(QUIET_RAD_S);
-        let along = self.along_axes().and_then(|[_, other]| other.agreement(QUIET_RAD_S));
+        let along = self.along_other_axes().map(|[_, other]| other);
         // A sine with the wrong sign is one that is late by half of its period, too.
         let at_once = best([Some(declared), reordered, signed], declared);
         let placed = Axes::that_fit(pairs, QUIET_RAD_S).filter(|(_, placed)| {
@@ -167,12 +167,8 @@ impl Judge<'_> {
     }
 
     /// The finding about rates that follow the attitude's derivative, and clearly better along the other axes.
-    fn clearly_along_other_axes(&self) -> Option<Finding> {
-        let [declared, other] = self.along_axes()?;
-        let [now, then] = [declared.agreement(QUIET_RAD_S)?, other.agreement(QUIET_RAD_S)?];
-        if !is_other(&declared, &other, now.slope.abs()) {
-            return None;
-        }
+    fn rates_along_other_axes(&self) -> Option<Finding> {
+        let [now, then] = self.along_other_axes()?;
         let axes = self.axes_of_rates();
         let what = format!(
             "along the axes of the {} it has a correlation of {:.4} with the derivative of the attitude, and of {:.4} along those of \
@@ -183,6 +179,13 @@ impl Judge<'_> {
             other_axes(axes).name()
         );
         Some(finding(Quantity::AngularVelocity, Some(of_axes(other_axes(axes))), &what))
+    }
+
+    /// The agreement with the axes as declared, and that with the others, if the rates are clearly along the others.
+    fn along_other_axes(&self) -> Option<[Agreement; 2]> {
+        let [declared, other] = self.along_axes()?;
+        let [now, then] = [declared.agreement(QUIET_RAD_S)?, other.agreement(QUIET_RAD_S)?];
+        is_other(&declared, &other, now.slope.abs()).then_some([now, then])
     }
 
     /// The pairs with the axes as declared, and with the others, both at the same times.
