@@ -38,19 +38,26 @@ pub fn part(cell: &str, indices: &[usize]) -> Option<f64> {
     number(elements(array)?.get(*last)?)
 }
 
-/// Appends the numbers of the array in a cell, with arrays in it to this depth.
+/// Appends the numbers of the array in a cell, with arrays in it to this depth. `None` if its elements are not of one size, since then the
+/// place of a number says nothing.
 fn append(cell: &str, depth: usize, numbers: &mut Vec<f64>) -> Option<()> {
+    let mut size = None;
     for element in elements(cell)? {
-        if element.starts_with(['[', '(']) {
+        let (before, is_array) = (numbers.len(), element.starts_with(['[', '(']));
+        if is_array {
             append(element, depth.checked_sub(1)?, numbers)?;
         } else {
             numbers.push(number(element)?);
+        }
+        let found = (is_array, numbers.len() - before);
+        if *size.get_or_insert(found) != found {
+            return None;
         }
     }
     Some(())
 }
 
-/// The number that an element is; NaN if it is none, `None` if it has brackets.
+/// The number that an element is; NaN if it is not a number, `None` if it has brackets.
 fn number(element: &str) -> Option<f64> {
     (!element.contains(['[', ']', '(', ')'])).then(|| element.parse().unwrap_or(f64::NAN))
 }
@@ -137,5 +144,8 @@ mod tests {
         let deep = |depth: usize| format!("{}1{}", "[".repeat(depth), "]".repeat(depth));
         assert_eq!(numbers(&deep(3)), Some(vec![1.0]));
         assert_eq!(numbers(&deep(100_000)), None);
+        for uneven in ["[[1], [2, 3]]", "[1, [2]]", "[[1, 2], 3]"] {
+            assert_eq!(numbers(uneven), None, "{uneven}");
+        }
     }
 }

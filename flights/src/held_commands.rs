@@ -144,11 +144,12 @@ fn rates(flight: &Flight) -> Channel<3> {
 /// True if the motion shows that nothing carries the vehicle in the second half of the time: rotors go on turning for a moment.
 fn falls(flight: &Flight, vehicle: &Vehicle, from_s: f64, to_s: f64) -> bool {
     let gravity_m_s2 = vehicle.gravity_m_s2;
-    let within = |time_s: &f64| (f64::midpoint(from_s, to_s)..=to_s).contains(time_s);
-    let forces = flight.specific_force.time_s.iter().zip(&flight.specific_force.values);
-    let sizes = forces
-        .filter(|(time_s, _)| within(time_s))
-        .map(|(_, f)| f.iter().map(|part| part * part).sum::<f64>().sqrt());
+    let middle_s = f64::midpoint(from_s, to_s);
+    let within = |time_s: &f64| (middle_s..=to_s).contains(time_s);
+    let Channel { time_s, values } = &flight.specific_force;
+    let from = time_s.partition_point(|time_s| *time_s < middle_s);
+    let to = time_s.partition_point(|time_s| *time_s <= to_s);
+    let sizes = values[from..to].iter().map(|f| f.iter().map(|part| part * part).sum::<f64>().sqrt());
     if let Some(size) = median(sizes) {
         return size < CARRIED * gravity_m_s2 || drops(flight, gravity_m_s2, from_s, to_s);
     }
@@ -168,8 +169,8 @@ fn falls(flight: &Flight, vehicle: &Vehicle, from_s: f64, to_s: f64) -> bool {
     change_m_s.is_some_and(|change_m_s| change_m_s < -CARRIED * gravity_m_s2 * (to_s - from_s) / 2.0)
 }
 
-/// True if the specific force falls at `from_s` as hardly anywhere else in the flight: rotors that are told to stop need a moment, and
-/// commands that were filled in fall at any time.
+/// True if the specific force falls at `from_s` more than almost anywhere else in the flight. Rotors need a moment to stop. Commands that an
+/// exporter filled in are unrelated to the force.
 fn drops(flight: &Flight, gravity_m_s2: f64, from_s: f64, to_s: f64) -> bool {
     let Channel { time_s, values } = &flight.specific_force;
     let mean = |from_s: f64, to_s: f64| {
@@ -183,13 +184,14 @@ fn drops(flight: &Flight, gravity_m_s2: f64, from_s: f64, to_s: f64) -> bool {
     let drop =
         |at_s: f64| Some(mean(at_s - length_s / 2.0, at_s)? - mean(at_s + length_s / 2.0, at_s + length_s)?);
     let here = drop(from_s).unwrap_or(0.0);
+    if here <= DROP * gravity_m_s2 {
+        return false;
+    }
     let times = ((last_s - first_s) / length_s).floor().min(values.len() as f64);
     let others: Vec<f64> =
         (0..times as usize).filter_map(|time| drop(first_s + length_s * time as f64)).collect();
     let as_far = others.iter().filter(|other| **other >= here).count();
-    here > DROP * gravity_m_s2
-        && others.len() >= TIMES_MIN
-        && (as_far as f64) < DROPS_ELSEWHERE * others.len() as f64
+    others.len() >= TIMES_MIN && (as_far as f64) < DROPS_ELSEWHERE * others.len() as f64
 }
 
 /// Slope of the straight line through points that leaves the least squares; `None` with fewer than three.

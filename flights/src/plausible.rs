@@ -543,15 +543,14 @@ fn of_lean(declared: f64, best: f64) -> String {
     let others = if best > declared + ALIKE {
         format!("; with axes named otherwise it is at best {best:.2}")
     } else {
-        ", and no higher one with axes named otherwise".to_owned()
+        ", and no clearly higher one with axes named otherwise".to_owned()
     };
     format!(
         "the position's acceleration has a correlation of {declared:.2} with how the vehicle leans{others}"
     )
 }
 
-/// True if axes named otherwise follow the lean, and those as declared do not. In gusts none follow it well, so that more has to be
-/// gained.
+/// True if the first correlation is clearly higher than the second. In gusts the difference has to be larger.
 pub fn is_clearly_better(best: f64, declared: f64) -> bool {
     let least = if best > SAME { CLEARLY } else { CLEARLY_IN_GUSTS };
     best > GUSTY && best > declared + least
@@ -601,10 +600,9 @@ mod tests {
                 "of -0.16 with how the vehicle leans; with axes named otherwise it is at best 0.16"
             )
         );
-        assert!(
-            of_lean(0.22, 0.21)
-                .ends_with("of 0.22 with how the vehicle leans, and no higher one with axes named otherwise")
-        );
+        assert!(of_lean(0.22, 0.21).ends_with(
+            "of 0.22 with how the vehicle leans, and no clearly higher one with axes named otherwise"
+        ));
     }
 
     #[test]

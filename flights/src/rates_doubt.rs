@@ -183,14 +183,19 @@ impl Judge<'_> {
 
     /// The agreement with the axes as declared, and that with the others, if the rates are clearly along the others.
     fn along_other_axes(&self) -> Option<[Agreement; 2]> {
-        let [declared, other] = self.along_axes()?;
-        let [now, then] = [declared.agreement(QUIET_RAD_S)?, other.agreement(QUIET_RAD_S)?];
-        is_other(&declared, &other, now.slope.abs()).then_some([now, then])
+        let (attitude, rates) = (&self.flight.attitude, &self.flight.angular_velocity);
+        let found = compared(self.along_axes(rates)?)?;
+        // On a circle at constant heading, a lateness looks like a turn about z.
+        if let Some(late) = lateness::of_rates(attitude, rates, WINDOW_S, QUIET_RAD_S) {
+            let time_s = rates.time_s.iter().map(|time_s| time_s - late.late_s).collect();
+            compared(self.along_axes(&Channel { time_s, values: rates.values.clone() })?)?;
+        }
+        Some(found)
     }
 
-    /// The pairs with the axes as declared, and with the others, both at the same times.
-    fn along_axes(&self) -> Option<[Pairs; 2]> {
-        let (attitude, rates) = (&self.flight.attitude, &self.flight.angular_velocity);
+    /// The pairs of `rates` with the axes as declared, and with the others, both at the same times.
+    fn along_axes(&self, rates: &Channel<3>) -> Option<[Pairs; 2]> {
+        let attitude = &self.flight.attitude;
         let frame = self.units.declared(Quantity::AngularVelocity)?.frame.unwrap_or_default();
         let now = self.axes_of_rates();
         let then = other_axes(now);
@@ -299,12 +304,19 @@ fn best_of(mut readings: Vec<Reading>, declared: Agreement) -> Option<Finding> {
         finding.fits.map(|fits| fits + &of)
     });
     let fits = fits.collect::<Vec<_>>().join(", or ");
-    let what = format!("{}, and of {greatest:.2} in each of these readings", of_derivative(declared));
+    let what =
+        format!("{}, and {greatest:.2} with each of the following corrections", of_derivative(declared));
     Some(finding(quantity, Some(fits), &what))
 }
 
-/// True if the logged vectors with the other axes are the derived ones, beyond noise, and those with the declared axes are not. The derived
-/// vectors are `scale` times too small.
+/// The agreement with the declared axes, and that with the others, if the others explain the rates.
+fn compared([declared, other]: [Pairs; 2]) -> Option<[Agreement; 2]> {
+    let [now, then] = [declared.agreement(QUIET_RAD_S)?, other.agreement(QUIET_RAD_S)?];
+    is_other(&declared, &other, now.slope.abs()).then_some([now, then])
+}
+
+/// True if the other axes explain the derived vectors beyond noise, and the declared axes do not. `scale`: size of the logged vectors over
+/// that of the derived ones.
 fn is_other(declared: &Pairs, other: &Pairs, scale: f64) -> bool {
     let all = || declared.logged.iter().zip(&other.logged).zip(&declared.derived);
     // The change of the vectors with the axes, and the change that would make them the derived ones.

@@ -27,7 +27,7 @@ const FOLLOWS: f64 = 0.6;
 const TURNS: f64 = 0.7;
 /// The size of the specific force of a free vehicle follows the commands of all rotors with at least this correlation.
 const THRUST_CORRELATION: f64 = 0.7;
-/// Rotors below this part of their greatest total may stand on the ground.
+/// Rotors in this lowest part of the range of their total may stand on the ground.
 const FLYING: f64 = 0.3;
 /// No tracked point is further from the bearing, in m.
 const LEVER_MAX_M: f64 = 0.5;
@@ -98,14 +98,15 @@ fn by_force(flight: &Flight, gravity_m_s2: f64) -> Hold {
 }
 
 /// Compares the size of the specific force with the total of the rotors: a free vehicle feels its thrust, while a bearing bears the
-/// weight whatever the rotors do. It shows no vehicle as held: one that hovers all the time has the same thrust at all times.
+/// weight whatever the rotors do. It never shows a vehicle as held: in a steady hover the thrust is constant, too.
 fn by_thrust(flight: &Flight) -> Hold {
     let rotors = if flight.rotor_speed.is_empty() { &flight.command } else { &flight.rotor_speed };
     let total = rotors.values.iter().map(|values| [values.iter().sum(), 0.0, 0.0]).collect();
     let total = Channel { time_s: rotors.time_s.clone(), values: total };
     let mut pairs = Pairs::sizes(&total, &flight.specific_force, WINDOW_S);
-    let greatest = pairs.logged.iter().map(|total| total.x).fold(0.0, f64::max);
-    pairs.retain_logged(|total| total.x > FLYING * greatest);
+    let totals = || pairs.logged.iter().map(|total| total.x);
+    let [least, greatest] = [totals().fold(f64::MAX, f64::min), totals().fold(f64::MIN, f64::max)];
+    pairs.retain_logged(|total| total.x - least > FLYING * (greatest - least));
     let follows = pairs.without_means().agreement(LEANING_M_S2).map(|agreement| agreement.correlation);
     if follows.is_some_and(|correlation| correlation > THRUST_CORRELATION) {
         Hold::Free

@@ -154,3 +154,32 @@ fn a_gyroscope_in_another_frame_is_no_attitude_in_another_order() {
     let found = ALONG_X.findings(&with_rates("\"wx\", \"-wy\", \"-wz\"", ""));
     assert_eq!(found, [(Quantity::AngularVelocity, "`frame = \"frd-ned\"`".to_owned())]);
 }
+
+/// On a circle at constant heading, an attitude that comes late looks like rates along turned axes.
+#[test]
+fn a_late_attitude_on_a_circle_is_no_rate_in_the_world() {
+    const LEAN_RAD: f64 = 0.1;
+    const HEADING_RAD: f64 = 0.3;
+    const TURN_RAD_S: f64 = 3.0;
+    const LATE_S: f64 = 0.1;
+    let attitude = |t: f64| {
+        let force =
+            Vector3::new(libm::cos(TURN_RAD_S * t), libm::sin(TURN_RAD_S * t), 1.0 / libm::tan(LEAN_RAD));
+        let leaning = UnitQuaternion::rotation_between(&Vector3::z(), &force).unwrap();
+        leaning * UnitQuaternion::from_euler_angles(0.0, 0.0, HEADING_RAD)
+    };
+    let radius_m = 9.81 * libm::tan(LEAN_RAD) / (TURN_RAD_S * TURN_RAD_S);
+    let mut text = "t,m1,m2,m3,m4,px,py,pz,qx,qy,qz,qw,wx,wy,wz\n".to_owned();
+    for k in 0..=1000 {
+        let t = 0.01 * f64::from(k);
+        let (q, step) = (attitude(t - LATE_S), 1e-5);
+        let w = (attitude(t - step).inverse() * attitude(t + step)).scaled_axis() / (2.0 * step);
+        let [x, y] = [-radius_m * libm::cos(TURN_RAD_S * t), -radius_m * libm::sin(TURN_RAD_S * t)];
+        let numbers = [100.0, 101.0, 102.0, 103.0, x, y, 1.0, q.i, q.j, q.k, q.w, w.x, w.y, w.z];
+        writeln!(text, "{t:.2},{}", numbers.map(|number| number.to_string()).join(",")).unwrap();
+    }
+    let place = Place::new();
+    place.write("log.csv", text.as_bytes());
+    let flight = place.load("log.csv", CHANNELS, "").unwrap();
+    assert!(!flight.notes.iter().any(|note| note.contains("holds")), "{:?}", flight.notes);
+}

@@ -99,8 +99,7 @@ fn has(prepared: &Prepared, quantity: Quantity) -> bool {
     }
 }
 
-/// True if a flight has another clock than that of its commands to hold an inertial unit against: that of the attitude, or of rotor speeds beside
-/// the commands.
+/// True if the flight has a clock besides those of commands and inertial unit: an attitude, or rotor speeds beside the commands.
 pub fn has_third_clock(prepared: &Prepared) -> bool {
     !prepared.flight.attitude.is_empty() || prepared.offset_of(prepared.rotor_speed()).is_some()
 }

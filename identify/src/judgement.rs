@@ -103,8 +103,8 @@ fn is_seen(problem: &Problem, candidate: &Candidate, fitted: &FitResult) -> bool
     })
 }
 
-/// True if an inertial unit is later than the commands, and no third clock shows which of the two is right: only the sum of both delays shows, and
-/// `command-delay` is its name. No delay of the commands is negative, so that an early inertial unit keeps its own name.
+/// True if the inertial unit is late and no third clock exists. Only the sum of both delays shows then, and `command-delay` is its name.
+/// Commands have no negative delay, so an early inertial unit keeps its name.
 fn is_delay_of_commands(problem: &Problem, candidate: &Candidate, fitted: &FitResult) -> bool {
     let is_late = || candidate.free.iter().any(|at| fitted.values[*at] > 0.0);
     *candidate.kind == IMU_DELAY && is_late() && !problem.flights().any(has_third_clock)

@@ -436,7 +436,7 @@ fn require_same(path: &Path, expected: &str, found: &str) -> anyhow::Result<()> 
     let short = |sum: &str| sum.chars().take(12).collect::<String>();
     bail!(
         "{} has changed since the checkpoint was written: expected SHA-256 {}… as in the checkpoint, found {}…; put the \
-         former file in its place, or fly from the start; change values of the run that goes on by --set",
+         former file in its place, or fly from the start; use --set to change values of the continued run",
         path.display(),
         short(expected),
         short(found)
