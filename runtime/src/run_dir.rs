@@ -32,7 +32,7 @@ const FULL_BYTES: u64 = 256 << 10;
 /// Words of the system for a lack of room: `ENOSPC` and `EDQUOT`.
 const NO_ROOM: [&str; 2] = ["No space left on device", "Disk quota exceeded"];
 /// Words of a process that ended for another reason than a lack of room.
-const OTHER_REASONS: [&str; 4] = [" failed at tick ", " computed tick ", "panicked at", "\n  error: "];
+const OTHER_REASONS: [&str; 3] = [" failed at tick ", " computed tick ", "panicked at"];
 
 /// Entry of a run: its description of itself.
 #[derive(Clone, Debug, Serialize, Deserialize)]
