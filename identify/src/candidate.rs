@@ -158,7 +158,7 @@ mod tests {
         unidentifiable.into_iter().filter(|one| one.effect == effect).map(|one| one.needs).collect()
     }
 
-    /// Of commands and an inertial unit alone only the sum of both delays shows.
+    /// Commands and an inertial unit alone show only the sum of both delays.
     #[test]
     fn attitude_and_rotor_speeds_are_a_third_clock() {
         let (all, alone) = (all_channels(), gyroscope_and_commands());

@@ -105,7 +105,7 @@ fn an_inertial_unit_alone_shows_mass_and_says_what_it_cannot_show() {
     }
 }
 
-/// Of commands and an inertial unit alone only the sum of both delays shows.
+/// Commands and an inertial unit alone show only the sum of both delays.
 #[test]
 fn an_inertial_unit_alone_is_not_told_from_late_commands() {
     let found = changed(&Case::of(&["command-delay"], 1.0, 26, 2.0 * DURATION_S), with_imu_alone);
