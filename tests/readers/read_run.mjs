@@ -130,7 +130,9 @@ const seen = await withPage(address, async (page, wrong) => {
   await page.bringToFront();
   await blur();
   await page.keyboard.press("p");
+  // Each page has the news in its own time.
   await awaitState("paused", other);
+  await awaitState("paused");
   found.other = await look(other);
   await other.close();
 
