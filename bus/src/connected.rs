@@ -385,7 +385,7 @@ impl ConnectedNode {
             if !lockstep.has(Need::OtherState, tick + 1) {
                 return Ok(Some(Awaited::count(Need::OtherState, tick + 1)));
             }
-            let failed = |reason| BusError::Parameters { node: self.links.node.name.clone(), reason };
+            let failed = |reason| BusError::Program { node: self.links.node.name.clone(), reason };
             self.state.load(tick, computation).map_err(failed)?;
         }
         let awaits =

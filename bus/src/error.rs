@@ -213,6 +213,15 @@ pub enum BusError {
         /// Key, expected value and found value.
         reason: String,
     },
+    /// The program of a node is at fault outside its steps: it uses the library wrongly, its component could not end, or a
+    /// state that it states cannot be read.
+    #[error("node `{node}`: {reason}")]
+    Program {
+        /// The node.
+        node: String,
+        /// Its fault.
+        reason: String,
+    },
     /// The transport refused something.
     #[error("node `{node}`: {action} failed: {reason}")]
     Transport {
@@ -363,8 +372,7 @@ impl BusError {
     // Without a wildcard: whoever adds a variant states its side.
     fn side(&self) -> Side {
         match self {
-            Self::Content { .. }
-            | Self::Checkpoint { .. }
+            Self::Checkpoint { .. }
             | Self::UnwiredPort { .. }
             | Self::UndeclaredPort { .. }
             | Self::TypeMismatch { .. }
@@ -373,6 +381,7 @@ impl BusError {
             Self::DeclaredTwice { .. }
             | Self::LayoutMismatch { .. }
             | Self::BackupLayout { .. }
+            | Self::Program { .. }
             | Self::UnwrittenOutput { .. }
             | Self::NotFinite { .. }
             | Self::Count { .. }
@@ -382,7 +391,9 @@ impl BusError {
             | Self::FileLimit { .. }
             | Self::Transport { .. }
             | Self::Denied { .. } => Side::System,
-            Self::NotInARun { .. }
+            // The processes of a run write its files: who has damaged one is not known.
+            Self::Content { .. }
+            | Self::NotInARun { .. }
             | Self::Claimed { .. }
             | Self::UnknownNode { .. }
             | Self::UnknownTopic { .. }
@@ -414,6 +425,7 @@ impl BusError {
             | Self::TypeMismatch { node, .. }
             | Self::InitialValue { node, .. }
             | Self::Parameters { node, .. }
+            | Self::Program { node, .. }
             | Self::Transport { node, .. }
             | Self::Gap { node, .. }
             | Self::UnwrittenOutput { node, .. }
@@ -472,7 +484,6 @@ mod tests {
         let (node, port, reason) = ("imu".to_owned(), "rates".to_owned(), "it is too short".to_owned());
         let known = String::new();
         vec![
-            BusError::Content { path: "plan.json".into(), expected: "a plan", found: reason.clone() },
             BusError::Checkpoint { node: node.clone(), reason: reason.clone() },
             BusError::UnwiredPort {
                 node: node.clone(),
@@ -514,6 +525,7 @@ mod tests {
                 found: found.clone(),
             },
             BusError::BackupLayout { node: node.clone(), topic, expected, found },
+            BusError::Program { node: node.clone(), reason: "it runs already".to_owned() },
             BusError::UnwrittenOutput { node: node.clone(), port, tick },
             BusError::NotFinite {
                 node: node.clone(),
@@ -545,6 +557,11 @@ mod tests {
     fn of_none() -> Vec<BusError> {
         let (name, known) = ("imu".to_owned(), "plant".to_owned());
         vec![
+            BusError::Content {
+                path: "plan.json".into(),
+                expected: "a plan",
+                found: "half of one".to_owned(),
+            },
             BusError::NotInARun { variable: "HUMMINGBUS_RUN" },
             BusError::Claimed { name: name.clone() },
             BusError::UnknownNode { node: name.clone(), known: known.clone() },

@@ -52,7 +52,7 @@ fn part(
 ) -> Result<Part, BusError> {
     let node = plan.nodes[member.node].name.clone();
     let registration = components.iter().find(|component| component.name == member.kind);
-    let registration = registration.ok_or_else(|| BusError::Parameters {
+    let registration = registration.ok_or_else(|| BusError::Program {
         node: node.clone(),
         reason: format!("this program brings no component `{}`", member.kind),
     })?;

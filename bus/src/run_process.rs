@@ -1,7 +1,7 @@
 //! A component as a node of a run: this process, or a thread of it, takes the node's part.
 
 use crate::announcement::Announcement;
-use crate::component::{Component, StateError, StepError, Transfer};
+use crate::component::{Component, StateError, Transfer};
 use crate::computation::Computation;
 use crate::connected::ConnectedNode;
 use crate::context::StepContext;
@@ -111,7 +111,7 @@ impl Part {
     ) -> Result<(), BusError> {
         let topics: Vec<_> = self.wiring.inputs.iter().flatten().map(|&input| announced(input)).collect();
         let told = self.instance.connected(&topics);
-        told.map_err(|error| failed(&self.name, &error))
+        told.map_err(|error| BusError::Parameters { node: self.name.clone(), reason: error.to_string() })
     }
 
     /// The component with its state, as the computation that steps at each tick.
@@ -127,7 +127,10 @@ pub(crate) fn finish(
 ) -> Result<(), BusError> {
     let mut finished = Ok(());
     for mut part in parts {
-        let ended = part.instance.finish().map_err(|error| failed(&part.name, &error));
+        let Part { name: node, instance, .. } = &mut part;
+        let ended = instance.finish();
+        let ended =
+            ended.map_err(|error| BusError::Program { node: node.clone(), reason: error.to_string() });
         finished = finished.and(ended);
     }
     match end {
@@ -135,10 +138,6 @@ pub(crate) fn finish(
         // The cause of a failed step makes the end fail too: the first error counts.
         Err(error) => Err(error),
     }
-}
-
-fn failed(node: &str, error: &StepError) -> BusError {
-    BusError::Parameters { node: node.to_owned(), reason: error.to_string() }
 }
 
 /// A component whose ports are those of a node.

@@ -91,7 +91,7 @@ pub(crate) unsafe fn mutable<'a, T>(pointer: *mut T, name: &str) -> Result<&'a m
 
 /// An error without a node.
 pub(crate) fn misuse(reason: String) -> BusError {
-    BusError::Parameters { node: std::env::var(bus::NODE_VARIABLE).unwrap_or_default(), reason }
+    BusError::Program { node: std::env::var(bus::NODE_VARIABLE).unwrap_or_default(), reason }
 }
 
 /// Notes what `call` objects to, and returns `otherwise` then.

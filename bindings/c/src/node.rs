@@ -27,7 +27,7 @@ impl HbNode {
     fn declaring(&mut self) -> Result<&mut DynamicNode, BusError> {
         let name = self.name.to_string_lossy().into_owned();
         let reason = "it runs already: ports and state are declared before".to_owned();
-        self.node.as_mut().ok_or(BusError::Parameters { node: name, reason })
+        self.node.as_mut().ok_or(BusError::Program { node: name, reason })
     }
 
     /// The node itself, for what it knows.

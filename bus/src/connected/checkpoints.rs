@@ -91,7 +91,7 @@ impl ConnectedNode {
         }
         if self.links.generation > 0 && self.tick == self.take_over_tick {
             // Every tick before is computed: the predecessor has stated the state with which this process takes over.
-            let failed = |reason| BusError::Parameters { node: self.links.node.name.clone(), reason };
+            let failed = |reason| BusError::Program { node: self.links.node.name.clone(), reason };
             self.state.load(self.tick, computation).map_err(failed)?;
         }
         self.write_checkpoint(Cause::Request, of, self.tick, locals, computation)
