@@ -67,6 +67,8 @@ pub struct FlightEntry {
     pub assume: Option<Spanned<Assumption>>,
     /// True if a rig holds the vehicle, false if it flies freely; else the channels show it.
     pub rig: Option<bool>,
+    /// False if the commands do not tell the torques, which are then not compared.
+    pub torques: Option<bool>,
     /// True if values that contradict their units are only noted.
     #[serde(default)]
     pub trust_units: bool,

@@ -91,6 +91,8 @@ pub struct Flight {
     pub battery_voltage: Channel<1>,
     /// True if a rig holds the vehicle at a point, false if it flies freely; `None` if nobody said so.
     pub on_rig: Option<bool>,
+    /// True if its torques are not to be compared, since the commands do not tell them: `torques = false`.
+    pub without_torques: bool,
     /// Assumptions of the flights file in place of measurements, such as a level attitude.
     pub assumed: Vec<String>,
     /// Notes of the reader: repeated samples left out, gaps, values that look like another unit.
@@ -173,6 +175,7 @@ impl Flight {
             specific_force: Channel::default(),
             battery_voltage: Channel::default(),
             on_rig: None,
+            without_torques: false,
             assumed: Vec::new(),
             notes: Vec::new(),
         }
@@ -220,6 +223,7 @@ impl Flight {
             commands_on_change: self.commands_on_change,
             command_breaks_s: self.command_breaks_s.clone(),
             on_rig: self.on_rig,
+            without_torques: self.without_torques,
             assumed: self.assumed.clone(),
             notes: self.notes.clone(),
         }

@@ -105,6 +105,7 @@ impl Reading<'_> {
         flight.commands_on_change =
             self.declared(Quantity::Command).is_some_and(|entry| entry.on_change == Some(true));
         flight.on_rig = self.entry.rig;
+        flight.without_torques = self.entry.torques == Some(false);
         flight.notes.splice(0..0, taken);
         let breaks = self.part_at_seams(&mut flight, &seams);
         if self.format.is_table() {

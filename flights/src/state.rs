@@ -20,6 +20,12 @@ impl StateQuantity {
     /// All, in the order of reports.
     pub const ALL: [Self; 4] = [Self::Position, Self::Velocity, Self::Attitude, Self::Rates];
 
+    /// True for attitude and rates, which torques change.
+    #[must_use]
+    pub fn is_turn(self) -> bool {
+        matches!(self, Self::Attitude | Self::Rates)
+    }
+
     /// The name in reports.
     #[must_use]
     pub fn name(self) -> &'static str {

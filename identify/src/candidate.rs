@@ -9,6 +9,9 @@ use plant::effects::{EffectKind, FitAs, Quantity};
 pub const FAST_COMMANDS: &str =
     "motor commands, or rotor speeds, that are logged faster than the motors follow";
 
+/// Need of effects that show in torques, where those are not compared.
+const COMPARED_TORQUES: &str = "torques that are compared: flights without `torques = false`";
+
 /// An effect, or the part of one that makes sense alone: one weak rotor, the bias of one sensor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
@@ -58,6 +61,10 @@ fn missing(kind: &EffectKind, flights: &[&Prepared]) -> Option<&'static str> {
     let is_slow = flights.iter().any(|flight| flight.slow_period_s.is_some());
     if is_slow && needs_fast_commands(kind) {
         return Some(FAST_COMMANDS);
+    }
+    let has_no_torques = flights.iter().any(|flight| flight.flight.without_torques);
+    if has_no_torques && (kind.turns_steadily || kind.needs.contains(&Quantity::Torque)) {
+        return Some(COMPARED_TORQUES);
     }
     // Only the means of forces and torques are true where the attitude was assumed.
     if !kind.steady_state && flights.iter().any(|flight| flight.is_assumed()) {

@@ -239,15 +239,17 @@ fn measured(flight: &Prepared, errors: &SensorErrors) -> Option<Measured> {
     let pieces_s = flight.layout.clock.pieces_s();
     let cut = (!pieces_s.is_empty()).then(|| flight.flight.within(&pieces_s));
     let measured = Measured::of(&errors.taken_off(cut.as_ref().unwrap_or(&flight.flight), &flight.late))?;
-    Some(measured.within(pieces_s, flight.settling_s()))
+    let measured = measured.within(pieces_s, flight.settling_s());
+    Some(if flight.turns_as_measured() { measured.turning_as_measured() } else { measured })
 }
 
-/// Errors of a state at the end of a window; 0 of a quantity that `flight` does not show.
+/// Errors of a state at the end of a window; 0 of a quantity that `flight` does not show, or that predictions take as it was measured.
 pub fn errors(flight: &Prepared, end: &WindowEnd, state: &RigidBody) -> WindowErrors {
     let errors = components(end, state);
-    std::array::from_fn(|at| {
-        f64::from(QUANTITIES[at / 3].is_measured(&flight.flight)) * errors[at / 3][at % 3]
-    })
+    let is_judged = |quantity: StateQuantity| {
+        quantity.is_measured(&flight.flight) && !(quantity.is_turn() && flight.turns_as_measured())
+    };
+    std::array::from_fn(|at| f64::from(is_judged(QUANTITIES[at / 3])) * errors[at / 3][at % 3])
 }
 
 #[cfg(test)]

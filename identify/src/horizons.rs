@@ -64,7 +64,11 @@ pub fn predictions(problem: &Problem, set: &FlightSet, values: &[f64]) -> Vec<Pr
         let settling_s = part.as_ref().map_or(0.0, Prepared::settling_s);
         let cut = part.is_some().then(|| flight.within(&pieces_s));
         let flight = cut.as_ref().unwrap_or(flight);
-        let measured = |flight: &Flight| Some(Measured::of(flight)?.within(pieces_s.clone(), settling_s));
+        let turns_as_measured = prepared.is_some_and(Prepared::turns_as_measured);
+        let measured = |flight: &Flight| {
+            let measured = Measured::of(flight)?.within(pieces_s.clone(), settling_s);
+            Some(if turns_as_measured { measured.turning_as_measured() } else { measured })
+        };
         let aligned = SensorErrors::default().taken_off(flight, &late);
         let corrected = sensor_errors.taken_off(flight, &late);
         let (Some(before), Some(after)) = (measured(&aligned), measured(&corrected)) else {
@@ -92,7 +96,11 @@ pub fn predictions(problem: &Problem, set: &FlightSet, values: &[f64]) -> Vec<Pr
                 simulated(&ends(&|from_s| seen.expected(&models, from_s))),
                 simulated(&turned.collect::<Vec<_>>()),
             ];
-            let channels = changes(&errors, &by_axis(&new));
+            let mut channels = changes(&errors, &by_axis(&new));
+            if turns_as_measured {
+                let turns = StateQuantity::ALL.into_iter().filter(|quantity| quantity.is_turn());
+                turns.for_each(|turn| _ = channels.remove(turn.name()));
+            }
             predictions.push(Prediction {
                 flight: flight.name.clone(),
                 role: flight.role,
@@ -112,14 +120,13 @@ fn changes(errors: &[Errors; 6], by_axis: &[[f64; 3]; 4]) -> BTreeMap<&'static s
         let (channel, unit) = (quantity.name(), quantity.unit());
         let [before, after, persistence, own_trim, disturbance, turned] =
             errors.each_ref().map(|errors| errors.get(channel).copied());
-        let is_turn = matches!(quantity, StateQuantity::Attitude | StateQuantity::Rates);
         let change = Change {
             before: before?,
             after: after?,
             persistence: persistence?,
             own_trim: own_trim?,
             disturbance: disturbance?,
-            measured_attitude: turned.filter(|_| !is_turn),
+            measured_attitude: turned.filter(|_| !quantity.is_turn()),
             by_axis: *by_axis,
             unit,
         };

@@ -118,7 +118,7 @@ impl std::fmt::Display for Loss {
 pub fn advice(channel: &str) -> &'static str {
     if ["attitude", RATES, "angular_acceleration"].contains(&channel) {
         "torques: log rotor speeds and every command the motors get, weigh and balance the vehicle before each flight, and measure \
-         its inertia and the rotors' thrust over command on a stand"
+         its inertia and the rotors' thrust over command on a stand; to judge the forces alone, give each flight the key `torques = false`"
     } else {
         "forces: weigh the vehicle, measure thrust over command and voltage on a stand, and fly in still air"
     }

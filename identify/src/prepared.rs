@@ -291,6 +291,11 @@ impl<'f> Prepared<'f> {
         !self.flight.assumed.is_empty()
     }
 
+    /// True if predictions take the measured attitude: torques that are not compared, since the commands do not tell them, predict none.
+    pub fn turns_as_measured(&self) -> bool {
+        !self.flight.attitude.is_empty() && self.offset_of(Equation::AngularAcceleration).is_none()
+    }
+
     /// Length of the compared part, in s.
     pub fn compared_s(&self) -> f64 {
         self.layout.knots.len() as f64 * BOX_STEPS as f64 * self.layout.clock.step_s
@@ -651,7 +656,10 @@ fn equations(flight: &Flight, is_slow: bool) -> Vec<Equation> {
         (Equation::SpecificForce, !flight.specific_force.is_empty()),
         (Equation::Acceleration, has_position && has_attitude),
         // Torques follow commands that were not logged.
-        (Equation::AngularAcceleration, (has_attitude || has_gyroscope) && !is_slow),
+        (
+            Equation::AngularAcceleration,
+            (has_attitude || has_gyroscope) && !is_slow && !flight.without_torques,
+        ),
         (Equation::Gyroscope, has_attitude && has_gyroscope && !is_assumed),
         (Equation::RotorSpeed(flight.rotors), has_both_speeds),
     ];

@@ -301,6 +301,8 @@ fn usable<'f>(
         let reason = reasons.last().filter(|_| prepared.is_none());
         let slow = prepared.as_ref().and_then(|prepared| prepared.slow_period_s);
         report.notes.extend(slow.map(|period_s| slow_note(period_s, &propulsion)));
+        let turns_as_measured = prepared.as_ref().is_some_and(Prepared::turns_as_measured);
+        report.notes.extend(turns_as_measured.then(|| TURNS_AS_MEASURED.to_owned()));
         report.notes.extend(reason.map(|(_, reason)| format!("not used: {reason}")));
         reports.push(report);
         match (prepared, flight.role) {
@@ -317,6 +319,10 @@ fn usable<'f>(
     let problem = Problem { model, estimation, validation, test, noises, block_s, shared_late_s: 0.0 };
     (problem, reports, reasons)
 }
+
+/// Note of a flight whose torques are not compared.
+const TURNS_AS_MEASURED: &str =
+    "torques are not compared: predictions take the measured attitude, and judge forces alone";
 
 fn slow_note(period_s: f64, propulsion: &Propulsion) -> String {
     let (most_s, motor_s) = (propulsion.longest_period_s(), propulsion.motor_s);

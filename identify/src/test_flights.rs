@@ -56,6 +56,7 @@ pub fn flown(
         specific_force: Channel::default(),
         battery_voltage: Channel::default(),
         on_rig: None,
+        without_torques: false,
         assumed: Vec::new(),
         notes: Vec::new(),
     }

@@ -260,6 +260,33 @@ fn commands_slower_than_the_motors_determine_no_lag_delay_or_inertia() {
     assert!(report.to_string().contains(note), "{report}");
 }
 
+/// A controller at 1 kHz whose commands are logged at 50 Hz: most of its torques are in no log.
+fn logged_at_50_hz(without_torques: bool) -> FlightSet {
+    changed(&heavy(20.0), |flight| {
+        keep(&mut flight.command, |at, _| at.is_multiple_of(20));
+        flight.without_torques = without_torques;
+    })
+}
+
+#[test]
+fn forces_alone_are_judged_where_torques_are_not_compared() {
+    let report = found(&logged_at_50_hz(true));
+    require_mass(&report);
+    assert!(report.losses.is_empty(), "{report}");
+    let channels: Vec<_> = report.held_out.values().flat_map(|horizons| horizons["0.5"].keys()).collect();
+    assert!(channels.contains(&&"velocity") && !channels.contains(&&"attitude"), "{channels:?}");
+    let velocity = &report.held_out.values().next().unwrap()["0.5"]["velocity"];
+    assert!(velocity.after < 0.3 * velocity.before, "{velocity:?}");
+    for effect in ["inertia-error", "com-offset", "rate-damping"] {
+        let missing = report.not_identifiable.iter().find(|missing| missing.effect == effect);
+        assert!(
+            missing.is_some_and(|missing| missing.needs.contains("torques = false")),
+            "{effect}: {report}"
+        );
+    }
+    assert!(report.to_string().contains("predictions take the measured attitude"), "{report}");
+}
+
 /// At 5 Hz the motors have settled three times between two commands, at speeds that nobody knows.
 #[test]
 fn commands_far_apart_are_refused() {

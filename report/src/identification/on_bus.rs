@@ -3,6 +3,7 @@
 use crate::validate::Validation;
 use diagnostics::Error;
 use flights::{Flight, FlightSet};
+use identify::Equation;
 use identify::SensorErrors;
 use identify::report::{FlightReport, Report};
 use identify::run::Outcome;
@@ -69,8 +70,11 @@ fn corrected(set: &FlightSet, outcome: &Outcome, errors: &SensorErrors) -> Fligh
         errors.taken_off(flight, &outcome.late.get(&flight.name).copied().unwrap_or_default())
     };
     let can_fly = |flight: &&Flight| {
-        let was_used =
-            |report: &FlightReport| report.name == flight.name && report.compared_s > LEAST_REPLAY_S;
+        // Where torques are not compared, predictions take the measured attitude, which a replay does not.
+        let was_used = |report: &FlightReport| {
+            let has_torques = report.equations.contains(&Equation::AngularAcceleration.name());
+            report.name == flight.name && report.compared_s > LEAST_REPLAY_S && has_torques
+        };
         !flight.command.is_empty()
             && !flight.attitude.is_empty()
             && outcome.report.flights.iter().any(was_used)
