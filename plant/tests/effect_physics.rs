@@ -196,6 +196,19 @@ fn a_slower_motor_is_the_same_motor_in_slower_time() {
 }
 
 #[test]
+fn a_steeper_command_map_keeps_hover_and_doubles_what_a_change_of_the_command_makes() {
+    let declared = hummingbird();
+    let steeper = Flight::hovering(vec![effect("command-slope", &[1.0])]);
+    let vehicle = steeper.model.vehicle();
+    let (hover, hover_rad_s) = (declared.hover_command(), declared.hover_speed_rad_s());
+    for counts in [-40.0, -10.0, 0.0, 10.0, 40.0] {
+        let speed = |vehicle: &Vehicle| vehicle.commanded_speed_rad_s(0, hover + counts) - hover_rad_s;
+        assert!((speed(vehicle) - 2.0 * speed(&declared)).abs() < 1e-9, "{counts}");
+    }
+    assert_eq!(vehicle.commanded_speed_rad_s(0, declared.command.min), 0.0, "the line goes on to standstill");
+}
+
+#[test]
 fn a_loaded_battery_sags_and_empties_as_ohm_and_coulomb_say() {
     // R, D, q_0, U_0, C, eta.
     let mut flight = Flight::hovering(vec![effect("battery-sag", &[0.05, 2.0, 0.1, 12.6, 7560.0, 0.7])]);

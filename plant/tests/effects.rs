@@ -26,6 +26,7 @@ const NAMES: &[&str] = &[
     "turbulence",
     "command-delay",
     "motor-lag",
+    "command-slope",
     "battery-sag",
     "weak-rotor",
     "thrust-scale",

@@ -7,6 +7,7 @@ mod bearing_friction;
 mod blade_flapping;
 mod com_offset;
 pub(super) mod command_delay;
+mod command_slope;
 mod gimbal_friction;
 mod ground_effect;
 mod ground_turbulence;
@@ -39,6 +40,7 @@ pub static CATALOGUE: &[&EffectKind] = &[
     &turbulence::EFFECT,
     &command_delay::EFFECT,
     &motor_lag::EFFECT,
+    &command_slope::EFFECT,
     &battery_sag::EFFECT,
     &weak_rotor::EFFECT,
     &thrust_scale::EFFECT,
