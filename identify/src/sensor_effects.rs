@@ -97,11 +97,15 @@ effect_parameters! {
     }
 }
 
+/// Greatest rotation of the attitude's sensor in its mount, 3 degrees; tuned, no source. Whoever flies sees a greater one, and what asks for
+/// more is a wind, or another force.
+const MOUNT_MAX_RAD: f64 = 0.0524;
+
 effect_parameters! {
     struct Attitude {
         /// rotation about x of the body
-        attitude_x: ANGLE, min: -0.3, max: 0.3, neutral: Some(0.0), nominal: 0.05, source: "tuned, no source";
+        attitude_x: ANGLE, min: -MOUNT_MAX_RAD, max: MOUNT_MAX_RAD, neutral: Some(0.0), nominal: 0.02, source: "tuned, no source";
         /// rotation about y of the body
-        attitude_y: ANGLE, min: -0.3, max: 0.3, neutral: Some(0.0), nominal: 0.05, source: "tuned, no source";
+        attitude_y: ANGLE, min: -MOUNT_MAX_RAD, max: MOUNT_MAX_RAD, neutral: Some(0.0), nominal: 0.02, source: "tuned, no source";
     }
 }
