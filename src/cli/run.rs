@@ -153,8 +153,10 @@ pub fn run(
         // The recording of the manifest itself is not replaced.
         path.set_extension("shadow.mcap");
     }
-    if let (Some(tick), None) = (going_on, record) {
-        // The recording of the run before is not replaced.
+    if let Some(tick) = going_on
+        && (record.is_none() || manifest.content.run.is_unrecorded())
+    {
+        // The recording and the checkpoints of the run before are not replaced.
         path.set_extension(format!("from-{tick}.mcap"));
     }
     let files = files.unwrap_or_else(|| Files::beside(&path));

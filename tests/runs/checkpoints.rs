@@ -349,6 +349,25 @@ fn a_run_that_breaks_leaves_the_checkpoints_before() {
     assert!(fs::metadata(&later).unwrap().len() > 4000);
 }
 
+/// A fork without a recording has checkpoints of its own, beside the manifest.
+#[test]
+fn an_unrecorded_fork_keeps_the_checkpoints_of_the_run_before() {
+    let place = Place::new();
+    let hover = repository("manifests/hover.toml");
+    let manifest = place.write("m.toml", format!("include = [{hover:?}]\n[run]\nduration_s = 1.4\n"));
+    let args = ["run", &manifest, "--in-process", "--checkpoint-every", "500ms"];
+    place.call(&args).flown();
+    let of_run = checkpoints(&place, "m");
+    assert_eq!(of_run.iter().map(|(tick, _)| *tick).collect::<Vec<_>>(), [500, 1000]);
+    let before = fs::read(&of_run[1].1).unwrap();
+    let args = ["run", "--from", &of_run[0].1, "--record", "none", "--in-process"];
+    let set = ["--set", "process.plant.vehicle.body.mass=0.6", "--set", "run.duration_s=1.2"];
+    place.call(&[&args[..], &set].concat()).flown();
+    assert!(fs::read(&of_run[1].1).unwrap() == before, "the checkpoint of the run before was replaced");
+    let of_fork = checkpoints(&place, "m.from-500");
+    assert_eq!(of_fork.iter().map(|(tick, _)| *tick).collect::<Vec<_>>(), [1000]);
+}
+
 /// The summary says from where to look at what went wrong.
 #[test]
 fn a_failed_condition_leads_to_the_checkpoint_before() {
