@@ -266,14 +266,14 @@ impl Summary {
         failed.filter_map(|verdict| verdict.failed_at_tick).min()
     }
 
-    /// The checkpoint to go back to: the newest before a condition failed first, or the newest.
+    /// The checkpoint to go back to: the newest before a condition failed first, or the newest. A run that went on from
+    /// the checkpoint `from` and failed before its own first one goes back to `from`.
     #[must_use]
-    pub fn checkpoint_to_go_back_to(&self) -> Option<&Written> {
+    pub fn checkpoint_to_go_back_to<'a>(&'a self, from: Option<&'a Written>) -> Option<&'a Written> {
         let failed_at = self.failed_at_tick();
-        self.checkpoints
-            .iter()
-            .rev()
-            .find(|written| failed_at.is_none_or(|failed_at| written.tick <= failed_at))
+        let is_before = |written: &&Written| failed_at.is_none_or(|failed_at| written.tick <= failed_at);
+        let own = self.checkpoints.iter().rev().find(is_before);
+        own.or_else(|| from.filter(|from| failed_at.is_some() && is_before(from)))
     }
 
     /// The replacements as text; those that were refused are never left out.

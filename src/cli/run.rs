@@ -199,18 +199,8 @@ pub fn run(
     if let Some(path) = &summary.recording {
         text += &format!("\nto plot it: {}\nto see it fly: {}", command("plot", path), command("view", path));
     }
-    match (summary.checkpoint_to_go_back_to(), summary.failed_at_tick()) {
-        (Some(Written { tick, path }), _) => {
-            text += &format!("\nto go on from tick {tick}: {}", command("run --from", path));
-        }
-        (None, Some(failed_at)) if !summary.checkpoints.is_empty() => {
-            text += &format!(
-                "\nno checkpoint before tick {failed_at}, at which a condition failed first, was kept: --checkpoint-every with a \
-                 shorter time writes one"
-            );
-        }
-        (None, _) => {}
-    }
+    let from = going_on.zip(arguments.from.clone()).map(|(tick, path)| Written { tick, path });
+    text += &to_go_on(&summary, from.as_ref());
     if arguments.json {
         print_json(&as_json(&summary, profile.as_ref(), &files)?)?;
     } else if !(arguments.quiet && summary.passed) {
@@ -222,6 +212,23 @@ pub fn run(
         stay(page, summary.recording.as_deref(), &stop)?;
     }
     Ok(summary.passed)
+}
+
+/// The line of the summary with the command that goes on from the checkpoint to go back to; `from` is that from which
+/// the run went on.
+fn to_go_on(summary: &Summary, from: Option<&Written>) -> String {
+    match (summary.checkpoint_to_go_back_to(from), summary.failed_at_tick()) {
+        (Some(Written { tick, path }), _) => {
+            format!("\nto go on from tick {tick}: {}", command("run --from", path))
+        }
+        (None, Some(failed_at)) if !summary.checkpoints.is_empty() => {
+            format!(
+                "\nno checkpoint before tick {failed_at}, at which a condition failed first, was kept: --checkpoint-every with a \
+                 shorter time writes one"
+            )
+        }
+        (None, _) => String::new(),
+    }
 }
 
 /// Serves the page of the run of `graph`, which is about to start.

@@ -391,6 +391,24 @@ fn a_failed_condition_leads_to_the_checkpoint_before() {
     place.call(&args).with_code(1).prints(&["no checkpoint before tick 2", "was kept"]);
 }
 
+/// The checkpoint from which it went on is the one before.
+#[test]
+fn a_fork_that_fails_before_its_own_first_checkpoint_goes_back_to_its_start() {
+    let place = Place::new();
+    let hover = repository("manifests/hover.toml");
+    let stays = "[[pass]]\nname = \"stays up\"\ntopic = \"/plant/state\"\nfield = \"position.z\"\nunit = \"m\"\nstatistic = \"min\"\nmin = 0.8\n";
+    let text = format!("include = [{hover:?}]\n[run]\nduration_s = 2.5\n{stays}");
+    let manifest = place.write("m.toml", text);
+    let args = ["run", &manifest, "--record", &place.path("a.mcap"), "--in-process"];
+    place.call(&[&args[..], &["--checkpoint-every", "1s"]].concat()).flown();
+    let file = place.path("a.1000.ckpt");
+    // Twice as heavy, it falls by 0.2 m within some tenths of a second.
+    let args = ["run", "--from", &file, "--record", &place.path("b.mcap"), "--in-process", "--set"];
+    let ended = place.call(&[&args[..], &["process.plant.vehicle.body.mass=1.0"]].concat()).with_code(1);
+    ended.prints(&["FAILED stays up", ", tick 1", "to go on from tick 1000:", "a.1000.ckpt"]);
+    assert!(!ended.to_string().contains("was kept"), "{ended}");
+}
+
 #[test]
 fn a_live_run_writes_one_when_it_is_asked() {
     let place = Place::new();
