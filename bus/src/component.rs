@@ -145,9 +145,24 @@ pub trait Component: Sized + Send {
     }
 }
 
-/// Function that returns from the bytes of a judge's state the simulation time in ns from which on a condition cannot hold any
-/// more, if there is one.
-pub type FailedNs = fn(&[u8]) -> Option<u64>;
+/// Condition that cannot hold any more.
+///
+/// ```
+/// use bus::component::Failure;
+///
+/// let failure = Failure { condition: "touches nothing".to_owned(), time_ns: 1_500_000 };
+/// assert_eq!(failure.time_ns / 1_000_000, 1, "tick 1 at 1 kHz");
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Failure {
+    /// Name of the condition.
+    pub condition: String,
+    /// Simulation time of the first sample after which it cannot hold, ns.
+    pub time_ns: u64,
+}
+
+/// Function that returns the first failure from the bytes of a judge's state, if a condition has failed.
+pub type FirstFailure = fn(&[u8]) -> Option<Failure>;
 
 /// Description of a component.
 ///
@@ -169,8 +184,8 @@ pub struct Info {
     pub initial: &'static [&'static str],
     /// Reason why it cannot take the place of a component from whose state it does not go on, if it cannot.
     pub needs_state: Option<&'static str>,
-    /// Failure that a judge has seen, if it is one.
-    pub failed_ns: Option<FailedNs>,
+    /// The first failure that a judge has seen, if it is one.
+    pub first_failure: Option<FirstFailure>,
 }
 
 /// Role of a component in a run.
@@ -188,7 +203,7 @@ impl Info {
     /// A component that computes outputs.
     #[must_use]
     pub const fn new(name: &'static str, summary: &'static str) -> Self {
-        Self { name, summary, role: Role::Compute, initial: &[], needs_state: None, failed_ns: None }
+        Self { name, summary, role: Role::Compute, initial: &[], needs_state: None, first_failure: None }
     }
 
     /// The same component, whose `parameters` count at the start alone. A run that goes on from a checkpoint refuses other
@@ -224,10 +239,10 @@ impl Info {
         Self { role: Role::Record, ..self }
     }
 
-    /// The same component as the one that judges a run that is not recorded. `failed_ns` returns the simulation time from which
-    /// on a condition cannot hold any more, from the bytes of its state.
+    /// The same component as the one that judges a run that is not recorded. `first_failure` returns the first failure that
+    /// it has seen, from the bytes of its state.
     #[must_use]
-    pub const fn judge(self, failed_ns: FailedNs) -> Self {
-        Self { role: Role::Judge, failed_ns: Some(failed_ns), ..self }
+    pub const fn judge(self, first_failure: FirstFailure) -> Self {
+        Self { role: Role::Judge, first_failure: Some(first_failure), ..self }
     }
 }

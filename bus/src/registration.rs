@@ -1,7 +1,7 @@
 //! A component in a table of components: its declaration, and how one is made, without its type.
 
 use crate::announcement::Announcement;
-use crate::component::{Component, FailedNs, Info, Role, State, StateError, StepError, Transfer};
+use crate::component::{Component, FirstFailure, Info, Role, State, StateError, StepError, Transfer};
 use crate::context::{NodeContext, StepContext};
 use crate::parameters::{Parameter, Parameters};
 use crate::plan::{NodePlan, Plan};
@@ -26,8 +26,8 @@ pub struct Registration {
     pub initial: &'static [&'static str],
     /// As [`Info::needs_state`].
     pub needs_state: Option<&'static str>,
-    /// As [`Info::failed_ns`].
-    pub failed_ns: Option<FailedNs>,
+    /// As [`Info::first_failure`].
+    pub first_failure: Option<FirstFailure>,
     /// Inputs.
     pub inputs: Inputs,
     /// Outputs.
@@ -47,14 +47,14 @@ impl Registration {
     /// The component `C`.
     #[must_use]
     pub const fn of<C: Component + 'static>() -> Self {
-        let Info { name, summary, role, initial, needs_state, failed_ns } = C::INFO;
+        let Info { name, summary, role, initial, needs_state, first_failure } = C::INFO;
         Self {
             name,
             summary,
             role,
             initial,
             needs_state,
-            failed_ns,
+            first_failure,
             inputs: <C::Inputs<'static> as InputPorts<'static>>::DECLARED,
             outputs: C::Outputs::DECLARED,
             transfer: C::State::TRANSFER,

@@ -6,7 +6,8 @@ use crate::instances::{Flown, Instances};
 use crate::manifest::Manifest;
 use anyhow::{Context as _, Result, anyhow, bail};
 use bus::checkpoint::{Cause, Parts};
-use bus::component::Transfer;
+use bus::component::{Failure, Transfer};
+use diagnostics::printable_line;
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
@@ -57,10 +58,11 @@ impl WrittenFiles {
         Some(planned.remove(oldest))
     }
 
-    /// The tick of the newest checkpoint of the plan up to tick `until`.
-    fn newest_planned(&self, until: u32) -> Option<u32> {
+    /// The newest checkpoint of the plan up to tick `until`.
+    fn newest_planned(&self, until: u32) -> Option<Written> {
         let planned = self.planned.borrow();
-        planned.iter().map(|written| written.tick).filter(|&tick| tick <= until).max()
+        let before = planned.iter().filter(|written| written.tick <= until);
+        before.max_by_key(|written| written.tick).cloned()
     }
 
     /// The newest before tick `now`: that of `tick`, if it is given.
@@ -222,22 +224,28 @@ pub(crate) struct Collector<'a> {
     next: Option<u32>,
     /// Checkpoints that could not be written.
     missed: Vec<Missed>,
+    /// True if requests can steer the run.
+    is_steered: bool,
     /// True if a condition is known to fail.
     has_failed: bool,
     /// The newest checkpoint before the failure, which is kept.
     pinned: Option<u32>,
+    /// Messages that the user has not seen.
+    notes: Vec<String>,
 }
 
 impl<'a> Collector<'a> {
-    /// The collector of the checkpoints that `writer` writes.
-    pub(crate) fn new(writer: Writer<'a>) -> Self {
+    /// The collector of the checkpoints that `writer` writes; `is_steered` says that requests can steer the run.
+    pub(crate) fn new(writer: Writer<'a>, is_steered: bool) -> Self {
         let plan = &writer.graph.plan;
         Self {
             writer,
             next: plan.checkpoint_after(plan.first_tick),
             missed: Vec::new(),
+            is_steered,
             has_failed: false,
             pinned: None,
+            notes: Vec::new(),
         }
     }
 
@@ -265,13 +273,15 @@ impl<'a> Collector<'a> {
     /// Writes the file of `parts`, and removes the oldest where fewer are kept.
     pub(crate) fn add(&mut self, parts: Parts) {
         let (tick, path) = (parts.tick, path(self.writer.stem, parts.tick));
-        let failed_at = self.failed_at(&parts);
+        let failure = self.failure(&parts);
         if let Err(error) = self.writer.put(parts, &path) {
             return self.miss(tick, error);
         }
         let Writer { manifest, files, .. } = self.writer;
-        if let (false, Some(failed_at)) = (self.has_failed, failed_at) {
-            (self.has_failed, self.pinned) = (true, files.newest_planned(failed_at));
+        if let (false, Some((condition, failed_at))) = (self.has_failed, failure) {
+            let before = files.newest_planned(failed_at);
+            self.notes.push(self.failure_note(&condition, failed_at, before.as_ref()));
+            (self.has_failed, self.pinned) = (true, before.map(|written| written.tick));
         }
         let keep = manifest.content.run.checkpoint_keep.as_ref().map_or(usize::MAX, |keep| *keep.get_ref());
         if let Some(oldest) = files.add_planned(Written { tick, path }, keep, self.pinned) {
@@ -280,12 +290,43 @@ impl<'a> Collector<'a> {
         }
     }
 
-    /// The first tick by which a condition cannot hold any more, if the judge has seen one before `parts`.
-    fn failed_at(&self, parts: &Parts) -> Option<u32> {
+    /// The condition that failed first and its tick, if the judge has seen one before `parts`.
+    fn failure(&self, parts: &Parts) -> Option<(String, u32)> {
         let Graph { plan, programs, .. } = self.writer.graph;
         let judges = programs.iter().zip(&parts.nodes);
-        let failed_ns = judges.filter_map(|(program, part)| program.component()?.failed_ns?(part.state()));
-        failed_ns.min().and_then(|failed_ns| u32::try_from(failed_ns / plan.tick_ns).ok())
+        let failures = judges.filter_map(|(program, part)| program.component()?.first_failure?(part.state()));
+        let Failure { condition, time_ns } = failures.min_by_key(|failure| failure.time_ns)?;
+        Some((condition, u32::try_from(time_ns / plan.tick_ns).ok()?))
+    }
+
+    /// The message that `condition` failed at tick `failed_at`, behind the checkpoint `before`.
+    fn failure_note(&self, condition: &str, failed_at: u32, before: Option<&Written>) -> String {
+        let plan = &self.writer.graph.plan;
+        let (condition, time_s) = (printable_line(condition), f64::from(failed_at) * plan.tick_s());
+        let first = plan.first_tick;
+        let advice = match before {
+            Some(Written { tick, path }) => {
+                let path = path.display();
+                let way = match self.is_steered {
+                    true => {
+                        format!("`hummingbus ctl pause`, then `hummingbus ctl rewind {tick}` go back there")
+                    }
+                    false => "`hummingbus run --from` goes on from there".to_owned(),
+                };
+                format!("the checkpoint before it is {path}; {way}")
+            }
+            None if first == 0 => "the run has written no checkpoint before it".to_owned(),
+            None if failed_at < first => {
+                format!("the run goes on from a checkpoint behind it, of tick {first}")
+            }
+            None => format!("the checkpoint before it is that of tick {first}, from which the run goes on"),
+        };
+        format!("warning: condition `{condition}` failed at tick {failed_at} ({time_s:.3} s): {advice}")
+    }
+
+    /// The messages since the last look.
+    pub(crate) fn take_notes(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.notes)
     }
 
     /// Notes that the checkpoint of `tick` cannot be written.
@@ -359,7 +400,7 @@ mod tests {
         for tick in [100, 200, 300] {
             assert_eq!(files.add_planned(written(tick), 3, None), None);
         }
-        assert_eq!((files.newest_planned(250), files.newest_planned(99)), (Some(200), None));
+        assert_eq!((files.newest_planned(250), files.newest_planned(99)), (Some(written(200)), None));
         let removed = [400, 500, 600].map(|tick| files.add_planned(written(tick), 3, Some(200)));
         assert_eq!(removed, [None, Some(written(100)), Some(written(300))]);
     }

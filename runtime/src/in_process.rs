@@ -119,7 +119,7 @@ pub(crate) fn fly(
     components: &'static [Registration],
     stop: &StopToken,
     on: &mut dyn FnMut(RunEvent<'_>),
-    save: &mut dyn FnMut(Parts),
+    save: &mut dyn FnMut(Parts) -> Vec<String>,
 ) -> anyhow::Result<Outcome> {
     let mut simulation = simulation(graph, |_| true, components)?;
     if let Some(parts) = &graph.from {
@@ -203,8 +203,8 @@ struct Run<'a> {
     graph: &'a Graph,
     stop: &'a StopToken,
     on: &'a mut dyn FnMut(RunEvent<'_>),
-    /// Takes the parts of a checkpoint.
-    save: &'a mut dyn FnMut(Parts),
+    /// Takes the parts of a checkpoint, and returns messages for the user.
+    save: &'a mut dyn FnMut(Parts) -> Vec<String>,
     start_ns: u64,
     /// Host time of the last report.
     reported_ns: u64,
@@ -243,7 +243,7 @@ pub fn fly_unrecorded(
     let path = folder.join(FIGURES);
     let graph = graph_of(manifest, files, &path, from)?;
     let stop = StopToken::new();
-    let mut outcome = fly(&graph, manifest.registry().components(), &stop, &mut |_| {}, &mut |_| {})?;
+    let mut outcome = fly(&graph, manifest.registry().components(), &stop, &mut |_| {}, &mut |_| Vec::new())?;
     let has_judge = graph.programs.iter().any(Program::is_judge);
     let read = || std::fs::read(&path).context("cannot read the figures of the judge");
     outcome.figures = has_judge.then(read).transpose()?;
@@ -293,7 +293,9 @@ impl Run<'_> {
             if next_checkpoint == Some(tick) {
                 let parts = simulation.save();
                 self.active = Active::CheckpointWriter;
-                (self.save)(parts);
+                let notes = (self.save)(parts);
+                self.active = Active::Listener;
+                notes.iter().for_each(|note| (self.on)(RunEvent::Note(note)));
                 self.active = Active::Run;
                 next_checkpoint = plan.checkpoint_after(tick);
             }

@@ -256,7 +256,7 @@ impl<'a> Launcher<'a> {
         let (run_path, stem) = (run_dir.path(), &outputs.stem);
         let instances = &Instances::default();
         let writer = Writer { manifest, graph, run_dir: run_path, stem, files, instances };
-        let mut checkpoints = Collector::new(writer);
+        let mut checkpoints = Collector::new(writer, self.host != Host::InProcess);
         let flown = self.fly_in(run_dir, place, manifest, graph, &mut checkpoints, rewinds, on);
         // A user goes back to those of a run that broke.
         let (written, missed) = checkpoints.finish();
@@ -285,8 +285,11 @@ impl<'a> Launcher<'a> {
     ) -> anyhow::Result<Outcome> {
         if self.host == Host::InProcess {
             let components = manifest.registry().components();
-            let mut outcome =
-                in_process::fly(graph, components, &self.stop, on, &mut |parts| checkpoints.add(parts))?;
+            let mut save = |parts| {
+                checkpoints.add(parts);
+                checkpoints.take_notes()
+            };
+            let mut outcome = in_process::fly(graph, components, &self.stop, on, &mut save)?;
             if !outcome.was_stopped {
                 outcome.figures = figures(graph, run_dir.path())?;
             }
@@ -320,6 +323,7 @@ impl<'a> Launcher<'a> {
         let mut on = |event: RunEvent<'_>| {
             if let RunEvent::Progress(_) = event {
                 checkpoints.collect();
+                checkpoints.take_notes().iter().for_each(|note| on(RunEvent::Note(note)));
             }
             on(event);
         };

@@ -391,6 +391,31 @@ fn a_failed_condition_leads_to_the_checkpoint_before() {
     place.call(&args).with_code(1).prints(&["no checkpoint before tick 2", "was kept"]);
 }
 
+/// The message comes in flight, and says how to go back there.
+#[test]
+fn a_condition_that_fails_is_told_while_the_run_flies() {
+    let place = Place::new();
+    let hover = repository("manifests/hover.toml");
+    let rises = "[[pass]]\nname = \"stays down\"\ntopic = \"/plant/state\"\nfield = \"position.z\"\nunit = \"m\"\nstatistic = \"max\"\nmax = 1.25\n";
+    let manifest = place.write("m.toml", format!("include = [{hover:?}]\n{rises}"));
+    let args = ["run", &manifest, "--record", &place.path("a.mcap"), "--checkpoint-every", "500ms"];
+    let launch = place.start_endless(&[&args[..], &["--json"]].concat());
+    launch.await_said("condition `stays down` failed at tick 2");
+    launch.await_said("a.2000.ckpt; `hummingbus ctl pause`, then `hummingbus ctl rewind 2000` go back there");
+    let run = place.run_id();
+    for request in [&["pause"][..], &["rewind", "2000"]] {
+        let all = [&["ctl"], request, &["--run", &run]].concat();
+        place.start(&all).end_among_others().with_code(0);
+    }
+    place.start(&["ctl", "stop", "--run", &run]).end_among_others().with_code(0);
+    launch.end().with_code(1);
+    // A run on one thread takes no requests, and tells it once.
+    let args = ["run", &manifest, "--record", &place.path("b.mcap"), "--checkpoint-every", "500ms"];
+    let ended = place.call(&[&args[..], &["--in-process", "--quiet"]].concat()).with_code(1);
+    ended.says(&["b.2000.ckpt; `hummingbus run --from` goes on from there"]);
+    assert_eq!(ended.error.matches("failed at tick").count(), 1, "{ended}");
+}
+
 /// The checkpoint from which it went on is the one before.
 #[test]
 fn a_fork_that_fails_before_its_own_first_checkpoint_goes_back_to_its_start() {

@@ -42,7 +42,8 @@ struct Pairs {
 /// Contents of a condition in a checkpoint.
 #[derive(Serialize, Deserialize)]
 pub struct KeptSamples {
-    name: String,
+    /// Name of the condition.
+    pub name: String,
     factor: Option<f64>,
     samples: Samples,
     pairs: Pairs,

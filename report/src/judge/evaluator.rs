@@ -5,6 +5,7 @@ use super::figures::Figures;
 use super::signals::Signals;
 use super::windows::Windows;
 use anyhow::anyhow;
+use bus::component::Failure;
 use diagnostics::Error;
 use flights::state::WindowEndErrors;
 use recorder::RecordingError;
@@ -20,11 +21,12 @@ struct Kept {
     windows: Vec<WindowEndErrors>,
 }
 
-/// The simulation time in ns of the first sample after which a condition cannot hold any more, from the bytes of
-/// [`Evaluator::save`].
-pub fn failed_ns(bytes: &[u8]) -> Option<u64> {
+/// The first failure of a condition, from the bytes of [`Evaluator::save`].
+pub fn first_failure(bytes: &[u8]) -> Option<Failure> {
     let kept: Kept = postcard::from_bytes(bytes).ok()?;
-    kept.conditions.iter().filter_map(|condition| condition.lost_ns).min()
+    let failures = kept.conditions.into_iter();
+    let failures = failures.filter_map(|kept| Some(Failure { time_ns: kept.lost_ns?, condition: kept.name }));
+    failures.min_by_key(|failure| failure.time_ns)
 }
 
 /// Conditions, measures and comparisons of a run, evaluated as samples pass.

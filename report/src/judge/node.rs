@@ -77,7 +77,7 @@ impl Component for Judge {
         "judge",
         "evaluates the conditions of a run without a recording; the launcher adds it, a manifest cannot",
     )
-    .judge(evaluator::failed_ns);
+    .judge(evaluator::first_failure);
     type Parameters = Parameters;
     type Inputs<'a> = AnyInputs<'a>;
     type Outputs = ();
