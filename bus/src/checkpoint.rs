@@ -103,22 +103,24 @@ impl NodePart {
     ) -> Result<(), BusError> {
         let refused = |reason: String| BusError::Checkpoint { node: self.name.clone(), reason };
         let layout = StateLayout::saved(transfer, computation.state_size(), computation.configuration());
-        match (&self.layout, &layout) {
-            (None, None) => {}
+        let goes_on = match (&self.layout, &layout) {
+            (None, None) => Ok(true),
             (Some(found), Some(expected)) if found.fits(expected, transfer) => {
-                computation.load(&self.state).map_err(|error| refused(error.to_string()))?;
+                computation.load(&self.state).map(|()| true)
             }
-            (found, expected) => {
-                let text = |layout: &Option<StateLayout>| {
-                    layout.as_ref().map_or("no state".to_owned(), ToString::to_string)
-                };
-                let (found, expected) = (text(found), text(expected));
-                let reason = format!(
-                    "it holds {found}, and the node goes on from {expected}; what has another memory by another value begins with \
-                     the run"
-                );
-                return Err(refused(reason));
-            }
+            (Some(found), Some(expected)) if found.is_of_type_of(expected) => computation.adopt(&self.state),
+            _ => Ok(false),
+        };
+        if !goes_on.map_err(|error| refused(error.to_string()))? {
+            let text = |layout: &Option<StateLayout>| {
+                layout.as_ref().map_or("no state".to_owned(), ToString::to_string)
+            };
+            let (found, expected) = (text(&self.layout), text(&layout));
+            let reason = format!(
+                "it holds {found}, and the node goes on from {expected}; what has another memory by another value begins with \
+                 the run"
+            );
+            return Err(refused(reason));
         }
         if self.is_succeeded && self.timing.len() != timing.len() {
             // As in a swap, the words of the new component stay.

@@ -13,6 +13,10 @@ pub(crate) trait Computation {
     fn save(&self, bytes: &mut [u8]);
     /// Continues from a state.
     fn load(&mut self, bytes: &[u8]) -> Result<(), StateError>;
+    /// As [`State::adopt`](crate::component::State::adopt).
+    fn adopt(&mut self, _bytes: &[u8]) -> Result<bool, StateError> {
+        Ok(false)
+    }
     /// Computes a tick.
     fn step(&mut self, tick: &mut Tick<'_>) -> Result<(), String>;
 }

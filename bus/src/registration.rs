@@ -170,6 +170,8 @@ pub(crate) trait Instance: Send {
     fn save(&self, bytes: &mut [u8]);
     /// As [`State::load`].
     fn load(&mut self, bytes: &[u8]) -> Result<(), StateError>;
+    /// As [`State::adopt`].
+    fn adopt(&mut self, bytes: &[u8]) -> Result<bool, StateError>;
     fn connected(&mut self, topics: &[(&str, &Announcement)]) -> Result<(), StepError>;
     fn step(
         &mut self,
@@ -201,6 +203,10 @@ impl<C: Component> Instance for Made<C> {
 
     fn load(&mut self, bytes: &[u8]) -> Result<(), StateError> {
         self.state.load(bytes)
+    }
+
+    fn adopt(&mut self, bytes: &[u8]) -> Result<bool, StateError> {
+        self.state.adopt(bytes)
     }
 
     fn connected(&mut self, topics: &[(&str, &Announcement)]) -> Result<(), StepError> {

@@ -163,6 +163,10 @@ impl Computation for Wired<'_> {
         self.instance.load(bytes)
     }
 
+    fn adopt(&mut self, bytes: &[u8]) -> Result<bool, StateError> {
+        self.instance.adopt(bytes)
+    }
+
     fn step(&mut self, tick: &mut Tick<'_>) -> Result<(), String> {
         let (number, locals, wiring) = (tick.number(), tick.locals, self.wiring);
         let inputs = Received { tick: number, ports: tick.inputs, locals, wiring: &wiring.inputs };

@@ -86,6 +86,15 @@ pub trait State: Send + Sized + 'static {
     /// # Errors
     /// The bytes do not fit this state.
     fn load(&mut self, bytes: &[u8]) -> Result<(), StateError>;
+
+    /// Continues from `bytes` that [`State::save`] wrote for the same component with other parameters, by which its
+    /// state has another layout: a fork from a checkpoint goes on so. False if it cannot, as by default.
+    ///
+    /// # Errors
+    /// The bytes do not fit these parameters.
+    fn adopt(&mut self, _bytes: &[u8]) -> Result<bool, StateError> {
+        Ok(false)
+    }
 }
 
 /// Reason why a component cannot continue from the bytes of a state.
@@ -182,5 +191,6 @@ mod tests {
         assert!(matches!(<()>::TRANSFER, Transfer::Nothing));
         assert_eq!((().size(), ().load(&[])), (0, Ok(())));
         assert!(().load(&[0]).is_err());
+        assert_eq!(().adopt(&[0]), Ok(false));
     }
 }

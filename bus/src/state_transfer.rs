@@ -55,6 +55,11 @@ impl StateLayout {
             && (grows || self.size == expected.size)
     }
 
+    /// True if the type of the state is that of `other`.
+    pub(crate) fn is_of_type_of(&self, other: &Self) -> bool {
+        self.type_name == other.type_name
+    }
+
     /// Number of 64-bit words of the state.
     pub(crate) fn words(&self) -> usize {
         self.size.div_ceil(8)

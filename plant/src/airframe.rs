@@ -94,12 +94,16 @@ impl Airframe {
         &self.frame_shift_B_m
     }
 
-    /// Fingerprint of the facts that the state of its flight with the backend `backend` depends on: the kinds
-    /// of its effects and the number of its rotors.
+    /// Fingerprint of the facts that the state of its flight with the backend `backend` depends on, without its effects: the
+    /// number of its rotors.
     pub(crate) fn fingerprint(&self, backend: &'static str) -> Fingerprint {
-        let kinds = self.effects.iter().map(|effect| effect.kind.name);
-        Fingerprint::of(std::iter::once(backend).chain(kinds))
-            .with(std::iter::once(self.vehicle.rotors.len() as f64))
+        let rotors = self.vehicle.rotors.len() as f64;
+        Fingerprint::of(std::iter::once(backend)).with(std::iter::once(rotors))
+    }
+
+    /// Names of the kinds of its effects, in their order.
+    pub(crate) fn kinds(&self) -> impl Iterator<Item = &'static str> {
+        self.effects.iter().map(|effect| effect.kind.name)
     }
 
     /// Its effects, in the order in which they are summed.
@@ -112,12 +116,12 @@ impl Airframe {
     /// whose seed is `seed`.
     #[must_use]
     pub fn initial_state(&self, seed: u64, node: &str, dt_s: f64) -> AirframeState {
-        let random = |effect: &Effect| bus::random::stream(seed, &format!("{node}/{}", effect.kind.name));
-        let state = |random| EffectState::new(random, self.vehicle.rotors.len());
+        let random = |kind: &str| bus::random::stream(seed, &format!("{node}/{kind}"));
+        let state = |kind: &str| EffectState::new(kind, random(kind), self.vehicle.rotors.len());
         AirframeState {
             actuation: Actuation::none(self.vehicle.rotors.len()),
             commands: DelayLine::new(self.delay_s() / dt_s, self.vehicle.rotors.len()),
-            effects: self.effects.iter().map(|effect| state(random(effect))).collect(),
+            effects: self.kinds().map(state).collect(),
         }
     }
 

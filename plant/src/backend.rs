@@ -7,6 +7,9 @@ use crate::snapshot::{Snapshot, SnapshotError};
 use crate::state::{RigidBody, State};
 use nalgebra::Vector3;
 
+/// Name of the part of a state that refuses a state of another scene.
+pub(crate) const CONFIGURATION: &str = "configuration";
+
 /// Physics that moves one vehicle from tick to tick.
 pub trait Backend: Send {
     /// The name of the physics, as manifests say it.

@@ -46,7 +46,7 @@ mod world;
 
 use crate::actuation::Battery;
 use crate::airframe_state::AirframeState;
-use crate::backend::{Backend, ContactReport, Neighbour, NotePart, TRAFFIC_MAX};
+use crate::backend::{Backend, CONFIGURATION, ContactReport, Neighbour, NotePart, TRAFFIC_MAX};
 use crate::newton_euler::{Accelerations, NewtonEuler};
 use crate::saved::{Fingerprint, Saved, saved_fields};
 use crate::snapshot::SnapshotError;
@@ -96,7 +96,7 @@ pub struct Rapier {
     others: Vec<Neighbour>,
     /// The names of the scene's things.
     names: Vec<String>,
-    /// Scene, rig and kinds of effects, which no state of others fits.
+    /// Scene, rig and number of rotors, which no state of others fits.
     configuration: Fingerprint,
 }
 
@@ -323,11 +323,11 @@ impl Backend for Rapier {
     }
 
     fn configuration(&self) -> u64 {
-        self.configuration.number()
+        self.configuration.and(self.motion.model.airframe().kinds()).number()
     }
 
     fn parts(&self, note: &mut dyn FnMut(&'static str, &dyn Saved)) {
-        note("configuration", &self.configuration);
+        note(CONFIGURATION, &self.configuration);
         note("state", &self.motion.state);
         note("effects", &self.effects);
         note("reaction", &self.reaction);
@@ -338,7 +338,7 @@ impl Backend for Rapier {
     }
 
     fn parts_mut(&mut self, note: &mut NotePart<'_>) -> Result<(), SnapshotError> {
-        note("configuration", &mut self.configuration)?;
+        note(CONFIGURATION, &mut self.configuration)?;
         note("state", &mut self.motion.state)?;
         note("effects", &mut self.effects)?;
         note("reaction", &mut self.reaction)?;

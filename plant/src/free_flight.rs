@@ -2,7 +2,7 @@
 
 use crate::actuation::Battery;
 use crate::airframe_state::AirframeState;
-use crate::backend::{Backend, ContactReport, Neighbour, NotePart};
+use crate::backend::{Backend, CONFIGURATION, ContactReport, Neighbour, NotePart};
 use crate::motor;
 use crate::newton_euler::{Accelerations, NewtonEuler};
 use crate::saved::{Fingerprint, Saved};
@@ -93,17 +93,17 @@ impl Backend for FreeFlight {
     }
 
     fn configuration(&self) -> u64 {
-        self.configuration.number()
+        self.configuration.and(self.model.airframe().kinds()).number()
     }
 
     fn parts(&self, note: &mut dyn FnMut(&'static str, &dyn Saved)) {
-        note("configuration", &self.configuration);
+        note(CONFIGURATION, &self.configuration);
         note("state", &self.state);
         note("effects", &self.effects);
     }
 
     fn parts_mut(&mut self, note: &mut NotePart<'_>) -> Result<(), SnapshotError> {
-        note("configuration", &mut self.configuration)?;
+        note(CONFIGURATION, &mut self.configuration)?;
         note("state", &mut self.state)?;
         note("effects", &mut self.effects)
     }

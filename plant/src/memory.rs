@@ -1,6 +1,6 @@
 //! State of a plant: the flight, and the place of its vehicle among those of the run.
 
-use crate::backend::Backend;
+use crate::backend::{Backend, CONFIGURATION};
 use crate::others::Others;
 use crate::saved::{Reader, Saved, Writer};
 use crate::snapshot::SnapshotError;
@@ -8,6 +8,9 @@ use bus::component::{State, StateError, Transfer};
 
 /// Name of the state's type.
 const TYPE_NAME: &str = "PlantMemory";
+/// Reason why a plant does not go on from the state of another one.
+const OTHER_WORLD: &str = "it is of another backend, another scene or another number of rotors; keep them from the checkpoint on, \
+                           or fly from the start; effects may be other ones";
 
 /// State of a plant.
 ///
@@ -58,5 +61,25 @@ impl State for PlantMemory {
             part.load(&mut from).map_err(|cause| SnapshotError::Misfit { component: name, cause })
         });
         loaded.map_err(|error| refused(error.to_string()))
+    }
+
+    /// Effects that the other plant lacks begin, and the states of effects that this one lacks are left out.
+    fn adopt(&mut self, bytes: &[u8]) -> Result<bool, StateError> {
+        let refused = |reason: String| StateError::Contents { type_name: TYPE_NAME, reason };
+        let mut from = Reader::new(bytes);
+        self.others
+            .adopt(&mut from)
+            .map_err(|unfit| refused(format!("the place in the traffic: {unfit}")))?;
+        let adopted = self.backend.parts_mut(&mut |name, part| {
+            part.adopt(&mut from).map_err(|cause| SnapshotError::Misfit { component: name, cause })
+        });
+        match adopted {
+            Ok(()) if from.is_at_end() => Ok(true),
+            Ok(()) => Err(refused("it is longer than expected".to_owned())),
+            Err(SnapshotError::Misfit { component: CONFIGURATION, .. }) => {
+                Err(refused(OTHER_WORLD.to_owned()))
+            }
+            Err(error) => Err(refused(error.to_string())),
+        }
     }
 }

@@ -28,6 +28,15 @@ pub trait Saved {
     /// # Errors
     /// The bytes do not fit.
     fn load(&mut self, from: &mut Reader<'_>) -> Result<(), Unfit>;
+
+    /// Reads all of what the same part of a vehicle with other effects has written. A part that does not depend on effects
+    /// reads it as its own.
+    ///
+    /// # Errors
+    /// The bytes do not fit.
+    fn adopt(&mut self, from: &mut Reader<'_>) -> Result<(), Unfit> {
+        self.load(from)
+    }
 }
 
 /// Reason why bytes do not fit a state.
@@ -81,7 +90,13 @@ impl<'a> Reader<'a> {
         Ok(*next)
     }
 
-    fn skip(&mut self, count: usize) -> Result<(), Unfit> {
+    /// True if no bytes are left.
+    pub(crate) fn is_at_end(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Leaves out `count` bytes.
+    pub(crate) fn skip(&mut self, count: usize) -> Result<(), Unfit> {
         self.0 = self.0.get(count..).ok_or(Unfit::Short)?;
         Ok(())
     }
@@ -223,11 +238,14 @@ impl Saved for UnitQuaternion<f64> {
     }
 }
 
+/// Bytes of the place in a random stream.
+pub(crate) const STREAM_BYTES: usize = size_of::<u64>() + size_of::<u128>();
+
 /// Place in a random stream: its number and its position. The key stays: it follows from the run's seed and the node's name,
 /// and a run that goes on with another seed has other noise from there on.
 impl Saved for Stream {
     fn size(&self) -> usize {
-        size_of::<u64>() + size_of::<u128>()
+        STREAM_BYTES
     }
 
     fn save(&self, to: &mut Writer<'_>) {
@@ -320,6 +338,12 @@ impl<T: Saved + Copy + Default> Saved for Bounded<T> {
     }
 }
 
+/// `hash` with a `name`.
+fn hashed(hash: u64, name: &str) -> u64 {
+    // No name has the byte 255, so that no two names are taken for one.
+    bus::random::fnv1a(&[255], bus::random::fnv1a(name.as_bytes(), hash))
+}
+
 /// Hash of a configuration: it is saved, and the state of another configuration is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Fingerprint(u64);
@@ -327,9 +351,12 @@ pub(crate) struct Fingerprint(u64);
 impl Fingerprint {
     /// The fingerprint of parts with these `names`.
     pub(crate) fn of<'n>(names: impl Iterator<Item = &'n str>) -> Self {
-        // No name has the byte 255, so that no two names are taken for one.
-        let hash = |hash, name: &str| bus::random::fnv1a(&[255], bus::random::fnv1a(name.as_bytes(), hash));
-        Self(names.fold(bus::random::FNV_OFFSET, hash))
+        Self(names.fold(bus::random::FNV_OFFSET, hashed))
+    }
+
+    /// The same, and those of parts with these `names`.
+    pub(crate) fn and<'n>(self, names: impl Iterator<Item = &'n str>) -> Self {
+        Self(names.fold(self.0, hashed))
     }
 
     /// The same, and these `numbers`.

@@ -133,6 +133,36 @@ fn the_state_of_another_backend_scene_or_effect_is_refused() {
     assert!(error.contains("bytes, expected"), "{error}");
 }
 
+/// All that is not an effect's own goes through a vehicle with other effects and back.
+#[test]
+fn a_vehicle_with_other_effects_adopts_a_state() {
+    let commands = commands();
+    for backend in ["newton-euler", "rapier"] {
+        let with = |vehicle: &str| {
+            let vehicle = repository(&format!("vehicles/{vehicle}"));
+            let start = [0.0, 0.0, 1.0];
+            plant(&json!({ "vehicle": vehicle, "backend": backend, "initial_position_m": start }), &[])
+        };
+        let (mut flown, mut drag) = (with("hummingbird.toml"), with("hummingbird-drag.toml"));
+        for command in &commands[..500] {
+            flown.step(Inputs { command, measured: None, traffic: None }).unwrap();
+        }
+        let state = flown.saved();
+        assert!(drag.state.load(&state).is_err());
+        assert_eq!(drag.state.adopt(&state), Ok(true), "{backend}");
+        let adopted = |bytes: &[u8]| {
+            let mut plant = with("hummingbird.toml");
+            assert_eq!(plant.state.adopt(bytes), Ok(true), "{backend}");
+            plant.saved()
+        };
+        assert!(adopted(&drag.saved()) == adopted(&state), "{backend}: something was lost");
+        assert!(drag.state.adopt(&state[..state.len() - 1]).is_err());
+        let other = if backend == "rapier" { "newton-euler" } else { "rapier" };
+        let error = plant(&json!({ "backend": other }), &[]).state.adopt(&state).unwrap_err().to_string();
+        assert!(error.contains("another backend"), "{error}");
+    }
+}
+
 #[test]
 fn a_configuration_has_a_number_of_its_own() {
     let parameters = [

@@ -24,7 +24,7 @@ use std::path::{Path, PathBuf};
 /// The first bytes of a checkpoint of any format: one of an earlier format may be replaced.
 const MARK: &[u8] = b"hummingbus checkpoint ";
 /// The first bytes of a checkpoint; the digit counts the changes of the format.
-const START: &[u8] = b"hummingbus checkpoint 3\n";
+const START: &[u8] = b"hummingbus checkpoint 4\n";
 /// Characters of a SHA-256 in hexadecimal, which the file ends with.
 const SUM_BYTES: usize = 64;
 /// Ending of the name of a file.

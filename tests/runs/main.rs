@@ -68,6 +68,7 @@ mod documentation;
 mod envelope;
 mod failures;
 mod forks;
+mod forks_of_effects;
 mod foxglove;
 mod identify;
 mod in_process;
