@@ -49,7 +49,7 @@ fn an_effect_begins_in_a_fork() {
         let args = ["run", "--from", file, "--record", fork, "--in-process", "--set", WEAK[1]];
         place.call(&args).flown();
     }
-    place.call(&["diff", &forks[0], &forks[1]]).with_code(0);
+    place.call(&["diff", "--tolerance", "0", &forks[0], &forks[1]]).with_code(0);
     place.call(&["diff", &whole, &forks[0]]).with_code(1).prints(&["tick 1000, topic /plant/"]);
 }
 
