@@ -8,9 +8,13 @@ use std::path::Path;
 
 /// hover.toml, cut to 1.5 s, with more tables.
 fn hover_with(place: &Place, name: &str, tables: &str) -> String {
-    let text =
-        format!("include = [{:?}]\n[run]\nduration_s = 1.5\n{tables}", repository("manifests/hover.toml"));
-    place.write(name, text)
+    flight_with(place, "hover", name, tables)
+}
+
+/// The shipped manifest `base`, cut to 1.5 s, with more tables.
+fn flight_with(place: &Place, base: &str, name: &str, tables: &str) -> String {
+    let base = repository(&format!("manifests/{base}.toml"));
+    place.write(name, format!("include = [{base:?}]\n[run]\nduration_s = 1.5\n{tables}"))
 }
 
 fn fly(place: &Place, manifest: &str, recording: &str) -> Ended {
@@ -19,7 +23,12 @@ fn fly(place: &Place, manifest: &str, recording: &str) -> Ended {
 
 /// The undisturbed flight of the same length.
 fn undisturbed(place: &Place) -> String {
-    let (manifest, recording) = (hover_with(place, "plain.toml", ""), place.path("plain.mcap"));
+    undisturbed_flight(place, "hover")
+}
+
+/// The undisturbed flight of `base` of the same length.
+fn undisturbed_flight(place: &Place, base: &str) -> String {
+    let (manifest, recording) = (flight_with(place, base, "plain.toml", ""), place.path("plain.mcap"));
     fly(place, &manifest, &recording).flown();
     recording
 }
@@ -154,29 +163,48 @@ fn a_process_of_a_live_run_is_swapped() {
     assert!(messages(&recording) == messages(&undisturbed(&place)), "the flights differ");
 }
 
-/// A swap of the plant for one `with` other parameters; returns the end of the run and its recording.
-fn swap_plant(place: &Place, with: &str) -> (Ended, String) {
-    let swap = format!("[[swap]]\nprocess = \"plant\"\nat_tick = 700\nshadow_ticks = 50\nwith.{with}\n");
-    let (manifest, recording) = (hover_with(place, "swap.toml", &swap), place.path("swap.mcap"));
+/// A swap of the plant of `base` with this line; returns the end of the run and its recording.
+fn swap_plant(place: &Place, base: &str, with: &str) -> (Ended, String) {
+    let swap = format!("[[swap]]\nprocess = \"plant\"\nat_tick = 700\nshadow_ticks = 50\n{with}\n");
+    let (manifest, recording) = (flight_with(place, base, "swap.toml", &swap), place.path("swap.mcap"));
     (fly(place, &manifest, &recording), recording)
+}
+
+/// Manifests with the backend `newton-euler`, and with `rapier`, bodies and a rope.
+const BACKENDS: [&str; 2] = ["hover", "slung-load"];
+
+#[test]
+fn a_swap_to_an_identical_plant_changes_no_message() {
+    let place = Place::new();
+    for base in BACKENDS {
+        let (ended, recording) = swap_plant(&place, base, "");
+        let ended = ended.flown();
+        assert_eq!(ended.json()["successions"][0]["hand_over"], "state", "{ended}");
+        let whole = undisturbed_flight(&place, base);
+        assert!(messages(&recording) == messages(&whole), "{base}: the flights differ");
+        let compared = place.call(&["diff", "--tolerance", "0", &whole, &recording]);
+        compared.with_code(1).prints(&["messages are the same", "has no topic /shadow/plant/"]);
+    }
 }
 
 #[test]
 fn a_plant_hands_its_state_to_one_with_other_numbers() {
     let place = Place::new();
-    let (ended, recording) = swap_plant(&place, "parameters.substeps = 4");
-    let ended = ended.flown();
-    assert_eq!(ended.json()["successions"][0]["hand_over"], "state", "{ended}");
-    let (flown, whole) = (messages(&recording), messages(&undisturbed(&place)));
-    assert!(flown != whole, "nothing was swapped");
-    assert_eq!(ticks_of(&recording, "/plant/state"), (0..1500).collect::<Vec<u32>>());
+    for base in BACKENDS {
+        let (ended, recording) = swap_plant(&place, base, "with.parameters.substeps = 4");
+        let ended = ended.flown();
+        assert_eq!(ended.json()["successions"][0]["hand_over"], "state", "{ended}");
+        let (flown, whole) = (messages(&recording), messages(&undisturbed_flight(&place, base)));
+        assert!(flown != whole, "{base}: nothing was swapped");
+        assert_eq!(ticks_of(&recording, "/plant/state"), (0..1500).collect::<Vec<u32>>());
+    }
 }
 
 #[test]
 fn a_plant_of_another_backend_is_refused_before_it_takes_over() {
     let place = Place::new();
     let parts = ["the backup of `plant` does not go on from its state", "another backend"];
-    let (ended, _) = swap_plant(&place, "parameters.backend = \"rapier\"");
+    let (ended, _) = swap_plant(&place, "hover", "with.parameters.backend = \"rapier\"");
     ended.with_code(2).says(&parts);
     place.call(&["check", &place.path("swap.toml")]).with_code(2).says(&parts);
     let (manifest, recording) = (hover_with(&place, "plain.toml", ""), place.path("live.mcap"));
