@@ -194,11 +194,23 @@ fn set_parameters(
     }
 }
 
+/// In words the rates nearest to `rate_hz`, below and above, whose ticks are whole numbers of nanoseconds.
+fn near_rates_hz(rate_hz: u32) -> String {
+    let is_whole = |rate_hz: &u32| 1_000_000_000 % rate_hz == 0;
+    let below = (1..=rate_hz.min(RATE_HZ_MAX)).rev().find(is_whole);
+    let above = (rate_hz.max(1)..=RATE_HZ_MAX).find(is_whole);
+    let near: Vec<String> = below.into_iter().chain(above).map(|rate_hz| rate_hz.to_string()).collect();
+    near.join(" or ")
+}
+
 fn plan(manifest: &Manifest, wiring: Wiring) -> Result<Plan, Diagnostic> {
     let run = &manifest.content.run;
     let rate_hz = *run.rate_hz.get_ref();
     if !(1..=RATE_HZ_MAX).contains(&rate_hz) || 1_000_000_000 % rate_hz != 0 {
-        let help = "a tick must be a whole number of nanoseconds: choose a divisor of 1 000 000 000 such as 250, 500, 1000";
+        let help = format!(
+            "a tick must be a whole number of nanoseconds: choose a divisor of 1 000 000 000, here {}",
+            near_rates_hz(rate_hz)
+        );
         return Err(manifest.problem(&run.rate_hz.span(), format!("`rate_hz` is {rate_hz}"), help));
     }
     let ticks = run.duration_s.get_ref() * f64::from(rate_hz);

@@ -86,8 +86,10 @@ fn a_run_of_no_length() {
 #[test]
 fn a_rate_whose_tick_is_no_whole_number_of_nanoseconds() {
     let with = |rate: &str| refused("duration_s = 0.1", &format!("duration_s = 0.1\nrate_hz = §{rate}"));
-    with("300").says(&["`rate_hz` is 300", "divisor of 1 000 000 000"]);
-    with("0").says(&["`rate_hz` is 0"]);
+    with("300").says(&["`rate_hz` is 300", "divisor of 1 000 000 000, here 256 or 320"]);
+    with("3000").says(&["`rate_hz` is 3000", "here 2560 or 3125"]);
+    with("0").says(&["`rate_hz` is 0", "here 1\n"]);
+    with("2000000").says(&["`rate_hz` is 2000000", "here 1000000\n"]);
     with("-5").says(&["-5"]);
 }
 

@@ -66,6 +66,14 @@ fn hover_and_doublet_on_both_backends() {
     fly_with("hover-rapier", &SEEDS);
 }
 
+/// All processes at eight times the rate, whose delays are as long as before.
+#[test]
+fn hover_and_doublet_at_8_khz() {
+    let (place, hover) = (Place::new(), repository("manifests/hover.toml"));
+    let args = ["run", &hover, "--record", "none", "--in-process", "--set", "run.rate_hz=8000"];
+    place.call(&args).with_code(0).prints(&["hover: 96000 ticks (12.000 s)", "\npassed"]);
+}
+
 #[test]
 fn take_off_in_disturbed_air() {
     fly("take-off");
