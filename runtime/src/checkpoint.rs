@@ -243,7 +243,15 @@ impl Checkpoint {
         let nodes = self.parts_for(graph)?;
         graph.plan.first_tick = self.tick();
         graph.from = Some(Parts { tick: self.tick(), nodes });
+        graph.source = Some(Box::new(self.clone()));
         Ok(())
+    }
+
+    /// The same checkpoint for the run of `manifest`, checked as `graph`, which goes on from it, perhaps with other values.
+    pub(crate) fn of_run(&self, manifest: &Manifest, graph: &Graph) -> Self {
+        let parts = Parts { tick: self.tick(), nodes: Vec::new() };
+        let now = Self::new(manifest, graph, parts, Flown::default());
+        Self { texts: now.texts, overrides: now.overrides, files: now.files, ..self.clone() }
     }
 
     /// Refuses the run of `graph` if it reads other files, or its ticks are others.
@@ -482,7 +490,7 @@ fn missing(path: &Path, error: std::io::Error) -> std::io::Error {
     }
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut known = [checkpoints_in(folder), checkpoints_in(&folder.join(MANIFESTS))].concat();
-    known.sort();
+    known.sort_by_cached_key(|path| run_and_tick(path));
     let mut named: Vec<String> =
         known.iter().take(NAMED_MAX).map(|path| path.display().to_string()).collect();
     if known.len() > NAMED_MAX {
@@ -494,6 +502,15 @@ fn missing(path: &Path, error: std::io::Error) -> std::io::Error {
         [most @ .., last] => format!("the checkpoints near it are {} and {last}", most.join(", ")),
     };
     std::io::Error::new(error.kind(), format!("there is no such file; {advice}"))
+}
+
+/// The name of a checkpoint at `path` without its tick, and the tick.
+fn run_and_tick(path: &Path) -> (PathBuf, Option<u32>) {
+    let name = path.with_extension("");
+    match name.extension().and_then(|tick| tick.to_str()?.parse().ok()) {
+        Some(tick) => (name.with_extension(""), Some(tick)),
+        None => (name, None),
+    }
 }
 
 /// The files in `folder` that are called like checkpoints.
@@ -540,10 +557,13 @@ mod tests {
         let listed = ["a.100.ckpt", "manifests/c.9.ckpt"].map(|name| folder.path().join(name));
         let listed = format!("near it are {} and {}", listed[0].display(), listed[1].display());
         assert!(found.ends_with(&listed), "{found}");
-        for tick in 10..20 {
+        for tick in [9, 20, 1000, 3000, 20_000, 100_000] {
             std::fs::write(folder.path().join(format!("a.{tick}.ckpt")), "").unwrap();
         }
-        assert!(error("b.ckpt").ends_with(" and 7 more"), "{}", error("b.ckpt"));
+        let found = error("b.ckpt");
+        let listed = [9, 20, 100, 1000, 3000].map(|tick| folder.path().join(format!("a.{tick}.ckpt")));
+        let listed = listed.map(|path| path.display().to_string()).join(", ");
+        assert!(found.ends_with(&format!("near it are {listed} and 3 more")), "{found}");
     }
 
     #[test]

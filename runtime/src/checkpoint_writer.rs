@@ -78,6 +78,7 @@ impl WrittenFiles {
             return Ok((**found).clone());
         }
         let wanted = tick.map_or_else(|| format!("before tick {now}"), |tick| format!("of tick {tick}"));
+        all.dedup_by_key(|written| written.tick);
         let ticks: Vec<String> = all.iter().map(|written| written.tick.to_string()).collect();
         let known = match &ticks[..] {
             [] => "the run has written none".to_owned(),
@@ -124,6 +125,16 @@ impl Writer<'_> {
         written.with_context(|| format!("no checkpoint of tick {tick}"))?;
         self.files.add_asked(Written { tick, path: path.clone() });
         Ok(Some(path))
+    }
+
+    /// Writes the checkpoint from which the run goes on to `path`, or beside the recording: at its first tick the run is what
+    /// that checkpoint holds.
+    pub(crate) fn write_source(&self, path: Option<&Path>) -> Result<PathBuf> {
+        let source = self.graph.source.as_ref().context("the run does not go on from a checkpoint")?;
+        let path = path.map_or_else(|| self::path(self.stem, source.tick()), Path::to_owned);
+        source.of_run(self.manifest, self.graph).write(&path)?;
+        self.files.add_asked(Written { tick: source.tick(), path: path.clone() });
+        Ok(path)
     }
 
     /// The parts of the checkpoint of `tick`, once its nodes have written them.

@@ -29,6 +29,7 @@ mod samples;
 mod sidecars;
 mod wiring;
 
+use crate::checkpoint::Checkpoint;
 pub use crate::program::BackupSpec;
 use crate::program::{Origin, Program};
 pub use backups::{backup_of, successor_of};
@@ -83,6 +84,8 @@ pub struct Graph {
     pub files: InputFiles,
     /// Parts of the checkpoint from which the run goes on.
     pub(crate) from: Option<Parts>,
+    /// That checkpoint.
+    pub(crate) source: Option<Box<Checkpoint>>,
     /// Origins of first processes that are not those of the manifest, by node: a run that goes on begins with them.
     pub(crate) begun: BTreeMap<usize, Origin>,
     /// Legal but unusual values; `check` and `run` print them.
@@ -163,6 +166,7 @@ impl Graph {
             models,
             files,
             from: None,
+            source: None,
             begun,
             warnings,
         }))

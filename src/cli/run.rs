@@ -317,12 +317,13 @@ fn loaded(arguments: &RunArguments, from: Option<&Checkpoint>) -> Result<Manifes
 
 /// A time such as `1s`, `250ms` or `0.5`, in seconds.
 fn seconds(text: &str) -> Result<f64, String> {
-    let (number, factor) = match (text.strip_suffix("ms"), text.strip_suffix('s')) {
-        (Some(number), _) => (number, 1e-3),
+    // Divided, not multiplied by a thousandth, which no binary number is: 333.3ms are 0.3333 s.
+    let (number, parts) = match (text.strip_suffix("ms"), text.strip_suffix('s')) {
+        (Some(number), _) => (number, 1e3),
         (None, Some(number)) => (number, 1.0),
         (None, None) => (text, 1.0),
     };
-    let time_s = number.trim().parse::<f64>().ok().map(|number| number * factor);
+    let time_s = number.trim().parse::<f64>().ok().map(|number| number / parts);
     time_s
         .filter(|time_s| time_s.is_finite() && *time_s > 0.0)
         .ok_or_else(|| "it is no time: write a number above 0 with its unit, such as 1s or 250ms".to_owned())
@@ -358,6 +359,7 @@ mod tests {
     #[test]
     fn a_time_has_a_unit_or_is_in_seconds() {
         assert_eq!(["1s", "250ms", "0.5"].map(seconds), [Ok(1.0), Ok(0.25), Ok(0.5)]);
+        assert_eq!(seconds("333.3ms"), Ok(0.3333));
         for text in ["0s", "-1", "ms", "1m", "inf", ""] {
             assert!(seconds(text).is_err(), "{text}");
         }

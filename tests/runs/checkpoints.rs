@@ -615,6 +615,7 @@ fn what_does_not_fit_is_refused_in_words() {
     let every = |time: &str| place.call(&[&args[..], &["--checkpoint-every", time]].concat());
     let neighbours = ["which is 1.5 ticks", "such as 0.001 s or 0.002 s"];
     every("1.5ms").with_code(2).says(&neighbours);
+    every("333.3ms").with_code(2).says(&["is 0.3333 s, which is 333.3 ticks", "such as 0.333 s or 0.334 s"]);
     every("0.5ms").with_code(2).says(&["which is 0.5 ticks", "such as 0.001 s"]);
     every("3ms").flown();
     every("200ms")

@@ -49,6 +49,10 @@ fn a_run_that_went_back_flies_as_one_from_the_checkpoint_and_its_recording_says_
         let file = place.path("a.300.ckpt");
         let text = ctl(&place, &run, &["rewind", &file])["text"].as_str().unwrap().to_owned();
         assert_eq!(text, format!("rewound from tick {} to tick 300, where it is paused", end - 27));
+        // It is where the checkpoint is: the same is written again.
+        let again = place.path("again.ckpt");
+        assert_eq!(ctl(&place, &run, &["checkpoint", &again])["tick"], 300);
+        assert!(fs::read(&again).unwrap() == fs::read(&file).unwrap(), "another checkpoint");
         refused(&["400"], "of tick 400: the run has those of the ticks 100, 200, 300");
         refused(&[&place.path("a.400.ckpt")], "a rewind goes back");
         ctl(&place, &run, &["step", &(end - 300).to_string()]);

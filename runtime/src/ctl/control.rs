@@ -104,6 +104,14 @@ impl<'a> ControlServer<'a> {
         self.control.end_tick() == tick && self.control.completed_ticks() >= tick
     }
 
+    /// Answers a request for a checkpoint of `tick`, with the path of the file that was `written`.
+    fn answer_written(&self, reply: Reply, tick: u32, written: Result<PathBuf>) {
+        match written {
+            Ok(path) => self.answer(reply, format!("the checkpoint of tick {tick} is {}", path.display())),
+            Err(error) => drop(reply.send(&Answer::refused(format!("{error:#}")))),
+        }
+    }
+
     fn answer(&self, reply: Reply, text: String) {
         reply.send(&Answer::Done { text, tick: self.control.completed_ticks() });
     }
@@ -151,14 +159,12 @@ impl<'a> ControlServer<'a> {
                 );
             }
             (Goal::PauseToSave { path, hold_tick }, Some(tick)) => self.save(path, tick, hold_tick, reply),
-            (Goal::Save { path, tick }, _) => match self.checkpoints.write_asked(tick, path.as_deref()) {
-                Ok(Some(written)) => {
-                    let text = format!("the checkpoint of tick {tick} is {}", written.display());
-                    self.answer(reply, text);
+            (Goal::Save { path, tick }, _) => {
+                match self.checkpoints.write_asked(tick, path.as_deref()).transpose() {
+                    Some(written) => self.answer_written(reply, tick, written),
+                    None => self.wish = Some((Goal::Save { path, tick }, reply)),
                 }
-                Ok(None) => self.wish = Some((Goal::Save { path, tick }, reply)),
-                Err(error) => drop(reply.send(&Answer::refused(format!("{error:#}")))),
-            },
+            }
             (goal, _) => self.wish = Some((goal, reply)),
         }
     }
@@ -168,8 +174,6 @@ impl<'a> ControlServer<'a> {
     fn save(&mut self, path: Option<PathBuf>, tick: u32, hold_tick: u32, reply: Reply) {
         let refused = if tick == 0 {
             Some("tick 0 is the start of the run: there is nothing to go on from")
-        } else if tick == self.plan.first_tick {
-            Some("the run has computed nothing since the checkpoint from which it goes on")
         } else if !self.plan.goes_on_from(tick) {
             Some("a process has computed its last step: nothing would go on from there")
         } else {
@@ -179,6 +183,10 @@ impl<'a> ControlServer<'a> {
             self.control.set_hold_tick(hold_tick);
             reply.send(&Answer::refused(reason));
             return;
+        }
+        if tick == self.plan.first_tick {
+            self.control.set_hold_tick(hold_tick);
+            return self.answer_written(reply, tick, self.checkpoints.write_source(path.as_deref()));
         }
         // Before the hold is lifted: every node sees it in the hold, or at its next tick.
         self.control.ask_for_checkpoint(tick);

@@ -65,8 +65,9 @@ pub fn add(
     reason = "within the range, which is checked"
 )]
 fn period(manifest: &Manifest, plan: &Plan, every: &Spanned<f64>) -> Result<u32, Diagnostic> {
-    let (every_s, tick_s) = (*every.get_ref(), plan.tick_s());
-    let ticks = every_s / tick_s;
+    let every_s = *every.get_ref();
+    // Of times in decimal, as people write them, rather than of their quotient.
+    let ticks = every_s * 1e9 / plan.tick_ns as f64;
     let is_whole = (ticks - ticks.round()).abs() <= 1e-6 * ticks.max(1.0);
     if is_whole && (1.0..f64::from(u32::MAX)).contains(&ticks.round()) {
         return Ok(ticks.round() as u32);

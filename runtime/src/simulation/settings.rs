@@ -111,5 +111,5 @@ pub(super) fn graph(draw: &mut Draw) -> Graph {
     let sidecars = sidecars.collect();
     let files = bus::InputFiles::default();
     let (models, begun, warnings) = (Vec::new(), BTreeMap::new(), Vec::new());
-    Graph { plan, programs, backups, sidecars, models, files, from: None, begun, warnings }
+    Graph { plan, programs, backups, sidecars, models, files, from: None, source: None, begun, warnings }
 }
