@@ -102,3 +102,50 @@ fn at_its_line(
         None => Diagnostic::in_file(path.display().to_string(), message),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn craft(name: &str) -> ControlledVehicle {
+        let path = format!("{}/../vehicles/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+        ControlledVehicle::load(&InputFiles::default(), path.as_ref()).unwrap()
+    }
+
+    #[test]
+    fn shipped_vehicles_keep_a_twentieth_of_their_thrust_range_at_either_end() {
+        for name in [
+            "hummingbird",
+            "crazyflie-2.1",
+            "crazyflie-2.1-brushless",
+            "dji-f550",
+            "tarot-t18",
+            "neuralfly-quadrotor",
+            "neurobem-quadrotor",
+        ] {
+            let craft = craft(name);
+            let (least_N, most_N) = craft.allocation.thrust_range_N(0.0);
+            let (kept_N, model) = (THRUST_RESERVE * (most_N - least_N), craft.hover_model());
+            let range_N = (model.thrust_min_N, model.thrust_max_N);
+            assert_eq!(range_N, (least_N + kept_N, most_N - kept_N), "{name}");
+        }
+    }
+
+    #[test]
+    fn vehicles_that_lift_many_times_their_weight_can_sink() {
+        let (least_N, most_N) = craft("hummingbird").allocation.thrust_range_N(0.0);
+        let lifting = |multiple: f64| {
+            let mut vehicle = craft("hummingbird").vehicle;
+            vehicle.mass_kg = most_N / multiple / vehicle.gravity_m_s2;
+            ControlledVehicle::new(vehicle).unwrap().hover_model()
+        };
+        for multiple in [11.5, 17.0, 23.0, 40.0] {
+            let (model, weight_N) = (lifting(multiple), most_N / multiple);
+            let expected_N = least_N + 0.3 * (weight_N - least_N);
+            assert!((model.thrust_min_N - expected_N).abs() < 1e-9, "{multiple}: {model:?}");
+        }
+        // It climbs with all rotors at their slowest, which only a rig allows: the range is that of any other vehicle.
+        let kept_N = THRUST_RESERVE * (most_N - least_N);
+        assert_eq!(lifting(100.0).thrust_min_N, least_N + kept_N);
+    }
+}

@@ -23,6 +23,11 @@ use vehicles::{ROTORS_MAX, Vehicle};
 /// [`Allocation::thrust_range_N`]. Tuned, no source: it leaves 0.09 N·m on the Hummingbird.
 pub(crate) const THRUST_RESERVE: f64 = 0.05;
 
+/// The greatest part of the way from the least thrust to the weight to keep free at the lower end: strong vehicles, which
+/// lift many times their weight, would else have no thrust left to sink with. Tuned, no source: it leaves 0.7 of that way,
+/// and begins to count where the rotors lift about six times the weight.
+const RESERVE_OF_WEIGHT: f64 = 0.3;
+
 /// The share of the torques that the rotors can make in hover for which thrust is given up: that of ArduPilot, the default of
 /// ATC_THR_MIX_MAX. Laws whose demands are off by far would else throw the vehicle about.
 const TORQUE_SHARE: f64 = 0.5;
@@ -163,6 +168,7 @@ pub struct Allocation {
     bounded: BoundedLeastSquares,
     /// Squared speeds of hover: those of the weight, or of the part of it that the rotors lift with room for torques.
     hover: PerRotor,
+    weight_N: f64,
     square_min_rad2_s2: f64,
     square_max_rad2_s2: f64,
 }
@@ -211,11 +217,11 @@ impl Allocation {
         let (square_min_rad2_s2, square_max_rad2_s2) = (min_rad_s * min_rad_s, max_rad_s * max_rad_s);
         let at_full_speed = effectiveness.iter().map(|rotor| torques_first(rotor) * square_max_rad2_s2);
         let bounded = BoundedLeastSquares::new(at_full_speed, square_min_rad2_s2 / square_max_rad2_s2);
-        let hover = PerRotor::default();
+        let (hover, weight_N) = (PerRotor::default(), vehicle.mass_kg * vehicle.gravity_m_s2);
         let mut made =
-            Self { effectiveness, inverse, bounded, hover, square_min_rad2_s2, square_max_rad2_s2 };
+            Self { effectiveness, inverse, bounded, hover, weight_N, square_min_rad2_s2, square_max_rad2_s2 };
         let (min_N, max_N) = made.thrust_range_N(THRUST_RESERVE);
-        let thrust_N = (vehicle.mass_kg * vehicle.gravity_m_s2).clamp(min_N, max_N);
+        let thrust_N = weight_N.clamp(min_N, max_N);
         made.hover = made.within_limits(&RotorWrench { thrust_N, ..RotorWrench::default() });
         let unbalanced = |part| AllocationError::Unbalanced { rotors, working, part };
         made.unbalanced(thrust_N).map_or(Ok(()), |part| Err(unbalanced(part)))?;
@@ -223,14 +229,18 @@ impl Allocation {
     }
 
     /// The least and greatest thrust (N) to demand if the fraction `reserve` (0 to ½) of the range from
-    /// all rotors slowest to all fastest is kept free at either end for roll and pitch.
+    /// all rotors slowest to all fastest is kept free at either end for roll and pitch. At the lower end, the part kept free
+    /// is bounded by the weight, so that strong vehicles can sink.
     #[must_use]
     pub fn thrust_range_N(&self, reserve: f64) -> (f64, f64) {
         let thrust_for_one: f64 = self.effectiveness.iter().map(|rotor| rotor[0]).sum();
         let min_N = thrust_for_one * self.square_min_rad2_s2;
         let max_N = thrust_for_one * self.square_max_rad2_s2;
         let kept_N = reserve.clamp(0.0, 0.5) * (max_N - min_N);
-        (min_N + kept_N, max_N - kept_N)
+        // On a rig, and without gravity, the weight may be less than the least thrust.
+        let sinks_N = self.weight_N - min_N;
+        let kept_below_N = if sinks_N > 0.0 { kept_N.min(RESERVE_OF_WEIGHT * sinks_N) } else { kept_N };
+        (min_N + kept_below_N, max_N - kept_N)
     }
 
     /// The wrench that the rotors make at `speeds_rad_s`.

@@ -175,6 +175,27 @@ fn a_hexacopter_and_an_octocopter_hover_and_follow_a_doublet() {
     ["hexa-hover", "octo-hover"].into_iter().for_each(|name| fly_with(name, &SEEDS));
 }
 
+/// Thrust over weight of 17 to 40: racers have 10 to 16.
+#[test]
+fn vehicles_that_lift_many_times_their_weight_hold_their_set_point() {
+    let text = std::fs::read_to_string(repository("vehicles/hummingbird.toml")).unwrap();
+    for multiple in [17, 28, 40] {
+        // Four times 7.6184e-8 N/rpm^2 at 8600 rpm.
+        let mass_kg = 22.538 / 9.81 / f64::from(multiple);
+        let place = Place::new();
+        let strong = text.replacen("mass = { value = 0.480", &format!("mass = {{ value = {mass_kg}"), 1);
+        let vehicle = place.write("strong.toml", strong);
+        let sets = ["plant", "controller"].map(|process| format!("process.{process}.vehicle={vehicle}"));
+        let ended = composed(
+            &place,
+            &repository("manifests/hover.toml"),
+            &place.path("flight.mcap"),
+            &sets.each_ref().map(String::as_str),
+        );
+        assert_eq!(ended.code, Some(0), "{multiple}: {ended}");
+    }
+}
+
 /// The vehicle file of the hexacopter with `line` in the table of its first rotor.
 fn hexacopter_with(place: &Place, line: &str) -> String {
     let text = std::fs::read_to_string(repository("vehicles/dji-f550.toml")).unwrap();
