@@ -30,26 +30,28 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// The layout of `rotors` in one of `frames`.
+    /// The layout of `rotors` in one of `frames`. Of several with rotors in these places, that with the same spins counts, then
+    /// that with all of them reversed.
     ///
     /// # Errors
     /// No frame has rotors in these places with these spins.
     pub fn of(rotors: &[Rotor], frames: &[Frame]) -> Result<Self, String> {
-        let placed =
-            frames.iter().find_map(|(frame, motors)| Some((*frame, *motors, assigned(rotors, motors)?)));
-        let Some((frame, motors, order)) = placed else {
+        let in_places = |&(frame, motors): &Frame| {
+            let order = assigned(rotors, motors)?;
+            Some(Placed::new(frame, order, rotors, motors))
+        };
+        let Some(placed) = frames.iter().filter_map(in_places).min_by_key(Placed::rank) else {
             let names: Vec<&str> = frames.iter().map(|(name, _)| *name).collect();
             return Err(format!("its {} rotors match none of the frames {}", rotors.len(), names.join(", ")));
         };
-        let clockwise = order.iter().map(|rotor| rotors[*rotor].spin < 0.0);
-        let reversed: Vec<bool> = clockwise.zip(motors).map(|(rotor, (_, motor))| rotor != *motor).collect();
+        let Placed { frame, motors, reversed } = placed;
         if let Some(wrong) = reversed.iter().position(|is| *is != reversed[0]) {
-            let name = &rotors[order[wrong]].name;
+            let name = &rotors[motors[wrong]].name;
             return Err(format!(
                 "its rotors stand as those of {frame}, and `{name}` turns the other way than there"
             ));
         }
-        Ok(Self { frame, is_reversed: reversed[0], motors: order })
+        Ok(Self { frame, is_reversed: reversed[0], motors })
     }
 
     /// Warns of rotors of `vehicle` for which the frame's mixer was not made.
@@ -73,6 +75,32 @@ impl Layout {
                 "has a rotor \"{name}\" that leans by {lean_deg:.1} degrees, and the mixer {frame} counts on upright ones"
             );
             settings::warn_of_vehicle(context, vehicle, &odd, &format!("rotors.{at}.axis"));
+        }
+    }
+}
+
+/// Rotors in the places of a frame, whatever their spins.
+struct Placed {
+    frame: &'static str,
+    /// Rotor of each motor.
+    motors: Vec<usize>,
+    /// By motor, true if its rotor turns the other way.
+    reversed: Vec<bool>,
+}
+
+impl Placed {
+    fn new(frame: &'static str, order: Vec<usize>, rotors: &[Rotor], motors: &[Motor]) -> Self {
+        let clockwise = order.iter().map(|rotor| rotors[*rotor].spin < 0.0);
+        let reversed = clockwise.zip(motors).map(|(rotor, (_, motor))| rotor != *motor).collect();
+        Self { frame, motors: order, reversed }
+    }
+
+    /// Order of preference: all spins as in the frame, all reversed, some reversed.
+    fn rank(&self) -> u8 {
+        match (self.reversed.contains(&true), self.reversed.contains(&false)) {
+            (false, _) => 0,
+            (true, false) => 1,
+            (true, true) => 2,
         }
     }
 }

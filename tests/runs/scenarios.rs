@@ -273,7 +273,7 @@ fn a_hexacopter_whose_spins_allow_it_flies_on_without_a_rotor() {
     let manifest = repository("manifests/hexa-hover.toml");
     composed(&place, &manifest, &recording, &[&plant, &controller]).flown();
     let states = rows(&recording, "/plant/state");
-    assert!(states.iter().all(|state| state.get("rotor_speed[0]") == 0.0));
+    assert!(states.iter().all(|state| state.get("rotor_speed[1]") == 0.0));
     let last = states.last().unwrap();
     assert!((last.get("position.z") - 1.5).abs() < 0.05, "{last:?}");
     let tilt = |state: &crate::recordings::Row| libm::hypot(state.get("attitude.x"), state.get("attitude.y"));

@@ -1,5 +1,5 @@
 //! Frames of ArduPilot with their motors in its order (`libraries/AP_Motors/AP_MotorsMatrix.cpp`), and their numbers
-//! (`AP_Motors_Class.h`).
+//! (`AP_Motors_Class.h`). Of several orders of one frame, one is here: the order of the outputs is ours to choose.
 
 use crate::layout::{Frame, Layout};
 
@@ -9,9 +9,16 @@ const HEXA_PLUS: &str = "hexa plus";
 const HEXA_X: &str = "hexa X";
 const OCTA_PLUS: &str = "octa plus";
 const OCTA_X: &str = "octa X";
+/// Places of the octa X, with all spins reversed: in Copter since 4.1.
+const OCTA_DJI_X: &str = "octa DJI X";
+const OCTAQUAD_PLUS: &str = "octaquad plus";
+const OCTAQUAD_X: &str = "octaquad X";
+const Y6: &str = "Y6";
+const DODECAHEXA_PLUS: &str = "dodecahexa plus";
+const DODECAHEXA_X: &str = "dodecahexa X";
 
 /// The frames.
-pub const FRAMES: [Frame; 6] = [
+pub const FRAMES: [Frame; 12] = [
     (QUAD_X, &[(45.0, false), (-135.0, false), (-45.0, true), (135.0, true)]),
     (QUAD_PLUS, &[(90.0, false), (-90.0, false), (0.0, true), (180.0, true)]),
     (HEXA_X, &[(90.0, true), (-90.0, false), (-30.0, true), (150.0, false), (30.0, false), (-150.0, true)]),
@@ -42,6 +49,81 @@ pub const FRAMES: [Frame; 6] = [
             (90.0, true),
         ],
     ),
+    (
+        OCTA_DJI_X,
+        &[
+            (22.5, false),
+            (-22.5, true),
+            (-67.5, false),
+            (-112.5, true),
+            (-157.5, false),
+            (157.5, true),
+            (112.5, false),
+            (67.5, true),
+        ],
+    ),
+    // Coaxial pairs.
+    (
+        OCTAQUAD_PLUS,
+        &[
+            (0.0, false),
+            (-90.0, true),
+            (180.0, false),
+            (90.0, true),
+            (-90.0, false),
+            (0.0, true),
+            (90.0, false),
+            (180.0, true),
+        ],
+    ),
+    (
+        OCTAQUAD_X,
+        &[
+            (45.0, false),
+            (-45.0, true),
+            (-135.0, false),
+            (135.0, true),
+            (-45.0, false),
+            (45.0, true),
+            (135.0, false),
+            (-135.0, true),
+        ],
+    ),
+    (Y6, &[(60.0, false), (-60.0, true), (-60.0, false), (180.0, true), (60.0, true), (180.0, false)]),
+    (
+        DODECAHEXA_PLUS,
+        &[
+            (0.0, false),
+            (0.0, true),
+            (60.0, true),
+            (60.0, false),
+            (120.0, false),
+            (120.0, true),
+            (180.0, true),
+            (180.0, false),
+            (-120.0, false),
+            (-120.0, true),
+            (-60.0, true),
+            (-60.0, false),
+        ],
+    ),
+    (
+        DODECAHEXA_X,
+        &[
+            (30.0, false),
+            (30.0, true),
+            (90.0, true),
+            (90.0, false),
+            (150.0, false),
+            (150.0, true),
+            (-150.0, true),
+            (-150.0, false),
+            (-90.0, false),
+            (-90.0, true),
+            (-30.0, true),
+            (-30.0, false),
+        ],
+    ),
 ];
 
 /// Values of `FRAME_CLASS` and `FRAME_TYPE`.
@@ -70,6 +152,12 @@ impl FrameNumbers {
             (HEXA_X, false) => (2, 1),
             (OCTA_PLUS, false) => (3, 0),
             (OCTA_X, false) => (3, 1),
+            (OCTA_DJI_X, false) => (3, 13),
+            (OCTAQUAD_PLUS, false) => (4, 0),
+            (OCTAQUAD_X, false) => (4, 1),
+            (Y6, false) => (5, 1),
+            (DODECAHEXA_PLUS, false) => (12, 0),
+            (DODECAHEXA_X, false) => (12, 1),
             (frame, _) => {
                 let reason =
                     format!("its rotors stand as those of {frame}, and each turns the other way than there");
@@ -109,21 +197,46 @@ mod tests {
         assert_eq!(names, ["right", "left", "front", "rear"]);
         assert_eq!(numbers(&reversed(hummingbird.rotors)), Ok((1, 6)));
         let octa = vehicle("tarot-t18").rotors;
-        let error = numbers(&octa).unwrap_err();
-        assert!(error.contains("octa X") && error.contains("each turns the other way"), "{error}");
+        assert_eq!(numbers(&octa), Ok((3, 13)));
+        let layout = Layout::of(&octa, &FRAMES).unwrap();
+        let names: Vec<&str> = layout.motors.iter().map(|rotor| &*octa[*rotor].name).collect();
+        let counter_clockwise_from_the_front_right = [
+            "front right",
+            "front left",
+            "left front",
+            "left rear",
+            "rear left",
+            "rear right",
+            "right rear",
+            "right front",
+        ];
+        assert_eq!(names, counter_clockwise_from_the_front_right);
         assert_eq!(numbers(&reversed(octa)), Ok((3, 1)));
+        let hexa = vehicle("dji-f550").rotors;
+        assert_eq!(numbers(&hexa), Ok((2, 1)));
+        let layout = Layout::of(&hexa, &FRAMES).unwrap();
+        assert_eq!(layout.motors, [0, 1, 2, 3, 4, 5], "motors of PX4 and ArduPilot have the same order");
+        let error = numbers(&reversed(hexa)).unwrap_err();
+        assert!(error.contains("hexa X") && error.contains("each turns the other way"), "{error}");
     }
 
-    /// In each frame the roll, pitch and yaw of all motors at once are zero, and neighbours are equally far from each other.
+    /// In each frame the roll, pitch and yaw of all motors at once are zero, and neighbours are equally far from each other;
+    /// in a coaxial pair one motor turns each way.
     #[test]
     fn frames_are_symmetric() {
         for (name, motors) in FRAMES {
+            let at = |is_clockwise: bool| motors.iter().filter(move |motor| motor.1 == is_clockwise);
             let mut angles: Vec<f64> = motors.iter().map(|(angle, _)| angle.rem_euclid(360.0)).collect();
             angles.sort_by(f64::total_cmp);
-            let step = 360.0 / motors.len() as f64;
+            angles.dedup();
+            let places = angles.len();
+            let step = 360.0 / places as f64;
             assert!(angles.windows(2).all(|pair| pair[1] - pair[0] == step), "{name}: {angles:?}");
-            let clockwise = motors.iter().filter(|(_, is_clockwise)| *is_clockwise).count();
-            assert_eq!(2 * clockwise, motors.len(), "{name}");
+            assert_eq!(2 * at(true).count(), motors.len(), "{name}");
+            if places < motors.len() {
+                let has_its_pair = |(angle, _): &(f64, bool)| at(false).any(|(other, _)| other == angle);
+                assert!(2 * places == motors.len() && at(true).all(has_its_pair), "{name}");
+            }
         }
     }
 
@@ -150,7 +263,10 @@ mod tests {
                 layout.motors.iter().copied().eq(0..motors.len()) && !layout.is_reversed,
                 "{name}: {layout:?}"
             );
-            assert_ne!(found(180.0 / motors.len() as f64), Ok(name));
+            let mut angles: Vec<f64> = motors.iter().map(|(angle, _)| *angle).collect();
+            angles.sort_by(f64::total_cmp);
+            angles.dedup();
+            assert_ne!(found(180.0 / angles.len() as f64), Ok(name));
         }
     }
 }

@@ -131,7 +131,11 @@ fn what_cannot_be_an_ardupilot_is_refused_by_check() {
     let settings = stand_in(&place, "");
     let [text, wrong] =
         [place.write("text", "no program"), place.write("wrong.parm", "# one\nFRAME_CLASS\n")];
-    let octa = repository("vehicles/tarot-t18.toml");
+    let hexacopter = fs::read_to_string(repository("vehicles/dji-f550.toml")).unwrap();
+    let swapped = hexacopter
+        .replace("\"counter-clockwise\"", "\"?\"")
+        .replace("\"clockwise\"", "\"counter-clockwise\"");
+    let mirrored = place.write("mirrored.toml", swapped.replace("\"?\"", "\"clockwise\""));
     let cases: [(&str, &[&str]); 9] = [
         ("process.controller.firmware=/bin/ls", &["/bin/ls: it is not ArduCopter's SITL", "`ArduCopter`"]),
         ("process.controller.firmware=${HUMMINGBUS_UNSET}", &["HUMMINGBUS_UNSET is not set"]),
@@ -141,11 +145,27 @@ fn what_cannot_be_an_ardupilot_is_refused_by_check() {
         ("process.controller.parameters.rest_s=0", &["rest_s", "above 0"]),
         ("process.controller.parameters.origin.latitude_deg=90", &["origin.latitude_deg"]),
         ("process.controller.period_ticks=100", &["the period is 0.1 s, expected less than 0.1 s"]),
-        (&format!("process.controller.vehicle={octa}"), &["octa X", "each turns the other way than there"]),
+        (
+            &format!("process.controller.vehicle={mirrored}"),
+            &["hexa X", "each turns the other way than there"],
+        ),
     ];
     for (setting, told) in cases {
         let settings = [&settings[..], &[setting.to_owned()]].concat();
         call(&place, "check", &manifest(), &settings, &[]).with_code(2).says(told);
+    }
+}
+
+#[test]
+fn the_shipped_hexacopter_and_octocopter_are_taken() {
+    let place = Place::new();
+    let settings = stand_in(&place, "");
+    for (name, hover) in [("dji-f550", [0.523; 6].to_vec()), ("tarot-t18", [0.4933; 8].to_vec())] {
+        let vehicle = repository(&format!("vehicles/{name}.toml"));
+        let sets = ["plant", "controller"].map(|process| format!("process.{process}.vehicle={vehicle}"));
+        let initial = format!("process.plant.inputs.command.initial.command={hover:?}");
+        let settings = [&settings[..], &sets[..], &[initial]].concat();
+        call(&place, "check", &manifest(), &settings, &[]).with_code(0);
     }
 }
 
