@@ -397,6 +397,8 @@ fn torques_first(effect: &Vector4<f64>) -> Vector4<f64> {
     Vector4::new(effect[1], effect[2], effect[3], effect[0])
 }
 
+/// Thrust and torques that a squared speed of each rotor makes. `torque_scale` is left out on purpose: it is what the physics
+/// has and the controllers do not know, as nobody measures it on a vehicle.
 fn effectiveness(vehicle: &Vehicle) -> Bounded<Vector4<f64>, ROTORS_MAX> {
     let (c_t, c_q) = (vehicle.thrust_coefficient, vehicle.torque_coefficient);
     let rotors = vehicle.rotors.iter().map(|rotor| {

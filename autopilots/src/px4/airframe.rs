@@ -32,7 +32,8 @@ pub fn script(configured: &str, vehicle: &Vehicle) -> Result<String, String> {
     }
     set("CA_AIRFRAME", &MULTIROTOR);
     set("CA_ROTOR_COUNT", &vehicle.rotors.len());
-    // Torque of a thrust, m. PX4 counts it as positive where the rotor turns counter-clockwise.
+    // Torque of a thrust, m. PX4 counts it as positive where the rotor turns counter-clockwise. `torque_scale` is left out on
+    // purpose: the physics has it, and no controller knows it.
     let moment_m = vehicle.torque_coefficient / vehicle.thrust_coefficient;
     for (at, rotor) in vehicle.rotors.iter().enumerate() {
         let (position_m, axis) = (rotor.position_m, rotor.axis);
