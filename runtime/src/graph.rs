@@ -4,7 +4,7 @@
 //! - `sidecars`: processes beside the ticks, and the order in which they start
 //! - `outputs`, `inputs`, `wiring`: topics and edges
 //! - `computing_time`: computing time of the steps
-//! - `parameters`, `recorders`: parameters and files of each node
+//! - `parameters`, `placeholders`, `recorders`: parameters and files of each node
 //! - `periods`: nodes and outputs that compute only once, or whose ticks would overflow
 //! - `samples`: samples that no reader takes, and measurements that come too late
 //! - `ranges`: ranges of numbers by their units
@@ -22,6 +22,7 @@ mod inputs;
 mod outputs;
 mod parameters;
 mod periods;
+mod placeholders;
 mod processes;
 mod ranges;
 mod recorders;

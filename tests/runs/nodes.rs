@@ -55,6 +55,9 @@ struct Parameters {
     /// A file, and the text that has to be in it.
     data: Option<PathBuf>,
     expected_text: Option<String>,
+    /// Further files, and the texts that have to be in them.
+    #[serde(default)]
+    others: Vec<(PathBuf, String)>,
 }
 
 #[derive(Clone, Copy, Deserialize)]
@@ -104,6 +107,12 @@ fn run() -> Result<(), BusError> {
     if let Some(path) = &parameters.data {
         let text = node.files().text(path).map_err(|cause| node.error(cause))?;
         if Some(&text) != parameters.expected_text.as_ref() {
+            return Err(node.error(format!("{} holds {text:?}", path.display())));
+        }
+    }
+    for (path, expected) in &parameters.others {
+        let text = std::fs::read_to_string(path).map_err(|cause| node.error(cause))?;
+        if text != *expected {
             return Err(node.error(format!("{} holds {text:?}", path.display())));
         }
     }

@@ -1,5 +1,6 @@
 //! Processes on the host: sidecars, commands, cores, priorities and environments.
 
+use crate::nodes;
 use crate::refusals::{good, refused, refused_setting, refused_text, refused_with};
 use crate::support::{Launch, Place, repository};
 use std::fs;
@@ -29,6 +30,33 @@ fn a_sidecar_runs_beside_the_ticks_and_ends_with_the_run() {
     launch.signal(rustix::process::Signal::INT);
     launch.end().with_code(1);
     assert!(!Path::new(&scratch).exists(), "it goes with the run");
+}
+
+/// The tests' own program reads the file at the path that it is given.
+#[test]
+fn files_and_variables_among_the_parameters_of_a_command_are_resolved() {
+    let place = Place::new();
+    fs::create_dir(place.path("notes")).unwrap();
+    place.write("notes/first.txt", "hello");
+    let with = |others: &str| {
+        let node = nodes::sender("reader", 1, &format!("parameters = {{ others = [[{others}]] }}"));
+        place.write("files.toml", nodes::manifest(5, &[node]))
+    };
+    let path = with(
+        "{ file = \"${HUMMINGBUS_UNSET:-notes}/first.txt\" }, { text = \"${HUMMINGBUS_UNSET:-hello}\" }",
+    );
+    place.call(&["run", &path, "--record", &place.path("a.mcap")]).flown();
+    for unset in
+        ["{ file = \"${HUMMINGBUS_UNSET}/first.txt\" }, \"\"", "\"\", { text = \"${HUMMINGBUS_UNSET}\" }"]
+    {
+        place
+            .call(&["check", &with(unset)])
+            .with_code(2)
+            .says(&["files.toml:", "HUMMINGBUS_UNSET is not set"]);
+    }
+    // Other texts and tables are the program's.
+    let path = with("\"${HUMMINGBUS_UNSET}/first.txt\", \"hello\"");
+    place.call(&["run", &path, "--record", &place.path("b.mcap")]).with_code(2).says(&["No such file"]);
 }
 
 /// Looks again and again, while a long run goes on.

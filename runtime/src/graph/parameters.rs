@@ -1,7 +1,7 @@
 //! Parameters: the values that each node reads about itself, checked by its kind.
 
 use super::processes::{DeclaredNode, files};
-use super::ranges;
+use super::{placeholders, ranges};
 use crate::manifest::{InputSetting, Manifest, Process};
 use crate::program::Executable;
 use bus::context::{InputMessage, NodeContext, SampleTimes};
@@ -83,8 +83,7 @@ pub fn of(
 ) -> Result<(serde_json::Value, Vec<InputFile>), Diagnostic> {
     let DeclaredNode { manifest, name, process, program, .. } = declared;
     let read = declared.files.listing_anew();
-    let mut parameters: BTreeMap<&str, serde_json::Value> =
-        process.parameters.iter().map(|(key, value)| (key.get_ref().as_str(), value.clone())).collect();
+    let mut parameters = stated(declared)?;
     // Copies of files with the values of `--set`: keys, originals, copies.
     let mut edited: Vec<(&str, PathBuf, PathBuf)> = Vec::new();
     let mut has_firmware = false;
@@ -161,6 +160,20 @@ pub fn of(
         checked?;
     }
     Ok((parameters, read.used()))
+}
+
+/// The parameters as the manifest states them. Those of a command may hold placeholders, which are replaced.
+fn stated<'a>(declared: &DeclaredNode<'a>) -> Result<BTreeMap<&'a str, serde_json::Value>, Diagnostic> {
+    let is_command = matches!(declared.program.executable, Executable::Command(_));
+    let of = |(key, value): (&'a Spanned<String>, &serde_json::Value)| {
+        let value = if is_command {
+            placeholders::replaced(declared.manifest, &key.span(), value)?
+        } else {
+            value.clone()
+        };
+        Ok((key.get_ref().as_str(), value))
+    };
+    declared.process.parameters.iter().map(of).collect()
 }
 
 /// The parameter `gains` of a built-in controller that names the gains file at `path` and has the table `stated` in its parameters:
