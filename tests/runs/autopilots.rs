@@ -64,6 +64,22 @@ fn a_firmware_flies_the_hover_and_its_doublet_and_two_runs_are_the_same_bytes() 
     require_same(&fs::read(&first).unwrap(), &second);
 }
 
+/// The page sends what the gamepad asks for: without a page the firmware hovers.
+#[test]
+fn a_firmware_that_a_person_flies_hovers_while_nobody_asks() {
+    let place = Place::new();
+    let manifest = repository("manifests/autopilots/betaflight-by-hand.toml");
+    let mut settings = stand_in(&place, "");
+    call(&place, "check", &manifest, &settings, &[]).with_code(0);
+    settings.push("run.duration_s=3".to_owned());
+    let [first, second] = ["a.mcap", "b.mcap"].map(|name| place.path(name));
+    for recording in [&first, &second] {
+        let args = ["--record", recording, "--pace", "free"];
+        call(&place, "run", &manifest, &settings, &args).with_code(0);
+    }
+    require_same(&fs::read(&first).unwrap(), &second);
+}
+
 #[test]
 fn a_controller_takes_over_from_a_firmware_and_gives_back() {
     let place = Place::new();
