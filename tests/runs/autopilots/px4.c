@@ -1,7 +1,7 @@
 /* Stands in for PX4's SITL with its simulator's MAVLink interface: the same messages, arguments, files, start-up script and commands, and a
  * law of a few lines, mixed by the rotors' parameters. Parameters say how it misbehaves, at a time of its clock in seconds: `ENDS`,
  * `CRASHES`, `HANGS`, `MUTE`, `WRONG_CRC`, `NOT_A_NUMBER`; or all the time: `NEVER_CONNECTS 1`, `NEVER_BOOTS 1`, `NO_LOCKSTEP 1`,
- * `UNARMED 1`, `TWICE 1`. With `LOST 1` the remote control may be lost and the vehicle fall. */
+ * `UNARMED 1`, `TWICE 1`, `LATE 1`. With `LOST 1` the remote control may be lost and the vehicle fall. */
 #include <arpa/inet.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -14,7 +14,9 @@
 #include <string.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
 #include <sys/un.h>
+#include <time.h>
 #include <unistd.h>
 
 enum { HEARTBEAT = 0, RC = 65, COMMAND = 76, CONTROLS = 93, SENSOR = 107, GPS = 113, STATE = 115 };
@@ -167,6 +169,9 @@ static void misbehave(void)
     if (is_due("HANGS"))
         for (printf("thinking\n"), fflush(stdout);;)
             pause();
+    /* By the host's time: a call of the C library would wait in the simulation's. */
+    if (parameter("LATE", 0) && sensors % 100 == 0)
+        syscall(SYS_nanosleep, &(struct timespec) { .tv_nsec = 30000000 }, NULL);
 }
 
 static void within(const char *what, double found, double min, double max)

@@ -92,6 +92,14 @@ fn the_last_outputs_of_a_step_count() {
     assert!(topics(&flight(&place, "TWICE 1\n", "twice.mcap")) == once);
 }
 
+/// By the time of the host, 30 ms after each hundredth message of the sensors.
+#[test]
+fn answers_that_come_late_change_nothing() {
+    let place = Place::new();
+    let undisturbed = topics(&flight(&place, "", "undisturbed.mcap"));
+    assert!(topics(&flight(&place, "LATE 1\n", "late.mcap")) == undisturbed);
+}
+
 #[test]
 fn a_lost_radio_is_lost_for_px4() {
     let place = Place::new();
