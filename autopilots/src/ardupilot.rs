@@ -40,8 +40,6 @@ const ARMED_S: f64 = 4.0;
 const PERIOD_MAX_S: f64 = 0.1;
 /// Text that occurs in each of its programs.
 const NAME: &str = "ArduCopter";
-/// Heading of the vehicle that rests, degrees from north: its x points east.
-const HEADING_DEG: f64 = 90.0;
 /// Date of the firmware's start, by which its GPS tells the time: 2025-01-01T00:00:00Z, in seconds since 1970. Without it, it is the host's.
 const START_TIME_S: u32 = 1_735_689_600;
 /// Name of the parameter file in the folder of the firmware.
@@ -164,6 +162,10 @@ impl Autopilot for ArduPilot {
         &self.vehicle
     }
 
+    fn origin(&self) -> &Origin {
+        &self.origin
+    }
+
     fn boot(&self) -> Result<Link, String> {
         let scratch = Scratch::new("ardupilot")?;
         let program = scratch.write("ardupilot", &self.firmware)?;
@@ -204,9 +206,10 @@ impl Autopilot for ArduPilot {
 impl ArduPilot {
     /// Arguments of the program.
     fn add_arguments(&self, command: &mut Command, ports: &Ports) {
-        let Origin { latitude_deg, longitude_deg, altitude_m } = self.origin;
+        // The vehicle that rests heads along the world's x.
+        let Origin { latitude_deg, longitude_deg, altitude_m, x_azimuth_deg } = self.origin;
         command.args(["--model", "JSON:127.0.0.1", "--speedup", "1", "--defaults", PARAMETER_FILE]);
-        command.arg("--home").arg(format!("{latitude_deg},{longitude_deg},{altitude_m},{HEADING_DEG}"));
+        command.arg("--home").arg(format!("{latitude_deg},{longitude_deg},{altitude_m},{x_azimuth_deg}"));
         command.arg("--start-time").arg(START_TIME_S.to_string());
         let Ports { output, input, rc, beacon } = ports;
         let ports =

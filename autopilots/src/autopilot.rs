@@ -1,5 +1,6 @@
 //! The interface of an autopilot: one implementation for each firmware.
 
+use crate::origin::Origin;
 use bus::Bounded;
 use bus::component::Info;
 use bus::context::NodeContext;
@@ -7,7 +8,7 @@ use bus::messages::{Imu, ROTORS_MAX, RcChannels, StateEstimate};
 use diagnostics::ParameterError;
 use vehicles::Vehicle;
 
-/// Inputs of a firmware at a tick: body x forward, y left, z up; the world's z up; SI units.
+/// Inputs of a firmware at a tick: body x forward, y left, z up; world east, north, up; SI units.
 #[derive(Clone, Copy, Debug)]
 pub struct Sensed<'a> {
     /// Simulation time since tick 0, s; below 0 while the firmware starts.
@@ -42,6 +43,9 @@ pub trait Autopilot: Sized + Send {
 
     /// The vehicle that it flies.
     fn vehicle(&self) -> &Vehicle;
+
+    /// Place and axes of the world on the earth.
+    fn origin(&self) -> &Origin;
 
     /// Starts the firmware, and waits until it is ready for tick 0.
     ///

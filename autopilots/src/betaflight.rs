@@ -185,6 +185,10 @@ impl Autopilot for Betaflight {
         &self.vehicle
     }
 
+    fn origin(&self) -> &Origin {
+        &self.origin
+    }
+
     fn boot(&self) -> Result<Link, String> {
         self.start().map_err(|error| format!("{}: {error}", self.firmware_path.display()))
     }

@@ -95,6 +95,7 @@ impl<A: Autopilot> Component for Bridge<A> {
         let Inputs { imu, estimate, rc } = inputs;
         let is_rc_new = state.is_rc_new(rc.stamp);
         let Some(link) = &mut state.link else { return Err("the firmware was not started".into()) };
+        let estimate = &self.0.origin().east_north_up(estimate);
         let sensed = Sensed { time_s: context.time_s(), imu, estimate, rc, is_rc_new };
         let throttles = self.0.exchange(link, &sensed)?;
         let range = &self.0.vehicle().command;

@@ -212,6 +212,10 @@ impl Autopilot for Px4 {
         &self.vehicle
     }
 
+    fn origin(&self) -> &Origin {
+        &self.origin
+    }
+
     fn boot(&self) -> Result<Link, String> {
         let mut link = Link {
             stream: self.start()?,
@@ -272,8 +276,8 @@ impl Px4 {
 
     /// Lets the firmware sense a level ground until its start-up script has ended and it sends outputs.
     fn await_start(&self, link: &mut Link) -> Result<(), String> {
-        let (imu, estimate, rc) =
-            (imu_at_rest(&self.vehicle), StateEstimate::default(), RcChannels::default());
+        let (imu, rc) = (imu_at_rest(&self.vehicle), RcChannels::default());
+        let estimate = self.origin.east_north_up(&StateEstimate::default());
         let sensed = Sensed { time_s: 0.0, imu: &imu, estimate: &estimate, rc: &rc, is_rc_new: true };
         self.receive(link)?;
         while link.sent < START_UP_MAX {
@@ -308,7 +312,7 @@ impl Px4 {
         let estimate = sensed.estimate;
         let field_B_T = self.magnetic_field.vector_B_T(estimate.attitude);
         // At rest, a position is one from the place of the rest.
-        let start_m = if *is_at_rest { self.start_position_m } else { [0.0; 3] };
+        let start_m = if *is_at_rest { self.origin.turned(self.start_position_m) } else { [0.0; 3] };
         let position: [f64; 3] = estimate.position.into();
         let place = self.origin.place(std::array::from_fn(|axis| start_m[axis] + position[axis]));
         let sample = Sample { time_us, count: *sent, sensed, place, field_B_T };

@@ -31,7 +31,7 @@ impl Rest {
     /// An exchange fails.
     pub fn of<A: Autopilot>(&self, autopilot: &A, link: &mut A::Link) -> Result<bool, String> {
         let imu = imu_at_rest(autopilot.vehicle());
-        let estimate = StateEstimate::default();
+        let estimate = autopilot.origin().east_north_up(&StateEstimate::default());
         let (all, armed) = (steps(self.time_s, self.period_s), steps(self.armed_s, self.period_s));
         let mut throttles = Throttles::default();
         for step in 0..all {
