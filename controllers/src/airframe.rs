@@ -106,6 +106,8 @@ fn at_its_line(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::allocation::RotorWrench;
+    use vehicles::Rotor;
 
     fn craft(name: &str) -> ControlledVehicle {
         let path = format!("{}/../vehicles/{name}.toml", env!("CARGO_MANIFEST_DIR"));
@@ -147,5 +149,42 @@ mod tests {
         // It climbs with all rotors at their slowest, which only a rig allows: the range is that of any other vehicle.
         let kept_N = THRUST_RESERVE * (most_N - least_N);
         assert_eq!(lifting(100.0).thrust_min_N, least_N + kept_N);
+    }
+
+    /// The Hummingbird with a fifth rotor at its centre of mass, which pushes along `axis`.
+    fn with_a_fifth(axis: Vector3<f64>) -> ControlledVehicle {
+        let mut vehicle = craft("hummingbird").vehicle;
+        let fifth = Rotor { position_m: Vector3::zeros(), axis, ..vehicle.rotors[0].clone() };
+        vehicle.rotors.push(fifth);
+        ControlledVehicle::new(vehicle).unwrap()
+    }
+
+    #[test]
+    fn rotors_that_push_sideways_or_downwards_are_allocated_to() {
+        for axis in [Vector3::x(), -Vector3::z()] {
+            let allocation = with_a_fifth(axis).allocation;
+            let demand = RotorWrench { thrust_N: 4.7, torque_B_N_m: Vector3::new(0.02, -0.02, 0.005) };
+            let made = allocation.allocate(&demand).wrench;
+            assert!((made.thrust_N - 4.7).abs() < 0.02, "{axis}: {made:?}");
+            assert!((made.torque_B_N_m - demand.torque_B_N_m).norm() < 2e-3, "{axis}: {made:?}");
+        }
+        let (least_N, most_N) = with_a_fifth(-Vector3::z()).allocation.thrust_range_N(0.0);
+        let (four_least_N, four_most_N) = craft("hummingbird").allocation.thrust_range_N(0.0);
+        let [one_least_N, one_most_N] = [four_least_N, four_most_N].map(|thrust_N| thrust_N / 4.0);
+        assert!((least_N - four_least_N + one_most_N).abs() < 1e-9, "{least_N}");
+        assert!((most_N - four_most_N + one_least_N).abs() < 1e-9, "{most_N}");
+    }
+
+    #[test]
+    fn rotors_of_which_none_push_upwards_are_refused() {
+        for axis in [Vector3::x(), -Vector3::z()] {
+            let mut vehicle = craft("hummingbird").vehicle;
+            vehicle.rotors.iter_mut().for_each(|rotor| rotor.axis = axis);
+            let message = ControlledVehicle::new(vehicle).unwrap_err().to_string();
+            assert!(
+                message.contains("thrust is not controllable") && message.contains("push upwards"),
+                "{message}"
+            );
+        }
     }
 }

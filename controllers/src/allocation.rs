@@ -32,6 +32,10 @@ const RESERVE_OF_WEIGHT: f64 = 0.3;
 /// ATC_THR_MIX_MAX. Laws whose demands are off by far would else throw the vehicle about.
 const TORQUE_SHARE: f64 = 0.5;
 
+/// The upward part of a rotor's thrust below which it does not limit the torques of the others: the cosine of 75 deg. Tuned, no
+/// source: it is at its slowest in hover, and would limit them to zero.
+const LIFTING_MIN: f64 = 0.258_8;
+
 /// The error of a part of a wrench, against its size over all rotors, that counts as none: rounding, and the part by which
 /// lower priorities move a higher one.
 const MISSED_MIN: f64 = 5e-4;
@@ -141,7 +145,7 @@ fn why(part: Part, (rotors, working): (usize, usize), is_one_way: bool) -> &'sta
         Part::Roll | Part::Pitch if working == 1 => " (a single rotor makes no torque without thrust)",
         Part::Roll | Part::Pitch if working == 2 => " (two rotors are always in a line)",
         Part::Roll | Part::Pitch => " (are the rotors in a line?)",
-        Part::Thrust => " (`rotor.thrust_coefficient` is 0)",
+        Part::Thrust => " (`rotor.thrust_coefficient` is 0, or no rotors push upwards)",
     }
 }
 
@@ -169,6 +173,8 @@ pub struct Allocation {
     /// Squared speeds of hover: those of the weight, or of the part of it that the rotors lift with room for torques.
     hover: PerRotor,
     weight_N: f64,
+    /// Thrust along body z that a squared speed of a rotor makes if it is to limit the torques, at least.
+    lifting_min: f64,
     square_min_rad2_s2: f64,
     square_max_rad2_s2: f64,
 }
@@ -218,8 +224,20 @@ impl Allocation {
         let at_full_speed = effectiveness.iter().map(|rotor| torques_first(rotor) * square_max_rad2_s2);
         let bounded = BoundedLeastSquares::new(at_full_speed, square_min_rad2_s2 / square_max_rad2_s2);
         let (hover, weight_N) = (PerRotor::default(), vehicle.mass_kg * vehicle.gravity_m_s2);
-        let mut made =
-            Self { effectiveness, inverse, bounded, hover, weight_N, square_min_rad2_s2, square_max_rad2_s2 };
+        let lifting_min = LIFTING_MIN * vehicle.thrust_coefficient;
+        let mut made = Self {
+            effectiveness,
+            inverse,
+            bounded,
+            hover,
+            weight_N,
+            lifting_min,
+            square_min_rad2_s2,
+            square_max_rad2_s2,
+        };
+        if made.thrust_range_N(0.0).1 <= 0.0 {
+            return Err(singular(Part::Thrust));
+        }
         let (min_N, max_N) = made.thrust_range_N(THRUST_RESERVE);
         let thrust_N = weight_N.clamp(min_N, max_N);
         made.hover = made.within_limits(&RotorWrench { thrust_N, ..RotorWrench::default() });
@@ -229,13 +247,14 @@ impl Allocation {
     }
 
     /// The least and greatest thrust (N) to demand if the fraction `reserve` (0 to ½) of the range from
-    /// all rotors slowest to all fastest is kept free at either end for roll and pitch. At the lower end, the part kept free
-    /// is bounded by the weight, so that strong vehicles can sink.
+    /// all rotors slowest to all fastest is kept free at either end for roll and pitch; of rotors that push downwards, from
+    /// fastest to slowest. At the lower end, the part kept free is bounded by the weight, so that strong vehicles can sink.
     #[must_use]
     pub fn thrust_range_N(&self, reserve: f64) -> (f64, f64) {
-        let thrust_for_one: f64 = self.effectiveness.iter().map(|rotor| rotor[0]).sum();
-        let min_N = thrust_for_one * self.square_min_rad2_s2;
-        let max_N = thrust_for_one * self.square_max_rad2_s2;
+        let upwards: f64 = self.effectiveness.iter().map(|rotor| rotor[0].max(0.0)).sum();
+        let downwards: f64 = self.effectiveness.iter().map(|rotor| rotor[0].min(0.0)).sum();
+        let min_N = upwards * self.square_min_rad2_s2 + downwards * self.square_max_rad2_s2;
+        let max_N = upwards * self.square_max_rad2_s2 + downwards * self.square_min_rad2_s2;
         let kept_N = reserve.clamp(0.0, 0.5) * (max_N - min_N);
         // On a rig, and without gravity, the weight may be less than the least thrust.
         let sinks_N = self.weight_N - min_N;
@@ -321,13 +340,15 @@ impl Allocation {
         [tilting, self.part_that_fits(&for_attitude, &self.for_yaw(demand))]
     }
 
-    /// The greatest multiple of `addition` that keeps every rotor within its limits when it is added to `base`, which is
-    /// within them.
+    /// The greatest multiple of `addition` that keeps every rotor that lifts within its limits when it is added to `base`, which
+    /// is within them.
     fn part_that_fits(&self, base: &PerRotor, addition: &PerRotor) -> f64 {
-        base.iter().zip(addition).fold(f64::INFINITY, |part, (&base, &addition)| {
+        let rotors = base.iter().zip(addition).zip(&self.effectiveness);
+        rotors.fold(f64::INFINITY, |part, ((&base, &addition), effect)| {
             let room =
                 if addition > 0.0 { self.square_max_rad2_s2 - base } else { self.square_min_rad2_s2 - base };
-            if addition == 0.0 { part } else { part.min((room / addition).max(0.0)) }
+            let is_free = addition == 0.0 || effect[0] < self.lifting_min;
+            if is_free { part } else { part.min((room / addition).max(0.0)) }
         })
     }
 

@@ -4,7 +4,7 @@ use crate::airframe::{Airframe, amid_rotors_B_m};
 use crate::airworthy::places;
 use crate::effects::{Effect, Quantity};
 use bus::context::NodeContext;
-use vehicles::{MotorModel, Vehicle};
+use vehicles::{MotorModel, Rotor, Vehicle};
 
 /// Arms above this are odd: the largest multirotors that carry people have 4 to 5 m (Volocopter 2X: 9.15 m across its
 /// rotors). Tuned.
@@ -19,6 +19,10 @@ const GYRATION_MIN: f64 = 0.03;
 /// Motors with a slower pole are odd: those of multirotors take 0.01 to 0.3 s. Tuned, no source.
 const SLOW_MAX_S: f64 = 0.3;
 
+/// An axis that is farther from body z is odd, degrees. Tuned, no source: fully actuated hexacopters tilt their rotors by 20
+/// to 30 deg (Rajappa et al., ICRA 2015), tilting ones by more.
+const LEAN_MAX_DEG: f64 = 75.0;
+
 /// Warns of everything odd about the vehicle of `airframe` and its effects.
 pub(crate) fn tell(airframe: &Airframe, run: &NodeContext<'_>) {
     let vehicle = airframe.vehicle();
@@ -26,6 +30,7 @@ pub(crate) fn tell(airframe: &Airframe, run: &NodeContext<'_>) {
         arms(vehicle),
         one_place(vehicle),
         one_way(vehicle),
+        leaning(vehicle),
         inertia(vehicle),
         slow_motors(vehicle),
         unfelt_wind(airframe.effects()),
@@ -76,6 +81,19 @@ fn one_way(vehicle: &Vehicle) -> Option<String> {
         )
     };
     (is_one_way && vehicle.rotors.len() > 1).then(message)
+}
+
+fn leaning(vehicle: &Vehicle) -> Option<String> {
+    let lean_deg = |rotor: &Rotor| libm::acos(rotor.axis.z.clamp(-1.0, 1.0)).to_degrees();
+    let at = vehicle.rotors.iter().position(|rotor| lean_deg(rotor) > LEAN_MAX_DEG)?;
+    let rotor = &vehicle.rotors[at];
+    Some(format!(
+        "has a rotor \"{}\" whose axis is {:.1} degrees from body z, expected at most {LEAN_MAX_DEG}: it lifts little or \
+         nothing; look at {}",
+        rotor.name,
+        lean_deg(rotor),
+        lines(vehicle, &[&format!("rotors.{at}.axis")])
+    ))
 }
 
 /// Compares the radii of gyration, sqrt(J / m), with the arms.
@@ -162,7 +180,7 @@ mod tests {
     #[test]
     fn what_is_odd_is_told_with_its_line() {
         type Change = fn(&mut Vehicle);
-        let cases: [(Change, &[&str]); 7] = [
+        let cases: [(Change, &[&str]); 8] = [
             (
                 |it| it.rotors.iter_mut().for_each(|rotor| rotor.position_m *= 88.0 / 0.17),
                 &["arms of 88.0000 m", "`rotors.0.position`"],
@@ -176,6 +194,7 @@ mod tests {
                 |it| it.inertia_kg_m2 *= 2.0 / 0.0056,
                 &["inertia of 2.0000e0 kg*m^2 at 0.4800 kg", "`body.inertia_xx`"],
             ),
+            (|it| it.rotors[1].axis = Vector3::x(), &["\"right\" whose axis is 90.0 degrees from body z"]),
             (|it| it.inertia_kg_m2 *= 1e-4, &["inertia of 5.6000e-7 kg*m^2"]),
             (
                 |it| it.motor = MotorModel::FirstOrder { time_constant_s: 25.0 },

@@ -37,9 +37,6 @@ pub const ROTOR_INERTIA: Bounds =
 pub const HUB: Bounds = bounds(-100.0, 100.0, "m", "the longest helicopter measures 40 m over its rotors");
 /// Components of the direction of a rotor's thrust, whose length does not matter.
 pub const AXIS: Bounds = bounds(-1e3, 1e3, "", "give a direction, such as [0, 0.2, 1]");
-/// The least part of a rotor's thrust that is upwards: the cosine of 75 deg. Tuned, no source: fully actuated hexacopters
-/// tilt their rotors by 20 to 30 deg (Rajappa et al., ICRA 2015), tilting ones by more.
-pub const AXIS_UPWARDS_MIN: f64 = 0.258_8;
 /// First-order lag of a motor.
 pub const TIME_CONSTANT: Bounds =
     bounds(1e-6, 100.0, "s", "a rotor takes a millisecond to some seconds to follow");

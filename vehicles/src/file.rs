@@ -289,10 +289,11 @@ fn axis(section: &Section) -> Result<Vector3<f64>, Diagnostic> {
     let given = Vector3::from(section.vector("axis", PURE_NUMBER, &bounds::AXIS)?);
     // Not divided where it is that of the other rotors: it stays the same number.
     let axis = if given == Vector3::z() { given } else { given / given.norm() };
-    if axis.z >= bounds::AXIS_UPWARDS_MIN {
+    // A length that is 0, or too small to divide by.
+    if axis.iter().all(|part| part.is_finite()) {
         return Ok(axis);
     }
-    let expected = "a direction upwards, at most 75 deg from body z";
+    let expected = "a direction, such as [0, 0.2, 1]";
     let found = format!("[{}, {}, {}]", given.x, given.y, given.z);
     Err(section.doc.bad(&section.at_of("axis"), &section.key("axis"), expected, found))
 }

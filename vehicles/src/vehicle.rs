@@ -92,12 +92,12 @@ pub enum MotorModel {
 
 impl Vehicle {
     /// The rotor speed at which rotors that turn alike carry the weight: sqrt(m g / (c_T sum of their axes' z)), in rad/s.
-    /// Rotors that have failed carry nothing. Infinite for a vehicle whose rotors make no thrust.
+    /// Rotors that have failed carry nothing. Infinite for a vehicle whose rotors make no thrust upwards.
     pub fn hover_speed_rad_s(&self) -> f64 {
         #[allow(non_snake_case, reason = "units stand last in names, and the newton is N")]
         let weight_N = self.mass_kg * self.gravity_m_s2;
         let upwards: f64 = self.working_rotors().map(|rotor| rotor.axis.z).sum();
-        if weight_N == 0.0 { 0.0 } else { (weight_N / (upwards * self.thrust_coefficient)).sqrt() }
+        if weight_N == 0.0 { 0.0 } else { (weight_N / (upwards.max(0.0) * self.thrust_coefficient)).sqrt() }
     }
 
     /// The rotors that turn.
