@@ -7,8 +7,10 @@ use std::fmt::Write as _;
 /// Pulse of a motor that is off, and the way to full thrust, us.
 pub const PULSE_MIN_US: f64 = 1000.0;
 pub const PULSE_RANGE_US: f64 = 1000.0;
-/// Function of an output that drives the first motor (`SERVOn_FUNCTION`); those of the next motors follow.
+/// Functions of the outputs that drive the first and the ninth motor (`SERVOn_FUNCTION`, `SRV_Channel.h`); those of the motors behind
+/// each follow.
 const FIRST_MOTOR: usize = 33;
+const NINTH_MOTOR: usize = 82;
 /// Values of this component where the user has none. A firmware that is not paced takes its attitude from the simulation (10), unless
 /// it is told to estimate it (3: EKF3). Its log would go with its folder, and is written by a thread whose locks its main thread awaits.
 const DEFAULTS: [(&str, &str); 2] = [("AHRS_EKF_TYPE", "3"), ("LOG_BACKEND_TYPE", "0")];
@@ -44,8 +46,9 @@ fn follows(frame: &FrameNumbers, motors: usize) -> Vec<(String, String)> {
         ("MOT_PWM_MAX", (PULSE_MIN_US + PULSE_RANGE_US).to_string()),
     ];
     let frame = frame.into_iter().map(|(name, value)| (name.to_owned(), value));
+    let function = |motor: usize| if motor < 8 { FIRST_MOTOR + motor } else { NINTH_MOTOR + motor - 8 };
     let outputs =
-        (0..motors).map(|motor| (format!("SERVO{}_FUNCTION", motor + 1), (FIRST_MOTOR + motor).to_string()));
+        (0..motors).map(|motor| (format!("SERVO{}_FUNCTION", motor + 1), function(motor).to_string()));
     frame.chain(outputs).collect()
 }
 
@@ -64,5 +67,12 @@ mod tests {
         assert_eq!(text(user, &PLUS, 4).unwrap(), expected);
         let other = text("AHRS_EKF_TYPE 10\nLOG_BACKEND_TYPE 1\n", &PLUS, 4).unwrap();
         assert!(other.starts_with("AHRS_EKF_TYPE 10\nLOG_BACKEND_TYPE 1\nFRAME_CLASS"), "{other}");
+    }
+
+    #[test]
+    fn a_dodecahexa_has_functions_of_two_ranges() {
+        let text = text("", &FrameNumbers { class: 12, kind: 1 }, 12).unwrap();
+        let expected = ["SERVO8_FUNCTION 40\n", "SERVO9_FUNCTION 82\n", "SERVO12_FUNCTION 85\n"];
+        assert!(expected.iter().all(|line| text.contains(line)), "{text}");
     }
 }
