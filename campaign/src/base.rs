@@ -14,6 +14,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
+/// Key of the duration of a run. Where it is varied, a measure may see some flights only.
+const DURATION: &str = "run.duration_s";
+
 /// The manifest of a campaign, not recorded, with the files that its flights read.
 #[derive(Debug)]
 pub struct Base {
@@ -46,12 +49,13 @@ impl Base {
         let forced = [format!("run.record={NO_RECORDING}"), "run.pace=free".to_owned()];
         let overrides = [&campaign.set[..], &forced].concat();
         let files = InputFiles::default();
-        let mut lines = 0;
+        // Of the manifest's own text, behind which the measures stand.
+        let (mut lines, mut length) = (0, 0);
         let (manifest, from) = match &campaign.start {
             Start::Manifest(path) => {
                 let read = || format!("cannot read the manifest {}", path.display());
                 let text = files.text(path).with_context(read)?;
-                lines = text.matches('\n').count() + 1;
+                (lines, length) = (text.matches('\n').count() + 1, text.len());
                 let places = campaign.set_places.clone();
                 let text = campaign.measures.behind(text);
                 let manifest = Manifest::parse_placed(text, path, &overrides, places, registry);
@@ -67,6 +71,11 @@ impl Base {
         };
         let graph = runtime::require_flyable(&manifest, files, from.as_ref())
             .map_err(|error| in_place(campaign, &manifest.path, lines, error.into()))?;
+        if !campaign.measures.is_empty() && !campaign.varies(DURATION) {
+            graph
+                .require_samples(&manifest, length)
+                .map_err(|error| in_place(campaign, &manifest.path, lines, error.into()))?;
+        }
         require_judgement(&manifest)?;
         let (figures, verdicts) = (columns(&manifest.content), verdict_columns(&manifest.content));
         require_different(&campaign.vary, &[&figures[..], &verdicts].concat())?;

@@ -233,6 +233,12 @@ impl Campaign {
             timeout_s_host,
         })
     }
+
+    /// True if a varied value sets `key`.
+    #[must_use]
+    pub fn varies(&self, key: &str) -> bool {
+        self.vary.iter().flat_map(|varied| &varied.keys).any(|varied| varied.trim() == key)
+    }
 }
 
 /// The manifest or the checkpoint that the campaign `file` at `path` names; an error has its span.

@@ -36,10 +36,16 @@ impl Measures {
         Self { text: file.to_string(), tables: places }
     }
 
+    /// True without a table.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.tables.is_empty()
+    }
+
     /// The text of a manifest with the measures. They are tables: they may stand behind everything else.
     #[must_use]
     pub fn behind(&self, manifest: String) -> String {
-        if self.tables.is_empty() { manifest } else { format!("{manifest}\n{}", self.text) }
+        if self.is_empty() { manifest } else { format!("{manifest}\n{}", self.text) }
     }
 
     /// `error` with places in the campaign file instead of those behind the `manifest_lines` of the manifest called `manifest`.

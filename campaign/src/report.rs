@@ -439,6 +439,22 @@ impl Report {
     }
 }
 
+impl Report {
+    /// Warnings of the figures that no flight has, if there are flights with figures.
+    fn write_missing(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.flights == self.broken {
+            return Ok(());
+        }
+        self.figures.iter().filter(|spread| spread.flights == 0).try_for_each(|spread| {
+            let figure = &spread.figure;
+            writeln!(
+                f,
+                "  warning: no flight has a value of `{figure}`; look at its span, and at run.duration_s"
+            )
+        })
+    }
+}
+
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [low, high] = self.interval.map(|limit| 100.0 * limit);
@@ -453,6 +469,7 @@ impl fmt::Display for Report {
         }
         self.failures.iter().try_for_each(|failure| writeln!(f, "  {failure}"))?;
         self.write_errors(f)?;
+        self.write_missing(f)?;
         writeln!(f, "  minimum, 5th percentile, median, 95th percentile, maximum:")?;
         self.figures.iter().try_for_each(|spread| writeln!(f, "    {spread}"))?;
         self.choices.iter().try_for_each(|choice| writeln!(f, "  {choice}"))?;

@@ -116,6 +116,15 @@ impl Graph {
         Self::noting(manifest, files, &mut notes).map_err(|fault| notes.explain(fault))
     }
 
+    /// Refuses measures that see no sample since the run ends first: those in the own text of `manifest`, this graph's, from byte
+    /// `start` on. [`Graph::build`] warns of them only, if `--set` states the duration.
+    ///
+    /// # Errors
+    /// Every such measure, with its place.
+    pub fn require_samples(&self, manifest: &Manifest, start: usize) -> Result<(), Diagnostic> {
+        evaluations::require_samples(manifest, &self.plan, start)
+    }
+
     fn noting(manifest: &Manifest, files: InputFiles, notes: &mut Notes) -> Result<Self, Diagnostic> {
         manifest.included().for_each(|(path, text)| files.keep(path, text.as_bytes().to_vec()));
         // A fault does not hide those of other keys, so that one look shows all of them.

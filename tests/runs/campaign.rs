@@ -244,6 +244,11 @@ fn what_cannot_be_flown_at_all_is_refused_before_the_first_flight() {
         (vary("process.plant.vehicle.rotors.0.position[2]"), "write `position.2`"),
         (HOVERS.replace("position.z", "position.w"), "c.toml:11:9: measure `height`"),
         (HOVERS.replace("statistic = \"last\"", "statistic = \"latest\""), "c.toml:13:13: "),
+        // Also if the campaign itself states the duration.
+        (
+            format!("{HOVERS}from_s = 0.5\n"),
+            "c.toml:14:10: measure `height`: `from_s` is 0.5 s, and the run ends at 0.4 s",
+        ),
         (format!("figures = [\"heigth\"]\n{HOVERS}"), "c.toml:2:12: no flight has a figure `heigth`"),
         (HOVERS.replace("name = \"height\"", "name = \"mass\""), "`mass` is the name of another column"),
         (HOVERS.replace("[\"run.dur", "[\"run.seed=5\", \"run.dur"), "each flight has a seed of its own"),

@@ -175,6 +175,29 @@ fn a_report_keeps_the_figures_that_the_campaign_chooses() {
     assert_eq!(before, fs::read_to_string(format!("{out}/rows.jsonl")).unwrap());
 }
 
+#[test]
+fn a_figure_that_no_flight_has_is_told() {
+    let place = Place::new();
+    let campaign = written(&place, "c.toml", HOVERS);
+    let measure = "[[measure]]\nname = \"late\"\ntopic = \"/plant/state\"\nfield = \"position.z\"\nunit = \"m\"\nstatistic = \"last\"\nfrom_s = 0.3\n";
+    // A measure of the manifest, which the campaign cuts short.
+    let hover = fs::read_to_string(place.path("hover.toml")).unwrap();
+    place.write("hover.toml", format!("{hover}\n{}", measure.replace("0.3", "5.0")));
+    let ended = place.call(&["campaign", &campaign, "--out", &place.path("cut")]).with_code(0);
+    ended.prints(&["  warning: no flight has a value of `late`", "    late: no value"]);
+    assert!(!ended.output.contains("a value of `height`"), "{ended}");
+
+    // Of drawn durations some are long enough: nothing is refused, and some flights have the figure.
+    let text = HOVERS
+        .replace("run.duration_s=0.4", "run.duration_s=0.2")
+        .replace("process.plant.vehicle.body.mass\"\nas = \"factor\"", "run.duration_s\"")
+        .replace("uniform = [0.8, 1.2]", "values = [0.2, 0.4]");
+    let campaign = written(&place, "varied.toml", &format!("{text}{measure}"));
+    let ended = place.call(&["campaign", &campaign, "--out", &place.path("varied")]).with_code(0);
+    ended.prints(&["12 of 12 flights passed", "    late: "]);
+    assert!(!ended.output.contains("no value") && !ended.output.contains("warning"), "{ended}");
+}
+
 /// Vehicles side by side: each flight of one is a flight of the other, and all results have their names.
 #[test]
 fn texts_are_varied_and_told_apart_in_every_result() {

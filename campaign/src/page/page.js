@@ -15,6 +15,11 @@ if (flights.length < report.flights) {
   element("summary").textContent += ` The plots show every ${Math.round(report.flights / flights.length)}th flight.`;
 }
 
+const missing = report.flights > report.broken ? report.figures.filter((it) => !it.flights) : [];
+if (missing.length) {
+  element("summary").textContent += ` No flight has a value of: ${missing.map((it) => it.figure).join("; ")}.`;
+}
+
 // Reasons that the table lists.
 const REASONS = 10;
 const others = report.errors.slice(REASONS).reduce((sum, it) => sum + it.flights, 0);

@@ -100,8 +100,7 @@ fn check_span(
         let message = format!("`from_s` is {from_s} s and `to_s` is {to_s} s");
         return Err(at(&["to_s", "from_s"], message, "a span ends where it begins, or later"));
     }
-    let period = plan.topics.iter().find(|known| known.name == *topic).map_or(1, |known| known.period_ticks);
-    let (first_s, period_s) = first_sample_s(*from_s, period, plan.tick_ns);
+    let (first_s, period_s) = first_sample_s(*from_s, period_ticks(plan, topic), plan.tick_ns);
     let end_s = f64::from(plan.duration_ticks) * plan.tick_s();
     if let Some(to_s) = to_s.filter(|to_s| first_s > to_s + HALF_NS_S) {
         let message = format!(
@@ -110,14 +109,8 @@ fn check_span(
         let help = "widen the span: a span without samples does not pass";
         return Err(at(&["from_s", "to_s"], message, help));
     }
-    if first_s >= end_s - HALF_NS_S {
-        if notes.is_cut(manifest, &pass.span()) {
-            return Ok(());
-        }
-        let message =
-            format!("`from_s` is {from_s} s, and the run ends at {end_s} s: no sample of {topic} is judged");
-        let help = "begin earlier, or raise run.duration_s: a span without samples does not pass";
-        return Err(at(&["from_s"], message, help));
+    if let Some(fault) = behind_end(manifest, plan, pass) {
+        return if notes.is_cut(manifest, &pass.span()) { Ok(()) } else { Err(fault) };
     }
     if let Some(to_s) = to_s.filter(|to_s| *to_s > end_s + HALF_NS_S)
         && !notes.is_cut(manifest, &pass.span())
@@ -127,6 +120,39 @@ fn check_span(
         notes.warnings.push(at(&["to_s"], message, help));
     }
     Ok(())
+}
+
+/// Fault of a span that begins where the run has ended; `None` if it begins earlier.
+fn behind_end(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) -> Option<Diagnostic> {
+    let PassCondition { name, topic, from_s, .. } = pass.get_ref();
+    let (first_s, _) = first_sample_s(*from_s, period_ticks(plan, topic), plan.tick_ns);
+    let end_s = f64::from(plan.duration_ticks) * plan.tick_s();
+    if first_s < end_s - HALF_NS_S {
+        return None;
+    }
+    let message = format!(
+        "{} `{name}`: `from_s` is {from_s} s, and the run ends at {end_s} s: no sample of {topic} is judged",
+        kind(pass.get_ref())
+    );
+    let help = "begin earlier, or raise run.duration_s: a span without samples does not pass";
+    let span = blamed(manifest, &pass.span(), "", &["from_s"]);
+    Some(manifest.problem(&span, message, help))
+}
+
+/// Refuses measures that begin where the run has ended, whatever states its duration: those that stand in the manifest's own text
+/// from byte `start` on.
+pub fn require_samples(manifest: &Manifest, plan: &Plan, start: usize) -> Result<(), Diagnostic> {
+    let is_meant = |measure: &&Spanned<PassCondition>| {
+        let at = measure.span().start;
+        at >= start && manifest.sources.is_one_text(at, start)
+    };
+    let fault = |measure| behind_end(manifest, plan, measure).map_or(Ok(()), Err);
+    Diagnostic::gather(manifest.content.measure.iter().filter(is_meant).map(fault)).map(drop)
+}
+
+/// Ticks between two samples of `topic`.
+fn period_ticks(plan: &Plan, topic: &str) -> u32 {
+    plan.topics.iter().find(|known| known.name == topic).map_or(1, |known| known.period_ticks)
 }
 
 /// Times in seconds are exact to half a nanosecond, as when the run is judged.
