@@ -1,6 +1,6 @@
-//! Ticks per second of the hover manifest by host, against a bare loop of the same components.
+//! Ticks per second of the hover manifest by host and in a campaign, against a bare loop of the same components.
 
-use crate::report::{Result, Spread, number, run_manifest};
+use crate::report::{Result, Spread, fly_manifest, number, run_manifest};
 use bus::Harness;
 use bus::messages::{Mocap, MotorCommand, PlantState, SetPoint, StateEstimate};
 use controllers::controller::Controller;
@@ -29,8 +29,82 @@ const HOSTS: [(&str, &[&str]); 5] = [
     ("one thread, not recorded", &["--in-process", "--record", "none"]),
 ];
 
+/// Turns of the campaign.
+const CAMPAIGNS: usize = 5;
+/// Flights of the campaign: its start of some tenths of a second must count little.
+const FLIGHTS: u32 = 200;
+/// Simulated seconds of a flight, as `hover.toml` states them.
+const FLIGHT_S: f64 = 12.0;
+/// Workers of the campaign, a core each.
+const WORKERS: usize = 2;
+/// Bare loops on each core beside a campaign.
+const BARE_LOOPS: usize = 10;
+
 /// Prints the tick rates, and the ratio of each to the bare loop's.
 pub fn report() -> Result<()> {
+    report_hosts()?;
+    report_campaign()
+}
+
+/// Prints the tick rate of a campaign on each core, and its ratio to that of bare loops on the same cores at once.
+fn report_campaign() -> Result<()> {
+    println!(
+        "\n{FLIGHTS} hovers of {FLIGHT_S} s, start and report of the campaign included, {CAMPAIGNS} runs by turns, kticks/s on each of \
+         {WORKERS} cores"
+    );
+    let (mut bare, mut rates, mut ratios) = (Vec::new(), Vec::new(), Vec::new());
+    for _ in 0..CAMPAIGNS {
+        let alone = bare_ticks_per_s_on_each_core()? * 1e-3;
+        let rate = campaign_ticks_per_s()? * 1e-3 / WORKERS as f64;
+        bare.push(alone);
+        rates.push(rate);
+        ratios.push(rate / alone);
+    }
+    println!("  {:34} {}", "bare loop, on both cores at once", Spread::of(bare));
+    let what = "campaign, two workers, a core each";
+    println!("  {what:34} {}   to the bare loop {}", Spread::of(rates), Spread::of(ratios));
+    Ok(())
+}
+
+/// Mean rate of bare loops that run on as many threads at once as a campaign has workers.
+fn bare_ticks_per_s_on_each_core() -> Result<f64> {
+    // Errors that may leave their thread are texts.
+    let mean = || {
+        let rates: std::result::Result<Vec<f64>, String> =
+            (0..BARE_LOOPS).map(|_| bare_ticks_per_s().map_err(|error| error.to_string())).collect();
+        rates.map(|rates| rates.iter().sum::<f64>() / BARE_LOOPS as f64)
+    };
+    std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..WORKERS).map(|_| scope.spawn(mean)).collect();
+        let mut sum = 0.0;
+        for thread in threads {
+            sum += thread.join().map_err(|_| "a bare loop panicked")??;
+        }
+        Ok(sum / WORKERS as f64)
+    })
+}
+
+/// Ticks a second of host time of a campaign of plain hovers, from the start of the program to its end.
+fn campaign_ticks_per_s() -> Result<f64> {
+    let folder = tempfile::tempdir()?;
+    let (file, out) = (folder.path().join("hovers.toml"), folder.path().join("out"));
+    let text = format!(
+        "manifest = {:?}\nflights = {FLIGHTS}\nset = [\"run.duration_s={FLIGHT_S:?}\"]\n",
+        manifest()
+    );
+    std::fs::write(&file, text)?;
+    let (out, workers) = (out.to_string_lossy(), WORKERS.to_string());
+    let start = Instant::now();
+    let report = fly_manifest("campaign", &file, &["--out", &*out, "--workers", &workers])?;
+    let host_s = start.elapsed().as_secs_f64();
+    if number(&report, "passed")? < f64::from(FLIGHTS) {
+        return Err("a hover of the campaign did not pass".into());
+    }
+    Ok(f64::from(FLIGHTS) * FLIGHT_S * 1000.0 / host_s)
+}
+
+/// Prints the tick rates of the hosts of the nodes, and the ratio of each to the bare loop's.
+fn report_hosts() -> Result<()> {
     println!("\nhover.toml, free-running, {SECONDS} s simulated, {REPETITIONS} runs by turns, kticks/s");
     let manifest = manifest();
     let folder = tempfile::tempdir()?;
