@@ -87,18 +87,40 @@ function traces(make) {
   return groups.map(([name, color, passed]) => make(flights.filter((it) => it.passed === passed), { name, marker: { color } }));
 }
 
+// Bins of a histogram: the square root of the number of flights, since many bins of few flights show no shape.
+const [BINS_MIN, BINS_MAX] = [5, 40];
+// Ticks of an axis at most: with fewer flights in the highest bar, plotly.js would put some at half flights.
+const TICKS = 10;
+
+// The least of 1, 2 or 5 times a power of ten that is not below `least`.
+function roundStep(least) {
+  const power = 10 ** Math.floor(Math.log10(least));
+  return power * [1, 2, 5, 10].find((factor) => factor * power >= least * (1 - 1e-9));
+}
+
 function drawHistogram() {
   const index = Number(element("figure").value);
   const values = flights.map((flight) => flight.figures[index]).filter((value) => value !== null);
+  const bins = Math.min(BINS_MAX, Math.max(BINS_MIN, Math.round(Math.sqrt(values.length))));
   // Both traces share their bins.
   const [low, high] = ends(values);
-  const size = (high - low) / 40 || 1;
+  const size = (high - low) / bins || 1;
+  const heights = Array(bins).fill(0);
   const bars = traces((group, trace) => {
-    const counts = Array(41).fill(0);
-    for (const flight of group) if (flight.figures[index] !== null) counts[Math.floor((flight.figures[index] - low) / size)] += 1;
+    const counts = Array(bins).fill(0);
+    for (const { figures: found } of group) {
+      if (found[index] === null) continue;
+      // The greatest value ends the last bin.
+      const bin = Math.min(bins - 1, Math.floor((found[index] - low) / size));
+      counts[bin] += 1;
+      heights[bin] += 1;
+    }
     return { ...trace, type: "bar", x: counts.map((_, bin) => low + (bin + 0.5) * size), y: counts };
   });
-  const more = { barmode: "stack", bargap: 0.05, showlegend: true };
+  // With few bins, plotly.js would put the ticks in the middles of the bars, at odd numbers.
+  const xaxis = bins < 2 * TICKS && high > low ? { tick0: 0, dtick: roundStep((high - low) / TICKS) } : {};
+  const yaxis = Math.max(...heights) < TICKS ? { dtick: 1 } : {};
+  const more = { barmode: "stack", bargap: 0.05, showlegend: true, xaxis, yaxis };
   Plotly.react("histogram", bars, layout("", inUnit(figures[index], index), "flights", more), CONFIG);
 }
 
