@@ -5,7 +5,7 @@ use super::files::require_kind;
 use super::interrupts::stop_token;
 use super::kind::Kind;
 use super::output::{print_json, print_text, say};
-use super::progress;
+use super::progress::{self, FlightLines};
 use anyhow::{Context, Result, bail};
 use campaign::base::Base;
 use campaign::declaration::Campaign;
@@ -206,7 +206,9 @@ impl Opened {
             require_flyable(&self.campaign, &self.base, &self.plan)?;
         }
         let (flown, planned) = (rows.len() as u64, self.plan.flights.len() as u64);
-        let bar = progress::bar_from(BAR, flown, planned, self.flying.json || self.flying.quiet);
+        let is_quiet = self.flying.json || self.flying.quiet;
+        let bar = progress::bar_from(BAR, flown, planned, is_quiet);
+        let mut lines = (bar.is_hidden() && !is_quiet).then(|| FlightLines::new(flown));
         let Self { flying, campaign, base, plan, build, store } = self;
         let (path, text, fingerprint) = (flying.path.clone(), flying.text.clone(), base.fingerprint.clone());
         let order = Order { build: build.clone(), path, text, fingerprint, folder: store.work_folder()? };
@@ -219,6 +221,10 @@ impl Opened {
             store.add(&row).inspect_err(|_| is_written = false)?;
             rows.insert(row.flight, row);
             bar.inc(1);
+            let flown = rows.len() as u64;
+            if let Some(line) = lines.as_mut().and_then(|lines| lines.due(flown, planned, bar.elapsed())) {
+                say(&line);
+            }
             Ok(())
         });
         progress::finish(&bar);

@@ -11,6 +11,8 @@ use std::time::Duration;
 const DRAW_HZ: u8 = 10;
 /// Time between two lines about one stage.
 const LINE_PERIOD: Duration = Duration::from_secs(10);
+/// Time between two lines about flights.
+const FLIGHTS_PERIOD: Duration = Duration::from_secs(30);
 /// Template of the bar of a run.
 pub const RUN: &str = "{bar:30} {pos}/{len} ticks  {msg}";
 
@@ -28,15 +30,12 @@ pub fn bar_from(template: &str, start: u64, length: u64, is_quiet: bool) -> Prog
     let bar = bar(template, is_quiet);
     let rate = move |state: &ProgressState, out: &mut dyn Write| {
         // A bar that cannot be drawn is left out.
-        let _ = write!(out, "{:.1}/s", rate_hz(state, start));
+        let _ = write!(out, "{:.1}/s", rate_hz(state.pos().saturating_sub(start), state.elapsed()));
     };
     let left = move |state: &ProgressState, out: &mut dyn Write| {
-        let rate_hz = rate_hz(state, start);
+        let rate_hz = rate_hz(state.pos().saturating_sub(start), state.elapsed());
         let steps = state.len().unwrap_or(0).saturating_sub(state.pos());
-        let _ = match Duration::try_from_secs_f64(steps as f64 / rate_hz) {
-            Ok(left) => write!(out, "{:#}", HumanDuration(left)),
-            Err(_) => write!(out, "–"),
-        };
+        let _ = write!(out, "{}", time_of(steps, rate_hz));
     };
     let bar = bar.with_position(start);
     bar.set_style(bar.style().with_key("rate", rate).with_key("left", left));
@@ -44,10 +43,41 @@ pub fn bar_from(template: &str, start: u64, length: u64, is_quiet: bool) -> Prog
     bar
 }
 
-/// Steps a second since the bar was made, at `start`.
-fn rate_hz(state: &ProgressState, start: u64) -> f64 {
-    let elapsed_s = state.elapsed().as_secs_f64();
-    if elapsed_s > 0.0 { state.pos().saturating_sub(start) as f64 / elapsed_s } else { 0.0 }
+/// Steps a second, if `elapsed` passed in so many steps.
+fn rate_hz(steps: u64, elapsed: Duration) -> f64 {
+    let elapsed_s = elapsed.as_secs_f64();
+    if elapsed_s > 0.0 { steps as f64 / elapsed_s } else { 0.0 }
+}
+
+/// Time that so many steps take, as text; a dash if the rate does not say.
+fn time_of(steps: u64, rate_hz: f64) -> String {
+    let time = Duration::try_from_secs_f64(steps as f64 / rate_hz);
+    time.map_or_else(|_| "–".to_owned(), |time| format!("{:#}", HumanDuration(time)))
+}
+
+/// Progress of flights as plain lines, where no terminal draws a bar.
+pub struct FlightLines {
+    start: u64,
+    /// Time of the last line since the beginning.
+    told: Duration,
+}
+
+impl FlightLines {
+    /// Lines about flights of which the first `start` were flown earlier.
+    pub const fn new(start: u64) -> Self {
+        Self { start, told: Duration::ZERO }
+    }
+
+    /// The line that is due `elapsed` after the beginning, when `flown` of `planned` flights were flown; `None` if the last one is new.
+    pub fn due(&mut self, flown: u64, planned: u64, elapsed: Duration) -> Option<String> {
+        if elapsed < self.told + FLIGHTS_PERIOD {
+            return None;
+        }
+        self.told = elapsed;
+        let rate_hz = rate_hz(flown.saturating_sub(self.start), elapsed);
+        let left = time_of(planned.saturating_sub(flown), rate_hz);
+        Some(format!("{flown} of {planned} flights: {rate_hz:.1}/s, {left} left"))
+    }
 }
 
 /// Progress as lines, where no terminal draws a bar: each stage is told once, and its count now and then.
@@ -95,7 +125,7 @@ pub fn finish(bar: &ProgressBar) {
 
 #[cfg(test)]
 mod tests {
-    use super::{Lines, bar_from, rate_hz};
+    use super::{FlightLines, Lines, bar_from, rate_hz};
     use std::time::Duration;
 
     #[test]
@@ -114,8 +144,25 @@ mod tests {
         let bar = bar_from("{rate} {left}", 900, 1000, true).with_elapsed(Duration::from_secs(10));
         bar.inc(5);
         bar.update(|state| {
-            let found = rate_hz(state, 900);
+            let found = rate_hz(state.pos() - 900, state.elapsed());
             assert!((found - 0.5).abs() < 0.01, "{found}");
         });
+    }
+
+    #[test]
+    fn flights_that_no_terminal_shows_have_a_line_twice_a_minute() {
+        let mut lines = FlightLines::new(400);
+        let mut due = |flown, s| lines.due(flown, 1000, Duration::from_secs(s));
+        assert_eq!(due(401, 1), None);
+        assert_eq!(due(430, 30).as_deref(), Some("430 of 1000 flights: 1.0/s, 10m left"));
+        assert_eq!(due(445, 59), None);
+        // A pause of the cluster.
+        assert_eq!(due(520, 240).as_deref(), Some("520 of 1000 flights: 0.5/s, 16m left"));
+        assert_eq!(due(521, 269), None);
+        let mut none = FlightLines::new(0);
+        assert_eq!(
+            none.due(0, 10, Duration::from_secs(31)).as_deref(),
+            Some("0 of 10 flights: 0.0/s, – left")
+        );
     }
 }
