@@ -2,6 +2,7 @@
 
 use crate::declaration::{Campaign, Meaning, Start, Varied};
 use crate::draw::rounded;
+use crate::measures::changed;
 use crate::row::{columns, require_different, units, verdict_columns};
 use anyhow::{Context, Result, bail};
 use diagnostics::{Diagnostic, ParameterError, did_you_mean};
@@ -96,8 +97,9 @@ impl Base {
             }
             let declared = self.declared(key)?.ok_or_else(|| {
                 // Its reader may say more about a key that does not exist.
-                if let Err(refusal) = self.check(&[format!("{key}=1")]) {
-                    return refusal;
+                let set = format!("{key}=1");
+                if let Err(refusal) = self.check(std::slice::from_ref(&set)) {
+                    return without_value(refusal, &set, key);
                 }
                 let message = format!("`{key}` has no declared number, which a factor or an offset needs");
                 let error = ParameterError::conflict("key", message);
@@ -138,6 +140,16 @@ impl Base {
             None => self.manifest.overridden(sets),
         }
     }
+}
+
+/// The error of the override `set` of `key`, whose value nobody chose: without the value.
+fn without_value(error: anyhow::Error, set: &str, key: &str) -> anyhow::Error {
+    let reword = |text: &str| text.replace(set, key);
+    changed(error, |mut fault| {
+        fault.help = reword(&fault.help);
+        fault.error = fault.error.reworded(reword);
+        fault
+    })
 }
 
 /// The error with the place of a measure in the campaign file.

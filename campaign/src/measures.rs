@@ -61,11 +61,7 @@ impl Measures {
             }
             fault
         };
-        let error = diagnostics::Error::from(error);
-        let Some(fault) = error.diagnostic() else { return error.into() };
-        let mut all: Vec<Diagnostic> = fault.all().map(placed).collect();
-        let others = all.split_off(1);
-        all.remove(0).and(others).into()
+        changed(error, placed)
     }
 
     /// Place in the campaign file of what stands in line number `line` of the text, from 0.
@@ -77,6 +73,16 @@ impl Measures {
         let place = keys.iter().find(|(name, _)| name == key).map_or(table, |(_, place)| place);
         Some(place.clone())
     }
+}
+
+/// `error` with each of its faults changed.
+#[must_use]
+pub fn changed(error: anyhow::Error, change: impl Fn(Diagnostic) -> Diagnostic) -> anyhow::Error {
+    let error = diagnostics::Error::from(error);
+    let Some(fault) = error.diagnostic() else { return error.into() };
+    let mut all: Vec<Diagnostic> = fault.all().map(change).collect();
+    let others = all.split_off(1);
+    all.remove(0).and(others).into()
 }
 
 impl Places {

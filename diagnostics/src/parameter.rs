@@ -90,6 +90,16 @@ pub struct FileFault {
     pub shown: String,
 }
 
+impl FileFault {
+    fn reword(&mut self, reword: &impl Fn(&str) -> String) {
+        let Self { file, place, message, help, text, shown, .. } = self;
+        let of_place = place.as_mut().map(|place| &mut place.file);
+        for words in [file, message, help, text, shown].into_iter().chain(of_place) {
+            *words = reword(words);
+        }
+    }
+}
+
 /// The faults behind the components that read the file; with `{:#}` the faults alone, with the lines of that file.
 impl Display for FileFaults {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -192,6 +202,24 @@ impl ParameterError {
             && !found.ends_with(&format!(" {unit}"))
         {
             *found = format!("{found} {unit}");
+        }
+        self
+    }
+
+    /// The same error in other words: `reword` returns each text of a message, and each text and file of the faults in a file.
+    ///
+    /// ```
+    /// use diagnostics::ParameterError;
+    ///
+    /// let error = ParameterError::conflict("gain", "gain=1: no such key").reworded(|text| text.replace("gain=1", "gain"));
+    /// assert_eq!(error.to_string(), "gain: no such key");
+    /// ```
+    #[must_use]
+    pub fn reworded(mut self, reword: impl Fn(&str) -> String) -> Self {
+        match &mut self {
+            Self::Conflict { message, .. } => *message = reword(message),
+            Self::File { faults, .. } => faults.each.iter_mut().for_each(|fault| fault.reword(&reword)),
+            Self::Value { .. } | Self::Missing { .. } | Self::Unknown { .. } => {}
         }
         self
     }

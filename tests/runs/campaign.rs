@@ -287,3 +287,28 @@ fn what_cannot_be_flown_at_all_is_refused_before_the_first_flight() {
     let campaign = written(&place, "c.toml", &HOVERS.replace("0.4\"", "0.5\""));
     place.call(&["campaign", &campaign, "--out", &folder]).with_code(2).says(&["flown with other inputs"]);
 }
+
+#[test]
+fn an_unknown_key_of_a_file_is_told_without_a_value_and_without_detours_in_paths() {
+    let place = Place::new();
+    let gains = repository("controllers/gains/wall-stop.toml");
+    for (key, says) in [
+        (
+            "hold.frequency",
+            "process.controller.gains.hold.frequency: unknown key `hold.frequency`".to_owned(),
+        ),
+        ("holdx.frequency", format!("{gains}: unknown key `holdx`")),
+        ("holdx.frequency", "(read with process.controller.gains.holdx.frequency of ".to_owned()),
+        ("hold.distance.value.x", format!("{gains} shows the keys")),
+    ] {
+        // The manifest includes one in another folder, which names the gains file from there.
+        let text = format!(
+            "manifest = {:?}\nflights = 2\n[[vary]]\nkey = \"process.controller.gains.{key}\"\nas = \"factor\"\nuniform = [0.9, 1.1]\n",
+            repository("manifests/wall-stop.toml")
+        );
+        let campaign = place.write("c.toml", text);
+        let ended = place.call(&["campaign", &campaign, "--out", &place.path("out")]).with_code(2);
+        ended.says(&[&says]);
+        assert!(!ended.error.contains("=1") && !ended.error.contains("/../"), "{ended}");
+    }
+}

@@ -11,7 +11,7 @@ use inputs::{InputFile, InputFiles};
 use scenes::Scene;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use toml::Spanned;
 use vehicles::Vehicle;
 
@@ -268,8 +268,19 @@ fn refused(declared: &DeclaredNode<'_>, error: &ParameterError) -> Diagnostic {
     };
     let is_unknown = matches!(error, ParameterError::Unknown { .. });
     let at = place_within(declared, key, is_unknown);
-    let error = error.clone().of(format!("process `{name}`"));
+    let error = tidied(error.clone()).of(format!("process `{name}`"));
     declared.manifest.problem(&at, error, help)
+}
+
+/// The same error with the paths of its files without detours: an included manifest names files from its own folder.
+fn tidied(error: ParameterError) -> ParameterError {
+    let ParameterError::File { faults, .. } = &error else { return error };
+    let short = |file: &str| inputs::tidy(Path::new(file)).display().to_string();
+    let files: BTreeMap<String, String> =
+        faults.each.iter().map(|fault| (fault.file.clone(), short(&fault.file))).collect();
+    let reword =
+        |text: &str| files.iter().fold(text.to_owned(), |text, (long, short)| text.replace(long, short));
+    error.reworded(reword)
 }
 
 fn problem(declared: &DeclaredNode<'_>, at: &Range<usize>, message: &str, help: String) -> Diagnostic {

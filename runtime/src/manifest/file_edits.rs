@@ -279,7 +279,7 @@ impl FileEdit {
 
     /// This edit's problem with the file at `path`.
     pub fn problem(&self, sources: &Sources, message: &str, path: &Path) -> Diagnostic {
-        sources.problem(&self.span, message, format!("{} shows the keys", path.display()))
+        sources.problem(&self.span, message, format!("{} shows the keys", inputs::tidy(path).display()))
     }
 }
 
