@@ -7,6 +7,7 @@ use crate::skipped::skip;
 use crate::support::{Ended, HUMMINGBUS, Launch, Place, repository};
 use rustix::process::Signal;
 use std::fs;
+use std::io::Write as _;
 use std::os::unix::fs::PermissionsExt as _;
 use std::process::Command;
 
@@ -91,6 +92,8 @@ fn a_cluster_gives_the_rows_of_this_machine_whatever_it_loses() {
     let output = Command::new(repository("scripts/slurm-check")).arg(HUMMINGBUS).output().unwrap();
     let (text, errors) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
     if output.status.code() == Some(NO_CLUSTER) {
+        // The daemons' logs, which the test runner would hide; the last line is the reason.
+        let _ = std::io::stderr().write_all(&output.stderr);
         return skip(&format!(
             "Slurm is installed, but {}",
             errors.lines().last().unwrap_or("no cluster starts here")
