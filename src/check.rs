@@ -55,8 +55,8 @@ fn with_unknown(unknown: Option<Diagnostic>, graph: Result<Graph, Diagnostic>) -
 /// ```
 pub fn check_with_programs(path: &Path, overrides: &[String]) -> Result<Graph, Error> {
     let (manifest, unknown) = Manifest::load_readable(path, overrides, COMPONENTS)?;
-    let mut graph = with_unknown(unknown, Graph::build(&manifest))?;
-    graph.warnings.extend(runtime::check_programs(&manifest, &graph, Path::new("/proc/self/exe"))?);
+    let graph = with_unknown(unknown, Graph::build(&manifest))?;
+    runtime::check_programs(&manifest, &graph, Path::new("/proc/self/exe"))?;
     Ok(graph)
 }
 

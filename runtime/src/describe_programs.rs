@@ -1,7 +1,7 @@
 //! Ports of a manifest's programs: each program is asked for them, so that a check finds the errors of a run.
 //!
 //! Each `command` that takes part in the ticks is started once, in a temporary run directory, and ends where it would connect
-//! ([`bus::description`]).
+//! ([`bus::description`]). All of them are started at once, as in a run, so that one patience bounds the wait for those that hang.
 
 use crate::graph::Graph;
 use crate::host_world::store_files;
@@ -10,7 +10,7 @@ use crate::process_log;
 use crate::program::{HOW_TO_JOIN, Program};
 use crate::role::Role;
 use crate::run_dir::shared_memory_of;
-use crate::spawn::{Started, start};
+use crate::spawn::{self, start};
 use anyhow::Context;
 use bus::announcement::Announcement;
 use bus::description::{DESCRIBE_VARIABLE, Description};
@@ -19,13 +19,11 @@ use bus::plan::{NodePlan, Plan};
 use bus::ports::Inputs;
 use diagnostics::{Diagnostic, Error};
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, ExitStatus};
 use std::time::Duration;
 use toml::Spanned;
 
-/// Time that a program has to describe itself.
-const PATIENCE: Duration = Duration::from_secs(20);
 const POLL: Duration = Duration::from_millis(2);
 
 /// A program that takes, or may take, a node's part.
@@ -37,16 +35,30 @@ struct Asked<'g> {
     program: &'g Program,
 }
 
+/// A program that was asked. It ends here at the latest, with what it has started itself.
+struct Started<'g> {
+    asked: Asked<'g>,
+    child: Child,
+    log: PathBuf,
+}
+
+impl Drop for Started<'_> {
+    fn drop(&mut self) {
+        bus::process::kill_group(self.child.id());
+        let _ = self.child.wait();
+    }
+}
+
 /// Starts the programs that `graph`, the checked `manifest`, names as a `command`, and those of `exe`, the binary
-/// with the kinds of the manifest. Compares their declarations with the manifest and with each other. Returns
-/// warnings of the programs without a declaration.
+/// with the kinds of the manifest. Compares their declarations with the manifest and with each other.
 ///
 /// # Errors
-/// The problem of the first program that would not fly, or the reason why none can be started.
-pub fn check_programs(manifest: &Manifest, graph: &Graph, exe: &Path) -> Result<Vec<Diagnostic>, Error> {
+/// The problem of the first program that would not fly, or the reason why none can be started. A program without an answer is
+/// waited for as long as a run waits for it: its `watchdog_ms_host`, from the last answer of another one on.
+pub fn check_programs(manifest: &Manifest, graph: &Graph, exe: &Path) -> Result<(), Error> {
     let asked = asked(graph);
     if asked.is_empty() {
-        return Ok(Vec::new());
+        return Ok(());
     }
     let folder = tempfile::Builder::new().prefix("hummingbus-check-").tempdir();
     let folder = folder.context("cannot make a folder for temporary files")?;
@@ -54,31 +66,26 @@ pub fn check_programs(manifest: &Manifest, graph: &Graph, exe: &Path) -> Result<
     let plan =
         Plan { run_id: format!("{:x}-{:x}", std::process::id(), monotonic_ns()), ..graph.plan.clone() };
     plan.store(run_dir)?;
-    let (mut messages, mut warnings, mut described) =
-        (known_messages(manifest, graph), Vec::new(), Vec::new());
     // Dropped before the folder: memory of a program that has joined instead of describing itself.
     let _shared_memory = SharedMemory(&plan.run_id);
-    for program in asked {
-        store_files(&graph.files, run_dir, program.plan)?;
-        if program.generation > 0 {
-            program.plan.store_backup(run_dir, program.node, program.generation)?;
+    let started: anyhow::Result<Vec<_>> =
+        asked.into_iter().map(|asked| begin(graph, exe, run_dir, asked)).collect();
+    let (mut messages, mut described) = (known_messages(manifest, graph), Vec::new());
+    let mut last_answer_ns = monotonic_ns();
+    for program in started? {
+        let asked = program.asked;
+        let description = answer(manifest, run_dir, program, last_answer_ns)?;
+        last_answer_ns = monotonic_ns();
+        for (output, message) in asked.plan.outputs.iter().zip(&description.outputs) {
+            let side = || Side::of_port(&asked.plan.name, "sends", &output.port, message.clone(), false);
+            messages.entry(output.topic).or_insert_with(side);
         }
-        match ask(manifest, exe, run_dir, program)? {
-            Answer::Described(description) => {
-                for (output, message) in program.plan.outputs.iter().zip(&description.outputs) {
-                    let side =
-                        || Side::of_port(&program.plan.name, "sends", &output.port, message.clone(), false);
-                    messages.entry(output.topic).or_insert_with(side);
-                }
-                described.push((program, description));
-            }
-            Answer::Silent(warning) => warnings.push(*warning),
-        }
+        described.push((asked, description));
     }
     for (program, description) in &described {
         compare(manifest, graph, *program, description, &messages)?;
     }
-    Ok(warnings)
+    Ok(())
 }
 
 /// Shared memory that a program of an older version may leave: such a program joins as if there were a run.
@@ -135,59 +142,64 @@ fn known_messages(manifest: &Manifest, graph: &Graph) -> BTreeMap<usize, Side> {
     sides.collect()
 }
 
-/// Answer of a program.
-enum Answer {
-    Described(Description),
-    /// It has declared nothing, but may fly.
-    Silent(Box<Diagnostic>),
-}
-
-fn ask(manifest: &Manifest, exe: &Path, run_dir: &Path, asked: Asked<'_>) -> anyhow::Result<Answer> {
+/// Starts a program in `run_dir` and asks it for its ports.
+fn begin<'g>(graph: &Graph, exe: &Path, run_dir: &Path, asked: Asked<'g>) -> anyhow::Result<Started<'g>> {
     let Asked { node, generation, plan, program } = asked;
+    store_files(&graph.files, run_dir, plan)?;
+    if generation > 0 {
+        plan.store_backup(run_dir, node, generation)?;
+    }
     // The place where the manifest has the output of its runs is not for that of a check.
     let mut program = Program { log: None, ..program.clone() };
     program.environment.insert(DESCRIBE_VARIABLE.to_owned(), "1".to_owned());
     let role = Role::Node { node, generation };
-    let (mut child, log) = start(exe, run_dir, &plan.name, role, Started::One(&program), None)?;
-    let ended = wait(&mut child);
-    // Also what it has started itself.
-    bus::process::kill_group(child.id());
-    if let Some(description) = Description::load(run_dir, node, generation)? {
-        return Ok(Answer::Described(description));
-    }
-    let who = format!("process `{}`", plan.name);
-    let said = process_log::last_words(&log).join("\n  ");
-    match ended {
-        Some(status) => {
-            let no_part = format!("{HOW_TO_JOIN}; a program that takes no part is `lockstep = false`");
-            let (said, help) = match said.is_empty() {
-                false => (format!("\n  {said}"), "correct the manifest or the program as its output says"),
-                true => (String::new(), &*no_part),
-            };
-            let message = format!("{who} would not take part in a run: it ended with {status}{said}");
-            let at = named_parameter(&message).unwrap_or_default().to_owned();
-            Err(problem(manifest, &plan.name, &at, message, help).into())
-        }
-        None => {
-            let message = format!("{who} did not report its ports within {} s", PATIENCE.as_secs());
-            let help = "a program that joins by this version of hummingbus answers; its ports are compared when a run begins";
-            Ok(Answer::Silent(Box::new(problem(manifest, &plan.name, "", message, help))))
-        }
-    }
+    let (child, log) = start(exe, run_dir, &plan.name, role, spawn::Started::One(&program), None)?;
+    Ok(Started { asked, child, log })
 }
 
-/// The end of a process; `None` if it went on, and was killed.
-fn wait(child: &mut Child) -> Option<ExitStatus> {
-    let end_ns = monotonic_ns() + PATIENCE.as_nanos() as u64;
-    while monotonic_ns() < end_ns {
+/// The declarations of `started`, which has its patience from `since_ns` on.
+fn answer(
+    manifest: &Manifest,
+    run_dir: &Path,
+    mut started: Started<'_>,
+    since_ns: u64,
+) -> anyhow::Result<Description> {
+    let Asked { node, generation, plan, program } = started.asked;
+    let patience_ns = u64::try_from(program.watchdog.as_nanos()).unwrap_or(u64::MAX);
+    let ended = wait(&mut started.child, since_ns.saturating_add(patience_ns));
+    if let Some(description) = Description::load(run_dir, node, generation)? {
+        return Ok(description);
+    }
+    let said = process_log::last_words(&started.log).join("\n  ");
+    let fault = match ended {
+        Some(status) => format!("it ended with {status}"),
+        None => format!("it did not report its ports within {} ms", program.watchdog.as_millis()),
+    };
+    let mut help = format!("{HOW_TO_JOIN}; a program that takes no part is `lockstep = false`");
+    match ended {
+        Some(_) if !said.is_empty() => {
+            "correct the manifest or the program as its output says".clone_into(&mut help)
+        }
+        Some(_) => {}
+        None => help.push_str("; one that needs longer to start has a longer `watchdog_ms_host`"),
+    }
+    let said = if said.is_empty() { said } else { format!("\n  {said}") };
+    let message = format!("process `{}` would not take part in a run: {fault}{said}", plan.name);
+    let at = named_parameter(&message).unwrap_or_default().to_owned();
+    Err(problem(manifest, &plan.name, &at, message, &help).into())
+}
+
+/// The end of a process; `None` if it goes on at `end_ns`.
+fn wait(child: &mut Child, end_ns: u64) -> Option<ExitStatus> {
+    loop {
         if let Ok(Some(status)) = child.try_wait() {
             return Some(status);
         }
+        if monotonic_ns() >= end_ns {
+            return None;
+        }
         std::thread::sleep(POLL);
     }
-    bus::process::kill_group(child.id());
-    let _ = child.wait();
-    None
 }
 
 /// Requires that the inputs and outputs of `asked` have the layouts of the others on the same topics.

@@ -109,6 +109,31 @@ fn a_program_that_takes_no_part_is_refused_and_none_is_started_where_that_is_ask
     place.call(&["check", &failing]).with_code(2).says(&["process `pilot` would not take part in a run"]);
 }
 
+#[test]
+fn a_program_that_hangs_is_refused_as_a_run_would_end_at_its_watchdog() {
+    let hanging = "command = [\"sleep\", \"100\"]\nwatchdog_ms_host = 500\n\
+                   outputs.set_point = { type = \"hummingbus_msgs/msg/SetPoint\" }\n";
+    let place = Place::new();
+    let manifest = hover(&place, &custom(INPUTS, TILT), hanging);
+    place.call(&["check", &manifest]).with_code(2).says(&[
+        "hover.toml:",
+        "process `pilot` would not take part in a run: it did not report its ports within 500 ms",
+        "lockstep = false",
+        "watchdog_ms_host",
+    ]);
+    place.call(&["run", &manifest]).with_code(2).says(&["process `pilot` was killed by the watchdog"]);
+    // The first of two that hang ends the check, and the second ends with it.
+    let both = hover(
+        &place,
+        &custom(INPUTS, TILT).replacen("[\"", "[\"sh\", \"-c\", \"sleep 100\", \"", 1),
+        hanging,
+    );
+    place
+        .call(&["check", &both, "--set", "process.controller.watchdog_ms_host=500"])
+        .with_code(2)
+        .says(&["500 ms"]);
+}
+
 /// The place of a parameter that a program refuses.
 #[test]
 fn a_parameter_that_a_program_refuses_is_told_with_its_line() {
