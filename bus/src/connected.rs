@@ -3,7 +3,7 @@
 
 mod checkpoints;
 
-use crate::announcement::{self, Announcement};
+use crate::announcement::{self, Announcement, Reader};
 use crate::checkpoint::Samples;
 use crate::component::Transfer;
 use crate::computation::Computation;
@@ -143,7 +143,7 @@ impl ConnectedNode {
             let topic = &links.plan.topics[input.topic];
             let announcement = Announcement::load(&announcement::topic_path(&links.run_dir, input.topic))?;
             if let Declared::Typed(schema) = declared {
-                announcement.check(schema, &links.node.name, &input.port, &topic.name)?;
+                announcement.check(schema, &links.plan, input.topic, &Reader::of(&links.node, input))?;
             }
             let initial = declared.initial_value(input, &links.node.name)?;
             let generation = links.publisher(membership, input.topic).primary.generation;

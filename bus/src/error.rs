@@ -151,8 +151,7 @@ pub enum BusError {
     /// Publisher and subscriber disagree on the bytes.
     #[error(
         "layout mismatch on topic {topic}: node `{node}` reads its port `{port}` as\n{expected}\n\
-         but the publisher sends\n{found}\nBuild the program of node `{node}` anew with the message of the publisher, or the \
-         publisher with that of `{node}`"
+         and node `{sender}` sends its port `{sender_port}` as\n{found}\n{advice}"
     )]
     LayoutMismatch {
         /// The topic.
@@ -163,8 +162,14 @@ pub enum BusError {
         port: String,
         /// The layout the node was built with.
         expected: String,
-        /// The layout the publisher announced.
+        /// The node that sends the topic.
+        sender: String,
+        /// Its port.
+        sender_port: String,
+        /// The layout the sender announced.
         found: String,
+        /// The side to rebuild.
+        advice: String,
     },
     /// A backup sends other bytes than the process it would succeed.
     #[error(
@@ -182,12 +187,16 @@ pub enum BusError {
         found: String,
     },
     /// The type the manifest states for an output is not the type the node publishes.
-    #[error("node `{node}` publishes {found} on its output `{port}`, the manifest states {expected}")]
+    #[error(
+        "node `{node}` publishes {found} on its output `{port}`, topic {topic}; the manifest states {expected}"
+    )]
     TypeMismatch {
         /// The node.
         node: String,
         /// Its port.
         port: String,
+        /// The topic.
+        topic: String,
         /// The type that the manifest states.
         expected: String,
         /// The type that the node publishes.
@@ -496,6 +505,7 @@ mod tests {
             BusError::TypeMismatch {
                 node: node.clone(),
                 port: port.clone(),
+                topic: "/imu/rates".to_owned(),
                 expected: "a".to_owned(),
                 found: "b".to_owned(),
             },
@@ -522,7 +532,10 @@ mod tests {
                 node: node.clone(),
                 port: port.clone(),
                 expected: expected.clone(),
+                sender: "plant".to_owned(),
+                sender_port: "state".to_owned(),
                 found: found.clone(),
+                advice: "Rebuild it".to_owned(),
             },
             BusError::BackupLayout { node: node.clone(), topic, expected, found },
             BusError::Program { node: node.clone(), reason: "it runs already".to_owned() },

@@ -343,12 +343,13 @@ impl Node {
                 verb: "name",
                 known: known(outputs.iter().map(|output| output.port.as_str())),
             })?;
-        let expected = &self.plan.topics[outputs[index].topic].type_name;
-        if expected != schema.type_name {
+        let topic = &self.plan.topics[outputs[index].topic];
+        if topic.type_name != schema.type_name {
             return Err(BusError::TypeMismatch {
                 node: self.name().to_owned(),
                 port: port.to_owned(),
-                expected: expected.clone(),
+                topic: topic.name.clone(),
+                expected: topic.type_name.clone(),
                 found: schema.type_name.to_owned(),
             });
         }

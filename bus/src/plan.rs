@@ -111,6 +111,9 @@ pub struct NodePlan {
     /// True for the recorder: it takes every sample, of a group from rings in shared memory.
     #[serde(default)]
     pub is_recorder: bool,
+    /// True if its program is part of this project; false for a `command`, which its user builds.
+    #[serde(default)]
+    pub is_built_in: bool,
 }
 
 impl NodePlan {
@@ -367,6 +370,7 @@ impl NodePlan {
             restarts,
             computing_time,
             is_recorder: false,
+            is_built_in: false,
         }
     }
 }

@@ -1,6 +1,6 @@
 //! A run in the memory of one thread: no processes, no shared memory, no clock.
 
-use crate::announcement::Announcement;
+use crate::announcement::{Announcement, Reader};
 use crate::checkpoint::{NodePart, Parts};
 use crate::depths::depths;
 use crate::error::BusError;
@@ -247,7 +247,8 @@ impl Simulation {
     pub fn topic<T: Message>(&self, name: &str) -> Result<Topic<T>, BusError> {
         let index = self.topic_index(name)?;
         if let Some(announcement) = &self.announcements[index] {
-            announcement.check(T::SCHEMA, "the simulation's host", name, name)?;
+            let host = Reader { node: "the simulation's host", port: name, is_built_in: false };
+            announcement.check(T::SCHEMA, &self.plan, index, &host)?;
         }
         Ok(Topic { index, message: PhantomData })
     }
@@ -378,7 +379,7 @@ impl Declaration {
             let topic = &plan.topics[input.topic];
             let announcement = announced(input.topic);
             if let Declared::Typed(schema) = declared {
-                announcement.check(schema, &node.name, &input.port, &topic.name)?;
+                announcement.check(schema, plan, input.topic, &Reader::of(node, input))?;
             }
             let initial = declared.initial_value(input, &node.name)?;
             let feed = Feed::Local { generation: 0 };

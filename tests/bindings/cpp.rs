@@ -141,8 +141,17 @@ fn what_goes_wrong_in_a_program_is_said_with_node_and_reason() {
             "port",
             "declares the output `nothing`, which the manifest does not name; it has `battery`, `set_point`",
         ),
-        ("type", "publishes hummingbus_msgs/msg/MotorCommand on its output `set_point`, the manifest states"),
-        ("layout", "layout mismatch on topic /pilot/set_point"),
+        (
+            "type",
+            "publishes hummingbus_msgs/msg/MotorCommand on its output `set_point`, topic /pilot/set_point; the manifest states",
+        ),
+        (
+            "layout",
+            "layout mismatch on topic /pilot/set_point: node `controller` reads its port `set_point` as",
+        ),
+        ("layout", "and node `pilot` sends its port `set_point` as"),
+        // The controller is built in: its user cannot rebuild it alone.
+        ("layout", "Rebuild the program of node `pilot` with this version of hummingbus"),
         ("padding", "has its field `voltage` at byte 8, and the fields before it end at 4"),
         ("handle", "the step asks for input number 7; the program has declared 0"),
         ("twice", "declares its state twice"),

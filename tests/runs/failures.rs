@@ -142,6 +142,10 @@ fn two_layouts_under_one_name_are_refused_and_both_printed() {
     let path = place.write("layouts.toml", manifest(100, &[changed, reader]));
     let ended = place.call(&["run", &path]).with_code(2);
     ended.says(&["process `reader` ended", "layout mismatch on topic /changed/note", "port `input`"]);
+    ended.says(&[
+        "and node `changed` sends its port `",
+        "Rebuild the program of node `changed` or that of `reader`",
+    ]);
     ended.says(&["test_msgs/msg/Note (40 bytes)", "uint64       seen_tick", "lead_ticks"]);
     ended.says(&["test_msgs/msg/Note (32 bytes)", "float64[3]   place", "m        world"]);
 }

@@ -40,6 +40,7 @@ fn node(name: &str, period_ticks: u32, inputs: &[(usize, u32)], output: usize) -
         restarts: false,
         computing_time: None,
         is_recorder: false,
+        is_built_in: false,
     }
 }
 

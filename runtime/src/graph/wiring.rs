@@ -54,6 +54,7 @@ pub fn wire_apart(
             restarts: declared.program.on_exit == OnExit::Restart,
             computing_time: computing_time::of(declared)?,
             is_recorder: declared.program.is_recorder(),
+            is_built_in: declared.program.kind().is_some(),
         })
     }))?;
     if faulty.is_empty() {

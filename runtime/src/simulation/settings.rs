@@ -74,6 +74,7 @@ fn node(name: &str, period_ticks: u32, inputs: Vec<InputPlan>, outputs: &[usize]
         restarts: true,
         computing_time: None,
         is_recorder: false,
+        is_built_in: false,
     }
 }
 
