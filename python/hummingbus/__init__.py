@@ -17,7 +17,7 @@ A run and its recording:
 
 from ._native import Error, __version__
 from ._campaigns import Campaign, campaign, identify
-from ._messages import Field, Message, dtype, message, messages, set_values, vector
+from ._messages import Field, Message, Schema, SchemaField, dtype, message, messages, schema, set_values, vector
 from ._nodes import Component, Optional, run_node
 from ._recordings import Recording
 from ._runs import Outcome, Run, fly, start
@@ -33,6 +33,8 @@ __all__ = [
     "Outcome",
     "Recording",
     "Run",
+    "Schema",
+    "SchemaField",
     "Simulation",
     "__version__",
     "campaign",
@@ -42,6 +44,7 @@ __all__ = [
     "message",
     "messages",
     "run_node",
+    "schema",
     "set_values",
     "start",
     "vector",

@@ -52,6 +52,30 @@ class Field:
     length: int = 0
 
 
+@dataclass(frozen=True)
+class SchemaField:
+    """A field of a schema. `type` is a number such as `float64`, or the name of a message; `[4]` behind it is an array, `[<=16]` a
+    sequence. `offset` is in bytes."""
+
+    name: str
+    type: str
+    unit: str
+    frame: str
+    doc: str
+    offset: int
+
+
+@dataclass(frozen=True)
+class Schema:
+    """A built-in message: its name, its size in bytes, the hash of its layout as `hummingbus schema` prints it, its fields."""
+
+    type_name: str
+    doc: str
+    size: int
+    layout_hash: str
+    fields: tuple[SchemaField, ...]
+
+
 def messages() -> list[str]:
     """Names of the built-in messages, and of states of components that are messages.
 
@@ -90,6 +114,25 @@ def message(name: str, fields: Iterable[Field] = (), doc: str = "") -> Message:
         offset += size
     description = {"type_name": name, "doc": doc, "size": offset, "fields": described}
     return Message(name, _fields(description), json.dumps(description))
+
+
+def schema(name: str) -> Schema:
+    """Fields, units, frames and layout hash of the built-in message `name`, with or without its package.
+
+    >>> altitude = schema("SetPoint").fields[1]
+    >>> altitude.name, altitude.type, altitude.unit, altitude.frame, altitude.offset
+    ('altitude', 'float64', 'm', 'world', 8)
+    """
+    described = json.loads(_native.message(name))
+    fields = (
+        SchemaField(
+            field["name"], _type(field["kind"]), field["unit"], field["frame"], field["doc"], field["offset"]
+        )
+        for field in described["fields"]
+    )
+    return Schema(
+        described["type_name"], described["doc"], described["size"], described["layout_hash"], tuple(fields)
+    )
 
 
 def dtype(name: str | Message) -> np.dtype:
@@ -170,6 +213,17 @@ def _fields(description: dict) -> np.dtype:
             "itemsize": description["size"],
         }
     )
+
+
+def _type(kind: Any) -> str:
+    """The name of a type."""
+    if isinstance(kind, str):
+        return kind
+    if "array" in kind:
+        return f"{_type(kind['array'])}[{kind['length']}]"
+    if "sequence" in kind:
+        return f"{_type(kind['sequence'])}[<={kind['most']}]"
+    return kind["type_name"]
 
 
 def _format(kind: Any) -> Any:

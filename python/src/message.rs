@@ -30,7 +30,11 @@ pub fn messages() -> Vec<&'static str> {
 /// The message `name`, with or without its package, as JSON.
 #[pyfunction]
 pub fn message(name: &str) -> PyResult<String> {
-    known(name).map(|schema| described(schema).to_string()).map_err(raised)
+    let schema = known(name).map_err(raised)?;
+    let mut description = described(schema);
+    // Many readers of JSON round integers beyond 53 bits, so that the hash is a text.
+    description["layout_hash"] = json!(format!("{:016x}", schema.layout_hash()));
+    Ok(description.to_string())
 }
 
 /// The schema of the built-in message `name`, with or without its package, which a port carries or which is part of one.

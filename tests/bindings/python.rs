@@ -335,7 +335,7 @@ fn the_examples_of_the_page_and_of_the_package_run() {
     let page = fs::read_to_string(repository("docs/python.md")).unwrap();
     let blocks: Vec<&str> =
         page.split("\n```python\n").skip(1).map(|rest| rest.split("\n```").next().unwrap()).collect();
-    assert_eq!(blocks.len(), 5, "docs/python.md");
+    assert_eq!(blocks.len(), 6, "docs/python.md");
     python.eval(&blocks.join("\n"));
     python.eval("import doctest, hummingbus._messages as m\nassert doctest.testmod(m).failed == 0");
     python.eval(
@@ -353,6 +353,28 @@ fn the_examples_of_the_page_and_of_the_package_run() {
     let place = Place::new();
     let ended = fly(python, &place, &hover(&place, node, "parameters = { more_m = 0.25 }\n"));
     ended.flown();
+}
+
+#[test]
+fn the_schemas_of_all_messages_are_those_that_the_program_prints() {
+    let Some(python) = python() else { return };
+    let place = Place::new();
+    let printed = place.call(&["schema", "--json"]).with_code(0).json();
+    let printed = place.write("schemas.json", printed.to_string());
+    python.eval(&format!(
+        "import json, hummingbus as hb\nprinted = json.load(open({printed:?}))\nassert len(printed) > 20\n\
+         known = set(hb.messages())\n\
+         for one in printed:\n\
+         \x20   if one['type_name'] not in known: continue\n\
+         \x20   found = hb.schema(one['type_name'])\n\
+         \x20   assert (found.type_name, found.size, found.layout_hash) == (one['type_name'], one['size'], one['layout_hash']), found\n\
+         motors = {{field.name: field for field in hb.schema('MotorCommand').fields}}\n\
+         assert motors['command'].type.startswith('float64[<='), motors\n\
+         assert {{field.name: field for field in hb.schema('PlantState').fields}}['position'].type == 'hummingbus_msgs/msg/Vector3'\n\
+         try: hb.schema('Nothing')\n\
+         except hb.Error as error: assert 'hummingbus.messages()' in str(error), error\n\
+         else: raise AssertionError"
+    ));
 }
 
 #[test]
