@@ -299,7 +299,7 @@ fn the_notebook_runs_from_a_launch_to_plots() {
 }
 
 #[test]
-fn a_campaign_and_an_identification_return_their_reports_or_raise_their_words() {
+fn a_campaign_returns_its_report_and_wrong_files_raise_the_words_of_the_program() {
     let Some(python) = python() else { return };
     let place = Place::new();
     let (hover, out) = (repository("manifests/hover.toml"), place.path("out"));
@@ -318,6 +318,36 @@ fn a_campaign_and_an_identification_return_their_reports_or_raise_their_words() 
          \x20   except hb.Error as error: assert 'nowhere.toml' in str(error), error\n\
          \x20   else: raise AssertionError"
     ));
+}
+
+/// A flight of the Hummingbird, held against one that is declared a tenth heavier.
+const IDENTIFIED: &str = r#"
+import json, os, hummingbus as hb
+os.chdir(FOLDER)
+hb.fly(ROOT + "manifests/identify/excite.toml", record="flown.mcap", set={"run.duration_s": 18.0})
+error = 'error = { value = 0.1, unit = "1", source = "a test", uncertainty = "exact" }'
+with open("heavy.toml", "w") as file:
+    file.write(f'base = "{ROOT}vehicles/hummingbird.toml"\nname = "heavy"\n[[effects]]\nname = "mass-error"\n{error}\n')
+topics = {"command": "/controller/command", "position": "/mocap/mocap", "attitude": "/mocap/mocap", "angular_velocity": "/imu/imu"}
+with open("flights.toml", "w") as file:
+    file.write('vehicle = "heavy.toml"\n[channels]\n')
+    file.writelines(f'{channel} = {{ topic = "{topic}" }}\n' for channel, topic in topics.items())
+    for name, role, times in (("early", "fit", "from_s = 1.0\nto_s = 10.0"), ("late", "test", "from_s = 10.0")):
+        file.write(f'[[flight]]\nname = "{name}"\nfile = "flown.mcap"\nrole = "{role}"\n{times}\n')
+report = hb.identify("flights.toml", "found", on_bus=False)
+assert report["verdict"] == ["mass-error"], report["verdict"]
+missing = {"vehicle", "flights", "effects", "held_out", "noise_floor", "not_identifiable", "next_flight"} - set(report)
+assert not missing, missing
+late = report["held_out"]["late"]["1"]["position"]
+assert late["after"] < 0.2 * late["before"] and late["unit"] == "m", late
+assert os.path.getsize("found/report.html") > 100_000 and "mass-error" in open("found/vehicle.toml").read()
+"#;
+
+#[test]
+fn an_identification_returns_the_report_of_a_flight_that_python_has_flown() {
+    let Some(python) = python() else { return };
+    let place = Place::new();
+    python.eval(&format!("FOLDER, ROOT = {:?}, {:?}\n{IDENTIFIED}", place.path(""), repository("")));
 }
 
 #[test]
