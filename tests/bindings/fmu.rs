@@ -59,7 +59,7 @@ fn fmus() -> Option<&'static Fmus> {
 }
 
 /// Name of the shared library of Python 3 that the dynamic linker knows.
-fn python_library() -> Option<String> {
+pub(crate) fn python_library() -> Option<String> {
     let known = Command::new("/sbin/ldconfig").arg("-p").output().ok()?;
     let known = String::from_utf8_lossy(&known.stdout).into_owned();
     let mut names = known.lines().filter_map(|line| line.split_whitespace().next());

@@ -7,6 +7,7 @@
 //! - [`mod@fmu`]: controllers in FMUs
 //! - [`mod@fmu_export`]: simulations exported as FMUs
 //! - [`python`]: nodes, runs and recordings in Python
+//! - [`pages`]: the commands of the pages
 //! - [`skipped`]: tests that cannot run here
 //! - [`headers`]: the headers are those of the messages
 
@@ -16,6 +17,7 @@ mod cpp;
 mod fmu;
 mod fmu_export;
 mod headers;
+mod pages;
 mod python;
 #[path = "../runs/skipped.rs"]
 #[allow(dead_code, reason = "it serves other tests, too")]

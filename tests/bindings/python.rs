@@ -7,13 +7,13 @@ use std::process::{Command, Output};
 use std::sync::OnceLock;
 
 /// A Python with numpy, pandas and polars, and the folder of the package that was built with the tests.
-struct Python {
+pub(crate) struct Python {
     interpreter: PathBuf,
     packages: PathBuf,
 }
 
 /// The Python of the readers, or a skipped test.
-fn python() -> Option<&'static Python> {
+pub(crate) fn python() -> Option<&'static Python> {
     static PYTHON: OnceLock<Option<Python>> = OnceLock::new();
     let python = PYTHON.get_or_init(|| {
         let readers = std::env::var_os("HUMMINGBUS_READERS")?;
@@ -40,7 +40,7 @@ fn python() -> Option<&'static Python> {
 
 impl Python {
     /// Variables by which programs find the package, and runs this Python.
-    fn variables(&self) -> Vec<(&'static str, String)> {
+    pub(crate) fn variables(&self) -> Vec<(&'static str, String)> {
         let folder = self.interpreter.parent().unwrap();
         let path = format!("{}:{}", folder.display(), std::env::var("PATH").unwrap_or_default());
         vec![
