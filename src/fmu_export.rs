@@ -1,16 +1,17 @@
-//! A manifest as an FMU: everything but one process, in whose place the importer of the FMU stands.
+//! A manifest as an FMU: all of it, or some of its processes, but one in whose place the importer of the FMU stands.
 
 use crate::agent::{Actions, acting, registry};
 use anyhow::{Context, anyhow, bail};
 use bus::component::Role;
 use bus::plan::{NodePlan, Plan};
 use bus::{Registration, initial};
-use diagnostics::Error;
+use diagnostics::{Diagnostic, Error};
 use fmu::Version;
 use fmu::export::{Contents, Model, ModelVariable, Source};
 use inputs::sha256;
 use runtime::graph::Graph;
 use runtime::manifest::Manifest;
+use std::collections::BTreeSet;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
@@ -24,6 +25,8 @@ const PORTS: [&str; 3] = ["command", "set_point", "reference"];
 pub struct Wishes<'w> {
     /// The process in whose place the importer stands.
     pub without: &'w str,
+    /// Processes, vehicles and groups of the manifest that go into the FMU; all where empty.
+    pub only: &'w [String],
     /// Topics that become outputs; where empty those that the process reads, and the states of plants.
     pub outputs: &'w [String],
     /// Version of the standard.
@@ -39,24 +42,76 @@ pub struct Exported {
     pub bytes: Vec<u8>,
     /// Contents.
     pub model: Model,
+    /// Inputs that nothing is wired to, since their senders are left out: `PROCESS.INPUT`.
+    pub cut: Vec<String>,
 }
 
 /// The FMU of the manifest or vehicle file at `path`, with the library `library` of `bindings/fmu-export`.
 ///
 /// # Errors
 /// The manifest has a problem, the process is not in it, a node needs a process of its own, or a topic is not there.
-/// It also fails if the process sends messages that no importer can send.
+/// It also fails if the process sends messages that no importer can send, or a node lacks an input that `only` leaves out.
 pub fn export(path: &Path, wishes: &Wishes<'_>, library: &[u8]) -> Result<Exported, Error> {
-    let load = |overrides: &[String]| load(path, overrides);
-    let declared = Graph::build(&load(wishes.overrides)?)?;
-    let replaced = node(&declared.plan, wishes.without)?;
-    let outputs = outputs(&declared.plan, replaced, wishes.outputs)?;
-    let agent = agent(&declared.plan, replaced)?;
-    let manifest = load(&[wishes.overrides, &[agent]].concat())?;
-    let graph = Graph::build(&manifest)?;
+    let whole = Graph::build(&load(path, wishes.overrides)?)?;
+    let replaced = node(&whole.plan, wishes.without)?;
+    let kept = kept(&whole.plan, wishes)?;
+    let sent = sent(&whole.plan, &kept);
+    let outputs = outputs(&whole.plan, replaced, wishes.outputs, &sent)?;
+    let agent = agent(&whole, replaced, &kept)?;
+    let mut manifest = load(path, &[wishes.overrides, &[agent]].concat())?;
+    let cut = match wishes.only {
+        [] => Vec::new(),
+        _ => manifest.retain(|name| kept.contains(name), |topic| sent.contains(topic)),
+    };
+    let graph = Graph::build(&manifest).map_err(|fault| explained(fault, &cut))?;
     let simulation = runtime::simulate(&manifest)?;
     let variables = variables(&graph.plan, simulation, wishes.without, &outputs)?;
-    Ok(write(&graph, path, wishes, variables, library)?)
+    Ok(Exported { cut, ..write(&graph, path, wishes, variables, library)? })
+}
+
+/// Names of the nodes that go into the FMU, with the one in whose place the importer stands.
+fn kept<'p>(plan: &'p Plan, wishes: &Wishes<'_>) -> anyhow::Result<BTreeSet<&'p str>> {
+    let names = plan.nodes.iter().map(|node| node.name.as_str());
+    if wishes.only.is_empty() {
+        return Ok(names.collect());
+    }
+    let mut kept = BTreeSet::new();
+    for asked in wishes.only {
+        let group = plan.groups.iter().find(|group| group.name == *asked);
+        let of_vehicle = format!("{asked}/");
+        let meant = names.clone().enumerate().filter(|(node, name)| {
+            name == asked || name.starts_with(&of_vehicle) || group.is_some_and(|group| group.has(*node))
+        });
+        let meant: Vec<&str> = meant.map(|(_, name)| name).collect();
+        if meant.is_empty() {
+            let names = names.collect::<Vec<_>>().join(", ");
+            bail!("--only: there is no process, vehicle or group `{asked}`; the processes are {names}");
+        }
+        kept.extend(meant);
+    }
+    if !kept.contains(wishes.without) {
+        bail!(
+            "--only leaves out `{}`, in whose place the importer stands: name it there, or another process with --without",
+            wishes.without
+        );
+    }
+    Ok(kept)
+}
+
+/// The topics that the nodes `kept` send.
+fn sent<'p>(plan: &'p Plan, kept: &BTreeSet<&str>) -> BTreeSet<&'p str> {
+    let senders = plan.nodes.iter().filter(|node| kept.contains(node.name.as_str()));
+    let outputs = senders.flat_map(|node| &node.outputs);
+    outputs.map(|output| plan.topics[output.topic].name.as_str()).collect()
+}
+
+/// A fault of a part of the manifest, in which the inputs `cut` have lost their senders.
+fn explained(fault: Diagnostic, cut: &[String]) -> Diagnostic {
+    if cut.is_empty() {
+        return fault;
+    }
+    fault
+        .help(format!("--only leaves out the senders of {}: name those that are needed, too", cut.join(", ")))
 }
 
 /// The manifest at `path`, or that of the vehicle file there.
@@ -87,12 +142,17 @@ fn node<'p>(plan: &'p Plan, name: &str) -> anyhow::Result<&'p NodePlan> {
 }
 
 /// The topics that become outputs: the requested ones, else those that the process reads with the states of plants,
-/// else all.
-fn outputs(plan: &Plan, replaced: &NodePlan, asked: &[String]) -> anyhow::Result<Vec<String>> {
-    let name = |topic: usize| plan.topics[topic].name.clone();
+/// else all; of those that are `sent`.
+fn outputs(
+    plan: &Plan,
+    replaced: &NodePlan,
+    asked: &[String],
+    sent: &BTreeSet<&str>,
+) -> anyhow::Result<Vec<String>> {
+    let all = plan.topics.iter().enumerate().filter(|(_, topic)| sent.contains(topic.name.as_str()));
     for asked in asked {
-        if !plan.topics.iter().any(|topic| topic.name == *asked) {
-            let names: Vec<&str> = plan.topics.iter().map(|topic| topic.name.as_str()).collect();
+        if !sent.contains(asked.as_str()) {
+            let names: Vec<&str> = all.map(|(_, topic)| topic.name.as_str()).collect();
             bail!("there is no topic {asked}; there are {}", names.join(", "));
         }
     }
@@ -101,19 +161,20 @@ fn outputs(plan: &Plan, replaced: &NodePlan, asked: &[String]) -> anyhow::Result
     }
     let is_own = |topic: usize| replaced.outputs.iter().any(|output| output.topic == topic);
     if replaced.inputs.is_empty() {
-        return Ok((0..plan.topics.len()).filter(|topic| !is_own(*topic)).map(name).collect());
+        return Ok(all.filter(|(topic, _)| !is_own(*topic)).map(|(_, topic)| topic.name.clone()).collect());
     }
-    let read = replaced.inputs.iter().map(|input| name(input.topic));
-    let states = plan.topics.iter().filter(|topic| topic.type_name.ends_with("/PlantState"));
-    let mut all: Vec<String> = read.chain(states.map(|topic| topic.name.clone())).collect();
-    let mut seen = std::collections::BTreeSet::new();
-    all.retain(|topic| seen.insert(topic.clone()));
-    Ok(all)
+    let read = replaced.inputs.iter().map(|input| &plan.topics[input.topic].name);
+    let read = read.filter(|name| sent.contains(name.as_str()));
+    let states = all.filter(|(_, topic)| topic.type_name.ends_with("/PlantState"));
+    let mut outputs: Vec<String> = read.chain(states.map(|(_, topic)| &topic.name)).cloned().collect();
+    let mut seen = BTreeSet::new();
+    outputs.retain(|topic| seen.insert(topic.clone()));
+    Ok(outputs)
 }
 
 /// The setting that puts an agent into the place of `replaced`, with the same topics.
-fn agent(plan: &Plan, replaced: &NodePlan) -> anyhow::Result<String> {
-    let name = &replaced.name;
+fn agent(graph: &Graph, replaced: &NodePlan, kept: &BTreeSet<&str>) -> anyhow::Result<String> {
+    let (plan, name) = (&graph.plan, &replaced.name);
     if replaced.computing_time.is_some() {
         bail!(
             "`{name}` has a `computing_time`, which an importer has not: leave the key out, and let the importer wait as long"
@@ -123,6 +184,9 @@ fn agent(plan: &Plan, replaced: &NodePlan) -> anyhow::Result<String> {
     for output in &replaced.outputs {
         let (port, topic) = (&output.port, &plan.topics[output.topic]);
         if !PORTS.contains(&port.as_str()) {
+            if !is_read(graph, kept, output.topic) {
+                continue;
+            }
             bail!(
                 "`{name}` sends `{port}` ({}), which an importer cannot; it can send {}: leave another process out",
                 topic.type_name,
@@ -133,10 +197,20 @@ fn agent(plan: &Plan, replaced: &NodePlan) -> anyhow::Result<String> {
             .push(format!("{port} = {{ topic = {:?}, every_ticks = {} }}", topic.name, topic.period_ticks));
     }
     if outputs.is_empty() {
-        bail!("`{name}` sends nothing: leave out a process that others listen to");
+        bail!("`{name}` sends nothing that another process reads: leave out one that others listen to");
     }
     let (period, outputs) = (replaced.period_ticks, outputs.join(", "));
     Ok(format!("process.{name}={{ kind = \"agent\", period_ticks = {period}, outputs = {{ {outputs} }} }}"))
+}
+
+/// True if one of the nodes `kept` reads `topic` that is no recorder and no judge.
+fn is_read(graph: &Graph, kept: &BTreeSet<&str>, topic: usize) -> bool {
+    let mut nodes = graph.plan.nodes.iter().zip(graph.components());
+    nodes.any(|(node, component)| {
+        kept.contains(node.name.as_str())
+            && component.is_none_or(|component| component.role == Role::Compute)
+            && node.inputs.iter().any(|input| input.topic == topic)
+    })
 }
 
 /// Variables of the simulation: inputs from the outputs of the agent, outputs from the topics, with their values
@@ -230,7 +304,7 @@ fn write(
     let mut bytes = Cursor::new(Vec::new());
     let version = wishes.version;
     fmu::export::write(Contents { model: &model, version, run_dir: folder.path(), library }, &mut bytes)?;
-    Ok(Exported { bytes: bytes.into_inner(), model })
+    Ok(Exported { bytes: bytes.into_inner(), model, cut: Vec::new() })
 }
 
 /// The plan without references to this machine. Paths begin at `/fmu` instead of the folder that all files lie in, no

@@ -195,6 +195,32 @@ impl Manifest {
         Ok((Self { path, recorded_text, content, sources, file_edits }, unknown))
     }
 
+    /// Keeps the processes that `is_kept` accepts, for a simulation of a part of the manifest. Groups, conditions and checkpoints go,
+    /// and so do the inputs whose topic `is_sent` does not accept. Returns their names.
+    pub fn retain(&mut self, is_kept: impl Fn(&str) -> bool, is_sent: impl Fn(&str) -> bool) -> Vec<String> {
+        let content = &mut self.content;
+        content.process.retain(|name, _| is_kept(name.get_ref()));
+        content.swap.retain(|swap| is_kept(swap.get_ref().process.get_ref()));
+        content.shadow.retain(|shadow| is_kept(shadow.get_ref().process.get_ref()));
+        content.group.clear();
+        content.checkpoint.clear();
+        (content.run.compose, content.run.checkpoint_every_s) = (None, None);
+        content.pass.clear();
+        content.measure.clear();
+        content.compare.clear();
+        let mut cut = Vec::new();
+        for (name, process) in &mut content.process {
+            process.inputs.retain(|port, input| {
+                let is_sent = is_sent(&input.topic);
+                if !is_sent {
+                    cut.push(format!("{}.{}", name.get_ref(), port.get_ref()));
+                }
+                is_sent
+            });
+        }
+        cut
+    }
+
     /// The manifest's name: its file name without `.toml`.
     pub fn name(&self) -> String {
         self.path.file_stem().unwrap_or_default().to_string_lossy().into_owned()

@@ -15,6 +15,7 @@ use std::path::{Path, PathBuf};
 pub const HELP: &str = "Examples:
   hummingbus export-fmu vehicles/hummingbird.toml                     the plant with an IMU and motion capture
   hummingbus export-fmu manifests/hover.toml --without controller     everything but the controller
+  hummingbus export-fmu manifests/ten-vehicles.toml --only v0 --without v0/controller     one vehicle of ten
   hummingbus export-fmu hover.toml --output /imu/imu --fmi 3 --out plant.fmu";
 
 /// Name of the library that goes into an FMU: bindings/fmu-export.
@@ -29,6 +30,10 @@ pub struct ExportFmuArguments {
     /// The process in whose place the importer of the FMU stands: what it sends becomes the inputs of the FMU.
     #[arg(long, value_name = "PROCESS", default_value = "controller")]
     without: String,
+    /// A process, a vehicle or a group of the manifest that goes into the FMU; may be given again, or several with commas.
+    /// Left out: all of them.
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    only: Vec<String>,
     /// A topic whose fields become outputs of the FMU. Left out: what that process reads, and the states of plants.
     #[arg(long = "output", value_name = "TOPIC")]
     outputs: Vec<String>,
@@ -63,6 +68,7 @@ pub fn export_fmu(arguments: &ExportFmuArguments) -> Result<bool> {
     output_file::check(&out, &FMU)?;
     let wishes = Wishes {
         without: &arguments.without,
+        only: &arguments.only,
         outputs: &arguments.outputs,
         version,
         overrides: &arguments.set,
@@ -72,10 +78,14 @@ pub fn export_fmu(arguments: &ExportFmuArguments) -> Result<bool> {
     let (inputs, outputs): (Vec<_>, Vec<_>) =
         exported.model.variables.iter().partition(|variable| variable.is_input());
     if arguments.json {
-        print_json(&json!({ "fmu": out, "model": exported.model }))?;
+        print_json(&json!({ "fmu": out, "model": exported.model, "unwired": exported.cut }))?;
     } else {
+        let cut = match &exported.cut[..] {
+            [] => String::new(),
+            cut => format!("\nwithout a sender, and not wired: {}", cut.join(", ")),
+        };
         print_text(&format!(
-            "{}: FMI {}, {} inputs in place of `{}`, {} outputs, a step of {} s\nin Simulink: docs/simulink.md; in Python: \
+            "{}: FMI {}, {} inputs in place of `{}`, {} outputs, a step of {} s{cut}\nin Simulink: docs/simulink.md; in Python: \
              fmpy simulate {}",
             out.display(),
             arguments.fmi,

@@ -6,15 +6,23 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-/// The table of `commands` for `step.py`.
-fn command_table(place: &Place, commands: &[f64]) -> String {
-    let mut text =
-        (0..4).map(|index| format!("controller.command.command[{index}]")).collect::<Vec<_>>().join(",")
-            + "\n";
+/// The table of `commands` of `controller` for `step.py`, each for so many `ticks`.
+fn command_table(place: &Place, controller: &str, commands: &[f64], ticks: usize) -> String {
+    let names: Vec<_> = (0..4).map(|index| format!("{controller}.command.command[{index}]")).collect();
+    let mut text = names.join(",") + "\n";
     for row in commands.chunks(4) {
-        text += &(row.iter().map(|command| format!("{command:?}")).collect::<Vec<_>>().join(",") + "\n");
+        let row = row.iter().map(|command| format!("{command:?}")).collect::<Vec<_>>().join(",") + "\n";
+        text += &row.repeat(ticks);
     }
     place.write("commands.csv", text)
+}
+
+/// The values of `names` at each tick of `fmu`, a valid one, with the inputs of `table`.
+fn stepped(readers: &Path, fmu: &str, table: &str, names: &[String]) -> Vec<Vec<f64>> {
+    let mut python = Command::new(readers.join("venv/bin/python3"));
+    python.args([&repository("tests/bindings/fmu/step.py"), fmu, table, "0.001"]).args(names);
+    let printed = crate::build::succeed(python);
+    printed.lines().map(|line| line.split(',').map(|number| number.parse().unwrap()).collect()).collect()
 }
 
 #[test]
@@ -26,7 +34,7 @@ fn a_simulation_as_an_fmu_is_valid_and_its_trajectory_is_that_of_the_bus_bit_for
     let manifest = repository("manifests/hover.toml");
     let short = ["--set", "run.duration_s=3"];
     place.call(&[&["run", &manifest, "--record", &place.path("hover.mcap")], &short[..]].concat());
-    let table = command_table(&place, &commands(&place, "hover.mcap", TOPIC));
+    let table = command_table(&place, "controller", &commands(&place, "hover.mcap", TOPIC), 1);
     let fields = [
         ("/plant/state", "position.x"),
         ("/plant/state", "position.z"),
@@ -40,13 +48,7 @@ fn a_simulation_as_an_fmu_is_valid_and_its_trajectory_is_that_of_the_bus_bit_for
         place
             .call(&[&["export-fmu", &manifest, "--fmi", version, "--out", &fmu], &short[..]].concat())
             .with_code(0);
-        let mut python = Command::new(Path::new(&readers).join("venv/bin/python3"));
-        python.args([&repository("tests/bindings/fmu/step.py"), &fmu, &table, "0.001"]).args(&names);
-        let stepped = crate::build::succeed(python);
-        let rows: Vec<Vec<f64>> = stepped
-            .lines()
-            .map(|line| line.split(',').map(|number| number.parse().unwrap()).collect())
-            .collect();
+        let rows = stepped(Path::new(&readers), &fmu, &table, &names);
         for (index, (topic, field)) in fields.iter().enumerate() {
             let flown = column(&place, "hover.mcap", topic, field);
             assert_eq!(flown.len(), 3000);
@@ -69,6 +71,47 @@ fn a_simulation_as_an_fmu_is_valid_and_its_trajectory_is_that_of_the_bus_bit_for
         fs::read(again).unwrap() == fs::read(place.path("hover2.fmu")).unwrap(),
         "another export differs"
     );
+}
+
+/// One vehicle of ten, as it flies where the others are not: its own noise and its own walls.
+#[test]
+fn a_vehicle_of_a_manifest_of_ten_is_exported_and_flies_as_it_does_alone() {
+    let Some(readers) = std::env::var_os("HUMMINGBUS_READERS") else {
+        return crate::skipped::skip("HUMMINGBUS_READERS with FMPy is not set");
+    };
+    let place = Place::new();
+    let ten = repository("manifests/ten-vehicles.toml");
+    let text = fs::read_to_string(&ten).unwrap();
+    let (first, rest) = (text.find("[[vehicle]]").unwrap(), text.find("[[vehicle]]\nname = \"v1\"").unwrap());
+    let alone = format!(
+        "include = [{:?}]\n[run]\nduration_s = 1.0\nseed = 1\n[process.traffic]\nkind = \"traffic\"\n\
+         inputs.v0 = \"/v0/plant/state\"\n[process.recorder]\nkind = \"recorder\"\n{}",
+        repository("manifests/sets/room-set.toml"),
+        &text[first..rest]
+    );
+    fly(&place, &place.write("alone.toml", alone), "alone.mcap").with_code(0);
+    let commands = commands(&place, "alone.mcap", "/v0/controller/command");
+    let table = command_table(&place, "v0.controller", &commands, 4);
+    let fmu = place.path("v0.fmu");
+    let export = ["export-fmu", &ten, "--without", "v0/controller", "--out", &fmu, "--only"];
+    place.call(&[&export[..], &["v0,traffic"]].concat()).with_code(0);
+    let fields = ["position.x", "position.z", "velocity.y", "attitude.w"];
+    let rows =
+        stepped(Path::new(&readers), &fmu, &table, &fields.map(|field| format!("v0.plant.state.{field}")));
+    for (index, field) in fields.iter().enumerate() {
+        let flown = column(&place, "alone.mcap", "/v0/plant/state", field);
+        let differs =
+            flown.iter().zip(&rows).position(|(flown, row)| flown.to_bits() != row[index].to_bits());
+        assert_eq!((differs, rows.len(), flown.len()), (None, 1000, 1000), "{field}");
+    }
+    // The left-out process needs no inputs of its own.
+    let plant = ["export-fmu", &repository("manifests/hover.toml"), "--only", "plant,controller", "--json"];
+    let ended = place.call(&[&plant[..], &["--out", &place.path("plant.fmu")]].concat()).with_code(0);
+    assert_eq!(ended.json()["unwired"], serde_json::json!([]), "{ended}");
+    // Without `traffic` two inputs that may be missing have no sender.
+    let ended = place.call(&[&export[..], &["v0", "--json"]].concat()).with_code(0);
+    let unwired = &ended.json()["unwired"];
+    assert_eq!(*unwired, serde_json::json!(["v0/plant.traffic", "v0/range.traffic"]), "{ended}");
 }
 
 #[test]
@@ -105,7 +148,8 @@ fn an_export_that_cannot_be_is_refused_in_words() {
     );
     let foreign = place.write("foreign.toml", foreign);
     let computing = repository("manifests/computing-time.toml");
-    let cases: [(&[&str], &str); 11] = [
+    let ten = repository("manifests/ten-vehicles.toml");
+    let cases: [(&[&str], &str); 15] = [
         (&[&hover, "--without", "control"], "there is no process `control` to leave out; there are"),
         (
             &[&hover, "--without", "imu"],
@@ -122,6 +166,10 @@ fn an_export_that_cannot_be_is_refused_in_words() {
         (&[&hover, "--fmi", "1"], "--fmi: expected 2 or 3, found 1"),
         (&[&hover, "--out", &text], "text.fmu"),
         (&[&foreign, "--without", "controller"], "needs a process of its own"),
+        (&[&ten, "--only", "v0"], "there is no process `controller` to leave out"),
+        (&[&ten, "--only", "v11", "--without", "v0/controller"], "no process, vehicle or group `v11`"),
+        (&[&hover, "--only", "ekf,controller"], "--only leaves out the senders of ekf."),
+        (&[&hover, "--only", "plant"], "--only leaves out `controller`, in whose place the importer stands"),
         (&["nowhere.toml"], "nowhere.toml"),
     ];
     for (arguments, words) in cases {

@@ -143,7 +143,7 @@ fn the_commands_of_the_pages_for_fmus_run() {
     fs::write(&manifest, text.replace("libpython3.11.so.1.0", &library)).unwrap();
     let variables = variables(python);
     assert_eq!(run(&place, "docs/fmu.md", &variables), 3);
-    assert_eq!(run(&place, "docs/simulink.md", &variables), 4);
+    assert_eq!(run(&place, "docs/simulink.md", &variables), 5);
     let simulated = fs::read_to_string(place.path("plant.csv")).unwrap();
     assert!(simulated.lines().count() > 1000 && simulated.contains("plant.state.position.z"));
 }
