@@ -221,6 +221,22 @@ fn the_component_of_the_readme_is_the_one_that_is_flown() {
     assert!(used.into_iter().all(|name| package["dependencies"].get(name).is_some()), "{package}");
 }
 
+/// The table of languages in the README states the lengths of its examples.
+#[test]
+fn the_examples_of_the_readme_have_as_many_lines_as_it_says() {
+    let text = fs::read_to_string(repository("README.md")).unwrap();
+    let mut count = 0;
+    for row in text.lines().filter(|line| line.starts_with("| ")) {
+        let Some((before, _)) = row.split_once(" lines |") else { continue };
+        let (link, stated) = before.rsplit_once("), ").unwrap_or_else(|| panic!("{row}"));
+        let (_, path) = link.rsplit_once("](").unwrap_or_else(|| panic!("{row}"));
+        let lines = fs::read_to_string(repository(path)).unwrap().lines().count();
+        assert_eq!(stated.parse(), Ok(lines), "README.md, {path}");
+        count += 1;
+    }
+    assert_eq!(count, 4);
+}
+
 /// The keys that the refusal of `unknown_key` in the good manifest, with `from` replaced by `to`, names as known.
 #[track_caller]
 fn known_keys(from: &str, to: &str) -> Vec<String> {
