@@ -224,9 +224,9 @@ pub enum BusError {
     },
     /// The program of a node is at fault outside its steps: it uses the library wrongly, its component could not end, or a
     /// state that it states cannot be read.
-    #[error("node `{node}`: {reason}")]
+    #[error("{}{reason}", of_node(node))]
     Program {
-        /// The node.
+        /// The node; empty if it is not known.
         node: String,
         /// Its fault.
         reason: String,
@@ -339,6 +339,11 @@ pub enum BusError {
     Aborted,
 }
 
+/// Beginning of the text of an error of `node`; empty if its name is.
+fn of_node(node: &str) -> String {
+    if node.is_empty() { String::new() } else { format!("node `{node}`: ") }
+}
+
 /// Side that is at fault.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Side {
@@ -440,7 +445,7 @@ impl BusError {
             | Self::UnwrittenOutput { node, .. }
             | Self::NotFinite { node, .. }
             | Self::Count { node, .. }
-            | Self::Step { node, .. } => Some(node),
+            | Self::Step { node, .. } => Some(node.as_str()).filter(|node| !node.is_empty()),
             Self::NotInARun { .. }
             | Self::Claimed { .. }
             | Self::File { .. }
@@ -588,6 +593,15 @@ mod tests {
             },
             BusError::Aborted,
         ]
+    }
+
+    #[test]
+    fn a_program_whose_node_is_not_known_has_no_name_in_its_error() {
+        let reason = "the argument `node` is a null pointer".to_owned();
+        let error = BusError::Program { node: String::new(), reason: reason.clone() };
+        assert_eq!((error.to_string(), error.node()), (reason, None));
+        let error = diagnostics::Error::from(error);
+        assert!(error.is_component() && error.process().is_none());
     }
 
     #[test]

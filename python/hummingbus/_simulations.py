@@ -13,6 +13,9 @@ from . import _native
 from ._messages import dtype
 from ._program import toml
 
+# Ticks are 32-bit numbers.
+_TICKS_MAX = 2**32 - 1
+
 
 class Simulation:
     """A simulation of a manifest, before tick 0.
@@ -55,6 +58,8 @@ class Simulation:
 
     def step(self, ticks: int = 1) -> None:
         """Computes so many ticks."""
+        if not 0 <= ticks <= _TICKS_MAX:
+            raise _native.Error(f"step: expected 0 to {_TICKS_MAX} ticks, found {ticks}")
         self._native.step(ticks)
 
     def act(self, agent: str, **messages: np.ndarray) -> None:

@@ -424,6 +424,11 @@ fn a_simulation_that_is_stepped_has_the_samples_of_a_run() {
          \x20   found = [*hb.vector(state['position']), state['attitude']['w']]\n\
          \x20   assert found == [column[tick] for name, column in recorded.items() if name != 'time_s'], tick\n\
          assert abs(simulation.time_s - 0.3) < 1e-12\n\
+         for wrong in (-1, 2**40):\n\
+         \x20   try: simulation.step(wrong)\n\
+         \x20   except hb.Error as error: assert f'ticks, found {{wrong}}' in str(error), error\n\
+         \x20   else: raise AssertionError\n\
+         assert simulation.tick == 300\n\
          try: simulation.read('/nothing')\n\
          except hb.Error as error: assert '/plant/state' in str(error)\n\
          else: raise AssertionError"
