@@ -133,6 +133,18 @@ fn expect_failure(output: &Output, reason: &str) {
     assert!(message.starts_with("read_") && message.contains(reason), "{message}");
 }
 
+/// Requires of a page that it is white in a light browser and dark in a dark one, with its letters and its plots.
+fn require_schemes(seen: &serde_json::Value) {
+    let [light, dark] = ["light", "dark"].map(|scheme| &seen["schemes"][scheme]);
+    assert_eq!(
+        (&light["ground"], &dark["ground"]),
+        (&"rgb(255, 255, 255)".into(), &"rgb(20, 23, 27)".into())
+    );
+    for part in ["ink", "mark"] {
+        assert!(!dark[part].is_null() && light[part] != dark[part], "{part}: {light} {dark}");
+    }
+}
+
 fn one_bit_more(number: &mut serde_json::Value) {
     *number = number.as_f64().unwrap().next_up().into();
 }

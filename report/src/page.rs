@@ -19,6 +19,9 @@ pub static PLOTLY_BASIC: Bundle = Bundle(include_bytes!(concat!(env!("OUT_DIR"),
 pub(crate) static PLOTLY_3D: Bundle =
     Bundle(include_bytes!(concat!(env!("OUT_DIR"), "/plotly-gl3d.min.zlib")));
 
+/// Style sheet with the colours of every page, in light and in dark.
+pub const COLOURS: &str = include_str!("page/colours.css");
+
 /// A script that the program holds compressed.
 #[derive(Debug, Clone, Copy)]
 pub struct Bundle(&'static [u8]);
@@ -43,6 +46,7 @@ impl Bundle {
 pub fn page(body: &str, plotly: &Bundle, script: &str, data: &Value) -> Vec<u8> {
     format!(
         include_str!("page/page.html"),
+        colours = COLOURS,
         style = include_str!("page/page.css"),
         body = body,
         plotly = plotly.script(),
@@ -63,6 +67,20 @@ mod tests {
         assert!(PLOTLY_BASIC.script().starts_with("/**\n* plotly.js"), "{:.40}", PLOTLY_BASIC.script());
         #[cfg(feature = "plots")]
         assert!(PLOTLY_3D.script().starts_with("/**\n* plotly.js"), "{:.40}", PLOTLY_3D.script());
+    }
+
+    #[test]
+    fn every_page_has_the_colours_of_both_schemes() {
+        let page = String::from_utf8(page("", &PLOTLY_BASIC, "", &Value::Null)).unwrap();
+        assert!(
+            page.contains(COLOURS) && page.contains(r#"<meta name="color-scheme" content="light dark">"#)
+        );
+        // Every name in the styles and scripts is declared.
+        let used = [include_str!("page/page.css"), include_str!("page/kit.js")].concat();
+        let names = used.split("var(--").skip(1).filter_map(|rest| rest.split_once(')'));
+        for name in names.map(|(name, _)| name) {
+            assert_eq!(COLOURS.matches(&format!(" --{name}: ")).count(), 2, "{name}");
+        }
     }
 
     #[test]

@@ -69,3 +69,28 @@ export async function withPage(url, use, { before, needsWebGl = false } = {}) {
     await browser.close();
   }
 }
+
+/** Whether every plot lies on the colour of the page. */
+function isOnPage() {
+  const colour = (place) => getComputedStyle(place).backgroundColor;
+  const grounds = [...document.querySelectorAll(".js-plotly-plot")].map((plot) => colour(plot.querySelector(".main-svg")));
+  return grounds.length > 0 && grounds.every((ground) => ground === colour(document.body));
+}
+
+/**
+ * The colours of the page, of its letters and of its first mark, in a dark and then in a light browser: the open page
+ * follows the change, once its plots have it, too.
+ */
+export async function schemes(page) {
+  const seen = {};
+  for (const value of ["dark", "light"]) {
+    await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value }]);
+    await page.waitForFunction(isOnPage);
+    seen[value] = await page.evaluate(() => {
+      const { backgroundColor: ground, color: ink } = getComputedStyle(document.body);
+      const { stroke, fill } = getComputedStyle(document.querySelector(".cartesianlayer .trace path"));
+      return { ground, ink, mark: [stroke, fill] };
+    });
+  }
+  return seen;
+}

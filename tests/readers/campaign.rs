@@ -1,6 +1,6 @@
 //! pandas, polars and DuckDB read the flights of a campaign, and a browser draws its page.
 
-use crate::{ROOT, hummingbus, look, readers};
+use crate::{ROOT, hummingbus, look, readers, require_schemes};
 use serde_json::json;
 use std::fs;
 use std::path::Path;
@@ -63,6 +63,7 @@ fn a_browser_draws_the_page_with_units_and_counts_within_its_window() {
 
     let seen = look(&readers, "read_campaign.mjs", &[out.join("report.html").as_os_str()]);
     assert_eq!((&seen["wrong"], &seen["overflow"]), (&json!([]), &json!(0)), "{seen}");
+    require_schemes(&seen);
     let cell = |table: &str, row: usize, column: usize| {
         seen["tables"][table][row][column]
             .as_str()

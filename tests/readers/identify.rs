@@ -1,6 +1,6 @@
 //! A browser draws the page of an identification.
 
-use crate::{ROOT, VEHICLE, hummingbus, look, readers};
+use crate::{ROOT, VEHICLE, hummingbus, look, readers, require_schemes};
 use serde_json::{Value, json};
 use std::fs;
 use std::path::PathBuf;
@@ -13,6 +13,7 @@ fn a_browser_draws_residuals_and_errors_without_a_network() {
     let found = Identified::fly();
     let seen = look(&readers, "read_identify.mjs", &[found.page.as_os_str()]);
     assert_eq!(seen["wrong"], json!([]));
+    require_schemes(&seen);
     let (first, last) = (&seen["first"], &seen["last"]);
     assert!(first["verdict"].as_str().unwrap().contains("mass-error"), "{}", first["verdict"]);
     require_brief(first);

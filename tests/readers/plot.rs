@@ -1,6 +1,6 @@
 //! A browser draws the page of a recording: curves over time, and the paths in space with the scene.
 
-use crate::{Flight, ROOT, hummingbus, laps, look, reader_of_a_page, readers};
+use crate::{Flight, ROOT, hummingbus, laps, look, reader_of_a_page, readers, require_schemes};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
@@ -31,6 +31,8 @@ fn a_browser_draws_every_curve_of_a_flight() {
         require_axes(axes, title, label, lines);
     }
     require_zoom(&seen);
+    require_schemes(&seen);
+    assert_eq!(seen["range"], seen["zoomed"][0], "a change of the scheme zooms out");
     assert_eq!(seen["corners"], json!([]), "labels of both axes lie over each other");
 }
 
@@ -54,8 +56,14 @@ fn require_axes(axes: &Value, title: &str, label: &str, [flown, estimated, asked
         (Some(lines.len() as u64), Some(asked as u64)),
         "{title}"
     );
-    let names: Vec<&Value> = lines.iter().map(|line| &line["name"]).collect();
-    assert_eq!(axes["legend"].as_array().unwrap().iter().collect::<Vec<_>>(), names, "{title}: the legend");
+    // Lines of a kind that all have the colours of flown ones share a row.
+    let names = lines.iter().map(|line| line["name"].as_str().unwrap());
+    let is_shared = |name: &str| {
+        (estimated > 1 && name.ends_with(" estimate")) || (asked > 1 && name.ends_with(" set point"))
+    };
+    let shared = [("estimate", estimated), ("set point", asked)].into_iter().filter(|(_, count)| *count > 1);
+    let rows: Vec<&str> = names.filter(|name| !is_shared(name)).chain(shared.map(|(name, _)| name)).collect();
+    assert_eq!(axes["legend"], json!(rows), "{title}: the legend");
     // None that sends the data to a server.
     let buttons = json!(["Download plot as a PNG", "Zoom", "Pan", "Zoom in", "Zoom out", "Reset axes"]);
     assert_eq!(axes["buttons"], buttons);

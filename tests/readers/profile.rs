@@ -1,6 +1,6 @@
 //! Perfetto and a browser find in a profile's files what was written into them.
 
-use crate::{hummingbus, look, manifest_text, readers};
+use crate::{hummingbus, look, manifest_text, readers, require_schemes};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fs;
@@ -84,6 +84,7 @@ fn a_browser_draws_the_page_without_a_network() {
     let flight = Profiled::fly();
     let seen = look(&readers, "read_page.mjs", &[flight.page.as_os_str()]);
     assert_eq!(seen["wrong"], json!([]));
+    require_schemes(&seen);
     let (first, last) = (&seen["first"], &seen["last"]);
     // The slowest ticks, the course of the run, each node's histogram, and the jitter.
     let marks: Vec<_> =

@@ -1,7 +1,7 @@
 // Prints as JSON what a browser draws of a campaign's page, 1200 pixels wide. Usage: read_campaign.mjs PAGE
 
 import { pathToFileURL } from "node:url";
-import { withPage } from "./browser.mjs";
+import { schemes, withPage } from "./browser.mjs";
 
 const [file] = process.argv.slice(2);
 const WIDTH = 1200;
@@ -35,6 +35,6 @@ const seen = await withPage(pathToFileURL(file).href, async (page, wrong) => {
     await new Promise((resolve) => setTimeout(resolve, 100));
     seen = await page.evaluate(look);
   }
-  return { ...seen, wrong };
+  return { ...seen, schemes: await schemes(page), wrong };
 });
 console.log(JSON.stringify(seen));

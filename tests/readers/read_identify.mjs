@@ -1,7 +1,7 @@
 // Prints as JSON what a browser draws of an identification's page. Usage: read_identify.mjs PAGE [SCREENSHOT.png]
 
 import { pathToFileURL } from "node:url";
-import { withPage } from "./browser.mjs";
+import { schemes, withPage } from "./browser.mjs";
 
 const [file, screenshot] = process.argv.slice(2);
 const PLOTS = ["residual", "sides", "against", "agreement", "auto", "cross"];
@@ -57,6 +57,6 @@ const seen = await withPage(pathToFileURL(file).href, async (page, wrong) => {
   const last = await page.evaluate(look, [PLOTS, CHOICES]);
   await page.setViewport({ width: WIDTH, height: 1000 });
   const attribution = await page.evaluate(attributionOverflow);
-  return { first, last, attribution, wrong };
+  return { first, last, attribution, schemes: await schemes(page), wrong };
 });
 console.log(JSON.stringify(seen));

@@ -1,7 +1,7 @@
 // Prints as JSON what a browser draws of a profile's page. Usage: read_page.mjs PAGE [SCREENSHOT.png]
 
 import { pathToFileURL } from "node:url";
-import { withPage } from "./browser.mjs";
+import { schemes, withPage } from "./browser.mjs";
 
 const [file, screenshot] = process.argv.slice(2);
 
@@ -30,6 +30,6 @@ const seen = await withPage(pathToFileURL(file).href, async (page, wrong) => {
   if (screenshot) await page.screenshot({ path: screenshot, fullPage: true });
   await page.select("#tick", String(first.ticks - 1));
   const last = await page.evaluate(look);
-  return { first, last, wrong };
+  return { first, last, schemes: await schemes(page), wrong };
 });
 console.log(JSON.stringify(seen));

@@ -2,7 +2,7 @@
 // `needs-webgl` fails where the browser has no WebGL, `no-webgl` takes it away from the page.
 
 import { pathToFileURL } from "node:url";
-import { withPage } from "./browser.mjs";
+import { schemes, withPage } from "./browser.mjs";
 
 const [file, ...rest] = process.argv.slice(2);
 const withoutWebGl = rest.includes("no-webgl");
@@ -20,7 +20,8 @@ function look() {
     title: plot.layout.title.text,
     x: plot.querySelector(".xtitle").textContent,
     y: plot.querySelector(".ytitle").textContent,
-    lines: plot.data.map(line(plot)),
+    // Without those that have no points and only name others in the legend.
+    lines: plot.data.map(line(plot)).filter((_, index) => plot.data[index].meta !== "legend"),
     // plotly.js has a layer of its own for each level that lines lie on.
     drawn: [...plot.querySelectorAll("g.trace.scatter")].filter((trace) => [...trace.querySelectorAll("path")].some(extent)).length,
     dashed: [...plot.querySelectorAll("g.trace.scatter .lines path")].filter((path) => path.style.strokeDasharray).length,
@@ -108,6 +109,8 @@ const seen = await withPage(pathToFileURL(file).href, async (page, wrong) => {
   const zoomed = first.axes.length ? await zoom(page) : null;
   if (first.vehicles.length > 1) await change(page);
   const second = first.vehicles.length > 1 ? await page.evaluate(look) : null;
-  return { ...first, colours: space, zoomed, second, corners: await page.evaluate(corners), wrong };
+  const followed = first.axes.length ? await schemes(page) : null;
+  const range = first.axes.length ? await page.evaluate(() => document.querySelector("#time > .js-plotly-plot")._fullLayout.xaxis.range) : null;
+  return { ...first, colours: space, zoomed, second, schemes: followed, range, corners: await page.evaluate(corners), wrong };
 }, { before: withoutWebGl ? refuseWebGl : undefined, needsWebGl: rest.includes("needs-webgl") });
 console.log(JSON.stringify(seen));

@@ -1,7 +1,7 @@
 const { report, varied, figures, flights } = data;
 const percent = (part) => `${(100 * part).toFixed(2)} %`;
-const PASSED = "#2c7fb8";
-const FAILED = "#d95f0e";
+const PASSED = "--curve-0";
+const FAILED = "--curve-1";
 // A smaller chance has no meaning.
 const chance = (value) => (value < 1e-3 ? "< 0.001" : number(value, 2));
 
@@ -121,7 +121,7 @@ function drawHistogram() {
   const xaxis = bins < 2 * TICKS && high > low ? { tick0: 0, dtick: roundStep((high - low) / TICKS) } : {};
   const yaxis = Math.max(...heights) < TICKS ? { dtick: 1 } : {};
   const more = { barmode: "stack", bargap: 0.05, showlegend: true, xaxis, yaxis };
-  Plotly.react("histogram", bars, layout("", inUnit(figures[index], index), "flights", more), CONFIG);
+  plotAt("histogram", bars, layout("", inUnit(figures[index], index), "flights", more), CONFIG);
 }
 
 function drawScatter() {
@@ -133,7 +133,7 @@ function drawScatter() {
     x: group.map((it) => it.drawn[from]), y: group.map((it) => it.figures[to]), text: group.map((it) => `flight ${it.flight}`),
   }));
   const label = inLines(inUnit(figures[to], to)).join("<br>");
-  Plotly.react("scatter", points, layout("", varied[from], label, { showlegend: true }), CONFIG);
+  plotAt("scatter", points, layout("", varied[from], label, { showlegend: true }), CONFIG);
 }
 
 for (const [id, names, draw] of [["figure", figures, drawHistogram], ["varied", varied, drawScatter], ["against", figures, drawScatter]]) {

@@ -2,8 +2,7 @@
 
 const report = data.report;
 
-// Distinguishable also without colour vision (Okabe and Ito).
-const COLOURS = { measured: "#8a8f94", before: "#e69f00", after: "#0072b2", noise: "#1a1a1a" };
+const COLOURS = { measured: "--thing", before: "--curve-4", after: "--curve-0", noise: "--ink" };
 const NAMES = { before: "declared", after: "new" };
 const MODELS = Object.keys(NAMES);
 const CHANNELS = ["position", "velocity", "attitude", "rates"];
@@ -227,7 +226,7 @@ function chosen() {
   return { equation, component, unit: shownUnit(equation.unit), input: inputs[at], cross: component.cross[at], windowS };
 }
 
-const redraw = (id, traces, ...axes) => Plotly.react(id, traces, layout(...axes), CONFIG);
+const redraw = (id, traces, ...axes) => plotAt(id, traces, layout(...axes), CONFIG);
 
 // The curve with nothing between two points that have a gap between them.
 const broken = (values, breaks) => values.flatMap((value, at) => (breaks.includes(at) ? [null, value] : [value]));
@@ -261,7 +260,7 @@ function drawClouds({ component: { cloud: points }, unit, input }) {
 }
 
 function boundLines(bounds) {
-  const grey = "#555";
+  const grey = "--faint";
   const shapes = Object.entries(bounds).flatMap(([share, bound]) =>
     [bound, -bound].map((y) => level(y, { color: grey, width: 1, dash: share === "95" ? "dash" : "dot" })));
   // Within and beyond, since the two bounds are close to each other.

@@ -7,7 +7,9 @@ const data = JSON.parse(document.getElementById("data").textContent);
 const config = (buttons) => ({ responsive: true, displaylogo: false, plotlyServerURL: "", modeBarButtons: [buttons] });
 const CONFIG = config(["toImage", "zoom2d", "pan2d", "zoomIn2d", "zoomOut2d", "resetScale2d"]);
 const SMALL = { ...CONFIG, displayModeBar: false };
-const AXIS = { exponentformat: "none", automargin: true, gridcolor: "#e6e6e6", zerolinecolor: "#999" };
+const AXIS = { exponentformat: "none", automargin: true, gridcolor: "--line", zerolinecolor: "--thing" };
+// Plots lie on the page, in its ink.
+const GROUND = { paper_bgcolor: "--ground", plot_bgcolor: "--ground", font: { color: "--ink" } };
 
 const element = (id) => document.getElementById(id);
 const spaced = (name) => name.replaceAll("_", " ");
@@ -59,11 +61,11 @@ function fillTable(id, headings, rows) {
 const grouped = (head, rows) =>
   rows.map((cells, index) => ({ cells: [left(index ? "" : head), ...cells], className: index ? "" : "first" }));
 
-// One legend for several plots: in each it would take a fifth of the room.
+// One legend for several plots: in each it would take a fifth of the room. Colours are names of the style sheet.
 function addLegend(id, entries) {
   for (const [colour, name] of entries) {
     const label = add(element(id), "span", { className: "label" });
-    add(label, "span", { className: "mark" }).style.background = colour;
+    add(label, "span", { className: "mark" }).style.background = `var(${colour})`;
     label.append(name);
     element(id).append(" ");
   }
@@ -77,22 +79,81 @@ function offer(id, names) {
 }
 
 // Labels below the ticks, so that the first one lies lower than the lowest label of the other axis.
-const BELOW = { ticks: "outside", ticklen: 6, tickcolor: "#999" };
+const BELOW = { ticks: "outside", ticklen: 6, tickcolor: "--thing" };
 
 const heading = (text) => ({ text, x: 0, xanchor: "left", font: { size: 14 } });
 
 // Axes with these names; `more` of a layout goes before what is usual, axis by axis.
 function layout(text, x, y, { xaxis, yaxis, ...more } = {}) {
   return {
-    title: heading(text), showlegend: false, hovermode: "closest", margin: { l: 64, r: 12, t: 36, b: 48 },
+    ...GROUND, title: heading(text), showlegend: false, hovermode: "closest", margin: { l: 64, r: 12, t: 36, b: 48 },
     xaxis: { ...AXIS, ...BELOW, title: { text: x }, ...xaxis }, yaxis: { ...AXIS, title: { text: y }, ...yaxis }, ...more,
   };
 }
 
+const sheetColour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+const parts = (colour) => [1, 3, 5].map((at) => parseInt(colour.slice(at, at + 2), 16));
+
+// A colour of the style sheet by its name: `--line`; with an opacity: `--line 0.4`; halfway to the ink: `--line inked`.
+function schemeColour(name) {
+  const [property, change] = name.split(" ");
+  const [value, ink] = [sheetColour(property), parts(sheetColour("--ink"))];
+  if (change === undefined) return value;
+  if (change === "inked") return `rgb(${parts(value).map((part, at) => Math.round((part + ink[at]) / 2))})`;
+  return `rgba(${parts(value)},${change})`;
+}
+
+const isColour = (key, value) => key.endsWith("color") && typeof value === "string" && value.startsWith("--");
+const isGroup = (value) => value !== null && typeof value === "object" && (!Array.isArray(value) || typeof value[0] === "object");
+
+// A copy of traces or of a layout for plotly.js, which knows no names of colours. Numbers are not copied.
+function painted(value, key = "") {
+  if (isColour(key, value)) return schemeColour(value);
+  if (!isGroup(value)) return value;
+  if (Array.isArray(value)) return value.map((item) => painted(item));
+  return Object.fromEntries(Object.entries(value).map(([name, item]) => [name, painted(item, name)]));
+}
+
+// The colours of a trace or of a layout by their places, as plotly.js names these.
+function coloursOf(value, place = "") {
+  if (!isGroup(value)) return [];
+  return Object.entries(value).flatMap(([key, item]) => {
+    const inner = Array.isArray(value) ? `${place}[${key}]` : place ? `${place}.${key}` : key;
+    return isColour(key, item) ? [[inner, schemeColour(item)]] : coloursOf(item, inner);
+  });
+}
+
+// Traces and layouts of the plots on the page, with the names of their colours.
+const drawn = new Map();
+
+// Draws at an element, or draws anew what is there.
+function plotAt(place, traces, layout, config) {
+  const plot = typeof place === "string" ? element(place) : place;
+  drawn.set(plot, { traces, layout });
+  return Plotly.react(plot, painted(traces), painted(layout), config);
+}
+
+// Gives the plots the colours of the present scheme; what a reader has zoomed or hidden stays so.
+function recolour() {
+  for (const [plot, { traces, layout }] of drawn) {
+    if (!plot.isConnected) {
+      drawn.delete(plot);
+      continue;
+    }
+    const changed = {};
+    for (const [index, trace] of traces.entries()) {
+      for (const [place, colour] of coloursOf(trace)) (changed[place] ??= Array(traces.length).fill(undefined))[index] = colour;
+    }
+    Plotly.update(plot, changed, Object.fromEntries(coloursOf(layout)));
+  }
+}
+
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", recolour);
+
 // A new plot at the end of an element.
 function addPlot(id, className, traces, layout, config) {
   const plot = add(element(id), "div", { className });
-  return Plotly.newPlot(plot, traces, layout, config).then(() => plot);
+  return plotAt(plot, traces, layout, config).then(() => plot);
 }
 
 // A line across the whole plot.

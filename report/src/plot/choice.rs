@@ -20,7 +20,7 @@ const TRAIL_POINTS_MAX: usize = 2000;
 pub enum Role {
     /// Values of the flight itself: a full line.
     Flown,
-    /// Estimates of an estimator: a thin line.
+    /// Estimates of an estimator: a wide and pale band.
     Estimated,
     /// Measurements of a sensor, or of a real flight: a thin line.
     Measured,
@@ -46,9 +46,10 @@ impl Role {
     /// Layer of the line: an estimator's noise must not hide the flown line, nor that line the set point.
     pub fn layer(self) -> u8 {
         match self {
-            Self::Estimated | Self::Measured => 0,
-            Self::Flown => 1,
-            Self::Asked => 2,
+            Self::Estimated => 0,
+            Self::Measured => 1,
+            Self::Flown => 2,
+            Self::Asked => 3,
         }
     }
 

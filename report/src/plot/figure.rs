@@ -6,8 +6,16 @@ use anyhow::{Result, bail};
 use diagnostics::printable_line;
 use serde::{Serialize, Serializer};
 
-/// Distinguishable also without colour vision (Okabe and Ito).
-const COLOURS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000"];
+/// Distinguishable also without colour vision (after Okabe and Ito): those of light pages, `--curve-0` to `--curve-7` of
+/// `colours.css`.
+const COLOURS: [&str; 8] =
+    ["#0072b2", "#d55e00", "#009e73", "#b8508c", "#a87b00", "#3b97c9", "#6b4fa0", "#4d4d4d"];
+
+/// Name in the style sheet of pages of a line's colour.
+pub fn colour_name(colour: &str) -> String {
+    let index = COLOURS.iter().position(|known| *known == colour).unwrap_or_default();
+    format!("--curve-{index}")
+}
 
 /// A line over time or in space.
 #[derive(Clone, Debug, Serialize)]
@@ -23,8 +31,10 @@ pub struct Line<P> {
     pub role: Role,
     /// Colour, as HTML writes it.
     pub colour: &'static str,
-    /// True if it is drawn darker: its colour is that of the flown line beside it.
+    /// True if it is drawn darker: its colour is that of a leading line beside it.
     pub is_darker: bool,
+    /// True if it is drawn as a wide and pale band: an estimate beside leading lines of another role.
+    pub is_band: bool,
     /// Samples in the recording.
     pub samples: u64,
     /// The points; JSON has their number.
@@ -108,7 +118,8 @@ fn axes(wanted: &Wanted) -> Result<Axes> {
         field: channel.path.clone(),
         role: ask.role,
         colour: "",
-        is_darker: ask.role != Role::Flown,
+        is_darker: false,
+        is_band: false,
         samples: curve.samples(),
         points: curve.points(),
     });
@@ -116,6 +127,7 @@ fn axes(wanted: &Wanted) -> Result<Axes> {
     curves.sort_by_key(|curve| curve.role);
     name(&mut curves);
     colour(&mut curves);
+    set_beside(&mut curves);
     let fields = together(&distinct(wanted.asks.iter().map(|ask| ask.field.as_str())));
     let or_fields = |text: &str| if text.is_empty() { fields.clone() } else { text.to_owned() };
     Ok(Axes { title: or_fields(wanted.title), label: or_fields(wanted.label), unit, curves })
@@ -259,14 +271,40 @@ pub fn trails(read: &[(Ask, thin::Poses)]) -> Vec<Trail> {
             field: String::new(),
             role: ask.role,
             colour: COLOURS[index % COLOURS.len()],
-            is_darker: movers.len() > 1 && ask.role != Role::Flown,
+            is_darker: false,
+            is_band: false,
             samples: trail.samples,
             points: trail.points().into_iter().map(|[x, y, z, ..]| [x, y, z]).collect(),
         }
     });
     let mut trails: Vec<Trail> = drawn.collect();
     trails.sort_by_key(|trail| trail.role);
+    set_beside(&mut trails);
     trails
+}
+
+/// Sets which lines stand beside leading ones: the flown, or else the measured, or else the estimated.
+fn set_beside<P>(lines: &mut [Line<P>]) {
+    let is_there = |role: &Role| lines.iter().any(|line| line.role == *role);
+    let Some(leading) = [Role::Flown, Role::Measured, Role::Estimated].into_iter().find(is_there) else {
+        return;
+    };
+    let led = |line: &&Line<P>| line.role == leading;
+    let colours: Vec<&'static str> = lines.iter().filter(led).map(|line| line.colour).collect();
+    for line in lines.iter_mut().filter(|line| line.role != leading) {
+        line.is_darker = colours.contains(&line.colour);
+        line.is_band = line.role == Role::Estimated;
+    }
+}
+
+/// Roles whose lines share a row of the legend: several lines, which all have the colours of leading ones. Nine rows hide the three
+/// that matter.
+pub fn shared_roles<P>(lines: &[Line<P>]) -> Vec<Role> {
+    let is_shared = |role: &Role| {
+        let of_role = || lines.iter().filter(|line| line.role == *role);
+        of_role().count() > 1 && of_role().all(|line| line.is_darker)
+    };
+    [Role::Estimated, Role::Measured, Role::Asked].into_iter().filter(is_shared).collect()
 }
 
 /// Number of the colour of an only vehicle's path.
@@ -288,7 +326,7 @@ fn trail_name(vehicle: &str, role: Role) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{Curve, colour, name};
+    use super::{COLOURS, Curve, colour, colour_name, name, set_beside, shared_roles};
     use crate::plot::choice::Role;
 
     fn curve(topic: &str, field: &str, role: Role) -> Curve {
@@ -300,6 +338,7 @@ mod tests {
             role,
             colour: "",
             is_darker: false,
+            is_band: false,
             samples: 0,
             points: Vec::new(),
         }
@@ -316,5 +355,32 @@ mod tests {
         assert_eq!(curves[3].name, "z set point");
         assert_eq!(curves[3].colour, curves[2].colour);
         assert_ne!(curves[3].colour, curves[0].colour);
+    }
+
+    #[test]
+    fn pages_have_the_colours_of_pictures() {
+        for colour in COLOURS {
+            let declared = format!("{}: {colour};", colour_name(colour));
+            assert!(crate::page::COLOURS.contains(&declared), "{declared}");
+        }
+    }
+
+    #[test]
+    fn estimates_beside_measured_distances_are_bands_and_share_a_row() {
+        let distances = |topic: &str, role| {
+            (0..3).map(|beam| curve(topic, &format!("distance[{beam}]"), role)).collect::<Vec<_>>()
+        };
+        let mut curves = [distances("/walls", Role::Estimated), distances("/range", Role::Measured)].concat();
+        colour(&mut curves);
+        set_beside(&mut curves);
+        let (estimated, measured) = curves.split_at(3);
+        assert!(estimated.iter().all(|curve| curve.is_band && curve.is_darker));
+        assert!(measured.iter().all(|curve| !curve.is_band && !curve.is_darker));
+        assert_eq!(shared_roles(&curves), [Role::Estimated]);
+        // Alone, an estimate is a line.
+        let mut alone = distances("/walls", Role::Estimated);
+        colour(&mut alone);
+        set_beside(&mut alone);
+        assert!(alone.iter().all(|curve| !curve.is_band) && shared_roles(&alone).is_empty());
     }
 }

@@ -3,8 +3,9 @@
 //! It is drawn by `page.js` with plotly.js ([`crate::page`]).
 
 use crate::page::PLOTLY_3D;
+use crate::plot::choice::Role;
 use crate::plot::drawing::Drawing;
-use crate::plot::figure::{Axes, Curve, Trail};
+use crate::plot::figure::{Axes, Curve, Line, Trail, colour_name, shared_roles};
 use crate::plot::outline::Outline;
 use crate::plot::request::{Format, View};
 use crate::plot::scene::Solid;
@@ -29,6 +30,7 @@ fn data(drawing: &Drawing) -> Value {
         "views": views,
         "trails": drawing.trails.iter().map(trail).collect::<Vec<_>>(),
         "airframes": drawing.airframes.iter().map(airframe).collect::<Vec<_>>(),
+        "shared": shared(&drawing.trails),
         "solids": drawing.solids.iter().map(solid).collect::<Vec<_>>(),
     })
 }
@@ -41,18 +43,26 @@ fn with<const N: usize>(thing: &impl Serialize, entries: [(&str, Value); N]) -> 
 }
 
 fn axes(axes: &Axes) -> Value {
-    with(axes, [("curves", axes.curves.iter().map(curve).collect())])
+    with(axes, [("curves", axes.curves.iter().map(curve).collect()), ("shared", shared(&axes.curves))])
+}
+
+/// The roles that have one row in the legend, with its text.
+fn shared<P>(lines: &[Line<P>]) -> Value {
+    let row = |role: Role| json!({ "role": role, "name": role.suffix().trim_start() });
+    shared_roles(lines).into_iter().map(row).collect()
 }
 
 fn curve(curve: &Curve) -> Value {
     // Times to the microsecond keep the page small.
     let x = curve.points.iter().map(|(time_s, _)| json!((time_s * 1e6).round() / 1e6));
-    with(curve, [("x", x.collect()), ("y", curve.points.iter().map(|point| short(point.1)).collect())])
+    let y = curve.points.iter().map(|point| short(point.1));
+    with(curve, [("x", x.collect()), ("y", y.collect()), ("colour", colour_name(curve.colour).into())])
 }
 
 fn trail(trail: &Trail) -> Value {
     let axis = |axis: usize| trail.points.iter().map(|point| short(point[axis])).collect();
-    with(trail, [("x", axis(0)), ("y", axis(1)), ("z", axis(2))])
+    let colour = colour_name(trail.colour).into();
+    with(trail, [("x", axis(0)), ("y", axis(1)), ("z", axis(2)), ("colour", colour)])
 }
 
 /// The lines of an airframe, one after another with a gap between two.
@@ -63,7 +73,8 @@ fn airframe(airframe: &Outline) -> Value {
         };
         airframe.lines.iter().flat_map(along).collect()
     };
-    with(airframe, [("x", axis(0)), ("y", axis(1)), ("z", axis(2))])
+    let colour = colour_name(airframe.colour).into();
+    with(airframe, [("x", axis(0)), ("y", axis(1)), ("z", axis(2)), ("colour", colour)])
 }
 
 fn solid(solid: &Solid) -> Value {

@@ -1,7 +1,7 @@
 //! Lines, letters, flat axes and legends of pictures, in plotters' units.
 
 use crate::plot::choice::Role;
-use crate::plot::figure::Line;
+use crate::plot::figure::{Line, shared_roles};
 use anyhow::Result;
 use plotters::coord::types::RangedCoordf64;
 use plotters::coord::{CoordTranslate, Shift};
@@ -21,6 +21,9 @@ pub const LEGEND_ROW: u32 = 18;
 /// Bold enough beside the curves' names, and thin enough beside each other.
 const FLOWN_WIDTH: u32 = 14;
 const THIN_WIDTH: u32 = 7;
+/// Seen on both sides of a flown line.
+const BAND_WIDTH: u32 = 44;
+const BAND_OPACITY: f64 = 0.35;
 /// Size of the letters of titles, but for the sheet's.
 pub const HEAD_SIZE: u32 = 15;
 /// Size of all other letters.
@@ -49,25 +52,31 @@ pub fn letters<'a>(size: u32) -> TextStyle<'a> {
 /// Look of a line.
 #[derive(Clone, Copy)]
 pub struct Look {
-    colour: RGBColor,
+    colour: RGBAColor,
     width: u32,
     /// True if it is dashed.
     pub is_dashed: bool,
 }
 
 impl Look {
-    /// Look of `line`: lines other than the flown one are thin, and darker where they share its colour.
+    /// Look of `line`: bands are wide and pale. Other lines than the flown one are thin, and darker where they share a leading line's
+    /// colour.
     pub fn of<P>(line: &Line<P>) -> Self {
         let RGBColor(red, green, blue) = rgb(line.colour);
-        let darker = RGBColor(red / 2, green / 2, blue / 2);
-        let colour = if line.is_darker { darker } else { RGBColor(red, green, blue) };
-        Self { colour, ..Self::of_role(line.role) }
+        let is_darker = line.is_darker && !line.is_band;
+        let colour =
+            if is_darker { RGBColor(red / 2, green / 2, blue / 2) } else { RGBColor(red, green, blue) };
+        Self::inked(line, colour)
     }
 
-    /// Look of the lines of a role, whatever their colours.
-    fn of_role(role: Role) -> Self {
-        let width = if role == Role::Flown { FLOWN_WIDTH } else { THIN_WIDTH };
-        Self { colour: INK, width, is_dashed: role == Role::Asked }
+    /// Look of `line` in another colour.
+    fn inked<P>(line: &Line<P>, colour: RGBColor) -> Self {
+        let is_dashed = line.role == Role::Asked;
+        if line.is_band {
+            return Self { colour: colour.mix(BAND_OPACITY), width: BAND_WIDTH, is_dashed };
+        }
+        let width = if line.role == Role::Flown { FLOWN_WIDTH } else { THIN_WIDTH };
+        Self { colour: colour.to_rgba(), width, is_dashed }
     }
 
     /// The style of the line for plotters.
@@ -119,21 +128,14 @@ pub fn draw_legend<'a, P>(area: &Area<'a>, width: u32, lines: &[Line<P>]) -> Res
     Ok(plots)
 }
 
-/// Rows of a legend. Lines of a role that all have the colours of flown lines share a row: nine rows hide the three that matter.
+/// Rows of a legend: those of lines, then one for each role whose lines share a row.
 pub fn legend_rows<P>(lines: &[Line<P>]) -> Vec<(Look, String)> {
-    let has_fellow = |line: &Line<P>| {
-        line.is_darker && lines.iter().any(|other| other.role == Role::Flown && other.colour == line.colour)
-    };
-    let is_shared = |role: Role| {
-        let mut of_role = lines.iter().filter(|line| line.role == role).peekable();
-        role != Role::Flown && of_role.peek().is_some() && of_role.all(has_fellow)
-    };
-    let count = |role: Role| lines.iter().filter(|line| line.role == role).count();
-    let is_short = |role: Role| is_shared(role) && count(role) > 1;
-    let alone = lines.iter().filter(|line| !is_short(line.role));
+    let shared = shared_roles(lines);
+    let alone = lines.iter().filter(|line| !shared.contains(&line.role));
     let mut rows: Vec<_> = alone.map(|line| (Look::of(line), line.name.clone())).collect();
-    let roles = [Role::Estimated, Role::Measured, Role::Asked].into_iter().filter(|role| is_short(*role));
-    rows.extend(roles.map(|role| (Look::of_role(role), role.suffix().trim_start().to_owned())));
+    let first_of = |role: Role| lines.iter().find(move |line| line.role == role);
+    let firsts = shared.into_iter().filter_map(first_of);
+    rows.extend(firsts.map(|line| (Look::inked(line, INK), line.role.suffix().trim_start().to_owned())));
     rows
 }
 

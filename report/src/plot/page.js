@@ -3,29 +3,46 @@
 const SPACE = config(["toImage", "zoom3d", "pan3d", "orbitRotation", "tableRotation", "resetCameraDefault3d"]);
 const SOLID = "#787878";
 // Layers of the lines: an estimator's noise must not hide the flown line, nor that the line that was asked for.
-const LAYERS = { estimated: 1, measured: 1, flown: 2, asked: 3 };
+const LAYERS = { estimated: 1, measured: 2, flown: 3, asked: 4 };
+const BAND_PX = 6;
 // Beside the curves a legend would leave a narrow page nothing to draw on: there it is below them.
 const NARROW = matchMedia("(max-width: 700px)");
 const LEGEND_ROW = 22;
 const WIDE_PX = 320;
-const LEGEND_BELOW = { orientation: "h", x: 0, xanchor: "left", y: 0, yref: "container", yanchor: "bottom", font: { size: 12 }, itemwidth: 30 };
-const LEGEND_BESIDE = { x: 1.01, y: 1, font: { size: 12 }, itemwidth: 30 };
+const LEGEND = { font: { size: 12 }, itemwidth: 30, traceorder: "normal" };
+const LEGEND_BELOW = { ...LEGEND, orientation: "h", x: 0, xanchor: "left", y: 0, yref: "container", yanchor: "bottom" };
+const LEGEND_BESIDE = { ...LEGEND, x: 1.01, y: 1 };
+
+// Names in the legend: lines of a role that all have the colours of other lines share one.
+function legendNames(lines, shared) {
+  const isShared = ({ role }) => shared.some((other) => other.role === role);
+  return [...lines.filter((line) => !isShared(line)), ...shared].map(({ name }) => name);
+}
+
 // So wide that the longest name has room, and the same for all plots: their axes of time are then as long.
-const LEGEND_WIDTH = 7 * Math.max(12, ...data.panels.flatMap((panel) => panel.axes).flatMap((axes) => axes.curves)
-  .map((curve) => curve.name.length)) + 60;
+const LEGEND_WIDTH = 7 * Math.max(12, ...data.panels.flatMap((panel) => panel.axes)
+  .flatMap((axes) => legendNames(axes.curves, axes.shared)).map((name) => name.length)) + 60;
 
 const trails = [...data.trails].sort((a, b) => LAYERS[a.role] - LAYERS[b.role]);
 const column = (rows, index) => rows.map((row) => row[index]);
 
-// Returns a darker colour, for lines beside the flown line.
-function darker(colour) {
-  const parts = [1, 3, 5].map((at) => Math.floor(parseInt(colour.slice(at, at + 2), 16) / 2));
-  return `rgb(${parts.join(",")})`;
+// An estimate is a band, which is seen on both sides of the flown line.
+function look({ role, colour, is_darker: isDarker, is_band: isBand }) {
+  if (isBand) return { color: `${colour} 0.35`, width: BAND_PX };
+  if (role === "flown") return { color: colour, width: 2 };
+  return { color: isDarker ? `${colour} inked` : colour, width: 1.2, dash: role === "asked" ? "dash" : "solid" };
 }
 
-function look({ role, colour, is_darker: isDarker }) {
-  if (role === "flown") return { color: colour, width: 2 };
-  return { color: isDarker ? darker(colour) : colour, width: 1.2, dash: role === "asked" ? "dash" : "solid" };
+// What a line has to do with the legend. A click on a shared name hides all lines of its role.
+const inLegend = ({ role }, shared) => (shared.some((other) => other.role === role) ? { legendgroup: role, showlegend: false } : {});
+
+// Lines without points: the shared names of the legend.
+function sharedTraces(type, lines, shared) {
+  const nowhere = type === "scatter3d" ? { x: [null], y: [null], z: [null] } : { x: [null], y: [null] };
+  return shared.map(({ role, name }) => {
+    const line = lookAs(type, { ...lines.find((line) => line.role === role), colour: "--ink", is_darker: false });
+    return { type, mode: "lines", name, ...nowhere, line, legendgroup: role, hoverinfo: "skip", meta: "legend" };
+  });
 }
 
 // Height that names need in a legend below the curves, at the present width.
@@ -42,12 +59,13 @@ function heightBelow(id, names) {
 
 function drawAxes(axes) {
   const traces = axes.curves.map((curve) => ({
-    mode: "lines", name: curve.name, x: curve.x, y: curve.y, line: look(curve), zorder: LAYERS[curve.role],
+    mode: "lines", name: curve.name, x: curve.x, y: curve.y, line: look(curve), zorder: LAYERS[curve.role], ...inLegend(curve, axes.shared),
     hovertemplate: `%{x:.3f} ${data.across.unit}: %{y:.5~g} ${axes.unit}<br>${curve.topic} ${curve.field}<extra>${curve.name}</extra>`,
   }));
-  const below = NARROW.matches ? heightBelow("time", traces.map(({ name }) => name)) : 0;
+  const below = NARROW.matches ? heightBelow("time", legendNames(axes.curves, axes.shared)) : 0;
   const room = below ? { l: 56, r: 8, t: 36, b: 64 + below } : { l: 76, r: LEGEND_WIDTH, t: 36, b: 50 };
-  return addPlot("time", below ? "" : "wide", traces, layout(axes.title, data.across.label, `${axes.label} [${axes.unit}]`, {
+  const all = [...traces, ...sharedTraces("scatter", axes.curves, axes.shared)];
+  return addPlot("time", below ? "" : "wide", all, layout(axes.title, data.across.label, `${axes.label} [${axes.unit}]`, {
     // A copy: plotly.js changes the one that it is given.
     xaxis: { range: [...data.across.range], zeroline: false, title: { text: data.across.label, standoff: below ? 12 : undefined } }, yaxis: { zeroline: false, automargin: false },
     margin: { ...room, autoexpand: false }, legend: below ? LEGEND_BELOW : LEGEND_BESIDE, showlegend: true,
@@ -82,12 +100,15 @@ function solidTraces(solid) {
   ];
 }
 
+// The look of lines of this type: bands would hide other lines in space, where the nearest is in front.
+const lookAs = (type, line) => look(type === "scatter3d" ? { ...line, is_band: false } : line);
+
 // A path and its start; lines in space look half as wide.
 function trailTraces(type, trail, points) {
-  const [line, size, widen] = [look(trail), ...(type === "scatter3d" ? [4, 2] : [8, 1])];
+  const [line, size, widen] = [lookAs(type, trail), ...(type === "scatter3d" ? [4, 2] : [8, 1])];
   const first = Object.fromEntries(Object.entries(points).map(([axis, values]) => [axis, values.slice(0, 1)]));
   return [
-    { type, mode: "lines", name: trail.name, ...points, line: { ...line, width: widen * line.width } },
+    { type, mode: "lines", name: trail.name, ...points, line: { ...line, width: widen * line.width }, ...inLegend(trail, data.shared) },
     { type, mode: "markers", name: `start of ${trail.name}`, showlegend: false, ...first, marker: { color: line.color, size } },
   ];
 }
@@ -95,7 +116,7 @@ function trailTraces(type, trail, points) {
 // The vehicle at some places of its path.
 function airframeTrace(type, airframe, points) {
   return {
-    type, mode: "lines", name: airframe.name, ...points, line: { color: darker(airframe.colour), width: type === "scatter3d" ? 2 : 1 },
+    type, mode: "lines", name: airframe.name, ...points, line: { color: `${airframe.colour} inked`, width: type === "scatter3d" ? 2 : 1 },
     showlegend: false, hoverinfo: "name", connectgaps: false,
   };
 }
@@ -108,7 +129,7 @@ function ground() {
   });
   return {
     type: "mesh3d", name: "ground", x: [left, right, right, left], y: [near, near, far, far], z: [0, 0, 0, 0],
-    i: [0, 0], j: [1, 2], k: [2, 3], color: "#c8d8c0", opacity: 0.5, hoverinfo: "skip",
+    i: [0, 0], j: [1, 2], k: [2, 3], color: "--floor", opacity: 0.5, hoverinfo: "skip",
   };
 }
 
@@ -116,10 +137,13 @@ function drawPath() {
   const paths = trails.flatMap(({ x, y, z, ...trail }) => trailTraces("scatter3d", trail, { x, y, z }));
   const airframes = data.airframes.map((airframe) =>
     airframeTrace("scatter3d", airframe, { x: airframe.x, y: airframe.y, z: airframe.z }));
-  const axis = (name) => ({ title: { text: `${name} [m]` }, exponentformat: "none", backgroundcolor: "#fff", gridcolor: "#ddd" });
+  const axis = (name) => ({
+    title: { text: `${name} [m]` }, exponentformat: "none", backgroundcolor: "--ground", gridcolor: "--line", zerolinecolor: "--thing",
+  });
   const camera = { eye: { x: 1.0, y: -1.8, z: 1.0 }, center: { x: 0, y: 0, z: -0.2 } };
-  return Plotly.newPlot("path", [ground(), ...data.solids.flatMap(solidTraces), ...airframes, ...paths], {
-    scene: { xaxis: axis("x"), yaxis: axis("y"), zaxis: axis("z"), aspectmode: "data", camera },
+  const names = sharedTraces("scatter3d", data.trails, data.shared);
+  return plotAt("path", [ground(), ...data.solids.flatMap(solidTraces), ...airframes, ...paths, ...names], {
+    ...GROUND, scene: { xaxis: axis("x"), yaxis: axis("y"), zaxis: axis("z"), aspectmode: "data", camera },
     margin: { l: 0, r: 0, t: 40, b: 0 }, legend: NARROW.matches ? LEGEND_BELOW : LEGEND_BESIDE, showlegend: true,
   }, SPACE);
 }
@@ -134,7 +158,7 @@ function drawFlat(id, text, up) {
   const paths = trails.flatMap((trail) => trailTraces("scatter", trail, { x: trail.x, y: trail[up] }));
   const airframes = data.airframes.map((airframe) => airframeTrace("scatter", airframe, { x: airframe.x, y: airframe[up] }));
   const axes = { xaxis: { zeroline: false }, yaxis: { zeroline: false, scaleanchor: "x", scaleratio: 1 } };
-  return Plotly.newPlot(id, [...outlines, ...airframes, ...paths], layout(text, "x [m]", `${up} [m]`, axes), CONFIG);
+  return plotAt(id, [...outlines, ...airframes, ...paths], layout(text, "x [m]", `${up} [m]`, axes), CONFIG);
 }
 
 const VIEWS = { path: drawPath, top: () => drawFlat("top", "From above", "y"), side: () => drawFlat("side", "From the side", "z") };
@@ -155,7 +179,7 @@ async function draw() {
   title(data.title);
   const [from, to] = data.span_s.map((time) => time.toFixed(3));
   element("summary").textContent = `${data.recording}, ${from} s to ${to} s of simulated time. ` +
-    "Dashed: asked for. Thin: estimated or measured. Drag to zoom, double-click to see all; a click on a name hides its curve.";
+    "Dashed: asked for. Wide and pale: estimated. Thin: measured. Drag to zoom, double-click to see all; a click on a name hides its curve.";
   offerVehicles();
   const drawShown = () => data.panels.length && drawPanel(data.panels[element("vehicle").value || 0]);
   await drawShown();

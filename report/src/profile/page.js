@@ -2,9 +2,8 @@
 
 const profile = data.profile;
 
-// Distinguishable also without colour vision (Okabe and Ito).
-const COLOURS = { wait: "#c8ccd0", "wake-up": "#e69f00", compute: "#0072b2", publish: "#009e73" };
-const PATH_COLOUR = "#d55e00";
+const COLOURS = { wait: "--grid", "wake-up": "--curve-4", compute: "--curve-0", publish: "--curve-2" };
+const PATH_COLOUR = "--curve-1";
 const QUANTILES = ["p50", "p90", "p99", "p99.9", "max"];
 const NODE_PARTS = [["wait", "wait"], ["wake_up", "wake-up"], ["compute", "compute"], ["publish", "publish"]];
 const LOG = { type: "log", dtick: 1, separatethousands: true };
@@ -49,7 +48,7 @@ function drawTimeline(slow) {
     name: "critical path", mode: "lines", line: { color: PATH_COLOUR, width: 3 }, hoverinfo: "skip",
     x: slow.path.flatMap(({ start, end }) => [start, end]), y: slow.path.flatMap(({ node }) => [node, node]),
   };
-  Plotly.react("timeline", [...bars, line], layout("", `µs from the start of the critical path of tick ${slow.tick}`, "", {
+  plotAt("timeline", [...bars, line], layout("", `µs from the start of the critical path of tick ${slow.tick}`, "", {
     barmode: "overlay", bargap: 0.35, height: 130 + 44 * nodes.length,
     xaxis: { separatethousands: true }, yaxis: { categoryorder: "array", categoryarray: [...nodes].reverse(), fixedrange: true },
     showlegend: true, legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 },
@@ -73,7 +72,7 @@ function drawPath() {
     mode: "markers", marker: { size: 4, color: COLOURS.compute }, hovertemplate: "%{x:.3f} s: %{y:.1f} µs<extra></extra>",
   };
   const axes = { xaxis: { zeroline: false }, yaxis: LOG };
-  Plotly.newPlot("course", [course], layout("Tick time over the run", "simulated time in s", "µs", axes), CONFIG);
+  plotAt("course", [course], layout("Tick time over the run", "simulated time in s", "µs", axes), CONFIG);
 }
 
 function drawNodes() {
@@ -101,7 +100,7 @@ function drawDeadlines() {
   element("missed").textContent = `Missed: ${pacing.missed_deadlines}. Grants late by a tick: ${pacing.late_grants}. ` +
     `Overruns: ${late.join(", ") || "none"}.`;
   const jitter = steps(data.jitter, COLOURS.compute);
-  Plotly.newPlot("jitter", [jitter], layout("Jitter: deadline to grant", "µs", "ticks", { xaxis: LOG, yaxis: LOG }), CONFIG);
+  plotAt("jitter", [jitter], layout("Jitter: deadline to grant", "µs", "ticks", { xaxis: LOG, yaxis: LOG }), CONFIG);
   fillTable("jitter-table", [left("jitter"), ...COUNTED], [[left("deadline to grant"), ...counted(pacing.jitter)]]);
 }
 

@@ -18,8 +18,11 @@ const STYLE: &str = "text/css; charset=utf-8";
 macro_rules! assets {
     ($($name:literal: $media:expr,)*) => {
         /// The files beside the page.
-        pub const ASSETS: &[Asset] =
-            &[$(Asset { name: $name, media: $media, content: include_str!(concat!("../assets/", $name)) },)*];
+        pub const ASSETS: &[Asset] = &[
+            // The colours that all pages share.
+            Asset { name: "colours.css", media: STYLE, content: report::page::COLOURS },
+            $(Asset { name: $name, media: $media, content: include_str!(concat!("../assets/", $name)) },)*
+        ];
     };
 }
 
