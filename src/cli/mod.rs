@@ -130,7 +130,7 @@ commands! {
     /// Watch a live run and steer it: ticks, processes, topics.
     #[command(after_help = top::HELP)]
     Top(top::TopArguments) => top::top;
-    /// Pause, step, pace or stop a live run; exit code 2 if it refuses.
+    /// Pause, step, pace, show or stop a live run; exit code 2 if it refuses.
     #[command(after_help = "Example: hummingbus ctl pause")]
     Ctl(steer::CtlArguments) => steer::ctl;
     /// Replace a process of a live run.

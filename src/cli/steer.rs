@@ -1,6 +1,7 @@
 //! `hummingbus ctl` and `hummingbus swap`: a live run is steered from outside.
 
-use super::output;
+use super::interrupts::stop_token;
+use super::{foxglove, output, view};
 use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand};
 use inputs::InputFiles;
@@ -8,6 +9,7 @@ use runtime::ctl::client;
 use runtime::ctl::protocol::{Answer, Request};
 use runtime::manifest::PaceSetting;
 use runtime::run_dir::find_own;
+use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 
 /// The arguments of `hummingbus ctl`.
@@ -62,11 +64,26 @@ enum CtlVerb {
     },
     /// End the run at the next tick boundary, as Ctrl-C does.
     Stop,
+    /// Show the run in Foxglove or Lichtblick, as `hummingbus view --foxglove` does, until it ends or until Ctrl-C.
+    #[command(after_help = "Examples: hummingbus ctl foxglove\n          hummingbus ctl foxglove 9000")]
+    Foxglove {
+        /// A port of 127.0.0.1, or an address of this machine, with or without a port.
+        #[arg(value_name = "ADDRESS", default_value = "127.0.0.1", value_parser = foxglove::address)]
+        address: SocketAddr,
+    },
+}
+
+/// Deed of a command.
+enum Deed {
+    /// Asks the launcher.
+    Ask(Request),
+    /// Shows the run at this address.
+    Show(SocketAddr),
 }
 
 impl CtlVerb {
-    fn request(&self) -> Result<Request> {
-        Ok(match self {
+    fn deed(&self) -> Result<Deed> {
+        Ok(Deed::Ask(match self {
             Self::Status => Request::Status,
             Self::Pause => Request::Pause,
             Self::Step { ticks } => Request::Step { ticks: *ticks },
@@ -82,16 +99,24 @@ impl CtlVerb {
                 Request::Rewind { tick, path: file.map(std::path::absolute).transpose()? }
             }
             Self::Stop => Request::Stop,
-        })
+            Self::Foxglove { address } => return Ok(Deed::Show(*address)),
+        }))
     }
 }
 
-/// Sends the request of `arguments` to a live run, and prints its answer.
+/// Sends the request of `arguments` to a live run, and prints its answer; or shows the run.
 ///
 /// # Errors
-/// If there is no such run, or it refuses.
+/// If there is no such run, it refuses, or the address to show it at is taken.
 pub fn ctl(arguments: &CtlArguments) -> Result<bool> {
-    ask(arguments.run.as_deref(), &arguments.verb.request()?, arguments.json).map(|()| true)
+    let run_id = arguments.run.as_deref();
+    match arguments.verb.deed()? {
+        Deed::Ask(request) => ask(run_id, &request, arguments.json).map(|()| true),
+        Deed::Show(_) if arguments.json => {
+            bail!("`ctl foxglove` prints no answer of the run: leave out --json")
+        }
+        Deed::Show(address) => view::in_foxglove(&find_own(run_id)?, address, &stop_token()?),
+    }
 }
 
 /// The arguments of `hummingbus swap`.

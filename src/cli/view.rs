@@ -9,7 +9,7 @@ use anyhow::{Context, Result};
 use bus::plan::Plan;
 use clap::Args;
 use runtime::event::StopToken;
-use runtime::run_dir::find_live;
+use runtime::run_dir::{LiveRun, find_live};
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use view::live::recording_of;
@@ -82,16 +82,11 @@ fn how_to_see(is_opened: bool) -> &'static str {
 /// Shows the live run.
 fn live(arguments: &ViewArguments, stop: &StopToken) -> Result<bool> {
     let run = find_live(arguments.run.as_deref())?;
-    let id = run.entry.run_id.clone();
-    let plan = Plan::load(&run.entry.run_dir)
-        .with_context(|| format!("run {id} has ended, or does not fly yet: try again"))?;
-    recording_of(&plan)?;
     if let Some(address) = arguments.foxglove {
-        let name = run.entry.manifest.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let launcher = run.entry.launcher;
-        let topics = LiveFoxglove::open(address, &plan, &name, move || find_live(Some(&id)).ok())?;
-        return stay(topics, launcher, stop);
+        return in_foxglove(&run, address, stop);
     }
+    plan_of(&run)?;
+    let id = run.entry.run_id;
     let mut page = LivePage::open(arguments.port, arguments.no_open)?;
     page.follow(move || find_live(Some(&id)).ok());
     print_text(page.address())?;
@@ -99,6 +94,26 @@ fn live(arguments: &ViewArguments, stop: &StopToken) -> Result<bool> {
     page.stay(stop, false);
     page.close()?;
     Ok(true)
+}
+
+/// The plan of a run that flies and records.
+fn plan_of(run: &LiveRun) -> Result<Plan> {
+    let plan = Plan::load(&run.entry.run_dir)
+        .with_context(|| format!("run {} has ended, or does not fly yet: try again", run.entry.run_id))?;
+    recording_of(&plan)?;
+    Ok(plan)
+}
+
+/// Shows a live run in Foxglove at this address until the run has ended, or `stop`.
+///
+/// # Errors
+/// If the run has ended or records nothing, or the address is taken.
+pub fn in_foxglove(run: &LiveRun, address: SocketAddr, stop: &StopToken) -> Result<bool> {
+    let plan = plan_of(run)?;
+    let id = run.entry.run_id.clone();
+    let name = run.entry.manifest.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let topics = LiveFoxglove::open(address, &plan, &name, move || find_live(Some(&id)).ok())?;
+    stay(topics, run.entry.launcher, stop)
 }
 
 /// Shows the run of the process `launcher` in Foxglove until the run has ended, or Ctrl-C.

@@ -163,7 +163,10 @@ fn a_run_that_flies_already_is_shown_too() {
         shown.signal(Signal::TERM);
         shown.end_among_others().with_code(0);
     }
-    let shown = place.start(&["view", "--run", &place.run_id(), "--foxglove=0"]);
+    let shown = place.start(&["ctl", "foxglove", "0", "--run", &place.run_id()]);
+    let mut client = Client::of(&shown);
+    client.subscribe();
+    client.sample();
     shown.await_said("ends with the run");
     run.signal(Signal::TERM);
     run.end_among_others();
@@ -229,6 +232,12 @@ fn an_address_that_is_taken_wrong_or_without_a_recording_is_refused_in_words() {
         .with_code(2)
         .says(&["--foxglove shows a run by its recording", "records nothing"]);
     place.call(&["view", "--foxglove", "--run", "0-0"]).with_code(2).says(&["alive"]);
+    place.call(&["ctl", "foxglove", "--run", "0-0"]).with_code(2).says(&["alive"]);
+    place
+        .call(&["ctl", "foxglove", "nowhere"])
+        .with_code(2)
+        .says(&["expected a port, an IP address or both"]);
+    place.call(&["ctl", "foxglove", "--json"]).with_code(2).says(&["leave out --json"]);
     place.call(&["view", "a.mcap", "--foxglove"]).with_code(2).says(&["cannot be used with"]);
     let open = place.start_endless(&[
         "run",
