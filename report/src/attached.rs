@@ -77,28 +77,51 @@ impl Attached {
         lists.flatten().filter_map(Value::as_table).collect()
     }
 
+    /// The processes by their names, such as `imu` or `h1/imu`, with their tables.
+    #[must_use]
+    pub fn processes(&self) -> Vec<(String, Table)> {
+        let names = self.names();
+        let is_of_vehicle = |process: &str| {
+            names.iter().any(|name| process.strip_prefix(name).is_some_and(|rest| rest.starts_with('/')))
+        };
+        let listed = |manifest: &Table| -> Vec<(String, Table)> {
+            let processes = manifest.get("process").and_then(Value::as_table).into_iter().flatten();
+            processes
+                .filter_map(|(name, process)| Some((name.clone(), process.as_table()?.clone())))
+                .collect()
+        };
+        let mut all = listed(&self.manifest);
+        all.retain(|(process, _)| !is_of_vehicle(process));
+        for name in &names {
+            let own = self.merged(name).map(|merged| listed(&merged)).unwrap_or_default();
+            all.extend(own.into_iter().map(|(process, table)| (format!("{name}/{process}"), table)));
+        }
+        all
+    }
+
     fn vehicles(&self) -> impl Iterator<Item = &Value> {
         self.manifest.get("vehicle").and_then(Value::as_array).into_iter().flatten()
     }
 
     /// The vehicle file of the plant, by the name alone under which it is attached.
     fn file_of(&self, name: &str) -> Option<String> {
-        let merged = if name.is_empty() {
-            self.manifest.clone()
-        } else {
-            let is_it = |vehicle: &&Value| vehicle.get("name").and_then(Value::as_str) == Some(name);
-            let vehicle = self.vehicles().find(is_it)?.as_table()?;
-            let set = vehicle.get("set").and_then(Value::as_str);
-            let set = set.and_then(|set| self.manifest.get("set")?.get(set)?.as_table());
-            let mut merged = set.cloned().unwrap_or_default();
-            put(&mut merged, vehicle.clone());
-            put(&mut merged, self.adjusted(name));
-            merged
-        };
+        let merged = if name.is_empty() { self.manifest.clone() } else { self.merged(name)? };
         let is_plant = |process: &&Value| process.get("kind").and_then(Value::as_str) == Some("plant");
         let plant = merged.get("process")?.as_table()?.values().find(is_plant)?;
         let file = plant.get("vehicle").or_else(|| plant.get("parameters")?.get("vehicle"))?;
         Some(Path::new(file.as_str()?).file_name()?.to_string_lossy().into_owned())
+    }
+
+    /// The set of a vehicle with the vehicle's own values over it.
+    fn merged(&self, name: &str) -> Option<Table> {
+        let is_it = |vehicle: &&Value| vehicle.get("name").and_then(Value::as_str) == Some(name);
+        let vehicle = self.vehicles().find(is_it)?.as_table()?;
+        let set = vehicle.get("set").and_then(Value::as_str);
+        let set = set.and_then(|set| self.manifest.get("set")?.get(set)?.as_table());
+        let mut merged = set.cloned().unwrap_or_default();
+        put(&mut merged, vehicle.clone());
+        put(&mut merged, self.adjusted(name));
+        Some(merged)
     }
 
     /// Adjustments of the vehicle's processes: tables such as `[process."h1/plant"]`.
@@ -191,6 +214,10 @@ mod tests {
         let names = ["h1", "h2"].map(|name| found.body(name).unwrap().name);
         assert_eq!(names, ["AscTec Hummingbird", "another"]);
         assert!(found.body("h3").is_none(), "two are attached, and none is told to be its");
+        let processes = found.processes();
+        let names: Vec<_> = processes.iter().map(|(name, _)| name.as_str()).collect();
+        assert_eq!(names, ["h1/plant", "h2/plant"]);
+        assert_eq!(processes[1].1["vehicle"].as_str(), Some("other.toml"));
     }
 
     #[test]
@@ -198,6 +225,8 @@ mod tests {
         let manifest = "[process.plant]\nkind = \"plant\"\n[[pass]]\nname = \"second\"\n";
         let included = "[process.imu]\nkind = \"imu\"\n[[pass]]\nname = \"first\"\n";
         let found = attached(&[("run.toml", manifest), ("sensors.toml", included)]);
+        let processes: Vec<_> = found.processes().into_iter().map(|(name, _)| name).collect();
+        assert_eq!(processes, ["imu", "plant"]);
         let names: Vec<_> = found.list("pass").iter().map(|pass| pass["name"].as_str().unwrap()).collect();
         assert_eq!(names, ["first", "second"]);
         assert!(found.list("swap").is_empty());

@@ -17,6 +17,8 @@ const LIMIT_REACH = 1.5;
 // Distance at which a mark is under the pointer, and marks that are told of at once.
 const NEAR_PX = 5;
 const HINTS_MAX = 4;
+// A fault is a strip at the top of a plot, in which the pointer finds its text.
+const FAULT_PX = 4;
 
 /** Unit and factor of a field as people read it: angles in degrees, rotor speeds in revolutions a minute. */
 function readable({ path, unit }) {
@@ -227,7 +229,7 @@ class Plot {
     });
   }
 
-  /** Draws limits of pass conditions on these fields, swaps and missed deadlines. */
+  /** Draws limits of pass conditions on these fields, swaps, faults and missed deadlines. */
   #marks(plot) {
     const { ctx: context, bbox } = plot;
     const [x, y] = [(seconds) => plot.valToPos(seconds, "x", true), (value) => plot.valToPos(value, "y", true)];
@@ -240,6 +242,7 @@ class Plot {
     context.setLineDash([4 * devicePixelRatio, 3 * devicePixelRatio]);
     for (const { kind, from_s: from, to_s: to } of this.scopes.marks) {
       if (kind === "late") this.#stretch(context, [x(from), x(to)], [top, bottom]);
+      if (kind === "fault") this.#strip(context, [x(from), x(to ?? this.scopes.endS)], top);
       if (kind === "swap") this.#line(context, pageColour("ink"), [x(from), top], [x(from), bottom]);
     }
     for (const { fromS, toS, value, text } of this.#limits()) {
@@ -257,6 +260,11 @@ class Plot {
     context.fillRect(from, top, Math.max(to - from, 2 * devicePixelRatio), bottom - top);
   }
 
+  #strip(context, [from, to], top) {
+    context.fillStyle = pageColour("warn");
+    context.fillRect(from, top, to - from, FAULT_PX * devicePixelRatio);
+  }
+
   #edge(context, left, place, isTop, text) {
     context.fillStyle = pageColour("warn");
     context.font = `${11 * devicePixelRatio}px system-ui`;
@@ -269,7 +277,9 @@ class Plot {
     const { left, top } = plot.cursor;
     const isNear = (value, axis, place) => Math.abs(plot.valToPos(value, axis) - place) < NEAR_PX;
     const isIn = (from, to) => left >= plot.valToPos(from, "x") - NEAR_PX && left <= plot.valToPos(to, "x") + NEAR_PX;
-    const timed = this.scopes.marks.filter(({ kind, from_s: from, to_s: to }) => kind !== "pass" && isIn(from, to ?? from));
+    const isUnder = ({ kind, from_s: from, to_s: to }) =>
+      kind === "fault" ? top <= FAULT_PX + NEAR_PX && isIn(from, to ?? this.scopes.endS) : kind !== "pass" && isIn(from, to ?? from);
+    const timed = this.scopes.marks.filter(isUnder);
     const limits = this.#limits().filter(({ value, fromS, toS }) => isIn(fromS, toS) && isNear(value, "y", top));
     const texts = left < 0 ? [] : [...new Set([...timed.map(({ text }) => text), ...limits.map(({ text }) => text)])];
     this.hint.hidden = texts.length === 0;

@@ -13,8 +13,9 @@ use std::net::TcpStream;
 use std::path::PathBuf;
 use tempfile::TempDir;
 
-/// Attached in front of the messages: one swap.
-const MANIFEST: &str = "[process.plant]\nkind = \"plant\"\n[[swap]]\nprocess = \"plant\"\nat_tick = 50\n";
+/// Attached in front of the messages: one swap, one fault.
+const MANIFEST: &str = "[process.plant]\nkind = \"plant\"\n[process.mocap]\nparameters.dropout = 0.1\n\
+                        [[swap]]\nprocess = \"plant\"\nat_tick = 50\n";
 
 /// A recording at work, with states at `/plant/state` every millisecond.
 struct Live {
@@ -94,8 +95,10 @@ fn a_late_vehicle_is_found_in_the_new_blocks_alone() {
     let before = server.get("api/catalogue");
     assert_eq!(
         (names(&before, "vehicles"), names(&before, "marks").len()),
-        (vec!["/plant/state".to_owned()], 1)
+        (vec!["/plant/state".to_owned()], 2)
     );
+    let fault = &before["recordings"][0]["marks"][1];
+    assert_eq!((&fault["kind"], &fault["from_s"]), (&json!("fault"), &json!(0.0)));
     // Attachment and first block.
     for part in 0..20 {
         overwrite(&live.path, part * 9 + 10, 200);
