@@ -42,8 +42,9 @@ use tempfile::TempDir;
 const HUMMINGBUS: &str = env!("CARGO_BIN_EXE_hummingbus");
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 /// Optional outputs of standard messages.
-const STANDARD: [&str; 7] = [
+const STANDARD: [&str; 8] = [
     "plant.odometry",
+    "plant.actuators",
     "imu.data_raw",
     "range.front",
     "range.back",
@@ -90,8 +91,9 @@ fn others_decode_the_frames_and_standard_messages_of_ten_vehicles() {
     let frames = ["transforms[0].child_frame_id\":\"v9/body", "\"child_frame_id\":\"v9/body"];
     let headers = ["body", "range/front", "range/back", "range/down"];
     let headers = headers.map(|frame| format!("\"header.frame_id\":\"v9/{frame}\""));
-    for frame in frames.into_iter().chain(headers.iter().map(String::as_str)) {
-        assert!(text.contains(frame), "no {frame}");
+    let command = "\"topic\":\"/v9/plant/actuators\"";
+    for part in frames.into_iter().chain(headers.iter().map(String::as_str)).chain([command]) {
+        assert!(text.contains(part), "no {part}");
     }
     for script in ["read_mcap_ros2.py", "read_rosbags.py", "read_foxglove.mjs"] {
         let output = read(&readers, script, &recording, &lines).output().unwrap();

@@ -8,7 +8,7 @@ use crate::airworthy;
 use crate::memory::PlantMemory;
 use crate::origin::Origin;
 use crate::others::OthersError;
-use crate::output::Outputs;
+use crate::output::{Outputs, actuators};
 use crate::parameters::{Parameters, unequal};
 use crate::state::RigidBody;
 use bus::InputPorts;
@@ -107,7 +107,8 @@ impl Component for Plant {
         if let Some(trouble) = memory.backend.trouble() {
             return Err(trouble.into());
         }
-        let outputs = Outputs::of(&*memory.backend, &self.frame, context.time_ns());
+        let actuators = actuators(&self.origin.model.vehicle().command, &inputs.command.command);
+        let outputs = Outputs::of(&*memory.backend, &self.frame, actuators, context.time_ns());
         set_body(memory, measured);
         Ok(outputs)
     }

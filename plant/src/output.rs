@@ -4,10 +4,11 @@ use crate::backend::Backend;
 use crate::state::RigidBody;
 use bus::OutputPorts;
 use bus::messages::{
-    Battery, BodyStates, BodyTransform, Contact, FrameName, Odometry, Orientation, PlantState, Point, Pose,
-    PoseStamped, Quaternion,
+    Actuators, Battery, BodyStates, BodyTransform, Contact, FrameName, Odometry, Orientation, PlantState,
+    Point, Pose, PoseStamped, Quaternion,
 };
 use nalgebra::{UnitQuaternion, Vector3};
+use vehicles::CommandMap;
 
 /// The outputs of a plant.
 #[derive(Debug, OutputPorts)]
@@ -20,6 +21,8 @@ pub struct Outputs {
     pub tf: Option<BodyTransform>,
     /// Pose in the world and velocity in the frame of the body, as `nav_msgs/Odometry`.
     pub odometry: Option<Odometry>,
+    /// The motors' command from 0 to 1, as `actuator_msgs/Actuators`.
+    pub actuators: Option<Actuators>,
     /// Contacts of the vehicle; with the backend `rapier`.
     pub contact: Option<Contact>,
     /// The scene's free bodies; with the backend `rapier`.
@@ -29,8 +32,8 @@ pub struct Outputs {
 }
 
 impl Outputs {
-    /// The motion of `backend`, at `time_ns`, of a body with this frame.
-    pub(crate) fn of(backend: &dyn Backend, frame: &FrameName, time_ns: u64) -> Self {
+    /// The motion of `backend`, at `time_ns`, of a body with this frame; `actuators` are the commands that it has.
+    pub(crate) fn of(backend: &dyn Backend, frame: &FrameName, actuators: Actuators, time_ns: u64) -> Self {
         let body = &backend.state().body;
         let (position, orientation) = (point(&body.position_W_m), orientation(&body.attitude_WB));
         Self {
@@ -38,12 +41,18 @@ impl Outputs {
             pose: Some(PoseStamped { pose: Pose { position, orientation }, ..Default::default() }),
             tf: Some(BodyTransform::new(frame, position, orientation)),
             odometry: Some(odometry(body, frame)),
+            actuators: Some(actuators),
             contact: Some(contact(backend)),
             // Without free bodies the port cannot be wired.
             bodies: (!backend.bodies().is_empty()).then(|| bodies(backend)),
             battery: Some(battery_message(backend, time_ns)),
         }
     }
+}
+
+/// Raw commands as shares of the range of the motors.
+pub(crate) fn actuators(map: &CommandMap, commands: &[f64]) -> Actuators {
+    Actuators::new(commands.iter().map(|command| map.share(*command)).collect())
 }
 
 /// The twist of `nav_msgs/Odometry` is in the axes of the child frame.
@@ -162,6 +171,13 @@ mod tests {
         }
         let mut covariances = numbers[7..43].iter().chain(&numbers[49..]);
         assert!(covariances.all(|number| *number == 0.0), "unknown: {numbers:?}");
+    }
+
+    #[test]
+    fn actuators_are_shares_of_the_commands_range() {
+        let vehicle = vehicles::Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml").unwrap();
+        let found = actuators(&vehicle.command, &[0.0, 1.0, 100.5, 765.0]);
+        assert_eq!(found.normalized, [0.0, 0.0, 0.5, 1.0]);
     }
 
     #[test]

@@ -139,7 +139,7 @@ fn schema_prints_every_message_with_units_frames_and_hash() {
         assert_eq!(cells[1..], ["float64", field, unit, frame]);
     }
     ended.prints(&["geometry_msgs/msg/PoseStamped", "tf2_msgs/msg/TFMessage", "nav_msgs/msg/Odometry"]);
-    ended.prints(&["sensor_msgs/msg/Imu", "sensor_msgs/msg/Range"]);
+    ended.prints(&["sensor_msgs/msg/Imu", "sensor_msgs/msg/Range", "actuator_msgs/msg/Actuators"]);
 }
 
 #[test]

@@ -34,10 +34,15 @@ impl CommandMap {
         if self.zero_is_off && command <= 0.0 {
             return 0.0;
         }
+        between(self.speed_at_min_rad_s, self.speed_at_max_rad_s, self.share(command))
+    }
+
+    /// The place of a raw `command` between the smallest, 0, and the largest, 1. A motor that is off has 0, too.
+    #[must_use]
+    pub fn share(&self, command: f64) -> f64 {
         // `max` first: it answers a NaN with `min`.
         let held = command.max(self.min).min(self.max);
-        let share = (held - self.min) / (self.max - self.min);
-        between(self.speed_at_min_rad_s, self.speed_at_max_rad_s, share)
+        (held - self.min) / (self.max - self.min)
     }
 
     /// The raw command that asks for `speed_rad_s`, saturated at the limits of the motor.
@@ -83,6 +88,10 @@ mod tests {
         assert_eq!(MAP.command(0.0), 1.0);
         assert_eq!(MAP.command(1e9), 200.0);
         assert_eq!(MAP.command(f64::NAN), 1.0);
+        assert_eq!(
+            [-5.0, 1.0, 100.5, 1e9, f64::NAN].map(|command| MAP.share(command)),
+            [0.0, 0.0, 0.5, 1.0, 0.0]
+        );
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Standard ROS 2 messages of a vehicle and its sensors, byte-identical to those of ROS 2. Their frames have names of any
 //! length.
 
-use super::{FRAME_BYTES_MAX, FrameName, MapFrame, Orientation, Point, Time, Vector3};
+use super::{FRAME_BYTES_MAX, FrameName, MapFrame, Orientation, PerRotor, Point, Time, Vector3};
 use crate::Message;
 use crate::schema::{FieldType, Kind, NAME_START, Numbers, Primitive};
 use std::mem::offset_of;
@@ -332,6 +332,68 @@ impl StandardRange {
     }
 }
 
+/// The empty string, laid out as CDR writes it in front of a number of 4 bytes.
+#[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+struct NoFrame {
+    length: u32,
+    text: [u8; 4],
+}
+
+impl FieldType for NoFrame {
+    const KIND: Kind = Kind::Text;
+}
+
+/// Commands of the motors, byte-identical to a ROS 2 `actuator_msgs/msg/Actuators` without positions and velocities.
+///
+/// ```
+/// use bus::messages::{Actuators, PerRotor};
+///
+/// let hover = Actuators::new(PerRotor::filled(4, 0.38));
+/// assert_eq!(hover.normalized, [0.38; 4]);
+/// ```
+#[derive(Clone, Copy, Debug, Message)]
+#[repr(C)]
+#[message(
+    type_name = "actuator_msgs/msg/Actuators",
+    definition = "\
+std_msgs/Header header
+float64[] position  # [rad]
+float64[] velocity  # [rad/s]
+float64[] normalized  # [1]
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+"
+)]
+pub struct Actuators {
+    /// Simulation time.
+    pub stamp: Time,
+    /// No frame: an empty name.
+    frame_id: NoFrame,
+    /// Number of positions: none.
+    positions: u32,
+    /// Number of velocities: none.
+    velocities: u32,
+    /// Command of each motor, from 0 to 1.
+    #[field(unit = "1")]
+    pub normalized: PerRotor,
+}
+
+impl Actuators {
+    /// The commands of motors, each from 0 to 1.
+    #[must_use]
+    pub fn new(normalized: PerRotor) -> Self {
+        let frame_id = NoFrame { length: 1, text: [0; 4] };
+        Self { stamp: Time::default(), frame_id, positions: 0, velocities: 0, normalized }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -413,6 +475,20 @@ mod tests {
             cdr.extend(numbers.iter().flat_map(|number| number.to_le_bytes()));
             require(StandardRange::SCHEMA, bytemuck::bytes_of(&range), &cdr);
             assert_eq!(range.numbers(), numbers);
+        }
+    }
+
+    #[test]
+    fn actuators_have_the_bytes_of_their_cdr_for_every_number_of_motors() {
+        for count in 0..=crate::messages::ROTORS_MAX {
+            let numbers: Vec<f64> = (0..count).map(|motor| 0.05 * motor as f64).collect();
+            let mut cdr = stamped(&[""]);
+            cdr.resize(cdr.len().next_multiple_of(4), 0);
+            // No position, no velocity, then the commands.
+            cdr.extend([0, 0, count as u32].into_iter().flat_map(u32::to_le_bytes));
+            let cdr = if count == 0 { cdr } else { doubles(cdr, &numbers) };
+            let actuators = Actuators::new(numbers.into_iter().collect());
+            require(Actuators::SCHEMA, bytemuck::bytes_of(&actuators), &cdr);
         }
     }
 
