@@ -2,8 +2,11 @@
 
 use crate::flight::{Watched, manifest};
 use crate::skipped::skip;
-use crate::support::Place;
+use crate::support::{Place, poll, repository};
+use rustix::process::Signal;
 use std::fs::Permissions;
+use std::io::{Read as _, Write as _};
+use std::net::TcpStream;
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::process::CommandExt;
 use std::path::Path;
@@ -82,9 +85,7 @@ struct Race {
 
 /// Tries, as nobody, to open every file of the runs whose names begin with `prefix` says, until told to end.
 fn race(prefix: &Mutex<String>, folder: &Path, is_over: &AtomicBool) -> Race {
-    // Of this thread alone; it is nobody's to its end.
-    rustix::thread::set_thread_res_gid(gid(NOBODY), gid(NOBODY), gid(NOBODY)).unwrap();
-    rustix::thread::set_thread_res_uid(uid(NOBODY), uid(NOBODY), uid(NOBODY)).unwrap();
+    become_nobody();
     let mut race = Race::default();
     while !is_over.load(Ordering::Relaxed) {
         let prefix = prefix.lock().unwrap().clone();
@@ -103,6 +104,12 @@ fn race(prefix: &Mutex<String>, folder: &Path, is_over: &AtomicBool) -> Race {
         }
     }
     race
+}
+
+/// Makes this thread nobody's, to its end.
+fn become_nobody() {
+    rustix::thread::set_thread_res_gid(gid(NOBODY), gid(NOBODY), gid(NOBODY)).unwrap();
+    rustix::thread::set_thread_res_uid(uid(NOBODY), uid(NOBODY), uid(NOBODY)).unwrap();
 }
 
 /// Ends the race where it is dropped: an assertion that fails must not leave the racer to run for ever.
@@ -130,7 +137,7 @@ fn another_user_who_tries_at_every_moment_opens_no_file_of_a_run() {
     }
     let place = Place::new();
     open_folders(&place);
-    let manifest = crate::support::repository("manifests/hover.toml");
+    let manifest = repository("manifests/hover.toml");
     let (prefix, is_over, folder) =
         (Mutex::new("/nowhere".to_owned()), AtomicBool::new(false), place.path("tmp"));
     let race = std::thread::scope(|scope| {
@@ -155,4 +162,52 @@ fn another_user_who_tries_at_every_moment_opens_no_file_of_a_run() {
     });
     assert!(race.opened.is_empty(), "{:?}", race.opened);
     assert!(race.refused > 10 * RACED_RUNS as u64, "it saw too little of the runs: {}", race.refused);
+}
+
+/// The first line of the answer that nobody gets to a request for `path`.
+fn answer_to_nobody(host: &str, path: &str) -> String {
+    let ask = || {
+        become_nobody();
+        let mut stream = TcpStream::connect(host).unwrap();
+        write!(stream, "GET {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n").unwrap();
+        let mut answer = Vec::new();
+        stream.read_to_end(&mut answer).unwrap();
+        String::from_utf8_lossy(&answer).lines().next().unwrap_or_default().to_owned()
+    };
+    std::thread::scope(|scope| scope.spawn(ask).join().unwrap())
+}
+
+#[test]
+fn another_user_finds_no_token_of_the_view_and_is_refused_without_it() {
+    if !rustix::process::getuid().is_root() {
+        skip("only root can act as a second user");
+        return;
+    }
+    let place = Place::new();
+    open_folders(&place);
+    let (recording, opened) = (place.path("hover.mcap"), place.path("opened"));
+    let manifest = repository("manifests/hover.toml");
+    place.call(&["run", &manifest, "--record", &recording, "--set", "run.duration_s=0.5"]).with_code(1);
+    let script = format!("#!/bin/sh\necho \"$1\" >{opened}.new && mv {opened}.new {opened}\n");
+    let browser = place.write("browser", script);
+    std::fs::set_permissions(&browser, Permissions::from_mode(0o755)).unwrap();
+    let launch = place.start_with(&["view", &recording], &[("BROWSER", &browser)]);
+    let address = poll("no address", || {
+        launch.output().lines().find_map(|line| line.strip_prefix("http://").map(str::to_owned))
+    });
+    let (host, path) = address.split_at(address.find('/').unwrap());
+    let seen = poll("no browser was opened", || std::fs::read_to_string(&opened).ok());
+
+    let page = seen.trim().strip_prefix("file://").unwrap();
+    let [arguments, environment] = ["cmdline", "environ"].map(|file| format!("/proc/{}/{file}", launch.id()));
+    assert!(!succeeds_for_nobody("cat \"$1\" >/dev/null", page), "nobody reads the page that leads there");
+    assert!(!succeeds_for_nobody("cat \"$1\" >/dev/null", &environment), "nobody reads the environment");
+    assert!(!succeeds_for_nobody("grep -qa token= \"$1\"", &arguments), "the arguments have the token");
+    for path in ["/", "/api/catalogue", "/token=00000000000000000000000000000000/api/catalogue"] {
+        assert_eq!(answer_to_nobody(host, path), "HTTP/1.1 403 Forbidden", "{path}");
+    }
+    // What the refusals above are measured against.
+    assert_eq!(answer_to_nobody(host, path), "HTTP/1.1 200 OK");
+    launch.signal(Signal::TERM);
+    launch.end().with_code(0);
 }
