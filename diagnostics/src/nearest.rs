@@ -24,6 +24,22 @@ fn begun<'a>(found: &str, known: &[&'a str]) -> Option<&'a str> {
     begun.next().is_none().then_some(*first)
 }
 
+/// The only name among `known` that `found` is, but for one or two letters; `None` where another name may be meant as well.
+///
+/// ```
+/// use diagnostics::typo_of;
+///
+/// assert_eq!(typo_of("sede", ["seed", "pace"]), Some("seed"));
+/// assert_eq!(typo_of("every_ticks", ["topic", "delay_ticks"]), None);
+/// assert_eq!(typo_of("mix", ["min", "max"]), None);
+/// ```
+pub fn typo_of<'a>(found: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let most = found.len().min(6) / 3;
+    let mut near = known.into_iter().filter(|name| strsim::damerau_levenshtein(found, name) <= most);
+    let first = near.next()?;
+    near.next().is_none().then_some(first)
+}
+
 /// Returns advice on the name `found` that is none of `known`: the one that was probably meant, else `all` and
 /// the names.
 ///

@@ -1,6 +1,6 @@
 //! Parameters of components: the error for one that is refused, and the checks that raise it.
 
-use crate::nearest::nearest;
+use crate::nearest::{nearest, typo_of};
 use crate::place::Place;
 use std::fmt::{self, Display};
 use std::ops::RangeBounds;
@@ -188,9 +188,14 @@ impl ParameterError {
             return nearest(found.strip_prefix('`')?.strip_suffix('`')?, names.split("`, `"));
         }
         let Self::Unknown { key, known } = self else { return None };
-        // The tables on the way are no part of what was misspelt.
-        let written = key.rsplit('.').next().unwrap_or(key);
-        nearest(written, known.iter().map(String::as_str))
+        nearest(last_name(key), known.iter().map(String::as_str))
+    }
+
+    /// The known key that an unknown one is, but for one or two letters.
+    #[must_use]
+    pub fn typo(&self) -> Option<&str> {
+        let Self::Unknown { key, known } = self else { return None };
+        typo_of(last_name(key), known.iter().map(String::as_str))
     }
 
     /// The same with `unit` behind the number that was found, unless it stands there already: for keys whose names do
@@ -264,6 +269,11 @@ impl From<&str> for ParameterError {
     fn from(message: &str) -> Self {
         Self::conflict("", message)
     }
+}
+
+/// Name of a dotted key without the tables on the way, which are not part of a misspelling.
+fn last_name(key: &str) -> &str {
+    key.rsplit('.').next().unwrap_or(key)
 }
 
 fn list(names: &[String]) -> String {

@@ -469,9 +469,9 @@ fn readable_content(sources: &Sources, tree: DeTable<'_>) -> Result<(Content, Ve
     }
 }
 
-/// True if `misread` is an unknown key: then the tree is repaired, by the key that is meant or without it.
+/// True if `misread` is an unknown key: then the tree is repaired. Its value goes to another key only if the key is surely a typo of that.
 fn misread_key(whole: &mut Spanned<DeValue<'_>>, misread: &Misread) -> bool {
-    let meant = misread.error.meant();
+    let meant = misread.error.typo();
     misread.is_unknown_key() && tree::repair(whole.get_mut(), &misread.span(), meant)
 }
 

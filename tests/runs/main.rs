@@ -18,6 +18,7 @@
 //! - [`failures`]: nodes that fail, in every way
 //! - [`cleanup`]: runs that are stopped or killed
 //! - [`refusals`], [`refused_parameters`], [`refused_conditions`], [`refused_flights`]: manifests that are wrong
+//! - [`all_faults`]: all faults of a manifest at once
 //! - [`manifests`]: includes, sets, settings
 //! - [`backups`]: swaps, shadows and standbys in manifests
 //! - [`planted`]: links that another user has planted
@@ -47,6 +48,7 @@
 //! - [`by_hand`]: set points of a person: sent, recorded, sent again
 //! - [`inputs`]: files that are edited after they were read
 
+mod all_faults;
 mod as_printed;
 mod autopilots;
 mod backups;
