@@ -1,7 +1,7 @@
 //! Checks manifests without running them, for the command line and for other programs: editors, tests, fuzzers.
 
 use crate::COMPONENTS;
-use diagnostics::{Diagnostic, Error, Faults};
+use diagnostics::{Diagnostic, Error};
 use runtime::graph::Graph;
 use runtime::manifest::Manifest;
 use scenes::Scene;
@@ -25,17 +25,7 @@ use std::path::Path;
 /// # Ok::<(), hummingbus::Diagnostic>(())
 /// ```
 pub fn check(path: &Path, overrides: &[String]) -> Result<Graph, Diagnostic> {
-    let (manifest, unknown) = Manifest::load_readable(path, overrides, COMPONENTS)?;
-    with_unknown(unknown, Graph::build(&manifest))
-}
-
-/// The graph of a manifest with keys whose faults are `unknown`.
-fn with_unknown(unknown: Option<Diagnostic>, graph: Result<Graph, Diagnostic>) -> Result<Graph, Diagnostic> {
-    let Some(unknown) = unknown else { return graph };
-    let mut faults = Faults::default();
-    faults.keep::<()>(Err(unknown));
-    let graph = faults.keep(graph);
-    faults.finish(graph)
+    Graph::build(&Manifest::load_readable(path, overrides, COMPONENTS)?)
 }
 
 /// As [`check()`], and asks the programs that the manifest names as a `command` for their ports: each is started once, and ends
@@ -54,8 +44,8 @@ fn with_unknown(unknown: Option<Diagnostic>, graph: Result<Graph, Diagnostic>) -
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn check_with_programs(path: &Path, overrides: &[String]) -> Result<Graph, Error> {
-    let (manifest, unknown) = Manifest::load_readable(path, overrides, COMPONENTS)?;
-    let graph = with_unknown(unknown, Graph::build(&manifest))?;
+    let manifest = Manifest::load_readable(path, overrides, COMPONENTS)?;
+    let graph = Graph::build(&manifest)?;
     runtime::check_programs(&manifest, &graph, Path::new("/proc/self/exe"))?;
     Ok(graph)
 }

@@ -33,12 +33,62 @@ pub trait Parameters: DeserializeOwned {
     /// The parameters, in the order in which they are documented.
     const DECLARED: &'static [Parameter];
 
+    /// Errors of all parameters that are outside their ranges, also in the tables.
+    fn out_of_range(&self) -> Vec<ParameterError> {
+        Vec::new()
+    }
+
     /// Refuses a parameter that is outside its range, also in its tables.
     ///
     /// # Errors
     /// The first that is.
     fn validate(&self) -> Result<(), ParameterError> {
-        Ok(())
+        self.out_of_range().into_iter().next().map_or(Ok(()), Err)
+    }
+}
+
+/// All errors of `parameters`, read as a `P`. None follows from another: of a value that is missing or does not go with others, only
+/// the first error counts.
+pub(crate) fn faults<P: Parameters>(parameters: &Value) -> Vec<ParameterError> {
+    let mut rest = parameters.clone();
+    let mut errors: Vec<ParameterError> = Vec::new();
+    loop {
+        let error = match diagnostics::read::<P>(&rest) {
+            Ok(read) => {
+                errors.extend(read.out_of_range());
+                return errors;
+            }
+            Err(error) => error,
+        };
+        let is_removed = remove(&mut rest, error.key());
+        if errors.is_empty() || matches!(error, ParameterError::Unknown { .. } | ParameterError::Value { .. })
+        {
+            errors.push(error);
+        }
+        if !is_removed {
+            return errors;
+        }
+    }
+}
+
+/// Removes the value at the dotted `key`, whose names may have dots in them; false if there is none. An entry is removed with its list,
+/// whose other entries then keep their numbers.
+fn remove(value: &mut Value, key: &str) -> bool {
+    match value {
+        Value::Object(table) => {
+            // The others keep their order, in which their errors are found.
+            table.shift_remove(key).is_some()
+                || key.match_indices('.').any(|(end, _)| {
+                    let (name, rest) = (&key[..end], &key[end + 1..]);
+                    let Some(inner) = table.get_mut(name) else { return false };
+                    remove(inner, rest) || (inner.is_array() && table.shift_remove(name).is_some())
+                })
+        }
+        Value::Array(list) => key.split_once('.').is_some_and(|(index, rest)| {
+            let entry = index.parse::<usize>().ok().and_then(|index| list.get_mut(index));
+            entry.is_some_and(|entry| remove(entry, rest))
+        }),
+        _ => false,
     }
 }
 
@@ -226,6 +276,22 @@ mod tests {
         assert_eq!((own.name, own.unit, own.default.text().as_str()), ("self", "1", "none"));
         assert_eq!((streams.default.text().as_str(), streams.table[0].name), ("none", "rate_hz"));
         assert_eq!((range_of(&finite).as_str(), range_of(&not_negative).as_str()), ("", "0 or more"));
+    }
+
+    #[test]
+    fn all_errors_of_a_table_are_found_and_none_that_follows() {
+        let keys = |value| {
+            let errors = super::faults::<Gains>(&value);
+            errors.iter().map(|error| error.key().to_owned()).collect::<Vec<_>>()
+        };
+        assert_eq!(keys(json!({ "one": 1, "self": "x", "two": 2 })), ["one", "self", "two"]);
+        let ranges =
+            json!({ "named": { "a.b": { "rate_hz": 0.0 } }, "main": { "rate_hz": -1.0 }, "more": 1 });
+        assert_eq!(keys(ranges), ["more", "main.rate_hz", "named.a.b.rate_hz"]);
+        // Without its value of a wrong type the table lacks it, which nobody wrote.
+        assert_eq!(keys(json!({ "main": { "rate_hz": "x" } })), ["main.rate_hz"]);
+        assert_eq!(keys(json!({ "named": { "a.b": { "rate_hz": [] } } })), ["named.a.b.rate_hz"]);
+        assert_eq!(keys(json!({ "streams": [3], "one": 1 })).len(), 2);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use crate::announcement::Announcement;
 use crate::component::{Component, FirstFailure, Info, Role, State, StateError, StepError, Transfer};
 use crate::context::{NodeContext, StepContext};
-use crate::parameters::{Parameter, Parameters};
+use crate::parameters::{self, Parameter, Parameters};
 use crate::plan::{NodePlan, Plan};
 use crate::ports::{InputPorts, InputSamples, Inputs, OutputPorts, OutputSamples, PortSpec};
 use crate::schema::Schema;
@@ -38,6 +38,7 @@ pub struct Registration {
     pub parameters: &'static [Parameter],
     period: fn(&Value, u64) -> Option<u32>,
     check: fn(&Value, &NodeContext<'_>) -> Result<(), ParameterError>,
+    faults: fn(&Value) -> Vec<ParameterError>,
     make: Make,
 }
 
@@ -64,6 +65,7 @@ impl Registration {
                 Some(C::period_ticks(&parameters, tick_ns))
             },
             check: |parameters, context| make::<C>(parameters, context)?.rehearse(context),
+            faults: parameters::faults::<C::Parameters>,
             make: |parameters, context| {
                 let component = make::<C>(parameters, context)?;
                 Ok(Box::new(Made { state: component.initial(), component }))
@@ -89,6 +91,13 @@ impl Registration {
     /// The parameter or file that is not valid.
     pub fn check(&self, parameters: &Value, context: &NodeContext<'_>) -> Result<(), ParameterError> {
         (self.check)(parameters, context)
+    }
+
+    /// All faults of `parameters` that can be found without a node: keys that are unknown, values of a wrong type and numbers out of
+    /// their ranges. None follows from another.
+    #[must_use]
+    pub fn faults(&self, parameters: &Value) -> Vec<ParameterError> {
+        (self.faults)(parameters)
     }
 
     /// True if the component, as `node` of `plan`, goes on in flight from the state of `before` as `node_before`; the run has read

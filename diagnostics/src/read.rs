@@ -145,7 +145,7 @@ pub fn read_tree<T: DeserializeOwned>(tree: &Spanned<DeValue<'_>>) -> Result<T, 
 }
 
 /// A value that the type to be read does not accept.
-#[derive(Debug, thiserror::Error)]
+#[derive(Clone, Debug, thiserror::Error)]
 #[error("{error}")]
 pub struct Misread {
     /// The key, the expected value and the value that was found.
@@ -166,6 +166,12 @@ impl Misread {
     #[must_use]
     pub fn is_unknown_key(&self) -> bool {
         matches!(self.error, ParameterError::Unknown { .. })
+    }
+
+    /// True for a key that is needed and not there.
+    #[must_use]
+    pub fn is_missing(&self) -> bool {
+        matches!(self.error, ParameterError::Missing { .. })
     }
 
     /// Returns the bytes of an earlier place that belongs to the error, such as the first of two equal keys.

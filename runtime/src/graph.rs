@@ -129,8 +129,13 @@ impl Graph {
         manifest.included().for_each(|(path, text)| files.keep(path, text.as_bytes().to_vec()));
         // A fault does not hide those of other keys, so that one look shows all of them.
         let mut faults = Faults::default();
-        let declared_nodes = faults.keep(processes::declared_nodes(manifest, &files));
-        let sidecars = faults.keep(sidecars::sidecars(manifest));
+        faults.keep(manifest.repairs.faults.clone().map_or(Ok(()), Err));
+        let declared_nodes = checkable_nodes(manifest, &files, &mut faults);
+        // A sidecar with a gap may seem to be a node.
+        let sidecars = match manifest.repairs.processes.is_empty() {
+            true => faults.keep(sidecars::sidecars(manifest)),
+            false => None,
+        };
         faults.keep(processes::require_own_logs(manifest));
         let wired = declared_nodes.as_deref().and_then(|nodes| faults.keep(wire_apart(nodes, None)));
         let planned =
@@ -141,18 +146,23 @@ impl Graph {
         let clock_cpu = &manifest.content.run.clock_cpu;
         faults.keep(processes::require_core(manifest, clock_cpu, "clock_cpu"));
         placement::place(&mut plan, clock_cpu.as_ref().map(|cpu| *cpu.get_ref()));
-        let groups = faults.keep(groups::of(manifest, &declared_nodes, &plan.nodes));
+        let is_whole = declared_nodes.iter().all(|declared| !declared.is_unchecked);
+        let groups = match is_whole {
+            true => faults.keep(groups::of(manifest, &declared_nodes, &plan.nodes)),
+            false => None,
+        };
         let groups = groups.map(|groups| placement::place_groups(&plan, groups));
         if manifest.content.run.window_ticks.is_none() && groups.as_ref().is_some_and(|it| !it.is_empty()) {
             plan.window_ticks = GROUPS_WINDOW_TICKS;
         }
-        let periods = faults.keep(periods::check(manifest, &declared_nodes, &plan, notes));
-        if periods.is_some() {
+        let has_times = !manifest.repairs.is_timeless;
+        let periods = has_times.then(|| periods::check(manifest, &declared_nodes, &plan, notes));
+        if faults.keep(periods.unwrap_or(Ok(()))).is_some() {
             set_parameters(&declared_nodes, &mut plan, &faulty, notes, &mut faults);
         }
         faults.keep(recorders::check(&declared_nodes, &plan.nodes));
         let programs: Vec<Program> = declared_nodes.iter().map(|declared| declared.program.clone()).collect();
-        faults.keep(evaluations::check(manifest, &plan, &programs, notes));
+        faults.keep(evaluations::check(manifest, &plan, &programs, notes, is_whole));
         if faults.is_empty() {
             samples::check(&declared_nodes, &plan, notes);
         }
@@ -183,8 +193,22 @@ impl Graph {
     }
 }
 
-/// Puts the checked parameters of all nodes into `plan`. The nodes with a `faulty` input have none: parameters are checked with the
-/// inputs.
+/// The nodes; those that cannot be started, and those with outputs that cannot be, are left unchecked.
+fn checkable_nodes<'m>(
+    manifest: &'m Manifest,
+    files: &'m InputFiles,
+    faults: &mut Faults,
+) -> Option<Vec<DeclaredNode<'m>>> {
+    let declared_nodes = processes::declared_apart(manifest, files, faults);
+    let mut declared_nodes = faults.keep(declared_nodes)?;
+    for declared in declared_nodes.iter_mut().filter(|declared| !declared.is_unchecked) {
+        declared.is_unchecked = faults.keep(outputs::require_outputs(declared)).is_none();
+    }
+    Some(declared_nodes)
+}
+
+/// Puts the checked parameters of all nodes into `plan`. Of a node with a `faulty` input, or with one from an unchecked node, only
+/// the parameters are checked that do not depend on inputs; nor on times, if these are not known.
 fn set_parameters(
     declared_nodes: &[DeclaredNode<'_>],
     plan: &mut Plan,
@@ -192,15 +216,20 @@ fn set_parameters(
     notes: &mut Notes,
     faults: &mut Faults,
 ) {
-    for (index, declared) in declared_nodes.iter().enumerate() {
+    for (index, declared) in declared_nodes.iter().enumerate().filter(|(_, declared)| !declared.is_unchecked)
+    {
         let node = &plan.nodes[index];
-        let of_node = match faulty.get(&index) {
-            Some(fault) => Err(fault.clone()),
-            None => parameters::of(declared, plan, node.period_ticks, notes).and_then(|of_node| {
-                processes::require_replaceable(declared, node)?;
-                Ok(of_node)
-            }),
-        };
+        let fault = faulty.get(&index);
+        faults.keep(fault.cloned().map_or(Ok(()), Err));
+        let is_fed = node.inputs.iter().all(|input| !plan.topics[input.topic].type_name.is_empty());
+        if fault.is_some() || !is_fed || declared.manifest.repairs.is_timeless {
+            faults.keep(parameters::check_alone(declared, plan, node.period_ticks, notes));
+            continue;
+        }
+        let of_node = parameters::of(declared, plan, node.period_ticks, notes).and_then(|of_node| {
+            processes::require_replaceable(declared, node)?;
+            Ok(of_node)
+        });
         if let Some((parameters, files)) = faults.keep(of_node) {
             let node = &mut plan.nodes[index];
             (node.parameters, node.files) = (parameters, files);

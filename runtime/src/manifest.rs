@@ -3,6 +3,7 @@
 //! - `sources`: the texts it is made of, laid end to end, so that one offset names a place in any of them
 //! - `mod@include`: reads the file and the files it includes
 //! - `overrides`: the values given with `--set`
+//! - `repair`: a faulty manifest is repaired, so that all of its faults are told at once
 //! - `tree`: tables with the places of their values, merged
 //! - `sets`: vehicles of process sets become processes
 //! - `replacement`: a backup's differences become a whole process
@@ -24,6 +25,7 @@ mod judging;
 mod overrides;
 mod put;
 mod recorded;
+mod repair;
 mod replacement;
 mod sets;
 mod sources;
@@ -40,9 +42,10 @@ pub(crate) use sets::is_name;
 
 use crate::registry::Registry;
 use diagnostics::parameter::FileFault;
-use diagnostics::{Diagnostic, Misread, ParameterError, Place, read_tree};
+use diagnostics::{Diagnostic, ParameterError, Place, read_tree};
 use file_edits::FileEdit;
 use inputs::InputFiles;
+use repair::Repairs;
 use sources::{Origin, Source, Sources};
 use std::fmt::Display;
 use std::ops::{Range, RangeInclusive};
@@ -73,6 +76,8 @@ pub struct Manifest {
     pub(crate) sources: Sources,
     /// Values of files that `--set` replaces.
     file_edits: Vec<FileEdit>,
+    /// Faults of a manifest that was read for a check, and its gaps.
+    pub(crate) repairs: Repairs,
 }
 
 impl Manifest {
@@ -84,15 +89,14 @@ impl Manifest {
         Self::parse(include::text(path)?, path, overrides, registry)
     }
 
-    /// As [`Manifest::load`] for a check that tells every fault: the manifest, its unknown keys repaired, and the faults of these.
+    /// As [`Manifest::load`] for a check that tells every fault: a faulty manifest is repaired, and [`Graph::build`] tells its faults with
+    /// those that it finds.
+    ///
+    /// [`Graph::build`]: crate::graph::Graph::build
     ///
     /// # Errors
     /// A [`Diagnostic`] that names the place, where the rest cannot be read.
-    pub fn load_readable(
-        path: &Path,
-        overrides: &[String],
-        registry: Registry,
-    ) -> Result<(Self, Option<Diagnostic>), Diagnostic> {
+    pub fn load_readable(path: &Path, overrides: &[String], registry: Registry) -> Result<Self, Diagnostic> {
         let mut sources = include::read(path, include::text(path)?, registry)?;
         overrides.iter().for_each(|text| sources.add(Origin::Override, text.clone()));
         Self::readable(path.to_owned(), sources)
@@ -180,19 +184,18 @@ impl Manifest {
     }
 
     fn of(path: PathBuf, sources: Sources) -> Result<Self, Diagnostic> {
-        let (manifest, unknown) = Self::readable(path, sources)?;
-        unknown.map_or(Ok(manifest), Err)
+        let manifest = Self::readable(path, sources)?;
+        manifest.repairs.faults.clone().map_or(Ok(manifest), Err)
     }
 
-    /// The manifest, its unknown keys repaired, and the faults of these.
-    fn readable(path: PathBuf, sources: Sources) -> Result<(Self, Option<Diagnostic>), Diagnostic> {
+    /// The manifest, repaired.
+    fn readable(path: PathBuf, sources: Sources) -> Result<Self, Diagnostic> {
         let tree = whole_tree(&sources)?;
-        let (content, unknown) = readable_content(&sources, tree)?;
-        let unknown = joined(unknown);
+        let (content, repairs) = repair::readable(&sources, tree)?;
         let edits = file_edits::all(&sources, &content);
         let texts = edits.and_then(|edits| Ok((edits, recorded::text(&sources, &content.process)?)));
-        let (file_edits, recorded_text) = texts.map_err(|fault| fault.and(unknown.clone()))?;
-        Ok((Self { path, recorded_text, content, sources, file_edits }, unknown))
+        let (file_edits, recorded_text) = texts.map_err(|fault| repairs.explain(fault))?;
+        Ok(Self { path, recorded_text, content, sources, file_edits, repairs })
     }
 
     /// Keeps the processes that `is_kept` accepts, for a simulation of a part of the manifest. Groups, conditions and checkpoints go,
@@ -439,67 +442,15 @@ impl Manifest {
         let whole = replacement::whole(&sources, &tree, &name, with)?;
         let whole = Spanned::new(span.clone(), DeValue::Table(whole));
         let whole = read_tree::<Process>(&whole).map_err(|misread| sources.refused(misread))?;
-        let content = content(&sources, tree)?;
+        let (content, repairs) = repair::readable(&sources, tree)?;
+        if let Some(faults) = &repairs.faults {
+            return Err(faults.clone());
+        }
         let (path, recorded_text) = (self.path.clone(), self.recorded_text.clone());
         let file_edits = self.file_edits.clone();
-        Ok((Self { path, recorded_text, content, sources, file_edits }, name, Spanned::new(span, whole)))
+        let manifest = Self { path, recorded_text, content, sources, file_edits, repairs };
+        Ok((manifest, name, Spanned::new(span, whole)))
     }
-}
-
-/// Content of the whole `tree`, its unknown keys repaired, and the faults of these.
-///
-/// # Errors
-/// The faults of the tree and of each process, if it cannot be read.
-fn readable_content(sources: &Sources, tree: DeTable<'_>) -> Result<(Content, Vec<Diagnostic>), Diagnostic> {
-    let mut whole = Spanned::new(0..0, DeValue::Table(tree));
-    let mut unknown = Vec::new();
-    let mut content = loop {
-        match read_tree(&whole) {
-            Ok(content) => break content,
-            Err(first) if !misread_key(&mut whole, &first) => {
-                return Err(faults_of(sources, &whole, first).and(unknown));
-            }
-            // What is left may have faults of its own.
-            Err(misread) => unknown.push(sources.refused(misread)),
-        }
-    };
-    match judging::complete(&mut content, sources) {
-        Ok(()) => Ok((content, unknown)),
-        Err(fault) => Err(fault.and(unknown)),
-    }
-}
-
-/// True if `misread` is an unknown key: then the tree is repaired. Its value goes to another key only if the key is surely a typo of that.
-fn misread_key(whole: &mut Spanned<DeValue<'_>>, misread: &Misread) -> bool {
-    let meant = misread.error.typo();
-    misread.is_unknown_key() && tree::repair(whole.get_mut(), &misread.span(), meant)
-}
-
-/// The fault `first` of the whole tree, with those of each process.
-fn faults_of(sources: &Sources, whole: &Spanned<DeValue<'_>>, first: Misread) -> Diagnostic {
-    let processes = whole.get_ref().get("process").and_then(|processes| processes.get_ref().as_table());
-    let others = processes.into_iter().flatten().filter_map(|(name, process)| {
-        let misread = read_tree::<Process>(process).err()?;
-        let misread = misread.within(&format!("process.{}", name.get_ref()));
-        (misread.span() != first.span()).then(|| sources.refused(misread))
-    });
-    let others: Vec<Diagnostic> = others.collect();
-    sources.refused(first).and(others)
-}
-
-/// Content of the whole `tree`.
-///
-/// # Errors
-/// As [`readable_content`], and the faults of unknown keys.
-fn content(sources: &Sources, tree: DeTable<'_>) -> Result<Content, Diagnostic> {
-    let (content, unknown) = readable_content(sources, tree)?;
-    joined(unknown).map_or(Ok(content), Err)
-}
-
-/// The faults as one, if there are any.
-fn joined(faults: Vec<Diagnostic>) -> Option<Diagnostic> {
-    let mut faults = faults.into_iter();
-    faults.next().map(|first| first.and(faults))
 }
 
 /// Everything that the sources say, with sets expanded and backups made whole.

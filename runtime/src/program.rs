@@ -81,6 +81,22 @@ pub struct Program {
 }
 
 impl Program {
+    /// The program of a process that cannot be started: a check goes on with it.
+    pub(crate) fn unknown() -> Self {
+        Self {
+            executable: Executable::Command(Vec::new()),
+            environment: BTreeMap::new(),
+            working_directory: None,
+            nice: None,
+            realtime_priority: None,
+            on_exit: OnExit::Stop,
+            watchdog: WATCHDOG,
+            ready: Readiness::Started,
+            after: Vec::new(),
+            log: None,
+        }
+    }
+
     /// The component that this is, where the binary brings it.
     pub fn component(&self) -> Option<&'static Registration> {
         match self.executable {

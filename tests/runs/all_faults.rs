@@ -1,7 +1,8 @@
 //! Faults of all stages of a manifest, told at once, and no false ones after them.
 
 use crate::refusals::good;
-use crate::support::Place;
+use crate::support::{Place, repository};
+use std::fs;
 
 /// Checks `text`, which must have the faults with these `parts` of their messages and no others, in this order.
 #[track_caller]
@@ -34,4 +35,66 @@ fn an_unknown_key_is_told_alone() {
     told(&text, &["unknown key `process.ekf.inputs.imu.every_ticks`"]);
     let text = with(&[(imu, "inputs.imu = { topi = \"/imu/imu\" }")]);
     told(&text, &["unknown key `process.ekf.inputs.imu.topi`"]);
+}
+
+/// A pass condition of the good manifest with this `line` in place of its statistic and limit.
+fn pass(line: &str) -> String {
+    format!(
+        "\n[[pass]]\nname = \"a\"\ntopic = \"/plant/state\"\nfield = \"position.z\"\nunit = \"m\"\n{line}\n"
+    )
+}
+
+#[test]
+fn faults_of_every_stage_are_told_at_once() {
+    let place = Place::new();
+    let hummingbird = repository("vehicles/hummingbird.toml");
+    let text = fs::read_to_string(&hummingbird).unwrap();
+    let vehicle =
+        place.write("light.toml", text.replacen("mass = { value = 0.480", "mass = { value = -1", 1));
+    let text = with(&[
+        ("window_ticks = 64", "sed = 1"),
+        ("kind = \"mocap\"", "kind = \"mocup\""),
+        ("\"/imu/imu\"", "\"/imu/imo\""),
+        ("altitude_m = 1.0", "altitude_m = \"high\""),
+    ]);
+    let text = text.replace(&hummingbird, &vehicle) + &pass("statistic = \"evry\"\nmax = 2.0");
+    let parts =
+        ["unknown key `run.sed`", "mass", "no kind `mocup`", "/imu/imo", "`initial_altitude_m`", "`evry`"];
+    told(&text, &parts);
+}
+
+/// Nothing is told that follows from the value that is missing then.
+#[test]
+fn a_value_of_a_wrong_type_hides_no_other_fault() {
+    let imu = "inputs.imu = \"/imu/imu\"";
+    let rate = ("window_ticks = 64", "rate_hz = \"x\"");
+    told(&with(&[rate, (imu, "")]), &["`run.rate_hz`", "no publisher for its input `imu`"]);
+    let limit = with(&[(imu, "")]) + &pass("statistic = \"max\"\nmin = \"a\"");
+    told(&limit, &["no publisher for its input `imu`", "`pass.0.min`"]);
+    let duration = with(&[("duration_s = 0.1", "duration_s = []"), ("kind = \"pid\"", "kind = \"pud\"")]);
+    told(&(duration + &pass("statistic = \"max\"\nmax = 9\nfrom_s = 5.0")), &["`run.duration_s`", "`pud`"]);
+    let both = with(&[]) + &pass("statistic = \"evry\"\nmin = \"a\"\nmx = 1");
+    told(&both, &["`pass.0.statistic`", "`pass.0.min`", "`pass.0.mx`"]);
+}
+
+/// Others read what a process with a fault sends, conditions judge it, and groups hold it.
+#[test]
+fn nothing_is_told_of_what_a_faulty_process_sends() {
+    let judged = "\n[[pass]]\nname = \"a\"\ntopic = \"/mocap/mocap\"\nfield = \"position.z\"\nunit = \"m\"\n\
+                  statistic = \"max\"\nmax = 2.0\n[group.all]\nprocesses = [\"imu\", \"mocap\"]\n";
+    let with = |from: &str, to: &str| with(&[(from, to)]) + judged;
+    told(&with("kind = \"mocap\"", "kind = \"mocup\""), &["no kind `mocup`"]);
+    told(&with("kind = \"mocap\"", "kind = 3"), &["`process.mocap.kind`"]);
+    told(&with("kind = \"mocap\"", "command = [\"/no/such/program\"]"), &["there is no such file"]);
+    told(&with("period_ticks = 5", "period_ticks = \"a\""), &["`process.mocap.period_ticks`"]);
+    told(&with("period_ticks = 5", "outputs.mocap.every_ticks = 0"), &["is due every 0 ticks"]);
+    told(&with("kind = \"recorder\"", "kind = \"recorder\"\ncpu = \"x\""), &["`process.recorder.cpu`"]);
+}
+
+#[test]
+fn all_faults_of_a_table_of_parameters_are_told() {
+    let mocap = |parameters: &str| with(&[("period_ticks = 5", &format!("parameters = {{ {parameters} }}"))]);
+    told(&mocap("rate = 3, delay = 4"), &["unknown key `rate`", "unknown key `delay`"]);
+    told(&mocap("delay_ms = -1, dropout = 2"), &["`delay_ms`", "`dropout`"]);
+    told(&mocap("rate_hz = \"x\", delay = 4"), &["`rate_hz`", "unknown key `delay`"]);
 }

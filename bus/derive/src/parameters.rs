@@ -79,7 +79,16 @@ pub(crate) fn expand(input: &DeriveInput) -> Result<Tokens> {
     let fields = fields(input)?;
     let name = &input.ident;
     let declarations = fields.iter().map(Declared::declaration);
-    let checks = fields.iter().filter_map(Declared::validation);
+    let checks: Vec<_> = fields.iter().filter_map(Declared::validation).collect();
+    let checks = (!checks.is_empty()).then(|| {
+        quote! {
+            fn out_of_range(&self) -> ::std::vec::Vec<::bus::ParameterError> {
+                let mut errors = ::std::vec::Vec::new();
+                #(#checks)*
+                errors
+            }
+        }
+    });
     let deserialize = deserialize(name, &fields);
     let default = has_default(input)?.then(|| default(name, &fields)).transpose()?;
     Ok(quote! {
@@ -87,10 +96,7 @@ pub(crate) fn expand(input: &DeriveInput) -> Result<Tokens> {
         impl ::bus::Parameters for #name {
             const DECLARED: &'static [::bus::parameters::Parameter] = &[#(#declarations),*];
 
-            fn validate(&self) -> ::core::result::Result<(), ::bus::ParameterError> {
-                #(#checks)*
-                ::core::result::Result::Ok(())
-            }
+            #checks
         }
         #deserialize
         #default
@@ -242,11 +248,11 @@ impl<'f> Declared<'f> {
         let Self { ident, name, options, .. } = self;
         if let Some(check) = &options.check {
             return Some(quote! {
-                ::bus::parameters::Numbers::all(&self.#ident, &|number| (#check)(#name, number))?;
+                errors.extend(::bus::parameters::Numbers::all(&self.#ident, &|number| (#check)(#name, number)).err());
             });
         }
         options.table.as_ref()?;
-        let validated = |table: Tokens, key: Tokens| quote!(::bus::Parameters::validate(#table).map_err(|error| error.within(#key))?;);
+        let validated = |table: Tokens, key: Tokens| quote!(errors.extend(::bus::Parameters::out_of_range(#table).into_iter().map(|error| error.within(#key))););
         Some(match options.entry.as_ref().map(LitStr::value).as_deref() {
             None => validated(quote!(&self.#ident), quote!(#name)),
             Some(NUMBER) => {

@@ -140,8 +140,14 @@ impl Run<'_> {
         let process = Process { outputs: self.outputs(node, span), ..whole.clone() };
         let mut declared_nodes = self.declared_nodes.to_vec();
         let files = declared_nodes[node].files;
-        declared_nodes[node] =
-            DeclaredNode { manifest: self.manifest, files, name: &name, process: &process, program };
+        declared_nodes[node] = DeclaredNode {
+            manifest: self.manifest,
+            files,
+            name: &name,
+            process: &process,
+            program,
+            is_unchecked: false,
+        };
         let mut wiring = wire(&declared_nodes, Some(node))?;
         let mut plan = wiring.nodes.swap_remove(node);
         let declared = &declared_nodes[node];

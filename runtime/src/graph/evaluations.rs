@@ -9,30 +9,50 @@ use recorder::RecordingError;
 use std::ops::Range;
 use toml::Spanned;
 
-/// Checks that all topics of the conditions reach the recorder or the judge, and that fields and units exist.
+/// Checks that all topics of the conditions reach the recorder or the judge, and that fields and units exist: of each condition up to
+/// its first fault. In a run with `is_whole` false, some nodes are unchecked: they may be the recorder.
 pub fn check(
     manifest: &Manifest,
     plan: &Plan,
     programs: &[Program],
     notes: &mut Notes,
+    is_whole: bool,
 ) -> Result<(), Diagnostic> {
     let content = &manifest.content;
-    let named = content.pass.iter().chain(&content.measure);
-    Diagnostic::gather(named.map(|condition| check_name(manifest, condition)))?;
-    check_taken(manifest, plan, programs)?;
-    Diagnostic::gather(content.compare.iter().map(|compare| check_window(manifest, plan, compare)))?;
-    let conditions = content.pass.iter().map(|pass| {
-        check_limits(manifest, pass)?;
-        check_field(manifest, plan, pass)?;
-        check_span(manifest, plan, pass, notes)
+    let has_times = !manifest.repairs.is_timeless;
+    let taken = if is_whole { taken(plan, programs) } else { (0..plan.topics.len()).collect() };
+    let compares = content.compare.iter().map(|compare| {
+        let Comparison { simulated, measured, .. } = compare.get_ref();
+        for (key, topic) in [("simulated", simulated), ("measured", measured)] {
+            check_taken(manifest, plan, &taken, &compare.span(), ["", key], topic)?;
+        }
+        if has_times { check_window(manifest, plan, compare) } else { Ok(()) }
     });
-    Diagnostic::gather(conditions)?;
-    let measures = content.measure.iter().map(|measure| {
-        check_no_limits(manifest, measure)?;
-        check_field(manifest, plan, measure)?;
-        check_span(manifest, plan, measure, notes)
+    let compares = Diagnostic::gather(compares).map(drop);
+    let conditions = content.pass.iter().map(|pass| (pass, true));
+    let conditions = conditions.chain(content.measure.iter().map(|measure| (measure, false)));
+    let conditions = conditions.map(|(condition, is_pass)| {
+        check_name(manifest, condition)?;
+        for (table, topic) in condition.get_ref().placed_topics() {
+            check_taken(manifest, plan, &taken, &condition.span(), [table, "topic"], topic)?;
+        }
+        if is_pass {
+            check_limits(manifest, condition)?
+        } else {
+            check_no_limits(manifest, condition)?
+        }
+        check_field(manifest, plan, condition)?;
+        if has_times { check_span(manifest, plan, condition, notes) } else { Ok(()) }
     });
-    Diagnostic::gather(measures).map(drop)
+    let conditions = Diagnostic::gather(conditions).map(drop);
+    Diagnostic::gather([conditions, compares]).map(drop)
+}
+
+/// The topics that the recorder or the judge takes.
+fn taken(plan: &Plan, programs: &[Program]) -> Vec<usize> {
+    let takes_samples = |(_, program): &(_, &Program)| program.is_recorder() || program.is_judge();
+    let takers = plan.nodes.iter().zip(programs).filter(takes_samples);
+    takers.flat_map(|(node, _)| &node.inputs).map(|input| input.topic).collect()
 }
 
 fn kind(condition: &PassCondition) -> &'static str {
@@ -336,35 +356,26 @@ fn unit_of(
     recorder::series::unit_of(schema, topic, field)
 }
 
-/// Refuses a condition on a topic without a publisher, or that neither the recorder nor a judge takes.
-fn check_taken(manifest: &Manifest, plan: &Plan, programs: &[Program]) -> Result<(), Diagnostic> {
-    let content = &manifest.content;
-    let passes = content.pass.iter().chain(&content.measure);
-    let passes = passes.flat_map(|pass| {
-        let topics = pass.get_ref().placed_topics();
-        topics.map(|(table, topic)| (pass.span(), [table, "topic"], topic))
-    });
-    let compares = content.compare.iter().flat_map(|compare| {
-        let Comparison { simulated, measured, .. } = compare.get_ref();
-        [("simulated", simulated), ("measured", measured)]
-            .map(|(key, topic)| (compare.span(), ["", key], topic.as_str()))
-    });
-    let takes_samples = |(_, program): &(_, &Program)| program.is_recorder() || program.is_judge();
-    let takers = plan.nodes.iter().zip(programs).filter(takes_samples);
-    let taken: Vec<usize> = takers.flat_map(|(node, _)| &node.inputs).map(|input| input.topic).collect();
-    for (span, [table, key], topic) in passes.chain(compares) {
-        let at = || key_of(manifest, &span, table, key);
-        let Some(index) = plan.topics.iter().position(|known| known.name == topic) else {
-            let known = plan.topics.iter().map(|topic| topic.name.as_str());
-            let help = did_you_mean(topic, known, "the topics are");
-            return Err(manifest.problem(&at(), format!("nobody publishes {}", printable_line(topic)), help));
-        };
-        if !taken.contains(&index) {
-            let help = "add a process with kind = \"recorder\" that takes it";
-            return Err(manifest.problem(&at(), format!("{topic} is judged but not recorded"), help));
-        }
+/// Refuses the `topic` of the condition or comparison at `span` if it has no publisher, or is none of those `taken`.
+fn check_taken(
+    manifest: &Manifest,
+    plan: &Plan,
+    taken: &[usize],
+    span: &Range<usize>,
+    [table, key]: [&str; 2],
+    topic: &str,
+) -> Result<(), Diagnostic> {
+    let at = || key_of(manifest, span, table, key);
+    let Some(index) = plan.topics.iter().position(|known| known.name == topic) else {
+        let known = plan.topics.iter().map(|topic| topic.name.as_str());
+        let help = did_you_mean(topic, known, "the topics are");
+        return Err(manifest.problem(&at(), format!("nobody publishes {}", printable_line(topic)), help));
+    };
+    if taken.contains(&index) {
+        return Ok(());
     }
-    Ok(())
+    let help = "add a process with kind = \"recorder\" that takes it";
+    Err(manifest.problem(&at(), format!("{topic} is judged but not recorded"), help))
 }
 
 /// Place of the value of `key` in the condition or comparison at `span`, or in its `table` of that name; the `--set` that

@@ -66,6 +66,9 @@ pub fn inputs(
     senders: &Senders<'_, '_>,
 ) -> Result<Vec<InputPlan>, Diagnostic> {
     let DeclaredNode { manifest, name, process, program, .. } = declared;
+    if declared.is_unchecked {
+        return Ok(Vec::new());
+    }
     match program.component().map(|kind| &kind.inputs) {
         Some(Inputs::Any) if process.inputs.is_empty() => {
             let port = |(topic, plan): (usize, &TopicPlan)| InputPlan {
@@ -123,7 +126,9 @@ fn input(
         return Err(at(&["topic"], format!(": nobody publishes {}", setting.topic), help));
     };
     let found = &topics[topic].type_name;
-    if let Some(expected) = expected_type(program, port.get_ref()).filter(|expected| expected != found) {
+    // The topic of an unchecked node has no type.
+    let differs = |expected: &&str| !found.is_empty() && expected != found;
+    if let Some(expected) = expected_type(program, port.get_ref()).filter(differs) {
         if let Some(error) = senders.misstated(topic, expected, &who) {
             return Err(error);
         }

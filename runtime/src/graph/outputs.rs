@@ -26,10 +26,15 @@ pub struct Published {
     pub span: Range<usize>,
 }
 
+/// Refuses outputs of `declared` that cannot be.
+pub fn require_outputs(declared: &DeclaredNode<'_>) -> Result<(), Diagnostic> {
+    published_by(0, declared).map(drop)
+}
+
 /// Returns all outputs of `declared_nodes`, each with its topic; refuses two on one topic.
 pub fn publish_all(declared_nodes: &[DeclaredNode<'_>]) -> Result<Vec<Published>, Diagnostic> {
     let mut all: Vec<Published> = Vec::new();
-    for (node, declared) in declared_nodes.iter().enumerate() {
+    for (node, declared) in declared_nodes.iter().enumerate().filter(|(_, declared)| !declared.is_unchecked) {
         for output in published_by(node, declared)? {
             let (topic, port, name) = (&output.topic.name, &output.port, declared.name.get_ref());
             if let Some(other) = all.iter().find(|other| other.topic.name == *topic) {
@@ -43,8 +48,33 @@ pub fn publish_all(declared_nodes: &[DeclaredNode<'_>]) -> Result<Vec<Published>
             all.push(output);
         }
     }
+    for (node, declared) in declared_nodes.iter().enumerate().filter(|(_, declared)| declared.is_unchecked) {
+        publish_unchecked(node, declared, &mut all);
+    }
     resolve_forwarded(declared_nodes, &mut all)?;
     Ok(all)
+}
+
+/// Adds the topics that an unchecked node may send: those that it states, and those that others expect of it.
+fn publish_unchecked(node: usize, declared: &DeclaredNode<'_>, all: &mut Vec<Published>) {
+    let DeclaredNode { manifest, name, process, .. } = declared;
+    let own = format!("/{}/", name.get_ref());
+    let stated = process.outputs.iter().map(|(port, setting)| {
+        let topic = setting.topic.clone().unwrap_or_else(|| format!("{own}{}", port.get_ref()));
+        (topic, setting.type_name.clone().unwrap_or_default())
+    });
+    let inputs = manifest.content.process.values().flat_map(|process| process.inputs.values());
+    let conditions = manifest.content.conditions();
+    let expected = inputs.map(|input| input.topic.as_str()).chain(conditions.topics());
+    let expected = expected.filter(|topic| topic.starts_with(&own));
+    let expected = expected.map(|topic| (topic.to_owned(), String::new()));
+    for (name, type_name) in stated.chain(expected) {
+        if all.iter().all(|known| known.topic.name != name) {
+            let topic = TopicPlan { name, type_name, period_ticks: 1 };
+            let (port, span) = (topic.name.replacen(&own, "", 1), declared.name.span());
+            all.push(Published { node, topic, forwards: None, port, span });
+        }
+    }
 }
 
 /// Gives the outputs that forward a topic its type.
@@ -58,7 +88,9 @@ fn resolve_forwarded(declared_nodes: &[DeclaredNode<'_>], all: &mut [Published])
             let Some(type_name) = source.map(|source| source.topic.type_name.clone()) else { continue };
             let output = &mut all[index];
             let declared = &declared_nodes[output.node];
-            require_forwardable(declared, output, &type_name)?;
+            if !type_name.is_empty() {
+                require_forwardable(declared, output, &type_name)?;
+            }
             output.topic.type_name = type_name;
             output.forwards = None;
         }

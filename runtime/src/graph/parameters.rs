@@ -4,6 +4,7 @@ use super::processes::{DeclaredNode, files};
 use super::{placeholders, ranges};
 use crate::manifest::{InputSetting, Manifest, Process};
 use crate::program::Executable;
+use bus::Registration;
 use bus::context::{InputMessage, NodeContext, SampleTimes};
 use bus::plan::Plan;
 use diagnostics::{Diagnostic, ParameterError};
@@ -81,6 +82,38 @@ pub fn of(
     period_ticks: u32,
     notes: &mut Notes,
 ) -> Result<(serde_json::Value, Vec<InputFile>), Diagnostic> {
+    checked(declared, plan, period_ticks, notes, Scope::All)
+}
+
+/// Checks the parameters of `declared` that do not depend on its inputs and on times, and the files that it names.
+///
+/// # Errors
+/// Their faults.
+pub fn check_alone(
+    declared: &DeclaredNode<'_>,
+    plan: &Plan,
+    period_ticks: u32,
+    notes: &mut Notes,
+) -> Result<(), Diagnostic> {
+    checked(declared, plan, period_ticks, notes, Scope::Alone).map(drop)
+}
+
+/// Extent of a check.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Scope {
+    /// All faults.
+    All,
+    /// Faults that do not depend on the inputs of the node and on times.
+    Alone,
+}
+
+fn checked(
+    declared: &DeclaredNode<'_>,
+    plan: &Plan,
+    period_ticks: u32,
+    notes: &mut Notes,
+    scope: Scope,
+) -> Result<(serde_json::Value, Vec<InputFile>), Diagnostic> {
     let DeclaredNode { manifest, name, process, program, .. } = declared;
     let read = declared.files.listing_anew();
     let mut parameters = stated(declared)?;
@@ -118,7 +151,7 @@ pub fn of(
     } else if program.is_judge() {
         return Ok((serde_json::json!({ "conditions": manifest.content.conditions() }), Vec::new()));
     } else if let Executable::Component(kind) = &program.executable {
-        ranges::check(manifest, name, process)?;
+        let ranges = ranges::check(manifest, name, process);
         let inputs: Vec<&str> = process.inputs.keys().map(|port| port.get_ref().as_str()).collect();
         let outputs: Vec<&str> = process.outputs.keys().map(|port| port.get_ref().as_str()).collect();
         let messages = messages(declared, plan);
@@ -128,12 +161,19 @@ pub fn of(
             .timed(plan.tick_ns, period_ticks, plan.duration_ticks)
             .seeded(plan.seed)
             .given(&read);
-        let checked = kind.check(&parameters, &context).map_err(|error| {
+        let refused = |error: ParameterError| {
             let error = edited.iter().fold(error, |error, (key, original, copy)| {
                 manifest.without_copy(declared.files, (name.get_ref(), key), (original, copy), error)
             });
-            refused(declared, &error)
-        });
+            Err::<(), _>(refused(declared, &error))
+        };
+        // No kind is made of a number that is out of all range.
+        let errors = match ranges.is_ok().then(|| kind.check(&parameters, &context)) {
+            None => kind.faults(&parameters),
+            Some(Ok(())) => Vec::new(),
+            Some(Err(first)) => all_errors(kind, &parameters, first, scope),
+        };
+        let checked = beside(ranges, Diagnostic::gather(errors.into_iter().map(refused)).map(drop));
         notes.times.entry(name.get_ref().clone()).or_insert_with(|| context.times());
         // A firmware has files beside its program.
         if has_firmware {
@@ -174,6 +214,29 @@ fn stated<'a>(declared: &DeclaredNode<'a>) -> Result<BTreeMap<&'a str, serde_jso
         Ok((key.get_ref().as_str(), value))
     };
     declared.process.parameters.iter().map(of).collect()
+}
+
+/// The errors of `parameters`, which `kind` refuses for the `first` of them.
+fn all_errors(
+    kind: &Registration,
+    parameters: &serde_json::Value,
+    first: ParameterError,
+    scope: Scope,
+) -> Vec<ParameterError> {
+    let mut errors = kind.faults(parameters);
+    let is_told = scope == Scope::All || matches!(first, ParameterError::File { .. });
+    if is_told && !errors.contains(&first) {
+        errors.insert(0, first);
+    }
+    errors
+}
+
+/// Both faults; of those at one place, the `first`.
+fn beside(first: Result<(), Diagnostic>, second: Result<(), Diagnostic>) -> Result<(), Diagnostic> {
+    let (Err(first), Err(second)) = (&first, &second) else { return first.and(second) };
+    let more: Vec<_> =
+        second.all().filter(|fault| first.all().all(|other| other.place != fault.place)).collect();
+    Err(first.clone().and(more))
 }
 
 /// The parameter `gains` of a built-in controller that names the gains file at `path` and has the table `stated` in its parameters:

@@ -8,7 +8,7 @@ use bus::component::Transfer;
 use bus::plan::NodePlan;
 use bus::process::{LAUNCHER_VARIABLE, RUN_VARIABLE};
 use bus::{GENERATION_VARIABLE, NODE_VARIABLE, Registration};
-use diagnostics::{Diagnostic, did_you_mean, nearest};
+use diagnostics::{Diagnostic, Faults, did_you_mean, nearest};
 use inputs::InputFiles;
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -31,6 +31,8 @@ pub struct DeclaredNode<'m> {
     pub process: &'m Process,
     /// Its program.
     pub program: Program,
+    /// True for a node with a fault that hides what it reads and sends: a check goes on without looking at it.
+    pub is_unchecked: bool,
 }
 
 impl DeclaredNode<'_> {
@@ -48,13 +50,34 @@ pub fn declared_nodes<'m>(
     manifest: &'m Manifest,
     files: &'m InputFiles,
 ) -> Result<Vec<DeclaredNode<'m>>, Diagnostic> {
-    let declared = |(name, process)| {
-        require_no_sidecar(manifest, name, process)?;
-        let program = program(manifest, name, process)?;
-        Ok(DeclaredNode { manifest, files, name, process, program })
+    let mut faults = Faults::default();
+    let declared_nodes = declared_apart(manifest, files, &mut faults);
+    let declared_nodes = faults.keep(declared_nodes);
+    faults.finish(declared_nodes)
+}
+
+/// As [`declared_nodes`], for a check that goes on: a node with a fault, which goes to `faults`, is left unchecked.
+///
+/// # Errors
+/// If there is none.
+pub fn declared_apart<'m>(
+    manifest: &'m Manifest,
+    files: &'m InputFiles,
+    faults: &mut Faults,
+) -> Result<Vec<DeclaredNode<'m>>, Diagnostic> {
+    let declared = |(name, process): (&'m Spanned<String>, &'m Process)| {
+        let has_gap = manifest.repairs.processes.contains(name.get_ref());
+        let program = (!has_gap).then(|| {
+            require_no_sidecar(manifest, name, process)?;
+            program(manifest, name, process)
+        });
+        let program = program.and_then(|program| faults.keep(program));
+        let is_unchecked = program.is_none();
+        let program = program.unwrap_or_else(Program::unknown);
+        DeclaredNode { manifest, files, name, process, program, is_unchecked }
     };
     let declared_nodes = manifest.content.process.iter().filter(|(_, process)| takes_part(process));
-    let declared_nodes = Diagnostic::gather(declared_nodes.map(declared))?;
+    let declared_nodes: Vec<_> = declared_nodes.map(declared).collect();
     if declared_nodes.is_empty() {
         let file = manifest.path.display().to_string();
         return Err(Diagnostic::in_file(file, "there is no process").help("add [process.<name>] tables"));

@@ -41,10 +41,12 @@ pub fn wire_apart(
     let senders = Senders { declared_nodes, published: &published };
     let mut nodes = Diagnostic::gather(declared_nodes.iter().enumerate().map(|(index, declared)| {
         let process = declared.process;
+        let is_checked = !declared.is_unchecked;
+        let stated = || processes::period_ticks(declared.manifest, process, declared.program.component());
         let inputs = inputs::inputs(declared, &topics, &senders);
         Ok(NodePlan {
             name: declared.name.get_ref().clone(),
-            period_ticks: processes::period_ticks(declared.manifest, process, declared.program.component())?,
+            period_ticks: if is_checked { stated()? } else { 1 },
             wait: process.wait.unwrap_or_default(),
             cpu: process.cpu.as_ref().map(|cpu| *cpu.get_ref()),
             inputs: inputs.map_err(|fault| faulty.insert(index, fault)).unwrap_or_default(),
@@ -52,7 +54,7 @@ pub fn wire_apart(
             parameters: serde_json::Value::Null,
             files: Vec::new(),
             restarts: declared.program.on_exit == OnExit::Restart,
-            computing_time: computing_time::of(declared)?,
+            computing_time: if is_checked { computing_time::of(declared)? } else { None },
             is_recorder: declared.program.is_recorder(),
             is_built_in: declared.program.kind().is_some(),
         })

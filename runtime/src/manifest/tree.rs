@@ -62,25 +62,50 @@ pub fn deepest(span: &Range<usize>, value: &Spanned<DeValue<'_>>, path: &[&str])
     places
 }
 
-/// Gives the value of the unknown key at `span` to the key that is `meant`, if that is absent, and removes it otherwise; false if
-/// there is no key at `span`.
-pub fn repair(value: &mut DeValue<'_>, span: &Range<usize>, meant: Option<&str>) -> bool {
+/// Gives the value of the unknown key at `span` to the key that is `meant`, if that is absent, and removes it otherwise. True if the
+/// value has moved; `None` if there is no key at `span`.
+pub fn repair(value: &mut DeValue<'_>, span: &Range<usize>, meant: Option<&str>) -> Option<bool> {
     match value {
         DeValue::Table(table) => {
             let Some(key) = table.keys().find(|key| key.span() == *span).map(|key| key.get_ref().to_string())
             else {
-                return table.iter_mut().any(|(_, value)| repair(value.get_mut(), span, meant));
+                return table.iter_mut().find_map(|(_, value)| repair(value.get_mut(), span, meant));
             };
-            let value = table.remove(key.as_str());
+            let value = table.remove(key.as_str())?;
             let meant = meant.filter(|meant| !table.contains_key(*meant));
-            if let (Some(value), Some(meant)) = (value, meant) {
+            if let Some(meant) = meant {
                 table.insert(Spanned::new(span.clone(), meant.to_owned().into()), value);
             }
-            true
+            Some(meant.is_some())
         }
-        DeValue::Array(array) => array.iter_mut().any(|value| repair(value.get_mut(), span, meant)),
+        DeValue::Array(array) => array.iter_mut().find_map(|value| repair(value.get_mut(), span, meant)),
+        _ => None,
+    }
+}
+
+/// Removes the key whose value lies at `span` within `value`, or is a list with an entry there; false if there is none.
+pub fn remove(value: &mut DeValue<'_>, span: &Range<usize>) -> bool {
+    match value {
+        DeValue::Table(table) => {
+            // A list of tables has the place of its first table.
+            if table.iter_mut().any(|(_, value)| remove(value.get_mut(), span)) {
+                return true;
+            }
+            let is_it = |value: &Spanned<DeValue<'_>>| value.span() == *span || lists(value.get_ref(), span);
+            let key = table.iter().find(|(_, value)| is_it(value)).map(|(key, _)| key.get_ref().to_string());
+            key.is_some_and(|key| table.remove(key.as_str()).is_some())
+        }
+        DeValue::Array(array) => array.iter_mut().any(|value| remove(value.get_mut(), span)),
         _ => false,
     }
+}
+
+/// True if `value` is a list with an entry at `span`.
+fn lists(value: &DeValue<'_>, span: &Range<usize>) -> bool {
+    let entries = value.as_array();
+    entries.is_some_and(|entries| {
+        entries.iter().any(|entry| entry.span() == *span || lists(entry.get_ref(), span))
+    })
 }
 
 fn shifted(value: Spanned<DeValue<'_>>, base: usize) -> Spanned<DeValue<'_>> {
