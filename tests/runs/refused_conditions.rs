@@ -107,11 +107,24 @@ fn a_comparison_without_a_limit_or_with_another_window_than_the_plant_has() {
     ];
     set(&window).says(&["`window_s` is 1 s, but the plant behind /plant-1s/state is set every 0.2 s"]);
     let text = std::fs::read_to_string(&manifest).unwrap().replace("../vehicles", &repository("vehicles"));
-    let lines: Vec<&str> = text.lines().filter(|line| !line.starts_with("max_")).collect();
+    let is_kept = |line: &&str| !line.starts_with("max_") && !line.starts_with("judged");
+    let lines: Vec<&str> = text.lines().filter(is_kept).collect();
     let limitless = place.write("limitless.toml", lines.join("\n"));
     let args = ["check", &limitless, "--set", &flight, "--set", "process.player.parameters.from_s=0.0"];
     let args = [&args[..], &["--set", "run.duration_s=1.001"]].concat();
-    place.call(&args).with_code(2).says(&["the comparison has no limit, so it cannot fail"]);
+    place
+        .call(&args)
+        .with_code(2)
+        .says(&["the comparison has no limit, so it cannot fail", "judged = false"]);
+    set(&[
+        "--set",
+        "process.player.parameters.from_s=0.0",
+        "--set",
+        "run.duration_s=1.001",
+        "--set",
+        "compare.0.judged=false",
+    ])
+    .says(&["`max_position_m` is a limit of a comparison that is not judged"]);
 }
 
 #[test]

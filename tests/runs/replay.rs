@@ -84,7 +84,8 @@ fn replay_made_up(place: &Place, limit_m: f64) -> Ended {
     let text = fs::read_to_string(repository(MANIFEST)).unwrap();
     let text = text.replace("../vehicles", &repository("vehicles")).replace("from_s = 6.0", "from_s = 0.0");
     // The made-up flight is none of the vehicle's: the limits of the real one do not hold for it.
-    let text: Vec<&str> = text.lines().filter(|line| !line.starts_with("max_")).collect();
+    let is_kept = |line: &&str| !line.starts_with("max_") && !line.starts_with("judged");
+    let text: Vec<&str> = text.lines().filter(is_kept).collect();
     let text = format!("{}\n", text.join("\n"));
     let limits = format!("max_position_m = {limit_m:?}\n");
     let text = text.split_inclusive('\n').fold(String::new(), |text, line| {
@@ -115,7 +116,20 @@ fn a_row_that_lies_on_a_tick_is_sent_as_it_stands() {
 #[test]
 fn a_comparison_beyond_its_limit_fails_the_run() {
     let place = Place::new();
-    replay_made_up(&place, 1e-6).with_code(1).prints(&["/plant-1s/state after 1 s", "FAILED"]);
+    replay_made_up(&place, 1e-6)
+        .with_code(1)
+        .prints(&["  FAILED /plant-1s/state after 1 s", "(at most 0.000001)"]);
+}
+
+/// Each figure stands beside its limit; errors without a limit are values.
+#[test]
+fn a_summary_shows_what_a_comparison_has_judged() {
+    let Some(data) = data() else { return };
+    let place = Place::new();
+    let args = ["run", &repository(MANIFEST), "--record", &place.path("a.mcap")];
+    let ended = place.start_with(&args, &[("HUMMINGBUS_DATA", data.as_str())]).end().with_code(0);
+    ended.prints(&["  ok     /plant-100ms/state after 0.1 s", "m (at most 0.06)", "deg (at most 30)"]);
+    ended.prints(&["  value  /plant-500ms/state after 0.5 s", "  value  /plant-1s/state after 1 s"]);
 }
 
 #[test]

@@ -56,9 +56,13 @@ pub struct Verdict {
 ///     position_rms_m: 0.012,
 ///     velocity_rms_m_s: 0.1,
 ///     attitude_rms_deg: 2.5,
+///     max_position_m: Some(0.01),
+///     max_velocity_m_s: None,
+///     max_attitude_deg: Some(3.0),
 ///     passed: false,
 /// };
-/// assert!(errors.to_string().ends_with("position 0.0120 m, velocity 0.1000 m/s, attitude 2.500 deg  FAILED"));
+/// let text = "position 0.0120 m (at most 0.01), velocity 0.1000 m/s, attitude 2.500 deg (at most 3)";
+/// assert_eq!(errors.to_string(), format!("  FAILED /plant/state after 0.5 s (RMS over 8 windows): {text}"));
 /// ```
 #[derive(Debug, Serialize)]
 pub struct WindowErrors {
@@ -74,6 +78,12 @@ pub struct WindowErrors {
     pub velocity_rms_m_s: f64,
     /// RMS angle of the attitude error.
     pub attitude_rms_deg: f64,
+    /// Upper limit of the position error.
+    pub max_position_m: Option<f64>,
+    /// Upper limit of the velocity error.
+    pub max_velocity_m_s: Option<f64>,
+    /// Upper limit of the attitude error.
+    pub max_attitude_deg: Option<f64>,
     /// True if all limits held.
     pub passed: bool,
 }
@@ -116,13 +126,14 @@ impl WindowErrors {
     /// If both states have no sample at the end of a window.
     pub(crate) fn of(compare: &Comparison, found: &WindowFigures) -> Result<Self> {
         let Comparison { simulated, measured, window_s, .. } = compare;
+        let Comparison { max_position_m, max_velocity_m_s, max_attitude_deg, .. } = *compare;
         let WindowFigures { windows, position_rms_m, velocity_rms_m_s, attitude_rms_deg } = *found;
         if windows == 0 {
             bail!("{simulated} and {measured} have no common sample at the end of a window of {window_s} s");
         }
-        let passed = within(position_rms_m, None, compare.max_position_m)
-            && within(velocity_rms_m_s, None, compare.max_velocity_m_s)
-            && within(attitude_rms_deg, None, compare.max_attitude_deg);
+        let passed = within(position_rms_m, None, max_position_m)
+            && within(velocity_rms_m_s, None, max_velocity_m_s)
+            && within(attitude_rms_deg, None, max_attitude_deg);
         Ok(Self {
             simulated: simulated.clone(),
             window_s: *window_s,
@@ -130,6 +141,9 @@ impl WindowErrors {
             position_rms_m,
             velocity_rms_m_s,
             attitude_rms_deg,
+            max_position_m,
+            max_velocity_m_s,
+            max_attitude_deg,
             passed,
         })
     }
@@ -176,11 +190,18 @@ impl fmt::Display for WindowErrors {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { simulated, window_s, windows, position_rms_m, velocity_rms_m_s, attitude_rms_deg, .. } =
             self;
-        let mark = if self.passed { "" } else { "  FAILED" };
+        let limits = [self.max_position_m, self.max_velocity_m_s, self.max_attitude_deg];
+        let mark = match (limits.iter().any(Option::is_some), self.passed) {
+            (_, false) => "FAILED",
+            (true, true) => "ok    ",
+            (false, true) => "value ",
+        };
+        let [position, velocity, attitude] =
+            limits.map(|limit| limit.map_or(String::new(), |limit| format!(" (at most {limit})")));
         write!(
             f,
-            "  {simulated} after {window_s} s (RMS over {windows} windows): position {position_rms_m:.4} m, \
-             velocity {velocity_rms_m_s:.4} m/s, attitude {attitude_rms_deg:.3} deg{mark}"
+            "  {mark} {simulated} after {window_s} s (RMS over {windows} windows): position {position_rms_m:.4} m{position}, \
+             velocity {velocity_rms_m_s:.4} m/s{velocity}, attitude {attitude_rms_deg:.3} deg{attitude}"
         )
     }
 }

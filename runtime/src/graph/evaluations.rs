@@ -225,8 +225,12 @@ fn check_window(manifest: &Manifest, plan: &Plan, compare: &Spanned<Comparison>)
         ("max_attitude_deg", compare.max_attitude_deg),
     ];
     let mut stated = limits.into_iter().filter_map(|(key, limit)| Some((key, limit?))).peekable();
-    if stated.peek().is_none() {
-        let help = "add max_position_m, max_velocity_m_s or max_attitude_deg";
+    if let (false, Some((key, _))) = (compare.judged, stated.peek()) {
+        let help = "leave the limit or `judged = false` out";
+        return at(key, format!("`{key}` is a limit of a comparison that is not judged"), help);
+    }
+    if compare.judged && stated.peek().is_none() {
+        let help = "add max_position_m, max_velocity_m_s or max_attitude_deg; with judged = false the errors are only reported";
         return at("", "the comparison has no limit, so it cannot fail".to_owned(), help);
     }
     if let Some(set_s) = reset_window_s(plan, simulated).filter(|set_s| *set_s != window_s) {

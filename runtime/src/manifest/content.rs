@@ -520,6 +520,13 @@ pub struct Comparison {
     pub max_velocity_m_s: Option<f64>,
     /// Upper limit of the RMS attitude error; no limit where absent.
     pub max_attitude_deg: Option<f64>,
+    /// False if the errors are reported and not judged.
+    #[serde(default = "default_judged")]
+    pub judged: bool,
+}
+
+fn default_judged() -> bool {
+    true
 }
 
 /// A process that takes over from another in flight.
