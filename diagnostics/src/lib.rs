@@ -35,7 +35,7 @@ pub mod unit;
 pub use component_failure::ComponentFailure;
 pub use diagnostic::{Diagnostic, Faults};
 pub use error::{Error, Result, find_diagnostic, has_text_of};
-pub use nearest::{did_you_mean, nearest, typo_of};
+pub use nearest::{did_you_mean, nearest, suggestion, typo_of};
 pub use parameter::ParameterError;
 pub use place::Place;
 pub use plain::plain;

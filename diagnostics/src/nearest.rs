@@ -9,18 +9,50 @@
 /// assert_eq!(nearest("PID", ["pid", "lqr"]), Some("pid"));
 /// assert_eq!(nearest("baro", ["barometer", "battery"]), Some("barometer"));
 /// assert_eq!(nearest("xyz", ["command", "state"]), None);
+/// assert_eq!(nearest("rnu", ["run", "fly"]), Some("run"), "two letters that change places are one fault");
+/// assert_eq!(nearest("gyro_noise", ["gyro_cross_axis", "gyro_noise_density"]), Some("gyro_noise_density"));
+/// assert_eq!(nearest("every_ticks", ["delay_ticks"]), None, "a common end alone is not enough");
 /// ```
 pub fn nearest<'a>(found: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let (found, known) = (found.to_lowercase(), known.into_iter().collect::<Vec<_>>());
-    let scored = known.iter().map(|name| (strsim::levenshtein(&found, &name.to_lowercase()), *name));
-    let near = scored.filter(|(distance, name)| *distance <= name.len().div_ceil(3)).min();
-    near.map(|(_, name)| name).or_else(|| begun(&found, &known))
+    let scored = || known.iter().filter_map(|name| Some((distance(&found, &name.to_lowercase())?, *name)));
+    begun(&found, &known).or_else(|| scored().min().map(|(_, name)| name))
 }
 
-/// The only name that begins with `found`, if that has three letters or more.
+/// The names among `known` that `found` was probably meant to be: the nearest, or those with a word that begins with `found`.
+fn suggested<'a>(found: &str, known: &[&'a str]) -> Vec<&'a str> {
+    /// More would be a list of the names.
+    const MOST: usize = 3;
+    if let Some(nearest) = nearest(found, known.iter().copied()) {
+        return vec![nearest];
+    }
+    let found = found.to_lowercase();
+    let holds = |name: &&&str| name.to_lowercase().split('_').any(|word| word.starts_with(&found));
+    let names: Vec<&str> = known.iter().filter(holds).copied().collect();
+    if found.len() < SHORTEST || names.len() > MOST { Vec::new() } else { names }
+}
+
+/// Fewer letters are the beginning of too many words.
+const SHORTEST: usize = 3;
+
+/// Number of faults by which `found` differs from `name`; `None` if it is too different. Words at the end that both have, such as a
+/// unit, do not count.
+fn distance(found: &str, name: &str) -> Option<usize> {
+    let (mut found, mut name) = (found, name);
+    while let (Some((before, last)), Some((before_name, last_name))) =
+        (found.rsplit_once('_'), name.rsplit_once('_'))
+        && last == last_name
+    {
+        (found, name) = (before, before_name);
+    }
+    let distance = strsim::damerau_levenshtein(found, name);
+    (distance <= name.len().div_ceil(3)).then_some(distance)
+}
+
+/// The only name that begins with `found`, if that is not too short.
 fn begun<'a>(found: &str, known: &[&'a str]) -> Option<&'a str> {
     let mut begun = known.iter().filter(|name| name.to_lowercase().starts_with(found));
-    let first = begun.next().filter(|_| found.len() >= 3)?;
+    let first = begun.next().filter(|_| found.len() >= SHORTEST)?;
     begun.next().is_none().then_some(*first)
 }
 
@@ -40,6 +72,23 @@ pub fn typo_of<'a>(found: &str, known: impl IntoIterator<Item = &'a str>) -> Opt
     near.next().is_none().then_some(first)
 }
 
+/// Returns the question for the name that `found` was probably meant to be among `known`, or for up to three such names; `None` if there
+/// is none.
+///
+/// ```
+/// use diagnostics::suggestion;
+///
+/// assert_eq!(suggestion("comand", ["command", "state"]).as_deref(), Some("did you mean `command`?"));
+/// let noises = suggestion("nois", ["position_noise_m", "attitude_noise_deg", "rate_hz"]);
+/// assert_eq!(noises.as_deref(), Some("did you mean `position_noise_m` or `attitude_noise_deg`?"));
+/// assert_eq!(suggestion("xyz", ["command", "state"]), None);
+/// ```
+pub fn suggestion<'a>(found: &str, known: impl IntoIterator<Item = &'a str>) -> Option<String> {
+    let known: Vec<&str> = known.into_iter().collect();
+    let names = suggested(found, &known);
+    (!names.is_empty()).then(|| format!("did you mean `{}`?", names.join("` or `")))
+}
+
 /// Returns advice on the name `found` that is none of `known`: the one that was probably meant, else `all` and
 /// the names.
 ///
@@ -53,8 +102,8 @@ pub fn typo_of<'a>(found: &str, known: impl IntoIterator<Item = &'a str>) -> Opt
 #[must_use]
 pub fn did_you_mean<'a>(found: &str, known: impl IntoIterator<Item = &'a str>, all: &str) -> String {
     let known: Vec<&str> = known.into_iter().collect();
-    match nearest(found, known.iter().copied()) {
-        Some(near) => format!("did you mean `{near}`?"),
+    match suggestion(found, known.iter().copied()) {
+        Some(question) => question,
         None if known.is_empty() => "there is none".to_owned(),
         None => format!("{all} {}", known.join(", ")),
     }

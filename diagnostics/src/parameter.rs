@@ -1,6 +1,6 @@
 //! Parameters of components: the error for one that is refused, and the checks that raise it.
 
-use crate::nearest::{nearest, typo_of};
+use crate::nearest::{nearest, suggestion, typo_of};
 use crate::place::Place;
 use std::fmt::{self, Display};
 use std::ops::RangeBounds;
@@ -169,24 +169,34 @@ impl ParameterError {
     pub fn help(&self) -> String {
         match self {
             Self::Missing { .. } => "add it to this table".to_owned(),
-            Self::Unknown { .. } => match self.meant() {
-                Some(known) => format!("did you mean `{known}`?"),
-                None => "remove it, or correct its spelling".to_owned(),
-            },
-            Self::Value { .. } => {
-                self.meant().map_or(String::new(), |meant| format!("did you mean `{meant}`?"))
+            Self::Unknown { .. } => {
+                self.suggestion().unwrap_or_else(|| "remove it, or correct its spelling".to_owned())
             }
+            Self::Value { .. } => self.suggestion().unwrap_or_default(),
             Self::File { .. } | Self::Conflict { .. } => String::new(),
         }
     }
 
-    /// The known key that an unknown one was probably meant to be; or the name, of a value that is one of several.
+    /// The question for the known key that an unknown one was probably meant to be, or for the name, of a value that is one of several.
+    ///
+    /// ```
+    /// use diagnostics::ParameterError;
+    ///
+    /// let error = ParameterError::value("kind", "\"step\", \"ramp\" or \"doublet\"", "\"stp\"");
+    /// assert_eq!(error.suggestion().as_deref(), Some("did you mean `step`?"));
+    /// ```
+    #[must_use]
+    pub fn suggestion(&self) -> Option<String> {
+        match self {
+            Self::Unknown { key, known } => suggestion(last_name(key), known.iter().map(String::as_str)),
+            Self::Value { expected, found, .. } => suggestion(quoted(found).first()?, choices(expected)?),
+            _ => None,
+        }
+    }
+
+    /// The known key that an unknown one was probably meant to be.
     #[must_use]
     pub fn meant(&self) -> Option<&str> {
-        if let Self::Value { expected, found, .. } = self {
-            let names = expected.strip_prefix("one of `")?.strip_suffix('`')?;
-            return nearest(found.strip_prefix('`')?.strip_suffix('`')?, names.split("`, `"));
-        }
         let Self::Unknown { key, known } = self else { return None };
         nearest(last_name(key), known.iter().map(String::as_str))
     }
@@ -274,6 +284,16 @@ impl From<&str> for ParameterError {
 /// Name of a dotted key without the tables on the way, which are not part of a misspelling.
 fn last_name(key: &str) -> &str {
     key.rsplit('.').next().unwrap_or(key)
+}
+
+/// The names that `expected` lists in quotes; `None` if they are no choice.
+fn choices(expected: &str) -> Option<Vec<&str>> {
+    Some(quoted(expected)).filter(|names| names.len() > 1)
+}
+
+/// The texts between quotes of `text`, of either kind.
+fn quoted(text: &str) -> Vec<&str> {
+    text.split(['`', '"']).skip(1).step_by(2).collect()
 }
 
 fn list(names: &[String]) -> String {

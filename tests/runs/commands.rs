@@ -451,7 +451,7 @@ fn what_is_no_recording_is_refused() {
 #[test]
 fn a_misspelt_command_is_answered_with_the_near_one() {
     let place = Place::new();
-    for (found, meant) in [("rn", "run"), ("vaildate", "validate")] {
+    for (found, meant) in [("rn", "run"), ("rnu", "run"), ("vaildate", "validate")] {
         let unknown = format!("unrecognized subcommand '{found}'");
         let tip = format!("a similar subcommand exists: '{meant}'");
         place.call(&[found]).with_code(2).says(&[&unknown, &tip]);

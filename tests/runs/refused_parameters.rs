@@ -10,7 +10,8 @@ fn set_points_that_cannot_be_flown() {
     let ended = with("unit = \"m\"", "unit = §\"ft\"");
     ended.says(&["process `pilot`: `set_points.0.unit` must be \"m\"", "found \"ft\""]);
     with("\"altitude\"", "§\"height\"").says(&["`set_points.0.channel` must be", "found \"height\""]);
-    with("kind = \"step\"", "kind = §\"ste\"").says(&["`set_points.0.kind`"]);
+    with("kind = \"step\"", "kind = §\"stp\"").says(&["`set_points.0.kind`", "did you mean `step`?"]);
+    with("\"altitude\"", "§\"altitud\"").says(&["`set_points.0.channel`", "did you mean `altitude`?"]);
     with("at_s = 0.1, to", "at_s = 0.1, §too")
         .says(&["unknown key `set_points.0.too`", "did you mean `to`?"]);
     with(
@@ -37,6 +38,18 @@ fn a_file_and_a_parameter_that_say_the_same() {
 fn a_parameter_that_is_unknown() {
     let ended = refused("initial_altitude_m", "§initial_altitude_ft");
     ended.says(&["process `pilot`", "unknown key `initial_altitude_ft`", "initial_altitude_m"]);
+}
+
+#[test]
+fn a_parameter_whose_name_has_only_begun() {
+    let with = |kind: &str, parameter: &str| {
+        let kind = format!("kind = \"{kind}\"");
+        refused(&kind, &format!("{kind}\nparameters.§{parameter} = 1"))
+    };
+    let noise = "did you mean `accelerometer_noise_density_m_s2_sqrt_hz`?";
+    with("imu", "accelerometer_noise").says(&["unknown key `accelerometer_noise`", noise]);
+    let noises = ["did you mean `position_noise_m` or `attitude_noise_deg`?"];
+    with("mocap", "nois").says(&noises);
 }
 
 #[test]

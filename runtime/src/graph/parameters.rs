@@ -327,7 +327,7 @@ fn refused(declared: &DeclaredNode<'_>, error: &ParameterError) -> Diagnostic {
                 "change the values in a copy of the {key} file, and write {key} = \"COPY\" in place of parameters.{key}"
             )
         }
-        _ => error.meant().map_or(String::new(), |near| format!("did you mean `{near}`?")),
+        _ => error.suggestion().unwrap_or_default(),
     };
     let is_unknown = matches!(error, ParameterError::Unknown { .. });
     let at = place_within(declared, key, is_unknown);

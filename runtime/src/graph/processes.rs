@@ -8,7 +8,7 @@ use bus::component::Transfer;
 use bus::plan::NodePlan;
 use bus::process::{LAUNCHER_VARIABLE, RUN_VARIABLE};
 use bus::{GENERATION_VARIABLE, NODE_VARIABLE, Registration};
-use diagnostics::{Diagnostic, Faults, did_you_mean, nearest};
+use diagnostics::{Diagnostic, Faults, did_you_mean, suggestion};
 use inputs::InputFiles;
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -164,8 +164,8 @@ fn executable(
             let component = registry.find(kind.get_ref()).map(Executable::Component);
             let found = component.or_else(|| registry.program(kind.get_ref()).map(Executable::Program));
             found.ok_or_else(|| {
-                let near = nearest(kind.get_ref(), registry.kinds());
-                let near = near.map_or("the".to_owned(), |near| format!("did you mean `{near}`? The"));
+                let near = suggestion(kind.get_ref(), registry.kinds());
+                let near = near.map_or("the".to_owned(), |question| format!("{question} The"));
                 let message = format!("there is no kind `{}`", kind.get_ref());
                 manifest.problem(&kind.span(), message, format!("{near} kinds are {}", registry.names()))
             })
