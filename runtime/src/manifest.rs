@@ -375,19 +375,20 @@ impl Manifest {
         let text = files.text(original).unwrap_or_default();
         let (shown, copied) = (original.display().to_string(), copy.display().to_string());
         for fault in faults.each.iter_mut().filter(|fault| fault.file == copied) {
-            let error = ParameterError::conflict(fault.key.clone(), in_words(&fault.message));
+            let error = |message: String| ParameterError::conflict(fault.key.clone(), message);
+            let message = in_words(&fault.message);
             let found = match edits.iter().find(|edit| edit.is_about(&fault.key, &text)) {
-                Some(edit) => self.problem(edit.span(), error, fault.help.clone()),
+                Some(edit) => self.problem(edit.span(), error(message), fault.help.clone()),
                 None => {
                     let values: Vec<String> =
                         edits.iter().map(|edit| self.sources.value(edit.span())).collect();
-                    let help = format!("{} (read with {})", fault.help, values.join(", "));
+                    let error = error(format!("{message}, with {}", values.join(", ")));
                     let place = fault.place.as_ref().and_then(|place| place.in_file(&shown, &text));
                     match place {
                         Some(place) => Diagnostic::at(place, error),
                         None => Diagnostic::in_file(&shown, error),
                     }
-                    .help(help.trim_start())
+                    .help(fault.help.clone())
                 }
             };
             *fault = FileFault::from(found);

@@ -277,6 +277,17 @@ fn a_key_that_is_there_twice_is_shown_at_both_places() {
         "3 | window_ticks = 64",
         "5 | window_ticks = 32",
     ]);
+    assert!(!ended.error.contains("help:"), "{ended}");
+}
+
+/// A message that says what is expected needs no advice to correct the value.
+#[test]
+fn a_value_of_a_wrong_type_has_no_help() {
+    let with = |value: &str| refused("window_ticks = 64", &format!("{value}\nwindow_ticks = 64"));
+    for value in ["seed = §-1", "profile = §3", "pace = §[]"] {
+        let ended = with(value);
+        assert!(!ended.error.contains("help:"), "{ended}");
+    }
 }
 
 #[test]

@@ -177,7 +177,8 @@ fn an_override_in_a_file_is_told_with_its_text_and_the_file_that_exists() {
     // A fault at another key of the file, which has a line.
     let set = "process.plant.vehicle.command.min=300";
     let ended = place.call(&["check", &manifest, "--set", set]).with_code(2);
-    ended.says(&[&format!("error: {vehicle}:"), "`command.max` must be", &format!("--set {set}")]);
+    ended.says(&[&format!("error: {vehicle}:"), "`command.max` must be", &format!(", with --set {set}")]);
+    assert!(!ended.error.contains("read with"), "{ended}");
     assert!(!ended.error.contains("@plant"), "{ended}");
 }
 

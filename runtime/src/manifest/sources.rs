@@ -85,8 +85,12 @@ impl Sources {
     pub fn table<'s>(&self, source: &'s Source) -> Result<DeTable<'s>, Diagnostic> {
         tree::parse(&source.text, source.base).map_err(|misread| {
             let (span, first) = (misread.span(), misread.first());
-            let mut problem =
-                self.problem(&span, misread.error, "docs/manifest.md shows how a manifest is written");
+            // The two places of a key that is there twice say it all.
+            let help = match first {
+                Some(_) => "",
+                None => "docs/manifest.md shows how a manifest is written",
+            };
+            let mut problem = self.problem(&span, misread.error, help);
             if let Some(first) = first {
                 let first = first.start - source.base..first.end - source.base;
                 problem.place = problem.place.map(|place| place.after(&source.text, &first));
@@ -218,9 +222,12 @@ impl Sources {
 
     /// Diagnostic for a value that could not be read, at its place.
     pub fn refused(&self, misread: Misread) -> Diagnostic {
-        let help = match misread.error.meant() {
-            Some(known) => format!("did you mean `{known}`?"),
-            None => "docs/manifest-reference.md lists every key".to_owned(),
+        let help = match misread.error {
+            ParameterError::Unknown { .. } | ParameterError::Missing { .. } => misread
+                .error
+                .suggestion()
+                .unwrap_or_else(|| "docs/manifest-reference.md lists every key".to_owned()),
+            _ => misread.error.suggestion().unwrap_or_default(),
         };
         self.problem(&misread.span(), misread.error, help)
     }
