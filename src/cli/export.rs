@@ -26,6 +26,9 @@ pub struct ExportArguments {
     /// Only this topic; repeatable.
     #[arg(long)]
     topic: Vec<String>,
+    /// Write Parquet, as without an option.
+    #[arg(long, conflicts_with = "csv")]
+    parquet: bool,
     /// Write CSV instead of Parquet.
     #[arg(long)]
     csv: bool,
@@ -47,7 +50,8 @@ pub fn export(arguments: &ExportArguments) -> Result<bool> {
     if folder == arguments.recording {
         bail!("{} has no ending to leave out: name a folder with --out", folder.display());
     }
-    let (ending, kind) = if arguments.csv { ("csv", &CSV) } else { ("parquet", &PARQUET) };
+    let is_csv = arguments.csv && !arguments.parquet;
+    let (ending, kind) = if is_csv { ("csv", &CSV) } else { ("parquet", &PARQUET) };
     let is_wanted = |topic: &&String| arguments.topic.is_empty() || arguments.topic.contains(topic);
     let topics = recording.topics().keys().filter(is_wanted);
     let files: Vec<(PathBuf, &String)> =
@@ -64,7 +68,7 @@ pub fn export(arguments: &ExportArguments) -> Result<bool> {
     // One after another: a table is whole in memory.
     for (path, topic) in &files {
         let table = table(&recording, topic)?;
-        write(path, kind, &table, arguments.csv)?;
+        write(path, kind, &table, is_csv)?;
         print_text(&format!("{}: {} messages", path.display(), table.rows()))?;
     }
     Ok(recording.cut().is_none())

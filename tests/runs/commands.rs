@@ -433,6 +433,10 @@ fn an_export_replaces_no_file_of_another_kind_and_names_an_unknown_topic() {
     fs::write(&file, "a letter").unwrap();
     place.call(&args).with_code(2).says(&["plant.state.csv"]);
     assert_eq!(fs::read_to_string(&file).unwrap(), "a letter");
+    let parquet = ["export", &recording, "--out", &out, "--topic", "/plant/state", "--parquet"];
+    place.call(&parquet).with_code(0).prints(&["plant.state.parquet: ", " messages"]);
+    let both = place.call(&[&parquet[..], &["--csv"]].concat()).with_code(2);
+    both.says(&["--parquet", "cannot be used with", "--csv"]);
     let unknown = place.call(&["export", &recording, "--out", &out, "--topic", "/none"]).with_code(2);
     unknown.says(&["/none", "/plant/state"]);
 }
