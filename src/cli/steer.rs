@@ -175,18 +175,25 @@ fn ask(run_id: Option<&str>, request: &Request, json: bool) -> Result<()> {
     let run = find_own(run_id)?;
     let answer = client::ask(&run, request)?;
     if json {
-        output::print_json_line(&answer)?;
+        let mut told = serde_json::to_value(&answer)?;
+        // Of the files of the run, not of its answer: older runs are asked, too.
+        told["run_id"] = run.entry.run_id.as_str().into();
+        told["manifest"] = run.entry.manifest.to_string_lossy().into();
+        output::print_json_line(&told)?;
     }
+    let manifest = run.entry.manifest.file_name().unwrap_or_default().display();
+    let of_run = |text: &str| format!("run {} ({manifest}): {text}", run.entry.run_id);
     match answer {
         Answer::Refused { reason } => bail!("{reason}"),
         _ if json => Ok(()),
         Answer::Done { text, .. } if run_id.is_some() => output::print_text(&text),
         // The user did not name the run: the answer does.
-        Answer::Done { text, .. } => {
-            let manifest = run.entry.manifest.file_name().unwrap_or_default().display();
-            output::print_text(&format!("run {} ({manifest}): {text}", run.entry.run_id))
+        Answer::Done { text, .. } => output::print_text(&of_run(&text)),
+        Answer::Status(status) => {
+            let text = status.to_string();
+            let named = format!("{}: ", status.run_id);
+            output::print_text(&of_run(text.strip_prefix(&named).unwrap_or(&text)))
         }
-        Answer::Status(status) => output::print_text(&status.to_string()),
     }
 }
 

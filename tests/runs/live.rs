@@ -48,6 +48,12 @@ fn pausing_stepping_and_pacing_change_no_byte_of_a_recording() {
     sleep(Duration::from_millis(300));
     assert_eq!(state(&place), ("paused".to_owned(), held), "a paused run stands still");
     assert_eq!(tick_after(&place, &["pause"]), held);
+    for answer in [ctl(&place, &["pause"]), ctl(&place, &["status"])] {
+        assert_eq!(answer["run_id"], place.run_id(), "{answer}");
+        assert!(answer["manifest"].as_str().unwrap().ends_with("hover.toml"), "{answer}");
+    }
+    let run = format!("run {} (hover.toml): paused at tick {held} of ", place.run_id());
+    call(&place, "ctl", &["status"]).with_code(0).prints(&[&run]);
     assert_eq!(tick_after(&place, &["step", "7"]), held + 7);
     assert_eq!(tick_after(&place, &["step"]), held + 8);
     sleep(Duration::from_millis(100));
