@@ -43,6 +43,19 @@ fn a_profiled_run_records_the_same_file() {
     require_same(&std::fs::read(recording).unwrap(), &profiled.path("hover.mcap"));
 }
 
+/// The times of the measurements are fields of recorded samples.
+#[test]
+fn ages_without_a_recording_are_said_to_count_from_the_stamps() {
+    let note = "ages count from the stamps of samples";
+    let place = Place::new();
+    let args = ["profile", &repository("manifests/hover.toml"), "--record", "none", "--set", DURATION];
+    place.call(&args).flown().prints(&[note]);
+    let json = place.call(&[&args[..], &["--json"]].concat()).flown().json();
+    assert_eq!(json["profile"]["age_from_stamps"], true);
+    let recorded = hover(&place, &[]);
+    assert!(!recorded.output.contains(note), "{recorded}");
+}
+
 #[test]
 fn every_tick_of_every_node_is_in_the_profile() {
     let profile = &hover(&Place::new(), &["--json"]).json()["profile"];

@@ -30,6 +30,8 @@ pub struct Profile {
     pub(super) nodes: Vec<NodeLatency>,
     pub(super) transport: Vec<Transport>,
     pub(super) age: Vec<Age>,
+    /// True if the ages count from the stamps of all samples: without a recording, the times of the measurements are not known.
+    pub(super) age_from_stamps: bool,
     pub(super) critical_path: CriticalPath,
     /// Deadlines; `None` for a run that was not paced.
     pub(super) pacing: Option<Pacing>,
@@ -39,15 +41,15 @@ impl Profile {
     /// The profile of `flight`, in which the clock counted `missed_deadlines`. Its `recording` has the times of the measurements.
     pub fn of(flight: &Flight, missed_deadlines: u32, recording: Option<&Path>) -> Self {
         let (nodes, transport) = latencies(flight);
-        // Without a whole recording the ages count from the stamps.
-        let measured = recording.and_then(|path| Measured::read(flight, path).ok()).unwrap_or_default();
+        let measured = recording.and_then(|path| Measured::read(flight, path).ok());
         Self {
             ticks: flight.ticks,
             noted: flight.noted(),
             left_out: flight.left_out(),
             nodes,
             transport,
-            age: ages(flight, &measured),
+            age_from_stamps: measured.is_none(),
+            age: ages(flight, &measured.unwrap_or_default()),
             critical_path: CriticalPath::of(flight),
             pacing: Pacing::of(flight, missed_deadlines),
         }

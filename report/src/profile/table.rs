@@ -19,6 +19,12 @@ impl Display for Profile {
         let path = table("critical path [µs]", tick.chain(path.places.iter().map(place)));
         write!(f, "{}", table("node, per tick [µs]", self.nodes.iter().flat_map(node)))?;
         std::iter::once(hops).chain(ages).chain([path]).try_for_each(|table| write!(f, "\n{table}"))?;
+        if self.age_from_stamps && !self.age.is_empty() {
+            writeln!(
+                f,
+                "ages count from the stamps of samples: only a recording has the times of measurements"
+            )?;
+        }
         self.write_pacing(f)?;
         if self.left_out > 0 {
             writeln!(f, "not profiled: {} computations beyond the first of each node", self.left_out)?;
