@@ -74,16 +74,20 @@ fn raised(sign: char) -> char {
     digit.unwrap_or(if sign == '-' { '⁻' } else { sign })
 }
 
+/// Value with four significant digits where these move it by a tenth of its `standard_error` at most, else with six.
+pub fn to_known_digits(value: f64, standard_error: f64) -> f64 {
+    let four = format!("{value:.3e}").parse().unwrap_or(value);
+    if (four - value).abs() <= 0.1 * standard_error { four } else { to_six_digits(value) }
+}
+
 /// Value with six significant digits: no estimate is known better.
-///
-/// Files have these; intervals in texts have four.
 pub fn to_six_digits(value: f64) -> f64 {
     format!("{value:.5e}").parse().unwrap_or(value)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{printed, printed_quantity, quantity, to_six_digits};
+    use super::{printed, printed_quantity, quantity, to_known_digits, to_six_digits};
 
     #[test]
     fn people_read_short_lengths_in_millimetres_and_powers_with_raised_digits() {
@@ -99,6 +103,12 @@ mod tests {
         let texts = [(-1.4137e-6, "N*s^2/(m*rad)"), (13.7, "m/s^2"), (0.25, "1"), (3.1e-5, "s^-1")];
         let texts = texts.map(|(value, unit)| printed_quantity(value, unit));
         assert_eq!(texts, ["−1.414·10⁻⁶ N·s²/(m·rad)", "13.70 m/s²", "0.2500", "3.100·10⁻⁵ s⁻¹"]);
+    }
+
+    #[test]
+    fn a_number_of_a_file_has_the_digits_that_are_known() {
+        let known = |standard_error| to_known_digits(0.005_995_057_451, standard_error);
+        assert_eq!([known(1e-6), known(1e-7), known(f64::NAN)], [0.005_995, 0.005_995_06, 0.005_995_06]);
     }
 
     #[test]

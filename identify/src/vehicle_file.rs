@@ -1,6 +1,6 @@
 //! The new vehicle file: the declared one with the effects that were accepted.
 
-use crate::digits::{quantity, rounded, to_six_digits};
+use crate::digits::{quantity, rounded, to_known_digits};
 use crate::envelope::Reached;
 use crate::report::{Estimate, Report};
 use diagnostics::Diagnostic;
@@ -135,6 +135,9 @@ fn source(report: &Report) -> String {
     format!("hummingbus identify: fitted on {fit}; {chosen}")
 }
 
+/// Length of an interval of 95 %, in standard errors.
+const INTERVAL_SIGMAS: f64 = 3.92;
+
 fn of_estimate(estimate: &Estimate, source: &str) -> Item {
     let doubt = match estimate {
         Estimate { determined: false, .. } => "not determined by these flights: ",
@@ -144,7 +147,8 @@ fn of_estimate(estimate: &Estimate, source: &str) -> Item {
     let (low, high) = (rounded(estimate.low), quantity(estimate.high, estimate.unit));
     let interval = format!("{doubt}95 % interval {low} to {high}");
     // At a bound the digits that are left out could lead beyond it.
-    let value = if estimate.at_bound { estimate.value } else { to_six_digits(estimate.value) };
+    let known = to_known_digits(estimate.value, (estimate.high - estimate.low).abs() / INTERVAL_SIGMAS);
+    let value = if estimate.at_bound { estimate.value } else { known };
     parameter(value, estimate.unit, source, interval.into())
 }
 

@@ -2,11 +2,13 @@
 
 use std::path::{Component, Path, PathBuf};
 
-/// Returns `path` without ways down and up again, if it still leads to the same file.
+/// Returns `path` without ways down and up again, if it still leads to the same file; of a file that is not there, to the same folder.
 ///
 /// ```
 /// let path = std::path::Path::new("src/../Cargo.toml");
 /// assert_eq!(inputs::tidy(path), std::path::Path::new("Cargo.toml"));
+/// let absent = std::path::Path::new("src/../src/none.toml");
+/// assert_eq!(inputs::tidy(absent), std::path::Path::new("src/none.toml"));
 /// ```
 #[must_use]
 pub fn tidy(path: &Path) -> PathBuf {
@@ -20,8 +22,15 @@ pub fn tidy(path: &Path) -> PathBuf {
             short.push(part);
         }
     }
-    match (short.canonicalize(), path.canonicalize()) {
-        (Ok(a), Ok(b)) if a == b => short,
-        _ => path.to_owned(),
-    }
+    let is_same = if path.exists() {
+        leads_to_same(&short, path)
+    } else {
+        let folders = short.parent().zip(path.parent());
+        short.file_name() == path.file_name() && folders.is_some_and(|(a, b)| leads_to_same(a, b))
+    };
+    if is_same { short } else { path.to_owned() }
+}
+
+fn leads_to_same(a: &Path, b: &Path) -> bool {
+    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }

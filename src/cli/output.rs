@@ -155,7 +155,7 @@ fn fault_json(
 ) -> Value {
     let named_in = by.map(|(by, component)| named_in((&by.file, by.place.as_ref(), by.key()), component));
     let mut fault = place_json(at);
-    fault["message"] = message.into();
+    fault["message"] = plain(message).into();
     fault["help"] = help.into();
     fault["named_in"] = named_in.into();
     fault

@@ -60,14 +60,24 @@ fn chosen(name: Option<&str>, with_states: bool) -> Result<Vec<&'static Schema>>
         schemas.extend(COMPONENTS.states());
     }
     let Some(name) = name else { return Ok(schemas) };
-    let names: Vec<_> = schemas.iter().map(|schema| short(schema)).collect();
+    let names = distinct_names(&schemas);
     schemas.retain(|schema| schema.type_name == name || short(schema) == name);
     if schemas.is_empty() {
         let written = name.rsplit('/').next().unwrap_or(name);
-        let help = did_you_mean(written, names, "there are:");
+        let help = did_you_mean(written, names.iter().copied(), "there are:");
         bail!("no component has a port for a message {name}; {help}");
     }
     Ok(schemas)
+}
+
+/// The names of messages: without their packages, but for those that only their packages tell apart.
+fn distinct_names(schemas: &[&'static Schema]) -> Vec<&'static str> {
+    let is_alone = |name: &str| schemas.iter().filter(|other| short(other) == name).count() == 1;
+    let name = |schema: &&'static Schema| {
+        let name = short(schema);
+        if is_alone(name) { name } else { schema.type_name }
+    };
+    schemas.iter().map(name).collect()
 }
 
 /// A message's name without its package.

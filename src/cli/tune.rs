@@ -54,13 +54,17 @@ pub struct TuneArguments {
     quiet: bool,
 }
 
+/// Advice on a file of another kind.
+const TUNING_FILE: &str =
+    "a tuning file is a campaign file with a table [tune], such as manifests/tune/hover.toml";
+
 /// The command `tune`; false if the tuned gains are not better.
 ///
 /// # Errors
 /// A problem in the tuning file, its manifest or the gains file, or an interrupted tuning.
 pub fn tune(arguments: &TuneArguments) -> Result<bool> {
     let path = &arguments.tuning;
-    require_kind(path, &[kind::Kind::Campaign], "")?;
+    require_kind(path, &[kind::Kind::Campaign], TUNING_FILE)?;
     let text = InputFiles::default().text(path).with_context(|| format!("cannot read {}", path.display()))?;
     let tuning = Tuning::parse(path, &text)?;
     let base = Base::read(&tuning.campaign, COMPONENTS)?;

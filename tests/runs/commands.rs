@@ -269,6 +269,10 @@ fn a_file_of_another_kind_is_told_with_the_command_that_reads_it() {
         &["hover.toml is a manifest, not a flights file", "hummingbus run"],
     );
     says(&["campaign", &hover()], &["hover.toml is a manifest, not a campaign file"]);
+    says(
+        &["tune", &hover()],
+        &["hover.toml is a manifest", "a tuning file is a campaign file with a table [tune]"],
+    );
     for command in ["run", "check"] {
         says(&[command, &recording], &["is a recording, not a manifest", "hummingbus cat"]);
         says(&[command, &vehicle], &["is a vehicle file, not a manifest", "as `vehicle`"]);

@@ -73,6 +73,24 @@ fn a_vehicle_file_that_is_not_there() {
     let vehicle = place.path("none.toml");
     let ended = refused_setting(&manifest, &[&format!("process.plant.vehicle={vehicle}")]);
     ended.says(&["process `plant`", &vehicle, "cannot read this file", "check the path"]);
+    // Programs find it in the same words.
+    let set = format!("process.plant.vehicle={vehicle}");
+    let json = place.call(&["check", &manifest, "--set", &set, "--json"]).with_code(2).json();
+    let message = json["faults"][0]["message"].as_str().unwrap();
+    assert!(message.contains("cannot read this file") && !message.contains("os error"), "{message}");
+}
+
+/// A path goes on from the manifest's folder; a message shows where it leads.
+#[test]
+fn a_path_is_told_without_ways_down_and_up_again() {
+    let place = Place::new();
+    fs::create_dir(place.path("manifests")).unwrap();
+    let vehicle = repository("vehicles/hummingbird.toml");
+    let text = good().replace(&vehicle, "../none.toml");
+    let manifest = place.write("manifests/lost.toml", text);
+    let ended = place.call(&["check", &manifest]).with_code(2);
+    ended.says(&[&place.path("none.toml")]);
+    assert!(!ended.error.contains("manifests/.."), "{ended}");
 }
 
 #[test]

@@ -216,7 +216,11 @@ fn inertia(section: &Section) -> Result<Matrix3<f64>, Diagnostic> {
     }
     let found = format!("{:.4e}, {:.4e}, {:.4e} kg*m^2", moments[0], moments[1], moments[2]);
     let expected = "a tensor whose principal moments are above 0, none larger than the sum of the other two";
-    let wrong = [&xx, &yy, &zz].into_iter().find(|moment| section.is_own(moment)).unwrap_or(&xx);
+    // The moment that is too large is to blame, else the first that the file states itself.
+    let sum = xx.si + yy.si + zz.si;
+    let mut own = [&xx, &yy, &zz].into_iter().filter(|moment| section.is_own(moment)).peekable();
+    let first = own.peek().copied().unwrap_or(&xx);
+    let wrong = own.find(|moment| moment.si > sum - moment.si).unwrap_or(first);
     Err(wrong.doc.bad(&wrong.at, &section.key("inertia_xx, inertia_yy, inertia_zz"), expected, found))
 }
 

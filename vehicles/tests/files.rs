@@ -360,6 +360,12 @@ fn what_a_file_on_a_base_replaces_wrongly_is_told_at_its_place() {
     let moment = "{ value = 1, unit = \"kg*m^2\", source = \"test\", uncertainty = \"exact\" }";
     let message = told(&format!("[body]\ninertia_zz = {moment}"));
     assert!(message.starts_with("mine.toml:4:24: `body.inertia_xx, inertia_yy, inertia_zz`"), "{message}");
+    // In a file of its own, too, the moment that is larger than the other two together is to blame.
+    let line = HUMMINGBIRD.lines().find(|line| line.starts_with("inertia_zz")).unwrap();
+    let number = HUMMINGBIRD.lines().position(|other| other == line).unwrap() + 1;
+    let wrong = HUMMINGBIRD.replacen(line, &format!("inertia_zz = {moment}"), 1);
+    let message = Vehicle::parse(&wrong, "a.toml").unwrap_err().to_string();
+    assert!(message.contains(&format!("a.toml:{number}:24: `body.inertia_xx")), "{message}");
     let message = told("[body]\nmas = 3");
     assert!(message.starts_with("mine.toml:4:1: unknown key `body.mas`"), "{message}");
     assert!(message.ends_with("did you mean `mass`?"), "{message}");

@@ -252,6 +252,8 @@ impl Sources {
     pub fn resolve(&self, written: &Spanned<String>) -> Result<PathBuf, Diagnostic> {
         let path = self.path(written)?;
         let path = std::path::absolute(&path).unwrap_or(path);
+        // As messages show it.
+        let path = inputs::tidy(&path);
         if path.to_str().is_none() {
             let message = format!("the path {} is not UTF-8", path.display());
             let help = "move the files into a folder whose name is UTF-8: processes are given paths as text";
