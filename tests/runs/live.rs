@@ -215,8 +215,11 @@ fn top_once_shows_what_flies() {
     assert!(state["rate_hz"].as_f64().unwrap() > pose["rate_hz"].as_f64().unwrap());
     let page = call(&place, "top", &["--once"]).with_code(0);
     page.prints(&["hover.toml  run ", "running\n", "p99 µs", "/plant/state", "holds the run"][..4]);
-    ctl(&place, &["pause"]);
-    call(&place, "top", &["--once"]).with_code(0).prints(&["paused\n", "holds the run", "0.00 × real time"]);
+    // The recording then has a whole second more.
+    ctl(&place, &["step", "1500"]);
+    let paused = call(&place, "top", &["--once"]).with_code(0);
+    paused.prints(&["paused\n", "holds the run", "0.00 × real time"]);
+    assert!(!paused.output.contains("height - m"), "{paused}");
     ctl(&place, &["stop"]);
     flight.end().with_code(1);
 }

@@ -1,4 +1,5 @@
-//! Heights and attitudes of the vehicles of a live run: from the samples that its recorder copies for watchers.
+//! Heights and attitudes of the vehicles of a live run: from the samples that its recorder copies for watchers. While none come, as in a
+//! run that was paused before, they are those at the end of the recording.
 
 use crate::top::view::VehicleRow;
 use bus::Message as _;
@@ -6,7 +7,11 @@ use bus::messages::PlantState;
 use bus::plan::Plan;
 use bus::watch::{WatchFiles, WatchReader};
 use recorder::fields::TopicFields;
+use recorder::index::Index;
+use recorder::reader::Recording;
+use recorder::series::value;
 use runtime::run_dir::{LiveRun, find_live};
+use std::path::{Path, PathBuf};
 
 /// Fields of a state that are shown.
 const FIELDS: [&str; 5] = ["position.z", "velocity", "attitude.roll", "attitude.pitch", "attitude.yaw"];
@@ -16,6 +21,11 @@ pub struct Vehicles {
     files: WatchFiles,
     samples: Option<WatchReader>,
     states: Vec<State>,
+    /// The recording, until it is read.
+    recording: Option<PathBuf>,
+    tick_ns: u64,
+    /// True from the second look on: by then the samples of a run that goes on have come.
+    has_looked: bool,
 }
 
 /// Newest state on a topic.
@@ -26,17 +36,22 @@ struct State {
     time_ns: u64,
     cdr: Vec<u8>,
     fields: Option<TopicFields>,
+    /// Time and values at the end of the recording, where no sample has come.
+    recorded: Option<(u64, [f64; 5])>,
 }
 
 impl Vehicles {
     /// The vehicles of `plan`; none if the run has no recorder, whose samples are shown.
     pub fn of(run: &LiveRun, plan: &Plan) -> Self {
         let files = WatchFiles::of(&run.entry.run_dir, &plan.run_id);
-        let is_recorded = plan.nodes.iter().any(|node| node.parameters.get("watch").is_some());
+        let recorder = plan.nodes.iter().find(|node| node.parameters.get("watch").is_some());
+        let recording = recorder.and_then(|node| node.parameters.get("path")?.as_str().map(PathBuf::from));
+        let is_recorded = recorder.is_some();
         let topics =
             plan.topics.iter().filter(|topic| is_recorded && topic.type_name == PlantState::SCHEMA.type_name);
         let states = topics.map(|topic| State::of(&topic.name)).collect();
-        let mut vehicles = Self { files, samples: None, states };
+        let tick_ns = plan.tick_ns;
+        let mut vehicles = Self { files, samples: None, states, recording, tick_ns, has_looked: false };
         vehicles.watch(run);
         vehicles
     }
@@ -54,7 +69,7 @@ impl Vehicles {
 
     /// Reads the samples that have come; returns a row for each vehicle.
     pub fn look(&mut self) -> Vec<VehicleRow> {
-        let Self { files, samples, states } = self;
+        let Self { samples, states, .. } = self;
         if let Some(samples) = samples {
             samples.read(|sample| {
                 if let Some(state) = states.iter_mut().find(|state| state.topic == sample.topic) {
@@ -64,7 +79,21 @@ impl Vehicles {
                 }
             });
         }
-        states.iter_mut().map(|state| state.row(files)).collect()
+        let is_still = std::mem::replace(&mut self.has_looked, true)
+            && self.states.iter().all(|state| state.cdr.is_empty());
+        if is_still && let Some(path) = self.recording.take() {
+            self.read_recorded(&path);
+        }
+        self.states.iter_mut().map(|state| state.row(&self.files)).collect()
+    }
+
+    /// Reads the states at the end of the recording as far as it is written; without one the rows stay empty.
+    fn read_recorded(&mut self, path: &Path) {
+        let Ok(recording) = Recording::salvage(path) else { return };
+        let Ok(index) = Index::of(&recording) else { return };
+        for state in &mut self.states {
+            state.recorded = state.newest_in(&recording, &index, self.tick_ns);
+        }
     }
 }
 
@@ -73,14 +102,31 @@ impl State {
         // A state is sent by a plant: `/h1/plant/state` is that of the vehicle `h1`.
         let plant = topic.trim_start_matches('/').trim_end_matches("/state");
         let vehicle = plant.strip_suffix("/plant").unwrap_or(plant).to_owned();
-        Self { topic: topic.to_owned(), vehicle, time_ns: 0, cdr: Vec::new(), fields: None }
+        Self { topic: topic.to_owned(), vehicle, time_ns: 0, cdr: Vec::new(), fields: None, recorded: None }
+    }
+
+    /// Time and values of the newest sample in `recording`.
+    fn newest_in(&self, recording: &Recording, index: &Index, tick_ns: u64) -> Option<(u64, [f64; 5])> {
+        let block = index.before(&self.topic, index.len())?;
+        let records = index.messages(recording, block).filter_map(Result::ok);
+        let newest = records.filter(|record| record.topic == self.topic).last()?;
+        let leaves = recording.decode(&newest).ok()?;
+        let number = |field: &str| value(&leaves, field).map(|(number, _)| number);
+        let squares = ["velocity.x", "velocity.y", "velocity.z"].map(|field| number(field).map(|it| it * it));
+        let speed_m_s = squares.into_iter().sum::<Option<f64>>()?.sqrt();
+        let [roll, pitch, yaw] = ["attitude.roll", "attitude.pitch", "attitude.yaw"].map(number);
+        let angles = [roll?, pitch?, yaw?].map(f64::to_degrees);
+        let values = [number("position.z")?, speed_m_s, angles[0], angles[1], angles[2]];
+        Some((u64::from(newest.tick) * tick_ns, values))
     }
 
     fn row(&mut self, files: &WatchFiles) -> VehicleRow {
-        let values = self.values(files);
+        let live = self.values(files).map(|values| (self.time_ns, values));
+        let newest = live.or(self.recorded);
+        let values = newest.map(|(_, values)| values);
         let [height_m, speed_m_s, roll_deg, pitch_deg, yaw_deg] =
             values.map_or([None; 5], |values| values.map(Some));
-        let time_s = values.map(|_| self.time_ns as f64 * 1e-9);
+        let time_s = newest.map(|(time_ns, _)| time_ns as f64 * 1e-9);
         VehicleRow { name: self.vehicle.clone(), time_s, height_m, speed_m_s, roll_deg, pitch_deg, yaw_deg }
     }
 

@@ -1,7 +1,7 @@
 //! A run as shown: in words for screen and paper, and as JSON.
 
 use crate::cells::Cells;
-use runtime::ctl::protocol::Status;
+use runtime::ctl::protocol::{State, Status};
 use serde::Serialize;
 use std::fmt;
 use std::path::Path;
@@ -108,7 +108,16 @@ pub fn vehicles(view: &View) -> Cells {
 pub fn only_vehicle(view: &View) -> String {
     let [only] = &view.vehicles[..] else { return String::new() };
     let [height, speed, roll, pitch, yaw] = &vehicle(only)[1..] else { return String::new() };
-    format!("height {height} m  speed {speed} m/s  roll {roll}°  pitch {pitch}°  yaw {yaw}°")
+    let at = only.time_s.filter(|time_s| is_behind(view, *time_s));
+    let at = at.map_or(String::new(), |time_s| format!("  at {time_s:.3} s"));
+    format!("height {height} m  speed {speed} m/s  roll {roll}°  pitch {pitch}°  yaw {yaw}°{at}")
+}
+
+/// True for a state of a paused run that is older than the pause: the recording has it, and not yet the newer ones.
+fn is_behind(view: &View, time_s: f64) -> bool {
+    /// Longer than a tick at any rate that flies.
+    const NEWEST_S: f64 = 0.02;
+    view.status.state == State::Paused && view.status.time_s - time_s > NEWEST_S
 }
 
 fn vehicle(row: &VehicleRow) -> Vec<String> {
