@@ -35,6 +35,9 @@ fn an_unknown_key_is_told_alone() {
     told(&text, &["unknown key `process.ekf.inputs.imu.every_ticks`"]);
     let text = with(&[(imu, "inputs.imu = { topi = \"/imu/imu\" }")]);
     told(&text, &["unknown key `process.ekf.inputs.imu.topi`"]);
+    // Without it the input lacks its topic, which nobody has to be told as well.
+    let text = with(&[(imu, "inputs.imu = { source = \"/imu/imu\" }")]);
+    told(&text, &["unknown key `process.ekf.inputs.imu.source`"]);
 }
 
 /// A pass condition of the good manifest with this `line` in place of its statistic and limit.

@@ -59,6 +59,7 @@ pub fn readable(sources: &Sources, tree: DeTable<'_>) -> Result<(Content, Repair
         sources,
         whole: Spanned::new(0..0, DeValue::Table(tree)),
         repairs: Repairs::default(),
+        touched: BTreeSet::new(),
         gaps: BTreeSet::new(),
         told: Vec::new(),
         faults: Vec::new(),
@@ -109,8 +110,8 @@ impl<'k> Part<'k> {
             "process" => Some(Self::Process(second)),
             "group" => Some(Self::Group(second)),
             _ => {
-                let (list, _) = LISTS.iter().find(|(list, _)| *list == first)?;
-                Some(Self::Entry(*list, second.parse().ok()?))
+                let &(list, _) = LISTS.iter().find(|(list, _)| *list == first)?;
+                Some(Self::Entry(list, second.parse().ok()?))
             }
         }
     }
@@ -121,6 +122,8 @@ struct Bench<'s, 't> {
     sources: &'s Sources,
     whole: Spanned<DeValue<'t>>,
     repairs: Repairs,
+    /// Processes from which something was removed: a key may be missing for that reason.
+    touched: BTreeSet<String>,
     /// Entries of lists with a gap.
     gaps: BTreeSet<(&'static str, usize)>,
     /// Places of faults that are told: copies of a table in a set or a backup have the same.
@@ -201,7 +204,7 @@ impl<'t> Bench<'_, 't> {
     }
 
     fn mend_process(&mut self, misread: &Misread, name: &str) -> bool {
-        let is_follow_up = misread.is_missing() && self.repairs.processes.contains(name);
+        let is_follow_up = misread.is_missing() && self.touched.contains(name);
         if !is_follow_up {
             self.tell(misread);
         }
@@ -212,6 +215,9 @@ impl<'t> Bench<'_, 't> {
         }
         // An unknown key deeper than those of the process leaves everything around it.
         let is_deep = misread.is_unknown_key() && misread.error.key().matches('.').count() > 2;
+        if gap != Gap::None {
+            self.touched.insert(name.to_owned());
+        }
         if gap != Gap::None && !is_deep {
             self.repairs.processes.insert(name.to_owned());
         }
@@ -234,11 +240,11 @@ impl<'t> Bench<'_, 't> {
         if !is_follow_up {
             self.tell(misread);
         }
-        let Some((_, other)) = LISTS.iter().find(|(name, _)| *name == list) else { return false };
+        let Some(&(_, other)) = LISTS.iter().find(|(name, _)| *name == list) else { return false };
         let Some(entry) = self.at(&[list, &index.to_string()]) else { return false };
         let gap = if misread.is_missing() { Gap::Whole } else { patch(entry.get_mut(), misread) };
         if gap == Gap::Whole {
-            let Some(other) = tree::parse_value(*other, 0) else { return false };
+            let Some(other) = tree::parse_value(other, 0) else { return false };
             *entry.get_mut() = other.into_inner();
         }
         if gap != Gap::None {
