@@ -218,9 +218,9 @@ fn inertia(section: &Section) -> Result<Matrix3<f64>, Diagnostic> {
     let expected = "a tensor whose principal moments are above 0, none larger than the sum of the other two";
     // The moment that is too large is to blame, else the first that the file states itself.
     let sum = xx.si + yy.si + zz.si;
-    let mut own = [&xx, &yy, &zz].into_iter().filter(|moment| section.is_own(moment)).peekable();
-    let first = own.peek().copied().unwrap_or(&xx);
-    let wrong = own.find(|moment| moment.si > sum - moment.si).unwrap_or(first);
+    let mut stated = [&xx, &yy, &zz].into_iter().filter(|moment| section.is_own(moment)).peekable();
+    let first = stated.peek().copied().unwrap_or(&xx);
+    let wrong = stated.find(|moment| moment.si > sum - moment.si).unwrap_or(first);
     Err(wrong.doc.bad(&wrong.at, &section.key("inertia_xx, inertia_yy, inertia_zz"), expected, found))
 }
 

@@ -58,20 +58,22 @@ pub fn publish_all(declared_nodes: &[DeclaredNode<'_>]) -> Result<Vec<Published>
 /// Adds the topics that an unchecked node may send: those that it states, and those that others expect of it.
 fn publish_unchecked(node: usize, declared: &DeclaredNode<'_>, all: &mut Vec<Published>) {
     let DeclaredNode { manifest, name, process, .. } = declared;
-    let own = format!("/{}/", name.get_ref());
+    let prefix = format!("/{}/", name.get_ref());
+    // A name with capital letters is itself the fault.
+    let is_own = |topic: &&str| topic.to_lowercase().starts_with(&prefix.to_lowercase());
     let stated = process.outputs.iter().map(|(port, setting)| {
-        let topic = setting.topic.clone().unwrap_or_else(|| format!("{own}{}", port.get_ref()));
+        let topic = setting.topic.clone().unwrap_or_else(|| format!("{prefix}{}", port.get_ref()));
         (topic, setting.type_name.clone().unwrap_or_default())
     });
     let inputs = manifest.content.process.values().flat_map(|process| process.inputs.values());
     let conditions = manifest.content.conditions();
     let expected = inputs.map(|input| input.topic.as_str()).chain(conditions.topics());
-    let expected = expected.filter(|topic| topic.starts_with(&own));
+    let expected = expected.filter(is_own);
     let expected = expected.map(|topic| (topic.to_owned(), String::new()));
     for (name, type_name) in stated.chain(expected) {
         if all.iter().all(|known| known.topic.name != name) {
             let topic = TopicPlan { name, type_name, period_ticks: 1 };
-            let (port, span) = (topic.name.replacen(&own, "", 1), declared.name.span());
+            let (port, span) = (topic.name.replacen(&prefix, "", 1), declared.name.span());
             all.push(Published { node, topic, forwards: None, port, span });
         }
     }
