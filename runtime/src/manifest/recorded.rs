@@ -124,6 +124,7 @@ fn name_copies(document: &mut toml_edit::DocumentMut, sources: &Sources, process
 #[cfg(test)]
 mod tests {
     use super::super::sources::{Origin, Sources};
+    use super::super::{repair, whole_tree};
     use super::{is_host_only, text};
 
     fn recorded(manifest: &str, overrides: &[&str]) -> String {
@@ -131,9 +132,8 @@ mod tests {
         sources.add(Origin::File("a.toml".into()), manifest.to_owned());
         sources.order.push(0);
         overrides.iter().for_each(|text| sources.add(Origin::Override, (*text).to_owned()));
-        let content =
-            super::super::whole_tree(&sources).and_then(|tree| super::super::content(&sources, tree));
-        text(&sources, &content.map(|content| content.process).unwrap_or_default()).unwrap()
+        let content = whole_tree(&sources).and_then(|tree| repair::readable(&sources, tree));
+        text(&sources, &content.map(|(content, _)| content.process).unwrap_or_default()).unwrap()
     }
 
     #[test]
