@@ -208,7 +208,7 @@ impl Opened {
         let (flown, planned) = (rows.len() as u64, self.plan.flights.len() as u64);
         let is_quiet = self.flying.json || self.flying.quiet;
         let bar = progress::bar_from(BAR, flown, planned, is_quiet);
-        let mut lines = (bar.is_hidden() && !is_quiet).then(|| FlightLines::new(flown));
+        let mut lines = (bar.is_hidden() && !is_quiet).then_some(FlightLines::new(flown));
         let Self { flying, campaign, base, plan, build, store } = self;
         let (path, text, fingerprint) = (flying.path.clone(), flying.text.clone(), base.fingerprint.clone());
         let order = Order { build: build.clone(), path, text, fingerprint, folder: store.work_folder()? };
