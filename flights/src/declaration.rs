@@ -67,7 +67,7 @@ pub struct FlightEntry {
     pub assume: Option<Spanned<Assumption>>,
     /// True if a rig holds the vehicle, false if it flies freely; else the channels show it.
     pub rig: Option<bool>,
-    /// False if the commands do not tell the torques, which are then not compared.
+    /// False if the log lacks commands that cause the torques, which are then not compared.
     pub torques: Option<bool>,
     /// True if values that contradict their units are only noted.
     #[serde(default)]

@@ -282,3 +282,10 @@ fn trusted_units_are_noted_only() {
     let flight = read(&deg, CHANNELS, "trust_units = true").unwrap();
     assert!(flight.notes.iter().any(|note| note.contains("deg/s")), "{:?}", flight.notes);
 }
+
+#[test]
+fn torques_are_compared_unless_the_flight_says_that_they_are_not() {
+    for (key, expected) in [("", false), ("torques = true", false), ("torques = false", true)] {
+        assert_eq!(read(&Motion::default(), CHANNELS, key).unwrap().without_torques, expected, "{key}");
+    }
+}

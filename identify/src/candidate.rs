@@ -62,7 +62,7 @@ fn missing(kind: &EffectKind, flights: &[&Prepared]) -> Option<&'static str> {
     if is_slow && needs_fast_commands(kind) {
         return Some(FAST_COMMANDS);
     }
-    let has_no_torques = flights.iter().any(|flight| flight.flight.without_torques);
+    let has_no_torques = flights.iter().all(|flight| flight.flight.without_torques);
     if has_no_torques && (kind.turns_steadily || kind.needs.contains(&Quantity::Torque)) {
         return Some(COMPARED_TORQUES);
     }

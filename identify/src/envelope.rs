@@ -29,14 +29,14 @@ struct Seen {
     height_m: Vec<f64>,
 }
 
-/// The envelope of the judged `flights`, each with the width of the windows in which it was compared, in s: limits by the keys
+/// The envelope of the judged `flights`, each with the width of the windows in which it was compared, in s, and whether its rates were judged: limits by the keys
 /// of `[envelope]` in a vehicle file, of what was measured. Values are within them in 99 % of the time. What is faster than one
 /// cycle in the widest window was not compared in every flight.
-pub fn of<'f>(flights: impl Iterator<Item = (&'f Flight, f64)>) -> BTreeMap<&'static str, Reached> {
+pub fn of<'f>(flights: impl Iterator<Item = (&'f Flight, f64, bool)>) -> BTreeMap<&'static str, Reached> {
     let (mut seen, mut widest_s) = (Seen::default(), 0.0_f64);
-    for (flight, window_s) in flights {
+    for (flight, window_s, has_judged_rates) in flights {
         widest_s = widest_s.max(window_s);
-        seen.look_at(flight);
+        seen.look_at(flight, has_judged_rates);
     }
     let frequency_hz = (widest_s > 0.0).then(|| widest_s.recip());
     let limits = [
@@ -54,7 +54,7 @@ pub fn of<'f>(flights: impl Iterator<Item = (&'f Flight, f64)>) -> BTreeMap<&'st
 }
 
 impl Seen {
-    fn look_at(&mut self, flight: &Flight) {
+    fn look_at(&mut self, flight: &Flight, has_judged_rates: bool) {
         let Ok(played) = Played::of(flight) else { return };
         let forces = flight.specific_force.time_s.iter().zip(&flight.specific_force.values);
         let forces = forces.filter(|(time_s, _)| played.counts(**time_s, **time_s));
@@ -73,7 +73,7 @@ impl Seen {
             if has(StateQuantity::Attitude) {
                 self.tilt_deg.push(tilt_deg(&row.attitude));
             }
-            if has(StateQuantity::Rates) {
+            if has_judged_rates && has(StateQuantity::Rates) {
                 self.angular_velocity_rad_s.push(length(&row.angular_velocity_rad_s));
             }
             if has(StateQuantity::Position) {

@@ -64,7 +64,7 @@ pub fn predictions(problem: &Problem, set: &FlightSet, values: &[f64]) -> Vec<Pr
         let settling_s = part.as_ref().map_or(0.0, Prepared::settling_s);
         let cut = part.is_some().then(|| flight.within(&pieces_s));
         let flight = cut.as_ref().unwrap_or(flight);
-        let turns_as_measured = prepared.is_some_and(Prepared::turns_as_measured);
+        let turns_as_measured = prepared.map_or(flight.without_torques, Prepared::turns_as_measured);
         let measured = |flight: &Flight| {
             let measured = Measured::of(flight)?.within(pieces_s.clone(), settling_s);
             Some(if turns_as_measured { measured.turning_as_measured() } else { measured })

@@ -189,6 +189,10 @@ impl<'f> Prepared<'f> {
             return Err(Unusable::of_channels(flight).or(slow).unwrap_or(Unusable::NoMotion));
         }
         Unusable::of_channels(flight).map_or(Ok(()), Err)?;
+        let shows_forces = [Equation::SpecificForce, Equation::Acceleration];
+        if flight.without_torques && !equations.iter().any(|equation| shows_forces.contains(equation)) {
+            return Err(Unusable::NothingCompared);
+        }
         let apart = || Unusable::Apart { spans: flight.spans() };
         let (start_s, end_s) = common_span(flight, &equations).ok_or_else(apart)?;
         // At 100 Hz windows of 0.12 s.
@@ -291,9 +295,10 @@ impl<'f> Prepared<'f> {
         !self.flight.assumed.is_empty()
     }
 
-    /// True if predictions take the measured attitude: torques that are not compared, since the commands do not tell them, predict none.
+    /// True if predictions take the measured attitude and rates, because torques are not compared.
     pub fn turns_as_measured(&self) -> bool {
-        !self.flight.attitude.is_empty() && self.offset_of(Equation::AngularAcceleration).is_none()
+        let turns = !(self.flight.attitude.is_empty() && self.flight.angular_velocity.is_empty());
+        turns && self.offset_of(Equation::AngularAcceleration).is_none()
     }
 
     /// Length of the compared part, in s.

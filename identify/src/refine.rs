@@ -434,9 +434,10 @@ fn cost(residuals: &[Residuals]) -> f64 {
     residuals.iter().flatten().flat_map(|(_, row)| row).map(|residual| loss(*residual)).sum()
 }
 
-/// The mean loss of a residual.
+/// The mean loss of a residual; those of quantities that are not judged are 0, and no residuals.
 fn variance(residuals: &[Residuals]) -> f64 {
-    cost(residuals) / (ERRORS * residuals.iter().map(Vec::len).sum::<usize>()).max(1) as f64
+    let judged = residuals.iter().flatten().flat_map(|(_, row)| row).filter(|residual| **residual != 0.0);
+    cost(residuals) / judged.count().max(1) as f64
 }
 
 /// Twice the soft L1 loss of a residual.

@@ -212,7 +212,9 @@ impl Report {
         let is_assumed = |name: &String| {
             self.flights.iter().any(|flight| flight.name == *name && !flight.assumed.is_empty())
         };
-        self.held_out.keys().all(is_assumed)
+        self.held_out
+            .iter()
+            .all(|(name, horizons)| is_assumed(name) || horizons.values().all(BTreeMap::is_empty))
     }
 
     /// True if the test flights tell where the model holds. A model that loses was not validated anywhere.

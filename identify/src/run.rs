@@ -128,8 +128,12 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
         before: whiteness(&problem, &selection.before.values),
         after: whiteness(&problem, values),
     };
-    let envelope =
-        envelope::of(problem.test.iter().map(|flight| (&*flight.flight, window_s(&flight.layout))));
+    let envelope = envelope::of(
+        problem
+            .test
+            .iter()
+            .map(|flight| (&*flight.flight, window_s(&flight.layout), !flight.turns_as_measured())),
+    );
     let mut losses = losses(&of_measured_attitude(&problem, &held_out), &noise_floor);
     losses.extend(misfits(&problem, values));
     let is_contradictory =
@@ -301,7 +305,8 @@ fn usable<'f>(
         let reason = reasons.last().filter(|_| prepared.is_none());
         let slow = prepared.as_ref().and_then(|prepared| prepared.slow_period_s);
         report.notes.extend(slow.map(|period_s| slow_note(period_s, &propulsion)));
-        let turns_as_measured = prepared.as_ref().is_some_and(Prepared::turns_as_measured);
+        let turns_as_measured =
+            prepared.as_ref().is_some_and(|flight| flight.turns_as_measured() && !flight.is_assumed());
         report.notes.extend(turns_as_measured.then(|| TURNS_AS_MEASURED.to_owned()));
         report.notes.extend(reason.map(|(_, reason)| format!("not used: {reason}")));
         reports.push(report);

@@ -97,8 +97,7 @@ effect_parameters! {
     }
 }
 
-/// Greatest rotation of the attitude's sensor in its mount, 3 degrees; tuned, no source. Whoever flies sees a greater one, and what asks for
-/// more is a wind, or another force.
+/// Greatest rotation of the attitude's sensor in its mount: 3 degrees; tuned, no source. Larger estimates stood for a wind or another force.
 const MOUNT_MAX_RAD: f64 = 0.0524;
 
 effect_parameters! {

@@ -23,6 +23,12 @@ pub enum Unusable {
     /// No channel of the motion.
     #[error("it has no motion; declare `attitude`, `angular_velocity` or `specific_force` in `channels`")]
     NoMotion,
+    /// Torques that are not compared, and nothing to compare forces with.
+    #[error(
+        "`torques = false` leaves nothing to compare, since no channel shows forces; remove the key, or declare `position`, \
+         `velocity` or `specific_force`"
+    )]
+    NothingCompared,
     /// Commands slower than the motors, and nothing to compare forces with.
     #[error(
         "its commands are logged every {period_s:.3} s, slower than the motors follow ({motor_s:.3} s), so that torques cannot \

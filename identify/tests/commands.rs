@@ -260,12 +260,31 @@ fn commands_slower_than_the_motors_determine_no_lag_delay_or_inertia() {
     assert!(report.to_string().contains(note), "{report}");
 }
 
+/// Rotor speeds that change more with the command than declared: neither a lighter body nor more thrust.
+#[test]
+fn another_slope_of_the_command_map_is_named() {
+    let mut case = Case::null(83, 20.0);
+    case.plan.truth = vec![simulated::effect("command-slope", &[("error", 0.3)])];
+    let report = found(&case.flights());
+    assert_eq!(report.verdict, ["command-slope"], "{report}");
+    let error = &report.effects["command-slope"].parameters["error"];
+    assert!((0.25..0.35).contains(&error.value) && error.low < 0.3 && error.high > 0.3, "{report}");
+}
+
 /// A controller at 1 kHz whose commands are logged at 50 Hz: most of its torques are in no log.
 fn logged_at_50_hz(without_torques: bool) -> FlightSet {
     changed(&heavy(20.0), |flight| {
         keep(&mut flight.command, |at, _| at.is_multiple_of(20));
         flight.without_torques = without_torques;
     })
+}
+
+/// Without the key the attitude is judged, which torques of commands that were not logged do not predict.
+#[test]
+fn a_lost_attitude_advises_to_judge_forces_alone() {
+    let report = found(&logged_at_50_hz(false));
+    let is_lost = report.losses.iter().any(|loss| loss.channel == "attitude");
+    assert!(is_lost && report.to_string().contains("give each flight the key `torques = false`"), "{report}");
 }
 
 #[test]

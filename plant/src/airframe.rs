@@ -24,14 +24,14 @@
 
 use crate::actuation::{Actuation, Battery};
 use crate::airframe_state::{AirframeState, DelayLine, EffectState};
-use crate::effects::{Action, Advance, Effect, FlightCondition, entry};
+use crate::effects::{Action, Advance, CATALOGUE, Effect, FlightCondition, entry};
 use crate::motor;
 use crate::rotor::{self, Wrench};
 use crate::saved::Fingerprint;
 use crate::state::{PerRotor, RotorRates, RotorState, State, paired};
 use diagnostics::Diagnostic;
 use nalgebra::Vector3;
-use vehicles::{EffectEntry, Vehicle};
+use vehicles::{CommandMap, EffectEntry, Vehicle};
 
 /// A vehicle as the backends fly it: immutable.
 ///
@@ -50,6 +50,8 @@ pub struct Airframe {
     vehicle: Vehicle,
     effects: Vec<Effect>,
     frame_shift_B_m: Vector3<f64>,
+    /// The command map as it is declared: an effect may change that of the vehicle.
+    declared_command: CommandMap,
 }
 
 impl Airframe {
@@ -73,20 +75,28 @@ impl Airframe {
     /// The airframe of `vehicle` with these effects instead of those that its file lists.
     #[must_use]
     pub fn with_effects(mut vehicle: Vehicle, effects: Vec<Effect>) -> Self {
-        let declared_B_m = amid_rotors_B_m(&vehicle);
-        for (effect, action) in actions(&effects) {
+        let (declared_B_m, declared_command) = (amid_rotors_B_m(&vehicle), vehicle.command);
+        // A file may list them in any order, in which a change may see those before it.
+        let mut by_catalogue = effects.clone();
+        by_catalogue.sort_by_key(|effect| CATALOGUE.iter().position(|kind| *kind == effect.kind));
+        for (effect, action) in actions(&by_catalogue) {
             if let Action::Vehicle(change) = action {
                 change(&effect.values, &mut vehicle);
             }
         }
         let frame_shift_B_m = amid_rotors_B_m(&vehicle) - declared_B_m;
-        Self { vehicle, effects, frame_shift_B_m }
+        Self { vehicle, effects, frame_shift_B_m, declared_command }
     }
 
     /// The vehicle as it flies, changed by its effects.
     #[must_use]
     pub fn vehicle(&self) -> &Vehicle {
         &self.vehicle
+    }
+
+    /// The command map as it is declared.
+    pub(crate) fn declared_command(&self) -> &CommandMap {
+        &self.declared_command
     }
 
     /// Returns the frame's displacement by the effects from its declared place, seen from the centre of mass.

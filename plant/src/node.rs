@@ -107,7 +107,7 @@ impl Component for Plant {
         if let Some(trouble) = memory.backend.trouble() {
             return Err(trouble.into());
         }
-        let actuators = actuators(&self.origin.model.vehicle().command, &inputs.command.command);
+        let actuators = actuators(self.origin.model.airframe().declared_command(), &inputs.command.command);
         let outputs = Outputs::of(&*memory.backend, &self.frame, actuators, context.time_ns());
         set_body(memory, measured);
         Ok(outputs)

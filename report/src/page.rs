@@ -75,7 +75,7 @@ mod tests {
         assert!(
             page.contains(COLOURS) && page.contains(r#"<meta name="color-scheme" content="light dark">"#)
         );
-        // Every name in the styles and scripts is declared.
+        // Every name in the styles is declared.
         let used = [include_str!("page/page.css"), include_str!("page/kit.js")].concat();
         let names = used.split("var(--").skip(1).filter_map(|rest| rest.split_once(')'));
         for name in names.map(|(name, _)| name) {

@@ -114,7 +114,11 @@ impl Checkpoint {
         Ok(Self::from_bytes(&bytes).with_context(about)?)
     }
 
-    fn from_bytes(bytes: &[u8]) -> anyhow::Result<Self> {
+    /// The checkpoint whose file has these `bytes`.
+    ///
+    /// # Errors
+    /// If it is none of this version of the program, or damaged.
+    pub(crate) fn from_bytes(bytes: &[u8]) -> anyhow::Result<Self> {
         if !bytes.starts_with(MARK) {
             bail!(
                 "it is no checkpoint of hummingbus; `run` writes them with --checkpoint-every or [[checkpoint]]"
@@ -146,11 +150,17 @@ impl Checkpoint {
     /// # Errors
     /// If it cannot be written, or something else would be lost.
     pub(crate) fn write(&self, path: &Path) -> Result<(), Error> {
+        let bytes = self.bytes()?;
+        output_file::write(path, &CHECKPOINT, |out| out.write_all(&bytes))
+    }
+
+    /// The bytes of its file.
+    fn bytes(&self) -> anyhow::Result<Vec<u8>> {
         let mut bytes = START.to_vec();
         bytes.extend(postcard::to_stdvec(self).context("cannot put the checkpoint into bytes")?);
         let sum = sha256(&bytes);
         bytes.extend(sum.as_bytes());
-        output_file::write(path, &CHECKPOINT, |out| out.write_all(&bytes))
+        Ok(bytes)
     }
 
     /// True if it is of the run that would write `other` now.
@@ -243,7 +253,7 @@ impl Checkpoint {
         let nodes = self.parts_for(graph)?;
         graph.plan.first_tick = self.tick();
         graph.from = Some(Parts { tick: self.tick(), nodes });
-        graph.source = Some(Box::new(self.clone()));
+        graph.source = Some(self.bytes()?);
         Ok(())
     }
 

@@ -131,6 +131,7 @@ impl Writer<'_> {
     /// that checkpoint holds.
     pub(crate) fn write_source(&self, path: Option<&Path>) -> Result<PathBuf> {
         let source = self.graph.source.as_ref().context("the run does not go on from a checkpoint")?;
+        let source = Checkpoint::from_bytes(source)?;
         let path = path.map_or_else(|| self::path(self.stem, source.tick()), Path::to_owned);
         source.of_run(self.manifest, self.graph).write(&path)?;
         self.files.add_asked(Written { tick: source.tick(), path: path.clone() });

@@ -30,7 +30,6 @@ mod samples;
 mod sidecars;
 mod wiring;
 
-use crate::checkpoint::Checkpoint;
 pub use crate::program::BackupSpec;
 use crate::program::{Origin, Program};
 pub use backups::{backup_of, successor_of};
@@ -85,8 +84,8 @@ pub struct Graph {
     pub files: InputFiles,
     /// Parts of the checkpoint from which the run goes on.
     pub(crate) from: Option<Parts>,
-    /// That checkpoint.
-    pub(crate) source: Option<Box<Checkpoint>>,
+    /// The bytes of its file.
+    pub(crate) source: Option<Vec<u8>>,
     /// Origins of first processes that are not those of the manifest, by node: a run that goes on begins with them.
     pub(crate) begun: BTreeMap<usize, Origin>,
     /// Legal but unusual values; `check` and `run` print them.

@@ -203,7 +203,7 @@ function drawNoise() {
   const units = Object.fromEntries(Object.values(report.held_out).flatMap(Object.values).flatMap(Object.entries).map(([channel, { unit }]) => [channel, unit]));
   fillTable("noise", [left("channel"), "deviation", left("unit"), ...ahead.map((horizon) => `error after ${horizon} s`), left("unit")],
     Object.entries(report.noise_floor).map(([channel, { value, unit, prediction }]) =>
-      [left(spaced(channel)), number(value), left(shownUnit(unit)), ...ahead.map((horizon) => number(prediction[horizon])), left(shownUnit(units[channel] ?? ""))]));
+      [left(spaced(channel)), number(value), left(shownUnit(unit)), ...ahead.map((horizon) => number(prediction[horizon])), left(shownUnit(units[channel] ?? { attitude: "deg", rates: "rad/s" }[channel] ?? ""))]));
 }
 
 function drawWhiteness() {

@@ -23,7 +23,7 @@ const FLOWN_WIDTH: u32 = 14;
 const THIN_WIDTH: u32 = 7;
 /// Seen on both sides of a flown line.
 const BAND_WIDTH: u32 = 44;
-const BAND_OPACITY: f64 = 0.35;
+const BAND_OPACITY: f64 = 0.5;
 /// Size of the letters of titles, but for the sheet's.
 pub const HEAD_SIZE: u32 = 15;
 /// Size of all other letters.

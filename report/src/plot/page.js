@@ -28,7 +28,7 @@ const column = (rows, index) => rows.map((row) => row[index]);
 
 // An estimate is a band, which is seen on both sides of the flown line.
 function look({ role, colour, is_darker: isDarker, is_band: isBand }) {
-  if (isBand) return { color: `${colour} 0.35`, width: BAND_PX };
+  if (isBand) return { color: `${colour} 0.5`, width: BAND_PX };
   if (role === "flown") return { color: colour, width: 2 };
   return { color: isDarker ? `${colour} inked` : colour, width: 1.2, dash: role === "asked" ? "dash" : "solid" };
 }
