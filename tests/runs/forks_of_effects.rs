@@ -50,7 +50,7 @@ fn an_effect_begins_in_a_fork() {
         place.call(&args).flown();
     }
     place.call(&["diff", "--tolerance", "0", &forks[0], &forks[1]]).with_code(0);
-    place.call(&["diff", &whole, &forks[0]]).with_code(1).prints(&["tick 1000, topic /plant/"]);
+    place.call(&["diff", &whole, &forks[0]]).with_code(1).prints(&["tick 1000, topic /"]);
 }
 
 #[test]
