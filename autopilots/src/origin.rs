@@ -57,7 +57,7 @@ impl Origin {
 
     /// The turn from the world's axes to east, north, up; `None` if they are that.
     fn turn(&self) -> Option<UnitQuaternion<f64>> {
-        let to_east_deg = EAST_DEG - self.x_azimuth_deg;
+        let to_east_deg = (EAST_DEG - self.x_azimuth_deg).rem_euclid(360.0);
         let turn = || UnitQuaternion::from_axis_angle(&Vector3::z_axis(), to_east_deg.to_radians());
         (to_east_deg != 0.0).then(turn)
     }

@@ -24,12 +24,12 @@ use vehicles::{ROTORS_MAX, Vehicle};
 pub(crate) const THRUST_RESERVE: f64 = 0.05;
 
 /// The greatest part of the way from the least thrust to the weight to keep free at the lower end: strong vehicles, which
-/// lift many times their weight, would else have no thrust left to sink with. Tuned, no source: it leaves 0.7 of that way,
-/// and begins to count where the rotors lift about six times the weight.
+/// lift many times their weight, would otherwise have no thrust left to sink with. Tuned, no source: it leaves 0.7 of that way,
+/// and begins to count where the range of the thrust is six times that way.
 const RESERVE_OF_WEIGHT: f64 = 0.3;
 
 /// The share of the torques that the rotors can make in hover for which thrust is given up: that of ArduPilot, the default of
-/// ATC_THR_MIX_MAX. Laws whose demands are off by far would else throw the vehicle about.
+/// ATC_THR_MIX_MAX. Laws whose demands are off by far would otherwise throw the vehicle about.
 const TORQUE_SHARE: f64 = 0.5;
 
 /// The upward part of a rotor's thrust below which it does not limit the torques of the others: the cosine of 75 deg. Tuned, no

@@ -65,6 +65,13 @@ impl WrittenFiles {
         before.max_by_key(|written| written.tick).cloned()
     }
 
+    /// The newest checkpoint of the plan or of a request up to tick `until`.
+    fn newest_up_to(&self, until: u32) -> Option<Written> {
+        let asked = self.asked.borrow();
+        let asked = asked.iter().filter(|written| written.tick <= until).cloned();
+        asked.chain(self.newest_planned(until)).max_by_key(|written| written.tick)
+    }
+
     /// The newest before tick `now`: that of `tick`, if it is given.
     ///
     /// # Errors
@@ -291,9 +298,10 @@ impl<'a> Collector<'a> {
         }
         let Writer { manifest, files, .. } = self.writer;
         if let (false, Some((condition, failed_at))) = (self.has_failed, failure) {
-            let before = files.newest_planned(failed_at);
+            let before = files.newest_up_to(failed_at);
             self.notes.push(self.failure_note(&condition, failed_at, before.as_ref()));
-            (self.has_failed, self.pinned) = (true, before.map(|written| written.tick));
+            (self.has_failed, self.pinned) =
+                (true, files.newest_planned(failed_at).map(|written| written.tick));
         }
         let keep = manifest.content.run.checkpoint_keep.as_ref().map_or(usize::MAX, |keep| *keep.get_ref());
         if let Some(oldest) = files.add_planned(Written { tick, path }, keep, self.pinned) {
@@ -311,7 +319,7 @@ impl<'a> Collector<'a> {
         Some((condition, u32::try_from(time_ns / plan.tick_ns).ok()?))
     }
 
-    /// The message that `condition` failed at tick `failed_at`, behind the checkpoint `before`.
+    /// The message that `condition` failed at tick `failed_at`, after the checkpoint `before`.
     fn failure_note(&self, condition: &str, failed_at: u32, before: Option<&Written>) -> String {
         let plan = &self.writer.graph.plan;
         let (condition, time_s) = (printable_line(condition), f64::from(failed_at) * plan.tick_s());
@@ -329,7 +337,7 @@ impl<'a> Collector<'a> {
             }
             None if first == 0 => "the run has written no checkpoint before it".to_owned(),
             None if failed_at < first => {
-                format!("the run goes on from a checkpoint behind it, of tick {first}")
+                format!("the run goes on from a later checkpoint, of tick {first}")
             }
             None => format!("the checkpoint before it is that of tick {first}, from which the run goes on"),
         };

@@ -68,7 +68,7 @@ impl FlightLines {
         Self { start, told: Duration::ZERO }
     }
 
-    /// The line that is due `elapsed` after the beginning, when `flown` of `planned` flights were flown; `None` if the last one is new.
+    /// The line that is due `elapsed` after the beginning, when `flown` of `planned` flights were flown; `None` if the last line is less than 30 s old.
     pub fn due(&mut self, flown: u64, planned: u64, elapsed: Duration) -> Option<String> {
         if elapsed < self.told + FLIGHTS_PERIOD {
             return None;

@@ -40,6 +40,38 @@ fn an_unknown_key_is_told_alone() {
     told(&text, &["unknown key `process.ekf.inputs.imu.source`"]);
 }
 
+/// An unknown key of a delay, of an output that others read, and of the run itself.
+#[test]
+fn nothing_follows_from_an_unknown_key() {
+    let place = Place::new();
+    let hover = fs::read_to_string(repository("manifests/hover.toml")).unwrap();
+    let hover = hover.replace("../vehicles", &repository("vehicles"));
+    for (from, to, key) in [
+        ("delay_ticks = 1", "delay = 1", "delay`"),
+        ("initial = { command", "start = { command", "start`"),
+        ("topic = \"/tf\"", "topicname = \"/tf\"", "topicname`"),
+        ("duration_s = 12.0", "[runn]\nduration_s = 12.0", "unknown key `runn`"),
+    ] {
+        assert!(hover.contains(from), "{from}");
+        let path = place.write("m.toml", hover.replacen(from, to, 1));
+        let found = place.call(&["check", &path, "--json"]).with_code(2).json();
+        let faults = found["faults"].as_array().unwrap();
+        assert!(faults.len() == 1 && faults[0]["message"].as_str().unwrap().contains(key), "{found:#}");
+    }
+}
+
+/// Names of processes may have dots.
+#[test]
+fn a_fault_of_a_process_with_a_dot_in_its_name_ends_in_words() {
+    let text = "[run]\nduration_s = 1.0\n[process.a]\nkind = \"imu\"\ninputs.state = \"/plant/state\"\n\
+                [process.\"a.b\"]\noutputs = 3\n[group.a]\nprocesses = []\n[group.\"a.b\"]\nprocesses = 3\n";
+    let place = Place::new();
+    let path = place.write("m.toml", text);
+    let found = place.call(&["check", &path, "--json"]).with_code(2).json();
+    let all = found["faults"].to_string();
+    assert!(all.contains("a.b") && all.contains("outputs"), "{found:#}");
+}
+
 /// A pass condition of the good manifest with this `line` in place of its statistic and limit.
 fn pass(line: &str) -> String {
     format!(

@@ -196,7 +196,7 @@ fn vehicles_that_lift_many_times_their_weight_hold_their_set_point() {
     }
 }
 
-/// The vehicle file of the hexacopter with `line` in the table of its first rotor.
+/// The vehicle file of the hexacopter with `line` in the table of its rotor `left`.
 fn hexacopter_with(place: &Place, line: &str) -> String {
     let text = std::fs::read_to_string(repository("vehicles/dji-f550.toml")).unwrap();
     place.write("hexa.toml", text.replacen("name = \"left\"", &format!("name = \"left\"\n{line}"), 1))

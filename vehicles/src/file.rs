@@ -293,8 +293,8 @@ fn axis(section: &Section) -> Result<Vector3<f64>, Diagnostic> {
     let given = Vector3::from(section.vector("axis", PURE_NUMBER, &bounds::AXIS)?);
     // Not divided where it is that of the other rotors: it stays the same number.
     let axis = if given == Vector3::z() { given } else { given / given.norm() };
-    // A length that is 0, or too small to divide by.
-    if axis.iter().all(|part| part.is_finite()) {
+    // Not of a length that is 0, or whose square is too small to keep its digits.
+    if given.norm_squared().is_normal() {
         return Ok(axis);
     }
     let expected = "a direction, such as [0, 0.2, 1]";

@@ -93,7 +93,12 @@ pub fn inputs(
         Some(Inputs::Ports(ports)) => require_ports(declared, ports)?,
         _ => {}
     }
-    process.inputs.iter().map(|(port, setting)| input(declared, port, setting, topics, senders)).collect()
+    // A process with a gap may send what nobody seems to publish.
+    let has_gaps = !manifest.repairs.processes.is_empty();
+    let is_judged =
+        |setting: &InputSetting| !has_gaps || topics.iter().any(|topic| topic.name == setting.topic);
+    let judged = process.inputs.iter().filter(|(_, setting)| is_judged(setting));
+    judged.map(|(port, setting)| input(declared, port, setting, topics, senders)).collect()
 }
 
 /// Refuses inputs that are none of `ports`, and the lack of one that is required.

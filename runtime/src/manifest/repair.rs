@@ -64,15 +64,19 @@ pub fn readable(sources: &Sources, tree: DeTable<'_>) -> Result<(Content, Repair
         told: Vec::new(),
         faults: Vec::new(),
     };
+    let mut last = None;
     let mut content: Content = loop {
-        match read_tree(&bench.whole) {
+        let misread = match read_tree(&bench.whole) {
             Ok(content) => break content,
-            Err(misread) if bench.mend(&misread) => {}
-            Err(misread) => {
-                bench.tell(&misread);
-                return Err(in_order(bench.faults).unwrap_or_else(|| sources.refused(misread)));
-            }
+            Err(misread) => misread,
+        };
+        // What is misread again at the same place is not to be repaired.
+        let at = Some((misread.error.key().to_owned(), misread.span()));
+        if at == last || !bench.mend(&misread) {
+            bench.tell(&misread);
+            return Err(in_order(bench.faults).unwrap_or_else(|| sources.refused(misread)));
         }
+        last = at;
     };
     bench.leave_out(&mut content);
     let mut repairs = bench.repairs;
@@ -92,9 +96,9 @@ fn in_order(faults: Vec<Diagnostic>) -> Option<Diagnostic> {
 enum Part<'k> {
     /// `[run]`, and the key in it.
     Run(&'k str),
-    /// A process, by its name.
+    /// A process: its name, and the key in it. Names may have dots.
     Process(&'k str),
-    /// A group, by its name.
+    /// A group: its name, and the key in it.
     Group(&'k str),
     /// An entry of one of the [`LISTS`].
     Entry(&'static str, usize),
@@ -107,8 +111,8 @@ impl<'k> Part<'k> {
         let second = rest.split('.').next().unwrap_or(rest);
         match first {
             "run" => Some(Self::Run(rest)),
-            "process" => Some(Self::Process(second)),
-            "group" => Some(Self::Group(second)),
+            "process" => Some(Self::Process(rest)),
+            "group" => Some(Self::Group(rest)),
             _ => {
                 let &(list, _) = LISTS.iter().find(|(list, _)| *list == first)?;
                 Some(Self::Entry(list, second.parse().ok()?))
@@ -137,10 +141,24 @@ impl<'t> Bench<'_, 't> {
         match Part::of(misread.error.key()) {
             None => self.mend_top(misread),
             Some(Part::Run(key)) => self.mend_run(misread, key),
-            Some(Part::Process(name)) => self.mend_process(misread, name),
-            Some(Part::Group(name)) => self.mend_group(misread, name),
+            Some(Part::Process(key)) => {
+                self.name_in("process", key).is_some_and(|name| self.mend_process(misread, &name))
+            }
+            Some(Part::Group(key)) => {
+                self.name_in("group", key).is_some_and(|name| self.mend_group(misread, &name))
+            }
             Some(Part::Entry(list, index)) => self.mend_entry(misread, list, index),
         }
+    }
+
+    /// The longest name of an entry of `table` with which the dotted `key` begins.
+    fn name_in(&mut self, table: &str, key: &str) -> Option<String> {
+        let DeValue::Table(entries) = self.at(&[table])?.get_ref() else { return None };
+        let begins = |name: &&str| {
+            key.strip_prefix(*name).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+        };
+        let names = entries.keys().map(|name| name.get_ref().as_ref());
+        names.filter(begins).max_by_key(|name| name.len()).map(str::to_owned)
     }
 
     fn tell(&mut self, misread: &Misread) {
@@ -178,7 +196,8 @@ impl<'t> Bench<'_, 't> {
 
     fn mend_run(&mut self, misread: &Misread, key: &str) -> bool {
         let name = if misread.is_unknown_key() { key } else { key.split('.').next().unwrap_or(key) };
-        let is_follow_up = misread.is_missing() && self.repairs.is_timeless;
+        let is_follow_up =
+            misread.is_missing() && (self.repairs.is_timeless || self.is_in_another_table(name));
         if !is_follow_up {
             self.tell(misread);
         }
@@ -203,6 +222,13 @@ impl<'t> Bench<'_, 't> {
         true
     }
 
+    /// True if a table beside `[run]` has the key `name`, such as one with a typo in its own name.
+    fn is_in_another_table(&self, name: &str) -> bool {
+        let DeValue::Table(root) = self.whole.get_ref() else { return false };
+        let has = |table: &DeValue<'_>| matches!(table, DeValue::Table(table) if table.contains_key(name));
+        root.iter().any(|(key, table)| key.get_ref() != "run" && has(table.get_ref()))
+    }
+
     fn mend_process(&mut self, misread: &Misread, name: &str) -> bool {
         let is_follow_up = misread.is_missing() && self.touched.contains(name);
         if !is_follow_up {
@@ -213,12 +239,8 @@ impl<'t> Bench<'_, 't> {
         if gap == Gap::Whole {
             *process.get_mut() = DeValue::Table(DeTable::new());
         }
-        // An unknown key deeper than those of the process leaves everything around it.
-        let is_deep = misread.is_unknown_key() && misread.error.key().matches('.').count() > 2;
         if gap != Gap::None {
             self.touched.insert(name.to_owned());
-        }
-        if gap != Gap::None && !is_deep {
             self.repairs.processes.insert(name.to_owned());
         }
         true

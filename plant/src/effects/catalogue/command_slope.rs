@@ -45,8 +45,11 @@ fn turn(values: &Values, vehicle: &mut Vehicle) {
     let map = &mut vehicle.command;
     let turned = |speed_rad_s: f64| speed_rad_s + error * (speed_rad_s - hover_rad_s);
     let [low_rad_s, high_rad_s] = [map.speed_at_min_rad_s, map.speed_at_max_rad_s].map(turned);
+    if high_rad_s <= 0.0 {
+        return;
+    }
     // The line goes on to standstill, and commands below ask for no speed.
-    if low_rad_s < 0.0 && high_rad_s > 0.0 {
+    if low_rad_s < 0.0 {
         map.min += (map.max - map.min) * -low_rad_s / (high_rad_s - low_rad_s);
     }
     (map.speed_at_min_rad_s, map.speed_at_max_rad_s) = (low_rad_s.max(0.0), high_rad_s);
