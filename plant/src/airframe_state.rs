@@ -171,9 +171,9 @@ impl DelayLine {
         let newest = usize::try_from(newest).ok().filter(|newest| *newest < other.ring.len());
         other.newest = newest.ok_or(OUTSIDE)?;
         (self.newest, self.is_empty) = (0, other.is_empty);
-        let (own, others) = (self.ring.len(), other.ring.len());
-        for ticks in 0..own {
-            self.ring[(own - ticks) % own] = other.back(ticks.min(others - 1));
+        let (count, others) = (self.ring.len(), other.ring.len());
+        for ticks in 0..count {
+            self.ring[(count - ticks) % count] = other.back(ticks.min(others - 1));
         }
         Ok(())
     }

@@ -93,8 +93,8 @@ impl Attached {
         let mut all = listed(&self.manifest);
         all.retain(|(process, _)| !is_of_vehicle(process));
         for name in &names {
-            let own = self.merged(name).map(|merged| listed(&merged)).unwrap_or_default();
-            all.extend(own.into_iter().map(|(process, table)| (format!("{name}/{process}"), table)));
+            let of_vehicle = self.merged(name).map(|merged| listed(&merged)).unwrap_or_default();
+            all.extend(of_vehicle.into_iter().map(|(process, table)| (format!("{name}/{process}"), table)));
         }
         all
     }

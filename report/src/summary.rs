@@ -272,8 +272,8 @@ impl Summary {
     pub fn checkpoint_to_go_back_to<'a>(&'a self, from: Option<&'a Written>) -> Option<&'a Written> {
         let failed_at = self.failed_at_tick();
         let is_before = |written: &&Written| failed_at.is_none_or(|failed_at| written.tick <= failed_at);
-        let own = self.checkpoints.iter().rev().find(is_before);
-        own.or_else(|| from.filter(|from| failed_at.is_some() && is_before(from)))
+        let written = self.checkpoints.iter().rev().find(is_before);
+        written.or_else(|| from.filter(|from| failed_at.is_some() && is_before(from)))
     }
 
     /// The replacements as text; those that were refused are never left out.
