@@ -111,7 +111,9 @@ mod tests {
         flight.position.time_s = time_s.clone();
         flight.command.time_s = time_s.clone();
         flight.specific_force.time_s = time_s;
-        let limits = of([(&flight, 0.1), (&flight, 0.08)].into_iter());
+        flight.angular_velocity.values = vec![[0.0, 0.0, 0.5]; 1000];
+        flight.angular_velocity.time_s = flight.position.time_s.clone();
+        let limits = of([(&flight, 0.1, true), (&flight, 0.08, false)].into_iter());
         let near = |key: &str, expected: f64| {
             let Reached { value, .. } = limits[key];
             assert!((value - expected).abs() < 0.02 * expected, "{key}: {value}");
@@ -119,9 +121,12 @@ mod tests {
         near("speed_max", 2.0);
         near("tilt_max", 10.0);
         near("specific_force_max", 9.9);
+        near("angular_velocity_max", 0.5);
         near("height_min", 1.5);
         near("height_max", 1.5);
         near("frequency_max", 10.0);
+        let forces_alone = of(std::iter::once((&flight, 0.1, false)));
+        assert!(!forces_alone.contains_key("angular_velocity_max") && forces_alone.contains_key("tilt_max"));
         assert!(of(std::iter::empty()).is_empty(), "no flight was judged");
     }
 }

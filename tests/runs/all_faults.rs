@@ -8,7 +8,7 @@ use std::fs;
 #[track_caller]
 fn told(text: &str, parts: &[&str]) {
     let place = Place::new();
-    let path = place.write("faulty.toml", text.to_owned());
+    let path = place.write("faulty.toml", text);
     let found = place.call(&["check", &path, "--json"]).with_code(2).json();
     let faults = found["faults"].as_array().unwrap();
     let messages: Vec<&str> = faults.iter().map(|fault| fault["message"].as_str().unwrap()).collect();
