@@ -12,11 +12,12 @@
 /// assert_eq!(nearest("rnu", ["run", "fly"]), Some("run"), "two letters that change places are one fault");
 /// assert_eq!(nearest("gyro_noise", ["gyro_cross_axis", "gyro_noise_density"]), Some("gyro_noise_density"));
 /// assert_eq!(nearest("every_ticks", ["delay_ticks"]), None, "a common end alone is not enough");
+/// assert_eq!(nearest("feed_forward", ["rate_feed_forward"]), Some("rate_feed_forward"));
 /// ```
 pub fn nearest<'a>(found: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let (found, known) = (found.to_lowercase(), known.into_iter().collect::<Vec<_>>());
     let scored = || known.iter().filter_map(|name| Some((distance(&found, &name.to_lowercase())?, *name)));
-    begun(&found, &known).or_else(|| scored().min().map(|(_, name)| name))
+    begun(&found, &known).or_else(|| ended(&found, &known)).or_else(|| scored().min().map(|(_, name)| name))
 }
 
 /// The names among `known` that `found` was probably meant to be: the nearest, or those with a word that begins with `found`.
@@ -54,6 +55,13 @@ fn begun<'a>(found: &str, known: &[&'a str]) -> Option<&'a str> {
     let mut begun = known.iter().filter(|name| name.to_lowercase().starts_with(found));
     let first = begun.next().filter(|_| found.len() >= SHORTEST)?;
     begun.next().is_none().then_some(*first)
+}
+
+/// The only name that ends with the words of `found`, if these are several.
+fn ended<'a>(found: &str, known: &[&'a str]) -> Option<&'a str> {
+    let mut ended = known.iter().filter(|name| name.to_lowercase().ends_with(&format!("_{found}")));
+    let first = ended.next().filter(|_| found.contains('_'))?;
+    ended.next().is_none().then_some(*first)
 }
 
 /// The only name among `known` that `found` is, but for one or two letters; `None` where another name may be meant as well.
