@@ -26,7 +26,7 @@ pub fn shipped_in_folders() -> Vec<String> {
     };
     let thesis =
         ["hover-estimated", "hover", "take-off", "propeller-steps-noisy", "propeller-steps", "propeller"];
-    let identify = ["course", "excite", "hover-gentle", "low-passes", "rig-a-riddle"];
+    let identify = ["excite", "hover-gentle", "low-passes", "rig-a-riddle"];
     let delays = ["command", "flight", "imu", "log", "nothing", "print-a", "print-b", "sticks"];
     [of("thesis", &thesis), of("identify", &identify), of("rig-delay", &delays)].concat()
 }
