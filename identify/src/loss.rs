@@ -157,7 +157,7 @@ mod tests {
         };
         assert_eq!(lost(&["rates"]), ["rates"]);
         assert_eq!(lost(&["attitude", "rates"]), ["attitude"]);
-        assert!(advice("rates").starts_with("torques"));
+        assert!(advice("rates").starts_with("torques") && advice("rates").contains("`torques = false`"));
     }
 
     #[test]
