@@ -214,7 +214,7 @@ fn a_number_that_is_not_physical_is_refused() {
     assert_refused("value = 0.480", "value = 0", mass, &["above 0"]);
     assert_refused("value = 0.480", "value = nan", mass, &["finite"]);
     assert_refused("value = 0.480", "value = inf", mass, &["finite"]);
-    assert_refused("value = 8.1e-3", "value = 11.3e-3", line_of("inertia_xx"), &["sum of the other two"]);
+    assert_refused("value = 8.1e-3", "value = 11.3e-3", line_of("inertia_zz"), &["sum of the other two"]);
     assert_refused("value = 200", "value = 1", line_of("max = "), &["command.max", "above `command.min`"]);
     assert_refused("value = 7.6184e-8", "value = 1e308", line_of("thrust_coefficient"), &["finite in SI"]);
     assert_refused("\"not stated\"", "-1", mass, &["body.mass.uncertainty"]);
