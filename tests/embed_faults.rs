@@ -553,11 +553,11 @@ fn sides(error: &Error) -> [bool; 3] {
 fn an_error_about_a_manifest_is_one_of_the_input_and_has_the_place() {
     alone(|folder| {
         let path = folder.join("wrong.toml");
-        std::fs::write(&path, "[run]\nduration_s = \"long\"\n").unwrap();
+        std::fs::write(&path, "[run]\nrate_hz = 1000\nduration_s = \"long\"\n[process]\n").unwrap();
         let error = hummingbus::check_with_programs(&path, &[]).unwrap_err();
         assert_eq!(sides(&error), [false, true, false], "{error}");
         let fault = error.diagnostic().unwrap();
-        assert_eq!((fault.file.as_str(), fault.place.as_ref().unwrap().line), (path.to_str().unwrap(), 2));
+        assert_eq!((fault.file.as_str(), fault.place.as_ref().unwrap().line), (path.to_str().unwrap(), 3));
         assert_eq!(error.process(), None);
     });
 }
