@@ -58,6 +58,7 @@ impl Brief {
 fn answer(report: &Report) -> String {
     let count = report.verdict.len();
     let effects = if count == 1 { "one effect".to_owned() } else { format!("{count} effects") };
+    let [small, beyond] = [false, true].map(|at_bound| report.withdrawn_names(at_bound));
     if report.is_undecided() {
         "These flights are too short to tell.".to_owned()
     } else if !report.losses.is_empty() && count == 0 && report.prediction_only.is_empty() {
@@ -71,11 +72,16 @@ fn answer(report: &Report) -> String {
              property of the vehicle.",
             report.prediction_only.join(" and ")
         )
-    } else if count == 0 && !report.withdrawn.is_empty() {
-        let withdrawn: Vec<&str> = report.withdrawn.iter().map(|withdrawn| withdrawn.effect).collect();
+    } else if count == 0 && !small.is_empty() {
         format!(
             "The declared vehicle file predicts these flights as well as any. They show {}, too small to change a prediction.",
-            withdrawn.join(" and ")
+            small.join(" and ")
+        )
+    } else if count == 0 && !beyond.is_empty() {
+        format!(
+            "The declared vehicle file lacks nothing that these flights can name. They ask for more of {} than is plausible: the cause \
+             is not known.",
+            beyond.join(" and ")
         )
     } else if count == 0 {
         "The declared vehicle file says all that these flights can show.".to_owned()
@@ -362,14 +368,23 @@ mod tests {
         let nothing = Brief::of(&Report::of_nothing());
         assert_eq!(nothing.answer, "The declared vehicle file says all that these flights can show.");
         assert!(nothing.missing.is_empty() && nothing.changes.is_empty(), "{nothing:?}");
-        let found =
-            Withdrawn { effect: "ground-effect", reason: "no prediction error falls noticeably".to_owned() };
-        let small = Report { withdrawn: vec![found], ..Report::of_nothing() };
+        let found = Withdrawn {
+            effect: "ground-effect",
+            reason: "no prediction error falls noticeably".to_owned(),
+            at_bound: false,
+        };
+        let small = Report { withdrawn: vec![found.clone()], ..Report::of_nothing() };
         assert!(Brief::of(&small).answer.contains("They show ground-effect, too small"));
         assert!(
             small
                 .to_string()
                 .contains("verdict: nothing. The equations fit better with ground-effect, but no prediction")
+        );
+        let reached = Withdrawn { effect: "sensor-bias", at_bound: true, ..found };
+        let beyond = Report { withdrawn: vec![reached], ..Report::of_nothing() };
+        assert!(Brief::of(&beyond).answer.contains("They ask for more of sensor-bias than is plausible"));
+        assert!(
+            beyond.to_string().contains("verdict: nothing. The equations ask for more of sensor-bias than")
         );
         let short = Brief::of(&Report { validation_blocks: 3, ..Report::of_nothing() });
         assert_eq!(short.answer, "These flights are too short to tell.");

@@ -4,7 +4,7 @@ use crate::candidate::{Candidate, FAST_COMMANDS, Unidentifiable, free_parameters
 use crate::confounded::Rival;
 use crate::fit::Problem;
 use crate::fit_result::FitResult;
-use crate::judgement::{Way, is_stopped};
+use crate::judgement::{Way, reached_bound};
 use crate::logging;
 use crate::parameter::Parameter;
 use crate::report::{BeforeAfter, EffectReport, Estimate};
@@ -181,7 +181,7 @@ pub fn estimates(problem: &Problem, fitted: &FitResult, free: &[usize]) -> BTree
         // Commands that were logged slowly make it come out too small, which no block of time shows.
         let bias = logging::bias(problem, entry);
         let (low, high) = ((value - half).max(entry.spec().min), (value + half + bias).min(entry.spec().max));
-        let at_bound = is_stopped(problem, fitted, *at);
+        let at_bound = reached_bound(problem, fitted, *at).is_some();
         let determined = low > entry.spec().min || high < entry.spec().max;
         let unit = entry.spec().unit();
         (entry.spec().name, Estimate { value, unit, low, high, at_bound, determined, by_equations: None })

@@ -122,7 +122,7 @@ fn is_beyond_bounds(problem: &Problem, candidate: &Candidate, fitted: &FitResult
 
 /// True if a parameter stopped at a bound other than its baseline, and the equations ask for more by more than chance. One that is in truth what its bound is (rotors
 /// without any angular momentum) is as often beyond it as within.
-pub fn is_stopped(problem: &Problem, fitted: &FitResult, at: usize) -> bool {
+fn is_stopped(problem: &Problem, fitted: &FitResult, at: usize) -> bool {
     let (entry, value) = (&problem.model.parameters.all[at], fitted.values[at]);
     let beyond = fitted.unbounded(at).map_or(f64::INFINITY, |asked| (asked - value).abs());
     let by_chance = fitted.t_quantile(0.975) * fitted.standard_error(at).unwrap_or(0.0);
@@ -136,15 +136,22 @@ fn drives_to_bound(problem: &Problem, base: &FitResult, candidate: &Candidate, f
     others.into_iter().any(|at| is_stopped(problem, fitted, *at) && !is_stopped(problem, base, *at))
 }
 
-/// The first parameter that stopped at a bound other than its baseline, of those that the flights determine.
+/// The bound at which an estimate is no finding: a limit of what is plausible, or one that the truth may be and that the equations ask to pass by more
+/// than chance.
+pub fn reached_bound(problem: &Problem, fitted: &FitResult, at: usize) -> Option<f64> {
+    let (entry, value) = (&problem.model.parameters.all[at], fitted.values[at]);
+    entry.reached(value).or_else(|| is_stopped(problem, fitted, at).then_some(value))
+}
+
+/// The first parameter that reached a bound, of those that the flights determine, as a sentence.
 pub fn at_bound(problem: &Problem, candidate: &Candidate, fitted: &FitResult) -> Option<String> {
     candidate.free.iter().find_map(|at| {
         let (entry, value) = (&problem.model.parameters.all[*at], fitted.values[*at]);
         let spec = entry.spec();
         let half = fitted.t_quantile(0.975) * fitted.standard_error(*at).unwrap_or(f64::INFINITY);
         let is_determined = value - half > spec.min || value + half < spec.max;
-        (is_stopped(problem, fitted, *at) && is_determined)
-            .then(|| format!("{} stopped at its bound {}", spec.name, quantity(value, spec.unit())))
+        let bound = reached_bound(problem, fitted, *at).filter(|_| is_determined)?;
+        Some(format!("{} reached its bound of {}: no name is given", spec.name, quantity(bound, spec.unit())))
     })
 }
 
@@ -222,4 +229,67 @@ pub fn is_clearly_worse(costs: &[f64], other: &FitResult) -> bool {
 /// True if `fitted` is worse on the validation data than `other`, beyond chance.
 pub fn is_worse(fitted: &FitResult, other: &FitResult) -> bool {
     p_value(&fitted.validation_costs, &other.validation_costs) < CONFOUNDED_LEVEL
+}
+
+#[cfg(test)]
+#[allow(clippy::disallowed_types, reason = "not in a component: the covariance of a report's fit")]
+mod tests {
+    use super::*;
+    use crate::model::Model;
+    use crate::parameter::Parameters;
+    use crate::test_flights::hummingbird;
+    use crate::whitening::Noises;
+    use nalgebra::DMatrix;
+
+    fn problem() -> Problem<'static> {
+        let vehicle = hummingbird();
+        Problem {
+            model: Model { parameters: Parameters::of(&vehicle, &[]), vehicle },
+            estimation: Vec::new(),
+            validation: Vec::new(),
+            test: Vec::new(),
+            noises: Noises::new(),
+            block_s: 1.0,
+            shared_late_s: 0.0,
+        }
+    }
+
+    /// The finding of [`at_bound`] where the parameter `name` of `effect` is estimated as `value`, the equations ask for `asked`, and the standard
+    /// error is `error`.
+    fn finding(effect: &str, name: &str, [value, asked, error]: [f64; 3]) -> Option<String> {
+        let problem = problem();
+        let all = &problem.model.parameters.all;
+        let is_wanted = |at: &usize| all[*at].kind.name == effect && all[*at].spec().name == name;
+        let at = (0..all.len()).find(is_wanted).expect("a parameter of this name");
+        let mut values = problem.model.parameters.baseline();
+        values[at] = value;
+        let fitted = FitResult {
+            values,
+            free: vec![at],
+            unbounded: vec![asked],
+            covariance: DMatrix::from_element(1, 1, error * error),
+            validation_costs: Vec::new(),
+            estimation_costs: vec![1.0; 50],
+        };
+        at_bound(&problem, &Candidate { kind: all[at].kind, free: vec![at] }, &fitted)
+    }
+
+    /// The equations may ask for more or not: a limit of what is plausible is no estimate.
+    #[test]
+    fn an_estimate_at_a_plausible_limit_is_no_finding() {
+        let attitude = |of| finding("sensor-bias", "attitude_y", of);
+        let expected = "attitude_y reached its bound of -0.05240 rad: no name is given";
+        assert_eq!(attitude([-0.0524, -0.0530, 0.003]).as_deref(), Some(expected));
+        assert_eq!(attitude([-0.0523, -0.0523, 0.003]).as_deref(), Some(expected), "just before it");
+        assert_eq!(attitude([-0.04, -0.04, 0.003]), None);
+        assert_eq!(attitude([-0.0524, -0.0530, 0.1]), None, "these flights do not determine it");
+        assert!(finding("parasitic-drag", "coefficient_z", [0.1, 0.105, 0.02]).is_some());
+    }
+
+    #[test]
+    fn an_estimate_at_a_bound_that_the_truth_may_be_is_one_within_chance() {
+        let rotors = |asked| finding("gyroscopic-torque", "scale_error", [-1.0, asked, 0.02]);
+        assert_eq!(rotors(-1.03), None);
+        assert!(rotors(-1.5).is_some_and(|text| text.starts_with("scale_error reached its bound of -1.000")));
+    }
 }

@@ -120,11 +120,35 @@ impl Parameter {
         wanted.clamp(self.spec().min, self.spec().max)
     }
 
+    /// The bound that `value` has reached, within [`AT_BOUND`]; `None` between the bounds, at a bound that the truth may be, and at one that is
+    /// the baseline.
+    pub fn reached(&self, value: f64) -> Option<f64> {
+        let spec = self.spec();
+        let reach = AT_BOUND * self.scale;
+        let is_reached = |bound: &f64| {
+            let is_declared = (self.baseline - bound).abs() <= reach;
+            (value - bound).abs() <= reach && !is_declared && !may_be_true(spec, *bound)
+        };
+        [spec.min, spec.max].into_iter().find(is_reached)
+    }
+
     /// True if `value` is a bound other than the baseline: more is asked for than the parameter can be.
     #[allow(clippy::float_cmp, reason = "values that stop at a bound are the bound")]
     pub fn stops_at(&self, value: f64) -> bool {
         value != self.baseline && (value == self.spec().min || value == self.spec().max)
     }
+}
+
+/// A value has reached a bound within this part of a plausible change: a fit may end a small step before the bound.
+const AT_BOUND: f64 = 0.01;
+
+/// True for bounds that the truth may be: no effect, a quantity that the vehicle does not have (an error of -1), and a whole share. The other
+/// bounds are limits of what is plausible.
+#[allow(clippy::float_cmp, reason = "bounds are constants")]
+fn may_be_true(spec: &ParameterSpec, bound: f64) -> bool {
+    let is_whole_share = spec.min == 0.0 && bound == 1.0;
+    let is_ratio = spec.unit() == "1";
+    spec.neutral == Some(bound) || (is_ratio && (bound == -1.0 || is_whole_share))
 }
 
 /// The grid cannot see less.
@@ -139,4 +163,42 @@ fn of_effect(effect: &Effect, vehicle: &Vehicle) -> Vec<Parameter> {
         Some(Parameter { kind, index, baseline: effect.values[index], scale, step })
     };
     kind.parameters_for(vehicle).iter().enumerate().filter_map(of_spec).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_flights::hummingbird;
+
+    /// The parameter `name` of `effect` of the Hummingbird.
+    fn parameter(effect: &str, name: &str) -> Parameter {
+        let all = Parameters::of(&hummingbird(), &[]).all;
+        let found = all.into_iter().find(|entry| entry.kind.name == effect && entry.spec().name == name);
+        found.expect("a parameter of this name")
+    }
+
+    #[test]
+    fn a_plausible_limit_is_reached_at_it_and_just_before_it() {
+        let attitude = parameter("sensor-bias", "attitude_y");
+        let [min, max] = [attitude.spec().min, attitude.spec().max];
+        assert_eq!([min, min + 1e-4, max].map(|value| attitude.reached(value)), [min, min, max].map(Some));
+        assert_eq!([0.9 * min, 0.0, 0.9 * max].map(|value| attitude.reached(value)), [None; 3]);
+        assert_eq!(parameter("parasitic-drag", "coefficient_z").reached(0.1), Some(0.1));
+        assert_eq!(parameter("mass-error", "error").reached(1.0), Some(1.0));
+    }
+
+    #[test]
+    fn bounds_that_the_truth_may_be_are_not_reached() {
+        let is_reached =
+            |effect: &str, name: &str, bound: f64| parameter(effect, name).reached(bound).is_some();
+        assert!(!is_reached("gyroscopic-torque", "scale_error", -1.0), "rotors without angular momentum");
+        assert!(is_reached("gyroscopic-torque", "scale_error", 4.0));
+        assert!(!is_reached("battery-sag", "discharged", 1.0), "an empty battery");
+        assert!(is_reached("battery-sag", "internal_resistance", 1.0));
+        assert!(!is_reached("rotor-drag", "coefficient", 0.0), "no drag");
+        let declared = Parameter { baseline: 8e-5, ..parameter("rotor-drag", "coefficient") };
+        assert_eq!(declared.reached(0.0), None, "no drag, where one is declared");
+        let declared = Parameter { baseline: 1e-3, ..declared };
+        assert_eq!(declared.reached(1e-3), None, "the declared value");
+    }
 }

@@ -299,14 +299,22 @@ impl Report {
         Ok(())
     }
 
+    /// The withdrawn effects that reached a bound, or the others.
+    pub(crate) fn withdrawn_names(&self, at_bound: bool) -> Vec<&'static str> {
+        let withdrawn = self.withdrawn.iter().filter(|withdrawn| withdrawn.at_bound == at_bound);
+        withdrawn.map(|withdrawn| withdrawn.effect).collect()
+    }
+
     /// The reason why no effect is named.
     fn no_effect(&self) -> String {
-        if self.withdrawn.is_empty() {
-            return "No candidate makes the equations fit better beyond chance.".to_owned();
+        let [effects, beyond] = [false, true].map(|at_bound| self.withdrawn_names(at_bound).join(", "));
+        if !effects.is_empty() {
+            format!("The equations fit better with {effects}, but no prediction error falls noticeably.")
+        } else if !beyond.is_empty() {
+            format!("The equations ask for more of {beyond} than is plausible: the cause is not known.")
+        } else {
+            "No candidate makes the equations fit better beyond chance.".to_owned()
         }
-        let effects: Vec<&str> = self.withdrawn.iter().map(|withdrawn| withdrawn.effect).collect();
-        let effects = effects.join(", ");
-        format!("The equations fit better with {effects}, but no prediction error falls noticeably.")
     }
 
     fn write_verdict(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -383,7 +391,7 @@ impl Report {
             writeln!(f, "ratios: {ratios}")?;
             writeln!(f, "  to separate thrust, inertia, static moment and friction: {}", ratios.experiment)?;
         }
-        for Withdrawn { effect, reason } in &self.withdrawn {
+        for Withdrawn { effect, reason, .. } in &self.withdrawn {
             writeln!(f, "withdrawn: {effect}: {reason}")?;
         }
         self.faults.iter().try_for_each(|fault| {

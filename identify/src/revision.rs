@@ -33,6 +33,8 @@ pub struct Withdrawn {
     pub effect: &'static str,
     /// The reason.
     pub reason: String,
+    /// True if a parameter reached its bound: another cause is at work, which no name is given.
+    pub at_bound: bool,
 }
 
 /// The next turn of a search.
@@ -179,11 +181,6 @@ impl Found<'_, '_> {
     /// An accepted effect with a parameter that `fitted` left at a bound, or the one that is least beyond chance beside the others, if that is not at
     /// `level`. Those `asked` for by predictions alone need not be.
     fn unsound(&self, fitted: &FitResult, level: f64, asked: &[Candidate]) -> Option<Withdrawn> {
-        let stopped = |candidate: &Candidate| {
-            let bound = at_bound(self.problem, candidate, fitted)?;
-            let reason = format!("{bound}: more is asked for than this effect can be");
-            Some(Withdrawn { effect: candidate.kind.name, reason })
-        };
         let chance =
             |candidate: &Candidate| (candidate.kind.name, joint_p_value(self.problem, fitted, candidate));
         let by_chance = || {
@@ -192,9 +189,9 @@ impl Found<'_, '_> {
             let (effect, chance) = unsure.max_by(|a, b| a.1.total_cmp(&b.1))?;
             let reason =
                 format!("its parameters are no longer beyond chance beside those of the others: {chance:.3}");
-            Some(Withdrawn { effect, reason })
+            Some(Withdrawn { effect, reason, at_bound: false })
         };
-        self.accepted.iter().find_map(stopped).or_else(by_chance)
+        beyond_bounds(self.problem, self.accepted, fitted).or_else(by_chance)
     }
 
     /// The accepted candidates of an effect.
@@ -327,7 +324,7 @@ impl Predictions {
         let [without, with] = [without, with].map(|error| quantity(error, unit));
         let reason =
             format!("the error of {channel} after {horizon_s} s is {without} without it, {with} with it");
-        Some(Withdrawn { effect, reason })
+        Some(Withdrawn { effect, reason, at_bound: false })
     }
 
     /// The effects, of those that may be, without which no error grows; the one that gains least first.
@@ -346,10 +343,19 @@ impl Predictions {
                 "no prediction error falls noticeably with it; most, the error of {channel} after {horizon_s} s, is {without} \
                  without it, {with} with it"
             );
-            Withdrawn { effect, reason }
+            Withdrawn { effect, reason, at_bound: false }
         };
         idle.into_iter().map(withdrawn).collect()
     }
+}
+
+/// The first of the `accepted` effects with a parameter that `fitted` left at a bound.
+pub fn beyond_bounds(problem: &Problem, accepted: &[Candidate], fitted: &FitResult) -> Option<Withdrawn> {
+    let of_candidate = |candidate: &Candidate| {
+        let reason = at_bound(problem, candidate, fitted)?;
+        Some(Withdrawn { effect: candidate.kind.name, reason, at_bound: true })
+    };
+    accepted.iter().find_map(of_candidate)
 }
 
 /// The accepted candidates but those of these effects, and their fit.
