@@ -5,8 +5,10 @@
 
 use crate::candidate::free_parameters;
 use crate::fit::Problem;
+use crate::fit_result::FitResult;
 use crate::prepared::Prepared;
 use crate::refine::refined;
+use crate::revision::{beyond_bounds, without_effects};
 use crate::select::Selection;
 use flights::Role;
 use std::ops::Range;
@@ -79,16 +81,32 @@ fn pieces(flight: &Prepared, share: f64) -> Vec<Range<usize>> {
     pieces
 }
 
-/// The selection that was `found` in an excerpt of `problem`, with the parameters fitted on all of it, and refined by prediction errors again.
+/// The selection that was `found` in an excerpt of `problem`, with the parameters fitted on all of it, and refined by prediction errors again. An
+/// effect with a parameter that reaches its bound only here is withdrawn.
 pub fn on_all(problem: &mut Problem, excerpt: &Problem, found: Selection) -> Selection {
     problem.noises = excerpt.noises.clone();
     let before = problem.fitted(&problem.model.parameters.baseline(), &[]);
+    let mut found = Selection { before, ..found };
+    loop {
+        (found.after, found.refined) = fitted_on_all(problem, &found);
+        let mut fits = std::iter::once(&found.after).chain(&found.refined);
+        let stopped = fits.find_map(|fit| beyond_bounds(problem, &found.accepted, fit));
+        let Some(stopped) = stopped else { return found };
+        (found.accepted, found.after) =
+            without_effects(problem, &found.accepted, &found.after, &[stopped.effect]);
+        found.worths.remove(stopped.effect);
+        found.withdrawn.push(stopped);
+    }
+}
+
+/// The accepted effects of `found`, fitted on all of `problem`, and refined where they were.
+fn fitted_on_all(problem: &Problem, found: &Selection) -> (FitResult, Option<FitResult>) {
     let after = problem.fitted(&found.after.values, &free_parameters(&found.accepted));
     let shorter = shortened(problem, REFINED_S);
     let predicted = shorter.as_ref().unwrap_or(problem);
-    let refined = found.refined.as_ref().and_then(|near| refined(predicted, &after, Some(&near.values)));
-    let refined = refined.map(|moved| moved.result);
-    Selection { before, after, refined, ..found }
+    let moved = found.refined.as_ref().and_then(|near| refined(predicted, &after, Some(&near.values)));
+    let moved = moved.map(|moved| moved.result);
+    (after, moved)
 }
 
 /// The time of a flight that is compared in an excerpt, as a note for the report.

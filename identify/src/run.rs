@@ -108,11 +108,14 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
     let mut selection = select(searched, &open, progress);
     progress("confounded effects");
     let mut effects = effect_reports::judged(searched, &selection);
-    let rivals = rivals(searched, &selection, &open);
+    let mut rivals = rivals(searched, &selection, &open);
     note_parts(&problem, &mut flight_reports);
     if let Some(excerpt) = &excerpt {
         progress("parameters on all flights");
+        let of_excerpt = selection.accepted.clone();
         selection = on_all(&mut problem, excerpt, selection);
+        let mut of_excerpt = of_excerpt.iter();
+        rivals.retain(|_| of_excerpt.next().is_some_and(|one| selection.accepted.contains(one)));
         note_excerpt(excerpt, &mut flight_reports);
     }
     effect_reports::add_accepted(&problem, &selection, &rivals, &mut effects);
