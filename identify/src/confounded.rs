@@ -3,7 +3,7 @@
 use crate::candidate::{Candidate, free_parameters};
 use crate::fit::Problem;
 use crate::fit_result::FitResult;
-use crate::judgement::{Judged, fitted, is_clearly_worse, is_worse, without};
+use crate::judgement::{Judged, at_bound, fitted, is_clearly_worse, is_worse, without};
 use crate::ratios;
 use crate::select::{Round, Selection};
 use rayon::prelude::*;
@@ -36,7 +36,8 @@ fn of_candidate(problem: &Problem, selection: &Selection, open: &[Candidate], at
         let base = without(problem, &selection.after, &selection.accepted, at);
         let rival = |rival: &&Candidate| {
             let fitted = fitted(problem, &base, &others, rival);
-            let is_alike = !is_worse(&fitted, &selection.after);
+            let is_alike =
+                !is_worse(&fitted, &selection.after) && at_bound(problem, rival, &fitted).is_none();
             is_alike.then(|| Rival { candidate: (*rival).clone(), fitted })
         };
         rivals.extend(screened.par_iter().filter_map(rival).collect::<Vec<_>>());
@@ -100,8 +101,10 @@ fn of_ratios(
             return None;
         }
         let fitted = problem.fitted(&start, &[kept.as_slice(), &free].concat());
-        let is_alike = !is_worse(&fitted, &selection.after);
-        is_alike.then_some(Rival { candidate: Candidate { kind: other.kind, free }, fitted })
+        let candidate = Candidate { kind: other.kind, free };
+        let is_alike =
+            !is_worse(&fitted, &selection.after) && at_bound(problem, &candidate, &fitted).is_none();
+        is_alike.then_some(Rival { candidate, fitted })
     };
     open.iter().filter(is_other).filter_map(rival).collect()
 }
