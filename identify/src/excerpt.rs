@@ -6,6 +6,7 @@
 use crate::candidate::free_parameters;
 use crate::fit::Problem;
 use crate::fit_result::FitResult;
+use crate::judgement::held_at_limits;
 use crate::prepared::Prepared;
 use crate::refine::refined;
 use crate::revision::{beyond_bounds, without_effects};
@@ -101,7 +102,8 @@ pub fn on_all(problem: &mut Problem, excerpt: &Problem, found: Selection) -> Sel
 
 /// The accepted effects of `found`, fitted on all of `problem`, and refined where they were.
 fn fitted_on_all(problem: &Problem, found: &Selection) -> (FitResult, Option<FitResult>) {
-    let after = problem.fitted(&found.after.values, &free_parameters(&found.accepted));
+    let fitted = problem.fitted(&found.after.values, &free_parameters(&found.accepted));
+    let after = held_at_limits(problem, fitted);
     let shorter = shortened(problem, REFINED_S);
     let predicted = shorter.as_ref().unwrap_or(problem);
     let moved = found.refined.as_ref().and_then(|near| refined(predicted, &after, Some(&near.values)));

@@ -146,13 +146,38 @@ pub fn reached_bound(problem: &Problem, fitted: &FitResult, at: usize) -> Option
 /// The first parameter that reached a bound, of those that the flights determine, as a sentence.
 pub fn at_bound(problem: &Problem, candidate: &Candidate, fitted: &FitResult) -> Option<String> {
     candidate.free.iter().find_map(|at| {
-        let (entry, value) = (&problem.model.parameters.all[*at], fitted.values[*at]);
-        let spec = entry.spec();
-        let half = fitted.t_quantile(0.975) * fitted.standard_error(*at).unwrap_or(f64::INFINITY);
-        let is_determined = value - half > spec.min || value + half < spec.max;
-        let bound = reached_bound(problem, fitted, *at).filter(|_| is_determined)?;
+        let spec = problem.model.parameters.all[*at].spec();
+        let bound = reached_bound(problem, fitted, *at).filter(|_| is_determined(problem, fitted, *at))?;
         Some(format!("{} reached its bound of {}: no name is given", spec.name, quantity(bound, spec.unit())))
     })
+}
+
+/// True if the interval of a parameter does not cover all values that it may have.
+fn is_determined(problem: &Problem, fitted: &FitResult, at: usize) -> bool {
+    let (spec, value) = (problem.model.parameters.all[at].spec(), fitted.values[at]);
+    let half = fitted.t_quantile(0.975) * fitted.standard_error(at).unwrap_or(f64::INFINITY);
+    value - half > spec.min || value + half < spec.max
+}
+
+/// The fit with each parameter held at its baseline that reached a limit of what is plausible, if the flights are explained as well without it and its
+/// effect has another parameter.
+pub fn held_at_limits(problem: &Problem, mut fitted: FitResult) -> FitResult {
+    let all = &problem.model.parameters.all;
+    let is_reached = |at: &usize| all[*at].reached(fitted.values[*at]).is_some();
+    let reached: Vec<usize> = fitted.free.iter().copied().filter(is_reached).collect();
+    for at in reached {
+        let others: Vec<usize> = fitted.free.iter().copied().filter(|other| *other != at).collect();
+        if !others.iter().any(|other| all[*other].kind == all[at].kind) {
+            continue;
+        }
+        let mut start = fitted.values.clone();
+        start[at] = all[at].baseline;
+        let held = problem.fitted(&start, &others);
+        if !is_worse(&held, &fitted) {
+            fitted = held;
+        }
+    }
+    fitted
 }
 
 /// The candidate's parameters fitted together with the accepted ones, from the best of its starts.
@@ -237,15 +262,16 @@ mod tests {
     use super::*;
     use crate::model::Model;
     use crate::parameter::Parameters;
-    use crate::test_flights::hummingbird;
+    use crate::prepared::{Prepared, Propulsion};
+    use crate::test_flights::{flown, hummingbird};
     use crate::whitening::Noises;
     use nalgebra::DMatrix;
 
-    fn problem() -> Problem<'static> {
+    fn problem(estimation: Vec<Prepared<'_>>) -> Problem<'_> {
         let vehicle = hummingbird();
         Problem {
             model: Model { parameters: Parameters::of(&vehicle, &[]), vehicle },
-            estimation: Vec::new(),
+            estimation,
             validation: Vec::new(),
             test: Vec::new(),
             noises: Noises::new(),
@@ -254,13 +280,18 @@ mod tests {
         }
     }
 
+    fn place(problem: &Problem, effect: &str, name: &str) -> usize {
+        let all = &problem.model.parameters.all;
+        let is_wanted = |at: &usize| all[*at].kind.name == effect && all[*at].spec().name == name;
+        (0..all.len()).find(is_wanted).expect("a parameter of this name")
+    }
+
     /// The finding of [`at_bound`] where the parameter `name` of `effect` is estimated as `value`, the equations ask for `asked`, and the standard
     /// error is `error`.
     fn finding(effect: &str, name: &str, [value, asked, error]: [f64; 3]) -> Option<String> {
-        let problem = problem();
+        let problem = problem(Vec::new());
         let all = &problem.model.parameters.all;
-        let is_wanted = |at: &usize| all[*at].kind.name == effect && all[*at].spec().name == name;
-        let at = (0..all.len()).find(is_wanted).expect("a parameter of this name");
+        let at = place(&problem, effect, name);
         let mut values = problem.model.parameters.baseline();
         values[at] = value;
         let fitted = FitResult {
@@ -291,5 +322,28 @@ mod tests {
         let rotors = |asked| finding("gyroscopic-torque", "scale_error", [-1.0, asked, 0.02]);
         assert_eq!(rotors(-1.03), None);
         assert!(rotors(-1.5).is_some_and(|text| text.starts_with("scale_error reached its bound of -1.000")));
+    }
+
+    /// Without noises nothing is explained worse.
+    #[test]
+    fn a_parameter_at_a_limit_is_held_if_its_effect_has_another_one() {
+        let flight = flown([8.0, 0.01], |_| [0.0, 0.0, 2.0], |t| [0.01 * libm::sin(3.0 * t), 0.0, 0.0]);
+        let prepared =
+            Prepared::new(&flight, None, &Propulsion::of(&hummingbird())).expect("a usable flight");
+        let problem = problem(vec![prepared]);
+        let [xy, z] = ["coefficient_xy", "coefficient_z"].map(|name| place(&problem, "parasitic-drag", name));
+        let mass = place(&problem, "mass-error", "error");
+        let fit_of = |at_limit: usize, others: &[usize]| {
+            let mut values = problem.model.parameters.baseline();
+            values[at_limit] = problem.model.parameters.all[at_limit].spec().max;
+            let free = [&[at_limit][..], others].concat();
+            let unbounded = free.iter().map(|at| values[*at]).collect();
+            let covariance = DMatrix::identity(free.len(), free.len());
+            FitResult { free, unbounded, covariance, ..problem.fitted(&values, &[]) }
+        };
+        let held = held_at_limits(&problem, fit_of(z, &[xy, mass]));
+        assert!(held.values[z] == 0.0 && held.free == [xy, mass], "{held:?}");
+        let alone = held_at_limits(&problem, fit_of(mass, &[xy]));
+        assert!(alone.values[mass] > 0.0 && alone.free == [mass, xy], "{alone:?}");
     }
 }

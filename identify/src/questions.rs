@@ -1,6 +1,6 @@
 //! Open questions of an identification: rivals of named effects, and parameters that the flights do not determine.
 
-use crate::candidate::Candidate;
+use crate::candidate::{Candidate, free_parameters};
 use crate::confounded::Rival;
 use crate::digits::printed_quantity;
 use crate::fit::Problem;
@@ -104,13 +104,16 @@ impl OpenQuestions {
         if !problem.estimation.iter().all(is_free) {
             return None;
         }
-        let mut hypotheses = vec![hypothesis(problem, "", &selection.after)];
+        // Parameters that were held at their baselines are open, too.
+        let free = free_parameters(&selection.accepted);
+        let mut hypotheses = vec![hypothesis(problem, "", &selection.after, &free)];
         let mut asked = Vec::new();
         for (candidate, rivals) in selection.accepted.iter().zip(rivals) {
             let mut group = vec![(0, candidate.kind.name)];
             for rival in strongest(rivals) {
                 group.push((hypotheses.len(), rival.candidate.kind.name));
-                hypotheses.push(hypothesis(problem, rival.candidate.kind.name, &rival.fitted));
+                let Rival { candidate, fitted } = rival;
+                hypotheses.push(hypothesis(problem, candidate.kind.name, fitted, &fitted.free));
             }
             asked.extend(pairs(&group));
         }
@@ -185,8 +188,8 @@ impl OpenQuestions {
     }
 }
 
-fn hypothesis(problem: &Problem, effect: &'static str, fitted: &FitResult) -> Hypothesis {
-    let FitResult { values, free, .. } = fitted;
+fn hypothesis(problem: &Problem, effect: &'static str, fitted: &FitResult, free: &[usize]) -> Hypothesis {
+    let values = &fitted.values;
     let mut known = normal::sum(&problem.blocks(&problem.estimation, values, free));
     if known.gradient.len() != free.len() {
         known = Block::zero(free.len());
@@ -194,7 +197,13 @@ fn hypothesis(problem: &Problem, effect: &'static str, fitted: &FitResult) -> Hy
     // The fit is at its minimum, and only what a further flight adds counts.
     known.gradient.fill(0.0);
     known.cost = 0.0;
-    Hypothesis { effect, values: values.clone(), plain: plainest(problem, fitted), free: free.clone(), known }
+    Hypothesis {
+        effect,
+        values: values.clone(),
+        plain: plainest(problem, fitted),
+        free: free.to_vec(),
+        known,
+    }
 }
 
 /// The values of `fitted` with each weak parameter at its baseline, if the others then explain the flights as well: a value that is

@@ -25,8 +25,8 @@ use crate::candidate::{Candidate, free_parameters};
 use crate::fit::{Equations, Problem, unbounded};
 use crate::fit_result::FitResult;
 use crate::judgement::{
-    FALSE_RATE, Judged, Way, fitted, fitted_from, is_clearly_worse, is_worse, judged, p_value, start,
-    start_from, without,
+    FALSE_RATE, Judged, Way, fitted, fitted_from, held_at_limits, is_clearly_worse, is_worse, judged,
+    p_value, start, start_from, without,
 };
 use crate::logging;
 use crate::normal::{self, Block};
@@ -113,7 +113,8 @@ pub fn select(problem: &mut Problem, candidates: &[Candidate], progress: &mut dy
     let End { refined, worths } = loop {
         search.run(problem, &open, revisions.added(), progress);
         problem.weigh(&search.base, candidates);
-        search.base = problem.fitted(&search.base.values, &free_parameters(&search.accepted));
+        let fitted = problem.fitted(&search.base.values, &free_parameters(&search.accepted));
+        search.base = held_at_limits(problem, fitted);
         let StepwiseSearch { accepted, base, rounds } = &mut search;
         match revisions.next(problem, accepted, base, &open, progress) {
             Revision::Without(found) => {
