@@ -193,8 +193,8 @@ fn agent(graph: &Graph, replaced: &NodePlan, kept: &BTreeSet<&str>) -> anyhow::R
                 PORTS.join(", ")
             );
         }
-        outputs
-            .push(format!("{port} = {{ topic = {:?}, every_ticks = {} }}", topic.name, topic.period_ticks));
+        let every = topic.ticks.period().map(|ticks| format!(", every_ticks = {ticks}")).unwrap_or_default();
+        outputs.push(format!("{port} = {{ topic = {:?}{every} }}", topic.name));
     }
     if outputs.is_empty() {
         bail!("`{name}` sends nothing that another process reads: leave out one that others listen to");

@@ -4,6 +4,7 @@ use crate::announcement::Announcement;
 use crate::context::{NodeContext, StepContext};
 use crate::parameters::Parameters;
 use crate::ports::{InputPorts, OutputPorts};
+use crate::sample_ticks::SampleTicks;
 use diagnostics::ParameterError;
 
 pub use crate::state::{State, StateError, Transfer};
@@ -99,6 +100,12 @@ pub trait Component: Sized + Send {
     /// something new to send more seldom.
     fn period_ticks(_parameters: &Self::Parameters, _tick_ns: u64) -> u32 {
         1
+    }
+
+    /// Ticks at which a node that computes every `period_ticks` ticks of `tick_ns` has something new to send: those at which it
+    /// computes, except for a component that measures. Its outputs are sent at these ticks, unless the manifest states `every_ticks`.
+    fn sample_ticks(_parameters: &Self::Parameters, _tick_ns: u64, period_ticks: u32) -> SampleTicks {
+        SampleTicks::every(period_ticks)
     }
 
     /// Tries the component before a run, in a check: finds errors and oddities although each parameter is valid.

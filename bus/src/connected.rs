@@ -170,12 +170,12 @@ impl ConnectedNode {
     /// The samples that `receiver` gets of `input`, from the first that this process reads on. Those from before a
     /// checkpoint from which the run goes on are not sent again.
     fn source(&self, input: &InputPlan, generation: u32, receiver: Receiver) -> Source {
-        let period_ticks = self.links.plan.topics[input.topic].period_ticks;
+        let ticks = self.links.plan.topics[input.topic].ticks;
         let (run_tick, limit) = (self.links.plan.first_tick, self.first_tick.checked_sub(input.delay_ticks));
-        if limit.is_none_or(|limit| limit - limit % period_ticks < run_tick) {
-            return Source::new(generation, receiver, run_tick, period_ticks);
+        if limit.is_none_or(|limit| ticks.newest(limit) < run_tick) {
+            return Source::new(generation, receiver, run_tick, ticks);
         }
-        Source::joined(generation, receiver, limit, period_ticks)
+        Source::joined(generation, receiver, limit, ticks)
     }
 
     /// Topic name and announced type of input `input`.
@@ -222,7 +222,7 @@ impl ConnectedNode {
             let topic = &links.plan.topics[output.topic];
             let receiver = links.subscriber(output.topic, generation)?;
             let limit = self.first_tick.checked_sub(1);
-            let source = Source::joined(generation, receiver, limit, topic.period_ticks);
+            let source = Source::joined(generation, receiver, limit, topic.ticks);
             let input =
                 InputPlan { port: output.port.clone(), topic: output.topic, delay_ticks: 1, initial: None };
             let announced = Announcement::load(&announcement::topic_path(&links.run_dir, output.topic))?;

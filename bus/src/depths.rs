@@ -36,9 +36,10 @@ mod tests {
     use super::depths;
     use crate::membership::{Instance, Membership};
     use crate::plan::{InputPlan, NodePlan, OutputPlan, Plan, TopicPlan};
+    use crate::sample_ticks::SampleTicks;
 
     fn topic(name: &str) -> TopicPlan {
-        TopicPlan { name: name.to_owned(), type_name: "a/msg/B".to_owned(), period_ticks: 1 }
+        TopicPlan { name: name.to_owned(), type_name: "a/msg/B".to_owned(), ticks: SampleTicks::every(1) }
     }
 
     fn node(name: &str, reads: &[(usize, u32)], topic: usize) -> NodePlan {

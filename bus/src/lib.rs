@@ -8,7 +8,7 @@
 //! |---|---|
 //! | a component and its declarations | [`component`], [`parameters`], [`ports`], [`context`], [`random`], `state`, `registration` |
 //! | messages | [`message`], [`messages`], [`schema`], `bounded`, `finite` |
-//! | the plan of a run, written by the launcher | [`plan`], `membership`, `depths`, `names` |
+//! | the plan of a run, written by the launcher | [`plan`], [`sample_ticks`], `membership`, `depths`, `names` |
 //! | one tick of a node, under every host | `stepper`, `timing`, [`computing_time`], `computation` |
 //! | a node in a process or on a thread | `join`, `place`, `node`, `links`, `connected`, `executor`, `group`, `run_process` |
 //! | all nodes on one thread, without shared memory | `simulation`, `sample_memory` |
@@ -83,6 +83,7 @@ pub mod room;
 mod run_process;
 mod sample_memory;
 mod sample_ring;
+pub mod sample_ticks;
 mod saved_sample;
 pub mod schema;
 mod shared_file;

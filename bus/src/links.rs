@@ -144,10 +144,10 @@ impl Links {
         if input.newest_generation() != backup.generation {
             let receiver = self.subscriber(input.topic, backup.generation)?;
             let first_tick = if backup.shadows { backup.join_tick } else { take_over_tick };
-            let period_ticks = self.plan.topics[input.topic].period_ticks;
+            let ticks = self.plan.topics[input.topic].ticks;
             // A reader that joined later than the shadow starts with the sample that its own first tick reads.
             let first_tick = first_tick.max(tick.saturating_sub(input.delay_ticks));
-            let source = Source::new(backup.generation, receiver, first_tick, period_ticks);
+            let source = Source::new(backup.generation, receiver, first_tick, ticks);
             input.drop_backups_beyond(publisher.primary.generation);
             input.add_backup(source, backup.shadows);
         }
@@ -160,7 +160,7 @@ impl Links {
         output.counts_from = instances.take_over_ticks[index];
         let shadows = instances.backup.as_ref().is_some_and(|backup| backup.shadows);
         output.sends_from = if shadows { 0 } else { output.counts_from };
-        let next_due = tick.div_ceil(output.period_ticks) * output.period_ticks;
+        let next_due = output.ticks.next(tick);
         if next_due > output.counts_from && self.lockstep.ticks_sent(output.topic) < next_due {
             self.lockstep.samples_sent(output.topic, next_due, &output.readers);
         }
@@ -175,6 +175,7 @@ mod tests {
     use crate::place::Place;
     use crate::plan::{GroupPlan, MemberPlan, NodePlan, OutputPlan, Plan, TopicPlan};
     use crate::sample_ring::SampleRing;
+    use crate::sample_ticks::SampleTicks;
     use crate::transport::Transport;
     use std::rc::Rc;
 
@@ -196,7 +197,7 @@ mod tests {
             let topic = |name: &str| TopicPlan {
                 name: name.to_owned(),
                 type_name: "test_msgs/msg/State".to_owned(),
-                period_ticks: 1,
+                ticks: SampleTicks::every(1),
             };
             let sender = |name, topic| {
                 NodePlan::for_test(name, vec![], vec![OutputPlan { port: "state".to_owned(), topic }])

@@ -29,6 +29,7 @@ mod tests {
     use crate::names::shm_path;
     use crate::place::Place;
     use crate::plan::{InputPlan, NodePlan, OutputPlan, Plan, TopicPlan, Wait};
+    use crate::sample_ticks::SampleTicks;
 
     /// The views of a run in which `reader` reads the topic of `sender`.
     struct Views {
@@ -41,7 +42,8 @@ mod tests {
     const SAMPLES: Need = Need::Samples { topic: 0, input: 0 };
 
     fn with_views(test: impl FnOnce(&Views, &[usize])) {
-        let topic = TopicPlan { name: "/t".to_owned(), type_name: "a/msg/B".to_owned(), period_ticks: 1 };
+        let ticks = SampleTicks::every(1);
+        let topic = TopicPlan { name: "/t".to_owned(), type_name: "a/msg/B".to_owned(), ticks };
         let input = InputPlan { port: "in".to_owned(), topic: 0, delay_ticks: 0, initial: None };
         let output = OutputPlan { port: "out".to_owned(), topic: 0 };
         let sender = NodePlan::for_test("sender", vec![], vec![output]);

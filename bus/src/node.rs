@@ -559,6 +559,7 @@ mod tests {
     use crate::messages::{MotorCommand, PlantState};
     use crate::place::Place;
     use crate::plan::{InputPlan, NodePlan, OutputPlan, Plan, TopicPlan};
+    use crate::sample_ticks::SampleTicks;
     use crate::tick::Tick;
     use crate::{BusError, Message};
     use std::alloc::{GlobalAlloc, Layout, System};
@@ -596,7 +597,7 @@ mod tests {
         let topic = TopicPlan {
             name: "/source/command".to_owned(),
             type_name: MotorCommand::SCHEMA.type_name.to_owned(),
-            period_ticks: 1,
+            ticks: SampleTicks::every(1),
         };
         let input = InputPlan { port: "command".to_owned(), topic: 0, delay_ticks: 0, initial: None };
         let output = OutputPlan { port: "command".to_owned(), topic: 0 };

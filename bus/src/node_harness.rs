@@ -11,6 +11,7 @@ use crate::plan::{InputPlan, NodePlan, Plan};
 use crate::ports::{InputSamples, Inputs, OutputSamples};
 use crate::registration::{Instance, Registration, message_of};
 use crate::sample_memory::{SampleMemory, empty_sample};
+use crate::sample_ticks::SampleTicks;
 use crate::schema::Schema;
 use diagnostics::ParameterError;
 use inputs::InputFiles;
@@ -38,8 +39,8 @@ struct InputWire {
 struct OutputWire {
     schema: &'static Schema,
     is_forwarded: bool,
-    /// Topic and its period.
-    topic: Option<(usize, u32)>,
+    /// Topic and the ticks of its samples.
+    topic: Option<(usize, SampleTicks)>,
 }
 
 /// A message as CDR bytes, with the index of its topic.
@@ -61,7 +62,7 @@ impl NodeHarness {
         let mut made = component.make_for(plan, node, &InputFiles::default(), None)?;
         let wire = |name: &str, schema: &'static Schema, is_forwarded: bool| {
             let output = node.outputs.iter().find(|output| output.port == name);
-            let topic = output.map(|output| (output.topic, plan.topics[output.topic].period_ticks));
+            let topic = output.map(|output| (output.topic, plan.topics[output.topic].ticks));
             OutputWire { schema, is_forwarded, topic }
         };
         let forwarded = forwarded(component, components, plan, node)?;
@@ -116,8 +117,8 @@ impl NodeHarness {
         let context = StepContext { tick, time_ns, predecessor: None };
         self.instance.step(&context, InputSamples(&given), &mut OutputSamples(&mut sent))?;
         let due = self.outputs.iter().zip(sent.samples).filter_map(|(wire, words)| {
-            let (topic, period_ticks) = wire.topic?;
-            let words = words.filter(|_| tick.is_multiple_of(period_ticks))?;
+            let (topic, ticks) = wire.topic?;
+            let words = words.filter(|_| ticks.is_due(tick))?;
             let time_ns = (!wire.is_forwarded).then_some(time_ns);
             Some((topic, stamped(words, wire.schema, time_ns)))
         });

@@ -3,6 +3,7 @@
 use crate::computing_time::ComputingTime;
 use crate::error::BusError;
 use crate::json_file;
+use crate::sample_ticks::SampleTicks;
 use inputs::InputFile;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -56,8 +57,8 @@ pub struct TopicPlan {
     pub name: String,
     /// Three-part type name.
     pub type_name: String,
-    /// Ticks between two samples.
-    pub period_ticks: u32,
+    /// Ticks at which its samples are sent.
+    pub ticks: SampleTicks,
 }
 
 /// A node's input.
@@ -314,7 +315,7 @@ impl Plan {
         let longest_period = self.nodes.iter().map(|node| node.period_ticks).max().unwrap_or(1);
         let ticks = u64::from(self.window_ticks) + u64::from(longest_period);
         let samples = |ticks: u64| {
-            let samples = ticks.div_ceil(u64::from(self.topics[topic].period_ticks)) + 2;
+            let samples = self.topics[topic].ticks.most_within(ticks) + 2;
             usize::try_from(samples).unwrap_or(usize::MAX)
         };
         // A subscriber that joins gets the history first: beside it there must be room for the samples that are sent

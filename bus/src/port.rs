@@ -9,6 +9,7 @@ use crate::messages::Time;
 use crate::plan::{InputPlan, OutputPlan, TopicPlan};
 use crate::sample_memory::empty_sample;
 use crate::sample_ring::SampleRing;
+use crate::sample_ticks::SampleTicks;
 use crate::saved_sample::SavedSample;
 use crate::schema::{Extent, Schema};
 use crate::transport::{IceoryxError, Loan, Received, Receiver, SampleHeader, Sender};
@@ -43,19 +44,24 @@ enum Found {
 
 impl Source {
     /// A source whose first sample is that of the first due tick from `first_tick` on.
-    pub(crate) fn new(generation: u32, receiver: Receiver, first_tick: u32, period_ticks: u32) -> Self {
-        let next_sequence = u64::from(first_tick.div_ceil(period_ticks));
+    pub(crate) fn new(generation: u32, receiver: Receiver, first_tick: u32, ticks: SampleTicks) -> Self {
+        let next_sequence = ticks.first_sequence(first_tick);
         Self { generation, receiver, next_sequence, has_history: true }
     }
 
     /// A source for a process that joins at `tick`: it gets the newest sample of that tick's limit first.
-    pub(crate) fn joined(generation: u32, receiver: Receiver, limit: Option<u32>, period_ticks: u32) -> Self {
-        let next_sequence = limit.map_or(0, |limit| u64::from(limit / period_ticks));
+    pub(crate) fn joined(
+        generation: u32,
+        receiver: Receiver,
+        limit: Option<u32>,
+        ticks: SampleTicks,
+    ) -> Self {
+        let next_sequence = limit.map_or(0, |limit| ticks.sequence(limit));
         Self { generation, receiver, next_sequence, has_history: true }
     }
 
     /// The next sample, if it is there.
-    fn next(&mut self, period_ticks: u32) -> Result<Option<Received>, Found> {
+    fn next(&mut self, ticks: SampleTicks) -> Result<Option<Received>, Found> {
         loop {
             let Some(sample) = self.receiver.receive()? else { return Ok(None) };
             let header = sample.header();
@@ -63,9 +69,7 @@ impl Source {
                 continue;
             }
             self.has_history = false;
-            if header.sequence != self.next_sequence
-                || header.tick != header.sequence * u64::from(period_ticks)
-            {
+            if header.sequence != self.next_sequence || header.tick != ticks.tick(header.sequence) {
                 return Err(Found::Other { sequence: header.sequence, tick: header.tick });
             }
             self.next_sequence += 1;
@@ -108,9 +112,9 @@ impl Feed {
     }
 
     /// The next sample, which another process has sent.
-    fn next(&mut self, period_ticks: u32) -> Result<Received, Found> {
+    fn next(&mut self, ticks: SampleTicks) -> Result<Received, Found> {
         let Self::Shared(source) = self else { return Err(Found::Nothing) };
-        source.next(period_ticks)?.ok_or(Found::Nothing)
+        source.next(ticks)?.ok_or(Found::Nothing)
     }
 
     /// True if the samples before number `first` were taken: those of a member are always there.
@@ -141,7 +145,7 @@ pub(crate) struct InPort {
     topic_name: String,
     size: usize,
     layout_hash: u64,
-    topic_period_ticks: u32,
+    topic_ticks: SampleTicks,
     /// True if the node reads the shadow samples too, and so waits for them.
     pub(crate) reads_shadow: bool,
     pub(crate) topic: usize,
@@ -168,7 +172,7 @@ impl InPort {
             topic_name: topic.name.clone(),
             size: announcement.size,
             layout_hash: announcement.layout_hash,
-            topic_period_ticks: topic.period_ticks,
+            topic_ticks: topic.ticks,
             reads_shadow: false,
             topic: input.topic,
             delay_ticks: input.delay_ticks,
@@ -244,20 +248,20 @@ impl InPort {
         self.newest_tick = limit;
         let Some(limit) = limit else { return Ok(()) };
         // The samples between the current one and the newest are received too, so that gaps show.
-        let newest_sequence = u64::from(limit / self.topic_period_ticks);
+        let newest_sequence = self.topic_ticks.sequence(limit);
         self.pass_take_over(newest_sequence);
         while let Feed::Shared(Source { next_sequence: expected, has_history, .. }) = self.active
             && expected <= newest_sequence
         {
             // A group that has died sent its newest samples to nobody outside; who succeeds a member sends newer ones.
             if !(has_history && self.take_left_behind(expected)) {
-                let next = self.active.next(self.topic_period_ticks);
+                let next = self.active.next(self.topic_ticks);
                 self.current = Some(next.map_err(|found| self.gap(node, tick, expected, found))?);
             }
             self.pass_take_over(newest_sequence);
         }
         if let Feed::Ring(ring) = &self.active
-            && limit.is_multiple_of(self.topic_period_ticks)
+            && self.topic_ticks.is_due(limit)
             && ring.at(limit).is_none()
         {
             return Err(self.gap(node, tick, newest_sequence, Found::Nothing));
@@ -267,7 +271,7 @@ impl InPort {
 
     /// Makes sample number `sequence` the current one, if a group has left it behind; false if none has.
     fn take_left_behind(&mut self, sequence: u64) -> bool {
-        let tick = sequence * u64::from(self.topic_period_ticks);
+        let tick = self.topic_ticks.tick(sequence);
         let left =
             self.left_behind.as_ref().zip(u32::try_from(tick).ok()).and_then(|(ring, tick)| ring.at(tick));
         let (Some(words), Feed::Shared(source)) = (left, &mut self.active) else { return false };
@@ -279,12 +283,12 @@ impl InPort {
 
     /// As [`InPort::take`], without insisting on the newest sample: it may not have been sent yet.
     pub(crate) fn take_available(&mut self, tick: u32, node: &str) -> Result<(), BusError> {
-        let newest_sequence = self.limit(tick).map_or(0, |limit| u64::from(limit / self.topic_period_ticks));
+        let newest_sequence = self.limit(tick).map_or(0, |limit| self.topic_ticks.sequence(limit));
         while let Feed::Shared(source) = &mut self.active
             && source.next_sequence <= newest_sequence
         {
             let expected = source.next_sequence;
-            match source.next(self.topic_period_ticks) {
+            match source.next(self.topic_ticks) {
                 Ok(Some(sample)) => self.current = Some(sample),
                 Ok(None) => break,
                 Err(found) => return Err(self.gap(node, tick, expected, found)),
@@ -296,7 +300,7 @@ impl InPort {
     /// Turns to the backup when the next sample is one of those that count.
     fn pass_take_over(&mut self, newest_sequence: u64) {
         while let Some(next) = self.backups.front() {
-            let first = u64::from(next.take_over_tick.div_ceil(self.topic_period_ticks));
+            let first = self.topic_ticks.first_sequence(next.take_over_tick);
             if next.take_over_tick == u32::MAX || newest_sequence < first || !self.active.has_taken(first) {
                 return;
             }
@@ -315,7 +319,7 @@ impl InPort {
         for Backup { source, .. } in &mut self.backups {
             while source.next_sequence <= newest_sequence {
                 let expected = source.next_sequence;
-                match source.next(self.topic_period_ticks).map_err(|found| (expected, found))? {
+                match source.next(self.topic_ticks).map_err(|found| (expected, found))? {
                     Some(sample) => self.shadow = Some(sample),
                     None => break,
                 }
@@ -384,10 +388,8 @@ impl InPort {
     pub(crate) fn sample_before(&self, before: u32, locals: &Locals) -> Option<SavedSample> {
         let (header, words) = match (&self.active, self.newest_tick) {
             (Feed::Ring(ring), Some(newest)) => {
-                let sequence = newest / self.topic_period_ticks;
-                let tick = sequence * self.topic_period_ticks;
-                let header =
-                    SampleHeader { tick: tick.into(), sequence: sequence.into(), ..SampleHeader::default() };
+                let (sequence, tick) = (self.topic_ticks.sequence(newest), self.topic_ticks.newest(newest));
+                let header = SampleHeader { tick: tick.into(), sequence, ..SampleHeader::default() };
                 ring.at(tick).map(|words| (header, words)).or_else(|| self.restored())
             }
             _ => self.sample(locals),
@@ -410,7 +412,7 @@ impl InPort {
             }
             Feed::Ring(ring) => {
                 let tick = self.newest_tick?;
-                let sequence = u64::from(tick / self.topic_period_ticks);
+                let sequence = self.topic_ticks.sequence(tick);
                 let header = SampleHeader { tick: tick.into(), sequence, ..SampleHeader::default() };
                 ring.at(tick).map(|words| (header, words))
             }
@@ -470,7 +472,7 @@ pub(crate) struct OutPort {
     /// True if a sample is taken at ticks at which none is sent: its node's steps take time, and send later.
     is_timed: bool,
     pub(crate) topic: usize,
-    pub(crate) period_ticks: u32,
+    pub(crate) ticks: SampleTicks,
     /// The tick from which on the samples count; before it they are a shadow's.
     pub(crate) counts_from: u32,
     /// The tick from which on samples are sent at all.
@@ -506,7 +508,7 @@ impl OutPort {
             stamp_offset: schema.stamp_offset(),
             is_timed: false,
             topic: output.topic,
-            period_ticks: topic.period_ticks,
+            ticks: topic.ticks,
             counts_from: 0,
             sends_from: 0,
             readers: Vec::new(),
@@ -542,7 +544,7 @@ impl OutPort {
     }
 
     pub(crate) fn is_due(&self, tick: u32) -> bool {
-        tick.is_multiple_of(self.period_ticks)
+        self.ticks.is_due(tick)
     }
 
     /// True if a step at `tick` writes a sample.
@@ -625,8 +627,8 @@ impl OutPort {
 
     /// The newest sample in the ring.
     fn recorded(&self) -> Option<(SampleHeader, &[u64])> {
-        let tick = self.ticks_sent.checked_sub(self.period_ticks)?;
-        let sequence = u64::from(tick / self.period_ticks);
+        let before = self.ticks_sent.checked_sub(1)?;
+        let (tick, sequence) = (self.ticks.newest(before), self.ticks.sequence(before));
         let header = SampleHeader { tick: tick.into(), sequence, ..SampleHeader::default() };
         Some((header, self.ring.as_ref()?.at(tick)?))
     }
@@ -674,7 +676,7 @@ impl OutPort {
         if let Some(offset) = stamp_offset {
             stamp(words, offset, time_ns);
         }
-        let sequence = u64::from(tick / self.period_ticks);
+        let sequence = self.ticks.sequence(tick);
         let header = SampleHeader { tick: u64::from(tick), sequence, received_ns, done_ns, sent_ns };
         let sent = match (&self.staging, self.loan.take(), &self.sender) {
             (None, Some(loan), _) => loan.send(header),
@@ -690,7 +692,7 @@ impl OutPort {
         {
             topic.send(header, staging);
         }
-        self.ticks_sent = tick + self.period_ticks;
+        self.ticks_sent = self.ticks.next(tick.saturating_add(1));
         Ok(())
     }
 

@@ -6,6 +6,7 @@ use crate::context::{NodeContext, StepContext};
 use crate::parameters::{self, Parameter, Parameters};
 use crate::plan::{NodePlan, Plan};
 use crate::ports::{InputPorts, InputSamples, Inputs, OutputPorts, OutputSamples, PortSpec};
+use crate::sample_ticks::SampleTicks;
 use crate::schema::Schema;
 use crate::state_transfer::StateLayout;
 use diagnostics::ParameterError;
@@ -37,6 +38,7 @@ pub struct Registration {
     /// Parameters in a manifest.
     pub parameters: &'static [Parameter],
     period: fn(&Value, u64) -> Option<u32>,
+    sample_ticks: fn(&Value, u64, u32) -> Option<SampleTicks>,
     check: fn(&Value, &NodeContext<'_>) -> Result<(), ParameterError>,
     faults: fn(&Value) -> Vec<ParameterError>,
     make: Make,
@@ -64,6 +66,10 @@ impl Registration {
                 let parameters = diagnostics::read::<C::Parameters>(parameters).ok()?;
                 Some(C::period_ticks(&parameters, tick_ns))
             },
+            sample_ticks: |parameters, tick_ns, period_ticks| {
+                let parameters = diagnostics::read::<C::Parameters>(parameters).ok()?;
+                Some(C::sample_ticks(&parameters, tick_ns, period_ticks))
+            },
             check: |parameters, context| make::<C>(parameters, context)?.rehearse(context),
             faults: parameters::faults::<C::Parameters>,
             make: |parameters, context| {
@@ -83,6 +89,13 @@ impl Registration {
     #[must_use]
     pub fn period_ticks(&self, parameters: &Value, tick_ns: u64) -> u32 {
         (self.period)(parameters, tick_ns).unwrap_or(1).max(1)
+    }
+
+    /// As [`Component::sample_ticks`]: all at which the node computes, of parameters that [`check`](Self::check) refuses.
+    #[must_use]
+    pub fn sample_ticks(&self, parameters: &Value, tick_ns: u64, period_ticks: u32) -> SampleTicks {
+        let ticks = (self.sample_ticks)(parameters, tick_ns, period_ticks);
+        ticks.unwrap_or(SampleTicks::every(period_ticks))
     }
 
     /// Checks `parameters` and the files that they name for a node, without running it.

@@ -11,6 +11,7 @@ use crate::error::BusError;
 use crate::message::sample_words;
 use crate::names::shm_path;
 use crate::plan::Plan;
+use crate::sample_ticks::SampleTicks;
 use crate::shared_file;
 use memmap2::MmapRaw;
 use std::path::PathBuf;
@@ -23,7 +24,7 @@ const WORD_BYTES: usize = size_of::<u64>();
 pub(crate) struct SampleRing {
     map: MmapRaw,
     entries: usize,
-    period_ticks: u32,
+    ticks: SampleTicks,
     /// Words of a sample; its stamp stands in front of them.
     sample_words: usize,
 }
@@ -48,8 +49,8 @@ impl SampleRing {
     }
 
     fn of(map: MmapRaw, plan: &Plan, topic: usize, size: usize) -> Self {
-        let period_ticks = plan.topics[topic].period_ticks;
-        Self { map, entries: entries(plan, topic), period_ticks, sample_words: sample_words(size) }
+        let ticks = plan.topics[topic].ticks;
+        Self { map, entries: entries(plan, topic), ticks, sample_words: sample_words(size) }
     }
 
     /// Writes `sample` as that of `tick`, at which one is due.
@@ -77,7 +78,9 @@ impl SampleRing {
     /// The stamp and the words of the entry of `tick`. The stamp is the tick plus one, so that memory that was never
     /// written holds no sample.
     fn entry(&self, tick: u32) -> (&AtomicU64, *mut u64) {
-        let first = (tick / self.period_ticks) as usize % self.entries * (1 + self.sample_words);
+        #[allow(clippy::cast_possible_truncation, reason = "at most the number of ticks, which has 32 bits")]
+        let number = self.ticks.sequence(tick) as usize;
+        let first = number % self.entries * (1 + self.sample_words);
         let end = (first + 1 + self.sample_words) * WORD_BYTES;
         assert!(end <= self.map.len(), "the sample of tick {tick} is outside its ring");
         let start = self.map.as_mut_ptr().cast::<u64>();
@@ -90,7 +93,8 @@ impl SampleRing {
 /// A publisher is at most a window ahead of the recorder; one sample more is that of the tick that it computes.
 fn entries(plan: &Plan, topic: usize) -> usize {
     let longest = plan.nodes.iter().map(|node| node.period_ticks).max().unwrap_or(1);
-    (plan.window_ticks + longest).div_ceil(plan.topics[topic].period_ticks) as usize + 2
+    let ticks = u64::from(plan.window_ticks) + u64::from(longest);
+    usize::try_from(plan.topics[topic].ticks.most_within(ticks)).unwrap_or(usize::MAX - 2) + 2
 }
 
 fn bytes(plan: &Plan, topic: usize, size: usize) -> usize {
@@ -105,14 +109,15 @@ fn path(plan: &Plan, topic: usize) -> PathBuf {
 mod tests {
     use super::SampleRing;
     use crate::plan::{Plan, TopicPlan};
+    use crate::sample_ticks::SampleTicks;
 
     /// A plan with one topic, whose files go with it.
     struct Run(Plan);
 
     impl Run {
-        fn new(period_ticks: u32) -> Self {
+        fn new(ticks: SampleTicks) -> Self {
             let (name, type_name) = ("/plant/state".to_owned(), "test_msgs/msg/State".to_owned());
-            Self(Plan::for_test(1000, vec![TopicPlan { name, type_name, period_ticks }], vec![]))
+            Self(Plan::for_test(1000, vec![TopicPlan { name, type_name, ticks }], vec![]))
         }
     }
 
@@ -124,26 +129,27 @@ mod tests {
 
     #[test]
     fn a_reader_a_window_behind_finds_each_sample_and_none_that_is_not_sent() {
-        for period_ticks in [1, 5] {
-            let run = Run::new(period_ticks);
+        let at_60_hz = SampleTicks::measured(1, 1_000_000, 16_666_667, 3_000_000);
+        for ticks in [SampleTicks::every(1), SampleTicks::every(5), at_60_hz] {
+            let run = Run::new(ticks);
             let mut sender = SampleRing::create(&run.0, 0, 12).unwrap();
             let reader = SampleRing::open(&run.0, 0, 12).unwrap();
             let sample = |tick: u32| [1, u64::from(tick), 7 * u64::from(tick)];
             assert_eq!(reader.at(0), None, "fresh memory holds no sample");
-            for tick in (0..1000).step_by(period_ticks as usize) {
+            for tick in (0..1000).filter(|tick| ticks.is_due(*tick)) {
                 sender.store(tick, &sample(tick));
-                let oldest = tick.saturating_sub(run.0.window_ticks).next_multiple_of(period_ticks);
-                for sent in (oldest..=tick).step_by(period_ticks as usize) {
+                let oldest = tick.saturating_sub(run.0.window_ticks);
+                for sent in (oldest..=tick).filter(|sent| ticks.is_due(*sent)) {
                     assert_eq!(reader.at(sent), Some(&sample(sent)[..]), "{sent} at {tick}");
                 }
-                assert_eq!(reader.at(tick + period_ticks), None);
+                assert_eq!(reader.at(ticks.next(tick + 1)), None);
             }
         }
     }
 
     #[test]
     fn messages_of_another_size_are_refused_by_the_files_name() {
-        let run = Run::new(1);
+        let run = Run::new(SampleTicks::every(1));
         let missing = SampleRing::open(&run.0, 0, 12).unwrap_err().to_string();
         assert!(missing.contains("samples_0"), "{missing}");
         let _sender = SampleRing::create(&run.0, 0, 12).unwrap();

@@ -395,6 +395,7 @@ mod tests {
     use crate::place::Place;
     use crate::plan::{Capacity, InputPlan, TopicPlan};
     use crate::port::{Feed, InPort, Source};
+    use crate::sample_ticks::SampleTicks;
     use std::os::unix::fs::{MetadataExt, PermissionsExt};
 
     #[test]
@@ -446,7 +447,7 @@ mod tests {
         let topic = TopicPlan {
             name: TOPIC.to_owned(),
             type_name: "test_msgs/msg/State".to_owned(),
-            period_ticks: 1,
+            ticks: SampleTicks::every(1),
         };
         let announcement = Announcement { size: SIZE, ..Announcement::of(SetPoint::SCHEMA) };
         InPort::new(
@@ -454,7 +455,7 @@ mod tests {
             &topic,
             &announcement,
             None,
-            Feed::Shared(Source::joined(0, receiver, Some(0), 1)),
+            Feed::Shared(Source::joined(0, receiver, Some(0), SampleTicks::every(1))),
         )
     }
 

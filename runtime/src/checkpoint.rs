@@ -367,8 +367,7 @@ impl Checkpoint {
             for input in node.inputs.iter().filter(|_| !program.is_recorder() && !program.is_judge()) {
                 let topic = &plan.topics[input.topic];
                 let due = tick.next_multiple_of(node.period_ticks.max(1));
-                let newest =
-                    due.checked_sub(input.delay_ticks).map(|limit| limit - limit % topic.period_ticks);
+                let newest = due.checked_sub(input.delay_ticks).map(|limit| topic.ticks.newest(limit));
                 let is_sent_in_time = newest.is_some_and(|newest| newest >= tick);
                 if !is_sent_in_time && input.initial.is_none() && !self.parts.has_sample_of(&topic.name) {
                     bail!(

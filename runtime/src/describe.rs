@@ -49,7 +49,7 @@ impl fmt::Display for Graph {
             }
             for output in &node.outputs {
                 let topic = &plan.topics[output.topic];
-                let hz = rounded(rate_hz / f64::from(topic.period_ticks));
+                let hz = rounded(rate_hz / topic.ticks.mean());
                 writeln!(f, "  -> {:<12} {} [{}] {hz} Hz", output.port, topic.name, topic.type_name)?;
             }
             f.write_str(&replacements(self, index))?;

@@ -123,7 +123,7 @@ impl Flight {
     /// The stamp of the sample that `input` reads at `tick`; `None` for an initial value.
     pub fn stamp(&self, input: &InputPlan, tick: u32) -> Option<u32> {
         let newest = tick.checked_sub(input.delay_ticks)?;
-        Some(newest - newest % self.plan.topics[input.topic].period_ticks.max(1))
+        Some(self.plan.topics[input.topic].ticks.newest(newest))
     }
 
     /// Host time at which the sample of `topic` stamped `tick` was sent.

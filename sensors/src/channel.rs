@@ -16,6 +16,7 @@ use bus::Message;
 use bus::component::{State, StateError, Transfer};
 use bus::context::{NodeContext, SampleTimes};
 use bus::random::{Stream, stream, uniform};
+use bus::sample_ticks::SampleTicks;
 use diagnostics::parameter::{ParameterError, not_negative, positive, refuse, require};
 
 /// Steps of a node between two measurements below which it warns that they are not evenly spaced: a fifth of
@@ -75,6 +76,20 @@ impl Timing {
         let interval = whole((self.rate_hz * tick_s).recip()).filter(|ticks| *ticks > 0);
         let delay = whole(self.delay_ms * 1e-3 / tick_s);
         interval.zip(delay).map_or(1, |(interval, delay)| greatest_common_divisor(interval, delay))
+    }
+
+    /// Ticks at which measurements arrive at a node that computes every `period_ticks` ticks of `tick_ns`.
+    #[must_use]
+    pub(crate) fn sample_ticks(&self, tick_ns: u64, period_ticks: u32) -> SampleTicks {
+        SampleTicks::measured(period_ticks, tick_ns, self.interval_ns(), self.delay_ns())
+    }
+
+    fn interval_ns(&self) -> u64 {
+        nanoseconds(self.rate_hz.recip())
+    }
+
+    fn delay_ns(&self) -> u64 {
+        nanoseconds(self.delay_ms * 1e-3)
     }
 
     /// Number of measurements under way, without the rounding to a node's period.
@@ -284,8 +299,7 @@ impl Channel {
         let random = || stream(context.seed, context.name);
         let (noise, mut loss) = (random(), random());
         loss.set_stream(1);
-        let (interval_ns, delay_ns) =
-            (nanoseconds(timing.rate_hz.recip()), nanoseconds(timing.delay_ms * 1e-3));
+        let (interval_ns, delay_ns) = (timing.interval_ns(), timing.delay_ns());
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most `UNDER_WAY_MAX`")]
         let places = timing.under_way().ceil() as usize + MORE_PLACES;
         Ok(Self { places, interval_ns, delay_ns, losses: Losses::new(timing), noise, loss })
@@ -382,6 +396,31 @@ mod tests {
         // Between two ticks, or at 60 Hz: each of them has to be looked at.
         assert_eq!([period(50.0, 2.5), period(60.0, 0.0), period(1000.0, 0.0), period(2000.0, 0.0)], [1; 4]);
         assert_eq!([period(0.0, 1.0), period(-1.0, 0.0), period(f64::NAN, 0.0), period(1e-300, 0.0)], [1; 4]);
+    }
+
+    /// Every sample but that of tick 0 is a new measurement, and no measurement is left out; of a delay of several whole intervals the
+    /// samples before the first measurement are left over.
+    #[test]
+    fn a_sample_is_sent_when_a_measurement_arrives() {
+        let late = |rate_hz, delay_ms| Timing { rate_hz, delay_ms, ..timing() };
+        for (timing, period_ticks, before) in [
+            (late(50.0, 0.0), 1, 0),
+            (late(50.0, 10.0), 10, 0),
+            (late(50.0, 10.0), 1, 0),
+            (late(50.0, 2.5), 1, 0),
+            (late(60.0, 40.0), 1, 0),
+            (late(160.0, 6.0), 5, 0),
+            (late(10.0, 250.0), 10, 0),
+            (late(100.0, 10.0), 5, 0),
+            (late(50.0, 60.0), 20, 2),
+        ] {
+            let arrivals = arrivals(&timing, period_ticks, 3000);
+            let is_new = |pair: &[(u64, u64)]| (pair[1].1 != pair[0].1).then_some(pair[1].0);
+            let new: Vec<u64> = arrivals.windows(2).filter_map(is_new).collect();
+            let ticks = timing.sample_ticks(TICK_NS, u32::try_from(period_ticks).unwrap());
+            let sent: Vec<u64> = (1..3000).filter(|tick| ticks.is_due(*tick)).map(u64::from).collect();
+            assert_eq!(sent[before..], new, "{timing:?} every {period_ticks} ticks");
+        }
     }
 
     fn channel(timing: &Timing, period_ticks: u64, seed: u64, node: &str) -> Result<Channel, ParameterError> {

@@ -6,6 +6,7 @@ use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::{Barometer, Battery, Gps, Magnetometer, Mocap, PlantState, Ranges, RotorSpeeds};
 use bus::ports::{InputPorts, OutputPorts};
+use bus::sample_ticks::SampleTicks;
 use bus::{InputPorts, Message};
 use diagnostics::ParameterError;
 use inputs::InputFiles;
@@ -186,6 +187,10 @@ impl<S: Sensor> Component for Sensing<S> {
 
     fn period_ticks(parameters: &S::Parameters, tick_ns: u64) -> u32 {
         parameters.timing().period_ticks(tick_ns)
+    }
+
+    fn sample_ticks(parameters: &S::Parameters, tick_ns: u64, period_ticks: u32) -> SampleTicks {
+        parameters.timing().sample_ticks(tick_ns, period_ticks)
     }
 
     fn initial(&self) -> Queued<S::State> {

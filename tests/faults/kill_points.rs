@@ -273,7 +273,7 @@ fn require_bounded_loss(case: &Case, watched: &Watched, sent_before: u32, record
     let (control, window) = (&watched.control, watched.plan.window_ticks);
     let recorder = control.completed_by(watched.node("recorder").unwrap());
     // The word of a topic that is sent every p ticks counts those that need no sample, up to p - 1 of them.
-    let longest = watched.plan.topics.iter().map(|topic| topic.period_ticks).max().unwrap();
+    let longest = watched.plan.topics.iter().filter_map(|topic| topic.ticks.period()).max().unwrap();
     let lost = watched.sent_ticks(|ticks| ticks.max()).saturating_sub(recorded + longest - 1);
     if case.cuts_recording() {
         // Killed between a flush and the word that says so, it has recorded a tick more than it says.

@@ -9,7 +9,7 @@ const RATES: [(&str, u32); 8] = [
     ("/controller/command", 1),
     ("/ekf/estimate", 1),
     ("/imu/imu", 1),
-    ("/mocap/mocap", 5),
+    ("/mocap/mocap", 10),
     ("/pilot/set_point", 1),
     ("/plant/pose", 10),
     ("/plant/state", 1),

@@ -92,11 +92,11 @@ fn the_critical_path_and_the_ages_are_those_of_the_loop() {
     assert_eq!(sources, ["/ekf/estimate", "/imu/imu", "/mocap/mocap", "/pilot/set_point", "/plant/state"]);
     for age in profile["age"].as_array().unwrap() {
         assert_eq!((&age["command"], &age["host"]["count"]), (&"/controller/command".into(), &TICKS.into()));
-        // Every edge of the loop but one is of the same tick; a pose of motion capture is sent for five, and measured 10 ms before it
-        // arrives, 100 times a second.
+        // Every edge of the loop but one is of the same tick; a pose of motion capture is sent for ten, and measured 10 ms before it
+        // arrives.
         let max_us = match age["source"].as_str().unwrap() {
             "/mocap/mocap" => 19_000.0,
-            "/plant/state" => 4000.0,
+            "/plant/state" => 9000.0,
             _ => 0.0,
         };
         assert_eq!(age["simulated"]["max_us"], max_us, "{age}");
@@ -118,9 +118,9 @@ fn ages_follow_from_the_periods_of_the_nodes() {
     let more = ["--json", "--set=process.imu.period_ticks=5"];
     let profile = &hover(&Place::new(), &more).json()["profile"];
     let age = |source| find(&profile["age"], "source", source)["simulated"].clone();
-    // A tick is 1 ms; a reading is used at its own tick and the four after it.
-    for source in ["/imu/imu", "/plant/state"] {
-        assert_eq!((&age(source)["max_us"], &age(source)["count"]), (&4000.0.into(), &TICKS.into()));
+    // A tick is 1 ms; a reading is used at its own tick and the four after it, a pose at nine after it.
+    for (source, max_us) in [("/imu/imu", 4000.0), ("/plant/state", 9000.0)] {
+        assert_eq!((&age(source)["max_us"], &age(source)["count"]), (&max_us.into(), &TICKS.into()));
     }
     assert_eq!(age("/pilot/set_point")["max_us"], 0.0);
     assert_eq!(find(&profile["nodes"], "name", "imu")["compute"]["count"], TICKS / 5);

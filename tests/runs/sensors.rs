@@ -3,8 +3,22 @@
 use crate::recordings::{require_same_messages, topics};
 use crate::support::{Place, repository};
 
-/// Every sensor of manifests/sensors.toml that is not part of hover.toml.
-const SENSORS: [&str; 7] = ["gps", "barometer", "magnetometer", "mocap", "range", "battery", "rpm"];
+/// The sensors of manifests/sensors.toml, each with a tick at which one of its measurements arrives.
+const SENSORS: [(&str, u32); 8] = [
+    ("gps", 280),
+    ("barometer", 376),
+    ("magnetometer", 446),
+    ("mocap", 530),
+    ("range", 650),
+    ("battery", 720),
+    ("rpm", 800),
+    ("imu", 860),
+];
+
+/// A swap by an identical process.
+fn swap((process, at_tick): (&str, u32)) -> String {
+    format!("[[swap]]\nprocess = \"{process}\"\nat_tick = {at_tick}\nshadow_ticks = 20\n")
+}
 
 /// manifests/sensors.toml cut to 1 s, with more tables.
 fn short(place: &Place, name: &str, tables: &str) -> String {
@@ -24,12 +38,7 @@ fn sensors_that_are_swapped_in_flight_leave_no_trace() {
     let place = Place::new();
     // Each with measurements under way: the IMU's are delayed too.
     let delayed = "[process.imu.parameters]\ndelay_ms = 7.0\ndropout = 0.1\n";
-    let swap = |(index, process): (usize, &&str)| {
-        let at_tick = 300 + 80 * index;
-        format!("[[swap]]\nprocess = \"{process}\"\nat_tick = {at_tick}\nshadow_ticks = 20\n")
-    };
-    let processes = [&SENSORS[..], &["imu"]].concat();
-    let swaps: String = processes.iter().enumerate().map(swap).collect();
+    let swaps: String = SENSORS.into_iter().map(swap).collect();
     let [plain, swapped] = ["plain", "swapped"].map(|name| place.path(&format!("{name}.mcap")));
     let manifest = short(&place, "plain.toml", delayed);
     place.call(&["run", &manifest, "--record", &plain, "--json"]).flown();
@@ -37,11 +46,20 @@ fn sensors_that_are_swapped_in_flight_leave_no_trace() {
     let ended = place.call(&["run", &manifest, "--record", &swapped, "--json"]).flown();
     let summary = ended.json();
     let successions = summary["successions"].as_array().unwrap();
-    assert_eq!(successions.len(), processes.len(), "{ended}");
+    assert_eq!(successions.len(), SENSORS.len(), "{ended}");
     assert!(successions.iter().all(|succession| succession["hand_over"] == "state"), "{ended}");
     let [plain, mut swapped] = [topics(&plain), topics(&swapped)];
     swapped.retain(|topic, _| !topic.starts_with("/shadow/"));
     require_same_messages(&plain, &swapped);
+}
+
+/// A backup sends as it takes over.
+#[test]
+fn a_sensor_is_swapped_where_one_of_its_measurements_arrives() {
+    let place = Place::new();
+    let manifest = short(&place, "between.toml", &swap(("gps", 300)));
+    let told = ["takes over at tick 300, at which no measurement of `gps` arrives", "choose tick 380"];
+    place.call(&["check", &manifest]).with_code(2).says(&told);
 }
 
 #[test]
@@ -51,7 +69,7 @@ fn a_sensor_that_should_measure_more_often_than_it_computes_is_refused() {
     place.call(&["run", &manifest]).with_code(2).says(&["`rate_hz`", "`period_ticks`", "mocap"]);
 }
 
-/// A period that nobody states changes the number of samples alone: whoever reads them sees the same.
+/// Whatever the period of its process: each sample behind the first is a new measurement, and readers see the same.
 #[test]
 fn a_sensor_sends_at_its_rate_and_readers_see_no_difference() {
     let place = Place::new();
@@ -67,11 +85,17 @@ fn a_sensor_sends_at_its_rate_and_readers_see_no_difference() {
         topics(&recording)
     };
     let parameters = "parameters = { rate_hz = 50.0, delay_ms = 10.0, dropout = 0.1 }\n";
-    let [mut each_tick, mut at_its_rate] =
+    let [mut each_tick, at_its_rate] =
         [("each", format!("period_ticks = 1\n{parameters}")), ("rate", parameters.to_owned())]
             .map(|(name, mocap)| flown(name, &mocap));
-    let [each, rate] =
-        [&mut each_tick, &mut at_its_rate].map(|topics| topics.remove("/mocap/mocap").unwrap());
-    assert_eq!((each.len(), rate.len()), (4000, 400));
+    let sent: Vec<u32> = at_its_rate["/mocap/mocap"].iter().map(|message| message.tick).collect();
+    let expected: Vec<u32> = std::iter::once(0).chain((10..4000).step_by(20)).collect();
+    assert_eq!(sent, expected);
     require_same_messages(&each_tick, &at_its_rate);
+    // A stated `every_ticks` repeats measurements.
+    let stated = format!("period_ticks = 1\noutputs.mocap.every_ticks = 1\n{parameters}");
+    let mut repeated = flown("stated", &stated);
+    assert_eq!(repeated.remove("/mocap/mocap").unwrap().len(), 4000);
+    each_tick.remove("/mocap/mocap");
+    require_same_messages(&each_tick, &repeated);
 }

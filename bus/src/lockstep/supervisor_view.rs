@@ -52,7 +52,7 @@ impl SupervisorView {
     fn begin_at(&self, plan: &Plan) {
         self.segment.head().clock.granted.store(plan.first_tick, Relaxed);
         for (cell, topic) in self.segment.topics().iter().zip(&plan.topics) {
-            cell.sent.store(plan.first_tick.next_multiple_of(topic.period_ticks.max(1)), Relaxed);
+            cell.sent.store(topic.ticks.next(plan.first_tick), Relaxed);
         }
         // A node counts as far as its first due tick: the clock holds no boundary for a slower one.
         for (slot, node) in plan.nodes.iter().enumerate() {

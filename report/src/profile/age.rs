@@ -80,9 +80,9 @@ pub fn ages(flight: &Flight, measured: &Measured) -> Vec<Age> {
     let none = (Times::in_units(flight.plan.tick_ns), Times::default());
     let mut found = vec![vec![none; topics]; closing.len()];
     for tick in 0..flight.ticks {
-        let is_due = |period_ticks: u32| tick.is_multiple_of(period_ticks.max(1));
-        let is_sent = |topic: usize| is_due(flight.plan.topics[topic].period_ticks);
-        for &node in order.iter().filter(|node| is_due(flight.plan.nodes[**node].period_ticks)) {
+        let computes = |node: usize| tick.is_multiple_of(flight.plan.nodes[node].period_ticks.max(1));
+        let is_sent = |topic: usize| flight.plan.topics[topic].ticks.is_due(tick);
+        for &node in order.iter().filter(|node| computes(**node)) {
             let oldest = oldest(flight, node, tick, &stamps);
             for output in flight.plan.nodes[node].outputs.iter().filter(|output| is_sent(output.topic)) {
                 stamps[output.topic].clone_from(&oldest);

@@ -10,6 +10,7 @@ use super::path::{CriticalPath, Path, Place, Stretch};
 use super::times::Times;
 use bus::plan::{InputPlan, NodePlan, OutputPlan, Pace, Plan, TopicPlan, Wait};
 use bus::profile::{GrantWriter, TickWriter};
+use bus::sample_ticks::SampleTicks;
 use runtime::flight::{Cause, Flight};
 use runtime::launcher::{Purpose, Report};
 use serde_json::Value;
@@ -48,7 +49,7 @@ fn plan() -> Plan {
     let topic = |(name, period_ticks): (&str, u32)| TopicPlan {
         name: name.to_owned(),
         type_name: "test_msgs/msg/Number".to_owned(),
-        period_ticks,
+        ticks: SampleTicks::every(period_ticks),
     };
     Plan {
         run_id: "synthetic".to_owned(),

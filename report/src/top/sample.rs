@@ -108,11 +108,12 @@ impl Source {
         let topic = &self.plan.topics[index];
         let sends = |node: &&NodePlan| node.outputs.iter().any(|output| output.topic == index);
         let publisher = self.plan.nodes.iter().find(sends).map(|node| node.name.clone());
+        let samples = topic.ticks.first_sequence(self.control.ticks_sent(index));
         TopicRow {
             name: topic.name.clone(),
             publisher: publisher.unwrap_or_default(),
             rate_hz: 0.0,
-            samples: self.control.ticks_sent(index).div_ceil(topic.period_ticks),
+            samples: u32::try_from(samples).unwrap_or(u32::MAX),
             lost: self.control.gaps(index),
         }
     }

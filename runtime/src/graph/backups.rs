@@ -5,7 +5,7 @@ use super::processes::{DeclaredNode, declared_nodes, irreplaceable, program};
 use super::wiring::wire;
 use crate::manifest::{Manifest, OutputSetting, Process, SwapSetting};
 use crate::program::{BackupSpec, Executable};
-use crate::supervisor::replacement::take_over_stride;
+use crate::supervisor::replacement::{next_take_over, take_over_stride};
 use bus::Registration;
 use bus::plan::{INPUTS_RESERVED, NodePlan, Plan};
 use bus::ports::{Inputs, PortSpec};
@@ -137,7 +137,11 @@ impl Run<'_> {
         if let Executable::Component(kind) = &program.executable {
             self.require_same_outputs(node, kind, whole, span)?;
         }
-        let process = Process { outputs: self.outputs(node, span), ..whole.clone() };
+        let process = Process {
+            outputs: self.outputs(node, span),
+            period_ticks: Some(Spanned::new(span.clone(), self.plan.nodes[node].period_ticks)),
+            ..whole.clone()
+        };
         let mut declared_nodes = self.declared_nodes.to_vec();
         let files = declared_nodes[node].files;
         declared_nodes[node] = DeclaredNode {
@@ -172,7 +176,7 @@ impl Run<'_> {
             let topic = &self.plan.topics[output.topic];
             let setting = OutputSetting {
                 topic: Some(topic.name.clone()),
-                every_ticks: Some(topic.period_ticks),
+                every_ticks: topic.ticks.period(),
                 type_name: Some(topic.type_name.clone()),
             };
             (Spanned::new(span.clone(), output.port.clone()), setting)
@@ -282,7 +286,24 @@ impl Run<'_> {
                 return Err(at(message, format!("choose multiples of {of}{why}")));
             }
         }
-        Ok((0..repeat).map(|n| (join_tick + n * every_ticks, at_tick + n * every_ticks)).collect())
+        let all = (0..repeat).map(|n| (join_tick + n * every_ticks, at_tick + n * every_ticks));
+        all.clone().try_for_each(|(_, at_tick)| self.require_sent(node, at_tick, &span))?;
+        Ok(all.collect())
+    }
+
+    /// Refuses a take-over at `tick` if `node` is a sensor of which no measurement arrives there.
+    fn require_sent(&self, node: usize, tick: u32, span: &Range<usize>) -> Result<(), Diagnostic> {
+        let next = next_take_over(self.plan, node, tick);
+        if next == Some(tick) {
+            return Ok(());
+        }
+        let name = &self.plan.nodes[node].name;
+        let message = format!("it takes over at tick {tick}, at which no measurement of `{name}` arrives");
+        let help = match next {
+            Some(next) => format!("choose tick {next}: a backup sends on every output at once"),
+            None => "choose an earlier tick: no measurement arrives before the end of the run".to_owned(),
+        };
+        Err(self.manifest.problem(span, message, help))
     }
 
     /// The first tick at which a swap takes over, and its place.

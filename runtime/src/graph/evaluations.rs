@@ -4,6 +4,7 @@ use super::parameters::Notes;
 use crate::manifest::{Comparison, Manifest, PassCondition, Statistic};
 use crate::program::Program;
 use bus::plan::{NodePlan, Plan};
+use bus::sample_ticks::SampleTicks;
 use diagnostics::{Diagnostic, NotOneLine, did_you_mean, printable_line, require_line};
 use recorder::RecordingError;
 use std::ops::Range;
@@ -120,7 +121,7 @@ fn check_span(
         let message = format!("`from_s` is {from_s} s and `to_s` is {to_s} s");
         return Err(at(&["to_s", "from_s"], message, "a span ends where it begins, or later"));
     }
-    let (first_s, period_s) = first_sample_s(*from_s, period_ticks(plan, topic), plan.tick_ns);
+    let (first_s, period_s) = first_sample_s(*from_s, sample_ticks(plan, topic), plan.tick_ns);
     let end_s = f64::from(plan.duration_ticks) * plan.tick_s();
     if let Some(to_s) = to_s.filter(|to_s| first_s > to_s + HALF_NS_S) {
         let message = format!(
@@ -145,7 +146,7 @@ fn check_span(
 /// Fault of a span that begins where the run has ended; `None` if it begins earlier.
 fn behind_end(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) -> Option<Diagnostic> {
     let PassCondition { name, topic, from_s, .. } = pass.get_ref();
-    let (first_s, _) = first_sample_s(*from_s, period_ticks(plan, topic), plan.tick_ns);
+    let (first_s, _) = first_sample_s(*from_s, sample_ticks(plan, topic), plan.tick_ns);
     let end_s = f64::from(plan.duration_ticks) * plan.tick_s();
     if first_s < end_s - HALF_NS_S {
         return None;
@@ -170,9 +171,10 @@ pub fn require_samples(manifest: &Manifest, plan: &Plan, start: usize) -> Result
     Diagnostic::gather(manifest.content.measure.iter().filter(is_meant).map(fault)).map(drop)
 }
 
-/// Ticks between two samples of `topic`.
-fn period_ticks(plan: &Plan, topic: &str) -> u32 {
-    plan.topics.iter().find(|known| known.name == topic).map_or(1, |known| known.period_ticks)
+/// Ticks at which the samples of `topic` are sent.
+fn sample_ticks(plan: &Plan, topic: &str) -> SampleTicks {
+    let known = plan.topics.iter().find(|known| known.name == topic);
+    known.map_or(SampleTicks::every(1), |known| known.ticks)
 }
 
 /// Times in seconds are exact to half a nanosecond, as when the run is judged.
@@ -180,11 +182,20 @@ const HALF_NS_S: f64 = 5e-10;
 /// The largest lag that can be looked for, s: the work grows with it. Own choice.
 const LAG_MAX_S: f64 = 60.0;
 
-/// The first sample at `from_s` or later of a topic that comes every `period_ticks`, and its period, in seconds.
-fn first_sample_s(from_s: f64, period_ticks: u32, tick_ns: u64) -> (f64, f64) {
-    let period_s = f64::from(period_ticks) * tick_ns as f64 * 1e-9;
-    let number = ((from_s - HALF_NS_S) / period_s).ceil().max(0.0);
-    (number * period_s, period_s)
+/// The first sample at `from_s` or later of a topic that is sent at `ticks`, and the mean time between two samples, in seconds.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a cast ends at the greatest tick"
+)]
+fn first_sample_s(from_s: f64, ticks: SampleTicks, tick_ns: u64) -> (f64, f64) {
+    let period_s = ticks.mean() * tick_ns as f64 * 1e-9;
+    let first = |unit_s: f64| ((from_s - HALF_NS_S) / unit_s).ceil().max(0.0);
+    if ticks.period().is_some() {
+        return (first(period_s) * period_s, period_s);
+    }
+    let tick_s = tick_ns as f64 * 1e-9;
+    (f64::from(ticks.next(first(tick_s) as u32)) * tick_s, period_s)
 }
 
 /// Keys, message and advice of a fault.

@@ -1,11 +1,12 @@
 //! Outputs: which topics a run has, of which type, from whom and how often.
 
-use super::processes::{DeclaredNode, period_ticks};
+use super::processes::{DeclaredNode, period_ticks, sample_ticks};
 use crate::manifest::{Manifest, OutputSetting, Process};
 use crate::program::Executable;
 use bus::Registration;
 use bus::plan::{OutputPlan, TopicPlan};
 use bus::ports::{Inputs, PortSpec};
+use bus::sample_ticks::SampleTicks;
 use bus::schema::Schema;
 use diagnostics::{Diagnostic, did_you_mean};
 use std::collections::BTreeMap;
@@ -72,7 +73,7 @@ fn publish_unchecked(node: usize, declared: &DeclaredNode<'_>, all: &mut Vec<Pub
     let expected = expected.map(|topic| (topic.to_owned(), String::new()));
     for (name, type_name) in stated.chain(expected) {
         if all.iter().all(|known| known.topic.name != name) {
-            let topic = TopicPlan { name, type_name, period_ticks: 1 };
+            let topic = TopicPlan { name, type_name, ticks: SampleTicks::every(1) };
             let (port, span) = (topic.name.replacen(&prefix, "", 1), declared.name.span());
             all.push(Published { node, topic, forwards: None, port, span });
         }
@@ -147,6 +148,7 @@ fn require_forwardable(
 fn published_by(node: usize, declared: &DeclaredNode<'_>) -> Result<Vec<Published>, Diagnostic> {
     let DeclaredNode { manifest, name, process, program, .. } = declared;
     let period = period_ticks(manifest, process, program.component())?;
+    let ticks = sample_ticks(manifest, process, program.component(), period);
     let outputs: Vec<(&str, Carries)> = match &program.executable {
         Executable::Component(kind) => {
             let forwarded = forwarded_ports(declared, kind)?;
@@ -166,7 +168,7 @@ fn published_by(node: usize, declared: &DeclaredNode<'_>) -> Result<Vec<Publishe
     };
     let published = outputs.into_iter().map(|(port, carries)| {
         let forwards = if let Carries::Forwarded(topic) = &carries { Some(topic.clone()) } else { None };
-        let (topic, span) = topic(manifest, name, period, port, &carries, setting(process, port))?;
+        let (topic, span) = topic(manifest, name, (period, ticks), port, &carries, setting(process, port))?;
         Ok(Published { node, port: port.to_owned(), span, topic, forwards })
     });
     published.collect()
@@ -211,11 +213,12 @@ fn setting<'a>(process: &'a Process, port: &str) -> Option<Stated<'a>> {
     process.outputs.iter().find(|(name, _)| name.get_ref() == port)
 }
 
-/// The topic of the output `port` of a node that computes every `period` ticks, and the place that says so.
+/// The topic of the output `port` of a node that computes every `period` ticks and has something new at `ticks`, and the place that
+/// says so.
 fn topic(
     manifest: &Manifest,
     node: &Spanned<String>,
-    period: u32,
+    (period, ticks): (u32, SampleTicks),
     port: &str,
     carries: &Carries,
     stated: Option<Stated<'_>>,
@@ -239,17 +242,18 @@ fn topic(
             return at(format!("output `{port}` of `{}` has no `type`", node.get_ref()), help);
         }
     };
-    let period_ticks = every_ticks.unwrap_or(period);
-    if period_ticks == 0 || !period_ticks.is_multiple_of(period) {
-        return Err(unequal_periods(manifest, (node, period), (port, period_ticks), &span));
-    }
+    let ticks = match every_ticks {
+        None => ticks,
+        Some(every) if every > 0 && every.is_multiple_of(period) => SampleTicks::every(every),
+        Some(every) => return Err(unequal_periods(manifest, (node, period), (port, every), &span)),
+    };
     let name = topic.unwrap_or_else(|| format!("/{}/{port}", node.get_ref()));
     let fits = |c: char| c.is_ascii_alphanumeric() || "/_-".contains(c);
     if !(name.starts_with('/') && (2..=200).contains(&name.len()) && name.chars().all(fits)) {
         let help = "a topic starts with `/` and has letters, digits, `_`, `-` and `/`";
         return at(format!("`{name}` cannot name a topic"), help);
     }
-    Ok((TopicPlan { name, type_name, period_ticks }, span))
+    Ok((TopicPlan { name, type_name, ticks }, span))
 }
 
 /// Error of an output that is due at other ticks than its process computes; where a `--set` states one of the periods, it is to

@@ -25,14 +25,17 @@ pub fn check(
         let who = format!("`period_ticks` of `{}`", name.get_ref());
         check_one(manifest, &span, &who, node.period_ticks, plan.duration_ticks, notes)?;
         for output in &node.outputs {
-            let every = plan.topics[output.topic].period_ticks;
+            let mut stated = declared.process.outputs.iter();
+            let stated = stated.find(|(port, _)| *port.get_ref() == output.port);
+            let Some((port, every)) = stated.and_then(|(port, stated)| Some((port, stated.every_ticks?)))
+            else {
+                continue;
+            };
             if every == node.period_ticks {
                 continue;
             }
-            let port = declared.process.outputs.keys().find(|port| *port.get_ref() == output.port);
-            let span = port.unwrap_or(name).span();
             let who = format!("`every_ticks` of the output `{}` of `{}`", output.port, name.get_ref());
-            check_one(manifest, &span, &who, every, plan.duration_ticks, notes)?;
+            check_one(manifest, &port.span(), &who, every, plan.duration_ticks, notes)?;
         }
     }
     Ok(())

@@ -7,6 +7,7 @@ use crate::spawn::SCRATCH_VARIABLE;
 use bus::component::Transfer;
 use bus::plan::NodePlan;
 use bus::process::{LAUNCHER_VARIABLE, RUN_VARIABLE};
+use bus::sample_ticks::SampleTicks;
 use bus::{GENERATION_VARIABLE, NODE_VARIABLE, Registration};
 use diagnostics::{Diagnostic, Faults, did_you_mean, suggestion};
 use inputs::InputFiles;
@@ -302,9 +303,29 @@ pub fn period_ticks(
     // Outputs whose period is stated are multiples of the node's.
     let has_stated_output = process.outputs.values().any(|output| output.every_ticks.is_some());
     let Some(kind) = kind.filter(|_| !has_stated_output) else { return Ok(1) };
+    Ok(kind.period_ticks(&parameters(process), tick_ns(manifest)))
+}
+
+/// Ticks at which the outputs of `process` are sent that state no `every_ticks`; it computes every `period` ticks, and is of `kind`
+/// if it is a component. A computing time moves what it sends to other ticks than those at which measurements arrive.
+pub fn sample_ticks(
+    manifest: &Manifest,
+    process: &Process,
+    kind: Option<&Registration>,
+    period: u32,
+) -> SampleTicks {
+    let of = |kind: &Registration| kind.sample_ticks(&parameters(process), tick_ns(manifest), period);
+    kind.filter(|_| process.computing_time.is_none()).map_or(SampleTicks::every(period), of)
+}
+
+/// The parameters of `process` as its table states them.
+fn parameters(process: &Process) -> serde_json::Value {
     let parameters = process.parameters.iter().map(|(key, value)| (key.get_ref().clone(), value.clone()));
-    let tick_ns = 1_000_000_000 / u64::from((*manifest.content.run.rate_hz.get_ref()).max(1));
-    Ok(kind.period_ticks(&parameters.collect::<serde_json::Map<_, _>>().into(), tick_ns))
+    parameters.collect::<serde_json::Map<_, _>>().into()
+}
+
+fn tick_ns(manifest: &Manifest) -> u64 {
+    1_000_000_000 / u64::from((*manifest.content.run.rate_hz.get_ref()).max(1))
 }
 
 /// The environment variables of `process`, their values with those of the launcher replaced.

@@ -47,14 +47,15 @@ impl Wires<'_, '_> {
     fn missed(&self, node: usize, input: &InputPlan) -> Option<Diagnostic> {
         let (reader, topic) = (&self.plan.nodes[node], &self.plan.topics[input.topic]);
         let sender = &self.plan.nodes[self.sender(input)?];
-        if reader.period_ticks <= topic.period_ticks {
+        if f64::from(reader.period_ticks) <= topic.ticks.mean() {
             return None;
         }
         let tick_s = self.plan.tick_s();
         let [sent_s, read_s] =
-            [topic.period_ticks, reader.period_ticks].map(|ticks| f64::from(ticks) * tick_s);
+            [topic.ticks.mean(), f64::from(reader.period_ticks)].map(|ticks| ticks * tick_s);
         let measured_s = self.times(sender).measured_every_s.map(|measured_s| measured_s.max(sent_s));
-        let is_even = reader.period_ticks.is_multiple_of(topic.period_ticks);
+        let period_ticks = topic.ticks.period();
+        let is_even = period_ticks.is_some_and(|period| reader.period_ticks.is_multiple_of(period));
         let is_missed = match measured_s {
             Some(measured_s) => {
                 read_s > measured_s * (1.0 + EQUAL_SHARE)
@@ -82,7 +83,7 @@ impl Wires<'_, '_> {
         );
         let help = format!(
             "lower `period_ticks` of `{name}` to {}, or let `{}` {} less often",
-            lower_period(made_s, tick_s, topic.period_ticks),
+            lower_period(made_s, tick_s, period_ticks.unwrap_or(1)),
             sender.name,
             if measured_s.is_some() { "measure" } else { "send" },
         );

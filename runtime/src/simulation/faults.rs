@@ -123,7 +123,7 @@ impl Sim {
         }
         let end = self.segment.end_tick;
         for (topic, plan) in self.plan.topics.iter().enumerate() {
-            for tick in (0..end).step_by(plan.period_ticks as usize) {
+            for tick in (0..end).filter(|tick| plan.ticks.is_due(*tick)) {
                 assert!(self.writers.contains_key(&(topic, tick)), "nobody wrote tick {tick} of {topic}");
             }
         }
@@ -133,10 +133,10 @@ impl Sim {
     /// sent the sample of that tick before.
     pub(super) fn check_swap(&self, node: usize, tick: u32) {
         for output in &self.plan.nodes[node].outputs {
-            let period = self.plan.topics[output.topic].period_ticks;
+            let ticks = self.plan.topics[output.topic].ticks;
             let generation = |tick: u32| self.writers.get(&(output.topic, tick)).copied();
-            let before = tick.checked_sub(period).and_then(generation);
-            let after = [tick, tick + period].map(generation);
+            let before = tick.checked_sub(1).and_then(|before| generation(ticks.newest(before)));
+            let after = [tick, ticks.next(tick + 1)].map(generation);
             let is_followed = after.iter().any(|&after| after.is_none() || after > before);
             assert!(is_followed, "{before:?} is followed by {after:?} at tick {tick}");
         }

@@ -144,11 +144,12 @@ impl Sim {
         let (Role::Node { node, generation }, tick) = (instance.role, instance.tick) else { return };
         for (output, counts_from) in instance.counts_from.clone().into_iter().enumerate() {
             let topic = self.plan.nodes[node].outputs[output].topic;
-            let period = self.plan.topics[topic].period_ticks;
-            let next_due = tick.next_multiple_of(period);
+            let ticks = self.plan.topics[topic].ticks;
+            let next_due = ticks.next(tick);
             if next_due > counts_from && self.segment.sent[topic] < next_due {
-                let first = self.segment.sent[topic].next_multiple_of(period);
-                (first..next_due).step_by(period as usize).for_each(|due| self.store(topic, due, generation));
+                let first = self.segment.sent[topic];
+                let due = (first..next_due).filter(|due| ticks.is_due(*due));
+                due.for_each(|due| self.store(topic, due, generation));
                 self.wake(Need::Samples(topic));
             }
         }
@@ -163,7 +164,7 @@ impl Sim {
         );
         let other = self.writers.insert((topic, tick), generation);
         assert_eq!(other, None, "two write tick {tick} of topic {topic}");
-        self.segment.sent[topic] = tick + self.plan.topics[topic].period_ticks;
+        self.segment.sent[topic] = self.plan.topics[topic].ticks.next(tick + 1);
     }
 
     fn await_tick(&mut self, index: usize) {
@@ -252,8 +253,8 @@ impl Sim {
             self.instances[index].doing = Doing::Waiting;
             return self.complete(self.plan.slot(node, generation), tick);
         };
-        let period = self.plan.topics[topic].period_ticks;
-        let is_sent = tick >= instance.sends_from[output] && tick.is_multiple_of(period);
+        let ticks = self.plan.topics[topic].ticks;
+        let is_sent = tick >= instance.sends_from[output] && ticks.is_due(tick);
         let counts = tick >= instance.counts_from[output];
         if is_sent && is_stored {
             self.wake(if counts { Need::Samples(topic) } else { Need::Shadow(topic) });
@@ -262,7 +263,7 @@ impl Sim {
         } else if is_sent {
             let due = self.shadow[topic];
             assert_eq!(due, tick, "a shadow writes tick {tick} of topic {topic} when {due} is due");
-            self.shadow[topic] = tick + period;
+            self.shadow[topic] = ticks.next(tick + 1);
         }
         self.instances[index].doing = if is_sent && !is_stored {
             Doing::Sending { output, is_stored: true }

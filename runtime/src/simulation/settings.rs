@@ -4,6 +4,7 @@ use super::sim::{Draw, NODES, WINDOW};
 use crate::graph::Graph;
 use crate::program::{BackupSpec, Executable, OnExit, Program, Readiness};
 use bus::plan::{InputPlan, NodePlan, OutputPlan, Pace, Plan, TopicPlan, Wait};
+use bus::sample_ticks::SampleTicks;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -54,7 +55,7 @@ fn plan(draw: &mut Draw) -> Plan {
 }
 
 fn topic(name: &str, period_ticks: u32) -> TopicPlan {
-    TopicPlan { name: name.to_owned(), type_name: "test".to_owned(), period_ticks }
+    TopicPlan { name: name.to_owned(), type_name: "test".to_owned(), ticks: SampleTicks::every(period_ticks) }
 }
 
 fn input(topic: usize, delay_ticks: u32) -> InputPlan {

@@ -362,10 +362,25 @@ impl<'a> Replacements<'a> {
     }
 }
 
-/// Number of which the tick of a take-over must be a multiple. The backup then sends on every output at once, and a
-/// process that joins later finds its samples.
+/// The first tick from `tick` on at which a backup of `node` may take over; `None` if the run ends before. The backup sends on every
+/// output there, and a process that joins later finds its samples.
+pub(crate) fn next_take_over(plan: &Plan, node: usize, tick: u32) -> Option<u32> {
+    let stride = take_over_stride(plan, node);
+    let mut tick = tick.checked_next_multiple_of(stride)?;
+    loop {
+        let sent = plan.nodes[node].outputs.iter().map(|output| plan.topics[output.topic].ticks.next(tick));
+        match sent.max().filter(|due| *due > tick) {
+            None => return Some(tick),
+            Some(due) if due >= plan.duration_ticks => return None,
+            Some(due) => tick = due.checked_next_multiple_of(stride)?,
+        }
+    }
+}
+
+/// Number of which the tick of a take-over must be a multiple: of the period of the node, and of those of its outputs that have one.
 pub(crate) fn take_over_stride(plan: &Plan, node: usize) -> u32 {
-    let periods = plan.nodes[node].outputs.iter().map(|output| plan.topics[output.topic].period_ticks);
+    let periods =
+        plan.nodes[node].outputs.iter().filter_map(|output| plan.topics[output.topic].ticks.period());
     let multiple = |a: u32, b: u32| (1..=b).map(|k| a.saturating_mul(k)).find(|m| m % b == 0).unwrap_or(a);
     periods.fold(plan.nodes[node].period_ticks, multiple)
 }

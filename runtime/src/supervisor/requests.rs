@@ -3,7 +3,7 @@
 use super::Supervisor;
 use crate::ctl::protocol::{Answer, Request};
 use crate::program::BackupSpec;
-use crate::supervisor::replacement::{Report, take_over_stride};
+use crate::supervisor::replacement::{Report, next_take_over, take_over_stride};
 use crate::supervisor::state_machine::State;
 use crate::view::View;
 use crate::world::World;
@@ -98,12 +98,14 @@ impl<W: World> Supervisor<'_, W> {
         let View { granted, end_tick: end, .. } = self.decisions.replacements.view;
         let join = tick.saturating_sub(shadow_ticks);
         let (period, stride) = (backup.plan.period_ticks, take_over_stride(self.plan, backup.node));
-        let advice = match least_tick(granted, shadow_ticks, stride) {
-            least if least >= u64::from(end) => "no tick is left: lower --shadow-ticks".to_owned(),
-            _ if !shadow_ticks.is_multiple_of(period) => {
+        let next = |tick: u32| next_take_over(self.plan, backup.node, tick);
+        let least = u32::try_from(least_tick(granted, shadow_ticks, stride)).ok().and_then(next);
+        let advice = match least.filter(|least| *least < end) {
+            None => "no tick is left: lower --shadow-ticks".to_owned(),
+            Some(_) if !shadow_ticks.is_multiple_of(period) => {
                 format!("choose --shadow-ticks as a multiple of {period}")
             }
-            least => format!("the least tick that works now is {least}"),
+            Some(least) => format!("the least tick that works now is {least}"),
         };
         if tick >= end {
             bail!("tick {tick} is not within the run, which has {end} ticks; {advice}");
@@ -118,6 +120,11 @@ impl<W: World> Supervisor<'_, W> {
             bail!(
                 "`{process}` sends every {stride} and computes every {period} ticks: let it take over at a multiple \
                  of the first and join at one of the second; {advice}"
+            );
+        }
+        if next(tick) != Some(tick) {
+            bail!(
+                "no measurement of `{process}` arrives at tick {tick}: let it take over where one does; {advice}"
             );
         }
         Ok(())

@@ -1,6 +1,6 @@
 //! Backups on the way in: their processes start, and join where the clock waits.
 
-use super::{Backup, Join, Pending, Purpose, Replacements, Report, Stage, take_over_stride};
+use super::{Backup, Join, Pending, Purpose, Replacements, Report, Stage, next_take_over};
 use bus::lockstep::{Phase, SlotState, TransferOutcome};
 use bus::membership::Instance;
 use diagnostics::Error;
@@ -204,9 +204,8 @@ impl Replacements<'_> {
             Join::At(tick) => (tick, spec.take_over_tick.unwrap_or(u32::MAX)),
             Join::Next { shadow_ticks } => {
                 let tick = view.held_at.unwrap_or_default();
-                let stride = take_over_stride(plan, node);
                 let take_over = shadow_ticks
-                    .and_then(|ticks| tick.checked_add(ticks.max(1))?.checked_next_multiple_of(stride));
+                    .and_then(|ticks| next_take_over(plan, node, tick.checked_add(ticks.max(1))?));
                 (tick, take_over.unwrap_or(u32::MAX))
             }
             Join::AtOnce => (view.slots[primary].done, view.slots[primary].done),
@@ -222,7 +221,7 @@ impl Replacements<'_> {
         let slot = plan.slot(node, backup.generation);
         for (output, &take_over_tick) in outputs.iter().zip(&membership.take_over_ticks) {
             // The next tick at which a shadow sample is due; one that does not shadow sends none.
-            let due = join_tick.next_multiple_of(plan.topics[output.topic].period_ticks);
+            let due = plan.topics[output.topic].ticks.next(join_tick);
             view.start_shadow(output.topic, if shadows { due } else { take_over_tick });
         }
         view.set_first_tick(slot, join_tick);

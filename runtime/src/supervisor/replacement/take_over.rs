@@ -32,9 +32,7 @@ impl Replacements<'_> {
         let is_shadowing = self.nodes[node].backup.as_ref().is_some_and(|c| c.stage == Stage::Shadowing);
         let outputs = membership.primary.plan.outputs.iter().zip(&membership.take_over_ticks);
         let has_sent = |(output, &tick): (&OutputPlan, &u32)| {
-            let period_ticks = u64::from(self.plan.topics[output.topic].period_ticks);
-            let first_due = u64::from(tick).next_multiple_of(period_ticks);
-            u64::from(self.view.sent[output.topic]) > first_due
+            self.view.sent[output.topic] > self.plan.topics[output.topic].ticks.next(tick)
         };
         is_shadowing && outputs.into_iter().any(has_sent)
     }
