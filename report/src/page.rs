@@ -61,6 +61,8 @@ pub fn page(body: &str, plotly: &Bundle, script: &str, data: &Value) -> Vec<u8> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs::{read_dir, read_to_string};
+    use std::path::{Path, PathBuf};
 
     #[test]
     fn the_bundles_are_scripts() {
@@ -80,6 +82,57 @@ mod tests {
         let names = used.split("var(--").skip(1).filter_map(|rest| rest.split_once(')'));
         for name in names.map(|(name, _)| name) {
             assert_eq!(COLOURS.matches(&format!(" --{name}: ")).count(), 2, "{name}");
+        }
+    }
+
+    /// Styles, scripts and templates of pages in `folder` and below, without what others wrote.
+    fn sources(folder: &Path) -> Vec<PathBuf> {
+        let paths = read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+        let found = paths.flat_map(|path| {
+            let name = path.file_name().unwrap().to_string_lossy().into_owned();
+            let is_page = [".css", ".html", ".js"].iter().any(|end| name.ends_with(end));
+            match path.is_dir() {
+                true if name != "vendor" => sources(&path),
+                false if is_page && !name.contains(".min.") => vec![path],
+                _ => vec![],
+            }
+        });
+        found.collect()
+    }
+
+    /// The text behind the start of the first colour that `text` states by its numbers.
+    fn colour(text: &str) -> Option<&str> {
+        let is_hexadecimal = |rest: &&str| {
+            let digits = rest.chars().take_while(char::is_ascii_hexdigit).count();
+            // `#add(` is a function of a script.
+            let ends =
+                rest[digits..].chars().next().is_none_or(|next| !next.is_alphanumeric() && next != '(');
+            matches!(digits, 3 | 4 | 6 | 8) && ends
+        };
+        let functions = ["rgb(", "rgba(", "hsl(", "hsla("].into_iter();
+        let mut arguments = functions.flat_map(|function| text.split(function).skip(1));
+        let stated = arguments.find(|rest| rest.starts_with(|first: char| first.is_ascii_digit()));
+        text.split('#').skip(1).find(is_hexadecimal).or(stated)
+    }
+
+    #[test]
+    fn colours_are_stated_in_one_file() {
+        for stated in
+            ["a { color: #fff; }", "\"#787878\"", "rgb(0 0 0 / 0.4)", "x: \"rgba(120,120,120,0.3)\""]
+        {
+            assert!(colour(stated).is_some(), "{stated}");
+        }
+        for named in ["var(--ink)", "this.#add(x)", "`rgba(${parts},1)`", "#plots"] {
+            assert_eq!(colour(named), None);
+        }
+        let crates = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let all =
+            ["src", "view/assets", "../campaign/src"].map(|folder| sources(&crates.join(folder))).concat();
+        assert!(all.len() > 20, "{all:?}");
+        for path in all {
+            let text = read_to_string(&path).unwrap();
+            let found = colour(&text).map(|found| found.lines().next());
+            assert_eq!(found.is_some(), path.ends_with("page/colours.css"), "{}: {found:?}", path.display());
         }
     }
 

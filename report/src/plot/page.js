@@ -1,7 +1,7 @@
 // Curves over time, and paths in space.
 
 const SPACE = config(["toImage", "zoom3d", "pan3d", "orbitRotation", "tableRotation", "resetCameraDefault3d"]);
-const SOLID = "#787878";
+const SOLID = "--thing";
 // Layers of the lines: an estimator's noise must not hide the flown line, nor that the line that was asked for.
 const LAYERS = { estimated: 1, measured: 2, flown: 3, asked: 4 };
 const BAND_PX = 6;
@@ -152,7 +152,7 @@ function drawFlat(id, text, up) {
   // With a gap between two lines.
   const along = (lines, axis) => lines.flatMap((line) => [...column(line, axis), null]);
   const outlines = data.solids.map((solid) => ({
-    type: "scatter", mode: "lines", fill: "toself", fillcolor: "rgba(120,120,120,0.3)", line: { color: SOLID, width: 1 },
+    type: "scatter", mode: "lines", fill: "toself", fillcolor: `${SOLID} 0.3`, line: { color: SOLID, width: 1 },
     name: solid.name, hoverinfo: "name", x: along(solid[id], 0), y: along(solid[id], 1),
   }));
   const paths = trails.flatMap((trail) => trailTraces("scatter", trail, { x: trail.x, y: trail[up] }));
