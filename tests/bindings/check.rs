@@ -3,6 +3,7 @@
 use crate::build::built;
 use crate::support::{Ended, HUMMINGBUS, Place, repository};
 use std::path::Path;
+use std::time::{Duration, Instant};
 
 /// A hover of 0.3 s with this controller and this pilot.
 fn hover(place: &Place, controller: &str, pilot: &str) -> String {
@@ -122,16 +123,26 @@ fn a_program_that_hangs_is_refused_as_a_run_would_end_at_its_watchdog() {
         "watchdog_ms_host",
     ]);
     place.call(&["run", &manifest]).with_code(2).says(&["process `pilot` was killed by the watchdog"]);
-    // The first of two that hang ends the check, and the second ends with it.
-    let both = hover(
-        &place,
-        &custom(INPUTS, TILT).replacen("[\"", "[\"sh\", \"-c\", \"sleep 100\", \"", 1),
-        hanging,
+}
+
+#[test]
+fn the_first_of_two_programs_that_hang_ends_the_check_and_the_second_ends_with_it() {
+    let place = Place::new();
+    let id = place.path("id");
+    let first = custom(INPUTS, TILT).replacen("[\"", "[\"sh\", \"-c\", \"sleep 100\", \"", 1);
+    let second = format!(
+        "command = [\"sh\", \"-c\", \"echo $$ >{id}; exec sleep 100\"]\nwatchdog_ms_host = 100000\n\
+         outputs.set_point = {{ type = \"hummingbus_msgs/msg/SetPoint\" }}\n"
     );
+    let manifest = hover(&place, &format!("{first}watchdog_ms_host = 2000\n"), &second);
+    let began = Instant::now();
     place
-        .call(&["check", &both, "--set", "process.controller.watchdog_ms_host=500"])
+        .call(&["check", &manifest])
         .with_code(2)
-        .says(&["500 ms"]);
+        .says(&["process `controller` would not take part", "it did not report its ports within 2000 ms"]);
+    assert!(began.elapsed() < Duration::from_secs(50), "it waited for the second: {:?}", began.elapsed());
+    let id = std::fs::read_to_string(id).unwrap();
+    assert!(!Path::new("/proc").join(id.trim()).exists(), "the second program {id} goes on");
 }
 
 /// The place of a parameter that a program refuses.
