@@ -107,6 +107,20 @@ enum Scope {
     Alone,
 }
 
+/// A file of a manifest and its copy with the values of `--set`, which the node reads.
+struct Edited<'k> {
+    key: &'k str,
+    original: PathBuf,
+    copy: PathBuf,
+}
+
+/// Parameters of a node with the paths of its files.
+struct Resolved<'k> {
+    parameters: BTreeMap<&'k str, serde_json::Value>,
+    edited: Vec<Edited<'k>>,
+    has_firmware: bool,
+}
+
 fn checked(
     declared: &DeclaredNode<'_>,
     plan: &Plan,
@@ -114,29 +128,60 @@ fn checked(
     notes: &mut Notes,
     scope: Scope,
 ) -> Result<(serde_json::Value, Vec<InputFile>), Diagnostic> {
-    let DeclaredNode { manifest, name, process, program, .. } = declared;
+    let DeclaredNode { manifest, process, program, .. } = declared;
     let read = declared.files.listing_anew();
-    let mut parameters = stated(declared)?;
-    // Copies of files with the values of `--set`: keys, originals, copies.
-    let mut edited: Vec<(&str, PathBuf, PathBuf)> = Vec::new();
-    let mut has_firmware = false;
+    let resolved = resolved(declared, &read, notes)?;
+    let parameters = serde_json::to_value(&resolved.parameters).unwrap_or_default();
+    if program.is_recorder() {
+        require_none(manifest, process)?;
+    } else if program.is_judge() {
+        return Ok((serde_json::json!({ "conditions": manifest.content.conditions() }), Vec::new()));
+    } else if let Executable::Component(kind) = &program.executable {
+        let inputs: Vec<&str> = process.inputs.keys().map(|port| port.get_ref().as_str()).collect();
+        let outputs: Vec<&str> = process.outputs.keys().map(|port| port.get_ref().as_str()).collect();
+        let messages = messages(declared, plan);
+        let context = NodeContext::new(declared.name.get_ref(), &inputs)
+            .naming(&outputs)
+            .reading(&messages)
+            .timed(plan.tick_ns, period_ticks, plan.duration_ticks)
+            .seeded(plan.seed)
+            .given(&read);
+        let checked = check_component(declared, kind, (&parameters, &resolved.edited), &context, scope);
+        notes.times.entry(declared.name.get_ref().clone()).or_insert_with(|| context.times());
+        // A firmware has files beside its program.
+        if resolved.has_firmware {
+            notes.models.extend(read.used().into_iter().map(|file| file.path));
+        }
+        note_warnings(declared, context, &resolved.edited, notes);
+        checked?;
+    }
+    Ok((parameters, read.used()))
+}
+
+/// The parameters of `declared` with the files that it names, as the node gets them. Notes the files.
+fn resolved<'a>(
+    declared: &DeclaredNode<'a>,
+    read: &InputFiles,
+    notes: &mut Notes,
+) -> Result<Resolved<'a>, Diagnostic> {
+    let DeclaredNode { manifest, name, process, program, .. } = declared;
+    let (mut parameters, mut edited, mut has_firmware) = (stated(declared)?, Vec::new(), false);
     for (key, file) in files(process) {
         let Some(file) = file else { continue };
         has_firmware |= key == "firmware";
-        // As the node gets it.
         let original = manifest.resolve(file)?;
-        let path = manifest.with_edits(declared.files, name.get_ref(), key, original.clone())?;
-        if path != original {
-            edited.push((key, original, path.clone()));
+        let copy = manifest.with_edits(declared.files, name.get_ref(), key, original.clone())?;
+        let path = copy.to_string_lossy().into_owned();
+        if copy != original {
+            edited.push(Edited { key, original, copy });
         }
-        let path = path.to_string_lossy().into_owned();
         if let Some(stated) = parameters.insert(key, path.as_str().into()) {
             let over_file = over_file(declared, key, &path, stated).ok_or_else(|| has_two(declared, key))?;
             parameters.insert(key, over_file);
         }
-        let named = named_files(&read, key, path.into());
+        let named = named_files(read, key, path.into());
         if program.component().is_none() {
-            read_named(&read, key, &named).map_err(|message| {
+            read_named(read, key, &named).map_err(|message| {
                 let message = format!("process `{}`: {message}", name.get_ref());
                 manifest.problem(&file.span(), message, "correct the path, which is relative to the manifest")
             })?;
@@ -145,61 +190,56 @@ fn checked(
             notes.models.extend(named);
         }
     }
-    let parameters = serde_json::to_value(parameters).unwrap_or_default();
-    if program.is_recorder() {
-        require_none(manifest, process)?;
-    } else if program.is_judge() {
-        return Ok((serde_json::json!({ "conditions": manifest.content.conditions() }), Vec::new()));
-    } else if let Executable::Component(kind) = &program.executable {
-        let ranges = ranges::check(manifest, name, process);
-        let inputs: Vec<&str> = process.inputs.keys().map(|port| port.get_ref().as_str()).collect();
-        let outputs: Vec<&str> = process.outputs.keys().map(|port| port.get_ref().as_str()).collect();
-        let messages = messages(declared, plan);
-        let context = NodeContext::new(name.get_ref(), &inputs)
-            .naming(&outputs)
-            .reading(&messages)
-            .timed(plan.tick_ns, period_ticks, plan.duration_ticks)
-            .seeded(plan.seed)
-            .given(&read);
-        let refused = |error: ParameterError| {
-            let error = edited.iter().fold(error, |error, (key, original, copy)| {
-                manifest.without_copy(declared.files, (name.get_ref(), key), (original, copy), error)
-            });
-            Err::<(), _>(refused(declared, &error))
-        };
-        // No kind is made of a number that is out of all range.
-        let errors = match ranges.is_ok().then(|| kind.check(&parameters, &context)) {
-            None => kind.faults(&parameters),
-            Some(Ok(())) => Vec::new(),
-            Some(Err(first)) => all_errors(kind, &parameters, first, scope),
-        };
-        let checked = beside(ranges, Diagnostic::gather(errors.into_iter().map(refused)).map(drop));
-        notes.times.entry(name.get_ref().clone()).or_insert_with(|| context.times());
-        // A firmware has files beside its program.
-        if has_firmware {
-            notes.models.extend(read.used().into_iter().map(|file| file.path));
+    Ok(Resolved { parameters, edited, has_firmware })
+}
+
+/// Checks the `parameters` of `declared`, a component of `kind`, some of whose files are `edited` copies.
+fn check_component(
+    declared: &DeclaredNode<'_>,
+    kind: &Registration,
+    (parameters, edited): (&serde_json::Value, &[Edited<'_>]),
+    context: &NodeContext<'_>,
+    scope: Scope,
+) -> Result<(), Diagnostic> {
+    let DeclaredNode { manifest, name, process, .. } = declared;
+    let ranges = ranges::check(manifest, name, process);
+    let refused = |error: ParameterError| {
+        let error = edited.iter().fold(error, |error, Edited { key, original, copy }| {
+            manifest.without_copy(declared.files, (name.get_ref(), key), (original, copy), error)
+        });
+        Err::<(), _>(refused(declared, &error))
+    };
+    // No kind is made of a number that is out of all range.
+    let errors = match ranges.is_ok().then(|| kind.check(parameters, context)) {
+        None => kind.faults(parameters),
+        Some(Ok(())) => Vec::new(),
+        Some(Err(first)) => all_errors(kind, parameters, first, scope),
+    };
+    beside(ranges, Diagnostic::gather(errors.into_iter().map(refused)).map(drop))
+}
+
+/// Notes the warnings of the component that was made in `context`.
+fn note_warnings(
+    declared: &DeclaredNode<'_>,
+    context: NodeContext<'_>,
+    edited: &[Edited<'_>],
+    notes: &mut Notes,
+) {
+    let DeclaredNode { manifest, name, .. } = declared;
+    for warning in context.into_warnings() {
+        let at = place(declared, &warning.key);
+        if warning.is_behind_end && notes.is_cut(manifest, &at) {
+            continue;
         }
-        for warning in context.into_warnings() {
-            let at = place(declared, &warning.key);
-            if !(warning.is_behind_end && notes.is_cut(manifest, &at)) {
-                let message = edited.iter().fold(warning.message, |message, (key, original, copy)| {
-                    manifest.without_copy_in(
-                        declared.files,
-                        (name.get_ref(), key),
-                        (original, copy),
-                        &message,
-                    )
-                });
-                let warning_at = problem(declared, &at, &message, String::new());
-                if warning.key == VEHICLE {
-                    notes.of_vehicles.push(warning_at.clone());
-                }
-                notes.warnings.push(warning_at);
-            }
+        let message = edited.iter().fold(warning.message, |message, Edited { key, original, copy }| {
+            manifest.without_copy_in(declared.files, (name.get_ref(), key), (original, copy), &message)
+        });
+        let warning_at = problem(declared, &at, &message, String::new());
+        if warning.key == VEHICLE {
+            notes.of_vehicles.push(warning_at.clone());
         }
-        checked?;
+        notes.warnings.push(warning_at);
     }
-    Ok((parameters, read.used()))
 }
 
 /// The parameters as the manifest states them. Those of a command may hold placeholders, which are replaced.
