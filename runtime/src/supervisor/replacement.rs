@@ -384,3 +384,40 @@ pub(crate) fn take_over_stride(plan: &Plan, node: usize) -> u32 {
     let multiple = |a: u32, b: u32| (1..=b).map(|k| a.saturating_mul(k)).find(|m| m % b == 0).unwrap_or(a);
     periods.fold(plan.nodes[node].period_ticks, multiple)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::next_take_over;
+    use bus::plan::Plan;
+    use bus::sample_ticks::SampleTicks;
+    use serde_json::{Value, json};
+
+    /// A run of 1000 ticks with one node, which computes every 10 ticks and sends at these.
+    fn plan(sent: &[SampleTicks]) -> Plan {
+        let topic = |ticks: &SampleTicks| json!({ "name": "/a", "type_name": "a/msg/B", "ticks": ticks });
+        let topics: Vec<Value> = sent.iter().map(topic).collect();
+        let outputs: Vec<Value> =
+            (0..sent.len()).map(|topic| json!({ "port": "out", "topic": topic })).collect();
+        let node = json!({
+            "name": "a", "period_ticks": 10, "wait": "block", "inputs": [], "outputs": outputs, "parameters": null,
+        });
+        let plan = json!({
+            "run_id": "test", "seed": 1, "tick_ns": 1_000_000, "duration_ticks": 1000, "window_ticks": 64,
+            "pace": "free", "topics": topics, "nodes": [node],
+        });
+        serde_json::from_value(plan).unwrap()
+    }
+
+    #[test]
+    fn a_backup_takes_over_where_it_sends_on_every_output() {
+        let next = |sent: &[SampleTicks], tick| next_take_over(&plan(sent), 0, tick);
+        let every = SampleTicks::every;
+        assert_eq!(next(&[every(20), every(50)], 101), Some(200));
+        assert_eq!(next(&[every(20)], 1001), Some(1020), "a take-over behind the end is refused elsewhere");
+        // At tick 80, 180, 280, …
+        let late = SampleTicks::measured(10, 1_000_000, 100_000_000, 80_000_000);
+        assert_eq!([0, 81, 180].map(|tick| next(&[late], tick)), [Some(0), Some(180), Some(180)]);
+        assert_eq!(next(&[late, every(30)], 1), Some(180));
+        assert_eq!([next(&[late, every(50)], 1), next(&[late], 981)], [None, None]);
+    }
+}
