@@ -69,7 +69,7 @@ fn a_sensor_that_should_measure_more_often_than_it_computes_is_refused() {
     place.call(&["run", &manifest]).with_code(2).says(&["`rate_hz`", "`period_ticks`", "mocap"]);
 }
 
-/// Whatever the period of its process: each sample behind the first is a new measurement, and readers see the same.
+/// Each sample behind the first is a new measurement, with any period of the process, and readers see the same.
 #[test]
 fn a_sensor_sends_at_its_rate_and_readers_see_no_difference() {
     let place = Place::new();
