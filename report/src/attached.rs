@@ -2,13 +2,36 @@
 
 use crate::airframe::Body;
 use plant::Airframe;
+use plant::effects::Effect;
+use plant::effects::entry::resolve;
 use recorder::RecordingError;
 use recorder::reader::Recording;
 use std::collections::BTreeSet;
 use std::io;
 use std::path::Path;
 use toml::{Table, Value};
-use vehicles::Vehicle;
+use vehicles::reader::{Document, Section};
+use vehicles::{EffectEntry, Vehicle};
+
+/// Motion of the air around a simulated vehicle, as its files state it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wind {
+    /// Velocity of the steady wind, in the world.
+    pub velocity_W_m_s: [f64; 3],
+    /// True if random gusts are added to it. No file tells their course.
+    pub has_gusts: bool,
+}
+
+impl Wind {
+    /// The wind of these effects; `None` in still air.
+    fn of(effects: &[Effect]) -> Option<Self> {
+        let values = |kind: &str| effects.iter().find(|effect| effect.kind.name == kind).map(|it| it.values);
+        let velocity_W_m_s = values("wind").map_or([0.0; 3], |wind| [wind[0], wind[1], wind[2]]);
+        let has_gusts = values("turbulence").is_some_and(|gusts| gusts[0] > 0.0);
+        let blows = velocity_W_m_s.iter().any(|part| *part != 0.0);
+        (blows || has_gusts).then_some(Self { velocity_W_m_s, has_gusts })
+    }
+}
 
 /// Files attached to a recording: the manifest, and the files that it names.
 #[derive(Debug)]
@@ -63,11 +86,28 @@ impl Attached {
     /// is attached.
     #[must_use]
     pub fn airframe(&self, name: &str) -> Option<Airframe> {
-        let vehicle = match self.file_of(name) {
+        let vehicle = match self.file_of(name, "vehicle") {
             Some(file) => self.vehicle(&file),
             None => self.only_vehicle(),
         };
         Airframe::from_files(vehicle?, &[]).ok()
+    }
+
+    /// The wind at the simulated vehicle that is called `name`, empty where it has none: that of its vehicle file and of its
+    /// scene file. `None` in still air, without a plant, and where its vehicle file is not attached.
+    #[must_use]
+    pub fn wind(&self, name: &str) -> Option<Wind> {
+        let mut entries = self.vehicle(&self.file_of(name, "vehicle")?)?.effects;
+        let scene = self.file_of(name, "scene");
+        entries.extend(scene.map_or_else(Vec::new, |file| self.listed_effects(&file)));
+        Wind::of(&resolve(&entries).ok()?)
+    }
+
+    /// The effects that the file attached as `file` lists.
+    fn listed_effects(&self, file: &str) -> Vec<EffectEntry> {
+        // A manifest of the same name lists none.
+        let listed = self.texts(file).filter_map(|text| read_effects(text, file));
+        listed.flatten().collect()
     }
 
     /// The tables of a list of the manifest, such as `pass`: those of the included files first.
@@ -103,12 +143,12 @@ impl Attached {
         self.manifest.get("vehicle").and_then(Value::as_array).into_iter().flatten()
     }
 
-    /// The vehicle file of the plant, by the name alone under which it is attached.
-    fn file_of(&self, name: &str) -> Option<String> {
+    /// The file that the plant names as `key`, `vehicle` or `scene`, by the name alone under which it is attached.
+    fn file_of(&self, name: &str, key: &str) -> Option<String> {
         let merged = if name.is_empty() { self.manifest.clone() } else { self.merged(name)? };
         let is_plant = |process: &&Value| process.get("kind").and_then(Value::as_str) == Some("plant");
         let plant = merged.get("process")?.as_table()?.values().find(is_plant)?;
-        let file = plant.get("vehicle").or_else(|| plant.get("parameters")?.get("vehicle"))?;
+        let file = plant.get(key).or_else(|| plant.get("parameters")?.get(key))?;
         Some(Path::new(file.as_str()?).file_name()?.to_string_lossy().into_owned())
     }
 
@@ -158,6 +198,13 @@ impl Attached {
     }
 }
 
+/// The effects that a scene file lists; `None` if it cannot be read.
+fn read_effects(text: &str, file: &str) -> Option<Vec<EffectEntry>> {
+    let document = Document::new(file, text);
+    let tree = document.tree().ok()?;
+    vehicles::effects::read(&Section::new(&document, String::new(), 0..0, tree.get_ref())).ok()
+}
+
 /// Puts the values of `upper` over those of `lower`.
 fn put(lower: &mut Table, upper: Table) {
     for (key, value) in upper {
@@ -172,7 +219,7 @@ fn put(lower: &mut Table, upper: Table) {
 
 #[cfg(test)]
 mod tests {
-    use super::Attached;
+    use super::{Attached, Wind};
 
     fn attached(files: &[(&str, &str)]) -> Attached {
         Attached::of(files.iter().map(|(name, text)| ((*name).to_owned(), (*text).to_owned())).collect())
@@ -218,6 +265,39 @@ mod tests {
         let names: Vec<_> = processes.iter().map(|(name, _)| name.as_str()).collect();
         assert_eq!(names, ["h1/plant", "h2/plant"]);
         assert_eq!(processes[1].1["vehicle"].as_str(), Some("other.toml"));
+    }
+
+    fn effect(name: &str, parameters: &[(&str, f64)]) -> String {
+        let stated = |(key, value): &(&str, f64)| {
+            format!(
+                "{key} = {{ value = {value}, unit = \"m/s\", source = \"test\", uncertainty = \"exact\" }}\n"
+            )
+        };
+        let parameters: String = parameters.iter().map(stated).collect();
+        format!("[[effects]]\nname = \"{name}\"\n{parameters}")
+    }
+
+    #[test]
+    fn the_wind_is_that_of_the_plant_s_vehicle_and_of_its_scene() {
+        let manifest =
+            "[process.plant]\nkind = \"plant\"\nvehicle = \"x/windy.toml\"\nscene = \"y/air.toml\"\n";
+        let still = manifest.replace("windy", "hummingbird").replace("air", "calm");
+        let windy = named("windy") + &effect("wind", &[("x", 3.0), ("z", -0.5)]);
+        let air = format!("name = \"air\"\n{}", effect("turbulence", &[("wind_at_20_ft", 5.0)]));
+        let wind = |manifest: &str| {
+            let files = [("run.toml", manifest), ("windy.toml", &*windy), ("hummingbird.toml", PLAIN)];
+            attached(&[&files[..], &[("air.toml", &*air), ("calm.toml", "name = \"calm\"\n")]].concat())
+                .wind("")
+        };
+        let velocity_W_m_s = [3.0, 0.0, -0.5];
+        assert_eq!(wind(manifest), Some(Wind { velocity_W_m_s, has_gusts: true }));
+        assert_eq!(wind(&manifest.replace("air", "calm")), Some(Wind { velocity_W_m_s, has_gusts: false }));
+        assert_eq!(wind(&still), None);
+        assert_eq!(wind(&still.replace("vehicle = ", "# ")), None, "the file of the vehicle is not told");
+        assert_eq!(
+            wind(&still.replace("calm", "air")),
+            Some(Wind { velocity_W_m_s: [0.0; 3], has_gusts: true })
+        );
     }
 
     #[test]

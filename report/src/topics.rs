@@ -26,5 +26,16 @@ pub fn vehicle(topic: &str) -> &str {
 /// True for topics of shadows, which were computed and not flown.
 #[must_use]
 pub fn is_of_shadow(topic: &str) -> bool {
-    topic.starts_with("/shadow/")
+    beside_shadow(topic).is_some()
+}
+
+/// The flown topic beside the topic of a shadow; `None` for a topic that is not of a shadow.
+///
+/// ```
+/// assert_eq!(report::topics::beside_shadow("/shadow/h1/controller/command"), Some("/h1/controller/command"));
+/// assert_eq!(report::topics::beside_shadow("/controller/command"), None);
+/// ```
+#[must_use]
+pub fn beside_shadow(topic: &str) -> Option<&str> {
+    topic.strip_prefix("/shadow").filter(|flown| flown.starts_with('/'))
 }

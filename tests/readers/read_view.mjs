@@ -164,6 +164,29 @@ function curvesShown() {
   }));
 }
 
+/** Lengths of the arrows of commands on the rotors of each vehicle, 0 where none is seen, and the estimate of a shadow. */
+function arrowsShown() {
+  const length = ({ visible, line, cone }) => (visible ? line.scale.y + cone.scale.y : 0);
+  return window.hummingbus.room.vehicles.map(({ vehicle, propellers, shadowBelieved }) => ({
+    map: vehicle.body?.command,
+    command: propellers.map(({ command }) => length(command)),
+    shadow: propellers.map(({ shadow }) => length(shadow)),
+    estimate: shadowBelieved.visible ? shadowBelieved.position.toArray() : null,
+  }));
+}
+
+/** The wind in the corner, seen along x of the world: its text, and its arrow across and up. */
+function windShown() {
+  const { room } = window.hummingbus;
+  room.setMode("free");
+  room.camera.position.copy(room.controls.target).add({ x: -5, y: 0, z: 0 });
+  room.draw();
+  const place = document.getElementById("wind");
+  const shown = { text: place.hidden ? null : place.textContent.trim(), seen: room.wind.seen, line: place.querySelector("path").getAttribute("d") };
+  room.setMode("follow");
+  return shown;
+}
+
 const options = { before: rest.includes("no-webgl") ? refuseWebGl : undefined };
 const seen = await withPage(address, async (page, wrong) => {
   const said = [];
@@ -187,6 +210,8 @@ const seen = await withPage(address, async (page, wrong) => {
     legend: await page.$eval("#legend", (legend) => legend.textContent),
     poses: shown,
     colours: await colours(page),
+    arrows: await page.evaluate(arrowsShown),
+    wind: await page.evaluate(windShown),
     plots: await page.evaluate(curvesShown),
     heads: await page.evaluate(() => [...document.querySelectorAll(".plot-head")].map((head) => head.textContent)),
     values: await page.evaluate(() => [...document.querySelectorAll(".plot-head .value")].map((value) => value.textContent)),

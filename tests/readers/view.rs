@@ -4,7 +4,7 @@
 use crate::{Flight, HUMMINGBUS, ROOT, laps, look, readers};
 use bus::Message as _;
 use bus::announcement::Announcement;
-use bus::messages::PlantState;
+use bus::messages::{MotorCommand, PlantState, StateEstimate, Time};
 use recorder::reader::Recording;
 use recorder::writer::{ChannelId, RecordingWriter};
 use serde_json::{Value, json};
@@ -142,6 +142,98 @@ fn a_browser_shows_two_vehicles_in_their_room_and_another_recording_as_a_ghost()
     let highest: Vec<f64> = heights.map(|curve| curve["spread"][1].as_f64().unwrap()).collect();
     assert_eq!(highest, [laps::SPIKE_M, laps::SPIKE_M]);
     require_short_heads(&seen);
+}
+
+#[test]
+fn a_browser_shows_a_shadow_for_as_long_as_it_sends_and_the_wind_of_the_files() {
+    let Some(readers) = readers() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let recording = shadowed(folder.path());
+    let view = View::of(&[&recording]);
+    let seen = view.look(&readers, &["1280x900", "250000000"]);
+    let arrows = &seen["arrows"][0];
+    let speed = |command: f64| {
+        let number = |key: &str| arrows["map"][key].as_f64().unwrap();
+        let (least, most) = (number("speed_at_min_rad_s"), number("speed_at_max_rad_s"));
+        least + (command - number("min")) / (number("max") - number("min")) * (most - least)
+    };
+    let ratio = (speed(SHADOW_COMMAND) / speed(COMMAND)).powi(2);
+    for rotor in 0..4 {
+        let length = |key: &str| arrows[key][rotor].as_f64().unwrap();
+        assert!((length("shadow") / length("command") - ratio).abs() < 1e-9, "{arrows}");
+    }
+    assert_eq!(arrows["estimate"], json!([0, 0, 2]));
+    // The commands of both are compared in a plot.
+    let curves = seen["plots"].as_array().unwrap().last().unwrap().as_array().unwrap();
+    let topics: Vec<_> = curves.iter().map(|curve| curve["topic"].as_str().unwrap()).collect();
+    assert_eq!(topics, [["/controller/command"; 4], ["/shadow/controller/command"; 4]].concat());
+    // Its last samples are not shown for ever.
+    let later = view.look(&readers, &["390x844", "dark", "750000000"]);
+    assert_eq!(
+        (&later["arrows"][0]["shadow"], &later["arrows"][0]["estimate"]),
+        (&json!([0, 0, 0, 0]), &Value::Null)
+    );
+    assert_eq!(later["arrows"][0]["command"], arrows["command"]);
+    require_wind(&seen["wind"]);
+}
+
+/// Seen along x, a wind along y comes from the right; what is along x is not seen.
+fn require_wind(wind: &Value) {
+    let speed = (3.0_f64 * 3.0 + 1.0 + 0.2 * 0.2).sqrt();
+    assert_eq!(wind["text"], format!("wind {speed:.1} m/s and gusts"));
+    let [across, up]: [f64; 2] = serde_json::from_value(wind["seen"].clone()).unwrap();
+    assert!((across + 1.0 / speed).abs() < 1e-6 && (up - 0.2 / speed).abs() < 1e-6, "{wind}");
+    // Up is negative in a picture.
+    let tip = wind["line"].as_str().unwrap().split('L').nth(1).unwrap();
+    assert!(tip.starts_with("-6.3 -1.3"), "{wind}");
+}
+
+const COMMAND: f64 = 76.5;
+const SHADOW_COMMAND: f64 = 100.0;
+
+/// A second of flight in wind, whose controller and estimator have shadows in its first half.
+fn shadowed(folder: &Path) -> PathBuf {
+    let path = folder.join("shadowed.mcap");
+    let mut writer = RecordingWriter::create(&path).unwrap();
+    let manifest = "[process.plant]\nkind = \"plant\"\nvehicle = \"windy.toml\"\n";
+    let effect = |name: &str, values: &[(&str, f64)]| {
+        let stated = |(key, value): &(&str, f64)| {
+            format!(
+                "{key} = {{ value = {value}, unit = \"m/s\", source = \"test\", uncertainty = \"exact\" }}\n"
+            )
+        };
+        format!("[[effects]]\nname = \"{name}\"\n{}", values.iter().map(stated).collect::<String>())
+    };
+    let windy = "name = \"windy\"\nbase = \"hummingbird.toml\"\n".to_owned()
+        + &effect("wind", &[("x", 3.0), ("y", 1.0), ("z", 0.2)])
+        + &effect("turbulence", &[("wind_at_20_ft", 5.0)]);
+    writer.attach("run.toml", manifest.as_bytes()).unwrap();
+    writer.attach("windy.toml", windy.as_bytes()).unwrap();
+    writer.attach("hummingbird.toml", vehicles::reference::HUMMINGBIRD.as_bytes()).unwrap();
+    let mut add = |topic, schema| writer.add_channel(topic, &Announcement::of(schema)).unwrap();
+    let state = add("/plant/state", PlantState::SCHEMA);
+    let commands =
+        ["/controller/command", "/shadow/controller/command"].map(|topic| add(topic, MotorCommand::SCHEMA));
+    let estimates = ["/ekf/estimate", "/shadow/ekf/estimate"].map(|topic| add(topic, StateEstimate::SCHEMA));
+    for tick in 0..100_u32 {
+        let time_ns = u64::from(tick) * 10_000_000;
+        let stamp = Time::from_ns(time_ns);
+        let mut send = |channel, bytes: &[u8]| {
+            writer.write(channel, tick, time_ns, &[&[0, 1, 0, 0], bytes].concat()).unwrap();
+        };
+        send(state, bytemuck::bytes_of(&PlantState { stamp, ..PlantState::default() }));
+        let of_shadow = [false, true].into_iter().filter(|is_shadow| !is_shadow || tick < 50);
+        for number in of_shadow.map(usize::from) {
+            let command = [[COMMAND; 4], [SHADOW_COMMAND; 4]][number].into();
+            send(commands[number], bytemuck::bytes_of(&MotorCommand { stamp, command }));
+            let position = [0.0, 0.0, [1.0, 2.0][number]].into();
+            let estimate = StateEstimate { stamp, position, ..StateEstimate::default() };
+            send(estimates[number], bytemuck::bytes_of(&estimate));
+        }
+        writer.end_tick().unwrap();
+    }
+    writer.finish().unwrap();
+    path
 }
 
 /// The head of a plot has each topic once, and values of up to four digits, or whole numbers.

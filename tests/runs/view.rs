@@ -67,6 +67,33 @@ fn it_prints_the_address_opens_the_browser_and_ends_with_code_0_when_told() {
     }
 }
 
+/// The files that a run attaches have the values of `--set`.
+#[test]
+fn the_catalogue_has_the_shadow_and_the_wind_of_a_run() {
+    let place = Place::new();
+    let hover = repository("manifests/hover.toml");
+    let shadow = "[[shadow]]\nprocess = \"controller\"\nwith.parameters.gains.tilt_command_max_rad = 0.1\n";
+    let manifest =
+        place.write("shadow.toml", format!("include = [{hover:?}]\n[run]\nduration_s = 0.5\n{shadow}"));
+    let recording = place.path("shadow.mcap");
+    let [east, north] = ["x={ value = 3, unit = \"m/s\" }", "y={ value = -4, unit = \"m/s\" }"]
+        .map(|value| format!("process.plant.vehicle.effects.wind.{value}"));
+    // It is too short for its conditions.
+    let args = ["run", &manifest, "--record", &recording, "--set", &east, "--set", &north];
+    place.call(&args).with_code(1);
+    let launch = place.start(&["view", &recording, "--no-open"]);
+    let address = address(&launch);
+    let (host, path) = address.split_at(address.find('/').unwrap());
+    let (_, body) = answer(host, &format!("{path}api/catalogue"));
+    let told: Value = serde_json::from_str(&body).unwrap();
+    let vehicle = &told["recordings"][0]["vehicles"][0];
+    let command = json!({ "topic": "/shadow/controller/command", "flown": "/controller/command" });
+    assert_eq!(vehicle["shadows"], json!({ "command": command }));
+    assert_eq!(vehicle["wind"], json!({ "velocity_m_s": [3.0, -4.0, 0.0], "has_gusts": false }));
+    launch.signal(Signal::TERM);
+    launch.end().with_code(0);
+}
+
 #[test]
 fn what_is_no_recording_is_refused_in_words() {
     let place = Place::new();

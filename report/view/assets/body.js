@@ -6,6 +6,10 @@ const PAINTS = { front: 0xd55e00, "counter-clockwise": 0x0072b2, clockwise: 0x00
 const BEAMS = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, -1]];
 // A vehicle whose file the recording lacks is drawn with this reach.
 const REACH_M = 0.25;
+// Colour of what a shadow sends, which nothing flies.
+const SHADOW = 0x8a93a0;
+// The last sample of a shadow that has ended stays the newest: one so much older than the flown one beside it is not shown.
+const SHADOW_LAG_S = 0.1;
 const VECTOR = ["x", "y", "z"];
 // Directions of wall estimates along the heading, in the order of the message; a wall is drawn as a frame of this size.
 const WALLS_RAD = [0, Math.PI, Math.PI / 2, -Math.PI / 2];
@@ -77,20 +81,22 @@ export class VehicleBody {
     // Beside the arrow of thrust, so that both are seen where they are equal.
     const command = arrow(0x56b4e9);
     command.position.x = 0.25 * radius;
-    hub.add(blade, thrust, command);
+    // On the other side: that of a shadow.
+    const shadow = arrow(SHADOW);
+    shadow.position.x = -0.25 * radius;
+    hub.add(blade, thrust, command, shadow);
     this.group.add(hub);
-    this.propellers.push({ blade, thrust, command, spin: rotor.spin });
+    this.propellers.push({ blade, thrust, command, shadow, spin: rotor.spin });
   }
 
   /** Finds the places of the values that it needs, among the topics of `vehicle`. */
   find(columns, vehicle = this.vehicle) {
     this.vehicle = vehicle;
-    const { state, topics, rotor_speeds: count } = this.vehicle;
+    const { state, topics, shadows, rotor_speeds: count } = this.vehicle;
     const vector = (topic, field) => columns.all(topic, VECTOR.map((axis) => `${field}.${axis}`));
     const row = (topic, field, length) => columns.all(topic, Array.from({ length }, (_, index) => `${field}[${index}]`));
     this.position = vector(state, "position");
     this.attitude = columns.all(state, ["x", "y", "z", "w"].map((part) => `attitude.${part}`));
-    this.velocity = vector(state, "velocity");
     this.speeds = count > 0 ? row(state, "rotor_speed", count) : null;
     this.commands = row(topics.command, "command", this.propellers.length);
     this.estimate = vector(topics.estimate, "position");
@@ -100,6 +106,10 @@ export class VehicleBody {
     this.inSight = row(topics.walls, "in_sight", WALLS_RAD.length);
     this.distances = row(topics.ranges, "distance", BEAMS.length);
     this.hits = row(topics.ranges, "valid", BEAMS.length);
+    this.shadowCommands = row(shadows.command?.topic, "command", this.propellers.length);
+    this.shadowEstimate = vector(shadows.estimate?.topic, "position");
+    const stamp = (topic) => columns.all(topic, ["stamp.sec", "stamp.nanosec"]);
+    this.shadowStamps = Object.fromEntries(Object.entries(shadows).map(([key, { topic, flown }]) => [key, [stamp(topic), stamp(flown)]]));
   }
 
   #marks(colour) {
@@ -118,11 +128,12 @@ export class VehicleBody {
     // Pairs of corners: the end of each side begins the next.
     const angles = Array.from({ length: 48 }, (_, index) => (Math.PI * Math.ceil(index / 2)) / 12);
     this.level = line(angles.map((angle) => new THREE.Vector3(Math.cos(angle), Math.sin(angle), 0).multiplyScalar(1.5 * this.reach)));
-    this.believed = new THREE.Mesh(
-      new THREE.OctahedronGeometry(0.25 * this.reach),
-      new THREE.MeshBasicMaterial({ color: colour, wireframe: true }),
-    );
-    this.believed.visible = false;
+    const octahedron = (paint) => {
+      const made = new THREE.Mesh(new THREE.OctahedronGeometry(0.25 * this.reach), new THREE.MeshBasicMaterial({ color: paint, wireframe: true }));
+      made.visible = false;
+      return made;
+    };
+    [this.believed, this.shadowBelieved] = [octahedron(colour), octahedron(SHADOW)];
     this.beams = new THREE.LineSegments(
       new THREE.BufferGeometry().setAttribute("position", new THREE.Float32BufferAttribute(new Float32Array(6 * BEAMS.length), 3)),
       new THREE.LineBasicMaterial({ color: 0xcc3377, transparent: true, opacity: 0.7 }),
@@ -135,7 +146,7 @@ export class VehicleBody {
     const sides = corners.flatMap((corner, index) => [corner, corners[(index + 1) % 4]]);
     this.walls = WALLS_RAD.map(() => line([...sides, corners[0], corners[2], corners[1], corners[3]]));
     this.group.add(this.beams, ...this.dots);
-    this.world.add(this.asked, this.level, this.believed, ...this.walls);
+    this.world.add(this.asked, this.level, this.believed, this.shadowBelieved, ...this.walls);
   }
 
   /** Moves to the values of `row`; `turnS` is the simulated time that passed since the last. */
@@ -153,13 +164,29 @@ export class VehicleBody {
     if (attitude?.every(Number.isFinite)) this.group.quaternion.set(...attitude).normalize();
     this.axes.visible = layers.axes ?? false;
     this.#turn(at(this.speeds), turnS, layers.thrust);
-    this.#command(at(this.commands), layers.command);
+    this.#command("command", at(this.commands), layers.command);
+    this.#shadow(row, at, layers.shadow);
     this.#measure(at(this.distances), at(this.hits), layers.beams);
     this.#ask(at(this.reference), at(this.altitude)?.[0], position, layers.asked);
     this.#sense(at(this.wallDistances), at(this.inSight), position, layers.walls);
-    const estimate = at(this.estimate);
-    this.believed.visible = Boolean(layers.estimate && estimate?.every(Number.isFinite));
-    if (this.believed.visible) this.believed.position.set(...estimate);
+    this.#believe(this.believed, at(this.estimate), layers.estimate);
+  }
+
+  /** Shows an estimate of the position. */
+  #believe(mark, estimate, isShown) {
+    mark.visible = Boolean(isShown && estimate?.every(Number.isFinite));
+    if (mark.visible) mark.position.set(...estimate);
+  }
+
+  /** Shows what shadows send beside what flies, for as long as they send it. */
+  #shadow(row, at, isShown) {
+    const seconds = (places) => (places ? row[places[0]] + 1e-9 * row[places[1]] : NaN);
+    const isAlive = (key) => {
+      const [shadow, flown] = (this.shadowStamps[key] ?? []).map(seconds);
+      return !(flown - shadow > SHADOW_LAG_S);
+    };
+    this.#command("shadow", at(this.shadowCommands), isShown && isAlive("command"));
+    this.#believe(this.shadowBelieved, at(this.shadowEstimate), isShown && isAlive("estimate"));
   }
 
   #turn(speeds, turnS, hasThrust) {
@@ -171,16 +198,16 @@ export class VehicleBody {
     });
   }
 
-  /** Shows the thrust that the motors are asked for, once they turn as fast as their commands ask. */
-  #command(commands, isShown) {
+  /** Shows the thrust that the motors are asked for, once they turn as fast as their commands ask, by the `arrows` of this name. */
+  #command(arrows, commands, isShown) {
     const map = this.vehicle.body?.command;
-    this.propellers.forEach(({ command }, index) => {
+    this.propellers.forEach((propeller, index) => {
       const asked = commands?.[index];
       const isKnown = Boolean(map) && Number.isFinite(asked);
       const share = isKnown ? (Math.min(Math.max(asked, map.min), map.max) - map.min) / (map.max - map.min) : 0;
       const isOff = !isKnown || (map.zero_is_off && asked <= 0);
       const speed = isOff ? 0 : map.speed_at_min_rad_s + share * (map.speed_at_max_rad_s - map.speed_at_min_rad_s);
-      this.#lift(command, speed, isShown);
+      this.#lift(propeller[arrows], speed, isShown);
     });
   }
 

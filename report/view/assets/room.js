@@ -5,6 +5,7 @@ import { frames } from "./api.js";
 import { VehicleBody } from "./body.js";
 import { FlatRenderer } from "./flat.js";
 import { curveColour, onTheme, pageColour } from "./palette.js";
+import { WindArrow } from "./wind.js";
 
 const PATH_POINTS = 3000;
 // Not the colour of the path, which hides it in a vehicle that follows well.
@@ -28,10 +29,12 @@ export const LAYERS = {
   plan: ["planned path", true],
   thrust: ["thrust", true],
   command: ["motor commands", true],
+  shadow: ["shadow", true],
   asked: ["set point", true],
   estimate: ["estimate", true],
   beams: ["range beams", true],
   walls: ["wall estimates", true],
+  wind: ["wind", true],
   axes: ["axes", true],
   grid: ["grid", true],
 };
@@ -47,6 +50,7 @@ export class Room {
     this.#renderer(flat);
     this.controls = new THREE.OrbitControls(this.camera, this.canvas);
     this.controls.addEventListener("change", () => (this.isStale = true));
+    this.wind = new WindArrow(document.getElementById("wind"));
     this.#lights();
     this.#solids();
     this.columns = columns;
@@ -109,7 +113,7 @@ export class Room {
       for (const vehicle of recording.vehicles) {
         this.#vehicle(vehicle, number, number > 0);
         // The measured flight is shown beside the simulated one.
-        const measured = { ...vehicle, name: `${vehicle.name} measured`.trim(), state: vehicle.topics.measured, topics: {}, rotor_speeds: 0 };
+        const measured = { ...vehicle, name: `${vehicle.name} measured`.trim(), state: vehicle.topics.measured, topics: {}, shadows: {}, wind: null, rotor_speeds: 0 };
         if (measured.state) this.#vehicle(measured, number, true);
       }
     });
@@ -353,6 +357,9 @@ export class Room {
     else this.controls.update();
     if (!this.isStale) return false;
     this.isStale = false;
+    // Of a room without vehicles there is no wind.
+    const wind = this.layers.wind ? this.vehicles[this.followed]?.vehicle.wind ?? null : null;
+    this.wind.show(wind, this.camera.quaternion);
     this.renderer.render(this.scene, this.camera);
     return true;
   }

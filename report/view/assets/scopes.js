@@ -19,6 +19,7 @@ const NEAR_PX = 5;
 const HINTS_MAX = 4;
 // A fault is a strip at the top of a plot, in which the pointer finds its text.
 const FAULT_PX = 4;
+const ROTORS_MAX = 12;
 
 /** Unit and factor of a field as people read it: angles in degrees, rotor speeds in revolutions a minute. */
 function readable({ path, unit }) {
@@ -50,15 +51,17 @@ export function defaultPlots(recordings) {
     fields.filter((field) => has(recording, topic, field)).map((field) => ({ recording: number, topic, field })));
   const vehicle = first.vehicles[0];
   if (!vehicle) return first.topics.slice(0, 3).map(({ name, fields }) => plot(name, fields.slice(0, 3).map(({ path }) => path)));
-  const { state, topics, rotor_speeds: count } = vehicle;
-  const rotors = Array.from({ length: count }, (_, index) => `rotor_speed[${index}]`);
+  const { state, topics, shadows } = vehicle;
+  const perRotor = (field) => Array.from({ length: ROTORS_MAX }, (_, index) => `${field}[${index}]`);
   const place = ["position.x", "position.y", "position.z"];
   const beams = [0, 1, 2, 3, 4].map((index) => `distance[${index}]`);
   return [
     [...plot(state, place), ...plot(topics.measured, place), ...plot(topics.status ?? topics.set_point, ["altitude_set_point", "altitude"])],
     plot(state, ["attitude.roll", "attitude.pitch", "attitude.yaw"]),
     topics.ranges ? plot(topics.ranges, beams) : plot(state, ["velocity.x", "velocity.y", "velocity.z"]),
-    plot(state, rotors),
+    plot(state, perRotor("rotor_speed")),
+    // A shadow of the controller is there to be compared: its commands beside those that flew.
+    shadows.command ? [...plot(shadows.command.flown, perRotor("command")), ...plot(shadows.command.topic, perRotor("command"))] : [],
   ].filter((fields) => fields.length > 0);
 }
 

@@ -36,6 +36,7 @@ assets! {
     "room.js": SCRIPT,
     "body.js": SCRIPT,
     "flat.js": SCRIPT,
+    "wind.js": SCRIPT,
     "scopes.js": SCRIPT,
     "picker.js": SCRIPT,
     "controls.js": SCRIPT,

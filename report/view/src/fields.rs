@@ -14,8 +14,8 @@ use std::ops::Range;
 const FIELDS_OF_TOPIC_MAX: usize = 512;
 /// Fields that are listed of all topics.
 const FIELDS_MAX: usize = 16_384;
-/// Fields of one request.
-pub const ASKED_MAX: usize = 512;
+/// Fields of one request: the room shows 54 of a vehicle with all sensors and a shadow.
+pub const ASKED_MAX: usize = 1024;
 
 /// A requested field of a topic.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize)]

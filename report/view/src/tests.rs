@@ -1,6 +1,7 @@
 //! Answers of the server compared with the messages that were written into a recording.
 
 mod live;
+mod vehicles;
 
 use crate::catalogue::{Lasting, catalogue};
 use crate::curves::{CurvesRequest, curves};
@@ -117,7 +118,7 @@ fn what_asks_for_too_much_or_for_nothing_is_refused_in_words() {
     assert!(refused(0, height()).contains("expected 1 to 8192 frames"));
     assert!(refused(1 << 40, height()).contains("expected 1 to 8192 frames"));
     assert!(refused(1, asked(&[("/no/topic", "x")])).contains("it has /pilot/set_point, /plant/state"));
-    assert!(refused(1, vec![height()[0].clone(); 513]).contains("at most 512"));
+    assert!(refused(1, vec![height()[0].clone(); 1025]).contains("at most 1024"));
     // A field that is not there is not known.
     let unknown = frames(&shown, &request(1, asked(&[("/plant/state", "position.q")]))).unwrap();
     assert!(unknown[0].is_nan());

@@ -4,7 +4,7 @@ use crate::fields::Field;
 use recorder::reader::Recording;
 use report::airframe::{Body, Paint, Part, Shape};
 use report::attached::Attached;
-use report::topics::{is_of_shadow, short_name, vehicle};
+use report::topics::{beside_shadow, is_of_shadow, short_name, vehicle};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
@@ -21,6 +21,8 @@ const SHOWN: [(&str, &str); 8] = [
     ("WallEstimate", "walls"),
     ("MotorCommand", "command"),
 ];
+/// Topics that are shown of the shadows of a vehicle's processes, by their types, and their names in the catalogue.
+const SHADOWED: [(&str, &str); 2] = [("MotorCommand", "command"), ("StateEstimate", "estimate")];
 
 /// The vehicles as the catalogue lists them, `h2` before `h10`.
 pub fn vehicles(
@@ -46,10 +48,29 @@ fn topics_of<'a>(
     fields: &'a BTreeMap<String, Vec<Field>>,
     type_name: &'a str,
 ) -> impl Iterator<Item = &'a str> {
+    all_of(recording, fields, type_name).filter(|name| !is_of_shadow(name))
+}
+
+/// The topics of a type that have messages.
+fn all_of<'a>(
+    recording: &'a Recording,
+    fields: &'a BTreeMap<String, Vec<Field>>,
+    type_name: &'a str,
+) -> impl Iterator<Item = &'a str> {
     let topics = recording.topics().iter();
     let of_type = topics.filter(move |(_, topic)| short_name(&topic.type_name) == type_name);
-    let names = of_type.map(|(name, _)| name.as_str());
-    names.filter(|name| !is_of_shadow(name) && fields.contains_key(*name))
+    of_type.map(|(name, _)| name.as_str()).filter(|name| fields.contains_key(*name))
+}
+
+/// Topics of shadows of the processes of the vehicle that is called `name`, each with the flown topic beside it.
+fn shadows(recording: &Recording, fields: &BTreeMap<String, Vec<Field>>, name: &str) -> Value {
+    let shadow_of = |type_name: &'static str| {
+        all_of(recording, fields, type_name).find_map(|shadow| {
+            let flown = beside_shadow(shadow).filter(|flown| vehicle(flown) == name)?;
+            Some(json!({ "topic": shadow, "flown": flown }))
+        })
+    };
+    SHADOWED.iter().filter_map(|(type_name, key)| Some(((*key).to_owned(), shadow_of(type_name)?))).collect()
 }
 
 fn one(
@@ -65,7 +86,17 @@ fn one(
     let topics: BTreeMap<&str, &str> =
         SHOWN.iter().filter_map(|(type_name, key)| Some((*key, topic_of(type_name)?))).collect();
     let speeds = fields[state].iter().filter(|field| field.path.starts_with("rotor_speed[")).count();
-    json!({ "name": name, "state": state, "topics": topics, "rotor_speeds": speeds, "body": body(attached, name) })
+    json!({
+        "name": name,
+        "state": state,
+        "topics": topics,
+        "shadows": shadows(recording, fields, name),
+        "rotor_speeds": speeds,
+        "body": body(attached, name),
+        "wind": attached.wind(name).map(|wind| {
+            json!({ "velocity_m_s": wind.velocity_W_m_s, "has_gusts": wind.has_gusts })
+        }),
+    })
 }
 
 /// The body of a vehicle whose file is attached; null without one.
