@@ -1,4 +1,5 @@
-// Prints as JSON how long the frames of a page of `hummingbus view` take in a browser, in milliseconds.
+// Prints as JSON how long the frames of a page of `hummingbus view` take in a browser, in milliseconds: the time from one to the
+// next, and the part of it in which the page's script computes. The rest is drawn by other threads, or by a graphics card.
 // Usage: read_frames.mjs ADDRESS SECONDS  or  read_frames.mjs ADDRESS end [slow]
 // With SECONDS it plays a recording for so long, from its start; with `end` it says `ready` once it draws, and watches a live run
 // to its end. A `slow` page draws once a second: it asks the server for as much, and leaves the cores to the run.
@@ -7,19 +8,28 @@ import { withPage } from "./browser.mjs";
 
 const [address, span, rate] = process.argv.slice(2);
 
-/** Notes when each frame begins, from now on. */
+/** Notes when each frame begins, and how long its scripts compute. */
 const note = () => {
+  const real = window.requestAnimationFrame.bind(window);
   window.noted = [];
-  const frame = (now) => {
-    window.noted.push(now);
-    requestAnimationFrame(frame);
-  };
-  requestAnimationFrame(frame);
+  window.requestAnimationFrame = (draw) => real((now) => {
+    const begin = performance.now();
+    draw(now);
+    const spent = performance.now() - begin;
+    const last = window.noted.at(-1);
+    // The scripts of one frame begin at one time.
+    if (last?.start === now) last.spent += spent;
+    else window.noted.push({ start: now, spent });
+  });
 };
 
 const drawSeldom = () => {
   window.requestAnimationFrame = (draw) => setTimeout(() => draw(performance.now()), 1000);
 };
+
+/** These functions, one after the other, as a script of the page. */
+const script = (...parts) => parts.map((part) => `(${part})();`).join("\n");
+
 
 const seen = await withPage(address, async (page, wrong) => {
   await page.setViewport({ width: 1280, height: 900 });
@@ -31,21 +41,31 @@ const seen = await withPage(address, async (page, wrong) => {
     });
     await page.waitForFunction(() => window.hummingbus.shown.timeNs > 0);
   }
-  const drawn = await page.evaluate(() => window.hummingbus.shown.frames);
-  await page.evaluate(note);
+  const drawn = await page.evaluate(() => {
+    window.noted.length = 0;
+    return window.hummingbus.shown.frames;
+  });
   if (span === "end") {
     console.log("ready");
     await page.waitForFunction(() => window.hummingbus.run.status?.state === "ended", { polling: 50 });
   } else await new Promise((resolve) => setTimeout(resolve, Number(span) * 1000));
   const found = await page.evaluate(() => ({
-    starts: window.noted,
+    noted: window.noted,
+    isPlaying: window.hummingbus.playback.isPlaying,
     drawn: window.hummingbus.shown.frames,
     vehicles: window.hummingbus.shown.vehicles.length,
     isFlat: window.hummingbus.shown.isFlat,
   }));
   return { ...found, drawn: found.drawn - drawn, wrong };
-}, { before: rate === "slow" ? drawSeldom : undefined });
-const times = seen.starts.slice(1).map((start, index) => start - seen.starts[index]).sort((a, b) => a - b);
-const quantile = (part) => times[Math.min(Math.floor(part * times.length), times.length - 1)] ?? null;
-const { starts, ...rest } = seen;
-console.log(JSON.stringify({ ...rest, frames: times.length, p50: quantile(0.5), p95: quantile(0.95), p99: quantile(0.99), max: quantile(1) }));
+}, { before: rate === "slow" ? script(drawSeldom, note) : script(note) });
+
+/** Quantiles of some times. */
+function quantiles(times) {
+  const sorted = times.toSorted((a, b) => a - b);
+  const at = (part) => sorted[Math.min(Math.floor(part * sorted.length), sorted.length - 1)] ?? null;
+  return { p50: at(0.5), p95: at(0.95), p99: at(0.99), max: at(1) };
+}
+
+const { noted, ...rest } = seen;
+const times = noted.slice(1).map(({ start }, index) => start - noted[index].start);
+console.log(JSON.stringify({ ...rest, frames: times.length, ...quantiles(times), script: quantiles(noted.map(({ spent }) => spent)) }));

@@ -10,7 +10,7 @@ use recorder::writer::{ChannelId, RecordingWriter};
 use serde_json::{Value, json};
 use std::ffi::OsStr;
 use std::fs;
-use std::io::{BufRead as _, BufReader};
+use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -261,6 +261,35 @@ fn a_browser_shows_names_that_look_like_html_as_they_are_and_says_that_the_serve
     assert_eq!(seen["plots"][0][0]["topic"], format!("/{name}/plant/state"));
     // At the end of the server the page says what to do.
     assert!(seen["lost"].as_str().unwrap().contains("Start it again"), "{}", seen["lost"]);
+}
+
+/// A frame at 60 a second.
+const FRAME_MS: f64 = 1000.0 / 60.0;
+
+/// The time from frame to frame is that of the machine: without a graphics card, Chromium draws by the processor, and other tests run
+/// beside it. The script's part of a frame is the page's own, and leaves the rest of a frame to the drawing.
+#[test]
+fn the_script_of_the_page_leaves_time_for_sixty_frames_a_second_of_ten_vehicles() {
+    let Some(readers) = readers() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let recording = folder.path().join("ten.mcap");
+    let mut run = Command::new(HUMMINGBUS);
+    run.arg("run").arg(Path::new(ROOT).join("manifests/ten-vehicles.toml")).arg("--record").arg(&recording);
+    // Its conditions do not matter: it is cut short.
+    let ended = run.args(["--set", "run.duration_s=8"]).output().unwrap();
+    assert!(matches!(ended.status.code(), Some(0 | 1)), "{}", String::from_utf8_lossy(&ended.stderr));
+    let view = View::of(&[&recording]);
+    let seen = look(&readers, "read_frames.mjs", &[view.address.as_ref(), "3".as_ref()]);
+    // Not `println!`, which the test runner hides.
+    writeln!(std::io::stderr(), "frames of ten vehicles, ms: {seen}").unwrap();
+    assert_eq!(
+        (&seen["vehicles"], &seen["isPlaying"], &seen["isFlat"], &seen["wrong"]),
+        (&json!(10), &json!(true), &json!(false), &json!([]))
+    );
+    // Each frame is drawn: the room moves all the time.
+    let [frames, drawn] = ["frames", "drawn"].map(|key| seen[key].as_u64().unwrap());
+    assert!(frames > 10 && drawn * 10 >= frames * 9, "{seen}");
+    assert!(seen["script"]["p50"].as_f64().unwrap() < FRAME_MS, "{seen}");
 }
 
 /// The page goes on with the newest second, and has the whole flight when the run has ended.
