@@ -42,7 +42,7 @@ use tempfile::TempDir;
 const HUMMINGBUS: &str = env!("CARGO_BIN_EXE_hummingbus");
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 /// Optional outputs of standard messages.
-const STANDARD: [&str; 8] = [
+const STANDARD: [&str; 9] = [
     "plant.odometry",
     "plant.actuators",
     "imu.data_raw",
@@ -51,6 +51,7 @@ const STANDARD: [&str; 8] = [
     "range.left",
     "range.right",
     "range.down",
+    "range.scan",
 ];
 const VEHICLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/vehicles/hummingbird.toml");
 
@@ -91,8 +92,8 @@ fn others_decode_the_frames_and_standard_messages_of_ten_vehicles() {
     let frames = ["transforms[0].child_frame_id\":\"v9/body", "\"child_frame_id\":\"v9/body"];
     let headers = ["body", "range/front", "range/back", "range/down"];
     let headers = headers.map(|frame| format!("\"header.frame_id\":\"v9/{frame}\""));
-    let command = "\"topic\":\"/v9/plant/actuators\"";
-    for part in frames.into_iter().chain(headers.iter().map(String::as_str)).chain([command]) {
+    let topics = ["\"topic\":\"/v9/plant/actuators\"", "\"topic\":\"/v9/range/scan\""];
+    for part in frames.into_iter().chain(headers.iter().map(String::as_str)).chain(topics) {
         assert!(text.contains(part), "no {part}");
     }
     for script in ["read_mcap_ros2.py", "read_rosbags.py", "read_foxglove.mjs"] {

@@ -156,7 +156,7 @@ mod tests {
 
     #[test]
     fn the_numbers_behind_a_name_are_looked_at_wherever_they_begin() {
-        use crate::messages::{BodyTransform, FrameName, Orientation, Point, StandardRange};
+        use crate::messages::{BodyTransform, FrameName, LaserScan, Orientation, Point, StandardRange};
         let level = Orientation { w: 1.0, ..Orientation::default() };
         for name in ["b", "seven77", "eight888", "h1/body"] {
             let at = |z: f64| {
@@ -170,6 +170,12 @@ mod tests {
             };
             assert_eq!(singles(1.0), None);
             assert_eq!(singles(f32::INFINITY), Some(("beam".to_owned(), f64::INFINITY)), "{name}");
+            let scan = |range: f32| {
+                let frame = FrameName::new(name).unwrap();
+                found(&LaserScan::new(&frame, 0.1, [0.2, 7.0], [1.0, 1.0, 1.0, range]))
+            };
+            assert_eq!(scan(1.0), None, "counts are no numbers that could be infinite");
+            assert_eq!(scan(f32::INFINITY), Some(("scan".to_owned(), f64::INFINITY)), "{name}");
         }
     }
 

@@ -22,7 +22,7 @@ pub use sensing::{
     Barometer, Battery, BodyStates, Clearance, Contact, Gps, Innovation, Magnetometer, Mocap, Ranges,
     RotorSpeeds, StateEstimate, Traffic, WallEstimate,
 };
-pub use standard::{Actuators, Odometry, StandardImu, StandardRange};
+pub use standard::{Actuators, LaserScan, Odometry, StandardImu, StandardRange};
 pub use transform::{BodyTransform, FRAME_BYTES_MAX, FrameName, body_frame};
 
 /// The most rotors that a vehicle has.

@@ -474,8 +474,8 @@ mod tests {
     use super::{Definition, Value, is_padding};
     use bus::Message;
     use bus::messages::{
-        BodyTransform, FrameName, MotorCommand, Odometry, Orientation, Point, PoseStamped, StandardImu,
-        StandardRange, Time, Vector3,
+        BodyTransform, FrameName, LaserScan, MotorCommand, Odometry, Orientation, Point, PoseStamped,
+        StandardImu, StandardRange, Time, Vector3,
     };
     use std::collections::BTreeMap;
 
@@ -542,6 +542,10 @@ mod tests {
             assert_eq!(range["radiation_type"], Value::Integer(1));
             assert_eq!(range["range"], Value::Float(1.5));
             assert_eq!((&range["variance"], range.len()), (&Value::Float(0.125), 9));
+            let scan = decoded(&LaserScan::new(&frame, 0.5, [0.25, 7.5], [7.0, 4.0, 3.0, 15.0]));
+            assert_eq!(scan["header.frame_id"], Value::Text(name.to_owned()));
+            assert_eq!((&scan["ranges[3]"], &scan["range_max"]), (&Value::Float(15.0), &Value::Float(7.5)));
+            assert_eq!((&scan["scan_time"], scan.len()), (&Value::Float(0.5), 3 + 7 + 4));
         }
     }
 

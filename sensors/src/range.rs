@@ -10,13 +10,13 @@
 
 use crate::channel::{Chance, ChannelState, Remembered};
 use crate::cone::{Cone, caster, check_bodies, check_told};
-use crate::frame::frame;
+use crate::frame::{body_frame_of, frame};
 use crate::sensing::Sensor;
 use crate::steps::in_steps;
 use crate::wire::{attitude, body_poses, vector};
 use bus::component::{Info, StepError};
 use bus::context::NodeContext;
-use bus::messages::{BodyStates, FrameName, PlantState, Ranges, StandardRange, Traffic};
+use bus::messages::{BodyStates, FrameName, LaserScan, PlantState, Ranges, StandardRange, Traffic};
 use bus::random::normal;
 use bus::{InputPorts, OutputPorts};
 use diagnostics::parameter::{ParameterError, finite, not_negative, positive, require, within};
@@ -30,7 +30,10 @@ const BEAMS: usize = 5;
 /// Outputs of the beams, in the order of `Ranges`.
 const BEAM_OUTPUTS: [&str; BEAMS] = ["front", "back", "left", "right", "down"];
 
-/// Reading of a beam without a measurement in `sensor_msgs/Range`, in reaches: readers discard what is beyond the reach. The
+/// The beams of a `sensor_msgs/LaserScan`, counter-clockwise from −y on.
+const SCANNED: [usize; LaserScan::RAYS] = [3, 0, 2, 1];
+
+/// Reading of a beam without a measurement in standard messages, in reaches: readers discard what is beyond the reach. The
 /// infinity of REP 117 would end the run. Tuned, no source.
 const NOTHING_REACHES: f64 = 2.0;
 
@@ -98,6 +101,8 @@ pub struct RangeFinders {
     scene: RayCaster,
     /// Frames of the beams, of those whose names are not too long.
     frames: [Option<FrameName>; BEAMS],
+    /// Frame of the body, unless its name is too long.
+    body: Option<FrameName>,
 }
 
 impl RangeFinders {
@@ -105,13 +110,26 @@ impl RangeFinders {
     fn standard(&self, beam: usize, ranges: &Ranges) -> Option<StandardRange> {
         let frame = self.frames[beam]?;
         let RangeParams { noise_m, reach_m, nearest_m, half_angle_deg, .. } = self.params;
-        let range_m = match ranges.valid[beam] {
-            0 => NOTHING_REACHES * reach_m,
-            _ => ranges.distance[beam],
-        };
+        let range_m = self.standard_m(beam, ranges);
         let field_of_view_rad = 2.0 * half_angle_deg.to_radians();
         let numbers = [field_of_view_rad, nearest_m, reach_m, range_m, noise_m * noise_m];
         Some(StandardRange::new(&frame, StandardRange::ULTRASOUND, numbers.map(|number| number as f32)))
+    }
+
+    /// The readings of the level beams in `ranges` as a scan.
+    fn scan(&self, ranges: &Ranges) -> Option<LaserScan> {
+        let RangeParams { rate_hz, reach_m, nearest_m, .. } = self.params;
+        let bounds_m = [nearest_m, reach_m].map(|bound_m| bound_m as f32);
+        let ranges_m = SCANNED.map(|beam| self.standard_m(beam, ranges) as f32);
+        Some(LaserScan::new(&self.body?, (1.0 / rate_hz) as f32, bounds_m, ranges_m))
+    }
+
+    /// The reading of a beam in `ranges` in a standard message.
+    fn standard_m(&self, beam: usize, ranges: &Ranges) -> f64 {
+        match ranges.valid[beam] {
+            0 => NOTHING_REACHES * self.params.reach_m,
+            _ => ranges.distance[beam],
+        }
     }
 
     /// Returns the distance to the first object that each beam meets within its reach, m.
@@ -183,7 +201,8 @@ impl Remembered for RangeState {
     }
 }
 
-/// Outputs of the sensor. The standard messages have a frame for each beam, `NODE/OUTPUT`, whose x axis is the beam.
+/// Outputs of the sensor. The messages of single beams have a frame for each beam, `NODE/OUTPUT`, whose x axis is the beam. The scan
+/// is in the frame of the body.
 #[derive(Debug, OutputPorts)]
 pub struct Outputs {
     /// The measurement that arrived last.
@@ -198,11 +217,13 @@ pub struct Outputs {
     pub right: Option<StandardRange>,
     /// The beam along −z as `sensor_msgs/Range`.
     pub down: Option<StandardRange>,
+    /// The beams along −y, +x, +y and −x as `sensor_msgs/LaserScan`.
+    pub scan: Option<LaserScan>,
 }
 
 impl From<Ranges> for Outputs {
     fn from(ranges: Ranges) -> Self {
-        Self { ranges, front: None, back: None, left: None, right: None, down: None }
+        Self { ranges, front: None, back: None, left: None, right: None, down: None, scan: None }
     }
 }
 
@@ -231,7 +252,7 @@ impl Sensor for RangeFinders {
         let (x, y, z) = (Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis());
         let half_angle_rad = params.half_angle_deg.to_radians();
         let cones = [x, -x, y, -y, -z].map(|axis_B| Cone::new(axis_B, half_angle_rad));
-        Ok(Self { params, cones, scene, frames: [None; BEAMS] })
+        Ok(Self { params, cones, scene, frames: [None; BEAMS], body: None })
     }
 
     fn in_run(mut self, run: &NodeContext<'_>) -> Result<Self, ParameterError> {
@@ -239,12 +260,13 @@ impl Sensor for RangeFinders {
         for (place, output) in self.frames.iter_mut().zip(BEAM_OUTPUTS) {
             *place = frame(run, output, &format!("{}/{output}", run.name))?;
         }
+        self.body = frame(run, "scan", &body_frame_of(run.name))?;
         Ok(self)
     }
 
     fn outputs(&self, ranges: Ranges) -> Outputs {
         let [front, back, left, right, down] = std::array::from_fn(|beam| self.standard(beam, &ranges));
-        Outputs { front, back, left, right, down, ..ranges.into() }
+        Outputs { front, back, left, right, down, scan: self.scan(&ranges), ranges }
     }
 
     fn check_inputs(&self, inputs: &RangeInputs<'_>) -> Result<(), StepError> {
@@ -382,7 +404,7 @@ mod tests {
         let truth = at([-4.0, 2.0, 1.5], 0.0, 0.0, 0.0);
         let mut finders = harness::<RangeFinders>(in_room(params), 100);
         let inputs = RangeInputs { state: &truth, traffic: None, bodies: None };
-        let Outputs { ranges, front, back, left, right, down } = finders.step(inputs).unwrap();
+        let Outputs { ranges, front, back, left, right, down, scan } = finders.step(inputs).unwrap();
         let beams = [front, back, left, right, down].map(Option::unwrap);
         for (beam, message) in beams.iter().enumerate() {
             let frame = format!("range/{}\0", BEAM_OUTPUTS[beam]);
@@ -393,6 +415,11 @@ mod tests {
             assert_eq!(message.numbers(), expected.map(|number| number as f32));
         }
         assert_eq!(ranges.valid, [0, 1, 1, 1, 1]);
+        // From the right on, counter-clockwise.
+        let scan = scan.unwrap();
+        assert!(bytemuck::bytes_of(&scan).windows(8).any(|bytes| bytes == b"hb_body\0"), "{scan:?}");
+        let [_, back_m, left_m, right_m, _] = ranges.distance;
+        assert_eq!(scan.ranges(), [right_m, 15.3, left_m, back_m].map(|range_m| range_m as f32));
     }
 
     #[test]

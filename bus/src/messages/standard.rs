@@ -4,6 +4,7 @@
 use super::{FRAME_BYTES_MAX, FrameName, MapFrame, Orientation, PerRotor, Point, Time, Vector3};
 use crate::Message;
 use crate::schema::{FieldType, Kind, NAME_START, Numbers, Primitive};
+use std::f32::consts::{FRAC_PI_2, PI};
 use std::mem::offset_of;
 
 /// Room for a frame's name. It ends at a multiple of 8 bytes, as names begin 4 bytes behind one.
@@ -14,6 +15,10 @@ const IMU_NUMBERS: Numbers = Numbers::doubles(4 + 9 + 3 + 9 + 3 + 9);
 const ODOMETRY_NUMBERS: Numbers = Numbers::doubles(7 + 36 + 6 + 36);
 /// The type of radiation, then five singles.
 const RANGE_NUMBERS: Numbers = Numbers { leading_bytes: 1, primitive: Primitive::F32, count: 5 };
+
+/// Seven singles, the count of the ranges, the ranges, and the count of the intensities: all of 4 bytes.
+const SCAN_NUMBERS: Numbers =
+    Numbers { leading_bytes: 0, primitive: Primitive::F32, count: 7 + 1 + LaserScan::RAYS + 1 };
 
 /// Declares a string and the numbers behind it, laid out as CDR writes them.
 macro_rules! named_numbers {
@@ -52,6 +57,7 @@ macro_rules! named_numbers {
 named_numbers!(NamedReading, IMU_NUMBERS);
 named_numbers!(NamedMotion, ODOMETRY_NUMBERS);
 named_numbers!(NamedBeam, RANGE_NUMBERS);
+named_numbers!(NamedScan, SCAN_NUMBERS);
 
 /// Place of the first number behind `behind` bytes of a name and what follows it, counted from the start of the name.
 fn start<T>(behind: usize) -> usize {
@@ -73,6 +79,7 @@ const _: () = assert!(
     offset_of!(StandardImu, reading).is_multiple_of(8)
         && offset_of!(Odometry, motion).is_multiple_of(8)
         && offset_of!(StandardRange, beam).is_multiple_of(8)
+        && offset_of!(LaserScan, scan).is_multiple_of(8)
         && (NAME_START + NAME_ROOM).is_multiple_of(8)
 );
 
@@ -332,6 +339,76 @@ impl StandardRange {
     }
 }
 
+/// Readings of four rays in a plane, byte-identical to a ROS 2 `sensor_msgs/msg/LaserScan` without intensities.
+///
+/// ```
+/// use bus::messages::{FrameName, LaserScan};
+///
+/// let scan = LaserScan::new(&FrameName::new("h1/body").unwrap(), 0.1, [0.2, 7.65], [7.0, 4.0, 3.0, 6.0]);
+/// assert_eq!(scan.ranges(), [7.0, 4.0, 3.0, 6.0]);
+/// ```
+#[derive(Clone, Copy, Debug, Message)]
+#[repr(C)]
+#[message(
+    type_name = "sensor_msgs/msg/LaserScan",
+    definition = "\
+std_msgs/Header header
+float32 angle_min  # [rad]
+float32 angle_max  # [rad]
+float32 angle_increment  # [rad]
+float32 time_increment  # [s]
+float32 scan_time  # [s]
+float32 range_min  # [m]
+float32 range_max  # [m]
+float32[] ranges  # [m]
+float32[] intensities
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+"
+)]
+pub struct LaserScan {
+    /// Simulation time.
+    pub stamp: Time,
+    /// Frame of the scan, its angles, times and bounds, the ranges with their count, the count of no intensities.
+    #[field(unit = "1")]
+    scan: NamedScan,
+}
+
+impl LaserScan {
+    /// Number of rays, a quarter of a turn apart.
+    pub const RAYS: usize = 4;
+    /// Angles of the first and of the last ray about the z axis of the frame, and between two rays.
+    const ANGLES_RAD: [f32; 3] = [-FRAC_PI_2, PI, FRAC_PI_2];
+
+    /// The readings `ranges_m` of rays along −y, +x, +y and −x of `frame`, which are measured together each `scan_time_s`. Readers
+    /// discard ranges outside of `bounds_m`.
+    #[must_use]
+    pub fn new(frame: &FrameName, scan_time_s: f32, bounds_m: [f32; 2], ranges_m: [f32; Self::RAYS]) -> Self {
+        // As words: the counts are integers.
+        let mut words = [0; SCAN_NUMBERS.count];
+        let (singles, rest) = words.split_at_mut(7);
+        let (count, rest) = rest.split_at_mut(1);
+        let numbers = Self::ANGLES_RAD.into_iter().chain([0.0, scan_time_s]).chain(bounds_m);
+        singles.iter_mut().zip(numbers).for_each(|(word, number)| *word = number.to_bits());
+        count[0] = Self::RAYS as u32;
+        rest.iter_mut().zip(ranges_m).for_each(|(word, range)| *word = range.to_bits());
+        Self { stamp: Time::default(), scan: NamedScan::new(frame, &[], &words) }
+    }
+
+    /// Its ranges, in m.
+    #[must_use]
+    pub fn ranges(&self) -> [f32; Self::RAYS] {
+        let words: [u32; SCAN_NUMBERS.count] = self.scan.numbers();
+        std::array::from_fn(|ray| f32::from_bits(words[8 + ray]))
+    }
+}
+
 /// The empty string, laid out as CDR writes it in front of a number of 4 bytes.
 #[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
@@ -475,6 +552,24 @@ mod tests {
             cdr.extend(numbers.iter().flat_map(|number| number.to_le_bytes()));
             require(StandardRange::SCHEMA, bytemuck::bytes_of(&range), &cdr);
             assert_eq!(range.numbers(), numbers);
+        }
+    }
+
+    #[test]
+    fn a_scan_has_the_bytes_of_its_cdr_for_names_of_every_length() {
+        let ranges = [7.0, 4.0, 3.0, 15.3_f32];
+        let numbers = [-FRAC_PI_2, PI, FRAC_PI_2, 0.0, 0.1, 0.2, 7.65];
+        for (name, frame) in frames() {
+            let scan = LaserScan::new(&frame, 0.1, [0.2, 7.65], ranges);
+            let mut cdr = stamped(&[&name]);
+            cdr.resize(cdr.len().next_multiple_of(4), 0);
+            cdr.extend(numbers.iter().flat_map(|number| number.to_le_bytes()));
+            cdr.extend(4_u32.to_le_bytes());
+            cdr.extend(ranges.iter().flat_map(|range| range.to_le_bytes()));
+            // No intensities.
+            cdr.extend([0; 4]);
+            require(LaserScan::SCHEMA, bytemuck::bytes_of(&scan), &cdr);
+            assert_eq!(scan.ranges(), ranges);
         }
     }
 
