@@ -281,7 +281,7 @@ fn the_script_of_the_page_leaves_time_for_sixty_frames_a_second_of_ten_vehicles(
     let view = View::of(&[&recording]);
     let seen = look(&readers, "read_frames.mjs", &[view.address.as_ref(), "3".as_ref()]);
     // Not `println!`, which the test runner hides.
-    writeln!(std::io::stderr(), "frames of ten vehicles, ms: {seen}").unwrap();
+    std::io::stderr().write_all(format!("frames of ten vehicles, ms: {seen}\n").as_bytes()).unwrap();
     assert_eq!(
         (&seen["vehicles"], &seen["isPlaying"], &seen["isFlat"], &seen["wrong"]),
         (&json!(10), &json!(true), &json!(false), &json!([]))
