@@ -1,5 +1,6 @@
 // Prints as JSON how long the frames of a page of `hummingbus view` take in a browser, in milliseconds: the time from one to the
-// next, and the part of it in which the page's script computes. The rest is drawn by other threads, or by a graphics card.
+// next, the time until its scripts have ended, and the processor's time of the page's own thread per frame. The rest is drawn by
+// other threads, or by a graphics card.
 // Usage: read_frames.mjs ADDRESS SECONDS  or  read_frames.mjs ADDRESS end [slow]
 // With SECONDS it plays a recording for so long, from its start; with `end` it says `ready` once it draws, and watches a live run
 // to its end. A `slow` page draws once a second: it asks the server for as much, and leaves the cores to the run.
@@ -41,6 +42,10 @@ const seen = await withPage(address, async (page, wrong) => {
     });
     await page.waitForFunction(() => window.hummingbus.shown.timeNs > 0);
   }
+  const client = await page.createCDPSession();
+  await client.send("Performance.enable", { timeDomain: "threadTicks" });
+  const busyMs = async () => 1000 * (await client.send("Performance.getMetrics")).metrics.find(({ name }) => name === "TaskDuration").value;
+  const busyBefore = await busyMs();
   const drawn = await page.evaluate(() => {
     window.noted.length = 0;
     return window.hummingbus.shown.frames;
@@ -56,14 +61,14 @@ const seen = await withPage(address, async (page, wrong) => {
     vehicles: window.hummingbus.shown.vehicles.length,
     isFlat: window.hummingbus.shown.isFlat,
   }));
-  return { ...found, drawn: found.drawn - drawn, wrong };
+  return { ...found, drawn: found.drawn - drawn, cpu: ((await busyMs()) - busyBefore) / found.noted.length, wrong };
 }, { before: rate === "slow" ? script(drawSeldom, note) : script(note) });
 
 /** Quantiles of some times. */
 function quantiles(times) {
   const sorted = times.toSorted((a, b) => a - b);
   const at = (part) => sorted[Math.min(Math.floor(part * sorted.length), sorted.length - 1)] ?? null;
-  return { p50: at(0.5), p95: at(0.95), p99: at(0.99), max: at(1) };
+  return { min: at(0), p50: at(0.5), p95: at(0.95), p99: at(0.99), max: at(1) };
 }
 
 const { noted, ...rest } = seen;

@@ -178,11 +178,13 @@ function arrowsShown() {
 /** The wind in the corner, seen along x of the world: its text, and its arrow across and up. */
 function windShown() {
   const { room } = window.hummingbus;
+  const before = room.camera.position.clone();
   room.setMode("free");
   room.camera.position.copy(room.controls.target).add({ x: -5, y: 0, z: 0 });
   room.draw();
   const place = document.getElementById("wind");
   const shown = { text: place.hidden ? null : place.textContent.trim(), seen: room.wind.seen, line: place.querySelector("path").getAttribute("d") };
+  room.camera.position.copy(before);
   room.setMode("follow");
   return shown;
 }
