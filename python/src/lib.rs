@@ -4,6 +4,7 @@
 mod error;
 mod message;
 mod node;
+mod places;
 mod recording;
 mod simulation;
 

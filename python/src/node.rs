@@ -2,15 +2,11 @@
 
 use crate::error::raised;
 use crate::message::declared;
+use crate::places::{Arrays, Places};
 use bus::BusError;
 use bus::dynamic::{DynamicNode, DynamicTick};
-use pyo3::ffi;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyMemoryView, PyString, PyTuple};
-
-/// `PyBUF_READ` and `PyBUF_WRITE` of Python's header, part of its stable interface.
-const READ_ONLY: std::ffi::c_int = 0x100;
-const WRITABLE: std::ffi::c_int = 0x200;
+use pyo3::types::{PyDict, PyString};
 
 /// A node of a run, before its first tick; `hummingbus/_nodes.py` has what people use.
 #[pyclass(unsendable)]
@@ -23,10 +19,10 @@ pub struct Node {
 
 /// A declared port.
 struct Port {
+    /// Interned, as the names of a function's parameters are: Python finds the parameter by its address.
     name: Py<PyString>,
     number: usize,
-    /// Type of numpy of its messages.
-    dtype: Py<PyAny>,
+    places: Places,
 }
 
 /// The state of a node, in memory of the bus.
@@ -93,7 +89,7 @@ impl Node {
         let node = self.declaring()?;
         let schema = declared(message, false).map_err(|reason| raised(node.error(reason)))?;
         let number = node.input(port, schema).map_err(raised)?;
-        self.inputs.push(Port { name: PyString::new(py, port).unbind(), number, dtype });
+        self.inputs.push(Port::new(py, port, number, Places::new(dtype, false)));
         Ok(())
     }
 
@@ -102,7 +98,7 @@ impl Node {
         let node = self.declaring()?;
         let schema = declared(message, false).map_err(|reason| raised(node.error(reason)))?;
         let number = node.output(port, schema).map_err(raised)?;
-        self.outputs.push(Port { name: PyString::new(py, port).unbind(), number, dtype });
+        self.outputs.push(Port::new(py, port, number, Places::new(dtype, true)));
         Ok(())
     }
 
@@ -125,7 +121,7 @@ impl Node {
         drop(declared);
         let ended = py.detach(|| {
             // What the closure holds is used by this thread alone.
-            let caller = caller;
+            let mut caller = caller;
             node.run(|tick| Python::attach(|py| caller.call(py, tick)))
         });
         match ended {
@@ -146,85 +142,78 @@ impl Node {
     }
 }
 
+impl Port {
+    fn new(py: Python<'_>, name: &str, number: usize, places: Places) -> Self {
+        Self { name: PyString::intern(py, name).unbind(), number, places }
+    }
+
+    /// The error of a step that has kept a view of the message.
+    fn kept(&self) -> String {
+        let port = &self.name;
+        format!(
+            "the step has kept a view of `{port}`, whose memory is another message's at the next tick; keep a copy: \
+             {port}.copy(), float({port}[\"field\"])"
+        )
+    }
+}
+
 /// Steps of a Python function.
 struct Caller {
     step: Py<PyAny>,
     inputs: Vec<Port>,
     outputs: Vec<Port>,
-    /// Array of the state, which stays where it is.
-    state: Option<Py<PyAny>>,
-    ndarray: Py<PyAny>,
-    /// `()`: the shape of a message. As an array of no dimension its fields are read 20 times as fast as those of a record.
-    no_dimension: Py<PyTuple>,
+    /// Arguments of the step by their names; the state, which stays where it is, is one of them.
+    messages: Py<PyDict>,
+    arrays: Arrays,
     format_exception: Py<PyAny>,
 }
 
 impl Caller {
     fn new(py: Python<'_>, node: &mut Node, step: Py<PyAny>) -> PyResult<Self> {
-        let mut caller = Self {
+        let (arrays, messages) = (Arrays::new(py)?, PyDict::new(py));
+        if let Some(State { memory, size, dtype }) = node.state.take() {
+            // SAFETY: this memory stays as long as the process lives; the bus changes it between steps only.
+            let (_, state) = unsafe { arrays.over(py, memory, size, true, &dtype) }?;
+            messages.set_item(PyString::intern(py, "state"), state)?;
+        }
+        Ok(Self {
             step,
             inputs: std::mem::take(&mut node.inputs),
             outputs: std::mem::take(&mut node.outputs),
-            state: None,
-            ndarray: py.import("numpy")?.getattr("ndarray")?.unbind(),
-            no_dimension: PyTuple::empty(py).unbind(),
+            messages: messages.unbind(),
+            arrays,
             format_exception: py.import("traceback")?.getattr("format_exception")?.unbind(),
-        };
-        if let Some(State { memory, size, dtype }) = node.state.take() {
-            // SAFETY: this memory stays as long as the process lives; the bus changes it between steps only.
-            let view = unsafe { memory_view(py, memory, size, true) }?;
-            caller.state = Some(caller.message(py, &view, &dtype)?.unbind());
-        }
-        Ok(caller)
-    }
-
-    /// The message in `view` as an array of numpy.
-    fn message<'py>(
-        &self,
-        py: Python<'py>,
-        view: &Bound<'py, PyMemoryView>,
-        dtype: &Py<PyAny>,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        self.ndarray.bind(py).call1((&self.no_dimension, dtype, view))
+        })
     }
 
     /// Calls the step with the messages of `tick`.
-    fn call(&self, py: Python<'_>, tick: &mut DynamicTick<'_, '_>) -> Result<(), String> {
-        let mut views = Vec::with_capacity(self.inputs.len() + self.outputs.len());
-        let called = self.call_with_views(py, tick, &mut views);
-        called.map_err(|error| self.told(py, &error))?;
-        views.iter().try_for_each(|(port, view)| released(port, view))
+    fn call(&mut self, py: Python<'_>, tick: &mut DynamicTick<'_, '_>) -> Result<(), String> {
+        self.call_with_messages(py, tick).map_err(|error| self.told(py, &error))?;
+        let mut ports = self.inputs.iter().chain(&self.outputs);
+        ports.find(|port| port.places.is_kept(py)).map_or(Ok(()), |port| Err(port.kept()))
     }
 
-    fn call_with_views<'py>(
-        &self,
-        py: Python<'py>,
-        tick: &mut DynamicTick<'_, '_>,
-        views: &mut Vec<(Py<PyString>, Bound<'py, PyMemoryView>)>,
-    ) -> PyResult<()> {
-        let messages = PyDict::new(py);
-        for Port { name, number, dtype } in &self.inputs {
+    fn call_with_messages(&mut self, py: Python<'_>, tick: &mut DynamicTick<'_, '_>) -> PyResult<()> {
+        let messages = self.messages.bind(py);
+        for Port { name, number, places } in &mut self.inputs {
             let bytes = tick.input(*number).map_err(raised)?;
-            // SAFETY: the message lies there until the step ends, and `released` ends the run where a view outlives that; what
+            // SAFETY: the message lies there until the step ends, and `is_kept` ends the run where a view outlives that; what
             // such a run has mapped stays as long as the process lives.
-            let view = unsafe { memory_view(py, bytes.as_ptr().cast_mut(), bytes.len(), false) }?;
-            messages.set_item(name, self.message(py, &view, dtype)?)?;
-            views.push((name.clone_ref(py), view));
+            let message =
+                unsafe { places.message(py, &self.arrays, bytes.as_ptr().cast_mut(), bytes.len()) }?;
+            messages.set_item(&*name, message)?;
         }
-        for Port { name, number, dtype } in &self.outputs {
+        for Port { name, number, places } in &mut self.outputs {
             let Some(bytes) = tick.output(*number).map_err(raised)? else {
-                messages.set_item(name, py.None())?;
+                places.skip();
+                messages.set_item(&*name, py.None())?;
                 continue;
             };
             // SAFETY: as above; nobody else reads or writes the message before it is sent.
-            let view = unsafe { memory_view(py, bytes.as_mut_ptr(), bytes.len(), true) }?;
-            messages.set_item(name, self.message(py, &view, dtype)?)?;
-            views.push((name.clone_ref(py), view));
+            let message = unsafe { places.message(py, &self.arrays, bytes.as_mut_ptr(), bytes.len()) }?;
+            messages.set_item(&*name, message)?;
         }
-        if let Some(state) = &self.state {
-            messages.set_item("state", state)?;
-        }
-        self.step.bind(py).call((tick.number(),), Some(&messages))?;
+        self.step.bind(py).call((tick.number(),), Some(messages))?;
         Ok(())
     }
 
@@ -236,36 +225,4 @@ impl Caller {
         let last = lines.last().map_or_else(|| error.to_string(), |line| line.trim_end().to_owned());
         format!("{last}\n{}", lines.concat().trim_end())
     }
-}
-
-/// Lets go of a message, of which the step may have kept no view: its memory is the next sample's. Each array on it refers to
-/// `view` (numpy does not hold the buffer of it).
-fn released(port: &Py<PyString>, view: &Bound<'_, PyMemoryView>) -> Result<(), String> {
-    // SAFETY: the object lives, and this thread is attached to the interpreter.
-    let references = unsafe { ffi::Py_REFCNT(view.as_ptr()) };
-    if references == 1 {
-        return Ok(());
-    }
-    Err(format!(
-        "the step has kept a view of `{port}`, whose memory is another message's at the next tick; keep a copy: \
-         {port}.copy(), float({port}[\"field\"])"
-    ))
-}
-
-/// A view of `size` bytes at `start`.
-///
-/// # Safety
-/// The memory is there, and nobody else changes it, as long as the view or what is made of it lives.
-unsafe fn memory_view(
-    py: Python<'_>,
-    start: *mut u8,
-    size: usize,
-    is_writable: bool,
-) -> PyResult<Bound<'_, PyMemoryView>> {
-    let flags = if is_writable { WRITABLE } else { READ_ONLY };
-    let size = isize::try_from(size).map_err(raised)?;
-    // SAFETY: the caller's promise; the call returns a new reference or an error.
-    let view =
-        unsafe { Bound::from_owned_ptr_or_err(py, ffi::PyMemoryView_FromMemory(start.cast(), size, flags)) }?;
-    Ok(view.cast_into::<PyMemoryView>()?)
 }
