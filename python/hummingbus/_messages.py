@@ -187,7 +187,7 @@ def set_values(field: np.ndarray, values: Any) -> None:
         raise ValueError(f"{count} values, and there is room for {len(room)}")
     field["count"] = count
     room[:count] = values
-    room[count:] = 0
+    room[count:].fill(0)
 
 
 def _kind(declared: str | Message) -> tuple[Any, int]:

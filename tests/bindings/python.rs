@@ -199,6 +199,25 @@ hb.run_node(step, inputs={'state': 'PlantState', 'more': hb.Optional('Imu')},
 }
 
 #[test]
+fn a_step_gets_the_same_arrays_again_with_the_messages_of_its_tick() {
+    let Some(python) = python() else { return };
+    let place = Place::new();
+    let code = "\
+import weakref
+first = []
+def step(tick, state, set_point):
+    if not first:
+        first.extend((weakref.ref(state), weakref.ref(set_point)))
+    assert all(array() is not None for array in first), 'an array is gone'
+    assert tick == 0 or state['stamp'].item() == (0, 1_000_000 * (tick - 1)), (tick, state['stamp'])
+    assert set_point.item() == ((0, 0), 0.0, 0.0, 0.0, 0.0), set_point
+    set_point['altitude'] = 1.0
+hb.run_node(step, inputs={'state': 'PlantState'}, outputs={'set_point': 'SetPoint'})
+";
+    fly(python, &place, &hover(&place, code, "")).flown();
+}
+
+#[test]
 fn what_goes_wrong_in_a_program_is_said_with_node_and_reason() {
     let Some(python) = python() else { return };
     let run = "hb.run_node(step, inputs={'state': 'PlantState'}, outputs={'set_point': 'SetPoint'})\n";
@@ -212,6 +231,16 @@ fn what_goes_wrong_in_a_program_is_said_with_node_and_reason() {
         (step("if tick == 100: raise ValueError('the battery is empty')"), "pilot.py\", line 5, in step"),
         (step("kept.append(state)"), "the step has kept a view of `state`"),
         (step("kept.append(state['position'])"), "the step has kept a view of `state`"),
+        // The array of an earlier tick, which the step gets again.
+        (
+            step("if tick == 200: kept.append(state)"),
+            "failed at tick 200 (t = 0.200 s): the step has kept a view of `state`",
+        ),
+        (
+            step("if tick == 200: kept.append(hb.vector(state['velocity']))"),
+            "the step has kept a view of `state`",
+        ),
+        (step("if tick == 200: kept.append(state.base)"), "the step has kept a view of `state`"),
         (step("kept.append(hb.vector(set_point))"), "its parts are of several types"),
         (
             format!("def step(tick, state): pass\n{}", run.replace("'set_point'", "'state'")),
