@@ -179,15 +179,18 @@ def set_values(field: np.ndarray, values: Any) -> None:
 
     >>> command = message("MotorCommand").zeros()
     >>> set_values(command["command"], [76.5] * 4)
-    >>> int(command["command"]["count"])
-    4
+    >>> set_values(command["command"], [80.0] * 3)
+    >>> int(command["command"]["count"]), command["command"]["values"][:5].tolist()
+    (3, [80.0, 80.0, 80.0, 0.0, 0.0])
     """
     count, room = len(values), field["values"]
     if count > len(room):
         raise ValueError(f"{count} values, and there is room for {len(room)}")
+    if field["count"].item() > count:
+        # Values beyond the count are zeros.
+        room[count:].fill(0)
     field["count"] = count
     room[:count] = values
-    room[count:].fill(0)
 
 
 def _kind(declared: str | Message) -> tuple[Any, int]:
