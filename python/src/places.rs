@@ -3,7 +3,7 @@
 use pyo3::ffi;
 use pyo3::prelude::*;
 use pyo3::types::{PyMemoryView, PyTuple};
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 
 /// `PyBUF_READ` and `PyBUF_WRITE` of Python's header, part of its stable interface.
 const READ_ONLY: std::ffi::c_int = 0x100;
@@ -31,7 +31,7 @@ pub(crate) struct Places {
     dtype: Py<PyAny>,
     places: Vec<Place>,
     /// Indices of the places by their addresses.
-    by_address: HashMap<usize, usize>,
+    by_address: BTreeMap<usize, usize>,
     /// Index of the place that the step got last; absent if it got no message.
     current: Option<usize>,
 }
@@ -69,7 +69,7 @@ impl Arrays {
 
 impl Places {
     pub(crate) fn new(dtype: Py<PyAny>, is_writable: bool) -> Self {
-        Self { is_writable, dtype, places: Vec::new(), by_address: HashMap::new(), current: None }
+        Self { is_writable, dtype, places: Vec::new(), by_address: BTreeMap::new(), current: None }
     }
 
     /// Array of the message of `size` bytes at `start`: the same one at each tick with a message there.
