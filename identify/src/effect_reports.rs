@@ -145,7 +145,7 @@ pub fn add_undetermined(
         let of_effect = problem.model.parameters.all.iter().filter(|entry| entry.kind.name == missing.effect);
         let open = |entry: &Parameter| {
             let (spec, value) = (entry.spec(), entry.baseline);
-            let (unit, low, high) = (spec.unit(), spec.min, spec.max);
+            let (unit, low, high) = (spec.unit(), spec.min, entry.max);
             (
                 spec.name,
                 Estimate { value, unit, low, high, at_bound: false, determined: false, by_equations: None },
@@ -180,9 +180,9 @@ pub fn estimates(problem: &Problem, fitted: &FitResult, free: &[usize]) -> BTree
             (fitted.values[*at], quantile * fitted.standard_error(*at).unwrap_or(f64::INFINITY));
         // Commands that were logged slowly make it come out too small, which no block of time shows.
         let bias = logging::bias(problem, entry);
-        let (low, high) = ((value - half).max(entry.spec().min), (value + half + bias).min(entry.spec().max));
+        let (low, high) = ((value - half).max(entry.spec().min), (value + half + bias).min(entry.max));
         let at_bound = reached_bound(problem, fitted, *at).is_some();
-        let determined = low > entry.spec().min || high < entry.spec().max;
+        let determined = low > entry.spec().min || high < entry.max;
         let unit = entry.spec().unit();
         (entry.spec().name, Estimate { value, unit, low, high, at_bound, determined, by_equations: None })
     };

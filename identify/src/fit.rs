@@ -288,7 +288,7 @@ impl<'f> Problem<'f> {
             for (at, parameter) in free.iter().enumerate() {
                 let entry = &self.model.parameters.all[*parameter];
                 let wanted = values[*parameter] + step[at];
-                let (bound, range) = (entry.bounded(wanted), entry.spec().max - entry.spec().min);
+                let (bound, range) = (entry.bounded(wanted), entry.max - entry.spec().min);
                 if held[at].is_none() && (bound - wanted).abs() > 1e-12 * range {
                     held[at] = Some(bound - values[*parameter]);
                     is_within = false;

@@ -154,9 +154,9 @@ pub fn at_bound(problem: &Problem, candidate: &Candidate, fitted: &FitResult) ->
 
 /// True if the interval of a parameter does not cover all values that it may have.
 fn is_determined(problem: &Problem, fitted: &FitResult, at: usize) -> bool {
-    let (spec, value) = (problem.model.parameters.all[at].spec(), fitted.values[at]);
+    let (entry, value) = (&problem.model.parameters.all[at], fitted.values[at]);
     let half = fitted.t_quantile(0.975) * fitted.standard_error(at).unwrap_or(f64::INFINITY);
-    value - half > spec.min || value + half < spec.max
+    value - half > entry.spec().min || value + half < entry.max
 }
 
 /// The fit with each parameter held at its baseline that reached a limit of what is plausible, if the flights are explained as well without it and its
@@ -335,7 +335,7 @@ mod tests {
         let mass = place(&problem, "mass-error", "error");
         let fit_of = |at_limit: usize, others: &[usize]| {
             let mut values = problem.model.parameters.baseline();
-            values[at_limit] = problem.model.parameters.all[at_limit].spec().max;
+            values[at_limit] = problem.model.parameters.all[at_limit].max;
             let free = [&[at_limit][..], others].concat();
             let unbounded = free.iter().map(|at| values[*at]).collect();
             let covariance = DMatrix::identity(free.len(), free.len());

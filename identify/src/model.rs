@@ -264,7 +264,7 @@ impl<'m, 'p, 'f> About<'m, 'p, 'f> {
     ) -> Vec<f64> {
         let (model, flight) = (self.model, self.flight);
         let entry = &model.parameters.all[parameter];
-        let up = self.values[parameter] + entry.step <= entry.spec().max;
+        let up = self.values[parameter] + entry.step <= entry.max;
         let step = if up { entry.step } else { -entry.step };
         let moved_by = |by: f64| {
             let mut values = self.values.to_vec();
@@ -417,7 +417,7 @@ mod tests {
                 *value = entry.bounded(entry.baseline + 0.5 * entry.scale);
             }
             if entry.kind.name == "parasitic-drag" {
-                *value = entry.spec().max;
+                *value = entry.max;
             }
         }
         let all = &model.parameters.all;
@@ -427,7 +427,7 @@ mod tests {
         let norm = |rows: &[f64]| rows.iter().map(|row| row * row).sum::<f64>().sqrt();
         for (at, column) in free.iter().zip(&columns) {
             let entry = &all[*at];
-            let up = values[*at] + entry.step <= entry.spec().max;
+            let up = values[*at] + entry.step <= entry.max;
             let step = if up { entry.step } else { -entry.step };
             let mut moved = values.clone();
             moved[*at] += step;

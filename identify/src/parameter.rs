@@ -21,6 +21,8 @@ pub struct Parameter {
     pub scale: f64,
     /// A change that is small and yet well above rounding.
     pub step: f64,
+    /// The greatest value of a fit: that of its specification, or the greatest plausible one for a vehicle of this size.
+    pub max: f64,
 }
 
 /// Parameters of all candidates, and the values of the plant's effects that are not fitted.
@@ -117,7 +119,7 @@ impl Parameter {
 
     /// The value within its bounds that is nearest to `wanted`.
     pub fn bounded(&self, wanted: f64) -> f64 {
-        wanted.clamp(self.spec().min, self.spec().max)
+        wanted.clamp(self.spec().min, self.max)
     }
 
     /// The bound that `value` has reached, within [`AT_BOUND`]; `None` between the bounds, at a bound that the truth may be, and at one that is
@@ -129,13 +131,13 @@ impl Parameter {
             let is_declared = (self.baseline - bound).abs() <= reach;
             (value - bound).abs() <= reach && !is_declared && !may_be_true(spec, *bound)
         };
-        [spec.min, spec.max].into_iter().find(is_reached)
+        [spec.min, self.max].into_iter().find(is_reached)
     }
 
     /// True if `value` is a bound other than the baseline: more is asked for than the parameter can be.
     #[allow(clippy::float_cmp, reason = "values that stop at a bound are the bound")]
     pub fn stops_at(&self, value: f64) -> bool {
-        value != self.baseline && (value == self.spec().min || value == self.spec().max)
+        value != self.baseline && (value == self.spec().min || value == self.max)
     }
 }
 
@@ -160,7 +162,10 @@ fn of_effect(effect: &Effect, vehicle: &Vehicle) -> Vec<Parameter> {
         let reach = (spec.nominal - spec.neutral?).abs();
         let scale = if reach == 0.0 { 1.0 } else { reach };
         let step = if kind.is_delay { DELAY_STEP_S } else { scale / 50.0 };
-        Some(Parameter { kind, index, baseline: effect.values[index], scale, step })
+        let baseline = effect.values[index];
+        // A file may declare more than is plausible.
+        let max = kind.most(spec, vehicle).max(baseline);
+        Some(Parameter { kind, index, baseline, scale, step, max })
     };
     kind.parameters_for(vehicle).iter().enumerate().filter_map(of_spec).collect()
 }
@@ -187,6 +192,16 @@ mod tests {
         assert_eq!(parameter("mass-error", "error").reached(1.0), Some(1.0));
     }
 
+    /// The area that drags grows with the square of the arms.
+    #[test]
+    fn the_limit_of_drag_grows_with_the_vehicle() {
+        let mut large = hummingbird();
+        large.rotors.iter_mut().for_each(|rotor| rotor.position_m *= 2.0);
+        let of_large = Parameters::of(&large, &[]).all;
+        let drag = of_large.iter().find(|entry| entry.kind.name == "parasitic-drag").expect("a drag");
+        assert_eq!((drag.bounded(0.3), drag.bounded(0.5), drag.reached(0.4)), (0.3, 0.4, Some(0.4)));
+    }
+
     #[test]
     fn bounds_that_the_truth_may_be_are_not_reached() {
         let is_reached =
@@ -200,5 +215,9 @@ mod tests {
         assert_eq!(declared.reached(0.0), None, "no drag, where one is declared");
         let declared = Parameter { baseline: 1e-3, ..declared };
         assert_eq!(declared.reached(1e-3), None, "the declared value");
+        let drag = plant::effects::find("parasitic-drag").expect("an effect").with(|_| 0.3);
+        let declared = Parameters::of(&hummingbird(), &[drag]).all;
+        let drag = declared.iter().find(|entry| entry.kind == drag.kind).expect("a drag");
+        assert_eq!(drag.bounded(0.4), 0.3, "declared beyond what is plausible");
     }
 }

@@ -263,7 +263,7 @@ fn parameters(problem: &Problem, selection: &Selection) -> Vec<(Question, Asked)
     let of = |at: &usize| {
         let entry = &problem.model.parameters.all[*at];
         let (value, half, spec) = (fitted.values[*at], half(*at), entry.spec());
-        let is_open = value - half <= spec.min && value + half >= spec.max;
+        let is_open = value - half <= spec.min && value + half >= entry.max;
         let (effect, parameter, unit) = (entry.kind.name, spec.name, spec.unit());
         let question = Question::Parameter { effect, parameter, plausible: entry.scale, unit };
         is_open.then_some((question, Asked::Parameter(*at)))

@@ -92,13 +92,11 @@ struct Linearised {
 fn known(problem: &Problem, fitted: &FitResult, free: &[usize]) -> DMatrix<f64> {
     let place = |at: usize| fitted.free.iter().position(|known| *known == at).unwrap_or(0);
     let covariance = DMatrix::from_fn(free.len(), free.len(), |i, j| {
-        let (spec, found) = (
-            problem.model.parameters.all[free[i]].spec(),
-            fitted.covariance[(place(free[i]), place(free[j]))],
-        );
+        let (entry, found) =
+            (&problem.model.parameters.all[free[i]], fitted.covariance[(place(free[i]), place(free[j]))]);
         match (i == j, found.is_finite()) {
             (_, true) => found,
-            (true, false) => (spec.max - spec.min).powi(2),
+            (true, false) => (entry.max - entry.spec().min).powi(2),
             (false, false) => 0.0,
         }
     });
@@ -334,7 +332,7 @@ impl Refinement<'_, '_> {
         let residuals = self.residuals(values);
         let slopes_of = |at: &usize| {
             let entry = &self.problem.model.parameters.all[*at];
-            let step = if values[*at] + entry.step <= entry.spec().max { entry.step } else { -entry.step };
+            let step = if values[*at] + entry.step <= entry.max { entry.step } else { -entry.step };
             let mut changed = values.to_vec();
             changed[*at] += step;
             slopes(&residuals, &self.residuals(&changed), step)

@@ -41,7 +41,7 @@ pub(crate) fn tell(airframe: &Airframe, run: &NodeContext<'_>) {
 }
 
 /// Length of the longest arm, m: from the middle of the rotors.
-fn longest_arm_m(vehicle: &Vehicle) -> f64 {
+pub(crate) fn longest_arm_m(vehicle: &Vehicle) -> f64 {
     let middle_B_m = amid_rotors_B_m(vehicle);
     vehicle.rotors.iter().map(|rotor| (rotor.position_m - middle_B_m).norm()).fold(0.0, f64::max)
 }

@@ -54,6 +54,9 @@ pub struct EffectKind {
     pub guesses: &'static [&'static [f64]],
     /// Fits nominal values, which are a Hummingbird's, to a vehicle of another size.
     pub scale_to: Option<fn(&Vehicle, &mut Values)>,
+    /// Greatest plausible value of each parameter for a vehicle, where that depends on its size. A fit goes no further; a file may state
+    /// more, up to the bound.
+    pub plausible_max: Option<fn(&Vehicle) -> f64>,
     /// Effects that look like it, and how to tell them apart. Each pair stands with one of the two.
     pub confounded_with: &'static [Confounder],
     /// Requirement on the vehicle that it acts on, if it has one.
@@ -287,6 +290,7 @@ impl EffectKind {
         is_linear: true,
         guesses: &[],
         scale_to: None,
+        plausible_max: None,
         confounded_with: &[],
         require: None,
         moves_air: false,
@@ -319,6 +323,24 @@ impl EffectKind {
     pub fn parameters_for(&self, vehicle: &Vehicle) -> &'static [ParameterSpec] {
         let count = if self.is_per_rotor { vehicle.rotors.len() } else { self.parameters.len() };
         &self.parameters[..count.min(self.parameters.len())]
+    }
+
+    /// The greatest value that a fit may give a parameter for `vehicle`: the plausible one within the bound.
+    ///
+    /// ```
+    /// use plant::effects::find;
+    /// use vehicles::{Vehicle, reference::HUMMINGBIRD};
+    ///
+    /// let drag = find("parasitic-drag").unwrap();
+    /// let mut vehicle = Vehicle::parse(HUMMINGBIRD, "hummingbird.toml")?;
+    /// assert_eq!(drag.most(&drag.parameters[0], &vehicle), 0.1);
+    /// vehicle.rotors.iter_mut().for_each(|rotor| rotor.position_m *= 2.0);
+    /// assert_eq!(drag.most(&drag.parameters[0], &vehicle), 0.4, "four times the area");
+    /// # Ok::<(), diagnostics::Diagnostic>(())
+    /// ```
+    #[must_use]
+    pub fn most(&self, spec: &ParameterSpec, vehicle: &Vehicle) -> f64 {
+        self.plausible_max.map_or(spec.max, |plausible_max| plausible_max(vehicle).min(spec.max))
     }
 
     /// The effect with neutral parameters, and those that fit `vehicle` where none is neutral.
