@@ -81,7 +81,7 @@ fn needs_fast_commands(kind: &EffectKind) -> bool {
 }
 
 /// True if a flight shows a quantity.
-fn has(prepared: &Prepared, quantity: Quantity) -> bool {
+pub fn has(prepared: &Prepared, quantity: Quantity) -> bool {
     let flight = &*prepared.flight;
     let allows = |equation| prepared.offset_of(equation).is_some();
     let has_attitude = !flight.attitude.is_empty();

@@ -16,6 +16,7 @@
 //! | [`steps_ahead`], [`accelerations`] | errors of multi-step predictions; accelerations at every sample, for benchmarks |
 //! | `parameter`, `sensor_effects` | what may be changed of the model; sensors' errors as effects beside the plant's |
 //! | `candidate` | which effects these flights can show |
+//! | `flight_wind` | one wind for each flight |
 //! | `noise_model`, `whitening` | the noise of a residual: autoregressive within a flight, trims between flights |
 //! | `normal`, `fit`, `fit_result` | generalised least squares over blocks of time: an estimation problem and its result |
 //! | `logging` | timing errors that slowly logged commands make |
@@ -65,6 +66,7 @@ mod excerpt;
 mod faults;
 mod fit;
 mod fit_result;
+mod flight_wind;
 mod forecast;
 mod foresight;
 mod horizons;

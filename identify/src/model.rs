@@ -28,9 +28,9 @@ impl Model {
         Airframe::with_effects(self.vehicle.clone(), self.parameters.effects_under(values))
     }
 
-    /// The vehicle of `flight` under these values: effects of a rig do not act where it moves freely.
+    /// The vehicle of `flight` under these values, in the wind of that flight: effects of a rig do not act where it moves freely.
     pub fn airframe_of(&self, flight: &Prepared, values: &[f64]) -> Airframe {
-        let mut effects = self.parameters.effects_under(values);
+        let mut effects = self.parameters.effects_of(flight.number, values);
         effects.retain(|effect| acts_on(effect.kind, flight));
         Airframe::with_effects(self.vehicle.clone(), effects)
     }
@@ -155,8 +155,30 @@ impl Model {
         })
     }
 
-    /// The residual under `values`, and its derivative by each parameter of `free`: one column each.
+    /// The residual under `values`, and its derivative by each parameter of `free`: one column each. Those by the winds of single flights follow
+    /// from those by the common wind.
     pub fn linearised(&self, flight: &Prepared, values: &[f64], free: &[usize]) -> (Vec<f64>, Vec<Vec<f64>>) {
+        if free.iter().all(|at| self.parameters.all[*at].flight.is_none()) {
+            return self.linearised_by(flight, values, free);
+        }
+        let acting: Vec<Option<(usize, f64)>> =
+            free.iter().map(|at| self.parameters.acting(*at, flight.number)).collect();
+        let mut computed: Vec<usize> = acting.iter().flatten().map(|(at, _)| *at).collect();
+        computed.sort_unstable();
+        computed.dedup();
+        let (residual, columns) = self.linearised_by(flight, values, &computed);
+        let column = |acting: &Option<(usize, f64)>| {
+            let (at, factor) = acting.as_ref()?;
+            let slopes = &columns[computed.binary_search(at).ok()?];
+            Some(slopes.iter().map(|slope| factor * slope).collect::<Vec<f64>>())
+        };
+        let columns =
+            acting.iter().map(|acting| column(acting).unwrap_or_else(|| vec![0.0; residual.len()])).collect();
+        (residual, columns)
+    }
+
+    /// The same by parameters that act by themselves.
+    fn linearised_by(&self, flight: &Prepared, values: &[f64], free: &[usize]) -> (Vec<f64>, Vec<Vec<f64>>) {
         use rayon::prelude::*;
         let key = Key { values: values.to_vec(), late: flight.late, distrusted: flight.distrusted };
         let (residual, columns) = match flight.memo.known(&key, free) {

@@ -4,8 +4,9 @@
 //! effects are not candidates, since no fit can follow their course: the residual that they cause is reported as
 //! unexplained.
 
+use crate::flight_wind::FLIGHT_WIND;
 use crate::sensor_effects::SENSOR_EFFECTS;
-use plant::effects::{CATALOGUE, Effect, EffectKind, ParameterSpec, Randomness, Values};
+use plant::effects::{CATALOGUE, Effect, EffectKind, ParameterSpec, Randomness, Values, WIND};
 use vehicles::Vehicle;
 
 /// One number that may be fitted.
@@ -23,6 +24,8 @@ pub struct Parameter {
     pub step: f64,
     /// The greatest value of a fit: that of its specification, or the greatest plausible one for a vehicle of this size.
     pub max: f64,
+    /// Number of the fit flight whose wind deviates by it; `None` if it acts on all flights.
+    pub flight: Option<usize>,
 }
 
 /// Parameters of all candidates, and the values of the plant's effects that are not fitted.
@@ -54,14 +57,42 @@ impl Parameters {
         Self { all, baseline, declared: declared.iter().map(|effect| effect.kind).collect() }
     }
 
+    /// Adds the deviations of the winds of so many flights. That of the first follows from the others.
+    pub fn add_winds(&mut self, vehicle: &Vehicle, flights: usize) {
+        let of_flight = |flight: usize| {
+            let deviation = of_effect(&FLIGHT_WIND.neutral(), vehicle).into_iter();
+            deviation.map(move |entry| Parameter { flight: Some(flight), ..entry })
+        };
+        self.all.extend((1..flights).flat_map(of_flight));
+    }
+
+    /// The places of the wind that all flights share, by axis.
+    pub fn wind(&self) -> Vec<usize> {
+        (0..self.all.len()).filter(|at| *self.all[*at].kind == WIND).collect()
+    }
+
+    /// The parameter at `at` as it acts on the fit flight of this number: the place of the one that is moved by it, and the factor between both;
+    /// `None` if it does not act there.
+    pub fn acting(&self, at: usize, flight: Option<usize>) -> Option<(usize, f64)> {
+        let entry = &self.all[at];
+        let Some(of) = entry.flight else { return Some((at, 1.0)) };
+        let wind = self.wind()[entry.index];
+        match flight {
+            Some(0) => Some((wind, -1.0)),
+            Some(flight) if flight == of => Some((wind, 1.0)),
+            _ => None,
+        }
+    }
+
     /// The values of the baseline model.
     pub fn baseline(&self) -> Vec<f64> {
         self.all.iter().map(|parameter| parameter.baseline).collect()
     }
 
-    /// The candidate effects, in the order of the catalogue, those of sensors last.
+    /// The candidate effects that act on all flights, in the order of the catalogue, those of sensors last.
     pub fn effects(&self) -> Vec<&'static EffectKind> {
-        let mut kinds: Vec<&'static EffectKind> = self.all.iter().map(|parameter| parameter.kind).collect();
+        let of_all = self.all.iter().filter(|parameter| parameter.flight.is_none());
+        let mut kinds: Vec<&'static EffectKind> = of_all.map(|parameter| parameter.kind).collect();
         kinds.dedup();
         kinds
     }
@@ -94,6 +125,18 @@ impl Parameters {
             }
         }
         effects.into_iter().zip(is_in).filter(|(_, is_in)| *is_in).map(|(effect, _)| effect).collect()
+    }
+
+    /// The plant's effects under `values` as they act on the fit flight of this number, in its own wind.
+    pub fn effects_of(&self, flight: Option<usize>, values: &[f64]) -> Vec<Effect> {
+        let mut acting = values.to_vec();
+        let deviations = self.all.iter().zip(values).enumerate();
+        for (at, (_, value)) in deviations.filter(|(_, (entry, _))| entry.flight.is_some()) {
+            if let Some((wind, factor)) = self.acting(at, flight) {
+                acting[wind] += factor * value;
+            }
+        }
+        self.effects_under(&acting)
     }
 
     /// The plant's effect `kind` under `values`.
@@ -165,7 +208,7 @@ fn of_effect(effect: &Effect, vehicle: &Vehicle) -> Vec<Parameter> {
         let baseline = effect.values[index];
         // A file may declare more than is plausible.
         let max = kind.most(spec, vehicle).max(baseline);
-        Some(Parameter { kind, index, baseline, scale, step, max })
+        Some(Parameter { kind, index, baseline, scale, step, max, flight: None })
     };
     kind.parameters_for(vehicle).iter().enumerate().filter_map(of_spec).collect()
 }

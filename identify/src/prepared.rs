@@ -160,6 +160,8 @@ pub struct Prepared<'f> {
     pub recent_rotors: Recent<f64, Rotors>,
     /// Measured states for predictions, by the errors of the sensors; `None` where there is nothing to predict with.
     pub recent_measured: Recent<SensorErrors, Option<Measured>>,
+    /// Number of the flight among the fit flights that may have a wind of their own.
+    pub number: Option<usize>,
     /// True if the vehicle accelerates as it leans, or moves further to the side than any rig allows.
     pub moves_freely: bool,
 }
@@ -214,6 +216,7 @@ impl<'f> Prepared<'f> {
             recent_tracks: Recent::default(),
             recent_rotors: Recent::default(),
             recent_measured: Recent::default(),
+            number: None,
             moves_freely,
         };
         prepared.layout.knots = prepared.knots(propulsion);
@@ -248,6 +251,7 @@ impl<'f> Prepared<'f> {
             recent_tracks: Recent::default(),
             recent_rotors: Recent::default(),
             recent_measured: Recent::default(),
+            number: self.number,
             moves_freely: self.moves_freely,
         }
     }

@@ -101,6 +101,7 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
     let (mut faults, believed) = believed(&vehicle, &declared, set)?;
     let set = believed.as_ref().unwrap_or(set);
     let (mut problem, mut flight_reports, offsets) = aligned(&vehicle, &declared, set, &mut faults)?;
+    problem.number_flights();
     let all: Vec<&Prepared> = problem.flights().collect();
     let (open, unidentifiable) = candidates(&problem.model.parameters, &all);
     let mut excerpt = excerpt(&problem);

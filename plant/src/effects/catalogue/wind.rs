@@ -4,6 +4,7 @@ use crate::effects::kind::{Action, Advance, EffectKind, Quantity, Values};
 use diagnostics::unit::WIND_VELOCITY;
 use nalgebra::Vector3;
 
+/// The air moves steadily.
 pub static EFFECT: EffectKind = EffectKind {
     name: "wind",
     summary: "the air moves steadily, everywhere alike",
