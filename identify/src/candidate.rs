@@ -1,5 +1,6 @@
 //! The candidates of a search: which parameters an effect brings, and whether flights can show it.
 
+use crate::flight_wind;
 use crate::parameter::Parameters;
 use crate::prepared::{Equation, Prepared};
 use flights::Flight;
@@ -26,6 +27,22 @@ impl Candidate {
     pub fn is_trim(&self) -> bool {
         self.kind.steady_state && self.kind.turns_steadily
     }
+
+    /// True if each of its parameters is one of `others`.
+    pub fn is_in(&self, others: &[Candidate]) -> bool {
+        self.free.iter().all(|at| others.iter().any(|other| other.free.contains(at)))
+    }
+
+    /// The parameters `free` without its own.
+    pub fn beside(&self, free: &[usize]) -> Vec<usize> {
+        free.iter().copied().filter(|at| !self.free.contains(at)).collect()
+    }
+}
+
+/// The candidates `accepted` and `one`, which takes the place of those that have no other parameters than it.
+pub fn with(accepted: &[Candidate], one: &Candidate) -> Vec<Candidate> {
+    let others = accepted.iter().filter(|other| !other.is_in(std::slice::from_ref(one)));
+    others.chain([one]).cloned().collect()
 }
 
 /// The parameters of candidates.
@@ -51,6 +68,7 @@ pub fn candidates(parameters: &Parameters, flights: &[&Prepared]) -> (Vec<Candid
             None => seen.extend(parts(parameters, kind)),
         }
     }
+    seen.extend(flight_wind::candidate(parameters));
     // Parts of an effect may lack the same.
     unidentifiable.dedup();
     (seen, unidentifiable)

@@ -3,6 +3,7 @@
 use crate::candidate::{Candidate, free_parameters};
 use crate::fit::Problem;
 use crate::fit_result::FitResult;
+use crate::flight_wind::FLIGHT_WIND;
 use crate::judgement::{Judged, at_bound, fitted, is_clearly_worse, is_worse, without};
 use crate::ratios;
 use crate::select::{Round, Selection};
@@ -109,7 +110,7 @@ fn of_ratios(
     open.iter().filter(is_other).filter_map(rival).collect()
 }
 
-/// The candidates of other effects with at least [`NEAR`] of the gain of `candidate`, in the round that took it.
+/// The candidates of other effects but the winds of flights, which have many numbers, with at least [`NEAR`] of the gain of `candidate`, in the round that took it.
 fn that_came_near<'s>(selection: &'s Selection, candidate: &Candidate) -> Vec<&'s Candidate> {
     let took = |round: &&Round| round.taken().is_some_and(|taken| taken.candidate == *candidate);
     let Some(round) = selection.rounds.iter().find(took) else { return Vec::new() };
@@ -117,7 +118,8 @@ fn that_came_near<'s>(selection: &'s Selection, candidate: &Candidate) -> Vec<&'
     let is_near = |judged: &&Judged| {
         judged.gain > NEAR * gain
             && judged.candidate.kind.name != candidate.kind.name
-            && !selection.accepted.contains(&judged.candidate)
+            && *judged.candidate.kind != FLIGHT_WIND
+            && !judged.candidate.is_in(&selection.accepted)
     };
     round.judged.iter().filter(is_near).map(|judged| &judged.candidate).collect()
 }

@@ -170,7 +170,7 @@ fn size(problem: &Problem, cost: f64) -> f64 {
     (cost / problem.validation_rows() as f64).sqrt()
 }
 
-/// The estimates of these parameters, with 95 % intervals.
+/// The estimates of these parameters, with 95 % intervals. Those of single flights are in [`crate::report::Report::winds`].
 #[must_use]
 pub fn estimates(problem: &Problem, fitted: &FitResult, free: &[usize]) -> BTreeMap<&'static str, Estimate> {
     let quantile = fitted.t_quantile(0.975);
@@ -186,7 +186,8 @@ pub fn estimates(problem: &Problem, fitted: &FitResult, free: &[usize]) -> BTree
         let unit = entry.spec().unit();
         (entry.spec().name, Estimate { value, unit, low, high, at_bound, determined, by_equations: None })
     };
-    free.iter().map(one).collect()
+    let of_all = free.iter().filter(|at| problem.model.parameters.all[**at].flight.is_none());
+    of_all.map(one).collect()
 }
 
 #[cfg(test)]

@@ -193,12 +193,42 @@ impl<'f> Problem<'f> {
         if free.is_empty() {
             return blocks.iter().map(|block| block.cost).collect();
         }
+        self.costs_by_folds(blocks, free, |others| self.step_of(others, values, free))
+    }
+
+    /// The cost of each block of the estimation data after the step that the equations without its fold ask for.
+    fn costs_by_folds(
+        &self,
+        blocks: &[Block],
+        free: &[usize],
+        step: impl Fn(&Block) -> DVector<f64>,
+    ) -> Vec<f64> {
         let total = normal::sum(blocks);
-        let of_fold = |fold: &[Block]| -> Vec<f64> {
-            let step = self.step_of(&total.without(&normal::sum(fold)), values, free);
-            fold.iter().map(|block| block.cost_after(&step)).collect()
-        };
-        folds(blocks).flat_map(of_fold).collect()
+        let mut costs = vec![0.0; blocks.len()];
+        for fold in self.folds(blocks.len(), free) {
+            let left_out: Vec<Block> = fold.iter().map(|at| blocks[*at].clone()).collect();
+            let step = step(&total.without(&normal::sum(&left_out)));
+            fold.iter().for_each(|at| costs[*at] = blocks[*at].cost_after(&step));
+        }
+        costs
+    }
+
+    /// The folds of a cross-validation of so many blocks, by their places: stretches of time. With winds of single flights among the `free` parameters
+    /// each fold is a stretch of every flight, since no other flight shows the wind of one.
+    pub fn folds(&self, blocks: usize, free: &[usize]) -> Vec<Vec<usize>> {
+        if free.iter().all(|at| self.model.parameters.all[*at].flight.is_none()) {
+            let places: Vec<usize> = (0..blocks).collect();
+            return places.chunks(blocks.div_ceil(FOLDS).max(1)).map(<[usize]>::to_vec).collect();
+        }
+        let mut folds = vec![Vec::new(); FOLDS];
+        let mut first = 0;
+        for flight in &self.estimation {
+            let count = self.block_knots(flight).len();
+            (0..count).for_each(|at| folds[at * FOLDS / count].push(first + at));
+            first += count;
+        }
+        folds.retain(|fold| !fold.is_empty());
+        folds
     }
 
     /// The costs of the data that effects are chosen on, as the equations about a fit promise them with the parameters `dropped` at
@@ -209,16 +239,11 @@ impl<'f> Problem<'f> {
             fitted.free.iter().map(|at| dropped.contains(at).then(|| baseline(at))).collect();
         let blocks = |flights| self.blocks(flights, &fitted.values, &fitted.free);
         let estimation = blocks(&self.estimation);
-        let total = normal::sum(&estimation);
         if !self.validation.is_empty() {
-            let step = held_step(&total, &held);
+            let step = held_step(&normal::sum(&estimation), &held);
             return blocks(&self.validation).iter().map(|block| block.cost_after(&step)).collect();
         }
-        let of_fold = |fold: &[Block]| -> Vec<f64> {
-            let step = held_step(&total.without(&normal::sum(fold)), &held);
-            fold.iter().map(|block| block.cost_after(&step)).collect()
-        };
-        folds(&estimation).flat_map(of_fold).collect()
+        self.costs_by_folds(&estimation, &fitted.free, |others| held_step(others, &held))
     }
 
     /// The values that were `fitted`, without the estimation flight at `flight`, by a step from the equations about them. With
@@ -485,11 +510,6 @@ impl<'f> Problem<'f> {
         }
         blocks
     }
-}
-
-/// The folds of a cross-validation: stretches of time.
-fn folds(blocks: &[Block]) -> std::slice::Chunks<'_, Block> {
-    blocks.chunks(blocks.len().div_ceil(FOLDS).max(1))
 }
 
 /// The values after the step that the equations `total` about `values` ask for, bounds or not.

@@ -3,16 +3,31 @@
 //! The effect `wind` of the catalogue is then the mean over the fit flights. Each of them has a deviation from it; the first has the negative sum of
 //! the others, so that the deviations sum to zero. Deviations of zero are one wind for all flights. A flight without a number of its own, such as a
 //! test flight, has the mean.
+//!
+//! A wind acts by drag alone, and their product has no slope where both are zero. So a fit starts at the winds that the mean forces of each flight ask for
+//! under the drags that are known.
 
-use crate::candidate::has;
+use crate::candidate::{Candidate, has};
 use crate::fit::Problem;
-use crate::prepared::Prepared;
+use crate::fit_result::FitResult;
+use crate::parameter::Parameters;
+use crate::prepared::{Equation, Prepared};
+use crate::rows::column;
 use diagnostics::unit::WIND_VELOCITY;
 use plant::effect_parameters;
 use plant::effects::{EffectKind, Quantity};
+use rayon::prelude::*;
 
 /// A flight has a wind of its own from so many blocks of time on: its three numbers are known by these alone; tuned, no source.
 const LEAST_BLOCKS: usize = 10;
+/// Steps to the winds that mean forces ask for: the drag changes with the wind.
+const START_STEPS: usize = 3;
+/// One of these steps goes no further along an axis, in m/s; tuned, no source.
+const STEP_MAX_M_S: f64 = 10.0;
+/// A direction with less than about this part of the slope of the other has its step shortened.
+const RIDGE: f64 = 0.01;
+/// Mean square of a force's slope by the wind, in 1/s^2, below which nothing feels the air.
+const LEAST_SLOPE: f64 = 1e-6;
 
 /// The deviation of a flight's wind from the mean.
 pub static FLIGHT_WIND: EffectKind = EffectKind {
@@ -23,6 +38,8 @@ pub static FLIGHT_WIND: EffectKind = EffectKind {
     validity: "constant over a flight",
     parameters: Deviation::SPECS,
     needs: &[Quantity::Airspeed, Quantity::Force],
+    // It begins at a start, which depends on the flights: see `start`.
+    guesses: &[&[]],
     ..EffectKind::PLAIN
 };
 
@@ -57,11 +74,114 @@ impl Problem<'_> {
     }
 }
 
+/// The candidate of one wind for each flight: the mean, and the deviations. `None` where no flight has a number.
+pub fn candidate(parameters: &Parameters) -> Option<Candidate> {
+    let deviations = parameters.of_name(FLIGHT_WIND.name);
+    let is_known = !deviations.is_empty();
+    is_known.then(|| Candidate { kind: &FLIGHT_WIND, free: [parameters.wind(), deviations].concat() })
+}
+
+/// True for effects by which a wind acts, as drags and lifts.
+pub fn is_drag(kind: &EffectKind) -> bool {
+    kind.needs == FLIGHT_WIND.needs && kind.only_adds() && kind.guesses.is_empty()
+}
+
+/// The greatest deviation of a flight's wind from the mean along an axis, in m/s.
+pub fn greatest_m_s(parameters: &Parameters, values: &[f64]) -> f64 {
+    let mut first = [0.0_f64; 3];
+    let mut greatest = 0.0_f64;
+    for (entry, value) in parameters.all.iter().zip(values).filter(|(entry, _)| entry.flight.is_some()) {
+        first[entry.index] -= value;
+        greatest = greatest.max(value.abs());
+    }
+    first.into_iter().map(f64::abs).fold(greatest, f64::max)
+}
+
+/// The start of a fit of one wind for each flight, and its cost: that of `base` where nothing feels the air.
+pub fn start(problem: &Problem, base: &FitResult) -> (Vec<f64>, f64) {
+    let least = base.estimation_cost();
+    let winds = by_forces(problem, &base.values).or_else(|| by_forces(problem, &with_drags(problem, base)));
+    let Some(values) = winds else { return (base.values.clone(), least) };
+    let cost = problem.costs(&problem.estimation, &values).iter().sum::<f64>();
+    (values, cost.min(least))
+}
+
+/// The values of `base` with each drag that was fitted to nothing at a plausible value. In the mean of several winds a drag may seem to be none.
+fn with_drags(problem: &Problem, base: &FitResult) -> Vec<f64> {
+    let mut values = base.values.clone();
+    for at in &base.free {
+        let entry = &problem.model.parameters.all[*at];
+        if is_drag(entry.kind) && values[*at] <= entry.spec().min {
+            values[*at] = entry.bounded(entry.baseline + entry.scale);
+        }
+    }
+    values
+}
+
+/// The values with the level winds that the forces of each flight ask for; `None` where nothing feels the air.
+fn by_forces(problem: &Problem, values: &[f64]) -> Option<Vec<f64>> {
+    let parameters = &problem.model.parameters;
+    let mut start = values.to_vec();
+    let deviations = parameters.of_name(FLIGHT_WIND.name);
+    deviations.iter().for_each(|at| start[*at] = 0.0);
+    let level = [parameters.wind()[0], parameters.wind()[1]];
+    let of_flight = |flight: &Prepared| -> Option<[f64; 2]> {
+        let mut values = start.clone();
+        for _ in 0..START_STEPS {
+            let step = step(problem, flight, &values, level)?;
+            for (at, step) in level.into_iter().zip(step) {
+                values[at] = parameters.all[at].bounded(values[at] + step);
+            }
+        }
+        Some(level.map(|at| values[at]))
+    };
+    let numbered: Vec<&Prepared> =
+        problem.estimation.iter().filter(|flight| flight.number.is_some()).collect();
+    let winds: Vec<[f64; 2]> =
+        numbered.into_par_iter().map(of_flight).collect::<Vec<_>>().into_iter().collect::<Option<_>>()?;
+    let mean = |axis: usize| winds.iter().map(|wind| wind[axis]).sum::<f64>() / winds.len() as f64;
+    let means = [mean(0), mean(1)];
+    for at in deviations {
+        let entry = &parameters.all[at];
+        let wind = entry.flight.and_then(|flight| winds.get(flight));
+        if let (Some(wind), Some(mean)) = (wind, means.get(entry.index)) {
+            start[at] = entry.bounded(wind[entry.index] - mean);
+        }
+    }
+    level.into_iter().zip(means).for_each(|(at, mean)| start[at] = mean);
+    Some(start)
+}
+
+/// The step of the level wind that takes most of the forces away which the model lacks in `flight`; `None` where nothing feels the air.
+fn step(problem: &Problem, flight: &Prepared, values: &[f64], level: [usize; 2]) -> Option<[f64; 2]> {
+    let (residual, columns) = problem.linearised(flight, values, &level);
+    // Along x alone, along both, along y alone.
+    let (mut gram, mut gradient, mut rows) = ([0.0; 3], [0.0; 2], 0.0);
+    for equation in [Equation::SpecificForce, Equation::Acceleration] {
+        for axis in 0..3 {
+            let left = column(flight, &residual, equation, axis);
+            let [x, y] = [0, 1].map(|of: usize| column(flight, &columns[of], equation, axis));
+            for ((left, x), y) in left.iter().zip(&x).zip(&y) {
+                gram = [gram[0] + x * x, gram[1] + x * y, gram[2] + y * y];
+                gradient = [gradient[0] + x * left, gradient[1] + y * left];
+                rows += 1.0;
+            }
+        }
+    }
+    let slope = gram[0] + gram[2];
+    if slope.is_nan() || slope <= LEAST_SLOPE * rows {
+        return None;
+    }
+    let [x, both, y] = [gram[0] + RIDGE * slope, gram[1], gram[2] + RIDGE * slope];
+    let size = x * y - both * both;
+    let step = [both * gradient[1] - y * gradient[0], both * gradient[0] - x * gradient[1]];
+    Some(step.map(|step| (step / size).clamp(-STEP_MAX_M_S, STEP_MAX_M_S)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::model::Model;
-    use crate::parameter::Parameters;
     use crate::prepared::Propulsion;
     use crate::test_flights::{flown, hummingbird};
     use crate::whitening::Noises;
@@ -158,6 +278,65 @@ mod tests {
             };
             assert!(shown <= expected && shown + 3 >= expected, "{shown}, expected {expected}");
         }
+    }
+
+    /// The first flight has what the others have not, with the opposite sign.
+    #[test]
+    fn the_greatest_deviation_is_that_of_any_flight() {
+        let flights = flights();
+        let problem = problem(&flights);
+        let parameters = &problem.model.parameters;
+        let mut values = parameters.baseline();
+        let deviations = parameters.of_name("flight-wind");
+        (values[deviations[1]], values[deviations[4]]) = (0.5, 0.75);
+        assert!((greatest_m_s(parameters, &values) - 1.25).abs() < 1e-12);
+    }
+
+    /// Rotor drag is linear in the wind, so that each flight has less force left under the wind of the start than without wind.
+    #[test]
+    fn a_start_has_the_winds_that_forces_ask_for() {
+        let flights = flights();
+        let problem = problem(&flights);
+        let still = problem.model.parameters.baseline();
+        let start = by_forces(&problem, &still).expect("a drag is declared");
+        assert!(greatest_m_s(&problem.model.parameters, &start) > 0.0);
+        let left = |flight: &Prepared, values: &[f64]| {
+            let residual = problem.model.residual_under(flight, values);
+            let rows = (0..3).flat_map(|axis| column(flight, &residual, Equation::Acceleration, axis));
+            rows.map(|row| row * row).sum::<f64>()
+        };
+        for flight in &problem.estimation {
+            let [before, after] = [&still, &start].map(|values| left(flight, values));
+            assert!(after < before, "{after}, expected less than {before}");
+        }
+    }
+
+    #[test]
+    fn without_drag_no_wind_is_asked_for() {
+        let flights = flights();
+        let mut problem = problem(&flights);
+        problem.model.parameters = Parameters::of(&hummingbird(), &[]);
+        assert_eq!(by_forces(&problem, &problem.model.parameters.baseline()), None);
+    }
+
+    #[test]
+    fn with_winds_of_flights_each_fold_has_a_part_of_every_flight() {
+        let flights = flights();
+        let problem = problem(&flights);
+        let counts: Vec<usize> =
+            problem.estimation.iter().map(|flight| problem.block_knots(flight).len()).collect();
+        let blocks: usize = counts.iter().sum();
+        let folds = problem.folds(blocks, &problem.model.parameters.of_name("flight-wind"));
+        let mut places = folds.concat();
+        places.sort_unstable();
+        assert_eq!(places, (0..blocks).collect::<Vec<_>>());
+        let ends = [counts[0], counts[0] + counts[1], blocks];
+        for fold in folds {
+            let flight_of = |at: &usize| ends.iter().position(|end| at < end);
+            assert!((0..3).all(|flight| fold.iter().any(|at| flight_of(at) == Some(flight))), "{fold:?}");
+        }
+        let first = problem.folds(blocks, &[]).swap_remove(0);
+        assert_eq!(first, (0..first.len()).collect::<Vec<_>>(), "one stretch of time");
     }
 
     /// Too short a flight has the mean wind, and flights that effects are chosen on would have to be fitted.

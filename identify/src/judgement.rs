@@ -4,6 +4,7 @@ use crate::candidate::{Candidate, free_parameters, has_third_clock};
 use crate::digits::quantity;
 use crate::fit::Problem;
 use crate::fit_result::FitResult;
+use crate::flight_wind::{self, FLIGHT_WIND};
 use crate::logging;
 use crate::sensor_effects::{IMU_DELAY, POSE_DELAY};
 use crate::statistics::{chance_of_no_gain, fisher_tail};
@@ -15,6 +16,8 @@ const LEAST_GAIN: f64 = 0.002;
 pub const FALSE_RATE: f64 = 0.01;
 /// A smaller part of a plausible value is not worth naming.
 const LEAST_PART: f64 = 0.01;
+/// Winds of flights that differ by less are one wind: so much pass trims for, too; tuned, no source.
+const LEAST_WIND_M_S: f64 = 0.3;
 /// A bound that is passed by a smaller part of a plausible change is not passed: what the model lacks elsewhere moves estimates by as much.
 const BEYOND_PART: f64 = 0.1;
 /// Two candidates whose difference is within this one-sided level cannot be told apart.
@@ -96,6 +99,9 @@ pub fn judged(
 /// True if one of its parameters is too large to be an artefact of the grid: a delay of more than half a step,
 /// or another parameter of more than [`LEAST_PART`] of a plausible change.
 fn is_seen(problem: &Problem, candidate: &Candidate, fitted: &FitResult) -> bool {
+    if *candidate.kind == FLIGHT_WIND {
+        return flight_wind::greatest_m_s(&problem.model.parameters, &fitted.values) > LEAST_WIND_M_S;
+    }
     candidate.free.iter().any(|at| {
         let entry = &problem.model.parameters.all[*at];
         let least = if entry.kind.is_delay { problem.least_delay_s() } else { LEAST_PART * entry.scale };
@@ -187,7 +193,7 @@ pub fn fitted(
     accepted: &[Candidate],
     candidate: &Candidate,
 ) -> FitResult {
-    let all = [free_parameters(accepted), candidate.free.clone()].concat();
+    let all = [candidate.beside(&free_parameters(accepted)), candidate.free.clone()].concat();
     problem.fitted(&start(problem, base, candidate).0, &all)
 }
 
@@ -199,7 +205,7 @@ pub fn fitted_from(
     candidate: &Candidate,
     promised: &[f64],
 ) -> FitResult {
-    let all = [free_parameters(accepted), candidate.free.clone()].concat();
+    let all = [candidate.beside(&free_parameters(accepted)), candidate.free.clone()].concat();
     problem.fitted(&start_from(problem, base, candidate, promised), &all)
 }
 
@@ -212,6 +218,9 @@ pub fn start_from(problem: &Problem, base: &FitResult, candidate: &Candidate, pr
 
 /// The best start of a candidate's fit, and its cost: that of `base` for one that starts at the baseline.
 pub fn start(problem: &Problem, base: &FitResult, candidate: &Candidate) -> (Vec<f64>, f64) {
+    if *candidate.kind == FLIGHT_WIND {
+        return flight_wind::start(problem, base);
+    }
     let mut start = base.values.clone();
     let mut least = base.estimation_cost();
     let by_clocks: &[f64] = &[problem.shared_late_s];
@@ -229,15 +238,27 @@ pub fn start(problem: &Problem, base: &FitResult, candidate: &Candidate) -> (Vec
 }
 
 /// Chance that the candidate's parameters are as far from their baselines together if they are there in truth: Wald's test
-/// with the jackknife's covariance. Of two that act as a product alone neither is sure by itself.
+/// with the jackknife's covariance. Of two that act as a product alone neither is sure by itself. Of the winds of flights the deviations from
+/// their mean count.
 pub fn joint_p_value(problem: &Problem, fitted: &FitResult, candidate: &Candidate) -> f64 {
     let is_known =
         |at: &usize| fitted.standard_error(*at).is_some_and(|error| error > 0.0 && error.is_finite());
-    let known: Vec<usize> = candidate.free.iter().copied().filter(is_known).collect();
-    let away: Vec<f64> =
-        known.iter().map(|at| fitted.values[*at] - problem.model.parameters.all[*at].baseline).collect();
-    let blocks = fitted.estimation_costs.len() as f64;
-    fisher_tail(fitted.wald(&known, &away) / known.len() as f64, known.len() as f64, blocks - 1.0)
+    let all = &problem.model.parameters.all;
+    let of_kind = candidate.free.iter().copied().filter(|at| all[*at].kind == candidate.kind);
+    let known: Vec<usize> = of_kind.filter(is_known).collect();
+    let away: Vec<f64> = known.iter().map(|at| fitted.values[*at] - all[*at].baseline).collect();
+    let (blocks, count) = (fitted.estimation_costs.len() as f64, known.len() as f64);
+    let wald = fitted.wald(&known, &away);
+    if *candidate.kind == FLIGHT_WIND {
+        // The covariance of many numbers is itself uncertain: Hotelling's distribution.
+        let left = blocks - count;
+        return if left < 1.0 {
+            1.0
+        } else {
+            fisher_tail(wald * left / (count * (blocks - 1.0)), count, left)
+        };
+    }
+    fisher_tail(wald / count, count, blocks - 1.0)
 }
 
 /// Chance that the mean gain of the blocks from `before` to `after` is not above zero.

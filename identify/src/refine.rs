@@ -16,10 +16,12 @@ use crate::fit::{Problem, unbounded};
 use crate::fit_result::FitResult;
 use crate::foresight::{ERRORS, Foresight, WindowErrors, ends, errors};
 use crate::normal::{self, Block};
+use crate::parameter::Parameter;
 use crate::predict::WindowEnd;
 use crate::prepared::Prepared;
 use crate::sensor_effects::SENSOR_EFFECTS;
 use nalgebra::{DMatrix, DVector};
+use plant::effects::WIND;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -51,7 +53,11 @@ pub fn refined<'p, 'f>(
     fitted: &'p FitResult,
     near: Option<&[f64]>,
 ) -> Option<Refined<'p, 'f>> {
-    let is_moved = |at: &usize| !SENSOR_EFFECTS.contains(&problem.model.parameters.all[*at].kind);
+    let all = &problem.model.parameters.all;
+    let has_winds = fitted.free.iter().any(|at| all[*at].flight.is_some());
+    // Derivatives by the winds of flights would take the time of as many flights again, and their mean belongs to them.
+    let is_wind = |entry: &Parameter| entry.flight.is_some() || (has_winds && *entry.kind == WIND);
+    let is_moved = |at: &usize| !SENSOR_EFFECTS.contains(&all[*at].kind) && !is_wind(&all[*at]);
     let free: Vec<usize> = fitted.free.iter().copied().filter(is_moved).collect();
     if free.is_empty() {
         return None;

@@ -8,13 +8,14 @@ use crate::candidate::{Candidate, free_parameters};
 use crate::digits::quantity;
 use crate::fit::Problem;
 use crate::fit_result::FitResult;
+use crate::flight_wind::FLIGHT_WIND;
 use crate::foresight::Foresight;
 use crate::judgement::{FALSE_RATE, Judged, Way, at_bound, fitted, joint_p_value};
 use crate::logging;
 use crate::refine::{Refined, refined};
 use crate::sensor_effects::SENSOR_EFFECTS;
 use crate::worth::Worth;
-use plant::effects::Action;
+use plant::effects::{Action, EffectKind};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -134,7 +135,7 @@ impl Revisions {
             // A declared number is a gain of torques or forces. Where a controller answers disturbances, predictions ask for other gains
             // whatever the vehicle is (Forssell and Ljung, Automatica 35, 1999).
             let is_gain = candidate.kind.actions.iter().any(|action| matches!(action, Action::Vehicle(_)));
-            let is_new = !accepted.contains(candidate) && !self.tried.contains(candidate);
+            let is_new = !candidate.is_in(accepted) && !self.tried.contains(candidate);
             is_linear && is_new && !is_gain && !SENSOR_EFFECTS.contains(&candidate.kind)
         };
         let candidates: Vec<&Candidate> = open.iter().filter(is_open).collect();
@@ -228,8 +229,9 @@ impl Found<'_, '_> {
     fn predictions_refined(&self, refined: &Refined) -> Predictions {
         let without = |name| {
             let of_effect = self.of_effect(name);
-            // Errors of sensors are not refined: without them the others are fitted and refined anew.
-            if of_effect.iter().any(|candidate| SENSOR_EFFECTS.contains(&candidate.kind)) {
+            // Errors of sensors and winds of flights are not refined: without them the others are fitted and refined anew.
+            let is_held = |kind: &'static EffectKind| SENSOR_EFFECTS.contains(&kind) || *kind == FLIGHT_WIND;
+            if of_effect.iter().any(|candidate| is_held(candidate.kind)) {
                 self.refined_without(name, &refined.result.values)
             } else {
                 refined.foresight(&free_parameters(&of_effect))

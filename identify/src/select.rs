@@ -19,11 +19,13 @@
 //!
 //! If a round accepts nothing although all candidates together would reduce the cost much, pairs are tried that
 //! gain only together. They face the same tests; the chance of a false acceptance in that search is
-//! [`FALSE_RATE`] once more. The rounds end when nothing changes any more.
+//! [`FALSE_RATE`] once more. So are pairs of a drag and one wind for each flight (`flight_wind`), whatever is left. The rounds end when nothing changes
+//! any more.
 
-use crate::candidate::{Candidate, free_parameters};
+use crate::candidate::{Candidate, free_parameters, with};
 use crate::fit::{Equations, Problem, unbounded};
 use crate::fit_result::FitResult;
+use crate::flight_wind::{FLIGHT_WIND, is_drag};
 use crate::judgement::{
     FALSE_RATE, Judged, Way, fitted, fitted_from, held_at_limits, is_clearly_worse, is_worse, judged,
     p_value, start, start_from, without,
@@ -153,7 +155,7 @@ impl StepwiseSearch {
         progress: &mut dyn FnMut(&str),
     ) {
         for _ in 0..ROUNDS_MAX {
-            let open = candidates.iter().filter(|candidate| !self.accepted.contains(candidate)).count();
+            let open = candidates.iter().filter(|candidate| !candidate.is_in(&self.accepted)).count();
             if open == 0 {
                 break;
             }
@@ -161,7 +163,10 @@ impl StepwiseSearch {
             problem.weigh(&self.base, candidates);
             self.base = problem.fitted(&self.base.values, &free_parameters(&self.accepted));
             self.rounds.push(round(problem, &self.base, &self.accepted, candidates, FALSE_RATE));
-            if !(self.take(problem, kept) || self.take_two(problem, candidates, kept)) {
+            let is_changed = self.take(problem, kept)
+                || self.take_two(problem, candidates, kept)
+                || self.take_winds(problem, candidates, kept);
+            if !is_changed {
                 break;
             }
         }
@@ -170,7 +175,7 @@ impl StepwiseSearch {
     /// Accepts the candidate that the last round took.
     fn take(&mut self, problem: &Problem, kept: &[Candidate]) -> bool {
         let Some(taken) = self.rounds.last().and_then(Round::taken).cloned() else { return false };
-        self.accepted.push(taken.candidate);
+        self.accepted = with(&self.accepted, &taken.candidate);
         self.base = without_idle(problem, taken.fitted, &mut self.accepted, kept);
         true
     }
@@ -187,27 +192,53 @@ impl StepwiseSearch {
         firsts.sort_by(|a, b| a.fitted.estimation_cost().total_cmp(&b.fitted.estimation_cost()));
         firsts.truncate(FIRSTS);
         let rate = FALSE_RATE / FIRSTS as f64;
-        let with = |accepted: &[Candidate], one: &Candidate| [accepted, std::slice::from_ref(one)].concat();
-        for Judged { candidate: first, .. } in firsts {
-            let alone = fitted(problem, &self.base, &self.accepted, &first);
-            let with_first = with(&self.accepted, &first);
-            let second_round = round(problem, &alone, &with_first, candidates, rate);
-            let Some(second) = second_round.taken().cloned() else { continue };
-            let with_second = with(&self.accepted, &second.candidate);
-            let both = with(&with_first, &second.candidate);
-            let without_first = without(problem, &second.fitted, &both, self.accepted.len());
-            let mut first_round = round(problem, &without_first, &with_second, candidates, rate);
-            first_round.taken =
-                first_round.judged.iter().position(|judged| judged.candidate == first && judged.is_accepted);
-            let is_gain = p_value(&self.base.validation_costs, &second.fitted.validation_costs) < rate;
-            if is_gain && first_round.taken.is_some() {
-                self.rounds.extend([first_round, second_round]);
-                self.accepted = both;
-                self.base = without_idle(problem, second.fitted, &mut self.accepted, kept);
-                return true;
-            }
+        firsts
+            .iter()
+            .any(|first| self.take_pair(problem, (&first.candidate, candidates), candidates, rate, kept))
+    }
+
+    /// Accepts a drag and the winds of the flights. A wind acts by a drag, and one drag for flights in several winds shows in these alone. That this is
+    /// missing does not show in what is left: winds of flights do not count among what all candidates together would leave.
+    fn take_winds(&mut self, problem: &Problem, candidates: &[Candidate], kept: &[Candidate]) -> bool {
+        let open = candidates.iter().filter(|candidate| !candidate.is_in(&self.accepted)).cloned();
+        let (winds, others): (Vec<Candidate>, Vec<Candidate>) =
+            open.partition(|candidate| *candidate.kind == FLIGHT_WIND);
+        if winds.is_empty() {
+            return false;
         }
-        false
+        let drags: Vec<Candidate> = others.into_iter().filter(|candidate| is_drag(candidate.kind)).collect();
+        let rate = FALSE_RATE / drags.len().max(1) as f64;
+        drags.iter().any(|drag| self.take_pair(problem, (drag, &winds), candidates, rate, kept))
+    }
+
+    /// Accepts `first` and one of `seconds` if that passes a round with the first, the first one among `candidates` with it, and both together gain.
+    fn take_pair(
+        &mut self,
+        problem: &Problem,
+        (first, seconds): (&Candidate, &[Candidate]),
+        candidates: &[Candidate],
+        rate: f64,
+        kept: &[Candidate],
+    ) -> bool {
+        let alone = fitted(problem, &self.base, &self.accepted, first);
+        let with_first = with(&self.accepted, first);
+        let second_round = round(problem, &alone, &with_first, seconds, rate);
+        let Some(second) = second_round.taken().cloned() else { return false };
+        let with_second = with(&self.accepted, &second.candidate);
+        let both = with(&with_first, &second.candidate);
+        let Some(place) = both.iter().position(|one| one == first) else { return false };
+        let without_first = without(problem, &second.fitted, &both, place);
+        let mut first_round = round(problem, &without_first, &with_second, candidates, rate);
+        first_round.taken =
+            first_round.judged.iter().position(|judged| judged.candidate == *first && judged.is_accepted);
+        let is_gain = p_value(&self.base.validation_costs, &second.fitted.validation_costs) < rate;
+        if !is_gain || first_round.taken.is_none() {
+            return false;
+        }
+        self.rounds.extend([first_round, second_round]);
+        self.accepted = both;
+        self.base = without_idle(problem, second.fitted, &mut self.accepted, kept);
+        true
     }
 }
 
@@ -219,7 +250,7 @@ fn round(
     candidates: &[Candidate],
     rate: f64,
 ) -> Round {
-    let open: Vec<&Candidate> = candidates.iter().filter(|candidate| !accepted.contains(candidate)).collect();
+    let open: Vec<&Candidate> = candidates.iter().filter(|candidate| !candidate.is_in(accepted)).collect();
     let level = rate / open.len().max(1) as f64;
     let screen = Screen::of(problem, base, accepted, &open);
     let judge = |candidate: &&Candidate| {
@@ -285,12 +316,13 @@ fn fitted_as_promised(
     level: f64,
 ) -> Judged {
     let candidate = &promise.candidate;
+    let others = candidate.beside(&screen.accepted);
     let near = if candidate.kind.guesses.is_empty() {
-        let all = [screen.accepted.as_slice(), &candidate.free].concat();
+        let all = [others.as_slice(), &candidate.free].concat();
         problem.fitted_near(&screen.equations.of(&all), &base.values)
     } else {
         let start = start_from(problem, base, candidate, &promise.fitted.values);
-        let known = (base.values.as_slice(), screen.accepted.as_slice());
+        let known = (base.values.as_slice(), others.as_slice());
         problem.fitted_near(&problem.equations_near(known, &start, &candidate.free), &start)
     };
     let promised = base.estimation_cost() - promise.fitted.estimation_cost();
@@ -308,7 +340,7 @@ fn promised_from_guess(
     accepted: &[Candidate],
     candidate: &Candidate,
 ) -> FitResult {
-    let accepted = free_parameters(accepted);
+    let accepted = candidate.beside(&free_parameters(accepted));
     let all = [accepted.clone(), candidate.free.clone()].concat();
     let blocks = |flights, values: &[f64]| {
         problem.blocks_near(flights, (&base.values, &accepted), values, &candidate.free)

@@ -8,6 +8,7 @@
 use crate::candidate::Candidate;
 use crate::fit::Problem;
 use crate::fit_result::FitResult;
+use crate::flight_wind::FLIGHT_WIND;
 use crate::lever::{Moments, factors};
 use crate::noise_model::Products;
 use crate::normal;
@@ -67,7 +68,9 @@ impl Problem<'_> {
         let is_assumed = self.estimation.iter().any(Prepared::is_assumed);
         let counts =
             |candidate: &&Candidate| candidate.kind.is_linear && (!is_assumed || candidate.is_trim());
-        for candidate in candidates.iter().filter(counts) {
+        // Winds of flights explain any trims. Until they are accepted, these are noise: only what a constant force cannot explain shows a wind.
+        let candidates = candidates.iter().filter(|candidate| *candidate.kind != FLIGHT_WIND);
+        for candidate in candidates.filter(counts) {
             all.extend(candidate.free.iter().filter(|at| !base.free.contains(at)));
         }
         for _ in 0..2 {
