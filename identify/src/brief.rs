@@ -2,6 +2,7 @@
 //! to do next.
 
 use crate::digits::{printed, printed_quantity};
+use crate::flight_wind::FLIGHT_WIND;
 use crate::horizons::Change;
 use crate::loss::advice;
 use crate::report::{EffectReport, Estimate, Report, UNCHECKED};
@@ -39,7 +40,11 @@ impl Brief {
         Self {
             answer: answer(report),
             // Effects of a model that loses are no findings.
-            missing: findings.iter().map(|(name, effect)| missing(name, effect)).collect(),
+            missing: findings
+                .iter()
+                .map(|(name, effect)| missing(name, effect))
+                .chain(winds(report).filter(|_| report.losses.is_empty()))
+                .collect(),
             certainty: findings
                 .iter()
                 .map(|(name, effect)| certainty(name, effect))
@@ -97,10 +102,16 @@ fn answer(report: &Report) -> String {
 }
 
 fn missing(name: &str, effect: &EffectReport) -> String {
-    let sensor_effect = || SENSOR_EFFECTS.into_iter().find(|kind| kind.name == name);
-    let summary = plant::effects::find(name).or_else(sensor_effect).map_or("", |kind| kind.summary);
+    let other = || SENSOR_EFFECTS.into_iter().chain([&FLIGHT_WIND]).find(|kind| kind.name == name);
+    let summary = plant::effects::find(name).or_else(other).map_or("", |kind| kind.summary);
     let values: Vec<_> = effect.parameters.iter().map(|(name, estimate)| value(name, estimate)).collect();
     format!("{name}: {summary}; {}.", values.join(", "))
+}
+
+/// The winds of the flights, where each has its own.
+fn winds(report: &Report) -> Option<String> {
+    let words = report.winds_in_words()?;
+    Some(format!("{words}. The new vehicle file has none of them: a wind is no property of the vehicle."))
 }
 
 fn value(name: &str, estimate: &Estimate) -> String {
@@ -217,6 +228,7 @@ fn next(report: &Report, accepted: &[(&str, &EffectReport)]) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::Brief;
+    use crate::flight_wind::FlightWind;
     use crate::horizons::{Change, Changes};
     use crate::loss::Loss;
     use crate::proposal::Proposal;
@@ -389,6 +401,20 @@ mod tests {
         let short = Brief::of(&Report { validation_blocks: 3, ..Report::of_nothing() });
         assert_eq!(short.answer, "These flights are too short to tell.");
         assert!(short.next[0].starts_with("Fly longer: "), "{:?}", short.next);
+    }
+
+    #[test]
+    fn winds_of_flights_are_counted() {
+        let wind = |flight: &str, [x, y]: [f64; 2]| {
+            let along = |value| Estimate { value, ..coefficient() };
+            FlightWind { flight: flight.to_owned(), x: along(x), y: along(y), z: along(0.0) }
+        };
+        let winds = vec![wind("calm", [0.0, 0.0]), wind("breeze", [3.0, -4.0])];
+        let brief = Brief::of(&Report { winds: winds.clone(), ..report() });
+        let line = "2 flights, 2 winds: 0 to 5.000 m/s. The new vehicle file has none of them: a wind is no property of the vehicle.";
+        assert!(brief.missing.iter().any(|text| text == line), "{:?}", brief.missing);
+        let lost = Brief::of(&Report { winds, losses: vec![loss("one")], ..report() });
+        assert!(lost.missing.is_empty(), "{:?}", lost.missing);
     }
 
     #[test]

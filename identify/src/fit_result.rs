@@ -42,6 +42,20 @@ impl FitResult {
         Some(self.covariance[(at, at)].max(0.0).sqrt())
     }
 
+    /// Standard error of a sum of parameters, each times its factor; `None` where one of them was held.
+    pub fn standard_error_of(&self, parts: &[(usize, f64)]) -> Option<f64> {
+        let place = |(parameter, factor): &(usize, f64)| {
+            Some((self.free.iter().position(|free| free == parameter)?, *factor))
+        };
+        let parts: Vec<(usize, f64)> = parts.iter().map(place).collect::<Option<_>>()?;
+        let mut variance = 0.0;
+        for (one, factor) in &parts {
+            variance +=
+                parts.iter().map(|(at, other)| factor * other * self.covariance[(*one, *at)]).sum::<f64>();
+        }
+        Some(variance.max(0.0).sqrt())
+    }
+
     /// The value that the equations would have a parameter take if it had no bounds; `None` where it was held.
     pub fn unbounded(&self, parameter: usize) -> Option<f64> {
         self.free.iter().position(|free| *free == parameter).map(|at| self.unbounded[at])

@@ -123,6 +123,7 @@ pub use clock::Lateness;
 pub use envelope::Reached;
 pub use evidence::Evidence;
 pub use faults::Fault;
+pub use flight_wind::FlightWind;
 pub use log_rates::LogRates;
 pub use prepared::Equation;
 pub use questions::{OpenQuestions, Question};

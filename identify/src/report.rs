@@ -5,6 +5,7 @@ use crate::candidate::Unidentifiable;
 use crate::digits::{quantity, rounded};
 use crate::envelope::Reached;
 use crate::faults::Fault;
+use crate::flight_wind::FlightWind;
 use crate::limits::Limits;
 use crate::loss::{Loss, advice};
 use crate::proposal::Proposal;
@@ -55,6 +56,8 @@ pub struct Report {
     pub faults: Vec<Fault>,
     /// The trims of the flights where they differ between flights: constant torques that no one vehicle explains.
     pub trims: Vec<Trim>,
+    /// The winds of the fit flights, where each has its own; empty where all have the same.
+    pub winds: Vec<FlightWind>,
     /// Prediction errors of the test flights: flight, horizon in s, channel.
     pub held_out: Changes,
     /// Parts of the squared errors of the test flights after 0.5 s, by what they are due to: channel.
@@ -176,6 +179,7 @@ impl fmt::Display for Report {
         self.write_flights(f)?;
         self.write_verdict(f)?;
         self.write_trims(f)?;
+        self.write_winds(f)?;
         self.write_errors(f)?;
         self.write_residuals(f)?;
         self.write_rest(f)?;
@@ -429,6 +433,35 @@ impl Report {
         Ok(())
     }
 
+    fn write_winds(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if !self.winds.is_empty() {
+            writeln!(f, "\neach fit flight has a wind of its own (m/s, 95 %):")?;
+        }
+        for FlightWind { flight, x, y, z } in &self.winds {
+            let along = |Estimate { value, low, high, .. }: &Estimate| {
+                let [value, low, high] = [*value, *low, *high].map(rounded);
+                format!("{value} ({low} ... {high})")
+            };
+            writeln!(f, "  {flight:28} x {}  y {}  z {}", along(x), along(y), along(z))?;
+        }
+        if !self.winds.is_empty() {
+            writeln!(
+                f,
+                "  these winds stand for trims, too: do not take them for measured ones. The vehicle file has no wind from these flights, which are \
+                 not flown again on the bus"
+            )?;
+        }
+        Ok(())
+    }
+
+    /// Number and range of the winds; `None` where all flights have the same.
+    pub(crate) fn winds_in_words(&self) -> Option<String> {
+        let speeds = || self.winds.iter().map(FlightWind::speed_m_s);
+        let (least, most) = (speeds().reduce(f64::min)?, speeds().reduce(f64::max)?);
+        let (count, least, most) = (self.winds.len(), rounded(least), quantity(most, "m/s"));
+        Some(format!("{count} flights, {count} winds: {least} to {most}"))
+    }
+
     fn write_errors(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if !self.held_out.is_empty() {
             let what = "prediction errors on the test flights (RMS, declared -> new; in brackets with the flight's own trim, with the disturbance \
@@ -517,6 +550,9 @@ impl Report {
         if self.has_validated() {
             writeln!(f, "validated in flights with {}", self.envelope_in_words(quantity))?;
         }
+        if let Some(winds) = self.winds_in_words() {
+            writeln!(f, "fitted in {winds}")?;
+        }
         self.not_identifiable.iter().try_for_each(|Unidentifiable { effect, needs }| {
             writeln!(f, "not identifiable here: {effect} needs {needs}")
         })
@@ -541,6 +577,7 @@ impl Report {
             time_offsets_s: BTreeMap::new(),
             faults: Vec::new(),
             trims: Vec::new(),
+            winds: Vec::new(),
             selected: Changes::new(),
             held_out: Changes::new(),
             limits: BTreeMap::new(),
@@ -560,6 +597,32 @@ impl Report {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_wind_of_each_flight_is_told() {
+        let along = |value: f64| Estimate {
+            value,
+            unit: "m/s",
+            low: value - 0.5,
+            high: value + 0.5,
+            at_bound: false,
+            determined: true,
+            by_equations: None,
+        };
+        let wind = |flight: &str, [x, y]: [f64; 2]| FlightWind {
+            flight: flight.to_owned(),
+            x: along(x),
+            y: along(y),
+            z: along(1.0),
+        };
+        let winds = vec![wind("calm", [0.0, 0.0]), wind("gale", [-8.0, 4.0])];
+        let text = Report { winds, ..Report::of_nothing() }.to_string();
+        let gale = "x -8.000 (-8.500 ... -7.500)  y 4.000 (3.500 ... 4.500)  z 1.000 (0.5000 ... 1.500)\n";
+        assert!(text.contains("\neach fit flight has a wind of its own (m/s, 95 %):\n  calm "), "{text}");
+        assert!(text.contains(gale), "{text}");
+        assert!(text.contains("fitted in 2 flights, 2 winds: 1.000 to 9.000 m/s\n"), "{text}");
+        assert!(!Report::of_nothing().to_string().contains("wind"));
+    }
 
     #[test]
     fn a_new_vehicle_that_predicts_worse_is_told() {

@@ -10,6 +10,7 @@ use crate::error::{faulty, no_flight};
 use crate::excerpt::{self, excerpt, on_all};
 use crate::faults::{self, Fault};
 use crate::fit::Problem;
+use crate::flight_wind::{self, FlightWind};
 use crate::horizons::{of_role, predictions};
 use crate::limits::limits;
 use crate::logging;
@@ -122,6 +123,8 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
     effect_reports::add_accepted(&problem, &selection, &rivals, &mut effects);
     effect_reports::add_undetermined(&problem, &selection, &unidentifiable, &mut effects);
     note_logging(&problem, &selection, &mut flight_reports);
+    let winds = flight_wind::winds(&problem, &selection);
+    note_winds(&winds, &mut flight_reports);
     progress("predictions");
     let values = &selection.flown().values;
     let sensor_errors = SensorErrors::of(&problem.model.parameters, values);
@@ -159,6 +162,7 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
         time_offsets_s: offsets.into_iter().collect(),
         faults,
         trims: trim::differing(&problem, values),
+        winds,
         held_out,
         selected: of_role(&predictions, Role::Select),
         fitted: of_role(&predictions, Role::Fit),
@@ -171,14 +175,15 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
         block_s: problem.block_s,
         validation_blocks: selection.after.validation_costs.len(),
     };
-    let effects = problem.model.parameters.effects_under(values);
+    let parameters = &problem.model.parameters;
+    let effects = parameters.effects_under(&flight_wind::values_of_file(parameters, &selection));
     let name = |flight: &Prepared| flight.flight.name.clone();
     let late = problem.flights().map(|flight| (name(flight), flight.late)).collect();
     let regressors =
         problem.flights().map(|flight| (name(flight), regressors(&problem.model, flight, values))).collect();
     let pictures = pictures(&problem, &selection);
-    // A model that loses is not worth another flight of its effects.
-    let is_found = report.losses.is_empty() && !report.verdict.is_empty();
+    // A model that loses is not worth another flight of its effects, and nobody knows the wind of another flight.
+    let is_found = report.losses.is_empty() && !report.verdict.is_empty() && report.winds.is_empty();
     let questions = OpenQuestions::of(&problem, &selection, &rivals).filter(|_| is_found);
     drop(problem);
     Ok(Outcome { pictures, regressors, effects, late, sensor_errors, report, believed, questions })
@@ -378,6 +383,20 @@ fn note_excerpt(excerpt: &Problem, reports: &mut [FlightReport]) {
         of_flight.for_each(|report| report.notes.push(excerpt::note(flight)));
     }
 }
+
+/// Notes the wind of each flight where the fit flights have winds of their own.
+fn note_winds(winds: &[FlightWind], reports: &mut [FlightReport]) {
+    for report in reports.iter_mut().filter(|_| !winds.is_empty()) {
+        let has_wind = winds.iter().any(|wind| wind.flight == report.name);
+        report.notes.push((if has_wind { OWN_WIND } else { MEAN_WIND }).to_owned());
+    }
+}
+
+/// Note of a flight with a wind of its own.
+const OWN_WIND: &str = "it has a wind of its own (`winds`), which is not in the vehicle file";
+
+/// Note of the other flights then.
+const MEAN_WIND: &str = "its wind is not fitted: it is predicted in the mean wind of the fit flights";
 
 /// Notes the lateness of the commands that their logging explains.
 fn note_logging(problem: &Problem, selection: &Selection, reports: &mut [FlightReport]) {

@@ -75,7 +75,9 @@ fn corrected(set: &FlightSet, outcome: &Outcome, errors: &SensorErrors) -> Fligh
             let has_torques = report.equations.contains(&Equation::AngularAcceleration.name());
             report.name == flight.name && report.compared_s > LEAST_REPLAY_S && has_torques
         };
-        !flight.command.is_empty()
+        // A vehicle file has one wind at most.
+        outcome.report.winds.is_empty()
+            && !flight.command.is_empty()
             && !flight.attitude.is_empty()
             && outcome.report.flights.iter().any(was_used)
     };

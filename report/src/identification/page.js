@@ -119,6 +119,12 @@ function drawFaults() {
     ...trim.angular_acceleration_rad_s2.map((torque, axis) => `${number(torque)} ± ${trim.deviation_rad_s2[axis].toPrecision(2)}`)]));
 }
 
+function drawWinds() {
+  const along = ({ value, low, high }) => [number(value), `${number(low)} to ${number(high)}`];
+  fillPart("winds", [left("flight"), ...["x", "y", "z"].flatMap((axis) => [axis, "95 % interval"])],
+    report.winds.map(({ flight, x, y, z }) => [left(flight), ...[x, y, z].flatMap(along)]));
+}
+
 // One row per parameter; the effect stands in the first.
 function effectRows([name, effect]) {
   const { before, after } = effect.held_out;
@@ -336,4 +342,4 @@ function drawResiduals() {
   zoomTogether(["residual", "sides"].map(element));
 }
 
-for (const part of [drawBrief, drawSummary, drawFlights, drawClocks, drawFaults, drawEffects, drawErrors, drawLimits, drawNoise, drawWhiteness, drawResiduals]) part();
+for (const part of [drawBrief, drawSummary, drawFlights, drawClocks, drawFaults, drawWinds, drawEffects, drawErrors, drawLimits, drawNoise, drawWhiteness, drawResiduals]) part();

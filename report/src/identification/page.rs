@@ -253,6 +253,7 @@ mod tests {
             time_offsets_s: BTreeMap::new(),
             faults: Vec::new(),
             trims: Vec::new(),
+            winds: Vec::new(),
             held_out: BTreeMap::new(),
             limits: BTreeMap::new(),
             selected: BTreeMap::new(),
