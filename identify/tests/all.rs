@@ -21,3 +21,4 @@ mod rotor_flights;
 mod statistics;
 mod steps_ahead;
 mod torques_of_the_air;
+mod winds;
