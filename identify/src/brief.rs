@@ -282,6 +282,7 @@ mod tests {
             persistence: 9.0,
             own_trim: after,
             disturbance: after,
+            own_wind: None,
             measured_attitude: None,
             by_axis: [0.0; 3],
             unit: "deg",

@@ -114,7 +114,7 @@ impl Observed {
 
 /// Time from a knot to the last sample that its residual depends on, in s: the reach of the window, that of slopes of positions and rotor speeds, and two
 /// samples of interpolation.
-fn lag_s(flight: &Prepared) -> f64 {
+pub fn lag_s(flight: &Prepared) -> f64 {
     let periods_s = [flight.flight.attitude.period_s(), flight.flight.position.period_s()];
     let slowest_s = periods_s.into_iter().flatten().fold(0.0, f64::max);
     (flight.reach() + BOX_STEPS) as f64 * flight.layout.clock.step_s + 2.0 * slowest_s

@@ -111,15 +111,21 @@ pub fn is_drag(kind: &EffectKind) -> bool {
     kind.needs == FLIGHT_WIND.needs && kind.only_adds() && kind.guesses.is_empty()
 }
 
+/// The deviations of the winds of the fit flights from their mean, by flight, in m/s; none where no flight has a number.
+pub fn deviations_m_s(parameters: &Parameters, values: &[f64]) -> Vec<[f64; 3]> {
+    let mut deviations: Vec<[f64; 3]> = Vec::new();
+    for (entry, value) in parameters.all.iter().zip(values) {
+        let Some(flight) = entry.flight else { continue };
+        deviations.resize(deviations.len().max(flight + 1), [0.0; 3]);
+        deviations[flight][entry.index] = *value;
+        deviations[0][entry.index] -= value;
+    }
+    deviations
+}
+
 /// The greatest deviation of a flight's wind from the mean along an axis, in m/s.
 pub fn greatest_m_s(parameters: &Parameters, values: &[f64]) -> f64 {
-    let mut first = [0.0_f64; 3];
-    let mut greatest = 0.0_f64;
-    for (entry, value) in parameters.all.iter().zip(values).filter(|(entry, _)| entry.flight.is_some()) {
-        first[entry.index] -= value;
-        greatest = greatest.max(value.abs());
-    }
-    first.into_iter().map(f64::abs).fold(greatest, f64::max)
+    deviations_m_s(parameters, values).as_flattened().iter().map(|along| along.abs()).fold(0.0, f64::max)
 }
 
 /// The start of a fit of one wind for each flight, and its cost: that of `base` where nothing feels the air.

@@ -5,6 +5,7 @@ use crate::disturbance::{DisturbanceModels, Observed};
 use crate::excerpt;
 use crate::fit::Problem;
 use crate::forecast::Forecast;
+use crate::past_wind::{Stage, stages};
 use crate::predict::{Errors, Measured, WindowEnd, components, errors};
 use crate::prepared::Prepared;
 use crate::sensing::SensorErrors;
@@ -33,6 +34,9 @@ pub struct Change {
     pub own_trim: f64,
     /// With the accepted effects, and the disturbance as it was seen up to the begin of each window, which decays to the trim.
     pub disturbance: f64,
+    /// With the accepted effects, in the wind that was seen before each stage of the flight; `None` where the fit flights have one wind.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub own_wind: Option<f64>,
     /// With the accepted effects and the measured attitude, so that forces alone make the error; `None` of the channels of rotation.
     pub measured_attitude: Option<f64>,
     /// Root mean square of `after` by axis: of position and velocity those of the world, of attitude and rates those of the body.
@@ -80,6 +84,15 @@ pub fn predictions(problem: &Problem, set: &FlightSet, values: &[f64]) -> Vec<Pr
         };
         let seen = prepared.map_or(Observed::default(), |prepared| Observed::of(problem, prepared, values));
         let turned = measured(&corrected).map(Measured::turning_as_measured);
+        let of_test = prepared.filter(|_| flight.role == Role::Test);
+        let stages = of_test.map_or(Vec::new(), |flight| stages(problem, flight, values));
+        // Rotors settle before each stage.
+        let settling_s = of_test.map_or(0.0, Prepared::settling_s);
+        let in_stage = |stage: Stage| {
+            let pieces_s = vec![(stage.from_s - settling_s, stage.to_s)];
+            Some((measured(&corrected)?.within(pieces_s, settling_s), stage.values))
+        };
+        let staged: Vec<(Measured, Vec<f64>)> = stages.into_iter().filter_map(in_stage).collect();
         for horizon_s in HORIZONS_S {
             let ends = |push: &dyn Fn(f64) -> Forecast| after.ends(airframe(values), horizon_s, push);
             let old = before.ends(airframe(&declared), horizon_s, |_| Forecast::none());
@@ -87,6 +100,9 @@ pub fn predictions(problem: &Problem, set: &FlightSet, values: &[f64]) -> Vec<Pr
             let turned = turned
                 .iter()
                 .flat_map(|turned| turned.ends(airframe(values), horizon_s, |_| Forecast::none()));
+            let in_wind = staged.iter().flat_map(|(measured, values)| {
+                measured.ends(airframe(values), horizon_s, |_| Forecast::none())
+            });
             let simulated = |ends: &[WindowEnd]| errors(&corrected, ends, |end| end.simulated);
             let errors = [
                 errors(&aligned, &old, |end| end.simulated),
@@ -95,6 +111,7 @@ pub fn predictions(problem: &Problem, set: &FlightSet, values: &[f64]) -> Vec<Pr
                 simulated(&ends(&|from_s| seen.trim(from_s))),
                 simulated(&ends(&|from_s| seen.expected(&models, from_s))),
                 simulated(&turned.collect::<Vec<_>>()),
+                simulated(&in_wind.collect::<Vec<_>>()),
             ];
             let mut channels = changes(&errors, &by_axis(&new));
             if turns_as_measured {
@@ -114,11 +131,11 @@ pub fn predictions(problem: &Problem, set: &FlightSet, values: &[f64]) -> Vec<Pr
 }
 
 /// Errors by channel: of the declared vehicle, the new one, persistence, and the new one with the flight's own trim, with the disturbance that was
-/// seen, and with the measured attitude.
-fn changes(errors: &[Errors; 6], by_axis: &[[f64; 3]; 4]) -> BTreeMap<&'static str, Change> {
+/// seen, with the measured attitude, and in the wind that was seen.
+fn changes(errors: &[Errors; 7], by_axis: &[[f64; 3]; 4]) -> BTreeMap<&'static str, Change> {
     let one = |(quantity, by_axis): (StateQuantity, &[f64; 3])| {
         let (channel, unit) = (quantity.name(), quantity.unit());
-        let [before, after, persistence, own_trim, disturbance, turned] =
+        let [before, after, persistence, own_trim, disturbance, turned, own_wind] =
             errors.each_ref().map(|errors| errors.get(channel).copied());
         let change = Change {
             before: before?,
@@ -126,6 +143,7 @@ fn changes(errors: &[Errors; 6], by_axis: &[[f64; 3]; 4]) -> BTreeMap<&'static s
             persistence: persistence?,
             own_trim: own_trim?,
             disturbance: disturbance?,
+            own_wind,
             measured_attitude: turned.filter(|_| !quantity.is_turn()),
             by_axis: *by_axis,
             unit,

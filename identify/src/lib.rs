@@ -16,7 +16,7 @@
 //! | [`steps_ahead`], [`accelerations`] | errors of multi-step predictions; accelerations at every sample, for benchmarks |
 //! | `parameter`, `sensor_effects` | what may be changed of the model; sensors' errors as effects beside the plant's |
 //! | `candidate` | which effects these flights can show |
-//! | `flight_wind` | one wind for each flight |
+//! | `flight_wind`, `past_wind` | one wind for each flight; that of a test flight as its past shows it |
 //! | `noise_model`, `whitening` | the noise of a residual: autoregressive within a flight, trims between flights |
 //! | `normal`, `fit`, `fit_result` | generalised least squares over blocks of time: an estimation problem and its result |
 //! | `logging` | timing errors that slowly logged commands make |
@@ -86,6 +86,7 @@ mod noise_model;
 mod normal;
 mod offset;
 mod parameter;
+mod past_wind;
 mod predict;
 mod prepared;
 pub mod proposal;

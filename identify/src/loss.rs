@@ -30,8 +30,8 @@ pub struct Loss {
     pub rival: &'static str,
     /// Root mean square of the new vehicle; beside `trim` the constant force that it lacks.
     pub new: f64,
-    /// Knowledge of the prediction besides the new vehicle: `nothing`, `own trim` or `disturbance`. Against persistence the best
-    /// of the three counts.
+    /// Knowledge of the prediction besides the new vehicle: `nothing`, `own trim`, `disturbance` or `own wind`. Against persistence the best
+    /// of these counts.
     pub knowing: &'static str,
     /// Root mean square of the rival; the limit of a trim.
     pub other: f64,
@@ -47,10 +47,11 @@ pub fn losses(errors: &Changes, noise: &BTreeMap<&'static str, Noise>) -> Vec<Lo
         for (horizon, channel, change) in HORIZONS.into_iter().flat_map(|horizon| judged(horizons, horizon)) {
             let floor =
                 noise.get(channel).and_then(|noise| noise.prediction.get(horizon)).copied().unwrap_or(0.0);
-            // A flight's own trim, and what disturbs it, are none of the vehicle's: the best of three.
+            // A flight's own trim, its wind, and what disturbs it, are none of the vehicle's: the best of all.
             let plain = (change.after, "nothing");
             let all = [plain, (change.own_trim, "own trim"), (change.disturbance, "disturbance")];
-            let best = all.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or(plain);
+            let in_wind = change.own_wind.map(|error| (error, "own wind"));
+            let best = all.into_iter().chain(in_wind).min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or(plain);
             let rivals = [("persistence", best, change.persistence), ("declared", plain, change.before)];
             let loses = |new: f64, other: f64| {
                 !new.is_finite() || (new * new - floor * floor).max(0.0).sqrt() > LEAST_RATIO * other
@@ -83,6 +84,7 @@ impl Loss {
         match self.knowing {
             "own trim" => " with the flight's own trim",
             "disturbance" => " with the disturbance seen before",
+            "own wind" => " in the wind seen before",
             _ => "",
         }
     }
@@ -140,6 +142,7 @@ mod tests {
             persistence,
             own_trim,
             disturbance: own_trim,
+            own_wind: None,
             measured_attitude: None,
             by_axis: [0.0; 3],
             unit: "deg",

@@ -467,6 +467,9 @@ impl Report {
             let what = "prediction errors on the test flights (RMS, declared -> new; in brackets with the flight's own trim, with the disturbance \
                         seen before, and persistence)";
             writeln!(f, "\n{what}:")?;
+            if !self.winds.is_empty() {
+                writeln!(f, "  (last in brackets: in the wind of the flight seen before)")?;
+            }
         }
         for (flight, horizons) in &self.held_out {
             writeln!(f, "  {flight}")?;
@@ -480,8 +483,10 @@ impl Report {
                         change.persistence,
                     ]
                     .map(rounded);
+                    let wind =
+                        change.own_wind.map_or(String::new(), |error| format!("; wind {}", rounded(error)));
                     format!(
-                        "{name} {before} -> {after} ({own_trim}; {disturbance}; {persistence}) {}",
+                        "{name} {before} -> {after} ({own_trim}; {disturbance}; {persistence}{wind}) {}",
                         change.unit
                     )
                 };
@@ -632,6 +637,7 @@ mod tests {
             persistence: 1.0,
             own_trim: after,
             disturbance: after,
+            own_wind: None,
             measured_attitude: None,
             by_axis: [0.0; 3],
             unit: "m",

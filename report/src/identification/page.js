@@ -153,15 +153,16 @@ const horizons = (flights) => [...new Set(Object.values(flights).flatMap(Object.
 const floorOf = (channel, horizon) => report.noise_floor[channel]?.prediction[horizon];
 
 function fillErrors(id, flights) {
+  const hasWinds = report.winds.length > 0;
   const rows = (flight, errors) => horizons({ errors }).flatMap((horizon) => CHANNELS.filter((name) => errors[horizon][name]).map((channel) => {
-    const { before, after, persistence, own_trim, disturbance, measured_attitude, by_axis, unit } = errors[horizon][channel];
+    const { before, after, persistence, own_trim, disturbance, own_wind, measured_attitude, by_axis, unit } = errors[horizon][channel];
     const flown = data.bus?.flights[flight]?.[horizon]?.[channel];
-    return [horizon, left(channel), number(before), number(after), ...by_axis.map((error) => number(error)), number(own_trim), number(disturbance), number(measured_attitude),
+    return [horizon, left(channel), number(before), number(after), ...by_axis.map((error) => number(error)), number(own_trim), number(disturbance), ...(hasWinds ? [number(own_wind)] : []), number(measured_attitude),
       number(persistence), left(shownUnit(unit)), change(before, after),
       number(floorOf(channel, horizon)), ...(data.bus ? [number(flown?.before), number(flown?.after)] : [])];
   }));
   const onBus = data.bus ? ["declared, on the bus", "new, on the bus"] : [];
-  fillTable(id, [left("flight"), "horizon [s]", left("channel"), "declared", "new", "x", "y", "z", "own trim", "disturbance seen",
+  fillTable(id, [left("flight"), "horizon [s]", left("channel"), "declared", "new", "x", "y", "z", "own trim", "disturbance seen", ...(hasWinds ? ["wind seen"] : []),
     "attitude as measured", "persistence", left("unit"), "change", "by noise alone", ...onBus],
     Object.entries(flights).flatMap(([flight, errors]) => grouped(flight, rows(flight, errors))));
 }
