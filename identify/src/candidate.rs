@@ -183,6 +183,17 @@ mod tests {
         unidentifiable.into_iter().filter(|one| one.effect == effect).map(|one| one.needs).collect()
     }
 
+    #[test]
+    fn a_candidate_takes_the_place_of_those_that_it_holds() {
+        let of = |free: &[usize]| Candidate { kind: &flight_wind::FLIGHT_WIND, free: free.to_vec() };
+        let (drag, wind, winds) = (of(&[1]), of(&[2, 3]), of(&[2, 3, 4, 5]));
+        let accepted = [drag.clone(), wind.clone()];
+        assert_eq!(with(&accepted, &winds), [drag.clone(), winds.clone()]);
+        assert!(wind.is_in(&[drag.clone(), winds.clone()]) && !winds.is_in(&accepted));
+        assert_eq!(winds.beside(&free_parameters(&accepted)), [1]);
+        assert_eq!(with(&accepted, &of(&[6])), [drag, wind, of(&[6])]);
+    }
+
     /// Commands and an inertial unit alone show only the sum of both delays.
     #[test]
     fn attitude_and_rotor_speeds_are_a_third_clock() {

@@ -110,7 +110,8 @@ fn of_ratios(
     open.iter().filter(is_other).filter_map(rival).collect()
 }
 
-/// The candidates of other effects but the winds of flights, which have many numbers, with at least [`NEAR`] of the gain of `candidate`, in the round that took it.
+/// The candidates of other effects with at least [`NEAR`] of the gain of `candidate`, in the round that took it. Winds of flights have many numbers, and
+/// are no rival.
 fn that_came_near<'s>(selection: &'s Selection, candidate: &Candidate) -> Vec<&'s Candidate> {
     let took = |round: &&Round| round.taken().is_some_and(|taken| taken.candidate == *candidate);
     let Some(round) = selection.rounds.iter().find(took) else { return Vec::new() };

@@ -16,7 +16,7 @@ const LEAST_GAIN: f64 = 0.002;
 pub const FALSE_RATE: f64 = 0.01;
 /// A smaller part of a plausible value is not worth naming.
 const LEAST_PART: f64 = 0.01;
-/// Winds of flights that differ by less are one wind: so much pass trims for, too; tuned, no source.
+/// Winds of flights that differ from their mean by less are one wind: trims pass for as much; tuned, no source.
 const LEAST_WIND_M_S: f64 = 0.3;
 /// A bound that is passed by a smaller part of a plausible change is not passed: what the model lacks elsewhere moves estimates by as much.
 const BEYOND_PART: f64 = 0.1;
