@@ -7,6 +7,7 @@ use anyhow::{Context, Result, anyhow};
 use bus::description::DESCRIBE_VARIABLE;
 use bus::group::GROUP_VARIABLE;
 use bus::process::{LAUNCHER_VARIABLE, RUN_VARIABLE};
+use bus::random::{FNV_OFFSET, fnv1a};
 use bus::{GENERATION_VARIABLE, NODE_VARIABLE};
 use std::fs::{File, OpenOptions};
 use std::io;
@@ -19,6 +20,13 @@ const NOTIFY_VARIABLE: &str = "NOTIFY_SOCKET";
 
 /// The environment variable with the folder of a command for files of its own, which goes with the run.
 pub const SCRATCH_VARIABLE: &str = "HUMMINGBUS_SCRATCH";
+
+/// Beginning of the names of a group's files.
+const GROUP_PREFIX: &str = "group.";
+/// Longest name of a file that the kernel allows, in bytes (`NAME_MAX`).
+const FILE_NAME_BYTES: usize = 255;
+/// Longest beginning that a shortened file name keeps, in bytes.
+const BEGINNING_BYTES: usize = 64;
 
 /// Process to start.
 #[derive(Clone, Copy)]
@@ -73,7 +81,8 @@ pub fn start(
         command.env(SCRATCH_VARIABLE, scratch(name, role, run_dir)?);
     }
     let log = program.and_then(|program| program.log.as_deref());
-    let log_name = if matches!(started, Started::Group) { format!("group.{name}") } else { name.to_owned() };
+    let log_name =
+        if matches!(started, Started::Group) { format!("{GROUP_PREFIX}{name}") } else { name.to_owned() };
     let (file, path) = open_log(&log_name, role, run_dir, log)?;
     command
         .env(RUN_VARIABLE, run_dir)
@@ -131,17 +140,26 @@ fn command(exe: &Path, started: Started<'_>) -> Command {
 
 /// A folder for the files of a process, which is removed with the run directory. A backup and a restarted process have their own.
 fn scratch(name: &str, role: Role, run_dir: &Path) -> Result<PathBuf> {
-    let path = run_dir.join(format!("{}.scratch", file_name(name, role)));
+    let path = run_dir.join(file_name(name, role, "scratch"));
     std::fs::create_dir_all(&path)
         .with_context(|| format!("process `{name}`: cannot make the folder {}", path.display()))?;
     Ok(path)
 }
 
-/// Name of the files of a process in the run directory: a backup and a restarted process have their number in it.
-fn file_name(name: &str, role: Role) -> String {
+/// Name of a file of a process in the run directory: a backup and a restarted process have their number in it. A name that is too
+/// long for a file, or that another name would share, is cut, and a hash of the whole name follows.
+fn file_name(name: &str, role: Role, ending: &str) -> String {
     let generation = role.generation();
     let number = if generation == 0 { String::new() } else { format!("#{generation}") };
-    format!("{}{number}", name.replace('/', "."))
+    let stem = name.replace('/', ".");
+    let whole = format!("{stem}{number}.{ending}");
+    // No name of a process has a dot or a tilde. A group's that has one would be the file of `a/b` or of a cut name.
+    let is_taken = name.strip_prefix(GROUP_PREFIX).unwrap_or(name).contains(['.', '~']);
+    if whole.len() <= FILE_NAME_BYTES && !is_taken {
+        return whole;
+    }
+    let beginning = &stem[..stem.floor_char_boundary(BEGINNING_BYTES)];
+    format!("{beginning}~{:016x}{number}.{ending}", fnv1a(name.as_bytes(), FNV_OFFSET))
 }
 
 /// Log file of a process: the file that the manifest names, to which a backup appends, or one in the run directory.
@@ -151,7 +169,7 @@ fn open_log(name: &str, role: Role, run_dir: &Path, log: Option<&Path>) -> Resul
         let file = append_to_log(path).with_context(|| format!("process `{name}`"))?;
         return Ok((file, path.to_owned()));
     }
-    let path = run_dir.join(format!("{}.log", file_name(name, role)));
+    let path = run_dir.join(file_name(name, role, "log"));
     let file = OpenOptions::new().create(true).append(true).open(&path);
     Ok((file.with_context(|| format!("process `{name}`: cannot open {}", path.display()))?, path))
 }
@@ -173,4 +191,39 @@ fn set_priority(child: &Child, name: &str, program: &Program) -> Result<()> {
         })?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FIRST: Role = Role::Node { node: 0, generation: 0 };
+    const RESTARTED: Role = Role::Node { node: 0, generation: u32::MAX };
+
+    #[test]
+    fn a_short_name_stays_whole() {
+        assert_eq!(file_name("h1/plant", FIRST, "log"), "h1.plant.log");
+        assert_eq!(file_name("h1/plant", Role::Node { node: 0, generation: 2 }, "log"), "h1.plant#2.log");
+        let longest = "g".repeat(FILE_NAME_BYTES - ".log".len());
+        assert_eq!(file_name(&longest, FIRST, "log"), format!("{longest}.log"));
+    }
+
+    #[test]
+    fn long_names_give_files_of_different_names() {
+        let folder = tempfile::tempdir().unwrap();
+        let members = |last: &str| format!("group.{}{last}", "h1/plant+".repeat(40));
+        let unicode = format!("group.{}", "é".repeat(300));
+        let mut names = vec![members("h1/imu"), members("h1/ekf"), "g".repeat(252), unicode];
+        names.extend(["group.a/b", "group.a.b", "group.a~b"].map(str::to_owned));
+        names.push(file_name(&names[0], FIRST, "log").replace(".log", ""));
+        for name in &names {
+            for (role, ending) in [(FIRST, "log"), (RESTARTED, "log"), (FIRST, "scratch")] {
+                let file = file_name(name, role, ending);
+                // A name that another one has is refused here, and so is one that is too long.
+                let made = File::create_new(folder.path().join(&file));
+                assert!(made.is_ok(), "{file}: {made:?}");
+            }
+        }
+        assert!(file_name(&members("h1/imu"), FIRST, "log").starts_with("group.h1.plant+h1.plant+"));
+    }
 }

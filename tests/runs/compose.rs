@@ -98,6 +98,21 @@ fn a_group_of_a_manifest_flies_and_is_listed() {
     launch.end_among_others().with_code(1);
 }
 
+/// No file can have the name of this group.
+#[test]
+fn a_group_with_a_long_name_flies() {
+    let place = Place::new();
+    let text = format!(
+        "include = [{:?}]\n[run]\nduration_s = 0.2\n[group.{}]\nprocesses = [\"imu\", \"mocap\"]\n",
+        repository("manifests/hover.toml"),
+        "g".repeat(300)
+    );
+    let manifest = place.write("long.toml", text);
+    // The conditions see no sample in a flight this short.
+    let ended = place.call(&["run", &manifest, "--record", &place.path("long.mcap"), "--json"]).with_code(1);
+    assert_eq!(ended.json()["ticks"], 200, "{ended}");
+}
+
 #[test]
 fn a_group_that_cannot_be_is_refused_with_the_reason() {
     let place = Place::new();
