@@ -150,7 +150,7 @@ impl Graph {
             true => faults.keep(groups::of(manifest, &declared_nodes, &plan.nodes)),
             false => None,
         };
-        let groups = groups.map(|groups| placement::place_groups(&plan, groups));
+        let groups = groups.map(|groups| placement::place_groups(&mut plan, groups));
         if manifest.content.run.window_ticks.is_none() && groups.as_ref().is_some_and(|it| !it.is_empty()) {
             plan.window_ticks = GROUPS_WINDOW_TICKS;
         }

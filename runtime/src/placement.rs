@@ -68,16 +68,17 @@ pub fn place(plan: &mut Plan, clock_cpu: Option<usize>) {
     }
 }
 
-/// Gives each of `groups` without a core that of its first member in a feedback loop, or else of its first member.
-pub fn place_groups(plan: &Plan, groups: Vec<GroupPlan>) -> Vec<GroupPlan> {
+/// Gives each of `groups` without a core that of its first member in a feedback loop, or else of its first member. All
+/// members get the core of their group.
+pub fn place_groups(plan: &mut Plan, mut groups: Vec<GroupPlan>) -> Vec<GroupPlan> {
     let loops = feedback_loops(plan);
-    let placed = |group: GroupPlan| {
-        let nodes = || group.members.iter().map(|member| member.node);
-        let node = nodes().find(|&node| loops[node].is_some()).or_else(|| nodes().next());
-        let cpu = group.cpu.or_else(|| plan.nodes[node?].cpu);
-        GroupPlan { cpu, ..group }
-    };
-    groups.into_iter().map(placed).collect()
+    for group in &mut groups {
+        let nodes: Vec<usize> = group.members.iter().map(|member| member.node).collect();
+        let leading = nodes.iter().copied().find(|&node| loops[node].is_some()).or(nodes.first().copied());
+        group.cpu = group.cpu.or_else(|| plan.nodes[leading?].cpu);
+        nodes.into_iter().for_each(|node| plan.nodes[node].cpu = group.cpu);
+    }
+    groups
 }
 
 /// Number of the feedback loop of each node, if it is in one: nodes that reach each other, delays included.

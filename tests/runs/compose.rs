@@ -136,14 +136,38 @@ fn a_group_that_cannot_be_is_refused_with_the_reason() {
 fn a_group_has_the_core_of_its_member_in_a_feedback_loop() {
     let place = Place::new();
     let sensors = repository("manifests/sensors.toml");
-    let plan =
-        place.call(&["check", &sensors, "--compose", "imu+battery,plant", "--json"]).with_code(0).json();
-    let cpu = |list: &str, name: &str| {
-        let found = plan[list].as_array().unwrap().iter().find(|entry| entry["name"] == name);
-        found.unwrap_or_else(|| panic!("{plan}"))["cpu"].clone()
+    let plan = |composition: &str| {
+        place.call(&["check", &sensors, "--compose", composition, "--json"]).with_code(0).json()
     };
-    assert_eq!(cpu("groups", "imu+battery"), cpu("nodes", "imu"));
-    assert_eq!(cpu("groups", "plant"), cpu("nodes", "plant"));
+    let (composed, apart) = (plan("imu+battery,plant"), plan("none"));
+    for (group, node) in [("imu+battery", "imu"), ("plant", "plant")] {
+        assert_eq!(cpu(&composed, "groups", group), cpu(&apart, "nodes", node));
+    }
+    assert_eq!(cpu(&composed, "nodes", "battery"), cpu(&composed, "groups", "imu+battery"));
+}
+
+/// Core of the entry `name` in a `list` of a checked plan.
+fn cpu(plan: &serde_json::Value, list: &str, name: &str) -> serde_json::Value {
+    let found = plan[list].as_array().unwrap().iter().find(|entry| entry["name"] == name);
+    found.unwrap_or_else(|| panic!("{plan}"))["cpu"].clone()
+}
+
+#[test]
+fn members_have_the_core_that_their_group_states() {
+    let place = Place::new();
+    for core in bus::process::allowed_cores().into_iter().take(2) {
+        let text = format!(
+            "include = [{:?}]\n[group.est]\nprocesses = [\"imu\", \"ekf\"]\ncpu = {core}\n",
+            repository("manifests/hover.toml")
+        );
+        let manifest = place.write("placed.toml", text);
+        let plan = place.call(&["check", &manifest, "--json"]).with_code(0).json();
+        for (list, name) in [("groups", "est"), ("nodes", "imu"), ("nodes", "ekf")] {
+            assert_eq!(cpu(&plan, list, name), core, "{name}");
+        }
+        let lines = [format!("imu (imu), 1000 Hz, cpu {core}"), format!("ekf (ekf), 1000 Hz, cpu {core}")];
+        place.call(&["check", &manifest]).with_code(0).prints(&[&lines[0], &lines[1]]);
+    }
 }
 
 #[test]
