@@ -28,7 +28,7 @@ pub struct CtlArguments {
 
 #[derive(Clone, Subcommand)]
 enum CtlVerb {
-    /// Say how far the run has come.
+    /// Say how far the run has come, and list its groups.
     Status,
     /// Hold the run at the next tick boundary, and wait until it is held.
     Pause,

@@ -171,7 +171,7 @@ fn members_have_the_core_that_their_group_states() {
 }
 
 #[test]
-fn top_names_the_group_of_each_member() {
+fn a_live_run_names_the_group_of_each_member() {
     let place = Place::new();
     let (manifest, recording) = (repository("manifests/hover.toml"), place.path("watched.mcap"));
     let compose = ["--record", &recording, "--compose", "imu+ekf"];
@@ -187,6 +187,14 @@ fn top_names_the_group_of_each_member() {
     let grouped = processes.iter().filter(|process| process["group"] == "imu+ekf");
     let names: Vec<_> = grouped.map(|process| process["name"].clone()).collect();
     assert_eq!(names, ["ekf", "imu"]);
+    let status = |more: &[&str]| {
+        let run = place.run_id();
+        let started = place.start(&[&["ctl", "status", "--run", &run], more].concat());
+        started.end_among_others().with_code(0)
+    };
+    status(&[]).prints(&["\ngroup imu+ekf: ekf, imu"]);
+    let groups = serde_json::json!([{ "name": "imu+ekf", "members": ["ekf", "imu"] }]);
+    assert_eq!(status(&["--json"]).json()["groups"], groups);
     let height_m = view["vehicles"][0]["height_m"].as_f64().unwrap();
     assert!((0.9..1.6).contains(&height_m), "{view}");
     launch.signal(Signal::INT);

@@ -135,6 +135,7 @@ mod tests {
                 time_s: 12.345,
                 pace: PaceSetting(Pace::Factor(0.5)),
                 missed_deadlines: 2,
+                groups: vec![],
             },
             span_s: 1.0,
             real_time_factor: 0.4999,

@@ -6,6 +6,7 @@ use crate::ctl::server::{Asked, Remote, Reply, Server};
 use crate::rewind::{Rewind, Rewinds};
 use anyhow::{Context as _, Result, bail};
 use bus::lockstep::SupervisorView;
+use bus::membership::Membership;
 use bus::plan::Plan;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::Receiver;
@@ -17,6 +18,7 @@ const MAX_A_LOOK: usize = 16;
 
 /// Serves requests about a run, a look at a time.
 pub struct ControlServer<'a> {
+    run_dir: PathBuf,
     plan: &'a Plan,
     control: &'a SupervisorView,
     server: Server<'a>,
@@ -63,7 +65,8 @@ impl<'a> ControlServer<'a> {
             control.set_pace(pace);
             (Goal::Rewind { from_tick, to_tick }, reply)
         });
-        Ok(Self { plan, control, server, checkpoints, rewinds, wish })
+        let run_dir = run_dir.to_owned();
+        Ok(Self { run_dir, plan, control, server, checkpoints, rewinds, wish })
     }
 
     /// Serves the requests since the last look; returns one that is not about the clock, a swap.
@@ -72,7 +75,7 @@ impl<'a> ControlServer<'a> {
         for _ in 0..MAX_A_LOOK {
             let (request, reply) = self.server.poll()?;
             match request {
-                Request::Status => drop(reply.send(&Answer::Status(Status::of(self.plan, self.control)))),
+                Request::Status => drop(reply.send(&Answer::Status(self.status()))),
                 Request::Pause => self.wish(0, Goal::Pause, reply),
                 Request::Step { ticks } => self.wish(0, Goal::PauseToStep(ticks.max(1)), reply),
                 Request::Resume => self.resume(reply),
@@ -98,6 +101,12 @@ impl<'a> ControlServer<'a> {
             self.grant_wish();
         }
         None
+    }
+
+    fn status(&self) -> Status {
+        let membership = Membership::load(&self.run_dir, self.control.epoch());
+        let membership = membership.unwrap_or_else(|_| Membership::first(self.plan));
+        Status::of(self.plan, self.control).with_groups(self.plan, &membership)
     }
 
     fn has_ended_at(&self, tick: u32) -> bool {

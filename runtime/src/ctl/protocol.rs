@@ -2,6 +2,7 @@
 
 use crate::manifest::PaceSetting;
 use bus::lockstep::{LiveView, Phase};
+use bus::membership::Membership;
 use bus::plan::Plan;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -170,10 +171,22 @@ pub struct Status {
     pub pace: PaceSetting,
     /// Deadlines missed (paced runs).
     pub missed_deadlines: u32,
+    /// Groups whose processes are alive, in the answer to a request.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub groups: Vec<Group>,
+}
+
+/// Nodes of a run that share a process.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Group {
+    /// Name of the group.
+    pub name: String,
+    /// Names of its nodes; without those that a process of their own has replaced.
+    pub members: Vec<String>,
 }
 
 impl Status {
-    /// Progress of the run of `plan`.
+    /// Progress of the run of `plan`, without its groups.
     pub fn of(plan: &Plan, control: &LiveView) -> Self {
         let tick = control.completed_ticks();
         Self {
@@ -184,21 +197,40 @@ impl Status {
             time_s: f64::from(tick) * plan.tick_s(),
             pace: PaceSetting(control.pace()),
             missed_deadlines: control.missed_deadlines(),
+            groups: Vec::new(),
         }
+    }
+
+    /// Adds the groups of `plan`, with the members that `membership` has in them still.
+    #[must_use]
+    pub fn with_groups(mut self, plan: &Plan, membership: &Membership) -> Self {
+        let groups = plan.groups.iter().map(|group| {
+            let nodes = group.members.iter().map(|member| member.node);
+            // A member's successor has a process of its own.
+            let members = nodes.filter(|&node| membership.nodes[node].primary.generation == 0);
+            let members = members.map(|node| plan.nodes[node].name.clone()).collect();
+            Group { name: group.name.clone(), members }
+        });
+        self.groups = groups.filter(|group| !group.members.is_empty()).collect();
+        self
     }
 }
 
 impl std::fmt::Display for Status {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { run_id, state, tick, end_tick, time_s, pace, missed_deadlines } = self;
+        let Self { run_id, state, tick, end_tick, time_s, pace, missed_deadlines, groups } = self;
         write!(f, "{run_id}: {state} at tick {tick} of {end_tick} ({time_s:.3} s), pace {pace}")?;
-        if *missed_deadlines > 0 { write!(f, ", {missed_deadlines} deadlines missed") } else { Ok(()) }
+        if *missed_deadlines > 0 {
+            write!(f, ", {missed_deadlines} deadlines missed")?;
+        }
+        let mut groups = groups.iter();
+        groups.try_for_each(|Group { name, members }| write!(f, "\ngroup {name}: {}", members.join(", ")))
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Answer, Request};
+    use super::{Answer, Request, Status};
 
     /// Requires that `line` is the text of a request, and that a request is written as `line`.
     fn require_round_trip(line: &str) {
@@ -221,6 +253,18 @@ mod tests {
         for wrong in [r#"{"request":"fly"}"#, r#"{"request":"step"}"#, r#"{"request":"pace","pace":-1}"#] {
             assert!(serde_json::from_str::<Request>(wrong).is_err(), "{wrong}");
         }
+    }
+
+    #[test]
+    fn a_status_has_a_line_for_each_group() {
+        let progress = r#"{"run_id":"1-a","state":"paused","tick":5,"end_tick":9,"time_s":0.005,"pace":"free","missed_deadlines":2"#;
+        let read = |more: &str| serde_json::from_str::<Status>(&format!("{progress}{more}}}")).unwrap();
+        let line = "1-a: paused at tick 5 of 9 (0.005 s), pace free, 2 deadlines missed";
+        assert_eq!(read("").to_string(), line);
+        assert_eq!(serde_json::to_string(&read("")).unwrap(), format!("{progress}}}"));
+        let groups = r#","groups":[{"name":"a","members":["ekf","imu"]},{"name":"b","members":["plant"]}]"#;
+        assert_eq!(read(groups).to_string(), format!("{line}\ngroup a: ekf, imu\ngroup b: plant"));
+        assert_eq!(serde_json::to_string(&read(groups)).unwrap(), format!("{progress}{groups}}}"));
     }
 
     #[test]

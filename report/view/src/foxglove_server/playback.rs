@@ -252,6 +252,7 @@ mod tests {
             time_s: 0.5,
             pace: PaceSetting(pace),
             missed_deadlines: 0,
+            groups: Vec::new(),
         }
     }
 
