@@ -4,10 +4,9 @@ use crate::recordings::require_same;
 use crate::support::{Place, repository};
 use rand_core::Rng;
 use rustix::process::{Signal, kill_process};
+use serde_json::Value;
 use std::fs;
-
-/// The nodes of hover.toml that can be members of a group.
-const NODES: [&str; 6] = ["controller", "ekf", "imu", "mocap", "pilot", "plant"];
+use std::ops::Range;
 
 /// Flies `manifest` for `duration_s` with `more` arguments; returns the recording.
 fn fly(place: &Place, manifest: &str, duration_s: f64, more: &[&str]) -> String {
@@ -20,14 +19,16 @@ fn fly(place: &Place, manifest: &str, duration_s: f64, more: &[&str]) -> String 
     recording
 }
 
-/// Requires that `manifest` gives the same file with each of these compositions as without any.
+/// Requires that `manifest` with `settings` gives the same file with each of these compositions as without any.
 #[track_caller]
-fn require_same_file(manifest: &str, duration_s: f64, compositions: &[String]) {
+fn require_same_file(manifest: &str, duration_s: f64, settings: &[&str], compositions: &[String]) {
+    let more: Vec<&str> = settings.iter().flat_map(|setting| ["--set", setting]).collect();
     let place = Place::new();
-    let alone = fs::read(fly(&place, manifest, duration_s, &["--compose", "none"])).unwrap();
+    let alone = fs::read(fly(&place, manifest, duration_s, &[&more[..], &["--compose", "none"]].concat()));
+    let alone = alone.unwrap();
     for composition in compositions {
         let place = Place::new();
-        let composed = fly(&place, manifest, duration_s, &["--compose", composition]);
+        let composed = fly(&place, manifest, duration_s, &[&more[..], &["--compose", composition]].concat());
         assert!(
             alone == fs::read(&composed).unwrap(),
             "{manifest}: another file with --compose {composition}"
@@ -35,24 +36,56 @@ fn require_same_file(manifest: &str, duration_s: f64, compositions: &[String]) {
     }
 }
 
-/// A partition of the nodes of hover.toml, drawn from `seed`; a set of one node is no group.
-fn partition(seed: u64) -> String {
+/// The nodes of `manifest` that can be members of a group.
+fn nodes(manifest: &str) -> Vec<String> {
+    let args = ["check", &repository(manifest), "--compose", "all", "--json"];
+    let plan = Place::new().call(&args).with_code(0).json();
+    let members = plan["groups"][0]["members"].as_array().unwrap().iter();
+    let node = |member: &Value| &plan["nodes"][usize::try_from(member["node"].as_u64().unwrap()).unwrap()];
+    members.map(|member| node(member)["name"].as_str().unwrap().to_owned()).collect()
+}
+
+/// A partition of `nodes`, drawn from `seed`; a set of one node is no group.
+fn partition(nodes: &[String], seed: u64) -> String {
     let mut random = bus::random::stream(seed, "partition");
     let mut sets: [Vec<&str>; 3] = Default::default();
-    NODES.iter().for_each(|node| sets[(random.next_u64() % 3) as usize].push(node));
+    nodes.iter().for_each(|node| sets[(random.next_u64() % 3) as usize].push(node));
     let groups: Vec<String> = sets.iter().filter(|set| set.len() > 1).map(|set| set.join("+")).collect();
     if groups.is_empty() { "none".to_owned() } else { groups.join(",") }
 }
 
-#[test]
-fn every_partition_of_the_hover_gives_the_same_file() {
-    let drawn = (0..12).map(partition);
-    require_same_file("manifests/hover.toml", 1.0, &drawn.chain(["all".to_owned()]).collect::<Vec<_>>());
+/// Partitions of the nodes of `manifest`, drawn from `seeds`.
+fn partitions(manifest: &str, seeds: Range<u64>) -> Vec<String> {
+    let nodes = nodes(manifest);
+    seeds.map(|seed| partition(&nodes, seed)).collect()
 }
 
 #[test]
-fn ten_vehicles_give_the_same_file_whole_by_vehicle_and_apart() {
-    require_same_file("manifests/ten-vehicles.toml", 0.3, &["all".to_owned(), "vehicles".to_owned()]);
+fn every_partition_of_the_hover_gives_the_same_file() {
+    let mut compositions = partitions("manifests/hover.toml", 0..12);
+    compositions.push("all".to_owned());
+    require_same_file("manifests/hover.toml", 1.0, &[], &compositions);
+}
+
+/// The swaps are moved to the beginning: the controller that is replaced is a member, or is not.
+#[test]
+fn partitions_of_other_flights_give_the_same_file() {
+    let swaps = ["swap.0.at_tick=250", "swap.1.at_tick=500", "swap.2.at_tick=750"];
+    for (manifest, duration_s, settings, seeds) in [
+        ("manifests/wall-follow-varying.toml", 0.5, &[][..], 12..15),
+        ("manifests/figure-eight.toml", 0.5, &[], 15..18),
+        ("manifests/swap-laws.toml", 0.9, &swaps, 18..21),
+    ] {
+        require_same_file(manifest, duration_s, settings, &partitions(manifest, seeds));
+    }
+}
+
+#[test]
+fn ten_vehicles_give_the_same_file_whole_by_vehicle_and_in_any_partition() {
+    let manifest = "manifests/ten-vehicles.toml";
+    let mut compositions = partitions(manifest, 21..22);
+    compositions.extend(["all".to_owned(), "vehicles".to_owned()]);
+    require_same_file(manifest, 0.3, &[], &compositions);
 }
 
 #[test]
@@ -67,7 +100,7 @@ fn contacts_walls_figures_and_swaps_give_the_same_file() {
     ] {
         // swap-laws swaps up to 9 s.
         let duration_s = if manifest.contains("swap") { 12.0 } else { 2.5 };
-        require_same_file(manifest, duration_s, &["all".to_owned()]);
+        require_same_file(manifest, duration_s, &[], &["all".to_owned()]);
     }
 }
 
@@ -147,7 +180,7 @@ fn a_group_has_the_core_of_its_member_in_a_feedback_loop() {
 }
 
 /// Core of the entry `name` in a `list` of a checked plan.
-fn cpu(plan: &serde_json::Value, list: &str, name: &str) -> serde_json::Value {
+fn cpu(plan: &Value, list: &str, name: &str) -> Value {
     let found = plan[list].as_array().unwrap().iter().find(|entry| entry["name"] == name);
     found.unwrap_or_else(|| panic!("{plan}"))["cpu"].clone()
 }
