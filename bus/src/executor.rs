@@ -6,7 +6,7 @@
 
 use crate::component::Transfer;
 use crate::computation::Computation;
-use crate::connected::{ConnectedNode, Turn};
+use crate::connected::{Awaited, ConnectedNode, Turn};
 use crate::depths::depths;
 use crate::error::BusError;
 use crate::local::LocalTopic;
@@ -15,6 +15,8 @@ use std::time::Duration;
 
 /// Sleep of a process that has completed its ticks, between two looks whether its last samples were taken.
 const RETIREMENT_NAP: Duration = Duration::from_millis(1);
+/// Sleep of a group that waits while a member leaves, between two looks at that member. No count wakes a process for it.
+const LEAVING_NAP: Duration = Duration::from_micros(100);
 /// A group reports its progress this many times a window, so that the clock's window never runs out meanwhile.
 const TELLS_PER_WINDOW: u32 = 8;
 
@@ -159,7 +161,7 @@ impl<'c> Executor<'c> {
                     self.tell();
                     self.look_at_leaving()?;
                     self.now_ns = None;
-                    if !self.members[index].node.wait(awaited)? {
+                    if !self.wait(index, awaited)? {
                         return Ok(Turn::Leave);
                     }
                 }
@@ -177,6 +179,16 @@ impl<'c> Executor<'c> {
                 turn => return Ok(turn),
             }
         }
+    }
+
+    /// Waits for the need of member `index`; false if it will not be met. The run may be held until a member has left: then no
+    /// need is met before, and the wait ends after a nap.
+    fn wait(&self, index: usize, awaited: Awaited) -> Result<bool, BusError> {
+        if self.leaving.is_empty() {
+            return self.members[index].node.wait(awaited);
+        }
+        std::thread::sleep(LEAVING_NAP);
+        Ok(true)
     }
 
     /// Updates the counts of all members in the control segment.

@@ -67,17 +67,25 @@ fn every_partition_of_the_hover_gives_the_same_file() {
     require_same_file("manifests/hover.toml", 1.0, &[], &compositions);
 }
 
-/// The swaps are moved to the beginning: the controller that is replaced is a member, or is not.
+/// The swaps of swap-laws.toml at the beginning of the flight. The second backup joins soon after the first has taken over.
+const EARLY_SWAPS: [&str; 3] = ["swap.0.at_tick=250", "swap.1.at_tick=500", "swap.2.at_tick=750"];
+
 #[test]
 fn partitions_of_other_flights_give_the_same_file() {
-    let swaps = ["swap.0.at_tick=250", "swap.1.at_tick=500", "swap.2.at_tick=750"];
     for (manifest, duration_s, settings, seeds) in [
         ("manifests/wall-follow-varying.toml", 0.5, &[][..], 12..15),
         ("manifests/figure-eight.toml", 0.5, &[], 15..18),
-        ("manifests/swap-laws.toml", 0.9, &swaps, 18..21),
+        ("manifests/swap-laws.toml", 0.9, &EARLY_SWAPS, 18..21),
     ] {
         require_same_file(manifest, duration_s, settings, &partitions(manifest, seeds));
     }
+}
+
+/// The clock is held for the next backup until the member before has left its group, whose other members wait meanwhile.
+#[test]
+fn a_member_leaves_its_group_while_the_others_wait() {
+    let compositions = ["controller+imu,ekf+pilot+trajectory", "controller+imu"].map(str::to_owned);
+    require_same_file("manifests/swap-laws.toml", 0.9, &EARLY_SWAPS, &compositions);
 }
 
 #[test]
