@@ -1,6 +1,8 @@
 //! Runs in this very process: nodes on threads, two at a time, stopped, steered, and nodes that fail.
 
-use hummingbus::{Answer, Host, Launcher, Manifest, Request, RunEvent, StopToken};
+use hummingbus::flights::FlightSet;
+use hummingbus::report::validate::Validation;
+use hummingbus::{Answer, COMPONENTS, Host, Launcher, Manifest, Request, RunEvent, StopToken};
 use std::path::{Path, PathBuf};
 
 fn hover() -> Manifest {
@@ -111,4 +113,30 @@ fn what_threads_cannot_have_is_refused_in_words() {
         let (message, name) = (refused(key, value), key.rsplit('.').next().unwrap());
         assert!(message.contains(name) && message.contains("needs a process of its own"), "{message}");
     }
+}
+
+/// This test is a program that embeds the library: executed once more, it would run its tests.
+#[test]
+fn flights_are_flown_again_in_this_thread_or_on_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let repository = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let manifest = hummingbus::load(repository.join("manifests/identify/hover-gentle.toml")).unwrap();
+    let manifest = manifest.set("run.duration_s", 2.001).unwrap();
+    recorded(Launcher::new(Host::InProcess), &manifest, folder.path().join("flown.mcap"));
+    let vehicle = repository.join("vehicles/hummingbird.toml");
+    let text = format!(
+        "vehicle = {vehicle:?}\n[channels]\ncommand = {{ topic = \"/controller/command\" }}\n\
+         position = {{ topic = \"/mocap/mocap\" }}\nattitude = {{ topic = \"/mocap/mocap\" }}\n\
+         angular_velocity = {{ topic = \"/imu/imu\" }}\n\
+         [[flight]]\nname = \"course\"\nfile = \"flown.mcap\"\nrole = \"test\"\n"
+    );
+    std::fs::write(folder.path().join("flights.toml"), text).unwrap();
+    let flights = FlightSet::load(&folder.path().join("flights.toml")).unwrap();
+    let stop = StopToken::new();
+    let here = Validation::new(COMPONENTS, &stop);
+    let threads = Validation { host: Host::Threads, ..here.clone() };
+    let errors = |how: &Validation<'_>| how.errors(&[vehicle.as_path()], &flights, &mut |_| {}).unwrap().json();
+    let (here, of_threads) = (errors(&here), errors(&threads));
+    assert!(here["flights"]["course"]["horizons"]["0.5"]["windows"].as_u64().unwrap() > 0, "{here}");
+    assert_eq!(here, of_threads);
 }

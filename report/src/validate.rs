@@ -30,6 +30,7 @@ use flights::{Flight, FlightSet};
 use labels::labels;
 use replay::Replay;
 use runtime::event::StopToken;
+use runtime::host::Host;
 use runtime::registry::Registry;
 use runtime::run_dir::Scratch;
 use std::collections::BTreeMap;
@@ -46,15 +47,19 @@ use vehicles::Vehicle;
 /// /// How well two vehicle files meet the flights, with the components that a program offers.
 /// fn compare(components: runtime::registry::Registry) -> Result<Errors, Box<dyn std::error::Error>> {
 ///     let flights = flights::FlightSet::load(Path::new("flights.toml"))?;
-///     let validation = Validation { components, stop: &StopToken::default(), keep: None };
+///     let stop = StopToken::default();
+///     let validation = Validation::new(components, &stop);
 ///     let vehicles = [Path::new("declared.toml"), Path::new("fitted.toml")];
 ///     Ok(validation.errors(&vehicles, &flights, &mut |line| println!("{line}"))?)
 /// }
 ///
 /// assert!(compare(runtime::registry::Registry::new(&[])).is_err(), "there are no such files");
 /// ```
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Validation<'a> {
+    /// Host of the runs. With [`Host::Exe`], this process is the parent of orphans during a run, as
+    /// [`Launcher::adopting_orphans`](runtime::launcher::Launcher::adopting_orphans) says.
+    pub host: Host,
     /// The components that a run may have; a player, a plant and a recorder are needed.
     pub components: Registry,
     /// Ends it.
@@ -63,7 +68,14 @@ pub struct Validation<'a> {
     pub keep: Option<&'a Path>,
 }
 
-impl Validation<'_> {
+impl<'a> Validation<'a> {
+    /// A validation with `components` in the thread that asks for it ([`Host::InProcess`]), which `stop` ends. No files are
+    /// kept.
+    #[must_use]
+    pub fn new(components: Registry, stop: &'a StopToken) -> Self {
+        Self { host: Host::InProcess, components, stop, keep: None }
+    }
+
     /// Flies the measured commands of every flight with each of `vehicles`, all vehicles of a flight in one run, and
     /// compares; `tell` is called with a line for each flight. Vehicle files that `flights` has read are not read
     /// again.
@@ -87,7 +99,7 @@ impl Validation<'_> {
             let replay = Replay::prepare(flight, vehicles, folder)
                 .with_context(|| format!("the flight `{}` cannot be replayed", flight.name))?;
             let (host_s, recording) = replay
-                .fly(self.components, self.stop, &flights.files, tell)
+                .fly(self, &flights.files, tell)
                 .with_context(|| not_flown(flight, self.keep.map(|_| replay.folder.as_path())))?;
             let flown = windows::flight_errors(flight, &replay, &recording, vehicles.len())?;
             tell(&format!("{}: {:.1} s flown in {host_s:.1} s", flight.name, replay.duration_s()));

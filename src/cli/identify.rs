@@ -9,7 +9,7 @@ use super::progress;
 use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand};
 use flights::FlightSet;
-use hummingbus::COMPONENTS;
+use hummingbus::{COMPONENTS, Host};
 use identify::proposal::Proposal;
 use identify::report::Report;
 use identify::run::Outcome;
@@ -156,7 +156,8 @@ fn flights_of(arguments: &IdentifyArguments, file: &Path, out: &Path) -> Result<
     let flown = if arguments.no_bus {
         None
     } else {
-        let how = Validation { components: COMPONENTS, stop: &stop_token()?, keep: None };
+        let stop = stop_token()?;
+        let how = Validation { host: Host::this_binary(), ..Validation::new(COMPONENTS, &stop) };
         let mut tell = |line: &str| say(&format!("on the bus: {line}"));
         identification::fly_again(&set, &vehicle, &outcome, &how, &mut tell)?
     };

@@ -7,7 +7,7 @@ use super::output::{print_json, print_text, say};
 use anyhow::{Result, bail};
 use clap::Args;
 use flights::FlightSet;
-use hummingbus::COMPONENTS;
+use hummingbus::{COMPONENTS, Host};
 use identify::steps_ahead::Between;
 use report::validate::{Notes, StepsAheadErrors, Validation, predicted_accelerations};
 use serde_json::Value;
@@ -76,8 +76,8 @@ pub fn validate(arguments: &ValidateArguments) -> Result<bool> {
         }
     };
     // Before there is a folder to remove, so that an interrupt leaves none.
-    let validation =
-        Validation { components: COMPONENTS, stop: &stop_token()?, keep: arguments.keep.as_deref() };
+    let (stop, keep) = (stop_token()?, arguments.keep.as_deref());
+    let validation = Validation { host: Host::this_binary(), keep, ..Validation::new(COMPONENTS, &stop) };
     let errors = validation.errors(&vehicles, &flights, &mut tell)?;
     print_with_notes(&flights, arguments.json, errors.json(), &errors.to_string())?;
     Ok(true)

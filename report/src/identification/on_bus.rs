@@ -14,7 +14,7 @@ use std::path::Path;
 const LEAST_REPLAY_S: f64 = 2.0;
 
 /// Flies the measured commands with the declared and the new vehicle on the bus, and compares the errors with the
-/// predictions of the report; `None` if no flight can be replayed.
+/// predictions of the report; `None` if no flight can be replayed. The flights have the host of `how`.
 ///
 /// # Errors
 /// As [`Validation::errors`].
