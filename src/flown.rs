@@ -2,6 +2,8 @@
 
 use diagnostics::Error;
 use recorder::reader::Recording;
+use report::beyond::with_envelope;
+use report::profile::Profile;
 use report::summary::Summary;
 use runtime::launcher::Launcher;
 use runtime::manifest::Manifest;
@@ -10,10 +12,13 @@ use std::path::Path;
 /// A flight that was flown and judged.
 #[derive(Debug)]
 pub struct Flown {
-    /// Verdicts, measures and comparisons; `passed` if all conditions hold. Its text is the summary of `hummingbus run`.
+    /// Verdicts, measures, comparisons and the warnings of the manifest; `passed` if all conditions hold. Its text is the summary of
+    /// `hummingbus run`.
     pub summary: Summary,
     /// The recording; `None` if the manifest has no recorder.
     pub recording: Option<Recording>,
+    /// Host time of the run, part by part; `None` if the manifest does not say `run.profile = true`.
+    pub profile: Option<Profile>,
 }
 
 /// Flies `manifest`, records it to `recording` if it has a recorder, and judges its conditions as `hummingbus run` does.
@@ -31,9 +36,15 @@ pub struct Flown {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn fly(launcher: Launcher<'_>, manifest: &Manifest, recording: impl AsRef<Path>) -> Result<Flown, Error> {
-    let (plan, mut outcome, recording) = launcher.fly_planned(manifest, recording.as_ref())?;
-    let figures = outcome.figures.take();
-    let mut summary = Summary::new(manifest.name(), outcome, plan.tick_s());
-    summary.judge_flight(recording.as_ref(), figures.as_deref(), &plan, &manifest.content)?;
-    Ok(Flown { summary, recording })
+    let (graph, mut outcome, recording) = launcher.fly_planned(manifest, recording.as_ref())?;
+    let (flight, figures) = (outcome.flight.take(), outcome.figures.take());
+    let path = recording.as_ref().map(Recording::path);
+    let profile = flight.as_ref().map(|flight| Profile::of(flight, outcome.missed_deadlines, path));
+    let mut summary = Summary::new(manifest.name(), outcome, graph.plan.tick_s());
+    summary.judge_flight(recording.as_ref(), figures.as_deref(), &graph.plan, &manifest.content)?;
+    if recording.is_none() {
+        summary.unevaluated = with_envelope(&graph.plan, &|path| graph.files.text(path).ok());
+    }
+    summary.warnings = graph.warnings;
+    Ok(Flown { summary, recording, profile })
 }

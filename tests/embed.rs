@@ -135,8 +135,37 @@ fn flights_are_flown_again_in_this_thread_or_on_threads() {
     let stop = StopToken::new();
     let here = Validation::new(COMPONENTS, &stop);
     let threads = Validation { host: Host::Threads, ..here.clone() };
-    let errors = |how: &Validation<'_>| how.errors(&[vehicle.as_path()], &flights, &mut |_| {}).unwrap().json();
+    let errors =
+        |how: &Validation<'_>| how.errors(&[vehicle.as_path()], &flights, &mut |_| {}).unwrap().json();
     let (here, of_threads) = (errors(&here), errors(&threads));
     assert!(here["flights"]["course"]["horizons"]["0.5"]["windows"].as_u64().unwrap() > 0, "{here}");
     assert_eq!(here, of_threads);
+}
+
+#[test]
+fn a_flight_has_its_warnings_its_profile_and_the_vehicles_that_were_not_compared() {
+    let folder = tempfile::tempdir().unwrap();
+    // The set points of the hover come after the end.
+    let short = || hover().set("run.duration_s", 0.2).unwrap();
+    let fly = |host: Host, manifest: &Manifest| {
+        hummingbus::fly(Launcher::new(host), manifest, folder.path().join("short.mcap")).unwrap()
+    };
+    let flown = fly(Host::Threads, &short().set("run.profile", true).unwrap());
+    let warnings = &flown.summary.warnings;
+    assert!(
+        warnings.iter().any(|warning| warning.to_string().contains("`duration_s` is 0.2 s")),
+        "{warnings:?}"
+    );
+    assert!(flown.profile.unwrap().to_string().contains("controller"));
+    assert!(flown.summary.unevaluated.is_empty(), "a recording is compared");
+
+    let limit = "{ value = 2.0, unit = \"m\", source = \"a test\", uncertainty = \"none\" }";
+    let base = Path::new(env!("CARGO_MANIFEST_DIR")).join("vehicles/hummingbird.toml");
+    let vehicle = folder.path().join("validated.toml");
+    let text = format!("name = \"validated\"\nbase = {base:?}\n\n[envelope]\nheight_max = {limit}\n");
+    std::fs::write(&vehicle, text).unwrap();
+    let unrecorded = short().set("process.plant.vehicle", vehicle.to_str().unwrap()).unwrap();
+    let flown = fly(Host::InProcess, &unrecorded.set("run.record", "none").unwrap());
+    assert_eq!(flown.summary.unevaluated, ["validated"]);
+    assert!(flown.recording.is_none() && flown.profile.is_none());
 }

@@ -168,7 +168,7 @@ impl<'a> Launcher<'a> {
         self.fly_planned(manifest, recording).map(|(_, outcome, recording)| (outcome, recording))
     }
 
-    /// As [`Launcher::fly`]; returns the plan of the run too.
+    /// As [`Launcher::fly`]; returns the checked graph of the run too.
     ///
     /// # Errors
     /// As [`Launcher::fly`].
@@ -176,14 +176,14 @@ impl<'a> Launcher<'a> {
         mut self,
         manifest: &Manifest,
         recording: &Path,
-    ) -> Result<(Plan, Outcome, Option<Recording>), Error> {
+    ) -> Result<(Graph, Outcome, Option<Recording>), Error> {
         let mut graph = Graph::build_from(manifest, self.files.clone())?;
         if let Some(from) = self.from.take() {
             from.resume(manifest, &mut graph, true)?;
         }
         let mut outputs = Outputs::of(manifest, &graph, recording, Vec::new())?;
         let outcome = self.launch(manifest, &mut graph, &mut outputs)?;
-        Ok((graph.plan, outcome, outputs.finish()?))
+        Ok((graph, outcome, outputs.finish()?))
     }
 
     /// Flies `graph`, the checked `manifest`, and claims `outputs` for it; returns when everything that was started has
