@@ -99,7 +99,7 @@ impl<'a> Validation<'a> {
             let replay = Replay::prepare(flight, vehicles, folder)
                 .with_context(|| format!("the flight `{}` cannot be replayed", flight.name))?;
             let (host_s, recording) = replay
-                .fly(self, &flights.files, tell)
+                .fly(&self.host, self.components, self.stop, &flights.files, tell)
                 .with_context(|| not_flown(flight, self.keep.map(|_| replay.folder.as_path())))?;
             let flown = windows::flight_errors(flight, &replay, &recording, vehicles.len())?;
             tell(&format!("{}: {:.1} s flown in {host_s:.1} s", flight.name, replay.duration_s()));

@@ -3,16 +3,16 @@
 //! The player plays the flight from its first moment on. For each vehicle and each length of window a plant flies the
 //! commands, set to the measured state at the start of each window; all in one run, so that all fly the same.
 
-use super::Validation;
 use anyhow::{Context, Result, bail};
 use flights::{Flight, Played};
 use inputs::InputFiles;
 use recorder::reader::Recording;
-use runtime::event::RunEvent;
+use runtime::event::{RunEvent, StopToken};
 use runtime::host::Host;
 use runtime::launcher::Launcher;
 use runtime::manifest::ManifestBuilder;
 use runtime::output_file::{self, Kind, Mark, is_same};
+use runtime::registry::Registry;
 use std::fs::File;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -85,21 +85,23 @@ impl Replay {
         Ok(Self { folder, manifest, played, ticks, _lock: lock })
     }
 
-    /// Flies the vehicles of `files` as `how` says; returns how long that took on the host, in seconds, and the recording.
+    /// Flies the vehicles of `files` in `host`; returns how long that took on the host, in seconds, and the recording.
     ///
     /// # Errors
     /// As `hummingbus run`; a run that was stopped too.
     pub fn fly(
         &self,
-        how: &Validation<'_>,
+        host: &Host,
+        components: Registry,
+        stop: &StopToken,
         files: &InputFiles,
         tell: &mut dyn FnMut(&str),
     ) -> Result<(f64, Recording)> {
-        let manifest = self.manifest.build(&self.folder.join(MANIFEST), how.components)?;
+        let manifest = self.manifest.build(&self.folder.join(MANIFEST), components)?;
         // The other files that the run reads are its own.
-        let launcher = Launcher::new(how.host.clone()).reading(files.branch()).stopped_by(how.stop);
+        let launcher = Launcher::new(host.clone()).reading(files.branch()).stopped_by(stop);
         // Only processes have descendants; a program that embeds this one may have children of its own meanwhile.
-        let launcher = match how.host {
+        let launcher = match host {
             Host::Exe(_) => launcher.adopting_orphans(),
             Host::Threads | Host::InProcess => launcher,
         };
