@@ -38,8 +38,8 @@ fn require_same_file(manifest: &str, duration_s: f64, settings: &[&str], composi
 
 /// The nodes of `manifest` that can be members of a group.
 fn nodes(manifest: &str) -> Vec<String> {
-    let args = ["check", &repository(manifest), "--compose", "all", "--json"];
-    let plan = Place::new().call(&args).with_code(0).json();
+    let manifest = repository(manifest);
+    let plan = Place::new().call(&["check", &manifest, "--compose", "all", "--json"]).with_code(0).json();
     let members = plan["groups"][0]["members"].as_array().unwrap().iter();
     let node = |member: &Value| &plan["nodes"][usize::try_from(member["node"].as_u64().unwrap()).unwrap()];
     members.map(|member| node(member)["name"].as_str().unwrap().to_owned()).collect()
@@ -72,11 +72,12 @@ const EARLY_SWAPS: [&str; 3] = ["swap.0.at_tick=250", "swap.1.at_tick=500", "swa
 
 #[test]
 fn partitions_of_other_flights_give_the_same_file() {
-    for (manifest, duration_s, settings, seeds) in [
-        ("manifests/wall-follow-varying.toml", 0.5, &[][..], 12..15),
+    let flights: [(&str, f64, &[&str], Range<u64>); 3] = [
+        ("manifests/wall-follow-varying.toml", 0.5, &[], 12..15),
         ("manifests/figure-eight.toml", 0.5, &[], 15..18),
         ("manifests/swap-laws.toml", 0.9, &EARLY_SWAPS, 18..21),
-    ] {
+    ];
+    for (manifest, duration_s, settings, seeds) in flights {
         require_same_file(manifest, duration_s, settings, &partitions(manifest, seeds));
     }
 }
