@@ -104,7 +104,8 @@ impl Selection {
 
 /// Selects among `candidates`, telling `progress` of each step.
 ///
-/// In the end effects without which predictions are better are taken back, and the search goes on without them.
+/// Effects that are tried last join once no other is taken. In the end effects without which predictions are better are taken back, and the
+/// search goes on without them.
 pub fn select(problem: &mut Problem, candidates: &[Candidate], progress: &mut dyn FnMut(&str)) -> Selection {
     let declared = problem.model.parameters.baseline();
     let base = problem.fitted(&declared, &[]);
@@ -112,6 +113,9 @@ pub fn select(problem: &mut Problem, candidates: &[Candidate], progress: &mut dy
     let mut open = candidates.to_vec();
     let mut withdrawn = Vec::new();
     let mut revisions = Revisions::default();
+    let first: Vec<Candidate> =
+        candidates.iter().filter(|candidate| !candidate.kind.is_tried_last).cloned().collect();
+    search.run(problem, &first, &[], progress);
     let End { refined, worths } = loop {
         search.run(problem, &open, revisions.added(), progress);
         problem.weigh(&search.base, candidates);
