@@ -7,6 +7,7 @@ use crate::plan::Plan;
 use crate::row::Row;
 use anyhow::{Context, Result, bail};
 use inputs::sha256;
+use runtime::output_file;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions, TryLockError};
@@ -113,15 +114,16 @@ impl Store {
     /// Opens or makes `folder` for `campaign`: its plan, which is written if it is not there, and the rows flown so far.
     ///
     /// # Errors
-    /// If another campaign uses the folder, it holds something else, or its flights were flown with other inputs.
+    /// If another campaign uses the folder, it holds something else, its flights were flown with other inputs, or a link on the way
+    /// to it is not to be trusted.
     pub fn open(
         folder: &Path,
         campaign: &Campaign,
         header: &Header,
         builds: Builds,
     ) -> Result<(Self, Plan, BTreeMap<u64, Row>)> {
-        let shown = folder.display();
-        std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {shown}"))?;
+        // Without links: no later change of one leads elsewhere.
+        let folder = &*output_file::make_folder(folder)?;
         require_own(folder)?;
         let mut lock = Lock::of(folder)?;
         remove_left_work(folder)?;
@@ -142,7 +144,7 @@ impl Store {
             writeln!(rows, "{}", serde_json::to_string(header)?)?;
         }
         let work = tempfile::Builder::new().prefix(WORK).tempdir_in(folder);
-        let work = work.with_context(|| format!("cannot make a folder in {shown}"))?;
+        let work = work.with_context(|| format!("cannot make a folder in {}", folder.display()))?;
         Ok((Self { folder: folder.to_owned(), rows, _lock: lock, work }, plan, flown))
     }
 

@@ -68,6 +68,11 @@ impl Unlocated {
     }
 }
 
+/// Makes the folder `path` and those above it where they are missing; returns its path without links.
+pub fn make_folder(path: &Path) -> Result<PathBuf, Unlocated> {
+    Walk::of(path, true)?.into_folder()
+}
+
 /// A name in an opened folder; there need not be a file of that name.
 #[derive(Clone, Debug)]
 pub struct Location {
@@ -81,11 +86,6 @@ impl Location {
     /// The location that `path` names, all links followed.
     pub fn find(path: &Path) -> Result<Self, Unlocated> {
         Walk::of(path, false)?.location()
-    }
-
-    /// As [`Location::find`]; makes the folders that are missing on the way.
-    pub fn make(path: &Path) -> Result<Self, Unlocated> {
-        Walk::of(path, true)?.location()
     }
 
     /// The location `name` in the same folder.
@@ -170,17 +170,25 @@ impl Walk {
         while let Some(name) = self.parts.pop() {
             if name == ".." {
                 self.enter(&name)?;
-                self.path.pop();
             } else if !self.follow(&name)? {
                 if self.parts.is_empty() {
                     let path = self.path.join(&name);
                     return Ok(Location { folder: Arc::new(self.folder), name, path });
                 }
                 self.enter(&name)?;
-                self.path.push(&name);
             }
         }
         Err(Unlocated::Folder)
+    }
+
+    /// The folder that the whole path names, as a path without links.
+    fn into_folder(mut self) -> Result<PathBuf, Unlocated> {
+        while let Some(name) = self.parts.pop() {
+            if name == ".." || !self.follow(&name)? {
+                self.enter(&name)?;
+            }
+        }
+        Ok(self.path)
     }
 
     fn enter(&mut self, name: &OsStr) -> Result<(), Unlocated> {
@@ -197,6 +205,11 @@ impl Walk {
             Err(Errno::NOENT | Errno::NOTDIR) => return Err(Unlocated::NoFolder(self.path.join(name))),
             Err(error) => return Err(self.refused(name, error)),
         };
+        if name == ".." {
+            self.path.pop();
+        } else {
+            self.path.push(name);
+        }
         Ok(())
     }
 
@@ -249,7 +262,7 @@ fn may_follow(link: &Stat, folder: &Stat) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::{Location, Unlocated};
+    use super::{Location, Unlocated, make_folder};
     use rustix::fs::OFlags;
     use std::io::{Read as _, Write as _};
     use std::os::unix::fs::{PermissionsExt as _, lchown, symlink};
@@ -281,8 +294,11 @@ mod tests {
         assert!(
             matches!(found(".."), Err(Unlocated::Folder)) && matches!(found("/"), Err(Unlocated::Folder))
         );
-        Location::make(&real.join("new/folders/file")).unwrap();
-        assert!(real.join("new/folders").is_dir() && !real.join("new/folders/file").exists());
+        assert_eq!(make_folder(&real.join("ab/../new/folders")).unwrap(), real.join("a/new/folders"));
+        assert!(real.join("a/new/folders").is_dir());
+        assert_eq!(make_folder(&real.join("absolute/.")).unwrap(), real.join("a"));
+        std::fs::write(real.join("plain"), "").unwrap();
+        assert!(matches!(make_folder(&real.join("plain")), Err(Unlocated::NoFolder(_))));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 //! and only once it is whole.
 
 use crate::file_lock;
-use crate::location::{Location, Unlocated};
+use crate::location::{self, Location, Unlocated};
 use anyhow::{Context, anyhow, bail};
 use bus::host_time::monotonic_ns;
 use diagnostics::Error;
@@ -214,15 +214,15 @@ impl Drop for Draft {
     }
 }
 
-/// Makes the folder `folder` and those above it where they are missing.
+/// Makes the folder `folder` and those above it where they are missing; returns its path without links.
 ///
 /// # Errors
 /// If that is not possible, or a link on the way is not to be trusted.
-pub fn make_folder(folder: &Path) -> Result<(), Error> {
-    let inside = folder.join("file");
+pub fn make_folder(folder: &Path) -> Result<PathBuf, Error> {
     let cannot = || format!("cannot make the folder {}", folder.display());
-    Location::make(&inside).map_err(|reason| reason.told(cannot()))?;
-    Ok(())
+    // No path at all is the working directory.
+    let made = location::make_folder(&folder.join("."));
+    Ok(made.map_err(|reason| reason.told(cannot()))?)
 }
 
 /// Holds the folder `folder` for one command that fills it.

@@ -2,7 +2,7 @@
 
 use super::files::open_recording;
 use super::output::print_text;
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Result, bail};
 use clap::Args;
 use report::columns::PARQUET_START;
 use report::export::{CSV_START, Table, table};
@@ -56,14 +56,15 @@ pub fn export(arguments: &ExportArguments) -> Result<bool> {
     let topics = recording.topics().keys().filter(is_wanted);
     let files: Vec<(PathBuf, &String)> =
         topics.map(|topic| (folder.join(file_name(topic, ending)), topic)).collect();
-    std::fs::create_dir_all(&folder)
-        .with_context(|| format!("cannot make the folder {}", folder.display()))?;
-    // Before the first is written.
     for (path, _) in &files {
-        output_file::check(path, kind)?;
         if files.iter().filter(|(other, _)| other == path).count() > 1 {
             bail!("two topics would be written to {}: name one with --topic", path.display());
         }
+    }
+    output_file::make_folder(&folder)?;
+    // Before the first is written.
+    for (path, _) in &files {
+        output_file::check(path, kind)?;
     }
     // One after another: a table is whole in memory.
     for (path, topic) in &files {

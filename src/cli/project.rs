@@ -3,6 +3,7 @@
 use super::shell::quoted;
 use anyhow::{Context, Result, anyhow, bail};
 use clap::ValueEnum;
+use runtime::output_file;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -127,9 +128,11 @@ pub fn make(folder: &Path, language: Language, sources: Option<&Path>) -> Result
     if !parent.is_dir() {
         bail!("cannot make a folder in {}: there is no such folder; make it first", parent.display());
     }
+    // Without links, of which another user may have planted one.
+    let parent = output_file::make_folder(parent)?;
     // Written beside its place, and renamed once it is whole. The draft is removed in any case. Its own name says nothing to
     // anybody.
-    let draft = tempfile::tempdir_in(parent)
+    let draft = tempfile::tempdir_in(&parent)
         .map_err(|error| anyhow!("cannot make a folder in {}: {}", parent.display(), error.kind()))?;
     // A folder within: the temporary folder is closed to other users, the project has the rights of the umask.
     let whole = draft.path().join(name);
@@ -137,7 +140,7 @@ pub fn make(folder: &Path, language: Language, sources: Option<&Path>) -> Result
     for (path, template) in FILES.iter().chain(templates.files) {
         write(&whole.join(path), &filled(template, name, templates, sources.as_deref()))?;
     }
-    fs::rename(&whole, folder).with_context(|| format!("cannot make {}", folder.display()))
+    fs::rename(&whole, parent.join(name)).with_context(|| format!("cannot make {}", folder.display()))
 }
 
 /// The last component of `folder`, which names a Cargo package too.

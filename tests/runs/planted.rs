@@ -14,6 +14,7 @@ fn what_a_planted_link_names_is_never_written_to() {
     let short = place.write("short.toml", manifest(50, &[sender("source", 1, "")]));
     let hover = repository("manifests/hover.toml");
     let vehicle = repository("vehicles/hummingbird.toml");
+    let campaign = repository("manifests/campaigns/hover-robustness.toml");
     // Files of this user that each command would replace, and a folder.
     let mine = |name: &str| place.path(&format!("mine/{name}"));
     fs::create_dir_all(mine("folder")).unwrap();
@@ -22,15 +23,19 @@ fn what_a_planted_link_names_is_never_written_to() {
     place.call(&["plot", &mine("a.mcap"), "--out", &mine("a.html")]).with_code(0);
     place.call(&["plot", &mine("a.mcap"), "--out", &mine("a.svg")]).with_code(0);
     place.call(&["urdf", &vehicle, "--out", &mine("a.urdf")]).with_code(0);
+    place.call(&["man", &mine("")]).with_code(0);
     fs::write(mine("a.log"), "").unwrap();
     fs::write(mine("a.trace.json"), "").unwrap();
+    let table = ["export", &mine("a.mcap"), "--topic", "/plant/state", "--csv", "--out"];
+    place.call(&[&table[..], &[mine("").as_str()]].concat()).with_code(0);
     fs::copy(mine("a.mcap"), mine("b.partial.mcap")).unwrap();
     // As /tmp.
     let shared = |name: &str| place.path(&format!("shared/{name}"));
     fs::create_dir(shared("")).unwrap();
     fs::set_permissions(shared(""), Permissions::from_mode(0o1777)).unwrap();
-    let names = ["a.mcap", "a.html", "a.svg", "a.urdf", "a.log", "a.trace.json", "b.partial.mcap", "folder"];
-    for name in names {
+    let files = ["a.mcap", "a.html", "a.svg", "a.urdf", "a.log", "a.trace.json", "b.partial.mcap"];
+    let names = [&files[..], &["hummingbus.1", "plant.state.csv", "folder"]].concat();
+    for name in &names {
         symlink(mine(name), shared(name)).unwrap();
         if lchown(shared(name), Some(NOBODY), Some(NOBODY)).is_err() {
             skip("only root can give a link to another user");
@@ -40,6 +45,7 @@ fn what_a_planted_link_names_is_never_written_to() {
     let before: Vec<_> = names.iter().map(|name| fs::read(mine(name)).ok()).collect();
 
     let log = format!("process.source.log={}", shared("a.log"));
+    let (here, inside) = (shared(""), shared("folder/new"));
     let calls: &[&[&str]] = &[
         &["run", &short, "--record", &shared("a.mcap")],
         &["run", &short, "--record", &shared("b.mcap")],
@@ -50,6 +56,12 @@ fn what_a_planted_link_names_is_never_written_to() {
         &["urdf", &vehicle, "--out", &shared("a.urdf")],
         &["profile", &hover, "--set", set, "--record", &record, "--trace", &shared("a.trace.json")],
         &["profile", &hover, "--set", set, "--record", &record, "--html", &shared("a.html")],
+        &["man", &shared("")],
+        &["man", &shared("folder")],
+        &["campaign", &campaign, "--plan-only", "--out", &shared("folder")],
+        &[&table[..], &[here.as_str()]].concat(),
+        &[&table[..], &[inside.as_str()]].concat(),
+        &["new", &shared("folder/drone")],
     ];
     for args in calls {
         let ended = place.call(args).with_code(2);
@@ -61,6 +73,7 @@ fn what_a_planted_link_names_is_never_written_to() {
     }
 
     let after: Vec<_> = names.iter().map(|name| fs::read(mine(name)).ok()).collect();
+    assert_eq!(fs::read_dir(shared("")).unwrap().count(), names.len(), "a file was made beside the links");
     assert!(before == after, "a file behind a link was written to");
     assert_eq!(fs::read_dir(mine("folder")).unwrap().count(), 0, "a file was made behind a link");
     // A folder of the link's owner, closed to all others.
