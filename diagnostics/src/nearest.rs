@@ -15,6 +15,9 @@
 /// assert_eq!(nearest("feed_forward", ["rate_feed_forward"]), Some("rate_feed_forward"));
 /// ```
 pub fn nearest<'a>(found: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    if found.len() > LONGEST {
+        return None;
+    }
     let (found, known) = (found.to_lowercase(), known.into_iter().collect::<Vec<_>>());
     let scored = || known.iter().filter_map(|name| Some((distance(&found, &name.to_lowercase())?, *name)));
     begun(&found, &known).or_else(|| ended(&found, &known)).or_else(|| scored().min().map(|(_, name)| name))
@@ -24,6 +27,9 @@ pub fn nearest<'a>(found: &str, known: impl IntoIterator<Item = &'a str>) -> Opt
 fn suggested<'a>(found: &str, known: &[&'a str]) -> Vec<&'a str> {
     /// More would be a list of the names.
     const MOST: usize = 3;
+    if found.len() > LONGEST {
+        return Vec::new();
+    }
     if let Some(nearest) = nearest(found, known.iter().copied()) {
         return vec![nearest];
     }
@@ -35,6 +41,9 @@ fn suggested<'a>(found: &str, known: &[&'a str]) -> Vec<&'a str> {
 
 /// Fewer letters are the beginning of too many words.
 const SHORTEST: usize = 3;
+/// Bytes of the longest word that is compared. No name is longer, and a comparison takes time and memory by the product of both
+/// lengths.
+const LONGEST: usize = 100;
 
 /// Number of faults by which `found` differs from `name`; `None` if it is too different. Words at the end that both have, such as a
 /// unit, do not count.
@@ -46,8 +55,12 @@ fn distance(found: &str, name: &str) -> Option<usize> {
     {
         (found, name) = (before, before_name);
     }
-    let distance = strsim::damerau_levenshtein(found, name);
-    (distance <= name.len().div_ceil(3)).then_some(distance)
+    faults(found, name).filter(|faults| *faults <= name.len().div_ceil(3))
+}
+
+/// Number of letters to add, drop, replace or exchange until `found` is `name`; `None` if one of them is too long for a name.
+fn faults(found: &str, name: &str) -> Option<usize> {
+    (found.len().max(name.len()) <= LONGEST).then(|| strsim::damerau_levenshtein(found, name))
 }
 
 /// The only name that begins with `found`, if that is not too short.
@@ -75,7 +88,7 @@ fn ended<'a>(found: &str, known: &[&'a str]) -> Option<&'a str> {
 /// ```
 pub fn typo_of<'a>(found: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let most = found.len().min(6) / 3;
-    let mut near = known.into_iter().filter(|name| strsim::damerau_levenshtein(found, name) <= most);
+    let mut near = known.into_iter().filter(|name| faults(found, name).is_some_and(|faults| faults <= most));
     let first = near.next()?;
     near.next().is_none().then_some(first)
 }
@@ -114,5 +127,30 @@ pub fn did_you_mean<'a>(found: &str, known: impl IntoIterator<Item = &'a str>, a
         Some(question) => question,
         None if known.is_empty() => "there is none".to_owned(),
         None => format!("{all} {}", known.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{LONGEST, did_you_mean, nearest, suggestion, typo_of};
+
+    #[test]
+    fn words_too_long_for_a_name_are_no_guess_and_take_no_time() {
+        let long = "command_".repeat(1_000_000);
+        assert_eq!(
+            did_you_mean(&long, ["command", "state"], "the ports are"),
+            "the ports are command, state"
+        );
+        assert_eq!((nearest(&long, [&*long]), typo_of(&long, [&*long])), (None, None));
+        assert_eq!((nearest("kommand", [&*long]), typo_of("kommand", [&*long])), (None, None));
+        assert_eq!(suggestion("kommand", [&*long, "command"]).as_deref(), Some("did you mean `command`?"));
+    }
+
+    #[test]
+    fn the_longest_names_are_guessed() {
+        let name = "n".repeat(LONGEST);
+        assert_eq!(nearest(&name.replacen('n', "m", 1), [&*name]), Some(&*name));
+        assert_eq!(typo_of(&name.replacen('n', "m", 1), [&*name]), Some(&*name));
+        assert_eq!(nearest(&format!("{name}m"), [&*name]), None);
     }
 }
