@@ -10,6 +10,13 @@ use std::os::unix::net::UnixStream;
 use std::thread::sleep;
 use std::time::Duration;
 
+/// Duration of a run that no test outlasts, in s.
+const ENDLESS: u32 = 4_000_000;
+/// Duration of a run that is to come to its end, in s.
+const SHORT: u32 = 30;
+/// Pace at which a [`SHORT`] run lasts for ten minutes, longer than the watchdog of a launch waits.
+const SLOW: &str = "0.05";
+
 /// Starts hover.toml at `pace`, recording to `name`, and waits until it is well on its way.
 fn take_off<'a>(place: &'a Place, name: &str, pace: &str, duration_s: u32) -> Launch<'a> {
     let (manifest, recording) = (repository("manifests/hover.toml"), place.path(name));
@@ -42,7 +49,7 @@ fn state(place: &Place) -> (String, u64) {
 #[test]
 fn pausing_stepping_and_pacing_change_no_byte_of_a_recording() {
     let place = Place::new();
-    let flight = take_off(&place, "steered.mcap", "0.5", 30);
+    let flight = take_off(&place, "steered.mcap", SLOW, SHORT);
     let held = tick_after(&place, &["pause"]);
     assert!(held >= 100, "{held}");
     sleep(Duration::from_millis(300));
@@ -59,24 +66,27 @@ fn pausing_stepping_and_pacing_change_no_byte_of_a_recording() {
     sleep(Duration::from_millis(100));
     assert_eq!(state(&place), ("paused".to_owned(), held + 8));
     ctl(&place, &["pace", "realtime"]);
+    ctl(&place, &["pace", SLOW]);
     ctl(&place, &["resume"]);
     let stepped = tick_after(&place, &["step", "3"]);
     assert!(stepped >= held + 11, "{stepped}");
     assert_eq!(state(&place), ("paused".to_owned(), stepped));
-    ctl(&place, &["resume"]);
     ctl(&place, &["pace", "2"]);
+    ctl(&place, &["pace", SLOW]);
+    ctl(&place, &["resume"]);
     ctl(&place, &["pace", "free"]);
     flight.end().flown();
     let undisturbed = place.path("undisturbed.mcap");
     let args = ["run", &repository("manifests/hover.toml"), "--record", &undisturbed];
-    place.call(&[&args[..], &["--set", "run.duration_s=30"]].concat()).flown();
+    let duration = format!("run.duration_s={SHORT}");
+    place.call(&[&args[..], &["--set", &duration]].concat()).flown();
     require_same(&std::fs::read(undisturbed).unwrap(), &place.path("steered.mcap"));
 }
 
 #[test]
 fn every_pause_holds_the_tick_that_it_names() {
     let place = Place::new();
-    let flight = take_off(&place, "often.mcap", "free", 4_000_000);
+    let flight = take_off(&place, "often.mcap", "free", ENDLESS);
     for _ in 0..30 {
         let held = tick_after(&place, &["pause"]);
         assert_eq!(state(&place), ("paused".to_owned(), held));
@@ -89,13 +99,14 @@ fn every_pause_holds_the_tick_that_it_names() {
 #[test]
 fn a_run_can_be_paused_for_longer_than_the_watchdog_waits() {
     let place = Place::new();
-    let flight = take_off(&place, "long.mcap", "realtime", 30);
+    let flight = take_off(&place, "long.mcap", "realtime", ENDLESS);
     let held = tick_after(&place, &["pause"]);
     sleep(Duration::from_secs(23));
     assert_eq!(state(&place), ("paused".to_owned(), held));
-    ctl(&place, &["pace", "free"]);
     ctl(&place, &["resume"]);
-    flight.end().flown();
+    poll("the run does not go on", || (state(&place).1 > held + 100).then_some(()));
+    ctl(&place, &["stop"]);
+    flight.end().with_code(1);
 }
 
 #[test]
@@ -136,7 +147,7 @@ fn a_program_can_speak_to_the_socket_and_nonsense_is_refused() {
 #[test]
 fn a_step_to_the_end_ends_the_run_and_one_beyond_it_is_refused() {
     let place = Place::new();
-    let flight = take_off(&place, "stepped.mcap", "realtime", 30);
+    let flight = take_off(&place, "stepped.mcap", SLOW, SHORT);
     let held = tick_after(&place, &["pause"]);
     call(&place, "ctl", &["step", "100000"]).with_code(2).says(&["only", "ends at tick 30000"]);
     assert_eq!(state(&place), ("paused".to_owned(), held));
@@ -164,14 +175,14 @@ fn a_later_request_overtakes_a_long_step() {
 #[test]
 fn a_run_that_is_not_there_or_has_ended_is_an_error() {
     let place = Place::new();
-    let flight = take_off(&place, "gone.mcap", "realtime", 30);
+    let flight = take_off(&place, "gone.mcap", "realtime", ENDLESS);
     let run_id = place.run_id();
     for verb in [&["ctl", "pause"][..], &["top", "--once"]] {
         let ended = place.start(&[verb, &["--run", "0-0"]].concat()).end_among_others();
         ended.with_code(2).says(&["no run `0-0` is alive", &run_id, "hover.toml"]);
     }
-    ctl(&place, &["pace", "free"]);
-    flight.end().flown();
+    ctl(&place, &["stop"]);
+    flight.end().with_code(1);
     let ended = place.start(&["ctl", "pause", "--run", &run_id]).end_among_others().with_code(2);
     assert!(ended.error.contains("is alive"), "{ended}");
 }
