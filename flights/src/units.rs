@@ -12,6 +12,10 @@ use crate::quantity::{FRACTION, PERCENT, Quantity};
 pub const HUNDREDS: f64 = 100.0;
 /// Counts of sensors are as near to some units as this factor: beyond it, a scale is as likely as a unit.
 const EXACT: f64 = 1.05;
+/// Units of accelerations that no channel is declared in, with their sizes in m/s^2.
+const FOREIGN_M_S2: [(&str, f64); 2] = [("mm/s^2", 1e-3), ("ft/s^2", 0.3048)];
+/// A scale that is measured by the force of a flight is right within this factor: the median force is not exactly gravity's.
+const SCALE_TOLERANCE: f64 = 1.25;
 /// Values that no unit explains are refused beyond this factor.
 const GROSS: f64 = 3.0;
 
@@ -65,7 +69,9 @@ impl Units<'_> {
 
     /// A finding for values that are `factor` times too large in the declared unit, and wrong in all others.
     pub fn by_scale(&self, quantity: Quantity, factor: f64, what: &str) -> Finding {
-        let fits = format!("no unit alone, but {}", self.scale(quantity, factor));
+        let exact = self.exact_scale(quantity, factor);
+        let scale = exact.unwrap_or_else(|| self.measured_scale(quantity, factor));
+        let fits = format!("no unit alone, but {scale}");
         finding(quantity, Some(fits), &format!("declared in {}, {what}", self.unit(quantity)))
     }
 
@@ -77,6 +83,27 @@ impl Units<'_> {
         let (percent, way) = (100.0 * error.abs(), if error > 0.0 { "large" } else { "small" });
         let scale = self.scale(quantity, factor);
         format!("{scale} ({unit} alone leaves the values about {percent:.0} % too {way})")
+    }
+
+    /// The keys for accelerations in a foreign unit, if its size is near the measured one.
+    fn exact_scale(&self, quantity: Quantity, factor: f64) -> Option<String> {
+        let declared = match self.declared(quantity).and_then(|entry| entry.scale.as_ref()) {
+            None => 1.0,
+            Some(EachNumber::All(scale)) => *scale,
+            Some(EachNumber::Each(_)) => return None,
+        };
+        let measured = declared * self.factor(quantity) / factor;
+        let is_near = |size: f64| libm::log(size / measured).abs() < libm::log(SCALE_TOLERANCE);
+        let mut foreign = FOREIGN_M_S2.iter().filter(|_| quantity == Quantity::SpecificForce);
+        let (name, size) = foreign.find(|(_, size)| is_near(*size))?;
+        Some(format!("{} with `scale = {size}` ({name})", of_unit(quantity.dimension().si())))
+    }
+
+    /// The measured scale; of a sensor with the source of the exact one.
+    fn measured_scale(&self, quantity: Quantity, factor: f64) -> String {
+        let scale = self.scale(quantity, factor);
+        let is_of_sensor = matches!(quantity, Quantity::AngularVelocity | Quantity::SpecificForce);
+        if is_of_sensor { format!("{scale} (take the figure of the sensor's data sheet)") } else { scale }
     }
 
     /// The scale with which values are right that are `factor` times too large.

@@ -266,14 +266,33 @@ fn a_unit_is_advised_only_where_it_alone_fits() {
         let number = fits.split_once("a `scale` of about ").unwrap_or_else(|| panic!("{fits}")).1;
         let number: f64 = number.split(' ').next().unwrap().parse().unwrap();
         assert!((number / scale - 1.0).abs() < 0.1, "{fits} for {scale}");
+        let has_source = fits.contains("(take the figure of the sensor's data sheet)");
+        assert!(has_source || fits.contains("alone leaves the values"), "{fits}");
     };
     let force = |force_unit| Motion { force_unit, ..Motion::default() };
-    scaled(Quantity::SpecificForce, force(1000.0), 1e-3);
     scaled(Quantity::SpecificForce, force(4096.0 / 9.81), 9.81 / 4096.0);
     scaled(Quantity::SpecificForce, force(0.01), 100.0);
     let rate = |rate_unit| Motion { rate_unit, ..Motion::default() };
     scaled(Quantity::AngularVelocity, rate(16.4 * 57.3), 1.0 / 16.4 / 57.3);
     scaled(Quantity::AngularVelocity, rate(0.01), 100.0);
+}
+
+/// The median force of a flight is not exactly gravity's: a scale of a known unit is not rounded to it.
+#[test]
+fn accelerations_in_a_foreign_unit_are_advised_with_its_exact_size() {
+    for (per_m_s2, declared, scale, name) in [
+        (1000.0, "m/s^2", "0.001", "mm/s^2"),
+        (1000.0, "g", "0.001", "mm/s^2"),
+        (1.0 / 0.3048, "m/s^2", "0.3048", "ft/s^2"),
+    ] {
+        let motion = Motion { force_unit: per_m_s2, ..Motion::default() };
+        let declare = |keys: &str| CHANNELS.replace("unit = \"m/s^2\"", keys);
+        let found = findings(&motion, &declare(&format!("unit = {declared:?}")));
+        let fits = format!("no unit alone, but `unit = \"m/s^2\"` with `scale = {scale}` ({name})");
+        assert!(found.contains(&(Quantity::SpecificForce, fits)), "{per_m_s2} {declared}: {found:?}");
+        let flight = read(&motion, &declare(&format!("unit = \"m/s^2\", scale = {scale}")), "").unwrap();
+        assert_eq!(flight.notes, [""; 0]);
+    }
 }
 
 #[test]
