@@ -137,6 +137,21 @@ fn the_architecture_tells_every_crate_and_whom_it_knows() {
 }
 
 #[test]
+fn the_page_of_the_thesis_begins_and_ends_as_its_script_writes_it() {
+    let script = fs::read_to_string(repository("scripts/thesis")).unwrap();
+    let page = fs::read_to_string(repository("docs/thesis.md")).unwrap();
+    let text = |name: &str| {
+        let (_, rest) = script.split_once(&format!("\n{name} = \"\"\"")).unwrap();
+        rest.split_once("\"\"\"").unwrap().0
+    };
+    assert!(page.starts_with(text("HEAD")) && page.ends_with(text("TAIL")));
+    let clients = page.lines().find(|line| line.starts_with("| remote clients ")).unwrap();
+    for language in ["Rust", "C++", "Python", "FMUs"] {
+        assert!(clients.contains(language), "{language} is missing in: {clients}");
+    }
+}
+
+#[test]
 fn every_manifest_is_named_in_the_scenarios() {
     let scenarios = fs::read_to_string(repository("docs/scenarios.md")).unwrap();
     for entry in fs::read_dir(repository("manifests")).unwrap() {
