@@ -6,6 +6,7 @@
 use crate::triangles::{Triangles, corner};
 use earcut::{Earcut, deviation, utils3d::project3d_to_2d};
 use nalgebra::Vector3;
+use vehicles::lines::numbered;
 
 /// Cutting takes a time up to the square of this.
 const POLYGON_MAX: usize = 10_000;
@@ -39,17 +40,17 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Triangles, String> {
 }
 
 /// The lines with their numbers; one that ends in `\` goes on in the next.
-fn lines(text: &str) -> impl Iterator<Item = (usize, String)> {
-    let mut lines = text.lines().enumerate();
+fn lines(text: &str) -> impl Iterator<Item = (u64, String)> {
+    let mut lines = numbered(text);
     std::iter::from_fn(move || {
-        let (index, first) = lines.next()?;
+        let (number, first) = lines.next()?;
         let mut line = first.to_owned();
         while line.ends_with('\\') {
             line.pop();
             line.push(' ');
             line.push_str(lines.next().map_or("", |(_, more)| more));
         }
-        Some((index + 1, line))
+        Some((number, line))
     })
 }
 
@@ -175,6 +176,10 @@ mod tests {
         let square = read(text).unwrap();
         assert_eq!((square.corners.len(), square.faces.len()), (4, 2));
         assert!((area(&square, 2) - 1.0).abs() < 1e-12);
+        for end in ["\r\n", "\r"] {
+            let text = String::from_utf8_lossy(text).replace("\r\n", "\n").replace('\n', end);
+            assert_eq!(read(text.as_bytes()).unwrap(), square, "{end:?}");
+        }
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! STL, as text or binary. Both may begin with `solid`: a binary file is one whose length is that of the triangles that it states.
 
 use crate::triangles::{Triangles, corner};
+use vehicles::lines::numbered;
 
 /// Bytes in front of the triangles: a header of any text, and their number.
 const HEAD_BYTES: usize = 80 + 4;
@@ -53,10 +54,10 @@ fn binary(bytes: &[u8]) -> Triangles {
 fn text(text: &str) -> Result<Triangles, String> {
     let mut read = Triangles::default();
     let mut corners = Vec::new();
-    for (index, line) in text.trim_start_matches('\u{FEFF}').lines().enumerate() {
+    for (number, line) in numbered(text.trim_start_matches('\u{FEFF}')) {
         let mut words = line.split_whitespace();
         let keyword = words.next().unwrap_or_default().to_ascii_lowercase();
-        let fault = |fault: String| format!("line {}: {fault}", index + 1);
+        let fault = |fault: String| format!("line {number}: {fault}");
         match keyword.as_str() {
             "vertex" => corners.push(corner(words).map_err(fault)?),
             "endloop" if corners.len() == 3 => read.add_triangle(corners.drain(..)),
@@ -94,8 +95,12 @@ mod tests {
     #[test]
     fn text_and_binary_are_told_apart_whatever_they_begin_with() {
         for head in ["solid", "solid ", "solid box", "SOLID facet vertex", "\u{FEFF}solid", "  \n solid\t"] {
-            let read = read(format!("{head}\n{FACET}{FACET}endsolid\n").as_bytes()).unwrap();
-            assert_eq!((read.faces.len(), read.corners[2]), (2, [0.0, 2.0, 0.5]), "{head}");
+            let text = format!("{head}\n{FACET}{FACET}endsolid\n");
+            // Ends of lines of Linux, Windows and old Macintoshes.
+            for end in ["\n", "\r\n", "\r"] {
+                let read = read(text.replace('\n', end).as_bytes()).unwrap();
+                assert_eq!((read.faces.len(), read.corners[2]), (2, [0.0, 2.0, 0.5]), "{head} {end:?}");
+            }
         }
         // A text whose length is that of some binary file.
         let padded = (0..50).map(|blanks| format!("solid\n{FACET}{}endsolid\n", " ".repeat(blanks)));
@@ -122,6 +127,7 @@ mod tests {
                 b"solid\nfacet\nvertex 0 0,5 0\n".to_vec(),
                 "line 3: a corner has a coordinate that is no finite number",
             ),
+            (b"solid\rfacet\r\nvertex 0 0\r".to_vec(), "line 3: expected three coordinates, found 2"),
             (b"solid\nvertex 0 0\n".to_vec(), "line 2: expected three coordinates, found 2"),
             (b"solid\nvertices 0 0 0\n".to_vec(), "found `vertices`"),
         ] {

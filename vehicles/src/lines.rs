@@ -36,3 +36,13 @@ pub fn of(text: &[u8]) -> impl Iterator<Item = Line> {
         Some(Line { number, content, next: from })
     })
 }
+
+/// The lines of `text` with their numbers.
+///
+/// ```
+/// let lines: Vec<_> = vehicles::lines::numbered("a\r\nbc\rd").collect();
+/// assert_eq!(lines, [(1, "a"), (2, "bc"), (3, "d")]);
+/// ```
+pub fn numbered(text: &str) -> impl Iterator<Item = (u64, &str)> {
+    of(text.as_bytes()).map(move |line| (line.number, &text[line.content]))
+}
