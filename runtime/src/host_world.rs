@@ -5,6 +5,7 @@ use crate::ctl::Reply;
 use crate::ctl::control::ControlServer;
 use crate::ctl::protocol::{Answer, Request};
 use crate::descendants::Descendants;
+use crate::executed::Executed;
 use crate::graph::successor_of;
 use crate::host::{End, Host, Thread, ThreadPart};
 use crate::instances::Instances;
@@ -65,6 +66,10 @@ pub struct HostWorld<'a> {
     pub instances: &'a Instances,
     /// The processes of groups that were started, by the groups' names.
     pub groups: BTreeMap<String, Rc<RefCell<SharedBody>>>,
+    /// The programs of commands that were started.
+    pub executed: Executed,
+    /// Warnings about started processes, until they are taken.
+    pub warnings: Vec<String>,
 }
 
 impl HostWorld<'_> {
@@ -188,6 +193,7 @@ impl World for HostWorld<'_> {
     }
 
     fn start(&mut self, name: &str, role: Role, program: Option<&Program>) -> Result<HostBody> {
+        self.warnings.extend(program.and_then(|program| self.executed.note(name, program)));
         let notify = match (role, program) {
             (Role::Sidecar { index, .. }, Some(program)) if program.ready == Readiness::Notify => {
                 Some(self.notify_socket(name, index)?)
@@ -205,6 +211,10 @@ impl World for HostWorld<'_> {
         }
         let started = program.map_or(Started::Clock, Started::One);
         Ok(HostBody::alone(self.start_body(name, role, started, notify.as_deref())?))
+    }
+
+    fn take_warnings(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.warnings)
     }
 
     fn hears_ready(&mut self, index: usize) -> bool {

@@ -6,6 +6,7 @@ use crate::ctl::control::ControlServer;
 use crate::ctl::{Asked, Remote};
 use crate::descendants::{Descendants, Place};
 use crate::event::{RunEvent, StopToken};
+use crate::executed::Executed;
 use crate::flight::Flight;
 use crate::graph::Graph;
 use crate::host::Host;
@@ -319,6 +320,8 @@ impl<'a> Launcher<'a> {
             instances: checkpoints.writer.instances,
             sockets: BTreeMap::new(),
             groups: BTreeMap::new(),
+            executed: Executed::default(),
+            warnings: Vec::new(),
         };
         let mut on = |event: RunEvent<'_>| {
             if let RunEvent::Progress(_) = event {

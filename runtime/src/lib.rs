@@ -7,7 +7,7 @@
 //! | the checked plan of a run | [`graph`], `placement`, [`registry`], `program`, `describe`, `describe_programs` |
 //! | a flight of processes or threads | [`launcher`], [`event`], `outcome`, [`flight`] |
 //! | its supervisor, which decides | `supervisor`, `processes`, `sidecars`, `watch_clock` |
-//! | what the supervisor sees and touches | `world`, `view`, `host_world`, [`host`], `spawn`, `role`, `instances` |
+//! | what the supervisor sees and touches | `world`, `view`, `host_world`, [`host`], `spawn`, `executed`, `role`, `instances` |
 //! | the same supervisor in simulated worlds | `simulation` |
 //! | a flight on one thread | `in_process` |
 //! | requests to a live run | [`ctl`], [`rewind`] |
@@ -24,6 +24,7 @@ mod descendants;
 mod describe;
 mod describe_programs;
 pub mod event;
+mod executed;
 mod file_lock;
 pub mod flight;
 mod fork;

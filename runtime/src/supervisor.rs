@@ -213,6 +213,7 @@ impl<'a, W: World> Supervisor<'a, W> {
         self.decisions.note_laggards();
         self.carry_out()?;
         self.see();
+        self.tell_warnings();
         self.note_stall()?;
         self.tell_progress();
         Ok(())
@@ -220,6 +221,13 @@ impl<'a, W: World> Supervisor<'a, W> {
 
     fn say(&mut self, text: &str) {
         (self.listener)(RunEvent::Note(text));
+    }
+
+    /// Reports what is unusual about processes that were started.
+    fn tell_warnings(&mut self) {
+        for warning in self.world.take_warnings() {
+            self.say(&warning);
+        }
     }
 
     /// Reports the progress of the run.

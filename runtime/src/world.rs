@@ -66,6 +66,10 @@ pub trait World {
     /// # Errors
     /// If it cannot be started.
     fn start(&mut self, name: &str, role: Role, program: Option<&Program>) -> Result<Self::Body>;
+    /// Warnings about processes that were started since the last call.
+    fn take_warnings(&mut self) -> Vec<String> {
+        Vec::new()
+    }
     /// True if sidecar `index` has reported that it is ready since the last call.
     fn hears_ready(&mut self, index: usize) -> bool;
     /// Takes note of orphans that have ended, except for the processes `known`, which are waited for elsewhere.

@@ -4,12 +4,13 @@
 use crate::campaign;
 use crate::flight::{Reference, Watched, messages, records, write_manifest};
 use crate::kill_points::{Blow, EDGES, GUARD_TICKS, Moment, signal_name, words_of};
-use crate::saboteur::{FAULT_VARIABLE, Fault, GENERATIONS_VARIABLE, TICK_VARIABLE};
+use crate::saboteur::{self, FAULT_VARIABLE, Fault, GENERATIONS_VARIABLE, TICK_VARIABLE};
 use crate::support::{Ended, Launch, Place, partial, repository};
 use rand_core::Rng;
 use rustix::process::{Signal, kill_process};
 use serde_json::Value;
 use std::collections::BTreeSet;
+use std::process::Command;
 
 const KILL_POINTS: u64 = 30;
 const VICTIMS: [&str; 6] = ["controller", "ekf", "imu", "pilot", "plant", "saboteur"];
@@ -204,6 +205,39 @@ fn a_process_that_dies_at_the_same_tick_again_is_not_restarted_for_ever() {
     let ended = panic_again_and_again(Policy::Restart);
     ended.says(&["`saboteur` is restarted at tick 700", "process `saboteur.1` ended with exit code 101"]);
     ended.says(&["it came in the place of a process that had died, and completed no tick"]);
+}
+
+/// Installs an executable script at `path`. Another process writes it: one that this process holds open for a moment, in a child
+/// of another test, could not be executed.
+fn install(place: &Place, path: &str, script: &str) {
+    let text = place.write("script", script);
+    let installed = Command::new("install").args(["-m", "755", &text, path]).status().unwrap();
+    assert!(installed.success());
+}
+
+#[test]
+fn a_restart_that_executes_a_rebuilt_program_warns() {
+    for is_rebuilt in [false, true] {
+        let (place, manifest) = (Place::new(), Policy::Restart.tables());
+        let (manifest, program) = (write_manifest(&place, &manifest), place.path("node"));
+        let words = saboteur::command().map(|word| format!("'{word}'")).join(" ");
+        install(&place, &program, &format!("#!/bin/sh\nexec {words}\n"));
+        let command = format!("process.saboteur.command=[{program:?}]");
+        let args = ["run", &manifest, "--record", &place.path("flight.mcap"), "--set", &command];
+        let launch = place.start(&args);
+        let watched = Watched::attach(&place);
+        assert_eq!(watched.hold_at(700), 700);
+        let build = if is_rebuilt { "# Rebuilt.\n" } else { "" };
+        install(&place, &program, &format!("#!/bin/sh\n{build}exec {words}\n"));
+        let epoch = watched.control.epoch();
+        kill_process(place.process_of_generation("saboteur", 0), Signal::KILL).unwrap();
+        watched.await_epoch(epoch + 1);
+        watched.control.set_hold_tick(u32::MAX);
+        let ended = launch.end().with_code(0);
+        let warning =
+            format!("warning: process `saboteur`: {program} has changed since the run first started it");
+        assert_eq!(ended.error.contains(&warning), is_rebuilt, "{ended}");
+    }
 }
 
 #[test]
