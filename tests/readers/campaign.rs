@@ -1,7 +1,7 @@
 //! pandas, polars and DuckDB read the flights of a campaign, and a browser draws its page.
 
 use crate::{ROOT, hummingbus, look, readers, require_schemes};
-use serde_json::json;
+use serde_json::{Value, json};
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -80,6 +80,53 @@ fn a_browser_draws_the_page_with_units_and_counts_within_its_window() {
     // The whole name of the figure, in lines that fit.
     let title = seen["axes"]["scatter"].as_str().unwrap();
     assert!(!title.contains('…') && seen["tooHigh"] == json!(0), "{seen}");
+}
+
+/// Two kinds of the controller.
+const KINDS: &str = r#"
+sampling = "grid"
+set = ["run.duration_s=3"]
+
+[[vary]]
+name = "controller"
+key = "process.controller.kind"
+values = ["lqr", "geometric"]
+
+[[vary]]
+key = "run.seed"
+integers = [1, 2]
+"#;
+
+/// Requires that a number of the page is `expected`, to the page's four digits.
+fn require_shown(shown: &str, expected: f64) {
+    let number: f64 = shown.replace('−', "-").parse().unwrap_or_else(|_| panic!("{shown} is not a number"));
+    assert!((number - expected).abs() <= 1e-3 * expected.abs(), "{shown} is not {expected}");
+}
+
+#[test]
+fn a_browser_draws_the_whole_page_of_a_campaign_with_choices() {
+    let Some(readers) = readers() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let (campaign, out) = (folder.path().join("c.toml"), folder.path().join("out"));
+    let manifest = Path::new(ROOT).join("manifests/figure-eight.toml");
+    fs::write(&campaign, format!("manifest = {:?}\n{KINDS}", manifest.to_str().unwrap())).unwrap();
+    hummingbus(&["campaign".as_ref(), campaign.as_os_str(), "--out".as_ref(), out.as_os_str()]);
+
+    let seen = look(&readers, "read_campaign.mjs", &[out.join("report.html").as_os_str()]);
+    assert_eq!(seen["wrong"], json!([]), "{seen}");
+    let report: Value = serde_json::from_str(&fs::read_to_string(out.join("report.json")).unwrap()).unwrap();
+    let choices = report["choices"].as_array().unwrap();
+    assert_eq!(choices.len(), 2, "{report}");
+    for (row, choice) in (1_usize..).zip(choices) {
+        let cells = seen["tables"]["choices"][row].as_array().unwrap();
+        assert_eq!(cells[1], choice["choice"], "{seen}");
+        let medians = choice["medians"].as_array().unwrap();
+        // The first seven columns have the flights and the pass rate.
+        assert_eq!(cells.len(), 7 + medians.len(), "{seen}");
+        for (cell, median) in cells[7..].iter().zip(medians) {
+            require_shown(cell.as_str().unwrap(), median.as_f64().unwrap());
+        }
+    }
 }
 
 fn read(readers: &Path, folder: &Path) -> Output {

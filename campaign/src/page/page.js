@@ -47,7 +47,7 @@ fillTable(
   "choices",
   [left("varied value"), left("choice"), "flights", "passed", "pass rate", "from", "to", ...report.figures.map((it) => wrapped(`median ${it.figure}`))],
   report.choices.map((it) => [
-    left(it.varied), left(it.choice), it.flights, it.passed, percent(it.pass_rate), ...it.interval.map(percent), ...it.medians.map(number),
+    left(it.varied), left(it.choice), it.flights, it.passed, percent(it.pass_rate), ...it.interval.map(percent), ...it.medians.map((value) => number(value)),
   ]),
 );
 fillTable(
