@@ -117,6 +117,8 @@ fn a_browser_draws_the_whole_page_of_a_campaign_with_choices() {
     let report: Value = serde_json::from_str(&fs::read_to_string(out.join("report.json")).unwrap()).unwrap();
     let choices = report["choices"].as_array().unwrap();
     assert_eq!(choices.len(), 2, "{report}");
+    let (summary, version) = (seen["summary"].as_str().unwrap(), report["version"].as_str().unwrap());
+    assert!(summary.contains(&format!("Flown by hummingbus {version}.")), "{summary}");
     for (row, choice) in (1_usize..).zip(choices) {
         let cells = seen["tables"]["choices"][row].as_array().unwrap();
         assert_eq!(cells[1], choice["choice"], "{seen}");

@@ -9,7 +9,8 @@ title(`Campaign ${report.campaign}`);
 element("summary").textContent =
   `${report.passed} of ${report.flights} flights of ${report.manifest} passed: ${percent(report.pass_rate)} ` +
   `(${percent(report.interval[0])} to ${percent(report.interval[1])} at 95 %). ` +
-  (report.flights < report.planned ? `${report.planned - report.flights} planned flights were not flown.` : "");
+  (report.flights < report.planned ? `${report.planned - report.flights} planned flights were not flown. ` : "") +
+  `Flown by hummingbus ${report.version}.`;
 
 if (flights.length < report.flights) {
   element("summary").textContent += ` The plots show every ${Math.round(report.flights / flights.length)}th flight.`;
