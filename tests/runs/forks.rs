@@ -128,6 +128,31 @@ fn a_fork_is_a_campaign_that_goes_on_where_it_was_cut_off() {
     fork(&[]).with_code(2).says(&["flown with other inputs"]);
 }
 
+/// The flight has the values of the run that wrote the checkpoint, `run.checkpoint_every_s` among them.
+#[test]
+fn a_flight_that_is_flown_again_names_the_checkpoints_that_it_writes() {
+    let place = Place::new();
+    let checkpoint = climbed(&place);
+    let out = place.path("out");
+    let fork = ["run", "--from", &checkpoint, "--fork", "1", "--vary", "run.seed=integers:1,9"];
+    let set = ["--set", "run.duration_s=2.5", "--out", &out];
+    place.call(&[&fork[..], &set].concat()).with_code(0);
+    let names = |ending: &str| {
+        let names =
+            fs::read_dir(&out).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+        names.filter(|name| name.ends_with(ending)).collect::<Vec<_>>()
+    };
+    assert!(names(".ckpt").is_empty(), "flights of a campaign write no checkpoints");
+    let again =
+        place.call(&["campaign", &format!("{out}/campaign.toml"), "--out", &out, "--fly", "0"]).flown();
+    again.prints(&["checkpoints: 1, the last ", "/flight-0.2400.ckpt"]);
+    // docs/campaigns.md lists both.
+    assert_eq!(
+        (names(".ckpt"), names(".mcap")),
+        (vec!["flight-0.2400.ckpt".to_owned()], vec!["flight-0.mcap".to_owned()])
+    );
+}
+
 #[test]
 fn what_cannot_vary_behind_a_checkpoint_is_refused_in_words() {
     let place = Place::new();
