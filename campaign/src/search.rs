@@ -156,8 +156,7 @@ pub fn search(
         let gains = tuning.gains.iter().zip(&declared).zip(point.iter());
         gains.map(|((gain, declared), x)| gain.value(*declared, *x)).collect()
     };
-    let gains_file = base.manifest.file_path(&tuning.process, "gains");
-    let gains_file = gains_file.and_then(|path| base.files.text(&path).ok()).unwrap_or_default();
+    let gains_file = gains_text(tuning, base);
     let tuned = |after: &[f64]| -> Vec<TunedGain> {
         let gains = tuning.gains.iter().zip(declared.iter().zip(after));
         let tuned = gains.map(|(gain, (before, after))| TunedGain {
@@ -223,12 +222,12 @@ pub fn search(
 /// Declared values of the tuned gains.
 fn declared(tuning: &Tuning, base: &Base) -> Result<Vec<f64>> {
     let value = |gain: &crate::tuning::Tuned| {
-        let number = |key: &String| {
+        let number = |(index, key): (usize, &String)| {
             let whole = format!("process.{}.gains.{key}", tuning.process);
             let number = base.manifest.number(&base.files, &whole)?;
-            number.ok_or_else(|| gain.problem(format!("the gains file has no number `{key}`")))
+            number.ok_or_else(|| gain.unknown(index, &gains_text(tuning, base)))
         };
-        let numbers = gain.keys.iter().map(number).collect::<Result<Vec<_>, _>>()?;
+        let numbers = gain.keys.iter().enumerate().map(number).collect::<Result<Vec<_>, _>>()?;
         #[allow(clippy::float_cmp, reason = "numbers of a file")]
         if numbers.iter().any(|number| *number != numbers[0]) {
             let message =
@@ -238,6 +237,12 @@ fn declared(tuning: &Tuning, base: &Base) -> Result<Vec<f64>> {
         Ok(numbers[0])
     };
     Ok(tuning.gains.iter().map(value).collect::<Result<Vec<_>, diagnostics::Diagnostic>>()?)
+}
+
+/// Text of the tuned gains file.
+fn gains_text(tuning: &Tuning, base: &Base) -> String {
+    let path = base.manifest.file_path(&tuning.process, "gains");
+    path.and_then(|path| base.files.text(&path).ok()).unwrap_or_default()
 }
 
 /// Costs of coordinates beyond 0 and 1, where the gains are those of the limit.

@@ -2,12 +2,12 @@
 
 use crate::declaration::{Campaign, Sampling, require_line};
 use crate::draw::rounded_to;
-use diagnostics::{Diagnostic, ParameterError, Place, nearest, read_toml};
+use diagnostics::{Diagnostic, ParameterError, Place, did_you_mean, nearest, read_toml};
 use serde::Deserialize;
 use std::ops::Range;
 use std::path::Path;
 use toml::Spanned;
-use toml_edit::DocumentMut;
+use toml_edit::{DocumentMut, Item};
 
 /// Significant digits of a tuned gain: what is flown is what the gains file says.
 const DIGITS: usize = 4;
@@ -64,6 +64,8 @@ pub struct Tuned {
     /// Limits of the value.
     pub limits: Limits,
     place: Place,
+    /// Places of the keys in the tuning file.
+    key_places: Vec<Place>,
 }
 
 /// Limits of a tuned gain.
@@ -117,9 +119,9 @@ struct Minimised {
 #[serde(deny_unknown_fields)]
 struct Gain {
     name: Option<String>,
-    key: Option<String>,
+    key: Option<Spanned<String>>,
     #[serde(default)]
-    keys: Vec<String>,
+    keys: Vec<Spanned<String>>,
     factor: Option<[f64; 2]>,
     value: Option<[f64; 2]>,
 }
@@ -147,9 +149,9 @@ impl Tuning {
             return Err(Diagnostic::at(place.clone(), error).help("leave `figures` out"));
         }
         let process = tune.check(&campaign).map_err(|error| at(&span, error))?;
+        let place = |span: &Range<usize>| Place::of(name.clone(), text, span);
         let gains = Diagnostic::gather(tune.gain.iter().map(|gain| {
-            let place = Place::of(name.clone(), text, &gain.span());
-            Tuned::of(gain.get_ref(), &place).map_err(|error| Diagnostic::at(place.clone(), error).help(HELP))
+            Tuned::of(gain, &place).map_err(|error| Diagnostic::at(place(&gain.span()), error).help(HELP))
         }))?;
         let terms = tune.minimise.iter().map(|term| Term {
             figure: term.figure.get_ref().clone(),
@@ -221,8 +223,11 @@ impl Tune {
 }
 
 impl Tuned {
-    fn of(gain: &Gain, place: &Place) -> Result<Self, ParameterError> {
-        let keys: Vec<String> = gain.key.iter().chain(&gain.keys).cloned().collect();
+    fn of(gain: &Spanned<Gain>, place: &dyn Fn(&Range<usize>) -> Place) -> Result<Self, ParameterError> {
+        let (span, gain) = (gain.span(), gain.get_ref());
+        let stated: Vec<&Spanned<String>> = gain.key.iter().chain(&gain.keys).collect();
+        let keys: Vec<String> = stated.iter().map(|key| key.get_ref().clone()).collect();
+        let key_places = stated.iter().map(|key| place(&key.span())).collect();
         let first =
             keys.first().ok_or_else(|| ParameterError::missing("key", "a key of the gains file"))?.clone();
         let limits = match (gain.factor, gain.value) {
@@ -241,7 +246,7 @@ impl Tuned {
         }
         let name = gain.name.clone().unwrap_or(first);
         require_line(&name)?;
-        Ok(Self { name, keys, limits, place: place.clone() })
+        Ok(Self { name, keys, limits, place: place(&span), key_places })
     }
 
     /// Value at the coordinate `x` of the range, 0 to 1, of a gain that is `declared`; four significant digits.
@@ -290,11 +295,32 @@ impl Tuned {
         Err(self.problem(message))
     }
 
+    /// The problem of key number `index`, which is not among the numbers of the gains file with this `text`.
+    pub(crate) fn unknown(&self, index: usize, text: &str) -> Diagnostic {
+        let key = &self.keys[index];
+        let document = text.parse::<DocumentMut>().unwrap_or_default();
+        let known = number_keys(document.as_item(), "");
+        let message = format!("the gains file has no number `{key}`");
+        let help = did_you_mean(key, known.iter().map(String::as_str), "its numbers are");
+        Diagnostic::at(self.key_places[index].clone(), ParameterError::conflict("key", message)).help(help)
+    }
+
     /// A problem with this gain, at its place in the file.
     pub(crate) fn problem(&self, message: impl Into<String>) -> Diagnostic {
         let (key, _) = self.limits.key();
         Diagnostic::at(self.place.clone(), ParameterError::conflict(key, message.into())).help(HELP)
     }
+}
+
+/// Dotted keys of the numbers in the table `item`, with `before` in front. A quantity is a number.
+fn number_keys(item: &Item, before: &str) -> Vec<String> {
+    let Some(table) = item.as_table_like() else { return Vec::new() };
+    let keys = table.iter().flat_map(|(key, item)| {
+        let key = if before.is_empty() { key.to_owned() } else { format!("{before}.{key}") };
+        let number = item.get("value").unwrap_or(item);
+        if number.is_float() || number.is_integer() { vec![key] } else { number_keys(item, &key) }
+    });
+    keys.collect()
 }
 
 impl Term {
@@ -344,6 +370,10 @@ mod tests {
         let file = "[roll]\nproportional = { value = 16, unit = \"1/s^2\" }\n";
         assert_eq!([file, "[roll]\nproportional = 16\n"].map(|file| gain.unit(file)), ["1/s^2", "1"]);
         assert!(gain.start(0.0).unwrap_err().to_string().contains("which no factor changes"));
+        let unknown = gain.unknown(0, "pole = 4.0\n[roll]\nproportinal = { value = 16, unit = \"1/s^2\" }\n");
+        let place = "t.toml:8:7: ";
+        let said = unknown.to_string();
+        assert!(said.starts_with(place) && said.ends_with("did you mean `roll.proportinal`?"), "{said}");
         // Flights that judge share no seed with those that tune.
         assert_ne!(tuning.held_out.seed, tuning.campaign.seed);
         let tuning = parse(&text.replace("factor = [0.5, 2]", "value = [0, 4]")).unwrap();

@@ -187,6 +187,14 @@ fn what_cannot_be_tuned_is_refused_in_words() {
         &format!("{file}:{line}:10: there is no figure `hight error`"),
         "did you mean `height error`?",
     ]);
+    // So has a gain that does not exist.
+    let file = tuning(&place, "t.toml", &TUNING.replace("altitude.derivative", "altitude.derivativ"));
+    let written = fs::read_to_string(&file).unwrap();
+    let line = written.lines().position(|line| line.starts_with("key = \"altitude")).unwrap() + 1;
+    place.call(&["tune", &file, "--out", &out]).with_code(2).says(&[
+        &format!("{file}:{line}:7: the gains file has no number `altitude.derivativ`"),
+        "did you mean `altitude.derivative`?",
+    ]);
     let file = tuning(&place, "t.toml", TUNING);
     let weak = place.path("weak.toml");
     place.call(&["tune", &file, "--out", &weak]).with_code(2).says(&["is an input of the tuning"]);
