@@ -63,6 +63,9 @@ struct Beside {
 }
 
 impl Diagnostic {
+    /// Advice on a file that cannot be read at all.
+    pub const CHECK_PATH: &'static str = "check the path and that it is UTF-8 text";
+
     /// Creates a fault of the whole file.
     #[must_use]
     pub fn in_file(file: impl Into<String>, error: impl Into<ParameterError>) -> Self {
@@ -81,7 +84,7 @@ impl Diagnostic {
     #[must_use]
     pub fn unreadable(file: impl Into<String>, cause: &io::Error) -> Self {
         Self::in_file(file, format!("cannot read this file: {}", plain(&cause.to_string())))
-            .help("check the path and that it is UTF-8 text")
+            .help(Self::CHECK_PATH)
     }
 
     /// The same with `help` as advice.

@@ -73,6 +73,8 @@ fn a_vehicle_file_that_is_not_there() {
     let vehicle = place.path("none.toml");
     let ended = refused_setting(&manifest, &[&format!("process.plant.vehicle={vehicle}")]);
     ended.says(&["process `plant`", &vehicle, "cannot read this file", "check the path"]);
+    let start = "here, a relative path starts at the folder of the manifest";
+    refused_setting(&manifest, &["process.plant.vehicle=none.toml"]).says(&["check the path", start]);
     // Programs find it in the same words.
     let set = format!("process.plant.vehicle={vehicle}");
     let json = place.call(&["check", &manifest, "--set", &set, "--json"]).with_code(2).json();

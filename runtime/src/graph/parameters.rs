@@ -371,8 +371,18 @@ fn refused(declared: &DeclaredNode<'_>, error: &ParameterError) -> Diagnostic {
     };
     let is_unknown = matches!(error, ParameterError::Unknown { .. });
     let at = place_within(declared, key, is_unknown);
-    let error = tidied(error.clone()).of(format!("process `{name}`"));
+    let mut error = tidied(error.clone()).of(format!("process `{name}`"));
+    if declared.manifest.sources.is_override(at.start) {
+        error = with_start_of_path(error);
+    }
     declared.manifest.problem(&at, error, help)
+}
+
+/// The same error of a value of `--set`; the advice on a file that cannot be read names the folder at which its path starts.
+fn with_start_of_path(error: ParameterError) -> ParameterError {
+    let advice =
+        format!("{}; here, a relative path starts at the folder of the manifest", Diagnostic::CHECK_PATH);
+    error.reworded(|text| text.replace(Diagnostic::CHECK_PATH, &advice))
 }
 
 /// The same error with the paths of its files without detours: an included manifest names files from its own folder.
