@@ -200,13 +200,20 @@ impl Summary {
                 self.describe(recording, plan)
             }
             (Some(recording), None) if self.first_tick > 0 => {
-                self.is_unjudged = !content.conditions().topics().is_empty();
+                self.leave_unjudged(content);
                 self.describe(recording, plan)
             }
             (Some(recording), None) => self.judge(recording, plan, content),
             (None, Some(figures)) => self.judge_by(figures, content),
             (None, None) => Ok(()),
         }
+    }
+
+    /// Notes that the flight before has no figures: conditions in `content` that are not judged have not held.
+    fn leave_unjudged(&mut self, content: &Content) {
+        self.is_unjudged = !content.conditions().topics().is_empty();
+        let is_judged = content.compare.iter().any(|compare| compare.get_ref().judged);
+        self.passed &= content.pass.is_empty() && !is_judged;
     }
 
     /// Judges the `recording` of the run: its shadows, its replacements, and the conditions in `content`. A run that
@@ -327,8 +334,8 @@ impl fmt::Display for Summary {
             writeln!(f, "  the flight envelope of {name} was not evaluated: it needs a recording")
         })?;
         if self.is_unjudged {
-            let why = "the run before had no judge in flight; one that writes checkpoints by itself has";
-            writeln!(f, "  conditions: not judged, {why}")?;
+            let (why, way) = ("no judge flew before tick", "a run with --checkpoint-every has one");
+            writeln!(f, "  conditions: not judged, since {why} {}; {way}", self.first_tick)?;
         }
         if let Some(recording) = &self.recording {
             writeln!(f, "  recording: {}", recording.display())?;
@@ -341,6 +348,7 @@ impl fmt::Display for Summary {
         match (self.passed, refused) {
             (true, _) => write!(f, "passed"),
             (false, 0) if self.stopped_early => write!(f, "FAILED: stopped before its end"),
+            (false, 0) if self.is_unjudged => write!(f, "FAILED: the conditions were not judged"),
             (false, 0) => write!(f, "FAILED"),
             (false, 1) => write!(f, "FAILED: a backup was refused"),
             (false, _) => write!(f, "FAILED: {refused} backups were refused"),

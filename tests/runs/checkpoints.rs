@@ -3,6 +3,7 @@
 
 use crate::manifests::{settings, shipped, shipped_in_folders};
 use crate::recordings::{first_tick, rows};
+use crate::refusals::good;
 use crate::support::{Place, poll, repository};
 use rustix::process::Signal;
 use std::fs;
@@ -519,9 +520,34 @@ fn a_live_run_writes_one_when_it_is_asked() {
     let (short, end) = (place.path("c.mcap"), format!("run.duration_s={}", (held + 150) as f64 * 1e-3));
     let args = ["run", "--from", &of_pause, "--pace", "free", "--set", &end, "--record", &short];
     for host in HOSTS {
-        place.call(&[&args[..], host].concat()).flown();
+        // The run before had no judge: what nothing has judged has not passed.
+        let ended = place.call(&[&args[..], host].concat()).with_code(1);
+        let unjudged = format!("conditions: not judged, since no judge flew before tick {held};");
+        ended.prints(&[&unjudged, "FAILED: the conditions were not judged"]);
         require_goes_on(&place, &place.path("a.mcap"), &short, u32::try_from(held).unwrap());
     }
+    let json = place.call(&[&args[..], &["--in-process", "--json"]].concat()).with_code(1).json();
+    assert_eq!((&json["passed"], &json["is_unjudged"]), (&false.into(), &true.into()));
+    let args = ["run", "--from", &of_pause, "--set", &end, "--record", "none"];
+    place.call(&args).with_code(2).says(&["holds nothing of the conditions so far", "--checkpoint-every"]);
+}
+
+#[test]
+fn a_run_without_conditions_passes_from_a_checkpoint_that_was_asked_for() {
+    let place = Place::new();
+    let manifest = place.write("good.toml", good());
+    let mut launch = place.start_endless(&["run", &manifest, "--record", &place.path("a.mcap")]);
+    launch.await_ticks(100);
+    let (run, file) = (place.run_id(), place.path("asked.ckpt"));
+    let asked = place.start(&["ctl", "checkpoint", &file, "--run", &run, "--json"]).end_among_others();
+    let tick = asked.with_code(0).json()["tick"].as_u64().unwrap();
+    place.start(&["ctl", "stop", "--run", &run]).end_among_others().with_code(0);
+    launch.end().with_code(1);
+    let end = format!("run.duration_s={}", (tick + 100) as f64 * 1e-3);
+    let args = ["run", "--from", &file, "--pace", "free", "--set", &end, "--record", &place.path("b.mcap")];
+    let ended = place.call(&[&args[..], &["--in-process"]].concat()).with_code(0);
+    ended.prints(&["from the checkpoint of tick", "passed"]);
+    assert!(!ended.output.contains("not judged"), "{ended}");
 }
 
 /// In processes of several nodes, and where some compute seldom.
