@@ -199,7 +199,8 @@ impl Summary {
                 self.judge_by(figures, content)?;
                 self.describe(recording, plan)
             }
-            (Some(recording), None) if self.first_tick > 0 => {
+            // A run that was stopped has no verdicts, whatever flew before.
+            (Some(recording), None) if self.first_tick > 0 && !self.stopped_early => {
                 self.leave_unjudged(content);
                 self.describe(recording, plan)
             }

@@ -60,7 +60,10 @@ fn a_run_that_went_back_flies_as_one_from_the_checkpoint_and_its_recording_says_
         let rewound =
             [format!("rewound from tick {end} to tick {}", end - 37), "to tick 300; up to there".to_owned()];
         let rewound: Vec<&str> = rewound.iter().map(String::as_str).collect();
-        launch.end().with_code(1).prints(&rewound);
+        let ended = launch.end().with_code(1);
+        ended.prints(&rewound);
+        ended.prints(&["FAILED: stopped before its end"]);
+        assert!(!ended.output.contains("not judged"), "{ended}");
         let [first, second] = [1, 2].map(|number| place.path(&format!("a.rewind-{number}.mcap")));
         assert_eq!([&first, &second, &record].map(|path| first_tick(path)), [0, end - 37, 300]);
         let expected = "begins at tick 300, and from there on all messages are those of";
