@@ -134,7 +134,9 @@ commands! {
     #[command(after_help = "Example: hummingbus ctl pause")]
     Ctl(steer::CtlArguments) => steer::ctl;
     /// Replace a process of a live run.
-    #[command(after_help = "Example: hummingbus swap controller --with better.toml --shadow-ticks 500")]
+    #[command(
+        after_help = "Example: hummingbus swap controller --with better.toml --shadow-ticks 500\n\nIn a paused run, the swap waits until the run goes on: hummingbus ctl resume"
+    )]
     Swap(steer::SwapArguments) => steer::swap;
     /// Remove what dead runs left, and nothing of live ones; exit code 1 if something could not be removed.
     #[command(after_help = "Example: hummingbus clean --dry-run")]

@@ -6,7 +6,7 @@ use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand};
 use inputs::InputFiles;
 use runtime::ctl::client;
-use runtime::ctl::protocol::{Answer, Request};
+use runtime::ctl::protocol::{Answer, Request, State};
 use runtime::manifest::PaceSetting;
 use runtime::run_dir::find_own;
 use std::net::SocketAddr;
@@ -153,7 +153,23 @@ pub fn swap(arguments: &SwapArguments) -> Result<bool> {
         shadow_ticks: arguments.shadow_ticks,
         at_tick: arguments.at_tick,
     };
-    ask(arguments.run.as_deref(), &request, arguments.json).map(|()| true)
+    let run_id = arguments.run.as_deref();
+    tell_of_pause(run_id);
+    ask(run_id, &request, arguments.json).map(|()| true)
+}
+
+/// Says at once that a swap of a paused run waits until the run goes on. Other states and errors are left to the answer.
+fn tell_of_pause(run_id: Option<&str>) {
+    let Ok(run) = find_own(run_id) else { return };
+    if let Ok(Answer::Status(status)) = client::ask(&run, &Request::Status)
+        && status.state == State::Paused
+    {
+        let named = run_id.map_or(String::new(), |run_id| format!(" --run {run_id}"));
+        output::say(&format!(
+            "the run is paused at tick {}, and the swap waits until it goes on: `hummingbus ctl resume{named}`",
+            status.tick
+        ));
+    }
 }
 
 /// The TOML text that `given` is, or that the file of this name holds.

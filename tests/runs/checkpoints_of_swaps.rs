@@ -132,6 +132,9 @@ fn a_checkpoint_of_a_pause_within_a_live_swap_goes_on() {
     let take_over = (paused + 300).to_string();
     let args = ["swap", "controller", "--with", SOFT, "--at-tick", &take_over, "--shadow-ticks", "200"];
     let swap = place.start(&[&args[..], &["--run", &run]].concat());
+    let waits =
+        format!("paused at tick {paused}, and the swap waits until it goes on: `hummingbus ctl resume --run");
+    swap.await_said(&waits);
     place.process_of_generation("controller", 1);
     let mut files = Vec::new();
     for ticks in ["150", "150", "50"] {
