@@ -55,7 +55,11 @@ pub fn diff(arguments: &DiffArguments) -> Result<bool> {
 fn first(a: &Recording, b: &Recording, is_json: bool) -> Result<bool> {
     let difference = first_difference(a, b)?;
     if is_json {
-        print_json(&json!({ "identical": difference.is_none(), "first": difference.as_ref().map(told) }))?;
+        print_json(&json!({
+            "identical": difference.is_none(),
+            "same_from_tick": difference.as_ref().and_then(same_from_tick),
+            "first": difference.as_ref().map(told),
+        }))?;
     } else {
         print_text(&difference.as_ref().map_or_else(|| "identical".to_owned(), ToString::to_string))?;
     }
@@ -80,6 +84,14 @@ fn within(a: &Recording, b: &Recording, tolerance: f64, is_json: bool) -> Result
         print_text(&text(&found, a, b, tolerance))?;
     }
     Ok(is_within)
+}
+
+/// The first tick of a recording that begins later than the other and has the same messages from there on.
+fn same_from_tick(difference: &Difference) -> Option<u32> {
+    match difference {
+        Difference::Later { first_tick, .. } => Some(*first_tick),
+        _ => None,
+    }
 }
 
 fn told(difference: &Difference) -> Value {

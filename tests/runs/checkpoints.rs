@@ -137,6 +137,8 @@ fn verdicts_are_those_of_the_whole_flight_and_the_manifest_names_the_tick() {
         assert!(ended["pass"].as_array().unwrap().len() > 2);
         if record != "none" {
             require_goes_on(&place, &whole, &record, 6500);
+            let told = place.call(&["diff", &whole, &record, "--json"]).with_code(1).json();
+            assert_eq!((&told["identical"], &told["same_from_tick"]), (&false.into(), &6500.into()));
         }
     }
 }
@@ -279,6 +281,8 @@ fn a_fork_differs_from_the_tick_on_at_which_its_value_counts() {
         place.call(&[&["run", "--from", &kept[0].1, "--record", &fork, "--in-process"][..], &set].concat());
     ended.flown();
     place.call(&["diff", &whole, &fork]).with_code(1).prints(&["tick 2000, topic /controller/"]);
+    let told = place.call(&["diff", &whole, &fork, "--json"]).with_code(1).json();
+    assert_eq!(told["same_from_tick"], serde_json::Value::Null);
     // One that ends before the other begins has nothing in common with it.
     let short = place.path("short.mcap");
     let end = ["--set", "run.duration_s=0.1", "--in-process"];
