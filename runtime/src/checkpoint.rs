@@ -202,6 +202,13 @@ impl Checkpoint {
     /// # Errors
     /// If one of its files has changed, or a value does not fit.
     pub fn load_manifest(&self, overrides: &[String], registry: Registry) -> Result<Manifest, Error> {
+        if !self.manifest.exists() {
+            let path = self.manifest.display();
+            return Err(anyhow!(
+                "the manifest of the checkpoint, {path}, is no longer there: `run --from` reads it where it was; put it back there"
+            )
+            .into());
+        }
         let all: Vec<String> = self.overrides.iter().chain(overrides).cloned().collect();
         let manifest = Manifest::load(&self.manifest, &all, registry)?;
         if !overrides.is_empty() {

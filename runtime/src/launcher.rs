@@ -266,7 +266,10 @@ impl<'a> Launcher<'a> {
             missed.iter().for_each(|missed| on(RunEvent::Note(missed)));
         }
         if let (Err(_), Some(Written { tick, path })) = (&flown, written.last()) {
-            on(RunEvent::Note(&format!("the last checkpoint is {}, of tick {tick}", path.display())));
+            let path = path.display();
+            on(RunEvent::Note(&format!(
+                "the last checkpoint is {path}, of tick {tick}; to go on from it: hummingbus run --from {path}"
+            )));
         }
         let mut outcome = flown?;
         (outcome.checkpoints, outcome.missed_checkpoints) = (written, missed);

@@ -387,7 +387,11 @@ fn a_run_that_breaks_leaves_the_checkpoints_before() {
         (found.len() >= 3).then_some(found)
     });
     rustix::process::kill_process(place.process_of("imu"), Signal::KILL).unwrap();
-    launch.end().with_code(2).says(&["imu", "the last checkpoint is"]);
+    launch.end().with_code(2).says(&[
+        "imu",
+        "the last checkpoint is",
+        "to go on from it: hummingbus run --from",
+    ]);
     let left = checkpoints(&place, "a");
     assert!(left.len() <= 3 && left.last().unwrap().0 >= kept[2].0, "{left:?}");
     let (tick, file) = left.last().unwrap();
@@ -629,6 +633,16 @@ fn what_does_not_fit_is_refused_in_words() {
     fs::write(&manifest, format!("{text}\n# longer\n")).unwrap();
     refused(&[], &["m.toml has changed since the checkpoint was written"]);
     fs::write(&manifest, &text).unwrap();
+    let moved = place.path("moved.toml");
+    fs::rename(&manifest, &moved).unwrap();
+    refused(&[], &["m.toml, is no longer there", "put it back there"]);
+    fs::rename(&moved, &manifest).unwrap();
+    // A gain of a file that the manifest does not name: a fork names it, too.
+    let gain = "process.controller.gains.roll.derivative=6.5";
+    refused(&["--set", gain], &["names no gains file", "or give --set process.controller.gains=PATH, too"]);
+    let file_of_gains = format!("process.controller.gains={}", repository("controllers/gains/pid.toml"));
+    let fork = ["run", "--from", &file, "--record", "none", "--in-process", "--set", &file_of_gains];
+    place.call(&[&fork[..], &["--set", gain]].concat()).flown();
     place.call(&["run", "--from", &file, "--record", "none", "--in-process"]).flown();
 
     for (more, part) in [

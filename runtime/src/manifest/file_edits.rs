@@ -177,7 +177,10 @@ impl FileEdit {
             return Ok(());
         }
         let message = format!("process `{name}` names no {} file", self.file);
-        let help = format!("add {} = \"PATH\" to [process.{name}]", self.file);
+        let file = self.file;
+        let help = format!(
+            "add {file} = \"PATH\" to [process.{name}], or give --set process.{name}.{file}=PATH, too"
+        );
         Err(sources.problem(&self.span, message, help))
     }
 
