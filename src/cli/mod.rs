@@ -10,6 +10,7 @@ mod component_kind;
 mod components;
 mod components_page;
 mod diff;
+mod earlier;
 mod effects;
 mod export;
 mod export_fmu;

@@ -1,5 +1,6 @@
 //! The command `run` and related ones: check a manifest, fly it, judge its recording, print the results.
 
+use super::earlier::Earlier;
 use super::files::require_kind;
 use super::foxglove::{self, LiveFoxglove};
 use super::interrupts::stop_token;
@@ -162,6 +163,7 @@ pub fn run(
     let files = files.unwrap_or_else(|| Files::beside(&path));
     let pages = if graph.plan.profile { files.outputs() } else { Vec::new() };
     let mut outputs = Outputs::of(&manifest, &graph, &path, pages)?;
+    let earlier = going_on.is_none().then(|| Earlier::beside(&path));
     let page = arguments.view.map(|port| page(port, arguments.no_open, &graph)).transpose()?;
     let topics = arguments.foxglove.map(|address| topics(address, &manifest, &graph)).transpose()?;
     let bar = progress::bar(RUN, arguments.json || arguments.quiet);
@@ -207,6 +209,11 @@ pub fn run(
         print_text(&text)?;
     } else {
         summary.missed_checkpoints.iter().for_each(|missed| say(&format!("warning: {missed}")));
+    }
+    if !summary.checkpoints.is_empty()
+        && let Some(warning) = earlier.as_ref().and_then(Earlier::warning)
+    {
+        say(&warning);
     }
     if let Some(page) = page {
         stay(page, summary.recording.as_deref(), &stop)?;

@@ -421,6 +421,28 @@ fn an_unrecorded_fork_keeps_the_checkpoints_of_the_run_before() {
     assert_eq!(of_fork.iter().map(|(tick, _)| *tick).collect::<Vec<_>>(), [1000]);
 }
 
+/// They look like those of the run that has replaced the recording. Nothing removes them: another run may go on from one.
+#[test]
+fn checkpoints_of_an_earlier_run_are_named() {
+    let place = Place::new();
+    let hover = repository("manifests/hover.toml");
+    let record = place.path("a.mcap");
+    let every = ["--in-process", "--checkpoint-every", "100ms", "--set"];
+    let flown =
+        |end: &str| place.call(&[&["run", &hover, "--record", &record][..], &every, &[end]].concat()).flown();
+    let first = flown("run.duration_s=0.5");
+    assert!(!first.error.contains("of an earlier run"), "{first}");
+    let second = flown("run.duration_s=0.25");
+    second.says(&["warning: 2 checkpoints of an earlier run lie beside", "a.300.ckpt", "a.400.ckpt"]);
+    assert!(!second.error.contains("a.200.ckpt"), "{second}");
+    let left: Vec<u32> = checkpoints(&place, "a").iter().map(|(tick, _)| *tick).collect();
+    assert_eq!(left, [100, 200, 300, 400]);
+    // A run that goes on from one of them needs those before.
+    let args = ["run", "--from", &place.path("a.300.ckpt"), "--record", &record, "--in-process"];
+    let later = place.call(&args).flown();
+    assert!(!later.error.contains("of an earlier run"), "{later}");
+}
+
 /// The summary says from where to look at what went wrong.
 #[test]
 fn a_failed_condition_leads_to_the_checkpoint_before() {
