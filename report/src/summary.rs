@@ -335,8 +335,12 @@ impl fmt::Display for Summary {
             writeln!(f, "  the flight envelope of {name} was not evaluated: it needs a recording")
         })?;
         if self.is_unjudged {
-            let (why, way) = ("no judge flew before tick", "a run with --checkpoint-every has one");
-            writeln!(f, "  conditions: not judged, since {why} {}; {way}", self.first_tick)?;
+            let advice = "a run with --checkpoint-every has one";
+            writeln!(
+                f,
+                "  conditions: not judged, since no judge flew before tick {}; {advice}",
+                self.first_tick
+            )?;
         }
         if let Some(recording) = &self.recording {
             writeln!(f, "  recording: {}", recording.display())?;
