@@ -15,7 +15,7 @@
 //! | [`store`] | the output folder: lock, plan, rows flown so far |
 //! | [`table`] | all rows as Parquet |
 //! | [`tuning`], [`search`], [`flying`], [`gains_file`] | gains that cost less: the table `[tune]`, the optimiser, its flights, the new file |
-//! | [`statistics`], [`requirement`], [`report`], [`page`] | pass rate, distributions, rank correlations, the gate for continuous integration |
+//! | [`statistics`], [`requirement`], [`pass_rates`], [`report`], [`page`] | pass rate, distributions, rank correlations, the gate for continuous integration |
 //!
 //! A flight is a run on one thread of a worker process, without a recording. Its row depends on the plan alone: the number
 //! of workers, their order and the load of the machine change no value.
@@ -33,6 +33,7 @@ pub mod gains_file;
 pub mod list;
 pub mod measures;
 pub mod page;
+pub mod pass_rates;
 pub mod plan;
 pub mod pool;
 pub mod report;

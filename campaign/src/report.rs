@@ -3,6 +3,7 @@
 use crate::base::Base;
 use crate::declaration::{Campaign, Start, Varied};
 use crate::list::shown;
+use crate::pass_rates::PassRates;
 use crate::plan::Plan;
 use crate::row::{Row, count};
 use crate::statistics::{clopper_pearson, quantiles, rank_correlation};
@@ -23,6 +24,8 @@ const REASONS: usize = 5;
 const QUANTILES: [f64; 5] = [0.0, 0.05, 0.5, 0.95, 1.0];
 /// Chance below which a rank correlation is shown: one in a thousand, since many pairs are looked at.
 const CHANCE_MAX: f64 = 1e-3;
+/// Name of the outcome among the figures.
+const PASSED: &str = "passed";
 
 /// The report of a campaign.
 #[derive(Debug, Serialize)]
@@ -58,7 +61,9 @@ pub struct Report {
     pub figures: Vec<Spread>,
     /// Flights by each text or truth value that a varied value is chosen from.
     pub choices: Vec<Choice>,
-    /// Rank correlations that chance does not explain, strongest first.
+    /// Pass rates by each varied number.
+    pub pass_rates: Vec<PassRates>,
+    /// Rank correlations that chance does not explain, strongest first; behind them, pass rates that chance does not explain.
     pub influences: Vec<Influence>,
     /// Command that flies a flight again, recorded; `FLIGHT` stands for its number.
     pub again: String,
@@ -120,7 +125,7 @@ pub struct Choice {
     pub medians: Vec<Option<f64>>,
 }
 
-/// Rank correlation of a varied value with the outcome or a figure.
+/// Influence of a varied value on the outcome or a figure.
 #[derive(Debug, Serialize)]
 pub struct Influence {
     /// Name of the varied value.
@@ -129,8 +134,20 @@ pub struct Influence {
     pub figure: String,
     /// Spearman's rank correlation.
     pub rank_correlation: f64,
-    /// Chance of one as large without any relation.
+    /// Chance of one as large, or of pass rates as different, without any relation.
     pub chance: f64,
+    /// Test that has found it.
+    pub test: Test,
+}
+
+/// Test of an influence.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Test {
+    /// Spearman's rank correlation.
+    RankCorrelation,
+    /// Chi-square test of the pass rates by the value.
+    PassRates,
 }
 
 /// A flight near the end of the list.
@@ -161,6 +178,7 @@ impl Report {
     ) -> Result<Self> {
         let flights = rows.len() as u64;
         let passed = rows.iter().filter(|row| row.passed).count() as u64;
+        let pass_rates = pass_rates(campaign, rows);
         Ok(Self {
             campaign: campaign.path.display().to_string(),
             version: build.to_owned(),
@@ -180,7 +198,8 @@ impl Report {
             errors: errors(rows),
             figures: spreads(base, rows),
             choices: choices(campaign, base, rows),
-            influences: influences(campaign, base, rows),
+            influences: influences(campaign, base, rows, &pass_rates),
+            pass_rates,
             again: again(campaign, folder, "FLIGHT")?,
             worst: worst(campaign, base, plan, rows, folder)?,
         })
@@ -290,8 +309,23 @@ fn choices(campaign: &Campaign, base: &Base, rows: &[Row]) -> Vec<Choice> {
     choices
 }
 
-/// Rank correlations of the varied numbers: texts have no order.
-fn influences(campaign: &Campaign, base: &Base, rows: &[Row]) -> Vec<Influence> {
+/// Pass rates by each varied number, of the flights with figures.
+fn pass_rates(campaign: &Campaign, rows: &[Row]) -> Vec<PassRates> {
+    let mut rates = Vec::new();
+    for (varied, Varied { name, distribution, .. }) in campaign.vary.iter().enumerate() {
+        if distribution.choices().is_none() {
+            let known = rows.iter().filter(|row| row.error.is_none());
+            let flights: Vec<(f64, bool)> =
+                known.filter_map(|row| Some((*row.drawn.get(varied)?, row.passed))).collect();
+            rates.push(PassRates::of(name, &flights));
+        }
+    }
+    rates
+}
+
+/// Rank correlations of the varied numbers: texts have no order. Behind them are the pass rates that differ, of numbers whose rank
+/// correlation does not show it.
+fn influences(campaign: &Campaign, base: &Base, rows: &[Row], rates: &[PassRates]) -> Vec<Influence> {
     let mut influences = Vec::new();
     for (varied, Varied { name, distribution, .. }) in campaign.vary.iter().enumerate() {
         if distribution.choices().is_some() {
@@ -304,15 +338,25 @@ fn influences(campaign: &Campaign, base: &Base, rows: &[Row]) -> Vec<Influence> 
                 rank_correlation(&pairs).filter(|(_, chance)| *chance < CHANCE_MAX)
             {
                 let (varied, figure) = (name.clone(), figure.to_owned());
-                influences.push(Influence { varied, figure, rank_correlation, chance });
+                let test = Test::RankCorrelation;
+                influences.push(Influence { varied, figure, rank_correlation, chance, test });
             }
         };
-        add("passed", &|row| row.error.is_none().then_some(if row.passed { 1.0 } else { 0.0 }));
+        add(PASSED, &|row| row.error.is_none().then_some(if row.passed { 1.0 } else { 0.0 }));
         for &index in &base.kept {
             add(&base.figures[index], &|row| row.figures.get(index).copied().flatten());
         }
     }
     influences.sort_by(|a, b| b.rank_correlation.abs().total_cmp(&a.rank_correlation.abs()));
+    let chance_max = CHANCE_MAX / rates.len().max(1) as f64;
+    for PassRates { varied, rank_correlation, chance, .. } in rates {
+        let is_listed = influences.iter().any(|it| it.varied == *varied && it.figure == PASSED);
+        if let Some(chance) = chance.filter(|chance| *chance < chance_max && !is_listed) {
+            let (varied, figure) = (varied.clone(), PASSED.to_owned());
+            let rank_correlation = rank_correlation.unwrap_or_default();
+            influences.push(Influence { varied, figure, rank_correlation, chance, test: Test::PassRates });
+        }
+    }
     influences
 }
 
@@ -455,6 +499,24 @@ impl Report {
     }
 }
 
+impl Report {
+    /// The strongest rank correlations, and the pass rates that chance does not explain.
+    fn write_influences(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let of = |test: Test| self.influences.iter().filter(move |it| it.test == test);
+        for Influence { varied, figure, rank_correlation, .. } in of(Test::RankCorrelation).take(WORST) {
+            writeln!(f, "    {rank_correlation:+.2} of `{varied}` with: {figure}")?;
+        }
+        if of(Test::RankCorrelation).next().is_none() {
+            writeln!(f, "    none that chance does not explain")?;
+        }
+        for Influence { varied, .. } in of(Test::PassRates) {
+            let mut rates = self.pass_rates.iter().filter(|rates| rates.varied == *varied);
+            rates.try_for_each(|rates| writeln!(f, "  {rates}"))?;
+        }
+        Ok(())
+    }
+}
+
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [low, high] = self.interval.map(|limit| 100.0 * limit);
@@ -474,12 +536,7 @@ impl fmt::Display for Report {
         self.figures.iter().try_for_each(|spread| writeln!(f, "    {spread}"))?;
         self.choices.iter().try_for_each(|choice| writeln!(f, "  {choice}"))?;
         writeln!(f, "  rank correlations (Spearman), strongest first:")?;
-        for Influence { varied, figure, rank_correlation, .. } in self.influences.iter().take(WORST) {
-            writeln!(f, "    {rank_correlation:+.2} of `{varied}` with: {figure}")?;
-        }
-        if self.influences.is_empty() {
-            writeln!(f, "    none that chance does not explain")?;
-        }
+        self.write_influences(f)?;
         writeln!(f, "  worst flights; each is flown again, recorded, by: {}", self.again)?;
         let mut worst = self.worst.iter();
         worst.try_for_each(|Worst { flight, reason, .. }| {

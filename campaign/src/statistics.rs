@@ -1,6 +1,6 @@
 //! Statistics of many flights: the pass rate's interval, quantiles, rank correlations.
 
-use statrs::distribution::{Beta, ContinuousCDF, StudentsT};
+use statrs::distribution::{Beta, ChiSquared, ContinuousCDF, StudentsT};
 
 /// Interval of a probability of which `passed` of `flights` are known, with at least the probability `confidence` that it
 /// holds the true one (Clopper and Pearson, Biometrika 26(4), 1934).
@@ -70,6 +70,34 @@ pub fn rank_correlation(pairs: &[(f64, f64)]) -> Option<(f64, f64)> {
     Some((rank, chance))
 }
 
+/// Chance of pass rates as different as those of `groups`, the number of flights of each and of those that passed, without any
+/// relation (chi-square test of independence). `None` for fewer than two groups, and where a group is expected to have less than
+/// one flight that passes or fails: the distribution is another one there.
+///
+/// ```
+/// use campaign::statistics::independence;
+/// // Two degrees of freedom: the chance of 10 is exp(-5).
+/// let chance = independence(&[(20, 5), (20, 10), (20, 15)]).unwrap();
+/// assert!((chance - 0.006_737_946_999).abs() < 1e-9);
+/// assert_eq!(independence(&[(20, 20), (20, 20)]), None);
+/// ```
+#[must_use]
+pub fn independence(groups: &[(u64, u64)]) -> Option<f64> {
+    let flights: u64 = groups.iter().map(|group| group.0).sum();
+    let passed: u64 = groups.iter().map(|group| group.1).sum();
+    let rate = passed as f64 / flights.max(1) as f64;
+    let is_thin = |group: &(u64, u64)| group.0 as f64 * rate.min(1.0 - rate) < 1.0;
+    if groups.len() < 2 || groups.iter().any(is_thin) {
+        return None;
+    }
+    let excess = |group: &(u64, u64)| {
+        let surplus = group.1 as f64 - rate * group.0 as f64;
+        surplus * surplus / (rate * (1.0 - rate) * group.0 as f64)
+    };
+    let sum: f64 = groups.iter().map(excess).sum();
+    Some(ChiSquared::new((groups.len() - 1) as f64).ok()?.sf(sum))
+}
+
 /// Ranks from 1; equal values share the mean of theirs.
 fn ranks(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
@@ -96,7 +124,7 @@ fn correlation(x: &[f64], y: &[f64]) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::{clopper_pearson, lower_limit, rank_correlation, ranks};
+    use super::{clopper_pearson, independence, lower_limit, rank_correlation, ranks};
 
     #[test]
     fn the_interval_is_that_of_scipy() {
@@ -114,6 +142,19 @@ mod tests {
         }
         // One-sided: 0.05^(1/300) for 300 of 300.
         assert!((lower_limit(300, 300, 0.95) - libm::pow(0.05, 1.0 / 300.0)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn pass_rates_that_differ_on_both_sides_are_not_chance() {
+        // Four degrees of freedom: the chance of 100 is (1 + 50) exp(-50).
+        let chance = independence(&[(20, 0), (20, 20), (20, 20), (20, 20), (20, 0)]).unwrap();
+        assert!((chance / (51.0 * libm::exp(-50.0)) - 1.0).abs() < 1e-3, "{chance}");
+        assert!(independence(&[(20, 12), (20, 11), (20, 13)]).unwrap() > 0.5);
+        let too_few: [&[(u64, u64)]; 4] =
+            [&[], &[(20, 10)], &[(20, 0), (20, 0)], &[(2, 1), (1, 0), (20, 10)]];
+        for groups in too_few {
+            assert_eq!(independence(groups), None, "{groups:?}");
+        }
     }
 
     #[test]

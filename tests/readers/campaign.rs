@@ -119,6 +119,8 @@ fn a_browser_draws_the_whole_page_of_a_campaign_with_choices() {
     assert_eq!(choices.len(), 2, "{report}");
     let (summary, version) = (seen["summary"].as_str().unwrap(), report["version"].as_str().unwrap());
     assert!(summary.contains(&format!("Flown by hummingbus {version}.")), "{summary}");
+    let rates = seen["tables"]["rates"].as_array().unwrap();
+    assert_eq!((rates.len(), &rates[1][0], &rates[1][2]), (3, &json!("seed"), &json!("1.000")), "{seen}");
     for (row, choice) in (1_usize..).zip(choices) {
         let cells = seen["tables"]["choices"][row].as_array().unwrap();
         assert_eq!(cells[1], choice["choice"], "{seen}");

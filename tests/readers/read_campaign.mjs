@@ -19,7 +19,7 @@ function look() {
   const height = (name) => document.querySelector(name)?.getBoundingClientRect().height ?? Infinity;
   const boxes = [document.documentElement, ...document.querySelectorAll(".scroll")];
   return {
-    tables: Object.fromEntries(["failures", "figures", "choices", "worst"].map((id) => [id, rows(id)])),
+    tables: Object.fromEntries(["failures", "figures", "choices", "influences", "rates", "worst"].map((id) => [id, rows(id)])),
     summary: text("#summary"),
     axes: { histogram: text("#histogram .xtitle"), scatter: title("#scatter .ytitle") },
     tooHigh: Math.max(0, height("#scatter .ytitle") - height("#scatter .main-svg")),

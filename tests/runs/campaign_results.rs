@@ -2,6 +2,7 @@
 
 use crate::campaign::{HOVERS, rows, written};
 use crate::support::{HUMMINGBUS, Load, Place, repository};
+use serde_json::json;
 use std::fs::{self, OpenOptions};
 use std::io::Write as _;
 use std::process::Command;
@@ -173,6 +174,27 @@ fn a_report_keeps_the_figures_that_the_campaign_chooses() {
     assert_eq!(names(&fly("figures = [\"east (max)\"]\n")), ["east (max)"]);
     assert!(table(&out).len() < wide);
     assert_eq!(before, fs::read_to_string(format!("{out}/rows.jsonl")).unwrap());
+}
+
+#[test]
+fn an_effect_on_both_sides_of_a_range_is_an_influence() {
+    let place = Place::new();
+    let campaign = written(&place, "c.toml", &HOVERS.replace("flights = 12", "flights = 60"));
+    // Light vehicles are too high, and heavy ones are too low.
+    let hover = fs::read_to_string(place.path("hover.toml")).unwrap();
+    let pass = "[[pass]]\nname = \"level\"\ntopic = \"/plant/state\"\nfield = \"position.z\"\nunit = \"m\"\nstatistic = \"last\"\nmin = 0.99\nmax = 1.01\n";
+    place.write("hover.toml", format!("{hover}\n{pass}"));
+    let args = ["campaign", &campaign, "--out", &place.path("out")];
+    place.call(&args).with_code(0).prints(&["  pass rates by `mass`: 0.0 % from 0."]);
+    let report = place.call(&[&args[..], &["--json"]].concat()).with_code(0).json();
+    let groups = report["pass_rates"][0]["groups"].as_array().unwrap();
+    let passed: Vec<u64> = groups.iter().map(|group| group["passed"].as_u64().unwrap()).collect();
+    assert_eq!(passed.len(), 5, "{report}");
+    assert!(passed[0] == 0 && passed[2] > 0 && passed[4] == 0, "{passed:?}");
+    assert_eq!(passed.iter().sum::<u64>(), report["passed"].as_u64().unwrap());
+    let influences = report["influences"].as_array().unwrap();
+    let found = influences.iter().find(|it| it["figure"] == "passed").unwrap();
+    assert_eq!((&found["varied"], &found["test"]), (&json!("mass"), &json!("pass-rates")), "{report}");
 }
 
 #[test]

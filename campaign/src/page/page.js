@@ -2,6 +2,8 @@ const { report, varied, figures, flights } = data;
 const percent = (part) => `${(100 * part).toFixed(2)} %`;
 const PASSED = "--curve-0";
 const FAILED = "--curve-1";
+// Letters of the bar of a pass rate of 100 %.
+const BAR = 20;
 // A smaller chance has no meaning.
 const chance = (value) => (value < 1e-3 ? "< 0.001" : number(value, 2));
 
@@ -53,8 +55,21 @@ fillTable(
 );
 fillTable(
   "influences",
-  [left("varied value"), left("outcome or figure"), "rank correlation", "chance"],
-  report.influences.map((it) => [left(it.varied), left(it.figure), it.rank_correlation.toFixed(2).replace("-", "−"), chance(it.chance)]),
+  [left("varied value"), left("outcome or figure"), "rank correlation", "chance", left("test")],
+  report.influences.map((it) =>
+    [left(it.varied), left(it.figure), it.rank_correlation.toFixed(2).replace("-", "−"), chance(it.chance), left(it.test.replace("-", " "))]),
+);
+element("rated").hidden = !report.pass_rates.some((it) => it.groups.length);
+fillTable(
+  "rates",
+  [left("varied value"), "chance", "from", "to", "flights", "passed", "pass rate", left("")],
+  report.pass_rates.flatMap(({ varied: name, chance: value, groups }) => groups.map((group, index) => ({
+    cells: [
+      left(index ? "" : name), index ? "" : value === null ? "–" : chance(value),
+      number(group.low), number(group.high), group.flights, group.passed, percent(group.pass_rate), left("█".repeat(Math.round(BAR * group.pass_rate))),
+    ],
+    className: index ? "" : "first",
+  }))),
 );
 fillTable(
   "worst",
