@@ -228,11 +228,11 @@ fn next(report: &Report, accepted: &[(&str, &EffectReport)]) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::Brief;
-    use crate::flight_wind::FlightWind;
     use crate::horizons::{Change, Changes};
     use crate::loss::Loss;
     use crate::proposal::Proposal;
     use crate::questions::Question;
+    use crate::report::FlightWind;
     use crate::report::{BeforeAfter, EffectReport, Estimate, Report};
     use crate::revision::Withdrawn;
     use std::collections::BTreeMap;

@@ -1,6 +1,6 @@
 //! The candidates of a search: which parameters an effect brings, and whether flights can show it.
 
-use crate::flight_wind;
+use crate::flight_wind::FLIGHT_WIND;
 use crate::parameter::Parameters;
 use crate::prepared::{Equation, Prepared};
 use flights::Flight;
@@ -68,10 +68,17 @@ pub fn candidates(parameters: &Parameters, flights: &[&Prepared]) -> (Vec<Candid
             None => seen.extend(parts(parameters, kind)),
         }
     }
-    seen.extend(flight_wind::candidate(parameters));
+    seen.extend(wind_of_each_flight(parameters));
     // Parts of an effect may lack the same.
     unidentifiable.dedup();
     (seen, unidentifiable)
+}
+
+/// The candidate of one wind for each flight: the mean, and the deviations. `None` where no flight has a number.
+pub fn wind_of_each_flight(parameters: &Parameters) -> Option<Candidate> {
+    let deviations = parameters.of_name(FLIGHT_WIND.name);
+    let is_known = !deviations.is_empty();
+    is_known.then(|| Candidate { kind: &FLIGHT_WIND, free: [parameters.wind(), deviations].concat() })
 }
 
 /// Returns the first requirement of an effect that `flights` do not meet; `None` if they meet all.
@@ -185,7 +192,7 @@ mod tests {
 
     #[test]
     fn a_candidate_takes_the_place_of_those_that_it_holds() {
-        let of = |free: &[usize]| Candidate { kind: &flight_wind::FLIGHT_WIND, free: free.to_vec() };
+        let of = |free: &[usize]| Candidate { kind: &FLIGHT_WIND, free: free.to_vec() };
         let (drag, wind, winds) = (of(&[1]), of(&[2, 3]), of(&[2, 3, 4, 5]));
         let accepted = [drag.clone(), wind.clone()];
         assert_eq!(with(&accepted, &winds), [drag.clone(), winds.clone()]);

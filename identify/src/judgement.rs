@@ -4,10 +4,11 @@ use crate::candidate::{Candidate, free_parameters, has_third_clock};
 use crate::digits::quantity;
 use crate::fit::Problem;
 use crate::fit_result::FitResult;
-use crate::flight_wind::{self, FLIGHT_WIND};
+use crate::flight_wind::FLIGHT_WIND;
 use crate::logging;
 use crate::sensor_effects::{IMU_DELAY, POSE_DELAY};
 use crate::statistics::{chance_of_no_gain, fisher_tail};
+use crate::wind_start;
 
 /// A smaller part of the squared error does not matter, however certain it is: the comparison's own error at its
 /// joints is of the order of a tenth of it.
@@ -100,7 +101,7 @@ pub fn judged(
 /// or another parameter of more than [`LEAST_PART`] of a plausible change.
 fn is_seen(problem: &Problem, candidate: &Candidate, fitted: &FitResult) -> bool {
     if *candidate.kind == FLIGHT_WIND {
-        return flight_wind::greatest_m_s(&problem.model.parameters, &fitted.values) > LEAST_WIND_M_S;
+        return wind_start::greatest_m_s(&problem.model.parameters, &fitted.values) > LEAST_WIND_M_S;
     }
     candidate.free.iter().any(|at| {
         let entry = &problem.model.parameters.all[*at];
@@ -219,7 +220,7 @@ pub fn start_from(problem: &Problem, base: &FitResult, candidate: &Candidate, pr
 /// The best start of a candidate's fit, and its cost: that of `base` for one that starts at the baseline.
 pub fn start(problem: &Problem, base: &FitResult, candidate: &Candidate) -> (Vec<f64>, f64) {
     if *candidate.kind == FLIGHT_WIND {
-        return flight_wind::start(problem, base);
+        return wind_start::start(problem, base);
     }
     let mut start = base.values.clone();
     let mut least = base.estimation_cost();

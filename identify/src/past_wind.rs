@@ -4,9 +4,9 @@
 
 use crate::disturbance::lag_s;
 use crate::fit::Problem;
-use crate::flight_wind::deviations_m_s;
 use crate::normal::{self, Block};
 use crate::prepared::Prepared;
+use crate::wind_start::deviations_m_s;
 
 /// Length of a stage, in s.
 const STAGE_S: f64 = 5.0;

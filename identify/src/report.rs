@@ -5,7 +5,6 @@ use crate::candidate::Unidentifiable;
 use crate::digits::{quantity, rounded};
 use crate::envelope::Reached;
 use crate::faults::Fault;
-use crate::flight_wind::FlightWind;
 use crate::limits::Limits;
 use crate::loss::{Loss, advice};
 use crate::proposal::Proposal;
@@ -199,6 +198,27 @@ const NOTHING_TO_COMPARE: &str = "nothing to compare the pose with; log gyroscop
 /// Advice for a pose that follows no inertial unit.
 const APART: &str = "the pose agrees with gyroscope and accelerometer at no delay up to 0.4 s; their clocks differ by more, or one \
                      of them is wrong: set `delay_s`, or choose one clock";
+
+/// The wind of one fit flight: the velocity of the air in the world.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FlightWind {
+    /// The flight.
+    pub flight: String,
+    /// Along x.
+    pub x: Estimate,
+    /// Along y.
+    pub y: Estimate,
+    /// Along z.
+    pub z: Estimate,
+}
+
+impl FlightWind {
+    /// Its speed, in m/s.
+    #[must_use]
+    pub fn speed_m_s(&self) -> f64 {
+        [self.x, self.y, self.z].map(|along| along.value * along.value).iter().sum::<f64>().sqrt()
+    }
+}
 
 impl Report {
     /// The effects of the verdict, and those that are kept for predictions.

@@ -10,7 +10,6 @@ use crate::error::{faulty, no_flight};
 use crate::excerpt::{self, excerpt, on_all};
 use crate::faults::{self, Fault};
 use crate::fit::Problem;
-use crate::flight_wind::{self, FlightWind};
 use crate::horizons::{of_role, predictions};
 use crate::limits::limits;
 use crate::logging;
@@ -23,7 +22,7 @@ use crate::prepared::{BOX_STEPS, Equation, Layout, Prepared, Propulsion, block_s
 use crate::questions::OpenQuestions;
 use crate::ratios::Ratios;
 use crate::regressor::{Regressor, regressors};
-use crate::report::{BeforeAfter, Changes, EffectReport, FlightReport, Report, Unexplained};
+use crate::report::{BeforeAfter, Changes, EffectReport, FlightReport, FlightWind, Report, Unexplained};
 use crate::rig;
 use crate::rows::column;
 use crate::select::{Selection, select};
@@ -31,6 +30,7 @@ use crate::sensing::SensorErrors;
 use crate::trim;
 use crate::whiteness::{Whiteness, whiteness};
 use crate::whitening::Noises;
+use crate::wind_reports;
 use flights::{Flight, FlightSet, Role};
 use plant::effects::{Effect, entry};
 use std::collections::BTreeMap;
@@ -123,7 +123,7 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
     effect_reports::add_accepted(&problem, &selection, &rivals, &mut effects);
     effect_reports::add_undetermined(&problem, &selection, &unidentifiable, &mut effects);
     note_logging(&problem, &selection, &mut flight_reports);
-    let winds = flight_wind::winds(&problem, &selection);
+    let winds = wind_reports::winds(&problem, &selection);
     note_winds(&winds, &mut flight_reports);
     progress("predictions");
     let values = &selection.flown().values;
@@ -176,7 +176,7 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
         validation_blocks: selection.after.validation_costs.len(),
     };
     let parameters = &problem.model.parameters;
-    let effects = parameters.effects_under(&flight_wind::values_of_file(parameters, &selection));
+    let effects = parameters.effects_under(&wind_reports::values_of_file(parameters, &selection));
     let name = |flight: &Prepared| flight.flight.name.clone();
     let late = problem.flights().map(|flight| (name(flight), flight.late)).collect();
     let regressors =

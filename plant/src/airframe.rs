@@ -24,6 +24,7 @@
 
 use crate::actuation::{Actuation, Battery};
 use crate::airframe_state::{AirframeState, DelayLine, EffectState};
+use crate::arms::amid_rotors_B_m;
 use crate::effects::{Action, Advance, CATALOGUE, Effect, FlightCondition, entry};
 use crate::motor;
 use crate::rotor::{self, Wrench};
@@ -258,11 +259,6 @@ impl Airframe {
         };
         actions(&self.effects).map(delay).sum()
     }
-}
-
-/// The mean of the rotors' places, from the centre of mass.
-pub(crate) fn amid_rotors_B_m(vehicle: &Vehicle) -> Vector3<f64> {
-    vehicle.rotors.iter().map(|rotor| rotor.position_m).sum::<Vector3<f64>>() / vehicle.rotors.len() as f64
 }
 
 /// Each action of each effect, in order.

@@ -1,7 +1,8 @@
 //! Oddities of a vehicle that may fly all the same: `check` warns of them, with the lines of the file.
 
-use crate::airframe::{Airframe, amid_rotors_B_m};
+use crate::airframe::Airframe;
 use crate::airworthy::places;
+use crate::arms::longest_arm_m;
 use crate::effects::{Effect, Quantity};
 use bus::context::NodeContext;
 use vehicles::{MotorModel, Rotor, Vehicle};
@@ -38,12 +39,6 @@ pub(crate) fn tell(airframe: &Airframe, run: &NodeContext<'_>) {
     for what in odd.into_iter().flatten() {
         run.warn("vehicle", format!("`vehicle` \"{}\" {what}", vehicle.name));
     }
-}
-
-/// Length of the longest arm, m: from the middle of the rotors.
-pub(crate) fn longest_arm_m(vehicle: &Vehicle) -> f64 {
-    let middle_B_m = amid_rotors_B_m(vehicle);
-    vehicle.rotors.iter().map(|rotor| (rotor.position_m - middle_B_m).norm()).fold(0.0, f64::max)
 }
 
 fn arms(vehicle: &Vehicle) -> Option<String> {

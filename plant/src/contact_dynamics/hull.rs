@@ -4,7 +4,8 @@
 //! with the length of the arms; for a Crazyflie 2.1 that gives propellers of 2.7 cm instead of 2.3 cm. Where an
 //! effect moves the centre of mass, the frame stays as it is: all of it moves the other way, seen from there.
 
-use crate::airframe::{Airframe, amid_rotors_B_m};
+use crate::airframe::Airframe;
+use crate::arms::amid_rotors_B_m;
 use nalgebra::Vector3;
 
 /// Arm of the Hummingbird: half of the 0.34 m between motor axes (thesis Table 2.1).

@@ -1,9 +1,9 @@
 //! Drag of the body, quadratic in the speed of the air.
 
 use super::rotor_drag;
+use crate::arms::longest_arm_m;
 use crate::effects::condition::FlightCondition;
 use crate::effects::kind::{Action, Confounder, EffectKind, Quantity, Values};
-use crate::odd::longest_arm_m;
 use crate::rotor::Wrench;
 use diagnostics::unit::DYNAMIC_DRAG;
 use nalgebra::Vector3;

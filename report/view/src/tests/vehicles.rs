@@ -1,4 +1,4 @@
-//! What the catalogue says of vehicles: shadows beside what flew, and wind.
+//! Vehicles of the catalogue: shadows beside what flew, and wind.
 
 use super::{MS, cdr};
 use crate::Shown;
