@@ -104,8 +104,7 @@ impl Selection {
 
 /// Selects among `candidates`, telling `progress` of each step.
 ///
-/// Effects that are tried last join once no other is taken. In the end effects without which predictions are better are taken back, and the
-/// search goes on without them.
+/// In the end effects without which predictions are better are taken back, and the search goes on without them.
 pub fn select(problem: &mut Problem, candidates: &[Candidate], progress: &mut dyn FnMut(&str)) -> Selection {
     let declared = problem.model.parameters.baseline();
     let base = problem.fitted(&declared, &[]);
@@ -113,9 +112,6 @@ pub fn select(problem: &mut Problem, candidates: &[Candidate], progress: &mut dy
     let mut open = candidates.to_vec();
     let mut withdrawn = Vec::new();
     let mut revisions = Revisions::default();
-    let first: Vec<Candidate> =
-        candidates.iter().filter(|candidate| !candidate.kind.is_tried_last).cloned().collect();
-    search.run(problem, &first, &[], progress);
     let End { refined, worths } = loop {
         search.run(problem, &open, revisions.added(), progress);
         problem.weigh(&search.base, candidates);

@@ -47,8 +47,6 @@ pub struct EffectKind {
     pub is_delay: bool,
     /// True if it changes how the rotors follow their commands.
     pub changes_drive: bool,
-    /// True if a fit tries it once all others explain no more: beside wrong effects it explains what the right one alone would.
-    pub is_tried_last: bool,
     /// True if equations linearised about the neutral values predict what it can explain.
     pub is_linear: bool,
     /// Initial guesses of a fit, each a value for each fitted parameter. If there are none, it starts at the
@@ -289,7 +287,6 @@ impl EffectKind {
         turns_steadily: false,
         is_delay: false,
         changes_drive: false,
-        is_tried_last: false,
         is_linear: true,
         guesses: &[],
         scale_to: None,

@@ -16,7 +16,6 @@ pub static EFFECT: EffectKind = EffectKind {
     needs: &[Quantity::Command, Quantity::Force],
     stage: Stage::Rotors,
     changes_drive: true,
-    is_tried_last: true,
     confounded_with: &[
         Confounder { effect: &inertia_error::EFFECT, experiment: CLIMB },
         Confounder { effect: &thrust_scale::EFFECT, experiment: CLIMB },
