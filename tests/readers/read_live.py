@@ -81,8 +81,10 @@ class Watcher(WebSocketBridgeClient):
 async def watch(address):
     watcher = Watcher(address)
     await watcher.connect()
-    channels = await watcher.until(lambda: watcher.channels, "the topics")
-    await watcher.until(lambda: len(watcher.messages) == len(channels) and min(watcher.counts().values()) >= ENOUGH, "messages")
+    # A busy server may tell of its topics one after the other.
+    is_seen = lambda: 0 < len(watcher.channels) == len(watcher.messages) and min(watcher.counts().values()) >= ENOUGH
+    await watcher.until(is_seen, "messages")
+    channels = dict(watcher.channels)
 
     await watcher.ask("pause", PlaybackCommand.PAUSE)
     await watcher.shows(PlaybackStatus.PAUSED)
