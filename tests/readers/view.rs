@@ -263,8 +263,8 @@ fn a_browser_shows_names_that_look_like_html_as_they_are_and_says_that_the_serve
     assert!(seen["lost"].as_str().unwrap().contains("Start it again"), "{}", seen["lost"]);
 }
 
-/// Limit for the processor's time of the page's own thread in a frame: twice the 21 to 25 ms of a machine of two cores at a load of 10.
-const CPU_MAX_MS: f64 = 50.0;
+/// Limit for the processor's time of the page's own thread in a frame: about four times the 21 to 31 ms of machines of two cores at a load of 10.
+const CPU_MAX_MS: f64 = 100.0;
 
 /// The time from frame to frame is that of the machine: without a graphics card, Chromium draws by the processor, and other tests run
 /// beside it. The processor's time of the page's thread is the page's own. Waiting for a core or for the drawing is not in it.
@@ -279,7 +279,7 @@ fn the_page_of_ten_vehicles_takes_little_of_the_processor_for_a_frame() {
     let ended = run.args(["--set", "run.duration_s=8"]).output().unwrap();
     assert!(matches!(ended.status.code(), Some(0 | 1)), "{}", String::from_utf8_lossy(&ended.stderr));
     let view = View::of(&[&recording]);
-    let seen = look(&readers, "read_frames.mjs", &[view.address.as_ref(), "3".as_ref()]);
+    let seen = look(&readers, "read_frames.mjs", &[view.address.as_ref(), "6".as_ref()]);
     // Not `println!`, which the test runner hides.
     std::io::stderr().write_all(format!("frames of ten vehicles, ms: {seen}\n").as_bytes()).unwrap();
     assert_eq!(
