@@ -36,7 +36,7 @@ fn is_accepted(selection: &Selection) -> bool {
 }
 
 /// The wind of the fit flight of this number along an axis, with its 95 % interval.
-fn estimate(problem: &Problem, fitted: &FitResult, number: usize, axis: usize) -> Estimate {
+pub fn estimate(problem: &Problem, fitted: &FitResult, number: usize, axis: usize) -> Estimate {
     let parameters = &problem.model.parameters;
     let wind = parameters.wind()[axis];
     let part = |at: usize| {
@@ -52,38 +52,4 @@ fn estimate(problem: &Problem, fitted: &FitResult, number: usize, axis: usize) -
     let at_bound = parts.iter().any(|(at, _)| reached_bound(problem, fitted, *at).is_some());
     let determined = low > least || high < most;
     Estimate { value, unit, low, high, at_bound, determined, by_equations: None }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::candidate::wind_of_each_flight;
-    use crate::wind_start::tests::{flights, problem};
-
-    /// The error of a flight's wind is that of the sum of the mean and its deviation.
-    #[test]
-    #[allow(clippy::disallowed_types, reason = "not in a component: the covariance of a report's fit")]
-    fn the_wind_of_a_flight_has_the_error_of_its_parts_together() {
-        let flights = flights();
-        let problem = problem(&flights);
-        let parameters = &problem.model.parameters;
-        let free = wind_of_each_flight(parameters).expect("three flights").free;
-        let mut values = parameters.baseline();
-        (values[free[0]], values[free[3]], values[free[6]]) = (5.0, 1.0, 2.0);
-        let count = free.len();
-        let fitted = FitResult {
-            values,
-            unbounded: vec![0.0; count],
-            covariance: nalgebra::DMatrix::identity(count, count) * 0.04,
-            validation_costs: Vec::new(),
-            estimation_costs: vec![1.0; 1000],
-            free,
-        };
-        let wind = |number| estimate(&problem, &fitted, number, 0);
-        assert_eq!([wind(0).value, wind(1).value, wind(2).value], [2.0, 6.0, 7.0]);
-        // Of the first flight three numbers, of the others two.
-        let ratio = (wind(0).high - wind(0).low) / (wind(1).high - wind(1).low);
-        assert!((ratio - 1.5_f64.sqrt()).abs() < 1e-9, "{ratio}");
-        assert!((wind(1).high - 6.0 - 1.96 * 0.2 * 2_f64.sqrt()).abs() < 2e-3, "{:?}", wind(1));
-    }
 }

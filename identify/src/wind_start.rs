@@ -142,12 +142,14 @@ fn step(problem: &Problem, flight: &Prepared, values: &[f64], level: [usize; 2])
 }
 
 #[cfg(test)]
-pub mod tests {
+mod tests {
     use super::*;
+    use crate::candidate::wind_of_each_flight;
     use crate::model::Model;
     use crate::prepared::Propulsion;
     use crate::test_flights::{flown, hummingbird};
     use crate::whitening::Noises;
+    use crate::wind_reports::estimate;
     use flights::Flight;
 
     fn flight(phase: f64) -> Flight {
@@ -159,7 +161,7 @@ pub mod tests {
     }
 
     /// Three fit flights and one for test, with rotor drag.
-    pub fn problem(flights: &[Flight]) -> Problem<'_> {
+    fn problem(flights: &[Flight]) -> Problem<'_> {
         let vehicle = hummingbird();
         let propulsion = Propulsion::of(&vehicle);
         let mut prepared: Vec<Prepared> = flights
@@ -181,7 +183,7 @@ pub mod tests {
         problem
     }
 
-    pub fn flights() -> Vec<Flight> {
+    fn flights() -> Vec<Flight> {
         [0.0, 0.5, 1.0, 1.5].into_iter().map(flight).collect()
     }
 
@@ -241,6 +243,33 @@ pub mod tests {
             };
             assert!(shown <= expected && shown + 3 >= expected, "{shown}, expected {expected}");
         }
+    }
+
+    /// The error of a flight's wind is that of the sum of the mean and its deviation.
+    #[test]
+    #[allow(clippy::disallowed_types, reason = "not in a component: the covariance of a report's fit")]
+    fn the_wind_of_a_flight_has_the_error_of_its_parts_together() {
+        let flights = flights();
+        let problem = problem(&flights);
+        let parameters = &problem.model.parameters;
+        let free = wind_of_each_flight(parameters).expect("three flights").free;
+        let mut values = parameters.baseline();
+        (values[free[0]], values[free[3]], values[free[6]]) = (5.0, 1.0, 2.0);
+        let count = free.len();
+        let fitted = FitResult {
+            values,
+            unbounded: vec![0.0; count],
+            covariance: nalgebra::DMatrix::identity(count, count) * 0.04,
+            validation_costs: Vec::new(),
+            estimation_costs: vec![1.0; 1000],
+            free,
+        };
+        let wind = |number| estimate(&problem, &fitted, number, 0);
+        assert_eq!([wind(0).value, wind(1).value, wind(2).value], [2.0, 6.0, 7.0]);
+        // Of the first flight three numbers, of the others two.
+        let ratio = (wind(0).high - wind(0).low) / (wind(1).high - wind(1).low);
+        assert!((ratio - 1.5_f64.sqrt()).abs() < 1e-9, "{ratio}");
+        assert!((wind(1).high - 6.0 - 1.96 * 0.2 * 2_f64.sqrt()).abs() < 2e-3, "{:?}", wind(1));
     }
 
     /// The first flight has what the others have not, with the opposite sign.
