@@ -278,8 +278,8 @@ pub fn is_worse(fitted: &FitResult, other: &FitResult) -> bool {
     p_value(&fitted.validation_costs, &other.validation_costs) < CONFOUNDED_LEVEL
 }
 
-#[cfg(test)]
 #[allow(clippy::disallowed_types, reason = "not in a component: the covariance of a report's fit")]
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::model::Model;

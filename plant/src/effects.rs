@@ -34,6 +34,7 @@ mod kind;
 pub mod page;
 
 pub use catalogue::command_delay::EFFECT as COMMAND_DELAY;
+pub use catalogue::turbulence::EFFECT as TURBULENCE;
 pub use catalogue::wind::EFFECT as WIND;
 pub use catalogue::{CATALOGUE, find};
 pub use condition::FlightCondition;

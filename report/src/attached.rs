@@ -2,8 +2,8 @@
 
 use crate::airframe::Body;
 use plant::Airframe;
-use plant::effects::Effect;
 use plant::effects::entry::resolve;
+use plant::effects::{Effect, TURBULENCE, WIND};
 use recorder::RecordingError;
 use recorder::reader::Recording;
 use std::collections::BTreeSet;
@@ -26,8 +26,8 @@ impl Wind {
     /// The wind of these effects; `None` in still air.
     fn of(effects: &[Effect]) -> Option<Self> {
         let values = |kind: &str| effects.iter().find(|effect| effect.kind.name == kind).map(|it| it.values);
-        let velocity_W_m_s = values("wind").map_or([0.0; 3], |wind| [wind[0], wind[1], wind[2]]);
-        let has_gusts = values("turbulence").is_some_and(|gusts| gusts[0] > 0.0);
+        let velocity_W_m_s = values(WIND.name).map_or([0.0; 3], |wind| [wind[0], wind[1], wind[2]]);
+        let has_gusts = values(TURBULENCE.name).is_some_and(|gusts| gusts[0] > 0.0);
         let blows = velocity_W_m_s.iter().any(|part| *part != 0.0);
         (blows || has_gusts).then_some(Self { velocity_W_m_s, has_gusts })
     }

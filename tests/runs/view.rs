@@ -89,7 +89,7 @@ fn the_catalogue_has_the_shadow_and_the_wind_of_a_run() {
     let vehicle = &told["recordings"][0]["vehicles"][0];
     let command = json!({ "topic": "/shadow/controller/command", "flown": "/controller/command" });
     assert_eq!(vehicle["shadows"], json!({ "command": command }));
-    assert_eq!(vehicle["wind"], json!({ "velocity_m_s": [3.0, -4.0, 0.0], "has_gusts": false }));
+    assert_eq!(vehicle["air"], json!({ "velocity_m_s": [3.0, -4.0, 0.0], "has_gusts": false }));
     launch.signal(Signal::TERM);
     launch.end().with_code(0);
 }

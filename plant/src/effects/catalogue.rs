@@ -21,7 +21,7 @@ mod rig_pendulum;
 mod rotor_drag;
 mod thrust_scale;
 mod translational_lift;
-mod turbulence;
+pub(super) mod turbulence;
 mod velocity_torque;
 mod weak_rotor;
 pub(super) mod wind;

@@ -358,7 +358,7 @@ export class Room {
     if (!this.isStale) return false;
     this.isStale = false;
     // Of a room without vehicles there is no wind.
-    const wind = this.layers.wind ? this.vehicles[this.followed]?.vehicle.wind ?? null : null;
+    const wind = this.layers.wind ? this.vehicles[this.followed]?.vehicle.air ?? null : null;
     this.wind.show(wind, this.camera.quaternion);
     this.renderer.render(this.scene, this.camera);
     return true;

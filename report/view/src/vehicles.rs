@@ -93,7 +93,7 @@ fn one(
         "shadows": shadows(recording, fields, name),
         "rotor_speeds": speeds,
         "body": body(attached, name),
-        "wind": attached.wind(name).map(|wind| {
+        "air": attached.wind(name).map(|wind| {
             json!({ "velocity_m_s": wind.velocity_W_m_s, "has_gusts": wind.has_gusts })
         }),
     })

@@ -3,6 +3,7 @@
 use crate::effects::kind::{Action, Advance, EffectKind, Randomness, Values};
 use diagnostics::unit::WIND_VELOCITY;
 
+/// Random gusts added to the wind.
 pub static EFFECT: EffectKind = EffectKind {
     name: "turbulence",
     summary: "the air gusts at random, in strength and scale as Dryden's model has it near the ground",

@@ -65,8 +65,8 @@ fn a_vehicle_has_the_wind_of_the_scene_that_its_plant_is_in() {
     let bird = vehicle_text();
     let files = [("run.toml", manifest), ("bird.toml", &*bird), ("air.toml", scene)];
     let wind = json!({ "velocity_m_s": [3.0, 0.0, 0.0], "has_gusts": false });
-    assert_eq!(vehicles(state, &files)[0]["wind"], wind);
-    assert_eq!(vehicles(state, &files[..2])[0]["wind"], Value::Null);
+    assert_eq!(vehicles(state, &files)[0]["air"], wind);
+    assert_eq!(vehicles(state, &files[..2])[0]["air"], Value::Null);
 }
 
 fn vehicle_text() -> String {
