@@ -105,6 +105,7 @@ pub mod run;
 mod select;
 mod sensing;
 mod sensor_effects;
+mod simpler;
 mod spinning;
 pub mod statistics;
 pub mod steps_ahead;

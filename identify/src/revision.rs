@@ -3,6 +3,7 @@
 //! Effects are found by the equations of each moment. What counts in the end are predictions: so the parameters are refined by
 //! prediction errors (`refine`), and an effect without which these are smaller is taken back. Where predictions ask for other values than the
 //! equations, they may ask for an effect that the equations hardly show. Such a candidate is added if predictions are better with it beyond chance.
+//! Two effects go for one that predicts as well (`simpler`).
 
 use crate::candidate::{Candidate, free_parameters};
 use crate::digits::quantity;
@@ -14,6 +15,7 @@ use crate::judgement::{FALSE_RATE, Judged, Way, at_bound, fitted, joint_p_value}
 use crate::logging;
 use crate::refine::{Refined, refined};
 use crate::sensor_effects::SENSOR_EFFECTS;
+use crate::simpler::{Exchange, exchanges};
 use crate::worth::Worth;
 use plant::effects::{Action, EffectKind};
 use rayon::prelude::*;
@@ -45,6 +47,8 @@ pub enum Revision {
     Without(Vec<Withdrawn>),
     /// With this candidate.
     With(Box<Judged>),
+    /// With one effect instead of two.
+    Instead(Box<Exchange>, Vec<Withdrawn>),
     /// Nothing: it is over.
     Done(End),
 }
@@ -75,13 +79,13 @@ impl Revisions {
         &self.added
     }
 
-    /// The revision of the `accepted` effects with the fit `base`; `open` are the candidates that may be added.
+    /// The revision of the `accepted` effects with the fit `base`; `open` are the candidates that may be added, and
+    /// `given_up` those that were accepted and were idle later.
     pub fn next(
         &mut self,
         problem: &Problem,
-        accepted: &[Candidate],
-        base: &FitResult,
-        open: &[Candidate],
+        (accepted, base): (&[Candidate], &FitResult),
+        (open, given_up): (&[Candidate], &[Candidate]),
         progress: &mut dyn FnMut(&str),
     ) -> Revision {
         progress("every effect once more, by its parameters");
@@ -95,10 +99,12 @@ impl Revisions {
             let predictions = search.predictions();
             let end = End { refined: None, worths: predictions.worths() };
             let together = |dropped: &[usize]| search.foresight(dropped);
-            return match search.unworthy(&predictions, together) {
-                found if found.is_empty() => Revision::Done(end),
-                found => Revision::Without(found),
-            };
+            let found = search.unworthy(&predictions, together);
+            if !found.is_empty() {
+                return Revision::Without(found);
+            }
+            let exchange = search.simpler(&predictions.with, given_up, &self.added, None);
+            return exchange.unwrap_or(Revision::Done(end));
         };
         self.near = Some(moved.result.values.clone());
         progress("every effect once more, by predictions");
@@ -109,6 +115,10 @@ impl Revisions {
         let found = search.unworthy(&predictions, |dropped| moved.foresight(dropped));
         if !found.is_empty() {
             return Revision::Without(found);
+        }
+        let near = Some(moved.result.values.as_slice());
+        if let Some(exchange) = search.simpler(&predictions.with, given_up, &self.added, near) {
+            return exchange;
         }
         progress("further effects, by predictions");
         match self.asked_for(&search, &moved, &predictions.with, open) {
@@ -258,10 +268,30 @@ impl Found<'_, '_> {
     fn refined_without(&self, effect: &str, near: &[f64]) -> Foresight {
         let Self { problem, accepted, base } = self;
         let (_, fitted) = without_effects(problem, accepted, base, &[effect]);
-        refined(problem, &fitted, Some(near)).map_or_else(
-            || Foresight::of(problem, &problem.equations(&fitted.values, &fitted.free), &fitted, &[]),
-            |moved| moved.foresight(&[]),
-        )
+        refined_foresight(problem, &fitted, Some(near))
+    }
+
+    /// One effect of `given_up` instead of two, of which `now` with both is worth no more.
+    fn simpler(
+        &self,
+        now: &Foresight,
+        given_up: &[Candidate],
+        kept: &[Candidate],
+        near: Option<&[f64]>,
+    ) -> Option<Revision> {
+        let Self { problem, accepted, base } = self;
+        let is_as_good = |exchange: &Exchange| {
+            !now.is_worth_more_than(&refined_foresight(problem, &exchange.fitted, near))
+        };
+        let found = exchanges(problem, (accepted, base), given_up, kept).into_iter().find(is_as_good)?;
+        let reason = format!(
+            "{} instead of {} predicts as well, with fewer parameters",
+            found.new.kind.name,
+            found.old.join(" and ")
+        );
+        let withdrawn = |effect| Withdrawn { effect, reason: reason.clone(), at_bound: false };
+        let old = found.old.map(withdrawn).to_vec();
+        Some(Revision::Instead(Box::new(found), old))
     }
 
     /// The accepted effect that predictions are better without, of several the one with the greatest growth; or else those that they gain
@@ -349,6 +379,14 @@ impl Predictions {
         };
         idle.into_iter().map(withdrawn).collect()
     }
+}
+
+/// Predictions of a fit, refined from the values `near` on where that predicts better.
+fn refined_foresight(problem: &Problem, fitted: &FitResult, near: Option<&[f64]>) -> Foresight {
+    refined(problem, fitted, near).map_or_else(
+        || Foresight::of(problem, &problem.equations(&fitted.values, &fitted.free), fitted, &[]),
+        |moved| moved.foresight(&[]),
+    )
 }
 
 /// The first of the `accepted` effects with a parameter that `fitted` left at a bound.

@@ -35,6 +35,7 @@ use crate::normal::{self, Block};
 use crate::revision::{End, Revision, Revisions, Withdrawn, without_effects};
 use crate::worth::Worth;
 use rayon::prelude::*;
+use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
 /// Steps of a promise from a guess: nothing but the candidate's own derivatives is computed again.
@@ -118,7 +119,15 @@ pub fn select(problem: &mut Problem, candidates: &[Candidate], progress: &mut dy
         let fitted = problem.fitted(&search.base.values, &free_parameters(&search.accepted));
         search.base = held_at_limits(problem, fitted);
         let StepwiseSearch { accepted, base, rounds } = &mut search;
-        match revisions.next(problem, accepted, base, &open, progress) {
+        let is_given_up = |one: &&Candidate| !one.is_in(accepted) && one.is_in(&open);
+        let taken = rounds.iter().filter_map(|round| Some(&round.taken()?.candidate));
+        let given_up: Vec<Candidate> = taken.filter(is_given_up).cloned().collect();
+        match revisions.next(problem, (accepted, base), (&open, &given_up), progress) {
+            Revision::Instead(exchange, old) => {
+                open.retain(|candidate| !exchange.old.contains(&candidate.kind.name));
+                withdrawn.extend(old);
+                (*accepted, *base) = (exchange.accepted, exchange.fitted);
+            }
             Revision::Without(found) => {
                 let effects: Vec<&str> = found.iter().map(|withdrawn| withdrawn.effect).collect();
                 (*accepted, *base) = without_effects(problem, accepted, base, &effects);
@@ -379,34 +388,40 @@ fn best(problem: &Problem, judged: &[Judged]) -> Option<usize> {
     accepted.iter().filter(is_alike).min_by(|a, b| size(**a).cmp(&size(**b)).then(by_gain(b, a))).copied()
 }
 
-/// Takes back effects that no longer gain anything.
+/// Takes back effects that no longer gain anything; of several, first the one with the most parameters. Else two with
+/// many parameters can stand for one with few: less thrust in hover and a steeper command map equal more mass.
 fn without_idle(
     problem: &Problem,
     mut base: FitResult,
     accepted: &mut Vec<Candidate>,
     kept: &[Candidate],
 ) -> FitResult {
-    let mut at = 0;
-    // The newest has just passed.
-    while at + 1 < accepted.len() {
-        if kept.contains(&accepted[at]) {
-            at += 1;
-            continue;
-        }
-        let promised = problem.promised_without(&base, &accepted[at].free);
-        if is_clearly_worse(&promised, &base) {
-            at += 1;
-            continue;
-        }
-        let fitted = without(problem, &base, accepted, at);
-        if is_worse(&fitted, &base) {
-            at += 1;
-        } else {
-            accepted.remove(at);
-            base = fitted;
-        }
+    while let Some((at, fitted)) = idle(problem, &base, accepted, kept) {
+        accepted.remove(at);
+        base = fitted;
     }
     base
+}
+
+/// The place of the effect with the most parameters among those that no longer gain anything, and the fit without it.
+fn idle(
+    problem: &Problem,
+    base: &FitResult,
+    accepted: &[Candidate],
+    kept: &[Candidate],
+) -> Option<(usize, FitResult)> {
+    // The newest has just passed.
+    let older = accepted.len().saturating_sub(1);
+    let mut places: Vec<usize> = (0..older).filter(|at| !kept.contains(&accepted[*at])).collect();
+    places.sort_by_key(|at| Reverse(accepted[*at].free.len()));
+    places.into_iter().find_map(|at| {
+        let promised = problem.promised_without(base, &accepted[at].free);
+        if is_clearly_worse(&promised, base) {
+            return None;
+        }
+        let fitted = without(problem, base, accepted, at);
+        (!is_worse(&fitted, base)).then_some((at, fitted))
+    })
 }
 
 /// Linearised equations from which the fit of each candidate is predicted.
