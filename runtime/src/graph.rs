@@ -12,7 +12,9 @@
 //! - `evaluations`: conditions and measures after the run
 //! - `checkpoints`: ticks at which the nodes write their states
 //! - `backups`: processes that shadow, take over or stand by
+//! - `backup_ticks`: ticks of the samples of such processes
 
+mod backup_ticks;
 mod backups;
 mod checkpoints;
 mod computing_time;

@@ -62,6 +62,44 @@ fn a_sensor_is_swapped_where_one_of_its_measurements_arrives() {
     place.call(&["check", &manifest]).with_code(2).says(&told);
 }
 
+/// A topic keeps the ticks of its samples.
+#[test]
+fn a_sensor_that_is_swapped_for_one_with_new_samples_at_other_ticks_is_told() {
+    let place = Place::new();
+    let sent = "/gps/gps is sent at ticks 0, 80, 180, 280, … (10 Hz), as before";
+    let checked = |name: &str, tables: &str, with: &str| {
+        let tables = format!("{tables}{}with = {{ {with} }}\n", swap(("gps", 280)));
+        place.call(&["check", &short(&place, name, &tables)]).with_code(0)
+    };
+    let help = "send at the ticks of both: period_ticks = 10, outputs.gps.every_ticks = 10";
+    for (name, with, told) in [
+        (
+            "fast",
+            "parameters.rate_hz = 20.0",
+            ["0, 80, 130, 180, … (20 Hz)", "some of its samples are never sent"],
+        ),
+        (
+            "slow",
+            "parameters.rate_hz = 5.0",
+            ["0, 80, 280, 480, … (5 Hz)", "its samples are sent more than once"],
+        ),
+        (
+            "late",
+            "parameters.delay_ms = 100.0",
+            ["0, 100, 200, 300, … (10 Hz)", "its samples wait for these"],
+        ),
+    ] {
+        let [ticks, effect] = told;
+        checked(&format!("{name}.toml"), "", with).says(&[sent, help, ticks, effect]);
+    }
+    let alike = "parameters.position_noise_m = [0.1, 0.1, 0.1]";
+    let stated = "[process.gps]\noutputs.gps.every_ticks = 10\n";
+    for (name, tables, with) in [("alike", "", alike), ("stated", stated, "parameters.rate_hz = 20.0")] {
+        let checked = checked(&format!("{name}.toml"), tables, with);
+        assert!(!checked.to_string().contains("as before"), "{checked}");
+    }
+}
+
 #[test]
 fn a_sensor_that_should_measure_more_often_than_it_computes_is_refused() {
     let place = Place::new();

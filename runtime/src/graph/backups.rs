@@ -1,5 +1,6 @@
 //! Backups: processes that shadow a node, take over from it, or stand by for it.
 
+use super::backup_ticks::Backup;
 use super::parameters::{self, Notes};
 use super::processes::{DeclaredNode, declared_nodes, irreplaceable, program};
 use super::wiring::wire;
@@ -157,6 +158,11 @@ impl Run<'_> {
         let declared = &declared_nodes[node];
         (plan.parameters, plan.files) = parameters::of(declared, self.plan, plan.period_ticks, notes)?;
         self.require_room(node, &plan, span)?;
+        if let Some(kind) = declared.program.component() {
+            let (manifest, present) = (self.manifest, self.declared_nodes[node].process);
+            let backup = Backup { manifest, plan: self.plan, node, present, whole, kind };
+            notes.warnings.extend(backup.other_ticks(span)?);
+        }
         for input in &mut plan.inputs {
             // The same topics, but perhaps in another order.
             let topic = &wiring.topics[input.topic].name;

@@ -378,16 +378,25 @@ pub(crate) fn next_take_over(plan: &Plan, node: usize, tick: u32) -> Option<u32>
 }
 
 /// Number of which the tick of a take-over must be a multiple: of the period of the node, and of those of its outputs that have one.
+/// The greatest number if it has more than 32 bits.
 pub(crate) fn take_over_stride(plan: &Plan, node: usize) -> u32 {
     let periods =
         plan.nodes[node].outputs.iter().filter_map(|output| plan.topics[output.topic].ticks.period());
-    let multiple = |a: u32, b: u32| (1..=b).map(|k| a.saturating_mul(k)).find(|m| m % b == 0).unwrap_or(a);
-    periods.fold(plan.nodes[node].period_ticks, multiple)
+    periods.fold(plan.nodes[node].period_ticks, least_common_multiple)
+}
+
+fn least_common_multiple(a: u32, b: u32) -> u32 {
+    (a / greatest_common_divisor(a, b).max(1)).saturating_mul(b)
+}
+
+/// Greatest number of which both are multiples.
+pub(crate) fn greatest_common_divisor(a: u32, b: u32) -> u32 {
+    if b == 0 { a } else { greatest_common_divisor(b, a % b) }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::next_take_over;
+    use super::{next_take_over, take_over_stride};
     use bus::plan::Plan;
     use bus::sample_ticks::SampleTicks;
     use serde_json::{Value, json};
@@ -419,5 +428,14 @@ mod tests {
         assert_eq!([0, 81, 180].map(|tick| next(&[late], tick)), [Some(0), Some(180), Some(180)]);
         assert_eq!(next(&[late, every(30)], 1), Some(180));
         assert_eq!([next(&[late, every(50)], 1), next(&[late], 981)], [None, None]);
+    }
+
+    #[test]
+    fn the_stride_of_long_periods_is_found_at_once() {
+        let stride = |sent: &[SampleTicks]| take_over_stride(&plan(sent), 0);
+        let every = SampleTicks::every;
+        assert_eq!((stride(&[]), stride(&[every(20), every(50)])), (10, 100));
+        assert_eq!(stride(&[every(400_000_001)]), 4_000_000_010);
+        assert_eq!(stride(&[every(4_000_000_001), every(30)]), u32::MAX, "it has more than 32 bits");
     }
 }
