@@ -172,6 +172,17 @@ fn streams_that_offer_more_than_the_line_carries_are_told_and_dropped() {
     assert_eq!(sent, 2878);
 }
 
+/// 160 messages of 27 bytes each second, some of them only 5 ms apart, and 4770 bytes of the other streams.
+#[test]
+fn a_stream_whose_messages_come_at_uneven_ticks_counts_with_its_mean_rate() {
+    let more = "[process.mocap]\nparameters.rate_hz = 160.0\n\
+                [process.down]\nparameters.streams.mocap.rate_hz = 1000.0\n";
+    let warnings = hummingbus::Graph::build(&load("ground-station.toml", more).unwrap()).unwrap().warnings;
+    let told: Vec<String> = warnings.iter().map(ToString::to_string).collect();
+    let expected = "its streams offer 9090 bytes/s, overhead included, and 57600 baud carry 5760";
+    assert!(told.iter().any(|told| told.contains(expected)), "{told:?}");
+}
+
 const CONTROLLER: &str = "[process.controller]\ncomputing_time";
 
 #[test]

@@ -47,18 +47,18 @@ pub struct NodeContext<'a> {
 /// ```
 /// use bus::context::{InputMessage, NodeContext};
 /// let inputs = ["estimate"];
-/// let messages = [InputMessage { port: "estimate", bytes: 96, period_ticks: 4, initial: None }];
+/// let messages = [InputMessage { port: "estimate", bytes: 96, period_ticks: 4.0, initial: None }];
 /// let context = NodeContext::new("down", &inputs).reading(&messages);
 /// assert_eq!(context.messages[0].bytes, 96);
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InputMessage<'a> {
     /// The input.
     pub port: &'a str,
     /// The most bytes that a message has.
     pub bytes: usize,
-    /// Ticks between two messages.
-    pub period_ticks: u32,
+    /// Mean number of ticks between two messages.
+    pub period_ticks: f64,
     /// Fields of the message before the first one is sent, as the manifest gives them.
     pub initial: Option<&'a serde_json::Value>,
 }
@@ -69,7 +69,7 @@ impl InputMessage<'_> {
     /// ```
     /// # use bus::context::InputMessage;
     /// let initial = serde_json::json!({ "command": [76.5, 76.5, 76.5, 76.5] });
-    /// let input = InputMessage { port: "command", bytes: 112, period_ticks: 1, initial: Some(&initial) };
+    /// let input = InputMessage { port: "command", bytes: 112, period_ticks: 1.0, initial: Some(&initial) };
     /// assert_eq!(input.initial_count("command"), Some(4));
     /// ```
     #[must_use]

@@ -238,7 +238,7 @@ mod tests {
         let warned = |vehicle: &str, command: f64| {
             let initial = json!({ "command": [command, command, command, command] });
             let message =
-                InputMessage { port: "command", bytes: 112, period_ticks: 1, initial: Some(&initial) };
+                InputMessage { port: "command", bytes: 112, period_ticks: 1.0, initial: Some(&initial) };
             let messages = [message];
             let context = NodeContext::new("plant", &["command"]).reading(&messages);
             let parameters = json!({ "vehicle": repository(vehicle) });
@@ -295,7 +295,8 @@ mod tests {
             assert!(error.contains(&format!("`command` has {count} motor commands, expected 4")), "{error}");
         }
         let initial = |value: &Value| {
-            let message = InputMessage { port: "command", bytes: 112, period_ticks: 1, initial: Some(value) };
+            let message =
+                InputMessage { port: "command", bytes: 112, period_ticks: 1.0, initial: Some(value) };
             let messages = [message];
             let context = NodeContext::new("plant", &["command"]).reading(&messages);
             Registration::of::<Plant>().check(&parameters, &context)

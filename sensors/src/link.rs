@@ -255,7 +255,7 @@ impl State for LinkMemory {
 /// use bus::context::{InputMessage, NodeContext};
 /// use sensors::link::Link;
 /// # use serde_json::json;
-/// let messages = [InputMessage { port: "estimate", bytes: 96, period_ticks: 1, initial: None }];
+/// let messages = [InputMessage { port: "estimate", bytes: 96, period_ticks: 1.0, initial: None }];
 /// let context = NodeContext::new("down", &["estimate"]).reading(&messages);
 /// Link::new(diagnostics::read(&json!({ "streams": { "estimate": { "rate_hz": 25.0 } } }))?, &context)?;
 /// // 107 bytes a millisecond are more than 57 600 baud carry.
@@ -473,7 +473,7 @@ impl Parameters {
                 )
             })?;
             let sent_hz =
-                (f64::from(message.period_ticks.max(context.period_ticks)) * context.tick_s()).recip();
+                (message.period_ticks.max(f64::from(context.period_ticks)) * context.tick_s()).recip();
             let rate_hz =
                 stream.and_then(|stream| stream.rate_hz).map_or(sent_hz, |rate_hz| rate_hz.min(sent_hz));
             offered_bytes_s += rate_hz * bytes as f64;

@@ -329,7 +329,7 @@ fn messages<'a>(declared: &DeclaredNode<'a>, plan: &Plan) -> Vec<InputMessage<'a
     let of = |(port, input): (&'a Spanned<String>, &'a InputSetting)| {
         let topic = plan.topics.iter().find(|topic| topic.name == input.topic)?;
         let schema = declared.manifest.registry().message(&topic.type_name)?;
-        let (period_ticks, initial) = (topic.ticks.least(), input.initial.as_ref());
+        let (period_ticks, initial) = (topic.ticks.mean(), input.initial.as_ref());
         Some(InputMessage { port: port.get_ref(), bytes: schema.size, period_ticks, initial })
     };
     declared.process.inputs.iter().filter_map(of).collect()
