@@ -84,7 +84,7 @@ fn answer(report: &Report) -> String {
         )
     } else if count == 0 && !beyond.is_empty() {
         format!(
-            "The declared vehicle file lacks nothing that these flights can name. They ask for more of {} than is plausible: the cause \
+            "The declared vehicle file lacks nothing that these flights can name. They put the estimate of {} at its bound: the cause \
              is not known.",
             beyond.join(" and ")
         )
@@ -395,9 +395,15 @@ mod tests {
         );
         let reached = Withdrawn { effect: "sensor-bias", at_bound: true, ..found };
         let beyond = Report { withdrawn: vec![reached], ..Report::of_nothing() };
-        assert!(Brief::of(&beyond).answer.contains("They ask for more of sensor-bias than is plausible"));
         assert!(
-            beyond.to_string().contains("verdict: nothing. The equations ask for more of sensor-bias than")
+            Brief::of(&beyond)
+                .answer
+                .contains("They put the estimate of sensor-bias at its bound: the cause")
+        );
+        assert!(
+            beyond
+                .to_string()
+                .contains("verdict: nothing. The equations put the estimate of sensor-bias at its bound")
         );
         let short = Brief::of(&Report { validation_blocks: 3, ..Report::of_nothing() });
         assert_eq!(short.answer, "These flights are too short to tell.");

@@ -177,7 +177,7 @@ impl Parameter {
         [spec.min, self.max].into_iter().find(is_reached)
     }
 
-    /// True if `value` is a bound other than the baseline: more is asked for than the parameter can be.
+    /// True if `value` is a bound other than the baseline.
     #[allow(clippy::float_cmp, reason = "values that stop at a bound are the bound")]
     pub fn stops_at(&self, value: f64) -> bool {
         value != self.baseline && (value == self.spec().min || value == self.max)

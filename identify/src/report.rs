@@ -335,7 +335,7 @@ impl Report {
         if !effects.is_empty() {
             format!("The equations fit better with {effects}, but no prediction error falls noticeably.")
         } else if !beyond.is_empty() {
-            format!("The equations ask for more of {beyond} than is plausible: the cause is not known.")
+            format!("The equations put the estimate of {beyond} at its bound: the cause is not known.")
         } else {
             "No candidate makes the equations fit better beyond chance.".to_owned()
         }
@@ -386,9 +386,7 @@ impl Report {
                 let [value, low, high] = [estimate.value, estimate.low, estimate.high].map(rounded);
                 let doubt = match estimate {
                     Estimate { determined: false, .. } => "; not determined by these flights",
-                    Estimate { at_bound: true, .. } => {
-                        "; at its bound: more is asked for than this effect can be"
-                    }
+                    Estimate { at_bound: true, .. } => "; at its bound: another cause may be at work",
                     _ => "",
                 };
                 let unit = behind_number(estimate.unit);
@@ -647,6 +645,34 @@ mod tests {
         assert!(text.contains(gale), "{text}");
         assert!(text.contains("fitted in 2 flights, 2 winds: 1.000 to 9.000 m/s\n"), "{text}");
         assert!(!Report::of_nothing().to_string().contains("wind"));
+    }
+
+    /// An estimate stands at a limit of what is plausible also where the equations ask for hardly more.
+    #[test]
+    fn an_estimate_at_its_bound_is_told_as_what_it_is() {
+        let estimate = Estimate {
+            value: 0.1,
+            unit: "kg/m",
+            low: 0.09,
+            high: 0.11,
+            at_bound: true,
+            determined: true,
+            by_equations: None,
+        };
+        let effect = EffectReport {
+            accepted: true,
+            linearised: false,
+            parameters: BTreeMap::from([("coefficient_z", estimate)]),
+            held_out: BeforeAfter { before: 1.3, after: 1.1 },
+            chance: 1e-4,
+            worth: Vec::new(),
+            confused_with: Vec::new(),
+            experiment: None,
+        };
+        let effects = BTreeMap::from([("parasitic-drag", effect)]);
+        let text = Report { verdict: vec!["parasitic-drag"], effects, ..Report::of_nothing() }.to_string();
+        assert!(text.contains("0.1100); at its bound: another cause may be at work\n"), "{text}");
+        assert!(!text.contains("more is asked"), "{text}");
     }
 
     #[test]
