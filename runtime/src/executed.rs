@@ -17,10 +17,25 @@ pub struct Executed(BTreeMap<String, Version>);
 struct Version {
     file: File,
     state: State,
+    /// SHA-256 of its bytes at the first start. Only of a file of at most [`DIGESTED_BYTES`].
+    digest: Option<String>,
 }
 
 /// Device, number, length and time of the last writing. It tells versions apart without reading them.
 type State = (u64, u64, u64, i64, i64);
+
+/// Largest file that is read at its first start, in bytes. A larger one is seldom a script, and the kernel lets nobody write to another program
+/// while a process executes it.
+const DIGESTED_BYTES: u64 = 4 * 1024 * 1024;
+
+/// A program, compared with the one that was first started.
+#[derive(Debug, PartialEq)]
+enum Comparison {
+    Same,
+    Changed,
+    /// The bytes of the first one are gone, or could not be read.
+    Unknown,
+}
 
 fn state(of: &Metadata) -> State {
     (of.dev(), of.ino(), of.len(), of.mtime(), of.mtime_nsec())
@@ -33,45 +48,71 @@ impl Version {
         path.metadata().ok().filter(Metadata::is_file)?;
         let file = File::open(path).ok()?;
         let state = state(&file.metadata().ok()?);
-        Some(Self { file, state })
+        Some(Self { file, state, digest: None })
+    }
+
+    /// The same version, which can be compared after other bytes were written to its file.
+    fn digested(mut self) -> Self {
+        if self.bytes() <= DIGESTED_BYTES {
+            self.digest = self.sha256().ok().flatten();
+        }
+        self
+    }
+
+    fn bytes(&self) -> u64 {
+        self.state.2
     }
 
     /// SHA-256 of its bytes; `None` if it has been written to since.
     fn sha256(&self) -> io::Result<Option<String>> {
+        if self.digest.is_some() {
+            return Ok(self.digest.clone());
+        }
         (&self.file).rewind()?;
         let digest = inputs::sha256_of(&self.file)?;
         Ok((state(&self.file.metadata()?) == self.state).then_some(digest))
     }
 
-    fn is_same(&self, other: &Self) -> bool {
-        let digests = || Ok::<_, io::Error>((self.sha256()?, other.sha256()?));
-        self.state == other.state || matches!(digests(), Ok((Some(a), Some(b))) if a == b)
+    /// Compares `found` with this one. The bytes are read only where the files differ by their states alone.
+    fn compare(&self, found: &Self) -> Comparison {
+        if self.state == found.state {
+            return Comparison::Same;
+        }
+        if self.bytes() != found.bytes() {
+            return Comparison::Changed;
+        }
+        match (self.sha256(), found.sha256()) {
+            (Ok(Some(first)), Ok(Some(found))) if first == found => Comparison::Same,
+            (Ok(Some(_)), Ok(Some(_))) => Comparison::Changed,
+            _ => Comparison::Unknown,
+        }
     }
 }
 
 impl Executed {
-    /// Notes the program that process `name` is about to execute. Returns a warning if it is another one than at its first start.
+    /// Notes the program that process `name` is about to execute. Returns a warning if it is another one than at its first start, or may be.
     pub fn note(&mut self, name: &str, program: &Program) -> Option<String> {
         let Executable::Command(words) = &program.executable else { return None };
         let path = words.first()?;
         let found = Version::at(path.as_ref())?;
         let Some(first) = self.0.get(path) else {
-            self.0.insert(path.clone(), found);
+            self.0.insert(path.clone(), found.digested());
             return None;
         };
-        (!first.is_same(&found)).then(|| {
-            format!(
-                "warning: process `{name}`: {path} has changed since the run first started it; this process executes the new \
-                 program"
-            )
-        })
+        let what = match first.compare(&found) {
+            Comparison::Same => return None,
+            Comparison::Changed => "has changed since the run first started it",
+            Comparison::Unknown => "was written again since the run first started it, and may have changed",
+        };
+        Some(format!("warning: process `{name}`: {path} {what}; the process is started from the new file"))
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Executable, Executed, Program};
-    use std::fs;
+    use super::{DIGESTED_BYTES, Executable, Executed, Program};
+    use std::fs::{self, File};
+    use std::time::{Duration, SystemTime};
 
     #[test]
     fn another_program_at_the_same_path_is_told() {
@@ -111,5 +152,30 @@ mod tests {
         fs::write(&path, "longer").unwrap();
         let told = executed.note("imu", &program).unwrap();
         assert!(told.contains(&format!("process `imu`: {path} has changed")), "{told}");
+        fs::write(&path, "bad").unwrap();
+        let told = executed.note("imu", &program).unwrap();
+        assert!(told.contains("has changed"), "as long as the first: {told}");
+        fs::write(&path, "old").unwrap();
+        written_at(&path, 1);
+        assert_eq!(executed.note("imu", &program), None, "the same bytes");
+    }
+
+    /// The time of the last writing becomes `s` after 1970.
+    fn written_at(path: &str, s: u64) {
+        let file = File::options().write(true).open(path).unwrap();
+        file.set_modified(SystemTime::UNIX_EPOCH + Duration::from_secs(s)).unwrap();
+    }
+
+    #[test]
+    fn a_large_program_whose_first_bytes_are_gone_may_have_changed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("node").to_string_lossy().into_owned();
+        let program = Program { executable: Executable::Command(vec![path.clone()]), ..Program::unknown() };
+        let mut executed = Executed::default();
+        File::create(&path).unwrap().set_len(DIGESTED_BYTES + 1).unwrap();
+        assert_eq!(executed.note("imu", &program), None);
+        written_at(&path, 1);
+        let told = executed.note("imu", &program).unwrap();
+        assert!(told.contains("was written again") && told.contains("may have changed"), "{told}");
     }
 }

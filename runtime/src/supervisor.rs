@@ -131,6 +131,8 @@ impl<'a, W: World> Supervisor<'a, W> {
     /// The error that ended the run before its time.
     pub fn fly(&mut self, start_order_seed: Option<u64>) -> Result<()> {
         let flown = self.start(start_order_seed).and_then(|()| self.watch());
+        // A changed program that cannot be started has ended the run before its warning was told.
+        self.tell_warnings();
         self.see();
         if flown.is_err() && !self.decisions.replacements.view.is_aborted {
             self.take_down();

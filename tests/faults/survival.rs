@@ -215,29 +215,45 @@ fn install(place: &Place, path: &str, script: &str) {
     assert!(installed.success());
 }
 
+/// Flies with a saboteur that is a script, which becomes `rebuilt` of its text at tick 700, where its process is killed. Returns the end of the
+/// run, and the warning of a program that has changed.
+fn fly_rebuilt(rebuilt: impl Fn(&str) -> String, goes_on: bool) -> (Ended, String) {
+    let (place, manifest) = (Place::new(), Policy::Restart.tables());
+    let (manifest, program) = (write_manifest(&place, &manifest), place.path("node"));
+    let words = saboteur::command().map(|word| format!("'{word}'")).join(" ");
+    let script = format!("#!/bin/sh\nexec {words}\n");
+    install(&place, &program, &script);
+    let command = format!("process.saboteur.command=[{program:?}]");
+    let args = ["run", &manifest, "--record", &place.path("flight.mcap"), "--set", &command];
+    let launch = place.start(&args);
+    let watched = Watched::attach(&place);
+    assert_eq!(watched.hold_at(700), 700);
+    install(&place, &program, &rebuilt(&script));
+    let epoch = watched.control.epoch();
+    kill_process(place.process_of_generation("saboteur", 0), Signal::KILL).unwrap();
+    if goes_on {
+        watched.await_epoch(epoch + 1);
+        watched.control.set_hold_tick(u32::MAX);
+    }
+    let warning =
+        format!("warning: process `saboteur`: {program} has changed since the run first started it");
+    (launch.end(), warning)
+}
+
 #[test]
 fn a_restart_that_executes_a_rebuilt_program_warns() {
     for is_rebuilt in [false, true] {
-        let (place, manifest) = (Place::new(), Policy::Restart.tables());
-        let (manifest, program) = (write_manifest(&place, &manifest), place.path("node"));
-        let words = saboteur::command().map(|word| format!("'{word}'")).join(" ");
-        install(&place, &program, &format!("#!/bin/sh\nexec {words}\n"));
-        let command = format!("process.saboteur.command=[{program:?}]");
-        let args = ["run", &manifest, "--record", &place.path("flight.mcap"), "--set", &command];
-        let launch = place.start(&args);
-        let watched = Watched::attach(&place);
-        assert_eq!(watched.hold_at(700), 700);
         let build = if is_rebuilt { "# Rebuilt.\n" } else { "" };
-        install(&place, &program, &format!("#!/bin/sh\n{build}exec {words}\n"));
-        let epoch = watched.control.epoch();
-        kill_process(place.process_of_generation("saboteur", 0), Signal::KILL).unwrap();
-        watched.await_epoch(epoch + 1);
-        watched.control.set_hold_tick(u32::MAX);
-        let ended = launch.end().with_code(0);
-        let warning =
-            format!("warning: process `saboteur`: {program} has changed since the run first started it");
+        let (ended, warning) = fly_rebuilt(|script| script.replace("exec", &format!("{build}exec")), true);
+        let ended = ended.with_code(0);
         assert_eq!(ended.error.contains(&warning), is_rebuilt, "{ended}");
     }
+}
+
+#[test]
+fn a_rebuilt_program_that_cannot_be_started_is_told_with_the_end_of_the_run() {
+    let (ended, warning) = fly_rebuilt(|_| "#!/nowhere/sh\n".to_owned(), false);
+    ended.with_code(2).says(&[&warning, "`saboteur` has ended, and cannot be started again"]);
 }
 
 #[test]
