@@ -251,6 +251,21 @@ fn a_live_swap_that_cannot_be_is_refused_and_the_run_flies_on() {
     assert!(messages(&recording) == messages(&undisturbed(&place)), "the flights differ");
 }
 
+/// The last measurement of its gps arrives at tick 1480.
+#[test]
+fn a_live_swap_whose_take_over_would_come_after_the_last_measurement_is_refused_as_it_joins() {
+    let place = Place::new();
+    let gps = "[process.gps]\nkind = \"gps\"\ninputs.state = \"/plant/state\"\n";
+    let (manifest, recording) = (hover_with(&place, "gps.toml", gps), place.path("live.mcap"));
+    let mut launch = place.start(&["run", &manifest, "--record", &recording]);
+    launch.hold_at(300);
+    let swap = ["swap", "gps", "--shadow-ticks", "1300", "--run", &place.run_id()];
+    // The run is still held.
+    place.start(&swap).end_among_others().with_code(2).says(&["no tick at which it could take over is left"]);
+    launch.release();
+    launch.end().with_code(1);
+}
+
 #[test]
 fn a_publisher_that_sends_seldom_can_be_swapped() {
     let place = Place::new();

@@ -395,14 +395,14 @@ pub(crate) fn greatest_common_divisor(a: u32, b: u32) -> u32 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::{next_take_over, take_over_stride};
     use bus::plan::Plan;
     use bus::sample_ticks::SampleTicks;
     use serde_json::{Value, json};
 
     /// A run of 1000 ticks with one node, which computes every 10 ticks and sends at these.
-    fn plan(sent: &[SampleTicks]) -> Plan {
+    pub(crate) fn plan(sent: &[SampleTicks]) -> Plan {
         let topic = |ticks: &SampleTicks| json!({ "name": "/a", "type_name": "a/msg/B", "ticks": ticks });
         let topics: Vec<Value> = sent.iter().map(topic).collect();
         let outputs: Vec<Value> =

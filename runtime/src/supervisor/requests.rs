@@ -8,6 +8,7 @@ use crate::supervisor::state_machine::State;
 use crate::view::View;
 use crate::world::World;
 use anyhow::{Result, bail};
+use bus::plan::Plan;
 
 /// Ticks that a backup shadows where a request does not say.
 const SHADOW_TICKS: u32 = 100;
@@ -18,6 +19,28 @@ const MAX_SWAPS_A_LOOK: usize = 16;
 fn least_tick(granted: u32, shadow_ticks: u32, stride: u32) -> u64 {
     let first = u64::from(granted) + u64::from(shadow_ticks) + 1;
     first.next_multiple_of(u64::from(stride.max(1)))
+}
+
+/// Advice on a swap of `node` in a run that has granted `granted` ticks and ends at tick `end`: the least tick of a take-over after
+/// `shadow_ticks`, or after the nearest number of ticks for which there is one.
+fn advice(plan: &Plan, node: usize, (granted, end): (u32, u32), shadow_ticks: u32) -> String {
+    let (period, stride) = (plan.nodes[node].period_ticks, take_over_stride(plan, node));
+    let least = |shadow_ticks: u32| {
+        let first = u32::try_from(least_tick(granted, shadow_ticks, stride)).ok()?;
+        next_take_over(plan, node, first).filter(|least| *least < end)
+    };
+    // A backup joins and takes over at ticks at which its node computes.
+    let whole = shadow_ticks.checked_next_multiple_of(period);
+    let found = whole.into_iter().chain([period]).find_map(|shadow| Some((shadow, least(shadow)?)));
+    match found {
+        None => "no tick at which it could take over is left before the end of the run".to_owned(),
+        Some((shadow, least)) if shadow == shadow_ticks => {
+            format!("the least tick that works now is {least}")
+        }
+        Some((shadow, least)) => {
+            format!("with --shadow-ticks {shadow}, the least tick that works now is {least}")
+        }
+    }
 }
 
 /// The answer to a swap that has ended.
@@ -98,15 +121,7 @@ impl<W: World> Supervisor<'_, W> {
         let View { granted, end_tick: end, .. } = self.decisions.replacements.view;
         let join = tick.saturating_sub(shadow_ticks);
         let (period, stride) = (backup.plan.period_ticks, take_over_stride(self.plan, backup.node));
-        let next = |tick: u32| next_take_over(self.plan, backup.node, tick);
-        let least = u32::try_from(least_tick(granted, shadow_ticks, stride)).ok().and_then(next);
-        let advice = match least.filter(|least| *least < end) {
-            None => "no tick is left: lower --shadow-ticks".to_owned(),
-            Some(_) if !shadow_ticks.is_multiple_of(period) => {
-                format!("choose --shadow-ticks as a multiple of {period}")
-            }
-            Some(least) => format!("the least tick that works now is {least}"),
-        };
+        let advice = advice(self.plan, backup.node, (granted, end), shadow_ticks);
         if tick >= end {
             bail!("tick {tick} is not within the run, which has {end} ticks; {advice}");
         }
@@ -122,7 +137,7 @@ impl<W: World> Supervisor<'_, W> {
                  of the first and join at one of the second; {advice}"
             );
         }
-        if next(tick) != Some(tick) {
+        if next_take_over(self.plan, backup.node, tick) != Some(tick) {
             bail!(
                 "no measurement of `{process}` arrives at tick {tick}: let it take over where one does; {advice}"
             );
@@ -149,7 +164,9 @@ impl<W: World> Supervisor<'_, W> {
 
 #[cfg(test)]
 mod tests {
-    use super::least_tick;
+    use super::{advice, least_tick};
+    use crate::supervisor::replacement::tests::plan;
+    use bus::sample_ticks::SampleTicks;
 
     #[test]
     fn the_least_tick_is_the_first_multiple_whose_backup_can_join() {
@@ -157,5 +174,23 @@ mod tests {
         assert_eq!(least_tick(300, 100, 5), 405);
         assert_eq!(least_tick(299, 100, 5), 400);
         assert_eq!(least_tick(u32::MAX, 1, 1), u64::from(u32::MAX) + 2);
+    }
+
+    /// A run of 1000 ticks, and a node that computes every 10 ticks.
+    #[test]
+    fn the_advice_names_ticks_that_work() {
+        let advice = |sent: SampleTicks, granted, shadow| advice(&plan(&[sent]), 0, (granted, 1000), shadow);
+        let every = SampleTicks::every(20);
+        assert_eq!(advice(every, 300, 100), "the least tick that works now is 420");
+        let whole = "with --shadow-ticks 110, the least tick that works now is 420";
+        assert_eq!(advice(every, 300, 105), whole, "it joins at a tick at which it computes");
+        let shorter = "with --shadow-ticks 10, the least tick that works now is 920";
+        assert_eq!(advice(every, 900, 100), shorter, "it would take over behind the end");
+        let late = "no tick at which it could take over is left before the end of the run";
+        assert_eq!(advice(every, 980, 10), late, "no shadowing is short enough");
+        // Measurements arrive at 80, 180, … and 980.
+        let measured = SampleTicks::measured(10, 1_000_000, 100_000_000, 80_000_000);
+        assert_eq!(advice(measured, 300, 100), "the least tick that works now is 480");
+        assert_eq!(advice(measured, 970, 10), late);
     }
 }

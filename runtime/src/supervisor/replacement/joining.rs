@@ -7,6 +7,10 @@ use diagnostics::Error;
 use std::collections::VecDeque;
 use std::time::Duration;
 
+/// Reason to refuse a swap that was requested in flight.
+const TOO_LATE: &str =
+    "after so many ticks of shadowing, no tick at which it could take over is left before the end of the run";
+
 impl Replacements<'_> {
     /// The backup on which the run waits, because it has not joined yet: node, generation, stage and when that
     /// began. One that is early for its tick, or prepares while the run flies, holds nothing up.
@@ -193,23 +197,37 @@ impl Replacements<'_> {
         }
     }
 
+    /// Ticks at which the backup of `node` joins now and takes over: `u32::MAX` for one that does not take over by the clock, and `None` if the
+    /// run ends before.
+    fn ticks_of(&self, node: usize, backup: &Backup) -> Option<(u32, u32)> {
+        let at = self.view.held_at.unwrap_or_default();
+        Some(match backup.pending.join {
+            Join::At(tick) => (tick, backup.pending.spec.take_over_tick.unwrap_or(u32::MAX)),
+            Join::Next { shadow_ticks: None } => (at, u32::MAX),
+            Join::Next { shadow_ticks: Some(ticks) } => {
+                (at, next_take_over(self.plan, node, at.checked_add(ticks.max(1))?)?)
+            }
+            Join::AtOnce => {
+                let primary = self.slot(node, self.membership.nodes[node].primary.generation);
+                (self.view.slots[primary].done, self.view.slots[primary].done)
+            }
+        })
+    }
+
     /// The clock waits at the tick: the backup may connect its inputs.
     pub(super) fn let_join(&mut self, node: usize) {
+        let Some(ticks) = self.nodes[node].backup.as_ref().map(|backup| self.ticks_of(node, backup)) else {
+            return;
+        };
+        let Some((join_tick, take_over_tick)) = ticks else {
+            // A checkpoint would have to name a tick for it.
+            self.refuse(node, TOO_LATE.to_owned());
+            return;
+        };
         let Some(backup) = &mut self.nodes[node].backup else { return };
         let (plan, view) = (self.plan, &mut self.view);
-        let primary = plan.slot(node, self.membership.nodes[node].primary.generation);
         let spec = &backup.pending.spec;
         let outputs = &spec.plan.outputs;
-        let (join_tick, take_over_tick) = match backup.pending.join {
-            Join::At(tick) => (tick, spec.take_over_tick.unwrap_or(u32::MAX)),
-            Join::Next { shadow_ticks } => {
-                let tick = view.held_at.unwrap_or_default();
-                let take_over = shadow_ticks
-                    .and_then(|ticks| next_take_over(plan, node, tick.checked_add(ticks.max(1))?));
-                (tick, take_over.unwrap_or(u32::MAX))
-            }
-            Join::AtOnce => (view.slots[primary].done, view.slots[primary].done),
-        };
         let shadows = backup.pending.join != Join::AtOnce;
         let membership = &mut self.membership.nodes[node];
         membership.take_over_tick = take_over_tick;
