@@ -186,11 +186,10 @@ def set_values(field: np.ndarray, values: Any) -> None:
     count, room = len(values), field["values"]
     if count > len(room):
         raise ValueError(f"{count} values, and there is room for {len(room)}")
-    if field["count"].item() > count:
-        # Values beyond the count are zeros.
-        room[count:].fill(0)
-    field["count"] = count
     room[:count] = values
+    # Values beyond the count are zeros, also where the count has been set by hand.
+    room[count:].fill(0)
+    field["count"] = count
 
 
 def _kind(declared: str | Message) -> tuple[Any, int]:

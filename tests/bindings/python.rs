@@ -389,6 +389,16 @@ fn a_run_that_fails_raises_its_own_words() {
 }
 
 #[test]
+fn values_beyond_the_count_of_a_sequence_are_zeros_whoever_has_set_them() {
+    let Some(python) = python() else { return };
+    python.eval(
+        "import hummingbus as hb\ncommand = hb.message('MotorCommand').zeros()['command']\n\
+         command['values'][:5] = 76.5\nhb.set_values(command, [80.0] * 3)\n\
+         assert command['values'][:5].tolist() == [80.0, 80.0, 80.0, 0.0, 0.0], command",
+    );
+}
+
+#[test]
 fn the_examples_of_the_page_and_of_the_package_run() {
     let Some(python) = python() else { return };
     let page = fs::read_to_string(repository("docs/python.md")).unwrap();
