@@ -21,8 +21,8 @@ const NOTIFY_VARIABLE: &str = "NOTIFY_SOCKET";
 /// The environment variable with the folder of a command for files of its own, which goes with the run.
 pub const SCRATCH_VARIABLE: &str = "HUMMINGBUS_SCRATCH";
 
-/// Beginning of the names of a group's files.
-const GROUP_PREFIX: &str = "group.";
+/// Beginning of the names of a group's files. That of the process `group/x` is `group.x`.
+const GROUP_PREFIX: &str = "group~";
 /// Longest name of a file that the kernel allows, in bytes (`NAME_MAX`).
 const FILE_NAME_BYTES: usize = 255;
 /// Longest beginning that a shortened file name keeps, in bytes.
@@ -211,10 +211,12 @@ mod tests {
     #[test]
     fn long_names_give_files_of_different_names() {
         let folder = tempfile::tempdir().unwrap();
-        let members = |last: &str| format!("group.{}{last}", "h1/plant+".repeat(40));
-        let unicode = format!("group.{}", "é".repeat(300));
+        let members = |last: &str| format!("{GROUP_PREFIX}{}{last}", "h1/plant+".repeat(40));
+        let unicode = format!("{GROUP_PREFIX}{}", "é".repeat(300));
         let mut names = vec![members("h1/imu"), members("h1/ekf"), "g".repeat(252), unicode];
-        names.extend(["group.a/b", "group.a.b", "group.a~b"].map(str::to_owned));
+        names.extend(["a/b", "a.b", "a~b"].map(|group| format!("{GROUP_PREFIX}{group}")));
+        // Processes of a vehicle that is called `group`, and a group that is called like the first.
+        names.extend(["group/x".to_owned(), "group/a/b".to_owned(), format!("{GROUP_PREFIX}x")]);
         names.push(file_name(&names[0], FIRST, "log").replace(".log", ""));
         for name in &names {
             for (role, ending) in [(FIRST, "log"), (RESTARTED, "log"), (FIRST, "scratch")] {
@@ -224,6 +226,6 @@ mod tests {
                 assert!(made.is_ok(), "{file}: {made:?}");
             }
         }
-        assert!(file_name(&members("h1/imu"), FIRST, "log").starts_with("group.h1.plant+h1.plant+"));
+        assert!(file_name(&members("h1/imu"), FIRST, "log").starts_with("group~h1.plant+h1.plant+"));
     }
 }
