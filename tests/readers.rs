@@ -14,6 +14,8 @@ mod identify;
 #[path = "runs/laps.rs"]
 #[allow(dead_code, reason = "shared with tests/runs")]
 mod laps;
+#[path = "readers/launched.rs"]
+mod launched;
 #[path = "readers/live.rs"]
 mod live;
 #[path = "readers/plot.rs"]

@@ -1,23 +1,17 @@
 //! A client of Foxglove's protocol that others wrote watches a live run and steers it.
 
+use crate::launched::Launched;
 use crate::{HUMMINGBUS, ROOT, readers};
 use serde_json::{Value, json};
 use std::fs;
 use std::io::{BufRead as _, BufReader, Read as _};
 use std::path::Path;
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Command, Output, Stdio};
 
-/// A run that Foxglove can watch; dropping it ends it.
+/// A run that Foxglove can watch.
 struct Run {
-    child: Child,
+    launched: Launched,
     address: String,
-}
-
-impl Drop for Run {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
 }
 
 impl Run {
@@ -36,16 +30,16 @@ impl Run {
                 break format!("ws://{address}");
             }
         };
-        Self { child, address }
+        Self { launched: Launched(child), address }
     }
 
     /// The summary of the run, which is stopped.
     fn end(mut self) -> Value {
-        let stopped = rustix::process::Pid::from_child(&self.child);
-        rustix::process::kill_process(stopped, rustix::process::Signal::INT).unwrap();
+        self.launched.interrupt();
+        let child = &mut self.launched.0;
         let mut text = String::new();
-        self.child.stdout.take().unwrap().read_to_string(&mut text).unwrap();
-        assert_eq!(self.child.wait().unwrap().code(), Some(1), "it was stopped");
+        child.stdout.take().unwrap().read_to_string(&mut text).unwrap();
+        assert_eq!(child.wait().unwrap().code(), Some(1), "it was stopped");
         serde_json::from_str(&text).unwrap()
     }
 }

@@ -1,25 +1,19 @@
 //! A browser steers the live run that its page shows, with the mouse and with keys alone.
 
+use crate::launched::Launched;
 use crate::{HUMMINGBUS, ROOT, look, readers};
 use recorder::reader::Recording;
 use serde_json::{Value, json};
 use std::ffi::OsStr;
 use std::io::{BufRead as _, BufReader, Read as _};
 use std::path::Path;
-use std::process::{Child, ChildStderr, Command, Stdio};
+use std::process::{ChildStderr, Command, Stdio};
 
-/// A watched run; dropping it ends it.
+/// A watched run.
 struct Run {
-    child: Child,
+    launched: Launched,
     address: String,
     errors: BufReader<ChildStderr>,
-}
-
-impl Drop for Run {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
 }
 
 impl Run {
@@ -42,16 +36,17 @@ impl Run {
                 break address.to_owned();
             }
         };
-        Self { child, address, errors }
+        Self { launched: Launched(child), address, errors }
     }
 
     /// The summary of the run, which ends by itself when its page was closed.
     fn end(mut self) -> Value {
+        let child = &mut self.launched.0;
         let mut text = String::new();
-        self.child.stdout.take().unwrap().read_to_string(&mut text).unwrap();
+        child.stdout.take().unwrap().read_to_string(&mut text).unwrap();
         let mut said = String::new();
         self.errors.read_to_string(&mut said).unwrap();
-        assert_eq!(self.child.wait().unwrap().code(), Some(1), "it was stopped: {said}");
+        assert_eq!(child.wait().unwrap().code(), Some(1), "it was stopped: {said}");
         serde_json::from_str(&text).unwrap()
     }
 }

@@ -1,6 +1,7 @@
 //! A browser shows recordings that `hummingbus view` serves: the poses are the recording's, the room and the scopes are
 //! drawn, and keys alone do everything.
 
+use crate::launched::Launched;
 use crate::{Flight, HUMMINGBUS, ROOT, laps, look, readers};
 use bus::Message as _;
 use bus::announcement::Announcement;
@@ -12,24 +13,14 @@ use std::ffi::OsStr;
 use std::fs;
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use tempfile::TempDir;
 
-/// A process; dropping it ends it.
-struct Process(Child);
-
-impl Drop for Process {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
 /// A server of recordings.
 struct View {
-    process: Process,
+    process: Launched,
     address: String,
 }
 
@@ -40,7 +31,7 @@ impl View {
         let mut child = command.spawn().unwrap();
         let mut address = String::new();
         BufReader::new(child.stdout.take().unwrap()).read_line(&mut address).unwrap();
-        Self { process: Process(child), address: address.trim().to_owned() }
+        Self { process: Launched(child), address: address.trim().to_owned() }
     }
 
     fn look(&self, readers: &Path, more: &[&str]) -> Value {
@@ -302,7 +293,7 @@ fn a_browser_follows_a_live_run_to_its_end() {
     let mut run = Command::new(HUMMINGBUS);
     run.arg("run").arg(Path::new(ROOT).join("manifests/hover.toml")).arg("--record").arg(&recording);
     run.args(["--pace", "realtime", "--set", "run.duration_s=4000"]);
-    let mut run = Process(run.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap());
+    let mut run = Launched(run.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap());
     while Recording::salvage(&partial).map_or(true, |recording| recording.topics().is_empty()) {
         assert!(run.0.try_wait().unwrap().is_none(), "the run has ended");
         std::thread::sleep(std::time::Duration::from_millis(50));

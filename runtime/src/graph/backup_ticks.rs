@@ -35,7 +35,7 @@ impl Backup<'_> {
     /// # Errors
     /// If the period of the backup is refused.
     pub fn other_ticks(&self, span: &Range<usize>) -> Result<Option<Diagnostic>, Diagnostic> {
-        let Self { manifest, plan, whole, kind, .. } = self;
+        let Self { manifest, plan, whole, kind, .. } = *self;
         let period = plan.nodes[self.node].period_ticks;
         let ticks = sample_ticks(manifest, whole, Some(kind), period);
         let is_other = |output: &&OutputPlan| {
@@ -55,15 +55,18 @@ impl Backup<'_> {
     fn warning(&self, output: &OutputPlan, ticks: SampleTicks, both: u32, span: &Range<usize>) -> Diagnostic {
         let (name, topic) = (&self.plan.nodes[self.node].name, &self.plan.topics[output.topic]);
         let (tick_s, port) = (self.plan.tick_s(), &output.port);
-        let takes_time = self.whole.computing_time.is_some();
-        let [effect, equal] = if takes_time {
-            ["its samples wait for these", "leave out its `computing_time`"]
+        let [waits, repeats] = ["its samples wait for these", "its samples are sent more than once"];
+        let [takes_time, took_time] = [self.whole, self.present].map(|of| of.computing_time.is_some());
+        let [effect, equal] = if takes_time && !took_time {
+            [waits, "leave out its `computing_time`"]
+        } else if took_time && !takes_time {
+            [repeats, "give it a `computing_time`, too"]
         } else if ticks.mean() < topic.ticks.mean() {
             ["some of its samples are never sent", "give it the rate of the other"]
         } else if ticks.mean() > topic.ticks.mean() {
-            ["its samples are sent more than once", "give it the rate of the other"]
+            [repeats, "give it the rate of the other"]
         } else {
-            ["its samples wait for these", "give it the delay of the other"]
+            [waits, "give it the delay of the other"]
         };
         let message = format!(
             "the backup of `{name}` has new samples at ticks {}, and {} is sent at ticks {}, as before: {effect}",
