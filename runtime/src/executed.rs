@@ -153,6 +153,7 @@ mod tests {
         let told = executed.note("imu", &program).unwrap();
         assert!(told.contains(&format!("process `imu`: {path} has changed")), "{told}");
         fs::write(&path, "bad").unwrap();
+        written_at(&path, 2);
         let told = executed.note("imu", &program).unwrap();
         assert!(told.contains("has changed"), "as long as the first: {told}");
         fs::write(&path, "old").unwrap();
