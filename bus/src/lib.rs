@@ -17,7 +17,7 @@
 //! | states: hand-over, checkpoints | `state_transfer`, `hand_over`, [`checkpoint`], `saved_sample` |
 //! | host times | `profile`, `step_times`, `host_time` |
 //! | files and memory of a run | `announcement`, `description`, `shared_file`, `json_file`, `user_file`, `reserve`, `room`, `claim`, `process` |
-//! | nodes of other languages, tests, people | [`dynamic`], `harness`, `node_harness`, [`asked`] |
+//! | nodes of other languages, tests, people | [`dynamic`], `harness`, `node_harness`, `input_messages`, [`asked`] |
 
 // The derive names this crate `bus` also when it is used inside it.
 extern crate self as bus;
@@ -51,6 +51,7 @@ mod harness;
 pub mod host_time;
 #[doc(hidden)]
 pub mod initial;
+mod input_messages;
 mod join;
 mod json_file;
 mod links;
@@ -111,6 +112,7 @@ pub use diagnostics::ParameterError;
 pub use error::BusError;
 pub use handles::{Input, Output};
 pub use harness::Harness;
+pub use input_messages::{InputMemory, InputMessages};
 pub use inputs::InputFiles;
 pub use join::{GENERATION_VARIABLE, Join, NODE_VARIABLE};
 pub use message::Message;

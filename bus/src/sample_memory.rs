@@ -6,7 +6,7 @@ use crate::ports::{OutputPorts, OutputSamples, SampleSink, SampleSource};
 use crate::schema::Schema;
 
 /// Samples by port.
-#[derive(Debug, PartialEq)]
+#[derive(Debug, Default, PartialEq)]
 pub(crate) struct SampleMemory {
     /// Sizes in bytes of the messages that can be written, by port; empty if none is written.
     sizes: Vec<usize>,
