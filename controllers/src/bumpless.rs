@@ -6,7 +6,7 @@
 //! ask for is added to its demand and fades out (`TIME_CONSTANT_S`).
 
 use crate::allocation::RotorWrench;
-use crate::control::{ControlInput, ControlOutput, within};
+use crate::control::{ControlOutput, within};
 use crate::controller_state::{ControllerState, LawId};
 use crate::law::{Law, Predecessor};
 use nalgebra::Vector3;
@@ -26,16 +26,19 @@ const ACCELERATION_MAX_RAD_S2: f64 = 10.0;
 /// The transfer to one law on one vehicle.
 ///
 /// ```
+/// use bus::messages::{SetPoint, StateEstimate};
 /// use controllers::airframe::ControlledVehicle;
-/// use controllers::{bumpless::BumplessTransfer, control::ControlInput, controller_state::ControllerState};
-/// use controllers::{pid::PidLaw, pid_gains::PidGains};
+/// use controllers::{bumpless::BumplessTransfer, controller_state::ControllerState};
+/// use controllers::{law_inputs::SetPointInputs, pid::PidLaw, pid_gains::PidGains};
 ///
 /// let vehicle = vehicles::Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml").unwrap();
 /// let craft = ControlledVehicle::new(vehicle).unwrap();
 /// let law = PidLaw { gains: PidGains::default(), vehicle: craft.hover_model(), period_s: 1e-3 };
 /// let mut state = ControllerState::default();
 /// let transfer = BumplessTransfer::to::<PidLaw>(&craft.vehicle, 1e-3);
-/// let asked = transfer.step(&law, &mut state, &ControlInput::default(), None).wrench;
+/// let (set_point, estimate) = (SetPoint::default(), StateEstimate::default());
+/// let inputs = SetPointInputs { set_point: &set_point, estimate: &estimate, attitude: None };
+/// let asked = transfer.step(&law, &mut state, &inputs, None).wrench;
 /// assert_eq!(state.thrust, asked.thrust_N, "what was asked for is there for the next law");
 /// ```
 #[derive(Debug, Clone, Copy)]
@@ -66,12 +69,12 @@ impl BumplessTransfer {
         &self,
         law: &L,
         state: &mut ControllerState,
-        input: &ControlInput,
+        inputs: &L::Inputs<'_>,
         last_wrench: Option<RotorWrench>,
     ) -> ControlOutput {
-        self.take_over(law, state, input, last_wrench);
+        self.take_over(law, state, inputs, last_wrench);
         let last = state.wrench();
-        let mut output = law.step(state.law_state_mut(), &last, input);
+        let mut output = law.step(state.law_state_mut(), &last, inputs);
         output.wrench = self.with_residual(state, &output.wrench);
         state.id = self.id;
         state.integrals = output.integrals;
@@ -84,7 +87,7 @@ impl BumplessTransfer {
         &self,
         law: &L,
         state: &mut ControllerState,
-        input: &ControlInput,
+        inputs: &L::Inputs<'_>,
         last_wrench: Option<RotorWrench>,
     ) {
         let is_anothers = !state.is_new() && state.id != self.id;
@@ -94,14 +97,14 @@ impl BumplessTransfer {
                 integrals: (!state.is_new()).then_some(state.integrals),
                 state: (state.id.state == self.id.state).then(|| state.law_state()),
             };
-            let (mut begun, last) = (law.start(Some(&from), input), law.last_wrench(Some(&wrench)));
+            let (mut begun, last) = (law.start(Some(&from), inputs), law.last_wrench(Some(&wrench)));
             *state = ControllerState::default();
             *state.law_state_mut() = begun;
             state.set_wrench(&last);
-            let asked = law.step(&mut begun, &last, input).wrench;
+            let asked = law.step(&mut begun, &last, inputs).wrench;
             self.keep_residual(state, &wrench, &asked);
         } else if state.is_new() {
-            *state.law_state_mut() = law.start(None, input);
+            *state.law_state_mut() = law.start(None, inputs);
             state.set_wrench(&law.last_wrench(None));
         }
     }

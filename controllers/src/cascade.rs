@@ -16,7 +16,7 @@ use crate::allocation::RotorWrench;
 use crate::altitude_loop::AltitudeLoop;
 use crate::angle::wrap_rad;
 use crate::cascade_gains::{CascadeGains, CommandFilter};
-use crate::control::{ControlInput, ControlOutput, HoverMotion, Integrals};
+use crate::control::{ControlOutput, HoverMotion, Integrals};
 use crate::law::{Law, LawContext, Predecessor};
 use crate::law_inputs::SetPointInputs;
 use crate::set_points::SetPoint;
@@ -120,12 +120,21 @@ impl Law for CascadeLaw {
         self.gains.rate.iter().fold(0.0, |most, axis| axis.proportional_1_s.max(most))
     }
 
-    fn start(&self, from: Option<&Predecessor<'_, CascadeState>>, input: &ControlInput) -> CascadeState {
-        self.begun(from, input.set_point.altitude_m, &HoverMotion::of(&input.motion))
+    fn start(
+        &self,
+        from: Option<&Predecessor<'_, CascadeState>>,
+        inputs: &SetPointInputs<'_>,
+    ) -> CascadeState {
+        self.begun(from, inputs.set_point.altitude, &HoverMotion::of(&inputs.motion()))
     }
 
-    fn step(&self, state: &mut CascadeState, last: &RotorWrench, input: &ControlInput) -> ControlOutput {
-        self.demand(state, last, &input.set_point, &HoverMotion::of(&input.motion))
+    fn step(
+        &self,
+        state: &mut CascadeState,
+        last: &RotorWrench,
+        inputs: &SetPointInputs<'_>,
+    ) -> ControlOutput {
+        self.demand(state, last, &inputs.asked(), &HoverMotion::of(&inputs.motion()))
     }
 }
 

@@ -1,8 +1,7 @@
-//! Inputs and outputs of a control law at a tick.
+//! Estimated motion and outputs of a control law at a tick.
 
 use crate::allocation::RotorWrench;
 use crate::set_points::SetPoint;
-use bus::messages::{Reference, WallEstimate};
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// The vehicle's motion as its estimators believe it.
@@ -16,19 +15,6 @@ pub struct MotionEstimate {
     pub attitude_WB: UnitQuaternion<f64>,
     /// Angular rate of the body against the world, body axes, rad/s.
     pub angular_velocity_B_rad_s: Vector3<f64>,
-}
-
-/// Inputs of a law at a tick.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct ControlInput {
-    /// The vehicle's motion.
-    pub motion: MotionEstimate,
-    /// Set point of the pilot; the default where no pilot is wired.
-    pub set_point: SetPoint,
-    /// Point of the trajectory; zero where none is wired.
-    pub reference: Reference,
-    /// Walls that the range finders see; zero where none are wired.
-    pub walls: WallEstimate,
 }
 
 /// Outputs of a law: the wrench to make, and its report beside it.
@@ -102,15 +88,6 @@ impl HoverMotion {
             pitch_rad,
             yaw_rad,
             angular_velocity_B_rad_s: motion.angular_velocity_B_rad_s,
-        }
-    }
-
-    /// The same with height and climb by the beam downwards.
-    pub(crate) fn by_ranges(input: &ControlInput) -> Self {
-        Self {
-            altitude_m: input.walls.height,
-            climb_rate_m_s: input.walls.climb_rate,
-            ..Self::of(&input.motion)
         }
     }
 }

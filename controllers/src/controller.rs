@@ -75,7 +75,7 @@ impl<L: Law> Component for Controller<L> {
         state: &mut ControllerState,
     ) -> Result<Outputs, StepError> {
         let last_wrench = context.predecessor().map(|last| self.made_by(&last));
-        let output = self.transfer.step(&self.law, state, &inputs.into(), last_wrench);
+        let output = self.transfer.step(&self.law, state, &inputs, last_wrench);
         if let Some(what) = output.not_finite() {
             // The allocation and the command map would make a command of it all the same.
             return Err(format!("the law asks for {what}: its output `command` is not sent").into());

@@ -6,7 +6,7 @@
 
 use crate::airframe::ControlledVehicle;
 use crate::allocation::{Allocation, RotorWrench, THRUST_RESERVE};
-use crate::control::{ControlInput, Integrals, within};
+use crate::control::{Integrals, MotionEstimate, within};
 use crate::disturbance::{Observer, ObserverState};
 use crate::law::Predecessor;
 use crate::motor_lag::{Made, MotorLag};
@@ -123,12 +123,12 @@ impl Foresight {
     pub fn start(
         &self,
         from: Option<&Predecessor<'_, ForesightState>>,
-        input: &ControlInput,
+        motion: &MotionEstimate,
     ) -> ForesightState {
-        let at_rest = ObserverState::at(&input.motion);
+        let at_rest = ObserverState::at(motion);
         match from {
             None => ForesightState::new(&Made::settled(self.hover()), at_rest),
-            Some(Predecessor { state: Some(before), .. }) => self.after_foresight(before, input),
+            Some(Predecessor { state: Some(before), .. }) => self.after_foresight(before, motion),
             Some(other) => {
                 // What the integrators of a law that does not foresee lift, the observer does from now on, and it alone:
                 // left beside it, they would be counted twice by the next law.
@@ -146,8 +146,8 @@ impl Foresight {
         before.map_or_else(|| self.hover(), |before| self.possible(before))
     }
 
-    fn after_foresight(&self, before: &ForesightState, input: &ControlInput) -> ForesightState {
-        let measured_W_m_s = input.motion.velocity_W_m_s;
+    fn after_foresight(&self, before: &ForesightState, motion: &MotionEstimate) -> ForesightState {
+        let measured_W_m_s = motion.velocity_W_m_s;
         let missed_W_m_s = Vector3::from(before.observer.velocity_foreseen) - measured_W_m_s;
         let foreseen_W_m_s = measured_W_m_s + missed_W_m_s.map(|v| within(v, VELOCITY_MISSED_MAX_M_S));
         let observer = ObserverState {

@@ -18,7 +18,7 @@
 
 use crate::airframe::ControlledVehicle;
 use crate::allocation::RotorWrench;
-use crate::control::{ControlInput, ControlOutput, MotionEstimate};
+use crate::control::{ControlOutput, MotionEstimate};
 use crate::disturbance::{Disturbance, ObserverState};
 use crate::flatness::{self, Moving, Target};
 use crate::foresight::{Foresight, ForesightState};
@@ -72,9 +72,9 @@ impl GeometricLaw {
         &self,
         observer: &mut ObserverState,
         made: &Made,
-        input: &ControlInput,
+        inputs: &ReferenceInputs<'_>,
     ) -> (RotorWrench, Target) {
-        let (reference, motion) = (&Point::from(&input.reference), &input.motion);
+        let (reference, motion) = (&Point::from(inputs.reference), &inputs.motion());
         let push = self.push(made, motion);
         let disturbance =
             self.gains.observer.step(observer, motion, &push.acceleration_W_m_s2, self.foresight.period_s);
@@ -177,18 +177,27 @@ impl Law for GeometricLaw {
         self.gains.attitude_derivative_1_s.max(self.gains.yaw_derivative_1_s)
     }
 
-    fn start(&self, from: Option<&Predecessor<'_, ForesightState>>, input: &ControlInput) -> ForesightState {
-        self.foresight.start(from, input)
+    fn start(
+        &self,
+        from: Option<&Predecessor<'_, ForesightState>>,
+        inputs: &ReferenceInputs<'_>,
+    ) -> ForesightState {
+        self.foresight.start(from, &inputs.motion())
     }
 
     fn last_wrench(&self, before: Option<&RotorWrench>) -> RotorWrench {
         self.foresight.last_wrench(before)
     }
 
-    fn step(&self, state: &mut ForesightState, last: &RotorWrench, input: &ControlInput) -> ControlOutput {
+    fn step(
+        &self,
+        state: &mut ForesightState,
+        last: &RotorWrench,
+        inputs: &ReferenceInputs<'_>,
+    ) -> ControlOutput {
         let made = self.foresight.advance(state, last);
-        let (wrench, target) = self.asked(&mut state.observer, &made, input);
-        let set_point = SetPoint::held(input.reference.position.z, &target.attitude_WB);
+        let (wrench, target) = self.asked(&mut state.observer, &made, inputs);
+        let set_point = SetPoint::held(inputs.reference.position.z, &target.attitude_WB);
         ControlOutput { wrench, integrals: state.integrals(), set_point, ..ControlOutput::default() }
     }
 }

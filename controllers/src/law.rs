@@ -2,7 +2,7 @@
 
 use crate::airframe::ControlledVehicle;
 use crate::allocation::RotorWrench;
-use crate::control::{ControlInput, ControlOutput, Integrals};
+use crate::control::{ControlOutput, Integrals};
 use bus::Message;
 use bus::component::Info;
 use bus::context::NodeContext;
@@ -18,8 +18,8 @@ pub trait Law: Sized + Send {
     const INFO: Info;
     /// Parameters, as the manifest's `parameters` table holds them.
     type Parameters: bus::Parameters;
-    /// Inputs.
-    type Inputs<'a>: InputPorts<'a> + Into<ControlInput>;
+    /// Inputs: ports of the law alone, `Option` for those that need not be wired. [`crate::law_inputs`] has some.
+    type Inputs<'a>: InputPorts<'a>;
     /// State between ticks.
     type State: Message;
 
@@ -41,7 +41,7 @@ pub trait Law: Sized + Send {
     /// Returns its first state: before the first tick of a run, or after another law, `from`. It need not ask for the
     /// other's last wrench, since [`crate::bumpless::BumplessTransfer`] makes up for the rest. An integrator
     /// should not take that up: it would keep amid a manoeuvre a wrench that is gone a moment later.
-    fn start(&self, from: Option<&Predecessor<'_, Self::State>>, input: &ControlInput) -> Self::State;
+    fn start(&self, from: Option<&Predecessor<'_, Self::State>>, inputs: &Self::Inputs<'_>) -> Self::State;
 
     /// The wrench that the rotors are taken to have been asked for one period before it begins, where another law asked
     /// for `before`.
@@ -50,7 +50,7 @@ pub trait Law: Sized + Send {
     }
 
     /// The demand now; advances the state by one period. `last` was asked for one period ago.
-    fn step(&self, state: &mut Self::State, last: &RotorWrench, input: &ControlInput) -> ControlOutput;
+    fn step(&self, state: &mut Self::State, last: &RotorWrench, inputs: &Self::Inputs<'_>) -> ControlOutput;
 }
 
 /// The law that flew before, as far as it is known.

@@ -1,11 +1,13 @@
-//! Inputs of laws from the bus.
+//! Inputs of laws: their ports, and the quantities in them.
+//!
+//! A law with other inputs declares ports of its own in its own file.
 
-use crate::control::{ControlInput, MotionEstimate};
+use crate::control::{HoverMotion, MotionEstimate};
 use crate::set_points::SetPoint;
 use bus::InputPorts;
 use bus::messages::{
-    AttitudeEstimate, Reference, SetPoint as SetPointMessage, StateEstimate, Vector3 as VectorMessage,
-    WallEstimate,
+    AttitudeEstimate, Quaternion as QuaternionMessage, Reference, SetPoint as SetPointMessage, StateEstimate,
+    Vector3 as VectorMessage, WallEstimate,
 };
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
@@ -51,44 +53,139 @@ pub struct WallInputs<'a> {
     pub attitude: &'a AttitudeEstimate,
 }
 
-impl From<SetPointInputs<'_>> for ControlInput {
-    fn from(inputs: SetPointInputs<'_>) -> Self {
-        let SetPointMessage { altitude, roll, pitch, yaw, .. } = *inputs.set_point;
-        let set_point = SetPoint { altitude_m: altitude, roll_rad: roll, pitch_rad: pitch, yaw_rad: yaw };
-        Self { motion: motion(inputs.estimate, inputs.attitude), set_point, ..Self::default() }
+impl SetPointInputs<'_> {
+    /// Set point of the pilot.
+    #[must_use]
+    pub fn asked(&self) -> SetPoint {
+        self.set_point.into()
+    }
+
+    /// The estimated motion.
+    #[must_use]
+    pub fn motion(&self) -> MotionEstimate {
+        motion(self.estimate, self.attitude)
     }
 }
 
-impl From<ReferenceInputs<'_>> for ControlInput {
-    fn from(inputs: ReferenceInputs<'_>) -> Self {
-        let motion = motion(inputs.estimate, inputs.attitude);
-        Self { motion, reference: *inputs.reference, ..Self::default() }
+impl ReferenceInputs<'_> {
+    /// The estimated motion.
+    #[must_use]
+    pub fn motion(&self) -> MotionEstimate {
+        motion(self.estimate, self.attitude)
     }
 }
 
-impl From<VelocityInputs<'_>> for ControlInput {
-    fn from(inputs: VelocityInputs<'_>) -> Self {
-        let motion = motion(inputs.estimate, inputs.attitude);
-        Self { motion, reference: inputs.reference.copied().unwrap_or_default(), ..Self::default() }
+impl VelocityInputs<'_> {
+    /// The estimated motion.
+    #[must_use]
+    pub fn motion(&self) -> MotionEstimate {
+        motion(self.estimate, self.attitude)
     }
 }
 
-impl From<WallInputs<'_>> for ControlInput {
-    fn from(inputs: WallInputs<'_>) -> Self {
-        let motion = motion(&StateEstimate::default(), Some(inputs.attitude));
-        Self { motion, walls: *inputs.walls, ..Self::default() }
+impl WallInputs<'_> {
+    /// The estimated motion, with height and climb by the beam downwards.
+    #[must_use]
+    pub fn measured(&self) -> HoverMotion {
+        let (roll_rad, pitch_rad, yaw_rad) = rotation(self.attitude.attitude).euler_angles();
+        HoverMotion {
+            altitude_m: self.walls.height,
+            climb_rate_m_s: self.walls.climb_rate,
+            roll_rad,
+            pitch_rad,
+            yaw_rad,
+            angular_velocity_B_rad_s: vector(self.attitude.angular_velocity),
+        }
     }
 }
 
 /// The motion by `estimate`; attitude and rates by `attitude` where that is wired.
 fn motion(estimate: &StateEstimate, attitude: Option<&AttitudeEstimate>) -> MotionEstimate {
-    let vector = |v: VectorMessage| Vector3::from(<[f64; 3]>::from(v));
     let q = attitude.map_or(estimate.attitude, |attitude| attitude.attitude);
     let rates = attitude.map_or(estimate.angular_velocity, |attitude| attitude.angular_velocity);
     MotionEstimate {
         position_W_m: vector(estimate.position),
         velocity_W_m_s: vector(estimate.velocity),
-        attitude_WB: UnitQuaternion::new_unchecked(Quaternion::new(q.w, q.x, q.y, q.z)),
+        attitude_WB: rotation(q),
         angular_velocity_B_rad_s: vector(rates),
+    }
+}
+
+fn vector(v: VectorMessage) -> Vector3<f64> {
+    <[f64; 3]>::from(v).into()
+}
+
+fn rotation(q: QuaternionMessage) -> UnitQuaternion<f64> {
+    UnitQuaternion::new_unchecked(Quaternion::new(q.w, q.x, q.y, q.z))
+}
+
+impl From<&MotionEstimate> for StateEstimate {
+    fn from(motion: &MotionEstimate) -> Self {
+        Self {
+            position: vector_message(&motion.position_W_m),
+            velocity: vector_message(&motion.velocity_W_m_s),
+            attitude: rotation_message(&motion.attitude_WB),
+            angular_velocity: vector_message(&motion.angular_velocity_B_rad_s),
+            ..Self::default()
+        }
+    }
+}
+
+impl From<&MotionEstimate> for AttitudeEstimate {
+    fn from(motion: &MotionEstimate) -> Self {
+        let (roll, pitch, yaw) = motion.attitude_WB.euler_angles();
+        let attitude = rotation_message(&motion.attitude_WB);
+        let angular_velocity = vector_message(&motion.angular_velocity_B_rad_s);
+        Self { attitude, roll, pitch, yaw, angular_velocity, ..Self::default() }
+    }
+}
+
+fn vector_message(v: &Vector3<f64>) -> VectorMessage {
+    <[f64; 3]>::from(*v).into()
+}
+
+fn rotation_message(rotation: &UnitQuaternion<f64>) -> QuaternionMessage {
+    let [x, y, z, w] = rotation.coords.into();
+    QuaternionMessage { x, y, z, w }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn turning() -> MotionEstimate {
+        MotionEstimate {
+            position_W_m: Vector3::new(1.0, -2.0, 3.0),
+            velocity_W_m_s: Vector3::new(0.1, 0.2, -0.3),
+            attitude_WB: UnitQuaternion::from_euler_angles(0.2, -0.1, 2.0),
+            angular_velocity_B_rad_s: Vector3::new(0.5, -0.6, 0.7),
+        }
+    }
+
+    #[test]
+    fn a_motion_in_messages_is_read_bit_by_bit() {
+        let (estimate, attitude) = (StateEstimate::from(&turning()), AttitudeEstimate::from(&turning()));
+        assert_eq!(motion(&estimate, None), turning());
+        assert_eq!(motion(&estimate, Some(&attitude)), turning());
+    }
+
+    #[test]
+    fn another_estimator_gives_attitude_and_rates_alone() {
+        let attitude = AttitudeEstimate::default();
+        let found = motion(&StateEstimate::from(&turning()), Some(&attitude));
+        let level = MotionEstimate {
+            attitude_WB: UnitQuaternion::identity(),
+            angular_velocity_B_rad_s: Vector3::zeros(),
+            ..turning()
+        };
+        assert_eq!(found, level);
+    }
+
+    #[test]
+    fn a_law_by_range_finders_has_height_and_climb_from_the_beam_downwards() {
+        let walls = WallEstimate { height: 1.5, climb_rate: -0.2, ..WallEstimate::default() };
+        let found = WallInputs { walls: &walls, attitude: &AttitudeEstimate::from(&turning()) }.measured();
+        let expected = HoverMotion { altitude_m: 1.5, climb_rate_m_s: -0.2, ..HoverMotion::of(&turning()) };
+        assert_eq!(found, expected);
     }
 }

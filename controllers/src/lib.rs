@@ -5,7 +5,7 @@
 //! - [`set_points`]: a pilot's schedule of steps, ramps and doublets; [`sticks`]: a recording of sticks.
 //! - [`allocation`]: from a wrench to the speeds of the rotors; `bounded`: the same beyond their limits; [`airframe`]: the
 //!   vehicle that a law knows.
-//! - [`control`]: what a law reads and answers; [`law_inputs`]: the ports that it comes from.
+//! - [`law_inputs`]: ports of laws; [`control`]: the estimated motion, and what a law answers.
 //! - `gains_file`: gains with units and sources; a law's gains are beside it, ours and the thesis's.
 //! - `altitude_loop`: the part that all laws about hover share.
 //! - [`pid`]: altitude and attitude PID.

@@ -8,7 +8,7 @@
 
 use crate::airframe::ControlledVehicle;
 use crate::allocation::RotorWrench;
-use crate::control::{ControlInput, ControlOutput, MotionEstimate};
+use crate::control::{ControlOutput, MotionEstimate};
 use crate::disturbance::Disturbance;
 use crate::flatness::{self, Moving, Target};
 use crate::foresight::{Foresight, ForesightState};
@@ -163,25 +163,34 @@ impl Law for LqrLaw {
         Self::for_craft(gains, context.craft, context.node.period_s())
     }
 
-    fn start(&self, from: Option<&Predecessor<'_, ForesightState>>, input: &ControlInput) -> ForesightState {
-        self.foresight.start(from, input)
+    fn start(
+        &self,
+        from: Option<&Predecessor<'_, ForesightState>>,
+        inputs: &ReferenceInputs<'_>,
+    ) -> ForesightState {
+        self.foresight.start(from, &inputs.motion())
     }
 
     fn last_wrench(&self, before: Option<&RotorWrench>) -> RotorWrench {
         self.foresight.last_wrench(before)
     }
 
-    fn step(&self, state: &mut ForesightState, last: &RotorWrench, input: &ControlInput) -> ControlOutput {
-        let (made, motion) = (self.foresight.advance(state, last), &input.motion);
+    fn step(
+        &self,
+        state: &mut ForesightState,
+        last: &RotorWrench,
+        inputs: &ReferenceInputs<'_>,
+    ) -> ControlOutput {
+        let (made, motion) = (self.foresight.advance(state, last), &inputs.motion());
         let explained_W_m_s2 = self.explained_W_m_s2(&made, motion);
         let observer = &mut state.observer;
         let disturbance =
             self.gains.observer.step(observer, motion, &explained_W_m_s2, self.foresight.period_s);
-        let reference = Point::from(&input.reference);
+        let reference = Point::from(inputs.reference);
         let needed = self.needed(&disturbance, &reference);
         let deviation = self.deviation(&needed, &made, motion, &reference);
         let wrench = self.demand(&needed, &deviation);
-        let set_point = SetPoint::held(input.reference.position.z, &needed.attitude.attitude_WB);
+        let set_point = SetPoint::held(inputs.reference.position.z, &needed.attitude.attitude_WB);
         ControlOutput { wrench, integrals: state.integrals(), set_point, ..ControlOutput::default() }
     }
 }

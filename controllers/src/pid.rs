@@ -6,7 +6,7 @@ use crate::airframe::HoverModel;
 use crate::allocation::RotorWrench;
 use crate::altitude_loop::{AltitudeLoop, LoopGains};
 use crate::angle::wrap_rad;
-use crate::control::{ControlInput, ControlOutput, HoverMotion, Integrals};
+use crate::control::{ControlOutput, HoverMotion, Integrals};
 use crate::law::{Law, LawContext, Predecessor};
 use crate::law_inputs::SetPointInputs;
 use crate::pid_gains::PidGains;
@@ -81,20 +81,16 @@ impl Law for PidLaw {
         [gains.roll, gains.pitch, gains.yaw].iter().fold(0.0, |most, axis| axis.derivative_1_s.max(most))
     }
 
-    fn start(&self, from: Option<&Predecessor<'_, PidState>>, input: &ControlInput) -> PidState {
-        let measured = HoverMotion::of(&input.motion);
-        let continued = |from| self.continued(from, input.set_point.altitude_m, &measured);
+    fn start(&self, from: Option<&Predecessor<'_, PidState>>, inputs: &SetPointInputs<'_>) -> PidState {
+        let measured = HoverMotion::of(&inputs.motion());
+        let continued = |from| self.continued(from, inputs.set_point.altitude, &measured);
         PidState { integrals: from.map(continued).unwrap_or_default() }
     }
 
-    fn step(&self, state: &mut PidState, _last: &RotorWrench, input: &ControlInput) -> ControlOutput {
-        let wrench = self.wrench(&mut state.integrals, &input.set_point, &HoverMotion::of(&input.motion));
-        ControlOutput {
-            wrench,
-            integrals: state.integrals,
-            set_point: input.set_point,
-            ..ControlOutput::default()
-        }
+    fn step(&self, state: &mut PidState, _last: &RotorWrench, inputs: &SetPointInputs<'_>) -> ControlOutput {
+        let (set_point, measured) = (inputs.asked(), HoverMotion::of(&inputs.motion()));
+        let wrench = self.wrench(&mut state.integrals, &set_point, &measured);
+        ControlOutput { wrench, integrals: state.integrals, set_point, ..ControlOutput::default() }
     }
 }
 

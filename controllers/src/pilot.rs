@@ -104,14 +104,7 @@ impl Component for Pilot {
 
     fn step(&self, context: &StepContext<'_>, (): (), (): &mut ()) -> Result<Outputs, StepError> {
         let asked = self.at(u64::from(context.tick()), context.time_s());
-        let set_point = SetPoint {
-            altitude: asked.altitude_m,
-            roll: asked.roll_rad,
-            pitch: asked.pitch_rad,
-            yaw: asked.yaw_rad,
-            ..Default::default()
-        };
-        Ok(Outputs { set_point })
+        Ok(Outputs { set_point: SetPoint::from(&asked) })
     }
 }
 

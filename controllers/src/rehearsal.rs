@@ -5,11 +5,12 @@
 
 use crate::airframe::ControlledVehicle;
 use crate::bumpless::BumplessTransfer;
-use crate::control::{ControlInput, ControlOutput, MotionEstimate};
+use crate::control::{ControlOutput, MotionEstimate};
 use crate::controller_state::ControllerState;
 use crate::law::Law;
-use crate::set_points::SetPoint;
 use bus::context::NodeContext;
+use bus::messages::{AttitudeEstimate, Reference, SetPoint, StateEstimate};
+use bus::{InputMemory, InputMessages};
 use diagnostics::parameter::{ParameterError, refuse};
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -83,18 +84,29 @@ fn motions() -> [MotionEstimate; 3] {
     [motion(0.0, 0.0, 0.0), motion(2.0, 0.4, 1.0), motion(-20.0, 3.0, 10.0)]
 }
 
+/// Messages of a flight with `motion`: a set point, and a reference at rest at the origin. Other inputs that a law needs
+/// are zero.
+fn messages(motion: &MotionEstimate) -> InputMessages {
+    let set_point = SetPoint { altitude: 1.5, roll: 0.1, pitch: -0.1, yaw: 0.5, ..SetPoint::default() };
+    InputMessages::default()
+        .with(&set_point)
+        .with(&StateEstimate::from(motion))
+        .with(&AttitudeEstimate::from(motion))
+        .with(&Reference::default())
+}
+
 fn fly<L: Law>(
     law: &L,
     craft: &ControlledVehicle,
     motion: &MotionEstimate,
     run: &NodeContext<'_>,
 ) -> Result<(), ParameterError> {
-    let set_point = SetPoint { altitude_m: 1.5, roll_rad: 0.1, pitch_rad: -0.1, yaw_rad: 0.5 };
-    let input = ControlInput { motion: *motion, set_point, ..ControlInput::default() };
+    let mut memory = InputMemory::default();
+    let inputs: L::Inputs<'_> = messages(motion).read(&mut memory);
     let transfer = BumplessTransfer::to::<L>(&craft.vehicle, run.period_s());
     let mut state = ControllerState::default();
     for step in 0..STEPS {
-        let output = transfer.step(law, &mut state, &input, None);
+        let output = transfer.step(law, &mut state, &inputs, None);
         let speeds_rad_s = craft.allocation.allocate(&output.wrench).speeds_rad_s;
         let odd = output.not_finite().or_else(|| first_not_finite("a rotor speed", &speeds_rad_s));
         refuse(odd.is_some(), "gains", || {
@@ -133,9 +145,14 @@ fn first_not_finite(what: &str, numbers: &[f64]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pid::PidLaw;
+    use crate::allocation::RotorWrench;
+    use crate::law::{FileParameters, LawContext, Predecessor};
+    use crate::pid::{PidLaw, PidState};
     use crate::pid_gains::PidGains;
+    use bus::component::Info;
     use bus::context::Warning;
+    use bus::messages::{Battery, Gps};
+    use std::path::Path;
     use vehicles::Vehicle;
 
     fn hummingbird(change: impl Fn(&mut Vehicle)) -> ControlledVehicle {
@@ -185,5 +202,46 @@ mod tests {
         let airframe = hummingbird(|it| it.inertia_kg_m2 *= 1e10);
         let message = checked(&airframe, gains, 1_000_000).0.unwrap_err().to_string();
         assert!(message.contains("lead to a torque in N*m that is"), "{message}");
+    }
+
+    /// Inputs that no other law has.
+    #[derive(Debug, bus::InputPorts)]
+    struct BatteryInputs<'a> {
+        battery: &'a Battery,
+        gps: Option<&'a Gps>,
+    }
+
+    /// A law with ports of its own, which asks for 1 N for each volt.
+    struct BatteryLaw;
+
+    impl Law for BatteryLaw {
+        const INFO: Info = Info::new("battery", "a law with ports of its own");
+        type Parameters = FileParameters;
+        type Inputs<'a> = BatteryInputs<'a>;
+        type State = PidState;
+
+        fn vehicle(parameters: &FileParameters) -> &Path {
+            &parameters.vehicle
+        }
+
+        fn new(_: &FileParameters, _: &LawContext<'_>) -> Result<Self, ParameterError> {
+            Ok(Self)
+        }
+
+        fn start(&self, _: Option<&Predecessor<'_, PidState>>, _: &BatteryInputs<'_>) -> PidState {
+            PidState::default()
+        }
+
+        fn step(&self, _: &mut PidState, _: &RotorWrench, inputs: &BatteryInputs<'_>) -> ControlOutput {
+            assert!(inputs.gps.is_none(), "no rehearsal has a receiver");
+            let wrench = RotorWrench { thrust_N: inputs.battery.voltage, ..RotorWrench::default() };
+            ControlOutput { wrench, ..ControlOutput::default() }
+        }
+    }
+
+    #[test]
+    fn a_law_with_ports_of_its_own_is_rehearsed_on_zeros_where_it_needs_a_message() {
+        let run = NodeContext::new("node", &[]).timed(1_000_000, 1, 1000);
+        assert_eq!(check(&BatteryLaw, &hummingbird(|_| {}), &run), Ok(()));
     }
 }

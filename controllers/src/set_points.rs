@@ -6,6 +6,7 @@
 //! zero, so that one of 1 s lasts 2 s as a whole. Pulses of half a second bring the Hummingbird to
 //! 9.1° and −8.8° only, behind its motors' lag (gains 16 and 6); with the thesis's 25 and 6, to 14.2° and −17.9°.
 
+use bus::messages::SetPoint as SetPointMessage;
 use diagnostics::ParameterError;
 use diagnostics::parameter::require;
 use diagnostics::unit::{ANGLE, Dimension};
@@ -31,6 +32,20 @@ impl SetPoint {
     pub(crate) fn held(altitude_m: f64, attitude_WB: &UnitQuaternion<f64>) -> Self {
         let (roll_rad, pitch_rad, yaw_rad) = attitude_WB.euler_angles();
         Self { altitude_m, roll_rad, pitch_rad, yaw_rad }
+    }
+}
+
+impl From<&SetPointMessage> for SetPoint {
+    fn from(message: &SetPointMessage) -> Self {
+        let SetPointMessage { altitude, roll, pitch, yaw, .. } = *message;
+        Self { altitude_m: altitude, roll_rad: roll, pitch_rad: pitch, yaw_rad: yaw }
+    }
+}
+
+impl From<&SetPoint> for SetPointMessage {
+    fn from(set_point: &SetPoint) -> Self {
+        let SetPoint { altitude_m, roll_rad, pitch_rad, yaw_rad } = *set_point;
+        Self { altitude: altitude_m, roll: roll_rad, pitch: pitch_rad, yaw: yaw_rad, ..Self::default() }
     }
 }
 

@@ -10,12 +10,13 @@ use crate::airframe::HoverModel;
 use crate::allocation::RotorWrench;
 use crate::cascade::{CascadeLaw, CascadeState};
 use crate::cascade_gains::CascadeGains;
-use crate::control::{ControlInput, ControlOutput, HoverMotion};
+use crate::control::{ControlOutput, HoverMotion, MotionEstimate};
 use crate::gains_file::Table;
 use crate::law::{Law, LawContext, Predecessor};
 use crate::law_inputs::VelocityInputs;
 use crate::set_points::SetPoint;
 use bus::component::Info;
+use bus::messages::Reference;
 use diagnostics::parameter::{ParameterError, finite, refuse};
 use diagnostics::unit::{ACCELERATION, PER_SECOND, PURE_NUMBER, TIME, VELOCITY};
 use std::path::{Path, PathBuf};
@@ -224,14 +225,15 @@ pub struct VelocityLaw {
 }
 
 impl VelocityLaw {
-    fn asked(&self, input: &ControlInput, measured: &HoverMotion) -> VelocitySetPoint {
-        let reference = &input.reference;
-        self.constant.unwrap_or_else(|| VelocitySetPoint {
+    /// The constant set point, or that of `reference`: [`Parameters::check`] requires one of them.
+    fn asked(&self, reference: Option<&Reference>, measured: &HoverMotion) -> VelocitySetPoint {
+        let by_reference = |reference: &Reference| VelocitySetPoint {
             velocity_m_s: along_heading([reference.velocity.x, reference.velocity.y], measured.yaw_rad),
             altitude_m: reference.position.z,
             yaw_rad: reference.yaw,
             ..VelocitySetPoint::default()
-        })
+        };
+        self.constant.or_else(|| reference.map(by_reference)).unwrap_or_default()
     }
 }
 
@@ -305,24 +307,35 @@ impl Law for VelocityLaw {
         self.velocity.cascade.rate_gain_1_s()
     }
 
-    fn start(&self, from: Option<&Predecessor<'_, VelocityState>>, input: &ControlInput) -> VelocityState {
-        let measured = HoverMotion::of(&input.motion);
-        self.velocity.begun(from, &velocity_m_s(input, &measured), &measured)
+    fn start(
+        &self,
+        from: Option<&Predecessor<'_, VelocityState>>,
+        inputs: &VelocityInputs<'_>,
+    ) -> VelocityState {
+        let motion = inputs.motion();
+        let measured = HoverMotion::of(&motion);
+        self.velocity.begun(from, &velocity_m_s(&motion, &measured), &measured)
     }
 
-    fn step(&self, state: &mut VelocityState, last: &RotorWrench, input: &ControlInput) -> ControlOutput {
-        let measured = HoverMotion::of(&input.motion);
-        let mut asked = self.asked(input, &measured);
+    fn step(
+        &self,
+        state: &mut VelocityState,
+        last: &RotorWrench,
+        inputs: &VelocityInputs<'_>,
+    ) -> ControlOutput {
+        let motion = inputs.motion();
+        let measured = HoverMotion::of(&motion);
+        let mut asked = self.asked(inputs.reference, &measured);
         for (axis, asked_m_s) in asked.velocity_m_s.iter_mut().enumerate() {
             *asked_m_s = self.velocity.gathered_m_s(state.velocity_command[axis], *asked_m_s);
         }
-        self.velocity.demand(state, last, &asked, &velocity_m_s(input, &measured), &measured)
+        self.velocity.demand(state, last, &asked, &velocity_m_s(&motion, &measured), &measured)
     }
 }
 
 /// The estimated velocity along the heading's level axes.
-fn velocity_m_s(input: &ControlInput, measured: &HoverMotion) -> [f64; 2] {
-    let velocity_W_m_s = input.motion.velocity_W_m_s;
+fn velocity_m_s(motion: &MotionEstimate, measured: &HoverMotion) -> [f64; 2] {
+    let velocity_W_m_s = motion.velocity_W_m_s;
     along_heading([velocity_W_m_s.x, velocity_W_m_s.y], measured.yaw_rad)
 }
 

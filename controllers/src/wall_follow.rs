@@ -16,7 +16,7 @@
 
 use crate::allocation::RotorWrench;
 use crate::approach::Approach;
-use crate::control::{ControlInput, ControlOutput, HoverMotion};
+use crate::control::ControlOutput;
 use crate::law::{Law, LawContext, Predecessor};
 use crate::law_inputs::WallInputs;
 use crate::legs::{self, Beam, Leg};
@@ -246,32 +246,37 @@ impl Law for WallFollowLaw {
     fn start(
         &self,
         from: Option<&Predecessor<'_, WallFollowState>>,
-        input: &ControlInput,
+        inputs: &WallInputs<'_>,
     ) -> WallFollowState {
         // A backup in flight goes on from where it is, not from where the run began.
         let place_m = |shared: Shared| {
             let start_m = shared.start_m.filter(|_| from.is_none());
-            start_m.unwrap_or_else(|| shared.room.begun_m(&input.walls))
+            start_m.unwrap_or_else(|| shared.room.begun_m(inputs.walls))
         };
         WallFollowState {
-            velocity: self.velocity.begun(from, &input.walls.velocity, &HoverMotion::by_ranges(input)),
+            velocity: self.velocity.begun(from, &inputs.walls.velocity, &inputs.measured()),
             room_position: self.shared.map_or([0.0; 2], place_m),
             phase: self.start_state,
             ..WallFollowState::default()
         }
     }
 
-    fn step(&self, state: &mut WallFollowState, last: &RotorWrench, input: &ControlInput) -> ControlOutput {
-        let distances_m = self.wall_distances_m(state, &input.walls);
+    fn step(
+        &self,
+        state: &mut WallFollowState,
+        last: &RotorWrench,
+        inputs: &WallInputs<'_>,
+    ) -> ControlOutput {
+        let distances_m = self.wall_distances_m(state, inputs.walls);
         self.enter_phase(state, &distances_m);
         let leg = Leg::of(state.phase);
         let asked = match self.mode {
             Mode::Varying => self.varying(state, leg, &distances_m),
-            Mode::Constant => self.constant(state, leg, &distances_m, &input.walls),
+            Mode::Constant => self.constant(state, leg, &distances_m, inputs.walls),
         };
-        let measured = HoverMotion::by_ranges(input);
+        let measured = inputs.measured();
         let output =
-            self.velocity.demand(&mut state.velocity, last, &asked, &input.walls.velocity, &measured);
+            self.velocity.demand(&mut state.velocity, last, &asked, &inputs.walls.velocity, &measured);
         ControlOutput { phase: state.phase, laps: state.laps, ..output }
     }
 }

@@ -11,7 +11,7 @@
 //! Nothing holds the distance beside in either. `wall_follow` is ours. docs/walls.md flies both.
 
 use crate::allocation::RotorWrench;
-use crate::control::{ControlInput, ControlOutput, HoverMotion};
+use crate::control::ControlOutput;
 use crate::free_flight::FreeFlight;
 use crate::law::{Law, LawContext, Predecessor};
 use crate::law_inputs::WallInputs;
@@ -197,9 +197,9 @@ impl Law for WallFollowThesisLaw {
     fn start(
         &self,
         from: Option<&Predecessor<'_, WallFollowThesisState>>,
-        input: &ControlInput,
+        inputs: &WallInputs<'_>,
     ) -> WallFollowThesisState {
-        let velocity = self.velocity.begun(from, &input.walls.velocity, &HoverMotion::by_ranges(input));
+        let velocity = self.velocity.begun(from, &inputs.walls.velocity, &inputs.measured());
         WallFollowThesisState { velocity, phase: self.start_state, laps: 0 }
     }
 
@@ -207,22 +207,22 @@ impl Law for WallFollowThesisLaw {
         &self,
         state: &mut WallFollowThesisState,
         last: &RotorWrench,
-        input: &ControlInput,
+        inputs: &WallInputs<'_>,
     ) -> ControlOutput {
-        let to_go_m = |phase| input.walls.distance[Leg::of(phase).ahead.0] - self.distance_m;
+        let to_go_m = |phase| inputs.walls.distance[Leg::of(phase).ahead.0] - self.distance_m;
         if to_go_m(state.phase) <= 0.0 {
             (state.phase, state.laps) = legs::next(state.phase, state.laps);
         }
         let ahead = Leg::of(state.phase).ahead;
         let asked = self.asked(ahead);
         let mut acceleration_m_s2 =
-            self.velocity.accelerations_m_s2(&mut state.velocity, &asked, &input.walls.velocity);
+            self.velocity.accelerations_m_s2(&mut state.velocity, &asked, &inputs.walls.velocity);
         if let Ahead::Tilt(tilt_rad) = self.ahead {
             let gravity_m_s2 = self.velocity.cascade.vehicle.gravity_m_s2;
             acceleration_m_s2[ahead.axis()] = ahead.sign()
                 * self.gains.free_flight.acceleration_m_s2(to_go_m(state.phase), tilt_rad, gravity_m_s2);
         }
-        let measured = HoverMotion::by_ranges(input);
+        let measured = inputs.measured();
         let output =
             self.velocity.accelerate(&mut state.velocity, last, &asked, &acceleration_m_s2, &measured);
         ControlOutput { phase: state.phase, laps: state.laps, ..output }

@@ -13,7 +13,7 @@
 
 use crate::allocation::RotorWrench;
 use crate::approach::Approach;
-use crate::control::{ControlInput, ControlOutput, HoverMotion};
+use crate::control::ControlOutput;
 use crate::law::{Law, LawContext, Predecessor};
 use crate::law_inputs::WallInputs;
 use crate::velocity::{LoopsGains, VelocityLoop, VelocitySetPoint, VelocityState};
@@ -167,23 +167,23 @@ impl Law for WallStopLaw {
         self.velocity.cascade.rate_gain_1_s()
     }
 
-    fn start(&self, from: Option<&Predecessor<'_, WallStopState>>, input: &ControlInput) -> WallStopState {
-        let measured = HoverMotion::by_ranges(input);
-        let velocity = self.velocity.begun(from, &input.walls.velocity, &measured);
+    fn start(&self, from: Option<&Predecessor<'_, WallStopState>>, inputs: &WallInputs<'_>) -> WallStopState {
+        let measured = inputs.measured();
+        let velocity = self.velocity.begun(from, &inputs.walls.velocity, &measured);
         WallStopState { velocity, ..WallStopState::default() }
     }
 
-    fn step(&self, state: &mut WallStopState, last: &RotorWrench, input: &ControlInput) -> ControlOutput {
-        let to_go_m = input.walls.distance[0] - self.distance_m;
-        let speed_m_s = input.walls.velocity[0];
+    fn step(&self, state: &mut WallStopState, last: &RotorWrench, inputs: &WallInputs<'_>) -> ControlOutput {
+        let to_go_m = inputs.walls.distance[0] - self.distance_m;
+        let speed_m_s = inputs.walls.velocity[0];
         state.phase = self.phase(state.phase, to_go_m, speed_m_s);
         self.integrate(state, to_go_m);
-        let aside_m = state.aside + input.walls.velocity[1] * self.velocity.cascade.period_s;
+        let aside_m = state.aside + inputs.walls.velocity[1] * self.velocity.cascade.period_s;
         state.aside = aside_m.clamp(-self.gains.aside_max_m, self.gains.aside_max_m);
         let asked = self.asked(state, to_go_m);
-        let measured = HoverMotion::by_ranges(input);
+        let measured = inputs.measured();
         let output =
-            self.velocity.demand(&mut state.velocity, last, &asked, &input.walls.velocity, &measured);
+            self.velocity.demand(&mut state.velocity, last, &asked, &inputs.walls.velocity, &measured);
         ControlOutput { phase: state.phase, ..output }
     }
 }

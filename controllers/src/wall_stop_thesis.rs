@@ -10,7 +10,7 @@
 //! `wall_stop` is ours, along a velocity curve. docs/walls.md flies both.
 
 use crate::allocation::RotorWrench;
-use crate::control::{ControlInput, ControlOutput, HoverMotion};
+use crate::control::ControlOutput;
 use crate::free_flight::FreeFlight;
 use crate::law::{Law, LawContext, Predecessor};
 use crate::law_inputs::WallInputs;
@@ -150,9 +150,9 @@ impl Law for WallStopThesisLaw {
     fn start(
         &self,
         from: Option<&Predecessor<'_, WallStopThesisState>>,
-        input: &ControlInput,
+        inputs: &WallInputs<'_>,
     ) -> WallStopThesisState {
-        let velocity = self.velocity.begun(from, &input.walls.velocity, &HoverMotion::by_ranges(input));
+        let velocity = self.velocity.begun(from, &inputs.walls.velocity, &inputs.measured());
         WallStopThesisState { velocity, phase: FREE_FLIGHT, ..WallStopThesisState::default() }
     }
 
@@ -160,18 +160,18 @@ impl Law for WallStopThesisLaw {
         &self,
         state: &mut WallStopThesisState,
         last: &RotorWrench,
-        input: &ControlInput,
+        inputs: &WallInputs<'_>,
     ) -> ControlOutput {
-        let to_go_m = input.walls.distance[0] - self.distance_m;
+        let to_go_m = inputs.walls.distance[0] - self.distance_m;
         if to_go_m <= 0.0 {
             state.phase = STOPPING;
         }
         let (altitude_m, yaw_rad) = (self.altitude_m, self.heading_rad);
         let at_rest = VelocitySetPoint { altitude_m, yaw_rad, ..VelocitySetPoint::default() };
         let braking_m_s2 =
-            self.velocity.accelerations_m_s2(&mut state.velocity, &at_rest, &input.walls.velocity);
+            self.velocity.accelerations_m_s2(&mut state.velocity, &at_rest, &inputs.walls.velocity);
         let acceleration_m_s2 = [self.ahead_m_s2(state.phase, to_go_m, braking_m_s2[0]), braking_m_s2[1]];
-        let measured = HoverMotion::by_ranges(input);
+        let measured = inputs.measured();
         let output =
             self.velocity.accelerate(&mut state.velocity, last, &at_rest, &acceleration_m_s2, &measured);
         ControlOutput { phase: state.phase, ..output }

@@ -2,7 +2,7 @@
 
 use crate::airframe::HoverModel;
 use crate::allocation::RotorWrench;
-use crate::control::{ControlInput, ControlOutput, HoverMotion};
+use crate::control::{ControlOutput, HoverMotion};
 use crate::law::{Law, LawContext, Predecessor};
 use crate::law_inputs::SetPointInputs;
 use bus::component::Info;
@@ -56,12 +56,12 @@ impl Law for LevelLaw {
         2.0 * self.bandwidth_rad_s
     }
 
-    fn start(&self, _: Option<&Predecessor<'_, LevelState>>, _: &ControlInput) -> LevelState {
+    fn start(&self, _: Option<&Predecessor<'_, LevelState>>, _: &SetPointInputs<'_>) -> LevelState {
         LevelState::default()
     }
 
-    fn step(&self, _: &mut LevelState, _: &RotorWrench, input: &ControlInput) -> ControlOutput {
-        let (asked, found) = (&input.set_point, HoverMotion::of(&input.motion));
+    fn step(&self, _: &mut LevelState, _: &RotorWrench, inputs: &SetPointInputs<'_>) -> ControlOutput {
+        let (asked, found) = (inputs.asked(), HoverMotion::of(&inputs.motion()));
         let [stiffness, damping] = [self.bandwidth_rad_s * self.bandwidth_rad_s, 2.0 * self.bandwidth_rad_s];
         let climb_m_s2 = stiffness * (asked.altitude_m - found.altitude_m) - damping * found.climb_rate_m_s;
         let tilt_rad = Vector3::new(found.roll_rad, found.pitch_rad, found.yaw_rad);
@@ -71,6 +71,6 @@ impl Law for LevelLaw {
             thrust_N: self.model.mass_kg * (self.model.gravity_m_s2 + climb_m_s2),
             torque_B_N_m: self.model.inertia_B_kg_m2.component_mul(&turn_B_rad_s2),
         };
-        ControlOutput { wrench, set_point: *asked, ..ControlOutput::default() }
+        ControlOutput { wrench, set_point: asked, ..ControlOutput::default() }
     }
 }

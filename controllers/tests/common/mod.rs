@@ -3,15 +3,15 @@
 #![allow(dead_code, reason = "each test file uses a part")]
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
-use bus::messages::Reference;
+use bus::messages::{AttitudeEstimate, Reference, SetPoint, StateEstimate};
 use bus::random::{Stream, stream};
+use bus::{InputMemory, InputMessages};
 use controllers::airframe::ControlledVehicle;
 use controllers::allocation::RotorWrench;
 use controllers::bumpless::BumplessTransfer;
-use controllers::control::{ControlInput, MotionEstimate};
+use controllers::control::MotionEstimate;
 use controllers::controller_state::ControllerState;
 use controllers::law::Law;
-use controllers::set_points::SetPoint;
 use controllers::trajectory::{Start, Trajectory};
 use diagnostics::ParameterError;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -137,7 +137,7 @@ impl Loop {
         let plant = NewtonEuler::new(craft.vehicle.clone(), 1);
         let state = plant.start(RigidBody::level_at(Vector3::z()), plant.vehicle().hover_command());
         let noise = craft.seed.map(Noise::new);
-        let set_point = SetPoint { altitude_m: 1.0, ..SetPoint::default() };
+        let set_point = SetPoint { altitude: 1.0, ..SetPoint::default() };
         let (believed, law_state, demand) = (believed(), ControllerState::default(), RotorWrench::default());
         Self { craft, plant, believed, noise, state, law_state, tick: 0, set_point, demand, saturated: false }
     }
@@ -150,10 +150,15 @@ impl Loop {
             Some(noise) => noise.estimate(self.tick, &self.state.body),
             None => exact(&self.state.body),
         };
-        let (reference, walls) = (Reference::from(&point), Default::default());
-        let input = ControlInput { motion, set_point: self.set_point, reference, walls };
+        let messages = InputMessages::default()
+            .with(&self.set_point)
+            .with(&StateEstimate::from(&motion))
+            .with(&AttitudeEstimate::from(&motion))
+            .with(&Reference::from(&point));
+        let mut memory = InputMemory::default();
+        let inputs: L::Inputs<'_> = messages.read(&mut memory);
         let transfer = BumplessTransfer::to::<L>(&self.believed.vehicle, PERIOD_S);
-        self.demand = transfer.step(law, &mut self.law_state, &input, None).wrench;
+        self.demand = transfer.step(law, &mut self.law_state, &inputs, None).wrench;
         let allocated = self.believed.allocation.allocate(&self.demand);
         self.saturated = allocated.is_saturated();
         let counts = allocated.speeds_rad_s.map(|speed| self.believed.vehicle.command.command(speed));

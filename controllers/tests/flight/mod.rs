@@ -6,10 +6,11 @@
 #![allow(dead_code, reason = "each test uses a part of it")]
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
-use bus::messages::{AttitudeEstimate, Reference, WallEstimate};
+use bus::messages::{AttitudeEstimate, Reference, SetPoint as SetPointMessage, StateEstimate, WallEstimate};
+use bus::{InputMemory, InputMessages};
 use controllers::airframe::ControlledVehicle;
 use controllers::bumpless::BumplessTransfer;
-use controllers::control::{ControlInput, ControlOutput, MotionEstimate};
+use controllers::control::{ControlOutput, MotionEstimate};
 use controllers::controller_state::ControllerState;
 use controllers::law::Law;
 use controllers::set_points::SetPoint;
@@ -195,9 +196,16 @@ impl Loop {
             ),
             angular_velocity_B_rad_s: <[f64; 3]>::from(attitude.angular_velocity).into(),
         };
-        let input = ControlInput { motion, set_point: self.set_point, reference: self.reference, walls };
+        let messages = InputMessages::default()
+            .with(&SetPointMessage::from(&self.set_point))
+            .with(&StateEstimate::from(&motion))
+            .with(&AttitudeEstimate::from(&motion))
+            .with(&self.reference)
+            .with(&walls);
+        let mut memory = InputMemory::default();
+        let inputs: L::Inputs<'_> = messages.read(&mut memory);
         let transfer = BumplessTransfer::to::<L>(&self.believed.vehicle, PERIOD_S);
-        let output = transfer.step(law, &mut self.law_state, &input, None);
+        let output = transfer.step(law, &mut self.law_state, &inputs, None);
         let speeds_rad_s = self.believed.allocation.allocate(&output.wrench).speeds_rad_s;
         let counts = speeds_rad_s.map(|speed| self.believed.vehicle.command.command(speed));
         self.plant.step(&mut self.state, &counts, PERIOD_S);
