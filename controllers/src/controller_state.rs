@@ -1,7 +1,8 @@
 //! The state of a controller: laid out alike for all laws, so that any of them can take over from any other.
 //!
-//! It holds the quantities that mean the same to all laws, and room for the law's own state, which only a law
-//! with the same type of state reads.
+//! A process is swapped for one of another law, also in Python or C++, only if the states of both have one layout.
+//! The state therefore holds the quantities that mean the same to all laws, and room for the law's own state. That is a
+//! typed message, [`Law::State`]. Only a law with the same type of state reads it.
 
 use crate::allocation::RotorWrench;
 use crate::control::Integrals;
