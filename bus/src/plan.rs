@@ -37,6 +37,11 @@ pub enum Pace {
     Factor(f64),
 }
 
+impl Pace {
+    /// One simulated second per second.
+    pub const REAL_TIME: Self = Self::Factor(1.0);
+}
+
 /// Way in which a process waits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

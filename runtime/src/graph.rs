@@ -117,6 +117,29 @@ impl Graph {
         Self::noting(manifest, files, &mut notes).map_err(|fault| notes.explain(fault))
     }
 
+    /// Adds a shadow of `process`, which computes from the first tick to the last. `with_text` is TOML with the keys in which it
+    /// differs, as `with` of `[[shadow]]`. `manifest` is that of this graph, and stays as it is.
+    ///
+    /// # Errors
+    /// As [`backup_of`], or if the process has a backup already.
+    pub fn add_shadow(
+        &mut self,
+        manifest: &Manifest,
+        process: &str,
+        with_text: &str,
+    ) -> Result<(), Diagnostic> {
+        let shadow = backup_of(manifest, &self.plan, &self.files, process, with_text)?;
+        if self.backups.iter().any(|other| other.node == shadow.node) {
+            let message = format!("`{process}` has a swap, a standby or a shadow in this manifest already");
+            let help = "a process has one backup at a time: leave one of them out";
+            return Err(Diagnostic::in_file(manifest.path.display().to_string(), message).help(help));
+        }
+        let place = (shadow.join_tick, shadow.node);
+        let index = self.backups.partition_point(|other| (other.join_tick, other.node) < place);
+        self.backups.insert(index, shadow);
+        Ok(())
+    }
+
     /// Refuses measures that see no sample since the run ends first: those in the own text of `manifest`, this graph's, from byte
     /// `start` on. [`Graph::build`] warns of them only, if `--set` states the duration.
     ///

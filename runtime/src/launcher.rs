@@ -14,7 +14,8 @@ use crate::host_limits::require_host;
 use crate::host_world::{HostWorld, store_files};
 use crate::in_process::{self, FIGURES};
 use crate::instances::Instances;
-use crate::manifest::Manifest;
+use crate::manifest::{Composition, Manifest};
+use crate::options::Options;
 pub use crate::outcome::Outcome;
 use crate::outputs::Outputs;
 use crate::program::Program;
@@ -25,7 +26,7 @@ pub use crate::supervisor::replacement::{Purpose, Report};
 use crate::world::Spent;
 use anyhow::Context;
 use bus::lockstep::SupervisorView;
-use bus::plan::Plan;
+use bus::plan::{Pace, Plan};
 use bus::watch::WatchFiles;
 use diagnostics::Error;
 use inputs::InputFiles;
@@ -98,6 +99,7 @@ pub struct Launcher<'a> {
     requests: Receiver<Asked>,
     files: InputFiles,
     from: Option<Checkpoint>,
+    options: Options,
 }
 
 impl<'a> Launcher<'a> {
@@ -114,6 +116,7 @@ impl<'a> Launcher<'a> {
             requests,
             files: InputFiles::default(),
             from: None,
+            options: Options::default(),
         }
     }
 
@@ -128,6 +131,148 @@ impl<'a> Launcher<'a> {
     #[must_use]
     pub fn going_on_from(mut self, checkpoint: Checkpoint) -> Self {
         self.from = Some(checkpoint);
+        self
+    }
+
+    /// [`Launcher::fly`] keeps `pace`, in place of `run.pace` of the manifest. A factor is in simulated seconds per second of host
+    /// time. The pace changes no byte of the recording.
+    ///
+    /// A factor outside 0.0001 to 10000 is an error of [`Launcher::fly`], with [`Error::is_input`].
+    ///
+    /// ```
+    /// # use bus::Registration;
+    /// # use runtime::{host::Host, launcher::Launcher, manifest::Manifest, registry::Registry};
+    /// # const COMPONENTS: Registry = Registry::new(&[Registration::of::<controllers::pilot::Pilot>()]);
+    /// # let folder = tempfile::tempdir()?;
+    /// # let text = "[run]\nduration_s = 0.05\n[process.pilot]\nkind = \"pilot\"\nparameters.initial_altitude_m = 1.0\n";
+    /// # let manifest = Manifest::parse(text.to_owned(), &folder.path().join("a.toml"), &[], COMPONENTS)?;
+    /// # let path = folder.path().join("a.mcap");
+    /// use bus::plan::Pace;
+    /// let launcher = Launcher::new(Host::InProcess).paced(Pace::REAL_TIME);
+    /// let (outcome, _) = launcher.fly(&manifest, &path)?;
+    /// assert!(outcome.host_s > 0.04, "50 ms of simulated time took {} s", outcome.host_s);
+    ///
+    /// let refused = Launcher::new(Host::InProcess).paced(Pace::Factor(0.0)).fly(&manifest, &path).unwrap_err();
+    /// assert!(refused.is_input() && refused.to_string().contains("`0` is not a pace"), "{refused}");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn paced(mut self, pace: Pace) -> Self {
+        self.options.pace = Some(pace);
+        self
+    }
+
+    /// [`Launcher::fly`] lets a fast node be `ticks` ahead of the slowest, in place of `run.window_ticks` of the manifest. Without
+    /// both, the window has 64 ticks, and 512 in a run with groups. It changes no byte of the recording.
+    /// [`Host::InProcess`] needs none.
+    ///
+    /// A window outside 1 to [`WINDOW_TICKS_MAX`](crate::graph::WINDOW_TICKS_MAX) ticks is an error of [`Launcher::fly`], with
+    /// [`Error::is_input`].
+    ///
+    /// ```
+    /// # use bus::Registration;
+    /// # use runtime::{host::Host, launcher::Launcher, manifest::Manifest, registry::Registry};
+    /// # const COMPONENTS: Registry = Registry::new(&[Registration::of::<controllers::pilot::Pilot>()]);
+    /// # let folder = tempfile::tempdir()?;
+    /// # let text = "[run]\nduration_s = 0.05\n[process.pilot]\nkind = \"pilot\"\nparameters.initial_altitude_m = 1.0\n";
+    /// # let manifest = Manifest::parse(text.to_owned(), &folder.path().join("a.toml"), &[], COMPONENTS)?;
+    /// # let path = folder.path().join("a.mcap");
+    /// let (graph, ..) = Launcher::new(Host::Threads).with_window(16).fly_planned(&manifest, &path)?;
+    /// assert_eq!(graph.plan.window_ticks, 16);
+    ///
+    /// let refused = Launcher::new(Host::Threads).with_window(0).fly(&manifest, &path).unwrap_err();
+    /// assert!(refused.to_string().contains("`window_ticks` is 0"), "{refused}");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn with_window(mut self, ticks: u32) -> Self {
+        self.options.window_ticks = Some(ticks);
+        self
+    }
+
+    /// [`Launcher::fly`] groups the nodes by `composition`, in place of `run.compose` and the `[group]` tables of the manifest. It
+    /// changes no byte of the recording. [`Host::InProcess`] has all nodes in one thread, whatever their groups.
+    ///
+    /// A group that names an unknown node, or one that needs a process of its own, is an error of [`Launcher::fly`], with
+    /// [`Error::is_input`].
+    ///
+    /// ```
+    /// # use bus::Registration;
+    /// # use runtime::{host::Host, launcher::Launcher, manifest::Manifest, registry::Registry};
+    /// # const COMPONENTS: Registry = Registry::new(&[Registration::of::<controllers::pilot::Pilot>()]);
+    /// # let folder = tempfile::tempdir()?;
+    /// # let pilot = |name: &str| format!("[process.{name}]\nkind = \"pilot\"\nparameters.initial_altitude_m = 1.0\n");
+    /// # let text = format!("[run]\nduration_s = 0.05\n{}{}", pilot("a"), pilot("b"));
+    /// # let manifest = Manifest::parse(text, &folder.path().join("a.toml"), &[], COMPONENTS)?;
+    /// # let path = folder.path().join("a.mcap");
+    /// use runtime::manifest::Composition;
+    /// let launcher = Launcher::new(Host::Threads).composed(Composition::All);
+    /// let (graph, ..) = launcher.fly_planned(&manifest, &path)?;
+    /// assert_eq!(graph.plan.groups[0].members.len(), 2);
+    ///
+    /// let unknown = Composition::Groups(vec![vec!["a".to_owned(), "c".to_owned()]]);
+    /// let refused = Launcher::new(Host::Threads).composed(unknown).fly(&manifest, &path).unwrap_err();
+    /// assert!(refused.is_input() && refused.to_string().contains("names `c`"), "{refused}");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn composed(mut self, composition: Composition) -> Self {
+        self.options.composition = Some(composition);
+        self
+    }
+
+    /// [`Launcher::fly`] notes the host times of every tick, as `run.profile = true` does; [`Outcome::flight`] has them. It changes
+    /// no byte of the recording.
+    ///
+    /// [`Launcher::fly`] refuses a profile with [`Host::InProcess`].
+    ///
+    /// ```
+    /// # use bus::Registration;
+    /// # use runtime::{host::Host, launcher::Launcher, manifest::Manifest, registry::Registry};
+    /// # const COMPONENTS: Registry = Registry::new(&[Registration::of::<controllers::pilot::Pilot>()]);
+    /// # let folder = tempfile::tempdir()?;
+    /// # let text = "[run]\nduration_s = 0.05\n[process.pilot]\nkind = \"pilot\"\nparameters.initial_altitude_m = 1.0\n";
+    /// # let manifest = Manifest::parse(text.to_owned(), &folder.path().join("a.toml"), &[], COMPONENTS)?;
+    /// # let path = folder.path().join("a.mcap");
+    /// let (outcome, _) = Launcher::new(Host::Threads).profiled().fly(&manifest, &path)?;
+    /// assert!(outcome.flight.is_some());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn profiled(mut self) -> Self {
+        self.options.is_profiled = true;
+        self
+    }
+
+    /// [`Launcher::fly`] flies a shadow of `process` beside it, from the first tick to the last; it never takes over. `with` has the
+    /// keys of a process in which it differs, as `with` of `[[shadow]]`. The shadow sends on `/shadow/<topic>`, which is recorded.
+    /// The text of the manifest in the recording does not name it. Shadows of several processes may be asked for.
+    ///
+    /// These are errors of [`Launcher::fly`], with [`Error::is_input`]: an unknown process, keys that do not fit it, and a process
+    /// with a swap, a standby or a shadow. [`Launcher::fly`] refuses shadows with [`Host::InProcess`], too.
+    ///
+    /// ```
+    /// # use bus::Registration;
+    /// # use runtime::{host::Host, launcher::Launcher, manifest::Manifest, registry::Registry};
+    /// # const COMPONENTS: Registry = Registry::new(&[
+    /// #     Registration::of::<controllers::pilot::Pilot>(),
+    /// #     Registration::of::<recorder::node::Recorder>(),
+    /// # ]);
+    /// # let folder = tempfile::tempdir()?;
+    /// # let text = "[run]\nduration_s = 0.05\n[process.pilot]\nkind = \"pilot\"\nparameters.initial_altitude_m = 1.0\n\
+    /// #             [process.recorder]\nkind = \"recorder\"\n";
+    /// # let manifest = Manifest::parse(text.to_owned(), &folder.path().join("a.toml"), &[], COMPONENTS)?;
+    /// # let path = folder.path().join("a.mcap");
+    /// let higher = toml::toml! { parameters.initial_altitude_m = 2.0 };
+    /// let launcher = Launcher::new(Host::Threads).shadowing("pilot", higher);
+    /// let (_, recording) = launcher.fly(&manifest, &path)?;
+    /// let shadow = recording.unwrap().series(&[("/shadow/pilot/set_point", "altitude")])?;
+    /// assert!(shadow[0].value.iter().all(|&altitude| altitude == 2.0));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn shadowing(mut self, process: &str, with: toml::Table) -> Self {
+        self.options.shadows.push((process.to_owned(), with));
         self
     }
 
@@ -164,7 +309,7 @@ impl<'a> Launcher<'a> {
     /// started has ended.
     ///
     /// # Errors
-    /// A problem in the manifest, or as [`Launcher::launch`].
+    /// A problem in the manifest or in an option of this launcher, or as [`Launcher::launch`].
     pub fn fly(self, manifest: &Manifest, recording: &Path) -> Result<(Outcome, Option<Recording>), Error> {
         self.fly_planned(manifest, recording).map(|(_, outcome, recording)| (outcome, recording))
     }
@@ -178,7 +323,10 @@ impl<'a> Launcher<'a> {
         manifest: &Manifest,
         recording: &Path,
     ) -> Result<(Graph, Outcome, Option<Recording>), Error> {
+        let stated = self.options.stated_in(manifest)?;
+        let manifest = &*stated;
         let mut graph = Graph::build_from(manifest, self.files.clone())?;
+        self.options.add_shadows(manifest, &mut graph)?;
         if let Some(from) = self.from.take() {
             from.resume(manifest, &mut graph, true)?;
         }
@@ -188,7 +336,8 @@ impl<'a> Launcher<'a> {
     }
 
     /// Flies `graph`, the checked `manifest`, and claims `outputs` for it; returns when everything that was started has
-    /// ended.
+    /// ended. `graph` has the pace, the window, the groups, the profile and the shadows: those of this launcher are for
+    /// [`Launcher::fly`].
     ///
     /// # Errors
     /// If another run writes to one of its files, or a process fails, stalls, or cannot be started; the error holds

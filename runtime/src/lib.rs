@@ -5,7 +5,7 @@
 //! |---|---|
 //! | the manifest, with the place of every value | [`manifest`] |
 //! | the checked plan of a run | [`graph`], `placement`, [`registry`], `program`, `describe`, `describe_programs` |
-//! | a flight of processes or threads | [`launcher`], [`event`], `outcome`, [`flight`] |
+//! | a flight of processes or threads | [`launcher`], `options`, [`event`], `outcome`, [`flight`] |
 //! | its supervisor, which decides | `supervisor`, `processes`, `sidecars`, `watch_clock` |
 //! | what the supervisor sees and touches | `world`, `view`, `host_world`, [`host`], `spawn`, `executed`, `role`, `instances` |
 //! | the same supervisor in simulated worlds | `simulation` |
@@ -37,6 +37,7 @@ mod instances;
 pub mod launcher;
 mod location;
 pub mod manifest;
+mod options;
 mod outcome;
 pub mod output_file;
 pub mod outputs;

@@ -65,7 +65,7 @@ use toml::de::{DeTable, DeValue};
 /// assert!(problem.to_string().contains("--set"), "{problem}");
 /// # Ok::<(), diagnostics::Diagnostic>(())
 /// ```
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Manifest {
     /// The file.
     pub path: PathBuf,
@@ -159,6 +159,12 @@ impl Manifest {
         Self::of(self.path.clone(), sources)
     }
 
+    /// Notes `value` of `key`, an option of a launcher; returns its place, for errors. The content does not change.
+    pub(crate) fn note_option(&mut self, key: &str, value: impl Display) -> Range<usize> {
+        self.sources.add(Origin::Option, format!("{key}={value}"));
+        self.sources.last_span()
+    }
+
     /// The number at `key`, a key of this manifest or of a file that a process names, as `--set` takes it; `None` if there is
     /// no number.
     ///
@@ -177,7 +183,8 @@ impl Manifest {
     /// that change no byte of a recording.
     pub fn simulated_texts(&self) -> impl Iterator<Item = &str> {
         let is_of_host = |source: &Source| {
-            matches!(source.origin, Origin::Override) && !Self::is_of_simulation(&source.text)
+            let is_set = matches!(source.origin, Origin::Override);
+            matches!(source.origin, Origin::Option) || (is_set && !Self::is_of_simulation(&source.text))
         };
         let simulated = self.sources.all.iter().filter(move |source| !is_of_host(source));
         simulated.map(|source| source.text.as_str())

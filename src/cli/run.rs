@@ -19,7 +19,7 @@ use report::profile::Profile;
 use report::summary::Summary;
 use runtime::checkpoint::{Checkpoint, Written};
 use runtime::event::StopToken;
-use runtime::graph::{self, Graph, backup_of};
+use runtime::graph::{self, Graph};
 use runtime::host::Host;
 use runtime::launcher::Launcher;
 use runtime::manifest::{Composition, Manifest, NO_RECORDING, PaceSetting};
@@ -138,11 +138,7 @@ pub fn run(
     print_warnings(&graph.warnings);
     graph.plan.profile |= files.is_some();
     if let Some((process, with)) = extra_shadow {
-        let shadow = backup_of(&manifest, &graph.plan, &graph.files, process, with)?;
-        if graph.backups.iter().any(|other| other.node == shadow.node) {
-            bail!("`{process}` has a backup, a standby or a shadow in this manifest already; one at a time");
-        }
-        graph.backups.push(shadow);
+        graph.add_shadow(&manifest, process, with)?;
     }
     let going_on = from.as_ref().map(Checkpoint::tick);
     if let (Some(from), Some(path)) = (from, &arguments.from) {

@@ -12,7 +12,7 @@ use std::fmt;
 use toml::Spanned;
 
 /// Content of a manifest.
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Content {
     /// Settings of the whole run.
@@ -81,7 +81,7 @@ impl Conditions {
 }
 
 /// Settings of the whole run.
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Run {
     /// Ticks per simulated second.
@@ -530,7 +530,7 @@ fn default_judged() -> bool {
 }
 
 /// A process that takes over from another in flight.
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SwapSetting {
     /// The process it succeeds.
@@ -555,7 +555,7 @@ fn default_shadow_ticks() -> u32 {
 }
 
 /// A tick at which the run writes a checkpoint.
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CheckpointSetting {
     /// The first tick that a run computes which goes on from it.
@@ -563,7 +563,7 @@ pub struct CheckpointSetting {
 }
 
 /// A process that computes beside another from the first tick to the last, and never takes over.
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ShadowSetting {
     /// The process it shadows.

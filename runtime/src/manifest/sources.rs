@@ -15,6 +15,8 @@ pub enum Origin {
     File(PathBuf),
     /// A `--set`.
     Override,
+    /// An option of a launcher, written as a `--set` of its key.
+    Option,
     /// The value of another argument.
     Argument(&'static str),
     /// The name of a process of a live run, as a command gives it.
@@ -34,7 +36,7 @@ impl Source {
     fn path(&self) -> Option<&Path> {
         match &self.origin {
             Origin::File(path) => Some(path),
-            Origin::Override | Origin::Argument(_) | Origin::Process => None,
+            Origin::Override | Origin::Option | Origin::Argument(_) | Origin::Process => None,
         }
     }
 }
@@ -152,6 +154,12 @@ impl Sources {
             Origin::Argument(_) | Origin::Process => {
                 return Diagnostic::in_file(self.file().display().to_string(), error).help(help);
             }
+            Origin::Option => {
+                let error: ParameterError = error.into();
+                let message = format!("{}: {error}", option(&source.text));
+                let error = ParameterError::conflict(error.key(), message);
+                return Diagnostic::in_file(self.file().display().to_string(), error).help(help);
+            }
             Origin::Override => {
                 let error: ParameterError = error.into();
                 if let Some(place) = self.set_place(&source.text) {
@@ -179,6 +187,7 @@ impl Sources {
     pub fn argument(&self, span: &Range<usize>) -> Option<String> {
         match &self.at(span.start).origin {
             Origin::Override => Some(self.value(span)),
+            Origin::Option => Some(option(&self.at(span.start).text)),
             Origin::Argument(name) => Some((*name).to_owned()),
             Origin::File(_) | Origin::Process => None,
         }
@@ -277,6 +286,11 @@ impl Sources {
     }
 }
 
+/// The option of a launcher that states `text`, as the user knows it.
+fn option(text: &str) -> String {
+    format!("{text} of the launcher")
+}
+
 #[cfg(test)]
 mod tests {
     use super::{Origin, Sources};
@@ -317,5 +331,10 @@ mod tests {
         assert_eq!(message(set), "a.toml: --set x=4: no");
         assert_eq!(sources.argument(&(set..set)).as_deref(), Some("--set x=4"));
         assert_eq!(sources.argument(&(base..base)), None, "a file states it");
+        sources.add(Origin::Option, "x=5".into());
+        let option = sources.last_span();
+        assert_eq!(sources.problem(&option, "no", "").to_string(), "a.toml: x=5 of the launcher: no");
+        assert_eq!(sources.argument(&option).as_deref(), Some("x=5 of the launcher"));
+        assert!(!sources.is_override(option.start), "no checkpoint keeps it");
     }
 }
