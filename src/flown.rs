@@ -17,14 +17,14 @@ pub struct Flown {
     pub summary: Summary,
     /// The recording; `None` if the manifest has no recorder.
     pub recording: Option<Recording>,
-    /// Host time of the run, part by part; `None` if the manifest does not say `run.profile = true`.
+    /// Host time of the run, part by part; `None` without `run.profile = true` in the manifest and without [`Launcher::profiled`].
     pub profile: Option<Profile>,
 }
 
 /// Flies `manifest`, records it to `recording` if it has a recorder, and judges its conditions as `hummingbus run` does.
 ///
 /// # Errors
-/// A problem in the manifest, or as [`Launcher::launch`]. A condition that does not hold is a verdict and no error.
+/// A problem in the manifest or in an option of the launcher, or as [`Launcher::launch`]. A condition that does not hold is a verdict and no error.
 ///
 /// ```
 /// use hummingbus::{Host, Launcher};

@@ -17,6 +17,10 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! Options of the command line that change the flight and not the manifest are methods of the launcher: [`Launcher::paced`],
+//! [`Launcher::with_window`], [`Launcher::composed`], [`Launcher::profiled`] and [`Launcher::shadowing`]. Other keys are
+//! set by [`Manifest::set`]. `docs/library.md` has a table of both.
+//!
 //! To look between two ticks, or to stop in a debugger, step the same components by [`simulate`]: the samples are the
 //! same, bit for bit:
 //!
@@ -88,6 +92,7 @@ pub mod operator;
 mod properties;
 
 pub use bus::Simulation;
+pub use bus::plan::Pace;
 pub use check::{check, check_text, check_with_programs, drives, meshes};
 pub use components::COMPONENTS;
 pub use diagnostics::{Diagnostic, Error, Result};
@@ -99,7 +104,7 @@ pub use runtime::event::{Progress, RunEvent, StopToken};
 pub use runtime::graph::Graph;
 pub use runtime::host::Host;
 pub use runtime::launcher::{Launcher, Outcome};
-pub use runtime::manifest::{Manifest, ManifestBuilder};
+pub use runtime::manifest::{Composition, Manifest, ManifestBuilder};
 pub use runtime::simulate;
 pub use {
     bus, controllers, flights, identify, inputs, plant, recorder, report, runtime, scenes, sensors, vehicles,
@@ -124,3 +129,8 @@ pub fn load(path: impl AsRef<Path>) -> Result<Manifest, Diagnostic> {
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;
+
+/// The examples of the page on the library, to be compiled.
+#[cfg(doctest)]
+#[doc = include_str!("../docs/library.md")]
+struct Library;

@@ -1,8 +1,11 @@
 //! Runs in this very process: nodes on threads, two at a time, stopped, steered, and nodes that fail.
 
+use hummingbus::bus::plan::GroupPlan;
 use hummingbus::flights::FlightSet;
 use hummingbus::report::validate::Validation;
-use hummingbus::{Answer, COMPONENTS, Host, Launcher, Manifest, Request, RunEvent, StopToken};
+use hummingbus::{
+    Answer, COMPONENTS, Composition, Host, Launcher, Manifest, Pace, Request, RunEvent, StopToken,
+};
 use std::path::{Path, PathBuf};
 
 fn hover() -> Manifest {
@@ -115,6 +118,100 @@ fn what_threads_cannot_have_is_refused_in_words() {
     }
 }
 
+/// Settings of a flight's plan, and the bytes of its recording.
+fn settings_and_bytes(
+    launcher: Launcher<'_>,
+    manifest: &Manifest,
+    path: &Path,
+) -> ((Pace, u32, Vec<GroupPlan>, bool), Vec<u8>) {
+    let (graph, ..) = launcher.fly_planned(manifest, path).unwrap();
+    let plan = graph.plan;
+    ((plan.pace, plan.window_ticks, plan.groups, plan.profile), std::fs::read(path).unwrap())
+}
+
+#[test]
+fn an_option_of_the_launcher_is_the_key_of_the_manifest() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("option.mcap");
+    let short = || hover().set("run.duration_s", 0.2).unwrap();
+    let (settings, bytes) = settings_and_bytes(threads(), &short(), &path);
+    let groups = Composition::Groups(vec![vec!["imu".to_owned(), "ekf".to_owned()]]);
+    let cases: [(Launcher<'_>, &str, toml::Value); 6] = [
+        (threads().paced(Pace::REAL_TIME), "run.pace", "realtime".into()),
+        (threads().paced(Pace::Factor(4.0)), "run.pace", 4.0.into()),
+        (threads().with_window(3), "run.window_ticks", 3.into()),
+        (threads().composed(Composition::All), "run.compose", "all".into()),
+        (threads().composed(groups), "run.compose", "imu+ekf".into()),
+        (threads().profiled(), "run.profile", true.into()),
+    ];
+    for (launcher, key, value) in cases {
+        let by_option = settings_and_bytes(launcher, &short(), &path);
+        let by_key = settings_and_bytes(threads(), &short().set(key, value).unwrap(), &path);
+        assert_eq!(by_option.0, by_key.0, "{key}");
+        assert_ne!(by_option.0, settings, "{key}");
+        assert!(by_option.1 == by_key.1 && by_option.1 == bytes, "{key}");
+    }
+    // An option takes the place of the key.
+    let stated = short().set("run.pace", 2.0).unwrap();
+    let (freed, _) = settings_and_bytes(threads().paced(Pace::Free), &stated, &path);
+    assert_eq!(freed, settings);
+}
+
+#[test]
+fn a_shadow_of_the_launcher_is_that_of_the_manifest() {
+    let folder = tempfile::tempdir().unwrap();
+    let short = || hover().set("run.duration_s", 0.2).unwrap();
+    let with = toml::toml! { parameters = { gains = { altitude = {
+        proportional_1_s2 = 9.0, integral_1_s3 = 2.0, derivative_1_s = 6.0
+    } } } };
+    let launcher = threads().shadowing("controller", with.clone());
+    let by_option = recorded(launcher, &short(), folder.path().join("option.mcap"));
+    let mut shadow = toml::Table::new();
+    shadow.insert("process".to_owned(), "controller".into());
+    shadow.insert("with".to_owned(), with.clone().into());
+    let mut stated = short().set("shadow", vec![shadow]).unwrap();
+    // The recording holds the text of the manifest, which an option does not change.
+    stated.recorded_text = short().recorded_text;
+    let by_key = recorded(threads(), &stated, folder.path().join("key.mcap"));
+    assert!(by_option == by_key, "{} and {} bytes", by_option.len(), by_key.len());
+
+    let launcher = threads().shadowing("controller", with.clone());
+    let flown = hummingbus::fly(launcher, &short(), folder.path().join("judged.mcap")).unwrap();
+    assert!(flown.summary.to_string().contains("shadow of `controller`"), "{}", flown.summary);
+
+    let twice = threads().shadowing("controller", with.clone()).shadowing("controller", with);
+    let error = twice.fly(&short(), &folder.path().join("twice.mcap")).unwrap_err();
+    assert!(error.is_input() && error.to_string().contains("`controller` has a swap"), "{error}");
+}
+
+#[test]
+fn a_faulty_option_is_an_error_of_the_input_that_names_it() {
+    let groups = Composition::Groups(vec![vec!["imu".to_owned(), "ekg".to_owned()]]);
+    for (launcher, texts) in [
+        (threads().paced(Pace::Factor(f64::NAN)), ["run.pace=NaN of the launcher", "is not a pace"]),
+        (threads().paced(Pace::Factor(1e9)), ["run.pace=1000000000 of the launcher", "is not a pace"]),
+        (threads().with_window(0), ["run.window_ticks=0 of the launcher", "`window_ticks` is 0"]),
+        (threads().composed(groups), ["run.compose=imu+ekg of the launcher", "names `ekg`"]),
+        (threads().shadowing("nix", toml::Table::new()), ["hover.toml", "there is no process `nix`"]),
+    ] {
+        let error = launcher.fly(&hover(), Path::new("/tmp/never.mcap")).unwrap_err();
+        let text = error.to_string();
+        assert!(error.is_input() && texts.iter().all(|part| text.contains(part)), "{text}");
+    }
+}
+
+#[test]
+fn one_thread_has_neither_a_profile_nor_a_shadow() {
+    let here = || Launcher::new(Host::InProcess);
+    for (launcher, asked) in [
+        (here().profiled(), "a profile"),
+        (here().shadowing("controller", toml::Table::new()), "another process for `controller`"),
+    ] {
+        let error = launcher.fly(&hover(), Path::new("/tmp/never.mcap")).unwrap_err();
+        assert!(error.to_string().contains(asked), "{error}");
+    }
+}
+
 /// This test is a program that embeds the library: executed once more, it would run its tests.
 #[test]
 fn flights_are_flown_again_in_this_thread_or_on_threads() {
@@ -150,6 +247,9 @@ fn a_flight_has_its_warnings_its_profile_and_the_vehicles_that_were_not_compared
     let fly = |host: Host, manifest: &Manifest| {
         hummingbus::fly(Launcher::new(host), manifest, folder.path().join("short.mcap")).unwrap()
     };
+    let launcher = Launcher::new(Host::Threads).profiled();
+    let flown = hummingbus::fly(launcher, &short(), folder.path().join("profiled.mcap")).unwrap();
+    assert!(flown.profile.is_some());
     let flown = fly(Host::Threads, &short().set("run.profile", true).unwrap());
     let warnings = &flown.summary.warnings;
     assert!(
