@@ -9,7 +9,7 @@ use thiserror::Error;
 ///
 /// ```
 /// // A node that nobody launched says so, and what to do.
-/// let error = bus::Node::join().unwrap_err();
+/// let error = bus::dynamic::DynamicNode::join().unwrap_err();
 /// assert!(matches!(error, bus::BusError::NotInARun { .. }));
 /// assert!(error.to_string().contains("hummingbus run MANIFEST"));
 /// ```

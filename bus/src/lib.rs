@@ -110,18 +110,21 @@ pub use bus_derive::{InputPorts, Message, OutputPorts, Parameters};
 pub use component::Component;
 pub use diagnostics::ParameterError;
 pub use error::BusError;
+#[doc(hidden)]
 pub use handles::{Input, Output};
 pub use harness::Harness;
 pub use input_messages::{InputMemory, InputMessages};
 pub use inputs::InputFiles;
 pub use join::{GENERATION_VARIABLE, Join, NODE_VARIABLE};
 pub use message::Message;
+#[doc(hidden)]
 pub use node::Node;
 pub use node_harness::{NodeHarness, Sample};
 pub use parameters::Parameters;
 pub use registration::{Registration, message_of};
 pub use run_process::run_process;
 pub use simulation::{Simulation, Topic};
+#[doc(hidden)]
 pub use tick::Tick;
 pub use transport::{IceoryxError, limit_transport_log, reap_dead, takes_run_dir};
 

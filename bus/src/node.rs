@@ -30,8 +30,9 @@ use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-/// A node that declares its ports by name and runs a closure, where no [`Component`](crate::Component) will do: the whole
-/// of an executable that a manifest names as a `command`.
+/// A node that declares its ports by name and runs a closure. It is the base of [`DynamicNode`](crate::dynamic::DynamicNode),
+/// and a tool of tests and benchmarks; programs run a [`Component`](crate::Component) by
+/// [`run_process`](crate::run_process()).
 ///
 /// ```no_run
 /// use bus::messages::{PlantState, SetPoint};

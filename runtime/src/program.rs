@@ -15,8 +15,8 @@ use std::time::Duration;
 pub const WATCHDOG: Duration = Duration::from_secs(20);
 
 /// Advice on a program that does not join a run.
-pub(crate) const HOW_TO_JOIN: &str = "to join, a program calls `bus::run_process` or `bus::Node::join` in Rust, `hummingbus::Node` in C++ \
-                                      or `hummingbus.run_node` in Python";
+pub(crate) const HOW_TO_JOIN: &str = "to join, a program calls `bus::run_process` in Rust, `hummingbus::Node` in C++ or \
+                                      `hummingbus.run_node` in Python";
 
 /// An executable behind a node.
 #[derive(Clone, Debug)]
