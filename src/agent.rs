@@ -11,7 +11,7 @@
 //! let mut actions = agent::Actions::default();
 //! let command = MotorCommand { command: [76.5; 4].into(), ..Default::default() };
 //! actions.entry("pilot".to_owned()).or_default().set("command", bytemuck::bytes_of(&command))?;
-//! agent::acting(&mut actions, || simulation.step())?;
+//! simulation.step_given(&actions)?;
 //! let sent = simulation.topic::<MotorCommand>("/pilot/command")?;
 //! assert_eq!(simulation.newest(sent).unwrap().command[3], 76.5);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -24,7 +24,6 @@ use bus::context::{NodeContext, StepContext};
 use bus::messages::{MotorCommand, Reference, SetPoint};
 use bus::{Message, OutputPorts, ParameterError, Registration};
 use runtime::registry::Registry;
-use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
@@ -38,7 +37,7 @@ pub fn registry() -> Registry {
     })
 }
 
-/// Actions of the agents of a simulation, by their names.
+/// Actions of the agents of a simulation, by the names of their nodes.
 pub type Actions = BTreeMap<String, Action>;
 
 /// Messages that an agent sends at its next steps.
@@ -70,20 +69,7 @@ fn read<T: Message>(message: &[u8]) -> Result<T, String> {
     })
 }
 
-thread_local! {
-    /// Actions of the simulation that this thread steps, by the names of their nodes.
-    static ACTIONS: RefCell<Actions> = RefCell::default();
-}
-
-/// Runs `step` on this thread, whose agents send `actions`.
-pub fn acting<R>(actions: &mut Actions, step: impl FnOnce() -> R) -> R {
-    ACTIONS.with_borrow_mut(|current| std::mem::swap(current, actions));
-    let stepped = step();
-    ACTIONS.with_borrow_mut(|current| std::mem::swap(current, actions));
-    stepped
-}
-
-/// A node that sends the values that the host of the simulation has set.
+/// A node that sends its messages among the [`Actions`] that [`Simulation::step_given`](bus::Simulation::step_given) gets.
 #[derive(Debug)]
 pub struct Agent {
     name: String,
@@ -117,9 +103,40 @@ impl Component for Agent {
 
     fn initial(&self) {}
 
-    fn step(&self, _: &StepContext<'_>, (): (), (): &mut ()) -> Result<Outputs, StepError> {
-        let action = ACTIONS.with_borrow(|actions| actions.get(&self.name).cloned()).unwrap_or_default();
+    fn step(&self, context: &StepContext<'_>, (): (), (): &mut ()) -> Result<Outputs, StepError> {
+        let actions = context.given::<Actions>();
+        let action = actions.and_then(|actions| actions.get(&self.name)).cloned().unwrap_or_default();
         let Action { command, set_point, reference } = action;
         Ok(Outputs { command, set_point, reference })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Actions, registry};
+    use bus::messages::MotorCommand;
+    use runtime::manifest::Manifest;
+
+    #[test]
+    fn simulations_of_one_thread_have_actions_of_their_own() {
+        let text = "[run]\nduration_s = 1.0\n[process.pilot]\nkind = \"agent\"\noutputs.command = {}\n";
+        let mut simulations = [1.0, 2.0].map(|count| {
+            let manifest = Manifest::parse(text.to_owned(), "fall.toml".as_ref(), &[], registry()).unwrap();
+            let command = MotorCommand { command: [count; 4].into(), ..Default::default() };
+            let mut actions = Actions::new();
+            let action = actions.entry("pilot".to_owned()).or_default();
+            action.set("command", bytemuck::bytes_of(&command)).unwrap();
+            (runtime::simulate(&manifest).unwrap(), actions)
+        });
+        for _ in 0..3 {
+            for (simulation, actions) in &mut simulations {
+                simulation.step_given(&*actions).unwrap();
+            }
+        }
+        let sent = simulations.map(|(simulation, _)| {
+            let topic = simulation.topic::<MotorCommand>("/pilot/command").unwrap();
+            simulation.newest(topic).unwrap().command[0]
+        });
+        assert_eq!(sent, [1.0, 2.0]);
     }
 }

@@ -1,6 +1,6 @@
 //! A manifest as an FMU: all of it, or some of its processes, but one in whose place the importer of the FMU stands.
 
-use crate::agent::{Actions, acting, registry};
+use crate::agent::{Actions, registry};
 use anyhow::{Context, anyhow, bail};
 use bus::component::Role;
 use bus::plan::{NodePlan, Plan};
@@ -248,7 +248,7 @@ fn variables(
         all.extend(fields);
     }
     simulation.step_last(agent)?;
-    acting(&mut actions, || simulation.begin_step())?;
+    simulation.begin_step_given(&actions)?;
     for topic in outputs {
         let (type_name, message) = simulation.newest_bytes(topic)?;
         let schema = registry()

@@ -2,6 +2,7 @@
 
 use crate::ports::{InputSamples, OutputPorts, SampleSource};
 use inputs::InputFiles;
+use std::any::Any;
 use std::cell::{Cell, RefCell};
 use std::path::Path;
 
@@ -247,6 +248,8 @@ pub struct StepContext<'a> {
     pub(crate) time_ns: u64,
     /// Last samples of the predecessor, by output.
     pub(crate) predecessor: Option<&'a dyn SampleSource>,
+    /// Value of the program that steps the simulation.
+    pub(crate) given: Option<&'a dyn Any>,
 }
 
 impl std::fmt::Debug for StepContext<'_> {
@@ -282,5 +285,12 @@ impl StepContext<'_> {
     #[must_use]
     pub fn predecessor<O: OutputPorts>(&self) -> Option<O> {
         self.predecessor.and_then(|sent| O::read(InputSamples(sent)))
+    }
+
+    /// The value that [`Simulation::step_given`](crate::Simulation::step_given) got; `None` in other runs, and if it is of another
+    /// type.
+    #[must_use]
+    pub fn given<T: Any>(&self) -> Option<&T> {
+        self.given?.downcast_ref()
     }
 }

@@ -72,6 +72,7 @@ impl<C: Component> Harness<C> {
             tick: self.tick,
             time_ns: u64::from(self.tick) * self.tick_ns,
             predecessor: predecessor.as_ref().map(|sent| sent as &dyn SampleSource),
+            given: None,
         };
         self.tick += self.period_ticks;
         self.component.step(&context, inputs, &mut self.state)

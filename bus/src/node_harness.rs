@@ -114,7 +114,7 @@ impl NodeHarness {
         let given = SampleMemory::given(self.inputs.iter().map(given).collect());
         let mut sent = SampleMemory::empty(self.outputs.iter().map(|wire| wire.schema));
         let time_ns = u64::from(tick) * self.tick_ns;
-        let context = StepContext { tick, time_ns, predecessor: None };
+        let context = StepContext { tick, time_ns, predecessor: None, given: None };
         self.instance.step(&context, InputSamples(&given), &mut OutputSamples(&mut sent))?;
         let due = self.outputs.iter().zip(sent.samples).filter_map(|(wire, words)| {
             let (topic, ticks) = wire.topic?;

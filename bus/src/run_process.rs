@@ -15,6 +15,7 @@ use crate::ports::{InputSamples, OutputSamples, SampleSink, SampleSource};
 use crate::registration::{Instance, Registration};
 use crate::tick::Tick;
 use inputs::InputFiles;
+use std::any::Any;
 
 /// Runs the component `C` as the node that the launcher started this process for: the whole `main` of an executable
 /// that a manifest names as a `command`.
@@ -116,7 +117,7 @@ impl Part {
 
     /// The component with its state, as the computation that steps at each tick.
     pub(crate) fn computation(&mut self) -> Wired<'_> {
-        Wired { instance: &mut *self.instance, wiring: &self.wiring }
+        Wired { instance: &mut *self.instance, wiring: &self.wiring, given: None }
     }
 }
 
@@ -144,6 +145,14 @@ pub(crate) fn finish(
 pub(crate) struct Wired<'a> {
     instance: &'a mut dyn Instance,
     wiring: &'a Wiring,
+    given: Option<&'a dyn Any>,
+}
+
+impl<'a> Wired<'a> {
+    /// The same component; its steps get the value `given` of the program that steps it.
+    pub(crate) fn given(self, given: Option<&'a dyn Any>) -> Self {
+        Self { given, ..self }
+    }
 }
 
 impl Computation for Wired<'_> {
@@ -175,6 +184,7 @@ impl Computation for Wired<'_> {
             tick: number,
             time_ns: tick.time_ns,
             predecessor: (!tick.predecessor.is_empty()).then_some(&predecessor as &dyn SampleSource),
+            given: self.given,
         };
         let mut sink = Loans { tick: number, node: tick.node, ports: tick.outputs, wiring: &wiring.outputs };
         let stepped = self.instance.step(&context, InputSamples(&inputs), &mut OutputSamples(&mut sink));

@@ -16,6 +16,7 @@ use crate::run_process::{Part, finish};
 use crate::schema::Schema;
 use crate::stepper::{Stepped, Stepper};
 use inputs::InputFiles;
+use std::any::Any;
 use std::marker::PhantomData;
 
 /// The nodes of a plan, stepped one after the other on the calling thread: the samples are those that processes of the
@@ -162,15 +163,23 @@ impl Simulation {
     /// # Errors
     /// As [`Simulation::step`].
     pub fn begin_step(&mut self) -> Result<(), BusError> {
-        self.compute(self.first)
+        self.compute(self.first, None)
+    }
+
+    /// As [`Simulation::begin_step`]; components get `given` as at [`Simulation::step_given`].
+    ///
+    /// # Errors
+    /// As [`Simulation::step`].
+    pub fn begin_step_given<T: Any>(&mut self, given: &T) -> Result<(), BusError> {
+        self.compute(self.first, Some(given))
     }
 
     /// Computes the next tick of the members up to the number `end` that have not computed it.
-    fn compute(&mut self, end: usize) -> Result<(), BusError> {
+    fn compute(&mut self, end: usize, given: Option<&dyn Any>) -> Result<(), BusError> {
         let tick = self.tick;
         for member in self.members.iter_mut().take(end).skip(self.begun) {
             if tick.is_multiple_of(member.period_ticks) {
-                member.step(tick, &mut self.samples)?;
+                member.step(tick, &mut self.samples, given)?;
             }
             self.begun += 1;
         }
@@ -183,7 +192,20 @@ impl Simulation {
     /// If a step fails, leaves a due output unwritten, or writes a value that no message may hold. Nothing more can
     /// be computed then.
     pub fn step(&mut self) -> Result<(), BusError> {
-        self.compute(self.members.len())?;
+        self.end_step(None)
+    }
+
+    /// As [`Simulation::step`]. A component that steps gets `given`, a value of the caller, by
+    /// [`StepContext::given`](crate::context::StepContext::given).
+    ///
+    /// # Errors
+    /// As [`Simulation::step`].
+    pub fn step_given<T: Any>(&mut self, given: &T) -> Result<(), BusError> {
+        self.end_step(Some(given))
+    }
+
+    fn end_step(&mut self, given: Option<&dyn Any>) -> Result<(), BusError> {
+        self.compute(self.members.len(), given)?;
         self.tick += 1;
         self.begun = 0;
         Ok(())
@@ -323,9 +345,14 @@ impl Member {
         part.restore(transfer, &mut self.part.computation(), &mut self.words)
     }
 
-    fn step(&mut self, tick: u32, samples: &mut [Option<LocalTopic>]) -> Result<(), BusError> {
+    fn step(
+        &mut self,
+        tick: u32,
+        samples: &mut [Option<LocalTopic>],
+        given: Option<&dyn Any>,
+    ) -> Result<(), BusError> {
         self.stepper.gather(tick).map_err(|(_, error)| error)?;
-        let computation = &mut self.part.computation();
+        let computation = &mut self.part.computation().given(given);
         let takes_over = std::mem::take(&mut self.succeeds);
         match self.stepper.step(tick, takes_over, &mut self.words, samples, computation)? {
             Stepped::InTime => {}

@@ -2,7 +2,7 @@
 
 use crate::error::raised;
 use bus::checkpoint::Parts;
-use hummingbus::agent::{Action, Actions, acting, registry};
+use hummingbus::agent::{Action, Actions, registry};
 use hummingbus::runtime::manifest::Manifest;
 use hummingbus::runtime::simulate;
 use pyo3::prelude::*;
@@ -54,7 +54,7 @@ impl Simulation {
         let mut left = ticks;
         while left > 0 {
             let some = left.min(TICKS_BETWEEN_SIGNALS);
-            acting(actions, || (0..some).try_for_each(|_| simulation.step())).map_err(raised)?;
+            (0..some).try_for_each(|_| simulation.step_given(&*actions)).map_err(raised)?;
             py.check_signals()?;
             left -= some;
         }

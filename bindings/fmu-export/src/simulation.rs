@@ -5,7 +5,7 @@ use bus::schema::Schema;
 use bus::{BusError, Registration};
 use fmu::export::{FIRST_REFERENCE, MODEL, Model, ModelVariable, SEED_REFERENCE, Source, TIME_REFERENCE};
 use fmu::{Field, Number};
-use hummingbus::agent::{Actions, acting, registry};
+use hummingbus::agent::{Actions, registry};
 use hummingbus::inputs::InputFiles;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -103,7 +103,7 @@ impl Simulation {
         simulation.step_last(&self.model.agent).map_err(|error| error.to_string())?;
         self.running = Some(simulation);
         self.act()?;
-        self.computed(bus::Simulation::begin_step)
+        self.computed(|simulation, actions| simulation.begin_step_given(actions))
     }
 
     /// Steps over `period_s` seconds from `time_s` on.
@@ -121,10 +121,10 @@ impl Simulation {
             return Err(format!("a step of {period_s} s is no multiple of the tick of {tick_s} s"));
         }
         self.act()?;
-        self.computed(|simulation| {
+        self.computed(|simulation, actions| {
             for _ in 0..ticks as u64 {
-                simulation.step()?;
-                simulation.begin_step()?;
+                simulation.step_given(actions)?;
+                simulation.begin_step_given(actions)?;
             }
             Ok(())
         })
@@ -225,13 +225,13 @@ impl Simulation {
 
     fn computed(
         &mut self,
-        compute: impl FnOnce(&mut bus::Simulation) -> Result<(), BusError>,
+        compute: impl FnOnce(&mut bus::Simulation, &Actions) -> Result<(), BusError>,
     ) -> Result<(), String> {
         if let Some(reason) = &self.ended {
             return Err(format!("the simulation has ended: {reason}"));
         }
         let simulation = self.running.as_mut().ok_or("the simulation is not initialized")?;
-        let computed = acting(&mut self.actions, || compute(simulation)).map_err(|error| error.to_string());
+        let computed = compute(simulation, &self.actions).map_err(|error| error.to_string());
         computed.inspect_err(|reason| self.ended = Some(reason.clone()))
     }
 }
