@@ -26,6 +26,8 @@ mod profile;
 mod skipped;
 #[path = "readers/steered.rs"]
 mod steered;
+#[path = "readers/throws.rs"]
+mod throws;
 #[path = "readers/urdf.rs"]
 mod urdf;
 #[path = "readers/view.rs"]
