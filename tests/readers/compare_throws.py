@@ -1,12 +1,12 @@
 """Holds drawn stacks and throws, flown by `hummingbus run`, against MuJoCo, closed forms and the laws of mechanics.
 
     compare_throws.py FOLDER --fly HUMMINGBUS --seeds 1-3     draws, writes, flies and judges
-    compare_throws.py FOLDER --seeds 1-3 --only slide-1       judges what was flown before
+    compare_throws.py FOLDER --seeds 1-3 --only slide-1       judges the flights in FOLDER
 
-A stack that falls and a body that tumbles end where rounding decides, in any engine. So they are compared with MuJoCo only
-up to their first contact, and at the end: MuJoCo, started where ours came to rest, has to leave it there. In between the laws
-of mechanics judge: energy never grows, the floor pushes and never pulls, its friction is within Coulomb's cone, nothing gets
-into anything else. It prints a table and ends with 1 where a figure is beyond its limit.
+In any engine, rounding decides where a stack that falls and a body that tumbles end. MuJoCo therefore judges such a flight
+only up to its first contact and at its end: MuJoCo starts from our end and has to leave the bodies there. In between, the
+laws of mechanics judge. Energy never grows. The floor pushes and never pulls. Its friction is within Coulomb's cone. No body
+gets into another one. The script prints a table. It ends with 1 if a figure is beyond its limit.
 """
 
 import argparse
@@ -53,12 +53,12 @@ LIMITS = {
     "falls: height at the end": ("1", 0.95, "of the highest body at the start"),
     "falls: height at the end, MuJoCo": ("1", 0.95, "of the highest body at the start"),
     "falls: first 0.2 s, MuJoCo": ("m", 2e-3, "its contacts are soft; where it agrees with itself"),
-    "energy gained": ("1", 1.0, "of what lifts all bodies by 2e-6 m and 1e-5 of the energy: steps of first order in contact"),
+    "energy gained": ("1", 1.0, "of 1e-5 of the energy and of a lift by 2e-6 m: steps of first order in contact"),
     "floor: pull": ("1", 1e-6, "of the weight: nothing pulls"),
     "floor: friction beyond the cone": ("1", 1e-6, "of the weight: rounding"),
     "overlap, by MuJoCo's geometry": ("m", 1e-5, "a micrometre, and the tolerance of its search"),
     "below the floor": ("m", 2 * OVERLAP_M, "a micrometre, and rounding"),
-    "end: speed of what cannot roll": ("m/s", REST_M_S, "it is at rest"),
+    "end: speed of boxes and prisms": ("m/s", REST_M_S, "it is at rest"),
     "end: moved by MuJoCo within 0.5 s": ("m", 1e-4, "its contacts yield and creep"),
 }
 
@@ -73,7 +73,8 @@ class Flown:
         bodies = range(len(case["bodies"]))
 
         def field(name, parts):
-            return np.stack([values[:, [columns[f"{name}[{number}].{part}"] for part in parts]] for number in bodies], axis=1)
+            at = [[columns[f"{name}[{number}].{part}"] for part in parts] for number in bodies]
+            return values[:, at]
 
         self.case = case
         self.time = values[:, columns["time_ns"]] * 1e-9
@@ -169,7 +170,7 @@ def advance(model, data, seconds):
 
 
 def deepest(flown):
-    """The deepest that ours are in each other or in what stands, as MuJoCo's geometry sees it."""
+    """The deepest overlap of two bodies or of a body and a wall or the floor, by MuJoCo's geometry."""
     model, data = mujoco_model(flown.case)
     most = 0.0
     for tick in np.linspace(0, len(flown.time) - 1, LOOKS).astype(int):
@@ -180,7 +181,7 @@ def deepest(flown):
 
 
 def moved_at_rest(flown, still):
-    """How far MuJoCo moves what lies still at the end within half a second, if all of it does."""
+    """The farthest that MuJoCo moves a body, which is at rest at the end, within half a second."""
     model, data = mujoco_model(flown.case)
     data.qpos[:] = np.concatenate([flown.place[-1], flown.turn[-1]], axis=1).ravel()
     data.qvel[:] = 0
@@ -189,7 +190,7 @@ def moved_at_rest(flown, still):
 
 
 def laws(flown):
-    """What holds whatever happens."""
+    """Figures that no chaos changes."""
     case, weight = flown.case, flown.mass.sum() * G_M_S2
     energy = flown.energy()
     allowed = 2 * OVERLAP_M * weight + 1e-5 * (1 + energy.max())
@@ -203,7 +204,7 @@ def laws(flown):
         yield "floor: friction beyond the cone", np.max(along - case["friction"] * across) / (weight * TICK_S)
     still = np.array([body["shape"] != "ball" for body in case["bodies"]])
     if case["kind"] != "bowl" and still.any():
-        yield "end: speed of what cannot roll", np.linalg.norm(flown.velocity[-1][still], axis=1).max()
+        yield "end: speed of boxes and prisms", np.linalg.norm(flown.velocity[-1][still], axis=1).max()
         if np.linalg.norm(flown.velocity[-1], axis=1).max() < REST_M_S:
             yield "end: moved by MuJoCo within 0.5 s", moved_at_rest(flown, still)
 
@@ -227,7 +228,7 @@ def judge_falls(flown):
     early = advance(model, data, 0.2)
     finer = advance(*mujoco_model(flown.case, STEP_S / 2), 0.2)
     what = "falls: first 0.2 s, MuJoCo"
-    # A ball on a box that tips slips or rolls by less than MuJoCo itself can tell.
+    # A ball on a box that tips slips or rolls, and which of both depends on MuJoCo's step.
     if apart(early, finer) < LIMITS[what][1] / 2:
         yield what, apart(flown.place[200], finer)
     yield "falls: height at the end", flown.place[-1, :, 2].max() / start
@@ -259,7 +260,7 @@ def judge_bowl(flown):
 
 
 def judge_throw(flown):
-    """Free flight of what is thrown, and its first contact."""
+    """Free flight of the thrown body, and its first contact."""
     number = max(range(len(flown.mass)), key=lambda at: np.linalg.norm(flown.case["bodies"][at]["velocity"]))
     body, time = flown.case["bodies"][number], flown.time[:, None]
     start, velocity, fall = np.array(body["centre"]), np.array(body["velocity"]), np.array([0, 0, -G_M_S2])
@@ -305,7 +306,7 @@ def judge_bounce(flown, met, start, velocity):
     slide = np.linalg.norm(slip)
     grip = min(case["friction"] * (1 + case["restitution"]) * across, 2 / 7 * slide)
     leaves = arrives + (1 + case["restitution"]) * across * normal - grip * slip / slide
-    # What is left of the tick is free flight.
+    # The rest of the tick is free flight.
     found = flown.velocity[met, 0] + (flown.time[met] - time) * np.array([0, 0, G_M_S2])
     off = found - leaves
     yield "bounce of a ball: speed across", abs(off @ normal)
@@ -358,7 +359,9 @@ def main():
     parser.add_argument("--fly", help="the program")
     parser.add_argument("--seeds", type=numbers, default="1-2")
     parser.add_argument("--only", help="the name of one case, or its kind")
+    parser.add_argument("--sides", type=int, default=drawn_throws.SIDES, help="sides of a prism")
     arguments = parser.parse_args()
+    drawn_throws.SIDES = arguments.sides
     cases = [case for seed in arguments.seeds for case in drawn_throws.drawn(seed)
              if arguments.only in (None, case["name"], case["kind"])]
     if not cases:

@@ -19,7 +19,7 @@ GRAIN_M = 1 / 1024
 MARGIN_M = 0.008
 WALL = {"centre": [1.6, 0.0, 2.0], "half": [0.1, 3.0, 2.0]}
 
-# A slide lasts 2 s at most; what falls or is thrown comes to rest.
+# A slide lasts 2 s at most. Falls and throws come to rest.
 DURATION_S = {"stands": 1.0, "falls": 3.0, "drop": 3.0, "slide": 2.2, "bowl": 1.0, "floor": 3.0, "wall": 3.0, "hit": 3.0}
 
 MANIFEST = """
@@ -111,7 +111,7 @@ def inside_m(polygon, point):
 
 
 def clipped(polygon, other):
-    """What two convex polygons share."""
+    """The part that two convex polygons share."""
     for (x, y), (a, b) in sides(other):
         depth = [(u - x) * a + (v - y) * b for u, v in polygon]
         kept = []
@@ -126,8 +126,10 @@ def clipped(polygon, other):
 
 
 def margin_m(bodies):
-    """By how much a stack of level faces stands, from the bottom up: the centre of mass of all that is above a face has to
-    be over what the two faces share. Negative: it falls."""
+    """The margin by which a stack of level faces stands, from the bottom up; negative if it falls.
+
+    The centre of mass of all bodies above a face has to be over the part that the two faces share.
+    """
     least = math.inf
     for number in range(1, len(bodies)):
         above = bodies[number:]
@@ -273,8 +275,8 @@ def placed(body, number, name, folder):
     else:
         file = f"{name}.{number}.obj"
         (folder / file).write_text(obj(body), encoding="utf-8")
-        table, more = "meshes", {"file": f'"{file}"', "position": given(body["centre"], "m"), "yaw": given(body["yaw"], "rad"),
-                                 "scale": given(1, "m"), "solid": '"convex"'}
+        table, more = "meshes", {"file": f'"{file}"', "position": given(body["centre"], "m"), "solid": '"convex"',
+                                 "yaw": given(body["yaw"], "rad"), "scale": given(1, "m")}
     lines = "".join(f"{key} = {value}\n" for key, value in (more | keys).items())
     return f'[[{table}]]\nname = "body {number}"\n{lines}'
 
