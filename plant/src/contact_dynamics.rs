@@ -18,6 +18,7 @@
 //! | `scratch`, `stepping` | a step that is cut at impacts, and what it works with |
 //! | `unsolved` | impulses that were not found |
 //! | `contacts` | when contacts begin and end |
+//! | `corners` | corners of large faces that parry leaves out |
 //! | `sheet` | triangles that touch with their borders |
 //! | `rim`, `rolling` | a disc's rim on an edge, and rolling |
 //! | `rig` | test rigs: joints and stops |
@@ -26,6 +27,7 @@ mod body;
 mod cholesky;
 mod cone;
 mod contacts;
+mod corners;
 mod direct;
 mod drive;
 mod free_bodies;

@@ -56,7 +56,7 @@ fn nearest_of((thing, pose): (&Collider, &Pose), point: Vector) -> Vector {
 }
 
 /// The point and its gap to the thing, if that is along the normal.
-fn gap(thing: (&Collider, &Pose), point: Vector, normal: Vector) -> Option<(Vector, f64)> {
+pub(super) fn gap(thing: (&Collider, &Pose), point: Vector, normal: Vector) -> Option<(Vector, f64)> {
     let way = point - nearest_of(thing, point);
     let gap_m = way.dot(normal);
     let aside_m = (way - normal * gap_m).length();

@@ -4,6 +4,7 @@
 //! result depends on the poses alone.
 
 use super::body::{self, from_rapier, to_rapier};
+use super::corners;
 use super::free_bodies::{FIRST_BODY, FIRST_THING, VEHICLE, WORLD};
 use super::hull::Hull;
 use super::rim;
@@ -340,6 +341,8 @@ fn tell(
                 }
             });
         }
+        let found = manifold.points.iter().map(|point| part_pose.transform_point(point.local_p2));
+        corners::missing((thing, thing_pose), (part, part_pose), normal, margin_m, found, &mut tell);
     }
 }
 
