@@ -15,7 +15,15 @@
 //! | `solver` | the impulses of contacts, stops and joints, by sweeps |
 //! | `islands`, `direct` | the same of bodies that the sweeps do not settle, all at once |
 //! | `cone`, `cholesky` | the algebra of that |
-//! | `scratch`, `stepping` | a step that is cut at impacts, and what it works with |
+//! | `multibody` | the vehicle, its rig and the free bodies, with their state |
+//! | `stepping` | a step that is cut at impacts |
+//! | `free_step` | a step without contacts |
+//! | `margin`, `constraints` | the search for contacts, and a constraint for each contact and each stop |
+//! | `impact`, `lasting` | contacts that bounce, and contacts that last |
+//! | `integration`, `push_out` | the end of a step with impulses, and the overlaps that it left |
+//! | `energy` | kinetic energy, and what impulses add to it |
+//! | `touching`, `ties`, `scratch` | the buffers of a step: contacts, joints, and all of them |
+//! | `warm_start`, `record` | the impulses of the last step, and all that lasts from step to step |
 //! | `unsolved` | impulses that were not found |
 //! | `contacts` | when contacts begin and end |
 //! | `corners` | corners of large faces that parry leaves out |
@@ -26,16 +34,26 @@
 mod body;
 mod cholesky;
 mod cone;
+mod constraints;
 mod contacts;
 mod corners;
 mod direct;
 mod drive;
+mod energy;
 mod free_bodies;
+mod free_step;
 pub mod hull;
+mod impact;
+mod integration;
 mod islands;
 mod joint_forces;
 mod joints;
+mod lasting;
+mod margin;
+mod multibody;
 mod poles;
+mod push_out;
+mod record;
 mod rig;
 mod rim;
 mod rolling;
@@ -43,7 +61,10 @@ mod scratch;
 mod sheet;
 mod solver;
 mod stepping;
+mod ties;
+mod touching;
 mod unsolved;
+mod warm_start;
 mod world;
 
 use crate::actuation::Battery;
@@ -57,10 +78,13 @@ use contacts::Contacts;
 pub(crate) use free_bodies::Misfit;
 use free_bodies::{FIRST_THING, FreeBodies};
 use hull::Hull;
+use multibody::{Changed, Multibody, Size};
 use nalgebra::{UnitQuaternion, Vector3};
+use record::Record;
 use scenes::{Rig, Scene};
 use scratch::Scratch;
-use stepping::{Changed, Held, Motion};
+use stepping::Motion;
+use warm_start::Held;
 use world::World;
 
 /// A vehicle lower than this above its stand starts on its feet, at rest.
@@ -130,25 +154,25 @@ impl Rapier {
         // The mount is on the frame, and where it is seen from may have moved.
         let mount_shift_B_m = model.airframe().frame_shift_B_m();
         let free_bodies = FreeBodies::new(scene, mount_shift_B_m);
-        let motion = Motion {
+        let inertia_min_kg_m2 = vehicle.inertia_kg_m2.symmetric_eigenvalues().min();
+        let world = World::new(&hull, scene, free_bodies.tied_pairs());
+        let system = Multibody {
+            size: Size { disc_radius_m: hull.disc_radius_m, inertia_min_kg_m2 },
             rig: scene.rig.map(|rig| Rig { mount_B_m: rig.mount_B_m + mount_shift_B_m, ..rig }),
-            crash_speed_m_s,
-            disc_radius_m: hull.disc_radius_m,
-            inertia_min_kg_m2: vehicle.inertia_kg_m2.symmetric_eigenvalues().min(),
-            world: World::new(&hull, scene, free_bodies.tied_pairs()),
-            contacts: Contacts::new(1 + scene.thing_count() + TRAFFIC_MAX),
             state: model.start(free_bodies.carrier_at_start(), 0.0),
-            time_s: 0.0,
-            free_bodies,
-            held: Held::new(scene.bodies().count(), scene.joints.len()),
-            unsolved: None,
             changed: Changed::default(),
-            scratch: Scratch::new(),
+            free_bodies,
             model,
         };
+        let record = Record {
+            contacts: Contacts::new(1 + scene.thing_count() + TRAFFIC_MAX, crash_speed_m_s),
+            held: Held::new(scene.bodies().count(), scene.joints.len()),
+            unsolved: None,
+        };
+        let motion = Motion { system, world, record, scratch: Scratch::new() };
         let others = Vec::with_capacity(TRAFFIC_MAX);
         let names = scene.things().map(|thing| thing.name().to_owned()).collect();
-        let fingerprint = motion.model.airframe().fingerprint(NAME);
+        let fingerprint = motion.system.model.airframe().fingerprint(NAME);
         let configuration = fingerprint.with(numbers(&motion).into_iter());
         let reaction = Reaction::default();
         let mut rapier = Self { hull, motion, effects, reaction, ticks: 0, others, names, configuration };
@@ -158,37 +182,38 @@ impl Rapier {
 
     /// The number of the scene's box or mesh that the vehicle is partly inside of, if any.
     pub(crate) fn thing_around(&self) -> Option<usize> {
-        self.motion.world.thing_around(&self.motion.state.body)
+        self.motion.world.thing_around(&self.motion.system.state.body)
     }
 
     /// The numbers of the first two of the scene's bodies, things and the vehicle that start inside of each other, as
     /// `bus::messages::Contact` counts them: 0 is the vehicle.
     pub(crate) fn overlap(&mut self) -> Option<[u32; 2]> {
-        let Motion { world, free_bodies, state, .. } = &mut self.motion;
-        world.overlap(&state.body, &free_bodies.states)
+        let Motion { world, system, .. } = &mut self.motion;
+        world.overlap(&system.state.body, &system.free_bodies.states)
     }
 
     /// Returns a fault of the scene's joints, with the vehicle and the bodies where they are.
     pub(crate) fn misfit(&self) -> Option<Misfit> {
-        self.motion.free_bodies.misfit(&self.motion.model, &self.motion.state.body)
+        self.motion.system.free_bodies.misfit(&self.motion.system.model, &self.motion.system.state.body)
     }
 
     /// Has the vehicle stand on its feet where it is too low to fly.
     fn put_down(&mut self) {
         let stands = self.stands();
-        let height_m = &mut self.motion.state.body.position_W_m.z;
+        let height_m = &mut self.motion.system.state.body.position_W_m.z;
         if stands {
             *height_m = height_m.max(self.hull.stand_m());
         }
-        self.motion.contacts.place(stands.then_some(world::GROUND), world::FEET);
+        self.motion.record.contacts.place(stands.then_some(world::GROUND), world::FEET);
     }
 
     /// Before anything has moved, a vehicle at rest is carried by the acceleration opposite to its free one: so its
     /// accelerometer reads g from the first tick on.
     fn lean_on_support(&mut self) {
-        let free = self.motion.model.accelerations_under(&self.effects.actuation, &self.motion.state);
-        let body = &self.motion.state.body;
-        let gravity_W_m_s2 = Vector3::z() * self.motion.model.vehicle().gravity_m_s2;
+        let free =
+            self.motion.system.model.accelerations_under(&self.effects.actuation, &self.motion.system.state);
+        let body = &self.motion.system.state.body;
+        let gravity_W_m_s2 = Vector3::z() * self.motion.system.model.vehicle().gravity_m_s2;
         let free_W_m_s2 = body.attitude_WB * free.specific_force_B_m_s2 - gravity_W_m_s2;
         let is_at_rest = body.velocity_W_m_s.norm() < AT_REST_M_S;
         self.reaction = Reaction::default();
@@ -199,33 +224,34 @@ impl Rapier {
 
     /// True if ground or rig keep the vehicle from accelerating freely.
     fn is_carried(&self, free_W_m_s2: &Vector3<f64>) -> bool {
-        let vehicle = self.motion.model.vehicle();
-        match &self.motion.rig {
+        let vehicle = self.motion.system.model.vehicle();
+        match &self.motion.system.rig {
             Some(rig) => {
                 let lift_N = free_W_m_s2.z * vehicle.mass_kg;
-                rig::holds(rig, &self.motion.state.body, lift_N, vehicle.gravity_m_s2)
+                rig::holds(rig, &self.motion.system.state.body, lift_N, vehicle.gravity_m_s2)
             }
             None => self.stands() && free_W_m_s2.z < 0.0,
         }
     }
 
     fn stands(&self) -> bool {
-        let upright = self.motion.state.body.attitude_WB * Vector3::z();
-        self.motion.state.body.position_W_m.z < self.hull.stand_m() + ON_THE_GROUND_M && upright.z > 0.999
+        let upright = self.motion.system.state.body.attitude_WB * Vector3::z();
+        self.motion.system.state.body.position_W_m.z < self.hull.stand_m() + ON_THE_GROUND_M
+            && upright.z > 0.999
     }
 
     /// Moves the vehicle to hang from the rig's bearing.
     fn hang(&mut self, rig: &Rig) {
-        self.motion.state.body = rig::hung(rig, &self.motion.state.body);
-        self.motion.contacts.place(None, 0);
+        self.motion.system.state.body = rig::hung(rig, &self.motion.system.state.body);
+        self.motion.record.contacts.place(None, 0);
     }
 }
 
 /// Numbers that distinguish a scene and a vehicle from others.
 fn numbers(motion: &Motion) -> Vec<f64> {
     let mut numbers = motion.world.numbers();
-    numbers.extend(motion.free_bodies.numbers());
-    numbers.extend(motion.rig.iter().flat_map(rig::numbers));
+    numbers.extend(motion.system.free_bodies.numbers());
+    numbers.extend(motion.system.rig.iter().flat_map(rig::numbers));
     numbers
 }
 
@@ -235,12 +261,14 @@ impl Backend for Rapier {
     }
 
     fn state(&self) -> &State {
-        &self.motion.state
+        &self.motion.system.state
     }
 
     fn accelerations(&self) -> Accelerations {
-        let free = self.motion.model.accelerations_under(&self.effects.actuation, &self.motion.state);
-        let in_body = |v_W: &Vector3<f64>| self.motion.state.body.attitude_WB.inverse_transform_vector(v_W);
+        let free =
+            self.motion.system.model.accelerations_under(&self.effects.actuation, &self.motion.system.state);
+        let in_body =
+            |v_W: &Vector3<f64>| self.motion.system.state.body.attitude_WB.inverse_transform_vector(v_W);
         let Reaction { acceleration_W_m_s2, angular_acceleration_W_rad_s2, .. } = &self.reaction;
         Accelerations {
             specific_force_B_m_s2: free.specific_force_B_m_s2 + in_body(acceleration_W_m_s2),
@@ -250,63 +278,63 @@ impl Backend for Rapier {
     }
 
     fn step(&mut self, commands: &[f64], dt_s: f64, traffic: &[Neighbour]) {
-        let airframe = self.motion.model.airframe();
-        let actuation = *airframe.begin_tick(&mut self.effects, &self.motion.state, commands, dt_s);
-        let span_s = dt_s / f64::from(self.motion.model.substeps());
-        self.motion.contacts.begin_tick();
-        self.motion.changed = Changed::default();
+        let airframe = self.motion.system.model.airframe();
+        let actuation = *airframe.begin_tick(&mut self.effects, &self.motion.system.state, commands, dt_s);
+        let span_s = dt_s / f64::from(self.motion.system.model.substeps());
+        self.motion.record.contacts.begin_tick();
+        self.motion.system.changed = Changed::default();
         let mut others = std::mem::take(&mut self.others);
         others.clear();
         others.extend_from_slice(traffic);
         let begin_s = self.ticks as f64 * dt_s;
-        for number in 0..self.motion.model.substeps() {
+        for number in 0..self.motion.system.model.substeps() {
             let time_s = begin_s + f64::from(number) * span_s;
             self.motion.substep(&actuation, [time_s, span_s], &mut others);
         }
         self.ticks += 1;
         self.others = others;
-        let body = &mut self.motion.state.body;
+        let body = &mut self.motion.system.state.body;
         body.attitude_WB = UnitQuaternion::new_normalize(body.attitude_WB.into_inner());
-        self.motion.model.airframe().settle(&actuation, &mut self.motion.state.rotors);
+        self.motion.system.model.airframe().settle(&actuation, &mut self.motion.system.state.rotors);
         self.reaction = Reaction {
-            acceleration_W_m_s2: self.motion.changed.velocity_W_m_s / dt_s,
-            angular_acceleration_W_rad_s2: self.motion.changed.spin_W_rad_s / dt_s,
-            normal_W_N: self.motion.contacts.normal_impulse_W_N_s / dt_s,
+            acceleration_W_m_s2: self.motion.system.changed.velocity_W_m_s / dt_s,
+            angular_acceleration_W_rad_s2: self.motion.system.changed.spin_W_rad_s / dt_s,
+            normal_W_N: self.motion.record.contacts.normal_impulse_W_N_s / dt_s,
         };
     }
 
     fn settle_rotors(&mut self, commands: &[f64]) {
-        self.motion.state.rotors = self.motion.model.steady_each(commands);
+        self.motion.system.state.rotors = self.motion.system.model.steady_each(commands);
         self.lean_on_support();
     }
 
     fn set_body(&mut self, body: &RigidBody) {
-        let before = self.motion.state.body;
-        self.motion.state.body = *body;
-        match self.motion.rig {
+        let before = self.motion.system.state.body;
+        self.motion.system.state.body = *body;
+        match self.motion.system.rig {
             Some(rig) => self.hang(&rig),
             None => self.put_down(),
         }
-        let after = self.motion.state.body;
-        self.motion.free_bodies.carry(&before, &after);
-        self.motion.held.clear();
+        let after = self.motion.system.state.body;
+        self.motion.system.free_bodies.carry(&before, &after);
+        self.motion.record.held.clear();
         self.lean_on_support();
     }
 
     fn bodies(&self) -> &[RigidBody] {
-        &self.motion.free_bodies.states
+        &self.motion.system.free_bodies.states
     }
 
     fn body_objects(&self) -> &[u32] {
-        &self.motion.free_bodies.objects
+        &self.motion.system.free_bodies.objects
     }
 
     fn contact(&self) -> ContactReport {
         // All that free flight does not explain is the contacts' doing; in a rig and on joints, which push too, it is what
         // they push along their normals, friction left out.
-        self.motion.contacts.report(&match self.motion.is_held() {
+        self.motion.record.contacts.report(&match self.motion.system.is_held() {
             true => self.reaction.normal_W_N,
-            false => self.reaction.acceleration_W_m_s2 * self.motion.model.vehicle().mass_kg,
+            false => self.reaction.acceleration_W_m_s2 * self.motion.system.model.vehicle().mass_kg,
         })
     }
 
@@ -317,38 +345,38 @@ impl Backend for Rapier {
             world::GROUND => "the ground".to_owned(),
             _ => named(number).map_or("another vehicle".to_owned(), |name| format!("\"{name}\"")),
         };
-        self.motion.unsolved.map(|unsolved| unsolved.message(name))
+        self.motion.record.unsolved.map(|unsolved| unsolved.message(name))
     }
 
     fn battery(&self) -> Option<Battery> {
-        self.motion.model.airframe().battery(&self.effects, &self.motion.state)
+        self.motion.system.model.airframe().battery(&self.effects, &self.motion.system.state)
     }
 
     fn configuration(&self) -> u64 {
-        self.configuration.and(self.motion.model.airframe().kinds()).number()
+        self.configuration.and(self.motion.system.model.airframe().kinds()).number()
     }
 
     fn parts(&self, note: &mut dyn FnMut(&'static str, &dyn Saved)) {
         note(CONFIGURATION, &self.configuration);
-        note("state", &self.motion.state);
+        note("state", &self.motion.system.state);
         note("effects", &self.effects);
         note("reaction", &self.reaction);
-        note("held", &self.motion.held);
-        note("contacts", &self.motion.contacts);
-        note("bodies", &self.motion.free_bodies.states);
+        note("held", &self.motion.record.held);
+        note("contacts", &self.motion.record.contacts);
+        note("bodies", &self.motion.system.free_bodies.states);
         note("ticks", &self.ticks);
     }
 
     fn parts_mut(&mut self, note: &mut NotePart<'_>) -> Result<(), SnapshotError> {
         note(CONFIGURATION, &mut self.configuration)?;
-        note("state", &mut self.motion.state)?;
+        note("state", &mut self.motion.system.state)?;
         note("effects", &mut self.effects)?;
         note("reaction", &mut self.reaction)?;
-        note("held", &mut self.motion.held)?;
-        note("contacts", &mut self.motion.contacts)?;
-        note("bodies", &mut self.motion.free_bodies.states)?;
+        note("held", &mut self.motion.record.held)?;
+        note("contacts", &mut self.motion.record.contacts)?;
+        note("bodies", &mut self.motion.system.free_bodies.states)?;
         note("ticks", &mut self.ticks)?;
-        self.motion.unsolved = None;
+        self.motion.record.unsolved = None;
         Ok(())
     }
 }

@@ -58,6 +58,8 @@ pub(super) struct Contacts {
     touches: Bounded<Touch>,
     began: u32,
     crashed: bool,
+    /// An impact that is faster is a crash.
+    crash_speed_m_s: f64,
     /// The speed of approach of the newest impact; 0 where nothing is touched.
     impact_speed_m_s: f64,
     /// True if that impact was in this tick.
@@ -69,12 +71,13 @@ pub(super) struct Contacts {
 saved_fields!(Contacts { touches, began, crashed, impact_speed_m_s, is_impact_new, normal_impulse_W_N_s });
 
 impl Contacts {
-    /// No contact so far, among at most `objects` things.
-    pub(super) fn new(objects: usize) -> Self {
+    /// No contact so far, among at most `objects` things. An impact faster than `crash_speed_m_s` is a crash.
+    pub(super) fn new(objects: usize, crash_speed_m_s: f64) -> Self {
         Self {
             touches: Bounded::new(objects),
             began: 0,
             crashed: false,
+            crash_speed_m_s,
             impact_speed_m_s: 0.0,
             is_impact_new: false,
             normal_impulse_W_N_s: Vector3::zeros(),
@@ -111,19 +114,14 @@ impl Contacts {
     }
 
     /// Takes in the contacts that a step found, with the vehicle's motion just before it.
-    pub(super) fn note(
-        &mut self,
-        before: &RigidBody,
-        sightings: impl Iterator<Item = Sighting>,
-        crash_speed_m_s: f64,
-    ) {
+    pub(super) fn note(&mut self, before: &RigidBody, sightings: impl Iterator<Item = Sighting>) {
         self.touches.iter_mut().for_each(|touch| (touch.seen, touch.parts_seen) = (false, 0));
         for sighting in sightings {
             self.normal_impulse_W_N_s += sighting.near.normal_W * sighting.impulse_N_s;
             if sighting.pushes() {
                 let speed_m_s = approach_m_s(before, &sighting);
                 // A part that already touches may be slammed down as well.
-                self.crashed |= speed_m_s > crash_speed_m_s;
+                self.crashed |= speed_m_s > self.crash_speed_m_s;
                 self.meet(&sighting, speed_m_s);
             }
             let touching = self.touches.iter_mut().find(|touch| touch.object == sighting.near.object);

@@ -1,7 +1,8 @@
 //! Impulses that were not found, and energy that impulses made: both end a run.
 
 use super::free_bodies::{FIRST_BODY, VEHICLE};
-use super::scratch::Scratch;
+use super::solver::Body;
+use super::touching::Touching;
 
 /// A rate that is farther off than this, and than a part of the fastest rate, ends the run, m/s. Tuned, no source.
 const OFF_MOST_M_S: f64 = 1e-4;
@@ -17,29 +18,38 @@ const GAIN_MOST: f64 = 1e-6;
 
 /// The result of a search for impulses.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Outcome {
+pub(super) struct Found {
     /// Greatest error of a rate.
     pub off_m_s: f64,
     /// Greatest speed at which two that touch come nearer or slip, before the impulses.
     pub fastest_m_s: f64,
+}
+
+/// The same with the energy of the bodies.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Outcome {
+    pub found: Found,
     /// Kinetic energy before the impulses.
     pub start_J: f64,
     /// Kinetic energy that the impulses added, beyond what was asked for; 0 where another vehicle pushes.
     pub gain_J: f64,
 }
 
-impl Outcome {
+impl Found {
     /// The error of a rate up to which impulses are taken as found.
-    pub(super) fn may_be_off_m_s(fastest_m_s: f64) -> f64 {
-        OFF_MOST_M_S.max(OFF_MOST_OF_FASTEST * fastest_m_s)
+    fn may_be_off_m_s(&self) -> f64 {
+        OFF_MOST_M_S.max(OFF_MOST_OF_FASTEST * self.fastest_m_s)
     }
 
-    fn is_met(&self) -> bool {
-        self.off_m_s <= Self::may_be_off_m_s(self.fastest_m_s)
+    /// True if the impulses are taken as found.
+    pub(super) fn is_met(&self) -> bool {
+        self.off_m_s <= self.may_be_off_m_s()
     }
+}
 
+impl Outcome {
     fn is_sound(&self) -> bool {
-        self.is_met() && self.gain_J <= GAIN_MOST * (1.0 + self.start_J)
+        self.found.is_met() && self.gain_J <= GAIN_MOST * (1.0 + self.start_J)
     }
 }
 
@@ -52,14 +62,15 @@ pub(super) struct Unsolved {
 }
 
 impl Unsolved {
-    /// The fault of an outcome, if it has one; `objects` are the numbers of the free bodies.
-    pub(super) fn of(outcome: &Outcome, scratch: &Scratch, objects: &[u32]) -> Option<Self> {
+    /// The fault of an outcome, if it has one. `then` are the bodies with the impulses of `touching`; `objects` are the
+    /// numbers of the free bodies.
+    pub(super) fn of(outcome: &Outcome, touching: &Touching, then: &[Body], objects: &[u32]) -> Option<Self> {
         if outcome.is_sound() {
             return None;
         }
-        let off = scratch.constraints.iter().map(|constraint| constraint.off_m_s(&scratch.then)).enumerate();
+        let off = touching.constraints.iter().map(|constraint| constraint.off_m_s(then)).enumerate();
         let worst = off.max_by(|(_, one), (_, other)| one.total_cmp(other));
-        let near = worst.and_then(|(number, _)| scratch.near.get(number));
+        let near = worst.and_then(|(number, _)| touching.near.get(number));
         let second = |body: usize| match body {
             VEHICLE => 0,
             _ => objects.get(body.wrapping_sub(FIRST_BODY)).copied().unwrap_or_default(),
@@ -74,11 +85,11 @@ impl Unsolved {
             let [first, second] = objects.map(name);
             format!("between {first} and {second}")
         });
-        let Outcome { off_m_s, fastest_m_s, gain_J, .. } = self.outcome;
-        let found = match self.outcome.is_met() {
+        let Outcome { found: impulses, gain_J, .. } = self.outcome;
+        let found = match impulses.is_met() {
             true => format!("they made {gain_J:.1e} J of motion"),
             false => {
-                let most_m_s = Outcome::may_be_off_m_s(fastest_m_s);
+                let (off_m_s, most_m_s) = (impulses.off_m_s, impulses.may_be_off_m_s());
                 format!("a rate is off by {off_m_s:.1e} m/s, expected {most_m_s:.0e} m/s at most")
             }
         };
