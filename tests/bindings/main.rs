@@ -8,7 +8,7 @@
 //! - [`mod@fmu_export`]: simulations exported as FMUs
 //! - [`python`]: nodes, runs and recordings in Python
 //! - [`pages`]: the commands of the pages
-//! - [`skipped`]: tests that cannot run here
+//! - [`skipped`]: tests that cannot run here, and cases that are left to `scripts/dev thorough`
 //! - [`headers`]: the headers are those of the messages
 
 mod build;

@@ -13,7 +13,7 @@
 //! - [`sidecars`]: sidecars that fail or are not ready
 //! - [`strays`]: what the nodes of a run started themselves
 //! - [`floods`]: too much output, and nowhere to write
-//! - [`skipped`]: tests that cannot run here
+//! - [`skipped`]: tests that cannot run here, and cases that are left to `scripts/dev thorough`
 //! - [`slow`]: steps that take too long
 //! - [`early`]: runs that are stopped while they start
 //! - [`disk`]: a full disk under the recorder

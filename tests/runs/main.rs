@@ -33,7 +33,7 @@
 //! - [`new`]: vehicle files from models of other tools
 //! - [`rights`]: rights that a run lacks are named
 //! - [`autopilots`]: firmware in lockstep
-//! - [`skipped`]: tests that cannot run here
+//! - [`skipped`]: tests that cannot run here, and cases that are left to `scripts/dev thorough`
 //! - [`sensors`]: sensors read what they should, and hand over what is under way
 //! - [`surroundings`]: hosts that lack something
 //! - [`untrusted`]: names and contents of files that others made

@@ -1,21 +1,66 @@
-//! Tests that cannot run here say so and are counted. Tests of all crates include this file.
+//! Tests that cannot run here, and cases that heavy tests leave to `scripts/dev thorough`: both are reported and counted.
+//! Tests of all crates include this file.
 
 use std::fs::OpenOptions;
 use std::io::Write as _;
 
-/// The file that gets a line for each skipped test; `scripts/test` sets it and counts the lines.
+/// The file that gets a line for each skipped test and for cases that are left out. `scripts/test` sets it and counts.
 const VARIABLE: &str = "HUMMINGBUS_SKIPPED";
+/// If it is set, heavy tests take all of their cases. `scripts/dev thorough` sets it.
+const THOROUGH: &str = "HUMMINGBUS_THOROUGH";
 
 /// Tells that the running test, or a part of it, is skipped, and why.
 pub fn skip(reason: &str) {
-    let thread = std::thread::current();
-    let line = format!("skipped: {}: {reason}\n", thread.name().unwrap_or("a test"));
+    report(&format!("skipped: {}: {reason}\n", test_name()));
+}
+
+/// Name of the running test.
+fn test_name() -> String {
+    std::thread::current().name().unwrap_or("a test").to_owned()
+}
+
+/// Writes a line to standard error and to the report.
+fn report(line: &str) {
     // Not `eprintln!`, which the test runner hides.
     let _ = std::io::stderr().write_all(line.as_bytes());
     if let Some(path) = std::env::var_os(VARIABLE) {
         let mut file = OpenOptions::new().create(true).append(true).open(&path).expect(VARIABLE);
         file.write_all(line.as_bytes()).expect(VARIABLE);
     }
+}
+
+/// True if heavy tests take all of their cases.
+#[allow(dead_code, reason = "few crates have heavy tests")]
+pub fn is_thorough() -> bool {
+    std::env::var_os(THOROUGH).is_some_and(|value| !value.is_empty())
+}
+
+/// Reports that the running test leaves `count` of its cases to `scripts/dev thorough`; `what` names them in the plural.
+#[allow(dead_code, reason = "few crates have heavy tests")]
+pub fn leave(count: usize, what: &str) {
+    // `scripts/test` sums the third words.
+    report(&format!("left out: {count} {what} of {}\n", test_name()));
+}
+
+/// The cases that the running test takes: all if it is thorough, and elsewhere those that `is_quick`. Reports the others.
+#[allow(dead_code, reason = "few crates have heavy tests")]
+#[track_caller]
+pub fn cases<T>(what: &str, all: impl IntoIterator<Item = T>, is_quick: impl Fn(&T) -> bool) -> Vec<T> {
+    let is_thorough = is_thorough();
+    let (taken, left): (Vec<T>, Vec<T>) = all.into_iter().partition(|case| is_thorough || is_quick(case));
+    assert!(!taken.is_empty(), "the quick tests take none of the {what}");
+    if !left.is_empty() {
+        leave(left.len(), what);
+    }
+    taken
+}
+
+/// The first `count` cases, or all as in [`cases`].
+#[allow(dead_code, reason = "few crates have heavy tests")]
+#[track_caller]
+pub fn first<T>(count: usize, what: &str, all: impl IntoIterator<Item = T>) -> Vec<T> {
+    let numbered = all.into_iter().enumerate();
+    cases(what, numbered, |(number, _)| *number < count).into_iter().map(|(_, case)| case).collect()
 }
 
 /// True where `HUMMINGBUS_STEADY` says that nothing else runs on this machine; a skipped test elsewhere. For tests of what
