@@ -3,8 +3,10 @@
 use crate::nodes::{manifest, sender, table};
 use crate::recordings::{open, require_same};
 use crate::refusals::{good, refused, refused_text};
+use crate::scenarios::{kind, nodes};
 use crate::support::{Place, repository};
 use serde_json::Value;
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -15,7 +17,45 @@ pub fn shipped() -> Vec<String> {
         let name = path.file_name().unwrap().to_string_lossy();
         name.ends_with(".toml") && !["cpp", "python", "fmu"].iter().any(|language| name.contains(language))
     };
-    entries.filter(is_flown_here).map(|path| path.to_string_lossy().into_owned()).collect()
+    let mut paths: Vec<String> =
+        entries.filter(is_flown_here).map(|path| path.to_string_lossy().into_owned()).collect();
+    // Whatever order the file system has them in: cases that are drawn are the same everywhere.
+    paths.sort();
+    paths
+}
+
+/// Manifests that have a node of every kind, every physics backend, meshes, free bodies, joints and ropes, a rig, a radio link, a
+/// node of another program, steps that take time, each way to replace a node, and many vehicles.
+const REPRESENTATIVE: [&str; 24] = [
+    "by-hand",
+    "commands-over-a-link",
+    "computing-time",
+    "custom-controller",
+    "driven-joints",
+    "ground-station-radio",
+    "hexa-hover",
+    "hover-rapier",
+    "identify/excite",
+    "imu-detail",
+    "labyrinth",
+    "replay-nanobench",
+    "rig-delay/imu",
+    "rig-hover",
+    "sensors",
+    "slung-load",
+    "standby",
+    "swap-laws",
+    "ten-vehicles",
+    "thesis/hover-estimated",
+    "thesis/propeller-steps-noisy",
+    "wall-follow-constant-thesis",
+    "wall-stop-open-gps",
+    "wall-stop-thesis-fast",
+];
+
+/// True for the manifests that quick tests of all shipped ones take.
+pub fn is_representative(path: &str) -> bool {
+    REPRESENTATIVE.iter().any(|name| path.ends_with(&format!("/manifests/{name}.toml")))
 }
 
 /// Manifests in the folders below that fly by themselves: no sets, campaigns and autopilots, which are parts of
@@ -70,16 +110,26 @@ fn read_by<'g>(graph: &'g Value, name: &str, port: &str) -> &'g str {
     graph["topics"][topic]["name"].as_str().unwrap()
 }
 
+/// The representative ones have every kind of node that any has.
 #[test]
 fn every_shipped_manifest_is_accepted() {
     let place = Place::new();
     let shipped = shipped();
     assert!(shipped.len() >= 7, "{shipped:?}");
+    let (mut all, mut representative, mut count) = (BTreeSet::new(), BTreeSet::new(), 0);
     for path in shipped.into_iter().chain(shipped_in_folders()) {
         let settings = settings(&place, &path);
         let settings: Vec<&str> = settings.iter().map(String::as_str).collect();
-        graph(&path, &settings);
+        let graph = graph(&path, &settings);
+        let kinds: BTreeSet<String> = nodes(&graph).map(|node| kind(node).to_owned()).collect();
+        if is_representative(&path) {
+            count += 1;
+            representative.extend(kinds.iter().cloned());
+        }
+        all.extend(kinds);
     }
+    assert_eq!(representative, all);
+    assert_eq!(count, REPRESENTATIVE.len(), "one of {REPRESENTATIVE:?} is not shipped");
 }
 
 // Includes
@@ -258,7 +308,7 @@ fn a_vehicle_differs_from_its_set_where_it_says_so() {
 fn every_loop_of_a_swarm_stays_on_one_core_and_all_cores_are_used() {
     let graph = graph(&repository("manifests/swarm.toml"), &[]);
     let core = |name: String| node(&graph, &name)["cpu"].as_u64();
-    let mut used = std::collections::BTreeSet::new();
+    let mut used = BTreeSet::new();
     for vehicle in 1..=4 {
         let cores = ["plant", "imu", "ekf", "controller"].map(|node| core(format!("h{vehicle}/{node}")));
         assert!(cores.iter().all(|core| *core == cores[0]), "h{vehicle}: {cores:?}");
