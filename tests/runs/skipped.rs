@@ -63,6 +63,16 @@ pub fn first<T>(count: usize, what: &str, all: impl IntoIterator<Item = T>) -> V
     cases(what, numbered, |(number, _)| *number < count).into_iter().map(|(_, case)| case).collect()
 }
 
+/// `whole` if the running test is thorough. Elsewhere `quick`, which reports one case that is left out.
+#[allow(dead_code, reason = "few crates have heavy tests")]
+pub fn quick_or<T>(quick: T, whole: T, what: &str) -> T {
+    if is_thorough() {
+        return whole;
+    }
+    leave(1, what);
+    quick
+}
+
 /// True where `HUMMINGBUS_STEADY` says that nothing else runs on this machine; a skipped test elsewhere. For tests of what
 /// host time decides, such as the silence of a person who flies by hand.
 #[allow(dead_code, reason = "few crates' tests need it")]
