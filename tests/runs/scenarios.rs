@@ -2,6 +2,7 @@
 //! truth.
 
 use crate::recordings::rows;
+use crate::skipped::{cases, first, is_thorough, leave};
 use crate::support::{Ended, Place, repository};
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -45,6 +46,11 @@ fn composed(place: &Place, path: &str, recording: &str, settings: &[&str]) -> En
     place.call(&args)
 }
 
+/// Flies the scenarios that the running test takes: all, or those of `quick`. `scripts/scenarios` flies all with every seed.
+fn fly_some(all: &[&str], quick: &[&str]) {
+    cases("scenarios", all.iter().copied(), |name| quick.contains(name)).into_iter().for_each(fly);
+}
+
 /// Flies `name` with one seed, or with each of several; its own conditions decide.
 fn fly(name: &str) {
     fly_with(name, &SEEDS[..1]);
@@ -80,10 +86,15 @@ fn take_off_in_disturbed_air() {
     fly("take-off-attitude");
 }
 
+/// Quick tests fly rig A until both sticks were answered: a rig takes longer than its simulated time.
 #[test]
 fn sticks_in_both_rigs() {
-    fly("rig-a");
-    fly("rig-b");
+    if is_thorough() {
+        return ["rig-a", "rig-b"].into_iter().for_each(fly);
+    }
+    let (place, manifest) = (Place::new(), repository("manifests/rig-a.toml"));
+    composed(&place, &manifest, &place.path("flight.mcap"), &["run.duration_s=16"]).with_code(0);
+    leave(2, "scenarios");
 }
 
 #[test]
@@ -99,7 +110,7 @@ fn rotors_hover_faster_where_they_lift_what_hangs_in_the_rig() {
 /// Of each the conditions in its first seconds, roll and pitch; `scripts/rig_delay` flies them whole.
 #[test]
 fn a_delay_beside_the_loop_shows_as_it_is_and_one_inside_is_not_flyable() {
-    for name in ["nothing", "print-b", "imu"] {
+    for name in cases("delays", ["nothing", "print-b", "imu"], |name| *name != "nothing") {
         let (place, manifest) = (Place::new(), repository(&format!("manifests/rig-delay/{name}.toml")));
         let recording = place.path("flight.mcap");
         composed(&place, &manifest, &recording, &["run.duration_s=7"]).with_code(0);
@@ -108,7 +119,7 @@ fn a_delay_beside_the_loop_shows_as_it_is_and_one_inside_is_not_flyable() {
 
 #[test]
 fn stops_before_a_wall_by_our_law_at_three_speeds() {
-    ["wall-stop-slow", "wall-stop", "wall-stop-fast"].into_iter().for_each(fly);
+    fly_some(&["wall-stop-slow", "wall-stop", "wall-stop-fast"], &["wall-stop"]);
 }
 
 /// The vehicle brakes from its cruising speed to standstill without speeding up on the way, at each speed and seed.
@@ -116,8 +127,9 @@ fn stops_before_a_wall_by_our_law_at_three_speeds() {
 fn it_stops_once_before_a_wall() {
     const STOPPED_M_S: f64 = 0.1;
     const STEPS_M_S: f64 = 0.03;
-    for (name, seconds) in [("wall-stop-slow", 35), ("wall-stop", 22), ("wall-stop-fast", 15)] {
-        for seed in SEEDS {
+    let flights = [("wall-stop-fast", 15), ("wall-stop", 22), ("wall-stop-slow", 35)];
+    for (name, seconds) in first(2, "speeds", flights) {
+        for seed in first(1, &format!("seeds of {name}"), SEEDS) {
             let (place, manifest) = (Place::new(), repository(&format!("manifests/{name}.toml")));
             let recording = place.path("flight.mcap");
             let [duration, seed_set] = [format!("run.duration_s={seconds}"), format!("run.seed={seed}")];
@@ -142,7 +154,10 @@ fn it_stops_once_before_a_wall() {
 
 #[test]
 fn stops_before_a_wall_by_the_thesis_s_law_at_three_speeds() {
-    ["wall-stop-thesis-slow", "wall-stop-thesis", "wall-stop-thesis-fast"].into_iter().for_each(fly);
+    fly_some(
+        &["wall-stop-thesis-slow", "wall-stop-thesis", "wall-stop-thesis-fast"],
+        &["wall-stop-thesis-fast"],
+    );
 }
 
 #[test]
@@ -152,12 +167,12 @@ fn stops_before_a_wall_in_the_open_and_stands_there_with_gps() {
 
 #[test]
 fn follows_the_walls_at_varying_speed() {
-    ["wall-follow-varying", "wall-follow-varying-thesis"].into_iter().for_each(fly);
+    fly_some(&["wall-follow-varying", "wall-follow-varying-thesis"], &["wall-follow-varying-thesis"]);
 }
 
 #[test]
 fn follows_the_walls_at_a_constant_distance() {
-    ["wall-follow-constant", "wall-follow-constant-thesis"].into_iter().for_each(fly);
+    fly_some(&["wall-follow-constant", "wall-follow-constant-thesis"], &["wall-follow-constant"]);
 }
 
 #[test]
