@@ -88,7 +88,12 @@ fn a_number_that_is_not_finite_ends_the_run_with_node_topic_tick_and_field() {
 
 #[test]
 fn a_node_that_hangs_is_named_with_its_tick() {
-    fly_with("hang").says(&["stood still", "tick 50 is not completed by", "`faulty`"]);
+    let place = Place::new();
+    let keys = "watchdog_ms_host = 3000\nparameters = { fault = \"hang\", at_tick = 50 }";
+    let relay = sender("relay", 1, "inputs.input = \"/faulty/note\"");
+    let path = place.write("hanging.toml", manifest(5_000, &[sender("faulty", 1, keys), relay]));
+    let ended = place.call(&["run", &path]).with_code(2);
+    ended.says(&["stood still", "tick 50 is not completed by", "`faulty`"]);
 }
 
 #[test]

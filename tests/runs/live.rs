@@ -1,6 +1,7 @@
 //! Runs that are watched and steered while they fly: what is seen is true, and nothing of it changes a recording.
 
 use crate::recordings::require_same;
+use crate::skipped::first;
 use crate::support::{Ended, Launch, Place, poll, repository};
 use crate::terminal::Terminal;
 use rustix::process::Signal;
@@ -19,10 +20,22 @@ const SLOW: &str = "0.05";
 
 /// Starts hover.toml at `pace`, recording to `name`, and waits until it is well on its way.
 fn take_off<'a>(place: &'a Place, name: &str, pace: &str, duration_s: u32) -> Launch<'a> {
+    take_off_with(place, name, pace, duration_s, &[])
+}
+
+/// The same with `more` arguments.
+fn take_off_with<'a>(
+    place: &'a Place,
+    name: &str,
+    pace: &str,
+    duration_s: u32,
+    more: &[String],
+) -> Launch<'a> {
     let (manifest, recording) = (repository("manifests/hover.toml"), place.path(name));
     let duration = format!("run.duration_s={duration_s}");
     let args = ["run", &manifest, "--record", &recording, "--pace", pace, "--set", &duration, "--json"];
-    let mut launch = place.start(&args);
+    let more = more.iter().map(String::as_str);
+    let mut launch = place.start(&args.into_iter().chain(more).collect::<Vec<_>>());
     launch.await_ticks(100);
     launch
 }
@@ -87,7 +100,7 @@ fn pausing_stepping_and_pacing_change_no_byte_of_a_recording() {
 fn every_pause_holds_the_tick_that_it_names() {
     let place = Place::new();
     let flight = take_off(&place, "often.mcap", "free", ENDLESS);
-    for _ in 0..30 {
+    for _ in first(10, "pauses", 0..30) {
         let held = tick_after(&place, &["pause"]);
         assert_eq!(state(&place), ("paused".to_owned(), held));
         ctl(&place, &["resume"]);
@@ -99,9 +112,11 @@ fn every_pause_holds_the_tick_that_it_names() {
 #[test]
 fn a_run_can_be_paused_for_longer_than_the_watchdog_waits() {
     let place = Place::new();
-    let flight = take_off(&place, "long.mcap", "realtime", ENDLESS);
+    let watchdogs = ["controller", "ekf", "imu", "mocap", "pilot", "plant", "recorder"]
+        .map(|name| format!("--set=process.{name}.watchdog_ms_host=5000"));
+    let flight = take_off_with(&place, "long.mcap", "realtime", ENDLESS, &watchdogs);
     let held = tick_after(&place, &["pause"]);
-    sleep(Duration::from_secs(23));
+    sleep(Duration::from_secs(8));
     assert_eq!(state(&place), ("paused".to_owned(), held));
     ctl(&place, &["resume"]);
     poll("the run does not go on", || (state(&place).1 > held + 100).then_some(()));
