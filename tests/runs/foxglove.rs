@@ -1,6 +1,7 @@
 //! Live runs in Foxglove: what a client sees, and that no client changes or holds up a run.
 
 use crate::recordings::require_same;
+use crate::skipped::first;
 use crate::support::{Launch, Place, poll, repository};
 use rustix::process::Signal;
 use serde_json::{Value, json};
@@ -117,10 +118,13 @@ fn a_run_that_is_watched_writes_the_same_bytes_though_a_client_does_not_read() {
     let manifest = repository("manifests/hover.toml");
     // So slow at first that clients are there before the end, however busy the machine is: who shows a run steps back for
     // it. A run on one thread takes no requests and keeps its pace.
-    for (host, pace) in [(&[][..], "0.1"), (&["--compose", "all"], "0.1"), (&["--in-process"], "0.5")] {
+    let hosts =
+        [(&[][..], "0.1", "4"), (&["--in-process"], "0.25", "2.5"), (&["--compose", "all"], "0.1", "4")];
+    for (host, pace, seconds) in first(2, "hosts", hosts) {
         let place = Place::new();
         let (recording, alone) = (place.path("watched.mcap"), place.path("alone.mcap"));
-        let args = ["run", &manifest, "--set", "run.duration_s=8", "--record"];
+        let duration = format!("run.duration_s={seconds}");
+        let args = ["run", &manifest, "--set", &duration, "--record"];
         let run = place.start(&[&args[..], &[&recording, "--foxglove=0", "--pace", pace], host].concat());
         // A client that takes all, and one that takes nothing any more.
         let mut quick = Client::of(&run);
