@@ -1,6 +1,7 @@
 //! Composition: nodes that share a process give the same bytes, are swapped like others, and end like others.
 
 use crate::recordings::require_same;
+use crate::skipped::{cases, first};
 use crate::support::{Place, repository};
 use rand_core::Rng;
 use rustix::process::{Signal, kill_process};
@@ -62,7 +63,7 @@ fn partitions(manifest: &str, seeds: Range<u64>) -> Vec<String> {
 
 #[test]
 fn every_partition_of_the_hover_gives_the_same_file() {
-    let mut compositions = partitions("manifests/hover.toml", 0..12);
+    let mut compositions = first(4, "partitions", partitions("manifests/hover.toml", 0..12));
     compositions.push("all".to_owned());
     require_same_file("manifests/hover.toml", 1.0, &[], &compositions);
 }
@@ -78,7 +79,9 @@ fn partitions_of_other_flights_give_the_same_file() {
         ("manifests/swap-laws.toml", 0.9, &EARLY_SWAPS, 18..21),
     ];
     for (manifest, duration_s, settings, seeds) in flights {
-        require_same_file(manifest, duration_s, settings, &partitions(manifest, seeds));
+        let what = format!("partitions of {manifest}");
+        let compositions = first(1, &what, partitions(manifest, seeds));
+        require_same_file(manifest, duration_s, settings, &compositions);
     }
 }
 
@@ -99,14 +102,18 @@ fn ten_vehicles_give_the_same_file_whole_by_vehicle_and_in_any_partition() {
 
 #[test]
 fn contacts_walls_figures_and_swaps_give_the_same_file() {
-    for manifest in [
+    let manifests = [
         "manifests/wall-follow-varying.toml",
         "manifests/figure-eight.toml",
         "manifests/swap-laws.toml",
         "manifests/standby.toml",
         "manifests/hover-rapier.toml",
         "manifests/computing-time.toml",
-    ] {
+    ];
+    // Partitions of the others are flown in other tests.
+    let is_quick =
+        |name: &str| ["standby", "hover-rapier", "computing-time"].iter().any(|it| name.contains(it));
+    for manifest in cases("manifests", manifests, |name| is_quick(name)) {
         // swap-laws swaps up to 9 s.
         let duration_s = if manifest.contains("swap") { 12.0 } else { 2.5 };
         require_same_file(manifest, duration_s, &[], &["all".to_owned()]);
