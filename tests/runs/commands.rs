@@ -1,5 +1,6 @@
 //! The other subcommands, exit codes and JSON.
 
+use crate::skipped::cases;
 use crate::support::{Place, repository};
 use serde_json::{Value, json};
 use std::fs;
@@ -343,7 +344,7 @@ fn a_recording_with_a_wrong_byte_is_never_identical_and_never_a_crash() {
     let place = Place::new();
     let whole = recording(&place);
     let bytes = fs::read(&whole).unwrap();
-    for part in 0..64 {
+    for part in cases("bytes", 0..64, |part| part % 4 == 0) {
         let mut changed = bytes.clone();
         changed[bytes.len() * part / 64] ^= 0x55;
         let changed = place.write("changed.mcap", changed);
