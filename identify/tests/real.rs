@@ -60,8 +60,10 @@ fn every_other_order_of_real_motors_is_found() {
     let fits = set.flights.iter().filter(|flight| flight.role == Role::Fit).count();
     let codes = (0..256_usize).map(|code| [code / 64, code / 16 % 4, code / 4 % 4, code % 4]);
     let others = codes.filter(|order| (0..4).all(|rotor| order.contains(&rotor))).skip(1);
+    let others = skipped::cases("orders", others.enumerate(), |(number, _)| number % 5 == 0);
     let wrong: Vec<String> = others
-        .filter_map(|order| {
+        .into_iter()
+        .filter_map(|(_, order)| {
             let mut set = set.clone();
             for commands in set.flights.iter_mut().flat_map(|flight| &mut flight.command.values) {
                 let logged = *commands;
@@ -85,12 +87,13 @@ fn every_other_order_of_real_motors_is_found() {
 fn real_flights_have_their_motors_in_order() {
     for name in ["nanobench", "arpl-crazyflie", "nanodrone", "neurobem"] {
         let Some(set) = flights(name) else { return };
-        // All together, and each flight by itself.
+        // All together, and each flight by itself: in quick tests every fifth.
         let of_role = |flight: &Flight, role| Flight { role, ..flight.clone() };
-        let alone = set
-            .flights
-            .iter()
-            .map(|flight| [Role::Fit, Role::Test].map(|role| of_role(flight, role)).to_vec());
+        let numbered = set.flights.iter().enumerate();
+        let alone = skipped::cases(&format!("flights of {name}"), numbered, |(number, _)| number % 5 == 0);
+        let alone = alone
+            .into_iter()
+            .map(|(_, flight)| [Role::Fit, Role::Test].map(|role| of_role(flight, role)).to_vec());
         for flights in std::iter::once(set.flights.clone()).chain(alone) {
             let found = faults(&FlightSet { flights, ..set.clone() });
             let found = found.unwrap_or_else(|error| panic!("{name}: {error}"));
