@@ -1,5 +1,6 @@
 //! Clocks of attitude and gyroscope against each other, whatever noise the attitude has, and of rotor speeds against the gyroscope.
 use crate::simulated;
+use crate::skipped::{cases, first};
 use flights::Channel;
 use identify::run::identify;
 use rayon::prelude::*;
@@ -23,7 +24,7 @@ fn offsets(seed: u64, late_s: f64) -> Vec<[f64; 4]> {
 
 #[test]
 fn intervals_hold_the_truth_and_flights_that_were_measured_right_are_not_shifted() {
-    for late_s in [0.0, 0.003, 0.0124] {
+    for late_s in cases("delays", [0.0, 0.003, 0.0124], |late_s| *late_s != 0.003) {
         let found: Vec<[f64; 4]> =
             (0..SEEDS).into_par_iter().flat_map_iter(|seed| offsets(9000 + seed, late_s)).collect();
         assert_eq!(found.len(), 2 * SEEDS as usize);
@@ -54,7 +55,8 @@ fn rotor_offsets(seed: u64, names: &[&'static str], late_s: [f64; 2]) -> (Vec<[f
 
 #[test]
 fn rotor_speeds_that_are_late_are_found_whatever_inertia_is_declared_and_no_effect_is_named_for_them() {
-    let cases: Vec<(u64, &[&'static str], [f64; 2])> = (0..4)
+    let flown: Vec<(u64, &[&'static str], [f64; 2])> = first(2, "seeds", 0..4)
+        .into_iter()
         .flat_map(|seed| {
             let of = |names, late_s| (9100 + seed, names, late_s);
             [
@@ -65,8 +67,8 @@ fn rotor_speeds_that_are_late_are_found_whatever_inertia_is_declared_and_no_effe
         })
         .collect();
     let found: Vec<_> =
-        cases.par_iter().map(|(seed, names, late_s)| rotor_offsets(*seed, names, *late_s)).collect();
-    for ((seed, names, late_s), (offsets, verdict)) in cases.iter().zip(&found) {
+        flown.par_iter().map(|(seed, names, late_s)| rotor_offsets(*seed, names, *late_s)).collect();
+    for ((seed, names, late_s), (offsets, verdict)) in flown.iter().zip(&found) {
         println!("{seed} {names:?}: true {late_s:?}, found {offsets:?}, named {verdict:?}");
         for ([value, _, _, taken_off], true_s) in offsets.iter().zip(late_s) {
             assert!((value - true_s).abs() < 0.002, "{seed} {names:?}: {value} for {true_s}");

@@ -1,5 +1,6 @@
 //! Torques of the air in free flight: torque by speed and rate damping, alone and beside an inertia error.
 use crate::simulated;
+use crate::skipped::first;
 use rayon::prelude::*;
 use simulated::cases::{Case, Judgement};
 
@@ -13,7 +14,8 @@ fn judged(names: &[&'static str], seeds: std::ops::Range<u64>) -> Vec<Judgement>
         case.plan.sensors.has_rotor_speeds = true;
         case.judged()
     };
-    seeds.into_par_iter().map(one).collect()
+    let what = format!("seeds of {}", names.join(" and "));
+    first(1, &what, seeds).into_par_iter().map(one).collect()
 }
 
 fn require_named_alone(names: &[&'static str], seeds: std::ops::Range<u64>) {
