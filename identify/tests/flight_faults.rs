@@ -20,7 +20,7 @@ const TOLD_S: f64 = 0.025;
 /// Commands on another clock pass for no other order of the rotors, whether they are late or early.
 #[test]
 fn commands_on_another_clock_are_told_with_the_time() {
-    for seed in [60, 160, 260] {
+    for seed in skipped::first(1, "seeds", [60, 160, 260]) {
         let whole = several(&Case::of(&["mass-error", "rotor-drag"], 1.0, seed, DURATION_S));
         let shifts_s = [-0.8, -0.45, -0.3, 0.25, 0.3, 0.45, 0.8];
         let wrong: Vec<String> = shifts_s
@@ -154,9 +154,11 @@ fn undeclared_effects_are_no_faults() {
             [1.0, 3.0].map(|noise| Case::of(&[*name], 1.0, 700 + 10 * number, DURATION_S).with_noise(noise))
         })
         .collect();
+    // Each noise with every fifth effect.
+    let cases = skipped::cases("effects", cases.into_iter().enumerate(), |(number, _)| number % 5 == 0);
     let wrong: Vec<String> = cases
         .par_iter()
-        .filter_map(|case| {
+        .filter_map(|(_, case)| {
             let found = found(&several(case));
             (!found.is_empty()).then(|| format!("{:?}: {found:#?}", case.effects()))
         })
@@ -179,7 +181,10 @@ fn ways_to_log_and_to_fly_are_no_faults() {
                 vec![scaled("rotor-drag", 1.0), scaled("command-delay", 1.0), scaled("motor-lag", 1.0)]
         },
     ];
-    for (number, change) in changes.iter().enumerate() {
+    // Slow control and poses, late poses, and stiff control with rotor speeds.
+    let is_quick = |number: usize| [1, 3, 5].contains(&number);
+    let ways = skipped::cases("ways", changes.iter().enumerate(), |(number, _)| is_quick(*number));
+    for (number, change) in ways {
         let mut case = Case::null(900 + 10 * number as u64, DURATION_S);
         change(&mut case.plan);
         let mut set = several(&case);
@@ -292,7 +297,7 @@ fn a_gyroscope_that_is_frozen_mirrored_or_scaled() {
     require_broken(false, "angular_velocity.y", "frozen", |flight| {
         freeze(&mut flight.angular_velocity, 0.0, 9.0, &[1]);
     });
-    for (axis, name) in ["x", "y", "z"].iter().enumerate() {
+    for (axis, name) in skipped::first(1, "axes", ["x", "y", "z"].iter().enumerate()) {
         let channel = format!("angular_velocity.{name}");
         require_broken(false, &channel, "mirrored", |flight| {
             each(&mut flight.angular_velocity, |rate| rate[axis] = -rate[axis]);
@@ -323,12 +328,12 @@ fn an_accelerometer_that_is_frozen_mirrored_or_scaled() {
     require_broken(false, "specific_force.z", "frozen", |flight| {
         freeze(&mut flight.specific_force, 0.0, 9.0, &[2]);
     });
-    for (axis, name) in ["x", "y", "z"].iter().enumerate() {
+    for (axis, name) in skipped::first(1, "axes", ["x", "y", "z"].iter().enumerate()) {
         require_broken(false, &format!("specific_force.{name}"), "mirrored", |flight| {
             each(&mut flight.specific_force, |force| force[axis] = -force[axis]);
         });
     }
-    for factor in [0.5, 2.0] {
+    for factor in skipped::first(1, "factors", [0.5, 2.0]) {
         require_broken(false, "specific_force.z", "scaled", |flight| {
             each(&mut flight.specific_force, |force| *force = force.map(|force| factor * force));
         });
@@ -344,7 +349,7 @@ fn a_position_that_jumps_is_frozen_or_mirrored() {
     require_broken(false, "position.x", "frozen", |flight| {
         freeze(&mut flight.position, 4.0, 5.0, &[0, 1, 2])
     });
-    for (axis, name) in ["x", "y", "z"].iter().enumerate() {
+    for (axis, name) in skipped::first(1, "axes", ["x", "y", "z"].iter().enumerate()) {
         require_broken(false, &format!("position.{name}"), "mirrored", |flight| {
             each(&mut flight.position, |position| position[axis] = -position[axis]);
         });
@@ -360,13 +365,15 @@ fn commands_that_are_frozen_swapped_or_scaled() {
         require_broken(rotor_speeds, "command", "frozen", |flight| {
             freeze(&mut flight.command, 3.0, 5.0, &[0, 1, 2, 3]);
         });
-        for (a, b) in [(0, 1), (0, 2), (1, 3), (2, 3)] {
+        let speeds = if rotor_speeds { "with rotor speeds" } else { "without rotor speeds" };
+        let what = format!("exchanges {speeds}");
+        for (a, b) in skipped::first(1, &what, [(0, 2), (0, 1), (1, 3), (2, 3)]) {
             let channel = format!("command.{}+{}", a + 1, b + 1);
             require_broken(rotor_speeds, &channel, "swapped", |flight| {
                 each(&mut flight.command, |commands| commands.swap(a, b));
             });
         }
-        for factor in [0.6, 2.0] {
+        for factor in skipped::first(1, &format!("factors {speeds}"), [0.6, 2.0]) {
             require_broken(rotor_speeds, "command", "scaled", |flight| {
                 each(&mut flight.command, |commands| *commands = commands.map(|command| factor * command));
             });
@@ -379,10 +386,9 @@ fn commands_that_are_frozen_swapped_or_scaled() {
 fn every_order_of_the_motors_is_found() {
     let orders = (0..256_usize).map(|code| [code / 64, code / 16 % 4, code / 4 % 4, code % 4]);
     let others = orders.filter(|order| (0..4).all(|rotor| order.contains(&rotor))).skip(1);
-    let wrong: Vec<String> = others
-        .collect::<Vec<_>>()
+    let wrong: Vec<String> = skipped::cases("orders", others.enumerate(), |(number, _)| number % 4 == 0)
         .par_iter()
-        .filter_map(|order| {
+        .filter_map(|(_, order)| {
             let mut set = flown(false);
             each(&mut set.flights[FAULTY].command, |commands| {
                 let logged = *commands;
