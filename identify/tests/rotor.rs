@@ -17,6 +17,8 @@ use tempfile::TempDir;
 const C_T: f64 = 4.0e-6;
 const C_Q: f64 = 6.0e-8;
 const CASES: u64 = 200;
+/// Cases of quick tests: at a true rate of 95 %, fewer than 90 hold the truth once in 90 times; the seeds are fixed.
+const QUICK_CASES: u64 = 100;
 
 /// Random numbers of a case.
 struct Draws(ChaCha8Rng);
@@ -179,9 +181,11 @@ fn dynamic_stand(seed: u64, motor: Motor) -> RotorReport {
     stand.run().unwrap()
 }
 
-/// The answers of all cases, by two threads.
+/// The answers of all cases that the running test takes, by two threads.
 fn all_cases<T: Send>(case: impl Fn(u64) -> T + Sync) -> Vec<T> {
-    let half = |odd: u64| (0..CASES / 2).map(|index| case(2 * index + odd)).collect::<Vec<T>>();
+    let count = if skipped::is_thorough() { CASES } else { QUICK_CASES };
+    skipped::leave((CASES - count) as usize, "seeds");
+    let half = |odd: u64| (0..count / 2).map(|index| case(2 * index + odd)).collect::<Vec<T>>();
     thread::scope(|scope| {
         let other = scope.spawn(|| half(1));
         let mut all = half(0);
@@ -194,9 +198,11 @@ fn require_coverage(name: &str, truth: f64, estimates: impl Iterator<Item = Opti
     let inside = |estimate: Option<Estimate>| {
         estimate.is_some_and(|estimate| estimate.low <= truth && truth <= estimate.high)
     };
-    let holds = estimates.filter(|estimate| inside(*estimate)).count() as f64 / CASES as f64;
+    let estimates: Vec<Option<Estimate>> = estimates.collect();
+    let count = estimates.len();
+    let holds = estimates.into_iter().filter(|estimate| inside(*estimate)).count() as f64 / count as f64;
     let _ =
-        writeln!(std::io::stderr(), "{name}: the truth is inside in {:.1} % of {CASES} cases", 100.0 * holds);
+        writeln!(std::io::stderr(), "{name}: the truth is inside in {:.1} % of {count} cases", 100.0 * holds);
     assert!((0.90..=0.99).contains(&holds), "{name}: {holds}");
 }
 
@@ -220,7 +226,7 @@ fn a_first_order_motor_is_told_as_one() {
     let dynamics = || reports.iter().map(|report| report.dynamics.as_ref().unwrap());
     require_coverage("time constant", 0.04, dynamics().map(|fit| fit.first.time_constant_s));
     let right = dynamics().filter(|fit| fit.comparison.preferred == Order::First).count();
-    assert!(right as u64 >= CASES * 95 / 100, "{right} of {CASES}");
+    assert!(right >= reports.len() * 95 / 100, "{right} of {}", reports.len());
 }
 
 #[test]
@@ -230,7 +236,7 @@ fn a_second_order_motor_is_told_as_one() {
     require_coverage("natural frequency", 45.0, dynamics().map(|fit| fit.second.natural_frequency_rad_s));
     require_coverage("damping ratio", 0.8, dynamics().map(|fit| fit.second.damping_ratio));
     let right = dynamics().filter(|fit| fit.comparison.preferred == Order::Second).count();
-    assert!(right as u64 >= CASES * 95 / 100, "{right} of {CASES}");
+    assert!(right >= reports.len() * 95 / 100, "{right} of {}", reports.len());
 }
 
 #[test]
