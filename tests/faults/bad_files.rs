@@ -1,6 +1,7 @@
 //! Corrupted manifests and truncated recordings: a clear error, never a crash.
 
 use crate::flight::{Reference, manifest};
+use crate::skipped::{cases, first};
 use crate::support::Place;
 use rand_core::Rng;
 
@@ -13,7 +14,9 @@ fn a_corrupted_manifest_is_refused_with_its_place_or_still_means_something() {
     let text = manifest().into_bytes();
     let mut random = bus::random::stream(SEED, "corrupted manifest");
     let mut refused = 0;
-    for round in 0..120 {
+    let rounds = first(40, "corruptions", 0..120);
+    let count = rounds.len();
+    for round in rounds {
         let mut corrupted = text.clone();
         let at = random.next_u32() as usize % corrupted.len();
         match round % 3 {
@@ -33,7 +36,7 @@ fn a_corrupted_manifest_is_refused_with_its_place_or_still_means_something() {
             _ => panic!("seed {SEED}, round {round}: {ended}"),
         }
     }
-    assert!(refused > 60, "only {refused} of 120 were refused");
+    assert!(2 * refused > count, "only {refused} of {count} were refused");
 }
 
 #[test]
@@ -41,7 +44,9 @@ fn a_truncated_recording_reads_up_to_its_last_whole_chunk() {
     let (place, reference) = (Place::new(), Reference::fly());
     let bytes = reference.bytes();
     let mut ends = Vec::new();
-    for part in 1..24 {
+    let parts = cases("lengths", 1..24, |part| part % 3 == 0);
+    let count = parts.len();
+    for part in parts {
         let cut = place.write("cut.mcap", &bytes[..bytes.len() * part / 24]);
         let diff = place.call(&["diff", &cut, &reference.path()]).with_code(1);
         diff.prints(&[&cut]);
@@ -61,7 +66,7 @@ fn a_truncated_recording_reads_up_to_its_last_whole_chunk() {
         cat.says(&[&format!("what is whole of it ends after tick {tick}")]);
         assert!(cat.output.lines().last().unwrap().contains(&format!("\"tick\":{tick},")));
     }
-    assert!(ends.is_sorted() && ends.len() > 12, "{ends:?}");
+    assert!(ends.is_sorted() && 2 * ends.len() > count, "{ends:?} of {count}");
 }
 
 #[test]

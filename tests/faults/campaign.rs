@@ -1,8 +1,9 @@
 //! Many seeded cases, two at a time; one that fails says how to repeat it.
 //!
-//! `HUMMINGBUS_KILL_POINTS` says how many, `HUMMINGBUS_SEED` which, `HUMMINGBUS_KILL_POINT` picks one of them to repeat
+//! Quick tests take the first third of the cases, and six of few. `HUMMINGBUS_KILL_POINTS` says how many, `HUMMINGBUS_SEED` which, `HUMMINGBUS_KILL_POINT` picks one of them to repeat
 //! it, and `HUMMINGBUS_LOAD` keeps cores busy beside them with this many threads.
 
+use crate::skipped::{is_thorough, leave};
 use crate::support::Load;
 use std::fmt::Debug;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -17,7 +18,8 @@ pub fn run<Case: Debug>(
 ) {
     let seed = number("HUMMINGBUS_SEED").unwrap_or(1);
     let first = number("HUMMINGBUS_KILL_POINT");
-    let count = first.map_or_else(|| number("HUMMINGBUS_KILL_POINTS").unwrap_or(count), |_| 1);
+    let asked = first.map(|_| 1).or_else(|| number("HUMMINGBUS_KILL_POINTS"));
+    let count = asked.unwrap_or_else(|| share(name, count));
     let _load = number("HUMMINGBUS_LOAD").map(|threads| Load::of_threads(usize::try_from(threads).unwrap()));
     let next = AtomicU64::new(first.unwrap_or(0));
     let end = next.load(Ordering::SeqCst) + count;
@@ -35,6 +37,16 @@ pub fn run<Case: Debug>(
     };
     std::thread::scope(|scope| (0..2).for_each(|_| drop(scope.spawn(work))));
     println!("seed {seed}, {count} cases of {name}");
+}
+
+/// The cases of `count` that the running test takes where no number is asked for.
+fn share(name: &str, count: u64) -> u64 {
+    if is_thorough() {
+        return count;
+    }
+    let share = count.div_ceil(3).max(6).min(count);
+    leave((count - share) as usize, &format!("cases of {name}"));
+    share
 }
 
 fn number(name: &str) -> Option<u64> {
