@@ -128,8 +128,8 @@ fn commands_that_are_written_on_change_hold_until_the_next() {
 /// Commands at 20 Hz that a table at the rate of the sensors repeats are as slow as those that were written once.
 #[test]
 fn commands_that_a_finer_table_holds_are_slow() {
-    let held = |is_on_change: bool| {
-        changed(&heavy(20.0), |flight| {
+    let held = |duration_s: f64, is_on_change: bool| {
+        changed(&heavy(duration_s), |flight| {
             let mut last = (f64::NEG_INFINITY, [0.0; ROTORS_MAX]);
             for (time_s, value) in flight.command.time_s.iter().zip(&mut flight.command.values) {
                 if time_s - last.0 > 0.05 - 1e-6 {
@@ -144,10 +144,10 @@ fn commands_that_a_finer_table_holds_are_slow() {
         let mut notes = report.flights.iter().flat_map(|flight| &flight.notes);
         notes.any(|note| note.contains("command: logged every 0.050 s"))
     };
-    let report = found(&held(false));
+    let report = found(&held(20.0, false));
     assert!(slow(&report), "{report}");
     require_mass_or_rival(&report);
-    assert!(!slow(&found(&held(true))));
+    assert!(!slow(&found(&held(8.0, true))));
 }
 
 /// Long flights with fewer samples of the pose, which are fitted in half of the time.
