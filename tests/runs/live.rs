@@ -14,8 +14,8 @@ use std::time::Duration;
 /// Duration of a run that no test outlasts, in s.
 const ENDLESS: u32 = 4_000_000;
 /// Duration of a run that is to come to its end, in s.
-const SHORT: u32 = 30;
-/// Pace at which a [`SHORT`] run lasts for ten minutes, longer than the watchdog of a launch waits.
+const SHORT: u32 = 17;
+/// Pace at which a [`SHORT`] run lasts for 340 s, longer than the watchdog of a launch waits.
 const SLOW: &str = "0.05";
 
 /// Starts hover.toml at `pace`, recording to `name`, and waits until it is well on its way.
@@ -164,10 +164,10 @@ fn a_step_to_the_end_ends_the_run_and_one_beyond_it_is_refused() {
     let place = Place::new();
     let flight = take_off(&place, "stepped.mcap", SLOW, SHORT);
     let held = tick_after(&place, &["pause"]);
-    call(&place, "ctl", &["step", "100000"]).with_code(2).says(&["only", "ends at tick 30000"]);
+    call(&place, "ctl", &["step", "100000"]).with_code(2).says(&["only", "ends at tick 17000"]);
     assert_eq!(state(&place), ("paused".to_owned(), held));
     ctl(&place, &["pace", "free"]);
-    assert_eq!(tick_after(&place, &["step", &(30_000 - held).to_string()]), 30_000);
+    assert_eq!(tick_after(&place, &["step", &(17_000 - held).to_string()]), 17_000);
     flight.end().flown();
 }
 
