@@ -270,7 +270,7 @@ fn a_live_run_of_a_hostile_name_is_shown_escaped() {
 #[test]
 fn a_name_of_megabytes_is_shortened() {
     let place = Place::new();
-    let long = "x".repeat(quick_or(1, 8, "names of 8 MB") << 20);
+    let long = "x".repeat(quick_or(1_usize, 8, "names of 8 MB") << 20);
     for (from, to) in [
         ("kind = \"imu\"", format!("kind = \"{long}\"")),
         ("[process.imu]", format!("[process.{long}]")),
