@@ -88,10 +88,15 @@ fn the_recording_is_the_same_however_processes_wait() {
 
 #[test]
 fn the_recording_is_the_same_on_any_core() {
-    require_reference(3, &["--set", "process.plant.cpu=1"]);
-    require_reference(3, &borrowed(&set_each("cpu", |_| "0".to_owned())));
-    require_reference(3, &borrowed(&set_each("cpu", |index| (index % 2).to_string())));
-    require_reference(3, &["--set", "run.clock_cpu=0", "--set", "process.recorder.cpu=0"]);
+    let ways = [
+        set_each("cpu", |_| "0".to_owned()),
+        set_each("cpu", |index| (index % 2).to_string()),
+        vec!["--set=process.plant.cpu=1".to_owned()],
+        vec!["--set=run.clock_cpu=0".to_owned(), "--set=process.recorder.cpu=0".to_owned()],
+    ];
+    for more in first(2, "placements", ways) {
+        require_reference(3, &borrowed(&more));
+    }
 }
 
 #[test]
