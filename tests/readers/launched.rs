@@ -6,12 +6,12 @@ use rustix::process::{Pid, Signal, kill_process};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-/// Longest time that a process may take to end in order.
-const GRACE: Duration = Duration::from_secs(10);
 /// Time between two looks at a process that ends.
 const LOOK: Duration = Duration::from_millis(20);
+/// Number of looks before a process is killed that does not end in order.
+const LOOKS: u32 = 500;
 
 /// A process of hummingbus. Dropping it ends it as Ctrl-C does: the launcher of a run removes the run's shared memory, also where the test has
 /// failed. One that does not end is killed.
@@ -26,19 +26,16 @@ impl Launched {
 
 impl Drop for Launched {
     fn drop(&mut self) {
-        let begun = Instant::now();
         let mut is_asked = false;
-        while let Ok(None) = self.0.try_wait() {
+        for _ in 0..LOOKS {
+            let Ok(None) = self.0.try_wait() else { return };
             if !is_asked {
                 is_asked = kill_process(Pid::from_child(&self.0), Signal::INT).is_ok();
             }
-            if begun.elapsed() > GRACE {
-                let _ = self.0.kill();
-                let _ = self.0.wait();
-                return;
-            }
             sleep(LOOK);
         }
+        let _ = self.0.kill();
+        let _ = self.0.wait();
     }
 }
 
