@@ -1,9 +1,9 @@
 //! Free bodies: things of a scene that move.
 #![allow(non_snake_case, reason = "a trailing _W names the frame a vector is written in")]
 
-use diagnostics::Diagnostic;
 use diagnostics::parameter::Bounds;
 use diagnostics::unit::{ANGULAR_VELOCITY, MASS, VELOCITY};
+use diagnostics::{Diagnostic, Faults};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use vehicles::reader::Section;
 
@@ -81,18 +81,22 @@ impl Keys {
         if !section.has("mass") {
             return Ok(None);
         }
-        let mass_kg = section.bounded("mass", MASS, &BODY_MASS);
+        let mut faults = Faults::default();
+        let mass_kg = faults.keep(section.bounded("mass", MASS, &BODY_MASS));
         let vector = |name, dimension, bounds| match section.has(name) {
             true => section.vector(name, dimension, bounds).map(Vector3::from),
             false => Ok(Vector3::zeros()),
         };
-        let velocity_W_m_s = vector("velocity", VELOCITY, &BODY_SPEED);
-        let angular_velocity_W_rad_s = vector("angular_velocity", ANGULAR_VELOCITY, &BODY_SPIN);
-        Ok(Some(Self {
-            mass_kg: mass_kg?,
-            velocity_W_m_s: velocity_W_m_s?,
-            angular_velocity_W_rad_s: angular_velocity_W_rad_s?,
-        }))
+        let velocity_W_m_s = faults.keep(vector("velocity", VELOCITY, &BODY_SPEED));
+        let angular_velocity_W_rad_s = faults.keep(vector("angular_velocity", ANGULAR_VELOCITY, &BODY_SPIN));
+        let keys = (|| {
+            Some(Self {
+                mass_kg: mass_kg?,
+                velocity_W_m_s: velocity_W_m_s?,
+                angular_velocity_W_rad_s: angular_velocity_W_rad_s?,
+            })
+        })();
+        faults.finish(keys).map(Some)
     }
 
     /// The body, of a shape whose inertia for each kilogram is `inertia_m2`.

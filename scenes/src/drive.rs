@@ -1,11 +1,11 @@
 //! Drives of joints: motors that turn a hinge or move a slide.
 
-use diagnostics::Diagnostic;
 use diagnostics::parameter::Bounds;
 use diagnostics::unit::{
     ANGLE, Dimension, FORCE, LENGTH, LINEAR_DAMPING, LINEAR_STIFFNESS, ROTARY_DAMPING, ROTARY_STIFFNESS,
     SPEED, TORQUE, VELOCITY,
 };
+use diagnostics::{Diagnostic, Faults};
 use vehicles::reader::Section;
 
 /// A motor in a revolute or a prismatic joint, as servos of URDF, SDF and MuJoCo: it acts on the child with
@@ -169,16 +169,25 @@ pub(crate) const LINEAR: Dimensions = Dimensions {
 
 /// Reads the table `drive` of a joint, whose numbers have these `dimensions`.
 pub(crate) fn parse(section: &Section, dimensions: &Dimensions) -> Result<Drive, Diagnostic> {
-    section.require_known(&["mode", "limit", "stiffness", "damping", "schedule"])?;
-    let mode = section.choice("mode", &MODES)?;
-    let limit = match section.has("limit") {
-        true => section.bounded("limit", dimensions.force, &LIMIT)?,
-        false => f64::INFINITY,
-    };
-    let [stiffness, damping] = gains(section, mode, dimensions)?;
-    let schedule = section.schedule("schedule", dimensions.of_targets(mode), [&TIME, &TARGET])?;
-    section.finish()?;
-    Ok(Drive { mode, stiffness, damping, limit, schedule })
+    let mut faults = Faults::default();
+    let known = section.require_known(&["mode", "limit", "stiffness", "damping", "schedule"]);
+    let mode = faults.keep(section.choice("mode", &MODES));
+    let limit = faults.keep(match section.has("limit") {
+        true => section.bounded("limit", dimensions.force, &LIMIT),
+        false => Ok(f64::INFINITY),
+    });
+    // The gains and the unit of the schedule are those of the mode.
+    let of_mode = mode.and_then(|mode| {
+        let gains = faults.keep(gains(section, mode, dimensions));
+        let points = section.schedule("schedule", dimensions.of_targets(mode), [&TIME, &TARGET]);
+        gains.zip(faults.keep(points))
+    });
+    faults.keep(known);
+    let drive = (|| {
+        let (mode, limit, ([stiffness, damping], schedule)) = (mode?, limit?, of_mode?);
+        Some(Drive { mode, stiffness, damping, limit, schedule })
+    })();
+    faults.finish(drive)
 }
 
 /// Stiffness and damping: of a speed the damping alone, of a position the stiffness and, where it is given, a damping.
@@ -192,12 +201,13 @@ fn gains(section: &Section, mode: Mode, dimensions: &Dimensions) -> Result<[f64;
         }
         Mode::Speed => Ok([0.0, section.bounded("damping", dimensions.damping, &GAIN)?]),
         Mode::Position => {
-            let stiffness = section.bounded("stiffness", dimensions.stiffness, &GAIN)?;
-            let damping = match has_damping {
-                true => section.bounded("damping", dimensions.damping, &DAMPING)?,
-                false => 0.0,
-            };
-            Ok([stiffness, damping])
+            let mut faults = Faults::default();
+            let stiffness = faults.keep(section.bounded("stiffness", dimensions.stiffness, &GAIN));
+            let damping = faults.keep(match has_damping {
+                true => section.bounded("damping", dimensions.damping, &DAMPING),
+                false => Ok(0.0),
+            });
+            faults.finish((|| Some([stiffness?, damping?]))())
         }
     }
 }

@@ -8,6 +8,7 @@ use crate::mesh_file::Format;
 use crate::rig::{self, PLACE};
 use crate::scene::{Ball, Cuboid, Scene};
 use crate::surface::Surface;
+use crate::triangles::Triangles;
 use diagnostics::parameter::Bounds;
 use diagnostics::unit::{ANGLE, LENGTH, RATIO};
 use diagnostics::{Diagnostic, Faults};
@@ -110,19 +111,13 @@ impl Scene {
         let mut faults = Faults::default();
         let name = faults.keep(root.text("name").map(str::to_owned));
         let surface = faults.keep(surface(&root, &Surface::default())).unwrap_or_default();
-        let sections = root.sections_if_any("boxes")?;
-        let boxes = sections.iter().map(|section| one_box(section, &surface));
-        let boxes = faults.keep(Diagnostic::gather(boxes));
-        let sections = root.sections_if_any("meshes")?;
+        let boxes = faults.keep(each(&root, "boxes", |section| one_box(section, &surface)));
         let folder = Path::new(file_name).parent().unwrap_or(Path::new(""));
-        let meshes = sections.iter().map(|section| one_mesh(section, &surface, folder, read));
-        let meshes = faults.keep(Diagnostic::gather(meshes));
-        let sections = root.sections_if_any("balls")?;
-        let balls = sections.iter().map(|section| one_ball(section, &surface));
-        let balls = faults.keep(Diagnostic::gather(balls));
+        let meshes = faults.keep(each(&root, "meshes", |section| one_mesh(section, &surface, folder, read)));
+        let balls = faults.keep(each(&root, "balls", |section| one_ball(section, &surface)));
         let rig = root.has("rig").then(|| faults.keep(root.section("rig").and_then(|rig| rig::parse(&rig))));
         let effects = faults.keep(vehicles::effects::read(&root));
-        let joints = root.sections_if_any("joints")?;
+        let joints = faults.keep(root.sections_if_any("joints")).unwrap_or_default();
         faults.keep(root.finish());
         let things = name.zip(boxes).zip(meshes).zip(balls).zip(effects);
         let rig = rig.flatten();
@@ -147,34 +142,27 @@ impl Scene {
     fn tie(&mut self, doc: &Document, sections: &[Section]) -> Result<(), Diagnostic> {
         let names: Vec<&str> = self.bodies().filter_map(|(number, _)| self.name_of(number)).collect();
         let joints = sections.iter().map(|section| joint::parse(section, &names));
-        let joints = Diagnostic::gather(joints)?;
-        let is_twice = |place: &usize| joints[..*place].iter().any(|joint| joint.name == joints[*place].name);
-        if let Some(place) = (0..joints.len()).find(is_twice) {
-            let (expected, found) = ("a name of its own", format!("a second \"{}\"", joints[place].name));
-            return Err(doc.bad(
-                &sections[place].at_of("name"),
-                &sections[place].key("name"),
-                expected,
-                found,
-            ));
+        self.joints = Diagnostic::gather(joints)?;
+        let mut faults = Faults::default();
+        for (place, (joint, section)) in self.joints.iter().zip(sections).enumerate() {
+            if self.joints[..place].iter().any(|before| before.name == joint.name) {
+                let (expected, found) = ("a name of its own", format!("a second \"{}\"", joint.name));
+                let at = section.at_of("name");
+                faults.keep(Err::<(), _>(doc.bad(&at, &section.key("name"), expected, found)));
+            }
         }
-        self.joints = joints;
-        if let Some(place) = self.joint_that_pins_the_vehicle() {
+        if let Some(section) = self.joint_that_pins_the_vehicle().map(|place| &sections[place]) {
             let expected = "a rope, where the world and the vehicle are tied together; a [rig] holds a vehicle otherwise";
             let found = "another: its child is the vehicle, or hangs from it by other joints";
-            return Err(doc.bad(
-                &sections[place].at_of("kind"),
-                &sections[place].key("kind"),
-                expected,
-                found,
-            ));
+            let at = section.at_of("kind");
+            faults.keep(Err::<(), _>(doc.bad(&at, &section.key("kind"), expected, found)));
         }
         let tying = self.joints.iter().position(|joint| [joint.parent, joint.child].contains(&End::Vehicle));
         if let Some(first) = tying.filter(|_| self.rig.is_some()).map(|place| &sections[place]) {
-            let (expected, found) = ("a [rig] or joints to the vehicle", "both".to_owned());
-            return Err(doc.bad(&first.at, &first.path, expected, found));
+            let (expected, found) = ("a [rig] or joints to the vehicle", "both");
+            faults.keep(Err::<(), _>(doc.bad(&first.at, &first.path, expected, found)));
         }
-        Ok(())
+        faults.finish(Some(()))
     }
 
     /// The mesh files that the scene file at `path` names; its faults are reported where it is read.
@@ -188,40 +176,42 @@ impl Scene {
     }
 }
 
+/// The tables of the array `name`, as `one` reads them.
+fn each<T>(
+    root: &Section,
+    name: &'static str,
+    one: impl Fn(&Section) -> Result<T, Diagnostic>,
+) -> Result<Vec<T>, Diagnostic> {
+    Diagnostic::gather(root.sections_if_any(name)?.iter().map(one))
+}
+
 /// Refuses more things or free bodies than there are numbers for, and two bodies of one name.
 fn check_numbers(doc: &Document, scene: &Scene) -> Result<(), Diagnostic> {
-    let refused = |key: &str, expected: String, found| Err(doc.bad(&(0..0), key, expected, found));
+    let mut faults = Faults::default();
+    let mut refuse = |key: &str, expected: String, found: String| {
+        faults.keep(Err::<(), _>(doc.bad(&(0..0), key, expected, found)));
+    };
     let (things, bodies) = (scene.thing_count(), scene.bodies().count());
     if things > THINGS_MAX {
-        return refused(
-            "boxes",
-            format!("at most {THINGS_MAX}, with meshes and balls"),
-            format!("{things} boxes, meshes and balls"),
-        );
+        let expected = format!("at most {THINGS_MAX}, with meshes and balls");
+        refuse("boxes", expected, format!("{things} boxes, meshes and balls"));
     }
     if bodies > BODIES_MAX {
-        return refused(
-            "mass",
-            format!("a key of at most {BODIES_MAX} things"),
-            format!("{bodies} free bodies"),
-        );
-    }
-    let taken = |name: &&str| ["world", "vehicle"].contains(name);
-    if let Some(name) = scene.bodies().filter_map(|(number, _)| scene.name_of(number)).find(taken) {
-        return refused(
-            "name",
-            "another: joints mean something else by it".to_owned(),
-            format!("\"{name}\""),
-        );
+        let expected = format!("a key of at most {BODIES_MAX} things");
+        refuse("mass", expected, format!("{bodies} free bodies"));
     }
     let mut names: Vec<_> = scene.bodies().filter_map(|(number, _)| scene.name_of(number)).collect();
     names.sort_unstable();
-    match names.windows(2).find(|pair| pair[0] == pair[1]) {
-        Some(pair) => {
-            refused("name", "one of its own for each free body".to_owned(), format!("two \"{}\"", pair[0]))
+    for of_one in names.chunk_by(|name, next| name == next) {
+        let name = of_one[0];
+        if ["world", "vehicle"].contains(&name) {
+            let expected = "another: joints mean something else by it".to_owned();
+            refuse("name", expected, format!("\"{name}\""));
+        } else if of_one.len() > 1 {
+            refuse("name", "one of its own for each free body".to_owned(), format!("two \"{name}\""));
         }
-        None => Ok(()),
     }
+    faults.finish(Some(()))
 }
 
 fn one_mesh(
@@ -230,44 +220,36 @@ fn one_mesh(
     folder: &Path,
     read: &dyn Fn(&Path) -> IoResult<Vec<u8>>,
 ) -> Result<Mesh, Diagnostic> {
-    section.require_known(
+    let known = section.require_known(
         &[&["name", "file", "position", "yaw", "scale", "solid"], &SURFACE[..], &body::KEYS].concat(),
-    )?;
-    let name = section.text("name")?.to_owned();
-    let file = folder.join(section.text("file")?);
-    let refused = |found: String| {
-        let found = format!("{}: {found}", file.display());
-        section.doc.bad(
-            &section.at_of("file"),
-            &section.key("file"),
-            "a mesh file, relative to this one",
-            found,
-        )
-    };
-    let format = Format::of(&file)
-        .ok_or_else(|| refused("a name that ends in none of .obj, .stl, .glb".to_owned()))?;
-    let place_W_m = section.vector("position", LENGTH, &PLACE)?;
-    let yaw_rad = if section.has("yaw") { section.bounded("yaw", ANGLE, &YAW)? } else { 0.0 };
-    let is_in_metres = format == Format::Glb && !section.has("scale");
-    let scale_m = if is_in_metres { 1.0 } else { section.bounded("scale", LENGTH, &SCALE)? };
-    let solidity =
-        section.choice("solid", &[("triangles", Solidity::Triangles), ("convex", Solidity::Convex)])?;
-    let surface = surface(section, surface_around)?;
-    let keys = Keys::read(section)?;
-    section.finish()?;
-    if keys.is_some() && solidity == Solidity::Triangles {
+    );
+    let mut faults = Faults::default();
+    let name = faults.keep(section.text("name"));
+    let file = faults.keep(section.text("file")).map(|file| folder.join(file));
+    let triangles = file.as_deref().and_then(|file| faults.keep(triangles_of(section, file, read)));
+    let place_W_m = faults.keep(section.vector("position", LENGTH, &PLACE));
+    let yaw_rad = faults.keep(yaw(section));
+    let scale_m = faults.keep(scale(section, file.as_deref()));
+    let solidity = faults
+        .keep(section.choice("solid", &[("triangles", Solidity::Triangles), ("convex", Solidity::Convex)]));
+    let surface = faults.keep(surface(section, surface_around));
+    let keys = faults.keep(Keys::read(section));
+    faults.keep(known.and_then(|()| section.finish()));
+    if matches!((&keys, solidity), (Some(Some(_)), Some(Solidity::Triangles))) {
         let expected = "\"convex\" of what has a `mass`: a shell has no inside that could weigh";
         let (at, key) = (section.at_of("solid"), section.key("solid"));
-        return Err(section.doc.bad(&at, &key, expected, "\"triangles\""));
+        faults.keep(Err::<(), _>(section.doc.bad(&at, &key, expected, "\"triangles\"")));
     }
-    let bytes = read(&file).map_err(|error| refused(error.to_string()))?;
-    let triangles = format.read(&bytes).map_err(refused)?;
+    let all = || Some((name?, file?, triangles?, place_W_m?, yaw_rad?, scale_m?, solidity?, surface?, keys?));
+    let (name, file, triangles, place_W_m, yaw_rad, scale_m, solidity, surface, keys) =
+        faults.finish(all())?;
+    let refused = |found: String| refused_mesh(section, &file, &found);
     let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), yaw_rad);
     let placed =
         |corner: [f64; 3]| (turn * Vector3::from(corner) * scale_m + Vector3::from(place_W_m)).into();
     let corners_W_m = triangles.corners.into_iter().map(placed).collect();
-    let (file, body) = (file.clone(), None);
-    let mesh = Mesh { name, file, corners_W_m, faces: triangles.faces, solidity, surface, body };
+    let (name, faces) = (name.to_owned(), triangles.faces);
+    let mesh = Mesh { name, file: file.clone(), corners_W_m, faces, solidity, surface, body: None };
     let mut mesh = mesh.without_lines();
     mesh.shape().map_err(refused)?;
     check_size(&mesh, scale_m).map_err(refused)?;
@@ -277,6 +259,36 @@ fn one_mesh(
         keys.body(turn.transpose() * spread_m2 * turn, centre_W_m, yaw_rad)
     });
     Ok(mesh)
+}
+
+/// The triangles in the mesh `file` of `section`.
+fn triangles_of(
+    section: &Section,
+    file: &Path,
+    read: &dyn Fn(&Path) -> IoResult<Vec<u8>>,
+) -> Result<Triangles, Diagnostic> {
+    let refused = |found: String| refused_mesh(section, file, &found);
+    let format =
+        Format::of(file).ok_or_else(|| refused("a name that ends in none of .obj, .stl, .glb".to_owned()))?;
+    let bytes = read(file).map_err(|error| refused(error.to_string()))?;
+    format.read(&bytes).map_err(refused)
+}
+
+/// The error of the mesh `file` of `section`.
+fn refused_mesh(section: &Section, file: &Path, found: &str) -> Diagnostic {
+    let expected = "a mesh file, relative to this one";
+    let found = format!("{}: {found}", file.display());
+    section.doc.bad(&section.at_of("file"), &section.key("file"), expected, found)
+}
+
+/// Length of a unit of the mesh `file`: a glTF file is in metres unless the scene says otherwise.
+fn scale(section: &Section, file: Option<&Path>) -> Result<f64, Diagnostic> {
+    let is_in_metres = file.and_then(Format::of).is_none_or(|format| format == Format::Glb);
+    if is_in_metres && !section.has("scale") { Ok(1.0) } else { section.bounded("scale", LENGTH, &SCALE) }
+}
+
+fn yaw(section: &Section) -> Result<f64, Diagnostic> {
+    if section.has("yaw") { section.bounded("yaw", ANGLE, &YAW) } else { Ok(0.0) }
 }
 
 /// Refuses a mesh of a size that nothing has.
@@ -300,34 +312,42 @@ fn surface(section: &Section, otherwise: &Surface) -> Result<Surface, Diagnostic
     let number = |name, bounds, otherwise| {
         if section.has(name) { section.bounded(name, RATIO, bounds) } else { Ok(otherwise) }
     };
-    // Both are read before either is refused: one that was not read would be told as unknown.
-    let friction = number("friction", &FRICTION, otherwise.friction);
-    let restitution = number("restitution", &RESTITUTION, otherwise.restitution);
-    Ok(Surface { friction: friction?, restitution: restitution? })
+    let mut faults = Faults::default();
+    let friction = faults.keep(number("friction", &FRICTION, otherwise.friction));
+    let restitution = faults.keep(number("restitution", &RESTITUTION, otherwise.restitution));
+    faults.finish((|| Some(Surface { friction: friction?, restitution: restitution? }))())
 }
 
 fn one_box(section: &Section, surface_around: &Surface) -> Result<Cuboid, Diagnostic> {
-    section.require_known(&[&["name", "centre", "size", "yaw"], &SURFACE[..], &body::KEYS].concat())?;
-    let name = section.text("name")?.to_owned();
-    let centre = section.vector("centre", LENGTH, &PLACE)?;
-    let size = section.vector("size", LENGTH, &SIZE)?;
-    let yaw_rad = if section.has("yaw") { section.bounded("yaw", ANGLE, &YAW)? } else { 0.0 };
-    let surface = surface(section, surface_around)?;
-    let keys = Keys::read(section)?;
-    section.finish()?;
+    let known =
+        section.require_known(&[&["name", "centre", "size", "yaw"], &SURFACE[..], &body::KEYS].concat());
+    let mut faults = Faults::default();
+    let name = faults.keep(section.text("name"));
+    let centre = faults.keep(section.vector("centre", LENGTH, &PLACE));
+    let size = faults.keep(section.vector("size", LENGTH, &SIZE));
+    let yaw_rad = faults.keep(yaw(section));
+    let surface = faults.keep(surface(section, surface_around));
+    let keys = faults.keep(Keys::read(section));
+    faults.keep(known.and_then(|()| section.finish()));
+    let all = || Some((name?, centre?, size?, yaw_rad?, surface?, keys?));
+    let (name, centre, size, yaw_rad, surface, keys) = faults.finish(all())?;
     let (centre_W_m, half_extents_m) = (Vector3::from(centre), Vector3::from(size) / 2.0);
     let body = keys.map(|keys| keys.body(body::box_inertia_m2(&half_extents_m), centre_W_m, yaw_rad));
-    Ok(Cuboid { name, centre_W_m, half_extents_m, yaw_rad, surface, body })
+    Ok(Cuboid { name: name.to_owned(), centre_W_m, half_extents_m, yaw_rad, surface, body })
 }
 
 fn one_ball(section: &Section, surface_around: &Surface) -> Result<Ball, Diagnostic> {
-    section.require_known(&[&["name", "centre", "radius"], &SURFACE[..], &body::KEYS].concat())?;
-    let name = section.text("name")?.to_owned();
-    let centre_W_m = Vector3::from(section.vector("centre", LENGTH, &PLACE)?);
-    let radius_m = section.bounded("radius", LENGTH, &RADIUS)?;
-    let surface = surface(section, surface_around)?;
-    let keys = Keys::read(section)?;
-    section.finish()?;
+    let known = section.require_known(&[&["name", "centre", "radius"], &SURFACE[..], &body::KEYS].concat());
+    let mut faults = Faults::default();
+    let name = faults.keep(section.text("name"));
+    let centre = faults.keep(section.vector("centre", LENGTH, &PLACE));
+    let radius_m = faults.keep(section.bounded("radius", LENGTH, &RADIUS));
+    let surface = faults.keep(surface(section, surface_around));
+    let keys = faults.keep(Keys::read(section));
+    faults.keep(known.and_then(|()| section.finish()));
+    let all = || Some((name?, centre?, radius_m?, surface?, keys?));
+    let (name, centre, radius_m, surface, keys) = faults.finish(all())?;
+    let centre_W_m = Vector3::from(centre);
     let body = keys.map(|keys| keys.body(body::ball_inertia_m2(radius_m), centre_W_m, 0.0));
-    Ok(Ball { name, centre_W_m, radius_m, surface, body })
+    Ok(Ball { name: name.to_owned(), centre_W_m, radius_m, surface, body })
 }

@@ -3,9 +3,9 @@
 
 use crate::drive::{self, Drive};
 use crate::rig::PLACE;
-use diagnostics::Diagnostic;
 use diagnostics::parameter::Bounds;
 use diagnostics::unit::{ANGLE, LENGTH, LINEAR_DAMPING, PURE_NUMBER, ROTARY_DAMPING};
+use diagnostics::{Diagnostic, Faults};
 use nalgebra::Vector3;
 use vehicles::reader::{Quantity, Section};
 
@@ -134,35 +134,62 @@ const KINDS: [(&str, Kind); 5] = [
 pub(crate) fn parse(section: &Section, bodies: &[&str]) -> Result<Joint, Diagnostic> {
     let ends = ["name", "kind", "parent", "child", "anchor"];
     let of_kinds = ["axis", "lower", "upper", "length", "end", "damping", "drive"];
-    section.require_known(&[&ends[..], &of_kinds].concat())?;
-    let name = section.text("name")?.to_owned();
-    let kind = section.choice("kind", &KINDS)?;
-    let parent = end(section, "parent", bodies)?;
-    let child = end(section, "child", bodies)?;
-    refuse_pair(section, parent, child)?;
-    let anchor_W_m = section.vector("anchor", LENGTH, &PLACE)?.into();
+    let mut faults = Faults::default();
+    let known = section.require_known(&[&ends[..], &of_kinds].concat());
+    let name = faults.keep(section.text("name"));
+    let kind = faults.keep(section.choice("kind", &KINDS));
+    let parent = faults.keep(end(section, "parent", bodies));
+    let child = faults.keep(end(section, "child", bodies));
+    if let Some((parent, child)) = parent.zip(child) {
+        faults.keep(refuse_pair(section, parent, child));
+    }
+    let anchor_W_m = faults.keep(section.vector("anchor", LENGTH, &PLACE));
+    let freedom = kind.and_then(|kind| faults.keep(freedom_of(section, kind)));
+    let damping = kind.and_then(|kind| faults.keep(damping_of(section, kind)));
+    let drive = kind.and_then(|kind| faults.keep(drive_of(section, kind)));
+    // Without a kind, the keys of all kinds are known; with one, those that were read.
+    faults.keep(known.and_then(|()| if kind.is_some() { section.finish() } else { Ok(()) }));
+    let joint = (|| {
+        Some(Joint {
+            name: name?.to_owned(),
+            parent: parent?,
+            child: child?,
+            anchor_W_m: anchor_W_m?.into(),
+            freedom: freedom?,
+            damping: damping?,
+            drive: drive?,
+        })
+    })();
+    faults.finish(joint)
+}
+
+fn freedom_of(section: &Section, kind: Kind) -> Result<Freedom, Diagnostic> {
     let freedom = match kind {
         Kind::Fixed => Freedom::Fixed,
         Kind::Ball => Freedom::Ball,
         Kind::Revolute => Freedom::Revolute(axis(section, |name| section.quantity(name, ANGLE), &TURN)?),
         Kind::Prismatic => Freedom::Prismatic(axis(section, |name| section.quantity(name, LENGTH), &WAY)?),
-        Kind::Rope => Freedom::Rope {
-            length_m: section.bounded("length", LENGTH, &ROPE)?,
-            end_W_m: section.vector("end", LENGTH, &PLACE)?.into(),
-        },
+        Kind::Rope => {
+            let mut faults = Faults::default();
+            let length_m = faults.keep(section.bounded("length", LENGTH, &ROPE));
+            let end_W_m = faults.keep(section.vector("end", LENGTH, &PLACE));
+            let (length_m, end_W_m) = faults.finish(length_m.zip(end_W_m))?;
+            Freedom::Rope { length_m, end_W_m: end_W_m.into() }
+        }
     };
-    let damping = match (section.has("damping"), kind) {
-        (true, Kind::Ball | Kind::Revolute) => section.bounded("damping", ROTARY_DAMPING, &DAMPING)?,
-        (true, Kind::Prismatic) => section.bounded("damping", LINEAR_DAMPING, &DAMPING)?,
+    Ok(freedom)
+}
+
+fn damping_of(section: &Section, kind: Kind) -> Result<f64, Diagnostic> {
+    match (section.has("damping"), kind) {
+        (true, Kind::Ball | Kind::Revolute) => section.bounded("damping", ROTARY_DAMPING, &DAMPING),
+        (true, Kind::Prismatic) => section.bounded("damping", LINEAR_DAMPING, &DAMPING),
         (true, Kind::Fixed | Kind::Rope) => {
             let found = "a joint that has none to damp";
-            return Err(refused(section, "damping", "kind ball, revolute or prismatic", found));
+            Err(refused(section, "damping", "kind ball, revolute or prismatic", found))
         }
-        (false, _) => 0.0,
-    };
-    let drive = drive_of(section, kind)?;
-    section.finish()?;
-    Ok(Joint { name, parent, child, anchor_W_m, freedom, damping, drive })
+        (false, _) => Ok(0.0),
+    }
 }
 
 /// The table `drive` of a joint of this `kind`, if it has one.
@@ -228,14 +255,19 @@ fn axis<'d, 't>(
     bounds: &Bounds,
 ) -> Result<Axis, Diagnostic> {
     let unit = Bounds { min: -1e6, max: 1e6, unit: "1", why: "a direction: its length does not matter" };
-    let along_W = Vector3::from(section.vector("axis", PURE_NUMBER, &unit)?);
-    let along_W =
-        along_W.try_normalize(1e-6).ok_or_else(|| refused(section, "axis", "a direction", "three zeros"))?;
+    let mut faults = Faults::default();
+    let along_W = faults.keep(section.vector("axis", PURE_NUMBER, &unit).and_then(|along_W| {
+        let along_W = Vector3::from(along_W).try_normalize(1e-6);
+        along_W.ok_or_else(|| refused(section, "axis", "a direction", "three zeros"))
+    }));
     let stop = |name, otherwise: f64| match section.has(name) {
         true => Ok(limit(name)?.within(bounds)?.si),
         false => Ok(otherwise),
     };
-    let limits = [stop("lower", f64::NEG_INFINITY)?, stop("upper", f64::INFINITY)?];
+    let lower = faults.keep(stop("lower", f64::NEG_INFINITY));
+    let upper = faults.keep(stop("upper", f64::INFINITY));
+    let (along_W, lower, upper) = faults.finish((|| Some((along_W?, lower?, upper?)))())?;
+    let limits = [lower, upper];
     let key = if limits[0] > 0.0 { "lower" } else { "upper" };
     if limits[0] > 0.0 || limits[1] < 0.0 {
         let found = format!("{} to {} {}", limits[0], limits[1], bounds.unit);

@@ -1,9 +1,9 @@
 //! A test rig: the vehicle hangs from a ball joint that limits its tilt, and that may slide up and down.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in, N the newton")]
 
-use diagnostics::Diagnostic;
 use diagnostics::parameter::Bounds;
 use diagnostics::unit::{ANGLE, FORCE, LENGTH, LINEAR_DAMPING, MASS, ROTARY_DAMPING, TORQUE};
+use diagnostics::{Diagnostic, Faults};
 use nalgebra::Vector3;
 use vehicles::reader::Section;
 
@@ -72,36 +72,37 @@ const AMOUNT: Bounds = Bounds {
 
 /// Reads the table `[rig]`; see `scenes/rig-sliding.toml`.
 pub(crate) fn parse(section: &Section) -> Result<Rig, Diagnostic> {
-    section.require_known(&[
-        "bearing",
-        "mount",
-        "tilt_max",
-        "heave",
-        "sway",
-        "moving_mass",
-        "bearing_friction",
-        "bearing_damping",
-        "slide_friction",
-        "slide_damping",
-    ])?;
-    let amount = |name, dimension| section.bounded(name, dimension, &AMOUNT);
+    let mut faults = Faults::default();
     let tilt_max = || {
         let tilt = section.quantity("tilt_max", ANGLE)?;
         let holds = tilt.si > 0.0 && tilt.si < std::f64::consts::PI;
         tilt.require(holds, "an angle above 0 and below 180 deg")
     };
-    let rig = Rig {
-        bearing_W_m: section.vector("bearing", LENGTH, &PLACE)?.into(),
-        mount_B_m: section.vector("mount", LENGTH, &MOUNT)?.into(),
-        tilt_max_rad: tilt_max()?.si,
-        heave_m: amount("heave", LENGTH)?,
-        sway_m: if section.has("sway") { amount("sway", LENGTH)? } else { 0.0 },
-        moving_mass_kg: section.bounded("moving_mass", MASS, &MOVING_MASS)?,
-        bearing_friction_N_m: amount("bearing_friction", TORQUE)?,
-        bearing_damping_N_m_s: amount("bearing_damping", ROTARY_DAMPING)?,
-        slide_friction_N: amount("slide_friction", FORCE)?,
-        slide_damping_N_s_m: amount("slide_damping", LINEAR_DAMPING)?,
-    };
-    section.finish()?;
-    Ok(rig)
+    let bearing_W_m = faults.keep(section.vector("bearing", LENGTH, &PLACE));
+    let mount_B_m = faults.keep(section.vector("mount", LENGTH, &MOUNT));
+    let tilt_max = faults.keep(tilt_max());
+    let moving_mass_kg = faults.keep(section.bounded("moving_mass", MASS, &MOVING_MASS));
+    let mut amount = |name, dimension| faults.keep(section.bounded(name, dimension, &AMOUNT));
+    let heave_m = amount("heave", LENGTH);
+    let sway_m = if section.has("sway") { amount("sway", LENGTH) } else { Some(0.0) };
+    let bearing_friction_N_m = amount("bearing_friction", TORQUE);
+    let bearing_damping_N_m_s = amount("bearing_damping", ROTARY_DAMPING);
+    let slide_friction_N = amount("slide_friction", FORCE);
+    let slide_damping_N_s_m = amount("slide_damping", LINEAR_DAMPING);
+    faults.keep(section.finish());
+    let rig = (|| {
+        Some(Rig {
+            bearing_W_m: bearing_W_m?.into(),
+            mount_B_m: mount_B_m?.into(),
+            tilt_max_rad: tilt_max?.si,
+            heave_m: heave_m?,
+            sway_m: sway_m?,
+            moving_mass_kg: moving_mass_kg?,
+            bearing_friction_N_m: bearing_friction_N_m?,
+            bearing_damping_N_m_s: bearing_damping_N_m_s?,
+            slide_friction_N: slide_friction_N?,
+            slide_damping_N_s_m: slide_damping_N_s_m?,
+        })
+    })();
+    faults.finish(rig)
 }

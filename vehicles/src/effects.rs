@@ -5,7 +5,7 @@
 
 use crate::provenance::Stated;
 use crate::reader::Section;
-use diagnostics::{Diagnostic, Place};
+use diagnostics::{Diagnostic, Faults, Place};
 
 /// One `[[effects]]` table.
 ///
@@ -41,14 +41,20 @@ pub fn read(root: &Section) -> Result<Vec<EffectEntry>, Diagnostic> {
 }
 
 fn one_effect(section: &Section) -> Result<EffectEntry, Diagnostic> {
-    section.require_spelt("name")?;
-    let name = section.text("name")?.to_owned();
-    let parameters = section.keys().filter(|key| *key != "name");
-    Ok(EffectEntry {
-        name,
+    let mut faults = Faults::default();
+    let spelt = section.require_spelt("name");
+    // A misspelt name is no parameter.
+    let misspelt = spelt.as_ref().err().map(|fault| fault.key().to_owned());
+    let name = faults.keep(spelt.and_then(|()| section.text("name")));
+    let is_parameter = |key: &&str| *key != "name" && misspelt.as_ref() != Some(&section.key(key));
+    let parameters = section.keys().filter(is_parameter).map(|key| section.stated(key));
+    let parameters = faults.keep(Diagnostic::gather(parameters));
+    let entry = name.zip(parameters).map(|(name, parameters)| EffectEntry {
+        name: name.to_owned(),
         key: section.path.clone(),
         place: section.doc.place(&section.at),
         name_place: section.doc.place(&section.at_of("name")),
-        parameters: parameters.map(|key| section.stated(key)).collect::<Result<_, _>>()?,
-    })
+        parameters,
+    });
+    faults.finish(entry)
 }

@@ -2,8 +2,8 @@
 //! compared with. Beyond them nobody has looked.
 
 use crate::reader::Section;
-use diagnostics::Diagnostic;
 use diagnostics::unit::{ACCELERATION, ANGLE, Dimension, FREQUENCY, LENGTH, SPEED, VELOCITY};
+use diagnostics::{Diagnostic, Faults};
 
 /// The table `[envelope]` of a vehicle file; a range that no flight showed is absent.
 ///
@@ -59,16 +59,20 @@ pub(crate) fn read(root: &Section) -> Result<Option<Envelope>, Diagnostic> {
         return Ok(None);
     }
     let (section, mut envelope) = (root.section("envelope")?, Envelope::default());
+    let mut faults = Faults::default();
     for (key, dimension, number) in Envelope::NUMBERS {
-        if section.has(key) {
-            let quantity = section.quantity(key, dimension)?;
+        if !section.has(key) {
+            continue;
+        }
+        let low_m = envelope.height_min_m.filter(|_| key == "height_max");
+        let read = section.quantity(key, dimension).and_then(|quantity| {
             // Heights may lie below the origin of the world.
             let quantity = if key.starts_with("height") { quantity } else { quantity.positive()? };
-            let is_above = envelope.height_min_m.is_none_or(|low| key != "height_max" || quantity.si > low);
-            *number(&mut envelope) =
-                Some(quantity.require(is_above, "a height above `envelope.height_min`")?.si);
-        }
+            let is_above = low_m.is_none_or(|low_m| quantity.si > low_m);
+            quantity.require(is_above, "a height above `envelope.height_min`")
+        });
+        *number(&mut envelope) = faults.keep(read).map(|quantity| quantity.si);
     }
-    section.finish()?;
-    Ok(Some(envelope))
+    faults.keep(section.finish());
+    faults.finish(Some(Some(envelope)))
 }

@@ -130,9 +130,15 @@ fn on_base(
         return Err(doc.bad(&lower.at_of("base"), "base", expected, "one that has a base itself"));
     }
     root.text("base")?;
-    // Alone first: what is wrong in it is not that of this file.
-    let base = complete(&lower, None)?;
-    let vehicle = complete(&root, Some(&lower))?;
+    let (base, vehicle) = (complete(&lower, None), complete(&root, Some(&lower)));
+    let (base, vehicle) = match (base, vehicle) {
+        (Ok(base), vehicle) => (base, vehicle?),
+        // The faults of the base, which this file may have inherited, and its own.
+        (Err(of_base), vehicle) => {
+            let faults = vehicle.err().into_iter().flat_map(|fault| fault.all().collect::<Vec<_>>());
+            return Err(of_base.and(faults.filter(|fault| fault.file != file)));
+        }
+    };
     let effects = [base.effects, vehicle.effects].concat();
     let provenance = [doc.provenance.take(), vehicle.provenance].concat();
     Ok(Vehicle { effects, provenance, ..vehicle })
@@ -205,10 +211,13 @@ fn body(section: &Section) -> Result<(f64, Matrix3<f64>, f64), Diagnostic> {
 
 /// The symmetric tensor J; `inertia_xy` and so on are the entries J_xy themselves, not their negatives.
 fn inertia(section: &Section) -> Result<Matrix3<f64>, Diagnostic> {
-    let moments = ["inertia_xx", "inertia_yy", "inertia_zz"].map(|name| moment(section, name));
-    let products = ["inertia_xy", "inertia_xz", "inertia_yz"].map(|name| product(section, name));
-    let ([xx, yy, zz], [xy, xz, yz]) = (moments, products);
-    let (xx, yy, zz, xy, xz, yz) = (xx?, yy?, zz?, xy?, xz?, yz?);
+    let mut faults = Faults::default();
+    let [xx, yy, zz] =
+        ["inertia_xx", "inertia_yy", "inertia_zz"].map(|name| faults.keep(moment(section, name)));
+    let [xy, xz, yz] =
+        ["inertia_xy", "inertia_xz", "inertia_yz"].map(|name| faults.keep(product(section, name)));
+    let entries = (|| Some((xx?, yy?, zz?, xy?, xz?, yz?)))();
+    let (xx, yy, zz, xy, xz, yz) = faults.finish(entries)?;
     let tensor = Matrix3::new(xx.si, xy, xz, xy, yy.si, yz, xz, yz, zz.si);
     let moments = principal_moments(&tensor);
     if is_physical(&moments) {
@@ -263,7 +272,7 @@ fn rotor(section: &Section) -> Result<[f64; 3], Diagnostic> {
 
 fn layout(root: &Section) -> Result<Vec<Rotor>, Diagnostic> {
     let sections = root.sections("rotors")?;
-    let rotors = sections.iter().map(one_rotor).collect::<Result<Vec<_>, _>>()?;
+    let rotors = Diagnostic::gather(sections.iter().map(one_rotor))?;
     // The first table tells where; with none at all, the file's start does.
     let at = sections.first().map_or(0..0, |section| section.at.clone());
     match rotors.len() {
@@ -273,19 +282,29 @@ fn layout(root: &Section) -> Result<Vec<Rotor>, Diagnostic> {
 }
 
 fn one_rotor(section: &Section) -> Result<Rotor, Diagnostic> {
-    section.require_known(&["name", "position", "axis", "spin", "failed", "torque_scale"])?;
-    let name = section.text("name")?.to_owned();
-    let position_m = Vector3::from(section.vector("position", LENGTH, &bounds::HUB)?);
-    let axis = if section.has("axis") { axis(section)? } else { Vector3::z() };
-    let spin = spin(&section.section("spin")?)?;
-    let has_failed = section.has("failed") && told(&section.section("failed")?)?;
-    let torque_scale = if section.has("torque_scale") {
-        section.bounded("torque_scale", PURE_NUMBER, &bounds::TORQUE_SCALE)?
+    let mut faults = Faults::default();
+    let name = faults.keep(section.text("name"));
+    let position_m = faults.keep(section.vector("position", LENGTH, &bounds::HUB));
+    let axis = faults.keep(if section.has("axis") { axis(section) } else { Ok(Vector3::z()) });
+    let spin = faults.keep(section.section("spin").and_then(|section| spin(&section)));
+    let has_failed = faults.keep(flag_if_any(section, "failed"));
+    let torque_scale = faults.keep(if section.has("torque_scale") {
+        section.bounded("torque_scale", PURE_NUMBER, &bounds::TORQUE_SCALE)
     } else {
-        1.0
-    };
-    section.finish()?;
-    Ok(Rotor { name, position_m, axis, spin, torque_scale, has_failed })
+        Ok(1.0)
+    });
+    faults.keep(section.finish());
+    let rotor = (|| {
+        Some(Rotor {
+            name: name?.to_owned(),
+            position_m: Vector3::from(position_m?),
+            axis: axis?,
+            spin: spin?,
+            torque_scale: torque_scale?,
+            has_failed: has_failed?,
+        })
+    })();
+    faults.finish(rotor)
 }
 
 /// The direction of a rotor's thrust, of which the length does not matter.
@@ -304,31 +323,41 @@ fn axis(section: &Section) -> Result<Vector3<f64>, Diagnostic> {
 
 /// A sense of rotation has a value and a source, but neither unit nor uncertainty.
 fn spin(section: &Section) -> Result<f64, Diagnostic> {
-    section.require_known(&["value", "source"])?;
-    let spin = section.choice("value", &[("counter-clockwise", 1.0), ("clockwise", -1.0)])?;
-    section.note("seen from above", section.source()?, Uncertainty::OneSigma(0.0));
-    section.finish()?;
+    let mut faults = Faults::default();
+    let spin = faults.keep(section.choice("value", &[("counter-clockwise", 1.0), ("clockwise", -1.0)]));
+    let source = faults.keep(section.source());
+    faults.keep(section.finish());
+    let (spin, source) = faults.finish(spin.zip(source))?;
+    section.note("seen from above", source, Uncertainty::OneSigma(0.0));
     Ok(spin)
 }
 
 fn motor(section: &Section) -> Result<MotorModel, Diagnostic> {
-    let is_first = section.choice("model", &[("first-order", true), ("second-order", false)])?;
     let mut faults = Faults::default();
-    let mut number = |name, dimension, bounds: &_| faults.keep(section.bounded(name, dimension, bounds));
-    let model = if is_first {
-        let time_constant_s = number("time_constant", TIME, &bounds::TIME_CONSTANT);
-        time_constant_s.map(|time_constant_s| MotorModel::FirstOrder { time_constant_s })
-    } else {
-        let natural_frequency_rad_s = number("natural_frequency", SPEED, &bounds::NATURAL_FREQUENCY);
-        let damping_ratio = number("damping_ratio", PURE_NUMBER, &bounds::DAMPING_RATIO);
-        let both = natural_frequency_rad_s.zip(damping_ratio);
-        both.map(|(natural_frequency_rad_s, damping_ratio)| MotorModel::SecondOrder {
-            natural_frequency_rad_s,
-            damping_ratio,
-        })
+    let is_first = faults.keep(section.choice("model", &[("first-order", true), ("second-order", false)]));
+    // Without a model, the numbers of both are read as far as the file has them.
+    let is_needed = |name: &'static str, of_first: bool| match is_first {
+        Some(is_first) => is_first == of_first,
+        None => section.has(name),
     };
+    let numbers = [
+        ("time_constant", true, TIME, &bounds::TIME_CONSTANT),
+        ("natural_frequency", false, SPEED, &bounds::NATURAL_FREQUENCY),
+        ("damping_ratio", false, PURE_NUMBER, &bounds::DAMPING_RATIO),
+    ];
+    let [time_constant_s, natural_frequency_rad_s, damping_ratio] =
+        numbers.map(|(name, of_first, dimension, bounds)| {
+            let read = is_needed(name, of_first).then(|| section.bounded(name, dimension, bounds));
+            read.and_then(|read| faults.keep(read))
+        });
     faults.keep(section.finish());
-    faults.finish(model)
+    let first = time_constant_s.map(|time_constant_s| MotorModel::FirstOrder { time_constant_s });
+    let second = natural_frequency_rad_s.zip(damping_ratio);
+    let second = second.map(|(natural_frequency_rad_s, damping_ratio)| MotorModel::SecondOrder {
+        natural_frequency_rad_s,
+        damping_ratio,
+    });
+    faults.finish(if is_first == Some(true) { first } else { second })
 }
 
 fn command(section: &Section) -> Result<CommandMap, Diagnostic> {
@@ -342,34 +371,48 @@ fn command(section: &Section) -> Result<CommandMap, Diagnostic> {
     .map(|(name, dimension, bounds)| {
         faults.keep(section.quantity(name, dimension).and_then(|number| number.within(bounds)))
     });
-    let zero_is_off = section.has("zero_is_off");
+    let commands = min.zip(max).and_then(|ends| {
+        let expected = ["a command below `command.max`", "a command above `command.min`"];
+        faults.keep(in_order(section, ends, expected))
+    });
+    let speeds = low.zip(high).and_then(|ends| {
+        let expected = ["a speed below `command.speed_at_max`", "a speed above `command.speed_at_min`"];
+        faults.keep(in_order(section, ends, expected))
+    });
+    let zero_is_off = faults.keep(flag_if_any(section, "zero_is_off"));
     faults.keep(section.finish());
-    let (min, max, low, high) = faults.finish((|| Some((min?, max?, low?, high?)))())?;
-    let (above_min, above_low) = (max.si > min.si, high.si > low.si);
-    // Of two numbers that do not go together, that of this file is wrong, not that of its base.
-    let (min, max) = match section.is_own(&max) {
-        true => (min, max.require(above_min, "a command above `command.min`")?),
-        false => (min.require(above_min, "a command below `command.max`")?, max),
-    };
-    let (low, high) = match section.is_own(&high) {
-        true => (low, high.require(above_low, "a speed above `command.speed_at_min`")?),
-        false => (low.require(above_low, "a speed below `command.speed_at_max`")?, high),
-    };
-    let zero_is_off = zero_is_off && told(&section.section("zero_is_off")?)?;
-    Ok(CommandMap {
-        min: min.si,
-        max: max.si,
-        speed_at_min_rad_s: low.si,
-        speed_at_max_rad_s: high.si,
-        zero_is_off,
-    })
+    let map = (|| {
+        let ([min, max], [speed_at_min_rad_s, speed_at_max_rad_s]) = (commands?, speeds?);
+        Some(CommandMap { min, max, speed_at_min_rad_s, speed_at_max_rad_s, zero_is_off: zero_is_off? })
+    })();
+    faults.finish(map)
+}
+
+/// The ends of a range, the low one first. Of two that do not go together, that of this file is wrong, not that of its base.
+fn in_order<'d, 't>(
+    section: &Section<'d, 't>,
+    (low, high): (Quantity<'d, 't>, Quantity<'d, 't>),
+    [below, above]: [&str; 2],
+) -> Result<[f64; 2], Diagnostic> {
+    let ends = [low.si, high.si];
+    let is_rising = high.si > low.si;
+    let is_own = section.is_own(&high);
+    let checked = if is_own { high.require(is_rising, above) } else { low.require(is_rising, below) };
+    checked.map(|_| ends)
+}
+
+/// The flag `name` of `section`; false where the file has none.
+fn flag_if_any<'d>(section: &Section<'d, '_>, name: &'d str) -> Result<bool, Diagnostic> {
+    if section.has(name) { told(&section.section(name)?) } else { Ok(false) }
 }
 
 /// True or false, with a source.
 fn told(section: &Section) -> Result<bool, Diagnostic> {
-    section.require_known(&["value", "source"])?;
-    let value = section.flag("value")?;
-    section.note("true or false", section.source()?, Uncertainty::OneSigma(0.0));
-    section.finish()?;
+    let mut faults = Faults::default();
+    let value = faults.keep(section.flag("value"));
+    let source = faults.keep(section.source());
+    faults.keep(section.finish());
+    let (value, source) = faults.finish(value.zip(source))?;
+    section.note("true or false", source, Uncertainty::OneSigma(0.0));
     Ok(value)
 }

@@ -11,7 +11,7 @@ use toml::de::{DeString, DeTable, DeValue};
 use crate::provenance::{NO_SOURCE, Provenance, Stated, Uncertainty};
 use diagnostics::parameter::{Bounds, all, not_negative, positive};
 use diagnostics::unit::Dimension;
-use diagnostics::{Diagnostic, ParameterError, Place, nearest, parse_toml};
+use diagnostics::{Diagnostic, Faults, ParameterError, Place, nearest, parse_toml};
 
 /// The file being read: for positions, and to gather provenance on the way.
 pub struct Document<'t> {
@@ -219,7 +219,9 @@ impl<'d, 't> Section<'d, 't> {
             return Err(self.wrong_type(&self.key(name), value, "an array of tables"));
         };
         let key = |index| format!("{}.{index}", self.key(name));
-        array.iter().enumerate().map(|(index, item)| self.as_section(key(index), item, "a table")).collect()
+        let tables =
+            array.iter().enumerate().map(|(index, item)| self.as_section(key(index), item, "a table"));
+        Diagnostic::gather(tables)
     }
 
     /// The names of all keys, in alphabetical order.
@@ -285,9 +287,12 @@ impl<'d, 't> Section<'d, 't> {
         origin: Origin,
     ) -> Result<Quantity<'d, 't>, Diagnostic> {
         let parameter = self.parameter(name)?;
-        let value = parameter.need("value", "a number")?;
-        let si = parameter.number("value", value)? * parameter.meta(dimension, origin)?;
-        let (doc, at, unit) = (parameter.doc, value.span(), dimension.si());
+        let mut faults = Faults::default();
+        let value = faults.keep(parameter.need("value", "a number"));
+        let number = value.and_then(|value| faults.keep(parameter.number("value", value)));
+        let factor = faults.keep(parameter.meta(dimension, origin));
+        let (value, number, factor) = faults.finish((|| Some((value?, number?, factor?)))())?;
+        let (doc, si, at, unit) = (parameter.doc, number * factor, value.span(), dimension.si());
         let quantity = Quantity { doc, si, key: parameter.path, at, unit };
         quantity.require(si.is_finite(), "a number that is finite in SI")
     }
@@ -300,9 +305,11 @@ impl<'d, 't> Section<'d, 't> {
         bounds: &Bounds,
     ) -> Result<[f64; 3], Diagnostic> {
         let parameter = self.parameter(name)?;
-        let value = parameter.need("value", "an array of three numbers")?;
-        let numbers = parameter.three(value)?;
-        let factor = parameter.meta(dimension, Origin::Known)?;
+        let mut faults = Faults::default();
+        let value = faults.keep(parameter.need("value", "an array of three numbers"));
+        let numbers = value.and_then(|value| faults.keep(parameter.three(value)));
+        let factor = faults.keep(parameter.meta(dimension, Origin::Known));
+        let (value, numbers, factor) = faults.finish((|| Some((value?, numbers?, factor?)))())?;
         let numbers = numbers.map(|number| number * factor);
         all(|key, si| bounds.check(key, si), &parameter.path, &numbers)
             .map_err(|error| Diagnostic::at(parameter.doc.place(&value.span()), error))?;
@@ -312,18 +319,25 @@ impl<'d, 't> Section<'d, 't> {
     /// A parameter of which only the reader of the catalogue knows the dimension: as it is written.
     pub(crate) fn stated(&self, name: &'d str) -> Result<Stated, Diagnostic> {
         let parameter = self.parameter(name)?;
-        let value = parameter.need("value", "a number")?;
-        let stated = Stated {
-            name: name.to_owned(),
-            value: parameter.number("value", value)?,
-            unit: parameter.text("unit")?.to_owned(),
-            source: parameter.source()?.to_owned(),
-            uncertainty: parameter.uncertainty(1.0)?,
-            place: parameter.doc.place(&value.span()),
-            unit_place: parameter.doc.place(&parameter.at_of("unit")),
-        };
-        parameter.finish()?;
-        Ok(stated)
+        let mut faults = Faults::default();
+        let value = faults.keep(parameter.need("value", "a number"));
+        let number = value.and_then(|value| faults.keep(parameter.number("value", value)));
+        let unit = faults.keep(parameter.text("unit"));
+        let source = faults.keep(parameter.source());
+        let uncertainty = faults.keep(parameter.uncertainty(1.0));
+        faults.keep(parameter.finish());
+        let stated = (|| {
+            Some(Stated {
+                name: name.to_owned(),
+                value: number?,
+                unit: unit?.to_owned(),
+                source: source?.to_owned(),
+                uncertainty: uncertainty?,
+                place: parameter.doc.place(&value?.span()),
+                unit_place: parameter.doc.place(&parameter.at_of("unit")),
+            })
+        })();
+        faults.finish(stated)
     }
 
     pub(crate) fn parameter(&self, name: &'d str) -> Result<Section<'d, 't>, Diagnostic> {
@@ -335,9 +349,7 @@ impl<'d, 't> Section<'d, 't> {
         if let Some(parameter) = self.replacing(name, value)? {
             return Ok(parameter);
         }
-        let parameter = self.as_section(self.key(name), value, expected)?;
-        parameter.require_known(&[VALUE, "unit", "source", "uncertainty"])?;
-        Ok(parameter)
+        self.as_section(self.key(name), value, expected)
     }
 
     /// The parameter of the base with another value, where the file has nothing but that; `None` where it has more.
@@ -355,17 +367,26 @@ impl<'d, 't> Section<'d, 't> {
 
     /// Checks unit, source and uncertainty of a parameter's table; notes them; gives the factor to SI.
     pub(crate) fn meta(&self, dimension: Dimension, origin: Origin) -> Result<f64, Diagnostic> {
-        let unit = self.text("unit")?;
-        let factor = dimension.factor(unit).ok_or_else(|| {
-            self.doc.bad(&self.at_of("unit"), &self.key("unit"), dimension.describe(), format!("\"{unit}\""))
-        })?;
+        let mut faults = Faults::default();
+        let unit = faults.keep(self.text("unit"));
+        let factor = unit.and_then(|unit| faults.keep(self.factor(dimension, unit)));
+        let source = faults.keep(self.source());
         let uncertainty = match origin {
-            Origin::Chosen if !self.has("uncertainty") => Uncertainty::Said("chosen".to_owned()),
-            _ => self.uncertainty(factor)?,
+            Origin::Chosen if !self.has("uncertainty") => Some(Uncertainty::Said("chosen".to_owned())),
+            _ => faults.keep(self.uncertainty(factor.unwrap_or(1.0))),
         };
-        self.note(unit, self.source()?, uncertainty);
-        self.finish()?;
+        faults.keep(self.finish());
+        let (unit, factor, source, uncertainty) =
+            faults.finish((|| Some((unit?, factor?, source?, uncertainty?)))())?;
+        self.note(unit, source, uncertainty);
         Ok(factor)
+    }
+
+    /// The factor from `unit` to SI.
+    fn factor(&self, dimension: Dimension, unit: &str) -> Result<f64, Diagnostic> {
+        dimension.factor(unit).ok_or_else(|| {
+            self.doc.bad(&self.at_of("unit"), &self.key("unit"), dimension.describe(), format!("\"{unit}\""))
+        })
     }
 
     /// Remembers where a parameter came from.
@@ -391,7 +412,9 @@ impl<'d, 't> Section<'d, 't> {
 
     /// Returns the uncertainty of a number; a number without a source need not have one.
     fn uncertainty(&self, factor: f64) -> Result<Uncertainty, Diagnostic> {
-        if self.source()? == NO_SOURCE && !self.has("uncertainty") {
+        // A source that is missing or no text is a fault of its own.
+        let needs_none = self.source().ok().is_none_or(|source| source == NO_SOURCE);
+        if !self.has("uncertainty") && needs_none {
             return Ok(Uncertainty::Said("not stated".to_owned()));
         }
         if let Some(lower) = self.inherited("uncertainty") {
@@ -420,7 +443,8 @@ impl<'d, 't> Section<'d, 't> {
                 None => self.wrong_type(&key, value, expected),
             });
         };
-        Ok([self.number("value", x)?, self.number("value", y)?, self.number("value", z)?])
+        let numbers = Diagnostic::gather([x, y, z].map(|number| self.number("value", number)))?;
+        Ok(std::array::from_fn(|axis| numbers[axis]))
     }
 
     /// A finite number, integer or not.

@@ -1,9 +1,9 @@
 //! Schedules: parameters that are lines of times and values.
 
 use crate::reader::{Origin, Section, seen};
-use diagnostics::Diagnostic;
-use diagnostics::parameter::Bounds;
+use diagnostics::parameter::{Bounds, ParameterError};
 use diagnostics::unit::Dimension;
+use diagnostics::{Diagnostic, Faults};
 use std::ops::Range;
 use toml::Spanned;
 use toml::de::DeValue;
@@ -17,7 +17,7 @@ impl<'d, 't> Section<'d, 't> {
     /// the file has one.
     ///
     /// # Errors
-    /// The first point that is not one, with its place.
+    /// The points that are none, each with its place.
     pub fn schedule(
         &self,
         name: &'d str,
@@ -25,33 +25,36 @@ impl<'d, 't> Section<'d, 't> {
         bounds: [&Bounds; 2],
     ) -> Result<Vec<[f64; 2]>, Diagnostic> {
         let parameter = self.parameter(name)?;
-        let value = parameter.need("value", POINTS)?;
-        let factor = parameter.meta(dimension, Origin::Chosen)?;
+        let mut faults = Faults::default();
+        let value = faults.keep(parameter.need("value", POINTS));
+        let factor = faults.keep(parameter.meta(dimension, Origin::Chosen));
+        let (value, factor) = faults.finish(value.zip(factor))?;
         let points = value.get_ref().as_array().map_or(&[][..], |array| array);
         if points.is_empty() {
             return Err(parameter.no_points(&value.span(), "value", value));
         }
+        let (mut faults, mut before_s) = (Faults::default(), f64::NEG_INFINITY);
         let mut schedule: Vec<[f64; 2]> = Vec::with_capacity(points.len());
         for (place, point) in points.iter().enumerate() {
             let key = format!("value.{place}");
-            let [time, target] = parameter.point(&key, point)?;
-            let point_si = [time, target * factor];
-            for ((si, bounds), unit) in point_si.into_iter().zip(bounds).zip(["s", dimension.si()]) {
-                let refused = |error: diagnostics::ParameterError| {
+            let read = parameter.point(&key, point).map(|[time_s, target]| [time_s, target * factor]);
+            let Some([time_s, target]) = faults.keep(read) else { continue };
+            for ((si, bounds), unit) in [time_s, target].into_iter().zip(bounds).zip(["s", dimension.si()]) {
+                let refused = |error: ParameterError| {
                     Diagnostic::at(self.doc.place(&point.span()), error.in_unit(unit))
                 };
-                bounds.check(&parameter.key(&key), si).map_err(refused)?;
+                faults.keep(bounds.check(&parameter.key(&key), si).map_err(refused));
             }
-            let before_s = schedule.last().map_or(f64::NEG_INFINITY, |[before_s, _]| *before_s);
-            if time < before_s {
+            if time_s < before_s {
                 let expected =
                     format!("a time of {before_s} s or later: the points are in the order of time");
-                let found = format!("{time} s");
-                return Err(self.doc.bad(&point.span(), &parameter.key(&key), expected, found));
+                let found = format!("{time_s} s");
+                faults.keep(Err::<(), _>(self.doc.bad(&point.span(), &parameter.key(&key), expected, found)));
             }
-            schedule.push(point_si);
+            before_s = time_s;
+            schedule.push([time_s, target]);
         }
-        Ok(schedule)
+        faults.finish(Some(schedule))
     }
 
     /// The two numbers of a point.

@@ -2,25 +2,28 @@
 
 use super::catalogue::{CATALOGUE, find};
 use super::kind::{Effect, EffectKind, ParameterSpec, Values};
-use diagnostics::{Diagnostic, ParameterError, nearest};
+use diagnostics::{Diagnostic, Faults, ParameterError, nearest};
 use vehicles::{EffectEntry, Stated, Vehicle};
 
 /// The effects of `entries`, in their order.
 ///
 /// # Errors
 /// An effect or parameter that the catalogue does not have, a unit of another dimension, a value out of bounds, a
-/// parameter that is missing, or an effect that stands twice.
+/// parameter that is missing, or an effect that stands twice; all of these faults.
 pub fn resolve<'e>(entries: impl IntoIterator<Item = &'e EffectEntry>) -> Result<Vec<Effect>, Diagnostic> {
+    let (mut faults, mut kinds) = (Faults::default(), Vec::new());
     let mut effects: Vec<Effect> = Vec::new();
     for entry in entries {
-        let kind = kind(entry)?;
-        if effects.iter().any(|effect| effect.kind == kind) {
+        let Some(kind) = faults.keep(kind(entry)) else { continue };
+        if kinds.contains(&kind) {
             let expected = "each effect once, vehicle and scene file together";
-            return Err(bad_name(entry, expected, "it a second time"));
+            faults.keep(Err::<(), _>(bad_name(entry, expected, "it a second time")));
+            continue;
         }
-        effects.push(Effect { kind, values: values(kind, entry)? });
+        kinds.push(kind);
+        effects.extend(faults.keep(values(kind, entry)).map(|values| Effect { kind, values }));
     }
-    Ok(effects)
+    faults.finish(Some(effects))
 }
 
 fn kind(entry: &EffectEntry) -> Result<&'static EffectKind, Diagnostic> {
@@ -42,23 +45,28 @@ fn bad_name(entry: &EffectEntry, expected: &str, found: &str) -> Diagnostic {
 }
 
 fn values(kind: &'static EffectKind, entry: &EffectEntry) -> Result<Values, Diagnostic> {
-    refuse_unknown(kind, entry)?;
-    let mut values = Values::default();
+    let (mut faults, mut values) = (Faults::default(), Values::default());
+    faults.keep(refuse_unknown(kind, entry));
     for (value, spec) in values.iter_mut().zip(kind.parameters) {
-        *value = match entry.parameters.iter().find(|stated| stated.name == spec.name) {
-            Some(stated) => within_bounds(spec, stated, entry)?,
-            None => spec.neutral.ok_or_else(|| missing(spec, entry))?,
+        let read = match entry.parameters.iter().find(|stated| stated.name == spec.name) {
+            Some(stated) => within_bounds(spec, stated, entry),
+            None => spec.neutral.ok_or_else(|| missing(spec, entry)),
         };
+        if let Some(number) = faults.keep(read) {
+            *value = number;
+        }
     }
-    Ok(values)
+    faults.finish(Some(values))
 }
 
 fn refuse_unknown(kind: &'static EffectKind, entry: &EffectEntry) -> Result<(), Diagnostic> {
     let is_known = |stated: &&Stated| kind.parameters.iter().any(|spec| spec.name == stated.name);
-    let Some(unknown) = entry.parameters.iter().find(|stated| !is_known(stated)) else { return Ok(()) };
-    let key = format!("{}.{}", entry.key, unknown.name);
-    let error = ParameterError::unknown(key, kind.parameters.iter().map(|spec| spec.name));
-    Err(Diagnostic::at(unknown.place.clone(), error))
+    let unknown = entry.parameters.iter().filter(|stated| !is_known(stated)).map(|unknown| {
+        let key = format!("{}.{}", entry.key, unknown.name);
+        let error = ParameterError::unknown(key, kind.parameters.iter().map(|spec| spec.name));
+        Err::<(), _>(Diagnostic::at(unknown.place.clone(), error))
+    });
+    Diagnostic::gather(unknown).map(drop)
 }
 
 fn missing(spec: &ParameterSpec, entry: &EffectEntry) -> Diagnostic {
@@ -100,22 +108,24 @@ pub(crate) fn require(
     effects: &[Effect],
     entries: &[EffectEntry],
 ) -> Result<(), Diagnostic> {
-    for (effect, entry) in effects.iter().zip(entries) {
+    let checked = effects.iter().zip(entries).map(|(effect, entry)| {
         if let Some(Err(expected)) = effect.kind.require.map(|require| require(vehicle)) {
             return Err(bad_name(entry, expected, "which does not"));
         }
-        refuse_absent_rotors(vehicle, effect, entry)?;
-    }
-    Ok(())
+        refuse_absent_rotors(vehicle, effect, entry)
+    });
+    Diagnostic::gather(checked).map(drop)
 }
 
 /// Refuses a value for a rotor that the vehicle does not have.
 fn refuse_absent_rotors(vehicle: &Vehicle, effect: &Effect, entry: &EffectEntry) -> Result<(), Diagnostic> {
     let known = effect.kind.parameters_for(vehicle);
     let is_absent = |stated: &&Stated| known.iter().all(|spec| spec.name != stated.name);
-    let Some(absent) = entry.parameters.iter().find(is_absent) else { return Ok(()) };
-    let expected = format!("a rotor of the vehicle, which has {}", vehicle.rotors.len());
-    let error =
-        ParameterError::value(format!("{}.{}", entry.key, absent.name), expected, "one behind the last");
-    Err(Diagnostic::at(absent.place.clone(), error))
+    let absent = entry.parameters.iter().filter(is_absent).map(|absent| {
+        let expected = format!("a rotor of the vehicle, which has {}", vehicle.rotors.len());
+        let key = format!("{}.{}", entry.key, absent.name);
+        let error = ParameterError::value(key, expected, "one behind the last");
+        Err::<(), _>(Diagnostic::at(absent.place.clone(), error))
+    });
+    Diagnostic::gather(absent).map(drop)
 }
